@@ -1,0 +1,1 @@
+//! Placeholder while the walking skeleton is under construction.
