@@ -1,0 +1,100 @@
+//! Checks that need no world. Each returns the sentence a caller needs: what is wrong, where, and what would work.
+
+/// No number of this contract, in metres, radians or metres per second, is anywhere near this large; a larger one would
+/// overflow the single precision of the physics.
+const LARGEST: f64 = 1e6;
+
+/// Every number is finite and of sane size.
+pub fn finite(place: &str, numbers: &[f64]) -> Result<(), String> {
+    match numbers
+        .iter()
+        .find(|number| number.is_nan() || number.abs() > LARGEST)
+    {
+        Some(number) => Err(format!(
+            "{place} holds {number}; every number must be finite, from -1e6 to 1e6"
+        )),
+        None => Ok(()),
+    }
+}
+
+/// The same for a number that may be left out.
+pub fn finite_or_null(place: &str, number: Option<f64>) -> Result<(), String> {
+    finite(place, number.as_slice())
+}
+
+/// A quaternion that has a direction. Its length does not matter: it is normalised before use.
+pub fn quaternion(place: &str, quaternion_wxyz: &[f64; 4]) -> Result<(), String> {
+    finite(place, quaternion_wxyz)?;
+    let norm = quaternion_wxyz
+        .iter()
+        .map(|part| part * part)
+        .sum::<f64>()
+        .sqrt();
+    if norm < 1e-6 {
+        return Err(format!(
+            "{place} has norm {norm}, so it has no direction; give [w, x, y, z] with norm 1, as [1, 0, 0, 0] for no rotation"
+        ));
+    }
+    Ok(())
+}
+
+/// A position and an orientation, each of which may be left out.
+pub fn pose(
+    side: &str,
+    position_m: Option<&[f64; 3]>,
+    quaternion_wxyz: Option<&[f64; 4]>,
+) -> Result<(), String> {
+    if let Some(position_m) = position_m {
+        finite(&format!("{side}_position_m"), position_m)?;
+    }
+    if let Some(quaternion_wxyz) = quaternion_wxyz {
+        quaternion(&format!("{side}_quaternion_wxyz"), quaternion_wxyz)?;
+    }
+    Ok(())
+}
+
+/// At least one control step. The largest number depends on the protocol, which the episode knows.
+pub fn steps(steps: u32) -> Result<(), String> {
+    if steps == 0 {
+        return Err(
+            "steps is 0; give at least 1 control step of 20 ms, as 25 for half a second".into(),
+        );
+    }
+    Ok(())
+}
+
+/// At least one robot, none of them twice.
+pub fn robots<'a>(names: impl Iterator<Item = &'a str>) -> Result<(), String> {
+    let mut seen: Vec<&str> = Vec::new();
+    for name in names {
+        if seen.contains(&name) {
+            return Err(format!(
+                "robot {name:?} is named twice; name each robot at most once"
+            ));
+        }
+        seen.push(name);
+    }
+    if seen.is_empty() {
+        return Err("robots is empty; name at least one robot, as \"A\"".into());
+    }
+    Ok(())
+}
+
+/// At least one pixel. Whether they lie in the picture, the episode knows.
+pub fn pixels(pixels: &[[i64; 2]]) -> Result<(), String> {
+    if pixels.is_empty() {
+        return Err("pixels is empty; give at least one [u, v], as [[160, 120]]".into());
+    }
+    Ok(())
+}
+
+/// Checks every entry of a list of robots, and says which robot a refusal is about.
+pub fn each<T>(
+    entries: &[T],
+    robot: impl Fn(&T) -> &str,
+    check: impl Fn(&T) -> Result<(), String>,
+) -> Result<(), String> {
+    entries.iter().try_for_each(|entry| {
+        check(entry).map_err(|reason| format!("robot {:?}: {reason}", robot(entry)))
+    })
+}

@@ -1,0 +1,95 @@
+//! JSON Schema that strict hosts accept: every field required, nullable instead of optional, no unknown fields, and none
+//! of the keywords (`minimum`, `maxItems`, `format`, ...) that they refuse or warn about. The server checks those itself.
+
+use schemars::{JsonSchema, generate::SchemaSettings};
+use serde_json::{Map, Value, json};
+
+/// Keywords that OpenAI's strict mode or common MCP clients refuse or warn about.
+const DROPPED: &[&str] = &[
+    "$schema",
+    "title",
+    "default",
+    "format",
+    "minimum",
+    "maximum",
+    "exclusiveMinimum",
+    "exclusiveMaximum",
+    "minItems",
+    "maxItems",
+    "minLength",
+    "maxLength",
+];
+
+/// The description of `T` and its schema without it.
+pub fn strict_schema<T: JsonSchema>() -> (String, Value) {
+    let settings = SchemaSettings::draft2020_12().with(|s| s.inline_subschemas = true);
+    let mut schema = settings
+        .into_generator()
+        .into_root_schema_for::<T>()
+        .to_value();
+    make_strict(&mut schema);
+    let description = match schema
+        .as_object_mut()
+        .and_then(|object| object.remove("description"))
+    {
+        Some(Value::String(text)) => text,
+        _ => String::new(),
+    };
+    (description, schema)
+}
+
+/// Adds the handle that stands in the path over REST and among the arguments everywhere else.
+pub fn require_episode_id(schema: &mut Value) {
+    schema["properties"]["episode_id"] =
+        json!({ "type": "string", "description": "The episode, as start_episode returned it." });
+    if let Some(required) = schema["required"].as_array_mut() {
+        required.insert(0, json!("episode_id"));
+    }
+}
+
+fn make_strict(schema: &mut Value) {
+    match schema {
+        Value::Array(items) => items.iter_mut().for_each(make_strict),
+        Value::Object(object) => {
+            DROPPED
+                .iter()
+                .for_each(|keyword| drop(object.remove(*keyword)));
+            unwrap_lines(object);
+            if object.get("type").is_some_and(|kind| kind == "object") {
+                close_object(object);
+            }
+            // A property may be called like a keyword, so names are walked past and only their schemas are made strict.
+            for (keyword, value) in object.iter_mut() {
+                match value {
+                    Value::Object(properties) if keyword == "properties" => {
+                        properties.values_mut().for_each(make_strict);
+                    }
+                    _ => make_strict(value),
+                }
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Doc comments break lines where the source does; a model reads sentences.
+fn unwrap_lines(object: &mut Map<String, Value>) {
+    if let Some(Value::String(text)) = object.get_mut("description") {
+        *text = text
+            .replace("\n\n", "\u{1}")
+            .replace('\n', " ")
+            .replace('\u{1}', "\n\n");
+    }
+}
+
+fn close_object(object: &mut Map<String, Value>) {
+    let properties = object.entry("properties").or_insert_with(|| json!({}));
+    let names: Vec<Value> = properties
+        .as_object()
+        .into_iter()
+        .flatten()
+        .map(|(name, _)| json!(name))
+        .collect();
+    object.insert("required".into(), names.into());
+    object.insert("additionalProperties".into(), Value::Bool(false));
+}

@@ -1,0 +1,81 @@
+//! One tool: its name, the text a model reads, and how its arguments are read from JSON.
+
+use schemars::JsonSchema;
+use serde::{Serialize, de::DeserializeOwned};
+use serde_json::{Value, json};
+
+use crate::{SpecError, schema};
+
+/// The arguments of one tool. The type's doc comment is the tool's description.
+pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
+    /// The name a caller uses.
+    const NAME: &'static str;
+    /// Whether the call leaves the world exactly as it was and costs no steps.
+    const READ_ONLY: bool;
+    /// Whether the call acts on an episode, so that specifications without a path carry `episode_id`.
+    const ON_EPISODE: bool = true;
+
+    /// Arguments that work, shown to callers whose own did not.
+    fn example() -> Self;
+
+    /// Checks what needs no world: lengths, finite numbers, quaternions that have a direction. The text says what
+    /// would work.
+    fn validate(&self) -> Result<(), String> {
+        Ok(())
+    }
+}
+
+/// Reads and checks the arguments of `T`. `null` stands for no arguments.
+pub fn parse_args<T: Tool>(args: Value) -> Result<T, SpecError> {
+    let args = if args.is_null() { json!({}) } else { args };
+    let parsed: T = serde_path_to_error::deserialize(args).map_err(|error| {
+        let path = error.path().to_string();
+        SpecError::Malformed {
+            tool: T::NAME,
+            place: if path == "." {
+                String::new()
+            } else {
+                format!("{path}: ")
+            },
+            reason: error.into_inner().to_string(),
+            example: json!(T::example()).to_string(),
+        }
+    })?;
+    parsed.validate().map_err(|reason| SpecError::Invalid {
+        tool: T::NAME,
+        reason,
+    })?;
+    Ok(parsed)
+}
+
+/// A tool as a policy's host needs it: for OpenAI, Anthropic and MCP alike.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ToolSpec {
+    /// The name a caller uses.
+    pub name: &'static str,
+    /// What the tool does, for the model.
+    pub description: String,
+    /// Strict JSON Schema of the arguments, with `episode_id` where the tool acts on an episode.
+    pub input_schema: Value,
+    /// Whether the call leaves the world as it was.
+    pub read_only: bool,
+    /// Whether the tool acts on an episode that `start_episode` made.
+    pub on_episode: bool,
+}
+
+impl ToolSpec {
+    /// The specification of `T`.
+    pub fn of<T: Tool>() -> ToolSpec {
+        let (description, mut input_schema) = schema::strict_schema::<T>();
+        if T::ON_EPISODE {
+            schema::require_episode_id(&mut input_schema);
+        }
+        ToolSpec {
+            name: T::NAME,
+            description,
+            input_schema,
+            read_only: T::READ_ONLY,
+            on_episode: T::ON_EPISODE,
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! `check_reach`: whether the arms could get to a pose, without moving.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{Tool, checks};
+
+/// Ask whether a robot's wrists could reach poses from where it stands, using both arms and the waist. Nothing moves and
+/// no steps are spent. Poses are of the wrist links (`left_wrist_yaw_link`, `right_wrist_yaw_link`) in the robot's pelvis
+/// frame: x forward, y left, z up, metres.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CheckReach {
+    /// The robot, as "A".
+    pub robot: String,
+    /// Left wrist position [x, y, z] in metres, as [0.30, 0.20, 0.10]. Null: its present target.
+    pub left_position_m: Option<[f64; 3]>,
+    /// Left wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null: its present target.
+    pub left_quaternion_wxyz: Option<[f64; 4]>,
+    /// Right wrist position [x, y, z] in metres, as [0.30, -0.20, 0.10]. Null: its present target.
+    pub right_position_m: Option<[f64; 3]>,
+    /// Right wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null: its present target.
+    pub right_quaternion_wxyz: Option<[f64; 4]>,
+}
+
+impl Tool for CheckReach {
+    const NAME: &'static str = "check_reach";
+    const READ_ONLY: bool = true;
+
+    fn example() -> Self {
+        CheckReach {
+            robot: "A".into(),
+            left_position_m: None,
+            left_quaternion_wxyz: None,
+            right_position_m: Some([0.30, -0.20, 0.10]),
+            right_quaternion_wxyz: Some([1.0, 0.0, 0.0, 0.0]),
+        }
+    }
+
+    fn validate(&self) -> Result<(), String> {
+        checks::pose(
+            "left",
+            self.left_position_m.as_ref(),
+            self.left_quaternion_wxyz.as_ref(),
+        )?;
+        checks::pose(
+            "right",
+            self.right_position_m.as_ref(),
+            self.right_quaternion_wxyz.as_ref(),
+        )
+    }
+}
+
+/// The reply to `check_reach`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ReachReply {
+    /// The robot that was asked about.
+    pub robot: String,
+    /// Whether both wrists reach their poses at once.
+    pub reachable: bool,
+    /// How near the left wrist comes.
+    pub left: HandReach,
+    /// How near the right wrist comes.
+    pub right: HandReach,
+    /// Joints that would rest at a limit, by name: what keeps the wrists from coming nearer.
+    pub joints_at_limit: Vec<String>,
+}
+
+/// How near one wrist comes to a pose.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct HandReach {
+    /// Whether it comes within the tolerance of 5 mm and 0.05 rad.
+    pub reachable: bool,
+    /// Distance left, in metres.
+    pub position_error_m: f64,
+    /// Angle left, in radians.
+    pub orientation_error_rad: f64,
+}

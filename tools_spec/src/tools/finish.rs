@@ -1,0 +1,108 @@
+//! `finish`: ends the episode and gives its result.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize, de::Error as _};
+use serde_json::{Map, Value};
+
+use crate::Tool;
+
+/// End the episode and get its result. Call it when the task is done or cannot be done any more. After that only
+/// get_status and finish answer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Finish {}
+
+impl Tool for Finish {
+    const NAME: &'static str = "finish";
+    const READ_ONLY: bool = false;
+
+    fn example() -> Self {
+        Finish {}
+    }
+}
+
+/// Why an episode has ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum EndReason {
+    /// The last phase was reached.
+    TaskComplete,
+    /// The steps ran out.
+    StepBudgetExhausted,
+    /// The policy's wall clock ran out.
+    WallClockExhausted,
+    /// `finish` was called, or the episode was deleted.
+    Finished,
+}
+
+/// The reply to `finish`, and the content of `result.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ResultReply {
+    /// The task's id.
+    pub task: String,
+    /// The seed.
+    pub seed: u32,
+    /// The rules that were in force.
+    pub protocol: crate::Protocol,
+    /// When each phase was reached, in simulated seconds; null where it was not.
+    pub phases: PhaseTimes,
+    /// Why the episode ended.
+    pub ended: EndReason,
+    /// Control steps of 20 ms, the initial hold included.
+    pub env_steps: u32,
+    /// Calls that were answered, reads included.
+    pub tool_calls: u32,
+    /// Robots that fell.
+    pub falls: u32,
+    /// Simulated seconds per second that the physics took.
+    pub realtime_factor: f64,
+    /// Hash of the whole physical state at the end, 16 hexadecimal digits.
+    pub state_hash: String,
+}
+
+/// Seconds by phase id, in the task's order; JSON object from `p1`, `p2`, ... to seconds or null.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PhaseTimes(pub Vec<(String, Option<f64>)>);
+
+impl PhaseTimes {
+    /// When phase `id` was reached.
+    pub fn reached_s(&self, id: &str) -> Option<f64> {
+        self.0
+            .iter()
+            .find(|(phase, _)| phase == id)
+            .and_then(|(_, time_s)| *time_s)
+    }
+}
+
+impl Serialize for PhaseTimes {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(phase, time_s)| (phase, time_s)))
+    }
+}
+
+impl<'de> Deserialize<'de> for PhaseTimes {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let object = Map::<String, Value>::deserialize(deserializer)?;
+        let time = |(phase, value): (String, Value)| match (value.as_f64(), value.is_null()) {
+            (None, false) => Err(D::Error::custom(format!(
+                "phase {phase} holds {value}; expected seconds or null"
+            ))),
+            (time_s, _) => Ok((phase, time_s)),
+        };
+        object
+            .into_iter()
+            .map(time)
+            .collect::<Result<_, _>>()
+            .map(PhaseTimes)
+    }
+}
+
+impl JsonSchema for PhaseTimes {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "PhaseTimes".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({ "type": "object", "additionalProperties": { "type": ["number", "null"] } })
+    }
+}

@@ -1,0 +1,62 @@
+//! `get_robot_state`: proprioception of one robot.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{JointValues, Pose, Tool};
+
+/// Read one robot's proprioception: 43 joint angles, velocities and torques by name, both wrist poses in the pelvis
+/// frame, which way is down, and the base command in force. Costs no steps; physics stands still.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GetRobotState {
+    /// The robot, as "A".
+    pub robot: String,
+}
+
+impl Tool for GetRobotState {
+    const NAME: &'static str = "get_robot_state";
+    const READ_ONLY: bool = true;
+
+    fn example() -> Self {
+        GetRobotState { robot: "A".into() }
+    }
+}
+
+/// The reply to `get_robot_state`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RobotState {
+    /// The robot, as "A".
+    pub robot: String,
+    /// Simulated seconds since the episode began.
+    pub time_s: f64,
+    /// Joint angles in radians.
+    pub joint_positions_rad: JointValues,
+    /// Joint velocities in radians per second.
+    pub joint_velocities_rad_s: JointValues,
+    /// Joint torques in newton metres, as the drives apply them.
+    pub joint_torques_n_m: JointValues,
+    /// Measured pose of the left wrist (`left_wrist_yaw_link`) in the pelvis frame (x forward, y left, z up).
+    pub left_wrist: Pose,
+    /// Measured pose of the right wrist (`right_wrist_yaw_link`) in the pelvis frame.
+    pub right_wrist: Pose,
+    /// The direction of gravity in the pelvis frame, length 1: [0, 0, -1] when upright.
+    pub gravity_in_pelvis: [f64; 3],
+    /// What locomotion is doing.
+    pub base_command: BaseCommand,
+    /// Whether the robot has fallen.
+    pub fallen: bool,
+}
+
+/// The base command in force. Velocities are zero between commands; the height persists.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct BaseCommand {
+    /// Forward velocity in metres per second.
+    pub vx_m_s: f64,
+    /// Velocity to the left in metres per second.
+    pub vy_m_s: f64,
+    /// Turning rate in radians per second, counter-clockwise seen from above.
+    pub yaw_rate_rad_s: f64,
+    /// Height of the pelvis above the floor in metres.
+    pub pelvis_height_m: f64,
+}

@@ -1,0 +1,76 @@
+//! `list_tasks`: what can be started.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{Protocol, Tool, tools::start_episode::Instruction};
+
+/// List the tasks that start_episode can start: their instructions, the phases they are scored by, and the budgets of
+/// each protocol.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ListTasks {}
+
+impl Tool for ListTasks {
+    const NAME: &'static str = "list_tasks";
+    const READ_ONLY: bool = true;
+    const ON_EPISODE: bool = false;
+
+    fn example() -> Self {
+        ListTasks {}
+    }
+}
+
+/// The reply to `list_tasks`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TaskList {
+    /// Every task.
+    pub tasks: Vec<TaskInfo>,
+}
+
+/// One task.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TaskInfo {
+    /// What start_episode calls it, as `handover`.
+    pub id: String,
+    /// What has to be done, for whoever directs all robots.
+    pub instruction: String,
+    /// What each robot has to do, for policies that direct one.
+    pub robots: Vec<Instruction>,
+    /// The phases, in the order they have to be reached.
+    pub phases: Vec<PhaseInfo>,
+    /// The protocols and their budgets for this task.
+    pub protocols: Vec<ProtocolInfo>,
+}
+
+/// One phase of a task.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PhaseInfo {
+    /// `p1`, `p2`, ...
+    pub id: String,
+    /// What the phase is called, as `transfer`.
+    pub name: String,
+    /// When the phase counts as reached.
+    pub description: String,
+    /// Whether more than one robot has to work on it.
+    pub collaborative: bool,
+}
+
+/// The budgets of one protocol.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ProtocolInfo {
+    /// Which protocol.
+    pub protocol: Protocol,
+    /// The most control steps of 20 ms that one command may ask for.
+    pub steps_per_command: u32,
+    /// Control steps of an episode, the initial hold included.
+    pub episode_steps: u32,
+    /// Control steps that start_episode spends holding still.
+    pub initial_hold_steps: u32,
+    /// Seconds that the policy may spend between calls; null for no limit.
+    pub wall_clock_s: Option<f64>,
+    /// The seeds that results are reported on: the first.
+    pub first_seed: u32,
+    /// The seeds that results are reported on: the last.
+    pub last_seed: u32,
+}

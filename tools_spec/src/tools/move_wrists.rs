@@ -1,0 +1,121 @@
+//! `move_wrists`: the command of agents that think in poses.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{Tool, checks};
+
+/// Move wrists, fingers and base of one or more robots for a number of control steps of 20 ms. Inverse kinematics turns
+/// wrist poses into arm and waist joints. Robots that are not named hold still, and a null field keeps what was asked
+/// for before. The reply says for each hand how far it is from its target: if it is still moving, repeat the command
+/// or call wait; if it has stopped short, joints_at_limit says why.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MoveWrists {
+    /// Control steps of 20 ms: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark protocol.
+    pub steps: u32,
+    /// One entry per robot that is to move; each robot at most once.
+    pub robots: Vec<WristMove>,
+}
+
+/// What one robot is to do. Wrist poses are of the links `left_wrist_yaw_link` and `right_wrist_yaw_link` in the robot's
+/// own pelvis frame: x forward, y left, z up, metres. They are held in that frame while the robot walks.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WristMove {
+    /// The robot, as "A".
+    pub robot: String,
+    /// Left wrist position [x, y, z] in metres, as [0.30, 0.20, 0.10]. Null keeps the target.
+    pub left_position_m: Option<[f64; 3]>,
+    /// Left wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null keeps the target.
+    pub left_quaternion_wxyz: Option<[f64; 4]>,
+    /// Right wrist position [x, y, z] in metres, as [0.30, -0.20, 0.10]. Null keeps the target.
+    pub right_position_m: Option<[f64; 3]>,
+    /// Right wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null keeps the target.
+    pub right_quaternion_wxyz: Option<[f64; 4]>,
+    /// Left finger joint angles in radians: [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1]. Closed
+    /// around a bottle: [0, 0.75, 0.8, -1.1, -1.3, -1.1, -1.3]; open: all 0. Null keeps the target.
+    pub left_fingers_rad: Option<[f64; 7]>,
+    /// Right finger joint angles in radians: [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1]. Closed
+    /// around a bottle: [0, -0.75, -0.8, 1.1, 1.3, 1.1, 1.3]; open: all 0. Null keeps the target.
+    pub right_fingers_rad: Option<[f64; 7]>,
+    /// Forward velocity in metres per second during this command. Null: 0.
+    pub vx_m_s: Option<f64>,
+    /// Velocity to the left in metres per second during this command. Null: 0.
+    pub vy_m_s: Option<f64>,
+    /// Turning rate in radians per second during this command, counter-clockwise seen from above. Null: 0.
+    pub yaw_rate_rad_s: Option<f64>,
+    /// Height of the pelvis above the floor in metres. Null keeps the target.
+    pub pelvis_height_m: Option<f64>,
+}
+
+impl WristMove {
+    /// A move of `robot` that keeps every target and does not walk.
+    pub fn hold(robot: &str) -> WristMove {
+        WristMove {
+            robot: robot.into(),
+            left_position_m: None,
+            left_quaternion_wxyz: None,
+            right_position_m: None,
+            right_quaternion_wxyz: None,
+            left_fingers_rad: None,
+            right_fingers_rad: None,
+            vx_m_s: None,
+            vy_m_s: None,
+            yaw_rate_rad_s: None,
+            pelvis_height_m: None,
+        }
+    }
+
+    fn validate(&self) -> Result<(), String> {
+        checks::pose(
+            "left",
+            self.left_position_m.as_ref(),
+            self.left_quaternion_wxyz.as_ref(),
+        )?;
+        checks::pose(
+            "right",
+            self.right_position_m.as_ref(),
+            self.right_quaternion_wxyz.as_ref(),
+        )?;
+        checks::finite(
+            "left_fingers_rad",
+            self.left_fingers_rad
+                .as_ref()
+                .map_or(&[], |fingers| &fingers[..]),
+        )?;
+        checks::finite(
+            "right_fingers_rad",
+            self.right_fingers_rad
+                .as_ref()
+                .map_or(&[], |fingers| &fingers[..]),
+        )?;
+        checks::finite_or_null("vx_m_s", self.vx_m_s)?;
+        checks::finite_or_null("vy_m_s", self.vy_m_s)?;
+        checks::finite_or_null("yaw_rate_rad_s", self.yaw_rate_rad_s)?;
+        checks::finite_or_null("pelvis_height_m", self.pelvis_height_m)
+    }
+}
+
+impl Tool for MoveWrists {
+    const NAME: &'static str = "move_wrists";
+    const READ_ONLY: bool = false;
+
+    fn example() -> Self {
+        let right = WristMove {
+            right_position_m: Some([0.30, -0.20, 0.10]),
+            right_quaternion_wxyz: Some([1.0, 0.0, 0.0, 0.0]),
+            ..WristMove::hold("A")
+        };
+        MoveWrists {
+            steps: 25,
+            robots: vec![right],
+        }
+    }
+
+    fn validate(&self) -> Result<(), String> {
+        checks::steps(self.steps)?;
+        checks::robots(self.robots.iter().map(|entry| entry.robot.as_str()))?;
+        checks::each(&self.robots, |entry| &entry.robot, WristMove::validate)
+    }
+}

@@ -1,0 +1,80 @@
+//! `observe`: what the robots see and feel.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{Png, Pose, RobotState, Tool, checks};
+
+/// Look through the robots' own head cameras and read their proprioception. Returns for each robot the same numbers as
+/// get_robot_state, the calibration of its camera, and one PNG image of 320x240 pixels. Costs no steps; physics stands
+/// still.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Observe {
+    /// The robots to look through, as ["A", "B"]. Null: all of them.
+    pub robots: Option<Vec<String>>,
+}
+
+impl Tool for Observe {
+    const NAME: &'static str = "observe";
+    const READ_ONLY: bool = true;
+
+    fn example() -> Self {
+        Observe {
+            robots: Some(vec!["A".into()]),
+        }
+    }
+
+    fn validate(&self) -> Result<(), String> {
+        match &self.robots {
+            Some(robots) => checks::robots(robots.iter().map(String::as_str)),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The reply to `observe`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Observation {
+    /// Simulated seconds since the episode began.
+    pub time_s: f64,
+    /// Proprioception, one entry per robot looked through.
+    pub states: Vec<RobotState>,
+    /// Camera calibration, one entry per robot looked through.
+    pub cameras: Vec<CameraCalibration>,
+    /// The pictures, in the order of `cameras`. Over MCP they follow as image blocks and are left out here.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub images: Vec<CameraImage>,
+}
+
+/// A pinhole camera without distortion: a point (x, y, z) in the camera's frame is seen at u = fx x / z + cx,
+/// v = fy y / z + cy. Axes: x right, y down, z forward (OpenCV's). Pixel (0, 0) is the top left one and its centre lies
+/// at u = v = 0.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CameraCalibration {
+    /// The robot whose head carries it.
+    pub robot: String,
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Focal length across, in pixels.
+    pub fx: f64,
+    /// Focal length down, in pixels.
+    pub fy: f64,
+    /// Column of the optical axis, in pixels.
+    pub cx: f64,
+    /// Row of the optical axis, in pixels.
+    pub cy: f64,
+    /// Pose of the camera's frame in the robot's pelvis frame (x forward, y left, z up).
+    pub camera_in_pelvis: Pose,
+}
+
+/// One picture.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CameraImage {
+    /// The robot whose head camera took it.
+    pub robot: String,
+    /// The picture.
+    pub png_base64: Png,
+}

@@ -1,0 +1,111 @@
+//! `send_joint_chunk`: the command of learned policies, one row of joint targets per control step.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{Tool, checks};
+
+/// Numbers in a row: 31 joint targets and the base command.
+pub const ACTION_ROW_LEN: usize = 35;
+
+/// The blocks of a row, in order, with the number of columns of each. Within a hand: thumb_0, thumb_1, thumb_2, middle_0,
+/// middle_1, index_0, index_1.
+const ROW_BLOCKS: [(&str, usize); 9] = [
+    ("left_arm", 7),
+    ("right_arm", 7),
+    ("left_hand", 7),
+    ("right_hand", 7),
+    ("waist", 3),
+    ("vx_m_s", 1),
+    ("vy_m_s", 1),
+    ("yaw_rate_rad_s", 1),
+    ("pelvis_height_m", 1),
+];
+
+/// The layout of a row in one line, as `left_arm 7, right_arm 7, ...`.
+pub fn action_row_layout() -> String {
+    ROW_BLOCKS
+        .map(|(block, columns)| format!("{block} {columns}"))
+        .join(", ")
+}
+
+/// Send joint targets for one or more robots, one row per control step of 20 ms. Rows of all named robots run side by
+/// side, so each robot needs the same number of rows: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark
+/// protocol. Robots that are not named hold still. Targets beyond a joint's limits are clamped and reported.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SendJointChunk {
+    /// One entry per robot that is to move; each robot at most once.
+    pub robots: Vec<JointChunk>,
+}
+
+/// The rows of one robot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JointChunk {
+    /// The robot, as "A".
+    pub robot: String,
+    /// Rows of 35 numbers: joint targets in radians for left_arm 7, right_arm 7, left_hand 7, right_hand 7, waist 3 (yaw,
+    /// roll, pitch), then vx in m/s, vy in m/s, yaw rate in rad/s and pelvis height in m. An arm is shoulder_pitch,
+    /// shoulder_roll, shoulder_yaw, elbow, wrist_roll, wrist_pitch, wrist_yaw; a hand is thumb_0, thumb_1, thumb_2,
+    /// middle_0, middle_1, index_0, index_1.
+    pub rows: Vec<Vec<f64>>,
+}
+
+impl JointChunk {
+    fn validate(&self) -> Result<(), String> {
+        for (index, row) in self.rows.iter().enumerate() {
+            if row.len() != ACTION_ROW_LEN {
+                return Err(format!(
+                    "row {index} holds {} numbers; give {ACTION_ROW_LEN}: {}",
+                    row.len(),
+                    action_row_layout()
+                ));
+            }
+            checks::finite(&format!("row {index}"), row)?;
+        }
+        Ok(())
+    }
+}
+
+impl Tool for SendJointChunk {
+    const NAME: &'static str = "send_joint_chunk";
+    const READ_ONLY: bool = false;
+
+    fn example() -> Self {
+        let mut row = vec![0.0; ACTION_ROW_LEN];
+        row[ACTION_ROW_LEN - 1] = 0.75;
+        SendJointChunk {
+            robots: vec![JointChunk {
+                robot: "A".into(),
+                rows: vec![row],
+            }],
+        }
+    }
+
+    fn validate(&self) -> Result<(), String> {
+        checks::robots(self.robots.iter().map(|entry| entry.robot.as_str()))?;
+        checks::each(&self.robots, |entry| &entry.robot, JointChunk::validate)?;
+        let first = &self.robots[0];
+        if first.rows.is_empty() {
+            return Err(format!(
+                "robot {:?} has no rows; give at least 1, one per control step of 20 ms",
+                first.robot
+            ));
+        }
+        match self
+            .robots
+            .iter()
+            .find(|entry| entry.rows.len() != first.rows.len())
+        {
+            Some(other) => Err(format!(
+                "robot {:?} has {} rows and robot {:?} has {}; give every robot the same number of rows",
+                first.robot,
+                first.rows.len(),
+                other.robot,
+                other.rows.len()
+            )),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! `start_episode`: makes a world and says what stands in it.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{Protocol, StatusReply, Tool};
+
+/// Start an episode of a task. Returns episode_id, which every other tool needs, the instruction, the robots with their
+/// joints and limits, and the budget. The same task, seed and commands always give the same episode. Physics stands
+/// still between calls.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StartEpisode {
+    /// The id of a task from list_tasks, as "handover".
+    pub task: String,
+    /// Decides where the objects stand: 0 to 4294967295. Results are reported on the seeds that list_tasks names.
+    pub seed: u32,
+    /// The rules: "agentic" for agents that think between commands, "benchmark" for learned policies. Null: "agentic".
+    pub protocol: Option<Protocol>,
+}
+
+impl Tool for StartEpisode {
+    const NAME: &'static str = "start_episode";
+    const READ_ONLY: bool = false;
+    const ON_EPISODE: bool = false;
+
+    fn example() -> Self {
+        StartEpisode {
+            task: "handover".into(),
+            seed: 0,
+            protocol: Some(Protocol::Agentic),
+        }
+    }
+}
+
+/// The reply to `start_episode`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct StartReply {
+    /// The handle that every other tool needs.
+    pub episode_id: String,
+    /// What the policy has to know.
+    #[serde(flatten)]
+    pub briefing: Briefing,
+}
+
+/// What a policy is told when an episode begins.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Briefing {
+    /// What has to be done.
+    pub instruction: String,
+    /// What each robot has to do.
+    pub instructions: Vec<Instruction>,
+    /// The robots and what can be asked of them.
+    pub robots: Vec<RobotInfo>,
+    /// The columns of a row of send_joint_chunk.
+    pub action_row: Vec<String>,
+    /// Where the episode stands after the initial hold.
+    pub status: StatusReply,
+}
+
+/// What one robot has to do.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Instruction {
+    /// The robot, as "A".
+    pub robot: String,
+    /// Its part of the task.
+    pub instruction: String,
+}
+
+/// One robot: its joints in published order, and what its locomotion accepts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RobotInfo {
+    /// The robot, as "A".
+    pub robot: String,
+    /// Its joints.
+    pub joints: Vec<JointInfo>,
+    /// Forward velocity.
+    pub vx_m_s: Range,
+    /// Velocity to the left.
+    pub vy_m_s: Range,
+    /// Turning rate, counter-clockwise seen from above.
+    pub yaw_rate_rad_s: Range,
+    /// Height of the pelvis above the floor.
+    pub pelvis_height_m: Range,
+}
+
+/// One joint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct JointInfo {
+    /// Unitree's name, as `left_elbow_joint`.
+    pub name: String,
+    /// Lower limit in radians.
+    pub lower_rad: f64,
+    /// Upper limit in radians.
+    pub upper_rad: f64,
+}
+
+/// From `min` to `max`, both accepted, in the unit of the field that holds it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Range {
+    /// The smallest value accepted.
+    pub min: f64,
+    /// The largest value accepted.
+    pub max: f64,
+}

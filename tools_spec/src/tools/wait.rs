@@ -1,0 +1,28 @@
+//! `wait`: lets time pass.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{Tool, checks};
+
+/// Let all robots hold their targets for a number of control steps of 20 ms: for a hand to arrive, for an object to come to
+/// rest.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Wait {
+    /// Control steps of 20 ms: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark protocol.
+    pub steps: u32,
+}
+
+impl Tool for Wait {
+    const NAME: &'static str = "wait";
+    const READ_ONLY: bool = false;
+
+    fn example() -> Self {
+        Wait { steps: 25 }
+    }
+
+    fn validate(&self) -> Result<(), String> {
+        checks::steps(self.steps)
+    }
+}

@@ -1,0 +1,67 @@
+//! `walk`: moves the base while the arms hold.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{Tool, checks};
+
+/// Walk, turn or change the pelvis height of one or more robots for a number of control steps of 20 ms, while their arms
+/// and hands hold. Velocities are in the robot's own frame and apply during this command only; the height persists.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Walk {
+    /// Control steps of 20 ms: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark protocol.
+    pub steps: u32,
+    /// One entry per robot that is to move; each robot at most once. Robots that are not named hold still.
+    pub robots: Vec<WalkMove>,
+}
+
+/// What one robot's base is to do. start_episode names the range of each field; values beyond it are clamped and reported.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WalkMove {
+    /// The robot, as "A".
+    pub robot: String,
+    /// Forward velocity in metres per second, as 0.3.
+    pub vx_m_s: f64,
+    /// Velocity to the left in metres per second.
+    pub vy_m_s: f64,
+    /// Turning rate in radians per second, counter-clockwise seen from above.
+    pub yaw_rate_rad_s: f64,
+    /// Height of the pelvis above the floor in metres. Null keeps the target.
+    pub pelvis_height_m: Option<f64>,
+}
+
+impl WalkMove {
+    fn validate(&self) -> Result<(), String> {
+        checks::finite("vx_m_s", &[self.vx_m_s])?;
+        checks::finite("vy_m_s", &[self.vy_m_s])?;
+        checks::finite("yaw_rate_rad_s", &[self.yaw_rate_rad_s])?;
+        checks::finite_or_null("pelvis_height_m", self.pelvis_height_m)
+    }
+}
+
+impl Tool for Walk {
+    const NAME: &'static str = "walk";
+    const READ_ONLY: bool = false;
+
+    fn example() -> Self {
+        let forward = WalkMove {
+            robot: "A".into(),
+            vx_m_s: 0.3,
+            vy_m_s: 0.0,
+            yaw_rate_rad_s: 0.0,
+            pelvis_height_m: None,
+        };
+        Walk {
+            steps: 25,
+            robots: vec![forward],
+        }
+    }
+
+    fn validate(&self) -> Result<(), String> {
+        checks::steps(self.steps)?;
+        checks::robots(self.robots.iter().map(|entry| entry.robot.as_str()))?;
+        checks::each(&self.robots, |entry| &entry.robot, WalkMove::validate)
+    }
+}
