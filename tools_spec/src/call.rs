@@ -5,8 +5,8 @@ use serde_json::Value;
 
 use crate::{
     CheckReach, CommandReply, DepthReply, Finish, GetRobotState, GetStatus, ListTasks, MoveWrists,
-    Observation, Observe, QueryDepth, ReachReply, ResultReply, RobotState, SendJointChunk,
-    SpecError, StartEpisode, StatusReply, Tool, ToolSpec, Wait, Walk, parse_args,
+    Observation, Observe, QueryDepth, ReachReply, ResultReply, RobotState, SendJointChunk, SpecError,
+    StartEpisode, StatusReply, Tool, ToolSpec, Wait, Walk, parse_args,
 };
 
 /// Every tool, in the order a policy meets them.
@@ -44,10 +44,7 @@ pub const EPISODE_TOOLS: &[&str] = &[
 /// A call on an episode, read and checked as far as that needs no world.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
-#[expect(
-    missing_docs,
-    reason = "each variant is the tool of its name, described on its type"
-)]
+#[expect(missing_docs, reason = "each variant is the tool of its name, described on its type")]
 pub enum ToolCall {
     Observe(Observe),
     GetRobotState(GetRobotState),
@@ -75,10 +72,7 @@ impl ToolCall {
             Wait::NAME => parse_args(args).map(ToolCall::Wait),
             GetStatus::NAME => parse_args(args).map(ToolCall::GetStatus),
             Finish::NAME => parse_args(args).map(ToolCall::Finish),
-            _ => Err(SpecError::UnknownTool {
-                name: name.into(),
-                have: EPISODE_TOOLS.to_vec(),
-            }),
+            _ => Err(SpecError::UnknownTool { name: name.into(), have: EPISODE_TOOLS.to_vec() }),
         }
     }
 
@@ -112,10 +106,7 @@ impl ToolCall {
             ToolCall::GetStatus(args) => args.validate(),
             ToolCall::Finish(args) => args.validate(),
         };
-        checked.map_err(|reason| SpecError::Invalid {
-            tool: self.name(),
-            reason,
-        })
+        checked.map_err(|reason| SpecError::Invalid { tool: self.name(), reason })
     }
 }
 

@@ -6,13 +6,8 @@ const LARGEST: f64 = 1e6;
 
 /// Every number is finite and of sane size.
 pub fn finite(place: &str, numbers: &[f64]) -> Result<(), String> {
-    match numbers
-        .iter()
-        .find(|number| number.is_nan() || number.abs() > LARGEST)
-    {
-        Some(number) => Err(format!(
-            "{place} holds {number}; every number must be finite, from -1e6 to 1e6"
-        )),
+    match numbers.iter().find(|number| number.is_nan() || number.abs() > LARGEST) {
+        Some(number) => Err(format!("{place} holds {number}; every number must be finite, from -1e6 to 1e6")),
         None => Ok(()),
     }
 }
@@ -25,11 +20,7 @@ pub fn finite_or_null(place: &str, number: Option<f64>) -> Result<(), String> {
 /// A quaternion that has a direction. Its length does not matter: it is normalised before use.
 pub fn quaternion(place: &str, quaternion_wxyz: &[f64; 4]) -> Result<(), String> {
     finite(place, quaternion_wxyz)?;
-    let norm = quaternion_wxyz
-        .iter()
-        .map(|part| part * part)
-        .sum::<f64>()
-        .sqrt();
+    let norm = quaternion_wxyz.iter().map(|part| part * part).sum::<f64>().sqrt();
     if norm < 1e-6 {
         return Err(format!(
             "{place} has norm {norm}, so it has no direction; give [w, x, y, z] with norm 1, as [1, 0, 0, 0] for no rotation"
@@ -56,9 +47,7 @@ pub fn pose(
 /// At least one control step. The largest number depends on the protocol, which the episode knows.
 pub fn steps(steps: u32) -> Result<(), String> {
     if steps == 0 {
-        return Err(
-            "steps is 0; give at least 1 control step of 20 ms, as 25 for half a second".into(),
-        );
+        return Err("steps is 0; give at least 1 control step of 20 ms, as 25 for half a second".into());
     }
     Ok(())
 }
@@ -68,9 +57,7 @@ pub fn robots<'a>(names: impl Iterator<Item = &'a str>) -> Result<(), String> {
     let mut seen: Vec<&str> = Vec::new();
     for name in names {
         if seen.contains(&name) {
-            return Err(format!(
-                "robot {name:?} is named twice; name each robot at most once"
-            ));
+            return Err(format!("robot {name:?} is named twice; name each robot at most once"));
         }
         seen.push(name);
     }
@@ -94,7 +81,7 @@ pub fn each<T>(
     robot: impl Fn(&T) -> &str,
     check: impl Fn(&T) -> Result<(), String>,
 ) -> Result<(), String> {
-    entries.iter().try_for_each(|entry| {
-        check(entry).map_err(|reason| format!("robot {:?}: {reason}", robot(entry)))
-    })
+    entries
+        .iter()
+        .try_for_each(|entry| check(entry).map_err(|reason| format!("robot {:?}: {reason}", robot(entry))))
 }

@@ -129,10 +129,7 @@ pub struct JointValues(pub Vec<(String, f64)>);
 impl JointValues {
     /// The value of one joint.
     pub fn get(&self, joint: &str) -> Option<f64> {
-        self.0
-            .iter()
-            .find(|(name, _)| name == joint)
-            .map(|(_, value)| *value)
+        self.0.iter().find(|(name, _)| name == joint).map(|(_, value)| *value)
     }
 }
 
@@ -147,15 +144,9 @@ impl<'de> Deserialize<'de> for JointValues {
         let object = Map::<String, Value>::deserialize(deserializer)?;
         let number = |(name, value): (String, Value)| match value.as_f64() {
             Some(value) => Ok((name, value)),
-            None => Err(D::Error::custom(format!(
-                "joint {name} holds {value}; expected a number"
-            ))),
+            None => Err(D::Error::custom(format!("joint {name} holds {value}; expected a number"))),
         };
-        object
-            .into_iter()
-            .map(number)
-            .collect::<Result<_, _>>()
-            .map(JointValues)
+        object.into_iter().map(number).collect::<Result<_, _>>().map(JointValues)
     }
 }
 
@@ -181,10 +172,7 @@ impl Serialize for Png {
 
 impl<'de> Deserialize<'de> for Png {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        BASE64_STANDARD
-            .decode(String::deserialize(deserializer)?)
-            .map(Png)
-            .map_err(D::Error::custom)
+        BASE64_STANDARD.decode(String::deserialize(deserializer)?).map(Png).map_err(D::Error::custom)
     }
 }
 

@@ -23,15 +23,9 @@ const DROPPED: &[&str] = &[
 /// The description of `T` and its schema without it.
 pub fn strict_schema<T: JsonSchema>() -> (String, Value) {
     let settings = SchemaSettings::draft2020_12().with(|s| s.inline_subschemas = true);
-    let mut schema = settings
-        .into_generator()
-        .into_root_schema_for::<T>()
-        .to_value();
+    let mut schema = settings.into_generator().into_root_schema_for::<T>().to_value();
     make_strict(&mut schema);
-    let description = match schema
-        .as_object_mut()
-        .and_then(|object| object.remove("description"))
-    {
+    let description = match schema.as_object_mut().and_then(|object| object.remove("description")) {
         Some(Value::String(text)) => text,
         _ => String::new(),
     };
@@ -40,8 +34,10 @@ pub fn strict_schema<T: JsonSchema>() -> (String, Value) {
 
 /// Adds the handle that stands in the path over REST and among the arguments everywhere else.
 pub fn require_episode_id(schema: &mut Value) {
-    schema["properties"]["episode_id"] =
-        json!({ "type": "string", "description": "The episode, as start_episode returned it." });
+    let handle = json!({ "type": "string", "description": "The episode, as start_episode returned it." });
+    if let Some(properties) = schema["properties"].as_object_mut() {
+        properties.shift_insert(0, "episode_id".into(), handle);
+    }
     if let Some(required) = schema["required"].as_array_mut() {
         required.insert(0, json!("episode_id"));
     }
@@ -51,10 +47,9 @@ fn make_strict(schema: &mut Value) {
     match schema {
         Value::Array(items) => items.iter_mut().for_each(make_strict),
         Value::Object(object) => {
-            DROPPED
-                .iter()
-                .for_each(|keyword| drop(object.remove(*keyword)));
+            DROPPED.iter().for_each(|keyword| drop(object.remove(*keyword)));
             unwrap_lines(object);
+            list_choices(object);
             if object.get("type").is_some_and(|kind| kind == "object") {
                 close_object(object);
             }
@@ -75,21 +70,32 @@ fn make_strict(schema: &mut Value) {
 /// Doc comments break lines where the source does; a model reads sentences.
 fn unwrap_lines(object: &mut Map<String, Value>) {
     if let Some(Value::String(text)) = object.get_mut("description") {
-        *text = text
-            .replace("\n\n", "\u{1}")
-            .replace('\n', " ")
-            .replace('\u{1}', "\n\n");
+        *text = text.replace("\n\n", "\u{1}").replace('\n', " ").replace('\u{1}', "\n\n");
     }
+}
+
+/// Strict hosts refuse `oneOf`, which is how schemars writes an enum whose variants are described: the names become an
+/// `enum` and their descriptions part of the enum's own.
+fn list_choices(object: &mut Map<String, Value>) {
+    let Some(Value::Array(choices)) = object.remove("oneOf") else {
+        return;
+    };
+    let mut description = object["description"].as_str().unwrap_or_default().to_owned();
+    for choice in &choices {
+        if let (Some(name), Some(text)) = (choice["const"].as_str(), choice["description"].as_str()) {
+            description += &format!(" \"{name}\": {}", text.replace('\n', " "));
+        }
+    }
+    let names: Vec<Value> = choices.iter().map(|choice| choice["const"].clone()).collect();
+    object.insert("type".into(), json!("string"));
+    object.insert("enum".into(), names.into());
+    object.insert("description".into(), description.into());
 }
 
 fn close_object(object: &mut Map<String, Value>) {
     let properties = object.entry("properties").or_insert_with(|| json!({}));
-    let names: Vec<Value> = properties
-        .as_object()
-        .into_iter()
-        .flatten()
-        .map(|(name, _)| json!(name))
-        .collect();
+    let names: Vec<Value> =
+        properties.as_object().into_iter().flatten().map(|(name, _)| json!(name)).collect();
     object.insert("required".into(), names.into());
     object.insert("additionalProperties".into(), Value::Bool(false));
 }

@@ -32,19 +32,12 @@ pub fn parse_args<T: Tool>(args: Value) -> Result<T, SpecError> {
         let path = error.path().to_string();
         SpecError::Malformed {
             tool: T::NAME,
-            place: if path == "." {
-                String::new()
-            } else {
-                format!("{path}: ")
-            },
+            place: if path == "." { String::new() } else { format!("{path}: ") },
             reason: error.into_inner().to_string(),
             example: json!(T::example()).to_string(),
         }
     })?;
-    parsed.validate().map_err(|reason| SpecError::Invalid {
-        tool: T::NAME,
-        reason,
-    })?;
+    parsed.validate().map_err(|reason| SpecError::Invalid { tool: T::NAME, reason })?;
     Ok(parsed)
 }
 

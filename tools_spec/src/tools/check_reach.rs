@@ -38,16 +38,8 @@ impl Tool for CheckReach {
     }
 
     fn validate(&self) -> Result<(), String> {
-        checks::pose(
-            "left",
-            self.left_position_m.as_ref(),
-            self.left_quaternion_wxyz.as_ref(),
-        )?;
-        checks::pose(
-            "right",
-            self.right_position_m.as_ref(),
-            self.right_quaternion_wxyz.as_ref(),
-        )
+        checks::pose("left", self.left_position_m.as_ref(), self.left_quaternion_wxyz.as_ref())?;
+        checks::pose("right", self.right_position_m.as_ref(), self.right_quaternion_wxyz.as_ref())
     }
 }
 

@@ -67,10 +67,7 @@ pub struct PhaseTimes(pub Vec<(String, Option<f64>)>);
 impl PhaseTimes {
     /// When phase `id` was reached.
     pub fn reached_s(&self, id: &str) -> Option<f64> {
-        self.0
-            .iter()
-            .find(|(phase, _)| phase == id)
-            .and_then(|(_, time_s)| *time_s)
+        self.0.iter().find(|(phase, _)| phase == id).and_then(|(_, time_s)| *time_s)
     }
 }
 
@@ -84,16 +81,12 @@ impl<'de> Deserialize<'de> for PhaseTimes {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let object = Map::<String, Value>::deserialize(deserializer)?;
         let time = |(phase, value): (String, Value)| match (value.as_f64(), value.is_null()) {
-            (None, false) => Err(D::Error::custom(format!(
-                "phase {phase} holds {value}; expected seconds or null"
-            ))),
+            (None, false) => {
+                Err(D::Error::custom(format!("phase {phase} holds {value}; expected seconds or null")))
+            }
             (time_s, _) => Ok((phase, time_s)),
         };
-        object
-            .into_iter()
-            .map(time)
-            .collect::<Result<_, _>>()
-            .map(PhaseTimes)
+        object.into_iter().map(time).collect::<Result<_, _>>().map(PhaseTimes)
     }
 }
 

@@ -68,27 +68,15 @@ impl WristMove {
     }
 
     fn validate(&self) -> Result<(), String> {
-        checks::pose(
-            "left",
-            self.left_position_m.as_ref(),
-            self.left_quaternion_wxyz.as_ref(),
-        )?;
-        checks::pose(
-            "right",
-            self.right_position_m.as_ref(),
-            self.right_quaternion_wxyz.as_ref(),
-        )?;
+        checks::pose("left", self.left_position_m.as_ref(), self.left_quaternion_wxyz.as_ref())?;
+        checks::pose("right", self.right_position_m.as_ref(), self.right_quaternion_wxyz.as_ref())?;
         checks::finite(
             "left_fingers_rad",
-            self.left_fingers_rad
-                .as_ref()
-                .map_or(&[], |fingers| &fingers[..]),
+            self.left_fingers_rad.as_ref().map_or(&[], |fingers| &fingers[..]),
         )?;
         checks::finite(
             "right_fingers_rad",
-            self.right_fingers_rad
-                .as_ref()
-                .map_or(&[], |fingers| &fingers[..]),
+            self.right_fingers_rad.as_ref().map_or(&[], |fingers| &fingers[..]),
         )?;
         checks::finite_or_null("vx_m_s", self.vx_m_s)?;
         checks::finite_or_null("vy_m_s", self.vy_m_s)?;
@@ -107,10 +95,7 @@ impl Tool for MoveWrists {
             right_quaternion_wxyz: Some([1.0, 0.0, 0.0, 0.0]),
             ..WristMove::hold("A")
         };
-        MoveWrists {
-            steps: 25,
-            robots: vec![right],
-        }
+        MoveWrists { steps: 25, robots: vec![right] }
     }
 
     fn validate(&self) -> Result<(), String> {

@@ -20,9 +20,7 @@ impl Tool for Observe {
     const READ_ONLY: bool = true;
 
     fn example() -> Self {
-        Observe {
-            robots: Some(vec!["A".into()]),
-        }
+        Observe { robots: Some(vec!["A".into()]) }
     }
 
     fn validate(&self) -> Result<(), String> {

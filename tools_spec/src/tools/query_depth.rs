@@ -22,10 +22,7 @@ impl Tool for QueryDepth {
     const READ_ONLY: bool = true;
 
     fn example() -> Self {
-        QueryDepth {
-            robot: "A".into(),
-            pixels: vec![[160, 120], [170, 120]],
-        }
+        QueryDepth { robot: "A".into(), pixels: vec![[160, 120], [170, 120]] }
     }
 
     fn validate(&self) -> Result<(), String> {

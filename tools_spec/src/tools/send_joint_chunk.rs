@@ -24,9 +24,7 @@ const ROW_BLOCKS: [(&str, usize); 9] = [
 
 /// The layout of a row in one line, as `left_arm 7, right_arm 7, ...`.
 pub fn action_row_layout() -> String {
-    ROW_BLOCKS
-        .map(|(block, columns)| format!("{block} {columns}"))
-        .join(", ")
+    ROW_BLOCKS.map(|(block, columns)| format!("{block} {columns}")).join(", ")
 }
 
 /// Send joint targets for one or more robots, one row per control step of 20 ms. Rows of all named robots run side by
@@ -75,12 +73,7 @@ impl Tool for SendJointChunk {
     fn example() -> Self {
         let mut row = vec![0.0; ACTION_ROW_LEN];
         row[ACTION_ROW_LEN - 1] = 0.75;
-        SendJointChunk {
-            robots: vec![JointChunk {
-                robot: "A".into(),
-                rows: vec![row],
-            }],
-        }
+        SendJointChunk { robots: vec![JointChunk { robot: "A".into(), rows: vec![row] }] }
     }
 
     fn validate(&self) -> Result<(), String> {
@@ -93,11 +86,7 @@ impl Tool for SendJointChunk {
                 first.robot
             ));
         }
-        match self
-            .robots
-            .iter()
-            .find(|entry| entry.rows.len() != first.rows.len())
-        {
+        match self.robots.iter().find(|entry| entry.rows.len() != first.rows.len()) {
             Some(other) => Err(format!(
                 "robot {:?} has {} rows and robot {:?} has {}; give every robot the same number of rows",
                 first.robot,

@@ -25,11 +25,7 @@ impl Tool for StartEpisode {
     const ON_EPISODE: bool = false;
 
     fn example() -> Self {
-        StartEpisode {
-            task: "handover".into(),
-            seed: 0,
-            protocol: Some(Protocol::Agentic),
-        }
+        StartEpisode { task: "handover".into(), seed: 0, protocol: Some(Protocol::Agentic) }
     }
 }
 

@@ -53,10 +53,7 @@ impl Tool for Walk {
             yaw_rate_rad_s: 0.0,
             pelvis_height_m: None,
         };
-        Walk {
-            steps: 25,
-            robots: vec![forward],
-        }
+        Walk { steps: 25, robots: vec![forward] }
     }
 
     fn validate(&self) -> Result<(), String> {

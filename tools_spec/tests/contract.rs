@@ -1,0 +1,171 @@
+//! The contract as its two readers meet it: strict hosts read the schemas, policies read the refusals.
+
+use serde_json::{Value, json};
+use tandem_tools_spec::{EPISODE_TOOLS, ToolCall, tool_specs};
+
+const REFUSED_KEYWORDS: &[&str] =
+    &["$ref", "$schema", "default", "format", "maxItems", "maximum", "minItems", "minimum", "title"];
+
+/// Walks every object schema below `schema`, the schema itself included.
+fn for_each_schema(schema: &Value, visit: &mut impl FnMut(&Value)) {
+    visit(schema);
+    for property in schema["properties"].as_object().into_iter().flat_map(|object| object.values()) {
+        for_each_schema(property, visit);
+    }
+    if schema["items"].is_object() {
+        for_each_schema(&schema["items"], visit);
+    }
+    for option in schema["anyOf"].as_array().into_iter().flatten() {
+        for_each_schema(option, visit);
+    }
+}
+
+#[test]
+fn schemas_are_strict() {
+    for spec in tool_specs() {
+        assert!(spec.description.len() > 40, "{} needs a description", spec.name);
+        assert_eq!(
+            spec.on_episode,
+            spec.input_schema["properties"].get("episode_id").is_some(),
+            "{}",
+            spec.name
+        );
+        for_each_schema(&spec.input_schema, &mut |schema| {
+            for keyword in REFUSED_KEYWORDS {
+                assert!(schema.get(*keyword).is_none(), "{}: {keyword} in {schema}", spec.name);
+            }
+            let Some(properties) = schema["properties"].as_object() else {
+                return;
+            };
+            assert_eq!(schema["additionalProperties"], json!(false), "{}", spec.name);
+            let required: Vec<&str> =
+                schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
+            for (name, property) in properties {
+                assert!(required.contains(&name.as_str()), "{}: {name} is optional", spec.name);
+                assert!(property["description"].is_string(), "{}: {name} has no description", spec.name);
+            }
+            assert_eq!(required.len(), properties.len(), "{}", spec.name);
+        });
+    }
+}
+
+#[test]
+fn the_two_lists_name_the_same_tools() {
+    let specs = tool_specs();
+    let on_episode: Vec<&str> = specs.iter().filter(|spec| spec.on_episode).map(|spec| spec.name).collect();
+    assert_eq!(on_episode, EPISODE_TOOLS);
+}
+
+#[test]
+fn calls_survive_the_wire() {
+    let calls = [
+        ("observe", json!({ "robots": null })),
+        ("get_robot_state", json!({ "robot": "B" })),
+        ("query_depth", json!({ "robot": "A", "pixels": [[0, 0], [319, 239]] })),
+        ("wait", json!({ "steps": 25 })),
+        ("get_status", json!({})),
+        ("finish", json!({})),
+    ];
+    for (name, args) in calls {
+        let call = ToolCall::parse(name, args.clone()).unwrap();
+        assert_eq!((call.name(), json!(call)), (name, args));
+    }
+}
+
+#[test]
+fn nullable_fields_may_be_left_out() {
+    let brief = json!({ "steps": 5, "robots": [{ "robot": "A", "left_position_m": [0.3, 0.2, 0.1] }] });
+    let ToolCall::MoveWrists(call) = ToolCall::parse("move_wrists", brief).unwrap() else { panic!() };
+    assert_eq!(call.robots[0].left_position_m, Some([0.3, 0.2, 0.1]));
+    assert_eq!(call.robots[0].right_position_m, None);
+    assert!(ToolCall::parse("observe", Value::Null).is_ok());
+}
+
+/// A refusal must contain every one of `says`.
+fn refused(name: &str, args: Value, says: &[&str]) {
+    let text = match ToolCall::parse(name, args.clone()) {
+        Ok(call) => panic!("{name} {args} was accepted: {call:?}"),
+        Err(error) => error.to_string(),
+    };
+    for part in says {
+        assert!(text.contains(part), "{name} {args}: {text:?} does not say {part:?}");
+    }
+}
+
+#[test]
+fn refusals_say_what_would_work() {
+    let wrist = |field: &str, value: Value| json!({ "steps": 5, "robots": [{ "robot": "A", field: value }] });
+    let chunk = |rows: Value| json!({ "robots": [{ "robot": "A", "rows": rows }] });
+    let row = |columns: usize| json!(vec![0.5; columns]);
+    refused("grasp", json!({}), &["\"grasp\"", "observe", "move_wrists", "finish"]);
+    refused("start_episode", json!({}), &["start_episode", "observe"]);
+    refused("wait", json!({ "steps": 0 }), &["steps is 0", "at least 1"]);
+    refused("wait", json!({ "steps": -1 }), &["wait: steps: ", "-1", "{\"steps\":25}"]);
+    refused("wait", json!({ "steps": 2.5 }), &["2.5", "{\"steps\":25}"]);
+    refused("wait", json!({ "step": 25 }), &["unknown field `step`", "`steps`"]);
+    refused("wait", json!({}), &["missing field `steps`"]);
+    refused("wait", json!([]), &["wait: ", "{\"steps\":25}"]);
+    refused(
+        "move_wrists",
+        wrist("left_quaternion_wxyz", json!([0, 0, 0, 0])),
+        &["robot \"A\"", "left_quaternion_wxyz", "[1, 0, 0, 0]"],
+    );
+    refused(
+        "move_wrists",
+        wrist("left_position_m", json!([0.1, 0.2])),
+        &["robots[0].left_position_m", "array of length 3"],
+    );
+    refused("move_wrists", wrist("right_position_m", json!([1e300, 0, 0])), &["right_position_m", "finite"]);
+    refused(
+        "move_wrists",
+        wrist("right_position_m", json!([null, 0, 0])),
+        &["robots[0].right_position_m[0]", "null"],
+    );
+    refused(
+        "move_wrists",
+        wrist("left_fingers_rad", json!([0, 0, 0, 0, 0, 0])),
+        &["left_fingers_rad", "length 7"],
+    );
+    refused("move_wrists", json!({ "steps": 5, "robots": [] }), &["robots is empty", "\"A\""]);
+    refused(
+        "move_wrists",
+        json!({ "steps": 5, "robots": [{ "robot": "A" }, { "robot": "A" }] }),
+        &["named twice"],
+    );
+    refused(
+        "check_reach",
+        json!({ "robot": "A", "right_quaternion_wxyz": [0, 0, 0, 0] }),
+        &["right_quaternion_wxyz", "norm 0"],
+    );
+    refused(
+        "send_joint_chunk",
+        chunk(json!([row(35), row(34)])),
+        &["row 1 holds 34", "35: left_arm 7, right_arm 7"],
+    );
+    refused("send_joint_chunk", chunk(json!([])), &["no rows", "at least 1"]);
+    refused(
+        "send_joint_chunk",
+        json!({ "robots": [{ "robot": "A", "rows": [row(35)] }, { "robot": "B", "rows": [row(35), row(35)] }] }),
+        &["same number of rows"],
+    );
+    refused("query_depth", json!({ "robot": "A", "pixels": [] }), &["pixels is empty", "[[160, 120]]"]);
+    refused(
+        "walk",
+        json!({ "steps": 5, "robots": [{ "robot": "A", "vx_m_s": 0.1 }] }),
+        &["missing field `vy_m_s`", "yaw_rate_rad_s"],
+    );
+}
+
+#[test]
+fn numbers_that_json_cannot_hold_are_refused_too() {
+    for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let ToolCall::Walk(mut walk) =
+            ToolCall::parse("walk", json!({ "steps": 5, "robots": [{ "robot": "A", "vx_m_s": 0, "vy_m_s": 0, "yaw_rate_rad_s": 0 }] })).unwrap()
+        else {
+            panic!()
+        };
+        walk.robots[0].vy_m_s = number;
+        let text = ToolCall::Walk(walk).validate().unwrap_err().to_string();
+        assert!(text.contains("vy_m_s") && text.contains("finite"), "{text}");
+    }
+}
