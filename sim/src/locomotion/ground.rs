@@ -1,0 +1,67 @@
+//! Ground reaction forces: how two planted feet share a wanted net force, and the leg torques that produce it.
+
+use rapier3d::math::{Pose, Vector};
+
+use crate::robot::{LEG_JOINT_COUNT, LEGS, Side, WholeBody};
+
+/// Force on one foot and the point of the ground where it acts, world frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FootForce {
+    pub force_n: Vector,
+    pub point_m: Vector,
+}
+
+/// Centre of pressure stays this far inside the sole, along and across the foot.
+const SOLE_HALF_LENGTH_M: f32 = 0.075;
+const SOLE_HALF_WIDTH_M: f32 = 0.022;
+/// Neither foot ever loses contact while standing.
+const SMALLEST_SHARE: f32 = 0.03;
+/// Below this the centre of pressure is undefined.
+const SMALLEST_VERTICAL_FORCE_N: f32 = 20.0;
+
+/// Splits a net force (N) and a moment (N m) about the centre of mass over two feet, given by their sole centres
+/// (world). The centre of pressure of the net force,
+///   p = c + ( -(m_y + h f_x), m_x - h f_y ) / f_z,   h = height of c above the soles,
+/// is shared along the line between the soles; what is left moves each foot's own centre of pressure.
+pub(super) fn distribute(com_m: Vector, force_n: Vector, moment_n_m: Vector, soles: [Pose; 2]) -> [FootForce; 2] {
+    let ground_m = (soles[0].translation.z + soles[1].translation.z) * 0.5;
+    let height_m = com_m.z - ground_m;
+    let vertical_n = force_n.z.max(SMALLEST_VERTICAL_FORCE_N);
+    let pressure_m = Vector::new(
+        com_m.x - (moment_n_m.y + height_m * force_n.x) / vertical_n,
+        com_m.y + (moment_n_m.x - height_m * force_n.y) / vertical_n,
+        ground_m,
+    );
+    let flat = |v: Vector| Vector::new(v.x, v.y, 0.0);
+    let across = flat(soles[0].translation - soles[1].translation);
+    let along_line = flat(pressure_m - soles[1].translation).dot(across) / across.length_squared();
+    let left_share = along_line.clamp(SMALLEST_SHARE, 1.0 - SMALLEST_SHARE);
+    let middle_m = soles[0].translation * left_share + soles[1].translation * (1.0 - left_share);
+    let rest_m = flat(pressure_m - middle_m);
+    [0, 1].map(|foot| {
+        let share = if foot == 0 { left_share } else { 1.0 - left_share };
+        let inside = soles[foot].rotation.inverse() * rest_m;
+        let inside = Vector::new(
+            inside.x.clamp(-SOLE_HALF_LENGTH_M, SOLE_HALF_LENGTH_M),
+            inside.y.clamp(-SOLE_HALF_WIDTH_M, SOLE_HALF_WIDTH_M),
+            0.0,
+        );
+        let point_m = soles[foot].translation + soles[foot].rotation * inside;
+        FootForce { force_n: force_n * share, point_m: Vector::new(point_m.x, point_m.y, ground_m) }
+    })
+}
+
+/// Torques with which a leg pushes on the ground so that the ground answers with `foot` and a free moment:
+/// tau = -J^T [f; m].
+pub(super) fn leg_torques_n_m(
+    body: &WholeBody,
+    side: Side,
+    foot: FootForce,
+    free_moment_n_m: Vector,
+) -> [f32; LEG_JOINT_COUNT] {
+    std::array::from_fn(|i| {
+        let joint = LEGS[side.index()] + i;
+        let (_, axis) = body.joint_axis(joint);
+        -body.moment_n_m(joint, foot.point_m, foot.force_n) - axis.dot(free_moment_n_m)
+    })
+}

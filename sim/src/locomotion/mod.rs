@@ -1,0 +1,65 @@
+//! Base control: turns a base command into torques of the twelve leg joints, through ground contact alone.
+
+mod ground;
+mod legs;
+mod stand;
+
+pub use stand::Stand;
+
+use serde::{Deserialize, Serialize};
+
+use crate::robot::WholeBody;
+
+/// What a policy asks of the base, in the robot's own heading frame.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BaseCommand {
+    pub vx_m_s: f32,
+    pub vy_m_s: f32,
+    pub yaw_rate_rad_s: f32,
+    pub pelvis_height_m: f32,
+}
+
+/// Smallest and largest value that a controller can follow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BaseLimits {
+    pub vx_m_s: [f32; 2],
+    pub vy_m_s: [f32; 2],
+    pub yaw_rate_rad_s: [f32; 2],
+    pub pelvis_height_m: [f32; 2],
+}
+
+impl BaseLimits {
+    /// The nearest command within the limits.
+    pub fn clamp(&self, command: BaseCommand) -> BaseCommand {
+        let within = |value: f32, [low, high]: [f32; 2]| value.clamp(low, high);
+        BaseCommand {
+            vx_m_s: within(command.vx_m_s, self.vx_m_s),
+            vy_m_s: within(command.vy_m_s, self.vy_m_s),
+            yaw_rate_rad_s: within(command.yaw_rate_rad_s, self.yaw_rate_rad_s),
+            pelvis_height_m: within(command.pelvis_height_m, self.pelvis_height_m),
+        }
+    }
+}
+
+/// PD target, gains and feedforward of the legs for one physics step: left six joints, then right six.
+#[derive(Clone, Debug)]
+pub struct LegCommand {
+    pub q_rad: [f32; 12],
+    pub kp_n_m_rad: [f32; 12],
+    pub kd_n_m_s_rad: [f32; 12],
+    pub feedforward_n_m: [f32; 12],
+}
+
+/// A base controller. It sees its own robot only, and acts through leg torques only.
+pub trait Locomotion: Send {
+    fn limits(&self) -> BaseLimits;
+
+    /// One physics step.
+    fn tick(&mut self, body: &WholeBody, command: &BaseCommand, dt_s: f32) -> LegCommand;
+
+    /// Internal state, for snapshots and the state hash.
+    fn save(&self) -> Result<Vec<u8>, postcard::Error>;
+
+    /// Takes back what [`Locomotion::save`] gave.
+    fn load(&mut self, state: &[u8]) -> Result<(), postcard::Error>;
+}

@@ -1,0 +1,134 @@
+//! Geoms: primitive shapes with pose, material and friction, as Rapier colliders and as things to draw.
+
+use mjcf_rs::body::GeomType;
+use rapier3d::math::{Pose, Rotation, Vector};
+use rapier3d::prelude::SharedShape;
+
+use super::{Document, pose, vector};
+use crate::SimError;
+
+/// Shape in its own frame; axial shapes lie along z, as in MJCF.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Primitive {
+    Sphere { radius_m: f32 },
+    Capsule { radius_m: f32, half_length_m: f32 },
+    Cylinder { radius_m: f32, half_length_m: f32 },
+    Box { half_extents_m: Vector },
+    Ellipsoid { radii_m: Vector },
+    Plane { half_extents_m: [f32; 2] },
+    Convex { vertices_m: Vec<Vector> },
+}
+
+/// One geom in its body's frame.
+#[derive(Clone, Debug)]
+pub struct Geom {
+    pub primitive: Primitive,
+    pub body_from_geom: Pose,
+    pub rgba: [f32; 4],
+    pub material: Option<String>,
+    pub friction: f32,
+    pub density_kg_m3: f32,
+    pub mass_kg: Option<f32>,
+    pub collides: bool,
+    pub drawn: bool,
+}
+
+/// MuJoCo hides groups 3 and above; robots keep their collision shapes there.
+const LAST_DRAWN_GROUP: i32 = 2;
+const DEFAULT_DENSITY_KG_M3: f64 = 1000.0;
+const DEFAULT_RGBA: [f64; 4] = [0.5, 0.5, 0.5, 1.0];
+/// A plane collides as a slab of this thickness: half-spaces have no mass centre and no bounds.
+const PLANE_THICKNESS_M: f32 = 0.2;
+
+impl Geom {
+    pub(super) fn read(document: &Document, geom: &mjcf_rs::body::Geom) -> Result<Geom, SimError> {
+        let size = vector(geom.size);
+        let (body_from_geom, half_length_m) = match geom.fromto {
+            Some(ends) => between(ends),
+            None => (pose(&geom.pose), size.y),
+        };
+        let radius_m = size.x;
+        let primitive = match geom.type_ {
+            GeomType::Sphere => Primitive::Sphere { radius_m },
+            GeomType::Capsule => Primitive::Capsule { radius_m, half_length_m },
+            GeomType::Cylinder => Primitive::Cylinder { radius_m, half_length_m },
+            GeomType::Box => Primitive::Box { half_extents_m: size },
+            GeomType::Ellipsoid => Primitive::Ellipsoid { radii_m: size },
+            GeomType::Plane => Primitive::Plane { half_extents_m: [size.x, size.y] },
+            GeomType::Mesh => Primitive::Convex { vertices_m: mesh_vertices(document, geom)? },
+            other => {
+                let what = format!("geom type {other:?}; use sphere, capsule, cylinder, box, ellipsoid, plane or mesh");
+                return Err(document.unsupported(what));
+            }
+        };
+        let material = geom.material.as_ref().and_then(|name| document.model.assets.material(name));
+        let rgba = geom.rgba.or(material.and_then(|m| m.rgba)).unwrap_or(DEFAULT_RGBA);
+        Ok(Geom {
+            primitive,
+            body_from_geom,
+            rgba: rgba.map(|c| c as f32),
+            material: geom.material.clone(),
+            friction: geom.friction[0] as f32,
+            density_kg_m3: geom.density.unwrap_or(DEFAULT_DENSITY_KG_M3) as f32,
+            mass_kg: geom.mass.map(|m| m as f32),
+            collides: geom.contype != 0 || geom.conaffinity != 0,
+            drawn: geom.group <= LAST_DRAWN_GROUP,
+        })
+    }
+
+    /// Collision shape and its pose in the body's frame; `None` for a degenerate mesh.
+    pub(crate) fn collider(&self) -> Option<(Pose, SharedShape)> {
+        let mut body_from_shape = self.body_from_geom;
+        // Rapier's cylinders and capsules lie along y, MJCF's along z.
+        let y_to_z = Pose::from_rotation(Rotation::from_rotation_x(std::f32::consts::FRAC_PI_2));
+        let shape = match &self.primitive {
+            Primitive::Sphere { radius_m } => SharedShape::ball(*radius_m),
+            Primitive::Capsule { radius_m, half_length_m } => SharedShape::capsule_z(*half_length_m, *radius_m),
+            Primitive::Cylinder { radius_m, half_length_m } => {
+                body_from_shape *= y_to_z;
+                SharedShape::cylinder(*half_length_m, *radius_m)
+            }
+            Primitive::Box { half_extents_m: h } => SharedShape::cuboid(h.x, h.y, h.z),
+            Primitive::Ellipsoid { radii_m } => SharedShape::convex_hull(&ellipsoid_points(*radii_m))?,
+            Primitive::Plane { half_extents_m: [x, y] } => {
+                body_from_shape *= Pose::from_translation(Vector::new(0.0, 0.0, -PLANE_THICKNESS_M / 2.0));
+                let extent = |half: f32| if half > 0.0 { half } else { 50.0 };
+                SharedShape::cuboid(extent(*x), extent(*y), PLANE_THICKNESS_M / 2.0)
+            }
+            Primitive::Convex { vertices_m } => SharedShape::convex_hull(vertices_m)?,
+        };
+        Some((body_from_shape, shape))
+    }
+}
+
+/// Pose with z from the first to the second end point, centred between them, and half the distance.
+fn between(ends: [f64; 6]) -> (Pose, f32) {
+    let a = vector([ends[0], ends[1], ends[2]]);
+    let b = vector([ends[3], ends[4], ends[5]]);
+    let half = (b - a) * 0.5;
+    let rotation = Rotation::from_rotation_arc(Vector::Z, half.normalize_or(Vector::Z));
+    (Pose::from_parts(a + half, rotation), half.length())
+}
+
+fn mesh_vertices(document: &Document, geom: &mjcf_rs::body::Geom) -> Result<Vec<Vector>, SimError> {
+    let name = geom.mesh.as_deref().unwrap_or_default();
+    let mesh = document.model.assets.mesh(name);
+    let Some(vertices) = mesh.and_then(|mesh| mesh.inline_vertices.as_ref()) else {
+        return Err(document.unsupported(format!("mesh `{name}` has no inline vertices; mesh files are not read")));
+    };
+    Ok(vertices.chunks_exact(3).map(|v| vector([v[0], v[1], v[2]])).collect())
+}
+
+/// Points of a Fibonacci sphere, scaled: an ellipsoid's convex hull for collision.
+fn ellipsoid_points(radii_m: Vector) -> Vec<Vector> {
+    const POINTS: usize = 96;
+    const GOLDEN_ANGLE_RAD: f32 = 2.399_963_2;
+    (0..POINTS)
+        .map(|i| {
+            let z = 1.0 - 2.0 * (i as f32 + 0.5) / POINTS as f32;
+            let (sin, cos) = (GOLDEN_ANGLE_RAD * i as f32).sin_cos();
+            let ring = (1.0 - z * z).sqrt();
+            Vector::new(ring * cos, ring * sin, z) * radii_m
+        })
+        .collect()
+}

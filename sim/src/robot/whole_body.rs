@@ -1,0 +1,97 @@
+//! Kinematic and static quantities of one robot at one instant, in the world frame.
+
+use rapier3d::math::{Pose, Vector};
+use rapier3d::prelude::{RigidBodyHandle, RigidBodySet};
+
+use super::{JOINTS, RobotModel};
+use crate::world::GRAVITY_M_S2;
+
+/// What a controller may know of its own robot: joint readings, link poses, centre of mass.
+pub struct WholeBody<'a> {
+    pub model: &'a RobotModel,
+    pub q_rad: [f32; JOINTS],
+    pub qd_rad_s: [f32; JOINTS],
+    pub world_from_link: Vec<Pose>,
+    pub pelvis_velocity_m_s: Vector,
+    pub pelvis_angular_velocity_rad_s: Vector,
+    pub com_m: Vector,
+    pub com_velocity_m_s: Vector,
+}
+
+impl<'a> WholeBody<'a> {
+    pub(crate) fn measure(
+        model: &'a RobotModel,
+        bodies: &RigidBodySet,
+        links: &[RigidBodyHandle],
+        q_rad: [f32; JOINTS],
+        qd_rad_s: [f32; JOINTS],
+    ) -> WholeBody<'a> {
+        let mut com_m = Vector::ZERO;
+        let mut com_velocity_m_s = Vector::ZERO;
+        let mut world_from_link = Vec::with_capacity(links.len());
+        for (link, handle) in model.links.iter().zip(links) {
+            let body = &bodies[*handle];
+            let world = *body.position();
+            com_m += world * link.mass.local_com * link.mass.mass();
+            com_velocity_m_s += body.linvel() * link.mass.mass();
+            world_from_link.push(world);
+        }
+        let pelvis = &bodies[links[0]];
+        WholeBody {
+            model,
+            q_rad,
+            qd_rad_s,
+            pelvis_velocity_m_s: pelvis.velocity_at_point(world_from_link[0].translation),
+            pelvis_angular_velocity_rad_s: pelvis.angvel(),
+            world_from_link,
+            com_m: com_m / model.mass_kg,
+            com_velocity_m_s: com_velocity_m_s / model.mass_kg,
+        }
+    }
+
+    pub fn world_from_pelvis(&self) -> Pose {
+        self.world_from_link[0]
+    }
+
+    /// World pose of a site, if the robot has it.
+    pub fn world_from_site(&self, name: &str) -> Option<Pose> {
+        self.model.site(name).map(|site| self.world_from_link[site.link] * site.link_from_site)
+    }
+
+    /// Origin and unit axis of a joint in the world.
+    pub fn joint_axis(&self, joint: usize) -> (Vector, Vector) {
+        let joint = &self.model.joints[joint];
+        let world = self.world_from_link[joint.link];
+        (world.translation, world.rotation * joint.axis)
+    }
+
+    /// Torques that hold the links against gravity, pelvis fixed: tau_j = -a_j . (r_j x m_j g), with m_j and r_j the
+    /// mass beyond joint j and its centre relative to the joint.
+    pub fn gravity_torques_n_m(&self) -> [f32; JOINTS] {
+        let links = self.model.links.len();
+        let mut mass_kg = vec![0.0; links];
+        let mut moment = vec![Vector::ZERO; links];
+        for index in (0..links).rev() {
+            let link = &self.model.links[index];
+            mass_kg[index] += link.mass.mass();
+            moment[index] += self.world_from_link[index] * link.mass.local_com * link.mass.mass();
+            if let Some(parent) = link.parent {
+                mass_kg[parent] += mass_kg[index];
+                let beyond = moment[index];
+                moment[parent] += beyond;
+            }
+        }
+        let gravity = Vector::new(0.0, 0.0, -GRAVITY_M_S2);
+        std::array::from_fn(|joint| {
+            let (origin, axis) = self.joint_axis(joint);
+            let link = self.model.joints[joint].link;
+            -axis.dot((moment[link] - origin * mass_kg[link]).cross(gravity))
+        })
+    }
+
+    /// Moment of a force at a point about a joint's axis: one column of J^T f.
+    pub fn moment_n_m(&self, joint: usize, point_m: Vector, force_n: Vector) -> f32 {
+        let (origin, axis) = self.joint_axis(joint);
+        axis.dot((point_m - origin).cross(force_n))
+    }
+}
