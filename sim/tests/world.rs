@@ -17,6 +17,7 @@ fn kitchen() -> WorldSpec {
         robots: vec![robot("A", 0.0, 0.0, 0.0), robot("B", 0.74, -0.12, PI)],
         objects: vec![ObjectPlacement {
             name: "bottle".into(),
+            file: "bottle".into(),
             world_from_object: Pose::from_translation(Vector::new(0.30, -0.07, 0.80)),
         }],
     }
@@ -133,6 +134,6 @@ fn unknown_files_are_named_with_what_there_is() {
     assert!(message.contains("no scene `kitchen`; have: ") && message.contains("kitchen_084"), "{message}");
 
     let mut spec = kitchen();
-    spec.objects[0].name = "botle".into();
+    spec.objects[0].file = "botle".into();
     assert!(matches!(World::new(&spec), Err(SimError::UnknownAsset { kind: "object", .. })));
 }

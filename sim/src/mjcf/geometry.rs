@@ -27,6 +27,8 @@ pub struct Geom {
     pub rgba: [f32; 4],
     pub material: Option<String>,
     pub friction: f32,
+    /// Rolling resistance, 0 unless `condim` is 6.
+    pub rolling_friction_m: f32,
     pub density_kg_m3: f32,
     pub mass_kg: Option<f32>,
     pub collides: bool,
@@ -69,6 +71,7 @@ impl Geom {
             rgba: rgba.map(|c| c as f32),
             material: geom.material.clone(),
             friction: geom.friction[0] as f32,
+            rolling_friction_m: if geom.condim == 6 { geom.friction[2] as f32 } else { 0.0 },
             density_kg_m3: geom.density.unwrap_or(DEFAULT_DENSITY_KG_M3) as f32,
             mass_kg: geom.mass.map(|m| m as f32),
             collides: geom.contype != 0 || geom.conaffinity != 0,

@@ -3,6 +3,7 @@
 use rapier3d::math::{Pose, Vector};
 use rapier3d::prelude::*;
 
+use super::GRAVITY_M_S2;
 use crate::mjcf::{Document, Geom, mass_properties, pose};
 use crate::{SimError, assets};
 use mjcf_rs::body::JointType;
@@ -10,8 +11,10 @@ use mjcf_rs::body::JointType;
 /// An object file put into the world.
 #[derive(Clone, Debug)]
 pub struct ObjectPlacement {
-    /// Name of the file, which is also what tasks call the object.
+    /// What tasks call it.
     pub name: String,
+    /// Name of the file in `assets/objects`; several objects may share one.
+    pub file: String,
     pub world_from_object: Pose,
 }
 
@@ -75,7 +78,7 @@ pub(super) fn insert_scene(
 
 /// Inserts an object file: one top-level body, free or a mark.
 pub(super) fn insert_object(physics: &mut PhysicsWorld, placement: &ObjectPlacement) -> Result<Object, SimError> {
-    let document = Document::parse(&placement.name, assets::object(&placement.name)?)?;
+    let document = Document::parse(&placement.file, assets::object(&placement.file)?)?;
     let mut bodies: Vec<Body> = bodies(&document)?.into_iter().filter(|body| body.id != 0).collect();
     if bodies.len() != 1 {
         return Err(document.unsupported("an object file has one top-level body; its parts have no joints"));
@@ -160,6 +163,7 @@ fn insert_body(
         let builder = RigidBodyBuilder::dynamic()
             .pose(world_from_body)
             .additional_mass_properties(body.mass)
+            .angular_damping(rolling_damping_1_s(&object.geoms, &body.mass))
             .can_sleep(false);
         object.body = Some(physics.insert_body(builder));
     }
@@ -181,6 +185,20 @@ fn insert_body(
     }
     Ok(object)
 }
+
+/// Rapier has no rolling resistance, without which a ball on a flat base never comes to rest. A geom with MuJoCo's rolling
+/// friction r (m) is damped instead, by as much as  r m g  would at [`ROLLING_RAD_S`].
+fn rolling_damping_1_s(geoms: &[Geom], mass: &MassProperties) -> f32 {
+    let rolling_m = geoms.iter().map(|geom| geom.rolling_friction_m).fold(0.0, f32::max);
+    let inertia_kg_m2 = mass.principal_inertia().max_element();
+    if inertia_kg_m2 == 0.0 {
+        return 0.0;
+    }
+    rolling_m * mass.mass() * GRAVITY_M_S2 / (inertia_kg_m2 * ROLLING_RAD_S)
+}
+
+/// A ball of 3 cm that rolls at 0.3 m/s.
+const ROLLING_RAD_S: f32 = 10.0;
 
 fn collider(geom: &Geom) -> Option<ColliderBuilder> {
     if !geom.collides {
