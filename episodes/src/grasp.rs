@@ -1,0 +1,161 @@
+//! Who holds what, by contact alone: a hand holds an object while its thumb presses against its fingers or its palm.
+
+use tandem_sim::{HandContacts, Side, Vector, World};
+
+use crate::facts::Grip;
+
+/// Each of two opposed parts of a hand must press at least this hard for a hold to begin. A 0.5 kg bottle held at
+/// friction 0.8 needs 3 N from either side, a resting finger presses less than half a newton.
+pub const HOLD_BEGINS_N: f32 = 1.5;
+/// A hold ends when the pressure falls below this; lower than the above, so that a hand in motion does not flicker.
+pub const HOLD_ENDS_N: f32 = 0.5;
+/// Presses count as opposed if the angle between them is at least 120 degrees.
+const OPPOSED_COSINE: f32 = -0.5;
+/// For how many control steps in a row the evidence must last before a hold begins or ends: 60 ms.
+pub const STEPS_TO_CHANGE: u32 = 3;
+
+/// The detector of one hand and one object.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GraspDetector {
+    holding: bool,
+    touching: bool,
+    /// Control steps in a row that spoke for the opposite of `holding`.
+    steps_against: u32,
+}
+
+impl GraspDetector {
+    /// Looks at the contacts of one control step.
+    pub fn update(&mut self, contacts: &HandContacts) {
+        let threshold_n = if self.holding { HOLD_ENDS_N } else { HOLD_BEGINS_N };
+        let pressed = opposed_press_n(contacts) >= threshold_n;
+        self.steps_against = if pressed == self.holding { 0 } else { self.steps_against + 1 };
+        if self.steps_against == STEPS_TO_CHANGE {
+            self.holding = pressed;
+            self.steps_against = 0;
+        }
+        let parts = [contacts.thumb_n, contacts.fingers_n, contacts.palm_n];
+        self.touching = parts.iter().any(|force_n| *force_n != Vector::ZERO);
+    }
+
+    pub fn grip(&self) -> Grip {
+        match (self.holding, self.touching) {
+            (true, _) => Grip::Holding,
+            (false, true) => Grip::Touching,
+            (false, false) => Grip::Off,
+        }
+    }
+}
+
+/// The smaller of two opposed presses, thumb against fingers or thumb against palm; 0 where nothing is opposed.
+fn opposed_press_n(contacts: &HandContacts) -> f32 {
+    let opposed = |other: Vector| {
+        let (thumb_n, other_n) = (contacts.thumb_n.length(), other.length());
+        let cosine = contacts.thumb_n.dot(other) / (thumb_n * other_n).max(f32::MIN_POSITIVE);
+        if cosine <= OPPOSED_COSINE { thumb_n.min(other_n) } else { 0.0 }
+    };
+    opposed(contacts.fingers_n).max(opposed(contacts.palm_n))
+}
+
+/// All hands on one object.
+#[derive(Clone, Debug)]
+pub struct ObjectGrasps {
+    object: &'static str,
+    /// Per robot: left, right.
+    detectors: Vec<[GraspDetector; 2]>,
+    /// Control steps since a hand last touched the object.
+    untouched_steps: u32,
+}
+
+impl ObjectGrasps {
+    pub fn new(object: &'static str, robots: usize) -> ObjectGrasps {
+        ObjectGrasps { object, detectors: vec![Default::default(); robots], untouched_steps: 0 }
+    }
+
+    /// Looks at the contacts of the control step that `world` has just made.
+    pub fn update(&mut self, world: &World) {
+        for (robot, hands) in self.detectors.iter_mut().enumerate() {
+            for side in Side::BOTH {
+                hands[side.index()].update(&world.hand_contacts(robot, side, self.object));
+            }
+        }
+        let off = self.grips().iter().flatten().all(|grip| *grip == Grip::Off);
+        self.untouched_steps = if off { self.untouched_steps + 1 } else { 0 };
+    }
+
+    pub fn grips(&self) -> Vec<[Grip; 2]> {
+        self.detectors.iter().map(|hands| hands.map(|hand| hand.grip())).collect()
+    }
+
+    pub fn untouched_s(&self) -> f64 {
+        f64::from(self.untouched_steps) / tandem_sim::CONTROL_HZ
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn contacts(thumb_n: Vector, fingers_n: Vector, palm_n: Vector) -> HandContacts {
+        HandContacts { thumb_n, fingers_n, palm_n }
+    }
+
+    /// Thumb and fingers on opposite sides, each pressing with `force_n`.
+    fn pinch(force_n: f32) -> HandContacts {
+        contacts(Vector::Y * force_n, Vector::Y * -force_n, Vector::ZERO)
+    }
+
+    #[test]
+    fn only_opposed_presses_hold() {
+        let (none, weak, strong) = (Vector::ZERO, HOLD_BEGINS_N - 0.01, HOLD_BEGINS_N + 0.01);
+        let tilted = |degrees: f32| {
+            let (sine, cosine) = degrees.to_radians().sin_cos();
+            Vector::new(sine, cosine, 0.0) * strong
+        };
+        let thumb = Vector::Y * strong;
+        for (what, contacts, expected) in [
+            ("nothing", contacts(none, none, none), Grip::Off),
+            ("thumb alone", contacts(thumb, none, none), Grip::Touching),
+            ("fingers and palm", contacts(none, thumb, -thumb), Grip::Touching),
+            ("thumb and fingers", pinch(strong), Grip::Holding),
+            ("thumb and palm", contacts(thumb, none, -thumb), Grip::Holding),
+            ("too weak", pinch(weak), Grip::Touching),
+            ("one side too weak", contacts(thumb * 9.0, -Vector::Y * weak, none), Grip::Touching),
+            ("same side", contacts(thumb, thumb, none), Grip::Touching),
+            ("121 degrees", contacts(thumb, tilted(121.0), none), Grip::Holding),
+            ("119 degrees", contacts(thumb, tilted(119.0), none), Grip::Touching),
+        ] {
+            let mut detector = GraspDetector::default();
+            (0..STEPS_TO_CHANGE).for_each(|_| detector.update(&contacts));
+            assert_eq!(detector.grip(), expected, "{what}");
+        }
+    }
+
+    #[test]
+    fn a_hold_takes_60_ms_to_begin_and_to_end_and_does_not_flicker() {
+        let between = (HOLD_BEGINS_N + HOLD_ENDS_N) / 2.0;
+        let (strong, off) = (HOLD_BEGINS_N + 1.0, 0.0);
+        let steps = [
+            (strong, false),
+            (strong, false),
+            (off, false), // starts over
+            (strong, false),
+            (strong, false),
+            (strong, true),
+            (between, true), // above the lower threshold
+            (off, true),
+            (off, true),
+            (strong, true), // starts over
+            (off, true),
+            (off, true),
+            (off, false),
+            (between, false), // below the upper threshold
+            (between, false),
+            (between, false),
+        ];
+        let mut detector = GraspDetector::default();
+        for (index, (force_n, holding)) in steps.into_iter().enumerate() {
+            detector.update(&pinch(force_n));
+            assert_eq!(detector.grip() == Grip::Holding, holding, "step {index}");
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! Which phases have been reached, and when. A phase is looked at only once its predecessors have been reached.
+
+use crate::{
+    facts::Facts,
+    tasks::{Done, Phase, Task},
+};
+
+/// The progress of one episode.
+#[derive(Clone, Debug)]
+pub struct PhaseTracker {
+    phases: &'static [Phase],
+    /// When each phase was reached, in simulated seconds.
+    reached_s: Vec<f64>,
+    /// Whether the `first` of the present phase's sequence has held, unbroken.
+    underway: bool,
+}
+
+impl PhaseTracker {
+    pub fn new(task: &Task) -> PhaseTracker {
+        PhaseTracker { phases: task.phases, reached_s: Vec::new(), underway: false }
+    }
+
+    /// Looks at one control step; true if it reached a phase.
+    pub fn update(&mut self, facts: &Facts) -> bool {
+        let before = self.reached_s.len();
+        while let Some(phase) = self.phases.get(self.reached_s.len()) {
+            if !self.is_done(&phase.done, facts) {
+                break;
+            }
+            self.reached_s.push(facts.time_s);
+            self.underway = false;
+        }
+        self.reached_s.len() > before
+    }
+
+    /// The phases reached so far, in order, with the time of each.
+    pub fn reached(&self) -> impl Iterator<Item = (&'static Phase, f64)> {
+        self.phases.iter().zip(self.reached_s.iter().copied())
+    }
+
+    /// Whether the last phase has been reached.
+    pub fn complete(&self) -> bool {
+        self.reached_s.len() == self.phases.len()
+    }
+
+    fn is_done(&mut self, done: &Done, facts: &Facts) -> bool {
+        match done {
+            Done::When(condition) => condition(facts),
+            Done::Sequence { first, then, broken } => {
+                self.underway = (self.underway && !broken(facts)) || first(facts);
+                self.underway && then(facts)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tandem_sim::Side::Right;
+
+    use super::*;
+    use crate::{
+        facts::{A, B, Grip::Holding},
+        tasks,
+    };
+
+    /// What a control step of Handover shows: who holds the bottle, and where it is.
+    #[derive(Clone, Copy, Debug)]
+    enum Scene {
+        Rests,
+        Aloft(&'static [usize]),
+        OnTarget,
+    }
+    use Scene::{Aloft, OnTarget, Rests};
+
+    fn facts(scene: Scene) -> Facts {
+        let mut facts = Facts::at_rest(tasks::find("handover").unwrap());
+        match scene {
+            Rests => {}
+            Aloft(holders) => {
+                facts = facts.raised("bottle", 0.1);
+                for robot in holders {
+                    facts = facts.grip(*robot, Right, "bottle", Holding);
+                }
+            }
+            OnTarget => {
+                let target = facts.object("target_pad").state;
+                facts.object_mut("bottle").state = target;
+            }
+        }
+        facts
+    }
+
+    /// Phases reached after each of the scenes.
+    fn play(scenes: &[Scene]) -> Vec<usize> {
+        let mut tracker = PhaseTracker::new(tasks::find("handover").unwrap());
+        let step = |scene: &Scene| {
+            tracker.update(&facts(*scene));
+            tracker.reached().count()
+        };
+        scenes.iter().map(step).collect()
+    }
+
+    #[test]
+    fn order_is_enforced_and_sequences_are_unbroken() {
+        let (by_a, by_both, by_b, by_nobody) = (Aloft(&[A]), Aloft(&[A, B]), Aloft(&[B]), Aloft(&[]));
+        for (scenes, reached) in [
+            (&[Rests, by_a, by_both, by_b, OnTarget][..], &[0, 1, 1, 2, 3][..]),
+            // The right final pose alone is nothing, nor is a transfer without A's lift.
+            (&[OnTarget, OnTarget], &[0, 0]),
+            (&[by_b, OnTarget], &[0, 0]),
+            (&[by_a, OnTarget, by_b, OnTarget], &[1, 1, 1, 1]),
+            // A throw: they never held it together.
+            (&[by_a, by_nobody, by_b, OnTarget], &[1, 1, 1, 1]),
+            // They held it together, dropped it, and B picked it up: together again is asked for.
+            (&[by_a, by_both, by_nobody, by_b, OnTarget], &[1, 1, 1, 1, 1]),
+            (&[by_a, by_both, by_nobody, by_b, by_both, by_b, OnTarget], &[1, 1, 1, 1, 1, 2, 3]),
+            // A takes it back in between, which is no release.
+            (&[by_a, by_both, by_a, by_both, by_b, OnTarget], &[1, 1, 1, 1, 2, 3]),
+            // What has been reached stays reached.
+            (&[by_a, Rests, by_both, by_b, by_nobody, OnTarget, Rests], &[1, 1, 1, 2, 2, 3, 3]),
+        ] {
+            assert_eq!(play(scenes), reached, "{scenes:?}");
+        }
+    }
+
+    #[test]
+    fn each_phase_has_the_time_of_its_step() {
+        let handover = tasks::find("handover").unwrap();
+        let mut tracker = PhaseTracker::new(handover);
+        for (time_s, scene) in [(1.0, Rests), (2.0, Aloft(&[A])), (3.0, Aloft(&[A, B])), (4.0, Aloft(&[B]))] {
+            let facts = Facts { time_s, ..facts(scene) };
+            assert_eq!(tracker.update(&facts), time_s == 2.0 || time_s == 4.0);
+        }
+        let reached: Vec<_> = tracker.reached().map(|(phase, time_s)| (phase.id, time_s)).collect();
+        assert_eq!(reached, [("grasp_and_lift", 2.0), ("transfer", 4.0)]);
+        assert!(!tracker.complete());
+    }
+}

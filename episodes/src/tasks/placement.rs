@@ -1,0 +1,26 @@
+//! What the tasks share about putting things down.
+
+use crate::facts::Facts;
+
+/// How long no hand may have touched an object before it counts as released.
+pub const RELEASE_S: f64 = 0.2;
+/// A placed object stands this nearly upright.
+pub const UPRIGHT_RAD: f32 = 15.0 * std::f32::consts::PI / 180.0;
+/// A placed object moves no faster than this.
+pub const STILL_M_S: f32 = 0.05;
+/// A placed object turns no faster than this.
+pub const STILL_RAD_S: f32 = 0.15;
+
+/// Every hand has been off `object` for 0.2 s, and it stands upright and still.
+pub fn stands_released(f: &Facts, object: &str) -> bool {
+    f.untouched_s(object) >= RELEASE_S
+        && f.tilt_rad(object) <= UPRIGHT_RAD
+        && f.speed_m_s(object) <= STILL_M_S
+        && f.turn_rate_rad_s(object) <= STILL_RAD_S
+}
+
+/// `object` is within `half_m` of `target` on each axis of the world.
+pub fn within_box(f: &Facts, object: &str, target: &str, half_m: f32) -> bool {
+    let apart = f.position_m(object) - f.position_m(target);
+    apart.abs().max_element() <= half_m
+}
