@@ -1,0 +1,123 @@
+//! What an episode came to, as `result.json`, and how the files of a run folder are written.
+
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+use tandem_tools_spec::{PhaseTimes, ResultReply};
+
+/// Why a file of a run folder could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    #[error("cannot write {}: {source}; give a folder on a disk with space that may be written to", path.display())]
+    Io { path: PathBuf, source: io::Error },
+    #[error("the recording {} failed: {source}", path.display())]
+    Mcap { path: PathBuf, source: mcap::McapError },
+    #[error("a record of the episode cannot be written as JSON: {0}")]
+    Json(#[from] serde_json::Error),
+    #[error("a message of the recording cannot be encoded: {0}")]
+    Encode(#[source] Box<dyn std::error::Error + Send + Sync>),
+}
+
+/// The content of `result.json`. Field order is the file's.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EpisodeResult {
+    pub task: String,
+    pub seed: u32,
+    /// Simulated seconds at which each phase was reached; null where it was not.
+    pub phases: PhaseTimes,
+    /// Control steps of 20 ms, the initial hold included.
+    pub env_steps: u32,
+    pub tool_calls: u32,
+    /// Robots that fell.
+    pub falls: u32,
+    /// Simulated seconds per second of physics.
+    pub realtime_factor: f64,
+    /// Of the whole physical state at the end, 16 hexadecimal digits.
+    pub state_hash: String,
+}
+
+impl EpisodeResult {
+    pub const FILE_NAME: &str = "result.json";
+
+    /// Writes `result.json` into a run folder. A reader sees the old file or the new one, never a part.
+    pub fn write(&self, folder: &Path) -> Result<PathBuf, OutputError> {
+        let mut text = serde_json::to_string_pretty(self)?;
+        text.push('\n');
+        write_whole(folder, Self::FILE_NAME, text.as_bytes())
+    }
+}
+
+impl From<&ResultReply> for EpisodeResult {
+    fn from(reply: &ResultReply) -> Self {
+        EpisodeResult {
+            task: reply.task.clone(),
+            seed: reply.seed,
+            phases: reply.phases.clone(),
+            env_steps: reply.env_steps,
+            tool_calls: reply.tool_calls,
+            falls: reply.falls,
+            realtime_factor: reply.realtime_factor,
+            state_hash: reply.state_hash.clone(),
+        }
+    }
+}
+
+/// Writes a file under another name first and renames it when it is complete.
+pub(crate) fn write_whole(folder: &Path, name: &str, bytes: &[u8]) -> Result<PathBuf, OutputError> {
+    let path = folder.join(name);
+    let partial = folder.join(format!("{name}.partial"));
+    fs::write(&partial, bytes)
+        .and_then(|()| fs::rename(&partial, &path))
+        .map_err(|source| OutputError::Io { path: path.clone(), source })?;
+    Ok(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn result(p3_s: Option<f64>) -> EpisodeResult {
+        EpisodeResult {
+            task: "handover".into(),
+            seed: 3,
+            phases: PhaseTimes(vec![
+                ("p1".into(), Some(4.2)),
+                ("p2".into(), Some(9.86)),
+                ("p3".into(), p3_s),
+            ]),
+            env_steps: 812,
+            tool_calls: 61,
+            falls: 0,
+            realtime_factor: 3.5,
+            state_hash: "00c0ffee00c0ffee".into(),
+        }
+    }
+
+    #[test]
+    fn result_json_has_the_agreed_keys() {
+        let folder = tempfile::tempdir().unwrap();
+        for (p3_s, p3) in [(None, json!(null)), (Some(14.0), json!(14.0))] {
+            let path = result(p3_s).write(folder.path()).unwrap();
+            let written: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+            let expected = json!({
+                "task": "handover", "seed": 3, "phases": {"p1": 4.2, "p2": 9.86, "p3": p3}, "env_steps": 812,
+                "tool_calls": 61, "falls": 0, "realtime_factor": 3.5, "state_hash": "00c0ffee00c0ffee",
+            });
+            assert_eq!(written, expected);
+            assert_eq!(serde_json::from_value::<EpisodeResult>(written).unwrap(), result(p3_s));
+        }
+        let names: Vec<_> =
+            fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        assert_eq!(names, ["result.json"], "no partial file stays behind");
+    }
+
+    #[test]
+    fn a_missing_folder_is_an_error_that_names_the_file() {
+        let error = result(None).write(Path::new("/nonexistent/run")).unwrap_err();
+        assert!(error.to_string().contains("/nonexistent/run/result.json"), "{error}");
+    }
+}
