@@ -7,6 +7,7 @@ pub mod assets;
 mod error;
 pub mod locomotion;
 pub mod mjcf;
+pub mod render;
 pub mod robot;
 pub mod world;
 

@@ -26,6 +26,8 @@ pub struct Geom {
     pub body_from_geom: Pose,
     pub rgba: [f32; 4],
     pub material: Option<String>,
+    /// The material's texture is MuJoCo's builtin checker.
+    pub checkered: bool,
     pub friction: f32,
     /// Rolling resistance, 0 unless `condim` is 6.
     pub rolling_friction_m: f32,
@@ -70,6 +72,7 @@ impl Geom {
             body_from_geom,
             rgba: rgba.map(|c| c as f32),
             material: geom.material.clone(),
+            checkered: material.is_some_and(|material| is_checkered(document, material)),
             friction: geom.friction[0] as f32,
             rolling_friction_m: if geom.condim == 6 { geom.friction[2] as f32 } else { 0.0 },
             density_kg_m3: geom.density.unwrap_or(DEFAULT_DENSITY_KG_M3) as f32,
@@ -102,6 +105,11 @@ impl Geom {
         };
         Some((body_from_shape, shape))
     }
+}
+
+fn is_checkered(document: &Document, material: &mjcf_rs::assets::Material) -> bool {
+    let texture = material.texture.as_ref().and_then(|name| document.model.assets.texture(name));
+    texture.is_some_and(|texture| texture.builtin.as_deref() == Some("checker"))
 }
 
 /// Pose with z from the first to the second end point, centred between them, and half the distance.

@@ -3,6 +3,7 @@
 mod contacts;
 mod objects;
 mod snapshot;
+mod view;
 
 use std::sync::Arc;
 

@@ -1,0 +1,155 @@
+//! Triangle meshes of primitive shapes, with normals.
+
+use std::f32::consts::{PI, TAU};
+
+use rapier3d::math::Vector;
+
+/// A corner of a triangle, in the mesh's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vertex {
+    pub position_m: Vector,
+    pub normal: Vector,
+}
+
+/// Triangles, counter-clockwise seen from outside.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    pub vertices: Vec<Vertex>,
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// Around a circle, and from pole to pole: 120 triangles a sphere.
+const SEGMENTS: u32 = 12;
+const RINGS: u32 = 6;
+/// An unbounded plane is drawn this large.
+const PLANE_M: f32 = 20.0;
+
+impl Mesh {
+    pub fn sphere(radius_m: f32) -> Mesh {
+        Mesh::capsule(radius_m, 0.0)
+    }
+
+    /// A capsule along z; with no length, a sphere.
+    pub fn capsule(radius_m: f32, half_length_m: f32) -> Mesh {
+        let mut mesh = Mesh::default();
+        for ring in 0..=RINGS {
+            let polar_rad = PI * ring as f32 / RINGS as f32;
+            let middle = 2 * ring == RINGS;
+            let upper = 2 * ring <= RINGS;
+            mesh.ring(polar_rad, radius_m, if upper { half_length_m } else { -half_length_m });
+            if middle && half_length_m > 0.0 {
+                mesh.ring(polar_rad, radius_m, -half_length_m);
+            }
+        }
+        let rings = mesh.vertices.len() as u32 / (SEGMENTS + 1);
+        for ring in 0..rings - 1 {
+            mesh.join(ring * (SEGMENTS + 1), (ring + 1) * (SEGMENTS + 1));
+        }
+        mesh
+    }
+
+    pub fn ellipsoid(radii_m: Vector) -> Mesh {
+        let mut mesh = Mesh::sphere(1.0);
+        for vertex in &mut mesh.vertices {
+            vertex.position_m *= radii_m;
+            vertex.normal = (vertex.normal / radii_m).normalize();
+        }
+        mesh
+    }
+
+    /// A cylinder along z.
+    pub fn cylinder(radius_m: f32, half_length_m: f32) -> Mesh {
+        let mut mesh = Mesh::default();
+        let rim = |z| (0..=SEGMENTS).map(move |i| {
+            let (sin, cos) = (TAU * i as f32 / SEGMENTS as f32).sin_cos();
+            (Vector::new(radius_m * cos, radius_m * sin, z), Vector::new(cos, sin, 0.0))
+        });
+        for z in [half_length_m, -half_length_m] {
+            mesh.vertices.extend(rim(z).map(|(position_m, normal)| Vertex { position_m, normal }));
+        }
+        mesh.join(0, SEGMENTS + 1);
+        for z in [half_length_m, -half_length_m] {
+            let normal = Vector::Z * z.signum();
+            let first = mesh.vertices.len() as u32;
+            mesh.vertices.extend(rim(z).map(|(position_m, _)| Vertex { position_m, normal }));
+            for i in 1..SEGMENTS - 1 {
+                let fan = if z > 0.0 { [0, i, i + 1] } else { [0, i + 1, i] };
+                mesh.triangles.push(fan.map(|corner| first + corner));
+            }
+        }
+        mesh
+    }
+
+    pub fn cuboid(half_extents_m: Vector) -> Mesh {
+        let mut mesh = Mesh::default();
+        for axis in 0..3 {
+            for sign in [1.0, -1.0] {
+                let mut normal = Vector::ZERO;
+                normal[axis] = sign;
+                let mut u = Vector::ZERO;
+                u[(axis + 1) % 3] = 1.0;
+                let v = normal.cross(u);
+                let first = mesh.vertices.len() as u32;
+                for (a, b) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
+                    let corner = normal + u * a + v * b;
+                    mesh.vertices.push(Vertex { position_m: corner * half_extents_m, normal });
+                }
+                mesh.triangles.push([first, first + 1, first + 2]);
+                mesh.triangles.push([first, first + 2, first + 3]);
+            }
+        }
+        mesh
+    }
+
+    /// A rectangle at z = 0; 0 stands for no bound.
+    pub fn plane(half_extents_m: [f32; 2]) -> Mesh {
+        let [x, y] = half_extents_m.map(|half_m| if half_m > 0.0 { half_m } else { PLANE_M });
+        let corners = [(-x, -y), (x, -y), (x, y), (-x, y)];
+        let vertex = |(x, y)| Vertex { position_m: Vector::new(x, y, 0.0), normal: Vector::Z };
+        Mesh { vertices: corners.map(vertex).to_vec(), triangles: vec![[0, 1, 2], [0, 2, 3]] }
+    }
+
+    /// Triangles with flat faces.
+    pub fn faceted(points_m: &[Vector], triangles: &[[u32; 3]]) -> Mesh {
+        let mut mesh = Mesh::default();
+        for triangle in triangles {
+            let [a, b, c] = triangle.map(|corner| points_m[corner as usize]);
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            let first = mesh.vertices.len() as u32;
+            mesh.vertices.extend([a, b, c].map(|position_m| Vertex { position_m, normal }));
+            mesh.triangles.push([first, first + 1, first + 2]);
+        }
+        mesh
+    }
+
+    /// Centre and radius of a sphere around the mesh.
+    pub fn bounds(&self) -> (Vector, f32) {
+        let points = self.vertices.iter().map(|vertex| vertex.position_m);
+        let low = points.clone().fold(Vector::INFINITY, Vector::min);
+        let high = points.fold(Vector::NEG_INFINITY, Vector::max);
+        ((low + high) * 0.5, (high - low).length() * 0.5)
+    }
+
+    /// One circle of a sphere, moved along z.
+    fn ring(&mut self, polar_rad: f32, radius_m: f32, shift_m: f32) {
+        for i in 0..=SEGMENTS {
+            let (sin, cos) = (TAU * i as f32 / SEGMENTS as f32).sin_cos();
+            let normal = Vector::new(polar_rad.sin() * cos, polar_rad.sin() * sin, polar_rad.cos());
+            let position_m = normal * radius_m + Vector::new(0.0, 0.0, shift_m);
+            self.vertices.push(Vertex { position_m, normal });
+        }
+    }
+
+    /// A band of triangles between two circles, the upper one first.
+    fn join(&mut self, upper: u32, lower: u32) {
+        for i in 0..SEGMENTS {
+            let (a, b, c, d) = (upper + i, upper + i + 1, lower + i, lower + i + 1);
+            for triangle in [[a, c, d], [a, d, b]] {
+                let [p, q, r] = triangle.map(|corner| self.vertices[corner as usize].position_m);
+                if (q - p).cross(r - p).length_squared() > 0.0 {
+                    self.triangles.push(triangle);
+                }
+            }
+        }
+    }
+}

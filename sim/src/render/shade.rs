@@ -1,0 +1,63 @@
+//! Light: one sun with shadow, a sky that lights from above, a faint lamp at the camera.
+
+use rapier3d::math::Vector;
+
+use super::{Instance, Pattern};
+
+/// Direction to the sun; high, so that hands over a counter cast their shadow on it.
+pub(super) const TO_SUN: Vector = Vector::new(-0.306_186_2, 0.353_553_4, 0.883_883_5);
+const SUN: Vector = Vector::new(0.80, 0.77, 0.72);
+const FROM_BELOW: Vector = Vector::new(0.20, 0.19, 0.18);
+const FROM_ABOVE: Vector = Vector::new(0.40, 0.42, 0.45);
+const LAMP: f32 = 0.15;
+const HIGHLIGHT: f32 = 0.15;
+const SHININESS: f32 = 40.0;
+/// Linear.
+pub(super) const SKY: Vector = Vector::new(0.45, 0.55, 0.70);
+const CHECKER_DARK: f32 = 0.72;
+const CHECKER_PER_M: f32 = 2.0;
+
+/// Linear colour of a surface point (world) with normal `normal`, seen from `eye_m`, `sunlit` 0 to 1.
+pub(super) fn shade(albedo: Vector, point_m: Vector, normal: Vector, eye_m: Vector, sunlit: f32) -> Vector {
+    let to_eye = (eye_m - point_m).normalize();
+    let normal = if normal.dot(to_eye) < 0.0 { -normal } else { normal };
+    let facing_sun = normal.dot(TO_SUN).max(0.0) * sunlit;
+    let ambient = FROM_BELOW.lerp(FROM_ABOVE, normal.z * 0.5 + 0.5);
+    let half_way = (to_eye + TO_SUN).normalize();
+    let highlight = HIGHLIGHT * normal.dot(half_way).max(0.0).powf(SHININESS) * facing_sun;
+    albedo * (ambient + SUN * facing_sun + LAMP * normal.dot(to_eye).max(0.0)) + highlight
+}
+
+/// Linear colour of an instance's surface at a point of the world.
+pub(super) fn albedo(instance: &Instance, linear_rgb: Vector, point_m: Vector) -> Vector {
+    match instance.pattern {
+        Pattern::Plain => linear_rgb,
+        Pattern::Checker => {
+            let square = |metres: f32| (metres * CHECKER_PER_M).floor() as i32;
+            let dark = (square(point_m.x) + square(point_m.y)) & 1 == 0;
+            if dark { linear_rgb * CHECKER_DARK } else { linear_rgb }
+        }
+    }
+}
+
+pub(super) fn linear(srgb: [f32; 3]) -> Vector {
+    let decode = |v: f32| if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
+    Vector::from(srgb.map(decode))
+}
+
+/// Table from linear light to sRGB bytes.
+pub(super) struct SrgbTable(Vec<u8>);
+
+const TABLE_LAST: f32 = 4095.0;
+
+impl SrgbTable {
+    pub(super) fn new() -> SrgbTable {
+        let encode = |v: f32| if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+        SrgbTable((0..=TABLE_LAST as usize).map(|i| (encode(i as f32 / TABLE_LAST) * 255.0 + 0.5) as u8).collect())
+    }
+
+    pub(super) fn encode(&self, colour: Vector) -> [u8; 3] {
+        let index = colour.clamp(Vector::ZERO, Vector::ONE) * TABLE_LAST + 0.5;
+        index.to_array().map(|i| self.0[i as usize])
+    }
+}

@@ -1,0 +1,82 @@
+//! Shadow of the sun around the scene's focus, kept while nothing moves.
+
+use rapier3d::math::{Matrix, Pose, Rotation, Vector};
+
+use super::RenderScene;
+use super::raster::Target;
+use super::shade::TO_SUN;
+
+/// Texels along each side: 2.4 mm at a focus of 1.25 m, so that fingers cast shadows.
+const TEXELS: usize = 1024;
+/// The sun's camera stands this far from the focus.
+const DISTANCE_M: f32 = 8.0;
+/// A surface does not shade itself: it is looked up this far along its normal, and this much nearer to the sun.
+const NORMAL_OFFSET_M: f32 = 0.006;
+const BIAS_M: f32 = 0.004;
+
+#[derive(Default)]
+pub(super) struct ShadowMap {
+    /// "Nearness" here is [`DISTANCE_M`] minus the distance from the sun's plane, and grows towards the sun.
+    target: Target,
+    sun_from_world: Pose,
+    texels_per_m: f32,
+    drawn: Vec<Pose>,
+}
+
+impl ShadowMap {
+    /// Draws the shadows of `scene`, unless nothing has moved since the last time.
+    pub(super) fn update(&mut self, scene: &RenderScene) {
+        let poses = scene.instances.iter().map(|instance| instance.world_from_mesh);
+        if self.drawn.len() == scene.instances.len() && poses.clone().eq(self.drawn.iter().copied()) {
+            return;
+        }
+        self.drawn.clear();
+        self.drawn.extend(poses);
+        let x = Vector::Z.cross(TO_SUN).normalize();
+        let rotation = Rotation::from_mat3(&Matrix::from_cols(x, TO_SUN.cross(x), TO_SUN));
+        self.sun_from_world = Pose::from_parts(scene.focus_m, rotation).inverse();
+        self.texels_per_m = TEXELS as f32 / (2.0 * scene.focus_radius_m);
+        self.target.reset(TEXELS, TEXELS);
+        let mut corners = Vec::new();
+        for instance in &scene.instances {
+            let mesh = &scene.meshes[instance.mesh];
+            let sun_from_mesh = self.sun_from_world * instance.world_from_mesh;
+            corners.clear();
+            corners.extend(mesh.vertices.iter().map(|vertex| self.texel(sun_from_mesh * vertex.position_m)));
+            for triangle in &mesh.triangles {
+                let corners = triangle.map(|corner| corners[corner as usize]);
+                self.target.fill(corners, 0);
+            }
+        }
+    }
+
+    /// Map coordinates and nearness of a point in the sun's frame.
+    fn texel(&self, point_m: Vector) -> [f32; 3] {
+        let half = 0.5 * TEXELS as f32;
+        [half + point_m.x * self.texels_per_m, half - point_m.y * self.texels_per_m, point_m.z + DISTANCE_M]
+    }
+
+    /// 1 in the sun, 0 in the shadow, smooth over three texels; points outside the map are in the sun.
+    pub(super) fn sunlit(&self, point_m: Vector, normal: Vector) -> f32 {
+        let [u, v, nearness] = self.texel(self.sun_from_world * (point_m + normal * NORMAL_OFFSET_M));
+        let (u, v) = (u - 0.5, v - 0.5);
+        let (column, row) = (u.floor(), v.floor());
+        let inside = |i: f32| i >= 1.0 && i < (TEXELS - 3) as f32;
+        if !inside(column) || !inside(row) {
+            return 1.0;
+        }
+        // Four taps with a tent's weights are a bilinear filter three texels wide.
+        let weights = |part: f32| [1.0 - part, 1.0, 1.0, part];
+        let (across, down) = (weights(u - column), weights(v - row));
+        let mut sum = 0.0;
+        for (j, weight) in down.into_iter().enumerate() {
+            let start = (row as usize - 1 + j) * TEXELS + column as usize - 1;
+            for (i, occluder) in self.target.nearness[start..start + 4].iter().enumerate() {
+                if nearness + BIAS_M >= *occluder {
+                    sum += weight * across[i];
+                }
+            }
+        }
+        sum / 9.0
+    }
+}
