@@ -10,6 +10,7 @@
 mod call;
 mod checks;
 mod error;
+mod openapi;
 mod parts;
 mod schema;
 mod tool;
@@ -17,6 +18,7 @@ mod tools;
 
 pub use call::{EPISODE_TOOLS, ToolCall, ToolReply, tool_specs};
 pub use error::{ProblemBody, SpecError};
+pub use openapi::openapi;
 pub use parts::{
     Budget, CommandReply, HandReport, JointValues, PhaseReached, Png, Pose, Protocol, RobotFallen,
     RobotReport, StopReason,

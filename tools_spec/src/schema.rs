@@ -22,14 +22,19 @@ const DROPPED: &[&str] = &[
 
 /// The description of `T` and its schema without it.
 pub fn strict_schema<T: JsonSchema>() -> (String, Value) {
-    let settings = SchemaSettings::draft2020_12().with(|s| s.inline_subschemas = true);
-    let mut schema = settings.into_generator().into_root_schema_for::<T>().to_value();
+    let mut schema = plain_schema::<T>();
     make_strict(&mut schema);
     let description = match schema.as_object_mut().and_then(|object| object.remove("description")) {
         Some(Value::String(text)) => text,
         _ => String::new(),
     };
     (description, schema)
+}
+
+/// The schema of `T` as it is, for replies: nothing has to be strict about what the server itself sends.
+pub fn plain_schema<T: JsonSchema>() -> Value {
+    let settings = SchemaSettings::draft2020_12().with(|s| s.inline_subschemas = true);
+    settings.into_generator().into_root_schema_for::<T>().to_value()
 }
 
 /// Adds the handle that stands in the path over REST and among the arguments everywhere else.

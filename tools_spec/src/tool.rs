@@ -8,6 +8,8 @@ use crate::{SpecError, schema};
 
 /// The arguments of one tool. The type's doc comment is the tool's description.
 pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
+    /// What the tool answers.
+    type Reply: Serialize + DeserializeOwned + JsonSchema;
     /// The name a caller uses.
     const NAME: &'static str;
     /// Whether the call leaves the world exactly as it was and costs no steps.
@@ -50,6 +52,10 @@ pub struct ToolSpec {
     pub description: String,
     /// Strict JSON Schema of the arguments, with `episode_id` where the tool acts on an episode.
     pub input_schema: Value,
+    /// JSON Schema of the reply. Hosts of language models do not want it (MCP clients drop the pictures of a tool that
+    /// declares one), so it is only part of the OpenAPI description.
+    #[serde(skip)]
+    pub reply_schema: Value,
     /// Whether the call leaves the world as it was.
     pub read_only: bool,
     /// Whether the tool acts on an episode that `start_episode` made.
@@ -67,6 +73,7 @@ impl ToolSpec {
             name: T::NAME,
             description,
             input_schema,
+            reply_schema: schema::plain_schema::<T::Reply>(),
             read_only: T::READ_ONLY,
             on_episode: T::ON_EPISODE,
         }

@@ -1,6 +1,6 @@
 //! The contract as its two readers meet it: strict hosts read the schemas, policies read the refusals.
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use tandem_tools_spec::{EPISODE_TOOLS, ToolCall, tool_specs};
 
 const REFUSED_KEYWORDS: &[&str] =
@@ -168,4 +168,29 @@ fn numbers_that_json_cannot_hold_are_refused_too() {
         let text = ToolCall::Walk(walk).validate().unwrap_err().to_string();
         assert!(text.contains("vy_m_s") && text.contains("finite"), "{text}");
     }
+}
+
+#[test]
+fn openapi_has_a_path_for_every_tool() {
+    let document = tandem_tools_spec::openapi("1.2.3");
+    assert_eq!((&document["openapi"], &document["info"]["version"]), (&json!("3.1.0"), &json!("1.2.3")));
+    for tool in EPISODE_TOOLS {
+        let call = &document["paths"][format!("/v1/episodes/{{episode_id}}/tools/{tool}")]["post"];
+        assert_eq!(call["operationId"], *tool);
+        let schema = &call["requestBody"]["content"]["application/json"]["schema"];
+        assert!(schema["properties"].get("episode_id").is_none(), "{tool}: {schema}");
+        assert_eq!(
+            schema["required"].as_array().map(Vec::len),
+            schema["properties"].as_object().map(Map::len)
+        );
+        assert!(
+            call["responses"]["200"]["content"]["application/json"]["schema"]["type"] == "object",
+            "{tool}"
+        );
+    }
+    let start = &document["paths"]["/v1/episodes"]["post"];
+    assert!(
+        start["responses"]["201"]["content"]["application/json"]["schema"]["properties"]["episode_id"]
+            .is_object()
+    );
 }

@@ -24,6 +24,7 @@ pub struct CheckReach {
 }
 
 impl Tool for CheckReach {
+    type Reply = ReachReply;
     const NAME: &'static str = "check_reach";
     const READ_ONLY: bool = true;
 

@@ -13,6 +13,7 @@ use crate::Tool;
 pub struct Finish {}
 
 impl Tool for Finish {
+    type Reply = ResultReply;
     const NAME: &'static str = "finish";
     const READ_ONLY: bool = false;
 

@@ -15,6 +15,7 @@ pub struct GetRobotState {
 }
 
 impl Tool for GetRobotState {
+    type Reply = RobotState;
     const NAME: &'static str = "get_robot_state";
     const READ_ONLY: bool = true;
 

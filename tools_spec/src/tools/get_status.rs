@@ -12,6 +12,7 @@ use crate::{Budget, PhaseReached, Protocol, RobotFallen, Tool, tools::finish::En
 pub struct GetStatus {}
 
 impl Tool for GetStatus {
+    type Reply = StatusReply;
     const NAME: &'static str = "get_status";
     const READ_ONLY: bool = true;
 

@@ -12,6 +12,7 @@ use crate::{Protocol, Tool, tools::start_episode::Instruction};
 pub struct ListTasks {}
 
 impl Tool for ListTasks {
+    type Reply = TaskList;
     const NAME: &'static str = "list_tasks";
     const READ_ONLY: bool = true;
     const ON_EPISODE: bool = false;

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Tool, checks};
+use crate::{CommandReply, Tool, checks};
 
 /// Move wrists, fingers and base of one or more robots for a number of control steps of 20 ms. Inverse kinematics turns
 /// wrist poses into arm and waist joints. Robots that are not named hold still, and a null field keeps what was asked
@@ -86,6 +86,7 @@ impl WristMove {
 }
 
 impl Tool for MoveWrists {
+    type Reply = CommandReply;
     const NAME: &'static str = "move_wrists";
     const READ_ONLY: bool = false;
 

@@ -16,6 +16,7 @@ pub struct Observe {
 }
 
 impl Tool for Observe {
+    type Reply = Observation;
     const NAME: &'static str = "observe";
     const READ_ONLY: bool = true;
 

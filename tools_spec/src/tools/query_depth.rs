@@ -18,6 +18,7 @@ pub struct QueryDepth {
 }
 
 impl Tool for QueryDepth {
+    type Reply = DepthReply;
     const NAME: &'static str = "query_depth";
     const READ_ONLY: bool = true;
 

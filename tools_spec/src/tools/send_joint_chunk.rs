@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Tool, checks};
+use crate::{CommandReply, Tool, checks};
 
 /// Numbers in a row: 31 joint targets and the base command.
 pub const ACTION_ROW_LEN: usize = 35;
@@ -67,6 +67,7 @@ impl JointChunk {
 }
 
 impl Tool for SendJointChunk {
+    type Reply = CommandReply;
     const NAME: &'static str = "send_joint_chunk";
     const READ_ONLY: bool = false;
 

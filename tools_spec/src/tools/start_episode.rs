@@ -20,6 +20,7 @@ pub struct StartEpisode {
 }
 
 impl Tool for StartEpisode {
+    type Reply = StartReply;
     const NAME: &'static str = "start_episode";
     const READ_ONLY: bool = false;
     const ON_EPISODE: bool = false;

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Tool, checks};
+use crate::{CommandReply, Tool, checks};
 
 /// Let all robots hold their targets for a number of control steps of 20 ms: for a hand to arrive, for an object to come to
 /// rest.
@@ -15,6 +15,7 @@ pub struct Wait {
 }
 
 impl Tool for Wait {
+    type Reply = CommandReply;
     const NAME: &'static str = "wait";
     const READ_ONLY: bool = false;
 

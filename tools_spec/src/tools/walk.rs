@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Tool, checks};
+use crate::{CommandReply, Tool, checks};
 
 /// Walk, turn or change the pelvis height of one or more robots for a number of control steps of 20 ms, while their arms
 /// and hands hold. Velocities are in the robot's own frame and apply during this command only; the height persists.
@@ -42,6 +42,7 @@ impl WalkMove {
 }
 
 impl Tool for Walk {
+    type Reply = CommandReply;
     const NAME: &'static str = "walk";
     const READ_ONLY: bool = false;
 
