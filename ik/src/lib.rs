@@ -1,1 +1,64 @@
-//! Placeholder while the walking skeleton is under construction.
+//! Differential inverse kinematics: joint displacements that bring frames to targets within limits.
+//!
+//! A step solves one quadratic program in the joint displacement dq,
+//!
+//! ```text
+//!   minimise    sum over tasks  1/2 |W (J dq - alpha e)|^2 + 1/2 mu |dq|^2
+//!   subject to  lower <= dq <= upper,  barrier rows,  equality tasks
+//! ```
+//!
+//! Everything is f64 and SI: metres, radians, seconds. Poses are `nalgebra::Isometry3<f64>` in the frame of the model's
+//! root, which stands still. Twists are ordered [linear; angular].
+//!
+//! ```
+//! use tandem_ik::{Configuration, FrameTask, Model, PostureTask, Solver, Task};
+//!
+//! # fn main() -> Result<(), tandem_ik::IkError> {
+//! let xml = r#"<mujoco><compiler angle="radian"/><worldbody><body name="base"><body name="upper" pos="0 0 1">
+//!     <joint name="shoulder" axis="0 1 0" range="-2 2"/><body name="lower" pos="0.3 0 0">
+//!     <joint name="elbow" axis="0 1 0" range="-2 2"/><site name="hand" pos="0.3 0 0"/></body></body></body></worldbody></mujoco>"#;
+//! let model = Model::from_mjcf(xml)?;
+//! let mut configuration = Configuration::new(&model, &[0.3, 0.3])?;
+//! let hand = model.frame("hand")?;
+//! let mut target = configuration.root_from_frame(hand);
+//! target.translation.z -= 0.05;
+//! let tasks = [
+//!     Task::Frame(FrameTask { orientation_cost: 0.0, ..FrameTask::new(hand, target) }),
+//!     Task::Posture(PostureTask { target: vec![0.3, 0.3], cost: 1e-3, gain: 1.0 }),
+//! ];
+//! let mut solver = Solver::new(&model, 0.02);
+//! for _ in 0..20 {
+//!     solver.step(&mut configuration, &tasks, &[]);
+//! }
+//! let missing = configuration.root_from_frame(hand).translation.vector - target.translation.vector;
+//! assert!(missing.norm() < 1e-4);
+//! # Ok(())
+//! # }
+//! ```
+
+#![warn(missing_docs)]
+
+mod barrier;
+mod configuration;
+mod error;
+mod limits;
+mod model;
+pub mod qp;
+mod read_mjcf;
+mod read_urdf;
+mod solve;
+mod solver;
+pub mod spatial;
+mod task;
+
+pub use barrier::{Capsule, ClosestPair, PositionBarrier, SelfCollision};
+pub use configuration::Configuration;
+pub use error::IkError;
+pub use limits::{LimitKind, Limits};
+pub use model::{Frame, FrameId, Joint, JointKind, Model};
+pub use solve::{SolveOptions, SolveReport};
+pub use solver::{ClampedJoint, Outcome, Solver, Tolerance, frame_errors, saturated};
+pub use task::{
+    CenterOfMassTask, DampingTask, FrameError, FrameTask, JointCouplingTask, JointVelocityTask, LowAccelerationTask,
+    PostureTask, RelativeFrameTask, Task,
+};

@@ -1,0 +1,140 @@
+//! Barriers: distances that must not shrink below a margin, as linear constraints on dq.
+//!
+//! For a distance h(q) with margin m the row  dh/dq dq >= -gain (h - m)  lets h approach m exponentially and not cross
+//! it. Source: Ames et al., Control barrier functions: theory and applications, 2019.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::qp::Qp;
+use crate::{Configuration, FrameId};
+
+/// A sphere swept along a segment, fixed to a frame; a sphere if both ends are the same.
+#[derive(Clone, Debug)]
+pub struct Capsule {
+    /// Frame that it moves with.
+    pub frame: FrameId,
+    /// Ends of the segment in that frame, m.
+    pub ends: [Point3<f64>; 2],
+    /// m.
+    pub radius_m: f64,
+}
+
+/// Keeps pairs of capsules apart.
+#[derive(Clone, Debug, Default)]
+pub struct SelfCollision {
+    /// Shapes of the robot.
+    pub capsules: Vec<Capsule>,
+    /// Pairs of indices into `capsules`.
+    pub pairs: Vec<[usize; 2]>,
+    /// Distance between surfaces that is kept, m.
+    pub margin_m: f64,
+    /// Pairs further apart than this add no row, m.
+    pub range_m: f64,
+    /// Part of the distance beyond the margin that one step may take.
+    pub gain: f64,
+}
+
+/// The pair that is nearest to touching.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClosestPair {
+    /// Index into [`SelfCollision::pairs`].
+    pub pair: usize,
+    /// Distance between surfaces, m; negative where they overlap.
+    pub distance_m: f64,
+}
+
+/// Directions of nearly coincident axes are noise: below this distance no row is written, m.
+const SMALLEST_AXIS_DISTANCE_M: f64 = 1e-6;
+
+impl SelfCollision {
+    /// Nearest pair, if there are any.
+    pub fn closest(&self, configuration: &Configuration) -> Option<ClosestPair> {
+        let distances = (0..self.pairs.len()).map(|pair| ClosestPair { pair, distance_m: self.pair(configuration, pair).2 });
+        distances.min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))
+    }
+
+    /// Closest points on the axes of a pair (root frame, m) and the distance of the surfaces.
+    fn pair(&self, configuration: &Configuration, pair: usize) -> (Vector3<f64>, Vector3<f64>, f64) {
+        let [a, b] = self.pairs[pair].map(|index| &self.capsules[index]);
+        let [sa, sb] = [a, b].map(|capsule| {
+            let pose = configuration.root_from_frame(capsule.frame);
+            capsule.ends.map(|end| (pose * end).coords)
+        });
+        let (on_a, on_b) = closest_points(sa, sb);
+        (on_a, on_b, (on_a - on_b).norm() - a.radius_m - b.radius_m)
+    }
+
+    /// Writes one row per pair within range.
+    pub(crate) fn write(&self, configuration: &Configuration, qp: &mut Qp) {
+        for pair in 0..self.pairs.len() {
+            let (on_a, on_b, distance_m) = self.pair(configuration, pair);
+            let axis = on_a - on_b;
+            if distance_m > self.range_m || axis.norm() < SMALLEST_AXIS_DISTANCE_M {
+                continue;
+            }
+            let normal = axis.normalize();
+            let row = qp.push_row();
+            let [a, b] = self.pairs[pair].map(|index| self.capsules[index].frame);
+            for (frame, point, sign) in [(a, on_a, 1.0), (b, on_b, -1.0)] {
+                for &joint in configuration.model().support(frame) {
+                    row.coefficients[joint] += sign * normal.dot(&configuration.velocity_of_point(&point, joint).0);
+                }
+            }
+            row.bound = -self.gain * (distance_m - self.margin_m);
+        }
+    }
+}
+
+/// Keeps the origin of a frame on one side of a plane: normal . p >= offset, in the root's frame.
+#[derive(Clone, Debug)]
+pub struct PositionBarrier {
+    /// The frame.
+    pub frame: FrameId,
+    /// Unit vector to the free side.
+    pub normal: Vector3<f64>,
+    /// m.
+    pub offset_m: f64,
+    /// Part of the distance that one step may take.
+    pub gain: f64,
+}
+
+impl PositionBarrier {
+    pub(crate) fn write(&self, configuration: &Configuration, qp: &mut Qp) {
+        let point = configuration.root_from_frame(self.frame).translation.vector;
+        let row = qp.push_row();
+        for &joint in configuration.model().support(self.frame) {
+            row.coefficients[joint] = self.normal.dot(&configuration.velocity_of_point(&point, joint).0);
+        }
+        row.bound = -self.gain * (self.normal.dot(&point) - self.offset_m);
+    }
+}
+
+/// Closest points of two segments. Source: Ericson, Real-time collision detection, 2004, section 5.1.9.
+fn closest_points(a: [Vector3<f64>; 2], b: [Vector3<f64>; 2]) -> (Vector3<f64>, Vector3<f64>) {
+    let (da, db, between) = (a[1] - a[0], b[1] - b[0], a[0] - b[0]);
+    let (aa, bb, f) = (da.norm_squared(), db.norm_squared(), db.dot(&between));
+    let point_like = 1e-18;
+    let (s, t) = if aa <= point_like && bb <= point_like {
+        (0.0, 0.0)
+    } else if aa <= point_like {
+        (0.0, (f / bb).clamp(0.0, 1.0))
+    } else {
+        let c = da.dot(&between);
+        if bb <= point_like {
+            ((-c / aa).clamp(0.0, 1.0), 0.0)
+        } else {
+            let ab = da.dot(&db);
+            let parallel = aa * bb - ab * ab;
+            let s = if parallel > 1e-12 * aa * bb { ((ab * f - c * bb) / parallel).clamp(0.0, 1.0) } else { 0.5 };
+            let t = (ab * s + f) / bb;
+            if t < 0.0 {
+                ((-c / aa).clamp(0.0, 1.0), 0.0)
+            } else if t > 1.0 {
+                (((ab - c) / aa).clamp(0.0, 1.0), 1.0)
+            } else {
+                (s, t)
+            }
+        }
+    };
+    (a[0] + da * s, b[0] + db * t)
+}

@@ -1,0 +1,286 @@
+//! What is asked of the joints, as weighted least squares in the joint displacement dq.
+//!
+//! Each task asks for  J dq = alpha e  at a cost, and adds to the quadratic program
+//!   1/2 |W (J dq - alpha e)|^2 + 1/2 mu |dq|^2,   mu = lambda |alpha W e|^2,
+//! so that  H += (WJ)'(WJ) + mu I,  c -= alpha (WJ)'(We).
+//! J: k x nv; e: k; W: diagonal. lambda is Levenberg-Marquardt damping, which fades as the error does.
+//! Source: Sugihara, Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method, 2011.
+
+use nalgebra::{Isometry3, Vector3, Vector6};
+
+use crate::spatial::Log6;
+use crate::{Configuration, FrameId};
+
+/// One thing to achieve; see the variants.
+#[derive(Clone, Debug)]
+pub enum Task {
+    /// A frame at a pose in the root's frame.
+    Frame(FrameTask),
+    /// A frame at a pose in another frame.
+    RelativeFrame(RelativeFrameTask),
+    /// The centre of mass at a point in the root's frame.
+    CenterOfMass(CenterOfMassTask),
+    /// All joints near given coordinates.
+    Posture(PostureTask),
+    /// Slow joints.
+    Damping(DampingTask),
+    /// Joints that move at given speeds.
+    JointVelocity(JointVelocityTask),
+    /// Joints that keep their speed.
+    LowAcceleration(LowAccelerationTask),
+    /// Joints whose coordinates keep a linear relation.
+    JointCoupling(JointCouplingTask),
+}
+
+/// Puts a frame at a pose. Error: e = log(frame^-1 target), 6, [m; rad], in the frame itself;
+/// J = J_l^-1(e) J_body, with J_l the left Jacobian of SE(3).
+#[derive(Clone, Debug)]
+pub struct FrameTask {
+    /// The frame.
+    pub frame: FrameId,
+    /// Where it should be, in the root's frame.
+    pub target: Isometry3<f64>,
+    /// Cost per metre.
+    pub position_cost: f64,
+    /// Cost per radian.
+    pub orientation_cost: f64,
+    /// alpha in 0..=1: the part of the error to remove in one step.
+    pub gain: f64,
+    /// lambda, dimensionless.
+    pub lm_damping: f64,
+}
+
+impl FrameTask {
+    /// Cost 1 per metre and per radian, gain 1, no Levenberg-Marquardt damping.
+    pub fn new(frame: FrameId, target: Isometry3<f64>) -> FrameTask {
+        FrameTask { frame, target, position_cost: 1.0, orientation_cost: 1.0, gain: 1.0, lm_damping: 0.0 }
+    }
+
+    /// Position (m) and orientation (rad) still missing.
+    pub fn error(&self, configuration: &Configuration) -> FrameError {
+        let missing = configuration.root_from_frame(self.frame).inverse() * self.target;
+        FrameError { position_m: missing.translation.vector.norm(), orientation_rad: missing.rotation.angle() }
+    }
+}
+
+/// What a frame is away from its target.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FrameError {
+    /// Distance of the origins, m.
+    pub position_m: f64,
+    /// Angle between the orientations, rad.
+    pub orientation_rad: f64,
+}
+
+/// Puts a frame at a pose in another frame that moves too.
+#[derive(Clone, Debug)]
+pub struct RelativeFrameTask {
+    /// The frame to move.
+    pub frame: FrameId,
+    /// The frame that the target is given in.
+    pub reference: FrameId,
+    /// Where `frame` should be, in `reference`.
+    pub target: Isometry3<f64>,
+    /// Cost per metre.
+    pub position_cost: f64,
+    /// Cost per radian.
+    pub orientation_cost: f64,
+    /// alpha in 0..=1.
+    pub gain: f64,
+}
+
+/// Puts the centre of mass at a point. e = target - centre, 3, m.
+#[derive(Clone, Debug)]
+pub struct CenterOfMassTask {
+    /// In the root's frame, m.
+    pub target: Vector3<f64>,
+    /// Cost per metre, along the root's axes; 0 leaves an axis free.
+    pub cost: Vector3<f64>,
+    /// alpha in 0..=1.
+    pub gain: f64,
+}
+
+/// Keeps all joints near coordinates. J = 1, e = target - q, nv.
+#[derive(Clone, Debug)]
+pub struct PostureTask {
+    /// Model order, rad or m.
+    pub target: Vec<f64>,
+    /// Cost per rad or m.
+    pub cost: f64,
+    /// alpha in 0..=1.
+    pub gain: f64,
+}
+
+/// Costs joint speed: J = 1 / dt, e = 0, nv, rad/s. Pink's damping task leaves dt out; its cost is this one's over dt.
+#[derive(Clone, Debug)]
+pub struct DampingTask {
+    /// Cost per rad/s or m/s.
+    pub cost: f64,
+}
+
+/// Asks for joint speeds. J = 1 / dt, e = target, nv, rad/s.
+#[derive(Clone, Debug)]
+pub struct JointVelocityTask {
+    /// Model order, rad/s or m/s.
+    pub target: Vec<f64>,
+    /// Cost per rad/s or m/s.
+    pub cost: f64,
+}
+
+/// Costs changes of joint speed since the last step. J = 1 / dt, e = last velocity, nv, rad/s.
+#[derive(Clone, Debug)]
+pub struct LowAccelerationTask {
+    /// Cost per rad/s or m/s.
+    pub cost: f64,
+}
+
+/// Keeps  sum_i ratio_i q_i = offset.  J = ratios, e = offset - ratios' q, 1.
+#[derive(Clone, Debug)]
+pub struct JointCouplingTask {
+    /// Joint and its ratio.
+    pub ratios: Vec<(usize, f64)>,
+    /// rad or m.
+    pub offset: f64,
+    /// Cost per rad or m.
+    pub cost: f64,
+    /// alpha in 0..=1.
+    pub gain: f64,
+}
+
+/// Receives a task's weighted rows.
+pub(crate) trait Sink {
+    /// One row: (joint, W J) for the joints that move it, and  alpha W e.
+    fn row(&mut self, entries: &[(usize, f64)], error: f64);
+    /// The same weight on every joint: W 1 dq = W e, with e per joint.
+    fn diagonal(&mut self, weight: f64, error: &dyn Fn(usize) -> f64);
+    /// mu, on every joint.
+    fn damp(&mut self, mu: f64);
+}
+
+/// What tasks need to know beside the configuration.
+pub(crate) struct StepContext<'a> {
+    pub dt_s: f64,
+    pub last_velocity: &'a [f64],
+}
+
+/// Buffers of one evaluation, so that nothing allocates.
+#[derive(Default)]
+pub(crate) struct TaskScratch {
+    columns: Vec<(usize, Vector6<f64>)>,
+    entries: Vec<(usize, f64)>,
+    centre: Vec<Vector3<f64>>,
+}
+
+impl TaskScratch {
+    pub(crate) fn new(nv: usize) -> TaskScratch {
+        TaskScratch {
+            columns: Vec::with_capacity(2 * nv),
+            entries: Vec::with_capacity(2 * nv),
+            centre: vec![Vector3::zeros(); nv],
+        }
+    }
+}
+
+impl Task {
+    pub(crate) fn write(
+        &self,
+        configuration: &Configuration,
+        context: &StepContext,
+        scratch: &mut TaskScratch,
+        sink: &mut dyn Sink,
+    ) {
+        match self {
+            Task::Frame(task) => task.write(configuration, scratch, sink),
+            Task::RelativeFrame(task) => task.write(configuration, scratch, sink),
+            Task::CenterOfMass(task) => task.write(configuration, scratch, sink),
+            Task::Posture(task) => {
+                let q = configuration.q();
+                sink.diagonal(task.cost, &|joint| task.gain * (task.target[joint] - q[joint]));
+            }
+            Task::Damping(task) => sink.diagonal(task.cost / context.dt_s, &|_| 0.0),
+            Task::JointVelocity(task) => {
+                sink.diagonal(task.cost / context.dt_s, &|joint| task.target[joint] * context.dt_s);
+            }
+            Task::LowAcceleration(task) => {
+                sink.diagonal(task.cost / context.dt_s, &|joint| context.last_velocity[joint] * context.dt_s);
+            }
+            Task::JointCoupling(task) => {
+                let now: f64 = task.ratios.iter().map(|(joint, ratio)| ratio * configuration.q()[*joint]).sum();
+                scratch.entries.clear();
+                scratch.entries.extend(task.ratios.iter().map(|(joint, ratio)| (*joint, task.cost * ratio)));
+                sink.row(&scratch.entries, task.cost * task.gain * (task.offset - now));
+            }
+        }
+    }
+}
+
+impl FrameTask {
+    fn write(&self, configuration: &Configuration, scratch: &mut TaskScratch, sink: &mut dyn Sink) {
+        let root_from_frame = configuration.root_from_frame(self.frame);
+        let missing = Log6::of(&(root_from_frame.inverse() * self.target));
+        scratch.columns.clear();
+        for &joint in configuration.model().support(self.frame) {
+            let (linear, angular) = configuration.body_jacobian_column(&root_from_frame, joint);
+            scratch.columns.push((joint, missing.transform(&linear, &angular)));
+        }
+        let weights = [self.position_cost, self.orientation_cost];
+        write_pose_rows(scratch, &missing.twist, weights, self.gain, sink);
+        let weighted = (self.gain * self.position_cost * missing.twist.fixed_rows::<3>(0)).norm_squared()
+            + (self.gain * self.orientation_cost * missing.twist.fixed_rows::<3>(3)).norm_squared();
+        sink.damp(self.lm_damping * weighted);
+    }
+}
+
+impl RelativeFrameTask {
+    fn write(&self, configuration: &Configuration, scratch: &mut TaskScratch, sink: &mut dyn Sink) {
+        let root_from_frame = configuration.root_from_frame(self.frame);
+        let root_from_reference = configuration.root_from_frame(self.reference);
+        let goal = root_from_reference * self.target;
+        let missing = Log6::of(&(root_from_frame.inverse() * goal));
+        scratch.columns.clear();
+        for &joint in configuration.model().support(self.frame) {
+            let (linear, angular) = configuration.body_jacobian_column(&root_from_frame, joint);
+            scratch.columns.push((joint, missing.transform(&linear, &angular)));
+        }
+        // The reference carries the goal along: the frame sees it move the other way.
+        for &joint in configuration.model().support(self.reference) {
+            let (linear, angular) =
+                configuration.velocity_of_point(&root_from_frame.translation.vector, joint);
+            let frame_from_root = root_from_frame.rotation.inverse();
+            let carried = missing.transform(&(frame_from_root * linear), &(frame_from_root * angular));
+            match scratch.columns.iter_mut().find(|(known, _)| *known == joint) {
+                Some((_, column)) => *column -= carried,
+                None => scratch.columns.push((joint, -carried)),
+            }
+        }
+        write_pose_rows(scratch, &missing.twist, [self.position_cost, self.orientation_cost], self.gain, sink);
+    }
+}
+
+impl CenterOfMassTask {
+    fn write(&self, configuration: &Configuration, scratch: &mut TaskScratch, sink: &mut dyn Sink) {
+        configuration.center_of_mass_jacobian(&mut scratch.centre);
+        let missing = self.target - configuration.center_of_mass();
+        for axis in 0..3 {
+            let cost = self.cost[axis];
+            scratch.entries.clear();
+            scratch.entries.extend(scratch.centre.iter().enumerate().map(|(joint, column)| (joint, cost * column[axis])));
+            sink.row(&scratch.entries, cost * self.gain * missing[axis]);
+        }
+    }
+}
+
+fn write_pose_rows(
+    scratch: &mut TaskScratch,
+    error: &Vector6<f64>,
+    [position, orientation]: [f64; 2],
+    gain: f64,
+    sink: &mut dyn Sink,
+) {
+    for i in 0..6 {
+        let weight = if i < 3 { position } else { orientation };
+        scratch.entries.clear();
+        scratch.entries.extend(scratch.columns.iter().map(|(joint, column)| (*joint, weight * column[i])));
+        sink.row(&scratch.entries, weight * gain * error[i]);
+    }
+}
