@@ -21,7 +21,7 @@
 //! let mut configuration = Configuration::new(&model, &[0.3, 0.3])?;
 //! let hand = model.frame("hand")?;
 //! let mut target = configuration.root_from_frame(hand);
-//! target.translation.z -= 0.05;
+//! target.translation.x -= 0.05;
 //! let tasks = [
 //!     Task::Frame(FrameTask { orientation_cost: 0.0, ..FrameTask::new(hand, target) }),
 //!     Task::Posture(PostureTask { target: vec![0.3, 0.3], cost: 1e-3, gain: 1.0 }),
