@@ -1,1 +1,5 @@
-//! Placeholder while the walking skeleton is under construction.
+//! What the end-to-end tests share: a server in this process on a free port, and a client that keeps whatever comes back.
+
+mod server;
+
+pub use server::{Answer, TestServer};

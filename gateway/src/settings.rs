@@ -1,0 +1,115 @@
+//! Settings: flags first, then environment (`TANDEM_*`), then a TOML file, then defaults.
+
+use std::{
+    net::SocketAddr,
+    path::{Path, PathBuf},
+};
+
+use clap::Args;
+use serde::Deserialize;
+
+/// One source of settings; what it leaves out comes from the next. The doc comments are the help text.
+#[derive(Debug, Clone, Default, PartialEq, Args, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Layer {
+    /// Address to serve on [default: 127.0.0.1:8700].
+    #[arg(long, env = "TANDEM_LISTEN", global = true, value_name = "ADDRESS:PORT")]
+    pub listen: Option<SocketAddr>,
+    /// Folder that recordings are written to, one folder per episode [default: runs].
+    #[arg(long, env = "TANDEM_RUNS", global = true, value_name = "DIR")]
+    pub runs: Option<PathBuf>,
+    /// Episodes that may be held at once; each costs a thread and about 100 MB [default: 8].
+    #[arg(long, env = "TANDEM_MAX_EPISODES", global = true, value_name = "N")]
+    pub max_episodes: Option<u32>,
+    /// Largest request body that is read [default: 2000000].
+    #[arg(long, env = "TANDEM_MAX_BODY_BYTES", global = true, value_name = "BYTES")]
+    pub max_body_bytes: Option<usize>,
+}
+
+impl Layer {
+    fn or(self, next: Layer) -> Layer {
+        Layer {
+            listen: self.listen.or(next.listen),
+            runs: self.runs.or(next.runs),
+            max_episodes: self.max_episodes.or(next.max_episodes),
+            max_body_bytes: self.max_body_bytes.or(next.max_body_bytes),
+        }
+    }
+}
+
+/// Every setting, resolved.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Address to serve on; port 0 takes a free one.
+    pub listen: SocketAddr,
+    /// Folder that recordings are written to, one folder per episode.
+    pub runs: PathBuf,
+    /// Episodes that may be held at once.
+    pub max_episodes: u32,
+    /// Largest request body that is read.
+    pub max_body_bytes: usize,
+}
+
+/// Why settings cannot be resolved.
+#[derive(Debug, thiserror::Error)]
+pub enum SettingsError {
+    /// The file cannot be read.
+    #[error("cannot read the settings file {path}: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is no TOML, or holds a setting that does not exist.
+    #[error("{path}: {source}")]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// Where and what.
+        source: toml::de::Error,
+    },
+}
+
+impl Settings {
+    /// Fills what `flags` (and the environment, which clap reads) leave out from the file at `config`, then from defaults.
+    pub fn resolve(flags: Layer, config: Option<&Path>) -> Result<Settings, SettingsError> {
+        let file = match config {
+            Some(path) => read_layer(path)?,
+            None => Layer::default(),
+        };
+        let layer = flags.or(file);
+        Ok(Settings {
+            listen: layer.listen.unwrap_or(SocketAddr::from(([127, 0, 0, 1], 8700))),
+            runs: layer.runs.unwrap_or_else(|| "runs".into()),
+            max_episodes: layer.max_episodes.unwrap_or(8),
+            max_body_bytes: layer.max_body_bytes.unwrap_or(2_000_000),
+        })
+    }
+}
+
+fn read_layer(path: &Path) -> Result<Layer, SettingsError> {
+    let text =
+        std::fs::read_to_string(path).map_err(|source| SettingsError::Read { path: path.into(), source })?;
+    toml::from_str(&text).map_err(|source| SettingsError::Parse { path: path.into(), source })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flags_come_before_the_file_and_the_file_before_defaults() {
+        let path = std::env::temp_dir().join(format!("tandem-settings-{}.toml", std::process::id()));
+        std::fs::write(&path, "max_episodes = 3\nmax_body_bytes = 5\n").unwrap();
+        let flags = Layer { max_body_bytes: Some(7), ..Layer::default() };
+        let settings = Settings::resolve(flags, Some(&path)).unwrap();
+        assert_eq!((settings.max_body_bytes, settings.max_episodes, settings.listen.port()), (7, 3, 8700));
+
+        std::fs::write(&path, "max_episode = 3\n").unwrap();
+        let text = Settings::resolve(Layer::default(), Some(&path)).unwrap_err().to_string();
+        assert!(text.contains("max_episode`") && text.contains("`max_episodes`"), "{text}");
+        std::fs::remove_file(&path).unwrap();
+        assert!(Settings::resolve(Layer::default(), Some(&path)).is_err());
+    }
+}

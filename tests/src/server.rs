@@ -1,0 +1,124 @@
+//! The server and the client.
+
+use std::{net::SocketAddr, path::PathBuf, time::Duration};
+
+use serde_json::{Value, json};
+use tandem::{server::Server, settings::Settings};
+use ureq::{Agent, Body, SendBody, http};
+
+/// An answer of the server, refused or not.
+#[derive(Debug)]
+pub struct Answer {
+    pub status: u16,
+    pub content_type: String,
+    pub location: Option<String>,
+    pub body: Value,
+}
+
+impl Answer {
+    /// The body of an answer that has to be a success.
+    #[track_caller]
+    pub fn ok(self) -> Value {
+        assert!((200..300).contains(&self.status), "{self:?}");
+        self.body
+    }
+
+    /// Checks a refusal: problem details of this status whose text says each of `says`.
+    #[track_caller]
+    pub fn refused(&self, status: u16, says: &[&str]) {
+        assert_eq!(
+            (self.status, self.content_type.as_str()),
+            (status, "application/problem+json"),
+            "{self:?}"
+        );
+        assert_eq!(self.body["status"], json!(status), "{self:?}");
+        let detail = self.body["detail"].as_str().unwrap_or_default();
+        for part in says {
+            assert!(detail.contains(part), "{detail:?} does not say {part:?}");
+        }
+    }
+}
+
+/// A server that records into a temporary folder, with room for two episodes.
+pub struct TestServer {
+    server: Option<Server>,
+    pub address: SocketAddr,
+    pub runs: tempfile::TempDir,
+    agent: Agent,
+}
+
+impl TestServer {
+    pub fn start() -> TestServer {
+        let runs = tempfile::tempdir().expect("a temporary folder");
+        let settings = Settings {
+            listen: "127.0.0.1:0".parse().expect("an address"),
+            runs: runs.path().into(),
+            max_episodes: 2,
+            max_body_bytes: 2_000_000,
+        };
+        let server = Server::start(&settings).expect("a free port");
+        let timeout = Some(Duration::from_secs(60));
+        let agent =
+            Agent::config_builder().http_status_as_error(false).timeout_global(timeout).build().new_agent();
+        TestServer { address: server.address(), server: Some(server), runs, agent }
+    }
+
+    /// Stops the server as SIGTERM does.
+    pub fn stop(&mut self) {
+        self.server.take().expect("a running server").stop();
+    }
+
+    /// Starts an episode of Handover and returns its id.
+    #[track_caller]
+    pub fn episode(&self, protocol: &str) -> String {
+        let started =
+            self.post("/v1/episodes", &json!({ "task": "handover", "seed": 0, "protocol": protocol })).ok();
+        started["episode_id"].as_str().expect("an id").into()
+    }
+
+    /// The folder that an episode is recorded into.
+    pub fn folder(&self, id: &str) -> PathBuf {
+        self.runs.path().join(id)
+    }
+
+    pub fn tool(&self, id: &str, tool: &str, args: &Value) -> Answer {
+        self.post(&format!("/v1/episodes/{id}/tools/{tool}"), args)
+    }
+
+    pub fn post(&self, path: &str, body: &Value) -> Answer {
+        self.send("POST", path, Some("application/json"), body.to_string().as_bytes())
+    }
+
+    pub fn get(&self, path: &str) -> Answer {
+        self.send("GET", path, None, b"")
+    }
+
+    pub fn delete(&self, path: &str) -> Answer {
+        self.send("DELETE", path, None, b"")
+    }
+
+    /// Sends any bytes as any type.
+    pub fn send(&self, method: &str, path: &str, content_type: Option<&str>, body: &[u8]) -> Answer {
+        let mut request =
+            http::Request::builder().method(method).uri(format!("http://{}{path}", self.address));
+        // What MCP asks for, and what REST takes as well.
+        request = request.header("accept", "application/json, text/event-stream");
+        if let Some(content_type) = content_type {
+            request = request.header("content-type", content_type);
+        }
+        let answer = if body.is_empty() {
+            self.agent.run(request.body(SendBody::none()).expect("a request"))
+        } else {
+            self.agent.run(request.body(body).expect("a request"))
+        };
+        read(answer.unwrap_or_else(|error| panic!("{method} {path}: {error}")))
+    }
+}
+
+fn read(mut response: http::Response<Body>) -> Answer {
+    let header = |name| response.headers().get(name).and_then(|value| value.to_str().ok()).map(str::to_owned);
+    let (content_type, location) = (header("content-type").unwrap_or_default(), header("location"));
+    let text = response.body_mut().with_config().limit(50_000_000).read_to_string().expect("a body");
+    let body = serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error}: {text}"));
+    Answer { status: response.status().as_u16(), content_type, location, body }
+}

@@ -1,0 +1,69 @@
+//! The MCP route, as a host sees it: JSON-RPC over HTTP, with pictures as blocks of their own.
+
+use serde_json::{Value, json};
+use tandem_tests::TestServer;
+
+/// One JSON-RPC request, without any session.
+fn rpc(server: &TestServer, method: &str, params: Value) -> Value {
+    let request = json!({ "jsonrpc": "2.0", "id": 1, "method": method, "params": params });
+    server.post("/mcp", &request).ok()["result"].clone()
+}
+
+fn call(server: &TestServer, tool: &str, args: Value) -> Value {
+    rpc(server, "tools/call", json!({ "name": tool, "arguments": args }))
+}
+
+fn text(result: &Value) -> &str {
+    result["content"][0]["text"].as_str().expect("a block of text")
+}
+
+#[test]
+fn tools_are_those_of_the_contract() {
+    let server = TestServer::start();
+    let listed = rpc(&server, "tools/list", json!({}));
+    let tools = listed["tools"].as_array().expect("tools");
+    let specs = tandem_tools_spec::tool_specs();
+    assert_eq!(tools.len(), specs.len());
+    for (tool, spec) in tools.iter().zip(specs) {
+        assert_eq!((&tool["name"], &tool["inputSchema"]), (&json!(spec.name), &spec.input_schema));
+        assert_eq!(tool["annotations"]["readOnlyHint"], json!(spec.read_only), "{tool}");
+        assert!(tool.get("outputSchema").is_none(), "clients drop the pictures of such tools: {tool}");
+    }
+}
+
+#[test]
+fn an_episode_can_be_played() {
+    let server = TestServer::start();
+    let started =
+        call(&server, "start_episode", json!({ "task": "handover", "seed": 0, "protocol": "benchmark" }));
+    let started: Value = serde_json::from_str(text(&started)).expect("JSON");
+    let id = &started["episode_id"];
+
+    let waited = call(&server, "wait", json!({ "episode_id": id, "steps": 2 }));
+    let waited: Value = serde_json::from_str(text(&waited)).expect("JSON");
+    assert_eq!(waited["executed_steps"], 2);
+
+    let seen = call(&server, "observe", json!({ "episode_id": id, "robots": null }));
+    let kinds: Vec<&str> =
+        seen["content"].as_array().into_iter().flatten().filter_map(|block| block["type"].as_str()).collect();
+    assert_eq!(kinds, ["text", "text", "image", "image"]);
+    assert_eq!(seen["content"][1]["text"], "2 images follow: A, B");
+    assert!(!text(&seen).contains("png_base64"));
+    assert!(seen["content"][2]["data"].as_str().is_some_and(|data| data.starts_with("iVBORw0KGgo")));
+}
+
+#[test]
+fn refusals_are_answers_that_a_model_can_read() {
+    let server = TestServer::start();
+    for (tool, args, says) in [
+        ("grasp", json!({}), "move_wrists"),
+        ("wait", json!({ "steps": 3 }), "wait needs episode_id"),
+        ("wait", json!({ "steps": 3, "episode_id": "nope" }), "no episode \"nope\""),
+        ("wait", json!({ "steps": 0, "episode_id": "nope" }), "at least 1"),
+        ("start_episode", json!({ "task": "handove", "seed": 0 }), "have: handover"),
+    ] {
+        let result = call(&server, tool, args);
+        assert_eq!(result["isError"], true, "{result}");
+        assert!(text(&result).contains(says), "{result}");
+    }
+}
