@@ -164,9 +164,16 @@ impl JsonSchema for JointValues {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Png(pub Vec<u8>);
 
+impl Png {
+    /// The file as base64, as JSON and MCP carry it.
+    pub fn to_base64(&self) -> String {
+        BASE64_STANDARD.encode(&self.0)
+    }
+}
+
 impl Serialize for Png {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(&BASE64_STANDARD.encode(&self.0))
+        serializer.serialize_str(&self.to_base64())
     }
 }
 
