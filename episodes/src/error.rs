@@ -19,6 +19,12 @@ pub enum EpisodeError {
     Spec(#[from] SpecError),
     #[error("the world cannot be built: {0}")]
     Sim(#[from] tandem_sim::SimError),
+    #[error("inverse kinematics cannot use the robot's file: {0}")]
+    Ik(#[from] tandem_ik::IkError),
+    #[error("a picture cannot be encoded: {0}")]
+    Picture(#[from] tandem_sim::render::PictureError),
+    #[error(transparent)]
+    Output(#[from] crate::results::OutputError),
 }
 
 fn reason_text(reason: EndReason) -> &'static str {

@@ -1,6 +1,6 @@
 //! What scoring and the experts may know about the world. None of it is served to a policy.
 
-use tandem_sim::{ObjectState, Pose, Side, Vector};
+use tandem_sim::{Pose, Side, Vector};
 
 /// Index of robot A in [`Facts::robots`].
 pub const A: usize = 0;
@@ -20,9 +20,9 @@ pub struct Facts {
 /// One robot.
 #[derive(Clone, Debug)]
 pub struct RobotFacts {
-    pub world_from_pelvis: Pose,
+    pub pelvis_in_world: Pose,
     /// Left, right.
-    pub pelvis_from_wrist: [Pose; 2],
+    pub wrist_in_pelvis: [Pose; 2],
     pub fallen: bool,
 }
 
@@ -30,7 +30,9 @@ pub struct RobotFacts {
 #[derive(Clone, Debug)]
 pub struct ObjectFacts {
     pub name: String,
-    pub state: ObjectState,
+    pub pose_in_world: Pose,
+    pub velocity_m_s: Vector,
+    pub angular_velocity_rad_s: Vector,
     /// Height of the object's origin above the floor when the episode began.
     pub rest_height_m: f32,
     /// Per robot: left hand, right hand.
@@ -74,26 +76,26 @@ impl Facts {
     /// How far the origin of `object` is above where it rested when the episode began.
     pub fn lift_m(&self, object: &str) -> f32 {
         let object = self.object(object);
-        object.state.world_from_object.translation.z - object.rest_height_m
+        object.pose_in_world.translation.z - object.rest_height_m
     }
 
     /// Angle between the z axis of `object` and the world's.
     pub fn tilt_rad(&self, object: &str) -> f32 {
-        let up_in_world = self.object(object).state.world_from_object.rotation * Vector::Z;
+        let up_in_world = self.object(object).pose_in_world.rotation * Vector::Z;
         up_in_world.angle_between(Vector::Z)
     }
 
     pub fn speed_m_s(&self, object: &str) -> f32 {
-        self.object(object).state.velocity_m_s.length()
+        self.object(object).velocity_m_s.length()
     }
 
     pub fn turn_rate_rad_s(&self, object: &str) -> f32 {
-        self.object(object).state.angular_velocity_rad_s.length()
+        self.object(object).angular_velocity_rad_s.length()
     }
 
     /// World position of the origin of `object`.
     pub fn position_m(&self, object: &str) -> Vector {
-        self.object(object).state.world_from_object.translation
+        self.object(object).pose_in_world.translation
     }
 
     /// Tasks name their own objects, so a name that is not there is a mistake in the task's file.
@@ -115,17 +117,15 @@ pub(crate) mod constructed {
         /// Every object at its spot, at rest and touched by no hand since the episode began 10 s ago.
         pub fn at_rest(task: &Task) -> Facts {
             let robot = |_| RobotFacts {
-                world_from_pelvis: Pose::IDENTITY,
-                pelvis_from_wrist: [Pose::IDENTITY; 2],
+                pelvis_in_world: Pose::IDENTITY,
+                wrist_in_pelvis: [Pose::IDENTITY; 2],
                 fallen: false,
             };
             let object = |spot: &crate::tasks::ObjectSpot| ObjectFacts {
                 name: spot.name.into(),
-                state: ObjectState {
-                    world_from_object: Pose::from_translation(spot.position_m.into()),
-                    velocity_m_s: Vector::ZERO,
-                    angular_velocity_rad_s: Vector::ZERO,
-                },
+                pose_in_world: Pose::from_translation(spot.position_m.into()),
+                velocity_m_s: Vector::ZERO,
+                angular_velocity_rad_s: Vector::ZERO,
                 rest_height_m: spot.position_m[2],
                 hands: vec![[Grip::Off; 2]; task.robots.len()],
                 untouched_s: 10.0,
@@ -149,13 +149,13 @@ pub(crate) mod constructed {
         }
 
         pub fn raised(mut self, object: &str, by_m: f32) -> Facts {
-            self.object_mut(object).state.world_from_object.translation.z += by_m;
+            self.object_mut(object).pose_in_world.translation.z += by_m;
             self
         }
 
         pub fn turned(mut self, object: &str, axis: Vector, angle_rad: f32) -> Facts {
             let turn = tandem_sim::Rotation::from_axis_angle(axis, angle_rad);
-            self.object_mut(object).state.world_from_object.rotation = turn;
+            self.object_mut(object).pose_in_world.rotation = turn;
             self
         }
     }

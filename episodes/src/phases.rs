@@ -84,8 +84,8 @@ mod tests {
                 }
             }
             OnTarget => {
-                let target = facts.object("target_pad").state;
-                facts.object_mut("bottle").state = target;
+                let target = facts.object("target_pad").pose_in_world;
+                facts.object_mut("bottle").pose_in_world = target;
             }
         }
         facts

@@ -38,6 +38,7 @@ impl McapFile {
             .map_err(|source| OutputError::Io { path: partial_path.clone(), source })?;
         let writer = mcap::WriteOptions::new()
             .library(concat!("tandem ", env!("CARGO_PKG_VERSION")))
+            .compression(Some(mcap::Compression::Lz4))
             .create(BufWriter::new(file))
             .map_err(|source| OutputError::Mcap { path: partial_path.clone(), source })?;
         Ok(McapFile { writer, partial_path, path, buffer: Vec::new() })

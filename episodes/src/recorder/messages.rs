@@ -97,7 +97,7 @@ impl From<&PhaseReached> for Json<Phase> {
 pub struct BudgetLeft {
     steps_left: u32,
     /// Absent where the protocol sets no limit.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "f64")]
     wall_clock_left_s: Option<f64>,
 }

@@ -184,6 +184,24 @@ fn metadata(bytes: &[u8]) -> BTreeMap<String, BTreeMap<String, String>> {
     summary.metadata_indexes.iter().map(read).map(|m| (m.name, m.metadata)).collect()
 }
 
+/// Foxglove's reader of JSON Schema wants one plain type per field and follows no references.
+#[test]
+fn json_schemas_are_flat() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, path) = record(folder.path());
+    let summary = mcap::Summary::read(&fs::read(path).unwrap()).unwrap().expect("a summary");
+    let schemas: Vec<_> = summary.schemas.values().filter(|schema| schema.encoding == "jsonschema").collect();
+    assert_eq!(schemas.len(), 5);
+    for schema in schemas {
+        let document: serde_json::Value = serde_json::from_slice(&schema.data).unwrap();
+        for (field, value) in document["properties"].as_object().unwrap() {
+            assert!(value["type"].is_string(), "{}.{field}: {value}", schema.name);
+        }
+        let required = document["required"].as_array().unwrap();
+        assert!(!required.contains(&"wall_clock_left_s".into()), "the benchmark protocol has no wall clock");
+    }
+}
+
 #[test]
 fn an_interrupted_recording_never_gets_the_final_name() {
     let folder = tempfile::tempdir().unwrap();

@@ -147,8 +147,8 @@ mod tests {
     /// The bottle stands on the target, untouched for 10 s.
     fn on_target() -> Facts {
         let mut facts = at_rest();
-        facts.object_mut("bottle").state.world_from_object =
-            facts.object("target_pad").state.world_from_object;
+        facts.object_mut("bottle").pose_in_world =
+            facts.object("target_pad").pose_in_world;
         facts
     }
 
@@ -160,11 +160,11 @@ mod tests {
 
     #[test]
     fn place_on_both_sides_of_every_threshold() {
-        let shifted = |by_m: Vector| changed(|bottle| bottle.state.world_from_object.translation += by_m);
+        let shifted = |by_m: Vector| changed(|bottle| bottle.pose_in_world.translation += by_m);
         let tilted = |degrees: f32| on_target().turned("bottle", Vector::Y, degrees.to_radians());
-        let moving = |m_s| changed(|bottle| bottle.state.velocity_m_s = Vector::new(0.0, m_s, 0.0));
+        let moving = |m_s| changed(|bottle| bottle.velocity_m_s = Vector::new(0.0, m_s, 0.0));
         let turning =
-            |rad_s| changed(|bottle| bottle.state.angular_velocity_rad_s = Vector::new(0.0, 0.0, rad_s));
+            |rad_s| changed(|bottle| bottle.angular_velocity_rad_s = Vector::new(0.0, 0.0, rad_s));
         let untouched = |for_s| changed(|bottle| bottle.untouched_s = for_s);
         for (what, inside, outside) in [
             ("x", shifted(Vector::X * 0.0599), shifted(Vector::X * 0.0601)),

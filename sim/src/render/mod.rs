@@ -11,7 +11,7 @@ mod shadow;
 
 pub use camera::Camera;
 pub use mesh::{Mesh, Vertex};
-pub use png::encode_png;
+pub use png::{PictureError, encode_png};
 pub use raster::CpuRenderer;
 
 use rapier3d::math::{Pose, Vector};

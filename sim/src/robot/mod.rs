@@ -68,6 +68,7 @@ struct Memory {
     last_upper_rad: Vec<f32>,
     torque_n_m: Vec<f32>,
     payload: Payload,
+    base: BaseCommand,
     fallen: bool,
 }
 
@@ -88,6 +89,11 @@ impl Robot {
             upper_rad: UPPER.map(|joint| q_rad[joint]),
             base: BaseCommand { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m },
         }
+    }
+
+    /// The base command of the last step.
+    pub fn base_command(&self) -> BaseCommand {
+        self.memory.base
     }
 
     fn read_joints(&self, physics: &PhysicsWorld) -> ([f32; JOINTS], [f32; JOINTS]) {
@@ -163,6 +169,7 @@ impl Robot {
         let upright = (pelvis.rotation * Vector::Z).z;
         self.memory.fallen |= pelvis.translation.z < FALLEN_HEIGHT_M || upright < FALLEN_TILT_COSINE;
         self.apply(physics, &drives, &q_rad, &qd_rad_s);
+        self.memory.base = command.base;
         if substep + 1 == PHYSICS_STEPS_PER_CONTROL {
             self.memory.last_upper_rad.copy_from_slice(&command.upper_rad);
         }

@@ -7,7 +7,7 @@ use rapier3d::prelude::*;
 
 use super::{JOINTS, Memory, Robot, RobotModel, UPPER, layout, payload::Payload};
 use crate::SimError;
-use crate::locomotion::Stand;
+use crate::locomotion::{BaseCommand, Stand};
 use crate::world::{RobotPlacement, link_tag};
 
 impl Robot {
@@ -45,8 +45,14 @@ impl Robot {
         }
         let (joints, slots) = connect(physics, model, &bodies, &q_rad);
         let last_upper_rad = UPPER.iter().map(|joint| q_rad[*joint]).collect();
-        let memory =
-            Memory { last_upper_rad, torque_n_m: vec![0.0; JOINTS], payload: Payload::default(), fallen: false };
+        let pelvis_height_m = world_from_link[0].translation.z;
+        let memory = Memory {
+            last_upper_rad,
+            torque_n_m: vec![0.0; JOINTS],
+            payload: Payload::default(),
+            base: BaseCommand { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m },
+            fallen: false,
+        };
         let name = placement.name.clone();
         let locomotion = Box::new(Stand::default());
         Ok(Robot { name, model: model.clone(), bodies, joints, slots, colliders, locomotion, memory })

@@ -110,6 +110,16 @@ impl World {
         self.objects.iter().find(|object| object.name == name).map(|object| object.state(&self.physics))
     }
 
+    /// Geoms of the scene that do not move, world frame.
+    pub fn room(&self) -> &[crate::mjcf::Geom] {
+        &self.fixed
+    }
+
+    /// Name and geoms of every object, in the object's frame.
+    pub fn object_geoms(&self) -> impl Iterator<Item = (&str, &[crate::mjcf::Geom])> {
+        self.objects.iter().map(|object| (object.name.as_str(), object.geoms.as_slice()))
+    }
+
     pub fn objects(&self) -> impl Iterator<Item = (&str, ObjectState)> {
         self.objects.iter().map(|object| (object.name.as_str(), object.state(&self.physics)))
     }

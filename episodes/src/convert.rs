@@ -1,0 +1,62 @@
+//! The one place where wire types become simulator or kinematics types, and back.
+
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use tandem_sim::{BaseCommand, BaseLimits, Pose, Rotation, Vector};
+use tandem_tools_spec as wire;
+
+/// Wire arrays to a rigid transform; the quaternion's norm has been checked to be positive.
+pub fn isometry(position_m: [f64; 3], quaternion_wxyz: [f64; 4]) -> Isometry3<f64> {
+    let [x, y, z] = position_m;
+    let [w, i, j, k] = quaternion_wxyz;
+    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k));
+    Isometry3::from_parts(Translation3::new(x, y, z), rotation)
+}
+
+pub fn isometry_from_sim(pose: &Pose) -> Isometry3<f64> {
+    let (t, r) = (pose.translation, pose.rotation);
+    isometry([t.x, t.y, t.z].map(f64::from), [r.w, r.x, r.y, r.z].map(f64::from))
+}
+
+pub fn wire_pose(pose: &Isometry3<f64>) -> wire::Pose {
+    let (t, r) = (pose.translation, pose.rotation);
+    wire::Pose { position_m: [t.x, t.y, t.z], quaternion_wxyz: [r.w, r.i, r.j, r.k] }
+}
+
+pub fn wire_pose_from_sim(pose: &Pose) -> wire::Pose {
+    wire_pose(&isometry_from_sim(pose))
+}
+
+pub fn wire_vector(v: Vector) -> [f64; 3] {
+    v.to_array().map(f64::from)
+}
+
+pub fn wire_base(base: &BaseCommand) -> wire::BaseCommand {
+    wire::BaseCommand {
+        vx_m_s: base.vx_m_s.into(),
+        vy_m_s: base.vy_m_s.into(),
+        yaw_rate_rad_s: base.yaw_rate_rad_s.into(),
+        pelvis_height_m: base.pelvis_height_m.into(),
+    }
+}
+
+pub fn wire_range([min, max]: [f32; 2]) -> wire::Range {
+    wire::Range { min: min.into(), max: max.into() }
+}
+
+/// A base command within the limits, and the fields that had to be moved there.
+pub fn clamp_base(command: BaseCommand, limits: &BaseLimits) -> (BaseCommand, Vec<String>) {
+    let clamped = limits.clamp(command);
+    let fields = [
+        ("vx_m_s", command.vx_m_s, clamped.vx_m_s),
+        ("vy_m_s", command.vy_m_s, clamped.vy_m_s),
+        ("yaw_rate_rad_s", command.yaw_rate_rad_s, clamped.yaw_rate_rad_s),
+        ("pelvis_height_m", command.pelvis_height_m, clamped.pelvis_height_m),
+    ];
+    let moved = fields.iter().filter(|(_, asked, got)| asked != got).map(|(name, ..)| name.to_string());
+    (clamped, moved.collect())
+}
+
+/// OpenCV's camera axes (x right, y down, z forward) for a camera given in MuJoCo's (x right, y up, looking along -z).
+pub fn opencv_axes(pelvis_from_camera: &Pose) -> Pose {
+    *pelvis_from_camera * Pose::from_rotation(Rotation::from_rotation_x(std::f32::consts::PI))
+}

@@ -1,0 +1,88 @@
+//! What policies are told about tasks, protocols and robots.
+
+use tandem_sim::robot::{RobotModel, UPPER};
+use tandem_sim::{BaseLimits, World};
+use tandem_tools_spec::{
+    Instruction, JointInfo, PhaseInfo, Protocol, ProtocolInfo, RobotInfo, TaskInfo, TaskList,
+};
+
+use crate::convert::wire_range;
+use crate::protocol::rules;
+use crate::tasks::{self, Task};
+
+/// The reply to `list_tasks`.
+pub fn task_list() -> TaskList {
+    TaskList { tasks: tasks::ALL.iter().map(task_info).collect() }
+}
+
+fn task_info(task: &Task) -> TaskInfo {
+    TaskInfo {
+        id: task.id.into(),
+        instruction: task.instruction.into(),
+        robots: instructions(task),
+        phases: task
+            .phases
+            .iter()
+            .enumerate()
+            .map(|(index, phase)| PhaseInfo {
+                id: phase_id(index),
+                name: phase.id.into(),
+                description: phase.description.into(),
+                collaborative: phase.collaborative,
+            })
+            .collect(),
+        protocols: [Protocol::Agentic, Protocol::Benchmark].map(|protocol| protocol_info(protocol, task)).to_vec(),
+    }
+}
+
+fn protocol_info(protocol: Protocol, task: &Task) -> ProtocolInfo {
+    let rules = rules(protocol, task);
+    ProtocolInfo {
+        protocol,
+        steps_per_command: rules.steps_per_command,
+        episode_steps: rules.episode_steps,
+        initial_hold_steps: rules.initial_hold_steps,
+        wall_clock_s: rules.thinking.map(|thinking| thinking.as_secs_f64()),
+        first_seed: rules.seeds.0,
+        last_seed: rules.seeds.1,
+    }
+}
+
+/// `p1` for the first phase.
+pub fn phase_id(index: usize) -> String {
+    format!("p{}", index + 1)
+}
+
+pub fn instructions(task: &Task) -> Vec<Instruction> {
+    let part = |robot: &tasks::RobotSpot| Instruction { robot: robot.name.into(), instruction: robot.instruction.into() };
+    task.robots.iter().map(part).collect()
+}
+
+pub fn robots(world: &World) -> Vec<RobotInfo> {
+    world.robots().iter().map(|robot| robot_info(&robot.name, &robot.model, &robot.base_limits())).collect()
+}
+
+fn robot_info(name: &str, model: &RobotModel, limits: &BaseLimits) -> RobotInfo {
+    RobotInfo {
+        robot: name.into(),
+        joints: model
+            .joints
+            .iter()
+            .map(|joint| JointInfo {
+                name: joint.name.clone(),
+                lower_rad: joint.lower_rad.into(),
+                upper_rad: joint.upper_rad.into(),
+            })
+            .collect(),
+        vx_m_s: wire_range(limits.vx_m_s),
+        vy_m_s: wire_range(limits.vy_m_s),
+        yaw_rate_rad_s: wire_range(limits.yaw_rate_rad_s),
+        pelvis_height_m: wire_range(limits.pelvis_height_m),
+    }
+}
+
+/// Names of the columns of an action row.
+pub fn action_row(model: &RobotModel) -> Vec<String> {
+    let joints = UPPER.iter().map(|joint| model.joints[*joint].name.clone());
+    joints.chain(["vx_m_s", "vy_m_s", "yaw_rate_rad_s", "pelvis_height_m"].map(String::from)).collect()
+}
