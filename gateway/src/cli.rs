@@ -13,24 +13,28 @@ pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
-    /// TOML file with any of the settings below; flags and environment come first.
-    #[arg(long, env = "TANDEM_CONFIG", global = true, value_name = "FILE")]
-    pub config: Option<PathBuf>,
-    /// Settings given as flags or environment.
-    #[command(flatten)]
-    pub layer: Layer,
 }
 
 /// What `tandem` can do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Serve episodes over HTTP until SIGINT or SIGTERM.
-    Serve,
+    Serve {
+        /// TOML file with any of the settings below; flags and environment come first.
+        #[arg(long, env = "TANDEM_CONFIG", value_name = "FILE")]
+        config: Option<PathBuf>,
+        /// Settings given as flags or environment.
+        #[command(flatten)]
+        flags: Layer,
+    },
     /// Play the Handover task by a scripted expert over real HTTP, and write what happened.
     Demo {
         /// One seed, or a range of seeds as 0..9, both ends included.
         #[arg(long = "seed", default_value = "0", value_name = "SEED")]
         seeds: Seeds,
+        /// Folder that the results are written to, one folder per episode.
+        #[arg(long, env = "TANDEM_RUNS", default_value = "runs", value_name = "DIR")]
+        runs: PathBuf,
     },
     /// List the tasks and their phases.
     Tasks,

@@ -3,7 +3,7 @@
 use std::{
     error::Error,
     net::{Ipv4Addr, SocketAddr},
-    process::ExitCode,
+    path::Path,
     sync::Arc,
 };
 
@@ -11,7 +11,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use tandem_episodes::{
     Facts,
     experts::{self, Arena, ExpertError},
-    tasks,
+    tasks::{self, Task},
 };
 use tandem_tools_spec::{CommandReply, Protocol, ResultReply, StartEpisode, ToolCall, ToolReply};
 
@@ -20,27 +20,40 @@ use crate::{
     http_caller::{HttpEpisode, HttpError},
     seeds::Seeds,
     server::Server,
-    settings::Settings,
+    settings::{Layer, Settings},
 };
 
 const TASK: &str = "handover";
 const LAST_PHASE: &str = "p3";
+/// The system picks one.
+const FREE_PORT: u16 = 0;
 
-/// Plays every seed in turn. Succeeds if the last phase was reached on 80 % of them, which for one seed means on that seed.
-pub fn run(settings: &Settings, seeds: Seeds) -> Result<ExitCode, Box<dyn Error>> {
-    let free_port = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-    let server = Server::start(&Settings { listen: free_port, ..settings.clone() })?;
-    let (mut played, mut placed) = (0, 0);
-    for seed in seeds.0 {
-        let result = play(&server, seed)?;
-        played += 1;
-        placed += u32::from(result.phases.reached_s(LAST_PHASE).is_some());
-    }
+/// Of the episodes played, how many in a hundred have to reach the last phase.
+const PASS_PERCENT: usize = 80;
+
+/// Plays every seed in turn, recorded under `runs`, and prints what came of it.
+pub fn play_all(runs: &Path, seeds: Seeds) -> Result<Vec<ResultReply>, Box<dyn Error>> {
+    let flags = Layer {
+        listen: Some(SocketAddr::from((Ipv4Addr::LOCALHOST, FREE_PORT))),
+        runs: Some(runs.into()),
+        ..Layer::default()
+    };
+    let server = Server::start(&Settings::resolve(flags, None)?)?;
+    let results = seeds.0.map(|seed| play(&server, seed)).collect::<Result<Vec<_>, _>>()?;
     server.stop();
-    if played > 1 {
-        println!("{LAST_PHASE} on {placed} of {played}");
+    if results.len() > 1 {
+        println!("{LAST_PHASE} on {} of {}", placed(&results), results.len());
     }
-    Ok(if placed * 10 >= played * 8 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(results)
+}
+
+/// Whether the last phase was reached on 80 % of the episodes; of a single one, whether it was reached.
+pub fn passed(results: &[ResultReply]) -> bool {
+    placed(results) * 100 >= results.len() * PASS_PERCENT
+}
+
+fn placed(results: &[ResultReply]) -> usize {
+    results.iter().filter(|result| result.phases.reached_s(LAST_PHASE).is_some()).count()
 }
 
 fn play(server: &Server, seed: u32) -> Result<ResultReply, Box<dyn Error>> {
@@ -57,22 +70,22 @@ fn play(server: &Server, seed: u32) -> Result<ResultReply, Box<dyn Error>> {
     if let Err(error) = outcome {
         println!("  the expert gave up: {error}");
     }
-    print_result(&result, &thread);
+    print_result(task, &result, thread.folder());
     Ok(result)
 }
 
-fn print_result(result: &ResultReply, thread: &EpisodeThread) {
-    for (id, time_s) in &result.phases.0 {
+fn print_result(task: &Task, result: &ResultReply, folder: &Path) {
+    for ((id, time_s), phase) in result.phases.0.iter().zip(task.phases) {
         match time_s {
-            Some(time_s) => println!("  {id} reached at {time_s:.2} s"),
-            None => println!("  {id} not reached"),
+            Some(time_s) => println!("  {id} {} reached at {time_s:.2} s", phase.id),
+            None => println!("  {id} {} not reached", phase.id),
         }
     }
     println!(
-        "  {} control steps, {} tool calls, {} falls, {:.1}x real time",
+        "  {} control steps of 20 ms, {} tool calls, {} falls, {:.1}x real time on one thread",
         result.env_steps, result.tool_calls, result.falls, result.realtime_factor
     );
-    println!("  files in {}", thread.folder().display());
+    println!("  {}: result.json, episode.mcap, strip.png, report.html", folder.display());
 }
 
 /// The expert's way to its episode: it acts over HTTP like any policy, and looks behind the curtain in this process.

@@ -22,16 +22,17 @@ fn main() -> ExitCode {
 }
 
 fn run(cli: Cli) -> Result<ExitCode, Box<dyn std::error::Error>> {
-    let settings = Settings::resolve(cli.layer, cli.config.as_deref())?;
     match cli.command {
-        Command::Serve => {
+        Command::Serve { config, flags } => {
             log_to_stderr("info");
+            let settings = Settings::resolve(flags, config.as_deref())?;
             Server::start(&settings)?.run_until_signal();
             Ok(ExitCode::SUCCESS)
         }
-        Command::Demo { seeds } => {
+        Command::Demo { seeds, runs } => {
             log_to_stderr("warn");
-            demo::run(&settings, seeds)
+            let results = demo::play_all(&runs, seeds)?;
+            Ok(if demo::passed(&results) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
         }
         Command::Tasks => {
             print_tasks();

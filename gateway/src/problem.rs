@@ -190,7 +190,9 @@ fn episode_kind(error: &EpisodeError) -> Kind {
         }
         EpisodeError::Ended { .. } => ("ended", "Episode ended", StatusCode::CONFLICT),
         EpisodeError::Spec(error) => spec_kind(error),
-        EpisodeError::Sim(_) | EpisodeError::Ik(_) | EpisodeError::Picture(_) | EpisodeError::Output(_) => INTERNAL,
+        EpisodeError::Sim(_) | EpisodeError::Ik(_) | EpisodeError::Picture(_) | EpisodeError::Output(_) => {
+            INTERNAL
+        }
     }
 }
 

@@ -13,16 +13,16 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields)]
 pub struct Layer {
     /// Address to serve on [default: 127.0.0.1:8700].
-    #[arg(long, env = "TANDEM_LISTEN", global = true, value_name = "ADDRESS:PORT")]
+    #[arg(long, env = "TANDEM_LISTEN", value_name = "ADDRESS:PORT")]
     pub listen: Option<SocketAddr>,
     /// Folder that recordings are written to, one folder per episode [default: runs].
-    #[arg(long, env = "TANDEM_RUNS", global = true, value_name = "DIR")]
+    #[arg(long, env = "TANDEM_RUNS", value_name = "DIR")]
     pub runs: Option<PathBuf>,
     /// Episodes that may be held at once; each costs a thread and about 100 MB [default: 8].
-    #[arg(long, env = "TANDEM_MAX_EPISODES", global = true, value_name = "N")]
+    #[arg(long, env = "TANDEM_MAX_EPISODES", value_name = "N")]
     pub max_episodes: Option<u32>,
     /// Largest request body that is read [default: 2000000].
-    #[arg(long, env = "TANDEM_MAX_BODY_BYTES", global = true, value_name = "BYTES")]
+    #[arg(long, env = "TANDEM_MAX_BODY_BYTES", value_name = "BYTES")]
     pub max_body_bytes: Option<usize>,
 }
 
