@@ -98,6 +98,36 @@ impl Facts {
         self.object(object).pose_in_world.translation
     }
 
+    /// World position of a point fixed to `object`, given in its frame.
+    pub fn point_m(&self, object: &str, point_in_object_m: Vector) -> Vector {
+        self.object(object).pose_in_world * point_in_object_m
+    }
+
+    /// Whether the origin of `object` is inside an upright cylinder fixed to `container`: at most `radius_m` from its z axis,
+    /// and between two heights above its origin.
+    pub fn inside_cylinder(&self, object: &str, container: &str, radius_m: f32, heights_m: [f32; 2]) -> bool {
+        let local = self.object(container).pose_in_world.inverse() * self.position_m(object);
+        local.truncate().length() <= radius_m && (heights_m[0]..=heights_m[1]).contains(&local.z)
+    }
+
+    /// Whether the origin of `object` is inside a box fixed to `container`, given by its smallest and largest corner.
+    pub fn inside_box(&self, object: &str, container: &str, low_m: Vector, high_m: Vector) -> bool {
+        let local = self.object(container).pose_in_world.inverse() * self.position_m(object);
+        local.cmpge(low_m).all() && local.cmple(high_m).all()
+    }
+
+    /// Whether a rod of `object`, from `ends_m[0]` to `ends_m[1]` in its frame, passes through a ring of `carrier`: a disc of
+    /// `radius_m` around `centre_m`, with its axis along y, in the carrier's frame.
+    pub fn threads(&self, object: &str, ends_m: [Vector; 2], carrier: &str, centre_m: Vector, radius_m: f32) -> bool {
+        let carrier_from_object = self.object(carrier).pose_in_world.inverse() * self.object(object).pose_in_world;
+        let [a, b] = ends_m.map(|end_m| carrier_from_object * end_m - centre_m);
+        if a.y * b.y > 0.0 {
+            return false;
+        }
+        let crossing = a + (b - a) * (a.y / (a.y - b.y));
+        crossing.x.hypot(crossing.z) <= radius_m
+    }
+
     /// Tasks name their own objects, so a name that is not there is a mistake in the task's file.
     pub fn object(&self, name: &str) -> &ObjectFacts {
         match self.objects.iter().find(|object| object.name == name) {

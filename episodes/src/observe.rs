@@ -18,7 +18,8 @@ pub struct Eyes {
 }
 
 impl Eyes {
-    fn render(&mut self, world: &World, camera: &Camera) -> Frame {
+    /// What any camera sees of the present state.
+    pub fn render(&mut self, world: &World, camera: &Camera) -> Frame {
         let now = world.control_steps();
         if self.scene.as_ref().is_none_or(|(then, _)| *then != now) {
             self.scene = Some((now, world.render_scene()));
@@ -29,14 +30,6 @@ impl Eyes {
         }
     }
 
-    pub fn egocentric(&mut self, world: &World, robot: usize) -> Frame {
-        self.render(world, &world.egocentric_camera(robot))
-    }
-
-    pub fn third_person(&mut self, world: &World) -> Frame {
-        self.render(world, &world.third_person_camera())
-    }
-
     /// Forgets the pictures: the world has been taken to another state.
     pub fn forget(&mut self) {
         self.scene = None;
@@ -45,7 +38,7 @@ impl Eyes {
     pub fn observe(&mut self, world: &World, robots: &[usize]) -> Result<Observation, EpisodeError> {
         let mut images = Vec::with_capacity(robots.len());
         for &robot in robots {
-            let frame = self.egocentric(world, robot);
+            let frame = self.render(world, &world.egocentric_camera(robot));
             let png = encode_png(frame.width, frame.height, &frame.rgb)?;
             images.push(CameraImage { robot: world.robots()[robot].name.clone(), png_base64: Png(png) });
         }

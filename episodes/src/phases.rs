@@ -13,11 +13,13 @@ pub struct PhaseTracker {
     reached_s: Vec<f64>,
     /// Whether the `first` of the present phase's sequence has held, unbroken.
     underway: bool,
+    /// Since when the present phase's lasting condition has held, in simulated seconds.
+    since_s: Option<f64>,
 }
 
 impl PhaseTracker {
     pub fn new(task: &Task) -> PhaseTracker {
-        PhaseTracker { phases: task.phases, reached_s: Vec::new(), underway: false }
+        PhaseTracker { phases: task.phases, reached_s: Vec::new(), underway: false, since_s: None }
     }
 
     /// Looks at one control step; true if it reached a phase.
@@ -29,6 +31,7 @@ impl PhaseTracker {
             }
             self.reached_s.push(facts.time_s);
             self.underway = false;
+            self.since_s = None;
         }
         self.reached_s.len() > before
     }
@@ -36,6 +39,11 @@ impl PhaseTracker {
     /// The phases reached so far, in order, with the time of each.
     pub fn reached(&self) -> impl Iterator<Item = (&'static Phase, f64)> {
         self.phases.iter().zip(self.reached_s.iter().copied())
+    }
+
+    /// Whether the present phase is a sequence whose `first` has held, unbroken.
+    pub fn underway(&self) -> bool {
+        self.underway
     }
 
     /// Whether the last phase has been reached.
@@ -49,6 +57,12 @@ impl PhaseTracker {
             Done::Sequence { first, then, broken } => {
                 self.underway = (self.underway && !broken(facts)) || first(facts);
                 self.underway && then(facts)
+            }
+            Done::Lasting { condition, for_s, at_end } => {
+                self.since_s = condition(facts).then(|| self.since_s.unwrap_or(facts.time_s));
+                // Times are sums of 20 ms steps; half of one keeps rounding out.
+                let lasted = self.since_s.is_some_and(|since_s| facts.time_s - since_s >= for_s - 0.01);
+                lasted && at_end(facts)
             }
         }
     }

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use tandem_sim::{ObjectPlacement, Pose, RobotCommand, RobotPlacement, Rotation, Snapshot, Vector, World, WorldSpec};
+use tandem_sim::{ObjectPlacement, Pose, RobotCommand, RobotPlacement, Rotation, Snapshot, World, WorldSpec};
 use tandem_tools_spec::{
     Briefing, Budget, CommandReply, EndReason, PhaseReached, PhaseTimes, Protocol, ResultReply, RobotFallen,
     StatusReply, StopReason, ToolCall, ToolReply,
@@ -226,6 +226,7 @@ impl Session {
             self.world.control_step(&commands);
             self.scores.keeper.update(&self.world);
             self.physics += started.elapsed();
+            let was_underway = self.scores.phases.underway();
             let reached = self.scores.phases.update(&self.facts());
             let budget = self.budget();
             if let Some(files) = &mut self.files {
@@ -233,6 +234,8 @@ impl Session {
             }
             if reached {
                 self.phase_reached()?;
+            } else if self.scores.phases.underway() && !was_underway {
+                self.keep_picture("together")?;
             }
             if self.scores.phases.complete() {
                 return Ok(step);
@@ -354,7 +357,9 @@ impl Session {
     /// Ends the episode and writes what a recorded one leaves behind.
     pub fn close(mut self) -> Result<ResultReply, EpisodeError> {
         self.ended.get_or_insert(EndReason::Finished);
-        self.keep_picture("end")?;
+        if !self.scores.phases.complete() {
+            self.keep_picture("end")?;
+        }
         let result = self.result();
         if let Some(files) = self.files {
             files.finish(&result, self.task)?;
@@ -395,10 +400,10 @@ fn world_spec(task: &Task, seed: u32) -> WorldSpec {
         position_m: robot.position_m,
         yaw_rad: robot.yaw_rad,
     });
-    let objects = task.objects.iter().zip(task.object_positions_m(seed)).map(|(spot, position_m)| ObjectPlacement {
+    let objects = task.objects.iter().zip(task.starts(seed)).map(|(spot, start)| ObjectPlacement {
         name: spot.name.into(),
-        file: spot.name.into(),
-        world_from_object: Pose::from_parts(Vector::from(position_m), Rotation::from_rotation_z(spot.yaw_rad)),
+        file: spot.file.into(),
+        world_from_object: Pose::from_parts(start.position_m.into(), Rotation::from_rotation_z(start.yaw_rad)),
     });
     WorldSpec { scene: task.scene.into(), robots: robots.collect(), objects: objects.collect() }
 }

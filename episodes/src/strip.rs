@@ -2,7 +2,7 @@
 
 use font8x8::legacy::BASIC_LEGACY;
 use tandem_sim::World;
-use tandem_sim::render::{Frame, encode_png};
+use tandem_sim::render::{Camera, Frame, encode_png};
 
 use crate::EpisodeError;
 use crate::observe::Eyes;
@@ -15,8 +15,8 @@ pub struct Moment {
     pub frames: Vec<Frame>,
 }
 
-const CELL_WIDTH: usize = 320;
-const CELL_HEIGHT: usize = 240;
+const CELL_WIDTH: usize = 400;
+const CELL_HEIGHT: usize = 300;
 const GAP: usize = 6;
 const CAPTION_HEIGHT: usize = 28;
 const GLYPH: usize = 8;
@@ -26,9 +26,11 @@ const INK: u8 = 25;
 
 impl Moment {
     pub fn capture(caption: &str, world: &World, eyes: &mut Eyes) -> Moment {
-        let mut frames = vec![eyes.third_person(world)];
-        frames.extend((0..world.robots().len()).map(|robot| eyes.egocentric(world, robot)));
-        Moment { caption: format!("{caption}  {:.1} s", world.time_s()), frames }
+        let in_cell = |camera: Camera| Camera { width: CELL_WIDTH as u32, height: CELL_HEIGHT as u32, ..camera };
+        let own = (0..world.robots().len()).map(|robot| world.egocentric_camera(robot));
+        let cameras = std::iter::once(world.third_person_camera()).chain(own);
+        let frames = cameras.map(|camera| eyes.render(world, &in_cell(camera))).collect();
+        Moment { caption: format!("{caption} {:.1} s", world.time_s()), frames }
     }
 }
 
@@ -54,21 +56,11 @@ struct Canvas {
 }
 
 impl Canvas {
-    /// Draws a frame at most a cell wide: larger ones are shrunk by a whole factor, each pixel a mean.
     fn draw(&mut self, x: usize, y: usize, frame: &Frame) {
-        let (width, height) = (frame.width as usize, frame.height as usize);
-        let factor = width.div_ceil(CELL_WIDTH).max(height.div_ceil(CELL_HEIGHT)).max(1);
-        for row in 0..height / factor {
-            for column in 0..width / factor {
-                let mean = |channel: usize| {
-                    let block = (0..factor * factor).map(|i| {
-                        let (px, py) = (column * factor + i % factor, row * factor + i / factor);
-                        u32::from(frame.rgb[(py * width + px) * 3 + channel])
-                    });
-                    (block.sum::<u32>() / (factor * factor) as u32) as u8
-                };
-                self.put(x + column, y + row, [mean(0), mean(1), mean(2)]);
-            }
+        let row_bytes = frame.width as usize * 3;
+        for (row, pixels) in frame.rgb.chunks_exact(row_bytes).enumerate() {
+            let start = ((y + row) * self.width + x) * 3;
+            self.rgb[start..start + row_bytes].copy_from_slice(pixels);
         }
     }
 

@@ -8,9 +8,9 @@ use std::f32::consts::PI;
 use tandem_sim::Side::Right;
 
 use super::{
-    Done, ObjectSpot, Phase, RobotSpot, Task,
+    Done, Phase, RobotSpot, Task,
     placement::{stands_released, within_box},
-    uniform_xy,
+    spot, uniform_xy,
 };
 use crate::facts::{A, B, Facts};
 
@@ -40,10 +40,10 @@ pub const TASK: Task = Task {
         },
     ],
     objects: &[
-        ObjectSpot { name: "bottle", position_m: [0.30, -0.07, COUNTER_M], yaw_rad: 0.0 },
-        ObjectSpot { name: "target_pad", position_m: [0.44, -0.06, COUNTER_M], yaw_rad: 0.0 },
+        spot("bottle", [0.30, -0.07, COUNTER_M]),
+        spot("target_pad", [0.44, -0.06, COUNTER_M]),
     ],
-    randomize: &[uniform_xy("bottle", 0.025), uniform_xy("target_pad", 0.025)],
+    randomize: &[uniform_xy(&["bottle"], 0.025, 0.025), uniform_xy(&["target_pad"], 0.025, 0.025)],
     instruction: "Robot A picks up the bottle with its right hand and passes it straight into Robot B's right hand; \
                   Robot B stands it upright on the target and lets go.",
     benchmark_steps: 1000,

@@ -2,16 +2,19 @@
 //!
 //! To add a task: one file here and its line in [`ALL`].
 
+mod co_pouring;
+mod frame_hang;
 mod handover;
 pub mod placement;
+mod pouring;
 mod randomize;
 
-pub use randomize::{Offset, uniform_xy};
+pub use randomize::{Offset, Start, uniform_xy};
 
 use crate::{EpisodeError, facts::Facts};
 
 /// Every task, in the benchmark's order.
-pub static ALL: &[Task] = &[handover::TASK];
+pub static ALL: &[Task] = &[handover::TASK, pouring::TASK, frame_hang::TASK, co_pouring::TASK];
 
 /// One benchmark task.
 #[derive(Debug)]
@@ -45,10 +48,16 @@ pub struct RobotSpot {
 /// Where an object rests before the seed moves it.
 #[derive(Debug)]
 pub struct ObjectSpot {
-    /// File name of the object under `sim/assets/objects`.
     pub name: &'static str,
+    /// File name under `sim/assets/objects`.
+    pub file: &'static str,
     pub position_m: [f32; 3],
     pub yaw_rad: f32,
+}
+
+/// An object called as its file, not turned.
+pub const fn spot(name: &'static str, position_m: [f32; 3]) -> ObjectSpot {
+    ObjectSpot { name, file: name, position_m, yaw_rad: 0.0 }
 }
 
 /// One scored phase.
@@ -69,6 +78,8 @@ pub enum Done {
     When(fn(&Facts) -> bool),
     /// When `then` holds after `first` held; a step at which `broken` holds in between asks for `first` again.
     Sequence { first: fn(&Facts) -> bool, then: fn(&Facts) -> bool, broken: fn(&Facts) -> bool },
+    /// When `condition` has held without a break for `for_s`, and `at_end` holds then too.
+    Lasting { condition: fn(&Facts) -> bool, for_s: f64, at_end: fn(&Facts) -> bool },
 }
 
 /// The task called `id`.
@@ -91,8 +102,8 @@ mod tests {
             assert_eq!(names, &["A", "B", "C"][..names.len()], "{}", task.id);
             assert_eq!(task.phases.len(), 3, "{}", task.id);
             for offset in task.randomize {
-                let known = task.objects.iter().any(|spot| spot.name == offset.object);
-                assert!(known, "{} moves {:?}", task.id, offset.object);
+                let known = |name: &&str| task.objects.iter().any(|spot| spot.name == *name);
+                assert!(offset.objects.iter().all(known), "{} moves {:?}", task.id, offset.objects);
             }
         }
     }

@@ -4,38 +4,47 @@ use std::ops::RangeInclusive;
 
 use super::Task;
 
-/// An object's displacement from its spot, uniform on each axis of the world.
+/// A displacement that some objects share, uniform on each axis of the world and about it.
 #[derive(Debug)]
 pub struct Offset {
-    pub object: &'static str,
+    /// Objects that move together.
+    pub objects: &'static [&'static str],
     pub x_m: RangeInclusive<f32>,
     pub y_m: RangeInclusive<f32>,
+    pub z_m: RangeInclusive<f32>,
+    /// Turn about each object's own vertical axis.
+    pub yaw_rad: RangeInclusive<f32>,
 }
 
-/// Up to `half_m` either way along world x and y, independently.
-pub const fn uniform_xy(object: &'static str, half_m: f32) -> Offset {
-    Offset { object, x_m: -half_m..=half_m, y_m: -half_m..=half_m }
+/// Up to `x_m` and `y_m` either way along world x and y, independently.
+pub const fn uniform_xy(objects: &'static [&'static str], x_m: f32, y_m: f32) -> Offset {
+    Offset { objects, x_m: -x_m..=x_m, y_m: -y_m..=y_m, z_m: 0.0..=0.0, yaw_rad: 0.0..=0.0 }
 }
 
 impl Task {
-    /// Where every object starts under `seed`, in the order of [`Task::objects`]: world position in metres.
-    pub fn object_positions_m(&self, seed: u32) -> Vec<[f32; 3]> {
+    /// Where every object starts under `seed`, in the order of [`Task::objects`]: world position in metres, and yaw.
+    pub fn starts(&self, seed: u32) -> Vec<Start> {
         let mut random = SplitMix64(seed.into());
-        let offsets: Vec<(&str, [f32; 2])> = self
-            .randomize
-            .iter()
-            .map(|o| (o.object, [random.uniform(&o.x_m), random.uniform(&o.y_m)]))
-            .collect();
-        let start = |spot: &super::ObjectSpot| {
-            let mut position_m = spot.position_m;
-            for (_, [x_m, y_m]) in offsets.iter().filter(|(object, _)| *object == spot.name) {
-                position_m[0] += x_m;
-                position_m[1] += y_m;
+        let mut starts: Vec<Start> =
+            self.objects.iter().map(|spot| Start { position_m: spot.position_m, yaw_rad: spot.yaw_rad }).collect();
+        for offset in self.randomize {
+            let [x_m, y_m, z_m, yaw_rad] =
+                [&offset.x_m, &offset.y_m, &offset.z_m, &offset.yaw_rad].map(|range| random.uniform(range));
+            let moved = |spot: &super::ObjectSpot| offset.objects.contains(&spot.name);
+            for (start, _) in starts.iter_mut().zip(self.objects).filter(|(_, spot)| moved(spot)) {
+                start.position_m = [start.position_m[0] + x_m, start.position_m[1] + y_m, start.position_m[2] + z_m];
+                start.yaw_rad += yaw_rad;
             }
-            position_m
-        };
-        self.objects.iter().map(start).collect()
+        }
+        starts
     }
+}
+
+/// Where one object starts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Start {
+    pub position_m: [f32; 3],
+    pub yaw_rad: f32,
 }
 
 /// Steele, Lea and Flood's SplitMix64: ten lines, so that a seed means the same episode in every version of Tandem,
@@ -73,19 +82,23 @@ mod tests {
     #[test]
     fn offsets_fill_their_ranges_and_stay_inside() {
         for task in ALL {
-            let starts: Vec<_> = (0..400).map(|seed| task.object_positions_m(seed)).collect();
+            let starts: Vec<_> = (0..400).map(|seed| task.starts(seed)).collect();
             for (index, spot) in task.objects.iter().enumerate() {
-                let Some(offset) = task.randomize.iter().find(|o| o.object == spot.name) else {
-                    continue;
-                };
-                for (axis, range) in [&offset.x_m, &offset.y_m].into_iter().enumerate() {
-                    let moved = starts.iter().map(|start| start[index][axis] - spot.position_m[axis]);
-                    let (low, high) = moved.fold((f32::MAX, f32::MIN), |(l, h), m| (l.min(m), h.max(m)));
-                    let (slack, width) = (1e-6, range.end() - range.start());
-                    assert!(low >= range.start() - slack && low < range.start() + 0.05 * width);
-                    assert!(high <= range.end() + slack && high > range.end() - 0.05 * width);
+                let own: Vec<_> = task.randomize.iter().filter(|offset| offset.objects.contains(&spot.name)).collect();
+                let axes: [fn(&Offset) -> &RangeInclusive<f32>; 4] =
+                    [|o| &o.x_m, |o| &o.y_m, |o| &o.z_m, |o| &o.yaw_rad];
+                let rest = [spot.position_m[0], spot.position_m[1], spot.position_m[2], spot.yaw_rad];
+                for (axis, range) in axes.into_iter().enumerate() {
+                    let low: f32 = own.iter().map(|offset| *range(offset).start()).sum();
+                    let high: f32 = own.iter().map(|offset| *range(offset).end()).sum();
+                    let value = |start: &Start| [start.position_m[0], start.position_m[1], start.position_m[2], start.yaw_rad][axis];
+                    let moved = starts.iter().map(|start| value(&start[index]) - rest[axis]);
+                    let (least, most) = moved.fold((f32::MAX, f32::MIN), |(l, h), m| (l.min(m), h.max(m)));
+                    // Sums of several offsets seldom come near their ends.
+                    let (slack, width) = (1e-5, high - low);
+                    assert!(least >= low - slack && least <= low + 0.25 * width + slack, "{} {axis}", spot.name);
+                    assert!(most <= high + slack && most >= high - 0.25 * width - slack, "{} {axis}", spot.name);
                 }
-                assert!(starts.iter().all(|start| start[index][2] == spot.position_m[2]));
             }
         }
     }
@@ -93,8 +106,8 @@ mod tests {
     #[test]
     fn a_seed_always_means_the_same_start_and_seeds_differ() {
         for task in ALL {
-            assert_eq!(task.object_positions_m(7), task.object_positions_m(7));
-            assert_ne!(task.object_positions_m(7), task.object_positions_m(8));
+            assert_eq!(task.starts(7), task.starts(7));
+            assert_ne!(task.starts(7), task.starts(8));
         }
     }
 }

@@ -1,0 +1,172 @@
+//! FrameHang: two robots lift a large picture frame and hang its loop on a peg in the wall.
+//!
+//! Conditions, tolerances and randomisation are the benchmark's. Where it is silent we chose what two G1s carry: a frame of
+//! 0.90 x 0.95 m and 1 kg that waits upright in a rack on the floor, so that its sides are at hand height.
+
+use std::f32::consts::FRAC_PI_2;
+
+use tandem_sim::Vector;
+
+use super::placement::RELEASE_S;
+use super::{Done, Offset, Phase, RobotSpot, Task, spot, uniform_xy};
+use crate::facts::{A, B, Facts};
+
+const FRAME_Y_M: f32 = 0.34;
+/// Surface of the wall.
+const WALL_Y_M: f32 = 0.50;
+const PEG_HEIGHT_M: f32 = 1.14;
+const LIFTED_M: f32 = 0.10;
+/// Ends of the peg's axis in its frame, and the hole of the loop in the frame's.
+const PEG_M: [Vector; 2] = [Vector::new(0.0, 0.0, 0.0), Vector::new(0.0, -0.107, 0.015)];
+const LOOP_CENTRE_M: Vector = Vector::new(0.0, 0.0, 0.988);
+const LOOP_RADIUS_M: f32 = 0.036;
+const STEADY_TILT_RAD: f32 = 35.0 * std::f32::consts::PI / 180.0;
+const STEADY_M_S: f32 = 0.20;
+const STEADY_RAD_S: f32 = 0.80;
+
+pub const TASK: Task = Task {
+    id: "frame_hang",
+    scene: "gallery_136",
+    robots: &[
+        RobotSpot {
+            name: "A",
+            position_m: [-0.32, 0.0],
+            yaw_rad: FRAC_PI_2,
+            instruction: "Take the left side of the frame with your left hand. Lift it level with your partner, bring the \
+                          brass loop on its top over the peg in the wall, lower it until it hangs, and let go.",
+        },
+        RobotSpot {
+            name: "B",
+            position_m: [0.32, 0.0],
+            yaw_rad: FRAC_PI_2,
+            instruction: "Take the right side of the frame with your right hand. Lift it level with your partner, bring the \
+                          brass loop on its top over the peg in the wall, lower it until it hangs, and let go.",
+        },
+    ],
+    objects: &[
+        spot("frame", [0.0, FRAME_Y_M, 0.0]),
+        spot("frame_rack", [0.0, FRAME_Y_M, 0.0]),
+        spot("wall_peg", [0.0, WALL_Y_M, PEG_HEIGHT_M]),
+    ],
+    randomize: &[
+        uniform_xy(&["frame", "frame_rack", "wall_peg"], 0.05, 0.025),
+        Offset { z_m: -0.04..=0.0, ..uniform_xy(&["wall_peg"], 0.0, 0.0) },
+        uniform_xy(&["frame", "frame_rack"], 0.03, 0.01),
+    ],
+    instruction: "Both robots lift the picture frame by its sides, hang it by its loop on the peg in the wall, and let go \
+                  once it hangs.",
+    benchmark_steps: 1000,
+    phases: &[
+        Phase {
+            id: "grasp",
+            description: "Both robots hold the frame.",
+            collaborative: false,
+            done: Done::When(held_by_both),
+        },
+        Phase {
+            id: "lift",
+            description: "Both robots hold the frame at least 10 cm above where it stood.",
+            collaborative: true,
+            done: Done::When(lifted),
+        },
+        Phase {
+            id: "hang",
+            description: "The peg has passed through the loop while both robots held the frame; the frame has stayed on it, \
+                          hangs within 35 degrees of upright and nearly still, and no hand has touched it for 0.2 s.",
+            collaborative: true,
+            done: Done::Sequence { first: threaded_while_held, then: hangs, broken: off_the_peg },
+        },
+    ],
+};
+
+fn held_by_both(f: &Facts) -> bool {
+    f.holds_any(A, "frame") && f.holds_any(B, "frame")
+}
+
+/// Both robots hold the frame in the air.
+fn lifted(f: &Facts) -> bool {
+    held_by_both(f) && f.lift_m("frame") >= LIFTED_M
+}
+
+fn threaded(f: &Facts) -> bool {
+    f.threads("wall_peg", PEG_M, "frame", LOOP_CENTRE_M, LOOP_RADIUS_M)
+}
+
+fn threaded_while_held(f: &Facts) -> bool {
+    threaded(f) && held_by_both(f)
+}
+
+fn off_the_peg(f: &Facts) -> bool {
+    !threaded(f)
+}
+
+/// The frame hangs on the peg, released.
+fn hangs(f: &Facts) -> bool {
+    threaded(f)
+        && f.untouched_s("frame") >= RELEASE_S
+        && f.tilt_rad("frame") <= STEADY_TILT_RAD
+        && f.speed_m_s("frame") <= STEADY_M_S
+        && f.turn_rate_rad_s("frame") <= STEADY_RAD_S
+}
+
+#[cfg(test)]
+mod tests {
+    use tandem_sim::Side::{Left, Right};
+
+    use super::*;
+    use crate::facts::{Grip::Holding, ObjectFacts};
+
+    fn held() -> Facts {
+        Facts::at_rest(&TASK).grip(A, Left, "frame", Holding).grip(B, Right, "frame", Holding)
+    }
+
+    /// The loop's centre at `offset_m` from where the middle of the peg's free part is.
+    fn on_peg(offset_m: Vector) -> Facts {
+        let mut facts = Facts::at_rest(&TASK);
+        let middle_m = facts.point_m("wall_peg", (PEG_M[0] + PEG_M[1]) * 0.5);
+        facts.object_mut("frame").pose_in_world.translation = middle_m + offset_m - LOOP_CENTRE_M;
+        facts
+    }
+
+    #[test]
+    fn both_robots_hold_and_lift_on_both_sides_of_10_cm() {
+        assert!(held_by_both(&held()));
+        assert!(!held_by_both(&Facts::at_rest(&TASK).grip(A, Left, "frame", Holding)));
+        assert!(lifted(&held().raised("frame", 0.1001)));
+        assert!(!lifted(&held().raised("frame", 0.0999)));
+    }
+
+    #[test]
+    fn the_peg_is_in_the_loop_or_beside_it() {
+        for (offset_m, expected) in [
+            (Vector::ZERO, true),
+            (Vector::new(0.0359, 0.0, 0.0), true),
+            (Vector::new(0.0361, 0.0, 0.0), false),
+            (Vector::new(0.0, 0.0, -0.0361), false),
+            (Vector::new(0.0, 0.052, 0.0), true),
+            (Vector::new(0.0, -0.055, 0.0), false),
+        ] {
+            assert_eq!(threaded(&on_peg(offset_m)), expected, "{offset_m}");
+        }
+    }
+
+    #[test]
+    fn hanging_on_both_sides_of_every_threshold() {
+        let changed = |change: &dyn Fn(&mut ObjectFacts)| {
+            let mut facts = on_peg(Vector::ZERO);
+            change(facts.object_mut("frame"));
+            facts
+        };
+        let moving = |m_s| changed(&|frame| frame.velocity_m_s = Vector::X * m_s);
+        let turning = |rad_s| changed(&|frame| frame.angular_velocity_rad_s = Vector::Y * rad_s);
+        let untouched = |for_s| changed(&|frame| frame.untouched_s = for_s);
+        for (what, inside, outside) in [
+            ("speed", moving(0.199), moving(0.201)),
+            ("turning", turning(0.799), turning(0.801)),
+            ("release", untouched(0.2), untouched(0.18)),
+        ] {
+            assert!(hangs(&inside), "{what} inside");
+            assert!(!hangs(&outside), "{what} outside");
+        }
+    }
+}

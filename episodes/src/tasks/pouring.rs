@@ -1,0 +1,152 @@
+//! Pouring: A tips a marble out of a small cup into a tall glass that B holds under it.
+//!
+//! Conditions, tolerances and randomisation are the benchmark's. Where it is silent we chose what two G1s reach without
+//! stepping: they face each other over a table, the cup before A's right hand, the glass before B's.
+
+use std::f32::consts::{FRAC_PI_3, FRAC_PI_6, PI};
+
+use super::{Done, Offset, Phase, RobotSpot, Task, spot, uniform_xy};
+use crate::facts::{A, Facts};
+
+/// Height of the worktop above the floor.
+const WORKTOP_M: f32 = 0.80;
+const ALOFT_M: f32 = 0.03;
+const TIPPED_RAD: f32 = FRAC_PI_3;
+/// Inside of the glass: its narrow part is 30 mm wide inside, its mouth 50 mm.
+const GLASS_RADIUS_M: f32 = 0.05;
+const GLASS_HEIGHTS_M: [f32; 2] = [0.0, 0.14];
+/// The marble's centre on the floor of the cup: 6 mm of base and its radius.
+const MARBLE_M: f32 = WORKTOP_M + 0.0171;
+const CUP_XY_M: [f32; 2] = [0.27, -0.10];
+
+pub const TASK: Task = Task {
+    id: "pouring",
+    scene: "kitchen_085",
+    robots: &[
+        RobotSpot {
+            name: "A",
+            position_m: [0.0, 0.0],
+            yaw_rad: 0.0,
+            instruction: "A marble lies in the small cup in front of you. Take the cup around its wall with your right hand, \
+                          lift it, bring it over the mouth of your partner's glass, and tip it until the marble falls in.",
+        },
+        RobotSpot {
+            name: "B",
+            position_m: [0.74, -0.12],
+            yaw_rad: PI,
+            instruction: "Take the tall glass in front of you around its wall with your right hand, lift it clear of the \
+                          table, and hold it upright and still under your partner's cup until the marble lies in it.",
+        },
+    ],
+    objects: &[
+        spot("cup", [CUP_XY_M[0], CUP_XY_M[1], WORKTOP_M]),
+        spot("glass", [0.47, -0.02, WORKTOP_M]),
+        spot("marble", [CUP_XY_M[0], CUP_XY_M[1], MARBLE_M]),
+    ],
+    randomize: &[
+        Offset { yaw_rad: -FRAC_PI_6..=FRAC_PI_6, ..uniform_xy(&["cup", "marble"], 0.03, 0.06) },
+        Offset { yaw_rad: -FRAC_PI_6..=FRAC_PI_6, ..uniform_xy(&["glass"], 0.03, 0.06) },
+        uniform_xy(&["marble"], 0.006, 0.006),
+    ],
+    instruction: "Both robots lift their vessels off the table; Robot A pours the marble from its cup into the glass that \
+                  Robot B holds up.",
+    benchmark_steps: 1000,
+    phases: &[
+        Phase {
+            id: "lift_both_vessels",
+            description: "Cup and glass are at least 3 cm above the worktop at the same time.",
+            collaborative: false,
+            done: Done::When(both_aloft),
+        },
+        Phase {
+            id: "tip",
+            description: "A holds the cup aloft and tilts it by at least 60 degrees.",
+            collaborative: false,
+            done: Done::When(tipped),
+        },
+        Phase {
+            id: "pour",
+            description: "The marble has been inside the glass for 0.5 s without a break, and the glass is at least 3 cm \
+                          above the worktop.",
+            collaborative: true,
+            done: Done::Lasting { condition: marble_in_glass, for_s: 0.5, at_end: glass_aloft },
+        },
+    ],
+};
+
+/// Cup and glass are off the worktop.
+fn both_aloft(f: &Facts) -> bool {
+    f.lift_m("cup") >= ALOFT_M && glass_aloft(f)
+}
+
+/// A holds the cup in the air, tilted.
+fn tipped(f: &Facts) -> bool {
+    f.holds_any(A, "cup") && f.lift_m("cup") >= ALOFT_M && f.tilt_rad("cup") >= TIPPED_RAD
+}
+
+/// The marble is between the walls of the glass.
+fn marble_in_glass(f: &Facts) -> bool {
+    f.inside_cylinder("marble", "glass", GLASS_RADIUS_M, GLASS_HEIGHTS_M)
+}
+
+/// The glass is off the worktop.
+fn glass_aloft(f: &Facts) -> bool {
+    f.lift_m("glass") >= ALOFT_M
+}
+
+#[cfg(test)]
+mod tests {
+    use tandem_sim::{Side::Right, Vector};
+
+    use super::*;
+    use crate::facts::Grip::{Holding, Touching};
+
+    fn lifted(cup_m: f32, glass_m: f32) -> Facts {
+        Facts::at_rest(&TASK).raised("cup", cup_m).raised("glass", glass_m)
+    }
+
+    #[test]
+    fn both_vessels_on_both_sides_of_3_cm() {
+        for (cup_m, glass_m, expected) in
+            [(0.0301, 0.0301, true), (0.0299, 0.0301, false), (0.0301, 0.0299, false)]
+        {
+            assert_eq!(both_aloft(&lifted(cup_m, glass_m)), expected, "{cup_m} {glass_m}");
+        }
+    }
+
+    #[test]
+    fn tip_on_both_sides_of_60_degrees() {
+        let held = |grip, lift_m, degrees: f32| {
+            let cup = lifted(lift_m, 0.1).grip(A, Right, "cup", grip);
+            cup.turned("cup", Vector::X, degrees.to_radians())
+        };
+        for (facts, expected) in [
+            (held(Holding, 0.1, 60.1), true),
+            (held(Holding, 0.1, 59.9), false),
+            (held(Touching, 0.1, 60.1), false),
+            (held(Holding, 0.0299, 60.1), false),
+        ] {
+            assert_eq!(tipped(&facts), expected);
+        }
+    }
+
+    #[test]
+    fn marble_on_both_sides_of_the_glass() {
+        let marble = |offset_m: Vector| {
+            let mut facts = lifted(0.1, 0.1);
+            let glass = facts.object("glass").pose_in_world;
+            facts.object_mut("marble").pose_in_world.translation = glass * offset_m;
+            facts
+        };
+        for (offset_m, expected) in [
+            (Vector::new(0.0, 0.0, 0.02), true),
+            (Vector::new(0.0499, 0.0, 0.02), true),
+            (Vector::new(0.0501, 0.0, 0.02), false),
+            (Vector::new(0.0, 0.0, 0.139), true),
+            (Vector::new(0.0, 0.0, 0.141), false),
+            (Vector::new(0.0, 0.0, -0.001), false),
+        ] {
+            assert_eq!(marble_in_glass(&marble(offset_m)), expected, "{offset_m}");
+        }
+    }
+}
