@@ -18,7 +18,7 @@ pub struct Layer {
     /// Folder that recordings are written to, one folder per episode [default: runs].
     #[arg(long, env = "TANDEM_RUNS", value_name = "DIR")]
     pub runs: Option<PathBuf>,
-    /// Episodes that may be held at once; each costs a thread and about 100 MB [default: 8].
+    /// Episodes that may be held at once; each costs a thread and about 30 MB [default: 8].
     #[arg(long, env = "TANDEM_MAX_EPISODES", value_name = "N")]
     pub max_episodes: Option<u32>,
     /// Largest request body that is read [default: 2000000].

@@ -69,6 +69,14 @@ fn no_source_file_is_too_long() {
 }
 
 #[test]
+fn most_source_files_are_short() {
+    let mut lengths: Vec<usize> = sources(&["rs"]).iter().map(|(_, text)| text.lines().count()).collect();
+    lengths.sort_unstable();
+    let median = lengths[lengths.len() / 2];
+    assert!(median <= 200, "half of the source files have more than {median} lines; 150 is what we aim at");
+}
+
+#[test]
 fn every_file_says_what_it_is_for() {
     let silent = sources(&["rs"])
         .into_iter()

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use crate::{
-    Finish, GetStatus, ListTasks, ProblemBody, StartEpisode, Tool, ToolSpec, schema::plain_schema, tool_specs,
+    Finish, GetStatus, ListTasks, ProblemBody, StartEpisode, Tool, schema::plain_schema, tool_specs,
 };
 
 /// The document. Each tool has a path of its own, so that generated clients have a method for each.
@@ -26,12 +26,14 @@ pub fn openapi(version: &str) -> Value {
             }
             StartEpisode::NAME => {
                 let mut start = operation(spec.name, &spec.description, "201", spec.reply_schema);
-                start["requestBody"] = json_body(spec.input_schema);
+                start["requestBody"] = json_body(spec.body_schema);
                 paths.insert("/v1/episodes".into(), json!({ "post": start }));
             }
             _ => {
                 let path = format!("/v1/episodes/{{episode_id}}/tools/{}", spec.name);
-                paths.insert(path, json!({ "parameters": [episode_id()], "post": tool(spec) }));
+                let mut call = operation(spec.name, &spec.description, "200", spec.reply_schema);
+                call["requestBody"] = json_body(spec.body_schema);
+                paths.insert(path, json!({ "parameters": [episode_id()], "post": call }));
             }
         }
     }
@@ -53,20 +55,6 @@ pub fn openapi(version: &str) -> Value {
     })
 }
 
-/// A call on an episode: the path names the episode, so the body need not.
-fn tool(spec: ToolSpec) -> Value {
-    let mut schema = spec.input_schema;
-    if let Some(required) = schema["required"].as_array_mut() {
-        required.retain(|name| name != "episode_id");
-    }
-    if let Some(properties) = schema["properties"].as_object_mut() {
-        properties.shift_remove("episode_id");
-    }
-    let mut call = operation(spec.name, &spec.description, "200", spec.reply_schema);
-    call["requestBody"] = json_body(schema);
-    call
-}
-
 fn operation(id: &str, description: &str, success: &str, reply: Value) -> Value {
     json!({
         "operationId": id,
@@ -81,8 +69,10 @@ fn operation(id: &str, description: &str, success: &str, reply: Value) -> Value 
     })
 }
 
+/// A body may be left out where no field of it is required.
 fn json_body(schema: Value) -> Value {
-    json!({ "required": true, "content": { "application/json": { "schema": schema } } })
+    let required = schema["required"].as_array().is_some_and(|fields| !fields.is_empty());
+    json!({ "required": required, "content": { "application/json": { "schema": schema } } })
 }
 
 fn episode_id() -> Value {

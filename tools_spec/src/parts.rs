@@ -122,7 +122,8 @@ pub struct CommandReply {
     pub budget: Budget,
 }
 
-/// One number per joint, in the robot's published joint order; JSON object from joint name to number.
+/// One number per joint, in the robot's published joint order; JSON object from joint name to number. JSON carries them
+/// to six decimals: the drives measure no finer, and a model reads a third of the text.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointValues(pub Vec<(String, f64)>);
 
@@ -135,7 +136,9 @@ impl JointValues {
 
 impl Serialize for JointValues {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.0.iter().map(|(name, value)| (name, value)))
+        // Adding zero makes the zero of tiny negative values a positive one.
+        let rounded = |value: f64| (value * 1e6).round() / 1e6 + 0.0;
+        serializer.collect_map(self.0.iter().map(|(name, value)| (name, rounded(*value))))
     }
 }
 

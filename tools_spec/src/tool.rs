@@ -52,6 +52,9 @@ pub struct ToolSpec {
     pub description: String,
     /// Strict JSON Schema of the arguments, with `episode_id` where the tool acts on an episode.
     pub input_schema: Value,
+    /// JSON Schema of a REST body, which need not be strict: what may be null may be left out, and lengths are said.
+    #[serde(skip)]
+    pub body_schema: Value,
     /// JSON Schema of the reply. Hosts of language models do not want it (MCP clients drop the pictures of a tool that
     /// declares one), so it is only part of the OpenAPI description.
     #[serde(skip)]
@@ -73,6 +76,7 @@ impl ToolSpec {
             name: T::NAME,
             description,
             input_schema,
+            body_schema: schema::plain_schema::<T>(),
             reply_schema: schema::plain_schema::<T::Reply>(),
             read_only: T::READ_ONLY,
             on_episode: T::ON_EPISODE,

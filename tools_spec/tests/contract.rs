@@ -1,6 +1,6 @@
 //! The contract as its two readers meet it: strict hosts read the schemas, policies read the refusals.
 
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use tandem_tools_spec::{EPISODE_TOOLS, ToolCall, tool_specs};
 
 const REFUSED_KEYWORDS: &[&str] =
@@ -179,10 +179,7 @@ fn openapi_has_a_path_for_every_tool() {
         assert_eq!(call["operationId"], *tool);
         let schema = &call["requestBody"]["content"]["application/json"]["schema"];
         assert!(schema["properties"].get("episode_id").is_none(), "{tool}: {schema}");
-        assert_eq!(
-            schema["required"].as_array().map(Vec::len),
-            schema["properties"].as_object().map(Map::len)
-        );
+        assert_eq!(schema["additionalProperties"], false, "{tool}: {schema}");
         assert!(
             call["responses"]["200"]["content"]["application/json"]["schema"]["type"] == "object",
             "{tool}"
@@ -193,4 +190,13 @@ fn openapi_has_a_path_for_every_tool() {
         start["responses"]["201"]["content"]["application/json"]["schema"]["properties"]["episode_id"]
             .is_object()
     );
+}
+
+#[test]
+fn joint_values_keep_their_order_and_six_decimals() {
+    let values =
+        tandem_tools_spec::JointValues(vec![("waist".into(), 0.639_963_209_6), ("elbow".into(), -1e-9)]);
+    assert_eq!(serde_json::to_string(&values).unwrap(), r#"{"waist":0.639963,"elbow":0.0}"#);
+    let read: tandem_tools_spec::JointValues = serde_json::from_value(json!(values)).unwrap();
+    assert_eq!((read.get("waist"), read.get("knee")), (Some(0.639_963), None));
 }

@@ -13,8 +13,10 @@ use crate::{CommandReply, Tool, checks};
 #[serde(deny_unknown_fields)]
 pub struct MoveWrists {
     /// Control steps of 20 ms: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark protocol.
+    #[schemars(range(min = 1))]
     pub steps: u32,
     /// One entry per robot that is to move; each robot at most once.
+    #[schemars(length(min = 1))]
     pub robots: Vec<WristMove>,
 }
 

@@ -34,6 +34,7 @@ pub fn action_row_layout() -> String {
 #[serde(deny_unknown_fields)]
 pub struct SendJointChunk {
     /// One entry per robot that is to move; each robot at most once.
+    #[schemars(length(min = 1))]
     pub robots: Vec<JointChunk>,
 }
 
@@ -47,6 +48,7 @@ pub struct JointChunk {
     /// roll, pitch), then vx in m/s, vy in m/s, yaw rate in rad/s and pelvis height in m. An arm is shoulder_pitch,
     /// shoulder_roll, shoulder_yaw, elbow, wrist_roll, wrist_pitch, wrist_yaw; a hand is thumb_0, thumb_1, thumb_2,
     /// middle_0, middle_1, index_0, index_1.
+    #[schemars(length(min = 1), inner(length(equal = ACTION_ROW_LEN)))]
     pub rows: Vec<Vec<f64>>,
 }
 

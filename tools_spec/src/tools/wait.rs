@@ -11,6 +11,7 @@ use crate::{CommandReply, Tool, checks};
 #[serde(deny_unknown_fields)]
 pub struct Wait {
     /// Control steps of 20 ms: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark protocol.
+    #[schemars(range(min = 1))]
     pub steps: u32,
 }
 
