@@ -90,15 +90,63 @@ impl CylinderGrasp<'_> {
 
     /// Wrist motion that brings the held object's origin to `object_m` (world), upright.
     pub fn carry(&self, stage: &mut Stage, object_m: Vector) -> Result<HandMove, ExpertError> {
-        let facts = stage.facts()?;
-        let object = facts.object(self.object).pose_in_world;
+        self.bring(stage, Pose::from_translation(object_m))
+    }
+
+    /// Wrist motion that brings the held object to a pose (world); its turn about its own axis does not matter.
+    pub fn bring(&self, stage: &mut Stage, world_from_object: Pose) -> Result<HandMove, ExpertError> {
+        let object = stage.facts()?.object(self.object).pose_in_world;
         let wrist = stage.world_from_wrist(self.robot, self.side)?;
-        let upright = Rotation::from_rotation_arc(object.rotation * Vector::Z, Vector::Z) * object.rotation;
-        let goal = Pose::from_parts(object_m, upright);
+        // How the object is turned about its axis relative to the hand stays as it was grasped.
+        let upright = self.upright_rotation(object, wrist);
+        let goal = Pose::from_parts(world_from_object.translation, world_from_object.rotation * upright);
         Ok(self.reach(goal * object.inverse() * wrist))
+    }
+
+    /// The rotation that the held object has when its axis stands upright and the hand points along its heading.
+    fn upright_rotation(&self, object: Pose, wrist: Pose) -> Rotation {
+        let held = wrist.rotation.inverse() * object.rotation;
+        let level = Rotation::from_rotation_z(self.heading_rad) * held;
+        Rotation::from_rotation_arc(level * Vector::Z, Vector::Z) * level
     }
 
     pub fn holds(&self, stage: &mut Stage) -> Result<bool, ExpertError> {
         Ok(stage.facts()?.holds(self.robot, self.side, self.object))
     }
+}
+
+const ATTEMPTS: usize = 4;
+
+/// Takes several objects at once, each with its hand; hands that miss try again.
+pub fn pick_up_all(stage: &mut Stage, grasps: &[CylinderGrasp]) -> Result<(), ExpertError> {
+    for _ in 0..ATTEMPTS {
+        let mut missing = Vec::new();
+        for grasp in grasps {
+            if !grasp.holds(stage)? {
+                missing.push(*grasp);
+            }
+        }
+        if missing.is_empty() {
+            return Ok(());
+        }
+        grasp_once(stage, &missing)?;
+    }
+    let names: Vec<&str> = grasps.iter().map(|grasp| grasp.object).collect();
+    Err(ExpertError::GaveUp(format!("could not grasp {}", names.join(" and "))))
+}
+
+/// One attempt: over the objects, down beside them, around them, close.
+pub fn grasp_once(stage: &mut Stage, grasps: &[CylinderGrasp]) -> Result<(), ExpertError> {
+    let each = |stage: &mut Stage, part: fn(&CylinderGrasp, &mut Stage) -> Result<HandMove, ExpertError>| {
+        grasps.iter().map(|grasp| part(grasp, stage)).collect::<Result<Vec<_>, _>>()
+    };
+    let above = each(stage, |grasp, stage| grasp.beside(stage, 0.06))?;
+    stage.perform(0.8, &above)?;
+    let beside = each(stage, |grasp, stage| grasp.beside(stage, 0.0))?;
+    stage.perform(0.6, &beside)?;
+    let around = each(stage, |grasp, stage| grasp.around(stage))?;
+    stage.perform(0.8, &around)?;
+    let close: Vec<HandMove> = grasps.iter().map(CylinderGrasp::close).collect();
+    stage.perform(0.8, &close)?;
+    stage.perform(0.2, &close)
 }

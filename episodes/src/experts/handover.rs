@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use tandem_sim::{Side, Vector};
 
-use super::grasp::CylinderGrasp;
+use super::grasp::{self, CylinderGrasp};
 use super::{ExpertError, Stage};
 use crate::facts::{A, B};
 
@@ -31,25 +31,16 @@ pub fn perform(stage: &mut Stage) -> Result<(), ExpertError> {
 
 fn pick_up(stage: &mut Stage) -> Result<(), ExpertError> {
     for _ in 0..ATTEMPTS {
-        let above = GIVER.beside(stage, 0.06)?;
-        stage.perform(0.8, &[above])?;
-        let beside = GIVER.beside(stage, 0.0)?;
-        stage.perform(0.6, &[beside])?;
-        let around = GIVER.around(stage)?;
-        stage.perform(0.8, &[around])?;
-        stage.perform(0.8, &[GIVER.close()])?;
-        stage.perform(0.2, &[GIVER.close()])?;
+        grasp::pick_up_all(stage, &[GIVER])?;
+        let resting_m = stage.facts()?.position_m(GIVER.object);
+        let lift = GIVER.carry(stage, resting_m + LIFT_M)?;
+        stage.perform(1.0, &[lift])?;
         if GIVER.holds(stage)? {
-            let resting_m = stage.facts()?.position_m(GIVER.object);
-            let lift = GIVER.carry(stage, resting_m + LIFT_M)?;
-            stage.perform(1.0, &[lift])?;
-            if GIVER.holds(stage)? {
-                return Ok(());
-            }
+            return Ok(());
         }
         release(stage, &GIVER)?;
     }
-    Err(ExpertError::GaveUp("A could not grasp the bottle".into()))
+    Err(ExpertError::GaveUp("A lost the bottle".into()))
 }
 
 fn hand_over(stage: &mut Stage) -> Result<(), ExpertError> {

@@ -5,6 +5,7 @@
 
 mod grasp;
 mod handover;
+mod pouring;
 mod stage;
 
 use tandem_tools_spec::{ToolCall, ToolReply};
@@ -38,7 +39,7 @@ pub enum ExpertError {
 /// Performs a task to its end.
 type Script = fn(&mut Stage) -> Result<(), ExpertError>;
 
-const ALL: &[(&str, Script)] = &[("handover", handover::perform)];
+const ALL: &[(&str, Script)] = &[("handover", handover::perform), ("pouring", pouring::perform)];
 
 /// Performs `task` in `arena` until it is done, the episode ends, or the expert gives up. An episode that ends under
 /// way is no error: the last phase may have been reached.

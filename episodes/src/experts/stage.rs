@@ -1,7 +1,7 @@
 //! What every expert builds on: hands that move along straight lines in the world, several at once.
 
 use tandem_sim::{Pose, Side};
-use tandem_tools_spec::{GetStatus, MoveWrists, StopReason, ToolCall, ToolReply, WristMove};
+use tandem_tools_spec::{MoveWrists, StopReason, ToolCall, ToolReply, WristMove};
 
 use super::{Arena, ExpertError};
 use crate::facts::Facts;
@@ -70,12 +70,21 @@ impl<'a> Stage<'a> {
 
     /// Moves hands along straight lines for `duration_s`, starting and arriving at rest; robots not named hold still.
     pub fn perform(&mut self, duration_s: f32, moves: &[HandMove]) -> Result<(), ExpertError> {
+        self.travel(duration_s, moves, smooth)
+    }
+
+    /// As [`Stage::perform`], at constant speed: one leg of a longer path.
+    pub fn glide(&mut self, duration_s: f32, moves: &[HandMove]) -> Result<(), ExpertError> {
+        self.travel(duration_s, moves, |part| part)
+    }
+
+    fn travel(&mut self, duration_s: f32, moves: &[HandMove], pace: fn(f32) -> f32) -> Result<(), ExpertError> {
         let from = self.goals.clone();
         let total = (duration_s / CONTROL_DT_S).round().max(1.0) as u32;
         let mut done = 0;
         while done < total {
             let steps = STEPS_PER_COMMAND.min(total - done);
-            let part = smooth((done + steps) as f32 / total as f32);
+            let part = pace((done + steps) as f32 / total as f32);
             for hand in moves {
                 let start = from[hand.robot][hand.side.index()];
                 let goal = &mut self.goals[hand.robot][hand.side.index()];
@@ -129,14 +138,6 @@ impl<'a> Stage<'a> {
     /// Where the wrist of a hand is now, world frame.
     pub fn world_from_wrist(&mut self, robot: usize, side: Side) -> Result<Pose, ExpertError> {
         Ok(world_from_wrist(&self.facts()?, robot, side))
-    }
-
-    /// Whether the episode still takes commands.
-    pub fn running(&mut self) -> Result<bool, ExpertError> {
-        match self.arena.call(ToolCall::GetStatus(GetStatus {}))? {
-            ToolReply::Status(status) => Ok(status.ended.is_none()),
-            other => Err(ExpertError::Call { tool: "get_status", reason: format!("unexpected reply {other:?}") }),
-        }
     }
 }
 
