@@ -3,6 +3,9 @@
 //! An expert sees [`Facts`], which no policy does; that is its only privilege. It acts through the same tool calls as
 //! everybody, and each call is charged to the episode's budget.
 
+mod bar;
+mod co_pouring;
+mod frame_hang;
 mod grasp;
 mod handover;
 mod pouring;
@@ -39,7 +42,12 @@ pub enum ExpertError {
 /// Performs a task to its end.
 type Script = fn(&mut Stage) -> Result<(), ExpertError>;
 
-const ALL: &[(&str, Script)] = &[("handover", handover::perform), ("pouring", pouring::perform)];
+const ALL: &[(&str, Script)] = &[
+    ("handover", handover::perform),
+    ("pouring", pouring::perform),
+    ("frame_hang", frame_hang::perform),
+    ("co_pouring", co_pouring::perform),
+];
 
 /// Performs `task` in `arena` until it is done, the episode ends, or the expert gives up. An episode that ends under
 /// way is no error: the last phase may have been reached.
