@@ -60,10 +60,12 @@ impl Mesh {
     /// A cylinder along z.
     pub fn cylinder(radius_m: f32, half_length_m: f32) -> Mesh {
         let mut mesh = Mesh::default();
-        let rim = |z| (0..=SEGMENTS).map(move |i| {
-            let (sin, cos) = (TAU * i as f32 / SEGMENTS as f32).sin_cos();
-            (Vector::new(radius_m * cos, radius_m * sin, z), Vector::new(cos, sin, 0.0))
-        });
+        let rim = |z| {
+            (0..=SEGMENTS).map(move |i| {
+                let (sin, cos) = (TAU * i as f32 / SEGMENTS as f32).sin_cos();
+                (Vector::new(radius_m * cos, radius_m * sin, z), Vector::new(cos, sin, 0.0))
+            })
+        };
         for z in [half_length_m, -half_length_m] {
             mesh.vertices.extend(rim(z).map(|(position_m, normal)| Vertex { position_m, normal }));
         }
@@ -132,9 +134,11 @@ impl Mesh {
 
     /// One circle of a sphere, moved along z.
     fn ring(&mut self, polar_rad: f32, radius_m: f32, shift_m: f32) {
+        // Rounding makes the sine negative at the lower pole, where all points must be one.
+        let across = polar_rad.sin().max(0.0);
         for i in 0..=SEGMENTS {
             let (sin, cos) = (TAU * i as f32 / SEGMENTS as f32).sin_cos();
-            let normal = Vector::new(polar_rad.sin() * cos, polar_rad.sin() * sin, polar_rad.cos());
+            let normal = Vector::new(across * cos, across * sin, polar_rad.cos());
             let position_m = normal * radius_m + Vector::new(0.0, 0.0, shift_m);
             self.vertices.push(Vertex { position_m, normal });
         }

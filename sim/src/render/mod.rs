@@ -3,6 +3,7 @@
 //! [`RenderScene`] is what every back end draws; [`CpuRenderer`] is the embedded one and needs nothing of the system.
 
 mod camera;
+mod cpu;
 mod mesh;
 mod png;
 mod raster;
@@ -10,14 +11,14 @@ mod shade;
 mod shadow;
 
 pub use camera::Camera;
+pub use cpu::CpuRenderer;
 pub use mesh::{Mesh, Vertex};
 pub use png::{PictureError, encode_png};
-pub use raster::CpuRenderer;
 
 use rapier3d::math::{Pose, Vector};
 
 /// Meshes that never change and instances that move.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct RenderScene {
     pub meshes: Vec<Mesh>,
     pub instances: Vec<Instance>,
@@ -27,7 +28,7 @@ pub struct RenderScene {
 }
 
 /// One mesh somewhere.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Instance {
     pub mesh: usize,
     pub world_from_mesh: Pose,

@@ -2,6 +2,7 @@
 
 use rapier3d::math::Vector;
 
+use super::shadow::ShadowMap;
 use super::{Instance, Pattern};
 
 /// Direction to the sun; high, so that hands over a counter cast their shadow on it.
@@ -11,21 +12,38 @@ const FROM_BELOW: Vector = Vector::new(0.20, 0.19, 0.18);
 const FROM_ABOVE: Vector = Vector::new(0.40, 0.42, 0.45);
 const LAMP: f32 = 0.15;
 const HIGHLIGHT: f32 = 0.15;
-const SHININESS: f32 = 40.0;
+const SHININESS: i32 = 40;
 /// Linear.
 pub(super) const SKY: Vector = Vector::new(0.45, 0.55, 0.70);
 const CHECKER_DARK: f32 = 0.72;
 const CHECKER_PER_M: f32 = 2.0;
 
-/// Linear colour of a surface point (world) with normal `normal`, seen from `eye_m`, `sunlit` 0 to 1.
-pub(super) fn shade(albedo: Vector, point_m: Vector, normal: Vector, eye_m: Vector, sunlit: f32) -> Vector {
-    let to_eye = (eye_m - point_m).normalize();
-    let normal = if normal.dot(to_eye) < 0.0 { -normal } else { normal };
-    let facing_sun = normal.dot(TO_SUN).max(0.0) * sunlit;
-    let ambient = FROM_BELOW.lerp(FROM_ABOVE, normal.z * 0.5 + 0.5);
-    let half_way = (to_eye + TO_SUN).normalize();
-    let highlight = HIGHLIGHT * normal.dot(half_way).max(0.0).powf(SHININESS) * facing_sun;
-    albedo * (ambient + SUN * facing_sun + LAMP * normal.dot(to_eye).max(0.0)) + highlight
+/// A point that is seen.
+pub(super) struct Surface {
+    /// In the world, as the directions are.
+    pub point_m: Vector,
+    pub normal: Vector,
+    pub to_eye: Vector,
+    pub albedo: Vector,
+}
+
+impl Surface {
+    /// Linear colour.
+    pub(super) fn shade(&self, shadow: &ShadowMap) -> Vector {
+        let facing_eye = self.normal.dot(self.to_eye);
+        let (normal, facing_eye) =
+            if facing_eye < 0.0 { (-self.normal, -facing_eye) } else { (self.normal, facing_eye) };
+        let ambient = FROM_BELOW.lerp(FROM_ABOVE, normal.z * 0.5 + 0.5);
+        let unlit = self.albedo * (ambient + LAMP * facing_eye);
+        let facing_sun = normal.dot(TO_SUN);
+        if facing_sun <= 0.0 {
+            return unlit;
+        }
+        let sunlight = facing_sun * shadow.sunlit(self.point_m, normal);
+        let half_way = (self.to_eye + TO_SUN).normalize();
+        let highlight = HIGHLIGHT * normal.dot(half_way).max(0.0).powi(SHININESS);
+        unlit + (self.albedo * SUN + highlight) * sunlight
+    }
 }
 
 /// Linear colour of an instance's surface at a point of the world.
@@ -50,12 +68,16 @@ pub(super) struct SrgbTable(Vec<u8>);
 
 const TABLE_LAST: f32 = 4095.0;
 
-impl SrgbTable {
-    pub(super) fn new() -> SrgbTable {
+impl Default for SrgbTable {
+    fn default() -> SrgbTable {
         let encode = |v: f32| if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
-        SrgbTable((0..=TABLE_LAST as usize).map(|i| (encode(i as f32 / TABLE_LAST) * 255.0 + 0.5) as u8).collect())
+        SrgbTable(
+            (0..=TABLE_LAST as usize).map(|i| (encode(i as f32 / TABLE_LAST) * 255.0 + 0.5) as u8).collect(),
+        )
     }
+}
 
+impl SrgbTable {
     pub(super) fn encode(&self, colour: Vector) -> [u8; 3] {
         let index = colour.clamp(Vector::ZERO, Vector::ONE) * TABLE_LAST + 0.5;
         index.to_array().map(|i| self.0[i as usize])

@@ -20,18 +20,16 @@ pub(super) struct ShadowMap {
     target: Target,
     sun_from_world: Pose,
     texels_per_m: f32,
-    drawn: Vec<Pose>,
+    drawn: RenderScene,
 }
 
 impl ShadowMap {
     /// Draws the shadows of `scene`, unless nothing has moved since the last time.
     pub(super) fn update(&mut self, scene: &RenderScene) {
-        let poses = scene.instances.iter().map(|instance| instance.world_from_mesh);
-        if self.drawn.len() == scene.instances.len() && poses.clone().eq(self.drawn.iter().copied()) {
+        if *scene == self.drawn && !self.target.nearness.is_empty() {
             return;
         }
-        self.drawn.clear();
-        self.drawn.extend(poses);
+        self.drawn.clone_from(scene);
         let x = Vector::Z.cross(TO_SUN).normalize();
         let rotation = Rotation::from_mat3(&Matrix::from_cols(x, TO_SUN.cross(x), TO_SUN));
         self.sun_from_world = Pose::from_parts(scene.focus_m, rotation).inverse();
@@ -60,17 +58,17 @@ impl ShadowMap {
     pub(super) fn sunlit(&self, point_m: Vector, normal: Vector) -> f32 {
         let [u, v, nearness] = self.texel(self.sun_from_world * (point_m + normal * NORMAL_OFFSET_M));
         let (u, v) = (u - 0.5, v - 0.5);
-        let (column, row) = (u.floor(), v.floor());
         let inside = |i: f32| i >= 1.0 && i < (TEXELS - 3) as f32;
-        if !inside(column) || !inside(row) {
+        if !inside(u) || !inside(v) {
             return 1.0;
         }
+        let (column, row) = (u as usize, v as usize);
         // Four taps with a tent's weights are a bilinear filter three texels wide.
         let weights = |part: f32| [1.0 - part, 1.0, 1.0, part];
-        let (across, down) = (weights(u - column), weights(v - row));
+        let (across, down) = (weights(u - column as f32), weights(v - row as f32));
         let mut sum = 0.0;
         for (j, weight) in down.into_iter().enumerate() {
-            let start = (row as usize - 1 + j) * TEXELS + column as usize - 1;
+            let start = (row - 1 + j) * TEXELS + column - 1;
             for (i, occluder) in self.target.nearness[start..start + 4].iter().enumerate() {
                 if nearness + BIAS_M >= *occluder {
                     sum += weight * across[i];

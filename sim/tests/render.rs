@@ -1,0 +1,310 @@
+//! Pictures against closed forms: depth, projection, ids, shadow, anti-aliasing, and the same bits every time.
+
+use std::f32::consts::{FRAC_PI_3, PI};
+
+use tandem_sim::render::{Camera, CpuRenderer, Frame, Instance, Mesh, Pattern, RenderScene, encode_png};
+use tandem_sim::{Pose, Rotation, Vector};
+
+const GREY: [f32; 3] = [0.6, 0.6, 0.6];
+
+/// Parts of a scene around the origin; the first has id 1.
+fn scene(parts: Vec<(Mesh, Pose)>) -> RenderScene {
+    let mut scene = RenderScene { focus_radius_m: 1.0, ..RenderScene::default() };
+    for (index, (mesh, world_from_mesh)) in parts.into_iter().enumerate() {
+        scene.meshes.push(mesh);
+        let id = index as u32 + 1;
+        scene.instances.push(Instance {
+            mesh: index,
+            world_from_mesh,
+            rgb: GREY,
+            pattern: Pattern::Plain,
+            id,
+        });
+    }
+    scene
+}
+
+fn at(x: f32, y: f32, z: f32) -> Pose {
+    Pose::from_translation(Vector::new(x, y, z))
+}
+
+fn floor() -> (Mesh, Pose) {
+    (Mesh::plane([0.0, 0.0]), Pose::IDENTITY)
+}
+
+fn camera(world_from_camera: Pose) -> Camera {
+    Camera { world_from_camera, vertical_fov_rad: FRAC_PI_3, width: 160, height: 120 }
+}
+
+/// Looks straight down from above the origin.
+fn overhead(height_m: f32) -> Camera {
+    camera(at(0.0, 0.0, height_m))
+}
+
+fn look_at(eye_m: Vector, target_m: Vector) -> Camera {
+    camera(Pose::look_at_rh(eye_m, target_m, Vector::Z).inverse())
+}
+
+fn render(scene: &RenderScene, camera: &Camera) -> Frame {
+    CpuRenderer::default().render(scene, camera)
+}
+
+/// Index of the pixel that shows a point of the world.
+fn pixel_at(camera: &Camera, point_m: Vector) -> usize {
+    let ([u, v], _) = camera.project(point_m).expect("the point is in front of the camera");
+    v as usize * camera.width as usize + u as usize
+}
+
+fn rgb(frame: &Frame, pixel: usize) -> [u8; 3] {
+    [frame.rgb[3 * pixel], frame.rgb[3 * pixel + 1], frame.rgb[3 * pixel + 2]]
+}
+
+/// Compares the depth of each pixel with that of its ray (camera frame, 1 m deep), where there is one.
+/// `too_deep_m` is how far a faceted shape lies within the true one. Returns how many pixels were compared.
+fn check_depth(
+    scene: &RenderScene,
+    camera: &Camera,
+    too_deep_m: f32,
+    expected_m: impl Fn(Vector) -> Option<f32>,
+) -> usize {
+    let frame = render(scene, camera);
+    let mut compared = 0;
+    for (pixel, depth_m) in frame.depth_m.iter().enumerate() {
+        let (u, v) = (pixel as u32 % camera.width, pixel as u32 / camera.width);
+        let Some(expected_m) = expected_m(camera.unproject([u as f32 + 0.5, v as f32 + 0.5], 1.0)) else {
+            continue;
+        };
+        let error_m = depth_m - expected_m;
+        assert!(
+            (-1e-4..=too_deep_m + 1e-4).contains(&error_m),
+            "pixel ({u}, {v}): depth {depth_m} m, expected {expected_m} m"
+        );
+        compared += 1;
+    }
+    compared
+}
+
+#[test]
+fn floor_depth_is_that_of_the_ray() {
+    // A large floor reaches behind every one of these cameras, and is cut at the near plane; the last is nearly in it.
+    for (eye, target) in [
+        (Vector::new(0.0, 0.0, 1.2), Vector::new(1.0, 0.0, 0.7)),
+        (Vector::new(0.3, -2.0, 1.6), Vector::new(0.0, 0.5, 0.0)),
+        (Vector::new(1.0, 2.0, 0.05), Vector::new(0.0, 0.0, 0.0)),
+    ] {
+        let camera = look_at(eye, target);
+        let compared = check_depth(&scene(vec![floor()]), &camera, 0.0, |ray| {
+            let down = -(camera.world_from_camera.rotation * ray).z;
+            (down > 0.0).then(|| eye.z / down).filter(|depth_m| *depth_m < 5.0)
+        });
+        assert!(compared > 5000, "from {eye} only {compared} pixels show the floor within 5 m");
+    }
+}
+
+#[test]
+fn sphere_depth_is_that_of_the_ray() {
+    let (radius_m, distance_m) = (0.1, 0.5);
+    let compared = check_depth(
+        &scene(vec![(Mesh::sphere(radius_m), at(0.0, 0.0, 0.0))]),
+        &overhead(distance_m),
+        0.008,
+        |ray| {
+            // |depth * ray + distance * z|^2 = radius^2, the nearer solution; rays that graze the sphere are left out.
+            let (a, b) = (ray.length_squared(), -distance_m);
+            let discriminant = b * b - a * (distance_m * distance_m - radius_m * radius_m);
+            (discriminant > 0.5 * radius_m * radius_m).then(|| (-b - discriminant.sqrt()) / a)
+        },
+    );
+    assert!(compared > 500, "only {compared} pixels show the sphere");
+}
+
+#[test]
+fn what_nothing_covers_is_infinitely_far() {
+    let frame = render(&scene(vec![(Mesh::sphere(0.1), at(0.0, 0.0, 5.0))]), &overhead(1.0));
+    assert!(frame.depth_m.iter().all(|depth_m| *depth_m == f32::INFINITY));
+    assert!(frame.ids.iter().all(|id| *id == 0));
+}
+
+#[test]
+fn unproject_inverts_project() {
+    let camera = look_at(Vector::new(0.2, -1.5, 1.4), Vector::new(0.0, 0.3, 0.7));
+    for point_m in [Vector::new(0.0, 0.3, 0.7), Vector::new(-0.5, 0.1, 0.9), Vector::new(0.4, 1.0, 0.0)] {
+        let (uv_px, depth_m) = camera.project(point_m).expect("in front");
+        let back_m = camera.world_from_camera * camera.unproject(uv_px, depth_m);
+        assert!((back_m - point_m).length() < 1e-5, "{point_m} came back as {back_m}");
+    }
+    assert_eq!(camera.project(Vector::new(0.2, -3.0, 1.4)), None, "a point behind the camera has no picture");
+}
+
+#[test]
+fn the_optical_axis_meets_the_middle() {
+    let camera = overhead(2.0);
+    let ([u, v], depth_m) = camera.project(Vector::ZERO).expect("in front");
+    assert_eq!(([u, v], depth_m), (camera.principal_point_px(), 2.0));
+    // +x of the world is to the right, +y is up.
+    let ([right, up], _) = camera.project(Vector::new(0.1, 0.1, 0.0)).expect("in front");
+    assert!(right > u && up < v);
+}
+
+#[test]
+fn ids_name_the_nearest_thing() {
+    let camera = overhead(2.0);
+    let frame = render(
+        &scene(vec![
+            floor(),
+            (Mesh::cuboid(Vector::splat(0.1)), at(0.3, 0.0, 0.1)),
+            (Mesh::sphere(0.05), at(0.3, 0.0, 0.5)),
+        ]),
+        &camera,
+    );
+    for (point_m, id) in [
+        (Vector::new(-0.3, 0.0, 0.0), 1),
+        (Vector::new(0.24, 0.06, 0.2), 2),
+        (Vector::new(0.3, 0.0, 0.55), 3),
+        // Below the sphere, which hides the box.
+        (Vector::new(0.3, 0.0, 0.2), 2),
+    ] {
+        let hidden = id == 2 && point_m.x == 0.3;
+        let seen = frame.ids[pixel_at(&camera, point_m)];
+        assert_eq!(seen, if hidden { 3 } else { id }, "at {point_m}");
+    }
+}
+
+#[test]
+fn neighbouring_triangles_leave_no_gap() {
+    // Inside the picture of a closed shape nothing of the floor behind it may show, whichever way it is turned.
+    for step in 0..24 {
+        let rotation =
+            Rotation::from_rotation_x(0.37 * step as f32) * Rotation::from_rotation_z(0.61 * step as f32);
+        for mesh in [Mesh::sphere(0.3), Mesh::cuboid(Vector::splat(0.3)), Mesh::cylinder(0.3, 0.3)] {
+            let shape = (mesh, Pose::from_parts(Vector::new(0.0, 0.0, 0.5), rotation));
+            let camera = overhead(1.2);
+            let frame = render(&scene(vec![floor(), shape]), &camera);
+            for (pixel, id) in frame.ids.iter().enumerate() {
+                let (u, v) = ((pixel % 160) as f32 + 0.5, (pixel / 160) as f32 + 0.5);
+                // The picture of the sphere that fits into all three, less a margin for facets.
+                let from_axis = camera.unproject([u, v], 1.0).truncate().length();
+                if from_axis < 0.9 * (0.3f32 / 0.7).asin().tan() {
+                    assert_eq!(*id, 2, "step {step}: gap at ({u}, {v})");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_thing_in_the_sun_darkens_the_floor() {
+    let camera = overhead(2.0);
+    let block = |x: f32| scene(vec![floor(), (Mesh::cuboid(Vector::splat(0.05)), at(x, 0.0, 0.3))]);
+    // One renderer for all three pictures: shadows must follow the scene.
+    let mut renderer = CpuRenderer::default();
+    let empty = renderer.render(&scene(vec![floor()]), &camera);
+    let left = renderer.render(&block(-0.3), &camera);
+    let right = renderer.render(&block(0.3), &camera);
+    // The sun stands at (-0.306, 0.354, 0.884): from 0.3 m up, the shadow falls 0.104 m to +x and 0.12 m to -y.
+    for (x, shaded, lit) in [(-0.3, &left, &right), (0.3, &right, &left)] {
+        let pixel = pixel_at(&camera, Vector::new(x + 0.104, -0.12, 0.0));
+        let [empty, shaded, lit] = [&empty, shaded, lit].map(|frame| rgb(frame, pixel));
+        assert_eq!(lit, empty, "the floor is in the sun where the block is not");
+        assert!(f32::from(shaded[0]) < 0.8 * f32::from(lit[0]), "shadow {shaded:?} against {lit:?}");
+    }
+}
+
+#[test]
+fn fingers_cast_shadows() {
+    // 16 mm thick and 40 mm above a counter, as a finger over a table.
+    let camera = overhead(1.0);
+    let finger = (
+        Mesh::capsule(0.008, 0.04),
+        Pose::from_parts(Vector::new(0.0, 0.0, 0.04), Rotation::from_rotation_y(PI / 2.0)),
+    );
+    let pixel = pixel_at(&camera, Vector::new(0.014, -0.016, 0.0));
+    let mut scene = scene(vec![floor(), finger]);
+    scene.focus_radius_m = 1.25;
+    let shaded = render(&scene, &camera);
+    assert_eq!(shaded.ids[pixel], 1, "the pixel shows the counter");
+    scene.instances.truncate(1);
+    let lit = render(&scene, &camera);
+    let (shaded, lit) = (rgb(&shaded, pixel)[0], rgb(&lit, pixel)[0]);
+    assert!(f32::from(shaded) < 0.85 * f32::from(lit), "{shaded} against {lit}");
+}
+
+#[test]
+fn an_edge_is_the_mean_of_both_sides_in_linear_light() {
+    // A wall whose edge runs through the middle of the picture's column 80, half a pixel to the right.
+    let camera = overhead(1.0);
+    let half_pixel_m = 0.5 / camera.focal_px();
+    let frame = render(&scene(vec![(Mesh::plane([1.0, 1.0]), at(-1.0 + half_pixel_m, 0.0, 0.0))]), &camera);
+    let row = 60 * camera.width as usize;
+    let linear = |value: u8| ((f32::from(value) / 255.0 + 0.055) / 1.055).powf(2.4);
+    let [wall, edge, sky] = [79, 80, 81].map(|column| rgb(&frame, row + column).map(linear));
+    for channel in 0..3 {
+        let mean = 0.5 * (wall[channel] + sky[channel]);
+        assert!((edge[channel] - mean).abs() < 0.01, "channel {channel}: {wall:?}, {edge:?}, {sky:?}");
+    }
+}
+
+#[test]
+fn things_at_different_depths_are_outlined() {
+    let camera = overhead(1.0);
+    let mut scene = scene(vec![floor(), (Mesh::plane([0.2, 0.2]), at(0.0, 0.0, 0.3))]);
+    let darkest = |scene: &RenderScene| {
+        let frame = render(scene, &camera);
+        let row = 60 * camera.width as usize;
+        (row..row + 80).map(|pixel| rgb(&frame, pixel)[0]).min()
+    };
+    let outlined = darkest(&scene);
+    scene.instances[1].id = 1;
+    assert!(outlined < darkest(&scene), "parts of one thing have no outline between them");
+}
+
+#[test]
+fn the_same_scene_gives_the_same_bits() {
+    let camera = look_at(Vector::new(0.8, -1.2, 1.0), Vector::ZERO);
+    let first = scene(vec![floor(), (Mesh::capsule(0.1, 0.2), at(0.0, 0.0, 0.3))]);
+    let other = scene(vec![floor(), (Mesh::cylinder(0.1, 0.2), at(0.0, 0.0, 0.3))]);
+    let mut renderer = CpuRenderer::default();
+    let before = renderer.render(&first, &camera);
+    let between = renderer.render(&other, &camera);
+    assert_ne!(before, between);
+    assert_eq!(before, renderer.render(&first, &camera));
+    assert_eq!(before, render(&first, &camera));
+}
+
+#[test]
+fn meshes_have_the_volume_of_their_shapes_and_normals_that_point_out() {
+    // A circle of twelve sides has 4.5 % less area, and a half circle of six turned around its axis 6.7 % less volume.
+    let (round, ball) = (0.046, 0.11);
+    let tetrahedron = [Vector::ZERO, Vector::X, Vector::Y, Vector::Z];
+    let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+    for (name, mesh, volume_m3, tolerance) in [
+        ("sphere", Mesh::sphere(0.1), 4.0 / 3.0 * PI * 1e-3, ball),
+        ("capsule", Mesh::capsule(0.1, 0.3), 4.0 / 3.0 * PI * 1e-3 + PI * 1e-2 * 0.6, ball),
+        ("ellipsoid", Mesh::ellipsoid(Vector::new(0.1, 0.2, 0.3)), 4.0 / 3.0 * PI * 6e-3, ball),
+        ("cylinder", Mesh::cylinder(0.1, 0.3), PI * 1e-2 * 0.6, round),
+        ("box", Mesh::cuboid(Vector::new(0.1, 0.2, 0.3)), 0.2 * 0.4 * 0.6, 1e-5),
+        ("tetrahedron", Mesh::faceted(&tetrahedron, &faces), 1.0 / 6.0, 1e-5),
+    ] {
+        let mut sum_m3 = 0.0;
+        for triangle in &mesh.triangles {
+            let [a, b, c] = triangle.map(|corner| mesh.vertices[corner as usize]);
+            let face = (b.position_m - a.position_m).cross(c.position_m - a.position_m).normalize();
+            sum_m3 += a.position_m.dot(b.position_m.cross(c.position_m)) / 6.0;
+            for corner in [a, b, c] {
+                assert!(corner.normal.is_normalized(), "{name}: a normal is {} long", corner.normal.length());
+                assert!(corner.normal.dot(face) > 0.5, "{name}: a normal points away from its face");
+            }
+        }
+        let missing = 1.0 - sum_m3 / volume_m3;
+        assert!((-1e-5..=tolerance).contains(&missing), "{name}: {sum_m3} m^3 of {volume_m3} m^3");
+    }
+}
+
+#[test]
+fn png_keeps_every_byte() {
+    let frame = render(&scene(vec![floor(), (Mesh::sphere(0.2), at(0.0, 0.0, 0.2))]), &overhead(1.0));
+    let png = encode_png(frame.width, frame.height, &frame.rgb).expect("the size fits");
+    let decoded = image::load_from_memory(&png).expect("it is a PNG file").into_rgb8();
+    assert_eq!((decoded.width(), decoded.height()), (frame.width, frame.height));
+    assert_eq!(decoded.into_raw(), frame.rgb);
+}
