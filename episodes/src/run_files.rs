@@ -7,8 +7,10 @@ use tandem_tools_spec::{Budget, PhaseReached, Protocol, ResultReply, ToolCall, T
 
 use crate::EpisodeError;
 use crate::observe::Eyes;
-use crate::recorder::{ObjectStep, RecordedRobot, Recorder, RecordingHeader, RobotStep, StepRecord, ToolCallRecord};
-use crate::report;
+use crate::recorder::{
+    ObjectStep, RecordedRobot, Recorder, RecordingHeader, RobotStep, StepRecord, ToolCallRecord,
+};
+use crate::report::{CallCounts, Report};
 use crate::results::{EpisodeResult, OutputError, write_whole};
 use crate::strip::{self, Moment};
 use crate::tasks::Task;
@@ -18,7 +20,8 @@ pub struct RunFiles {
     folder: PathBuf,
     recorder: Recorder,
     moments: Vec<Moment>,
-    calls: report::CallCounts,
+    calls: CallCounts,
+    budget_left: Option<Budget>,
 }
 
 impl RunFiles {
@@ -39,17 +42,31 @@ impl RunFiles {
             task: task.id.into(),
             seed,
             protocol,
-            robots: robots.map(|robot| RecordedRobot { name: robot.name.clone(), model: robot.model.clone() }).collect(),
+            robots: robots
+                .map(|robot| RecordedRobot { name: robot.name.clone(), model: robot.model.clone() })
+                .collect(),
         };
         let mut recorder = Recorder::create(folder, header)?;
         recorder.draw("world", world.room())?;
         for (name, geoms) in world.object_geoms() {
             recorder.draw(name, geoms)?;
         }
-        Ok(RunFiles { folder: folder.into(), recorder, moments: Vec::new(), calls: Default::default() })
+        Ok(RunFiles {
+            folder: folder.into(),
+            recorder,
+            moments: Vec::new(),
+            calls: CallCounts::default(),
+            budget_left: None,
+        })
     }
 
-    pub fn step(&mut self, world: &World, commands: &[RobotCommand], budget: Budget) -> Result<(), EpisodeError> {
+    pub fn step(
+        &mut self,
+        world: &World,
+        commands: &[RobotCommand],
+        budget: Budget,
+    ) -> Result<(), EpisodeError> {
+        self.budget_left = Some(budget);
         let robots: Vec<RobotStep> = commands
             .iter()
             .enumerate()
@@ -83,7 +100,12 @@ impl RunFiles {
     }
 
     /// Keeps this moment for the strip.
-    pub fn keep_picture(&mut self, caption: &str, world: &World, eyes: &mut Eyes) -> Result<(), EpisodeError> {
+    pub fn keep_picture(
+        &mut self,
+        caption: &str,
+        world: &World,
+        eyes: &mut Eyes,
+    ) -> Result<(), EpisodeError> {
         self.moments.push(Moment::capture(caption, world, eyes));
         Ok(())
     }
@@ -94,8 +116,9 @@ impl RunFiles {
         self.recorder.finish(&summary)?;
         let strip = strip::png(&self.moments)?;
         write_whole(&self.folder, Self::STRIP, &strip)?;
-        let page = report::page(task, result, &self.calls, &strip);
-        write_whole(&self.folder, Self::REPORT, page.as_bytes())?;
+        let report =
+            Report { task, result, calls: &self.calls, budget_left: self.budget_left, strip: &strip };
+        write_whole(&self.folder, Self::REPORT, report.html().as_bytes())?;
         summary.write(&self.folder)?;
         Ok(())
     }

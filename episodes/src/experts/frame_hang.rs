@@ -24,9 +24,9 @@ const BEFORE_M: Vector = Vector::new(0.0, -0.045, 0.004);
 const PAST_M: Vector = Vector::new(0.0, 0.040, 0.002);
 const RESTING_M: Vector = Vector::new(0.0, 0.045, -0.034);
 /// Fingers open as far as the wall behind the frame lets them, then the hands go outwards and back.
-const LOOSE: f32 = 0.45;
-const OUTWARDS_M: f32 = 0.07;
-const BACK_M: f32 = 0.12;
+const LOOSE: f32 = 0.35;
+const OUTWARDS_M: f32 = 0.13;
+const BACK_M: f32 = 0.14;
 
 pub fn perform(stage: &mut Stage) -> Result<(), ExpertError> {
     let grasp = |robot, side, x_m| BarGrasp {
@@ -67,7 +67,8 @@ fn let_go(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), ExpertError> {
             let by_m = Vector::new(step_m.x * outwards, step_m.y, step_m.z);
             moves.push(HandMove::reach(grasp.robot, grasp.side, Pose::from_parts(wrist.translation + by_m, wrist.rotation)));
         }
-        stage.perform(0.6, &moves)?;
+        stage.perform(0.9, &moves)?;
     }
-    stage.perform(1.0, &grasps.iter().map(BarGrasp::open).collect::<Vec<_>>())
+    // It still swings a little.
+    stage.perform(3.0, &grasps.iter().map(BarGrasp::open).collect::<Vec<_>>())
 }

@@ -171,13 +171,21 @@ impl Recorder {
         self.file.write(&mut self.phases, phase.time_s, &Json::from(phase))
     }
 
-    /// Appends a tool call and its answer.
+    /// Appends a tool call and its answer. Pictures of the answer go to the topics of their robots' cameras.
     pub fn tool_call(&mut self, record: &ToolCallRecord) -> Result<(), OutputError> {
-        self.file.write(&mut self.tool_calls, record.time_s, &ToolCallMessage::new(record)?)
+        self.file.write(&mut self.tool_calls, record.time_s, &ToolCallMessage::new(record)?)?;
+        if let Ok(ToolReply::Observation(observation)) = record.outcome {
+            for image in &observation.images {
+                if let Some(robot) = self.robots.iter().position(|robot| robot.name == image.robot) {
+                    self.egocentric(robot, record.time_s, image.png_base64.0.clone())?;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Appends a PNG seen through the head camera of robot number `robot`.
-    pub fn egocentric(&mut self, robot: usize, time_s: f64, png: Vec<u8>) -> Result<(), OutputError> {
+    fn egocentric(&mut self, robot: usize, time_s: f64, png: Vec<u8>) -> Result<(), OutputError> {
         let name = &self.robots[robot].name;
         let frame_id = robot_frame(name, EGOCENTRIC);
         let camera = match &mut self.robot_topics[robot].camera {

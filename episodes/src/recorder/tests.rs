@@ -4,11 +4,12 @@ use std::{collections::BTreeMap, fs, path::Path};
 
 use foxglove::Decode;
 use tandem_sim::{ObjectPlacement, RobotPlacement, Rotation, Vector, World, WorldSpec};
-use tandem_tools_spec::{PhaseTimes, ToolCall};
+use tandem_tools_spec::{CameraImage, Observation, PhaseTimes, Png, ToolCall};
 
 use super::*;
 
 const STEPS: u32 = 10;
+const PICTURE: &[u8] = b"the bytes of a PNG";
 
 fn world() -> World {
     let robot = |name: &str, x_m: f32, yaw_rad: f32| RobotPlacement {
@@ -60,7 +61,7 @@ fn record_step(recorder: &mut Recorder, world: &mut World, commands: &[RobotComm
     recorder.step(&step).unwrap();
 }
 
-/// Records `STEPS` steps, a phase, two tool calls and a picture of A.
+/// Records `STEPS` steps, a phase, a refused call and an observation with a picture.
 fn record(folder: &Path) -> (World, PathBuf) {
     let mut world = world();
     let mut recorder = recorder(folder, &world);
@@ -71,10 +72,12 @@ fn record(folder: &Path) -> (World, PathBuf) {
     let time_s = world.time_s();
     recorder.phase(&PhaseReached { id: "p1".into(), name: "grasp_and_lift".into(), time_s }).unwrap();
     let wait = ToolCall::parse("wait", serde_json::json!({ "steps": 10 })).unwrap();
-    for problem in ["the episode has ended", "no steps are left"] {
-        recorder.tool_call(&ToolCallRecord { time_s, call: &wait, outcome: Err(problem) }).unwrap();
-    }
-    recorder.egocentric(0, time_s, vec![0x89, b'P', b'N', b'G']).unwrap();
+    recorder.tool_call(&ToolCallRecord { time_s, call: &wait, outcome: Err("no steps are left") }).unwrap();
+    let observe = ToolCall::parse("observe", serde_json::json!({ "robots": ["A"] })).unwrap();
+    let image = CameraImage { robot: "A".into(), png_base64: Png(PICTURE.into()) };
+    let seen = Observation { time_s, states: vec![], cameras: vec![], images: vec![image] };
+    let reply = ToolReply::Observation(seen);
+    recorder.tool_call(&ToolCallRecord { time_s, call: &observe, outcome: Ok(&reply) }).unwrap();
     let path = recorder.finish(&result()).unwrap();
     (world, path)
 }
@@ -110,8 +113,11 @@ fn a_recording_reads_back() {
         let count: &mut u32 = counts.entry((message.channel.topic.clone(), schema)).or_default();
         assert_eq!(message.sequence, *count);
         *count += 1;
-        if message.channel.topic == "/tf" {
-            last_transforms = Some(FrameTransforms::decode(&*message.data).unwrap());
+        match message.channel.topic.as_str() {
+            "/tf" => last_transforms = Some(FrameTransforms::decode(&*message.data).unwrap()),
+            "/A/egocentric" => assert_eq!(CompressedImage::decode(&*message.data).unwrap().data, PICTURE),
+            "/tool_calls" => assert!(!String::from_utf8_lossy(&message.data).contains("base64")),
+            _ => {}
         }
     }
     assert_eq!(last_ns, 200_000_000, "ten steps of 20 ms");
