@@ -31,7 +31,9 @@ fn task_info(task: &Task) -> TaskInfo {
                 collaborative: phase.collaborative,
             })
             .collect(),
-        protocols: [Protocol::Agentic, Protocol::Benchmark].map(|protocol| protocol_info(protocol, task)).to_vec(),
+        protocols: [Protocol::Agentic, Protocol::Benchmark]
+            .map(|protocol| protocol_info(protocol, task))
+            .to_vec(),
     }
 }
 
@@ -54,7 +56,10 @@ pub fn phase_id(index: usize) -> String {
 }
 
 pub fn instructions(task: &Task) -> Vec<Instruction> {
-    let part = |robot: &tasks::RobotSpot| Instruction { robot: robot.name.into(), instruction: robot.instruction.into() };
+    let part = |robot: &tasks::RobotSpot| Instruction {
+        robot: robot.name.into(),
+        instruction: robot.instruction.into(),
+    };
     task.robots.iter().map(part).collect()
 }
 

@@ -118,8 +118,16 @@ impl Facts {
 
     /// Whether a rod of `object`, from `ends_m[0]` to `ends_m[1]` in its frame, passes through a ring of `carrier`: a disc of
     /// `radius_m` around `centre_m`, with its axis along y, in the carrier's frame.
-    pub fn threads(&self, object: &str, ends_m: [Vector; 2], carrier: &str, centre_m: Vector, radius_m: f32) -> bool {
-        let carrier_from_object = self.object(carrier).pose_in_world.inverse() * self.object(object).pose_in_world;
+    pub fn threads(
+        &self,
+        object: &str,
+        ends_m: [Vector; 2],
+        carrier: &str,
+        centre_m: Vector,
+        radius_m: f32,
+    ) -> bool {
+        let carrier_from_object =
+            self.object(carrier).pose_in_world.inverse() * self.object(object).pose_in_world;
         let [a, b] = ends_m.map(|end_m| carrier_from_object * end_m - centre_m);
         if a.y * b.y > 0.0 {
             return false;

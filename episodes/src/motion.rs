@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3};
 use tandem_ik::{
-    Capsule, Configuration, DampingTask, FrameId, FrameTask, IkError, JointCouplingTask, Limits, Model, Outcome,
-    PostureTask, SelfCollision, SolveOptions, SolveReport, Solver, Task, Tolerance,
+    Capsule, Configuration, DampingTask, FrameId, FrameTask, IkError, JointCouplingTask, Limits, Model,
+    Outcome, PostureTask, SelfCollision, SolveOptions, SolveReport, Solver, Task, Tolerance,
 };
 use tandem_sim::robot::{UPPER, UPPER_JOINTS, joint_names};
 use tandem_sim::{BaseCommand, RobotCommand, Side};
@@ -45,8 +45,10 @@ impl UpperBody {
         let names = joint_names();
         let whole = Model::from_mjcf(robot_mjcf)?;
         let is_hand = |column: usize| (HAND_COLUMNS[0]..HAND_COLUMNS[1] + HAND_JOINTS).contains(&column);
-        let free: Vec<&str> =
-            (0..UPPER_JOINTS).filter(|column| !is_hand(*column)).map(|column| names[UPPER[column]].as_str()).collect();
+        let free: Vec<&str> = (0..UPPER_JOINTS)
+            .filter(|column| !is_hand(*column))
+            .map(|column| names[UPPER[column]].as_str())
+            .collect();
         let model = whole.reduced(&free, &vec![0.0; whole.nv()])?;
         let column_of = |name: &str| (0..UPPER_JOINTS).find(|column| names[UPPER[*column]] == name);
         let columns: Vec<usize> = model.joints().iter().filter_map(|joint| column_of(&joint.name)).collect();
@@ -66,10 +68,19 @@ impl UpperBody {
             let wrist = FrameTask::new(self.wrists[side.index()], targets[side.index()]);
             tasks.push(Task::Frame(FrameTask { orientation_cost: ORIENTATION_COST, gain, ..wrist }));
         }
-        tasks.push(Task::Posture(PostureTask { target: self.rest_rad.clone(), cost: POSTURE_COST, gain: 0.1 }));
+        tasks.push(Task::Posture(PostureTask {
+            target: self.rest_rad.clone(),
+            cost: POSTURE_COST,
+            gain: 0.1,
+        }));
         for (joint, model) in self.model.joints().iter().enumerate() {
             if model.name.starts_with("waist") {
-                let upright = JointCouplingTask { ratios: vec![(joint, 1.0)], offset: 0.0, cost: WAIST_COST, gain: 0.1 };
+                let upright = JointCouplingTask {
+                    ratios: vec![(joint, 1.0)],
+                    offset: 0.0,
+                    cost: WAIST_COST,
+                    gain: 0.1,
+                };
                 tasks.push(Task::JointCoupling(upright));
             }
         }
@@ -269,7 +280,10 @@ impl Run {
             }
             motion.follow(&targets);
         }
-        RobotCommand { upper_rad: motion.state.upper_rad.map(|target| target as f32), base: motion.state.base }
+        RobotCommand {
+            upper_rad: motion.state.upper_rad.map(|target| target as f32),
+            base: motion.state.base,
+        }
     }
 }
 

@@ -50,7 +50,12 @@ impl Eyes {
         })
     }
 
-    pub fn depth(&mut self, world: &World, robot: usize, pixels: &[[i64; 2]]) -> Result<DepthReply, EpisodeError> {
+    pub fn depth(
+        &mut self,
+        world: &World,
+        robot: usize,
+        pixels: &[[i64; 2]],
+    ) -> Result<DepthReply, EpisodeError> {
         let camera = world.egocentric_camera(robot);
         let (width, height) = (camera.width, camera.height);
         let outside = |[u, v]: [i64; 2]| u < 0 || v < 0 || u >= width.into() || v >= height.into();
@@ -95,7 +100,9 @@ pub fn robot_state(world: &World, robot: usize) -> RobotState {
     let state = world.robot_state(robot);
     let joints = &world.robots()[robot].model.joints;
     let named = |values: &[f32]| {
-        JointValues(joints.iter().zip(values).map(|(joint, value)| (joint.name.clone(), f64::from(*value))).collect())
+        JointValues(
+            joints.iter().zip(values).map(|(joint, value)| (joint.name.clone(), f64::from(*value))).collect(),
+        )
     };
     let down = state.world_from_pelvis.rotation.inverse() * Vector::new(0.0, 0.0, -1.0);
     RobotState {

@@ -60,12 +60,16 @@ pub fn protocol_name(protocol: Protocol) -> &'static str {
 pub fn order(call: &ToolCall, name: &str, robot: &Robot, motion: &Motion) -> Order {
     let hold = Order { plan: motion.hold(), clamped: Vec::new(), base_clamped: Vec::new() };
     match call {
-        ToolCall::MoveWrists(args) => {
-            args.robots.iter().find(|entry| entry.robot == name).map_or(hold, |entry| wrist_order(entry, robot, motion))
-        }
-        ToolCall::Walk(args) => {
-            args.robots.iter().find(|entry| entry.robot == name).map_or(hold, |entry| walk_order(entry, robot, motion))
-        }
+        ToolCall::MoveWrists(args) => args
+            .robots
+            .iter()
+            .find(|entry| entry.robot == name)
+            .map_or(hold, |entry| wrist_order(entry, robot, motion)),
+        ToolCall::Walk(args) => args
+            .robots
+            .iter()
+            .find(|entry| entry.robot == name)
+            .map_or(hold, |entry| walk_order(entry, robot, motion)),
         ToolCall::SendJointChunk(args) => args
             .robots
             .iter()
@@ -133,8 +137,7 @@ fn chunk_order(rows: &[Vec<f64>], robot: &Robot, motion: &Motion) -> Order {
         let upper_rad: [f64; UPPER_JOINTS] =
             std::array::from_fn(|column| clamp_column(robot, column, row[column], &mut order.clamped));
         let [vx, vy, yaw_rate, height] = [31, 32, 33, 34].map(|column| row[column] as f32);
-        let asked =
-            BaseCommand { vx_m_s: vx, vy_m_s: vy, yaw_rate_rad_s: yaw_rate, pelvis_height_m: height };
+        let asked = BaseCommand { vx_m_s: vx, vy_m_s: vy, yaw_rate_rad_s: yaw_rate, pelvis_height_m: height };
         let (base, moved) = clamp_base(asked, &robot.base_limits());
         for field in moved {
             if !order.base_clamped.contains(&field) {
@@ -170,8 +173,9 @@ pub fn report(order: &Order, robot: &Robot, state: &RobotState, motion: &Motion)
     };
     let hand = |side: Side| {
         let (arm, hand) = (ARM_COLUMNS[side.index()], HAND_COLUMNS[side.index()]);
-        let is_own =
-            move |column: usize| (arm..arm + ARM_JOINTS).contains(&column) || (hand..hand + HAND_JOINTS).contains(&column);
+        let is_own = move |column: usize| {
+            (arm..arm + ARM_JOINTS).contains(&column) || (hand..hand + HAND_JOINTS).contains(&column)
+        };
         let target = &motion.targets()[side.index()];
         let measured = isometry_from_sim(&state.pelvis_from_wrist[side.index()]);
         let missing = measured.inverse() * target;
@@ -189,7 +193,9 @@ pub fn report(order: &Order, robot: &Robot, state: &RobotState, motion: &Motion)
         robot: robot.name.clone(),
         left: hand(Side::Left),
         right: hand(Side::Right),
-        waist_joints_clamped: names(&mut order.clamped.iter().copied().filter(|column| *column >= WAIST_COLUMN)),
+        waist_joints_clamped: names(
+            &mut order.clamped.iter().copied().filter(|column| *column >= WAIST_COLUMN),
+        ),
         waist_joints_at_limit: names(&mut (WAIST_COLUMN..UPPER_JOINTS).filter(|column| at_limit(*column))),
         base_command_clamped: order.base_clamped.clone(),
     }
@@ -212,7 +218,13 @@ pub fn check_reach(args: &CheckReach, motion: &Motion) -> ReachReply {
         }
     };
     let (left, right) = (hand(Side::Left), hand(Side::Right));
-    ReachReply { robot: args.robot.clone(), reachable: left.reachable && right.reachable, left, right, joints_at_limit }
+    ReachReply {
+        robot: args.robot.clone(),
+        reachable: left.reachable && right.reachable,
+        left,
+        right,
+        joints_at_limit,
+    }
 }
 
 fn is_within_reach(error: &FrameError) -> bool {

@@ -24,7 +24,9 @@ impl Scorekeeper {
     pub fn new(task: &Task, world: &World) -> Scorekeeper {
         let objects = task.objects.iter().map(|spot| Watched {
             name: spot.name,
-            rest_height_m: world.object(spot.name).map_or(0.0, |object| object.world_from_object.translation.z),
+            rest_height_m: world
+                .object(spot.name)
+                .map_or(0.0, |object| object.world_from_object.translation.z),
             grasps: ObjectGrasps::new(spot.name, world.robots().len()),
         });
         Scorekeeper { objects: objects.collect() }

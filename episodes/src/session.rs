@@ -10,6 +10,7 @@ use tandem_tools_spec::{
     StatusReply, StopReason, ToolCall, ToolReply,
 };
 
+use crate::EpisodeError;
 use crate::describe;
 use crate::facts::Facts;
 use crate::motion::{Motion, MotionState, Plan, UpperBody};
@@ -20,7 +21,6 @@ use crate::protocol::{Clock, Rules, ThinkingClock, monotonic, rules};
 use crate::run_files::RunFiles;
 use crate::scorekeeper::Scorekeeper;
 use crate::tasks::Task;
-use crate::EpisodeError;
 
 /// One episode from start to result.
 pub struct Session {
@@ -81,7 +81,8 @@ impl Session {
         let rest = world.rest_command(0);
         let body = UpperBody::new(tandem_sim::assets::robot(tandem_sim::assets::DEFAULT_ROBOT)?, &rest)?;
         let body = Arc::new(body);
-        let motions = (0..world.robots().len()).map(|robot| Motion::new(&body, &world.rest_command(robot))).collect();
+        let motions =
+            (0..world.robots().len()).map(|robot| Motion::new(&body, &world.rest_command(robot))).collect();
         let rules = rules(protocol, task);
         let files = match folder {
             Some(folder) => Some(RunFiles::create(folder, task, seed, protocol, &world)?),
@@ -202,7 +203,12 @@ impl Session {
             StopReason::StepsDone
         };
         let reports = orders.iter().map(|(robot, order)| {
-            plan::report(order, &self.world.robots()[*robot], &self.world.robot_state(*robot), &self.motions[*robot])
+            plan::report(
+                order,
+                &self.world.robots()[*robot],
+                &self.world.robot_state(*robot),
+                &self.motions[*robot],
+            )
         });
         Ok(CommandReply {
             executed_steps,
@@ -217,8 +223,11 @@ impl Session {
 
     /// Executes up to `steps` control steps; fewer if the last phase is reached. Returns how many.
     fn run(&mut self, plans: Vec<Plan>, steps: u32) -> Result<u32, EpisodeError> {
-        let mut runs: Vec<_> =
-            plans.into_iter().zip(&mut self.motions).map(|(plan, motion)| motion.begin(plan, steps)).collect();
+        let mut runs: Vec<_> = plans
+            .into_iter()
+            .zip(&mut self.motions)
+            .map(|(plan, motion)| motion.begin(plan, steps))
+            .collect();
         for step in 1..=steps {
             let started = Instant::now();
             let commands: Vec<RobotCommand> =
@@ -302,7 +311,9 @@ impl Session {
     fn fallen(&self) -> Vec<RobotFallen> {
         let robots = self.world.robots().iter().enumerate();
         let fallen = |index| self.world.robot_state(index).fallen;
-        robots.map(|(index, robot)| RobotFallen { robot: robot.name.clone(), fallen: fallen(index) }).collect()
+        robots
+            .map(|(index, robot)| RobotFallen { robot: robot.name.clone(), fallen: fallen(index) })
+            .collect()
     }
 
     fn phases(&self) -> Vec<PhaseReached> {
@@ -403,7 +414,10 @@ fn world_spec(task: &Task, seed: u32) -> WorldSpec {
     let objects = task.objects.iter().zip(task.starts(seed)).map(|(spot, start)| ObjectPlacement {
         name: spot.name.into(),
         file: spot.file.into(),
-        world_from_object: Pose::from_parts(start.position_m.into(), Rotation::from_rotation_z(start.yaw_rad)),
+        world_from_object: Pose::from_parts(
+            start.position_m.into(),
+            Rotation::from_rotation_z(start.yaw_rad),
+        ),
     });
     WorldSpec { scene: task.scene.into(), robots: robots.collect(), objects: objects.collect() }
 }

@@ -19,6 +19,7 @@ fn scene(parts: Vec<(Mesh, Pose)>) -> RenderScene {
             rgb: GREY,
             pattern: Pattern::Plain,
             id,
+            casts_shadow: true,
         });
     }
     scene

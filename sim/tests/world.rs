@@ -30,7 +30,9 @@ fn world() -> World {
 /// Commands that let both robots wave their arms in front of them, by control step.
 fn waving(rest: &[RobotCommand], step: u64) -> Vec<RobotCommand> {
     let time_s = step as f32 * CONTROL_DT_S;
-    let wave = |joint: usize, robot: usize| 0.3 * (2.5 * time_s + joint as f32 + robot as f32).sin() * time_s.min(1.0);
+    let wave = |joint: usize, robot: usize| {
+        0.3 * (2.5 * time_s + joint as f32 + robot as f32).sin() * time_s.min(1.0)
+    };
     let mut commands = rest.to_vec();
     for (robot, command) in commands.iter_mut().enumerate() {
         // Shoulder pitch and elbow of both arms: they swing in front of the body and touch nothing.

@@ -49,7 +49,11 @@ impl BarGrasp<'_> {
     }
 
     pub fn close(&self) -> HandMove {
-        HandMove::shape(self.robot, self.side, closed_rad(self.side).map(|angle_rad| angle_rad * self.closure))
+        HandMove::shape(
+            self.robot,
+            self.side,
+            closed_rad(self.side).map(|angle_rad| angle_rad * self.closure),
+        )
     }
 
     pub fn open(&self) -> HandMove {

@@ -48,6 +48,12 @@ pub fn perform(stage: &mut Stage) -> Result<(), ExpertError> {
     };
     move_together(stage, &grasps, &|part| tub_at(LIFT_M * part, 0.0, 0.0), 5, 0.3)?;
     move_together(stage, &grasps, &|part| tub_at(LIFT_M, OVER_CRATE_M * part, 0.5 * part), 6, 0.3)?;
-    move_together(stage, &grasps, &|part| tub_at(LIFT_M, OVER_CRATE_M, 0.5 + (TIP_RAD - 0.5) * part), 8, 0.3)?;
+    move_together(
+        stage,
+        &grasps,
+        &|part| tub_at(LIFT_M, OVER_CRATE_M, 0.5 + (TIP_RAD - 0.5) * part),
+        8,
+        0.3,
+    )?;
     move_together(stage, &grasps, &|_| tub_at(LIFT_M, OVER_CRATE_M, TIP_RAD), 8, 0.4)
 }

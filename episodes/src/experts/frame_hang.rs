@@ -65,7 +65,11 @@ fn let_go(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), ExpertError> {
             let wrist = stage.world_from_wrist(grasp.robot, grasp.side)?;
             let outwards = if grasp.side == Side::Left { -1.0 } else { 1.0 };
             let by_m = Vector::new(step_m.x * outwards, step_m.y, step_m.z);
-            moves.push(HandMove::reach(grasp.robot, grasp.side, Pose::from_parts(wrist.translation + by_m, wrist.rotation)));
+            moves.push(HandMove::reach(
+                grasp.robot,
+                grasp.side,
+                Pose::from_parts(wrist.translation + by_m, wrist.rotation),
+            ));
         }
         stage.perform(0.9, &moves)?;
     }

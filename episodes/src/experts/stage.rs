@@ -78,7 +78,12 @@ impl<'a> Stage<'a> {
         self.travel(duration_s, moves, |part| part)
     }
 
-    fn travel(&mut self, duration_s: f32, moves: &[HandMove], pace: fn(f32) -> f32) -> Result<(), ExpertError> {
+    fn travel(
+        &mut self,
+        duration_s: f32,
+        moves: &[HandMove],
+        pace: fn(f32) -> f32,
+    ) -> Result<(), ExpertError> {
         let from = self.goals.clone();
         let total = (duration_s / CONTROL_DT_S).round().max(1.0) as u32;
         let mut done = 0;
@@ -92,7 +97,8 @@ impl<'a> Stage<'a> {
                     goal.world_from_wrist = start.world_from_wrist.lerp(&end, part);
                 }
                 if let Some(end_rad) = hand.fingers_rad {
-                    let between = |i: usize| start.fingers_rad[i] + (end_rad[i] - start.fingers_rad[i]) * part;
+                    let between =
+                        |i: usize| start.fingers_rad[i] + (end_rad[i] - start.fingers_rad[i]) * part;
                     goal.fingers_rad = std::array::from_fn(between);
                 }
             }
@@ -110,7 +116,9 @@ impl<'a> Stage<'a> {
         match self.arena.call(ToolCall::MoveWrists(MoveWrists { steps, robots }))? {
             ToolReply::Command(reply) if reply.stop_reason == StopReason::StepsDone => Ok(()),
             ToolReply::Command(_) => Err(ExpertError::EpisodeOver),
-            other => Err(ExpertError::Call { tool: "move_wrists", reason: format!("unexpected reply {other:?}") }),
+            other => {
+                Err(ExpertError::Call { tool: "move_wrists", reason: format!("unexpected reply {other:?}") })
+            }
         }
     }
 

@@ -148,7 +148,8 @@ mod tests {
             let mut facts = held();
             let crate_in_world = facts.object("crate").pose_in_world;
             for apple in APPLES {
-                facts.object_mut(apple).pose_in_world.translation = crate_in_world * Vector::new(0.0, 0.0, 0.05);
+                facts.object_mut(apple).pose_in_world.translation =
+                    crate_in_world * Vector::new(0.0, 0.0, 0.05);
             }
             facts.object_mut(APPLES[5]).pose_in_world.translation = crate_in_world * offset_m;
             facts

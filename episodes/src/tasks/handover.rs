@@ -39,10 +39,7 @@ pub const TASK: Task = Task {
                           go, stand it upright on the target in front of you and let go.",
         },
     ],
-    objects: &[
-        spot("bottle", [0.30, -0.07, COUNTER_M]),
-        spot("target_pad", [0.44, -0.06, COUNTER_M]),
-    ],
+    objects: &[spot("bottle", [0.30, -0.07, COUNTER_M]), spot("target_pad", [0.44, -0.06, COUNTER_M])],
     randomize: &[uniform_xy(&["bottle"], 0.025, 0.025), uniform_xy(&["target_pad"], 0.025, 0.025)],
     instruction: "Robot A picks up the bottle with its right hand and passes it straight into Robot B's right hand; \
                   Robot B stands it upright on the target and lets go.",
@@ -147,8 +144,7 @@ mod tests {
     /// The bottle stands on the target, untouched for 10 s.
     fn on_target() -> Facts {
         let mut facts = at_rest();
-        facts.object_mut("bottle").pose_in_world =
-            facts.object("target_pad").pose_in_world;
+        facts.object_mut("bottle").pose_in_world = facts.object("target_pad").pose_in_world;
         facts
     }
 
@@ -163,8 +159,7 @@ mod tests {
         let shifted = |by_m: Vector| changed(|bottle| bottle.pose_in_world.translation += by_m);
         let tilted = |degrees: f32| on_target().turned("bottle", Vector::Y, degrees.to_radians());
         let moving = |m_s| changed(|bottle| bottle.velocity_m_s = Vector::new(0.0, m_s, 0.0));
-        let turning =
-            |rad_s| changed(|bottle| bottle.angular_velocity_rad_s = Vector::new(0.0, 0.0, rad_s));
+        let turning = |rad_s| changed(|bottle| bottle.angular_velocity_rad_s = Vector::new(0.0, 0.0, rad_s));
         let untouched = |for_s| changed(|bottle| bottle.untouched_s = for_s);
         for (what, inside, outside) in [
             ("x", shifted(Vector::X * 0.0599), shifted(Vector::X * 0.0601)),

@@ -25,14 +25,18 @@ impl Task {
     /// Where every object starts under `seed`, in the order of [`Task::objects`]: world position in metres, and yaw.
     pub fn starts(&self, seed: u32) -> Vec<Start> {
         let mut random = SplitMix64(seed.into());
-        let mut starts: Vec<Start> =
-            self.objects.iter().map(|spot| Start { position_m: spot.position_m, yaw_rad: spot.yaw_rad }).collect();
+        let mut starts: Vec<Start> = self
+            .objects
+            .iter()
+            .map(|spot| Start { position_m: spot.position_m, yaw_rad: spot.yaw_rad })
+            .collect();
         for offset in self.randomize {
             let [x_m, y_m, z_m, yaw_rad] =
                 [&offset.x_m, &offset.y_m, &offset.z_m, &offset.yaw_rad].map(|range| random.uniform(range));
             let moved = |spot: &super::ObjectSpot| offset.objects.contains(&spot.name);
             for (start, _) in starts.iter_mut().zip(self.objects).filter(|(_, spot)| moved(spot)) {
-                start.position_m = [start.position_m[0] + x_m, start.position_m[1] + y_m, start.position_m[2] + z_m];
+                start.position_m =
+                    [start.position_m[0] + x_m, start.position_m[1] + y_m, start.position_m[2] + z_m];
                 start.yaw_rad += yaw_rad;
             }
         }
@@ -84,20 +88,31 @@ mod tests {
         for task in ALL {
             let starts: Vec<_> = (0..400).map(|seed| task.starts(seed)).collect();
             for (index, spot) in task.objects.iter().enumerate() {
-                let own: Vec<_> = task.randomize.iter().filter(|offset| offset.objects.contains(&spot.name)).collect();
+                let own: Vec<_> =
+                    task.randomize.iter().filter(|offset| offset.objects.contains(&spot.name)).collect();
                 let axes: [fn(&Offset) -> &RangeInclusive<f32>; 4] =
                     [|o| &o.x_m, |o| &o.y_m, |o| &o.z_m, |o| &o.yaw_rad];
                 let rest = [spot.position_m[0], spot.position_m[1], spot.position_m[2], spot.yaw_rad];
                 for (axis, range) in axes.into_iter().enumerate() {
                     let low: f32 = own.iter().map(|offset| *range(offset).start()).sum();
                     let high: f32 = own.iter().map(|offset| *range(offset).end()).sum();
-                    let value = |start: &Start| [start.position_m[0], start.position_m[1], start.position_m[2], start.yaw_rad][axis];
+                    let value = |start: &Start| {
+                        [start.position_m[0], start.position_m[1], start.position_m[2], start.yaw_rad][axis]
+                    };
                     let moved = starts.iter().map(|start| value(&start[index]) - rest[axis]);
                     let (least, most) = moved.fold((f32::MAX, f32::MIN), |(l, h), m| (l.min(m), h.max(m)));
                     // Sums of several offsets seldom come near their ends.
                     let (slack, width) = (1e-5, high - low);
-                    assert!(least >= low - slack && least <= low + 0.25 * width + slack, "{} {axis}", spot.name);
-                    assert!(most <= high + slack && most >= high - 0.25 * width - slack, "{} {axis}", spot.name);
+                    assert!(
+                        least >= low - slack && least <= low + 0.25 * width + slack,
+                        "{} {axis}",
+                        spot.name
+                    );
+                    assert!(
+                        most <= high + slack && most >= high - 0.25 * width - slack,
+                        "{} {axis}",
+                        spot.name
+                    );
                 }
             }
         }

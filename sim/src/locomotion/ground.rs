@@ -23,7 +23,12 @@ const SMALLEST_VERTICAL_FORCE_N: f32 = 20.0;
 /// (world). The centre of pressure of the net force,
 ///   p = c + ( -(m_y + h f_x), m_x - h f_y ) / f_z,   h = height of c above the soles,
 /// is shared along the line between the soles; what is left moves each foot's own centre of pressure.
-pub(super) fn distribute(com_m: Vector, force_n: Vector, moment_n_m: Vector, soles: [Pose; 2]) -> [FootForce; 2] {
+pub(super) fn distribute(
+    com_m: Vector,
+    force_n: Vector,
+    moment_n_m: Vector,
+    soles: [Pose; 2],
+) -> [FootForce; 2] {
     let ground_m = (soles[0].translation.z + soles[1].translation.z) * 0.5;
     let height_m = com_m.z - ground_m;
     let vertical_n = force_n.z.max(SMALLEST_VERTICAL_FORCE_N);

@@ -20,7 +20,12 @@ pub(super) fn rotation_vector_rad(rotation: Rotation) -> Vector {
 }
 
 /// Joint origins, joint axes and foot pose for a pelvis pose and leg angles.
-fn forward(model: &RobotModel, side: Side, pelvis: Pose, q_rad: &LegAngles) -> ([Vector; 6], [Vector; 6], Pose) {
+fn forward(
+    model: &RobotModel,
+    side: Side,
+    pelvis: Pose,
+    q_rad: &LegAngles,
+) -> ([Vector; 6], [Vector; 6], Pose) {
     let mut frame = pelvis;
     let mut origins = [Vector::ZERO; LEG_JOINT_COUNT];
     let mut axes = [Vector::ZERO; LEG_JOINT_COUNT];

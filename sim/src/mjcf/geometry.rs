@@ -61,7 +61,9 @@ impl Geom {
             GeomType::Plane => Primitive::Plane { half_extents_m: [size.x, size.y] },
             GeomType::Mesh => Primitive::Convex { vertices_m: mesh_vertices(document, geom)? },
             other => {
-                let what = format!("geom type {other:?}; use sphere, capsule, cylinder, box, ellipsoid, plane or mesh");
+                let what = format!(
+                    "geom type {other:?}; use sphere, capsule, cylinder, box, ellipsoid, plane or mesh"
+                );
                 return Err(document.unsupported(what));
             }
         };
@@ -89,7 +91,9 @@ impl Geom {
         let y_to_z = Pose::from_rotation(Rotation::from_rotation_x(std::f32::consts::FRAC_PI_2));
         let shape = match &self.primitive {
             Primitive::Sphere { radius_m } => SharedShape::ball(*radius_m),
-            Primitive::Capsule { radius_m, half_length_m } => SharedShape::capsule_z(*half_length_m, *radius_m),
+            Primitive::Capsule { radius_m, half_length_m } => {
+                SharedShape::capsule_z(*half_length_m, *radius_m)
+            }
             Primitive::Cylinder { radius_m, half_length_m } => {
                 body_from_shape *= y_to_z;
                 SharedShape::cylinder(*half_length_m, *radius_m)
@@ -125,7 +129,9 @@ fn mesh_vertices(document: &Document, geom: &mjcf_rs::body::Geom) -> Result<Vec<
     let name = geom.mesh.as_deref().unwrap_or_default();
     let mesh = document.model.assets.mesh(name);
     let Some(vertices) = mesh.and_then(|mesh| mesh.inline_vertices.as_ref()) else {
-        return Err(document.unsupported(format!("mesh `{name}` has no inline vertices; mesh files are not read")));
+        return Err(
+            document.unsupported(format!("mesh `{name}` has no inline vertices; mesh files are not read"))
+        );
     };
     Ok(vertices.chunks_exact(3).map(|v| vector([v[0], v[1], v[2]])).collect())
 }

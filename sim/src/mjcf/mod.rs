@@ -6,7 +6,7 @@ mod geometry;
 pub use camera::MjcfCamera;
 pub use geometry::{Geom, Primitive};
 
-use mjcf_rs::body::{Inertial, InertiaSpec};
+use mjcf_rs::body::{InertiaSpec, Inertial};
 use rapier3d::math::{Matrix, Pose, Rotation, Vector};
 use rapier3d::prelude::MassProperties;
 

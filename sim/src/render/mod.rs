@@ -37,6 +37,7 @@ pub struct Instance {
     pub pattern: Pattern,
     /// What [`Frame::ids`] shows for it; parts of one thing share one. 0 is the background.
     pub id: u32,
+    pub casts_shadow: bool,
 }
 
 /// How a surface varies.

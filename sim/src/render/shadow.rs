@@ -36,7 +36,7 @@ impl ShadowMap {
         self.texels_per_m = TEXELS as f32 / (2.0 * scene.focus_radius_m);
         self.target.reset(TEXELS, TEXELS);
         let mut corners = Vec::new();
-        for instance in &scene.instances {
+        for instance in scene.instances.iter().filter(|instance| instance.casts_shadow) {
             let mesh = &scene.meshes[instance.mesh];
             let sun_from_mesh = self.sun_from_world * instance.world_from_mesh;
             corners.clear();

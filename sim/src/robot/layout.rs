@@ -40,8 +40,15 @@ const LEG_JOINTS: [&str; 6] = ["hip_pitch", "hip_roll", "hip_yaw", "knee", "ankl
 const WAIST_JOINTS: [&str; 3] = ["waist_yaw", "waist_roll", "waist_pitch"];
 const ARM_JOINTS: [&str; 7] =
     ["shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_roll", "wrist_pitch", "wrist_yaw"];
-const HAND_JOINTS: [&str; 7] =
-    ["hand_thumb_0", "hand_thumb_1", "hand_thumb_2", "hand_middle_0", "hand_middle_1", "hand_index_0", "hand_index_1"];
+const HAND_JOINTS: [&str; 7] = [
+    "hand_thumb_0",
+    "hand_thumb_1",
+    "hand_thumb_2",
+    "hand_middle_0",
+    "hand_middle_1",
+    "hand_index_0",
+    "hand_index_1",
+];
 
 /// Names of the 43 joints in published order.
 pub fn joint_names() -> [String; JOINTS] {

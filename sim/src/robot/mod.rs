@@ -117,7 +117,8 @@ impl Robot {
     pub(crate) fn state(&self, physics: &PhysicsWorld) -> RobotState {
         let body = self.measure(physics);
         let pelvis_from_world = body.world_from_pelvis().inverse();
-        let wrist = |name| body.world_from_site(name).map_or(Pose::IDENTITY, |world| pelvis_from_world * world);
+        let wrist =
+            |name| body.world_from_site(name).map_or(Pose::IDENTITY, |world| pelvis_from_world * world);
         RobotState {
             q_rad: body.q_rad,
             qd_rad_s: body.qd_rad_s,

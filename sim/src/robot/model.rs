@@ -98,7 +98,9 @@ impl RobotModel {
         let placed = model.read_links(&document)?;
         model.mass_kg = model.links.iter().map(|link| link.mass.mass()).sum();
         model.egocentric_link = match &model.egocentric.body {
-            Some(body) => document.model.body_id_by_name(body).and_then(|id| placed.get(&id)).map_or(0, |p| p.link),
+            Some(body) => {
+                document.model.body_id_by_name(body).and_then(|id| placed.get(&id)).map_or(0, |p| p.link)
+            }
             None => 0,
         };
         model.exclude_contacts(&document, &placed);
@@ -106,7 +108,9 @@ impl RobotModel {
             model.hands[side.index()] = model.find_hand(&document, side)?;
         }
         for site in ["left_foot", "right_foot"] {
-            model.site(site).ok_or_else(|| document.unsupported(format!("needs a site `{site}` at the sole's centre")))?;
+            model
+                .site(site)
+                .ok_or_else(|| document.unsupported(format!("needs a site `{site}` at the sole's centre")))?;
         }
         Ok(model)
     }
@@ -159,7 +163,10 @@ impl RobotModel {
                 (Some(parent), [joint]) if joint.type_ == JointType::Hinge && joint.pos == [0.0; 3] => {
                     let index = self.joints.iter().position(|j| Some(&j.name) == joint.name.as_ref());
                     let index = index.ok_or_else(|| {
-                        document.unsupported(format!("joint {:?} of `{name}` has no <position> actuator", joint.name))
+                        document.unsupported(format!(
+                            "joint {:?} of `{name}` has no <position> actuator",
+                            joint.name
+                        ))
                     })?;
                     let link = self.links.len();
                     self.joints[index].link = link;
@@ -172,7 +179,9 @@ impl RobotModel {
                     Placed { link: parent.link, link_from_body: parent.link_from_body * pose(&body.pose) }
                 }
                 _ => {
-                    let what = format!("body `{name}`: a robot is one free root body and hinges at their body's origin");
+                    let what = format!(
+                        "body `{name}`: a robot is one free root body and hinges at their body's origin"
+                    );
                     return Err(document.unsupported(what));
                 }
             };
@@ -197,7 +206,8 @@ impl RobotModel {
     }
 
     fn exclude_contacts(&mut self, document: &Document, placed: &HashMap<usize, Placed>) {
-        let link_of = |name: &str| document.model.body_id_by_name(name).and_then(|id| placed.get(&id)).map(|p| p.link);
+        let link_of =
+            |name: &str| document.model.body_id_by_name(name).and_then(|id| placed.get(&id)).map(|p| p.link);
         for pair in &document.model.contact.excludes {
             if let (Some(a), Some(b)) = (link_of(&pair.body1), link_of(&pair.body2)) {
                 self.excluded.insert((a.min(b), a.max(b)));
@@ -212,9 +222,12 @@ impl RobotModel {
 
     fn find_hand(&self, document: &Document, side: Side) -> Result<HandLinks, SimError> {
         let site = format!("{}_wrist", side.name());
-        let wrist = self.site(&site).ok_or_else(|| document.unsupported(format!("needs a site `{site}`")))?.link;
+        let wrist =
+            self.site(&site).ok_or_else(|| document.unsupported(format!("needs a site `{site}`")))?.link;
         let mut hand = HandLinks { wrist, ..HandLinks::default() };
-        for (index, link) in self.links.iter().enumerate().filter(|(_, link)| link.name.starts_with(side.name())) {
+        for (index, link) in
+            self.links.iter().enumerate().filter(|(_, link)| link.name.starts_with(side.name()))
+        {
             if link.name.contains("hand_thumb") {
                 hand.thumb.push(index);
             } else if link.name.contains("hand_") {
@@ -243,26 +256,33 @@ fn first_keyframe(document: &Document) -> Result<Vec<f64>, SimError> {
 
 /// Joints in actuator order; links are filled in later.
 fn read_joints(document: &Document) -> Result<Vec<JointModel>, SimError> {
-    document.model.actuators.iter().map(|actuator| {
-        let name = actuator.joint.clone().unwrap_or_default();
-        let (body, index) = document.model.joint_by_name(&name)
-            .ok_or_else(|| document.unsupported(format!("actuator of unknown joint `{name}`")))?;
-        let joint = &document.model.bodies[body].body.joints[index];
-        let missing = |what: &str| document.unsupported(format!("joint `{name}` needs {what}"));
-        let [lower, upper] = joint.range.ok_or_else(|| missing("a range"))?;
-        let [_, effort] = actuator.force_range.ok_or_else(|| missing("a forcerange on its actuator"))?;
-        Ok(JointModel {
-            link: 0,
-            axis: vector(joint.axis).normalize(),
-            lower_rad: lower as f32,
-            upper_rad: upper as f32,
-            armature_kg_m2: joint.armature as f32,
-            friction_n_m: joint.frictionloss as f32,
-            kp_n_m_rad: actuator.kp.ok_or_else(|| missing("a kp on its <position> actuator"))? as f32,
-            kd_n_m_s_rad: actuator.kv.ok_or_else(|| missing("a kv on its <position> actuator"))? as f32,
-            effort_n_m: effort as f32,
-            rest_rad: 0.0,
-            name,
+    document
+        .model
+        .actuators
+        .iter()
+        .map(|actuator| {
+            let name = actuator.joint.clone().unwrap_or_default();
+            let (body, index) = document
+                .model
+                .joint_by_name(&name)
+                .ok_or_else(|| document.unsupported(format!("actuator of unknown joint `{name}`")))?;
+            let joint = &document.model.bodies[body].body.joints[index];
+            let missing = |what: &str| document.unsupported(format!("joint `{name}` needs {what}"));
+            let [lower, upper] = joint.range.ok_or_else(|| missing("a range"))?;
+            let [_, effort] = actuator.force_range.ok_or_else(|| missing("a forcerange on its actuator"))?;
+            Ok(JointModel {
+                link: 0,
+                axis: vector(joint.axis).normalize(),
+                lower_rad: lower as f32,
+                upper_rad: upper as f32,
+                armature_kg_m2: joint.armature as f32,
+                friction_n_m: joint.frictionloss as f32,
+                kp_n_m_rad: actuator.kp.ok_or_else(|| missing("a kp on its <position> actuator"))? as f32,
+                kd_n_m_s_rad: actuator.kv.ok_or_else(|| missing("a kv on its <position> actuator"))? as f32,
+                effort_n_m: effort as f32,
+                rest_rad: 0.0,
+                name,
+            })
         })
-    }).collect()
+        .collect()
 }

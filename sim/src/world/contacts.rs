@@ -55,9 +55,12 @@ impl World {
     /// Forces of one hand on one object; zero if the object is unknown or out of touch.
     pub fn hand_contacts(&self, robot: usize, side: Side, object: &str) -> HandContacts {
         let mut contacts = HandContacts::default();
-        let Some(object) = self.objects.iter().find(|candidate| candidate.name == object) else { return contacts };
+        let Some(object) = self.objects.iter().find(|candidate| candidate.name == object) else {
+            return contacts;
+        };
         let hand = &self.robots[robot].model.hands[side.index()];
-        for (link, force_n) in object.colliders.iter().flat_map(|collider| self.link_forces(robot, *collider)) {
+        for (link, force_n) in object.colliders.iter().flat_map(|collider| self.link_forces(robot, *collider))
+        {
             if hand.thumb.contains(&link) {
                 contacts.thumb_n += force_n;
             } else if hand.fingers.contains(&link) {
@@ -89,7 +92,8 @@ impl World {
                 if pair.collider1 != *collider {
                     continue;
                 }
-                let Some((owner, other)) = robot_and_link(self.physics.colliders[pair.collider2].user_data) else {
+                let Some((owner, other)) = robot_and_link(self.physics.colliders[pair.collider2].user_data)
+                else {
                     continue;
                 };
                 let force_n = pair.total_impulse_magnitude() / PHYSICS_DT_S;

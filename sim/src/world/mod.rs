@@ -58,7 +58,8 @@ impl World {
     pub fn new(spec: &WorldSpec) -> Result<World, SimError> {
         let model = Arc::new(RobotModel::parse("robot.xml", assets::robot(assets::DEFAULT_ROBOT)?)?);
         let scene = Document::parse(&spec.scene, assets::scene(&spec.scene)?)?;
-        let mut physics = PhysicsWorld { gravity: Vector::new(0.0, 0.0, -GRAVITY_M_S2), ..PhysicsWorld::new() };
+        let mut physics =
+            PhysicsWorld { gravity: Vector::new(0.0, 0.0, -GRAVITY_M_S2), ..PhysicsWorld::new() };
         configure(&mut physics.integration_parameters);
         let (fixed, mut objects) = objects::insert_scene(&mut physics, &scene)?;
         for placement in &spec.objects {

@@ -77,7 +77,10 @@ pub(super) fn insert_scene(
 }
 
 /// Inserts an object file: one top-level body, free or a mark.
-pub(super) fn insert_object(physics: &mut PhysicsWorld, placement: &ObjectPlacement) -> Result<Object, SimError> {
+pub(super) fn insert_object(
+    physics: &mut PhysicsWorld,
+    placement: &ObjectPlacement,
+) -> Result<Object, SimError> {
     let document = Document::parse(&placement.file, assets::object(&placement.file)?)?;
     let mut bodies: Vec<Body> = bodies(&document)?.into_iter().filter(|body| body.id != 0).collect();
     if bodies.len() != 1 {

@@ -19,7 +19,11 @@ impl World {
     /// About half a megabyte for two robots.
     pub fn snapshot(&self) -> Result<Snapshot, SimError> {
         let robots = self.robots.iter().map(|robot| robot.save()).collect::<Result<_, _>>()?;
-        Ok(Snapshot { physics: postcard::to_stdvec(&self.physics)?, robots, control_steps: self.control_steps })
+        Ok(Snapshot {
+            physics: postcard::to_stdvec(&self.physics)?,
+            robots,
+            control_steps: self.control_steps,
+        })
     }
 
     /// Takes the world back to a snapshot. On an error the world is as it was.
@@ -44,7 +48,8 @@ impl World {
     pub fn state_hash(&self) -> u64 {
         let mut hash = Xxh3::new();
         hash.update(&self.control_steps.to_le_bytes());
-        let mut floats = |values: &[f32]| values.iter().for_each(|value| hash.update(&value.to_bits().to_le_bytes()));
+        let mut floats =
+            |values: &[f32]| values.iter().for_each(|value| hash.update(&value.to_bits().to_le_bytes()));
         for (_, body) in self.physics.bodies.iter() {
             floats(&body.position().translation.to_array());
             floats(&body.position().rotation.to_array());

@@ -13,6 +13,8 @@ const ACCENT_MATERIAL: &str = "accent";
 /// Around the middle between the robots: counter, objects and all hands.
 const FOCUS_HEIGHT_M: f32 = 0.8;
 const FOCUS_RADIUS_M: f32 = 1.25;
+/// The light stands for lamps at this height: walls and what hangs above them cast no shadow into the room.
+const LAMPS_M: f32 = 2.2;
 /// Third-person view where a scene's file gives none: from the side, a little above.
 const FALLBACK_EYE_M: Vector = Vector::new(0.4, -2.4, 1.6);
 const FALLBACK_TARGET_M: Vector = Vector::new(0.4, 0.0, 0.8);
@@ -26,7 +28,7 @@ impl World {
     pub fn render_scene(&self) -> RenderScene {
         let mut scene = RenderScene { focus_radius_m: FOCUS_RADIUS_M, ..RenderScene::default() };
         let mut middle_m = Vector::ZERO;
-        add(&mut scene, &self.fixed, Pose::IDENTITY, ROOM_ID, |geom| rgb(geom));
+        add(&mut scene, &self.fixed, Pose::IDENTITY, ROOM_ID, rgb);
         for (index, robot) in self.robots.iter().enumerate() {
             let accent = ACCENTS[index % ACCENTS.len()];
             let body = robot.measure(&self.physics);
@@ -87,12 +89,23 @@ fn rgb(geom: &Geom) -> [f32; 3] {
     [geom.rgba[0], geom.rgba[1], geom.rgba[2]]
 }
 
-fn add(scene: &mut RenderScene, geoms: &[Geom], world_from_body: Pose, id: u32, rgb: impl Fn(&Geom) -> [f32; 3]) {
+fn add(
+    scene: &mut RenderScene,
+    geoms: &[Geom],
+    world_from_body: Pose,
+    id: u32,
+    rgb: impl Fn(&Geom) -> [f32; 3],
+) {
     for geom in geoms.iter().filter(|geom| geom.drawn) {
-        scene.meshes.push(mesh(&geom.primitive));
+        let mesh = mesh(&geom.primitive);
+        let world_from_mesh = world_from_body * geom.body_from_geom;
+        let top_m =
+            mesh.vertices.iter().map(|vertex| (world_from_mesh * vertex.position_m).z).fold(0.0, f32::max);
+        scene.meshes.push(mesh);
         scene.instances.push(Instance {
             mesh: scene.meshes.len() - 1,
-            world_from_mesh: world_from_body * geom.body_from_geom,
+            world_from_mesh,
+            casts_shadow: top_m < LAMPS_M,
             rgb: rgb(geom),
             pattern: if geom.checkered { Pattern::Checker } else { Pattern::Plain },
             id,
