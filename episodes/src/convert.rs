@@ -17,9 +17,14 @@ pub fn isometry_from_sim(pose: &Pose) -> Isometry3<f64> {
     isometry([t.x, t.y, t.z].map(f64::from), [r.w, r.x, r.y, r.z].map(f64::from))
 }
 
+/// Six decimals: a micrometre. More would only cost a language model tokens.
 pub fn wire_pose(pose: &Isometry3<f64>) -> wire::Pose {
     let (t, r) = (pose.translation, pose.rotation);
-    wire::Pose { position_m: [t.x, t.y, t.z], quaternion_wxyz: [r.w, r.i, r.j, r.k] }
+    wire::Pose { position_m: [t.x, t.y, t.z].map(rounded), quaternion_wxyz: [r.w, r.i, r.j, r.k].map(rounded) }
+}
+
+pub fn rounded(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6
 }
 
 pub fn wire_pose_from_sim(pose: &Pose) -> wire::Pose {
@@ -27,7 +32,7 @@ pub fn wire_pose_from_sim(pose: &Pose) -> wire::Pose {
 }
 
 pub fn wire_vector(v: Vector) -> [f64; 3] {
-    v.to_array().map(f64::from)
+    v.to_array().map(|value| rounded(value.into()))
 }
 
 pub fn wire_base(base: &BaseCommand) -> wire::BaseCommand {

@@ -7,7 +7,7 @@ use tandem_tools_spec::{
 };
 
 use crate::EpisodeError;
-use crate::convert::{opencv_axes, wire_base, wire_pose_from_sim, wire_vector};
+use crate::convert::{opencv_axes, rounded, wire_base, wire_pose_from_sim, wire_vector};
 
 /// Renders what the robots of a world see. Keeps the pictures of the present state.
 #[derive(Default)]
@@ -71,7 +71,7 @@ impl Eyes {
             let point_m = pelvis_from_camera * camera.unproject([u as f32 + 0.5, v as f32 + 0.5], depth_m);
             DepthPoint {
                 pixel,
-                depth_m: seen.then_some(depth_m.into()),
+                depth_m: seen.then_some(rounded(depth_m.into())),
                 point_in_pelvis_m: seen.then_some(wire_vector(point_m)),
             }
         });

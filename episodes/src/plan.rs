@@ -8,7 +8,7 @@ use tandem_tools_spec::{
     CheckReach, HandReach, HandReport, Protocol, ReachReply, RobotReport, ToolCall, WalkMove, WristMove,
 };
 
-use crate::convert::{clamp_base, isometry, isometry_from_sim, wire_pose};
+use crate::convert::{clamp_base, isometry, isometry_from_sim, rounded, wire_pose};
 use crate::motion::{HAND_JOINTS, Motion, Plan};
 
 /// First column of each hand in an action row: left, right.
@@ -182,8 +182,8 @@ pub fn report(order: &Order, robot: &Robot, state: &RobotState, motion: &Motion)
         HandReport {
             target: wire_pose(target),
             measured: wire_pose(&measured),
-            position_error_m: missing.translation.vector.norm(),
-            orientation_error_rad: missing.rotation.angle(),
+            position_error_m: rounded(missing.translation.vector.norm()),
+            orientation_error_rad: rounded(missing.rotation.angle()),
             joints_clamped: names(&mut order.clamped.iter().copied().filter(|column| is_own(*column))),
             // A finger is at a limit whenever the hand is open; that says nothing about reach.
             joints_at_limit: names(&mut (arm..arm + ARM_JOINTS).filter(|column| at_limit(*column))),
@@ -213,8 +213,8 @@ pub fn check_reach(args: &CheckReach, motion: &Motion) -> ReachReply {
         let error = report.errors.get(side.index()).copied().unwrap_or_default();
         HandReach {
             reachable: is_within_reach(&error),
-            position_error_m: error.position_m,
-            orientation_error_rad: error.orientation_rad,
+            position_error_m: rounded(error.position_m),
+            orientation_error_rad: rounded(error.orientation_rad),
         }
     };
     let (left, right) = (hand(Side::Left), hand(Side::Right));
