@@ -2,10 +2,14 @@
 //!
 //! For a distance h(q) with margin m the row  dh/dq dq >= -gain (h - m)  lets h approach m exponentially and not cross
 //! it. Source: Ames et al., Control barrier functions: theory and applications, 2019.
+//!
+//! Rows come and go without a jump in dq if the range, where a pair's row first appears, is so far out that the row does
+//! not bind there:  gain (range - margin) >= what the joints can close in one step.
 
 use nalgebra::{Point3, Vector3};
 
-use crate::qp::Qp;
+use crate::program::{RowOwner, Rows};
+use crate::qp::Row;
 use crate::{Configuration, FrameId};
 
 /// A sphere swept along a segment, fixed to a frame; a sphere if both ends are the same.
@@ -46,38 +50,63 @@ pub struct ClosestPair {
 /// Directions of nearly coincident axes are noise: below this distance no row is written, m.
 const SMALLEST_AXIS_DISTANCE_M: f64 = 1e-6;
 
+/// A capsule's axis in the root's frame, m.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Segment {
+    centre: Vector3<f64>,
+    /// From the centre to the second end.
+    half: Vector3<f64>,
+    half_length: f64,
+}
+
+impl Segment {
+    fn of(capsule: &Capsule, configuration: &Configuration) -> Segment {
+        let pose = configuration.root_from_frame(capsule.frame);
+        let [first, second] = capsule.ends.map(|end| (pose * end).coords);
+        let half = (second - first) * 0.5;
+        Segment { centre: (first + second) * 0.5, half, half_length: half.norm() }
+    }
+
+    fn ends(&self) -> [Vector3<f64>; 2] {
+        [self.centre - self.half, self.centre + self.half]
+    }
+}
+
 impl SelfCollision {
     /// Nearest pair, if there are any.
     pub fn closest(&self, configuration: &Configuration) -> Option<ClosestPair> {
-        let distances = (0..self.pairs.len()).map(|pair| ClosestPair { pair, distance_m: self.pair(configuration, pair).2 });
-        distances.min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))
-    }
-
-    /// Closest points on the axes of a pair (root frame, m) and the distance of the surfaces.
-    fn pair(&self, configuration: &Configuration, pair: usize) -> (Vector3<f64>, Vector3<f64>, f64) {
-        let [a, b] = self.pairs[pair].map(|index| &self.capsules[index]);
-        let [sa, sb] = [a, b].map(|capsule| {
-            let pose = configuration.root_from_frame(capsule.frame);
-            capsule.ends.map(|end| (pose * end).coords)
+        let pairs = self.pairs.iter().enumerate().map(|(pair, indices)| {
+            let [a, b] = indices.map(|index| &self.capsules[index]);
+            let [on_a, on_b] =
+                closest_points([a, b].map(|capsule| Segment::of(capsule, configuration).ends()));
+            ClosestPair { pair, distance_m: (on_a - on_b).norm() - a.radius_m - b.radius_m }
         });
-        let (on_a, on_b) = closest_points(sa, sb);
-        (on_a, on_b, (on_a - on_b).norm() - a.radius_m - b.radius_m)
+        pairs.min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))
     }
 
-    /// Writes one row per pair within range.
-    pub(crate) fn write(&self, configuration: &Configuration, qp: &mut Qp) {
-        for pair in 0..self.pairs.len() {
-            let (on_a, on_b, distance_m) = self.pair(configuration, pair);
+    /// Writes one row per pair within range; spheres about the capsules keep distant pairs cheap.
+    pub(crate) fn write(&self, configuration: &Configuration, segments: &mut Vec<Segment>, rows: &mut Rows) {
+        segments.clear();
+        segments.extend(self.capsules.iter().map(|capsule| Segment::of(capsule, configuration)));
+        for (pair, &[first, second]) in self.pairs.iter().enumerate() {
+            let (a, b) = (&segments[first], &segments[second]);
+            let radii = self.capsules[first].radius_m + self.capsules[second].radius_m;
+            let within = self.range_m + radii + a.half_length + b.half_length;
+            if (a.centre - b.centre).norm_squared() > within * within {
+                continue;
+            }
+            let [on_a, on_b] = closest_points([a.ends(), b.ends()]);
             let axis = on_a - on_b;
+            let distance_m = axis.norm() - radii;
             if distance_m > self.range_m || axis.norm() < SMALLEST_AXIS_DISTANCE_M {
                 continue;
             }
             let normal = axis.normalize();
-            let row = qp.push_row();
-            let [a, b] = self.pairs[pair].map(|index| self.capsules[index].frame);
-            for (frame, point, sign) in [(a, on_a, 1.0), (b, on_b, -1.0)] {
-                for &joint in configuration.model().support(frame) {
-                    row.coefficients[joint] += sign * normal.dot(&configuration.velocity_of_point(&point, joint).0);
+            let row = rows.push(RowOwner::SelfCollision(pair));
+            for (capsule, point, sign) in [(first, on_a, 1.0), (second, on_b, -1.0)] {
+                for &joint in configuration.model().support(self.capsules[capsule].frame) {
+                    row.coefficients[joint] +=
+                        sign * normal.dot(&configuration.velocity_of_point(&point, joint).0);
                 }
             }
             row.bound = -self.gain * (distance_m - self.margin_m);
@@ -99,9 +128,8 @@ pub struct PositionBarrier {
 }
 
 impl PositionBarrier {
-    pub(crate) fn write(&self, configuration: &Configuration, qp: &mut Qp) {
+    pub(crate) fn write(&self, configuration: &Configuration, row: &mut Row) {
         let point = configuration.root_from_frame(self.frame).translation.vector;
-        let row = qp.push_row();
         for &joint in configuration.model().support(self.frame) {
             row.coefficients[joint] = self.normal.dot(&configuration.velocity_of_point(&point, joint).0);
         }
@@ -110,7 +138,7 @@ impl PositionBarrier {
 }
 
 /// Closest points of two segments. Source: Ericson, Real-time collision detection, 2004, section 5.1.9.
-fn closest_points(a: [Vector3<f64>; 2], b: [Vector3<f64>; 2]) -> (Vector3<f64>, Vector3<f64>) {
+fn closest_points([a, b]: [[Vector3<f64>; 2]; 2]) -> [Vector3<f64>; 2] {
     let (da, db, between) = (a[1] - a[0], b[1] - b[0], a[0] - b[0]);
     let (aa, bb, f) = (da.norm_squared(), db.norm_squared(), db.dot(&between));
     let point_like = 1e-18;
@@ -125,7 +153,8 @@ fn closest_points(a: [Vector3<f64>; 2], b: [Vector3<f64>; 2]) -> (Vector3<f64>, 
         } else {
             let ab = da.dot(&db);
             let parallel = aa * bb - ab * ab;
-            let s = if parallel > 1e-12 * aa * bb { ((ab * f - c * bb) / parallel).clamp(0.0, 1.0) } else { 0.5 };
+            let s =
+                if parallel > 1e-12 * aa * bb { ((ab * f - c * bb) / parallel).clamp(0.0, 1.0) } else { 0.5 };
             let t = (ab * s + f) / bb;
             if t < 0.0 {
                 ((-c / aa).clamp(0.0, 1.0), 0.0)
@@ -136,5 +165,5 @@ fn closest_points(a: [Vector3<f64>; 2], b: [Vector3<f64>; 2]) -> (Vector3<f64>, 
             }
         }
     };
-    (a[0] + da * s, b[0] + db * t)
+    [a[0] + da * s, b[0] + db * t]
 }

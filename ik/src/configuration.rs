@@ -1,8 +1,8 @@
 //! A model at one set of joint coordinates: poses, Jacobians, centre of mass. Nothing allocates after construction.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Vector3, Vector6};
 
-use crate::{FrameId, IkError, JointKind, Model};
+use crate::{FrameId, IkError, Joint, JointKind, Model};
 
 /// Joint coordinates with the poses that follow from them.
 #[derive(Clone, Debug)]
@@ -15,8 +15,11 @@ pub struct Configuration<'m> {
 impl<'m> Configuration<'m> {
     /// The model at coordinates `q` (rad or m, model order).
     pub fn new(model: &'m Model, q: &[f64]) -> Result<Configuration<'m>, IkError> {
-        let mut configuration =
-            Configuration { model, q: vec![0.0; model.nv()], root_from_joint: vec![Isometry3::identity(); model.nv()] };
+        let mut configuration = Configuration {
+            model,
+            q: vec![0.0; model.nv()],
+            root_from_joint: vec![Isometry3::identity(); model.nv()],
+        };
         configuration.set(q)?;
         Ok(configuration)
     }
@@ -32,6 +35,14 @@ impl<'m> Configuration<'m> {
         self.q.copy_from_slice(q);
         self.update();
         Ok(())
+    }
+
+    /// Moves each joint to a finite coordinate.
+    pub(crate) fn place(&mut self, mut coordinate: impl FnMut(&Joint) -> f64) {
+        for (q, joint) in self.q.iter_mut().zip(&self.model.joints) {
+            *q = coordinate(joint);
+        }
+        self.update();
     }
 
     /// Adds `scale` times `dq` to the coordinates.
@@ -65,12 +76,13 @@ impl<'m> Configuration<'m> {
     /// Pose of a frame in the root's frame.
     pub fn root_from_frame(&self, frame: FrameId) -> Isometry3<f64> {
         let frame = &self.model.frames[frame.0];
-        frame.joint.map_or(Isometry3::identity(), |joint| self.root_from_joint[joint]) * frame.joint_from_frame
+        frame.joint.map_or(Isometry3::identity(), |joint| self.root_from_joint[joint])
+            * frame.joint_from_frame
     }
 
     /// Velocity (m/s, rad/s) of a frame's origin and the frame's angular velocity per unit speed of one joint that
     /// supports it, both expressed in the frame itself: one column of the body Jacobian.
-    pub fn body_jacobian_column(
+    pub(crate) fn body_jacobian_column(
         &self,
         root_from_frame: &Isometry3<f64>,
         joint: usize,
@@ -80,8 +92,23 @@ impl<'m> Configuration<'m> {
         (frame_from_root * linear, frame_from_root * angular)
     }
 
+    /// Body Jacobian of a frame, 6 x nv, [m; rad] per rad or m, written to `columns`.
+    pub fn frame_jacobian(&self, frame: FrameId, columns: &mut [Vector6<f64>]) {
+        columns.fill(Vector6::zeros());
+        let root_from_frame = self.root_from_frame(frame);
+        for &joint in self.model.support(frame) {
+            let (linear, angular) = self.body_jacobian_column(&root_from_frame, joint);
+            columns[joint].fixed_rows_mut::<3>(0).copy_from(&linear);
+            columns[joint].fixed_rows_mut::<3>(3).copy_from(&angular);
+        }
+    }
+
     /// Velocity of a point (root frame) that moves with the tip of `joint`, and angular velocity, per unit joint speed.
-    pub(crate) fn velocity_of_point(&self, point: &Vector3<f64>, joint: usize) -> (Vector3<f64>, Vector3<f64>) {
+    pub(crate) fn velocity_of_point(
+        &self,
+        point: &Vector3<f64>,
+        joint: usize,
+    ) -> (Vector3<f64>, Vector3<f64>) {
         let pose = &self.root_from_joint[joint];
         let axis = pose.rotation * self.model.joints[joint].axis.into_inner();
         match self.model.joints[joint].kind {
@@ -114,7 +141,8 @@ impl<'m> Configuration<'m> {
             if mass.mass_kg <= 0.0 {
                 continue;
             }
-            let centre = self.root_from_joint[index] * nalgebra::Point3::from(mass.moment_kg_m / mass.mass_kg);
+            let centre =
+                self.root_from_joint[index] * nalgebra::Point3::from(mass.moment_kg_m / mass.mass_kg);
             for &joint in support {
                 columns[joint] += self.velocity_of_point(&centre.coords, joint).0 * (mass.mass_kg / total_kg);
             }

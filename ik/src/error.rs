@@ -9,6 +9,9 @@ pub enum IkError {
     /// The URDF text cannot be read.
     #[error("not valid URDF: {0}")]
     Urdf(#[from] urdf_rs::UrdfError),
+    /// A file of targets cannot be read.
+    #[error("not a valid targets file: {0}")]
+    Targets(#[from] serde_json::Error),
     /// Something in the file that this crate has no use for.
     #[error("{0}")]
     Unsupported(String),

@@ -39,13 +39,16 @@
 #![warn(missing_docs)]
 
 mod barrier;
+pub mod bench;
 mod configuration;
 mod error;
 mod limits;
 mod model;
+mod program;
 pub mod qp;
 mod read_mjcf;
 mod read_urdf;
+mod report;
 mod solve;
 mod solver;
 pub mod spatial;
@@ -56,9 +59,10 @@ pub use configuration::Configuration;
 pub use error::IkError;
 pub use limits::{LimitKind, Limits};
 pub use model::{Frame, FrameId, Joint, JointKind, Model};
-pub use solve::{SolveOptions, SolveReport};
-pub use solver::{ClampedJoint, Outcome, Solver, Tolerance, frame_errors, saturated};
+pub use report::{ClampedJoint, Outcome, SolveReport, Tolerance, saturated};
+pub use solve::SolveOptions;
+pub use solver::{Solver, frame_errors};
 pub use task::{
-    CenterOfMassTask, DampingTask, FrameError, FrameTask, JointCouplingTask, JointVelocityTask, LowAccelerationTask,
-    PostureTask, RelativeFrameTask, Task,
+    CenterOfMassTask, DampingTask, FrameError, FrameTask, JointCouplingTask, JointVelocityTask,
+    LowAccelerationTask, PostureTask, RelativeFrameTask, Task,
 };

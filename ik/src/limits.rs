@@ -50,8 +50,16 @@ impl Limits {
         if let Some(acceleration) = self.acceleration.as_ref().map(|acceleration| acceleration[joint]) {
             let braking = |room: f64| (2.0 * acceleration * room.max(0.0)).sqrt() * dt_s;
             let reach = acceleration * dt_s * dt_s;
-            raise(&mut low, (last_velocity * dt_s - reach).max(-braking(q - range.lower)), LimitKind::Acceleration);
-            lower(&mut high, (last_velocity * dt_s + reach).min(braking(range.upper - q)), LimitKind::Acceleration);
+            raise(
+                &mut low,
+                (last_velocity * dt_s - reach).max(-braking(q - range.lower)),
+                LimitKind::Acceleration,
+            );
+            lower(
+                &mut high,
+                (last_velocity * dt_s + reach).min(braking(range.upper - q)),
+                LimitKind::Acceleration,
+            );
         }
         if let Some(gain) = self.configuration_gain {
             raise(&mut low, (gain * (range.lower - q)).min(fastest), LimitKind::Configuration);

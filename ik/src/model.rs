@@ -112,6 +112,11 @@ impl Model {
         })
     }
 
+    /// Name of a frame.
+    pub fn frame_name(&self, frame: FrameId) -> &str {
+        &self.frames[frame.0].name
+    }
+
     /// Joints that move a frame, root first.
     pub(crate) fn support(&self, frame: FrameId) -> &[usize] {
         self.frames[frame.0].joint.map_or(&[], |joint| &self.supports[joint])
@@ -131,7 +136,8 @@ impl Model {
         let mut joints = Vec::new();
         let mut masses = vec![Mass::default(); free.len() + 1];
         for (index, joint) in self.joints.iter().enumerate() {
-            let (parent, before) = joint.parent.map_or((None, Isometry3::identity()), |parent| placed[parent]);
+            let (parent, before) =
+                joint.parent.map_or((None, Isometry3::identity()), |parent| placed[parent]);
             let pose = before * joint.parent_from_joint;
             if free.contains(&joint.name.as_str()) {
                 joints.push(Joint { parent, parent_from_joint: pose, ..joint.clone() });
@@ -155,10 +161,13 @@ impl Joint {
     /// Pose in the joint's frame at rest after moving by `q`.
     pub(crate) fn motion(&self, q: f64) -> Isometry3<f64> {
         match self.kind {
-            JointKind::Hinge => {
-                Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&self.axis, q))
+            JointKind::Hinge => Isometry3::from_parts(
+                Translation3::identity(),
+                UnitQuaternion::from_axis_angle(&self.axis, q),
+            ),
+            JointKind::Slide => {
+                Isometry3::from_parts((self.axis.into_inner() * q).into(), UnitQuaternion::identity())
             }
-            JointKind::Slide => Isometry3::from_parts((self.axis.into_inner() * q).into(), UnitQuaternion::identity()),
         }
     }
 }

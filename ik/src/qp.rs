@@ -85,7 +85,8 @@ pub struct Qp {
 impl Qp {
     /// Work space for `n` variables.
     pub fn new(n: usize) -> Qp {
-        let scratch = MemBuffer::new(llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default()));
+        let scratch =
+            MemBuffer::new(llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default()));
         Qp {
             n,
             hessian: Mat::zeros(n, n),
@@ -126,6 +127,20 @@ impl Qp {
         row
     }
 
+    /// Lowers the bound of every inequality that the start x = 0 violates to `cap` of the largest  a' x  within the
+    /// bounds on x; says whether there was any.
+    pub fn cap_inequalities(&mut self, cap: impl Fn(f64) -> f64) -> bool {
+        let mut lowered = false;
+        for row in self.rows[..self.used_rows].iter_mut().filter(|row| !row.equality && row.bound > 0.0) {
+            let largest = row.coefficients.iter().enumerate().filter(|(_, a)| **a != 0.0);
+            let attainable: f64 = largest.map(|(i, a)| (a * self.lower[i]).max(a * self.upper[i])).sum();
+            let capped = row.bound.min(cap(attainable.max(0.0)));
+            lowered |= capped < row.bound;
+            row.bound = capped;
+        }
+        lowered
+    }
+
     /// Constraints that hold with equality at the solution.
     pub fn active(&self) -> impl Iterator<Item = Constraint> + '_ {
         self.active.iter().map(|(constraint, _)| *constraint)
@@ -155,8 +170,14 @@ impl Qp {
     fn unconstrained_minimum(&mut self) -> Result<(), QpFailure> {
         self.factor.copy_from(&self.hessian);
         let stack = MemStack::new(&mut self.scratch);
-        llt::factor::cholesky_in_place(self.factor.as_mut(), Default::default(), Par::Seq, stack, Default::default())
-            .map_err(|_| QpFailure::NotConvex)?;
+        llt::factor::cholesky_in_place(
+            self.factor.as_mut(),
+            Default::default(),
+            Par::Seq,
+            stack,
+            Default::default(),
+        )
+        .map_err(|_| QpFailure::NotConvex)?;
         for i in 0..self.n {
             self.rhs[(i, 0)] = -self.linear[i];
         }
@@ -248,7 +269,9 @@ impl Qp {
             self.d[k] = sign
                 * match constraint {
                     Constraint::Lower(i) | Constraint::Upper(i) => column[i],
-                    Constraint::Row(row) => self.rows[row].coefficients.iter().zip(column).map(|(a, j)| a * j).sum(),
+                    Constraint::Row(row) => {
+                        self.rows[row].coefficients.iter().zip(column).map(|(a, j)| a * j).sum()
+                    }
                 };
         }
         self.direction.fill(0.0);

@@ -1,6 +1,7 @@
 //! Models from MJCF: bodies and sites become frames, a free joint at the root is left out.
 
 use std::collections::HashMap;
+use std::path::Path;
 
 use mjcf_rs::body::JointType;
 use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
@@ -12,7 +13,12 @@ impl Model {
     /// Reads MJCF text. The first top-level body is the root, whatever joint it has; speeds are unlimited, as MJCF has
     /// no velocity limits.
     pub fn from_mjcf(xml: &str) -> Result<Model, IkError> {
-        let document = mjcf_rs::Model::from_str(xml, ".")?;
+        Model::from_mjcf_in(xml, Path::new("."))
+    }
+
+    /// The same, for text that includes files named relative to `folder`.
+    pub fn from_mjcf_in(xml: &str, folder: &Path) -> Result<Model, IkError> {
+        let document = mjcf_rs::Model::from_str(xml, folder)?;
         let mut joints: Vec<Joint> = Vec::new();
         let mut frames = Vec::new();
         let mut masses: Vec<Mass> = Vec::new();
@@ -30,7 +36,12 @@ impl Model {
                 let kind = match joint.type_ {
                     JointType::Hinge => JointKind::Hinge,
                     JointType::Slide => JointKind::Slide,
-                    other => return Err(IkError::Unsupported(format!("joint {:?} is {other:?}; use hinges and slides", joint.name))),
+                    other => {
+                        return Err(IkError::Unsupported(format!(
+                            "joint {:?} is {other:?}; use hinges and slides",
+                            joint.name
+                        )));
+                    }
                 };
                 let anchor = Translation3::from(Vector3::from(joint.pos));
                 let [lower, upper] = joint.range.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);

@@ -12,11 +12,19 @@ impl Model {
     /// Reads URDF text. Joints come depth first, children in file order.
     pub fn from_urdf(xml: &str) -> Result<Model, IkError> {
         let robot = urdf_rs::read_from_string(xml)?;
-        let links: HashMap<&str, &urdf_rs::Link> = robot.links.iter().map(|link| (link.name.as_str(), link)).collect();
+        let links: HashMap<&str, &urdf_rs::Link> =
+            robot.links.iter().map(|link| (link.name.as_str(), link)).collect();
         let is_child = |link: &str| robot.joints.iter().any(|joint| joint.child.link == link);
         let root = robot.links.iter().find(|link| !is_child(&link.name));
         let root = root.ok_or_else(|| IkError::Unsupported("the links form a loop: no root".into()))?;
-        let mut parts = Parts { robot: &robot, links, joints: Vec::new(), frames: Vec::new(), masses: Vec::new(), root: Mass::default() };
+        let mut parts = Parts {
+            robot: &robot,
+            links,
+            joints: Vec::new(),
+            frames: Vec::new(),
+            masses: Vec::new(),
+            root: Mass::default(),
+        };
         parts.add_link(&root.name, None, Isometry3::identity())?;
         let Parts { joints, frames, mut masses, root, .. } = parts;
         masses.push(root);
@@ -53,7 +61,10 @@ impl Parts<'_> {
                 JointType::Revolute | JointType::Continuous => JointKind::Hinge,
                 JointType::Prismatic => JointKind::Slide,
                 ref other => {
-                    return Err(IkError::Unsupported(format!("joint `{}` is {other:?}; use revolute and prismatic", joint.name)));
+                    return Err(IkError::Unsupported(format!(
+                        "joint `{}` is {other:?}; use revolute and prismatic",
+                        joint.name
+                    )));
                 }
             };
             let unlimited = joint.joint_type == JointType::Continuous;

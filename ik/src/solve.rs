@@ -1,9 +1,11 @@
 //! Whole solutions: steps with a clamped error and a line search, until the frames are there or nothing moves.
 
-use crate::solver::{Outcome, Solver, frame_errors, saturated};
-use crate::task::{FrameTask, Task};
-use crate::{Configuration, FrameError};
 use nalgebra::{Isometry3, UnitQuaternion};
+
+use crate::Configuration;
+use crate::report::{ClampedJoint, Outcome, SolveReport, saturated};
+use crate::solver::{Solver, frame_errors};
+use crate::task::Task;
 
 /// How long and how hard to try.
 #[derive(Clone, Debug)]
@@ -18,28 +20,22 @@ pub struct SolveOptions {
     pub restarts: usize,
     /// Seed of those coordinates.
     pub seed: u64,
+    /// Tasks that hold exactly, as in [`Solver::step`].
+    pub constraints: Vec<Task>,
 }
 
 impl Default for SolveOptions {
     /// 200 steps, error clamp 0.3 m and 0.9 rad, line search, no restarts.
     fn default() -> Self {
-        SolveOptions { max_iterations: 200, error_clamp: Some((0.3, 0.9)), line_search: true, restarts: 0, seed: 1 }
+        SolveOptions {
+            max_iterations: 200,
+            error_clamp: Some((0.3, 0.9)),
+            line_search: true,
+            restarts: 0,
+            seed: 1,
+            constraints: Vec::new(),
+        }
     }
-}
-
-/// How a solution ended.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SolveReport {
-    /// `Moving` if the iterations ran out.
-    pub outcome: Outcome,
-    /// Steps over all attempts.
-    pub iterations: usize,
-    /// Attempts after the first.
-    pub restarts: usize,
-    /// Per frame task, in order.
-    pub errors: Vec<FrameError>,
-    /// Largest joint speed of the last step, rad/s or m/s: a stalled solution has come to rest.
-    pub final_speed: f64,
 }
 
 const MAX_HALVINGS: usize = 5;
@@ -51,38 +47,70 @@ const REST_SPEED: f64 = 0.04;
 /// Random starts keep this part of each joint's range.
 const START_RANGE: f64 = 0.8;
 
+/// Where an attempt ended.
+struct Attempt {
+    outcome: Outcome,
+    q: Vec<f64>,
+    squared_error: f64,
+    clamped: Vec<ClampedJoint>,
+    final_speed: f64,
+}
+
 impl Solver {
     /// Moves `configuration` to `tasks`. If no attempt gets there, it is left at the best coordinates found.
-    pub fn solve(&mut self, configuration: &mut Configuration, tasks: &[Task], options: &SolveOptions) -> SolveReport {
+    pub fn solve(
+        &mut self,
+        configuration: &mut Configuration,
+        tasks: &[Task],
+        options: &SolveOptions,
+    ) -> SolveReport {
         let mut random = options.seed.max(1);
-        let mut best: Option<(f64, Vec<f64>, Outcome, f64)> = None;
-        let (mut iterations, mut restarts) = (0, 0);
-        for attempt in 0..=options.restarts {
-            if attempt > 0 {
-                let start: Vec<f64> = configuration.model().joints().iter().map(|joint| random_coordinate(joint, &mut random)).collect();
-                // The coordinates are finite and as many as joints.
-                let _ = configuration.set(&start);
-            }
-            self.rest();
-            let last = attempt == options.restarts;
-            let (outcome, final_speed) = self.attempt(configuration, tasks, options, last, &mut iterations);
-            let error = squared_error(configuration, tasks);
-            let reached = outcome == Outcome::Reached;
-            if reached || best.as_ref().is_none_or(|(least, ..)| error < *least) {
-                best = Some((error, configuration.q().to_vec(), outcome, final_speed));
-            }
-            restarts = attempt;
-            if reached {
-                break;
+        let mut iterations = 0;
+        let to_rest = |attempt| attempt == options.restarts;
+        let mut best = self.attempt(configuration, tasks, options, to_rest(0), &mut iterations);
+        let mut restarts = 0;
+        while best.outcome != Outcome::Reached && restarts < options.restarts {
+            restarts += 1;
+            configuration.place(|joint| random_coordinate(joint, &mut random));
+            let attempt = self.attempt(configuration, tasks, options, to_rest(restarts), &mut iterations);
+            if attempt.outcome == Outcome::Reached || attempt.squared_error < best.squared_error {
+                best = attempt;
             }
         }
-        let (_, q, outcome, final_speed) = best.expect("there is a first attempt");
-        let _ = configuration.set(&q);
-        let errors = frame_errors(configuration, tasks).collect();
-        SolveReport { outcome, iterations, restarts, errors, final_speed }
+        let mut q = best.q.iter();
+        configuration.place(|_| *q.next().expect("one coordinate per joint"));
+        SolveReport {
+            outcome: best.outcome,
+            iterations,
+            restarts,
+            errors: frame_errors(configuration, tasks).collect(),
+            clamped: best.clamped,
+            closest_pair: self.closest_pair(configuration),
+            final_speed: best.final_speed,
+        }
     }
 
     fn attempt(
+        &mut self,
+        configuration: &mut Configuration,
+        tasks: &[Task],
+        options: &SolveOptions,
+        to_rest: bool,
+        iterations: &mut usize,
+    ) -> Attempt {
+        self.rest();
+        let (outcome, final_speed) = self.iterate(configuration, tasks, options, to_rest, iterations);
+        Attempt {
+            outcome,
+            q: configuration.q().to_vec(),
+            squared_error: squared_error(configuration, tasks),
+            clamped: self.clamped(configuration).collect(),
+            final_speed,
+        }
+    }
+
+    /// How an attempt ended, and the largest joint speed in its last step.
+    fn iterate(
         &mut self,
         configuration: &mut Configuration,
         tasks: &[Task],
@@ -108,8 +136,8 @@ impl Solver {
             }
             *iterations += 1;
             prepare(&mut clamped, tasks, configuration, options, damping);
-            if let Err(failure) = self.displacement(configuration, &clamped, &[]) {
-                return (self.infeasible(configuration.model(), failure), 0.0);
+            if let Err(failure) = self.displacement(configuration, &clamped, &options.constraints) {
+                return (self.infeasible(configuration.model(), &options.constraints, failure), 0.0);
             }
             let step = self.last_displacement();
             let fastest = step.iter().fold(0.0_f64, |fastest, dq| fastest.max(dq.abs())) / self.dt_s;
@@ -156,10 +184,13 @@ fn prepare(
     for (prepared, task) in prepared.iter_mut().zip(tasks) {
         match (prepared, task) {
             (Task::Frame(prepared), Task::Frame(task)) => {
-                prepared.target = match options.error_clamp {
-                    Some((position_m, angle_rad)) => clamped_target(task, configuration, position_m, angle_rad),
-                    None => task.target,
-                };
+                let now = configuration.root_from_frame(task.frame);
+                prepared.target = clamped(&task.target, &now, options.error_clamp);
+            }
+            (Task::RelativeFrame(prepared), Task::RelativeFrame(task)) => {
+                let reference_from_root = configuration.root_from_frame(task.reference).inverse();
+                let now = reference_from_root * configuration.root_from_frame(task.frame);
+                prepared.target = clamped(&task.target, &now, options.error_clamp);
             }
             (Task::Damping(prepared), Task::Damping(task)) => prepared.cost = task.cost * damping,
             _ => {}
@@ -167,28 +198,24 @@ fn prepare(
     }
 }
 
-/// The target, pulled towards the frame until it is within `position_m` and `angle_rad` of it.
-fn clamped_target(
-    task: &FrameTask,
-    configuration: &Configuration,
-    position_m: f64,
-    angle_rad: f64,
-) -> Isometry3<f64> {
-    let now = configuration.root_from_frame(task.frame);
-    let way = task.target.translation.vector - now.translation.vector;
-    let turn = now.rotation.inverse() * task.target.rotation;
-    let translation = now.translation.vector + way * (position_m / way.norm().max(f64::MIN_POSITIVE)).min(1.0);
+/// The target, pulled towards where the frame is now until it is within the clamp's distance and angle of it.
+fn clamped(target: &Isometry3<f64>, now: &Isometry3<f64>, clamp: Option<(f64, f64)>) -> Isometry3<f64> {
+    let Some((position_m, angle_rad)) = clamp else { return *target };
+    let way = target.translation.vector - now.translation.vector;
+    let turn = now.rotation.inverse() * target.rotation;
+    let translation =
+        now.translation.vector + way * (position_m / way.norm().max(f64::MIN_POSITIVE)).min(1.0);
     let part = (angle_rad / turn.angle().max(f64::MIN_POSITIVE)).min(1.0);
     let rotation = now.rotation * UnitQuaternion::from_scaled_axis(turn.scaled_axis() * part);
     Isometry3::from_parts(translation.into(), rotation)
 }
 
 fn squared_error(configuration: &Configuration, tasks: &[Task]) -> f64 {
-    frame_errors(configuration, tasks).map(|error| error.position_m.powi(2) + error.orientation_rad.powi(2)).sum()
+    frame_errors(configuration, tasks).map(|error| error.squared()).sum()
 }
 
 /// Uniform in the middle of a joint's range; xorshift64 (Marsaglia 2003).
-fn random_coordinate(joint: &crate::Joint, state: &mut u64) -> f64 {
+pub(crate) fn random_coordinate(joint: &crate::Joint, state: &mut u64) -> f64 {
     *state ^= *state << 13;
     *state ^= *state >> 7;
     *state ^= *state << 17;

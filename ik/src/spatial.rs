@@ -10,7 +10,11 @@ const SMALL_ANGLE_RAD: f64 = 1e-3;
 /// Rotation vector of a rotation, the short way round; continuous up to pi.
 pub fn log3(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
     let quaternion = rotation.quaternion();
-    let (w, v) = if quaternion.w < 0.0 { (-quaternion.w, -quaternion.imag()) } else { (quaternion.w, quaternion.imag()) };
+    let (w, v) = if quaternion.w < 0.0 {
+        (-quaternion.w, -quaternion.imag())
+    } else {
+        (quaternion.w, quaternion.imag())
+    };
     let sine = v.norm();
     let scale = if sine < 1e-10 { 2.0 / w } else { 2.0 * sine.atan2(w) / sine };
     v * scale

@@ -8,8 +8,9 @@
 
 use nalgebra::{Isometry3, Vector3, Vector6};
 
+use crate::program::Sink;
 use crate::spatial::Log6;
-use crate::{Configuration, FrameId};
+use crate::{Configuration, FrameId, Model};
 
 /// One thing to achieve; see the variants.
 #[derive(Clone, Debug)]
@@ -56,10 +57,10 @@ impl FrameTask {
         FrameTask { frame, target, position_cost: 1.0, orientation_cost: 1.0, gain: 1.0, lm_damping: 0.0 }
     }
 
-    /// Position (m) and orientation (rad) still missing.
+    /// What is missing; a component without cost is not asked for and counts as 0.
     pub fn error(&self, configuration: &Configuration) -> FrameError {
         let missing = configuration.root_from_frame(self.frame).inverse() * self.target;
-        FrameError { position_m: missing.translation.vector.norm(), orientation_rad: missing.rotation.angle() }
+        FrameError::of(&missing, [self.position_cost, self.orientation_cost])
     }
 }
 
@@ -70,6 +71,20 @@ pub struct FrameError {
     pub position_m: f64,
     /// Angle between the orientations, rad.
     pub orientation_rad: f64,
+}
+
+impl FrameError {
+    fn of(missing: &Isometry3<f64>, [position_cost, orientation_cost]: [f64; 2]) -> FrameError {
+        FrameError {
+            position_m: if position_cost > 0.0 { missing.translation.vector.norm() } else { 0.0 },
+            orientation_rad: if orientation_cost > 0.0 { missing.rotation.angle() } else { 0.0 },
+        }
+    }
+
+    /// Squared, metres and radians alike.
+    pub(crate) fn squared(&self) -> f64 {
+        self.position_m.powi(2) + self.orientation_rad.powi(2)
+    }
 }
 
 /// Puts a frame at a pose in another frame that moves too.
@@ -134,7 +149,7 @@ pub struct LowAccelerationTask {
     pub cost: f64,
 }
 
-/// Keeps  sum_i ratio_i q_i = offset.  J = ratios, e = offset - ratios' q, 1.
+/// Keeps  sum_i ratio_i q_i = offset, with each joint named once.  J = ratios, e = offset - ratios' q, 1.
 #[derive(Clone, Debug)]
 pub struct JointCouplingTask {
     /// Joint and its ratio.
@@ -145,16 +160,6 @@ pub struct JointCouplingTask {
     pub cost: f64,
     /// alpha in 0..=1.
     pub gain: f64,
-}
-
-/// Receives a task's weighted rows.
-pub(crate) trait Sink {
-    /// One row: (joint, W J) for the joints that move it, and  alpha W e.
-    fn row(&mut self, entries: &[(usize, f64)], error: f64);
-    /// The same weight on every joint: W 1 dq = W e, with e per joint.
-    fn diagonal(&mut self, weight: f64, error: &dyn Fn(usize) -> f64);
-    /// mu, on every joint.
-    fn damp(&mut self, mu: f64);
 }
 
 /// What tasks need to know beside the configuration.
@@ -182,12 +187,46 @@ impl TaskScratch {
 }
 
 impl Task {
+    /// What is missing to a frame's pose or to the centre of mass; `None` for tasks that only shape the way there.
+    pub fn error(&self, configuration: &Configuration) -> Option<FrameError> {
+        match self {
+            Task::Frame(task) => Some(task.error(configuration)),
+            Task::RelativeFrame(task) => Some(task.error(configuration)),
+            Task::CenterOfMass(task) => Some(task.error(configuration)),
+            Task::Posture(_)
+            | Task::Damping(_)
+            | Task::JointVelocity(_)
+            | Task::LowAcceleration(_)
+            | Task::JointCoupling(_) => None,
+        }
+    }
+
+    /// For messages: what the task is about.
+    pub(crate) fn describe(&self, model: &Model) -> String {
+        match self {
+            Task::Frame(task) => format!("pose of {}", model.frame_name(task.frame)),
+            Task::RelativeFrame(task) => {
+                format!("pose of {} in {}", model.frame_name(task.frame), model.frame_name(task.reference))
+            }
+            Task::CenterOfMass(_) => "centre of mass".into(),
+            Task::Posture(_) => "posture".into(),
+            Task::Damping(_) => "damping".into(),
+            Task::JointVelocity(_) => "joint velocities".into(),
+            Task::LowAcceleration(_) => "low acceleration".into(),
+            Task::JointCoupling(task) => {
+                let joints: Vec<&str> =
+                    task.ratios.iter().map(|(joint, _)| model.joints()[*joint].name.as_str()).collect();
+                format!("coupling of {}", joints.join(", "))
+            }
+        }
+    }
+
     pub(crate) fn write(
         &self,
         configuration: &Configuration,
         context: &StepContext,
         scratch: &mut TaskScratch,
-        sink: &mut dyn Sink,
+        sink: &mut impl Sink,
     ) {
         match self {
             Task::Frame(task) => task.write(configuration, scratch, sink),
@@ -195,17 +234,18 @@ impl Task {
             Task::CenterOfMass(task) => task.write(configuration, scratch, sink),
             Task::Posture(task) => {
                 let q = configuration.q();
-                sink.diagonal(task.cost, &|joint| task.gain * (task.target[joint] - q[joint]));
+                sink.diagonal(task.cost, |joint| task.gain * (task.target[joint] - q[joint]));
             }
-            Task::Damping(task) => sink.diagonal(task.cost / context.dt_s, &|_| 0.0),
+            Task::Damping(task) => sink.diagonal(task.cost / context.dt_s, |_| 0.0),
             Task::JointVelocity(task) => {
-                sink.diagonal(task.cost / context.dt_s, &|joint| task.target[joint] * context.dt_s);
+                sink.diagonal(task.cost / context.dt_s, |joint| task.target[joint] * context.dt_s);
             }
             Task::LowAcceleration(task) => {
-                sink.diagonal(task.cost / context.dt_s, &|joint| context.last_velocity[joint] * context.dt_s);
+                sink.diagonal(task.cost / context.dt_s, |joint| context.last_velocity[joint] * context.dt_s);
             }
             Task::JointCoupling(task) => {
-                let now: f64 = task.ratios.iter().map(|(joint, ratio)| ratio * configuration.q()[*joint]).sum();
+                let now: f64 =
+                    task.ratios.iter().map(|(joint, ratio)| ratio * configuration.q()[*joint]).sum();
                 scratch.entries.clear();
                 scratch.entries.extend(task.ratios.iter().map(|(joint, ratio)| (*joint, task.cost * ratio)));
                 sink.row(&scratch.entries, task.cost * task.gain * (task.offset - now));
@@ -215,7 +255,7 @@ impl Task {
 }
 
 impl FrameTask {
-    fn write(&self, configuration: &Configuration, scratch: &mut TaskScratch, sink: &mut dyn Sink) {
+    fn write(&self, configuration: &Configuration, scratch: &mut TaskScratch, sink: &mut impl Sink) {
         let root_from_frame = configuration.root_from_frame(self.frame);
         let missing = Log6::of(&(root_from_frame.inverse() * self.target));
         scratch.columns.clear();
@@ -232,7 +272,13 @@ impl FrameTask {
 }
 
 impl RelativeFrameTask {
-    fn write(&self, configuration: &Configuration, scratch: &mut TaskScratch, sink: &mut dyn Sink) {
+    fn error(&self, configuration: &Configuration) -> FrameError {
+        let frame_from_root = configuration.root_from_frame(self.frame).inverse();
+        let missing = frame_from_root * configuration.root_from_frame(self.reference) * self.target;
+        FrameError::of(&missing, [self.position_cost, self.orientation_cost])
+    }
+
+    fn write(&self, configuration: &Configuration, scratch: &mut TaskScratch, sink: &mut impl Sink) {
         let root_from_frame = configuration.root_from_frame(self.frame);
         let root_from_reference = configuration.root_from_frame(self.reference);
         let goal = root_from_reference * self.target;
@@ -253,18 +299,32 @@ impl RelativeFrameTask {
                 None => scratch.columns.push((joint, -carried)),
             }
         }
-        write_pose_rows(scratch, &missing.twist, [self.position_cost, self.orientation_cost], self.gain, sink);
+        write_pose_rows(
+            scratch,
+            &missing.twist,
+            [self.position_cost, self.orientation_cost],
+            self.gain,
+            sink,
+        );
     }
 }
 
 impl CenterOfMassTask {
-    fn write(&self, configuration: &Configuration, scratch: &mut TaskScratch, sink: &mut dyn Sink) {
+    fn error(&self, configuration: &Configuration) -> FrameError {
+        let asked = self.cost.map(|cost| if cost > 0.0 { 1.0 } else { 0.0 });
+        let missing = (self.target - configuration.center_of_mass()).component_mul(&asked);
+        FrameError { position_m: missing.norm(), orientation_rad: 0.0 }
+    }
+
+    fn write(&self, configuration: &Configuration, scratch: &mut TaskScratch, sink: &mut impl Sink) {
         configuration.center_of_mass_jacobian(&mut scratch.centre);
         let missing = self.target - configuration.center_of_mass();
         for axis in 0..3 {
             let cost = self.cost[axis];
             scratch.entries.clear();
-            scratch.entries.extend(scratch.centre.iter().enumerate().map(|(joint, column)| (joint, cost * column[axis])));
+            scratch.entries.extend(
+                scratch.centre.iter().enumerate().map(|(joint, column)| (joint, cost * column[axis])),
+            );
             sink.row(&scratch.entries, cost * self.gain * missing[axis]);
         }
     }
@@ -275,7 +335,7 @@ fn write_pose_rows(
     error: &Vector6<f64>,
     [position, orientation]: [f64; 2],
     gain: f64,
-    sink: &mut dyn Sink,
+    sink: &mut impl Sink,
 ) {
     for i in 0..6 {
         let weight = if i < 3 { position } else { orientation };
