@@ -41,6 +41,8 @@
 mod barrier;
 pub mod bench;
 mod configuration;
+#[cfg(test)]
+mod derivatives;
 mod error;
 mod limits;
 mod model;

@@ -127,6 +127,11 @@ impl Qp {
         row
     }
 
+    /// Rows since [`Qp::clear_rows`].
+    pub fn rows(&self) -> &[Row] {
+        &self.rows[..self.used_rows]
+    }
+
     /// Lowers the bound of every inequality that the start x = 0 violates to `cap` of the largest  a' x  within the
     /// bounds on x; says whether there was any.
     pub fn cap_inequalities(&mut self, cap: impl Fn(f64) -> f64) -> bool {
