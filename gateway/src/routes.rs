@@ -57,8 +57,8 @@ async fn health(State(app): State<App>) -> Json<Value> {
     Json(json!({ "status": "ok", "version": env!("CARGO_PKG_VERSION"), "episodes": app.table.len() }))
 }
 
-async fn tasks() -> Json<TaskList> {
-    Json(tandem_episodes::task_list())
+async fn tasks(State(app): State<App>) -> Json<TaskList> {
+    Json(app.table.instructions().task_list())
 }
 
 async fn tools() -> Json<Vec<ToolSpec>> {

@@ -41,7 +41,11 @@ impl Server {
             )
         })?;
         let address = listener.local_addr()?;
-        let table = Arc::new(EpisodeTable::new(settings.max_episodes, settings.runs.clone()));
+        let table = Arc::new(EpisodeTable::new(
+            settings.max_episodes,
+            settings.runs.clone(),
+            settings.instructions.clone(),
+        ));
         let app = App { table: table.clone(), max_body_bytes: settings.max_body_bytes };
         let (stop, stopped) = oneshot::channel::<()>();
         let service = axum::serve(listener, router(app, address.ip())).with_graceful_shutdown(async {

@@ -7,6 +7,7 @@ use std::{
 
 use clap::Args;
 use serde::Deserialize;
+use tandem_episodes::{Instructions, InstructionsError};
 
 /// One source of settings; what it leaves out comes from the next. The doc comments are the help text.
 #[derive(Debug, Clone, Default, PartialEq, Args, Deserialize)]
@@ -18,6 +19,9 @@ pub struct Layer {
     /// Folder that recordings are written to, one folder per episode [default: runs].
     #[arg(long, env = "TANDEM_RUNS", value_name = "DIR")]
     pub runs: Option<PathBuf>,
+    /// JSON file with instructions in place of the tasks' own: {"handover": {"joint": "...", "robots": {"A": "..."}}}.
+    #[arg(long, env = "TANDEM_INSTRUCTIONS", value_name = "FILE")]
+    pub instructions: Option<PathBuf>,
     /// Episodes that may be held at once; each costs a thread and about 30 MB [default: 8].
     #[arg(long, env = "TANDEM_MAX_EPISODES", value_name = "N")]
     pub max_episodes: Option<u32>,
@@ -31,6 +35,7 @@ impl Layer {
         Layer {
             listen: self.listen.or(next.listen),
             runs: self.runs.or(next.runs),
+            instructions: self.instructions.or(next.instructions),
             max_episodes: self.max_episodes.or(next.max_episodes),
             max_body_bytes: self.max_body_bytes.or(next.max_body_bytes),
         }
@@ -44,6 +49,8 @@ pub struct Settings {
     pub listen: SocketAddr,
     /// Folder that recordings are written to, one folder per episode.
     pub runs: PathBuf,
+    /// Instructions in place of the tasks' own.
+    pub instructions: Instructions,
     /// Episodes that may be held at once.
     pub max_episodes: u32,
     /// Largest request body that is read.
@@ -61,6 +68,9 @@ pub enum SettingsError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// The file with instructions cannot be used.
+    #[error(transparent)]
+    Instructions(#[from] InstructionsError),
     /// The file is no TOML, or holds a setting that does not exist.
     #[error("{path}: {source}")]
     Parse {
@@ -82,6 +92,10 @@ impl Settings {
         Ok(Settings {
             listen: layer.listen.unwrap_or(SocketAddr::from(([127, 0, 0, 1], 8700))),
             runs: layer.runs.unwrap_or_else(|| "runs".into()),
+            instructions: match &layer.instructions {
+                Some(path) => Instructions::read(path)?,
+                None => Instructions::default(),
+            },
             max_episodes: layer.max_episodes.unwrap_or(8),
             max_body_bytes: layer.max_body_bytes.unwrap_or(2_000_000),
         })

@@ -9,6 +9,7 @@ use std::{
     },
 };
 
+use tandem_episodes::Instructions;
 use tandem_tools_spec::{ResultReply, StartEpisode, StartReply};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
@@ -22,17 +23,19 @@ pub struct EpisodeTable {
     limit: u32,
     closing: AtomicBool,
     runs: PathBuf,
+    instructions: Instructions,
 }
 
 impl EpisodeTable {
-    /// An empty table for at most `limit` episodes, recorded under `runs`.
-    pub fn new(limit: u32, runs: PathBuf) -> EpisodeTable {
+    /// An empty table for at most `limit` episodes, recorded under `runs` and described by `instructions`.
+    pub fn new(limit: u32, runs: PathBuf, instructions: Instructions) -> EpisodeTable {
         EpisodeTable {
             episodes: Mutex::default(),
             places: Arc::new(Semaphore::new(limit as usize)),
             limit,
             closing: AtomicBool::new(false),
             runs,
+            instructions,
         }
     }
 
@@ -42,10 +45,16 @@ impl EpisodeTable {
         let place = self.take_place().await?;
         let (id, folder) = run_folder::create(&self.runs, task.id, args.seed)
             .map_err(|error| ApiError::Internal(format!("no folder in {}: {error}", self.runs.display())))?;
-        let (episode, briefing) = EpisodeThread::start(&id, args, folder, place).await?;
+        let (episode, mut briefing) = EpisodeThread::start(&id, args, folder, place).await?;
+        self.instructions.rephrase_briefing(&mut briefing);
         self.lock().insert(id.clone(), Arc::new(episode));
         tracing::info!(episode = id, "started");
         Ok(StartReply { episode_id: id, briefing })
+    }
+
+    /// How tasks are described.
+    pub fn instructions(&self) -> &Instructions {
+        &self.instructions
     }
 
     /// The episode `id`.

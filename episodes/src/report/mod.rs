@@ -242,7 +242,7 @@ mod tests {
             state_hash: "<script>".into(),
         };
         let mut calls = CallCounts::default();
-        [true, true, false].map(|answered| calls.count("move_wrists", answered));
+        [true, true, false].into_iter().for_each(|answered| calls.count("move_wrists", answered));
         let wall_clock_left_s = (protocol == Protocol::Agentic).then_some(1740.0);
         let budget_left = Some(Budget { steps_left: 5500, wall_clock_left_s, steps_per_command: 25 });
         let task = tasks::find("handover").unwrap();

@@ -1,0 +1,119 @@
+//! Instructions from a file, in place of the tasks' own words: other languages, other styles, a benchmark's exact wording.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use tandem_tools_spec::{Briefing, Instruction, TaskList};
+
+use crate::describe::task_list;
+use crate::tasks;
+
+/// Instructions by task id, as JSON:
+/// `{"handover": {"joint": "what all robots do", "robots": {"A": "what A does", "B": "what B does"}}}`.
+/// What the file leaves out keeps the task's own words.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(transparent)]
+pub struct Instructions(BTreeMap<String, TaskInstructions>);
+
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TaskInstructions {
+    joint: Option<String>,
+    #[serde(default)]
+    robots: BTreeMap<String, String>,
+}
+
+/// Why a file of instructions cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum InstructionsError {
+    #[error("cannot read the instructions {path}: {source}")]
+    Read { path: PathBuf, source: std::io::Error },
+    #[error(
+        "{path}: {source}; a file that works: {{\"handover\": {{\"joint\": \"...\", \"robots\": {{\"A\": \"...\", \"B\": \"...\"}}}}}}"
+    )]
+    Parse { path: PathBuf, source: serde_json::Error },
+    #[error("{path}: {reason}")]
+    Unknown { path: PathBuf, reason: String },
+}
+
+impl Instructions {
+    /// Reads a file and checks that its tasks and robots exist.
+    pub fn read(path: &Path) -> Result<Instructions, InstructionsError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| InstructionsError::Read { path: path.into(), source })?;
+        let instructions: Instructions = serde_json::from_str(&text)
+            .map_err(|source| InstructionsError::Parse { path: path.into(), source })?;
+        let unknown = |reason: String| InstructionsError::Unknown { path: path.into(), reason };
+        for (id, own) in &instructions.0 {
+            let task = tasks::find(id).map_err(|error| unknown(error.to_string()))?;
+            let names: Vec<&str> = task.robots.iter().map(|robot| robot.name).collect();
+            if let Some(robot) = own.robots.keys().find(|robot| !names.contains(&robot.as_str())) {
+                return Err(unknown(format!("{id} has no robot {robot:?}; have: {}", names.join(", "))));
+            }
+        }
+        Ok(instructions)
+    }
+
+    /// The reply to `list_tasks` in these words.
+    pub fn task_list(&self) -> TaskList {
+        let mut list = task_list();
+        for task in &mut list.tasks {
+            self.rephrase(&task.id, &mut task.instruction, &mut task.robots);
+        }
+        list
+    }
+
+    /// Puts a briefing into these words.
+    pub fn rephrase_briefing(&self, briefing: &mut Briefing) {
+        self.rephrase(&briefing.status.task, &mut briefing.instruction, &mut briefing.instructions);
+    }
+
+    fn rephrase(&self, task: &str, joint: &mut String, robots: &mut [Instruction]) {
+        let Some(own) = self.0.get(task) else { return };
+        if let Some(text) = &own.joint {
+            joint.clone_from(text);
+        }
+        for robot in robots {
+            if let Some(text) = own.robots.get(&robot.robot) {
+                robot.instruction.clone_from(text);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Instructions, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("instructions.json");
+        std::fs::write(&path, text).unwrap();
+        Instructions::read(&path).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn only_what_the_file_says_changes() {
+        let list = read(r#"{"handover": {"joint": "Reicht die Flasche weiter.", "robots": {"B": "Nimm sie."}}}"#);
+        let list = list.unwrap().task_list();
+        let (own, handover) = (task_list(), &list.tasks[0]);
+        assert_eq!(handover.instruction, "Reicht die Flasche weiter.");
+        assert_eq!(handover.robots[0], own.tasks[0].robots[0]);
+        assert_eq!(handover.robots[1].instruction, "Nimm sie.");
+        assert_eq!(list.tasks[1..], own.tasks[1..]);
+    }
+
+    #[test]
+    fn mistakes_are_named_with_what_would_work() {
+        for (text, expected) in [
+            (r#"{"handove": {}}"#, "no task \"handove\"; have: handover"),
+            (r#"{"handover": {"robots": {"C": "x"}}}"#, "handover has no robot \"C\"; have: A, B"),
+            (r#"{"handover": {"both": "x"}}"#, "a file that works"),
+            ("not JSON", "a file that works"),
+        ] {
+            let message = read(text).unwrap_err();
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+}

@@ -1,0 +1,293 @@
+//! Sessions on real physics: what repeats, what a command does and does not move, what a policy is charged.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::time::Duration;
+
+use tandem_episodes::{Clock, EpisodeError, Session, facts, monotonic, tasks};
+use tandem_sim::Vector;
+use tandem_tools_spec::{
+    CheckReach, CommandReply, EndReason, Finish, GetRobotState, GetStatus, JointChunk, MoveWrists, Observe, Protocol,
+    QueryDepth, RobotState, SendJointChunk, StatusReply, StopReason, ToolCall, ToolReply, Wait, Walk, WalkMove,
+    WristMove,
+};
+
+fn start(task: &str, seed: u32, protocol: Protocol, clock: Clock) -> Session {
+    Session::start_with_clock(tasks::find(task).unwrap(), seed, protocol, None, clock).unwrap()
+}
+
+fn handover(seed: u32) -> Session {
+    start("handover", seed, Protocol::Benchmark, monotonic())
+}
+
+fn command(session: &mut Session, call: ToolCall) -> CommandReply {
+    match session.call(call).unwrap() {
+        ToolReply::Command(reply) => reply,
+        other => panic!("{other:?} is no reply to a command"),
+    }
+}
+
+fn wait(session: &mut Session, steps: u32) -> CommandReply {
+    command(session, ToolCall::Wait(Wait { steps }))
+}
+
+fn status(session: &mut Session) -> StatusReply {
+    match session.call(ToolCall::GetStatus(GetStatus {})).unwrap() {
+        ToolReply::Status(status) => status,
+        other => panic!("{other:?} is no status"),
+    }
+}
+
+fn state(session: &mut Session, robot: &str) -> RobotState {
+    match session.call(ToolCall::GetRobotState(GetRobotState { robot: robot.into() })).unwrap() {
+        ToolReply::RobotState(state) => state,
+        other => panic!("{other:?} is no state"),
+    }
+}
+
+/// A's right hand to the side of its chest, fingers half closed.
+fn raise_hand(steps: u32) -> ToolCall {
+    let raise = WristMove {
+        right_position_m: Some([0.28, -0.24, 0.22]),
+        right_quaternion_wxyz: Some([1.0, 0.0, 0.0, 0.0]),
+        right_fingers_rad: Some([0.0, -0.4, -0.4, 0.6, 0.6, 0.6, 0.6]),
+        ..WristMove::hold("A")
+    };
+    ToolCall::MoveWrists(MoveWrists { steps, robots: vec![raise] })
+}
+
+fn squat(height_m: f64) -> ToolCall {
+    let entry = WalkMove {
+        robot: "B".into(),
+        vx_m_s: 0.0,
+        vy_m_s: 0.0,
+        yaw_rate_rad_s: 0.0,
+        pelvis_height_m: Some(height_m),
+    };
+    ToolCall::Walk(Walk { steps: 50, robots: vec![entry] })
+}
+
+/// A second and a half in which every kind of command is used.
+fn play(session: &mut Session) {
+    command(session, raise_hand(25));
+    command(session, squat(0.70));
+    let rows = vec![session_row(session, "B"); 5];
+    command(session, ToolCall::SendJointChunk(SendJointChunk { robots: vec![JointChunk { robot: "B".into(), rows }] }));
+    wait(session, 10);
+}
+
+/// The action row under which a robot stays as it measures itself.
+fn session_row(session: &mut Session, robot: &str) -> Vec<f64> {
+    let columns = session.briefing().action_row;
+    let state = state(session, robot);
+    let base = [0.0, 0.0, 0.0, state.base_command.pelvis_height_m];
+    columns.iter().filter_map(|column| state.joint_positions_rad.get(column)).chain(base).collect()
+}
+
+#[test]
+fn the_same_seed_and_calls_give_the_same_state_and_others_do_not() {
+    let hash_after = |seed| {
+        let mut session = handover(seed);
+        play(&mut session);
+        session.state_hash()
+    };
+    let first = hash_after(3);
+    assert_eq!(first, hash_after(3));
+    assert_ne!(first, hash_after(4));
+}
+
+#[test]
+fn an_episode_taken_up_from_a_checkpoint_goes_on_as_it_did() {
+    let mut session = handover(5);
+    command(&mut session, raise_hand(25));
+    let checkpoint = session.checkpoint().unwrap();
+    let (hash_then, status_then) = (session.state_hash(), status(&mut session));
+    play(&mut session);
+    let end = (session.state_hash(), status(&mut session));
+
+    let mut other = handover(5);
+    for resumed in [&mut session, &mut other] {
+        resumed.resume(&checkpoint).unwrap();
+        assert_eq!((resumed.state_hash(), status(resumed)), (hash_then.clone(), status_then.clone()));
+        play(resumed);
+        assert_eq!((resumed.state_hash(), status(resumed)), end);
+    }
+}
+
+#[test]
+fn a_wrist_arrives_and_nobody_else_moves() {
+    let mut session = handover(0);
+    wait(&mut session, 25);
+    let partner = state(&mut session, "B");
+    command(&mut session, raise_hand(50));
+    let reply = command(&mut session, raise_hand(25));
+    let right = &reply.robots[0].right;
+    assert!(right.position_error_m < 0.01, "{} m short", right.position_error_m);
+    assert!(right.orientation_error_rad < 0.05, "{} rad off", right.orientation_error_rad);
+    assert!(right.joints_clamped.is_empty() && right.joints_at_limit.is_empty(), "{right:?}");
+    assert!(reply.robots[0].left.position_error_m < 0.01, "the other hand stays: {:?}", reply.robots[0].left);
+    assert_eq!(reply.robots.len(), 1, "only robots that the command names are reported on");
+    let finger = state(&mut session, "A").joint_positions_rad.get("right_hand_middle_0_joint").unwrap();
+    assert!((finger - 0.6).abs() < 0.05, "finger at {finger} rad");
+
+    let moved = state(&mut session, "B");
+    for (before, after) in [(partner.left_wrist, moved.left_wrist), (partner.right_wrist, moved.right_wrist)] {
+        let apart = Vector::from_array(std::array::from_fn(|axis| {
+            (before.position_m[axis] - after.position_m[axis]) as f32
+        }));
+        assert!(apart.length() < 0.005, "B's wrist moved by {} m", apart.length());
+    }
+}
+
+#[test]
+fn an_unreachable_wrist_is_reported_with_the_joints_that_stop_it() {
+    let mut session = handover(0);
+    let far = WristMove { right_position_m: Some([0.9, -0.2, 0.2]), ..WristMove::hold("A") };
+    let call = ToolCall::MoveWrists(MoveWrists { steps: 50, robots: vec![far] });
+    command(&mut session, call.clone());
+    let reply = command(&mut session, call);
+    let right = &reply.robots[0].right;
+    assert!(right.position_error_m > 0.2, "{} m short", right.position_error_m);
+    assert_eq!(right.target.position_m, [0.9, -0.2, 0.2]);
+    assert!(!reply.fallen.iter().any(|robot| robot.fallen));
+}
+
+#[test]
+fn checking_reach_tells_near_from_far_and_moves_nothing() {
+    let mut session = handover(0);
+    let before = session.state_hash();
+    for (position_m, reachable) in [([0.28, -0.24, 0.22], true), ([0.9, -0.2, 0.2], false)] {
+        let call = ToolCall::CheckReach(CheckReach {
+            robot: "A".into(),
+            left_position_m: None,
+            left_quaternion_wxyz: None,
+            right_position_m: Some(position_m),
+            right_quaternion_wxyz: Some([1.0, 0.0, 0.0, 0.0]),
+        });
+        let ToolReply::Reach(reply) = session.call(call).unwrap() else { panic!("no reach") };
+        assert_eq!((reply.reachable, reply.right.reachable, reply.left.reachable), (reachable, reachable, true));
+    }
+    assert_eq!(session.state_hash(), before);
+}
+
+#[test]
+fn height_persists_and_velocities_do_not() {
+    let mut session = handover(0);
+    let height_m = |session: &Session| f64::from(session.facts().robots[facts::B].pelvis_in_world.translation.z);
+    command(&mut session, squat(0.66));
+    wait(&mut session, 50);
+    wait(&mut session, 50);
+    assert!((height_m(&session) - 0.66).abs() < 0.015, "pelvis at {} m", height_m(&session));
+    let walk = WalkMove {
+        robot: "B".into(),
+        vx_m_s: 0.05,
+        vy_m_s: 0.0,
+        yaw_rate_rad_s: 0.0,
+        pelvis_height_m: None,
+    };
+    command(&mut session, ToolCall::Walk(Walk { steps: 2, robots: vec![walk] }));
+    wait(&mut session, 1);
+    let base = state(&mut session, "B").base_command;
+    assert_eq!((base.vx_m_s, base.vy_m_s, base.yaw_rate_rad_s), (0.0, 0.0, 0.0));
+    assert!((base.pelvis_height_m - 0.66).abs() < 1e-6);
+}
+
+#[test]
+fn depth_finds_the_bottle_where_it_is() {
+    let mut session = handover(2);
+    wait(&mut session, 25);
+    let facts = session.facts();
+    let robot = &facts.robots[facts::A];
+    let bottle = facts.object("bottle").pose_in_world;
+    // The middle of the label, 9 cm above the base; the surface is 3.5 cm in front of the axis.
+    let in_pelvis = robot.pelvis_in_world.inverse() * (bottle * Vector::new(0.0, 0.0, 0.09));
+
+    let ToolReply::Observation(seen) = session.call(ToolCall::Observe(Observe { robots: Some(vec!["A".into()]) })).unwrap()
+    else {
+        panic!("no observation")
+    };
+    let camera = &seen.cameras[0];
+    assert_eq!((camera.width, camera.height, seen.images.len()), (320, 240, 1));
+    // The pinhole formula that the reply's description gives to a policy, with its numbers only.
+    let [w, i, j, k] = camera.camera_in_pelvis.quaternion_wxyz.map(|part| part as f32);
+    let rotation = tandem_sim::Rotation::from_xyzw(i, j, k, w);
+    let origin = Vector::from_array(camera.camera_in_pelvis.position_m.map(|part| part as f32));
+    let in_camera = rotation.inverse() * (in_pelvis - origin);
+    let u = f64::from(in_camera.x / in_camera.z) * camera.fx + camera.cx;
+    let v = f64::from(in_camera.y / in_camera.z) * camera.fy + camera.cy;
+
+    let pixel = [u.round() as i64, v.round() as i64];
+    let query = QueryDepth { robot: "A".into(), pixels: vec![pixel] };
+    let ToolReply::Depth(reply) = session.call(ToolCall::QueryDepth(query)).unwrap() else { panic!("no depth") };
+    let point = Vector::from_array(reply.points[0].point_in_pelvis_m.unwrap().map(|part| part as f32));
+    let apart = in_pelvis - point;
+    assert!(apart.length() > 0.025 && apart.length() < 0.055, "bottle's axis {in_pelvis}, surface seen {point}");
+    let expected_m = f64::from(in_camera.z) - 0.035;
+    assert!((reply.points[0].depth_m.unwrap() - expected_m).abs() < 0.02, "{:?}", reply.points[0]);
+}
+
+#[test]
+fn steps_are_charged_and_their_end_ends_the_episode() {
+    let mut session = handover(0);
+    assert_eq!(status(&mut session).budget.steps_left, 1000);
+    let refused = session.call(ToolCall::Wait(Wait { steps: 51 })).unwrap_err();
+    assert_eq!(
+        refused.to_string(),
+        "51 control steps in one command; the benchmark protocol allows 1 to 50"
+    );
+    for done in 1..=19 {
+        let reply = wait(&mut session, 50);
+        assert_eq!((reply.executed_steps, reply.stop_reason), (50, StopReason::StepsDone));
+        assert_eq!(reply.budget.steps_left, 1000 - 50 * done);
+    }
+    wait(&mut session, 30);
+    let last = wait(&mut session, 50);
+    assert_eq!((last.executed_steps, last.stop_reason), (20, StopReason::StepBudgetExhausted));
+    let hash = session.state_hash();
+    let refused = session.call(ToolCall::Wait(Wait { steps: 1 })).unwrap_err();
+    assert!(matches!(refused, EpisodeError::Ended { reason: EndReason::StepBudgetExhausted }), "{refused}");
+    let ToolReply::Result(result) = session.call(ToolCall::Finish(Finish {})).unwrap() else { panic!("no result") };
+    assert_eq!((result.ended, result.env_steps), (EndReason::StepBudgetExhausted, 1000));
+    assert!(result.phases.0.iter().all(|(_, time_s)| time_s.is_none()), "idling reaches no phase");
+    assert_eq!(session.state_hash(), hash);
+}
+
+#[test]
+fn the_wall_clock_charges_thinking_and_ends_the_episode() {
+    let hands_s = Arc::new(AtomicU64::new(0));
+    let read = hands_s.clone();
+    let clock: Clock = Box::new(move || Duration::from_secs(read.load(Relaxed)));
+    let mut session = start("handover", 0, Protocol::Agentic, clock);
+    let left = |session: &mut Session| status(session).budget;
+    let budget = left(&mut session);
+    assert_eq!((budget.steps_left, budget.wall_clock_left_s), (5700, Some(1800.0)), "after the initial hold");
+    hands_s.fetch_add(1799, Relaxed);
+    assert_eq!(wait(&mut session, 1).budget.wall_clock_left_s, Some(1.0));
+    hands_s.fetch_add(1, Relaxed);
+    let hash = session.state_hash();
+    let refused = session.call(ToolCall::Wait(Wait { steps: 1 })).unwrap_err();
+    assert!(matches!(refused, EpisodeError::Ended { reason: EndReason::WallClockExhausted }), "{refused}");
+    assert_eq!(status(&mut session).ended, Some(EndReason::WallClockExhausted));
+    assert_eq!(session.state_hash(), hash);
+}
+
+#[test]
+fn scenes_settle_objects_stay_and_idling_reaches_nothing() {
+    for task in tasks::ALL {
+        let mut session = start(task.id, 1, Protocol::Agentic, monotonic());
+        let settled = session.facts();
+        for object in &settled.objects {
+            let (speed, turning) = (object.velocity_m_s.length(), object.angular_velocity_rad_s.length());
+            assert!(speed < 0.01, "{}: {} moves at {speed} m/s, turns at {turning} rad/s", task.id, object.name);
+        }
+        // Ten seconds, as many as a test can pay for; drift is steady, so 2 mm in 60 s are a third of a millimetre.
+        (0..20).for_each(|_| drop(wait(&mut session, 25)));
+        for (before, after) in settled.objects.iter().zip(&session.facts().objects) {
+            let moved = before.pose_in_world.translation.distance(after.pose_in_world.translation);
+            assert!(moved < 0.002 / 6.0, "{}: {} has moved {moved} m", task.id, before.name);
+        }
+        let status = status(&mut session);
+        assert!(status.phases.is_empty(), "{}: {:?}", task.id, status.phases);
+        assert!(!status.fallen.iter().any(|robot| robot.fallen), "{}: {:?}", task.id, status.fallen);
+    }
+}
