@@ -128,12 +128,17 @@ pub struct PositionBarrier {
 }
 
 impl PositionBarrier {
+    /// Distance of the frame's origin to the plane, m; negative beyond it.
+    pub fn height_m(&self, configuration: &Configuration) -> f64 {
+        self.normal.dot(&configuration.root_from_frame(self.frame).translation.vector) - self.offset_m
+    }
+
     pub(crate) fn write(&self, configuration: &Configuration, row: &mut Row) {
         let point = configuration.root_from_frame(self.frame).translation.vector;
         for &joint in configuration.model().support(self.frame) {
             row.coefficients[joint] = self.normal.dot(&configuration.velocity_of_point(&point, joint).0);
         }
-        row.bound = -self.gain * (self.normal.dot(&point) - self.offset_m);
+        row.bound = -self.gain * self.height_m(configuration);
     }
 }
 

@@ -5,7 +5,8 @@ use crate::Configuration;
 /// What bounds a joint's displacement dq in a step of dt:
 ///   gain (lower - q) <= dq <= gain (upper - q)                configuration
 ///   |dq| <= velocity dt                                       velocity
-///   |dq - v_last dt| <= acceleration dt^2,  |dq| <= sqrt(2 acceleration (upper - q)) dt     acceleration and braking
+///   |dq - v_last dt| <= acceleration dt^2                     acceleration
+///   |v| <= -a dt + sqrt(a^2 dt^2 + 2 a (upper - q))           braking: v dt + v^2 / (2 a) is what stopping takes
 /// A joint that starts outside its range comes back, no faster than its velocity limit.
 #[derive(Clone, Debug)]
 pub struct Limits {
@@ -48,8 +49,10 @@ impl Limits {
         let mut low = (-fastest, LimitKind::Velocity);
         let mut high = (fastest, LimitKind::Velocity);
         if let Some(acceleration) = self.acceleration.as_ref().map(|acceleration| acceleration[joint]) {
-            let braking = |room: f64| (2.0 * acceleration * room.max(0.0)).sqrt() * dt_s;
-            let reach = acceleration * dt_s * dt_s;
+            let change = acceleration * dt_s;
+            let reach = change * dt_s;
+            let braking =
+                |room: f64| ((change * change + 2.0 * acceleration * room.max(0.0)).sqrt() - change) * dt_s;
             raise(
                 &mut low,
                 (last_velocity * dt_s - reach).max(-braking(q - range.lower)),

@@ -7,7 +7,7 @@ use crate::{Configuration, FrameError, Joint};
 /// How a step or a solution ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
-    /// Every frame and centre of mass that has a target is within [`Tolerance`].
+    /// Every frame and centre of mass that has a target is within [`Tolerance`], and no barrier is crossed.
     Reached,
     /// On the way.
     Moving,

@@ -110,10 +110,16 @@ impl Solver {
         self.last_velocity.fill(0.0);
     }
 
-    /// Whether there are targets and all of them are within tolerance.
+    /// Whether there are targets, all of them are within tolerance, and no barrier is crossed.
     pub fn is_reached(&self, configuration: &Configuration, tasks: &[Task]) -> bool {
         let mut errors = frame_errors(configuration, tasks).peekable();
-        errors.peek().is_some() && errors.all(|error| self.tolerance.accepts(&error))
+        let there = errors.peek().is_some() && errors.all(|error| self.tolerance.accepts(&error));
+        there
+            && self.closest_pair(configuration).is_none_or(|pair| pair.distance_m >= 0.0)
+            && self
+                .position_barriers
+                .iter()
+                .all(|barrier| barrier.height_m(configuration) >= -self.tolerance.position_m)
     }
 
     /// Sets up and solves the quadratic program; the displacement is in `self.qp.x`.
