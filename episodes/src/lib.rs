@@ -1,5 +1,6 @@
 //! Episodes: tasks and their phases, budgets, grasp detection, and the session that runs tool calls on a world.
 
+pub mod bench;
 mod convert;
 mod describe;
 mod error;

@@ -43,13 +43,7 @@ impl UpperBody {
     /// Reads the robot's MJCF; `rest` is the command that it stands under.
     pub fn new(robot_mjcf: &str, rest: &RobotCommand) -> Result<UpperBody, IkError> {
         let names = joint_names();
-        let whole = Model::from_mjcf(robot_mjcf)?;
-        let is_hand = |column: usize| (HAND_COLUMNS[0]..HAND_COLUMNS[1] + HAND_JOINTS).contains(&column);
-        let free: Vec<&str> = (0..UPPER_JOINTS)
-            .filter(|column| !is_hand(*column))
-            .map(|column| names[UPPER[column]].as_str())
-            .collect();
-        let model = whole.reduced(&free, &vec![0.0; whole.nv()])?;
+        let model = upper_body(&Model::from_mjcf(robot_mjcf)?)?;
         let column_of = |name: &str| (0..UPPER_JOINTS).find(|column| names[UPPER[*column]] == name);
         let columns: Vec<usize> = model.joints().iter().filter_map(|joint| column_of(&joint.name)).collect();
         let rest_rad = columns.iter().map(|column| rest.upper_rad[*column].into()).collect();
@@ -96,6 +90,15 @@ impl UpperBody {
         solver.self_collision = Some(self.self_collision.clone());
         solver
     }
+}
+
+/// The robot with arms and waist free; legs and hands are locked straight.
+pub fn upper_body(whole: &Model) -> Result<Model, IkError> {
+    let names = joint_names();
+    let is_hand = |column: usize| (HAND_COLUMNS[0]..HAND_COLUMNS[1] + HAND_JOINTS).contains(&column);
+    let columns = (0..UPPER_JOINTS).filter(|column| !is_hand(*column));
+    let free: Vec<&str> = columns.map(|column| names[UPPER[column]].as_str()).collect();
+    whole.reduced(&free, &vec![0.0; whole.nv()])
 }
 
 /// Trunk, head, forearms and hands as capsules, a little inside the collision shapes of the robot's file.

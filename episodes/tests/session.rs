@@ -1,4 +1,4 @@
-//! Sessions on real physics: what repeats, what a command does and does not move, what a policy is charged.
+//! Sessions on real physics: what repeats, what a command moves and what it leaves alone, what a policy is charged.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -7,9 +7,9 @@ use std::time::Duration;
 use tandem_episodes::{Clock, EpisodeError, Session, facts, monotonic, tasks};
 use tandem_sim::Vector;
 use tandem_tools_spec::{
-    CheckReach, CommandReply, EndReason, Finish, GetRobotState, GetStatus, JointChunk, MoveWrists, Observe, Protocol,
-    QueryDepth, RobotState, SendJointChunk, StatusReply, StopReason, ToolCall, ToolReply, Wait, Walk, WalkMove,
-    WristMove,
+    CheckReach, CommandReply, EndReason, Finish, GetRobotState, GetStatus, JointChunk, MoveWrists, Observe,
+    Protocol, QueryDepth, RobotState, SendJointChunk, StatusReply, StopReason, ToolCall, ToolReply, Wait,
+    Walk, WalkMove, WristMove,
 };
 
 fn start(task: &str, seed: u32, protocol: Protocol, clock: Clock) -> Session {
@@ -71,13 +71,16 @@ fn squat(height_m: f64) -> ToolCall {
 fn play(session: &mut Session) {
     command(session, raise_hand(25));
     command(session, squat(0.70));
-    let rows = vec![session_row(session, "B"); 5];
-    command(session, ToolCall::SendJointChunk(SendJointChunk { robots: vec![JointChunk { robot: "B".into(), rows }] }));
+    let rows = vec![row(session, "B"); 5];
+    command(
+        session,
+        ToolCall::SendJointChunk(SendJointChunk { robots: vec![JointChunk { robot: "B".into(), rows }] }),
+    );
     wait(session, 10);
 }
 
 /// The action row under which a robot stays as it measures itself.
-fn session_row(session: &mut Session, robot: &str) -> Vec<f64> {
+fn row(session: &mut Session, robot: &str) -> Vec<f64> {
     let columns = session.briefing().action_row;
     let state = state(session, robot);
     let base = [0.0, 0.0, 0.0, state.base_command.pelvis_height_m];
@@ -131,7 +134,8 @@ fn a_wrist_arrives_and_nobody_else_moves() {
     assert!((finger - 0.6).abs() < 0.05, "finger at {finger} rad");
 
     let moved = state(&mut session, "B");
-    for (before, after) in [(partner.left_wrist, moved.left_wrist), (partner.right_wrist, moved.right_wrist)] {
+    for (before, after) in [(partner.left_wrist, moved.left_wrist), (partner.right_wrist, moved.right_wrist)]
+    {
         let apart = Vector::from_array(std::array::from_fn(|axis| {
             (before.position_m[axis] - after.position_m[axis]) as f32
         }));
@@ -140,7 +144,7 @@ fn a_wrist_arrives_and_nobody_else_moves() {
 }
 
 #[test]
-fn an_unreachable_wrist_is_reported_with_the_joints_that_stop_it() {
+fn a_wrist_that_cannot_arrive_is_reported_short() {
     let mut session = handover(0);
     let far = WristMove { right_position_m: Some([0.9, -0.2, 0.2]), ..WristMove::hold("A") };
     let call = ToolCall::MoveWrists(MoveWrists { steps: 50, robots: vec![far] });
@@ -165,7 +169,7 @@ fn checking_reach_tells_near_from_far_and_moves_nothing() {
             right_quaternion_wxyz: Some([1.0, 0.0, 0.0, 0.0]),
         });
         let ToolReply::Reach(reply) = session.call(call).unwrap() else { panic!("no reach") };
-        assert_eq!((reply.reachable, reply.right.reachable, reply.left.reachable), (reachable, reachable, true));
+        assert_eq!((reply.reachable, reply.right.reachable), (reachable, reachable), "{reply:?}");
     }
     assert_eq!(session.state_hash(), before);
 }
@@ -173,18 +177,14 @@ fn checking_reach_tells_near_from_far_and_moves_nothing() {
 #[test]
 fn height_persists_and_velocities_do_not() {
     let mut session = handover(0);
-    let height_m = |session: &Session| f64::from(session.facts().robots[facts::B].pelvis_in_world.translation.z);
+    let height_m =
+        |session: &Session| f64::from(session.facts().robots[facts::B].pelvis_in_world.translation.z);
     command(&mut session, squat(0.66));
     wait(&mut session, 50);
     wait(&mut session, 50);
     assert!((height_m(&session) - 0.66).abs() < 0.015, "pelvis at {} m", height_m(&session));
-    let walk = WalkMove {
-        robot: "B".into(),
-        vx_m_s: 0.05,
-        vy_m_s: 0.0,
-        yaw_rate_rad_s: 0.0,
-        pelvis_height_m: None,
-    };
+    let walk =
+        WalkMove { robot: "B".into(), vx_m_s: 0.05, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m: None };
     command(&mut session, ToolCall::Walk(Walk { steps: 2, robots: vec![walk] }));
     wait(&mut session, 1);
     let base = state(&mut session, "B").base_command;
@@ -199,10 +199,11 @@ fn depth_finds_the_bottle_where_it_is() {
     let facts = session.facts();
     let robot = &facts.robots[facts::A];
     let bottle = facts.object("bottle").pose_in_world;
-    // The middle of the label, 9 cm above the base; the surface is 3.5 cm in front of the axis.
-    let in_pelvis = robot.pelvis_in_world.inverse() * (bottle * Vector::new(0.0, 0.0, 0.09));
+    let pelvis_from_bottle = robot.pelvis_in_world.inverse() * bottle;
+    let label = pelvis_from_bottle * Vector::new(0.0, 0.0, 0.09);
 
-    let ToolReply::Observation(seen) = session.call(ToolCall::Observe(Observe { robots: Some(vec!["A".into()]) })).unwrap()
+    let ToolReply::Observation(seen) =
+        session.call(ToolCall::Observe(Observe { robots: Some(vec!["A".into()]) })).unwrap()
     else {
         panic!("no observation")
     };
@@ -212,18 +213,22 @@ fn depth_finds_the_bottle_where_it_is() {
     let [w, i, j, k] = camera.camera_in_pelvis.quaternion_wxyz.map(|part| part as f32);
     let rotation = tandem_sim::Rotation::from_xyzw(i, j, k, w);
     let origin = Vector::from_array(camera.camera_in_pelvis.position_m.map(|part| part as f32));
-    let in_camera = rotation.inverse() * (in_pelvis - origin);
-    let u = f64::from(in_camera.x / in_camera.z) * camera.fx + camera.cx;
-    let v = f64::from(in_camera.y / in_camera.z) * camera.fy + camera.cy;
+    let in_camera = |in_pelvis: Vector| rotation.inverse() * (in_pelvis - origin);
+    let aim = in_camera(label);
+    let u = f64::from(aim.x / aim.z) * camera.fx + camera.cx;
+    let v = f64::from(aim.y / aim.z) * camera.fy + camera.cy;
 
-    let pixel = [u.round() as i64, v.round() as i64];
-    let query = QueryDepth { robot: "A".into(), pixels: vec![pixel] };
-    let ToolReply::Depth(reply) = session.call(ToolCall::QueryDepth(query)).unwrap() else { panic!("no depth") };
+    let query = QueryDepth { robot: "A".into(), pixels: vec![[u.round() as i64, v.round() as i64]] };
+    let ToolReply::Depth(reply) = session.call(ToolCall::QueryDepth(query)).unwrap() else {
+        panic!("no depth")
+    };
     let point = Vector::from_array(reply.points[0].point_in_pelvis_m.unwrap().map(|part| part as f32));
-    let apart = in_pelvis - point;
-    assert!(apart.length() > 0.025 && apart.length() < 0.055, "bottle's axis {in_pelvis}, surface seen {point}");
-    let expected_m = f64::from(in_camera.z) - 0.035;
-    assert!((reply.points[0].depth_m.unwrap() - expected_m).abs() < 0.02, "{:?}", reply.points[0]);
+    let on_bottle = pelvis_from_bottle.inverse() * point;
+    let radius_m = on_bottle.x.hypot(on_bottle.y);
+    assert!((radius_m - 0.035).abs() < 0.002, "the glass is 3.5 cm from the axis, seen at {radius_m} m");
+    assert!(on_bottle.z > 0.09 && on_bottle.z < 0.2, "seen {} m above the base", on_bottle.z);
+    let depth_m = reply.points[0].depth_m.unwrap();
+    assert!((depth_m - f64::from(in_camera(point).z)).abs() < 1e-4, "depth and point disagree: {depth_m} m");
 }
 
 #[test]
@@ -231,10 +236,7 @@ fn steps_are_charged_and_their_end_ends_the_episode() {
     let mut session = handover(0);
     assert_eq!(status(&mut session).budget.steps_left, 1000);
     let refused = session.call(ToolCall::Wait(Wait { steps: 51 })).unwrap_err();
-    assert_eq!(
-        refused.to_string(),
-        "51 control steps in one command; the benchmark protocol allows 1 to 50"
-    );
+    assert_eq!(refused.to_string(), "51 control steps in one command; the benchmark protocol allows 1 to 50");
     for done in 1..=19 {
         let reply = wait(&mut session, 50);
         assert_eq!((reply.executed_steps, reply.stop_reason), (50, StopReason::StepsDone));
@@ -246,7 +248,9 @@ fn steps_are_charged_and_their_end_ends_the_episode() {
     let hash = session.state_hash();
     let refused = session.call(ToolCall::Wait(Wait { steps: 1 })).unwrap_err();
     assert!(matches!(refused, EpisodeError::Ended { reason: EndReason::StepBudgetExhausted }), "{refused}");
-    let ToolReply::Result(result) = session.call(ToolCall::Finish(Finish {})).unwrap() else { panic!("no result") };
+    let ToolReply::Result(result) = session.call(ToolCall::Finish(Finish {})).unwrap() else {
+        panic!("no result")
+    };
     assert_eq!((result.ended, result.env_steps), (EndReason::StepBudgetExhausted, 1000));
     assert!(result.phases.0.iter().all(|(_, time_s)| time_s.is_none()), "idling reaches no phase");
     assert_eq!(session.state_hash(), hash);
@@ -278,13 +282,18 @@ fn scenes_settle_objects_stay_and_idling_reaches_nothing() {
         let settled = session.facts();
         for object in &settled.objects {
             let (speed, turning) = (object.velocity_m_s.length(), object.angular_velocity_rad_s.length());
-            assert!(speed < 0.01, "{}: {} moves at {speed} m/s, turns at {turning} rad/s", task.id, object.name);
+            assert!(
+                speed < 0.01,
+                "{}: {} moves at {speed} m/s, turns at {turning} rad/s",
+                task.id,
+                object.name
+            );
         }
-        // Ten seconds, as many as a test can pay for; drift is steady, so 2 mm in 60 s are a third of a millimetre.
-        (0..20).for_each(|_| drop(wait(&mut session, 25)));
+        // Five seconds, as many as a test can pay for; 2 mm in 60 s are a sixth of a millimetre then.
+        (0..10).for_each(|_| drop(wait(&mut session, 25)));
         for (before, after) in settled.objects.iter().zip(&session.facts().objects) {
             let moved = before.pose_in_world.translation.distance(after.pose_in_world.translation);
-            assert!(moved < 0.002 / 6.0, "{}: {} has moved {moved} m", task.id, before.name);
+            assert!(moved < 0.002 / 12.0, "{}: {} has moved {moved} m", task.id, before.name);
         }
         let status = status(&mut session);
         assert!(status.phases.is_empty(), "{}: {:?}", task.id, status.phases);

@@ -38,6 +38,26 @@ pub enum Command {
     },
     /// List the tasks and their phases.
     Tasks,
+    /// Measure a part of Tandem on this machine.
+    Bench {
+        /// Which part.
+        #[command(subcommand)]
+        part: BenchPart,
+    },
+}
+
+/// What can be measured on its own.
+#[derive(Debug, Subcommand)]
+pub enum BenchPart {
+    /// Inverse kinematics of both wrists: share of targets reached, iterations, time.
+    Ik {
+        /// JSON file with targets; without it, 200 are drawn from the robot's joint ranges.
+        #[arg(long, value_name = "FILE")]
+        targets: Option<PathBuf>,
+        /// Print JSON instead of a table.
+        #[arg(long)]
+        json: bool,
+    },
 }
 
 /// Prints the tasks as `list_tasks` has them.

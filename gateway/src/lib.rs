@@ -3,6 +3,7 @@
 //! One request: [`routes`] reads it, [`table`] finds the episode, [`episode_thread`] hands the typed call to the thread
 //! that owns the world, and [`problem`] turns every refusal into RFC 9457 problem details.
 
+pub mod bench;
 pub mod cli;
 pub mod demo;
 pub mod episode_thread;

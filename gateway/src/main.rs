@@ -4,7 +4,8 @@ use std::{io::IsTerminal, process::ExitCode};
 
 use clap::Parser;
 use tandem::{
-    cli::{Cli, Command, print_tasks},
+    bench,
+    cli::{BenchPart, Cli, Command, print_tasks},
     demo,
     server::Server,
     settings::Settings,
@@ -33,6 +34,10 @@ fn run(cli: Cli) -> Result<ExitCode, Box<dyn std::error::Error>> {
             log_to_stderr("warn");
             let results = demo::play_all(&runs, seeds)?;
             Ok(if demo::passed(&results) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+        }
+        Command::Bench { part: BenchPart::Ik { targets, json } } => {
+            bench::ik(targets.as_deref(), json)?;
+            Ok(ExitCode::SUCCESS)
         }
         Command::Tasks => {
             print_tasks();

@@ -1,0 +1,42 @@
+//! `tandem bench ik`: inverse kinematics measured on the robot that the episodes use.
+
+use std::path::{Path, PathBuf};
+
+use tandem_ik::bench::{Report, TargetSet, run};
+use tandem_ik::{IkError, Model};
+use tandem_sim::assets;
+
+use crate::motion;
+
+/// Targets drawn where no file gives any.
+const SAMPLED_TARGETS: usize = 200;
+const SAMPLE_SEED: u64 = 1;
+const WRISTS: [&str; 2] = ["left_wrist_yaw_link", "right_wrist_yaw_link"];
+
+/// Why the measurement cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    #[error("cannot read the targets {path}: {source}")]
+    Read { path: PathBuf, source: std::io::Error },
+    #[error(transparent)]
+    Ik(#[from] IkError),
+    #[error(transparent)]
+    Sim(#[from] tandem_sim::SimError),
+}
+
+/// Solves the targets of a file, or 200 that are drawn from the robot's own joint ranges.
+pub fn ik(targets: Option<&Path>) -> Result<Report, BenchError> {
+    let whole = Model::from_mjcf(assets::robot(assets::DEFAULT_ROBOT)?)?;
+    let set = match targets {
+        Some(path) => {
+            let read = std::fs::read_to_string(path);
+            TargetSet::from_json(&read.map_err(|source| BenchError::Read { path: path.into(), source })?)?
+        }
+        None => {
+            let upper_body = motion::upper_body(&whole)?;
+            let start_rad = vec![0.0; upper_body.nv()];
+            TargetSet::sample(&upper_body, &WRISTS, &start_rad, SAMPLED_TARGETS, SAMPLE_SEED)?
+        }
+    };
+    Ok(run(&whole, &set)?)
+}
