@@ -12,6 +12,7 @@ import json
 import sys
 
 import jsonschema
+from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader, make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
@@ -115,5 +116,6 @@ def check(path):
 if __name__ == "__main__":
     try:
         check(sys.argv[1])
-    except (Broken, jsonschema.ValidationError, jsonschema.SchemaError) as error:
-        sys.exit(f"{sys.argv[1]}: {error}")
+    except (Broken, McapError, RuntimeError, jsonschema.ValidationError, jsonschema.SchemaError) as error:
+        # lz4 reports damaged data as RuntimeError.
+        sys.exit(f"{sys.argv[1]}: {type(error).__name__}: {error}")
