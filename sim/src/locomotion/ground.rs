@@ -19,6 +19,12 @@ const SMALLEST_SHARE: f32 = 0.03;
 /// Below this the centre of pressure is undefined.
 const SMALLEST_VERTICAL_FORCE_N: f32 = 20.0;
 
+/// Centres of the left and right sole, world.
+pub(super) fn soles(body: &WholeBody) -> [Pose; 2] {
+    // A robot file without these sites is refused when it is read.
+    ["left_foot", "right_foot"].map(|site| body.world_from_site(site).unwrap_or(Pose::IDENTITY))
+}
+
 /// Splits a net force (N) and a moment (N m) about the centre of mass over two feet, given by their sole centres
 /// (world). The centre of pressure of the net force,
 ///   p = c + ( -(m_y + h f_x), m_x - h f_y ) / f_z,   h = height of c above the soles,

@@ -1,10 +1,14 @@
 //! Base control: turns a base command into torques of the twelve leg joints, through ground contact alone.
 
+mod balance;
+pub mod bench;
 mod ground;
 mod legs;
+mod load;
 mod stand;
+mod step;
 
-pub use stand::Stand;
+pub use balance::Balance;
 
 use serde::{Deserialize, Serialize};
 

@@ -1,5 +1,6 @@
 //! One robot in a world: measured state, joint drives, payload estimate.
 
+mod hand_force;
 mod layout;
 mod model;
 mod payload;
@@ -20,6 +21,7 @@ pub(crate) use layout::{ARM_JOINT_COUNT, ARMS, LEG_JOINT_COUNT, LEGS};
 
 use crate::locomotion::{BaseCommand, Locomotion};
 use crate::{PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError};
+use hand_force::HandForce;
 use payload::Payload;
 
 /// What one robot is told for one control step.
@@ -44,6 +46,8 @@ pub struct RobotState {
     pub pelvis_from_camera: Pose,
     /// Weight that each hand carries beyond its own, estimated from joint torques.
     pub payload_n: [f32; 2],
+    /// External force on each hand, world frame, estimated from joint torques.
+    pub hand_force_n: [Vector; 2],
     /// Pelvis below 0.4 m or tilted beyond 60 degrees. Stays true: nothing puts a robot back.
     pub fallen: bool,
 }
@@ -68,6 +72,7 @@ struct Memory {
     last_upper_rad: Vec<f32>,
     torque_n_m: Vec<f32>,
     payload: Payload,
+    hand_force: HandForce,
     base: BaseCommand,
     fallen: bool,
 }
@@ -79,6 +84,10 @@ impl Robot {
     /// Base commands that this robot can follow.
     pub fn base_limits(&self) -> crate::BaseLimits {
         self.locomotion.limits()
+    }
+
+    pub(crate) fn set_locomotion(&mut self, locomotion: Box<dyn Locomotion>) {
+        self.locomotion = locomotion;
     }
 
     /// The command under which the robot stays as it is.
@@ -111,7 +120,14 @@ impl Robot {
 
     pub(crate) fn measure(&self, physics: &PhysicsWorld) -> WholeBody<'_> {
         let (q_rad, qd_rad_s) = self.read_joints(physics);
-        WholeBody::measure(&self.model, &physics.bodies, &self.bodies, q_rad, qd_rad_s)
+        WholeBody::measure(
+            &self.model,
+            &physics.bodies,
+            &self.bodies,
+            q_rad,
+            qd_rad_s,
+            self.memory.hand_force.force_n(),
+        )
     }
 
     pub(crate) fn state(&self, physics: &PhysicsWorld) -> RobotState {
@@ -129,6 +145,7 @@ impl Robot {
                 * body.world_from_link[self.model.egocentric_link]
                 * self.model.egocentric.body_from_camera,
             payload_n: self.memory.payload.weight_n(),
+            hand_force_n: self.memory.hand_force.force_n(),
             fallen: self.memory.fallen,
         }
     }
@@ -136,9 +153,12 @@ impl Robot {
     /// Sets this robot's joint drives for one physics step, `substep` counting from 0 within the control step.
     pub(crate) fn drive(&mut self, physics: &mut PhysicsWorld, command: &RobotCommand, substep: u32) {
         let (q_rad, qd_rad_s) = self.read_joints(physics);
-        let body = WholeBody::measure(&self.model, &physics.bodies, &self.bodies, q_rad, qd_rad_s);
+        let hand_force_n = self.memory.hand_force.force_n();
+        let body =
+            WholeBody::measure(&self.model, &physics.bodies, &self.bodies, q_rad, qd_rad_s, hand_force_n);
         let legs = self.locomotion.tick(&body, &command.base, PHYSICS_DT_S);
         let gravity_n_m = body.gravity_torques_n_m();
+        self.memory.hand_force.update(&body, &self.memory.torque_n_m, &gravity_n_m, PHYSICS_DT_S);
         self.memory.payload.update(&body, &self.memory.torque_n_m, &gravity_n_m, PHYSICS_DT_S);
         let payload_n_m = self.memory.payload.torques_n_m(&body);
 

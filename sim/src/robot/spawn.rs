@@ -5,9 +5,9 @@ use std::sync::Arc;
 use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::prelude::*;
 
-use super::{JOINTS, Memory, Robot, RobotModel, UPPER, layout, payload::Payload};
+use super::{JOINTS, Memory, Robot, RobotModel, UPPER, hand_force::HandForce, layout, payload::Payload};
 use crate::SimError;
-use crate::locomotion::{BaseCommand, Stand};
+use crate::locomotion::{Balance, BaseCommand};
 use crate::world::{RobotPlacement, link_tag};
 
 impl Robot {
@@ -50,11 +50,12 @@ impl Robot {
             last_upper_rad,
             torque_n_m: vec![0.0; JOINTS],
             payload: Payload::default(),
+            hand_force: HandForce::default(),
             base: BaseCommand { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m },
             fallen: false,
         };
         let name = placement.name.clone();
-        let locomotion = Box::new(Stand::default());
+        let locomotion = Box::new(Balance::default());
         Ok(Robot { name, model: model.clone(), bodies, joints, slots, colliders, locomotion, memory })
     }
 }

@@ -6,6 +6,8 @@ use rapier3d::prelude::{RigidBodyHandle, RigidBodySet};
 use super::{JOINTS, RobotModel};
 use crate::world::GRAVITY_M_S2;
 
+const PALM_IN_WRIST_M: Vector = Vector::new(0.12, 0.0, 0.0);
+
 /// What a controller may know of its own robot: joint readings, link poses, centre of mass.
 pub struct WholeBody<'a> {
     pub model: &'a RobotModel,
@@ -16,6 +18,8 @@ pub struct WholeBody<'a> {
     pub pelvis_angular_velocity_rad_s: Vector,
     pub com_m: Vector,
     pub com_velocity_m_s: Vector,
+    /// Measured external force on each hand, left and right, at its palm.
+    pub hand_force_n: [Vector; 2],
 }
 
 impl<'a> WholeBody<'a> {
@@ -25,6 +29,7 @@ impl<'a> WholeBody<'a> {
         links: &[RigidBodyHandle],
         q_rad: [f32; JOINTS],
         qd_rad_s: [f32; JOINTS],
+        hand_force_n: [Vector; 2],
     ) -> WholeBody<'a> {
         let mut com_m = Vector::ZERO;
         let mut com_velocity_m_s = Vector::ZERO;
@@ -46,7 +51,13 @@ impl<'a> WholeBody<'a> {
             world_from_link,
             com_m: com_m / model.mass_kg,
             com_velocity_m_s: com_velocity_m_s / model.mass_kg,
+            hand_force_n,
         }
+    }
+
+    /// Middle of the left and right palm, where loads of the hands are taken to act.
+    pub fn palms_m(&self) -> [Vector; 2] {
+        [0, 1].map(|hand| self.world_from_link[self.model.hands[hand].wrist] * PALM_IN_WRIST_M)
     }
 
     pub fn world_from_pelvis(&self) -> Pose {

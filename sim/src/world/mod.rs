@@ -1,6 +1,7 @@
 //! A room with objects and robots, stepped in control steps of 20 ms.
 
 mod contacts;
+mod disturb;
 mod objects;
 mod snapshot;
 mod view;
@@ -51,6 +52,8 @@ pub struct World {
     fixed: Vec<crate::mjcf::Geom>,
     cameras: Vec<MjcfCamera>,
     control_steps: u64,
+    /// Forces of [`World::push`] are set.
+    pushed: bool,
 }
 
 impl World {
@@ -70,7 +73,16 @@ impl World {
             robots.push(Robot::spawn(&mut physics, &model, placement, index)?);
         }
         let hooks = SelfCollision::new(model);
-        Ok(World { physics, hooks, robots, objects, fixed, cameras: scene.cameras, control_steps: 0 })
+        Ok(World {
+            physics,
+            hooks,
+            robots,
+            objects,
+            fixed,
+            cameras: scene.cameras,
+            pushed: false,
+            control_steps: 0,
+        })
     }
 
     /// Advances by one control step. One command per robot, in the order of [`World::robots`].
@@ -82,6 +94,7 @@ impl World {
             }
             self.physics.step_with_events(&self.hooks, &());
         }
+        self.end_pushes();
         self.control_steps += 1;
     }
 

@@ -1,0 +1,161 @@
+//! The default base controller: stands while it can, steps when it is told to move or is pushed out of its stance.
+
+use rapier3d::math::{Rotation, Vector};
+use serde::{Deserialize, Serialize};
+
+use super::ground::soles;
+use super::load::Load;
+use super::stand::Stand;
+use super::step::Step;
+use super::{BaseCommand, BaseLimits, LegCommand, Locomotion};
+use crate::robot::WholeBody;
+use crate::world::GRAVITY_M_S2;
+
+const LIMITS: BaseLimits = BaseLimits {
+    vx_m_s: [-0.3, 0.4],
+    vy_m_s: [-0.3, 0.3],
+    yaw_rate_rad_s: [-0.5, 0.5],
+    pelvis_height_m: [0.50, 0.76],
+};
+/// A velocity command changes no faster than this, per second.
+const LARGEST_CHANGE_1_S: [f32; 3] = [0.8, 0.8, 1.5];
+/// Below this a command means to stand.
+const STILL: f32 = 0.01;
+/// Standing ends when the capture point leaves the feet by this much: forward, backward, sideways beyond a sole's centre.
+const FORWARD_M: f32 = 0.075;
+const BACKWARD_M: f32 = 0.07;
+const SIDEWAYS_M: f32 = 0.005;
+/// No change of mind within this time after planting.
+const LEAST_STANDING_S: f32 = 0.1;
+/// Feet and capture point from which standing succeeds.
+const LEAST_STEPS: u32 = 2;
+const LARGEST_STAGGER_M: f32 = 0.12;
+const LARGEST_WIDTH_M: f32 = 0.36;
+const CAPTURED_M: f32 = 0.05;
+
+/// Stands or steps; see the module's text.
+#[derive(Default)]
+pub struct Balance {
+    state: Option<State>,
+}
+
+#[derive(Clone, Serialize, Deserialize)]
+struct State {
+    mode: Mode,
+    heading_rad: f32,
+    /// Velocity command after the ramp: forward, left, turning.
+    velocity: [f32; 3],
+    time_in_mode_s: f32,
+    /// Where the pelvis rests over the middle of the soles, heading frame.
+    pelvis_from_middle_m: Vector,
+}
+
+#[derive(Clone, Serialize, Deserialize)]
+enum Mode {
+    Stand(Stand),
+    Step(Step),
+}
+
+/// Capture point relative to the feet, in the heading frame.
+struct Stance {
+    capture_m: Vector,
+    left_from_right_m: Vector,
+}
+
+impl Locomotion for Balance {
+    fn limits(&self) -> BaseLimits {
+        LIMITS
+    }
+
+    fn tick(&mut self, body: &WholeBody, command: &BaseCommand, dt_s: f32) -> LegCommand {
+        let state = self.state.get_or_insert_with(|| State::new(body));
+        let command = LIMITS.clamp(*command);
+        let wanted = [command.vx_m_s, command.vy_m_s, command.yaw_rate_rad_s];
+        for i in 0..3 {
+            let change = LARGEST_CHANGE_1_S[i] * dt_s;
+            state.velocity[i] += (wanted[i] - state.velocity[i]).clamp(-change, change);
+        }
+        state.time_in_mode_s += dt_s;
+        let ground_m = soles(body).iter().map(|sole| sole.translation.z).fold(f32::INFINITY, f32::min);
+        let load = Load::of(body, ground_m);
+        state.change_mode(body, &load);
+        match &mut state.mode {
+            Mode::Stand(stand) => stand.tick(body, &load, command.pelvis_height_m, dt_s),
+            Mode::Step(step) => {
+                let legs = step.tick(body, &load, state.velocity, command.pelvis_height_m, dt_s);
+                state.heading_rad = step.heading_rad;
+                legs
+            }
+        }
+    }
+
+    fn save(&self) -> Result<Vec<u8>, postcard::Error> {
+        postcard::to_stdvec(&self.state)
+    }
+
+    fn load(&mut self, state: &[u8]) -> Result<(), postcard::Error> {
+        self.state = postcard::from_bytes(state)?;
+        Ok(())
+    }
+}
+
+impl State {
+    fn new(body: &WholeBody) -> State {
+        let pelvis = body.world_from_pelvis();
+        let forward = pelvis.rotation * Vector::X;
+        let heading_rad = forward.y.atan2(forward.x);
+        let [left, right] = soles(body);
+        let middle_m = (left.translation + right.translation) * 0.5;
+        let mut pelvis_from_middle_m =
+            Rotation::from_rotation_z(-heading_rad) * (pelvis.translation - middle_m);
+        pelvis_from_middle_m.z = 0.0;
+        State {
+            mode: Mode::Stand(Stand::plant(body, heading_rad, None)),
+            heading_rad,
+            velocity: [0.0; 3],
+            time_in_mode_s: 0.0,
+            pelvis_from_middle_m,
+        }
+    }
+
+    fn change_mode(&mut self, body: &WholeBody, load: &Load) {
+        let moving = self.velocity.iter().any(|part| part.abs() > STILL);
+        let stance = self.stance(body, load);
+        let half_width_m = stance.left_from_right_m.y * 0.5;
+        match &self.mode {
+            Mode::Stand(_) => {
+                let lost = stance.capture_m.x > FORWARD_M
+                    || stance.capture_m.x < -BACKWARD_M
+                    || stance.capture_m.y.abs() > half_width_m + SIDEWAYS_M;
+                if (moving || lost) && self.time_in_mode_s > LEAST_STANDING_S {
+                    self.mode =
+                        Mode::Step(Step::start(body, load, self.heading_rad, stance.capture_m.y > 0.0));
+                    self.time_in_mode_s = 0.0;
+                }
+            }
+            Mode::Step(step) => {
+                let captured =
+                    stance.capture_m.x.abs() < CAPTURED_M && stance.capture_m.y.abs() < half_width_m;
+                let feet_together = stance.left_from_right_m.x.abs() < LARGEST_STAGGER_M
+                    && stance.left_from_right_m.y < LARGEST_WIDTH_M;
+                if !moving && step.just_landed() && step.steps() >= LEAST_STEPS && captured && feet_together {
+                    let stand = Stand::plant(body, self.heading_rad, Some(self.pelvis_from_middle_m));
+                    self.mode = Mode::Stand(stand);
+                    self.time_in_mode_s = 0.0;
+                }
+            }
+        }
+    }
+
+    fn stance(&self, body: &WholeBody, load: &Load) -> Stance {
+        let [left, right] = soles(body);
+        let middle_m = (left.translation + right.translation) * 0.5;
+        let height_m = body.com_m.z - middle_m.z;
+        let capture_m = load.balance_point_m + body.com_velocity_m_s * (height_m / GRAVITY_M_S2).sqrt();
+        let into_heading = Rotation::from_rotation_z(-self.heading_rad);
+        Stance {
+            capture_m: into_heading * (capture_m - middle_m),
+            left_from_right_m: into_heading * (left.translation - right.translation),
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! The table of cases.
+
+use super::motion::Arms;
+use super::tour::Tour;
+
+/// One situation; a seed draws its arm motion and directions.
+pub struct Case {
+    pub name: &'static str,
+    pub seconds: f32,
+    pub(super) arms: Arms,
+    pub(super) hand_load_kg: f32,
+    pub(super) plan: Plan,
+    pub(super) disturbance: Disturbance,
+}
+
+/// What the base is told.
+pub(super) enum Plan {
+    Hold,
+    /// Forward m/s, left m/s, turning rad/s; the last [`STOP_S`] seconds are a stop.
+    Move([f32; 3]),
+    /// Down and up again, a third of the time each.
+    Squat {
+        high_m: f32,
+        low_m: f32,
+    },
+    Tour(Tour),
+}
+
+/// What else happens.
+pub(super) enum Disturbance {
+    None,
+    /// A steady force on each hand.
+    Pull {
+        force_n: f32,
+    },
+    /// One second at the torso, in the direction of the seed (eight of them).
+    Push {
+        force_n: f32,
+    },
+}
+
+pub(super) const STOP_S: f32 = 5.0;
+
+const HOLD: Case = Case {
+    name: "",
+    seconds: 20.0,
+    arms: Arms::Forward,
+    hand_load_kg: 0.0,
+    plan: Plan::Hold,
+    disturbance: Disturbance::None,
+};
+
+const fn moving(name: &'static str, velocity: [f32; 3]) -> Case {
+    Case { name, seconds: 21.0 + STOP_S, plan: Plan::Move(velocity), ..HOLD }
+}
+
+pub const CASES: [Case; 25] = [
+    Case { name: "stand", ..HOLD },
+    Case { name: "stand_waving", seconds: 60.0, arms: Arms::Waving, ..HOLD },
+    Case { name: "stand_1kg", hand_load_kg: 1.0, ..HOLD },
+    Case { name: "stand_2kg", hand_load_kg: 2.0, ..HOLD },
+    Case { name: "stand_3kg", hand_load_kg: 3.0, ..HOLD },
+    Case { name: "stand_pull_15n", disturbance: Disturbance::Pull { force_n: 15.0 }, ..HOLD },
+    moving("forward_0.4", [0.4, 0.0, 0.0]),
+    moving("forward_0.2", [0.2, 0.0, 0.0]),
+    moving("backward_0.3", [-0.3, 0.0, 0.0]),
+    moving("left_0.3", [0.0, 0.3, 0.0]),
+    moving("right_0.3", [0.0, -0.3, 0.0]),
+    moving("turn_left_0.5", [0.0, 0.0, 0.5]),
+    moving("turn_right_0.5", [0.0, 0.0, -0.5]),
+    moving("mix_forward_left_turn", [0.3, 0.15, 0.3]),
+    moving("mix_backward_right_turn", [-0.2, -0.15, -0.3]),
+    Case { arms: Arms::Waving, ..moving("forward_0.3_waving", [0.3, 0.0, 0.0]) },
+    Case { hand_load_kg: 2.0, ..moving("left_0.25_2kg", [0.0, 0.25, 0.0]) },
+    Case { hand_load_kg: 2.0, ..moving("forward_0.3_2kg", [0.3, 0.0, 0.0]) },
+    Case {
+        disturbance: Disturbance::Pull { force_n: 15.0 },
+        ..moving("left_0.25_pull_15n", [0.0, 0.25, 0.0])
+    },
+    Case {
+        disturbance: Disturbance::Pull { force_n: 15.0 },
+        ..moving("forward_0.3_pull_15n", [0.3, 0.0, 0.0])
+    },
+    Case { name: "squat", plan: Plan::Squat { high_m: 0.75, low_m: 0.55 }, ..HOLD },
+    Case { name: "squat_1kg", hand_load_kg: 1.0, plan: Plan::Squat { high_m: 0.75, low_m: 0.55 }, ..HOLD },
+    Case { name: "push_40n", disturbance: Disturbance::Push { force_n: 40.0 }, ..HOLD },
+    Case { disturbance: Disturbance::Push { force_n: 30.0 }, ..moving("push_30n_walking", [0.3, 0.0, 0.0]) },
+    Case { name: "tour", seconds: 90.0, arms: Arms::Waving, plan: Plan::Tour(Tour::STANDARD), ..HOLD },
+];

@@ -1,0 +1,116 @@
+//! What a base controller can do: standing, loads, walking, stopping, squatting, pushes and a tour, several seeds each.
+
+mod cases;
+mod motion;
+mod tour;
+mod trial;
+
+use std::fmt;
+
+use serde::Serialize;
+
+pub use cases::{CASES, Case};
+
+use super::Locomotion;
+use crate::SimError;
+use trial::Trial;
+
+/// Makes a fresh controller for each trial.
+pub type NewLocomotion<'a> = &'a dyn Fn() -> Box<dyn Locomotion>;
+
+/// Results of all cases.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    pub cases: Vec<CaseReport>,
+}
+
+/// One case over its seeds. A number is the worst of the robots that did not fall; energy is a mean. `None`: not
+/// measured in this case.
+#[derive(Clone, Debug, Serialize)]
+pub struct CaseReport {
+    pub case: String,
+    pub seeds: usize,
+    pub survived: usize,
+    /// Deviation of the mean velocity, as a part of the command: mean over the seeds.
+    pub velocity_error: Option<f32>,
+    pub heading_error_deg: Option<f32>,
+    pub final_drift_m: Option<f32>,
+    pub sway_m: Option<f32>,
+    pub height_error_m: Option<f32>,
+    /// From the zero command until the pelvis stays slower than 0.1 m/s, and than 0.02 m/s.
+    pub standing_after_s: Option<f32>,
+    pub still_after_s: Option<f32>,
+    /// Mean absolute mechanical power of all joints.
+    pub power_w: f32,
+}
+
+/// Runs every case whose name contains one of the comma-separated parts of `filter`, with seeds 0 up to `seeds`; `done` hears of each case as it ends.
+pub fn run(
+    new_locomotion: NewLocomotion,
+    filter: &str,
+    seeds: usize,
+    mut done: impl FnMut(&CaseReport),
+) -> Result<Report, SimError> {
+    let mut cases = Vec::new();
+    for case in CASES.iter().filter(|case| filter.split(",").any(|f| case.name.contains(f))) {
+        let trials: Vec<Trial> = (0..seeds)
+            .map(|seed| trial::run(case, seed as u64, new_locomotion()))
+            .collect::<Result<_, _>>()?;
+        let report = summarise(case, &trials);
+        done(&report);
+        cases.push(report);
+    }
+    Ok(Report { cases })
+}
+
+fn summarise(case: &Case, trials: &[Trial]) -> CaseReport {
+    let standing: Vec<&Trial> = trials.iter().filter(|trial| !trial.fell).collect();
+    let worst =
+        |value: fn(&Trial) -> Option<f32>| standing.iter().filter_map(|trial| value(trial)).reduce(f32::max);
+    let mean = |value: fn(&Trial) -> Option<f32>| {
+        let values: Vec<f32> = standing.iter().filter_map(|trial| value(trial)).collect();
+        (!values.is_empty()).then(|| values.iter().sum::<f32>() / values.len() as f32)
+    };
+    CaseReport {
+        case: case.name.into(),
+        seeds: trials.len(),
+        survived: standing.len(),
+        velocity_error: mean(|trial| trial.velocity_error),
+        heading_error_deg: worst(|trial| trial.heading_error_deg),
+        final_drift_m: worst(|trial| trial.final_drift_m),
+        sway_m: worst(|trial| trial.sway_m),
+        height_error_m: worst(|trial| trial.height_error_m),
+        standing_after_s: worst(|trial| trial.standing_after_s),
+        still_after_s: worst(|trial| trial.still_after_s),
+        power_w: mean(|trial| Some(trial.power_w)).unwrap_or(0.0),
+    }
+}
+
+impl CaseReport {
+    /// Column heads of [`CaseReport`]'s lines.
+    pub const HEAD: &str =
+        "case                        alive  v err  heading    drift     sway   height  stands  still  power";
+}
+
+impl fmt::Display for CaseReport {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let show = |value: Option<f32>, scale: f32, unit: &str| {
+            value.map_or("-".into(), |value| format!("{:.1}{unit}", value * scale))
+        };
+        write!(
+            f,
+            "{:26} {:>2}/{:<2}  {:>5}  {:>7}  {:>7}  {:>7}  {:>7}  {:>6}  {:>5}  {:>5}",
+            self.case,
+            self.survived,
+            self.seeds,
+            show(self.velocity_error, 100.0, "%"),
+            show(self.heading_error_deg, 1.0, "°"),
+            show(self.final_drift_m, 100.0, "cm"),
+            show(self.sway_m, 100.0, "cm"),
+            show(self.height_error_m, 100.0, "cm"),
+            show(self.standing_after_s, 1.0, "s"),
+            show(self.still_after_s, 1.0, "s"),
+            show(Some(self.power_w), 1.0, "W"),
+        )
+    }
+}

@@ -1,0 +1,83 @@
+//! The tour: waypoints in a square, reached one after the other under punches.
+
+use rapier3d::math::Vector;
+
+use super::motion::Random;
+use crate::locomotion::{BaseCommand, BaseLimits};
+
+/// Parameters of a tour.
+pub(super) struct Tour {
+    pub waypoints: usize,
+    pub half_side_m: f32,
+    pub leg_s: f32,
+    pub punch_n: f32,
+    pub punch_s: f32,
+}
+
+impl Tour {
+    pub(super) const STANDARD: Tour =
+        Tour { waypoints: 18, half_side_m: 1.5, leg_s: 5.0, punch_n: 300.0, punch_s: 0.08 };
+}
+
+/// Links that get punched.
+const BODIES: [&str; 6] = [
+    "pelvis",
+    "torso_link",
+    "left_shoulder_yaw_link",
+    "right_shoulder_yaw_link",
+    "left_elbow_link",
+    "right_elbow_link",
+];
+const POSITION_GAIN_1_S: f32 = 1.0;
+const NEAR_M: f32 = 0.05;
+
+/// One leg: where to, and the punch on the way.
+pub(super) struct Leg {
+    pub target_m: Vector,
+    pub punch_at_s: f32,
+    pub punched_link: &'static str,
+    pub punch_n: Vector,
+}
+
+/// Legs of a seed.
+pub(super) fn legs(tour: &Tour, random: &mut Random) -> Vec<Leg> {
+    let reach_m = tour.leg_s * 0.25;
+    let mut from_m = Vector::ZERO;
+    (0..tour.waypoints)
+        .map(|_| {
+            let angle = random.uniform(0.0, std::f32::consts::TAU);
+            let length_m = random.uniform(0.3, reach_m);
+            let side = tour.half_side_m;
+            let next = from_m + Vector::new(angle.cos(), angle.sin(), 0.0) * length_m;
+            let target_m = Vector::new(next.x.clamp(-side, side), next.y.clamp(-side, side), 0.0);
+            from_m = target_m;
+            let direction = random.uniform(0.0, std::f32::consts::TAU);
+            let size_n = random.uniform(0.0, tour.punch_n);
+            Leg {
+                target_m,
+                punch_at_s: random.uniform(0.5, tour.leg_s - 0.5),
+                punched_link: BODIES
+                    [(random.uniform(0.0, BODIES.len() as f32) as usize).min(BODIES.len() - 1)],
+                punch_n: Vector::new(direction.cos(), direction.sin(), 0.0) * size_n,
+            }
+        })
+        .collect()
+}
+
+/// Walks straight to the target without turning; stands within [`NEAR_M`] of it.
+pub(super) fn command(
+    away_m: Vector,
+    heading_rad: f32,
+    limits: &BaseLimits,
+    pelvis_height_m: f32,
+) -> BaseCommand {
+    let (sine, cosine) = heading_rad.sin_cos();
+    let still = away_m.length() < NEAR_M;
+    let along = |part: f32| if still { 0.0 } else { part * POSITION_GAIN_1_S };
+    limits.clamp(BaseCommand {
+        vx_m_s: along(away_m.x * cosine + away_m.y * sine),
+        vy_m_s: along(away_m.y * cosine - away_m.x * sine),
+        yaw_rate_rad_s: -heading_rad.clamp(-0.5, 0.5) * if still { 0.0 } else { 1.0 },
+        pelvis_height_m,
+    })
+}

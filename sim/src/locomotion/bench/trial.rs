@@ -1,0 +1,232 @@
+//! One case with one seed.
+
+use std::f32::consts::{PI, TAU};
+
+use rapier3d::math::{Pose, Vector};
+
+use super::cases::{Case, Disturbance, Plan, STOP_S};
+use super::motion::{ArmMotion, Random};
+use super::tour::{self, Leg};
+use crate::locomotion::{BaseCommand, Locomotion};
+use crate::robot::{RobotCommand, RobotState, Side};
+use crate::{CONTROL_HZ, RobotPlacement, SimError, World, WorldSpec};
+
+const DT_S: f32 = 1.0 / CONTROL_HZ as f32;
+/// Arms rise and loads swing out before anything is asked or measured.
+const SETTLE_S: f32 = 2.0;
+/// A velocity is measured after the start of motion has faded.
+const RAMP_S: f32 = 2.0;
+const PUSH_S: f32 = 1.0;
+const PALM_IN_WRIST_M: Vector = Vector::new(0.12, 0.0, 0.0);
+
+/// What came out; see [`super::CaseReport`].
+#[derive(Clone, Debug, Default)]
+pub(super) struct Trial {
+    pub fell: bool,
+    pub velocity_error: Option<f32>,
+    pub heading_error_deg: Option<f32>,
+    pub final_drift_m: Option<f32>,
+    pub sway_m: Option<f32>,
+    pub height_error_m: Option<f32>,
+    pub standing_after_s: Option<f32>,
+    pub still_after_s: Option<f32>,
+    pub power_w: f32,
+}
+
+/// One control step of the log.
+struct Sample {
+    pelvis_m: Vector,
+    /// Unwrapped.
+    heading_rad: f32,
+    command: BaseCommand,
+}
+
+/// Runs until the time is up or the robot lies.
+pub(super) fn run(case: &Case, seed: u64, locomotion: Box<dyn Locomotion>) -> Result<Trial, SimError> {
+    let placement = RobotPlacement { name: "A".into(), position_m: [0.0, 0.0], yaw_rad: 0.0 };
+    let spec = WorldSpec { scene: "floor".into(), robots: vec![placement], objects: vec![] };
+    let mut world = World::new(&spec)?;
+    world.set_locomotion(0, locomotion);
+    let mut random = Random(seed);
+    let arms = ArmMotion::new(case.arms, &mut random);
+    let legs = if let Plan::Tour(tour) = &case.plan { tour::legs(tour, &mut random) } else { Vec::new() };
+    let direction = pull_direction(&mut random);
+    for side in Side::BOTH {
+        world.load_hand(0, side, case.hand_load_kg, PALM_IN_WRIST_M);
+    }
+    let rest = world.rest_command(0);
+    let mut log: Vec<Sample> = Vec::new();
+    let mut trial = Trial::default();
+    let mut work_j = 0.0;
+    for step in 0..(case.seconds / DT_S) as usize {
+        let time_s = step as f32 * DT_S;
+        let state = world.robot_state(0);
+        trial.fell = state.fallen;
+        if trial.fell {
+            break;
+        }
+        let heading_rad =
+            unwrap(heading_rad(state.world_from_pelvis), log.last().map_or(0.0, |s| s.heading_rad));
+        let base = base_command(case, &world, &state, heading_rad, &legs, time_s, rest.base);
+        disturb(case, &mut world, seed, direction, &legs, time_s);
+        let upper_rad = arms.at(&rest.upper_rad, time_s);
+        world.control_step(&[RobotCommand { upper_rad, base }]);
+        work_j += power_w(&state) * DT_S;
+        log.push(Sample { pelvis_m: state.world_from_pelvis.translation, heading_rad, command: base });
+    }
+    trial.power_w = work_j / (log.len() as f32 * DT_S);
+    if !trial.fell {
+        measure(case, &log, &legs, &mut trial);
+    }
+    Ok(trial)
+}
+
+fn base_command(
+    case: &Case,
+    world: &World,
+    state: &RobotState,
+    heading_rad: f32,
+    legs: &[Leg],
+    time_s: f32,
+    rest: BaseCommand,
+) -> BaseCommand {
+    match &case.plan {
+        Plan::Hold => rest,
+        Plan::Move(velocity) if time_s > SETTLE_S && time_s < case.seconds - STOP_S => {
+            let [vx_m_s, vy_m_s, yaw_rate_rad_s] = *velocity;
+            BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, ..rest }
+        }
+        Plan::Move(_) => rest,
+        Plan::Squat { high_m, low_m } => {
+            let middle = (case.seconds / 3.0..case.seconds * 2.0 / 3.0).contains(&time_s);
+            BaseCommand { pelvis_height_m: if middle { *low_m } else { *high_m }, ..rest }
+        }
+        Plan::Tour(tour) => {
+            let leg = ((time_s / tour.leg_s) as usize).min(legs.len() - 1);
+            let pelvis_m = state.world_from_pelvis.translation;
+            let away_m = legs[leg].target_m - Vector::new(pelvis_m.x, pelvis_m.y, 0.0);
+            tour::command(away_m, heading_rad, &world.robots()[0].base_limits(), rest.pelvis_height_m)
+        }
+    }
+}
+
+fn disturb(case: &Case, world: &mut World, seed: u64, direction: Vector, legs: &[Leg], time_s: f32) {
+    match &case.disturbance {
+        Disturbance::Pull { force_n } if time_s > 0.5 * SETTLE_S => {
+            for side in Side::BOTH {
+                let link = world.robots()[0].model.links[world.robots()[0].model.hands[side.index()].wrist]
+                    .name
+                    .clone();
+                world.push(
+                    0,
+                    &link,
+                    PALM_IN_WRIST_M,
+                    direction * (force_n * (time_s - 0.5 * SETTLE_S).min(1.0)),
+                );
+            }
+        }
+        Disturbance::Push { force_n } if (5.0..5.0 + PUSH_S).contains(&time_s) => {
+            let angle = TAU * seed as f32 / 8.0;
+            let force_n = Vector::new(angle.cos(), angle.sin(), 0.0) * *force_n;
+            world.push(0, "torso_link", Vector::new(0.0, 0.0, 0.1), force_n);
+        }
+        _ => {}
+    }
+    if let Plan::Tour(tour) = &case.plan {
+        let leg = ((time_s / tour.leg_s) as usize).min(legs.len() - 1);
+        let within_s = time_s - leg as f32 * tour.leg_s - legs[leg].punch_at_s;
+        if (0.0..tour.punch_s - 0.5 * DT_S).contains(&within_s) {
+            world.push(0, legs[leg].punched_link, Vector::ZERO, legs[leg].punch_n);
+        }
+    }
+}
+
+/// Any direction, no more than 45 degrees out of the horizontal.
+fn pull_direction(random: &mut Random) -> Vector {
+    let (angle, rise) = (random.uniform(0.0, TAU), random.uniform(-PI / 4.0, PI / 4.0));
+    Vector::new(angle.cos() * rise.cos(), angle.sin() * rise.cos(), rise.sin())
+}
+
+fn power_w(state: &RobotState) -> f32 {
+    state.torque_n_m.iter().zip(&state.qd_rad_s).map(|(torque, rate)| (torque * rate).abs()).sum()
+}
+
+fn heading_rad(pelvis: Pose) -> f32 {
+    let forward = pelvis.rotation * Vector::X;
+    forward.y.atan2(forward.x)
+}
+
+fn unwrap(angle_rad: f32, last_rad: f32) -> f32 {
+    last_rad + (angle_rad - last_rad + PI).rem_euclid(TAU) - PI
+}
+
+fn flat(v: Vector) -> Vector {
+    Vector::new(v.x, v.y, 0.0)
+}
+
+fn measure(case: &Case, log: &[Sample], legs: &[Leg], trial: &mut Trial) {
+    let at = |time_s: f32| ((time_s / DT_S) as usize).min(log.len() - 1);
+    let (start, end) = (at(SETTLE_S), log.len() - 1);
+    match &case.plan {
+        Plan::Hold | Plan::Squat { .. } => {
+            let (mut low, mut high) = (Vector::INFINITY, Vector::NEG_INFINITY);
+            for sample in &log[start..] {
+                low = low.min(sample.pelvis_m);
+                high = high.max(sample.pelvis_m);
+            }
+            trial.sway_m = Some((high.x - low.x).max(high.y - low.y));
+            trial.final_drift_m = Some(flat(log[end].pelvis_m - log[0].pelvis_m).length());
+        }
+        Plan::Move(velocity) => {
+            let stop = at(case.seconds - STOP_S);
+            trial.velocity_error = Some(velocity_error(&log[at(SETTLE_S + RAMP_S)..stop], *velocity));
+            let turned_rad = velocity[2] * (stop - start) as f32 * DT_S;
+            trial.heading_error_deg =
+                Some((log[end].heading_rad - log[start].heading_rad - turned_rad).abs().to_degrees());
+            trial.standing_after_s = Some(slower_after_s(&log[stop..], 0.1));
+            trial.still_after_s = Some(slower_after_s(&log[stop..], 0.02));
+        }
+        Plan::Tour(tour) => {
+            let error_m = |leg: usize| {
+                let last = at((leg + 1) as f32 * tour.leg_s - DT_S);
+                flat(log[last].pelvis_m - legs[leg].target_m).length()
+            };
+            trial.final_drift_m = Some((0..legs.len()).map(error_m).sum::<f32>() / legs.len() as f32);
+        }
+    }
+    if let Plan::Squat { .. } = &case.plan {
+        let ends = [case.seconds / 3.0, case.seconds * 2.0 / 3.0, case.seconds];
+        let error_m = |end_s: &f32| {
+            let sample = &log[at(end_s - 2.0 * DT_S)];
+            (sample.pelvis_m.z - sample.command.pelvis_height_m).abs()
+        };
+        trial.height_error_m = ends.iter().map(error_m).reduce(f32::max);
+    }
+}
+
+/// Largest deviation of the mean velocity in the heading frame, as a part of the commanded speed (m/s or rad/s).
+fn velocity_error(log: &[Sample], velocity: [f32; 3]) -> f32 {
+    let mut moved = [0.0; 3];
+    for pair in log.windows(2) {
+        let step_m = pair[1].pelvis_m - pair[0].pelvis_m;
+        let (sine, cosine) = pair[0].heading_rad.sin_cos();
+        moved[0] += step_m.x * cosine + step_m.y * sine;
+        moved[1] += step_m.y * cosine - step_m.x * sine;
+        moved[2] += pair[1].heading_rad - pair[0].heading_rad;
+    }
+    let time_s = (log.len() - 1) as f32 * DT_S;
+    let [x, y, turn] = std::array::from_fn(|i| moved[i] / time_s - velocity[i]);
+    let speed_m_s = velocity[0].hypot(velocity[1]);
+    let linear = if speed_m_s > 0.0 { x.hypot(y) / speed_m_s } else { 0.0 };
+    let angular = if velocity[2] != 0.0 { (turn / velocity[2]).abs() } else { 0.0 };
+    linear.max(angular)
+}
+
+/// Time until the pelvis stays slower than a limit, averaged over a fifth of a second.
+fn slower_after_s(log: &[Sample], limit_m_s: f32) -> f32 {
+    const WINDOW: usize = 10;
+    let speed_m_s =
+        |i: usize| flat(log[i + WINDOW].pelvis_m - log[i].pelvis_m).length() / (WINDOW as f32 * DT_S);
+    let last = (0..log.len() - WINDOW).rev().find(|i| speed_m_s(*i) > limit_m_s);
+    last.map_or(0.0, |i| (i + WINDOW) as f32 * DT_S)
+}
