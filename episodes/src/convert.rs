@@ -20,7 +20,10 @@ pub fn isometry_from_sim(pose: &Pose) -> Isometry3<f64> {
 /// Six decimals: a micrometre. More would only cost a language model tokens.
 pub fn wire_pose(pose: &Isometry3<f64>) -> wire::Pose {
     let (t, r) = (pose.translation, pose.rotation);
-    wire::Pose { position_m: [t.x, t.y, t.z].map(rounded), quaternion_wxyz: [r.w, r.i, r.j, r.k].map(rounded) }
+    wire::Pose {
+        position_m: [t.x, t.y, t.z].map(rounded),
+        quaternion_wxyz: [r.w, r.i, r.j, r.k].map(rounded),
+    }
 }
 
 pub fn rounded(value: f64) -> f64 {

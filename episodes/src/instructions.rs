@@ -95,7 +95,8 @@ mod tests {
 
     #[test]
     fn only_what_the_file_says_changes() {
-        let list = read(r#"{"handover": {"joint": "Reicht die Flasche weiter.", "robots": {"B": "Nimm sie."}}}"#);
+        let list =
+            read(r#"{"handover": {"joint": "Reicht die Flasche weiter.", "robots": {"B": "Nimm sie."}}}"#);
         let list = list.unwrap().task_list();
         let (own, handover) = (task_list(), &list.tasks[0]);
         assert_eq!(handover.instruction, "Reicht die Flasche weiter.");
