@@ -31,7 +31,7 @@ const LEAST_STANDING_S: f32 = 0.1;
 const LEAST_STEPS: u32 = 2;
 const LARGEST_STAGGER_M: f32 = 0.12;
 const LARGEST_WIDTH_M: f32 = 0.36;
-const CAPTURED_M: f32 = 0.05;
+const CAPTURED_M: f32 = 0.066;
 
 /// Stands or steps; see the module's text.
 #[derive(Default)]
