@@ -60,10 +60,10 @@ fn messages_name_what_there_is() {
     check(model.frame("left_wrst").expect_err("misspelt").to_string(), "left_wrist");
     check(model.joint("elbow").expect_err("misspelt").to_string(), "left_elbow_joint");
     check(
-        Configuration::new(&model, &[0.0; 3]).err().expect("too few").to_string(),
+        Configuration::new(&model, &[0.0; 3]).expect_err("too few").to_string(),
         "3 joint coordinates given",
     );
-    check(Configuration::new(&model, &[f64::NAN; 17]).err().expect("no numbers").to_string(), "not finite");
+    check(Configuration::new(&model, &[f64::NAN; 17]).expect_err("no numbers").to_string(), "not finite");
     let ball =
         r#"<mujoco><worldbody><body name="a"><joint type="ball" name="b"/></body></worldbody></mujoco>"#;
     check(Model::from_mjcf(ball).expect_err("a ball joint").to_string(), "use hinges and slides");
