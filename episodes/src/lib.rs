@@ -4,6 +4,7 @@ pub mod bench;
 mod convert;
 mod describe;
 mod error;
+pub mod evaluation;
 pub mod experts;
 pub mod facts;
 mod grasp;

@@ -2,9 +2,14 @@
 
 use std::path::PathBuf;
 
-use clap::{Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use tandem_episodes::{
+    evaluation::{Plan, Policy},
+    tasks::Task,
+};
+use tandem_tools_spec::Protocol;
 
-use crate::{seeds::Seeds, settings::Layer};
+use crate::{evaluate, seeds::Seeds, settings::Layer};
 
 /// Physics of humanoids that must work together, behind an HTTP API.
 #[derive(Debug, Parser)]
@@ -36,6 +41,25 @@ pub enum Command {
         #[arg(long, env = "TANDEM_RUNS", default_value = "runs", value_name = "DIR")]
         runs: PathBuf,
     },
+    /// Play tasks over seeds in parallel worlds and count the phases reached. Goes on where an interrupted run stopped.
+    Evaluate {
+        /// Who plays.
+        #[arg(long, value_enum, default_value = "expert")]
+        policy: PolicyChoice,
+        #[command(flatten)]
+        episodes: EpisodeChoice,
+        /// Folder for `results.json` and one file per episode.
+        #[arg(long, value_name = "DIR", default_value = "runs/evaluation")]
+        out: PathBuf,
+    },
+    /// Record demonstrations of the experts as MCAP, one folder per episode.
+    Collect {
+        #[command(flatten)]
+        episodes: EpisodeChoice,
+        /// Folder for the recordings.
+        #[arg(long, value_name = "DIR", default_value = "runs/demonstrations")]
+        out: PathBuf,
+    },
     /// List the tasks and their phases.
     Tasks,
     /// Measure a part of Tandem on this machine.
@@ -44,6 +68,69 @@ pub enum Command {
         #[command(subcommand)]
         part: BenchPart,
     },
+}
+
+/// Which episodes to play.
+#[derive(Debug, Args)]
+pub struct EpisodeChoice {
+    /// Task ids separated by commas, or `all`.
+    #[arg(long, default_value = "all", value_name = "TASKS", value_parser = TaskList::parse)]
+    pub tasks: TaskList,
+    /// One seed, or a range of seeds as 0-9, both ends included.
+    #[arg(long, default_value = "0-9", value_name = "SEEDS")]
+    pub seeds: Seeds,
+    /// The rules.
+    #[arg(long, value_enum, default_value = "agentic")]
+    pub protocol: ProtocolChoice,
+    /// Worlds that run side by side.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub jobs: usize,
+}
+
+/// Tasks named on the command line.
+#[derive(Debug, Clone)]
+pub struct TaskList(pub Vec<&'static Task>);
+
+impl TaskList {
+    fn parse(text: &str) -> Result<TaskList, String> {
+        evaluate::parse_tasks(text).map(TaskList)
+    }
+}
+
+/// Who plays an evaluation.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum PolicyChoice {
+    /// The scripted experts.
+    Expert,
+    /// Nobody: robots hold still.
+    Idle,
+}
+
+/// The rules on the command line.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum ProtocolChoice {
+    Agentic,
+    Benchmark,
+}
+
+impl EpisodeChoice {
+    /// The plan to play these episodes by `policy`.
+    pub fn plan(self, policy: PolicyChoice, record: bool) -> Plan {
+        Plan {
+            policy: match policy {
+                PolicyChoice::Expert => Policy::Expert,
+                PolicyChoice::Idle => Policy::Idle,
+            },
+            protocol: match self.protocol {
+                ProtocolChoice::Agentic => Protocol::Agentic,
+                ProtocolChoice::Benchmark => Protocol::Benchmark,
+            },
+            tasks: self.tasks.0,
+            seeds: self.seeds.0.collect(),
+            jobs: self.jobs,
+            record,
+        }
+    }
 }
 
 /// What can be measured on its own.

@@ -7,6 +7,7 @@ pub mod bench;
 pub mod cli;
 pub mod demo;
 pub mod episode_thread;
+pub mod evaluate;
 pub mod http_caller;
 pub mod mcp;
 pub mod problem;

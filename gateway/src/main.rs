@@ -5,8 +5,8 @@ use std::{io::IsTerminal, process::ExitCode};
 use clap::Parser;
 use tandem::{
     bench,
-    cli::{BenchPart, Cli, Command, print_tasks},
-    demo,
+    cli::{BenchPart, Cli, Command, PolicyChoice, print_tasks},
+    demo, evaluate,
     server::Server,
     settings::Settings,
 };
@@ -37,6 +37,14 @@ fn run(cli: Cli) -> Result<ExitCode, Box<dyn std::error::Error>> {
         }
         Command::Bench { part: BenchPart::Ik { targets, json } } => {
             bench::ik(targets.as_deref(), json)?;
+            Ok(ExitCode::SUCCESS)
+        }
+        Command::Evaluate { policy, episodes, out } => {
+            evaluate::run(&episodes.plan(policy, false), &out)?;
+            Ok(ExitCode::SUCCESS)
+        }
+        Command::Collect { episodes, out } => {
+            evaluate::run(&episodes.plan(PolicyChoice::Expert, true), &out)?;
             Ok(ExitCode::SUCCESS)
         }
         Command::Tasks => {

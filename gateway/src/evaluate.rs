@@ -1,0 +1,53 @@
+//! `tandem evaluate` and `tandem collect`: episodes over seeds, in parallel worlds.
+
+use std::{error::Error, path::Path};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use tandem_episodes::{
+    evaluation::{self, Evaluation, Plan, TaskSummary, clopper_pearson},
+    tasks::{self, Task},
+};
+
+/// The tasks that `text` names: `all`, or ids separated by commas.
+pub fn parse_tasks(text: &str) -> Result<Vec<&'static Task>, String> {
+    match text {
+        "all" => Ok(tasks::ALL.iter().collect()),
+        ids => ids.split(',').map(|id| tasks::find(id.trim()).map_err(|error| error.to_string())).collect(),
+    }
+}
+
+/// Plays `plan` into `folder`, with a progress bar, and prints a table.
+pub fn run(plan: &Plan, folder: &Path) -> Result<(), Box<dyn Error>> {
+    let bar = ProgressBar::new((plan.tasks.len() * plan.seeds.len()) as u64);
+    bar.set_style(ProgressStyle::with_template("  [{bar:30}] {pos} of {len} episodes, {elapsed}, {msg}")?);
+    let evaluation = evaluation::evaluate(plan, folder, &|played| {
+        bar.set_message(format!("{} seed {}", played.result.task, played.result.seed));
+        bar.inc(1);
+    })?;
+    bar.finish_and_clear();
+    print_table(&evaluation);
+    for episode in evaluation.episodes.iter().filter(|episode| episode.note.is_some()) {
+        let note = episode.note.as_deref().unwrap_or_default();
+        println!("  {} seed {}: {note}", episode.result.task, episode.result.seed);
+    }
+    println!("  results in {}", folder.display());
+    Ok(())
+}
+
+fn print_table(evaluation: &Evaluation) {
+    println!("{:14} {:>8}  {:^22} {:^22} {:^22} {:>5} {:>6}", "task", "episodes", "p1", "p2", "p3", "falls", "steps");
+    for (id, task) in &evaluation.tasks {
+        let [p1, p2, p3] = [task.p1, task.p2, task.p3].map(|count| rate(count, task));
+        println!(
+            "{id:14} {:>8}  {p1:^22} {p2:^22} {p3:^22} {:>5} {:>6.0}",
+            task.episodes, task.falls, task.mean_env_steps
+        );
+    }
+    println!("rates in %, with exact 95 % intervals (Clopper-Pearson)");
+}
+
+fn rate(count: usize, task: &TaskSummary) -> String {
+    let [low, high] = clopper_pearson(count, task.episodes);
+    let percent = 100.0 * count as f64 / task.episodes as f64;
+    format!("{percent:.0} [{:.0}, {:.0}]", 100.0 * low, 100.0 * high)
+}
