@@ -87,7 +87,11 @@ const RESULTS: &str = "results.json";
 const EPISODES: &str = "episodes";
 
 /// Plays what `folder` does not hold yet, writes `results.json` there, and calls `progress` after each episode.
-pub fn evaluate(plan: &Plan, folder: &Path, progress: &(dyn Fn(&Played) + Sync)) -> Result<Evaluation, EvaluationError> {
+pub fn evaluate(
+    plan: &Plan,
+    folder: &Path,
+    progress: &(dyn Fn(&Played) + Sync),
+) -> Result<Evaluation, EvaluationError> {
     let kept = folder.join(EPISODES);
     std::fs::create_dir_all(&kept).map_err(|source| EvaluationError::Io { path: kept.clone(), source })?;
     let work: Vec<(&'static Task, u32)> =
@@ -106,7 +110,10 @@ pub fn evaluate(plan: &Plan, folder: &Path, progress: &(dyn Fn(&Played) + Sync))
                         Err(error) => {
                             // Nobody else begins another episode.
                             next.store(work.len(), Ordering::Relaxed);
-                            failure.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).get_or_insert(error);
+                            failure
+                                .lock()
+                                .unwrap_or_else(|poisoned| poisoned.into_inner())
+                                .get_or_insert(error);
                         }
                     }
                 }
@@ -125,10 +132,17 @@ pub fn evaluate(plan: &Plan, folder: &Path, progress: &(dyn Fn(&Played) + Sync))
     })
 }
 
-fn kept_or_played(plan: &Plan, task: &'static Task, seed: u32, folder: &Path) -> Result<Played, EvaluationError> {
+fn kept_or_played(
+    plan: &Plan,
+    task: &'static Task,
+    seed: u32,
+    folder: &Path,
+) -> Result<Played, EvaluationError> {
     let name = format!("{}-{seed}.json", task.id);
     let version = env!("CARGO_PKG_VERSION");
-    let kept = std::fs::read(folder.join(&name)).ok().and_then(|bytes| serde_json::from_slice::<Played>(&bytes).ok());
+    let kept = std::fs::read(folder.join(&name))
+        .ok()
+        .and_then(|bytes| serde_json::from_slice::<Played>(&bytes).ok());
     if let Some(kept) = kept.filter(|kept| {
         (kept.policy, kept.protocol, kept.version.as_str()) == (plan.policy, plan.protocol, version)
     }) {
@@ -143,7 +157,8 @@ fn kept_or_played(plan: &Plan, task: &'static Task, seed: u32, folder: &Path) ->
     };
     let result = EpisodeResult::from(&arena.0.close()?);
     let note = outcome.err().map(|error| error.to_string());
-    let episode = Played { policy: plan.policy, protocol: plan.protocol, version: version.into(), result, note };
+    let episode =
+        Played { policy: plan.policy, protocol: plan.protocol, version: version.into(), result, note };
     write_whole(folder, &name, serde_json::to_string_pretty(&episode)?.as_bytes())?;
     Ok(episode)
 }

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use tandem_sim::{RobotCommand, World};
 use tandem_tools_spec::{Budget, PhaseReached, Protocol, ResultReply, ToolCall, ToolReply};
 
-use crate::EpisodeError;
 use crate::observe::Eyes;
 use crate::recorder::{
     ObjectStep, RecordedRobot, Recorder, RecordingHeader, RobotStep, StepRecord, ToolCallRecord,
@@ -14,6 +13,7 @@ use crate::report::{CallCounts, Report};
 use crate::results::{EpisodeResult, OutputError, write_whole};
 use crate::strip::{self, Moment};
 use crate::tasks::Task;
+use crate::{EpisodeError, Facts};
 
 /// The files of an episode under way.
 pub struct RunFiles {
@@ -64,13 +64,22 @@ impl RunFiles {
         &mut self,
         world: &World,
         commands: &[RobotCommand],
+        facts: &Facts,
         budget: Budget,
     ) -> Result<(), EpisodeError> {
         self.budget_left = Some(budget);
         let robots: Vec<RobotStep> = commands
             .iter()
             .enumerate()
-            .map(|(robot, command)| RobotStep { state: world.robot_state(robot), command: *command })
+            .map(|(robot, command)| RobotStep {
+                state: world.robot_state(robot),
+                command: *command,
+                grips: facts
+                    .objects
+                    .iter()
+                    .map(|object| (object.name.clone(), object.hands[robot]))
+                    .collect(),
+            })
             .collect();
         let objects: Vec<ObjectStep> = world
             .objects()

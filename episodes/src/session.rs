@@ -235,11 +235,12 @@ impl Session {
             self.world.control_step(&commands);
             self.scores.keeper.update(&self.world);
             self.physics += started.elapsed();
+            let facts = self.facts();
             let was_underway = self.scores.phases.underway();
-            let reached = self.scores.phases.update(&self.facts());
+            let reached = self.scores.phases.update(&facts);
             let budget = self.budget();
             if let Some(files) = &mut self.files {
-                files.step(&self.world, &commands, budget)?;
+                files.step(&self.world, &commands, &facts, budget)?;
             }
             if reached {
                 self.phase_reached()?;

@@ -22,7 +22,7 @@ WELL_KNOWN = {
     "/A/joint_states": "foxglove.JointStates",
     "/B/joint_states": "foxglove.JointStates",
 }
-OURS = {"/A/action", "/B/action", "/A/base_command", "/B/base_command", "/budget", "/phases", "/tool_calls"}
+OURS = {"/A/action", "/B/action", "/A/base_command", "/B/base_command", "/A/hands", "/B/hands", "/budget", "/phases", "/tool_calls"}
 CONTROL_STEP_NS = 20_000_000
 
 
@@ -96,7 +96,7 @@ def check(path):
     for topic, name in WELL_KNOWN.items():
         expect(schemas.get(topic) == name, f"{topic} carries {schemas.get(topic)}; expected {name}")
     steps = counts["/tf"]
-    per_step = [topic for topic in schemas if topic.split("/")[-1] in ("joint_states", "action", "base_command", "budget")]
+    per_step = [topic for topic in schemas if topic.split("/")[-1] in ("joint_states", "action", "base_command", "hands", "budget")]
     for topic in per_step:
         expect(counts[topic] == steps, f"{topic} has {counts[topic]} messages for {steps} steps")
     missing = {topic for topic in OURS - {"/phases", "/tool_calls"} if topic not in schemas}

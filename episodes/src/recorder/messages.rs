@@ -5,10 +5,11 @@ use foxglove::{Encode, Schema, bytes::BufMut};
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
-use tandem_sim::{BaseCommand, RobotCommand};
+use tandem_sim::{BaseCommand, RobotCommand, Side};
 use tandem_tools_spec::{Budget, PhaseReached, ToolReply};
 
-use super::ToolCallRecord;
+use super::{RobotStep, ToolCallRecord};
+use crate::facts::Grip;
 use crate::results::OutputError;
 
 /// A message written as JSON.
@@ -71,6 +72,39 @@ impl From<&RobotCommand> for Json<Base> {
     fn from(command: &RobotCommand) -> Self {
         let BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m } = command.base;
         Json(Base { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m })
+    }
+}
+
+/// What a robot's hands feel and hold: forces of the world on them (world frame), estimated from the arms' torques.
+#[derive(Serialize, JsonSchema)]
+pub struct Hands {
+    left_force_n: [f32; 3],
+    right_force_n: [f32; 3],
+    left_holds: Vec<String>,
+    right_holds: Vec<String>,
+    left_touches: Vec<String>,
+    right_touches: Vec<String>,
+}
+
+impl JsonMessage for Hands {
+    const SCHEMA_NAME: &str = "tandem.Hands";
+}
+
+impl From<&RobotStep> for Json<Hands> {
+    fn from(step: &RobotStep) -> Self {
+        let [left, right] = step.state.hand_force_n.map(|force_n| force_n.to_array());
+        let named = |side: Side, wanted: Grip| {
+            let grips = step.grips.iter().filter(|(_, grips)| grips[side.index()] == wanted);
+            grips.map(|(object, _)| object.clone()).collect()
+        };
+        Json(Hands {
+            left_force_n: left,
+            right_force_n: right,
+            left_holds: named(Side::Left, Grip::Holding),
+            right_holds: named(Side::Right, Grip::Holding),
+            left_touches: named(Side::Left, Grip::Touching),
+            right_touches: named(Side::Right, Grip::Touching),
+        })
     }
 }
 

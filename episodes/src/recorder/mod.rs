@@ -28,9 +28,10 @@ use tandem_sim::{
 };
 use tandem_tools_spec::{Budget, PhaseReached, Protocol, ToolCall, ToolReply};
 
+use crate::facts::Grip;
 use crate::results::{EpisodeResult, OutputError};
 use file::{McapFile, Topic};
-use messages::{Action, Base, BudgetLeft, Json, Phase, ToolCallMessage};
+use messages::{Action, Base, BudgetLeft, Hands, Json, Phase, ToolCallMessage};
 use transforms::{EGOCENTRIC, robot_frame, timestamp};
 
 /// What is known of an episode before its first step.
@@ -60,6 +61,8 @@ pub struct StepRecord<'a> {
 pub struct RobotStep {
     pub state: RobotState,
     pub command: RobotCommand,
+    /// Per object: what the left and the right hand do to it.
+    pub grips: Vec<(String, [Grip; 2])>,
 }
 
 /// One object at one control step.
@@ -92,6 +95,7 @@ struct RobotTopics {
     joint_states: Topic<JointStates>,
     action: Topic<Json<Action>>,
     base_command: Topic<Json<Base>>,
+    hands: Topic<Json<Hands>>,
     /// Opened by the first picture.
     camera: Option<CameraTopics>,
 }
@@ -162,6 +166,7 @@ impl Recorder {
             self.file.write(&mut topics.joint_states, time_s, &joints)?;
             self.file.write(&mut topics.action, time_s, &Json::from(&moved.command))?;
             self.file.write(&mut topics.base_command, time_s, &Json::from(&moved.command))?;
+            self.file.write(&mut topics.hands, time_s, &Json::<Hands>::from(moved))?;
         }
         self.file.write(&mut self.budget, time_s, &Json::from(&step.budget))
     }
@@ -225,6 +230,7 @@ impl RobotTopics {
             joint_states: file.topic(&format!("/{}/joint_states", robot.name), &[])?,
             action: file.topic(&format!("/{}/action", robot.name), &[("columns", &columns.join(","))])?,
             base_command: file.topic(&format!("/{}/base_command", robot.name), &[])?,
+            hands: file.topic(&format!("/{}/hands", robot.name), &[])?,
             camera: None,
         })
     }

@@ -46,7 +46,11 @@ fn record_step(recorder: &mut Recorder, world: &mut World, commands: &[RobotComm
     let robots: Vec<RobotStep> = commands
         .iter()
         .enumerate()
-        .map(|(robot, command)| RobotStep { state: world.robot_state(robot), command: *command })
+        .map(|(robot, command)| RobotStep {
+            state: world.robot_state(robot),
+            command: *command,
+            grips: vec![("bottle".into(), [Grip::Off, Grip::Touching])],
+        })
         .collect();
     let objects: Vec<ObjectStep> = world
         .objects()
@@ -127,9 +131,11 @@ fn a_recording_reads_back() {
         ("/A/base_command", "tandem.BaseCommand", STEPS),
         ("/A/egocentric", "foxglove.CompressedImage", 1),
         ("/A/egocentric/calibration", "foxglove.CameraCalibration", 1),
+        ("/A/hands", "tandem.Hands", STEPS),
         ("/A/joint_states", "foxglove.JointStates", STEPS),
         ("/B/action", "tandem.Action", STEPS),
         ("/B/base_command", "tandem.BaseCommand", STEPS),
+        ("/B/hands", "tandem.Hands", STEPS),
         ("/B/joint_states", "foxglove.JointStates", STEPS),
         ("/budget", "tandem.Budget", STEPS),
         ("/phases", "tandem.Phase", 1),
@@ -197,7 +203,7 @@ fn json_schemas_are_flat() {
     let (_, path) = record(folder.path());
     let summary = mcap::Summary::read(&fs::read(path).unwrap()).unwrap().expect("a summary");
     let schemas: Vec<_> = summary.schemas.values().filter(|schema| schema.encoding == "jsonschema").collect();
-    assert_eq!(schemas.len(), 5);
+    assert_eq!(schemas.len(), 6);
     for schema in schemas {
         let document: serde_json::Value = serde_json::from_slice(&schema.data).unwrap();
         for (field, value) in document["properties"].as_object().unwrap() {
@@ -220,7 +226,7 @@ fn an_interrupted_recording_never_gets_the_final_name() {
 
     let partial = fs::read(folder.path().join("episode.mcap.partial")).unwrap();
     let summary = mcap::Summary::read(&partial).unwrap().expect("the index is written nevertheless");
-    assert_eq!(summary.stats.unwrap().message_count, 9, "shapes, transforms, budget and three per robot");
+    assert_eq!(summary.stats.unwrap().message_count, 11, "shapes, transforms, budget and four per robot");
 }
 
 #[test]
