@@ -42,7 +42,7 @@ impl Sink for Recorder {
 fn rows(task: &Task, configuration: &Configuration) -> Vec<(Vec<f64>, f64)> {
     let nv = configuration.model().nv();
     let mut recorder = Recorder { nv, rows: Vec::new() };
-    let context = StepContext { dt_s: 0.02, last_velocity: &vec![0.0; nv] };
+    let context = StepContext { dt_s: 0.02, last_velocity: &vec![0.0; nv], error_clamp: None };
     task.write(configuration, &context, &mut TaskScratch::new(nv), &mut recorder);
     recorder.rows
 }

@@ -55,6 +55,7 @@ mod solve;
 mod solver;
 pub mod spatial;
 mod task;
+mod track;
 
 pub use barrier::{Capsule, ClosestPair, PositionBarrier, SelfCollision};
 pub use configuration::Configuration;

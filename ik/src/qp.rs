@@ -132,6 +132,13 @@ impl Qp {
         &self.rows[..self.used_rows]
     }
 
+    /// Whether x = 0 keeps all bounds and equalities to `tolerance`.
+    pub fn accepts_standstill(&self, tolerance: f64) -> bool {
+        let within = |(lower, upper): (&f64, &f64)| *lower <= tolerance && *upper >= -tolerance;
+        let keeps = |row: &Row| !row.equality || row.bound.abs() <= tolerance;
+        self.lower.iter().zip(&self.upper).all(within) && self.rows().iter().all(keeps)
+    }
+
     /// Lowers the bound of every inequality that the start x = 0 violates to `cap` of the largest  a' x  within the
     /// bounds on x; says whether there was any.
     pub fn cap_inequalities(&mut self, cap: impl Fn(f64) -> f64) -> bool {

@@ -20,7 +20,9 @@ pub struct Solver {
     pub position_barriers: Vec<PositionBarrier>,
     /// When a frame counts as reached.
     pub tolerance: Tolerance,
-    qp: Qp,
+    /// What [`Solver::track`] remembers of failed steps, at least 1; goes with the joints where these are saved.
+    pub caution: f64,
+    pub(crate) qp: Qp,
     row_owners: Vec<RowOwner>,
     scratch: TaskScratch,
     segments: Vec<Segment>,
@@ -30,8 +32,8 @@ pub struct Solver {
 
 /// Added to the Hessian's diagonal: joints that no task moves stay where they are.
 const REGULARIZATION: f64 = 1e-12;
-/// A step slower than this, in rad/s or m/s, away from its goal has stalled.
-const STALLED_SPEED: f64 = 1e-3;
+/// A step slower than this, in rad/s or m/s, away from its goal has stalled: it would not get anywhere in seconds.
+const STALLED_SPEED: f64 = 0.02;
 /// Part of the speed that the joints could give to a violated barrier that it may ask for.
 const RECOVERY: f64 = 0.5;
 
@@ -46,6 +48,7 @@ impl Solver {
             position_barriers: Vec::new(),
             tolerance: Tolerance::default(),
             qp: Qp::new(nv),
+            caution: 1.0,
             row_owners: Vec::new(),
             scratch: TaskScratch::new(nv),
             segments: Vec::new(),
@@ -55,28 +58,43 @@ impl Solver {
     }
 
     /// Moves `configuration` by one step of [`Solver::dt_s`] towards `tasks`; `constraints` are tasks that hold exactly.
-    /// A target out of reach is approached at full speed; [`Solver::solve`] is the one that comes to rest there.
+    /// These are Pink's iterates: a target out of reach keeps the joints moving; see [`Solver::track`].
     pub fn step(
         &mut self,
         configuration: &mut Configuration,
         tasks: &[Task],
         constraints: &[Task],
     ) -> Outcome {
-        if let Err(failure) = self.displacement(configuration, tasks, constraints) {
-            self.last_velocity.fill(0.0);
+        if let Err(failure) = self.displacement(configuration, tasks, constraints, None, 0.0) {
+            self.rest();
             return self.infeasible(configuration.model(), constraints, failure);
         }
         configuration.advance(&self.qp.x, 1.0);
+        self.remember(1.0);
+        self.outcome(configuration, tasks)
+    }
+
+    /// Takes `scale` times the displacement found for the last velocity.
+    pub(crate) fn remember(&mut self, scale: f64) {
         for (velocity, dq) in self.last_velocity.iter_mut().zip(&self.qp.x) {
-            *velocity = dq / self.dt_s;
+            *velocity = scale * dq / self.dt_s;
         }
+    }
+
+    /// What a step that led to `configuration` amounts to.
+    pub(crate) fn outcome(&self, configuration: &Configuration, tasks: &[Task]) -> Outcome {
         if self.is_reached(configuration, tasks) {
             Outcome::Reached
-        } else if self.last_velocity.iter().all(|velocity| velocity.abs() < STALLED_SPEED) {
+        } else if self.fastest() < STALLED_SPEED {
             Outcome::Stalled { saturated: saturated(configuration) }
         } else {
             Outcome::Moving
         }
+    }
+
+    /// Largest joint speed of the last step, rad/s or m/s.
+    pub fn fastest(&self) -> f64 {
+        self.last_velocity.iter().fold(0.0, |fastest, velocity| fastest.max(velocity.abs()))
     }
 
     /// Joint speeds of the last step, rad/s or m/s.
@@ -105,21 +123,24 @@ impl Solver {
         self.self_collision.as_ref().and_then(|barrier| barrier.closest(configuration))
     }
 
-    /// Forgets the last velocity: the next step starts at rest.
+    /// Forgets the last steps: the next one starts at rest and without caution.
     pub fn rest(&mut self) {
         self.last_velocity.fill(0.0);
+        self.caution = 1.0;
     }
 
     /// Whether there are targets, all of them are within tolerance, and no barrier is crossed.
     pub fn is_reached(&self, configuration: &Configuration, tasks: &[Task]) -> bool {
         let mut errors = frame_errors(configuration, tasks).peekable();
         let there = errors.peek().is_some() && errors.all(|error| self.tolerance.accepts(&error));
-        there
-            && self.closest_pair(configuration).is_none_or(|pair| pair.distance_m >= 0.0)
-            && self
-                .position_barriers
-                .iter()
-                .all(|barrier| barrier.height_m(configuration) >= -self.tolerance.position_m)
+        there && !self.crosses_barrier(configuration)
+    }
+
+    /// Whether shapes overlap or a frame is beyond its plane.
+    pub(crate) fn crosses_barrier(&self, configuration: &Configuration) -> bool {
+        let beyond = |barrier: &PositionBarrier| barrier.height_m(configuration) < -self.tolerance.position_m;
+        self.closest_pair(configuration).is_some_and(|pair| pair.distance_m < 0.0)
+            || self.position_barriers.iter().any(beyond)
     }
 
     /// Sets up and solves the quadratic program; the displacement is in `self.qp.x`.
@@ -131,9 +152,11 @@ impl Solver {
         configuration: &Configuration,
         tasks: &[Task],
         constraints: &[Task],
+        error_clamp: Option<FrameError>,
+        damping: f64,
     ) -> Result<(), QpFailure> {
         self.write_bounds(configuration);
-        self.write_cost(configuration, tasks);
+        self.write_cost(configuration, tasks, error_clamp, REGULARIZATION + damping);
         self.write_rows(configuration, constraints);
         match self.qp.solve() {
             Err(QpFailure::Infeasible(_)) if self.qp.cap_inequalities(|_| 0.0) => self.qp.solve(),
@@ -149,12 +172,18 @@ impl Solver {
         }
     }
 
-    fn write_cost(&mut self, configuration: &Configuration, tasks: &[Task]) {
+    fn write_cost(
+        &mut self,
+        configuration: &Configuration,
+        tasks: &[Task],
+        error_clamp: Option<FrameError>,
+        damping: f64,
+    ) {
         self.qp.hessian.fill(0.0);
         self.qp.linear.fill(0.0);
-        let context = StepContext { dt_s: self.dt_s, last_velocity: &self.last_velocity };
+        let context = StepContext { dt_s: self.dt_s, last_velocity: &self.last_velocity, error_clamp };
         let mut cost = Cost { qp: &mut self.qp };
-        cost.damp(REGULARIZATION);
+        cost.damp(damping);
         for task in tasks {
             task.write(configuration, &context, &mut self.scratch, &mut cost);
         }
@@ -163,7 +192,7 @@ impl Solver {
     fn write_rows(&mut self, configuration: &Configuration, constraints: &[Task]) {
         self.qp.clear_rows();
         self.row_owners.clear();
-        let context = StepContext { dt_s: self.dt_s, last_velocity: &self.last_velocity };
+        let context = StepContext { dt_s: self.dt_s, last_velocity: &self.last_velocity, error_clamp: None };
         let mut rows = Rows { qp: &mut self.qp, owners: &mut self.row_owners };
         for (task, constraint) in constraints.iter().enumerate() {
             let mut equalities = Equalities { rows: &mut rows, task };
@@ -176,10 +205,6 @@ impl Solver {
             barrier.write(configuration, rows.push(RowOwner::Position(index)));
         }
         self.qp.cap_inequalities(|attainable| RECOVERY * attainable);
-    }
-
-    pub(crate) fn last_displacement(&self) -> &[f64] {
-        &self.qp.x
     }
 
     pub(crate) fn infeasible(&self, model: &Model, constraints: &[Task], failure: QpFailure) -> Outcome {

@@ -6,7 +6,7 @@
 //! J: k x nv; e: k; W: diagonal. lambda is Levenberg-Marquardt damping, which fades as the error does.
 //! Source: Sugihara, Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method, 2011.
 
-use nalgebra::{Isometry3, Vector3, Vector6};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3, Vector6};
 
 use crate::program::Sink;
 use crate::spatial::Log6;
@@ -59,8 +59,7 @@ impl FrameTask {
 
     /// What is missing; a component without cost is not asked for and counts as 0.
     pub fn error(&self, configuration: &Configuration) -> FrameError {
-        let missing = configuration.root_from_frame(self.frame).inverse() * self.target;
-        FrameError::of(&missing, [self.position_cost, self.orientation_cost])
+        FrameError::of(&self.missing(configuration), [self.position_cost, self.orientation_cost])
     }
 }
 
@@ -166,7 +165,12 @@ pub struct JointCouplingTask {
 pub(crate) struct StepContext<'a> {
     pub dt_s: f64,
     pub last_velocity: &'a [f64],
+    /// Errors of frames are cut to this.
+    pub error_clamp: Option<FrameError>,
 }
+
+/// What one step of a whole solution takes on: far targets do not upset near joints.
+pub(crate) const ERROR_CLAMP: FrameError = FrameError { position_m: 0.3, orientation_rad: 0.9 };
 
 /// Buffers of one evaluation, so that nothing allocates.
 #[derive(Default)]
@@ -201,6 +205,31 @@ impl Task {
         }
     }
 
+    /// alpha/2 |W e|^2; 0 for tasks on velocities, which a line search leaves alone.
+    pub(crate) fn objective(&self, configuration: &Configuration) -> f64 {
+        match self {
+            Task::Frame(task) => {
+                let weights = [task.position_cost, task.orientation_cost];
+                0.5 * task.gain * weighted_square(&Log6::of(&task.missing(configuration)).twist, weights)
+            }
+            Task::RelativeFrame(task) => {
+                let weights = [task.position_cost, task.orientation_cost];
+                0.5 * task.gain * weighted_square(&Log6::of(&task.missing(configuration)).twist, weights)
+            }
+            Task::CenterOfMass(task) => {
+                let missing = task.target - configuration.center_of_mass();
+                0.5 * task.gain * missing.component_mul(&task.cost).norm_squared()
+            }
+            Task::Posture(task) => {
+                let missing =
+                    task.target.iter().zip(configuration.q()).map(|(target, q)| (target - q).powi(2));
+                0.5 * task.gain * task.cost * task.cost * missing.sum::<f64>()
+            }
+            Task::JointCoupling(task) => 0.5 * task.gain * (task.cost * task.missing(configuration)).powi(2),
+            Task::Damping(_) | Task::JointVelocity(_) | Task::LowAcceleration(_) => 0.0,
+        }
+    }
+
     /// For messages: what the task is about.
     pub(crate) fn describe(&self, model: &Model) -> String {
         match self {
@@ -229,8 +258,8 @@ impl Task {
         sink: &mut impl Sink,
     ) {
         match self {
-            Task::Frame(task) => task.write(configuration, scratch, sink),
-            Task::RelativeFrame(task) => task.write(configuration, scratch, sink),
+            Task::Frame(task) => task.write(configuration, context, scratch, sink),
+            Task::RelativeFrame(task) => task.write(configuration, context, scratch, sink),
             Task::CenterOfMass(task) => task.write(configuration, scratch, sink),
             Task::Posture(task) => {
                 let q = configuration.q();
@@ -244,20 +273,28 @@ impl Task {
                 sink.diagonal(task.cost / context.dt_s, |joint| context.last_velocity[joint] * context.dt_s);
             }
             Task::JointCoupling(task) => {
-                let now: f64 =
-                    task.ratios.iter().map(|(joint, ratio)| ratio * configuration.q()[*joint]).sum();
                 scratch.entries.clear();
                 scratch.entries.extend(task.ratios.iter().map(|(joint, ratio)| (*joint, task.cost * ratio)));
-                sink.row(&scratch.entries, task.cost * task.gain * (task.offset - now));
+                sink.row(&scratch.entries, task.cost * task.gain * task.missing(configuration));
             }
         }
     }
 }
 
 impl FrameTask {
-    fn write(&self, configuration: &Configuration, scratch: &mut TaskScratch, sink: &mut impl Sink) {
+    fn missing(&self, configuration: &Configuration) -> Isometry3<f64> {
+        configuration.root_from_frame(self.frame).inverse() * self.target
+    }
+
+    fn write(
+        &self,
+        configuration: &Configuration,
+        context: &StepContext,
+        scratch: &mut TaskScratch,
+        sink: &mut impl Sink,
+    ) {
         let root_from_frame = configuration.root_from_frame(self.frame);
-        let missing = Log6::of(&(root_from_frame.inverse() * self.target));
+        let missing = Log6::of(&clamped(&self.missing(configuration), context.error_clamp));
         scratch.columns.clear();
         for &joint in configuration.model().support(self.frame) {
             let (linear, angular) = configuration.body_jacobian_column(&root_from_frame, joint);
@@ -265,24 +302,29 @@ impl FrameTask {
         }
         let weights = [self.position_cost, self.orientation_cost];
         write_pose_rows(scratch, &missing.twist, weights, self.gain, sink);
-        let weighted = (self.gain * self.position_cost * missing.twist.fixed_rows::<3>(0)).norm_squared()
-            + (self.gain * self.orientation_cost * missing.twist.fixed_rows::<3>(3)).norm_squared();
-        sink.damp(self.lm_damping * weighted);
+        sink.damp(self.lm_damping * self.gain * self.gain * weighted_square(&missing.twist, weights));
     }
 }
 
 impl RelativeFrameTask {
-    fn error(&self, configuration: &Configuration) -> FrameError {
+    fn missing(&self, configuration: &Configuration) -> Isometry3<f64> {
         let frame_from_root = configuration.root_from_frame(self.frame).inverse();
-        let missing = frame_from_root * configuration.root_from_frame(self.reference) * self.target;
-        FrameError::of(&missing, [self.position_cost, self.orientation_cost])
+        frame_from_root * configuration.root_from_frame(self.reference) * self.target
     }
 
-    fn write(&self, configuration: &Configuration, scratch: &mut TaskScratch, sink: &mut impl Sink) {
+    fn error(&self, configuration: &Configuration) -> FrameError {
+        FrameError::of(&self.missing(configuration), [self.position_cost, self.orientation_cost])
+    }
+
+    fn write(
+        &self,
+        configuration: &Configuration,
+        context: &StepContext,
+        scratch: &mut TaskScratch,
+        sink: &mut impl Sink,
+    ) {
         let root_from_frame = configuration.root_from_frame(self.frame);
-        let root_from_reference = configuration.root_from_frame(self.reference);
-        let goal = root_from_reference * self.target;
-        let missing = Log6::of(&(root_from_frame.inverse() * goal));
+        let missing = Log6::of(&clamped(&self.missing(configuration), context.error_clamp));
         scratch.columns.clear();
         for &joint in configuration.model().support(self.frame) {
             let (linear, angular) = configuration.body_jacobian_column(&root_from_frame, joint);
@@ -309,6 +351,12 @@ impl RelativeFrameTask {
     }
 }
 
+impl JointCouplingTask {
+    fn missing(&self, configuration: &Configuration) -> f64 {
+        self.offset - self.ratios.iter().map(|(joint, ratio)| ratio * configuration.q()[*joint]).sum::<f64>()
+    }
+}
+
 impl CenterOfMassTask {
     fn error(&self, configuration: &Configuration) -> FrameError {
         let asked = self.cost.map(|cost| if cost > 0.0 { 1.0 } else { 0.0 });
@@ -328,6 +376,22 @@ impl CenterOfMassTask {
             sink.row(&scratch.entries, cost * self.gain * missing[axis]);
         }
     }
+}
+
+/// |W e|^2 of a pose's error.
+fn weighted_square(error: &Vector6<f64>, [position, orientation]: [f64; 2]) -> f64 {
+    (position * error.fixed_rows::<3>(0)).norm_squared()
+        + (orientation * error.fixed_rows::<3>(3)).norm_squared()
+}
+
+/// A pose that is missing, cut to the clamp's distance and angle: the way starts in the same direction.
+fn clamped(missing: &Isometry3<f64>, clamp: Option<FrameError>) -> Isometry3<f64> {
+    let Some(clamp) = clamp else { return *missing };
+    let (way, turn) = (missing.translation.vector, missing.rotation.scaled_axis());
+    let part = |limit: f64, size: f64| (limit / size.max(f64::MIN_POSITIVE)).min(1.0);
+    let translation = way * part(clamp.position_m, way.norm());
+    let rotation = UnitQuaternion::from_scaled_axis(turn * part(clamp.orientation_rad, turn.norm()));
+    Isometry3::from_parts(translation.into(), rotation)
 }
 
 fn write_pose_rows(
