@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
 use tandem_ik::spatial::{Log6, log3};
 
 /// Turns of every size, the smallest below the series' limit and the largest next to pi.
-const ANGLES_RAD: [f64; 9] = [0.0, 1e-12, 1e-7, 0.9e-3, 1.1e-3, 0.1, 1.0, 3.0, 3.14];
+const ANGLES_RAD: [f64; 9] = [0.0, 1e-12, 1e-7, 0.9e-3, 1.1e-3, 0.1, 1.0, 3.0, 3.13];
 
 fn poses() -> Vec<Isometry3<f64>> {
     let axes = [Vector3::x(), Vector3::new(1.0, -2.0, 0.5), Vector3::new(-0.3, 0.1, 0.9)];
