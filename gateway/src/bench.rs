@@ -9,7 +9,10 @@ pub fn ik(targets: Option<&Path>, json: bool) -> Result<(), Box<dyn Error>> {
         println!("{}", serde_json::to_string_pretty(&report)?);
         return Ok(());
     }
-    println!("{:24} {:>8} {:>11} {:>9} {:>10}", "configuration", "reached", "iterations", "us/step", "ms/solve");
+    println!(
+        "{:24} {:>8} {:>11} {:>9} {:>10}",
+        "configuration", "reached", "iterations", "us/step", "ms/solve"
+    );
     for way in &report.configurations {
         println!(
             "{:24} {:>8.3} {:>11.0} {:>9.1} {:>10.3}",

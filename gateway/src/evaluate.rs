@@ -35,7 +35,10 @@ pub fn run(plan: &Plan, folder: &Path) -> Result<(), Box<dyn Error>> {
 }
 
 fn print_table(evaluation: &Evaluation) {
-    println!("{:14} {:>8}  {:^22} {:^22} {:^22} {:>5} {:>6}", "task", "episodes", "p1", "p2", "p3", "falls", "steps");
+    println!(
+        "{:14} {:>8}  {:^22} {:^22} {:^22} {:>5} {:>6}",
+        "task", "episodes", "p1", "p2", "p3", "falls", "steps"
+    );
     for (id, task) in &evaluation.tasks {
         let [p1, p2, p3] = [task.p1, task.p2, task.p3].map(|count| rate(count, task));
         println!(
