@@ -10,6 +10,10 @@
 //! Everything is f64 and SI: metres, radians, seconds. Poses are `nalgebra::Isometry3<f64>` in the frame of the model's
 //! root, which stands still. Twists are ordered [linear; angular].
 //!
+//! [`Solver::step`] takes one such step and yields Pink's iterates. [`Solver::track`] takes one that never makes things
+//! worse, for targets that stream in and may be out of reach. [`Solver::solve`] goes all the way, with restarts for
+//! planning. All three say how it ended as an [`Outcome`].
+//!
 //! ```
 //! use tandem_ik::{Configuration, FrameTask, Model, PostureTask, Solver, Task};
 //!
