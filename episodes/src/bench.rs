@@ -1,10 +1,12 @@
-//! `tandem bench ik`: inverse kinematics measured on the robot that the episodes use.
+//! Parts of Tandem measured on their own, on the robot that the episodes use.
 
 use std::path::{Path, PathBuf};
 
 use tandem_ik::bench::{Report, TargetSet, run};
 use tandem_ik::{IkError, Model};
 use tandem_sim::assets;
+pub use tandem_sim::locomotion::bench::{CaseReport, Report as LocomotionReport};
+use tandem_sim::locomotion::{self, Balance};
 
 use crate::motion;
 
@@ -22,6 +24,16 @@ pub enum BenchError {
     Ik(#[from] IkError),
     #[error(transparent)]
     Sim(#[from] tandem_sim::SimError),
+}
+
+/// Plays the bench's cases whose names contain one of the words of `filter`, separated by commas, on seeds 0 to
+/// `seeds` - 1, and calls `done` after each case.
+pub fn locomotion(
+    filter: &str,
+    seeds: usize,
+    done: impl FnMut(&CaseReport),
+) -> Result<LocomotionReport, BenchError> {
+    Ok(locomotion::bench::run(&|| Box::new(Balance::default()), filter, seeds, done)?)
 }
 
 /// Solves the targets of a file, or 200 that are drawn from the robot's own joint ranges.

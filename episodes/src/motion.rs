@@ -134,6 +134,8 @@ pub struct MotionState {
     base: BaseCommand,
     /// Where the wrists are to be, pelvis frame: left, right.
     targets: [Isometry3<f64>; 2],
+    /// What the solver remembers of steps that did not help; see [`Solver::caution`].
+    caution: f64,
     /// Joints follow `targets`; otherwise the last joint chunk's row holds.
     follows_wrists: bool,
 }
@@ -155,6 +157,7 @@ impl Motion {
             upper_rad: rest.upper_rad.map(f64::from),
             base: rest.base,
             targets: [Isometry3::identity(); 2],
+            caution: 1.0,
             follows_wrists: true,
         };
         let mut motion = Motion { solver: body.solver(), body: body.clone(), state };
@@ -219,12 +222,14 @@ impl Motion {
         let tasks = body.tasks(targets, GAIN);
         let q: Vec<f64> = body.columns.iter().map(|column| self.state.upper_rad[*column]).collect();
         let mut configuration = Configuration::new(&body.model, &q).expect("one finite target per joint");
-        if let Outcome::Infeasible { .. } = self.solver.step(&mut configuration, &tasks, &[]) {
+        self.solver.caution = self.state.caution;
+        if let Outcome::Infeasible { .. } = self.solver.track(&mut configuration, &tasks, &[]) {
             // Shapes that already overlap can contradict each other; the joints must still get out.
             let barrier = self.solver.self_collision.take();
-            self.solver.step(&mut configuration, &tasks, &[]);
+            self.solver.track(&mut configuration, &tasks, &[]);
             self.solver.self_collision = barrier;
         }
+        self.state.caution = self.solver.caution;
         for (column, q) in body.columns.iter().zip(configuration.q()) {
             self.state.upper_rad[*column] = *q;
         }

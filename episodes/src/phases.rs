@@ -70,7 +70,7 @@ impl PhaseTracker {
 
 #[cfg(test)]
 mod tests {
-    use tandem_sim::Side::Right;
+    use tandem_sim::{Side::Right, Vector};
 
     use super::*;
     use crate::{
@@ -135,6 +135,33 @@ mod tests {
             (&[by_a, Rests, by_both, by_b, by_nobody, OnTarget, Rests], &[1, 1, 1, 2, 2, 3, 3]),
         ] {
             assert_eq!(play(scenes), reached, "{scenes:?}");
+        }
+    }
+
+    /// Objects where they belong in the end, put there by nobody.
+    #[test]
+    fn the_right_final_pose_alone_is_never_a_success() {
+        let moved = |task: &str, moves: &[(&str, &str, Vector)]| {
+            let mut facts = Facts::at_rest(tasks::find(task).unwrap());
+            for (object, to, offset_m) in moves {
+                let goal_m = facts.point_m(to, *offset_m);
+                facts.object_mut(object).pose_in_world.translation = goal_m;
+            }
+            facts
+        };
+        let apples = ["apple_1", "apple_2", "apple_3", "apple_4", "apple_5", "apple_6"];
+        let in_crate = apples.map(|apple| (apple, "crate", Vector::new(0.0, 0.0, 0.05)));
+        for (task, facts) in [
+            ("handover", moved("handover", &[("bottle", "target_pad", Vector::ZERO)])),
+            ("pouring", moved("pouring", &[("marble", "glass", Vector::new(0.0, 0.0, 0.02))])),
+            ("frame_hang", moved("frame_hang", &[("frame", "wall_peg", Vector::new(0.0, -0.05, -0.98))])),
+            ("co_pouring", moved("co_pouring", &in_crate)),
+        ] {
+            let mut tracker = PhaseTracker::new(tasks::find(task).unwrap());
+            for step in 0..200 {
+                tracker.update(&Facts { time_s: f64::from(step) * 0.02, ..facts.clone() });
+            }
+            assert_eq!(tracker.reached().count(), 0, "{task}");
         }
     }
 

@@ -2,6 +2,18 @@
 
 use std::{error::Error, path::Path};
 
+use tandem_episodes::bench::CaseReport;
+
+/// Plays the locomotion bench, prints a line per case as it ends, and writes JSON if `json` names a file.
+pub fn locomotion(cases: &str, seeds: usize, json: Option<&Path>) -> Result<(), Box<dyn Error>> {
+    println!("{}", CaseReport::HEAD);
+    let report = tandem_episodes::bench::locomotion(cases, seeds, |case| println!("{case}"))?;
+    if let Some(path) = json {
+        std::fs::write(path, serde_json::to_string_pretty(&report)?)?;
+    }
+    Ok(())
+}
+
 /// Measures inverse kinematics and prints a table, or JSON.
 pub fn ik(targets: Option<&Path>, json: bool) -> Result<(), Box<dyn Error>> {
     let report = tandem_episodes::bench::ik(targets)?;

@@ -60,6 +60,12 @@ pub enum Command {
         #[arg(long, value_name = "DIR", default_value = "runs/demonstrations")]
         out: PathBuf,
     },
+    /// The base controller.
+    Locomotion {
+        /// What to do with it.
+        #[command(subcommand)]
+        part: LocomotionPart,
+    },
     /// List the tasks and their phases.
     Tasks,
     /// Measure a part of Tandem on this machine.
@@ -131,6 +137,23 @@ impl EpisodeChoice {
             record,
         }
     }
+}
+
+/// What can be done with a base controller.
+#[derive(Debug, Subcommand)]
+pub enum LocomotionPart {
+    /// Stand, walk, squat, carry, be pulled and pushed; report survival, errors and power per case.
+    Bench {
+        /// Cases whose names contain one of these words, separated by commas.
+        #[arg(long, default_value = "", value_name = "WORDS")]
+        cases: String,
+        /// Seeds per case.
+        #[arg(long, default_value_t = 10, value_name = "N")]
+        seeds: usize,
+        /// JSON file to write.
+        #[arg(long, value_name = "OUT")]
+        json: Option<PathBuf>,
+    },
 }
 
 /// What can be measured on its own.

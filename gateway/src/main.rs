@@ -5,7 +5,7 @@ use std::{io::IsTerminal, process::ExitCode};
 use clap::Parser;
 use tandem::{
     bench,
-    cli::{BenchPart, Cli, Command, PolicyChoice, print_tasks},
+    cli::{BenchPart, Cli, Command, LocomotionPart, PolicyChoice, print_tasks},
     demo, evaluate,
     server::Server,
     settings::Settings,
@@ -45,6 +45,10 @@ fn run(cli: Cli) -> Result<ExitCode, Box<dyn std::error::Error>> {
         }
         Command::Collect { episodes, out } => {
             evaluate::run(&episodes.plan(PolicyChoice::Expert, true), &out)?;
+            Ok(ExitCode::SUCCESS)
+        }
+        Command::Locomotion { part: LocomotionPart::Bench { cases, seeds, json } } => {
+            bench::locomotion(&cases, seeds, json.as_deref())?;
             Ok(ExitCode::SUCCESS)
         }
         Command::Tasks => {

@@ -112,6 +112,7 @@ fn hangs(f: &Facts) -> bool {
 #[cfg(test)]
 mod tests {
     use tandem_sim::Side::{Left, Right};
+    use tandem_sim::{Pose, Rotation};
 
     use super::*;
     use crate::facts::{Grip::Holding, ObjectFacts};
@@ -160,7 +161,17 @@ mod tests {
         let moving = |m_s| changed(&|frame| frame.velocity_m_s = Vector::X * m_s);
         let turning = |rad_s| changed(&|frame| frame.angular_velocity_rad_s = Vector::Y * rad_s);
         let untouched = |for_s| changed(&|frame| frame.untouched_s = for_s);
+        // Turned in the plane of the picture, about the loop.
+        let tilted = |degrees: f32| {
+            let mut facts = on_peg(Vector::ZERO);
+            let loop_m = facts.point_m("frame", LOOP_CENTRE_M);
+            let rotation = Rotation::from_rotation_y(degrees.to_radians());
+            facts.object_mut("frame").pose_in_world =
+                Pose::from_parts(loop_m - rotation * LOOP_CENTRE_M, rotation);
+            facts
+        };
         for (what, inside, outside) in [
+            ("tilt", tilted(34.9), tilted(35.1)),
             ("speed", moving(0.199), moving(0.201)),
             ("turning", turning(0.799), turning(0.801)),
             ("release", untouched(0.2), untouched(0.18)),
