@@ -26,8 +26,9 @@ pub fn wire_pose(pose: &Isometry3<f64>) -> wire::Pose {
     }
 }
 
+/// Zero has no sign here: `-0.0` would look like a finding.
 pub fn rounded(value: f64) -> f64 {
-    (value * 1e6).round() / 1e6
+    (value * 1e6).round() / 1e6 + 0.0
 }
 
 pub fn wire_pose_from_sim(pose: &Pose) -> wire::Pose {
@@ -40,15 +41,15 @@ pub fn wire_vector(v: Vector) -> [f64; 3] {
 
 pub fn wire_base(base: &BaseCommand) -> wire::BaseCommand {
     wire::BaseCommand {
-        vx_m_s: base.vx_m_s.into(),
-        vy_m_s: base.vy_m_s.into(),
-        yaw_rate_rad_s: base.yaw_rate_rad_s.into(),
-        pelvis_height_m: base.pelvis_height_m.into(),
+        vx_m_s: rounded(base.vx_m_s.into()),
+        vy_m_s: rounded(base.vy_m_s.into()),
+        yaw_rate_rad_s: rounded(base.yaw_rate_rad_s.into()),
+        pelvis_height_m: rounded(base.pelvis_height_m.into()),
     }
 }
 
 pub fn wire_range([min, max]: [f32; 2]) -> wire::Range {
-    wire::Range { min: min.into(), max: max.into() }
+    wire::Range { min: rounded(min.into()), max: rounded(max.into()) }
 }
 
 /// A base command within the limits, and the fields that had to be moved there.

@@ -6,7 +6,7 @@ use tandem_tools_spec::{
     Instruction, JointInfo, PhaseInfo, Protocol, ProtocolInfo, RobotInfo, TaskInfo, TaskList,
 };
 
-use crate::convert::wire_range;
+use crate::convert::{rounded, wire_range};
 use crate::protocol::rules;
 use crate::tasks::{self, Task};
 
@@ -75,8 +75,8 @@ fn robot_info(name: &str, model: &RobotModel, limits: &BaseLimits) -> RobotInfo 
             .iter()
             .map(|joint| JointInfo {
                 name: joint.name.clone(),
-                lower_rad: joint.lower_rad.into(),
-                upper_rad: joint.upper_rad.into(),
+                lower_rad: rounded(joint.lower_rad.into()),
+                upper_rad: rounded(joint.upper_rad.into()),
             })
             .collect(),
         vx_m_s: wire_range(limits.vx_m_s),

@@ -1,6 +1,7 @@
 //! Episodes over seeds: plays them in parallel worlds, keeps each result, and counts.
 
 use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hasher};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, mpsc};
@@ -42,8 +43,8 @@ pub struct Plan {
 pub struct Played {
     pub policy: Policy,
     pub protocol: Protocol,
-    /// Results of other versions are played again.
-    pub version: String,
+    /// Version and fingerprint of the program; what another build played is played again.
+    pub build: String,
     #[serde(flatten)]
     pub result: EpisodeResult,
     /// Why the policy gave up, if it did.
@@ -81,6 +82,8 @@ pub enum EvaluationError {
     Io { path: PathBuf, source: std::io::Error },
     #[error("an episode cannot be written as JSON: {0}")]
     Json(#[from] serde_json::Error),
+    #[error("cannot read this program's own file, which tells its results from those of other builds: {0}")]
+    Build(#[source] std::io::Error),
 }
 
 const RESULTS: &str = "results.json";
@@ -94,6 +97,7 @@ pub fn evaluate(
 ) -> Result<Evaluation, EvaluationError> {
     let kept = folder.join(EPISODES);
     std::fs::create_dir_all(&kept).map_err(|source| EvaluationError::Io { path: kept.clone(), source })?;
+    let keeper = Keeper { plan, folder: &kept, build: build()? };
     let work: Vec<(&'static Task, u32)> =
         plan.tasks.iter().flat_map(|task| plan.seeds.iter().map(|seed| (*task, *seed))).collect();
     let next = AtomicUsize::new(0);
@@ -102,10 +106,10 @@ pub fn evaluate(
     std::thread::scope(|scope| {
         for _ in 0..plan.jobs.max(1) {
             let done = done.clone();
-            let (work, next, failure, kept) = (&work, &next, &failure, &kept);
+            let (work, next, failure, keeper) = (&work, &next, &failure, &keeper);
             scope.spawn(move || {
                 while let Some((task, seed)) = work.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    match kept_or_played(plan, task, *seed, kept) {
+                    match keeper.kept_or_played(task, *seed) {
                         Ok(episode) => drop(done.send(episode)),
                         Err(error) => {
                             // Nobody else begins another episode.
@@ -132,35 +136,69 @@ pub fn evaluate(
     })
 }
 
-fn kept_or_played(
-    plan: &Plan,
-    task: &'static Task,
-    seed: u32,
-    folder: &Path,
-) -> Result<Played, EvaluationError> {
-    let name = format!("{}-{seed}.json", task.id);
-    let version = env!("CARGO_PKG_VERSION");
-    let kept = std::fs::read(folder.join(&name))
-        .ok()
-        .and_then(|bytes| serde_json::from_slice::<Played>(&bytes).ok());
-    if let Some(kept) = kept.filter(|kept| {
-        (kept.policy, kept.protocol, kept.version.as_str()) == (plan.policy, plan.protocol, version)
-    }) {
-        return Ok(kept);
+/// Which program this is: two builds of one version may differ in physics, and their results must not mix in one table.
+fn build() -> Result<String, EvaluationError> {
+    let path = std::env::current_exe().map_err(EvaluationError::Build)?;
+    let mut hasher = DefaultHasher::new();
+    hasher.write(&std::fs::read(path).map_err(EvaluationError::Build)?);
+    Ok(format!("{}+{:016x}", env!("CARGO_PKG_VERSION"), hasher.finish()))
+}
+
+/// The folder of single episodes, and what has to agree for one of them to be taken instead of played.
+struct Keeper<'a> {
+    plan: &'a Plan,
+    folder: &'a Path,
+    build: String,
+}
+
+impl Keeper<'_> {
+    fn kept_or_played(&self, task: &'static Task, seed: u32) -> Result<Played, EvaluationError> {
+        match self.kept(task, seed) {
+            Some(kept) => Ok(kept),
+            None => self.play(task, seed),
+        }
     }
-    let recording = plan.record.then(|| folder.join(format!("{}-{seed}", task.id)));
-    let session = Session::start(task, seed, plan.protocol, recording.as_deref())?;
-    let mut arena = InProcess(session);
-    let outcome = match plan.policy {
-        Policy::Expert => experts::perform(task, &mut arena),
-        Policy::Idle => idle(task, &mut arena),
-    };
-    let result = EpisodeResult::from(&arena.0.close()?);
-    let note = outcome.err().map(|error| error.to_string());
-    let episode =
-        Played { policy: plan.policy, protocol: plan.protocol, version: version.into(), result, note };
-    write_whole(folder, &name, serde_json::to_string_pretty(&episode)?.as_bytes())?;
-    Ok(episode)
+
+    /// An earlier run's episode, if it is this one: a file that is torn, renamed or from other rules counts as missing.
+    fn kept(&self, task: &Task, seed: u32) -> Option<Played> {
+        let bytes = std::fs::read(self.folder.join(file_name(task, seed))).ok()?;
+        let kept: Played = serde_json::from_slice(&bytes).ok()?;
+        let rules = (kept.policy, kept.protocol, kept.build.as_str());
+        let same = rules == (self.plan.policy, self.plan.protocol, &self.build)
+            && (kept.result.task.as_str(), kept.result.seed) == (task.id, seed)
+            && self.recording(task, seed).is_none_or(|folder| folder.join(EpisodeResult::FILE_NAME).exists());
+        same.then_some(kept)
+    }
+
+    /// Where the episode is recorded, if it is. Its `result.json` is written last.
+    fn recording(&self, task: &Task, seed: u32) -> Option<PathBuf> {
+        self.plan.record.then(|| self.folder.join(format!("{}-{seed}", task.id)))
+    }
+
+    fn play(&self, task: &'static Task, seed: u32) -> Result<Played, EvaluationError> {
+        let plan = self.plan;
+        let session = Session::start(task, seed, plan.protocol, self.recording(task, seed).as_deref())?;
+        let mut arena = InProcess(session);
+        let outcome = match plan.policy {
+            Policy::Expert => experts::perform(task, &mut arena),
+            Policy::Idle => idle(task, &mut arena),
+        };
+        let result = EpisodeResult::from(&arena.0.close()?);
+        let episode = Played {
+            policy: plan.policy,
+            protocol: plan.protocol,
+            build: self.build.clone(),
+            result,
+            note: outcome.err().map(|error| error.to_string()),
+        };
+        let text = serde_json::to_string_pretty(&episode)?;
+        write_whole(self.folder, &file_name(task, seed), text.as_bytes())?;
+        Ok(episode)
+    }
+}
+
+fn file_name(task: &Task, seed: u32) -> String {
+    format!("{}-{seed}.json", task.id)
 }
 
 /// An episode in this process.
@@ -241,5 +279,66 @@ mod tests {
             let interval = clopper_pearson(successes, trials);
             assert!((interval[0] - low).abs() < 1e-4 && (interval[1] - high).abs() < 1e-4, "{interval:?}");
         }
+    }
+
+    /// An episode that was played under `keeper`'s rules.
+    fn played(keeper: &Keeper, task: &Task, seed: u32) -> Played {
+        let result = EpisodeResult {
+            task: task.id.into(),
+            seed,
+            phases: PhaseTimes(vec![("p1".into(), Some(4.2))]),
+            env_steps: 812,
+            tool_calls: 61,
+            falls: 0,
+            realtime_factor: 3.5,
+            state_hash: "00c0ffee00c0ffee".into(),
+        };
+        let (policy, protocol) = (keeper.plan.policy, keeper.plan.protocol);
+        Played { policy, protocol, build: keeper.build.clone(), result, note: None }
+    }
+
+    #[test]
+    fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
+        let folder = tempfile::tempdir().unwrap();
+        let task = crate::tasks::find("pouring").unwrap();
+        let plan = Plan {
+            policy: Policy::Expert,
+            protocol: Protocol::Agentic,
+            tasks: vec![task],
+            seeds: vec![7],
+            jobs: 1,
+            record: false,
+        };
+        let keeper = Keeper { plan: &plan, folder: folder.path(), build: build().unwrap() };
+        let kept_after = |text: &str| {
+            std::fs::write(folder.path().join("pouring-7.json"), text).unwrap();
+            keeper.kept(task, 7)
+        };
+        assert_eq!(keeper.kept(task, 7), None, "nothing was played");
+        let same = played(&keeper, task, 7);
+        let text = serde_json::to_string(&same).unwrap();
+        assert_eq!(kept_after(&text), Some(same.clone()));
+        assert_eq!(kept_after(&text[..text.len() / 2]), None, "a torn file");
+        type Change = fn(&mut Played);
+        for (what, change) in [
+            ("task", (|played| played.result.task = "handover".into()) as Change),
+            ("seed", |played| played.result.seed = 8),
+            ("protocol", |played| played.protocol = Protocol::Benchmark),
+            ("policy", |played| played.policy = Policy::Idle),
+            ("build", |played| played.build.push('0')),
+        ] {
+            let mut other = same.clone();
+            change(&mut other);
+            assert_eq!(kept_after(&serde_json::to_string(&other).unwrap()), None, "another {what}");
+        }
+
+        // One that was played without a recording is no demonstration.
+        let recorded = Plan { record: true, ..plan.clone() };
+        let collector = Keeper { plan: &recorded, ..keeper };
+        std::fs::write(folder.path().join("pouring-7.json"), &text).unwrap();
+        assert_eq!(collector.kept(task, 7), None, "no recording");
+        std::fs::create_dir(folder.path().join("pouring-7")).unwrap();
+        same.result.write(&folder.path().join("pouring-7")).unwrap();
+        assert_eq!(collector.kept(task, 7), Some(same));
     }
 }

@@ -23,6 +23,9 @@ pub struct RobotFacts {
     pub pelvis_in_world: Pose,
     /// Left, right.
     pub wrist_in_pelvis: [Pose; 2],
+    /// Force of the world on each palm, left, right, in the world's frame; estimated from the arm's own torques. A hand that
+    /// holds 0.5 kg still feels -4.9 N along z; one in quick motion feels its own inertia, too.
+    pub hand_force_n: [Vector; 2],
     pub fallen: bool,
 }
 
@@ -157,6 +160,7 @@ pub(crate) mod constructed {
             let robot = |_| RobotFacts {
                 pelvis_in_world: Pose::IDENTITY,
                 wrist_in_pelvis: [Pose::IDENTITY; 2],
+                hand_force_n: [Vector::ZERO; 2],
                 fallen: false,
             };
             let object = |spot: &crate::tasks::ObjectSpot| ObjectFacts {

@@ -82,7 +82,7 @@ impl Eyes {
 fn calibration(world: &World, robot: usize) -> CameraCalibration {
     let camera = world.egocentric_camera(robot);
     let [cx, cy] = camera.principal_point_px();
-    let focal_px = f64::from(camera.focal_px());
+    let focal_px = rounded(camera.focal_px().into());
     CameraCalibration {
         robot: world.robots()[robot].name.clone(),
         width: camera.width,

@@ -138,6 +138,42 @@ mod tests {
         }
     }
 
+    /// Pouring's last phase, one step of 20 ms at a time: whether the marble is in the glass, and how high the glass is.
+    #[test]
+    fn a_lasting_condition_needs_its_whole_time_without_a_break() {
+        const IN: (bool, f32) = (true, 0.1);
+        const OUT: (bool, f32) = (false, 0.1);
+        const LOW: (bool, f32) = (true, 0.0299);
+        let pouring = tasks::find("pouring").unwrap();
+        let facts = |step: usize, (inside, glass_m): (bool, f32)| {
+            let mut facts = Facts::at_rest(pouring).raised("cup", 0.1).raised("glass", glass_m);
+            facts.time_s = step as f64 * 0.02;
+            facts = facts.grip(A, Right, "cup", Holding).turned("cup", Vector::X, 1.5);
+            let inside_m = facts.point_m("glass", Vector::new(0.0, 0.0, 0.02));
+            if inside {
+                facts.object_mut("marble").pose_in_world.translation = inside_m;
+            }
+            facts
+        };
+        // Step 0 reaches the first two phases; then runs of equal steps.
+        for (runs, expected) in [
+            (&[(OUT, 1), (IN, 25)][..], 2),
+            (&[(OUT, 1), (IN, 26)], 3),
+            (&[(OUT, 1), (IN, 25), (OUT, 1), (IN, 25)], 2),
+            (&[(OUT, 1), (IN, 25), (OUT, 1), (IN, 26)], 3),
+            // The glass has to be aloft when the time is over, not before.
+            (&[(OUT, 1), (LOW, 60)], 2),
+            (&[(OUT, 1), (LOW, 60), (IN, 1)], 3),
+        ] {
+            let mut tracker = PhaseTracker::new(pouring);
+            let steps = runs.iter().flat_map(|(scene, count)| std::iter::repeat_n(*scene, *count));
+            for (step, scene) in steps.enumerate() {
+                tracker.update(&facts(step, scene));
+            }
+            assert_eq!(tracker.reached().count(), expected, "{runs:?}");
+        }
+    }
+
     /// Objects where they belong in the end, put there by nobody.
     #[test]
     fn the_right_final_pose_alone_is_never_a_success() {

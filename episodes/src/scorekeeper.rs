@@ -46,6 +46,7 @@ impl Scorekeeper {
             RobotFacts {
                 pelvis_in_world: state.world_from_pelvis,
                 wrist_in_pelvis: state.pelvis_from_wrist,
+                hand_force_n: state.hand_force_n,
                 fallen: state.fallen,
             }
         });

@@ -11,6 +11,7 @@ use tandem_tools_spec::{
 };
 
 use crate::EpisodeError;
+use crate::convert::rounded;
 use crate::describe;
 use crate::facts::Facts;
 use crate::motion::{Motion, MotionState, Plan, UpperBody};
@@ -304,7 +305,7 @@ impl Session {
     fn budget(&self) -> Budget {
         Budget {
             steps_left: self.steps_left(),
-            wall_clock_left_s: self.clock.left().map(|left| left.as_secs_f64()),
+            wall_clock_left_s: self.clock.left().map(|left| rounded(left.as_secs_f64())),
             steps_per_command: self.rules.steps_per_command,
         }
     }

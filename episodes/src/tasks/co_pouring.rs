@@ -131,6 +131,7 @@ mod tests {
     fn lift_on_both_sides_of_3_cm_and_with_both_robots() {
         assert!(lifted(&held().raised("tub", 0.0301)));
         assert!(!lifted(&held().raised("tub", 0.0299)));
+        assert!(!lifted(&held().grip(A, Left, "tub", Touching).raised("tub", 0.0301)));
         assert!(!lifted(&held().grip(B, Right, "tub", Touching).raised("tub", 0.0301)));
     }
 
@@ -161,6 +162,12 @@ mod tests {
             (Vector::new(0.0, -0.169, 0.05), false),
             (Vector::new(0.0, 0.0, 0.189), true),
             (Vector::new(0.0, 0.0, 0.191), false),
+            (Vector::new(-0.227, 0.0, 0.05), true),
+            (Vector::new(-0.229, 0.0, 0.05), false),
+            (Vector::new(0.0, 0.167, 0.05), true),
+            (Vector::new(0.0, 0.169, 0.05), false),
+            (Vector::new(0.0, 0.0, 0.001), true),
+            (Vector::new(0.0, 0.0, -0.001), false),
         ] {
             assert_eq!(poured(&with_last_at(offset_m)), expected, "{offset_m}");
         }

@@ -135,6 +135,7 @@ mod tests {
         assert!(!held_by_both(&Facts::at_rest(&TASK).grip(A, Left, "frame", Holding)));
         assert!(lifted(&held().raised("frame", 0.1001)));
         assert!(!lifted(&held().raised("frame", 0.0999)));
+        assert!(!lifted(&Facts::at_rest(&TASK).grip(B, Right, "frame", Holding).raised("frame", 0.1001)));
     }
 
     #[test]
@@ -143,11 +144,32 @@ mod tests {
             (Vector::ZERO, true),
             (Vector::new(0.0359, 0.0, 0.0), true),
             (Vector::new(0.0361, 0.0, 0.0), false),
+            (Vector::new(0.0, 0.0, -0.0359), true),
             (Vector::new(0.0, 0.0, -0.0361), false),
-            (Vector::new(0.0, 0.052, 0.0), true),
-            (Vector::new(0.0, -0.055, 0.0), false),
+            // The ends of the peg, 53.5 mm from its middle.
+            (Vector::new(0.0, 0.053, 0.0), true),
+            (Vector::new(0.0, 0.054, 0.0), false),
+            (Vector::new(0.0, -0.053, 0.0), true),
+            (Vector::new(0.0, -0.054, 0.0), false),
         ] {
             assert_eq!(threaded(&on_peg(offset_m)), expected, "{offset_m}");
+            assert_eq!(off_the_peg(&on_peg(offset_m)), !expected, "{offset_m}");
+            assert_eq!(hangs(&on_peg(offset_m)), expected, "{offset_m}");
+        }
+    }
+
+    #[test]
+    fn the_peg_passes_the_loop_while_both_robots_hold_the_frame() {
+        let by_a = |facts: Facts| facts.grip(A, Left, "frame", Holding);
+        let by_b = |facts: Facts| facts.grip(B, Right, "frame", Holding);
+        let beside = on_peg(Vector::new(0.0361, 0.0, 0.0));
+        for (facts, expected) in [
+            (by_b(by_a(on_peg(Vector::ZERO))), true),
+            (by_a(on_peg(Vector::ZERO)), false),
+            (by_b(on_peg(Vector::ZERO)), false),
+            (by_b(by_a(beside)), false),
+        ] {
+            assert_eq!(threaded_while_held(&facts), expected, "{facts:?}");
         }
     }
 

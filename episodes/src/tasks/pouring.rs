@@ -99,7 +99,10 @@ mod tests {
     use tandem_sim::{Side::Right, Vector};
 
     use super::*;
-    use crate::facts::Grip::{Holding, Touching};
+    use crate::facts::{
+        B,
+        Grip::{Holding, Touching},
+    };
 
     fn lifted(cup_m: f32, glass_m: f32) -> Facts {
         Facts::at_rest(&TASK).raised("cup", cup_m).raised("glass", glass_m)
@@ -124,7 +127,9 @@ mod tests {
             (held(Holding, 0.1, 60.1), true),
             (held(Holding, 0.1, 59.9), false),
             (held(Touching, 0.1, 60.1), false),
+            (held(Holding, 0.0301, 60.1), true),
             (held(Holding, 0.0299, 60.1), false),
+            (lifted(0.1, 0.1).grip(B, Right, "cup", Holding).turned("cup", Vector::X, 1.5), false),
         ] {
             assert_eq!(tipped(&facts), expected);
         }
@@ -144,6 +149,7 @@ mod tests {
             (Vector::new(0.0501, 0.0, 0.02), false),
             (Vector::new(0.0, 0.0, 0.139), true),
             (Vector::new(0.0, 0.0, 0.141), false),
+            (Vector::new(0.0, 0.0, 0.001), true),
             (Vector::new(0.0, 0.0, -0.001), false),
         ] {
             assert_eq!(marble_in_glass(&marble(offset_m)), expected, "{offset_m}");
