@@ -1,4 +1,4 @@
-//! The binary `tandem`: `serve`, `demo` and `tasks`.
+//! The binary `tandem`: from the command line to what it names.
 
 use std::{io::IsTerminal, process::ExitCode};
 

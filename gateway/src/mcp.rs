@@ -17,7 +17,7 @@ use rmcp::{
 use serde::Serialize;
 use serde_json::Value;
 use tandem_tools_spec::{
-    ListTasks, StartEpisode, Tool as _, ToolCall, ToolReply, ToolSpec, parse_args, tool_specs,
+    ListTasks, SpecError, StartEpisode, Tool as _, ToolCall, ToolReply, ToolSpec, parse_args, tool_specs,
 };
 
 use crate::{problem::ApiError, routes::App};
@@ -88,7 +88,7 @@ impl McpServer {
 
     async fn call_episode(&self, name: &str, mut args: Value) -> Result<Vec<ContentBlock>, ApiError> {
         let handle = args.as_object_mut().and_then(|object| object.shift_remove("episode_id"));
-        let call = ToolCall::parse(name, args)?;
+        let call = ToolCall::parse(name, args).map_err(with_every_tool)?;
         let Some(Value::String(id)) = handle else {
             return Err(ApiError::NoEpisodeNamed { tool: call.name() });
         };
@@ -110,6 +110,16 @@ impl McpServer {
             }
             reply => json_block(&reply),
         }
+    }
+}
+
+/// This route serves the tools that need no episode, too.
+fn with_every_tool(error: SpecError) -> SpecError {
+    match error {
+        SpecError::UnknownTool { name, .. } => {
+            SpecError::UnknownTool { name, have: tool_specs().iter().map(|spec| spec.name).collect() }
+        }
+        error => error,
     }
 }
 

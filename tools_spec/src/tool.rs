@@ -35,12 +35,17 @@ pub fn parse_args<T: Tool>(args: Value) -> Result<T, SpecError> {
         SpecError::Malformed {
             tool: T::NAME,
             place: if path == "." { String::new() } else { format!("{path}: ") },
-            reason: error.into_inner().to_string(),
+            reason: in_plain_words(&error.into_inner().to_string()),
             example: json!(T::example()).to_string(),
         }
     })?;
     parsed.validate().map_err(|reason| SpecError::Invalid { tool: T::NAME, reason })?;
     Ok(parsed)
+}
+
+/// Serde names Rust's types, which a caller need not know.
+fn in_plain_words(reason: &str) -> String {
+    reason.replace("expected u32", "expected a whole number from 0 to 4294967295")
 }
 
 /// A tool as a policy's host needs it: for OpenAI, Anthropic and MCP alike.

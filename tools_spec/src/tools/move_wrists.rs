@@ -21,7 +21,11 @@ pub struct MoveWrists {
 }
 
 /// What one robot is to do. Wrist poses are of the links `left_wrist_yaw_link` and `right_wrist_yaw_link` in the robot's
-/// own pelvis frame: x forward, y left, z up, metres. They are held in that frame while the robot walks.
+/// own pelvis frame: x forward, y left, z up, metres. They are held in that frame while the robot walks. The fingers point
+/// along a wrist's x axis; the right palm faces along its y axis, the left palm against it, so that with [1, 0, 0, 0] the
+/// fingers point forward and the palms face each other. A hand closes on what lies 0.12 m along x and 0.055 m before its
+/// palm. To grasp an upright bottle from the side with [1, 0, 0, 0], open the thumb, bring the right wrist to
+/// [-0.12, -0.135, 0] from the bottle's axis, then to [-0.12, -0.055, 0], palm first, then close the fingers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WristMove {
@@ -36,10 +40,10 @@ pub struct WristMove {
     /// Right wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null keeps the target.
     pub right_quaternion_wxyz: Option<[f64; 4]>,
     /// Left finger joint angles in radians: [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1]. Closed
-    /// around a bottle: [0, 0.75, 0.8, -1.1, -1.3, -1.1, -1.3]; open: all 0. Null keeps the target.
+    /// around a bottle: [0, 0.75, 0.8, -1.1, -1.3, -1.1, -1.3]; open: [0, -0.3, 0, 0, 0, 0, 0]. Null keeps the target.
     pub left_fingers_rad: Option<[f64; 7]>,
     /// Right finger joint angles in radians: [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1]. Closed
-    /// around a bottle: [0, -0.75, -0.8, 1.1, 1.3, 1.1, 1.3]; open: all 0. Null keeps the target.
+    /// around a bottle: [0, -0.75, -0.8, 1.1, 1.3, 1.1, 1.3]; open: [0, 0.3, 0, 0, 0, 0, 0]. Null keeps the target.
     pub right_fingers_rad: Option<[f64; 7]>,
     /// Forward velocity in metres per second during this command. Null: 0.
     pub vx_m_s: Option<f64>,
