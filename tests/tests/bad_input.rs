@@ -31,6 +31,7 @@ fn refused_calls() -> Vec<(&'static str, Value, u16, &'static [&'static str])> {
         ("wait", json!({ "steps": 26 }), 422, &["26", "agentic", "1 to 25"]),
         ("wait", json!({ "steps": 0 }), 422, &["at least 1"]),
         ("wait", json!({ "steps": "25" }), 422, &["steps", "{\"steps\":25}"]),
+        ("wait", json!({ "steps": 2.5 }), 422, &["steps", "a whole number"]),
         ("wait", json!({ "seconds": 1 }), 422, &["`seconds`", "`steps`"]),
         ("wait", json!({ "steps": 1, "episode_id": "other" }), 422, &["\"other\"", "leave episode_id out"]),
         ("move_wrists", json!({ "steps": 26, "robots": [{ "robot": "A" }] }), 422, &["26", "1 to 25"]),

@@ -1,24 +1,9 @@
 //! Every task is solved by its expert, within the benchmark protocol's steps, on real physics.
 
-use tandem_episodes::experts::{Arena, ExpertError, perform};
-use tandem_episodes::{EpisodeError, Facts, Session, tasks};
-use tandem_tools_spec::{Protocol, ToolCall, ToolReply};
-
-struct InProcess(Session);
-
-impl Arena for InProcess {
-    fn call(&mut self, call: ToolCall) -> Result<ToolReply, ExpertError> {
-        let tool = call.name();
-        self.0.call(call).map_err(|error| match error {
-            EpisodeError::Ended { .. } => ExpertError::EpisodeOver,
-            error => ExpertError::Call { tool, reason: error.to_string() },
-        })
-    }
-
-    fn facts(&mut self) -> Result<Facts, ExpertError> {
-        Ok(self.0.facts())
-    }
-}
+use tandem_episodes::evaluation::InProcess;
+use tandem_episodes::experts::perform;
+use tandem_episodes::{Session, tasks};
+use tandem_tools_spec::Protocol;
 
 /// Plays a task and checks that all phases were reached in order and that nobody fell.
 fn solve(id: &str, seed: u32) {

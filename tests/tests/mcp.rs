@@ -56,7 +56,7 @@ fn an_episode_can_be_played() {
 fn refusals_are_answers_that_a_model_can_read() {
     let server = TestServer::start();
     for (tool, args, says) in [
-        ("grasp", json!({}), "move_wrists"),
+        ("grasp", json!({}), "have: list_tasks, start_episode, observe"),
         ("wait", json!({ "steps": 3 }), "wait needs episode_id"),
         ("wait", json!({ "steps": 3, "episode_id": "nope" }), "no episode \"nope\""),
         ("wait", json!({ "steps": 0, "episode_id": "nope" }), "at least 1"),
