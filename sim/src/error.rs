@@ -13,6 +13,20 @@ pub enum SimError {
     Xml { file: String, source: roxmltree::Error },
     #[error("`{file}`: {what}")]
     Unsupported { file: String, what: String },
+    #[error(
+        "`{path}` is not an ONNX file ({source}); a velocity policy for the G1 as AGILE exports it would work"
+    )]
+    NotOnnx { path: String, source: Box<dyn std::error::Error + Send + Sync> },
+    #[error(
+        "`{path}` has no {kind} `{tensor}`; a velocity policy for the G1 needs it; this file has: {have}"
+    )]
+    MissingTensor { path: String, kind: &'static str, tensor: String, have: String },
+    #[error("`{path}`: {kind} `{tensor}` has shape {have:?}; a velocity policy for the G1 has {expected:?}")]
+    TensorShape { path: String, kind: &'static str, tensor: String, have: Vec<usize>, expected: Vec<usize> },
+    #[error("`{path}` cannot be run: {source}")]
+    NotRunnable { path: String, source: Box<dyn std::error::Error + Send + Sync> },
+    #[error("`{path}` gives targets that are not numbers, or gains that are not positive")]
+    PolicyOutput { path: String },
     #[error("snapshot cannot be read: {0}; it must come from this binary and this world")]
     Snapshot(#[from] postcard::Error),
 }

@@ -1,14 +1,18 @@
 //! Base control: turns a base command into torques of the twelve leg joints, through ground contact alone.
 
+mod agile;
 mod balance;
 pub mod bench;
+mod choice;
 mod ground;
 mod legs;
 mod load;
 mod stand;
 mod step;
 
+pub use agile::{Agile, Network};
 pub use balance::Balance;
+pub use choice::LocomotionChoice;
 
 use serde::{Deserialize, Serialize};
 
@@ -54,12 +58,18 @@ pub struct LegCommand {
     pub feedforward_n_m: [f32; 12],
 }
 
-/// A base controller. It sees its own robot only, and acts through leg torques only.
+/// A base controller. It sees its own robot only, and acts through joint drives of legs and waist only.
 pub trait Locomotion: Send {
     fn limits(&self) -> BaseLimits;
 
     /// One physics step.
     fn tick(&mut self, body: &WholeBody, command: &BaseCommand, dt_s: f32) -> LegCommand;
+
+    /// What is added to the task's waist targets (yaw, roll, pitch) until the next [`Locomotion::tick`], by a controller
+    /// that balances with the waist.
+    fn waist_offset_rad(&self) -> [f32; 3] {
+        [0.0; 3]
+    }
 
     /// Internal state, for snapshots and the state hash.
     fn save(&self) -> Result<Vec<u8>, postcard::Error>;

@@ -30,7 +30,7 @@ pub const UPPER_JOINTS: usize = 31;
 /// First joint of each group in published order: left_leg, right_leg, waist, left_arm, left_hand, right_arm, right_hand.
 const LEFT_LEG: usize = 0;
 const RIGHT_LEG: usize = 6;
-const WAIST: usize = 12;
+pub(crate) const WAIST: usize = 12;
 const LEFT_ARM: usize = 15;
 const LEFT_HAND: usize = 22;
 const RIGHT_ARM: usize = 29;

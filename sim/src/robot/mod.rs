@@ -17,7 +17,7 @@ pub use layout::{JOINTS, Side, UPPER, UPPER_JOINTS, joint_names};
 pub use model::{HandLinks, JointModel, Link, RobotModel, SiteModel};
 pub use whole_body::WholeBody;
 
-pub(crate) use layout::{ARM_JOINT_COUNT, ARMS, LEG_JOINT_COUNT, LEGS};
+pub(crate) use layout::{ARM_JOINT_COUNT, ARMS, LEG_JOINT_COUNT, LEGS, WAIST};
 
 use crate::locomotion::{BaseCommand, Locomotion};
 use crate::{PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError};
@@ -94,10 +94,8 @@ impl Robot {
     pub(crate) fn rest_command(&self, physics: &PhysicsWorld) -> RobotCommand {
         let (q_rad, _) = self.read_joints(physics);
         let pelvis_height_m = physics.bodies[self.bodies[0]].translation().z;
-        RobotCommand {
-            upper_rad: UPPER.map(|joint| q_rad[joint]),
-            base: BaseCommand { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m },
-        }
+        let base = BaseCommand { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m };
+        RobotCommand { upper_rad: UPPER.map(|joint| q_rad[joint]), base: self.base_limits().clamp(base) }
     }
 
     /// The base command of the last step.
@@ -127,7 +125,13 @@ impl Robot {
             q_rad,
             qd_rad_s,
             self.memory.hand_force.force_n(),
+            self.waist_target_rad(),
         )
+    }
+
+    /// Where the last control step's command took the waist.
+    fn waist_target_rad(&self) -> [f32; 3] {
+        std::array::from_fn(|i| self.memory.last_upper_rad[UPPER_JOINTS - 3 + i])
     }
 
     pub(crate) fn state(&self, physics: &PhysicsWorld) -> RobotState {
@@ -153,10 +157,17 @@ impl Robot {
     /// Sets this robot's joint drives for one physics step, `substep` counting from 0 within the control step.
     pub(crate) fn drive(&mut self, physics: &mut PhysicsWorld, command: &RobotCommand, substep: u32) {
         let (q_rad, qd_rad_s) = self.read_joints(physics);
-        let hand_force_n = self.memory.hand_force.force_n();
-        let body =
-            WholeBody::measure(&self.model, &physics.bodies, &self.bodies, q_rad, qd_rad_s, hand_force_n);
+        let body = WholeBody::measure(
+            &self.model,
+            &physics.bodies,
+            &self.bodies,
+            q_rad,
+            qd_rad_s,
+            self.memory.hand_force.force_n(),
+            self.waist_target_rad(),
+        );
         let legs = self.locomotion.tick(&body, &command.base, PHYSICS_DT_S);
+        let waist_offset_rad = self.locomotion.waist_offset_rad();
         let gravity_n_m = body.gravity_torques_n_m();
         self.memory.hand_force.update(&body, &self.memory.torque_n_m, &gravity_n_m, PHYSICS_DT_S);
         self.memory.payload.update(&body, &self.memory.torque_n_m, &gravity_n_m, PHYSICS_DT_S);
@@ -177,6 +188,9 @@ impl Robot {
                     + payload_n_m[joint]
                     + model.kd_n_m_s_rad * (to - from) / control_dt_s,
             };
+        }
+        for (drive, offset_rad) in drives[WAIST..].iter_mut().zip(waist_offset_rad) {
+            drive.target_rad += offset_rad;
         }
         for i in 0..2 * LEG_JOINT_COUNT {
             drives[LEGS[i / LEG_JOINT_COUNT] + i % LEG_JOINT_COUNT] = Drive {

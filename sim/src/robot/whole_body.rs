@@ -20,6 +20,8 @@ pub struct WholeBody<'a> {
     pub com_velocity_m_s: Vector,
     /// Measured external force on each hand, left and right, at its palm.
     pub hand_force_n: [Vector; 2],
+    /// Where the task wants the waist: yaw, roll, pitch.
+    pub waist_target_rad: [f32; 3],
 }
 
 impl<'a> WholeBody<'a> {
@@ -30,6 +32,7 @@ impl<'a> WholeBody<'a> {
         q_rad: [f32; JOINTS],
         qd_rad_s: [f32; JOINTS],
         hand_force_n: [Vector; 2],
+        waist_target_rad: [f32; 3],
     ) -> WholeBody<'a> {
         let mut com_m = Vector::ZERO;
         let mut com_velocity_m_s = Vector::ZERO;
@@ -52,6 +55,7 @@ impl<'a> WholeBody<'a> {
             com_m: com_m / model.mass_kg,
             com_velocity_m_s: com_velocity_m_s / model.mass_kg,
             hand_force_n,
+            waist_target_rad,
         }
     }
 

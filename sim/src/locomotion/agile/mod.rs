@@ -1,0 +1,164 @@
+//! A base controller that somebody else trained: a velocity policy as an ONNX file, of the kind that AGILE exports for the
+//! G1.
+//!
+//! The policy runs once per control step and drives the legs by PD targets with its own gains. Roll and pitch of the waist,
+//! which it balances with, belong to the task here: the policy sees them less the task's targets, as if the task had asked
+//! for an upright waist, and what it wants of them is added to the task's targets.
+
+mod joints;
+mod network;
+mod place;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+pub use network::Network;
+
+use super::{BaseCommand, BaseLimits, LegCommand, Locomotion};
+use crate::PHYSICS_STEPS_PER_CONTROL;
+use crate::robot::{JOINTS, WAIST, WholeBody};
+use joints::JointMap;
+use network::{Action, Memory, Observation};
+use place::Place;
+
+const LIMITS: BaseLimits = BaseLimits {
+    vx_m_s: [-0.3, 0.4],
+    vy_m_s: [-0.3, 0.3],
+    yaw_rate_rad_s: [-0.5, 0.5],
+    // The policy has no height command; it stands and walks here.
+    pelvis_height_m: [0.73, 0.73],
+};
+/// A robot whose hands pull down by this much together leans, and would walk for ever to where it should be.
+const HEAVY_N: f32 = 50.0;
+
+/// One robot under a policy.
+pub struct Agile {
+    network: Arc<Network>,
+    joints: JointMap,
+    state: Option<State>,
+}
+
+#[derive(Clone, Serialize, Deserialize)]
+struct State {
+    memory: Memory,
+    action: Action,
+    place: Place,
+    /// Physics steps so far.
+    ticks: u32,
+}
+
+impl Agile {
+    pub fn new(network: Arc<Network>) -> Agile {
+        Agile { network, joints: JointMap::new(), state: None }
+    }
+
+    fn observe(&self, body: &WholeBody, velocity_command: [f32; 3]) -> Observation {
+        let pelvis = body.world_from_pelvis().rotation;
+        let turning = pelvis.inverse() * body.pelvis_angular_velocity_rad_s;
+        let q_rad = less_waist_targets(body);
+        Observation {
+            quaternion_wxyz: [pelvis.w, pelvis.x, pelvis.y, pelvis.z],
+            angular_velocity_rad_s: turning.to_array(),
+            velocity_command,
+            q_rad: self.joints.observed.map(|joint| q_rad[joint]),
+            qd_rad_s: self.joints.observed.map(|joint| body.qd_rad_s[joint]),
+        }
+    }
+
+    /// Stands as it is until the policy has spoken.
+    fn begin(&self, body: &WholeBody) -> State {
+        let q_rad = less_waist_targets(body);
+        let joints = &body.model.joints;
+        let observation = self.observe(body, [0.0; 3]);
+        State {
+            memory: self.network.remember(&observation).unwrap_or_else(|_| self.network.blank()),
+            action: Action {
+                target_rad: self.joints.controlled.map(|joint| q_rad[joint]),
+                kp_n_m_rad: self.joints.controlled.map(|joint| joints[joint].kp_n_m_rad),
+                kd_n_m_s_rad: self.joints.controlled.map(|joint| joints[joint].kd_n_m_s_rad),
+            },
+            place: Place::of(body.world_from_pelvis()),
+            ticks: 0,
+        }
+    }
+
+    fn legs(&self, action: &Action) -> LegCommand {
+        let mut legs = LegCommand {
+            q_rad: [0.0; 12],
+            kp_n_m_rad: [0.0; 12],
+            kd_n_m_s_rad: [0.0; 12],
+            feedforward_n_m: [0.0; 12],
+        };
+        // In published order the legs come first.
+        for (i, joint) in self.joints.controlled.into_iter().enumerate().filter(|(_, joint)| *joint < WAIST) {
+            legs.q_rad[joint] = action.target_rad[i];
+            legs.kp_n_m_rad[joint] = action.kp_n_m_rad[i];
+            legs.kd_n_m_s_rad[joint] = action.kd_n_m_s_rad[i];
+        }
+        legs
+    }
+}
+
+impl Locomotion for Agile {
+    fn limits(&self) -> BaseLimits {
+        LIMITS
+    }
+
+    fn tick(&mut self, body: &WholeBody, command: &BaseCommand, dt_s: f32) -> LegCommand {
+        let mut state = self.state.take().unwrap_or_else(|| self.begin(body));
+        if state.ticks.is_multiple_of(PHYSICS_STEPS_PER_CONTROL) {
+            let command = LIMITS.clamp(*command);
+            let mut velocity = [command.vx_m_s, command.vy_m_s, command.yaw_rate_rad_s];
+            let pelvis = body.world_from_pelvis();
+            let pulled_down_n: f32 = body.hand_force_n.iter().map(|force| -force.z).sum();
+            if pulled_down_n > HEAVY_N {
+                state.place = Place::of(pelvis);
+            } else {
+                velocity = state.place.follow(pelvis, velocity, dt_s * PHYSICS_STEPS_PER_CONTROL as f32);
+            }
+            // A network that ran at load runs again; should it ever not, the last targets hold the robot.
+            if let Ok((action, memory)) = self.network.run(&self.observe(body, velocity), &state.memory)
+                && action.usable()
+            {
+                (state.action, state.memory) = (action, memory);
+            }
+        }
+        state.ticks += 1;
+        let legs = self.legs(&state.action);
+        self.state = Some(state);
+        legs
+    }
+
+    fn waist_offset_rad(&self) -> [f32; 3] {
+        let mut offset_rad = [0.0; 3];
+        if let Some(state) = &self.state {
+            for (joint, target_rad) in self.joints.controlled.into_iter().zip(state.action.target_rad) {
+                if let Some(offset_rad) = joint.checked_sub(WAIST).and_then(|i| offset_rad.get_mut(i)) {
+                    *offset_rad = target_rad;
+                }
+            }
+        }
+        offset_rad
+    }
+
+    fn save(&self) -> Result<Vec<u8>, postcard::Error> {
+        postcard::to_stdvec(&self.state)
+    }
+
+    fn load(&mut self, state: &[u8]) -> Result<(), postcard::Error> {
+        self.state = postcard::from_bytes(state)?;
+        Ok(())
+    }
+}
+
+/// Joint angles as they would be had the task asked for an upright waist.
+fn less_waist_targets(body: &WholeBody) -> [f32; JOINTS] {
+    let mut q_rad = body.q_rad;
+    for (i, target_rad) in body.waist_target_rad.into_iter().enumerate() {
+        q_rad[WAIST + i] -= target_rad;
+    }
+    q_rad
+}

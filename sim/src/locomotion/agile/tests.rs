@@ -1,0 +1,231 @@
+//! Policies that are made here: what a file must have, and that one which has it drives a robot.
+
+use std::path::PathBuf;
+
+use prost::Message;
+use tract_onnx::pb::{
+    GraphProto, ModelProto, NodeProto, OperatorSetIdProto, TensorProto, TensorShapeProto, TypeProto,
+    ValueInfoProto, tensor_shape_proto::Dimension, tensor_shape_proto::dimension, type_proto,
+};
+
+use super::network::Network;
+use super::*;
+use crate::{RobotPlacement, SimError, World, WorldSpec};
+
+const FLOAT: i32 = 1;
+const INT64: i32 = 7;
+/// Where the controlled joints stand among the observed ones.
+const CONTROLLED_OF_OBSERVED: [i64; 14] = [0, 1, 3, 4, 5, 6, 7, 8, 9, 10, 13, 14, 17, 18];
+
+fn value(name: &str, shape: &[i64]) -> ValueInfoProto {
+    let size =
+        |size: &i64| Dimension { value: Some(dimension::Value::DimValue(*size)), ..Dimension::default() };
+    let shape = TensorShapeProto { dim: shape.iter().map(size).collect() };
+    let tensor = type_proto::Tensor { elem_type: FLOAT, shape: Some(shape) };
+    let tensor = TypeProto { value: Some(type_proto::Value::TensorType(tensor)), ..TypeProto::default() };
+    ValueInfoProto { name: name.into(), r#type: Some(tensor), ..ValueInfoProto::default() }
+}
+
+fn node(op: &str, inputs: [&str; 2], output: &str) -> NodeProto {
+    NodeProto {
+        op_type: op.into(),
+        name: output.into(),
+        input: inputs.map(String::from).into(),
+        output: vec![output.into()],
+        ..NodeProto::default()
+    }
+}
+
+fn floats(name: &str, shape: &[i64], value: f32) -> TensorProto {
+    let float_data = vec![value; shape.iter().product::<i64>() as usize];
+    TensorProto {
+        name: name.into(),
+        dims: shape.into(),
+        data_type: FLOAT,
+        float_data,
+        ..TensorProto::default()
+    }
+}
+
+/// Wants every joint to be where it is, a milliradian further with every step, at stiffness `kp`.
+fn limp(kp: f32) -> GraphProto {
+    let joints = TensorProto {
+        name: "joints".into(),
+        dims: vec![14],
+        data_type: INT64,
+        int64_data: CONTROLLED_OF_OBSERVED.into(),
+        ..TensorProto::default()
+    };
+    // Gather works along axis 0, so the row of joints is made a column and back.
+    let shape = |name: &str, sizes: [i64; 2]| TensorProto {
+        name: name.into(),
+        dims: vec![2],
+        data_type: INT64,
+        int64_data: sizes.into(),
+        ..TensorProto::default()
+    };
+    GraphProto {
+        name: "limp".into(),
+        input: vec![
+            value("root_link_quat_w", &[1, 4]),
+            value("root_ang_vel_b", &[1, 3]),
+            value("velocity_commands", &[1, 3]),
+            value("joint_pos", &[1, 29]),
+            value("joint_vel", &[1, 29]),
+            value("last_actions", &[1, 14]),
+            value("shift_history", &[1, 2, 14]),
+        ],
+        output: vec![
+            value("action_joint_pos", &[1, 14]),
+            value("action_joint_pos_kp_gains", &[1, 14]),
+            value("action_joint_pos_kd_gains", &[1, 14]),
+            value("last_actions_out", &[1, 14]),
+            value("shift_history_out", &[1, 2, 14]),
+        ],
+        initializer: vec![
+            joints,
+            shape("column", [29, 1]),
+            shape("row", [1, 14]),
+            floats("milliradian", &[1, 14], 1e-3),
+            floats("one", &[1], 1.0),
+            floats("action_joint_pos_kp_gains", &[1, 14], kp),
+            floats("action_joint_pos_kd_gains", &[1, 14], 3.0),
+        ],
+        node: vec![
+            node("Reshape", ["joint_pos", "column"], "joint_column"),
+            node("Gather", ["joint_column", "joints"], "controlled_column"),
+            node("Reshape", ["controlled_column", "row"], "controlled"),
+            node("Add", ["last_actions", "milliradian"], "last_actions_out"),
+            node("Add", ["controlled", "last_actions_out"], "action_joint_pos"),
+            node("Add", ["shift_history", "one"], "shift_history_out"),
+        ],
+        ..GraphProto::default()
+    }
+}
+
+fn file(folder: &tempfile::TempDir, bytes: &[u8]) -> PathBuf {
+    let path = folder.path().join("policy.onnx");
+    std::fs::write(&path, bytes).unwrap();
+    path
+}
+
+fn read(graph: GraphProto) -> Result<Network, SimError> {
+    let opset = OperatorSetIdProto { domain: String::new(), version: 17 };
+    let model =
+        ModelProto { ir_version: 8, opset_import: vec![opset], graph: Some(graph), ..ModelProto::default() };
+    let folder = tempfile::tempdir().unwrap();
+    Network::from_file(&file(&folder, &model.encode_to_vec()))
+}
+
+fn without(tensor: &str) -> GraphProto {
+    let mut graph = limp(50.0);
+    graph.input.retain(|input| input.name != tensor);
+    graph.output.retain(|output| output.name != tensor);
+    graph
+}
+
+fn reshaped(tensor: &str, shape: &[i64]) -> GraphProto {
+    let mut graph = limp(50.0);
+    graph
+        .input
+        .iter_mut()
+        .filter(|input| input.name == tensor)
+        .for_each(|input| *input = value(tensor, shape));
+    graph
+}
+
+#[test]
+fn a_wrong_file_is_told_what_it_lacks() {
+    for (graph, expected) in [
+        (without("joint_vel"), "no input `joint_vel`"),
+        (without("root_link_quat_w"), "no input `root_link_quat_w`"),
+        (without("action_joint_pos_kp_gains"), "no output `action_joint_pos_kp_gains`"),
+        (without("last_actions_out"), "no output `last_actions_out`"),
+        (without("shift_history_out"), "no output `shift_history_out`"),
+        (reshaped("root_ang_vel_b", &[1, 4]), "input `root_ang_vel_b` has shape [1, 4]"),
+        (
+            reshaped("joint_vel", &[1, 43]),
+            "input `joint_vel` has shape [1, 43]; a velocity policy for the G1 has [1, 29]",
+        ),
+        (limp(-50.0), "gains that are not positive"),
+    ] {
+        let message = read(graph).unwrap_err().to_string();
+        assert!(message.contains(expected) && message.contains("policy.onnx"), "{message}");
+    }
+}
+
+#[test]
+fn a_graph_that_does_not_make_its_outputs_is_no_panic() {
+    let mut graph = limp(50.0);
+    graph.node.retain(|node| node.name != "last_actions_out");
+    let message = read(graph).unwrap_err().to_string();
+    assert!(message.contains("no node makes") || message.contains("cannot be run"), "{message}");
+    graph = limp(50.0);
+    graph.node[0].op_type = "Frobnicate".into();
+    let message = read(graph).unwrap_err().to_string();
+    assert!(message.contains("cannot be run"), "{message}");
+}
+
+#[test]
+fn what_is_no_onnx_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for (bytes, expected) in [
+        (&b"velocity: 0.4\n"[..], "is not an ONNX file"),
+        (&b""[..], "holds no graph"),
+        (&[0xff; 64][..], "is not an ONNX file"),
+    ] {
+        let message = Network::from_file(&file(&folder, bytes)).unwrap_err().to_string();
+        assert!(message.contains(expected) && message.contains("policy.onnx"), "{message}");
+    }
+    let message = Network::from_file(&folder.path().join("none.onnx")).unwrap_err().to_string();
+    assert!(message.contains("cannot read") && message.contains("none.onnx"), "{message}");
+}
+
+#[test]
+fn memories_come_back_and_begin_without_actions() {
+    let network = read(limp(50.0)).unwrap();
+    let observation = Observation {
+        quaternion_wxyz: [1.0, 0.0, 0.0, 0.0],
+        angular_velocity_rad_s: [0.0; 3],
+        velocity_command: [0.0; 3],
+        q_rad: std::array::from_fn(|joint| joint as f32),
+        qd_rad_s: [0.0; 29],
+    };
+    let mut memory = network.remember(&observation).unwrap();
+    for step in 1..=3 {
+        let (action, next) = network.run(&observation, &memory).unwrap();
+        let expected = CONTROLLED_OF_OBSERVED.map(|joint| joint as f32 + step as f32 * 1e-3);
+        let largest = action.target_rad.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(largest < 1e-5, "{action:?}");
+        assert_eq!((action.kp_n_m_rad, action.kd_n_m_s_rad), ([50.0; 14], [3.0; 14]));
+        memory = next;
+    }
+    // Two frames were lived through before the first step.
+    assert_eq!(memory.0[1], [5.0; 28]);
+}
+
+#[test]
+fn a_policy_drives_the_robot_and_snapshots_continue_bit_for_bit() {
+    let network = Arc::new(read(limp(50.0)).unwrap());
+    let placement = RobotPlacement { name: "A".into(), position_m: [0.0, 0.0], yaw_rad: 0.0 };
+    let spec = WorldSpec { scene: "floor".into(), robots: vec![placement], objects: vec![] };
+    let world = || {
+        let mut world = World::new(&spec).unwrap();
+        world.set_locomotion(0, Box::new(Agile::new(network.clone())));
+        world
+    };
+    let mut first = world();
+    let command = first.rest_command(0);
+    assert_eq!(command.base.pelvis_height_m, LIMITS.pelvis_height_m[0]);
+    let run = |world: &mut World, steps: u32| (0..steps).for_each(|_| world.control_step(&[command]));
+    run(&mut first, 6);
+    let snapshot = first.snapshot().unwrap();
+    run(&mut first, 6);
+    let mut second = world();
+    second.restore(&snapshot).unwrap();
+    run(&mut second, 6);
+    assert_eq!(first.state_hash(), second.state_hash());
+    // Six steps later the targets are 12 milliradians ahead of the waist's angles, which follow.
+    let waist_rad = first.robot_state(0).q_rad[WAIST + 1];
+    assert!(waist_rad > 2e-3, "{waist_rad}");
+}
