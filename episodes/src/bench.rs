@@ -6,7 +6,7 @@ use tandem_ik::bench::{Report, TargetSet, run};
 use tandem_ik::{IkError, Model};
 use tandem_sim::assets;
 pub use tandem_sim::locomotion::bench::{CaseReport, Report as LocomotionReport};
-use tandem_sim::locomotion::{self, Balance};
+use tandem_sim::locomotion::{self, LocomotionChoice};
 
 use crate::motion;
 
@@ -27,13 +27,14 @@ pub enum BenchError {
 }
 
 /// Plays the bench's cases whose names contain one of the words of `filter`, separated by commas, on seeds 0 to
-/// `seeds` - 1, and calls `done` after each case.
+/// `seeds` - 1, by controllers of `choice`, and calls `done` after each case.
 pub fn locomotion(
+    choice: &LocomotionChoice,
     filter: &str,
     seeds: usize,
     done: impl FnMut(&CaseReport),
 ) -> Result<LocomotionReport, BenchError> {
-    Ok(locomotion::bench::run(&|| Box::new(Balance::default()), filter, seeds, done)?)
+    Ok(locomotion::bench::run(&|| choice.controller(), filter, seeds, done)?)
 }
 
 /// Solves the targets of a file, or 200 that are drawn from the robot's own joint ranges.

@@ -48,8 +48,14 @@ pub fn wire_base(base: &BaseCommand) -> wire::BaseCommand {
     }
 }
 
-pub fn wire_range([min, max]: [f32; 2]) -> wire::Range {
-    wire::Range { min: rounded(min.into()), max: rounded(max.into()) }
+pub fn wire_limits(limits: &BaseLimits) -> wire::BaseLimits {
+    let range = |[min, max]: [f32; 2]| wire::Range { min: rounded(min.into()), max: rounded(max.into()) };
+    wire::BaseLimits {
+        vx_m_s: range(limits.vx_m_s),
+        vy_m_s: range(limits.vy_m_s),
+        yaw_rate_rad_s: range(limits.yaw_rate_rad_s),
+        pelvis_height_m: range(limits.pelvis_height_m),
+    }
 }
 
 /// A base command within the limits, and the fields that had to be moved there.

@@ -6,13 +6,13 @@ use tandem_tools_spec::{
     Instruction, JointInfo, PhaseInfo, Protocol, ProtocolInfo, RobotInfo, TaskInfo, TaskList,
 };
 
-use crate::convert::{rounded, wire_range};
+use crate::convert::{rounded, wire_limits};
 use crate::protocol::rules;
 use crate::tasks::{self, Task};
 
-/// The reply to `list_tasks`.
-pub fn task_list() -> TaskList {
-    TaskList { tasks: tasks::ALL.iter().map(task_info).collect() }
+/// The reply to `list_tasks` where robots follow base commands within `limits`.
+pub fn task_list(limits: &BaseLimits) -> TaskList {
+    TaskList { tasks: tasks::ALL.iter().map(task_info).collect(), base_limits: wire_limits(limits) }
 }
 
 fn task_info(task: &Task) -> TaskInfo {
@@ -79,10 +79,7 @@ fn robot_info(name: &str, model: &RobotModel, limits: &BaseLimits) -> RobotInfo 
                 upper_rad: rounded(joint.upper_rad.into()),
             })
             .collect(),
-        vx_m_s: wire_range(limits.vx_m_s),
-        vy_m_s: wire_range(limits.vy_m_s),
-        yaw_rate_rad_s: wire_range(limits.yaw_rate_rad_s),
-        pelvis_height_m: wire_range(limits.pelvis_height_m),
+        base_limits: wire_limits(limits),
     }
 }
 

@@ -13,7 +13,7 @@ use tandem_tools_spec::{PhaseTimes, Protocol, ToolCall, ToolReply, Wait};
 use crate::experts::{self, Arena, ExpertError};
 use crate::results::{EpisodeResult, OutputError, write_whole};
 use crate::tasks::Task;
-use crate::{EpisodeError, Facts, Session};
+use crate::{EpisodeError, Facts, LocomotionChoice, Session};
 
 /// Who plays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -30,6 +30,7 @@ pub enum Policy {
 pub struct Plan {
     pub policy: Policy,
     pub protocol: Protocol,
+    pub locomotion: LocomotionChoice,
     pub tasks: Vec<&'static Task>,
     pub seeds: Vec<u32>,
     /// Worlds that run side by side, each on a thread of its own.
@@ -43,6 +44,8 @@ pub struct Plan {
 pub struct Played {
     pub policy: Policy,
     pub protocol: Protocol,
+    /// Which base controller the robots had.
+    pub locomotion: String,
     /// Version and fingerprint of the program; what another build played is played again.
     pub build: String,
     #[serde(flatten)]
@@ -67,6 +70,7 @@ pub struct TaskSummary {
 pub struct Evaluation {
     pub policy: Policy,
     pub protocol: Protocol,
+    pub locomotion: String,
     pub tasks: BTreeMap<String, TaskSummary>,
     pub episodes: Vec<Played>,
 }
@@ -163,8 +167,9 @@ impl Keeper<'_> {
     fn kept(&self, task: &Task, seed: u32) -> Option<Played> {
         let bytes = std::fs::read(self.folder.join(file_name(task, seed))).ok()?;
         let kept: Played = serde_json::from_slice(&bytes).ok()?;
-        let rules = (kept.policy, kept.protocol, kept.build.as_str());
-        let same = rules == (self.plan.policy, self.plan.protocol, &self.build)
+        let plan = self.plan;
+        let rules = (kept.policy, kept.protocol, kept.locomotion.as_str(), kept.build.as_str());
+        let same = rules == (plan.policy, plan.protocol, plan.locomotion.name(), &self.build)
             && (kept.result.task.as_str(), kept.result.seed) == (task.id, seed)
             && self.recording(task, seed).is_none_or(|folder| folder.join(EpisodeResult::FILE_NAME).exists());
         same.then_some(kept)
@@ -177,7 +182,8 @@ impl Keeper<'_> {
 
     fn play(&self, task: &'static Task, seed: u32) -> Result<Played, EvaluationError> {
         let plan = self.plan;
-        let session = Session::start(task, seed, plan.protocol, self.recording(task, seed).as_deref())?;
+        let recording = self.recording(task, seed);
+        let session = Session::start(task, seed, plan.protocol, &plan.locomotion, recording.as_deref())?;
         let mut arena = InProcess(session);
         let outcome = match plan.policy {
             Policy::Expert => experts::perform(task, &mut arena),
@@ -187,6 +193,7 @@ impl Keeper<'_> {
         let episode = Played {
             policy: plan.policy,
             protocol: plan.protocol,
+            locomotion: plan.locomotion.name().into(),
             build: self.build.clone(),
             result,
             note: outcome.err().map(|error| error.to_string()),
@@ -246,7 +253,13 @@ fn summarise(plan: &Plan, episodes: Vec<Played>) -> Evaluation {
     for task in tasks.values_mut() {
         task.mean_env_steps /= task.episodes as f64;
     }
-    Evaluation { policy: plan.policy, protocol: plan.protocol, tasks, episodes }
+    Evaluation {
+        policy: plan.policy,
+        protocol: plan.protocol,
+        locomotion: plan.locomotion.name().into(),
+        tasks,
+        episodes,
+    }
 }
 
 fn was_reached(phases: &PhaseTimes, phase: &str) -> bool {
@@ -294,7 +307,8 @@ mod tests {
             state_hash: "00c0ffee00c0ffee".into(),
         };
         let (policy, protocol) = (keeper.plan.policy, keeper.plan.protocol);
-        Played { policy, protocol, build: keeper.build.clone(), result, note: None }
+        let locomotion = keeper.plan.locomotion.name().into();
+        Played { policy, protocol, locomotion, build: keeper.build.clone(), result, note: None }
     }
 
     #[test]
@@ -304,6 +318,7 @@ mod tests {
         let plan = Plan {
             policy: Policy::Expert,
             protocol: Protocol::Agentic,
+            locomotion: LocomotionChoice::Balance,
             tasks: vec![task],
             seeds: vec![7],
             jobs: 1,
@@ -325,6 +340,7 @@ mod tests {
             ("seed", |played| played.result.seed = 8),
             ("protocol", |played| played.protocol = Protocol::Benchmark),
             ("policy", |played| played.policy = Policy::Idle),
+            ("controller", |played| played.locomotion.push('0')),
             ("build", |played| played.build.push('0')),
         ] {
             let mut other = same.clone();

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+use tandem_sim::BaseLimits;
 use tandem_tools_spec::{Briefing, Instruction, TaskList};
 
 use crate::describe::task_list;
@@ -55,9 +56,9 @@ impl Instructions {
         Ok(instructions)
     }
 
-    /// The reply to `list_tasks` in these words.
-    pub fn task_list(&self) -> TaskList {
-        let mut list = task_list();
+    /// The reply to `list_tasks` in these words, where robots follow base commands within `limits`.
+    pub fn task_list(&self, limits: &BaseLimits) -> TaskList {
+        let mut list = task_list(limits);
         for task in &mut list.tasks {
             self.rephrase(&task.id, &mut task.instruction, &mut task.robots);
         }
@@ -85,6 +86,7 @@ impl Instructions {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::LocomotionChoice;
 
     fn read(text: &str) -> Result<Instructions, String> {
         let folder = tempfile::tempdir().unwrap();
@@ -97,8 +99,9 @@ mod tests {
     fn only_what_the_file_says_changes() {
         let list =
             read(r#"{"handover": {"joint": "Reicht die Flasche weiter.", "robots": {"B": "Nimm sie."}}}"#);
-        let list = list.unwrap().task_list();
-        let (own, handover) = (task_list(), &list.tasks[0]);
+        let limits = LocomotionChoice::default().limits();
+        let list = list.unwrap().task_list(&limits);
+        let (own, handover) = (task_list(&limits), &list.tasks[0]);
         assert_eq!(handover.instruction, "Reicht die Flasche weiter.");
         assert_eq!(handover.robots[0], own.tasks[0].robots[0]);
         assert_eq!(handover.robots[1].instruction, "Nimm sie.");

@@ -34,6 +34,7 @@ impl RunFiles {
         task: &Task,
         seed: u32,
         protocol: Protocol,
+        locomotion: &str,
         world: &World,
     ) -> Result<RunFiles, EpisodeError> {
         std::fs::create_dir_all(folder).map_err(|source| OutputError::Io { path: folder.into(), source })?;
@@ -42,6 +43,7 @@ impl RunFiles {
             task: task.id.into(),
             seed,
             protocol,
+            locomotion: locomotion.into(),
             robots: robots
                 .map(|robot| RecordedRobot { name: robot.name.clone(), model: robot.model.clone() })
                 .collect(),

@@ -10,7 +10,6 @@ use tandem_tools_spec::{
     StatusReply, StopReason, ToolCall, ToolReply,
 };
 
-use crate::EpisodeError;
 use crate::convert::rounded;
 use crate::describe;
 use crate::facts::Facts;
@@ -22,6 +21,7 @@ use crate::protocol::{Clock, Rules, ThinkingClock, monotonic, rules};
 use crate::run_files::RunFiles;
 use crate::scorekeeper::Scorekeeper;
 use crate::tasks::Task;
+use crate::{EpisodeError, LocomotionChoice};
 
 /// One episode from start to result.
 pub struct Session {
@@ -60,14 +60,15 @@ pub struct Checkpoint {
 }
 
 impl Session {
-    /// Builds the world of `task` under `seed` and runs the initial hold. With a folder, the episode is recorded there.
+    /// Builds the world of `task` under `seed`, with robots that walk by `locomotion`, and runs the initial hold. With a folder, the episode is recorded there.
     pub fn start(
         task: &'static Task,
         seed: u32,
         protocol: Protocol,
+        locomotion: &LocomotionChoice,
         folder: Option<&Path>,
     ) -> Result<Session, EpisodeError> {
-        Session::start_with_clock(task, seed, protocol, folder, monotonic())
+        Session::start_with_clock(task, seed, protocol, locomotion, folder, monotonic())
     }
 
     /// As [`Session::start`], with the policy's wall clock read from `clock`.
@@ -75,10 +76,14 @@ impl Session {
         task: &'static Task,
         seed: u32,
         protocol: Protocol,
+        locomotion: &LocomotionChoice,
         folder: Option<&Path>,
         clock: Clock,
     ) -> Result<Session, EpisodeError> {
-        let world = World::new(&world_spec(task, seed))?;
+        let mut world = World::new(&world_spec(task, seed))?;
+        for robot in 0..world.robots().len() {
+            world.set_locomotion(robot, locomotion.controller());
+        }
         let rest = world.rest_command(0);
         let body = UpperBody::new(tandem_sim::assets::robot(tandem_sim::assets::DEFAULT_ROBOT)?, &rest)?;
         let body = Arc::new(body);
@@ -86,7 +91,7 @@ impl Session {
             (0..world.robots().len()).map(|robot| Motion::new(&body, &world.rest_command(robot))).collect();
         let rules = rules(protocol, task);
         let files = match folder {
-            Some(folder) => Some(RunFiles::create(folder, task, seed, protocol, &world)?),
+            Some(folder) => Some(RunFiles::create(folder, task, seed, protocol, locomotion.name(), &world)?),
             None => None,
         };
         let mut session = Session {

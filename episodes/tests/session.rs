@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
 use tandem_episodes::experts::{self, Arena, ExpertError};
-use tandem_episodes::{Clock, EpisodeError, Facts, Session, facts, monotonic, tasks};
+use tandem_episodes::{Clock, EpisodeError, Facts, LocomotionChoice, Session, facts, monotonic, tasks};
 use tandem_sim::{Side, Vector};
 use tandem_tools_spec::{
     CheckReach, CommandReply, EndReason, Finish, GetRobotState, GetStatus, JointChunk, MoveWrists, Observe,
@@ -14,7 +14,15 @@ use tandem_tools_spec::{
 };
 
 fn start(task: &str, seed: u32, protocol: Protocol, clock: Clock) -> Session {
-    Session::start_with_clock(tasks::find(task).unwrap(), seed, protocol, None, clock).unwrap()
+    Session::start_with_clock(
+        tasks::find(task).unwrap(),
+        seed,
+        protocol,
+        &LocomotionChoice::Balance,
+        None,
+        clock,
+    )
+    .unwrap()
 }
 
 fn handover(seed: u32) -> Session {

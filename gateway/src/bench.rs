@@ -2,12 +2,17 @@
 
 use std::{error::Error, path::Path};
 
-use tandem_episodes::bench::CaseReport;
+use tandem_episodes::{LocomotionChoice, bench::CaseReport};
 
-/// Plays the locomotion bench, prints a line per case as it ends, and writes JSON if `json` names a file.
-pub fn locomotion(cases: &str, seeds: usize, json: Option<&Path>) -> Result<(), Box<dyn Error>> {
+/// Plays the locomotion bench by controllers of `choice`, prints a line per case as it ends, and writes JSON if `json` names a file.
+pub fn locomotion(
+    choice: &LocomotionChoice,
+    cases: &str,
+    seeds: usize,
+    json: Option<&Path>,
+) -> Result<(), Box<dyn Error>> {
     println!("{}", CaseReport::HEAD);
-    let report = tandem_episodes::bench::locomotion(cases, seeds, |case| println!("{case}"))?;
+    let report = tandem_episodes::bench::locomotion(choice, cases, seeds, |case| println!("{case}"))?;
     if let Some(path) = json {
         std::fs::write(path, serde_json::to_string_pretty(&report)?)?;
     }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use tandem_episodes::{
+    LocomotionChoice, SimError,
     evaluation::{Plan, Policy},
     tasks::Task,
 };
@@ -40,6 +41,8 @@ pub enum Command {
         /// Folder that the results are written to, one folder per episode.
         #[arg(long, env = "TANDEM_RUNS", default_value = "runs", value_name = "DIR")]
         runs: PathBuf,
+        #[command(flatten)]
+        locomotion: LocomotionFlag,
     },
     /// Play tasks over seeds in parallel worlds and count the phases reached. Goes on where an interrupted run stopped.
     Evaluate {
@@ -91,6 +94,23 @@ pub struct EpisodeChoice {
     /// Worlds that run side by side.
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub jobs: usize,
+    #[command(flatten)]
+    pub locomotion: LocomotionFlag,
+}
+
+/// The base controller on the command line.
+#[derive(Debug, Args)]
+pub struct LocomotionFlag {
+    /// ONNX file with a velocity policy for the G1 in place of our own base controller.
+    #[arg(long = "locomotion", env = "TANDEM_LOCOMOTION", value_name = "FILE")]
+    pub file: Option<PathBuf>,
+}
+
+impl LocomotionFlag {
+    /// Reads and checks the file.
+    pub fn load(&self) -> Result<LocomotionChoice, SimError> {
+        LocomotionChoice::from_file(self.file.as_deref())
+    }
 }
 
 /// Tasks named on the command line.
@@ -121,8 +141,8 @@ pub enum ProtocolChoice {
 
 impl EpisodeChoice {
     /// The plan to play these episodes by `policy`.
-    pub fn plan(self, policy: PolicyChoice, record: bool) -> Plan {
-        Plan {
+    pub fn plan(self, policy: PolicyChoice, record: bool) -> Result<Plan, SimError> {
+        Ok(Plan {
             policy: match policy {
                 PolicyChoice::Expert => Policy::Expert,
                 PolicyChoice::Idle => Policy::Idle,
@@ -131,11 +151,12 @@ impl EpisodeChoice {
                 ProtocolChoice::Agentic => Protocol::Agentic,
                 ProtocolChoice::Benchmark => Protocol::Benchmark,
             },
+            locomotion: self.locomotion.load()?,
             tasks: self.tasks.0,
             seeds: self.seeds.0.collect(),
             jobs: self.jobs,
             record,
-        }
+        })
     }
 }
 
@@ -144,6 +165,8 @@ impl EpisodeChoice {
 pub enum LocomotionPart {
     /// Stand, walk, squat, carry, be pulled and pushed; report survival, errors and power per case.
     Bench {
+        #[command(flatten)]
+        locomotion: LocomotionFlag,
         /// Cases whose names contain one of these words, separated by commas.
         #[arg(long, default_value = "", value_name = "WORDS")]
         cases: String,
@@ -172,7 +195,7 @@ pub enum BenchPart {
 
 /// Prints the tasks as `list_tasks` has them.
 pub fn print_tasks() {
-    for task in tandem_episodes::task_list().tasks {
+    for task in tandem_episodes::task_list(&LocomotionChoice::default().limits()).tasks {
         println!("{}: {}", task.id, task.instruction);
         for phase in task.phases {
             let who = if phase.collaborative { "together" } else { "alone" };

@@ -3,7 +3,7 @@
 use std::{
     error::Error,
     net::{Ipv4Addr, SocketAddr},
-    path::Path,
+    path::{Path, PathBuf},
     sync::Arc,
 };
 
@@ -31,11 +31,17 @@ const FREE_PORT: u16 = 0;
 /// Of the episodes played, how many in a hundred have to reach the last phase.
 const PASS_PERCENT: usize = 80;
 
-/// Plays every seed in turn, recorded under `runs`, and prints what came of it.
-pub fn play_all(runs: &Path, seeds: Seeds) -> Result<Vec<ResultReply>, Box<dyn Error>> {
+/// Plays every seed in turn, recorded under `runs`, by robots that walk by the policy of a file if one is given, and prints
+/// what came of it.
+pub fn play_all(
+    runs: &Path,
+    seeds: Seeds,
+    locomotion: Option<PathBuf>,
+) -> Result<Vec<ResultReply>, Box<dyn Error>> {
     let flags = Layer {
         listen: Some(SocketAddr::from((Ipv4Addr::LOCALHOST, FREE_PORT))),
         runs: Some(runs.into()),
+        locomotion,
         ..Layer::default()
     };
     let server = Server::start(&Settings::resolve(flags, None)?)?;

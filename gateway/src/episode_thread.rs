@@ -9,7 +9,7 @@ use std::{
     },
 };
 
-use tandem_episodes::{EpisodeError, Facts, Session};
+use tandem_episodes::{EpisodeError, Facts, LocomotionChoice, Session};
 use tandem_tools_spec::{Briefing, Protocol, ResultReply, StartEpisode, ToolCall, ToolReply};
 use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 
@@ -41,6 +41,7 @@ impl EpisodeThread {
     pub async fn start(
         id: &str,
         args: StartEpisode,
+        locomotion: LocomotionChoice,
         folder: PathBuf,
         permit: OwnedSemaphorePermit,
     ) -> Result<(EpisodeThread, Briefing), ApiError> {
@@ -50,7 +51,7 @@ impl EpisodeThread {
         let thread_ended = ended.clone();
         let thread_folder = folder.clone();
         let thread = move || {
-            match open_session(&args, &thread_folder) {
+            match open_session(&args, &locomotion, &thread_folder) {
                 Ok((session, briefing)) => {
                     // A caller that went away during the start has dropped the inbox's other end, and serve returns.
                     let _ = started.send(Ok(briefing));
@@ -111,9 +112,14 @@ impl EpisodeThread {
     }
 }
 
-fn open_session(args: &StartEpisode, folder: &Path) -> Result<(Session, Briefing), EpisodeError> {
+fn open_session(
+    args: &StartEpisode,
+    locomotion: &LocomotionChoice,
+    folder: &Path,
+) -> Result<(Session, Briefing), EpisodeError> {
     let task = tandem_episodes::tasks::find(&args.task)?;
-    let session = Session::start(task, args.seed, args.protocol.unwrap_or(Protocol::Agentic), Some(folder))?;
+    let protocol = args.protocol.unwrap_or(Protocol::Agentic);
+    let session = Session::start(task, args.seed, protocol, locomotion, Some(folder))?;
     let briefing = session.briefing();
     Ok((session, briefing))
 }

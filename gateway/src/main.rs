@@ -30,9 +30,9 @@ fn run(cli: Cli) -> Result<ExitCode, Box<dyn std::error::Error>> {
             Server::start(&settings)?.run_until_signal();
             Ok(ExitCode::SUCCESS)
         }
-        Command::Demo { seeds, runs } => {
+        Command::Demo { seeds, runs, locomotion } => {
             log_to_stderr("warn");
-            let results = demo::play_all(&runs, seeds)?;
+            let results = demo::play_all(&runs, seeds, locomotion.file)?;
             Ok(if demo::passed(&results) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
         }
         Command::Bench { part: BenchPart::Ik { targets, json } } => {
@@ -40,15 +40,15 @@ fn run(cli: Cli) -> Result<ExitCode, Box<dyn std::error::Error>> {
             Ok(ExitCode::SUCCESS)
         }
         Command::Evaluate { policy, episodes, out } => {
-            evaluate::run(&episodes.plan(policy, false), &out)?;
+            evaluate::run(&episodes.plan(policy, false)?, &out)?;
             Ok(ExitCode::SUCCESS)
         }
         Command::Collect { episodes, out } => {
-            evaluate::run(&episodes.plan(PolicyChoice::Expert, true), &out)?;
+            evaluate::run(&episodes.plan(PolicyChoice::Expert, true)?, &out)?;
             Ok(ExitCode::SUCCESS)
         }
-        Command::Locomotion { part: LocomotionPart::Bench { cases, seeds, json } } => {
-            bench::locomotion(&cases, seeds, json.as_deref())?;
+        Command::Locomotion { part: LocomotionPart::Bench { locomotion, cases, seeds, json } } => {
+            bench::locomotion(&locomotion.load()?, &cases, seeds, json.as_deref())?;
             Ok(ExitCode::SUCCESS)
         }
         Command::Tasks => {

@@ -79,7 +79,7 @@ impl McpServer {
         match name {
             ListTasks::NAME => {
                 parse_args::<ListTasks>(args)?;
-                json_block(&self.app.table.instructions().task_list())
+                json_block(&self.app.table.task_list())
             }
             StartEpisode::NAME => json_block(&self.app.table.start(parse_args(args)?).await?),
             _ => self.call_episode(name, args).await,

@@ -58,7 +58,7 @@ async fn health(State(app): State<App>) -> Json<Value> {
 }
 
 async fn tasks(State(app): State<App>) -> Json<TaskList> {
-    Json(app.table.instructions().task_list())
+    Json(app.table.task_list())
 }
 
 async fn tools() -> Json<Vec<ToolSpec>> {

@@ -45,6 +45,7 @@ impl Server {
             settings.max_episodes,
             settings.runs.clone(),
             settings.instructions.clone(),
+            settings.locomotion.clone(),
         ));
         let app = App { table: table.clone(), max_body_bytes: settings.max_body_bytes };
         let (stop, stopped) = oneshot::channel::<()>();

@@ -7,7 +7,7 @@ use std::{
 
 use clap::Args;
 use serde::Deserialize;
-use tandem_episodes::{Instructions, InstructionsError};
+use tandem_episodes::{Instructions, InstructionsError, LocomotionChoice, SimError};
 
 /// One source of settings; what it leaves out comes from the next. The doc comments are the help text.
 #[derive(Debug, Clone, Default, PartialEq, Args, Deserialize)]
@@ -22,6 +22,9 @@ pub struct Layer {
     /// JSON file with instructions in place of the tasks' own: {"handover": {"joint": "...", "robots": {"A": "..."}}}.
     #[arg(long, env = "TANDEM_INSTRUCTIONS", value_name = "FILE")]
     pub instructions: Option<PathBuf>,
+    /// ONNX file with a velocity policy for the G1 in place of our own base controller.
+    #[arg(long, env = "TANDEM_LOCOMOTION", value_name = "FILE")]
+    pub locomotion: Option<PathBuf>,
     /// Episodes that may be held at once; each costs a thread and about 30 MB [default: 8].
     #[arg(long, env = "TANDEM_MAX_EPISODES", value_name = "N")]
     pub max_episodes: Option<u32>,
@@ -36,6 +39,7 @@ impl Layer {
             listen: self.listen.or(next.listen),
             runs: self.runs.or(next.runs),
             instructions: self.instructions.or(next.instructions),
+            locomotion: self.locomotion.or(next.locomotion),
             max_episodes: self.max_episodes.or(next.max_episodes),
             max_body_bytes: self.max_body_bytes.or(next.max_body_bytes),
         }
@@ -43,7 +47,7 @@ impl Layer {
 }
 
 /// Every setting, resolved.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Settings {
     /// Address to serve on; port 0 takes a free one.
     pub listen: SocketAddr,
@@ -51,6 +55,8 @@ pub struct Settings {
     pub runs: PathBuf,
     /// Instructions in place of the tasks' own.
     pub instructions: Instructions,
+    /// The base controller of every robot.
+    pub locomotion: LocomotionChoice,
     /// Episodes that may be held at once.
     pub max_episodes: u32,
     /// Largest request body that is read.
@@ -71,6 +77,9 @@ pub enum SettingsError {
     /// The file with instructions cannot be used.
     #[error(transparent)]
     Instructions(#[from] InstructionsError),
+    /// The policy for the robots' legs cannot be used.
+    #[error(transparent)]
+    Locomotion(#[from] SimError),
     /// The file is no TOML, or holds a setting that does not exist.
     #[error("{path}: {source}")]
     Parse {
@@ -96,6 +105,7 @@ impl Settings {
                 Some(path) => Instructions::read(path)?,
                 None => Instructions::default(),
             },
+            locomotion: LocomotionChoice::from_file(layer.locomotion.as_deref())?,
             max_episodes: layer.max_episodes.unwrap_or(8),
             max_body_bytes: layer.max_body_bytes.unwrap_or(2_000_000),
         })
@@ -123,6 +133,10 @@ mod tests {
         std::fs::write(&path, "max_episode = 3\n").unwrap();
         let text = Settings::resolve(Layer::default(), Some(&path)).unwrap_err().to_string();
         assert!(text.contains("max_episode`") && text.contains("`max_episodes`"), "{text}");
+
+        let flags = Layer { locomotion: Some(path.clone()), ..Layer::default() };
+        let text = Settings::resolve(flags, None).unwrap_err().to_string();
+        assert!(text.contains("is not an ONNX file") && text.contains("tandem-settings"), "{text}");
         std::fs::remove_file(&path).unwrap();
         assert!(Settings::resolve(Layer::default(), Some(&path)).is_err());
     }

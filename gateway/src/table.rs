@@ -9,8 +9,8 @@ use std::{
     },
 };
 
-use tandem_episodes::Instructions;
-use tandem_tools_spec::{ResultReply, StartEpisode, StartReply};
+use tandem_episodes::{Instructions, LocomotionChoice};
+use tandem_tools_spec::{ResultReply, StartEpisode, StartReply, TaskList};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::{episode_thread::EpisodeThread, problem::ApiError, run_folder};
@@ -24,11 +24,18 @@ pub struct EpisodeTable {
     closing: AtomicBool,
     runs: PathBuf,
     instructions: Instructions,
+    locomotion: LocomotionChoice,
 }
 
 impl EpisodeTable {
-    /// An empty table for at most `limit` episodes, recorded under `runs` and described by `instructions`.
-    pub fn new(limit: u32, runs: PathBuf, instructions: Instructions) -> EpisodeTable {
+    /// An empty table for at most `limit` episodes, recorded under `runs` and described by `instructions`, of robots that
+    /// walk by `locomotion`.
+    pub fn new(
+        limit: u32,
+        runs: PathBuf,
+        instructions: Instructions,
+        locomotion: LocomotionChoice,
+    ) -> EpisodeTable {
         EpisodeTable {
             episodes: Mutex::default(),
             places: Arc::new(Semaphore::new(limit as usize)),
@@ -36,6 +43,7 @@ impl EpisodeTable {
             closing: AtomicBool::new(false),
             runs,
             instructions,
+            locomotion,
         }
     }
 
@@ -45,16 +53,17 @@ impl EpisodeTable {
         let place = self.take_place().await?;
         let (id, folder) = run_folder::create(&self.runs, task.id, args.seed)
             .map_err(|error| ApiError::Internal(format!("no folder in {}: {error}", self.runs.display())))?;
-        let (episode, mut briefing) = EpisodeThread::start(&id, args, folder, place).await?;
+        let (episode, mut briefing) =
+            EpisodeThread::start(&id, args, self.locomotion.clone(), folder, place).await?;
         self.instructions.rephrase_briefing(&mut briefing);
         self.lock().insert(id.clone(), Arc::new(episode));
         tracing::info!(episode = id, "started");
         Ok(StartReply { episode_id: id, briefing })
     }
 
-    /// How tasks are described.
-    pub fn instructions(&self) -> &Instructions {
-        &self.instructions
+    /// The reply to `list_tasks`.
+    pub fn task_list(&self) -> TaskList {
+        self.instructions.task_list(&self.locomotion.limits())
     }
 
     /// The episode `id`.

@@ -54,6 +54,7 @@ impl TestServer {
             listen: "127.0.0.1:0".parse().expect("an address"),
             runs: runs.path().into(),
             instructions: Default::default(),
+            locomotion: Default::default(),
             max_episodes: 2,
             max_body_bytes: 2_000_000,
         };

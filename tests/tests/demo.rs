@@ -8,7 +8,7 @@ use tandem_tools_spec::ResultReply;
 
 fn play(runs: &Path) -> ResultReply {
     let seeds = "0".parse().expect("a seed");
-    demo::play_all(runs, seeds).expect("an episode").remove(0)
+    demo::play_all(runs, seeds, None).expect("an episode").remove(0)
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use tandem_episodes::evaluation::{Plan, Played, Policy, evaluate};
-use tandem_episodes::tasks;
+use tandem_episodes::{LocomotionChoice, tasks};
 use tandem_tools_spec::Protocol;
 
 fn plan(jobs: usize, seeds: Vec<u32>) -> Plan {
@@ -11,6 +11,7 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> Plan {
     Plan {
         policy: Policy::Expert,
         protocol: Protocol::Benchmark,
+        locomotion: LocomotionChoice::Balance,
         tasks: vec![handover],
         seeds,
         jobs,

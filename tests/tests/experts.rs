@@ -2,13 +2,14 @@
 
 use tandem_episodes::evaluation::InProcess;
 use tandem_episodes::experts::perform;
-use tandem_episodes::{Session, tasks};
+use tandem_episodes::{LocomotionChoice, Session, tasks};
 use tandem_tools_spec::Protocol;
 
 /// Plays a task and checks that all phases were reached in order and that nobody fell.
 fn solve(id: &str, seed: u32) {
     let task = tasks::find(id).expect("a task");
-    let session = Session::start(task, seed, Protocol::Benchmark, None).expect("the world can be built");
+    let session = Session::start(task, seed, Protocol::Benchmark, &LocomotionChoice::Balance, None)
+        .expect("the world can be built");
     let mut arena = InProcess(session);
     let outcome = perform(task, &mut arena);
     let result = arena.0.close().expect("nothing is written");

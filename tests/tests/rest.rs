@@ -136,4 +136,13 @@ fn tools_and_tasks_are_listed() {
     let tasks = server.get("/v1/tasks").ok();
     let handover = tasks["tasks"].as_array().into_iter().flatten().find(|task| task["id"] == "handover");
     assert_eq!(handover.and_then(|task| task["phases"].as_array()).map(Vec::len), Some(3), "{tasks}");
+
+    // What robots can do is known before the first episode, and it is what each robot of an episode can do.
+    let started =
+        server.post("/v1/episodes", &json!({ "task": "handover", "seed": 0, "protocol": "benchmark" })).ok();
+    for field in ["vx_m_s", "vy_m_s", "yaw_rate_rad_s", "pelvis_height_m"] {
+        let limits = &tasks["base_limits"][field];
+        assert!(limits["min"].as_f64() < limits["max"].as_f64(), "{field}: {limits}");
+        assert_eq!(&started["robots"][0][field], limits);
+    }
 }

@@ -34,7 +34,7 @@ pub use tools::observe::{CameraCalibration, CameraImage, Observation, Observe};
 pub use tools::query_depth::{DepthPoint, DepthReply, QueryDepth};
 pub use tools::send_joint_chunk::{ACTION_ROW_LEN, JointChunk, SendJointChunk, action_row_layout};
 pub use tools::start_episode::{
-    Briefing, Instruction, JointInfo, Range, RobotInfo, StartEpisode, StartReply,
+    BaseLimits, Briefing, Instruction, JointInfo, Range, RobotInfo, StartEpisode, StartReply,
 };
 pub use tools::wait::Wait;
 pub use tools::walk::{Walk, WalkMove};

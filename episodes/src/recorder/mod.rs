@@ -39,6 +39,8 @@ pub struct RecordingHeader {
     pub task: String,
     pub seed: u32,
     pub protocol: Protocol,
+    /// Which base controller the robots have.
+    pub locomotion: String,
     /// In the order of [`StepRecord::robots`].
     pub robots: Vec<RecordedRobot>,
 }
@@ -116,6 +118,7 @@ impl Recorder {
             ("task", header.task.as_str()),
             ("seed", &header.seed.to_string()),
             ("protocol", protocol_name(header.protocol)),
+            ("locomotion", header.locomotion.as_str()),
             ("robots", &names.join(",")),
             ("tandem_version", env!("CARGO_PKG_VERSION")),
         ];

@@ -36,6 +36,7 @@ fn recorder(folder: &Path, world: &World) -> Recorder {
         task: "handover".into(),
         seed: 7,
         protocol: Protocol::Agentic,
+        locomotion: "balance".into(),
         robots: robots.map(|r| RecordedRobot { name: r.name.clone(), model: r.model.clone() }).collect(),
     };
     Recorder::create(folder, header).unwrap()
@@ -151,6 +152,7 @@ fn a_recording_reads_back() {
     let metadata = metadata(&bytes);
     assert_eq!(metadata["episode"]["seed"], "7");
     assert_eq!(metadata["episode"]["protocol"], "agentic");
+    assert_eq!(metadata["episode"]["locomotion"], "balance");
     let recorded: EpisodeResult = serde_json::from_str(&metadata["result"]["result.json"]).unwrap();
     assert_eq!(recorded, result());
 }

@@ -3,10 +3,13 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Protocol, Tool, tools::start_episode::Instruction};
+use crate::{
+    Protocol, Tool,
+    tools::start_episode::{BaseLimits, Instruction},
+};
 
 /// List the tasks that start_episode can start: their instructions, the phases they are scored by, and the budgets of
-/// each protocol.
+/// each protocol; and how fast and how low the robots can move.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ListTasks {}
@@ -27,6 +30,8 @@ impl Tool for ListTasks {
 pub struct TaskList {
     /// Every task.
     pub tasks: Vec<TaskInfo>,
+    /// The base commands that the robots can follow, in every task.
+    pub base_limits: BaseLimits,
 }
 
 /// One task.

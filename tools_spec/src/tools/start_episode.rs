@@ -71,13 +71,21 @@ pub struct RobotInfo {
     pub robot: String,
     /// Its joints.
     pub joints: Vec<JointInfo>,
+    /// The base commands that its locomotion accepts.
+    #[serde(flatten)]
+    pub base_limits: BaseLimits,
+}
+
+/// The base commands that locomotion accepts; what lies beyond is moved to the limit and reported.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct BaseLimits {
     /// Forward velocity.
     pub vx_m_s: Range,
     /// Velocity to the left.
     pub vy_m_s: Range,
     /// Turning rate, counter-clockwise seen from above.
     pub yaw_rate_rad_s: Range,
-    /// Height of the pelvis above the floor.
+    /// Height of the pelvis above the floor. Where min equals max the robots cannot squat.
     pub pelvis_height_m: Range,
 }
 
