@@ -34,6 +34,8 @@ const SENSED: [(&str, usize); 5] = [
 const ACTIONS: [&str; 3] = ["action_joint_pos", "action_joint_pos_kp_gains", "action_joint_pos_kd_gains"];
 /// What a memory's output is called beyond the input's name.
 const FED_BACK: &str = "_out";
+/// Beyond the five frames that histories have, so that the actions in them have settled.
+const STEPS_TO_REMEMBER: usize = 25;
 
 /// What the network sees at one control step.
 #[derive(Clone, Debug)]
@@ -80,8 +82,6 @@ struct MemoryTensor {
     shape: Vec<usize>,
     /// Position of its next value among the outputs.
     output: usize,
-    /// Holds the network's own actions, which are zero before the first.
-    of_actions: bool,
 }
 
 impl Network {
@@ -159,7 +159,6 @@ impl Network {
                     memories.push(MemoryTensor {
                         shape: have.clone(),
                         output: output(&format!("{name}{FED_BACK}"))?,
-                        of_actions: name.contains("actions"),
                     });
                     have.clone()
                 }
@@ -185,19 +184,12 @@ impl Network {
         Ok(Network { name, plan, inputs, actions, memories })
     }
 
-    /// The memory of a robot that has been as in `observation` for as long as the histories reach, and has not acted.
+    /// The memory of a robot that has stood as in `observation` for half a second, acting as the policy wanted. One that
+    /// had not acted before would be thrown into the policy's own stance: it hops a third of a metre.
     pub(super) fn remember(&self, observation: &Observation) -> TractResult<Memory> {
         let mut memory = self.blank();
-        let histories = self.memories.iter().filter(|tensor| tensor.shape.len() == 3);
-        let frames = histories.map(|tensor| tensor.shape[1]).max().unwrap_or(0);
-        for _ in 0..frames {
-            let (_, mut next) = self.run(observation, &memory)?;
-            for (tensor, values) in self.memories.iter().zip(&mut next.0) {
-                if tensor.of_actions {
-                    values.fill(0.0);
-                }
-            }
-            memory = next;
+        for _ in 0..STEPS_TO_REMEMBER {
+            memory = self.run(observation, &memory)?.1;
         }
         Ok(memory)
     }
