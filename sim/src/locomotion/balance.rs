@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ground::soles;
 use super::load::Load;
+use super::observer::Observer;
 use super::stand::Stand;
 use super::step::Step;
 use super::{BaseCommand, BaseLimits, LegCommand, Locomotion};
@@ -32,6 +33,8 @@ const LEAST_STEPS: u32 = 2;
 const LARGEST_STAGGER_M: f32 = 0.12;
 const LARGEST_WIDTH_M: f32 = 0.36;
 const CAPTURED_M: f32 = 0.066;
+/// A robot that leans farther against a push would fall when the push ends.
+const LARGEST_LEAN_M: f32 = 0.1;
 
 /// Stands or steps; see the module's text.
 #[derive(Default)]
@@ -48,6 +51,7 @@ struct State {
     time_in_mode_s: f32,
     /// Where the pelvis rests over the middle of the soles, heading frame.
     pelvis_from_middle_m: Vector,
+    observer: Observer,
 }
 
 #[derive(Clone, Serialize, Deserialize)]
@@ -59,6 +63,7 @@ enum Mode {
 /// Capture point relative to the feet, in the heading frame.
 struct Stance {
     capture_m: Vector,
+    com_m: Vector,
     left_from_right_m: Vector,
 }
 
@@ -77,16 +82,19 @@ impl Locomotion for Balance {
         }
         state.time_in_mode_s += dt_s;
         let ground_m = soles(body).iter().map(|sole| sole.translation.z).fold(f32::INFINITY, f32::min);
-        let load = Load::of(body, ground_m);
+        state.observer.update(body.com_velocity_m_s, dt_s);
+        let load = Load::of(body, ground_m, state.observer.push_m_s2());
         state.change_mode(body, &load);
-        match &mut state.mode {
+        let (legs, expected_m_s2) = match &mut state.mode {
             Mode::Stand(stand) => stand.tick(body, &load, command.pelvis_height_m, dt_s),
             Mode::Step(step) => {
-                let legs = step.tick(body, &load, state.velocity, command.pelvis_height_m, dt_s);
+                let done = step.tick(body, &load, state.velocity, command.pelvis_height_m, dt_s);
                 state.heading_rad = step.heading_rad;
-                legs
+                done
             }
-        }
+        };
+        state.observer.expect(expected_m_s2);
+        legs
     }
 
     fn save(&self) -> Result<Vec<u8>, postcard::Error> {
@@ -115,6 +123,7 @@ impl State {
             velocity: [0.0; 3],
             time_in_mode_s: 0.0,
             pelvis_from_middle_m,
+            observer: Observer::default(),
         }
     }
 
@@ -128,18 +137,20 @@ impl State {
                     || stance.capture_m.x < -BACKWARD_M
                     || stance.capture_m.y.abs() > half_width_m + SIDEWAYS_M;
                 if (moving || lost) && self.time_in_mode_s > LEAST_STANDING_S {
-                    self.mode =
-                        Mode::Step(Step::start(body, load, self.heading_rad, stance.capture_m.y > 0.0));
+                    let left_carries = stance.capture_m.y > 0.0;
+                    self.mode = Mode::Step(Step::start(body, load, self.heading_rad, left_carries));
                     self.time_in_mode_s = 0.0;
                 }
             }
             Mode::Step(step) => {
-                let captured =
-                    stance.capture_m.x.abs() < CAPTURED_M && stance.capture_m.y.abs() < half_width_m;
+                let captured = stance.capture_m.x.abs() < CAPTURED_M
+                    && stance.capture_m.y.abs() < half_width_m
+                    && stance.com_m.x.abs() < LARGEST_LEAN_M
+                    && stance.com_m.y.abs() < half_width_m;
                 let feet_together = stance.left_from_right_m.x.abs() < LARGEST_STAGGER_M
                     && stance.left_from_right_m.y < LARGEST_WIDTH_M;
                 if !moving && step.just_landed() && step.steps() >= LEAST_STEPS && captured && feet_together {
-                    let stand = Stand::plant(body, self.heading_rad, Some(self.pelvis_from_middle_m));
+                    let stand = Stand::plant(body, self.heading_rad, Some((self.pelvis_from_middle_m, load)));
                     self.mode = Mode::Stand(stand);
                     self.time_in_mode_s = 0.0;
                 }
@@ -155,6 +166,7 @@ impl State {
         let into_heading = Rotation::from_rotation_z(-self.heading_rad);
         Stance {
             capture_m: into_heading * (capture_m - middle_m),
+            com_m: into_heading * (body.com_m - middle_m),
             left_from_right_m: into_heading * (left.translation - right.translation),
         }
     }

@@ -25,24 +25,63 @@ pub(super) fn soles(body: &WholeBody) -> [Pose; 2] {
     ["left_foot", "right_foot"].map(|site| body.world_from_site(site).unwrap_or(Pose::IDENTITY))
 }
 
+/// The point nearest to `point_m` where two planted feet can have their centre of pressure.
+pub(super) fn nearest_support_m(point_m: Vector, soles: [Pose; 2]) -> Vector {
+    let flat = |v: Vector| Vector::new(v.x, v.y, 0.0);
+    let across = flat(soles[0].translation - soles[1].translation);
+    let left_share = (flat(point_m - soles[1].translation).dot(across) / across.length_squared())
+        .clamp(SMALLEST_SHARE, 1.0 - SMALLEST_SHARE);
+    let middle_m = soles[0].translation * left_share + soles[1].translation * (1.0 - left_share);
+    let turn = soles[1].rotation.slerp(soles[0].rotation, left_share);
+    let inside = turn.inverse() * flat(point_m - middle_m);
+    let inside = Vector::new(
+        inside.x.clamp(-SOLE_HALF_LENGTH_M, SOLE_HALF_LENGTH_M),
+        inside.y.clamp(-SOLE_HALF_WIDTH_M, SOLE_HALF_WIDTH_M),
+        0.0,
+    );
+    middle_m + flat(turn * inside)
+}
+
+/// The net force nearest to `force_n` whose centre of pressure, with a moment about the centre of mass, lies within the
+/// feet: a trunk that stays upright matters more than where the robot drifts.
+pub(super) fn supported_force_n(
+    com_m: Vector,
+    force_n: Vector,
+    moment_n_m: Vector,
+    soles: [Pose; 2],
+) -> Vector {
+    let pressure_m = centre_of_pressure_m(com_m, force_n, moment_n_m, soles);
+    let height_m = com_m.z - pressure_m.z;
+    let change_m = nearest_support_m(pressure_m, soles) - pressure_m;
+    Vector::new(
+        force_n.x - change_m.x * force_n.z / height_m,
+        force_n.y - change_m.y * force_n.z / height_m,
+        force_n.z,
+    )
+}
+
+///   p = c + ( -(m_y + h f_x), m_x - h f_y ) / f_z,   h = height of c above the soles.
+fn centre_of_pressure_m(com_m: Vector, force_n: Vector, moment_n_m: Vector, soles: [Pose; 2]) -> Vector {
+    let ground_m = (soles[0].translation.z + soles[1].translation.z) * 0.5;
+    let height_m = com_m.z - ground_m;
+    let vertical_n = force_n.z.max(SMALLEST_VERTICAL_FORCE_N);
+    Vector::new(
+        com_m.x - (moment_n_m.y + height_m * force_n.x) / vertical_n,
+        com_m.y + (moment_n_m.x - height_m * force_n.y) / vertical_n,
+        ground_m,
+    )
+}
+
 /// Splits a net force (N) and a moment (N m) about the centre of mass over two feet, given by their sole centres
-/// (world). The centre of pressure of the net force,
-///   p = c + ( -(m_y + h f_x), m_x - h f_y ) / f_z,   h = height of c above the soles,
-/// is shared along the line between the soles; what is left moves each foot's own centre of pressure.
+/// (world). The centre of pressure is shared along the line between the soles; what is left moves each foot's own.
 pub(super) fn distribute(
     com_m: Vector,
     force_n: Vector,
     moment_n_m: Vector,
     soles: [Pose; 2],
 ) -> [FootForce; 2] {
-    let ground_m = (soles[0].translation.z + soles[1].translation.z) * 0.5;
-    let height_m = com_m.z - ground_m;
-    let vertical_n = force_n.z.max(SMALLEST_VERTICAL_FORCE_N);
-    let pressure_m = Vector::new(
-        com_m.x - (moment_n_m.y + height_m * force_n.x) / vertical_n,
-        com_m.y + (moment_n_m.x - height_m * force_n.y) / vertical_n,
-        ground_m,
-    );
+    let pressure_m = centre_of_pressure_m(com_m, force_n, moment_n_m, soles);
+    let ground_m = pressure_m.z;
     let flat = |v: Vector| Vector::new(v.x, v.y, 0.0);
     let across = flat(soles[0].translation - soles[1].translation);
     let along_line = flat(pressure_m - soles[1].translation).dot(across) / across.length_squared();

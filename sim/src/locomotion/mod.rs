@@ -4,11 +4,15 @@ mod agile;
 mod balance;
 pub mod bench;
 mod choice;
+mod effort;
+mod gait;
 mod ground;
 mod legs;
 mod load;
+mod observer;
 mod stand;
 mod step;
+mod swing;
 
 pub use agile::{Agile, Network};
 pub use balance::Balance;

@@ -8,7 +8,8 @@ use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
 use super::LegCommand;
-use super::ground::{distribute, leg_torques_n_m, soles};
+use super::effort::ground_force_n;
+use super::ground::{distribute, leg_torques_n_m, soles, supported_force_n};
 use super::legs::{LegAngles, inverse, rotation_vector_rad};
 use super::load::Load;
 use crate::robot::{LEG_JOINT_COUNT, LEGS, Side, WholeBody};
@@ -60,32 +61,55 @@ pub(super) struct Stand {
 }
 
 impl Stand {
-    /// Plants the feet where they are. `pelvis_from_middle_m` is where the pelvis rests relative to the middle of the
-    /// soles, in the heading frame; `None` keeps it where it is.
-    pub(super) fn plant(body: &WholeBody, heading_rad: f32, pelvis_from_middle_m: Option<Vector>) -> Stand {
+    /// Plants the feet where they are. `moving` is a robot's that comes to rest: where the pelvis rests relative to the
+    /// middle of the soles, in the heading frame, and what it leans against. `None` keeps the pelvis where it is.
+    pub(super) fn plant(body: &WholeBody, heading_rad: f32, moving: Option<(Vector, &Load)>) -> Stand {
         let pelvis = body.world_from_pelvis();
         let soles = soles(body);
         let middle_m = (soles[0].translation + soles[1].translation) * 0.5;
         let heading = Rotation::from_rotation_z(heading_rad);
-        let home_m = pelvis_from_middle_m.map_or(pelvis.translation, |rest_m| middle_m + heading * rest_m);
+        let home_m = moving.map_or(pelvis.translation, |(rest_m, _)| middle_m + heading * rest_m);
         let flat = |v: Vector| Vector::new(v.x, v.y, 0.0);
-        let moving = if pelvis_from_middle_m.is_some() { 1.0 } else { 0.0 };
-        Stand {
+        let mut stand = Stand {
             feet: Side::BOTH.map(|side| body.world_from_link[body.model.joints[LEGS[side.index()] + 5].link]),
             soles,
             home_m,
             offset_m: flat(pelvis.translation - home_m),
-            offset_rate_m_s: flat(body.com_velocity_m_s) * moving,
+            offset_rate_m_s: Vector::ZERO,
             tilt: heading.inverse() * pelvis.rotation,
             heading_rad,
             shift_m: Vector::ZERO,
             height_m: pelvis.translation.z - middle_m.z,
             q_rad: Side::BOTH.map(|side| std::array::from_fn(|i| body.q_rad[LEGS[side.index()] + i])),
+        };
+        if let Some((_, load)) = moving {
+            stand.offset_rate_m_s = flat(body.com_velocity_m_s);
+            stand.shift_m = stand.wanted_shift_m(body, load);
+            stand.offset_m -= stand.shift_m;
         }
+        stand
+    }
+
+    /// Shift of the pelvis from home that keeps the balance point within [`COM_ZONE_M`] of the middle of the feet.
+    fn wanted_shift_m(&self, body: &WholeBody, load: &Load) -> Vector {
+        let middle_m = (self.soles[0].translation + self.soles[1].translation) * 0.5;
+        let at_home_m = self.home_m + load.balance_point_m - body.world_from_pelvis().translation - middle_m;
+        let excess = |offset_m: f32| offset_m.clamp(-COM_ZONE_M, COM_ZONE_M) - offset_m;
+        Vector::new(
+            excess(at_home_m.x).clamp(-LARGEST_SHIFT_M[0], LARGEST_SHIFT_M[0]),
+            excess(at_home_m.y).clamp(-LARGEST_SHIFT_M[1], LARGEST_SHIFT_M[1]),
+            0.0,
+        )
     }
 
     /// One physics step towards a pelvis height over the soles.
-    pub(super) fn tick(&mut self, body: &WholeBody, load: &Load, height_m: f32, dt_s: f32) -> LegCommand {
+    pub(super) fn tick(
+        &mut self,
+        body: &WholeBody,
+        load: &Load,
+        height_m: f32,
+        dt_s: f32,
+    ) -> (LegCommand, Vector) {
         let rise_m = (height_m - self.height_m).clamp(-HEIGHT_RATE_M_S * dt_s, HEIGHT_RATE_M_S * dt_s);
         self.height_m += rise_m;
         let pull_m_s2 =
@@ -101,29 +125,38 @@ impl Stand {
         let goal_velocity_m_s = Vector::new(self.offset_rate_m_s.x, self.offset_rate_m_s.y, rise_m / dt_s);
         let torques = balance_torques_n_m(body, load, goal, goal_velocity_m_s);
         let gravity = body.gravity_torques_n_m();
+        let feedforward_n_m: [f32; 2 * LEG_JOINT_COUNT] = std::array::from_fn(|i| {
+            let (leg, own) = (i / LEG_JOINT_COUNT, i % LEG_JOINT_COUNT);
+            gravity[LEGS[leg] + own] + torques[leg][own]
+        });
         let joint = |i: usize| &body.model.joints[LEGS[i / LEG_JOINT_COUNT] + i % LEG_JOINT_COUNT];
-        LegCommand {
+        let mut push_n = Vector::ZERO;
+        for side in Side::BOTH {
+            let applied_n_m = std::array::from_fn(|own| {
+                let i = side.index() * LEG_JOINT_COUNT + own;
+                let (q_rad, qd_rad_s) =
+                    (body.q_rad[LEGS[side.index()] + own], body.qd_rad_s[LEGS[side.index()] + own]);
+                joint(i).kp_n_m_rad * (self.q_rad[side.index()][own] - q_rad)
+                    - joint(i).kd_n_m_s_rad * qd_rad_s
+                    + feedforward_n_m[i]
+            });
+            push_n += ground_force_n(body, side, &gravity, &applied_n_m);
+        }
+        let expected_m_s2 = push_n / body.model.mass_kg;
+        let legs = LegCommand {
             q_rad: std::array::from_fn(|i| self.q_rad[i / LEG_JOINT_COUNT][i % LEG_JOINT_COUNT]),
             kp_n_m_rad: std::array::from_fn(|i| joint(i).kp_n_m_rad),
             kd_n_m_s_rad: std::array::from_fn(|i| joint(i).kd_n_m_s_rad),
-            feedforward_n_m: std::array::from_fn(|i| {
-                let (leg, own) = (i / LEG_JOINT_COUNT, i % LEG_JOINT_COUNT);
-                gravity[LEGS[leg] + own] + torques[leg][own]
-            }),
-        }
+            feedforward_n_m,
+        };
+        (legs, Vector::new(expected_m_s2.x, expected_m_s2.y, 0.0))
     }
 
     /// Pelvis pose (world) that keeps the centre of mass within [`COM_ZONE_M`] of the middle of the planted feet,
     /// as near to home as that allows.
     fn pelvis_goal(&mut self, body: &WholeBody, load: &Load, dt_s: f32) -> Pose {
         let middle_m = (self.soles[0].translation + self.soles[1].translation) * 0.5;
-        let com_from_pelvis_m = load.balance_point_m - body.world_from_pelvis().translation;
-        let at_home_m = self.home_m + com_from_pelvis_m - middle_m;
-        let excess = |offset_m: f32| offset_m.clamp(-COM_ZONE_M, COM_ZONE_M) - offset_m;
-        let wanted_m = Vector::new(excess(at_home_m.x), excess(at_home_m.y), 0.0);
-        self.shift_m += (wanted_m - self.shift_m) * (dt_s / PELVIS_SHIFT_TIME_S);
-        self.shift_m.x = self.shift_m.x.clamp(-LARGEST_SHIFT_M[0], LARGEST_SHIFT_M[0]);
-        self.shift_m.y = self.shift_m.y.clamp(-LARGEST_SHIFT_M[1], LARGEST_SHIFT_M[1]);
+        self.shift_m += (self.wanted_shift_m(body, load) - self.shift_m) * (dt_s / PELVIS_SHIFT_TIME_S);
         let lean_rad = ((LEAN_BELOW_M - self.height_m) * LEAN_RAD_PER_M).clamp(0.0, LARGEST_LEAN_RAD);
         let mut position_m = self.home_m + self.offset_m + self.shift_m;
         position_m.z = middle_m.z + self.height_m;
@@ -163,7 +196,10 @@ fn balance_torques_n_m(
     let tilt_rad = rotation_vector_rad(goal.rotation * pelvis.rotation.inverse());
     let moment_n_m =
         tilt_rad * TRUNK_STIFFNESS_N_M_RAD - body.pelvis_angular_velocity_rad_s * TRUNK_DAMPING_N_M_S_RAD;
-    let feet = distribute(body.com_m, force_n - load.force_n, moment_n_m - load.moment_n_m, soles(body));
+    let soles = soles(body);
+    let ground_force_n =
+        supported_force_n(body.com_m, force_n - load.force_n, moment_n_m - load.moment_n_m, soles);
+    let feet = distribute(body.com_m, ground_force_n, moment_n_m - load.moment_n_m, soles);
     let turning_n_m = Vector::new(0.0, 0.0, moment_n_m.z * 0.5);
     Side::BOTH.map(|side| leg_torques_n_m(body, side, feet[side.index()], turning_n_m))
 }

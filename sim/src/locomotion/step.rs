@@ -2,65 +2,86 @@
 //!
 //! With x the balance point, v its velocity and w = sqrt(g / h), the capture point xi = x + v / w obeys
 //!   xi' = w (xi - p),   p the centre of pressure,
-//! so that a foot put down at  u = p + (xi - p) e^{w t} - b  when t of the step remains leaves the capture point the
-//! wanted offset b from the new foot. b is the one of a steady gait at the commanded velocity:
-//!   b = v T / (e^{w T} - 1)  along the motion,   width / (1 + e^{w T})  to the inside.
+//! which moves from the old foot to the new one within the transfer time and stays there. A foot put down at
+//! u = xi(T) - b  leaves the capture point the offset b of a steady gait from the new foot; see [`Gait`].
 //! Source: Englsberger, Ott, Albu-Schaeffer 2015; Khadiv et al. 2016.
+
+use std::f32::consts::{PI, TAU};
 
 use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
 use super::LegCommand;
-use super::ground::{FootForce, distribute, leg_torques_n_m, soles};
-use super::legs::{LegAngles, inverse, rotation_vector_rad};
+use super::effort::{Contact, Motion, Torques, leg_torques};
+use super::gait::{Gait, PERIOD_S, TRANSFER_S, recoil};
+use super::ground::{nearest_support_m, soles};
+use super::legs::rotation_vector_rad;
 use super::load::Load;
-use crate::robot::{LEG_JOINT_COUNT, LEGS, Side, WholeBody};
+use super::swing::{SOLE_IN_FOOT_M, SWING_S, Swing};
+use crate::robot::{Acceleration, LEG_JOINT_COUNT, LEGS, Side, WholeBody};
 use crate::world::GRAVITY_M_S2;
 
-/// Length of a step and distance of the feet, found by random search on a prototype.
-const PERIOD_S: f32 = 0.262;
-const WIDTH_M: f32 = 0.254;
-const SWING_HEIGHT_M: f32 = 0.056;
 /// The feet never cross.
-const LEAST_SPREAD_M: f32 = 0.13;
-/// Part of the capture point's error that the centre of pressure of the carrying foot works against.
-const CAPTURE_GAIN: f32 = 1.033;
-/// Position loop: a steady gait falls short of its command by a fifth.
-const VELOCITY_GAIN: f32 = 1.3;
+const LEAST_SPREAD_M: f32 = 0.12;
+const LARGEST_SPREAD_M: f32 = 0.45;
+const REACH_M: [f32; 2] = [-0.3, 0.4];
+/// Part of the capture point's error that the centre of pressure of the carrying foot works against, and how far the
+/// pressure goes from the sole's centre: along and across the foot.
+const CAPTURE_GAIN: f32 = 1.0;
+const PRESSURE_M: [f32; 2] = [0.065, 0.018];
+const SHIFT_GAIN: f32 = 3.0;
+/// The first foot lifts when the capture point is this near to where a step would have left it, or when a robot that
+/// falls forward or backward has no time to shift.
+const SHIFTED_M: f32 = 0.012;
+const LATEST_M: f32 = 0.1;
+/// Position loop: a steady gait falls a little short of its command.
 const POSITION_GAIN_1_S: f32 = 0.8;
 const BIAS_GAIN_1_S2: f32 = 0.3;
+const LARGEST_CORRECTION_M_S: [f32; 2] = [0.3, 0.12];
 /// A robot that was pushed farther than this off its way does not come back for it.
 const LEASH_M: f32 = 0.4;
+/// One foot holds little against turning: a robot that is turned by force gives way, and turns back slowly.
+const HEADING_LEASH_RAD: f32 = 0.12;
+const RETURN_RAD_S: f32 = 0.4;
 const LIFT_STIFFNESS_1_S2: f32 = 111.0;
 const LIFT_DAMPING_1_S: f32 = 16.0;
-const TRUNK_STIFFNESS_N_M_RAD: f32 = 200.0;
-const TRUNK_DAMPING_N_M_S_RAD: f32 = 25.0;
-const LARGEST_MOMENT_N_M: f32 = 60.0;
+/// Vertical acceleration stays within these parts of gravity.
+const LIFT_RANGE: [f32; 2] = [-0.3, 0.6];
+const TRUNK_STIFFNESS_1_S2: f32 = 150.0;
+const TRUNK_DAMPING_1_S: f32 = 22.0;
+const LARGEST_TURN_RAD_S2: f32 = 50.0;
+/// Turning about the vertical is the least of a robot's worries.
+const YAW_PART: f32 = 0.5;
 /// Walking is neither stretched nor crouched.
-const HEIGHT_RANGE_M: [f32; 2] = [0.66, 0.745];
-const HEIGHT_RATE_M_S: f32 = 0.15;
+const HIGHEST_M: f32 = 0.745;
+const LOWEST_M: f32 = 0.62;
+const RAISING_M_S: f32 = 0.15;
+const LOWERING_M_S: f32 = 0.4;
+/// From the hip's roll axis to the ankle roll link of a leg that is bent enough.
+const LEG_M: f32 = 0.58;
+const ANKLE_HEIGHT_M: f32 = 0.053;
+/// A step ends when the foot meets the ground in the last part of the swing, or is overdue.
+const EARLIEST_LANDING: f32 = 0.65;
+const LATEST_LANDING: f32 = 1.25;
+const GROUND_M: f32 = 0.002;
 
-/// Ankle roll link to the centre of its sole.
-const SOLE_IN_FOOT_M: Vector = Vector::new(0.035, 0.0, -0.035);
-
-const SWING_KP_N_M_RAD: [f32; LEG_JOINT_COUNT] = [200.0, 200.0, 120.0, 200.0, 40.0, 40.0];
-const SWING_KD_N_M_S_RAD: [f32; LEG_JOINT_COUNT] = [6.0, 6.0, 4.0, 6.0, 1.5, 1.5];
 /// A leg that carries is driven by torque; the drives need some stiffness, around the measured angle.
-const STANCE_KP_N_M_RAD: f32 = 1.0;
-const STANCE_KD_N_M_S_RAD: f32 = 1.0;
+const KP_N_M_RAD: f32 = 1.0;
+const KD_N_M_S_RAD: f32 = 1.0;
 
 /// A robot that steps; see the module's text.
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct Step {
     pub(super) heading_rad: f32,
+    /// Where the commands alone would have turned the heading.
+    goal_rad: f32,
     stance: Side,
-    /// Both feet still carry: the capture point moves over the first stance foot.
+    /// Before the first step: the capture point moves over the first stance foot.
     shifting: bool,
+    /// Since the stance foot landed.
     time_s: f32,
     steps: u32,
-    swing_from: Pose,
-    swing_to: Pose,
-    swing_q_rad: LegAngles,
+    swing: Swing,
     height_m: f32,
     /// Where the balance point should be by now, and what the velocity command lacked so far.
     reference_m: Vector,
@@ -74,18 +95,17 @@ impl Step {
         let ground_m = soles(body)[stance.index()].translation.z;
         let mut step = Step {
             heading_rad,
+            goal_rad: heading_rad,
             stance,
             shifting: true,
             time_s: 0.0,
             steps: 0,
-            swing_from: Pose::IDENTITY,
-            swing_to: Pose::IDENTITY,
-            swing_q_rad: [0.0; LEG_JOINT_COUNT],
+            swing: Swing::default(),
             height_m: body.world_from_pelvis().translation.z - ground_m,
             reference_m: load.balance_point_m,
             bias_m_s: [0.0; 2],
         };
-        step.lift_off(body);
+        step.swing.plant(body, step.stance.other());
         step
     }
 
@@ -98,20 +118,7 @@ impl Step {
         self.time_s == 0.0 && !self.shifting
     }
 
-    fn swing(&self) -> Side {
-        if self.stance == Side::Left { Side::Right } else { Side::Left }
-    }
-
-    /// The swing foot starts from where it is.
-    fn lift_off(&mut self, body: &WholeBody) {
-        let swing = self.swing();
-        self.time_s = 0.0;
-        self.swing_from = body.world_from_link[body.model.joints[LEGS[swing.index()] + 5].link];
-        self.swing_to = self.swing_from;
-        self.swing_q_rad = std::array::from_fn(|i| body.q_rad[LEGS[swing.index()] + i]);
-    }
-
-    /// One physics step.
+    /// One physics step; also gives the horizontal acceleration of the centre of mass that it should bring.
     pub(super) fn tick(
         &mut self,
         body: &WholeBody,
@@ -119,74 +126,115 @@ impl Step {
         velocity: [f32; 3],
         height_m: f32,
         dt_s: f32,
-    ) -> LegCommand {
+    ) -> (LegCommand, Vector) {
         let soles = soles(body);
         let ground_m = soles[self.stance.index()].translation.z;
-        self.heading_rad += velocity[2] * dt_s;
+        self.goal_rad += velocity[2] * dt_s;
+        let return_rad =
+            wrapped(self.goal_rad - self.heading_rad).clamp(-RETURN_RAD_S * dt_s, RETURN_RAD_S * dt_s);
+        self.heading_rad += velocity[2] * dt_s + return_rad;
+        let forward = body.world_from_pelvis().rotation * Vector::X;
+        let ahead_rad = wrapped(self.heading_rad - forward.y.atan2(forward.x));
+        self.heading_rad += ahead_rad.clamp(-HEADING_LEASH_RAD, HEADING_LEASH_RAD) - ahead_rad;
         let heading = Rotation::from_rotation_z(self.heading_rad);
         let (ahead, left) = (heading * Vector::X, heading * Vector::Y);
-        let balance_m = load.balance_point_m;
-        let com_height_m = (balance_m.z - ground_m).max(0.4);
+        let com_height_m = (body.com_m.z - ground_m).max(0.4);
         let rate_1_s = (GRAVITY_M_S2 / com_height_m).sqrt();
+        let balance_m = load.balance_point_m;
         let capture_m = flat(balance_m + body.com_velocity_m_s / rate_1_s);
-        let velocity_m_s = self.corrected_velocity(velocity, balance_m, ahead, left, dt_s);
-        let growth = (rate_1_s * PERIOD_S).exp();
-        let outwards = if self.stance == Side::Left { 1.0 } else { -1.0 };
+        let [forward_m_s, left_m_s] = self.corrected_velocity(velocity, balance_m, ahead, left, dt_s);
+        let outside = if self.stance == Side::Left { left } else { -left };
+        let gait = Gait::new(rate_1_s, ahead * forward_m_s + left * left_m_s, outside);
         let stance_m = flat(soles[self.stance.index()].translation);
-        let inside_m = WIDTH_M / (1.0 + growth);
-        let mut pressure_m;
-        if self.shifting {
-            let target_m = stance_m - left * (outwards * inside_m);
-            pressure_m = capture_m + (capture_m - target_m);
-            if (capture_m - target_m).dot(left) * outwards > -0.012 {
+        let old_m = flat(soles[self.stance.other().index()].translation);
+        let pressure_m = if self.shifting {
+            // As a step that just ended would leave it.
+            let target_m = stance_m + (gait.step_m + gait.offset_m) * (-rate_1_s * SWING_S).exp();
+            let late = (capture_m - (stance_m + old_m) * 0.5).dot(ahead).abs() > LATEST_M;
+            if (target_m - capture_m).dot(outside) < SHIFTED_M || late {
                 self.shifting = false;
-                self.lift_off(body);
             }
+            nearest_support_m(capture_m + (capture_m - target_m) * SHIFT_GAIN, soles)
         } else {
             self.time_s += dt_s;
             let remaining_s = (PERIOD_S - self.time_s).max(0.0);
-            let along_m = (ahead * velocity_m_s[0] + left * velocity_m_s[1]) * (PERIOD_S / (growth - 1.0));
-            let wanted_m =
-                stance_m + (along_m - left * (outwards * inside_m)) * (rate_1_s * self.time_s).exp();
+            let wanted_m = stance_m + (gait.step_m + gait.offset_m) * (-rate_1_s * remaining_s).exp();
             let sole = soles[self.stance.index()].rotation;
+            let most_m = Vector::new(PRESSURE_M[0], PRESSURE_M[1], 0.0);
             let correction_m = sole.inverse() * ((capture_m - wanted_m) * CAPTURE_GAIN);
-            let correction_m =
-                Vector::new(correction_m.x.clamp(-0.05, 0.06), correction_m.y.clamp(-0.018, 0.018), 0.0);
-            pressure_m = flat(stance_m + sole * correction_m);
-            let landing_capture_m = pressure_m + (capture_m - pressure_m) * (rate_1_s * remaining_s).exp();
-            let from_stance_m = landing_capture_m - (along_m + left * (outwards * inside_m)) - stance_m;
-            let reach_m = from_stance_m.dot(ahead).clamp(-0.35, 0.45);
-            let spread_m = (from_stance_m.dot(left) * -outwards).clamp(LEAST_SPREAD_M, 0.45);
+            let correction_m = Vector::new(correction_m.x, correction_m.y, 0.0).clamp(-most_m, most_m);
+            let carrying_m = flat(stance_m + sole * correction_m);
+            let share = (self.time_s / TRANSFER_S).min(1.0);
+            let now_m = old_m + (carrying_m - old_m) * share;
+            let ramp_s = (TRANSFER_S - self.time_s).max(0.0);
+            let landing_m = gait.predict(capture_m, now_m, carrying_m, ramp_s, remaining_s) - gait.offset_m;
+            let recoil = recoil(rate_1_s, remaining_s.min(SWING_S));
+            let landing_m = (landing_m + flat(self.swing.sole_m()) * recoil) / (1.0 + recoil) - stance_m;
+            let reach_m = landing_m.dot(ahead).clamp(REACH_M[0], REACH_M[1]);
+            let spread_m = (-landing_m.dot(outside)).clamp(LEAST_SPREAD_M, LARGEST_SPREAD_M);
             let turned = Rotation::from_rotation_z(self.heading_rad + velocity[2] * remaining_s);
-            let mut sole_m = stance_m + ahead * reach_m - left * (outwards * spread_m);
+            let mut sole_m = stance_m + ahead * reach_m - outside * spread_m;
             sole_m.z = ground_m;
-            if remaining_s > 0.04 {
-                self.swing_to = Pose::from_parts(sole_m - turned * SOLE_IN_FOOT_M, turned);
-            }
-        }
-        let gravity = body.gravity_torques_n_m();
-        let mut legs = carrying_legs(body);
-        if !self.shifting {
-            self.drive_swing(body, &mut legs, dt_s);
-            let swing = self.swing();
-            let clear_m = clearance_m(&soles[swing.index()]) - ground_m;
-            if self.time_s >= PERIOD_S * 1.1 || (self.time_s > 0.7 * PERIOD_S && clear_m < 0.002) {
-                self.stance = swing;
-                self.steps += 1;
-                self.lift_off(body);
-                pressure_m = flat(soles[self.stance.index()].translation);
-                legs = carrying_legs(body);
-            }
-        }
-        let rise = (height_m.clamp(HEIGHT_RANGE_M[0], HEIGHT_RANGE_M[1]) - self.height_m)
-            .clamp(-HEIGHT_RATE_M_S * dt_s, HEIGHT_RATE_M_S * dt_s);
+            self.swing.advance(
+                Pose::from_parts(sole_m - turned * SOLE_IN_FOOT_M, turned),
+                self.time_s - TRANSFER_S,
+                dt_s,
+            );
+            now_m
+        };
+        let wanted_m = height_m.min(HIGHEST_M).min(self.within_reach_m(body)).max(LOWEST_M);
+        let rise = (wanted_m - self.height_m).clamp(-LOWERING_M_S * dt_s, RAISING_M_S * dt_s);
         self.height_m += rise;
-        let torques = self.carry(body, load, pressure_m, &soles, com_height_m, heading);
-        for (i, feedforward_n_m) in legs.feedforward_n_m.iter_mut().enumerate() {
-            let (leg, own) = (i / LEG_JOINT_COUNT, i % LEG_JOINT_COUNT);
-            *feedforward_n_m += gravity[LEGS[leg] + own] + torques[leg][own];
+        let torques = self.carry(body, load, pressure_m, ground_m, heading);
+        self.land(body, &soles, ground_m);
+        let legs = LegCommand {
+            q_rad: std::array::from_fn(|i| body.q_rad[leg_joint(i)]),
+            kp_n_m_rad: [KP_N_M_RAD; 12],
+            kd_n_m_s_rad: [KD_N_M_S_RAD; 12],
+            feedforward_n_m: std::array::from_fn(|i| {
+                // The drives' dampers are not wanted.
+                let own_n_m = torques.torque_n_m[i / LEG_JOINT_COUNT][i % LEG_JOINT_COUNT];
+                own_n_m + KD_N_M_S_RAD * body.qd_rad_s[leg_joint(i)]
+            }),
+        };
+        (legs, torques.acceleration_m_s2)
+    }
+
+    /// Largest height of the pelvis at which both legs reach: the carrying one now, the other where it will land.
+    fn within_reach_m(&self, body: &WholeBody) -> f32 {
+        let pelvis_m = body.world_from_pelvis().translation;
+        let remaining_s = (PERIOD_S - self.time_s).max(0.0);
+        let height_m = |side: Side| {
+            let first = LEGS[side.index()];
+            let (hip_m, _) = body.joint_axis(first + 1);
+            let ankle_m = body.world_from_link[body.model.joints[first + 5].link].translation;
+            let away_m = if side == self.stance || self.shifting {
+                ankle_m - hip_m
+            } else {
+                self.swing.goal_m() - hip_m - body.com_velocity_m_s * remaining_s
+            };
+            let away_m = flat(away_m).length().min(0.8 * LEG_M);
+            pelvis_m.z - hip_m.z + ANKLE_HEIGHT_M + (LEG_M * LEG_M - away_m * away_m).sqrt()
+        };
+        height_m(Side::Left).min(height_m(Side::Right))
+    }
+
+    /// Exchanges the feet when the swinging one has met the ground.
+    fn land(&mut self, body: &WholeBody, soles: &[Pose; 2], ground_m: f32) {
+        let swinging_s = self.time_s - TRANSFER_S;
+        let swing = self.stance.other();
+        if self.shifting || swinging_s < 0.0 {
+            self.swing.plant(body, swing);
+            return;
         }
-        legs
+        let clear_m = clearance_m(&soles[swing.index()]) - ground_m;
+        let met = swinging_s > EARLIEST_LANDING * SWING_S && clear_m < GROUND_M;
+        if met || swinging_s >= LATEST_LANDING * SWING_S {
+            self.stance = swing;
+            self.steps += 1;
+            self.time_s = 0.0;
+            self.swing.plant(body, self.stance.other());
+        }
     }
 
     /// Velocity to plan with: the command, plus what brings the balance point back to where it should be by now.
@@ -214,112 +262,63 @@ impl Step {
         }
         let error_m = [error_m.dot(ahead), error_m.dot(left)];
         std::array::from_fn(|i| {
-            let most_m_s = [0.4, 0.25][i];
+            let most_m_s = LARGEST_CORRECTION_M_S[i];
             if self.steps > 0 {
                 self.bias_m_s[i] = (self.bias_m_s[i] + BIAS_GAIN_1_S2 * error_m[i].clamp(-0.3, 0.3) * dt_s)
                     .clamp(-most_m_s, most_m_s);
             }
-            VELOCITY_GAIN * velocity[i] + (POSITION_GAIN_1_S * error_m[i]).clamp(-0.3, 0.3) + self.bias_m_s[i]
+            let pull = (POSITION_GAIN_1_S * error_m[i]).clamp(-most_m_s, most_m_s);
+            velocity[i] + pull + self.bias_m_s[i]
         })
     }
 
-    fn drive_swing(&mut self, body: &WholeBody, legs: &mut LegCommand, dt_s: f32) {
-        let air_s = PERIOD_S * 0.92;
-        let phase = (self.time_s / air_s).clamp(0.0, 1.0);
-        let smooth = phase * phase * phase * (10.0 - 15.0 * phase + 6.0 * phase * phase);
-        let mut position_m =
-            self.swing_from.translation + (self.swing_to.translation - self.swing_from.translation) * smooth;
-        position_m.z += SWING_HEIGHT_M * (std::f32::consts::PI * phase).sin();
-        // Push down until the ground answers.
-        position_m.z -= 0.25 * (self.time_s - air_s).max(0.0);
-        let foot =
-            Pose::from_parts(position_m, self.swing_from.rotation.slerp(self.swing_to.rotation, smooth));
-        let swing = self.swing();
-        let before = self.swing_q_rad;
-        self.swing_q_rad = inverse(body.model, swing, body.world_from_pelvis(), foot, &before, 3);
-        for i in 0..LEG_JOINT_COUNT {
-            let joint = swing.index() * LEG_JOINT_COUNT + i;
-            legs.q_rad[joint] = self.swing_q_rad[i];
-            legs.kp_n_m_rad[joint] = SWING_KP_N_M_RAD[i];
-            legs.kd_n_m_s_rad[joint] = SWING_KD_N_M_S_RAD[i];
-            if self.time_s > 2.0 * dt_s {
-                let rate_rad_s = ((self.swing_q_rad[i] - before[i]) / dt_s).clamp(-15.0, 15.0);
-                legs.feedforward_n_m[joint] = SWING_KD_N_M_S_RAD[i] * rate_rad_s;
-            }
-        }
-    }
-
-    /// Torques of the carrying leg or legs for a centre of pressure.
+    /// Torques of both legs for a centre of pressure, an upright trunk and the swinging foot's path.
     fn carry(
         &self,
         body: &WholeBody,
         load: &Load,
         pressure_m: Vector,
-        soles: &[Pose; 2],
-        com_height_m: f32,
+        ground_m: f32,
         heading: Rotation,
-    ) -> [[f32; LEG_JOINT_COUNT]; 2] {
-        let mass_kg = body.model.mass_kg;
+    ) -> Torques {
         let pelvis = body.world_from_pelvis();
-        let ground_m = soles[self.stance.index()].translation.z;
-        let weight_n = mass_kg * GRAVITY_M_S2;
-        let lift_m_s2 = LIFT_STIFFNESS_1_S2 * (self.height_m + ground_m - pelvis.translation.z)
-            - LIFT_DAMPING_1_S * body.pelvis_velocity_m_s.z;
-        let vertical_n =
-            (weight_n - load.force_n.z + mass_kg * lift_m_s2).clamp(0.5 * weight_n, 1.8 * weight_n);
+        let lift_m_s2 = (LIFT_STIFFNESS_1_S2 * (self.height_m + ground_m - pelvis.translation.z)
+            - LIFT_DAMPING_1_S * body.pelvis_velocity_m_s.z)
+            .clamp(LIFT_RANGE[0] * GRAVITY_M_S2, LIFT_RANGE[1] * GRAVITY_M_S2);
         let tilt_rad = rotation_vector_rad(heading * pelvis.rotation.inverse());
-        let most = LARGEST_MOMENT_N_M;
-        let moment =
-            tilt_rad * TRUNK_STIFFNESS_N_M_RAD - body.pelvis_angular_velocity_rad_s * TRUNK_DAMPING_N_M_S_RAD;
-        let moment_n_m =
-            Vector::new(moment.x.clamp(-most, most), moment.y.clamp(-most, most), moment.z.clamp(-8.0, 8.0));
-        let away_m = flat(load.balance_point_m) - pressure_m;
-        let turn = Vector::new(0.0, 0.0, moment_n_m.z);
-        if self.shifting {
-            let force_n = friction(Vector::new(
-                vertical_n / com_height_m * away_m.x,
-                vertical_n / com_height_m * away_m.y,
-                vertical_n,
-            ));
-            let feet = distribute(load.balance_point_m, force_n, moment_n_m, *soles);
-            return Side::BOTH.map(|side| leg_torques_n_m(body, side, feet[side.index()], turn * 0.5));
+        let turn = tilt_rad * TRUNK_STIFFNESS_1_S2 - body.pelvis_angular_velocity_rad_s * TRUNK_DAMPING_1_S;
+        let turn = turn * Vector::new(1.0, 1.0, YAW_PART);
+        let most = Vector::splat(LARGEST_TURN_RAD_S2);
+        let both = self.shifting || self.time_s < TRANSFER_S;
+        let mut feet = [Acceleration::default(); 2];
+        if !both {
+            let swing = self.stance.other();
+            feet[swing.index()] = self.swing.wanted(body, swing, self.time_s - TRANSFER_S);
         }
-        let force_n = friction(Vector::new(
-            (vertical_n * away_m.x - moment_n_m.y) / com_height_m,
-            (vertical_n * away_m.y + moment_n_m.x) / com_height_m,
-            vertical_n,
-        ));
-        let point_m = Vector::new(pressure_m.x, pressure_m.y, ground_m);
-        let mut torques = [[0.0; LEG_JOINT_COUNT]; 2];
-        torques[self.stance.index()] =
-            leg_torques_n_m(body, self.stance, FootForce { force_n, point_m }, turn);
+        let motion = Motion { lift_m_s2, turn_rad_s2: turn.clamp(-most, most), feet };
+        let contact = Contact {
+            pressure_m: Vector::new(pressure_m.x, pressure_m.y, ground_m),
+            foot: (!both).then_some(self.stance),
+        };
+        let torques = leg_torques(body, load, &motion, &contact);
         torques
     }
+}
+
+fn leg_joint(i: usize) -> usize {
+    LEGS[i / LEG_JOINT_COUNT] + i % LEG_JOINT_COUNT
+}
+
+fn wrapped(angle_rad: f32) -> f32 {
+    (angle_rad + PI).rem_euclid(TAU) - PI
 }
 
 fn flat(v: Vector) -> Vector {
     Vector::new(v.x, v.y, 0.0)
 }
 
-/// Horizontal force within what friction surely gives.
-fn friction(force_n: Vector) -> Vector {
-    let horizontal_n = force_n.x.hypot(force_n.y);
-    let scale = (0.55 * force_n.z / horizontal_n.max(1e-3)).min(1.0);
-    Vector::new(force_n.x * scale, force_n.y * scale, force_n.z)
-}
-
 /// Height of the lowest point of a sole.
 fn clearance_m(sole: &Pose) -> f32 {
     let corner = |x: f32, y: f32| (*sole * Vector::new(x, y, 0.0)).z;
     corner(0.085, 0.03).min(corner(0.085, -0.03)).min(corner(-0.085, 0.025)).min(corner(-0.085, -0.025))
-}
-
-/// Both legs limp at their measured angles, to be driven by torque.
-fn carrying_legs(body: &WholeBody) -> LegCommand {
-    LegCommand {
-        q_rad: std::array::from_fn(|i| body.q_rad[LEGS[i / LEG_JOINT_COUNT] + i % LEG_JOINT_COUNT]),
-        kp_n_m_rad: [STANCE_KP_N_M_RAD; 12],
-        kd_n_m_s_rad: [STANCE_KD_N_M_S_RAD; 12],
-        feedforward_n_m: [0.0; 12],
-    }
 }

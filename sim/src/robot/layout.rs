@@ -17,6 +17,10 @@ impl Side {
         self as usize
     }
 
+    pub fn other(self) -> Side {
+        if self == Side::Left { Side::Right } else { Side::Left }
+    }
+
     /// Prefix of link, joint and site names.
     pub fn name(self) -> &'static str {
         ["left", "right"][self.index()]

@@ -1,5 +1,6 @@
 //! One robot in a world: measured state, joint drives, payload estimate.
 
+mod dynamics;
 mod hand_force;
 mod layout;
 mod model;
@@ -13,6 +14,7 @@ use rapier3d::math::{Pose, Vector};
 use rapier3d::prelude::{ColliderHandle, MultibodyJointHandle, PhysicsWorld, RigidBodyHandle};
 use serde::{Deserialize, Serialize};
 
+pub use dynamics::{Acceleration, Effort};
 pub use layout::{JOINTS, Side, UPPER, UPPER_JOINTS, joint_names};
 pub use model::{HandLinks, JointModel, Link, RobotModel, SiteModel};
 pub use whole_body::WholeBody;

@@ -92,6 +92,9 @@ impl World {
             for (robot, command) in self.robots.iter_mut().zip(commands) {
                 robot.drive(&mut self.physics, command, substep);
             }
+            for object in &self.objects {
+                object.resist_rolling(&mut self.physics);
+            }
             self.physics.step_with_events(&self.hooks, &());
         }
         self.end_pushes();

@@ -34,9 +34,22 @@ pub(super) struct Object {
     pub world_from_mark: Pose,
     pub colliders: Vec<ColliderHandle>,
     pub geoms: Vec<Geom>,
+    /// Deceleration by rolling resistance, rad/s^2; 0 for what does not roll.
+    rolling_rad_s2: f32,
 }
 
+/// Slower than this, rolling resistance acts as a damper: a fixed torque would turn the ball back.
+const SLOWEST_ROLLING_RAD_S: f32 = 0.5;
+
 impl Object {
+    /// Rapier has no rolling resistance, without which a ball on a flat base never comes to rest. The damping of one
+    /// physics step takes from the measured rate what MuJoCo's rolling friction r (m) would:  I w' = -r m g.
+    pub(super) fn resist_rolling(&self, physics: &mut PhysicsWorld) {
+        let Some(handle) = self.body.filter(|_| self.rolling_rad_s2 > 0.0) else { return };
+        let body = &mut physics.bodies[handle];
+        body.set_angular_damping(self.rolling_rad_s2 / body.angvel().length().max(SLOWEST_ROLLING_RAD_S));
+    }
+
     pub(super) fn state(&self, physics: &PhysicsWorld) -> ObjectState {
         match self.body.map(|handle| &physics.bodies[handle]) {
             Some(body) => ObjectState {
@@ -160,13 +173,13 @@ fn insert_body(
         body: None,
         world_from_mark: world_from_body,
         colliders: Vec::new(),
+        rolling_rad_s2: rolling_rad_s2(&body.geoms, &body.mass),
         geoms: body.geoms,
     };
     if body.free {
         let builder = RigidBodyBuilder::dynamic()
             .pose(world_from_body)
             .additional_mass_properties(body.mass)
-            .angular_damping(rolling_damping_1_s(&object.geoms, &body.mass))
             .can_sleep(false);
         object.body = Some(physics.insert_body(builder));
     }
@@ -189,19 +202,12 @@ fn insert_body(
     Ok(object)
 }
 
-/// Rapier has no rolling resistance, without which a ball on a flat base never comes to rest. A geom with MuJoCo's rolling
-/// friction r (m) is damped instead, by as much as  r m g  would at [`ROLLING_RAD_S`].
-fn rolling_damping_1_s(geoms: &[Geom], mass: &MassProperties) -> f32 {
+/// r m g / I of the geom with the largest rolling friction r.
+fn rolling_rad_s2(geoms: &[Geom], mass: &MassProperties) -> f32 {
     let rolling_m = geoms.iter().map(|geom| geom.rolling_friction_m).fold(0.0, f32::max);
     let inertia_kg_m2 = mass.principal_inertia().max_element();
-    if inertia_kg_m2 == 0.0 {
-        return 0.0;
-    }
-    rolling_m * mass.mass() * GRAVITY_M_S2 / (inertia_kg_m2 * ROLLING_RAD_S)
+    if inertia_kg_m2 == 0.0 { 0.0 } else { rolling_m * mass.mass() * GRAVITY_M_S2 / inertia_kg_m2 }
 }
-
-/// A ball of 3 cm that rolls at 0.3 m/s.
-const ROLLING_RAD_S: f32 = 10.0;
 
 fn collider(geom: &Geom) -> Option<ColliderBuilder> {
     if !geom.collides {

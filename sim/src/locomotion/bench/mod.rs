@@ -6,6 +6,8 @@ mod tour;
 mod trial;
 
 use std::fmt;
+use std::num::NonZero;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde::Serialize;
 
@@ -16,7 +18,7 @@ use crate::SimError;
 use trial::Trial;
 
 /// Makes a fresh controller for each trial.
-pub type NewLocomotion<'a> = &'a dyn Fn() -> Box<dyn Locomotion>;
+pub type NewLocomotion<'a> = &'a (dyn Fn() -> Box<dyn Locomotion> + Sync);
 
 /// Results of all cases.
 #[derive(Clone, Debug, Serialize)]
@@ -53,14 +55,34 @@ pub fn run(
 ) -> Result<Report, SimError> {
     let mut cases = Vec::new();
     for case in CASES.iter().filter(|case| filter.split(",").any(|f| case.name.contains(f))) {
-        let trials: Vec<Trial> = (0..seeds)
-            .map(|seed| trial::run(case, seed as u64, new_locomotion()))
-            .collect::<Result<_, _>>()?;
+        let trials = trials(case, seeds, new_locomotion)?;
         let report = summarise(case, &trials);
         done(&report);
         cases.push(report);
     }
     Ok(Report { cases })
+}
+
+/// One trial per seed, as many at once as there are processors.
+fn trials(case: &Case, seeds: usize, new_locomotion: NewLocomotion) -> Result<Vec<Trial>, SimError> {
+    let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut done = Vec::new();
+        loop {
+            let seed = next.fetch_add(1, Ordering::Relaxed);
+            if seed >= seeds {
+                return done;
+            }
+            done.push((seed, trial::run(case, seed as u64, new_locomotion())));
+        }
+    };
+    let mut trials: Vec<_> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads.min(seeds)).map(|_| scope.spawn(work)).collect();
+        workers.into_iter().flat_map(|worker| worker.join().expect("a trial never panics")).collect()
+    });
+    trials.sort_by_key(|(seed, _)| *seed);
+    trials.into_iter().map(|(_, trial)| trial).collect()
 }
 
 fn summarise(case: &Case, trials: &[Trial]) -> CaseReport {

@@ -1,0 +1,158 @@
+//! Leg torques by inverse dynamics: trunk and feet accelerate as wanted, the ground answers at the wanted point.
+
+use rapier3d::math::Vector;
+use rapier3d::na::{SMatrix, SVector};
+
+use super::ground::{FootForce, distribute, leg_torques_n_m, soles};
+use super::load::Load;
+use crate::robot::{Acceleration, Effort, JOINTS, LEG_JOINT_COUNT, LEGS, Side, WholeBody};
+use crate::world::GRAVITY_M_S2;
+
+/// Horizontal force within what friction surely gives.
+const FRICTION_USED: f32 = 0.7;
+/// A foot whose pressure is not in its middle spins more easily.
+const LARGEST_TURN_N_M: f32 = 22.0;
+const TURN_FADE_M: f32 = 0.12;
+/// Of trunk and arms about the vertical.
+const TURN_INERTIA_KG_M2: f32 = 1.2;
+const CORRECTIONS: usize = 2;
+/// A knee that is almost straight must not ask for the impossible.
+const DAMPING: f32 = 0.004;
+const LARGEST_JOINT_ACCELERATION_RAD_S2: f32 = 150.0;
+
+/// Wanted accelerations, world frame.
+pub(super) struct Motion {
+    pub lift_m_s2: f32,
+    pub turn_rad_s2: Vector,
+    /// Left, right ankle roll link; zero for a foot that stands.
+    pub feet: [Acceleration; 2],
+}
+
+/// Where the ground acts.
+pub(super) struct Contact {
+    pub pressure_m: Vector,
+    /// The only foot that carries; `None` for both.
+    pub foot: Option<Side>,
+}
+
+pub(super) struct Torques {
+    pub torque_n_m: [[f32; LEG_JOINT_COUNT]; 2],
+    /// Horizontal acceleration of the centre of mass that they bring.
+    pub acceleration_m_s2: Vector,
+}
+
+/// Torques of both legs. The pelvis accelerates sideways as it must for the ground force to have no moment about the
+/// pressure point: found in one correction, since the moment is linear in that acceleration.
+pub(super) fn leg_torques(body: &WholeBody, load: &Load, motion: &Motion, contact: &Contact) -> Torques {
+    let point_m = contact.pressure_m;
+    let height_m = (body.com_m.z - point_m.z).max(0.4);
+    let pelvis_m = body.world_from_pelvis().translation;
+    let flat = |v: Vector| Vector::new(v.x, v.y, 0.0);
+    let away_m = flat(body.com_m - point_m);
+    let mut pelvis = Acceleration {
+        linear_m_s2: away_m * ((GRAVITY_M_S2 + motion.lift_m_s2) / height_m) + Vector::Z * motion.lift_m_s2,
+        angular_rad_s2: motion.turn_rad_s2,
+    };
+    let inertia_kg_m = body.model.mass_kg * height_m;
+    let most_turn_n_m = match contact.foot {
+        Some(side) => {
+            let from_middle_m = flat(point_m - soles(body)[side.index()].translation).length();
+            LARGEST_TURN_N_M * (1.0 - from_middle_m / TURN_FADE_M).max(0.1)
+        }
+        None => LARGEST_TURN_N_M,
+    };
+    let mut qdd_rad_s2 = [0.0; JOINTS];
+    let mut pass = 0;
+    let (effort, force_n, rest_n_m) = loop {
+        let effort = body.inverse_dynamics(pelvis, &qdd_rad_s2);
+        move_feet(body, motion, &effort, &mut qdd_rad_s2);
+        let effort = body.inverse_dynamics(pelvis, &qdd_rad_s2);
+        let force_n = effort.force_n - load.force_n;
+        let rest_n_m = effort.moment_n_m + (pelvis_m - point_m).cross(effort.force_n)
+            - load.moment_n_m
+            - (body.com_m - point_m).cross(load.force_n);
+        if pass == CORRECTIONS {
+            break (effort, force_n, rest_n_m);
+        }
+        pass += 1;
+        let away = Vector::new(-rest_n_m.y, rest_n_m.x, 0.0);
+        pelvis.linear_m_s2 += away / inertia_kg_m;
+        let force_n = force_n + away / height_m;
+        let sliding = flat(force_n).length() / (FRICTION_USED * force_n.z.max(1.0));
+        if sliding > 1.0 {
+            pelvis.linear_m_s2 -= flat(force_n) * ((1.0 - 1.0 / sliding) / body.model.mass_kg);
+        }
+        let too_much_n_m = rest_n_m.z - rest_n_m.z.clamp(-most_turn_n_m, most_turn_n_m);
+        pelvis.angular_rad_s2.z -= too_much_n_m / TURN_INERTIA_KG_M2;
+    };
+    let turn_n_m = Vector::Z * rest_n_m.z.clamp(-most_turn_n_m, most_turn_n_m);
+    let pushes = match contact.foot {
+        Some(side) => {
+            let mut pushes = [[0.0; LEG_JOINT_COUNT]; 2];
+            pushes[side.index()] = leg_torques_n_m(body, side, FootForce { force_n, point_m }, turn_n_m);
+            pushes
+        }
+        None => {
+            let about_com_n_m = rest_n_m + (point_m - body.com_m).cross(force_n);
+            let feet = distribute(body.com_m, force_n, about_com_n_m, soles(body));
+            Side::BOTH.map(|side| leg_torques_n_m(body, side, feet[side.index()], turn_n_m * 0.5))
+        }
+    };
+    Torques {
+        torque_n_m: Side::BOTH.map(|side| {
+            std::array::from_fn(|i| effort.torque_n_m[LEGS[side.index()] + i] + pushes[side.index()][i])
+        }),
+        acceleration_m_s2: flat(force_n) / body.model.mass_kg,
+    }
+}
+
+/// Force (N) with which the ground answers the torques of one leg whose foot stands:
+///   J^T w = tau_dynamics - tau,  damped as in [`move_feet`].
+pub(super) fn ground_force_n(
+    body: &WholeBody,
+    side: Side,
+    dynamics_n_m: &[f32; JOINTS],
+    torque_n_m: &[f32; LEG_JOINT_COUNT],
+) -> Vector {
+    let jacobian = foot_jacobian(body, side);
+    let rest = SVector::<f32, 6>::from_fn(|i, _| dynamics_n_m[LEGS[side.index()] + i] - torque_n_m[i]);
+    let normal = jacobian * jacobian.transpose() + SMatrix::identity() * DAMPING;
+    normal.cholesky().map_or(Vector::ZERO, |factor| {
+        let wrench = factor.solve(&(jacobian * rest));
+        Vector::new(wrench[0], wrench[1], wrench[2])
+    })
+}
+
+/// Linear over angular velocity of an ankle roll link per joint velocity of its leg.
+fn foot_jacobian(body: &WholeBody, side: Side) -> SMatrix<f32, 6, 6> {
+    let first = LEGS[side.index()];
+    let foot_m = body.world_from_link[body.model.joints[first + 5].link].translation;
+    let mut jacobian = SMatrix::<f32, 6, 6>::zeros();
+    for i in 0..LEG_JOINT_COUNT {
+        let (origin, axis) = body.joint_axis(first + i);
+        let linear = axis.cross(foot_m - origin);
+        jacobian.set_column(i, &SVector::from([linear.x, linear.y, linear.z, axis.x, axis.y, axis.z]));
+    }
+    jacobian
+}
+
+/// Changes the joint accelerations of both legs so that the feet accelerate as wanted:
+///   (J^T J + damping I) d = J^T (wanted - now).
+fn move_feet(body: &WholeBody, motion: &Motion, effort: &Effort, qdd_rad_s2: &mut [f32; JOINTS]) {
+    for side in Side::BOTH {
+        let first = LEGS[side.index()];
+        let foot = body.model.joints[first + 5].link;
+        let jacobian = foot_jacobian(body, side);
+        let (wanted, now) = (motion.feet[side.index()], effort.links[foot]);
+        let linear = wanted.linear_m_s2 - now.linear_m_s2;
+        let angular = wanted.angular_rad_s2 - now.angular_rad_s2;
+        let error = SVector::<f32, 6>::from([linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]);
+        let normal = jacobian.transpose() * jacobian + SMatrix::identity() * DAMPING;
+        let Some(factor) = normal.cholesky() else { continue };
+        let change = factor.solve(&(jacobian.transpose() * error));
+        for i in 0..LEG_JOINT_COUNT {
+            let most = LARGEST_JOINT_ACCELERATION_RAD_S2;
+            qdd_rad_s2[first + i] = (qdd_rad_s2[first + i] + change[i]).clamp(-most, most);
+        }
+    }
+}

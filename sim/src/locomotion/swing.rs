@@ -1,0 +1,113 @@
+//! The foot in the air: a path that jerks least, planned anew at each instant to where the foot has to go.
+
+use rapier3d::math::{Pose, Vector};
+use serde::{Deserialize, Serialize};
+
+use super::legs::rotation_vector_rad;
+use crate::robot::{Acceleration, LEG_JOINT_COUNT, LEGS, Side, WholeBody};
+
+pub(super) const SWING_S: f32 = 0.25;
+/// The foot is down a little before the step ends.
+const AIR_S: f32 = 0.93 * SWING_S;
+const HEIGHT_M: f32 = 0.045;
+/// A foot that meets no ground goes on down.
+const PROBING_M_S: f32 = 0.25;
+/// The goal stands still for the last part of the way.
+const LEAST_REMAINING_S: f32 = 0.03;
+const LARGEST_ACCELERATION_M_S2: f32 = 60.0;
+const STIFFNESS_1_S2: f32 = 600.0;
+const DAMPING_1_S: f32 = 45.0;
+
+/// Ankle roll link to the centre of its sole.
+pub(super) const SOLE_IN_FOOT_M: Vector = Vector::new(0.035, 0.0, -0.035);
+
+/// Path of the ankle roll link, world frame.
+#[derive(Clone, Default, Serialize, Deserialize)]
+pub(super) struct Swing {
+    from: Pose,
+    to: Pose,
+    /// Along the ground; the lift is added to it.
+    position_m: Vector,
+    velocity_m_s: Vector,
+    acceleration_m_s2: Vector,
+}
+
+impl Swing {
+    /// The foot stands; its next swing starts from where it is.
+    pub(super) fn plant(&mut self, body: &WholeBody, side: Side) {
+        let foot = body.world_from_link[body.model.joints[LEGS[side.index()] + 5].link];
+        *self = Swing { from: foot, to: foot, position_m: foot.translation, ..Swing::default() };
+    }
+
+    /// One physics step of the path to `goal`, `time_s` after lift-off. The jerk of least jerk from position x,
+    /// velocity v, acceleration a to rest at x1 in T:  60 (x1 - x) / T^3 - 36 v / T^2 - 9 a / T.
+    pub(super) fn advance(&mut self, goal: Pose, time_s: f32, dt_s: f32) {
+        if time_s <= 0.0 {
+            return;
+        }
+        let remaining_s = AIR_S - time_s;
+        if remaining_s > LEAST_REMAINING_S {
+            self.to = goal;
+        }
+        let remaining_s = remaining_s.max(LEAST_REMAINING_S);
+        let jerk_m_s3 = (self.to.translation - self.position_m) * (60.0 / remaining_s.powi(3))
+            - self.velocity_m_s * (36.0 / (remaining_s * remaining_s))
+            - self.acceleration_m_s2 * (9.0 / remaining_s);
+        self.acceleration_m_s2 =
+            (self.acceleration_m_s2 + jerk_m_s3 * dt_s).clamp_length_max(LARGEST_ACCELERATION_M_S2);
+        self.velocity_m_s += self.acceleration_m_s2 * dt_s;
+        self.position_m += self.velocity_m_s * dt_s;
+    }
+
+    /// Where the sole's centre is on its path, without the lift.
+    pub(super) fn sole_m(&self) -> Vector {
+        self.position_m + self.from.rotation * SOLE_IN_FOOT_M
+    }
+
+    /// Where the ankle roll link is going.
+    pub(super) fn goal_m(&self) -> Vector {
+        self.to.translation
+    }
+
+    /// Acceleration of the foot that keeps it on its path.
+    pub(super) fn wanted(&self, body: &WholeBody, side: Side, time_s: f32) -> Acceleration {
+        let (foot, speed_m_s, spin_rad_s) = foot_motion(body, side);
+        let p = (time_s / AIR_S).clamp(0.0, 1.0);
+        let (mut lift_m, mut lift_m_s, mut lift_m_s2) = (
+            16.0 * HEIGHT_M * (p * (1.0 - p)).powi(2),
+            32.0 * HEIGHT_M * p * (1.0 - p) * (1.0 - 2.0 * p) / AIR_S,
+            HEIGHT_M * (32.0 - 192.0 * p + 192.0 * p * p) / (AIR_S * AIR_S),
+        );
+        if time_s > AIR_S {
+            (lift_m, lift_m_s, lift_m_s2) = (PROBING_M_S * (AIR_S - time_s), -PROBING_M_S, 0.0);
+        }
+        let position_m = self.position_m + Vector::Z * lift_m;
+        let velocity_m_s = self.velocity_m_s + Vector::Z * lift_m_s;
+        let smooth = p * p * p * (10.0 - 15.0 * p + 6.0 * p * p);
+        let rotation = self.from.rotation.slerp(self.to.rotation, smooth);
+        let turn_rad = rotation_vector_rad(rotation * foot.rotation.inverse());
+        Acceleration {
+            linear_m_s2: self.acceleration_m_s2
+                + Vector::Z * lift_m_s2
+                + (position_m - foot.translation) * STIFFNESS_1_S2
+                + (velocity_m_s - speed_m_s) * DAMPING_1_S,
+            angular_rad_s2: turn_rad * STIFFNESS_1_S2 - spin_rad_s * DAMPING_1_S,
+        }
+    }
+}
+
+/// Pose, velocity and angular velocity of an ankle roll link, world frame.
+fn foot_motion(body: &WholeBody, side: Side) -> (Pose, Vector, Vector) {
+    let first = LEGS[side.index()];
+    let foot = body.world_from_link[body.model.joints[first + 5].link];
+    let mut spin_rad_s = body.pelvis_angular_velocity_rad_s;
+    let from_pelvis_m = foot.translation - body.world_from_pelvis().translation;
+    let mut speed_m_s = body.pelvis_velocity_m_s + spin_rad_s.cross(from_pelvis_m);
+    for joint in first..first + LEG_JOINT_COUNT {
+        let (origin, axis) = body.joint_axis(joint);
+        let turn = axis * body.qd_rad_s[joint];
+        speed_m_s += turn.cross(foot.translation - origin);
+        spin_rad_s += turn;
+    }
+    (foot, speed_m_s, spin_rad_s)
+}
