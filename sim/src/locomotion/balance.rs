@@ -24,7 +24,7 @@ const LARGEST_CHANGE_1_S: [f32; 3] = [0.8, 0.8, 1.5];
 const STILL: f32 = 0.01;
 /// Standing ends when the capture point leaves the feet by this much: forward, backward, sideways beyond a sole's centre.
 const FORWARD_M: f32 = 0.075;
-const BACKWARD_M: f32 = 0.07;
+const BACKWARD_M: f32 = 0.055;
 const SIDEWAYS_M: f32 = 0.005;
 /// No change of mind within this time after planting.
 const LEAST_STANDING_S: f32 = 0.1;
@@ -138,7 +138,7 @@ impl State {
                     || stance.capture_m.y.abs() > half_width_m + SIDEWAYS_M;
                 if (moving || lost) && self.time_in_mode_s > LEAST_STANDING_S {
                     let left_carries = stance.capture_m.y > 0.0;
-                    self.mode = Mode::Step(Step::start(body, load, self.heading_rad, left_carries));
+                    self.mode = Mode::Step(Step::start(body, self.heading_rad, left_carries));
                     self.time_in_mode_s = 0.0;
                 }
             }

@@ -15,7 +15,7 @@ pub(super) struct Load {
 }
 
 /// Pushes and pulls are taken to act this high over the centre of mass: at the chest and the hands.
-const PUSH_LEVER_M: f32 = 0.25;
+const PUSH_LEVER_M: f32 = 0.19;
 /// A lighter weight is arm motion and friction, not a load.
 const DEAD_ZONE_N: f32 = 6.0;
 

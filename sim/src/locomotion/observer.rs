@@ -3,7 +3,7 @@
 use rapier3d::math::Vector;
 use serde::{Deserialize, Serialize};
 
-const RATE_1_S: f32 = 12.0;
+const RATE_1_S: f32 = 11.5;
 const LARGEST_PUSH_M_S2: f32 = 2.0;
 
 /// Luenberger observer of the horizontal  v' = expected + d,  d' = 0,  both poles at -[`RATE_1_S`].

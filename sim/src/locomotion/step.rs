@@ -28,7 +28,7 @@ const REACH_M: [f32; 2] = [-0.3, 0.4];
 /// Part of the capture point's error that the centre of pressure of the carrying foot works against, and how far the
 /// pressure goes from the sole's centre: along and across the foot.
 const CAPTURE_GAIN: f32 = 1.0;
-const PRESSURE_M: [f32; 2] = [0.065, 0.018];
+const PRESSURE_M: [f32; 2] = [0.069, 0.018];
 const SHIFT_GAIN: f32 = 3.0;
 /// The first foot lifts when the capture point is this near to where a step would have left it, or when a robot that
 /// falls forward or backward has no time to shift.
@@ -44,21 +44,21 @@ const LEASH_M: f32 = 0.4;
 const HEADING_LEASH_RAD: f32 = 0.12;
 const RETURN_RAD_S: f32 = 0.4;
 const LIFT_STIFFNESS_1_S2: f32 = 111.0;
-const LIFT_DAMPING_1_S: f32 = 16.0;
+const LIFT_DAMPING_1_S: f32 = 15.0;
 /// Vertical acceleration stays within these parts of gravity.
 const LIFT_RANGE: [f32; 2] = [-0.3, 0.6];
-const TRUNK_STIFFNESS_1_S2: f32 = 150.0;
-const TRUNK_DAMPING_1_S: f32 = 22.0;
+const TRUNK_STIFFNESS_1_S2: f32 = 115.0;
+const TRUNK_DAMPING_1_S: f32 = 28.0;
 const LARGEST_TURN_RAD_S2: f32 = 50.0;
 /// Turning about the vertical is the least of a robot's worries.
-const YAW_PART: f32 = 0.5;
+const YAW_PART: f32 = 0.42;
 /// Walking is neither stretched nor crouched.
 const HIGHEST_M: f32 = 0.745;
 const LOWEST_M: f32 = 0.62;
 const RAISING_M_S: f32 = 0.15;
 const LOWERING_M_S: f32 = 0.4;
 /// From the hip's roll axis to the ankle roll link of a leg that is bent enough.
-const LEG_M: f32 = 0.58;
+const LEG_M: f32 = 0.49;
 const ANKLE_HEIGHT_M: f32 = 0.053;
 /// A step ends when the foot meets the ground in the last part of the swing, or is overdue.
 const EARLIEST_LANDING: f32 = 0.65;
@@ -83,14 +83,14 @@ pub(super) struct Step {
     steps: u32,
     swing: Swing,
     height_m: f32,
-    /// Where the balance point should be by now, and what the velocity command lacked so far.
+    /// Where the pelvis should be by now, and what the velocity command lacked so far.
     reference_m: Vector,
     bias_m_s: [f32; 2],
 }
 
 impl Step {
     /// Starts stepping; the first foot to carry is the one nearer to the capture point.
-    pub(super) fn start(body: &WholeBody, load: &Load, heading_rad: f32, left_carries: bool) -> Step {
+    pub(super) fn start(body: &WholeBody, heading_rad: f32, left_carries: bool) -> Step {
         let stance = if left_carries { Side::Left } else { Side::Right };
         let ground_m = soles(body)[stance.index()].translation.z;
         let mut step = Step {
@@ -102,7 +102,7 @@ impl Step {
             steps: 0,
             swing: Swing::default(),
             height_m: body.world_from_pelvis().translation.z - ground_m,
-            reference_m: load.balance_point_m,
+            reference_m: body.world_from_pelvis().translation,
             bias_m_s: [0.0; 2],
         };
         step.swing.plant(body, step.stance.other());
@@ -142,7 +142,8 @@ impl Step {
         let rate_1_s = (GRAVITY_M_S2 / com_height_m).sqrt();
         let balance_m = load.balance_point_m;
         let capture_m = flat(balance_m + body.com_velocity_m_s / rate_1_s);
-        let [forward_m_s, left_m_s] = self.corrected_velocity(velocity, balance_m, ahead, left, dt_s);
+        let pelvis_m = body.world_from_pelvis().translation;
+        let [forward_m_s, left_m_s] = self.corrected_velocity(velocity, pelvis_m, ahead, left, dt_s);
         let outside = if self.stance == Side::Left { left } else { -left };
         let gait = Gait::new(rate_1_s, ahead * forward_m_s + left * left_m_s, outside);
         let stance_m = flat(soles[self.stance.index()].translation);
@@ -185,7 +186,7 @@ impl Step {
         let wanted_m = height_m.min(HIGHEST_M).min(self.within_reach_m(body)).max(LOWEST_M);
         let rise = (wanted_m - self.height_m).clamp(-LOWERING_M_S * dt_s, RAISING_M_S * dt_s);
         self.height_m += rise;
-        let torques = self.carry(body, load, pressure_m, ground_m, heading);
+        let torques = self.carry(body, load, pressure_m, ground_m, heading, velocity[2]);
         self.land(body, &soles, ground_m);
         let legs = LegCommand {
             q_rad: std::array::from_fn(|i| body.q_rad[leg_joint(i)]),
@@ -237,11 +238,11 @@ impl Step {
         }
     }
 
-    /// Velocity to plan with: the command, plus what brings the balance point back to where it should be by now.
+    /// Velocity to plan with: the command, plus what brings the pelvis back to where it should be by now.
     fn corrected_velocity(
         &mut self,
         velocity: [f32; 3],
-        balance_m: Vector,
+        pelvis_m: Vector,
         ahead: Vector,
         left: Vector,
         dt_s: f32,
@@ -249,16 +250,16 @@ impl Step {
         // A robot that is to stop stops where it can: the bias was learned in another direction of motion.
         let stopping = velocity == [0.0; 3];
         if self.steps == 0 || stopping {
-            self.reference_m = balance_m;
+            self.reference_m = pelvis_m;
         }
         if stopping {
             self.bias_m_s = [0.0; 2];
         }
         self.reference_m += (ahead * velocity[0] + left * velocity[1]) * dt_s;
-        let mut error_m = flat(self.reference_m - balance_m);
+        let mut error_m = flat(self.reference_m - pelvis_m);
         if error_m.length() > LEASH_M {
             error_m *= LEASH_M / error_m.length();
-            self.reference_m = balance_m + error_m;
+            self.reference_m = pelvis_m + error_m;
         }
         let error_m = [error_m.dot(ahead), error_m.dot(left)];
         std::array::from_fn(|i| {
@@ -280,13 +281,15 @@ impl Step {
         pressure_m: Vector,
         ground_m: f32,
         heading: Rotation,
+        yaw_rate_rad_s: f32,
     ) -> Torques {
         let pelvis = body.world_from_pelvis();
         let lift_m_s2 = (LIFT_STIFFNESS_1_S2 * (self.height_m + ground_m - pelvis.translation.z)
             - LIFT_DAMPING_1_S * body.pelvis_velocity_m_s.z)
             .clamp(LIFT_RANGE[0] * GRAVITY_M_S2, LIFT_RANGE[1] * GRAVITY_M_S2);
         let tilt_rad = rotation_vector_rad(heading * pelvis.rotation.inverse());
-        let turn = tilt_rad * TRUNK_STIFFNESS_1_S2 - body.pelvis_angular_velocity_rad_s * TRUNK_DAMPING_1_S;
+        let spin_rad_s = Vector::Z * yaw_rate_rad_s - body.pelvis_angular_velocity_rad_s;
+        let turn = tilt_rad * TRUNK_STIFFNESS_1_S2 + spin_rad_s * TRUNK_DAMPING_1_S;
         let turn = turn * Vector::new(1.0, 1.0, YAW_PART);
         let most = Vector::splat(LARGEST_TURN_RAD_S2);
         let both = self.shifting || self.time_s < TRANSFER_S;

@@ -86,3 +86,34 @@ impl WholeBody<'_> {
         Effort { torque_n_m, force_n: force_n[0], moment_n_m: moment_n_m[0], links }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{RobotPlacement, World, WorldSpec};
+
+    /// A robot at rest takes its weight from outside and gravity's torques from its joints; accelerated as a whole, its
+    /// mass times that more.
+    #[test]
+    fn rest_takes_the_weight_and_acceleration_its_inertia() {
+        let placement = RobotPlacement { name: "A".into(), position_m: [0.3, 0.1], yaw_rad: 0.7 };
+        let spec = WorldSpec { scene: "floor".into(), robots: vec![placement], objects: vec![] };
+        let world = World::new(&spec).unwrap();
+        let body = world.robots()[0].measure(&world.physics);
+        let weight_n = Vector::new(0.0, 0.0, body.model.mass_kg * GRAVITY_M_S2);
+        let rest = body.inverse_dynamics(Acceleration::default(), &[0.0; JOINTS]);
+        assert!((rest.force_n - weight_n).length() < 1e-2, "{}", rest.force_n);
+        let lever_m = body.com_m - body.world_from_pelvis().translation;
+        assert!((rest.moment_n_m - lever_m.cross(weight_n)).length() < 1e-2, "{}", rest.moment_n_m);
+        for (torque, gravity) in rest.torque_n_m.iter().zip(body.gravity_torques_n_m()) {
+            assert!((torque - gravity).abs() < 1e-3, "{torque} {gravity}");
+        }
+        let push_m_s2 = Vector::new(1.0, -2.0, 0.5);
+        let pushed = body.inverse_dynamics(
+            Acceleration { linear_m_s2: push_m_s2, ..Acceleration::default() },
+            &[0.0; JOINTS],
+        );
+        let force_n = weight_n + push_m_s2 * body.model.mass_kg;
+        assert!((pushed.force_n - force_n).length() < 1e-2, "{}", pushed.force_n);
+    }
+}

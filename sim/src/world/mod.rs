@@ -44,7 +44,7 @@ pub struct RobotPlacement {
 
 /// A simulated room. One thread owns it.
 pub struct World {
-    physics: PhysicsWorld,
+    pub(crate) physics: PhysicsWorld,
     hooks: SelfCollision,
     robots: Vec<Robot>,
     objects: Vec<Object>,

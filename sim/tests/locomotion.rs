@@ -1,0 +1,53 @@
+//! The default base controller walks, carries, gives way and comes back, bit for bit again.
+
+use tandem_sim::locomotion::{Balance, bench};
+use tandem_sim::{RobotCommand, RobotPlacement, World, WorldSpec};
+
+fn report(case: &str, seeds: usize) -> bench::CaseReport {
+    let report = bench::run(&|| Box::new(Balance::default()), case, seeds, |_| {}).unwrap();
+    assert_eq!(report.cases.len(), 1, "`{case}` names one case");
+    report.cases.into_iter().next().unwrap()
+}
+
+#[test]
+fn walks_as_commanded_and_stops() {
+    for case in ["forward_0.4", "mix_backward_right_turn", "left_0.25_2kg"] {
+        let report = report(case, 1);
+        assert_eq!(report.survived, 1, "{report:?}");
+        assert!(report.velocity_error.unwrap() < 0.15, "{report:?}");
+        assert!(report.heading_error_deg.unwrap() < 5.0, "{report:?}");
+        assert!(report.standing_after_s.unwrap() < 1.5 && report.still_after_s.unwrap() < 3.0, "{report:?}");
+    }
+}
+
+/// Seed 0 is pushed forward, seed 1 obliquely.
+#[test]
+fn stays_on_its_feet_under_pushes_and_pulls() {
+    for (case, seeds) in [("push_40n", 2), ("left_0.25_pull_15n", 1)] {
+        let report = report(case, seeds);
+        assert_eq!(report.survived, seeds, "{report:?}");
+    }
+}
+
+fn walking() -> (World, RobotCommand) {
+    let placement = RobotPlacement { name: "A".into(), position_m: [0.0, 0.0], yaw_rad: 0.0 };
+    let world =
+        World::new(&WorldSpec { scene: "floor".into(), robots: vec![placement], objects: vec![] }).unwrap();
+    let mut command = world.rest_command(0);
+    (command.base.vx_m_s, command.base.yaw_rate_rad_s) = (0.3, 0.2);
+    (world, command)
+}
+
+#[test]
+fn a_walk_continues_from_a_snapshot_bit_for_bit() {
+    let (mut first, command) = walking();
+    (0..73).for_each(|_| first.control_step(&[command]));
+    let snapshot = first.snapshot().unwrap();
+    let mut second = walking().0;
+    second.restore(&snapshot).unwrap();
+    for world in [&mut first, &mut second] {
+        (0..100).for_each(|_| world.control_step(&[command]));
+    }
+    assert!(first.robot_state(0).world_from_pelvis.translation.x > 0.6);
+    assert_eq!(first.state_hash(), second.state_hash());
+}
