@@ -24,7 +24,7 @@ const LARGEST_CHANGE_1_S: [f32; 3] = [0.8, 0.8, 1.5];
 const STILL: f32 = 0.01;
 /// Standing ends when the capture point leaves the feet by this much: forward, backward, sideways beyond a sole's centre.
 const FORWARD_M: f32 = 0.075;
-const BACKWARD_M: f32 = 0.055;
+const BACKWARD_M: f32 = 0.07;
 const SIDEWAYS_M: f32 = 0.005;
 /// No change of mind within this time after planting.
 const LEAST_STANDING_S: f32 = 0.1;

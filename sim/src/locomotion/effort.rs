@@ -35,6 +35,7 @@ pub(super) struct Contact {
     pub foot: Option<Side>,
 }
 
+/// Of both legs, left and right.
 pub(super) struct Torques {
     pub torque_n_m: [[f32; LEG_JOINT_COUNT]; 2],
     /// Horizontal acceleration of the centre of mass that they bring.
@@ -42,7 +43,8 @@ pub(super) struct Torques {
 }
 
 /// Torques of both legs. The pelvis accelerates sideways as it must for the ground force to have no moment about the
-/// pressure point: found in one correction, since the moment is linear in that acceleration.
+/// pressure point, and turns no harder than one foot can hold: both are linear in its acceleration, and found by correcting
+/// it [`CORRECTIONS`] times.
 pub(super) fn leg_torques(body: &WholeBody, load: &Load, motion: &Motion, contact: &Contact) -> Torques {
     let point_m = contact.pressure_m;
     let height_m = (body.com_m.z - point_m.z).max(0.4);

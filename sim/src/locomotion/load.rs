@@ -1,11 +1,11 @@
-//! What pulls on the hands, as seen by the balance: a wrench about the centre of mass and the point it has to stand over.
+//! What pulls and pushes, as seen by the balance: a wrench about the centre of mass and the point it has to stand over.
 
 use rapier3d::math::Vector;
 
 use crate::robot::WholeBody;
 use crate::world::GRAVITY_M_S2;
 
-/// External wrench of both hands, world frame, and its effect on balance.
+/// External wrench, world frame, and its effect on balance: weights in the hands and an observed push.
 pub(super) struct Load {
     pub force_n: Vector,
     /// About the centre of mass.

@@ -46,7 +46,8 @@ pub struct CaseReport {
     pub power_w: f32,
 }
 
-/// Runs every case whose name contains one of the comma-separated parts of `filter`, with seeds 0 up to `seeds`; `done` hears of each case as it ends.
+/// Runs every case whose name contains one of the comma-separated parts of `filter`, with seeds 0 up to `seeds`;
+/// `done` hears of each case as it ends.
 pub fn run(
     new_locomotion: NewLocomotion,
     filter: &str,
