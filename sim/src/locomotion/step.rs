@@ -303,8 +303,7 @@ impl Step {
             pressure_m: Vector::new(pressure_m.x, pressure_m.y, ground_m),
             foot: (!both).then_some(self.stance),
         };
-        let torques = leg_torques(body, load, &motion, &contact);
-        torques
+        leg_torques(body, load, &motion, &contact)
     }
 }
 
