@@ -17,8 +17,16 @@ const TURN_FADE_M: f32 = 0.12;
 const TURN_INERTIA_KG_M2: f32 = 1.2;
 const CORRECTIONS: usize = 2;
 /// A knee that is almost straight must not ask for the impossible.
-const DAMPING: f32 = 0.004;
-const LARGEST_JOINT_ACCELERATION_RAD_S2: f32 = 150.0;
+const DAMPING: f32 = 0.012;
+/// Of the ground force that torques give away.
+const FORCE_DAMPING: f32 = 0.004;
+const LARGEST_JOINT_ACCELERATION_RAD_S2: f32 = 400.0;
+
+/// Torques stay within this part of the joints' limits as long as easing off helps.
+const EFFORT_USED: f32 = 0.9;
+/// What is left of the wanted turning and of the feet's acceleration when a robot eases off altogether.
+const EASED_TURN: f32 = 0.6;
+const EASED_FEET: f32 = 0.2;
 
 /// Wanted accelerations, world frame.
 pub(super) struct Motion {
@@ -42,10 +50,51 @@ pub(super) struct Torques {
     pub acceleration_m_s2: Vector,
 }
 
+/// [`leg_torques`], with trunk and feet driven less hard if a joint could not do it: torques that saturate fit no motion,
+/// and tip the foot that carries.
+pub(super) fn leg_torques_within_limits(
+    body: &WholeBody,
+    load: &Load,
+    motion: &Motion,
+    contact: &Contact,
+) -> Torques {
+    let full = leg_torques(body, load, motion, contact);
+    let most_n_m = |leg: usize, i: usize| body.model.joints[LEGS[leg] + i].effort_n_m * EFFORT_USED;
+    let joints = || (0..2).flat_map(|leg| (0..LEG_JOINT_COUNT).map(move |i| (leg, i)));
+    if joints().all(|(leg, i)| full.torque_n_m[leg][i].abs() <= most_n_m(leg, i)) {
+        return full;
+    }
+    let eased = Motion {
+        lift_m_s2: motion.lift_m_s2,
+        turn_rad_s2: motion.turn_rad_s2 * EASED_TURN,
+        feet: motion.feet.map(|foot| Acceleration {
+            linear_m_s2: foot.linear_m_s2 * EASED_FEET,
+            angular_rad_s2: foot.angular_rad_s2 * EASED_FEET,
+        }),
+    };
+    let eased = leg_torques(body, load, &eased, contact);
+    let mut share = 1.0_f32;
+    for (leg, i) in joints() {
+        let (low, high) = (eased.torque_n_m[leg][i], full.torque_n_m[leg][i]);
+        let most = most_n_m(leg, i);
+        if high.abs() > most && low.abs() < most {
+            share = share.min((most * high.signum() - low) / (high - low));
+        }
+    }
+    let between = |low: f32, high: f32| low + (high - low) * share;
+    Torques {
+        torque_n_m: std::array::from_fn(|leg| {
+            std::array::from_fn(|i| between(eased.torque_n_m[leg][i], full.torque_n_m[leg][i]))
+        }),
+        acceleration_m_s2: eased.acceleration_m_s2
+            + (full.acceleration_m_s2 - eased.acceleration_m_s2) * share,
+    }
+}
+
 /// Torques of both legs. The pelvis accelerates sideways as it must for the ground force to have no moment about the
 /// pressure point, and turns no harder than one foot can hold: both are linear in its acceleration, and found by correcting
 /// it [`CORRECTIONS`] times.
-pub(super) fn leg_torques(body: &WholeBody, load: &Load, motion: &Motion, contact: &Contact) -> Torques {
+fn leg_torques(body: &WholeBody, load: &Load, motion: &Motion, contact: &Contact) -> Torques {
     let point_m = contact.pressure_m;
     let height_m = (body.com_m.z - point_m.z).max(0.4);
     let pelvis_m = body.world_from_pelvis().translation;
@@ -109,7 +158,7 @@ pub(super) fn leg_torques(body: &WholeBody, load: &Load, motion: &Motion, contac
 }
 
 /// Force (N) with which the ground answers the torques of one leg whose foot stands:
-///   J^T w = tau_dynamics - tau,  damped as in [`move_feet`].
+///   J^T w = tau_dynamics - tau,  by damped least squares.
 pub(super) fn ground_force_n(
     body: &WholeBody,
     side: Side,
@@ -118,7 +167,7 @@ pub(super) fn ground_force_n(
 ) -> Vector {
     let jacobian = foot_jacobian(body, side);
     let rest = SVector::<f32, 6>::from_fn(|i, _| dynamics_n_m[LEGS[side.index()] + i] - torque_n_m[i]);
-    let normal = jacobian * jacobian.transpose() + SMatrix::identity() * DAMPING;
+    let normal = jacobian * jacobian.transpose() + SMatrix::identity() * FORCE_DAMPING;
     normal.cholesky().map_or(Vector::ZERO, |factor| {
         let wrench = factor.solve(&(jacobian * rest));
         Vector::new(wrench[0], wrench[1], wrench[2])

@@ -5,6 +5,7 @@ mod balance;
 pub mod bench;
 mod choice;
 mod effort;
+mod footstep;
 mod gait;
 mod ground;
 mod legs;

@@ -5,6 +5,8 @@ use serde::{Deserialize, Serialize};
 
 const RATE_1_S: f32 = 11.5;
 const LARGEST_PUSH_M_S2: f32 = 2.0;
+/// A blow is over before a foot lands: only what lasts is a push.
+const LARGEST_CHANGE_M_S3: f32 = 4.5;
 
 /// Luenberger observer of the horizontal  v' = expected + d,  d' = 0,  both poles at -[`RATE_1_S`].
 #[derive(Clone, Default, Serialize, Deserialize)]
@@ -31,7 +33,7 @@ impl Observer {
         let velocity = self.velocity_m_s.get_or_insert(measured);
         let error = measured - *velocity;
         *velocity += (self.expected_m_s2 + self.push_m_s2 + error * (2.0 * RATE_1_S)) * dt_s;
-        self.push_m_s2 =
-            (self.push_m_s2 + error * (RATE_1_S * RATE_1_S * dt_s)).clamp_length_max(LARGEST_PUSH_M_S2);
+        let change_m_s3 = (error * (RATE_1_S * RATE_1_S)).clamp_length_max(LARGEST_CHANGE_M_S3);
+        self.push_m_s2 = (self.push_m_s2 + change_m_s3 * dt_s).clamp_length_max(LARGEST_PUSH_M_S2);
     }
 }

@@ -12,8 +12,9 @@ use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
 use super::LegCommand;
-use super::effort::{Contact, Motion, Torques, leg_torques};
-use super::gait::{Gait, PERIOD_S, TRANSFER_S, recoil};
+use super::effort::{Contact, Motion, Torques, leg_torques_within_limits};
+use super::footstep::{Footstep, Situation};
+use super::gait::{Gait, PERIOD_S, TRANSFER_S};
 use super::ground::{nearest_support_m, soles};
 use super::legs::rotation_vector_rad;
 use super::load::Load;
@@ -21,25 +22,17 @@ use super::swing::{SOLE_IN_FOOT_M, SWING_S, Swing};
 use crate::robot::{Acceleration, LEG_JOINT_COUNT, LEGS, Side, WholeBody};
 use crate::world::GRAVITY_M_S2;
 
-/// The feet never cross.
-const LEAST_SPREAD_M: f32 = 0.12;
-const LARGEST_SPREAD_M: f32 = 0.45;
-const REACH_M: [f32; 2] = [-0.3, 0.4];
-/// Part of the capture point's error that the centre of pressure of the carrying foot works against, and how far the
-/// pressure goes from the sole's centre: along and across the foot.
-const CAPTURE_GAIN: f32 = 1.0;
-const PRESSURE_M: [f32; 2] = [0.069, 0.018];
 const SHIFT_GAIN: f32 = 3.0;
 /// The first foot lifts when the capture point is this near to where a step would have left it, or when a robot that
 /// falls forward or backward has no time to shift.
 const SHIFTED_M: f32 = 0.012;
 const LATEST_M: f32 = 0.1;
 /// Position loop: a steady gait falls a little short of its command.
-const POSITION_GAIN_1_S: f32 = 0.8;
+const POSITION_GAIN_1_S: f32 = 0.4;
 const BIAS_GAIN_1_S2: f32 = 0.3;
 const LARGEST_CORRECTION_M_S: [f32; 2] = [0.3, 0.12];
 /// A robot that was pushed farther than this off its way does not come back for it.
-const LEASH_M: f32 = 0.4;
+const LEASH_M: f32 = 0.15;
 /// One foot holds little against turning: a robot that is turned by force gives way, and turns back slowly.
 const HEADING_LEASH_RAD: f32 = 0.12;
 const RETURN_RAD_S: f32 = 0.4;
@@ -129,59 +122,32 @@ impl Step {
     ) -> (LegCommand, Vector) {
         let soles = soles(body);
         let ground_m = soles[self.stance.index()].translation.z;
-        self.goal_rad += velocity[2] * dt_s;
-        let return_rad =
-            wrapped(self.goal_rad - self.heading_rad).clamp(-RETURN_RAD_S * dt_s, RETURN_RAD_S * dt_s);
-        self.heading_rad += velocity[2] * dt_s + return_rad;
-        let forward = body.world_from_pelvis().rotation * Vector::X;
-        let ahead_rad = wrapped(self.heading_rad - forward.y.atan2(forward.x));
-        self.heading_rad += ahead_rad.clamp(-HEADING_LEASH_RAD, HEADING_LEASH_RAD) - ahead_rad;
+        self.turn(body, velocity[2], dt_s);
         let heading = Rotation::from_rotation_z(self.heading_rad);
         let (ahead, left) = (heading * Vector::X, heading * Vector::Y);
-        let com_height_m = (body.com_m.z - ground_m).max(0.4);
-        let rate_1_s = (GRAVITY_M_S2 / com_height_m).sqrt();
-        let balance_m = load.balance_point_m;
-        let capture_m = flat(balance_m + body.com_velocity_m_s / rate_1_s);
+        let rate_1_s = (GRAVITY_M_S2 / (body.com_m.z - ground_m).max(0.4)).sqrt();
         let pelvis_m = body.world_from_pelvis().translation;
         let [forward_m_s, left_m_s] = self.corrected_velocity(velocity, pelvis_m, ahead, left, dt_s);
         let outside = if self.stance == Side::Left { left } else { -left };
         let gait = Gait::new(rate_1_s, ahead * forward_m_s + left * left_m_s, outside);
-        let stance_m = flat(soles[self.stance.index()].translation);
-        let old_m = flat(soles[self.stance.other().index()].translation);
+        let situation = Situation {
+            gait: &gait,
+            swing: &self.swing,
+            capture_m: flat(load.balance_point_m + body.com_velocity_m_s / rate_1_s),
+            stance: soles[self.stance.index()],
+            old_m: flat(soles[self.stance.other().index()].translation),
+            ahead,
+            outside,
+            time_s: self.time_s,
+        };
         let pressure_m = if self.shifting {
-            // As a step that just ended would leave it.
-            let target_m = stance_m + (gait.step_m + gait.offset_m) * (-rate_1_s * SWING_S).exp();
-            let late = (capture_m - (stance_m + old_m) * 0.5).dot(ahead).abs() > LATEST_M;
-            if (target_m - capture_m).dot(outside) < SHIFTED_M || late {
-                self.shifting = false;
-            }
-            nearest_support_m(capture_m + (capture_m - target_m) * SHIFT_GAIN, soles)
+            let (target_m, shifted) = shift(&situation);
+            self.shifting = !shifted;
+            nearest_support_m(situation.capture_m + (situation.capture_m - target_m) * SHIFT_GAIN, soles)
         } else {
-            self.time_s += dt_s;
-            let remaining_s = (PERIOD_S - self.time_s).max(0.0);
-            let wanted_m = stance_m + (gait.step_m + gait.offset_m) * (-rate_1_s * remaining_s).exp();
-            let sole = soles[self.stance.index()].rotation;
-            let most_m = Vector::new(PRESSURE_M[0], PRESSURE_M[1], 0.0);
-            let correction_m = sole.inverse() * ((capture_m - wanted_m) * CAPTURE_GAIN);
-            let correction_m = Vector::new(correction_m.x, correction_m.y, 0.0).clamp(-most_m, most_m);
-            let carrying_m = flat(stance_m + sole * correction_m);
-            let share = (self.time_s / TRANSFER_S).min(1.0);
-            let now_m = old_m + (carrying_m - old_m) * share;
-            let ramp_s = (TRANSFER_S - self.time_s).max(0.0);
-            let landing_m = gait.predict(capture_m, now_m, carrying_m, ramp_s, remaining_s) - gait.offset_m;
-            let recoil = recoil(rate_1_s, remaining_s.min(SWING_S));
-            let landing_m = (landing_m + flat(self.swing.sole_m()) * recoil) / (1.0 + recoil) - stance_m;
-            let reach_m = landing_m.dot(ahead).clamp(REACH_M[0], REACH_M[1]);
-            let spread_m = (-landing_m.dot(outside)).clamp(LEAST_SPREAD_M, LARGEST_SPREAD_M);
-            let turned = Rotation::from_rotation_z(self.heading_rad + velocity[2] * remaining_s);
-            let mut sole_m = stance_m + ahead * reach_m - outside * spread_m;
-            sole_m.z = ground_m;
-            self.swing.advance(
-                Pose::from_parts(sole_m - turned * SOLE_IN_FOOT_M, turned),
-                self.time_s - TRANSFER_S,
-                dt_s,
-            );
-            now_m
+            let footstep = situation.plan(dt_s);
+            self.advance(&footstep, velocity[2], ground_m, dt_s);
+            footstep.pressure_m
         };
         let wanted_m = height_m.min(HIGHEST_M).min(self.within_reach_m(body)).max(LOWEST_M);
         let rise = (wanted_m - self.height_m).clamp(-LOWERING_M_S * dt_s, RAISING_M_S * dt_s);
@@ -199,6 +165,27 @@ impl Step {
             }),
         };
         (legs, torques.acceleration_m_s2)
+    }
+
+    /// Turns the heading as commanded, within the leash of where the robot faces.
+    fn turn(&mut self, body: &WholeBody, yaw_rate_rad_s: f32, dt_s: f32) {
+        self.goal_rad += yaw_rate_rad_s * dt_s;
+        let return_rad =
+            wrapped(self.goal_rad - self.heading_rad).clamp(-RETURN_RAD_S * dt_s, RETURN_RAD_S * dt_s);
+        self.heading_rad += yaw_rate_rad_s * dt_s + return_rad;
+        let forward = body.world_from_pelvis().rotation * Vector::X;
+        let ahead_rad = wrapped(self.heading_rad - forward.y.atan2(forward.x));
+        self.heading_rad += ahead_rad.clamp(-HEADING_LEASH_RAD, HEADING_LEASH_RAD) - ahead_rad;
+    }
+
+    /// One physics step of the swinging foot.
+    fn advance(&mut self, footstep: &Footstep, yaw_rate_rad_s: f32, ground_m: f32, dt_s: f32) {
+        self.time_s += dt_s * footstep.pace;
+        let remaining_s = (PERIOD_S - self.time_s).max(0.0) / footstep.pace;
+        let turned = Rotation::from_rotation_z(self.heading_rad + yaw_rate_rad_s * remaining_s);
+        let sole_m = footstep.foothold_m + Vector::Z * ground_m;
+        let goal = Pose::from_parts(sole_m - turned * SOLE_IN_FOOT_M, turned);
+        self.swing.advance(goal, self.time_s - TRANSFER_S, footstep.pace, dt_s);
     }
 
     /// Largest height of the pelvis at which both legs reach: the carrying one now, the other where it will land.
@@ -303,8 +290,18 @@ impl Step {
             pressure_m: Vector::new(pressure_m.x, pressure_m.y, ground_m),
             foot: (!both).then_some(self.stance),
         };
-        leg_torques(body, load, &motion, &contact)
+        leg_torques_within_limits(body, load, &motion, &contact)
     }
+}
+
+/// Where the capture point has to be when the first foot lifts, as a step that just ended would leave it; and whether
+/// the foot lifts now.
+fn shift(now: &Situation) -> (Vector, bool) {
+    let gait = now.gait;
+    let stance_m = flat(now.stance.translation);
+    let target_m = stance_m + (gait.step_m + gait.offset_m) * (-gait.rate_1_s * SWING_S).exp();
+    let late = (now.capture_m - (stance_m + now.old_m) * 0.5).dot(now.ahead).abs() > LATEST_M;
+    (target_m, late || (target_m - now.capture_m).dot(now.outside) < SHIFTED_M)
 }
 
 fn leg_joint(i: usize) -> usize {

@@ -15,8 +15,10 @@ const PROBING_M_S: f32 = 0.25;
 /// The goal stands still for the last part of the way.
 const LEAST_REMAINING_S: f32 = 0.03;
 const LARGEST_ACCELERATION_M_S2: f32 = 60.0;
-const STIFFNESS_1_S2: f32 = 600.0;
-const DAMPING_1_S: f32 = 45.0;
+/// The farthest that a foot at rest gets in the time T: this times T^2.
+const REACH_M_S2: f32 = 14.0;
+const STIFFNESS_1_S2: f32 = 300.0;
+const DAMPING_1_S: f32 = 35.0;
 
 /// Ankle roll link to the centre of its sole.
 pub(super) const SOLE_IN_FOOT_M: Vector = Vector::new(0.035, 0.0, -0.035);
@@ -30,22 +32,25 @@ pub(super) struct Swing {
     position_m: Vector,
     velocity_m_s: Vector,
     acceleration_m_s2: Vector,
+    /// How much faster than in the gait.
+    pace: f32,
 }
 
 impl Swing {
     /// The foot stands; its next swing starts from where it is.
     pub(super) fn plant(&mut self, body: &WholeBody, side: Side) {
         let foot = body.world_from_link[body.model.joints[LEGS[side.index()] + 5].link];
-        *self = Swing { from: foot, to: foot, position_m: foot.translation, ..Swing::default() };
+        *self = Swing { from: foot, to: foot, position_m: foot.translation, pace: 1.0, ..Swing::default() };
     }
 
-    /// One physics step of the path to `goal`, `time_s` after lift-off. The jerk of least jerk from position x,
+    /// One physics step of the path to `goal`, `time_s` (at the pace of the gait) after lift-off. The jerk of least jerk from position x,
     /// velocity v, acceleration a to rest at x1 in T:  60 (x1 - x) / T^3 - 36 v / T^2 - 9 a / T.
-    pub(super) fn advance(&mut self, goal: Pose, time_s: f32, dt_s: f32) {
+    pub(super) fn advance(&mut self, goal: Pose, time_s: f32, pace: f32, dt_s: f32) {
         if time_s <= 0.0 {
             return;
         }
-        let remaining_s = AIR_S - time_s;
+        self.pace = pace;
+        let remaining_s = (AIR_S - time_s) / pace;
         if remaining_s > LEAST_REMAINING_S {
             self.to = goal;
         }
@@ -57,6 +62,18 @@ impl Swing {
             (self.acceleration_m_s2 + jerk_m_s3 * dt_s).clamp_length_max(LARGEST_ACCELERATION_M_S2);
         self.velocity_m_s += self.acceleration_m_s2 * dt_s;
         self.position_m += self.velocity_m_s * dt_s;
+    }
+
+    /// The place nearest to `sole_m` where the sole can come to rest in time. A foot that is left to itself stops at
+    ///   x + 0.6 v T + 0.15 a T^2,   where the jerk of least jerk is zero.
+    pub(super) fn reachable_m(&self, sole_m: Vector, time_s: f32, pace: f32) -> Vector {
+        let remaining_s = ((AIR_S - time_s) / pace).max(0.0);
+        let resting_m = self.sole_m()
+            + self.velocity_m_s * (0.6 * remaining_s)
+            + self.acceleration_m_s2 * (0.15 * remaining_s * remaining_s);
+        let mut change_m = sole_m - resting_m;
+        change_m.z = 0.0;
+        sole_m - change_m + change_m.clamp_length_max(REACH_M_S2 * remaining_s * remaining_s)
     }
 
     /// Where the sole's centre is on its path, without the lift.
@@ -81,6 +98,8 @@ impl Swing {
         if time_s > AIR_S {
             (lift_m, lift_m_s, lift_m_s2) = (PROBING_M_S * (AIR_S - time_s), -PROBING_M_S, 0.0);
         }
+        lift_m_s *= self.pace;
+        lift_m_s2 *= self.pace * self.pace;
         let position_m = self.position_m + Vector::Z * lift_m;
         let velocity_m_s = self.velocity_m_s + Vector::Z * lift_m_s;
         let smooth = p * p * p * (10.0 - 15.0 * p + 6.0 * p * p);

@@ -1,0 +1,91 @@
+//! Plans the rest of a step: where the ground should push now, where the swinging foot should land, and how soon.
+
+use rapier3d::math::{Pose, Vector};
+
+use super::gait::{Gait, PERIOD_S, TRANSFER_S, recoil};
+use super::swing::{SWING_S, Swing};
+
+/// Footholds lie within these of the foot that carries, along the heading and to the inside: the feet never cross.
+const REACH_M: [f32; 2] = [-0.4, 0.48];
+const SPREAD_M: [f32; 2] = [0.08, 0.52];
+/// A foothold outside of these is a strain.
+const EASY_REACH_M: [f32; 2] = [-0.22, 0.3];
+const EASY_SPREAD_M: [f32; 2] = [0.12, 0.42];
+/// The capture point runs away exponentially: a robot that was hit hurries, to need a nearer foothold.
+const FASTER: [f32; 4] = [1.25, 1.5, 1.75, 2.0];
+/// Strain per pace above one, and per distance between the foothold that is needed and the nearest within reach.
+const HURRY_M: f32 = 0.01;
+const MISS: f32 = 0.1;
+/// How far the centre of pressure goes from the sole's centre: along and across the foot.
+const PRESSURE_M: [f32; 2] = [0.069, 0.018];
+
+/// What a footstep is planned from. Horizontal vectors, world frame.
+pub(super) struct Situation<'a> {
+    pub gait: &'a Gait,
+    pub swing: &'a Swing,
+    pub capture_m: Vector,
+    /// Sole that carries, and the centre of the one that carried before.
+    pub stance: Pose,
+    pub old_m: Vector,
+    pub ahead: Vector,
+    pub outside: Vector,
+    /// Since the stance foot landed, at the pace of the gait.
+    pub time_s: f32,
+}
+
+/// The plan: centre of pressure now, centre of the sole when it lands, and how much faster than the gait.
+pub(super) struct Footstep {
+    pub pressure_m: Vector,
+    pub foothold_m: Vector,
+    pub pace: f32,
+    strain_m: f32,
+}
+
+impl Situation<'_> {
+    /// The footstep of the pace that strains least. A foot that has not left the ground does not hurry.
+    pub(super) fn plan(&self, dt_s: f32) -> Footstep {
+        let swinging = self.time_s > TRANSFER_S && self.time_s < PERIOD_S;
+        let faster = if swinging { &FASTER[..] } else { &[] };
+        let gait = self.at_pace(1.0, dt_s);
+        faster
+            .iter()
+            .map(|pace| self.at_pace(*pace, dt_s))
+            .fold(gait, |best, next| if next.strain_m < best.strain_m { next } else { best })
+    }
+
+    fn at_pace(&self, pace: f32, dt_s: f32) -> Footstep {
+        let gait = self.gait;
+        let stance_m = flat(self.stance.translation);
+        let time_s = self.time_s + dt_s * pace;
+        let remaining_s = (PERIOD_S - time_s).max(0.0) / pace;
+        let wanted_m = stance_m + (gait.step_m + gait.offset_m) * (-gait.rate_1_s * remaining_s).exp();
+        let most_m = Vector::new(PRESSURE_M[0], PRESSURE_M[1], 0.0);
+        let correction_m = flat(self.stance.rotation.inverse() * (self.capture_m - wanted_m));
+        let carrying_m = flat(stance_m + self.stance.rotation * correction_m.clamp(-most_m, most_m));
+        let pressure_m = self.old_m + (carrying_m - self.old_m) * (time_s / TRANSFER_S).min(1.0);
+        let ramp_s = (TRANSFER_S - time_s).max(0.0);
+        let landing_m =
+            gait.predict(self.capture_m, pressure_m, carrying_m, ramp_s, remaining_s) - gait.offset_m;
+        let recoil = recoil(gait.rate_1_s, remaining_s.min(SWING_S));
+        let needed_m = (landing_m + flat(self.swing.sole_m()) * recoil) / (1.0 + recoil);
+        let possible_m =
+            self.swing.reachable_m(self.nearest_m(needed_m, REACH_M, SPREAD_M), time_s - TRANSFER_S, pace);
+        let foothold_m = flat(possible_m);
+        let easy_m = self.nearest_m(needed_m, EASY_REACH_M, EASY_SPREAD_M);
+        let strain_m =
+            (needed_m - easy_m).length() + (needed_m - foothold_m).length() * MISS + (pace - 1.0) * HURRY_M;
+        Footstep { pressure_m, foothold_m, pace, strain_m }
+    }
+
+    /// The foothold nearest to `point_m` within a reach along the heading and a spread to the inside.
+    fn nearest_m(&self, point_m: Vector, reach_m: [f32; 2], spread_m: [f32; 2]) -> Vector {
+        let stance_m = flat(self.stance.translation);
+        let away_m = point_m - stance_m;
+        stance_m + self.ahead * away_m.dot(self.ahead).clamp(reach_m[0], reach_m[1])
+            - self.outside * (-away_m.dot(self.outside)).clamp(spread_m[0], spread_m[1])
+    }
+}
+
+fn flat(v: Vector) -> Vector {
+    Vector::new(v.x, v.y, 0.0)
+}
