@@ -50,8 +50,14 @@ pub struct Played {
     pub build: String,
     #[serde(flatten)]
     pub result: EpisodeResult,
-    /// Why the policy gave up, if it did.
+    /// Why the episode fell short: what stopped the policy, or the first phase that was missed.
     pub note: Option<String>,
+}
+
+/// The first phase that was not reached.
+fn missed(result: &EpisodeResult) -> Option<String> {
+    let (phase, _) = result.phases.0.iter().find(|(_, time_s)| time_s.is_none())?;
+    Some(format!("{phase} was not reached in {} steps", result.env_steps))
 }
 
 /// How a task went over its seeds.
@@ -195,8 +201,8 @@ impl Keeper<'_> {
             protocol: plan.protocol,
             locomotion: plan.locomotion.name().into(),
             build: self.build.clone(),
+            note: outcome.err().map(|error| error.to_string()).or_else(|| missed(&result)),
             result,
-            note: outcome.err().map(|error| error.to_string()),
         };
         let text = serde_json::to_string_pretty(&episode)?;
         write_whole(self.folder, &file_name(task, seed), text.as_bytes())?;
@@ -294,21 +300,36 @@ mod tests {
         }
     }
 
-    /// An episode that was played under `keeper`'s rules.
-    fn played(keeper: &Keeper, task: &Task, seed: u32) -> Played {
-        let result = EpisodeResult {
-            task: task.id.into(),
+    fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> EpisodeResult {
+        EpisodeResult {
+            task: task.into(),
             seed,
-            phases: PhaseTimes(vec![("p1".into(), Some(4.2))]),
+            phases: PhaseTimes(phases),
             env_steps: 812,
             tool_calls: 61,
             falls: 0,
             realtime_factor: 3.5,
             state_hash: "00c0ffee00c0ffee".into(),
-        };
+        }
+    }
+
+    /// An episode that was played under `keeper`'s rules.
+    fn played(keeper: &Keeper, task: &Task, seed: u32) -> Played {
+        let result = result(task.id, seed, vec![("p1".into(), Some(4.2))]);
         let (policy, protocol) = (keeper.plan.policy, keeper.plan.protocol);
         let locomotion = keeper.plan.locomotion.name().into();
         Played { policy, protocol, locomotion, build: keeper.build.clone(), result, note: None }
+    }
+
+    #[test]
+    fn the_first_phase_that_was_missed_is_noted() {
+        let note = |times: [Option<f64>; 3]| {
+            let phases = ["p1", "p2", "p3"].into_iter().map(String::from).zip(times).collect();
+            missed(&result("handover", 7, phases))
+        };
+        let second = note([Some(4.2), None, None]);
+        assert_eq!(second.as_deref(), Some("p2 was not reached in 812 steps"));
+        assert_eq!(note([Some(4.2), Some(5.0), Some(6.0)]), None);
     }
 
     #[test]

@@ -8,6 +8,9 @@ use tandem_episodes::{
     tasks::{self, Task},
 };
 
+/// Notes on failures below the table.
+const NOTES_SHOWN: usize = 20;
+
 /// The tasks that `text` names: `all`, or ids separated by commas.
 pub fn parse_tasks(text: &str) -> Result<Vec<&'static Task>, String> {
     match text {
@@ -26,9 +29,15 @@ pub fn run(plan: &Plan, folder: &Path) -> Result<(), Box<dyn Error>> {
     })?;
     bar.finish_and_clear();
     print_table(&evaluation);
-    for episode in evaluation.episodes.iter().filter(|episode| episode.note.is_some()) {
-        let note = episode.note.as_deref().unwrap_or_default();
-        println!("  {} seed {}: {note}", episode.result.task, episode.result.seed);
+    let notes: Vec<String> = evaluation
+        .episodes
+        .iter()
+        .filter_map(|episode| Some((&episode.result, episode.note.as_deref()?)))
+        .map(|(result, note)| format!("  {} seed {}: {note}", result.task, result.seed))
+        .collect();
+    notes.iter().take(NOTES_SHOWN).for_each(|note| println!("{note}"));
+    if notes.len() > NOTES_SHOWN {
+        println!("  and {} more notes in results.json", notes.len() - NOTES_SHOWN);
     }
     println!("  results in {}", folder.display());
     Ok(())
