@@ -54,12 +54,6 @@ pub struct Played {
     pub note: Option<String>,
 }
 
-/// The first phase that was not reached.
-fn missed(result: &EpisodeResult) -> Option<String> {
-    let (phase, _) = result.phases.0.iter().find(|(_, time_s)| time_s.is_none())?;
-    Some(format!("{phase} was not reached in {} steps", result.env_steps))
-}
-
 /// How a task went over its seeds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TaskSummary {
@@ -270,6 +264,12 @@ fn summarise(plan: &Plan, episodes: Vec<Played>) -> Evaluation {
 
 fn was_reached(phases: &PhaseTimes, phase: &str) -> bool {
     phases.reached_s(phase).is_some()
+}
+
+/// The first phase that was not reached.
+fn missed(result: &EpisodeResult) -> Option<String> {
+    let (phase, _) = result.phases.0.iter().find(|(_, time_s)| time_s.is_none())?;
+    Some(format!("{phase} was not reached in {} steps", result.env_steps))
 }
 
 /// Exact 95 % interval of a rate, `successes` of `trials` (Clopper and Pearson, 1934).

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::ground::soles;
 use super::load::Load;
 use super::observer::Observer;
+use super::plane::heading_rad;
 use super::stand::Stand;
 use super::step::Step;
 use super::{BaseCommand, BaseLimits, LegCommand, Locomotion};
@@ -110,8 +111,7 @@ impl Locomotion for Balance {
 impl State {
     fn new(body: &WholeBody) -> State {
         let pelvis = body.world_from_pelvis();
-        let forward = pelvis.rotation * Vector::X;
-        let heading_rad = forward.y.atan2(forward.x);
+        let heading_rad = heading_rad(pelvis);
         let [left, right] = soles(body);
         let middle_m = (left.translation + right.translation) * 0.5;
         let mut pelvis_from_middle_m =

@@ -5,6 +5,7 @@ use rapier3d::na::{SMatrix, SVector};
 
 use super::ground::{FootForce, distribute, leg_torques_n_m, soles};
 use super::load::Load;
+use super::plane::flat;
 use crate::robot::{Acceleration, Effort, JOINTS, LEG_JOINT_COUNT, LEGS, Side, WholeBody};
 use crate::world::GRAVITY_M_S2;
 
@@ -98,7 +99,6 @@ fn leg_torques(body: &WholeBody, load: &Load, motion: &Motion, contact: &Contact
     let point_m = contact.pressure_m;
     let height_m = (body.com_m.z - point_m.z).max(0.4);
     let pelvis_m = body.world_from_pelvis().translation;
-    let flat = |v: Vector| Vector::new(v.x, v.y, 0.0);
     let away_m = flat(body.com_m - point_m);
     let mut pelvis = Acceleration {
         linear_m_s2: away_m * ((GRAVITY_M_S2 + motion.lift_m_s2) / height_m) + Vector::Z * motion.lift_m_s2,
@@ -177,7 +177,7 @@ pub(super) fn ground_force_n(
 /// Linear over angular velocity of an ankle roll link per joint velocity of its leg.
 fn foot_jacobian(body: &WholeBody, side: Side) -> SMatrix<f32, 6, 6> {
     let first = LEGS[side.index()];
-    let foot_m = body.world_from_link[body.model.joints[first + 5].link].translation;
+    let foot_m = body.world_from_foot(side).translation;
     let mut jacobian = SMatrix::<f32, 6, 6>::zeros();
     for i in 0..LEG_JOINT_COUNT {
         let (origin, axis) = body.joint_axis(first + i);

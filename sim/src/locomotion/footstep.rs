@@ -3,6 +3,7 @@
 use rapier3d::math::{Pose, Vector};
 
 use super::gait::{Gait, PERIOD_S, TRANSFER_S, recoil};
+use super::plane::flat;
 use super::swing::{SWING_S, Swing};
 
 /// Footholds lie within these of the foot that carries, along the heading and to the inside: the feet never cross.
@@ -53,14 +54,20 @@ impl Situation<'_> {
             .fold(gait, |best, next| if next.strain_m < best.strain_m { next } else { best })
     }
 
+    /// Where the capture point of the steady gait is, `remaining_s` before the swinging foot lands.
+    pub(super) fn steady_capture_m(&self, remaining_s: f32) -> Vector {
+        let gait = self.gait;
+        flat(self.stance.translation) + (gait.step_m + gait.offset_m) * (-gait.rate_1_s * remaining_s).exp()
+    }
+
     fn at_pace(&self, pace: f32, dt_s: f32) -> Footstep {
         let gait = self.gait;
         let stance_m = flat(self.stance.translation);
         let time_s = self.time_s + dt_s * pace;
         let remaining_s = (PERIOD_S - time_s).max(0.0) / pace;
-        let wanted_m = stance_m + (gait.step_m + gait.offset_m) * (-gait.rate_1_s * remaining_s).exp();
         let most_m = Vector::new(PRESSURE_M[0], PRESSURE_M[1], 0.0);
-        let correction_m = flat(self.stance.rotation.inverse() * (self.capture_m - wanted_m));
+        let correction_m =
+            flat(self.stance.rotation.inverse() * (self.capture_m - self.steady_capture_m(remaining_s)));
         let carrying_m = flat(stance_m + self.stance.rotation * correction_m.clamp(-most_m, most_m));
         let pressure_m = self.old_m + (carrying_m - self.old_m) * (time_s / TRANSFER_S).min(1.0);
         let ramp_s = (TRANSFER_S - time_s).max(0.0);
@@ -84,8 +91,4 @@ impl Situation<'_> {
         stance_m + self.ahead * away_m.dot(self.ahead).clamp(reach_m[0], reach_m[1])
             - self.outside * (-away_m.dot(self.outside)).clamp(spread_m[0], spread_m[1])
     }
-}
-
-fn flat(v: Vector) -> Vector {
-    Vector::new(v.x, v.y, 0.0)
 }

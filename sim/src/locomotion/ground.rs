@@ -2,6 +2,7 @@
 
 use rapier3d::math::{Pose, Vector};
 
+use super::plane::flat;
 use crate::robot::{LEG_JOINT_COUNT, LEGS, Side, WholeBody};
 
 /// Force on one foot and the point of the ground where it acts, world frame.
@@ -27,7 +28,6 @@ pub(super) fn soles(body: &WholeBody) -> [Pose; 2] {
 
 /// The point nearest to `point_m` where two planted feet can have their centre of pressure.
 pub(super) fn nearest_support_m(point_m: Vector, soles: [Pose; 2]) -> Vector {
-    let flat = |v: Vector| Vector::new(v.x, v.y, 0.0);
     let across = flat(soles[0].translation - soles[1].translation);
     let left_share = (flat(point_m - soles[1].translation).dot(across) / across.length_squared())
         .clamp(SMALLEST_SHARE, 1.0 - SMALLEST_SHARE);
@@ -82,7 +82,6 @@ pub(super) fn distribute(
 ) -> [FootForce; 2] {
     let pressure_m = centre_of_pressure_m(com_m, force_n, moment_n_m, soles);
     let ground_m = pressure_m.z;
-    let flat = |v: Vector| Vector::new(v.x, v.y, 0.0);
     let across = flat(soles[0].translation - soles[1].translation);
     let along_line = flat(pressure_m - soles[1].translation).dot(across) / across.length_squared();
     let left_share = along_line.clamp(SMALLEST_SHARE, 1.0 - SMALLEST_SHARE);

@@ -11,6 +11,7 @@ mod ground;
 mod legs;
 mod load;
 mod observer;
+mod plane;
 mod stand;
 mod step;
 mod swing;

@@ -12,6 +12,7 @@ use super::effort::ground_force_n;
 use super::ground::{distribute, leg_torques_n_m, soles, supported_force_n};
 use super::legs::{LegAngles, inverse, rotation_vector_rad};
 use super::load::Load;
+use super::plane::flat;
 use crate::robot::{LEG_JOINT_COUNT, LEGS, Side, WholeBody};
 use crate::world::GRAVITY_M_S2;
 
@@ -69,9 +70,8 @@ impl Stand {
         let middle_m = (soles[0].translation + soles[1].translation) * 0.5;
         let heading = Rotation::from_rotation_z(heading_rad);
         let home_m = moving.map_or(pelvis.translation, |(rest_m, _)| middle_m + heading * rest_m);
-        let flat = |v: Vector| Vector::new(v.x, v.y, 0.0);
         let mut stand = Stand {
-            feet: Side::BOTH.map(|side| body.world_from_link[body.model.joints[LEGS[side.index()] + 5].link]),
+            feet: Side::BOTH.map(|side| body.world_from_foot(side)),
             soles,
             home_m,
             offset_m: flat(pelvis.translation - home_m),

@@ -6,8 +6,6 @@
 //! u = xi(T) - b  leaves the capture point the offset b of a steady gait from the new foot; see [`Gait`].
 //! Source: Englsberger, Ott, Albu-Schaeffer 2015; Khadiv et al. 2016.
 
-use std::f32::consts::{PI, TAU};
-
 use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
@@ -18,6 +16,7 @@ use super::gait::{Gait, PERIOD_S, TRANSFER_S};
 use super::ground::{nearest_support_m, soles};
 use super::legs::rotation_vector_rad;
 use super::load::Load;
+use super::plane::{flat, heading_rad, wrapped_rad};
 use super::swing::{SOLE_IN_FOOT_M, SWING_S, Swing};
 use crate::robot::{Acceleration, LEG_JOINT_COUNT, LEGS, Side, WholeBody};
 use crate::world::GRAVITY_M_S2;
@@ -171,10 +170,9 @@ impl Step {
     fn turn(&mut self, body: &WholeBody, yaw_rate_rad_s: f32, dt_s: f32) {
         self.goal_rad += yaw_rate_rad_s * dt_s;
         let return_rad =
-            wrapped(self.goal_rad - self.heading_rad).clamp(-RETURN_RAD_S * dt_s, RETURN_RAD_S * dt_s);
+            wrapped_rad(self.goal_rad - self.heading_rad).clamp(-RETURN_RAD_S * dt_s, RETURN_RAD_S * dt_s);
         self.heading_rad += yaw_rate_rad_s * dt_s + return_rad;
-        let forward = body.world_from_pelvis().rotation * Vector::X;
-        let ahead_rad = wrapped(self.heading_rad - forward.y.atan2(forward.x));
+        let ahead_rad = wrapped_rad(self.heading_rad - heading_rad(body.world_from_pelvis()));
         self.heading_rad += ahead_rad.clamp(-HEADING_LEASH_RAD, HEADING_LEASH_RAD) - ahead_rad;
     }
 
@@ -193,9 +191,8 @@ impl Step {
         let pelvis_m = body.world_from_pelvis().translation;
         let remaining_s = (PERIOD_S - self.time_s).max(0.0);
         let height_m = |side: Side| {
-            let first = LEGS[side.index()];
-            let (hip_m, _) = body.joint_axis(first + 1);
-            let ankle_m = body.world_from_link[body.model.joints[first + 5].link].translation;
+            let (hip_m, _) = body.joint_axis(LEGS[side.index()] + 1);
+            let ankle_m = body.world_from_foot(side).translation;
             let away_m = if side == self.stance || self.shifting {
                 ankle_m - hip_m
             } else {
@@ -297,23 +294,14 @@ impl Step {
 /// Where the capture point has to be when the first foot lifts, as a step that just ended would leave it; and whether
 /// the foot lifts now.
 fn shift(now: &Situation) -> (Vector, bool) {
-    let gait = now.gait;
-    let stance_m = flat(now.stance.translation);
-    let target_m = stance_m + (gait.step_m + gait.offset_m) * (-gait.rate_1_s * SWING_S).exp();
-    let late = (now.capture_m - (stance_m + now.old_m) * 0.5).dot(now.ahead).abs() > LATEST_M;
+    let target_m = now.steady_capture_m(SWING_S);
+    let middle_m = (flat(now.stance.translation) + now.old_m) * 0.5;
+    let late = (now.capture_m - middle_m).dot(now.ahead).abs() > LATEST_M;
     (target_m, late || (target_m - now.capture_m).dot(now.outside) < SHIFTED_M)
 }
 
 fn leg_joint(i: usize) -> usize {
     LEGS[i / LEG_JOINT_COUNT] + i % LEG_JOINT_COUNT
-}
-
-fn wrapped(angle_rad: f32) -> f32 {
-    (angle_rad + PI).rem_euclid(TAU) - PI
-}
-
-fn flat(v: Vector) -> Vector {
-    Vector::new(v.x, v.y, 0.0)
 }
 
 /// Height of the lowest point of a sole.

@@ -39,12 +39,12 @@ pub(super) struct Swing {
 impl Swing {
     /// The foot stands; its next swing starts from where it is.
     pub(super) fn plant(&mut self, body: &WholeBody, side: Side) {
-        let foot = body.world_from_link[body.model.joints[LEGS[side.index()] + 5].link];
+        let foot = body.world_from_foot(side);
         *self = Swing { from: foot, to: foot, position_m: foot.translation, pace: 1.0, ..Swing::default() };
     }
 
-    /// One physics step of the path to `goal`, `time_s` (at the pace of the gait) after lift-off. The jerk of least jerk from position x,
-    /// velocity v, acceleration a to rest at x1 in T:  60 (x1 - x) / T^3 - 36 v / T^2 - 9 a / T.
+    /// One physics step of the path to `goal`, `time_s` (at the pace of the gait) after lift-off. The jerk of least jerk
+    /// from position x, velocity v, acceleration a to rest at x1 in T:  60 (x1 - x) / T^3 - 36 v / T^2 - 9 a / T.
     pub(super) fn advance(&mut self, goal: Pose, time_s: f32, pace: f32, dt_s: f32) {
         if time_s <= 0.0 {
             return;
@@ -118,7 +118,7 @@ impl Swing {
 /// Pose, velocity and angular velocity of an ankle roll link, world frame.
 fn foot_motion(body: &WholeBody, side: Side) -> (Pose, Vector, Vector) {
     let first = LEGS[side.index()];
-    let foot = body.world_from_link[body.model.joints[first + 5].link];
+    let foot = body.world_from_foot(side);
     let mut spin_rad_s = body.pelvis_angular_velocity_rad_s;
     let from_pelvis_m = foot.translation - body.world_from_pelvis().translation;
     let mut speed_m_s = body.pelvis_velocity_m_s + spin_rad_s.cross(from_pelvis_m);

@@ -3,7 +3,7 @@
 use rapier3d::math::{Pose, Vector};
 use rapier3d::prelude::{RigidBodyHandle, RigidBodySet};
 
-use super::{JOINTS, RobotModel};
+use super::{JOINTS, LEG_JOINT_COUNT, LEGS, RobotModel, Side};
 use crate::world::GRAVITY_M_S2;
 
 const PALM_IN_WRIST_M: Vector = Vector::new(0.12, 0.0, 0.0);
@@ -71,6 +71,11 @@ impl<'a> WholeBody<'a> {
     /// World pose of a site, if the robot has it.
     pub fn world_from_site(&self, name: &str) -> Option<Pose> {
         self.model.site(name).map(|site| self.world_from_link[site.link] * site.link_from_site)
+    }
+
+    /// Ankle roll link, to which a sole belongs.
+    pub fn world_from_foot(&self, side: Side) -> Pose {
+        self.world_from_link[self.model.joints[LEGS[side.index()] + LEG_JOINT_COUNT - 1].link]
     }
 
     /// Origin and unit axis of a joint in the world.

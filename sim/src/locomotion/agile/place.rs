@@ -4,10 +4,12 @@
 //! place moves with the command, and while the robot is told to move, or has strayed, the policy is told
 //!   v = v_command + k e + k/2 int(e dt),   e: reference minus pelvis, in the pelvis's heading frame [m].
 
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::PI;
 
 use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
+
+use crate::locomotion::plane::{heading_rad, wrapped_rad};
 
 const GAIN_1_S: f32 = 1.5;
 const INTEGRAL_1_S: f32 = 0.5 * GAIN_1_S;
@@ -54,7 +56,7 @@ impl Place {
         let (leash_m, leash_rad) = if moving { (LEASH_M, LEASH_RAD) } else { (f32::MAX, PI) };
         let heading_now_rad = heading_rad(world_from_pelvis);
         self.heading_rad += command[2] * dt_s;
-        let turned_rad = wrapped(self.heading_rad - heading_now_rad).clamp(-leash_rad, leash_rad);
+        let turned_rad = wrapped_rad(self.heading_rad - heading_now_rad).clamp(-leash_rad, leash_rad);
         self.heading_rad = heading_now_rad + turned_rad;
         let along = Rotation::from_rotation_z(self.heading_rad) * Vector::new(command[0], command[1], 0.0);
         let [x, y] = self.position_m;
@@ -89,15 +91,6 @@ impl Place {
         told[2] += GAIN_1_S * turned_rad;
         std::array::from_fn(|i| told[i].clamp(SMALLEST_COMMAND[i], LARGEST_COMMAND[i]))
     }
-}
-
-fn heading_rad(world_from_pelvis: Pose) -> f32 {
-    let forward = world_from_pelvis.rotation * Vector::X;
-    forward.y.atan2(forward.x)
-}
-
-fn wrapped(angle_rad: f32) -> f32 {
-    (angle_rad + PI).rem_euclid(TAU) - PI
 }
 
 #[cfg(test)]

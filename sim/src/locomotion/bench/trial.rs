@@ -2,11 +2,12 @@
 
 use std::f32::consts::{PI, TAU};
 
-use rapier3d::math::{Pose, Vector};
+use rapier3d::math::Vector;
 
 use super::cases::{Case, Disturbance, Plan, STOP_S};
 use super::motion::{ArmMotion, Random};
 use super::tour::{self, Leg};
+use crate::locomotion::plane::{flat, heading_rad, wrapped_rad};
 use crate::locomotion::{BaseCommand, Locomotion};
 use crate::robot::{RobotCommand, RobotState, Side};
 use crate::{CONTROL_HZ, RobotPlacement, SimError, World, WorldSpec};
@@ -151,17 +152,8 @@ fn power_w(state: &RobotState) -> f32 {
     state.torque_n_m.iter().zip(&state.qd_rad_s).map(|(torque, rate)| (torque * rate).abs()).sum()
 }
 
-fn heading_rad(pelvis: Pose) -> f32 {
-    let forward = pelvis.rotation * Vector::X;
-    forward.y.atan2(forward.x)
-}
-
 fn unwrap(angle_rad: f32, last_rad: f32) -> f32 {
-    last_rad + (angle_rad - last_rad + PI).rem_euclid(TAU) - PI
-}
-
-fn flat(v: Vector) -> Vector {
-    Vector::new(v.x, v.y, 0.0)
+    last_rad + wrapped_rad(angle_rad - last_rad)
 }
 
 fn measure(case: &Case, log: &[Sample], legs: &[Leg], trial: &mut Trial) {
