@@ -11,7 +11,7 @@ mod randomize;
 
 pub use randomize::{Offset, Start, uniform_xy};
 
-use crate::{EpisodeError, facts::Facts};
+use crate::{EpisodeError, scoring::Phase};
 
 /// Every task, in the benchmark's order.
 pub static ALL: &[Task] = &[handover::TASK, pouring::TASK, frame_hang::TASK, co_pouring::TASK];
@@ -58,28 +58,6 @@ pub struct ObjectSpot {
 /// An object called as its file, not turned.
 pub const fn spot(name: &'static str, position_m: [f32; 3]) -> ObjectSpot {
     ObjectSpot { name, file: name, position_m, yaw_rad: 0.0 }
-}
-
-/// One scored phase.
-#[derive(Debug)]
-pub struct Phase {
-    pub id: &'static str,
-    /// When the phase counts as reached, for people and policies.
-    pub description: &'static str,
-    /// Whether more than one robot has to work on it.
-    pub collaborative: bool,
-    pub done: Done,
-}
-
-/// When a phase is reached. Conditions see one control step at a time; what has to happen in sequence says so here.
-#[derive(Debug)]
-pub enum Done {
-    /// As soon as the condition holds.
-    When(fn(&Facts) -> bool),
-    /// When `then` holds after `first` held; a step at which `broken` holds in between asks for `first` again.
-    Sequence { first: fn(&Facts) -> bool, then: fn(&Facts) -> bool, broken: fn(&Facts) -> bool },
-    /// When `condition` has held without a break for `for_s`, and `at_end` holds then too.
-    Lasting { condition: fn(&Facts) -> bool, for_s: f64, at_end: fn(&Facts) -> bool },
 }
 
 /// The task called `id`.
