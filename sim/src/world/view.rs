@@ -41,7 +41,7 @@ impl World {
         }
         for (index, object) in self.objects.iter().enumerate() {
             let pose = object.state(&self.physics).world_from_object;
-            add(&mut scene, &object.geoms, pose, self.object_id(index), rgb);
+            add(&mut scene, &object.model.geoms, pose, self.object_id(index), rgb);
         }
         scene.focus_m = Vector::new(middle_m.x, middle_m.y, FOCUS_HEIGHT_M);
         scene
