@@ -5,7 +5,6 @@ mod disturb;
 mod objects;
 mod snapshot;
 mod step;
-mod view;
 
 use std::sync::Arc;
 
@@ -135,6 +134,11 @@ impl World {
     /// Geoms of the scene that do not move, world frame.
     pub fn room(&self) -> &[crate::mjcf::Geom] {
         &self.fixed
+    }
+
+    /// Cameras of the scene's file, world frame.
+    pub fn cameras(&self) -> &[MjcfCamera] {
+        &self.cameras
     }
 
     /// Every object's name and what its file says of it.
