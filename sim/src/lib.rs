@@ -15,7 +15,10 @@ pub use error::SimError;
 pub use locomotion::{BaseCommand, BaseLimits};
 pub use rapier3d::math::{Pose, Rotation, Vector};
 pub use robot::{RobotCommand, RobotState, Side};
-pub use world::{HandContacts, ObjectPlacement, ObjectState, RobotPlacement, Snapshot, World, WorldSpec};
+pub use world::{
+    HandContacts, ObjectModel, ObjectPlacement, ObjectState, ObjectStep, RobotPlacement, RobotStep, Snapshot,
+    Step, Touch, World, WorldSpec,
+};
 
 /// Control steps per second; every control step runs [`PHYSICS_STEPS_PER_CONTROL`] physics steps.
 pub const CONTROL_HZ: f64 = 50.0;

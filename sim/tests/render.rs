@@ -2,27 +2,41 @@
 
 use std::f32::consts::{FRAC_PI_3, PI};
 
-use tandem_sim::render::{Camera, CpuRenderer, Frame, Instance, Mesh, Pattern, RenderScene, encode_png};
-use tandem_sim::{Pose, Rotation, Vector};
+use tandem_sim::render::{Camera, Carrier, Frame, Mesh, Part, Pattern, Scenery, cpu, encode_png};
+use tandem_sim::{ObjectState, ObjectStep, Pose, Rotation, Step, Vector};
 
 const GREY: [f32; 3] = [0.6, 0.6, 0.6];
 
-/// Parts of a scene around the origin; the first has id 1.
-fn scene(parts: Vec<(Mesh, Pose)>) -> RenderScene {
-    let mut scene = RenderScene { focus_radius_m: 1.0, ..RenderScene::default() };
-    for (index, (mesh, world_from_mesh)) in parts.into_iter().enumerate() {
-        scene.meshes.push(mesh);
-        let id = index as u32 + 1;
-        scene.instances.push(Instance {
-            mesh: index,
-            world_from_mesh,
-            rgb: GREY,
-            pattern: Pattern::Plain,
-            id,
-            casts_shadow: true,
-        });
-    }
-    scene
+/// Parts around the origin that do not move; the first has id 1.
+fn scenery(parts: Vec<(Mesh, Pose)>) -> Scenery {
+    let part = |((mesh, carrier_from_mesh), id)| Part {
+        mesh,
+        carrier: Carrier::Room,
+        carrier_from_mesh,
+        rgb: GREY,
+        pattern: Pattern::Plain,
+        id,
+        casts_shadow: true,
+    };
+    Scenery { parts: parts.into_iter().zip(1..).map(part).collect(), focus_radius_m: 1.0 }
+}
+
+/// A floor, and something that moves.
+fn floor_and(mesh: Mesh) -> Scenery {
+    let mut scenery = scenery(vec![floor(), (mesh, Pose::IDENTITY)]);
+    scenery.parts[1].carrier = Carrier::Object(0);
+    scenery
+}
+
+fn step(objects: &[Pose]) -> Step {
+    let object = |world_from_object: &Pose| {
+        let (velocity_m_s, angular_velocity_rad_s) = (Vector::ZERO, Vector::ZERO);
+        let state =
+            ObjectState { world_from_object: *world_from_object, velocity_m_s, angular_velocity_rad_s };
+        ObjectStep { name: "thing".into(), state }
+    };
+    let objects = objects.iter().map(object).collect();
+    Step { control_step: 0, time_s: 0.0, robots: vec![], objects, touches: vec![] }
 }
 
 fn at(x: f32, y: f32, z: f32) -> Pose {
@@ -46,8 +60,9 @@ fn look_at(eye_m: Vector, target_m: Vector) -> Camera {
     camera(Pose::look_at_rh(eye_m, target_m, Vector::Z).inverse())
 }
 
-fn render(scene: &RenderScene, camera: &Camera) -> Frame {
-    CpuRenderer::default().render(scene, camera)
+/// A picture of what does not move.
+fn render(scenery: &Scenery, camera: &Camera) -> Frame {
+    cpu(scenery.clone()).render(&step(&[]), camera)
 }
 
 /// Index of the pixel that shows a point of the world.
@@ -63,12 +78,12 @@ fn rgb(frame: &Frame, pixel: usize) -> [u8; 3] {
 /// Compares the depth of each pixel with that of its ray (camera frame, 1 m deep), where there is one.
 /// `too_deep_m` is how far a faceted shape lies within the true one. Returns how many pixels were compared.
 fn check_depth(
-    scene: &RenderScene,
+    scenery: &Scenery,
     camera: &Camera,
     too_deep_m: f32,
     expected_m: impl Fn(Vector) -> Option<f32>,
 ) -> usize {
-    let frame = render(scene, camera);
+    let frame = render(scenery, camera);
     let mut compared = 0;
     for (pixel, depth_m) in frame.depth_m.iter().enumerate() {
         let (u, v) = (pixel as u32 % camera.width, pixel as u32 / camera.width);
@@ -94,7 +109,7 @@ fn floor_depth_is_that_of_the_ray() {
         (Vector::new(1.0, 2.0, 0.05), Vector::new(0.0, 0.0, 0.0)),
     ] {
         let camera = look_at(eye, target);
-        let compared = check_depth(&scene(vec![floor()]), &camera, 0.0, |ray| {
+        let compared = check_depth(&scenery(vec![floor()]), &camera, 0.0, |ray| {
             let down = -(camera.world_from_camera.rotation * ray).z;
             (down > 0.0).then(|| eye.z / down).filter(|depth_m| *depth_m < 5.0)
         });
@@ -106,7 +121,7 @@ fn floor_depth_is_that_of_the_ray() {
 fn sphere_depth_is_that_of_the_ray() {
     let (radius_m, distance_m) = (0.1, 0.5);
     let compared = check_depth(
-        &scene(vec![(Mesh::sphere(radius_m), at(0.0, 0.0, 0.0))]),
+        &scenery(vec![(Mesh::sphere(radius_m), at(0.0, 0.0, 0.0))]),
         &overhead(distance_m),
         0.008,
         |ray| {
@@ -121,7 +136,7 @@ fn sphere_depth_is_that_of_the_ray() {
 
 #[test]
 fn what_nothing_covers_is_infinitely_far() {
-    let frame = render(&scene(vec![(Mesh::sphere(0.1), at(0.0, 0.0, 5.0))]), &overhead(1.0));
+    let frame = render(&scenery(vec![(Mesh::sphere(0.1), at(0.0, 0.0, 5.0))]), &overhead(1.0));
     assert!(frame.depth_m.iter().all(|depth_m| *depth_m == f32::INFINITY));
     assert!(frame.ids.iter().all(|id| *id == 0));
 }
@@ -151,7 +166,7 @@ fn the_optical_axis_meets_the_middle() {
 fn ids_name_the_nearest_thing() {
     let camera = overhead(2.0);
     let frame = render(
-        &scene(vec![
+        &scenery(vec![
             floor(),
             (Mesh::cuboid(Vector::splat(0.1)), at(0.3, 0.0, 0.1)),
             (Mesh::sphere(0.05), at(0.3, 0.0, 0.5)),
@@ -180,7 +195,7 @@ fn neighbouring_triangles_leave_no_gap() {
         for mesh in [Mesh::sphere(0.3), Mesh::cuboid(Vector::splat(0.3)), Mesh::cylinder(0.3, 0.3)] {
             let shape = (mesh, Pose::from_parts(Vector::new(0.0, 0.0, 0.5), rotation));
             let camera = overhead(1.2);
-            let frame = render(&scene(vec![floor(), shape]), &camera);
+            let frame = render(&scenery(vec![floor(), shape]), &camera);
             for (pixel, id) in frame.ids.iter().enumerate() {
                 let (u, v) = ((pixel % 160) as f32 + 0.5, (pixel / 160) as f32 + 0.5);
                 // The picture of the sphere that fits into all three, less a margin for facets.
@@ -196,12 +211,12 @@ fn neighbouring_triangles_leave_no_gap() {
 #[test]
 fn a_thing_in_the_sun_darkens_the_floor() {
     let camera = overhead(2.0);
-    let block = |x: f32| scene(vec![floor(), (Mesh::cuboid(Vector::splat(0.05)), at(x, 0.0, 0.3))]);
-    // One renderer for all three pictures: shadows must follow the scene.
-    let mut renderer = CpuRenderer::default();
-    let empty = renderer.render(&scene(vec![floor()]), &camera);
-    let left = renderer.render(&block(-0.3), &camera);
-    let right = renderer.render(&block(0.3), &camera);
+    let block_at = |x: f32, z: f32| step(&[at(x, 0.0, z)]);
+    // One renderer for all three pictures: shadows must follow the step. The first block is below the floor.
+    let mut renderer = cpu(floor_and(Mesh::cuboid(Vector::splat(0.05))));
+    let empty = renderer.render(&block_at(0.0, -5.0), &camera);
+    let left = renderer.render(&block_at(-0.3, 0.3), &camera);
+    let right = renderer.render(&block_at(0.3, 0.3), &camera);
     // The sun stands at (-0.306, 0.354, 0.884): from 0.3 m up, the shadow falls 0.104 m to +x and 0.12 m to -y.
     for (x, shaded, lit) in [(-0.3, &left, &right), (0.3, &right, &left)] {
         let pixel = pixel_at(&camera, Vector::new(x + 0.104, -0.12, 0.0));
@@ -220,12 +235,12 @@ fn fingers_cast_shadows() {
         Pose::from_parts(Vector::new(0.0, 0.0, 0.04), Rotation::from_rotation_y(PI / 2.0)),
     );
     let pixel = pixel_at(&camera, Vector::new(0.014, -0.016, 0.0));
-    let mut scene = scene(vec![floor(), finger]);
-    scene.focus_radius_m = 1.25;
-    let shaded = render(&scene, &camera);
+    let mut scenery = scenery(vec![floor(), finger]);
+    scenery.focus_radius_m = 1.25;
+    let shaded = render(&scenery, &camera);
     assert_eq!(shaded.ids[pixel], 1, "the pixel shows the counter");
-    scene.instances.truncate(1);
-    let lit = render(&scene, &camera);
+    scenery.parts.truncate(1);
+    let lit = render(&scenery, &camera);
     let (shaded, lit) = (rgb(&shaded, pixel)[0], rgb(&lit, pixel)[0]);
     assert!(f32::from(shaded) < 0.85 * f32::from(lit), "{shaded} against {lit}");
 }
@@ -235,7 +250,7 @@ fn an_edge_is_the_mean_of_both_sides_in_linear_light() {
     // A wall whose edge runs through the middle of the picture's column 80, half a pixel to the right.
     let camera = overhead(1.0);
     let half_pixel_m = 0.5 / camera.focal_px();
-    let frame = render(&scene(vec![(Mesh::plane([1.0, 1.0]), at(-1.0 + half_pixel_m, 0.0, 0.0))]), &camera);
+    let frame = render(&scenery(vec![(Mesh::plane([1.0, 1.0]), at(-1.0 + half_pixel_m, 0.0, 0.0))]), &camera);
     let row = 60 * camera.width as usize;
     let linear = |value: u8| ((f32::from(value) / 255.0 + 0.055) / 1.055).powf(2.4);
     let [wall, edge, sky] = [79, 80, 81].map(|column| rgb(&frame, row + column).map(linear));
@@ -248,28 +263,28 @@ fn an_edge_is_the_mean_of_both_sides_in_linear_light() {
 #[test]
 fn things_at_different_depths_are_outlined() {
     let camera = overhead(1.0);
-    let mut scene = scene(vec![floor(), (Mesh::plane([0.2, 0.2]), at(0.0, 0.0, 0.3))]);
-    let darkest = |scene: &RenderScene| {
-        let frame = render(scene, &camera);
+    let mut scenery = scenery(vec![floor(), (Mesh::plane([0.2, 0.2]), at(0.0, 0.0, 0.3))]);
+    let darkest = |scenery: &Scenery| {
+        let frame = render(scenery, &camera);
         let row = 60 * camera.width as usize;
         (row..row + 80).map(|pixel| rgb(&frame, pixel)[0]).min()
     };
-    let outlined = darkest(&scene);
-    scene.instances[1].id = 1;
-    assert!(outlined < darkest(&scene), "parts of one thing have no outline between them");
+    let outlined = darkest(&scenery);
+    scenery.parts[1].id = 1;
+    assert!(outlined < darkest(&scenery), "parts of one thing have no outline between them");
 }
 
 #[test]
-fn the_same_scene_gives_the_same_bits() {
+fn the_same_step_gives_the_same_bits() {
     let camera = look_at(Vector::new(0.8, -1.2, 1.0), Vector::ZERO);
-    let first = scene(vec![floor(), (Mesh::capsule(0.1, 0.2), at(0.0, 0.0, 0.3))]);
-    let other = scene(vec![floor(), (Mesh::cylinder(0.1, 0.2), at(0.0, 0.0, 0.3))]);
-    let mut renderer = CpuRenderer::default();
+    let scenery = floor_and(Mesh::capsule(0.1, 0.2));
+    let (first, other) = (step(&[at(0.0, 0.0, 0.3)]), step(&[at(0.1, 0.0, 0.3)]));
+    let mut renderer = cpu(scenery.clone());
     let before = renderer.render(&first, &camera);
     let between = renderer.render(&other, &camera);
     assert_ne!(before, between);
     assert_eq!(before, renderer.render(&first, &camera));
-    assert_eq!(before, render(&first, &camera));
+    assert_eq!(before, cpu(scenery).render(&first, &camera));
 }
 
 #[test]
@@ -303,7 +318,7 @@ fn meshes_have_the_volume_of_their_shapes_and_normals_that_point_out() {
 
 #[test]
 fn png_keeps_every_byte() {
-    let frame = render(&scene(vec![floor(), (Mesh::sphere(0.2), at(0.0, 0.0, 0.2))]), &overhead(1.0));
+    let frame = render(&scenery(vec![floor(), (Mesh::sphere(0.2), at(0.0, 0.0, 0.2))]), &overhead(1.0));
     let png = encode_png(frame.width, frame.height, &frame.rgb).expect("the size fits");
     let decoded = image::load_from_memory(&png).expect("it is a PNG file").into_rgb8();
     assert_eq!((decoded.width(), decoded.height()), (frame.width, frame.height));

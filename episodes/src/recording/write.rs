@@ -24,6 +24,7 @@ use foxglove::messages::{
 use tandem_sim::{
     Pose, RobotCommand, RobotState,
     mjcf::{Geom, MjcfCamera},
+    render::robot_rgba,
     robot::{RobotModel, UPPER},
 };
 use tandem_tools_spec::{Budget, LookReply, PhaseReached, Protocol, ToolCall, ToolReply};
@@ -154,7 +155,7 @@ impl Recorder {
         for (index, robot) in self.robots.iter().enumerate() {
             for link in &robot.model.links {
                 let frame = robot_frame(&robot.name, &link.name);
-                entities.push(scene::entity(&frame, &link.geoms, |geom| robot_colour(geom, index)));
+                entities.push(scene::entity(&frame, &link.geoms, |geom| robot_rgba(geom, index)));
             }
         }
         self.file.write(&mut self.scene, 0.0, &SceneUpdate { entities, deletions: vec![] })
@@ -236,15 +237,6 @@ impl RobotTopics {
             hands: file.topic(&format!("/{}/hands", robot.name), &[])?,
             camera: None,
         })
-    }
-}
-
-/// The colour of a robot's geom. Robots differ in their accents alone, so that partners can be told apart.
-fn robot_colour(geom: &Geom, robot: usize) -> [f32; 4] {
-    const ACCENTS: [[f32; 4]; 3] = [[0.12, 0.35, 0.85, 1.0], [0.92, 0.45, 0.08, 1.0], [0.15, 0.6, 0.25, 1.0]];
-    match geom.material.as_deref() {
-        Some("accent") => ACCENTS[robot % ACCENTS.len()],
-        _ => geom.rgba,
     }
 }
 

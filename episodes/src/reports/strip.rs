@@ -39,13 +39,17 @@ const LABEL_INK: [u8; 3] = [250; 3];
 
 impl Moment {
     pub fn capture(caption: &str, world: &World, eyes: &mut Eyes) -> Moment {
+        let step = world.present();
+        let third_person = eyes.cameras.third_person();
+        let heads: Vec<Camera> =
+            (0..step.robots.len()).map(|robot| eyes.cameras.egocentric(&step, robot)).collect();
         let mut see = |label: String, camera: Camera| {
             let camera = Camera { width: CELL_WIDTH as u32, height: CELL_HEIGHT as u32, ..camera };
-            View { label, frame: eyes.render(world, &camera) }
+            View { label, frame: eyes.render(&step, &camera) }
         };
-        let mut views = vec![see("the room".into(), world.third_person_camera())];
-        for (index, robot) in world.robots().iter().enumerate() {
-            views.push(see(format!("what {} sees", robot.name), world.egocentric_camera(index)));
+        let mut views = vec![see("the room".into(), third_person)];
+        for (robot, camera) in world.robots().iter().zip(heads) {
+            views.push(see(format!("what {} sees", robot.name), camera));
         }
         Moment { caption: [caption.into(), format!("{:.1} s", world.time_s())], views }
     }

@@ -1,7 +1,7 @@
 //! Replies to the tools that only look: pictures, depth, proprioception.
 
-use tandem_sim::render::{Camera, CpuRenderer, Frame, RenderScene, encode_png};
-use tandem_sim::{Vector, World};
+use tandem_sim::render::{self, Camera, Cameras, Frame, Renderer, Scenery, encode_png};
+use tandem_sim::{Step, Vector, World};
 use tandem_tools_spec::{
     CameraCalibration, CameraImage, DepthPoint, DepthReply, JointValues, Observation, Png, RobotState,
 };
@@ -9,43 +9,40 @@ use tandem_tools_spec::{
 use crate::EpisodeError;
 use crate::convert::{opencv_axes, rounded, wire_base, wire_pose_from_sim, wire_vector};
 
-/// Renders what the robots of a world see. Keeps the pictures of the present state.
-#[derive(Default)]
+/// Renders what the robots of a world see.
 pub struct Eyes {
-    renderer: CpuRenderer,
-    /// The scene and the control step that it shows.
-    scene: Option<(u64, RenderScene)>,
+    renderer: Box<dyn Renderer>,
+    pub cameras: Cameras,
 }
 
 impl Eyes {
-    /// What any camera sees of the present state.
-    pub fn render(&mut self, world: &World, camera: &Camera) -> Frame {
-        let now = world.control_steps();
-        if self.scene.as_ref().is_none_or(|(then, _)| *then != now) {
-            self.scene = Some((now, world.render_scene()));
-        }
-        match &self.scene {
-            Some((_, scene)) => self.renderer.render(scene, camera),
-            None => unreachable!("the scene has just been set"),
-        }
+    pub fn new(world: &World) -> Eyes {
+        Eyes { renderer: render::cpu(Scenery::of(world)), cameras: Cameras::of(world) }
     }
 
-    /// Forgets the pictures: the world has been taken to another state.
-    pub fn forget(&mut self) {
-        self.scene = None;
+    /// What any camera sees after `step`.
+    pub fn render(&mut self, step: &Step, camera: &Camera) -> Frame {
+        self.renderer.render(step, camera)
     }
 
     pub fn observe(&mut self, world: &World, robots: &[usize]) -> Result<Observation, EpisodeError> {
+        let step = world.present();
+        let cameras: Vec<Camera> =
+            robots.iter().map(|robot| self.cameras.egocentric(&step, *robot)).collect();
         let mut images = Vec::with_capacity(robots.len());
-        for &robot in robots {
-            let frame = self.render(world, &world.egocentric_camera(robot));
+        for (&robot, camera) in robots.iter().zip(&cameras) {
+            let frame = self.render(&step, camera);
             let png = encode_png(frame.width, frame.height, &frame.rgb)?;
             images.push(CameraImage { robot: world.robots()[robot].name.clone(), png_base64: Png(png) });
         }
         Ok(Observation {
             time_s: world.time_s(),
             states: robots.iter().map(|robot| robot_state(world, *robot)).collect(),
-            cameras: robots.iter().map(|robot| calibration(world, *robot)).collect(),
+            cameras: robots
+                .iter()
+                .zip(&cameras)
+                .map(|(robot, camera)| calibration(world, *robot, camera))
+                .collect(),
             images,
         })
     }
@@ -56,14 +53,15 @@ impl Eyes {
         robot: usize,
         pixels: &[[i64; 2]],
     ) -> Result<DepthReply, EpisodeError> {
-        let camera = world.egocentric_camera(robot);
+        let step = world.present();
+        let camera = self.cameras.egocentric(&step, robot);
         let (width, height) = (camera.width, camera.height);
         let outside = |[u, v]: [i64; 2]| u < 0 || v < 0 || u >= width.into() || v >= height.into();
         if let Some([u, v]) = pixels.iter().copied().find(|pixel| outside(*pixel)) {
             return Err(EpisodeError::PixelOutside { u, v, width, height });
         }
-        let frame = self.render(world, &camera);
-        let pelvis_from_camera = world.robot_state(robot).pelvis_from_camera;
+        let frame = self.render(&step, &camera);
+        let pelvis_from_camera = step.robots[robot].state.pelvis_from_camera;
         let points = pixels.iter().map(|&pixel| {
             let [u, v] = pixel;
             let depth_m = frame.depth_m[v as usize * width as usize + u as usize];
@@ -79,8 +77,7 @@ impl Eyes {
     }
 }
 
-fn calibration(world: &World, robot: usize) -> CameraCalibration {
-    let camera = world.egocentric_camera(robot);
+fn calibration(world: &World, robot: usize, camera: &Camera) -> CameraCalibration {
     let [cx, cy] = camera.principal_point_px();
     let focal_px = rounded(camera.focal_px().into());
     CameraCalibration {

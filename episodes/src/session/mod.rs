@@ -102,9 +102,9 @@ impl Session {
             rules,
             motions,
             scores: Scores { keeper: Scorekeeper::new(task, &world), phases: PhaseTracker::new(task) },
+            eyes: Eyes::new(&world),
             world,
             clock: ThinkingClock::new(rules.thinking, clock),
-            eyes: Eyes::default(),
             files,
             tool_calls: 0,
             physics: Duration::ZERO,
@@ -412,7 +412,6 @@ impl Session {
         self.tool_calls = checkpoint.tool_calls;
         self.clock.set_spent(checkpoint.thought);
         self.ended = checkpoint.ended;
-        self.eyes.forget();
         Ok(())
     }
 }

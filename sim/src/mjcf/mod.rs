@@ -1,10 +1,12 @@
-//! Reads MJCF through `mjcf-rs` and adds what that parser leaves out: cameras, and geoms as shapes we can use.
+//! Reads MJCF through `mjcf-rs` and adds what that parser leaves out: cameras, and geoms and sites as we use them.
 
 mod camera;
 mod geometry;
+mod site;
 
 pub use camera::MjcfCamera;
 pub use geometry::{Geom, Primitive};
+pub use site::Site;
 
 use mjcf_rs::body::{InertiaSpec, Inertial};
 use rapier3d::math::{Matrix, Pose, Rotation, Vector};
@@ -35,6 +37,11 @@ impl Document {
     /// Geoms of a body, in that body's frame.
     pub(crate) fn geoms(&self, body: usize) -> Result<Vec<Geom>, SimError> {
         self.model.bodies[body].body.geoms.iter().map(|geom| Geom::read(self, geom)).collect()
+    }
+
+    /// Sites of a body, in that body's frame.
+    pub(crate) fn sites(&self, body: usize) -> impl Iterator<Item = Site> {
+        self.model.bodies[body].body.sites.iter().map(Site::read)
     }
 }
 

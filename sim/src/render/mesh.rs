@@ -4,6 +4,8 @@ use std::f32::consts::{PI, TAU};
 
 use rapier3d::math::Vector;
 
+use crate::mjcf::Primitive;
+
 /// A corner of a triangle, in the mesh's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vertex {
@@ -25,6 +27,22 @@ const RINGS: u32 = 6;
 const PLANE_M: f32 = 20.0;
 
 impl Mesh {
+    /// The surface of a shape; of a mesh, its convex hull.
+    pub fn of(primitive: &Primitive) -> Mesh {
+        match primitive {
+            Primitive::Sphere { radius_m } => Mesh::sphere(*radius_m),
+            Primitive::Capsule { radius_m, half_length_m } => Mesh::capsule(*radius_m, *half_length_m),
+            Primitive::Cylinder { radius_m, half_length_m } => Mesh::cylinder(*radius_m, *half_length_m),
+            Primitive::Box { half_extents_m } => Mesh::cuboid(*half_extents_m),
+            Primitive::Ellipsoid { radii_m } => Mesh::ellipsoid(*radii_m),
+            Primitive::Plane { half_extents_m } => Mesh::plane(*half_extents_m),
+            Primitive::Convex { vertices_m } => {
+                let (points_m, triangles) = rapier3d::parry::transformation::convex_hull(vertices_m);
+                Mesh::faceted(&points_m, &triangles)
+            }
+        }
+    }
+
     pub fn sphere(radius_m: f32) -> Mesh {
         Mesh::capsule(radius_m, 0.0)
     }

@@ -1,52 +1,29 @@
-//! Pictures of a world: RGB, metric depth and instance ids for any camera, from one scene description.
+//! Pictures of a world: RGB, metric depth and instance ids for any camera.
 //!
-//! [`RenderScene`] is what every back end draws; [`CpuRenderer`] is the embedded one and needs nothing of the system.
+//! [`Scenery`] is what there is to see, built once per world; a [`Step`] says where it is; a [`Renderer`] draws it. [`cpu`] is
+//! the embedded back end and needs nothing of the system.
 
+mod accents;
 mod camera;
+mod cameras;
 mod cpu;
 mod mesh;
 mod png;
-mod raster;
-mod shade;
-mod shadow;
+mod scenery;
 
+pub use accents::robot_rgba;
 pub use camera::Camera;
-pub use cpu::CpuRenderer;
+pub use cameras::Cameras;
 pub use mesh::{Mesh, Vertex};
 pub use png::{PictureError, encode_png};
+pub use scenery::{Carrier, Part, Pattern, Placed, Scenery};
 
-use rapier3d::math::{Pose, Vector};
+use crate::Step;
 
-/// Meshes that never change and instances that move.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct RenderScene {
-    pub meshes: Vec<Mesh>,
-    pub instances: Vec<Instance>,
-    /// Shadows are drawn within this distance of this point (world): the smaller, the sharper.
-    pub focus_m: Vector,
-    pub focus_radius_m: f32,
-}
-
-/// One mesh somewhere.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Instance {
-    pub mesh: usize,
-    pub world_from_mesh: Pose,
-    /// sRGB, 0 to 1.
-    pub rgb: [f32; 3],
-    pub pattern: Pattern,
-    /// What [`Frame::ids`] shows for it; parts of one thing share one. 0 is the background.
-    pub id: u32,
-    pub casts_shadow: bool,
-}
-
-/// How a surface varies.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Pattern {
-    #[default]
-    Plain,
-    /// Squares of half a metre in the world's ground plane.
-    Checker,
+/// Draws the scenery that it was made for.
+pub trait Renderer: Send {
+    /// What `camera` sees after `step`.
+    fn render(&mut self, step: &Step, camera: &Camera) -> Frame;
 }
 
 /// A rendered picture, row by row from the top left.
@@ -58,5 +35,11 @@ pub struct Frame {
     pub rgb: Vec<u8>,
     /// Distance along the optical axis at the pixel's centre; infinite where nothing is.
     pub depth_m: Vec<f32>,
+    /// What is seen there: 0 nothing, 1 the room, then robots, then objects.
     pub ids: Vec<u32>,
+}
+
+/// The embedded renderer; it draws on the calling thread.
+pub fn cpu(scenery: Scenery) -> Box<dyn Renderer> {
+    Box::new(cpu::CpuRenderer::new(scenery))
 }

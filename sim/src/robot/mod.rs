@@ -5,6 +5,7 @@ mod hand_force;
 mod layout;
 mod model;
 mod payload;
+mod per_joint;
 mod spawn;
 mod whole_body;
 
@@ -27,7 +28,7 @@ use hand_force::HandForce;
 use payload::Payload;
 
 /// What one robot is told for one control step.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotCommand {
     /// Absolute joint targets in action order (see [`UPPER`]).
     pub upper_rad: [f32; UPPER_JOINTS],
@@ -35,11 +36,14 @@ pub struct RobotCommand {
 }
 
 /// What a robot can measure of itself; poses as named.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotState {
     /// Published order, as the velocities and torques.
+    #[serde(with = "per_joint")]
     pub q_rad: [f32; JOINTS],
+    #[serde(with = "per_joint")]
     pub qd_rad_s: [f32; JOINTS],
+    #[serde(with = "per_joint")]
     pub torque_n_m: [f32; JOINTS],
     pub world_from_pelvis: Pose,
     /// Left, right.
@@ -100,6 +104,12 @@ impl Robot {
         RobotCommand { upper_rad: UPPER.map(|joint| q_rad[joint]), base: self.base_limits().clamp(base) }
     }
 
+    /// The command of the last control step.
+    pub(crate) fn last_command(&self) -> RobotCommand {
+        let upper_rad = std::array::from_fn(|i| self.memory.last_upper_rad[i]);
+        RobotCommand { upper_rad, base: self.memory.base }
+    }
+
     /// The base command of the last step.
     pub fn base_command(&self) -> BaseCommand {
         self.memory.base
@@ -136,8 +146,8 @@ impl Robot {
         std::array::from_fn(|i| self.memory.last_upper_rad[UPPER_JOINTS - 3 + i])
     }
 
-    pub(crate) fn state(&self, physics: &PhysicsWorld) -> RobotState {
-        let body = self.measure(physics);
+    /// What the robot reports when its body is measured as `body`.
+    pub(crate) fn state(&self, body: &WholeBody) -> RobotState {
         let pelvis_from_world = body.world_from_pelvis().inverse();
         let wrist =
             |name| body.world_from_site(name).map_or(Pose::IDENTITY, |world| pelvis_from_world * world);

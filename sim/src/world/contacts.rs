@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use rapier3d::math::Vector;
 use rapier3d::prelude::*;
+use serde::{Deserialize, Serialize};
 
-use super::World;
+use super::{Touch, World};
 use crate::PHYSICS_DT_S;
-use crate::robot::{RobotModel, Side};
+use crate::robot::{HandLinks, RobotModel, Side};
 
 /// Normal contact forces (N, world) that a hand's parts exert on an object, averaged over the last physics step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct HandContacts {
     pub thumb_n: Vector,
     pub fingers_n: Vector,
@@ -51,35 +52,55 @@ impl PhysicsHooks for SelfCollision {
     }
 }
 
+impl HandContacts {
+    /// Adds the force of one of the robot's links, if it belongs to `hand`.
+    fn add(&mut self, hand: &HandLinks, link: usize, force_n: Vector) {
+        if hand.thumb.contains(&link) {
+            self.thumb_n += force_n;
+        } else if hand.fingers.contains(&link) {
+            self.fingers_n += force_n;
+        } else if link == hand.wrist {
+            self.palm_n += force_n;
+        }
+    }
+}
+
 impl World {
-    /// Forces of one hand on one object; zero if the object is unknown or out of touch.
-    pub fn hand_contacts(&self, robot: usize, side: Side, object: &str) -> HandContacts {
-        let mut contacts = HandContacts::default();
-        let Some(object) = self.objects.iter().find(|candidate| candidate.name == object) else {
-            return contacts;
-        };
-        let hand = &self.robots[robot].model.hands[side.index()];
-        for (link, force_n) in object.colliders.iter().flat_map(|collider| self.link_forces(robot, *collider))
-        {
-            if hand.thumb.contains(&link) {
-                contacts.thumb_n += force_n;
-            } else if hand.fingers.contains(&link) {
-                contacts.fingers_n += force_n;
-            } else if link == hand.wrist {
-                contacts.palm_n += force_n;
+    /// All hands that touch an object.
+    pub(super) fn touches(&self) -> Vec<Touch> {
+        let mut touches = Vec::new();
+        for (object, colliders) in self.objects.iter().map(|object| &object.colliders).enumerate() {
+            let mut hands = vec![[HandContacts::default(); 2]; self.robots.len()];
+            for (robot, link, force_n) in colliders.iter().flat_map(|collider| self.link_forces(*collider)) {
+                for side in Side::BOTH {
+                    let links = &self.robots[robot].model.hands[side.index()];
+                    hands[robot][side.index()].add(links, link, force_n);
+                }
+            }
+            for (robot, hands) in hands.into_iter().enumerate() {
+                for (side, contacts) in Side::BOTH.into_iter().zip(hands) {
+                    if contacts != HandContacts::default() {
+                        touches.push(Touch { robot, side, object, contacts });
+                    }
+                }
             }
         }
-        contacts
+        touches
     }
 
-    /// Links of a robot that press on a collider, with their normal force on it (N, world).
-    fn link_forces(&self, robot: usize, collider: ColliderHandle) -> impl Iterator<Item = (usize, Vector)> {
+    /// Forces of one hand on one object; zero if the object is unknown or out of touch.
+    pub fn hand_contacts(&self, robot: usize, side: Side, object: &str) -> HandContacts {
+        self.present().contacts(robot, side, object)
+    }
+
+    /// Links of robots that press on a collider: robot, link, and the normal force on the collider (N, world).
+    fn link_forces(&self, collider: ColliderHandle) -> impl Iterator<Item = (usize, usize, Vector)> {
         self.physics.narrow_phase.contact_pairs_with(collider).filter_map(move |pair| {
             let first = pair.collider1 == collider;
             let other = if first { pair.collider2 } else { pair.collider1 };
-            let (owner, link) = robot_and_link(self.physics.colliders[other].user_data)?;
+            let (robot, link) = robot_and_link(self.physics.colliders[other].user_data)?;
             let sign = if first { -1.0 } else { 1.0 };
-            (owner == robot).then(|| (link, pair.total_impulse() * (sign / PHYSICS_DT_S)))
+            Some((robot, link, pair.total_impulse() * (sign / PHYSICS_DT_S)))
         })
     }
 

@@ -4,7 +4,7 @@ mod contacts;
 mod disturb;
 mod objects;
 mod snapshot;
-mod view;
+mod step;
 
 use std::sync::Arc;
 
@@ -12,8 +12,9 @@ use rapier3d::math::Vector;
 use rapier3d::prelude::*;
 
 pub use contacts::HandContacts;
-pub use objects::{ObjectPlacement, ObjectState};
+pub use objects::{ObjectModel, ObjectPlacement, ObjectState};
 pub use snapshot::Snapshot;
+pub use step::{ObjectStep, RobotStep, Step, Touch};
 
 pub(crate) use contacts::link_tag;
 
@@ -85,8 +86,9 @@ impl World {
         })
     }
 
-    /// Advances by one control step. One command per robot, in the order of [`World::robots`].
-    pub fn control_step(&mut self, commands: &[RobotCommand]) {
+    /// Advances by one control step, and says what it left behind. One command per robot, in the order of
+    /// [`World::robots`].
+    pub fn control_step(&mut self, commands: &[RobotCommand]) -> Step {
         assert_eq!(commands.len(), self.robots.len(), "one command per robot");
         for substep in 0..PHYSICS_STEPS_PER_CONTROL {
             for (robot, command) in self.robots.iter_mut().zip(commands) {
@@ -99,6 +101,7 @@ impl World {
         }
         self.end_pushes();
         self.control_steps += 1;
+        self.present()
     }
 
     pub fn control_steps(&self) -> u64 {
@@ -114,7 +117,8 @@ impl World {
     }
 
     pub fn robot_state(&self, robot: usize) -> RobotState {
-        self.robots[robot].state(&self.physics)
+        let robot = &self.robots[robot];
+        robot.state(&robot.measure(&self.physics))
     }
 
     /// The command under which a robot stays as it was put into the world.
@@ -132,9 +136,19 @@ impl World {
         &self.fixed
     }
 
+    /// Cameras of the scene's file, world frame.
+    pub fn cameras(&self) -> &[MjcfCamera] {
+        &self.cameras
+    }
+
+    /// Every object's name and what its file says of it.
+    pub fn object_models(&self) -> impl Iterator<Item = (&str, &ObjectModel)> {
+        self.objects.iter().map(|object| (object.name.as_str(), &object.model))
+    }
+
     /// Name and geoms of every object, in the object's frame.
     pub fn object_geoms(&self) -> impl Iterator<Item = (&str, &[crate::mjcf::Geom])> {
-        self.objects.iter().map(|object| (object.name.as_str(), object.geoms.as_slice()))
+        self.object_models().map(|(name, model)| (name, model.geoms.as_slice()))
     }
 
     pub fn objects(&self) -> impl Iterator<Item = (&str, ObjectState)> {

@@ -1,10 +1,10 @@
-//! Shadow of the sun around the scene's focus, kept while nothing moves.
+//! Shadow of the sun around the focus.
 
 use rapier3d::math::{Matrix, Pose, Rotation, Vector};
 
-use super::RenderScene;
 use super::raster::Target;
 use super::shade::TO_SUN;
+use crate::render::{Placed, Scenery};
 
 /// Texels along each side: 2.4 mm at a focus of 1.25 m, so that fingers cast shadows.
 const TEXELS: usize = 1024;
@@ -20,28 +20,24 @@ pub(super) struct ShadowMap {
     target: Target,
     sun_from_world: Pose,
     texels_per_m: f32,
-    drawn: RenderScene,
 }
 
 impl ShadowMap {
-    /// Draws the shadows of `scene`, unless nothing has moved since the last time.
-    pub(super) fn update(&mut self, scene: &RenderScene) {
-        if *scene == self.drawn && !self.target.nearness.is_empty() {
-            return;
-        }
-        self.drawn.clone_from(scene);
+    /// Draws the shadows of everything that casts one.
+    pub(super) fn draw(&mut self, scenery: &Scenery, placed: &Placed) {
         let x = Vector::Z.cross(TO_SUN).normalize();
         let rotation = Rotation::from_mat3(&Matrix::from_cols(x, TO_SUN.cross(x), TO_SUN));
-        self.sun_from_world = Pose::from_parts(scene.focus_m, rotation).inverse();
-        self.texels_per_m = TEXELS as f32 / (2.0 * scene.focus_radius_m);
+        self.sun_from_world = Pose::from_parts(placed.focus_m, rotation).inverse();
+        self.texels_per_m = TEXELS as f32 / (2.0 * scenery.focus_radius_m);
         self.target.reset(TEXELS, TEXELS);
         let mut corners = Vec::new();
-        for instance in scene.instances.iter().filter(|instance| instance.casts_shadow) {
-            let mesh = &scene.meshes[instance.mesh];
-            let sun_from_mesh = self.sun_from_world * instance.world_from_mesh;
+        let parts = scenery.parts.iter().zip(&placed.world_from_mesh);
+        for (part, world_from_mesh) in parts.filter(|(part, _)| part.casts_shadow) {
+            let sun_from_mesh = self.sun_from_world * *world_from_mesh;
+            let vertices = part.mesh.vertices.iter();
             corners.clear();
-            corners.extend(mesh.vertices.iter().map(|vertex| self.texel(sun_from_mesh * vertex.position_m)));
-            for triangle in &mesh.triangles {
+            corners.extend(vertices.map(|vertex| self.texel(sun_from_mesh * vertex.position_m)));
+            for triangle in &part.mesh.triangles {
                 let corners = triangle.map(|corner| corners[corner as usize]);
                 self.target.fill(corners, 0);
             }

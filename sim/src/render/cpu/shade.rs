@@ -3,7 +3,7 @@
 use rapier3d::math::Vector;
 
 use super::shadow::ShadowMap;
-use super::{Instance, Pattern};
+use crate::render::Pattern;
 
 /// Direction to the sun; high, so that hands over a counter cast their shadow on it.
 pub(super) const TO_SUN: Vector = Vector::new(-0.306_186_2, 0.353_553_4, 0.883_883_5);
@@ -46,9 +46,9 @@ impl Surface {
     }
 }
 
-/// Linear colour of an instance's surface at a point of the world.
-pub(super) fn albedo(instance: &Instance, linear_rgb: Vector, point_m: Vector) -> Vector {
-    match instance.pattern {
+/// Linear colour of a part's surface at a point of the world.
+pub(super) fn albedo(pattern: Pattern, linear_rgb: Vector, point_m: Vector) -> Vector {
+    match pattern {
         Pattern::Plain => linear_rgb,
         Pattern::Checker => {
             let square = |metres: f32| (metres * CHECKER_PER_M).floor() as i32;

@@ -1,11 +1,16 @@
 //! The embedded renderer: a visibility buffer of triangle numbers, shaded afterwards, four samples a pixel.
 
-use rapier3d::math::Vector;
+mod raster;
+mod shade;
+mod shadow;
 
-use super::raster::{NOTHING, Numbering, Target};
-use super::shade::{SKY, SrgbTable, Surface, albedo, linear};
-use super::shadow::ShadowMap;
-use super::{Camera, Frame, RenderScene};
+use rapier3d::math::{Pose, Vector};
+
+use super::{Camera, Frame, Placed, Renderer, Scenery};
+use crate::Step;
+use raster::{Index, NOTHING, Target};
+use shade::{SKY, SrgbTable, Surface, albedo, linear};
+use shadow::ShadowMap;
 
 /// Samples a pixel along each axis.
 const SAMPLES: usize = 2;
@@ -14,24 +19,46 @@ const OUTLINE: f32 = 0.45;
 /// Two things are outlined where their depths differ by more than this part: not where they touch.
 const OUTLINE_DEPTH_STEP: f32 = 0.02;
 
-/// Renders on the calling thread. It keeps its buffers, and the shadows of the last scene.
-#[derive(Default)]
-pub struct CpuRenderer {
+/// Renders on the calling thread. It keeps its buffers, and the shadows of the last state.
+pub(super) struct CpuRenderer {
+    scenery: Scenery,
+    index: Index,
+    /// Of each part.
+    linear_rgb: Vec<Vector>,
+    srgb: SrgbTable,
+    /// What the shadows are of.
+    placed: Placed,
+    shadow: ShadowMap,
     target: Target,
     /// One sample a pixel, at its centre: what depth and ids are read from.
     centres: Target,
-    shadow: ShadowMap,
-    srgb: SrgbTable,
 }
 
 impl CpuRenderer {
-    /// Draws `scene` as `camera` sees it.
-    pub fn render(&mut self, scene: &RenderScene, camera: &Camera) -> Frame {
-        let numbering = Numbering::new(scene);
-        self.shadow.update(scene);
-        self.centres.draw(scene, &numbering, camera, 1);
-        self.target.draw(scene, &numbering, camera, SAMPLES);
-        let view = View::new(scene, &numbering, camera, &self.target, &self.shadow);
+    pub(super) fn new(scenery: Scenery) -> CpuRenderer {
+        CpuRenderer {
+            index: Index::new(&scenery),
+            linear_rgb: scenery.parts.iter().map(|part| linear(part.rgb)).collect(),
+            scenery,
+            srgb: SrgbTable::default(),
+            placed: Placed::default(),
+            shadow: ShadowMap::default(),
+            target: Target::default(),
+            centres: Target::default(),
+        }
+    }
+}
+
+impl Renderer for CpuRenderer {
+    fn render(&mut self, step: &Step, camera: &Camera) -> Frame {
+        let placed = self.scenery.place(step);
+        if self.placed != placed {
+            self.shadow.draw(&self.scenery, &placed);
+            self.placed = placed;
+        }
+        self.centres.draw(&self.scenery, &self.index, &self.placed, camera, 1);
+        self.target.draw(&self.scenery, &self.index, &self.placed, camera, SAMPLES);
+        let view = View::new(self, camera);
         let pixels = (camera.width * camera.height) as usize;
         let mut rgb = Vec::with_capacity(pixels * 3);
         for y in 0..camera.height as usize {
@@ -51,13 +78,14 @@ impl CpuRenderer {
 
 /// A filled target, ready to be shaded.
 struct View<'a> {
-    scene: &'a RenderScene,
-    numbering: &'a Numbering,
-    camera: &'a Camera,
+    scenery: &'a Scenery,
+    index: &'a Index,
+    linear_rgb: &'a [Vector],
     target: &'a Target,
     shadow: &'a ShadowMap,
-    /// Of each instance.
-    linear_rgb: Vec<Vector>,
+    /// World from mesh and back, of each part.
+    poses: Vec<(Pose, Pose)>,
+    eye_m: Vector,
     /// Ray through the target's top left corner, and from one sample to the next, at a depth of 1 m in the world.
     corner_ray: Vector,
     ray_right: Vector,
@@ -65,25 +93,27 @@ struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    fn new(
-        scene: &'a RenderScene,
-        numbering: &'a Numbering,
-        camera: &'a Camera,
-        target: &'a Target,
-        shadow: &'a ShadowMap,
-    ) -> View<'a> {
-        let linear_rgb = scene.instances.iter().map(|instance| linear(instance.rgb)).collect();
+    fn new(renderer: &'a CpuRenderer, camera: &Camera) -> View<'a> {
         let rotation = camera.world_from_camera.rotation;
         let sample = 1.0 / (camera.focal_px() * SAMPLES as f32);
-        let corner_ray = rotation * camera.unproject([0.0, 0.0], 1.0);
-        let (ray_right, ray_down) = (rotation * Vector::X * sample, rotation * Vector::NEG_Y * sample);
-        View { scene, numbering, camera, target, shadow, linear_rgb, corner_ray, ray_right, ray_down }
+        View {
+            scenery: &renderer.scenery,
+            index: &renderer.index,
+            linear_rgb: &renderer.linear_rgb,
+            target: &renderer.target,
+            shadow: &renderer.shadow,
+            poses: renderer.placed.world_from_mesh.iter().map(|pose| (*pose, pose.inverse())).collect(),
+            eye_m: camera.world_from_camera.translation,
+            corner_ray: rotation * camera.unproject([0.0, 0.0], 1.0),
+            ray_right: rotation * Vector::X * sample,
+            ray_down: rotation * Vector::NEG_Y * sample,
+        }
     }
 
     fn id(&self, triangle: u32) -> u32 {
         match triangle {
             NOTHING => 0,
-            _ => self.scene.instances[self.numbering.owner[triangle as usize] as usize].id,
+            _ => self.scenery.parts[self.index.owner[triangle as usize] as usize].id,
         }
     }
 
@@ -130,16 +160,15 @@ impl<'a> View<'a> {
 
     /// Colour of a triangle where a sample sees it.
     fn surface(&self, sx: usize, sy: usize, triangle: u32) -> Vector {
-        let owner = self.numbering.owner[triangle as usize] as usize;
-        let instance = &self.scene.instances[owner];
+        let owner = self.index.owner[triangle as usize] as usize;
+        let part = &self.scenery.parts[owner];
+        let (world_from_mesh, mesh_from_world) = self.poses[owner];
         let depth_m = 1.0 / self.target.nearness[sy * self.target.width + sx];
         let ray = self.corner_ray + self.ray_right * (sx as f32 + 0.5) + self.ray_down * (sy as f32 + 0.5);
-        let eye_m = self.camera.world_from_camera.translation;
-        let point_m = eye_m + ray * depth_m;
-        let mesh = &self.scene.meshes[instance.mesh];
-        let corners = mesh.triangles[(triangle - self.numbering.first[owner]) as usize];
-        let [a, b, c] = corners.map(|corner| mesh.vertices[corner as usize]);
-        let in_mesh_m = instance.world_from_mesh.inverse() * point_m;
+        let point_m = self.eye_m + ray * depth_m;
+        let corners = part.mesh.triangles[(triangle - self.index.first[owner]) as usize];
+        let [a, b, c] = corners.map(|corner| part.mesh.vertices[corner as usize]);
+        let in_mesh_m = mesh_from_world * point_m;
         let (ab, ac, ap) =
             (b.position_m - a.position_m, c.position_m - a.position_m, in_mesh_m - a.position_m);
         let face = ab.cross(ac);
@@ -149,9 +178,9 @@ impl<'a> View<'a> {
         let normal = a.normal * (1.0 - weight_b - weight_c) + b.normal * weight_b + c.normal * weight_c;
         Surface {
             point_m,
-            normal: (instance.world_from_mesh.rotation * normal).normalize(),
+            normal: (world_from_mesh.rotation * normal).normalize(),
             to_eye: -ray.normalize(),
-            albedo: albedo(instance, self.linear_rgb[owner], point_m),
+            albedo: albedo(part.pattern, self.linear_rgb[owner], point_m),
         }
         .shade(self.shadow)
     }

@@ -2,8 +2,8 @@
 
 use rapier3d::math::{Pose, Vector};
 
-use super::camera::NEAR_M;
-use super::{Camera, Mesh, RenderScene};
+use crate::render::camera::NEAR_M;
+use crate::render::{Camera, Placed, Scenery};
 
 /// Marks a sample at which nothing is.
 pub(super) const NOTHING: u32 = u32::MAX;
@@ -17,23 +17,25 @@ pub(super) struct Target {
     pub triangle: Vec<u32>,
 }
 
-/// Numbers of all triangles of a scene, instance by instance.
-pub(super) struct Numbering {
-    /// First triangle of each instance.
+/// What never changes of a scenery: the numbers of all triangles, part by part, and how far parts reach.
+pub(super) struct Index {
+    /// First triangle of each part.
     pub first: Vec<u32>,
-    /// Instance of each triangle.
+    /// Part of each triangle.
     pub owner: Vec<u32>,
+    /// Centre and radius of a sphere around each part, in its mesh's frame.
+    bounds: Vec<(Vector, f32)>,
 }
 
-impl Numbering {
-    pub(super) fn new(scene: &RenderScene) -> Numbering {
-        let mut numbering = Numbering { first: Vec::with_capacity(scene.instances.len()), owner: Vec::new() };
-        for (index, instance) in scene.instances.iter().enumerate() {
-            let count = scene.meshes[instance.mesh].triangles.len();
-            numbering.first.push(numbering.owner.len() as u32);
-            numbering.owner.resize(numbering.owner.len() + count, index as u32);
+impl Index {
+    pub(super) fn new(scenery: &Scenery) -> Index {
+        let mut index = Index { first: Vec::new(), owner: Vec::new(), bounds: Vec::new() };
+        for (number, part) in scenery.parts.iter().enumerate() {
+            index.first.push(index.owner.len() as u32);
+            index.owner.resize(index.owner.len() + part.mesh.triangles.len(), number as u32);
+            index.bounds.push(part.mesh.bounds());
         }
-        numbering
+        index
     }
 }
 
@@ -41,8 +43,9 @@ impl Target {
     /// Fills the target, `samples` a pixel along each axis, with all that `camera` sees.
     pub(super) fn draw(
         &mut self,
-        scene: &RenderScene,
-        numbering: &Numbering,
+        scenery: &Scenery,
+        index: &Index,
+        placed: &Placed,
         camera: &Camera,
         samples: usize,
     ) {
@@ -55,15 +58,14 @@ impl Target {
             [cx + p.x * focal * nearness, cy - p.y * focal * nearness, nearness]
         };
         let mut corners = Vec::new();
-        for (instance, first) in scene.instances.iter().zip(&numbering.first) {
-            let mesh = &scene.meshes[instance.mesh];
-            let camera_from_mesh = camera_from_world * instance.world_from_mesh;
-            if !in_view(mesh, camera_from_mesh, cx / focal, cy / focal) {
+        for (number, part) in scenery.parts.iter().enumerate() {
+            let camera_from_mesh = camera_from_world * placed.world_from_mesh[number];
+            if !in_view(index.bounds[number], camera_from_mesh, cx / focal, cy / focal) {
                 continue;
             }
             corners.clear();
-            corners.extend(mesh.vertices.iter().map(|vertex| camera_from_mesh * vertex.position_m));
-            for (number, triangle) in (*first..).zip(&mesh.triangles) {
+            corners.extend(part.mesh.vertices.iter().map(|vertex| camera_from_mesh * vertex.position_m));
+            for (number, triangle) in (index.first[number]..).zip(&part.mesh.triangles) {
                 let p = triangle.map(|corner| corners[corner as usize]);
                 if p.iter().all(|p| p.z < -NEAR_M) {
                     self.fill(p.map(screen), number);
@@ -144,8 +146,7 @@ impl Target {
 }
 
 /// Whether a mesh's bounding sphere reaches into the pyramid of view, given by the tangents of its half angles.
-fn in_view(mesh: &Mesh, camera_from_mesh: Pose, tan_x: f32, tan_y: f32) -> bool {
-    let (centre, radius) = mesh.bounds();
+fn in_view((centre, radius): (Vector, f32), camera_from_mesh: Pose, tan_x: f32, tan_y: f32) -> bool {
     let c = camera_from_mesh * centre;
     let inside = |across: f32, tan: f32| across.abs() + c.z * tan <= radius * (1.0 + tan * tan).sqrt();
     c.z - radius < -NEAR_M && inside(c.x, tan_x) && inside(c.y, tan_y)

@@ -1,0 +1,91 @@
+//! What one control step left behind: plain, serialisable, complete. Whoever looks at a world reads this.
+
+use rapier3d::math::Pose;
+use serde::{Deserialize, Serialize};
+
+use super::objects::Object;
+use super::{HandContacts, ObjectState, World};
+use crate::robot::{RobotCommand, RobotState, Side};
+
+/// The world after one control step, or before the first.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Step {
+    /// Steps made so far.
+    pub control_step: u64,
+    /// Simulated time since the first step.
+    pub time_s: f64,
+    /// In the order of [`World::robots`].
+    pub robots: Vec<RobotStep>,
+    /// In the order of [`World::object_models`].
+    pub objects: Vec<ObjectStep>,
+    /// Hands that touch an object; those that touch none have no entry.
+    pub touches: Vec<Touch>,
+}
+
+/// One robot: what it measured after the step, and what it was told for the step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RobotStep {
+    pub state: RobotState,
+    /// In the order of [`crate::robot::RobotModel::links`].
+    pub world_from_link: Vec<Pose>,
+    /// Before the first step, the command under which the robot rests.
+    pub command: RobotCommand,
+}
+
+/// One object.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ObjectStep {
+    pub name: String,
+    pub state: ObjectState,
+}
+
+/// One hand on one object.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Touch {
+    /// Index into [`Step::robots`].
+    pub robot: usize,
+    pub side: Side,
+    /// Index into [`Step::objects`].
+    pub object: usize,
+    pub contacts: HandContacts,
+}
+
+impl Step {
+    /// State of an object, by the name that tasks call it.
+    pub fn object(&self, name: &str) -> Option<&ObjectState> {
+        self.objects.iter().find(|object| object.name == name).map(|object| &object.state)
+    }
+
+    /// Forces of one hand on one object; zero if the object is unknown or out of touch.
+    pub fn contacts(&self, robot: usize, side: Side, object: &str) -> HandContacts {
+        let of_hand = |touch: &&Touch| {
+            touch.robot == robot && touch.side == side && self.objects[touch.object].name == object
+        };
+        self.touches.iter().find(of_hand).map(|touch| touch.contacts).unwrap_or_default()
+    }
+}
+
+impl World {
+    /// The world as it stands: what the last [`World::control_step`] returned, also after a restore.
+    pub fn present(&self) -> Step {
+        let object =
+            |object: &Object| ObjectStep { name: object.name.clone(), state: object.state(&self.physics) };
+        Step {
+            control_step: self.control_steps,
+            time_s: self.time_s(),
+            robots: (0..self.robots.len()).map(|robot| self.robot_step(robot)).collect(),
+            objects: self.objects.iter().map(object).collect(),
+            touches: self.touches(),
+        }
+    }
+
+    fn robot_step(&self, index: usize) -> RobotStep {
+        let robot = &self.robots[index];
+        let body = robot.measure(&self.physics);
+        let command = match self.control_steps {
+            0 => robot.rest_command(&self.physics),
+            _ => robot.last_command(),
+        };
+        RobotStep { state: robot.state(&body), world_from_link: body.world_from_link, command }
+    }
+}
