@@ -8,7 +8,7 @@ pub enum EpisodeError {
     #[error("no task {id:?}; have: {}", .have.join(", "))]
     UnknownTask { id: String, have: Vec<&'static str> },
     #[error("no robot {name:?} in this episode; have: {}", .have.join(", "))]
-    UnknownRobot { name: String, have: Vec<&'static str> },
+    UnknownRobot { name: String, have: Vec<String> },
     #[error("{asked} control steps in one command; the {protocol} protocol allows 1 to {most}")]
     TooManySteps { asked: usize, most: u32, protocol: &'static str },
     #[error("pixel [{u}, {v}] is outside the image; u goes from 0 to {}, v from 0 to {}", .width - 1, .height - 1)]
@@ -24,7 +24,11 @@ pub enum EpisodeError {
     #[error("a picture cannot be encoded: {0}")]
     Picture(#[from] tandem_sim::render::PictureError),
     #[error(transparent)]
-    Output(#[from] crate::results::OutputError),
+    Checkpoint(#[from] crate::session::CheckpointError),
+    #[error("cannot read this program's own file, which tells it from other builds: {0}")]
+    Build(#[source] std::io::Error),
+    #[error(transparent)]
+    Output(#[from] crate::output::OutputError),
 }
 
 fn reason_text(reason: EndReason) -> &'static str {

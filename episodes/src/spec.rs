@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use tandem_sim::{LocomotionChoice, SimError};
+use tandem_sim::SimError;
+use tandem_sim::locomotion::LocomotionChoice;
 use tandem_tools_spec::Protocol;
 
 use crate::tasks::{self, Task};
@@ -84,12 +85,20 @@ impl Default for RobotFile {
 }
 
 impl RobotFile {
+    /// For messages: the embedded file's name, or the path.
+    pub fn name(&self) -> String {
+        match self {
+            RobotFile::Embedded(name) => name.clone(),
+            RobotFile::File(path) => path.display().to_string(),
+        }
+    }
+
     /// The file's text.
     pub fn read(&self) -> Result<String, SimError> {
         match self {
             RobotFile::Embedded(name) => Ok(tandem_sim::assets::robot(name)?.into()),
             RobotFile::File(path) => std::fs::read_to_string(path)
-                .map_err(|source| SimError::Read { path: path.clone(), source }),
+                .map_err(|source| SimError::Read { path: path.display().to_string(), source }),
         }
     }
 }

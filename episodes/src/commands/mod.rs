@@ -8,7 +8,7 @@ mod report;
 mod run;
 mod upper_body;
 
-pub use columns::{action_row, clamped_fields};
+pub use columns::{action_row, base_row};
 pub use motion::{Motion, MotionState, RobotSheet};
 pub use reach::check_reach;
 pub use report::report;
@@ -30,13 +30,13 @@ pub struct Command {
     /// One per robot of the episode.
     pub orders: Vec<Order>,
     /// Robots that the caller named, in its order: these are reported on.
-    pub named: Vec<usize>,
+    named: Vec<usize>,
 }
 
 /// What one robot is to do, and what of it had to be cut down.
 pub struct Order {
     pub movement: Movement,
-    cut: Cut,
+    pub cut: Cut,
 }
 
 /// What one robot does during a command.
@@ -69,7 +69,7 @@ pub struct Row {
 
 /// What lay beyond a limit and was moved there.
 #[derive(Clone, Debug, Default)]
-struct Cut {
+pub struct Cut {
     /// Columns of the action row.
     columns: Vec<usize>,
     /// Fields of the base command.
@@ -100,6 +100,11 @@ impl Command {
     /// `robots` robots stand still for `steps` control steps.
     pub fn hold(steps: u32, robots: usize) -> Command {
         Command { steps, orders: (0..robots).map(|_| Order::hold()).collect(), named: Vec::new() }
+    }
+
+    /// The robots to report on, and what of their orders had to be cut down.
+    pub fn cuts(&self) -> Vec<(usize, Cut)> {
+        self.named.iter().map(|robot| (*robot, self.orders[*robot].cut.clone())).collect()
     }
 
     /// Robots with an entry get the order that `order` makes of it, the others hold.

@@ -6,15 +6,15 @@ use tandem_tools_spec::{HandReport, RobotReport};
 
 use super::columns::{self, ARM_JOINTS, HAND_JOINTS};
 use super::motion::{Motion, RobotSheet};
-use super::{Cut, Order};
+use super::Cut;
 use crate::convert::{isometry_from_sim, rounded, wire_pose};
 
 /// A measured joint this near to its limit rests at it.
 const AT_LIMIT_RAD: f32 = 0.01;
 
-/// What became of `order`, where the robot measures `state` after it.
-pub fn report(order: &Order, state: &RobotState, motion: &Motion) -> RobotReport {
-    let (robot, cut) = (&motion.robot, &order.cut);
+/// What became of an order of which `cut` was cut down, where the robot measures `state` after it.
+pub fn report(cut: &Cut, state: &RobotState, motion: &Motion) -> RobotReport {
+    let robot = &motion.robot;
     RobotReport {
         robot: robot.name.clone(),
         left: hand_report(Side::Left, cut, state, motion),

@@ -1,36 +1,33 @@
 //! Episodes over seeds: plays them in parallel worlds, keeps each result, and counts.
 
-use std::collections::BTreeMap;
-use std::hash::{DefaultHasher, Hasher};
+mod keep;
+mod summary;
+#[cfg(test)]
+mod tests;
+mod workers;
+
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, mpsc};
 
-use serde::{Deserialize, Serialize};
-use statrs::distribution::{Beta, ContinuousCDF};
-use tandem_tools_spec::{PhaseTimes, Protocol, ToolCall, ToolReply, Wait};
+use tandem_tools_spec::Protocol;
 
-use crate::experts::{self, Arena, ExpertError};
-use crate::results::{EpisodeResult, OutputError, write_whole};
+use crate::output::{OutputError, write_whole};
+use crate::players;
+use crate::spec::{Controller, EpisodeSpec, RobotFile};
 use crate::tasks::Task;
-use crate::{EpisodeError, Facts, LocomotionChoice, Session};
+use crate::{EpisodeError, fingerprint};
+use keep::Keeper;
 
-/// Who plays.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Policy {
-    /// The task's scripted expert, which sees object poses.
-    Expert,
-    /// Nobody: robots hold still until the steps of the benchmark protocol are used up.
-    Idle,
-}
+pub use keep::Played;
+pub use summary::{Evaluation, TaskSummary, clopper_pearson};
 
 /// What to play.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    pub policy: Policy,
+    /// Who plays.
+    pub player: &'static players::Entry,
     pub protocol: Protocol,
-    pub locomotion: LocomotionChoice,
+    pub robot: RobotFile,
+    pub locomotion: Controller,
     pub tasks: Vec<&'static Task>,
     pub seeds: Vec<u32>,
     /// Worlds that run side by side, each on a thread of its own.
@@ -39,40 +36,15 @@ pub struct Plan {
     pub record: bool,
 }
 
-/// One episode that was played, as it is kept in a file of its own.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Played {
-    pub policy: Policy,
-    pub protocol: Protocol,
-    /// Which base controller the robots had.
-    pub locomotion: String,
-    /// Version and fingerprint of the program; what another build played is played again.
-    pub build: String,
-    #[serde(flatten)]
-    pub result: EpisodeResult,
-    /// Why the episode fell short: what stopped the policy, or the first phase that was missed.
-    pub note: Option<String>,
-}
-
-/// How a task went over its seeds.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct TaskSummary {
-    pub episodes: usize,
-    pub p1: usize,
-    pub p2: usize,
-    pub p3: usize,
-    pub falls: u32,
-    pub mean_env_steps: f64,
-}
-
-/// The content of `results.json`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Evaluation {
-    pub policy: Policy,
-    pub protocol: Protocol,
-    pub locomotion: String,
-    pub tasks: BTreeMap<String, TaskSummary>,
-    pub episodes: Vec<Played>,
+impl Plan {
+    /// One of the episodes to play.
+    pub fn spec(&self, task: &'static Task, seed: u32) -> EpisodeSpec {
+        EpisodeSpec {
+            robot: self.robot.clone(),
+            locomotion: self.locomotion.clone(),
+            ..EpisodeSpec::new(task, seed, self.protocol)
+        }
+    }
 }
 
 /// Why an evaluation stopped. Episodes that were played are kept, and the next run goes on from there.
@@ -86,8 +58,6 @@ pub enum EvaluationError {
     Io { path: PathBuf, source: std::io::Error },
     #[error("an episode cannot be written as JSON: {0}")]
     Json(#[from] serde_json::Error),
-    #[error("cannot read this program's own file, which tells its results from those of other builds: {0}")]
-    Build(#[source] std::io::Error),
 }
 
 const RESULTS: &str = "results.json";
@@ -101,186 +71,11 @@ pub fn evaluate(
 ) -> Result<Evaluation, EvaluationError> {
     let kept = folder.join(EPISODES);
     std::fs::create_dir_all(&kept).map_err(|source| EvaluationError::Io { path: kept.clone(), source })?;
-    let keeper = Keeper { plan, folder: &kept, build: build()? };
-    let work: Vec<(&'static Task, u32)> =
-        plan.tasks.iter().flat_map(|task| plan.seeds.iter().map(|seed| (*task, *seed))).collect();
-    let next = AtomicUsize::new(0);
-    let failure = Mutex::new(None);
-    let (done, played) = mpsc::channel();
-    std::thread::scope(|scope| {
-        for _ in 0..plan.jobs.max(1) {
-            let done = done.clone();
-            let (work, next, failure, keeper) = (&work, &next, &failure, &keeper);
-            scope.spawn(move || {
-                while let Some((task, seed)) = work.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    match keeper.kept_or_played(task, *seed) {
-                        Ok(episode) => drop(done.send(episode)),
-                        Err(error) => {
-                            // Nobody else begins another episode.
-                            next.store(work.len(), Ordering::Relaxed);
-                            failure
-                                .lock()
-                                .unwrap_or_else(|poisoned| poisoned.into_inner())
-                                .get_or_insert(error);
-                        }
-                    }
-                }
-            });
-        }
-        drop(done);
-        let mut episodes: Vec<Played> = played.iter().inspect(progress).collect();
-        if let Some(error) = failure.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).take() {
-            return Err(error);
-        }
-        let rank = |episode: &Played| plan.tasks.iter().position(|task| task.id == episode.result.task);
-        episodes.sort_by_key(|episode| (rank(episode), episode.result.seed));
-        let evaluation = summarise(plan, episodes);
-        write_whole(folder, RESULTS, serde_json::to_string_pretty(&evaluation)?.as_bytes())?;
-        Ok(evaluation)
-    })
+    let build = fingerprint::build().map_err(EpisodeError::Build)?;
+    let locomotion = plan.locomotion.load().map_err(EpisodeError::from)?.name().to_string();
+    let keeper = Keeper { plan, folder: &kept, locomotion, build };
+    let episodes = workers::play_all(&keeper, progress)?;
+    let evaluation = summary::summarise(&keeper, episodes);
+    write_whole(&folder.join(RESULTS), serde_json::to_string_pretty(&evaluation)?.as_bytes())?;
+    Ok(evaluation)
 }
-
-/// Which program this is: two builds of one version may differ in physics, and their results must not mix in one table.
-fn build() -> Result<String, EvaluationError> {
-    let path = std::env::current_exe().map_err(EvaluationError::Build)?;
-    let mut hasher = DefaultHasher::new();
-    hasher.write(&std::fs::read(path).map_err(EvaluationError::Build)?);
-    Ok(format!("{}+{:016x}", env!("CARGO_PKG_VERSION"), hasher.finish()))
-}
-
-/// The folder of single episodes, and what has to agree for one of them to be taken instead of played.
-struct Keeper<'a> {
-    plan: &'a Plan,
-    folder: &'a Path,
-    build: String,
-}
-
-impl Keeper<'_> {
-    fn kept_or_played(&self, task: &'static Task, seed: u32) -> Result<Played, EvaluationError> {
-        match self.kept(task, seed) {
-            Some(kept) => Ok(kept),
-            None => self.play(task, seed),
-        }
-    }
-
-    /// An earlier run's episode, if it is this one: a file that is torn, renamed or from other rules counts as missing.
-    fn kept(&self, task: &Task, seed: u32) -> Option<Played> {
-        let bytes = std::fs::read(self.folder.join(file_name(task, seed))).ok()?;
-        let kept: Played = serde_json::from_slice(&bytes).ok()?;
-        let plan = self.plan;
-        let rules = (kept.policy, kept.protocol, kept.locomotion.as_str(), kept.build.as_str());
-        let same = rules == (plan.policy, plan.protocol, plan.locomotion.name(), &self.build)
-            && (kept.result.task.as_str(), kept.result.seed) == (task.id, seed)
-            && self.recording(task, seed).is_none_or(|folder| folder.join(EpisodeResult::FILE_NAME).exists());
-        same.then_some(kept)
-    }
-
-    /// Where the episode is recorded, if it is. Its `result.json` is written last.
-    fn recording(&self, task: &Task, seed: u32) -> Option<PathBuf> {
-        self.plan.record.then(|| self.folder.join(format!("{}-{seed}", task.id)))
-    }
-
-    fn play(&self, task: &'static Task, seed: u32) -> Result<Played, EvaluationError> {
-        let plan = self.plan;
-        let recording = self.recording(task, seed);
-        let session = Session::start(task, seed, plan.protocol, &plan.locomotion, recording.as_deref())?;
-        let mut arena = InProcess(session);
-        let outcome = match plan.policy {
-            Policy::Expert => experts::perform(task, &mut arena),
-            Policy::Idle => idle(task, &mut arena),
-        };
-        let result = EpisodeResult::from(&arena.0.close()?);
-        let episode = Played {
-            policy: plan.policy,
-            protocol: plan.protocol,
-            locomotion: plan.locomotion.name().into(),
-            build: self.build.clone(),
-            note: outcome.err().map(|error| error.to_string()).or_else(|| missed(&result)),
-            result,
-        };
-        let text = serde_json::to_string_pretty(&episode)?;
-        write_whole(self.folder, &file_name(task, seed), text.as_bytes())?;
-        Ok(episode)
-    }
-}
-
-fn file_name(task: &Task, seed: u32) -> String {
-    format!("{}-{seed}.json", task.id)
-}
-
-/// An episode in this process.
-pub struct InProcess(pub Session);
-
-impl Arena for InProcess {
-    fn call(&mut self, call: ToolCall) -> Result<ToolReply, ExpertError> {
-        let tool = call.name();
-        self.0.call(call).map_err(|error| match error {
-            EpisodeError::Ended { .. } => ExpertError::EpisodeOver,
-            error => ExpertError::Call { tool, reason: error.to_string() },
-        })
-    }
-
-    fn facts(&mut self) -> Result<Facts, ExpertError> {
-        Ok(self.0.facts())
-    }
-}
-
-const IDLE_STEPS: u32 = 25;
-
-fn idle(task: &Task, arena: &mut dyn Arena) -> Result<(), ExpertError> {
-    for _ in 0..task.benchmark_steps.div_ceil(IDLE_STEPS) {
-        match arena.call(Wait { steps: IDLE_STEPS }.into()) {
-            Ok(_) => {}
-            Err(ExpertError::EpisodeOver) => return Ok(()),
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(())
-}
-
-fn summarise(plan: &Plan, episodes: Vec<Played>) -> Evaluation {
-    let mut tasks: BTreeMap<String, TaskSummary> = BTreeMap::new();
-    for episode in &episodes {
-        let task = tasks.entry(episode.result.task.clone()).or_default();
-        let reached = |phase: &str| usize::from(was_reached(&episode.result.phases, phase));
-        task.episodes += 1;
-        task.p1 += reached("p1");
-        task.p2 += reached("p2");
-        task.p3 += reached("p3");
-        task.falls += episode.result.falls;
-        task.mean_env_steps += f64::from(episode.result.env_steps);
-    }
-    for task in tasks.values_mut() {
-        task.mean_env_steps /= task.episodes as f64;
-    }
-    Evaluation {
-        policy: plan.policy,
-        protocol: plan.protocol,
-        locomotion: plan.locomotion.name().into(),
-        tasks,
-        episodes,
-    }
-}
-
-fn was_reached(phases: &PhaseTimes, phase: &str) -> bool {
-    phases.reached_s(phase).is_some()
-}
-
-/// The first phase that was not reached.
-fn missed(result: &EpisodeResult) -> Option<String> {
-    let (phase, _) = result.phases.0.iter().find(|(_, time_s)| time_s.is_none())?;
-    Some(format!("{phase} was not reached in {} steps", result.env_steps))
-}
-
-/// Exact 95 % interval of a rate, `successes` of `trials` (Clopper and Pearson, 1934).
-pub fn clopper_pearson(successes: usize, trials: usize) -> [f64; 2] {
-    const TAIL: f64 = 0.025;
-    let (k, n) = (successes as f64, trials as f64);
-    let quantile = |a: f64, b: f64, p: f64| Beta::new(a, b).map_or(f64::NAN, |beta| beta.inverse_cdf(p));
-    let low = if successes == 0 { 0.0 } else { quantile(k, n - k + 1.0, TAIL) };
-    let high = if successes == trials { 1.0 } else { quantile(k + 1.0, n - k, 1.0 - TAIL) };
-    [low, high]
-}
-
-#[cfg(test)]
-mod tests;

@@ -1,6 +1,10 @@
 //! Which episodes are kept, what is noted, and how they are counted.
 
+use tandem_tools_spec::PhaseTimes;
+
+use super::keep::missed;
 use super::*;
+use crate::reports::EpisodeResult;
 
 /// Against R's `binom.test(k, n)$conf.int`.
 #[test]
@@ -30,11 +34,15 @@ fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> EpisodeR
 }
 
 /// An episode that was played under `keeper`'s rules.
-fn played(keeper: &Keeper, task: &Task, seed: u32) -> Played {
-    let result = result(task.id, seed, vec![("p1".into(), Some(4.2))]);
-    let (policy, protocol) = (keeper.plan.policy, keeper.plan.protocol);
-    let locomotion = keeper.plan.locomotion.name().into();
-    Played { policy, protocol, locomotion, build: keeper.build.clone(), result, note: None }
+fn played(keeper: &Keeper, task: &'static Task, seed: u32) -> Played {
+    Played {
+        policy: keeper.plan.player.name.into(),
+        spec: keeper.plan.spec(task, seed),
+        locomotion: keeper.locomotion.clone(),
+        build: keeper.build.into(),
+        result: result(task.id, seed, vec![("p1".into(), Some(4.2))]),
+        note: None,
+    }
 }
 
 #[test]
@@ -53,15 +61,17 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
     let folder = tempfile::tempdir().unwrap();
     let task = crate::tasks::find("pouring").unwrap();
     let plan = Plan {
-        policy: Policy::Expert,
+        player: players::find("expert").unwrap(),
         protocol: Protocol::Agentic,
-        locomotion: LocomotionChoice::Balance,
+        robot: RobotFile::default(),
+        locomotion: Controller::Balance,
         tasks: vec![task],
         seeds: vec![7],
         jobs: 1,
         record: false,
     };
-    let keeper = Keeper { plan: &plan, folder: folder.path(), build: build().unwrap() };
+    let build = fingerprint::build().unwrap();
+    let keeper = Keeper { plan: &plan, folder: folder.path(), locomotion: "balance".into(), build };
     let kept_after = |text: &str| {
         std::fs::write(folder.path().join("pouring-7.json"), text).unwrap();
         keeper.kept(task, 7)
@@ -75,8 +85,9 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
     for (what, change) in [
         ("task", (|played| played.result.task = "handover".into()) as Change),
         ("seed", |played| played.result.seed = 8),
-        ("protocol", |played| played.protocol = Protocol::Benchmark),
-        ("policy", |played| played.policy = Policy::Idle),
+        ("protocol", |played| played.spec.protocol = Protocol::Benchmark),
+        ("robot", |played| played.spec.robot = RobotFile::File("other.xml".into())),
+        ("policy", |played| played.policy = "idle".into()),
         ("controller", |played| played.locomotion.push('0')),
         ("build", |played| played.build.push('0')),
     ] {

@@ -11,7 +11,7 @@ use std::{
 use foxglove::Encode;
 use mcap::records::{MessageHeader, Metadata};
 
-use crate::results::OutputError;
+use crate::output::OutputError;
 
 /// A file that is being written.
 pub struct McapFile {

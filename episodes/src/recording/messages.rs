@@ -1,16 +1,18 @@
 //! Messages that have no well-known schema: flat JSON objects, because Foxglove's plots address numbers by field name and
 //! its schema reader takes neither references nor nullable types.
 
+use base64::{DecodeError, Engine, prelude::BASE64_STANDARD};
 use foxglove::{Encode, Schema, bytes::BufMut};
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use tandem_sim::{BaseCommand, RobotCommand, Side};
+use tandem_sim::{BaseCommand, RobotCommand, RobotState, Side, Step};
 use tandem_tools_spec::{Budget, LookReply, PhaseReached, ToolReply};
 
-use super::{RobotStep, ToolCallRecord};
-use crate::facts::Grip;
-use crate::results::OutputError;
+use super::ToolCallRecord;
+use crate::commands::base_row;
+use crate::output::OutputError;
+use crate::scoring::{Facts, Grip};
 
 /// A message written as JSON.
 pub struct Json<T>(pub T);
@@ -37,6 +39,42 @@ impl<T: JsonMessage> Encode for Json<T> {
     }
 }
 
+/// Everything that a control step left behind, as bytes: thousands of numbers that have to come back as they were.
+#[derive(Serialize, Deserialize, JsonSchema)]
+pub struct StepMessage {
+    control_step: u64,
+    /// [`Step`] in postcard's encoding, base64.
+    #[schemars(extend("contentEncoding" = "base64"))]
+    postcard: String,
+}
+
+impl JsonMessage for StepMessage {
+    const SCHEMA_NAME: &str = "tandem.Step";
+}
+
+/// Why a message holds no [`Step`].
+#[derive(Debug, thiserror::Error)]
+pub enum StepError {
+    #[error("no base64: {0}")]
+    Base64(#[from] DecodeError),
+    #[error("not a step of this build: {0}")]
+    Postcard(#[from] postcard::Error),
+}
+
+impl StepMessage {
+    pub fn new(step: &Step) -> Result<Json<StepMessage>, OutputError> {
+        let bytes = postcard::to_stdvec(step).map_err(|source| OutputError::Encode(source.into()))?;
+        Ok(Json(StepMessage {
+            control_step: step.control_step,
+            postcard: BASE64_STANDARD.encode(bytes),
+        }))
+    }
+
+    pub fn step(&self) -> Result<Step, StepError> {
+        Ok(postcard::from_bytes(&BASE64_STANDARD.decode(&self.postcard)?)?)
+    }
+}
+
 /// The 35 numbers one robot was commanded for one control step; the channel's metadata names the columns.
 #[derive(Serialize, JsonSchema)]
 pub struct Action {
@@ -49,9 +87,7 @@ impl JsonMessage for Action {
 
 impl From<&RobotCommand> for Json<Action> {
     fn from(command: &RobotCommand) -> Self {
-        let BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m } = command.base;
-        let base = [vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m];
-        Json(Action { row: command.upper_rad.into_iter().chain(base).collect() })
+        Json(Action { row: command.upper_rad.into_iter().chain(base_row(&command.base)).collect() })
     }
 }
 
@@ -90,12 +126,13 @@ impl JsonMessage for Hands {
     const SCHEMA_NAME: &str = "tandem.Hands";
 }
 
-impl From<&RobotStep> for Json<Hands> {
-    fn from(step: &RobotStep) -> Self {
-        let [left, right] = step.state.hand_force_n.map(|force_n| force_n.to_array());
+impl Hands {
+    /// Of robot number `robot`, which measures `state` where scoring sees `facts`.
+    pub fn of(state: &RobotState, robot: usize, facts: &Facts) -> Json<Hands> {
+        let [left, right] = state.hand_force_n.map(|force_n| force_n.to_array());
         let named = |side: Side, wanted: Grip| {
-            let grips = step.grips.iter().filter(|(_, grips)| grips[side.index()] == wanted);
-            grips.map(|(object, _)| object.clone()).collect()
+            let objects = facts.objects.iter().filter(|object| object.hands[robot][side.index()] == wanted);
+            objects.map(|object| object.name.clone()).collect()
         };
         Json(Hands {
             left_force_n: left,
@@ -109,11 +146,11 @@ impl From<&RobotStep> for Json<Hands> {
 }
 
 /// A phase that was reached.
-#[derive(Serialize, JsonSchema)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 pub struct Phase {
-    id: String,
-    name: String,
-    time_s: f64,
+    pub id: String,
+    pub name: String,
+    pub time_s: f64,
 }
 
 impl JsonMessage for Phase {
@@ -147,13 +184,13 @@ impl From<&Budget> for Json<BudgetLeft> {
 }
 
 /// A tool call and its answer. Arguments and reply are JSON texts, since every tool has others.
-#[derive(Serialize, JsonSchema)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 pub struct ToolCallMessage {
-    tool: String,
-    arguments: String,
-    ok: bool,
+    pub tool: String,
+    pub arguments: String,
+    pub ok: bool,
     /// The reply without pictures, or the text of the problem.
-    reply: String,
+    pub reply: String,
 }
 
 impl JsonMessage for ToolCallMessage {

@@ -1,11 +1,11 @@
 //! Poses as Foxglove's transforms: the world, each robot's chain of links, its camera, and the objects.
 
-use std::f32::consts::PI;
-
 use foxglove::messages::{FrameTransform, FrameTransforms, Quaternion, Timestamp, Vector3};
-use tandem_sim::{Pose, RobotState, Rotation, Vector, robot::RobotModel};
+use tandem_sim::{Pose, RobotState, Rotation, Step, Vector, robot::RobotModel};
 
-use super::{RecordedRobot, StepRecord, file::time_ns};
+use super::file::time_ns;
+use crate::commands::RobotSheet;
+use crate::convert::opencv_axes;
 
 /// The frame that everything else hangs on.
 pub const WORLD: &str = "world";
@@ -18,7 +18,7 @@ pub fn robot_frame(robot: &str, part: &str) -> String {
 }
 
 /// All frames at one step.
-pub fn transforms(robots: &[RecordedRobot], step: &StepRecord) -> FrameTransforms {
+pub fn transforms(robots: &[RobotSheet], step: &Step) -> FrameTransforms {
     let timestamp = timestamp(step.time_s);
     let frame = |parent: String, child: String, parent_from_child: Pose| FrameTransform {
         timestamp: Some(timestamp),
@@ -28,7 +28,7 @@ pub fn transforms(robots: &[RecordedRobot], step: &StepRecord) -> FrameTransform
         rotation: Some(quaternion(parent_from_child.rotation)),
     };
     let mut transforms = Vec::new();
-    for (robot, moved) in robots.iter().zip(step.robots) {
+    for (robot, moved) in robots.iter().zip(&step.robots) {
         let model = &robot.model;
         let name = |link: usize| robot_frame(&robot.name, &model.links[link].name);
         transforms.push(frame(WORLD.into(), name(0), moved.state.world_from_pelvis));
@@ -37,10 +37,10 @@ pub fn transforms(robots: &[RecordedRobot], step: &StepRecord) -> FrameTransform
             transforms.push(frame(name(parent), name(link), parent_from_link));
         }
         let camera = robot_frame(&robot.name, EGOCENTRIC);
-        transforms.push(frame(name(0), camera, optical(moved.state.pelvis_from_camera)));
+        transforms.push(frame(name(0), camera, opencv_axes(&moved.state.pelvis_from_camera)));
     }
-    for object in step.objects {
-        transforms.push(frame(WORLD.into(), object.name.into(), object.world_from_object));
+    for object in &step.objects {
+        transforms.push(frame(WORLD.into(), object.name.clone(), object.state.world_from_object));
     }
     FrameTransforms { transforms }
 }
@@ -51,11 +51,6 @@ fn link_poses<'a>(model: &'a RobotModel, state: &'a RobotState) -> impl Iterator
         let turn = Rotation::from_axis_angle(joint.axis, state.q_rad[index]);
         (joint.link, model.links[joint.link].parent_from_link * Pose::from_rotation(turn))
     })
-}
-
-/// A camera frame with MuJoCo's axes (looking along -z, y up) as one with an image's (looking along z, y down).
-fn optical(pelvis_from_camera: Pose) -> Pose {
-    pelvis_from_camera * Pose::from_rotation(Rotation::from_rotation_x(PI))
 }
 
 pub fn timestamp(time_s: f64) -> Timestamp {

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use base64::{Engine, prelude::BASE64_STANDARD};
 use tandem_sim::CONTROL_HZ;
-use tandem_tools_spec::{Budget, EndReason, Protocol, ResultReply};
+use tandem_tools_spec::{Budget, EndReason, ResultReply};
 
-use crate::describe::phase_id;
+use crate::scoring::Phase;
 use crate::protocol::{Rules, rules};
 use crate::tasks::Task;
 
@@ -23,7 +23,7 @@ impl CallCounts {
 }
 
 /// What the page tells.
-pub struct Report<'a> {
+pub struct EpisodePage<'a> {
     pub task: &'a Task,
     pub result: &'a ResultReply,
     pub calls: &'a CallCounts,
@@ -33,7 +33,7 @@ pub struct Report<'a> {
     pub strip: &'a [u8],
 }
 
-impl Report<'_> {
+impl EpisodePage<'_> {
     /// The page.
     pub fn html(&self) -> String {
         let title = format!("{}, seed {}", escape(self.task.id), self.result.seed);
@@ -96,12 +96,8 @@ impl Report<'_> {
     }
 
     fn facts(&self) -> String {
-        let protocol = match self.result.protocol {
-            Protocol::Agentic => "agentic",
-            Protocol::Benchmark => "benchmark",
-        };
         let facts = [
-            ("Protocol", protocol.to_string()),
+            ("Protocol", self.result.protocol.name().into()),
             ("Simulated time", format!("{:.2} s", self.duration_s())),
             ("Tool calls", self.result.tool_calls.to_string()),
             ("Robots that fell", self.result.falls.to_string()),
@@ -134,7 +130,7 @@ impl Report<'_> {
     fn phases(&self) -> String {
         let mut rows = String::new();
         for (index, phase) in self.task.phases.iter().enumerate() {
-            let id = phase_id(index);
+            let id = Phase::number(index);
             let (class, reached) = match self.result.phases.reached_s(&id) {
                 Some(time_s) => ("good", format!("{time_s:.2} s")),
                 None => ("bad", "not reached".into()),

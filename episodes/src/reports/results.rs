@@ -1,25 +1,11 @@
-//! What an episode came to, as `result.json`, and how the files of a run folder are written.
+//! What an episode came to, as `result.json`.
 
-use std::{
-    fs, io,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use tandem_tools_spec::{PhaseTimes, ResultReply};
 
-/// Why a file of a run folder could not be written.
-#[derive(Debug, thiserror::Error)]
-pub enum OutputError {
-    #[error("cannot write {}: {source}; give a folder on a disk with space that may be written to", path.display())]
-    Io { path: PathBuf, source: io::Error },
-    #[error("the recording {} failed: {source}", path.display())]
-    Mcap { path: PathBuf, source: mcap::McapError },
-    #[error("a record of the episode cannot be written as JSON: {0}")]
-    Json(#[from] serde_json::Error),
-    #[error("a message of the recording cannot be encoded: {0}")]
-    Encode(#[source] Box<dyn std::error::Error + Send + Sync>),
-}
+use crate::output::{OutputError, write_whole};
 
 /// The content of `result.json`. Field order is the file's.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -46,7 +32,9 @@ impl EpisodeResult {
     pub fn write(&self, folder: &Path) -> Result<PathBuf, OutputError> {
         let mut text = serde_json::to_string_pretty(self)?;
         text.push('\n');
-        write_whole(folder, Self::FILE_NAME, text.as_bytes())
+        let path = folder.join(Self::FILE_NAME);
+        write_whole(&path, text.as_bytes())?;
+        Ok(path)
     }
 }
 
@@ -65,20 +53,13 @@ impl From<&ResultReply> for EpisodeResult {
     }
 }
 
-/// Writes a file under another name first and renames it when it is complete.
-pub(crate) fn write_whole(folder: &Path, name: &str, bytes: &[u8]) -> Result<PathBuf, OutputError> {
-    let path = folder.join(name);
-    let partial = folder.join(format!("{name}.partial"));
-    fs::write(&partial, bytes)
-        .and_then(|()| fs::rename(&partial, &path))
-        .map_err(|source| OutputError::Io { path: path.clone(), source })?;
-    Ok(path)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use std::fs;
+
     use serde_json::json;
+
+    use super::*;
 
     fn result(p3_s: Option<f64>) -> EpisodeResult {
         EpisodeResult {

@@ -1,11 +1,7 @@
 //! A picture strip: one column per key moment, third person above, the robots' own views below.
 
 use font8x8::legacy::BASIC_LEGACY;
-use tandem_sim::World;
-use tandem_sim::render::{Camera, Frame, encode_png};
-
-use crate::EpisodeError;
-use crate::observe::Eyes;
+use tandem_sim::render::{Frame, PictureError, encode_png};
 
 /// One column.
 #[derive(Clone)]
@@ -23,8 +19,8 @@ pub struct View {
     pub frame: Frame,
 }
 
-const CELL_WIDTH: usize = 400;
-const CELL_HEIGHT: usize = 300;
+pub const CELL_WIDTH: usize = 400;
+pub const CELL_HEIGHT: usize = 300;
 const GAP: usize = 6;
 const CAPTION_HEIGHT: usize = 48;
 /// From the top of one line of text to the next.
@@ -37,28 +33,10 @@ const INK: [u8; 3] = [25; 3];
 const FAINT_INK: [u8; 3] = [105; 3];
 const LABEL_INK: [u8; 3] = [250; 3];
 
-impl Moment {
-    pub fn capture(caption: &str, world: &World, eyes: &mut Eyes) -> Moment {
-        let step = world.present();
-        let third_person = eyes.cameras.third_person();
-        let heads: Vec<Camera> =
-            (0..step.robots.len()).map(|robot| eyes.cameras.egocentric(&step, robot)).collect();
-        let mut see = |label: String, camera: Camera| {
-            let camera = Camera { width: CELL_WIDTH as u32, height: CELL_HEIGHT as u32, ..camera };
-            View { label, frame: eyes.render(&step, &camera) }
-        };
-        let mut views = vec![see("the room".into(), third_person)];
-        for (robot, camera) in world.robots().iter().zip(heads) {
-            views.push(see(format!("what {} sees", robot.name), camera));
-        }
-        Moment { caption: [caption.into(), format!("{:.1} s", world.time_s())], views }
-    }
-}
-
 /// The strip as a PNG file.
-pub fn png(moments: &[Moment]) -> Result<Vec<u8>, EpisodeError> {
+pub fn png(moments: &[Moment]) -> Result<Vec<u8>, PictureError> {
     let canvas = compose(moments);
-    Ok(encode_png(canvas.width as u32, canvas.height() as u32, &canvas.rgb)?)
+    encode_png(canvas.width as u32, canvas.height() as u32, &canvas.rgb)
 }
 
 fn compose(moments: &[Moment]) -> Canvas {

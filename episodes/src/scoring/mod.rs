@@ -8,4 +8,4 @@ mod scores;
 
 pub use facts::{A, B, Facts, Grip, ObjectFacts, RobotFacts};
 pub use phases::{Done, Phase};
-pub use scores::{Progress, Scores};
+pub use scores::{ScoreMemory, Scored, Scores};

@@ -1,38 +1,50 @@
 //! Watches an episode step by step, and says what scoring and experts may know of it.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
-use tandem_sim::Step;
+use tandem_sim::{ObjectModel, SimError, Step, mjcf::Site};
 
 use super::facts::{Facts, ObjectFacts, RobotFacts};
 use super::grasps::ObjectGrasps;
 
-/// What has to be remembered between control steps: grasps, and where objects began.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+/// The objects that are watched.
+#[derive(Clone, Debug)]
 pub struct Scorekeeper {
-    objects: Vec<Watched>,
+    /// Of each object, as its file has them.
+    sites: Vec<Arc<[Site]>>,
+    watched: Vec<Watched>,
 }
 
+/// What has to be remembered of one object between control steps: grasps, and where it began.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-struct Watched {
+pub struct Watched {
     name: String,
     rest_height_m: f32,
     grasps: ObjectGrasps,
 }
 
 impl Scorekeeper {
-    /// Begins to watch the objects called `names`, with the state before the first control step.
-    pub fn new<'a>(names: impl Iterator<Item = &'a str>, start: &Step) -> Scorekeeper {
-        let objects = names.map(|name| Watched {
-            name: name.into(),
-            rest_height_m: start.object(name).map_or(0.0, |state| state.world_from_object.translation.z),
-            grasps: ObjectGrasps::new(name, start.robots.len()),
-        });
-        Scorekeeper { objects: objects.collect() }
+    /// Begins to watch `objects`, given by name and file, with the state before the first control step.
+    pub fn new<'a>(
+        objects: impl Iterator<Item = (&'a str, &'a str)>,
+        start: &Step,
+    ) -> Result<Scorekeeper, SimError> {
+        let mut keeper = Scorekeeper { sites: Vec::new(), watched: Vec::new() };
+        for (name, file) in objects {
+            keeper.sites.push(ObjectModel::load(file)?.sites.into());
+            keeper.watched.push(Watched {
+                name: name.into(),
+                rest_height_m: start.object(name).map_or(0.0, |state| state.world_from_object.translation.z),
+                grasps: ObjectGrasps::new(name, start.robots.len()),
+            });
+        }
+        Ok(keeper)
     }
 
     /// Looks at the control step that follows the last one.
     pub fn update(&mut self, step: &Step) {
-        for object in &mut self.objects {
+        for object in &mut self.watched {
             object.grasps.update(step);
         }
     }
@@ -45,10 +57,11 @@ impl Scorekeeper {
             hand_force_n: robot.state.hand_force_n,
             fallen: robot.state.fallen,
         });
-        let objects = self.objects.iter().filter_map(|watched| {
+        let objects = self.watched.iter().zip(&self.sites).filter_map(|(watched, sites)| {
             let state = step.object(&watched.name)?;
             Some(ObjectFacts {
                 name: watched.name.clone(),
+                sites: sites.clone(),
                 pose_in_world: state.world_from_object,
                 velocity_m_s: state.velocity_m_s,
                 angular_velocity_rad_s: state.angular_velocity_rad_s,
@@ -58,5 +71,14 @@ impl Scorekeeper {
             })
         });
         Facts { time_s: step.time_s, robots: robots.collect(), objects: objects.collect() }
+    }
+
+    pub fn watched(&self) -> &[Watched] {
+        &self.watched
+    }
+
+    /// Goes back to an earlier [`Scorekeeper::watched`] of the same objects.
+    pub fn set_watched(&mut self, watched: Vec<Watched>) {
+        self.watched = watched;
     }
 }

@@ -1,10 +1,10 @@
 //! The score of one episode: grasps, facts and phases, step by step. An episode under way and its recording are scored alike.
 
 use serde::{Deserialize, Serialize};
-use tandem_sim::Step;
+use tandem_sim::{SimError, Step};
 
-use super::phases::{PhaseProgress, PhaseTracker};
-use super::scorekeeper::Scorekeeper;
+use super::phases::{PhaseMemory, PhaseTracker};
+use super::scorekeeper::{Scorekeeper, Watched};
 use super::{Facts, Phase};
 
 /// How far an episode has come.
@@ -16,21 +16,35 @@ pub struct Scores {
 
 /// What [`Scores`] remember between control steps.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Progress {
-    keeper: Scorekeeper,
-    phases: PhaseProgress,
+pub struct ScoreMemory {
+    objects: Vec<Watched>,
+    phases: PhaseMemory,
+}
+
+/// What one control step shows.
+pub struct Scored {
+    pub facts: Facts,
+    /// Whether it reached a phase.
+    pub reached: bool,
 }
 
 impl Scores {
-    /// Begins to score `phases`, which may ask for the objects called `names`, with the state before the first control step.
-    pub fn new<'a>(phases: &'static [Phase], names: impl Iterator<Item = &'a str>, start: &Step) -> Scores {
-        Scores { keeper: Scorekeeper::new(names, start), phases: PhaseTracker::new(phases) }
+    /// Begins to score `phases`, which may ask for `objects`, given by name and file, with the state before the first
+    /// control step.
+    pub fn new<'a>(
+        phases: &'static [Phase],
+        objects: impl Iterator<Item = (&'a str, &'a str)>,
+        start: &Step,
+    ) -> Result<Scores, SimError> {
+        Ok(Scores { keeper: Scorekeeper::new(objects, start)?, phases: PhaseTracker::new(phases) })
     }
 
-    /// Looks at the control step that follows the last one; true if it reached a phase.
-    pub fn update(&mut self, step: &Step) -> bool {
+    /// Looks at the control step that follows the last one.
+    pub fn update(&mut self, step: &Step) -> Scored {
         self.keeper.update(step);
-        self.phases.update(&self.keeper.facts(step))
+        let facts = self.keeper.facts(step);
+        let reached = self.phases.update(&facts);
+        Scored { facts, reached }
     }
 
     /// The facts after `step`, the last one that was looked at.
@@ -53,13 +67,13 @@ impl Scores {
         self.phases.complete()
     }
 
-    pub fn progress(&self) -> Progress {
-        Progress { keeper: self.keeper.clone(), phases: self.phases.progress().clone() }
+    pub fn memory(&self) -> ScoreMemory {
+        ScoreMemory { objects: self.keeper.watched().to_vec(), phases: self.phases.memory().clone() }
     }
 
-    /// Goes back to an earlier [`Scores::progress`] of the same phases and objects.
-    pub fn set_progress(&mut self, progress: Progress) {
-        self.keeper = progress.keeper;
-        self.phases.set_progress(progress.phases);
+    /// Goes back to an earlier [`Scores::memory`] of the same phases and objects.
+    pub fn set_memory(&mut self, memory: ScoreMemory) {
+        self.keeper.set_watched(memory.objects);
+        self.phases.set_memory(memory.phases);
     }
 }

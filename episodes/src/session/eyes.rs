@@ -1,13 +1,14 @@
-//! Replies to the tools that only look: pictures, depth, proprioception.
+//! What the robots of a world see: pictures, and depth at pixels.
 
 use tandem_sim::render::{self, Camera, Cameras, Frame, Renderer, Scenery, encode_png};
-use tandem_sim::{Step, Vector, World};
-use tandem_tools_spec::{
-    CameraCalibration, CameraImage, DepthPoint, DepthReply, JointValues, Observation, Png, RobotState,
-};
+use tandem_sim::{Step, World};
+use tandem_tools_spec::{CameraImage, DepthPoint, DepthReply, Observation, Png};
 
+use super::replies::{calibration, robot_state};
 use crate::EpisodeError;
-use crate::convert::{opencv_axes, rounded, wire_base, wire_pose_from_sim, wire_vector};
+use crate::commands::Motion;
+use crate::convert::{rounded, wire_vector};
+use crate::spec::RendererKind;
 
 /// Renders what the robots of a world see.
 pub struct Eyes {
@@ -16,8 +17,12 @@ pub struct Eyes {
 }
 
 impl Eyes {
-    pub fn new(world: &World) -> Eyes {
-        Eyes { renderer: render::cpu(Scenery::of(world)), cameras: Cameras::of(world) }
+    pub fn new(kind: RendererKind, world: &World) -> Eyes {
+        let scenery = Scenery::of(world);
+        let renderer = match kind {
+            RendererKind::Cpu => render::cpu(scenery),
+        };
+        Eyes { renderer, cameras: Cameras::of(world) }
     }
 
     /// What any camera sees after `step`.
@@ -25,42 +30,42 @@ impl Eyes {
         self.renderer.render(step, camera)
     }
 
-    pub fn observe(&mut self, world: &World, robots: &[usize]) -> Result<Observation, EpisodeError> {
-        let step = world.present();
-        let cameras: Vec<Camera> =
-            robots.iter().map(|robot| self.cameras.egocentric(&step, *robot)).collect();
+    /// The reply to `observe` for the robots numbered `robots`, all of which `motions` move.
+    pub fn observe(
+        &mut self,
+        step: &Step,
+        robots: &[usize],
+        motions: &[Motion],
+    ) -> Result<Observation, EpisodeError> {
         let mut images = Vec::with_capacity(robots.len());
-        for (&robot, camera) in robots.iter().zip(&cameras) {
-            let frame = self.render(&step, camera);
+        let mut cameras = Vec::with_capacity(robots.len());
+        for &robot in robots {
+            let name = &motions[robot].robot.name;
+            let camera = self.cameras.egocentric(step, robot);
+            let frame = self.render(step, &camera);
             let png = encode_png(frame.width, frame.height, &frame.rgb)?;
-            images.push(CameraImage { robot: world.robots()[robot].name.clone(), png_base64: Png(png) });
+            images.push(CameraImage { robot: name.clone(), png_base64: Png(png) });
+            cameras.push(calibration(step, robot, name, &camera));
         }
-        Ok(Observation {
-            time_s: world.time_s(),
-            states: robots.iter().map(|robot| robot_state(world, *robot)).collect(),
-            cameras: robots
-                .iter()
-                .zip(&cameras)
-                .map(|(robot, camera)| calibration(world, *robot, camera))
-                .collect(),
-            images,
-        })
+        let states = robots.iter().map(|robot| robot_state(step, *robot, &motions[*robot].robot));
+        Ok(Observation { time_s: step.time_s, states: states.collect(), cameras, images })
     }
 
+    /// The reply to `query_depth` for robot number `robot`, called `name`.
     pub fn depth(
         &mut self,
-        world: &World,
+        step: &Step,
         robot: usize,
+        name: &str,
         pixels: &[[i64; 2]],
     ) -> Result<DepthReply, EpisodeError> {
-        let step = world.present();
-        let camera = self.cameras.egocentric(&step, robot);
+        let camera = self.cameras.egocentric(step, robot);
         let (width, height) = (camera.width, camera.height);
         let outside = |[u, v]: [i64; 2]| u < 0 || v < 0 || u >= width.into() || v >= height.into();
         if let Some([u, v]) = pixels.iter().copied().find(|pixel| outside(*pixel)) {
             return Err(EpisodeError::PixelOutside { u, v, width, height });
         }
-        let frame = self.render(&step, &camera);
+        let frame = self.render(step, &camera);
         let pelvis_from_camera = step.robots[robot].state.pelvis_from_camera;
         let points = pixels.iter().map(|&pixel| {
             let [u, v] = pixel;
@@ -73,45 +78,6 @@ impl Eyes {
                 point_in_pelvis_m: seen.then_some(wire_vector(point_m)),
             }
         });
-        Ok(DepthReply { robot: world.robots()[robot].name.clone(), points: points.collect() })
-    }
-}
-
-fn calibration(world: &World, robot: usize, camera: &Camera) -> CameraCalibration {
-    let [cx, cy] = camera.principal_point_px();
-    let focal_px = rounded(camera.focal_px().into());
-    CameraCalibration {
-        robot: world.robots()[robot].name.clone(),
-        width: camera.width,
-        height: camera.height,
-        fx: focal_px,
-        fy: focal_px,
-        // The wire counts from the first pixel's centre, the camera from its corner.
-        cx: f64::from(cx) - 0.5,
-        cy: f64::from(cy) - 0.5,
-        camera_in_pelvis: wire_pose_from_sim(&opencv_axes(&world.robot_state(robot).pelvis_from_camera)),
-    }
-}
-
-pub fn robot_state(world: &World, robot: usize) -> RobotState {
-    let state = world.robot_state(robot);
-    let joints = &world.robots()[robot].model.joints;
-    let named = |values: &[f32]| {
-        JointValues(
-            joints.iter().zip(values).map(|(joint, value)| (joint.name.clone(), f64::from(*value))).collect(),
-        )
-    };
-    let down = state.world_from_pelvis.rotation.inverse() * Vector::new(0.0, 0.0, -1.0);
-    RobotState {
-        robot: world.robots()[robot].name.clone(),
-        time_s: world.time_s(),
-        joint_positions_rad: named(&state.q_rad),
-        joint_velocities_rad_s: named(&state.qd_rad_s),
-        joint_torques_n_m: named(&state.torque_n_m),
-        left_wrist: wire_pose_from_sim(&state.pelvis_from_wrist[0]),
-        right_wrist: wire_pose_from_sim(&state.pelvis_from_wrist[1]),
-        gravity_in_pelvis: wire_vector(down),
-        base_command: wire_base(&world.robots()[robot].base_command()),
-        fallen: state.fallen,
+        Ok(DepthReply { robot: name.into(), points: points.collect() })
     }
 }

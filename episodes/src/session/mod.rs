@@ -1,36 +1,42 @@
 //! An episode: a world, its rules, and the tool calls that act on it. Synchronous; it lives on a thread of its own.
 
+mod answer;
+mod build;
+mod checkpoint;
+mod clock;
+mod eyes;
+mod moment;
+mod replies;
+mod run_files;
+mod status;
+
+pub use checkpoint::{Checkpoint, CheckpointError};
+pub use clock::{Clock, monotonic};
+pub use run_files::RunFiles;
+
 use std::path::Path;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use tandem_sim::{ObjectPlacement, Pose, RobotCommand, RobotPlacement, Rotation, Snapshot, World, WorldSpec};
-use tandem_tools_spec::{
-    ActCall, Briefing, Budget, CommandReply, EndReason, LookCall, LookReply, ManageCall, ManageReply,
-    PhaseReached, PhaseTimes, Protocol, ResultReply, RobotFallen, StatusReply, StopReason, ToolCall,
-    ToolReply,
-};
+use tandem_sim::{RobotCommand, Step, World};
+use tandem_tools_spec::{EndReason, ResultReply, ToolCall, ToolReply};
 
-use crate::convert::rounded;
-use crate::describe;
-use crate::facts::Facts;
-use crate::motion::{Motion, MotionState, Plan, UpperBody};
-use crate::observe::{Eyes, robot_state};
-use crate::phases::PhaseTracker;
-use crate::plan;
-use crate::protocol::{Clock, Rules, ThinkingClock, monotonic, rules};
-use crate::run_files::RunFiles;
-use crate::scorekeeper::Scorekeeper;
-use crate::tasks::Task;
-use crate::{EpisodeError, LocomotionChoice};
+use crate::commands::{Command, Motion, Run};
+use crate::protocol::{Rules, rules};
+use crate::scoring::{Facts, Scores};
+use crate::spec::{EpisodeSpec, Start};
+use crate::{EpisodeError, fingerprint};
+use build::Built;
+use checkpoint::Origin;
+use clock::ThinkingClock;
+use eyes::Eyes;
 
 /// One episode from start to result.
 pub struct Session {
-    task: &'static Task,
-    seed: u32,
-    protocol: Protocol,
+    origin: Origin,
     rules: Rules,
     world: World,
+    /// What the last control step left behind.
+    present: Step,
     motions: Vec<Motion>,
     scores: Scores,
     clock: ThinkingClock,
@@ -42,81 +48,58 @@ pub struct Session {
     ended: Option<EndReason>,
 }
 
-/// What scoring remembers from step to step.
-#[derive(Clone)]
-struct Scores {
-    keeper: Scorekeeper,
-    phases: PhaseTracker,
-}
-
-/// An episode at one instant, for going on from there later with the same task, seed and binary.
-#[derive(Clone)]
-pub struct Checkpoint {
-    world: Snapshot,
-    motions: Vec<MotionState>,
-    scores: Scores,
-    tool_calls: u32,
-    thought: Duration,
-    ended: Option<EndReason>,
-}
-
 impl Session {
-    /// Builds the world of `task` under `seed`, with robots that walk by `locomotion`, and runs the initial hold. With a folder, the episode is recorded there.
-    pub fn start(
-        task: &'static Task,
-        seed: u32,
-        protocol: Protocol,
-        locomotion: &LocomotionChoice,
-        folder: Option<&Path>,
-    ) -> Result<Session, EpisodeError> {
-        Session::start_with_clock(task, seed, protocol, locomotion, folder, monotonic())
+    /// Builds the world of `spec` and takes it to where the episode begins, which under some protocols is after an initial
+    /// hold. With a folder, the episode is recorded there.
+    pub fn start(spec: &EpisodeSpec, folder: Option<&Path>) -> Result<Session, EpisodeError> {
+        Session::start_with_clock(spec, folder, monotonic())
     }
 
     /// As [`Session::start`], with the policy's wall clock read from `clock`.
     pub fn start_with_clock(
-        task: &'static Task,
-        seed: u32,
-        protocol: Protocol,
-        locomotion: &LocomotionChoice,
+        spec: &EpisodeSpec,
         folder: Option<&Path>,
         clock: Clock,
     ) -> Result<Session, EpisodeError> {
-        let mut world = World::new(&world_spec(task, seed))?;
-        for robot in 0..world.robots().len() {
-            world.set_locomotion(robot, locomotion.controller());
-        }
-        let rest = world.rest_command(0);
-        let body = UpperBody::new(tandem_sim::assets::robot(tandem_sim::assets::DEFAULT_ROBOT)?, &rest)?;
-        let body = Arc::new(body);
-        let motions =
-            (0..world.robots().len()).map(|robot| Motion::new(&body, &world.rest_command(robot))).collect();
-        let rules = rules(protocol, task);
-        let files = match folder {
-            Some(folder) => Some(RunFiles::create(folder, task, seed, protocol, locomotion.name(), &world)?),
-            None => None,
-        };
+        let Built { world, motions, robot, locomotion } = build::build(spec)?;
+        let rules = rules(spec.protocol, spec.task);
+        let present = world.present();
         let mut session = Session {
-            task,
-            seed,
-            protocol,
+            origin: Origin { spec: spec.clone(), robot, locomotion },
             rules,
             motions,
-            scores: Scores { keeper: Scorekeeper::new(task, &world), phases: PhaseTracker::new(task) },
-            eyes: Eyes::new(&world),
-            world,
+            scores: spec.task.scores(&present)?,
             clock: ThinkingClock::new(rules.thinking, clock),
-            files,
+            eyes: Eyes::new(spec.renderer, &world),
+            files: None,
             tool_calls: 0,
             physics: Duration::ZERO,
             ended: None,
+            present,
+            world,
         };
-        session.keep_picture("start")?;
-        let holds: Vec<Plan> = session.motions.iter().map(Motion::hold).collect();
-        if rules.initial_hold_steps > 0 {
-            session.run(holds, rules.initial_hold_steps)?;
-        }
+        session.begin(folder)?;
         session.clock.resume();
         Ok(session)
+    }
+
+    /// Takes a world that has just been built to where its episode begins.
+    fn begin(&mut self, folder: Option<&Path>) -> Result<(), EpisodeError> {
+        let hold_steps = match &self.origin.spec.start {
+            Start::Task => self.rules.initial_hold_steps,
+            Start::Checkpoint(path) => {
+                self.resume(&Checkpoint::read(path)?)?;
+                0
+            }
+        };
+        if let Some(folder) = folder {
+            self.files = Some(RunFiles::create(folder, self)?);
+        }
+        self.keep_picture("start")?;
+        if hold_steps > 0 {
+            self.run(Command::hold(hold_steps, self.motions.len()))?;
+        }
+        Ok(())
     }
 
     /// Answers a tool call. An error changes nothing but the count of calls.
@@ -128,141 +111,49 @@ impl Session {
         let answer = call.validate().map_err(EpisodeError::from).and_then(|()| self.answer(&call));
         self.tool_calls += 1;
         if let Some(files) = &mut self.files {
-            files.tool_call(self.world.time_s(), &call, &answer)?;
+            files.tool_call(self.present.time_s, &call, &answer)?;
         }
         self.clock.resume();
         answer
     }
 
-    fn answer(&mut self, call: &ToolCall) -> Result<ToolReply, EpisodeError> {
-        match (call, self.ended) {
-            (ToolCall::Manage(call), _) => Ok(ToolReply::Manage(self.manage(call))),
-            (ToolCall::Look(_) | ToolCall::Act(_), Some(reason)) => Err(EpisodeError::Ended { reason }),
-            (ToolCall::Look(call), None) => self.look(call).map(ToolReply::Look),
-            (ToolCall::Act(call), None) => self.act(call).map(ToolReply::Act),
-        }
-    }
-
-    fn look(&mut self, call: &LookCall) -> Result<LookReply, EpisodeError> {
-        match call {
-            LookCall::Observe(args) => {
-                let robots = match &args.robots {
-                    Some(names) => names.iter().map(|name| self.robot(name)).collect::<Result<_, _>>()?,
-                    None => (0..self.motions.len()).collect::<Vec<_>>(),
-                };
-                self.eyes.observe(&self.world, &robots).map(LookReply::Observe)
-            }
-            LookCall::GetRobotState(args) => {
-                let robot = self.robot(&args.robot)?;
-                Ok(LookReply::GetRobotState(robot_state(&self.world, robot)))
-            }
-            LookCall::QueryDepth(args) => {
-                let robot = self.robot(&args.robot)?;
-                self.eyes.depth(&self.world, robot, &args.pixels).map(LookReply::QueryDepth)
-            }
-            LookCall::CheckReach(args) => {
-                let robot = self.robot(&args.robot)?;
-                Ok(LookReply::CheckReach(plan::check_reach(args, &self.motions[robot])))
-            }
-        }
-    }
-
-    fn manage(&mut self, call: &ManageCall) -> ManageReply {
-        match call {
-            ManageCall::GetStatus(_) => ManageReply::GetStatus(self.status()),
-            ManageCall::Finish(_) => {
-                self.ended.get_or_insert(EndReason::Finished);
-                ManageReply::Finish(self.result())
-            }
-        }
-    }
-
-    fn robot(&self, name: &str) -> Result<usize, EpisodeError> {
-        let names: Vec<&'static str> = self.task.robots.iter().map(|robot| robot.name).collect();
-        let index = names.iter().position(|known| *known == name);
-        index.ok_or_else(|| EpisodeError::UnknownRobot { name: name.into(), have: names })
-    }
-
-    /// Checks a command as a whole, then executes it.
-    fn act(&mut self, call: &ActCall) -> Result<CommandReply, EpisodeError> {
-        let asked = plan::steps(call);
-        if asked == 0 || asked > self.rules.steps_per_command as usize {
-            return Err(EpisodeError::TooManySteps {
-                asked,
-                most: self.rules.steps_per_command,
-                protocol: plan::protocol_name(self.protocol),
-            });
-        }
-        let mut orders = Vec::with_capacity(self.motions.len());
-        for name in plan::named_robots(call) {
-            let robot = self.robot(name)?;
-            orders.push((robot, plan::order(call, name, &self.world.robots()[robot], &self.motions[robot])));
-        }
-        let mut plans: Vec<Plan> = self.motions.iter().map(Motion::hold).collect();
-        for (robot, order) in &orders {
-            plans[*robot] = order.plan.clone();
-        }
-        let steps = (asked as u32).min(self.steps_left());
-        let executed_steps = self.run(plans, steps)?;
-        let stop_reason = if self.scores.phases.complete() {
-            self.ended = Some(EndReason::TaskComplete);
-            StopReason::TaskComplete
-        } else if self.steps_left() == 0 {
-            self.ended = Some(EndReason::StepBudgetExhausted);
-            StopReason::StepBudgetExhausted
-        } else {
-            StopReason::StepsDone
-        };
-        let reports = orders.iter().map(|(robot, order)| {
-            plan::report(
-                order,
-                &self.world.robots()[*robot],
-                &self.world.robot_state(*robot),
-                &self.motions[*robot],
-            )
-        });
-        Ok(CommandReply {
-            executed_steps,
-            stop_reason,
-            time_s: self.world.time_s(),
-            robots: reports.collect(),
-            fallen: self.fallen(),
-            phases: self.phases(),
-            budget: self.budget(),
-        })
-    }
-
-    /// Executes up to `steps` control steps; fewer if the last phase is reached. Returns how many.
-    fn run(&mut self, plans: Vec<Plan>, steps: u32) -> Result<u32, EpisodeError> {
-        let mut runs: Vec<_> = plans
-            .into_iter()
+    /// Executes a command; fewer of its steps if the last phase is reached or the budget ends. Returns how many.
+    fn run(&mut self, command: Command) -> Result<u32, EpisodeError> {
+        let steps = command.steps.min(self.steps_left());
+        let movements = command.orders.into_iter().map(|order| order.movement);
+        let mut runs: Vec<Run> = movements
             .zip(&mut self.motions)
-            .map(|(plan, motion)| motion.begin(plan, steps))
+            .map(|(movement, motion)| Run::begin(movement, steps, motion))
             .collect();
         for step in 1..=steps {
-            let started = Instant::now();
-            let commands: Vec<RobotCommand> =
-                runs.iter_mut().zip(&mut self.motions).map(|(run, motion)| run.command(motion)).collect();
-            self.world.control_step(&commands);
-            self.scores.keeper.update(&self.world);
-            self.physics += started.elapsed();
-            let facts = self.facts();
-            let was_underway = self.scores.phases.underway();
-            let reached = self.scores.phases.update(&facts);
-            let budget = self.budget();
-            if let Some(files) = &mut self.files {
-                files.step(&self.world, &commands, &facts, budget)?;
-            }
-            if reached {
-                self.phase_reached()?;
-            } else if self.scores.phases.underway() && !was_underway {
-                self.keep_picture("together")?;
-            }
-            if self.scores.phases.complete() {
+            self.step(&mut runs)?;
+            if self.scores.complete() {
                 return Ok(step);
             }
         }
         Ok(steps)
+    }
+
+    /// One control step, from the robots' movements to what is scored and recorded of it.
+    fn step(&mut self, runs: &mut [Run]) -> Result<(), EpisodeError> {
+        let started = Instant::now();
+        let commands: Vec<RobotCommand> =
+            runs.iter_mut().zip(&mut self.motions).map(|(run, motion)| run.command(motion)).collect();
+        self.present = self.world.control_step(&commands);
+        self.physics += started.elapsed();
+        let was_underway = self.scores.underway();
+        let scored = self.scores.update(&self.present);
+        let budget = self.budget();
+        if let Some(files) = &mut self.files {
+            files.step(&self.present, &scored.facts, budget)?;
+        }
+        if scored.reached {
+            self.phase_reached()
+        } else if self.scores.underway() && !was_underway {
+            self.keep_picture("together")
+        } else {
+            Ok(())
+        }
     }
 
     fn phase_reached(&mut self) -> Result<(), EpisodeError> {
@@ -277,25 +168,25 @@ impl Session {
     /// Keeps a picture of this moment for the strip, if the episode is recorded.
     fn keep_picture(&mut self, caption: &str) -> Result<(), EpisodeError> {
         if let Some(files) = &mut self.files {
-            files.keep_picture(caption, &self.world, &mut self.eyes)?;
+            let names = self.motions.iter().map(|motion| motion.robot.name.as_str());
+            files.keep(moment::capture(caption, &self.present, names, &mut self.eyes));
         }
         Ok(())
     }
 
-    /// What has to be known to begin.
-    pub fn briefing(&self) -> Briefing {
-        Briefing {
-            instruction: self.task.instruction.into(),
-            instructions: describe::instructions(self.task),
-            robots: describe::robots(&self.world),
-            action_row: describe::action_row(&self.world.robots()[0].model),
-            status: self.status(),
-        }
+    /// What the episode is.
+    pub fn spec(&self) -> &EpisodeSpec {
+        &self.origin.spec
+    }
+
+    /// What the last control step left behind.
+    pub fn present(&self) -> &Step {
+        &self.present
     }
 
     /// What scoring and experts see.
     pub fn facts(&self) -> Facts {
-        self.scores.keeper.facts(&self.world)
+        self.scores.facts(&self.present)
     }
 
     /// Why the episode has ended, if it has.
@@ -308,127 +199,21 @@ impl Session {
         format!("{:016x}", self.world.state_hash())
     }
 
-    fn steps_left(&self) -> u32 {
-        self.rules.episode_steps.saturating_sub(self.world.control_steps() as u32)
-    }
-
-    fn budget(&self) -> Budget {
-        Budget {
-            steps_left: self.steps_left(),
-            wall_clock_left_s: self.clock.left().map(|left| rounded(left.as_secs_f64())),
-            steps_per_command: self.rules.steps_per_command,
-        }
-    }
-
-    fn fallen(&self) -> Vec<RobotFallen> {
-        let robots = self.world.robots().iter().enumerate();
-        let fallen = |index| self.world.robot_state(index).fallen;
-        robots
-            .map(|(index, robot)| RobotFallen { robot: robot.name.clone(), fallen: fallen(index) })
-            .collect()
-    }
-
-    fn phases(&self) -> Vec<PhaseReached> {
-        let reached = self.scores.phases.reached().enumerate();
-        reached
-            .map(|(index, (phase, time_s))| PhaseReached {
-                id: describe::phase_id(index),
-                name: phase.id.into(),
-                time_s,
-            })
-            .collect()
-    }
-
-    fn status(&self) -> StatusReply {
-        StatusReply {
-            task: self.task.id.into(),
-            seed: self.seed,
-            protocol: self.protocol,
-            time_s: self.world.time_s(),
-            env_steps: self.world.control_steps() as u32,
-            ended: self.ended,
-            fallen: self.fallen(),
-            phases: self.phases(),
-            budget: self.budget(),
-            state_hash: self.state_hash(),
-        }
-    }
-
-    /// The result as it stands.
-    pub fn result(&self) -> ResultReply {
-        let reached = self.phases();
-        let time_s = |id: &str| reached.iter().find(|phase| phase.id == id).map(|phase| phase.time_s);
-        let phases = (0..self.task.phases.len()).map(describe::phase_id).map(|id| {
-            let reached_s = time_s(&id);
-            (id, reached_s)
-        });
-        let physics_s = self.physics.as_secs_f64();
-        ResultReply {
-            task: self.task.id.into(),
-            seed: self.seed,
-            protocol: self.protocol,
-            phases: PhaseTimes(phases.collect()),
-            ended: self.ended.unwrap_or(EndReason::Finished),
-            env_steps: self.world.control_steps() as u32,
-            tool_calls: self.tool_calls,
-            falls: self.fallen().iter().filter(|robot| robot.fallen).count() as u32,
-            realtime_factor: if physics_s > 0.0 { self.world.time_s() / physics_s } else { 0.0 },
-            state_hash: self.state_hash(),
-        }
-    }
-
     /// Ends the episode and writes what a recorded one leaves behind.
     pub fn close(mut self) -> Result<ResultReply, EpisodeError> {
         self.ended.get_or_insert(EndReason::Finished);
-        if !self.scores.phases.complete() {
+        if !self.scores.complete() {
             self.keep_picture("end")?;
         }
         let result = self.result();
         if let Some(files) = self.files {
-            files.finish(&result, self.task)?;
+            files.finish(&result, self.origin.spec.task)?;
         }
         Ok(result)
     }
-
-    /// The episode as it stands.
-    pub fn checkpoint(&self) -> Result<Checkpoint, EpisodeError> {
-        Ok(Checkpoint {
-            world: self.world.snapshot()?,
-            motions: self.motions.iter().map(|motion| motion.state().clone()).collect(),
-            scores: self.scores.clone(),
-            tool_calls: self.tool_calls,
-            thought: self.clock.spent(),
-            ended: self.ended,
-        })
-    }
-
-    /// Takes the episode to a checkpoint of an episode of the same task and seed.
-    pub fn resume(&mut self, checkpoint: &Checkpoint) -> Result<(), EpisodeError> {
-        self.world.restore(&checkpoint.world)?;
-        for (motion, state) in self.motions.iter_mut().zip(&checkpoint.motions) {
-            motion.set_state(state.clone());
-        }
-        self.scores = checkpoint.scores.clone();
-        self.tool_calls = checkpoint.tool_calls;
-        self.clock.set_spent(checkpoint.thought);
-        self.ended = checkpoint.ended;
-        Ok(())
-    }
 }
 
-fn world_spec(task: &Task, seed: u32) -> WorldSpec {
-    let robots = task.robots.iter().map(|robot| RobotPlacement {
-        name: robot.name.into(),
-        position_m: robot.position_m,
-        yaw_rad: robot.yaw_rad,
-    });
-    let objects = task.objects.iter().zip(task.starts(seed)).map(|(spot, start)| ObjectPlacement {
-        name: spot.name.into(),
-        file: spot.file.into(),
-        world_from_object: Pose::from_parts(
-            start.position_m.into(),
-            Rotation::from_rotation_z(start.yaw_rad),
-        ),
-    });
-    WorldSpec { scene: task.scene.into(), robots: robots.collect(), objects: objects.collect() }
+/// [`fingerprint::build`] as an episode's own error.
+fn this_build() -> Result<&'static str, EpisodeError> {
+    fingerprint::build().map_err(EpisodeError::Build)
 }

@@ -2,18 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use tandem_sim::{RobotCommand, World};
-use tandem_tools_spec::{Budget, PhaseReached, Protocol, ResultReply, ToolCall, ToolReply};
+use tandem_sim::Step;
+use tandem_tools_spec::{Budget, PhaseReached, ResultReply, ToolCall, ToolReply};
 
-use crate::observe::Eyes;
-use crate::recorder::{
-    ObjectStep, RecordedRobot, Recorder, RecordingHeader, RobotStep, StepRecord, ToolCallRecord,
-};
-use crate::report::{CallCounts, Report};
-use crate::results::{EpisodeResult, OutputError, write_whole};
-use crate::strip::{self, Moment};
+use super::{Session, this_build};
+use crate::output::{OutputError, write_whole};
+use crate::recording::{Recorder, RecordingHeader, ToolCallRecord};
+use crate::reports::{self, CallCounts, EpisodePage, EpisodeResult, Moment};
+use crate::scoring::Facts;
 use crate::tasks::Task;
-use crate::{EpisodeError, Facts};
+use crate::EpisodeError;
 
 /// The files of an episode under way.
 pub struct RunFiles {
@@ -28,30 +26,20 @@ impl RunFiles {
     pub const STRIP: &str = "strip.png";
     pub const REPORT: &str = "report.html";
 
-    /// Makes the folder and begins the recording.
-    pub fn create(
-        folder: &Path,
-        task: &Task,
-        seed: u32,
-        protocol: Protocol,
-        locomotion: &str,
-        world: &World,
-    ) -> Result<RunFiles, EpisodeError> {
+    /// Makes the folder and begins the recording where `session` stands.
+    pub(super) fn create(folder: &Path, session: &Session) -> Result<RunFiles, EpisodeError> {
         std::fs::create_dir_all(folder).map_err(|source| OutputError::Io { path: folder.into(), source })?;
-        let robots = world.robots().iter();
         let header = RecordingHeader {
-            task: task.id.into(),
-            seed,
-            protocol,
-            locomotion: locomotion.into(),
-            robots: robots
-                .map(|robot| RecordedRobot { name: robot.name.clone(), model: robot.model.clone() })
-                .collect(),
+            spec: session.spec().clone(),
+            locomotion: session.origin.locomotion.clone(),
+            build: this_build()?.into(),
+            robots: session.motions.iter().map(|motion| motion.robot.clone()).collect(),
+            scores: session.scores.memory(),
         };
-        let mut recorder = Recorder::create(folder, header)?;
-        recorder.draw("world", world.room())?;
-        for (name, geoms) in world.object_geoms() {
-            recorder.draw(name, geoms)?;
+        let mut recorder = Recorder::create(folder, header, &session.present)?;
+        recorder.draw("world", session.world.room())?;
+        for (name, model) in session.world.object_models() {
+            recorder.draw(name, &model.geoms)?;
         }
         Ok(RunFiles {
             folder: folder.into(),
@@ -62,40 +50,16 @@ impl RunFiles {
         })
     }
 
-    pub fn step(
-        &mut self,
-        world: &World,
-        commands: &[RobotCommand],
-        facts: &Facts,
-        budget: Budget,
-    ) -> Result<(), EpisodeError> {
+    pub(super) fn step(&mut self, step: &Step, facts: &Facts, budget: Budget) -> Result<(), EpisodeError> {
         self.budget_left = Some(budget);
-        let robots: Vec<RobotStep> = commands
-            .iter()
-            .enumerate()
-            .map(|(robot, command)| RobotStep {
-                state: world.robot_state(robot),
-                command: *command,
-                grips: facts
-                    .objects
-                    .iter()
-                    .map(|object| (object.name.clone(), object.hands[robot]))
-                    .collect(),
-            })
-            .collect();
-        let objects: Vec<ObjectStep> = world
-            .objects()
-            .map(|(name, state)| ObjectStep { name, world_from_object: state.world_from_object })
-            .collect();
-        let step = StepRecord { time_s: world.time_s(), robots: &robots, objects: &objects, budget };
-        Ok(self.recorder.step(&step)?)
+        Ok(self.recorder.step(step, facts, budget)?)
     }
 
-    pub fn phase(&mut self, phase: &PhaseReached) -> Result<(), EpisodeError> {
+    pub(super) fn phase(&mut self, phase: &PhaseReached) -> Result<(), EpisodeError> {
         Ok(self.recorder.phase(phase)?)
     }
 
-    pub fn tool_call(
+    pub(super) fn tool_call(
         &mut self,
         time_s: f64,
         call: &ToolCall,
@@ -110,26 +74,20 @@ impl RunFiles {
         Ok(self.recorder.tool_call(&ToolCallRecord { time_s, call, outcome })?)
     }
 
-    /// Keeps this moment for the strip.
-    pub fn keep_picture(
-        &mut self,
-        caption: &str,
-        world: &World,
-        eyes: &mut Eyes,
-    ) -> Result<(), EpisodeError> {
-        self.moments.push(Moment::capture(caption, world, eyes));
-        Ok(())
+    /// Keeps a moment for the strip.
+    pub(super) fn keep(&mut self, moment: Moment) {
+        self.moments.push(moment);
     }
 
     /// Closes the recording and writes the rest.
-    pub fn finish(self, result: &ResultReply, task: &Task) -> Result<(), EpisodeError> {
+    pub(super) fn finish(self, result: &ResultReply, task: &Task) -> Result<(), EpisodeError> {
         let summary = EpisodeResult::from(result);
         self.recorder.finish(&summary)?;
-        let strip = strip::png(&self.moments)?;
-        write_whole(&self.folder, Self::STRIP, &strip)?;
-        let report =
-            Report { task, result, calls: &self.calls, budget_left: self.budget_left, strip: &strip };
-        write_whole(&self.folder, Self::REPORT, report.html().as_bytes())?;
+        let strip = reports::png(&self.moments)?;
+        write_whole(&self.folder.join(Self::STRIP), &strip)?;
+        let page =
+            EpisodePage { task, result, calls: &self.calls, budget_left: self.budget_left, strip: &strip };
+        write_whole(&self.folder.join(Self::REPORT), page.html().as_bytes())?;
         summary.write(&self.folder)?;
         Ok(())
     }

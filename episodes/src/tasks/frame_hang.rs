@@ -5,8 +5,6 @@
 
 use std::f32::consts::FRAC_PI_2;
 
-use tandem_sim::Vector;
-
 use super::placement::RELEASE_S;
 use super::{Offset, RobotSpot, Task, spot, uniform_xy};
 use crate::scoring::{A, B, Facts, Done, Phase};
@@ -16,10 +14,6 @@ const FRAME_Y_M: f32 = 0.34;
 const WALL_Y_M: f32 = 0.50;
 const PEG_HEIGHT_M: f32 = 1.14;
 const LIFTED_M: f32 = 0.10;
-/// Ends of the peg's axis in its frame, and the hole of the loop in the frame's.
-const PEG_M: [Vector; 2] = [Vector::new(0.0, 0.0, 0.0), Vector::new(0.0, -0.107, 0.015)];
-const LOOP_CENTRE_M: Vector = Vector::new(0.0, 0.0, 0.988);
-const LOOP_RADIUS_M: f32 = 0.036;
 const STEADY_TILT_RAD: f32 = 35.0 * std::f32::consts::PI / 180.0;
 const STEADY_M_S: f32 = 0.20;
 const STEADY_RAD_S: f32 = 0.80;
@@ -89,7 +83,7 @@ fn lifted(f: &Facts) -> bool {
 }
 
 fn threaded(f: &Facts) -> bool {
-    f.threads("wall_peg", PEG_M, "frame", LOOP_CENTRE_M, LOOP_RADIUS_M)
+    f.threads("wall_peg", ["root", "tip"], "frame", "loop")
 }
 
 fn threaded_while_held(f: &Facts) -> bool {

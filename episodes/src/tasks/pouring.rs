@@ -12,9 +12,6 @@ use crate::scoring::{A, Facts, Done, Phase};
 const WORKTOP_M: f32 = 0.80;
 const ALOFT_M: f32 = 0.03;
 const TIPPED_RAD: f32 = FRAC_PI_3;
-/// Inside of the glass: its narrow part is 30 mm wide inside, its mouth 50 mm.
-const GLASS_RADIUS_M: f32 = 0.05;
-const GLASS_HEIGHTS_M: [f32; 2] = [0.0, 0.14];
 /// The marble's centre on the floor of the cup: 6 mm of base and its radius.
 const MARBLE_M: f32 = WORKTOP_M + 0.0171;
 const CUP_XY_M: [f32; 2] = [0.27, -0.10];
@@ -86,7 +83,7 @@ fn tipped(f: &Facts) -> bool {
 
 /// The marble is between the walls of the glass.
 fn marble_in_glass(f: &Facts) -> bool {
-    f.inside_cylinder("marble", "glass", GLASS_RADIUS_M, GLASS_HEIGHTS_M)
+    f.inside_cylinder("marble", "glass", "inside")
 }
 
 /// The glass is off the worktop.

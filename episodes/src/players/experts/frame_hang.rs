@@ -4,21 +4,14 @@ use std::f32::consts::FRAC_PI_2;
 
 use tandem_sim::{Pose, Rotation, Side, Vector};
 
-use super::bar::{BarGrasp, move_together, take_together};
-use super::stage::HandMove;
-use super::{ExpertError, Stage};
-use crate::facts::{A, B};
+use super::skills::{BarGrasp, HandMove, Stage, move_together, take_together};
+use crate::players::PlayerError;
+use crate::scoring::{A, B};
 
 /// Where the moulding, 50 x 40 mm, lies in a hand whose palm is on its outside.
 const MOULDING_IN_WRIST_M: Vector = Vector::new(0.112, 0.045, 0.0);
 const CLOSURE: f32 = 1.1;
-const SIDE_X_M: f32 = 0.425;
-/// At the height of the elbows, above the frame's centre of mass.
-const GRIP_HEIGHT_M: f32 = 0.87;
 
-/// Middle of the loop's hole in the frame, and the peg's tip in the peg's frame.
-const LOOP_M: Vector = Vector::new(0.0, 0.0, 0.988);
-const TIP_M: Vector = Vector::new(0.0, -0.107, 0.015);
 /// Before the tip, past the tip, and resting on the peg: the loop's middle relative to the tip.
 const BEFORE_M: Vector = Vector::new(0.0, -0.045, 0.004);
 const PAST_M: Vector = Vector::new(0.0, 0.040, 0.002);
@@ -28,21 +21,22 @@ const LOOSE: f32 = 0.35;
 const OUTWARDS_M: f32 = 0.13;
 const BACK_M: f32 = 0.14;
 
-pub fn perform(stage: &mut Stage) -> Result<(), ExpertError> {
-    let grasp = |robot, side, x_m| BarGrasp {
+pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
+    let grasp = |robot, side, bar| BarGrasp {
         robot,
         side,
         object: "frame",
-        bar_m: Vector::new(x_m, 0.0, GRIP_HEIGHT_M),
+        bar,
         bar_in_wrist_m: MOULDING_IN_WRIST_M,
         object_from_wrist: Rotation::from_rotation_z(FRAC_PI_2),
         closure: CLOSURE,
     };
-    let grasps = [grasp(A, Side::Left, -SIDE_X_M), grasp(B, Side::Right, SIDE_X_M)];
+    let grasps = [grasp(A, Side::Left, "left_side"), grasp(B, Side::Right, "right_side")];
     take_together(stage, &grasps)?;
-    let start = stage.facts()?.object("frame").pose_in_world;
-    let tip_m = stage.facts()?.point_m("wall_peg", TIP_M);
-    let upright = |loop_m: Vector| Pose::from_translation(loop_m - LOOP_M);
+    let facts = stage.facts()?;
+    let start = facts.object("frame").pose_in_world;
+    let tip_m = facts.site_m("wall_peg", "tip");
+    let upright = |loop_m: Vector| Pose::from_translation(loop_m - facts.site("frame", "loop").position_m());
     let before = upright(tip_m + BEFORE_M);
     let raised_m = Vector::new(start.translation.x, start.translation.y, before.translation.z);
     let raised = Pose::from_translation(raised_m);
@@ -55,7 +49,7 @@ pub fn perform(stage: &mut Stage) -> Result<(), ExpertError> {
     let_go(stage, &grasps)
 }
 
-fn let_go(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), ExpertError> {
+fn let_go(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
     let loose = |grasp: &BarGrasp| BarGrasp { closure: LOOSE, ..*grasp }.close();
     let loosen: Vec<HandMove> = grasps.iter().map(loose).collect();
     stage.perform(0.5, &loosen)?;

@@ -4,15 +4,15 @@ use std::f32::consts::PI;
 
 use tandem_sim::{Side, Vector};
 
-use super::grasp::{self, CylinderGrasp};
-use super::{ExpertError, Stage};
-use crate::facts::{A, B};
+use super::skills::{CylinderGrasp, Stage, pick_up_all};
+use crate::players::PlayerError;
+use crate::scoring::{A, B};
 
 /// One hand above the other on the straight part of the bottle, 20 cm long; a hand is 9 cm wide.
 const GIVER: CylinderGrasp =
-    CylinderGrasp { robot: A, side: Side::Right, object: "bottle", height_m: 0.058, heading_rad: 0.0 };
+    CylinderGrasp { robot: A, side: Side::Right, object: "bottle", grip: "grip_low", heading_rad: 0.0 };
 const TAKER: CylinderGrasp =
-    CylinderGrasp { robot: B, side: Side::Right, object: "bottle", height_m: 0.158, heading_rad: PI };
+    CylinderGrasp { robot: B, side: Side::Right, object: "bottle", grip: "grip_high", heading_rad: PI };
 
 /// Where the bottle changes hands: between the robots, above the counter.
 const MEETING_M: Vector = Vector::new(0.36, -0.06, 0.92);
@@ -21,7 +21,7 @@ const LIFT_M: Vector = Vector::new(0.0, 0.0, 0.10);
 const ABOVE_PAD_M: Vector = Vector::new(0.0, 0.0, 0.05);
 const ATTEMPTS: usize = 4;
 
-pub fn perform(stage: &mut Stage) -> Result<(), ExpertError> {
+pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
     pick_up(stage)?;
     let bring = GIVER.carry(stage, MEETING_M)?;
     stage.perform(1.0, &[bring])?;
@@ -29,9 +29,9 @@ pub fn perform(stage: &mut Stage) -> Result<(), ExpertError> {
     put_down(stage)
 }
 
-fn pick_up(stage: &mut Stage) -> Result<(), ExpertError> {
+fn pick_up(stage: &mut Stage) -> Result<(), PlayerError> {
     for _ in 0..ATTEMPTS {
-        grasp::pick_up_all(stage, &[GIVER])?;
+        pick_up_all(stage, &[GIVER])?;
         let resting_m = stage.facts()?.position_m(GIVER.object);
         let lift = GIVER.carry(stage, resting_m + LIFT_M)?;
         stage.perform(1.0, &[lift])?;
@@ -40,10 +40,10 @@ fn pick_up(stage: &mut Stage) -> Result<(), ExpertError> {
         }
         release(stage, &GIVER)?;
     }
-    Err(ExpertError::GaveUp("A lost the bottle".into()))
+    Err(PlayerError::GaveUp("A lost the bottle".into()))
 }
 
-fn hand_over(stage: &mut Stage) -> Result<(), ExpertError> {
+fn hand_over(stage: &mut Stage) -> Result<(), PlayerError> {
     for _ in 0..ATTEMPTS {
         let beside = TAKER.beside(stage, 0.0)?;
         stage.perform(1.2, &[beside])?;
@@ -56,10 +56,10 @@ fn hand_over(stage: &mut Stage) -> Result<(), ExpertError> {
         }
         release(stage, &TAKER)?;
     }
-    Err(ExpertError::GaveUp("B could not take the bottle".into()))
+    Err(PlayerError::GaveUp("B could not take the bottle".into()))
 }
 
-fn put_down(stage: &mut Stage) -> Result<(), ExpertError> {
+fn put_down(stage: &mut Stage) -> Result<(), PlayerError> {
     let pad_m = stage.facts()?.position_m("target_pad");
     let over = TAKER.carry(stage, pad_m + ABOVE_PAD_M)?;
     stage.perform(1.0, &[over])?;
@@ -70,7 +70,7 @@ fn put_down(stage: &mut Stage) -> Result<(), ExpertError> {
     stage.perform(1.0, &[TAKER.open()])
 }
 
-fn release(stage: &mut Stage, grasp: &CylinderGrasp) -> Result<(), ExpertError> {
+fn release(stage: &mut Stage, grasp: &CylinderGrasp) -> Result<(), PlayerError> {
     stage.perform(0.5, &[grasp.open()])?;
     let away = grasp.away(stage)?;
     stage.perform(0.6, &[away])

@@ -1,12 +1,12 @@
 //! What the page says of an episode, and what it keeps out.
 
-use tandem_tools_spec::PhaseTimes;
+use tandem_tools_spec::{PhaseTimes, Protocol};
 
 use super::*;
 use crate::tasks;
 
 fn page(phase_times_s: [Option<f64>; 3], protocol: Protocol) -> String {
-    let phases = phase_times_s.into_iter().enumerate().map(|(index, time_s)| (phase_id(index), time_s));
+    let phases = phase_times_s.into_iter().enumerate().map(|(index, time_s)| (Phase::number(index), time_s));
     let result = ResultReply {
         task: "handover".into(),
         seed: 4,
@@ -24,7 +24,7 @@ fn page(phase_times_s: [Option<f64>; 3], protocol: Protocol) -> String {
     let wall_clock_left_s = (protocol == Protocol::Agentic).then_some(1740.0);
     let budget_left = Some(Budget { steps_left: 5500, wall_clock_left_s, steps_per_command: 25 });
     let task = tasks::find("handover").unwrap();
-    Report { task, result: &result, calls: &calls, budget_left, strip: b"png" }.html()
+    EpisodePage { task, result: &result, calls: &calls, budget_left, strip: b"png" }.html()
 }
 
 #[test]

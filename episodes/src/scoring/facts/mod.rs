@@ -1,6 +1,8 @@
 //! What scoring and the experts may know about the world. None of it is served to a policy.
 
-use tandem_sim::{Pose, Side, Vector};
+use std::sync::Arc;
+
+use tandem_sim::{Pose, Side, Vector, mjcf::Site};
 
 /// Index of robot A in [`Facts::robots`].
 pub const A: usize = 0;
@@ -33,6 +35,8 @@ pub struct RobotFacts {
 #[derive(Clone, Debug)]
 pub struct ObjectFacts {
     pub name: String,
+    /// Points and regions that the object's file gives a name to.
+    pub sites: Arc<[Site]>,
     pub pose_in_world: Pose,
     pub velocity_m_s: Vector,
     pub angular_velocity_rad_s: Vector,
@@ -106,37 +110,46 @@ impl Facts {
         self.object(object).pose_in_world * point_in_object_m
     }
 
-    /// Whether the origin of `object` is inside an upright cylinder fixed to `container`: at most `radius_m` from its z axis,
-    /// and between two heights above its origin.
-    pub fn inside_cylinder(&self, object: &str, container: &str, radius_m: f32, heights_m: [f32; 2]) -> bool {
-        let local = self.object(container).pose_in_world.inverse() * self.position_m(object);
-        local.truncate().length() <= radius_m && (heights_m[0]..=heights_m[1]).contains(&local.z)
+    /// World position of a site of `object`.
+    pub fn site_m(&self, object: &str, site: &str) -> Vector {
+        self.point_m(object, self.site(object, site).position_m())
     }
 
-    /// Whether the origin of `object` is inside a box fixed to `container`, given by its smallest and largest corner.
-    pub fn inside_box(&self, object: &str, container: &str, low_m: Vector, high_m: Vector) -> bool {
+    /// Whether the origin of `object` is inside a site of `container` that is an upright cylinder.
+    pub fn inside_cylinder(&self, object: &str, container: &str, site: &str) -> bool {
+        let site = self.site(container, site);
+        let [low_m, high_m] = site.heights_m();
+        let local = self.object(container).pose_in_world.inverse() * self.position_m(object);
+        local.truncate().length() <= site.radius_m() && (low_m..=high_m).contains(&local.z)
+    }
+
+    /// Whether the origin of `object` is inside a site of `container` that is a box.
+    pub fn inside_box(&self, object: &str, container: &str, site: &str) -> bool {
+        let [low_m, high_m] = self.site(container, site).corners_m();
         let local = self.object(container).pose_in_world.inverse() * self.position_m(object);
         local.cmpge(low_m).all() && local.cmple(high_m).all()
     }
 
-    /// Whether a rod of `object`, from `ends_m[0]` to `ends_m[1]` in its frame, passes through a ring of `carrier`: a disc of
-    /// `radius_m` around `centre_m`, with its axis along y, in the carrier's frame.
-    pub fn threads(
-        &self,
-        object: &str,
-        ends_m: [Vector; 2],
-        carrier: &str,
-        centre_m: Vector,
-        radius_m: f32,
-    ) -> bool {
+    /// Whether a rod of `object`, from one site to another, passes through a ring of `carrier`: a site with its axis along y.
+    pub fn threads(&self, object: &str, ends: [&str; 2], carrier: &str, ring: &str) -> bool {
+        let ring = self.site(carrier, ring);
         let carrier_from_object =
             self.object(carrier).pose_in_world.inverse() * self.object(object).pose_in_world;
-        let [a, b] = ends_m.map(|end_m| carrier_from_object * end_m - centre_m);
+        let end_m = |end: &str| carrier_from_object * self.site(object, end).position_m() - ring.position_m();
+        let [a, b] = ends.map(end_m);
         if a.y * b.y > 0.0 {
             return false;
         }
         let crossing = a + (b - a) * (a.y / (a.y - b.y));
-        crossing.x.hypot(crossing.z) <= radius_m
+        crossing.x.hypot(crossing.z) <= ring.radius_m()
+    }
+
+    /// A site of `object`. Objects' files name their sites, so one that is not there is a mistake in task or file.
+    pub fn site(&self, object: &str, name: &str) -> &Site {
+        match self.object(object).sites.iter().find(|site| site.name == name) {
+            Some(site) => site,
+            None => panic!("the file of {object:?} has no site {name:?}, which a task or its expert asks for"),
+        }
     }
 
     /// Tasks name their own objects, so a name that is not there is a mistake in the task's file.

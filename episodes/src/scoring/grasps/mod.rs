@@ -76,7 +76,7 @@ impl ObjectGrasps {
     pub fn update(&mut self, step: &Step) {
         for (robot, hands) in self.detectors.iter_mut().enumerate() {
             for side in Side::BOTH {
-                hands[side.index()].update(&step.hand_contacts(robot, side, &self.object));
+                hands[side.index()].update(&step.contacts(robot, side, &self.object));
             }
         }
         let off = self.grips().iter().flatten().all(|grip| *grip == Grip::Off);

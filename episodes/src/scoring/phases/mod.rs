@@ -37,12 +37,12 @@ impl Phase {
 #[derive(Clone, Debug)]
 pub struct PhaseTracker {
     phases: &'static [Phase],
-    progress: PhaseProgress,
+    memory: PhaseMemory,
 }
 
 /// What a [`PhaseTracker`] remembers between control steps.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub struct PhaseProgress {
+pub struct PhaseMemory {
     /// When each phase was reached, in simulated seconds.
     reached_s: Vec<f64>,
     /// Whether the `first` of the present phase's sequence has held, unbroken.
@@ -53,50 +53,50 @@ pub struct PhaseProgress {
 
 impl PhaseTracker {
     pub fn new(phases: &'static [Phase]) -> PhaseTracker {
-        PhaseTracker { phases, progress: PhaseProgress::default() }
+        PhaseTracker { phases, memory: PhaseMemory::default() }
     }
 
-    pub fn progress(&self) -> &PhaseProgress {
-        &self.progress
+    pub fn memory(&self) -> &PhaseMemory {
+        &self.memory
     }
 
-    /// Goes back to an earlier [`PhaseTracker::progress`] of the same phases.
-    pub fn set_progress(&mut self, progress: PhaseProgress) {
-        self.progress = progress;
+    /// Goes back to an earlier [`PhaseTracker::memory`] of the same phases.
+    pub fn set_memory(&mut self, memory: PhaseMemory) {
+        self.memory = memory;
     }
 
     /// Looks at one control step; true if it reached a phase.
     pub fn update(&mut self, facts: &Facts) -> bool {
-        let progress = &mut self.progress;
-        let before = progress.reached_s.len();
-        while let Some(phase) = self.phases.get(progress.reached_s.len()) {
-            if !progress.is_done(&phase.done, facts) {
+        let memory = &mut self.memory;
+        let before = memory.reached_s.len();
+        while let Some(phase) = self.phases.get(memory.reached_s.len()) {
+            if !memory.is_done(&phase.done, facts) {
                 break;
             }
-            progress.reached_s.push(facts.time_s);
-            progress.underway = false;
-            progress.since_s = None;
+            memory.reached_s.push(facts.time_s);
+            memory.underway = false;
+            memory.since_s = None;
         }
-        progress.reached_s.len() > before
+        memory.reached_s.len() > before
     }
 
     /// The phases reached so far, in order, with the time of each.
     pub fn reached(&self) -> impl Iterator<Item = (&'static Phase, f64)> {
-        self.phases.iter().zip(self.progress.reached_s.iter().copied())
+        self.phases.iter().zip(self.memory.reached_s.iter().copied())
     }
 
     /// Whether the present phase is a sequence whose `first` has held, unbroken.
     pub fn underway(&self) -> bool {
-        self.progress.underway
+        self.memory.underway
     }
 
     /// Whether the last phase has been reached.
     pub fn complete(&self) -> bool {
-        self.progress.reached_s.len() == self.phases.len()
+        self.memory.reached_s.len() == self.phases.len()
     }
 }
 
-impl PhaseProgress {
+impl PhaseMemory {
     fn is_done(&mut self, done: &Done, facts: &Facts) -> bool {
         match done {
             Done::When(condition) => condition(facts),

@@ -1,6 +1,7 @@
 //! Both sides of every threshold of CoPouring.
 
 use tandem_sim::Side::{Left, Right};
+use tandem_sim::Vector;
 
 use super::*;
 use crate::scoring::Grip::{Holding, Touching};

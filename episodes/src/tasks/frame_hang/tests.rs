@@ -1,7 +1,7 @@
 //! Both sides of every threshold of FrameHang.
 
 use tandem_sim::Side::{Left, Right};
-use tandem_sim::{Pose, Rotation};
+use tandem_sim::{Pose, Rotation, Vector};
 
 use super::*;
 use crate::scoring::{Grip::Holding, ObjectFacts};
@@ -13,8 +13,9 @@ fn held() -> Facts {
 /// The loop's centre at `offset_m` from where the middle of the peg's free part is.
 fn on_peg(offset_m: Vector) -> Facts {
     let mut facts = Facts::at_rest(&TASK);
-    let middle_m = facts.point_m("wall_peg", (PEG_M[0] + PEG_M[1]) * 0.5);
-    facts.object_mut("frame").pose_in_world.translation = middle_m + offset_m - LOOP_CENTRE_M;
+    let middle_m = (facts.site_m("wall_peg", "root") + facts.site_m("wall_peg", "tip")) * 0.5;
+    let loop_m = facts.site("frame", "loop").position_m();
+    facts.object_mut("frame").pose_in_world.translation = middle_m + offset_m - loop_m;
     facts
 }
 
@@ -75,10 +76,10 @@ fn hanging_on_both_sides_of_every_threshold() {
     // Turned in the plane of the picture, about the loop.
     let tilted = |degrees: f32| {
         let mut facts = on_peg(Vector::ZERO);
-        let loop_m = facts.point_m("frame", LOOP_CENTRE_M);
+        let (loop_m, loop_in_frame_m) = (facts.site_m("frame", "loop"), facts.site("frame", "loop").position_m());
         let rotation = Rotation::from_rotation_y(degrees.to_radians());
         facts.object_mut("frame").pose_in_world =
-            Pose::from_parts(loop_m - rotation * LOOP_CENTRE_M, rotation);
+            Pose::from_parts(loop_m - rotation * loop_in_frame_m, rotation);
         facts
     };
     for (what, inside, outside) in [

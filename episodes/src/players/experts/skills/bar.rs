@@ -2,9 +2,9 @@
 
 use tandem_sim::{Pose, Rotation, Side, Vector};
 
-use super::grasp::{closed_rad, open_rad};
-use super::stage::HandMove;
-use super::{ExpertError, Stage};
+use super::hand::{closed_rad, mirrored_m, open_rad};
+use super::stage::{HandMove, Stage};
+use crate::players::PlayerError;
 
 /// A hand that is to hold a bar, which lies along the hand's own z axis.
 #[derive(Clone, Copy)]
@@ -12,8 +12,8 @@ pub struct BarGrasp<'a> {
     pub robot: usize,
     pub side: Side,
     pub object: &'a str,
-    /// Where on the object, in its frame.
-    pub bar_m: Vector,
+    /// Site of the object in the middle of the bar.
+    pub bar: &'a str,
     /// Where the bar's axis lies in a right wrist's frame; a left hand mirrors it.
     pub bar_in_wrist_m: Vector,
     /// The wrist's rotation in the object's frame.
@@ -23,29 +23,26 @@ pub struct BarGrasp<'a> {
 }
 
 impl BarGrasp<'_> {
-    fn object_pose(&self, stage: &mut Stage) -> Result<Pose, ExpertError> {
-        Ok(stage.facts()?.object(self.object).pose_in_world)
-    }
-
-    /// Wrist pose (world) with the palm `standoff_m` short of the bar, for an object at `world_from_object`.
-    fn wrist(&self, world_from_object: Pose, standoff_m: f32) -> Pose {
-        let mirror = if self.side == Side::Left { -1.0 } else { 1.0 };
-        let bar_m = self.bar_in_wrist_m + Vector::new(0.0, standoff_m, 0.0);
-        let bar_m = Vector::new(bar_m.x, bar_m.y * mirror, bar_m.z);
-        let origin_m = self.bar_m - self.object_from_wrist * bar_m;
-        world_from_object * Pose::from_parts(origin_m, self.object_from_wrist)
+    /// Wrist motion to the bar, `standoff_m` short of it.
+    fn reach(&self, stage: &mut Stage, standoff_m: f32) -> Result<HandMove, PlayerError> {
+        let facts = stage.facts()?;
+        let bar_in_wrist_m =
+            mirrored_m(self.bar_in_wrist_m + Vector::new(0.0, standoff_m, 0.0), self.side);
+        let bar_m = facts.site(self.object, self.bar).position_m();
+        let origin_m = bar_m - self.object_from_wrist * bar_in_wrist_m;
+        let world_from_object = facts.object(self.object).pose_in_world;
+        let wrist = world_from_object * Pose::from_parts(origin_m, self.object_from_wrist);
+        Ok(HandMove::reach(self.robot, self.side, wrist))
     }
 
     /// Open hand, `standoff_m` short of the bar.
-    pub fn before(&self, stage: &mut Stage, standoff_m: f32) -> Result<HandMove, ExpertError> {
-        let object = self.object_pose(stage)?;
-        Ok(HandMove::reach(self.robot, self.side, self.wrist(object, standoff_m)).shaped(open_rad(self.side)))
+    pub fn before(&self, stage: &mut Stage, standoff_m: f32) -> Result<HandMove, PlayerError> {
+        Ok(self.reach(stage, standoff_m)?.shaped(open_rad(self.side)))
     }
 
     /// Palm on the bar.
-    pub fn around(&self, stage: &mut Stage) -> Result<HandMove, ExpertError> {
-        let object = self.object_pose(stage)?;
-        Ok(HandMove::reach(self.robot, self.side, self.wrist(object, 0.0)))
+    pub fn around(&self, stage: &mut Stage) -> Result<HandMove, PlayerError> {
+        self.reach(stage, 0.0)
     }
 
     pub fn close(&self) -> HandMove {
@@ -60,7 +57,7 @@ impl BarGrasp<'_> {
         HandMove::shape(self.robot, self.side, open_rad(self.side))
     }
 
-    pub fn holds(&self, stage: &mut Stage) -> Result<bool, ExpertError> {
+    pub fn holds(&self, stage: &mut Stage) -> Result<bool, PlayerError> {
         Ok(stage.facts()?.holds_any(self.robot, self.object))
     }
 }
@@ -70,8 +67,8 @@ const ATTEMPTS: usize = 4;
 const STANDOFF_M: f32 = 0.08;
 
 /// Closes all hands on their bars at once; hands that miss try again.
-pub fn take_together(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), ExpertError> {
-    let each = |stage: &mut Stage, part: fn(&BarGrasp, &mut Stage) -> Result<HandMove, ExpertError>| {
+pub fn take_together(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
+    let each = |stage: &mut Stage, part: fn(&BarGrasp, &mut Stage) -> Result<HandMove, PlayerError>| {
         grasps.iter().map(|grasp| part(grasp, stage)).collect::<Result<Vec<_>, _>>()
     };
     for _ in 0..ATTEMPTS {
@@ -92,7 +89,7 @@ pub fn take_together(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), Exper
         let open: Vec<HandMove> = grasps.iter().map(BarGrasp::open).collect();
         stage.perform(0.5, &open)?;
     }
-    Err(ExpertError::GaveUp("not every hand could take its bar".into()))
+    Err(PlayerError::GaveUp("not every hand could take its bar".into()))
 }
 
 /// Brings an object that all `grasps` hold to a pose (world) in `legs` short straight moves, so that hands and object
@@ -103,10 +100,10 @@ pub fn move_together(
     path: &dyn Fn(f32) -> Pose,
     legs: u32,
     leg_s: f32,
-) -> Result<(), ExpertError> {
+) -> Result<(), PlayerError> {
     let Some(first) = grasps.first() else { return Ok(()) };
     // The grips are measured once: following the object's own lag would let hands drift apart.
-    let object = first.object_pose(stage)?;
+    let object = stage.facts()?.object(first.object).pose_in_world;
     let mut grips = Vec::with_capacity(grasps.len());
     for grasp in grasps {
         grips.push(object.inverse() * stage.world_from_wrist(grasp.robot, grasp.side)?);

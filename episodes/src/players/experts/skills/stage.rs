@@ -1,15 +1,15 @@
 //! What every expert builds on: hands that move along straight lines in the world, several at once.
 
-use tandem_sim::{Pose, Side};
+use tandem_sim::{CONTROL_HZ, Pose, Side};
 use tandem_tools_spec::{MoveWrists, StopReason, Tool as _, ToolReply, WristMove};
 
-use super::{Arena, ExpertError};
-use crate::facts::Facts;
+use crate::players::{Backstage, PlayerError};
+use crate::scoring::Facts;
+use crate::tasks::Task;
 
 /// Control steps of one command: short enough to correct for a swaying pelvis.
 const STEPS_PER_COMMAND: u32 = 10;
-const CONTROL_DT_S: f32 = 0.02;
-const ROBOT_NAMES: [&str; 3] = ["A", "B", "C"];
+const CONTROL_DT_S: f32 = 1.0 / CONTROL_HZ as f32;
 
 /// Part of one hand in a motion. What is not said stays as it is.
 #[derive(Clone, Copy, Debug)]
@@ -45,14 +45,15 @@ struct HandGoal {
 
 /// An episode and what its hands were last told.
 pub struct Stage<'a> {
-    arena: &'a mut dyn Arena,
+    task: &'static Task,
+    episode: &'a mut dyn Backstage,
     /// Per robot: left, right.
     goals: Vec<[HandGoal; 2]>,
 }
 
 impl<'a> Stage<'a> {
-    pub fn new(arena: &'a mut dyn Arena) -> Result<Stage<'a>, ExpertError> {
-        let facts = arena.facts()?;
+    pub fn new(task: &'static Task, episode: &'a mut dyn Backstage) -> Result<Stage<'a>, PlayerError> {
+        let facts = episode.facts()?;
         let goals = (0..facts.robots.len())
             .map(|robot| {
                 Side::BOTH.map(|side| HandGoal {
@@ -61,20 +62,20 @@ impl<'a> Stage<'a> {
                 })
             })
             .collect();
-        Ok(Stage { arena, goals })
+        Ok(Stage { task, episode, goals })
     }
 
-    pub fn facts(&mut self) -> Result<Facts, ExpertError> {
-        self.arena.facts()
+    pub fn facts(&mut self) -> Result<Facts, PlayerError> {
+        self.episode.facts()
     }
 
     /// Moves hands along straight lines for `duration_s`, starting and arriving at rest; robots not named hold still.
-    pub fn perform(&mut self, duration_s: f32, moves: &[HandMove]) -> Result<(), ExpertError> {
+    pub fn perform(&mut self, duration_s: f32, moves: &[HandMove]) -> Result<(), PlayerError> {
         self.travel(duration_s, moves, smooth)
     }
 
     /// As [`Stage::perform`], at constant speed: one leg of a longer path.
-    pub fn glide(&mut self, duration_s: f32, moves: &[HandMove]) -> Result<(), ExpertError> {
+    pub fn glide(&mut self, duration_s: f32, moves: &[HandMove]) -> Result<(), PlayerError> {
         self.travel(duration_s, moves, |part| part)
     }
 
@@ -83,7 +84,7 @@ impl<'a> Stage<'a> {
         duration_s: f32,
         moves: &[HandMove],
         pace: fn(f32) -> f32,
-    ) -> Result<(), ExpertError> {
+    ) -> Result<(), PlayerError> {
         let from = self.goals.clone();
         let total = (duration_s / CONTROL_DT_S).round().max(1.0) as u32;
         let mut done = 0;
@@ -109,14 +110,14 @@ impl<'a> Stage<'a> {
     }
 
     /// One `move_wrists` with the present goals of all robots that `moves` name.
-    fn command(&mut self, steps: u32, moves: &[HandMove]) -> Result<(), ExpertError> {
-        let facts = self.arena.facts()?;
+    fn command(&mut self, steps: u32, moves: &[HandMove]) -> Result<(), PlayerError> {
+        let facts = self.episode.facts()?;
         let named = (0..self.goals.len()).filter(|robot| moves.iter().any(|hand| hand.robot == *robot));
         let robots = named.map(|robot| self.wrist_move(&facts, robot)).collect();
-        match self.arena.call(MoveWrists { steps, robots }.into())? {
+        match self.episode.call(MoveWrists { steps, robots }.into())? {
             ToolReply::Act(reply) if reply.stop_reason == StopReason::StepsDone => Ok(()),
-            ToolReply::Act(_) => Err(ExpertError::EpisodeOver),
-            other @ (ToolReply::Look(_) | ToolReply::Manage(_)) => Err(ExpertError::Call {
+            ToolReply::Act(_) => Err(PlayerError::EpisodeOver),
+            other @ (ToolReply::Look(_) | ToolReply::Manage(_)) => Err(PlayerError::Call {
                 tool: MoveWrists::NAME,
                 reason: format!("unexpected reply {other:?}"),
             }),
@@ -140,12 +141,12 @@ impl<'a> Stage<'a> {
             right_quaternion_wxyz: quaternion(Side::Right),
             left_fingers_rad: fingers(Side::Left),
             right_fingers_rad: fingers(Side::Right),
-            ..WristMove::hold(ROBOT_NAMES[robot])
+            ..WristMove::hold(self.task.robots[robot].name)
         }
     }
 
     /// Where the wrist of a hand is now, world frame.
-    pub fn world_from_wrist(&mut self, robot: usize, side: Side) -> Result<Pose, ExpertError> {
+    pub fn world_from_wrist(&mut self, robot: usize, side: Side) -> Result<Pose, PlayerError> {
         Ok(world_from_wrist(&self.facts()?, robot, side))
     }
 }
