@@ -20,7 +20,7 @@ use tandem_tools_spec::{
     ListTasks, SpecError, StartEpisode, Tool as _, ToolCall, ToolReply, ToolSpec, parse_args, tool_specs,
 };
 
-use crate::{problem::ApiError, routes::App};
+use super::{app::App, problem::ApiError};
 
 /// What a host tells its model about the server as a whole.
 const INSTRUCTIONS: &str = "Simulated humanoids that must work together. Call list_tasks, then start_episode, then look \
@@ -33,7 +33,7 @@ pub fn service(app: App, listen: IpAddr) -> StreamableHttpService<McpServer, Nev
     let config = StreamableHttpServerConfig::default()
         .with_legacy_session_mode(false)
         .with_json_response(true)
-        .with_max_request_body_bytes(app.max_body_bytes);
+        .with_max_request_body_bytes(app.settings.max_body_bytes);
     let config = if listen.is_loopback() { config } else { config.disable_allowed_hosts() };
     StreamableHttpService::new(move || Ok(McpServer { app: app.clone() }), Arc::default(), config)
 }
@@ -124,8 +124,7 @@ fn with_every_tool(error: SpecError) -> SpecError {
 }
 
 fn json_block(reply: &impl Serialize) -> Result<Vec<ContentBlock>, ApiError> {
-    let text = serde_json::to_string(reply)
-        .map_err(|error| ApiError::Internal(format!("a reply is no JSON: {error}")))?;
+    let text = serde_json::to_string(reply).map_err(ApiError::Reply)?;
     Ok(vec![ContentBlock::text(text)])
 }
 
