@@ -229,7 +229,7 @@ const IDLE_STEPS: u32 = 25;
 
 fn idle(task: &Task, arena: &mut dyn Arena) -> Result<(), ExpertError> {
     for _ in 0..task.benchmark_steps.div_ceil(IDLE_STEPS) {
-        match arena.call(ToolCall::Wait(Wait { steps: IDLE_STEPS })) {
+        match arena.call(Wait { steps: IDLE_STEPS }.into()) {
             Ok(_) => {}
             Err(ExpertError::EpisodeOver) => return Ok(()),
             Err(error) => return Err(error),

@@ -5,7 +5,7 @@ use tandem_ik::FrameError;
 use tandem_sim::robot::{Robot, UPPER, UPPER_JOINTS};
 use tandem_sim::{BaseCommand, RobotState, Side};
 use tandem_tools_spec::{
-    CheckReach, HandReach, HandReport, Protocol, ReachReply, RobotReport, ToolCall, WalkMove, WristMove,
+    ActCall, CheckReach, HandReach, HandReport, Protocol, ReachReply, RobotReport, WalkMove, WristMove,
 };
 
 use crate::convert::{clamp_base, isometry, isometry_from_sim, rounded, wire_pose};
@@ -29,23 +29,22 @@ pub struct Order {
 }
 
 /// Control steps that a command asks for.
-pub fn steps(call: &ToolCall) -> usize {
+pub fn steps(call: &ActCall) -> usize {
     match call {
-        ToolCall::MoveWrists(args) => args.steps as usize,
-        ToolCall::Walk(args) => args.steps as usize,
-        ToolCall::Wait(args) => args.steps as usize,
-        ToolCall::SendJointChunk(args) => args.robots.first().map_or(0, |chunk| chunk.rows.len()),
-        _ => 0,
+        ActCall::MoveWrists(args) => args.steps as usize,
+        ActCall::Walk(args) => args.steps as usize,
+        ActCall::Wait(args) => args.steps as usize,
+        ActCall::SendJointChunk(args) => args.robots.first().map_or(0, |chunk| chunk.rows.len()),
     }
 }
 
 /// Robots that a command names, in its order.
-pub fn named_robots(call: &ToolCall) -> Vec<&str> {
+pub fn named_robots(call: &ActCall) -> Vec<&str> {
     match call {
-        ToolCall::MoveWrists(args) => args.robots.iter().map(|entry| entry.robot.as_str()).collect(),
-        ToolCall::Walk(args) => args.robots.iter().map(|entry| entry.robot.as_str()).collect(),
-        ToolCall::SendJointChunk(args) => args.robots.iter().map(|entry| entry.robot.as_str()).collect(),
-        _ => Vec::new(),
+        ActCall::MoveWrists(args) => args.robots.iter().map(|entry| entry.robot.as_str()).collect(),
+        ActCall::Walk(args) => args.robots.iter().map(|entry| entry.robot.as_str()).collect(),
+        ActCall::SendJointChunk(args) => args.robots.iter().map(|entry| entry.robot.as_str()).collect(),
+        ActCall::Wait(_) => Vec::new(),
     }
 }
 
@@ -57,25 +56,25 @@ pub fn protocol_name(protocol: Protocol) -> &'static str {
 }
 
 /// The plan for robot `name` of a command that names it.
-pub fn order(call: &ToolCall, name: &str, robot: &Robot, motion: &Motion) -> Order {
+pub fn order(call: &ActCall, name: &str, robot: &Robot, motion: &Motion) -> Order {
     let hold = Order { plan: motion.hold(), clamped: Vec::new(), base_clamped: Vec::new() };
     match call {
-        ToolCall::MoveWrists(args) => args
+        ActCall::MoveWrists(args) => args
             .robots
             .iter()
             .find(|entry| entry.robot == name)
             .map_or(hold, |entry| wrist_order(entry, robot, motion)),
-        ToolCall::Walk(args) => args
+        ActCall::Walk(args) => args
             .robots
             .iter()
             .find(|entry| entry.robot == name)
             .map_or(hold, |entry| walk_order(entry, robot, motion)),
-        ToolCall::SendJointChunk(args) => args
+        ActCall::SendJointChunk(args) => args
             .robots
             .iter()
             .find(|entry| entry.robot == name)
             .map_or(hold, |entry| chunk_order(&entry.rows, robot, motion)),
-        _ => hold,
+        ActCall::Wait(_) => hold,
     }
 }
 

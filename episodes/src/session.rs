@@ -6,8 +6,9 @@ use std::time::{Duration, Instant};
 
 use tandem_sim::{ObjectPlacement, Pose, RobotCommand, RobotPlacement, Rotation, Snapshot, World, WorldSpec};
 use tandem_tools_spec::{
-    Briefing, Budget, CommandReply, EndReason, PhaseReached, PhaseTimes, Protocol, ResultReply, RobotFallen,
-    StatusReply, StopReason, ToolCall, ToolReply,
+    ActCall, Briefing, Budget, CommandReply, EndReason, LookCall, LookReply, ManageCall, ManageReply,
+    PhaseReached, PhaseTimes, Protocol, ResultReply, RobotFallen, StatusReply, StopReason, ToolCall,
+    ToolReply,
 };
 
 use crate::convert::rounded;
@@ -134,41 +135,45 @@ impl Session {
     }
 
     fn answer(&mut self, call: &ToolCall) -> Result<ToolReply, EpisodeError> {
-        match call {
-            ToolCall::GetStatus(_) => return Ok(ToolReply::Status(self.status())),
-            ToolCall::Finish(_) => {
-                self.ended.get_or_insert(EndReason::Finished);
-                return Ok(ToolReply::Result(self.result()));
-            }
-            _ => {}
+        match (call, self.ended) {
+            (ToolCall::Manage(call), _) => Ok(ToolReply::Manage(self.manage(call))),
+            (ToolCall::Look(_) | ToolCall::Act(_), Some(reason)) => Err(EpisodeError::Ended { reason }),
+            (ToolCall::Look(call), None) => self.look(call).map(ToolReply::Look),
+            (ToolCall::Act(call), None) => self.act(call).map(ToolReply::Act),
         }
-        if let Some(reason) = self.ended {
-            return Err(EpisodeError::Ended { reason });
-        }
+    }
+
+    fn look(&mut self, call: &LookCall) -> Result<LookReply, EpisodeError> {
         match call {
-            ToolCall::Observe(args) => {
+            LookCall::Observe(args) => {
                 let robots = match &args.robots {
                     Some(names) => names.iter().map(|name| self.robot(name)).collect::<Result<_, _>>()?,
                     None => (0..self.motions.len()).collect::<Vec<_>>(),
                 };
-                self.eyes.observe(&self.world, &robots).map(ToolReply::Observation)
+                self.eyes.observe(&self.world, &robots).map(LookReply::Observe)
             }
-            ToolCall::GetRobotState(args) => {
+            LookCall::GetRobotState(args) => {
                 let robot = self.robot(&args.robot)?;
-                Ok(ToolReply::RobotState(robot_state(&self.world, robot)))
+                Ok(LookReply::GetRobotState(robot_state(&self.world, robot)))
             }
-            ToolCall::QueryDepth(args) => {
+            LookCall::QueryDepth(args) => {
                 let robot = self.robot(&args.robot)?;
-                self.eyes.depth(&self.world, robot, &args.pixels).map(ToolReply::Depth)
+                self.eyes.depth(&self.world, robot, &args.pixels).map(LookReply::QueryDepth)
             }
-            ToolCall::CheckReach(args) => {
+            LookCall::CheckReach(args) => {
                 let robot = self.robot(&args.robot)?;
-                Ok(ToolReply::Reach(plan::check_reach(args, &self.motions[robot])))
+                Ok(LookReply::CheckReach(plan::check_reach(args, &self.motions[robot])))
             }
-            ToolCall::MoveWrists(_) | ToolCall::Walk(_) | ToolCall::SendJointChunk(_) | ToolCall::Wait(_) => {
-                self.command(call).map(ToolReply::Command)
+        }
+    }
+
+    fn manage(&mut self, call: &ManageCall) -> ManageReply {
+        match call {
+            ManageCall::GetStatus(_) => ManageReply::GetStatus(self.status()),
+            ManageCall::Finish(_) => {
+                self.ended.get_or_insert(EndReason::Finished);
+                ManageReply::Finish(self.result())
             }
-            ToolCall::GetStatus(_) | ToolCall::Finish(_) => unreachable!("answered above"),
         }
     }
 
@@ -179,7 +184,7 @@ impl Session {
     }
 
     /// Checks a command as a whole, then executes it.
-    fn command(&mut self, call: &ToolCall) -> Result<CommandReply, EpisodeError> {
+    fn act(&mut self, call: &ActCall) -> Result<CommandReply, EpisodeError> {
         let asked = plan::steps(call);
         if asked == 0 || asked > self.rules.steps_per_command as usize {
             return Err(EpisodeError::TooManySteps {

@@ -8,9 +8,9 @@ use tandem_episodes::experts::{self, Arena, ExpertError};
 use tandem_episodes::{Clock, EpisodeError, Facts, LocomotionChoice, Session, facts, monotonic, tasks};
 use tandem_sim::{Side, Vector};
 use tandem_tools_spec::{
-    CheckReach, CommandReply, EndReason, Finish, GetRobotState, GetStatus, JointChunk, MoveWrists, Observe,
-    Protocol, QueryDepth, RobotState, SendJointChunk, StatusReply, StopReason, ToolCall, ToolReply, Wait,
-    Walk, WalkMove, WristMove,
+    CheckReach, CommandReply, EndReason, Finish, GetRobotState, GetStatus, JointChunk, LookReply,
+    ManageReply, MoveWrists, Observe, Protocol, QueryDepth, RobotState, SendJointChunk, StatusReply,
+    StopReason, ToolCall, ToolReply, Wait, Walk, WalkMove, WristMove,
 };
 
 fn start(task: &str, seed: u32, protocol: Protocol, clock: Clock) -> Session {
@@ -31,25 +31,25 @@ fn handover(seed: u32) -> Session {
 
 fn command(session: &mut Session, call: ToolCall) -> CommandReply {
     match session.call(call).unwrap() {
-        ToolReply::Command(reply) => reply,
+        ToolReply::Act(reply) => reply,
         other => panic!("{other:?} is no reply to a command"),
     }
 }
 
 fn wait(session: &mut Session, steps: u32) -> CommandReply {
-    command(session, ToolCall::Wait(Wait { steps }))
+    command(session, Wait { steps }.into())
 }
 
 fn status(session: &mut Session) -> StatusReply {
-    match session.call(ToolCall::GetStatus(GetStatus {})).unwrap() {
-        ToolReply::Status(status) => status,
+    match session.call(GetStatus {}.into()).unwrap() {
+        ToolReply::Manage(ManageReply::GetStatus(status)) => status,
         other => panic!("{other:?} is no status"),
     }
 }
 
 fn state(session: &mut Session, robot: &str) -> RobotState {
-    match session.call(ToolCall::GetRobotState(GetRobotState { robot: robot.into() })).unwrap() {
-        ToolReply::RobotState(state) => state,
+    match session.call(GetRobotState { robot: robot.into() }.into()).unwrap() {
+        ToolReply::Look(LookReply::GetRobotState(state)) => state,
         other => panic!("{other:?} is no state"),
     }
 }
@@ -62,7 +62,7 @@ fn raise_hand(steps: u32) -> ToolCall {
         right_fingers_rad: Some([0.0, -0.4, -0.4, 0.6, 0.6, 0.6, 0.6]),
         ..WristMove::hold("A")
     };
-    ToolCall::MoveWrists(MoveWrists { steps, robots: vec![raise] })
+    MoveWrists { steps, robots: vec![raise] }.into()
 }
 
 fn squat(height_m: f64) -> ToolCall {
@@ -73,7 +73,7 @@ fn squat(height_m: f64) -> ToolCall {
         yaw_rate_rad_s: 0.0,
         pelvis_height_m: Some(height_m),
     };
-    ToolCall::Walk(Walk { steps: 50, robots: vec![entry] })
+    Walk { steps: 50, robots: vec![entry] }.into()
 }
 
 /// A second and a half in which every kind of command is used.
@@ -81,10 +81,7 @@ fn play(session: &mut Session) {
     command(session, raise_hand(25));
     command(session, squat(0.70));
     let rows = vec![row(session, "B"); 5];
-    command(
-        session,
-        ToolCall::SendJointChunk(SendJointChunk { robots: vec![JointChunk { robot: "B".into(), rows }] }),
-    );
+    command(session, SendJointChunk { robots: vec![JointChunk { robot: "B".into(), rows }] }.into());
     wait(session, 10);
 }
 
@@ -156,7 +153,7 @@ fn a_wrist_arrives_and_nobody_else_moves() {
 fn a_wrist_that_cannot_arrive_is_reported_short() {
     let mut session = handover(0);
     let far = WristMove { right_position_m: Some([0.9, -0.2, 0.2]), ..WristMove::hold("A") };
-    let call = ToolCall::MoveWrists(MoveWrists { steps: 50, robots: vec![far] });
+    let call = ToolCall::from(MoveWrists { steps: 50, robots: vec![far] });
     command(&mut session, call.clone());
     let reply = command(&mut session, call);
     let right = &reply.robots[0].right;
@@ -170,14 +167,16 @@ fn checking_reach_tells_near_from_far_and_moves_nothing() {
     let mut session = handover(0);
     let before = session.state_hash();
     for (position_m, reachable) in [([0.28, -0.24, 0.22], true), ([0.9, -0.2, 0.2], false)] {
-        let call = ToolCall::CheckReach(CheckReach {
+        let call = CheckReach {
             robot: "A".into(),
             left_position_m: None,
             left_quaternion_wxyz: None,
             right_position_m: Some(position_m),
             right_quaternion_wxyz: Some([1.0, 0.0, 0.0, 0.0]),
-        });
-        let ToolReply::Reach(reply) = session.call(call).unwrap() else { panic!("no reach") };
+        };
+        let ToolReply::Look(LookReply::CheckReach(reply)) = session.call(call.into()).unwrap() else {
+            panic!("no reach")
+        };
         assert_eq!((reply.reachable, reply.right.reachable), (reachable, reachable), "{reply:?}");
     }
     assert_eq!(session.state_hash(), before);
@@ -194,7 +193,7 @@ fn height_persists_and_velocities_do_not() {
     assert!((height_m(&session) - 0.66).abs() < 0.015, "pelvis at {} m", height_m(&session));
     let walk =
         WalkMove { robot: "B".into(), vx_m_s: 0.05, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m: None };
-    command(&mut session, ToolCall::Walk(Walk { steps: 2, robots: vec![walk] }));
+    command(&mut session, Walk { steps: 2, robots: vec![walk] }.into());
     wait(&mut session, 1);
     let base = state(&mut session, "B").base_command;
     assert_eq!((base.vx_m_s, base.vy_m_s, base.yaw_rate_rad_s), (0.0, 0.0, 0.0));
@@ -211,8 +210,8 @@ fn depth_finds_the_bottle_where_it_is() {
     let pelvis_from_bottle = robot.pelvis_in_world.inverse() * bottle;
     let label = pelvis_from_bottle * Vector::new(0.0, 0.0, 0.09);
 
-    let ToolReply::Observation(seen) =
-        session.call(ToolCall::Observe(Observe { robots: Some(vec!["A".into()]) })).unwrap()
+    let ToolReply::Look(LookReply::Observe(seen)) =
+        session.call(Observe { robots: Some(vec!["A".into()]) }.into()).unwrap()
     else {
         panic!("no observation")
     };
@@ -228,7 +227,7 @@ fn depth_finds_the_bottle_where_it_is() {
     let v = f64::from(aim.y / aim.z) * camera.fy + camera.cy;
 
     let query = QueryDepth { robot: "A".into(), pixels: vec![[u.round() as i64, v.round() as i64]] };
-    let ToolReply::Depth(reply) = session.call(ToolCall::QueryDepth(query)).unwrap() else {
+    let ToolReply::Look(LookReply::QueryDepth(reply)) = session.call(query.into()).unwrap() else {
         panic!("no depth")
     };
     let point = Vector::from_array(reply.points[0].point_in_pelvis_m.unwrap().map(|part| part as f32));
@@ -244,7 +243,7 @@ fn depth_finds_the_bottle_where_it_is() {
 fn steps_are_charged_and_their_end_ends_the_episode() {
     let mut session = handover(0);
     assert_eq!(status(&mut session).budget.steps_left, 1000);
-    let refused = session.call(ToolCall::Wait(Wait { steps: 51 })).unwrap_err();
+    let refused = session.call(Wait { steps: 51 }.into()).unwrap_err();
     assert_eq!(refused.to_string(), "51 control steps in one command; the benchmark protocol allows 1 to 50");
     for done in 1..=19 {
         let reply = wait(&mut session, 50);
@@ -255,9 +254,9 @@ fn steps_are_charged_and_their_end_ends_the_episode() {
     let last = wait(&mut session, 50);
     assert_eq!((last.executed_steps, last.stop_reason), (20, StopReason::StepBudgetExhausted));
     let hash = session.state_hash();
-    let refused = session.call(ToolCall::Wait(Wait { steps: 1 })).unwrap_err();
+    let refused = session.call(Wait { steps: 1 }.into()).unwrap_err();
     assert!(matches!(refused, EpisodeError::Ended { reason: EndReason::StepBudgetExhausted }), "{refused}");
-    let ToolReply::Result(result) = session.call(ToolCall::Finish(Finish {})).unwrap() else {
+    let ToolReply::Manage(ManageReply::Finish(result)) = session.call(Finish {}.into()).unwrap() else {
         panic!("no result")
     };
     assert_eq!((result.ended, result.env_steps), (EndReason::StepBudgetExhausted, 1000));
@@ -278,7 +277,7 @@ fn the_wall_clock_charges_thinking_and_ends_the_episode() {
     assert_eq!(wait(&mut session, 1).budget.wall_clock_left_s, Some(1.0));
     hands_s.fetch_add(1, Relaxed);
     let hash = session.state_hash();
-    let refused = session.call(ToolCall::Wait(Wait { steps: 1 })).unwrap_err();
+    let refused = session.call(Wait { steps: 1 }.into()).unwrap_err();
     assert!(matches!(refused, EpisodeError::Ended { reason: EndReason::WallClockExhausted }), "{refused}");
     assert_eq!(status(&mut session).ended, Some(EndReason::WallClockExhausted));
     assert_eq!(session.state_hash(), hash);

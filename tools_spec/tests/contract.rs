@@ -1,7 +1,7 @@
 //! The contract as its two readers meet it: strict hosts read the schemas, policies read the refusals.
 
 use serde_json::{Value, json};
-use tandem_tools_spec::{EPISODE_TOOLS, ToolCall, tool_specs};
+use tandem_tools_spec::{ActCall, EPISODE_TOOLS, ToolCall, tool_specs};
 
 const REFUSED_KEYWORDS: &[&str] =
     &["$ref", "$schema", "default", "format", "maxItems", "maximum", "minItems", "minimum", "title"];
@@ -75,7 +75,9 @@ fn calls_survive_the_wire() {
 #[test]
 fn nullable_fields_may_be_left_out() {
     let brief = json!({ "steps": 5, "robots": [{ "robot": "A", "left_position_m": [0.3, 0.2, 0.1] }] });
-    let ToolCall::MoveWrists(call) = ToolCall::parse("move_wrists", brief).unwrap() else { panic!() };
+    let ToolCall::Act(ActCall::MoveWrists(call)) = ToolCall::parse("move_wrists", brief).unwrap() else {
+        panic!()
+    };
     assert_eq!(call.robots[0].left_position_m, Some([0.3, 0.2, 0.1]));
     assert_eq!(call.robots[0].right_position_m, None);
     assert!(ToolCall::parse("observe", Value::Null).is_ok());
@@ -159,13 +161,13 @@ fn refusals_say_what_would_work() {
 #[test]
 fn numbers_that_json_cannot_hold_are_refused_too() {
     for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        let ToolCall::Walk(mut walk) =
+        let ToolCall::Act(ActCall::Walk(mut walk)) =
             ToolCall::parse("walk", json!({ "steps": 5, "robots": [{ "robot": "A", "vx_m_s": 0, "vy_m_s": 0, "yaw_rate_rad_s": 0 }] })).unwrap()
         else {
             panic!()
         };
         walk.robots[0].vy_m_s = number;
-        let text = ToolCall::Walk(walk).validate().unwrap_err().to_string();
+        let text = ToolCall::from(walk).validate().unwrap_err().to_string();
         assert!(text.contains("vy_m_s") && text.contains("finite"), "{text}");
     }
 }

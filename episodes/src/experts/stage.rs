@@ -1,7 +1,7 @@
 //! What every expert builds on: hands that move along straight lines in the world, several at once.
 
 use tandem_sim::{Pose, Side};
-use tandem_tools_spec::{MoveWrists, StopReason, ToolCall, ToolReply, WristMove};
+use tandem_tools_spec::{MoveWrists, StopReason, Tool as _, ToolReply, WristMove};
 
 use super::{Arena, ExpertError};
 use crate::facts::Facts;
@@ -113,12 +113,13 @@ impl<'a> Stage<'a> {
         let facts = self.arena.facts()?;
         let named = (0..self.goals.len()).filter(|robot| moves.iter().any(|hand| hand.robot == *robot));
         let robots = named.map(|robot| self.wrist_move(&facts, robot)).collect();
-        match self.arena.call(ToolCall::MoveWrists(MoveWrists { steps, robots }))? {
-            ToolReply::Command(reply) if reply.stop_reason == StopReason::StepsDone => Ok(()),
-            ToolReply::Command(_) => Err(ExpertError::EpisodeOver),
-            other => {
-                Err(ExpertError::Call { tool: "move_wrists", reason: format!("unexpected reply {other:?}") })
-            }
+        match self.arena.call(MoveWrists { steps, robots }.into())? {
+            ToolReply::Act(reply) if reply.stop_reason == StopReason::StepsDone => Ok(()),
+            ToolReply::Act(_) => Err(ExpertError::EpisodeOver),
+            other @ (ToolReply::Look(_) | ToolReply::Manage(_)) => Err(ExpertError::Call {
+                tool: MoveWrists::NAME,
+                reason: format!("unexpected reply {other:?}"),
+            }),
         }
     }
 

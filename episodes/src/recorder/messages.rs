@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 use tandem_sim::{BaseCommand, RobotCommand, Side};
-use tandem_tools_spec::{Budget, PhaseReached, ToolReply};
+use tandem_tools_spec::{Budget, LookReply, PhaseReached, ToolReply};
 
 use super::{RobotStep, ToolCallRecord};
 use crate::facts::Grip;
@@ -174,7 +174,7 @@ impl ToolCallMessage {
 /// A reply as JSON. Pictures have a topic of their own and would make this one unreadable.
 fn without_pictures(reply: &ToolReply) -> Result<Value, serde_json::Error> {
     match reply {
-        ToolReply::Observation(observation) => {
+        ToolReply::Look(LookReply::Observe(observation)) => {
             let states = serde_json::to_value(&observation.states)?;
             let robots: Vec<&str> = observation.images.iter().map(|image| image.robot.as_str()).collect();
             Ok(serde_json::json!({ "time_s": observation.time_s, "states": states, "pictures_of": robots }))

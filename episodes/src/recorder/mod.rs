@@ -26,7 +26,7 @@ use tandem_sim::{
     mjcf::{Geom, MjcfCamera},
     robot::{RobotModel, UPPER},
 };
-use tandem_tools_spec::{Budget, PhaseReached, Protocol, ToolCall, ToolReply};
+use tandem_tools_spec::{Budget, LookReply, PhaseReached, Protocol, ToolCall, ToolReply};
 
 use crate::facts::Grip;
 use crate::results::{EpisodeResult, OutputError};
@@ -182,7 +182,7 @@ impl Recorder {
     /// Appends a tool call and its answer. Pictures of the answer go to the topics of their robots' cameras.
     pub fn tool_call(&mut self, record: &ToolCallRecord) -> Result<(), OutputError> {
         self.file.write(&mut self.tool_calls, record.time_s, &ToolCallMessage::new(record)?)?;
-        if let Ok(ToolReply::Observation(observation)) = record.outcome {
+        if let Ok(ToolReply::Look(LookReply::Observe(observation))) = record.outcome {
             for image in &observation.images {
                 if let Some(robot) = self.robots.iter().position(|robot| robot.name == image.robot) {
                     self.egocentric(robot, record.time_s, image.png_base64.0.clone())?;

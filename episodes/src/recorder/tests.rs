@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, fs, path::Path};
 
 use foxglove::Decode;
 use tandem_sim::{ObjectPlacement, RobotPlacement, Rotation, Vector, World, WorldSpec};
-use tandem_tools_spec::{CameraImage, Observation, PhaseTimes, Png, ToolCall};
+use tandem_tools_spec::{CameraImage, LookReply, Observation, PhaseTimes, Png, ToolCall};
 
 use super::*;
 
@@ -81,7 +81,7 @@ fn record(folder: &Path) -> (World, PathBuf) {
     let observe = ToolCall::parse("observe", serde_json::json!({ "robots": ["A"] })).unwrap();
     let image = CameraImage { robot: "A".into(), png_base64: Png(PICTURE.into()) };
     let seen = Observation { time_s, states: vec![], cameras: vec![], images: vec![image] };
-    let reply = ToolReply::Observation(seen);
+    let reply = ToolReply::Look(LookReply::Observe(seen));
     recorder.tool_call(&ToolCallRecord { time_s, call: &observe, outcome: Ok(&reply) }).unwrap();
     let path = recorder.finish(&result()).unwrap();
     (world, path)

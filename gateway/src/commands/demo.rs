@@ -128,7 +128,7 @@ impl Arena for OverHttp {
             HttpError::Refused(problem) if problem.kind.ends_with(":ended") => ExpertError::EpisodeOver,
             error => ExpertError::Call { tool: call.name(), reason: error.to_string() },
         })?;
-        if let ToolReply::Command(reply) = &reply {
+        if let ToolReply::Act(reply) = &reply {
             self.progress.show(reply);
         }
         Ok(reply)

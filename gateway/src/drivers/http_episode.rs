@@ -48,7 +48,7 @@ impl HttpEpisode {
     /// Makes a tool call.
     pub fn call(&self, call: &ToolCall) -> Result<ToolReply, HttpError> {
         let url = format!("{}/tools/{}", self.url, call.name());
-        Ok(ToolReply::parse(call.name(), post(&self.agent, &url, call)?)?)
+        Ok(call.parse_reply(post(&self.agent, &url, call)?)?)
     }
 
     /// Ends the episode and closes its recording.

@@ -17,7 +17,8 @@ use rmcp::{
 use serde::Serialize;
 use serde_json::Value;
 use tandem_tools_spec::{
-    ListTasks, SpecError, StartEpisode, Tool as _, ToolCall, ToolReply, ToolSpec, parse_args, tool_specs,
+    ListTasks, LookReply, SpecError, StartEpisode, Tool as _, ToolCall, ToolReply, ToolSpec, parse_args,
+    tool_specs,
 };
 
 use super::{app::App, problem::ApiError};
@@ -94,7 +95,7 @@ impl McpServer {
         };
         let reply = self.app.table.get(&id)?.call(call).await?;
         match reply {
-            ToolReply::Observation(mut observation) => {
+            ToolReply::Look(LookReply::Observe(mut observation)) => {
                 let images = std::mem::take(&mut observation.images);
                 let mut content = json_block(&observation)?;
                 let robots: Vec<&str> = images.iter().map(|image| image.robot.as_str()).collect();

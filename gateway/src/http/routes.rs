@@ -68,7 +68,7 @@ async fn start(State(app): State<App>, request: Request) -> Result<Response, Api
 }
 
 async fn status(State(app): State<App>, Path(id): Path<String>) -> Result<Json<ToolReply>, ApiError> {
-    Ok(Json(app.table.get(&id)?.call(ToolCall::GetStatus(GetStatus {})).await?))
+    Ok(Json(app.table.get(&id)?.call(GetStatus {}.into()).await?))
 }
 
 async fn call(
