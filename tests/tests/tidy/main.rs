@@ -7,6 +7,7 @@ mod lengths;
 mod modules;
 mod order;
 mod paths;
+mod readme_steps;
 mod sources;
 mod text;
 mod units;

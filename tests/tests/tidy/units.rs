@@ -22,21 +22,23 @@ const UNITS: &[&str] = &[
     "m",
     "m2",
     "m3",
+    "1_m",
     "rad",
     "deg",
     "s",
     "ms",
     "us",
     "hz",
+    "1_s",
     "kg",
     "n",
     "w",
     "px",
+    "steps",
     "m_s",
     "m_s2",
     "rad_s",
     "rad_s2",
-    "1_s",
     "n_s",
     "n_m",
     "n_m_s",
@@ -48,19 +50,23 @@ const UNITS: &[&str] = &[
     "kg_m3",
 ];
 
-/// What the name of a number without a unit may end in.
+/// What the name of a number without a unit may end in, or a name that says of several units which is where.
 const DIMENSIONLESS: &[&str] = &[
-    // Directions and orientations.
+    // Directions, of length one, and orientations.
     "axis",
     "normal",
     "direction",
-    "wxyz",
+    "ray",
+    "ahead",
+    "outside",
     "gravity_in_pelvis",
+    "wxyz",
     // Colours.
     "rgb",
     "rgba",
     "albedo",
-    // Parts of one.
+    "colour",
+    // Parts and multiples.
     "share",
     "fraction",
     "ratio",
@@ -68,6 +74,22 @@ const DIMENSIONLESS: &[&str] = &[
     "friction",
     "closure",
     "pace",
+    "gain",
+    "caution",
+    // Any number: of conversions and checks, and of ranges whose own names carry the unit.
+    "value",
+    "values",
+    "min",
+    "max",
+    // Columns of the contract: joints in rad, then m/s, m/s, rad/s and m of the base.
+    "row",
+    "rows",
+    "command",
+    // A camera's intrinsics, in pixels, as every library calls them.
+    "fx",
+    "fy",
+    "cx",
+    "cy",
 ];
 
 fn has_unit(name: &str) -> bool {
