@@ -12,7 +12,8 @@ const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "sim",
         &[
-            &["units", "sides", "error", "assets"],
+            &["units", "sides", "error"],
+            &["assets"],
             &["mjcf"],
             &["dynamics"],
             &["body"],
