@@ -3,6 +3,7 @@
 use std::{
     net::SocketAddr,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use clap::Args;
@@ -92,13 +93,13 @@ pub enum SettingsError {
 
 impl Settings {
     /// Fills what `flags` (and the environment, which clap reads) leave out from the file at `config`, then from defaults.
-    pub fn resolve(flags: Layer, config: Option<&Path>) -> Result<Settings, SettingsError> {
+    pub fn resolve(flags: Layer, config: Option<&Path>) -> Result<Arc<Settings>, SettingsError> {
         let file = match config {
             Some(path) => read_layer(path)?,
             None => Layer::default(),
         };
         let layer = flags.or(file);
-        Ok(Settings {
+        Ok(Arc::new(Settings {
             listen: layer.listen.unwrap_or(SocketAddr::from(([127, 0, 0, 1], 8700))),
             runs: layer.runs.unwrap_or_else(|| "runs".into()),
             instructions: match &layer.instructions {
@@ -108,7 +109,7 @@ impl Settings {
             locomotion: LocomotionChoice::from_file(layer.locomotion.as_deref())?,
             max_episodes: layer.max_episodes.unwrap_or(8),
             max_body_bytes: layer.max_body_bytes.unwrap_or(2_000_000),
-        })
+        }))
     }
 }
 

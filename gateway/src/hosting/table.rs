@@ -2,60 +2,49 @@
 
 use std::{
     collections::BTreeMap,
-    path::PathBuf,
     sync::{
         Arc, Mutex, MutexGuard,
         atomic::{AtomicBool, Ordering},
     },
 };
 
-use tandem_episodes::{Instructions, LocomotionChoice};
+use tandem_episodes::tasks;
 use tandem_tools_spec::{ResultReply, StartEpisode, StartReply, TaskList};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use crate::{episode_thread::EpisodeThread, problem::ApiError, run_folder};
+use super::{EpisodeThread, HostingError, run_folder};
+use crate::settings::Settings;
 
 /// The episodes of one server.
 #[derive(Debug)]
 pub struct EpisodeTable {
     episodes: Mutex<BTreeMap<String, Arc<EpisodeThread>>>,
     places: Arc<Semaphore>,
-    limit: u32,
     closing: AtomicBool,
-    runs: PathBuf,
-    instructions: Instructions,
-    locomotion: LocomotionChoice,
+    settings: Arc<Settings>,
 }
 
 impl EpisodeTable {
-    /// An empty table for at most `limit` episodes, recorded under `runs` and described by `instructions`, of robots that
-    /// walk by `locomotion`.
-    pub fn new(
-        limit: u32,
-        runs: PathBuf,
-        instructions: Instructions,
-        locomotion: LocomotionChoice,
-    ) -> EpisodeTable {
+    /// An empty table with as many places, words and robots as `settings` say.
+    pub fn new(settings: Arc<Settings>) -> EpisodeTable {
         EpisodeTable {
             episodes: Mutex::default(),
-            places: Arc::new(Semaphore::new(limit as usize)),
-            limit,
+            places: Arc::new(Semaphore::new(settings.max_episodes as usize)),
             closing: AtomicBool::new(false),
-            runs,
-            instructions,
-            locomotion,
+            settings,
         }
     }
 
     /// Starts an episode. Where every place is taken, an episode that has ended makes room.
-    pub async fn start(&self, args: StartEpisode) -> Result<StartReply, ApiError> {
-        let task = tandem_episodes::tasks::find(&args.task)?;
+    pub async fn start(&self, args: StartEpisode) -> Result<StartReply, HostingError> {
+        let task = tasks::find(&args.task)?;
         let place = self.take_place().await?;
-        let (id, folder) = run_folder::create(&self.runs, task.id, args.seed)
-            .map_err(|error| ApiError::Internal(format!("no folder in {}: {error}", self.runs.display())))?;
-        let (episode, mut briefing) =
-            EpisodeThread::start(&id, args, self.locomotion.clone(), folder, place).await?;
-        self.instructions.rephrase_briefing(&mut briefing);
+        let runs = &self.settings.runs;
+        let (id, folder) = run_folder::create(runs, task.id, args.seed)
+            .map_err(|source| HostingError::Folder { runs: runs.clone(), source })?;
+        let locomotion = self.settings.locomotion.clone();
+        let (episode, mut briefing) = EpisodeThread::start(&id, args, locomotion, folder, place).await?;
+        self.settings.instructions.rephrase_briefing(&mut briefing);
         self.lock().insert(id.clone(), Arc::new(episode));
         tracing::info!(episode = id, "started");
         Ok(StartReply { episode_id: id, briefing })
@@ -63,17 +52,17 @@ impl EpisodeTable {
 
     /// The reply to `list_tasks`.
     pub fn task_list(&self) -> TaskList {
-        self.instructions.task_list(&self.locomotion.limits())
+        self.settings.instructions.task_list(&self.settings.locomotion.limits())
     }
 
     /// The episode `id`.
-    pub fn get(&self, id: &str) -> Result<Arc<EpisodeThread>, ApiError> {
+    pub fn get(&self, id: &str) -> Result<Arc<EpisodeThread>, HostingError> {
         let episodes = self.lock();
         episodes.get(id).cloned().ok_or_else(|| unknown(id, &episodes))
     }
 
     /// Ends the episode `id`, forgets it and returns its result.
-    pub async fn remove(&self, id: &str) -> Result<ResultReply, ApiError> {
+    pub async fn remove(&self, id: &str) -> Result<ResultReply, HostingError> {
         let episode = {
             let mut episodes = self.lock();
             episodes.remove(id).ok_or_else(|| unknown(id, &episodes))?
@@ -105,12 +94,12 @@ impl EpisodeTable {
             }
         }
         // Also waits for threads that no handle names any more, as after a client that left during its start.
-        let _ = self.places.acquire_many(self.limit).await;
+        let _ = self.places.acquire_many(self.settings.max_episodes).await;
     }
 
-    async fn take_place(&self) -> Result<OwnedSemaphorePermit, ApiError> {
+    async fn take_place(&self) -> Result<OwnedSemaphorePermit, HostingError> {
         if self.closing.load(Ordering::SeqCst) {
-            return Err(ApiError::ShuttingDown);
+            return Err(HostingError::ShuttingDown);
         }
         if let Ok(place) = self.places.clone().try_acquire_owned() {
             return Ok(place);
@@ -118,7 +107,8 @@ impl EpisodeTable {
         if let Some(ended) = self.remove_one_that_has_ended() {
             ended.close().await?;
         }
-        self.places.clone().try_acquire_owned().map_err(|_| ApiError::TooManyEpisodes { limit: self.limit })
+        let limit = self.settings.max_episodes;
+        self.places.clone().try_acquire_owned().map_err(|_| HostingError::TooManyEpisodes { limit })
     }
 
     fn remove_one_that_has_ended(&self) -> Option<Arc<EpisodeThread>> {
@@ -133,6 +123,6 @@ impl EpisodeTable {
     }
 }
 
-fn unknown(id: &str, episodes: &BTreeMap<String, Arc<EpisodeThread>>) -> ApiError {
-    ApiError::UnknownEpisode { id: id.into(), have: episodes.keys().cloned().collect() }
+fn unknown(id: &str, episodes: &BTreeMap<String, Arc<EpisodeThread>>) -> HostingError {
+    HostingError::UnknownEpisode { id: id.into(), have: episodes.keys().cloned().collect() }
 }

@@ -4,6 +4,7 @@ use std::{
     error::Error,
     net::{Ipv4Addr, SocketAddr},
     path::{Path, PathBuf},
+    process::ExitCode,
     sync::Arc,
 };
 
@@ -15,11 +16,11 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{CommandReply, Protocol, ResultReply, StartEpisode, ToolCall, ToolReply};
 
+use super::{Outcome, Seeds, episode_flags::LocomotionFlag, log};
 use crate::{
-    episode_thread::EpisodeThread,
-    http_caller::{HttpEpisode, HttpError},
-    seeds::Seeds,
-    server::Server,
+    drivers::{HttpEpisode, HttpError},
+    hosting::EpisodeThread,
+    http::Server,
     settings::{Layer, Settings},
 };
 
@@ -30,6 +31,26 @@ const FREE_PORT: u16 = 0;
 
 /// Of the episodes played, how many in a hundred have to reach the last phase.
 const PASS_PERCENT: usize = 80;
+
+/// Play the Handover task by a scripted expert over real HTTP, and write what happened.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// One seed, or a range of seeds as 0..9, both ends included.
+    #[arg(long = "seed", default_value = "0", value_name = "SEED")]
+    seeds: Seeds,
+    /// Folder that the results are written to, one folder per episode.
+    #[arg(long, env = "TANDEM_RUNS", default_value = "runs", value_name = "DIR")]
+    runs: PathBuf,
+    #[command(flatten)]
+    locomotion: LocomotionFlag,
+}
+
+/// Plays; it is a failure if too few episodes reach the last phase.
+pub fn run(args: Args) -> Outcome {
+    log::to_stderr("warn");
+    let results = play_all(&args.runs, args.seeds, args.locomotion.file)?;
+    Ok(if passed(&results) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
 
 /// Plays every seed in turn, recorded under `runs`, by robots that walk by the policy of a file if one is given, and prints
 /// what came of it.
@@ -44,7 +65,7 @@ pub fn play_all(
         locomotion,
         ..Layer::default()
     };
-    let server = Server::start(&Settings::resolve(flags, None)?)?;
+    let server = Server::start(Settings::resolve(flags, None)?)?;
     let results = seeds.0.map(|seed| play(&server, seed)).collect::<Result<Vec<_>, _>>()?;
     server.stop();
     if results.len() > 1 {

@@ -7,6 +7,8 @@ use axum::{
 use tandem_episodes::EpisodeError;
 use tandem_tools_spec::{ProblemBody, SpecError};
 
+use crate::hosting::HostingError;
+
 /// The media type of RFC 9457.
 pub const PROBLEM_JSON: &str = "application/problem+json";
 
@@ -16,9 +18,9 @@ pub enum ApiError {
     /// The call does not fit the contract.
     #[error(transparent)]
     Spec(#[from] SpecError),
-    /// The episode refused the call.
-    #[error(transparent)]
-    Episode(#[from] EpisodeError),
+    /// The host of the episodes, or the episode itself, refused.
+    #[error("{0}{}", way_out(.0))]
+    Hosting(#[from] HostingError),
     /// No such route, or not with this method.
     #[error("{method} {path} is not served; have: {}", .have.join(", "))]
     NoRoute {
@@ -30,14 +32,6 @@ pub enum ApiError {
         have: Vec<String>,
         /// Whether the path is served with another method.
         other_method: bool,
-    },
-    /// No such episode.
-    #[error("no episode {id:?}; have: {}; start_episode (POST /v1/episodes) starts one", list(.have))]
-    UnknownEpisode {
-        /// What was asked for.
-        id: String,
-        /// The episodes that are held.
-        have: Vec<String>,
     },
     /// The body names another episode than the path.
     #[error(
@@ -70,24 +64,6 @@ pub enum ApiError {
     /// The body is said to be something else than JSON.
     #[error("content-type {0:?} is not read; send JSON with content-type: application/json")]
     ContentType(String),
-    /// Every place for an episode is taken.
-    #[error("all {limit} places for episodes are taken; finish or DELETE one, or try again later")]
-    TooManyEpisodes {
-        /// How many places there are.
-        limit: u32,
-    },
-    /// Too many calls wait for one episode.
-    #[error("{limit} calls already wait for this episode; call again when one of them has answered")]
-    TooManyWaiting {
-        /// How many may wait.
-        limit: usize,
-    },
-    /// The server is going down.
-    #[error("the server is shutting down and takes no new episodes; try again when it is back")]
-    ShuttingDown,
-    /// The episode's thread is gone without having been asked to.
-    #[error("the episode has stopped; start another with start_episode (POST /v1/episodes)")]
-    EpisodeStopped,
     /// A request that axum refused before any handler saw it.
     #[error("{detail}")]
     Protocol {
@@ -96,13 +72,23 @@ pub enum ApiError {
         /// What axum said.
         detail: String,
     },
-    /// Our own fault.
-    #[error("{0}")]
-    Internal(String),
+    /// A reply of ours that cannot be written.
+    #[error("a reply is no JSON: {0}")]
+    Reply(#[source] serde_json::Error),
 }
 
-fn list(names: &[String]) -> String {
-    if names.is_empty() { "none".into() } else { names.join(", ") }
+/// What a caller over HTTP can do about a refusal whose text does not say so: the host does not know the routes.
+fn way_out(error: &HostingError) -> &'static str {
+    match error {
+        HostingError::UnknownEpisode { .. } => "; start_episode (POST /v1/episodes) starts one",
+        HostingError::TooManyEpisodes { .. } => "; finish or DELETE one, or try again later",
+        HostingError::EpisodeStopped => "; start another with start_episode (POST /v1/episodes)",
+        HostingError::Episode(_)
+        | HostingError::TooManyWaiting { .. }
+        | HostingError::ShuttingDown
+        | HostingError::Folder { .. }
+        | HostingError::Thread(_) => "",
+    }
 }
 
 /// A kind of problem: a stable name, the name in words, and the status it is served with.
@@ -112,14 +98,13 @@ impl ApiError {
     fn kind(&self) -> Kind {
         match self {
             ApiError::Spec(error) => spec_kind(error),
-            ApiError::Episode(error) => episode_kind(error),
+            ApiError::Hosting(error) => hosting_kind(error),
             ApiError::NoRoute { other_method: false, .. } => {
                 ("no-route", "No such route", StatusCode::NOT_FOUND)
             }
             ApiError::NoRoute { other_method: true, .. } => {
                 ("no-method", "Method not allowed", StatusCode::METHOD_NOT_ALLOWED)
             }
-            ApiError::UnknownEpisode { .. } => ("unknown-episode", "Unknown episode", StatusCode::NOT_FOUND),
             ApiError::EpisodeMismatch { .. } => {
                 ("episode-mismatch", "Two episodes named", StatusCode::UNPROCESSABLE_ENTITY)
             }
@@ -134,16 +119,8 @@ impl ApiError {
             ApiError::ContentType(_) => {
                 ("content-type", "Unsupported content type", StatusCode::UNSUPPORTED_MEDIA_TYPE)
             }
-            ApiError::TooManyEpisodes { .. } => {
-                ("too-many-episodes", "Too many episodes", StatusCode::TOO_MANY_REQUESTS)
-            }
-            ApiError::TooManyWaiting { .. } => {
-                ("too-many-calls", "Too many calls at once", StatusCode::TOO_MANY_REQUESTS)
-            }
-            ApiError::ShuttingDown => ("shutting-down", "Shutting down", StatusCode::SERVICE_UNAVAILABLE),
-            ApiError::EpisodeStopped => ("episode-stopped", "Episode stopped", StatusCode::GONE),
             ApiError::Protocol { status, .. } => ("bad-request", "Bad request", *status),
-            ApiError::Internal(_) => INTERNAL,
+            ApiError::Reply(_) => INTERNAL,
         }
     }
 
@@ -175,6 +152,22 @@ impl IntoResponse for ApiError {
         }
         let text = serde_json::json!(body).to_string();
         (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], text).into_response()
+    }
+}
+
+fn hosting_kind(error: &HostingError) -> Kind {
+    match error {
+        HostingError::Episode(error) => episode_kind(error),
+        HostingError::UnknownEpisode { .. } => ("unknown-episode", "Unknown episode", StatusCode::NOT_FOUND),
+        HostingError::TooManyEpisodes { .. } => {
+            ("too-many-episodes", "Too many episodes", StatusCode::TOO_MANY_REQUESTS)
+        }
+        HostingError::TooManyWaiting { .. } => {
+            ("too-many-calls", "Too many calls at once", StatusCode::TOO_MANY_REQUESTS)
+        }
+        HostingError::ShuttingDown => ("shutting-down", "Shutting down", StatusCode::SERVICE_UNAVAILABLE),
+        HostingError::EpisodeStopped => ("episode-stopped", "Episode stopped", StatusCode::GONE),
+        HostingError::Folder { .. } | HostingError::Thread(_) => INTERNAL,
     }
 }
 

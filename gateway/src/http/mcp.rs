@@ -8,6 +8,7 @@ use rmcp::{
     model::{
         CallToolRequestParams, CallToolResponse, CallToolResult, ContentBlock, Implementation,
         ListToolsResult, PaginatedRequestParams, ServerCapabilities, ServerConfig, Tool, ToolAnnotations,
+        object,
     },
     service::RequestContext,
     transport::streamable_http_server::{
@@ -21,7 +22,7 @@ use tandem_tools_spec::{
     tool_specs,
 };
 
-use crate::{problem::ApiError, routes::App};
+use super::{app::App, problem::ApiError};
 
 /// What a host tells its model about the server as a whole.
 const INSTRUCTIONS: &str = "Simulated humanoids that must work together. Call list_tasks, then start_episode, then look \
@@ -34,7 +35,7 @@ pub fn service(app: App, listen: IpAddr) -> StreamableHttpService<McpServer, Nev
     let config = StreamableHttpServerConfig::default()
         .with_legacy_session_mode(false)
         .with_json_response(true)
-        .with_max_request_body_bytes(app.max_body_bytes);
+        .with_max_request_body_bytes(app.settings.max_body_bytes);
     let config = if listen.is_loopback() { config } else { config.disable_allowed_hosts() };
     StreamableHttpService::new(move || Ok(McpServer { app: app.clone() }), Arc::default(), config)
 }
@@ -125,18 +126,13 @@ fn with_every_tool(error: SpecError) -> SpecError {
 }
 
 fn json_block(reply: &impl Serialize) -> Result<Vec<ContentBlock>, ApiError> {
-    let text = serde_json::to_string(reply)
-        .map_err(|error| ApiError::Internal(format!("a reply is no JSON: {error}")))?;
+    let text = serde_json::to_string(reply).map_err(ApiError::Reply)?;
     Ok(vec![ContentBlock::text(text)])
 }
 
 /// The tool as MCP describes it. No output schema: clients drop the pictures of tools that declare one.
 fn described(spec: ToolSpec) -> Tool {
-    let schema = match spec.input_schema {
-        Value::Object(schema) => schema,
-        _ => unreachable!("the schema of a tool's arguments is an object"),
-    };
-    Tool::new(spec.name, spec.description, Arc::new(schema)).with_annotations(
+    Tool::new(spec.name, spec.description, Arc::new(object(spec.input_schema))).with_annotations(
         ToolAnnotations::new().read_only(spec.read_only).destructive(false).open_world(false),
     )
 }

@@ -1,26 +1,15 @@
-//! `tandem evaluate` and `tandem collect`: episodes over seeds, in parallel worlds.
+//! Episodes over seeds, in parallel worlds: a bar while they are played, a table afterwards.
 
 use std::{error::Error, path::Path};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use tandem_episodes::{
-    evaluation::{self, Evaluation, Plan, TaskSummary, clopper_pearson},
-    tasks::{self, Task},
-};
+use tandem_episodes::evaluation::{self, Evaluation, Plan, TaskSummary, clopper_pearson};
 
 /// Notes on failures below the table.
 const NOTES_SHOWN: usize = 20;
 
-/// The tasks that `text` names: `all`, or ids separated by commas.
-pub fn parse_tasks(text: &str) -> Result<Vec<&'static Task>, String> {
-    match text {
-        "all" => Ok(tasks::ALL.iter().collect()),
-        ids => ids.split(',').map(|id| tasks::find(id.trim()).map_err(|error| error.to_string())).collect(),
-    }
-}
-
 /// Plays `plan` into `folder`, with a progress bar, and prints a table.
-pub fn run(plan: &Plan, folder: &Path) -> Result<(), Box<dyn Error>> {
+pub fn play_and_print(plan: &Plan, folder: &Path) -> Result<(), Box<dyn Error>> {
     let bar = ProgressBar::new((plan.tasks.len() * plan.seeds.len()) as u64);
     bar.set_style(ProgressStyle::with_template("  [{bar:30}] {pos} of {len} episodes, {elapsed}, {msg}")?);
     let evaluation = evaluation::evaluate(plan, folder, &|played| {

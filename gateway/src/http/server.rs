@@ -4,11 +4,8 @@ use std::{io, net::SocketAddr, sync::Arc, time::Duration};
 
 use tokio::{net::TcpListener, runtime::Runtime, sync::oneshot, task::JoinHandle};
 
-use crate::{
-    routes::{App, router},
-    settings::Settings,
-    table::EpisodeTable,
-};
+use super::{app::App, routes::router};
+use crate::{hosting::EpisodeTable, settings::Settings};
 
 /// Requests only parse, wait and answer; the worlds have threads of their own.
 const HTTP_THREADS: usize = 2;
@@ -28,7 +25,7 @@ pub struct Server {
 
 impl Server {
     /// Binds and begins to serve.
-    pub fn start(settings: &Settings) -> io::Result<Server> {
+    pub fn start(settings: Arc<Settings>) -> io::Result<Server> {
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(HTTP_THREADS)
             .thread_name("http")
@@ -41,13 +38,8 @@ impl Server {
             )
         })?;
         let address = listener.local_addr()?;
-        let table = Arc::new(EpisodeTable::new(
-            settings.max_episodes,
-            settings.runs.clone(),
-            settings.instructions.clone(),
-            settings.locomotion.clone(),
-        ));
-        let app = App { table: table.clone(), max_body_bytes: settings.max_body_bytes };
+        let table = Arc::new(EpisodeTable::new(settings.clone()));
+        let app = App { table: table.clone(), settings };
         let (stop, stopped) = oneshot::channel::<()>();
         let service = axum::serve(listener, router(app, address.ip())).with_graceful_shutdown(async {
             let _ = stopped.await;

@@ -1,6 +1,6 @@
 //! The REST routes under `/v1`.
 
-use std::{net::IpAddr, sync::Arc};
+use std::net::IpAddr;
 
 use axum::{
     Json, Router,
@@ -16,16 +16,7 @@ use tandem_tools_spec::{
     tool_specs,
 };
 
-use crate::{mcp, problem::ApiError, request::json_body, table::EpisodeTable};
-
-/// What every handler needs.
-#[derive(Debug, Clone)]
-pub struct App {
-    /// The episodes that are held.
-    pub table: Arc<EpisodeTable>,
-    /// Largest request body that is read.
-    pub max_body_bytes: usize,
-}
+use super::{app::App, mcp, problem::ApiError, request::json_body};
 
 /// Every route: path, methods, handlers.
 fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 7] {
@@ -70,7 +61,7 @@ async fn openapi() -> Json<Value> {
 }
 
 async fn start(State(app): State<App>, request: Request) -> Result<Response, ApiError> {
-    let args: StartEpisode = parse_args(json_body(request, app.max_body_bytes).await?)?;
+    let args: StartEpisode = parse_args(json_body(request, app.settings.max_body_bytes).await?)?;
     let reply: StartReply = app.table.start(args).await?;
     let location = format!("/v1/episodes/{}", reply.episode_id);
     Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(reply)).into_response())
@@ -85,7 +76,7 @@ async fn call(
     Path((id, name)): Path<(String, String)>,
     request: Request,
 ) -> Result<Json<ToolReply>, ApiError> {
-    let args = json_body(request, app.max_body_bytes).await?;
+    let args = json_body(request, app.settings.max_body_bytes).await?;
     let episode = app.table.get(&id)?;
     let call = ToolCall::parse(&name, without_episode_id(args, &id)?)?;
     Ok(Json(episode.call(call).await?))

@@ -13,7 +13,7 @@ use tandem_episodes::{EpisodeError, Facts, LocomotionChoice, Session};
 use tandem_tools_spec::{Briefing, Protocol, ResultReply, StartEpisode, ToolCall, ToolReply};
 use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 
-use crate::problem::ApiError;
+use super::HostingError;
 
 /// Calls that may wait for one episode. A policy has no use for more than one at a time; a few more are a burst.
 const WAITING_CALLS: usize = 16;
@@ -44,7 +44,7 @@ impl EpisodeThread {
         locomotion: LocomotionChoice,
         folder: PathBuf,
         permit: OwnedSemaphorePermit,
-    ) -> Result<(EpisodeThread, Briefing), ApiError> {
+    ) -> Result<(EpisodeThread, Briefing), HostingError> {
         let (commands, inbox) = mpsc::channel(WAITING_CALLS);
         let (started, start) = oneshot::channel();
         let ended = Arc::new(AtomicBool::new(false));
@@ -67,30 +67,30 @@ impl EpisodeThread {
             .name(id.into())
             .stack_size(STACK_BYTES)
             .spawn(thread)
-            .map_err(|error| ApiError::Internal(format!("no thread for an episode: {error}")))?;
-        let briefing = start.await.map_err(|_| ApiError::EpisodeStopped)??;
+            .map_err(HostingError::Thread)?;
+        let briefing = start.await.map_err(|_| HostingError::EpisodeStopped)??;
         Ok((EpisodeThread { commands, ended, folder }, briefing))
     }
 
     /// Runs a call and returns its reply.
-    pub async fn call(&self, call: ToolCall) -> Result<ToolReply, ApiError> {
+    pub async fn call(&self, call: ToolCall) -> Result<ToolReply, HostingError> {
         let (reply, answer) = oneshot::channel();
         self.send(Command::Call { call, reply })?;
-        Ok(answer.await.map_err(|_| ApiError::EpisodeStopped)??)
+        Ok(answer.await.map_err(|_| HostingError::EpisodeStopped)??)
     }
 
     /// Where everything is and who touches what: for experts and scoring in this process, never for policies.
-    pub fn facts_blocking(&self) -> Result<Facts, ApiError> {
+    pub fn facts_blocking(&self) -> Result<Facts, HostingError> {
         let (reply, answer) = oneshot::channel();
         self.send(Command::Facts { reply })?;
-        answer.blocking_recv().map_err(|_| ApiError::EpisodeStopped)
+        answer.blocking_recv().map_err(|_| HostingError::EpisodeStopped)
     }
 
     /// Ends the episode after the calls already waiting, closes its recording and returns the result.
-    pub async fn close(&self) -> Result<ResultReply, ApiError> {
+    pub async fn close(&self) -> Result<ResultReply, HostingError> {
         let (reply, answer) = oneshot::channel();
-        self.commands.send(Command::Close { reply }).await.map_err(|_| ApiError::EpisodeStopped)?;
-        let result = answer.await.map_err(|_| ApiError::EpisodeStopped)??;
+        self.commands.send(Command::Close { reply }).await.map_err(|_| HostingError::EpisodeStopped)?;
+        let result = answer.await.map_err(|_| HostingError::EpisodeStopped)??;
         Ok(result)
     }
 
@@ -104,10 +104,10 @@ impl EpisodeThread {
         &self.folder
     }
 
-    fn send(&self, command: Command) -> Result<(), ApiError> {
+    fn send(&self, command: Command) -> Result<(), HostingError> {
         self.commands.try_send(command).map_err(|error| match error {
-            mpsc::error::TrySendError::Full(_) => ApiError::TooManyWaiting { limit: WAITING_CALLS },
-            mpsc::error::TrySendError::Closed(_) => ApiError::EpisodeStopped,
+            mpsc::error::TrySendError::Full(_) => HostingError::TooManyWaiting { limit: WAITING_CALLS },
+            mpsc::error::TrySendError::Closed(_) => HostingError::EpisodeStopped,
         })
     }
 }

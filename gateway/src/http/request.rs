@@ -7,7 +7,7 @@ use axum::{
 };
 use serde_json::Value;
 
-use crate::problem::ApiError;
+use super::problem::ApiError;
 
 /// A body beyond the limit is read and thrown away up to this many times the limit, because a client that is still
 /// sending when the connection closes never sees the answer.

@@ -1,0 +1,85 @@
+//! The flags that say which episodes to play, and by robots of which kind.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use tandem_episodes::{
+    LocomotionChoice, SimError,
+    evaluation::{Plan, Policy},
+    tasks::{self, Task},
+};
+use tandem_tools_spec::Protocol;
+
+use super::Seeds;
+
+/// Which episodes to play.
+#[derive(Debug, Args)]
+pub struct EpisodeFlags {
+    /// Task ids separated by commas, or `all`.
+    #[arg(long, default_value = "all", value_name = "TASKS", value_parser = parse_tasks)]
+    tasks: TaskList,
+    /// One seed, or a range of seeds as 0-9, both ends included.
+    #[arg(long, default_value = "0-9", value_name = "SEEDS")]
+    seeds: Seeds,
+    /// The rules.
+    #[arg(long, value_enum, default_value = "agentic")]
+    protocol: ProtocolChoice,
+    /// Worlds that run side by side.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    jobs: usize,
+    #[command(flatten)]
+    locomotion: LocomotionFlag,
+}
+
+/// The base controller on the command line.
+#[derive(Debug, Args)]
+pub struct LocomotionFlag {
+    /// ONNX file with a velocity policy for the G1 in place of our own base controller.
+    #[arg(long = "locomotion", env = "TANDEM_LOCOMOTION", value_name = "FILE")]
+    pub file: Option<PathBuf>,
+}
+
+impl LocomotionFlag {
+    /// Reads and checks the file.
+    pub fn load(&self) -> Result<LocomotionChoice, SimError> {
+        LocomotionChoice::from_file(self.file.as_deref())
+    }
+}
+
+/// Tasks named on the command line. The name keeps clap from taking it for a flag that is given several times.
+#[derive(Debug, Clone)]
+struct TaskList(Vec<&'static Task>);
+
+/// The tasks that `text` names: `all`, or ids separated by commas.
+fn parse_tasks(text: &str) -> Result<TaskList, String> {
+    let found: Result<_, _> = match text {
+        "all" => Ok(tasks::ALL.iter().collect()),
+        ids => ids.split(',').map(|id| tasks::find(id.trim())).collect(),
+    };
+    found.map(TaskList).map_err(|error: tandem_episodes::EpisodeError| error.to_string())
+}
+
+/// The rules on the command line.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum ProtocolChoice {
+    Agentic,
+    Benchmark,
+}
+
+impl EpisodeFlags {
+    /// The plan to play these episodes by `policy`.
+    pub fn plan(self, policy: Policy, record: bool) -> Result<Plan, SimError> {
+        Ok(Plan {
+            policy,
+            protocol: match self.protocol {
+                ProtocolChoice::Agentic => Protocol::Agentic,
+                ProtocolChoice::Benchmark => Protocol::Benchmark,
+            },
+            locomotion: self.locomotion.load()?,
+            tasks: self.tasks.0,
+            seeds: self.seeds.0.collect(),
+            jobs: self.jobs,
+            record,
+        })
+    }
+}
