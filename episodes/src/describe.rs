@@ -5,8 +5,8 @@ use tandem_tools_spec::{
     Instruction, JointInfo, PhaseInfo, Protocol, ProtocolInfo, RobotInfo, TaskInfo, TaskList,
 };
 
-use crate::convert::{rounded, wire_limits};
 use crate::commands::RobotSheet;
+use crate::convert::{rounded, wire_limits};
 use crate::protocol::rules;
 use crate::scoring::Phase;
 use crate::tasks::{self, Task};
@@ -32,9 +32,7 @@ fn task_info(task: &Task) -> TaskInfo {
                 collaborative: phase.collaborative,
             })
             .collect(),
-        protocols: Protocol::ALL
-            .map(|protocol| protocol_info(protocol, task))
-            .to_vec(),
+        protocols: Protocol::ALL.map(|protocol| protocol_info(protocol, task)).to_vec(),
     }
 }
 

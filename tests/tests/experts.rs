@@ -2,16 +2,17 @@
 
 use std::thread::available_parallelism;
 
-use tandem_episodes::evaluation::{Plan, Policy, evaluate};
-use tandem_episodes::{LocomotionChoice, tasks};
+use tandem_episodes::evaluation::{Plan, evaluate};
+use tandem_episodes::{Controller, RobotFile, players, tasks};
 use tandem_tools_spec::Protocol;
 
 #[test]
 fn every_task_is_solved_in_order_and_nobody_falls() {
     let plan = Plan {
-        policy: Policy::Expert,
+        player: players::find("expert").expect("a player"),
         protocol: Protocol::Benchmark,
-        locomotion: LocomotionChoice::Balance,
+        robot: RobotFile::default(),
+        locomotion: Controller::Balance,
         tasks: tasks::ALL.iter().collect(),
         seeds: vec![3],
         jobs: available_parallelism().map_or(1, usize::from),

@@ -133,8 +133,7 @@ impl Order {
 /// Index of the robot called `name`.
 pub fn find(name: &str, motions: &[Motion]) -> Result<usize, EpisodeError> {
     let names = || motions.iter().map(|motion| motion.robot.name.clone());
-    names().position(|known| known == name).ok_or_else(|| EpisodeError::UnknownRobot {
-        name: name.into(),
-        have: names().collect(),
-    })
+    names()
+        .position(|known| known == name)
+        .ok_or_else(|| EpisodeError::UnknownRobot { name: name.into(), have: names().collect() })
 }

@@ -4,9 +4,9 @@ use tandem_sim::robot::UPPER;
 use tandem_sim::{RobotState, Side};
 use tandem_tools_spec::{HandReport, RobotReport};
 
+use super::Cut;
 use super::columns::{self, ARM_JOINTS, HAND_JOINTS};
 use super::motion::{Motion, RobotSheet};
-use super::Cut;
 use crate::convert::{isometry_from_sim, rounded, wire_pose};
 
 /// A measured joint this near to its limit rests at it.
@@ -20,7 +20,10 @@ pub fn report(cut: &Cut, state: &RobotState, motion: &Motion) -> RobotReport {
         left: hand_report(Side::Left, cut, state, motion),
         right: hand_report(Side::Right, cut, state, motion),
         waist_joints_clamped: names(robot, clamped(cut, |column| columns::waist().contains(&column))),
-        waist_joints_at_limit: names(robot, columns::waist().filter(|column| at_limit(*column, robot, state))),
+        waist_joints_at_limit: names(
+            robot,
+            columns::waist().filter(|column| at_limit(*column, robot, state)),
+        ),
         base_command_clamped: cut.base.iter().map(|field| field.to_string()).collect(),
     }
 }

@@ -64,10 +64,7 @@ pub enum StepError {
 impl StepMessage {
     pub fn new(step: &Step) -> Result<Json<StepMessage>, OutputError> {
         let bytes = postcard::to_stdvec(step).map_err(|source| OutputError::Encode(source.into()))?;
-        Ok(Json(StepMessage {
-            control_step: step.control_step,
-            postcard: BASE64_STANDARD.encode(bytes),
-        }))
+        Ok(Json(StepMessage { control_step: step.control_step, postcard: BASE64_STANDARD.encode(bytes) }))
     }
 
     pub fn step(&self) -> Result<Step, StepError> {

@@ -62,8 +62,8 @@ impl Recording {
     pub fn read(path: &Path) -> Result<Recording, RecordingError> {
         let bytes =
             std::fs::read(path).map_err(|source| RecordingError::Read { path: path.into(), source })?;
-        let records = metadata_records(&bytes)
-            .map_err(|source| RecordingError::Mcap { path: path.into(), source })?;
+        let records =
+            metadata_records(&bytes).map_err(|source| RecordingError::Mcap { path: path.into(), source })?;
         let json = |source| RecordingError::Json { path: path.into(), source };
         let missing = |what: &str| RecordingError::Missing { path: path.into(), what: what.into() };
         let episode = records.get(metadata::EPISODE).ok_or_else(|| missing(metadata::EPISODE))?;

@@ -1,12 +1,24 @@
 //! Recordings of a real world, read back.
 
-use std::{collections::BTreeMap, fs, path::Path};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
 
 use foxglove::Decode;
-use tandem_sim::{ObjectPlacement, RobotPlacement, Rotation, Vector, World, WorldSpec};
-use tandem_tools_spec::{CameraImage, LookReply, Observation, PhaseTimes, Png, ToolCall};
+use foxglove::messages::{CompressedImage, FrameTransforms, SceneUpdate};
+use tandem_sim::{ObjectPlacement, Pose, RobotCommand, RobotPlacement, Rotation, Vector, World, WorldSpec};
+use tandem_tools_spec::{
+    Budget, CameraImage, LookReply, Observation, PhaseReached, PhaseTimes, Png, Protocol, ToolCall, ToolReply,
+};
 
 use super::*;
+use crate::commands::RobotSheet;
+use crate::reports::EpisodeResult;
+use crate::scoring::Scores;
+use crate::spec::EpisodeSpec;
+use crate::tasks;
 
 const STEPS: u32 = 10;
 const PICTURE: &[u8] = b"the bytes of a PNG";
@@ -30,49 +42,46 @@ fn world() -> World {
     World::new(&spec).unwrap()
 }
 
-fn recorder(folder: &Path, world: &World) -> Recorder {
-    let robots = world.robots().iter();
-    let header = RecordingHeader {
-        task: "handover".into(),
-        seed: 7,
-        protocol: Protocol::Agentic,
-        locomotion: "balance".into(),
-        robots: robots.map(|r| RecordedRobot { name: r.name.clone(), model: r.model.clone() }).collect(),
-    };
-    Recorder::create(folder, header).unwrap()
+fn spec() -> EpisodeSpec {
+    EpisodeSpec::new(tasks::find("handover").unwrap(), 7, Protocol::Agentic)
 }
 
-fn record_step(recorder: &mut Recorder, world: &mut World, commands: &[RobotCommand]) {
-    world.control_step(commands);
-    let robots: Vec<RobotStep> = commands
-        .iter()
-        .enumerate()
-        .map(|(robot, command)| RobotStep {
-            state: world.robot_state(robot),
-            command: *command,
-            grips: vec![("bottle".into(), [Grip::Off, Grip::Touching])],
-        })
-        .collect();
-    let objects: Vec<ObjectStep> = world
-        .objects()
-        .map(|(name, state)| ObjectStep { name, world_from_object: state.world_from_object })
-        .collect();
+/// A recorder, and what scores the world's one object.
+fn recorder(folder: &Path, world: &World) -> (Recorder, Scores) {
+    let start = world.present();
+    let scores = Scores::new(spec().task.phases, [("bottle", "bottle")].into_iter(), &start).unwrap();
+    let sheet = |robot: &tandem_sim::robot::Robot| RobotSheet {
+        name: robot.name.clone(),
+        model: robot.model.clone(),
+        base_limits: robot.base_limits(),
+    };
+    let header = RecordingHeader {
+        spec: spec(),
+        locomotion: "balance".into(),
+        build: "0.1.0+test".into(),
+        robots: world.robots().iter().map(sheet).collect(),
+        scores: scores.memory(),
+    };
+    (Recorder::create(folder, header, &start).unwrap(), scores)
+}
+
+fn record_step(recorder: &mut Recorder, scores: &mut Scores, world: &mut World, commands: &[RobotCommand]) {
+    let step = world.control_step(commands);
     let budget = Budget {
-        steps_left: 6000 - world.control_steps() as u32,
+        steps_left: 6000 - step.control_step as u32,
         wall_clock_left_s: Some(1800.0),
         steps_per_command: 25,
     };
-    let step = StepRecord { time_s: world.time_s(), robots: &robots, objects: &objects, budget };
-    recorder.step(&step).unwrap();
+    recorder.step(&step, &scores.update(&step).facts, budget).unwrap();
 }
 
 /// Records `STEPS` steps, a phase, a refused call and an observation with a picture.
 fn record(folder: &Path) -> (World, PathBuf) {
     let mut world = world();
-    let mut recorder = recorder(folder, &world);
+    let (mut recorder, mut scores) = recorder(folder, &world);
     let commands = [world.rest_command(0), world.rest_command(1)];
     for _ in 0..STEPS {
-        record_step(&mut recorder, &mut world, &commands);
+        record_step(&mut recorder, &mut scores, &mut world, &commands);
     }
     let time_s = world.time_s();
     recorder.phase(&PhaseReached { id: "p1".into(), name: "grasp_and_lift".into(), time_s }).unwrap();
@@ -141,6 +150,7 @@ fn a_recording_reads_back() {
         ("/budget", "tandem.Budget", STEPS),
         ("/phases", "tandem.Phase", 1),
         ("/scene", "foxglove.SceneUpdate", 1),
+        ("/steps", "tandem.Step", STEPS + 1),
         ("/tf", "foxglove.FrameTransforms", STEPS),
         ("/tool_calls", "tandem.ToolCall", 2),
     ];
@@ -153,8 +163,15 @@ fn a_recording_reads_back() {
     assert_eq!(metadata["episode"]["seed"], "7");
     assert_eq!(metadata["episode"]["protocol"], "agentic");
     assert_eq!(metadata["episode"]["locomotion"], "balance");
-    let recorded: EpisodeResult = serde_json::from_str(&metadata["result"]["result.json"]).unwrap();
-    assert_eq!(recorded, result());
+
+    let recording = Recording::read(&path).unwrap();
+    assert_eq!((recording.spec.clone(), recording.build.as_str()), (spec(), "0.1.0+test"));
+    assert_eq!(recording.steps().unwrap().last().unwrap().unwrap(), world.present());
+    assert_eq!(recording.phases().unwrap()[0].time_s, 0.2);
+    let calls = recording.tool_calls().unwrap();
+    assert_eq!((calls[0].tool.as_str(), &calls[0].outcome), ("wait", &Err("no steps are left".into())));
+    assert_eq!((calls[1].arguments["robots"][0].as_str(), calls[1].outcome.is_ok()), (Some("A"), true));
+    assert_eq!(recording.result.unwrap(), result());
 }
 
 /// The chain of recorded frames puts wrists and camera where the world measured them.
@@ -205,7 +222,7 @@ fn json_schemas_are_flat() {
     let (_, path) = record(folder.path());
     let summary = mcap::Summary::read(&fs::read(path).unwrap()).unwrap().expect("a summary");
     let schemas: Vec<_> = summary.schemas.values().filter(|schema| schema.encoding == "jsonschema").collect();
-    assert_eq!(schemas.len(), 6);
+    assert_eq!(schemas.len(), 7);
     for schema in schemas {
         let document: serde_json::Value = serde_json::from_slice(&schema.data).unwrap();
         for (field, value) in document["properties"].as_object().unwrap() {
@@ -220,15 +237,21 @@ fn json_schemas_are_flat() {
 fn an_interrupted_recording_never_gets_the_final_name() {
     let folder = tempfile::tempdir().unwrap();
     let mut world = world();
-    let mut recorder = recorder(folder.path(), &world);
+    let (mut recorder, mut scores) = recorder(folder.path(), &world);
     let commands = [world.rest_command(0), world.rest_command(1)];
-    record_step(&mut recorder, &mut world, &commands);
+    record_step(&mut recorder, &mut scores, &mut world, &commands);
     drop(recorder);
     assert!(!folder.path().join("episode.mcap").exists());
 
     let partial = fs::read(folder.path().join("episode.mcap.partial")).unwrap();
     let summary = mcap::Summary::read(&partial).unwrap().expect("the index is written nevertheless");
-    assert_eq!(summary.stats.unwrap().message_count, 11, "shapes, transforms, budget and four per robot");
+    assert_eq!(
+        summary.stats.unwrap().message_count,
+        13,
+        "shapes, two steps, transforms, budget and four per robot"
+    );
+    let recording = Recording::read(&folder.path().join("episode.mcap.partial")).unwrap();
+    assert_eq!((recording.steps().unwrap().count(), recording.result), (2, None));
 }
 
 #[test]

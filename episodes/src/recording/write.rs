@@ -62,8 +62,11 @@ impl Recorder {
     pub fn create(folder: &Path, header: RecordingHeader, start: &Step) -> Result<Recorder, OutputError> {
         let mut file = McapFile::create(folder, Self::FILE_NAME)?;
         write_header(&mut file, &header)?;
-        let robot_topics =
-            header.robots.iter().map(|robot| RobotTopics::open(&mut file, robot)).collect::<Result<_, _>>()?;
+        let robot_topics = header
+            .robots
+            .iter()
+            .map(|robot| RobotTopics::open(&mut file, robot))
+            .collect::<Result<_, _>>()?;
         let mut recorder = Recorder {
             steps: file.topic(topics::STEPS, &[])?,
             transforms: file.topic("/tf", &[])?,
@@ -84,7 +87,11 @@ impl Recorder {
     /// Adds shapes that are drawn in frame `frame` from the start: `world` for the room, an object's name for an object.
     pub fn draw(&mut self, frame: &str, geoms: &[Geom]) -> Result<(), OutputError> {
         let entity = scene::entity(frame, geoms, |geom| geom.rgba);
-        self.file.write(&mut self.scene, self.start_s, &SceneUpdate { entities: vec![entity], deletions: vec![] })
+        self.file.write(
+            &mut self.scene,
+            self.start_s,
+            &SceneUpdate { entities: vec![entity], deletions: vec![] },
+        )
     }
 
     fn draw_robots(&mut self) -> Result<(), OutputError> {
@@ -132,7 +139,8 @@ impl Recorder {
 
     /// Writes the result and the index, and gives the file its name.
     pub fn finish(mut self, result: &EpisodeResult) -> Result<PathBuf, OutputError> {
-        self.file.metadata(metadata::RESULT, &[(EpisodeResult::FILE_NAME, &serde_json::to_string(result)?)])?;
+        self.file
+            .metadata(metadata::RESULT, &[(EpisodeResult::FILE_NAME, &serde_json::to_string(result)?)])?;
         self.file.finish()
     }
 }

@@ -6,8 +6,8 @@ use base64::{Engine, prelude::BASE64_STANDARD};
 use tandem_sim::CONTROL_HZ;
 use tandem_tools_spec::{Budget, EndReason, ResultReply};
 
-use crate::scoring::Phase;
 use crate::protocol::{Rules, rules};
+use crate::scoring::Phase;
 use crate::tasks::Task;
 
 const STYLE: &str = include_str!("style.css");

@@ -97,8 +97,8 @@ impl Checkpoint {
 
     /// Reads a file that this build has written.
     pub fn read(path: &Path) -> Result<Checkpoint, EpisodeError> {
-        let bytes = std::fs::read(path)
-            .map_err(|source| CheckpointError::Read { path: path.into(), source })?;
+        let bytes =
+            std::fs::read(path).map_err(|source| CheckpointError::Read { path: path.into(), source })?;
         let line = bytes.iter().position(|byte| *byte == b'\n').unwrap_or(bytes.len());
         let header: Header = serde_json::from_slice(&bytes[..line])
             .map_err(|source| CheckpointError::NotOne { path: path.into(), source })?;

@@ -6,12 +6,12 @@ use tandem_sim::Step;
 use tandem_tools_spec::{Budget, PhaseReached, ResultReply, ToolCall, ToolReply};
 
 use super::{Session, this_build};
+use crate::EpisodeError;
 use crate::output::{OutputError, write_whole};
 use crate::recording::{Recorder, RecordingHeader, ToolCallRecord};
 use crate::reports::{self, CallCounts, EpisodePage, EpisodeResult, Moment};
 use crate::scoring::Facts;
 use crate::tasks::Task;
-use crate::EpisodeError;
 
 /// The files of an episode under way.
 pub struct RunFiles {

@@ -1,6 +1,8 @@
 //! How the episode stands: budget, phases, falls, result.
 
-use tandem_tools_spec::{Briefing, Budget, EndReason, PhaseReached, PhaseTimes, ResultReply, RobotFallen, StatusReply};
+use tandem_tools_spec::{
+    Briefing, Budget, EndReason, PhaseReached, PhaseTimes, ResultReply, RobotFallen, StatusReply,
+};
 
 use super::Session;
 use crate::commands::action_row;

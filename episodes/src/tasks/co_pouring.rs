@@ -6,7 +6,7 @@
 use std::f32::consts::PI;
 
 use super::{ObjectSpot, RobotSpot, Task, spot, uniform_xy};
-use crate::scoring::{A, B, Facts, Done, Phase};
+use crate::scoring::{A, B, Done, Facts, Phase};
 
 const TUB_STACK_M: f32 = 0.75;
 const CRATE_STACK_M: f32 = 0.45;

@@ -12,7 +12,7 @@ use super::{
     placement::{stands_released, within_box},
     spot, uniform_xy,
 };
-use crate::scoring::{A, B, Facts, Done, Phase};
+use crate::scoring::{A, B, Done, Facts, Phase};
 
 /// Height of the counter's top above the floor.
 const COUNTER_M: f32 = 0.80;

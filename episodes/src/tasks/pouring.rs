@@ -6,7 +6,7 @@
 use std::f32::consts::{FRAC_PI_3, FRAC_PI_6, PI};
 
 use super::{Offset, RobotSpot, Task, spot, uniform_xy};
-use crate::scoring::{A, Facts, Done, Phase};
+use crate::scoring::{A, Done, Facts, Phase};
 
 /// Height of the worktop above the floor.
 const WORKTOP_M: f32 = 0.80;

@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, process::ExitCode};
 
-use tandem_episodes::evaluation::Policy;
+use tandem_episodes::players;
 
 use super::{Outcome, episode_flags::EpisodeFlags, played};
 
@@ -18,7 +18,7 @@ pub struct Args {
 
 /// Plays and records.
 pub fn run(args: Args) -> Outcome {
-    let plan = args.episodes.plan(Policy::Expert, true)?;
+    let plan = args.episodes.plan(players::find("expert")?, true);
     played::play_and_print(&plan, &args.out)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -10,8 +10,8 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressStyle};
 use tandem_episodes::{
-    Facts,
-    experts::{self, Arena, ExpertError},
+    EpisodeSpec, Facts,
+    players::{self, Backstage, Caller, PlayerError},
     tasks::{self, Task},
 };
 use tandem_tools_spec::{CommandReply, Protocol, ResultReply, StartEpisode, ToolCall, ToolReply};
@@ -85,13 +85,14 @@ fn placed(results: &[ResultReply]) -> usize {
 
 fn play(server: &Server, seed: u32) -> Result<ResultReply, Box<dyn Error>> {
     let task = tasks::find(TASK)?;
-    let args = StartEpisode { task: TASK.into(), seed, protocol: Some(Protocol::Agentic) };
+    let spec = EpisodeSpec::new(task, seed, Protocol::Agentic);
+    let args = StartEpisode { task: task.id.into(), seed, protocol: Some(spec.protocol) };
     println!("{TASK}, seed {seed}, over http://{}", server.address());
     let (http, started) = HttpEpisode::start(server.address(), &args)?;
     let thread = server.table().get(&started.episode_id)?;
-    let mut arena = OverHttp { http, thread, progress: Progress::new(task.phases.len()) };
-    let outcome = experts::perform(task, &mut arena);
-    let OverHttp { http, thread, progress } = arena;
+    let mut episode = OverHttp { http, thread, progress: Progress::new(task.phases.len()) };
+    let outcome = players::find("expert")?.play(&spec, &mut episode);
+    let OverHttp { http, thread, progress } = episode;
     progress.bar.finish_and_clear();
     let result = http.delete()?;
     if let Err(error) = outcome {
@@ -122,22 +123,24 @@ struct OverHttp {
     progress: Progress,
 }
 
-impl Arena for OverHttp {
-    fn call(&mut self, call: ToolCall) -> Result<ToolReply, ExpertError> {
+impl Caller for OverHttp {
+    fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {
         let reply = self.http.call(&call).map_err(|error| match error {
-            HttpError::Refused(problem) if problem.kind.ends_with(":ended") => ExpertError::EpisodeOver,
-            error => ExpertError::Call { tool: call.name(), reason: error.to_string() },
+            HttpError::Refused(problem) if problem.kind.ends_with(":ended") => PlayerError::EpisodeOver,
+            error => PlayerError::Call { tool: call.name(), reason: error.to_string() },
         })?;
         if let ToolReply::Act(reply) = &reply {
             self.progress.show(reply);
         }
         Ok(reply)
     }
+}
 
-    fn facts(&mut self) -> Result<Facts, ExpertError> {
+impl Backstage for OverHttp {
+    fn facts(&mut self) -> Result<Facts, PlayerError> {
         self.thread
             .facts_blocking()
-            .map_err(|error| ExpertError::Call { tool: "facts", reason: error.to_string() })
+            .map_err(|error| PlayerError::Call { tool: "facts", reason: error.to_string() })
     }
 }
 

@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use tandem_episodes::{
-    LocomotionChoice, SimError,
-    evaluation::{Plan, Policy},
+    Controller, RobotFile,
+    evaluation::Plan,
+    players,
     tasks::{self, Task},
 };
 use tandem_tools_spec::Protocol;
@@ -40,9 +41,8 @@ pub struct LocomotionFlag {
 }
 
 impl LocomotionFlag {
-    /// Reads and checks the file.
-    pub fn load(&self) -> Result<LocomotionChoice, SimError> {
-        LocomotionChoice::from_file(self.file.as_deref())
+    pub fn controller(&self) -> Controller {
+        Controller::from_file(self.file.as_deref())
     }
 }
 
@@ -67,19 +67,20 @@ enum ProtocolChoice {
 }
 
 impl EpisodeFlags {
-    /// The plan to play these episodes by `policy`.
-    pub fn plan(self, policy: Policy, record: bool) -> Result<Plan, SimError> {
-        Ok(Plan {
-            policy,
+    /// The plan to have `player` play these episodes.
+    pub fn plan(self, player: &'static players::Entry, record: bool) -> Plan {
+        Plan {
+            player,
             protocol: match self.protocol {
                 ProtocolChoice::Agentic => Protocol::Agentic,
                 ProtocolChoice::Benchmark => Protocol::Benchmark,
             },
-            locomotion: self.locomotion.load()?,
+            robot: RobotFile::default(),
+            locomotion: self.locomotion.controller(),
             tasks: self.tasks.0,
             seeds: self.seeds.0.collect(),
             jobs: self.jobs,
             record,
-        })
+        }
     }
 }

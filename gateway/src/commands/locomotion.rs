@@ -36,7 +36,7 @@ enum Part {
 /// Plays the cases, prints a line per case as it ends, and writes JSON where it is asked for.
 pub fn run(args: Args) -> Outcome {
     let Part::Bench { locomotion, cases, seeds, json } = args.part;
-    let choice = locomotion.load()?;
+    let choice = locomotion.controller().load()?;
     println!("{}", CaseReport::HEAD);
     let report = bench::locomotion(&choice, &cases, seeds, |case| println!("{case}"))?;
     if let Some(path) = json {

@@ -9,8 +9,8 @@ use std::{
     },
 };
 
-use tandem_episodes::{EpisodeError, Facts, LocomotionChoice, Session};
-use tandem_tools_spec::{Briefing, Protocol, ResultReply, StartEpisode, ToolCall, ToolReply};
+use tandem_episodes::{EpisodeError, EpisodeSpec, Facts, Session};
+use tandem_tools_spec::{Briefing, ResultReply, ToolCall, ToolReply};
 use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 
 use super::HostingError;
@@ -40,8 +40,7 @@ impl EpisodeThread {
     /// is one of the places for live episodes and is given back when the thread ends.
     pub async fn start(
         id: &str,
-        args: StartEpisode,
-        locomotion: LocomotionChoice,
+        spec: EpisodeSpec,
         folder: PathBuf,
         permit: OwnedSemaphorePermit,
     ) -> Result<(EpisodeThread, Briefing), HostingError> {
@@ -51,7 +50,7 @@ impl EpisodeThread {
         let thread_ended = ended.clone();
         let thread_folder = folder.clone();
         let thread = move || {
-            match open_session(&args, &locomotion, &thread_folder) {
+            match open_session(&spec, &thread_folder) {
                 Ok((session, briefing)) => {
                     // A caller that went away during the start has dropped the inbox's other end, and serve returns.
                     let _ = started.send(Ok(briefing));
@@ -112,14 +111,8 @@ impl EpisodeThread {
     }
 }
 
-fn open_session(
-    args: &StartEpisode,
-    locomotion: &LocomotionChoice,
-    folder: &Path,
-) -> Result<(Session, Briefing), EpisodeError> {
-    let task = tandem_episodes::tasks::find(&args.task)?;
-    let protocol = args.protocol.unwrap_or(Protocol::Agentic);
-    let session = Session::start(task, args.seed, protocol, locomotion, Some(folder))?;
+fn open_session(spec: &EpisodeSpec, folder: &Path) -> Result<(Session, Briefing), EpisodeError> {
+    let session = Session::start(spec, Some(folder))?;
     let briefing = session.briefing();
     Ok((session, briefing))
 }

@@ -8,8 +8,8 @@ use std::{
     },
 };
 
-use tandem_episodes::tasks;
-use tandem_tools_spec::{ResultReply, StartEpisode, StartReply, TaskList};
+use tandem_episodes::{EpisodeSpec, tasks};
+use tandem_tools_spec::{Protocol, ResultReply, StartEpisode, StartReply, TaskList};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use super::{EpisodeThread, HostingError, run_folder};
@@ -37,13 +37,16 @@ impl EpisodeTable {
 
     /// Starts an episode. Where every place is taken, an episode that has ended makes room.
     pub async fn start(&self, args: StartEpisode) -> Result<StartReply, HostingError> {
-        let task = tasks::find(&args.task)?;
+        let protocol = args.protocol.unwrap_or(Protocol::Agentic);
+        let spec = EpisodeSpec {
+            locomotion: self.settings.locomotion.clone(),
+            ..EpisodeSpec::new(tasks::find(&args.task)?, args.seed, protocol)
+        };
         let place = self.take_place().await?;
         let runs = &self.settings.runs;
-        let (id, folder) = run_folder::create(runs, task.id, args.seed)
+        let (id, folder) = run_folder::create(runs, spec.task.id, spec.seed)
             .map_err(|source| HostingError::Folder { runs: runs.clone(), source })?;
-        let locomotion = self.settings.locomotion.clone();
-        let (episode, mut briefing) = EpisodeThread::start(&id, args, locomotion, folder, place).await?;
+        let (episode, mut briefing) = EpisodeThread::start(&id, spec, folder, place).await?;
         self.settings.instructions.rephrase_briefing(&mut briefing);
         self.lock().insert(id.clone(), Arc::new(episode));
         tracing::info!(episode = id, "started");
@@ -52,7 +55,7 @@ impl EpisodeTable {
 
     /// The reply to `list_tasks`.
     pub fn task_list(&self) -> TaskList {
-        self.settings.instructions.task_list(&self.settings.locomotion.limits())
+        self.settings.instructions.task_list(&self.settings.base_limits)
     }
 
     /// The episode `id`.

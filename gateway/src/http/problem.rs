@@ -183,9 +183,14 @@ fn episode_kind(error: &EpisodeError) -> Kind {
         }
         EpisodeError::Ended { .. } => ("ended", "Episode ended", StatusCode::CONFLICT),
         EpisodeError::Spec(error) => spec_kind(error),
-        EpisodeError::Sim(_) | EpisodeError::Ik(_) | EpisodeError::Picture(_) | EpisodeError::Output(_) => {
-            INTERNAL
+        EpisodeError::Checkpoint(_) => {
+            ("checkpoint", "Checkpoint does not fit", StatusCode::UNPROCESSABLE_ENTITY)
         }
+        EpisodeError::Sim(_)
+        | EpisodeError::Ik(_)
+        | EpisodeError::Picture(_)
+        | EpisodeError::Build(_)
+        | EpisodeError::Output(_) => INTERNAL,
     }
 }
 

@@ -55,7 +55,8 @@ fn pour(stage: &mut Stage) -> Result<(), PlayerError> {
 /// cup is tipped to +y, away from the palm.
 fn cup_at(stage: &mut Stage, glass_m: Vector, tilt_rad: f32) -> Result<HandMove, PlayerError> {
     let facts = stage.facts()?;
-    let [mouth_m, lip_m] = [("glass", "mouth"), ("cup", "lip")].map(|(object, site)| facts.site(object, site).position_m());
+    let [mouth_m, lip_m] =
+        [("glass", "mouth"), ("cup", "lip")].map(|(object, site)| facts.site(object, site).position_m());
     let rotation = Rotation::from_rotation_x(-tilt_rad);
     let to_go = 1.0 - tilt_rad / TIP_RAD;
     let goal_m = glass_m + mouth_m + ABOVE_MOUTH_M + BEFORE_TIPPING_M * to_go;

@@ -148,7 +148,9 @@ impl Facts {
     pub fn site(&self, object: &str, name: &str) -> &Site {
         match self.object(object).sites.iter().find(|site| site.name == name) {
             Some(site) => site,
-            None => panic!("the file of {object:?} has no site {name:?}, which a task or its expert asks for"),
+            None => {
+                panic!("the file of {object:?} has no site {name:?}, which a task or its expert asks for")
+            }
         }
     }
 

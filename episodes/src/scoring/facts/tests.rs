@@ -24,12 +24,8 @@ fn a_hold_is_of_one_hand_and_a_touch_is_no_hold() {
     let rest = Facts::at_rest(tasks::find("handover").unwrap());
     assert!(rest.hands_off(A, "bottle") && !rest.holds_any(A, "bottle"));
     let held = rest.clone().grip(A, Right, "bottle", Grip::Holding);
-    assert!(
-        held.holds(A, Right, "bottle") && held.holds_any(A, "bottle") && !held.hands_off(A, "bottle")
-    );
-    assert!(
-        !held.holds(A, Left, "bottle") && !held.holds(B, Right, "bottle") && held.hands_off(B, "bottle")
-    );
+    assert!(held.holds(A, Right, "bottle") && held.holds_any(A, "bottle") && !held.hands_off(A, "bottle"));
+    assert!(!held.holds(A, Left, "bottle") && !held.holds(B, Right, "bottle") && held.hands_off(B, "bottle"));
     let touched = rest.grip(A, Right, "bottle", Grip::Touching);
     assert!(!touched.holds_any(A, "bottle") && !touched.hands_off(A, "bottle"));
 }

@@ -69,7 +69,11 @@ pub struct ObjectGrasps {
 
 impl ObjectGrasps {
     pub fn new(object: &str, robots: usize) -> ObjectGrasps {
-        ObjectGrasps { object: object.into(), detectors: vec![Default::default(); robots], untouched_steps: 0 }
+        ObjectGrasps {
+            object: object.into(),
+            detectors: vec![Default::default(); robots],
+            untouched_steps: 0,
+        }
     }
 
     /// Looks at the touches of one control step.

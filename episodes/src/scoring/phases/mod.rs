@@ -107,7 +107,8 @@ impl PhaseMemory {
             Done::Lasting { condition, for_s, at_end } => {
                 self.since_s = condition(facts).then(|| self.since_s.unwrap_or(facts.time_s));
                 // Times are sums of control steps; half of one keeps rounding out.
-                let lasted = self.since_s.is_some_and(|since_s| facts.time_s - since_s >= for_s - HALF_STEP_S);
+                let lasted =
+                    self.since_s.is_some_and(|since_s| facts.time_s - since_s >= for_s - HALF_STEP_S);
                 lasted && at_end(facts)
             }
         }

@@ -32,8 +32,7 @@ fn every_apple_has_to_be_in_the_crate() {
         let mut facts = held();
         let crate_in_world = facts.object("crate").pose_in_world;
         for apple in APPLES {
-            facts.object_mut(apple).pose_in_world.translation =
-                crate_in_world * Vector::new(0.0, 0.0, 0.05);
+            facts.object_mut(apple).pose_in_world.translation = crate_in_world * Vector::new(0.0, 0.0, 0.05);
         }
         facts.object_mut(APPLES[5]).pose_in_world.translation = crate_in_world * offset_m;
         facts

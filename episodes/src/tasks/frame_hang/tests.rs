@@ -76,7 +76,8 @@ fn hanging_on_both_sides_of_every_threshold() {
     // Turned in the plane of the picture, about the loop.
     let tilted = |degrees: f32| {
         let mut facts = on_peg(Vector::ZERO);
-        let (loop_m, loop_in_frame_m) = (facts.site_m("frame", "loop"), facts.site("frame", "loop").position_m());
+        let (loop_m, loop_in_frame_m) =
+            (facts.site_m("frame", "loop"), facts.site("frame", "loop").position_m());
         let rotation = Rotation::from_rotation_y(degrees.to_radians());
         facts.object_mut("frame").pose_in_world =
             Pose::from_parts(loop_m - rotation * loop_in_frame_m, rotation);

@@ -30,16 +30,8 @@ fn offsets_fill_their_ranges_and_stay_inside() {
                 let (least, most) = moved.fold((f32::MAX, f32::MIN), |(l, h), m| (l.min(m), h.max(m)));
                 // Sums of several offsets seldom come near their ends.
                 let (slack, width) = (1e-5, high - low);
-                assert!(
-                    least >= low - slack && least <= low + 0.25 * width + slack,
-                    "{} {axis}",
-                    spot.name
-                );
-                assert!(
-                    most <= high + slack && most >= high - 0.25 * width - slack,
-                    "{} {axis}",
-                    spot.name
-                );
+                assert!(least >= low - slack && least <= low + 0.25 * width + slack, "{} {axis}", spot.name);
+                assert!(most <= high + slack && most >= high - 0.25 * width - slack, "{} {axis}", spot.name);
             }
         }
     }

@@ -26,8 +26,7 @@ impl BarGrasp<'_> {
     /// Wrist motion to the bar, `standoff_m` short of it.
     fn reach(&self, stage: &mut Stage, standoff_m: f32) -> Result<HandMove, PlayerError> {
         let facts = stage.facts()?;
-        let bar_in_wrist_m =
-            mirrored_m(self.bar_in_wrist_m + Vector::new(0.0, standoff_m, 0.0), self.side);
+        let bar_in_wrist_m = mirrored_m(self.bar_in_wrist_m + Vector::new(0.0, standoff_m, 0.0), self.side);
         let bar_m = facts.site(self.object, self.bar).position_m();
         let origin_m = bar_m - self.object_from_wrist * bar_in_wrist_m;
         let world_from_object = facts.object(self.object).pose_in_world;

@@ -4,94 +4,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
-use tandem_episodes::experts::{self, Arena, ExpertError};
-use tandem_episodes::{Clock, EpisodeError, Facts, LocomotionChoice, Session, facts, monotonic, tasks};
-use tandem_sim::{Side, Vector};
+use crate::common::*;
+use tandem_episodes::{A, B, Clock, EpisodeError, Session};
+use tandem_sim::Vector;
 use tandem_tools_spec::{
-    CheckReach, CommandReply, EndReason, Finish, GetRobotState, GetStatus, JointChunk, LookReply,
-    ManageReply, MoveWrists, Observe, Protocol, QueryDepth, RobotState, SendJointChunk, StatusReply,
+    CheckReach, EndReason, Finish, LookReply, ManageReply, MoveWrists, Observe, Protocol, QueryDepth,
     StopReason, ToolCall, ToolReply, Wait, Walk, WalkMove, WristMove,
 };
-
-fn start(task: &str, seed: u32, protocol: Protocol, clock: Clock) -> Session {
-    Session::start_with_clock(
-        tasks::find(task).unwrap(),
-        seed,
-        protocol,
-        &LocomotionChoice::Balance,
-        None,
-        clock,
-    )
-    .unwrap()
-}
-
-fn handover(seed: u32) -> Session {
-    start("handover", seed, Protocol::Benchmark, monotonic())
-}
-
-fn command(session: &mut Session, call: ToolCall) -> CommandReply {
-    match session.call(call).unwrap() {
-        ToolReply::Act(reply) => reply,
-        other => panic!("{other:?} is no reply to a command"),
-    }
-}
-
-fn wait(session: &mut Session, steps: u32) -> CommandReply {
-    command(session, Wait { steps }.into())
-}
-
-fn status(session: &mut Session) -> StatusReply {
-    match session.call(GetStatus {}.into()).unwrap() {
-        ToolReply::Manage(ManageReply::GetStatus(status)) => status,
-        other => panic!("{other:?} is no status"),
-    }
-}
-
-fn state(session: &mut Session, robot: &str) -> RobotState {
-    match session.call(GetRobotState { robot: robot.into() }.into()).unwrap() {
-        ToolReply::Look(LookReply::GetRobotState(state)) => state,
-        other => panic!("{other:?} is no state"),
-    }
-}
-
-/// A's right hand to the side of its chest, fingers half closed.
-fn raise_hand(steps: u32) -> ToolCall {
-    let raise = WristMove {
-        right_position_m: Some([0.28, -0.24, 0.22]),
-        right_quaternion_wxyz: Some([1.0, 0.0, 0.0, 0.0]),
-        right_fingers_rad: Some([0.0, -0.4, -0.4, 0.6, 0.6, 0.6, 0.6]),
-        ..WristMove::hold("A")
-    };
-    MoveWrists { steps, robots: vec![raise] }.into()
-}
-
-fn squat(height_m: f64) -> ToolCall {
-    let entry = WalkMove {
-        robot: "B".into(),
-        vx_m_s: 0.0,
-        vy_m_s: 0.0,
-        yaw_rate_rad_s: 0.0,
-        pelvis_height_m: Some(height_m),
-    };
-    Walk { steps: 50, robots: vec![entry] }.into()
-}
-
-/// A second and a half in which every kind of command is used.
-fn play(session: &mut Session) {
-    command(session, raise_hand(25));
-    command(session, squat(0.70));
-    let rows = vec![row(session, "B"); 5];
-    command(session, SendJointChunk { robots: vec![JointChunk { robot: "B".into(), rows }] }.into());
-    wait(session, 10);
-}
-
-/// The action row under which a robot stays as it measures itself.
-fn row(session: &mut Session, robot: &str) -> Vec<f64> {
-    let columns = session.briefing().action_row;
-    let state = state(session, robot);
-    let base = [0.0, 0.0, 0.0, state.base_command.pelvis_height_m];
-    columns.iter().filter_map(|column| state.joint_positions_rad.get(column)).chain(base).collect()
-}
 
 #[test]
 fn the_same_seed_and_calls_give_the_same_state_and_others_do_not() {
@@ -103,24 +22,6 @@ fn the_same_seed_and_calls_give_the_same_state_and_others_do_not() {
     let first = hash_after(3);
     assert_eq!(first, hash_after(3));
     assert_ne!(first, hash_after(4));
-}
-
-#[test]
-fn an_episode_taken_up_from_a_checkpoint_goes_on_as_it_did() {
-    let mut session = handover(5);
-    command(&mut session, raise_hand(25));
-    let checkpoint = session.checkpoint().unwrap();
-    let (hash_then, status_then) = (session.state_hash(), status(&mut session));
-    play(&mut session);
-    let end = (session.state_hash(), status(&mut session));
-
-    let mut other = handover(5);
-    for resumed in [&mut session, &mut other] {
-        resumed.resume(&checkpoint).unwrap();
-        assert_eq!((resumed.state_hash(), status(resumed)), (hash_then.clone(), status_then.clone()));
-        play(resumed);
-        assert_eq!((resumed.state_hash(), status(resumed)), end);
-    }
 }
 
 #[test]
@@ -185,8 +86,7 @@ fn checking_reach_tells_near_from_far_and_moves_nothing() {
 #[test]
 fn height_persists_and_velocities_do_not() {
     let mut session = handover(0);
-    let height_m =
-        |session: &Session| f64::from(session.facts().robots[facts::B].pelvis_in_world.translation.z);
+    let height_m = |session: &Session| f64::from(session.facts().robots[B].pelvis_in_world.translation.z);
     command(&mut session, squat(0.66));
     wait(&mut session, 50);
     wait(&mut session, 50);
@@ -205,7 +105,7 @@ fn depth_finds_the_bottle_where_it_is() {
     let mut session = handover(2);
     wait(&mut session, 25);
     let facts = session.facts();
-    let robot = &facts.robots[facts::A];
+    let robot = &facts.robots[A];
     let bottle = facts.object("bottle").pose_in_world;
     let pelvis_from_bottle = robot.pelvis_in_world.inverse() * bottle;
     let label = pelvis_from_bottle * Vector::new(0.0, 0.0, 0.09);
@@ -269,7 +169,8 @@ fn the_wall_clock_charges_thinking_and_ends_the_episode() {
     let hands_s = Arc::new(AtomicU64::new(0));
     let read = hands_s.clone();
     let clock: Clock = Box::new(move || Duration::from_secs(read.load(Relaxed)));
-    let mut session = start("handover", 0, Protocol::Agentic, clock);
+    let mut session =
+        Session::start_with_clock(&spec("handover", 0, Protocol::Agentic), None, clock).unwrap();
     let left = |session: &mut Session| status(session).budget;
     let budget = left(&mut session);
     assert_eq!((budget.steps_left, budget.wall_clock_left_s), (5700, Some(1800.0)), "after the initial hold");
@@ -281,90 +182,4 @@ fn the_wall_clock_charges_thinking_and_ends_the_episode() {
     assert!(matches!(refused, EpisodeError::Ended { reason: EndReason::WallClockExhausted }), "{refused}");
     assert_eq!(status(&mut session).ended, Some(EndReason::WallClockExhausted));
     assert_eq!(session.state_hash(), hash);
-}
-
-#[test]
-fn scenes_settle_within_a_second_and_start_again_bit_for_bit() {
-    for task in tasks::ALL {
-        // This protocol has no initial hold.
-        let [mut session, mut again] = [(); 2].map(|()| start(task.id, 1, Protocol::Benchmark, monotonic()));
-        assert_eq!(session.state_hash(), again.state_hash(), "{}", task.id);
-        wait(&mut session, 50);
-        wait(&mut again, 50);
-        assert_eq!(session.state_hash(), again.state_hash(), "{}", task.id);
-        for object in session.facts().objects {
-            let speed_m_s = object.velocity_m_s.length();
-            assert!(speed_m_s < 0.01, "{}: {} moves at {speed_m_s} m/s", task.id, object.name);
-        }
-    }
-}
-
-/// Does nothing in every task: objects move less than `drift_m`, nobody falls, no phase is reached.
-fn idle(wait_s: u32, drift_m: f32) {
-    for task in tasks::ALL {
-        let mut session = start(task.id, 1, Protocol::Agentic, monotonic());
-        let before = session.facts();
-        (0..2 * wait_s).for_each(|_| drop(wait(&mut session, 25)));
-        for (before, after) in before.objects.iter().zip(&session.facts().objects) {
-            let moved_m = before.pose_in_world.translation.distance(after.pose_in_world.translation);
-            println!("{}: {} has moved {moved_m} m in {wait_s} s", task.id, before.name);
-            assert!(moved_m < drift_m, "{}: {} has moved {moved_m} m in {wait_s} s", task.id, before.name);
-        }
-        let status = status(&mut session);
-        assert!(status.phases.is_empty(), "{}: {:?}", task.id, status.phases);
-        assert!(!status.fallen.iter().any(|robot| robot.fallen), "{}: {:?}", task.id, status.fallen);
-    }
-}
-
-/// As many seconds as every run of the tests can pay for; 2 mm in 60 s are a sixth of a millimetre then.
-#[test]
-fn objects_stay_and_idling_reaches_nothing() {
-    idle(5, 0.002 / 12.0);
-}
-
-#[test]
-#[ignore = "a minute of every task takes more than a minute; run it with --ignored"]
-fn objects_stay_for_a_minute() {
-    idle(60, 0.002);
-}
-
-/// Plays on, and notes the hand forces whenever A alone holds the bottle in the air.
-struct Lifting {
-    session: Session,
-    /// Of the robots at each of these moments: left hand, right hand.
-    felt_n: Vec<Vec<[Vector; 2]>>,
-}
-
-impl Arena for Lifting {
-    fn call(&mut self, call: ToolCall) -> Result<ToolReply, ExpertError> {
-        let reply = self.session.call(call).map_err(|_| ExpertError::EpisodeOver)?;
-        let facts = self.session.facts();
-        let by_a_alone = facts.holds(facts::A, Side::Right, "bottle") && facts.hands_off(facts::B, "bottle");
-        if by_a_alone && facts.lift_m("bottle") > 0.03 {
-            self.felt_n.push(facts.robots.iter().map(|robot| robot.hand_force_n).collect());
-        }
-        Ok(reply)
-    }
-
-    fn facts(&mut self) -> Result<Facts, ExpertError> {
-        Ok(self.session.facts())
-    }
-}
-
-/// Forces are estimated from the arm's torques alone, so the bottle's weight has to show where it is held, and only there.
-#[test]
-fn a_hand_that_lifts_the_bottle_feels_its_weight() {
-    const BOTTLE_N: f32 = 0.5 * 9.81;
-    let mut lifting = Lifting { session: handover(1), felt_n: Vec::new() };
-    experts::perform(tasks::find("handover").unwrap(), &mut lifting).unwrap();
-    assert!(lifting.felt_n.len() >= 5, "A held the bottle after {} commands", lifting.felt_n.len());
-    for felt_n in &lifting.felt_n {
-        let [left_n, right_n] = felt_n[facts::A];
-        assert!((right_n.z + BOTTLE_N).abs() < 0.15 * BOTTLE_N, "the right hand feels {right_n} N");
-        assert!(left_n.z.abs() < 0.1 * BOTTLE_N, "the left hand feels {left_n} N");
-    }
-    // Later B moves its arms, and their inertia shows.
-    for force_n in lifting.felt_n[0][facts::B] {
-        assert!(force_n.length() < 0.05, "B's hands touch nothing and feel {force_n} N");
-    }
 }
