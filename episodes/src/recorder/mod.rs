@@ -22,9 +22,8 @@ use foxglove::messages::{
     CameraCalibration, CompressedImage, FrameTransforms, JointState, JointStates, SceneUpdate,
 };
 use tandem_sim::{
-    Pose, RobotCommand, RobotState,
+    Pose, RobotCommand, RobotModel, RobotState, UPPER,
     mjcf::{Geom, MjcfCamera},
-    robot::{RobotModel, UPPER},
 };
 use tandem_tools_spec::{Budget, PhaseReached, Protocol, ToolCall, ToolReply};
 

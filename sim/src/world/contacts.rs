@@ -6,8 +6,8 @@ use rapier3d::math::Vector;
 use rapier3d::prelude::*;
 
 use super::World;
-use crate::PHYSICS_DT_S;
-use crate::robot::{RobotModel, Side};
+use crate::robot::RobotModel;
+use crate::{PHYSICS_DT_S, Side};
 
 /// Normal contact forces (N, world) that a hand's parts exert on an object, averaged over the last physics step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -58,7 +58,7 @@ impl World {
         let Some(object) = self.objects.iter().find(|candidate| candidate.name == object) else {
             return contacts;
         };
-        let hand = &self.robots[robot].model.hands[side.index()];
+        let hand = &self.robots[robot].model.hands[side];
         for (link, force_n) in object.colliders.iter().flat_map(|collider| self.link_forces(robot, *collider))
         {
             if hand.thumb.contains(&link) {

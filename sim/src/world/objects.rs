@@ -3,9 +3,8 @@
 use rapier3d::math::{Pose, Vector};
 use rapier3d::prelude::*;
 
-use super::GRAVITY_M_S2;
 use crate::mjcf::{Document, Geom, mass_properties, pose};
-use crate::{SimError, assets};
+use crate::{GRAVITY_M_S2, SimError, assets};
 use mjcf_rs::body::JointType;
 
 /// An object file put into the world.
