@@ -1,7 +1,6 @@
 //! What policies are told about tasks, protocols and robots.
 
-use tandem_sim::robot::{RobotModel, UPPER};
-use tandem_sim::{BaseLimits, World};
+use tandem_sim::{BaseLimits, RobotModel, UPPER, World};
 use tandem_tools_spec::{
     Instruction, JointInfo, PhaseInfo, Protocol, ProtocolInfo, RobotInfo, TaskInfo, TaskList,
 };

@@ -1,6 +1,6 @@
 //! What scoring and the experts may know about the world. None of it is served to a policy.
 
-use tandem_sim::{Pose, Side, Vector};
+use tandem_sim::{Pose, Side, Sides, Vector};
 
 /// Index of robot A in [`Facts::robots`].
 pub const A: usize = 0;
@@ -21,11 +21,10 @@ pub struct Facts {
 #[derive(Clone, Debug)]
 pub struct RobotFacts {
     pub pelvis_in_world: Pose,
-    /// Left, right.
-    pub wrist_in_pelvis: [Pose; 2],
-    /// Force of the world on each palm, left, right, in the world's frame; estimated from the arm's own torques. A hand that
+    pub wrist_in_pelvis: Sides<Pose>,
+    /// Force of the world on each palm, in the world's frame; estimated from the arm's own torques. A hand that
     /// holds 0.5 kg still feels -4.9 N along z; one in quick motion feels its own inertia, too.
-    pub hand_force_n: [Vector; 2],
+    pub hand_force_n: Sides<Vector>,
     pub fallen: bool,
 }
 
@@ -159,8 +158,8 @@ pub(crate) mod constructed {
         pub fn at_rest(task: &Task) -> Facts {
             let robot = |_| RobotFacts {
                 pelvis_in_world: Pose::IDENTITY,
-                wrist_in_pelvis: [Pose::IDENTITY; 2],
-                hand_force_n: [Vector::ZERO; 2],
+                wrist_in_pelvis: Sides::both(Pose::IDENTITY),
+                hand_force_n: Sides::both(Vector::ZERO),
                 fallen: false,
             };
             let object = |spot: &crate::tasks::ObjectSpot| ObjectFacts {

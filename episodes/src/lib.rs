@@ -32,4 +32,4 @@ pub use recorder::Recorder;
 pub use results::{EpisodeResult, OutputError};
 pub use run_files::RunFiles;
 pub use session::{Checkpoint, Session};
-pub use tandem_sim::{SimError, locomotion::LocomotionChoice};
+pub use tandem_sim::{LocomotionChoice, SimError};

@@ -7,14 +7,11 @@ use tandem_ik::{
     Capsule, Configuration, DampingTask, FrameId, FrameTask, IkError, JointCouplingTask, Limits, Model,
     Outcome, PostureTask, SelfCollision, SolveOptions, SolveReport, Solver, Task, Tolerance,
 };
-use tandem_sim::robot::{UPPER, UPPER_JOINTS, joint_names};
-use tandem_sim::{BaseCommand, RobotCommand, Side};
+use tandem_sim::{
+    BaseCommand, CONTROL_HZ, HAND_COLUMNS, HAND_JOINTS, RobotCommand, Side, UPPER, UPPER_JOINTS, joint_names,
+};
 
-/// Positions in an action row of the joints that inverse kinematics leaves alone: both hands.
-const HAND_COLUMNS: [usize; 2] = [14, 21];
-pub const HAND_JOINTS: usize = 7;
-
-const DT_S: f64 = 0.02;
+const DT_S: f64 = 1.0 / CONTROL_HZ;
 /// Unitree's limits are 22 to 37 rad/s; arms that work next to people and partners move slower.
 const ARM_SPEED_RAD_S: f64 = 4.0;
 const WAIST_SPEED_RAD_S: f64 = 1.0;
@@ -95,7 +92,7 @@ impl UpperBody {
 /// The robot with arms and waist free; legs and hands are locked straight.
 pub fn upper_body(whole: &Model) -> Result<Model, IkError> {
     let names = joint_names();
-    let is_hand = |column: usize| (HAND_COLUMNS[0]..HAND_COLUMNS[1] + HAND_JOINTS).contains(&column);
+    let is_hand = |column: usize| (HAND_COLUMNS.left..HAND_COLUMNS.right + HAND_JOINTS).contains(&column);
     let columns = (0..UPPER_JOINTS).filter(|column| !is_hand(*column));
     let free: Vec<&str> = columns.map(|column| names[UPPER[column]].as_str()).collect();
     whole.reduced(&free, &vec![0.0; whole.nv()])
@@ -272,7 +269,7 @@ impl Run {
         }
         for side in Side::BOTH {
             if let Some(goal_rad) = &self.plan.fingers_rad[side.index()] {
-                let first = HAND_COLUMNS[side.index()];
+                let first = HAND_COLUMNS[side];
                 for (finger, goal_rad) in goal_rad.iter().enumerate() {
                     let from_rad = self.from_rad[first + finger];
                     motion.state.upper_rad[first + finger] = from_rad + (goal_rad - from_rad) * part;

@@ -2,21 +2,17 @@
 
 use nalgebra::Isometry3;
 use tandem_ik::FrameError;
-use tandem_sim::robot::{Robot, UPPER, UPPER_JOINTS};
-use tandem_sim::{BaseCommand, RobotState, Side};
+use tandem_sim::{
+    ARM_COLUMNS, ARM_JOINTS, BaseCommand, HAND_COLUMNS, HAND_JOINTS, Robot, RobotState, Side, UPPER,
+    UPPER_JOINTS, WAIST_COLUMN,
+};
 use tandem_tools_spec::{
     CheckReach, HandReach, HandReport, Protocol, ReachReply, RobotReport, ToolCall, WalkMove, WristMove,
 };
 
 use crate::convert::{clamp_base, isometry, isometry_from_sim, rounded, wire_pose};
-use crate::motion::{HAND_JOINTS, Motion, Plan};
+use crate::motion::{Motion, Plan};
 
-/// First column of each hand in an action row: left, right.
-const HAND_COLUMNS: [usize; 2] = [14, 21];
-/// First column of each arm.
-const ARM_COLUMNS: [usize; 2] = [0, 7];
-const ARM_JOINTS: usize = 7;
-const WAIST_COLUMN: usize = 28;
 /// A measured joint this near to its limit rests at it.
 const AT_LIMIT_RAD: f32 = 0.01;
 
@@ -94,7 +90,7 @@ fn wrist_order(entry: &WristMove, robot: &Robot, motion: &Motion) -> Order {
         let Some(fingers) = fingers else { continue };
         let mut goal_rad = [0.0; HAND_JOINTS];
         for (finger, asked_rad) in fingers.iter().enumerate() {
-            let column = HAND_COLUMNS[side.index()] + finger;
+            let column = HAND_COLUMNS[side] + finger;
             goal_rad[finger] = clamp_column(robot, column, *asked_rad, &mut order.clamped);
         }
         order.plan.fingers_rad[side.index()] = Some(goal_rad);
@@ -172,12 +168,12 @@ pub fn report(order: &Order, robot: &Robot, state: &RobotState, motion: &Motion)
         q_rad < joint.lower_rad + AT_LIMIT_RAD || q_rad > joint.upper_rad - AT_LIMIT_RAD
     };
     let hand = |side: Side| {
-        let (arm, hand) = (ARM_COLUMNS[side.index()], HAND_COLUMNS[side.index()]);
+        let (arm, hand) = (ARM_COLUMNS[side], HAND_COLUMNS[side]);
         let is_own = move |column: usize| {
             (arm..arm + ARM_JOINTS).contains(&column) || (hand..hand + HAND_JOINTS).contains(&column)
         };
         let target = &motion.targets()[side.index()];
-        let measured = isometry_from_sim(&state.pelvis_from_wrist[side.index()]);
+        let measured = isometry_from_sim(&state.pelvis_from_wrist[side]);
         let missing = measured.inverse() * target;
         HandReport {
             target: wire_pose(target),

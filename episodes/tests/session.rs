@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use tandem_episodes::experts::{self, Arena, ExpertError};
 use tandem_episodes::{Clock, EpisodeError, Facts, LocomotionChoice, Session, facts, monotonic, tasks};
-use tandem_sim::{Side, Vector};
+use tandem_sim::{Side, Sides, Vector};
 use tandem_tools_spec::{
     CheckReach, CommandReply, EndReason, Finish, GetRobotState, GetStatus, JointChunk, MoveWrists, Observe,
     Protocol, QueryDepth, RobotState, SendJointChunk, StatusReply, StopReason, ToolCall, ToolReply, Wait,
@@ -332,8 +332,8 @@ fn objects_stay_for_a_minute() {
 /// Plays on, and notes the hand forces whenever A alone holds the bottle in the air.
 struct Lifting {
     session: Session,
-    /// Of the robots at each of these moments: left hand, right hand.
-    felt_n: Vec<Vec<[Vector; 2]>>,
+    /// By the robots' hands at each of these moments.
+    felt_n: Vec<Vec<Sides<Vector>>>,
 }
 
 impl Arena for Lifting {
@@ -360,7 +360,7 @@ fn a_hand_that_lifts_the_bottle_feels_its_weight() {
     experts::perform(tasks::find("handover").unwrap(), &mut lifting).unwrap();
     assert!(lifting.felt_n.len() >= 5, "A held the bottle after {} commands", lifting.felt_n.len());
     for felt_n in &lifting.felt_n {
-        let [left_n, right_n] = felt_n[facts::A];
+        let Sides { left: left_n, right: right_n } = felt_n[facts::A];
         assert!((right_n.z + BOTTLE_N).abs() < 0.15 * BOTTLE_N, "the right hand feels {right_n} N");
         assert!(left_n.z.abs() < 0.1 * BOTTLE_N, "the left hand feels {left_n} N");
     }

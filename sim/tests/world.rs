@@ -2,9 +2,9 @@
 
 use std::f32::consts::PI;
 
-use tandem_sim::{ObjectPlacement, Pose, RobotCommand, RobotPlacement, SimError, Vector, World, WorldSpec};
-
-const CONTROL_DT_S: f32 = 0.02;
+use tandem_sim::{
+    CONTROL_DT_S, ObjectPlacement, Pose, RobotCommand, RobotPlacement, SimError, Vector, World, WorldSpec,
+};
 
 fn kitchen() -> WorldSpec {
     let robot = |name: &str, x: f32, y: f32, yaw_rad: f32| RobotPlacement {

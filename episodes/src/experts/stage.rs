@@ -1,6 +1,6 @@
 //! What every expert builds on: hands that move along straight lines in the world, several at once.
 
-use tandem_sim::{Pose, Side};
+use tandem_sim::{CONTROL_DT_S, Pose, Side};
 use tandem_tools_spec::{MoveWrists, StopReason, ToolCall, ToolReply, WristMove};
 
 use super::{Arena, ExpertError};
@@ -8,7 +8,6 @@ use crate::facts::Facts;
 
 /// Control steps of one command: short enough to correct for a swaying pelvis.
 const STEPS_PER_COMMAND: u32 = 10;
-const CONTROL_DT_S: f32 = 0.02;
 const ROBOT_NAMES: [&str; 3] = ["A", "B", "C"];
 
 /// Part of one hand in a motion. What is not said stays as it is.
@@ -151,7 +150,7 @@ impl<'a> Stage<'a> {
 
 fn world_from_wrist(facts: &Facts, robot: usize, side: Side) -> Pose {
     let robot = &facts.robots[robot];
-    robot.pelvis_in_world * robot.wrist_in_pelvis[side.index()]
+    robot.pelvis_in_world * robot.wrist_in_pelvis[side]
 }
 
 /// Zero speed at both ends.

@@ -92,14 +92,14 @@ impl JsonMessage for Hands {
 
 impl From<&RobotStep> for Json<Hands> {
     fn from(step: &RobotStep) -> Self {
-        let [left, right] = step.state.hand_force_n.map(|force_n| force_n.to_array());
+        let felt_n = step.state.hand_force_n.map(|force_n| force_n.to_array());
         let named = |side: Side, wanted: Grip| {
             let grips = step.grips.iter().filter(|(_, grips)| grips[side.index()] == wanted);
             grips.map(|(object, _)| object.clone()).collect()
         };
         Json(Hands {
-            left_force_n: left,
-            right_force_n: right,
+            left_force_n: felt_n.left,
+            right_force_n: felt_n.right,
             left_holds: named(Side::Left, Grip::Holding),
             right_holds: named(Side::Right, Grip::Holding),
             left_touches: named(Side::Left, Grip::Touching),

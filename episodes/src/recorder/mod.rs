@@ -22,10 +22,9 @@ use foxglove::messages::{
     CameraCalibration, CompressedImage, FrameTransforms, JointState, JointStates, SceneUpdate,
 };
 use tandem_sim::{
-    Pose, RobotCommand, RobotState,
+    Pose, RobotCommand, RobotModel, RobotState, UPPER,
     mjcf::{Geom, MjcfCamera},
     render::robot_rgba,
-    robot::{RobotModel, UPPER},
 };
 use tandem_tools_spec::{Budget, PhaseReached, Protocol, ToolCall, ToolReply};
 

@@ -3,7 +3,7 @@
 use std::f32::consts::PI;
 
 use foxglove::messages::{FrameTransform, FrameTransforms, Quaternion, Timestamp, Vector3};
-use tandem_sim::{Pose, RobotState, Rotation, Vector, robot::RobotModel};
+use tandem_sim::{Pose, RobotModel, RobotState, Rotation, Vector};
 
 use super::{RecordedRobot, StepRecord, file::time_ns};
 
