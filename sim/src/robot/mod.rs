@@ -50,7 +50,7 @@ pub struct RobotState {
     pub torque_n_m: [f32; JOINTS],
     pub world_from_pelvis: Pose,
     pub pelvis_from_wrist: Sides<Pose>,
-    /// MuJoCo's camera axes: x right, y up, looking along -z.
+    /// Axes as [`crate::mjcf::MjcfCamera`]'s.
     pub pelvis_from_camera: Pose,
     /// Weight that each hand carries beyond its own, estimated from joint torques.
     pub payload_n: Sides<f32>,
