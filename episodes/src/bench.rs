@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use tandem_ik::bench::{Report, TargetSet, run};
 use tandem_ik::{IkError, Model};
 use tandem_sim::assets;
-pub use tandem_sim::locomotion::bench::{CaseReport, Report as LocomotionReport};
-use tandem_sim::locomotion::{self, LocomotionChoice};
+pub use tandem_sim::bench::{CaseReport, Report as LocomotionReport};
+use tandem_sim::{LocomotionChoice, bench};
 
 use crate::commands;
 
@@ -34,7 +34,7 @@ pub fn locomotion(
     seeds: usize,
     done: impl FnMut(&CaseReport),
 ) -> Result<LocomotionReport, BenchError> {
-    Ok(locomotion::bench::run(&|| choice.controller(), filter, seeds, done)?)
+    Ok(bench::run(&|| choice.controller(), filter, seeds, done)?)
 }
 
 /// Solves the targets of a file, or 200 that are drawn from the robot's own joint ranges.

@@ -9,20 +9,20 @@ pub mod locomotion;
 pub mod mjcf;
 pub mod render;
 pub mod robot;
+mod sides;
+mod units;
 pub mod world;
 
 pub use error::SimError;
-pub use locomotion::{BaseCommand, BaseLimits};
+pub use locomotion::{BaseCommand, BaseLimits, LocomotionChoice, bench};
 pub use rapier3d::math::{Pose, Rotation, Vector};
-pub use robot::{RobotCommand, RobotState, Side};
+pub use robot::{
+    ARM_COLUMNS, ARM_JOINTS, HAND_COLUMNS, HAND_JOINTS, JOINTS, Robot, RobotCommand, RobotModel, RobotState,
+    UPPER, UPPER_JOINTS, WAIST_COLUMN, WholeBody, joint_names,
+};
+pub use sides::{Side, Sides};
+pub use units::{CONTROL_DT_S, CONTROL_HZ, GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL};
 pub use world::{
     HandContacts, ObjectModel, ObjectPlacement, ObjectState, ObjectStep, RobotPlacement, RobotStep, Snapshot,
     Step, Touch, World, WorldSpec,
 };
-
-/// Control steps per second; every control step runs [`PHYSICS_STEPS_PER_CONTROL`] physics steps.
-pub const CONTROL_HZ: f64 = 50.0;
-/// Physics runs at 200 Hz.
-pub const PHYSICS_STEPS_PER_CONTROL: u32 = 4;
-/// Length of one physics step.
-pub const PHYSICS_DT_S: f32 = 1.0 / 200.0;

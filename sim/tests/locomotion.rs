@@ -1,7 +1,7 @@
 //! The default base controller walks, carries, gives way and comes back, bit for bit again.
 
-use tandem_sim::locomotion::{Balance, bench};
-use tandem_sim::{RobotCommand, RobotPlacement, World, WorldSpec};
+use tandem_sim::locomotion::Balance;
+use tandem_sim::{RobotCommand, RobotPlacement, World, WorldSpec, bench};
 
 fn report(case: &str, seeds: usize) -> bench::CaseReport {
     let report = bench::run(&|| Box::new(Balance::default()), case, seeds, |_| {}).unwrap();

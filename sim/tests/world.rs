@@ -2,9 +2,10 @@
 
 use std::f32::consts::PI;
 
-use tandem_sim::{ObjectPlacement, Pose, RobotCommand, RobotPlacement, SimError, Vector, World, WorldSpec};
-
-const CONTROL_DT_S: f32 = 0.02;
+use tandem_sim::{
+    CONTROL_DT_S, HandContacts, ObjectPlacement, Pose, RobotCommand, RobotPlacement, Side, SimError, Step,
+    Vector, World, WorldSpec,
+};
 
 fn kitchen() -> WorldSpec {
     let robot = |name: &str, x: f32, y: f32, yaw_rad: f32| RobotPlacement {
@@ -47,10 +48,16 @@ fn rest(world: &World) -> Vec<RobotCommand> {
     (0..world.robots().len()).map(|robot| world.rest_command(robot)).collect()
 }
 
-fn run(world: &mut World, rest: &[RobotCommand], steps: u64) {
+/// The last step of several that wave.
+fn run(world: &mut World, rest: &[RobotCommand], steps: u64) -> Step {
     for _ in 0..steps {
         world.control_step(&waving(rest, world.control_steps()));
     }
+    world.present()
+}
+
+fn pelvis_m(step: &Step, robot: usize) -> Vector {
+    step.robots[robot].state.world_from_pelvis.translation
 }
 
 #[test]
@@ -59,32 +66,32 @@ fn robots_stand_while_their_arms_move() {
     let rest = rest(&world);
     let (mut low, mut high) = (Vector::INFINITY, Vector::NEG_INFINITY);
     for _ in 0..500 {
-        run(&mut world, &rest, 1);
-        let state = world.robot_state(0);
-        low = low.min(state.world_from_pelvis.translation);
-        high = high.max(state.world_from_pelvis.translation);
-        for (torque_n_m, joint) in state.torque_n_m.iter().zip(&world.robots()[0].model.joints) {
+        let step = run(&mut world, &rest, 1);
+        low = low.min(pelvis_m(&step, 0));
+        high = high.max(pelvis_m(&step, 0));
+        let torques_n_m = step.robots[0].state.torque_n_m;
+        for (torque_n_m, joint) in torques_n_m.iter().zip(&world.robots()[0].model.joints) {
             assert!(torque_n_m.abs() <= joint.effort_n_m, "{} needs {torque_n_m} N m", joint.name);
         }
         assert_eq!(world.self_contacts(0), []);
+        assert!(step.robots.iter().all(|robot| !robot.state.fallen));
     }
     let sway = high - low;
     assert!(sway.x < 0.015 && sway.y < 0.015 && sway.z < 0.005, "pelvis sways {sway} m");
-    assert!(!world.robot_state(0).fallen && !world.robot_state(1).fallen);
 }
 
 #[test]
 fn height_command_is_followed_without_drift() {
     let mut world = world();
     let mut commands = rest(&world);
-    let start = world.robot_state(0).world_from_pelvis.translation;
+    let start = pelvis_m(&world.present(), 0);
     for (height_m, steps) in [(0.60, 200), (0.74, 200)] {
         commands[0].base.pelvis_height_m = height_m;
         (0..steps).for_each(|_| drop(world.control_step(&commands)));
-        let pelvis = world.robot_state(0).world_from_pelvis.translation;
+        let pelvis = pelvis_m(&world.present(), 0);
         assert!((pelvis.z - height_m).abs() < 0.02, "asked for {height_m} m, stands at {} m", pelvis.z);
     }
-    let end = world.robot_state(0).world_from_pelvis.translation;
+    let end = pelvis_m(&world.present(), 0);
     assert!((end.x - start.x).abs() < 0.01 && (end.y - start.y).abs() < 0.01, "from {start} to {end}");
 }
 
@@ -96,10 +103,49 @@ fn bottle_rests_where_it_was_put() {
     for _ in 0..500 {
         world.control_step(&commands);
     }
-    let state = world.object("bottle").expect("it is in the world");
+    let step = world.present();
+    let state = step.object("bottle").expect("it is in the world");
     let drift_m = (state.world_from_object.translation - start).length();
     assert!(drift_m < 0.002, "drifted {drift_m} m");
     assert!(state.velocity_m_s.length() < 0.01);
+    assert_eq!(step.touches, [], "nobody is near it");
+}
+
+#[test]
+fn a_step_says_what_was_done_and_comes_back_from_its_bytes() {
+    let mut world = world();
+    let commands = waving(&rest(&world), 5);
+    let first = world.present();
+    assert_eq!((first.control_step, first.time_s), (0, 0.0));
+    let at_rest: Vec<RobotCommand> = first.robots.iter().map(|robot| robot.command).collect();
+    assert_eq!(at_rest, rest(&world));
+
+    let step = world.control_step(&commands);
+    assert_eq!((step.control_step, step.time_s), (1, 0.02));
+    let executed: Vec<RobotCommand> = step.robots.iter().map(|robot| robot.command).collect();
+    assert_eq!(executed, commands);
+    let bytes = postcard::to_stdvec(&step).expect("a step is plain");
+    assert_eq!(postcard::from_bytes::<Step>(&bytes).expect("it was just written"), step);
+}
+
+#[test]
+fn a_step_names_the_hand_that_touches() {
+    let right_wrist = {
+        let state = &world().present().robots[0].state;
+        state.world_from_pelvis * state.pelvis_from_wrist.right
+    };
+    let mut spec = kitchen();
+    // The bottle's lower half reaches into the hand from above.
+    let in_hand_m = right_wrist * Vector::new(0.09, 0.0, 0.0);
+    spec.objects[0].world_from_object = Pose::from_translation(in_hand_m);
+    let mut world = World::new(&spec).expect("embedded files load");
+    let rest = rest(&world);
+    let step = world.control_step(&rest);
+    let hands: Vec<_> = step.touches.iter().map(|touch| (touch.robot, touch.side, touch.object)).collect();
+    assert_eq!(hands, [(0, Side::Right, 0)]);
+    assert_eq!(step.contacts(0, Side::Right, "bottle"), step.touches[0].contacts);
+    assert_eq!(step.contacts(0, Side::Left, "bottle"), HandContacts::default());
+    assert_eq!(step.contacts(0, Side::Right, "vase"), HandContacts::default());
 }
 
 #[test]
@@ -118,13 +164,13 @@ fn equal_commands_give_equal_hashes_and_other_commands_do_not() {
 fn a_restored_world_continues_bit_for_bit() {
     let mut original = world();
     let rest = rest(&original);
-    run(&mut original, &rest, 40);
+    let saved = run(&mut original, &rest, 40);
     let snapshot = original.snapshot().expect("worlds can be saved");
     run(&mut original, &rest, 60);
 
     let mut continued = world();
     continued.restore(&snapshot).expect("the same binary reads it");
-    assert_eq!(continued.control_steps(), 40);
+    assert_eq!(continued.present(), saved);
     run(&mut continued, &rest, 60);
     assert_eq!(continued.state_hash(), original.state_hash());
 }

@@ -11,7 +11,7 @@ use super::stand::Stand;
 use super::step::Step;
 use super::{BaseCommand, BaseLimits, LegCommand, Locomotion};
 use crate::robot::WholeBody;
-use crate::world::GRAVITY_M_S2;
+use crate::{GRAVITY_M_S2, Sides};
 
 const LIMITS: BaseLimits = BaseLimits {
     vx_m_s: [-0.3, 0.4],
@@ -112,7 +112,7 @@ impl State {
     fn new(body: &WholeBody) -> State {
         let pelvis = body.world_from_pelvis();
         let heading_rad = heading_rad(pelvis);
-        let [left, right] = soles(body);
+        let Sides { left, right } = soles(body);
         let middle_m = (left.translation + right.translation) * 0.5;
         let mut pelvis_from_middle_m =
             Rotation::from_rotation_z(-heading_rad) * (pelvis.translation - middle_m);
@@ -159,7 +159,7 @@ impl State {
     }
 
     fn stance(&self, body: &WholeBody, load: &Load) -> Stance {
-        let [left, right] = soles(body);
+        let Sides { left, right } = soles(body);
         let middle_m = (left.translation + right.translation) * 0.5;
         let height_m = body.com_m.z - middle_m.z;
         let capture_m = load.balance_point_m + body.com_velocity_m_s * (height_m / GRAVITY_M_S2).sqrt();

@@ -6,8 +6,8 @@ use rapier3d::na::{SMatrix, SVector};
 use super::ground::{FootForce, distribute, leg_torques_n_m, soles};
 use super::load::Load;
 use super::plane::flat;
-use crate::robot::{Acceleration, Effort, JOINTS, LEG_JOINT_COUNT, LEGS, Side, WholeBody};
-use crate::world::GRAVITY_M_S2;
+use crate::robot::{Acceleration, Effort, JOINTS, LEG_JOINTS, LEGS, WholeBody};
+use crate::{GRAVITY_M_S2, Side, Sides};
 
 /// Horizontal force within what friction surely gives.
 const FRICTION_USED: f32 = 0.7;
@@ -33,8 +33,8 @@ const EASED_FEET: f32 = 0.2;
 pub(super) struct Motion {
     pub lift_m_s2: f32,
     pub turn_rad_s2: Vector,
-    /// Left, right ankle roll link; zero for a foot that stands.
-    pub feet: [Acceleration; 2],
+    /// Of the ankle roll links; zero for a foot that stands.
+    pub feet: Sides<Acceleration>,
 }
 
 /// Where the ground acts.
@@ -44,9 +44,9 @@ pub(super) struct Contact {
     pub foot: Option<Side>,
 }
 
-/// Of both legs, left and right.
+/// Of both legs.
 pub(super) struct Torques {
-    pub torque_n_m: [[f32; LEG_JOINT_COUNT]; 2],
+    pub torque_n_m: Sides<[f32; LEG_JOINTS]>,
     /// Horizontal acceleration of the centre of mass that they bring.
     pub acceleration_m_s2: Vector,
 }
@@ -60,9 +60,9 @@ pub(super) fn leg_torques_within_limits(
     contact: &Contact,
 ) -> Torques {
     let full = leg_torques(body, load, motion, contact);
-    let most_n_m = |leg: usize, i: usize| body.model.joints[LEGS[leg] + i].effort_n_m * EFFORT_USED;
-    let joints = || (0..2).flat_map(|leg| (0..LEG_JOINT_COUNT).map(move |i| (leg, i)));
-    if joints().all(|(leg, i)| full.torque_n_m[leg][i].abs() <= most_n_m(leg, i)) {
+    let most_n_m = |side: Side, i: usize| body.model.joints[LEGS[side] + i].effort_n_m * EFFORT_USED;
+    let joints = || Side::BOTH.into_iter().flat_map(|side| (0..LEG_JOINTS).map(move |i| (side, i)));
+    if joints().all(|(side, i)| full.torque_n_m[side][i].abs() <= most_n_m(side, i)) {
         return full;
     }
     let eased = Motion {
@@ -75,17 +75,17 @@ pub(super) fn leg_torques_within_limits(
     };
     let eased = leg_torques(body, load, &eased, contact);
     let mut share = 1.0_f32;
-    for (leg, i) in joints() {
-        let (low, high) = (eased.torque_n_m[leg][i], full.torque_n_m[leg][i]);
-        let most = most_n_m(leg, i);
+    for (side, i) in joints() {
+        let (low, high) = (eased.torque_n_m[side][i], full.torque_n_m[side][i]);
+        let most = most_n_m(side, i);
         if high.abs() > most && low.abs() < most {
             share = share.min((most * high.signum() - low) / (high - low));
         }
     }
     let between = |low: f32, high: f32| low + (high - low) * share;
     Torques {
-        torque_n_m: std::array::from_fn(|leg| {
-            std::array::from_fn(|i| between(eased.torque_n_m[leg][i], full.torque_n_m[leg][i]))
+        torque_n_m: Sides::from_fn(|side| {
+            std::array::from_fn(|i| between(eased.torque_n_m[side][i], full.torque_n_m[side][i]))
         }),
         acceleration_m_s2: eased.acceleration_m_s2
             + (full.acceleration_m_s2 - eased.acceleration_m_s2) * share,
@@ -107,7 +107,7 @@ fn leg_torques(body: &WholeBody, load: &Load, motion: &Motion, contact: &Contact
     let inertia_kg_m = body.model.mass_kg * height_m;
     let most_turn_n_m = match contact.foot {
         Some(side) => {
-            let from_middle_m = flat(point_m - soles(body)[side.index()].translation).length();
+            let from_middle_m = flat(point_m - soles(body)[side].translation).length();
             LARGEST_TURN_N_M * (1.0 - from_middle_m / TURN_FADE_M).max(0.1)
         }
         None => LARGEST_TURN_N_M,
@@ -139,19 +139,19 @@ fn leg_torques(body: &WholeBody, load: &Load, motion: &Motion, contact: &Contact
     let turn_n_m = Vector::Z * rest_n_m.z.clamp(-most_turn_n_m, most_turn_n_m);
     let pushes = match contact.foot {
         Some(side) => {
-            let mut pushes = [[0.0; LEG_JOINT_COUNT]; 2];
-            pushes[side.index()] = leg_torques_n_m(body, side, FootForce { force_n, point_m }, turn_n_m);
+            let mut pushes = Sides::both([0.0; LEG_JOINTS]);
+            pushes[side] = leg_torques_n_m(body, side, FootForce { force_n, point_m }, turn_n_m);
             pushes
         }
         None => {
             let about_com_n_m = rest_n_m + (point_m - body.com_m).cross(force_n);
             let feet = distribute(body.com_m, force_n, about_com_n_m, soles(body));
-            Side::BOTH.map(|side| leg_torques_n_m(body, side, feet[side.index()], turn_n_m * 0.5))
+            Sides::from_fn(|side| leg_torques_n_m(body, side, feet[side], turn_n_m * 0.5))
         }
     };
     Torques {
-        torque_n_m: Side::BOTH.map(|side| {
-            std::array::from_fn(|i| effort.torque_n_m[LEGS[side.index()] + i] + pushes[side.index()][i])
+        torque_n_m: Sides::from_fn(|side| {
+            std::array::from_fn(|i| effort.torque_n_m[LEGS[side] + i] + pushes[side][i])
         }),
         acceleration_m_s2: flat(force_n) / body.model.mass_kg,
     }
@@ -163,10 +163,10 @@ pub(super) fn ground_force_n(
     body: &WholeBody,
     side: Side,
     dynamics_n_m: &[f32; JOINTS],
-    torque_n_m: &[f32; LEG_JOINT_COUNT],
+    torque_n_m: &[f32; LEG_JOINTS],
 ) -> Vector {
     let jacobian = foot_jacobian(body, side);
-    let rest = SVector::<f32, 6>::from_fn(|i, _| dynamics_n_m[LEGS[side.index()] + i] - torque_n_m[i]);
+    let rest = SVector::<f32, 6>::from_fn(|i, _| dynamics_n_m[LEGS[side] + i] - torque_n_m[i]);
     let normal = jacobian * jacobian.transpose() + SMatrix::identity() * FORCE_DAMPING;
     normal.cholesky().map_or(Vector::ZERO, |factor| {
         let wrench = factor.solve(&(jacobian * rest));
@@ -176,10 +176,10 @@ pub(super) fn ground_force_n(
 
 /// Linear over angular velocity of an ankle roll link per joint velocity of its leg.
 fn foot_jacobian(body: &WholeBody, side: Side) -> SMatrix<f32, 6, 6> {
-    let first = LEGS[side.index()];
+    let first = LEGS[side];
     let foot_m = body.world_from_foot(side).translation;
     let mut jacobian = SMatrix::<f32, 6, 6>::zeros();
-    for i in 0..LEG_JOINT_COUNT {
+    for i in 0..LEG_JOINTS {
         let (origin, axis) = body.joint_axis(first + i);
         let linear = axis.cross(foot_m - origin);
         jacobian.set_column(i, &SVector::from([linear.x, linear.y, linear.z, axis.x, axis.y, axis.z]));
@@ -191,17 +191,17 @@ fn foot_jacobian(body: &WholeBody, side: Side) -> SMatrix<f32, 6, 6> {
 ///   (J^T J + damping I) d = J^T (wanted - now).
 fn move_feet(body: &WholeBody, motion: &Motion, effort: &Effort, qdd_rad_s2: &mut [f32; JOINTS]) {
     for side in Side::BOTH {
-        let first = LEGS[side.index()];
+        let first = LEGS[side];
         let foot = body.model.joints[first + 5].link;
         let jacobian = foot_jacobian(body, side);
-        let (wanted, now) = (motion.feet[side.index()], effort.links[foot]);
+        let (wanted, now) = (motion.feet[side], effort.links[foot]);
         let linear = wanted.linear_m_s2 - now.linear_m_s2;
         let angular = wanted.angular_rad_s2 - now.angular_rad_s2;
         let error = SVector::<f32, 6>::from([linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]);
         let normal = jacobian.transpose() * jacobian + SMatrix::identity() * DAMPING;
         let Some(factor) = normal.cholesky() else { continue };
         let change = factor.solve(&(jacobian.transpose() * error));
-        for i in 0..LEG_JOINT_COUNT {
+        for i in 0..LEG_JOINTS {
             let most = LARGEST_JOINT_ACCELERATION_RAD_S2;
             qdd_rad_s2[first + i] = (qdd_rad_s2[first + i] + change[i]).clamp(-most, most);
         }

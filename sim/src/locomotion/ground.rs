@@ -3,7 +3,8 @@
 use rapier3d::math::{Pose, Vector};
 
 use super::plane::flat;
-use crate::robot::{LEG_JOINT_COUNT, LEGS, Side, WholeBody};
+use crate::robot::{LEG_JOINTS, LEGS, WholeBody};
+use crate::{Side, Sides};
 
 /// Force on one foot and the point of the ground where it acts, world frame.
 #[derive(Clone, Copy, Debug)]
@@ -20,19 +21,21 @@ const SMALLEST_SHARE: f32 = 0.03;
 /// Below this the centre of pressure is undefined.
 const SMALLEST_VERTICAL_FORCE_N: f32 = 20.0;
 
-/// Centres of the left and right sole, world.
-pub(super) fn soles(body: &WholeBody) -> [Pose; 2] {
-    // A robot file without these sites is refused when it is read.
-    ["left_foot", "right_foot"].map(|site| body.world_from_site(site).unwrap_or(Pose::IDENTITY))
+/// Centres of the soles, world.
+pub(super) fn soles(body: &WholeBody) -> Sides<Pose> {
+    Sides::from_fn(|side| {
+        // A robot file without these sites is refused when it is read.
+        body.world_from_site(&format!("{}_foot", side.name())).unwrap_or(Pose::IDENTITY)
+    })
 }
 
 /// The point nearest to `point_m` where two planted feet can have their centre of pressure.
-pub(super) fn nearest_support_m(point_m: Vector, soles: [Pose; 2]) -> Vector {
-    let across = flat(soles[0].translation - soles[1].translation);
-    let left_share = (flat(point_m - soles[1].translation).dot(across) / across.length_squared())
+pub(super) fn nearest_support_m(point_m: Vector, soles: Sides<Pose>) -> Vector {
+    let across = flat(soles.left.translation - soles.right.translation);
+    let left_share = (flat(point_m - soles.right.translation).dot(across) / across.length_squared())
         .clamp(SMALLEST_SHARE, 1.0 - SMALLEST_SHARE);
-    let middle_m = soles[0].translation * left_share + soles[1].translation * (1.0 - left_share);
-    let turn = soles[1].rotation.slerp(soles[0].rotation, left_share);
+    let middle_m = soles.left.translation * left_share + soles.right.translation * (1.0 - left_share);
+    let turn = soles.right.rotation.slerp(soles.left.rotation, left_share);
     let inside = turn.inverse() * flat(point_m - middle_m);
     let inside = Vector::new(
         inside.x.clamp(-SOLE_HALF_LENGTH_M, SOLE_HALF_LENGTH_M),
@@ -48,7 +51,7 @@ pub(super) fn supported_force_n(
     com_m: Vector,
     force_n: Vector,
     moment_n_m: Vector,
-    soles: [Pose; 2],
+    soles: Sides<Pose>,
 ) -> Vector {
     let pressure_m = centre_of_pressure_m(com_m, force_n, moment_n_m, soles);
     let height_m = com_m.z - pressure_m.z;
@@ -61,8 +64,8 @@ pub(super) fn supported_force_n(
 }
 
 ///   p = c + ( -(m_y + h f_x), m_x - h f_y ) / f_z,   h = height of c above the soles.
-fn centre_of_pressure_m(com_m: Vector, force_n: Vector, moment_n_m: Vector, soles: [Pose; 2]) -> Vector {
-    let ground_m = (soles[0].translation.z + soles[1].translation.z) * 0.5;
+fn centre_of_pressure_m(com_m: Vector, force_n: Vector, moment_n_m: Vector, soles: Sides<Pose>) -> Vector {
+    let ground_m = (soles.left.translation.z + soles.right.translation.z) * 0.5;
     let height_m = com_m.z - ground_m;
     let vertical_n = force_n.z.max(SMALLEST_VERTICAL_FORCE_N);
     Vector::new(
@@ -78,25 +81,26 @@ pub(super) fn distribute(
     com_m: Vector,
     force_n: Vector,
     moment_n_m: Vector,
-    soles: [Pose; 2],
-) -> [FootForce; 2] {
+    soles: Sides<Pose>,
+) -> Sides<FootForce> {
     let pressure_m = centre_of_pressure_m(com_m, force_n, moment_n_m, soles);
     let ground_m = pressure_m.z;
-    let across = flat(soles[0].translation - soles[1].translation);
-    let along_line = flat(pressure_m - soles[1].translation).dot(across) / across.length_squared();
+    let across = flat(soles.left.translation - soles.right.translation);
+    let along_line = flat(pressure_m - soles.right.translation).dot(across) / across.length_squared();
     let left_share = along_line.clamp(SMALLEST_SHARE, 1.0 - SMALLEST_SHARE);
-    let middle_m = soles[0].translation * left_share + soles[1].translation * (1.0 - left_share);
+    let middle_m = soles.left.translation * left_share + soles.right.translation * (1.0 - left_share);
     let rest_m = flat(pressure_m - middle_m);
-    [0, 1].map(|foot| {
-        let share = if foot == 0 { left_share } else { 1.0 - left_share };
-        let inside = soles[foot].rotation.inverse() * rest_m;
+    let shares = Sides { left: left_share, right: 1.0 - left_share };
+    Sides::from_fn(|side| {
+        let sole = soles[side];
+        let inside = sole.rotation.inverse() * rest_m;
         let inside = Vector::new(
             inside.x.clamp(-SOLE_HALF_LENGTH_M, SOLE_HALF_LENGTH_M),
             inside.y.clamp(-SOLE_HALF_WIDTH_M, SOLE_HALF_WIDTH_M),
             0.0,
         );
-        let point_m = soles[foot].translation + soles[foot].rotation * inside;
-        FootForce { force_n: force_n * share, point_m: Vector::new(point_m.x, point_m.y, ground_m) }
+        let point_m = sole.translation + sole.rotation * inside;
+        FootForce { force_n: force_n * shares[side], point_m: Vector::new(point_m.x, point_m.y, ground_m) }
     })
 }
 
@@ -107,9 +111,9 @@ pub(super) fn leg_torques_n_m(
     side: Side,
     foot: FootForce,
     free_moment_n_m: Vector,
-) -> [f32; LEG_JOINT_COUNT] {
+) -> [f32; LEG_JOINTS] {
     std::array::from_fn(|i| {
-        let joint = LEGS[side.index()] + i;
+        let joint = LEGS[side] + i;
         let (_, axis) = body.joint_axis(joint);
         -body.moment_n_m(joint, foot.point_m, foot.force_n) - axis.dot(free_moment_n_m)
     })

@@ -3,9 +3,10 @@
 use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::na::{SMatrix, SVector};
 
-use crate::robot::{LEG_JOINT_COUNT, LEGS, RobotModel, Side};
+use crate::Side;
+use crate::robot::{LEG_JOINTS, LEGS, RobotModel};
 
-pub(super) type LegAngles = [f32; LEG_JOINT_COUNT];
+pub(super) type LegAngles = [f32; LEG_JOINTS];
 
 /// Largest change of a joint in one iteration: the linearisation holds within it.
 const MAX_STEP_RAD: f32 = 0.3;
@@ -25,12 +26,12 @@ fn forward(
     side: Side,
     pelvis: Pose,
     q_rad: &LegAngles,
-) -> ([Vector; 6], [Vector; 6], Pose) {
+) -> ([Vector; LEG_JOINTS], [Vector; LEG_JOINTS], Pose) {
     let mut frame = pelvis;
-    let mut origins = [Vector::ZERO; LEG_JOINT_COUNT];
-    let mut axes = [Vector::ZERO; LEG_JOINT_COUNT];
-    for i in 0..LEG_JOINT_COUNT {
-        let joint = &model.joints[LEGS[side.index()] + i];
+    let mut origins = [Vector::ZERO; LEG_JOINTS];
+    let mut axes = [Vector::ZERO; LEG_JOINTS];
+    for i in 0..LEG_JOINTS {
+        let joint = &model.joints[LEGS[side] + i];
         frame *= model.links[joint.link].parent_from_link;
         origins[i] = frame.translation;
         axes[i] = frame.rotation * joint.axis;
@@ -58,7 +59,7 @@ pub(super) fn inverse(
             position.x, position.y, position.z, rotation.x, rotation.y, rotation.z,
         ]);
         let mut jacobian = SMatrix::<f32, 6, 6>::zeros();
-        for i in 0..LEG_JOINT_COUNT {
+        for i in 0..LEG_JOINTS {
             let linear = axes[i].cross(reached.translation - origins[i]);
             let column = [linear.x, linear.y, linear.z, axes[i].x, axes[i].y, axes[i].z];
             jacobian.set_column(i, &SVector::from(column));
@@ -66,8 +67,8 @@ pub(super) fn inverse(
         let normal = jacobian.transpose() * jacobian + SMatrix::identity() * DAMPING;
         let Some(factor) = normal.cholesky() else { break };
         let step = factor.solve(&(jacobian.transpose() * error));
-        for i in 0..LEG_JOINT_COUNT {
-            let joint = &model.joints[LEGS[side.index()] + i];
+        for i in 0..LEG_JOINTS {
+            let joint = &model.joints[LEGS[side] + i];
             let moved = q_rad[i] + step[i].clamp(-MAX_STEP_RAD, MAX_STEP_RAD);
             q_rad[i] = moved.clamp(joint.lower_rad, joint.upper_rad);
         }

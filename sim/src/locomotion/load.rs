@@ -2,8 +2,8 @@
 
 use rapier3d::math::Vector;
 
+use crate::GRAVITY_M_S2;
 use crate::robot::WholeBody;
-use crate::world::GRAVITY_M_S2;
 
 /// External wrench, world frame, and its effect on balance: weights in the hands and an observed push.
 pub(super) struct Load {

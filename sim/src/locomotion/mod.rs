@@ -22,7 +22,8 @@ pub use choice::LocomotionChoice;
 
 use serde::{Deserialize, Serialize};
 
-use crate::robot::WholeBody;
+use crate::Sides;
+use crate::robot::{LEG_JOINTS, WholeBody};
 
 /// What a policy asks of the base, in the robot's own heading frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -55,14 +56,17 @@ impl BaseLimits {
     }
 }
 
-/// PD target, gains and feedforward of the legs for one physics step: left six joints, then right six.
-#[derive(Clone, Debug)]
-pub struct LegCommand {
-    pub q_rad: [f32; 12],
-    pub kp_n_m_rad: [f32; 12],
-    pub kd_n_m_s_rad: [f32; 12],
-    pub feedforward_n_m: [f32; 12],
+/// Spring, damper and feedforward of one joint for one physics step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Drive {
+    pub target_rad: f32,
+    pub kp_n_m_rad: f32,
+    pub kd_n_m_s_rad: f32,
+    pub feedforward_n_m: f32,
 }
+
+/// Drives of both legs, from the hip to the ankle.
+pub type LegCommand = Sides<[Drive; LEG_JOINTS]>;
 
 /// A base controller. It sees its own robot only, and acts through joint drives of legs and waist only.
 pub trait Locomotion: Send {

@@ -7,14 +7,14 @@
 use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
-use super::LegCommand;
 use super::effort::ground_force_n;
 use super::ground::{distribute, leg_torques_n_m, soles, supported_force_n};
 use super::legs::{LegAngles, inverse, rotation_vector_rad};
 use super::load::Load;
 use super::plane::flat;
-use crate::robot::{LEG_JOINT_COUNT, LEGS, Side, WholeBody};
-use crate::world::GRAVITY_M_S2;
+use super::{Drive, LegCommand};
+use crate::robot::{JOINTS, LEG_JOINTS, LEGS, WholeBody};
+use crate::{GRAVITY_M_S2, Side, Sides};
 
 /// The centre of mass may lie this far from the middle of the feet before the pelvis gives way.
 const COM_ZONE_M: f32 = 0.03;
@@ -48,8 +48,8 @@ const TILT_SETTLING_TIME_S: f32 = 0.15;
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct Stand {
     /// Ankle roll links where they were planted, world.
-    feet: [Pose; 2],
-    soles: [Pose; 2],
+    feet: Sides<Pose>,
+    soles: Sides<Pose>,
     /// Pelvis over the middle of the feet, and what it still is away from there since planting.
     home_m: Vector,
     offset_m: Vector,
@@ -58,7 +58,7 @@ pub(super) struct Stand {
     heading_rad: f32,
     shift_m: Vector,
     height_m: f32,
-    q_rad: [LegAngles; 2],
+    q_rad: Sides<LegAngles>,
 }
 
 impl Stand {
@@ -67,11 +67,11 @@ impl Stand {
     pub(super) fn plant(body: &WholeBody, heading_rad: f32, moving: Option<(Vector, &Load)>) -> Stand {
         let pelvis = body.world_from_pelvis();
         let soles = soles(body);
-        let middle_m = (soles[0].translation + soles[1].translation) * 0.5;
+        let middle_m = (soles.left.translation + soles.right.translation) * 0.5;
         let heading = Rotation::from_rotation_z(heading_rad);
         let home_m = moving.map_or(pelvis.translation, |(rest_m, _)| middle_m + heading * rest_m);
         let mut stand = Stand {
-            feet: Side::BOTH.map(|side| body.world_from_foot(side)),
+            feet: Sides::from_fn(|side| body.world_from_foot(side)),
             soles,
             home_m,
             offset_m: flat(pelvis.translation - home_m),
@@ -80,7 +80,7 @@ impl Stand {
             heading_rad,
             shift_m: Vector::ZERO,
             height_m: pelvis.translation.z - middle_m.z,
-            q_rad: Side::BOTH.map(|side| std::array::from_fn(|i| body.q_rad[LEGS[side.index()] + i])),
+            q_rad: Sides::from_fn(|side| std::array::from_fn(|i| body.q_rad[LEGS[side] + i])),
         };
         if let Some((_, load)) = moving {
             stand.offset_rate_m_s = flat(body.com_velocity_m_s);
@@ -92,7 +92,7 @@ impl Stand {
 
     /// Shift of the pelvis from home that keeps the balance point within [`COM_ZONE_M`] of the middle of the feet.
     fn wanted_shift_m(&self, body: &WholeBody, load: &Load) -> Vector {
-        let middle_m = (self.soles[0].translation + self.soles[1].translation) * 0.5;
+        let middle_m = (self.soles.left.translation + self.soles.right.translation) * 0.5;
         let at_home_m = self.home_m + load.balance_point_m - body.world_from_pelvis().translation - middle_m;
         let excess = |offset_m: f32| offset_m.clamp(-COM_ZONE_M, COM_ZONE_M) - offset_m;
         Vector::new(
@@ -119,43 +119,33 @@ impl Stand {
         self.tilt = self.tilt.slerp(Rotation::IDENTITY, dt_s / TILT_SETTLING_TIME_S);
         let goal = self.pelvis_goal(body, load, dt_s);
         for side in Side::BOTH {
-            let leg = &mut self.q_rad[side.index()];
-            *leg = inverse(body.model, side, goal, self.feet[side.index()], leg, IK_ITERATIONS);
+            let leg = &mut self.q_rad[side];
+            *leg = inverse(body.model, side, goal, self.feet[side], leg, IK_ITERATIONS);
         }
         let goal_velocity_m_s = Vector::new(self.offset_rate_m_s.x, self.offset_rate_m_s.y, rise_m / dt_s);
-        let torques = balance_torques_n_m(body, load, goal, goal_velocity_m_s);
-        let gravity = body.gravity_torques_n_m();
-        let feedforward_n_m: [f32; 2 * LEG_JOINT_COUNT] = std::array::from_fn(|i| {
-            let (leg, own) = (i / LEG_JOINT_COUNT, i % LEG_JOINT_COUNT);
-            gravity[LEGS[leg] + own] + torques[leg][own]
+        let torques_n_m = balance_torques_n_m(body, load, goal, goal_velocity_m_s);
+        let gravity_n_m = body.gravity_torques_n_m();
+        let legs: LegCommand = Sides::from_fn(|side| {
+            std::array::from_fn(|i| {
+                let joint = LEGS[side] + i;
+                let model = &body.model.joints[joint];
+                Drive {
+                    target_rad: self.q_rad[side][i],
+                    kp_n_m_rad: model.kp_n_m_rad,
+                    kd_n_m_s_rad: model.kd_n_m_s_rad,
+                    feedforward_n_m: gravity_n_m[joint] + torques_n_m[side][i],
+                }
+            })
         });
-        let joint = |i: usize| &body.model.joints[LEGS[i / LEG_JOINT_COUNT] + i % LEG_JOINT_COUNT];
-        let mut push_n = Vector::ZERO;
-        for side in Side::BOTH {
-            let applied_n_m = std::array::from_fn(|own| {
-                let i = side.index() * LEG_JOINT_COUNT + own;
-                let (q_rad, qd_rad_s) =
-                    (body.q_rad[LEGS[side.index()] + own], body.qd_rad_s[LEGS[side.index()] + own]);
-                joint(i).kp_n_m_rad * (self.q_rad[side.index()][own] - q_rad)
-                    - joint(i).kd_n_m_s_rad * qd_rad_s
-                    + feedforward_n_m[i]
-            });
-            push_n += ground_force_n(body, side, &gravity, &applied_n_m);
-        }
-        let expected_m_s2 = push_n / body.model.mass_kg;
-        let legs = LegCommand {
-            q_rad: std::array::from_fn(|i| self.q_rad[i / LEG_JOINT_COUNT][i % LEG_JOINT_COUNT]),
-            kp_n_m_rad: std::array::from_fn(|i| joint(i).kp_n_m_rad),
-            kd_n_m_s_rad: std::array::from_fn(|i| joint(i).kd_n_m_s_rad),
-            feedforward_n_m,
-        };
-        (legs, Vector::new(expected_m_s2.x, expected_m_s2.y, 0.0))
+        let push_n: Vector =
+            Side::BOTH.map(|side| push_n(body, side, &legs[side], &gravity_n_m)).into_iter().sum();
+        (legs, flat(push_n / body.model.mass_kg))
     }
 
     /// Pelvis pose (world) that keeps the centre of mass within [`COM_ZONE_M`] of the middle of the planted feet,
     /// as near to home as that allows.
     fn pelvis_goal(&mut self, body: &WholeBody, load: &Load, dt_s: f32) -> Pose {
-        let middle_m = (self.soles[0].translation + self.soles[1].translation) * 0.5;
+        let middle_m = (self.soles.left.translation + self.soles.right.translation) * 0.5;
         self.shift_m += (self.wanted_shift_m(body, load) - self.shift_m) * (dt_s / PELVIS_SHIFT_TIME_S);
         let lean_rad = ((LEAN_BELOW_M - self.height_m) * LEAN_RAD_PER_M).clamp(0.0, LARGEST_LEAN_RAD);
         let mut position_m = self.home_m + self.offset_m + self.shift_m;
@@ -167,13 +157,23 @@ impl Stand {
     }
 }
 
+/// Force with which the ground answers the drives of one leg.
+fn push_n(body: &WholeBody, side: Side, drives: &[Drive; LEG_JOINTS], gravity_n_m: &[f32; JOINTS]) -> Vector {
+    let applied_n_m = std::array::from_fn(|i| {
+        let (joint, drive) = (LEGS[side] + i, &drives[i]);
+        drive.kp_n_m_rad * (drive.target_rad - body.q_rad[joint]) - drive.kd_n_m_s_rad * body.qd_rad_s[joint]
+            + drive.feedforward_n_m
+    });
+    ground_force_n(body, side, gravity_n_m, &applied_n_m)
+}
+
 /// Leg torques of the ground forces that accelerate the centre of mass and right the trunk towards `goal`.
 fn balance_torques_n_m(
     body: &WholeBody,
     load: &Load,
     goal: Pose,
     goal_velocity_m_s: Vector,
-) -> [[f32; LEG_JOINT_COUNT]; 2] {
+) -> Sides<[f32; LEG_JOINTS]> {
     let mass_kg = body.model.mass_kg;
     let pelvis = body.world_from_pelvis();
     let error_m = goal.translation - pelvis.translation;
@@ -201,5 +201,5 @@ fn balance_torques_n_m(
         supported_force_n(body.com_m, force_n - load.force_n, moment_n_m - load.moment_n_m, soles);
     let feet = distribute(body.com_m, ground_force_n, moment_n_m - load.moment_n_m, soles);
     let turning_n_m = Vector::new(0.0, 0.0, moment_n_m.z * 0.5);
-    Side::BOTH.map(|side| leg_torques_n_m(body, side, feet[side.index()], turning_n_m))
+    Sides::from_fn(|side| leg_torques_n_m(body, side, feet[side], turning_n_m))
 }

@@ -9,7 +9,6 @@
 use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
-use super::LegCommand;
 use super::effort::{Contact, Motion, Torques, leg_torques_within_limits};
 use super::footstep::{Footstep, Situation};
 use super::gait::{Gait, PERIOD_S, TRANSFER_S};
@@ -18,8 +17,9 @@ use super::legs::rotation_vector_rad;
 use super::load::Load;
 use super::plane::{flat, heading_rad, wrapped_rad};
 use super::swing::{SOLE_IN_FOOT_M, SWING_S, Swing};
-use crate::robot::{Acceleration, LEG_JOINT_COUNT, LEGS, Side, WholeBody};
-use crate::world::GRAVITY_M_S2;
+use super::{Drive, LegCommand};
+use crate::robot::{Acceleration, LEGS, WholeBody};
+use crate::{GRAVITY_M_S2, Side, Sides};
 
 const SHIFT_GAIN: f32 = 3.0;
 /// The first foot lifts when the capture point is this near to where a step would have left it, or when a robot that
@@ -84,7 +84,7 @@ impl Step {
     /// Starts stepping; the first foot to carry is the one nearer to the capture point.
     pub(super) fn start(body: &WholeBody, heading_rad: f32, left_carries: bool) -> Step {
         let stance = if left_carries { Side::Left } else { Side::Right };
-        let ground_m = soles(body)[stance.index()].translation.z;
+        let ground_m = soles(body)[stance].translation.z;
         let mut step = Step {
             heading_rad,
             goal_rad: heading_rad,
@@ -120,7 +120,7 @@ impl Step {
         dt_s: f32,
     ) -> (LegCommand, Vector) {
         let soles = soles(body);
-        let ground_m = soles[self.stance.index()].translation.z;
+        let ground_m = soles[self.stance].translation.z;
         self.turn(body, velocity[2], dt_s);
         let heading = Rotation::from_rotation_z(self.heading_rad);
         let (ahead, left) = (heading * Vector::X, heading * Vector::Y);
@@ -133,8 +133,8 @@ impl Step {
             gait: &gait,
             swing: &self.swing,
             capture_m: flat(load.balance_point_m + body.com_velocity_m_s / rate_1_s),
-            stance: soles[self.stance.index()],
-            old_m: flat(soles[self.stance.other().index()].translation),
+            stance: soles[self.stance],
+            old_m: flat(soles[self.stance.other()].translation),
             ahead,
             outside,
             time_s: self.time_s,
@@ -153,16 +153,18 @@ impl Step {
         self.height_m += rise;
         let torques = self.carry(body, load, pressure_m, ground_m, heading, velocity[2]);
         self.land(body, &soles, ground_m);
-        let legs = LegCommand {
-            q_rad: std::array::from_fn(|i| body.q_rad[leg_joint(i)]),
-            kp_n_m_rad: [KP_N_M_RAD; 12],
-            kd_n_m_s_rad: [KD_N_M_S_RAD; 12],
-            feedforward_n_m: std::array::from_fn(|i| {
-                // The drives' dampers are not wanted.
-                let own_n_m = torques.torque_n_m[i / LEG_JOINT_COUNT][i % LEG_JOINT_COUNT];
-                own_n_m + KD_N_M_S_RAD * body.qd_rad_s[leg_joint(i)]
-            }),
-        };
+        let legs = Sides::from_fn(|side| {
+            std::array::from_fn(|i| {
+                let joint = LEGS[side] + i;
+                Drive {
+                    target_rad: body.q_rad[joint],
+                    kp_n_m_rad: KP_N_M_RAD,
+                    kd_n_m_s_rad: KD_N_M_S_RAD,
+                    // The drives' dampers are not wanted.
+                    feedforward_n_m: torques.torque_n_m[side][i] + KD_N_M_S_RAD * body.qd_rad_s[joint],
+                }
+            })
+        });
         (legs, torques.acceleration_m_s2)
     }
 
@@ -191,7 +193,7 @@ impl Step {
         let pelvis_m = body.world_from_pelvis().translation;
         let remaining_s = (PERIOD_S - self.time_s).max(0.0);
         let height_m = |side: Side| {
-            let (hip_m, _) = body.joint_axis(LEGS[side.index()] + 1);
+            let (hip_m, _) = body.joint_axis(LEGS[side] + 1);
             let ankle_m = body.world_from_foot(side).translation;
             let away_m = if side == self.stance || self.shifting {
                 ankle_m - hip_m
@@ -205,14 +207,14 @@ impl Step {
     }
 
     /// Exchanges the feet when the swinging one has met the ground.
-    fn land(&mut self, body: &WholeBody, soles: &[Pose; 2], ground_m: f32) {
+    fn land(&mut self, body: &WholeBody, soles: &Sides<Pose>, ground_m: f32) {
         let swinging_s = self.time_s - TRANSFER_S;
         let swing = self.stance.other();
         if self.shifting || swinging_s < 0.0 {
             self.swing.plant(body, swing);
             return;
         }
-        let clear_m = clearance_m(&soles[swing.index()]) - ground_m;
+        let clear_m = clearance_m(&soles[swing]) - ground_m;
         let met = swinging_s > EARLIEST_LANDING * SWING_S && clear_m < GROUND_M;
         if met || swinging_s >= LATEST_LANDING * SWING_S {
             self.stance = swing;
@@ -277,10 +279,10 @@ impl Step {
         let turn = turn * Vector::new(1.0, 1.0, YAW_PART);
         let most = Vector::splat(LARGEST_TURN_RAD_S2);
         let both = self.shifting || self.time_s < TRANSFER_S;
-        let mut feet = [Acceleration::default(); 2];
+        let mut feet = Sides::<Acceleration>::default();
         if !both {
             let swing = self.stance.other();
-            feet[swing.index()] = self.swing.wanted(body, swing, self.time_s - TRANSFER_S);
+            feet[swing] = self.swing.wanted(body, swing, self.time_s - TRANSFER_S);
         }
         let motion = Motion { lift_m_s2, turn_rad_s2: turn.clamp(-most, most), feet };
         let contact = Contact {
@@ -298,10 +300,6 @@ fn shift(now: &Situation) -> (Vector, bool) {
     let middle_m = (flat(now.stance.translation) + now.old_m) * 0.5;
     let late = (now.capture_m - middle_m).dot(now.ahead).abs() > LATEST_M;
     (target_m, late || (target_m - now.capture_m).dot(now.outside) < SHIFTED_M)
-}
-
-fn leg_joint(i: usize) -> usize {
-    LEGS[i / LEG_JOINT_COUNT] + i % LEG_JOINT_COUNT
 }
 
 /// Height of the lowest point of a sole.

@@ -4,7 +4,8 @@ use rapier3d::math::{Pose, Vector};
 use serde::{Deserialize, Serialize};
 
 use super::legs::rotation_vector_rad;
-use crate::robot::{Acceleration, LEG_JOINT_COUNT, LEGS, Side, WholeBody};
+use crate::Side;
+use crate::robot::{Acceleration, LEG_JOINTS, LEGS, WholeBody};
 
 pub(super) const SWING_S: f32 = 0.25;
 /// The foot is down a little before the step ends.
@@ -117,12 +118,12 @@ impl Swing {
 
 /// Pose, velocity and angular velocity of an ankle roll link, world frame.
 fn foot_motion(body: &WholeBody, side: Side) -> (Pose, Vector, Vector) {
-    let first = LEGS[side.index()];
+    let first = LEGS[side];
     let foot = body.world_from_foot(side);
     let mut spin_rad_s = body.pelvis_angular_velocity_rad_s;
     let from_pelvis_m = foot.translation - body.world_from_pelvis().translation;
     let mut speed_m_s = body.pelvis_velocity_m_s + spin_rad_s.cross(from_pelvis_m);
-    for joint in first..first + LEG_JOINT_COUNT {
+    for joint in first..first + LEG_JOINTS {
         let (origin, axis) = body.joint_axis(joint);
         let turn = axis * body.qd_rad_s[joint];
         speed_m_s += turn.cross(foot.translation - origin);

@@ -4,7 +4,7 @@ use rapier3d::math::{Matrix, Pose, Rotation, Vector};
 
 use crate::SimError;
 
-/// A camera fixed to a body. Its frame is MuJoCo's: x right, y up, looking along -z.
+/// A camera fixed to a body. Its axes are MuJoCo's and OpenGL's: x right, y up, looking along -z.
 #[derive(Clone, Debug)]
 pub struct MjcfCamera {
     pub name: String,

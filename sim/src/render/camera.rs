@@ -2,7 +2,7 @@
 
 use rapier3d::math::{Pose, Vector};
 
-/// MuJoCo's and OpenGL's convention: x right, y up, looking along -z. Square pixels, principal point in the middle.
+/// Axes as [`crate::mjcf::MjcfCamera`]'s. Square pixels, principal point in the middle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     pub world_from_camera: Pose,

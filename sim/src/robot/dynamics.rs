@@ -8,7 +8,7 @@
 use rapier3d::math::Vector;
 
 use super::{JOINTS, WholeBody};
-use crate::world::GRAVITY_M_S2;
+use crate::GRAVITY_M_S2;
 
 /// Of a link, at its origin, world frame.
 #[derive(Clone, Copy, Debug, Default)]

@@ -16,14 +16,17 @@ use rapier3d::prelude::{ColliderHandle, MultibodyJointHandle, PhysicsWorld, Rigi
 use serde::{Deserialize, Serialize};
 
 pub use dynamics::{Acceleration, Effort};
-pub use layout::{JOINTS, Side, UPPER, UPPER_JOINTS, joint_names};
+pub use layout::{
+    ARM_COLUMNS, ARM_JOINTS, HAND_COLUMNS, HAND_JOINTS, JOINTS, UPPER, UPPER_JOINTS, WAIST_COLUMN,
+    joint_names,
+};
 pub use model::{HandLinks, JointModel, Link, RobotModel, SiteModel};
 pub use whole_body::WholeBody;
 
-pub(crate) use layout::{ARM_JOINT_COUNT, ARMS, LEG_JOINT_COUNT, LEGS, WAIST};
+pub(crate) use layout::{ARMS, LEG_JOINTS, LEGS, WAIST};
 
-use crate::locomotion::{BaseCommand, Locomotion};
-use crate::{PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError};
+use crate::locomotion::{BaseCommand, Drive, Locomotion};
+use crate::{CONTROL_DT_S, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, Side, Sides, SimError};
 use hand_force::HandForce;
 use payload::Payload;
 
@@ -46,14 +49,13 @@ pub struct RobotState {
     #[serde(with = "per_joint")]
     pub torque_n_m: [f32; JOINTS],
     pub world_from_pelvis: Pose,
-    /// Left, right.
-    pub pelvis_from_wrist: [Pose; 2],
-    /// MuJoCo's camera axes: x right, y up, looking along -z.
+    pub pelvis_from_wrist: Sides<Pose>,
+    /// Axes as [`crate::mjcf::MjcfCamera`]'s.
     pub pelvis_from_camera: Pose,
     /// Weight that each hand carries beyond its own, estimated from joint torques.
-    pub payload_n: [f32; 2],
+    pub payload_n: Sides<f32>,
     /// External force on each hand, world frame, estimated from joint torques.
-    pub hand_force_n: [Vector; 2],
+    pub hand_force_n: Sides<Vector>,
     /// Pelvis below 0.4 m or tilted beyond 60 degrees. Stays true: nothing puts a robot back.
     pub fallen: bool,
 }
@@ -149,14 +151,16 @@ impl Robot {
     /// What the robot reports when its body is measured as `body`.
     pub(crate) fn state(&self, body: &WholeBody) -> RobotState {
         let pelvis_from_world = body.world_from_pelvis().inverse();
-        let wrist =
-            |name| body.world_from_site(name).map_or(Pose::IDENTITY, |world| pelvis_from_world * world);
+        let wrist = |side: Side| {
+            let site = format!("{}_wrist", side.name());
+            body.world_from_site(&site).map_or(Pose::IDENTITY, |world| pelvis_from_world * world)
+        };
         RobotState {
             q_rad: body.q_rad,
             qd_rad_s: body.qd_rad_s,
             torque_n_m: std::array::from_fn(|joint| self.memory.torque_n_m[joint]),
             world_from_pelvis: body.world_from_pelvis(),
-            pelvis_from_wrist: ["left_wrist", "right_wrist"].map(wrist),
+            pelvis_from_wrist: Sides::from_fn(wrist),
             pelvis_from_camera: pelvis_from_world
                 * body.world_from_link[self.model.egocentric_link]
                 * self.model.egocentric.body_from_camera,
@@ -187,7 +191,6 @@ impl Robot {
 
         let mut drives = [Drive::default(); JOINTS];
         let part = (substep + 1) as f32 / PHYSICS_STEPS_PER_CONTROL as f32;
-        let control_dt_s = PHYSICS_DT_S * PHYSICS_STEPS_PER_CONTROL as f32;
         for (i, joint) in UPPER.into_iter().enumerate() {
             let model = &self.model.joints[joint];
             let (from, to) = (self.memory.last_upper_rad[i], command.upper_rad[i]);
@@ -198,19 +201,14 @@ impl Robot {
                 // The damper acts on the absolute velocity, so the wanted velocity is fed forward.
                 feedforward_n_m: gravity_n_m[joint]
                     + payload_n_m[joint]
-                    + model.kd_n_m_s_rad * (to - from) / control_dt_s,
+                    + model.kd_n_m_s_rad * (to - from) / CONTROL_DT_S,
             };
         }
         for (drive, offset_rad) in drives[WAIST..].iter_mut().zip(waist_offset_rad) {
             drive.target_rad += offset_rad;
         }
-        for i in 0..2 * LEG_JOINT_COUNT {
-            drives[LEGS[i / LEG_JOINT_COUNT] + i % LEG_JOINT_COUNT] = Drive {
-                target_rad: legs.q_rad[i],
-                kp_n_m_rad: legs.kp_n_m_rad[i],
-                kd_n_m_s_rad: legs.kd_n_m_s_rad[i],
-                feedforward_n_m: legs.feedforward_n_m[i],
-            };
+        for (first, legs) in LEGS.into_iter().zip(legs) {
+            drives[first..first + LEG_JOINTS].copy_from_slice(&legs);
         }
         let pelvis = body.world_from_pelvis();
         let upright = (pelvis.rotation * Vector::Z).z;
@@ -258,13 +256,4 @@ impl Robot {
         self.memory = memory;
         Ok(())
     }
-}
-
-/// Spring, damper and feedforward of one joint for one physics step.
-#[derive(Clone, Copy, Default)]
-struct Drive {
-    target_rad: f32,
-    kp_n_m_rad: f32,
-    kd_n_m_s_rad: f32,
-    feedforward_n_m: f32,
 }

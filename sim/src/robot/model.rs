@@ -7,7 +7,7 @@ use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::prelude::MassProperties;
 
 use crate::mjcf::{Document, Geom, MjcfCamera, mass_properties, pose, vector};
-use crate::{SimError, robot::Side};
+use crate::{Side, Sides, SimError};
 
 /// One rigid link. Bodies without a joint are merged into their parent's link.
 #[derive(Clone, Debug)]
@@ -61,7 +61,7 @@ pub struct RobotModel {
     pub mass_kg: f32,
     /// Link pairs that never touch, smaller index first.
     excluded: BTreeSet<(usize, usize)>,
-    pub hands: [HandLinks; 2],
+    pub hands: Sides<HandLinks>,
 }
 
 /// Links of one hand, for contact queries.
@@ -93,7 +93,7 @@ impl RobotModel {
             egocentric_link: 0,
             mass_kg: 0.0,
             excluded: BTreeSet::new(),
-            hands: Default::default(),
+            hands: Sides::default(),
         };
         let placed = model.read_links(&document)?;
         model.mass_kg = model.links.iter().map(|link| link.mass.mass()).sum();
@@ -105,7 +105,7 @@ impl RobotModel {
         };
         model.exclude_contacts(&document, &placed);
         for side in Side::BOTH {
-            model.hands[side.index()] = model.find_hand(&document, side)?;
+            model.hands[side] = model.find_hand(&document, side)?;
         }
         for site in ["left_foot", "right_foot"] {
             model

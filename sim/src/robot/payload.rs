@@ -6,7 +6,8 @@
 use rapier3d::math::Vector;
 use serde::{Deserialize, Serialize};
 
-use super::{ARM_JOINT_COUNT, ARMS, JOINTS, Side, WholeBody};
+use super::{ARM_JOINTS, ARMS, JOINTS, WholeBody};
+use crate::{Side, Sides};
 
 /// Slow against the arm's own motion, fast against a lift of one second.
 const FILTER_TIME_S: f32 = 0.12;
@@ -19,11 +20,11 @@ const LARGEST_WEIGHT_N: f32 = 35.0;
 
 #[derive(Clone, Default, Serialize, Deserialize)]
 pub(super) struct Payload {
-    weight_n: [f32; 2],
+    weight_n: Sides<f32>,
 }
 
 impl Payload {
-    pub(super) fn weight_n(&self) -> [f32; 2] {
+    pub(super) fn weight_n(&self) -> Sides<f32> {
         self.weight_n
     }
 
@@ -38,8 +39,8 @@ impl Payload {
         for side in Side::BOTH {
             let lever_m = vertical_levers_m(body, side);
             let square: f32 = lever_m.iter().map(|lever| lever * lever).sum();
-            let excess_n_m: [f32; ARM_JOINT_COUNT] = std::array::from_fn(|i| {
-                let joint = ARMS[side.index()] + i;
+            let excess_n_m: [f32; ARM_JOINTS] = std::array::from_fn(|i| {
+                let joint = ARMS[side] + i;
                 torque_n_m[joint] - gravity_n_m[joint]
             });
             let along: f32 = lever_m.iter().zip(&excess_n_m).map(|(lever, excess)| lever * excess).sum();
@@ -47,7 +48,7 @@ impl Payload {
             let explained = along * along / (square * total).max(1e-6);
             let measured_n = if explained > LEAST_EXPLAINED { along / square } else { 0.0 };
             let measured_n = measured_n.clamp(0.0, LARGEST_WEIGHT_N);
-            let weight_n = &mut self.weight_n[side.index()];
+            let weight_n = &mut self.weight_n[side];
             *weight_n += (measured_n - *weight_n) * (dt_s / FILTER_TIME_S);
         }
     }
@@ -57,8 +58,8 @@ impl Payload {
         let mut torques_n_m = [0.0; JOINTS];
         for side in Side::BOTH {
             let levers_m = vertical_levers_m(body, side);
-            for (lever_m, joint) in levers_m.into_iter().zip(ARMS[side.index()]..) {
-                torques_n_m[joint] = GAIN * self.weight_n[side.index()] * lever_m;
+            for (lever_m, joint) in levers_m.into_iter().zip(ARMS[side]..) {
+                torques_n_m[joint] = GAIN * self.weight_n[side] * lever_m;
             }
         }
         torques_n_m
@@ -66,8 +67,8 @@ impl Payload {
 }
 
 /// Torque of each arm joint per newton of upward force at the palm.
-fn vertical_levers_m(body: &WholeBody, side: Side) -> [f32; ARM_JOINT_COUNT] {
-    let hand = body.model.hands[side.index()].wrist;
+fn vertical_levers_m(body: &WholeBody, side: Side) -> [f32; ARM_JOINTS] {
+    let hand = body.model.hands[side].wrist;
     let palm_m = body.world_from_link[hand] * Vector::new(0.12, 0.0, 0.0);
-    std::array::from_fn(|i| body.moment_n_m(ARMS[side.index()] + i, palm_m, Vector::Z))
+    std::array::from_fn(|i| body.moment_n_m(ARMS[side] + i, palm_m, Vector::Z))
 }

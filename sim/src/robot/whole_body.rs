@@ -3,8 +3,8 @@
 use rapier3d::math::{Pose, Vector};
 use rapier3d::prelude::{RigidBodyHandle, RigidBodySet};
 
-use super::{JOINTS, LEG_JOINT_COUNT, LEGS, RobotModel, Side};
-use crate::world::GRAVITY_M_S2;
+use super::{JOINTS, LEG_JOINTS, LEGS, RobotModel};
+use crate::{GRAVITY_M_S2, Side, Sides};
 
 const PALM_IN_WRIST_M: Vector = Vector::new(0.12, 0.0, 0.0);
 
@@ -18,8 +18,8 @@ pub struct WholeBody<'a> {
     pub pelvis_angular_velocity_rad_s: Vector,
     pub com_m: Vector,
     pub com_velocity_m_s: Vector,
-    /// Measured external force on each hand, left and right, at its palm.
-    pub hand_force_n: [Vector; 2],
+    /// Measured external force on each hand, at its palm.
+    pub hand_force_n: Sides<Vector>,
     /// Where the task wants the waist: yaw, roll, pitch.
     pub waist_target_rad: [f32; 3],
 }
@@ -31,7 +31,7 @@ impl<'a> WholeBody<'a> {
         links: &[RigidBodyHandle],
         q_rad: [f32; JOINTS],
         qd_rad_s: [f32; JOINTS],
-        hand_force_n: [Vector; 2],
+        hand_force_n: Sides<Vector>,
         waist_target_rad: [f32; 3],
     ) -> WholeBody<'a> {
         let mut com_m = Vector::ZERO;
@@ -59,9 +59,9 @@ impl<'a> WholeBody<'a> {
         }
     }
 
-    /// Middle of the left and right palm, where loads of the hands are taken to act.
-    pub fn palms_m(&self) -> [Vector; 2] {
-        [0, 1].map(|hand| self.world_from_link[self.model.hands[hand].wrist] * PALM_IN_WRIST_M)
+    /// Middle of each palm, where loads of the hands are taken to act.
+    pub fn palms_m(&self) -> Sides<Vector> {
+        self.model.hands.as_ref().map(|hand| self.world_from_link[hand.wrist] * PALM_IN_WRIST_M)
     }
 
     pub fn world_from_pelvis(&self) -> Pose {
@@ -75,7 +75,7 @@ impl<'a> WholeBody<'a> {
 
     /// Ankle roll link, to which a sole belongs.
     pub fn world_from_foot(&self, side: Side) -> Pose {
-        self.world_from_link[self.model.joints[LEGS[side.index()] + LEG_JOINT_COUNT - 1].link]
+        self.world_from_link[self.model.joints[LEGS[side] + LEG_JOINTS - 1].link]
     }
 
     /// Origin and unit axis of a joint in the world.

@@ -7,8 +7,8 @@ use rapier3d::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{Touch, World};
-use crate::PHYSICS_DT_S;
-use crate::robot::{HandLinks, RobotModel, Side};
+use crate::robot::{HandLinks, RobotModel};
+use crate::{PHYSICS_DT_S, Side, Sides};
 
 /// Normal contact forces (N, world) that a hand's parts exert on an object, averaged over the last physics step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -70,11 +70,10 @@ impl World {
     pub(super) fn touches(&self) -> Vec<Touch> {
         let mut touches = Vec::new();
         for (object, colliders) in self.objects.iter().map(|object| &object.colliders).enumerate() {
-            let mut hands = vec![[HandContacts::default(); 2]; self.robots.len()];
+            let mut hands = vec![Sides::<HandContacts>::default(); self.robots.len()];
             for (robot, link, force_n) in colliders.iter().flat_map(|collider| self.link_forces(*collider)) {
                 for side in Side::BOTH {
-                    let links = &self.robots[robot].model.hands[side.index()];
-                    hands[robot][side.index()].add(links, link, force_n);
+                    hands[robot][side].add(&self.robots[robot].model.hands[side], link, force_n);
                 }
             }
             for (robot, hands) in hands.into_iter().enumerate() {

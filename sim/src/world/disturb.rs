@@ -5,8 +5,8 @@ use rapier3d::math::Vector;
 use rapier3d::prelude::{AngVector, MassProperties};
 
 use super::World;
+use crate::Side;
 use crate::locomotion::Locomotion;
-use crate::robot::Side;
 
 impl World {
     /// Sets the force (N, world) that pulls at a point (link frame) of a robot's link during the next control step, in
@@ -24,7 +24,7 @@ impl World {
     /// Fuses a point mass to a palm: the controller is not told.
     pub fn load_hand(&mut self, robot: usize, side: Side, mass_kg: f32, point_in_wrist_m: Vector) {
         let robot = &self.robots[robot];
-        let wrist = robot.model.hands[side.index()].wrist;
+        let wrist = robot.model.hands[side].wrist;
         let load = MassProperties::new(point_in_wrist_m, mass_kg, AngVector::splat(1e-4 * mass_kg));
         let whole = robot.model.links[wrist].mass + load;
         self.physics.bodies[robot.bodies[wrist]].set_additional_mass_properties(whole, true);

@@ -20,11 +20,9 @@ pub(crate) use contacts::link_tag;
 
 use crate::mjcf::{Document, MjcfCamera};
 use crate::robot::{Robot, RobotCommand, RobotModel, RobotState};
-use crate::{CONTROL_HZ, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError, assets};
+use crate::{CONTROL_HZ, GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError, assets};
 use contacts::SelfCollision;
 use objects::Object;
-
-pub(crate) const GRAVITY_M_S2: f32 = 9.81;
 
 /// Everything a world is made of.
 #[derive(Clone, Debug)]

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::objects::Object;
 use super::{HandContacts, ObjectState, World};
-use crate::robot::{RobotCommand, RobotState, Side};
+use crate::Side;
+use crate::robot::{RobotCommand, RobotState};
 
 /// The world after one control step, or before the first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -17,9 +17,9 @@ use serde::{Deserialize, Serialize};
 
 pub use network::Network;
 
-use super::{BaseCommand, BaseLimits, LegCommand, Locomotion};
+use super::{BaseCommand, BaseLimits, Drive, LegCommand, Locomotion};
 use crate::PHYSICS_STEPS_PER_CONTROL;
-use crate::robot::{JOINTS, WAIST, WholeBody};
+use crate::robot::{JOINTS, LEGS, WAIST, WholeBody};
 use joints::JointMap;
 use network::{Action, Memory, Observation};
 use place::Place;
@@ -86,19 +86,16 @@ impl Agile {
     }
 
     fn legs(&self, action: &Action) -> LegCommand {
-        let mut legs = LegCommand {
-            q_rad: [0.0; 12],
-            kp_n_m_rad: [0.0; 12],
-            kd_n_m_s_rad: [0.0; 12],
-            feedforward_n_m: [0.0; 12],
-        };
-        // In published order the legs come first.
-        for (i, joint) in self.joints.controlled.into_iter().enumerate().filter(|(_, joint)| *joint < WAIST) {
-            legs.q_rad[joint] = action.target_rad[i];
-            legs.kp_n_m_rad[joint] = action.kp_n_m_rad[i];
-            legs.kd_n_m_s_rad[joint] = action.kd_n_m_s_rad[i];
+        let mut drives = [Drive::default(); JOINTS];
+        for (i, joint) in self.joints.controlled.into_iter().enumerate() {
+            drives[joint] = Drive {
+                target_rad: action.target_rad[i],
+                kp_n_m_rad: action.kp_n_m_rad[i],
+                kd_n_m_s_rad: action.kd_n_m_s_rad[i],
+                feedforward_n_m: 0.0,
+            };
         }
-        legs
+        LEGS.map(|first| std::array::from_fn(|i| drives[first + i]))
     }
 }
 
@@ -113,7 +110,7 @@ impl Locomotion for Agile {
             let command = LIMITS.clamp(*command);
             let mut velocity = [command.vx_m_s, command.vy_m_s, command.yaw_rate_rad_s];
             let pelvis = body.world_from_pelvis();
-            let pulled_down_n: f32 = body.hand_force_n.iter().map(|force| -force.z).sum();
+            let pulled_down_n: f32 = body.hand_force_n.into_iter().map(|force| -force.z).sum();
             if pulled_down_n > HEAVY_N {
                 state.place = Place::of(pelvis);
             } else {

@@ -9,10 +9,9 @@ use super::motion::{ArmMotion, Random};
 use super::tour::{self, Leg};
 use crate::locomotion::plane::{flat, heading_rad, wrapped_rad};
 use crate::locomotion::{BaseCommand, Locomotion};
-use crate::robot::{RobotCommand, RobotState, Side};
-use crate::{CONTROL_HZ, RobotPlacement, SimError, World, WorldSpec};
+use crate::robot::{RobotCommand, RobotState};
+use crate::{CONTROL_DT_S as DT_S, RobotPlacement, Side, SimError, World, WorldSpec};
 
-const DT_S: f32 = 1.0 / CONTROL_HZ as f32;
 /// Arms rise and loads swing out before anything is asked or measured.
 const SETTLE_S: f32 = 2.0;
 /// A velocity is measured after the start of motion has faded.
@@ -115,9 +114,8 @@ fn disturb(case: &Case, world: &mut World, seed: u64, direction: Vector, legs: &
     match &case.disturbance {
         Disturbance::Pull { force_n } if time_s > 0.5 * SETTLE_S => {
             for side in Side::BOTH {
-                let link = world.robots()[0].model.links[world.robots()[0].model.hands[side.index()].wrist]
-                    .name
-                    .clone();
+                let link =
+                    world.robots()[0].model.links[world.robots()[0].model.hands[side].wrist].name.clone();
                 world.push(
                     0,
                     &link,

@@ -2,8 +2,9 @@
 
 use rapier3d::math::{Pose, Vector};
 
+use super::prepared::Prepared;
 use crate::render::camera::NEAR_M;
-use crate::render::{Camera, Placed, Scenery};
+use crate::render::{Camera, Placed};
 
 /// Marks a sample at which nothing is.
 pub(super) const NOTHING: u32 = u32::MAX;
@@ -17,38 +18,9 @@ pub(super) struct Target {
     pub triangle: Vec<u32>,
 }
 
-/// What never changes of a scenery: the numbers of all triangles, part by part, and how far parts reach.
-pub(super) struct Index {
-    /// First triangle of each part.
-    pub first: Vec<u32>,
-    /// Part of each triangle.
-    pub owner: Vec<u32>,
-    /// Centre and radius of a sphere around each part, in its mesh's frame.
-    bounds: Vec<(Vector, f32)>,
-}
-
-impl Index {
-    pub(super) fn new(scenery: &Scenery) -> Index {
-        let mut index = Index { first: Vec::new(), owner: Vec::new(), bounds: Vec::new() };
-        for (number, part) in scenery.parts.iter().enumerate() {
-            index.first.push(index.owner.len() as u32);
-            index.owner.resize(index.owner.len() + part.mesh.triangles.len(), number as u32);
-            index.bounds.push(part.mesh.bounds());
-        }
-        index
-    }
-}
-
 impl Target {
     /// Fills the target, `samples` a pixel along each axis, with all that `camera` sees.
-    pub(super) fn draw(
-        &mut self,
-        scenery: &Scenery,
-        index: &Index,
-        placed: &Placed,
-        camera: &Camera,
-        samples: usize,
-    ) {
+    pub(super) fn draw(&mut self, prepared: &Prepared, placed: &Placed, camera: &Camera, samples: usize) {
         self.reset(camera.width as usize * samples, camera.height as usize * samples);
         let camera_from_world = camera.world_from_camera.inverse();
         let focal = camera.focal_px() * samples as f32;
@@ -58,14 +30,14 @@ impl Target {
             [cx + p.x * focal * nearness, cy - p.y * focal * nearness, nearness]
         };
         let mut corners = Vec::new();
-        for (number, part) in scenery.parts.iter().enumerate() {
+        for (number, part) in prepared.scenery.parts.iter().enumerate() {
             let camera_from_mesh = camera_from_world * placed.world_from_mesh[number];
-            if !in_view(index.bounds[number], camera_from_mesh, cx / focal, cy / focal) {
+            if !in_view(prepared.bounds[number], camera_from_mesh, cx / focal, cy / focal) {
                 continue;
             }
             corners.clear();
             corners.extend(part.mesh.vertices.iter().map(|vertex| camera_from_mesh * vertex.position_m));
-            for (number, triangle) in (index.first[number]..).zip(&part.mesh.triangles) {
+            for (number, triangle) in (prepared.first[number]..).zip(&part.mesh.triangles) {
                 let p = triangle.map(|corner| corners[corner as usize]);
                 if p.iter().all(|p| p.z < -NEAR_M) {
                     self.fill(p.map(screen), number);

@@ -2,11 +2,9 @@
 
 use rapier3d::math::Vector;
 
-use super::shadow::ShadowMap;
+use super::shadow::{ShadowMap, TO_SUN};
 use crate::render::Pattern;
 
-/// Direction to the sun; high, so that hands over a counter cast their shadow on it.
-pub(super) const TO_SUN: Vector = Vector::new(-0.306_186_2, 0.353_553_4, 0.883_883_5);
 const SUN: Vector = Vector::new(0.80, 0.77, 0.72);
 const FROM_BELOW: Vector = Vector::new(0.20, 0.19, 0.18);
 const FROM_ABOVE: Vector = Vector::new(0.40, 0.42, 0.45);
@@ -55,31 +53,5 @@ pub(super) fn albedo(pattern: Pattern, linear_rgb: Vector, point_m: Vector) -> V
             let dark = (square(point_m.x) + square(point_m.y)) & 1 == 0;
             if dark { linear_rgb * CHECKER_DARK } else { linear_rgb }
         }
-    }
-}
-
-pub(super) fn linear(srgb: [f32; 3]) -> Vector {
-    let decode = |v: f32| if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
-    Vector::from(srgb.map(decode))
-}
-
-/// Table from linear light to sRGB bytes.
-pub(super) struct SrgbTable(Vec<u8>);
-
-const TABLE_LAST: f32 = 4095.0;
-
-impl Default for SrgbTable {
-    fn default() -> SrgbTable {
-        let encode = |v: f32| if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
-        SrgbTable(
-            (0..=TABLE_LAST as usize).map(|i| (encode(i as f32 / TABLE_LAST) * 255.0 + 0.5) as u8).collect(),
-        )
-    }
-}
-
-impl SrgbTable {
-    pub(super) fn encode(&self, colour: Vector) -> [u8; 3] {
-        let index = colour.clamp(Vector::ZERO, Vector::ONE) * TABLE_LAST + 0.5;
-        index.to_array().map(|i| self.0[i as usize])
     }
 }

@@ -3,9 +3,10 @@
 use rapier3d::math::{Matrix, Pose, Rotation, Vector};
 
 use super::raster::Target;
-use super::shade::TO_SUN;
 use crate::render::{Placed, Scenery};
 
+/// Direction to the sun; high, so that hands over a counter cast their shadow on it.
+pub(super) const TO_SUN: Vector = Vector::new(-0.306_186_2, 0.353_553_4, 0.883_883_5);
 /// Texels along each side: 2.4 mm at a focus of 1.25 m, so that fingers cast shadows.
 const TEXELS: usize = 1024;
 /// The sun's camera stands this far from the focus.

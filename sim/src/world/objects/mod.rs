@@ -3,6 +3,8 @@
 mod insert;
 mod model;
 mod rolling;
+#[cfg(test)]
+mod site_tests;
 
 use rapier3d::math::{Pose, Vector};
 use rapier3d::prelude::*;

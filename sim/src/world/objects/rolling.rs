@@ -3,7 +3,7 @@
 use rapier3d::prelude::PhysicsWorld;
 
 use super::{Object, ObjectModel};
-use crate::world::GRAVITY_M_S2;
+use crate::GRAVITY_M_S2;
 
 /// Slower than this, rolling resistance acts as a damper: a fixed torque would turn the ball back.
 const SLOWEST_ROLLING_RAD_S: f32 = 0.5;

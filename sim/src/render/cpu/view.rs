@@ -1,0 +1,129 @@
+//! From samples to pixels: colour where a camera's rays meet triangles, and outlines between things.
+
+use rapier3d::math::{Pose, Vector};
+
+use super::prepared::Prepared;
+use super::raster::{NOTHING, Target};
+use super::shade::{SKY, Surface, albedo};
+use super::shadow::ShadowMap;
+use crate::render::{Camera, Placed};
+
+/// Samples a pixel along each axis.
+pub(super) const SAMPLES: usize = 2;
+/// How much the outline between two things darkens.
+const OUTLINE: f32 = 0.45;
+/// Two things are outlined where their depths differ by more than this part: not where they touch.
+const OUTLINE_DEPTH_STEP: f32 = 0.02;
+
+/// A filled target, ready to be shaded.
+pub(super) struct View<'a> {
+    prepared: &'a Prepared,
+    target: &'a Target,
+    shadow: &'a ShadowMap,
+    /// World from mesh and back, of each part.
+    poses: Vec<(Pose, Pose)>,
+    eye_m: Vector,
+    /// Ray through the target's top left corner, and from one sample to the next, at a depth of 1 m in the world.
+    corner_ray: Vector,
+    ray_right: Vector,
+    ray_down: Vector,
+}
+
+impl<'a> View<'a> {
+    pub(super) fn new(
+        prepared: &'a Prepared,
+        placed: &Placed,
+        target: &'a Target,
+        shadow: &'a ShadowMap,
+        camera: &Camera,
+    ) -> View<'a> {
+        let rotation = camera.world_from_camera.rotation;
+        let sample = 1.0 / (camera.focal_px() * SAMPLES as f32);
+        View {
+            prepared,
+            target,
+            shadow,
+            poses: placed.world_from_mesh.iter().map(|pose| (*pose, pose.inverse())).collect(),
+            eye_m: camera.world_from_camera.translation,
+            corner_ray: rotation * camera.unproject([0.0, 0.0], 1.0),
+            ray_right: rotation * Vector::X * sample,
+            ray_down: rotation * Vector::NEG_Y * sample,
+        }
+    }
+
+    /// Of the thing that a triangle belongs to.
+    pub(super) fn id(&self, triangle: u32) -> u32 {
+        match triangle {
+            NOTHING => 0,
+            _ => self.prepared.id(triangle),
+        }
+    }
+
+    /// Mean linear colour of a pixel's samples; a triangle that covers several is shaded once.
+    pub(super) fn pixel(&self, x: usize, y: usize) -> Vector {
+        let mut shaded: [(u32, Vector); SAMPLES * SAMPLES] = [(0, Vector::ZERO); SAMPLES * SAMPLES];
+        let mut count = 0;
+        let mut sum = Vector::ZERO;
+        let mut edges = 0;
+        for i in 0..SAMPLES * SAMPLES {
+            let (sx, sy) = (x * SAMPLES + i % SAMPLES, y * SAMPLES + i / SAMPLES);
+            let triangle = self.target.triangle[sy * self.target.width + sx];
+            edges += self.outlines(sx, sy);
+            sum += match shaded[..count].iter().find(|(known, _)| *known == triangle) {
+                Some((_, colour)) => *colour,
+                None => {
+                    let colour = if triangle == NOTHING { SKY } else { self.surface(sx, sy, triangle) };
+                    shaded[count] = (triangle, colour);
+                    count += 1;
+                    colour
+                }
+            };
+        }
+        let outline = (edges as f32 / (2 * SAMPLES) as f32).min(1.0);
+        sum * ((1.0 - OUTLINE * outline) / (SAMPLES * SAMPLES) as f32)
+    }
+
+    /// How many of the neighbours to the right and below belong to another thing at another depth.
+    fn outlines(&self, sx: usize, sy: usize) -> u32 {
+        if sx + 1 >= self.target.width || sy + 1 >= self.target.height {
+            return 0;
+        }
+        let here = sy * self.target.width + sx;
+        let differs = |there: usize| {
+            let (a, b) = (self.target.triangle[here], self.target.triangle[there]);
+            if a == b || a == NOTHING || b == NOTHING || self.id(a) == self.id(b) {
+                return false;
+            }
+            let (near_a, near_b) = (self.target.nearness[here], self.target.nearness[there]);
+            (near_a - near_b).abs() > OUTLINE_DEPTH_STEP * near_a.max(near_b)
+        };
+        u32::from(differs(here + 1)) + u32::from(differs(here + self.target.width))
+    }
+
+    /// Colour of a triangle where a sample sees it.
+    fn surface(&self, sx: usize, sy: usize, triangle: u32) -> Vector {
+        let owner = self.prepared.owner[triangle as usize] as usize;
+        let part = &self.prepared.scenery.parts[owner];
+        let (world_from_mesh, mesh_from_world) = self.poses[owner];
+        let depth_m = 1.0 / self.target.nearness[sy * self.target.width + sx];
+        let ray = self.corner_ray + self.ray_right * (sx as f32 + 0.5) + self.ray_down * (sy as f32 + 0.5);
+        let point_m = self.eye_m + ray * depth_m;
+        let corners = part.mesh.triangles[(triangle - self.prepared.first[owner]) as usize];
+        let [a, b, c] = corners.map(|corner| part.mesh.vertices[corner as usize]);
+        let in_mesh_m = mesh_from_world * point_m;
+        let (ab, ac, ap) =
+            (b.position_m - a.position_m, c.position_m - a.position_m, in_mesh_m - a.position_m);
+        let face = ab.cross(ac);
+        let scale = 1.0 / face.length_squared();
+        let weight_b = ap.cross(ac).dot(face) * scale;
+        let weight_c = ab.cross(ap).dot(face) * scale;
+        let normal = a.normal * (1.0 - weight_b - weight_c) + b.normal * weight_b + c.normal * weight_c;
+        Surface {
+            point_m,
+            normal: (world_from_mesh.rotation * normal).normalize(),
+            to_eye: -ray.normalize(),
+            albedo: albedo(part.pattern, self.prepared.linear_rgb[owner], point_m),
+        }
+        .shade(self.shadow)
+    }
+}

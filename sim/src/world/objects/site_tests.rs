@@ -1,0 +1,66 @@
+//! Sites against the shapes around them: a handle is on something solid, a hole is in the open.
+
+use rapier3d::math::Vector;
+
+use super::ObjectModel;
+use crate::mjcf::Site;
+
+/// Distance from a point of an object to its nearest shape; 0 inside one.
+fn clearance_m(model: &ObjectModel, point_m: Vector) -> f32 {
+    let shapes = model.geoms.iter().filter(|geom| geom.collides).filter_map(|geom| geom.collider());
+    shapes.map(|(pose, shape)| shape.distance_to_point(&pose, point_m, true)).fold(f32::INFINITY, f32::min)
+}
+
+fn object(name: &str) -> ObjectModel {
+    ObjectModel::load(name).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn site<'a>(model: &'a ObjectModel, name: &str) -> &'a Site {
+    model.site(name).unwrap_or_else(|| panic!("{} has no site {name}", model.name))
+}
+
+#[test]
+fn sites_lie_on_the_shapes_or_in_the_open() {
+    // How far the nearest shape is, at least and at most.
+    const SOLID_M: [f32; 2] = [0.0, 0.0];
+    for (name, sites, [low_m, high_m]) in [
+        ("bottle", &["grip_low", "grip_high"][..], SOLID_M),
+        ("tub", &["bar_a", "bar_b"], SOLID_M),
+        ("frame", &["left_side", "right_side"], SOLID_M),
+        ("wall_peg", &["root", "tip"], SOLID_M),
+        ("cup", &["lip"], [0.0, 0.003]),
+        // The axes of vessels, as far from the wall as they are wide inside.
+        ("cup", &["grip"], [0.030, 0.035]),
+        ("glass", &["grip"], [0.028, 0.033]),
+        ("glass", &["mouth"], [0.040, 0.047]),
+        ("glass", &["inside"], [0.028, 0.033]),
+        ("crate", &["inside"], [0.08, 0.09]),
+        // A hole of 60 mm less what the chords of its ring cut off.
+        ("frame", &["loop"], [0.028, 0.030]),
+    ] {
+        let model = object(name);
+        for name in sites {
+            let clearance_m = clearance_m(&model, site(&model, name).position_m());
+            let found = format!("{}: {name} is {clearance_m} m from a shape", model.name);
+            assert!((low_m..=high_m).contains(&clearance_m), "{found}");
+        }
+    }
+}
+
+#[test]
+fn regions_have_the_extent_of_what_they_stand_for() {
+    // The corners of the room in the crate touch its walls and its floor, from within.
+    let model = object("crate");
+    let [low_m, high_m] = site(&model, "inside").corners_m();
+    for outwards in [Vector::NEG_X, Vector::X, Vector::NEG_Y, Vector::Y] {
+        let middle_m = (low_m + high_m) * 0.5;
+        let at_wall_m = middle_m + outwards * ((high_m - low_m) * 0.5);
+        assert!(clearance_m(&model, at_wall_m) < 1e-5, "{outwards}");
+        assert!(clearance_m(&model, at_wall_m - outwards * 0.01) > 0.005, "{outwards}");
+    }
+    assert!(low_m.z.abs() < 1e-6, "an apple that lies on the base is inside");
+    let glass = object("glass");
+    let [low_m, high_m] = site(&glass, "inside").heights_m();
+    let mouth_m = site(&glass, "mouth").position_m().z;
+    assert!(low_m == 0.0 && (0.0..0.01).contains(&(mouth_m - high_m)), "from {low_m} m to {high_m} m");
+}
