@@ -28,4 +28,4 @@ pub use reports::EpisodeResult;
 pub use scoring::{A, B, Facts, Grip, Scores};
 pub use session::{Checkpoint, CheckpointError, Clock, RunFiles, Session, monotonic};
 pub use spec::{Controller, EpisodeSpec, RendererKind, RobotFile, Start};
-pub use tandem_sim::{BaseLimits, SimError, locomotion::LocomotionChoice};
+pub use tandem_sim::{BaseLimits, LocomotionChoice, SimError};

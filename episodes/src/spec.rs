@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use tandem_sim::SimError;
-use tandem_sim::locomotion::LocomotionChoice;
+use tandem_sim::{LocomotionChoice, SimError};
 use tandem_tools_spec::Protocol;
 
 use crate::tasks::{self, Task};

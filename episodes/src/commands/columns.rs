@@ -1,39 +1,33 @@
 //! The action row: arms 14, hands 14, waist 3, base 4.
 
-use tandem_sim::robot::{RobotModel, UPPER, UPPER_JOINTS};
-use tandem_sim::{BaseCommand, Side};
+use std::ops::Range;
 
-pub const ARM_JOINTS: usize = 7;
-pub const HAND_JOINTS: usize = 7;
-const WAIST: usize = 28;
+use tandem_sim::{
+    ARM_COLUMNS, ARM_JOINTS, BaseCommand, HAND_COLUMNS, HAND_JOINTS, RobotModel, Side, UPPER, UPPER_JOINTS,
+    WAIST_COLUMN,
+};
 
 /// Names of the last four columns, as every message with a base command has them.
 const BASE: [&str; 4] = ["vx_m_s", "vy_m_s", "yaw_rate_rad_s", "pelvis_height_m"];
 
-/// First column of an arm.
-pub fn arm(side: Side) -> usize {
-    match side {
-        Side::Left => 0,
-        Side::Right => ARM_JOINTS,
-    }
+/// The columns of an arm.
+pub fn arm(side: Side) -> Range<usize> {
+    ARM_COLUMNS[side]..ARM_COLUMNS[side] + ARM_JOINTS
 }
 
-/// First column of a hand.
-pub fn hand(side: Side) -> usize {
-    match side {
-        Side::Left => 2 * ARM_JOINTS,
-        Side::Right => 2 * ARM_JOINTS + HAND_JOINTS,
-    }
+/// The columns of a hand.
+pub fn hand(side: Side) -> Range<usize> {
+    HAND_COLUMNS[side]..HAND_COLUMNS[side] + HAND_JOINTS
 }
 
 /// The joint columns of the waist.
-pub fn waist() -> std::ops::Range<usize> {
-    WAIST..UPPER_JOINTS
+pub fn waist() -> Range<usize> {
+    WAIST_COLUMN..UPPER_JOINTS
 }
 
 /// Whether a column is a joint of a hand.
 pub fn is_hand(column: usize) -> bool {
-    (hand(Side::Left)..WAIST).contains(&column)
+    Side::BOTH.into_iter().any(|side| hand(side).contains(&column))
 }
 
 /// Names of the columns.

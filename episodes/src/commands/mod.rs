@@ -16,13 +16,11 @@ pub use run::Run;
 pub use upper_body::{UpperBody, upper_body};
 
 use nalgebra::Isometry3;
-use tandem_sim::BaseCommand;
-use tandem_sim::robot::UPPER_JOINTS;
+use tandem_sim::{BaseCommand, HAND_JOINTS, Sides, UPPER_JOINTS};
 use tandem_tools_spec::ActCall;
 
 use crate::EpisodeError;
 use crate::protocol::Rules;
-use columns::HAND_JOINTS;
 
 /// What all robots do for some control steps.
 pub struct Command {
@@ -51,12 +49,12 @@ pub enum Movement {
     Rows(Vec<Row>),
 }
 
-/// Where hands are to be; what is `None` stays. Left, right.
+/// Where hands are to be; what is `None` stays.
 #[derive(Clone, Debug)]
 pub struct Goals {
     /// Pelvis frame.
-    pub wrists: [Option<Isometry3<f64>>; 2],
-    pub fingers_rad: [Option<[f64; HAND_JOINTS]>; 2],
+    pub wrists: Sides<Option<Isometry3<f64>>>,
+    pub fingers_rad: Sides<Option<[f64; HAND_JOINTS]>>,
     pub base: BaseCommand,
 }
 

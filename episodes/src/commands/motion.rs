@@ -5,8 +5,7 @@ use std::sync::Arc;
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 use tandem_ik::{Configuration, Outcome, SolveOptions, SolveReport, Solver};
-use tandem_sim::robot::{RobotModel, UPPER_JOINTS};
-use tandem_sim::{BaseCommand, BaseLimits, RobotCommand, Side};
+use tandem_sim::{BaseCommand, BaseLimits, HAND_JOINTS, RobotCommand, RobotModel, Side, Sides, UPPER_JOINTS};
 
 use super::columns;
 use super::upper_body::{REACH_TOLERANCE, UpperBody};
@@ -38,8 +37,8 @@ pub struct MotionState {
     /// Joint targets of the present control step, action order.
     pub(super) upper_rad: [f64; UPPER_JOINTS],
     pub(super) base: BaseCommand,
-    /// Where the wrists are to be, pelvis frame: left, right.
-    pub(super) targets: [Isometry3<f64>; 2],
+    /// Where the wrists are to be, pelvis frame.
+    pub(super) targets: Sides<Isometry3<f64>>,
     /// What the solver remembers of steps that did not help; see [`Solver::caution`].
     caution: f64,
     /// Joints follow `targets`; otherwise the last joint chunk's row holds.
@@ -52,7 +51,7 @@ impl Motion {
         let state = MotionState {
             upper_rad: rest.upper_rad.map(f64::from),
             base: rest.base,
-            targets: [Isometry3::identity(); 2],
+            targets: Sides::both(Isometry3::identity()),
             caution: 1.0,
             follows_wrists: true,
         };
@@ -74,7 +73,7 @@ impl Motion {
     }
 
     /// Wrist targets in force, pelvis frame.
-    pub fn targets(&self) -> &[Isometry3<f64>; 2] {
+    pub fn targets(&self) -> &Sides<Isometry3<f64>> {
         &self.state.targets
     }
 
@@ -89,14 +88,14 @@ impl Motion {
     }
 
     /// New wrist targets; one that is `None` stays, or is where the last joint chunk left its wrist.
-    pub(super) fn aim(&mut self, wrists: &[Option<Isometry3<f64>>; 2]) {
+    pub(super) fn aim(&mut self, wrists: &Sides<Option<Isometry3<f64>>>) {
         let commanded = self.commanded_wrists();
         for side in Side::BOTH {
-            if let Some(target) = wrists[side.index()] {
+            if let Some(target) = wrists[side] {
                 if !self.state.follows_wrists {
                     self.state.targets = commanded;
                 }
-                self.state.targets[side.index()] = target;
+                self.state.targets[side] = target;
                 self.state.follows_wrists = true;
             }
         }
@@ -108,13 +107,12 @@ impl Motion {
         self.state.targets = self.commanded_wrists();
     }
 
-    pub(super) fn set_fingers(&mut self, side: Side, fingers_rad: &[f64]) {
-        let first = columns::hand(side);
-        self.state.upper_rad[first..first + fingers_rad.len()].copy_from_slice(fingers_rad);
+    pub(super) fn set_fingers(&mut self, side: Side, fingers_rad: &[f64; HAND_JOINTS]) {
+        self.state.upper_rad[columns::hand(side)].copy_from_slice(fingers_rad);
     }
 
     /// Where the commanded joints put the wrists, pelvis frame.
-    pub(super) fn commanded_wrists(&self) -> [Isometry3<f64>; 2] {
+    pub(super) fn commanded_wrists(&self) -> Sides<Isometry3<f64>> {
         let configuration = self.configuration();
         self.body.wrists.map(|wrist| configuration.root_from_frame(wrist))
     }
@@ -122,7 +120,7 @@ impl Motion {
     /// Joint targets for one step towards `targets`, unless the joints hold a chunk's last row.
     ///
     /// Inverse kinematics begins at the commanded, not at the measured joints: gravity's sag does not wind up.
-    pub(super) fn follow(&mut self, targets: &[Isometry3<f64>; 2]) {
+    pub(super) fn follow(&mut self, targets: &Sides<Isometry3<f64>>) {
         if !self.state.follows_wrists {
             return;
         }
@@ -143,7 +141,7 @@ impl Motion {
     }
 
     /// Whether the wrists would get to `targets` from here, and the joints that would be at their limits.
-    pub fn reach(&self, targets: &[Isometry3<f64>; 2]) -> (SolveReport, Vec<String>) {
+    pub fn reach(&self, targets: &Sides<Isometry3<f64>>) -> (SolveReport, Vec<String>) {
         let mut solver = self.body.solver();
         solver.tolerance = REACH_TOLERANCE;
         let mut configuration = self.configuration();

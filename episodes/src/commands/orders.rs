@@ -1,11 +1,10 @@
 //! What a tool's arguments ask of one robot, within the limits of its joints and its base.
 
 use nalgebra::Isometry3;
-use tandem_sim::robot::{UPPER, UPPER_JOINTS};
-use tandem_sim::{BaseCommand, Side};
+use tandem_sim::{BaseCommand, HAND_JOINTS, Side, Sides, UPPER, UPPER_JOINTS};
 use tandem_tools_spec::{WalkMove, WristMove};
 
-use super::columns::{self, HAND_JOINTS};
+use super::columns;
 use super::motion::{Motion, RobotSheet};
 use super::{Cut, Goals, Movement, Order, Row};
 use crate::convert::{isometry, wire_pose};
@@ -15,21 +14,23 @@ pub fn reach(entry: &WristMove, motion: &Motion) -> Order {
     let velocity =
         [entry.vx_m_s.unwrap_or(0.0), entry.vy_m_s.unwrap_or(0.0), entry.yaw_rate_rad_s.unwrap_or(0.0)];
     let base = base(velocity, entry.pelvis_height_m, motion, &mut cut);
-    let [left, right] = motion.targets();
-    let wrists = [
-        wrist_target(entry.left_position_m, entry.left_quaternion_wxyz, left),
-        wrist_target(entry.right_position_m, entry.right_quaternion_wxyz, right),
-    ];
+    let present = motion.targets();
+    let wrists = Sides {
+        left: wrist_target(entry.left_position_m, entry.left_quaternion_wxyz, &present.left),
+        right: wrist_target(entry.right_position_m, entry.right_quaternion_wxyz, &present.right),
+    };
     let mut fingers = |side: Side, asked_rad: &Option<[f64; HAND_JOINTS]>| {
-        let first = columns::hand(side);
+        let first = columns::hand(side).start;
         asked_rad.map(|asked_rad| {
             std::array::from_fn(|finger| {
                 within_joint_limits(&motion.robot, first + finger, asked_rad[finger], &mut cut)
             })
         })
     };
-    let fingers_rad =
-        [fingers(Side::Left, &entry.left_fingers_rad), fingers(Side::Right, &entry.right_fingers_rad)];
+    let fingers_rad = Sides {
+        left: fingers(Side::Left, &entry.left_fingers_rad),
+        right: fingers(Side::Right, &entry.right_fingers_rad),
+    };
     Order { movement: Movement::Reach(Goals { wrists, fingers_rad, base }), cut }
 }
 

@@ -1,7 +1,7 @@
 //! Whether a robot's wrists would reach the poses asked for.
 
 use tandem_ik::FrameError;
-use tandem_sim::Side;
+use tandem_sim::{Side, Sides};
 use tandem_tools_spec::{CheckReach, HandReach, ReachReply};
 
 use super::motion::Motion;
@@ -11,11 +11,10 @@ use crate::convert::rounded;
 
 /// The reply to `check_reach`.
 pub fn check_reach(args: &CheckReach, motion: &Motion) -> ReachReply {
-    let [left, right] = motion.targets();
-    let targets = [
-        wrist_target(args.left_position_m, args.left_quaternion_wxyz, left).unwrap_or(*left),
-        wrist_target(args.right_position_m, args.right_quaternion_wxyz, right).unwrap_or(*right),
-    ];
+    let present = motion.targets();
+    let left = wrist_target(args.left_position_m, args.left_quaternion_wxyz, &present.left);
+    let right = wrist_target(args.right_position_m, args.right_quaternion_wxyz, &present.right);
+    let targets = Sides { left: left.unwrap_or(present.left), right: right.unwrap_or(present.right) };
     let (report, joints_at_limit) = motion.reach(&targets);
     let hand = |side: Side| {
         let error = report.errors.get(side.index()).copied().unwrap_or_default();

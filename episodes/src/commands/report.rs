@@ -1,11 +1,10 @@
 //! How a robot did under an order that has just been executed.
 
-use tandem_sim::robot::UPPER;
-use tandem_sim::{RobotState, Side};
+use tandem_sim::{RobotState, Side, UPPER};
 use tandem_tools_spec::{HandReport, RobotReport};
 
 use super::Cut;
-use super::columns::{self, ARM_JOINTS, HAND_JOINTS};
+use super::columns;
 use super::motion::{Motion, RobotSheet};
 use crate::convert::{isometry_from_sim, rounded, wire_pose};
 
@@ -30,9 +29,8 @@ pub fn report(cut: &Cut, state: &RobotState, motion: &Motion) -> RobotReport {
 
 fn hand_report(side: Side, cut: &Cut, state: &RobotState, motion: &Motion) -> HandReport {
     let (arm, hand) = (columns::arm(side), columns::hand(side));
-    let (arm, hand) = (arm..arm + ARM_JOINTS, hand..hand + HAND_JOINTS);
-    let target = &motion.targets()[side.index()];
-    let measured = isometry_from_sim(&state.pelvis_from_wrist[side.index()]);
+    let target = &motion.targets()[side];
+    let measured = isometry_from_sim(&state.pelvis_from_wrist[side]);
     let missing = measured.inverse() * target;
     let robot = &motion.robot;
     HandReport {

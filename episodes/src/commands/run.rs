@@ -1,10 +1,9 @@
 //! A movement under way: wrists and fingers go in a straight line and arrive with the command's last step.
 
 use nalgebra::Isometry3;
-use tandem_sim::robot::UPPER_JOINTS;
-use tandem_sim::{RobotCommand, Side};
+use tandem_sim::{HAND_JOINTS, RobotCommand, Side, Sides, UPPER_JOINTS};
 
-use super::columns::{self, HAND_JOINTS};
+use super::columns;
 use super::motion::Motion;
 use super::{Goals, Movement};
 
@@ -13,7 +12,7 @@ pub struct Run {
     movement: Movement,
     steps: u32,
     done: u32,
-    from_wrists: [Isometry3<f64>; 2],
+    from_wrists: Sides<Isometry3<f64>>,
     from_rad: [f64; UPPER_JOINTS],
 }
 
@@ -57,14 +56,14 @@ impl Run {
         motion.walk(goals.base);
         let mut targets = *motion.targets();
         for side in Side::BOTH {
-            if let Some(goal_rad) = &goals.fingers_rad[side.index()] {
-                let from_rad = &self.from_rad[columns::hand(side)..][..HAND_JOINTS];
+            if let Some(goal_rad) = &goals.fingers_rad[side] {
+                let from_rad = &self.from_rad[columns::hand(side)];
                 let between: [f64; HAND_JOINTS] =
                     std::array::from_fn(|i| from_rad[i] + (goal_rad[i] - from_rad[i]) * part);
                 motion.set_fingers(side, &between);
             }
-            if let Some(goal) = &goals.wrists[side.index()] {
-                targets[side.index()] = between(&self.from_wrists[side.index()], goal, part);
+            if let Some(goal) = &goals.wrists[side] {
+                targets[side] = between(&self.from_wrists[side], goal, part);
             }
         }
         motion.follow(&targets);

@@ -5,8 +5,7 @@ use tandem_ik::{
     Capsule, DampingTask, FrameId, FrameTask, IkError, JointCouplingTask, Limits, Model, PostureTask,
     SelfCollision, Solver, Task, Tolerance,
 };
-use tandem_sim::robot::{UPPER, UPPER_JOINTS, joint_names};
-use tandem_sim::{CONTROL_HZ, RobotCommand, Side};
+use tandem_sim::{CONTROL_HZ, RobotCommand, Side, Sides, UPPER, UPPER_JOINTS, joint_names};
 
 use super::columns;
 
@@ -24,8 +23,7 @@ pub const REACH_TOLERANCE: Tolerance = Tolerance { position_m: 0.005, orientatio
 /// Shared by all robots of an episode.
 pub struct UpperBody {
     pub model: Model,
-    /// Left, right.
-    pub wrists: [FrameId; 2],
+    pub wrists: Sides<FrameId>,
     /// Position in an action row of each joint of the model.
     pub columns: Vec<usize>,
     self_collision: SelfCollision,
@@ -41,7 +39,7 @@ impl UpperBody {
         let columns: Vec<usize> = model.joints().iter().filter_map(|joint| column_of(&joint.name)).collect();
         let rest_rad = columns.iter().map(|column| rest.upper_rad[*column].into()).collect();
         Ok(UpperBody {
-            wrists: [model.frame("left_wrist")?, model.frame("right_wrist")?],
+            wrists: Sides { left: model.frame("left_wrist")?, right: model.frame("right_wrist")? },
             self_collision: self_collision(&model)?,
             model,
             columns,
@@ -50,10 +48,10 @@ impl UpperBody {
     }
 
     /// Wrists at `targets`, of whose error one step is to remove the part `gain`, and as little else as that takes.
-    pub fn tasks(&self, targets: &[Isometry3<f64>; 2], gain: f64) -> Vec<Task> {
+    pub fn tasks(&self, targets: &Sides<Isometry3<f64>>, gain: f64) -> Vec<Task> {
         let mut tasks: Vec<Task> = Vec::with_capacity(7);
         for side in Side::BOTH {
-            let wrist = FrameTask::new(self.wrists[side.index()], targets[side.index()]);
+            let wrist = FrameTask::new(self.wrists[side], targets[side]);
             tasks.push(Task::Frame(FrameTask { orientation_cost: ORIENTATION_COST, gain, ..wrist }));
         }
         tasks.push(Task::Posture(PostureTask {

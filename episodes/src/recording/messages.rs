@@ -126,14 +126,14 @@ impl JsonMessage for Hands {
 impl Hands {
     /// Of robot number `robot`, which measures `state` where scoring sees `facts`.
     pub fn of(state: &RobotState, robot: usize, facts: &Facts) -> Json<Hands> {
-        let [left, right] = state.hand_force_n.map(|force_n| force_n.to_array());
+        let felt_n = state.hand_force_n.map(|force_n| force_n.to_array());
         let named = |side: Side, wanted: Grip| {
-            let objects = facts.objects.iter().filter(|object| object.hands[robot][side.index()] == wanted);
+            let objects = facts.objects.iter().filter(|object| object.hands[robot][side] == wanted);
             objects.map(|object| object.name.clone()).collect()
         };
         Json(Hands {
-            left_force_n: left,
-            right_force_n: right,
+            left_force_n: felt_n.left,
+            right_force_n: felt_n.right,
             left_holds: named(Side::Left, Grip::Holding),
             right_holds: named(Side::Right, Grip::Holding),
             left_touches: named(Side::Left, Grip::Touching),

@@ -1,7 +1,7 @@
 //! The topics of one robot: what its joints do, what it was told, what its hands feel and what its camera saw.
 
 use foxglove::messages::{CameraCalibration, CompressedImage, JointState, JointStates};
-use tandem_sim::{RobotState, RobotStep, mjcf::MjcfCamera, robot::RobotModel};
+use tandem_sim::{RobotModel, RobotState, RobotStep, mjcf::MjcfCamera};
 
 use super::file::{McapFile, Topic};
 use super::messages::{Action, Base, Hands, Json};

@@ -50,7 +50,7 @@ fn spec() -> EpisodeSpec {
 fn recorder(folder: &Path, world: &World) -> (Recorder, Scores) {
     let start = world.present();
     let scores = Scores::new(spec().task.phases, [("bottle", "bottle")].into_iter(), &start).unwrap();
-    let sheet = |robot: &tandem_sim::robot::Robot| RobotSheet {
+    let sheet = |robot: &tandem_sim::Robot| RobotSheet {
         name: robot.name.clone(),
         model: robot.model.clone(),
         base_limits: robot.base_limits(),

@@ -1,7 +1,7 @@
 //! Poses as Foxglove's transforms: the world, each robot's chain of links, its camera, and the objects.
 
 use foxglove::messages::{FrameTransform, FrameTransforms, Quaternion, Timestamp, Vector3};
-use tandem_sim::{Pose, RobotState, Rotation, Step, Vector, robot::RobotModel};
+use tandem_sim::{Pose, RobotModel, RobotState, Rotation, Step, Vector};
 
 use super::file::time_ns;
 use crate::commands::RobotSheet;

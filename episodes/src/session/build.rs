@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use tandem_sim::robot::{Robot, RobotModel};
-use tandem_sim::{ObjectPlacement, Pose, RobotPlacement, Rotation, World, WorldSpec};
+use tandem_sim::{ObjectPlacement, Pose, Robot, RobotModel, RobotPlacement, Rotation, World, WorldSpec};
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::EpisodeError;

@@ -3,14 +3,14 @@
 use crate::common::*;
 use tandem_episodes::players::{self, Backstage, Caller, PlayerError};
 use tandem_episodes::{A, B, Facts, Session};
-use tandem_sim::{Side, Vector};
+use tandem_sim::{Side, Sides, Vector};
 use tandem_tools_spec::{Protocol, ToolCall, ToolReply};
 
 /// Plays on, and notes the hand forces whenever A alone holds the bottle in the air.
 struct Lifting {
     session: Session,
-    /// Of the robots at each of these moments: left hand, right hand.
-    felt_n: Vec<Vec<[Vector; 2]>>,
+    /// By the robots' hands at each of these moments.
+    felt_n: Vec<Vec<Sides<Vector>>>,
 }
 
 impl Caller for Lifting {
@@ -40,7 +40,7 @@ fn a_hand_that_lifts_the_bottle_feels_its_weight() {
     players::find("expert").unwrap().play(&spec, &mut lifting).unwrap();
     assert!(lifting.felt_n.len() >= 5, "A held the bottle after {} commands", lifting.felt_n.len());
     for felt_n in &lifting.felt_n {
-        let [left_n, right_n] = felt_n[A];
+        let Sides { left: left_n, right: right_n } = felt_n[A];
         assert!((right_n.z + BOTTLE_N).abs() < 0.15 * BOTTLE_N, "the right hand feels {right_n} N");
         assert!(left_n.z.abs() < 0.1 * BOTTLE_N, "the left hand feels {left_n} N");
     }

@@ -18,7 +18,7 @@ use tandem_tools_spec::{CommandReply, Protocol, ResultReply, StartEpisode, ToolC
 
 use super::{Outcome, Seeds, episode_flags::LocomotionFlag, log};
 use crate::{
-    drivers::{HttpEpisode, HttpError},
+    drivers::HttpEpisode,
     hosting::EpisodeThread,
     http::Server,
     settings::{Layer, Settings},
@@ -125,10 +125,7 @@ struct OverHttp {
 
 impl Caller for OverHttp {
     fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {
-        let reply = self.http.call(&call).map_err(|error| match error {
-            HttpError::Refused(problem) if problem.kind.ends_with(":ended") => PlayerError::EpisodeOver,
-            error => PlayerError::Call { tool: call.name(), reason: error.to_string() },
-        })?;
+        let reply = self.http.call(call)?;
         if let ToolReply::Act(reply) = &reply {
             self.progress.show(reply);
         }

@@ -2,7 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::{
+    Args,
+    builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
+};
 use tandem_episodes::{
     Controller, RobotFile,
     evaluation::Plan,
@@ -23,8 +26,8 @@ pub struct EpisodeFlags {
     #[arg(long, default_value = "0-9", value_name = "SEEDS")]
     seeds: Seeds,
     /// The rules.
-    #[arg(long, value_enum, default_value = "agentic")]
-    protocol: ProtocolChoice,
+    #[arg(long, value_parser = protocol_parser(), default_value = Protocol::Agentic.name())]
+    protocol: Protocol,
     /// Worlds that run side by side.
     #[arg(long, default_value_t = 1, value_name = "N")]
     jobs: usize,
@@ -41,6 +44,7 @@ pub struct LocomotionFlag {
 }
 
 impl LocomotionFlag {
+    /// Which controller the flag names; its file is not read yet.
     pub fn controller(&self) -> Controller {
         Controller::from_file(self.file.as_deref())
     }
@@ -59,11 +63,17 @@ fn parse_tasks(text: &str) -> Result<TaskList, String> {
     found.map(TaskList).map_err(|error: tandem_episodes::EpisodeError| error.to_string())
 }
 
-/// The rules on the command line.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum ProtocolChoice {
-    Agentic,
-    Benchmark,
+/// One of the protocols, by name.
+fn protocol_parser() -> impl TypedValueParser<Value = Protocol> {
+    let find = |name: String| Protocol::ALL.into_iter().find(|protocol| protocol.name() == name);
+    PossibleValuesParser::new(Protocol::ALL.map(Protocol::name))
+        .try_map(move |name| find(name).ok_or("not one of the protocols"))
+}
+
+/// One of the players, by name.
+pub fn player_parser() -> impl TypedValueParser<Value = &'static players::Entry> {
+    let names = players::ALL.iter().map(|player| PossibleValue::new(player.name).help(player.about));
+    PossibleValuesParser::new(names).try_map(|name| players::find(&name))
 }
 
 impl EpisodeFlags {
@@ -71,10 +81,7 @@ impl EpisodeFlags {
     pub fn plan(self, player: &'static players::Entry, record: bool) -> Plan {
         Plan {
             player,
-            protocol: match self.protocol {
-                ProtocolChoice::Agentic => Protocol::Agentic,
-                ProtocolChoice::Benchmark => Protocol::Benchmark,
-            },
+            protocol: self.protocol,
             robot: RobotFile::default(),
             locomotion: self.locomotion.controller(),
             tasks: self.tasks.0,

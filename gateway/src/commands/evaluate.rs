@@ -4,13 +4,17 @@ use std::{path::PathBuf, process::ExitCode};
 
 use tandem_episodes::players;
 
-use super::{Outcome, episode_flags::EpisodeFlags, played};
+use super::{
+    Outcome,
+    episode_flags::{EpisodeFlags, player_parser},
+    played,
+};
 
 /// Play tasks over seeds in parallel worlds and count the phases reached. Goes on where an interrupted run stopped.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Who plays: `expert`, the task's scripted expert, or `idle`, nobody.
-    #[arg(long, value_name = "PLAYER", value_parser = players::find, default_value = "expert")]
+    /// Who plays.
+    #[arg(long, value_parser = player_parser(), default_value = "expert")]
     policy: &'static players::Entry,
     #[command(flatten)]
     episodes: EpisodeFlags,

@@ -4,6 +4,7 @@ use std::{net::SocketAddr, time::Duration};
 
 use serde::Serialize;
 use serde_json::Value;
+use tandem_episodes::players::{Caller, PlayerError};
 use tandem_tools_spec::{ProblemBody, ResultReply, StartEpisode, StartReply, ToolCall, ToolReply};
 use ureq::{Agent, http::Response};
 
@@ -45,15 +46,20 @@ impl HttpEpisode {
         Ok((HttpEpisode { agent, url }, started))
     }
 
-    /// Makes a tool call.
-    pub fn call(&self, call: &ToolCall) -> Result<ToolReply, HttpError> {
-        let url = format!("{}/tools/{}", self.url, call.name());
-        Ok(call.parse_reply(post(&self.agent, &url, call)?)?)
-    }
-
     /// Ends the episode and closes its recording.
     pub fn delete(self) -> Result<ResultReply, HttpError> {
         Ok(serde_json::from_value(reply(self.agent.delete(&self.url).call()?)?)?)
+    }
+}
+
+impl Caller for HttpEpisode {
+    fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {
+        let url = format!("{}/tools/{}", self.url, call.name());
+        let answer = post(&self.agent, &url, &call).and_then(|reply| Ok(call.parse_reply(reply)?));
+        answer.map_err(|error| match error {
+            HttpError::Refused(problem) if problem.kind.ends_with(":ended") => PlayerError::EpisodeOver,
+            error => PlayerError::Call { tool: call.name(), reason: error.to_string() },
+        })
     }
 }
 

@@ -1,5 +1,5 @@
-//! Ways to drive an episode from outside its thread.
+//! Policies that are not in the episode's process: how they reach it.
 
 mod http_episode;
 
-pub use http_episode::{HttpEpisode, HttpError};
+pub use http_episode::HttpEpisode;

@@ -202,3 +202,27 @@ fn spec_kind(error: &SpecError) -> Kind {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+
+    use super::*;
+
+    #[test]
+    fn our_own_faults_stay_in_the_log_and_other_refusals_say_what_would_work() {
+        let check = |error: HostingError, status: u16, says: &str| {
+            let body = ApiError::from(error).body();
+            assert_eq!(body.status, status, "{body:?}");
+            assert!(body.detail.contains(says), "{body:?}");
+        };
+        let failure = || io::Error::other("disk full");
+        check(HostingError::Folder { runs: "runs".into(), source: failure() }, 500, "its log says why");
+        check(HostingError::Thread(failure()), 500, "the server failed; its log says why");
+        check(HostingError::UnknownEpisode { id: "x".into(), have: vec![] }, 404, "POST /v1/episodes");
+        check(HostingError::TooManyEpisodes { limit: 8 }, 429, "all 8 places for episodes are taken; finish");
+        check(HostingError::TooManyWaiting { limit: 16 }, 429, "call again when");
+        check(HostingError::ShuttingDown, 503, "try again");
+        check(HostingError::EpisodeStopped, 410, "start another");
+    }
+}

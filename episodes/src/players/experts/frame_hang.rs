@@ -57,7 +57,7 @@ fn let_go(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
         let mut moves = Vec::with_capacity(grasps.len());
         for grasp in grasps {
             let wrist = stage.world_from_wrist(grasp.robot, grasp.side)?;
-            let outwards = if grasp.side == Side::Left { -1.0 } else { 1.0 };
+            let outwards = -grasp.side.sign();
             let by_m = Vector::new(step_m.x * outwards, step_m.y, step_m.z);
             moves.push(HandMove::reach(
                 grasp.robot,

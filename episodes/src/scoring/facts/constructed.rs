@@ -8,8 +8,8 @@ impl Facts {
     pub fn at_rest(task: &Task) -> Facts {
         let robot = |_| RobotFacts {
             pelvis_in_world: Pose::IDENTITY,
-            wrist_in_pelvis: [Pose::IDENTITY; 2],
-            hand_force_n: [Vector::ZERO; 2],
+            wrist_in_pelvis: Sides::both(Pose::IDENTITY),
+            hand_force_n: Sides::both(Vector::ZERO),
             fallen: false,
         };
         let object = |spot: &crate::tasks::ObjectSpot| ObjectFacts {
@@ -19,7 +19,7 @@ impl Facts {
             velocity_m_s: Vector::ZERO,
             angular_velocity_rad_s: Vector::ZERO,
             rest_height_m: spot.position_m[2],
-            hands: vec![[Grip::Off; 2]; task.robots.len()],
+            hands: vec![Sides::both(Grip::Off); task.robots.len()],
             untouched_s: 10.0,
         };
         Facts {
@@ -35,7 +35,7 @@ impl Facts {
 
     pub fn grip(mut self, robot: usize, side: Side, object: &str, grip: Grip) -> Facts {
         let object = self.object_mut(object);
-        object.hands[robot][side.index()] = grip;
+        object.hands[robot][side] = grip;
         object.untouched_s = 0.0;
         self
     }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tandem_sim::{Pose, Side, Vector, mjcf::Site};
+use tandem_sim::{Pose, Side, Sides, Vector, mjcf::Site};
 
 /// Index of robot A in [`Facts::robots`].
 pub const A: usize = 0;
@@ -23,11 +23,10 @@ pub struct Facts {
 #[derive(Clone, Debug)]
 pub struct RobotFacts {
     pub pelvis_in_world: Pose,
-    /// Left, right.
-    pub wrist_in_pelvis: [Pose; 2],
-    /// Force of the world on each palm, left, right, in the world's frame; estimated from the arm's own torques. A hand that
+    pub wrist_in_pelvis: Sides<Pose>,
+    /// Force of the world on each palm, in the world's frame; estimated from the arm's own torques. A hand that
     /// holds 0.5 kg still feels -4.9 N along z; one in quick motion feels its own inertia, too.
-    pub hand_force_n: [Vector; 2],
+    pub hand_force_n: Sides<Vector>,
     pub fallen: bool,
 }
 
@@ -42,8 +41,8 @@ pub struct ObjectFacts {
     pub angular_velocity_rad_s: Vector,
     /// Height of the object's origin above the floor when the episode began.
     pub rest_height_m: f32,
-    /// Per robot: left hand, right hand.
-    pub hands: Vec<[Grip; 2]>,
+    /// By robot.
+    pub hands: Vec<Sides<Grip>>,
     /// For how long no hand has touched it.
     pub untouched_s: f64,
 }
@@ -62,17 +61,17 @@ pub enum Grip {
 impl Facts {
     /// Whether this hand of this robot holds `object`.
     pub fn holds(&self, robot: usize, side: Side, object: &str) -> bool {
-        self.object(object).hands[robot][side.index()] == Grip::Holding
+        self.object(object).hands[robot][side] == Grip::Holding
     }
 
     /// Whether any hand of this robot holds `object`.
     pub fn holds_any(&self, robot: usize, object: &str) -> bool {
-        self.object(object).hands[robot].contains(&Grip::Holding)
+        self.object(object).hands[robot].iter().any(|grip| *grip == Grip::Holding)
     }
 
     /// Whether neither hand of this robot touches `object`.
     pub fn hands_off(&self, robot: usize, object: &str) -> bool {
-        self.object(object).hands[robot] == [Grip::Off; 2]
+        self.object(object).hands[robot] == Sides::both(Grip::Off)
     }
 
     /// For how long no hand has touched `object`.

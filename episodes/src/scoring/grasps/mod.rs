@@ -1,7 +1,7 @@
 //! Who holds what, by contact alone: a hand holds an object while its thumb presses against its fingers or its palm.
 
 use serde::{Deserialize, Serialize};
-use tandem_sim::{HandContacts, Side, Step, Vector};
+use tandem_sim::{HandContacts, Side, Sides, Step, Vector};
 
 use super::Grip;
 
@@ -61,8 +61,8 @@ fn opposed_press_n(contacts: &HandContacts) -> f32 {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ObjectGrasps {
     object: String,
-    /// Per robot: left, right.
-    detectors: Vec<[GraspDetector; 2]>,
+    /// By robot.
+    detectors: Vec<Sides<GraspDetector>>,
     /// Control steps since a hand last touched the object.
     untouched_steps: u32,
 }
@@ -80,14 +80,14 @@ impl ObjectGrasps {
     pub fn update(&mut self, step: &Step) {
         for (robot, hands) in self.detectors.iter_mut().enumerate() {
             for side in Side::BOTH {
-                hands[side.index()].update(&step.contacts(robot, side, &self.object));
+                hands[side].update(&step.contacts(robot, side, &self.object));
             }
         }
-        let off = self.grips().iter().flatten().all(|grip| *grip == Grip::Off);
+        let off = self.grips().iter().all(|hands| *hands == Sides::both(Grip::Off));
         self.untouched_steps = if off { self.untouched_steps + 1 } else { 0 };
     }
 
-    pub fn grips(&self) -> Vec<[Grip; 2]> {
+    pub fn grips(&self) -> Vec<Sides<Grip>> {
         self.detectors.iter().map(|hands| hands.map(|hand| hand.grip())).collect()
     }
 

@@ -28,10 +28,7 @@ pub fn mirrored_m(right_m: Vector, side: Side) -> Vector {
     Vector::new(right_m.x, right_m.y * away(side), right_m.z)
 }
 
-/// Which way along the wrist's y axis is away from the palm's face: 1 for a right hand.
+/// Of y in the wrist's frame on the side that the palm faces: 1 for a right hand.
 pub fn away(side: Side) -> f32 {
-    match side {
-        Side::Left => -1.0,
-        Side::Right => 1.0,
-    }
+    -side.sign()
 }

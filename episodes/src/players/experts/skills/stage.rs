@@ -1,6 +1,6 @@
 //! What every expert builds on: hands that move along straight lines in the world, several at once.
 
-use tandem_sim::{CONTROL_HZ, Pose, Side};
+use tandem_sim::{CONTROL_DT_S, Pose, Side, Sides};
 use tandem_tools_spec::{MoveWrists, StopReason, Tool as _, ToolReply, WristMove};
 
 use crate::players::{Backstage, PlayerError};
@@ -9,7 +9,6 @@ use crate::tasks::Task;
 
 /// Control steps of one command: short enough to correct for a swaying pelvis.
 const STEPS_PER_COMMAND: u32 = 10;
-const CONTROL_DT_S: f32 = 1.0 / CONTROL_HZ as f32;
 
 /// Part of one hand in a motion. What is not said stays as it is.
 #[derive(Clone, Copy, Debug)]
@@ -47,8 +46,8 @@ struct HandGoal {
 pub struct Stage<'a> {
     task: &'static Task,
     episode: &'a mut dyn Backstage,
-    /// Per robot: left, right.
-    goals: Vec<[HandGoal; 2]>,
+    /// By robot.
+    goals: Vec<Sides<HandGoal>>,
 }
 
 impl<'a> Stage<'a> {
@@ -56,7 +55,7 @@ impl<'a> Stage<'a> {
         let facts = episode.facts()?;
         let goals = (0..facts.robots.len())
             .map(|robot| {
-                Side::BOTH.map(|side| HandGoal {
+                Sides::from_fn(|side| HandGoal {
                     world_from_wrist: world_from_wrist(&facts, robot, side),
                     fingers_rad: [0.0; 7],
                 })
@@ -92,8 +91,8 @@ impl<'a> Stage<'a> {
             let steps = STEPS_PER_COMMAND.min(total - done);
             let part = pace((done + steps) as f32 / total as f32);
             for hand in moves {
-                let start = from[hand.robot][hand.side.index()];
-                let goal = &mut self.goals[hand.robot][hand.side.index()];
+                let start = from[hand.robot][hand.side];
+                let goal = &mut self.goals[hand.robot][hand.side];
                 if let Some(end) = hand.world_from_wrist {
                     goal.world_from_wrist = start.world_from_wrist.lerp(&end, part);
                 }
@@ -126,7 +125,7 @@ impl<'a> Stage<'a> {
 
     fn wrist_move(&self, facts: &Facts, robot: usize) -> WristMove {
         let pelvis_from_world = facts.robots[robot].pelvis_in_world.inverse();
-        let goal = |side: Side| self.goals[robot][side.index()];
+        let goal = |side: Side| self.goals[robot][side];
         let pose = |side: Side| pelvis_from_world * goal(side).world_from_wrist;
         let position = |side: Side| Some(pose(side).translation.to_array().map(f64::from));
         let quaternion = |side: Side| {
@@ -153,7 +152,7 @@ impl<'a> Stage<'a> {
 
 fn world_from_wrist(facts: &Facts, robot: usize, side: Side) -> Pose {
     let robot = &facts.robots[robot];
-    robot.pelvis_in_world * robot.wrist_in_pelvis[side.index()]
+    robot.pelvis_in_world * robot.wrist_in_pelvis[side]
 }
 
 /// Zero speed at both ends.
