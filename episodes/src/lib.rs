@@ -19,13 +19,13 @@ mod spec;
 pub mod tasks;
 
 pub use describe::task_list;
-pub use error::EpisodeError;
+pub use error::{CheckpointError, EpisodeError};
 pub use instructions::{Instructions, InstructionsError};
 pub use output::OutputError;
 pub use protocol::{Rules, rules};
 pub use recording::{RecordedCall, Recorder, Recording, RecordingError};
 pub use reports::EpisodeResult;
 pub use scoring::{A, B, Facts, Grip, Scores};
-pub use session::{Checkpoint, CheckpointError, Clock, RunFiles, Session, monotonic};
+pub use session::{Checkpoint, Clock, RunFiles, Session, monotonic};
 pub use spec::{Controller, EpisodeSpec, RendererKind, RobotFile, Start};
 pub use tandem_sim::{BaseLimits, LocomotionChoice, SimError};

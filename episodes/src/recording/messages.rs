@@ -7,9 +7,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tandem_sim::{BaseCommand, RobotCommand, RobotState, Side, Step};
-use tandem_tools_spec::{Budget, LookReply, PhaseReached, ToolReply};
+use tandem_tools_spec::{Budget, LookReply, PhaseReached, ToolCall, ToolReply};
 
-use super::ToolCallRecord;
 use crate::commands::base_row;
 use crate::output::OutputError;
 use crate::scoring::{Facts, Grip};
@@ -178,6 +177,14 @@ impl From<&Budget> for Json<BudgetLeft> {
     fn from(budget: &Budget) -> Self {
         Json(BudgetLeft { steps_left: budget.steps_left, wall_clock_left_s: budget.wall_clock_left_s })
     }
+}
+
+/// A tool call and how it was answered: a reply, or the text of the problem.
+pub struct ToolCallRecord<'a> {
+    /// When it was answered.
+    pub time_s: f64,
+    pub call: &'a ToolCall,
+    pub outcome: Result<&'a ToolReply, &'a str>,
 }
 
 /// A tool call and its answer. Arguments and reply are JSON texts, since every tool has others.

@@ -18,8 +18,9 @@ mod tests;
 mod transforms;
 mod write;
 
+pub use messages::ToolCallRecord;
 pub use read::{RecordedCall, Recording, RecordingError};
-pub use write::{Recorder, RecordingHeader, ToolCallRecord};
+pub use write::{Recorder, RecordingHeader};
 
 /// Topics that are read back.
 mod topics {

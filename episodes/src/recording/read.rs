@@ -84,9 +84,9 @@ impl Recording {
 
     /// The state before the first step, then every step.
     pub fn steps(&self) -> Result<impl Iterator<Item = Result<Step, RecordingError>>, RecordingError> {
-        let steps = self.messages(topics::STEPS)?;
+        let steps = self.messages::<StepMessage>(topics::STEPS)?;
         Ok(steps.map(|message| {
-            let (_, message): (f64, StepMessage) = message?;
+            let (_, message) = message?;
             message.step().map_err(|source| RecordingError::Step { path: self.path.clone(), source })
         }))
     }

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use base64::{Engine, prelude::BASE64_STANDARD};
 use foxglove::messages::{FrameTransforms, SceneUpdate};
 use tandem_sim::{Step, mjcf::Geom, render::robot_rgba};
-use tandem_tools_spec::{Budget, LookReply, PhaseReached, ToolCall, ToolReply};
+use tandem_tools_spec::{Budget, LookReply, PhaseReached, ToolReply};
 
 use super::file::{McapFile, Topic};
-use super::messages::{BudgetLeft, Json, Phase, StepMessage, ToolCallMessage};
+use super::messages::{BudgetLeft, Json, Phase, StepMessage, ToolCallMessage, ToolCallRecord};
 use super::robot_topics::RobotTopics;
 use super::transforms::{self, robot_frame};
 use super::{metadata, scene, topics};
@@ -29,14 +29,6 @@ pub struct RecordingHeader {
     pub robots: Vec<RobotSheet>,
     /// What scoring remembers where the recording begins.
     pub scores: ScoreMemory,
-}
-
-/// A tool call and how it was answered: a reply, or the text of the problem.
-pub struct ToolCallRecord<'a> {
-    /// When it was answered.
-    pub time_s: f64,
-    pub call: &'a ToolCall,
-    pub outcome: Result<&'a ToolReply, &'a str>,
 }
 
 /// A recording under way.

@@ -2,7 +2,7 @@
 //!
 //! The file is one line of JSON that says whose progress follows, so that `head -1` shows it, then the progress itself.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
@@ -11,7 +11,7 @@ use tandem_tools_spec::EndReason;
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::{Session, this_build};
-use crate::EpisodeError;
+use crate::error::{CheckpointError, EpisodeError};
 use crate::commands::MotionState;
 use crate::output::write_whole;
 use crate::scoring::ScoreMemory;
@@ -53,29 +53,6 @@ struct Header {
     /// Length and hash of what follows.
     bytes: usize,
     xxh3: String,
-}
-
-/// Why a checkpoint cannot be gone on from.
-#[derive(Debug, thiserror::Error)]
-pub enum CheckpointError {
-    #[error("cannot read the checkpoint {}: {source}", path.display())]
-    Read { path: PathBuf, source: std::io::Error },
-    #[error("{} is no checkpoint of an episode: {source}", path.display())]
-    NotOne { path: PathBuf, source: serde_json::Error },
-    #[error(
-        "the checkpoint {} was made by build {made_by} of {episode}; this is build {this}, and only the build that made a checkpoint goes on from it",
-        path.display()
-    )]
-    OtherBuild { path: PathBuf, made_by: String, episode: String, this: &'static str },
-    #[error(
-        "the checkpoint {} is torn: {have} of its {expected} bytes are as they were written; make it again",
-        path.display()
-    )]
-    Torn { path: PathBuf, have: usize, expected: usize },
-    #[error("the checkpoint was made of {made_of}; it fits that episode, and this one is {wanted}")]
-    OtherEpisode { made_of: String, wanted: String },
-    #[error("the progress in a checkpoint cannot be read or written: {0}")]
-    Progress(#[from] postcard::Error),
 }
 
 impl Checkpoint {

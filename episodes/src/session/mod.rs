@@ -10,7 +10,7 @@ mod replies;
 mod run_files;
 mod status;
 
-pub use checkpoint::{Checkpoint, CheckpointError};
+pub use checkpoint::Checkpoint;
 pub use clock::{Clock, monotonic};
 pub use run_files::RunFiles;
 
@@ -88,7 +88,8 @@ impl Session {
         let hold_steps = match &self.origin.spec.start {
             Start::Task => self.rules.initial_hold_steps,
             Start::Checkpoint(path) => {
-                self.resume(&Checkpoint::read(path)?)?;
+                let checkpoint = Checkpoint::read(path)?;
+                self.resume(&checkpoint)?;
                 0
             }
         };

@@ -23,6 +23,20 @@ const ORDER: &[(&str, &[&[&str]])] = &[
             &["render", "bench"],
         ],
     ),
+    (
+        "episodes",
+        &[
+            &["output", "fingerprint", "scoring", "convert"],
+            &["error"],
+            &["tasks"],
+            &["protocol", "spec"],
+            &["commands", "reports"],
+            &["describe", "recording", "bench"],
+            &["instructions", "session"],
+            &["players"],
+            &["evaluation"],
+        ],
+    ),
     ("gateway", &[&["settings"], &["hosting"], &["http"], &["drivers"], &["commands"], &["cli"], &["main"]]),
 ];
 
