@@ -11,8 +11,8 @@ use tandem_tools_spec::EndReason;
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::{Session, this_build};
-use crate::error::{CheckpointError, EpisodeError};
 use crate::commands::MotionState;
+use crate::error::{CheckpointError, EpisodeError};
 use crate::output::write_whole;
 use crate::scoring::ScoreMemory;
 use crate::spec::EpisodeSpec;
