@@ -1,207 +1,19 @@
-//! Dense strictly convex quadratic programs by the dual active set method.
-//!
-//!   minimise    1/2 x' H x + c' x
-//!   subject to  lower <= x <= upper,   a_k' x >= b_k   (or = b_k)
-//!
-//! H: n x n, positive definite. The method starts at the unconstrained minimum and adds the most violated constraint
-//! until none is left, so a problem whose optimum is inside its bounds costs one Cholesky factorisation.
-//! Source: Goldfarb and Idnani, A numerically stable dual method for solving strictly convex quadratic programs, 1983.
+//! The active set: which constraint to add, how far to go for it, and which ones to drop on the way.
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt;
+use faer::Par;
 use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
-use faer::{Mat, Par};
 
-/// A constraint of the problem.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Constraint {
-    /// `x[i] >= lower[i]`.
-    Lower(usize),
-    /// `x[i] <= upper[i]`.
-    Upper(usize),
-    /// `a_k' x >= b_k`, or equality.
-    Row(usize),
-}
-
-/// One linear constraint with dense coefficients.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Row {
-    /// a.
-    pub coefficients: Vec<f64>,
-    /// b.
-    pub bound: f64,
-    /// a' x = b instead of a' x >= b.
-    pub equality: bool,
-}
-
-/// Why there is no solution.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum QpFailure {
-    /// H is not positive definite.
-    NotConvex,
-    /// This constraint contradicts others.
-    Infeasible(Constraint),
-    /// Rounding kept the active set from settling.
-    Unsettled,
-}
+use super::constraint::Constraint;
+use super::problem::{Qp, QpFailure};
 
 /// A violation below this is rounding.
 const TOLERANCE: f64 = 1e-11;
 /// Relative size below which a constraint's normal lies in the span of the active ones.
 const DEPENDENT: f64 = 1e-20;
 
-/// Problem data and work space for `n` variables.
-pub struct Qp {
-    n: usize,
-    /// Lower triangle is read.
-    pub hessian: Mat<f64>,
-    /// c.
-    pub linear: Vec<f64>,
-    /// Bounds on x; may be infinite.
-    pub lower: Vec<f64>,
-    /// Bounds on x; may be infinite.
-    pub upper: Vec<f64>,
-    /// Further constraints; only the first `used_rows` count.
-    rows: Vec<Row>,
-    used_rows: usize,
-    /// The solution after [`Qp::solve`].
-    pub x: Vec<f64>,
-    factor: Mat<f64>,
-    inverse: Mat<f64>,
-    rhs: Mat<f64>,
-    scratch: MemBuffer,
-    /// Columns span the active normals first, then their complement: L^-T Q.
-    basis: Vec<f64>,
-    /// Upper triangular factor of the active normals, column major.
-    r: Vec<f64>,
-    /// Active constraints with the sign of their normal, and their multipliers.
-    active: Vec<(Constraint, f64)>,
-    multipliers: Vec<f64>,
-    d: Vec<f64>,
-    direction: Vec<f64>,
-    dual_step: Vec<f64>,
-}
-
 impl Qp {
-    /// Work space for `n` variables.
-    pub fn new(n: usize) -> Qp {
-        let scratch =
-            MemBuffer::new(llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default()));
-        Qp {
-            n,
-            hessian: Mat::zeros(n, n),
-            linear: vec![0.0; n],
-            lower: vec![f64::NEG_INFINITY; n],
-            upper: vec![f64::INFINITY; n],
-            rows: Vec::new(),
-            used_rows: 0,
-            x: vec![0.0; n],
-            factor: Mat::zeros(n, n),
-            inverse: Mat::zeros(n, n),
-            rhs: Mat::zeros(n, 1),
-            scratch,
-            basis: vec![0.0; n * n],
-            r: vec![0.0; n * n],
-            active: Vec::with_capacity(n + 1),
-            multipliers: vec![0.0; n + 1],
-            d: vec![0.0; n],
-            direction: vec![0.0; n],
-            dual_step: vec![0.0; n],
-        }
-    }
-
-    /// Forgets all rows; their memory is kept.
-    pub fn clear_rows(&mut self) {
-        self.used_rows = 0;
-    }
-
-    /// A new row, zero so far.
-    pub fn push_row(&mut self) -> &mut Row {
-        if self.used_rows == self.rows.len() {
-            self.rows.push(Row { coefficients: vec![0.0; self.n], bound: 0.0, equality: false });
-        }
-        self.used_rows += 1;
-        let row = &mut self.rows[self.used_rows - 1];
-        row.coefficients.fill(0.0);
-        row.equality = false;
-        row
-    }
-
-    /// Rows since [`Qp::clear_rows`].
-    pub fn rows(&self) -> &[Row] {
-        &self.rows[..self.used_rows]
-    }
-
-    /// Whether x = 0 keeps all bounds and equalities to `tolerance`.
-    pub fn accepts_standstill(&self, tolerance: f64) -> bool {
-        let within = |(lower, upper): (&f64, &f64)| *lower <= tolerance && *upper >= -tolerance;
-        let keeps = |row: &Row| !row.equality || row.bound.abs() <= tolerance;
-        self.lower.iter().zip(&self.upper).all(within) && self.rows().iter().all(keeps)
-    }
-
-    /// Lowers the bound of every inequality that the start x = 0 violates to `cap` of the largest  a' x  within the
-    /// bounds on x; says whether there was any.
-    pub fn cap_inequalities(&mut self, cap: impl Fn(f64) -> f64) -> bool {
-        let mut lowered = false;
-        for row in self.rows[..self.used_rows].iter_mut().filter(|row| !row.equality && row.bound > 0.0) {
-            let largest = row.coefficients.iter().enumerate().filter(|(_, a)| **a != 0.0);
-            let attainable: f64 = largest.map(|(i, a)| (a * self.lower[i]).max(a * self.upper[i])).sum();
-            let capped = row.bound.min(cap(attainable.max(0.0)));
-            lowered |= capped < row.bound;
-            row.bound = capped;
-        }
-        lowered
-    }
-
-    /// Constraints that hold with equality at the solution.
-    pub fn active(&self) -> impl Iterator<Item = Constraint> + '_ {
-        self.active.iter().map(|(constraint, _)| *constraint)
-    }
-
-    /// Solves the problem as it stands; the result is in [`Qp::x`].
-    pub fn solve(&mut self) -> Result<(), QpFailure> {
-        self.unconstrained_minimum()?;
-        self.active.clear();
-        let mut has_basis = false;
-        for _ in 0..10 * self.n + 100 {
-            let Some((constraint, sign, violation)) = self.most_violated() else {
-                for i in 0..self.n {
-                    self.x[i] = self.x[i].clamp(self.lower[i], self.upper[i].max(self.lower[i]));
-                }
-                return Ok(());
-            };
-            if !has_basis {
-                self.start_basis();
-                has_basis = true;
-            }
-            self.add(constraint, sign, violation)?;
-        }
-        Err(QpFailure::Unsettled)
-    }
-
-    fn unconstrained_minimum(&mut self) -> Result<(), QpFailure> {
-        self.factor.copy_from(&self.hessian);
-        let stack = MemStack::new(&mut self.scratch);
-        llt::factor::cholesky_in_place(
-            self.factor.as_mut(),
-            Default::default(),
-            Par::Seq,
-            stack,
-            Default::default(),
-        )
-        .map_err(|_| QpFailure::NotConvex)?;
-        for i in 0..self.n {
-            self.rhs[(i, 0)] = -self.linear[i];
-        }
-        llt::solve::solve_in_place(self.factor.as_ref(), self.rhs.as_mut(), Par::Seq, stack);
-        for i in 0..self.n {
-            self.x[i] = self.rhs[(i, 0)];
-        }
-        Ok(())
-    }
-
     /// The inactive constraint with the largest violation, the sign of its normal, and its (negative) slack.
-    fn most_violated(&self) -> Option<(Constraint, f64, f64)> {
+    pub(super) fn most_violated(&self) -> Option<(Constraint, f64, f64)> {
         let mut worst: Option<(Constraint, f64, f64)> = None;
         let mut consider = |constraint: Constraint, sign: f64, slack: f64| {
             let limit = worst.map_or(-TOLERANCE, |(_, _, slack)| slack);
@@ -226,7 +38,7 @@ impl Qp {
     }
 
     /// basis = L^-T.
-    fn start_basis(&mut self) {
+    pub(super) fn start_basis(&mut self) {
         self.inverse.fill(0.0);
         for i in 0..self.n {
             self.inverse[(i, i)] = 1.0;
@@ -240,7 +52,7 @@ impl Qp {
     }
 
     /// Makes one violated constraint active, dropping others on the way.
-    fn add(&mut self, constraint: Constraint, sign: f64, mut slack: f64) -> Result<(), QpFailure> {
+    pub(super) fn add(&mut self, constraint: Constraint, sign: f64, mut slack: f64) -> Result<(), QpFailure> {
         let n = self.n;
         self.multipliers[self.active.len()] = 0.0;
         loop {

@@ -1,6 +1,6 @@
 //! Joint limits as one interval for each joint's displacement in a step.
 
-use crate::Configuration;
+use crate::model::{Configuration, Model};
 
 /// What bounds a joint's displacement dq in a step of dt:
 ///   gain (lower - q) <= dq <= gain (upper - q)                configuration
@@ -31,7 +31,7 @@ pub enum LimitKind {
 
 impl Limits {
     /// The file's ranges and velocities; gain 0.5, no acceleration limit.
-    pub fn of(model: &crate::Model) -> Limits {
+    pub fn of(model: &Model) -> Limits {
         let velocity = model.joints().iter().map(|joint| joint.velocity).collect();
         Limits { configuration_gain: Some(0.5), velocity, acceleration: None }
     }

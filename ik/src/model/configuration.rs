@@ -2,7 +2,9 @@
 
 use nalgebra::{Isometry3, Vector3, Vector6};
 
-use crate::{FrameId, IkError, Joint, JointKind, Model};
+use super::parts::{FrameId, Joint, JointKind};
+use super::tree::Model;
+use crate::error::IkError;
 
 /// Joint coordinates with the poses that follow from them.
 #[derive(Clone, Debug)]

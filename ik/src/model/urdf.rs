@@ -5,8 +5,9 @@ use std::collections::HashMap;
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use urdf_rs::JointType;
 
-use crate::IkError;
-use crate::model::{Frame, Joint, JointKind, Mass, Model};
+use super::parts::{Frame, Joint, JointKind, Mass};
+use super::tree::Model;
+use crate::error::IkError;
 
 impl Model {
     /// Reads URDF text. Joints come depth first, children in file order.

@@ -6,8 +6,9 @@ use std::path::Path;
 use mjcf_rs::body::JointType;
 use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 
-use crate::IkError;
-use crate::model::{Frame, Joint, JointKind, Mass, Model};
+use super::parts::{Frame, Joint, JointKind, Mass};
+use super::tree::Model;
+use crate::error::IkError;
 
 impl Model {
     /// Reads MJCF text. The first top-level body is the root, whatever joint it has; speeds are unlimited, as MJCF has

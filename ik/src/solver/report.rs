@@ -1,8 +1,9 @@
 //! What steps and solutions say about themselves.
 
-use crate::barrier::ClosestPair;
-use crate::limits::LimitKind;
-use crate::{Configuration, FrameError, Joint};
+use super::limits::LimitKind;
+use crate::barriers::ClosestPair;
+use crate::model::{Configuration, Joint};
+use crate::tasks::FrameError;
 
 /// How a step or a solution ended.
 #[derive(Clone, Debug, PartialEq)]

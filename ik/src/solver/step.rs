@@ -1,12 +1,12 @@
-//! One differential step: sets up the quadratic program, solves it and moves the joints.
+//! One differential step: solves the quadratic program and moves the joints.
 
-use crate::barrier::{ClosestPair, PositionBarrier, Segment, SelfCollision};
-use crate::limits::{LimitKind, Limits};
-use crate::program::{Cost, Equalities, RowOwner, Rows, Sink, name_failure};
-use crate::qp::{Constraint, Qp, QpFailure};
-use crate::report::{ClampedJoint, Outcome, Tolerance, saturated};
-use crate::task::{StepContext, Task, TaskScratch};
-use crate::{Configuration, FrameError, Model};
+use super::limits::{LimitKind, Limits};
+use super::program::RowOwner;
+use super::report::{ClampedJoint, Outcome, Tolerance, saturated};
+use crate::barriers::{ClosestPair, PositionBarrier, Segment, SelfCollision};
+use crate::model::{Configuration, Model};
+use crate::qp::{Constraint, Qp};
+use crate::tasks::{FrameError, Task, TaskScratch};
 
 /// Solves for joint displacements of one model; keeps its work space, so that a step that moves does not allocate.
 pub struct Solver {
@@ -22,20 +22,16 @@ pub struct Solver {
     pub tolerance: Tolerance,
     /// What [`Solver::track`] remembers of failed steps, at least 1; goes with the joints where these are saved.
     pub caution: f64,
-    pub(crate) qp: Qp,
-    row_owners: Vec<RowOwner>,
-    scratch: TaskScratch,
-    segments: Vec<Segment>,
-    last_velocity: Vec<f64>,
-    bounds: Vec<[(f64, LimitKind); 2]>,
+    pub(super) qp: Qp,
+    pub(super) row_owners: Vec<RowOwner>,
+    pub(super) scratch: TaskScratch,
+    pub(super) segments: Vec<Segment>,
+    pub(super) last_velocity: Vec<f64>,
+    pub(super) bounds: Vec<[(f64, LimitKind); 2]>,
 }
 
-/// Added to the Hessian's diagonal: joints that no task moves stay where they are.
-const REGULARIZATION: f64 = 1e-12;
 /// A step slower than this, in rad/s or m/s, away from its goal has stalled: it would not get anywhere in seconds.
 const STALLED_SPEED: f64 = 0.02;
-/// Part of the speed that the joints could give to a violated barrier that it may ask for.
-const RECOVERY: f64 = 0.5;
 
 impl Solver {
     /// Work space for `model`, with its own limits.
@@ -141,77 +137,6 @@ impl Solver {
         let beyond = |barrier: &PositionBarrier| barrier.height_m(configuration) < -self.tolerance.position_m;
         self.closest_pair(configuration).is_some_and(|pair| pair.distance_m < 0.0)
             || self.position_barriers.iter().any(beyond)
-    }
-
-    /// Sets up and solves the quadratic program; the displacement is in `self.qp.x`.
-    ///
-    /// A barrier that is violated already asks for a way out. It may ask for part of what the joints can do, and for
-    /// no more than standing still if such demands contradict each other.
-    pub(crate) fn displacement(
-        &mut self,
-        configuration: &Configuration,
-        tasks: &[Task],
-        constraints: &[Task],
-        error_clamp: Option<FrameError>,
-        damping: f64,
-    ) -> Result<(), QpFailure> {
-        self.write_bounds(configuration);
-        self.write_cost(configuration, tasks, error_clamp, REGULARIZATION + damping);
-        self.write_rows(configuration, constraints);
-        match self.qp.solve() {
-            Err(QpFailure::Infeasible(_)) if self.qp.cap_inequalities(|_| 0.0) => self.qp.solve(),
-            result => result,
-        }
-    }
-
-    fn write_bounds(&mut self, configuration: &Configuration) {
-        for joint in 0..configuration.model().nv() {
-            let interval = self.limits.interval(configuration, joint, self.dt_s, self.last_velocity[joint]);
-            self.bounds[joint] = interval;
-            (self.qp.lower[joint], self.qp.upper[joint]) = (interval[0].0, interval[1].0);
-        }
-    }
-
-    fn write_cost(
-        &mut self,
-        configuration: &Configuration,
-        tasks: &[Task],
-        error_clamp: Option<FrameError>,
-        damping: f64,
-    ) {
-        self.qp.hessian.fill(0.0);
-        self.qp.linear.fill(0.0);
-        let context = StepContext { dt_s: self.dt_s, last_velocity: &self.last_velocity, error_clamp };
-        let mut cost = Cost { qp: &mut self.qp };
-        cost.damp(damping);
-        for task in tasks {
-            task.write(configuration, &context, &mut self.scratch, &mut cost);
-        }
-    }
-
-    fn write_rows(&mut self, configuration: &Configuration, constraints: &[Task]) {
-        self.qp.clear_rows();
-        self.row_owners.clear();
-        let context = StepContext { dt_s: self.dt_s, last_velocity: &self.last_velocity, error_clamp: None };
-        let mut rows = Rows { qp: &mut self.qp, owners: &mut self.row_owners };
-        for (task, constraint) in constraints.iter().enumerate() {
-            let mut equalities = Equalities { rows: &mut rows, task };
-            constraint.write(configuration, &context, &mut self.scratch, &mut equalities);
-        }
-        if let Some(self_collision) = &self.self_collision {
-            self_collision.write(configuration, &mut self.segments, &mut rows);
-        }
-        for (index, barrier) in self.position_barriers.iter().enumerate() {
-            barrier.write(configuration, rows.push(RowOwner::Position(index)));
-        }
-        self.qp.cap_inequalities(|attainable| RECOVERY * attainable);
-    }
-
-    pub(crate) fn infeasible(&self, model: &Model, constraints: &[Task], failure: QpFailure) -> Outcome {
-        let (self_collision, barriers) = (self.self_collision.as_ref(), &self.position_barriers);
-        let constraint =
-            name_failure(failure, model, &self.row_owners, constraints, self_collision, barriers);
-        Outcome::Infeasible { constraint }
     }
 }
 

@@ -1,9 +1,9 @@
 //! Whole solutions: steps with a clamped error and a line search, until the frames are there or nothing moves.
 
-use crate::Configuration;
-use crate::report::{ClampedJoint, Outcome, SolveReport, saturated};
-use crate::solver::{Solver, frame_errors};
-use crate::task::Task;
+use super::report::{ClampedJoint, Outcome, SolveReport, saturated};
+use super::step::{Solver, frame_errors};
+use crate::model::{Configuration, Joint};
+use crate::tasks::Task;
 
 /// How long and how hard to try.
 #[derive(Clone, Debug)]
@@ -133,7 +133,7 @@ fn squared_error(configuration: &Configuration, tasks: &[Task]) -> f64 {
 }
 
 /// Uniform in the middle of a joint's range; xorshift64 (Marsaglia 2003).
-pub(crate) fn random_coordinate(joint: &crate::Joint, state: &mut u64) -> f64 {
+pub(crate) fn random_coordinate(joint: &Joint, state: &mut u64) -> f64 {
     *state ^= *state << 13;
     *state ^= *state >> 7;
     *state ^= *state << 17;

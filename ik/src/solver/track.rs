@@ -8,11 +8,11 @@
 //! step. Source: Levenberg 1944; Nocedal and Wright,
 //! Numerical Optimization, 2006, chapters 3 and 10.
 
+use super::report::Outcome;
+use super::step::Solver;
+use crate::model::Configuration;
 use crate::qp::QpFailure;
-use crate::report::Outcome;
-use crate::solver::Solver;
-use crate::task::Task;
-use crate::{Configuration, task};
+use crate::tasks::{ERROR_CLAMP, Task};
 
 const MAX_HALVINGS: usize = 5;
 /// Damping per joint that caution multiplies, 1/rad or 1/m.
@@ -49,7 +49,7 @@ impl Solver {
     ) -> Result<(), QpFailure> {
         let before = objective(configuration, tasks);
         let damping = CAUTION * CAUTION * (self.caution * self.caution - 1.0);
-        self.displacement(configuration, tasks, constraints, Some(task::ERROR_CLAMP), damping)?;
+        self.displacement(configuration, tasks, constraints, Some(ERROR_CLAMP), damping)?;
         // Joints that must brake or come back, and shapes that must part, do so whatever it costs.
         let urgent = self.crosses_barrier(configuration) || !self.qp.accepts_standstill(URGENT);
         let mut scale = 1.0;
@@ -79,5 +79,5 @@ impl Solver {
 }
 
 fn objective(configuration: &Configuration, tasks: &[Task]) -> f64 {
-    tasks.iter().map(|task| task.objective(configuration)).sum()
+    tasks.iter().map(|task| task.goal().objective(configuration)).sum()
 }

@@ -1,17 +1,9 @@
 //! Writes tasks, constraints and barriers into the quadratic program, and remembers whose each row is.
 
-use crate::qp::{Constraint, Qp, QpFailure, Row};
-use crate::{Model, PositionBarrier, SelfCollision, Task};
-
-/// Receives a task's weighted rows.
-pub(crate) trait Sink {
-    /// One row: (joint, W J) for the joints that move it, and  alpha W e.
-    fn row(&mut self, entries: &[(usize, f64)], error: f64);
-    /// The same weight on every joint: W 1 dq = W e, with e per joint.
-    fn diagonal(&mut self, weight: f64, error: impl Fn(usize) -> f64);
-    /// mu, on every joint.
-    fn damp(&mut self, mu: f64);
-}
+use crate::barriers::{PositionBarrier, SelfCollision};
+use crate::model::Model;
+use crate::qp::{Constraint, Qp, QpFailure, Rows};
+use crate::tasks::{Sink, Task};
 
 /// Adds tasks to the cost; only the lower triangle of the Hessian is written.
 pub(crate) struct Cost<'a> {
@@ -28,7 +20,7 @@ impl Sink for Cost<'_> {
         }
     }
 
-    fn diagonal(&mut self, weight: f64, error: impl Fn(usize) -> f64) {
+    fn diagonal(&mut self, weight: f64, error: &dyn Fn(usize) -> f64) {
         let square = weight * weight;
         for joint in 0..self.qp.linear.len() {
             self.qp.hessian[(joint, joint)] += square;
@@ -51,23 +43,9 @@ pub(crate) enum RowOwner {
     Position(usize),
 }
 
-/// Adds rows under one owner after the other.
-pub(crate) struct Rows<'a> {
-    pub qp: &'a mut Qp,
-    pub owners: &'a mut Vec<RowOwner>,
-}
-
-impl Rows<'_> {
-    /// A new row, zero so far.
-    pub fn push(&mut self, owner: RowOwner) -> &mut Row {
-        self.owners.push(owner);
-        self.qp.push_row()
-    }
-}
-
 /// Adds one task as equations.
 pub(crate) struct Equalities<'a, 'b> {
-    pub rows: &'a mut Rows<'b>,
+    pub rows: &'a mut Rows<'b, RowOwner>,
     pub task: usize,
 }
 
@@ -81,7 +59,7 @@ impl Sink for Equalities<'_, '_> {
         row.equality = true;
     }
 
-    fn diagonal(&mut self, weight: f64, error: impl Fn(usize) -> f64) {
+    fn diagonal(&mut self, weight: f64, error: &dyn Fn(usize) -> f64) {
         for joint in 0..self.rows.qp.linear.len() {
             self.row(&[(joint, weight)], weight * error(joint));
         }
@@ -115,7 +93,9 @@ pub(crate) fn name_failure(
             (RowOwner::Position(index), _) => {
                 format!("position barrier of {}", model.frame_name(position_barriers[index].frame))
             }
-            (RowOwner::Equality(index), _) => format!("equality: {}", constraints[index].describe(model)),
+            (RowOwner::Equality(index), _) => {
+                format!("equality: {}", constraints[index].goal().describe(model))
+            }
             (RowOwner::SelfCollision(pair), None) => format!("distance of pair {pair}"),
         },
         QpFailure::NotConvex => "the cost: a task holds numbers that are not finite".into(),
