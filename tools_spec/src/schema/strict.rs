@@ -1,8 +1,10 @@
 //! JSON Schema that strict hosts accept: every field required, nullable instead of optional, no unknown fields, and none
 //! of the keywords (`minimum`, `maxItems`, `format`, ...) that they refuse or warn about. The server checks those itself.
 
-use schemars::{JsonSchema, generate::SchemaSettings};
+use schemars::JsonSchema;
 use serde_json::{Map, Value, json};
+
+use super::plain::plain_schema;
 
 /// Keywords that OpenAI's strict mode or common MCP clients refuse or warn about.
 const DROPPED: &[&str] = &[
@@ -21,29 +23,24 @@ const DROPPED: &[&str] = &[
 ];
 
 /// The description of `T` and its schema without it.
-pub fn strict_schema<T: JsonSchema>() -> (String, Value) {
+pub fn strict_schema<T: JsonSchema>() -> (String, Map<String, Value>) {
     let mut schema = plain_schema::<T>();
     make_strict(&mut schema);
-    let description = match schema.as_object_mut().and_then(|object| object.remove("description")) {
+    let mut object = schema.as_object_mut().map(std::mem::take).unwrap_or_default();
+    let description = match object.remove("description") {
         Some(Value::String(text)) => text,
         _ => String::new(),
     };
-    (description, schema)
-}
-
-/// The schema of `T` as it is, for replies: nothing has to be strict about what the server itself sends.
-pub fn plain_schema<T: JsonSchema>() -> Value {
-    let settings = SchemaSettings::draft2020_12().with(|s| s.inline_subschemas = true);
-    settings.into_generator().into_root_schema_for::<T>().to_value()
+    (description, object)
 }
 
 /// Adds the handle that stands in the path over REST and among the arguments everywhere else.
-pub fn require_episode_id(schema: &mut Value) {
+pub fn require_episode_id(schema: &mut Map<String, Value>) {
     let handle = json!({ "type": "string", "description": "The episode, as start_episode returned it." });
-    if let Some(properties) = schema["properties"].as_object_mut() {
+    if let Some(Value::Object(properties)) = schema.get_mut("properties") {
         properties.shift_insert(0, "episode_id".into(), handle);
     }
-    if let Some(required) = schema["required"].as_array_mut() {
+    if let Some(Value::Array(required)) = schema.get_mut("required") {
         required.insert(0, json!("episode_id"));
     }
 }
