@@ -7,16 +7,16 @@ use crate::parts::BASE_COLUMNS;
 const LARGEST: f64 = 1e6;
 
 /// Every number is finite and of sane size.
-pub fn finite(place: &str, numbers: &[f64]) -> Result<(), String> {
-    match numbers.iter().find(|number| number.is_nan() || number.abs() > LARGEST) {
+pub fn finite(place: &str, values: &[f64]) -> Result<(), String> {
+    match values.iter().find(|number| number.is_nan() || number.abs() > LARGEST) {
         Some(number) => Err(format!("{place} holds {number}; every number must be finite, from -1e6 to 1e6")),
         None => Ok(()),
     }
 }
 
 /// What is given of a base command, in the order of its columns, is finite.
-pub fn base(parts: [Option<f64>; 4]) -> Result<(), String> {
-    BASE_COLUMNS.iter().zip(parts).try_for_each(|(column, part)| finite(column, part.as_slice()))
+pub fn base(command: [Option<f64>; 4]) -> Result<(), String> {
+    BASE_COLUMNS.iter().zip(command).try_for_each(|(column, part)| finite(column, part.as_slice()))
 }
 
 /// A quaternion that has a direction. Its length does not matter: it is normalised before use.

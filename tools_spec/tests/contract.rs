@@ -96,7 +96,6 @@ fn refused(name: &str, args: Value, says: &[&str]) {
 
 #[test]
 fn refusals_say_what_would_work() {
-    let wrist = |field: &str, value: Value| json!({ "steps": 5, "robots": [{ "robot": "A", field: value }] });
     let chunk = |rows: Value| json!({ "robots": [{ "robot": "A", "rows": rows }] });
     let row = |columns: usize| json!(vec![0.5; columns]);
     refused("grasp", json!({}), &["\"grasp\"", "observe", "move_wrists", "finish"]);
@@ -107,6 +106,28 @@ fn refusals_say_what_would_work() {
     refused("wait", json!({ "step": 25 }), &["unknown field `step`", "`steps`"]);
     refused("wait", json!({}), &["missing field `steps`"]);
     refused("wait", json!([]), &["wait: ", "{\"steps\":25}"]);
+    refused(
+        "send_joint_chunk",
+        chunk(json!([row(35), row(34)])),
+        &["row 1 holds 34", "35: left_arm 7, right_arm 7"],
+    );
+    refused("send_joint_chunk", chunk(json!([])), &["no rows", "at least 1"]);
+    refused(
+        "send_joint_chunk",
+        json!({ "robots": [{ "robot": "A", "rows": [row(35)] }, { "robot": "B", "rows": [row(35), row(35)] }] }),
+        &["same number of rows"],
+    );
+    refused("query_depth", json!({ "robot": "A", "pixels": [] }), &["pixels is empty", "[[160, 120]]"]);
+    refused(
+        "walk",
+        json!({ "steps": 5, "robots": [{ "robot": "A", "vx_m_s": 0.1 }] }),
+        &["missing field `vy_m_s`", "yaw_rate_rad_s"],
+    );
+}
+
+#[test]
+fn refusals_of_wrist_poses_name_the_robot_and_the_field() {
+    let wrist = |field: &str, value: Value| json!({ "steps": 5, "robots": [{ "robot": "A", field: value }] });
     refused(
         "move_wrists",
         wrist("left_quaternion_wxyz", json!([0, 0, 0, 0])),
@@ -138,23 +159,6 @@ fn refusals_say_what_would_work() {
         "check_reach",
         json!({ "robot": "A", "right_quaternion_wxyz": [0, 0, 0, 0] }),
         &["right_quaternion_wxyz", "norm 0"],
-    );
-    refused(
-        "send_joint_chunk",
-        chunk(json!([row(35), row(34)])),
-        &["row 1 holds 34", "35: left_arm 7, right_arm 7"],
-    );
-    refused("send_joint_chunk", chunk(json!([])), &["no rows", "at least 1"]);
-    refused(
-        "send_joint_chunk",
-        json!({ "robots": [{ "robot": "A", "rows": [row(35)] }, { "robot": "B", "rows": [row(35), row(35)] }] }),
-        &["same number of rows"],
-    );
-    refused("query_depth", json!({ "robot": "A", "pixels": [] }), &["pixels is empty", "[[160, 120]]"]);
-    refused(
-        "walk",
-        json!({ "steps": 5, "robots": [{ "robot": "A", "vx_m_s": 0.1 }] }),
-        &["missing field `vy_m_s`", "yaw_rate_rad_s"],
     );
 }
 
