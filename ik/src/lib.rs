@@ -42,34 +42,25 @@
 
 #![warn(missing_docs)]
 
-mod barrier;
+mod barriers;
 pub mod bench;
-mod configuration;
 #[cfg(test)]
-mod derivatives;
+mod differences;
 mod error;
-mod limits;
 mod model;
-mod program;
 pub mod qp;
-mod read_mjcf;
-mod read_urdf;
-mod report;
-mod solve;
 mod solver;
 pub mod spatial;
-mod task;
-mod track;
+mod tasks;
 
-pub use barrier::{Capsule, ClosestPair, PositionBarrier, SelfCollision};
-pub use configuration::Configuration;
+pub use barriers::{Capsule, ClosestPair, PositionBarrier, SelfCollision};
 pub use error::IkError;
-pub use limits::{LimitKind, Limits};
-pub use model::{Frame, FrameId, Joint, JointKind, Model};
-pub use report::{ClampedJoint, Outcome, SolveReport, Tolerance, saturated};
-pub use solve::SolveOptions;
-pub use solver::{Solver, frame_errors};
-pub use task::{
+pub use model::{Configuration, Frame, FrameId, Joint, JointKind, Model};
+pub use solver::{
+    ClampedJoint, LimitKind, Limits, Outcome, SolveOptions, SolveReport, Solver, Tolerance, frame_errors,
+    saturated,
+};
+pub use tasks::{
     CenterOfMassTask, DampingTask, FrameError, FrameTask, JointCouplingTask, JointVelocityTask,
     LowAccelerationTask, PostureTask, RelativeFrameTask, Task,
 };

@@ -25,7 +25,7 @@ fn tools_are_those_of_the_contract() {
     let specs = tandem_tools_spec::tool_specs();
     assert_eq!(tools.len(), specs.len());
     for (tool, spec) in tools.iter().zip(specs) {
-        assert_eq!((&tool["name"], &tool["inputSchema"]), (&json!(spec.name), &spec.input_schema));
+        assert_eq!((&tool["name"], &tool["inputSchema"]), (&json!(spec.name), &json!(spec.input_schema)));
         assert_eq!(tool["annotations"]["readOnlyHint"], json!(spec.read_only), "{tool}");
         assert!(tool.get("outputSchema").is_none(), "clients drop the pictures of such tools: {tool}");
     }

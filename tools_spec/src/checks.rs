@@ -1,5 +1,7 @@
 //! Checks that need no world. Each returns the sentence a caller needs: what is wrong, where, and what would work.
 
+use crate::parts::BASE_COLUMNS;
+
 /// No number of this contract, in metres, radians or metres per second, is anywhere near this large; a larger one would
 /// overflow the single precision of the physics.
 const LARGEST: f64 = 1e6;
@@ -12,9 +14,9 @@ pub fn finite(place: &str, values: &[f64]) -> Result<(), String> {
     }
 }
 
-/// The same for a number that may be left out.
-pub fn finite_or_null(place: &str, value: Option<f64>) -> Result<(), String> {
-    finite(place, value.as_slice())
+/// What is given of a base command, in the order of its columns, is finite.
+pub fn base(command: [Option<f64>; 4]) -> Result<(), String> {
+    BASE_COLUMNS.iter().zip(command).try_for_each(|(column, part)| finite(column, part.as_slice()))
 }
 
 /// A quaternion that has a direction. Its length does not matter: it is normalised before use.

@@ -10,7 +10,6 @@
 mod checks;
 mod error;
 mod list;
-mod openapi;
 mod parts;
 mod schema;
 mod tool;
@@ -20,23 +19,15 @@ pub use error::{ProblemBody, SpecError};
 pub use list::{
     ActCall, EPISODE_TOOLS, LookCall, LookReply, ManageCall, ManageReply, ToolCall, ToolReply, tool_specs,
 };
-pub use openapi::openapi;
 pub use parts::{
-    Budget, CommandReply, HandReport, JointValues, PhaseReached, Png, Pose, Protocol, RobotFallen,
-    RobotReport, StopReason,
+    BASE_COLUMNS, BaseCommand, BaseLimits, Budget, CommandReply, HandReport, JointValues, PhaseReached, Png,
+    Pose, Protocol, Range, RobotFallen, RobotReport, StopReason,
 };
-pub use tool::{Tool, ToolSpec, parse_args};
-pub use tools::check_reach::{CheckReach, HandReach, ReachReply};
-pub use tools::finish::{EndReason, Finish, PhaseTimes, ResultReply};
-pub use tools::get_robot_state::{BaseCommand, GetRobotState, RobotState};
-pub use tools::get_status::{GetStatus, StatusReply};
-pub use tools::list_tasks::{ListTasks, PhaseInfo, ProtocolInfo, TaskInfo, TaskList};
-pub use tools::move_wrists::{MoveWrists, WristMove};
-pub use tools::observe::{CameraCalibration, CameraImage, Observation, Observe};
-pub use tools::query_depth::{DepthPoint, DepthReply, QueryDepth};
-pub use tools::send_joint_chunk::{ACTION_ROW_LEN, JointChunk, SendJointChunk, action_row_layout};
-pub use tools::start_episode::{
-    BaseLimits, Briefing, Instruction, JointInfo, Range, RobotInfo, StartEpisode, StartReply,
-};
-pub use tools::wait::Wait;
-pub use tools::walk::{Walk, WalkMove};
+pub use schema::ToolSpec;
+pub use tool::{Tool, parse_args};
+pub use tools::*;
+
+/// The REST interface of `version` as OpenAPI 3.1, from the same types that read and write it.
+pub fn openapi(version: &str) -> serde_json::Value {
+    schema::openapi(version, tool_specs().into_iter().filter(|spec| spec.on_episode))
+}

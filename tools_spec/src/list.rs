@@ -3,10 +3,11 @@
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::{
-    CheckReach, CommandReply, Finish, GetRobotState, GetStatus, ListTasks, MoveWrists, Observe, QueryDepth,
-    SendJointChunk, SpecError, StartEpisode, Tool, ToolSpec, Wait, Walk, parse_args,
-};
+use crate::error::SpecError;
+use crate::parts::CommandReply;
+use crate::schema::ToolSpec;
+use crate::tool::{Tool, parse_args};
+use crate::tools::*;
 
 /// Makes all that has to know every tool. A tool is the one line with the type of its arguments, in the group of what it
 /// does:

@@ -30,7 +30,7 @@ fn schemas_are_strict() {
             "{}",
             spec.name
         );
-        for_each_schema(&spec.input_schema, &mut |schema| {
+        for_each_schema(&json!(spec.input_schema), &mut |schema| {
             for keyword in REFUSED_KEYWORDS {
                 assert!(schema.get(*keyword).is_none(), "{}: {keyword} in {schema}", spec.name);
             }
@@ -196,6 +196,18 @@ fn openapi_has_a_path_for_every_tool() {
         start["responses"]["201"]["content"]["application/json"]["schema"]["properties"]["episode_id"]
             .is_object()
     );
+}
+
+#[test]
+fn openapi_describes_every_tool() {
+    let document = tandem_tools_spec::openapi("1.2.3").to_string();
+    for spec in tool_specs() {
+        assert!(
+            document.contains(&format!("\"operationId\":\"{}\"", spec.name)),
+            "{} has no path",
+            spec.name
+        );
+    }
 }
 
 #[test]

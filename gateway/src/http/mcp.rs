@@ -132,7 +132,7 @@ fn json_block(reply: &impl Serialize) -> Result<Vec<ContentBlock>, ApiError> {
 
 /// The tool as MCP describes it. No output schema: clients drop the pictures of tools that declare one.
 fn described(spec: ToolSpec) -> Tool {
-    Tool::new(spec.name, spec.description, Arc::new(object(spec.input_schema))).with_annotations(
+    Tool::new(spec.name, spec.description, Arc::new(spec.input_schema)).with_annotations(
         ToolAnnotations::new().read_only(spec.read_only).destructive(false).open_world(false),
     )
 }

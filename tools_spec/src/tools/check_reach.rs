@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Tool, checks};
+use crate::checks;
+use crate::tool::Tool;
 
 /// Ask whether a robot's wrists could reach poses from where it stands, using both arms and the waist. Nothing moves and
 /// no steps are spent. Poses are of the wrist links (`left_wrist_yaw_link`, `right_wrist_yaw_link`) in the robot's pelvis

@@ -4,7 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::Error as _};
 use serde_json::{Map, Value};
 
-use crate::Tool;
+use crate::parts::Protocol;
+use crate::tool::Tool;
 
 /// End the episode and get its result. Call it when the task is done or cannot be done any more. After that only
 /// get_status and finish answer.
@@ -44,7 +45,7 @@ pub struct ResultReply {
     /// The seed.
     pub seed: u32,
     /// The rules that were in force.
-    pub protocol: crate::Protocol,
+    pub protocol: Protocol,
     /// When each phase was reached, in simulated seconds; null where it was not.
     pub phases: PhaseTimes,
     /// Why the episode ended.

@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{JointValues, Pose, Tool};
+use crate::parts::{BaseCommand, JointValues, Pose};
+use crate::tool::Tool;
 
 /// Read one robot's proprioception: 43 joint angles, velocities and torques by name, both wrist poses in the pelvis
 /// frame, which way is down, and the base command in force. Costs no steps; physics stands still.
@@ -47,17 +48,4 @@ pub struct RobotState {
     pub base_command: BaseCommand,
     /// Whether the robot has fallen.
     pub fallen: bool,
-}
-
-/// The base command in force. Velocities are zero between commands; the height persists.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct BaseCommand {
-    /// Forward velocity in metres per second.
-    pub vx_m_s: f64,
-    /// Velocity to the left in metres per second.
-    pub vy_m_s: f64,
-    /// Turning rate in radians per second, counter-clockwise seen from above.
-    pub yaw_rate_rad_s: f64,
-    /// Height of the pelvis above the floor in metres.
-    pub pelvis_height_m: f64,
 }

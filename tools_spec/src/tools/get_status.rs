@@ -3,7 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Budget, PhaseReached, Protocol, RobotFallen, Tool, tools::finish::EndReason};
+use super::finish::EndReason;
+use crate::parts::{Budget, PhaseReached, Protocol, RobotFallen};
+use crate::tool::Tool;
 
 /// Ask where the episode stands: time, phases reached, who has fallen, and the budget left. Costs no steps; physics stands
 /// still. Also answers after the episode has ended.

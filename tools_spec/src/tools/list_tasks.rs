@@ -3,10 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    Protocol, Tool,
-    tools::start_episode::{BaseLimits, Instruction},
-};
+use super::start_episode::Instruction;
+use crate::parts::{BaseLimits, Protocol};
+use crate::tool::Tool;
 
 /// List the tasks that start_episode can start: their instructions, the phases they are scored by, and the budgets of
 /// each protocol; and how fast and how low the robots can move.

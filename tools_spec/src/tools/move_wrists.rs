@@ -3,7 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{CommandReply, Tool, checks};
+use crate::checks;
+use crate::parts::CommandReply;
+use crate::tool::Tool;
 
 /// Move wrists, fingers and base of one or more robots for a number of control steps of 20 ms. Inverse kinematics turns
 /// wrist poses into arm and waist joints. Robots that are not named hold still, and a null field keeps what was asked
@@ -84,10 +86,7 @@ impl WristMove {
             "right_fingers_rad",
             self.right_fingers_rad.as_ref().map_or(&[], |fingers| &fingers[..]),
         )?;
-        checks::finite_or_null("vx_m_s", self.vx_m_s)?;
-        checks::finite_or_null("vy_m_s", self.vy_m_s)?;
-        checks::finite_or_null("yaw_rate_rad_s", self.yaw_rate_rad_s)?;
-        checks::finite_or_null("pelvis_height_m", self.pelvis_height_m)
+        checks::base([self.vx_m_s, self.vy_m_s, self.yaw_rate_rad_s, self.pelvis_height_m])
     }
 }
 

@@ -3,7 +3,10 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Png, Pose, RobotState, Tool, checks};
+use super::get_robot_state::RobotState;
+use crate::checks;
+use crate::parts::{Png, Pose};
+use crate::tool::Tool;
 
 /// Look through the robots' own head cameras and read their proprioception. Returns for each robot the same numbers as
 /// get_robot_state, the calibration of its camera, and one PNG image of 320x240 pixels. Costs no steps; physics stands

@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Tool, checks};
+use crate::checks;
+use crate::tool::Tool;
 
 /// Measure depth at pixels of a robot's head camera. Returns for each pixel the distance along the optical axis and the
 /// 3-D point in the robot's pelvis frame, the frame that wrist targets are given in. A pixel sees a surface, so the

@@ -3,28 +3,22 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{CommandReply, Tool, checks};
+use crate::checks;
+use crate::parts::{BASE_COLUMNS, CommandReply};
+use crate::tool::Tool;
 
 /// Numbers in a row: 31 joint targets and the base command.
 pub const ACTION_ROW_LEN: usize = 35;
 
-/// The blocks of a row, in order, with the number of columns of each. Within a hand: thumb_0, thumb_1, thumb_2, middle_0,
-/// middle_1, index_0, index_1.
-const ROW_BLOCKS: [(&str, usize); 9] = [
-    ("left_arm", 7),
-    ("right_arm", 7),
-    ("left_hand", 7),
-    ("right_hand", 7),
-    ("waist", 3),
-    ("vx_m_s", 1),
-    ("vy_m_s", 1),
-    ("yaw_rate_rad_s", 1),
-    ("pelvis_height_m", 1),
-];
+/// The blocks of joints that a row begins with, in order, with the number of columns of each. Within a hand: thumb_0,
+/// thumb_1, thumb_2, middle_0, middle_1, index_0, index_1.
+const JOINT_BLOCKS: [(&str, usize); 5] =
+    [("left_arm", 7), ("right_arm", 7), ("left_hand", 7), ("right_hand", 7), ("waist", 3)];
 
 /// The layout of a row in one line, as `left_arm 7, right_arm 7, ...`.
 pub fn action_row_layout() -> String {
-    ROW_BLOCKS.map(|(block, columns)| format!("{block} {columns}")).join(", ")
+    let blocks = JOINT_BLOCKS.into_iter().chain(BASE_COLUMNS.map(|column| (column, 1)));
+    blocks.map(|(block, columns)| format!("{block} {columns}")).collect::<Vec<_>>().join(", ")
 }
 
 /// Send joint targets for one or more robots, one row per control step of 20 ms. Rows of all named robots run side by

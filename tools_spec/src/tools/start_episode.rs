@@ -3,7 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Protocol, StatusReply, Tool};
+use super::get_status::StatusReply;
+use crate::parts::{BaseLimits, Protocol};
+use crate::tool::Tool;
 
 /// Start an episode of a task. Returns episode_id, which every other tool needs, the instruction, the robots with their
 /// joints and limits, and the budget. The same task, seed and commands always give the same episode. Physics stands
@@ -75,19 +77,6 @@ pub struct RobotInfo {
     pub base_limits: BaseLimits,
 }
 
-/// The base commands that locomotion accepts; what lies beyond is moved to the limit and reported.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct BaseLimits {
-    /// Forward velocity.
-    pub vx_m_s: Range,
-    /// Velocity to the left.
-    pub vy_m_s: Range,
-    /// Turning rate, counter-clockwise seen from above.
-    pub yaw_rate_rad_s: Range,
-    /// Height of the pelvis above the floor. Where min equals max the robots cannot squat.
-    pub pelvis_height_m: Range,
-}
-
 /// One joint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct JointInfo {
@@ -97,13 +86,4 @@ pub struct JointInfo {
     pub lower_rad: f64,
     /// Upper limit in radians.
     pub upper_rad: f64,
-}
-
-/// From `min` to `max`, both accepted, in the unit of the field that holds it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Range {
-    /// The smallest value accepted.
-    pub min: f64,
-    /// The largest value accepted.
-    pub max: f64,
 }

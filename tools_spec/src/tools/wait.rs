@@ -3,7 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{CommandReply, Tool, checks};
+use crate::checks;
+use crate::parts::CommandReply;
+use crate::tool::Tool;
 
 /// Let all robots hold their targets for a number of control steps of 20 ms: for a hand to arrive, for an object to come to
 /// rest.

@@ -3,7 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{CommandReply, Tool, checks};
+use crate::checks;
+use crate::parts::CommandReply;
+use crate::tool::Tool;
 
 /// Walk, turn or change the pelvis height of one or more robots for a number of control steps of 20 ms, while their arms
 /// and hands hold. Velocities are in the robot's own frame and apply during this command only; the height persists.
@@ -36,10 +38,7 @@ pub struct WalkMove {
 
 impl WalkMove {
     fn validate(&self) -> Result<(), String> {
-        checks::finite("vx_m_s", &[self.vx_m_s])?;
-        checks::finite("vy_m_s", &[self.vy_m_s])?;
-        checks::finite("yaw_rate_rad_s", &[self.yaw_rate_rad_s])?;
-        checks::finite_or_null("pelvis_height_m", self.pelvis_height_m)
+        checks::base([Some(self.vx_m_s), Some(self.vy_m_s), Some(self.yaw_rate_rad_s), self.pelvis_height_m])
     }
 }
 

@@ -1,0 +1,16 @@
+//! A tree of joints with one degree of freedom each, frames fixed to them, and the masses they carry; and the same tree
+//! at one set of joint coordinates.
+
+mod configuration;
+mod mjcf;
+mod parts;
+mod reduced;
+mod tree;
+mod urdf;
+
+#[cfg(test)]
+mod tests;
+
+pub use configuration::Configuration;
+pub use parts::{Frame, FrameId, Joint, JointKind};
+pub use tree::Model;

@@ -1,0 +1,126 @@
+//! A problem's data and work space, and the way from the unconstrained minimum to the solution.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt;
+use faer::{Mat, Par};
+
+use super::constraint::{Constraint, Row};
+
+/// Why there is no solution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum QpFailure {
+    /// H is not positive definite.
+    NotConvex,
+    /// This constraint contradicts others.
+    Infeasible(Constraint),
+    /// Rounding kept the active set from settling.
+    Unsettled,
+}
+
+/// Problem data and work space for `n` variables.
+pub struct Qp {
+    pub(super) n: usize,
+    /// Lower triangle is read.
+    pub hessian: Mat<f64>,
+    /// c.
+    pub linear: Vec<f64>,
+    /// Bounds on x; may be infinite.
+    pub lower: Vec<f64>,
+    /// Bounds on x; may be infinite.
+    pub upper: Vec<f64>,
+    /// Further constraints; only the first `used_rows` count.
+    pub(super) rows: Vec<Row>,
+    pub(super) used_rows: usize,
+    /// The solution after [`Qp::solve`].
+    pub x: Vec<f64>,
+    pub(super) factor: Mat<f64>,
+    pub(super) inverse: Mat<f64>,
+    rhs: Mat<f64>,
+    scratch: MemBuffer,
+    /// Columns span the active normals first, then their complement: L^-T Q.
+    pub(super) basis: Vec<f64>,
+    /// Upper triangular factor of the active normals, column major.
+    pub(super) r: Vec<f64>,
+    /// Active constraints with the sign of their normal, and their multipliers.
+    pub(super) active: Vec<(Constraint, f64)>,
+    pub(super) multipliers: Vec<f64>,
+    pub(super) d: Vec<f64>,
+    pub(super) direction: Vec<f64>,
+    pub(super) dual_step: Vec<f64>,
+}
+
+impl Qp {
+    /// Work space for `n` variables.
+    pub fn new(n: usize) -> Qp {
+        let scratch =
+            MemBuffer::new(llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default()));
+        Qp {
+            n,
+            hessian: Mat::zeros(n, n),
+            linear: vec![0.0; n],
+            lower: vec![f64::NEG_INFINITY; n],
+            upper: vec![f64::INFINITY; n],
+            rows: Vec::new(),
+            used_rows: 0,
+            x: vec![0.0; n],
+            factor: Mat::zeros(n, n),
+            inverse: Mat::zeros(n, n),
+            rhs: Mat::zeros(n, 1),
+            scratch,
+            basis: vec![0.0; n * n],
+            r: vec![0.0; n * n],
+            active: Vec::with_capacity(n + 1),
+            multipliers: vec![0.0; n + 1],
+            d: vec![0.0; n],
+            direction: vec![0.0; n],
+            dual_step: vec![0.0; n],
+        }
+    }
+
+    /// Constraints that hold with equality at the solution.
+    pub fn active(&self) -> impl Iterator<Item = Constraint> + '_ {
+        self.active.iter().map(|(constraint, _)| *constraint)
+    }
+
+    /// Solves the problem as it stands; the result is in [`Qp::x`].
+    pub fn solve(&mut self) -> Result<(), QpFailure> {
+        self.unconstrained_minimum()?;
+        self.active.clear();
+        let mut has_basis = false;
+        for _ in 0..10 * self.n + 100 {
+            let Some((constraint, sign, violation)) = self.most_violated() else {
+                for i in 0..self.n {
+                    self.x[i] = self.x[i].clamp(self.lower[i], self.upper[i].max(self.lower[i]));
+                }
+                return Ok(());
+            };
+            if !has_basis {
+                self.start_basis();
+                has_basis = true;
+            }
+            self.add(constraint, sign, violation)?;
+        }
+        Err(QpFailure::Unsettled)
+    }
+
+    fn unconstrained_minimum(&mut self) -> Result<(), QpFailure> {
+        self.factor.copy_from(&self.hessian);
+        let stack = MemStack::new(&mut self.scratch);
+        llt::factor::cholesky_in_place(
+            self.factor.as_mut(),
+            Default::default(),
+            Par::Seq,
+            stack,
+            Default::default(),
+        )
+        .map_err(|_| QpFailure::NotConvex)?;
+        for i in 0..self.n {
+            self.rhs[(i, 0)] = -self.linear[i];
+        }
+        llt::solve::solve_in_place(self.factor.as_ref(), self.rhs.as_mut(), Par::Seq, stack);
+        for i in 0..self.n {
+            self.x[i] = self.rhs[(i, 0)];
+        }
+        Ok(())
+    }
+}

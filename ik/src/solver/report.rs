@@ -1,0 +1,87 @@
+//! What steps and solutions say about themselves.
+
+use super::limits::LimitKind;
+use crate::barriers::ClosestPair;
+use crate::model::{Configuration, Joint};
+use crate::tasks::FrameError;
+
+/// How a step or a solution ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// Every frame and centre of mass that has a target is within [`Tolerance`], and no barrier is crossed.
+    Reached,
+    /// On the way.
+    Moving,
+    /// No further progress.
+    Stalled {
+        /// Joints at a limit of their range: what would have to give way.
+        saturated: Vec<usize>,
+    },
+    /// The constraints contradict each other.
+    Infeasible {
+        /// The joint, equality task or barrier that cannot be kept.
+        constraint: String,
+    },
+}
+
+/// When a frame counts as reached.
+#[derive(Clone, Copy, Debug)]
+pub struct Tolerance {
+    /// m.
+    pub position_m: f64,
+    /// rad.
+    pub orientation_rad: f64,
+}
+
+impl Default for Tolerance {
+    /// 1 mm and half a degree.
+    fn default() -> Self {
+        Tolerance { position_m: 1e-3, orientation_rad: 0.5_f64.to_radians() }
+    }
+}
+
+impl Tolerance {
+    pub(crate) fn accepts(&self, error: &FrameError) -> bool {
+        error.position_m <= self.position_m && error.orientation_rad <= self.orientation_rad
+    }
+}
+
+/// A joint whose step was cut short.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClampedJoint {
+    /// Index in the model.
+    pub joint: usize,
+    /// The limit that did it.
+    pub limit: LimitKind,
+    /// What is left of the joint's range in the direction that it was stopped in, rad or m.
+    pub margin: f64,
+}
+
+/// How a solution ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SolveReport {
+    /// `Moving` if the iterations ran out.
+    pub outcome: Outcome,
+    /// Steps over all attempts.
+    pub iterations: usize,
+    /// Attempts after the first.
+    pub restarts: usize,
+    /// Per task that has one, in order; see [`crate::Task::error`].
+    pub errors: Vec<FrameError>,
+    /// Joints that a limit stopped in the last step of the attempt that is reported.
+    pub clamped: Vec<ClampedJoint>,
+    /// The pair of shapes nearest to touching.
+    pub closest_pair: Option<ClosestPair>,
+    /// Largest joint speed of the last step, rad/s or m/s: a stalled solution has come to rest.
+    pub final_speed: f64,
+}
+
+/// Joints within this of a limit count as saturated, rad or m.
+const SATURATED: f64 = 1e-3;
+
+/// Joints at a limit of their range.
+pub fn saturated(configuration: &Configuration) -> Vec<usize> {
+    let at_limit = |joint: &Joint, q: f64| q < joint.lower + SATURATED || q > joint.upper - SATURATED;
+    let joints = configuration.model().joints().iter().zip(configuration.q());
+    joints.enumerate().filter(|(_, (joint, q))| at_limit(joint, **q)).map(|(index, _)| index).collect()
+}

@@ -1,0 +1,83 @@
+//! Steps that do not make things worse: errors are clamped, steps halved, and failures make the solver cautious.
+//!
+//! Near a singular posture, a straight arm for one, a step along J^+ e overshoots, and the next one overshoots back. Here
+//! a step is halved until it lowers the objective  sum over tasks  alpha/2 |W e|^2,  of which the quadratic program's
+//! solution is a descent direction. Where halving does not help, the joints stay and further steps are damped by
+//!   mu = CAUTION^2 (caution^2 - 1),
+//! with caution tripled where no part of a step helps, raised by half where only a part does, and halved after a whole
+//! step. Source: Levenberg 1944; Nocedal and Wright,
+//! Numerical Optimization, 2006, chapters 3 and 10.
+
+use super::report::Outcome;
+use super::step::Solver;
+use crate::model::Configuration;
+use crate::qp::QpFailure;
+use crate::tasks::{ERROR_CLAMP, Task};
+
+const MAX_HALVINGS: usize = 5;
+/// Damping per joint that caution multiplies, 1/rad or 1/m.
+const CAUTION: f64 = 1e-2;
+const MOST_CAUTIOUS: f64 = 1e3;
+/// An objective that grows by this part is the same up to rounding.
+const SAME: f64 = 1e-9;
+/// Violations that a step must mend at once rather than in a line search's time, rad or m per step.
+const URGENT: f64 = 1e-4;
+
+impl Solver {
+    /// One step as [`Solver::step`], for targets that may move and may be out of reach: there the joints come to rest.
+    pub fn track(
+        &mut self,
+        configuration: &mut Configuration,
+        tasks: &[Task],
+        constraints: &[Task],
+    ) -> Outcome {
+        match self.guarded_step(configuration, tasks, constraints) {
+            Ok(()) => self.outcome(configuration, tasks),
+            Err(failure) => {
+                self.rest();
+                self.infeasible(configuration.model(), constraints, failure)
+            }
+        }
+    }
+
+    /// Moves by a part of the quadratic program's solution that lowers the objective, maybe none.
+    pub(crate) fn guarded_step(
+        &mut self,
+        configuration: &mut Configuration,
+        tasks: &[Task],
+        constraints: &[Task],
+    ) -> Result<(), QpFailure> {
+        let before = objective(configuration, tasks);
+        let damping = CAUTION * CAUTION * (self.caution * self.caution - 1.0);
+        self.displacement(configuration, tasks, constraints, Some(ERROR_CLAMP), damping)?;
+        // Joints that must brake or come back, and shapes that must part, do so whatever it costs.
+        let urgent = self.crosses_barrier(configuration) || !self.qp.accepts_standstill(URGENT);
+        let mut scale = 1.0;
+        configuration.advance(&self.qp.x, scale);
+        if !urgent {
+            let worse =
+                |configuration: &Configuration| objective(configuration, tasks) > before * (1.0 + SAME);
+            let mut halvings = 0;
+            while worse(configuration) {
+                halvings += 1;
+                let next = if halvings < MAX_HALVINGS { 0.5 * scale } else { 0.0 };
+                configuration.advance(&self.qp.x, next - scale);
+                scale = next;
+                if scale == 0.0 {
+                    break;
+                }
+            }
+        }
+        self.caution = match scale {
+            1.0 => (self.caution * 0.5).max(1.0),
+            0.0 => (self.caution * 3.0).min(MOST_CAUTIOUS),
+            _ => (self.caution * 1.5).min(MOST_CAUTIOUS),
+        };
+        self.remember(scale);
+        Ok(())
+    }
+}
+
+fn objective(configuration: &Configuration, tasks: &[Task]) -> f64 {
+    tasks.iter().map(|task| task.goal().objective(configuration)).sum()
+}

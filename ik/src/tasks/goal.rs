@@ -1,0 +1,67 @@
+//! What every task can say and do, and where it writes its rows.
+
+use nalgebra::{Vector3, Vector6};
+
+use super::frame_error::FrameError;
+use crate::model::{Configuration, Model};
+
+/// One kind of task. [`super::Task`] asks the one that it holds.
+pub(crate) trait Goal {
+    /// What is missing to a frame's pose or to the centre of mass; `None` for tasks that only shape the way there.
+    fn frame_error(&self, _: &Configuration) -> Option<FrameError> {
+        None
+    }
+
+    /// alpha/2 |W e|^2; 0 for tasks on velocities, which a line search leaves alone.
+    fn objective(&self, _: &Configuration) -> f64 {
+        0.0
+    }
+
+    /// For messages: what the task is about.
+    fn describe(&self, model: &Model) -> String;
+
+    /// Writes  W J  and  alpha W e  at `configuration`.
+    fn write(
+        &self,
+        configuration: &Configuration,
+        context: &StepContext,
+        scratch: &mut TaskScratch,
+        sink: &mut dyn Sink,
+    );
+}
+
+/// Receives a task's weighted rows.
+pub(crate) trait Sink {
+    /// One row: (joint, W J) for the joints that move it, and  alpha W e.
+    fn row(&mut self, entries: &[(usize, f64)], error: f64);
+    /// The same weight on every joint: W 1 dq = W e, with e per joint.
+    fn diagonal(&mut self, weight: f64, error: &dyn Fn(usize) -> f64);
+    /// mu, on every joint.
+    fn damp(&mut self, mu: f64);
+}
+
+/// What tasks need to know beside the configuration.
+pub(crate) struct StepContext<'a> {
+    pub dt_s: f64,
+    pub last_velocity: &'a [f64],
+    /// Errors of frames are cut to this.
+    pub error_clamp: Option<FrameError>,
+}
+
+/// Buffers of one evaluation, so that nothing allocates.
+#[derive(Default)]
+pub(crate) struct TaskScratch {
+    pub columns: Vec<(usize, Vector6<f64>)>,
+    pub entries: Vec<(usize, f64)>,
+    pub centre: Vec<Vector3<f64>>,
+}
+
+impl TaskScratch {
+    pub(crate) fn new(nv: usize) -> TaskScratch {
+        TaskScratch {
+            columns: Vec::with_capacity(2 * nv),
+            entries: Vec::with_capacity(2 * nv),
+            centre: vec![Vector3::zeros(); nv],
+        }
+    }
+}

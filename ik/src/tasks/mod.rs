@@ -1,0 +1,78 @@
+//! What is asked of the joints, as weighted least squares in the joint displacement dq.
+//!
+//! Each task asks for  J dq = alpha e  at a cost, and adds to the quadratic program
+//!   1/2 |W (J dq - alpha e)|^2 + 1/2 mu |dq|^2,   mu = lambda |alpha W e|^2,
+//! so that  H += (WJ)'(WJ) + mu I,  c -= alpha (WJ)'(We).
+//! J: k x nv; e: k; W: diagonal. lambda is Levenberg-Marquardt damping, which fades as the error does.
+//! Source: Sugihara, Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method, 2011.
+
+mod center_of_mass;
+mod damping;
+mod frame;
+mod frame_error;
+mod goal;
+mod joint_coupling;
+mod joint_velocity;
+mod low_acceleration;
+mod pose;
+mod posture;
+mod relative_frame;
+
+#[cfg(test)]
+mod tests;
+
+pub use center_of_mass::CenterOfMassTask;
+pub use damping::DampingTask;
+pub use frame::FrameTask;
+pub(crate) use frame_error::ERROR_CLAMP;
+pub use frame_error::FrameError;
+pub(crate) use goal::{Goal, Sink, StepContext, TaskScratch};
+pub use joint_coupling::JointCouplingTask;
+pub use joint_velocity::JointVelocityTask;
+pub use low_acceleration::LowAccelerationTask;
+pub use posture::PostureTask;
+pub use relative_frame::RelativeFrameTask;
+
+use crate::model::Configuration;
+
+/// One thing to achieve; see the variants.
+#[derive(Clone, Debug)]
+pub enum Task {
+    /// A frame at a pose in the root's frame.
+    Frame(FrameTask),
+    /// A frame at a pose in another frame.
+    RelativeFrame(RelativeFrameTask),
+    /// The centre of mass at a point in the root's frame.
+    CenterOfMass(CenterOfMassTask),
+    /// All joints near given coordinates.
+    Posture(PostureTask),
+    /// Slow joints.
+    Damping(DampingTask),
+    /// Joints that move at given speeds.
+    JointVelocity(JointVelocityTask),
+    /// Joints that keep their speed.
+    LowAcceleration(LowAccelerationTask),
+    /// Joints whose coordinates keep a linear relation.
+    JointCoupling(JointCouplingTask),
+}
+
+impl Task {
+    /// What is missing to a frame's pose or to the centre of mass; `None` for tasks that only shape the way there.
+    pub fn error(&self, configuration: &Configuration) -> Option<FrameError> {
+        self.goal().frame_error(configuration)
+    }
+
+    /// The task of its kind.
+    pub(crate) fn goal(&self) -> &dyn Goal {
+        match self {
+            Task::Frame(task) => task,
+            Task::RelativeFrame(task) => task,
+            Task::CenterOfMass(task) => task,
+            Task::Posture(task) => task,
+            Task::Damping(task) => task,
+            Task::JointVelocity(task) => task,
+            Task::LowAcceleration(task) => task,
+            Task::JointCoupling(task) => task,
+        }
+    }
+}

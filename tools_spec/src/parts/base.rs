@@ -1,0 +1,62 @@
+//! The base command: what it is made of, and what locomotion accepts of it.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What a base command is made of, in the order of action rows. Fields and columns bear these names.
+pub const BASE_COLUMNS: [&str; 4] = ["vx_m_s", "vy_m_s", "yaw_rate_rad_s", "pelvis_height_m"];
+
+/// The base command in force. Velocities are zero between commands; the height persists.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct BaseCommand {
+    /// Forward velocity in metres per second.
+    pub vx_m_s: f64,
+    /// Velocity to the left in metres per second.
+    pub vy_m_s: f64,
+    /// Turning rate in radians per second, counter-clockwise seen from above.
+    pub yaw_rate_rad_s: f64,
+    /// Height of the pelvis above the floor in metres.
+    pub pelvis_height_m: f64,
+}
+
+/// The base commands that locomotion accepts; what lies beyond is moved to the limit and reported.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct BaseLimits {
+    /// Forward velocity.
+    pub vx_m_s: Range,
+    /// Velocity to the left.
+    pub vy_m_s: Range,
+    /// Turning rate, counter-clockwise seen from above.
+    pub yaw_rate_rad_s: Range,
+    /// Height of the pelvis above the floor. Where min equals max the robots cannot squat.
+    pub pelvis_height_m: Range,
+}
+
+/// From `min` to `max`, both accepted, in the unit of the field that holds it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Range {
+    /// The smallest value accepted.
+    pub min: f64,
+    /// The largest value accepted.
+    pub max: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::*;
+
+    #[test]
+    fn the_fields_are_the_columns() {
+        let command = BaseCommand { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m: 0.75 };
+        let range = Range { min: 0.0, max: 0.0 };
+        let limits =
+            BaseLimits { vx_m_s: range, vy_m_s: range, yaw_rate_rad_s: range, pelvis_height_m: range };
+        let names = |value: Value| -> Vec<String> {
+            value.as_object().into_iter().flatten().map(|(name, _)| name.clone()).collect()
+        };
+        assert_eq!(names(json!(command)), BASE_COLUMNS);
+        assert_eq!(names(json!(limits)), BASE_COLUMNS);
+    }
+}

@@ -1,0 +1,17 @@
+//! What several tools share.
+
+mod base;
+mod command;
+mod episode;
+mod joint_values;
+mod png;
+mod pose;
+mod protocol;
+
+pub use base::{BASE_COLUMNS, BaseCommand, BaseLimits, Range};
+pub use command::{CommandReply, HandReport, RobotReport, StopReason};
+pub use episode::{Budget, PhaseReached, RobotFallen};
+pub use joint_values::JointValues;
+pub use png::Png;
+pub use pose::Pose;
+pub use protocol::Protocol;

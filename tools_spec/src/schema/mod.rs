@@ -1,0 +1,9 @@
+//! The contract as machines read it: strict JSON Schema for the hosts of language models, OpenAPI for everybody else.
+
+mod openapi;
+mod plain;
+mod spec;
+mod strict;
+
+pub use openapi::openapi;
+pub use spec::ToolSpec;

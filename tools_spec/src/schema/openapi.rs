@@ -1,0 +1,88 @@
+//! The REST interface as OpenAPI 3.1, from the same types that read and write it.
+
+use serde_json::{Map, Value, json};
+
+use super::plain::plain_schema;
+use super::spec::ToolSpec;
+use crate::error::ProblemBody;
+use crate::tool::Tool;
+use crate::tools::{Finish, GetStatus, ListTasks, StartEpisode};
+
+/// The document of a server of `version` whose episodes have the tools `on_episode`. Each tool has a path of its own, so
+/// that generated clients have a method for each.
+pub fn openapi(version: &str, on_episode: impl Iterator<Item = ToolSpec>) -> Value {
+    let mut paths = paths_without_episode();
+    for spec in on_episode {
+        let path = format!("/v1/episodes/{{episode_id}}/tools/{}", spec.name);
+        let mut call = operation(spec.name, &spec.description, "200", spec.reply_schema);
+        call["requestBody"] = json_body(spec.body_schema);
+        paths.insert(path, json!({ "parameters": [episode_id()], "post": call }));
+    }
+    let status = plain_schema::<<GetStatus as Tool>::Reply>();
+    let result = plain_schema::<<Finish as Tool>::Reply>();
+    paths.insert(
+        "/v1/episodes/{episode_id}".into(),
+        json!({
+            "parameters": [episode_id()],
+            "get": operation("episode_status", "Where the episode stands.", "200", status),
+            "delete": operation("delete_episode", "End the episode, close its recording and forget it.", "200", result),
+        }),
+    );
+    json!({
+        "openapi": "3.1.0",
+        "info": { "title": "Tandem", "version": version },
+        "paths": paths,
+        "components": { "schemas": { "Problem": plain_schema::<ProblemBody>() } },
+    })
+}
+
+fn paths_without_episode() -> Map<String, Value> {
+    let health = json!({ "type": "object", "description": "The server answers." });
+    let health = operation("health", "Whether the server answers.", "200", health);
+    let specs = json!({ "type": "array", "items": { "type": "object" } });
+    let tools =
+        "The tools as specifications for language models, which name the episode among the arguments.";
+    let tools = operation("list_tools", tools, "200", specs);
+    let list = ToolSpec::without_episode::<ListTasks>();
+    let list = operation(list.name, &list.description, "200", list.reply_schema);
+    let start = ToolSpec::without_episode::<StartEpisode>();
+    let mut post = operation(start.name, &start.description, "201", start.reply_schema);
+    post["requestBody"] = json_body(start.body_schema);
+    let paths = [
+        ("/healthz", json!({ "get": health })),
+        ("/v1/tools", json!({ "get": tools })),
+        ("/v1/tasks", json!({ "get": list })),
+        ("/v1/episodes", json!({ "post": post })),
+    ];
+    paths.into_iter().map(|(path, methods)| (path.into(), methods)).collect()
+}
+
+fn operation(id: &str, description: &str, success: &str, reply: Value) -> Value {
+    json!({
+        "operationId": id,
+        "description": description,
+        "responses": {
+            success: { "description": "Done.", "content": { "application/json": { "schema": reply } } },
+            "default": {
+                "description": "Refused; the detail says what would work.",
+                "content": { "application/problem+json": { "schema": { "$ref": "#/components/schemas/Problem" } } },
+            },
+        },
+    })
+}
+
+/// A body may be left out where no field of it is required.
+fn json_body(schema: Value) -> Value {
+    let required = schema["required"].as_array().is_some_and(|fields| !fields.is_empty());
+    json!({ "required": required, "content": { "application/json": { "schema": schema } } })
+}
+
+fn episode_id() -> Value {
+    json!({
+        "name": "episode_id",
+        "in": "path",
+        "required": true,
+        "description": "The episode, as start_episode returned it.",
+        "schema": { "type": "string" },
+    })
+}

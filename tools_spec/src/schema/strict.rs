@@ -1,0 +1,103 @@
+//! JSON Schema that strict hosts accept: every field required, nullable instead of optional, no unknown fields, and none
+//! of the keywords (`minimum`, `maxItems`, `format`, ...) that they refuse or warn about. The server checks those itself.
+
+use schemars::JsonSchema;
+use serde_json::{Map, Value, json};
+
+use super::plain::plain_schema;
+
+/// Keywords that OpenAI's strict mode or common MCP clients refuse or warn about.
+const DROPPED: &[&str] = &[
+    "$schema",
+    "title",
+    "default",
+    "format",
+    "minimum",
+    "maximum",
+    "exclusiveMinimum",
+    "exclusiveMaximum",
+    "minItems",
+    "maxItems",
+    "minLength",
+    "maxLength",
+];
+
+/// The description of `T` and its schema without it.
+pub fn strict_schema<T: JsonSchema>() -> (String, Map<String, Value>) {
+    let mut schema = plain_schema::<T>();
+    make_strict(&mut schema);
+    let mut object = schema.as_object_mut().map(std::mem::take).unwrap_or_default();
+    let description = match object.remove("description") {
+        Some(Value::String(text)) => text,
+        _ => String::new(),
+    };
+    (description, object)
+}
+
+/// Adds the handle that stands in the path over REST and among the arguments everywhere else.
+pub fn require_episode_id(schema: &mut Map<String, Value>) {
+    let handle = json!({ "type": "string", "description": "The episode, as start_episode returned it." });
+    if let Some(Value::Object(properties)) = schema.get_mut("properties") {
+        properties.shift_insert(0, "episode_id".into(), handle);
+    }
+    if let Some(Value::Array(required)) = schema.get_mut("required") {
+        required.insert(0, json!("episode_id"));
+    }
+}
+
+fn make_strict(schema: &mut Value) {
+    match schema {
+        Value::Array(items) => items.iter_mut().for_each(make_strict),
+        Value::Object(object) => {
+            DROPPED.iter().for_each(|keyword| drop(object.remove(*keyword)));
+            unwrap_lines(object);
+            list_choices(object);
+            if object.get("type").is_some_and(|kind| kind == "object") {
+                close_object(object);
+            }
+            // A property may be called like a keyword, so names are walked past and only their schemas are made strict.
+            for (keyword, value) in object.iter_mut() {
+                match value {
+                    Value::Object(properties) if keyword == "properties" => {
+                        properties.values_mut().for_each(make_strict);
+                    }
+                    _ => make_strict(value),
+                }
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Doc comments break lines where the source does; a model reads sentences.
+fn unwrap_lines(object: &mut Map<String, Value>) {
+    if let Some(Value::String(text)) = object.get_mut("description") {
+        *text = text.replace("\n\n", "\u{1}").replace('\n', " ").replace('\u{1}', "\n\n");
+    }
+}
+
+/// Strict hosts refuse `oneOf`, which is how schemars writes an enum whose variants are described: the names become an
+/// `enum` and their descriptions part of the enum's own.
+fn list_choices(object: &mut Map<String, Value>) {
+    let Some(Value::Array(choices)) = object.remove("oneOf") else {
+        return;
+    };
+    let mut description = object["description"].as_str().unwrap_or_default().to_owned();
+    for choice in &choices {
+        if let (Some(name), Some(text)) = (choice["const"].as_str(), choice["description"].as_str()) {
+            description += &format!(" \"{name}\": {}", text.replace('\n', " "));
+        }
+    }
+    let names: Vec<Value> = choices.iter().map(|choice| choice["const"].clone()).collect();
+    object.insert("type".into(), json!("string"));
+    object.insert("enum".into(), names.into());
+    object.insert("description".into(), description.into());
+}
+
+fn close_object(object: &mut Map<String, Value>) {
+    let properties = object.entry("properties").or_insert_with(|| json!({}));
+    let names: Vec<Value> =
+        properties.as_object().into_iter().flatten().map(|(name, _)| json!(name)).collect();
+    object.insert("required".into(), names.into());
+    object.insert("additionalProperties".into(), Value::Bool(false));
+}
