@@ -3,9 +3,9 @@
 use rapier3d::math::{Pose, Vector};
 
 use super::World;
+use crate::body::RobotModel;
 use crate::mjcf::{Geom, MjcfCamera, Primitive};
 use crate::render::{Camera, Instance, Mesh, Pattern, RenderScene};
-use crate::robot::RobotModel;
 
 /// Colours that tell robots apart, in place of the material `accent` of the robot's file.
 const ACCENTS: [[f32; 3]; 3] = [[0.12, 0.35, 0.85], [0.95, 0.48, 0.08], [0.15, 0.62, 0.28]];

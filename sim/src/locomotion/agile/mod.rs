@@ -17,9 +17,9 @@ use serde::{Deserialize, Serialize};
 
 pub use network::Network;
 
-use super::{BaseCommand, BaseLimits, Drive, LegCommand, Locomotion};
+use super::{BaseCommand, BaseLimits, LegCommand, Locomotion};
 use crate::PHYSICS_STEPS_PER_CONTROL;
-use crate::robot::{JOINTS, LEGS, WAIST, WholeBody};
+use crate::body::{Drive, JOINTS, LEGS, WAIST, WholeBody};
 use joints::JointMap;
 use network::{Action, Memory, Observation};
 use place::Place;
@@ -108,7 +108,7 @@ impl Locomotion for Agile {
         let mut state = self.state.take().unwrap_or_else(|| self.begin(body));
         if state.ticks.is_multiple_of(PHYSICS_STEPS_PER_CONTROL) {
             let command = LIMITS.clamp(*command);
-            let mut velocity = [command.vx_m_s, command.vy_m_s, command.yaw_rate_rad_s];
+            let mut velocity = command.velocity();
             let pelvis = body.world_from_pelvis();
             let pulled_down_n: f32 = body.hand_force_n.into_iter().map(|force| -force.z).sum();
             if pulled_down_n > HEAVY_N {

@@ -1,6 +1,7 @@
 //! Random numbers of a seed, and arm motion drawn from them.
 
-use crate::robot::UPPER_JOINTS;
+use crate::Sides;
+use crate::body::{ARM_COLUMNS, ARM_JOINTS, MIRRORED_ARM, UPPER_JOINTS};
 
 /// SplitMix64: the same numbers everywhere.
 pub(super) struct Random(pub u64);
@@ -25,35 +26,36 @@ pub(super) enum Arms {
     Waving,
 }
 
-/// Arm joints of the action row: left 7, right 7.
-const ARM_JOINTS: usize = 14;
 /// Hands a forearm's length ahead of the chest: shoulder pitch, roll, yaw, elbow, wrist.
-const FORWARD_LEFT_RAD: [f32; 7] = [-0.35, 0.2, 0.0, 0.3, 0.0, 0.0, 0.0];
-/// Roll and yaw joints mirror.
-const MIRROR: [f32; 7] = [1.0, -1.0, -1.0, 1.0, -1.0, 1.0, -1.0];
+const FORWARD_LEFT_RAD: [f32; ARM_JOINTS] = [-0.35, 0.2, 0.0, 0.3, 0.0, 0.0, 0.0];
 const RAISE_S: f32 = 1.5;
 
 /// Joint targets over time.
 pub(super) struct ArmMotion {
     /// Amplitude (rad), frequency (rad/s), phase per joint.
-    waves: [[f32; 3]; ARM_JOINTS],
+    waves: Sides<[[f32; 3]; ARM_JOINTS]>,
 }
 
 impl ArmMotion {
     pub(super) fn new(arms: Arms, random: &mut Random) -> ArmMotion {
         let amplitude = if arms == Arms::Waving { [0.1, 0.35] } else { [0.0, 0.03] };
-        let waves = std::array::from_fn(|_| {
+        let mut wave = || {
             [random.uniform(amplitude[0], amplitude[1]), random.uniform(1.0, 4.0), random.uniform(0.0, 6.3)]
-        });
+        };
+        let waves = Sides::from_fn(|_| std::array::from_fn(|_| wave()));
         ArmMotion { waves }
     }
 
     pub(super) fn at(&self, rest_rad: &[f32; UPPER_JOINTS], time_s: f32) -> [f32; UPPER_JOINTS] {
         let part = (time_s / RAISE_S).min(1.0);
         let mut q_rad = *rest_rad;
-        for (i, [amplitude, rate, phase]) in self.waves.iter().enumerate() {
-            let forward = FORWARD_LEFT_RAD[i % 7] * if i < 7 { 1.0 } else { MIRROR[i % 7] };
-            q_rad[i] += part * (forward - rest_rad[i] + amplitude * (rate * time_s + phase).sin());
+        for (side, waves) in self.waves.by_side() {
+            for (i, [amplitude, rate, phase]) in waves.into_iter().enumerate() {
+                let forward = FORWARD_LEFT_RAD[i] * if MIRRORED_ARM[i] { side.sign() } else { 1.0 };
+                let column = ARM_COLUMNS[side] + i;
+                q_rad[column] +=
+                    part * (forward - rest_rad[column] + amplitude * (rate * time_s + phase).sin());
+            }
         }
         q_rad
     }

@@ -1,17 +1,28 @@
 //! The default base controller: stands while it can, steps when it is told to move or is pushed out of its stance.
 
+mod course;
+mod effort;
+mod footstep;
+mod gait;
+mod ground;
+mod legs;
+mod load;
+mod observer;
+mod stand;
+mod step;
+mod swing;
+
 use rapier3d::math::{Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
-use super::ground::soles;
-use super::load::Load;
-use super::observer::Observer;
 use super::plane::heading_rad;
-use super::stand::Stand;
-use super::step::Step;
 use super::{BaseCommand, BaseLimits, LegCommand, Locomotion};
-use crate::robot::WholeBody;
+use crate::body::WholeBody;
 use crate::{GRAVITY_M_S2, Sides};
+use load::Load;
+use observer::Observer;
+use stand::Stand;
+use step::Step;
 
 const LIMITS: BaseLimits = BaseLimits {
     vx_m_s: [-0.3, 0.4],
@@ -76,13 +87,14 @@ impl Locomotion for Balance {
     fn tick(&mut self, body: &WholeBody, command: &BaseCommand, dt_s: f32) -> LegCommand {
         let state = self.state.get_or_insert_with(|| State::new(body));
         let command = LIMITS.clamp(*command);
-        let wanted = [command.vx_m_s, command.vy_m_s, command.yaw_rate_rad_s];
+        let wanted = command.velocity();
         for i in 0..3 {
             let change = LARGEST_CHANGE_1_S[i] * dt_s;
             state.velocity[i] += (wanted[i] - state.velocity[i]).clamp(-change, change);
         }
         state.time_in_mode_s += dt_s;
-        let ground_m = soles(body).iter().map(|sole| sole.translation.z).fold(f32::INFINITY, f32::min);
+        let ground_m =
+            body.world_from_soles().iter().map(|sole| sole.translation.z).fold(f32::INFINITY, f32::min);
         state.observer.update(body.com_velocity_m_s, dt_s);
         let load = Load::of(body, ground_m, state.observer.push_m_s2());
         state.change_mode(body, &load);
@@ -112,7 +124,7 @@ impl State {
     fn new(body: &WholeBody) -> State {
         let pelvis = body.world_from_pelvis();
         let heading_rad = heading_rad(pelvis);
-        let Sides { left, right } = soles(body);
+        let Sides { left, right } = body.world_from_soles();
         let middle_m = (left.translation + right.translation) * 0.5;
         let mut pelvis_from_middle_m =
             Rotation::from_rotation_z(-heading_rad) * (pelvis.translation - middle_m);
@@ -159,7 +171,7 @@ impl State {
     }
 
     fn stance(&self, body: &WholeBody, load: &Load) -> Stance {
-        let Sides { left, right } = soles(body);
+        let Sides { left, right } = body.world_from_soles();
         let middle_m = (left.translation + right.translation) * 0.5;
         let height_m = body.com_m.z - middle_m.z;
         let capture_m = load.balance_point_m + body.com_velocity_m_s * (height_m / GRAVITY_M_S2).sqrt();

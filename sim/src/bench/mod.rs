@@ -1,6 +1,7 @@
 //! What a base controller can do: standing, loads, walking, stopping, squatting, pushes and a tour, several seeds each.
 
 mod cases;
+mod measure;
 mod motion;
 mod tour;
 mod trial;
@@ -13,9 +14,9 @@ use serde::Serialize;
 
 pub use cases::{CASES, Case};
 
-use super::Locomotion;
 use crate::SimError;
-use trial::Trial;
+use crate::locomotion::Locomotion;
+use measure::Trial;
 
 /// Makes a fresh controller for each trial.
 pub type NewLocomotion<'a> = &'a (dyn Fn() -> Box<dyn Locomotion> + Sync);

@@ -1,10 +1,13 @@
 //! Plans the rest of a step: where the ground should push now, where the swinging foot should land, and how soon.
 
+#[cfg(test)]
+mod tests;
+
 use rapier3d::math::{Pose, Vector};
 
 use super::gait::{Gait, PERIOD_S, TRANSFER_S, recoil};
-use super::plane::flat;
 use super::swing::{SWING_S, Swing};
+use crate::locomotion::plane::flat;
 
 /// Footholds lie within these of the foot that carries, along the heading and to the inside: the feet never cross.
 const REACH_M: [f32; 2] = [-0.4, 0.48];
