@@ -5,8 +5,8 @@ use rapier3d::math::Vector;
 use super::cases::{Case, Plan, STOP_S};
 use super::tour::Leg;
 use crate::CONTROL_DT_S as DT_S;
-use crate::locomotion::BaseCommand;
 use crate::locomotion::plane::flat;
+use crate::locomotion::{BaseCommand, BaseVelocity};
 
 /// Arms rise and loads swing out before anything is asked or measured.
 pub(super) const SETTLE_S: f32 = 2.0;
@@ -17,7 +17,7 @@ const RAMP_S: f32 = 2.0;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Trial {
     pub fell: bool,
-    pub velocity_error: Option<f32>,
+    pub velocity_error_share: Option<f32>,
     pub heading_error_deg: Option<f32>,
     pub final_drift_m: Option<f32>,
     pub sway_m: Option<f32>,
@@ -50,9 +50,9 @@ pub(super) fn measure(case: &Case, log: &[Sample], legs: &[Leg], trial: &mut Tri
             trial.final_drift_m = Some(flat(log[end].pelvis_m - log[0].pelvis_m).length());
         }
         Plan::Move(velocity) => {
-            let stop = at(case.seconds - STOP_S);
-            trial.velocity_error = Some(velocity_error(&log[at(SETTLE_S + RAMP_S)..stop], *velocity));
-            let turned_rad = velocity[2] * (stop - start) as f32 * DT_S;
+            let stop = at(case.duration_s - STOP_S);
+            trial.velocity_error_share = Some(velocity_error(&log[at(SETTLE_S + RAMP_S)..stop], *velocity));
+            let turned_rad = velocity.turning_rad_s * (stop - start) as f32 * DT_S;
             trial.heading_error_deg =
                 Some((log[end].heading_rad - log[start].heading_rad - turned_rad).abs().to_degrees());
             trial.standing_after_s = Some(slower_after_s(&log[stop..], 0.1));
@@ -67,7 +67,7 @@ pub(super) fn measure(case: &Case, log: &[Sample], legs: &[Leg], trial: &mut Tri
         }
     }
     if let Plan::Squat { .. } = &case.plan {
-        let ends = [case.seconds / 3.0, case.seconds * 2.0 / 3.0, case.seconds];
+        let ends = [case.duration_s / 3.0, case.duration_s * 2.0 / 3.0, case.duration_s];
         let error_m = |end_s: &f32| {
             let sample = &log[at(end_s - 2.0 * DT_S)];
             (sample.pelvis_m.z - sample.command.pelvis_height_m).abs()
@@ -77,8 +77,8 @@ pub(super) fn measure(case: &Case, log: &[Sample], legs: &[Leg], trial: &mut Tri
 }
 
 /// Largest deviation of the mean velocity in the heading frame, as a part of the commanded speed (m/s or rad/s).
-fn velocity_error(log: &[Sample], velocity: [f32; 3]) -> f32 {
-    let mut moved = [0.0; 3];
+fn velocity_error(log: &[Sample], velocity: BaseVelocity) -> f32 {
+    let mut moved = [0.0_f32; 3];
     for pair in log.windows(2) {
         let step_m = pair[1].pelvis_m - pair[0].pelvis_m;
         let (sine, cosine) = pair[0].heading_rad.sin_cos();
@@ -87,10 +87,12 @@ fn velocity_error(log: &[Sample], velocity: [f32; 3]) -> f32 {
         moved[2] += pair[1].heading_rad - pair[0].heading_rad;
     }
     let time_s = (log.len() - 1) as f32 * DT_S;
-    let [x, y, turn] = std::array::from_fn(|i| moved[i] / time_s - velocity[i]);
-    let speed_m_s = velocity[0].hypot(velocity[1]);
+    let BaseVelocity { forward_m_s, left_m_s, turning_rad_s } = velocity;
+    let [x, y, turn] = moved.map(|moved| moved / time_s);
+    let (x, y, turn) = (x - forward_m_s, y - left_m_s, turn - turning_rad_s);
+    let speed_m_s = forward_m_s.hypot(left_m_s);
     let linear = if speed_m_s > 0.0 { x.hypot(y) / speed_m_s } else { 0.0 };
-    let angular = if velocity[2] != 0.0 { (turn / velocity[2]).abs() } else { 0.0 };
+    let angular = if turning_rad_s != 0.0 { (turn / turning_rad_s).abs() } else { 0.0 };
     linear.max(angular)
 }
 

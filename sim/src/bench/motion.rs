@@ -7,8 +7,8 @@ use crate::body::{ARM_COLUMNS, ARM_JOINTS, MIRRORED_ARM, UPPER_JOINTS};
 pub(super) struct Random(pub u64);
 
 impl Random {
-    /// Uniform in `low..high`.
-    pub(super) fn uniform(&mut self, low: f32, high: f32) -> f32 {
+    /// Uniform between the two.
+    pub(super) fn uniform(&mut self, [low, high]: [f32; 2]) -> f32 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -32,15 +32,30 @@ const RAISE_S: f32 = 1.5;
 
 /// Joint targets over time.
 pub(super) struct ArmMotion {
-    /// Amplitude (rad), frequency (rad/s), phase per joint.
-    waves: Sides<[[f32; 3]; ARM_JOINTS]>,
+    waves: Sides<[Wave; ARM_JOINTS]>,
+}
+
+/// Of one joint.
+#[derive(Clone, Copy)]
+struct Wave {
+    amplitude_rad: f32,
+    rate_rad_s: f32,
+    phase_rad: f32,
+}
+
+impl Wave {
+    fn at(&self, time_s: f32) -> f32 {
+        self.amplitude_rad * (self.rate_rad_s * time_s + self.phase_rad).sin()
+    }
 }
 
 impl ArmMotion {
     pub(super) fn new(arms: Arms, random: &mut Random) -> ArmMotion {
-        let amplitude = if arms == Arms::Waving { [0.1, 0.35] } else { [0.0, 0.03] };
-        let mut wave = || {
-            [random.uniform(amplitude[0], amplitude[1]), random.uniform(1.0, 4.0), random.uniform(0.0, 6.3)]
+        let amplitude_rad = if arms == Arms::Waving { [0.1, 0.35] } else { [0.0, 0.03] };
+        let mut wave = || Wave {
+            amplitude_rad: random.uniform(amplitude_rad),
+            rate_rad_s: random.uniform([1.0, 4.0]),
+            phase_rad: random.uniform([0.0, 6.3]),
         };
         let waves = Sides::from_fn(|_| std::array::from_fn(|_| wave()));
         ArmMotion { waves }
@@ -50,11 +65,10 @@ impl ArmMotion {
         let part = (time_s / RAISE_S).min(1.0);
         let mut q_rad = *rest_rad;
         for (side, waves) in self.waves.by_side() {
-            for (i, [amplitude, rate, phase]) in waves.into_iter().enumerate() {
+            for (i, wave) in waves.into_iter().enumerate() {
                 let forward = FORWARD_LEFT_RAD[i] * if MIRRORED_ARM[i] { side.sign() } else { 1.0 };
                 let column = ARM_COLUMNS[side] + i;
-                q_rad[column] +=
-                    part * (forward - rest_rad[column] + amplitude * (rate * time_s + phase).sin());
+                q_rad[column] += part * (forward - rest_rad[column] + wave.at(time_s));
             }
         }
         q_rad

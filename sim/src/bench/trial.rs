@@ -10,7 +10,7 @@ use super::motion::{ArmMotion, Random};
 use super::tour::{self, Leg};
 use crate::body::PALM_IN_WRIST_M;
 use crate::locomotion::plane::{heading_rad, wrapped_rad};
-use crate::locomotion::{BaseCommand, Locomotion};
+use crate::locomotion::{BaseCommand, BaseVelocity, Locomotion};
 use crate::robot::{RobotCommand, RobotState};
 use crate::{CONTROL_DT_S as DT_S, RobotPlacement, Side, SimError, World, WorldSpec};
 
@@ -33,7 +33,7 @@ pub(super) fn run(case: &Case, seed: u64, locomotion: Box<dyn Locomotion>) -> Re
     let mut log: Vec<Sample> = Vec::new();
     let mut trial = Trial::default();
     let mut work_j = 0.0;
-    for step in 0..(case.seconds / DT_S) as usize {
+    for step in 0..(case.duration_s / DT_S) as usize {
         let time_s = step as f32 * DT_S;
         let state = world.robot_state(0);
         trial.fell = state.fallen;
@@ -67,13 +67,18 @@ fn base_command(
 ) -> BaseCommand {
     match &case.plan {
         Plan::Hold => rest,
-        Plan::Move(velocity) if time_s > SETTLE_S && time_s < case.seconds - STOP_S => {
-            let [vx_m_s, vy_m_s, yaw_rate_rad_s] = *velocity;
-            BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, ..rest }
+        Plan::Move(velocity) if time_s > SETTLE_S && time_s < case.duration_s - STOP_S => {
+            let BaseVelocity { forward_m_s, left_m_s, turning_rad_s } = *velocity;
+            BaseCommand {
+                vx_m_s: forward_m_s,
+                vy_m_s: left_m_s,
+                yaw_rate_rad_s: turning_rad_s,
+                pelvis_height_m: rest.pelvis_height_m,
+            }
         }
         Plan::Move(_) => rest,
         Plan::Squat { high_m, low_m } => {
-            let middle = (case.seconds / 3.0..case.seconds * 2.0 / 3.0).contains(&time_s);
+            let middle = (case.duration_s / 3.0..case.duration_s * 2.0 / 3.0).contains(&time_s);
             BaseCommand { pelvis_height_m: if middle { *low_m } else { *high_m }, ..rest }
         }
         Plan::Tour(tour) => {
@@ -113,7 +118,7 @@ fn disturb(case: &Case, world: &mut World, seed: u64, direction: Vector, legs: &
 
 /// Any direction, no more than 45 degrees out of the horizontal.
 fn pull_direction(random: &mut Random) -> Vector {
-    let (angle, rise) = (random.uniform(0.0, TAU), random.uniform(-PI / 4.0, PI / 4.0));
+    let (angle, rise) = (random.uniform([0.0, TAU]), random.uniform([-PI / 4.0, PI / 4.0]));
     Vector::new(angle.cos() * rise.cos(), angle.sin() * rise.cos(), rise.sin())
 }
 

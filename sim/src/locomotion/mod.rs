@@ -23,15 +23,26 @@ pub struct BaseCommand {
     pub pelvis_height_m: f32,
 }
 
+/// How the base goes, in its own heading frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BaseVelocity {
+    pub forward_m_s: f32,
+    pub left_m_s: f32,
+    pub turning_rad_s: f32,
+}
+
+impl BaseVelocity {
+    pub const STILL: BaseVelocity = BaseVelocity { forward_m_s: 0.0, left_m_s: 0.0, turning_rad_s: 0.0 };
+}
+
 impl BaseCommand {
     /// Stays where it is, with the pelvis at this height.
     pub fn standing(pelvis_height_m: f32) -> BaseCommand {
         BaseCommand { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m }
     }
 
-    /// Forward m/s, left m/s, turning rad/s.
-    pub fn velocity(&self) -> [f32; 3] {
-        [self.vx_m_s, self.vy_m_s, self.yaw_rate_rad_s]
+    pub fn velocity(&self) -> BaseVelocity {
+        BaseVelocity { forward_m_s: self.vx_m_s, left_m_s: self.vy_m_s, turning_rad_s: self.yaw_rate_rad_s }
     }
 }
 

@@ -5,8 +5,8 @@ use std::f32::consts::{PI, TAU};
 use rapier3d::math::{Pose, Vector};
 
 /// The horizontal part.
-pub(crate) fn flat(v: Vector) -> Vector {
-    Vector::new(v.x, v.y, 0.0)
+pub(crate) fn flat(Vector { x, y, .. }: Vector) -> Vector {
+    Vector::new(x, y, 0.0)
 }
 
 /// The same angle within half a turn of zero.

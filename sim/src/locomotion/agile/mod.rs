@@ -108,7 +108,7 @@ impl Locomotion for Agile {
         let mut state = self.state.take().unwrap_or_else(|| self.begin(body));
         if state.ticks.is_multiple_of(PHYSICS_STEPS_PER_CONTROL) {
             let command = LIMITS.clamp(*command);
-            let mut velocity = command.velocity();
+            let mut velocity = [command.vx_m_s, command.vy_m_s, command.yaw_rate_rad_s];
             let pelvis = body.world_from_pelvis();
             let pulled_down_n: f32 = body.hand_force_n.into_iter().map(|force| -force.z).sum();
             if pulled_down_n > HEAVY_N {

@@ -25,17 +25,17 @@ pub(super) struct Gait {
 impl Gait {
     /// With E = e^{w t}, t the transfer, G = e^{w (T - t)} and K = G (E - 1) / (w t):
     ///   b = v T (1 - E G + K) / (E G - 1)  along the motion,   width (E G + 1 - K) / (E G + 1)  to the inside.
-    pub(super) fn new(rate_1_s: f32, velocity_m_s: Vector, outside: Vector) -> Gait {
+    pub(super) fn new(rate_1_s: f32, velocity_m_s: Vector, outside_axis: Vector) -> Gait {
         let transfer = (rate_1_s * TRANSFER_S).exp();
         let whole = (rate_1_s * PERIOD_S).exp();
         let ramp = whole / transfer * (transfer - 1.0) / (rate_1_s * TRANSFER_S);
         let along_m = velocity_m_s * PERIOD_S;
-        let width_m = WIDTH_M + WIDENING * along_m.dot(outside).abs();
+        let width_m = WIDTH_M + WIDENING * along_m.dot(outside_axis).abs();
         Gait {
             rate_1_s,
-            step_m: along_m - outside * width_m,
+            step_m: along_m - outside_axis * width_m,
             offset_m: along_m * ((1.0 - whole + ramp + 2.0 * recoil(rate_1_s, SWING_S)) / (whole - 1.0))
-                + outside * (width_m * (whole + 1.0 - ramp) / (whole + 1.0)),
+                + outside_axis * (width_m * (whole + 1.0 - ramp) / (whole + 1.0)),
         }
     }
 

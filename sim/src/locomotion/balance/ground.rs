@@ -26,15 +26,15 @@ const SMALLEST_VERTICAL_FORCE_N: f32 = 20.0;
 
 /// The point nearest to `point_m` where two planted feet can have their centre of pressure.
 pub(super) fn nearest_support_m(point_m: Vector, soles: Sides<Pose>) -> Vector {
-    let shares = shares(point_m, soles);
-    let middle_m = between_m(soles, shares);
-    let turn = soles.right.rotation.slerp(soles.left.rotation, shares.left);
+    let share = share(point_m, soles);
+    let middle_m = between_m(soles, share);
+    let turn = soles.right.rotation.slerp(soles.left.rotation, share.left);
     let inside_m = within_sole_m(turn.inverse() * flat(point_m - middle_m));
     middle_m + flat(turn * inside_m)
 }
 
 /// How two feet share a load at a point of the line between their soles.
-fn shares(point_m: Vector, soles: Sides<Pose>) -> Sides<f32> {
+fn share(point_m: Vector, soles: Sides<Pose>) -> Sides<f32> {
     let across = flat(soles.left.translation - soles.right.translation);
     let along_line = flat(point_m - soles.right.translation).dot(across) / across.length_squared();
     let left = along_line.clamp(SMALLEST_SHARE, 1.0 - SMALLEST_SHARE);
@@ -42,8 +42,8 @@ fn shares(point_m: Vector, soles: Sides<Pose>) -> Sides<f32> {
 }
 
 /// The point of that line at which the load is shared so.
-fn between_m(soles: Sides<Pose>, shares: Sides<f32>) -> Vector {
-    soles.left.translation * shares.left + soles.right.translation * shares.right
+fn between_m(soles: Sides<Pose>, share: Sides<f32>) -> Vector {
+    soles.left.translation * share.left + soles.right.translation * share.right
 }
 
 /// The nearest point of a sole, in its frame.
@@ -95,13 +95,13 @@ pub(super) fn distribute(
 ) -> Sides<FootForce> {
     let pressure_m = centre_of_pressure_m(com_m, force_n, moment_n_m, soles);
     let ground_m = pressure_m.z;
-    let shares = shares(pressure_m, soles);
-    let rest_m = flat(pressure_m - between_m(soles, shares));
+    let share = share(pressure_m, soles);
+    let rest_m = flat(pressure_m - between_m(soles, share));
     Sides::from_fn(|side| {
         let sole = soles[side];
         let inside_m = within_sole_m(sole.rotation.inverse() * rest_m);
         let point_m = sole.translation + sole.rotation * inside_m;
-        FootForce { force_n: force_n * shares[side], point_m: Vector::new(point_m.x, point_m.y, ground_m) }
+        FootForce { force_n: force_n * share[side], point_m: Vector::new(point_m.x, point_m.y, ground_m) }
     })
 }
 

@@ -18,8 +18,8 @@ use super::legs::rotation_vector_rad;
 use super::load::Load;
 use super::swing::{SOLE_IN_FOOT_M, SWING_S, Swing};
 use crate::body::{Acceleration, Drive, LEGS, WholeBody};
-use crate::locomotion::LegCommand;
 use crate::locomotion::plane::{flat, heading_rad, wrapped_rad};
+use crate::locomotion::{BaseVelocity, LegCommand};
 use crate::{GRAVITY_M_S2, Side, Sides};
 
 const SHIFT_GAIN: f32 = 3.0;
@@ -107,13 +107,13 @@ impl Step {
         &mut self,
         body: &WholeBody,
         load: &Load,
-        velocity: [f32; 3],
+        velocity: BaseVelocity,
         height_m: f32,
         dt_s: f32,
     ) -> (LegCommand, Vector) {
         let soles = body.world_from_soles();
         let ground_m = soles[self.stance].translation.z;
-        self.turn(body, velocity[2], dt_s);
+        self.turn(body, velocity.turning_rad_s, dt_s);
         let heading = Rotation::from_rotation_z(self.heading_rad);
         let (ahead, left) = (heading * Vector::X, heading * Vector::Y);
         let rate_1_s = (GRAVITY_M_S2 / (body.com_m.z - ground_m).max(0.4)).sqrt();
@@ -128,8 +128,8 @@ impl Step {
             capture_m: flat(load.balance_point_m + body.com_velocity_m_s / rate_1_s),
             stance: soles[self.stance],
             old_m: flat(soles[self.stance.other()].translation),
-            ahead,
-            outside,
+            ahead_axis: ahead,
+            outside_axis: outside,
             time_s: self.time_s,
         };
         let pressure_m = if self.shifting {
@@ -138,13 +138,13 @@ impl Step {
             nearest_support_m(situation.capture_m + (situation.capture_m - target_m) * SHIFT_GAIN, soles)
         } else {
             let footstep = situation.plan(dt_s);
-            self.advance(&footstep, velocity[2], ground_m, dt_s);
+            self.advance(&footstep, velocity.turning_rad_s, ground_m, dt_s);
             footstep.pressure_m
         };
         let wanted_m = height_m.min(HIGHEST_M).min(self.within_reach_m(body)).max(LOWEST_M);
         let rise = (wanted_m - self.height_m).clamp(-LOWERING_M_S * dt_s, RAISING_M_S * dt_s);
         self.height_m += rise;
-        let torques = self.carry(body, load, pressure_m, ground_m, heading, velocity[2]);
+        let torques = self.carry(body, load, pressure_m, ground_m, heading, velocity.turning_rad_s);
         self.land(body, &soles, ground_m);
         (drives(body, &torques), torques.acceleration_m_s2)
     }
@@ -259,8 +259,8 @@ fn drives(body: &WholeBody, torques: &Torques) -> LegCommand {
 fn shift(now: &Situation) -> (Vector, bool) {
     let target_m = now.steady_capture_m(SWING_S);
     let middle_m = (flat(now.stance.translation) + now.old_m) * 0.5;
-    let late = (now.capture_m - middle_m).dot(now.ahead).abs() > LATEST_M;
-    (target_m, late || (target_m - now.capture_m).dot(now.outside) < SHIFTED_M)
+    let late = (now.capture_m - middle_m).dot(now.ahead_axis).abs() > LATEST_M;
+    (target_m, late || (target_m - now.capture_m).dot(now.outside_axis) < SHIFTED_M)
 }
 
 /// Height of the lowest point of a sole.

@@ -46,8 +46,8 @@ impl Pendulum {
                 capture_m: self.capture_m,
                 stance: Pose::from_translation(self.stance_m),
                 old_m,
-                ahead: Vector::X,
-                outside,
+                ahead_axis: Vector::X,
+                outside_axis: outside,
                 time_s,
             };
             let plan = situation.plan(DT_S);
@@ -111,8 +111,8 @@ fn feet_do_not_cross_and_hurry_only_when_they_must() {
             capture_m: Vector::ZERO,
             stance: Pose::IDENTITY,
             old_m: gait.step_m,
-            ahead: Vector::X,
-            outside: Vector::Y,
+            ahead_axis: Vector::X,
+            outside_axis: Vector::Y,
             time_s: TRANSFER_S + 0.02,
         };
         situation.capture_m = situation.steady_capture_m(PERIOD_S - situation.time_s - DT_S) + push_m;
