@@ -14,7 +14,7 @@ fn walks_as_commanded_and_stops() {
     for case in ["forward_0.4", "mix_backward_right_turn", "left_0.25_2kg"] {
         let report = report(case, 1);
         assert_eq!(report.survived, 1, "{report:?}");
-        assert!(report.velocity_error.unwrap() < 0.15, "{report:?}");
+        assert!(report.velocity_error_share.unwrap() < 0.15, "{report:?}");
         assert!(report.heading_error_deg.unwrap() < 5.0, "{report:?}");
         assert!(report.standing_after_s.unwrap() < 1.5 && report.still_after_s.unwrap() < 3.0, "{report:?}");
     }

@@ -16,10 +16,9 @@ pub use objects::{ObjectModel, ObjectPlacement, ObjectState};
 pub use snapshot::Snapshot;
 pub use step::{ObjectStep, RobotStep, Step, Touch};
 
-pub(crate) use contacts::link_tag;
-
+use crate::body::RobotModel;
 use crate::mjcf::{Document, MjcfCamera};
-use crate::robot::{Robot, RobotCommand, RobotModel, RobotState};
+use crate::robot::{Robot, RobotCommand, RobotPlacement, RobotState};
 use crate::{CONTROL_HZ, GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError, assets};
 use contacts::SelfCollision;
 use objects::Object;
@@ -31,14 +30,6 @@ pub struct WorldSpec {
     pub scene: String,
     pub robots: Vec<RobotPlacement>,
     pub objects: Vec<ObjectPlacement>,
-}
-
-/// A robot stands on the floor here, facing `yaw_rad` (0 looks along +x).
-#[derive(Clone, Debug)]
-pub struct RobotPlacement {
-    pub name: String,
-    pub position_m: [f32; 2],
-    pub yaw_rad: f32,
 }
 
 /// A simulated room. One thread owns it.

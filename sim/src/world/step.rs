@@ -27,7 +27,7 @@ pub struct Step {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotStep {
     pub state: RobotState,
-    /// In the order of [`crate::robot::RobotModel::links`].
+    /// In the order of [`crate::body::RobotModel::links`].
     pub world_from_link: Vec<Pose>,
     /// Before the first step, the command under which the robot rests.
     pub command: RobotCommand,
