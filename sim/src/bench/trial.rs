@@ -30,12 +30,12 @@ pub(super) fn run(case: &Case, seed: u64, locomotion: Box<dyn Locomotion>) -> Re
         world.load_hand(0, side, case.hand_load_kg, PALM_IN_WRIST_M);
     }
     let rest = world.rest_command(0);
+    let mut state = world.present().robots.remove(0).state;
     let mut log: Vec<Sample> = Vec::new();
     let mut trial = Trial::default();
     let mut work_j = 0.0;
     for step in 0..(case.duration_s / DT_S) as usize {
         let time_s = step as f32 * DT_S;
-        let state = world.robot_state(0);
         trial.fell = state.fallen;
         if trial.fell {
             break;
@@ -45,9 +45,9 @@ pub(super) fn run(case: &Case, seed: u64, locomotion: Box<dyn Locomotion>) -> Re
         let base = base_command(case, &world, &state, heading_rad, &legs, time_s, rest.base);
         disturb(case, &mut world, seed, direction, &legs, time_s);
         let upper_rad = arms.at(&rest.upper_rad, time_s);
-        world.control_step(&[RobotCommand { upper_rad, base }]);
         work_j += power_w(&state) * DT_S;
         log.push(Sample { pelvis_m: state.world_from_pelvis.translation, heading_rad, command: base });
+        state = world.control_step(&[RobotCommand { upper_rad, base }]).robots.remove(0).state;
     }
     trial.power_w = work_j / (log.len() as f32 * DT_S);
     if !trial.fell {
