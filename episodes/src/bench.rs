@@ -8,7 +8,7 @@ use tandem_sim::assets;
 pub use tandem_sim::bench::{CaseReport, Report as LocomotionReport};
 use tandem_sim::{LocomotionChoice, bench};
 
-use crate::motion;
+use crate::commands;
 
 /// Targets drawn where no file gives any.
 const SAMPLED_TARGETS: usize = 200;
@@ -46,7 +46,7 @@ pub fn ik(targets: Option<&Path>) -> Result<Report, BenchError> {
             TargetSet::from_json(&read.map_err(|source| BenchError::Read { path: path.into(), source })?)?
         }
         None => {
-            let upper_body = motion::upper_body(&whole)?;
+            let upper_body = commands::upper_body(&whole)?;
             let start_rad = vec![0.0; upper_body.nv()];
             TargetSet::sample(&upper_body, &WRISTS, &start_rad, SAMPLED_TARGETS, SAMPLE_SEED)?
         }

@@ -58,19 +58,6 @@ pub fn wire_limits(limits: &BaseLimits) -> wire::BaseLimits {
     }
 }
 
-/// A base command within the limits, and the fields that had to be moved there.
-pub fn clamp_base(command: BaseCommand, limits: &BaseLimits) -> (BaseCommand, Vec<String>) {
-    let clamped = limits.clamp(command);
-    let fields = [
-        ("vx_m_s", command.vx_m_s, clamped.vx_m_s),
-        ("vy_m_s", command.vy_m_s, clamped.vy_m_s),
-        ("yaw_rate_rad_s", command.yaw_rate_rad_s, clamped.yaw_rate_rad_s),
-        ("pelvis_height_m", command.pelvis_height_m, clamped.pelvis_height_m),
-    ];
-    let moved = fields.iter().filter(|(_, asked, got)| asked != got).map(|(name, ..)| name.to_string());
-    (clamped, moved.collect())
-}
-
 /// OpenCV's camera axes (x right, y down, z forward) for a camera given in MuJoCo's (x right, y up, looking along -z).
 pub fn opencv_axes(pelvis_from_camera: &Pose) -> Pose {
     *pelvis_from_camera * Pose::from_rotation(Rotation::from_rotation_x(std::f32::consts::PI))

@@ -1,12 +1,14 @@
 //! What policies are told about tasks, protocols and robots.
 
-use tandem_sim::{BaseLimits, RobotModel, UPPER, World};
+use tandem_sim::BaseLimits;
 use tandem_tools_spec::{
     Instruction, JointInfo, PhaseInfo, Protocol, ProtocolInfo, RobotInfo, TaskInfo, TaskList,
 };
 
+use crate::commands::RobotSheet;
 use crate::convert::{rounded, wire_limits};
 use crate::protocol::rules;
+use crate::scoring::Phase;
 use crate::tasks::{self, Task};
 
 /// The reply to `list_tasks` where robots follow base commands within `limits`.
@@ -24,15 +26,13 @@ fn task_info(task: &Task) -> TaskInfo {
             .iter()
             .enumerate()
             .map(|(index, phase)| PhaseInfo {
-                id: phase_id(index),
+                id: Phase::number(index),
                 name: phase.id.into(),
                 description: phase.description.into(),
                 collaborative: phase.collaborative,
             })
             .collect(),
-        protocols: [Protocol::Agentic, Protocol::Benchmark]
-            .map(|protocol| protocol_info(protocol, task))
-            .to_vec(),
+        protocols: Protocol::ALL.map(|protocol| protocol_info(protocol, task)).to_vec(),
     }
 }
 
@@ -49,11 +49,6 @@ fn protocol_info(protocol: Protocol, task: &Task) -> ProtocolInfo {
     }
 }
 
-/// `p1` for the first phase.
-pub fn phase_id(index: usize) -> String {
-    format!("p{}", index + 1)
-}
-
 pub fn instructions(task: &Task) -> Vec<Instruction> {
     let part = |robot: &tasks::RobotSpot| Instruction {
         robot: robot.name.into(),
@@ -62,14 +57,11 @@ pub fn instructions(task: &Task) -> Vec<Instruction> {
     task.robots.iter().map(part).collect()
 }
 
-pub fn robots(world: &World) -> Vec<RobotInfo> {
-    world.robots().iter().map(|robot| robot_info(&robot.name, &robot.model, &robot.base_limits())).collect()
-}
-
-fn robot_info(name: &str, model: &RobotModel, limits: &BaseLimits) -> RobotInfo {
+pub fn robot(robot: &RobotSheet) -> RobotInfo {
     RobotInfo {
-        robot: name.into(),
-        joints: model
+        robot: robot.name.clone(),
+        joints: robot
+            .model
             .joints
             .iter()
             .map(|joint| JointInfo {
@@ -78,12 +70,6 @@ fn robot_info(name: &str, model: &RobotModel, limits: &BaseLimits) -> RobotInfo 
                 upper_rad: rounded(joint.upper_rad.into()),
             })
             .collect(),
-        base_limits: wire_limits(limits),
+        base_limits: wire_limits(&robot.base_limits),
     }
-}
-
-/// Names of the columns of an action row.
-pub fn action_row(model: &RobotModel) -> Vec<String> {
-    let joints = UPPER.iter().map(|joint| model.joints[*joint].name.clone());
-    joints.chain(["vx_m_s", "vy_m_s", "yaw_rate_rad_s", "pelvis_height_m"].map(String::from)).collect()
 }

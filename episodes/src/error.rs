@@ -1,5 +1,7 @@
 //! Why an episode refuses a call. None of these changes the world.
 
+use std::path::PathBuf;
+
 use tandem_tools_spec::{EndReason, SpecError};
 
 /// The text says what would work, because its reader is often a language model.
@@ -8,7 +10,7 @@ pub enum EpisodeError {
     #[error("no task {id:?}; have: {}", .have.join(", "))]
     UnknownTask { id: String, have: Vec<&'static str> },
     #[error("no robot {name:?} in this episode; have: {}", .have.join(", "))]
-    UnknownRobot { name: String, have: Vec<&'static str> },
+    UnknownRobot { name: String, have: Vec<String> },
     #[error("{asked} control steps in one command; the {protocol} protocol allows 1 to {most}")]
     TooManySteps { asked: usize, most: u32, protocol: &'static str },
     #[error("pixel [{u}, {v}] is outside the image; u goes from 0 to {}, v from 0 to {}", .width - 1, .height - 1)]
@@ -24,7 +26,34 @@ pub enum EpisodeError {
     #[error("a picture cannot be encoded: {0}")]
     Picture(#[from] tandem_sim::render::PictureError),
     #[error(transparent)]
-    Output(#[from] crate::results::OutputError),
+    Checkpoint(#[from] CheckpointError),
+    #[error("cannot read this program's own file, which tells it from other builds: {0}")]
+    Build(#[source] std::io::Error),
+    #[error(transparent)]
+    Output(#[from] crate::output::OutputError),
+}
+
+/// Why a checkpoint cannot be gone on from.
+#[derive(Debug, thiserror::Error)]
+pub enum CheckpointError {
+    #[error("cannot read the checkpoint {}: {source}", path.display())]
+    Read { path: PathBuf, source: std::io::Error },
+    #[error("{} is no checkpoint of an episode: {source}", path.display())]
+    NotOne { path: PathBuf, source: serde_json::Error },
+    #[error(
+        "the checkpoint {} was made by build {made_by} of {episode}; this is build {this}, and only the build that made a checkpoint goes on from it",
+        path.display()
+    )]
+    OtherBuild { path: PathBuf, made_by: String, episode: String, this: &'static str },
+    #[error(
+        "the checkpoint {} is torn: {have} of its {expected} bytes are as they were written; make it again",
+        path.display()
+    )]
+    Torn { path: PathBuf, have: usize, expected: usize },
+    #[error("the checkpoint was made of {made_of}; it fits that episode, and this one is {wanted}")]
+    OtherEpisode { made_of: String, wanted: String },
+    #[error("the progress in a checkpoint cannot be read or written: {0}")]
+    Progress(#[from] postcard::Error),
 }
 
 fn reason_text(reason: EndReason) -> &'static str {

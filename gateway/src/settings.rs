@@ -3,11 +3,12 @@
 use std::{
     net::SocketAddr,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use clap::Args;
 use serde::Deserialize;
-use tandem_episodes::{Instructions, InstructionsError, LocomotionChoice, SimError};
+use tandem_episodes::{BaseLimits, Controller, Instructions, InstructionsError, SimError};
 
 /// One source of settings; what it leaves out comes from the next. The doc comments are the help text.
 #[derive(Debug, Clone, Default, PartialEq, Args, Deserialize)]
@@ -56,7 +57,9 @@ pub struct Settings {
     /// Instructions in place of the tasks' own.
     pub instructions: Instructions,
     /// The base controller of every robot.
-    pub locomotion: LocomotionChoice,
+    pub locomotion: Controller,
+    /// What that controller follows.
+    pub base_limits: BaseLimits,
     /// Episodes that may be held at once.
     pub max_episodes: u32,
     /// Largest request body that is read.
@@ -92,23 +95,25 @@ pub enum SettingsError {
 
 impl Settings {
     /// Fills what `flags` (and the environment, which clap reads) leave out from the file at `config`, then from defaults.
-    pub fn resolve(flags: Layer, config: Option<&Path>) -> Result<Settings, SettingsError> {
+    pub fn resolve(flags: Layer, config: Option<&Path>) -> Result<Arc<Settings>, SettingsError> {
         let file = match config {
             Some(path) => read_layer(path)?,
             None => Layer::default(),
         };
         let layer = flags.or(file);
-        Ok(Settings {
+        let locomotion = Controller::from_file(layer.locomotion.as_deref());
+        Ok(Arc::new(Settings {
             listen: layer.listen.unwrap_or(SocketAddr::from(([127, 0, 0, 1], 8700))),
             runs: layer.runs.unwrap_or_else(|| "runs".into()),
             instructions: match &layer.instructions {
                 Some(path) => Instructions::read(path)?,
                 None => Instructions::default(),
             },
-            locomotion: LocomotionChoice::from_file(layer.locomotion.as_deref())?,
+            base_limits: locomotion.load()?.limits(),
+            locomotion,
             max_episodes: layer.max_episodes.unwrap_or(8),
             max_body_bytes: layer.max_body_bytes.unwrap_or(2_000_000),
-        })
+        }))
     }
 }
 

@@ -1,9 +1,9 @@
 //! The server and the client.
 
-use std::{net::SocketAddr, path::PathBuf, time::Duration};
+use std::{net::SocketAddr, path::PathBuf, sync::Arc, time::Duration};
 
 use serde_json::{Value, json};
-use tandem::{server::Server, settings::Settings};
+use tandem::{http::Server, settings::Settings};
 use ureq::{Agent, Body, SendBody, http};
 
 /// An answer of the server, refused or not.
@@ -58,7 +58,7 @@ impl TestServer {
             max_episodes: 2,
             max_body_bytes: 2_000_000,
         };
-        let server = Server::start(&settings).expect("a free port");
+        let server = Server::start(Arc::new(settings)).expect("a free port");
         let timeout = Some(Duration::from_secs(60));
         let agent =
             Agent::config_builder().http_status_as_error(false).timeout_global(timeout).build().new_agent();

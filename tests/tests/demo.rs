@@ -3,7 +3,7 @@
 use std::{fs, path::Path, thread};
 
 use serde_json::Value;
-use tandem::demo;
+use tandem::commands::demo;
 use tandem_tools_spec::ResultReply;
 
 fn play(runs: &Path) -> ResultReply {

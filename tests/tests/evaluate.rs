@@ -2,16 +2,17 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use tandem_episodes::evaluation::{Plan, Played, Policy, evaluate};
-use tandem_episodes::{LocomotionChoice, tasks};
+use tandem_episodes::evaluation::{Plan, Played, evaluate};
+use tandem_episodes::{Controller, RobotFile, players, tasks};
 use tandem_tools_spec::Protocol;
 
 fn plan(jobs: usize, seeds: Vec<u32>) -> Plan {
     let handover = tasks::find("handover").expect("a task");
     Plan {
-        policy: Policy::Expert,
+        player: players::find("expert").expect("a player"),
         protocol: Protocol::Benchmark,
-        locomotion: LocomotionChoice::Balance,
+        robot: RobotFile::default(),
+        locomotion: Controller::Balance,
         tasks: vec![handover],
         seeds,
         jobs,

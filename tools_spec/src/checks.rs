@@ -5,16 +5,16 @@
 const LARGEST: f64 = 1e6;
 
 /// Every number is finite and of sane size.
-pub fn finite(place: &str, numbers: &[f64]) -> Result<(), String> {
-    match numbers.iter().find(|number| number.is_nan() || number.abs() > LARGEST) {
+pub fn finite(place: &str, values: &[f64]) -> Result<(), String> {
+    match values.iter().find(|number| number.is_nan() || number.abs() > LARGEST) {
         Some(number) => Err(format!("{place} holds {number}; every number must be finite, from -1e6 to 1e6")),
         None => Ok(()),
     }
 }
 
 /// The same for a number that may be left out.
-pub fn finite_or_null(place: &str, number: Option<f64>) -> Result<(), String> {
-    finite(place, number.as_slice())
+pub fn finite_or_null(place: &str, value: Option<f64>) -> Result<(), String> {
+    finite(place, value.as_slice())
 }
 
 /// A quaternion that has a direction. Its length does not matter: it is normalised before use.

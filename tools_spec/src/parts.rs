@@ -16,6 +16,19 @@ pub enum Protocol {
     Benchmark,
 }
 
+impl Protocol {
+    /// Every protocol.
+    pub const ALL: [Protocol; 2] = [Protocol::Agentic, Protocol::Benchmark];
+
+    /// As requests and results write it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Protocol::Agentic => "agentic",
+            Protocol::Benchmark => "benchmark",
+        }
+    }
+}
+
 /// A pose in the frame that the field which holds it names.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Pose {

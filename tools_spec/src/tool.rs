@@ -14,8 +14,6 @@ pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
     const NAME: &'static str;
     /// Whether the call leaves the world exactly as it was and costs no steps.
     const READ_ONLY: bool;
-    /// Whether the call acts on an episode, so that specifications without a path carry `episode_id`.
-    const ON_EPISODE: bool = true;
 
     /// Arguments that work, shown to callers whose own did not.
     fn example() -> Self;
@@ -71,12 +69,16 @@ pub struct ToolSpec {
 }
 
 impl ToolSpec {
-    /// The specification of `T`.
-    pub fn of<T: Tool>() -> ToolSpec {
-        let (description, mut input_schema) = schema::strict_schema::<T>();
-        if T::ON_EPISODE {
-            schema::require_episode_id(&mut input_schema);
-        }
+    /// The specification of `T`, which acts on an episode; without a path to name it, the arguments carry `episode_id`.
+    pub fn on_episode<T: Tool>() -> ToolSpec {
+        let mut spec = ToolSpec::without_episode::<T>();
+        schema::require_episode_id(&mut spec.input_schema);
+        ToolSpec { on_episode: true, ..spec }
+    }
+
+    /// The specification of `T`, which needs no episode.
+    pub fn without_episode<T: Tool>() -> ToolSpec {
+        let (description, input_schema) = schema::strict_schema::<T>();
         ToolSpec {
             name: T::NAME,
             description,
@@ -84,7 +86,7 @@ impl ToolSpec {
             body_schema: schema::plain_schema::<T>(),
             reply_schema: schema::plain_schema::<T::Reply>(),
             read_only: T::READ_ONLY,
-            on_episode: T::ON_EPISODE,
+            on_episode: false,
         }
     }
 }

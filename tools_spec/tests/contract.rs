@@ -1,7 +1,7 @@
 //! The contract as its two readers meet it: strict hosts read the schemas, policies read the refusals.
 
 use serde_json::{Value, json};
-use tandem_tools_spec::{EPISODE_TOOLS, ToolCall, tool_specs};
+use tandem_tools_spec::{ActCall, EPISODE_TOOLS, ToolCall, tool_specs};
 
 const REFUSED_KEYWORDS: &[&str] =
     &["$ref", "$schema", "default", "format", "maxItems", "maximum", "minItems", "minimum", "title"];
@@ -75,7 +75,9 @@ fn calls_survive_the_wire() {
 #[test]
 fn nullable_fields_may_be_left_out() {
     let brief = json!({ "steps": 5, "robots": [{ "robot": "A", "left_position_m": [0.3, 0.2, 0.1] }] });
-    let ToolCall::MoveWrists(call) = ToolCall::parse("move_wrists", brief).unwrap() else { panic!() };
+    let ToolCall::Act(ActCall::MoveWrists(call)) = ToolCall::parse("move_wrists", brief).unwrap() else {
+        panic!()
+    };
     assert_eq!(call.robots[0].left_position_m, Some([0.3, 0.2, 0.1]));
     assert_eq!(call.robots[0].right_position_m, None);
     assert!(ToolCall::parse("observe", Value::Null).is_ok());
@@ -94,7 +96,6 @@ fn refused(name: &str, args: Value, says: &[&str]) {
 
 #[test]
 fn refusals_say_what_would_work() {
-    let wrist = |field: &str, value: Value| json!({ "steps": 5, "robots": [{ "robot": "A", field: value }] });
     let chunk = |rows: Value| json!({ "robots": [{ "robot": "A", "rows": rows }] });
     let row = |columns: usize| json!(vec![0.5; columns]);
     refused("grasp", json!({}), &["\"grasp\"", "observe", "move_wrists", "finish"]);
@@ -105,6 +106,28 @@ fn refusals_say_what_would_work() {
     refused("wait", json!({ "step": 25 }), &["unknown field `step`", "`steps`"]);
     refused("wait", json!({}), &["missing field `steps`"]);
     refused("wait", json!([]), &["wait: ", "{\"steps\":25}"]);
+    refused(
+        "send_joint_chunk",
+        chunk(json!([row(35), row(34)])),
+        &["row 1 holds 34", "35: left_arm 7, right_arm 7"],
+    );
+    refused("send_joint_chunk", chunk(json!([])), &["no rows", "at least 1"]);
+    refused(
+        "send_joint_chunk",
+        json!({ "robots": [{ "robot": "A", "rows": [row(35)] }, { "robot": "B", "rows": [row(35), row(35)] }] }),
+        &["same number of rows"],
+    );
+    refused("query_depth", json!({ "robot": "A", "pixels": [] }), &["pixels is empty", "[[160, 120]]"]);
+    refused(
+        "walk",
+        json!({ "steps": 5, "robots": [{ "robot": "A", "vx_m_s": 0.1 }] }),
+        &["missing field `vy_m_s`", "yaw_rate_rad_s"],
+    );
+}
+
+#[test]
+fn refusals_of_wrist_poses_name_the_robot_and_the_field() {
+    let wrist = |field: &str, value: Value| json!({ "steps": 5, "robots": [{ "robot": "A", field: value }] });
     refused(
         "move_wrists",
         wrist("left_quaternion_wxyz", json!([0, 0, 0, 0])),
@@ -137,35 +160,18 @@ fn refusals_say_what_would_work() {
         json!({ "robot": "A", "right_quaternion_wxyz": [0, 0, 0, 0] }),
         &["right_quaternion_wxyz", "norm 0"],
     );
-    refused(
-        "send_joint_chunk",
-        chunk(json!([row(35), row(34)])),
-        &["row 1 holds 34", "35: left_arm 7, right_arm 7"],
-    );
-    refused("send_joint_chunk", chunk(json!([])), &["no rows", "at least 1"]);
-    refused(
-        "send_joint_chunk",
-        json!({ "robots": [{ "robot": "A", "rows": [row(35)] }, { "robot": "B", "rows": [row(35), row(35)] }] }),
-        &["same number of rows"],
-    );
-    refused("query_depth", json!({ "robot": "A", "pixels": [] }), &["pixels is empty", "[[160, 120]]"]);
-    refused(
-        "walk",
-        json!({ "steps": 5, "robots": [{ "robot": "A", "vx_m_s": 0.1 }] }),
-        &["missing field `vy_m_s`", "yaw_rate_rad_s"],
-    );
 }
 
 #[test]
 fn numbers_that_json_cannot_hold_are_refused_too() {
     for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        let ToolCall::Walk(mut walk) =
+        let ToolCall::Act(ActCall::Walk(mut walk)) =
             ToolCall::parse("walk", json!({ "steps": 5, "robots": [{ "robot": "A", "vx_m_s": 0, "vy_m_s": 0, "yaw_rate_rad_s": 0 }] })).unwrap()
         else {
             panic!()
         };
         walk.robots[0].vy_m_s = number;
-        let text = ToolCall::Walk(walk).validate().unwrap_err().to_string();
+        let text = ToolCall::from(walk).validate().unwrap_err().to_string();
         assert!(text.contains("vy_m_s") && text.contains("finite"), "{text}");
     }
 }

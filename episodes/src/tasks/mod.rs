@@ -5,13 +5,16 @@
 mod co_pouring;
 mod frame_hang;
 mod handover;
-pub mod placement;
+mod placement;
 mod pouring;
 mod randomize;
 
 pub use randomize::{Offset, Start, uniform_xy};
 
-use crate::{EpisodeError, facts::Facts};
+use tandem_sim::{SimError, Step};
+
+use crate::EpisodeError;
+use crate::scoring::{Phase, Scores};
 
 /// Every task, in the benchmark's order.
 pub static ALL: &[Task] = &[handover::TASK, pouring::TASK, frame_hang::TASK, co_pouring::TASK];
@@ -60,26 +63,38 @@ pub const fn spot(name: &'static str, position_m: [f32; 3]) -> ObjectSpot {
     ObjectSpot { name, file: name, position_m, yaw_rad: 0.0 }
 }
 
-/// One scored phase.
-#[derive(Debug)]
-pub struct Phase {
-    pub id: &'static str,
-    /// When the phase counts as reached, for people and policies.
-    pub description: &'static str,
-    /// Whether more than one robot has to work on it.
-    pub collaborative: bool,
-    pub done: Done,
+impl Task {
+    /// Begins to score an episode of this task, with the state before the first control step.
+    pub fn scores(&self, start: &Step) -> Result<Scores, SimError> {
+        Scores::new(self.phases, self.objects.iter().map(|spot| (spot.name, spot.file)), start)
+    }
+
+    /// Names of the robots, in their order.
+    pub fn robot_names(&self) -> impl Iterator<Item = &'static str> {
+        self.robots.iter().map(|robot| robot.name)
+    }
 }
 
-/// When a phase is reached. Conditions see one control step at a time; what has to happen in sequence says so here.
-#[derive(Debug)]
-pub enum Done {
-    /// As soon as the condition holds.
-    When(fn(&Facts) -> bool),
-    /// When `then` holds after `first` held; a step at which `broken` holds in between asks for `first` again.
-    Sequence { first: fn(&Facts) -> bool, then: fn(&Facts) -> bool, broken: fn(&Facts) -> bool },
-    /// When `condition` has held without a break for `for_s`, and `at_end` holds then too.
-    Lasting { condition: fn(&Facts) -> bool, for_s: f64, at_end: fn(&Facts) -> bool },
+/// There is one task of each id.
+impl PartialEq for Task {
+    fn eq(&self, other: &Task) -> bool {
+        self.id == other.id
+    }
+}
+
+/// A task written as its id, for `#[serde(with)]`.
+pub mod by_id {
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    use super::Task;
+
+    pub fn serialize<S: Serializer>(task: &Task, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(task.id)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<&'static Task, D::Error> {
+        super::find(&String::deserialize(deserializer)?).map_err(D::Error::custom)
+    }
 }
 
 /// The task called `id`.

@@ -1,6 +1,6 @@
 //! What the tasks share about putting things down.
 
-use crate::facts::Facts;
+use crate::scoring::Facts;
 
 /// How long no hand may have touched an object before it counts as released.
 pub const RELEASE_S: f64 = 0.2;

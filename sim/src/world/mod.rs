@@ -47,9 +47,14 @@ pub struct World {
 }
 
 impl World {
-    /// Builds the world at rest; nothing has been stepped yet.
+    /// Builds the world at rest, of embedded robots; nothing has been stepped yet.
     pub fn new(spec: &WorldSpec) -> Result<World, SimError> {
-        let model = Arc::new(RobotModel::parse("robot.xml", assets::robot(assets::DEFAULT_ROBOT)?)?);
+        let model = RobotModel::parse("robot.xml", assets::robot(assets::DEFAULT_ROBOT)?)?;
+        World::with_robot(spec, Arc::new(model))
+    }
+
+    /// As [`World::new`], of robots of another file.
+    pub fn with_robot(spec: &WorldSpec, model: Arc<RobotModel>) -> Result<World, SimError> {
         let scene = Document::parse(&spec.scene, assets::scene(&spec.scene)?)?;
         let mut physics =
             PhysicsWorld { gravity: Vector::new(0.0, 0.0, -GRAVITY_M_S2), ..PhysicsWorld::new() };

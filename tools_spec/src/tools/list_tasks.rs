@@ -18,7 +18,6 @@ impl Tool for ListTasks {
     type Reply = TaskList;
     const NAME: &'static str = "list_tasks";
     const READ_ONLY: bool = true;
-    const ON_EPISODE: bool = false;
 
     fn example() -> Self {
         ListTasks {}

@@ -23,7 +23,6 @@ impl Tool for StartEpisode {
     type Reply = StartReply;
     const NAME: &'static str = "start_episode";
     const READ_ONLY: bool = false;
-    const ON_EPISODE: bool = false;
 
     fn example() -> Self {
         StartEpisode { task: "handover".into(), seed: 0, protocol: Some(Protocol::Agentic) }

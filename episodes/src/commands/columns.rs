@@ -1,0 +1,53 @@
+//! The action row: arms 14, hands 14, waist 3, base 4.
+
+use std::ops::Range;
+
+use tandem_sim::{
+    ARM_COLUMNS, ARM_JOINTS, BaseCommand, HAND_COLUMNS, HAND_JOINTS, RobotModel, Side, UPPER, UPPER_JOINTS,
+    WAIST_COLUMN,
+};
+
+/// Names of the last four columns, as every message with a base command has them.
+const BASE: [&str; 4] = ["vx_m_s", "vy_m_s", "yaw_rate_rad_s", "pelvis_height_m"];
+
+/// The columns of an arm.
+pub fn arm(side: Side) -> Range<usize> {
+    ARM_COLUMNS[side]..ARM_COLUMNS[side] + ARM_JOINTS
+}
+
+/// The columns of a hand.
+pub fn hand(side: Side) -> Range<usize> {
+    HAND_COLUMNS[side]..HAND_COLUMNS[side] + HAND_JOINTS
+}
+
+/// The joint columns of the waist.
+pub fn waist() -> Range<usize> {
+    WAIST_COLUMN..UPPER_JOINTS
+}
+
+/// Whether a column is a joint of a hand.
+pub fn is_hand(column: usize) -> bool {
+    Side::BOTH.into_iter().any(|side| hand(side).contains(&column))
+}
+
+/// Names of the columns.
+pub fn action_row(model: &RobotModel) -> Vec<String> {
+    let joints = UPPER.iter().map(|joint| model.joints[*joint].name.clone());
+    joints.chain(BASE.map(String::from)).collect()
+}
+
+/// The base command as the last four columns.
+pub fn base_row(base: &BaseCommand) -> [f32; 4] {
+    [base.vx_m_s, base.vy_m_s, base.yaw_rate_rad_s, base.pelvis_height_m]
+}
+
+/// The base command that a row's last four columns ask for.
+pub fn base_command([vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m]: [f32; 4]) -> BaseCommand {
+    BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m }
+}
+
+/// Fields of the base command that differ between what was asked and what is done.
+pub fn clamped_fields(asked: &BaseCommand, done: &BaseCommand) -> impl Iterator<Item = &'static str> {
+    let pairs = base_row(asked).into_iter().zip(base_row(done));
+    BASE.into_iter().zip(pairs).filter(|(_, (asked, done))| asked != done).map(|(name, _)| name)
+}

@@ -1,0 +1,111 @@
+//! The robot above its hips for inverse kinematics: what is free, what may not collide, and what is asked of it besides wrists.
+
+use nalgebra::{Isometry3, Point3};
+use tandem_ik::{
+    Capsule, DampingTask, FrameId, FrameTask, IkError, JointCouplingTask, Limits, Model, PostureTask,
+    SelfCollision, Solver, Task, Tolerance,
+};
+use tandem_sim::{CONTROL_HZ, RobotCommand, Side, Sides, UPPER, UPPER_JOINTS, joint_names};
+
+use super::columns;
+
+/// Unitree's limits are 22 to 37 rad/s; arms that work next to people and partners move slower.
+const ARM_SPEED_RAD_S: f64 = 4.0;
+const WAIST_SPEED_RAD_S: f64 = 1.0;
+const ORIENTATION_COST: f64 = 0.5;
+/// Elbows stay near where they rest, without pulling a wrist off its target.
+const POSTURE_COST: f64 = 0.02;
+/// The trunk bends only when the arms do not suffice: bending moves the centre of mass.
+const WAIST_COST: f64 = 0.15;
+const DAMPING_COST: f64 = 2e-4;
+pub const REACH_TOLERANCE: Tolerance = Tolerance { position_m: 0.005, orientation_rad: 0.05 };
+
+/// Shared by all robots of an episode.
+pub struct UpperBody {
+    pub model: Model,
+    pub wrists: Sides<FrameId>,
+    /// Position in an action row of each joint of the model.
+    pub columns: Vec<usize>,
+    self_collision: SelfCollision,
+    rest_rad: Vec<f64>,
+}
+
+impl UpperBody {
+    /// Reads the robot's MJCF; `rest` is the command that it stands under.
+    pub fn new(robot_mjcf: &str, rest: &RobotCommand) -> Result<UpperBody, IkError> {
+        let names = joint_names();
+        let model = upper_body(&Model::from_mjcf(robot_mjcf)?)?;
+        let column_of = |name: &str| (0..UPPER_JOINTS).find(|column| names[UPPER[*column]] == name);
+        let columns: Vec<usize> = model.joints().iter().filter_map(|joint| column_of(&joint.name)).collect();
+        let rest_rad = columns.iter().map(|column| rest.upper_rad[*column].into()).collect();
+        Ok(UpperBody {
+            wrists: Sides { left: model.frame("left_wrist")?, right: model.frame("right_wrist")? },
+            self_collision: self_collision(&model)?,
+            model,
+            columns,
+            rest_rad,
+        })
+    }
+
+    /// Wrists at `targets`, of whose error one step is to remove the part `gain`, and as little else as that takes.
+    pub fn tasks(&self, targets: &Sides<Isometry3<f64>>, gain: f64) -> Vec<Task> {
+        let mut tasks: Vec<Task> = Vec::with_capacity(7);
+        for side in Side::BOTH {
+            let wrist = FrameTask::new(self.wrists[side], targets[side]);
+            tasks.push(Task::Frame(FrameTask { orientation_cost: ORIENTATION_COST, gain, ..wrist }));
+        }
+        tasks.push(Task::Posture(PostureTask {
+            target: self.rest_rad.clone(),
+            cost: POSTURE_COST,
+            gain: 0.1,
+        }));
+        for (joint, model) in self.model.joints().iter().enumerate() {
+            if is_waist(&model.name) {
+                let ratios = vec![(joint, 1.0)];
+                let upright = JointCouplingTask { ratios, offset: 0.0, cost: WAIST_COST, gain: 0.1 };
+                tasks.push(Task::JointCoupling(upright));
+            }
+        }
+        tasks.push(Task::Damping(DampingTask { cost: DAMPING_COST }));
+        tasks
+    }
+
+    pub fn solver(&self) -> Solver {
+        let mut solver = Solver::new(&self.model, 1.0 / CONTROL_HZ);
+        let speed = |name: &str| if is_waist(name) { WAIST_SPEED_RAD_S } else { ARM_SPEED_RAD_S };
+        let velocity = self.model.joints().iter().map(|joint| speed(&joint.name)).collect();
+        solver.limits = Limits { velocity, ..Limits::of(&self.model) };
+        solver.self_collision = Some(self.self_collision.clone());
+        solver
+    }
+}
+
+fn is_waist(joint: &str) -> bool {
+    joint.starts_with("waist")
+}
+
+/// The robot with arms and waist free; legs and hands are locked straight.
+pub fn upper_body(whole: &Model) -> Result<Model, IkError> {
+    let names = joint_names();
+    let columns = (0..UPPER_JOINTS).filter(|column| !columns::is_hand(*column));
+    let free: Vec<&str> = columns.map(|column| names[UPPER[column]].as_str()).collect();
+    whole.reduced(&free, &vec![0.0; whole.nv()])
+}
+
+/// Trunk, head, forearms and hands as capsules, a little inside the collision shapes of the robot's file.
+fn self_collision(model: &Model) -> Result<SelfCollision, IkError> {
+    let capsule = |frame: &str, a: [f64; 3], b: [f64; 3], radius_m: f64| -> Result<Capsule, IkError> {
+        Ok(Capsule { frame: model.frame(frame)?, ends: [Point3::from(a), Point3::from(b)], radius_m })
+    };
+    let mut capsules = vec![
+        capsule("torso_link", [0.0, 0.0, 0.08], [0.0, 0.0, 0.25], 0.10)?,
+        capsule("torso_link", [0.0, 0.0, 0.43], [0.0, 0.0, 0.43], 0.10)?,
+    ];
+    for side in Side::BOTH {
+        let link = |part: &str| format!("{}_{part}_link", side.name());
+        capsules.push(capsule(&link("elbow"), [0.0; 3], [0.10, 0.0, -0.01], 0.035)?);
+        capsules.push(capsule(&link("wrist_yaw"), [0.0; 3], [0.15, 0.0, 0.0], 0.045)?);
+    }
+    let pairs = vec![[0, 2], [0, 3], [1, 3], [0, 4], [0, 5], [1, 5], [3, 5], [2, 5], [3, 4], [2, 4]];
+    Ok(SelfCollision { capsules, pairs, margin_m: 0.005, range_m: 0.08, gain: 0.3 })
+}

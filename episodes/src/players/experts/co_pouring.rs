@@ -1,0 +1,58 @@
+//! CoPouring: both robots lay a hand on the bar at their end, lift, and turn the tub about the bars over the crate.
+
+use std::f32::consts::{FRAC_PI_2, PI};
+
+use tandem_sim::{Pose, Rotation, Side, Vector};
+
+use super::skills::{BarGrasp, Stage, move_together, take_together};
+use crate::players::PlayerError;
+use crate::scoring::{A, B};
+
+/// Where a 36 mm bar lies in a hand whose palm is on it.
+const BAR_IN_WRIST_M: Vector = Vector::new(0.105, 0.042, 0.0);
+/// Closed a little further than round a bottle.
+const CLOSURE: f32 = 1.15;
+
+const LIFT_M: f32 = 0.12;
+/// While it tips, the tub moves sideways until its lip is over the crate.
+const OVER_CRATE_M: f32 = 0.18;
+const TIP_RAD: f32 = 1.25;
+
+pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
+    let palm_down = |heading_rad: f32, roll_rad: f32| {
+        Rotation::from_rotation_z(heading_rad) * Rotation::from_rotation_x(roll_rad)
+    };
+    let grasp = |robot, side, bar, object_from_wrist| BarGrasp {
+        robot,
+        side,
+        object: "tub",
+        bar,
+        bar_in_wrist_m: BAR_IN_WRIST_M,
+        object_from_wrist,
+        closure: CLOSURE,
+    };
+    let grasps = [
+        grasp(A, Side::Left, "bar_a", palm_down(0.0, FRAC_PI_2)),
+        grasp(B, Side::Right, "bar_b", palm_down(PI, -FRAC_PI_2)),
+    ];
+    take_together(stage, &grasps)?;
+    let facts = stage.facts()?;
+    let start = facts.object("tub").pose_in_world;
+    // The bars are the axis: hands turn, and move little.
+    let bars = Vector::new(0.0, 0.0, facts.site("tub", "bar_a").position_m().z);
+    let tub_at = |lift_m: f32, sideways_m: f32, tip_rad: f32| {
+        let rotation = Rotation::from_rotation_x(-tip_rad) * start.rotation;
+        let axis_m = start.translation + bars + Vector::new(0.0, sideways_m, lift_m);
+        Pose::from_parts(axis_m - rotation * bars, rotation)
+    };
+    move_together(stage, &grasps, &|part| tub_at(LIFT_M * part, 0.0, 0.0), 5, 0.3)?;
+    move_together(stage, &grasps, &|part| tub_at(LIFT_M, OVER_CRATE_M * part, 0.5 * part), 6, 0.3)?;
+    move_together(
+        stage,
+        &grasps,
+        &|part| tub_at(LIFT_M, OVER_CRATE_M, 0.5 + (TIP_RAD - 0.5) * part),
+        8,
+        0.3,
+    )?;
+    move_together(stage, &grasps, &|_| tub_at(LIFT_M, OVER_CRATE_M, TIP_RAD), 8, 0.4)
+}

@@ -1,0 +1,72 @@
+//! FrameHang: each robot takes one side of the frame, both lift it before the peg, push the loop over it and lower.
+
+use std::f32::consts::FRAC_PI_2;
+
+use tandem_sim::{Pose, Rotation, Side, Vector};
+
+use super::skills::{BarGrasp, HandMove, Stage, move_together, take_together};
+use crate::players::PlayerError;
+use crate::scoring::{A, B};
+
+/// Where the moulding, 50 x 40 mm, lies in a hand whose palm is on its outside.
+const MOULDING_IN_WRIST_M: Vector = Vector::new(0.112, 0.045, 0.0);
+const CLOSURE: f32 = 1.1;
+
+/// Before the tip, past the tip, and resting on the peg: the loop's middle relative to the tip.
+const BEFORE_M: Vector = Vector::new(0.0, -0.045, 0.004);
+const PAST_M: Vector = Vector::new(0.0, 0.040, 0.002);
+const RESTING_M: Vector = Vector::new(0.0, 0.045, -0.034);
+/// Fingers open as far as the wall behind the frame lets them, then the hands go outwards and back.
+const LOOSE: f32 = 0.35;
+const OUTWARDS_M: f32 = 0.13;
+const BACK_M: f32 = 0.14;
+
+pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
+    let grasp = |robot, side, bar| BarGrasp {
+        robot,
+        side,
+        object: "frame",
+        bar,
+        bar_in_wrist_m: MOULDING_IN_WRIST_M,
+        object_from_wrist: Rotation::from_rotation_z(FRAC_PI_2),
+        closure: CLOSURE,
+    };
+    let grasps = [grasp(A, Side::Left, "left_side"), grasp(B, Side::Right, "right_side")];
+    take_together(stage, &grasps)?;
+    let facts = stage.facts()?;
+    let start = facts.object("frame").pose_in_world;
+    let tip_m = facts.site_m("wall_peg", "tip");
+    let upright = |loop_m: Vector| Pose::from_translation(loop_m - facts.site("frame", "loop").position_m());
+    let before = upright(tip_m + BEFORE_M);
+    let raised_m = Vector::new(start.translation.x, start.translation.y, before.translation.z);
+    let raised = Pose::from_translation(raised_m);
+    let legs = [(start, raised, 8), (raised, before, 5), (before, upright(tip_m + PAST_M), 6)];
+    for (from, to, count) in legs {
+        move_together(stage, &grasps, &|part| from.lerp(&to, part), count, 0.3)?;
+    }
+    let (from, to) = (upright(tip_m + PAST_M), upright(tip_m + RESTING_M));
+    move_together(stage, &grasps, &|part| from.lerp(&to, part), 4, 0.3)?;
+    let_go(stage, &grasps)
+}
+
+fn let_go(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
+    let loose = |grasp: &BarGrasp| BarGrasp { closure: LOOSE, ..*grasp }.close();
+    let loosen: Vec<HandMove> = grasps.iter().map(loose).collect();
+    stage.perform(0.5, &loosen)?;
+    for step_m in [Vector::new(OUTWARDS_M, 0.0, 0.0), Vector::new(0.0, -BACK_M, 0.0)] {
+        let mut moves = Vec::with_capacity(grasps.len());
+        for grasp in grasps {
+            let wrist = stage.world_from_wrist(grasp.robot, grasp.side)?;
+            let outwards = -grasp.side.sign();
+            let by_m = Vector::new(step_m.x * outwards, step_m.y, step_m.z);
+            moves.push(HandMove::reach(
+                grasp.robot,
+                grasp.side,
+                Pose::from_parts(wrist.translation + by_m, wrist.rotation),
+            ));
+        }
+        stage.perform(0.9, &moves)?;
+    }
+    // It still swings a little.
+    stage.perform(3.0, &grasps.iter().map(BarGrasp::open).collect::<Vec<_>>())
+}

@@ -1,0 +1,51 @@
+//! Experts: scripts that solve the tasks, as proof that scene, physics, phases and tools fit together.
+//!
+//! An expert sees the [`crate::Facts`], which no policy does; that is its only privilege. It acts through the same tool
+//! calls as everybody, and each call is charged to the episode's budget.
+//!
+//! To add an expert: one file here, named as its task, and its line in `ALL`; what several use is in `skills`.
+
+mod co_pouring;
+mod frame_hang;
+mod handover;
+mod pouring;
+mod skills;
+
+use super::{Backstage, Insider, PlayerError};
+use crate::tasks::Task;
+use skills::Stage;
+
+/// Performs a task to its end.
+type Script = fn(&mut Stage) -> Result<(), PlayerError>;
+
+const ALL: &[(&str, Script)] = &[
+    ("handover", handover::perform),
+    ("pouring", pouring::perform),
+    ("frame_hang", frame_hang::perform),
+    ("co_pouring", co_pouring::perform),
+];
+
+/// The script of one task.
+pub struct Expert {
+    task: &'static Task,
+    script: Script,
+}
+
+impl Expert {
+    /// The expert of `task`.
+    pub fn of(task: &'static Task) -> Result<Expert, PlayerError> {
+        match ALL.iter().find(|(id, _)| *id == task.id) {
+            Some((_, script)) => Ok(Expert { task, script: *script }),
+            None => Err(PlayerError::NoExpert {
+                task: task.id.into(),
+                have: ALL.iter().map(|(id, _)| *id).collect(),
+            }),
+        }
+    }
+}
+
+impl Insider for Expert {
+    fn play(&mut self, episode: &mut dyn Backstage) -> Result<(), PlayerError> {
+        (self.script)(&mut Stage::new(self.task, episode)?)
+    }
+}

@@ -1,0 +1,64 @@
+//! Pouring: both lift their vessels, A turns the cup about its lip above the mouth of B's glass.
+
+use std::f32::consts::PI;
+
+use tandem_sim::{Pose, Rotation, Side, Vector};
+
+use super::skills::{CylinderGrasp, HandMove, Stage, pick_up_all};
+use crate::players::PlayerError;
+use crate::scoring::{A, B};
+
+/// Both vessels are held by their lower part; a hand is 9 cm wide and stays clear of the table.
+const CUP: CylinderGrasp =
+    CylinderGrasp { robot: A, side: Side::Right, object: "cup", grip: "grip", heading_rad: 0.0 };
+const GLASS: CylinderGrasp =
+    CylinderGrasp { robot: B, side: Side::Right, object: "glass", grip: "grip", heading_rad: PI };
+
+/// Where B holds the glass: between the robots, just above the table.
+const GLASS_PLACE_M: Vector = Vector::new(0.40, 0.0, 0.86);
+/// Lip above mouth while pouring, and how much further off the cup is when it begins to tip.
+const ABOVE_MOUTH_M: Vector = Vector::new(0.0, 0.0, 0.03);
+const BEFORE_TIPPING_M: Vector = Vector::new(0.0, -0.04, 0.10);
+const TIP_RAD: f32 = 2.0;
+/// The tip is played in this many straight moves.
+const TIP_MOVES: u32 = 8;
+const TIP_MOVE_S: f32 = 0.3;
+
+pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
+    pick_up_all(stage, &[CUP, GLASS])?;
+    let raise = |stage: &mut Stage, grasp: &CylinderGrasp, by_m: f32| {
+        let from_m = stage.facts()?.position_m(grasp.object);
+        grasp.carry(stage, from_m + Vector::new(0.0, 0.0, by_m))
+    };
+    let lifts = [raise(stage, &CUP, 0.12)?, raise(stage, &GLASS, 0.06)?];
+    stage.perform(1.0, &lifts)?;
+    let glass = GLASS.carry(stage, GLASS_PLACE_M)?;
+    let cup = cup_at(stage, GLASS_PLACE_M, 0.0)?;
+    stage.perform(1.5, &[cup, glass])?;
+    pour(stage)?;
+    for _ in 0..4 {
+        stage.perform(0.5, &[GLASS.close()])?;
+    }
+    Ok(())
+}
+
+fn pour(stage: &mut Stage) -> Result<(), PlayerError> {
+    for part in 1..=TIP_MOVES {
+        let glass_m = stage.facts()?.position_m("glass");
+        let tip = cup_at(stage, glass_m, TIP_RAD * part as f32 / TIP_MOVES as f32)?;
+        stage.glide(TIP_MOVE_S, &[tip])?;
+    }
+    Ok(())
+}
+
+/// Wrist motion that puts the cup, tipped by `tilt_rad`, with its lip above the mouth of an upright glass at `glass_m`. The
+/// cup is tipped to +y, away from the palm.
+fn cup_at(stage: &mut Stage, glass_m: Vector, tilt_rad: f32) -> Result<HandMove, PlayerError> {
+    let facts = stage.facts()?;
+    let [mouth_m, lip_m] =
+        [("glass", "mouth"), ("cup", "lip")].map(|(object, site)| facts.site(object, site).position_m());
+    let rotation = Rotation::from_rotation_x(-tilt_rad);
+    let to_go = 1.0 - tilt_rad / TIP_RAD;
+    let goal_m = glass_m + mouth_m + ABOVE_MOUTH_M + BEFORE_TIPPING_M * to_go;
+    CUP.bring(stage, Pose::from_parts(goal_m - rotation * lip_m, rotation))
+}

@@ -1,0 +1,129 @@
+//! Grasps of upright cylinders, and moving what a hand holds.
+
+use tandem_sim::{Pose, Rotation, Side, Vector};
+
+use super::hand::{away, closed_rad, mirrored_m, open_rad};
+use super::stage::{HandMove, Stage};
+use crate::players::PlayerError;
+
+/// Where the axis of a held cylinder lies in a right wrist's frame: in front of the palm, between fingers and thumb.
+const AXIS_IN_WRIST_M: Vector = Vector::new(0.1195, 0.055, 0.0);
+/// From here a hand comes at a cylinder, palm first.
+const STANDOFF_M: f32 = 0.08;
+
+/// A hand that is to hold an upright cylinder.
+#[derive(Clone, Copy)]
+pub struct CylinderGrasp<'a> {
+    pub robot: usize,
+    pub side: Side,
+    pub object: &'a str,
+    /// Site on the object's axis where the middle of the palm goes.
+    pub grip: &'a str,
+    /// Heading of the hand in the world: the direction its fingers point in.
+    pub heading_rad: f32,
+}
+
+impl CylinderGrasp<'_> {
+    /// Wrist motion that has the object in its grip, were the object upright and raised by `raise_m`; `standoff_m` short
+    /// of it.
+    fn grip(&self, stage: &mut Stage, raise_m: f32, standoff_m: f32) -> Result<HandMove, PlayerError> {
+        let facts = stage.facts()?;
+        let height_m = facts.site(self.object, self.grip).position_m().z;
+        let axis_m = facts.position_m(self.object) + Vector::new(0.0, 0.0, raise_m);
+        let rotation = Rotation::from_rotation_z(self.heading_rad);
+        let axis = mirrored_m(AXIS_IN_WRIST_M + Vector::new(0.0, standoff_m, 0.0), self.side);
+        let origin_m = axis_m + Vector::new(0.0, 0.0, height_m) - rotation * axis;
+        Ok(self.reach(Pose::from_parts(origin_m, rotation)))
+    }
+
+    fn reach(&self, world_from_wrist: Pose) -> HandMove {
+        HandMove::reach(self.robot, self.side, world_from_wrist)
+    }
+
+    /// Open hand beside the object, `raise_m` above its grip; others may move at the same time.
+    pub fn beside(&self, stage: &mut Stage, raise_m: f32) -> Result<HandMove, PlayerError> {
+        Ok(self.grip(stage, raise_m, STANDOFF_M)?.shaped(open_rad(self.side)))
+    }
+
+    /// Palm at the object.
+    pub fn around(&self, stage: &mut Stage) -> Result<HandMove, PlayerError> {
+        self.grip(stage, 0.0, 0.0)
+    }
+
+    pub fn close(&self) -> HandMove {
+        HandMove::shape(self.robot, self.side, closed_rad(self.side))
+    }
+
+    pub fn open(&self) -> HandMove {
+        HandMove::shape(self.robot, self.side, open_rad(self.side))
+    }
+
+    /// Away from the object, the way it came.
+    pub fn away(&self, stage: &mut Stage) -> Result<HandMove, PlayerError> {
+        let wrist = stage.world_from_wrist(self.robot, self.side)?;
+        let back = wrist.rotation * Vector::new(0.0, -STANDOFF_M * away(self.side), 0.0);
+        Ok(self.reach(Pose::from_parts(wrist.translation + back, wrist.rotation)))
+    }
+
+    /// Wrist motion that brings the held object's origin to `object_m` (world), upright.
+    pub fn carry(&self, stage: &mut Stage, object_m: Vector) -> Result<HandMove, PlayerError> {
+        self.bring(stage, Pose::from_translation(object_m))
+    }
+
+    /// Wrist motion that brings the held object to a pose (world); its turn about its own axis does not matter.
+    pub fn bring(&self, stage: &mut Stage, world_from_object: Pose) -> Result<HandMove, PlayerError> {
+        let object = stage.facts()?.object(self.object).pose_in_world;
+        let wrist = stage.world_from_wrist(self.robot, self.side)?;
+        // How the object is turned about its axis relative to the hand stays as it was grasped.
+        let upright = self.upright_rotation(object, wrist);
+        let goal = Pose::from_parts(world_from_object.translation, world_from_object.rotation * upright);
+        Ok(self.reach(goal * object.inverse() * wrist))
+    }
+
+    /// The rotation that the held object has when its axis stands upright and the hand points along its heading.
+    fn upright_rotation(&self, object: Pose, wrist: Pose) -> Rotation {
+        let held = wrist.rotation.inverse() * object.rotation;
+        let level = Rotation::from_rotation_z(self.heading_rad) * held;
+        Rotation::from_rotation_arc(level * Vector::Z, Vector::Z) * level
+    }
+
+    pub fn holds(&self, stage: &mut Stage) -> Result<bool, PlayerError> {
+        Ok(stage.facts()?.holds(self.robot, self.side, self.object))
+    }
+}
+
+const ATTEMPTS: usize = 4;
+
+/// Takes several objects at once, each with its hand; hands that miss try again.
+pub fn pick_up_all(stage: &mut Stage, grasps: &[CylinderGrasp]) -> Result<(), PlayerError> {
+    for _ in 0..ATTEMPTS {
+        let mut missing = Vec::new();
+        for grasp in grasps {
+            if !grasp.holds(stage)? {
+                missing.push(*grasp);
+            }
+        }
+        if missing.is_empty() {
+            return Ok(());
+        }
+        grasp_once(stage, &missing)?;
+    }
+    let names: Vec<&str> = grasps.iter().map(|grasp| grasp.object).collect();
+    Err(PlayerError::GaveUp(format!("could not grasp {}", names.join(" and "))))
+}
+
+/// One attempt: over the objects, down beside them, around them, close.
+fn grasp_once(stage: &mut Stage, grasps: &[CylinderGrasp]) -> Result<(), PlayerError> {
+    let each = |stage: &mut Stage, part: fn(&CylinderGrasp, &mut Stage) -> Result<HandMove, PlayerError>| {
+        grasps.iter().map(|grasp| part(grasp, stage)).collect::<Result<Vec<_>, _>>()
+    };
+    let above = each(stage, |grasp, stage| grasp.beside(stage, 0.06))?;
+    stage.perform(0.8, &above)?;
+    let beside = each(stage, |grasp, stage| grasp.beside(stage, 0.0))?;
+    stage.perform(0.6, &beside)?;
+    let around = each(stage, |grasp, stage| grasp.around(stage))?;
+    stage.perform(0.8, &around)?;
+    let close: Vec<HandMove> = grasps.iter().map(CylinderGrasp::close).collect();
+    stage.perform(0.8, &close)?;
+    stage.perform(0.2, &close)
+}

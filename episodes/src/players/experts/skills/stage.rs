@@ -1,0 +1,161 @@
+//! What every expert builds on: hands that move along straight lines in the world, several at once.
+
+use tandem_sim::{CONTROL_DT_S, Pose, Side, Sides};
+use tandem_tools_spec::{MoveWrists, StopReason, Tool as _, ToolReply, WristMove};
+
+use crate::players::{Backstage, PlayerError};
+use crate::scoring::Facts;
+use crate::tasks::Task;
+
+/// Control steps of one command: short enough to correct for a swaying pelvis.
+const STEPS_PER_COMMAND: u32 = 10;
+
+/// Part of one hand in a motion. What is not said stays as it is.
+#[derive(Clone, Copy, Debug)]
+pub struct HandMove {
+    pub robot: usize,
+    pub side: Side,
+    /// Wrist pose in the world to arrive at.
+    pub world_from_wrist: Option<Pose>,
+    /// Finger angles to arrive at, rad, in the order of `move_wrists`.
+    pub fingers_rad: Option<[f32; 7]>,
+}
+
+impl HandMove {
+    pub fn reach(robot: usize, side: Side, world_from_wrist: Pose) -> HandMove {
+        HandMove { robot, side, world_from_wrist: Some(world_from_wrist), fingers_rad: None }
+    }
+
+    pub fn shape(robot: usize, side: Side, fingers_rad: [f32; 7]) -> HandMove {
+        HandMove { robot, side, world_from_wrist: None, fingers_rad: Some(fingers_rad) }
+    }
+
+    pub fn shaped(self, fingers_rad: [f32; 7]) -> HandMove {
+        HandMove { fingers_rad: Some(fingers_rad), ..self }
+    }
+}
+
+/// Where a hand was last told to be.
+#[derive(Clone, Copy)]
+struct HandGoal {
+    world_from_wrist: Pose,
+    fingers_rad: [f32; 7],
+}
+
+/// An episode and what its hands were last told.
+pub struct Stage<'a> {
+    task: &'static Task,
+    episode: &'a mut dyn Backstage,
+    /// By robot.
+    goals: Vec<Sides<HandGoal>>,
+}
+
+impl<'a> Stage<'a> {
+    pub fn new(task: &'static Task, episode: &'a mut dyn Backstage) -> Result<Stage<'a>, PlayerError> {
+        let facts = episode.facts()?;
+        let goals = (0..facts.robots.len())
+            .map(|robot| {
+                Sides::from_fn(|side| HandGoal {
+                    world_from_wrist: world_from_wrist(&facts, robot, side),
+                    fingers_rad: [0.0; 7],
+                })
+            })
+            .collect();
+        Ok(Stage { task, episode, goals })
+    }
+
+    pub fn facts(&mut self) -> Result<Facts, PlayerError> {
+        self.episode.facts()
+    }
+
+    /// Moves hands along straight lines for `duration_s`, starting and arriving at rest; robots not named hold still.
+    pub fn perform(&mut self, duration_s: f32, moves: &[HandMove]) -> Result<(), PlayerError> {
+        self.travel(duration_s, moves, smooth)
+    }
+
+    /// As [`Stage::perform`], at constant speed: one leg of a longer path.
+    pub fn glide(&mut self, duration_s: f32, moves: &[HandMove]) -> Result<(), PlayerError> {
+        self.travel(duration_s, moves, |part| part)
+    }
+
+    fn travel(
+        &mut self,
+        duration_s: f32,
+        moves: &[HandMove],
+        pace: fn(f32) -> f32,
+    ) -> Result<(), PlayerError> {
+        let from = self.goals.clone();
+        let total = (duration_s / CONTROL_DT_S).round().max(1.0) as u32;
+        let mut done = 0;
+        while done < total {
+            let steps = STEPS_PER_COMMAND.min(total - done);
+            let part = pace((done + steps) as f32 / total as f32);
+            for hand in moves {
+                let start = from[hand.robot][hand.side];
+                let goal = &mut self.goals[hand.robot][hand.side];
+                if let Some(end) = hand.world_from_wrist {
+                    goal.world_from_wrist = start.world_from_wrist.lerp(&end, part);
+                }
+                if let Some(end_rad) = hand.fingers_rad {
+                    let between =
+                        |i: usize| start.fingers_rad[i] + (end_rad[i] - start.fingers_rad[i]) * part;
+                    goal.fingers_rad = std::array::from_fn(between);
+                }
+            }
+            self.command(steps, moves)?;
+            done += steps;
+        }
+        Ok(())
+    }
+
+    /// One `move_wrists` with the present goals of all robots that `moves` name.
+    fn command(&mut self, steps: u32, moves: &[HandMove]) -> Result<(), PlayerError> {
+        let facts = self.episode.facts()?;
+        let named = (0..self.goals.len()).filter(|robot| moves.iter().any(|hand| hand.robot == *robot));
+        let robots = named.map(|robot| self.wrist_move(&facts, robot)).collect();
+        match self.episode.call(MoveWrists { steps, robots }.into())? {
+            ToolReply::Act(reply) if reply.stop_reason == StopReason::StepsDone => Ok(()),
+            ToolReply::Act(_) => Err(PlayerError::EpisodeOver),
+            other @ (ToolReply::Look(_) | ToolReply::Manage(_)) => Err(PlayerError::Call {
+                tool: MoveWrists::NAME,
+                reason: format!("unexpected reply {other:?}"),
+            }),
+        }
+    }
+
+    fn wrist_move(&self, facts: &Facts, robot: usize) -> WristMove {
+        let pelvis_from_world = facts.robots[robot].pelvis_in_world.inverse();
+        let goal = |side: Side| self.goals[robot][side];
+        let pose = |side: Side| pelvis_from_world * goal(side).world_from_wrist;
+        let position = |side: Side| Some(pose(side).translation.to_array().map(f64::from));
+        let quaternion = |side: Side| {
+            let q = pose(side).rotation;
+            Some([q.w, q.x, q.y, q.z].map(f64::from))
+        };
+        let fingers = |side: Side| Some(goal(side).fingers_rad.map(f64::from));
+        WristMove {
+            left_position_m: position(Side::Left),
+            left_quaternion_wxyz: quaternion(Side::Left),
+            right_position_m: position(Side::Right),
+            right_quaternion_wxyz: quaternion(Side::Right),
+            left_fingers_rad: fingers(Side::Left),
+            right_fingers_rad: fingers(Side::Right),
+            ..WristMove::hold(self.task.robots[robot].name)
+        }
+    }
+
+    /// Where the wrist of a hand is now, world frame.
+    pub fn world_from_wrist(&mut self, robot: usize, side: Side) -> Result<Pose, PlayerError> {
+        Ok(world_from_wrist(&self.facts()?, robot, side))
+    }
+}
+
+fn world_from_wrist(facts: &Facts, robot: usize, side: Side) -> Pose {
+    let robot = &facts.robots[robot];
+    robot.pelvis_in_world * robot.wrist_in_pelvis[side]
+}
+
+/// Zero speed at both ends.
+fn smooth(part: f32) -> f32 {
+    part * part * (3.0 - 2.0 * part)
+}

@@ -1,0 +1,29 @@
+//! Nobody: robots hold still. What a task lets this player reach is no achievement.
+
+use tandem_tools_spec::Wait;
+
+use super::{Caller, Player, PlayerError};
+use crate::tasks::Task;
+
+/// As many as the agentic protocol allows.
+const STEPS_PER_COMMAND: u32 = 25;
+
+/// Waits for as long as the benchmark protocol lasts.
+pub struct Idle {
+    commands: u32,
+}
+
+impl Idle {
+    pub fn new(task: &Task) -> Idle {
+        Idle { commands: task.benchmark_steps.div_ceil(STEPS_PER_COMMAND) }
+    }
+}
+
+impl Player for Idle {
+    fn play(&mut self, episode: &mut dyn Caller) -> Result<(), PlayerError> {
+        for _ in 0..self.commands {
+            episode.call(Wait { steps: STEPS_PER_COMMAND }.into())?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,125 @@
+//! Who acts in an episode. A player makes tool calls; those that solve a task by looking behind the curtain say so in
+//! their type, and nobody else can be handed what is there.
+//!
+//! To add a player: one file or folder here and its line in [`ALL`].
+
+pub mod experts;
+mod idle;
+mod in_process;
+
+use tandem_tools_spec::{ToolCall, ToolReply};
+
+use crate::scoring::Facts;
+use crate::spec::EpisodeSpec;
+
+pub use in_process::InProcess;
+
+/// Makes tool calls on one episode, which is in this process or behind HTTP.
+pub trait Caller {
+    fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError>;
+}
+
+/// A caller who also sees what no policy does.
+pub trait Backstage: Caller {
+    fn facts(&mut self) -> Result<Facts, PlayerError>;
+}
+
+/// Plays one episode to its end by tool calls alone; made anew for each episode.
+pub trait Player {
+    fn play(&mut self, episode: &mut dyn Caller) -> Result<(), PlayerError>;
+}
+
+/// Plays one episode to its end with a look at the facts; made anew for each episode.
+pub trait Insider {
+    fn play(&mut self, episode: &mut dyn Backstage) -> Result<(), PlayerError>;
+}
+
+/// Why a player stopped before the episode's end.
+#[derive(Debug, thiserror::Error)]
+pub enum PlayerError {
+    #[error("no player {name:?}; have: {}", .have.join(", "))]
+    UnknownPlayer { name: String, have: Vec<&'static str> },
+    #[error("no expert for task {task:?}; have: {}", .have.join(", "))]
+    NoExpert { task: String, have: Vec<&'static str> },
+    #[error("the episode has ended")]
+    EpisodeOver,
+    #[error("{tool} failed: {reason}")]
+    Call { tool: &'static str, reason: String },
+    #[error("{0}")]
+    GaveUp(String),
+}
+
+/// A player by name.
+#[derive(Debug)]
+pub struct Entry {
+    pub name: &'static str,
+    pub about: &'static str,
+    make: Make,
+}
+
+/// How a player is made for an episode.
+#[derive(Debug)]
+enum Make {
+    Player(fn(&EpisodeSpec) -> Result<Box<dyn Player>, PlayerError>),
+    Insider(fn(&EpisodeSpec) -> Result<Box<dyn Insider>, PlayerError>),
+}
+
+/// Every player.
+pub static ALL: &[Entry] = &[
+    Entry {
+        name: "expert",
+        about: "the task's scripted expert, which sees object poses",
+        make: Make::Insider(|spec| Ok(Box::new(experts::Expert::of(spec.task)?))),
+    },
+    Entry {
+        name: "idle",
+        about: "nobody: robots hold still until the steps of the benchmark protocol are used up",
+        make: Make::Player(|spec| Ok(Box::new(idle::Idle::new(spec.task)))),
+    },
+];
+
+/// The player called `name`.
+pub fn find(name: &str) -> Result<&'static Entry, PlayerError> {
+    ALL.iter().find(|entry| entry.name == name).ok_or_else(|| PlayerError::UnknownPlayer {
+        name: name.into(),
+        have: ALL.iter().map(|entry| entry.name).collect(),
+    })
+}
+
+impl Entry {
+    /// Plays the episode `spec`. That it ends under way is no error: the last phase may have been reached.
+    pub fn play(&self, spec: &EpisodeSpec, episode: &mut dyn Backstage) -> Result<(), PlayerError> {
+        let outcome = match self.make {
+            Make::Player(make) => make(spec)?.play(episode),
+            Make::Insider(make) => make(spec)?.play(episode),
+        };
+        match outcome {
+            Err(PlayerError::EpisodeOver) => Ok(()),
+            outcome => outcome,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tasks;
+    use tandem_tools_spec::Protocol;
+
+    #[test]
+    fn every_player_can_be_made_for_every_task() {
+        for entry in ALL {
+            assert_eq!(find(entry.name).unwrap().name, entry.name);
+            for task in tasks::ALL {
+                let spec = EpisodeSpec::new(task, 0, Protocol::Agentic);
+                let made = match entry.make {
+                    Make::Player(make) => make(&spec).map(drop),
+                    Make::Insider(make) => make(&spec).map(drop),
+                };
+                assert!(made.is_ok(), "{} for {}: {made:?}", entry.name, task.id);
+            }
+        }
+        let text = find("expart").unwrap_err().to_string();
+        assert_eq!(text, "no player \"expart\"; have: expert, idle");
+    }
+}

@@ -1,0 +1,225 @@
+//! Messages that have no well-known schema: flat JSON objects, because Foxglove's plots address numbers by field name and
+//! its schema reader takes neither references nor nullable types.
+
+use base64::{DecodeError, Engine, prelude::BASE64_STANDARD};
+use foxglove::{Encode, Schema, bytes::BufMut};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use tandem_sim::{BaseCommand, RobotCommand, RobotState, Side, Step};
+use tandem_tools_spec::{Budget, LookReply, PhaseReached, ToolCall, ToolReply};
+
+use crate::commands::base_row;
+use crate::output::OutputError;
+use crate::scoring::{Facts, Grip};
+
+/// A message written as JSON.
+pub struct Json<T>(pub T);
+
+/// A type that has a schema of its own in the recording.
+pub trait JsonMessage: Serialize + JsonSchema {
+    const SCHEMA_NAME: &str;
+}
+
+impl<T: JsonMessage> Encode for Json<T> {
+    type Error = serde_json::Error;
+
+    fn get_schema() -> Option<Schema> {
+        let schema = schemars::schema_for!(T).to_value().to_string();
+        Some(Schema::new(T::SCHEMA_NAME, "jsonschema", schema.into_bytes()))
+    }
+
+    fn get_message_encoding() -> String {
+        "json".into()
+    }
+
+    fn encode(&self, buffer: &mut impl BufMut) -> Result<(), serde_json::Error> {
+        serde_json::to_writer(buffer.writer(), &self.0)
+    }
+}
+
+/// Everything that a control step left behind, as bytes: thousands of numbers that have to come back as they were.
+#[derive(Serialize, Deserialize, JsonSchema)]
+pub struct StepMessage {
+    control_step: u64,
+    /// [`Step`] in postcard's encoding, base64.
+    #[schemars(extend("contentEncoding" = "base64"))]
+    postcard: String,
+}
+
+impl JsonMessage for StepMessage {
+    const SCHEMA_NAME: &str = "tandem.Step";
+}
+
+/// Why a message holds no [`Step`].
+#[derive(Debug, thiserror::Error)]
+pub enum StepError {
+    #[error("no base64: {0}")]
+    Base64(#[from] DecodeError),
+    #[error("not a step of this build: {0}")]
+    Postcard(#[from] postcard::Error),
+}
+
+impl StepMessage {
+    pub fn new(step: &Step) -> Result<Json<StepMessage>, OutputError> {
+        let bytes = postcard::to_stdvec(step).map_err(|source| OutputError::Encode(source.into()))?;
+        Ok(Json(StepMessage { control_step: step.control_step, postcard: BASE64_STANDARD.encode(bytes) }))
+    }
+
+    pub fn step(&self) -> Result<Step, StepError> {
+        Ok(postcard::from_bytes(&BASE64_STANDARD.decode(&self.postcard)?)?)
+    }
+}
+
+/// The 35 numbers one robot was commanded for one control step; the channel's metadata names the columns.
+#[derive(Serialize, JsonSchema)]
+pub struct Action {
+    row: Vec<f32>,
+}
+
+impl JsonMessage for Action {
+    const SCHEMA_NAME: &str = "tandem.Action";
+}
+
+impl From<&RobotCommand> for Json<Action> {
+    fn from(command: &RobotCommand) -> Self {
+        Json(Action { row: command.upper_rad.into_iter().chain(base_row(&command.base)).collect() })
+    }
+}
+
+/// The base command alone, with a name for each number.
+#[derive(Serialize, JsonSchema)]
+pub struct Base {
+    vx_m_s: f32,
+    vy_m_s: f32,
+    yaw_rate_rad_s: f32,
+    pelvis_height_m: f32,
+}
+
+impl JsonMessage for Base {
+    const SCHEMA_NAME: &str = "tandem.BaseCommand";
+}
+
+impl From<&RobotCommand> for Json<Base> {
+    fn from(command: &RobotCommand) -> Self {
+        let BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m } = command.base;
+        Json(Base { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m })
+    }
+}
+
+/// What a robot's hands feel and hold: forces of the world on them (world frame), estimated from the arms' torques.
+#[derive(Serialize, JsonSchema)]
+pub struct Hands {
+    left_force_n: [f32; 3],
+    right_force_n: [f32; 3],
+    left_holds: Vec<String>,
+    right_holds: Vec<String>,
+    left_touches: Vec<String>,
+    right_touches: Vec<String>,
+}
+
+impl JsonMessage for Hands {
+    const SCHEMA_NAME: &str = "tandem.Hands";
+}
+
+impl Hands {
+    /// Of robot number `robot`, which measures `state` where scoring sees `facts`.
+    pub fn of(state: &RobotState, robot: usize, facts: &Facts) -> Json<Hands> {
+        let felt_n = state.hand_force_n.map(|force_n| force_n.to_array());
+        let named = |side: Side, wanted: Grip| {
+            let objects = facts.objects.iter().filter(|object| object.hands[robot][side] == wanted);
+            objects.map(|object| object.name.clone()).collect()
+        };
+        Json(Hands {
+            left_force_n: felt_n.left,
+            right_force_n: felt_n.right,
+            left_holds: named(Side::Left, Grip::Holding),
+            right_holds: named(Side::Right, Grip::Holding),
+            left_touches: named(Side::Left, Grip::Touching),
+            right_touches: named(Side::Right, Grip::Touching),
+        })
+    }
+}
+
+/// A phase that was reached.
+#[derive(Serialize, Deserialize, JsonSchema)]
+pub struct Phase {
+    pub id: String,
+    pub name: String,
+    pub time_s: f64,
+}
+
+impl JsonMessage for Phase {
+    const SCHEMA_NAME: &str = "tandem.Phase";
+}
+
+impl From<&PhaseReached> for Json<Phase> {
+    fn from(phase: &PhaseReached) -> Self {
+        Json(Phase { id: phase.id.clone(), name: phase.name.clone(), time_s: phase.time_s })
+    }
+}
+
+/// What is left of the episode.
+#[derive(Serialize, JsonSchema)]
+pub struct BudgetLeft {
+    steps_left: u32,
+    /// Absent where the protocol sets no limit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "f64")]
+    wall_clock_left_s: Option<f64>,
+}
+
+impl JsonMessage for BudgetLeft {
+    const SCHEMA_NAME: &str = "tandem.Budget";
+}
+
+impl From<&Budget> for Json<BudgetLeft> {
+    fn from(budget: &Budget) -> Self {
+        Json(BudgetLeft { steps_left: budget.steps_left, wall_clock_left_s: budget.wall_clock_left_s })
+    }
+}
+
+/// A tool call and how it was answered: a reply, or the text of the problem.
+pub struct ToolCallRecord<'a> {
+    /// When it was answered.
+    pub time_s: f64,
+    pub call: &'a ToolCall,
+    pub outcome: Result<&'a ToolReply, &'a str>,
+}
+
+/// A tool call and its answer. Arguments and reply are JSON texts, since every tool has others.
+#[derive(Serialize, Deserialize, JsonSchema)]
+pub struct ToolCallMessage {
+    pub tool: String,
+    pub arguments: String,
+    pub ok: bool,
+    /// The reply without pictures, or the text of the problem.
+    pub reply: String,
+}
+
+impl JsonMessage for ToolCallMessage {
+    const SCHEMA_NAME: &str = "tandem.ToolCall";
+}
+
+impl ToolCallMessage {
+    pub fn new(record: &ToolCallRecord) -> Result<Json<Self>, OutputError> {
+        let (ok, reply) = match record.outcome {
+            Ok(reply) => (true, without_pictures(reply)?.to_string()),
+            Err(problem) => (false, problem.to_string()),
+        };
+        let arguments = serde_json::to_string(record.call)?;
+        Ok(Json(ToolCallMessage { tool: record.call.name().into(), arguments, ok, reply }))
+    }
+}
+
+/// A reply as JSON. Pictures have a topic of their own and would make this one unreadable.
+fn without_pictures(reply: &ToolReply) -> Result<Value, serde_json::Error> {
+    match reply {
+        ToolReply::Look(LookReply::Observe(observation)) => {
+            let states = serde_json::to_value(&observation.states)?;
+            let robots: Vec<&str> = observation.images.iter().map(|image| image.robot.as_str()).collect();
+            Ok(serde_json::json!({ "time_s": observation.time_s, "states": states, "pictures_of": robots }))
+        }
+        other => serde_json::to_value(other),
+    }
+}

@@ -1,0 +1,40 @@
+//! Recordings: an episode as MCAP with Foxglove's well-known schemas, so that it can be watched and plotted in Foxglove, and
+//! read back step by step.
+//!
+//! Log times are simulated time. Frames: `world`, `A/pelvis` and every other link of robot A as `A/<link>`, its camera as
+//! `A/egocentric`, objects by name. Numbers that have no well-known schema are JSON with a JSON Schema. `/steps` holds each
+//! [`tandem_sim::Step`] as it was, bit for bit, from the state before the first one on; everything else is for people.
+//!
+//! The file is `episode.mcap.partial` until [`Recorder::finish`] renames it. A recorder that is dropped earlier still
+//! writes the index, so the partial file can be opened, but an `episode.mcap` is always complete.
+
+mod file;
+mod messages;
+mod read;
+mod robot_topics;
+mod scene;
+#[cfg(test)]
+mod tests;
+mod transforms;
+mod write;
+
+pub use messages::ToolCallRecord;
+pub use read::{RecordedCall, Recording, RecordingError};
+pub use write::{Recorder, RecordingHeader};
+
+/// Topics that are read back.
+mod topics {
+    pub const STEPS: &str = "/steps";
+    pub const PHASES: &str = "/phases";
+    pub const TOOL_CALLS: &str = "/tool_calls";
+}
+
+/// Records of metadata that are read back, and their entries.
+mod metadata {
+    pub const EPISODE: &str = "episode";
+    pub const SPEC: &str = "spec";
+    pub const LOCOMOTION: &str = "locomotion";
+    pub const BUILD: &str = "build";
+    pub const SCORES: &str = "scores";
+    pub const RESULT: &str = "result";
+}

@@ -1,0 +1,156 @@
+//! Reads a recording back: what the episode was, every step bit for bit, phases and tool calls; and scores it again.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use base64::{Engine, prelude::BASE64_STANDARD};
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+use tandem_sim::{SimError, Step};
+use tandem_tools_spec::PhaseReached;
+
+use super::messages::{Phase, StepError, StepMessage, ToolCallMessage};
+use super::{metadata, topics};
+use crate::reports::EpisodeResult;
+use crate::scoring::{ScoreMemory, Scores};
+use crate::spec::EpisodeSpec;
+
+/// A recording in memory.
+pub struct Recording {
+    path: PathBuf,
+    bytes: Vec<u8>,
+    pub spec: EpisodeSpec,
+    /// Which base controller the robots had; the name tells files of different content apart.
+    pub locomotion: String,
+    /// Which build of Tandem played it.
+    pub build: String,
+    /// `None` where the episode was interrupted.
+    pub result: Option<EpisodeResult>,
+    scores: ScoreMemory,
+}
+
+/// A tool call as it was made, and its answer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedCall {
+    /// When it was answered.
+    pub time_s: f64,
+    pub tool: String,
+    pub arguments: Value,
+    /// The reply as JSON, without pictures; or the text of the problem.
+    pub outcome: Result<String, String>,
+}
+
+/// Why a recording cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingError {
+    #[error("cannot read the recording {}: {source}", path.display())]
+    Read { path: PathBuf, source: std::io::Error },
+    #[error("{} is no complete MCAP file: {source}", path.display())]
+    Mcap { path: PathBuf, source: mcap::McapError },
+    #[error("{} has no {what}; recordings that this version of Tandem makes have it", path.display())]
+    Missing { path: PathBuf, what: String },
+    #[error("{}: a message or an entry is not what its name says: {source}", path.display())]
+    Json { path: PathBuf, source: serde_json::Error },
+    #[error("{}: {source}", path.display())]
+    Step { path: PathBuf, source: StepError },
+    #[error("the objects of the episode cannot be read: {0}")]
+    Sim(#[from] SimError),
+}
+
+impl Recording {
+    /// Reads a file and checks that it is a recording of an episode. Steps are read as they are asked for.
+    pub fn read(path: &Path) -> Result<Recording, RecordingError> {
+        let bytes =
+            std::fs::read(path).map_err(|source| RecordingError::Read { path: path.into(), source })?;
+        let records =
+            metadata_records(&bytes).map_err(|source| RecordingError::Mcap { path: path.into(), source })?;
+        let json = |source| RecordingError::Json { path: path.into(), source };
+        let missing = |what: &str| RecordingError::Missing { path: path.into(), what: what.into() };
+        let episode = records.get(metadata::EPISODE).ok_or_else(|| missing(metadata::EPISODE))?;
+        let entry = |name: &str| episode.get(name).ok_or_else(|| missing(name));
+        let step = |source: StepError| RecordingError::Step { path: path.into(), source };
+        let scores = BASE64_STANDARD.decode(entry(metadata::SCORES)?).map_err(|e| step(e.into()))?;
+        let result = records.get(metadata::RESULT).and_then(|entries| entries.get(EpisodeResult::FILE_NAME));
+        Ok(Recording {
+            path: path.into(),
+            spec: serde_json::from_str(entry(metadata::SPEC)?).map_err(json)?,
+            locomotion: entry(metadata::LOCOMOTION)?.clone(),
+            build: entry(metadata::BUILD)?.clone(),
+            result: result.map(|text| serde_json::from_str(text)).transpose().map_err(json)?,
+            scores: postcard::from_bytes(&scores).map_err(|e| step(e.into()))?,
+            bytes,
+        })
+    }
+
+    /// The state before the first step, then every step.
+    pub fn steps(&self) -> Result<impl Iterator<Item = Result<Step, RecordingError>>, RecordingError> {
+        let steps = self.messages::<StepMessage>(topics::STEPS)?;
+        Ok(steps.map(|message| {
+            let (_, message) = message?;
+            message.step().map_err(|source| RecordingError::Step { path: self.path.clone(), source })
+        }))
+    }
+
+    /// The phases that the episode reached.
+    pub fn phases(&self) -> Result<Vec<PhaseReached>, RecordingError> {
+        let phase = |message: Result<(f64, Phase), RecordingError>| {
+            let (_, Phase { id, name, time_s }) = message?;
+            Ok(PhaseReached { id, name, time_s })
+        };
+        self.messages(topics::PHASES)?.map(phase).collect()
+    }
+
+    /// The tool calls of the episode, in their order.
+    pub fn tool_calls(&self) -> Result<Vec<RecordedCall>, RecordingError> {
+        let call = |message: Result<(f64, ToolCallMessage), RecordingError>| {
+            let (time_s, ToolCallMessage { tool, arguments, ok, reply }) = message?;
+            let arguments = serde_json::from_str(&arguments).map_err(|source| self.json(source))?;
+            Ok(RecordedCall { time_s, tool, arguments, outcome: if ok { Ok(reply) } else { Err(reply) } })
+        };
+        self.messages(topics::TOOL_CALLS)?.map(call).collect()
+    }
+
+    /// Scores the recorded steps by the task's conditions as this build has them.
+    pub fn score(&self) -> Result<Scores, RecordingError> {
+        let mut steps = self.steps()?;
+        let missing = || RecordingError::Missing { path: self.path.clone(), what: topics::STEPS.into() };
+        let start = steps.next().ok_or_else(missing)??;
+        let mut scores = self.spec.task.scores(&start)?;
+        scores.set_memory(self.scores.clone());
+        for step in steps {
+            scores.update(&step?);
+        }
+        Ok(scores)
+    }
+
+    /// The JSON messages of a topic, with the simulated time of each.
+    fn messages<T: DeserializeOwned>(
+        &self,
+        topic: &str,
+    ) -> Result<impl Iterator<Item = Result<(f64, T), RecordingError>>, RecordingError> {
+        let failed = |source| RecordingError::Mcap { path: self.path.clone(), source };
+        let stream = mcap::MessageStream::new(&self.bytes).map_err(failed)?;
+        let wanted = move |message: &Result<mcap::Message, mcap::McapError>| match message {
+            Ok(message) => message.channel.topic == topic,
+            Err(_) => true,
+        };
+        Ok(stream.filter(wanted).map(move |message| {
+            let message = message.map_err(failed)?;
+            let content = serde_json::from_slice(&message.data).map_err(|source| self.json(source))?;
+            Ok((message.log_time as f64 / 1e9, content))
+        }))
+    }
+
+    fn json(&self, source: serde_json::Error) -> RecordingError {
+        RecordingError::Json { path: self.path.clone(), source }
+    }
+}
+
+type Entries = BTreeMap<String, String>;
+
+/// The metadata records of a file, by name.
+fn metadata_records(bytes: &[u8]) -> Result<BTreeMap<String, Entries>, mcap::McapError> {
+    let summary = mcap::Summary::read(bytes)?.unwrap_or_default();
+    let read = |index| mcap::read::metadata(bytes, index);
+    summary.metadata_indexes.iter().map(|index| read(index).map(|m| (m.name, m.metadata))).collect()
+}

@@ -1,0 +1,119 @@
+//! The topics of one robot: what its joints do, what it was told, what its hands feel and what its camera saw.
+
+use foxglove::messages::{CameraCalibration, CompressedImage, JointState, JointStates};
+use tandem_sim::{RobotModel, RobotState, RobotStep, mjcf::MjcfCamera};
+
+use super::file::{McapFile, Topic};
+use super::messages::{Action, Base, Hands, Json};
+use super::transforms::{EGOCENTRIC, robot_frame, timestamp};
+use crate::commands::{RobotSheet, action_row};
+use crate::output::OutputError;
+use crate::scoring::Facts;
+
+/// The topics of one robot.
+pub struct RobotTopics {
+    joint_states: Topic<JointStates>,
+    action: Topic<Json<Action>>,
+    base_command: Topic<Json<Base>>,
+    hands: Topic<Json<Hands>>,
+    /// Opened by the first picture.
+    camera: Option<CameraTopics>,
+}
+
+struct CameraTopics {
+    image: Topic<CompressedImage>,
+    calibration: Topic<CameraCalibration>,
+}
+
+impl RobotTopics {
+    pub fn open(file: &mut McapFile, robot: &RobotSheet) -> Result<RobotTopics, OutputError> {
+        let columns = action_row(&robot.model).join(",");
+        Ok(RobotTopics {
+            joint_states: file.topic(&format!("/{}/joint_states", robot.name), &[])?,
+            action: file.topic(&format!("/{}/action", robot.name), &[("columns", &columns)])?,
+            base_command: file.topic(&format!("/{}/base_command", robot.name), &[])?,
+            hands: file.topic(&format!("/{}/hands", robot.name), &[])?,
+            camera: None,
+        })
+    }
+
+    /// Appends what robot number `index`, described by `robot`, did in the control step that ended at `time_s`.
+    pub fn step(
+        &mut self,
+        file: &mut McapFile,
+        robot: &RobotSheet,
+        index: usize,
+        time_s: f64,
+        step: &RobotStep,
+        facts: &Facts,
+    ) -> Result<(), OutputError> {
+        let joints = joint_states(&robot.model, time_s, &step.state);
+        file.write(&mut self.joint_states, time_s, &joints)?;
+        file.write(&mut self.action, time_s, &Json::from(&step.command))?;
+        file.write(&mut self.base_command, time_s, &Json::from(&step.command))?;
+        file.write(&mut self.hands, time_s, &Hands::of(&step.state, index, facts))
+    }
+
+    /// Appends a PNG seen through the robot's head camera.
+    pub fn picture(
+        &mut self,
+        file: &mut McapFile,
+        robot: &RobotSheet,
+        time_s: f64,
+        png: Vec<u8>,
+    ) -> Result<(), OutputError> {
+        let name = &robot.name;
+        let frame_id = robot_frame(name, EGOCENTRIC);
+        let camera = match &mut self.camera {
+            Some(camera) => camera,
+            unopened => {
+                let mut camera = CameraTopics {
+                    image: file.topic(&format!("/{name}/egocentric"), &[])?,
+                    calibration: file.topic(&format!("/{name}/egocentric/calibration"), &[])?,
+                };
+                let calibration = calibration(&robot.model.egocentric, &frame_id, time_s);
+                file.write(&mut camera.calibration, time_s, &calibration)?;
+                unopened.insert(camera)
+            }
+        };
+        let image = CompressedImage {
+            timestamp: Some(timestamp(time_s)),
+            frame_id,
+            data: png.into(),
+            format: "png".into(),
+        };
+        file.write(&mut camera.image, time_s, &image)
+    }
+}
+
+fn joint_states(model: &RobotModel, time_s: f64, state: &RobotState) -> JointStates {
+    let joints = model.joints.iter().enumerate().map(|(index, joint)| JointState {
+        name: joint.name.clone(),
+        position: Some(state.q_rad[index].into()),
+        velocity: Some(state.qd_rad_s[index].into()),
+        acceleration: None,
+        effort: Some(state.torque_n_m[index].into()),
+    });
+    JointStates { timestamp: Some(timestamp(time_s)), joints: joints.collect() }
+}
+
+/// Pinhole calibration without distortion; the centre of pixel (0, 0) lies at (0, 0).
+fn calibration(camera: &MjcfCamera, frame_id: &str, time_s: f64) -> CameraCalibration {
+    let (width, height) = camera.resolution_px;
+    let focal_px = f64::from(height) / 2.0 / (f64::from(camera.vertical_fov_rad) / 2.0).tan();
+    let [cx, cy] = [width, height].map(|size| (f64::from(size) - 1.0) / 2.0);
+    #[rustfmt::skip]
+    let (k, p) = (
+        vec![focal_px, 0.0, cx,  0.0, focal_px, cy,  0.0, 0.0, 1.0],
+        vec![focal_px, 0.0, cx, 0.0,  0.0, focal_px, cy, 0.0,  0.0, 0.0, 1.0, 0.0],
+    );
+    CameraCalibration {
+        timestamp: Some(timestamp(time_s)),
+        frame_id: frame_id.into(),
+        width,
+        height,
+        k,
+        p,
+        ..CameraCalibration::default()
+    }
+}

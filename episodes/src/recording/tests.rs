@@ -1,0 +1,291 @@
+//! Recordings of a real world, read back.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use foxglove::Decode;
+use foxglove::messages::{CompressedImage, FrameTransforms, SceneUpdate};
+use tandem_sim::{ObjectPlacement, Pose, RobotCommand, RobotPlacement, Rotation, Vector, World, WorldSpec};
+use tandem_tools_spec::{
+    Budget, CameraImage, LookReply, Observation, PhaseReached, PhaseTimes, Png, Protocol, ToolCall, ToolReply,
+};
+
+use super::*;
+use crate::commands::RobotSheet;
+use crate::reports::EpisodeResult;
+use crate::scoring::Scores;
+use crate::spec::EpisodeSpec;
+use crate::tasks;
+
+const STEPS: u32 = 10;
+const PICTURE: &[u8] = b"the bytes of a PNG";
+
+fn world() -> World {
+    let robot = |name: &str, x_m: f32, yaw_rad: f32| RobotPlacement {
+        name: name.into(),
+        position_m: [x_m, 0.0],
+        yaw_rad,
+    };
+    let bottle = Pose::from_translation(Vector::new(0.0, 0.0, 1.0));
+    let spec = WorldSpec {
+        scene: "kitchen_084".into(),
+        robots: vec![robot("A", -0.6, 0.0), robot("B", 0.6, std::f32::consts::PI)],
+        objects: vec![ObjectPlacement {
+            name: "bottle".into(),
+            file: "bottle".into(),
+            world_from_object: bottle,
+        }],
+    };
+    World::new(&spec).unwrap()
+}
+
+fn spec() -> EpisodeSpec {
+    EpisodeSpec::new(tasks::find("handover").unwrap(), 7, Protocol::Agentic)
+}
+
+/// A recorder, and what scores the world's one object.
+fn recorder(folder: &Path, world: &World) -> (Recorder, Scores) {
+    let start = world.present();
+    let scores = Scores::new(spec().task.phases, [("bottle", "bottle")].into_iter(), &start).unwrap();
+    let sheet = |robot: &tandem_sim::Robot| RobotSheet {
+        name: robot.name.clone(),
+        model: robot.model.clone(),
+        base_limits: robot.base_limits(),
+    };
+    let header = RecordingHeader {
+        spec: spec(),
+        locomotion: "balance".into(),
+        build: "0.1.0+test".into(),
+        robots: world.robots().iter().map(sheet).collect(),
+        scores: scores.memory(),
+    };
+    (Recorder::create(folder, header, &start).unwrap(), scores)
+}
+
+fn record_step(recorder: &mut Recorder, scores: &mut Scores, world: &mut World, commands: &[RobotCommand]) {
+    let step = world.control_step(commands);
+    let budget = Budget {
+        steps_left: 6000 - step.control_step as u32,
+        wall_clock_left_s: Some(1800.0),
+        steps_per_command: 25,
+    };
+    recorder.step(&step, &scores.update(&step).facts, budget).unwrap();
+}
+
+/// Records `STEPS` steps, a phase, a refused call and an observation with a picture.
+fn record(folder: &Path) -> (World, PathBuf) {
+    let mut world = world();
+    let (mut recorder, mut scores) = recorder(folder, &world);
+    let commands = [world.rest_command(0), world.rest_command(1)];
+    for _ in 0..STEPS {
+        record_step(&mut recorder, &mut scores, &mut world, &commands);
+    }
+    let time_s = world.time_s();
+    recorder.phase(&PhaseReached { id: "p1".into(), name: "grasp_and_lift".into(), time_s }).unwrap();
+    let wait = ToolCall::parse("wait", serde_json::json!({ "steps": 10 })).unwrap();
+    recorder.tool_call(&ToolCallRecord { time_s, call: &wait, outcome: Err("no steps are left") }).unwrap();
+    let observe = ToolCall::parse("observe", serde_json::json!({ "robots": ["A"] })).unwrap();
+    let image = CameraImage { robot: "A".into(), png_base64: Png(PICTURE.into()) };
+    let seen = Observation { time_s, states: vec![], cameras: vec![], images: vec![image] };
+    let reply = ToolReply::Look(LookReply::Observe(seen));
+    recorder.tool_call(&ToolCallRecord { time_s, call: &observe, outcome: Ok(&reply) }).unwrap();
+    let path = recorder.finish(&result()).unwrap();
+    (world, path)
+}
+
+fn result() -> EpisodeResult {
+    EpisodeResult {
+        task: "handover".into(),
+        seed: 7,
+        phases: PhaseTimes(vec![("p1".into(), Some(0.2))]),
+        env_steps: STEPS,
+        tool_calls: 2,
+        falls: 0,
+        realtime_factor: 4.0,
+        state_hash: "0123456789abcdef".into(),
+    }
+}
+
+#[test]
+fn a_recording_reads_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let (world, path) = record(folder.path());
+    assert_eq!(path, folder.path().join("episode.mcap"));
+    let bytes = fs::read(&path).unwrap();
+
+    let mut counts = BTreeMap::new();
+    let mut last_ns = 0;
+    let mut last_transforms = None;
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        assert!(message.log_time >= last_ns, "{} goes back in time", message.channel.topic);
+        last_ns = message.log_time;
+        let schema = message.channel.schema.as_ref().unwrap().name.clone();
+        let count: &mut u32 = counts.entry((message.channel.topic.clone(), schema)).or_default();
+        assert_eq!(message.sequence, *count);
+        *count += 1;
+        match message.channel.topic.as_str() {
+            "/tf" => last_transforms = Some(FrameTransforms::decode(&*message.data).unwrap()),
+            "/A/egocentric" => assert_eq!(CompressedImage::decode(&*message.data).unwrap().data, PICTURE),
+            "/tool_calls" => assert!(!String::from_utf8_lossy(&message.data).contains("base64")),
+            _ => {}
+        }
+    }
+    assert_eq!(last_ns, 200_000_000, "ten steps of 20 ms");
+
+    let expected = [
+        ("/A/action", "tandem.Action", STEPS),
+        ("/A/base_command", "tandem.BaseCommand", STEPS),
+        ("/A/egocentric", "foxglove.CompressedImage", 1),
+        ("/A/egocentric/calibration", "foxglove.CameraCalibration", 1),
+        ("/A/hands", "tandem.Hands", STEPS),
+        ("/A/joint_states", "foxglove.JointStates", STEPS),
+        ("/B/action", "tandem.Action", STEPS),
+        ("/B/base_command", "tandem.BaseCommand", STEPS),
+        ("/B/hands", "tandem.Hands", STEPS),
+        ("/B/joint_states", "foxglove.JointStates", STEPS),
+        ("/budget", "tandem.Budget", STEPS),
+        ("/phases", "tandem.Phase", 1),
+        ("/scene", "foxglove.SceneUpdate", 1),
+        ("/steps", "tandem.Step", STEPS + 1),
+        ("/tf", "foxglove.FrameTransforms", STEPS),
+        ("/tool_calls", "tandem.ToolCall", 2),
+    ];
+    let counts: Vec<_> =
+        counts.iter().map(|((topic, schema), n)| (topic.as_str(), schema.as_str(), *n)).collect();
+    assert_eq!(counts, expected);
+    wrists_follow_from_transforms(&world, &last_transforms.unwrap());
+
+    let metadata = metadata(&bytes);
+    assert_eq!(metadata["episode"]["seed"], "7");
+    assert_eq!(metadata["episode"]["protocol"], "agentic");
+    assert_eq!(metadata["episode"]["locomotion"], "balance");
+
+    let recording = Recording::read(&path).unwrap();
+    assert_eq!((recording.spec.clone(), recording.build.as_str()), (spec(), "0.1.0+test"));
+    assert_eq!(recording.steps().unwrap().last().unwrap().unwrap(), world.present());
+    assert_eq!(recording.phases().unwrap()[0].time_s, 0.2);
+    let calls = recording.tool_calls().unwrap();
+    assert_eq!((calls[0].tool.as_str(), &calls[0].outcome), ("wait", &Err("no steps are left".into())));
+    assert_eq!((calls[1].arguments["robots"][0].as_str(), calls[1].outcome.is_ok()), (Some("A"), true));
+    assert_eq!(recording.result.unwrap(), result());
+}
+
+/// The chain of recorded frames puts wrists and camera where the world measured them.
+fn wrists_follow_from_transforms(world: &World, recorded: &FrameTransforms) {
+    let pose = |child: &str| {
+        let mut frame = child;
+        let mut world_from_child = Pose::IDENTITY;
+        while frame != "world" {
+            let link = recorded.transforms.iter().find(|t| t.child_frame_id == frame).unwrap();
+            let (t, q) = (link.translation.unwrap(), link.rotation.unwrap());
+            let parent_from_frame = Pose::from_parts(
+                Vector::new(t.x as f32, t.y as f32, t.z as f32),
+                Rotation::from_xyzw(q.x as f32, q.y as f32, q.z as f32, q.w as f32),
+            );
+            world_from_child = parent_from_frame * world_from_child;
+            frame = &link.parent_frame_id;
+        }
+        world_from_child
+    };
+    for (index, robot) in ["A", "B"].into_iter().enumerate() {
+        let state = world.robot_state(index);
+        for (side, measured) in ["left", "right"].into_iter().zip(state.pelvis_from_wrist) {
+            let recorded = pose(&format!("{robot}/{side}_wrist_yaw_link"));
+            let measured = state.world_from_pelvis * measured;
+            let error_m = (recorded.translation - measured.translation).length();
+            assert!(error_m < 1e-4, "{robot} {side} wrist is {error_m} m off");
+            assert!(recorded.rotation.angle_between(measured.rotation) < 2e-3);
+        }
+        let camera = state.world_from_pelvis * state.pelvis_from_camera;
+        let optical = pose(&format!("{robot}/egocentric"));
+        let forward = optical.rotation * Vector::Z;
+        assert!((forward + camera.rotation * Vector::Z).length() < 1e-3, "an image's z axis looks forward");
+    }
+    let bottle = world.object("bottle").unwrap().world_from_object;
+    assert!((pose("bottle").translation - bottle.translation).length() < 1e-6);
+}
+
+fn metadata(bytes: &[u8]) -> BTreeMap<String, BTreeMap<String, String>> {
+    let summary = mcap::Summary::read(bytes).unwrap().expect("a summary");
+    let read = |index| mcap::read::metadata(bytes, index).unwrap();
+    summary.metadata_indexes.iter().map(read).map(|m| (m.name, m.metadata)).collect()
+}
+
+/// Foxglove's reader of JSON Schema wants one plain type per field and follows no references.
+#[test]
+fn json_schemas_are_flat() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, path) = record(folder.path());
+    let summary = mcap::Summary::read(&fs::read(path).unwrap()).unwrap().expect("a summary");
+    let schemas: Vec<_> = summary.schemas.values().filter(|schema| schema.encoding == "jsonschema").collect();
+    assert_eq!(schemas.len(), 7);
+    for schema in schemas {
+        let document: serde_json::Value = serde_json::from_slice(&schema.data).unwrap();
+        for (field, value) in document["properties"].as_object().unwrap() {
+            assert!(value["type"].is_string(), "{}.{field}: {value}", schema.name);
+        }
+        let required = document["required"].as_array().unwrap();
+        assert!(!required.contains(&"wall_clock_left_s".into()), "the benchmark protocol has no wall clock");
+    }
+}
+
+#[test]
+fn an_interrupted_recording_never_gets_the_final_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut world = world();
+    let (mut recorder, mut scores) = recorder(folder.path(), &world);
+    let commands = [world.rest_command(0), world.rest_command(1)];
+    record_step(&mut recorder, &mut scores, &mut world, &commands);
+    drop(recorder);
+    assert!(!folder.path().join("episode.mcap").exists());
+
+    let partial = fs::read(folder.path().join("episode.mcap.partial")).unwrap();
+    let summary = mcap::Summary::read(&partial).unwrap().expect("the index is written nevertheless");
+    assert_eq!(
+        summary.stats.unwrap().message_count,
+        13,
+        "shapes, two steps, transforms, budget and four per robot"
+    );
+    let recording = Recording::read(&folder.path().join("episode.mcap.partial")).unwrap();
+    assert_eq!((recording.steps().unwrap().count(), recording.result), (2, None));
+}
+
+#[test]
+fn the_scene_shows_every_drawn_geom() {
+    let folder = tempfile::tempdir().unwrap();
+    let (world, path) = record(folder.path());
+    let bytes = fs::read(path).unwrap();
+    let scene =
+        mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).find(|m| m.channel.topic == "/scene");
+    let update = SceneUpdate::decode(&*scene.unwrap().data).unwrap();
+    assert_eq!(update.entities.len(), world.robots().iter().map(|r| r.model.links.len()).sum::<usize>());
+    for entity in &update.entities {
+        let (robot, link) = entity.frame_id.split_once('/').unwrap();
+        let robot = world.robots().iter().find(|r| r.name == robot).unwrap();
+        let link = robot.model.links.iter().find(|l| l.name == link).unwrap();
+        let drawn = |wanted: fn(&tandem_sim::mjcf::Primitive) -> bool| {
+            link.geoms.iter().filter(|geom| geom.drawn && wanted(&geom.primitive)).count()
+        };
+        use tandem_sim::mjcf::Primitive::*;
+        assert_eq!(entity.cubes.len(), drawn(|p| matches!(p, Box { .. } | Plane { .. })), "{}", entity.id);
+        assert_eq!(
+            entity.cylinders.len(),
+            drawn(|p| matches!(p, Cylinder { .. } | Capsule { .. })),
+            "{}",
+            entity.id
+        );
+        assert_eq!(entity.triangles.len(), drawn(|p| matches!(p, Convex { .. })), "{}", entity.id);
+        for list in &entity.triangles {
+            assert!(list.indices.iter().all(|index| (*index as usize) < list.points.len()));
+        }
+    }
+    let colours = |robot: &str| -> Vec<String> {
+        let entities = update.entities.iter().filter(|entity| entity.id.starts_with(robot));
+        entities.flat_map(|e| e.triangles.iter()).map(|t| format!("{:?}", t.color)).collect()
+    };
+    assert_ne!(colours("A/"), colours("B/"), "partners differ in colour");
+}

@@ -1,0 +1,68 @@
+//! Poses as Foxglove's transforms: the world, each robot's chain of links, its camera, and the objects.
+
+use foxglove::messages::{FrameTransform, FrameTransforms, Quaternion, Timestamp, Vector3};
+use tandem_sim::{Pose, RobotModel, RobotState, Rotation, Step, Vector};
+
+use super::file::time_ns;
+use crate::commands::RobotSheet;
+use crate::convert::opencv_axes;
+
+/// The frame that everything else hangs on.
+pub const WORLD: &str = "world";
+/// Name of a robot's camera frame after the robot's own name.
+pub const EGOCENTRIC: &str = "egocentric";
+
+/// Frame of a robot's link or camera.
+pub fn robot_frame(robot: &str, part: &str) -> String {
+    format!("{robot}/{part}")
+}
+
+/// All frames at one step.
+pub fn transforms(robots: &[RobotSheet], step: &Step) -> FrameTransforms {
+    let timestamp = timestamp(step.time_s);
+    let frame = |parent: String, child: String, parent_from_child: Pose| FrameTransform {
+        timestamp: Some(timestamp),
+        parent_frame_id: parent,
+        child_frame_id: child,
+        translation: Some(vector3(parent_from_child.translation)),
+        rotation: Some(quaternion(parent_from_child.rotation)),
+    };
+    let mut transforms = Vec::new();
+    for (robot, moved) in robots.iter().zip(&step.robots) {
+        let model = &robot.model;
+        let name = |link: usize| robot_frame(&robot.name, &model.links[link].name);
+        transforms.push(frame(WORLD.into(), name(0), moved.state.world_from_pelvis));
+        for (link, parent_from_link) in link_poses(model, &moved.state) {
+            let parent = model.links[link].parent.unwrap_or_default();
+            transforms.push(frame(name(parent), name(link), parent_from_link));
+        }
+        let camera = robot_frame(&robot.name, EGOCENTRIC);
+        transforms.push(frame(name(0), camera, opencv_axes(&moved.state.pelvis_from_camera)));
+    }
+    for object in &step.objects {
+        transforms.push(frame(WORLD.into(), object.name.clone(), object.state.world_from_object));
+    }
+    FrameTransforms { transforms }
+}
+
+/// Pose of every jointed link in its parent, from the measured joint angles: multibody joints do not drift.
+fn link_poses<'a>(model: &'a RobotModel, state: &'a RobotState) -> impl Iterator<Item = (usize, Pose)> + 'a {
+    model.joints.iter().enumerate().map(|(index, joint)| {
+        let turn = Rotation::from_axis_angle(joint.axis, state.q_rad[index]);
+        (joint.link, model.links[joint.link].parent_from_link * Pose::from_rotation(turn))
+    })
+}
+
+pub fn timestamp(time_s: f64) -> Timestamp {
+    const NS_PER_S: u64 = 1_000_000_000;
+    let ns = time_ns(time_s);
+    Timestamp::new((ns / NS_PER_S) as u32, (ns % NS_PER_S) as u32)
+}
+
+pub fn vector3(v: Vector) -> Vector3 {
+    Vector3 { x: v.x.into(), y: v.y.into(), z: v.z.into() }
+}
+
+pub fn quaternion(q: Rotation) -> Quaternion {
+    Quaternion { x: q.x.into(), y: q.y.into(), z: q.z.into(), w: q.w.into() }
+}

@@ -1,0 +1,156 @@
+//! Writes a recording while the episode runs.
+
+use std::path::{Path, PathBuf};
+
+use base64::{Engine, prelude::BASE64_STANDARD};
+use foxglove::messages::{FrameTransforms, SceneUpdate};
+use tandem_sim::{Step, mjcf::Geom, render::robot_rgba};
+use tandem_tools_spec::{Budget, LookReply, PhaseReached, ToolReply};
+
+use super::file::{McapFile, Topic};
+use super::messages::{BudgetLeft, Json, Phase, StepMessage, ToolCallMessage, ToolCallRecord};
+use super::robot_topics::RobotTopics;
+use super::transforms::{self, robot_frame};
+use super::{metadata, scene, topics};
+use crate::commands::RobotSheet;
+use crate::output::OutputError;
+use crate::reports::EpisodeResult;
+use crate::scoring::{Facts, ScoreMemory};
+use crate::spec::EpisodeSpec;
+
+/// What is known of an episode before its first step.
+pub struct RecordingHeader {
+    pub spec: EpisodeSpec,
+    /// Which base controller the robots have; the name tells files of different content apart.
+    pub locomotion: String,
+    /// Which build of Tandem plays it.
+    pub build: String,
+    /// In their order in the world.
+    pub robots: Vec<RobotSheet>,
+    /// What scoring remembers where the recording begins.
+    pub scores: ScoreMemory,
+}
+
+/// A recording under way.
+pub struct Recorder {
+    file: McapFile,
+    /// Simulated time at which the recording begins.
+    start_s: f64,
+    robots: Vec<RobotSheet>,
+    robot_topics: Vec<RobotTopics>,
+    steps: Topic<Json<StepMessage>>,
+    transforms: Topic<FrameTransforms>,
+    scene: Topic<SceneUpdate>,
+    phases: Topic<Json<Phase>>,
+    budget: Topic<Json<BudgetLeft>>,
+    tool_calls: Topic<Json<ToolCallMessage>>,
+}
+
+impl Recorder {
+    pub const FILE_NAME: &str = "episode.mcap";
+
+    /// Opens a recording in an existing run folder and writes what the episode is, what its robots look like, and `start`,
+    /// the state before the first step that will be recorded.
+    pub fn create(folder: &Path, header: RecordingHeader, start: &Step) -> Result<Recorder, OutputError> {
+        let mut file = McapFile::create(folder, Self::FILE_NAME)?;
+        write_header(&mut file, &header)?;
+        let robot_topics = header
+            .robots
+            .iter()
+            .map(|robot| RobotTopics::open(&mut file, robot))
+            .collect::<Result<_, _>>()?;
+        let mut recorder = Recorder {
+            steps: file.topic(topics::STEPS, &[])?,
+            transforms: file.topic("/tf", &[])?,
+            scene: file.topic("/scene", &[])?,
+            phases: file.topic(topics::PHASES, &[])?,
+            budget: file.topic("/budget", &[])?,
+            tool_calls: file.topic(topics::TOOL_CALLS, &[])?,
+            start_s: start.time_s,
+            robot_topics,
+            robots: header.robots,
+            file,
+        };
+        recorder.draw_robots()?;
+        recorder.file.write(&mut recorder.steps, start.time_s, &StepMessage::new(start)?)?;
+        Ok(recorder)
+    }
+
+    /// Adds shapes that are drawn in frame `frame` from the start: `world` for the room, an object's name for an object.
+    pub fn draw(&mut self, frame: &str, geoms: &[Geom]) -> Result<(), OutputError> {
+        let entity = scene::entity(frame, geoms, |geom| geom.rgba);
+        self.file.write(
+            &mut self.scene,
+            self.start_s,
+            &SceneUpdate { entities: vec![entity], deletions: vec![] },
+        )
+    }
+
+    fn draw_robots(&mut self) -> Result<(), OutputError> {
+        let mut entities = Vec::new();
+        for (index, robot) in self.robots.iter().enumerate() {
+            for link in &robot.model.links {
+                let frame = robot_frame(&robot.name, &link.name);
+                entities.push(scene::entity(&frame, &link.geoms, |geom| robot_rgba(geom, index)));
+            }
+        }
+        self.file.write(&mut self.scene, self.start_s, &SceneUpdate { entities, deletions: vec![] })
+    }
+
+    /// Appends one control step, of which scoring sees `facts`.
+    pub fn step(&mut self, step: &Step, facts: &Facts, budget: Budget) -> Result<(), OutputError> {
+        let time_s = step.time_s;
+        self.file.write(&mut self.steps, time_s, &StepMessage::new(step)?)?;
+        self.file.write(&mut self.transforms, time_s, &transforms::transforms(&self.robots, step))?;
+        let robots = self.robots.iter().zip(&mut self.robot_topics).zip(&step.robots);
+        for (index, ((robot, topics), moved)) in robots.enumerate() {
+            topics.step(&mut self.file, robot, index, time_s, moved, facts)?;
+        }
+        self.file.write(&mut self.budget, time_s, &Json::from(&budget))
+    }
+
+    /// Appends a phase at the time it was reached.
+    pub fn phase(&mut self, phase: &PhaseReached) -> Result<(), OutputError> {
+        self.file.write(&mut self.phases, phase.time_s, &Json::from(phase))
+    }
+
+    /// Appends a tool call and its answer. Pictures of the answer go to the topics of their robots' cameras.
+    pub fn tool_call(&mut self, record: &ToolCallRecord) -> Result<(), OutputError> {
+        self.file.write(&mut self.tool_calls, record.time_s, &ToolCallMessage::new(record)?)?;
+        if let Ok(ToolReply::Look(LookReply::Observe(observation))) = record.outcome {
+            for image in &observation.images {
+                let robots = self.robots.iter().zip(&mut self.robot_topics);
+                for (robot, topics) in robots.filter(|(robot, _)| robot.name == image.robot) {
+                    let png = image.png_base64.0.clone();
+                    topics.picture(&mut self.file, robot, record.time_s, png)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the result and the index, and gives the file its name.
+    pub fn finish(mut self, result: &EpisodeResult) -> Result<PathBuf, OutputError> {
+        self.file
+            .metadata(metadata::RESULT, &[(EpisodeResult::FILE_NAME, &serde_json::to_string(result)?)])?;
+        self.file.finish()
+    }
+}
+
+/// The episode in one value for programs, and in single words for people.
+fn write_header(file: &mut McapFile, header: &RecordingHeader) -> Result<(), OutputError> {
+    let names: Vec<&str> = header.robots.iter().map(|robot| robot.name.as_str()).collect();
+    let scores = postcard::to_stdvec(&header.scores).map_err(|source| OutputError::Encode(source.into()))?;
+    let entries = [
+        ("task", header.spec.task.id),
+        ("seed", &header.spec.seed.to_string()),
+        ("protocol", header.spec.protocol.name()),
+        (metadata::LOCOMOTION, header.locomotion.as_str()),
+        ("robots", &names.join(",")),
+        ("tandem_version", env!("CARGO_PKG_VERSION")),
+        (metadata::BUILD, header.build.as_str()),
+        (metadata::SPEC, &serde_json::to_string(&header.spec)?),
+        (metadata::SCORES, &BASE64_STANDARD.encode(scores)),
+    ];
+    file.metadata(metadata::EPISODE, &entries)
+}

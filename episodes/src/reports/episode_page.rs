@@ -1,0 +1,220 @@
+//! `report.html`: one episode on one page that needs nothing else.
+
+use std::collections::BTreeMap;
+
+use base64::{Engine, prelude::BASE64_STANDARD};
+use tandem_sim::CONTROL_HZ;
+use tandem_tools_spec::{Budget, EndReason, ResultReply};
+
+use crate::protocol::{Rules, rules};
+use crate::scoring::Phase;
+use crate::tasks::Task;
+
+const STYLE: &str = include_str!("style.css");
+
+/// Answered and refused calls by tool.
+#[derive(Debug, Default)]
+pub struct CallCounts(BTreeMap<&'static str, [u32; 2]>);
+
+impl CallCounts {
+    pub fn count(&mut self, tool: &'static str, answered: bool) {
+        self.0.entry(tool).or_default()[usize::from(!answered)] += 1;
+    }
+}
+
+/// What the page tells.
+pub struct EpisodePage<'a> {
+    pub task: &'a Task,
+    pub result: &'a ResultReply,
+    pub calls: &'a CallCounts,
+    /// As it stood at the last control step; `None` if there was none.
+    pub budget_left: Option<Budget>,
+    /// A PNG file.
+    pub strip: &'a [u8],
+}
+
+impl EpisodePage<'_> {
+    /// The page.
+    pub fn html(&self) -> String {
+        let title = format!("{}, seed {}", escape(self.task.id), self.result.seed);
+        let strip = BASE64_STANDARD.encode(self.strip);
+        format!(
+            r#"<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>
+{STYLE}</style>
+</head>
+<body>
+<h1>{title}</h1>
+<p class="soft">{instruction}</p>
+<p>{verdict}</p>
+<dl class="facts">{facts}</dl>
+<h2>Phases</h2>
+{timeline}
+{phases}
+<h2>Key moments</h2>
+<img alt="One column per key moment: third person above, then what each robot sees" src="data:image/png;base64,{strip}">
+<h2>Budget</h2>
+{budget}
+<h2>Tool calls</h2>
+{calls}
+<h2>Recording</h2>
+{recording}
+</body>
+</html>
+"#,
+            instruction = escape(self.task.instruction),
+            verdict = self.verdict(),
+            facts = self.facts(),
+            timeline = self.timeline(),
+            phases = self.phases(),
+            budget = self.budget(),
+            calls = self.tool_calls(),
+            recording = self.recording(),
+        )
+    }
+
+    fn duration_s(&self) -> f64 {
+        f64::from(self.result.env_steps) / CONTROL_HZ
+    }
+
+    fn verdict(&self) -> String {
+        let reached = self.result.phases.0.iter().filter(|(_, time_s)| time_s.is_some()).count();
+        let phases = self.task.phases.len();
+        let class = if reached == phases { "good" } else { "bad" };
+        let why = match self.result.ended {
+            EndReason::TaskComplete => "The task was completed.",
+            EndReason::StepBudgetExhausted => "The steps ran out.",
+            EndReason::WallClockExhausted => "The policy's time ran out.",
+            EndReason::Finished => "The policy ended the episode.",
+        };
+        format!(r#"<span class="{class}">{reached} of {phases} phases reached.</span> {why}"#)
+    }
+
+    fn facts(&self) -> String {
+        let facts = [
+            ("Protocol", self.result.protocol.name().into()),
+            ("Simulated time", format!("{:.2} s", self.duration_s())),
+            ("Tool calls", self.result.tool_calls.to_string()),
+            ("Robots that fell", self.result.falls.to_string()),
+            ("Physics, times real time", format!("{:.1}", self.result.realtime_factor)),
+        ];
+        facts.map(|(name, value)| format!("<div><dt>{name}</dt><dd>{value}</dd></div>")).concat()
+    }
+
+    /// One segment per phase that was reached, as long as it took, and the rest of the episode.
+    fn timeline(&self) -> String {
+        let mut segments = String::new();
+        let mut from_s = 0.0;
+        let percent = |span_s: f64| 100.0 * span_s / self.duration_s().max(f64::MIN_POSITIVE);
+        for (id, time_s) in &self.result.phases.0 {
+            let Some(time_s) = *time_s else { break };
+            let (id, width) = (escape(id), percent(time_s - from_s));
+            segments += &format!(r#"<span style="width:{width:.2}%">{id} {time_s:.2} s</span>"#);
+            from_s = time_s;
+        }
+        let rest = percent(self.duration_s() - from_s);
+        if rest > 0.0 {
+            segments += &format!(r#"<span class="rest" style="width:{rest:.2}%"></span>"#);
+        }
+        let end_s = self.duration_s();
+        format!(
+            r#"<div class="timeline">{segments}</div><div class="scale"><span>0 s</span><span>{end_s:.2} s</span></div>"#
+        )
+    }
+
+    fn phases(&self) -> String {
+        let mut rows = String::new();
+        for (index, phase) in self.task.phases.iter().enumerate() {
+            let id = Phase::number(index);
+            let (class, reached) = match self.result.phases.reached_s(&id) {
+                Some(time_s) => ("good", format!("{time_s:.2} s")),
+                None => ("bad", "not reached".into()),
+            };
+            let name = escape(&phase.id.replace('_', " "));
+            let who = if phase.collaborative { "together" } else { "alone" };
+            let condition = escape(phase.description);
+            rows += &format!(
+                r#"<tr><td>{id} {name}</td><td class="{class}">{reached}</td><td>{who}</td><td>{condition}</td></tr>"#
+            );
+        }
+        format!(
+            "<table><tr><th>Phase</th><th>Reached at</th><th>Robots work</th><th>Condition</th></tr>{rows}</table>"
+        )
+    }
+
+    fn budget(&self) -> String {
+        let Rules { episode_steps, initial_hold_steps, thinking, .. } =
+            rules(self.result.protocol, self.task);
+        let steps = self.result.env_steps;
+        let hold = match initial_hold_steps {
+            0 => String::new(),
+            hold => format!(", {hold} of them the initial hold"),
+        };
+        let mut rows = format!(
+            r#"<tr><td>Control steps of 20 ms</td><td><meter max="{episode_steps}" value="{steps}"></meter></td><td>{steps} of {episode_steps}{hold}</td></tr>"#
+        );
+        if let (Some(allowed), Some(left_s)) = (thinking, self.budget_left.and_then(|b| b.wall_clock_left_s))
+        {
+            let allowed_s = allowed.as_secs_f64();
+            let used_s = allowed_s - left_s;
+            rows += &format!(
+                r#"<tr><td>Policy's own time</td><td><meter max="{allowed_s}" value="{used_s:.2}"></meter></td><td>{used_s:.1} of {allowed_s:.0} s by the last step</td></tr>"#
+            );
+        }
+        format!("<table>{rows}</table>")
+    }
+
+    fn tool_calls(&self) -> String {
+        if self.calls.0.is_empty() {
+            return "<p>There were none.</p>".into();
+        }
+        let mut rows = String::new();
+        for (tool, [answered, refused]) in &self.calls.0 {
+            rows += &format!(
+                r#"<tr><td><code>{tool}</code></td><td class="number">{answered}</td><td class="number">{refused}</td></tr>"#
+            );
+        }
+        format!(
+            r#"<table><tr><th>Tool</th><th class="number">Answered</th><th class="number">Refused</th></tr>{rows}</table>"#
+        )
+    }
+
+    fn recording(&self) -> String {
+        let hash = escape(&self.result.state_hash);
+        format!(
+            r#"<p><code>episode.mcap</code> beside this page holds every control step. To watch it, open it as a local file in
+<a href="https://app.foxglove.dev">Foxglove</a> or any other reader of MCAP.</p>
+<ul>
+<li>3D panel: fixed frame <code>world</code>, topics <code>/scene</code> and <code>/tf</code>.</li>
+<li>Plots: <code>/A/joint_states</code>, <code>/A/action.row[0]</code> (its columns are named in the channel's metadata),
+<code>/A/base_command</code>, <code>/budget</code>; the same for the other robots.</li>
+<li>Tables: <code>/phases</code> and <code>/tool_calls</code>, where each call stands with its arguments and its reply.</li>
+</ul>
+<p>The same binary, seed and calls end in the same state, bit for bit: <code>{hash}</code>.</p>"#
+        )
+    }
+}
+
+/// Text as it may stand in HTML, in attributes too.
+fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' => escaped += "&amp;",
+            '<' => escaped += "&lt;",
+            '>' => escaped += "&gt;",
+            '"' => escaped += "&quot;",
+            '\'' => escaped += "&#39;",
+            other => escaped.push(other),
+        }
+    }
+    escaped
+}
+
+#[cfg(test)]
+mod tests;

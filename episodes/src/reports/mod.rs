@@ -1,0 +1,9 @@
+//! What an episode leaves for people to read: its result, a page, a strip of pictures.
+
+mod episode_page;
+mod results;
+mod strip;
+
+pub use episode_page::{CallCounts, EpisodePage};
+pub use results::EpisodeResult;
+pub use strip::{CELL_HEIGHT, CELL_WIDTH, Moment, View, png};

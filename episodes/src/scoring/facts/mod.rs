@@ -1,0 +1,168 @@
+//! What scoring and the experts may know about the world. None of it is served to a policy.
+
+use std::sync::Arc;
+
+use tandem_sim::{Pose, Side, Sides, Vector, mjcf::Site};
+
+/// Index of robot A in [`Facts::robots`].
+pub const A: usize = 0;
+/// Index of robot B.
+pub const B: usize = 1;
+
+/// The world at one control step.
+#[derive(Clone, Debug)]
+pub struct Facts {
+    /// Simulated seconds since the episode began.
+    pub time_s: f64,
+    /// One per robot, A first.
+    pub robots: Vec<RobotFacts>,
+    pub objects: Vec<ObjectFacts>,
+}
+
+/// One robot.
+#[derive(Clone, Debug)]
+pub struct RobotFacts {
+    pub pelvis_in_world: Pose,
+    pub wrist_in_pelvis: Sides<Pose>,
+    /// Force of the world on each palm, in the world's frame; estimated from the arm's own torques. A hand that
+    /// holds 0.5 kg still feels -4.9 N along z; one in quick motion feels its own inertia, too.
+    pub hand_force_n: Sides<Vector>,
+    pub fallen: bool,
+}
+
+/// One object and the hands on it.
+#[derive(Clone, Debug)]
+pub struct ObjectFacts {
+    pub name: String,
+    /// Points and regions that the object's file gives a name to.
+    pub sites: Arc<[Site]>,
+    pub pose_in_world: Pose,
+    pub velocity_m_s: Vector,
+    pub angular_velocity_rad_s: Vector,
+    /// Height of the object's origin above the floor when the episode began.
+    pub rest_height_m: f32,
+    /// By robot.
+    pub hands: Vec<Sides<Grip>>,
+    /// For how long no hand has touched it.
+    pub untouched_s: f64,
+}
+
+/// What a hand does to an object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Grip {
+    /// No contact at all.
+    Off,
+    /// Contact, but not from two sides.
+    Touching,
+    /// The grasp detector is satisfied.
+    Holding,
+}
+
+impl Facts {
+    /// Whether this hand of this robot holds `object`.
+    pub fn holds(&self, robot: usize, side: Side, object: &str) -> bool {
+        self.object(object).hands[robot][side] == Grip::Holding
+    }
+
+    /// Whether any hand of this robot holds `object`.
+    pub fn holds_any(&self, robot: usize, object: &str) -> bool {
+        self.object(object).hands[robot].iter().any(|grip| *grip == Grip::Holding)
+    }
+
+    /// Whether neither hand of this robot touches `object`.
+    pub fn hands_off(&self, robot: usize, object: &str) -> bool {
+        self.object(object).hands[robot] == Sides::both(Grip::Off)
+    }
+
+    /// For how long no hand has touched `object`.
+    pub fn untouched_s(&self, object: &str) -> f64 {
+        self.object(object).untouched_s
+    }
+
+    /// How far the origin of `object` is above where it rested when the episode began.
+    pub fn lift_m(&self, object: &str) -> f32 {
+        let object = self.object(object);
+        object.pose_in_world.translation.z - object.rest_height_m
+    }
+
+    /// Angle between the z axis of `object` and the world's.
+    pub fn tilt_rad(&self, object: &str) -> f32 {
+        let up_in_world = self.object(object).pose_in_world.rotation * Vector::Z;
+        up_in_world.angle_between(Vector::Z)
+    }
+
+    pub fn speed_m_s(&self, object: &str) -> f32 {
+        self.object(object).velocity_m_s.length()
+    }
+
+    pub fn turn_rate_rad_s(&self, object: &str) -> f32 {
+        self.object(object).angular_velocity_rad_s.length()
+    }
+
+    /// World position of the origin of `object`.
+    pub fn position_m(&self, object: &str) -> Vector {
+        self.object(object).pose_in_world.translation
+    }
+
+    /// World position of a point fixed to `object`, given in its frame.
+    pub fn point_m(&self, object: &str, point_in_object_m: Vector) -> Vector {
+        self.object(object).pose_in_world * point_in_object_m
+    }
+
+    /// World position of a site of `object`.
+    pub fn site_m(&self, object: &str, site: &str) -> Vector {
+        self.point_m(object, self.site(object, site).position_m())
+    }
+
+    /// Whether the origin of `object` is inside a site of `container` that is an upright cylinder.
+    pub fn inside_cylinder(&self, object: &str, container: &str, site: &str) -> bool {
+        let site = self.site(container, site);
+        let [low_m, high_m] = site.heights_m();
+        let local = self.object(container).pose_in_world.inverse() * self.position_m(object);
+        local.truncate().length() <= site.radius_m() && (low_m..=high_m).contains(&local.z)
+    }
+
+    /// Whether the origin of `object` is inside a site of `container` that is a box.
+    pub fn inside_box(&self, object: &str, container: &str, site: &str) -> bool {
+        let [low_m, high_m] = self.site(container, site).corners_m();
+        let local = self.object(container).pose_in_world.inverse() * self.position_m(object);
+        local.cmpge(low_m).all() && local.cmple(high_m).all()
+    }
+
+    /// Whether a rod of `object`, from one site to another, passes through a ring of `carrier`: a site with its axis along y.
+    pub fn threads(&self, object: &str, ends: [&str; 2], carrier: &str, ring: &str) -> bool {
+        let ring = self.site(carrier, ring);
+        let carrier_from_object =
+            self.object(carrier).pose_in_world.inverse() * self.object(object).pose_in_world;
+        let end_m = |end: &str| carrier_from_object * self.site(object, end).position_m() - ring.position_m();
+        let [a, b] = ends.map(end_m);
+        if a.y * b.y > 0.0 {
+            return false;
+        }
+        let crossing = a + (b - a) * (a.y / (a.y - b.y));
+        crossing.x.hypot(crossing.z) <= ring.radius_m()
+    }
+
+    /// A site of `object`. Objects' files name their sites, so one that is not there is a mistake in task or file.
+    pub fn site(&self, object: &str, name: &str) -> &Site {
+        match self.object(object).sites.iter().find(|site| site.name == name) {
+            Some(site) => site,
+            None => {
+                panic!("the file of {object:?} has no site {name:?}, which a task or its expert asks for")
+            }
+        }
+    }
+
+    /// Tasks name their own objects, so a name that is not there is a mistake in the task's file.
+    pub fn object(&self, name: &str) -> &ObjectFacts {
+        match self.objects.iter().find(|object| object.name == name) {
+            Some(object) => object,
+            None => panic!("the task's conditions name {name:?}, which its table of objects does not"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod constructed;
+#[cfg(test)]
+mod tests;

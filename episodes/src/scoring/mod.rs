@@ -1,0 +1,11 @@
+//! Scoring: what a control step shows of who holds what, and which phases that reaches. It reads steps and knows no task.
+
+mod facts;
+mod grasps;
+mod phases;
+mod scorekeeper;
+mod scores;
+
+pub use facts::{A, B, Facts, Grip, ObjectFacts, RobotFacts};
+pub use phases::{Done, Phase};
+pub use scores::{ScoreMemory, Scored, Scores};

@@ -1,0 +1,121 @@
+//! Which phases have been reached, and when. A phase is looked at only once its predecessors have been reached.
+
+use serde::{Deserialize, Serialize};
+
+use super::Facts;
+
+/// One scored phase.
+#[derive(Debug)]
+pub struct Phase {
+    pub id: &'static str,
+    /// When the phase counts as reached, for people and policies.
+    pub description: &'static str,
+    /// Whether more than one robot has to work on it.
+    pub collaborative: bool,
+    pub done: Done,
+}
+
+/// When a phase is reached. Conditions see one control step at a time; what has to happen in sequence says so here.
+#[derive(Debug)]
+pub enum Done {
+    /// As soon as the condition holds.
+    When(fn(&Facts) -> bool),
+    /// When `then` holds after `first` held; a step at which `broken` holds in between asks for `first` again.
+    Sequence { first: fn(&Facts) -> bool, then: fn(&Facts) -> bool, broken: fn(&Facts) -> bool },
+    /// When `condition` has held without a break for `for_s`, and `at_end` holds then too.
+    Lasting { condition: fn(&Facts) -> bool, for_s: f64, at_end: fn(&Facts) -> bool },
+}
+
+impl Phase {
+    /// What results call phase number `index`: `p1` for the first.
+    pub fn number(index: usize) -> String {
+        format!("p{}", index + 1)
+    }
+}
+
+/// The progress of one episode.
+#[derive(Clone, Debug)]
+pub struct PhaseTracker {
+    phases: &'static [Phase],
+    memory: PhaseMemory,
+}
+
+/// What a [`PhaseTracker`] remembers between control steps.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct PhaseMemory {
+    /// When each phase was reached, in simulated seconds.
+    reached_s: Vec<f64>,
+    /// Whether the `first` of the present phase's sequence has held, unbroken.
+    underway: bool,
+    /// Since when the present phase's lasting condition has held, in simulated seconds.
+    since_s: Option<f64>,
+}
+
+impl PhaseTracker {
+    pub fn new(phases: &'static [Phase]) -> PhaseTracker {
+        PhaseTracker { phases, memory: PhaseMemory::default() }
+    }
+
+    pub fn memory(&self) -> &PhaseMemory {
+        &self.memory
+    }
+
+    /// Goes back to an earlier [`PhaseTracker::memory`] of the same phases.
+    pub fn set_memory(&mut self, memory: PhaseMemory) {
+        self.memory = memory;
+    }
+
+    /// Looks at one control step; true if it reached a phase.
+    pub fn update(&mut self, facts: &Facts) -> bool {
+        let memory = &mut self.memory;
+        let before = memory.reached_s.len();
+        while let Some(phase) = self.phases.get(memory.reached_s.len()) {
+            if !memory.is_done(&phase.done, facts) {
+                break;
+            }
+            memory.reached_s.push(facts.time_s);
+            memory.underway = false;
+            memory.since_s = None;
+        }
+        memory.reached_s.len() > before
+    }
+
+    /// The phases reached so far, in order, with the time of each.
+    pub fn reached(&self) -> impl Iterator<Item = (&'static Phase, f64)> {
+        self.phases.iter().zip(self.memory.reached_s.iter().copied())
+    }
+
+    /// Whether the present phase is a sequence whose `first` has held, unbroken.
+    pub fn underway(&self) -> bool {
+        self.memory.underway
+    }
+
+    /// Whether the last phase has been reached.
+    pub fn complete(&self) -> bool {
+        self.memory.reached_s.len() == self.phases.len()
+    }
+}
+
+impl PhaseMemory {
+    fn is_done(&mut self, done: &Done, facts: &Facts) -> bool {
+        match done {
+            Done::When(condition) => condition(facts),
+            Done::Sequence { first, then, broken } => {
+                self.underway = (self.underway && !broken(facts)) || first(facts);
+                self.underway && then(facts)
+            }
+            Done::Lasting { condition, for_s, at_end } => {
+                self.since_s = condition(facts).then(|| self.since_s.unwrap_or(facts.time_s));
+                // Times are sums of control steps; half of one keeps rounding out.
+                let lasted =
+                    self.since_s.is_some_and(|since_s| facts.time_s - since_s >= for_s - HALF_STEP_S);
+                lasted && at_end(facts)
+            }
+        }
+    }
+}
+
+const HALF_STEP_S: f64 = 0.5 / tandem_sim::CONTROL_HZ;
+
+#[cfg(test)]
+mod tests;

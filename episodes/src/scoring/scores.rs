@@ -1,0 +1,79 @@
+//! The score of one episode: grasps, facts and phases, step by step. An episode under way and its recording are scored alike.
+
+use serde::{Deserialize, Serialize};
+use tandem_sim::{SimError, Step};
+
+use super::phases::{PhaseMemory, PhaseTracker};
+use super::scorekeeper::{Scorekeeper, Watched};
+use super::{Facts, Phase};
+
+/// How far an episode has come.
+#[derive(Clone, Debug)]
+pub struct Scores {
+    keeper: Scorekeeper,
+    phases: PhaseTracker,
+}
+
+/// What [`Scores`] remember between control steps.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct ScoreMemory {
+    objects: Vec<Watched>,
+    phases: PhaseMemory,
+}
+
+/// What one control step shows.
+pub struct Scored {
+    pub facts: Facts,
+    /// Whether it reached a phase.
+    pub reached: bool,
+}
+
+impl Scores {
+    /// Begins to score `phases`, which may ask for `objects`, given by name and file, with the state before the first
+    /// control step.
+    pub fn new<'a>(
+        phases: &'static [Phase],
+        objects: impl Iterator<Item = (&'a str, &'a str)>,
+        start: &Step,
+    ) -> Result<Scores, SimError> {
+        Ok(Scores { keeper: Scorekeeper::new(objects, start)?, phases: PhaseTracker::new(phases) })
+    }
+
+    /// Looks at the control step that follows the last one.
+    pub fn update(&mut self, step: &Step) -> Scored {
+        self.keeper.update(step);
+        let facts = self.keeper.facts(step);
+        let reached = self.phases.update(&facts);
+        Scored { facts, reached }
+    }
+
+    /// The facts after `step`, the last one that was looked at.
+    pub fn facts(&self, step: &Step) -> Facts {
+        self.keeper.facts(step)
+    }
+
+    /// The phases reached so far, in order, with the simulated time of each.
+    pub fn reached(&self) -> impl Iterator<Item = (&'static Phase, f64)> {
+        self.phases.reached()
+    }
+
+    /// Whether the present phase is a sequence that has begun.
+    pub fn underway(&self) -> bool {
+        self.phases.underway()
+    }
+
+    /// Whether the last phase has been reached.
+    pub fn complete(&self) -> bool {
+        self.phases.complete()
+    }
+
+    pub fn memory(&self) -> ScoreMemory {
+        ScoreMemory { objects: self.keeper.watched().to_vec(), phases: self.phases.memory().clone() }
+    }
+
+    /// Goes back to an earlier [`Scores::memory`] of the same phases and objects.
+    pub fn set_memory(&mut self, memory: ScoreMemory) {
+        self.keeper.set_watched(memory.objects);
+        self.phases.set_memory(memory.phases);
+    }
+}

@@ -1,0 +1,150 @@
+//! An episode at one instant, for going on from there later: in memory, or in a file that the same build reads again.
+//!
+//! The file is one line of JSON that says whose progress follows, so that `head -1` shows it, then the progress itself.
+
+use std::path::Path;
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use tandem_sim::Snapshot;
+use tandem_tools_spec::EndReason;
+use xxhash_rust::xxh3::xxh3_64;
+
+use super::{Session, this_build};
+use crate::commands::MotionState;
+use crate::error::{CheckpointError, EpisodeError};
+use crate::output::write_whole;
+use crate::scoring::ScoreMemory;
+use crate::spec::EpisodeSpec;
+
+/// An episode at one instant. It fits episodes of the same task, seed, protocol, robot and controller.
+#[derive(Clone)]
+pub struct Checkpoint {
+    origin: Origin,
+    progress: Progress,
+}
+
+/// Whose progress it is.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Origin {
+    pub spec: EpisodeSpec,
+    /// Names of robot and controller that tell files of different content apart.
+    pub robot: String,
+    pub locomotion: String,
+}
+
+/// All of an episode that changes.
+#[derive(Clone, Serialize, Deserialize)]
+struct Progress {
+    world: Snapshot,
+    motions: Vec<MotionState>,
+    scores: ScoreMemory,
+    tool_calls: u32,
+    thought: Duration,
+    ended: Option<EndReason>,
+}
+
+/// The first line of a file.
+#[derive(Serialize, Deserialize)]
+struct Header {
+    build: String,
+    #[serde(flatten)]
+    origin: Origin,
+    /// Length and hash of what follows.
+    bytes: usize,
+    xxh3: String,
+}
+
+impl Checkpoint {
+    /// Writes a file. A reader sees the whole of it or nothing.
+    pub fn write(&self, path: &Path) -> Result<(), EpisodeError> {
+        let progress = postcard::to_stdvec(&self.progress).map_err(CheckpointError::from)?;
+        let header = Header {
+            build: this_build()?.into(),
+            origin: self.origin.clone(),
+            bytes: progress.len(),
+            xxh3: hash(&progress),
+        };
+        let mut bytes = serde_json::to_vec(&header).map_err(crate::OutputError::from)?;
+        bytes.push(b'\n');
+        bytes.extend(progress);
+        write_whole(path, &bytes)?;
+        Ok(())
+    }
+
+    /// Reads a file that this build has written.
+    pub fn read(path: &Path) -> Result<Checkpoint, EpisodeError> {
+        let bytes =
+            std::fs::read(path).map_err(|source| CheckpointError::Read { path: path.into(), source })?;
+        let line = bytes.iter().position(|byte| *byte == b'\n').unwrap_or(bytes.len());
+        let header: Header = serde_json::from_slice(&bytes[..line])
+            .map_err(|source| CheckpointError::NotOne { path: path.into(), source })?;
+        let this = this_build()?;
+        if header.build != this {
+            let (made_by, episode) = (header.build, header.origin.episode());
+            return Err(CheckpointError::OtherBuild { path: path.into(), made_by, episode, this }.into());
+        }
+        let progress = bytes.get(line + 1..).unwrap_or_default();
+        if (progress.len(), hash(progress)) != (header.bytes, header.xxh3) {
+            let (have, expected) = (progress.len().min(header.bytes), header.bytes);
+            return Err(CheckpointError::Torn { path: path.into(), have, expected }.into());
+        }
+        let progress = postcard::from_bytes(progress).map_err(CheckpointError::from)?;
+        Ok(Checkpoint { origin: header.origin, progress })
+    }
+
+    /// The episode that it was made of.
+    pub fn spec(&self) -> &EpisodeSpec {
+        &self.origin.spec
+    }
+}
+
+impl Origin {
+    /// What has to be the same for progress to fit, in words.
+    fn episode(&self) -> String {
+        let EpisodeSpec { task, seed, protocol, .. } = &self.spec;
+        let (task, protocol, robot, locomotion) = (task.id, protocol.name(), &self.robot, &self.locomotion);
+        format!(
+            "task {task} seed {seed} under the {protocol} protocol with robot {robot} and controller {locomotion}"
+        )
+    }
+}
+
+fn hash(bytes: &[u8]) -> String {
+    format!("{:016x}", xxh3_64(bytes))
+}
+
+impl Session {
+    /// The episode as it stands.
+    pub fn checkpoint(&self) -> Result<Checkpoint, EpisodeError> {
+        let progress = Progress {
+            world: self.world.snapshot()?,
+            motions: self.motions.iter().map(|motion| motion.state().clone()).collect(),
+            scores: self.scores.memory(),
+            tool_calls: self.tool_calls,
+            thought: self.clock.spent(),
+            ended: self.ended,
+        };
+        Ok(Checkpoint { origin: self.origin.clone(), progress })
+    }
+
+    /// Takes the episode to a checkpoint of an episode of the same task, seed, protocol, robot and controller. On an error
+    /// the episode is as it was.
+    pub fn resume(&mut self, checkpoint: &Checkpoint) -> Result<(), EpisodeError> {
+        let (made_of, wanted) = (checkpoint.origin.episode(), self.origin.episode());
+        if made_of != wanted {
+            return Err(CheckpointError::OtherEpisode { made_of, wanted }.into());
+        }
+        let progress = &checkpoint.progress;
+        self.world.restore(&progress.world)?;
+        self.present = self.world.present();
+        for (motion, state) in self.motions.iter_mut().zip(&progress.motions) {
+            motion.set_state(state.clone());
+        }
+        self.scores.set_memory(progress.scores.clone());
+        self.tool_calls = progress.tool_calls;
+        self.clock.set_spent(progress.thought);
+        self.ended = progress.ended;
+        Ok(())
+    }
+}

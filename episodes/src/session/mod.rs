@@ -1,0 +1,220 @@
+//! An episode: a world, its rules, and the tool calls that act on it. Synchronous; it lives on a thread of its own.
+
+mod answer;
+mod build;
+mod checkpoint;
+mod clock;
+mod eyes;
+mod moment;
+mod replies;
+mod run_files;
+mod status;
+
+pub use checkpoint::Checkpoint;
+pub use clock::{Clock, monotonic};
+pub use run_files::RunFiles;
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use tandem_sim::{RobotCommand, Step, World};
+use tandem_tools_spec::{EndReason, ResultReply, ToolCall, ToolReply};
+
+use crate::commands::{Command, Motion, Run};
+use crate::protocol::{Rules, rules};
+use crate::scoring::{Facts, Scores};
+use crate::spec::{EpisodeSpec, Start};
+use crate::{EpisodeError, fingerprint};
+use build::Built;
+use checkpoint::Origin;
+use clock::ThinkingClock;
+use eyes::Eyes;
+
+/// One episode from start to result.
+pub struct Session {
+    origin: Origin,
+    rules: Rules,
+    world: World,
+    /// What the last control step left behind.
+    present: Step,
+    motions: Vec<Motion>,
+    scores: Scores,
+    clock: ThinkingClock,
+    eyes: Eyes,
+    files: Option<RunFiles>,
+    tool_calls: u32,
+    /// Time that physics took, for the real-time factor.
+    physics: Duration,
+    ended: Option<EndReason>,
+}
+
+impl Session {
+    /// Builds the world of `spec` and takes it to where the episode begins, which under some protocols is after an initial
+    /// hold. With a folder, the episode is recorded there.
+    pub fn start(spec: &EpisodeSpec, folder: Option<&Path>) -> Result<Session, EpisodeError> {
+        Session::start_with_clock(spec, folder, monotonic())
+    }
+
+    /// As [`Session::start`], with the policy's wall clock read from `clock`.
+    pub fn start_with_clock(
+        spec: &EpisodeSpec,
+        folder: Option<&Path>,
+        clock: Clock,
+    ) -> Result<Session, EpisodeError> {
+        let Built { world, motions, robot, locomotion } = build::build(spec)?;
+        let rules = rules(spec.protocol, spec.task);
+        let present = world.present();
+        let mut session = Session {
+            origin: Origin { spec: spec.clone(), robot, locomotion },
+            rules,
+            motions,
+            scores: spec.task.scores(&present)?,
+            clock: ThinkingClock::new(rules.thinking, clock),
+            eyes: Eyes::new(spec.renderer, &world),
+            files: None,
+            tool_calls: 0,
+            physics: Duration::ZERO,
+            ended: None,
+            present,
+            world,
+        };
+        session.begin(folder)?;
+        session.clock.resume();
+        Ok(session)
+    }
+
+    /// Takes a world that has just been built to where its episode begins.
+    fn begin(&mut self, folder: Option<&Path>) -> Result<(), EpisodeError> {
+        let hold_steps = match &self.origin.spec.start {
+            Start::Task => self.rules.initial_hold_steps,
+            Start::Checkpoint(path) => {
+                let checkpoint = Checkpoint::read(path)?;
+                self.resume(&checkpoint)?;
+                0
+            }
+        };
+        if let Some(folder) = folder {
+            self.files = Some(RunFiles::create(folder, self)?);
+        }
+        self.keep_picture("start")?;
+        if hold_steps > 0 {
+            self.run(Command::hold(hold_steps, self.motions.len()))?;
+        }
+        Ok(())
+    }
+
+    /// Answers a tool call. An error changes nothing but the count of calls.
+    pub fn call(&mut self, call: ToolCall) -> Result<ToolReply, EpisodeError> {
+        self.clock.pause();
+        if self.ended.is_none() && self.clock.exhausted() {
+            self.ended = Some(EndReason::WallClockExhausted);
+        }
+        let answer = call.validate().map_err(EpisodeError::from).and_then(|()| self.answer(&call));
+        self.tool_calls += 1;
+        if let Some(files) = &mut self.files {
+            files.tool_call(self.present.time_s, &call, &answer)?;
+        }
+        self.clock.resume();
+        answer
+    }
+
+    /// Executes a command; fewer of its steps if the last phase is reached or the budget ends. Returns how many.
+    fn run(&mut self, command: Command) -> Result<u32, EpisodeError> {
+        let steps = command.steps.min(self.steps_left());
+        let movements = command.orders.into_iter().map(|order| order.movement);
+        let mut runs: Vec<Run> = movements
+            .zip(&mut self.motions)
+            .map(|(movement, motion)| Run::begin(movement, steps, motion))
+            .collect();
+        for step in 1..=steps {
+            self.step(&mut runs)?;
+            if self.scores.complete() {
+                return Ok(step);
+            }
+        }
+        Ok(steps)
+    }
+
+    /// One control step, from the robots' movements to what is scored and recorded of it.
+    fn step(&mut self, runs: &mut [Run]) -> Result<(), EpisodeError> {
+        let started = Instant::now();
+        let commands: Vec<RobotCommand> =
+            runs.iter_mut().zip(&mut self.motions).map(|(run, motion)| run.command(motion)).collect();
+        self.present = self.world.control_step(&commands);
+        self.physics += started.elapsed();
+        let was_underway = self.scores.underway();
+        let scored = self.scores.update(&self.present);
+        let budget = self.budget();
+        if let Some(files) = &mut self.files {
+            files.step(&self.present, &scored.facts, budget)?;
+        }
+        if scored.reached {
+            self.phase_reached()
+        } else if self.scores.underway() && !was_underway {
+            self.keep_picture("together")
+        } else {
+            Ok(())
+        }
+    }
+
+    fn phase_reached(&mut self) -> Result<(), EpisodeError> {
+        let Some(phase) = self.phases().pop() else { return Ok(()) };
+        self.keep_picture(&format!("{} {}", phase.id, phase.name.replace('_', " ")))?;
+        if let Some(files) = &mut self.files {
+            files.phase(&phase)?;
+        }
+        Ok(())
+    }
+
+    /// Keeps a picture of this moment for the strip, if the episode is recorded.
+    fn keep_picture(&mut self, caption: &str) -> Result<(), EpisodeError> {
+        if let Some(files) = &mut self.files {
+            let names = self.motions.iter().map(|motion| motion.robot.name.as_str());
+            files.keep(moment::capture(caption, &self.present, names, &mut self.eyes));
+        }
+        Ok(())
+    }
+
+    /// What the episode is.
+    pub fn spec(&self) -> &EpisodeSpec {
+        &self.origin.spec
+    }
+
+    /// What the last control step left behind.
+    pub fn present(&self) -> &Step {
+        &self.present
+    }
+
+    /// What scoring and experts see.
+    pub fn facts(&self) -> Facts {
+        self.scores.facts(&self.present)
+    }
+
+    /// Why the episode has ended, if it has.
+    pub fn ended(&self) -> Option<EndReason> {
+        self.ended
+    }
+
+    /// Equal for equal physical states, 16 hexadecimal digits.
+    pub fn state_hash(&self) -> String {
+        format!("{:016x}", self.world.state_hash())
+    }
+
+    /// Ends the episode and writes what a recorded one leaves behind.
+    pub fn close(mut self) -> Result<ResultReply, EpisodeError> {
+        self.ended.get_or_insert(EndReason::Finished);
+        if !self.scores.complete() {
+            self.keep_picture("end")?;
+        }
+        let result = self.result();
+        if let Some(files) = self.files {
+            files.finish(&result, self.origin.spec.task)?;
+        }
+        Ok(result)
+    }
+}
+
+/// [`fingerprint::build`] as an episode's own error.
+fn this_build() -> Result<&'static str, EpisodeError> {
+    fingerprint::build().map_err(EpisodeError::Build)
+}

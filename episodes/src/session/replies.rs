@@ -1,0 +1,47 @@
+//! What a robot measures of itself, and its camera's calibration, as replies.
+
+use tandem_sim::render::Camera;
+use tandem_sim::{Step, Vector};
+use tandem_tools_spec::{CameraCalibration, JointValues, RobotState};
+
+use crate::commands::RobotSheet;
+use crate::convert::{opencv_axes, rounded, wire_base, wire_pose_from_sim, wire_vector};
+
+/// What robot number `robot`, described by `sheet`, measures after `step`.
+pub fn robot_state(step: &Step, robot: usize, sheet: &RobotSheet) -> RobotState {
+    let (state, command) = (&step.robots[robot].state, &step.robots[robot].command);
+    let named = |values: &[f32]| {
+        let joints = sheet.model.joints.iter().zip(values);
+        JointValues(joints.map(|(joint, value)| (joint.name.clone(), f64::from(*value))).collect())
+    };
+    let down = state.world_from_pelvis.rotation.inverse() * Vector::new(0.0, 0.0, -1.0);
+    RobotState {
+        robot: sheet.name.clone(),
+        time_s: step.time_s,
+        joint_positions_rad: named(&state.q_rad),
+        joint_velocities_rad_s: named(&state.qd_rad_s),
+        joint_torques_n_m: named(&state.torque_n_m),
+        left_wrist: wire_pose_from_sim(&state.pelvis_from_wrist.left),
+        right_wrist: wire_pose_from_sim(&state.pelvis_from_wrist.right),
+        gravity_in_pelvis: wire_vector(down),
+        base_command: wire_base(&command.base),
+        fallen: state.fallen,
+    }
+}
+
+/// Of the camera in the head of robot number `robot`, called `name`, after `step`.
+pub fn calibration(step: &Step, robot: usize, name: &str, camera: &Camera) -> CameraCalibration {
+    let [cx, cy] = camera.principal_point_px();
+    let focal_px = rounded(camera.focal_px().into());
+    CameraCalibration {
+        robot: name.into(),
+        width: camera.width,
+        height: camera.height,
+        fx: focal_px,
+        fy: focal_px,
+        // The wire counts from the first pixel's centre, the camera from its corner.
+        cx: f64::from(cx) - 0.5,
+        cy: f64::from(cy) - 0.5,
+        camera_in_pelvis: wire_pose_from_sim(&opencv_axes(&step.robots[robot].state.pelvis_from_camera)),
+    }
+}

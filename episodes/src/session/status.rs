@@ -1,0 +1,93 @@
+//! How the episode stands: budget, phases, falls, result.
+
+use tandem_tools_spec::{
+    Briefing, Budget, EndReason, PhaseReached, PhaseTimes, ResultReply, RobotFallen, StatusReply,
+};
+
+use super::Session;
+use crate::commands::action_row;
+use crate::convert::rounded;
+use crate::describe;
+use crate::scoring::Phase;
+
+impl Session {
+    pub(super) fn steps_left(&self) -> u32 {
+        self.rules.episode_steps.saturating_sub(self.env_steps())
+    }
+
+    fn env_steps(&self) -> u32 {
+        self.present.control_step as u32
+    }
+
+    pub(super) fn budget(&self) -> Budget {
+        Budget {
+            steps_left: self.steps_left(),
+            wall_clock_left_s: self.clock.left().map(|left| rounded(left.as_secs_f64())),
+            steps_per_command: self.rules.steps_per_command,
+        }
+    }
+
+    pub(super) fn fallen(&self) -> Vec<RobotFallen> {
+        let robots = self.motions.iter().zip(&self.present.robots);
+        robots
+            .map(|(motion, step)| RobotFallen { robot: motion.robot.name.clone(), fallen: step.state.fallen })
+            .collect()
+    }
+
+    pub(super) fn phases(&self) -> Vec<PhaseReached> {
+        let reached = self.scores.reached().enumerate();
+        reached
+            .map(|(index, (phase, time_s))| PhaseReached {
+                id: Phase::number(index),
+                name: phase.id.into(),
+                time_s,
+            })
+            .collect()
+    }
+
+    pub(super) fn status(&self) -> StatusReply {
+        StatusReply {
+            task: self.spec().task.id.into(),
+            seed: self.spec().seed,
+            protocol: self.spec().protocol,
+            time_s: self.present.time_s,
+            env_steps: self.env_steps(),
+            ended: self.ended,
+            fallen: self.fallen(),
+            phases: self.phases(),
+            budget: self.budget(),
+            state_hash: self.state_hash(),
+        }
+    }
+
+    /// What has to be known to begin.
+    pub fn briefing(&self) -> Briefing {
+        let task = self.spec().task;
+        Briefing {
+            instruction: task.instruction.into(),
+            instructions: describe::instructions(task),
+            robots: self.motions.iter().map(|motion| describe::robot(&motion.robot)).collect(),
+            action_row: action_row(&self.motions[0].robot.model),
+            status: self.status(),
+        }
+    }
+
+    /// The result as it stands.
+    pub fn result(&self) -> ResultReply {
+        let mut times_s = self.scores.reached().map(|(_, time_s)| time_s);
+        let phases = (0..self.spec().task.phases.len()).map(|index| (Phase::number(index), times_s.next()));
+        let physics_s = self.physics.as_secs_f64();
+        ResultReply {
+            task: self.spec().task.id.into(),
+            seed: self.spec().seed,
+            protocol: self.spec().protocol,
+            phases: PhaseTimes(phases.collect()),
+            ended: self.ended.unwrap_or(EndReason::Finished),
+            env_steps: self.env_steps(),
+            tool_calls: self.tool_calls,
+            falls: self.fallen().iter().filter(|robot| robot.fallen).count() as u32,
+            realtime_factor: if physics_s > 0.0 { self.present.time_s / physics_s } else { 0.0 },
+            state_hash: self.state_hash(),
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! What makes an episode what it is, in one value: from a request or flags to the session, the recording and the results.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use tandem_sim::{LocomotionChoice, SimError};
+use tandem_tools_spec::Protocol;
+
+use crate::tasks::{self, Task};
+
+/// Everything that makes an episode what it is. Equal values, played by equal calls on the same build, end in the same
+/// state, bit for bit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EpisodeSpec {
+    #[serde(with = "tasks::by_id")]
+    pub task: &'static Task,
+    pub seed: u32,
+    pub protocol: Protocol,
+    pub robot: RobotFile,
+    pub locomotion: Controller,
+    pub renderer: RendererKind,
+    pub start: Start,
+}
+
+/// Which file describes the robots.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RobotFile {
+    /// One that the binary carries, by name.
+    Embedded(String),
+    /// An MJCF file.
+    File(PathBuf),
+}
+
+/// Which base controller the robots have.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Controller {
+    /// Our own.
+    #[default]
+    Balance,
+    /// A velocity policy in an ONNX file.
+    File(PathBuf),
+}
+
+/// Who draws what robots see.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RendererKind {
+    #[default]
+    Cpu,
+}
+
+/// Where an episode begins.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Start {
+    /// At the task's own beginning under the seed.
+    #[default]
+    Task,
+    /// Where another episode of the same task, seed, protocol, robot and controller stood: a [`crate::Checkpoint`]'s file.
+    Checkpoint(PathBuf),
+}
+
+impl EpisodeSpec {
+    /// An episode of the embedded robot under our own controller, from the task's beginning.
+    pub fn new(task: &'static Task, seed: u32, protocol: Protocol) -> EpisodeSpec {
+        EpisodeSpec {
+            task,
+            seed,
+            protocol,
+            robot: RobotFile::default(),
+            locomotion: Controller::default(),
+            renderer: RendererKind::default(),
+            start: Start::default(),
+        }
+    }
+}
+
+impl Default for RobotFile {
+    fn default() -> RobotFile {
+        RobotFile::Embedded(tandem_sim::assets::DEFAULT_ROBOT.into())
+    }
+}
+
+impl RobotFile {
+    /// For messages: the embedded file's name, or the path.
+    pub fn name(&self) -> String {
+        match self {
+            RobotFile::Embedded(name) => name.clone(),
+            RobotFile::File(path) => path.display().to_string(),
+        }
+    }
+
+    /// The file's text.
+    pub fn read(&self) -> Result<String, SimError> {
+        match self {
+            RobotFile::Embedded(name) => Ok(tandem_sim::assets::robot(name)?.into()),
+            RobotFile::File(path) => std::fs::read_to_string(path)
+                .map_err(|source| SimError::Read { path: path.display().to_string(), source }),
+        }
+    }
+}
+
+impl Controller {
+    /// The controller of a file, or our own without one.
+    pub fn from_file(path: Option<&Path>) -> Controller {
+        path.map_or(Controller::Balance, |path| Controller::File(path.into()))
+    }
+
+    /// Reads and checks the file.
+    pub fn load(&self) -> Result<LocomotionChoice, SimError> {
+        match self {
+            Controller::Balance => Ok(LocomotionChoice::Balance),
+            Controller::File(path) => LocomotionChoice::from_file(Some(path)),
+        }
+    }
+}

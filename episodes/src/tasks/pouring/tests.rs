@@ -1,0 +1,61 @@
+//! Both sides of every threshold of Pouring.
+
+use tandem_sim::{Side::Right, Vector};
+
+use super::*;
+use crate::scoring::{
+    B,
+    Grip::{Holding, Touching},
+};
+
+fn lifted(cup_m: f32, glass_m: f32) -> Facts {
+    Facts::at_rest(&TASK).raised("cup", cup_m).raised("glass", glass_m)
+}
+
+#[test]
+fn both_vessels_on_both_sides_of_3_cm() {
+    for (cup_m, glass_m, expected) in
+        [(0.0301, 0.0301, true), (0.0299, 0.0301, false), (0.0301, 0.0299, false)]
+    {
+        assert_eq!(both_aloft(&lifted(cup_m, glass_m)), expected, "{cup_m} {glass_m}");
+    }
+}
+
+#[test]
+fn tip_on_both_sides_of_60_degrees() {
+    let held = |grip, lift_m, degrees: f32| {
+        let cup = lifted(lift_m, 0.1).grip(A, Right, "cup", grip);
+        cup.turned("cup", Vector::X, degrees.to_radians())
+    };
+    for (facts, expected) in [
+        (held(Holding, 0.1, 60.1), true),
+        (held(Holding, 0.1, 59.9), false),
+        (held(Touching, 0.1, 60.1), false),
+        (held(Holding, 0.0301, 60.1), true),
+        (held(Holding, 0.0299, 60.1), false),
+        (lifted(0.1, 0.1).grip(B, Right, "cup", Holding).turned("cup", Vector::X, 1.5), false),
+    ] {
+        assert_eq!(tipped(&facts), expected);
+    }
+}
+
+#[test]
+fn marble_on_both_sides_of_the_glass() {
+    let marble = |offset_m: Vector| {
+        let mut facts = lifted(0.1, 0.1);
+        let glass = facts.object("glass").pose_in_world;
+        facts.object_mut("marble").pose_in_world.translation = glass * offset_m;
+        facts
+    };
+    for (offset_m, expected) in [
+        (Vector::new(0.0, 0.0, 0.02), true),
+        (Vector::new(0.0499, 0.0, 0.02), true),
+        (Vector::new(0.0501, 0.0, 0.02), false),
+        (Vector::new(0.0, 0.0, 0.139), true),
+        (Vector::new(0.0, 0.0, 0.141), false),
+        (Vector::new(0.0, 0.0, 0.001), true),
+        (Vector::new(0.0, 0.0, -0.001), false),
+    ] {
+        assert_eq!(marble_in_glass(&marble(offset_m)), expected, "{offset_m}");
+    }
+}

@@ -1,0 +1,185 @@
+//! Sessions on real physics: what repeats, what a command moves and what it leaves alone, what a policy is charged.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::time::Duration;
+
+use crate::common::*;
+use tandem_episodes::{A, B, Clock, EpisodeError, Session};
+use tandem_sim::Vector;
+use tandem_tools_spec::{
+    CheckReach, EndReason, Finish, LookReply, ManageReply, MoveWrists, Observe, Protocol, QueryDepth,
+    StopReason, ToolCall, ToolReply, Wait, Walk, WalkMove, WristMove,
+};
+
+#[test]
+fn the_same_seed_and_calls_give_the_same_state_and_others_do_not() {
+    let hash_after = |seed| {
+        let mut session = handover(seed);
+        play(&mut session);
+        session.state_hash()
+    };
+    let first = hash_after(3);
+    assert_eq!(first, hash_after(3));
+    assert_ne!(first, hash_after(4));
+}
+
+#[test]
+fn a_wrist_arrives_and_nobody_else_moves() {
+    let mut session = handover(0);
+    wait(&mut session, 25);
+    let partner = state(&mut session, "B");
+    command(&mut session, raise_hand(50));
+    let reply = command(&mut session, raise_hand(25));
+    let right = &reply.robots[0].right;
+    assert!(right.position_error_m < 0.01, "{} m short", right.position_error_m);
+    assert!(right.orientation_error_rad < 0.05, "{} rad off", right.orientation_error_rad);
+    assert!(right.joints_clamped.is_empty() && right.joints_at_limit.is_empty(), "{right:?}");
+    assert!(reply.robots[0].left.position_error_m < 0.01, "the other hand stays: {:?}", reply.robots[0].left);
+    assert_eq!(reply.robots.len(), 1, "only robots that the command names are reported on");
+    let finger = state(&mut session, "A").joint_positions_rad.get("right_hand_middle_0_joint").unwrap();
+    assert!((finger - 0.6).abs() < 0.05, "finger at {finger} rad");
+
+    let moved = state(&mut session, "B");
+    for (before, after) in [(partner.left_wrist, moved.left_wrist), (partner.right_wrist, moved.right_wrist)]
+    {
+        let apart = Vector::from_array(std::array::from_fn(|axis| {
+            (before.position_m[axis] - after.position_m[axis]) as f32
+        }));
+        assert!(apart.length() < 0.005, "B's wrist moved by {} m", apart.length());
+    }
+}
+
+#[test]
+fn a_wrist_that_cannot_arrive_is_reported_short() {
+    let mut session = handover(0);
+    let far = WristMove { right_position_m: Some([0.9, -0.2, 0.2]), ..WristMove::hold("A") };
+    let call = ToolCall::from(MoveWrists { steps: 50, robots: vec![far] });
+    command(&mut session, call.clone());
+    let reply = command(&mut session, call);
+    let right = &reply.robots[0].right;
+    assert!(right.position_error_m > 0.2, "{} m short", right.position_error_m);
+    assert_eq!(right.target.position_m, [0.9, -0.2, 0.2]);
+    assert!(!reply.fallen.iter().any(|robot| robot.fallen));
+}
+
+#[test]
+fn checking_reach_tells_near_from_far_and_moves_nothing() {
+    let mut session = handover(0);
+    let before = session.state_hash();
+    for (position_m, reachable) in [([0.28, -0.24, 0.22], true), ([0.9, -0.2, 0.2], false)] {
+        let call = CheckReach {
+            robot: "A".into(),
+            left_position_m: None,
+            left_quaternion_wxyz: None,
+            right_position_m: Some(position_m),
+            right_quaternion_wxyz: Some([1.0, 0.0, 0.0, 0.0]),
+        };
+        let ToolReply::Look(LookReply::CheckReach(reply)) = session.call(call.into()).unwrap() else {
+            panic!("no reach")
+        };
+        assert_eq!((reply.reachable, reply.right.reachable), (reachable, reachable), "{reply:?}");
+    }
+    assert_eq!(session.state_hash(), before);
+}
+
+#[test]
+fn height_persists_and_velocities_do_not() {
+    let mut session = handover(0);
+    let height_m = |session: &Session| f64::from(session.facts().robots[B].pelvis_in_world.translation.z);
+    command(&mut session, squat(0.66));
+    wait(&mut session, 50);
+    wait(&mut session, 50);
+    assert!((height_m(&session) - 0.66).abs() < 0.015, "pelvis at {} m", height_m(&session));
+    let walk =
+        WalkMove { robot: "B".into(), vx_m_s: 0.05, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m: None };
+    command(&mut session, Walk { steps: 2, robots: vec![walk] }.into());
+    wait(&mut session, 1);
+    let base = state(&mut session, "B").base_command;
+    assert_eq!((base.vx_m_s, base.vy_m_s, base.yaw_rate_rad_s), (0.0, 0.0, 0.0));
+    assert!((base.pelvis_height_m - 0.66).abs() < 1e-6);
+}
+
+#[test]
+fn depth_finds_the_bottle_where_it_is() {
+    let mut session = handover(2);
+    wait(&mut session, 25);
+    let facts = session.facts();
+    let robot = &facts.robots[A];
+    let bottle = facts.object("bottle").pose_in_world;
+    let pelvis_from_bottle = robot.pelvis_in_world.inverse() * bottle;
+    let label = pelvis_from_bottle * Vector::new(0.0, 0.0, 0.09);
+
+    let ToolReply::Look(LookReply::Observe(seen)) =
+        session.call(Observe { robots: Some(vec!["A".into()]) }.into()).unwrap()
+    else {
+        panic!("no observation")
+    };
+    let camera = &seen.cameras[0];
+    assert_eq!((camera.width, camera.height, seen.images.len()), (320, 240, 1));
+    // The pinhole formula that the reply's description gives to a policy, with its numbers only.
+    let [w, i, j, k] = camera.camera_in_pelvis.quaternion_wxyz.map(|part| part as f32);
+    let rotation = tandem_sim::Rotation::from_xyzw(i, j, k, w);
+    let origin = Vector::from_array(camera.camera_in_pelvis.position_m.map(|part| part as f32));
+    let in_camera = |in_pelvis: Vector| rotation.inverse() * (in_pelvis - origin);
+    let aim = in_camera(label);
+    let u = f64::from(aim.x / aim.z) * camera.fx + camera.cx;
+    let v = f64::from(aim.y / aim.z) * camera.fy + camera.cy;
+
+    let query = QueryDepth { robot: "A".into(), pixels: vec![[u.round() as i64, v.round() as i64]] };
+    let ToolReply::Look(LookReply::QueryDepth(reply)) = session.call(query.into()).unwrap() else {
+        panic!("no depth")
+    };
+    let point = Vector::from_array(reply.points[0].point_in_pelvis_m.unwrap().map(|part| part as f32));
+    let on_bottle = pelvis_from_bottle.inverse() * point;
+    let radius_m = on_bottle.x.hypot(on_bottle.y);
+    assert!((radius_m - 0.035).abs() < 0.002, "the glass is 3.5 cm from the axis, seen at {radius_m} m");
+    assert!(on_bottle.z > 0.09 && on_bottle.z < 0.2, "seen {} m above the base", on_bottle.z);
+    let depth_m = reply.points[0].depth_m.unwrap();
+    assert!((depth_m - f64::from(in_camera(point).z)).abs() < 1e-4, "depth and point disagree: {depth_m} m");
+}
+
+#[test]
+fn steps_are_charged_and_their_end_ends_the_episode() {
+    let mut session = handover(0);
+    assert_eq!(status(&mut session).budget.steps_left, 1000);
+    let refused = session.call(Wait { steps: 51 }.into()).unwrap_err();
+    assert_eq!(refused.to_string(), "51 control steps in one command; the benchmark protocol allows 1 to 50");
+    for done in 1..=19 {
+        let reply = wait(&mut session, 50);
+        assert_eq!((reply.executed_steps, reply.stop_reason), (50, StopReason::StepsDone));
+        assert_eq!(reply.budget.steps_left, 1000 - 50 * done);
+    }
+    wait(&mut session, 30);
+    let last = wait(&mut session, 50);
+    assert_eq!((last.executed_steps, last.stop_reason), (20, StopReason::StepBudgetExhausted));
+    let hash = session.state_hash();
+    let refused = session.call(Wait { steps: 1 }.into()).unwrap_err();
+    assert!(matches!(refused, EpisodeError::Ended { reason: EndReason::StepBudgetExhausted }), "{refused}");
+    let ToolReply::Manage(ManageReply::Finish(result)) = session.call(Finish {}.into()).unwrap() else {
+        panic!("no result")
+    };
+    assert_eq!((result.ended, result.env_steps), (EndReason::StepBudgetExhausted, 1000));
+    assert!(result.phases.0.iter().all(|(_, time_s)| time_s.is_none()), "idling reaches no phase");
+    assert_eq!(session.state_hash(), hash);
+}
+
+#[test]
+fn the_wall_clock_charges_thinking_and_ends_the_episode() {
+    let hands_s = Arc::new(AtomicU64::new(0));
+    let read = hands_s.clone();
+    let clock: Clock = Box::new(move || Duration::from_secs(read.load(Relaxed)));
+    let mut session =
+        Session::start_with_clock(&spec("handover", 0, Protocol::Agentic), None, clock).unwrap();
+    let left = |session: &mut Session| status(session).budget;
+    let budget = left(&mut session);
+    assert_eq!((budget.steps_left, budget.wall_clock_left_s), (5700, Some(1800.0)), "after the initial hold");
+    hands_s.fetch_add(1799, Relaxed);
+    assert_eq!(wait(&mut session, 1).budget.wall_clock_left_s, Some(1.0));
+    hands_s.fetch_add(1, Relaxed);
+    let hash = session.state_hash();
+    let refused = session.call(Wait { steps: 1 }.into()).unwrap_err();
+    assert!(matches!(refused, EpisodeError::Ended { reason: EndReason::WallClockExhausted }), "{refused}");
+    assert_eq!(status(&mut session).ended, Some(EndReason::WallClockExhausted));
+    assert_eq!(session.state_hash(), hash);
+}

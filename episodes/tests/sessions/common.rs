@@ -1,0 +1,83 @@
+//! Sessions to play with, and calls that they answer.
+
+use tandem_episodes::{EpisodeSpec, Session, tasks};
+use tandem_tools_spec::{
+    CommandReply, GetRobotState, GetStatus, JointChunk, LookReply, ManageReply, MoveWrists, Protocol,
+    RobotState, SendJointChunk, StatusReply, ToolCall, ToolReply, Wait, Walk, WalkMove, WristMove,
+};
+
+pub fn spec(task: &str, seed: u32, protocol: Protocol) -> EpisodeSpec {
+    EpisodeSpec::new(tasks::find(task).unwrap(), seed, protocol)
+}
+
+pub fn start(task: &str, seed: u32, protocol: Protocol) -> Session {
+    Session::start(&spec(task, seed, protocol), None).unwrap()
+}
+
+pub fn handover(seed: u32) -> Session {
+    start("handover", seed, Protocol::Benchmark)
+}
+
+pub fn command(session: &mut Session, call: ToolCall) -> CommandReply {
+    match session.call(call).unwrap() {
+        ToolReply::Act(reply) => reply,
+        other => panic!("{other:?} is no reply to a command"),
+    }
+}
+
+pub fn wait(session: &mut Session, steps: u32) -> CommandReply {
+    command(session, Wait { steps }.into())
+}
+
+pub fn status(session: &mut Session) -> StatusReply {
+    match session.call(GetStatus {}.into()).unwrap() {
+        ToolReply::Manage(ManageReply::GetStatus(status)) => status,
+        other => panic!("{other:?} is no status"),
+    }
+}
+
+pub fn state(session: &mut Session, robot: &str) -> RobotState {
+    match session.call(GetRobotState { robot: robot.into() }.into()).unwrap() {
+        ToolReply::Look(LookReply::GetRobotState(state)) => state,
+        other => panic!("{other:?} is no state"),
+    }
+}
+
+/// A's right hand to the side of its chest, fingers half closed.
+pub fn raise_hand(steps: u32) -> ToolCall {
+    let raise = WristMove {
+        right_position_m: Some([0.28, -0.24, 0.22]),
+        right_quaternion_wxyz: Some([1.0, 0.0, 0.0, 0.0]),
+        right_fingers_rad: Some([0.0, -0.4, -0.4, 0.6, 0.6, 0.6, 0.6]),
+        ..WristMove::hold("A")
+    };
+    MoveWrists { steps, robots: vec![raise] }.into()
+}
+
+pub fn squat(height_m: f64) -> ToolCall {
+    let entry = WalkMove {
+        robot: "B".into(),
+        vx_m_s: 0.0,
+        vy_m_s: 0.0,
+        yaw_rate_rad_s: 0.0,
+        pelvis_height_m: Some(height_m),
+    };
+    Walk { steps: 50, robots: vec![entry] }.into()
+}
+
+/// A second and a half in which every kind of command is used.
+pub fn play(session: &mut Session) {
+    command(session, raise_hand(25));
+    command(session, squat(0.70));
+    let rows = vec![row(session, "B"); 5];
+    command(session, SendJointChunk { robots: vec![JointChunk { robot: "B".into(), rows }] }.into());
+    wait(session, 10);
+}
+
+/// The action row under which a robot stays as it measures itself.
+pub fn row(session: &mut Session, robot: &str) -> Vec<f64> {
+    let columns = session.briefing().action_row;
+    let state = state(session, robot);
+    let base = [0.0, 0.0, 0.0, state.base_command.pelvis_height_m];
+    columns.iter().filter_map(|column| state.joint_positions_rad.get(column)).chain(base).collect()
+}

@@ -1,0 +1,8 @@
+//! Sessions on real physics.
+
+mod at_rest;
+mod checkpoints;
+mod commands;
+mod common;
+mod hand_force;
+mod recordings;

@@ -1,0 +1,160 @@
+//! `tandem demo`: the gateway in this process, and the scripted expert that plays the Handover task over real HTTP.
+
+use std::{
+    error::Error,
+    net::{Ipv4Addr, SocketAddr},
+    path::{Path, PathBuf},
+    process::ExitCode,
+    sync::Arc,
+};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use tandem_episodes::{
+    EpisodeSpec, Facts,
+    players::{self, Backstage, Caller, PlayerError},
+    tasks::{self, Task},
+};
+use tandem_tools_spec::{CommandReply, Protocol, ResultReply, StartEpisode, ToolCall, ToolReply};
+
+use super::{Outcome, Seeds, episode_flags::LocomotionFlag, log};
+use crate::{
+    drivers::HttpEpisode,
+    hosting::EpisodeThread,
+    http::Server,
+    settings::{Layer, Settings},
+};
+
+const TASK: &str = "handover";
+const LAST_PHASE: &str = "p3";
+/// The system picks one.
+const FREE_PORT: u16 = 0;
+
+/// Of the episodes played, how many in a hundred have to reach the last phase.
+const PASS_PERCENT: usize = 80;
+
+/// Play the Handover task by a scripted expert over real HTTP, and write what happened.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// One seed, or a range of seeds as 0..9, both ends included.
+    #[arg(long = "seed", default_value = "0", value_name = "SEED")]
+    seeds: Seeds,
+    /// Folder that the results are written to, one folder per episode.
+    #[arg(long, env = "TANDEM_RUNS", default_value = "runs", value_name = "DIR")]
+    runs: PathBuf,
+    #[command(flatten)]
+    locomotion: LocomotionFlag,
+}
+
+/// Plays; it is a failure if too few episodes reach the last phase.
+pub fn run(args: Args) -> Outcome {
+    log::to_stderr("warn");
+    let results = play_all(&args.runs, args.seeds, args.locomotion.file)?;
+    Ok(if passed(&results) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Plays every seed in turn, recorded under `runs`, by robots that walk by the policy of a file if one is given, and prints
+/// what came of it.
+pub fn play_all(
+    runs: &Path,
+    seeds: Seeds,
+    locomotion: Option<PathBuf>,
+) -> Result<Vec<ResultReply>, Box<dyn Error>> {
+    let flags = Layer {
+        listen: Some(SocketAddr::from((Ipv4Addr::LOCALHOST, FREE_PORT))),
+        runs: Some(runs.into()),
+        locomotion,
+        ..Layer::default()
+    };
+    let server = Server::start(Settings::resolve(flags, None)?)?;
+    let results = seeds.0.map(|seed| play(&server, seed)).collect::<Result<Vec<_>, _>>()?;
+    server.stop();
+    if results.len() > 1 {
+        println!("{LAST_PHASE} on {} of {}", placed(&results), results.len());
+    }
+    Ok(results)
+}
+
+/// Whether the last phase was reached on 80 % of the episodes; of a single one, whether it was reached.
+pub fn passed(results: &[ResultReply]) -> bool {
+    placed(results) * 100 >= results.len() * PASS_PERCENT
+}
+
+fn placed(results: &[ResultReply]) -> usize {
+    results.iter().filter(|result| result.phases.reached_s(LAST_PHASE).is_some()).count()
+}
+
+fn play(server: &Server, seed: u32) -> Result<ResultReply, Box<dyn Error>> {
+    let task = tasks::find(TASK)?;
+    let spec = EpisodeSpec::new(task, seed, Protocol::Agentic);
+    let args = StartEpisode { task: task.id.into(), seed, protocol: Some(spec.protocol) };
+    println!("{TASK}, seed {seed}, over http://{}", server.address());
+    let (http, started) = HttpEpisode::start(server.address(), &args)?;
+    let thread = server.table().get(&started.episode_id)?;
+    let mut episode = OverHttp { http, thread, progress: Progress::new(task.phases.len()) };
+    let outcome = players::find("expert")?.play(&spec, &mut episode);
+    let OverHttp { http, thread, progress } = episode;
+    progress.bar.finish_and_clear();
+    let result = http.delete()?;
+    if let Err(error) = outcome {
+        println!("  the expert gave up: {error}");
+    }
+    print_result(task, &result, thread.folder());
+    Ok(result)
+}
+
+fn print_result(task: &Task, result: &ResultReply, folder: &Path) {
+    for ((id, time_s), phase) in result.phases.0.iter().zip(task.phases) {
+        match time_s {
+            Some(time_s) => println!("  {id} {} reached at {time_s:.2} s", phase.id),
+            None => println!("  {id} {} not reached", phase.id),
+        }
+    }
+    println!(
+        "  {} control steps of 20 ms, {} tool calls, {} falls, {:.1}x real time on one thread",
+        result.env_steps, result.tool_calls, result.falls, result.realtime_factor
+    );
+    println!("  {}: result.json, episode.mcap, strip.png, report.html", folder.display());
+}
+
+/// The expert's way to its episode: it acts over HTTP like any policy, and looks behind the curtain in this process.
+struct OverHttp {
+    http: HttpEpisode,
+    thread: Arc<EpisodeThread>,
+    progress: Progress,
+}
+
+impl Caller for OverHttp {
+    fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {
+        let reply = self.http.call(call)?;
+        if let ToolReply::Act(reply) = &reply {
+            self.progress.show(reply);
+        }
+        Ok(reply)
+    }
+}
+
+impl Backstage for OverHttp {
+    fn facts(&mut self) -> Result<Facts, PlayerError> {
+        self.thread
+            .facts_blocking()
+            .map_err(|error| PlayerError::Call { tool: "facts", reason: error.to_string() })
+    }
+}
+
+/// A bar that counts phases, because how many steps a phase takes is not known before.
+struct Progress {
+    bar: ProgressBar,
+}
+
+impl Progress {
+    fn new(phases: usize) -> Progress {
+        let template = "  [{bar:30}] {pos} of {len} phases, {msg}";
+        let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        Progress { bar: ProgressBar::new(phases as u64).with_style(style.progress_chars("=> ")) }
+    }
+
+    fn show(&self, reply: &CommandReply) {
+        self.bar.set_position(reply.phases.len() as u64);
+        self.bar.set_message(format!("{:.1} s, {} steps left", reply.time_s, reply.budget.steps_left));
+    }
+}

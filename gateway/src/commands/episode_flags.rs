@@ -1,0 +1,93 @@
+//! The flags that say which episodes to play, and by robots of which kind.
+
+use std::path::PathBuf;
+
+use clap::{
+    Args,
+    builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
+};
+use tandem_episodes::{
+    Controller, RobotFile,
+    evaluation::Plan,
+    players,
+    tasks::{self, Task},
+};
+use tandem_tools_spec::Protocol;
+
+use super::Seeds;
+
+/// Which episodes to play.
+#[derive(Debug, Args)]
+pub struct EpisodeFlags {
+    /// Task ids separated by commas, or `all`.
+    #[arg(long, default_value = "all", value_name = "TASKS", value_parser = parse_tasks)]
+    tasks: TaskList,
+    /// One seed, or a range of seeds as 0-9, both ends included.
+    #[arg(long, default_value = "0-9", value_name = "SEEDS")]
+    seeds: Seeds,
+    /// The rules.
+    #[arg(long, value_parser = protocol_parser(), default_value = Protocol::Agentic.name())]
+    protocol: Protocol,
+    /// Worlds that run side by side.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    jobs: usize,
+    #[command(flatten)]
+    locomotion: LocomotionFlag,
+}
+
+/// The base controller on the command line.
+#[derive(Debug, Args)]
+pub struct LocomotionFlag {
+    /// ONNX file with a velocity policy for the G1 in place of our own base controller.
+    #[arg(long = "locomotion", env = "TANDEM_LOCOMOTION", value_name = "FILE")]
+    pub file: Option<PathBuf>,
+}
+
+impl LocomotionFlag {
+    /// Which controller the flag names; its file is not read yet.
+    pub fn controller(&self) -> Controller {
+        Controller::from_file(self.file.as_deref())
+    }
+}
+
+/// Tasks named on the command line. The name keeps clap from taking it for a flag that is given several times.
+#[derive(Debug, Clone)]
+struct TaskList(Vec<&'static Task>);
+
+/// The tasks that `text` names: `all`, or ids separated by commas.
+fn parse_tasks(text: &str) -> Result<TaskList, String> {
+    let found: Result<_, _> = match text {
+        "all" => Ok(tasks::ALL.iter().collect()),
+        ids => ids.split(',').map(|id| tasks::find(id.trim())).collect(),
+    };
+    found.map(TaskList).map_err(|error: tandem_episodes::EpisodeError| error.to_string())
+}
+
+/// One of the protocols, by name.
+fn protocol_parser() -> impl TypedValueParser<Value = Protocol> {
+    let find = |name: String| Protocol::ALL.into_iter().find(|protocol| protocol.name() == name);
+    PossibleValuesParser::new(Protocol::ALL.map(Protocol::name))
+        .try_map(move |name| find(name).ok_or("not one of the protocols"))
+}
+
+/// One of the players, by name.
+pub fn player_parser() -> impl TypedValueParser<Value = &'static players::Entry> {
+    let names = players::ALL.iter().map(|player| PossibleValue::new(player.name).help(player.about));
+    PossibleValuesParser::new(names).try_map(|name| players::find(&name))
+}
+
+impl EpisodeFlags {
+    /// The plan to have `player` play these episodes.
+    pub fn plan(self, player: &'static players::Entry, record: bool) -> Plan {
+        Plan {
+            player,
+            protocol: self.protocol,
+            robot: RobotFile::default(),
+            locomotion: self.locomotion.controller(),
+            tasks: self.tasks.0,
+            seeds: self.seeds.0.collect(),
+            jobs: self.jobs,
+            record,
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! `tandem locomotion`: the base controller on its own.
+
+use std::{path::PathBuf, process::ExitCode};
+
+use clap::Subcommand;
+use tandem_episodes::bench::{self, CaseReport};
+
+use super::{Outcome, episode_flags::LocomotionFlag};
+
+/// The base controller.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// What to do with it.
+    #[command(subcommand)]
+    part: Part,
+}
+
+#[derive(Debug, Subcommand)]
+enum Part {
+    /// Stand, walk, squat, carry, be pulled and pushed; report survival, errors and power per case.
+    Bench {
+        #[command(flatten)]
+        locomotion: LocomotionFlag,
+        /// Cases whose names contain one of these words, separated by commas.
+        #[arg(long, default_value = "", value_name = "WORDS")]
+        cases: String,
+        /// Seeds per case.
+        #[arg(long, default_value_t = 10, value_name = "N")]
+        seeds: usize,
+        /// JSON file to write.
+        #[arg(long, value_name = "OUT")]
+        json: Option<PathBuf>,
+    },
+}
+
+/// Plays the cases, prints a line per case as it ends, and writes JSON where it is asked for.
+pub fn run(args: Args) -> Outcome {
+    let Part::Bench { locomotion, cases, seeds, json } = args.part;
+    let choice = locomotion.controller().load()?;
+    println!("{}", CaseReport::HEAD);
+    let report = bench::locomotion(&choice, &cases, seeds, |case| println!("{case}"))?;
+    if let Some(path) = json {
+        std::fs::write(path, serde_json::to_string_pretty(&report)?)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

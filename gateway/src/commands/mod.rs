@@ -1,0 +1,20 @@
+//! What `tandem` can do: one file per subcommand, each with its flags and its `run`.
+
+pub mod bench;
+pub mod collect;
+pub mod demo;
+mod episode_flags;
+pub mod evaluate;
+pub mod locomotion;
+mod log;
+mod played;
+mod seeds;
+pub mod serve;
+pub mod tasks;
+
+use std::{error::Error, process::ExitCode};
+
+pub use seeds::Seeds;
+
+/// What the program ends with: an error is printed and is a failure, too.
+pub type Outcome = Result<ExitCode, Box<dyn Error>>;

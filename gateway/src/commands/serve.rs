@@ -1,0 +1,28 @@
+//! `tandem serve`: episodes for policies.
+
+use std::{path::PathBuf, process::ExitCode};
+
+use super::{Outcome, log};
+use crate::{
+    http::Server,
+    settings::{Layer, Settings},
+};
+
+/// Serve episodes over HTTP until SIGINT or SIGTERM.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// TOML file with any of the settings below; flags and environment come first.
+    #[arg(long, env = "TANDEM_CONFIG", value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Settings given as flags or environment.
+    #[command(flatten)]
+    flags: Layer,
+}
+
+/// Serves.
+pub fn run(args: Args) -> Outcome {
+    log::to_stderr("info");
+    let settings = Settings::resolve(args.flags, args.config.as_deref())?;
+    Server::start(settings)?.run_until_signal();
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,23 @@
+//! `tandem tasks`: what there is to play.
+
+use std::process::ExitCode;
+
+use tandem_episodes::LocomotionChoice;
+
+use super::Outcome;
+
+/// List the tasks and their phases.
+#[derive(Debug, clap::Args)]
+pub struct Args {}
+
+/// Prints the tasks as `list_tasks` has them.
+pub fn run(_: Args) -> Outcome {
+    for task in tandem_episodes::task_list(&LocomotionChoice::default().limits()).tasks {
+        println!("{}: {}", task.id, task.instruction);
+        for phase in task.phases {
+            let who = if phase.collaborative { "together" } else { "alone" };
+            println!("  {} {} ({who}): {}", phase.id, phase.name, phase.description);
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,76 @@
+//! A client of one episode over HTTP, as a policy written in Rust would use it.
+
+use std::{net::SocketAddr, time::Duration};
+
+use serde::Serialize;
+use serde_json::Value;
+use tandem_episodes::players::{Caller, PlayerError};
+use tandem_tools_spec::{ProblemBody, ResultReply, StartEpisode, StartReply, ToolCall, ToolReply};
+use ureq::{Agent, http::Response};
+
+/// Longer than any call takes: the slowest, the start with its initial hold, takes a few seconds.
+const TIMEOUT: Duration = Duration::from_secs(120);
+
+/// An episode on a server.
+#[derive(Debug)]
+pub struct HttpEpisode {
+    agent: Agent,
+    url: String,
+}
+
+/// Why a call over HTTP has no reply.
+#[derive(Debug, thiserror::Error)]
+pub enum HttpError {
+    /// The server refused, and said why.
+    #[error("{}", .0.detail)]
+    Refused(ProblemBody),
+    /// The server was not reached, or what it sent is no JSON.
+    #[error("no reply over HTTP: {0}")]
+    Transport(#[from] ureq::Error),
+    /// The reply is not what the contract says.
+    #[error("a reply that the contract does not know: {0}")]
+    Contract(#[from] serde_json::Error),
+}
+
+impl HttpEpisode {
+    /// Starts an episode on the server at `address`.
+    pub fn start(address: SocketAddr, args: &StartEpisode) -> Result<(HttpEpisode, StartReply), HttpError> {
+        let agent = Agent::config_builder()
+            .http_status_as_error(false)
+            .timeout_global(Some(TIMEOUT))
+            .build()
+            .new_agent();
+        let episodes = format!("http://{address}/v1/episodes");
+        let started: StartReply = serde_json::from_value(post(&agent, &episodes, args)?)?;
+        let url = format!("{episodes}/{}", started.episode_id);
+        Ok((HttpEpisode { agent, url }, started))
+    }
+
+    /// Ends the episode and closes its recording.
+    pub fn delete(self) -> Result<ResultReply, HttpError> {
+        Ok(serde_json::from_value(reply(self.agent.delete(&self.url).call()?)?)?)
+    }
+}
+
+impl Caller for HttpEpisode {
+    fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {
+        let url = format!("{}/tools/{}", self.url, call.name());
+        let answer = post(&self.agent, &url, &call).and_then(|reply| Ok(call.parse_reply(reply)?));
+        answer.map_err(|error| match error {
+            HttpError::Refused(problem) if problem.kind.ends_with(":ended") => PlayerError::EpisodeOver,
+            error => PlayerError::Call { tool: call.name(), reason: error.to_string() },
+        })
+    }
+}
+
+fn post(agent: &Agent, url: &str, body: &impl Serialize) -> Result<Value, HttpError> {
+    reply(agent.post(url).send_json(body)?)
+}
+
+fn reply(mut response: Response<ureq::Body>) -> Result<Value, HttpError> {
+    if response.status().is_success() {
+        Ok(response.body_mut().read_json()?)
+    } else {
+        Err(HttpError::Refused(response.body_mut().read_json()?))
+    }
+}

@@ -1,0 +1,151 @@
+//! The thread that owns one episode's world. Calls reach it through a bounded channel, each with its own reply, and a call
+//! whose caller has gone still finishes, is recorded and charged.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+};
+
+use tandem_episodes::{EpisodeError, EpisodeSpec, Facts, Session};
+use tandem_tools_spec::{Briefing, ResultReply, ToolCall, ToolReply};
+use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
+
+use super::HostingError;
+
+/// Calls that may wait for one episode. A policy has no use for more than one at a time; a few more are a burst.
+const WAITING_CALLS: usize = 16;
+
+/// The contact solver keeps large temporaries on the stack.
+const STACK_BYTES: usize = 8 << 20;
+
+enum Command {
+    Call { call: ToolCall, reply: oneshot::Sender<Result<ToolReply, EpisodeError>> },
+    Facts { reply: oneshot::Sender<Facts> },
+    Close { reply: oneshot::Sender<Closing> },
+}
+
+/// A running episode. Dropping the last handle ends the episode and closes its recording.
+#[derive(Debug)]
+pub struct EpisodeThread {
+    commands: mpsc::Sender<Command>,
+    ended: Arc<AtomicBool>,
+    folder: PathBuf,
+}
+
+impl EpisodeThread {
+    /// Makes the world on a thread of its own, runs the initial hold, and returns what the policy has to know. The permit
+    /// is one of the places for live episodes and is given back when the thread ends.
+    pub async fn start(
+        id: &str,
+        spec: EpisodeSpec,
+        folder: PathBuf,
+        permit: OwnedSemaphorePermit,
+    ) -> Result<(EpisodeThread, Briefing), HostingError> {
+        let (commands, inbox) = mpsc::channel(WAITING_CALLS);
+        let (started, start) = oneshot::channel();
+        let ended = Arc::new(AtomicBool::new(false));
+        let thread_ended = ended.clone();
+        let thread_folder = folder.clone();
+        let thread = move || {
+            match open_session(&spec, &thread_folder) {
+                Ok((session, briefing)) => {
+                    // A caller that went away during the start has dropped the inbox's other end, and serve returns.
+                    let _ = started.send(Ok(briefing));
+                    let closed = serve(session, inbox, &thread_ended);
+                    // The place is free before the caller hears of the end, so that it can start the next episode.
+                    drop(permit);
+                    closed.answer();
+                }
+                Err(error) => drop(started.send(Err(error))),
+            }
+        };
+        std::thread::Builder::new()
+            .name(id.into())
+            .stack_size(STACK_BYTES)
+            .spawn(thread)
+            .map_err(HostingError::Thread)?;
+        let briefing = start.await.map_err(|_| HostingError::EpisodeStopped)??;
+        Ok((EpisodeThread { commands, ended, folder }, briefing))
+    }
+
+    /// Runs a call and returns its reply.
+    pub async fn call(&self, call: ToolCall) -> Result<ToolReply, HostingError> {
+        let (reply, answer) = oneshot::channel();
+        self.send(Command::Call { call, reply })?;
+        Ok(answer.await.map_err(|_| HostingError::EpisodeStopped)??)
+    }
+
+    /// Where everything is and who touches what: for experts and scoring in this process, never for policies.
+    pub fn facts_blocking(&self) -> Result<Facts, HostingError> {
+        let (reply, answer) = oneshot::channel();
+        self.send(Command::Facts { reply })?;
+        answer.blocking_recv().map_err(|_| HostingError::EpisodeStopped)
+    }
+
+    /// Ends the episode after the calls already waiting, closes its recording and returns the result.
+    pub async fn close(&self) -> Result<ResultReply, HostingError> {
+        let (reply, answer) = oneshot::channel();
+        self.commands.send(Command::Close { reply }).await.map_err(|_| HostingError::EpisodeStopped)?;
+        let result = answer.await.map_err(|_| HostingError::EpisodeStopped)??;
+        Ok(result)
+    }
+
+    /// Whether the episode takes no more commands.
+    pub fn ended(&self) -> bool {
+        self.ended.load(Ordering::Relaxed)
+    }
+
+    /// Where the recording lies.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    fn send(&self, command: Command) -> Result<(), HostingError> {
+        self.commands.try_send(command).map_err(|error| match error {
+            mpsc::error::TrySendError::Full(_) => HostingError::TooManyWaiting { limit: WAITING_CALLS },
+            mpsc::error::TrySendError::Closed(_) => HostingError::EpisodeStopped,
+        })
+    }
+}
+
+fn open_session(spec: &EpisodeSpec, folder: &Path) -> Result<(Session, Briefing), EpisodeError> {
+    let session = Session::start(spec, Some(folder))?;
+    let briefing = session.briefing();
+    Ok((session, briefing))
+}
+
+/// Who asked for the end, and what they are to be told once the place is free.
+struct Closed(Option<(oneshot::Sender<Closing>, Closing)>);
+
+type Closing = Result<ResultReply, EpisodeError>;
+
+impl Closed {
+    fn answer(self) {
+        if let Some((reply, result)) = self.0 {
+            let _ = reply.send(result);
+        }
+    }
+}
+
+/// Answers commands until one asks for the end, or nobody is left who could send one.
+fn serve(mut session: Session, mut inbox: mpsc::Receiver<Command>, ended: &AtomicBool) -> Closed {
+    while let Some(command) = inbox.blocking_recv() {
+        // A reply that cannot be sent means that the caller has gone. What was done stays done.
+        match command {
+            Command::Call { call, reply } => {
+                let answer = session.call(call);
+                ended.store(session.ended().is_some(), Ordering::Relaxed);
+                let _ = reply.send(answer);
+            }
+            Command::Facts { reply } => drop(reply.send(session.facts())),
+            Command::Close { reply } => return Closed(Some((reply, session.close()))),
+        }
+    }
+    if let Err(error) = session.close() {
+        tracing::error!(%error, "a recording was not closed");
+    }
+    Closed(None)
+}

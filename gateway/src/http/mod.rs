@@ -1,0 +1,10 @@
+//! Episodes over HTTP: REST under `/v1`, MCP at `/mcp`, and problem details for whatever is refused.
+
+mod app;
+mod mcp;
+mod problem;
+mod request;
+mod routes;
+mod server;
+
+pub use server::Server;

@@ -1,0 +1,228 @@
+//! Every refusal as RFC 9457 problem details. The detail says what would work; what is our own fault goes to the log only.
+
+use axum::{
+    http::{StatusCode, header},
+    response::{IntoResponse, Response},
+};
+use tandem_episodes::EpisodeError;
+use tandem_tools_spec::{ProblemBody, SpecError};
+
+use crate::hosting::HostingError;
+
+/// The media type of RFC 9457.
+pub const PROBLEM_JSON: &str = "application/problem+json";
+
+/// Everything a request can be refused for.
+#[derive(Debug, thiserror::Error)]
+pub enum ApiError {
+    /// The call does not fit the contract.
+    #[error(transparent)]
+    Spec(#[from] SpecError),
+    /// The host of the episodes, or the episode itself, refused.
+    #[error("{0}{}", way_out(.0))]
+    Hosting(#[from] HostingError),
+    /// No such route, or not with this method.
+    #[error("{method} {path} is not served; have: {}", .have.join(", "))]
+    NoRoute {
+        /// What was asked for.
+        method: String,
+        /// What was asked for.
+        path: String,
+        /// The routes that are served.
+        have: Vec<String>,
+        /// Whether the path is served with another method.
+        other_method: bool,
+    },
+    /// The body names another episode than the path.
+    #[error(
+        "the path names episode {path:?} and the body {body}; leave episode_id out of the body or make them equal"
+    )]
+    EpisodeMismatch {
+        /// From the path.
+        path: String,
+        /// From the body, as JSON.
+        body: String,
+    },
+    /// A call over MCP that names no episode.
+    #[error("{tool} needs episode_id, a text, as start_episode returned it")]
+    NoEpisodeNamed {
+        /// The tool that was called.
+        tool: &'static str,
+    },
+    /// The body is no JSON.
+    #[error("the body is no JSON: {0}; send one JSON object, with finite numbers only, as {{\"steps\": 25}}")]
+    MalformedJson(String),
+    /// The body did not arrive.
+    #[error("the body could not be read: {0}; send it again")]
+    BrokenBody(String),
+    /// The body is too large.
+    #[error("the body is larger than {limit_bytes} bytes; send less, as fewer rows per send_joint_chunk")]
+    BodyTooLarge {
+        /// The most that is read.
+        limit_bytes: usize,
+    },
+    /// The body is said to be something else than JSON.
+    #[error("content-type {0:?} is not read; send JSON with content-type: application/json")]
+    ContentType(String),
+    /// A request that axum refused before any handler saw it.
+    #[error("{detail}")]
+    Protocol {
+        /// As axum had it.
+        status: StatusCode,
+        /// What axum said.
+        detail: String,
+    },
+    /// A reply of ours that cannot be written.
+    #[error("a reply is no JSON: {0}")]
+    Reply(#[source] serde_json::Error),
+}
+
+/// What a caller over HTTP can do about a refusal whose text does not say so: the host does not know the routes.
+fn way_out(error: &HostingError) -> &'static str {
+    match error {
+        HostingError::UnknownEpisode { .. } => "; start_episode (POST /v1/episodes) starts one",
+        HostingError::TooManyEpisodes { .. } => "; finish or DELETE one, or try again later",
+        HostingError::EpisodeStopped => "; start another with start_episode (POST /v1/episodes)",
+        HostingError::Episode(_)
+        | HostingError::TooManyWaiting { .. }
+        | HostingError::ShuttingDown
+        | HostingError::Folder { .. }
+        | HostingError::Thread(_) => "",
+    }
+}
+
+/// A kind of problem: a stable name, the name in words, and the status it is served with.
+type Kind = (&'static str, &'static str, StatusCode);
+
+impl ApiError {
+    fn kind(&self) -> Kind {
+        match self {
+            ApiError::Spec(error) => spec_kind(error),
+            ApiError::Hosting(error) => hosting_kind(error),
+            ApiError::NoRoute { other_method: false, .. } => {
+                ("no-route", "No such route", StatusCode::NOT_FOUND)
+            }
+            ApiError::NoRoute { other_method: true, .. } => {
+                ("no-method", "Method not allowed", StatusCode::METHOD_NOT_ALLOWED)
+            }
+            ApiError::EpisodeMismatch { .. } => {
+                ("episode-mismatch", "Two episodes named", StatusCode::UNPROCESSABLE_ENTITY)
+            }
+            ApiError::NoEpisodeNamed { .. } => {
+                ("no-episode-named", "No episode named", StatusCode::UNPROCESSABLE_ENTITY)
+            }
+            ApiError::MalformedJson(_) => ("malformed-json", "Malformed JSON", StatusCode::BAD_REQUEST),
+            ApiError::BrokenBody(_) => ("broken-body", "Body not received", StatusCode::BAD_REQUEST),
+            ApiError::BodyTooLarge { .. } => {
+                ("body-too-large", "Body too large", StatusCode::PAYLOAD_TOO_LARGE)
+            }
+            ApiError::ContentType(_) => {
+                ("content-type", "Unsupported content type", StatusCode::UNSUPPORTED_MEDIA_TYPE)
+            }
+            ApiError::Protocol { status, .. } => ("bad-request", "Bad request", *status),
+            ApiError::Reply(_) => INTERNAL,
+        }
+    }
+
+    /// The body that this refusal is served with.
+    pub fn body(&self) -> ProblemBody {
+        let (kind, title, status) = self.kind();
+        let detail = if status == StatusCode::INTERNAL_SERVER_ERROR {
+            "the server failed; its log says why".into()
+        } else {
+            self.to_string()
+        };
+        ProblemBody {
+            kind: format!("urn:tandem:problem:{kind}"),
+            title: title.into(),
+            status: status.as_u16(),
+            detail,
+        }
+    }
+}
+
+const INTERNAL: Kind = ("internal", "Internal error", StatusCode::INTERNAL_SERVER_ERROR);
+
+impl IntoResponse for ApiError {
+    fn into_response(self) -> Response {
+        let body = self.body();
+        let (_, _, status) = self.kind();
+        if status.is_server_error() {
+            tracing::error!(error = %self, "request failed");
+        }
+        let text = serde_json::json!(body).to_string();
+        (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], text).into_response()
+    }
+}
+
+fn hosting_kind(error: &HostingError) -> Kind {
+    match error {
+        HostingError::Episode(error) => episode_kind(error),
+        HostingError::UnknownEpisode { .. } => ("unknown-episode", "Unknown episode", StatusCode::NOT_FOUND),
+        HostingError::TooManyEpisodes { .. } => {
+            ("too-many-episodes", "Too many episodes", StatusCode::TOO_MANY_REQUESTS)
+        }
+        HostingError::TooManyWaiting { .. } => {
+            ("too-many-calls", "Too many calls at once", StatusCode::TOO_MANY_REQUESTS)
+        }
+        HostingError::ShuttingDown => ("shutting-down", "Shutting down", StatusCode::SERVICE_UNAVAILABLE),
+        HostingError::EpisodeStopped => ("episode-stopped", "Episode stopped", StatusCode::GONE),
+        HostingError::Folder { .. } | HostingError::Thread(_) => INTERNAL,
+    }
+}
+
+fn episode_kind(error: &EpisodeError) -> Kind {
+    match error {
+        EpisodeError::UnknownTask { .. } => ("unknown-task", "Unknown task", StatusCode::NOT_FOUND),
+        EpisodeError::UnknownRobot { .. } => ("unknown-robot", "Unknown robot", StatusCode::NOT_FOUND),
+        EpisodeError::TooManySteps { .. } => {
+            ("too-many-steps", "Too many steps", StatusCode::UNPROCESSABLE_ENTITY)
+        }
+        EpisodeError::PixelOutside { .. } => {
+            ("pixel-outside", "Pixel outside the image", StatusCode::UNPROCESSABLE_ENTITY)
+        }
+        EpisodeError::Ended { .. } => ("ended", "Episode ended", StatusCode::CONFLICT),
+        EpisodeError::Spec(error) => spec_kind(error),
+        EpisodeError::Checkpoint(_) => {
+            ("checkpoint", "Checkpoint does not fit", StatusCode::UNPROCESSABLE_ENTITY)
+        }
+        EpisodeError::Sim(_)
+        | EpisodeError::Ik(_)
+        | EpisodeError::Picture(_)
+        | EpisodeError::Build(_)
+        | EpisodeError::Output(_) => INTERNAL,
+    }
+}
+
+fn spec_kind(error: &SpecError) -> Kind {
+    match error {
+        SpecError::UnknownTool { .. } => ("unknown-tool", "Unknown tool", StatusCode::NOT_FOUND),
+        SpecError::Malformed { .. } | SpecError::Invalid { .. } => {
+            ("invalid-arguments", "Invalid arguments", StatusCode::UNPROCESSABLE_ENTITY)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+
+    use super::*;
+
+    #[test]
+    fn our_own_faults_stay_in_the_log_and_other_refusals_say_what_would_work() {
+        let check = |error: HostingError, status: u16, says: &str| {
+            let body = ApiError::from(error).body();
+            assert_eq!(body.status, status, "{body:?}");
+            assert!(body.detail.contains(says), "{body:?}");
+        };
+        let failure = || io::Error::other("disk full");
+        check(HostingError::Folder { runs: "runs".into(), source: failure() }, 500, "its log says why");
+        check(HostingError::Thread(failure()), 500, "the server failed; its log says why");
+        check(HostingError::UnknownEpisode { id: "x".into(), have: vec![] }, 404, "POST /v1/episodes");
+        check(HostingError::TooManyEpisodes { limit: 8 }, 429, "all 8 places for episodes are taken; finish");
+        check(HostingError::TooManyWaiting { limit: 16 }, 429, "call again when");
+        check(HostingError::ShuttingDown, 503, "try again");
+        check(HostingError::EpisodeStopped, 410, "start another");
+    }
+}

@@ -1,0 +1,133 @@
+//! The REST routes under `/v1`.
+
+use std::net::IpAddr;
+
+use axum::{
+    Json, Router,
+    extract::{Path, Request, State},
+    http::{Method, StatusCode, Uri, header},
+    middleware::{self, Next},
+    response::{IntoResponse, Response},
+    routing::{MethodRouter, get, post},
+};
+use serde_json::{Value, json};
+use tandem_tools_spec::{
+    GetStatus, ResultReply, StartEpisode, StartReply, TaskList, ToolCall, ToolReply, ToolSpec, parse_args,
+    tool_specs,
+};
+
+use super::{app::App, mcp, problem::ApiError, request::json_body};
+
+/// Every route: path, methods, handlers.
+fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 7] {
+    [
+        ("/healthz", &["GET"], get(health)),
+        ("/v1/tasks", &["GET"], get(tasks)),
+        ("/v1/tools", &["GET"], get(tools)),
+        ("/v1/openapi.json", &["GET"], get(openapi)),
+        ("/v1/episodes", &["POST"], post(start)),
+        ("/v1/episodes/{id}", &["GET", "DELETE"], get(status).delete(remove)),
+        ("/v1/episodes/{id}/tools/{name}", &["POST"], post(call)),
+    ]
+}
+
+/// The whole service.
+pub fn router(app: App, listen: IpAddr) -> Router {
+    let mut router = Router::new().nest_service("/mcp", mcp::service(app.clone(), listen));
+    for (path, _, handlers) in routes() {
+        router = router.route(path, handlers);
+    }
+    router
+        .fallback(no_route)
+        .method_not_allowed_fallback(no_method)
+        .layer(middleware::from_fn(log_and_describe))
+        .with_state(app)
+}
+
+async fn health(State(app): State<App>) -> Json<Value> {
+    Json(json!({ "status": "ok", "version": env!("CARGO_PKG_VERSION"), "episodes": app.table.len() }))
+}
+
+async fn tasks(State(app): State<App>) -> Json<TaskList> {
+    Json(app.table.task_list())
+}
+
+async fn tools() -> Json<Vec<ToolSpec>> {
+    Json(tool_specs())
+}
+
+async fn openapi() -> Json<Value> {
+    Json(tandem_tools_spec::openapi(env!("CARGO_PKG_VERSION")))
+}
+
+async fn start(State(app): State<App>, request: Request) -> Result<Response, ApiError> {
+    let args: StartEpisode = parse_args(json_body(request, app.settings.max_body_bytes).await?)?;
+    let reply: StartReply = app.table.start(args).await?;
+    let location = format!("/v1/episodes/{}", reply.episode_id);
+    Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(reply)).into_response())
+}
+
+async fn status(State(app): State<App>, Path(id): Path<String>) -> Result<Json<ToolReply>, ApiError> {
+    Ok(Json(app.table.get(&id)?.call(GetStatus {}.into()).await?))
+}
+
+async fn call(
+    State(app): State<App>,
+    Path((id, name)): Path<(String, String)>,
+    request: Request,
+) -> Result<Json<ToolReply>, ApiError> {
+    let args = json_body(request, app.settings.max_body_bytes).await?;
+    let episode = app.table.get(&id)?;
+    let call = ToolCall::parse(&name, without_episode_id(args, &id)?)?;
+    Ok(Json(episode.call(call).await?))
+}
+
+async fn remove(State(app): State<App>, Path(id): Path<String>) -> Result<Json<ResultReply>, ApiError> {
+    Ok(Json(app.table.remove(&id).await?))
+}
+
+/// Clients made for MCP send `episode_id` among the arguments; that is fine as long as it is the path's.
+fn without_episode_id(mut args: Value, id: &str) -> Result<Value, ApiError> {
+    match args.as_object_mut().and_then(|object| object.shift_remove("episode_id")) {
+        Some(body) if body != id => {
+            Err(ApiError::EpisodeMismatch { path: id.into(), body: body.to_string() })
+        }
+        _ => Ok(args),
+    }
+}
+
+async fn no_route(method: Method, uri: Uri) -> ApiError {
+    refused_route(method, uri, false)
+}
+
+async fn no_method(method: Method, uri: Uri) -> ApiError {
+    refused_route(method, uri, true)
+}
+
+fn refused_route(method: Method, uri: Uri, other_method: bool) -> ApiError {
+    let have = routes()
+        .iter()
+        .map(|(path, methods, _)| format!("{} {path}", methods.join("|")))
+        .chain(["POST /mcp".into()])
+        .collect();
+    ApiError::NoRoute { method: method.to_string(), path: uri.path().into(), have, other_method }
+}
+
+/// Logs every request, and turns refusals of axum's own (as of a path that is not UTF-8) into problem details.
+async fn log_and_describe(request: Request, next: Next) -> Response {
+    let (method, path) = (request.method().clone(), request.uri().path().to_owned());
+    let began = std::time::Instant::now();
+    let mut response = next.run(request).await;
+    let status = response.status();
+    let described = response
+        .headers()
+        .get(header::CONTENT_TYPE)
+        .is_some_and(|value| value.to_str().is_ok_and(|text| text.contains("json")));
+    if status.is_client_error() && !described {
+        let text = axum::body::to_bytes(response.into_body(), 10_000).await.unwrap_or_default();
+        let detail = format!("{}; see GET /v1/tools for what is served", String::from_utf8_lossy(&text));
+        response = ApiError::Protocol { status, detail }.into_response();
+    }
+    tracing::info!(%method, path, status = status.as_u16(), ms = began.elapsed().as_millis() as u64, "request");
+    response
+}

@@ -1,0 +1,108 @@
+//! The server: binds, serves, and closes every recording before it goes.
+
+use std::{io, net::SocketAddr, sync::Arc, time::Duration};
+
+use tokio::{net::TcpListener, runtime::Runtime, sync::oneshot, task::JoinHandle};
+
+use super::{app::App, routes::router};
+use crate::{hosting::EpisodeTable, settings::Settings};
+
+/// Requests only parse, wait and answer; the worlds have threads of their own.
+const HTTP_THREADS: usize = 2;
+
+/// How long requests that are still arriving at the end may take.
+const LAST_REQUESTS: Duration = Duration::from_secs(5);
+
+/// A running server. Dropping it stops it at once; [`Server::stop`] lets calls under way finish.
+#[derive(Debug)]
+pub struct Server {
+    runtime: Runtime,
+    address: SocketAddr,
+    table: Arc<EpisodeTable>,
+    stop: oneshot::Sender<()>,
+    served: JoinHandle<io::Result<()>>,
+}
+
+impl Server {
+    /// Binds and begins to serve.
+    pub fn start(settings: Arc<Settings>) -> io::Result<Server> {
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(HTTP_THREADS)
+            .thread_name("http")
+            .enable_all()
+            .build()?;
+        let listener = runtime.block_on(TcpListener::bind(settings.listen)).map_err(|error| {
+            io::Error::new(
+                error.kind(),
+                format!("cannot listen on {}: {error}; try --listen 127.0.0.1:0", settings.listen),
+            )
+        })?;
+        let address = listener.local_addr()?;
+        let table = Arc::new(EpisodeTable::new(settings.clone()));
+        let app = App { table: table.clone(), settings };
+        let (stop, stopped) = oneshot::channel::<()>();
+        let service = axum::serve(listener, router(app, address.ip())).with_graceful_shutdown(async {
+            let _ = stopped.await;
+        });
+        let served = runtime.spawn(service.into_future());
+        tracing::info!("serving on http://{address}");
+        Ok(Server { runtime, address, table, stop, served })
+    }
+
+    /// Where it serves.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// The episodes, for experts and scoring in this process.
+    pub fn table(&self) -> &Arc<EpisodeTable> {
+        &self.table
+    }
+
+    /// Serves until SIGINT or SIGTERM, then stops as [`Server::stop`] does.
+    pub fn run_until_signal(self) {
+        self.runtime.block_on(shutdown_signal());
+        tracing::info!("shutting down; calls under way finish first, a second signal ends at once");
+        self.runtime.spawn(async {
+            shutdown_signal().await;
+            std::process::exit(1);
+        });
+        self.stop();
+    }
+
+    /// Takes no more requests, finishes the calls under way, and returns when every recording is closed.
+    pub fn stop(self) {
+        let Server { runtime, table, stop, served, .. } = self;
+        let _ = stop.send(());
+        runtime.block_on(async {
+            table.close_all().await;
+            // A client that never finishes its request must not keep the process alive; the recordings are closed by now.
+            if tokio::time::timeout(LAST_REQUESTS, served).await.is_err() {
+                tracing::warn!("a request was cut off");
+            }
+        });
+    }
+}
+
+#[cfg(unix)]
+async fn shutdown_signal() {
+    use tokio::signal::unix::{SignalKind, signal};
+    let terminate = async {
+        match signal(SignalKind::terminate()) {
+            Ok(mut signals) => drop(signals.recv().await),
+            Err(error) => {
+                tracing::error!(%error, "SIGTERM is not heard; SIGINT is");
+                std::future::pending().await
+            }
+        }
+    };
+    tokio::select! {
+        _ = tokio::signal::ctrl_c() => {}
+        () = terminate => {}
+    }
+}
+
+#[cfg(not(unix))]
+async fn shutdown_signal() {
+    let _ = tokio::signal::ctrl_c().await;
+}

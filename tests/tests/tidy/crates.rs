@@ -1,0 +1,55 @@
+//! Which crate may depend on which.
+
+use std::fs;
+
+use super::sources::root;
+
+/// Which crates of the workspace each crate may depend on. `sim`, `ik` and `tools_spec` know nothing of each other.
+const ARROWS: &[(&str, &[&str])] = &[
+    ("tools_spec", &[]),
+    ("ik", &[]),
+    ("sim", &[]),
+    ("episodes", &["tandem-sim", "tandem-ik", "tandem-tools-spec"]),
+    ("gateway", &["tandem-episodes", "tandem-tools-spec"]),
+    ("tests", &["tandem", "tandem-episodes", "tandem-ik", "tandem-sim", "tandem-tools-spec"]),
+];
+
+/// The folders of the crates.
+pub fn members() -> impl Iterator<Item = &'static str> {
+    ARROWS.iter().map(|(member, _)| *member)
+}
+
+fn manifest(folder: &str) -> toml::Table {
+    let path = root().join(folder).join("Cargo.toml");
+    let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    text.parse().unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+#[test]
+fn crates_depend_along_the_arrows() {
+    for (member, allowed) in ARROWS {
+        let manifest = manifest(member);
+        for section in ["dependencies", "dev-dependencies", "build-dependencies"] {
+            let names =
+                manifest.get(section).and_then(toml::Value::as_table).into_iter().flat_map(toml::Table::keys);
+            let ours = names.filter(|name| *name == "tandem" || name.starts_with("tandem-"));
+            for name in ours {
+                assert!(
+                    allowed.contains(&name.as_str()),
+                    "{member} must not depend on {name}; it may on {allowed:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_arrows_name_every_member() {
+    let manifest = manifest("");
+    let listed = manifest["workspace"]["members"].as_array().into_iter().flatten();
+    let mut listed: Vec<&str> = listed.filter_map(toml::Value::as_str).collect();
+    let mut named: Vec<&str> = members().collect();
+    listed.sort_unstable();
+    named.sort_unstable();
+    assert_eq!(named, listed);
+}

@@ -1,0 +1,79 @@
+//! The order of the modules of a crate: each imports only from those before it.
+
+use std::collections::BTreeSet;
+
+use super::{
+    modules::{Arrow, arrows, made_of, modules},
+    sources::expect_none,
+};
+
+/// By crate, rows of top-level modules. A module may name those of earlier rows, never those of its own or a later one.
+const ORDER: &[(&str, &[&[&str]])] = &[
+    (
+        "sim",
+        &[
+            &["units", "sides", "error"],
+            &["assets"],
+            &["mjcf"],
+            &["dynamics"],
+            &["body"],
+            &["locomotion"],
+            &["robot"],
+            &["world"],
+            &["render", "bench"],
+        ],
+    ),
+    (
+        "episodes",
+        &[
+            &["output", "fingerprint", "scoring", "convert"],
+            &["error"],
+            &["tasks"],
+            &["protocol", "spec"],
+            &["commands", "reports"],
+            &["describe", "recording", "bench"],
+            &["instructions", "session"],
+            &["players"],
+            &["evaluation"],
+        ],
+    ),
+    ("gateway", &[&["settings"], &["hosting"], &["http"], &["drivers"], &["commands"], &["cli"], &["main"]]),
+];
+
+fn misplaced(rows: &[&[&str]], names: &BTreeSet<String>, arrows: &[Arrow]) -> Vec<String> {
+    let row = |name: &str| rows.iter().position(|row| row.contains(&name));
+    let nowhere = names
+        .iter()
+        .filter(|name| row(name).is_none())
+        .map(|name| format!("{name} has no place in the order; give it one in tests/tests/tidy/order.rs"));
+    let backward = arrows.iter().filter_map(|arrow| {
+        let (from, to) = (arrow.from.first()?, arrow.to.first()?);
+        (from != to && row(to)? >= row(from)?).then(|| format!("{from} -> {to} at {}", arrow.place))
+    });
+    nowhere.chain(backward).collect()
+}
+
+#[test]
+fn modules_import_along_the_order() {
+    for (member, rows) in ORDER {
+        let modules = modules(member);
+        let names = modules.iter().filter_map(|module| module.name.first().cloned()).collect();
+        let found = misplaced(rows, &names, &arrows(&modules));
+        let order: Vec<String> = rows.iter().map(|row| row.join(", ")).collect();
+        expect_none(&found, &format!("{member} is built in the order {}", order.join(" <- ")));
+    }
+}
+
+#[test]
+fn what_is_out_of_order_is_found() {
+    let check = |files: &[(&str, &str)], expected: usize| {
+        let modules = made_of(files);
+        let names = modules.iter().filter_map(|module| module.name.first().cloned()).collect();
+        let found = misplaced(&[&["a"], &["b", "c"]], &names, &arrows(&modules));
+        assert_eq!(found.len(), expected, "{files:?}: {found:?}");
+    };
+    check(&[("a.rs", ""), ("b/mod.rs", ""), ("b/d.rs", "use crate::a::A;")], 0);
+    check(&[("a.rs", "use crate::b::d::D;"), ("b/mod.rs", ""), ("b/d.rs", "")], 1);
+    check(&[("b.rs", "use crate::c::C;"), ("c.rs", "")], 1);
+    check(&[("d.rs", "")], 1);
+}

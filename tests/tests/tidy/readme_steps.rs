@@ -1,0 +1,161 @@
+//! What README says about adding something is true: beside its own file and its line in a list, no code has to be told.
+//! A list that somebody keeps by hand would name everything in it, so no text in the code may be such a name.
+
+use std::path::Path;
+
+use proc_macro2::{TokenStream, TokenTree};
+use syn::{
+    Item, LitStr, Macro,
+    visit::{self, Visit},
+};
+
+use super::{
+    modules::modules,
+    sources::{below, expect_none},
+};
+
+/// Something that README says how to add.
+struct Step {
+    /// As README calls it.
+    what: &'static str,
+    /// Folder of the files.
+    folder: &'static str,
+    extension: &'static str,
+    /// What a file of this kind says; others may lie beside it.
+    says: &'static str,
+    /// Beginnings of the paths that may name it.
+    may: &'static [&'static str],
+}
+
+const STEPS: &[Step] = &[
+    Step {
+        what: "task",
+        folder: "episodes/src/tasks",
+        extension: "rs",
+        says: "pub const TASK: Task",
+        // An expert plays one task; the demo and the contract's example are Handover.
+        may: &[
+            "episodes/src/tasks/",
+            "episodes/src/players/experts/",
+            "gateway/src/commands/demo.rs",
+            "tools_spec/src/tools/start_episode.rs",
+        ],
+    },
+    Step {
+        what: "scene",
+        folder: "sim/assets/scenes",
+        extension: "xml",
+        says: "<mujoco",
+        may: &["episodes/src/tasks/", "sim/src/bench/"],
+    },
+    Step {
+        what: "tool",
+        folder: "tools_spec/src/tools",
+        extension: "rs",
+        says: "impl Tool for",
+        may: &["tools_spec/src/tools/"],
+    },
+    Step {
+        what: "player",
+        folder: "episodes/src/players",
+        extension: "rs",
+        says: "impl Player for",
+        may: &["episodes/src/players/"],
+    },
+    Step {
+        what: "renderer",
+        folder: "sim/src/render",
+        extension: "rs",
+        says: "impl Renderer for",
+        may: &["sim/src/render/"],
+    },
+];
+
+const CRATES: [&str; 4] = ["tools_spec", "sim", "episodes", "gateway"];
+
+/// The texts of a file, with their lines; those in macros, too.
+#[derive(Default)]
+struct Texts {
+    found: Vec<(String, usize)>,
+}
+
+impl Texts {
+    fn of(items: &[Item]) -> Vec<(String, usize)> {
+        let mut texts = Texts::default();
+        items.iter().for_each(|item| texts.visit_item(item));
+        texts.found
+    }
+
+    fn add_tokens(&mut self, tokens: TokenStream) {
+        for token in tokens {
+            match token {
+                TokenTree::Literal(literal) => {
+                    let text = literal.to_string().trim_matches('"').to_owned();
+                    self.found.push((text, literal.span().start().line));
+                }
+                TokenTree::Group(group) => self.add_tokens(group.stream()),
+                TokenTree::Ident(_) | TokenTree::Punct(_) => {}
+            }
+        }
+    }
+}
+
+impl<'ast> Visit<'ast> for Texts {
+    fn visit_lit_str(&mut self, text: &'ast LitStr) {
+        self.found.push((text.value(), text.span().start().line));
+    }
+
+    fn visit_macro(&mut self, call: &'ast Macro) {
+        self.add_tokens(call.tokens.clone());
+        visit::visit_macro(self, call);
+    }
+}
+
+/// The file's name, or that of its folder.
+fn name(path: &Path) -> String {
+    let parts = path.with_extension("");
+    let last = parts.iter().rev().find(|part| *part != "mod").unwrap_or_default();
+    last.to_string_lossy().into_owned()
+}
+
+#[test]
+fn what_is_added_is_named_only_where_readme_says() {
+    let code: Vec<_> = CRATES.iter().flat_map(|member| modules(member)).collect();
+    let code: Vec<_> = code.iter().map(|module| (&module.path, Texts::of(&module.items))).collect();
+    let mut wrong = Vec::new();
+    for step in STEPS {
+        let files: Vec<_> = below(step.folder, &[step.extension])
+            .into_iter()
+            .filter(|file| file.text.contains(step.says))
+            .collect();
+        assert!(
+            !files.is_empty(),
+            "README's step for a {} is about {}: nothing there",
+            step.what,
+            step.folder
+        );
+        for file in files {
+            let name = name(&file.path);
+            for (path, texts) in &code {
+                if step.may.iter().any(|may| path.starts_with(may)) {
+                    continue;
+                }
+                let named = texts.iter().filter(|(text, _)| *text == name);
+                wrong.extend(
+                    named.map(|(_, line)| format!("{} {name}: {}:{line}", step.what, path.display())),
+                );
+            }
+        }
+    }
+    expect_none(
+        &wrong,
+        "these have to be told of what README says can be added without them; read the list instead",
+    );
+}
+
+#[test]
+fn texts_are_found_in_macros_too() {
+    let file = syn::parse_file("const A: &str = \"a\"; fn f() { g(vec![h(\"b\")]) }").expect("Rust");
+    let texts: Vec<String> = Texts::of(&file.items).into_iter().map(|(text, _)| text).collect();
+    assert_eq!(texts, ["a", "b"]);
+}

@@ -1,0 +1,189 @@
+//! Names of physical quantities say their unit.
+
+use syn::{
+    Field, FnArg, GenericArgument, Item, Pat, PathArguments, Signature, Type,
+    visit::{self, Visit},
+};
+
+use super::{modules::modules, sources::expect_none};
+
+/// The crates in which numbers are physical. `ik` is left out: its vectors hold coordinates of any joint, in rad or m,
+/// and its costs and errors are weighted.
+const CRATES: [&str; 4] = ["tools_spec", "sim", "episodes", "gateway"];
+
+/// Types that hold a quantity.
+const QUANTITIES: [&str; 5] = ["f32", "f64", "Vector", "Vector3", "Vec3"];
+
+/// Types that hold quantities of another type.
+const CONTAINERS: [&str; 6] = ["Option", "Vec", "Box", "Sides", "Range", "RangeInclusive"];
+
+/// What the name of a quantity may end in.
+const UNITS: &[&str] = &[
+    "m",
+    "m2",
+    "m3",
+    "1_m",
+    "rad",
+    "deg",
+    "s",
+    "ms",
+    "us",
+    "hz",
+    "1_s",
+    "kg",
+    "n",
+    "w",
+    "px",
+    "steps",
+    "m_s",
+    "m_s2",
+    "rad_s",
+    "rad_s2",
+    "n_s",
+    "n_m",
+    "n_m_s",
+    "n_m_rad",
+    "n_m_s_rad",
+    "n_m2",
+    "kg_m",
+    "kg_m2",
+    "kg_m3",
+];
+
+/// What the name of a number without a unit may end in, or a name that says of several units which is where.
+const DIMENSIONLESS: &[&str] = &[
+    // Directions, of length one, and orientations.
+    "axis",
+    "normal",
+    "direction",
+    "ray",
+    "ahead",
+    "outside",
+    "gravity_in_pelvis",
+    "wxyz",
+    // Colours.
+    "rgb",
+    "rgba",
+    "albedo",
+    "colour",
+    // Parts and multiples.
+    "share",
+    "fraction",
+    "ratio",
+    "factor",
+    "friction",
+    "closure",
+    "pace",
+    "gain",
+    "caution",
+    // Any number: of conversions and checks, and of ranges whose own names carry the unit.
+    "value",
+    "values",
+    "min",
+    "max",
+    // Columns of the contract: joints in rad, then m/s, m/s, rad/s and m of the base.
+    "row",
+    "rows",
+    "command",
+    // A camera's intrinsics, in pixels, as every library calls them.
+    "fx",
+    "fy",
+    "cx",
+    "cy",
+];
+
+fn has_unit(name: &str) -> bool {
+    let ends = |end: &&str| name == *end || name.strip_suffix(*end).is_some_and(|stem| stem.ends_with('_'));
+    DIMENSIONLESS.iter().any(ends) || UNITS.iter().any(|unit| ends(unit) && name != *unit)
+}
+
+fn is_quantity(kind: &Type) -> bool {
+    match kind {
+        Type::Reference(inner) => is_quantity(&inner.elem),
+        Type::Slice(inner) => is_quantity(&inner.elem),
+        Type::Array(inner) => is_quantity(&inner.elem),
+        Type::Path(path) => {
+            let Some(last) = path.path.segments.last() else { return false };
+            let inner = match &last.arguments {
+                PathArguments::AngleBracketed(list) => list.args.iter().any(|argument| match argument {
+                    GenericArgument::Type(kind) => is_quantity(kind),
+                    _ => false,
+                }),
+                PathArguments::None | PathArguments::Parenthesized(_) => false,
+            };
+            let name = last.ident.to_string();
+            QUANTITIES.contains(&name.as_str()) || (CONTAINERS.contains(&name.as_str()) && inner)
+        }
+        _ => false,
+    }
+}
+
+/// Names of quantities, as fields and parameters, that say no unit.
+#[derive(Default)]
+struct Unnamed {
+    found: Vec<(String, usize)>,
+}
+
+impl Unnamed {
+    fn check(&mut self, name: &syn::Ident, kind: &Type) {
+        if is_quantity(kind) && !has_unit(&name.to_string()) {
+            self.found.push((name.to_string(), name.span().start().line));
+        }
+    }
+}
+
+impl<'ast> Visit<'ast> for Unnamed {
+    fn visit_field(&mut self, field: &'ast Field) {
+        if let Some(name) = &field.ident {
+            self.check(name, &field.ty);
+        }
+    }
+
+    fn visit_signature(&mut self, signature: &'ast Signature) {
+        for input in &signature.inputs {
+            if let FnArg::Typed(typed) = input
+                && let Pat::Ident(name) = &*typed.pat
+            {
+                self.check(&name.ident, &typed.ty);
+            }
+        }
+        visit::visit_signature(self, signature);
+    }
+}
+
+fn unnamed(items: &[Item]) -> Vec<(String, usize)> {
+    let mut unnamed = Unnamed::default();
+    items.iter().for_each(|item| unnamed.visit_item(item));
+    unnamed.found
+}
+
+#[test]
+fn quantities_say_their_unit() {
+    let mut found = Vec::new();
+    for module in CRATES.iter().flat_map(|member| modules(member)) {
+        for (name, line) in unnamed(&module.items) {
+            found.push(format!("{}:{line} `{name}`", module.path.display()));
+        }
+    }
+    let rule = format!(
+        "the name of a number that is a field or a parameter ends in its unit, one of {}, or says that it has none, by one of {}",
+        UNITS.join(" "),
+        DIMENSIONLESS.join(" ")
+    );
+    expect_none(&found, &rule);
+}
+
+#[test]
+fn fields_and_parameters_without_a_unit_are_found() {
+    let check = |text: &str, expected: &[&str]| {
+        let found = unnamed(&syn::parse_file(text).expect("Rust").items);
+        let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, expected, "{text}");
+    };
+    check("struct A { height: f32, height_m: f32, count: u32 }", &["height"]);
+    check("struct A { speeds: Vec<[f64; 3]>, reach: Option<Vector>, dt_s: f64 }", &["speeds", "reach"]);
+    check("fn f(forces: &[f32], force_n: &[f32], s: f32) {}", &["forces", "s"]);
+    check("impl A { fn f(&self, at: Vector3<f64>, axis: Vector) {} }", &["at"]);
+    check("trait A { fn f(quaternion_wxyz: [f32; 4], quaternion: [f32; 4]); }", &["quaternion"]);
+    check("enum A { B { turn: f32 } }", &["turn"]);
+}

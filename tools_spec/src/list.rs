@@ -1,0 +1,166 @@
+//! The one list of tools: what a caller may ask, what it gets back and how both are read follow from a tool's line here.
+
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::{
+    CheckReach, CommandReply, Finish, GetRobotState, GetStatus, ListTasks, MoveWrists, Observe, QueryDepth,
+    SendJointChunk, SpecError, StartEpisode, Tool, ToolSpec, Wait, Walk, parse_args,
+};
+
+/// Makes all that has to know every tool. A tool is the one line with the type of its arguments, in the group of what it
+/// does:
+///
+/// ```text
+/// /// Asks how things stand.
+/// Look(LookCall) -> each LookReply {
+///     QueryDepth,
+/// }
+/// ```
+///
+/// That line adds `query_depth` to the names and to the specifications; the variants `LookCall::QueryDepth`, with the
+/// arguments, and `LookReply::QueryDepth`, with the tool's own `Tool::Reply`; a `From<QueryDepth>` for `ToolCall`; and
+/// its arms where calls are read, named and checked and replies are read. Whoever answers `LookCall`s does not compile
+/// until it answers this one.
+///
+/// In a group with `-> each R`, `R` is made here and every tool has a reply of its own; with `-> all R`, every tool of the
+/// group replies with the existing type `R`. What `without_episode` lists has no call on an episode.
+macro_rules! tools {
+    (
+        without_episode { $($free:ident,)* }
+        $( $(#[$doc:meta])* $group:ident($call:ident) -> $whose:ident $reply:ident { $($tool:ident,)* } )*
+    ) => {
+        /// Every tool, in the order a policy meets them.
+        pub fn tool_specs() -> Vec<ToolSpec> {
+            vec![
+                $( ToolSpec::without_episode::<$free>(), )*
+                $( $( ToolSpec::on_episode::<$tool>(), )* )*
+            ]
+        }
+
+        /// The tools that act on an episode, by name.
+        pub const EPISODE_TOOLS: &[&str] = &[$( $( $tool::NAME, )* )*];
+
+        $(
+            $(#[$doc])*
+            #[derive(Debug, Clone, PartialEq, Serialize)]
+            #[serde(untagged)]
+            #[allow(missing_docs, reason = "each variant is the tool of its name, described on its type")]
+            pub enum $call {
+                $( $tool($tool), )*
+            }
+
+            tools!(@replies $whose $reply $call { $($tool)* });
+        )*
+
+        /// A call on an episode, read and checked as far as that needs no world. It serialises to its arguments.
+        #[derive(Debug, Clone, PartialEq, Serialize)]
+        #[serde(untagged)]
+        pub enum ToolCall {
+            $( $(#[$doc])* $group($call), )*
+        }
+
+        /// The reply to a [`ToolCall`].
+        #[derive(Debug, Clone, PartialEq, Serialize)]
+        #[serde(untagged)]
+        pub enum ToolReply {
+            $( #[doc = concat!("To a [`", stringify!($call), "`].")] $group($reply), )*
+        }
+
+        $( $(
+            impl From<$tool> for ToolCall {
+                fn from(args: $tool) -> ToolCall {
+                    ToolCall::$group($call::$tool(args))
+                }
+            }
+        )* )*
+
+        impl ToolCall {
+            /// One call of every tool that every check of the contract accepts.
+            pub fn examples() -> Vec<ToolCall> {
+                vec![$( $( $tool::example().into(), )* )*]
+            }
+
+            /// Reads the call of tool `name` with arguments `args`, without `episode_id`.
+            pub fn parse(name: &str, args: Value) -> Result<ToolCall, SpecError> {
+                match name {
+                    $( $( $tool::NAME => parse_args::<$tool>(args).map(ToolCall::from), )* )*
+                    _ => Err(SpecError::UnknownTool { name: name.into(), have: EPISODE_TOOLS.to_vec() }),
+                }
+            }
+
+            /// The tool's name.
+            pub fn name(&self) -> &'static str {
+                match self {
+                    $( $( ToolCall::$group($call::$tool(_)) => $tool::NAME, )* )*
+                }
+            }
+
+            /// Checks a call that was built in Rust rather than read from JSON; [`ToolCall::parse`] has already done it.
+            pub fn validate(&self) -> Result<(), SpecError> {
+                let checked = match self {
+                    $( $( ToolCall::$group($call::$tool(args)) => args.validate(), )* )*
+                };
+                checked.map_err(|reason| SpecError::Invalid { tool: self.name(), reason })
+            }
+
+            /// Reads the reply to this call, for clients written in Rust.
+            pub fn parse_reply(&self, reply: Value) -> Result<ToolReply, serde_json::Error> {
+                match self {
+                    $( $(
+                        ToolCall::$group($call::$tool(_)) => {
+                            let reply: <$tool as Tool>::Reply = serde_json::from_value(reply)?;
+                            Ok(ToolReply::$group(tools!(@reply $whose $reply $tool reply)))
+                        }
+                    )* )*
+                }
+            }
+        }
+    };
+
+    (@replies each $reply:ident $call:ident { $($tool:ident)* }) => {
+        #[doc = concat!("The reply to a [`", stringify!($call), "`].")]
+        #[derive(Debug, Clone, PartialEq, Serialize)]
+        #[serde(untagged)]
+        #[allow(missing_docs, reason = "each variant is the reply to the tool of its name")]
+        pub enum $reply {
+            $( $tool(<$tool as Tool>::Reply), )*
+        }
+    };
+    (@replies all $reply:ident $call:ident { $($tool:ident)* }) => {};
+
+    (@reply each $group_reply:ident $tool:ident $reply:ident) => { $group_reply::$tool($reply) };
+    (@reply all $group_reply:ident $tool:ident $reply:ident) => { $reply };
+}
+
+tools! {
+    without_episode {
+        ListTasks,
+        StartEpisode,
+    }
+
+    /// Asks how things are. Changes nothing and costs no steps.
+    Look(LookCall) -> each LookReply {
+        Observe,
+        GetRobotState,
+        QueryDepth,
+        CheckReach,
+    }
+
+    /// A command to the robots. Physics moves on by its steps.
+    Act(ActCall) -> all CommandReply {
+        MoveWrists,
+        Walk,
+        SendJointChunk,
+        Wait,
+    }
+
+    /// Concerns the episode as a whole, and is answered after its end too.
+    Manage(ManageCall) -> each ManageReply {
+        GetStatus,
+        Finish,
+    }
+}
+
+#[cfg(test)]
+mod tests;
