@@ -71,11 +71,6 @@ impl Robot {
         self.locomotion = locomotion;
     }
 
-    /// The base command of the last step.
-    pub fn base_command(&self) -> BaseCommand {
-        self.memory.base
-    }
-
     /// Sets this robot's joint drives for one physics step, `substep` counting from 0 within the control step.
     pub(crate) fn drive(&mut self, physics: &mut PhysicsWorld, command: &RobotCommand, substep: u32) {
         // What is sensed borrows from this model, so that the robot may change meanwhile.

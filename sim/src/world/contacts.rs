@@ -78,11 +78,6 @@ impl World {
         touches
     }
 
-    /// Forces of one hand on one object; zero if the object is unknown or out of touch.
-    pub fn hand_contacts(&self, robot: usize, side: Side, object: &str) -> HandContacts {
-        self.present().contacts(robot, side, object)
-    }
-
     /// Links of robots that press on a collider: robot, link, and the normal force on the collider (N, world).
     fn link_forces(&self, collider: ColliderHandle) -> impl Iterator<Item = (usize, usize, Vector)> {
         self.physics.narrow_phase.contact_pairs_with(collider).filter_map(move |pair| {
