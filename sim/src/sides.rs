@@ -59,8 +59,13 @@ impl<T> Sides<T> {
         Sides { left: change(self.left), right: change(self.right) }
     }
 
-    pub fn as_ref(&self) -> Sides<&T> {
+    pub fn each_ref(&self) -> Sides<&T> {
         Sides { left: &self.left, right: &self.right }
+    }
+
+    /// Each with its side: left, then right.
+    pub fn by_side(self) -> impl Iterator<Item = (Side, T)> {
+        Side::BOTH.into_iter().zip(self)
     }
 
     /// Left, then right.
@@ -127,6 +132,7 @@ mod tests {
         let mut names = Sides::from_fn(Side::name);
         assert_eq!((names[Side::Left], names[Side::Right]), ("left", "right"));
         assert_eq!(names.into_iter().collect::<Vec<_>>(), ["left", "right"]);
+        assert!(names.by_side().all(|(side, name)| name == side.name()));
         names[Side::Right] = "other";
         assert_eq!(names.map(str::len), Sides { left: 4, right: 5 });
         assert_eq!(Side::BOTH.map(Side::other), [Side::Right, Side::Left]);

@@ -50,10 +50,11 @@ fn rest(world: &World) -> Vec<RobotCommand> {
 
 /// The last step of several that wave.
 fn run(world: &mut World, rest: &[RobotCommand], steps: u64) -> Step {
+    let mut step = world.present();
     for _ in 0..steps {
-        world.control_step(&waving(rest, world.control_steps()));
+        step = world.control_step(&waving(rest, step.control_step));
     }
-    world.present()
+    step
 }
 
 fn pelvis_m(step: &Step, robot: usize) -> Vector {

@@ -83,7 +83,7 @@ fn record(folder: &Path) -> (World, PathBuf) {
     for _ in 0..STEPS {
         record_step(&mut recorder, &mut scores, &mut world, &commands);
     }
-    let time_s = world.time_s();
+    let time_s = world.present().time_s;
     recorder.phase(&PhaseReached { id: "p1".into(), name: "grasp_and_lift".into(), time_s }).unwrap();
     let wait = ToolCall::parse("wait", serde_json::json!({ "steps": 10 })).unwrap();
     recorder.tool_call(&ToolCallRecord { time_s, call: &wait, outcome: Err("no steps are left") }).unwrap();
@@ -191,8 +191,9 @@ fn wrists_follow_from_transforms(world: &World, recorded: &FrameTransforms) {
         }
         world_from_child
     };
+    let step = world.present();
     for (index, robot) in ["A", "B"].into_iter().enumerate() {
-        let state = world.robot_state(index);
+        let state = &step.robots[index].state;
         for (side, measured) in ["left", "right"].into_iter().zip(state.pelvis_from_wrist) {
             let recorded = pose(&format!("{robot}/{side}_wrist_yaw_link"));
             let measured = state.world_from_pelvis * measured;
@@ -205,7 +206,7 @@ fn wrists_follow_from_transforms(world: &World, recorded: &FrameTransforms) {
         let forward = optical.rotation * Vector::Z;
         assert!((forward + camera.rotation * Vector::Z).length() < 1e-3, "an image's z axis looks forward");
     }
-    let bottle = world.object("bottle").unwrap().world_from_object;
+    let bottle = step.object("bottle").unwrap().world_from_object;
     assert!((pose("bottle").translation - bottle.translation).length() < 1e-6);
 }
 

@@ -2,19 +2,8 @@
 
 mod agile;
 mod balance;
-pub mod bench;
 mod choice;
-mod effort;
-mod footstep;
-mod gait;
-mod ground;
-mod legs;
-mod load;
-mod observer;
-mod plane;
-mod stand;
-mod step;
-mod swing;
+pub(crate) mod plane;
 
 pub use agile::{Agile, Network};
 pub use balance::Balance;
@@ -23,7 +12,7 @@ pub use choice::LocomotionChoice;
 use serde::{Deserialize, Serialize};
 
 use crate::Sides;
-use crate::robot::{LEG_JOINTS, WholeBody};
+use crate::body::{Drive, LEG_JOINTS, WAIST_JOINTS, WholeBody};
 
 /// What a policy asks of the base, in the robot's own heading frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -32,6 +21,29 @@ pub struct BaseCommand {
     pub vy_m_s: f32,
     pub yaw_rate_rad_s: f32,
     pub pelvis_height_m: f32,
+}
+
+/// How the base goes, in its own heading frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BaseVelocity {
+    pub forward_m_s: f32,
+    pub left_m_s: f32,
+    pub turning_rad_s: f32,
+}
+
+impl BaseVelocity {
+    pub const STILL: BaseVelocity = BaseVelocity { forward_m_s: 0.0, left_m_s: 0.0, turning_rad_s: 0.0 };
+}
+
+impl BaseCommand {
+    /// Stays where it is, with the pelvis at this height.
+    pub fn standing(pelvis_height_m: f32) -> BaseCommand {
+        BaseCommand { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m }
+    }
+
+    pub fn velocity(&self) -> BaseVelocity {
+        BaseVelocity { forward_m_s: self.vx_m_s, left_m_s: self.vy_m_s, turning_rad_s: self.yaw_rate_rad_s }
+    }
 }
 
 /// Smallest and largest value that a controller can follow.
@@ -56,15 +68,6 @@ impl BaseLimits {
     }
 }
 
-/// Spring, damper and feedforward of one joint for one physics step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Drive {
-    pub target_rad: f32,
-    pub kp_n_m_rad: f32,
-    pub kd_n_m_s_rad: f32,
-    pub feedforward_n_m: f32,
-}
-
 /// Drives of both legs, from the hip to the ankle.
 pub type LegCommand = Sides<[Drive; LEG_JOINTS]>;
 
@@ -77,8 +80,8 @@ pub trait Locomotion: Send {
 
     /// What is added to the task's waist targets (yaw, roll, pitch) until the next [`Locomotion::tick`], by a controller
     /// that balances with the waist.
-    fn waist_offset_rad(&self) -> [f32; 3] {
-        [0.0; 3]
+    fn waist_offset_rad(&self) -> [f32; WAIST_JOINTS] {
+        [0.0; WAIST_JOINTS]
     }
 
     /// Internal state, for snapshots and the state hash.

@@ -5,17 +5,17 @@ use std::f32::consts::{PI, TAU};
 use rapier3d::math::{Pose, Vector};
 
 /// The horizontal part.
-pub(super) fn flat(v: Vector) -> Vector {
-    Vector::new(v.x, v.y, 0.0)
+pub(crate) fn flat(Vector { x, y, .. }: Vector) -> Vector {
+    Vector::new(x, y, 0.0)
 }
 
 /// The same angle within half a turn of zero.
-pub(super) fn wrapped_rad(angle_rad: f32) -> f32 {
+pub(crate) fn wrapped_rad(angle_rad: f32) -> f32 {
     (angle_rad + PI).rem_euclid(TAU) - PI
 }
 
 /// Which way the x axis of a pose points.
-pub(super) fn heading_rad(pose: Pose) -> f32 {
+pub(crate) fn heading_rad(pose: Pose) -> f32 {
     let forward = pose.rotation * Vector::X;
     forward.y.atan2(forward.x)
 }

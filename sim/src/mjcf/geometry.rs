@@ -117,9 +117,9 @@ fn is_checkered(document: &Document, material: &mjcf_rs::assets::Material) -> bo
 }
 
 /// Pose with z from the first to the second end point, centred between them, and half the distance.
-fn between(ends: [f64; 6]) -> (Pose, f32) {
-    let a = vector([ends[0], ends[1], ends[2]]);
-    let b = vector([ends[3], ends[4], ends[5]]);
+fn between(ends_m: [f64; 6]) -> (Pose, f32) {
+    let a = vector([ends_m[0], ends_m[1], ends_m[2]]);
+    let b = vector([ends_m[3], ends_m[4], ends_m[5]]);
     let half = (b - a) * 0.5;
     let rotation = Rotation::from_rotation_arc(Vector::Z, half.normalize_or(Vector::Z));
     (Pose::from_parts(a + half, rotation), half.length())

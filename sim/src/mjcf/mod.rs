@@ -54,8 +54,8 @@ pub(crate) fn pose(p: &mjcf_rs::Pose) -> Pose {
     )
 }
 
-pub(crate) fn vector(v: [f64; 3]) -> Vector {
-    Vector::new(v[0] as f32, v[1] as f32, v[2] as f32)
+pub(crate) fn vector([x, y, z]: [f64; 3]) -> Vector {
+    Vector::new(x as f32, y as f32, z as f32)
 }
 
 /// Mass properties of an `<inertial>`, in the body's frame.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
-use super::JOINTS;
+use crate::body::JOINTS;
 
 pub fn serialize<S: Serializer>(values: &[f32; JOINTS], serializer: S) -> Result<S::Ok, S::Error> {
     values.as_slice().serialize(serializer)

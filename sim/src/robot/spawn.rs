@@ -5,10 +5,31 @@ use std::sync::Arc;
 use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::prelude::*;
 
-use super::{JOINTS, Memory, Robot, RobotModel, UPPER, hand_force::HandForce, layout, payload::Payload};
+use super::feeling::Feeling;
+use super::joints::Joints;
+use super::{Memory, Robot};
 use crate::SimError;
+use crate::body::{JOINTS, RobotModel, UPPER, check_joint_order};
 use crate::locomotion::{Balance, BaseCommand};
-use crate::world::{RobotPlacement, link_tag};
+
+/// A robot stands on the floor here, facing `yaw_rad` (0 looks along +x).
+#[derive(Clone, Debug)]
+pub struct RobotPlacement {
+    pub name: String,
+    pub position_m: [f32; 2],
+    pub yaw_rad: f32,
+}
+
+/// Collider tag of a robot's link: robot and link, both counted from 1, so that 0 is anything else.
+fn link_tag(robot: usize, link: usize) -> u128 {
+    ((robot as u128 + 1) << 32) | (link as u128 + 1)
+}
+
+/// Robot and link of a collider's tag.
+pub(crate) fn robot_and_link(tag: u128) -> Option<(usize, usize)> {
+    let (robot, link) = ((tag >> 32) as usize, (tag & 0xffff_ffff) as usize);
+    (robot > 0 && link > 0).then(|| (robot - 1, link - 1))
+}
 
 impl Robot {
     /// Inserts a robot standing on the floor (z = 0) in its rest pose. `index` tells robots of one world apart.
@@ -18,7 +39,7 @@ impl Robot {
         placement: &RobotPlacement,
         index: usize,
     ) -> Result<Robot, SimError> {
-        layout::check(&placement.name, model)?;
+        check_joint_order(&placement.name, model)?;
         let q_rad = model.rest_rad();
         let world_from_link = model.forward_kinematics(standing_pelvis(model, placement, &q_rad), &q_rad);
         let mut bodies = Vec::with_capacity(model.links.len());
@@ -43,20 +64,17 @@ impl Robot {
             }
             bodies.push(body);
         }
-        let (joints, slots) = connect(physics, model, &bodies, &q_rad);
-        let last_upper_rad = UPPER.iter().map(|joint| q_rad[*joint]).collect();
-        let pelvis_height_m = world_from_link[0].translation.z;
+        let joints = connect(physics, model, &bodies, &q_rad);
         let memory = Memory {
-            last_upper_rad,
+            last_upper_rad: UPPER.iter().map(|joint| q_rad[*joint]).collect(),
             torque_n_m: vec![0.0; JOINTS],
-            payload: Payload::default(),
-            hand_force: HandForce::default(),
-            base: BaseCommand { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m },
+            feeling: Feeling::default(),
+            base: BaseCommand::standing(world_from_link[0].translation.z),
             fallen: false,
         };
         let name = placement.name.clone();
         let locomotion = Box::new(Balance::default());
-        Ok(Robot { name, model: model.clone(), bodies, joints, slots, colliders, locomotion, memory })
+        Ok(Robot { name, model: model.clone(), bodies, joints, colliders, locomotion, memory })
     }
 }
 
@@ -83,7 +101,7 @@ fn connect(
     model: &RobotModel,
     bodies: &[RigidBodyHandle],
     q_rad: &[f32],
-) -> (Vec<MultibodyJointHandle>, Vec<(usize, usize)>) {
+) -> Joints {
     let mut handles = vec![None; model.joints.len()];
     for (index, link) in model.links.iter().enumerate() {
         let (Some(parent), Some(joint)) = (link.parent, link.joint) else { continue };
@@ -97,23 +115,15 @@ fn connect(
             .contacts_enabled(false);
         handles[joint] = physics.insert_multibody_joint(bodies[parent], bodies[index], hinge.build());
     }
-    let joints: Vec<MultibodyJointHandle> = handles.into_iter().flatten().collect();
-    let mut slots = Vec::with_capacity(joints.len());
-    for handle in &joints {
+    let handles: Vec<MultibodyJointHandle> = handles.into_iter().flatten().collect();
+    let mut joints = Joints { any: handles[0], slots: Vec::with_capacity(handles.len()) };
+    for handle in &handles {
         if let Some((multibody, link)) = physics.multibody_joints.get(*handle) {
-            slots.push((link, multibody.link(link).map_or(0, |link| link.assembly_id())));
+            joints.slots.push((link, multibody.link(link).map_or(0, |link| link.assembly_id())));
         }
     }
-    if let Some((multibody, _)) = physics.multibody_joints.get_mut(joints[0]) {
-        // Rapier damps every angular coordinate by default, the free root's too.
-        multibody.damping_mut().fill(0.0);
-        let mut displacement = vec![0.0; multibody.ndofs()];
-        for (joint, (_, dof)) in slots.iter().enumerate() {
-            multibody.armature_mut()[*dof] = model.joints[joint].armature_kg_m2;
-            multibody.frictions_mut()[*dof] = model.joints[joint].friction_n_m;
-            displacement[*dof] = q_rad[joint];
-        }
-        multibody.apply_displacements(&displacement);
+    if let Some((multibody, _)) = physics.multibody_joints.get_mut(joints.any) {
+        joints.prepare(multibody, model, q_rad);
     }
-    (joints, slots)
+    joints
 }

@@ -7,7 +7,8 @@ use rapier3d::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{Touch, World};
-use crate::robot::{HandLinks, RobotModel};
+use crate::body::{HandLinks, RobotModel};
+use crate::robot::robot_and_link;
 use crate::{PHYSICS_DT_S, Side, Sides};
 
 /// Normal contact forces (N, world) that a hand's parts exert on an object, averaged over the last physics step.
@@ -16,16 +17,6 @@ pub struct HandContacts {
     pub thumb_n: Vector,
     pub fingers_n: Vector,
     pub palm_n: Vector,
-}
-
-/// Collider tag of a robot's link: robot and link, both counted from 1, so that 0 is anything else.
-pub(crate) fn link_tag(robot: usize, link: usize) -> u128 {
-    ((robot as u128 + 1) << 32) | (link as u128 + 1)
-}
-
-fn robot_and_link(tag: u128) -> Option<(usize, usize)> {
-    let (robot, link) = ((tag >> 32) as usize, (tag & 0xffff_ffff) as usize);
-    (robot > 0 && link > 0).then(|| (robot - 1, link - 1))
 }
 
 /// Leaves out the contacts inside a robot that its file excludes.
@@ -85,11 +76,6 @@ impl World {
             }
         }
         touches
-    }
-
-    /// Forces of one hand on one object; zero if the object is unknown or out of touch.
-    pub fn hand_contacts(&self, robot: usize, side: Side, object: &str) -> HandContacts {
-        self.present().contacts(robot, side, object)
     }
 
     /// Links of robots that press on a collider: robot, link, and the normal force on the collider (N, world).

@@ -16,11 +16,10 @@ pub use objects::{ObjectModel, ObjectPlacement, ObjectState};
 pub use snapshot::Snapshot;
 pub use step::{ObjectStep, RobotStep, Step, Touch};
 
-pub(crate) use contacts::link_tag;
-
+use crate::body::RobotModel;
 use crate::mjcf::{Document, MjcfCamera};
-use crate::robot::{Robot, RobotCommand, RobotModel, RobotState};
-use crate::{CONTROL_HZ, GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError, assets};
+use crate::robot::{Robot, RobotCommand, RobotPlacement};
+use crate::{GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError, assets};
 use contacts::SelfCollision;
 use objects::Object;
 
@@ -31,14 +30,6 @@ pub struct WorldSpec {
     pub scene: String,
     pub robots: Vec<RobotPlacement>,
     pub objects: Vec<ObjectPlacement>,
-}
-
-/// A robot stands on the floor here, facing `yaw_rad` (0 looks along +x).
-#[derive(Clone, Debug)]
-pub struct RobotPlacement {
-    pub name: String,
-    pub position_m: [f32; 2],
-    pub yaw_rad: f32,
 }
 
 /// A simulated room. One thread owns it.
@@ -107,31 +98,13 @@ impl World {
         self.present()
     }
 
-    pub fn control_steps(&self) -> u64 {
-        self.control_steps
-    }
-
-    pub fn time_s(&self) -> f64 {
-        self.control_steps as f64 / CONTROL_HZ
-    }
-
     pub fn robots(&self) -> &[Robot] {
         &self.robots
-    }
-
-    pub fn robot_state(&self, robot: usize) -> RobotState {
-        let robot = &self.robots[robot];
-        robot.state(&robot.measure(&self.physics))
     }
 
     /// The command under which a robot stays as it was put into the world.
     pub fn rest_command(&self, robot: usize) -> RobotCommand {
         self.robots[robot].rest_command(&self.physics)
-    }
-
-    /// State of an object or mark of the scene, by file name.
-    pub fn object(&self, name: &str) -> Option<ObjectState> {
-        self.objects.iter().find(|object| object.name == name).map(|object| object.state(&self.physics))
     }
 
     /// Geoms of the scene that do not move, world frame.
@@ -147,15 +120,6 @@ impl World {
     /// Every object's name and what its file says of it.
     pub fn object_models(&self) -> impl Iterator<Item = (&str, &ObjectModel)> {
         self.objects.iter().map(|object| (object.name.as_str(), &object.model))
-    }
-
-    /// Name and geoms of every object, in the object's frame.
-    pub fn object_geoms(&self) -> impl Iterator<Item = (&str, &[crate::mjcf::Geom])> {
-        self.object_models().map(|(name, model)| (name, model.geoms.as_slice()))
-    }
-
-    pub fn objects(&self) -> impl Iterator<Item = (&str, ObjectState)> {
-        self.objects.iter().map(|object| (object.name.as_str(), object.state(&self.physics)))
     }
 }
 

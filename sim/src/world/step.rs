@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::objects::Object;
 use super::{HandContacts, ObjectState, World};
-use crate::Side;
 use crate::robot::{RobotCommand, RobotState};
+use crate::{CONTROL_HZ, Side};
 
 /// The world after one control step, or before the first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,7 +27,7 @@ pub struct Step {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotStep {
     pub state: RobotState,
-    /// In the order of [`crate::robot::RobotModel::links`].
+    /// In the order of [`crate::body::RobotModel::links`].
     pub world_from_link: Vec<Pose>,
     /// Before the first step, the command under which the robot rests.
     pub command: RobotCommand,
@@ -73,7 +73,7 @@ impl World {
             |object: &Object| ObjectStep { name: object.name.clone(), state: object.state(&self.physics) };
         Step {
             control_step: self.control_steps,
-            time_s: self.time_s(),
+            time_s: self.control_steps as f64 / CONTROL_HZ,
             robots: (0..self.robots.len()).map(|robot| self.robot_step(robot)).collect(),
             objects: self.objects.iter().map(object).collect(),
             touches: self.touches(),

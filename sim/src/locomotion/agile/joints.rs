@@ -1,6 +1,6 @@
 //! The order in which a velocity policy sees and drives joints.
 
-use crate::robot::joint_names;
+use crate::body::joint_names;
 
 pub(super) const OBSERVED_JOINTS: usize = 29;
 pub(super) const CONTROLLED_JOINTS: usize = 14;

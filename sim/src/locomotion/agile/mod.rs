@@ -17,9 +17,9 @@ use serde::{Deserialize, Serialize};
 
 pub use network::Network;
 
-use super::{BaseCommand, BaseLimits, Drive, LegCommand, Locomotion};
+use super::{BaseCommand, BaseLimits, LegCommand, Locomotion};
 use crate::PHYSICS_STEPS_PER_CONTROL;
-use crate::robot::{JOINTS, LEGS, WAIST, WholeBody};
+use crate::body::{Drive, JOINTS, LEGS, WAIST, WholeBody};
 use joints::JointMap;
 use network::{Action, Memory, Observation};
 use place::Place;

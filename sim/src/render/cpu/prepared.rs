@@ -11,6 +11,8 @@ pub(super) struct Prepared {
     pub first: Vec<u32>,
     /// Part of each triangle.
     pub owner: Vec<u32>,
+    /// What a picture's ids show for each triangle.
+    pub ids: Vec<u32>,
     /// Centre and radius of a sphere around each part, in its mesh's frame.
     pub bounds: Vec<(Vector, f32)>,
     /// Of each part.
@@ -19,22 +21,20 @@ pub(super) struct Prepared {
 
 impl Prepared {
     pub(super) fn new(scenery: Scenery) -> Prepared {
-        let (mut first, mut owner) = (Vec::with_capacity(scenery.parts.len()), Vec::new());
+        let (mut first, mut owner, mut ids) = (Vec::new(), Vec::new(), Vec::new());
         for (number, part) in scenery.parts.iter().enumerate() {
             first.push(owner.len() as u32);
-            owner.resize(owner.len() + part.mesh.triangles.len(), number as u32);
+            let end = owner.len() + part.mesh.triangles.len();
+            owner.resize(end, number as u32);
+            ids.resize(end, part.id);
         }
         Prepared {
             first,
             owner,
+            ids,
             bounds: scenery.parts.iter().map(|part| part.mesh.bounds()).collect(),
             linear_rgb: scenery.parts.iter().map(|part| linear(part.rgb)).collect(),
             scenery,
         }
-    }
-
-    /// What a picture's ids show for a triangle.
-    pub(super) fn id(&self, triangle: u32) -> u32 {
-        self.scenery.parts[self.owner[triangle as usize] as usize].id
     }
 }

@@ -55,7 +55,7 @@ impl<'a> View<'a> {
     pub(super) fn id(&self, triangle: u32) -> u32 {
         match triangle {
             NOTHING => 0,
-            _ => self.prepared.id(triangle),
+            _ => self.prepared.ids[triangle as usize],
         }
     }
 

@@ -1,12 +1,12 @@
 //! Kinematic and static quantities of one robot at one instant, in the world frame.
 
 use rapier3d::math::{Pose, Vector};
-use rapier3d::prelude::{RigidBodyHandle, RigidBodySet};
 
-use super::{JOINTS, LEG_JOINTS, LEGS, RobotModel};
+use super::{JOINTS, LEG_JOINTS, LEGS, RobotModel, SiteModel, WAIST_JOINTS};
 use crate::{GRAVITY_M_S2, Side, Sides};
 
-const PALM_IN_WRIST_M: Vector = Vector::new(0.12, 0.0, 0.0);
+/// Middle of the palm, where loads of the hands act, in the frame of the link that carries the wrist.
+pub(crate) const PALM_IN_WRIST_M: Vector = Vector::new(0.12, 0.0, 0.0);
 
 /// What a controller may know of its own robot: joint readings, link poses, centre of mass.
 pub struct WholeBody<'a> {
@@ -21,56 +21,26 @@ pub struct WholeBody<'a> {
     /// Measured external force on each hand, at its palm.
     pub hand_force_n: Sides<Vector>,
     /// Where the task wants the waist: yaw, roll, pitch.
-    pub waist_target_rad: [f32; 3],
+    pub waist_target_rad: [f32; WAIST_JOINTS],
 }
 
-impl<'a> WholeBody<'a> {
-    pub(crate) fn measure(
-        model: &'a RobotModel,
-        bodies: &RigidBodySet,
-        links: &[RigidBodyHandle],
-        q_rad: [f32; JOINTS],
-        qd_rad_s: [f32; JOINTS],
-        hand_force_n: Sides<Vector>,
-        waist_target_rad: [f32; 3],
-    ) -> WholeBody<'a> {
-        let mut com_m = Vector::ZERO;
-        let mut com_velocity_m_s = Vector::ZERO;
-        let mut world_from_link = Vec::with_capacity(links.len());
-        for (link, handle) in model.links.iter().zip(links) {
-            let body = &bodies[*handle];
-            let world = *body.position();
-            com_m += world * link.mass.local_com * link.mass.mass();
-            com_velocity_m_s += body.linvel() * link.mass.mass();
-            world_from_link.push(world);
-        }
-        let pelvis = &bodies[links[0]];
-        WholeBody {
-            model,
-            q_rad,
-            qd_rad_s,
-            pelvis_velocity_m_s: pelvis.velocity_at_point(world_from_link[0].translation),
-            pelvis_angular_velocity_rad_s: pelvis.angvel(),
-            world_from_link,
-            com_m: com_m / model.mass_kg,
-            com_velocity_m_s: com_velocity_m_s / model.mass_kg,
-            hand_force_n,
-            waist_target_rad,
-        }
-    }
-
+impl WholeBody<'_> {
     /// Middle of each palm, where loads of the hands are taken to act.
     pub fn palms_m(&self) -> Sides<Vector> {
-        self.model.hands.as_ref().map(|hand| self.world_from_link[hand.wrist] * PALM_IN_WRIST_M)
+        self.model.hands.each_ref().map(|hand| self.world_from_link[hand.wrist] * PALM_IN_WRIST_M)
     }
 
     pub fn world_from_pelvis(&self) -> Pose {
         self.world_from_link[0]
     }
 
-    /// World pose of a site, if the robot has it.
-    pub fn world_from_site(&self, name: &str) -> Option<Pose> {
-        self.model.site(name).map(|site| self.world_from_link[site.link] * site.link_from_site)
+    pub fn world_from_site(&self, site: &SiteModel) -> Pose {
+        self.world_from_link[site.link] * site.link_from_site
+    }
+
+    /// Centres of the soles.
+    pub fn world_from_soles(&self) -> Sides<Pose> {
+        self.model.soles.each_ref().map(|sole| self.world_from_site(sole))
     }
 
     /// Ankle roll link, to which a sole belongs.

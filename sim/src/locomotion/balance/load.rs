@@ -3,7 +3,7 @@
 use rapier3d::math::Vector;
 
 use crate::GRAVITY_M_S2;
-use crate::robot::WholeBody;
+use crate::body::WholeBody;
 
 /// External wrench, world frame, and its effect on balance: weights in the hands and an observed push.
 pub(super) struct Load {
@@ -38,5 +38,47 @@ impl Load {
         let away_m =
             Vector::new(moment_n_m.y + height_m * force_n.x, height_m * force_n.y - moment_n_m.x, 0.0);
         Load { force_n, moment_n_m, balance_point_m: body.com_m + away_m / vertical_n }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Sides;
+    use crate::body::posed::Posed;
+
+    #[test]
+    fn a_robot_stands_under_what_it_carries() {
+        let mut body = Posed::standing().body();
+        let free = Load::of(&body, 0.0, Vector::ZERO);
+        assert_eq!(
+            (free.force_n, free.moment_n_m, free.balance_point_m),
+            (Vector::ZERO, Vector::ZERO, body.com_m)
+        );
+
+        // Equal weights in both hands act as one in the middle: the common centre of mass.
+        let weight_n = 20.0;
+        body.hand_force_n = Sides::both(Vector::new(0.0, 0.0, -weight_n - DEAD_ZONE_N));
+        let loaded = Load::of(&body, 0.0, Vector::ZERO);
+        let palms_m: Vector = body.palms_m().into_iter().sum();
+        let robot_n = body.model.mass_kg * GRAVITY_M_S2;
+        let common_m = (body.com_m * robot_n + palms_m * weight_n) / (robot_n + 2.0 * weight_n);
+        let away_m = loaded.balance_point_m - common_m;
+        assert!(away_m.x.abs() < 1e-5 && away_m.y.abs() < 1e-5, "{away_m}");
+
+        // What lifts, and what is lighter than the dead zone, is no load.
+        body.hand_force_n = Sides { left: Vector::Z * 30.0, right: Vector::Z * -0.9 * DEAD_ZONE_N };
+        assert_eq!(Load::of(&body, 0.0, Vector::ZERO).force_n, Vector::ZERO);
+    }
+
+    /// Against a steady push a robot leans: moments about the pressure point cancel.
+    #[test]
+    fn a_push_is_leant_against() {
+        let body = Posed::standing().body();
+        let push_m_s2 = Vector::new(0.5, 0.0, 0.0);
+        let load = Load::of(&body, 0.0, push_m_s2);
+        let lean_m = body.com_m.x - load.balance_point_m.x;
+        let expected_m = -push_m_s2.x * (body.com_m.z + PUSH_LEVER_M) / GRAVITY_M_S2;
+        assert!((lean_m - expected_m).abs() < 1e-5, "{lean_m} {expected_m}");
     }
 }

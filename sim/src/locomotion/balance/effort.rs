@@ -1,12 +1,15 @@
 //! Leg torques by inverse dynamics: trunk and feet accelerate as wanted, the ground answers at the wanted point.
 
+#[cfg(test)]
+mod tests;
+
 use rapier3d::math::Vector;
 use rapier3d::na::{SMatrix, SVector};
 
-use super::ground::{FootForce, distribute, leg_torques_n_m, soles};
+use super::ground::{FootForce, distribute, leg_torques_n_m};
 use super::load::Load;
-use super::plane::flat;
-use crate::robot::{Acceleration, Effort, JOINTS, LEG_JOINTS, LEGS, WholeBody};
+use crate::body::{Acceleration, Effort, JOINTS, LEG_JOINTS, LEGS, WholeBody};
+use crate::locomotion::plane::flat;
 use crate::{GRAVITY_M_S2, Side, Sides};
 
 /// Horizontal force within what friction surely gives.
@@ -17,6 +20,8 @@ const TURN_FADE_M: f32 = 0.12;
 /// Of trunk and arms about the vertical.
 const TURN_INERTIA_KG_M2: f32 = 1.2;
 const CORRECTIONS: usize = 2;
+/// Of the centre of mass over the ground: a robot that is lower has fallen.
+const LEAST_HEIGHT_M: f32 = 0.4;
 /// A knee that is almost straight must not ask for the impossible.
 const DAMPING: f32 = 0.012;
 /// Of the ground force that torques give away.
@@ -97,63 +102,99 @@ pub(super) fn leg_torques_within_limits(
 /// it [`CORRECTIONS`] times.
 fn leg_torques(body: &WholeBody, load: &Load, motion: &Motion, contact: &Contact) -> Torques {
     let point_m = contact.pressure_m;
-    let height_m = (body.com_m.z - point_m.z).max(0.4);
-    let pelvis_m = body.world_from_pelvis().translation;
+    let height_m = (body.com_m.z - point_m.z).max(LEAST_HEIGHT_M);
     let away_m = flat(body.com_m - point_m);
     let mut pelvis = Acceleration {
         linear_m_s2: away_m * ((GRAVITY_M_S2 + motion.lift_m_s2) / height_m) + Vector::Z * motion.lift_m_s2,
         angular_rad_s2: motion.turn_rad_s2,
     };
-    let inertia_kg_m = body.model.mass_kg * height_m;
-    let most_turn_n_m = match contact.foot {
-        Some(side) => {
-            let from_middle_m = flat(point_m - soles(body)[side].translation).length();
-            LARGEST_TURN_N_M * (1.0 - from_middle_m / TURN_FADE_M).max(0.1)
-        }
-        None => LARGEST_TURN_N_M,
-    };
+    let most_turn_n_m = contact.most_turn_n_m(body);
     let mut qdd_rad_s2 = [0.0; JOINTS];
-    let mut pass = 0;
-    let (effort, force_n, rest_n_m) = loop {
-        let effort = body.inverse_dynamics(pelvis, &qdd_rad_s2);
-        move_feet(body, motion, &effort, &mut qdd_rad_s2);
-        let effort = body.inverse_dynamics(pelvis, &qdd_rad_s2);
-        let force_n = effort.force_n - load.force_n;
+    let mut reaction = Reaction::of(body, load, motion, pelvis, point_m, &mut qdd_rad_s2);
+    for _ in 0..CORRECTIONS {
+        reaction.correct(&mut pelvis, body.model.mass_kg, height_m, most_turn_n_m);
+        reaction = Reaction::of(body, load, motion, pelvis, point_m, &mut qdd_rad_s2);
+    }
+    let turn_n_m = Vector::Z * reaction.rest_n_m.z.clamp(-most_turn_n_m, most_turn_n_m);
+    let pushes_n_m = reaction.pushes_n_m(body, contact, turn_n_m);
+    Torques {
+        torque_n_m: Sides::from_fn(|side| {
+            std::array::from_fn(|i| reaction.effort.torque_n_m[LEGS[side] + i] + pushes_n_m[side][i])
+        }),
+        acceleration_m_s2: flat(reaction.force_n) / body.model.mass_kg,
+    }
+}
+
+impl Contact {
+    /// A foot holds less against turning the farther the pressure is from its middle.
+    fn most_turn_n_m(&self, body: &WholeBody) -> f32 {
+        match self.foot {
+            Some(side) => {
+                let middle_m = body.world_from_soles()[side].translation;
+                let from_middle_m = flat(self.pressure_m - middle_m).length();
+                LARGEST_TURN_N_M * (1.0 - from_middle_m / TURN_FADE_M).max(0.1)
+            }
+            None => LARGEST_TURN_N_M,
+        }
+    }
+}
+
+/// What the ground has to do for a motion of the pelvis.
+struct Reaction {
+    effort: Effort,
+    force_n: Vector,
+    /// Moment about the pressure point that the force does not have.
+    rest_n_m: Vector,
+}
+
+impl Reaction {
+    fn of(
+        body: &WholeBody,
+        load: &Load,
+        motion: &Motion,
+        pelvis: Acceleration,
+        point_m: Vector,
+        qdd_rad_s2: &mut [f32; JOINTS],
+    ) -> Reaction {
+        let effort = body.inverse_dynamics(pelvis, qdd_rad_s2);
+        move_feet(body, motion, &effort, qdd_rad_s2);
+        let effort = body.inverse_dynamics(pelvis, qdd_rad_s2);
+        let pelvis_m = body.world_from_pelvis().translation;
         let rest_n_m = effort.moment_n_m + (pelvis_m - point_m).cross(effort.force_n)
             - load.moment_n_m
             - (body.com_m - point_m).cross(load.force_n);
-        if pass == CORRECTIONS {
-            break (effort, force_n, rest_n_m);
-        }
-        pass += 1;
-        let away = Vector::new(-rest_n_m.y, rest_n_m.x, 0.0);
-        pelvis.linear_m_s2 += away / inertia_kg_m;
-        let force_n = force_n + away / height_m;
+        Reaction { force_n: effort.force_n - load.force_n, rest_n_m, effort }
+    }
+
+    /// Accelerates the pelvis away from the moment that is left, no harder than friction gives, and turns it less where
+    /// the foot would spin.
+    fn correct(&self, pelvis: &mut Acceleration, mass_kg: f32, height_m: f32, most_turn_n_m: f32) {
+        let away = Vector::new(-self.rest_n_m.y, self.rest_n_m.x, 0.0);
+        pelvis.linear_m_s2 += away / (mass_kg * height_m);
+        let force_n = self.force_n + away / height_m;
         let sliding = flat(force_n).length() / (FRICTION_USED * force_n.z.max(1.0));
         if sliding > 1.0 {
-            pelvis.linear_m_s2 -= flat(force_n) * ((1.0 - 1.0 / sliding) / body.model.mass_kg);
+            pelvis.linear_m_s2 -= flat(force_n) * ((1.0 - 1.0 / sliding) / mass_kg);
         }
-        let too_much_n_m = rest_n_m.z - rest_n_m.z.clamp(-most_turn_n_m, most_turn_n_m);
+        let too_much_n_m = self.rest_n_m.z - self.rest_n_m.z.clamp(-most_turn_n_m, most_turn_n_m);
         pelvis.angular_rad_s2.z -= too_much_n_m / TURN_INERTIA_KG_M2;
-    };
-    let turn_n_m = Vector::Z * rest_n_m.z.clamp(-most_turn_n_m, most_turn_n_m);
-    let pushes = match contact.foot {
-        Some(side) => {
-            let mut pushes = Sides::both([0.0; LEG_JOINTS]);
-            pushes[side] = leg_torques_n_m(body, side, FootForce { force_n, point_m }, turn_n_m);
-            pushes
+    }
+
+    /// Torques with which the legs push on the ground.
+    fn pushes_n_m(&self, body: &WholeBody, contact: &Contact, turn_n_m: Vector) -> Sides<[f32; LEG_JOINTS]> {
+        let (force_n, point_m) = (self.force_n, contact.pressure_m);
+        match contact.foot {
+            Some(side) => {
+                let mut pushes_n_m = Sides::both([0.0; LEG_JOINTS]);
+                pushes_n_m[side] = leg_torques_n_m(body, side, FootForce { force_n, point_m }, turn_n_m);
+                pushes_n_m
+            }
+            None => {
+                let about_com_n_m = self.rest_n_m + (point_m - body.com_m).cross(force_n);
+                let feet = distribute(body.com_m, force_n, about_com_n_m, body.world_from_soles());
+                Sides::from_fn(|side| leg_torques_n_m(body, side, feet[side], turn_n_m * 0.5))
+            }
         }
-        None => {
-            let about_com_n_m = rest_n_m + (point_m - body.com_m).cross(force_n);
-            let feet = distribute(body.com_m, force_n, about_com_n_m, soles(body));
-            Sides::from_fn(|side| leg_torques_n_m(body, side, feet[side], turn_n_m * 0.5))
-        }
-    };
-    Torques {
-        torque_n_m: Sides::from_fn(|side| {
-            std::array::from_fn(|i| effort.torque_n_m[LEGS[side] + i] + pushes[side][i])
-        }),
-        acceleration_m_s2: flat(force_n) / body.model.mass_kg,
     }
 }
 

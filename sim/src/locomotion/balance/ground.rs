@@ -1,9 +1,12 @@
 //! Ground reaction forces: how two planted feet share a wanted net force, and the leg torques that produce it.
 
+#[cfg(test)]
+mod tests;
+
 use rapier3d::math::{Pose, Vector};
 
-use super::plane::flat;
-use crate::robot::{LEG_JOINTS, LEGS, WholeBody};
+use crate::body::{LEG_JOINTS, LEGS, WholeBody};
+use crate::locomotion::plane::flat;
 use crate::{Side, Sides};
 
 /// Force on one foot and the point of the ground where it acts, world frame.
@@ -21,28 +24,35 @@ const SMALLEST_SHARE: f32 = 0.03;
 /// Below this the centre of pressure is undefined.
 const SMALLEST_VERTICAL_FORCE_N: f32 = 20.0;
 
-/// Centres of the soles, world.
-pub(super) fn soles(body: &WholeBody) -> Sides<Pose> {
-    Sides::from_fn(|side| {
-        // A robot file without these sites is refused when it is read.
-        body.world_from_site(&format!("{}_foot", side.name())).unwrap_or(Pose::IDENTITY)
-    })
-}
-
 /// The point nearest to `point_m` where two planted feet can have their centre of pressure.
 pub(super) fn nearest_support_m(point_m: Vector, soles: Sides<Pose>) -> Vector {
+    let share = share(point_m, soles);
+    let middle_m = between_m(soles, share);
+    let turn = soles.right.rotation.slerp(soles.left.rotation, share.left);
+    let inside_m = within_sole_m(turn.inverse() * flat(point_m - middle_m));
+    middle_m + flat(turn * inside_m)
+}
+
+/// How two feet share a load at a point of the line between their soles.
+fn share(point_m: Vector, soles: Sides<Pose>) -> Sides<f32> {
     let across = flat(soles.left.translation - soles.right.translation);
-    let left_share = (flat(point_m - soles.right.translation).dot(across) / across.length_squared())
-        .clamp(SMALLEST_SHARE, 1.0 - SMALLEST_SHARE);
-    let middle_m = soles.left.translation * left_share + soles.right.translation * (1.0 - left_share);
-    let turn = soles.right.rotation.slerp(soles.left.rotation, left_share);
-    let inside = turn.inverse() * flat(point_m - middle_m);
-    let inside = Vector::new(
-        inside.x.clamp(-SOLE_HALF_LENGTH_M, SOLE_HALF_LENGTH_M),
-        inside.y.clamp(-SOLE_HALF_WIDTH_M, SOLE_HALF_WIDTH_M),
+    let along_line = flat(point_m - soles.right.translation).dot(across) / across.length_squared();
+    let left = along_line.clamp(SMALLEST_SHARE, 1.0 - SMALLEST_SHARE);
+    Sides { left, right: 1.0 - left }
+}
+
+/// The point of that line at which the load is shared so.
+fn between_m(soles: Sides<Pose>, share: Sides<f32>) -> Vector {
+    soles.left.translation * share.left + soles.right.translation * share.right
+}
+
+/// The nearest point of a sole, in its frame.
+fn within_sole_m(point_in_sole_m: Vector) -> Vector {
+    Vector::new(
+        point_in_sole_m.x.clamp(-SOLE_HALF_LENGTH_M, SOLE_HALF_LENGTH_M),
+        point_in_sole_m.y.clamp(-SOLE_HALF_WIDTH_M, SOLE_HALF_WIDTH_M),
         0.0,
-    );
-    middle_m + flat(turn * inside)
+    )
 }
 
 /// The net force nearest to `force_n` whose centre of pressure, with a moment about the centre of mass, lies within the
@@ -85,22 +95,13 @@ pub(super) fn distribute(
 ) -> Sides<FootForce> {
     let pressure_m = centre_of_pressure_m(com_m, force_n, moment_n_m, soles);
     let ground_m = pressure_m.z;
-    let across = flat(soles.left.translation - soles.right.translation);
-    let along_line = flat(pressure_m - soles.right.translation).dot(across) / across.length_squared();
-    let left_share = along_line.clamp(SMALLEST_SHARE, 1.0 - SMALLEST_SHARE);
-    let middle_m = soles.left.translation * left_share + soles.right.translation * (1.0 - left_share);
-    let rest_m = flat(pressure_m - middle_m);
-    let shares = Sides { left: left_share, right: 1.0 - left_share };
+    let share = share(pressure_m, soles);
+    let rest_m = flat(pressure_m - between_m(soles, share));
     Sides::from_fn(|side| {
         let sole = soles[side];
-        let inside = sole.rotation.inverse() * rest_m;
-        let inside = Vector::new(
-            inside.x.clamp(-SOLE_HALF_LENGTH_M, SOLE_HALF_LENGTH_M),
-            inside.y.clamp(-SOLE_HALF_WIDTH_M, SOLE_HALF_WIDTH_M),
-            0.0,
-        );
-        let point_m = sole.translation + sole.rotation * inside;
-        FootForce { force_n: force_n * shares[side], point_m: Vector::new(point_m.x, point_m.y, ground_m) }
+        let inside_m = within_sole_m(sole.rotation.inverse() * rest_m);
+        let point_m = sole.translation + sole.rotation * inside_m;
+        FootForce { force_n: force_n * share[side], point_m: Vector::new(point_m.x, point_m.y, ground_m) }
     })
 }
 

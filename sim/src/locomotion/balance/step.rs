@@ -9,16 +9,17 @@
 use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
+use super::course::Course;
 use super::effort::{Contact, Motion, Torques, leg_torques_within_limits};
 use super::footstep::{Footstep, Situation};
 use super::gait::{Gait, PERIOD_S, TRANSFER_S};
-use super::ground::{nearest_support_m, soles};
+use super::ground::nearest_support_m;
 use super::legs::rotation_vector_rad;
 use super::load::Load;
-use super::plane::{flat, heading_rad, wrapped_rad};
 use super::swing::{SOLE_IN_FOOT_M, SWING_S, Swing};
-use super::{Drive, LegCommand};
-use crate::robot::{Acceleration, LEGS, WholeBody};
+use crate::body::{Acceleration, Drive, LEGS, WholeBody};
+use crate::locomotion::plane::{flat, heading_rad, wrapped_rad};
+use crate::locomotion::{BaseVelocity, LegCommand};
 use crate::{GRAVITY_M_S2, Side, Sides};
 
 const SHIFT_GAIN: f32 = 3.0;
@@ -26,12 +27,6 @@ const SHIFT_GAIN: f32 = 3.0;
 /// falls forward or backward has no time to shift.
 const SHIFTED_M: f32 = 0.012;
 const LATEST_M: f32 = 0.1;
-/// Position loop: a steady gait falls a little short of its command.
-const POSITION_GAIN_1_S: f32 = 0.4;
-const BIAS_GAIN_1_S2: f32 = 0.3;
-const LARGEST_CORRECTION_M_S: [f32; 2] = [0.3, 0.12];
-/// A robot that was pushed farther than this off its way does not come back for it.
-const LEASH_M: f32 = 0.15;
 /// One foot holds little against turning: a robot that is turned by force gives way, and turns back slowly.
 const HEADING_LEASH_RAD: f32 = 0.12;
 const RETURN_RAD_S: f32 = 0.4;
@@ -75,16 +70,14 @@ pub(super) struct Step {
     steps: u32,
     swing: Swing,
     height_m: f32,
-    /// Where the pelvis should be by now, and what the velocity command lacked so far.
-    reference_m: Vector,
-    bias_m_s: [f32; 2],
+    course: Course,
 }
 
 impl Step {
     /// Starts stepping; the first foot to carry is the one nearer to the capture point.
     pub(super) fn start(body: &WholeBody, heading_rad: f32, left_carries: bool) -> Step {
         let stance = if left_carries { Side::Left } else { Side::Right };
-        let ground_m = soles(body)[stance].translation.z;
+        let ground_m = body.world_from_soles()[stance].translation.z;
         let mut step = Step {
             heading_rad,
             goal_rad: heading_rad,
@@ -94,8 +87,7 @@ impl Step {
             steps: 0,
             swing: Swing::default(),
             height_m: body.world_from_pelvis().translation.z - ground_m,
-            reference_m: body.world_from_pelvis().translation,
-            bias_m_s: [0.0; 2],
+            course: Course::from(body.world_from_pelvis().translation),
         };
         step.swing.plant(body, step.stance.other());
         step
@@ -115,19 +107,20 @@ impl Step {
         &mut self,
         body: &WholeBody,
         load: &Load,
-        velocity: [f32; 3],
+        velocity: BaseVelocity,
         height_m: f32,
         dt_s: f32,
     ) -> (LegCommand, Vector) {
-        let soles = soles(body);
+        let soles = body.world_from_soles();
         let ground_m = soles[self.stance].translation.z;
-        self.turn(body, velocity[2], dt_s);
+        self.turn(body, velocity.turning_rad_s, dt_s);
         let heading = Rotation::from_rotation_z(self.heading_rad);
         let (ahead, left) = (heading * Vector::X, heading * Vector::Y);
         let rate_1_s = (GRAVITY_M_S2 / (body.com_m.z - ground_m).max(0.4)).sqrt();
         let pelvis_m = body.world_from_pelvis().translation;
-        let [forward_m_s, left_m_s] = self.corrected_velocity(velocity, pelvis_m, ahead, left, dt_s);
-        let outside = if self.stance == Side::Left { left } else { -left };
+        let [forward_m_s, left_m_s] =
+            self.course.corrected_velocity(velocity, self.steps > 0, pelvis_m, [ahead, left], dt_s);
+        let outside = left * self.stance.sign();
         let gait = Gait::new(rate_1_s, ahead * forward_m_s + left * left_m_s, outside);
         let situation = Situation {
             gait: &gait,
@@ -135,8 +128,8 @@ impl Step {
             capture_m: flat(load.balance_point_m + body.com_velocity_m_s / rate_1_s),
             stance: soles[self.stance],
             old_m: flat(soles[self.stance.other()].translation),
-            ahead,
-            outside,
+            ahead_axis: ahead,
+            outside_axis: outside,
             time_s: self.time_s,
         };
         let pressure_m = if self.shifting {
@@ -145,27 +138,15 @@ impl Step {
             nearest_support_m(situation.capture_m + (situation.capture_m - target_m) * SHIFT_GAIN, soles)
         } else {
             let footstep = situation.plan(dt_s);
-            self.advance(&footstep, velocity[2], ground_m, dt_s);
+            self.advance(&footstep, velocity.turning_rad_s, ground_m, dt_s);
             footstep.pressure_m
         };
         let wanted_m = height_m.min(HIGHEST_M).min(self.within_reach_m(body)).max(LOWEST_M);
         let rise = (wanted_m - self.height_m).clamp(-LOWERING_M_S * dt_s, RAISING_M_S * dt_s);
         self.height_m += rise;
-        let torques = self.carry(body, load, pressure_m, ground_m, heading, velocity[2]);
+        let torques = self.carry(body, load, pressure_m, ground_m, heading, velocity.turning_rad_s);
         self.land(body, &soles, ground_m);
-        let legs = Sides::from_fn(|side| {
-            std::array::from_fn(|i| {
-                let joint = LEGS[side] + i;
-                Drive {
-                    target_rad: body.q_rad[joint],
-                    kp_n_m_rad: KP_N_M_RAD,
-                    kd_n_m_s_rad: KD_N_M_S_RAD,
-                    // The drives' dampers are not wanted.
-                    feedforward_n_m: torques.torque_n_m[side][i] + KD_N_M_S_RAD * body.qd_rad_s[joint],
-                }
-            })
-        });
-        (legs, torques.acceleration_m_s2)
+        (drives(body, &torques), torques.acceleration_m_s2)
     }
 
     /// Turns the heading as commanded, within the leash of where the robot faces.
@@ -224,41 +205,6 @@ impl Step {
         }
     }
 
-    /// Velocity to plan with: the command, plus what brings the pelvis back to where it should be by now.
-    fn corrected_velocity(
-        &mut self,
-        velocity: [f32; 3],
-        pelvis_m: Vector,
-        ahead: Vector,
-        left: Vector,
-        dt_s: f32,
-    ) -> [f32; 2] {
-        // A robot that is to stop stops where it can: the bias was learned in another direction of motion.
-        let stopping = velocity == [0.0; 3];
-        if self.steps == 0 || stopping {
-            self.reference_m = pelvis_m;
-        }
-        if stopping {
-            self.bias_m_s = [0.0; 2];
-        }
-        self.reference_m += (ahead * velocity[0] + left * velocity[1]) * dt_s;
-        let mut error_m = flat(self.reference_m - pelvis_m);
-        if error_m.length() > LEASH_M {
-            error_m *= LEASH_M / error_m.length();
-            self.reference_m = pelvis_m + error_m;
-        }
-        let error_m = [error_m.dot(ahead), error_m.dot(left)];
-        std::array::from_fn(|i| {
-            let most_m_s = LARGEST_CORRECTION_M_S[i];
-            if self.steps > 0 {
-                self.bias_m_s[i] = (self.bias_m_s[i] + BIAS_GAIN_1_S2 * error_m[i].clamp(-0.3, 0.3) * dt_s)
-                    .clamp(-most_m_s, most_m_s);
-            }
-            let pull = (POSITION_GAIN_1_S * error_m[i]).clamp(-most_m_s, most_m_s);
-            velocity[i] + pull + self.bias_m_s[i]
-        })
-    }
-
     /// Torques of both legs for a centre of pressure, an upright trunk and the swinging foot's path.
     fn carry(
         &self,
@@ -293,13 +239,28 @@ impl Step {
     }
 }
 
+/// Torques as drives: of their springs and dampers nothing is left at the measured angle and velocity.
+fn drives(body: &WholeBody, torques: &Torques) -> LegCommand {
+    Sides::from_fn(|side| {
+        std::array::from_fn(|i| {
+            let joint = LEGS[side] + i;
+            Drive {
+                target_rad: body.q_rad[joint],
+                kp_n_m_rad: KP_N_M_RAD,
+                kd_n_m_s_rad: KD_N_M_S_RAD,
+                feedforward_n_m: torques.torque_n_m[side][i] + KD_N_M_S_RAD * body.qd_rad_s[joint],
+            }
+        })
+    })
+}
+
 /// Where the capture point has to be when the first foot lifts, as a step that just ended would leave it; and whether
 /// the foot lifts now.
 fn shift(now: &Situation) -> (Vector, bool) {
     let target_m = now.steady_capture_m(SWING_S);
     let middle_m = (flat(now.stance.translation) + now.old_m) * 0.5;
-    let late = (now.capture_m - middle_m).dot(now.ahead).abs() > LATEST_M;
-    (target_m, late || (target_m - now.capture_m).dot(now.outside) < SHIFTED_M)
+    let late = (now.capture_m - middle_m).dot(now.ahead_axis).abs() > LATEST_M;
+    (target_m, late || (target_m - now.capture_m).dot(now.outside_axis) < SHIFTED_M)
 }
 
 /// Height of the lowest point of a sole.

@@ -1,6 +1,7 @@
 //! What a base controller can do: standing, loads, walking, stopping, squatting, pushes and a tour, several seeds each.
 
 mod cases;
+mod measure;
 mod motion;
 mod tour;
 mod trial;
@@ -13,9 +14,9 @@ use serde::Serialize;
 
 pub use cases::{CASES, Case};
 
-use super::Locomotion;
 use crate::SimError;
-use trial::Trial;
+use crate::locomotion::Locomotion;
+use measure::Trial;
 
 /// Makes a fresh controller for each trial.
 pub type NewLocomotion<'a> = &'a (dyn Fn() -> Box<dyn Locomotion> + Sync);
@@ -34,7 +35,8 @@ pub struct CaseReport {
     pub seeds: usize,
     pub survived: usize,
     /// Deviation of the mean velocity, as a part of the command: mean over the seeds.
-    pub velocity_error: Option<f32>,
+    #[serde(rename = "velocity_error")]
+    pub velocity_error_share: Option<f32>,
     pub heading_error_deg: Option<f32>,
     pub final_drift_m: Option<f32>,
     pub sway_m: Option<f32>,
@@ -98,7 +100,7 @@ fn summarise(case: &Case, trials: &[Trial]) -> CaseReport {
         case: case.name.into(),
         seeds: trials.len(),
         survived: standing.len(),
-        velocity_error: mean(|trial| trial.velocity_error),
+        velocity_error_share: mean(|trial| trial.velocity_error_share),
         heading_error_deg: worst(|trial| trial.heading_error_deg),
         final_drift_m: worst(|trial| trial.final_drift_m),
         sway_m: worst(|trial| trial.sway_m),
@@ -126,7 +128,7 @@ impl fmt::Display for CaseReport {
             self.case,
             self.survived,
             self.seeds,
-            show(self.velocity_error, 100.0, "%"),
+            show(self.velocity_error_share, 100.0, "%"),
             show(self.heading_error_deg, 1.0, "°"),
             show(self.final_drift_m, 100.0, "cm"),
             show(self.sway_m, 100.0, "cm"),

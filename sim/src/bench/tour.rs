@@ -45,19 +45,19 @@ pub(super) fn legs(tour: &Tour, random: &mut Random) -> Vec<Leg> {
     let mut from_m = Vector::ZERO;
     (0..tour.waypoints)
         .map(|_| {
-            let angle = random.uniform(0.0, std::f32::consts::TAU);
-            let length_m = random.uniform(0.3, reach_m);
+            let angle = random.uniform([0.0, std::f32::consts::TAU]);
+            let length_m = random.uniform([0.3, reach_m]);
             let side = tour.half_side_m;
             let next = from_m + Vector::new(angle.cos(), angle.sin(), 0.0) * length_m;
             let target_m = Vector::new(next.x.clamp(-side, side), next.y.clamp(-side, side), 0.0);
             from_m = target_m;
-            let direction = random.uniform(0.0, std::f32::consts::TAU);
-            let size_n = random.uniform(0.0, tour.punch_n);
+            let direction = random.uniform([0.0, std::f32::consts::TAU]);
+            let size_n = random.uniform([0.0, tour.punch_n]);
             Leg {
                 target_m,
-                punch_at_s: random.uniform(0.5, tour.leg_s - 0.5),
+                punch_at_s: random.uniform([0.5, tour.leg_s - 0.5]),
                 punched_link: BODIES
-                    [(random.uniform(0.0, BODIES.len() as f32) as usize).min(BODIES.len() - 1)],
+                    [(random.uniform([0.0, BODIES.len() as f32]) as usize).min(BODIES.len() - 1)],
                 punch_n: Vector::new(direction.cos(), direction.sin(), 0.0) * size_n,
             }
         })

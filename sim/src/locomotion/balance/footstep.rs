@@ -1,10 +1,13 @@
 //! Plans the rest of a step: where the ground should push now, where the swinging foot should land, and how soon.
 
+#[cfg(test)]
+mod tests;
+
 use rapier3d::math::{Pose, Vector};
 
 use super::gait::{Gait, PERIOD_S, TRANSFER_S, recoil};
-use super::plane::flat;
 use super::swing::{SWING_S, Swing};
+use crate::locomotion::plane::flat;
 
 /// Footholds lie within these of the foot that carries, along the heading and to the inside: the feet never cross.
 const REACH_M: [f32; 2] = [-0.4, 0.48];
@@ -28,8 +31,8 @@ pub(super) struct Situation<'a> {
     /// Sole that carries, and the centre of the one that carried before.
     pub stance: Pose,
     pub old_m: Vector,
-    pub ahead: Vector,
-    pub outside: Vector,
+    pub ahead_axis: Vector,
+    pub outside_axis: Vector,
     /// Since the stance foot landed, at the pace of the gait.
     pub time_s: f32,
 }
@@ -88,7 +91,7 @@ impl Situation<'_> {
     fn nearest_m(&self, point_m: Vector, reach_m: [f32; 2], spread_m: [f32; 2]) -> Vector {
         let stance_m = flat(self.stance.translation);
         let away_m = point_m - stance_m;
-        stance_m + self.ahead * away_m.dot(self.ahead).clamp(reach_m[0], reach_m[1])
-            - self.outside * (-away_m.dot(self.outside)).clamp(spread_m[0], spread_m[1])
+        stance_m + self.ahead_axis * away_m.dot(self.ahead_axis).clamp(reach_m[0], reach_m[1])
+            - self.outside_axis * (-away_m.dot(self.outside_axis)).clamp(spread_m[0], spread_m[1])
     }
 }

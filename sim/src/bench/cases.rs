@@ -2,11 +2,12 @@
 
 use super::motion::Arms;
 use super::tour::Tour;
+use crate::locomotion::BaseVelocity;
 
 /// One situation; a seed draws its arm motion and directions.
 pub struct Case {
     pub name: &'static str,
-    pub seconds: f32,
+    pub duration_s: f32,
     pub(super) arms: Arms,
     pub(super) hand_load_kg: f32,
     pub(super) plan: Plan,
@@ -16,8 +17,8 @@ pub struct Case {
 /// What the base is told.
 pub(super) enum Plan {
     Hold,
-    /// Forward m/s, left m/s, turning rad/s; the last [`STOP_S`] seconds are a stop.
-    Move([f32; 3]),
+    /// The last [`STOP_S`] seconds are a stop.
+    Move(BaseVelocity),
     /// Down and up again, a third of the time each.
     Squat {
         high_m: f32,
@@ -43,20 +44,21 @@ pub(super) const STOP_S: f32 = 5.0;
 
 const HOLD: Case = Case {
     name: "",
-    seconds: 20.0,
+    duration_s: 20.0,
     arms: Arms::Forward,
     hand_load_kg: 0.0,
     plan: Plan::Hold,
     disturbance: Disturbance::None,
 };
 
-const fn moving(name: &'static str, velocity: [f32; 3]) -> Case {
-    Case { name, seconds: 21.0 + STOP_S, plan: Plan::Move(velocity), ..HOLD }
+const fn moving(name: &'static str, [forward_m_s, left_m_s, turning_rad_s]: [f32; 3]) -> Case {
+    let velocity = BaseVelocity { forward_m_s, left_m_s, turning_rad_s };
+    Case { name, duration_s: 21.0 + STOP_S, plan: Plan::Move(velocity), ..HOLD }
 }
 
 pub const CASES: [Case; 25] = [
     Case { name: "stand", ..HOLD },
-    Case { name: "stand_waving", seconds: 60.0, arms: Arms::Waving, ..HOLD },
+    Case { name: "stand_waving", duration_s: 60.0, arms: Arms::Waving, ..HOLD },
     Case { name: "stand_1kg", hand_load_kg: 1.0, ..HOLD },
     Case { name: "stand_2kg", hand_load_kg: 2.0, ..HOLD },
     Case { name: "stand_3kg", hand_load_kg: 3.0, ..HOLD },
@@ -85,5 +87,5 @@ pub const CASES: [Case; 25] = [
     Case { name: "squat_1kg", hand_load_kg: 1.0, plan: Plan::Squat { high_m: 0.75, low_m: 0.55 }, ..HOLD },
     Case { name: "push_40n", disturbance: Disturbance::Push { force_n: 40.0 }, ..HOLD },
     Case { disturbance: Disturbance::Push { force_n: 30.0 }, ..moving("push_30n_walking", [0.3, 0.0, 0.0]) },
-    Case { name: "tour", seconds: 90.0, arms: Arms::Waving, plan: Plan::Tour(Tour::STANDARD), ..HOLD },
+    Case { name: "tour", duration_s: 90.0, arms: Arms::Waving, plan: Plan::Tour(Tour::STANDARD), ..HOLD },
 ];

@@ -1,17 +1,28 @@
 //! The default base controller: stands while it can, steps when it is told to move or is pushed out of its stance.
 
+mod course;
+mod effort;
+mod footstep;
+mod gait;
+mod ground;
+mod legs;
+mod load;
+mod observer;
+mod stand;
+mod step;
+mod swing;
+
 use rapier3d::math::{Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
-use super::ground::soles;
-use super::load::Load;
-use super::observer::Observer;
 use super::plane::heading_rad;
-use super::stand::Stand;
-use super::step::Step;
-use super::{BaseCommand, BaseLimits, LegCommand, Locomotion};
-use crate::robot::WholeBody;
+use super::{BaseCommand, BaseLimits, BaseVelocity, LegCommand, Locomotion};
+use crate::body::WholeBody;
 use crate::{GRAVITY_M_S2, Sides};
+use load::Load;
+use observer::Observer;
+use stand::Stand;
+use step::Step;
 
 const LIMITS: BaseLimits = BaseLimits {
     vx_m_s: [-0.3, 0.4],
@@ -19,10 +30,12 @@ const LIMITS: BaseLimits = BaseLimits {
     yaw_rate_rad_s: [-0.5, 0.5],
     pelvis_height_m: [0.50, 0.76],
 };
-/// A velocity command changes no faster than this, per second.
-const LARGEST_CHANGE_1_S: [f32; 3] = [0.8, 0.8, 1.5];
-/// Below this a command means to stand.
-const STILL: f32 = 0.01;
+/// A velocity command changes no faster than this.
+const LARGEST_CHANGE_M_S2: f32 = 0.8;
+const LARGEST_CHANGE_RAD_S2: f32 = 1.5;
+/// Below these a command means to stand.
+const STILL_M_S: f32 = 0.01;
+const STILL_RAD_S: f32 = 0.01;
 /// Standing ends when the capture point leaves the feet by this much: forward, backward, sideways beyond a sole's centre.
 const FORWARD_M: f32 = 0.075;
 const BACKWARD_M: f32 = 0.07;
@@ -47,8 +60,8 @@ pub struct Balance {
 struct State {
     mode: Mode,
     heading_rad: f32,
-    /// Velocity command after the ramp: forward, left, turning.
-    velocity: [f32; 3],
+    /// Velocity command after the ramp.
+    velocity: BaseVelocity,
     time_in_mode_s: f32,
     /// Where the pelvis rests over the middle of the soles, heading frame.
     pelvis_from_middle_m: Vector,
@@ -76,13 +89,10 @@ impl Locomotion for Balance {
     fn tick(&mut self, body: &WholeBody, command: &BaseCommand, dt_s: f32) -> LegCommand {
         let state = self.state.get_or_insert_with(|| State::new(body));
         let command = LIMITS.clamp(*command);
-        let wanted = [command.vx_m_s, command.vy_m_s, command.yaw_rate_rad_s];
-        for i in 0..3 {
-            let change = LARGEST_CHANGE_1_S[i] * dt_s;
-            state.velocity[i] += (wanted[i] - state.velocity[i]).clamp(-change, change);
-        }
+        state.velocity = ramped(state.velocity, command.velocity(), dt_s);
         state.time_in_mode_s += dt_s;
-        let ground_m = soles(body).iter().map(|sole| sole.translation.z).fold(f32::INFINITY, f32::min);
+        let ground_m =
+            body.world_from_soles().iter().map(|sole| sole.translation.z).fold(f32::INFINITY, f32::min);
         state.observer.update(body.com_velocity_m_s, dt_s);
         let load = Load::of(body, ground_m, state.observer.push_m_s2());
         state.change_mode(body, &load);
@@ -112,7 +122,7 @@ impl State {
     fn new(body: &WholeBody) -> State {
         let pelvis = body.world_from_pelvis();
         let heading_rad = heading_rad(pelvis);
-        let Sides { left, right } = soles(body);
+        let Sides { left, right } = body.world_from_soles();
         let middle_m = (left.translation + right.translation) * 0.5;
         let mut pelvis_from_middle_m =
             Rotation::from_rotation_z(-heading_rad) * (pelvis.translation - middle_m);
@@ -120,7 +130,7 @@ impl State {
         State {
             mode: Mode::Stand(Stand::plant(body, heading_rad, None)),
             heading_rad,
-            velocity: [0.0; 3],
+            velocity: BaseVelocity::STILL,
             time_in_mode_s: 0.0,
             pelvis_from_middle_m,
             observer: Observer::default(),
@@ -128,7 +138,9 @@ impl State {
     }
 
     fn change_mode(&mut self, body: &WholeBody, load: &Load) {
-        let moving = self.velocity.iter().any(|part| part.abs() > STILL);
+        let BaseVelocity { forward_m_s, left_m_s, turning_rad_s } = self.velocity;
+        let moving =
+            forward_m_s.abs() > STILL_M_S || left_m_s.abs() > STILL_M_S || turning_rad_s.abs() > STILL_RAD_S;
         let stance = self.stance(body, load);
         let half_width_m = stance.left_from_right_m.y * 0.5;
         match &self.mode {
@@ -159,7 +171,7 @@ impl State {
     }
 
     fn stance(&self, body: &WholeBody, load: &Load) -> Stance {
-        let Sides { left, right } = soles(body);
+        let Sides { left, right } = body.world_from_soles();
         let middle_m = (left.translation + right.translation) * 0.5;
         let height_m = body.com_m.z - middle_m.z;
         let capture_m = load.balance_point_m + body.com_velocity_m_s * (height_m / GRAVITY_M_S2).sqrt();
@@ -169,5 +181,16 @@ impl State {
             com_m: into_heading * (body.com_m - middle_m),
             left_from_right_m: into_heading * (left.translation - right.translation),
         }
+    }
+}
+
+/// One physics step from a velocity towards another.
+fn ramped(from: BaseVelocity, to: BaseVelocity, dt_s: f32) -> BaseVelocity {
+    let towards = |from: f32, to: f32, most: f32| from + (to - from).clamp(-most, most);
+    let (most_m_s, most_rad_s) = (LARGEST_CHANGE_M_S2 * dt_s, LARGEST_CHANGE_RAD_S2 * dt_s);
+    BaseVelocity {
+        forward_m_s: towards(from.forward_m_s, to.forward_m_s, most_m_s),
+        left_m_s: towards(from.left_m_s, to.left_m_s, most_m_s),
+        turning_rad_s: towards(from.turning_rad_s, to.turning_rad_s, most_rad_s),
     }
 }

@@ -8,6 +8,7 @@ pub const JOINTS: usize = 43;
 /// Joints a task commands: arms 14, hands 14, waist 3.
 pub const UPPER_JOINTS: usize = 31;
 pub(crate) const LEG_JOINTS: usize = 6;
+pub(crate) const WAIST_JOINTS: usize = 3;
 pub const ARM_JOINTS: usize = 7;
 pub const HAND_JOINTS: usize = 7;
 
@@ -24,9 +25,11 @@ pub const WAIST_COLUMN: usize = 28;
 
 const LEG_NAMES: [&str; LEG_JOINTS] =
     ["hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll"];
-const WAIST_NAMES: [&str; 3] = ["waist_yaw", "waist_roll", "waist_pitch"];
+const WAIST_NAMES: [&str; WAIST_JOINTS] = ["waist_yaw", "waist_roll", "waist_pitch"];
 const ARM_NAMES: [&str; ARM_JOINTS] =
     ["shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_roll", "wrist_pitch", "wrist_yaw"];
+/// Roll and yaw joints of the right arm turn the other way than the left arm's.
+pub(crate) const MIRRORED_ARM: [bool; ARM_JOINTS] = [false, true, true, false, true, false, true];
 const HAND_NAMES: [&str; HAND_JOINTS] = [
     "hand_thumb_0",
     "hand_thumb_1",
@@ -77,7 +80,7 @@ pub const UPPER: [usize; UPPER_JOINTS] = {
 };
 
 /// Fails unless a robot file's actuators are the published joints in the published order.
-pub(super) fn check(file: &str, model: &RobotModel) -> Result<(), SimError> {
+pub(crate) fn check_joint_order(file: &str, model: &RobotModel) -> Result<(), SimError> {
     let have: Vec<&str> = model.joints.iter().map(|joint| joint.name.as_str()).collect();
     if have == joint_names() {
         return Ok(());

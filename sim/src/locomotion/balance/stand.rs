@@ -8,12 +8,12 @@ use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
 use super::effort::ground_force_n;
-use super::ground::{distribute, leg_torques_n_m, soles, supported_force_n};
+use super::ground::{distribute, leg_torques_n_m, supported_force_n};
 use super::legs::{LegAngles, inverse, rotation_vector_rad};
 use super::load::Load;
-use super::plane::flat;
-use super::{Drive, LegCommand};
-use crate::robot::{JOINTS, LEG_JOINTS, LEGS, WholeBody};
+use crate::body::{Drive, JOINTS, LEG_JOINTS, LEGS, WholeBody};
+use crate::locomotion::LegCommand;
+use crate::locomotion::plane::flat;
 use crate::{GRAVITY_M_S2, Side, Sides};
 
 /// The centre of mass may lie this far from the middle of the feet before the pelvis gives way.
@@ -66,7 +66,7 @@ impl Stand {
     /// middle of the soles, in the heading frame, and what it leans against. `None` keeps the pelvis where it is.
     pub(super) fn plant(body: &WholeBody, heading_rad: f32, moving: Option<(Vector, &Load)>) -> Stand {
         let pelvis = body.world_from_pelvis();
-        let soles = soles(body);
+        let soles = body.world_from_soles();
         let middle_m = (soles.left.translation + soles.right.translation) * 0.5;
         let heading = Rotation::from_rotation_z(heading_rad);
         let home_m = moving.map_or(pelvis.translation, |(rest_m, _)| middle_m + heading * rest_m);
@@ -196,7 +196,7 @@ fn balance_torques_n_m(
     let tilt_rad = rotation_vector_rad(goal.rotation * pelvis.rotation.inverse());
     let moment_n_m =
         tilt_rad * TRUNK_STIFFNESS_N_M_RAD - body.pelvis_angular_velocity_rad_s * TRUNK_DAMPING_N_M_S_RAD;
-    let soles = soles(body);
+    let soles = body.world_from_soles();
     let ground_force_n =
         supported_force_n(body.com_m, force_n - load.force_n, moment_n_m - load.moment_n_m, soles);
     let feet = distribute(body.com_m, ground_force_n, moment_n_m - load.moment_n_m, soles);

@@ -1,11 +1,14 @@
 //! The foot in the air: a path that jerks least, planned anew at each instant to where the foot has to go.
 
+#[cfg(test)]
+mod tests;
+
 use rapier3d::math::{Pose, Vector};
 use serde::{Deserialize, Serialize};
 
 use super::legs::rotation_vector_rad;
 use crate::Side;
-use crate::robot::{Acceleration, LEG_JOINTS, LEGS, WholeBody};
+use crate::body::{Acceleration, LEG_JOINTS, LEGS, WholeBody};
 
 pub(super) const SWING_S: f32 = 0.25;
 /// The foot is down a little before the step ends.
@@ -40,8 +43,12 @@ pub(super) struct Swing {
 impl Swing {
     /// The foot stands; its next swing starts from where it is.
     pub(super) fn plant(&mut self, body: &WholeBody, side: Side) {
-        let foot = body.world_from_foot(side);
-        *self = Swing { from: foot, to: foot, position_m: foot.translation, pace: 1.0, ..Swing::default() };
+        *self = Swing::at(body.world_from_foot(side));
+    }
+
+    /// A foot that stands.
+    pub(super) fn at(foot: Pose) -> Swing {
+        Swing { from: foot, to: foot, position_m: foot.translation, pace: 1.0, ..Swing::default() }
     }
 
     /// One physics step of the path to `goal`, `time_s` (at the pace of the gait) after lift-off. The jerk of least jerk
@@ -91,16 +98,9 @@ impl Swing {
     pub(super) fn wanted(&self, body: &WholeBody, side: Side, time_s: f32) -> Acceleration {
         let (foot, speed_m_s, spin_rad_s) = foot_motion(body, side);
         let p = (time_s / AIR_S).clamp(0.0, 1.0);
-        let (mut lift_m, mut lift_m_s, mut lift_m_s2) = (
-            16.0 * HEIGHT_M * (p * (1.0 - p)).powi(2),
-            32.0 * HEIGHT_M * p * (1.0 - p) * (1.0 - 2.0 * p) / AIR_S,
-            HEIGHT_M * (32.0 - 192.0 * p + 192.0 * p * p) / (AIR_S * AIR_S),
-        );
-        if time_s > AIR_S {
-            (lift_m, lift_m_s, lift_m_s2) = (PROBING_M_S * (AIR_S - time_s), -PROBING_M_S, 0.0);
-        }
-        lift_m_s *= self.pace;
-        lift_m_s2 *= self.pace * self.pace;
+        let [lift_m, lift_m_s, lift_m_s2] = lift(time_s);
+        let lift_m_s = lift_m_s * self.pace;
+        let lift_m_s2 = lift_m_s2 * (self.pace * self.pace);
         let position_m = self.position_m + Vector::Z * lift_m;
         let velocity_m_s = self.velocity_m_s + Vector::Z * lift_m_s;
         let smooth = p * p * p * (10.0 - 15.0 * p + 6.0 * p * p);
@@ -114,6 +114,20 @@ impl Swing {
             angular_rad_s2: turn_rad * STIFFNESS_1_S2 - spin_rad_s * DAMPING_1_S,
         }
     }
+}
+
+/// Height over the path along the ground, `time_s` after lift-off, with its first and second derivative:
+///   16 h p^2 (1 - p)^2,   p = t / T;   after T down, until something is met.
+fn lift(time_s: f32) -> [f32; 3] {
+    if time_s > AIR_S {
+        return [PROBING_M_S * (AIR_S - time_s), -PROBING_M_S, 0.0];
+    }
+    let p = (time_s / AIR_S).clamp(0.0, 1.0);
+    [
+        16.0 * HEIGHT_M * (p * (1.0 - p)).powi(2),
+        32.0 * HEIGHT_M * p * (1.0 - p) * (1.0 - 2.0 * p) / AIR_S,
+        HEIGHT_M * (32.0 - 192.0 * p + 192.0 * p * p) / (AIR_S * AIR_S),
+    ]
 }
 
 /// Pose, velocity and angular velocity of an ankle roll link, world frame.

@@ -1,0 +1,106 @@
+//! Numbers of a trial, from its log.
+
+use rapier3d::math::Vector;
+
+use super::cases::{Case, Plan, STOP_S};
+use super::tour::Leg;
+use crate::CONTROL_DT_S as DT_S;
+use crate::locomotion::plane::flat;
+use crate::locomotion::{BaseCommand, BaseVelocity};
+
+/// Arms rise and loads swing out before anything is asked or measured.
+pub(super) const SETTLE_S: f32 = 2.0;
+/// A velocity is measured after the start of motion has faded.
+const RAMP_S: f32 = 2.0;
+
+/// What came out; see [`super::CaseReport`].
+#[derive(Clone, Debug, Default)]
+pub(super) struct Trial {
+    pub fell: bool,
+    pub velocity_error_share: Option<f32>,
+    pub heading_error_deg: Option<f32>,
+    pub final_drift_m: Option<f32>,
+    pub sway_m: Option<f32>,
+    pub height_error_m: Option<f32>,
+    pub standing_after_s: Option<f32>,
+    pub still_after_s: Option<f32>,
+    pub power_w: f32,
+}
+
+/// One control step of the log.
+pub(super) struct Sample {
+    pub pelvis_m: Vector,
+    /// Unwrapped.
+    pub heading_rad: f32,
+    pub command: BaseCommand,
+}
+
+/// Fills in what the case measures; the robot stands.
+pub(super) fn measure(case: &Case, log: &[Sample], legs: &[Leg], trial: &mut Trial) {
+    let at = |time_s: f32| ((time_s / DT_S) as usize).min(log.len() - 1);
+    let (start, end) = (at(SETTLE_S), log.len() - 1);
+    match &case.plan {
+        Plan::Hold | Plan::Squat { .. } => {
+            let (mut low, mut high) = (Vector::INFINITY, Vector::NEG_INFINITY);
+            for sample in &log[start..] {
+                low = low.min(sample.pelvis_m);
+                high = high.max(sample.pelvis_m);
+            }
+            trial.sway_m = Some((high.x - low.x).max(high.y - low.y));
+            trial.final_drift_m = Some(flat(log[end].pelvis_m - log[0].pelvis_m).length());
+        }
+        Plan::Move(velocity) => {
+            let stop = at(case.duration_s - STOP_S);
+            trial.velocity_error_share = Some(velocity_error(&log[at(SETTLE_S + RAMP_S)..stop], *velocity));
+            let turned_rad = velocity.turning_rad_s * (stop - start) as f32 * DT_S;
+            trial.heading_error_deg =
+                Some((log[end].heading_rad - log[start].heading_rad - turned_rad).abs().to_degrees());
+            trial.standing_after_s = Some(slower_after_s(&log[stop..], 0.1));
+            trial.still_after_s = Some(slower_after_s(&log[stop..], 0.02));
+        }
+        Plan::Tour(tour) => {
+            let error_m = |leg: usize| {
+                let last = at((leg + 1) as f32 * tour.leg_s - DT_S);
+                flat(log[last].pelvis_m - legs[leg].target_m).length()
+            };
+            trial.final_drift_m = Some((0..legs.len()).map(error_m).sum::<f32>() / legs.len() as f32);
+        }
+    }
+    if let Plan::Squat { .. } = &case.plan {
+        let ends = [case.duration_s / 3.0, case.duration_s * 2.0 / 3.0, case.duration_s];
+        let error_m = |end_s: &f32| {
+            let sample = &log[at(end_s - 2.0 * DT_S)];
+            (sample.pelvis_m.z - sample.command.pelvis_height_m).abs()
+        };
+        trial.height_error_m = ends.iter().map(error_m).reduce(f32::max);
+    }
+}
+
+/// Largest deviation of the mean velocity in the heading frame, as a part of the commanded speed (m/s or rad/s).
+fn velocity_error(log: &[Sample], velocity: BaseVelocity) -> f32 {
+    let mut moved = [0.0_f32; 3];
+    for pair in log.windows(2) {
+        let step_m = pair[1].pelvis_m - pair[0].pelvis_m;
+        let (sine, cosine) = pair[0].heading_rad.sin_cos();
+        moved[0] += step_m.x * cosine + step_m.y * sine;
+        moved[1] += step_m.y * cosine - step_m.x * sine;
+        moved[2] += pair[1].heading_rad - pair[0].heading_rad;
+    }
+    let time_s = (log.len() - 1) as f32 * DT_S;
+    let BaseVelocity { forward_m_s, left_m_s, turning_rad_s } = velocity;
+    let [x, y, turn] = moved.map(|moved| moved / time_s);
+    let (x, y, turn) = (x - forward_m_s, y - left_m_s, turn - turning_rad_s);
+    let speed_m_s = forward_m_s.hypot(left_m_s);
+    let linear = if speed_m_s > 0.0 { x.hypot(y) / speed_m_s } else { 0.0 };
+    let angular = if turning_rad_s != 0.0 { (turn / turning_rad_s).abs() } else { 0.0 };
+    linear.max(angular)
+}
+
+/// Time until the pelvis stays slower than a limit, averaged over a fifth of a second.
+fn slower_after_s(log: &[Sample], limit_m_s: f32) -> f32 {
+    const WINDOW: usize = 10;
+    let speed_m_s =
+        |i: usize| flat(log[i + WINDOW].pelvis_m - log[i].pelvis_m).length() / (WINDOW as f32 * DT_S);
+    let last = (0..log.len() - WINDOW).rev().find(|i| speed_m_s(*i) > limit_m_s);
+    last.map_or(0.0, |i| (i + WINDOW) as f32 * DT_S)
+}

@@ -1,0 +1,76 @@
+//! Random numbers of a seed, and arm motion drawn from them.
+
+use crate::Sides;
+use crate::body::{ARM_COLUMNS, ARM_JOINTS, MIRRORED_ARM, UPPER_JOINTS};
+
+/// SplitMix64: the same numbers everywhere.
+pub(super) struct Random(pub u64);
+
+impl Random {
+    /// Uniform between the two.
+    pub(super) fn uniform(&mut self, [low, high]: [f32; 2]) -> f32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^= z >> 31;
+        low + (high - low) * ((z >> 40) as f32 / (1u64 << 24) as f32)
+    }
+}
+
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Arms {
+    /// Held out with a little random motion.
+    Forward,
+    /// As forward, with every joint swinging widely.
+    Waving,
+}
+
+/// Hands a forearm's length ahead of the chest: shoulder pitch, roll, yaw, elbow, wrist.
+const FORWARD_LEFT_RAD: [f32; ARM_JOINTS] = [-0.35, 0.2, 0.0, 0.3, 0.0, 0.0, 0.0];
+const RAISE_S: f32 = 1.5;
+
+/// Joint targets over time.
+pub(super) struct ArmMotion {
+    waves: Sides<[Wave; ARM_JOINTS]>,
+}
+
+/// Of one joint.
+#[derive(Clone, Copy)]
+struct Wave {
+    amplitude_rad: f32,
+    rate_rad_s: f32,
+    phase_rad: f32,
+}
+
+impl Wave {
+    fn at(&self, time_s: f32) -> f32 {
+        self.amplitude_rad * (self.rate_rad_s * time_s + self.phase_rad).sin()
+    }
+}
+
+impl ArmMotion {
+    pub(super) fn new(arms: Arms, random: &mut Random) -> ArmMotion {
+        let amplitude_rad = if arms == Arms::Waving { [0.1, 0.35] } else { [0.0, 0.03] };
+        let mut wave = || Wave {
+            amplitude_rad: random.uniform(amplitude_rad),
+            rate_rad_s: random.uniform([1.0, 4.0]),
+            phase_rad: random.uniform([0.0, 6.3]),
+        };
+        let waves = Sides::from_fn(|_| std::array::from_fn(|_| wave()));
+        ArmMotion { waves }
+    }
+
+    pub(super) fn at(&self, rest_rad: &[f32; UPPER_JOINTS], time_s: f32) -> [f32; UPPER_JOINTS] {
+        let part = (time_s / RAISE_S).min(1.0);
+        let mut q_rad = *rest_rad;
+        for (side, waves) in self.waves.by_side() {
+            for (i, wave) in waves.into_iter().enumerate() {
+                let forward = FORWARD_LEFT_RAD[i] * if MIRRORED_ARM[i] { side.sign() } else { 1.0 };
+                let column = ARM_COLUMNS[side] + i;
+                q_rad[column] += part * (forward - rest_rad[column] + wave.at(time_s));
+            }
+        }
+        q_rad
+    }
+}

@@ -1,0 +1,131 @@
+//! One case with one seed.
+
+use std::f32::consts::{PI, TAU};
+
+use rapier3d::math::Vector;
+
+use super::cases::{Case, Disturbance, Plan, STOP_S};
+use super::measure::{SETTLE_S, Sample, Trial, measure};
+use super::motion::{ArmMotion, Random};
+use super::tour::{self, Leg};
+use crate::body::PALM_IN_WRIST_M;
+use crate::locomotion::plane::{heading_rad, wrapped_rad};
+use crate::locomotion::{BaseCommand, BaseVelocity, Locomotion};
+use crate::robot::{RobotCommand, RobotState};
+use crate::{CONTROL_DT_S as DT_S, RobotPlacement, Side, SimError, World, WorldSpec};
+
+const PUSH_S: f32 = 1.0;
+
+/// Runs until the time is up or the robot lies.
+pub(super) fn run(case: &Case, seed: u64, locomotion: Box<dyn Locomotion>) -> Result<Trial, SimError> {
+    let placement = RobotPlacement { name: "A".into(), position_m: [0.0, 0.0], yaw_rad: 0.0 };
+    let spec = WorldSpec { scene: "floor".into(), robots: vec![placement], objects: vec![] };
+    let mut world = World::new(&spec)?;
+    world.set_locomotion(0, locomotion);
+    let mut random = Random(seed);
+    let arms = ArmMotion::new(case.arms, &mut random);
+    let legs = if let Plan::Tour(tour) = &case.plan { tour::legs(tour, &mut random) } else { Vec::new() };
+    let direction = pull_direction(&mut random);
+    for side in Side::BOTH {
+        world.load_hand(0, side, case.hand_load_kg, PALM_IN_WRIST_M);
+    }
+    let rest = world.rest_command(0);
+    let mut state = world.present().robots.remove(0).state;
+    let mut log: Vec<Sample> = Vec::new();
+    let mut trial = Trial::default();
+    let mut work_j = 0.0;
+    for step in 0..(case.duration_s / DT_S) as usize {
+        let time_s = step as f32 * DT_S;
+        trial.fell = state.fallen;
+        if trial.fell {
+            break;
+        }
+        let heading_rad =
+            unwrap(heading_rad(state.world_from_pelvis), log.last().map_or(0.0, |s| s.heading_rad));
+        let base = base_command(case, &world, &state, heading_rad, &legs, time_s, rest.base);
+        disturb(case, &mut world, seed, direction, &legs, time_s);
+        let upper_rad = arms.at(&rest.upper_rad, time_s);
+        work_j += power_w(&state) * DT_S;
+        log.push(Sample { pelvis_m: state.world_from_pelvis.translation, heading_rad, command: base });
+        state = world.control_step(&[RobotCommand { upper_rad, base }]).robots.remove(0).state;
+    }
+    trial.power_w = work_j / (log.len() as f32 * DT_S);
+    if !trial.fell {
+        measure(case, &log, &legs, &mut trial);
+    }
+    Ok(trial)
+}
+
+fn base_command(
+    case: &Case,
+    world: &World,
+    state: &RobotState,
+    heading_rad: f32,
+    legs: &[Leg],
+    time_s: f32,
+    rest: BaseCommand,
+) -> BaseCommand {
+    match &case.plan {
+        Plan::Hold => rest,
+        Plan::Move(velocity) if time_s > SETTLE_S && time_s < case.duration_s - STOP_S => {
+            let BaseVelocity { forward_m_s, left_m_s, turning_rad_s } = *velocity;
+            BaseCommand {
+                vx_m_s: forward_m_s,
+                vy_m_s: left_m_s,
+                yaw_rate_rad_s: turning_rad_s,
+                pelvis_height_m: rest.pelvis_height_m,
+            }
+        }
+        Plan::Move(_) => rest,
+        Plan::Squat { high_m, low_m } => {
+            let middle = (case.duration_s / 3.0..case.duration_s * 2.0 / 3.0).contains(&time_s);
+            BaseCommand { pelvis_height_m: if middle { *low_m } else { *high_m }, ..rest }
+        }
+        Plan::Tour(tour) => {
+            let leg = ((time_s / tour.leg_s) as usize).min(legs.len() - 1);
+            let pelvis_m = state.world_from_pelvis.translation;
+            let away_m = legs[leg].target_m - Vector::new(pelvis_m.x, pelvis_m.y, 0.0);
+            tour::command(away_m, heading_rad, &world.robots()[0].base_limits(), rest.pelvis_height_m)
+        }
+    }
+}
+
+fn disturb(case: &Case, world: &mut World, seed: u64, direction: Vector, legs: &[Leg], time_s: f32) {
+    match &case.disturbance {
+        Disturbance::Pull { force_n } if time_s > 0.5 * SETTLE_S => {
+            for side in Side::BOTH {
+                let model = &world.robots()[0].model;
+                let link = model.links[model.hands[side].wrist].name.clone();
+                let force_n = direction * (force_n * (time_s - 0.5 * SETTLE_S).min(1.0));
+                world.push(0, &link, PALM_IN_WRIST_M, force_n);
+            }
+        }
+        Disturbance::Push { force_n } if (5.0..5.0 + PUSH_S).contains(&time_s) => {
+            let angle = TAU * seed as f32 / 8.0;
+            let force_n = Vector::new(angle.cos(), angle.sin(), 0.0) * *force_n;
+            world.push(0, "torso_link", Vector::new(0.0, 0.0, 0.1), force_n);
+        }
+        _ => {}
+    }
+    if let Plan::Tour(tour) = &case.plan {
+        let leg = ((time_s / tour.leg_s) as usize).min(legs.len() - 1);
+        let within_s = time_s - leg as f32 * tour.leg_s - legs[leg].punch_at_s;
+        if (0.0..tour.punch_s - 0.5 * DT_S).contains(&within_s) {
+            world.push(0, legs[leg].punched_link, Vector::ZERO, legs[leg].punch_n);
+        }
+    }
+}
+
+/// Any direction, no more than 45 degrees out of the horizontal.
+fn pull_direction(random: &mut Random) -> Vector {
+    let (angle, rise) = (random.uniform([0.0, TAU]), random.uniform([-PI / 4.0, PI / 4.0]));
+    Vector::new(angle.cos() * rise.cos(), angle.sin() * rise.cos(), rise.sin())
+}
+
+fn power_w(state: &RobotState) -> f32 {
+    state.torque_n_m.iter().zip(&state.qd_rad_s).map(|(torque, rate)| (torque * rate).abs()).sum()
+}
+
+fn unwrap(angle_rad: f32, last_rad: f32) -> f32 {
+    last_rad + wrapped_rad(angle_rad - last_rad)
+}

@@ -1,0 +1,24 @@
+//! What a controller may know of a robot: its model, the order of its joints, kinematics and inverse dynamics. It knows no
+//! physics world: whoever senses a robot there fills in a [`WholeBody`].
+
+mod drive;
+mod inverse_dynamics;
+mod layout;
+mod model;
+#[cfg(test)]
+pub(crate) mod posed;
+#[cfg(test)]
+mod tests;
+mod whole_body;
+
+pub use drive::Drive;
+pub use inverse_dynamics::{Acceleration, Effort};
+pub use layout::{
+    ARM_COLUMNS, ARM_JOINTS, HAND_COLUMNS, HAND_JOINTS, JOINTS, UPPER, UPPER_JOINTS, WAIST_COLUMN,
+    joint_names,
+};
+pub use model::{HandLinks, JointModel, Link, RobotModel, SiteModel};
+pub use whole_body::WholeBody;
+
+pub(crate) use layout::{ARMS, LEG_JOINTS, LEGS, MIRRORED_ARM, WAIST, WAIST_JOINTS, check_joint_order};
+pub(crate) use whole_body::PALM_IN_WRIST_M;

@@ -1,0 +1,103 @@
+//! A robot as its MJCF file describes it: links, joints with gains and limits, sites, cameras, self-collision pairs.
+
+mod read;
+
+use std::collections::BTreeSet;
+
+use rapier3d::math::{Pose, Rotation, Vector};
+use rapier3d::prelude::MassProperties;
+
+use crate::Sides;
+use crate::mjcf::{Geom, MjcfCamera};
+
+/// One rigid link. Bodies without a joint are merged into their parent's link.
+#[derive(Clone, Debug)]
+pub struct Link {
+    pub name: String,
+    pub parent: Option<usize>,
+    /// Joint origin in the parent link's frame, at joint coordinate 0.
+    pub parent_from_link: Pose,
+    /// Index into [`RobotModel::joints`]; `None` for the pelvis.
+    pub joint: Option<usize>,
+    pub mass: MassProperties,
+    pub geoms: Vec<Geom>,
+}
+
+/// One actuated hinge, with the PD gains and limits of its position actuator.
+#[derive(Clone, Debug)]
+pub struct JointModel {
+    pub name: String,
+    pub link: usize,
+    /// In the link's frame.
+    pub axis: Vector,
+    pub lower_rad: f32,
+    pub upper_rad: f32,
+    pub armature_kg_m2: f32,
+    pub friction_n_m: f32,
+    pub kp_n_m_rad: f32,
+    pub kd_n_m_s_rad: f32,
+    pub effort_n_m: f32,
+    /// Coordinate in the file's first keyframe.
+    pub rest_rad: f32,
+}
+
+/// A frame fixed to a link.
+#[derive(Clone, Copy, Debug)]
+pub struct SiteModel {
+    pub link: usize,
+    pub link_from_site: Pose,
+}
+
+/// A robot that can be put into a world any number of times.
+#[derive(Clone, Debug)]
+pub struct RobotModel {
+    /// Parents before children; 0 is the pelvis.
+    pub links: Vec<Link>,
+    /// Published order: the file's actuators.
+    pub joints: Vec<JointModel>,
+    /// Where tasks put a hand.
+    pub wrists: Sides<SiteModel>,
+    /// Centre of the sole.
+    pub soles: Sides<SiteModel>,
+    pub egocentric: MjcfCamera,
+    pub egocentric_link: usize,
+    pub mass_kg: f32,
+    /// Link pairs that never touch, smaller index first.
+    excluded: BTreeSet<(usize, usize)>,
+    pub hands: Sides<HandLinks>,
+}
+
+/// Links of one hand, for contact queries.
+#[derive(Clone, Debug, Default)]
+pub struct HandLinks {
+    /// Link that carries palm and wrist.
+    pub wrist: usize,
+    pub thumb: Vec<usize>,
+    pub fingers: Vec<usize>,
+}
+
+impl RobotModel {
+    pub(crate) fn may_touch(&self, a: usize, b: usize) -> bool {
+        !self.excluded.contains(&(a.min(b), a.max(b)))
+    }
+
+    /// World poses of all links for a pelvis pose and joint coordinates in published order.
+    pub fn forward_kinematics(&self, pelvis: Pose, q_rad: &[f32]) -> Vec<Pose> {
+        let mut world_from_link: Vec<Pose> = Vec::with_capacity(self.links.len());
+        for link in &self.links {
+            let pose = match (link.parent, link.joint) {
+                (Some(parent), Some(joint)) => {
+                    let turn = Rotation::from_axis_angle(self.joints[joint].axis, q_rad[joint]);
+                    world_from_link[parent] * link.parent_from_link * Pose::from_rotation(turn)
+                }
+                _ => pelvis,
+            };
+            world_from_link.push(pose);
+        }
+        world_from_link
+    }
+
+    pub(crate) fn rest_rad(&self) -> Vec<f32> {
+        self.joints.iter().map(|joint| joint.rest_rad).collect()
+    }
+}

@@ -1,0 +1,96 @@
+//! Position loop of stepping: a steady gait falls a little short of its command, and makes up for it.
+
+use rapier3d::math::Vector;
+use serde::{Deserialize, Serialize};
+
+use crate::locomotion::BaseVelocity;
+use crate::locomotion::plane::flat;
+
+const POSITION_GAIN_1_S: f32 = 0.4;
+const BIAS_GAIN_1_S2: f32 = 0.3;
+const LARGEST_CORRECTION_M_S: [f32; 2] = [0.3, 0.12];
+/// A robot that was pushed farther than this off its way does not come back for it.
+const LEASH_M: f32 = 0.15;
+const LARGEST_ERROR_M: f32 = 0.3;
+
+/// Where the pelvis should be by now, and what the velocity command lacked so far.
+#[derive(Clone, Serialize, Deserialize)]
+pub(super) struct Course {
+    reference_m: Vector,
+    bias_m_s: [f32; 2],
+}
+
+impl Course {
+    pub(super) fn from(pelvis_m: Vector) -> Course {
+        Course { reference_m: pelvis_m, bias_m_s: [0.0; 2] }
+    }
+
+    /// Velocity to plan with: the command, plus what brings the pelvis back to where it should be
+    /// by now. Before the first step, while a robot has not `stepped`, there is nothing to make up for.
+    pub(super) fn corrected_velocity(
+        &mut self,
+        velocity: BaseVelocity,
+        stepped: bool,
+        pelvis_m: Vector,
+        [ahead, left]: [Vector; 2],
+        dt_s: f32,
+    ) -> [f32; 2] {
+        // A robot that is to stop stops where it can: the bias was learned in another direction of motion.
+        let stopping = velocity == BaseVelocity::STILL;
+        if !stepped || stopping {
+            self.reference_m = pelvis_m;
+        }
+        if stopping {
+            self.bias_m_s = [0.0; 2];
+        }
+        self.reference_m += (ahead * velocity.forward_m_s + left * velocity.left_m_s) * dt_s;
+        let mut error_m = flat(self.reference_m - pelvis_m);
+        if error_m.length() > LEASH_M {
+            error_m *= LEASH_M / error_m.length();
+            self.reference_m = pelvis_m + error_m;
+        }
+        let error_m = [error_m.dot(ahead), error_m.dot(left)];
+        let command_m_s = [velocity.forward_m_s, velocity.left_m_s];
+        std::array::from_fn(|i| {
+            let most_m_s = LARGEST_CORRECTION_M_S[i];
+            if stepped {
+                let felt_m = error_m[i].clamp(-LARGEST_ERROR_M, LARGEST_ERROR_M);
+                self.bias_m_s[i] =
+                    (self.bias_m_s[i] + BIAS_GAIN_1_S2 * felt_m * dt_s).clamp(-most_m_s, most_m_s);
+            }
+            let pull = (POSITION_GAIN_1_S * error_m[i]).clamp(-most_m_s, most_m_s);
+            command_m_s[i] + pull + self.bias_m_s[i]
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DT_S: f32 = 1.0 / 200.0;
+    const AXES: [Vector; 2] = [Vector::X, Vector::Y];
+
+    /// A gait that goes 80 % of what it is told ends up at the commanded velocity.
+    #[test]
+    fn a_slow_gait_is_told_to_hurry() {
+        let command = BaseVelocity { forward_m_s: 0.3, ..BaseVelocity::STILL };
+        let (mut course, mut pelvis_m) = (Course::from(Vector::ZERO), Vector::ZERO);
+        let mut told_m_s = [0.0; 2];
+        for _ in 0..6000 {
+            told_m_s = course.corrected_velocity(command, true, pelvis_m, AXES, DT_S);
+            pelvis_m += Vector::X * (0.8 * told_m_s[0] * DT_S);
+        }
+        assert!((0.8 * told_m_s[0] - 0.3).abs() < 1e-3 && told_m_s[1] == 0.0, "{told_m_s:?}");
+    }
+
+    #[test]
+    fn a_stop_forgets_and_a_push_is_not_walked_back() {
+        let mut course = Course::from(Vector::ZERO);
+        let far_m = Vector::X * -5.0;
+        let command = BaseVelocity { forward_m_s: 0.2, ..BaseVelocity::STILL };
+        let told_m_s = course.corrected_velocity(command, true, far_m, AXES, DT_S);
+        assert!((told_m_s[0] - 0.2 - POSITION_GAIN_1_S * LEASH_M).abs() < 1e-3, "{told_m_s:?}");
+        assert_eq!(course.corrected_velocity(BaseVelocity::STILL, true, Vector::Y, AXES, DT_S), [0.0; 2]);
+    }
+}

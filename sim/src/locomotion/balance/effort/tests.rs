@@ -1,0 +1,90 @@
+//! Leg torques against statics, the pendulum and known ground forces.
+
+use super::*;
+use crate::body::posed::Posed;
+
+const STILL: Motion = Motion { lift_m_s2: 0.0, turn_rad_s2: Vector::ZERO, feet: Sides::both(AT_REST) };
+const AT_REST: Acceleration = Acceleration { linear_m_s2: Vector::ZERO, angular_rad_s2: Vector::ZERO };
+
+fn solve(body: &WholeBody, motion: &Motion, pressure_m: Vector, foot: Option<Side>) -> Torques {
+    let load = Load::of(body, 0.0, Vector::ZERO);
+    leg_torques_within_limits(body, &load, motion, &Contact { pressure_m: flat(pressure_m), foot })
+}
+
+/// On one foot under the centre of mass: each joint of that leg holds up all that is above it, and the other leg hangs.
+#[test]
+fn one_leg_holds_the_rest_of_the_robot() {
+    let body = Posed::standing().body();
+    let torques = solve(&body, &STILL, body.com_m, Some(Side::Left));
+    assert!(torques.acceleration_m_s2.length() < 1e-3, "{}", torques.acceleration_m_s2);
+    let gravity_n_m = body.gravity_torques_n_m();
+    for i in 0..LEG_JOINTS {
+        let hanging_n_m = gravity_n_m[LEGS[Side::Right] + i];
+        assert!((torques.torque_n_m[Side::Right][i] - hanging_n_m).abs() < 0.02);
+
+        // The links from this joint down to the foot follow each other in the file.
+        let joint = LEGS[Side::Left] + i;
+        let below = body.model.joints[joint].link..=body.model.joints[LEGS[Side::Left] + 5].link;
+        let (origin_m, axis) = body.joint_axis(joint);
+        let mut expected_n_m = 0.0;
+        for (index, link) in body.model.links.iter().enumerate().filter(|(index, _)| !below.contains(index)) {
+            let lever_m = body.world_from_link[index] * link.mass.local_com - origin_m;
+            let weight_n = Vector::Z * (-GRAVITY_M_S2 * link.mass.mass());
+            expected_n_m += axis.dot(lever_m.cross(weight_n));
+        }
+        let torque_n_m = torques.torque_n_m[Side::Left][i];
+        assert!((torque_n_m - expected_n_m).abs() < 0.05, "{i}: {torque_n_m} N m, not {expected_n_m}");
+    }
+}
+
+/// The linear inverted pendulum: a pressure that is off by d accelerates by g d / h, away from it.
+#[test]
+fn the_robot_falls_away_from_the_pressure() {
+    let body = Posed::standing().body();
+    for away_m in [Vector::new(0.04, 0.0, 0.0), Vector::new(-0.03, 0.02, 0.0)] {
+        let acceleration_m_s2 = solve(&body, &STILL, body.com_m - away_m, None).acceleration_m_s2;
+        let expected_m_s2 = away_m * (GRAVITY_M_S2 / body.com_m.z);
+        let error_m_s2 = (acceleration_m_s2 - expected_m_s2).length();
+        assert!(error_m_s2 < 0.1 * expected_m_s2.length(), "{acceleration_m_s2}, not {expected_m_s2}");
+    }
+}
+
+#[test]
+fn torques_ease_off_rather_than_saturate() {
+    let body = Posed::standing().body();
+    let kick = Acceleration { linear_m_s2: Vector::new(250.0, 0.0, 60.0), ..AT_REST };
+    let motion = Motion { feet: Sides { left: AT_REST, right: kick }, ..STILL };
+    let contact = Contact { pressure_m: flat(body.com_m), foot: Some(Side::Left) };
+    let load = Load::of(&body, 0.0, Vector::ZERO);
+    let most_used = |torques: &Torques| {
+        let used = torques.torque_n_m.by_side().flat_map(|(side, leg)| {
+            let joints = &body.model.joints[LEGS[side]..];
+            std::iter::zip(leg, joints)
+                .map(|(torque, joint)| torque.abs() / joint.effort_n_m)
+                .collect::<Vec<_>>()
+        });
+        used.fold(0.0, f32::max)
+    };
+    let (full, eased) = (
+        leg_torques(&body, &load, &motion, &contact),
+        leg_torques_within_limits(&body, &load, &motion, &contact),
+    );
+    assert!(most_used(&full) > 1.0, "the kick uses {}", most_used(&full));
+    assert!((most_used(&eased) - EFFORT_USED).abs() < 1e-3, "eased, it uses {}", most_used(&eased));
+}
+
+/// What the ground gives is found again from the torques against it, but for the damping.
+#[test]
+fn a_ground_force_is_recovered() {
+    let body = Posed::standing().body();
+    let dynamics_n_m = body.gravity_torques_n_m();
+    for side in Side::BOTH {
+        let force_n = Vector::new(12.0, -8.0, 160.0);
+        let foot_m = body.world_from_foot(side).translation;
+        let pushed = FootForce { force_n, point_m: foot_m };
+        let pushes_n_m = leg_torques_n_m(&body, side, pushed, Vector::ZERO);
+        let torque_n_m = std::array::from_fn(|i| dynamics_n_m[LEGS[side] + i] + pushes_n_m[i]);
+        let found_n = ground_force_n(&body, side, &dynamics_n_m, &torque_n_m);
+        assert!((found_n - force_n).length() < 0.1 * force_n.length(), "{found_n}, not {force_n}");
+    }
+}

@@ -1,0 +1,143 @@
+//! What a robot can measure of itself.
+
+use rapier3d::math::{Pose, Vector};
+use rapier3d::prelude::PhysicsWorld;
+use serde::{Deserialize, Serialize};
+
+use super::{Robot, RobotCommand, per_joint};
+use crate::Sides;
+use crate::body::{JOINTS, RobotModel, UPPER, WholeBody};
+use crate::locomotion::BaseCommand;
+
+/// What a robot can measure of itself; poses as named.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RobotState {
+    /// Published order, as the velocities and torques.
+    #[serde(with = "per_joint")]
+    pub q_rad: [f32; JOINTS],
+    #[serde(with = "per_joint")]
+    pub qd_rad_s: [f32; JOINTS],
+    #[serde(with = "per_joint")]
+    pub torque_n_m: [f32; JOINTS],
+    pub world_from_pelvis: Pose,
+    pub pelvis_from_wrist: Sides<Pose>,
+    /// Axes as [`crate::mjcf::MjcfCamera`]'s.
+    pub pelvis_from_camera: Pose,
+    /// Weight that each hand carries beyond its own, estimated from joint torques.
+    pub payload_n: Sides<f32>,
+    /// External force on each hand, world frame, estimated from joint torques.
+    pub hand_force_n: Sides<Vector>,
+    /// Pelvis below 0.4 m or tilted beyond 60 degrees. Stays true: nothing puts a robot back.
+    pub fallen: bool,
+}
+
+impl Robot {
+    /// The robot as its controller may know it.
+    pub(crate) fn measure(&self, physics: &PhysicsWorld) -> WholeBody<'_> {
+        self.sense(&self.model, physics)
+    }
+
+    /// [`Robot::measure`], for a robot that changes while its model is looked at.
+    pub(super) fn sense<'a>(&self, model: &'a RobotModel, physics: &PhysicsWorld) -> WholeBody<'a> {
+        let (q_rad, qd_rad_s) = self.joints.read(physics);
+        let mut com_m = Vector::ZERO;
+        let mut com_velocity_m_s = Vector::ZERO;
+        let mut world_from_link = Vec::with_capacity(self.bodies.len());
+        for (link, handle) in model.links.iter().zip(&self.bodies) {
+            let body = &physics.bodies[*handle];
+            let world = *body.position();
+            com_m += world * link.mass.local_com * link.mass.mass();
+            com_velocity_m_s += body.linvel() * link.mass.mass();
+            world_from_link.push(world);
+        }
+        let pelvis = &physics.bodies[self.bodies[0]];
+        WholeBody {
+            model,
+            q_rad,
+            qd_rad_s,
+            pelvis_velocity_m_s: pelvis.velocity_at_point(world_from_link[0].translation),
+            pelvis_angular_velocity_rad_s: pelvis.angvel(),
+            world_from_link,
+            com_m: com_m / model.mass_kg,
+            com_velocity_m_s: com_velocity_m_s / model.mass_kg,
+            hand_force_n: self.memory.feeling.force_n(),
+            waist_target_rad: self.waist_target_rad(),
+        }
+    }
+
+    /// What the robot reports when it is measured as `body`.
+    pub(crate) fn state(&self, body: &WholeBody) -> RobotState {
+        let model = body.model;
+        let pelvis_from_world = body.world_from_pelvis().inverse();
+        RobotState {
+            q_rad: body.q_rad,
+            qd_rad_s: body.qd_rad_s,
+            torque_n_m: std::array::from_fn(|joint| self.memory.torque_n_m[joint]),
+            world_from_pelvis: body.world_from_pelvis(),
+            pelvis_from_wrist: model
+                .wrists
+                .each_ref()
+                .map(|wrist| pelvis_from_world * body.world_from_site(wrist)),
+            pelvis_from_camera: pelvis_from_world
+                * body.world_from_link[model.egocentric_link]
+                * model.egocentric.body_from_camera,
+            payload_n: self.memory.feeling.weight_n(),
+            hand_force_n: body.hand_force_n,
+            fallen: self.memory.fallen,
+        }
+    }
+
+    /// The command of the last control step.
+    pub(crate) fn last_command(&self) -> RobotCommand {
+        let upper_rad = std::array::from_fn(|i| self.memory.last_upper_rad[i]);
+        RobotCommand { upper_rad, base: self.memory.base }
+    }
+
+    /// The command under which the robot stays as it is.
+    pub(crate) fn rest_command(&self, physics: &PhysicsWorld) -> RobotCommand {
+        let (q_rad, _) = self.joints.read(physics);
+        let pelvis_height_m = physics.bodies[self.bodies[0]].translation().z;
+        let base = BaseCommand::standing(pelvis_height_m);
+        RobotCommand { upper_rad: UPPER.map(|joint| q_rad[joint]), base: self.base_limits().clamp(base) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::body::posed::{Posed, model};
+    use crate::robot::RobotPlacement;
+
+    /// What is sensed in the physics world is what the model's kinematics make of joints and pelvis: here of a robot in the
+    /// air, with an arm on the move.
+    #[test]
+    fn sensed_poses_and_velocities_are_those_of_the_model() {
+        let mut physics = PhysicsWorld::new();
+        let placement = RobotPlacement { name: "A".into(), position_m: [0.3, -0.2], yaw_rad: 0.8 };
+        let mut robot = Robot::spawn(&mut physics, &Arc::new(model().clone()), &placement, 0).unwrap();
+        let mut command = robot.rest_command(&physics);
+        command.upper_rad[0] -= 0.5;
+        for substep in 0..4 {
+            robot.drive(&mut physics, &command, substep);
+            physics.step();
+        }
+        let sensed = robot.measure(&physics);
+        let body = Posed {
+            world_from_pelvis: sensed.world_from_pelvis(),
+            pelvis_velocity_m_s: sensed.pelvis_velocity_m_s,
+            pelvis_angular_velocity_rad_s: sensed.pelvis_angular_velocity_rad_s,
+            q_rad: sensed.q_rad,
+            qd_rad_s: sensed.qd_rad_s,
+        }
+        .body();
+        assert!(sensed.qd_rad_s.iter().any(|rate| rate.abs() > 0.1), "the arm moves");
+        for (seen, expected) in sensed.world_from_link.iter().zip(&body.world_from_link) {
+            assert!((seen.translation - expected.translation).length() < 1e-4, "{seen:?} {expected:?}");
+        }
+        assert!((sensed.com_m - body.com_m).length() < 1e-4);
+        let error_m_s = (sensed.com_velocity_m_s - body.com_velocity_m_s).length();
+        assert!(error_m_s < 1e-3, "{} {}", sensed.com_velocity_m_s, body.com_velocity_m_s);
+    }
+}
