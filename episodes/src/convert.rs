@@ -35,8 +35,8 @@ pub fn wire_pose_from_sim(pose: &Pose) -> wire::Pose {
     wire_pose(&isometry_from_sim(pose))
 }
 
-pub fn wire_vector(v: Vector) -> [f64; 3] {
-    v.to_array().map(|value| rounded(value.into()))
+pub fn wire_vector(value: Vector) -> [f64; 3] {
+    value.to_array().map(|value| rounded(value.into()))
 }
 
 pub fn wire_base(base: &BaseCommand) -> wire::BaseCommand {

@@ -67,8 +67,8 @@ pub fn wrist_target(
 }
 
 /// Without a height, the base keeps the one it was last told.
-fn base(velocity: [f64; 3], height_m: Option<f64>, motion: &Motion, cut: &mut Cut) -> BaseCommand {
-    let [vx_m_s, vy_m_s, yaw_rate_rad_s] = velocity.map(|part| part as f32);
+fn base(velocity_command: [f64; 3], height_m: Option<f64>, motion: &Motion, cut: &mut Cut) -> BaseCommand {
+    let [vx_m_s, vy_m_s, yaw_rate_rad_s] = velocity_command.map(|part| part as f32);
     let pelvis_height_m = height_m.map_or(motion.base().pelvis_height_m, |height_m| height_m as f32);
     let asked = BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m };
     within_base_limits(&motion.robot, asked, cut)

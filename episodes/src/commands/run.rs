@@ -70,6 +70,6 @@ impl Run {
     }
 }
 
-fn between(from: &Isometry3<f64>, to: &Isometry3<f64>, part: f64) -> Isometry3<f64> {
-    from.try_lerp_slerp(to, part, 1e-9).unwrap_or(*to)
+fn between(from: &Isometry3<f64>, to: &Isometry3<f64>, share: f64) -> Isometry3<f64> {
+    from.try_lerp_slerp(to, share, 1e-9).unwrap_or(*to)
 }

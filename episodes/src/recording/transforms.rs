@@ -59,8 +59,8 @@ pub fn timestamp(time_s: f64) -> Timestamp {
     Timestamp::new((ns / NS_PER_S) as u32, (ns % NS_PER_S) as u32)
 }
 
-pub fn vector3(v: Vector) -> Vector3 {
-    Vector3 { x: v.x.into(), y: v.y.into(), z: v.z.into() }
+pub fn vector3(value: Vector) -> Vector3 {
+    Vector3 { x: value.x.into(), y: value.y.into(), z: value.z.into() }
 }
 
 pub fn quaternion(q: Rotation) -> Quaternion {

@@ -64,10 +64,10 @@ impl SplitMix64 {
         z ^ (z >> 31)
     }
 
-    /// Uniform over `range`, from the 24 highest bits, which is what an f32 holds.
-    fn uniform(&mut self, range: &RangeInclusive<f32>) -> f32 {
+    /// Uniform over `values`, from the 24 highest bits, which is what an f32 holds.
+    fn uniform(&mut self, values: &RangeInclusive<f32>) -> f32 {
         let unit = (self.next() >> 40) as f32 / (1u32 << 24) as f32;
-        range.start() + unit * (range.end() - range.start())
+        values.start() + unit * (values.end() - values.start())
     }
 }
 

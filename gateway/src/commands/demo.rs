@@ -15,6 +15,7 @@ use tandem_episodes::{
     tasks::{self, Task},
 };
 use tandem_tools_spec::{CommandReply, Protocol, ResultReply, StartEpisode, ToolCall, ToolReply};
+use tracing_subscriber::filter::LevelFilter;
 
 use super::{Outcome, Seeds, episode_flags::LocomotionFlag, log};
 use crate::{
@@ -47,7 +48,7 @@ pub struct Args {
 
 /// Plays; it is a failure if too few episodes reach the last phase.
 pub fn run(args: Args) -> Outcome {
-    log::to_stderr("warn");
+    log::to_stderr(LevelFilter::WARN);
     let results = play_all(&args.runs, args.seeds, args.locomotion.file)?;
     Ok(if passed(&results) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

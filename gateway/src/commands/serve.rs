@@ -2,6 +2,8 @@
 
 use std::{path::PathBuf, process::ExitCode};
 
+use tracing_subscriber::filter::LevelFilter;
+
 use super::{Outcome, log};
 use crate::{
     http::Server,
@@ -21,7 +23,7 @@ pub struct Args {
 
 /// Serves.
 pub fn run(args: Args) -> Outcome {
-    log::to_stderr("info");
+    log::to_stderr(LevelFilter::INFO);
     let settings = Settings::resolve(args.flags, args.config.as_deref())?;
     Server::start(settings)?.run_until_signal();
     Ok(ExitCode::SUCCESS)

@@ -4,6 +4,7 @@
 use rapier3d::math::Vector;
 use serde::{Deserialize, Serialize};
 
+use super::arm::Arm;
 use super::hand_force::HandForce;
 use super::payload::Payload;
 use crate::Sides;
@@ -13,14 +14,6 @@ use crate::body::{ARM_JOINTS, ARMS, JOINTS, WholeBody};
 pub(super) struct Feeling {
     payload: Sides<Payload>,
     force: Sides<HandForce>,
-}
-
-/// One arm at one instant.
-pub(super) struct Arm {
-    /// Torque of each joint per newton at the palm along world x, y, z: the rows of J.
-    pub levers_m: [[f32; ARM_JOINTS]; 3],
-    /// Torques of the drives beyond those that hold the arm against gravity.
-    pub excess_n_m: [f32; ARM_JOINTS],
 }
 
 impl Feeling {

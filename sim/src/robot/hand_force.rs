@@ -8,7 +8,7 @@ use rapier3d::math::Vector;
 use rapier3d::na::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-use super::feeling::Arm;
+use super::arm::Arm;
 use crate::body::ARM_JOINTS;
 
 /// Slow against the arm's own motion, fast against a partner who starts to pull.

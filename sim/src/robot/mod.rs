@@ -1,5 +1,6 @@
 //! One robot in a physics world: put there, sensed, driven.
 
+mod arm;
 mod feeling;
 mod hand_force;
 mod joints;

@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::feeling::Arm;
+use super::arm::Arm;
 use crate::body::ARM_JOINTS;
 
 /// Slow against the arm's own motion, fast against a lift of one second.

@@ -6,18 +6,11 @@ use rapier3d::math::Vector;
 use rapier3d::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{Touch, World};
+use super::step::{HandContacts, Touch};
+use super::World;
 use crate::body::{HandLinks, RobotModel};
 use crate::robot::robot_and_link;
 use crate::{PHYSICS_DT_S, Side, Sides};
-
-/// Normal contact forces (N, world) that a hand's parts exert on an object, averaged over the last physics step.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct HandContacts {
-    pub thumb_n: Vector,
-    pub fingers_n: Vector,
-    pub palm_n: Vector,
-}
 
 /// Leaves out the contacts inside a robot that its file excludes.
 pub(super) struct SelfCollision {

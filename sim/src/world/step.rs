@@ -1,10 +1,10 @@
 //! What one control step left behind: plain, serialisable, complete. Whoever looks at a world reads this.
 
-use rapier3d::math::Pose;
+use rapier3d::math::{Pose, Vector};
 use serde::{Deserialize, Serialize};
 
 use super::objects::Object;
-use super::{HandContacts, ObjectState, World};
+use super::{ObjectState, World};
 use crate::robot::{RobotCommand, RobotState};
 use crate::{CONTROL_HZ, Side};
 
@@ -49,6 +49,14 @@ pub struct Touch {
     /// Index into [`Step::objects`].
     pub object: usize,
     pub contacts: HandContacts,
+}
+
+/// Normal contact forces (N, world) that a hand's parts exert on an object, averaged over the last physics step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct HandContacts {
+    pub thumb_n: Vector,
+    pub fingers_n: Vector,
+    pub palm_n: Vector,
 }
 
 impl Step {

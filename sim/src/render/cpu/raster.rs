@@ -9,12 +9,12 @@ use crate::render::{Camera, Placed};
 /// Marks a sample at which nothing is.
 pub(super) const NOTHING: u32 = u32::MAX;
 
-/// Nearest surface per sample. `nearness` is 1 / depth, which is linear over a triangle's picture.
+/// Nearest surface per sample. `nearness_1_m` is 1 / depth, which is linear over a triangle's picture.
 #[derive(Default)]
 pub(super) struct Target {
     pub width: usize,
     pub height: usize,
-    pub nearness: Vec<f32>,
+    pub nearness_1_m: Vec<f32>,
     pub triangle: Vec<u32>,
 }
 
@@ -53,8 +53,8 @@ impl Target {
 
     pub(super) fn reset(&mut self, width: usize, height: usize) {
         (self.width, self.height) = (width, height);
-        self.nearness.clear();
-        self.nearness.resize(width * height, 0.0);
+        self.nearness_1_m.clear();
+        self.nearness_1_m.resize(width * height, 0.0);
         self.triangle.clear();
         self.triangle.resize(width * height, NOTHING);
     }
@@ -105,7 +105,7 @@ impl Target {
             let step = along_x as f32;
             let line = row as usize * self.width;
             let span = line + left as usize..=line + right as usize;
-            let samples = self.nearness[span.clone()].iter_mut().zip(&mut self.triangle[span]);
+            let samples = self.nearness_1_m[span.clone()].iter_mut().zip(&mut self.triangle[span]);
             for (i, (nearest, owner)) in samples.enumerate() {
                 let nearness = start + step * i as f32;
                 if nearness > *nearest {
@@ -118,19 +118,19 @@ impl Target {
 }
 
 /// Whether a mesh's bounding sphere reaches into the pyramid of view, given by the tangents of its half angles.
-fn in_view((centre, radius): (Vector, f32), camera_from_mesh: Pose, tan_x: f32, tan_y: f32) -> bool {
+fn in_view((centre, radius): (Vector, f32), camera_from_mesh: Pose, x_tan: f32, y_tan: f32) -> bool {
     let c = camera_from_mesh * centre;
     let inside = |across: f32, tan: f32| across.abs() + c.z * tan <= radius * (1.0 + tan * tan).sqrt();
-    c.z - radius < -NEAR_M && inside(c.x, tan_x) && inside(c.y, tan_y)
+    c.z - radius < -NEAR_M && inside(c.x, x_tan) && inside(c.y, y_tan)
 }
 
 /// The part of a triangle beyond the near plane: three or four corners.
-fn clip_near(p: [Vector; 3]) -> ([Vector; 4], usize) {
+fn clip_near(corners_m: [Vector; 3]) -> ([Vector; 4], usize) {
     let visible = |p: Vector| p.z < -NEAR_M;
     let mut kept = [Vector::ZERO; 4];
     let mut count = 0;
     for i in 0..3 {
-        let (a, b) = (p[i], p[(i + 1) % 3]);
+        let (a, b) = (corners_m[i], corners_m[(i + 1) % 3]);
         if visible(a) {
             kept[count] = a;
             count += 1;
@@ -148,12 +148,12 @@ fn clip_near(p: [Vector; 3]) -> ([Vector; 4], usize) {
 }
 
 /// As `f64::floor`, which without SSE 4.1 is a call; clamped to the range of `i32`.
-fn floor(x: f64) -> i32 {
-    let truncated = x as i32;
-    if f64::from(truncated) > x { truncated.saturating_sub(1) } else { truncated }
+fn floor(value: f64) -> i32 {
+    let truncated = value as i32;
+    if f64::from(truncated) > value { truncated.saturating_sub(1) } else { truncated }
 }
 
-fn ceil(x: f64) -> i32 {
-    let truncated = x as i32;
-    if f64::from(truncated) < x { truncated.saturating_add(1) } else { truncated }
+fn ceil(value: f64) -> i32 {
+    let truncated = value as i32;
+    if f64::from(truncated) < value { truncated.saturating_add(1) } else { truncated }
 }

@@ -2,9 +2,9 @@
 
 use rapier3d::math::Vector;
 
-pub(super) fn linear(srgb: [f32; 3]) -> Vector {
+pub(super) fn linear(rgb: [f32; 3]) -> Vector {
     let decode = |v: f32| if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
-    Vector::from(srgb.map(decode))
+    Vector::from(rgb.map(decode))
 }
 
 /// Table from linear light to sRGB bytes.

@@ -156,6 +156,6 @@ fn world_from_wrist(facts: &Facts, robot: usize, side: Side) -> Pose {
 }
 
 /// Zero speed at both ends.
-fn smooth(part: f32) -> f32 {
-    part * part * (3.0 - 2.0 * part)
+fn smooth(share: f32) -> f32 {
+    share * share * (3.0 - 2.0 * share)
 }
