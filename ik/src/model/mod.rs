@@ -6,6 +6,7 @@ mod mjcf;
 mod parts;
 mod reduced;
 mod tree;
+#[cfg(feature = "urdf")]
 mod urdf;
 
 #[cfg(test)]
