@@ -55,7 +55,7 @@ fn the_robot_falls_away_from_the_pressure() {
 #[test]
 fn torques_ease_off_rather_than_saturate() {
     let body = Posed::standing().body();
-    let kick = Acceleration { linear_m_s2: Vector::new(40.0, 0.0, 10.0), ..AT_REST };
+    let kick = Acceleration { linear_m_s2: Vector::new(70.0, 0.0, 20.0), ..AT_REST };
     let motion = Motion { feet: Sides { left: AT_REST, right: kick }, ..STILL };
     let contact = Contact { pressure_m: flat(body.com_m), foot: Some(Side::Left) };
     let load = Load::of(&body, 0.0, Vector::ZERO);
