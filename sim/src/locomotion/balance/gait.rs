@@ -39,7 +39,8 @@ impl Gait {
         }
     }
 
-    /// Capture point after `time_s` for a pressure that moves from `now_m` to `then_m` within `ramp_s`.
+    /// Capture point after `time_s` for a pressure that moves from `now_m` to `then_m` within `ramp_s`; without a ramp it is
+    /// there already.
     pub(super) fn predict(
         &self,
         capture_m: Vector,
@@ -73,8 +74,8 @@ mod tests {
     #[test]
     fn prediction_solves_the_capture_point_equation() {
         let gait = Gait::new(RATE_1_S, Vector::ZERO, Vector::Y);
-        let (now_m, then_m) = (Vector::new(-0.1, 0.05, 0.0), Vector::new(0.1, -0.02, 0.0));
-        for (ramp_s, time_s) in [(0.05, 0.3), (0.0, 0.2), (0.02, 0.02)] {
+        let (old_m, then_m) = (Vector::new(-0.1, 0.05, 0.0), Vector::new(0.1, -0.02, 0.0));
+        for (now_m, ramp_s, time_s) in [(old_m, 0.05, 0.3), (then_m, 0.0, 0.2), (old_m, 0.02, 0.02)] {
             let mut capture_m = Vector::new(0.03, 0.01, 0.0);
             let predicted_m = gait.predict(capture_m, now_m, then_m, ramp_s, time_s);
             const STEPS: usize = 20_000;

@@ -53,7 +53,6 @@ fn pressure_stays_under_the_feet() {
     assert!((nearest_support_m(inside_m, soles()) - inside_m).length() < 1e-6);
     for (x, y) in [(0.3, 0.0), (-0.4, 0.1), (0.0, 0.5), (0.2, -0.5)] {
         let nearest_m = nearest_support_m(Vector::new(x, y, 0.0), soles());
-        assert!((nearest_support_m(nearest_m, soles()) - nearest_m).length() < 1e-3, "{nearest_m}");
         assert!(nearest_m.x.abs() < 0.05 + SOLE_HALF_LENGTH_M + SOLE_HALF_WIDTH_M);
         assert!(nearest_m.y.abs() < 0.12 + 2.0 * SOLE_HALF_WIDTH_M, "{nearest_m}");
     }
