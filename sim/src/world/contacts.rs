@@ -6,8 +6,8 @@ use rapier3d::math::Vector;
 use rapier3d::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::step::{HandContacts, Touch};
 use super::World;
+use super::step::{HandContacts, Touch};
 use crate::body::{HandLinks, RobotModel};
 use crate::robot::robot_and_link;
 use crate::{PHYSICS_DT_S, Side, Sides};
