@@ -4,10 +4,9 @@ use std::sync::Arc;
 
 use rapier3d::math::Vector;
 use rapier3d::prelude::*;
-use serde::{Deserialize, Serialize};
 
-use super::step::{HandContacts, Touch};
 use super::World;
+use super::step::{HandContacts, Touch};
 use crate::body::{HandLinks, RobotModel};
 use crate::robot::robot_and_link;
 use crate::{PHYSICS_DT_S, Side, Sides};

@@ -11,10 +11,9 @@ use std::sync::Arc;
 use rapier3d::math::Vector;
 use rapier3d::prelude::*;
 
-pub use contacts::HandContacts;
 pub use objects::{ObjectModel, ObjectPlacement, ObjectState};
 pub use snapshot::Snapshot;
-pub use step::{ObjectStep, RobotStep, Step, Touch};
+pub use step::{HandContacts, ObjectStep, RobotStep, Step, Touch};
 
 use crate::body::RobotModel;
 use crate::mjcf::{Document, MjcfCamera};

@@ -61,7 +61,7 @@ impl Renderer for CpuRenderer {
             width: camera.width,
             height: camera.height,
             rgb,
-            depth_m: self.centres.nearness.iter().map(|nearness| 1.0 / nearness).collect(),
+            depth_m: self.centres.nearness_1_m.iter().map(|nearness| 1.0 / nearness).collect(),
             ids: self.centres.triangle.iter().map(|triangle| view.id(*triangle)).collect(),
         }
     }

@@ -66,7 +66,7 @@ impl ShadowMap {
         let mut sum = 0.0;
         for (j, weight) in down.into_iter().enumerate() {
             let start = (row - 1 + j) * TEXELS + column - 1;
-            for (i, occluder) in self.target.nearness[start..start + 4].iter().enumerate() {
+            for (i, occluder) in self.target.nearness_1_m[start..start + 4].iter().enumerate() {
                 if nearness + BIAS_M >= *occluder {
                     sum += weight * across[i];
                 }

@@ -94,7 +94,7 @@ impl<'a> View<'a> {
             if a == b || a == NOTHING || b == NOTHING || self.id(a) == self.id(b) {
                 return false;
             }
-            let (near_a, near_b) = (self.target.nearness[here], self.target.nearness[there]);
+            let (near_a, near_b) = (self.target.nearness_1_m[here], self.target.nearness_1_m[there]);
             (near_a - near_b).abs() > OUTLINE_DEPTH_STEP * near_a.max(near_b)
         };
         u32::from(differs(here + 1)) + u32::from(differs(here + self.target.width))
@@ -105,7 +105,7 @@ impl<'a> View<'a> {
         let owner = self.prepared.owner[triangle as usize] as usize;
         let part = &self.prepared.scenery.parts[owner];
         let (world_from_mesh, mesh_from_world) = self.poses[owner];
-        let depth_m = 1.0 / self.target.nearness[sy * self.target.width + sx];
+        let depth_m = 1.0 / self.target.nearness_1_m[sy * self.target.width + sx];
         let ray = self.corner_ray + self.ray_right * (sx as f32 + 0.5) + self.ray_down * (sy as f32 + 0.5);
         let point_m = self.eye_m + ray * depth_m;
         let corners = part.mesh.triangles[(triangle - self.prepared.first[owner]) as usize];
