@@ -66,8 +66,9 @@ const DIMENSIONLESS: &[&str] = &[
     "rgba",
     "albedo",
     "colour",
-    // Parts and multiples.
+    // Parts, multiples and tangents.
     "share",
+    "tan",
     "fraction",
     "ratio",
     "factor",
@@ -85,6 +86,8 @@ const DIMENSIONLESS: &[&str] = &[
     "row",
     "rows",
     "command",
+    // Of a picture: column and row in pixels, then what else stands there.
+    "corners",
     // A camera's intrinsics, in pixels, as every library calls them.
     "fx",
     "fy",

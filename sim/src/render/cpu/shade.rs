@@ -21,14 +21,14 @@ pub(super) struct Surface {
     /// In the world, as the directions are.
     pub point_m: Vector,
     pub normal: Vector,
-    pub to_eye: Vector,
+    pub eye_direction: Vector,
     pub albedo: Vector,
 }
 
 impl Surface {
     /// Linear colour.
     pub(super) fn shade(&self, shadow: &ShadowMap) -> Vector {
-        let facing_eye = self.normal.dot(self.to_eye);
+        let facing_eye = self.normal.dot(self.eye_direction);
         let (normal, facing_eye) =
             if facing_eye < 0.0 { (-self.normal, -facing_eye) } else { (self.normal, facing_eye) };
         let ambient = FROM_BELOW.lerp(FROM_ABOVE, normal.z * 0.5 + 0.5);
@@ -38,7 +38,7 @@ impl Surface {
             return unlit;
         }
         let sunlight = facing_sun * shadow.sunlit(self.point_m, normal);
-        let half_way = (self.to_eye + TO_SUN).normalize();
+        let half_way = (self.eye_direction + TO_SUN).normalize();
         let highlight = HIGHLIGHT * normal.dot(half_way).max(0.0).powi(SHININESS);
         unlit + (self.albedo * SUN + highlight) * sunlight
     }

@@ -25,8 +25,8 @@ pub(super) struct View<'a> {
     eye_m: Vector,
     /// Ray through the target's top left corner, and from one sample to the next, at a depth of 1 m in the world.
     corner_ray: Vector,
-    ray_right: Vector,
-    ray_down: Vector,
+    right_ray: Vector,
+    down_ray: Vector,
 }
 
 impl<'a> View<'a> {
@@ -46,8 +46,8 @@ impl<'a> View<'a> {
             poses: placed.world_from_mesh.iter().map(|pose| (*pose, pose.inverse())).collect(),
             eye_m: camera.world_from_camera.translation,
             corner_ray: rotation * camera.unproject([0.0, 0.0], 1.0),
-            ray_right: rotation * Vector::X * sample,
-            ray_down: rotation * Vector::NEG_Y * sample,
+            right_ray: rotation * Vector::X * sample,
+            down_ray: rotation * Vector::NEG_Y * sample,
         }
     }
 
@@ -106,7 +106,7 @@ impl<'a> View<'a> {
         let part = &self.prepared.scenery.parts[owner];
         let (world_from_mesh, mesh_from_world) = self.poses[owner];
         let depth_m = 1.0 / self.target.nearness_1_m[sy * self.target.width + sx];
-        let ray = self.corner_ray + self.ray_right * (sx as f32 + 0.5) + self.ray_down * (sy as f32 + 0.5);
+        let ray = self.corner_ray + self.right_ray * (sx as f32 + 0.5) + self.down_ray * (sy as f32 + 0.5);
         let point_m = self.eye_m + ray * depth_m;
         let corners = part.mesh.triangles[(triangle - self.prepared.first[owner]) as usize];
         let [a, b, c] = corners.map(|corner| part.mesh.vertices[corner as usize]);
@@ -121,7 +121,7 @@ impl<'a> View<'a> {
         Surface {
             point_m,
             normal: (world_from_mesh.rotation * normal).normalize(),
-            to_eye: -ray.normalize(),
+            eye_direction: -ray.normalize(),
             albedo: albedo(part.pattern, self.prepared.linear_rgb[owner], point_m),
         }
         .shade(self.shadow)
