@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use rapier3d::math::Vector;
 use rapier3d::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use super::World;
 use super::step::{HandContacts, Touch};
