@@ -1,9 +1,12 @@
 //! The server and the client.
 
-use std::{net::SocketAddr, path::PathBuf, sync::Arc, time::Duration};
+use std::{net::SocketAddr, path::PathBuf, time::Duration};
 
 use serde_json::{Value, json};
-use tandem::{http::Server, settings::Settings};
+use tandem::{
+    http::Server,
+    settings::{Layer, Settings},
+};
 use ureq::{Agent, Body, SendBody, http};
 
 /// An answer of the server, refused or not.
@@ -50,15 +53,14 @@ pub struct TestServer {
 impl TestServer {
     pub fn start() -> TestServer {
         let runs = tempfile::tempdir().expect("a temporary folder");
-        let settings = Settings {
-            listen: "127.0.0.1:0".parse().expect("an address"),
-            runs: runs.path().into(),
-            instructions: Default::default(),
-            locomotion: Default::default(),
-            max_episodes: 2,
-            max_body_bytes: 2_000_000,
+        let flags = Layer {
+            listen: Some("127.0.0.1:0".parse().expect("an address")),
+            runs: Some(runs.path().into()),
+            max_episodes: Some(2),
+            ..Layer::default()
         };
-        let server = Server::start(Arc::new(settings)).expect("a free port");
+        let settings = Settings::resolve(flags, None).expect("settings");
+        let server = Server::start(settings).expect("a free port");
         let timeout = Some(Duration::from_secs(60));
         let agent =
             Agent::config_builder().http_status_as_error(false).timeout_global(timeout).build().new_agent();

@@ -19,7 +19,7 @@ pub enum ApiError {
     #[error(transparent)]
     Spec(#[from] SpecError),
     /// The host of the episodes, or the episode itself, refused.
-    #[error("{0}{}", way_out(.0))]
+    #[error("{0}{way}", way = way_out(.0))]
     Hosting(#[from] HostingError),
     /// No such route, or not with this method.
     #[error("{method} {path} is not served; have: {}", .have.join(", "))]

@@ -8,7 +8,7 @@ use super::arm::Arm;
 use super::hand_force::HandForce;
 use super::payload::Payload;
 use crate::Sides;
-use crate::body::{ARM_JOINTS, ARMS, JOINTS, WholeBody};
+use crate::body::{ARMS, JOINTS, WholeBody};
 
 #[derive(Clone, Default, Serialize, Deserialize)]
 pub(super) struct Feeling {
@@ -52,6 +52,7 @@ impl Feeling {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::body::ARM_JOINTS;
     use crate::body::posed::{Posed, model};
     use crate::{PHYSICS_DT_S, Side};
 
