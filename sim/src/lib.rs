@@ -4,6 +4,7 @@
 //! thread; the same binary, specification and commands give the same [`World::state_hash`], bit for bit.
 
 pub mod assets;
+pub mod dynamics;
 mod error;
 pub mod locomotion;
 pub mod mjcf;

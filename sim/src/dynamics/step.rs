@@ -1,0 +1,120 @@
+//! One step of everything.
+
+use rapier3d::prelude::{PhysicsHooks, PhysicsWorld};
+
+use super::Dynamics;
+use super::error::Diverged;
+use super::spatial::pose_to_rapier;
+use super::tree::Tree;
+
+impl Dynamics {
+    /// Detects collisions, finds what forces act, and moves all trees and Rapier's bodies by one step. After the first
+    /// steps nothing is allocated beyond what Rapier's collision detection does. An error leaves
+    /// all state as it was.
+    pub fn step(&mut self, physics: &mut PhysicsWorld, hooks: &dyn PhysicsHooks) -> Result<(), Diverged> {
+        self.detect_collisions(physics, hooks);
+        self.advance(physics)
+    }
+
+    /// Rapier's broad and narrow phase at the poses of its bodies.
+    pub fn detect_collisions(&self, physics: &mut PhysicsWorld, hooks: &dyn PhysicsHooks) {
+        physics.collision_pipeline.step(
+            self.settings.prediction_m as f32,
+            &mut physics.islands,
+            &mut physics.broad_phase,
+            &mut physics.narrow_phase,
+            &mut physics.bodies,
+            &mut physics.colliders,
+            hooks,
+            &(),
+        );
+    }
+
+    /// The step without collision detection, with the contacts that were detected last.
+    pub fn advance(&mut self, physics: &mut PhysicsWorld) -> Result<(), Diverged> {
+        let settings = &self.settings;
+        for (tree, range) in self.trees.ranges() {
+            tree.prepare(settings.dt_s, settings.gravity_m_s2, &mut self.solver.w[range]);
+        }
+        self.pairs.gather(&physics.narrow_phase, &self.trees, settings);
+        self.solver.prepare(&self.trees, &self.pairs, settings);
+        self.solver.correct(&self.pairs, settings.sweeps);
+        unwhiten(&self.trees.all, &self.solver.w, &mut self.moving_v);
+        self.solver.relax(&self.pairs, settings.relaxing_sweeps);
+        unwhiten(&self.trees.all, &self.solver.w, &mut self.final_v);
+        self.check()?;
+        self.solver.commit(&mut self.trees);
+        for (tree, range) in self.trees.ranges() {
+            tree.keep_efforts(settings.dt_s, &self.final_v[range.clone()]);
+            tree.integrate(settings.dt_s, &self.moving_v[range.clone()], &self.final_v[range]);
+            tree.kinematics();
+        }
+        for (tree, link, impulse) in self.solver.excess() {
+            self.trees.all[tree].effort[link] += impulse / settings.dt_s;
+        }
+        self.place_bodies(physics);
+        Ok(())
+    }
+
+    /// Puts Rapier's bodies where the links are; needed after a tree was moved by hand, and done by every step.
+    pub fn place_bodies(&self, physics: &mut PhysicsWorld) {
+        for (tree, bodies) in self.trees.all.iter().zip(&self.bodies) {
+            for (link, handle) in bodies.iter().enumerate() {
+                let body = &mut physics.bodies[*handle];
+                let pose = pose_to_rapier(&tree.world_from_link(link));
+                if *body.position() != pose {
+                    body.set_position(pose, false);
+                }
+            }
+        }
+    }
+
+    /// Positions are as finite as the velocities that they move by.
+    fn check(&self) -> Result<(), Diverged> {
+        for (tree, offset) in self.trees.all.iter().zip(&self.trees.offset) {
+            for (dof, link) in tree.layout.link_of.iter().enumerate() {
+                let (moving, last) = (self.moving_v[offset + dof], self.final_v[offset + dof]);
+                if moving.abs() + last.abs() < FASTEST {
+                    continue;
+                }
+                return Err(Diverged { tree: tree.name.clone(), link: tree.links[*link].name.clone() });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// m/s or rad/s. Nothing real comes near; beyond, Rapier's f32 would soon overflow.
+const FASTEST: f64 = 1e6;
+
+fn unwhiten(trees: &[Tree], w: &[f64], v: &mut [f64]) {
+    let mut offset = 0;
+    for tree in trees {
+        let range = offset..offset + tree.dofs();
+        tree.unwhiten(&w[range.clone()], &mut v[range.clone()]);
+        offset = range.end;
+    }
+}
+
+impl Tree {
+    /// Factorises the mass matrix and sets `w` to the whitened velocities of a step without constraints.
+    fn prepare(&mut self, dt_s: f64, gravity_m_s2: super::DVec3, w: &mut [f64]) {
+        self.bias(gravity_m_s2);
+        self.joint_forces(dt_s);
+        self.composite_mass_matrix();
+        self.factorise();
+        let mut start = std::mem::take(&mut self.unconstrained);
+        self.spin_freely(dt_s, &mut start);
+        self.whiten(dt_s, &start, w);
+        self.unconstrained = start;
+    }
+
+    /// Efforts of the drives as if without limits, at the velocities `v` of the end of the step.
+    fn keep_efforts(&mut self, dt_s: f64, v: &[f64]) {
+        for (i, drive) in self.drives.iter().enumerate() {
+            let velocity = self.links[i].joint.axis().map_or(0.0, |_| v[self.layout.first_dof[i]]);
+            let impulse = drive.impulse_at_rest(self.q[i], dt_s) - drive.implicit(dt_s) * velocity;
+            self.effort[i] = impulse / dt_s;
+        }
+    }
+}

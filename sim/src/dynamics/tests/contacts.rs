@@ -1,0 +1,99 @@
+//! Stacks, unequal masses, impacts, and what contacts report.
+
+use rapier3d::glamx::{DPose3, DQuat, DVec3};
+
+use super::bench::{Bench, DOWN, DT_S, G_M_S2, sliding};
+
+#[test]
+fn dynamics_stack_of_eight_boxes_stands() {
+    let half_m = DVec3::splat(0.05);
+    let mut bench = Bench::with_floor(DOWN, sliding(0.6));
+    let boxes: Vec<_> = (0..8)
+        .map(|level| {
+            let aside_m = 0.004 * f64::from(level % 3 - 1);
+            let at = DVec3::new(aside_m, -aside_m, 0.05 + 0.1 * f64::from(level));
+            bench.add_box(1.0, half_m, DPose3::from_translation(at), sliding(0.6))
+        })
+        .collect();
+    let before: Vec<DVec3> = boxes.iter().map(|id| bench.position_m(*id)).collect();
+    bench.run_s(10.0);
+    for (level, (id, before)) in boxes.iter().zip(before).enumerate() {
+        let moved_m = bench.position_m(*id) - before;
+        let limit_m = 0.0005 * (level + 1) as f64;
+        assert!(moved_m.length() < limit_m, "box {level} moved by {moved_m}");
+        let speed_m_s = bench.dynamics.tree(*id).link_velocity_m_s(0).length();
+        assert!(speed_m_s < 1e-3, "box {level} moves at {speed_m_s} m/s");
+    }
+}
+
+#[test]
+fn dynamics_light_box_bears_a_hundred_times_its_weight() {
+    let half_m = DVec3::splat(0.05);
+    let mut bench = Bench::with_floor(DOWN, sliding(0.6));
+    let light =
+        bench.add_box(0.1, half_m, DPose3::from_translation(DVec3::new(0.0, 0.0, 0.05)), sliding(0.6));
+    let heavy =
+        bench.add_box(10.0, half_m, DPose3::from_translation(DVec3::new(0.0, 0.0, 0.15)), sliding(0.6));
+    bench.run_s(5.0);
+    let (low_m, high_m) = (bench.position_m(light), bench.position_m(heavy));
+    assert!((low_m - DVec3::new(0.0, 0.0, 0.05)).length() < 1.5e-3, "{low_m}");
+    assert!((high_m - DVec3::new(0.0, 0.0, 0.15)).length() < 3e-3, "{high_m}");
+}
+
+/// Balls and tilted boxes that fall on each other never gain energy.
+#[test]
+fn dynamics_impacts_do_not_gain_energy() {
+    let mut bench = Bench::with_floor(DOWN, sliding(0.5));
+    let half_m = DVec3::new(0.1, 0.07, 0.04);
+    let at = |x, z, turn| DPose3::from_parts(DVec3::new(x, 0.0, z), DQuat::from_scaled_axis(turn));
+    let bodies = [
+        bench.add_box(1.0, half_m, at(0.0, 0.5, DVec3::new(0.4, 0.7, 0.1)), sliding(0.5)),
+        bench.add_box(0.2, half_m, at(0.05, 0.9, DVec3::new(-0.3, 0.2, 0.5)), sliding(0.5)),
+        bench.add_ball(2.0, 0.08, DVec3::new(0.02, 0.03, 1.3), sliding(0.5)),
+    ];
+    let energy = |bench: &Bench| bodies.iter().map(|id| bench.energy_j(*id)).sum::<f64>();
+    let fallen_j = 3.2 * G_M_S2;
+    let mut last_j = energy(&bench);
+    for step in 0..600 {
+        bench.step();
+        let now_j = energy(&bench);
+        // Taking back penetration lifts by a fraction of a millimetre.
+        assert!(now_j < last_j + 1e-3 * fallen_j, "{now_j} after {last_j} J in step {step}");
+        last_j = now_j;
+    }
+    assert!(bodies.iter().all(|id| bench.dynamics.tree(*id).link_velocity_m_s(0).length() < 0.5));
+}
+
+/// A ball at 5 m/s neither bounces nor passes.
+#[test]
+fn dynamics_fast_ball_stops_at_the_floor() {
+    let mut bench = Bench::with_floor(DOWN, sliding(0.5));
+    let ball = bench.add_ball(0.4, 0.04, DVec3::new(0.0, 0.0, 0.3), sliding(0.5));
+    let pose = bench.dynamics.tree(ball).world_from_link(0);
+    bench.dynamics.tree_mut(ball).set_base(pose, DVec3::new(0.0, 0.0, -5.0), DVec3::ZERO);
+    let (mut lowest, mut fastest) = (f64::MAX, f64::MIN);
+    for _ in 0..200 {
+        bench.step();
+        lowest = f64::min(lowest, bench.position_m(ball).z);
+        fastest = f64::max(fastest, bench.dynamics.tree(ball).link_velocity_m_s(0).z);
+    }
+    assert!(lowest > 0.03 && fastest < 0.05, "{lowest} {fastest}");
+    assert!((bench.position_m(ball).z - 0.04).abs() < 1e-3);
+}
+
+/// A resting box is held by its weight, and the contacts say so.
+#[test]
+fn dynamics_contacts_report_the_weight() {
+    let mut bench = Bench::with_floor(DOWN, sliding(0.5));
+    let at = DPose3::from_translation(DVec3::new(0.3, 0.0, 0.05));
+    let body = bench.add_box(2.0, DVec3::splat(0.05), at, sliding(0.5));
+    bench.run_s(1.0);
+    bench.dynamics.tree_mut(body).push(0, bench.position_m(body), DVec3::new(4.0, 0.0, 0.0));
+    bench.step();
+    let collider = bench.dynamics.touches()[0].colliders[1];
+    let force: DVec3 = bench.dynamics.forces_on(collider).map(|(_, force)| force).sum();
+    assert!((force - DVec3::new(-4.0, 0.0, 2.0 * G_M_S2)).length() < 0.05, "{force}");
+    let normal: f64 = bench.dynamics.touches().iter().map(|touch| touch.normal_impulse_n_s).sum();
+    assert!((normal / DT_S - 2.0 * G_M_S2).abs() < 0.05);
+    assert_eq!(bench.dynamics.touches().len(), 4);
+}
