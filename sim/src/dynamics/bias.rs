@@ -11,7 +11,7 @@ use super::spatial::{Force, Inertia, Motion, Symmetric};
 use super::tree::Tree;
 
 impl Tree {
-    /// Sets `rhs` to -bias with the forces from outside, which are used up, and each link's own spatial inertia.
+    /// Sets `rhs` to -bias with the forces from outside, and each link's own spatial inertia.
     pub(super) fn bias(&mut self, gravity_m_s2: DVec3) {
         let count = self.links.len();
         for i in 0..count {
@@ -24,8 +24,8 @@ impl Tree {
             self.inertia[i] = inertia;
             self.acceleration[i] = acceleration;
             let velocity = self.velocity[i];
-            self.force[i] = inertia.mul(acceleration) + velocity.cross_force(inertia.mul(velocity))
-                - std::mem::take(&mut self.external[i]);
+            self.force[i] =
+                inertia.mul(acceleration) + velocity.cross_force(inertia.mul(velocity)) - self.external[i];
         }
         for i in (0..count).rev() {
             let force: Force = self.force[i];

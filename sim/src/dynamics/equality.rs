@@ -117,7 +117,7 @@ impl Equalities {
         polynomial: &[f64; 5],
     ) -> f64 {
         let start = self.rows.column.len();
-        let mut push = |rows: &mut Rows<3>, id: LinkId, scale: f64| {
+        let push = |rows: &mut Rows<3>, id: LinkId, scale: f64| {
             let tree = &trees.all[id.tree.index()];
             let dof = tree.layout.first_dof[id.link];
             rows.push_dof(tree, trees.offset[id.tree.index()], dof, [scale, 0.0, 0.0]);

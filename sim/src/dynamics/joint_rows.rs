@@ -1,5 +1,6 @@
-//! Rows of single joints: effort limits of drives, dry friction and limits of position, all along one degree of freedom.
+//! Rows of single joints: drives at their effort limits, dry friction and limits of position, all along one degree of freedom.
 
+use super::drive::Law;
 use super::jacobian::Rows;
 use super::settings::{Pass, Settings};
 use super::tree::Tree;
@@ -15,18 +16,15 @@ struct JointRow {
     link: usize,
     /// Y . Y.
     inverse_mass: f64,
-    drive: DriveLimit,
+    drive: Option<BoundedDrive>,
     dry: DryFriction,
     range: Option<Range>,
 }
 
-/// A drive's impulse  T = rest - implicit v' + excess  must keep to +-most. It is in the mass matrix without a limit;
-/// `excess` is what has to be taken off, and nothing where T keeps to it by itself.
-struct DriveLimit {
-    rest: f64,
-    implicit: f64,
-    most: f64,
-    excess: f64,
+/// A drive near its effort limit, which the mass matrix leaves out.
+struct BoundedDrive {
+    law: Law,
+    impulse: f64,
 }
 
 struct DryFriction {
@@ -44,9 +42,6 @@ struct Range {
 
 /// A joint without other rows gets one for its range only if it could reach an end when this much faster, rad/s or m/s.
 const NEAR_RANGE: f64 = 10.0;
-/// Efforts keep to their limits to this share.
-const EFFORT_TOLERANCE: f64 = 1e-9;
-const MOST_SETTLING_SWEEPS: usize = 50;
 
 impl JointRows {
     pub fn clear(&mut self) {
@@ -60,9 +55,8 @@ impl JointRows {
         for (i, link) in tree.links.iter().enumerate() {
             let Some(axis) = link.joint.axis() else { continue };
             let dof = tree.layout.first_dof[i];
-            let (q, v, drive) = (tree.q[i], tree.v[dof], &tree.drives[i]);
-            let limited = axis.effort_limit.is_finite() && *drive != super::Drive::NONE;
-            let held = limited || axis.friction_loss > 0.0;
+            let (q, v) = (tree.q[i], tree.v[dof]);
+            let held = tree.bounded[i] || axis.friction_loss > 0.0;
             let near = |[low, high]: [f64; 2]| {
                 let reach = (v.abs() + NEAR_RANGE) * dt_s;
                 held || q - reach < low || q + reach > high
@@ -80,12 +74,7 @@ impl JointRows {
                 tree: index,
                 link: i,
                 inverse_mass,
-                drive: DriveLimit {
-                    rest: drive.impulse_at_rest(q, dt_s),
-                    implicit: drive.implicit(dt_s),
-                    most: if limited { axis.effort_limit * dt_s } else { f64::INFINITY },
-                    excess: 0.0,
-                },
+                drive: tree.bounded[i].then(|| BoundedDrive::new(tree, i, dt_s)),
                 dry: DryFriction { most, impulse: tree.dry_friction[i].clamp(-most, most) },
                 range: range.map(|[low, high]| Range {
                     down: approach(q - low, settings),
@@ -99,8 +88,9 @@ impl JointRows {
 
     pub fn warm_start(&self, w: &mut [f64]) {
         for (group, row) in self.all.iter().enumerate() {
-            if row.dry.impulse != 0.0 {
-                self.rows.push_impulse(group, &[row.dry.impulse], w);
+            let impulse = row.dry.impulse + row.drive.as_ref().map_or(0.0, |drive| drive.impulse);
+            if impulse != 0.0 {
+                self.rows.push_impulse(group, &[impulse], w);
             }
         }
     }
@@ -109,7 +99,9 @@ impl JointRows {
         for (group, row) in self.all.iter_mut().enumerate() {
             let [before] = self.rows.velocity(group, w);
             let mut v = before;
-            row.drive.update(row.inverse_mass, &mut v);
+            if let Some(drive) = &mut row.drive {
+                drive.update(row.inverse_mass, &mut v);
+            }
             row.dry.update(row.inverse_mass, &mut v);
             if let Some(range) = &mut row.range {
                 range.update(pass, row.inverse_mass, &mut v);
@@ -120,39 +112,15 @@ impl JointRows {
         }
     }
 
-    /// Repeats the effort limits alone until all are kept: other rows came after them in the last sweep.
-    pub fn settle_efforts(&mut self, w: &mut [f64]) {
-        for _ in 0..MOST_SETTLING_SWEEPS {
-            let mut settled = true;
-            for (group, row) in self.all.iter_mut().enumerate() {
-                if row.drive.most.is_infinite() {
-                    continue;
-                }
-                let [before] = self.rows.velocity(group, w);
-                let mut v = before;
-                row.drive.update(row.inverse_mass, &mut v);
-                let change = (v - before) / row.inverse_mass;
-                if change.abs() > EFFORT_TOLERANCE * row.drive.most {
-                    settled = false;
-                    self.rows.push_impulse(group, &[change], w);
-                }
-            }
-            if settled {
-                break;
-            }
-        }
-    }
-
-    /// Gives the trees the impulses of dry friction.
-    pub fn keep_friction(&self, trees: &mut [Tree]) {
+    /// Gives the trees the impulses of dry friction and the efforts of bounded drives.
+    pub fn commit(&self, trees: &mut [Tree], dt_s: f64) {
         for row in &self.all {
-            trees[row.tree].dry_friction[row.link] = row.dry.impulse;
+            let tree = &mut trees[row.tree];
+            tree.dry_friction[row.link] = row.dry.impulse;
+            if let Some(drive) = &row.drive {
+                tree.effort[row.link] = drive.impulse / dt_s;
+            }
         }
-    }
-
-    /// Tells the trees what was taken off their drives, as impulses.
-    pub fn excess(&self) -> impl Iterator<Item = (usize, usize, f64)> {
-        self.all.iter().map(|row| (row.tree, row.link, row.drive.excess))
     }
 }
 
@@ -164,18 +132,21 @@ fn approach(distance: f64, settings: &Settings) -> [f64; 2] {
     [correcting, open]
 }
 
-impl DriveLimit {
-    /// T as a function of the excess e rises by  1 - implicit Y.Y  per e, which is positive because `implicit` is part of
-    /// the mass matrix. Chooses the smallest |e| that keeps T to its limit.
+impl BoundedDrive {
+    /// Begins with the effort of the last step.
+    fn new(tree: &Tree, link: usize, dt_s: f64) -> BoundedDrive {
+        let law = tree.drive_law(link, dt_s);
+        let impulse = (tree.effort[link] * dt_s).clamp(-law.most, law.most);
+        BoundedDrive { law, impulse }
+    }
+
+    /// T' = rest - implicit v' with  v' = v + (T' - T) Y.Y,  within the limit.
     fn update(&mut self, inverse_mass: f64, v: &mut f64) {
-        if self.most.is_infinite() {
-            return;
-        }
-        let rise = 1.0 - self.implicit * inverse_mass;
-        let without = self.rest - self.implicit * *v + self.excess - rise * self.excess;
-        let excess = (without.clamp(-self.most, self.most) - without) / rise;
-        *v += inverse_mass * (excess - self.excess);
-        self.excess = excess;
+        let Law { rest, implicit, most } = self.law;
+        let change = (rest - implicit * *v - self.impulse) / (1.0 + implicit * inverse_mass);
+        let impulse = (self.impulse + change).clamp(-most, most);
+        *v += inverse_mass * (impulse - self.impulse);
+        self.impulse = impulse;
     }
 }
 

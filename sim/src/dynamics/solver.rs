@@ -80,7 +80,6 @@ impl Solver {
         for _ in 0..sweeps {
             self.sweep(Pass::Relaxing);
         }
-        self.joints.settle_efforts(&mut self.w);
         let (mut plain, mut rolling) = (self.plain.all.iter(), self.rolling.all.iter());
         for (touch, index) in self.found.iter_mut().zip(&pairs.order) {
             let candidate = &pairs.candidates[*index as usize];
@@ -92,8 +91,8 @@ impl Solver {
     }
 
     /// Keeps what the next step begins with. Before, nothing of the last step has changed.
-    pub fn commit(&mut self, trees: &mut Trees) {
-        self.joints.keep_friction(&mut trees.all);
+    pub fn commit(&mut self, trees: &mut Trees, dt_s: f64) {
+        self.joints.commit(&mut trees.all, dt_s);
         self.equalities.commit();
         std::mem::swap(&mut self.touches, &mut self.found);
     }
@@ -103,11 +102,6 @@ impl Solver {
         self.equalities.sweep(pass, &mut self.w);
         self.plain.sweep(pass, &mut self.w);
         self.rolling.sweep(pass, &mut self.w);
-    }
-
-    /// What was taken off the drives: tree, link and impulse.
-    pub fn excess(&self) -> impl Iterator<Item = (usize, usize, f64)> {
-        self.joints.excess()
     }
 }
 

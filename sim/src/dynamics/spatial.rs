@@ -5,7 +5,7 @@
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
 use rapier3d::glamx::{DMat3, DPose3, DQuat, DVec3};
-use rapier3d::math::{Pose, Vector};
+use rapier3d::math::Pose;
 
 /// Velocity, acceleration or joint axis: `angular` [rad/s], `linear` [m/s] of the point at the reference.
 #[derive(Clone, Copy, Default, Debug)]
@@ -230,10 +230,6 @@ pub(super) fn turned(rotation: DQuat, turn_rad: DVec3) -> DQuat {
         return rotation;
     }
     (DQuat::from_scaled_axis(turn_rad) * rotation).normalize()
-}
-
-pub(super) fn vector_from_rapier(v: Vector) -> DVec3 {
-    v.as_dvec3()
 }
 
 /// Rapier's quaternions are unit only to f32.

@@ -4,7 +4,7 @@ use rapier3d::prelude::{PhysicsHooks, PhysicsWorld};
 
 use super::Dynamics;
 use super::error::Diverged;
-use super::spatial::pose_to_rapier;
+use super::spatial::{Force, pose_to_rapier};
 use super::tree::Tree;
 
 impl Dynamics {
@@ -32,28 +32,45 @@ impl Dynamics {
 
     /// The step without collision detection, with the contacts that were detected last.
     pub fn advance(&mut self, physics: &mut PhysicsWorld) -> Result<(), Diverged> {
+        self.pairs.gather(&physics.narrow_phase, &self.trees, &self.settings);
+        self.trees.all.iter_mut().for_each(Tree::guess_bounded);
+        self.solve();
+        while self.bound_more() {
+            self.solve();
+        }
+        self.trees.all.iter_mut().for_each(|tree| tree.external.fill(Force::default()));
+        self.check()?;
+        self.solver.commit(&mut self.trees, self.settings.dt_s);
+        let dt_s = self.settings.dt_s;
+        for (tree, range) in self.trees.ranges() {
+            tree.keep_efforts(dt_s, &self.final_v[range.clone()]);
+            tree.integrate(dt_s, &self.moving_v[range.clone()], &self.final_v[range]);
+            tree.kinematics();
+        }
+        self.place_bodies(physics);
+        Ok(())
+    }
+
+    /// Velocities at the end of the step, with the drives as they are bounded.
+    fn solve(&mut self) {
         let settings = &self.settings;
         for (tree, range) in self.trees.ranges() {
             tree.prepare(settings.dt_s, settings.gravity_m_s2, &mut self.solver.w[range]);
         }
-        self.pairs.gather(&physics.narrow_phase, &self.trees, settings);
         self.solver.prepare(&self.trees, &self.pairs, settings);
         self.solver.correct(&self.pairs, settings.sweeps);
         unwhiten(&self.trees.all, &self.solver.w, &mut self.moving_v);
         self.solver.relax(&self.pairs, settings.relaxing_sweeps);
         unwhiten(&self.trees.all, &self.solver.w, &mut self.final_v);
-        self.check()?;
-        self.solver.commit(&mut self.trees);
+    }
+
+    /// Makes rows of the drives that exceeded their limits; every round adds one at least, so that it ends.
+    fn bound_more(&mut self) -> bool {
+        let mut more = false;
         for (tree, range) in self.trees.ranges() {
-            tree.keep_efforts(settings.dt_s, &self.final_v[range.clone()]);
-            tree.integrate(settings.dt_s, &self.moving_v[range.clone()], &self.final_v[range]);
-            tree.kinematics();
+            more |= tree.bound_more(self.settings.dt_s, &self.final_v[range]);
         }
-        for (tree, link, impulse) in self.solver.excess() {
-            self.trees.all[tree].effort[link] += impulse / settings.dt_s;
-        }
-        self.place_bodies(physics);
-        Ok(())
+        more
     }
 
     /// Puts Rapier's bodies where the links are; needed after a tree was moved by hand, and done by every step.
@@ -107,14 +124,5 @@ impl Tree {
         self.spin_freely(dt_s, &mut start);
         self.whiten(dt_s, &start, w);
         self.unconstrained = start;
-    }
-
-    /// Efforts of the drives as if without limits, at the velocities `v` of the end of the step.
-    fn keep_efforts(&mut self, dt_s: f64, v: &[f64]) {
-        for (i, drive) in self.drives.iter().enumerate() {
-            let velocity = self.links[i].joint.axis().map_or(0.0, |_| v[self.layout.first_dof[i]]);
-            let impulse = drive.impulse_at_rest(self.q[i], dt_s) - drive.implicit(dt_s) * velocity;
-            self.effort[i] = impulse / dt_s;
-        }
     }
 }

@@ -26,6 +26,8 @@ pub struct Tree {
     pub(super) v: Vec<f64>,
     /// By link.
     pub(super) drives: Vec<Drive>,
+    /// By link: the drive is a row of the solver in this step.
+    pub(super) bounded: Vec<bool>,
     /// From outside, by link, about the reference; for the next step only.
     pub(super) external: Vec<Force>,
     /// What the drives exerted in the last step, by link.
@@ -67,6 +69,7 @@ impl Tree {
             q: vec![0.0; count],
             v: vec![0.0; dofs],
             drives: vec![Drive::NONE; count],
+            bounded: vec![false; count],
             external: vec![Force::default(); count],
             effort: vec![0.0; count],
             dry_friction: vec![0.0; count],

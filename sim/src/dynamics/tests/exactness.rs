@@ -36,7 +36,9 @@ fn scene(shuffle: bool) -> Bench {
         bench.add_shape(tree.link(link), SharedShape::ball(0.05), sliding(0.6));
     }
     let [a, b] = [tree.link(5), tree.link(12)];
-    let held = Equality::Connect { a, a_point_m: DVec3::X * 0.1, b: Some(b), b_point_m: DVec3::ZERO };
+    let pose = |id: super::super::LinkId| bench.dynamics.tree(tree).world_from_link(id.link);
+    let a_point_m = pose(a).inverse() * pose(b).translation;
+    let held = Equality::Connect { a, a_point_m, b: Some(b), b_point_m: DVec3::ZERO };
     bench.dynamics.add_equality(held, true);
     bench
 }

@@ -166,7 +166,7 @@ fn dynamics_latch_holds_a_door() {
     let door = bench.add(jointed(hinge(DVec3::Z), mass));
     let latch = Equality::Couple { follower: door.link(0), leader: None, polynomial: [0.0; 5] };
     let latch = bench.dynamics.add_equality(latch, true);
-    let mut pull = |bench: &mut Bench| {
+    let pull = |bench: &mut Bench| {
         for _ in 0..200 {
             let tree = bench.dynamics.tree_mut(door);
             tree.push(0, DVec3::new(0.8, 0.0, 0.0), DVec3::new(0.0, 30.0, 0.0));
