@@ -28,3 +28,10 @@ pub struct Diverged {
     pub tree: String,
     pub link: String,
 }
+
+/// A state that belongs to another world.
+#[derive(Debug, Error, PartialEq)]
+#[error(
+    "the state has other trees or equalities than this world; one taken from a world of the same making would fit"
+)]
+pub struct OtherWorld;

@@ -39,7 +39,7 @@ use rapier3d::prelude::{ColliderBuilder, ColliderHandle, PhysicsWorld, RigidBody
 
 pub use drive::Drive;
 pub use equality::{Equality, EqualityId};
-pub use error::{Diverged, TreeError};
+pub use error::{Diverged, OtherWorld, TreeError};
 pub use friction::{Directions, Friction};
 pub use link::{Axis, Joint, Link, Mass};
 pub use rapier3d::glamx::{DMat3, DPose3, DQuat, DVec3};

@@ -106,7 +106,7 @@ impl Between<'_> {
         let subshapes = [manifold.subshape_pos1(), manifold.subshape_pos2()];
         for (surface, subshape) in [&mut first, &mut second].into_iter().zip(subshapes) {
             if let Some(shape_from_subshape) = subshape {
-                surface.body_from_shape = surface.body_from_shape * pose_from_rapier(shape_from_subshape);
+                surface.body_from_shape *= pose_from_rapier(shape_from_subshape);
             }
         }
         let [world_from_a, world_from_b] = [first, second].map(|surface| self.world_from(surface.body));

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Dynamics;
 use super::equality::Memory;
+use super::error::OtherWorld;
 use super::state::TreeState;
 use super::touch::Touch;
 
@@ -24,20 +25,21 @@ impl Dynamics {
         }
     }
 
-    /// Takes back a state of the same world; `false`, and nothing done, for one of another. Rapier's bodies are left to
-    /// whoever restores Rapier's world.
-    pub fn restore(&mut self, state: &DynamicsState) -> bool {
+    /// Takes back a state of this world, or of one made like it. Rapier's bodies are left to whoever restores Rapier's
+    /// world. An error leaves all as it was.
+    pub fn restore(&mut self, state: &DynamicsState) -> Result<(), OtherWorld> {
         let trees = &mut self.trees.all;
         let fits = trees.len() == state.trees.len()
             && self.solver.equalities.memory.len() == state.equalities.len()
             && trees.iter().zip(&state.trees).all(|(tree, state)| tree.fits(state));
-        if fits {
-            for (tree, state) in trees.iter_mut().zip(&state.trees) {
-                tree.restore(state);
-            }
-            self.solver.equalities.memory.clone_from(&state.equalities);
-            self.solver.touches.clone_from(&state.touches);
+        if !fits {
+            return Err(OtherWorld);
         }
-        fits
+        for (tree, state) in trees.iter_mut().zip(&state.trees) {
+            tree.restore(state);
+        }
+        self.solver.equalities.memory.clone_from(&state.equalities);
+        self.solver.touches.clone_from(&state.touches);
+        Ok(())
     }
 }

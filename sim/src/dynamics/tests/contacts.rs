@@ -24,10 +24,12 @@ fn dynamics_stack_of_eight_boxes_stands() {
         // Contacts are soft: those at the bottom give by a millimetre under the others' weight.
         let (sunk_m, crept_m) = (after - built[level], after - settled[level]);
         assert!(sunk_m.length() < 0.0015 * (level + 1) as f64, "box {level} moved by {sunk_m}");
-        assert!(crept_m.length() < 1e-4, "box {level} crept by {crept_m}");
+        assert!(crept_m.length() < 3e-4, "box {level} crept by {crept_m}");
     }
 }
 
+/// Contacts are soft by the lighter side's mass: a hundred times its weight presses them in by some millimetres, at once
+/// and no further.
 #[test]
 fn dynamics_light_box_bears_a_hundred_times_its_weight() {
     let half_m = DVec3::splat(0.05);
@@ -36,10 +38,15 @@ fn dynamics_light_box_bears_a_hundred_times_its_weight() {
         bench.add_box(0.1, half_m, DPose3::from_translation(DVec3::new(0.0, 0.0, 0.05)), sliding(0.6));
     let heavy =
         bench.add_box(10.0, half_m, DPose3::from_translation(DVec3::new(0.0, 0.0, 0.15)), sliding(0.6));
-    bench.run_s(5.0);
-    let (low_m, high_m) = (bench.position_m(light), bench.position_m(heavy));
-    assert!((low_m - DVec3::new(0.0, 0.0, 0.05)).length() < 3e-3, "{low_m}");
-    assert!((high_m - DVec3::new(0.0, 0.0, 0.15)).length() < 6e-3, "{high_m}");
+    bench.run_s(2.0);
+    let settled_m = [light, heavy].map(|id| bench.position_m(id));
+    bench.run_s(3.0);
+    for (id, settled_m) in [light, heavy].into_iter().zip(settled_m) {
+        let crept_m = bench.position_m(id) - settled_m;
+        assert!(crept_m.length() < 1e-3, "{crept_m}");
+    }
+    assert!((bench.position_m(light) - DVec3::new(0.0, 0.0, 0.05)).length() < 3e-3);
+    assert!((bench.position_m(heavy) - DVec3::new(0.0, 0.0, 0.15)).length() < 12e-3);
 }
 
 fn tilted(x_m: f64, z_m: f64, turn_rad: DVec3) -> DPose3 {

@@ -6,11 +6,11 @@ use rapier3d::prelude::{ColliderBuilder, PhysicsWorld, SharedShape};
 use super::super::{Drive, DynamicsState, Equality, Joint, TreeState};
 use super::bench::{Bench, DOWN, Random, bush, sliding, stir};
 
-/// Boxes, balls and a tree that fall on each other. `shuffle` makes Rapier's handles another order.
-fn scene(shuffle: bool) -> Bench {
+/// Boxes, balls and a tree that fall on each other. `shift` makes Rapier's handles others.
+fn scene(shift: bool) -> Bench {
     let mut bench = Bench::new(DOWN);
-    if shuffle {
-        shuffle_handles(&mut bench.physics);
+    if shift {
+        shift_handles(&mut bench.physics);
     }
     let slab = ColliderBuilder::cuboid(5.0, 5.0, 0.1).translation([0.0, 0.0, -0.1].into());
     bench.dynamics.add_collider(slab, None, sliding(0.6), &mut bench.physics);
@@ -43,12 +43,11 @@ fn scene(shuffle: bool) -> Bench {
     bench
 }
 
-/// Leaves free slots behind, which Rapier fills from the last.
-fn shuffle_handles(physics: &mut PhysicsWorld) {
-    let handles: Vec<_> =
-        (0..12).map(|_| physics.insert_collider(ColliderBuilder::ball(0.1), None)).collect();
-    for index in [3, 0, 7, 5, 11, 2, 9, 1, 10, 4, 8, 6] {
-        physics.remove_collider(handles[index]);
+/// Colliders far away shift all of Rapier's handles, so that its tree and its lists of pairs come out otherwise. Who is
+/// first in a pair stays: Rapier goes by its handles there, and its contact points are not the same to the bit both ways.
+fn shift_handles(physics: &mut PhysicsWorld) {
+    for x in 0..12 {
+        physics.insert_collider(ColliderBuilder::ball(0.1).translation([x as f32, 50.0, 0.0].into()), None);
     }
 }
 
@@ -86,10 +85,10 @@ fn dynamics_restored_worlds_go_on_as_they_would_have() {
     second.run_s(0.1);
     second.physics = postcard::from_bytes(&physics).unwrap();
     let state: DynamicsState = postcard::from_bytes(&state).unwrap();
-    assert!(second.dynamics.restore(&state));
+    second.dynamics.restore(&state).unwrap();
     second.run_s(1.0);
     assert_eq!(bits(&first), bits(&second));
-    assert!(!Bench::new(DOWN).dynamics.restore(&state));
+    assert!(Bench::new(DOWN).dynamics.restore(&state).is_err());
 }
 
 /// A force that is not a number ends the step with the name of what it hit, and the state stays as it was.
