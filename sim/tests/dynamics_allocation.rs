@@ -1,4 +1,4 @@
-//! A step allocates nothing once its buffers have grown.
+//! A step allocates nothing once its buffers have grown, beside what Rapier does to detect collisions.
 
 // Counting allocations takes a global allocator, whose trait is unsafe to implement.
 #![allow(unsafe_code)]
@@ -81,8 +81,9 @@ fn dynamics_allocates_nothing_after_the_first_steps() {
     for _ in 0..100 {
         dynamics.detect_collisions(&mut physics, &());
         let before = ALLOCATIONS.load(Ordering::Relaxed);
-        dynamics.advance(&mut physics).unwrap();
+        dynamics.advance(&physics.narrow_phase).unwrap();
         assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before);
+        dynamics.place_bodies(&mut physics);
     }
     assert!(!dynamics.touches().is_empty());
 }

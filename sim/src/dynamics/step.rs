@@ -1,6 +1,6 @@
 //! One step of everything.
 
-use rapier3d::prelude::{PhysicsHooks, PhysicsWorld};
+use rapier3d::prelude::{NarrowPhase, PhysicsHooks, PhysicsWorld};
 
 use super::Dynamics;
 use super::error::Diverged;
@@ -8,12 +8,13 @@ use super::spatial::{Force, pose_to_rapier};
 use super::tree::Tree;
 
 impl Dynamics {
-    /// Detects collisions, finds what forces act, and moves all trees and Rapier's bodies by one step. After the first
-    /// steps nothing is allocated beyond what Rapier's collision detection does. An error leaves
-    /// all state as it was.
+    /// Detects collisions, finds what forces act, and moves all trees and Rapier's bodies by one step. An error leaves all
+    /// state as it was.
     pub fn step(&mut self, physics: &mut PhysicsWorld, hooks: &dyn PhysicsHooks) -> Result<(), Diverged> {
         self.detect_collisions(physics, hooks);
-        self.advance(physics)
+        self.advance(&physics.narrow_phase)?;
+        self.place_bodies(physics);
+        Ok(())
     }
 
     /// Rapier's broad and narrow phase at the poses of its bodies.
@@ -30,9 +31,9 @@ impl Dynamics {
         );
     }
 
-    /// The step without collision detection, with the contacts that were detected last.
-    pub fn advance(&mut self, physics: &mut PhysicsWorld) -> Result<(), Diverged> {
-        self.pairs.gather(&physics.narrow_phase, &self.trees, &self.settings);
+    /// The step of the trees, with the contacts that were detected last; once its buffers have grown it allocates nothing.
+    pub fn advance(&mut self, narrow_phase: &NarrowPhase) -> Result<(), Diverged> {
+        self.pairs.gather(narrow_phase, &self.trees, &self.settings);
         self.trees.all.iter_mut().for_each(Tree::guess_bounded);
         self.solve();
         while self.bound_more() {
@@ -47,7 +48,6 @@ impl Dynamics {
             tree.integrate(dt_s, &self.moving_v[range.clone()], &self.final_v[range]);
             tree.kinematics();
         }
-        self.place_bodies(physics);
         Ok(())
     }
 
