@@ -9,6 +9,7 @@
 pub mod assets;
 pub mod bench;
 pub mod body;
+pub mod dynamics;
 mod error;
 pub mod locomotion;
 pub mod mjcf;

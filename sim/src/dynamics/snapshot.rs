@@ -1,0 +1,45 @@
+//! Saving and restoring everything that outlasts a step.
+
+use serde::{Deserialize, Serialize};
+
+use super::Dynamics;
+use super::equality::Memory;
+use super::error::OtherWorld;
+use super::state::TreeState;
+use super::touch::Touch;
+
+/// State of all trees, equalities and contacts, in full precision. Rapier's world is saved beside it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct DynamicsState {
+    pub(super) trees: Vec<TreeState>,
+    equalities: Vec<Memory>,
+    touches: Vec<Touch>,
+}
+
+impl Dynamics {
+    pub fn state(&self) -> DynamicsState {
+        DynamicsState {
+            trees: self.trees.all.iter().map(|tree| tree.state()).collect(),
+            equalities: self.solver.equalities.memory.clone(),
+            touches: self.solver.touches.clone(),
+        }
+    }
+
+    /// Takes back a state of this world, or of one made like it. Rapier's bodies are left to whoever restores Rapier's
+    /// world. An error leaves all as it was.
+    pub fn restore(&mut self, state: &DynamicsState) -> Result<(), OtherWorld> {
+        let trees = &mut self.trees.all;
+        let fits = trees.len() == state.trees.len()
+            && self.solver.equalities.memory.len() == state.equalities.len()
+            && trees.iter().zip(&state.trees).all(|(tree, state)| tree.fits(state));
+        if !fits {
+            return Err(OtherWorld);
+        }
+        for (tree, state) in trees.iter_mut().zip(&state.trees) {
+            tree.restore(state);
+        }
+        self.solver.equalities.memory.clone_from(&state.equalities);
+        self.solver.touches.clone_from(&state.touches);
+        Ok(())
+    }
+}

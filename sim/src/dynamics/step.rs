@@ -1,0 +1,128 @@
+//! One step of everything.
+
+use rapier3d::prelude::{NarrowPhase, PhysicsHooks, PhysicsWorld};
+
+use super::Dynamics;
+use super::error::Diverged;
+use super::spatial::{Force, pose_to_rapier};
+use super::tree::Tree;
+
+impl Dynamics {
+    /// Detects collisions, finds what forces act, and moves all trees and Rapier's bodies by one step. An error leaves all
+    /// state as it was.
+    pub fn step(&mut self, physics: &mut PhysicsWorld, hooks: &dyn PhysicsHooks) -> Result<(), Diverged> {
+        self.detect_collisions(physics, hooks);
+        self.advance(&physics.narrow_phase)?;
+        self.place_bodies(physics);
+        Ok(())
+    }
+
+    /// Rapier's broad and narrow phase at the poses of its bodies.
+    pub fn detect_collisions(&self, physics: &mut PhysicsWorld, hooks: &dyn PhysicsHooks) {
+        physics.collision_pipeline.step(
+            self.settings.prediction_m as f32,
+            &mut physics.islands,
+            &mut physics.broad_phase,
+            &mut physics.narrow_phase,
+            &mut physics.bodies,
+            &mut physics.colliders,
+            hooks,
+            &(),
+        );
+    }
+
+    /// The step of the trees, with the contacts that were detected last; once its buffers have grown it allocates nothing.
+    pub fn advance(&mut self, narrow_phase: &NarrowPhase) -> Result<(), Diverged> {
+        self.pairs.gather(narrow_phase, &self.trees, &self.settings);
+        self.trees.all.iter_mut().for_each(Tree::guess_bounded);
+        self.solve();
+        while self.bound_more() {
+            self.solve();
+        }
+        self.trees.all.iter_mut().for_each(|tree| tree.external.fill(Force::default()));
+        self.check()?;
+        self.solver.commit(&mut self.trees, self.settings.dt_s);
+        let dt_s = self.settings.dt_s;
+        for (tree, range) in self.trees.ranges() {
+            tree.keep_efforts(dt_s, &self.final_v[range.clone()]);
+            tree.integrate(dt_s, &self.moving_v[range.clone()], &self.final_v[range]);
+            tree.kinematics();
+        }
+        Ok(())
+    }
+
+    /// Velocities at the end of the step, with the drives as they are bounded.
+    fn solve(&mut self) {
+        let settings = &self.settings;
+        for (tree, range) in self.trees.ranges() {
+            tree.prepare(settings.dt_s, settings.gravity_m_s2, &mut self.solver.w[range]);
+        }
+        self.solver.prepare(&self.trees, &self.pairs, settings);
+        self.solver.correct(&self.pairs, settings.sweeps);
+        unwhiten(&self.trees.all, &self.solver.w, &mut self.moving_v);
+        self.solver.relax(&self.pairs, settings.relaxing_sweeps);
+        unwhiten(&self.trees.all, &self.solver.w, &mut self.final_v);
+    }
+
+    /// Makes rows of the drives that exceeded their limits; every round adds one at least, so that it ends.
+    fn bound_more(&mut self) -> bool {
+        let mut more = false;
+        for (tree, range) in self.trees.ranges() {
+            more |= tree.bound_more(self.settings.dt_s, &self.final_v[range]);
+        }
+        more
+    }
+
+    /// Puts Rapier's bodies where the links are; needed after a tree was moved by hand, and done by every step.
+    pub fn place_bodies(&self, physics: &mut PhysicsWorld) {
+        for (tree, bodies) in self.trees.all.iter().zip(&self.bodies) {
+            for (link, handle) in bodies.iter().enumerate() {
+                let body = &mut physics.bodies[*handle];
+                let pose = pose_to_rapier(&tree.world_from_link(link));
+                if *body.position() != pose {
+                    body.set_position(pose, false);
+                }
+            }
+        }
+    }
+
+    /// Positions are as finite as the velocities that they move by.
+    fn check(&self) -> Result<(), Diverged> {
+        for (tree, offset) in self.trees.all.iter().zip(&self.trees.offset) {
+            for (dof, link) in tree.layout.link_of.iter().enumerate() {
+                let (moving, last) = (self.moving_v[offset + dof], self.final_v[offset + dof]);
+                if moving.abs() + last.abs() < FASTEST {
+                    continue;
+                }
+                return Err(Diverged { tree: tree.name.clone(), link: tree.links[*link].name.clone() });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// m/s or rad/s. Nothing real comes near; beyond, Rapier's f32 would soon overflow.
+const FASTEST: f64 = 1e6;
+
+fn unwhiten(trees: &[Tree], w: &[f64], v: &mut [f64]) {
+    let mut offset = 0;
+    for tree in trees {
+        let range = offset..offset + tree.dofs();
+        tree.unwhiten(&w[range.clone()], &mut v[range.clone()]);
+        offset = range.end;
+    }
+}
+
+impl Tree {
+    /// Factorises the mass matrix and sets `w` to the whitened velocities of a step without constraints.
+    fn prepare(&mut self, dt_s: f64, gravity_m_s2: super::DVec3, w: &mut [f64]) {
+        self.bias(gravity_m_s2);
+        self.joint_forces(dt_s);
+        self.composite_mass_matrix();
+        self.factorise();
+        let mut start = std::mem::take(&mut self.unconstrained);
+        self.spin_freely(dt_s, &mut start);
+        self.whiten(dt_s, &start, w);
+        self.unconstrained = start;
+    }
+}

@@ -1,0 +1,123 @@
+//! Drives keep to their effort limits, and report what acts.
+
+use rapier3d::glamx::{DPose3, DVec3};
+
+use super::super::{Axis, Drive, Joint, Mass, Tree};
+use super::bench::{Bench, DOWN, DT_S, Random, jointed, link, sliding};
+use super::inverse::efforts;
+
+/// Far from its target a drive exerts its limit, and what it reports is what changes the momentum.
+#[test]
+fn dynamics_drive_saturates() {
+    let mass = Mass::of_box(3.0, DVec3::splat(0.1));
+    let inertia = mass.inertia_kg_m2.z_axis.z + 0.02;
+    let mut axis = Axis::along(DVec3::Z);
+    (axis.armature, axis.effort_limit) = (0.02, 5.0);
+    let mut bench = Bench::new(DOWN);
+    let id = bench.add(jointed(Joint::Hinge(axis), mass));
+    let drive = Drive { target: 2.0, kp: 200.0, kd: 20.0, feedforward: 0.0 };
+    bench.dynamics.tree_mut(id).drive(0, drive);
+    let mut limited = 0;
+    for _ in 0..400 {
+        let before = bench.dynamics.tree(id).joint_velocity(0);
+        bench.step();
+        let tree = bench.dynamics.tree(id);
+        let (acted, told) = (inertia * (tree.joint_velocity(0) - before) / DT_S, tree.drive_effort(0));
+        assert!((acted - told).abs() < 1e-9, "{acted} {told}");
+        assert!(told.abs() <= 5.0 * (1.0 + 1e-8), "{told}");
+        limited += usize::from(told.abs() > 4.999);
+    }
+    assert!(limited > 15, "{limited}");
+    assert!((bench.dynamics.tree(id).joint_position(0) - 2.0).abs() < 1e-3);
+}
+
+/// A floating chain on the floor whose drives all ask for too much: within limits, and by inverse dynamics true.
+#[test]
+fn dynamics_saturated_chain_on_the_floor() {
+    let limit = 4.0;
+    let mut links =
+        vec![link(None, DVec3::new(0.0, 0.0, 0.4), Joint::Free, Mass::of_box(2.0, DVec3::splat(0.05)))];
+    for index in 1..7 {
+        let mut axis = Axis::along([DVec3::X, DVec3::Y, DVec3::new(0.0, 1.0, 1.0)][index % 3]);
+        (axis.armature, axis.effort_limit) = (0.003, limit);
+        let mass = Mass::of_box(0.7, DVec3::new(0.05, 0.03, 0.03));
+        links.push(link(Some(index - 1), DVec3::new(0.12, 0.0, 0.0), Joint::Hinge(axis), mass));
+    }
+    let mut bench = Bench::with_floor(DOWN, sliding(0.7));
+    let id = bench.add(Tree::new("chain", links).unwrap());
+    for index in [0, 3, 6] {
+        let ball = rapier3d::prelude::SharedShape::ball(0.05);
+        bench.add_shape(id.link(index), ball, sliding(0.7));
+    }
+    let mut random = Random(3);
+    let mut limited = 0;
+    for step in 0..600 {
+        if step % 20 == 0 {
+            for link in 1..7 {
+                let drive = Drive { target: 2.0 * random.number(), kp: 150.0, kd: 5.0, feedforward: 0.0 };
+                bench.dynamics.tree_mut(id).drive(link, drive);
+            }
+        }
+        let (at, before) = (bench.dynamics.tree(id).state(), bench.dynamics.tree(id).v.clone());
+        bench.step();
+        let tree = bench.dynamics.tree(id);
+        for link in 1..7 {
+            let told = tree.drive_effort(link);
+            assert!(told.abs() <= limit * (1.0 + 1e-8), "{told} at link {link}");
+            limited += usize::from(told.abs() > 0.999 * limit);
+        }
+        check_efforts(&bench, id, &at, &before);
+    }
+    assert!(limited > 500, "{limited}");
+}
+
+/// While nothing touches, the reported efforts are those of inverse dynamics.
+fn check_efforts(bench: &Bench, id: super::super::TreeId, at: &super::super::TreeState, before: &[f64]) {
+    if !bench.dynamics.touches().is_empty() {
+        return;
+    }
+    let tree = bench.dynamics.tree(id);
+    let acceleration: Vec<f64> =
+        tree.v.iter().zip(before).map(|(after, before)| (after - before) / DT_S).collect();
+    let mut old = Tree::new("chain", tree.links().to_vec()).unwrap();
+    old.restore(at);
+    let found = efforts(&old, before, &acceleration, DOWN);
+    for link in 1..7 {
+        let (found, told) = (found[5 + link], tree.drive_effort(link));
+        assert!((found - told).abs() < 1e-7, "{found} {told} at link {link}");
+    }
+}
+
+/// A drive holds a load against gravity with the limit just above it, and gives way just below.
+#[test]
+fn dynamics_drive_gives_way_beyond_its_limit() {
+    let mut mass = Mass::of_box(2.0, DVec3::splat(0.05));
+    mass.com_m = DVec3::new(0.3, 0.0, 0.0);
+    let weight_n_m = 2.0 * 9.81 * 0.3;
+    let sag = |share: f64| {
+        let mut axis = Axis::along(DVec3::Y);
+        axis.effort_limit = weight_n_m * share;
+        let mut bench = Bench::new(DOWN);
+        let id = bench.add(jointed(Joint::Hinge(axis), mass));
+        let drive = Drive { target: 0.0, kp: 500.0, kd: 20.0, feedforward: -weight_n_m };
+        bench.dynamics.tree_mut(id).drive(0, drive);
+        bench.run_s(1.0);
+        bench.dynamics.tree(id).joint_position(0).abs()
+    };
+    assert!(sag(1.01) < 1e-6, "{}", sag(1.01));
+    assert!(sag(0.97) > 0.1, "{}", sag(0.97));
+}
+
+#[test]
+fn dynamics_lone_trees_take_pushes() {
+    let mut bench = Bench::new(DVec3::ZERO);
+    let body = bench.add(super::bench::lone("crate", DPose3::IDENTITY, Mass::of_box(4.0, DVec3::splat(0.2))));
+    bench.dynamics.tree_mut(body).push(0, DVec3::ZERO, DVec3::new(8.0, 0.0, 0.0));
+    bench.dynamics.tree_mut(body).twist(0, DVec3::new(0.0, 0.0, 1.0));
+    bench.step();
+    bench.step();
+    let tree = bench.dynamics.tree(body);
+    let inertia = 4.0 * 0.04 * 2.0 / 3.0;
+    assert!((tree.link_velocity_m_s(0) - DVec3::new(2.0 * DT_S, 0.0, 0.0)).length() < 1e-12);
+    assert!((tree.link_spin_rad_s(0).z - DT_S / inertia).abs() < 1e-12);
+}

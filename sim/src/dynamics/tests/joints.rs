@@ -1,0 +1,192 @@
+//! Joints of one degree of freedom, limits and equalities.
+
+use rapier3d::glamx::{DPose3, DVec3};
+
+use super::super::{Axis, Drive, Equality, Joint, Link, Mass, Tree};
+use super::bench::{Bench, DOWN, DT_S, G_M_S2, hinge, jointed, link, lone};
+
+/// Period of a pendulum at 0.2 rad, and its energy over 20 s.
+#[test]
+fn dynamics_pendulum() {
+    let (mass_kg, length_m) = (1.3, 0.7);
+    let mut mass = Mass::of_box(mass_kg, DVec3::new(0.05, 0.05, 0.1));
+    mass.com_m = DVec3::new(0.0, 0.0, -length_m);
+    let inertia = mass.inertia_kg_m2.y_axis.y + mass_kg * length_m * length_m;
+    let mut bench = Bench::new(DOWN);
+    let id = bench.add(jointed(hinge(DVec3::Y), mass));
+    bench.dynamics.tree_mut(id).set_joint(0, 0.2, 0.0);
+    let energy_j = bench.energy_j(id);
+    let swing_j = mass_kg * G_M_S2 * length_m * (1.0 - 0.2f64.cos());
+    let (mut crossings, mut last) = (Vec::new(), 0.2);
+    for step in 1..=4000 {
+        bench.step();
+        let q = bench.dynamics.tree(id).joint_position(0);
+        if last > 0.0 && q <= 0.0 {
+            crossings.push((step as f64 - q / (q - last)) * DT_S);
+        }
+        last = q;
+        assert!((bench.energy_j(id) - energy_j).abs() < 0.02 * swing_j, "energy at step {step}");
+    }
+    let period_s = (crossings[crossings.len() - 1] - crossings[0]) / (crossings.len() - 1) as f64;
+    let small = std::f64::consts::TAU * (inertia / (mass_kg * G_M_S2 * length_m)).sqrt();
+    let wanted_s = small * (1.0 + 0.2f64.powi(2) / 16.0);
+    assert!((period_s / wanted_s - 1.0).abs() < 2e-4, "{period_s} for {wanted_s}");
+}
+
+/// I q'' + c q' + k q = 0, underdamped. Implicit springs add  omega dt / 2  to the damping ratio.
+#[test]
+fn dynamics_hinge_with_spring_and_damper() {
+    let mass = Mass::of_box(3.0, DVec3::new(0.1, 0.1, 0.1));
+    let inertia = mass.inertia_kg_m2.z_axis.z;
+    let (omega, ratio) = (4.0, 0.2);
+    let mut axis = Axis::along(DVec3::Z);
+    axis.stiffness = inertia * omega * omega;
+    axis.damping = 2.0 * ratio * omega * inertia;
+    axis.spring_rest = 0.3;
+    let mut bench = Bench::new(DVec3::ZERO);
+    let id = bench.add(jointed(Joint::Hinge(axis), mass));
+    bench.dynamics.tree_mut(id).set_joint(0, 0.8, 0.0);
+    let numeric = ratio + 0.5 * omega * DT_S;
+    let damped = omega * (1.0 - numeric * numeric).sqrt();
+    for step in 1..=600 {
+        bench.step();
+        let t = f64::from(step) * DT_S;
+        let decay = (-numeric * omega * t).exp();
+        let wanted = 0.3 + 0.5 * decay * ((damped * t).cos() + numeric * omega / damped * (damped * t).sin());
+        let q = bench.dynamics.tree(id).joint_position(0);
+        assert!((q - wanted).abs() < 0.005, "{q} for {wanted} after {t} s");
+    }
+}
+
+#[test]
+fn dynamics_slide_under_a_force_and_with_dry_friction() {
+    let mut axis = Axis::along(DVec3::X);
+    axis.armature = 0.5;
+    axis.friction_loss = 1.0;
+    let mut bench = Bench::new(DOWN);
+    let id = bench.add(jointed(Joint::Slide(axis), Mass::of_box(1.5, DVec3::splat(0.1))));
+    let push = |bench: &mut Bench, feedforward| {
+        bench.dynamics.tree_mut(id).drive(0, Drive { feedforward, ..Drive::NONE });
+        bench.run_s(1.0);
+        bench.dynamics.tree(id).joint_position(0)
+    };
+    assert!(push(&mut bench, 0.999).abs() < 1e-12, "held by dry friction");
+    let slid_m = push(&mut bench, 3.0);
+    assert!((slid_m - 0.5 * (1.0 + DT_S)).abs() < 1e-9, "{slid_m}");
+}
+
+/// An arm that is driven into the end of its range at full speed, and a light finger.
+#[test]
+fn dynamics_joint_stops_at_its_limit() {
+    for (half_m, effort) in [(DVec3::new(0.2, 0.03, 0.03), 60.0), (DVec3::new(0.02, 0.008, 0.008), 1.5)] {
+        let mut mass = Mass::of_box(half_m.x * 5.0, half_m);
+        mass.com_m = DVec3::new(half_m.x, 0.0, 0.0);
+        let mut axis = Axis::along(DVec3::Z);
+        axis.range = Some([-1.0, 1.0]);
+        axis.effort_limit = effort;
+        let mut bench = Bench::new(DOWN);
+        let id = bench.add(jointed(Joint::Hinge(axis), mass));
+        let tree = bench.dynamics.tree_mut(id);
+        tree.set_joint(0, 0.0, 30.0);
+        tree.drive(0, Drive { target: 5.0, kp: 200.0, kd: 0.5, feedforward: 0.0 });
+        for _ in 0..200 {
+            bench.step();
+            let q = bench.dynamics.tree(id).joint_position(0);
+            assert!(q < 1.001, "{q}");
+        }
+        assert!(bench.dynamics.tree(id).joint_position(0) > 0.999);
+    }
+}
+
+#[test]
+fn dynamics_coupled_joints_follow() {
+    let polynomial = [0.1, 0.8, -0.3, 0.2, 0.0];
+    let mut mass = Mass::of_box(0.2, DVec3::new(0.05, 0.01, 0.01));
+    mass.com_m = DVec3::new(0.05, 0.0, 0.0);
+    let joint = || hinge(DVec3::Y);
+    let links =
+        vec![link(None, DVec3::ZERO, joint(), mass), link(Some(0), DVec3::new(0.1, 0.0, 0.0), joint(), mass)];
+    let mut bench = Bench::new(DOWN);
+    let id = bench.add(Tree::new("finger", links).unwrap());
+    let (follower, leader) = (id.link(1), Some(id.link(0)));
+    bench.dynamics.add_equality(Equality::Couple { follower, leader, polynomial }, true);
+    bench.dynamics.tree_mut(id).set_joint(1, 0.1, 0.0);
+    for step in 0..600 {
+        let target = 1.2 * (f64::from(step) * DT_S * 3.0).sin();
+        bench.dynamics.tree_mut(id).drive(0, Drive { target, kp: 20.0, kd: 0.5, feedforward: 0.0 });
+        bench.step();
+        let tree = bench.dynamics.tree(id);
+        let (x, y) = (tree.joint_position(0), tree.joint_position(1));
+        let wanted = polynomial.iter().rev().fold(0.0, |sum, a| sum * x + a);
+        assert!((y - wanted).abs() < 2e-3, "{y} for {wanted} at step {step}");
+    }
+}
+
+/// A welded body hangs without moving; switched off, it falls; a point that is held stays where it is.
+#[test]
+fn dynamics_weld_and_connect() {
+    let half_m = DVec3::new(0.1, 0.05, 0.02);
+    let at = DPose3::from_translation(DVec3::new(0.5, 0.0, 1.0));
+    let mut bench = Bench::new(DOWN);
+    let arm = bench.add(jointed(Joint::Fixed, Mass::of_box(1.0, half_m)));
+    let body = bench.add(lone("picture", at, Mass::of_box(2.0, half_m)));
+    let weld = Equality::Weld { a: arm.link(0), a_from_b: at, b: Some(body.link(0)) };
+    let weld = bench.dynamics.add_equality(weld, true);
+    bench.run_s(2.0);
+    let moved_m = (bench.position_m(body) - at.translation).length();
+    assert!(moved_m < 1e-3, "{moved_m}");
+    bench.dynamics.set_active(weld, false);
+    let corner_m = DVec3::new(0.1, 0.05, 0.0);
+    let pin = Equality::Connect {
+        a: body.link(0),
+        a_point_m: corner_m,
+        b: None,
+        b_point_m: at.translation + corner_m,
+    };
+    let pin = bench.dynamics.add_equality(pin, true);
+    for _ in 0..400 {
+        bench.step();
+        let off = bench.dynamics.tree(body).world_from_link(0) * corner_m - at.translation - corner_m;
+        assert!(off.length() < 3e-3, "{off}");
+    }
+    assert!((bench.position_m(body) - at.translation).length() > 0.05, "it swings");
+    bench.dynamics.set_active(pin, false);
+    let before_m = bench.position_m(body).z;
+    bench.run_s(0.5);
+    assert!(bench.position_m(body).z < before_m - 0.5);
+}
+
+/// A weld whose far side is a hinge: the latch of a door that somebody pulls at.
+#[test]
+fn dynamics_latch_holds_a_door() {
+    let half_m = DVec3::new(0.4, 0.02, 1.0);
+    let mut mass = Mass::of_box(20.0, half_m);
+    mass.com_m = DVec3::new(0.4, 0.0, 0.0);
+    let mut bench = Bench::new(DOWN);
+    let door = bench.add(jointed(hinge(DVec3::Z), mass));
+    let latch = Equality::Couple { follower: door.link(0), leader: None, polynomial: [0.0; 5] };
+    let latch = bench.dynamics.add_equality(latch, true);
+    let pull = |bench: &mut Bench| {
+        for _ in 0..200 {
+            let tree = bench.dynamics.tree_mut(door);
+            tree.push(0, DVec3::new(0.8, 0.0, 0.0), DVec3::new(0.0, 30.0, 0.0));
+            bench.step();
+        }
+        bench.dynamics.tree(door).joint_position(0)
+    };
+    let held = pull(&mut bench);
+    assert!(held.abs() < 1e-3, "{held}");
+    bench.dynamics.set_active(latch, false);
+    let open = pull(&mut bench);
+    assert!(open > 0.5, "{open}");
+}
+
+#[test]
+fn dynamics_trees_that_cannot_be_are_named() {
+    let massless = Tree::new("arm", vec![link(None, DVec3::ZERO, hinge(DVec3::Z), Mass::NONE)]);
+    assert!(massless.err().unwrap().to_string().contains("armature"));
+    let mass = Mass::of_box(1.0, DVec3::ONE);
+    let two: Vec<Link> =
+        vec![link(None, DVec3::ZERO, Joint::Fixed, mass), link(Some(0), DVec3::ZERO, Joint::Free, mass)];
+    assert!(Tree::new("pair", two).err().unwrap().to_string().contains("only the first link"));
+}

@@ -1,0 +1,10 @@
+//! Closed forms, conservation, exactness.
+
+mod bench;
+mod contacts;
+mod drives;
+mod exactness;
+mod free_motion;
+mod friction;
+mod inverse;
+mod joints;
