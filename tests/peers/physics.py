@@ -120,9 +120,16 @@ def write_reference(scene):
         rows = {kind: (values[:, columns].round(DECIMALS) + 0.0).tolist() for kind, values in rows.items()}
         quantities.append({"name": name, "tolerance": scene.tolerance[name], **rows})
     reference = {"scene": path.name, "compares": scene.compares, "judge": f"MuJoCo {mujoco.__version__}",
-                 "seconds": scene.seconds, "hz": scene.hz, "quantities": quantities}
+                 "seconds": scene.seconds, "hz": scene.hz, "quantities": quantities, "bodies": masses(model)}
     text = json.dumps(reference, separators=(",", ":"))
     path.with_suffix(".json").write_text(text.replace('{"name"', '\n{"name"') + "\n")
+
+
+def masses(model):
+    """Masses and principal inertias, smallest first, which MuJoCo finds for the bodies that move."""
+    bodies = [model.body(body) for body in range(1, model.nbody) if model.body_weldid[body] == body]
+    return [{"name": body.name, "mass_kg": round(float(body.mass[0]), 6),
+             "inertia_kg_m2": [float(f"{moment:.5g}") for moment in sorted(body.inertia)]} for body in bodies]
 
 
 def main():
