@@ -10,6 +10,11 @@ use tandem::{
     server::Server,
     settings::Settings,
 };
+use tracing_subscriber::{
+    filter::{LevelFilter, Targets},
+    layer::SubscriberExt,
+    util::SubscriberInitExt,
+};
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -25,13 +30,13 @@ fn main() -> ExitCode {
 fn run(cli: Cli) -> Result<ExitCode, Box<dyn std::error::Error>> {
     match cli.command {
         Command::Serve { config, flags } => {
-            log_to_stderr("info");
+            log_to_stderr(LevelFilter::INFO);
             let settings = Settings::resolve(flags, config.as_deref())?;
             Server::start(&settings)?.run_until_signal();
             Ok(ExitCode::SUCCESS)
         }
         Command::Demo { seeds, runs, locomotion } => {
-            log_to_stderr("warn");
+            log_to_stderr(LevelFilter::WARN);
             let results = demo::play_all(&runs, seeds, locomotion.file)?;
             Ok(if demo::passed(&results) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
         }
@@ -59,11 +64,11 @@ fn run(cli: Cli) -> Result<ExitCode, Box<dyn std::error::Error>> {
 }
 
 /// `TANDEM_LOG` sets what is logged, as `debug` or `tandem=debug`.
-fn log_to_stderr(default: &str) {
-    let filter = tracing_subscriber::EnvFilter::try_from_env("TANDEM_LOG").unwrap_or_else(|_| default.into());
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
+fn log_to_stderr(default: LevelFilter) {
+    let wanted = std::env::var("TANDEM_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
+    let lines = tracing_subscriber::fmt::layer()
         .with_ansi(std::io::stderr().is_terminal())
-        .with_writer(std::io::stderr)
-        .init();
+        .with_writer(std::io::stderr);
+    let filter = wanted.unwrap_or_else(|| Targets::new().with_default(default));
+    tracing_subscriber::registry().with(filter).with(lines).init();
 }

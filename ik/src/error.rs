@@ -7,6 +7,7 @@ pub enum IkError {
     #[error("not valid MJCF: {0}")]
     Mjcf(#[from] mjcf_rs::ParseError),
     /// The URDF text cannot be read.
+    #[cfg(feature = "urdf")]
     #[error("not valid URDF: {0}")]
     Urdf(#[from] urdf_rs::UrdfError),
     /// A file of targets cannot be read.

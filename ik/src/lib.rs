@@ -53,6 +53,7 @@ mod model;
 mod program;
 pub mod qp;
 mod read_mjcf;
+#[cfg(feature = "urdf")]
 mod read_urdf;
 mod report;
 mod solve;

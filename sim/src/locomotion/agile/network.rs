@@ -4,15 +4,14 @@
 //! `action_joint_pos`, `action_joint_pos_kp_gains` and `action_joint_pos_kd_gains`. Every other input `X` (last actions,
 //! histories) is a memory: the output `X_out` is its value at the next step.
 
+use std::error::Error;
 use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
+use rten::{Dimension, LoadError, LoadErrorKind, Model, NodeId, RunOptions, ThreadPool, Value, ValueView};
+use rten_tensor::{Layout, Tensor};
 use serde::{Deserialize, Serialize};
-use tract_onnx::pb::ModelProto;
-use tract_onnx::prelude::*;
-use tract_onnx::tract_hir::infer::Factoid;
-use tract_onnx::tract_hir::internal::DimLike;
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::joints::{CONTROLLED_JOINTS, OBSERVED_JOINTS};
@@ -66,38 +65,38 @@ pub(super) struct Memory(pub(super) Vec<Vec<f32>>);
 /// A checked file, ready to run. Robots share it; what differs between them is [`Memory`].
 pub struct Network {
     name: String,
-    plan: Arc<TypedRunnableModel>,
+    model: Model,
     inputs: Vec<Input>,
-    /// Positions of [`ACTIONS`] among the outputs.
-    actions: [usize; 3],
-    memories: Vec<MemoryTensor>,
+    /// Those of [`ACTIONS`], then the next values of the memories.
+    outputs: Vec<NodeId>,
+    /// Shapes of the memories.
+    memories: Vec<Vec<usize>>,
+    /// One thread: the layers are too small to share out, and sums do not depend on how many cores there are.
+    thread: Arc<ThreadPool>,
 }
 
-enum Input {
+struct Input {
+    node: NodeId,
+    source: Source,
+}
+
+enum Source {
     Sensed(&'static str),
     Memory(usize),
 }
 
-struct MemoryTensor {
-    shape: Vec<usize>,
-    /// Position of its next value among the outputs.
-    output: usize,
-}
+/// Should a run fail.
+type RunResult<T> = Result<T, Box<dyn Error + Send + Sync>>;
 
 impl Network {
     /// Reads a file, checks names and shapes, and runs it once.
     pub fn from_file(path: &Path) -> Result<Network, SimError> {
         let file = path.display().to_string();
         let bytes = std::fs::read(path).map_err(|source| SimError::Read { path: file.clone(), source })?;
-        let not_onnx = |source: TractError| SimError::NotOnnx { path: file.clone(), source: source.into() };
-        let proto = tract_onnx::onnx().proto_model_for_read(&mut bytes.as_slice()).map_err(not_onnx)?;
-        let outputs = output_names(&proto, &file)?;
-        let not_runnable =
-            |source: TractError| SimError::NotRunnable { path: file.clone(), source: source.into() };
-        let model = tract_onnx::onnx().model_for_proto_model(&proto).map_err(not_runnable)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let name = format!("{name}+{:016x}", xxh3_64(&bytes));
-        let network = Network::check(&file, name, model, &outputs)?;
+        let model = Model::load(bytes).map_err(|source| unreadable(&file, source))?;
+        let network = Network::check(&file, name, model)?;
         let still = Observation {
             quaternion_wxyz: [1.0, 0.0, 0.0, 0.0],
             angular_velocity_rad_s: [0.0; 3],
@@ -105,7 +104,10 @@ impl Network {
             q_rad: [0.0; OBSERVED_JOINTS],
             qd_rad_s: [0.0; OBSERVED_JOINTS],
         };
-        let (action, _) = network.run(&still, &network.blank()).map_err(not_runnable)?;
+        let not_runnable = |source| SimError::NotRunnable { path: file.clone(), source };
+        let outputs = network.evaluate(&still, &network.blank()).map_err(not_runnable)?;
+        network.expect_outputs(&file, &outputs)?;
+        let (action, _) = network.split(outputs).map_err(not_runnable)?;
         if !action.usable() {
             return Err(SimError::PolicyOutput { path: file });
         }
@@ -117,76 +119,59 @@ impl Network {
         &self.name
     }
 
-    fn check(
-        file: &str,
-        name: String,
-        mut model: InferenceModel,
-        outputs: &[String],
-    ) -> Result<Network, SimError> {
-        let not_runnable =
-            |source: TractError| SimError::NotRunnable { path: file.into(), source: source.into() };
+    /// Finds every tensor by its name and checks the inputs' shapes.
+    fn check(file: &str, name: String, model: Model) -> Result<Network, SimError> {
+        let (input_names, output_names) =
+            (names(&model, model.input_ids()), names(&model, model.output_ids()));
         let missing = |kind, tensor: &str, have: &[String]| SimError::MissingTensor {
             path: file.into(),
             kind,
             tensor: tensor.into(),
             have: have.join(", "),
         };
-        let names: Vec<String> = model
-            .input_outlets()
-            .map_err(not_runnable)?
-            .iter()
-            .map(|outlet| model.node(outlet.node).name.clone())
-            .collect();
-        if let Some((name, _)) = SENSED.iter().find(|(name, _)| !names.iter().any(|have| have == name)) {
-            return Err(missing("input", name, &names));
+        if let Some((name, _)) = SENSED.iter().find(|(name, _)| !input_names.iter().any(|have| have == name))
+        {
+            return Err(missing("input", name, &input_names));
         }
         let output = |name: &str| {
-            let found = outputs.iter().position(|output| output == name);
-            found.ok_or_else(|| missing("output", name, outputs))
+            let found = output_names.iter().position(|output| output == name);
+            found.map(|index| model.output_ids()[index]).ok_or_else(|| missing("output", name, &output_names))
         };
-        let actions = [output(ACTIONS[0])?, output(ACTIONS[1])?, output(ACTIONS[2])?];
-        let mut inputs = Vec::with_capacity(names.len());
+        let mut outputs = ACTIONS.into_iter().map(output).collect::<Result<Vec<_>, _>>()?;
+        let mut inputs = Vec::with_capacity(input_names.len());
         let mut memories = Vec::new();
-        for (index, name) in names.iter().enumerate() {
-            let have = input_shape(&model, index).map_err(not_runnable)?;
-            let shape = match SENSED.iter().find(|(sensed, _)| sensed == name) {
+        for (index, (name, node)) in input_names.iter().zip(model.input_ids()).enumerate() {
+            let have = input_shape(&model, index);
+            let source = match SENSED.iter().find(|(sensed, _)| sensed == name) {
                 Some((sensed, width)) => {
-                    inputs.push(Input::Sensed(sensed));
-                    vec![1, *width]
+                    expect_shape(file, "input", name, &have, &[1, *width])?;
+                    Source::Sensed(sensed)
                 }
                 None => {
-                    inputs.push(Input::Memory(memories.len()));
-                    memories.push(MemoryTensor {
-                        shape: have.clone(),
-                        output: output(&format!("{name}{FED_BACK}"))?,
-                    });
-                    have.clone()
+                    outputs.push(output(&format!("{name}{FED_BACK}"))?);
+                    memories.push(have);
+                    Source::Memory(memories.len() - 1)
                 }
             };
-            expect_shape(file, "input", name, &have, &shape)?;
-            model.set_input_fact(index, f32::fact(&shape).into()).map_err(not_runnable)?;
+            inputs.push(Input { node: *node, source });
         }
-        let model = model.into_optimized().map_err(not_runnable)?;
-        for (tensor, index) in ACTIONS.iter().zip(actions) {
-            expect_shape(
-                file,
-                "output",
-                tensor,
-                &output_shape(&model, index).map_err(not_runnable)?,
-                &[1, CONTROLLED_JOINTS],
-            )?;
+        let thread = Arc::new(ThreadPool::with_num_threads(1));
+        Ok(Network { name, model, inputs, outputs, memories, thread })
+    }
+
+    /// What a run gave has to fit the joints, and the memories that it is fed back into.
+    fn expect_outputs(&self, file: &str, values: &[Value]) -> Result<(), SimError> {
+        let action = [1, CONTROLLED_JOINTS];
+        let expected = ACTIONS.iter().map(|_| &action[..]).chain(self.memories.iter().map(Vec::as_slice));
+        for ((name, value), expected) in names(&self.model, &self.outputs).iter().zip(values).zip(expected) {
+            expect_shape(file, "output", name, &value.shape(), expected)?;
         }
-        for memory in &memories {
-            let have = output_shape(&model, memory.output).map_err(not_runnable)?;
-            expect_shape(file, "output", &outputs[memory.output], &have, &memory.shape)?;
-        }
-        let plan = model.into_runnable().map_err(not_runnable)?;
-        Ok(Network { name, plan, inputs, actions, memories })
+        Ok(())
     }
 
     /// The memory of a robot that has stood as in `observation` for half a second, acting as the policy wanted. One that
     /// had not acted before would be thrown into the policy's own stance: it hops a third of a metre.
-    pub(super) fn remember(&self, observation: &Observation) -> TractResult<Memory> {
+    pub(super) fn remember(&self, observation: &Observation) -> RunResult<Memory> {
         let mut memory = self.blank();
         for _ in 0..STEPS_TO_REMEMBER {
             memory = self.run(observation, &memory)?.1;
@@ -195,36 +180,44 @@ impl Network {
     }
 
     pub(super) fn blank(&self) -> Memory {
-        Memory(self.memories.iter().map(|tensor| vec![0.0; tensor.shape.iter().product()]).collect())
+        Memory(self.memories.iter().map(|shape| vec![0.0; shape.iter().product()]).collect())
     }
 
     /// One control step.
-    pub(super) fn run(&self, observation: &Observation, memory: &Memory) -> TractResult<(Action, Memory)> {
-        let inputs = self.inputs.iter().map(|input| {
-            let tensor = match input {
-                Input::Sensed(name) => {
+    pub(super) fn run(&self, observation: &Observation, memory: &Memory) -> RunResult<(Action, Memory)> {
+        self.split(self.evaluate(observation, memory)?)
+    }
+
+    /// Values of [`Network::outputs`].
+    fn evaluate(&self, observation: &Observation, memory: &Memory) -> RunResult<Vec<Value>> {
+        let mut inputs = Vec::with_capacity(self.inputs.len());
+        for input in &self.inputs {
+            let value = match input.source {
+                Source::Sensed(name) => {
                     let values = observation.values(name);
-                    Tensor::from_shape(&[1, values.len()], values)
+                    ValueView::from_shape([1, values.len()], values)?
                 }
-                Input::Memory(index) => Tensor::from_shape(&self.memories[*index].shape, &memory.0[*index]),
+                Source::Memory(index) => ValueView::from_shape(&self.memories[index], &memory.0[index])?,
             };
-            tensor.map(TValue::from)
-        });
-        let inputs = inputs.collect::<TractResult<TVec<TValue>>>()?;
-        let outputs = self.plan.run(inputs);
-        clear_vector_registers();
-        let outputs = outputs?;
-        let values = |index: usize| -> TractResult<Vec<f32>> {
-            Ok(outputs[index].to_plain_array_view::<f32>()?.iter().copied().collect())
+            inputs.push((input.node, value.into()));
+        }
+        let options = RunOptions::default().with_thread_pool(Some(self.thread.clone()));
+        Ok(self.model.run(inputs, &self.outputs, Some(options))?)
+    }
+
+    /// Shapes have been checked, so that none is left out.
+    fn split(&self, outputs: Vec<Value>) -> RunResult<(Action, Memory)> {
+        let floats = |value: Value| {
+            let tensor: Option<Tensor<f32>> = value.into_tensor();
+            Ok(tensor.ok_or("an output is not of 32-bit floats")?.into_data())
         };
-        let joints = |index: usize| -> TractResult<[f32; CONTROLLED_JOINTS]> {
-            let values = values(self.actions[index])?;
-            // Shapes have been checked, so that none is left out.
-            Ok(std::array::from_fn(|joint| values.get(joint).copied().unwrap_or(f32::NAN)))
+        let mut values = outputs.into_iter().map(floats).collect::<RunResult<Vec<Vec<f32>>>>()?;
+        let memory = Memory(values.split_off(ACTIONS.len()));
+        let joints = |index: usize| {
+            let values: &Vec<f32> = &values[index];
+            std::array::from_fn(|joint| values.get(joint).copied().unwrap_or(f32::NAN))
         };
-        let action = Action { target_rad: joints(0)?, kp_n_m_rad: joints(1)?, kd_n_m_s_rad: joints(2)? };
-        let next = self.memories.iter().map(|tensor| values(tensor.output)).collect::<TractResult<_>>()?;
-        Ok((action, Memory(next)))
+        Ok((Action { target_rad: joints(0), kp_n_m_rad: joints(1), kd_n_m_s_rad: joints(2) }, memory))
     }
 }
 
@@ -258,53 +251,31 @@ impl Action {
     }
 }
 
-/// Ends the use of the wide vector registers, which tract's kernels leave to their callers: with their upper halves in use,
-/// every SSE instruction of the thread takes longer, and physics twice its time.
-#[cfg(target_arch = "x86_64")]
-#[expect(unsafe_code, reason = "one instruction that has no safe form")]
-fn clear_vector_registers() {
-    #[target_feature(enable = "avx")]
-    fn clear() {
-        std::arch::x86_64::_mm256_zeroupper();
-    }
-    if std::arch::is_x86_feature_detected!("avx") {
-        // SAFETY: the processor has the instruction.
-        unsafe { clear() }
+/// What cannot be read is no ONNX file; what is one, but has an operator or a graph that makes no sense, cannot be run.
+fn unreadable(file: &str, source: LoadError) -> SimError {
+    let path = file.to_owned();
+    match source.kind() {
+        LoadErrorKind::ParseError => SimError::NotOnnx { path, source: source.into() },
+        LoadErrorKind::UnknownFileType | LoadErrorKind::FormatNotEnabled => {
+            SimError::NotOnnx { path, source: "it holds no graph".into() }
+        }
+        _ => SimError::NotRunnable { path, source: source.into() },
     }
 }
 
-#[cfg(not(target_arch = "x86_64"))]
-fn clear_vector_registers() {}
-
-/// Names of the outputs in the file's order. Refuses a file without a graph, as an empty one, and a graph that does not
-/// make what it declares.
-fn output_names(proto: &ModelProto, file: &str) -> Result<Vec<String>, SimError> {
-    let Some(graph) = &proto.graph else {
-        return Err(SimError::NotOnnx { path: file.into(), source: "it holds no graph".into() });
-    };
-    let made = |name: &String| {
-        graph.node.iter().any(|node| node.output.contains(name))
-            || graph.input.iter().any(|input| input.name == *name)
-            || graph.initializer.iter().any(|constant| constant.name == *name)
-    };
-    let names: Vec<String> = graph.output.iter().map(|output| output.name.clone()).collect();
-    match names.iter().find(|name| !made(name)) {
-        Some(name) => {
-            let source = format!("no node makes the output `{name}`").into();
-            Err(SimError::NotRunnable { path: file.into(), source })
-        }
-        None => Ok(names),
-    }
+fn names(model: &Model, nodes: &[NodeId]) -> Vec<String> {
+    let name =
+        |node: &NodeId| model.node_info(*node).and_then(|info| info.name()).unwrap_or_default().to_owned();
+    nodes.iter().map(name).collect()
 }
 
 /// Dimensions without a size, as a batch, count as 1.
-fn input_shape(model: &InferenceModel, index: usize) -> TractResult<Vec<usize>> {
-    let dims = model.input_fact(index)?.shape.dims();
-    Ok(dims.map(|dim| dim.concretize().and_then(|dim| dim.to_usize().ok()).unwrap_or(1)).collect())
-}
-
-fn output_shape(model: &TypedModel, index: usize) -> TractResult<Vec<usize>> {
-    model.output_fact(index)?.shape.iter().map(|dim| Ok(dim.to_usize()?)).collect()
+fn input_shape(model: &Model, index: usize) -> Vec<usize> {
+    let size = |dimension| match dimension {
+        Dimension::Fixed(size) => size,
+        Dimension::Symbolic(_) => 1,
+    };
+    model.input_shape(index).unwrap_or_default().into_iter().map(size).collect()
 }
 
 fn expect_shape(

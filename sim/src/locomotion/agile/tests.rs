@@ -2,34 +2,30 @@
 
 use std::path::PathBuf;
 
-use prost::Message;
-use tract_onnx::pb::{
-    GraphProto, ModelProto, NodeProto, OperatorSetIdProto, TensorProto, TensorShapeProto, TypeProto,
-    ValueInfoProto, tensor_shape_proto::Dimension, tensor_shape_proto::dimension, type_proto,
+use rten_onnx::onnx::{
+    DataType, Dimension, GraphProto, ModelProto, NodeProto, OperatorSetIdProto, TensorProto,
+    TensorShapeProto, TypeProto, TypeProtoTensor, ValueInfoProto,
 };
 
 use super::network::Network;
 use super::*;
 use crate::{RobotPlacement, SimError, World, WorldSpec};
 
-const FLOAT: i32 = 1;
-const INT64: i32 = 7;
 /// Where the controlled joints stand among the observed ones.
 const CONTROLLED_OF_OBSERVED: [i64; 14] = [0, 1, 3, 4, 5, 6, 7, 8, 9, 10, 13, 14, 17, 18];
 
 fn value(name: &str, shape: &[i64]) -> ValueInfoProto {
-    let size =
-        |size: &i64| Dimension { value: Some(dimension::Value::DimValue(*size)), ..Dimension::default() };
+    let size = |size: &i64| Dimension { dim_value: Some(*size), ..Dimension::default() };
     let shape = TensorShapeProto { dim: shape.iter().map(size).collect() };
-    let tensor = type_proto::Tensor { elem_type: FLOAT, shape: Some(shape) };
-    let tensor = TypeProto { value: Some(type_proto::Value::TensorType(tensor)), ..TypeProto::default() };
-    ValueInfoProto { name: name.into(), r#type: Some(tensor), ..ValueInfoProto::default() }
+    let tensor = TypeProtoTensor { elem_type: Some(DataType::FLOAT), shape: Some(shape) };
+    let tensor = TypeProto { tensor_type: Some(tensor), ..TypeProto::default() };
+    ValueInfoProto { name: Some(name.into()), r#type: Some(tensor) }
 }
 
 fn node(op: &str, inputs: [&str; 2], output: &str) -> NodeProto {
     NodeProto {
-        op_type: op.into(),
-        name: output.into(),
+        op_type: Some(op.into()),
+        name: Some(output.into()),
         input: inputs.map(String::from).into(),
         output: vec![output.into()],
         ..NodeProto::default()
@@ -39,33 +35,27 @@ fn node(op: &str, inputs: [&str; 2], output: &str) -> NodeProto {
 fn floats(name: &str, shape: &[i64], value: f32) -> TensorProto {
     let float_data = vec![value; shape.iter().product::<i64>() as usize];
     TensorProto {
-        name: name.into(),
+        name: Some(name.into()),
         dims: shape.into(),
-        data_type: FLOAT,
+        data_type: Some(DataType::FLOAT),
         float_data,
+        ..TensorProto::default()
+    }
+}
+
+fn integers(name: &str, values: &[i64]) -> TensorProto {
+    TensorProto {
+        name: Some(name.into()),
+        dims: vec![values.len() as i64],
+        data_type: Some(DataType::INT64),
+        int64_data: values.into(),
         ..TensorProto::default()
     }
 }
 
 /// Wants every joint to be where it is, a milliradian further with every step, at stiffness `kp`.
 fn limp(kp: f32) -> GraphProto {
-    let joints = TensorProto {
-        name: "joints".into(),
-        dims: vec![14],
-        data_type: INT64,
-        int64_data: CONTROLLED_OF_OBSERVED.into(),
-        ..TensorProto::default()
-    };
-    // Gather works along axis 0, so the row of joints is made a column and back.
-    let shape = |name: &str, sizes: [i64; 2]| TensorProto {
-        name: name.into(),
-        dims: vec![2],
-        data_type: INT64,
-        int64_data: sizes.into(),
-        ..TensorProto::default()
-    };
     GraphProto {
-        name: "limp".into(),
         input: vec![
             value("root_link_quat_w", &[1, 4]),
             value("root_ang_vel_b", &[1, 3]),
@@ -83,9 +73,10 @@ fn limp(kp: f32) -> GraphProto {
             value("shift_history_out", &[1, 2, 14]),
         ],
         initializer: vec![
-            joints,
-            shape("column", [29, 1]),
-            shape("row", [1, 14]),
+            integers("joints", &CONTROLLED_OF_OBSERVED),
+            // Gather works along axis 0, so the row of joints is made a column and back.
+            integers("column", &[29, 1]),
+            integers("row", &[1, 14]),
             floats("milliradian", &[1, 14], 1e-3),
             floats("one", &[1], 1.0),
             floats("action_joint_pos_kp_gains", &[1, 14], kp),
@@ -110,17 +101,21 @@ fn file(folder: &tempfile::TempDir, bytes: &[u8]) -> PathBuf {
 }
 
 fn read(graph: GraphProto) -> Result<Network, SimError> {
-    let opset = OperatorSetIdProto { domain: String::new(), version: 17 };
-    let model =
-        ModelProto { ir_version: 8, opset_import: vec![opset], graph: Some(graph), ..ModelProto::default() };
+    let opset = OperatorSetIdProto { version: Some(17), ..OperatorSetIdProto::default() };
+    let model = ModelProto {
+        ir_version: Some(8),
+        opset_import: vec![opset],
+        graph: Some(graph),
+        ..ModelProto::default()
+    };
     let folder = tempfile::tempdir().unwrap();
-    Network::from_file(&file(&folder, &model.encode_to_vec()))
+    Network::from_file(&file(&folder, &model.write_buf().unwrap()))
 }
 
 fn without(tensor: &str) -> GraphProto {
     let mut graph = limp(50.0);
-    graph.input.retain(|input| input.name != tensor);
-    graph.output.retain(|output| output.name != tensor);
+    graph.input.retain(|input| input.name.as_deref() != Some(tensor));
+    graph.output.retain(|output| output.name.as_deref() != Some(tensor));
     graph
 }
 
@@ -129,7 +124,7 @@ fn reshaped(tensor: &str, shape: &[i64]) -> GraphProto {
     graph
         .input
         .iter_mut()
-        .filter(|input| input.name == tensor)
+        .filter(|input| input.name.as_deref() == Some(tensor))
         .for_each(|input| *input = value(tensor, shape));
     graph
 }
@@ -157,11 +152,11 @@ fn a_wrong_file_is_told_what_it_lacks() {
 #[test]
 fn a_graph_that_does_not_make_its_outputs_is_no_panic() {
     let mut graph = limp(50.0);
-    graph.node.retain(|node| node.name != "last_actions_out");
+    graph.node.retain(|node| node.name.as_deref() != Some("last_actions_out"));
     let message = read(graph).unwrap_err().to_string();
     assert!(message.contains("no node makes") || message.contains("cannot be run"), "{message}");
     graph = limp(50.0);
-    graph.node[0].op_type = "Frobnicate".into();
+    graph.node[0].op_type = Some("Frobnicate".into());
     let message = read(graph).unwrap_err().to_string();
     assert!(message.contains("cannot be run"), "{message}");
 }
