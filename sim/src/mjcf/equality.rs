@@ -1,6 +1,6 @@
 //! Constraints between joints or bodies that a file asks for: couplings, welds, pins.
 
-use mjcf_rs::Equality as Element;
+use mjcf_rs::equality::Equality as Element;
 use rapier3d::glamx::{DPose3, DVec3};
 
 use super::Document;
