@@ -4,7 +4,7 @@ use mjcf_rs::body::GeomType;
 use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::prelude::SharedShape;
 
-use super::{Document, pose, vector};
+use super::{ContactKind, Document, Friction, Surface, pose, vector};
 use crate::SimError;
 
 /// Shape in its own frame; axial shapes lie along z, as in MJCF.
@@ -28,9 +28,7 @@ pub struct Geom {
     pub material: Option<String>,
     /// The material's texture is MuJoCo's builtin checker.
     pub checkered: bool,
-    pub friction: f32,
-    /// Rolling resistance, 0 unless `condim` is 6.
-    pub rolling_friction_m: f32,
+    pub surface: Surface,
     pub density_kg_m3: f32,
     pub mass_kg: Option<f32>,
     pub collides: bool,
@@ -75,8 +73,7 @@ impl Geom {
             rgba: rgba.map(|c| c as f32),
             material: geom.material.clone(),
             checkered: material.is_some_and(|material| is_checkered(document, material)),
-            friction: geom.friction[0] as f32,
-            rolling_friction_m: if geom.condim == 6 { geom.friction[2] as f32 } else { 0.0 },
+            surface: surface(document, geom)?,
             density_kg_m3: geom.density.unwrap_or(DEFAULT_DENSITY_KG_M3) as f32,
             mass_kg: geom.mass.map(|m| m as f32),
             collides: geom.contype != 0 || geom.conaffinity != 0,
@@ -109,6 +106,13 @@ impl Geom {
         };
         Some((body_from_shape, shape))
     }
+}
+
+fn surface(document: &Document, geom: &mjcf_rs::body::Geom) -> Result<Surface, SimError> {
+    let contact = ContactKind::from_condim(geom.condim)
+        .ok_or_else(|| document.unsupported(format!("condim {}; use 1, 3, 4 or 6", geom.condim)))?;
+    let [slide, spin_m, roll_m] = geom.friction.map(|coefficient| coefficient as f32);
+    Ok(Surface { coefficients: Friction { slide, spin_m, roll_m }, contact, priority: geom.priority })
 }
 
 fn is_checkered(document: &Document, material: &mjcf_rs::assets::Material) -> bool {

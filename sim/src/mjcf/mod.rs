@@ -1,16 +1,30 @@
-//! Reads MJCF through `mjcf-rs` and adds what that parser leaves out: cameras, and geoms and sites as we use them.
+//! Reads MJCF through `mjcf-rs` and adds what that parser leaves out: cameras, and everything else as we use it.
 
+mod actuator;
 mod camera;
+mod equality;
 mod geometry;
+mod joint;
+mod mass;
 mod site;
+mod surface;
+mod tree;
+#[cfg(test)]
+mod tree_tests;
 
+pub use actuator::{Actuator, ActuatorKind};
 pub use camera::MjcfCamera;
+pub use equality::{Equality, EqualityKind};
 pub use geometry::{Geom, Primitive};
+pub use joint::{AxisJoint, LinkJoint};
+pub(crate) use mass::mass_properties;
 pub use site::Site;
+pub use surface::{ContactKind, Friction, Surface};
+pub use tree::{BodyLink, BodyTree, PlacedBody};
 
-use mjcf_rs::body::{InertiaSpec, Inertial};
-use rapier3d::math::{Matrix, Pose, Rotation, Vector};
-use rapier3d::prelude::MassProperties;
+use std::path::Path;
+
+use rapier3d::math::{Pose, Rotation, Vector};
 
 use crate::SimError;
 
@@ -24,7 +38,19 @@ pub struct Document {
 impl Document {
     /// Parses MJCF text; `file` is what error messages call it. Includes and mesh files are not followed.
     pub fn parse(file: &str, xml: &str) -> Result<Document, SimError> {
-        let model = mjcf_rs::Model::from_str(xml, ".")
+        Document::parse_in(file, xml, Path::new("."))
+    }
+
+    /// Reads a file. Other MJCF files that it includes are read from where they lie beside it, without their cameras.
+    pub fn read(path: &Path) -> Result<Document, SimError> {
+        let file = path.display().to_string();
+        let xml =
+            std::fs::read_to_string(path).map_err(|source| SimError::Read { path: file.clone(), source })?;
+        Document::parse_in(&file, &xml, path.parent().unwrap_or(Path::new(".")))
+    }
+
+    fn parse_in(file: &str, xml: &str, folder: &Path) -> Result<Document, SimError> {
+        let model = mjcf_rs::Model::from_str(xml, folder)
             .map_err(|source| SimError::Mjcf { file: file.into(), source })?;
         let cameras = camera::parse(file, xml)?;
         Ok(Document { file: file.into(), model, cameras })
@@ -56,16 +82,4 @@ pub(crate) fn pose(p: &mjcf_rs::Pose) -> Pose {
 
 pub(crate) fn vector([x, y, z]: [f64; 3]) -> Vector {
     Vector::new(x as f32, y as f32, z as f32)
-}
-
-/// Mass properties of an `<inertial>`, in the body's frame.
-pub(crate) fn mass_properties(inertial: &Inertial) -> MassProperties {
-    let inertia = match inertial.inertia {
-        InertiaSpec::Diagonal(d) => Matrix::from_diagonal(vector(d)),
-        InertiaSpec::Full([xx, yy, zz, xy, xz, yz]) => {
-            Matrix::from_cols(vector([xx, xy, xz]), vector([xy, yy, yz]), vector([xz, yz, zz]))
-        }
-    };
-    MassProperties::with_inertia_matrix(Vector::ZERO, inertial.mass as f32, inertia)
-        .transform_by(&pose(&inertial.pose))
 }

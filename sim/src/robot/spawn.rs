@@ -56,7 +56,7 @@ impl Robot {
                 let collider = ColliderBuilder::new(shape)
                     .position(body_from_shape)
                     .density(0.0)
-                    .friction(geom.friction)
+                    .friction(geom.surface.coefficients.slide)
                     .friction_combine_rule(CoefficientCombineRule::Max)
                     .active_hooks(ActiveHooks::FILTER_CONTACT_PAIRS)
                     .user_data(link_tag(index, link_index));

@@ -76,7 +76,7 @@ fn collider(geom: &Geom) -> Option<ColliderBuilder> {
     let builder = ColliderBuilder::new(shape)
         .position(body_from_shape)
         .density(0.0)
-        .friction(geom.friction)
+        .friction(geom.surface.coefficients.slide)
         .friction_combine_rule(CoefficientCombineRule::Max);
     Some(builder)
 }

@@ -20,7 +20,8 @@ impl Object {
 
 /// r m g / I of the geom with the largest rolling friction r.
 pub(super) fn rolling_rad_s2(model: &ObjectModel) -> f32 {
-    let rolling_m = model.geoms.iter().map(|geom| geom.rolling_friction_m).fold(0.0, f32::max);
+    let rolling_m =
+        model.geoms.iter().map(|geom| geom.surface.against(&geom.surface).roll_m).fold(0.0, f32::max);
     let inertia_kg_m2 = model.mass.principal_inertia().max_element();
     if inertia_kg_m2 == 0.0 { 0.0 } else { rolling_m * model.mass.mass() * GRAVITY_M_S2 / inertia_kg_m2 }
 }
