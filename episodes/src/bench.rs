@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use tandem_ik::bench::{Report, TargetSet, run};
 use tandem_ik::{IkError, Model};
 use tandem_sim::assets;
-pub use tandem_sim::bench::{CaseReport, Report as LocomotionReport};
+pub use tandem_sim::bench::{CaseReport, PhysicsCase, PhysicsReport, Report as LocomotionReport};
 use tandem_sim::{LocomotionChoice, bench};
 
 use crate::commands;
@@ -35,6 +35,11 @@ pub fn locomotion(
     done: impl FnMut(&CaseReport),
 ) -> Result<LocomotionReport, BenchError> {
     Ok(bench::run(&|| choice.controller(), filter, seeds, done)?)
+}
+
+/// Times physics steps of one to three robots; `done` hears of each case as it ends.
+pub fn physics(done: impl FnMut(&PhysicsCase)) -> Result<PhysicsReport, BenchError> {
+    Ok(bench::physics(done)?)
 }
 
 /// Solves the targets of a file, or 200 that are drawn from the robot's own joint ranges.

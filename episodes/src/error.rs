@@ -21,6 +21,8 @@ pub enum EpisodeError {
     Spec(#[from] SpecError),
     #[error("the world cannot be built: {0}")]
     Sim(#[from] tandem_sim::SimError),
+    #[error("the episode ends here: {0}")]
+    Diverged(#[from] tandem_sim::dynamics::Diverged),
     #[error("inverse kinematics cannot use the robot's file: {0}")]
     Ik(#[from] tandem_ik::IkError),
     #[error("a picture cannot be encoded: {0}")]

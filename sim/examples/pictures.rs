@@ -21,7 +21,7 @@ fn main() -> Result<(), SimError> {
     let started = Instant::now();
     let mut pairs: Vec<Duration> = (0..states)
         .map(|_| {
-            let step = world.control_step(&commands);
+            let step = world.control_step(&commands).expect("it stays finite");
             let before = busy(started);
             for robot in 0..2 {
                 let frame = renderer.render(&step, &cameras.egocentric(&step, robot));

@@ -1,6 +1,8 @@
-//! What can go wrong while a world is put together.
+//! What can go wrong with a world.
 
-/// Loading failed; the text names the file and what would work.
+use crate::dynamics::{Diverged, OtherWorld, TreeError};
+
+/// Loading failed, or a step; the text names the file or body and what would work.
 #[derive(Debug, thiserror::Error)]
 pub enum SimError {
     #[error("no {kind} `{name}`; have: {have}")]
@@ -27,6 +29,12 @@ pub enum SimError {
     NotRunnable { path: String, source: Box<dyn std::error::Error + Send + Sync> },
     #[error("`{path}` gives targets that are not numbers, or gains that are not positive")]
     PolicyOutput { path: String },
+    #[error("a mechanism cannot be built: {0}")]
+    Tree(#[from] TreeError),
+    #[error(transparent)]
+    Diverged(#[from] Diverged),
+    #[error("snapshot cannot be restored: {0}")]
+    OtherWorld(#[from] OtherWorld),
     #[error("snapshot cannot be read: {0}; it must come from this binary and this world")]
     Snapshot(#[from] postcard::Error),
 }

@@ -1,7 +1,7 @@
-//! Physics of the robots and their rooms: MJCF loading, Rapier world, balance control, cameras and renderers.
+//! Physics of the robots and their rooms: MJCF loading, dynamics, balance control, cameras and renderers.
 //!
-//! Rooms, each knowing only those before it: [`mjcf`], [`body`], [`locomotion`], [`robot`], [`world`], then [`render`] and
-//! [`bench`].
+//! Rooms, each knowing only those before it: [`dynamics`], [`mjcf`], [`body`], [`locomotion`], [`robot`], [`world`], then
+//! [`render`] and [`bench`].
 //!
 //! Units are SI, z is up, frames are right-handed, quaternions are written `wxyz`. One [`World`] is stepped by one
 //! thread; the same binary, specification and commands give the same [`World::state_hash`], bit for bit.
@@ -12,7 +12,9 @@ pub mod body;
 pub mod dynamics;
 mod error;
 pub mod locomotion;
+mod mechanism;
 pub mod mjcf;
+mod owner;
 pub mod render;
 pub mod robot;
 mod sides;

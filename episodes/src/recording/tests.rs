@@ -66,7 +66,7 @@ fn recorder(folder: &Path, world: &World) -> (Recorder, Scores) {
 }
 
 fn record_step(recorder: &mut Recorder, scores: &mut Scores, world: &mut World, commands: &[RobotCommand]) {
-    let step = world.control_step(commands);
+    let step = world.control_step(commands).unwrap();
     let budget = Budget {
         steps_left: 6000 - step.control_step as u32,
         wall_clock_left_s: Some(1800.0),

@@ -140,8 +140,12 @@ impl Session {
         let started = Instant::now();
         let commands: Vec<RobotCommand> =
             runs.iter_mut().zip(&mut self.motions).map(|(run, motion)| run.command(motion)).collect();
-        self.present = self.world.control_step(&commands);
+        let stepped = self.world.control_step(&commands);
         self.physics += started.elapsed();
+        if stepped.is_err() {
+            self.ended = Some(EndReason::Finished);
+        }
+        self.present = stepped?;
         let was_underway = self.scores.underway();
         let scored = self.scores.update(&self.present);
         let budget = self.budget();

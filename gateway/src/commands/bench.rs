@@ -1,6 +1,9 @@
 //! `tandem bench`: figures that anybody can repeat.
 
-use std::{path::PathBuf, process::ExitCode};
+use std::{
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
 use clap::Subcommand;
 
@@ -25,12 +28,35 @@ enum Part {
         #[arg(long)]
         json: bool,
     },
+    /// Physics: time of a step of 5 ms with one to three robots that stand, walk or hold a bottle.
+    Physics {
+        /// Write the cases to this file as JSON, too.
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+    },
 }
 
 /// Measures and prints.
 pub fn run(args: Args) -> Outcome {
-    let Part::Ik { targets, json } = args.part;
-    let report = tandem_episodes::bench::ik(targets.as_deref())?;
+    match args.part {
+        Part::Ik { targets, json } => ik(targets.as_deref(), json),
+        Part::Physics { json } => physics(json.as_deref()),
+    }
+}
+
+fn physics(json: Option<&Path>) -> Outcome {
+    println!("{:14}{:>7}{:>10}{:>11}", "case", "robots", "us/step", "real time");
+    let report = tandem_episodes::bench::physics(|case| {
+        println!("{:14}{:>7}{:>10.1}{:>10.1}x", case.name, case.robots, case.step_us_median, case.realtime_factor);
+    })?;
+    if let Some(path) = json {
+        std::fs::write(path, serde_json::to_string_pretty(&report)? + "\n")?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn ik(targets: Option<&Path>, json: bool) -> Outcome {
+    let report = tandem_episodes::bench::ik(targets)?;
     if json {
         println!("{}", serde_json::to_string_pretty(&report)?);
         return Ok(ExitCode::SUCCESS);

@@ -186,6 +186,7 @@ fn episode_kind(error: &EpisodeError) -> Kind {
         EpisodeError::Checkpoint(_) => {
             ("checkpoint", "Checkpoint does not fit", StatusCode::UNPROCESSABLE_ENTITY)
         }
+        EpisodeError::Diverged(_) => ("diverged", "Physics diverged", StatusCode::CONFLICT),
         EpisodeError::Sim(_)
         | EpisodeError::Ik(_)
         | EpisodeError::Picture(_)

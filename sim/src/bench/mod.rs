@@ -1,8 +1,10 @@
-//! What a base controller can do: standing, loads, walking, stopping, squatting, pushes and a tour, several seeds each.
+//! What a base controller can do: standing, loads, walking, stopping, squatting, pushes and a tour, several seeds each. And
+//! how long a step of physics takes.
 
 mod cases;
 mod measure;
 mod motion;
+mod physics;
 mod tour;
 mod trial;
 
@@ -13,6 +15,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use serde::Serialize;
 
 pub use cases::{CASES, Case};
+pub use physics::{PhysicsCase, PhysicsReport, physics};
 
 use crate::SimError;
 use crate::locomotion::Locomotion;

@@ -47,7 +47,7 @@ pub(super) fn run(case: &Case, seed: u64, locomotion: Box<dyn Locomotion>) -> Re
         let upper_rad = arms.at(&rest.upper_rad, time_s);
         work_j += power_w(&state) * DT_S;
         log.push(Sample { pelvis_m: state.world_from_pelvis.translation, heading_rad, command: base });
-        state = world.control_step(&[RobotCommand { upper_rad, base }]).robots.remove(0).state;
+        state = world.control_step(&[RobotCommand { upper_rad, base }])?.robots.remove(0).state;
     }
     trial.power_w = work_j / (log.len() as f32 * DT_S);
     if !trial.fell {

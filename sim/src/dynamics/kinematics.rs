@@ -98,6 +98,11 @@ impl Tree {
         self.velocity[link].at(self.position_m[link])
     }
 
+    /// Of a point that is fixed to a link and now here in the world.
+    pub fn point_velocity_m_s(&self, link: usize, point_m: DVec3) -> DVec3 {
+        self.velocity[link].at(point_m - self.reference_m)
+    }
+
     pub fn link_spin_rad_s(&self, link: usize) -> DVec3 {
         self.velocity[link].angular
     }

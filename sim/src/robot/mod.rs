@@ -1,4 +1,4 @@
-//! One robot in a physics world: put there, sensed, driven.
+//! One robot in a world: put there, sensed, driven.
 
 mod arm;
 mod feeling;
@@ -12,22 +12,19 @@ mod state;
 use std::sync::Arc;
 
 use rapier3d::math::Vector;
-use rapier3d::prelude::{ColliderHandle, PhysicsWorld, RigidBodyHandle};
 use serde::{Deserialize, Serialize};
 
 pub use spawn::RobotPlacement;
 pub use state::RobotState;
 
-pub(crate) use spawn::robot_and_link;
-
 use crate::body::{
     Drive, JOINTS, LEG_JOINTS, LEGS, RobotModel, UPPER, UPPER_JOINTS, WAIST, WAIST_COLUMN, WAIST_JOINTS,
     WholeBody,
 };
+use crate::dynamics::{Dynamics, TreeId};
 use crate::locomotion::{BaseCommand, BaseLimits, LegCommand, Locomotion};
 use crate::{CONTROL_DT_S, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError};
 use feeling::Feeling;
-use joints::Joints;
 
 /// What one robot is told for one control step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -37,23 +34,21 @@ pub struct RobotCommand {
     pub base: BaseCommand,
 }
 
-/// A robot that exists in a physics world.
+/// A robot that exists in a world.
 pub struct Robot {
     pub name: String,
     pub model: Arc<RobotModel>,
-    pub(crate) bodies: Vec<RigidBodyHandle>,
-    joints: Joints,
-    pub(crate) colliders: Vec<(ColliderHandle, usize)>,
+    /// Its links are the model's.
+    pub(crate) tree: TreeId,
     locomotion: Box<dyn Locomotion>,
     memory: Memory,
 }
 
-/// Everything of a robot that lives outside Rapier and outlasts a step.
+/// Everything of a robot that lives outside dynamics and outlasts a step.
 #[derive(Clone, Serialize, Deserialize)]
 struct Memory {
     /// Upper-body targets at the last control step; within a step they move linearly to the new command.
     last_upper_rad: Vec<f32>,
-    torque_n_m: Vec<f32>,
     feeling: Feeling,
     base: BaseCommand,
     fallen: bool,
@@ -73,25 +68,27 @@ impl Robot {
     }
 
     /// Sets this robot's joint drives for one physics step, `substep` counting from 0 within the control step.
-    pub(crate) fn drive(&mut self, physics: &mut PhysicsWorld, command: &RobotCommand, substep: u32) {
+    pub(crate) fn drive(&mut self, dynamics: &mut Dynamics, command: &RobotCommand, substep: u32) {
         // What is sensed borrows from this model, so that the robot may change meanwhile.
         let model = Arc::clone(&self.model);
-        let body = self.sense(&model, physics);
-        let load_n_m = self.feel(&body);
+        let tree = dynamics.tree_mut(self.tree);
+        let body = self.sense(&model, tree);
+        let load_n_m = self.feel(&body, &joints::torques_n_m(tree, &model));
         let legs = self.locomotion.tick(&body, &command.base, PHYSICS_DT_S);
         let mut drives = [Drive::default(); JOINTS];
         self.set_upper_body(&mut drives, &load_n_m, command, substep);
         set_legs(&mut drives, &legs);
-        self.memory.torque_n_m.copy_from_slice(&self.joints.apply(physics, &body, &drives));
+        joints::drive(tree, &model, &drives);
         self.remember(command, substep);
     }
 
     /// Torques of the upper body's joints against gravity and what the hands carry, as far as it is known by now.
-    fn feel(&mut self, body: &WholeBody) -> [f32; JOINTS] {
+    /// `torque_n_m` are the drives' torques of the last step.
+    fn feel(&mut self, body: &WholeBody, torque_n_m: &[f32; JOINTS]) -> [f32; JOINTS] {
         let pelvis = body.world_from_pelvis();
         let upright = (pelvis.rotation * Vector::Z).z;
         self.memory.fallen |= pelvis.translation.z < FALLEN_HEIGHT_M || upright < FALLEN_TILT_COSINE;
-        self.memory.feeling.update(body, &self.memory.torque_n_m, PHYSICS_DT_S)
+        self.memory.feeling.update(body, torque_n_m, PHYSICS_DT_S)
     }
 
     /// The upper body goes linearly from the last command to this one. A controller that balances with the waist adds to
@@ -132,7 +129,7 @@ impl Robot {
         std::array::from_fn(|i| self.memory.last_upper_rad[WAIST_COLUMN + i])
     }
 
-    /// Bytes of everything outside Rapier.
+    /// Bytes of everything outside dynamics.
     pub(crate) fn save(&self) -> Result<Vec<u8>, SimError> {
         Ok(postcard::to_stdvec(&(&self.memory, self.locomotion.save()?))?)
     }

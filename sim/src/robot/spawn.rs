@@ -1,16 +1,18 @@
-//! Puts a robot model into a physics world as one multibody.
+//! Puts a robot model into a world as one tree.
 
 use std::sync::Arc;
 
 use rapier3d::math::{Pose, Rotation, Vector};
-use rapier3d::prelude::*;
+use rapier3d::prelude::PhysicsWorld;
 
 use super::feeling::Feeling;
-use super::joints::Joints;
 use super::{Memory, Robot};
 use crate::SimError;
-use crate::body::{JOINTS, RobotModel, UPPER, check_joint_order};
+use crate::body::{self, RobotModel, UPPER, check_joint_order};
+use crate::dynamics::{Axis, DVec3, Dynamics, Joint, Link, Mass, Tree};
 use crate::locomotion::{Balance, BaseCommand};
+use crate::mechanism::{add_collider, precise};
+use crate::owner::Owner;
 
 /// A robot stands on the floor here, facing `yaw_rad` (0 looks along +x).
 #[derive(Clone, Debug)]
@@ -20,20 +22,10 @@ pub struct RobotPlacement {
     pub yaw_rad: f32,
 }
 
-/// Collider tag of a robot's link: robot and link, both counted from 1, so that 0 is anything else.
-fn link_tag(robot: usize, link: usize) -> u128 {
-    ((robot as u128 + 1) << 32) | (link as u128 + 1)
-}
-
-/// Robot and link of a collider's tag.
-pub(crate) fn robot_and_link(tag: u128) -> Option<(usize, usize)> {
-    let (robot, link) = ((tag >> 32) as usize, (tag & 0xffff_ffff) as usize);
-    (robot > 0 && link > 0).then(|| (robot - 1, link - 1))
-}
-
 impl Robot {
     /// Inserts a robot standing on the floor (z = 0) in its rest pose. `index` tells robots of one world apart.
     pub(crate) fn spawn(
+        dynamics: &mut Dynamics,
         physics: &mut PhysicsWorld,
         model: &Arc<RobotModel>,
         placement: &RobotPlacement,
@@ -41,40 +33,29 @@ impl Robot {
     ) -> Result<Robot, SimError> {
         check_joint_order(&placement.name, model)?;
         let q_rad = model.rest_rad();
-        let world_from_link = model.forward_kinematics(standing_pelvis(model, placement, &q_rad), &q_rad);
-        let mut bodies = Vec::with_capacity(model.links.len());
-        let mut colliders = Vec::new();
-        for (link_index, (link, pose)) in model.links.iter().zip(&world_from_link).enumerate() {
-            let body = physics.insert_body(
-                RigidBodyBuilder::dynamic()
-                    .pose(*pose)
-                    .additional_mass_properties(link.mass)
-                    .can_sleep(false),
-            );
-            for geom in link.geoms.iter().filter(|geom| geom.collides) {
-                let Some((body_from_shape, shape)) = geom.collider() else { continue };
-                let collider = ColliderBuilder::new(shape)
-                    .position(body_from_shape)
-                    .density(0.0)
-                    .friction(geom.surface.coefficients.slide)
-                    .friction_combine_rule(CoefficientCombineRule::Max)
-                    .active_hooks(ActiveHooks::FILTER_CONTACT_PAIRS)
-                    .user_data(link_tag(index, link_index));
-                colliders.push((physics.insert_collider(collider, Some(body)), link_index));
-            }
-            bodies.push(body);
+        let pelvis = standing_pelvis(model, placement, &q_rad);
+        let links = model.links.iter().map(|link| tree_link(model, link)).collect();
+        let mut tree = Tree::new(&placement.name, links)?;
+        tree.set_base(precise(&pelvis), DVec3::ZERO, DVec3::ZERO);
+        for (joint, q_rad) in model.joints.iter().zip(&q_rad) {
+            tree.set_joint(joint.link, f64::from(*q_rad), 0.0);
         }
-        let joints = connect(physics, model, &bodies, &q_rad);
+        let tree = dynamics.add_tree(tree, physics);
+        for (link, geoms) in model.links.iter().map(|link| &link.geoms).enumerate() {
+            let owner = Owner::Link { robot: index, link };
+            for geom in geoms {
+                add_collider(dynamics, physics, geom, Some(tree.link(link)), Some(owner));
+            }
+        }
         let memory = Memory {
             last_upper_rad: UPPER.iter().map(|joint| q_rad[*joint]).collect(),
-            torque_n_m: vec![0.0; JOINTS],
             feeling: Feeling::default(),
-            base: BaseCommand::standing(world_from_link[0].translation.z),
+            base: BaseCommand::standing(pelvis.translation.z),
             fallen: false,
         };
         let name = placement.name.clone();
         let locomotion = Box::new(Balance::default());
-        Ok(Robot { name, model: model.clone(), bodies, joints, colliders, locomotion, memory })
+        Ok(Robot { name, model: model.clone(), tree, locomotion, memory })
     }
 }
 
@@ -95,35 +76,23 @@ fn standing_pelvis(model: &RobotModel, placement: &RobotPlacement, q_rad: &[f32]
     at(-lowest_m)
 }
 
-/// Joins the links; joints start at coordinate 0 whatever the body poses, so they are moved to `q_rad` afterwards.
-fn connect(
-    physics: &mut PhysicsWorld,
-    model: &RobotModel,
-    bodies: &[RigidBodyHandle],
-    q_rad: &[f32],
-) -> Joints {
-    let mut handles = vec![None; model.joints.len()];
-    for (index, link) in model.links.iter().enumerate() {
-        let (Some(parent), Some(joint)) = (link.parent, link.joint) else { continue };
-        let joint_model = &model.joints[joint];
-        // Rapier's hinges turn about x.
-        let axis_from_x = Pose::from_rotation(Rotation::from_rotation_arc(Vector::X, joint_model.axis));
-        let hinge = GenericJointBuilder::new(JointAxesMask::LOCKED_REVOLUTE_AXES)
-            .local_frame1(link.parent_from_link * axis_from_x)
-            .local_frame2(axis_from_x)
-            .limits(JointAxis::AngX, [joint_model.lower_rad, joint_model.upper_rad])
-            .contacts_enabled(false);
-        handles[joint] = physics.insert_multibody_joint(bodies[parent], bodies[index], hinge.build());
+/// A link of the model with the joint that carries it; the first is free.
+fn tree_link(model: &RobotModel, link: &body::Link) -> Link {
+    let joint = link.joint.map_or(Joint::Free, |joint| {
+        let joint = &model.joints[joint];
+        Joint::Hinge(Axis {
+            armature: f64::from(joint.armature_kg_m2),
+            friction_loss: f64::from(joint.friction_n_m),
+            range: Some([f64::from(joint.lower_rad), f64::from(joint.upper_rad)]),
+            effort_limit: f64::from(joint.effort_n_m),
+            ..Axis::along(joint.axis.as_dvec3())
+        })
+    });
+    Link {
+        name: link.name.clone(),
+        parent: link.parent,
+        parent_from_link: precise(&link.parent_from_link),
+        joint,
+        mass: Mass::from_rapier(&link.mass),
     }
-    let handles: Vec<MultibodyJointHandle> = handles.into_iter().flatten().collect();
-    let mut joints = Joints { any: handles[0], slots: Vec::with_capacity(handles.len()) };
-    for handle in &handles {
-        if let Some((multibody, link)) = physics.multibody_joints.get(*handle) {
-            joints.slots.push((link, multibody.link(link).map_or(0, |link| link.assembly_id())));
-        }
-    }
-    if let Some((multibody, _)) = physics.multibody_joints.get_mut(joints.any) {
-        joints.prepare(multibody, model, q_rad);
-    }
-    joints
 }

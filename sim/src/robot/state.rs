@@ -1,13 +1,14 @@
 //! What a robot can measure of itself.
 
 use rapier3d::math::{Pose, Vector};
-use rapier3d::prelude::PhysicsWorld;
 use serde::{Deserialize, Serialize};
 
-use super::{Robot, RobotCommand, per_joint};
+use super::{Robot, RobotCommand, joints, per_joint};
 use crate::Sides;
 use crate::body::{JOINTS, RobotModel, UPPER, WholeBody};
+use crate::dynamics::{Dynamics, Tree};
 use crate::locomotion::BaseCommand;
+use crate::mechanism::rounded;
 
 /// What a robot can measure of itself; poses as named.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -33,30 +34,30 @@ pub struct RobotState {
 
 impl Robot {
     /// The robot as its controller may know it.
-    pub(crate) fn measure(&self, physics: &PhysicsWorld) -> WholeBody<'_> {
-        self.sense(&self.model, physics)
+    pub(crate) fn measure(&self, dynamics: &Dynamics) -> WholeBody<'_> {
+        self.sense(&self.model, dynamics.tree(self.tree))
     }
 
-    /// [`Robot::measure`], for a robot that changes while its model is looked at.
-    pub(super) fn sense<'a>(&self, model: &'a RobotModel, physics: &PhysicsWorld) -> WholeBody<'a> {
-        let (q_rad, qd_rad_s) = self.joints.read(physics);
+    /// [`Robot::measure`], for a robot that changes while its model is looked at. Masses are the model's, whatever was
+    /// loaded on a hand.
+    pub(super) fn sense<'a>(&self, model: &'a RobotModel, tree: &Tree) -> WholeBody<'a> {
+        let (q_rad, qd_rad_s) = joints::read(tree, model);
         let mut com_m = Vector::ZERO;
         let mut com_velocity_m_s = Vector::ZERO;
-        let mut world_from_link = Vec::with_capacity(self.bodies.len());
-        for (link, handle) in model.links.iter().zip(&self.bodies) {
-            let body = &physics.bodies[*handle];
-            let world = *body.position();
-            com_m += world * link.mass.local_com * link.mass.mass();
-            com_velocity_m_s += body.linvel() * link.mass.mass();
-            world_from_link.push(world);
+        let mut world_from_link = Vec::with_capacity(model.links.len());
+        for (index, link) in model.links.iter().enumerate() {
+            let world = tree.world_from_link(index);
+            let centre_m = world * link.mass.local_com.as_dvec3();
+            com_m += centre_m.as_vec3() * link.mass.mass();
+            com_velocity_m_s += tree.point_velocity_m_s(index, centre_m).as_vec3() * link.mass.mass();
+            world_from_link.push(rounded(&world));
         }
-        let pelvis = &physics.bodies[self.bodies[0]];
         WholeBody {
             model,
             q_rad,
             qd_rad_s,
-            pelvis_velocity_m_s: pelvis.velocity_at_point(world_from_link[0].translation),
-            pelvis_angular_velocity_rad_s: pelvis.angvel(),
+            pelvis_velocity_m_s: tree.link_velocity_m_s(0).as_vec3(),
+            pelvis_angular_velocity_rad_s: tree.link_spin_rad_s(0).as_vec3(),
             world_from_link,
             com_m: com_m / model.mass_kg,
             com_velocity_m_s: com_velocity_m_s / model.mass_kg,
@@ -66,13 +67,13 @@ impl Robot {
     }
 
     /// What the robot reports when it is measured as `body`.
-    pub(crate) fn state(&self, body: &WholeBody) -> RobotState {
+    pub(crate) fn state(&self, body: &WholeBody, dynamics: &Dynamics) -> RobotState {
         let model = body.model;
         let pelvis_from_world = body.world_from_pelvis().inverse();
         RobotState {
             q_rad: body.q_rad,
             qd_rad_s: body.qd_rad_s,
-            torque_n_m: std::array::from_fn(|joint| self.memory.torque_n_m[joint]),
+            torque_n_m: joints::torques_n_m(dynamics.tree(self.tree), model),
             world_from_pelvis: body.world_from_pelvis(),
             pelvis_from_wrist: model
                 .wrists
@@ -94,10 +95,10 @@ impl Robot {
     }
 
     /// The command under which the robot stays as it is.
-    pub(crate) fn rest_command(&self, physics: &PhysicsWorld) -> RobotCommand {
-        let (q_rad, _) = self.joints.read(physics);
-        let pelvis_height_m = physics.bodies[self.bodies[0]].translation().z;
-        let base = BaseCommand::standing(pelvis_height_m);
+    pub(crate) fn rest_command(&self, dynamics: &Dynamics) -> RobotCommand {
+        let tree = dynamics.tree(self.tree);
+        let (q_rad, _) = joints::read(tree, &self.model);
+        let base = BaseCommand::standing(tree.world_from_link(0).translation.z as f32);
         RobotCommand { upper_rad: UPPER.map(|joint| q_rad[joint]), base: self.base_limits().clamp(base) }
     }
 }
@@ -106,9 +107,12 @@ impl Robot {
 mod tests {
     use std::sync::Arc;
 
+    use rapier3d::prelude::PhysicsWorld;
+
     use super::*;
     use crate::PHYSICS_DT_S;
     use crate::body::posed::{Posed, model};
+    use crate::dynamics::{DVec3, Settings};
     use crate::robot::RobotPlacement;
 
     /// What is sensed in the physics world is what the model's kinematics make of joints and pelvis: here of a robot in the
@@ -116,16 +120,17 @@ mod tests {
     #[test]
     fn sensed_poses_and_velocities_are_those_of_the_model() {
         let mut physics = PhysicsWorld::new();
-        physics.integration_parameters.dt = PHYSICS_DT_S;
+        let mut dynamics = Dynamics::new(Settings::new(f64::from(PHYSICS_DT_S), DVec3::Z * -9.81));
         let placement = RobotPlacement { name: "A".into(), position_m: [0.3, -0.2], yaw_rad: 0.8 };
-        let mut robot = Robot::spawn(&mut physics, &Arc::new(model().clone()), &placement, 0).unwrap();
-        let mut command = robot.rest_command(&physics);
+        let model = Arc::new(model().clone());
+        let mut robot = Robot::spawn(&mut dynamics, &mut physics, &model, &placement, 0).unwrap();
+        let mut command = robot.rest_command(&dynamics);
         command.upper_rad[0] -= 0.1;
         for substep in 0..4 {
-            robot.drive(&mut physics, &command, substep);
-            physics.step();
+            robot.drive(&mut dynamics, &command, substep);
+            dynamics.step(&mut physics, &()).unwrap();
         }
-        let sensed = robot.measure(&physics);
+        let sensed = robot.measure(&dynamics);
         let body = Posed {
             world_from_pelvis: sensed.world_from_pelvis(),
             pelvis_velocity_m_s: sensed.pelvis_velocity_m_s,

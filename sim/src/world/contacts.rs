@@ -1,14 +1,15 @@
 //! Which colliders may touch, and what a hand feels of an object.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use rapier3d::math::Vector;
-use rapier3d::prelude::*;
+use rapier3d::prelude::{ColliderHandle, PairFilterContext, PhysicsHooks, SolverFlags};
 
 use super::World;
 use super::step::{HandContacts, Touch};
 use crate::body::{HandLinks, RobotModel};
-use crate::robot::robot_and_link;
+use crate::owner::Owner;
 use crate::{PHYSICS_DT_S, Side, Sides};
 
 /// Leaves out the contacts inside a robot that its file excludes.
@@ -24,10 +25,11 @@ impl SelfCollision {
 
 impl PhysicsHooks for SelfCollision {
     fn filter_contact_pair(&self, pair: &PairFilterContext) -> Option<SolverFlags> {
-        let tag = |handle: ColliderHandle| robot_and_link(pair.colliders[handle].user_data);
-        let apart = match (tag(pair.collider1), tag(pair.collider2)) {
-            (Some((robot_1, link_1)), Some((robot_2, link_2))) if robot_1 == robot_2 => {
-                !self.model.may_touch(link_1, link_2)
+        let [first, second] = [pair.collider1, pair.collider2]
+            .map(|handle| Owner::of_tag(pair.colliders[handle].user_data));
+        let apart = match (first, second) {
+            (Some(Owner::Link { robot: a, link: link_a }), Some(Owner::Link { robot: b, link: link_b })) => {
+                a == b && !self.model.may_touch(link_a, link_b)
             }
             _ => false,
         };
@@ -49,57 +51,47 @@ impl HandContacts {
 }
 
 impl World {
-    /// All hands that touch an object.
+    /// All hands that touch an object, in the order of the objects.
     pub(super) fn touches(&self) -> Vec<Touch> {
-        let mut touches = Vec::new();
-        for (object, colliders) in self.objects.iter().map(|object| &object.colliders).enumerate() {
-            let mut hands = vec![Sides::<HandContacts>::default(); self.robots.len()];
-            for (robot, link, force_n) in colliders.iter().flat_map(|collider| self.link_forces(*collider)) {
-                for side in Side::BOTH {
-                    hands[robot][side].add(&self.robots[robot].model.hands[side], link, force_n);
-                }
-            }
-            for (robot, hands) in hands.into_iter().enumerate() {
-                for (side, contacts) in Side::BOTH.into_iter().zip(hands) {
-                    if contacts != HandContacts::default() {
-                        touches.push(Touch { robot, side, object, contacts });
-                    }
-                }
+        let mut found: BTreeMap<(usize, usize), Sides<HandContacts>> = BTreeMap::new();
+        for (owners, force_n) in self.presses() {
+            let (object, robot, link, force_n) = match owners {
+                [Some(Owner::Link { robot, link }), Some(Owner::Object(object))] => (object, robot, link, force_n),
+                [Some(Owner::Object(object)), Some(Owner::Link { robot, link })] => (object, robot, link, -force_n),
+                _ => continue,
+            };
+            let hands = found.entry((object, robot)).or_default();
+            for side in Side::BOTH {
+                hands[side].add(&self.robots[robot].model.hands[side], link, force_n);
             }
         }
-        touches
+        let by_hand = found.into_iter().flat_map(|((object, robot), hands)| {
+            let touch = move |(side, contacts)| Touch { robot, side, object, contacts };
+            Side::BOTH.into_iter().zip(hands).map(touch)
+        });
+        by_hand.filter(|touch| touch.contacts != HandContacts::default()).collect()
     }
 
-    /// Links of robots that press on a collider: robot, link, and the normal force on the collider (N, world).
-    fn link_forces(&self, collider: ColliderHandle) -> impl Iterator<Item = (usize, usize, Vector)> {
-        self.physics.narrow_phase.contact_pairs_with(collider).filter_map(move |pair| {
-            let first = pair.collider1 == collider;
-            let other = if first { pair.collider2 } else { pair.collider1 };
-            let (robot, link) = robot_and_link(self.physics.colliders[other].user_data)?;
-            let sign = if first { -1.0 } else { 1.0 };
-            Some((robot, link, pair.total_impulse() * (sign / PHYSICS_DT_S)))
+    /// Points that pressed in the last step: whose colliders they are between, and the normal force on the second (N, world).
+    fn presses(&self) -> impl Iterator<Item = ([Option<Owner>; 2], Vector)> {
+        let owner = |handle: ColliderHandle| Owner::of_tag(self.physics.colliders[handle].user_data);
+        self.dynamics.touches().iter().filter(|touch| touch.normal_impulse_n_s > 0.0).map(move |touch| {
+            let force_n = touch.normal * (touch.normal_impulse_n_s / f64::from(PHYSICS_DT_S));
+            (touch.colliders.map(owner), force_n.as_vec3())
         })
     }
 
     /// Pairs of a robot's own links that press on each other, with the force (N): empty in a clean pose.
     pub fn self_contacts(&self, robot: usize) -> Vec<(String, String, f32)> {
-        let links = &self.robots[robot].model.links;
-        let mut pairs = Vec::new();
-        for (collider, link) in &self.robots[robot].colliders {
-            for pair in self.physics.narrow_phase.contact_pairs_with(*collider) {
-                if pair.collider1 != *collider {
-                    continue;
-                }
-                let Some((owner, other)) = robot_and_link(self.physics.colliders[pair.collider2].user_data)
-                else {
-                    continue;
-                };
-                let force_n = pair.total_impulse_magnitude() / PHYSICS_DT_S;
-                if owner == robot && force_n > 0.0 {
-                    pairs.push((links[*link].name.clone(), links[other].name.clone(), force_n));
-                }
+        let mut forces_n: BTreeMap<(usize, usize), f32> = BTreeMap::new();
+        for (owners, force_n) in self.presses() {
+            if let [Some(Owner::Link { robot: a, link: first }), Some(Owner::Link { robot: b, link: second })] = owners
+                && (a, b) == (robot, robot)
+            {
+                *forces_n.entry((first.min(second), first.max(second))).or_default() += force_n.length();
             }
         }
-        pairs
+        let name = |link: usize| self.robots[robot].model.links[link].name.clone();
+        forces_n.into_iter().map(|((a, b), force_n)| (name(a), name(b), force_n)).collect()
     }
 }

@@ -1,12 +1,31 @@
-//! Loads that no command can make: pushes at a link, weights fused to a hand. For benches and tests of controllers; no
+//! What no command can make: pushes at a link, weights fused to a hand, objects put elsewhere. For benches and tests of controllers; no
 //! tool reaches them.
 
-use rapier3d::math::Vector;
+use rapier3d::math::{Pose, Vector};
 use rapier3d::prelude::{AngVector, MassProperties};
 
 use super::World;
 use crate::Side;
+use crate::dynamics::{DVec3, Dynamics, LinkId, Mass};
 use crate::locomotion::Locomotion;
+use crate::mechanism::precise;
+
+/// A force for one control step.
+pub(super) struct Push {
+    link: LinkId,
+    point_in_link_m: Vector,
+    /// World frame.
+    force_n: Vector,
+}
+
+impl Push {
+    /// For one physics step.
+    pub fn apply(&self, dynamics: &mut Dynamics) {
+        let tree = dynamics.tree_mut(self.link.tree);
+        let point_m = tree.world_from_link(self.link.link) * self.point_in_link_m.as_dvec3();
+        tree.push(self.link.link, point_m, self.force_n.as_dvec3());
+    }
+}
 
 impl World {
     /// Sets the force (N, world) that pulls at a point (link frame) of a robot's link during the next control step, in
@@ -15,10 +34,7 @@ impl World {
         let robot = &self.robots[robot];
         let found = robot.model.links.iter().position(|candidate| candidate.name == link);
         let link = found.unwrap_or_else(|| panic!("no link `{link}` in the robot's file"));
-        let body = &mut self.physics.bodies[robot.bodies[link]];
-        let point_m = *body.position() * point_in_link_m;
-        body.add_force_at_point(force_n, point_m, true);
-        self.pushed = true;
+        self.pushes.push(Push { link: robot.tree.link(link), point_in_link_m, force_n });
     }
 
     /// Fuses a point mass to a palm: the controller is not told.
@@ -27,21 +43,20 @@ impl World {
         let wrist = robot.model.hands[side].wrist;
         let load = MassProperties::new(point_in_wrist_m, mass_kg, AngVector::splat(1e-4 * mass_kg));
         let whole = robot.model.links[wrist].mass + load;
-        self.physics.bodies[robot.bodies[wrist]].set_additional_mass_properties(whole, true);
+        self.dynamics.tree_mut(robot.tree).set_mass(wrist, Mass::from_rapier(&whole));
+    }
+
+    /// Puts a free object somewhere, at rest. An unknown one is a bug of the caller.
+    pub(crate) fn put_object(&mut self, name: &str, world_from_object: Pose) {
+        let object = self.objects.iter().find(|object| object.name == name);
+        let link = object.and_then(|object| object.link).unwrap_or_else(|| panic!("no free object `{name}`"));
+        let tree = self.dynamics.tree_mut(link.tree);
+        tree.set_base(precise(&world_from_object), DVec3::ZERO, DVec3::ZERO);
+        self.dynamics.place_bodies(&mut self.physics);
     }
 
     /// Gives a robot another base controller, which starts from how the robot stands now.
     pub fn set_locomotion(&mut self, robot: usize, locomotion: Box<dyn Locomotion>) {
         self.robots[robot].set_locomotion(locomotion);
-    }
-
-    /// Pushes last one control step.
-    pub(super) fn end_pushes(&mut self) {
-        if std::mem::take(&mut self.pushed) {
-            for body in self.robots.iter().flat_map(|robot| &robot.bodies) {
-                self.physics.bodies[*body].reset_forces(true);
-                self.physics.bodies[*body].reset_torques(true);
-            }
-        }
     }
 }

@@ -8,18 +8,19 @@ mod step;
 
 use std::sync::Arc;
 
-use rapier3d::math::Vector;
-use rapier3d::prelude::*;
+use rapier3d::prelude::PhysicsWorld;
 
 pub use objects::{ObjectModel, ObjectPlacement, ObjectState};
 pub use snapshot::Snapshot;
 pub use step::{HandContacts, ObjectStep, RobotStep, Step, Touch};
 
 use crate::body::RobotModel;
+use crate::dynamics::{DVec3, Diverged, Dynamics, Settings};
 use crate::mjcf::{Document, MjcfCamera};
 use crate::robot::{Robot, RobotCommand, RobotPlacement};
 use crate::{GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError, assets};
 use contacts::SelfCollision;
+use disturb::Push;
 use objects::Object;
 
 /// Everything a world is made of.
@@ -33,7 +34,9 @@ pub struct WorldSpec {
 
 /// A simulated room. One thread owns it.
 pub struct World {
-    pub(crate) physics: PhysicsWorld,
+    /// Collision detection; its bodies are where [`World::dynamics`] puts them.
+    physics: PhysicsWorld,
+    dynamics: Dynamics,
     hooks: SelfCollision,
     robots: Vec<Robot>,
     objects: Vec<Object>,
@@ -41,8 +44,8 @@ pub struct World {
     fixed: Vec<crate::mjcf::Geom>,
     cameras: Vec<MjcfCamera>,
     control_steps: u64,
-    /// Forces of [`World::push`] are set.
-    pushed: bool,
+    /// For the next control step.
+    pushes: Vec<Push>,
 }
 
 impl World {
@@ -55,46 +58,55 @@ impl World {
     /// As [`World::new`], of robots of another file.
     pub fn with_robot(spec: &WorldSpec, model: Arc<RobotModel>) -> Result<World, SimError> {
         let scene = Document::parse(&spec.scene, assets::scene(&spec.scene)?)?;
-        let mut physics =
-            PhysicsWorld { gravity: Vector::new(0.0, 0.0, -GRAVITY_M_S2), ..PhysicsWorld::new() };
-        configure(&mut physics.integration_parameters);
-        let (fixed, mut objects) = objects::insert_scene(&mut physics, &scene)?;
+        let gravity_m_s2 = DVec3::new(0.0, 0.0, -f64::from(GRAVITY_M_S2));
+        let mut dynamics = Dynamics::new(Settings::new(f64::from(PHYSICS_DT_S), gravity_m_s2));
+        let mut physics = PhysicsWorld::new();
+        let (fixed, mut objects) = objects::insert_scene(&mut dynamics, &mut physics, &scene)?;
         for placement in &spec.objects {
-            objects.push(objects::insert_object(&mut physics, placement)?);
+            objects::insert_object(&mut dynamics, &mut physics, placement, &mut objects)?;
         }
         let mut robots = Vec::with_capacity(spec.robots.len());
         for (index, placement) in spec.robots.iter().enumerate() {
-            robots.push(Robot::spawn(&mut physics, &model, placement, index)?);
+            robots.push(Robot::spawn(&mut dynamics, &mut physics, &model, placement, index)?);
         }
         let hooks = SelfCollision::new(model);
         Ok(World {
             physics,
+            dynamics,
             hooks,
             robots,
             objects,
             fixed,
             cameras: scene.cameras,
-            pushed: false,
+            pushes: Vec::new(),
             control_steps: 0,
         })
     }
 
     /// Advances by one control step, and says what it left behind. One command per robot, in the order of
-    /// [`World::robots`].
-    pub fn control_step(&mut self, commands: &[RobotCommand]) -> Step {
+    /// [`World::robots`]. After an error the world stands where its last physics step left it, and cannot go on.
+    pub fn control_step(&mut self, commands: &[RobotCommand]) -> Result<Step, Diverged> {
         assert_eq!(commands.len(), self.robots.len(), "one command per robot");
         for substep in 0..PHYSICS_STEPS_PER_CONTROL {
-            for (robot, command) in self.robots.iter_mut().zip(commands) {
-                robot.drive(&mut self.physics, command, substep);
-            }
-            for object in &self.objects {
-                object.resist_rolling(&mut self.physics);
-            }
-            self.physics.step_with_events(&self.hooks, &());
+            self.drive(commands, substep);
+            self.advance()?;
         }
-        self.end_pushes();
+        self.pushes.clear();
         self.control_steps += 1;
-        self.present()
+        Ok(self.present())
+    }
+
+    /// Sets what acts on the robots in the next physics step.
+    pub(crate) fn drive(&mut self, commands: &[RobotCommand], substep: u32) {
+        for (robot, command) in self.robots.iter_mut().zip(commands) {
+            robot.drive(&mut self.dynamics, command, substep);
+        }
+        self.pushes.iter().for_each(|push| push.apply(&mut self.dynamics));
+    }
+
+    /// One physics step.
+    pub(crate) fn advance(&mut self) -> Result<(), Diverged> {
+        self.dynamics.step(&mut self.physics, &self.hooks)
     }
 
     pub fn robots(&self) -> &[Robot] {
@@ -103,7 +115,7 @@ impl World {
 
     /// The command under which a robot stays as it was put into the world.
     pub fn rest_command(&self, robot: usize) -> RobotCommand {
-        self.robots[robot].rest_command(&self.physics)
+        self.robots[robot].rest_command(&self.dynamics)
     }
 
     /// Geoms of the scene that do not move, world frame.
@@ -120,18 +132,4 @@ impl World {
     pub fn object_models(&self) -> impl Iterator<Item = (&str, &ObjectModel)> {
         self.objects.iter().map(|object| (object.name.as_str(), &object.model))
     }
-}
-
-/// Settings measured for grasping and standing; see README's notes on physics.
-fn configure(parameters: &mut IntegrationParameters) {
-    parameters.dt = PHYSICS_DT_S;
-    parameters.num_solver_iterations = 1;
-    parameters.num_internal_pgs_iterations = 4;
-    parameters.num_internal_stabilization_iterations = 1;
-    parameters.contact_softness = SpringCoefficients::new(60.0, 5.0);
-    parameters.static_contact_softness = SpringCoefficients::new(120.0, 5.0);
-    // Recycled contacts keep stale distances: a grasp slips 1.5 mm instead of 0.07 mm.
-    parameters.contact_recycling = false;
-    parameters.max_ccd_substeps = 0;
-    parameters.friction_model = FrictionModel::Coulomb;
 }

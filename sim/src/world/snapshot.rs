@@ -6,11 +6,14 @@ use xxhash_rust::xxh3::Xxh3;
 
 use super::World;
 use crate::SimError;
+use crate::dynamics::DynamicsState;
 
 /// A world at one instant. It fits only a world made from the same specification by the same binary.
 #[derive(Clone, Serialize, Deserialize)]
 pub struct Snapshot {
+    /// Collision detection goes on from what it found last.
     physics: Vec<u8>,
+    dynamics: DynamicsState,
     robots: Vec<Vec<u8>>,
     control_steps: u64,
 }
@@ -18,10 +21,10 @@ pub struct Snapshot {
 impl World {
     /// About half a megabyte for two robots.
     pub fn snapshot(&self) -> Result<Snapshot, SimError> {
-        let robots = self.robots.iter().map(|robot| robot.save()).collect::<Result<_, _>>()?;
         Ok(Snapshot {
             physics: postcard::to_stdvec(&self.physics)?,
-            robots,
+            dynamics: self.dynamics.state(),
+            robots: self.save_robots()?,
             control_steps: self.control_steps,
         })
     }
@@ -29,35 +32,36 @@ impl World {
     /// Takes the world back to a snapshot. On an error the world is as it was.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), SimError> {
         let physics: PhysicsWorld = postcard::from_bytes(&snapshot.physics)?;
-        let before = self.snapshot()?;
-        for index in 0..self.robots.len() {
-            let bytes = snapshot.robots.get(index).map(Vec::as_slice).unwrap_or_default();
-            if let Err(error) = self.robots[index].load(bytes) {
-                for (robot, bytes) in self.robots.iter_mut().zip(&before.robots) {
-                    robot.load(bytes)?;
-                }
-                return Err(error);
-            }
+        let before = self.save_robots()?;
+        let loaded = self.load_robots(&snapshot.robots);
+        if let Err(error) = loaded.and_then(|()| Ok(self.dynamics.restore(&snapshot.dynamics)?)) {
+            self.load_robots(&before)?;
+            return Err(error);
         }
         self.physics = physics;
         self.control_steps = snapshot.control_steps;
         Ok(())
     }
 
-    /// Hash of everything that decides the future: poses and velocities of all bodies, controllers, step count.
+    fn save_robots(&self) -> Result<Vec<Vec<u8>>, SimError> {
+        self.robots.iter().map(|robot| robot.save()).collect()
+    }
+
+    fn load_robots(&mut self, saved: &[Vec<u8>]) -> Result<(), SimError> {
+        for (index, robot) in self.robots.iter_mut().enumerate() {
+            robot.load(saved.get(index).map(Vec::as_slice).unwrap_or_default())?;
+        }
+        Ok(())
+    }
+
+    /// Hash of everything that decides the future, in full precision: positions, velocities and impulses of dynamics,
+    /// controllers, step count.
     pub fn state_hash(&self) -> u64 {
         let mut hash = Xxh3::new();
         hash.update(&self.control_steps.to_le_bytes());
-        let mut floats =
-            |values: &[f32]| values.iter().for_each(|value| hash.update(&value.to_bits().to_le_bytes()));
-        for (_, body) in self.physics.bodies.iter() {
-            floats(&body.position().translation.to_array());
-            floats(&body.position().rotation.to_array());
-            floats(&body.linvel().to_array());
-            floats(&body.angvel().to_array());
-        }
+        // Serialising plain data to memory does not fail.
+        hash.update(&postcard::to_stdvec(&self.dynamics.state()).unwrap_or_default());
         for robot in &self.robots {
-            // Serialising plain data to memory does not fail.
             hash.update(&robot.save().unwrap_or_default());
         }
         hash.digest()

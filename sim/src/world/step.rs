@@ -78,7 +78,7 @@ impl World {
     /// The world as it stands: what the last [`World::control_step`] returned, also after a restore.
     pub fn present(&self) -> Step {
         let object =
-            |object: &Object| ObjectStep { name: object.name.clone(), state: object.state(&self.physics) };
+            |object: &Object| ObjectStep { name: object.name.clone(), state: object.state(&self.dynamics) };
         Step {
             control_step: self.control_steps,
             time_s: self.control_steps as f64 / CONTROL_HZ,
@@ -90,11 +90,11 @@ impl World {
 
     fn robot_step(&self, index: usize) -> RobotStep {
         let robot = &self.robots[index];
-        let body = robot.measure(&self.physics);
+        let body = robot.measure(&self.dynamics);
         let command = match self.control_steps {
-            0 => robot.rest_command(&self.physics),
+            0 => robot.rest_command(&self.dynamics),
             _ => robot.last_command(),
         };
-        RobotStep { state: robot.state(&body), world_from_link: body.world_from_link, command }
+        RobotStep { state: robot.state(&body, &self.dynamics), world_from_link: body.world_from_link, command }
     }
 }

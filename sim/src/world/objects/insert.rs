@@ -1,82 +1,102 @@
-//! Puts scenes and objects into a physics world.
+//! Puts scenes and objects into a world.
 
 use rapier3d::math::Pose;
-use rapier3d::prelude::*;
+use rapier3d::prelude::PhysicsWorld;
 
-use super::model::top_level;
-use super::rolling::rolling_rad_s2;
 use super::{Object, ObjectModel, ObjectPlacement};
 use crate::SimError;
-use crate::mjcf::{Document, Geom};
+use crate::dynamics::{DPose3, Dynamics, Tree, TreeId};
+use crate::mechanism::{Placed, add_collider, add_equalities, links, precise, rounded};
+use crate::mjcf::{BodyLink, BodyTree, Document, Geom};
+use crate::owner::Owner;
 
-/// Inserts a scene: bodies without a joint stay where they are, bodies with a free joint become objects.
+/// Inserts a scene: bodies that no joint moves are its room, the links of the others become objects.
 pub(in crate::world) fn insert_scene(
+    dynamics: &mut Dynamics,
     physics: &mut PhysicsWorld,
     scene: &Document,
 ) -> Result<(Vec<Geom>, Vec<Object>), SimError> {
     let mut fixed = Vec::new();
     let mut objects = Vec::new();
-    for model in top_level(scene)? {
-        if model.free {
-            objects.push(insert(physics, model.name.clone(), model, Pose::IDENTITY));
-            continue;
-        }
-        for mut geom in model.geoms {
-            geom.body_from_geom = model.world_from_body * geom.body_from_geom;
-            if let Some(collider) = collider(&geom) {
-                physics.insert_collider(collider, None);
+    let trees = scene.trees()?;
+    let mut placed = Vec::with_capacity(trees.len());
+    for tree in &trees {
+        let id = if tree.is_fixed() {
+            for geom in tree.links.iter().flat_map(in_file) {
+                add_collider(dynamics, physics, &geom, None, None);
+                fixed.push(geom);
             }
-            fixed.push(geom);
-        }
+            None
+        } else {
+            let name = |link: &BodyLink| link.name.clone();
+            Some(insert_moving(dynamics, physics, tree, &DPose3::IDENTITY, name, &mut objects)?)
+        };
+        placed.push(Placed { tree, id });
     }
+    add_equalities(dynamics, scene, &placed, &DPose3::IDENTITY)?;
     Ok((fixed, objects))
 }
 
-/// Inserts an object file: one top-level body, free or a mark.
+/// Inserts an object file: one top-level body, a mark if no joint moves it. The body has the placement's name, and the
+/// links on it have their own after it.
 pub(in crate::world) fn insert_object(
+    dynamics: &mut Dynamics,
     physics: &mut PhysicsWorld,
     placement: &ObjectPlacement,
-) -> Result<Object, SimError> {
-    let model = ObjectModel::load(&placement.file)?;
-    Ok(insert(physics, placement.name.clone(), model, placement.world_from_object))
-}
-
-fn insert(physics: &mut PhysicsWorld, name: String, model: ObjectModel, placed: Pose) -> Object {
-    let world_from_body = placed * model.world_from_body;
-    let body = model.free.then(|| {
-        let builder = RigidBodyBuilder::dynamic()
-            .pose(world_from_body)
-            .additional_mass_properties(model.mass)
-            .can_sleep(false);
-        physics.insert_body(builder)
-    });
-    let mut colliders = Vec::new();
-    for geom in &model.geoms {
-        let Some(mut builder) = collider(geom) else { continue };
-        if body.is_none() {
-            let world_from_shape = world_from_body * builder.position;
-            builder = builder.position(world_from_shape);
-        } else if !model.has_inertial {
-            builder = match geom.mass_kg {
-                Some(mass_kg) => builder.mass(mass_kg),
-                None => builder.density(geom.density_kg_m3),
-            };
+    objects: &mut Vec<Object>,
+) -> Result<(), SimError> {
+    let (document, tree) = ObjectModel::read(&placement.file)?;
+    let world_from_file = precise(&placement.world_from_object);
+    if tree.is_fixed() {
+        let owner = Owner::Object(objects.len());
+        for mut geom in tree.links.iter().flat_map(in_file) {
+            geom.body_from_geom = placement.world_from_object * geom.body_from_geom;
+            add_collider(dynamics, physics, &geom, None, Some(owner));
         }
-        colliders.push(physics.insert_collider(builder, body));
+        objects.push(Object {
+            name: placement.name.clone(),
+            model: ObjectModel::of(&tree.links[0]),
+            link: None,
+            world_from_mark: placement.world_from_object * rounded(&tree.links[0].parent_from_link),
+        });
+        return Ok(());
     }
-    let rolling_rad_s2 = rolling_rad_s2(&model);
-    Object { name, model, body, world_from_mark: world_from_body, colliders, rolling_rad_s2 }
+    let name = |link: &BodyLink| match link.parent {
+        None => placement.name.clone(),
+        Some(_) => format!("{} {}", placement.name, link.name),
+    };
+    let id = insert_moving(dynamics, physics, &tree, &world_from_file, name, objects)?;
+    add_equalities(dynamics, &document, &[Placed { tree: &tree, id: Some(id) }], &world_from_file)
 }
 
-fn collider(geom: &Geom) -> Option<ColliderBuilder> {
-    if !geom.collides {
-        return None;
+fn insert_moving(
+    dynamics: &mut Dynamics,
+    physics: &mut PhysicsWorld,
+    tree: &BodyTree,
+    world_from_file: &DPose3,
+    name: impl Fn(&BodyLink) -> String,
+    objects: &mut Vec<Object>,
+) -> Result<TreeId, SimError> {
+    let id = dynamics.add_tree(Tree::new(&name(&tree.links[0]), links(tree, world_from_file))?, physics);
+    for (index, link) in tree.links.iter().enumerate() {
+        let owner = Owner::Object(objects.len());
+        for geom in &link.geoms {
+            add_collider(dynamics, physics, geom, Some(id.link(index)), Some(owner));
+        }
+        objects.push(Object {
+            name: name(link),
+            model: ObjectModel::of(link),
+            link: Some(id.link(index)),
+            world_from_mark: Pose::IDENTITY,
+        });
     }
-    let (body_from_shape, shape) = geom.collider()?;
-    let builder = ColliderBuilder::new(shape)
-        .position(body_from_shape)
-        .density(0.0)
-        .friction(geom.surface.coefficients.slide)
-        .friction_combine_rule(CoefficientCombineRule::Max);
-    Some(builder)
+    Ok(id)
+}
+
+/// Geoms of a link that does not move, in the frame of its file.
+fn in_file(link: &BodyLink) -> impl Iterator<Item = Geom> {
+    let file_from_link = rounded(&link.parent_from_link);
+    link.geoms
+        .iter()
+        .map(move |geom| Geom { body_from_geom: file_from_link * geom.body_from_geom, ..geom.clone() })
 }

@@ -1,16 +1,17 @@
-//! Objects: everything named in a world that is not a robot, free or fixed.
+//! Objects: everything named in a world that is not a robot. One that has joints inside is an object per link.
 
 mod insert;
 mod model;
-mod rolling;
 #[cfg(test)]
 mod site_tests;
 
 use rapier3d::math::{Pose, Vector};
-use rapier3d::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub use model::ObjectModel;
+
+use crate::dynamics::{Dynamics, LinkId};
+use crate::mechanism::rounded;
 
 pub(super) use insert::{insert_object, insert_scene};
 
@@ -32,26 +33,23 @@ pub struct ObjectState {
     pub angular_velocity_rad_s: Vector,
 }
 
-/// Something named that is not a robot: a free body, or a mark that only is looked at.
+/// Something named that is not a robot: a link that moves, or a mark that only is looked at.
 pub(super) struct Object {
     /// What tasks call it.
     pub name: String,
     pub model: ObjectModel,
-    pub body: Option<RigidBodyHandle>,
-    /// Where a mark lies; a body's pose is Rapier's.
+    pub link: Option<LinkId>,
+    /// Where a mark lies; a link's pose is that of dynamics.
     pub world_from_mark: Pose,
-    pub colliders: Vec<ColliderHandle>,
-    /// Deceleration by rolling resistance, rad/s^2; 0 for what does not roll.
-    rolling_rad_s2: f32,
 }
 
 impl Object {
-    pub(super) fn state(&self, physics: &PhysicsWorld) -> ObjectState {
-        match self.body.map(|handle| &physics.bodies[handle]) {
-            Some(body) => ObjectState {
-                world_from_object: *body.position(),
-                velocity_m_s: body.velocity_at_point(body.position().translation),
-                angular_velocity_rad_s: body.angvel(),
+    pub(super) fn state(&self, dynamics: &Dynamics) -> ObjectState {
+        match self.link.map(|id| (dynamics.tree(id.tree), id.link)) {
+            Some((tree, link)) => ObjectState {
+                world_from_object: rounded(&tree.world_from_link(link)),
+                velocity_m_s: tree.link_velocity_m_s(link).as_vec3(),
+                angular_velocity_rad_s: tree.link_spin_rad_s(link).as_vec3(),
             },
             None => ObjectState {
                 world_from_object: self.world_from_mark,

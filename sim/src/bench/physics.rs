@@ -1,0 +1,181 @@
+//! How long a physics step of 5 ms takes: robots in the kitchen of Handover that stand, walk, or hold a bottle each.
+//! `tests/peers/physics_timing.py` steps the same situations in MuJoCo.
+
+use std::f32::consts::PI;
+use std::time::{Duration, Instant};
+
+use rapier3d::math::{Pose, Vector};
+use serde::Serialize;
+
+use crate::body::{HAND_COLUMNS, HAND_JOINTS};
+use crate::{
+    ObjectPlacement, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, RobotCommand, RobotPlacement, SimError, World,
+    WorldSpec,
+};
+
+/// Median times of all situations.
+#[derive(Clone, Debug, Serialize)]
+pub struct PhysicsReport {
+    pub cases: Vec<PhysicsCase>,
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub struct PhysicsCase {
+    pub name: &'static str,
+    pub robots: usize,
+    /// Collision detection and dynamics of one physics step.
+    pub step_us_median: f64,
+    /// Of the whole: physics, sensing and the robots' controllers.
+    pub realtime_factor: f64,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Situation {
+    Standing,
+    Walking,
+    Holding,
+}
+
+const MOST_ROBOTS: usize = 3;
+const ROUNDS: usize = 3;
+/// In which robots come to rest, or into their stride.
+const SETTLING_CONTROL_STEPS: usize = 75;
+const CONTROL_STEPS: usize = 150;
+/// Fingers have closed nearly before the bottle is put between them.
+const CLOSING_CONTROL_STEPS: usize = 25;
+const NEARLY: f32 = 0.8;
+/// Round an upright cylinder of 7 cm, right hand: thumb 0 to 2, middle 0 and 1, index 0 and 1.
+const CLOSED_RAD: [f32; HAND_JOINTS] = [0.0, 0.75, -0.8, 1.1, 1.3, 1.1, 1.3];
+/// Middle of the grasped cylinder in the frame of the wrist, and how far above its base a bottle is held.
+const GRASP_IN_WRIST_M: Vector = Vector::new(0.12, 0.055, 0.0);
+const HELD_AT_M: f32 = 0.1;
+/// Backwards, away from the counter and from each other.
+const WALKING_M_S: f32 = -0.2;
+
+/// Measures every situation with one to three robots; `done` hears of each as it ends.
+pub fn physics(mut done: impl FnMut(&PhysicsCase)) -> Result<PhysicsReport, SimError> {
+    let mut cases = Vec::new();
+    for situation in [Situation::Standing, Situation::Walking, Situation::Holding] {
+        for robots in 1..=MOST_ROBOTS {
+            let case = measure(situation, robots)?;
+            done(&case);
+            cases.push(case);
+        }
+    }
+    Ok(PhysicsReport { cases })
+}
+
+fn measure(situation: Situation, robots: usize) -> Result<PhysicsCase, SimError> {
+    let mut steps: Vec<Duration> = Vec::new();
+    let mut whole: Vec<Duration> = Vec::new();
+    for _ in 0..ROUNDS {
+        let (mut world, commands) = begin(situation, robots)?;
+        for control_step in 0..SETTLING_CONTROL_STEPS + CONTROL_STEPS {
+            let started = Instant::now();
+            let mut within = Vec::with_capacity(PHYSICS_STEPS_PER_CONTROL as usize);
+            for substep in 0..PHYSICS_STEPS_PER_CONTROL {
+                world.drive(&commands, substep);
+                let stepped = Instant::now();
+                world.advance()?;
+                within.push(stepped.elapsed());
+            }
+            if control_step >= SETTLING_CONTROL_STEPS {
+                whole.push(started.elapsed() / PHYSICS_STEPS_PER_CONTROL);
+                steps.append(&mut within);
+            }
+        }
+        check(&world, situation);
+    }
+    Ok(PhysicsCase {
+        name: situation.name(),
+        robots,
+        step_us_median: median_us(&mut steps),
+        realtime_factor: f64::from(PHYSICS_DT_S) * 1e6 / median_us(&mut whole),
+    })
+}
+
+/// A world and the commands under which it stays what it is.
+fn begin(situation: Situation, robots: usize) -> Result<(World, Vec<RobotCommand>), SimError> {
+    let bottles = if situation == Situation::Holding { robots } else { 1 };
+    let mut world = World::new(&kitchen(robots, bottles))?;
+    let mut commands: Vec<RobotCommand> = (0..robots).map(|robot| world.rest_command(robot)).collect();
+    match situation {
+        Situation::Standing => {}
+        Situation::Walking => commands.iter_mut().for_each(|command| command.base.vx_m_s = WALKING_M_S),
+        Situation::Holding => {
+            close(&mut commands, NEARLY);
+            for _ in 0..CLOSING_CONTROL_STEPS {
+                world.control_step(&commands)?;
+            }
+            for (robot, measured) in world.present().robots.iter().enumerate() {
+                let state = &measured.state;
+                let world_from_wrist = state.world_from_pelvis * state.pelvis_from_wrist.right;
+                let wrist_from_bottle = Pose::from_translation(GRASP_IN_WRIST_M - Vector::Z * HELD_AT_M);
+                world.put_object(&bottle_name(robot), world_from_wrist * wrist_from_bottle);
+            }
+            close(&mut commands, 1.0);
+        }
+    }
+    Ok((world, commands))
+}
+
+fn close(commands: &mut [RobotCommand], part: f32) {
+    for command in commands {
+        let hand = &mut command.upper_rad[HAND_COLUMNS.right..HAND_COLUMNS.right + HAND_JOINTS];
+        hand.iter_mut().zip(CLOSED_RAD).for_each(|(target, closed)| *target = part * closed);
+    }
+}
+
+/// Nobody fell and nothing was dropped: otherwise the time is that of another situation.
+fn check(world: &World, situation: Situation) {
+    let present = world.present();
+    for (index, robot) in present.robots.iter().enumerate() {
+        assert!(!robot.state.fallen, "robot {index} fell while {}", situation.name());
+        if situation == Situation::Holding {
+            let wrist = robot.state.world_from_pelvis * robot.state.pelvis_from_wrist.right;
+            let bottle = present.object(&bottle_name(index)).map(|bottle| bottle.world_from_object);
+            let away_m = bottle.map(|bottle| (bottle * (Vector::Z * HELD_AT_M) - wrist.translation).length());
+            assert!(away_m.is_some_and(|away_m| away_m < 0.2), "robot {index} dropped its bottle: {away_m:?}");
+        }
+    }
+}
+
+/// Handover's places, and a third robot that stands free. Each robot has its bottle; those that nobody holds yet lie
+/// out of reach.
+fn kitchen(robots: usize, bottles: usize) -> WorldSpec {
+    const PLACES: [(f32, f32, f32); MOST_ROBOTS] = [(0.0, 0.0, 0.0), (0.74, -0.12, PI), (-0.9, -1.2, 0.5)];
+    let robot = |(index, (x, y, yaw_rad)): (usize, &(f32, f32, f32))| RobotPlacement {
+        name: format!("{index}"),
+        position_m: [*x, *y],
+        yaw_rad: *yaw_rad,
+    };
+    let bottle = |index: usize| ObjectPlacement {
+        name: bottle_name(index),
+        file: "bottle".into(),
+        world_from_object: Pose::from_translation(Vector::new(0.37, 0.1 + 0.1 * index as f32, 0.8)),
+    };
+    WorldSpec {
+        scene: "kitchen_084".into(),
+        robots: PLACES[..robots].iter().enumerate().map(robot).collect(),
+        objects: (0..bottles).map(bottle).collect(),
+    }
+}
+
+fn bottle_name(index: usize) -> String {
+    format!("bottle {index}")
+}
+
+fn median_us(spans: &mut [Duration]) -> f64 {
+    spans.sort_unstable();
+    spans[spans.len() / 2].as_secs_f64() * 1e6
+}
+
+impl Situation {
+    fn name(self) -> &'static str {
+        match self {
+            Situation::Standing => "standing",
+            Situation::Walking => "walking",
+            Situation::Holding => "held object",
+        }
+    }
+}

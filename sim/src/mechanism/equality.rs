@@ -1,0 +1,101 @@
+//! Equalities of a file between the links that its bodies became.
+
+use crate::SimError;
+use crate::dynamics::{DPose3, Dynamics, Equality, LinkId, TreeId};
+use crate::mjcf::{BodyTree, Document, EqualityKind};
+
+/// A tree of a file, and what it became: `None` is a part of the world.
+pub(crate) struct Placed<'a> {
+    pub tree: &'a BodyTree,
+    pub id: Option<TreeId>,
+}
+
+/// One body that an equality names.
+#[derive(Clone, Copy)]
+struct End {
+    /// `None` is the world.
+    link: Option<LinkId>,
+    /// In the frame of the link, or of the world.
+    carrier_from_body: DPose3,
+    world_from_body: DPose3,
+}
+
+/// Adds all equalities of a file whose trees were placed with the file's frame at `world_from_file`.
+pub(crate) fn add_equalities(
+    dynamics: &mut Dynamics,
+    document: &Document,
+    placed: &[Placed],
+    world_from_file: &DPose3,
+) -> Result<(), SimError> {
+    for equality in document.equalities()? {
+        let end = |body: Option<&String>| end(dynamics, placed, world_from_file, body);
+        let found = match &equality.kind {
+            EqualityKind::Coupling { joint, other, coefficients } => {
+                let leader = other.as_ref().and_then(|name| joint_link(placed, name));
+                joint_link(placed, joint).map(|follower| Equality::Couple {
+                    follower,
+                    leader,
+                    polynomial: *coefficients,
+                })
+            }
+            EqualityKind::Weld { body, other, body_from_other } => {
+                let (a, b) = (end(Some(body)), end(other.as_ref()));
+                let as_placed = a.world_from_body.inverse() * b.world_from_body;
+                weld(a, b, body_from_other.unwrap_or(as_placed))
+            }
+            EqualityKind::Pin { body, other, anchor_in_body_m } => {
+                let (a, b) = (end(Some(body)), end(other.as_ref()));
+                let world_m = a.world_from_body * *anchor_in_body_m;
+                let on = |end: End| end.carrier_from_body * (end.world_from_body.inverse() * world_m);
+                let (a, b) = if a.link.is_some() { (a, b) } else { (b, a) };
+                let ends = |link| Equality::Connect { a: link, a_point_m: on(a), b: b.link, b_point_m: on(b) };
+                a.link.map(ends)
+            }
+        };
+        if let Some(found) = found {
+            dynamics.add_equality(found, equality.active);
+        }
+    }
+    Ok(())
+}
+
+/// Between two parts of the world there is nothing to hold.
+fn weld(a: End, b: End, a_from_b: DPose3) -> Option<Equality> {
+    let (a, b, a_from_b) = if a.link.is_some() { (a, b, a_from_b) } else { (b, a, a_from_b.inverse()) };
+    let between_links = a.carrier_from_body * a_from_b * b.carrier_from_body.inverse();
+    a.link.map(|link| Equality::Weld { a: link, a_from_b: between_links, b: b.link })
+}
+
+fn end(dynamics: &Dynamics, placed: &[Placed], world_from_file: &DPose3, body: Option<&String>) -> End {
+    let world = End {
+        link: None,
+        carrier_from_body: *world_from_file,
+        world_from_body: *world_from_file,
+    };
+    let Some(name) = body else { return world };
+    for Placed { tree, id } in placed {
+        for (index, link) in tree.links.iter().enumerate() {
+            let Some(found) = link.bodies.iter().find(|body| body.name == *name) else { continue };
+            let in_link = found.link_from_body;
+            return match id {
+                Some(id) => End {
+                    link: Some(id.link(index)),
+                    carrier_from_body: in_link,
+                    world_from_body: dynamics.tree(*id).world_from_link(index) * in_link,
+                },
+                None => {
+                    let world_from_body = *world_from_file * link.parent_from_link * in_link;
+                    End { link: None, carrier_from_body: world_from_body, world_from_body }
+                }
+            };
+        }
+    }
+    world
+}
+
+fn joint_link(placed: &[Placed], joint: &str) -> Option<LinkId> {
+    placed.iter().find_map(|Placed { tree, id }| {
+        let index = tree.links.iter().position(|link| link.joint.name() == Some(joint))?;
+        Some((*id)?.link(index))
+    })
+}

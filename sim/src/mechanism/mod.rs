@@ -1,0 +1,99 @@
+//! From what files say to what dynamics takes: surfaces, links and equalities. Robots and objects are made of these.
+
+mod equality;
+
+use rapier3d::math::Pose;
+use rapier3d::prelude::{ActiveHooks, ColliderBuilder, PhysicsWorld};
+
+pub(crate) use equality::{Placed, add_equalities};
+
+use crate::dynamics::{
+    Axis, DPose3, DQuat, Directions, Dynamics, Friction, Joint, Link, LinkId, Mass,
+};
+use crate::mjcf::{AxisJoint, BodyLink, BodyTree, ContactKind, Geom, LinkJoint, Surface};
+use crate::owner::Owner;
+
+/// In full precision; the rotation is a unit quaternion again.
+pub(crate) fn precise(pose: &Pose) -> DPose3 {
+    let [x, y, z, w] = pose.rotation.to_array().map(f64::from);
+    DPose3::from_parts(pose.translation.as_dvec3(), DQuat::from_xyzw(x, y, z, w).normalize())
+}
+
+/// As everything outside of dynamics has it.
+pub(crate) fn rounded(pose: &DPose3) -> Pose {
+    Pose::from_parts(pose.translation.as_vec3(), pose.rotation.as_quat())
+}
+
+/// Adds the collision shape of a geom, if it has one, to a link or to the world; the geom's pose is in the frame of either.
+pub(crate) fn add_collider(
+    dynamics: &mut Dynamics,
+    physics: &mut PhysicsWorld,
+    geom: &Geom,
+    on: Option<LinkId>,
+    owner: Option<Owner>,
+) {
+    let Some((body_from_shape, shape)) = geom.collider().filter(|_| geom.collides) else { return };
+    let hooks = match owner {
+        Some(Owner::Link { .. }) => ActiveHooks::FILTER_CONTACT_PAIRS,
+        Some(Owner::Object(_)) | None => ActiveHooks::empty(),
+    };
+    let collider = ColliderBuilder::new(shape)
+        .position(body_from_shape)
+        .user_data(owner.map_or(0, Owner::tag))
+        .active_hooks(hooks);
+    dynamics.add_collider(collider, on, friction(&geom.surface), physics);
+}
+
+fn friction(surface: &Surface) -> Friction {
+    let coefficients = &surface.coefficients;
+    let directions = match surface.contact {
+        ContactKind::Normal => Directions::None,
+        ContactKind::Sliding => Directions::Slide,
+        ContactKind::Spinning => Directions::SlideSpin,
+        ContactKind::Rolling => Directions::SlideSpinRoll,
+    };
+    Friction {
+        directions,
+        slide: f64::from(coefficients.slide),
+        spin_m: f64::from(coefficients.spin_m),
+        roll_m: f64::from(coefficients.roll_m),
+        priority: surface.priority,
+    }
+}
+
+/// Links of a tree of a file, which is put at `world_from_file` with its top.
+pub(crate) fn links(tree: &BodyTree, world_from_file: &DPose3) -> Vec<Link> {
+    tree.links.iter().map(|link| self::link(link, world_from_file)).collect()
+}
+
+fn link(link: &BodyLink, world_from_file: &DPose3) -> Link {
+    Link {
+        name: link.name.clone(),
+        parent: link.parent,
+        parent_from_link: match link.parent {
+            Some(_) => link.parent_from_link,
+            None => *world_from_file * link.parent_from_link,
+        },
+        joint: match &link.joint {
+            LinkJoint::Fixed => Joint::Fixed,
+            LinkJoint::Free { .. } => Joint::Free,
+            LinkJoint::Hinge(joint) => Joint::Hinge(axis(joint)),
+            LinkJoint::Slide(joint) => Joint::Slide(axis(joint)),
+        },
+        mass: Mass::from_rapier(&link.mass),
+    }
+}
+
+fn axis(joint: &AxisJoint) -> Axis {
+    Axis {
+        direction: joint.direction,
+        anchor_m: joint.anchor_m,
+        armature: joint.armature,
+        friction_loss: joint.friction_loss,
+        damping: joint.damping,
+        stiffness: joint.stiffness,
+        spring_rest: joint.spring_rest,
+        range: joint.range,
+        effort_limit: f64::INFINITY,
+    }
+}
