@@ -32,7 +32,8 @@ mod tests {
 
     #[test]
     fn a_tag_tells_its_owner() {
-        for owner in [Owner::Link { robot: 0, link: 0 }, Owner::Link { robot: 2, link: 43 }, Owner::Object(0)] {
+        for owner in [Owner::Link { robot: 0, link: 0 }, Owner::Link { robot: 2, link: 43 }, Owner::Object(0)]
+        {
             assert_eq!(Owner::of_tag(owner.tag()), Some(owner));
         }
         assert_eq!(Owner::of_tag(0), None, "the room");

@@ -47,7 +47,10 @@ pub fn run(args: Args) -> Outcome {
 fn physics(json: Option<&Path>) -> Outcome {
     println!("{:14}{:>7}{:>10}{:>11}", "case", "robots", "us/step", "real time");
     let report = tandem_episodes::bench::physics(|case| {
-        println!("{:14}{:>7}{:>10.1}{:>10.1}x", case.name, case.robots, case.step_us_median, case.realtime_factor);
+        println!(
+            "{:14}{:>7}{:>10.1}{:>10.1}x",
+            case.name, case.robots, case.step_us_median, case.realtime_factor
+        );
     })?;
     if let Some(path) = json {
         std::fs::write(path, serde_json::to_string_pretty(&report)? + "\n")?;

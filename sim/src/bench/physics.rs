@@ -135,7 +135,10 @@ fn check(world: &World, situation: Situation) {
             let wrist = robot.state.world_from_pelvis * robot.state.pelvis_from_wrist.right;
             let bottle = present.object(&bottle_name(index)).map(|bottle| bottle.world_from_object);
             let away_m = bottle.map(|bottle| (bottle * (Vector::Z * HELD_AT_M) - wrist.translation).length());
-            assert!(away_m.is_some_and(|away_m| away_m < 0.2), "robot {index} dropped its bottle: {away_m:?}");
+            assert!(
+                away_m.is_some_and(|away_m| away_m < 0.2),
+                "robot {index} dropped its bottle: {away_m:?}"
+            );
         }
     }
 }

@@ -48,7 +48,8 @@ pub(crate) fn add_equalities(
                 let world_m = a.world_from_body * *anchor_in_body_m;
                 let on = |end: End| end.carrier_from_body * (end.world_from_body.inverse() * world_m);
                 let (a, b) = if a.link.is_some() { (a, b) } else { (b, a) };
-                let ends = |link| Equality::Connect { a: link, a_point_m: on(a), b: b.link, b_point_m: on(b) };
+                let ends =
+                    |link| Equality::Connect { a: link, a_point_m: on(a), b: b.link, b_point_m: on(b) };
                 a.link.map(ends)
             }
         };
@@ -67,11 +68,7 @@ fn weld(a: End, b: End, a_from_b: DPose3) -> Option<Equality> {
 }
 
 fn end(dynamics: &Dynamics, placed: &[Placed], world_from_file: &DPose3, body: Option<&String>) -> End {
-    let world = End {
-        link: None,
-        carrier_from_body: *world_from_file,
-        world_from_body: *world_from_file,
-    };
+    let world = End { link: None, carrier_from_body: *world_from_file, world_from_body: *world_from_file };
     let Some(name) = body else { return world };
     for Placed { tree, id } in placed {
         for (index, link) in tree.links.iter().enumerate() {

@@ -7,9 +7,7 @@ use rapier3d::prelude::{ActiveHooks, ColliderBuilder, PhysicsWorld};
 
 pub(crate) use equality::{Placed, add_equalities};
 
-use crate::dynamics::{
-    Axis, DPose3, DQuat, Directions, Dynamics, Friction, Joint, Link, LinkId, Mass,
-};
+use crate::dynamics::{Axis, DPose3, DQuat, Directions, Dynamics, Friction, Joint, Link, LinkId, Mass};
 use crate::mjcf::{AxisJoint, BodyLink, BodyTree, ContactKind, Geom, LinkJoint, Surface};
 use crate::owner::Owner;
 

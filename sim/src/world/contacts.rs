@@ -25,8 +25,8 @@ impl SelfCollision {
 
 impl PhysicsHooks for SelfCollision {
     fn filter_contact_pair(&self, pair: &PairFilterContext) -> Option<SolverFlags> {
-        let [first, second] = [pair.collider1, pair.collider2]
-            .map(|handle| Owner::of_tag(pair.colliders[handle].user_data));
+        let [first, second] =
+            [pair.collider1, pair.collider2].map(|handle| Owner::of_tag(pair.colliders[handle].user_data));
         let apart = match (first, second) {
             (Some(Owner::Link { robot: a, link: link_a }), Some(Owner::Link { robot: b, link: link_b })) => {
                 a == b && !self.model.may_touch(link_a, link_b)
@@ -56,8 +56,12 @@ impl World {
         let mut found: BTreeMap<(usize, usize), Sides<HandContacts>> = BTreeMap::new();
         for (owners, force_n) in self.presses() {
             let (object, robot, link, force_n) = match owners {
-                [Some(Owner::Link { robot, link }), Some(Owner::Object(object))] => (object, robot, link, force_n),
-                [Some(Owner::Object(object)), Some(Owner::Link { robot, link })] => (object, robot, link, -force_n),
+                [Some(Owner::Link { robot, link }), Some(Owner::Object(object))] => {
+                    (object, robot, link, force_n)
+                }
+                [Some(Owner::Object(object)), Some(Owner::Link { robot, link })] => {
+                    (object, robot, link, -force_n)
+                }
                 _ => continue,
             };
             let hands = found.entry((object, robot)).or_default();
@@ -85,7 +89,8 @@ impl World {
     pub fn self_contacts(&self, robot: usize) -> Vec<(String, String, f32)> {
         let mut forces_n: BTreeMap<(usize, usize), f32> = BTreeMap::new();
         for (owners, force_n) in self.presses() {
-            if let [Some(Owner::Link { robot: a, link: first }), Some(Owner::Link { robot: b, link: second })] = owners
+            if let [Some(Owner::Link { robot: a, link: first }), Some(Owner::Link { robot: b, link: second })] =
+                owners
                 && (a, b) == (robot, robot)
             {
                 *forces_n.entry((first.min(second), first.max(second))).or_default() += force_n.length();

@@ -95,6 +95,10 @@ impl World {
             0 => robot.rest_command(&self.dynamics),
             _ => robot.last_command(),
         };
-        RobotStep { state: robot.state(&body, &self.dynamics), world_from_link: body.world_from_link, command }
+        RobotStep {
+            state: robot.state(&body, &self.dynamics),
+            world_from_link: body.world_from_link,
+            command,
+        }
     }
 }

@@ -211,7 +211,9 @@ fn a_policy_drives_the_robot_and_snapshots_continue_bit_for_bit() {
     let mut first = world();
     let command = first.rest_command(0);
     assert_eq!(command.base.pelvis_height_m, LIMITS.pelvis_height_m[0]);
-    let run = |world: &mut World, steps: u32| (0..steps).for_each(|_| drop(world.control_step(&[command]).unwrap()));
+    let run = |world: &mut World, steps: u32| {
+        (0..steps).for_each(|_| drop(world.control_step(&[command]).unwrap()))
+    };
     run(&mut first, 6);
     let snapshot = first.snapshot().unwrap();
     run(&mut first, 6);
