@@ -9,7 +9,8 @@ use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
-use rten::{Dimension, LoadError, LoadErrorKind, Model, NodeId, RunOptions, ThreadPool, Value, ValueView};
+use prost::Message;
+use rten::{Dimension, LoadErrorKind, Model, NodeId, RunOptions, ThreadPool, Value, ValueView};
 use rten_tensor::{Layout, Tensor};
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64;
@@ -95,7 +96,7 @@ impl Network {
         let bytes = std::fs::read(path).map_err(|source| SimError::Read { path: file.clone(), source })?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let name = format!("{name}+{:016x}", xxh3_64(&bytes));
-        let model = Model::load(bytes).map_err(|source| unreadable(&file, source))?;
+        let model = load(&file, bytes)?;
         let network = Network::check(&file, name, model)?;
         let still = Observation {
             quaternion_wxyz: [1.0, 0.0, 0.0, 0.0],
@@ -251,16 +252,23 @@ impl Action {
     }
 }
 
-/// What cannot be read is no ONNX file; what is one, but has an operator or a graph that makes no sense, cannot be run.
-fn unreadable(file: &str, source: LoadError) -> SimError {
-    let path = file.to_owned();
-    match source.kind() {
-        LoadErrorKind::ParseError => SimError::NotOnnx { path, source: source.into() },
-        LoadErrorKind::UnknownFileType | LoadErrorKind::FormatNotEnabled => {
-            SimError::NotOnnx { path, source: "it holds no graph".into() }
-        }
-        _ => SimError::NotRunnable { path, source: source.into() },
+/// Enough of an ONNX file to tell it from others: some files that are none would keep rten's reader busy for ever.
+#[derive(Clone, PartialEq, Message)]
+struct Outline {
+    #[prost(message, optional, tag = "7")]
+    graph: Option<()>,
+}
+
+fn load(file: &str, bytes: Vec<u8>) -> Result<Model, SimError> {
+    let not_onnx = |source| SimError::NotOnnx { path: file.into(), source };
+    let outline = Outline::decode(bytes.as_slice()).map_err(|source| not_onnx(source.into()))?;
+    if outline.graph.is_none() {
+        return Err(not_onnx("it holds no graph".into()));
     }
+    Model::load(bytes).map_err(|source| match source.kind() {
+        LoadErrorKind::ParseError | LoadErrorKind::UnknownFileType => not_onnx(source.into()),
+        _ => SimError::NotRunnable { path: file.into(), source: source.into() },
+    })
 }
 
 fn names(model: &Model, nodes: &[NodeId]) -> Vec<String> {
