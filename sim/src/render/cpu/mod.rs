@@ -13,7 +13,7 @@ use prepared::Prepared;
 use raster::Target;
 use shadow::ShadowMap;
 use srgb::SrgbTable;
-use view::{SAMPLES, View};
+use view::View;
 
 /// Renders on the calling thread. It keeps its buffers, and the shadows of the last state.
 pub(super) struct CpuRenderer {
@@ -47,8 +47,7 @@ impl Renderer for CpuRenderer {
             self.shadow.draw(&self.prepared.scenery, &placed);
             self.placed = placed;
         }
-        self.centres.draw(&self.prepared, &self.placed, camera, 1);
-        self.target.draw(&self.prepared, &self.placed, camera, SAMPLES);
+        self.target.draw(&mut self.centres, &self.prepared, &self.placed, camera);
         let view = View::new(&self.prepared, &self.placed, &self.target, &self.shadow, camera);
         let pixels = (camera.width * camera.height) as usize;
         let mut rgb = Vec::with_capacity(pixels * 3);

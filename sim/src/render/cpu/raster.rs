@@ -1,11 +1,15 @@
 //! Rasteriser: for each sample of a picture, the nearest triangle and how near it is.
 
+use std::ops::Range;
+
 use rapier3d::math::{Pose, Vector};
 
 use super::prepared::Prepared;
 use crate::render::camera::NEAR_M;
 use crate::render::{Camera, Placed};
 
+/// Samples a pixel along each axis; a power of two, so that dividing by it is exact.
+pub(super) const SAMPLES: usize = 2;
 /// Marks a sample at which nothing is.
 pub(super) const NOTHING: u32 = u32::MAX;
 
@@ -19,12 +23,25 @@ pub(super) struct Target {
 }
 
 impl Target {
-    /// Fills the target, `samples` a pixel along each axis, with all that `camera` sees.
-    pub(super) fn draw(&mut self, prepared: &Prepared, placed: &Placed, camera: &Camera, samples: usize) {
-        self.reset(camera.width as usize * samples, camera.height as usize * samples);
+    /// Fills the target, [`SAMPLES`] a pixel along each axis, and `centres`, one a pixel, with all that `camera` sees.
+    pub(super) fn draw(
+        &mut self,
+        centres: &mut Target,
+        prepared: &Prepared,
+        placed: &Placed,
+        camera: &Camera,
+    ) {
+        let (width, height) = (camera.width as usize, camera.height as usize);
+        self.reset(width * SAMPLES, height * SAMPLES);
+        centres.reset(width, height);
+        let mut fill = |corners: [[f32; 3]; 3], number: u32| {
+            self.fill(corners, number);
+            let centred = |[x, y, nearness]: [f32; 3]| [x / SAMPLES as f32, y / SAMPLES as f32, nearness];
+            centres.fill(corners.map(centred), number);
+        };
         let camera_from_world = camera.world_from_camera.inverse();
-        let focal = camera.focal_px() * samples as f32;
-        let (cx, cy) = (self.width as f32 * 0.5, self.height as f32 * 0.5);
+        let focal = camera.focal_px() * SAMPLES as f32;
+        let [cx, cy] = [width, height].map(|pixels| (pixels * SAMPLES) as f32 * 0.5);
         let screen = |p: Vector| {
             let nearness = -1.0 / p.z;
             [cx + p.x * focal * nearness, cy - p.y * focal * nearness, nearness]
@@ -40,18 +57,18 @@ impl Target {
             for (number, triangle) in (prepared.first[number]..).zip(&part.mesh.triangles) {
                 let p = triangle.map(|corner| corners[corner as usize]);
                 if p.iter().all(|p| p.z < -NEAR_M) {
-                    self.fill(p.map(screen), number);
+                    fill(p.map(screen), number);
                 } else if p.iter().any(|p| p.z < -NEAR_M) {
                     let (clipped, count) = clip_near(p);
                     for i in 1..count - 1 {
-                        self.fill([clipped[0], clipped[i], clipped[i + 1]].map(screen), number);
+                        fill([clipped[0], clipped[i], clipped[i + 1]].map(screen), number);
                     }
                 }
             }
         }
     }
 
-    pub(super) fn reset(&mut self, width: usize, height: usize) {
+    fn reset(&mut self, width: usize, height: usize) {
         (self.width, self.height) = (width, height);
         self.nearness_1_m.clear();
         self.nearness_1_m.resize(width * height, 0.0);
@@ -59,61 +76,76 @@ impl Target {
         self.triangle.resize(width * height, NOTHING);
     }
 
-    /// Fills a triangle given by picture coordinates and nearness. Back faces are left out.
-    ///
-    /// Everything but the samples is f64: a floor triangle clipped at the near plane has corners 1e4 pixels off the
-    /// picture, and f32 gradients would err by centimetres. In f64 the edge that two triangles share also comes out
-    /// the same for both, to the bit, and leaves no gap.
-    pub(super) fn fill(&mut self, corners: [[f32; 3]; 3], number: u32) {
-        let [[ax, ay, an], [bx, by, bn], [cx, cy, cn]] = corners.map(|p| p.map(f64::from));
-        let (ux, uy, un, vx, vy, vn) = (bx - ax, by - ay, bn - an, cx - ax, cy - ay, cn - an);
-        // Rows count downwards, so that what is counter-clockwise has a negative area.
-        let area = ux * vy - uy * vx;
-        if area >= 0.0 || !area.is_finite() {
-            return;
-        }
-        let (mut x0, mut x1) = (0, self.width as i32 - 1);
-        x0 = x0.max(ceil(ax.min(bx).min(cx) - 0.5));
-        x1 = x1.min(floor(ax.max(bx).max(cx) - 0.5));
-        let y0 = ceil(ay.min(by).min(cy) - 0.5).max(0);
-        let y1 = floor(ay.max(by).max(cy) - 0.5).min(self.height as i32 - 1);
-        if x0 > x1 || y0 > y1 {
-            return;
-        }
-        let along_x = (un * vy - vn * uy) / area;
-        let along_y = (vn * ux - un * vx) / area;
-        // Inside where x * ex + y * ey + e0 >= 0 for all three edges.
-        let edge = |px: f64, py: f64, qx: f64, qy: f64| (qy - py, px - qx, qx * py - px * qy);
-        let edges = [edge(ax, ay, bx, by), edge(bx, by, cx, cy), edge(cx, cy, ax, ay)];
-        for row in y0..=y1 {
-            let y = f64::from(row) + 0.5;
-            let (mut left, mut right) = (x0, x1);
-            for (ex, ey, e0) in edges {
-                let rest = ey * y + e0;
-                if ex > 0.0 {
-                    left = left.max(ceil(-rest / ex - 0.5));
-                } else if ex < 0.0 {
-                    right = right.min(floor(-rest / ex - 0.5));
-                } else if rest < 0.0 {
-                    right = -1;
-                }
+    fn fill(&mut self, corners: [[f32; 3]; 3], number: u32) {
+        for_spans(corners, self.width, self.height, |span, start, step| {
+            nearest(&mut self.nearness_1_m[span.clone()], &mut self.triangle[span], start, step, number);
+        });
+    }
+}
+
+/// Puts a triangle into those samples of a row that it is the nearest of. Nothing branches, and the slices are arguments,
+/// known not to overlap: so several samples are done at once.
+fn nearest(nearness_1_m: &mut [f32], triangle: &mut [u32], start: f32, step: f32, number: u32) {
+    for (i, (nearest, owner)) in nearness_1_m.iter_mut().zip(triangle).enumerate() {
+        let (nearness, before, owner_before) = (start + step * i as i32 as f32, *nearest, *owner);
+        *nearest = if nearness > before { nearness } else { before };
+        *owner = if nearness > before { number } else { owner_before };
+    }
+}
+
+/// Calls `fill` for each row of samples in a triangle, which is given by picture coordinates and nearness, with their
+/// indices, the nearness of the first and the step to the next. Back faces are left out.
+///
+/// Everything but the samples is f64: a floor triangle clipped at the near plane has corners 1e4 pixels off the
+/// picture, and f32 gradients would err by centimetres. In f64 the edge that two triangles share also comes out
+/// the same for both, to the bit, and leaves no gap.
+pub(super) fn for_spans(
+    corners: [[f32; 3]; 3],
+    width: usize,
+    height: usize,
+    mut fill: impl FnMut(Range<usize>, f32, f32),
+) {
+    let [[ax, ay, an], [bx, by, bn], [cx, cy, cn]] = corners.map(|p| p.map(f64::from));
+    let (ux, uy, un, vx, vy, vn) = (bx - ax, by - ay, bn - an, cx - ax, cy - ay, cn - an);
+    // Rows count downwards, so that what is counter-clockwise has a negative area.
+    let area = ux * vy - uy * vx;
+    if area >= 0.0 || !area.is_finite() {
+        return;
+    }
+    let x0 = ceil(ax.min(bx).min(cx) - 0.5).max(0);
+    let x1 = floor(ax.max(bx).max(cx) - 0.5).min(width as i32 - 1);
+    let y0 = ceil(ay.min(by).min(cy) - 0.5).max(0);
+    let y1 = floor(ay.max(by).max(cy) - 0.5).min(height as i32 - 1);
+    if x0 > x1 || y0 > y1 {
+        return;
+    }
+    let along_x = (un * vy - vn * uy) / area;
+    let along_y = (vn * ux - un * vx) / area;
+    // Inside where x * ex + y * ey + e0 >= 0 for all three edges.
+    let edge = |px: f64, py: f64, qx: f64, qy: f64| {
+        let ex = qy - py;
+        (ex, 1.0 / ex, px - qx, qx * py - px * qy)
+    };
+    let edges = [edge(ax, ay, bx, by), edge(bx, by, cx, cy), edge(cx, cy, ax, ay)];
+    for row in y0..=y1 {
+        let y = f64::from(row) + 0.5;
+        let (mut left, mut right) = (x0, x1);
+        for (ex, per_ex, ey, e0) in edges {
+            let rest = ey * y + e0;
+            if ex > 0.0 {
+                left = left.max(ceil(-rest * per_ex - 0.5));
+            } else if ex < 0.0 {
+                right = right.min(floor(-rest * per_ex - 0.5));
+            } else if rest < 0.0 {
+                right = -1;
             }
-            if left > right {
-                continue;
-            }
-            let start = (an + along_x * (f64::from(left) + 0.5 - ax) + along_y * (y - ay)) as f32;
-            let step = along_x as f32;
-            let line = row as usize * self.width;
-            let span = line + left as usize..=line + right as usize;
-            let samples = self.nearness_1_m[span.clone()].iter_mut().zip(&mut self.triangle[span]);
-            for (i, (nearest, owner)) in samples.enumerate() {
-                let nearness = start + step * i as f32;
-                if nearness > *nearest {
-                    *nearest = nearness;
-                    *owner = number;
-                }
-            }
         }
+        if left > right {
+            continue;
+        }
+        let start = an + along_x * (f64::from(left) + 0.5 - ax) + along_y * (y - ay);
+        let line = row as usize * width;
+        fill(line + left as usize..line + right as usize + 1, start as f32, along_x as f32);
     }
 }
 
@@ -148,7 +180,7 @@ fn clip_near(corners_m: [Vector; 3]) -> ([Vector; 4], usize) {
 }
 
 /// As `f64::floor`, which without SSE 4.1 is a call; clamped to the range of `i32`.
-fn floor(value: f64) -> i32 {
+pub(super) fn floor(value: f64) -> i32 {
     let truncated = value as i32;
     if f64::from(truncated) > value { truncated.saturating_sub(1) } else { truncated }
 }

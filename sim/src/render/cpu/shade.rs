@@ -2,6 +2,7 @@
 
 use rapier3d::math::Vector;
 
+use super::raster::floor;
 use super::shadow::{ShadowMap, TO_SUN};
 use crate::render::Pattern;
 
@@ -10,7 +11,8 @@ const FROM_BELOW: Vector = Vector::new(0.20, 0.19, 0.18);
 const FROM_ABOVE: Vector = Vector::new(0.40, 0.42, 0.45);
 const LAMP: f32 = 0.15;
 const HIGHLIGHT: f32 = 0.15;
-const SHININESS: i32 = 40;
+/// Half the exponent, for the square of the cosine.
+const SHININESS: i32 = 20;
 /// Linear.
 pub(super) const SKY: Vector = Vector::new(0.45, 0.55, 0.70);
 const CHECKER_DARK: f32 = 0.72;
@@ -27,10 +29,10 @@ pub(super) struct Surface {
 
 impl Surface {
     /// Linear colour.
+    #[inline]
     pub(super) fn shade(&self, shadow: &ShadowMap) -> Vector {
-        let facing_eye = self.normal.dot(self.eye_direction);
-        let (normal, facing_eye) =
-            if facing_eye < 0.0 { (-self.normal, -facing_eye) } else { (self.normal, facing_eye) };
+        let towards_eye = self.normal.dot(self.eye_direction);
+        let (normal, facing_eye) = (self.normal * 1f32.copysign(towards_eye), towards_eye.abs());
         let ambient = FROM_BELOW.lerp(FROM_ABOVE, normal.z * 0.5 + 0.5);
         let unlit = self.albedo * (ambient + LAMP * facing_eye);
         let facing_sun = normal.dot(TO_SUN);
@@ -38,8 +40,9 @@ impl Surface {
             return unlit;
         }
         let sunlight = facing_sun * shadow.sunlit(self.point_m, normal);
-        let half_way = (self.eye_direction + TO_SUN).normalize();
-        let highlight = HIGHLIGHT * normal.dot(half_way).max(0.0).powi(SHININESS);
+        let half_way = self.eye_direction + TO_SUN;
+        let cosine = normal.dot(half_way).max(0.0);
+        let highlight = HIGHLIGHT * (cosine * cosine / half_way.length_squared()).powi(SHININESS);
         unlit + (self.albedo * SUN + highlight) * sunlight
     }
 }
@@ -49,7 +52,7 @@ pub(super) fn albedo(pattern: Pattern, linear_rgb: Vector, point_m: Vector) -> V
     match pattern {
         Pattern::Plain => linear_rgb,
         Pattern::Checker => {
-            let square = |metres: f32| (metres * CHECKER_PER_M).floor() as i32;
+            let square = |metres: f32| floor(f64::from(metres * CHECKER_PER_M));
             let dark = (square(point_m.x) + square(point_m.y)) & 1 == 0;
             if dark { linear_rgb * CHECKER_DARK } else { linear_rgb }
         }

@@ -2,7 +2,7 @@
 
 use rapier3d::math::{Matrix, Pose, Rotation, Vector};
 
-use super::raster::Target;
+use super::raster::for_spans;
 use crate::render::{Placed, Scenery};
 
 /// Direction to the sun; high, so that hands over a counter cast their shadow on it.
@@ -18,7 +18,7 @@ const BIAS_M: f32 = 0.004;
 #[derive(Default)]
 pub(super) struct ShadowMap {
     /// "Nearness" here is [`DISTANCE_M`] minus the distance from the sun's plane, and grows towards the sun.
-    target: Target,
+    nearness_m: Vec<f32>,
     sun_from_world: Pose,
     texels_per_m: f32,
 }
@@ -30,7 +30,8 @@ impl ShadowMap {
         let rotation = Rotation::from_mat3(&Matrix::from_cols(x, TO_SUN.cross(x), TO_SUN));
         self.sun_from_world = Pose::from_parts(placed.focus_m, rotation).inverse();
         self.texels_per_m = TEXELS as f32 / (2.0 * scenery.focus_radius_m);
-        self.target.reset(TEXELS, TEXELS);
+        self.nearness_m.clear();
+        self.nearness_m.resize(TEXELS * TEXELS, 0.0);
         let mut corners = Vec::new();
         let parts = scenery.parts.iter().zip(&placed.world_from_mesh);
         for (part, world_from_mesh) in parts.filter(|(part, _)| part.casts_shadow) {
@@ -40,7 +41,12 @@ impl ShadowMap {
             corners.extend(vertices.map(|vertex| self.texel(sun_from_mesh * vertex.position_m)));
             for triangle in &part.mesh.triangles {
                 let corners = triangle.map(|corner| corners[corner as usize]);
-                self.target.fill(corners, 0);
+                for_spans(corners, TEXELS, TEXELS, |span, start, step| {
+                    for (i, nearest) in self.nearness_m[span].iter_mut().enumerate() {
+                        let nearness = start + step * i as i32 as f32;
+                        *nearest = if nearness > *nearest { nearness } else { *nearest };
+                    }
+                });
             }
         }
     }
@@ -63,15 +69,14 @@ impl ShadowMap {
         // Four taps with a tent's weights are a bilinear filter three texels wide.
         let weights = |part: f32| [1.0 - part, 1.0, 1.0, part];
         let (across, down) = (weights(u - column as f32), weights(v - row as f32));
-        let mut sum = 0.0;
+        let mut columns = [0.0; 4];
         for (j, weight) in down.into_iter().enumerate() {
             let start = (row - 1 + j) * TEXELS + column - 1;
-            for (i, occluder) in self.target.nearness_1_m[start..start + 4].iter().enumerate() {
-                if nearness + BIAS_M >= *occluder {
-                    sum += weight * across[i];
-                }
+            for (sum, occluder) in columns.iter_mut().zip(&self.nearness_m[start..start + 4]) {
+                *sum += if nearness + BIAS_M >= *occluder { weight } else { 0.0 };
             }
         }
+        let sum: f32 = columns.into_iter().zip(across).map(|(sum, weight)| sum * weight).sum();
         sum / 9.0
     }
 }

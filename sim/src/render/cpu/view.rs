@@ -1,15 +1,13 @@
 //! From samples to pixels: colour where a camera's rays meet triangles, and outlines between things.
 
-use rapier3d::math::{Pose, Vector};
+use rapier3d::math::{Matrix, Vector};
 
 use super::prepared::Prepared;
-use super::raster::{NOTHING, Target};
+use super::raster::{NOTHING, SAMPLES, Target};
 use super::shade::{SKY, Surface, albedo};
 use super::shadow::ShadowMap;
 use crate::render::{Camera, Placed};
 
-/// Samples a pixel along each axis.
-pub(super) const SAMPLES: usize = 2;
 /// How much the outline between two things darkens.
 const OUTLINE: f32 = 0.45;
 /// Two things are outlined where their depths differ by more than this part: not where they touch.
@@ -20,8 +18,8 @@ pub(super) struct View<'a> {
     prepared: &'a Prepared,
     target: &'a Target,
     shadow: &'a ShadowMap,
-    /// World from mesh and back, of each part.
-    poses: Vec<(Pose, Pose)>,
+    /// Rotation and translation from each part's mesh to the world. Matrices, for they turn a vector fastest.
+    world_from_mesh: Vec<(Matrix, Vector)>,
     eye_m: Vector,
     /// Ray through the target's top left corner, and from one sample to the next, at a depth of 1 m in the world.
     corner_ray: Vector,
@@ -39,11 +37,12 @@ impl<'a> View<'a> {
     ) -> View<'a> {
         let rotation = camera.world_from_camera.rotation;
         let sample = 1.0 / (camera.focal_px() * SAMPLES as f32);
+        let poses = placed.world_from_mesh.iter();
         View {
             prepared,
             target,
             shadow,
-            poses: placed.world_from_mesh.iter().map(|pose| (*pose, pose.inverse())).collect(),
+            world_from_mesh: poses.map(|pose| (Matrix::from_quat(pose.rotation), pose.translation)).collect(),
             eye_m: camera.world_from_camera.translation,
             corner_ray: rotation * camera.unproject([0.0, 0.0], 1.0),
             right_ray: rotation * Vector::X * sample,
@@ -61,6 +60,9 @@ impl<'a> View<'a> {
 
     /// Mean linear colour of a pixel's samples; a triangle that covers several is shaded once.
     pub(super) fn pixel(&self, x: usize, y: usize) -> Vector {
+        if self.is_plain(x * SAMPLES, y * SAMPLES) {
+            return self.colour(x * SAMPLES, y * SAMPLES);
+        }
         let mut shaded: [(u32, Vector); SAMPLES * SAMPLES] = [(0, Vector::ZERO); SAMPLES * SAMPLES];
         let mut count = 0;
         let mut sum = Vector::ZERO;
@@ -72,7 +74,7 @@ impl<'a> View<'a> {
             sum += match shaded[..count].iter().find(|(known, _)| *known == triangle) {
                 Some((_, colour)) => *colour,
                 None => {
-                    let colour = if triangle == NOTHING { SKY } else { self.surface(sx, sy, triangle) };
+                    let colour = self.colour(sx, sy);
                     shaded[count] = (triangle, colour);
                     count += 1;
                     colour
@@ -81,6 +83,20 @@ impl<'a> View<'a> {
         }
         let outline = (edges as f32 / (2 * SAMPLES) as f32).min(1.0);
         sum * ((1.0 - OUTLINE * outline) / (SAMPLES * SAMPLES) as f32)
+    }
+
+    /// Whether one triangle covers all samples of a pixel and all of their neighbours to the right and below, so that
+    /// there is no outline either.
+    fn is_plain(&self, sx: usize, sy: usize) -> bool {
+        let Target { width, height, ref triangle, .. } = *self.target;
+        if sx + SAMPLES >= width || sy + SAMPLES >= height {
+            return false;
+        }
+        let first = triangle[sy * width + sx];
+        (sy..=sy + SAMPLES).all(|row| {
+            let start = row * width + sx;
+            triangle[start..=start + SAMPLES].iter().all(|other| *other == first)
+        })
     }
 
     /// How many of the neighbours to the right and below belong to another thing at another depth.
@@ -100,29 +116,32 @@ impl<'a> View<'a> {
         u32::from(differs(here + 1)) + u32::from(differs(here + self.target.width))
     }
 
-    /// Colour of a triangle where a sample sees it.
-    fn surface(&self, sx: usize, sy: usize, triangle: u32) -> Vector {
-        let owner = self.prepared.owner[triangle as usize] as usize;
-        let part = &self.prepared.scenery.parts[owner];
-        let (world_from_mesh, mesh_from_world) = self.poses[owner];
-        let depth_m = 1.0 / self.target.nearness_1_m[sy * self.target.width + sx];
+    /// Colour that a sample sees.
+    fn colour(&self, sx: usize, sy: usize) -> Vector {
+        let sample = sy * self.target.width + sx;
+        let triangle = self.target.triangle[sample];
+        if triangle == NOTHING {
+            return SKY;
+        }
+        let face = &self.prepared.faces[triangle as usize];
+        let owner = face.part as usize;
+        let (rotation, translation_m) = self.world_from_mesh[owner];
+        let depth_m = 1.0 / self.target.nearness_1_m[sample];
         let ray = self.corner_ray + self.right_ray * (sx as f32 + 0.5) + self.down_ray * (sy as f32 + 0.5);
         let point_m = self.eye_m + ray * depth_m;
-        let corners = part.mesh.triangles[(triangle - self.prepared.first[owner]) as usize];
-        let [a, b, c] = corners.map(|corner| part.mesh.vertices[corner as usize]);
-        let in_mesh_m = mesh_from_world * point_m;
-        let (ab, ac, ap) =
-            (b.position_m - a.position_m, c.position_m - a.position_m, in_mesh_m - a.position_m);
-        let face = ab.cross(ac);
-        let scale = 1.0 / face.length_squared();
-        let weight_b = ap.cross(ac).dot(face) * scale;
-        let weight_c = ab.cross(ap).dot(face) * scale;
-        let normal = a.normal * (1.0 - weight_b - weight_c) + b.normal * weight_b + c.normal * weight_c;
+        let normal = match face.bend_1_m {
+            None => rotation * face.normal,
+            Some(bend_1_m) => {
+                let in_mesh_m = rotation.transpose() * (point_m - translation_m);
+                (rotation * (face.normal + bend_1_m * (in_mesh_m - face.corner_m))).normalize()
+            }
+        };
+        let pattern = self.prepared.scenery.parts[owner].pattern;
         Surface {
             point_m,
-            normal: (world_from_mesh.rotation * normal).normalize(),
+            normal,
             eye_direction: -ray.normalize(),
-            albedo: albedo(part.pattern, self.prepared.linear_rgb[owner], point_m),
+            albedo: albedo(pattern, self.prepared.linear_rgb[owner], point_m),
         }
         .shade(self.shadow)
     }
