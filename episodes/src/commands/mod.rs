@@ -43,7 +43,7 @@ pub enum Movement {
     /// Nothing new is asked for, and the base stands.
     Hold,
     /// Wrists and fingers arrive with the command's last step.
-    Reach(Goals),
+    Reach(Box<Goals>),
     Walk(BaseCommand),
     /// One row per step.
     Rows(Vec<Row>),

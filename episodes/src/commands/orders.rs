@@ -31,7 +31,7 @@ pub fn reach(entry: &WristMove, motion: &Motion) -> Order {
         left: fingers(Side::Left, &entry.left_fingers_rad),
         right: fingers(Side::Right, &entry.right_fingers_rad),
     };
-    Order { movement: Movement::Reach(Goals { wrists, fingers_rad, base }), cut }
+    Order { movement: Movement::Reach(Box::new(Goals { wrists, fingers_rad, base })), cut }
 }
 
 pub fn walk(entry: &WalkMove, motion: &Motion) -> Order {
