@@ -70,8 +70,9 @@ mod tests {
     fn feel(body: &WholeBody, force_n: Sides<Vector>) -> (Feeling, [f32; JOINTS]) {
         let mut torque_n_m = body.gravity_torques_n_m();
         for (side, first) in ARMS.by_side() {
-            for joint in first..first + ARM_JOINTS {
-                torque_n_m[joint] -= body.moment_n_m(joint, body.palms_m()[side], force_n[side]);
+            let (palm_m, force_n) = (body.palms_m()[side], force_n[side]);
+            for (joint, torque_n_m) in torque_n_m.iter_mut().enumerate().skip(first).take(ARM_JOINTS) {
+                *torque_n_m -= body.moment_n_m(joint, palm_m, force_n);
             }
         }
         let mut feeling = Feeling::default();

@@ -136,7 +136,7 @@ impl<'a> Map<'a> {
         let mut hops = 0;
         while !rest.is_empty() {
             let next = rest.remove(0);
-            let child = [at.as_slice(), &[next.clone()]].concat();
+            let child = [at.as_slice(), std::slice::from_ref(&next)].concat();
             if self.names.contains(&child) {
                 at = child;
             } else if let Some(target) = self.imported.get(&(&at, next)).filter(|_| hops < MOST_HOPS) {
