@@ -87,9 +87,11 @@ impl Target {
 /// known not to overlap: so several samples are done at once.
 fn nearest(nearness_1_m: &mut [f32], triangle: &mut [u32], start: f32, step: f32, number: u32) {
     for (i, (nearest, owner)) in nearness_1_m.iter_mut().zip(triangle).enumerate() {
-        let (nearness, before, owner_before) = (start + step * i as i32 as f32, *nearest, *owner);
-        *nearest = if nearness > before { nearness } else { before };
-        *owner = if nearness > before { number } else { owner_before };
+        let nearness = start + step * i as i32 as f32;
+        // All bits of it are set, or none.
+        let nearer = u32::from(nearness > *nearest).wrapping_neg();
+        *nearest = nearest.max(nearness);
+        *owner = (number & nearer) | (*owner & !nearer);
     }
 }
 
@@ -129,17 +131,20 @@ pub(super) fn for_spans(
     let edges = [edge(ax, ay, bx, by), edge(bx, by, cx, cy), edge(cx, cy, ax, ay)];
     for row in y0..=y1 {
         let y = f64::from(row) + 0.5;
-        let (mut left, mut right) = (x0, x1);
+        // Compared as they are: both are rounded once, not for each edge.
+        let (mut from, mut to) = (f64::from(x0), f64::from(x1));
         for (ex, per_ex, ey, e0) in edges {
             let rest = ey * y + e0;
+            let x = -rest * per_ex - 0.5;
             if ex > 0.0 {
-                left = left.max(ceil(-rest * per_ex - 0.5));
+                from = if x > from { x } else { from };
             } else if ex < 0.0 {
-                right = right.min(floor(-rest * per_ex - 0.5));
+                to = if x < to { x } else { to };
             } else if rest < 0.0 {
-                right = -1;
+                to = -1.0;
             }
         }
+        let (left, right) = (ceil(from), floor(to));
         if left > right {
             continue;
         }

@@ -11,8 +11,8 @@ const FROM_BELOW: Vector = Vector::new(0.20, 0.19, 0.18);
 const FROM_ABOVE: Vector = Vector::new(0.40, 0.42, 0.45);
 const LAMP: f32 = 0.15;
 const HIGHLIGHT: f32 = 0.15;
-/// Half the exponent, for the square of the cosine.
-const SHININESS: i32 = 20;
+/// Half the exponent of the cosine: its square needs no root.
+const HALF_SHININESS: i32 = 20;
 /// Linear.
 pub(super) const SKY: Vector = Vector::new(0.45, 0.55, 0.70);
 const CHECKER_DARK: f32 = 0.72;
@@ -41,8 +41,9 @@ impl Surface {
         }
         let sunlight = facing_sun * shadow.sunlit(self.point_m, normal);
         let half_way = self.eye_direction + TO_SUN;
-        let cosine = normal.dot(half_way).max(0.0);
-        let highlight = HIGHLIGHT * (cosine * cosine / half_way.length_squared()).powi(SHININESS);
+        let along = normal.dot(half_way).max(0.0);
+        let cosine_squared = along * along / half_way.length_squared();
+        let highlight = HIGHLIGHT * cosine_squared.powi(HALF_SHININESS);
         unlit + (self.albedo * SUN + highlight) * sunlight
     }
 }

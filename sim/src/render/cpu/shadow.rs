@@ -43,8 +43,7 @@ impl ShadowMap {
                 let corners = triangle.map(|corner| corners[corner as usize]);
                 for_spans(corners, TEXELS, TEXELS, |span, start, step| {
                     for (i, nearest) in self.nearness_m[span].iter_mut().enumerate() {
-                        let nearness = start + step * i as i32 as f32;
-                        *nearest = if nearness > *nearest { nearness } else { *nearest };
+                        *nearest = nearest.max(start + step * i as i32 as f32);
                     }
                 });
             }
@@ -65,7 +64,7 @@ impl ShadowMap {
         if !inside(u) || !inside(v) {
             return 1.0;
         }
-        let (column, row) = (u as usize, v as usize);
+        let (column, row) = (usize::from(u as u16), usize::from(v as u16));
         // Four taps with a tent's weights are a bilinear filter three texels wide.
         let weights = |part: f32| [1.0 - part, 1.0, 1.0, part];
         let (across, down) = (weights(u - column as f32), weights(v - row as f32));
