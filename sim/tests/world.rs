@@ -136,12 +136,13 @@ fn a_step_names_the_hand_that_touches() {
         state.world_from_pelvis * state.pelvis_from_wrist.right
     };
     let mut spec = kitchen();
-    // The bottle's lower half reaches into the hand from above.
+    // The bottle falls onto the hand.
     let in_hand_m = right_wrist * Vector::new(0.09, 0.0, 0.0);
     spec.objects[0].world_from_object = Pose::from_translation(in_hand_m);
     let mut world = World::new(&spec).expect("embedded files load");
     let rest = rest(&world);
-    let step = world.control_step(&rest).expect("it stays finite");
+    let mut steps = (0..50).map(|_| world.control_step(&rest).expect("it stays finite"));
+    let step = steps.find(|step| !step.touches.is_empty()).expect("the bottle lands on the hand");
     let hands: Vec<_> = step.touches.iter().map(|touch| (touch.robot, touch.side, touch.object)).collect();
     assert_eq!(hands, [(0, Side::Right, 0)]);
     assert_eq!(step.contacts(0, Side::Right, "bottle"), step.touches[0].contacts);

@@ -49,7 +49,7 @@ fn physics(json: Option<&Path>) -> Outcome {
     let report = tandem_episodes::bench::physics(|case| {
         println!(
             "{:14}{:>7}{:>10.1}{:>10.1}x",
-            case.name, case.robots, case.step_us_median, case.realtime_factor
+            case.name, case.robots, case.median_step_us, case.realtime_factor
         );
     })?;
     if let Some(path) = json {

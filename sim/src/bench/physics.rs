@@ -24,7 +24,8 @@ pub struct PhysicsCase {
     pub name: &'static str,
     pub robots: usize,
     /// Collision detection and dynamics of one physics step.
-    pub step_us_median: f64,
+    #[serde(rename = "step_us_median")]
+    pub median_step_us: f64,
     /// Of the whole: physics, sensing and the robots' controllers.
     pub realtime_factor: f64,
 }
@@ -89,7 +90,7 @@ fn measure(situation: Situation, robots: usize) -> Result<PhysicsCase, SimError>
     Ok(PhysicsCase {
         name: situation.name(),
         robots,
-        step_us_median: median_us(&mut steps),
+        median_step_us: median_us(&mut steps),
         realtime_factor: f64::from(PHYSICS_DT_S) * 1e6 / median_us(&mut whole),
     })
 }
@@ -119,10 +120,10 @@ fn begin(situation: Situation, robots: usize) -> Result<(World, Vec<RobotCommand
     Ok((world, commands))
 }
 
-fn close(commands: &mut [RobotCommand], part: f32) {
+fn close(commands: &mut [RobotCommand], closed_share: f32) {
     for command in commands {
         let hand = &mut command.upper_rad[HAND_COLUMNS.right..HAND_COLUMNS.right + HAND_JOINTS];
-        hand.iter_mut().zip(CLOSED_RAD).for_each(|(target, closed)| *target = part * closed);
+        hand.iter_mut().zip(CLOSED_RAD).for_each(|(target, closed)| *target = closed_share * closed);
     }
 }
 

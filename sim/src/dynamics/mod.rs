@@ -11,6 +11,7 @@
 mod bias;
 mod contact;
 mod drive;
+mod efforts;
 mod equality;
 mod error;
 mod factor;
@@ -34,6 +35,7 @@ mod tests;
 mod touch;
 mod tree;
 mod trees;
+mod whiten;
 
 use rapier3d::prelude::{ColliderBuilder, ColliderHandle, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
 

@@ -116,7 +116,7 @@ mod tests {
     use crate::robot::RobotPlacement;
 
     /// What is sensed in the physics world is what the model's kinematics make of joints and pelvis: here of a robot in the
-    /// air, with an arm on the move.
+    /// air, touching nothing, with an arm on the move.
     #[test]
     fn sensed_poses_and_velocities_are_those_of_the_model() {
         let mut physics = PhysicsWorld::new();
@@ -128,7 +128,7 @@ mod tests {
         command.upper_rad[0] -= 0.1;
         for substep in 0..4 {
             robot.drive(&mut dynamics, &command, substep);
-            dynamics.step(&mut physics, &()).unwrap();
+            dynamics.advance(&physics.narrow_phase).unwrap();
         }
         let sensed = robot.measure(&dynamics);
         let body = Posed {

@@ -12,10 +12,11 @@ const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "sim",
         &[
-            &["units", "sides", "error"],
+            &["units", "sides", "dynamics", "owner"],
+            &["error"],
             &["assets"],
             &["mjcf"],
-            &["dynamics"],
+            &["mechanism"],
             &["body"],
             &["locomotion"],
             &["robot"],

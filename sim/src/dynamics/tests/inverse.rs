@@ -9,7 +9,6 @@ use super::bench::{Bench, DOWN, DT_S, Random, bush, hinge, stir};
 ///   c'' = o'' + dw x r + w x (w x r),  f = m (c'' - g),  n = I dw + w x I w.
 /// Of a free first link the force and the moment about its centre of mass.
 pub fn efforts(tree: &Tree, v: &[f64], a: &[f64], gravity_m_s2: DVec3) -> Vec<f64> {
-    let count = tree.links().len();
     let mut motion: Vec<(DVec3, DVec3, DVec3)> = Vec::new();
     let mut loads: Vec<(DVec3, DVec3)> = Vec::new();
     let mut dof = 0;
@@ -52,8 +51,13 @@ pub fn efforts(tree: &Tree, v: &[f64], a: &[f64], gravity_m_s2: DVec3) -> Vec<f6
         motion.push((spin, turn, origin));
         loads.push((force, moment));
     }
+    gathered(tree, a, loads, dof)
+}
+
+/// Sums what each link takes, force and moment about the world's origin, inwards along the tree.
+fn gathered(tree: &Tree, a: &[f64], mut loads: Vec<(DVec3, DVec3)>, mut dof: usize) -> Vec<f64> {
     let mut efforts = vec![0.0; dof];
-    for index in (0..count).rev() {
+    for index in (0..loads.len()).rev() {
         let link = &tree.links()[index];
         let (force, moment): (DVec3, DVec3) = loads[index];
         let pose = tree.world_from_link(index);

@@ -85,9 +85,9 @@ impl Target {
 
 /// Puts a triangle into those samples of a row that it is the nearest of. Nothing branches, and the slices are arguments,
 /// known not to overlap: so several samples are done at once.
-fn nearest(nearness_1_m: &mut [f32], triangle: &mut [u32], start: f32, step: f32, number: u32) {
+fn nearest(nearness_1_m: &mut [f32], triangle: &mut [u32], start_1_m: f32, step_1_m: f32, number: u32) {
     for (i, (nearest, owner)) in nearness_1_m.iter_mut().zip(triangle).enumerate() {
-        let nearness = start + step * i as i32 as f32;
+        let nearness = start_1_m + step_1_m * i as i32 as f32;
         // All bits of it are set, or none.
         let nearer = u32::from(nearness > *nearest).wrapping_neg();
         *nearest = nearest.max(nearness);
