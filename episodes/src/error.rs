@@ -1,4 +1,4 @@
-//! Why an episode refuses a call. None of these changes the world.
+//! Why an episode refuses a call. None of these changes the world, but for a physics that diverged, which ends the episode.
 
 use std::path::PathBuf;
 
