@@ -16,6 +16,10 @@ pub enum SimError {
     #[error("`{file}`: {what}")]
     Unsupported { file: String, what: String },
     #[error(
+        "this build cannot read `{path}`: ONNX policies are an extra; build with `cargo build --release --features onnx`"
+    )]
+    WithoutOnnx { path: String },
+    #[error(
         "`{path}` is not an ONNX file ({source}); a velocity policy for the G1 as AGILE exports it would work"
     )]
     NotOnnx { path: String, source: Box<dyn std::error::Error + Send + Sync> },

@@ -1,9 +1,12 @@
 //! Which base controller the robots of a world get.
 
 use std::path::Path;
+#[cfg(feature = "onnx")]
 use std::sync::Arc;
 
-use super::{Agile, Balance, BaseLimits, Locomotion, Network};
+#[cfg(feature = "onnx")]
+use super::{Agile, Network};
+use super::{Balance, BaseLimits, Locomotion};
 use crate::SimError;
 
 /// Cheap to clone: a file is read and checked once, and robots share its network.
@@ -13,6 +16,7 @@ pub enum LocomotionChoice {
     #[default]
     Balance,
     /// A velocity policy that was read from an ONNX file.
+    #[cfg(feature = "onnx")]
     Onnx(Arc<Network>),
 }
 
@@ -20,7 +24,7 @@ impl LocomotionChoice {
     /// The policy of a file, or our own controller without one.
     pub fn from_file(path: Option<&Path>) -> Result<LocomotionChoice, SimError> {
         Ok(match path {
-            Some(path) => LocomotionChoice::Onnx(Arc::new(Network::from_file(path)?)),
+            Some(path) => from_onnx(path)?,
             None => LocomotionChoice::Balance,
         })
     }
@@ -29,6 +33,7 @@ impl LocomotionChoice {
     pub fn controller(&self) -> Box<dyn Locomotion> {
         match self {
             LocomotionChoice::Balance => Box::new(Balance::default()),
+            #[cfg(feature = "onnx")]
             LocomotionChoice::Onnx(network) => Box::new(Agile::new(network.clone())),
         }
     }
@@ -42,7 +47,18 @@ impl LocomotionChoice {
     pub fn name(&self) -> &str {
         match self {
             LocomotionChoice::Balance => "balance",
+            #[cfg(feature = "onnx")]
             LocomotionChoice::Onnx(network) => network.name(),
         }
     }
+}
+
+#[cfg(feature = "onnx")]
+fn from_onnx(path: &Path) -> Result<LocomotionChoice, SimError> {
+    Ok(LocomotionChoice::Onnx(Arc::new(Network::from_file(path)?)))
+}
+
+#[cfg(not(feature = "onnx"))]
+fn from_onnx(path: &Path) -> Result<LocomotionChoice, SimError> {
+    Err(SimError::WithoutOnnx { path: path.display().to_string() })
 }

@@ -1,10 +1,12 @@
 //! Base control: turns a base command into torques of the twelve leg joints, through ground contact alone.
 
+#[cfg(feature = "onnx")]
 mod agile;
 mod balance;
 mod choice;
 pub(crate) mod plane;
 
+#[cfg(feature = "onnx")]
 pub use agile::{Agile, Network};
 pub use balance::Balance;
 pub use choice::LocomotionChoice;

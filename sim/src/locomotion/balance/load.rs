@@ -4,6 +4,7 @@ use rapier3d::math::Vector;
 
 use crate::GRAVITY_M_S2;
 use crate::body::WholeBody;
+use crate::locomotion::plane::flat;
 
 /// External wrench, world frame, and its effect on balance: weights in the hands and an observed push.
 pub(super) struct Load {
@@ -18,6 +19,8 @@ pub(super) struct Load {
 const PUSH_LEVER_M: f32 = 0.19;
 /// A lighter weight is arm motion and friction, not a load.
 const DEAD_ZONE_N: f32 = 6.0;
+/// More about the vertical than a foot can hold is not fed forward.
+const LARGEST_TURN_N_M: f32 = 20.0;
 
 impl Load {
     /// With height h of the centre of mass c over the ground and vertical load N = m g - f_z:
@@ -29,7 +32,10 @@ impl Load {
             let felt_n = Vector::new(0.0, 0.0, (hand_n.z + DEAD_ZONE_N).min(0.0));
             force_n += felt_n;
             moment_n_m += (palm_m - body.com_m).cross(felt_n);
+            // What turns the robot, the hands alone tell: the push acts over the centre of mass.
+            moment_n_m.z += (palm_m - body.com_m).cross(flat(hand_n)).z;
         }
+        moment_n_m.z = moment_n_m.z.clamp(-LARGEST_TURN_N_M, LARGEST_TURN_N_M);
         let pushing_n = push_m_s2 * body.model.mass_kg;
         force_n += pushing_n;
         moment_n_m += Vector::new(0.0, 0.0, PUSH_LEVER_M).cross(pushing_n);

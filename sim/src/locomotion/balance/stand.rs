@@ -200,6 +200,6 @@ fn balance_torques_n_m(
     let ground_force_n =
         supported_force_n(body.com_m, force_n - load.force_n, moment_n_m - load.moment_n_m, soles);
     let feet = distribute(body.com_m, ground_force_n, moment_n_m - load.moment_n_m, soles);
-    let turning_n_m = Vector::new(0.0, 0.0, moment_n_m.z * 0.5);
+    let turning_n_m = Vector::new(0.0, 0.0, (moment_n_m.z - load.moment_n_m.z) * 0.5);
     Sides::from_fn(|side| leg_torques_n_m(body, side, feet[side], turning_n_m))
 }

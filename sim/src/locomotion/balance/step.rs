@@ -28,7 +28,7 @@ const SHIFT_GAIN: f32 = 3.0;
 const SHIFTED_M: f32 = 0.012;
 const LATEST_M: f32 = 0.1;
 /// One foot holds little against turning: a robot that is turned by force gives way, and turns back slowly.
-const HEADING_LEASH_RAD: f32 = 0.12;
+const HEADING_LEASH_RAD: f32 = 0.2;
 const RETURN_RAD_S: f32 = 0.4;
 const LIFT_STIFFNESS_1_S2: f32 = 111.0;
 const LIFT_DAMPING_1_S: f32 = 15.0;
