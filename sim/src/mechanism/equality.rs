@@ -90,7 +90,8 @@ fn end(dynamics: &Dynamics, placed: &[Placed], world_from_file: &DPose3, body: O
     world
 }
 
-fn joint_link(placed: &[Placed], joint: &str) -> Option<LinkId> {
+/// The link that a joint of a file moves, unless that is a part of the world.
+pub(super) fn joint_link(placed: &[Placed], joint: &str) -> Option<LinkId> {
     placed.iter().find_map(|Placed { tree, id }| {
         let index = tree.links.iter().position(|link| link.joint.name() == Some(joint))?;
         Some((*id)?.link(index))

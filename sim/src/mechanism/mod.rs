@@ -1,14 +1,20 @@
-//! From what files say to what dynamics takes: surfaces, links and equalities. Robots and objects are made of these.
+//! From what files say to what dynamics takes: surfaces, links, equalities, actuators and the state to begin with. Robots and
+//! objects are made of these.
 
 mod equality;
+mod machinery;
+mod start;
 
 use rapier3d::math::Pose;
 use rapier3d::prelude::{ActiveHooks, ColliderBuilder, PhysicsWorld};
 
+use equality::joint_link;
 pub(crate) use equality::{Placed, add_equalities};
+pub(crate) use machinery::{Machinery, START};
+pub(crate) use start::begin;
 
 use crate::dynamics::{Axis, DPose3, DQuat, Directions, Dynamics, Friction, Joint, Link, LinkId, Mass};
-use crate::mjcf::{AxisJoint, BodyLink, BodyTree, ContactKind, Geom, LinkJoint, Surface};
+use crate::mjcf::{Actuator, AxisJoint, BodyLink, BodyTree, ContactKind, Geom, LinkJoint, Surface};
 use crate::owner::Owner;
 
 /// In full precision; the rotation is a unit quaternion again.
@@ -32,8 +38,8 @@ pub(crate) fn add_collider(
 ) {
     let Some((body_from_shape, shape)) = geom.collider().filter(|_| geom.collides) else { return };
     let hooks = match owner {
-        Some(Owner::Link { .. }) => ActiveHooks::FILTER_CONTACT_PAIRS,
-        Some(Owner::Object(_)) | None => ActiveHooks::empty(),
+        Some(Owner::Link { .. } | Owner::Object(_)) => ActiveHooks::FILTER_CONTACT_PAIRS,
+        None => ActiveHooks::empty(),
     };
     let collider = ColliderBuilder::new(shape)
         .position(body_from_shape)
@@ -59,12 +65,13 @@ fn friction(surface: &Surface) -> Friction {
     }
 }
 
-/// Links of a tree of a file, which is put at `world_from_file` with its top.
-pub(crate) fn links(tree: &BodyTree, world_from_file: &DPose3) -> Vec<Link> {
-    tree.links.iter().map(|link| self::link(link, world_from_file)).collect()
+/// Links of a tree of a file, which is put at `world_from_file` with its top. Drives of its joints are as strong as the
+/// file's actuators.
+pub(crate) fn links(tree: &BodyTree, world_from_file: &DPose3, actuators: &[Actuator]) -> Vec<Link> {
+    tree.links.iter().map(|link| self::link(link, world_from_file, actuators)).collect()
 }
 
-fn link(link: &BodyLink, world_from_file: &DPose3) -> Link {
+fn link(link: &BodyLink, world_from_file: &DPose3, actuators: &[Actuator]) -> Link {
     Link {
         name: link.name.clone(),
         parent: link.parent,
@@ -75,14 +82,16 @@ fn link(link: &BodyLink, world_from_file: &DPose3) -> Link {
         joint: match &link.joint {
             LinkJoint::Fixed => Joint::Fixed,
             LinkJoint::Free { .. } => Joint::Free,
-            LinkJoint::Hinge(joint) => Joint::Hinge(axis(joint)),
-            LinkJoint::Slide(joint) => Joint::Slide(axis(joint)),
+            LinkJoint::Hinge(joint) => Joint::Hinge(axis(joint, actuators)),
+            LinkJoint::Slide(joint) => Joint::Slide(axis(joint, actuators)),
         },
         mass: Mass::from_rapier(&link.mass),
     }
 }
 
-fn axis(joint: &AxisJoint) -> Axis {
+fn axis(joint: &AxisJoint, actuators: &[Actuator]) -> Axis {
+    let actuator = actuators.iter().find(|actuator| actuator.joint == joint.name);
+    let effort_range = actuator.and_then(|actuator| actuator.effort_range);
     Axis {
         direction: joint.direction,
         anchor_m: joint.anchor_m,
@@ -92,6 +101,6 @@ fn axis(joint: &AxisJoint) -> Axis {
         stiffness: joint.stiffness,
         spring_rest: joint.spring_rest,
         range: joint.range,
-        effort_limit: f64::INFINITY,
+        effort_limit: effort_range.map_or(f64::INFINITY, |[_, most]| most),
     }
 }

@@ -55,6 +55,15 @@ impl LinkJoint {
         }
     }
 
+    /// Numbers of MuJoCo's `qvel`.
+    pub fn freedoms(&self) -> usize {
+        match self {
+            LinkJoint::Fixed => 0,
+            LinkJoint::Free { .. } => 6,
+            LinkJoint::Hinge(_) | LinkJoint::Slide(_) => 1,
+        }
+    }
+
     /// Numbers of MuJoCo's `qpos`: a free joint has a position and a quaternion.
     pub fn coordinates(&self) -> usize {
         match self {

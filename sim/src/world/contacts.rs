@@ -1,6 +1,6 @@
 //! Which colliders may touch, and what a hand feels of an object.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use rapier3d::math::Vector;
@@ -12,25 +12,23 @@ use crate::body::{HandLinks, RobotModel};
 use crate::owner::Owner;
 use crate::{PHYSICS_DT_S, Side, Sides};
 
-/// Leaves out the contacts inside a robot that its file excludes.
-pub(super) struct SelfCollision {
-    model: Arc<RobotModel>,
+/// Leaves out the contacts inside a robot, and between the objects of a scene, that their files exclude.
+pub(super) struct Exclusions {
+    /// `None` while there is no robot.
+    pub model: Option<Arc<RobotModel>>,
+    /// Smaller index first.
+    pub objects: BTreeSet<(usize, usize)>,
 }
 
-impl SelfCollision {
-    pub(super) fn new(model: Arc<RobotModel>) -> SelfCollision {
-        SelfCollision { model }
-    }
-}
-
-impl PhysicsHooks for SelfCollision {
+impl PhysicsHooks for Exclusions {
     fn filter_contact_pair(&self, pair: &PairFilterContext) -> Option<SolverFlags> {
         let [first, second] =
             [pair.collider1, pair.collider2].map(|handle| Owner::of_tag(pair.colliders[handle].user_data));
         let apart = match (first, second) {
             (Some(Owner::Link { robot: a, link: link_a }), Some(Owner::Link { robot: b, link: link_b })) => {
-                a == b && !self.model.may_touch(link_a, link_b)
+                a == b && self.model.as_ref().is_some_and(|model| !model.may_touch(link_a, link_b))
             }
+            (Some(Owner::Object(a)), Some(Owner::Object(b))) => self.objects.contains(&(a.min(b), a.max(b))),
             _ => false,
         };
         (!apart).then_some(SolverFlags::COMPUTE_RIGID_IMPULSES)

@@ -16,12 +16,13 @@ pub use step::{HandContacts, ObjectStep, RobotStep, Step, Touch};
 
 use crate::body::RobotModel;
 use crate::dynamics::{DVec3, Diverged, Dynamics, Settings};
+use crate::mechanism::Machinery;
 use crate::mjcf::{Document, MjcfCamera};
 use crate::robot::{Robot, RobotCommand, RobotPlacement};
-use crate::{GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError, assets};
-use contacts::SelfCollision;
+use crate::{CONTROL_HZ, GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError, assets};
+use contacts::Exclusions;
 use disturb::Push;
-use objects::Object;
+use objects::{Furniture, Object};
 
 /// Everything a world is made of.
 #[derive(Clone, Debug)]
@@ -37,9 +38,11 @@ pub struct World {
     /// Collision detection; its bodies are where [`World::dynamics`] puts them.
     physics: PhysicsWorld,
     dynamics: Dynamics,
-    hooks: SelfCollision,
+    hooks: Exclusions,
     robots: Vec<Robot>,
     objects: Vec<Object>,
+    /// Drives the joints of the scene.
+    machinery: Machinery,
     /// Geoms of the scene that do not move, world frame.
     fixed: Vec<crate::mjcf::Geom>,
     cameras: Vec<MjcfCamera>,
@@ -57,25 +60,33 @@ impl World {
 
     /// As [`World::new`], of robots of another file.
     pub fn with_robot(spec: &WorldSpec, model: Arc<RobotModel>) -> Result<World, SimError> {
-        let scene = Document::parse(&spec.scene, assets::scene(&spec.scene)?)?;
+        let mut world = World::of_scene(Document::parse(&spec.scene, assets::scene(&spec.scene)?)?)?;
+        let (dynamics, physics) = (&mut world.dynamics, &mut world.physics);
+        for placement in &spec.objects {
+            objects::insert_object(dynamics, physics, placement, &mut world.objects)?;
+        }
+        for (index, placement) in spec.robots.iter().enumerate() {
+            world.robots.push(Robot::spawn(dynamics, physics, &model, placement, index)?);
+        }
+        world.hooks.model = Some(model);
+        Ok(world)
+    }
+
+    /// A scene with what its own file has in it, and no more. It begins as its key `start` has it; its actuators do what
+    /// that key tells them, and from the time of every later key what that one does.
+    pub fn of_scene(scene: Document) -> Result<World, SimError> {
         let gravity_m_s2 = DVec3::new(0.0, 0.0, -f64::from(GRAVITY_M_S2));
         let mut dynamics = Dynamics::new(Settings::new(f64::from(PHYSICS_DT_S), gravity_m_s2));
         let mut physics = PhysicsWorld::new();
-        let (fixed, mut objects) = objects::insert_scene(&mut dynamics, &mut physics, &scene)?;
-        for placement in &spec.objects {
-            objects::insert_object(&mut dynamics, &mut physics, placement, &mut objects)?;
-        }
-        let mut robots = Vec::with_capacity(spec.robots.len());
-        for (index, placement) in spec.robots.iter().enumerate() {
-            robots.push(Robot::spawn(&mut dynamics, &mut physics, &model, placement, index)?);
-        }
-        let hooks = SelfCollision::new(model);
+        let Furniture { fixed, objects, machinery, apart } =
+            objects::insert_scene(&mut dynamics, &mut physics, &scene)?;
         Ok(World {
             physics,
             dynamics,
-            hooks,
-            robots,
+            hooks: Exclusions { model: None, objects: apart },
+            robots: Vec::new(),
             objects,
+            machinery,
             fixed,
             cameras: scene.cameras,
             pushes: Vec::new(),
@@ -96,11 +107,12 @@ impl World {
         Ok(self.present())
     }
 
-    /// Sets what acts on the robots in the next physics step.
+    /// Sets what acts on the robots and the scene's joints in the next physics step.
     pub(crate) fn drive(&mut self, commands: &[RobotCommand], substep: u32) {
         for (robot, command) in self.robots.iter_mut().zip(commands) {
             robot.drive(&mut self.dynamics, command, substep);
         }
+        self.machinery.drive(&mut self.dynamics, self.control_steps as f64 / CONTROL_HZ);
         self.pushes.iter().for_each(|push| push.apply(&mut self.dynamics));
     }
 
@@ -126,6 +138,13 @@ impl World {
     /// Cameras of the scene's file, world frame.
     pub fn cameras(&self) -> &[MjcfCamera] {
         &self.cameras
+    }
+
+    /// Position of a hinge (rad) or a slide (m) of an object, by the name that its file gives; the first that has it.
+    pub fn joint_position(&self, joint: &str) -> Option<f64> {
+        let named = |object: &&Object| object.joint.as_deref() == Some(joint);
+        let link = self.objects.iter().find(named)?.link?;
+        Some(self.dynamics.tree(link.tree).joint_position(link.link))
     }
 
     /// Every object's name and what its file says of it.

@@ -14,8 +14,13 @@ use super::{modules::modules, sources::expect_none};
 const CRATES: [&str; 4] = ["tools_spec", "sim", "episodes", "gateway"];
 
 /// In these files numbers belong to joints of any kind, in rad or m as in `ik`, or to rows of the solver, which mix them.
-const GENERALISED: [&str; 4] =
-    ["sim/src/dynamics/", "sim/src/mjcf/actuator.rs", "sim/src/mjcf/equality.rs", "sim/src/mjcf/joint.rs"];
+const GENERALISED: [&str; 5] = [
+    "sim/src/dynamics/",
+    "sim/src/mjcf/actuator.rs",
+    "sim/src/mjcf/equality.rs",
+    "sim/src/mjcf/joint.rs",
+    "sim/src/mjcf/key.rs",
+];
 
 /// Types that hold a quantity.
 const QUANTITIES: [&str; 5] = ["f32", "f64", "Vector", "Vector3", "Vec3"];

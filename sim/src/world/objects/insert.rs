@@ -1,24 +1,40 @@
 //! Puts scenes and objects into a world.
 
+use std::collections::BTreeSet;
+
 use rapier3d::math::Pose;
 use rapier3d::prelude::PhysicsWorld;
 
 use super::{Object, ObjectModel, ObjectPlacement};
 use crate::SimError;
-use crate::dynamics::{DPose3, Dynamics, Tree, TreeId};
-use crate::mechanism::{Placed, add_collider, add_equalities, links, precise, rounded};
+use crate::dynamics::{DPose3, Dynamics, Link, Tree, TreeId};
+use crate::mechanism::{
+    Machinery, Placed, START, add_collider, add_equalities, begin, links, precise, rounded,
+};
 use crate::mjcf::{BodyLink, BodyTree, Document, Geom};
 use crate::owner::Owner;
 
-/// Inserts a scene: bodies that no joint moves are its room, the links of the others become objects.
+/// What a scene's file brings into a world.
+pub(in crate::world) struct Furniture {
+    /// Geoms that do not move, world frame.
+    pub fixed: Vec<Geom>,
+    pub objects: Vec<Object>,
+    pub machinery: Machinery,
+    /// Pairs of objects that never touch, smaller index first.
+    pub apart: BTreeSet<(usize, usize)>,
+}
+
+/// Inserts a scene: bodies that no joint moves are its room, the links of the others become objects. All begin as the key
+/// `start` has them, if there is one.
 pub(in crate::world) fn insert_scene(
     dynamics: &mut Dynamics,
     physics: &mut PhysicsWorld,
     scene: &Document,
-) -> Result<(Vec<Geom>, Vec<Object>), SimError> {
+) -> Result<Furniture, SimError> {
     let mut fixed = Vec::new();
     let mut objects = Vec::new();
     let trees = scene.trees()?;
+    let actuators = scene.actuators()?;
     let mut placed = Vec::with_capacity(trees.len());
     for tree in &trees {
         let id = if tree.is_fixed() {
@@ -29,12 +45,36 @@ pub(in crate::world) fn insert_scene(
             None
         } else {
             let name = |link: &BodyLink| link.name.clone();
-            Some(insert_moving(dynamics, physics, tree, &DPose3::IDENTITY, name, &mut objects)?)
+            let tree_links = links(tree, &DPose3::IDENTITY, &actuators);
+            Some(insert_moving(dynamics, physics, tree, tree_links, name, &mut objects)?)
         };
         placed.push(Placed { tree, id });
     }
+    // Welds hold bodies as they are placed, whatever they begin with.
     add_equalities(dynamics, scene, &placed, &DPose3::IDENTITY)?;
-    Ok((fixed, objects))
+    let machinery = Machinery::of(scene, &placed)?;
+    if let Some(start) = scene.keys()?.iter().find(|key| key.name == START) {
+        begin(dynamics, &placed, start);
+        dynamics.place_bodies(physics);
+    }
+    let apart = apart(scene, &trees)?;
+    Ok(Furniture { fixed, objects, machinery, apart })
+}
+
+/// Objects that the file's `<exclude>` keeps from touching, by their numbers.
+fn apart(scene: &Document, trees: &[BodyTree]) -> Result<BTreeSet<(usize, usize)>, SimError> {
+    let moving = || trees.iter().filter(|tree| !tree.is_fixed()).flat_map(|tree| &tree.links);
+    let object = |name: &str| {
+        let found = moving().position(|link| link.bodies.iter().any(|body| body.name == name));
+        found.ok_or_else(|| scene.unsupported(format!("exclude of `{name}`, which is no body that moves")))
+    };
+    let excludes = scene.model.contact.excludes.iter();
+    excludes
+        .map(|pair| {
+            let (a, b) = (object(&pair.body1)?, object(&pair.body2)?);
+            Ok((a.min(b), a.max(b)))
+        })
+        .collect()
 }
 
 /// Inserts an object file: one top-level body, a mark if no joint moves it. The body has the placement's name, and the
@@ -57,6 +97,7 @@ pub(in crate::world) fn insert_object(
             name: placement.name.clone(),
             model: ObjectModel::of(&tree.links[0]),
             link: None,
+            joint: None,
             world_from_mark: placement.world_from_object * rounded(&tree.links[0].parent_from_link),
         });
         return Ok(());
@@ -65,7 +106,8 @@ pub(in crate::world) fn insert_object(
         None => placement.name.clone(),
         Some(_) => format!("{} {}", placement.name, link.name),
     };
-    let id = insert_moving(dynamics, physics, &tree, &world_from_file, name, objects)?;
+    let tree_links = links(&tree, &world_from_file, &[]);
+    let id = insert_moving(dynamics, physics, &tree, tree_links, name, objects)?;
     add_equalities(dynamics, &document, &[Placed { tree: &tree, id: Some(id) }], &world_from_file)
 }
 
@@ -73,11 +115,11 @@ fn insert_moving(
     dynamics: &mut Dynamics,
     physics: &mut PhysicsWorld,
     tree: &BodyTree,
-    world_from_file: &DPose3,
+    links: Vec<Link>,
     name: impl Fn(&BodyLink) -> String,
     objects: &mut Vec<Object>,
 ) -> Result<TreeId, SimError> {
-    let id = dynamics.add_tree(Tree::new(&name(&tree.links[0]), links(tree, world_from_file))?, physics);
+    let id = dynamics.add_tree(Tree::new(&name(&tree.links[0]), links)?, physics);
     for (index, link) in tree.links.iter().enumerate() {
         let owner = Owner::Object(objects.len());
         for geom in &link.geoms {
@@ -87,6 +129,7 @@ fn insert_moving(
             name: name(link),
             model: ObjectModel::of(link),
             link: Some(id.link(index)),
+            joint: link.joint.name().map(String::from),
             world_from_mark: Pose::IDENTITY,
         });
     }

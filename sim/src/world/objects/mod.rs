@@ -13,7 +13,7 @@ pub use model::ObjectModel;
 use crate::dynamics::{Dynamics, LinkId};
 use crate::mechanism::rounded;
 
-pub(super) use insert::{insert_object, insert_scene};
+pub(super) use insert::{Furniture, insert_object, insert_scene};
 
 /// An object file put into the world.
 #[derive(Clone, Debug)]
@@ -39,6 +39,8 @@ pub(super) struct Object {
     pub name: String,
     pub model: ObjectModel,
     pub link: Option<LinkId>,
+    /// Of a link, as its file calls it.
+    pub joint: Option<String>,
     /// Where a mark lies; a link's pose is that of dynamics.
     pub world_from_mark: Pose,
 }
