@@ -31,8 +31,10 @@ pub(super) struct Contact<const N: usize> {
     /// 1 / (1 + softness).
     firmness: f64,
     inverse_friction: [f64; N],
-    /// Y Y^T.
+    /// Y Y^T, the inverses of its diagonal, and of its blocks over the tangents and over the rolls.
     inverse_mass: [[f64; N]; N],
+    mass: [f64; N],
+    pair_mass: [Block; 2],
     /// s mu_c^2, with s below the inverse of the largest eigenvalue of  diag(mu) A diag(mu)  over the friction lanes.
     slide_gain: [f64; N],
     pub impulse: [f64; N],
@@ -66,6 +68,8 @@ impl<const N: usize> Contacts<N> {
             bias_m_s: terms.bias_m_s,
             firmness: 1.0 / (1.0 + terms.softness),
             inverse_friction: mu.map(|mu| if mu > 0.0 { 1.0 / mu } else { 0.0 }),
+            mass: std::array::from_fn(|lane| inverse(inverse_mass[lane][lane])),
+            pair_mass: [1, 4].map(|lane| Block::inverse_of(&inverse_mass, lane)),
             inverse_mass,
             slide_gain: mu.map(|mu| step * mu * mu),
             impulse: terms.impulse,
@@ -106,7 +110,7 @@ impl<const N: usize> Contact<N> {
             Pass::Correcting => (self.bias_m_s[0], self.firmness),
             Pass::Relaxing => (self.bias_m_s[1], 1.0),
         };
-        let normal = (firmness * (old[0] - (v[0] + bias_m_s) / a[0][0])).max(0.0);
+        let normal = (firmness * (old[0] - (v[0] + bias_m_s) * self.mass[0])).max(0.0);
         if normal == 0.0 {
             return [0.0; N];
         }
@@ -141,39 +145,60 @@ impl<const N: usize> Contact<N> {
     fn stick(&self, mut v: [f64; N]) -> [f64; N] {
         let (a, old) = (&self.inverse_mass, &self.impulse);
         let mut new = *old;
-        self.stop_pair(1, &v, &mut new);
+        self.stop_pair(1, &self.pair_mass[0], &v, &mut new);
         if N > 3 {
             v[3] += a[1][3] * (new[1] - old[1]) + a[2][3] * (new[2] - old[2]);
-            new[3] =
-                if self.inverse_friction[3] > 0.0 && a[3][3] > 0.0 { old[3] - v[3] / a[3][3] } else { 0.0 };
+            new[3] = if self.inverse_friction[3] > 0.0 { old[3] - v[3] * self.mass[3] } else { 0.0 };
         }
         if N > 5 {
             for c in 4..6 {
                 v[c] += (1..4).map(|d| a[d][c] * (new[d] - old[d])).sum::<f64>();
             }
-            self.stop_pair(4, &v, &mut new);
+            self.stop_pair(4, &self.pair_mass[1], &v, &mut new);
         }
         new
     }
 
-    /// Solves for two lanes; each by itself where they are not independent.
+    /// Solves for two lanes together.
     #[inline]
-    fn stop_pair(&self, lane: usize, v: &[f64; N], impulse: &mut [f64; N]) {
+    fn stop_pair(&self, lane: usize, mass: &Block, v: &[f64; N], impulse: &mut [f64; N]) {
         if self.inverse_friction[lane] == 0.0 {
             (impulse[lane], impulse[lane + 1]) = (0.0, 0.0);
             return;
         }
-        let a = &self.inverse_mass;
+        impulse[lane] -= mass.first * v[lane] + mass.across * v[lane + 1];
+        impulse[lane + 1] -= mass.across * v[lane] + mass.second * v[lane + 1];
+    }
+}
+
+/// Symmetric 2 x 2 matrix.
+#[derive(Default)]
+struct Block {
+    first: f64,
+    across: f64,
+    second: f64,
+}
+
+impl Block {
+    /// Inverse of the block of two lanes that begins at `lane`, if there is one. Of two that are not independent each is taken
+    /// by itself and does half.
+    fn inverse_of<const N: usize>(a: &[[f64; N]; N], lane: usize) -> Block {
+        if lane + 1 >= N {
+            return Block::default();
+        }
         let (p, q, r) = (a[lane][lane], a[lane][lane + 1], a[lane + 1][lane + 1]);
         let determinant = p * r - q * q;
         if determinant > DEPENDENT * p * r {
-            impulse[lane] -= (r * v[lane] - q * v[lane + 1]) / determinant;
-            impulse[lane + 1] -= (p * v[lane + 1] - q * v[lane]) / determinant;
+            Block { first: r / determinant, across: -q / determinant, second: p / determinant }
         } else {
-            impulse[lane] -= if p > 0.0 { 0.5 * v[lane] / p } else { 0.0 };
-            impulse[lane + 1] -= if r > 0.0 { 0.5 * v[lane + 1] / r } else { 0.0 };
+            Block { first: 0.5 * inverse(p), across: 0.0, second: 0.5 * inverse(r) }
         }
     }
+}
+
+/// 0 for what nothing moves.
+fn inverse(inverse_mass: f64) -> f64 {
+    if inverse_mass > 0.0 { inverse_mass.recip() } else { 0.0 }
 }
 
 /// Two directions whose determinant is below this share are one.

@@ -11,6 +11,9 @@ pub(super) struct Rows<const N: usize> {
     start: Vec<usize>,
 }
 
+/// Sums that grow side by side: an addition waits for the one before it.
+const CHAINS: usize = 4;
+
 impl<const N: usize> Default for Rows<N> {
     fn default() -> Self {
         Rows { y: Vec::new(), column: Vec::new(), start: vec![0] }
@@ -94,14 +97,24 @@ impl<const N: usize> Rows<N> {
     #[inline]
     pub fn velocity(&self, group: usize, w: &[f64]) -> [f64; N] {
         let (y, column) = self.group(group);
-        let mut v = [0.0; N];
-        for (y, column) in y.iter().zip(column) {
-            let w = w[usize::from(*column)];
-            for c in 0..N {
-                v[c] += y[c] * w;
+        let mut sums = [[0.0; N]; CHAINS];
+        let (whole, whole_columns) = (y.chunks_exact(CHAINS), column.chunks_exact(CHAINS));
+        let (rest, rest_columns) = (whole.remainder(), whole_columns.remainder());
+        for (y, column) in whole.zip(whole_columns) {
+            for chain in 0..CHAINS {
+                let w = w[usize::from(column[chain])];
+                for c in 0..N {
+                    sums[chain][c] += y[chain][c] * w;
+                }
             }
         }
-        v
+        for (chain, (y, column)) in rest.iter().zip(rest_columns).enumerate() {
+            let w = w[usize::from(*column)];
+            for c in 0..N {
+                sums[chain][c] += y[c] * w;
+            }
+        }
+        std::array::from_fn(|c| sums.iter().map(|sum| sum[c]).sum())
     }
 
     /// Adds the impulses of a group.

@@ -14,8 +14,9 @@ pub(super) struct JointRows {
 struct JointRow {
     tree: usize,
     link: usize,
-    /// Y . Y.
+    /// Y . Y, and its inverse.
     inverse_mass: f64,
+    mass: f64,
     drive: Option<BoundedDrive>,
     dry: DryFriction,
     range: Option<Range>,
@@ -74,6 +75,7 @@ impl JointRows {
                 tree: index,
                 link: i,
                 inverse_mass,
+                mass: inverse_mass.recip(),
                 drive: tree.bounded[i].then(|| BoundedDrive::new(tree, i, dt_s)),
                 dry: DryFriction { most, impulse: tree.dry_friction[i].clamp(-most, most) },
                 range: range.map(|[low, high]| Range {
@@ -99,15 +101,16 @@ impl JointRows {
         for (group, row) in self.all.iter_mut().enumerate() {
             let [before] = self.rows.velocity(group, w);
             let mut v = before;
+            let (inverse_mass, mass) = (row.inverse_mass, row.mass);
             if let Some(drive) = &mut row.drive {
-                drive.update(row.inverse_mass, &mut v);
+                drive.update(inverse_mass, &mut v);
             }
-            row.dry.update(row.inverse_mass, &mut v);
+            row.dry.update(inverse_mass, mass, &mut v);
             if let Some(range) = &mut row.range {
-                range.update(pass, row.inverse_mass, &mut v);
+                range.update(pass, inverse_mass, mass, &mut v);
             }
             if v != before {
-                self.rows.push_impulse(group, &[(v - before) / row.inverse_mass], w);
+                self.rows.push_impulse(group, &[(v - before) * mass], w);
             }
         }
     }
@@ -151,9 +154,9 @@ impl BoundedDrive {
 }
 
 impl DryFriction {
-    fn update(&mut self, inverse_mass: f64, v: &mut f64) {
+    fn update(&mut self, inverse_mass: f64, mass: f64, v: &mut f64) {
         if self.most > 0.0 {
-            let impulse = (self.impulse - *v / inverse_mass).clamp(-self.most, self.most);
+            let impulse = (self.impulse - *v * mass).clamp(-self.most, self.most);
             *v += inverse_mass * (impulse - self.impulse);
             self.impulse = impulse;
         }
@@ -161,15 +164,15 @@ impl DryFriction {
 }
 
 impl Range {
-    fn update(&mut self, pass: Pass, inverse_mass: f64, v: &mut f64) {
+    fn update(&mut self, pass: Pass, inverse_mass: f64, mass: f64, v: &mut f64) {
         let at = match pass {
             Pass::Correcting => 0,
             Pass::Relaxing => 1,
         };
-        let up = (self.impulse_up - (*v + self.down[at]) / inverse_mass).max(0.0);
+        let up = (self.impulse_up - (*v + self.down[at]) * mass).max(0.0);
         *v += inverse_mass * (up - self.impulse_up);
         self.impulse_up = up;
-        let down = (self.impulse_down - (*v - self.up[at]) / inverse_mass).min(0.0);
+        let down = (self.impulse_down - (*v - self.up[at]) * mass).min(0.0);
         *v += inverse_mass * (down - self.impulse_down);
         self.impulse_down = down;
     }

@@ -1,14 +1,16 @@
-//! Articulated trees and their contacts: dynamics in reduced coordinates on Rapier's collision detection.
+//! Articulated trees and their contacts: dynamics in reduced coordinates on the collision detection of Rapier and Parry.
 //!
-//! [`Dynamics`] owns the motion of everything that moves; Rapier's bodies hold poses for its colliders and no more. A step
-//! ([`Dynamics::step`]) is, for every [`Tree`]: bias forces (`bias`), mass matrix (`inertia`), its factor M = L^T D L and
-//! whitened velocities (`factor`); then rows of contacts (`pairs`, `contact`), joints (`joint_rows`) and equalities
+//! A step ([`Dynamics::step`]) finds what is near (`near`: Rapier's broad phase) and where it touches (`collision`: Parry's
+//! manifolds). Then it is, for every [`Tree`]: bias forces (`bias`), mass matrix (`inertia`), its factor M = L^T D L and
+//! whitened velocities (`factor`); then rows of contacts (`contact`), joints (`joint_rows`) and equalities
 //! (`equality`), Gauss-Seidel on them (`solver`), and new positions (`kinematics`). It knows no robot and no file format.
 //!
 //! SI units, radians, world axes with z wherever gravity says, f64 throughout. The same sequence of calls gives the same
-//! bits: trees and colliders count in the order in which they were added, and pairs are sorted by it.
+//! bits: trees and colliders count in the order in which they were added, and so do contacts.
 
 mod bias;
+mod collider;
+mod collision;
 mod contact;
 mod drive;
 mod efforts;
@@ -23,7 +25,7 @@ mod joint_rows;
 mod kinematics;
 mod layout;
 mod link;
-mod pairs;
+mod near;
 mod settings;
 mod snapshot;
 mod solver;
@@ -37,8 +39,7 @@ mod tree;
 mod trees;
 mod whiten;
 
-use rapier3d::prelude::{ColliderBuilder, ColliderHandle, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
-
+pub use collider::{Collider, ColliderId};
 pub use drive::Drive;
 pub use equality::{Equality, EqualityId};
 pub use error::{Diverged, OtherWorld, TreeError};
@@ -52,18 +53,15 @@ pub use touch::Touch;
 pub use tree::Tree;
 pub use trees::{LinkId, TreeId};
 
-use pairs::Pairs;
+use collision::Collision;
 use solver::Solver;
-use spatial::{pose_from_rapier, pose_to_rapier};
 use trees::Trees;
 
 /// Everything that moves in a world.
 pub struct Dynamics {
     pub settings: Settings,
     trees: Trees,
-    /// Rapier's body of each link.
-    bodies: Vec<Vec<RigidBodyHandle>>,
-    pairs: Pairs,
+    collision: Collision,
     solver: Solver,
     /// Velocities of all trees by which positions move, and those at the end of the step.
     moving_v: Vec<f64>,
@@ -75,21 +73,14 @@ impl Dynamics {
         Dynamics {
             settings,
             trees: Trees::default(),
-            bodies: Vec::new(),
-            pairs: Pairs::default(),
+            collision: Collision::default(),
             solver: Solver::default(),
             moving_v: Vec::new(),
             final_v: Vec::new(),
         }
     }
 
-    /// Takes over a tree and gives each of its links a body for colliders. Rapier must not step these bodies itself.
-    pub fn add_tree(&mut self, tree: Tree, physics: &mut PhysicsWorld) -> TreeId {
-        let holder = |link| {
-            let pose = pose_to_rapier(&tree.world_from_link(link));
-            physics.insert_body(RigidBodyBuilder::dynamic().pose(pose).can_sleep(false))
-        };
-        self.bodies.push((0..tree.links().len()).map(holder).collect());
+    pub fn add_tree(&mut self, tree: Tree) -> TreeId {
         let id = self.trees.push(tree);
         let dofs = self.trees.dofs();
         self.solver.w.resize(dofs, 0.0);
@@ -98,19 +89,14 @@ impl Dynamics {
         id
     }
 
-    /// Inserts a collider on a link, or fixed in the world; its position is in the frame of either. Mass comes from links
-    /// and friction from here, whatever the builder says.
-    pub fn add_collider(
-        &mut self,
-        collider: ColliderBuilder,
-        on: Option<LinkId>,
-        friction: Friction,
-        physics: &mut PhysicsWorld,
-    ) -> ColliderHandle {
-        let body_from_shape = pose_from_rapier(&collider.position);
-        let handle = physics.insert_collider(collider.density(0.0), on.map(|link| self.body(link)));
-        self.pairs.register(handle, on, body_from_shape, friction);
-        handle
+    /// Adds a collider; it has no mass.
+    pub fn add_collider(&mut self, collider: Collider) -> ColliderId {
+        self.collision.add(collider, &self.trees, &self.settings)
+    }
+
+    /// From now on these links never touch. To be called before the first step.
+    pub fn keep_apart(&mut self, a: LinkId, b: LinkId) {
+        self.collision.keep_apart(a, b);
     }
 
     pub fn add_equality(&mut self, equality: Equality, active: bool) -> EqualityId {
@@ -130,9 +116,8 @@ impl Dynamics {
         &mut self.trees.all[id.index()]
     }
 
-    /// Rapier's body that carries a link's colliders.
-    pub fn body(&self, id: LinkId) -> RigidBodyHandle {
-        self.bodies[id.tree.index()][id.link]
+    pub fn collider(&self, id: ColliderId) -> &Collider {
+        self.collision.collider(id)
     }
 
     /// All points of contact of the last step.
@@ -142,7 +127,7 @@ impl Dynamics {
 
     /// What pressed on a collider in the last step: the other collider and the force on this one (N, world axes),
     /// friction included, point by point.
-    pub fn forces_on(&self, collider: ColliderHandle) -> impl Iterator<Item = (ColliderHandle, DVec3)> {
+    pub fn forces_on(&self, collider: ColliderId) -> impl Iterator<Item = (ColliderId, DVec3)> {
         let per_s = 1.0 / self.settings.dt_s;
         self.touches().iter().filter_map(move |touch| match touch.colliders {
             [other, this] if this == collider => Some((other, touch.impulse_n_s * per_s)),

@@ -38,8 +38,6 @@ pub struct Settings {
     pub slop_m: f64,
     /// Depth is taken back no faster than this.
     pub fastest_correction_m_s: f64,
-    /// Gaps up to this width are seen by collision detection.
-    pub prediction_m: f64,
     /// A gap that would stay open if it closed faster by this gets no row.
     pub margin_m_s: f64,
     /// A contact continues one of the last step that lies no farther away.
@@ -59,7 +57,6 @@ impl Settings {
             ground_contact: Softness { frequency_hz: 120.0, damping_ratio: 5.0 },
             slop_m: 0.0002,
             fastest_correction_m_s: 3.0,
-            prediction_m: 0.02,
             margin_m_s: 0.5,
             match_m: 0.004,
             joint_correction_per_s: 40.0,

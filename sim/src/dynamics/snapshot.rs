@@ -8,7 +8,7 @@ use super::error::OtherWorld;
 use super::state::TreeState;
 use super::touch::Touch;
 
-/// State of all trees, equalities and contacts, in full precision. Rapier's world is saved beside it.
+/// State of all trees, equalities and contacts, in full precision.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DynamicsState {
     pub(super) trees: Vec<TreeState>,
@@ -25,8 +25,7 @@ impl Dynamics {
         }
     }
 
-    /// Takes back a state of this world, or of one made like it. Rapier's bodies are left to whoever restores Rapier's
-    /// world. An error leaves all as it was.
+    /// Takes back a state of this world, or of one made like it. An error leaves all as it was.
     pub fn restore(&mut self, state: &DynamicsState) -> Result<(), OtherWorld> {
         let trees = &mut self.trees.all;
         let fits = trees.len() == state.trees.len()

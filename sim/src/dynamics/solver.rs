@@ -1,10 +1,9 @@
 //! Contacts, joints and equalities of a step, and the impulses that meet them: projected Gauss-Seidel on whitened velocities.
 
-use super::contact::{Contacts, Terms};
+use super::contact::{Contact, Contacts, Terms};
 use super::equality::Equalities;
 use super::friction::Directions;
 use super::joint_rows::JointRows;
-use super::pairs::Pairs;
 use super::settings::{Pass, Settings};
 use super::spatial::Force;
 use super::touch::{Candidate, Impulses, Touch, continued};
@@ -16,10 +15,10 @@ pub(super) struct Solver {
     pub w: Vec<f64>,
     joints: JointRows,
     pub equalities: Equalities,
-    /// Contacts that slide and spin, and contacts that also resist rolling; both in the order of the pairs.
+    /// Contacts that slide and spin, and contacts that also resist rolling; both in the order of the candidates.
     plain: Contacts<4>,
     rolling: Contacts<6>,
-    /// Of the last step, in the order of their keys.
+    /// Of the last step, in the order of their colliders.
     pub touches: Vec<Touch>,
     /// Of this step; [`Solver::commit`] makes them those of the last.
     found: Vec<Touch>,
@@ -27,7 +26,7 @@ pub(super) struct Solver {
 
 impl Solver {
     /// Builds all rows. The trees are factorised, and `w` holds the velocities without constraints.
-    pub fn prepare(&mut self, trees: &Trees, pairs: &Pairs, settings: &Settings) {
+    pub fn prepare(&mut self, trees: &Trees, candidates: &[Candidate], settings: &Settings) {
         self.joints.clear();
         for (index, (tree, offset)) in trees.all.iter().zip(&trees.offset).enumerate() {
             self.joints.push_tree(tree, index, *offset, settings);
@@ -36,14 +35,13 @@ impl Solver {
         self.plain.clear();
         self.rolling.clear();
         let mut before = 0;
-        for index in &pairs.order {
-            let candidate = &pairs.candidates[*index as usize];
+        for candidate in candidates {
             let touch = &candidate.touch;
-            let pair = (touch.key.0, touch.key.1);
-            while self.touches.get(before).is_some_and(|old| (old.key.0, old.key.1) < pair) {
+            while self.touches.get(before).is_some_and(|old| old.colliders < touch.colliders) {
                 before += 1;
             }
-            let same = self.touches[before..].iter().take_while(|old| (old.key.0, old.key.1) == pair).count();
+            let of_pair = |old: &&Touch| old.colliders == touch.colliders;
+            let same = self.touches[before..].iter().take_while(of_pair).count();
             let old = continued(touch, &self.touches[before..before + same], settings.match_m);
             let impulse = old.unwrap_or_default().lanes(candidate.directions);
             match candidate.friction.directions {
@@ -56,7 +54,7 @@ impl Solver {
     }
 
     /// Impulses that correct positions; `w` is what positions move by. They are what the next step begins with.
-    pub fn correct(&mut self, pairs: &Pairs, sweeps: usize) {
+    pub fn correct(&mut self, candidates: &[Candidate], sweeps: usize) {
         self.joints.warm_start(&mut self.w);
         self.equalities.warm_start(&mut self.w);
         self.plain.warm_start(&mut self.w);
@@ -67,8 +65,7 @@ impl Solver {
         self.equalities.remember();
         self.found.clear();
         let (mut plain, mut rolling) = (self.plain.all.iter(), self.rolling.all.iter());
-        for index in &pairs.order {
-            let candidate = &pairs.candidates[*index as usize];
+        for candidate in candidates {
             let lanes = next_impulse(candidate, &mut plain, &mut rolling);
             let memory = Impulses::of_lanes(lanes, candidate.directions);
             self.found.push(Touch { memory, ..candidate.touch });
@@ -76,13 +73,12 @@ impl Solver {
     }
 
     /// Impulses without correction; `w` is then the velocity at the end of the step, and the touches tell what acted.
-    pub fn relax(&mut self, pairs: &Pairs, sweeps: usize) {
+    pub fn relax(&mut self, candidates: &[Candidate], sweeps: usize) {
         for _ in 0..sweeps {
             self.sweep(Pass::Relaxing);
         }
         let (mut plain, mut rolling) = (self.plain.all.iter(), self.rolling.all.iter());
-        for (touch, index) in self.found.iter_mut().zip(&pairs.order) {
-            let candidate = &pairs.candidates[*index as usize];
+        for (touch, candidate) in self.found.iter_mut().zip(candidates) {
             let lanes = next_impulse(candidate, &mut plain, &mut rolling);
             let acted = Impulses::of_lanes(lanes, candidate.directions);
             touch.normal_impulse_n_s = acted.normal;
@@ -137,8 +133,8 @@ fn push<const N: usize>(
 /// Impulses of the contact that a candidate became; candidates and contacts are in the same order.
 fn next_impulse<'a>(
     candidate: &Candidate,
-    plain: &mut impl Iterator<Item = &'a super::contact::Contact<4>>,
-    rolling: &mut impl Iterator<Item = &'a super::contact::Contact<6>>,
+    plain: &mut impl Iterator<Item = &'a Contact<4>>,
+    rolling: &mut impl Iterator<Item = &'a Contact<6>>,
 ) -> [f64; 6] {
     let mut lanes = [0.0; 6];
     match candidate.friction.directions {

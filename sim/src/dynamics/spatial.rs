@@ -232,11 +232,6 @@ pub(super) fn turned(rotation: DQuat, turn_rad: DVec3) -> DQuat {
     (DQuat::from_scaled_axis(turn_rad) * rotation).normalize()
 }
 
-/// Rapier's quaternions are unit only to f32.
-pub(super) fn pose_from_rapier(pose: &Pose) -> DPose3 {
-    DPose3::from_parts(pose.translation.as_dvec3(), pose.rotation.as_dquat().normalize())
-}
-
 pub(super) fn pose_to_rapier(pose: &DPose3) -> Pose {
     Pose::from_parts(pose.translation.as_vec3(), pose.rotation.as_quat())
 }

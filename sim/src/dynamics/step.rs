@@ -1,39 +1,15 @@
 //! One step of everything.
 
-use rapier3d::prelude::{NarrowPhase, PhysicsHooks, PhysicsWorld};
-
 use super::Dynamics;
 use super::error::Diverged;
-use super::spatial::{Force, pose_to_rapier};
+use super::spatial::Force;
 use super::tree::Tree;
 
 impl Dynamics {
-    /// Detects collisions, finds what forces act, and moves all trees and Rapier's bodies by one step. An error leaves all
-    /// state as it was.
-    pub fn step(&mut self, physics: &mut PhysicsWorld, hooks: &dyn PhysicsHooks) -> Result<(), Diverged> {
-        self.detect_collisions(physics, hooks);
-        self.advance(&physics.narrow_phase)?;
-        self.place_bodies(physics);
-        Ok(())
-    }
-
-    /// Rapier's broad and narrow phase at the poses of its bodies.
-    pub fn detect_collisions(&self, physics: &mut PhysicsWorld, hooks: &dyn PhysicsHooks) {
-        physics.collision_pipeline.step(
-            self.settings.prediction_m as f32,
-            &mut physics.islands,
-            &mut physics.broad_phase,
-            &mut physics.narrow_phase,
-            &mut physics.bodies,
-            &mut physics.colliders,
-            hooks,
-            &(),
-        );
-    }
-
-    /// The step of the trees, with the contacts that were detected last; once its buffers have grown it allocates nothing.
-    pub fn advance(&mut self, narrow_phase: &NarrowPhase) -> Result<(), Diverged> {
-        self.pairs.gather(narrow_phase, &self.trees, &self.settings);
+    /// Detects collisions, finds what forces act, and moves all trees by one step; once its buffers have grown it allocates
+    /// nothing. An error leaves all state as it was.
+    pub fn step(&mut self) -> Result<(), Diverged> {
+        self.collision.detect(&self.trees, &self.settings);
         self.trees.all.iter_mut().for_each(Tree::guess_bounded);
         self.solve();
         while self.bound_more() {
@@ -57,10 +33,11 @@ impl Dynamics {
         for (tree, range) in self.trees.ranges() {
             tree.prepare(settings.dt_s, settings.gravity_m_s2, &mut self.solver.w[range]);
         }
-        self.solver.prepare(&self.trees, &self.pairs, settings);
-        self.solver.correct(&self.pairs, settings.sweeps);
+        let candidates = &self.collision.candidates;
+        self.solver.prepare(&self.trees, candidates, settings);
+        self.solver.correct(candidates, settings.sweeps);
         unwhiten(&self.trees.all, &self.solver.w, &mut self.moving_v);
-        self.solver.relax(&self.pairs, settings.relaxing_sweeps);
+        self.solver.relax(candidates, settings.relaxing_sweeps);
         unwhiten(&self.trees.all, &self.solver.w, &mut self.final_v);
     }
 
@@ -71,19 +48,6 @@ impl Dynamics {
             more |= tree.bound_more(self.settings.dt_s, &self.final_v[range]);
         }
         more
-    }
-
-    /// Puts Rapier's bodies where the links are; needed after a tree was moved by hand, and done by every step.
-    pub fn place_bodies(&self, physics: &mut PhysicsWorld) {
-        for (tree, bodies) in self.trees.all.iter().zip(&self.bodies) {
-            for (link, handle) in bodies.iter().enumerate() {
-                let body = &mut physics.bodies[*handle];
-                let pose = pose_to_rapier(&tree.world_from_link(link));
-                if *body.position() != pose {
-                    body.set_position(pose, false);
-                }
-            }
-        }
     }
 
     /// Positions are as finite as the velocities that they move by.

@@ -1,16 +1,17 @@
 //! Points of contact: what collision detection found, and what acted there.
 
 use rapier3d::glamx::DVec3;
-use rapier3d::prelude::ColliderHandle;
 use serde::{Deserialize, Serialize};
 
+use super::collider::ColliderId;
 use super::friction::Friction;
 use super::trees::LinkId;
 
 /// A point at which two colliders touched in the last step.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Touch {
-    pub colliders: [ColliderHandle; 2],
+    /// The one that was added earlier first.
+    pub colliders: [ColliderId; 2],
     /// World frame, midway between the surfaces.
     pub point_m: DVec3,
     /// Unit, from the first collider to the second.
@@ -21,9 +22,9 @@ pub struct Touch {
     pub impulse_n_s: DVec3,
     /// Part of it along the normal.
     pub normal_impulse_n_s: f64,
-    /// Stable names of the colliders, smaller first, and number of the point between them.
-    pub(super) key: (u32, u32, u32),
-    /// The point on each collider, in the frame of its link or of the world.
+    /// Of the point, among those of the same colliders.
+    pub(super) number: u32,
+    /// The point on each collider, in its own frame.
     pub(super) local_m: [DVec3; 2],
     /// With which the next step begins.
     pub(super) memory: Impulses,

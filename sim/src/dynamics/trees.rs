@@ -6,11 +6,11 @@ use super::jacobian::Rows;
 use super::spatial::Force;
 use super::tree::Tree;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct TreeId(pub(super) u16);
 
 /// A link of a tree of a world.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct LinkId {
     pub tree: TreeId,
     pub link: usize,
@@ -62,6 +62,10 @@ impl Trees {
     /// Whether something moves a link; without, it is part of the world.
     pub fn moves(&self, link: LinkId) -> bool {
         self.all[link.tree.index()].layout.last_dof[link.link].is_some()
+    }
+
+    pub fn world_from(&self, link: LinkId) -> super::DPose3 {
+        self.all[link.tree.index()].world_from_link(link.link)
     }
 
     /// Appends N rows whose unit impulses act on the second body as `wrenches` says and on the first as its opposite;

@@ -6,14 +6,15 @@ mod machinery;
 mod start;
 
 use rapier3d::math::Pose;
-use rapier3d::prelude::{ActiveHooks, ColliderBuilder, PhysicsWorld};
 
 use equality::joint_link;
 pub(crate) use equality::{Placed, add_equalities};
 pub(crate) use machinery::{Machinery, START};
 pub(crate) use start::begin;
 
-use crate::dynamics::{Axis, DPose3, DQuat, Directions, Dynamics, Friction, Joint, Link, LinkId, Mass};
+use crate::dynamics::{
+    Axis, Collider, DPose3, DQuat, Directions, Dynamics, Friction, Joint, Link, LinkId, Mass,
+};
 use crate::mjcf::{Actuator, AxisJoint, BodyLink, BodyTree, ContactKind, Geom, LinkJoint, Surface};
 use crate::owner::Owner;
 
@@ -29,23 +30,15 @@ pub(crate) fn rounded(pose: &DPose3) -> Pose {
 }
 
 /// Adds the collision shape of a geom, if it has one, to a link or to the world; the geom's pose is in the frame of either.
-pub(crate) fn add_collider(
-    dynamics: &mut Dynamics,
-    physics: &mut PhysicsWorld,
-    geom: &Geom,
-    on: Option<LinkId>,
-    owner: Option<Owner>,
-) {
+pub(crate) fn add_collider(dynamics: &mut Dynamics, geom: &Geom, on: Option<LinkId>, owner: Option<Owner>) {
     let Some((body_from_shape, shape)) = geom.collider().filter(|_| geom.collides) else { return };
-    let hooks = match owner {
-        Some(Owner::Link { .. } | Owner::Object(_)) => ActiveHooks::FILTER_CONTACT_PAIRS,
-        None => ActiveHooks::empty(),
-    };
-    let collider = ColliderBuilder::new(shape)
-        .position(body_from_shape)
-        .user_data(owner.map_or(0, Owner::tag))
-        .active_hooks(hooks);
-    dynamics.add_collider(collider, on, friction(&geom.surface), physics);
+    dynamics.add_collider(Collider {
+        shape,
+        on,
+        body_from_shape: precise(&body_from_shape),
+        friction: friction(&geom.surface),
+        tag: owner.map_or(0, Owner::tag),
+    });
 }
 
 fn friction(surface: &Surface) -> Friction {

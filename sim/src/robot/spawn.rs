@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use rapier3d::math::{Pose, Rotation, Vector};
-use rapier3d::prelude::PhysicsWorld;
 
 use super::feeling::Feeling;
 use super::{Memory, Robot};
@@ -26,7 +25,6 @@ impl Robot {
     /// Inserts a robot standing on the floor (z = 0) in its rest pose. `index` tells robots of one world apart.
     pub(crate) fn spawn(
         dynamics: &mut Dynamics,
-        physics: &mut PhysicsWorld,
         model: &Arc<RobotModel>,
         placement: &RobotPlacement,
         index: usize,
@@ -40,12 +38,15 @@ impl Robot {
         for (joint, q_rad) in model.joints.iter().zip(&q_rad) {
             tree.set_joint(joint.link, f64::from(*q_rad), 0.0);
         }
-        let tree = dynamics.add_tree(tree, physics);
+        let tree = dynamics.add_tree(tree);
         for (link, geoms) in model.links.iter().map(|link| &link.geoms).enumerate() {
             let owner = Owner::Link { robot: index, link };
             for geom in geoms {
-                add_collider(dynamics, physics, geom, Some(tree.link(link)), Some(owner));
+                add_collider(dynamics, geom, Some(tree.link(link)), Some(owner));
             }
+        }
+        for (a, b) in model.apart() {
+            dynamics.keep_apart(tree.link(a), tree.link(b));
         }
         let memory = Memory {
             last_upper_rad: UPPER.iter().map(|joint| q_rad[*joint]).collect(),

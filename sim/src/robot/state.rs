@@ -107,8 +107,6 @@ impl Robot {
 mod tests {
     use std::sync::Arc;
 
-    use rapier3d::prelude::PhysicsWorld;
-
     use super::*;
     use crate::PHYSICS_DT_S;
     use crate::body::posed::{Posed, model};
@@ -119,16 +117,15 @@ mod tests {
     /// air, touching nothing, with an arm on the move.
     #[test]
     fn sensed_poses_and_velocities_are_those_of_the_model() {
-        let mut physics = PhysicsWorld::new();
         let mut dynamics = Dynamics::new(Settings::new(f64::from(PHYSICS_DT_S), DVec3::Z * -9.81));
         let placement = RobotPlacement { name: "A".into(), position_m: [0.3, -0.2], yaw_rad: 0.8 };
         let model = Arc::new(model().clone());
-        let mut robot = Robot::spawn(&mut dynamics, &mut physics, &model, &placement, 0).unwrap();
+        let mut robot = Robot::spawn(&mut dynamics, &model, &placement, 0).unwrap();
         let mut command = robot.rest_command(&dynamics);
         command.upper_rad[0] -= 0.1;
         for substep in 0..4 {
             robot.drive(&mut dynamics, &command, substep);
-            dynamics.advance(&physics.narrow_phase).unwrap();
+            dynamics.step().unwrap();
         }
         let sensed = robot.measure(&dynamics);
         let body = Posed {

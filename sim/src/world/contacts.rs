@@ -1,39 +1,15 @@
-//! Which colliders may touch, and what a hand feels of an object.
+//! What a hand feels of an object, and a robot of itself.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
+use std::collections::BTreeMap;
 
 use rapier3d::math::Vector;
-use rapier3d::prelude::{ColliderHandle, PairFilterContext, PhysicsHooks, SolverFlags};
 
 use super::World;
 use super::step::{HandContacts, Touch};
-use crate::body::{HandLinks, RobotModel};
+use crate::body::HandLinks;
+use crate::dynamics::ColliderId;
 use crate::owner::Owner;
 use crate::{PHYSICS_DT_S, Side, Sides};
-
-/// Leaves out the contacts inside a robot, and between the objects of a scene, that their files exclude.
-pub(super) struct Exclusions {
-    /// `None` while there is no robot.
-    pub model: Option<Arc<RobotModel>>,
-    /// Smaller index first.
-    pub objects: BTreeSet<(usize, usize)>,
-}
-
-impl PhysicsHooks for Exclusions {
-    fn filter_contact_pair(&self, pair: &PairFilterContext) -> Option<SolverFlags> {
-        let [first, second] =
-            [pair.collider1, pair.collider2].map(|handle| Owner::of_tag(pair.colliders[handle].user_data));
-        let apart = match (first, second) {
-            (Some(Owner::Link { robot: a, link: link_a }), Some(Owner::Link { robot: b, link: link_b })) => {
-                a == b && self.model.as_ref().is_some_and(|model| !model.may_touch(link_a, link_b))
-            }
-            (Some(Owner::Object(a)), Some(Owner::Object(b))) => self.objects.contains(&(a.min(b), a.max(b))),
-            _ => false,
-        };
-        (!apart).then_some(SolverFlags::COMPUTE_RIGID_IMPULSES)
-    }
-}
 
 impl HandContacts {
     /// Adds the force of one of the robot's links, if it belongs to `hand`.
@@ -76,7 +52,7 @@ impl World {
 
     /// Points that pressed in the last step: whose colliders they are between, and the normal force on the second (N, world).
     fn presses(&self) -> impl Iterator<Item = ([Option<Owner>; 2], Vector)> {
-        let owner = |handle: ColliderHandle| Owner::of_tag(self.physics.colliders[handle].user_data);
+        let owner = |id: ColliderId| Owner::of_tag(self.dynamics.collider(id).tag);
         self.dynamics.touches().iter().filter(|touch| touch.normal_impulse_n_s > 0.0).map(move |touch| {
             let force_n = touch.normal * (touch.normal_impulse_n_s / f64::from(PHYSICS_DT_S));
             (touch.colliders.map(owner), force_n.as_vec3())

@@ -52,7 +52,6 @@ impl World {
         let link = object.and_then(|object| object.link).unwrap_or_else(|| panic!("no free object `{name}`"));
         let tree = self.dynamics.tree_mut(link.tree);
         tree.set_base(precise(&world_from_object), DVec3::ZERO, DVec3::ZERO);
-        self.dynamics.place_bodies(&mut self.physics);
     }
 
     /// Gives a robot another base controller, which starts from how the robot stands now.

@@ -8,8 +8,6 @@ mod step;
 
 use std::sync::Arc;
 
-use rapier3d::prelude::PhysicsWorld;
-
 pub use objects::{ObjectModel, ObjectPlacement, ObjectState};
 pub use snapshot::Snapshot;
 pub use step::{HandContacts, ObjectStep, RobotStep, Step, Touch};
@@ -20,7 +18,6 @@ use crate::mechanism::Machinery;
 use crate::mjcf::{Document, MjcfCamera};
 use crate::robot::{Robot, RobotCommand, RobotPlacement};
 use crate::{CONTROL_HZ, GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError, assets};
-use contacts::Exclusions;
 use disturb::Push;
 use objects::{Furniture, Object};
 
@@ -35,10 +32,7 @@ pub struct WorldSpec {
 
 /// A simulated room. One thread owns it.
 pub struct World {
-    /// Collision detection; its bodies are where [`World::dynamics`] puts them.
-    physics: PhysicsWorld,
     dynamics: Dynamics,
-    hooks: Exclusions,
     robots: Vec<Robot>,
     objects: Vec<Object>,
     /// Drives the joints of the scene.
@@ -61,14 +55,13 @@ impl World {
     /// As [`World::new`], of robots of another file.
     pub fn with_robot(spec: &WorldSpec, model: Arc<RobotModel>) -> Result<World, SimError> {
         let mut world = World::of_scene(Document::parse(&spec.scene, assets::scene(&spec.scene)?)?)?;
-        let (dynamics, physics) = (&mut world.dynamics, &mut world.physics);
+        let dynamics = &mut world.dynamics;
         for placement in &spec.objects {
-            objects::insert_object(dynamics, physics, placement, &mut world.objects)?;
+            objects::insert_object(dynamics, placement, &mut world.objects)?;
         }
         for (index, placement) in spec.robots.iter().enumerate() {
-            world.robots.push(Robot::spawn(dynamics, physics, &model, placement, index)?);
+            world.robots.push(Robot::spawn(dynamics, &model, placement, index)?);
         }
-        world.hooks.model = Some(model);
         Ok(world)
     }
 
@@ -77,13 +70,9 @@ impl World {
     pub fn of_scene(scene: Document) -> Result<World, SimError> {
         let gravity_m_s2 = DVec3::new(0.0, 0.0, -f64::from(GRAVITY_M_S2));
         let mut dynamics = Dynamics::new(Settings::new(f64::from(PHYSICS_DT_S), gravity_m_s2));
-        let mut physics = PhysicsWorld::new();
-        let Furniture { fixed, objects, machinery, apart } =
-            objects::insert_scene(&mut dynamics, &mut physics, &scene)?;
+        let Furniture { fixed, objects, machinery } = objects::insert_scene(&mut dynamics, &scene)?;
         Ok(World {
-            physics,
             dynamics,
-            hooks: Exclusions { model: None, objects: apart },
             robots: Vec::new(),
             objects,
             machinery,
@@ -118,7 +107,7 @@ impl World {
 
     /// One physics step.
     pub(crate) fn advance(&mut self) -> Result<(), Diverged> {
-        self.dynamics.step(&mut self.physics, &self.hooks)
+        self.dynamics.step()
     }
 
     pub fn robots(&self) -> &[Robot] {

@@ -1,6 +1,5 @@
 //! Saving, restoring and hashing a world.
 
-use rapier3d::prelude::PhysicsWorld;
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::Xxh3;
 
@@ -11,8 +10,6 @@ use crate::dynamics::DynamicsState;
 /// A world at one instant. It fits only a world made from the same specification by the same binary.
 #[derive(Clone, Serialize, Deserialize)]
 pub struct Snapshot {
-    /// Collision detection goes on from what it found last.
-    physics: Vec<u8>,
     dynamics: DynamicsState,
     robots: Vec<Vec<u8>>,
     control_steps: u64,
@@ -22,7 +19,6 @@ impl World {
     /// About half a megabyte for two robots.
     pub fn snapshot(&self) -> Result<Snapshot, SimError> {
         Ok(Snapshot {
-            physics: postcard::to_stdvec(&self.physics)?,
             dynamics: self.dynamics.state(),
             robots: self.save_robots()?,
             control_steps: self.control_steps,
@@ -31,14 +27,12 @@ impl World {
 
     /// Takes the world back to a snapshot. On an error the world is as it was.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), SimError> {
-        let physics: PhysicsWorld = postcard::from_bytes(&snapshot.physics)?;
         let before = self.save_robots()?;
         let loaded = self.load_robots(&snapshot.robots);
         if let Err(error) = loaded.and_then(|()| Ok(self.dynamics.restore(&snapshot.dynamics)?)) {
             self.load_robots(&before)?;
             return Err(error);
         }
-        self.physics = physics;
         self.control_steps = snapshot.control_steps;
         Ok(())
     }

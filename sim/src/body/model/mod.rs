@@ -77,8 +77,9 @@ pub struct HandLinks {
 }
 
 impl RobotModel {
-    pub(crate) fn may_touch(&self, a: usize, b: usize) -> bool {
-        !self.excluded.contains(&(a.min(b), a.max(b)))
+    /// Pairs of links that never touch.
+    pub(crate) fn apart(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.excluded.iter().copied()
     }
 
     /// World poses of all links for a pelvis pose and joint coordinates in published order.

@@ -1,40 +1,47 @@
 //! Small worlds for tests.
 
 use rapier3d::glamx::{DMat3, DPose3, DVec3};
-use rapier3d::math::{Pose, Vector};
-use rapier3d::prelude::{ColliderBuilder, ColliderHandle, PhysicsWorld, SharedShape};
+use rapier3d::prelude::SharedShape;
 
-use super::super::{Axis, Directions, Dynamics, Friction, Joint, Link, LinkId, Mass, Settings, Tree, TreeId};
+use super::super::{
+    Axis, Collider, ColliderId, Directions, Dynamics, Friction, Joint, Link, LinkId, Mass, Settings, Tree,
+    TreeId,
+};
 
 pub const DT_S: f64 = 1.0 / 200.0;
 pub const G_M_S2: f64 = 9.81;
 pub const DOWN: DVec3 = DVec3::new(0.0, 0.0, -G_M_S2);
 
 pub struct Bench {
-    pub physics: PhysicsWorld,
     pub dynamics: Dynamics,
 }
 
 impl Bench {
     pub fn new(gravity_m_s2: DVec3) -> Bench {
-        Bench { physics: PhysicsWorld::new(), dynamics: Dynamics::new(Settings::new(DT_S, gravity_m_s2)) }
+        Bench { dynamics: Dynamics::new(Settings::new(DT_S, gravity_m_s2)) }
     }
 
     /// With the upper side of a large slab at z = 0.
     pub fn with_floor(gravity_m_s2: DVec3, friction: Friction) -> Bench {
         let mut bench = Bench::new(gravity_m_s2);
-        let slab = ColliderBuilder::cuboid(20.0, 20.0, 0.1).translation(Vector::new(0.0, 0.0, -0.1));
-        bench.dynamics.add_collider(slab, None, friction, &mut bench.physics);
+        bench.add_slab(20.0, friction);
         bench
     }
 
     pub fn add(&mut self, tree: Tree) -> TreeId {
-        self.dynamics.add_tree(tree, &mut self.physics)
+        self.dynamics.add_tree(tree)
     }
 
-    pub fn add_shape(&mut self, on: LinkId, shape: SharedShape, friction: Friction) -> ColliderHandle {
-        let collider = ColliderBuilder::new(shape).position(Pose::IDENTITY);
-        self.dynamics.add_collider(collider, Some(on), friction, &mut self.physics)
+    /// A fixed slab with its upper side at z = 0.
+    pub fn add_slab(&mut self, half_width_m: f32, friction: Friction) {
+        let shape = SharedShape::cuboid(half_width_m, half_width_m, 0.1);
+        let body_from_shape = DPose3::from_translation(DVec3::new(0.0, 0.0, -0.1));
+        self.dynamics.add_collider(Collider { shape, on: None, body_from_shape, friction, tag: 0 });
+    }
+
+    pub fn add_shape(&mut self, on: LinkId, shape: SharedShape, friction: Friction) -> ColliderId {
+        let body_from_shape = DPose3::IDENTITY;
+        self.dynamics.add_collider(Collider { shape, on: Some(on), body_from_shape, friction, tag: 0 })
     }
 
     /// A lone box of even density.
@@ -55,7 +62,7 @@ impl Bench {
     }
 
     pub fn step(&mut self) {
-        self.dynamics.step(&mut self.physics, &()).expect("a step of finite numbers");
+        self.dynamics.step().expect("a step of finite numbers");
     }
 
     pub fn run_s(&mut self, time_s: f64) {

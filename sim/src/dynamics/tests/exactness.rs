@@ -1,19 +1,15 @@
-//! The same bits again, whatever happened to Rapier's handles; and nothing that is not finite.
+//! The same bits again, whatever Rapier's broad phase has seen before; and nothing that is not finite.
 
 use rapier3d::glamx::{DPose3, DVec3};
-use rapier3d::prelude::{ColliderBuilder, PhysicsWorld, SharedShape};
+use rapier3d::prelude::SharedShape;
 
 use super::super::{Drive, DynamicsState, Equality, Joint, TreeState};
 use super::bench::{Bench, DOWN, Random, bush, sliding, stir};
 
-/// Boxes, balls and a tree that fall on each other. `shift` makes Rapier's handles others.
-fn scene(shift: bool) -> Bench {
+/// Boxes, balls and a tree that fall on each other.
+fn scene() -> Bench {
     let mut bench = Bench::new(DOWN);
-    if shift {
-        shift_handles(&mut bench.physics);
-    }
-    let slab = ColliderBuilder::cuboid(5.0, 5.0, 0.1).translation([0.0, 0.0, -0.1].into());
-    bench.dynamics.add_collider(slab, None, sliding(0.6), &mut bench.physics);
+    bench.add_slab(5.0, sliding(0.6));
     let mut random = Random(11);
     for level in 0..6 {
         let at = random.vector() * 0.05 + DVec3::new(0.0, 0.0, 0.3 + 0.2 * f64::from(level));
@@ -43,30 +39,31 @@ fn scene(shift: bool) -> Bench {
     bench
 }
 
-/// Colliders far away shift all of Rapier's handles, so that its tree and its lists of pairs come out otherwise. Who is
-/// first in a pair stays: Rapier goes by its handles there, and its contact points are not the same to the bit both ways.
-fn shift_handles(physics: &mut PhysicsWorld) {
-    for x in 0..12 {
-        physics.insert_collider(ColliderBuilder::ball(0.1).translation([x as f32, 50.0, 0.0].into()), None);
-    }
-}
-
 fn bits(bench: &Bench) -> Vec<u8> {
     postcard::to_stdvec(&bench.dynamics.state().trees).expect("plain numbers")
 }
 
 #[test]
 fn dynamics_reruns_are_equal_to_the_bit() {
-    let (mut first, mut second) = (scene(false), scene(false));
+    let (mut first, mut second) = (scene(), scene());
     first.run_s(2.0);
     second.run_s(2.0);
     assert_eq!(bits(&first), bits(&second));
     assert!(!first.dynamics.touches().is_empty());
 }
 
+/// What was near before, and in which order it came near, is nothing to the contacts of now.
 #[test]
-fn dynamics_handles_of_rapier_do_not_matter() {
-    let (mut first, mut second) = (scene(false), scene(true));
+fn dynamics_the_past_of_the_broad_phase_does_not_matter() {
+    let (mut first, mut second) = (scene(), scene());
+    let start = second.dynamics.state();
+    for tree in 0..6_u16 {
+        let at = DPose3::from_translation(DVec3::new(0.1 * f64::from(6 - tree), 0.0, 0.06));
+        let tree = second.dynamics.tree_mut(super::super::TreeId(tree));
+        tree.set_base(at, DVec3::X, DVec3::Y);
+    }
+    second.run_s(0.5);
+    second.dynamics.restore(&start).unwrap();
     for step in 0..400 {
         first.step();
         second.step();
@@ -76,14 +73,12 @@ fn dynamics_handles_of_rapier_do_not_matter() {
 
 #[test]
 fn dynamics_restored_worlds_go_on_as_they_would_have() {
-    let mut first = scene(false);
+    let mut first = scene();
     first.run_s(0.8);
-    let physics = postcard::to_stdvec(&first.physics).unwrap();
     let state = postcard::to_stdvec(&first.dynamics.state()).unwrap();
     first.run_s(1.0);
-    let mut second = scene(false);
+    let mut second = scene();
     second.run_s(0.1);
-    second.physics = postcard::from_bytes(&physics).unwrap();
     let state: DynamicsState = postcard::from_bytes(&state).unwrap();
     second.dynamics.restore(&state).unwrap();
     second.run_s(1.0);
@@ -94,14 +89,14 @@ fn dynamics_restored_worlds_go_on_as_they_would_have() {
 /// A force that is not a number ends the step with the name of what it hit, and the state stays as it was.
 #[test]
 fn dynamics_divergence_is_an_error_and_changes_nothing() {
-    let mut bench = scene(false);
+    let mut bench = scene();
     bench.run_s(0.5);
     let before: Vec<TreeState> = bench.dynamics.state().trees;
     let touches = postcard::to_stdvec(bench.dynamics.touches()).unwrap();
     let body = super::super::TreeId(2);
     for bad in [f64::NAN, f64::INFINITY, 1e300] {
         bench.dynamics.tree_mut(body).push(0, DVec3::ZERO, DVec3::new(bad, 0.0, 0.0));
-        let error = bench.dynamics.step(&mut bench.physics, &()).unwrap_err();
+        let error = bench.dynamics.step().unwrap_err();
         assert!(error.to_string().contains(&error.tree), "{error}");
         assert_eq!(bench.dynamics.state().trees, before);
         assert_eq!(postcard::to_stdvec(bench.dynamics.touches()).unwrap(), touches);

@@ -1,9 +1,6 @@
 //! Puts scenes and objects into a world.
 
-use std::collections::BTreeSet;
-
 use rapier3d::math::Pose;
-use rapier3d::prelude::PhysicsWorld;
 
 use super::{Object, ObjectModel, ObjectPlacement};
 use crate::SimError;
@@ -20,15 +17,12 @@ pub(in crate::world) struct Furniture {
     pub fixed: Vec<Geom>,
     pub objects: Vec<Object>,
     pub machinery: Machinery,
-    /// Pairs of objects that never touch, smaller index first.
-    pub apart: BTreeSet<(usize, usize)>,
 }
 
 /// Inserts a scene: bodies that no joint moves are its room, the links of the others become objects. All begin as the key
 /// `start` has them, if there is one.
 pub(in crate::world) fn insert_scene(
     dynamics: &mut Dynamics,
-    physics: &mut PhysicsWorld,
     scene: &Document,
 ) -> Result<Furniture, SimError> {
     let mut fixed = Vec::new();
@@ -39,14 +33,14 @@ pub(in crate::world) fn insert_scene(
     for tree in &trees {
         let id = if tree.is_fixed() {
             for geom in tree.links.iter().flat_map(in_file) {
-                add_collider(dynamics, physics, &geom, None, None);
+                add_collider(dynamics, &geom, None, None);
                 fixed.push(geom);
             }
             None
         } else {
             let name = |link: &BodyLink| link.name.clone();
             let tree_links = links(tree, &DPose3::IDENTITY, &actuators);
-            Some(insert_moving(dynamics, physics, tree, tree_links, name, &mut objects)?)
+            Some(insert_moving(dynamics, tree, tree_links, name, &mut objects)?)
         };
         placed.push(Placed { tree, id });
     }
@@ -55,33 +49,30 @@ pub(in crate::world) fn insert_scene(
     let machinery = Machinery::of(scene, &placed)?;
     if let Some(start) = scene.keys()?.iter().find(|key| key.name == START) {
         begin(dynamics, &placed, start);
-        dynamics.place_bodies(physics);
     }
-    let apart = apart(scene, &trees)?;
-    Ok(Furniture { fixed, objects, machinery, apart })
+    keep_apart(dynamics, scene, &placed)?;
+    Ok(Furniture { fixed, objects, machinery })
 }
 
-/// Objects that the file's `<exclude>` keeps from touching, by their numbers.
-fn apart(scene: &Document, trees: &[BodyTree]) -> Result<BTreeSet<(usize, usize)>, SimError> {
-    let moving = || trees.iter().filter(|tree| !tree.is_fixed()).flat_map(|tree| &tree.links);
-    let object = |name: &str| {
-        let found = moving().position(|link| link.bodies.iter().any(|body| body.name == name));
+/// What the file's `<exclude>` names never touches.
+fn keep_apart(dynamics: &mut Dynamics, scene: &Document, placed: &[Placed]) -> Result<(), SimError> {
+    let link_of = |name: &str| {
+        let found = placed.iter().find_map(|Placed { tree, id }| {
+            let has = |link: &BodyLink| link.bodies.iter().any(|body| body.name == name);
+            Some((*id)?.link(tree.links.iter().position(has)?))
+        });
         found.ok_or_else(|| scene.unsupported(format!("exclude of `{name}`, which is no body that moves")))
     };
-    let excludes = scene.model.contact.excludes.iter();
-    excludes
-        .map(|pair| {
-            let (a, b) = (object(&pair.body1)?, object(&pair.body2)?);
-            Ok((a.min(b), a.max(b)))
-        })
-        .collect()
+    for pair in &scene.model.contact.excludes {
+        dynamics.keep_apart(link_of(&pair.body1)?, link_of(&pair.body2)?);
+    }
+    Ok(())
 }
 
 /// Inserts an object file: one top-level body, a mark if no joint moves it. The body has the placement's name, and the
 /// links on it have their own after it.
 pub(in crate::world) fn insert_object(
     dynamics: &mut Dynamics,
-    physics: &mut PhysicsWorld,
     placement: &ObjectPlacement,
     objects: &mut Vec<Object>,
 ) -> Result<(), SimError> {
@@ -91,7 +82,7 @@ pub(in crate::world) fn insert_object(
         let owner = Owner::Object(objects.len());
         for mut geom in tree.links.iter().flat_map(in_file) {
             geom.body_from_geom = placement.world_from_object * geom.body_from_geom;
-            add_collider(dynamics, physics, &geom, None, Some(owner));
+            add_collider(dynamics, &geom, None, Some(owner));
         }
         objects.push(Object {
             name: placement.name.clone(),
@@ -107,23 +98,22 @@ pub(in crate::world) fn insert_object(
         Some(_) => format!("{} {}", placement.name, link.name),
     };
     let tree_links = links(&tree, &world_from_file, &[]);
-    let id = insert_moving(dynamics, physics, &tree, tree_links, name, objects)?;
+    let id = insert_moving(dynamics, &tree, tree_links, name, objects)?;
     add_equalities(dynamics, &document, &[Placed { tree: &tree, id: Some(id) }], &world_from_file)
 }
 
 fn insert_moving(
     dynamics: &mut Dynamics,
-    physics: &mut PhysicsWorld,
     tree: &BodyTree,
     links: Vec<Link>,
     name: impl Fn(&BodyLink) -> String,
     objects: &mut Vec<Object>,
 ) -> Result<TreeId, SimError> {
-    let id = dynamics.add_tree(Tree::new(&name(&tree.links[0]), links)?, physics);
+    let id = dynamics.add_tree(Tree::new(&name(&tree.links[0]), links)?);
     for (index, link) in tree.links.iter().enumerate() {
         let owner = Owner::Object(objects.len());
         for geom in &link.geoms {
-            add_collider(dynamics, physics, geom, Some(id.link(index)), Some(owner));
+            add_collider(dynamics, geom, Some(id.link(index)), Some(owner));
         }
         objects.push(Object {
             name: name(link),
