@@ -1,8 +1,13 @@
-//! From where the colliders are to candidates for contacts: a function of the trees' positions and velocities alone.
+//! From where the colliders are to candidates for contacts.
+//!
+//! Parry moves the points of a pair along while it hardly turns: of two faces that lie on each other it would choose now the
+//! one and now the other. So the points of the last step are part of the state.
 
 use rapier3d::math::Vector;
 use rapier3d::parry::bounding_volume::BoundingVolume;
 use rapier3d::parry::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
+
+use serde::{Deserialize, Serialize};
 
 use super::DVec3;
 use super::collider::{Collider, ColliderId, Surface};
@@ -16,10 +21,20 @@ use super::trees::{LinkId, Trees};
 pub(super) struct Collision {
     surfaces: Vec<Surface>,
     near: Near,
-    /// Of this step, in the order of their keys.
+    /// Of this step, in the order of their colliders.
     pub candidates: Vec<Candidate>,
-    /// Working memory.
-    manifold: ContactManifold<(), ()>,
+    /// Of the last step, in the order of their colliders: those that have points.
+    pub manifolds: Vec<Manifold>,
+    /// Of this step; [`Collision::commit`] makes them those of the last.
+    found: Vec<Manifold>,
+    spare: Vec<ContactManifold<(), ()>>,
+}
+
+/// Parry's points of two colliders.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Manifold {
+    colliders: [ColliderId; 2],
+    points: ContactManifold<(), ()>,
 }
 
 impl Collision {
@@ -45,15 +60,30 @@ impl Collision {
         self.place(trees, settings);
         self.near.update(&self.surfaces, trees);
         self.candidates.clear();
-        for (a, b) in &self.near.pairs {
-            let between = Between {
-                ids: [*a, *b],
-                surfaces: [*a, *b].map(|id| &self.surfaces[id.index()]),
-                trees,
-                settings,
-            };
-            between.collect(&mut self.manifold, &mut self.candidates);
+        self.spare.extend(self.found.drain(..).map(|manifold| manifold.points));
+        let mut last = self.manifolds.iter().peekable();
+        for &colliders in &self.near.pairs {
+            while last.next_if(|manifold| manifold.colliders < colliders).is_some() {}
+            let surfaces = colliders.map(|id| &self.surfaces[id.index()]);
+            let between = Between { colliders, surfaces, trees, settings };
+            if !surfaces[0].bounds.intersects(&surfaces[1].bounds) {
+                continue;
+            }
+            let mut points = self.spare.pop().unwrap_or_default();
+            let before = last.next_if(|manifold| manifold.colliders == colliders);
+            between.find(before.map(|manifold| &manifold.points), &mut points);
+            if points.points.is_empty() {
+                self.spare.push(points);
+            } else {
+                between.collect(&points, &mut self.candidates);
+                self.found.push(Manifold { colliders, points });
+            }
         }
+    }
+
+    /// Keeps what the next step begins with.
+    pub fn commit(&mut self) {
+        std::mem::swap(&mut self.manifolds, &mut self.found);
     }
 
     /// Puts the colliders that move where their links are.
@@ -75,30 +105,35 @@ impl Collision {
 
 /// Two colliders that are near each other.
 struct Between<'a> {
-    ids: [ColliderId; 2],
+    colliders: [ColliderId; 2],
     surfaces: [&'a Surface; 2],
     trees: &'a Trees,
     settings: &'a Settings,
 }
 
 impl Between<'_> {
-    /// Finds their points of contact with Parry, afresh in every step.
-    fn collect(&self, manifold: &mut ContactManifold<(), ()>, candidates: &mut Vec<Candidate>) {
+    /// Points of contact, from those of the last step on if there were any.
+    fn find(&self, before: Option<&ContactManifold<(), ()>>, manifold: &mut ContactManifold<(), ()>) {
         let [first, second] = self.surfaces;
-        if !first.bounds.intersects(&second.bounds) {
-            return;
-        }
         manifold.clear();
-        // Where Parry begins to look.
-        manifold.local_n1 = first.towards(second).as_vec3();
+        match before {
+            Some(before) => {
+                (manifold.local_n1, manifold.local_n2) = (before.local_n1, before.local_n2);
+                manifold.points.extend_from_slice(&before.points);
+            }
+            // Where Parry begins to look.
+            None => manifold.local_n1 = first.towards(second).as_vec3(),
+        }
         let near_m = (first.reach_m + second.reach_m) as f32;
         let [a, b] = self.surfaces.map(|surface| &*surface.collider.shape);
         DefaultQueryDispatcher
             .contact_manifold_convex_convex(&first.pose_of(second), a, b, None, None, near_m, manifold)
             .expect("Parry knows all convex shapes");
-        if manifold.points.is_empty() {
-            return;
-        }
+    }
+
+    /// Those of the points that touch, or will within the step.
+    fn collect(&self, manifold: &ContactManifold<(), ()>, candidates: &mut Vec<Candidate>) {
+        let [first, second] = self.surfaces;
         let normal = (first.world_from_shape.rotation * manifold.local_n1.as_dvec3()).normalize();
         let (t1, t2) = normal.any_orthonormal_pair();
         let friction = Friction::between(&first.collider.friction, &second.collider.friction);
@@ -114,7 +149,7 @@ impl Between<'_> {
                 continue;
             }
             let touch = Touch {
-                colliders: self.ids,
+                colliders: self.colliders,
                 number,
                 point_m,
                 normal,

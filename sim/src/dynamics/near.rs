@@ -14,7 +14,7 @@ use super::trees::{LinkId, Trees};
 pub(super) struct Near {
     /// In order, the smaller first: all that could touch in this step, and some that could not. Which of those are among them
     /// depends on the past, so that nothing else may.
-    pub pairs: Vec<(ColliderId, ColliderId)>,
+    pub pairs: Vec<[ColliderId; 2]>,
     /// Links that never touch, smaller first.
     apart: BTreeSet<(LinkId, LinkId)>,
     broad_phase: BroadPhaseBvh,
@@ -76,19 +76,19 @@ impl Near {
     }
 }
 
-fn in_order(pair: &ColliderPair) -> (ColliderId, ColliderId) {
+fn in_order(pair: &ColliderPair) -> [ColliderId; 2] {
     let [a, b] = [pair.collider1, pair.collider2].map(|handle| ColliderId(handle.into_raw_parts().0));
-    (a.min(b), a.max(b))
+    [a.min(b), a.max(b)]
 }
 
 /// Bodies of one tree that a joint joins do not collide, as in MuJoCo; nor do two that are kept apart.
 fn may_touch(
-    (a, b): (ColliderId, ColliderId),
+    pair: [ColliderId; 2],
     surfaces: &[Surface],
     trees: &Trees,
     apart: &BTreeSet<(LinkId, LinkId)>,
 ) -> bool {
-    let [a, b] = [a, b].map(|id| surfaces[id.index()].body);
+    let [a, b] = pair.map(|id| surfaces[id.index()].body);
     let (Some(a), Some(b)) = (a, b) else { return true };
     let joined = a.tree == b.tree && trees.all[a.tree.index()].layout.are_neighbours(a.link, b.link);
     !joined && !apart.contains(&(a.min(b), a.max(b)))

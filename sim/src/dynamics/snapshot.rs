@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Dynamics;
+use super::collision::Manifold;
 use super::equality::Memory;
 use super::error::OtherWorld;
 use super::state::TreeState;
@@ -14,6 +15,7 @@ pub struct DynamicsState {
     pub(super) trees: Vec<TreeState>,
     equalities: Vec<Memory>,
     touches: Vec<Touch>,
+    manifolds: Vec<Manifold>,
 }
 
 impl Dynamics {
@@ -22,6 +24,7 @@ impl Dynamics {
             trees: self.trees.all.iter().map(|tree| tree.state()).collect(),
             equalities: self.solver.equalities.memory.clone(),
             touches: self.solver.touches.clone(),
+            manifolds: self.collision.manifolds.clone(),
         }
     }
 
@@ -39,6 +42,7 @@ impl Dynamics {
         }
         self.solver.equalities.memory.clone_from(&state.equalities);
         self.solver.touches.clone_from(&state.touches);
+        self.collision.manifolds.clone_from(&state.manifolds);
         Ok(())
     }
 }

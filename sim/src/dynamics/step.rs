@@ -18,6 +18,7 @@ impl Dynamics {
         self.trees.all.iter_mut().for_each(|tree| tree.external.fill(Force::default()));
         self.check()?;
         self.solver.commit(&mut self.trees, self.settings.dt_s);
+        self.collision.commit();
         let dt_s = self.settings.dt_s;
         for (tree, range) in self.trees.ranges() {
             tree.keep_efforts(dt_s, &self.final_v[range.clone()]);
