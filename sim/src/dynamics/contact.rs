@@ -122,9 +122,23 @@ impl<const N: usize> Contact<N> {
         if self.fullness(&stuck) <= normal * normal {
             return stuck;
         }
+        let slid = self.slide(old, &v, normal);
+        if N < 6 {
+            return slid;
+        }
+        // The step suits the tangents; rolls, of less inertia and friction, need a second to keep up with a ball that speeds up.
+        for c in 1..N {
+            v[c] += (1..N).map(|d| a[d][c] * (slid[d] - old[d])).sum::<f64>();
+        }
+        self.slide(&slid, &v, normal)
+    }
+
+    /// One step of projected gradients from the impulses `from`, at the velocities `v`.
+    #[inline]
+    fn slide(&self, from: &[f64; N], v: &[f64; N], normal: f64) -> [f64; N] {
         let mut slid = [normal; N];
         for c in 1..N {
-            slid[c] = old[c] - self.slide_gain[c] * v[c];
+            slid[c] = from[c] - self.slide_gain[c] * v[c];
         }
         let fullness = self.fullness(&slid);
         if fullness > normal * normal {

@@ -4,8 +4,11 @@
 //!   I (w' - w) + dt m x I m = 0,
 //! which keeps |I w| and w . I w whatever the step, so that a tumbling body neither gains energy nor loses it.
 //! Newton's iteration on it; the derivative is  I + dt/2 ([m] I - [I m]).
+//!
+//! Contacts are solved for the spin that ends like this, but their impulses act when the step begins: the spin that they
+//! left gyrates as a whole. Were it turned without its gyration, a top would tilt by  omega dt / 2  of its precession.
 
-use rapier3d::glamx::{DMat3, DVec3};
+use rapier3d::glamx::{DMat3, DQuat, DVec3};
 
 use super::tree::Tree;
 
@@ -31,6 +34,22 @@ impl Tree {
         for (rhs, moment) in self.rhs[3..6].iter_mut().zip(gyroscopic_n_m.to_array()) {
             *rhs += moment;
         }
+    }
+
+    /// By how much a free body turns in a step (rad, world axes) in which positions move by the spin `moving`, and the spin
+    /// at the end of it; `after` is that spin as the solver found it.
+    pub(super) fn spin_on(&self, dt_s: f64, moving: DVec3, after: DVec3) -> (DVec3, DVec3) {
+        let gyration = self.half_gyration_rad_s * 2.0;
+        if gyration == DVec3::ZERO {
+            return (moving * dt_s, after);
+        }
+        let inertia = self.own_inertia[0].rotated(&self.rotation[0]).matrix();
+        let pushed = moving - gyration;
+        let moved = midpoint_spin(&inertia, pushed, dt_s);
+        let turn_rad = (pushed + moved) * (0.5 * dt_s);
+        // In the body's axes the new spin is what it was: the world's turns with the body.
+        let carried = DQuat::from_scaled_axis(turn_rad) * DQuat::from_scaled_axis(-moved * dt_s);
+        (turn_rad, carried * midpoint_spin(&inertia, after - gyration, dt_s))
     }
 }
 

@@ -65,21 +65,17 @@ impl Tree {
     }
 
     /// Moves the positions by the velocities `v` for one step, and takes over `after` as velocities; [`Tree::kinematics`]
-    /// follows. A lone body turns by the mean of its angular velocities over the step, see [`Tree::spin_freely`].
+    /// follows. A lone body turns by the mean of its angular velocities over the step, see [`Tree::spin_on`].
     pub(super) fn integrate(&mut self, dt_s: f64, v: &[f64], after: &[f64]) {
         self.v.copy_from_slice(after);
         if let Joint::Free = self.links[0].joint {
             let com_m = self.links[0].mass.com_m;
             let centre_m = self.base * com_m + DVec3::from_slice(&v[..3]) * dt_s;
-            let spin = DVec3::from_slice(&v[3..6]);
-            let turn_rad = (spin - self.half_gyration_rad_s) * dt_s;
+            let [moving, after] = [v, after].map(|v| DVec3::from_slice(&v[3..6]));
+            let (turn_rad, spin_rad_s) = self.spin_on(dt_s, moving, after);
             let rotation = turned(self.base.rotation, turn_rad);
             self.base = DPose3::from_parts(centre_m - rotation * com_m, rotation);
-            if self.half_gyration_rad_s != DVec3::ZERO {
-                // In the body's axes the new angular velocity is what it was: the world's turn with the body.
-                let carried = DQuat::from_scaled_axis(turn_rad) * DQuat::from_scaled_axis(-spin * dt_s);
-                (carried * DVec3::from_slice(&after[3..6])).write_to_slice(&mut self.v[3..6]);
-            }
+            spin_rad_s.write_to_slice(&mut self.v[3..6]);
         }
         for (i, link) in self.links.iter().enumerate() {
             if link.joint.axis().is_some() {

@@ -121,12 +121,17 @@ fn push<const N: usize>(
     let open_m_s = gap_m.max(0.0) / settings.dt_s;
     let depth_m = (gap_m + settings.slop_m).min(0.0);
     let correction_m_s = depth_m * softness.correction_per_s(settings.dt_s);
-    let friction = candidate.friction.lanes();
+    let mut friction = candidate.friction.lanes();
+    if gap_m > 0.0 {
+        // Only what is pressed resists rolling. A ball in a bowl would lose a part of its spin to every face that it is about to
+        // reach.
+        friction[4..].fill(0.0);
+    }
     contacts.push(Terms {
         bias_m_s: [open_m_s + correction_m_s.max(-settings.fastest_correction_m_s), open_m_s],
         softness: softness.compliance(settings.dt_s),
         friction: std::array::from_fn(|lane| friction[lane]),
-        impulse: std::array::from_fn(|lane| impulse[lane]),
+        impulse: std::array::from_fn(|lane| if friction[lane] > 0.0 { impulse[lane] } else { 0.0 }),
     });
 }
 

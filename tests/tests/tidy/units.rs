@@ -14,8 +14,9 @@ use super::{modules::modules, sources::expect_none};
 const CRATES: [&str; 4] = ["tools_spec", "sim", "episodes", "gateway"];
 
 /// In these files numbers belong to joints of any kind, in rad or m as in `ik`, or to rows of the solver, which mix them.
-const GENERALISED: [&str; 5] = [
+const GENERALISED: [&str; 6] = [
     "sim/src/dynamics/",
+    "sim/src/mechanism/start.rs",
     "sim/src/mjcf/actuator.rs",
     "sim/src/mjcf/equality.rs",
     "sim/src/mjcf/joint.rs",

@@ -1,6 +1,6 @@
 //! Joints of one degree of freedom, limits and equalities.
 
-use rapier3d::glamx::{DPose3, DVec3};
+use rapier3d::glamx::{DMat3, DPose3, DQuat, DVec3};
 
 use super::super::{Axis, Drive, Equality, Joint, Link, Mass, Tree};
 use super::bench::{Bench, DOWN, DT_S, G_M_S2, hinge, jointed, link, lone};
@@ -154,6 +154,37 @@ fn dynamics_weld_and_connect() {
     let before_m = bench.position_m(body).z;
     bench.run_s(0.5);
     assert!(bench.position_m(body).z < before_m - 0.5);
+}
+
+/// A top on a pin at steady precession W keeps its tilt:  I1 W^2 cos(tilt) - I3 w3 W + m g h = 0,  I1 about the pin.
+#[test]
+fn dynamics_top_precesses() {
+    let (mass_kg, height_m, tilt_rad, precession_rad_s) = (1.0, 0.04, 0.3_f64, 1.6);
+    let (across, along) = (0.005, 0.01);
+    let mass = Mass {
+        mass_kg,
+        com_m: DVec3::new(0.0, 0.0, height_m),
+        inertia_kg_m2: DMat3::from_diagonal(DVec3::new(across, across, along)),
+    };
+    let about_pin = across + mass_kg * height_m * height_m;
+    let moment_n_m = mass_kg * G_M_S2 * height_m;
+    let own_rad_s = (about_pin * precession_rad_s * precession_rad_s * tilt_rad.cos() + moment_n_m)
+        / (along * precession_rad_s);
+    let at = DPose3::from_parts(DVec3::ZERO, DQuat::from_rotation_x(tilt_rad));
+    let axis = at.rotation * DVec3::Z;
+    let turning = DVec3::Z * precession_rad_s;
+    let spin_rad_s = turning + axis * (own_rad_s - turning.dot(axis));
+    let mut bench = Bench::new(DOWN);
+    let top = bench.add(lone("top", at, mass));
+    bench.dynamics.tree_mut(top).set_base(at, DVec3::ZERO, spin_rad_s);
+    let pin = Equality::Connect { a: top.link(0), a_point_m: DVec3::ZERO, b: None, b_point_m: DVec3::ZERO };
+    bench.dynamics.add_equality(pin, true);
+    for step in 1..=800 {
+        bench.step();
+        let turned = DQuat::from_rotation_z(precession_rad_s * f64::from(step) * DT_S);
+        let is = bench.dynamics.tree(top).world_from_link(0).rotation * DVec3::Z;
+        assert!((is - turned * axis).length() < 0.02, "{is} for {} at step {step}", turned * axis);
+    }
 }
 
 /// A weld whose far side is a hinge: the latch of a door that somebody pulls at.
