@@ -5,6 +5,7 @@
 
 use rapier3d::math::Vector;
 use rapier3d::parry::bounding_volume::BoundingVolume;
+use rapier3d::parry::shape::PackedFeatureId;
 use rapier3d::parry::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
 
 use serde::{Deserialize, Serialize};
@@ -139,7 +140,9 @@ impl Between<'_> {
         let friction = Friction::between(&first.collider.friction, &second.collider.friction);
         let bodies = self.surfaces.map(|surface| surface.body);
         let mut number = 0;
-        for point in &manifold.points {
+        // The nearest point is added to the corners of two faces that lie on each other; it lies between them and wanders.
+        let faces = manifold.points.len() > 3;
+        for point in manifold.points.iter().filter(|point| !faces || point.fid1 != PackedFeatureId::UNKNOWN) {
             let local_m = [point.local_p1, point.local_p2].map(Vector::as_dvec3);
             let [on_a_m, on_b_m] = [0, 1].map(|side| self.surfaces[side].world_from_shape * local_m[side]);
             let (gap_m, point_m) = ((on_b_m - on_a_m).dot(normal), (on_a_m + on_b_m) * 0.5);
