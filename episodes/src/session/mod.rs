@@ -21,6 +21,7 @@ use tandem_sim::{RobotCommand, Step, World};
 use tandem_tools_spec::{EndReason, ResultReply, ToolCall, ToolReply};
 
 use crate::commands::{Command, Motion, Run};
+use crate::convert::isometry_from_sim;
 use crate::protocol::{Rules, rules};
 use crate::scoring::{Facts, Scores};
 use crate::spec::{EpisodeSpec, Start};
@@ -146,6 +147,9 @@ impl Session {
             self.ended = Some(EndReason::Finished);
         }
         self.present = stepped?;
+        for (motion, robot) in self.motions.iter_mut().zip(&self.present.robots) {
+            motion.sense(isometry_from_sim(&robot.state.world_from_pelvis));
+        }
         let was_underway = self.scores.underway();
         let scored = self.scores.update(&self.present);
         let budget = self.budget();

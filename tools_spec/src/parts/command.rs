@@ -40,9 +40,10 @@ pub enum StopReason {
 /// How one hand did under a command, at its last step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HandReport {
-    /// The wrist pose that was asked for, in the pelvis frame; after a joint chunk, the pose its last row stands for.
+    /// The wrist pose that was asked for, in the pelvis frame as it is now; of an arm without a wrist target, the pose that
+    /// its joint targets stand for.
     pub target: Pose,
-    /// The wrist pose that was measured, in the pelvis frame.
+    /// The wrist pose that was measured, in the pelvis frame as it is now.
     pub measured: Pose,
     /// Distance from target to measured, in metres.
     pub position_error_m: f64,
