@@ -129,7 +129,7 @@ impl Session {
             .collect();
         for step in 1..=steps {
             self.step(&mut runs)?;
-            if self.scores.complete() {
+            if self.has_succeeded() {
                 return Ok(step);
             }
         }
@@ -166,7 +166,7 @@ impl Session {
     }
 
     fn phase_reached(&mut self) -> Result<(), EpisodeError> {
-        let Some(phase) = self.phases().pop() else { return Ok(()) };
+        let Some(phase) = self.reached().pop() else { return Ok(()) };
         self.keep_picture(&format!("{} {}", phase.id, phase.name.replace('_', " ")))?;
         if let Some(files) = &mut self.files {
             files.phase(&phase)?;

@@ -107,8 +107,7 @@ pub struct AtRest {
     pub released_s: f64,
 }
 
-pub const PLACED: AtRest =
-    AtRest { tilt_deg: 15.0, speed_m_s: 0.05, turning_rad_s: 0.15, released_s: 0.2 };
+pub const PLACED: AtRest = AtRest { tilt_deg: 15.0, speed_m_s: 0.05, turning_rad_s: 0.15, released_s: 0.2 };
 pub const HUNG: AtRest = AtRest { tilt_deg: 35.0, speed_m_s: 0.20, turning_rad_s: 0.80, released_s: 0.2 };
 
 pub const PHYSICS_HZ: f64 = 200.0;

@@ -19,7 +19,7 @@ pub struct CommandReply {
     pub robots: Vec<RobotReport>,
     /// Every robot of the episode.
     pub fallen: Vec<RobotFallen>,
-    /// Every phase reached so far.
+    /// Every phase reached so far, where the episode's disclosure tells it.
     pub phases: Vec<PhaseReached>,
     /// What is left of the episode.
     pub budget: Budget,
@@ -31,7 +31,7 @@ pub struct CommandReply {
 pub enum StopReason {
     /// Every step that was asked for was executed.
     StepsDone,
-    /// The last phase of the task was reached; the episode has ended.
+    /// The last phase of the task was reached, which has ended the episode.
     TaskComplete,
     /// The episode's steps ran out; the episode has ended.
     StepBudgetExhausted,
