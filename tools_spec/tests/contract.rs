@@ -118,6 +118,9 @@ fn refusals_say_what_would_work() {
         &["same number of rows"],
     );
     refused("check_reach", json!({ "robot": "A" }), &["no pose", "right_position_m"]);
+    let pixels = |count: usize| json!({ "robot": "A", "pixels": vec![[160, 120]; count] });
+    assert!(ToolCall::parse("query_depth", pixels(256)).is_ok());
+    refused("query_depth", pixels(257), &["257", "at most 256"]);
     refused("query_depth", json!({ "robot": "A", "pixels": [] }), &["pixels is empty", "[[160, 120]]"]);
     refused(
         "walk",
