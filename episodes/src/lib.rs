@@ -25,7 +25,7 @@ pub use output::OutputError;
 pub use protocol::{Rules, rules};
 pub use recording::{RecordedCall, Recorder, Recording, RecordingError};
 pub use reports::EpisodeResult;
-pub use scoring::{A, B, Facts, Grip, ObjectFacts, RobotFacts, Scored, Scores};
+pub use scoring::{A, B, Done, Facts, Grip, ObjectFacts, Phase, RobotFacts, Scored, Scores};
 pub use session::{Checkpoint, Clock, RunFiles, Session, monotonic};
 pub use spec::{Controller, EpisodeSpec, RendererKind, RobotFile, Start};
 pub use tandem_sim::{BaseLimits, LocomotionChoice, SimError};

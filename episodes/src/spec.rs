@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use tandem_sim::{LocomotionChoice, SimError};
-use tandem_tools_spec::Protocol;
+use tandem_tools_spec::{Disclosure, Protocol};
 
 use crate::tasks::{self, Task};
 
@@ -20,6 +20,9 @@ pub struct EpisodeSpec {
     pub locomotion: Controller,
     pub renderer: RendererKind,
     pub start: Start,
+    /// What the policy is told about its success.
+    #[serde(default)]
+    pub disclosure: Disclosure,
 }
 
 /// Which file describes the robots.
@@ -73,6 +76,7 @@ impl EpisodeSpec {
             locomotion: Controller::default(),
             renderer: RendererKind::default(),
             start: Start::default(),
+            disclosure: Disclosure::default(),
         }
     }
 }

@@ -6,9 +6,13 @@ use std::{
     sync::Arc,
 };
 
-use clap::Args;
+use clap::{
+    Args,
+    builder::{PossibleValuesParser, TypedValueParser},
+};
 use serde::Deserialize;
 use tandem_episodes::{BaseLimits, Controller, Instructions, InstructionsError, SimError};
+use tandem_tools_spec::Disclosure;
 
 /// One source of settings; what it leaves out comes from the next. The doc comments are the help text.
 #[derive(Debug, Clone, Default, PartialEq, Args, Deserialize)]
@@ -26,6 +30,10 @@ pub struct Layer {
     /// ONNX file with a velocity policy for the G1 in place of our own base controller.
     #[arg(long, env = "TANDEM_LOCOMOTION", value_name = "FILE")]
     pub locomotion: Option<PathBuf>,
+    /// What policies are told: `live` tells phases in every reply and ends an episode on success, `end` tells them at the end,
+    /// `never` only in the files; neither of these two ends an episode on success [default: live].
+    #[arg(long, env = "TANDEM_DISCLOSURE", value_name = "WHEN", value_parser = disclosure_parser())]
+    pub disclosure: Option<Disclosure>,
     /// Episodes that may be held at once; each costs a thread and about 30 MB [default: 8].
     #[arg(long, env = "TANDEM_MAX_EPISODES", value_name = "N")]
     pub max_episodes: Option<u32>,
@@ -41,6 +49,7 @@ impl Layer {
             runs: self.runs.or(next.runs),
             instructions: self.instructions.or(next.instructions),
             locomotion: self.locomotion.or(next.locomotion),
+            disclosure: self.disclosure.or(next.disclosure),
             max_episodes: self.max_episodes.or(next.max_episodes),
             max_body_bytes: self.max_body_bytes.or(next.max_body_bytes),
         }
@@ -60,6 +69,8 @@ pub struct Settings {
     pub locomotion: Controller,
     /// What that controller follows.
     pub base_limits: BaseLimits,
+    /// What policies are told about their success.
+    pub disclosure: Disclosure,
     /// Episodes that may be held at once.
     pub max_episodes: u32,
     /// Largest request body that is read.
@@ -111,10 +122,18 @@ impl Settings {
             },
             base_limits: locomotion.load()?.limits(),
             locomotion,
+            disclosure: layer.disclosure.unwrap_or_default(),
             max_episodes: layer.max_episodes.unwrap_or(8),
             max_body_bytes: layer.max_body_bytes.unwrap_or(2_000_000),
         }))
     }
+}
+
+/// One of the kinds of disclosure, by name.
+fn disclosure_parser() -> impl TypedValueParser<Value = Disclosure> {
+    let find = |name: String| Disclosure::ALL.into_iter().find(|disclosure| disclosure.name() == name);
+    PossibleValuesParser::new(Disclosure::ALL.map(Disclosure::name))
+        .try_map(move |name| find(name).ok_or("not one of the kinds"))
 }
 
 fn read_layer(path: &Path) -> Result<Layer, SettingsError> {

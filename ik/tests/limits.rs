@@ -151,3 +151,28 @@ fn the_other_tasks_do_what_they_say() {
     assert_eq!(report.outcome, Outcome::Reached);
     assert!((configuration.center_of_mass() - goal).xy().norm() < 1e-3);
 }
+
+/// A joint that may not move keeps its coordinate bit for bit, also where a solution begins anew from random coordinates.
+#[test]
+fn a_joint_without_speed_stays_through_steps_and_restarts() {
+    let model = common::g1();
+    let mut solver = Solver::new(&model, DT_S);
+    let held: Vec<usize> =
+        (0..model.nv()).filter(|joint| model.joints()[*joint].name.starts_with("left")).collect();
+    for joint in &held {
+        solver.limits.velocity[*joint] = 0.0;
+    }
+    let wrist = model.frame("right_wrist").expect("a frame");
+    let far = nalgebra::Isometry3::translation(0.9, -0.2, 0.2);
+    let tasks = [Task::Frame(FrameTask::new(wrist, far))];
+    let mut configuration = common::ready(&model);
+    let options = SolveOptions { restarts: 3, ..SolveOptions::default() };
+    assert_eq!(solver.solve(&mut configuration, &tasks, &options).restarts, 3, "nothing is that near");
+    let start = common::ready(&model);
+    assert!(
+        held.iter().all(|joint| configuration.q()[*joint] == start.q()[*joint]),
+        "{:?}",
+        configuration.q()
+    );
+    assert!(configuration.q() != start.q());
+}

@@ -27,7 +27,7 @@ fn refused_calls() -> Vec<(&'static str, Value, u16, &'static [&'static str])> {
         ("observe", json!({ "robots": ["A", "C"] }), 404, &["\"C\"", "A, B"]),
         ("move_wrists", json!({ "steps": 5, "robots": [{ "robot": "a" }] }), 404, &["\"a\"", "A, B"]),
         ("query_depth", json!({ "robot": "Z", "pixels": [[0, 0]] }), 404, &["\"Z\"", "A, B"]),
-        ("check_reach", json!({ "robot": "Z" }), 404, &["\"Z\"", "A, B"]),
+        ("check_reach", json!({ "robot": "Z", "left_position_m": [0.3, 0.2, 0.1] }), 404, &["\"Z\"", "A, B"]),
         ("wait", json!({ "steps": 26 }), 422, &["26", "agentic", "1 to 25"]),
         ("wait", json!({ "steps": 0 }), 422, &["at least 1"]),
         ("wait", json!({ "steps": "25" }), 422, &["steps", "{\"steps\":25}"]),

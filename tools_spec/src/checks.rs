@@ -69,10 +69,19 @@ pub fn robots<'a>(names: impl Iterator<Item = &'a str>) -> Result<(), String> {
     Ok(())
 }
 
-/// At least one pixel. Whether they lie in the picture, the episode knows.
+/// The most pixels that one call may ask for.
+const MOST_PIXELS: usize = 256;
+
+/// At least one pixel, and not too many. Whether they lie in the picture, the episode knows.
 pub fn pixels(pixels: &[[i64; 2]]) -> Result<(), String> {
     if pixels.is_empty() {
         return Err("pixels is empty; give at least one [u, v], as [[160, 120]]".into());
+    }
+    if pixels.len() > MOST_PIXELS {
+        return Err(format!(
+            "pixels holds {}; give at most {MOST_PIXELS}, as every fourth one of a region",
+            pixels.len()
+        ));
     }
     Ok(())
 }

@@ -20,8 +20,8 @@ pub use list::{
     ActCall, EPISODE_TOOLS, LookCall, LookReply, ManageCall, ManageReply, ToolCall, ToolReply, tool_specs,
 };
 pub use parts::{
-    BASE_COLUMNS, BaseCommand, BaseLimits, Budget, CommandReply, HandReport, JointValues, PhaseReached, Png,
-    Pose, Protocol, Range, RobotFallen, RobotReport, StopReason,
+    BASE_COLUMNS, BaseCommand, BaseLimits, Budget, CommandReply, Disclosure, HandReport, JointValues,
+    PhaseReached, Png, Pose, Protocol, Range, RobotFallen, RobotReport, StopReason,
 };
 pub use schema::ToolSpec;
 pub use tool::{Tool, parse_args};

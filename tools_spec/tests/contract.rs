@@ -117,6 +117,10 @@ fn refusals_say_what_would_work() {
         json!({ "robots": [{ "robot": "A", "rows": [row(35)] }, { "robot": "B", "rows": [row(35), row(35)] }] }),
         &["same number of rows"],
     );
+    refused("check_reach", json!({ "robot": "A" }), &["no pose", "right_position_m"]);
+    let pixels = |count: usize| json!({ "robot": "A", "pixels": vec![[160, 120]; count] });
+    assert!(ToolCall::parse("query_depth", pixels(256)).is_ok());
+    refused("query_depth", pixels(257), &["257", "at most 256"]);
     refused("query_depth", json!({ "robot": "A", "pixels": [] }), &["pixels is empty", "[[160, 120]]"]);
     refused(
         "walk",

@@ -1,5 +1,6 @@
 //! Commands: an acting tool call becomes one order per robot, once; orders become joint targets, step by step.
 
+mod aim;
 mod columns;
 mod motion;
 mod orders;
@@ -8,6 +9,7 @@ mod report;
 mod run;
 mod upper_body;
 
+pub use aim::Aim;
 pub use columns::{action_row, base_row};
 pub use motion::{Motion, MotionState, RobotSheet};
 pub use reach::check_reach;
@@ -15,7 +17,6 @@ pub use report::report;
 pub use run::Run;
 pub use upper_body::{UpperBody, upper_body};
 
-use nalgebra::Isometry3;
 use tandem_sim::{BaseCommand, HAND_JOINTS, Sides, UPPER_JOINTS};
 use tandem_tools_spec::ActCall;
 
@@ -40,20 +41,20 @@ pub struct Order {
 /// What one robot does during a command.
 #[derive(Clone, Debug)]
 pub enum Movement {
-    /// Nothing new is asked for, and the base stands.
+    /// Nothing new is asked for, and the base stands: hands go on to where they were told to be.
     Hold,
     /// Wrists and fingers arrive with the command's last step.
     Reach(Box<Goals>),
+    /// The base moves; arms and hands keep their joints.
     Walk(BaseCommand),
     /// One row per step.
     Rows(Vec<Row>),
 }
 
-/// Where hands are to be; what is `None` stays.
+/// Where hands are to be; fingers that are `None` stay.
 #[derive(Clone, Debug)]
 pub struct Goals {
-    /// Pelvis frame.
-    pub wrists: Sides<Option<Isometry3<f64>>>,
+    pub wrists: Sides<Aim>,
     pub fingers_rad: Sides<Option<[f64; HAND_JOINTS]>>,
     pub base: BaseCommand,
 }
@@ -135,3 +136,6 @@ pub fn find(name: &str, motions: &[Motion]) -> Result<usize, EpisodeError> {
         .position(|known| known == name)
         .ok_or_else(|| EpisodeError::UnknownRobot { name: name.into(), have: names().collect() })
 }
+
+#[cfg(test)]
+mod tests;

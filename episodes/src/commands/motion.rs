@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
-use tandem_ik::{Configuration, Outcome, SolveOptions, SolveReport, Solver};
+use tandem_ik::{Configuration, FrameError, Outcome, SolveOptions, Solver, frame_errors};
 use tandem_sim::{BaseCommand, BaseLimits, HAND_JOINTS, RobotCommand, RobotModel, Side, Sides, UPPER_JOINTS};
 
+use super::aim::Aim;
 use super::columns;
 use super::upper_body::{REACH_TOLERANCE, UpperBody};
 
@@ -37,27 +38,38 @@ pub struct MotionState {
     /// Joint targets of the present control step, action order.
     pub(super) upper_rad: [f64; UPPER_JOINTS],
     pub(super) base: BaseCommand,
-    /// Where the wrists are to be, pelvis frame.
-    pub(super) targets: Sides<Isometry3<f64>>,
+    pub(super) aims: Sides<Aim>,
+    /// The pelvis as it was last sensed.
+    world_from_pelvis: Isometry3<f64>,
     /// What the solver remembers of steps that did not help; see [`Solver::caution`].
     caution: f64,
-    /// Joints follow `targets`; otherwise the last joint chunk's row holds.
-    pub(super) follows_wrists: bool,
 }
 
 impl Motion {
-    /// A robot that stands under `rest`.
-    pub fn new(robot: RobotSheet, body: &Arc<UpperBody>, rest: &RobotCommand) -> Motion {
+    /// A robot that stands under `rest`, with its pelvis at `world_from_pelvis`.
+    pub fn new(
+        robot: RobotSheet,
+        body: &Arc<UpperBody>,
+        rest: &RobotCommand,
+        world_from_pelvis: Isometry3<f64>,
+    ) -> Motion {
         let state = MotionState {
             upper_rad: rest.upper_rad.map(f64::from),
             base: rest.base,
-            targets: Sides::both(Isometry3::identity()),
+            aims: Sides::both(Aim::Joints),
+            world_from_pelvis,
             caution: 1.0,
-            follows_wrists: true,
         };
-        let mut motion = Motion { robot, solver: body.solver(), body: body.clone(), state };
-        motion.state.targets = motion.commanded_wrists();
-        motion
+        Motion { robot, solver: body.solver(), body: body.clone(), state }
+    }
+
+    /// What the robot's hands are steered by until the pelvis is sensed anew.
+    pub fn sense(&mut self, world_from_pelvis: Isometry3<f64>) {
+        self.state.world_from_pelvis = world_from_pelvis;
+    }
+
+    pub fn world_from_pelvis(&self) -> &Isometry3<f64> {
+        &self.state.world_from_pelvis
     }
 
     pub fn state(&self) -> &MotionState {
@@ -72,9 +84,12 @@ impl Motion {
         self.state.base
     }
 
-    /// Wrist targets in force, pelvis frame.
-    pub fn targets(&self) -> &Sides<Isometry3<f64>> {
-        &self.state.targets
+    /// Where the wrists are to be, in the frame of the pelvis as it is now; of an arm without a target, where its joints
+    /// have the wrist.
+    pub fn targets(&self) -> Sides<Isometry3<f64>> {
+        let commanded = self.commanded_wrists();
+        let asked = self.in_pelvis(&self.state.aims);
+        Sides::from_fn(|side| asked[side].unwrap_or(commanded[side]))
     }
 
     /// The base stands at the height that it was last told.
@@ -87,24 +102,14 @@ impl Motion {
         self.state.base = base;
     }
 
-    /// New wrist targets; one that is `None` stays, or is where the last joint chunk left its wrist.
-    pub(super) fn aim(&mut self, wrists: &Sides<Option<Isometry3<f64>>>) {
-        let commanded = self.commanded_wrists();
-        for side in Side::BOTH {
-            if let Some(target) = wrists[side] {
-                if !self.state.follows_wrists {
-                    self.state.targets = commanded;
-                }
-                self.state.targets[side] = target;
-                self.state.follows_wrists = true;
-            }
-        }
+    /// What the wrists are to do from now on.
+    pub(super) fn aim(&mut self, aims: Sides<Aim>) {
+        self.state.aims = aims;
     }
 
     pub(super) fn set_joints(&mut self, upper_rad: [f64; UPPER_JOINTS]) {
         self.state.upper_rad = upper_rad;
-        self.state.follows_wrists = false;
-        self.state.targets = self.commanded_wrists();
+        self.state.aims = Sides::both(Aim::Joints);
     }
 
     pub(super) fn set_fingers(&mut self, side: Side, fingers_rad: &[f64; HAND_JOINTS]) {
@@ -117,16 +122,18 @@ impl Motion {
         self.body.wrists.map(|wrist| configuration.root_from_frame(wrist))
     }
 
-    /// Joint targets for one step towards `targets`, unless the joints hold a chunk's last row.
+    /// Joint targets for one step towards `aims`; an arm without a target keeps its joints.
     ///
     /// Inverse kinematics begins at the commanded, not at the measured joints: gravity's sag does not wind up.
-    pub(super) fn follow(&mut self, targets: &Sides<Isometry3<f64>>) {
-        if !self.state.follows_wrists {
+    pub(super) fn follow(&mut self, aims: &Sides<Aim>) {
+        let targets = self.in_pelvis(aims);
+        if targets == Sides::both(None) {
             return;
         }
         let body = self.body.clone();
-        let tasks = body.tasks(targets, GAIN);
+        let tasks = body.tasks(&targets, GAIN);
         let mut configuration = configuration(&body, &self.state);
+        self.solver.limits.velocity = body.speeds_rad_s(&targets);
         self.solver.caution = self.state.caution;
         if let Outcome::Infeasible { .. } = self.solver.track(&mut configuration, &tasks, &[]) {
             // Shapes that already overlap can contradict each other; the joints must still get out.
@@ -140,16 +147,25 @@ impl Motion {
         }
     }
 
-    /// Whether the wrists would get to `targets` from here, and the joints that would be at their limits.
-    pub fn reach(&self, targets: &Sides<Isometry3<f64>>) -> (SolveReport, Vec<String>) {
+    /// How far from `targets` (pelvis frame) the wrists would come to rest, and the joints that would be at their limits. An
+    /// arm without a target keeps its joints.
+    pub fn reach(&self, targets: &Sides<Option<Isometry3<f64>>>) -> (Sides<Option<FrameError>>, Vec<String>) {
         let mut solver = self.body.solver();
         solver.tolerance = REACH_TOLERANCE;
+        solver.limits.velocity = self.body.speeds_rad_s(targets);
         let mut configuration = self.configuration();
         let options = SolveOptions { restarts: REACH_RESTARTS, ..SolveOptions::default() };
-        let report = solver.solve(&mut configuration, &self.body.tasks(targets, 1.0), &options);
-        let at_limit = tandem_ik::saturated(&configuration);
-        let names = at_limit.iter().map(|joint| self.body.model.joints()[*joint].name.clone()).collect();
-        (report, names)
+        let tasks = self.body.tasks(targets, 1.0);
+        solver.solve(&mut configuration, &tasks, &options);
+        let mut errors = frame_errors(&configuration, &tasks);
+        let errors = targets.each_ref().map(|target| target.as_ref().and_then(|_| errors.next()));
+        let moves = solver.limits.velocity.iter().map(|speed| *speed > 0.0).collect::<Vec<_>>();
+        let at_limit = tandem_ik::saturated(&configuration).into_iter().filter(|joint| moves[*joint]);
+        (errors, at_limit.map(|joint| self.body.model.joints()[joint].name.clone()).collect())
+    }
+
+    fn in_pelvis(&self, aims: &Sides<Aim>) -> Sides<Option<Isometry3<f64>>> {
+        aims.map(|aim| aim.in_pelvis(&self.state.world_from_pelvis))
     }
 
     fn configuration(&self) -> Configuration<'_> {

@@ -4,6 +4,7 @@ use nalgebra::Isometry3;
 use tandem_sim::{BaseCommand, HAND_JOINTS, Side, Sides, UPPER, UPPER_JOINTS};
 use tandem_tools_spec::{WalkMove, WristMove};
 
+use super::aim::Aim;
 use super::columns;
 use super::motion::{Motion, RobotSheet};
 use super::{Cut, Goals, Movement, Order, Row};
@@ -15,10 +16,15 @@ pub fn reach(entry: &WristMove, motion: &Motion) -> Order {
         [entry.vx_m_s.unwrap_or(0.0), entry.vy_m_s.unwrap_or(0.0), entry.yaw_rate_rad_s.unwrap_or(0.0)];
     let base = base(velocity, entry.pelvis_height_m, motion, &mut cut);
     let present = motion.targets();
-    let wrists = Sides {
+    let targets = Sides {
         left: wrist_target(entry.left_position_m, entry.left_quaternion_wxyz, &present.left),
         right: wrist_target(entry.right_position_m, entry.right_quaternion_wxyz, &present.right),
     };
+    let wrists = targets.map(|target| match (target, entry.carried.unwrap_or(false)) {
+        (None, _) => Aim::Joints,
+        (Some(pelvis_from_wrist), true) => Aim::Carried(pelvis_from_wrist),
+        (Some(pelvis_from_wrist), false) => Aim::World(motion.world_from_pelvis() * pelvis_from_wrist),
+    });
     let mut fingers = |side: Side, asked_rad: &Option<[f64; HAND_JOINTS]>| {
         let first = columns::hand(side).start;
         asked_rad.map(|asked_rad| {

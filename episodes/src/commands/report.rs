@@ -29,12 +29,12 @@ pub fn report(cut: &Cut, state: &RobotState, motion: &Motion) -> RobotReport {
 
 fn hand_report(side: Side, cut: &Cut, state: &RobotState, motion: &Motion) -> HandReport {
     let (arm, hand) = (columns::arm(side), columns::hand(side));
-    let target = &motion.targets()[side];
+    let target = motion.targets()[side];
     let measured = isometry_from_sim(&state.pelvis_from_wrist[side]);
     let missing = measured.inverse() * target;
     let robot = &motion.robot;
     HandReport {
-        target: wire_pose(target),
+        target: wire_pose(&target),
         measured: wire_pose(&measured),
         position_error_m: rounded(missing.translation.vector.norm()),
         orientation_error_rad: rounded(missing.rotation.angle()),

@@ -1,8 +1,9 @@
-//! A movement under way: wrists and fingers go in a straight line and arrive with the command's last step.
+//! A movement under way: wrists and fingers go in a straight line and arrive with the command's last step. The line is
+//! straight in the world, or for carried targets in the pelvis frame.
 
-use nalgebra::Isometry3;
 use tandem_sim::{HAND_JOINTS, RobotCommand, Side, Sides, UPPER_JOINTS};
 
+use super::aim::Aim;
 use super::columns;
 use super::motion::Motion;
 use super::{Goals, Movement};
@@ -12,34 +13,34 @@ pub struct Run {
     movement: Movement,
     steps: u32,
     done: u32,
-    from_wrists: Sides<Isometry3<f64>>,
+    /// Of the kind of the aims that the movement goes to.
+    from: Sides<Aim>,
     from_rad: [f64; UPPER_JOINTS],
 }
 
 impl Run {
     /// Has `motion` take up a movement of `steps` control steps; [`Run::command`] gives each of them.
     pub fn begin(movement: Movement, steps: u32, motion: &mut Motion) -> Run {
-        let (from_wrists, from_rad) = (motion.commanded_wrists(), motion.state().upper_rad);
         match &movement {
-            Movement::Reach(goals) => motion.aim(&goals.wrists),
-            Movement::Hold | Movement::Walk(_) | Movement::Rows(_) => {}
+            Movement::Hold => {}
+            Movement::Reach(goals) => motion.aim(goals.wrists),
+            Movement::Walk(_) | Movement::Rows(_) => motion.aim(Sides::both(Aim::Joints)),
         }
-        Run { movement, steps, done: 0, from_wrists, from_rad }
+        let commanded = motion.commanded_wrists();
+        let arrived = |side| motion.state().aims[side].at(motion.world_from_pelvis(), &commanded[side]);
+        let from = Sides::from_fn(arrived);
+        Run { movement, steps, done: 0, from, from_rad: motion.state().upper_rad }
     }
 
     /// The next control step's command.
     pub fn command(&mut self, motion: &mut Motion) -> RobotCommand {
         self.done += 1;
-        let targets = *motion.targets();
         match &self.movement {
             Movement::Hold => {
                 motion.stand();
-                motion.follow(&targets);
+                motion.follow(&motion.state().aims.clone());
             }
-            Movement::Walk(base) => {
-                motion.walk(*base);
-                motion.follow(&targets);
-            }
+            Movement::Walk(base) => motion.walk(*base),
             Movement::Reach(goals) => self.reach(goals, motion),
             Movement::Rows(rows) => {
                 let row = rows[self.done as usize - 1];
@@ -54,7 +55,6 @@ impl Run {
     fn reach(&self, goals: &Goals, motion: &mut Motion) {
         let part = f64::from(self.done) / f64::from(self.steps);
         motion.walk(goals.base);
-        let mut targets = *motion.targets();
         for side in Side::BOTH {
             if let Some(goal_rad) = &goals.fingers_rad[side] {
                 let from_rad = &self.from_rad[columns::hand(side)];
@@ -62,14 +62,7 @@ impl Run {
                     std::array::from_fn(|i| from_rad[i] + (goal_rad[i] - from_rad[i]) * part);
                 motion.set_fingers(side, &between);
             }
-            if let Some(goal) = &goals.wrists[side] {
-                targets[side] = between(&self.from_wrists[side], goal, part);
-            }
         }
-        motion.follow(&targets);
+        motion.follow(&Sides::from_fn(|side| self.from[side].towards(&goals.wrists[side], part)));
     }
-}
-
-fn between(from: &Isometry3<f64>, to: &Isometry3<f64>, share: f64) -> Isometry3<f64> {
-    from.try_lerp_slerp(to, share, 1e-9).unwrap_or(*to)
 }

@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Point3};
 use tandem_ik::{
-    Capsule, DampingTask, FrameId, FrameTask, IkError, JointCouplingTask, Limits, Model, PostureTask,
-    SelfCollision, Solver, Task, Tolerance,
+    Capsule, DampingTask, FrameId, FrameTask, IkError, JointCouplingTask, Model, PostureTask, SelfCollision,
+    Solver, Task, Tolerance,
 };
 use tandem_sim::{CONTROL_HZ, RobotCommand, Side, Sides, UPPER, UPPER_JOINTS, joint_names};
 
@@ -47,11 +47,13 @@ impl UpperBody {
         })
     }
 
-    /// Wrists at `targets`, of whose error one step is to remove the part `gain`, and as little else as that takes.
-    pub fn tasks(&self, targets: &Sides<Isometry3<f64>>, gain: f64) -> Vec<Task> {
+    /// Wrists at those `targets` that there are, of whose error one step is to remove the part `gain`, and as little else as
+    /// that takes.
+    pub fn tasks(&self, targets: &Sides<Option<Isometry3<f64>>>, gain: f64) -> Vec<Task> {
         let mut tasks: Vec<Task> = Vec::with_capacity(7);
-        for side in Side::BOTH {
-            let wrist = FrameTask::new(self.wrists[side], targets[side]);
+        for (side, target) in targets.by_side() {
+            let Some(target) = target else { continue };
+            let wrist = FrameTask::new(self.wrists[side], target);
             tasks.push(Task::Frame(FrameTask { orientation_cost: ORIENTATION_COST, gain, ..wrist }));
         }
         tasks.push(Task::Posture(PostureTask {
@@ -70,13 +72,24 @@ impl UpperBody {
         tasks
     }
 
+    /// Limits of range and self-collision; those of speed depend on the targets.
     pub fn solver(&self) -> Solver {
         let mut solver = Solver::new(&self.model, 1.0 / CONTROL_HZ);
-        let speed = |name: &str| if is_waist(name) { WAIST_SPEED_RAD_S } else { ARM_SPEED_RAD_S };
-        let velocity = self.model.joints().iter().map(|joint| speed(&joint.name)).collect();
-        solver.limits = Limits { velocity, ..Limits::of(&self.model) };
         solver.self_collision = Some(self.self_collision.clone());
         solver
+    }
+
+    /// How fast each joint of the model may move: not at all in an arm whose wrist has no target.
+    pub fn speeds_rad_s(&self, targets: &Sides<Option<Isometry3<f64>>>) -> Vec<f64> {
+        let speed_rad_s = |column: &usize| {
+            let side = Side::BOTH.into_iter().find(|side| columns::arm(*side).contains(column));
+            match side.map(|side| targets[side]) {
+                None => WAIST_SPEED_RAD_S,
+                Some(None) => 0.0,
+                Some(Some(_)) => ARM_SPEED_RAD_S,
+            }
+        };
+        self.columns.iter().map(speed_rad_s).collect()
     }
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use tandem_sim::{ObjectModel, SimError, Step, mjcf::Site};
+use tandem_sim::{ObjectModel, SimError, Step};
 
 use super::facts::{Facts, ObjectFacts, RobotFacts};
 use super::grasps::ObjectGrasps;
@@ -11,8 +11,8 @@ use super::grasps::ObjectGrasps;
 /// The objects that are watched.
 #[derive(Clone, Debug)]
 pub struct Scorekeeper {
-    /// Of each object, as its file has them.
-    sites: Vec<Arc<[Site]>>,
+    /// Of each object, as its file has it.
+    models: Vec<Arc<ObjectModel>>,
     watched: Vec<Watched>,
 }
 
@@ -30,9 +30,9 @@ impl Scorekeeper {
         objects: impl Iterator<Item = (&'a str, &'a str)>,
         start: &Step,
     ) -> Result<Scorekeeper, SimError> {
-        let mut keeper = Scorekeeper { sites: Vec::new(), watched: Vec::new() };
+        let mut keeper = Scorekeeper { models: Vec::new(), watched: Vec::new() };
         for (name, file) in objects {
-            keeper.sites.push(ObjectModel::load(file)?.sites.into());
+            keeper.models.push(ObjectModel::load(file)?.into());
             keeper.watched.push(Watched {
                 name: name.into(),
                 rest_height_m: start.object(name).map_or(0.0, |state| state.world_from_object.translation.z),
@@ -57,11 +57,11 @@ impl Scorekeeper {
             hand_force_n: robot.state.hand_force_n,
             fallen: robot.state.fallen,
         });
-        let objects = self.watched.iter().zip(&self.sites).filter_map(|(watched, sites)| {
+        let objects = self.watched.iter().zip(&self.models).filter_map(|(watched, model)| {
             let state = step.object(&watched.name)?;
             Some(ObjectFacts {
                 name: watched.name.clone(),
-                sites: sites.clone(),
+                model: model.clone(),
                 pose_in_world: state.world_from_object,
                 velocity_m_s: state.velocity_m_s,
                 angular_velocity_rad_s: state.angular_velocity_rad_s,

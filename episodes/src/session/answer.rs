@@ -51,7 +51,7 @@ impl Session {
             ManageCall::GetStatus(_) => ManageReply::GetStatus(self.status()),
             ManageCall::Finish(_) => {
                 self.ended.get_or_insert(EndReason::Finished);
-                ManageReply::Finish(self.result())
+                ManageReply::Finish(self.result().told(self.spec().disclosure))
             }
         }
     }
@@ -79,7 +79,7 @@ impl Session {
 
     /// Why a command that has been executed stopped; what ends the episode ends it here.
     fn stop_reason(&mut self) -> StopReason {
-        if self.scores.complete() {
+        if self.has_succeeded() {
             self.ended = Some(EndReason::TaskComplete);
             StopReason::TaskComplete
         } else if self.steps_left() == 0 {

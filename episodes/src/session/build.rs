@@ -7,6 +7,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use crate::EpisodeError;
 use crate::commands::{Motion, RobotSheet, UpperBody};
+use crate::convert::isometry_from_sim;
 use crate::spec::{EpisodeSpec, RobotFile};
 use crate::tasks::Task;
 
@@ -31,13 +32,15 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
         world.set_locomotion(robot, locomotion.controller());
     }
     let body = Arc::new(UpperBody::new(&mjcf, &world.rest_command(0))?);
+    let present = world.present();
     let motion = |(index, robot): (usize, &Robot)| {
         let sheet = RobotSheet {
             name: robot.name.clone(),
             model: robot.model.clone(),
             base_limits: robot.base_limits(),
         };
-        Motion::new(sheet, &body, &world.rest_command(index))
+        let world_from_pelvis = isometry_from_sim(&present.robots[index].state.world_from_pelvis);
+        Motion::new(sheet, &body, &world.rest_command(index), world_from_pelvis)
     };
     let motions = world.robots().iter().enumerate().map(motion).collect();
     let robot = match &spec.robot {

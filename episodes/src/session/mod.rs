@@ -21,6 +21,7 @@ use tandem_sim::{RobotCommand, Step, World};
 use tandem_tools_spec::{EndReason, ResultReply, ToolCall, ToolReply};
 
 use crate::commands::{Command, Motion, Run};
+use crate::convert::isometry_from_sim;
 use crate::protocol::{Rules, rules};
 use crate::scoring::{Facts, Scores};
 use crate::spec::{EpisodeSpec, Start};
@@ -128,7 +129,7 @@ impl Session {
             .collect();
         for step in 1..=steps {
             self.step(&mut runs)?;
-            if self.scores.complete() {
+            if self.has_succeeded() {
                 return Ok(step);
             }
         }
@@ -146,6 +147,9 @@ impl Session {
             self.ended = Some(EndReason::Finished);
         }
         self.present = stepped?;
+        for (motion, robot) in self.motions.iter_mut().zip(&self.present.robots) {
+            motion.sense(isometry_from_sim(&robot.state.world_from_pelvis));
+        }
         let was_underway = self.scores.underway();
         let scored = self.scores.update(&self.present);
         let budget = self.budget();
@@ -162,7 +166,7 @@ impl Session {
     }
 
     fn phase_reached(&mut self) -> Result<(), EpisodeError> {
-        let Some(phase) = self.phases().pop() else { return Ok(()) };
+        let Some(phase) = self.reached().pop() else { return Ok(()) };
         self.keep_picture(&format!("{} {}", phase.id, phase.name.replace('_', " ")))?;
         if let Some(files) = &mut self.files {
             files.phase(&phase)?;

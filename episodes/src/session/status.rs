@@ -34,7 +34,20 @@ impl Session {
             .collect()
     }
 
+    /// Whether success ends the episode now.
+    pub(super) fn has_succeeded(&self) -> bool {
+        self.spec().disclosure.ends_on_success() && self.scores.complete()
+    }
+
+    /// The phases reached, as far as the policy is told.
     pub(super) fn phases(&self) -> Vec<PhaseReached> {
+        match self.spec().disclosure.tells(self.ended.is_some()) {
+            true => self.reached(),
+            false => Vec::new(),
+        }
+    }
+
+    pub(super) fn reached(&self) -> Vec<PhaseReached> {
         let reached = self.scores.reached().enumerate();
         reached
             .map(|(index, (phase, time_s))| PhaseReached {
@@ -54,6 +67,7 @@ impl Session {
             env_steps: self.env_steps(),
             ended: self.ended,
             fallen: self.fallen(),
+            disclosure: self.spec().disclosure,
             phases: self.phases(),
             budget: self.budget(),
             state_hash: self.state_hash(),
@@ -72,7 +86,7 @@ impl Session {
         }
     }
 
-    /// The result as it stands.
+    /// The result as it stands, whatever the policy is told of it.
     pub fn result(&self) -> ResultReply {
         let mut times_s = self.scores.reached().map(|(_, time_s)| time_s);
         let phases = (0..self.spec().task.phases.len()).map(|index| (Phase::number(index), times_s.next()));

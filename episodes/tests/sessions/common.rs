@@ -45,13 +45,16 @@ pub fn state(session: &mut Session, robot: &str) -> RobotState {
 
 /// A's right hand to the side of its chest, fingers half closed.
 pub fn raise_hand(steps: u32) -> ToolCall {
-    let raise = WristMove {
+    MoveWrists { steps, robots: vec![hand_up()] }.into()
+}
+
+pub fn hand_up() -> WristMove {
+    WristMove {
         right_position_m: Some([0.28, -0.24, 0.22]),
         right_quaternion_wxyz: Some([1.0, 0.0, 0.0, 0.0]),
         right_fingers_rad: Some([0.0, -0.4, -0.4, 0.6, 0.6, 0.6, 0.6]),
         ..WristMove::hold("A")
-    };
-    MoveWrists { steps, robots: vec![raise] }.into()
+    }
 }
 
 pub fn squat(height_m: f64) -> ToolCall {

@@ -4,5 +4,6 @@ mod at_rest;
 mod checkpoints;
 mod commands;
 mod common;
+mod disclosure;
 mod hand_force;
 mod recordings;

@@ -40,6 +40,7 @@ impl EpisodeTable {
         let protocol = args.protocol.unwrap_or(Protocol::Agentic);
         let spec = EpisodeSpec {
             locomotion: self.settings.locomotion.clone(),
+            disclosure: self.settings.disclosure,
             ..EpisodeSpec::new(tasks::find(&args.task)?, args.seed, protocol)
         };
         let place = self.take_place().await?;
@@ -72,7 +73,7 @@ impl EpisodeTable {
         };
         let result = episode.close().await?;
         tracing::info!(episode = id, "closed");
-        Ok(result)
+        Ok(result.told(self.settings.disclosure))
     }
 
     /// How many episodes are held.

@@ -12,7 +12,7 @@ use crate::model::{Configuration, Model};
 pub struct Limits {
     /// Part of the way to a limit that one step may take; 0.5 keeps joints off their stops, `None` leaves limits out.
     pub configuration_gain: Option<f64>,
-    /// Largest speed per joint, rad/s or m/s.
+    /// Largest speed per joint, rad/s or m/s; one of 0 keeps its joint where it is, through restarts too.
     pub velocity: Vec<f64>,
     /// Largest acceleration per joint, rad/s^2 or m/s^2.
     pub acceleration: Option<Vec<f64>>,

@@ -51,13 +51,19 @@ impl Solver {
         options: &SolveOptions,
     ) -> SolveReport {
         let mut random = options.seed.max(1);
+        let start = configuration.q().to_vec();
         let mut iterations = 0;
         let to_rest = |attempt| attempt == options.restarts;
         let mut best = self.attempt(configuration, tasks, options, to_rest(0), &mut iterations);
         let mut restarts = 0;
         while best.outcome != Outcome::Reached && restarts < options.restarts {
             restarts += 1;
-            configuration.place(|joint| random_coordinate(joint, &mut random));
+            let mut held =
+                start.iter().zip(&self.limits.velocity).map(|(q, speed)| (*speed == 0.0).then_some(*q));
+            configuration.place(|joint| {
+                let drawn = random_coordinate(joint, &mut random);
+                held.next().flatten().unwrap_or(drawn)
+            });
             let attempt = self.attempt(configuration, tasks, options, to_rest(restarts), &mut iterations);
             if attempt.outcome == Outcome::Reached || attempt.squared_error < best.squared_error {
                 best = attempt;

@@ -33,12 +33,6 @@ impl Site {
         self.size_m.x
     }
 
-    /// Between which heights of the body's frame an upright cylinder lies.
-    pub fn heights_m(&self) -> [f32; 2] {
-        let (middle_m, half_m) = (self.position_m().z, self.size_m.y);
-        [middle_m - half_m, middle_m + half_m]
-    }
-
     /// Smallest and largest corner, in the body's frame, of a box that lies along its axes.
     pub fn corners_m(&self) -> [Vector; 2] {
         [self.position_m() - self.size_m, self.position_m() + self.size_m]

@@ -19,7 +19,7 @@ pub struct CommandReply {
     pub robots: Vec<RobotReport>,
     /// Every robot of the episode.
     pub fallen: Vec<RobotFallen>,
-    /// Every phase reached so far.
+    /// Every phase reached so far, where the episode's disclosure tells it.
     pub phases: Vec<PhaseReached>,
     /// What is left of the episode.
     pub budget: Budget,
@@ -31,7 +31,7 @@ pub struct CommandReply {
 pub enum StopReason {
     /// Every step that was asked for was executed.
     StepsDone,
-    /// The last phase of the task was reached; the episode has ended.
+    /// The last phase of the task was reached, which has ended the episode.
     TaskComplete,
     /// The episode's steps ran out; the episode has ended.
     StepBudgetExhausted,
@@ -40,9 +40,10 @@ pub enum StopReason {
 /// How one hand did under a command, at its last step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HandReport {
-    /// The wrist pose that was asked for, in the pelvis frame; after a joint chunk, the pose its last row stands for.
+    /// The wrist pose that was asked for, in the pelvis frame as it is now; of an arm without a wrist target, the pose that
+    /// its joint targets stand for.
     pub target: Pose,
-    /// The wrist pose that was measured, in the pelvis frame.
+    /// The wrist pose that was measured, in the pelvis frame as it is now.
     pub measured: Pose,
     /// Distance from target to measured, in metres.
     pub position_error_m: f64,

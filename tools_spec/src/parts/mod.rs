@@ -2,6 +2,7 @@
 
 mod base;
 mod command;
+mod disclosure;
 mod episode;
 mod joint_values;
 mod png;
@@ -10,6 +11,7 @@ mod protocol;
 
 pub use base::{BASE_COLUMNS, BaseCommand, BaseLimits, Range};
 pub use command::{CommandReply, HandReport, RobotReport, StopReason};
+pub use disclosure::Disclosure;
 pub use episode::{Budget, PhaseReached, RobotFallen};
 pub use joint_values::JointValues;
 pub use png::Png;

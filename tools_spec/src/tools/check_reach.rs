@@ -6,21 +6,23 @@ use serde::{Deserialize, Serialize};
 use crate::checks;
 use crate::tool::Tool;
 
-/// Ask whether a robot's wrists could reach poses from where it stands, using both arms and the waist. Nothing moves and
-/// no steps are spent. Poses are of the wrist links (`left_wrist_yaw_link`, `right_wrist_yaw_link`) in the robot's pelvis
+/// Ask whether a robot's wrists could reach poses from where it stands, using the arms that are given a pose and the waist.
+/// Nothing moves and no steps are spent. Poses are of the wrist links (`left_wrist_yaw_link`, `right_wrist_yaw_link`) in the robot's pelvis
 /// frame: x forward, y left, z up, metres.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CheckReach {
     /// The robot, as "A".
     pub robot: String,
-    /// Left wrist position [x, y, z] in metres, as [0.30, 0.20, 0.10]. Null: its present target.
+    /// Left wrist position [x, y, z] in metres, as [0.30, 0.20, 0.10]. Null: where it is to be now, or, without an
+    /// orientation either, this arm keeps its joints.
     pub left_position_m: Option<[f64; 3]>,
-    /// Left wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null: its present target.
+    /// Left wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null: as it is to be now.
     pub left_quaternion_wxyz: Option<[f64; 4]>,
-    /// Right wrist position [x, y, z] in metres, as [0.30, -0.20, 0.10]. Null: its present target.
+    /// Right wrist position [x, y, z] in metres, as [0.30, -0.20, 0.10]. Null: where it is to be now, or, without an
+    /// orientation either, this arm keeps its joints.
     pub right_position_m: Option<[f64; 3]>,
-    /// Right wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null: its present target.
+    /// Right wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null: as it is to be now.
     pub right_quaternion_wxyz: Option<[f64; 4]>,
 }
 
@@ -40,8 +42,18 @@ impl Tool for CheckReach {
     }
 
     fn validate(&self) -> Result<(), String> {
-        checks::pose("left", self.left_position_m.as_ref(), self.left_quaternion_wxyz.as_ref())?;
-        checks::pose("right", self.right_position_m.as_ref(), self.right_quaternion_wxyz.as_ref())
+        let poses = [
+            ("left", self.left_position_m, self.left_quaternion_wxyz),
+            ("right", self.right_position_m, self.right_quaternion_wxyz),
+        ];
+        if poses.iter().all(|(_, position_m, quaternion)| position_m.is_none() && quaternion.is_none()) {
+            return Err(
+                "no pose is given; give at least one, as \"right_position_m\": [0.30, -0.20, 0.10]".into()
+            );
+        }
+        poses.iter().try_for_each(|(side, position_m, quaternion_wxyz)| {
+            checks::pose(side, position_m.as_ref(), quaternion_wxyz.as_ref())
+        })
     }
 }
 
@@ -50,13 +62,14 @@ impl Tool for CheckReach {
 pub struct ReachReply {
     /// The robot that was asked about.
     pub robot: String,
-    /// Whether both wrists reach their poses at once.
+    /// Whether every wrist that was given a pose reaches it, both at once if both were.
     pub reachable: bool,
-    /// How near the left wrist comes.
-    pub left: HandReach,
-    /// How near the right wrist comes.
-    pub right: HandReach,
-    /// Joints that would rest at a limit, by name: what keeps the wrists from coming nearer.
+    /// How near the left wrist comes; null if it was given no pose.
+    pub left: Option<HandReach>,
+    /// How near the right wrist comes; null if it was given no pose.
+    pub right: Option<HandReach>,
+    /// Joints of the waist and of the arms asked about that would rest at a limit, by name: what keeps the wrists from
+    /// coming nearer.
     pub joints_at_limit: Vec<String>,
 }
 

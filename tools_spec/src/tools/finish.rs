@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::Error as _};
 use serde_json::{Map, Value};
 
-use crate::parts::Protocol;
+use crate::parts::{Disclosure, Protocol};
 use crate::tool::Tool;
 
 /// End the episode and get its result. Call it when the task is done or cannot be done any more. After that only
@@ -46,7 +46,7 @@ pub struct ResultReply {
     pub seed: u32,
     /// The rules that were in force.
     pub protocol: Protocol,
-    /// When each phase was reached, in simulated seconds; null where it was not.
+    /// When each phase was reached, in simulated seconds; null where it was not, or is not told.
     pub phases: PhaseTimes,
     /// Why the episode ended.
     pub ended: EndReason,
@@ -60,6 +60,16 @@ pub struct ResultReply {
     pub realtime_factor: f64,
     /// Hash of the whole physical state at the end, 16 hexadecimal digits.
     pub state_hash: String,
+}
+
+impl ResultReply {
+    /// The result as a policy hears it at the end.
+    pub fn told(mut self, disclosure: Disclosure) -> ResultReply {
+        if !disclosure.tells(true) {
+            self.phases.0.iter_mut().for_each(|(_, time_s)| *time_s = None);
+        }
+        self
+    }
 }
 
 /// Seconds by phase id, in the task's order; JSON object from `p1`, `p2`, ... to seconds or null.

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::finish::EndReason;
-use crate::parts::{Budget, PhaseReached, Protocol, RobotFallen};
+use crate::parts::{Budget, Disclosure, PhaseReached, Protocol, RobotFallen};
 use crate::tool::Tool;
 
 /// Ask where the episode stands: time, phases reached, who has fallen, and the budget left. Costs no steps; physics stands
@@ -40,7 +40,9 @@ pub struct StatusReply {
     pub ended: Option<EndReason>,
     /// Every robot of the episode.
     pub fallen: Vec<RobotFallen>,
-    /// Every phase reached so far.
+    /// What is told of the phases, and whether the last one ends the episode.
+    pub disclosure: Disclosure,
+    /// Every phase reached so far, where the disclosure tells it.
     pub phases: Vec<PhaseReached>,
     /// What is left of the episode.
     pub budget: Budget,

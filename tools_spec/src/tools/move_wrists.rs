@@ -8,9 +8,9 @@ use crate::parts::CommandReply;
 use crate::tool::Tool;
 
 /// Move wrists, fingers and base of one or more robots for a number of control steps of 20 ms. Inverse kinematics turns
-/// wrist poses into arm and waist joints. Robots that are not named hold still, and a null field keeps what was asked
-/// for before. The reply says for each hand how far it is from its target: if it is still moving, repeat the command
-/// or call wait; if it has stopped short, joints_at_limit says why.
+/// wrist poses into arm and waist joints. Robots that are not named hold still; a hand without a wrist target keeps its
+/// arm's joints, and fingers that are not given keep theirs. The reply says for each hand how far it is from its target: if
+/// it is still moving, repeat the command or call wait; if it has stopped short, joints_at_limit says why.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MoveWrists {
@@ -23,24 +23,32 @@ pub struct MoveWrists {
 }
 
 /// What one robot is to do. Wrist poses are of the links `left_wrist_yaw_link` and `right_wrist_yaw_link` in the robot's
-/// own pelvis frame: x forward, y left, z up, metres. They are held in that frame while the robot walks. The fingers point
-/// along a wrist's x axis; the right palm faces along its y axis, the left palm against it, so that with [1, 0, 0, 0] the
-/// fingers point forward and the palms face each other. A hand closes on what lies 0.12 m along x and 0.055 m before its
-/// palm. To grasp an upright bottle from the side with [1, 0, 0, 0], open the thumb, bring the right wrist to
-/// [-0.12, -0.135, 0] from the bottle's axis, then to [-0.12, -0.055, 0], palm first, then close the fingers.
+/// own pelvis frame as it is when the command begins: x forward, y left, z up, metres. From then on they are fixed in the
+/// world: a robot that walks or sways does not take its hands along, unless `carried` is true. The fingers point along a
+/// wrist's x axis; the right palm faces along its y axis, the left palm against it, so that with [1, 0, 0, 0] the fingers
+/// point forward and the palms face each other. A hand closes on what lies 0.12 m along x and 0.055 m before its palm. To
+/// grasp an upright bottle from the side with [1, 0, 0, 0], open the thumb, bring the right wrist to [-0.12, -0.135, 0] from
+/// the bottle's axis, then to [-0.12, -0.055, 0], palm first, then close the fingers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WristMove {
     /// The robot, as "A".
     pub robot: String,
-    /// Left wrist position [x, y, z] in metres, as [0.30, 0.20, 0.10]. Null keeps the target.
+    /// Left wrist position [x, y, z] in metres, as [0.30, 0.20, 0.10]. Null keeps where it is to be; without an orientation
+    /// either, the arm keeps its joints.
     pub left_position_m: Option<[f64; 3]>,
-    /// Left wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null keeps the target.
+    /// Left wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null keeps how it is to be turned; without a position either, the
+    /// arm keeps its joints.
     pub left_quaternion_wxyz: Option<[f64; 4]>,
-    /// Right wrist position [x, y, z] in metres, as [0.30, -0.20, 0.10]. Null keeps the target.
+    /// Right wrist position [x, y, z] in metres, as [0.30, -0.20, 0.10]. Null keeps where it is to be; without an orientation
+    /// either, the arm keeps its joints.
     pub right_position_m: Option<[f64; 3]>,
-    /// Right wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null keeps the target.
+    /// Right wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null keeps how it is to be turned; without a position either,
+    /// the arm keeps its joints.
     pub right_quaternion_wxyz: Option<[f64; 4]>,
+    /// True: the wrist targets move with the pelvis from the command's beginning on, as a robot that carries something wants
+    /// it. False or null: they are fixed in the world.
+    pub carried: Option<bool>,
     /// Left finger joint angles in radians: [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1]. Closed
     /// around a bottle: [0, 0.75, 0.8, -1.1, -1.3, -1.1, -1.3]; open: [0, -0.3, 0, 0, 0, 0, 0]. Null keeps the target.
     pub left_fingers_rad: Option<[f64; 7]>,
@@ -66,6 +74,7 @@ impl WristMove {
             left_quaternion_wxyz: None,
             right_position_m: None,
             right_quaternion_wxyz: None,
+            carried: None,
             left_fingers_rad: None,
             right_fingers_rad: None,
             vx_m_s: None,

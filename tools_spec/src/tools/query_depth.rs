@@ -14,8 +14,9 @@ use crate::tool::Tool;
 pub struct QueryDepth {
     /// The robot whose camera measures, as "A".
     pub robot: String,
-    /// Pixels as [u, v]: column 0 to 319 from the left, row 0 to 239 from the top. Example: [[160, 120], [170, 120]].
-    #[schemars(length(min = 1))]
+    /// Pixels as [u, v]: column 0 to 319 from the left, row 0 to 239 from the top, at most 256 of them.
+    /// Example: [[160, 120], [170, 120]].
+    #[schemars(length(min = 1, max = 256))]
     pub pixels: Vec<[i64; 2]>,
 }
 

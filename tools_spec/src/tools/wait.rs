@@ -8,7 +8,7 @@ use crate::parts::CommandReply;
 use crate::tool::Tool;
 
 /// Let all robots hold their targets for a number of control steps of 20 ms: for a hand to arrive, for an object to come to
-/// rest.
+/// rest. Wrist targets of the last command stay fixed in the world, or carried, as they were given.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Wait {

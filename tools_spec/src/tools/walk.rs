@@ -1,4 +1,4 @@
-//! `walk`: moves the base while the arms hold.
+//! `walk`: moves the base while the arms keep their joints.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,8 @@ use crate::parts::CommandReply;
 use crate::tool::Tool;
 
 /// Walk, turn or change the pelvis height of one or more robots for a number of control steps of 20 ms, while their arms
-/// and hands hold. Velocities are in the robot's own frame and apply during this command only; the height persists.
+/// and hands keep their joints and so go along. Velocities are in the robot's own frame and apply during this command only;
+/// the height persists.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Walk {

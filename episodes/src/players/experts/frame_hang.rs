@@ -6,7 +6,7 @@ use tandem_sim::{Pose, Rotation, Side, Vector};
 
 use super::skills::{BarGrasp, HandMove, Stage, move_together, take_together};
 use crate::players::PlayerError;
-use crate::scoring::{A, B};
+use crate::scoring::{A, B, Facts};
 
 /// Where the moulding, 50 x 40 mm, lies in a hand whose palm is on its outside.
 const MOULDING_IN_WRIST_M: Vector = Vector::new(0.112, 0.045, 0.0);
@@ -16,6 +16,10 @@ const CLOSURE: f32 = 1.1;
 const BEFORE_M: Vector = Vector::new(0.0, -0.045, 0.004);
 const PAST_M: Vector = Vector::new(0.0, 0.040, 0.002);
 const RESTING_M: Vector = Vector::new(0.0, 0.045, -0.034);
+const LEG_S: f32 = 0.3;
+/// A frame that missed the peg, or leans by more than this on it, is taken off and hung anew.
+const TRIES: u32 = 3;
+const ASKEW_RAD: f32 = 0.2;
 /// Fingers open as far as the wall behind the frame lets them, then the hands go outwards and back.
 const LOOSE: f32 = 0.35;
 const OUTWARDS_M: f32 = 0.13;
@@ -40,13 +44,33 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
     let before = upright(tip_m + BEFORE_M);
     let raised_m = Vector::new(start.translation.x, start.translation.y, before.translation.z);
     let raised = Pose::from_translation(raised_m);
-    let legs = [(start, raised, 8), (raised, before, 5), (before, upright(tip_m + PAST_M), 6)];
-    for (from, to, count) in legs {
-        move_together(stage, &grasps, &|part| from.lerp(&to, part), count, 0.3)?;
+    let go = |stage: &mut Stage, from: Pose, to: Pose, count: u32| {
+        move_together(stage, &grasps, &|part| from.lerp(&to, part), count, LEG_S)
+    };
+    go(stage, start, raised, 8)?;
+    go(stage, raised, before, 5)?;
+    let (past, resting) = (upright(tip_m + PAST_M), upright(tip_m + RESTING_M));
+    for _ in 0..TRIES {
+        go(stage, before, past, 6)?;
+        if is_straight_on_peg(&stage.facts()?) {
+            go(stage, past, resting, 4)?;
+            if is_straight_on_peg(&stage.facts()?) {
+                return let_go(stage, &grasps);
+            }
+        }
+        // Off again the way it came, and once more with the grips as they are now.
+        let missed = stage.facts()?.object("frame").pose_in_world;
+        let above_m = Vector::new(missed.translation.x, missed.translation.y, past.translation.z);
+        let above = Pose::from_translation(above_m);
+        go(stage, missed, above, 4)?;
+        go(stage, above, before, 6)?;
     }
-    let (from, to) = (upright(tip_m + PAST_M), upright(tip_m + RESTING_M));
-    move_together(stage, &grasps, &|part| from.lerp(&to, part), 4, 0.3)?;
-    let_go(stage, &grasps)
+    Err(PlayerError::GaveUp("the frame does not hang straight on the peg".into()))
+}
+
+/// Once let go of, a frame that hangs askew stays so: no hand has room behind it to take it again.
+fn is_straight_on_peg(facts: &Facts) -> bool {
+    facts.threads("wall_peg", ["root", "tip"], "frame", "loop") && facts.tilt_rad("frame") < ASKEW_RAD
 }
 
 fn let_go(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError> {

@@ -16,10 +16,13 @@ const GLASS: CylinderGrasp =
 
 /// Where B holds the glass: between the robots, just above the table.
 const GLASS_PLACE_M: Vector = Vector::new(0.40, 0.0, 0.86);
-/// Lip above mouth while pouring, and how much further off the cup is when it begins to tip.
+/// Lip above mouth while pouring, and how much further off the cup is while it stands upright.
 const ABOVE_MOUTH_M: Vector = Vector::new(0.0, 0.0, 0.03);
 const BEFORE_TIPPING_M: Vector = Vector::new(0.0, -0.04, 0.10);
 const TIP_RAD: f32 = 2.0;
+/// A marble that stays in the cup is poured again, tipped by this much more, up to what a wrist can do.
+const MORE_RAD: f32 = 0.2;
+const DEEPEST_RAD: f32 = 2.6;
 /// The tip is played in this many straight moves.
 const TIP_MOVES: u32 = 8;
 const TIP_MOVE_S: f32 = 0.3;
@@ -35,17 +38,30 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
     let glass = GLASS.carry(stage, GLASS_PLACE_M)?;
     let cup = cup_at(stage, GLASS_PLACE_M, 0.0)?;
     stage.perform(1.5, &[cup, glass])?;
-    pour(stage)?;
-    for _ in 0..4 {
-        stage.perform(0.5, &[GLASS.close()])?;
+    let mut tip_rad = TIP_RAD;
+    loop {
+        pour(stage, tip_rad)?;
+        for _ in 0..4 {
+            stage.perform(0.5, &[GLASS.close()])?;
+        }
+        let facts = stage.facts()?;
+        if facts.inside_vessel("marble", "glass") {
+            return Ok(());
+        }
+        if !facts.inside_vessel("marble", "cup") {
+            return Err(PlayerError::GaveUp("the marble fell beside the glass".into()));
+        }
+        tip_rad = (tip_rad + MORE_RAD).min(DEEPEST_RAD);
+        let upright = cup_at(stage, facts.position_m("glass"), 0.0)?;
+        stage.perform(1.0, &[upright])?;
     }
-    Ok(())
 }
 
-fn pour(stage: &mut Stage) -> Result<(), PlayerError> {
+/// Tips the cup by `tip_rad`, its lip over the glass wherever that is by then.
+fn pour(stage: &mut Stage, tip_rad: f32) -> Result<(), PlayerError> {
     for part in 1..=TIP_MOVES {
         let glass_m = stage.facts()?.position_m("glass");
-        let tip = cup_at(stage, glass_m, TIP_RAD * part as f32 / TIP_MOVES as f32)?;
+        let tip = cup_at(stage, glass_m, tip_rad * part as f32 / TIP_MOVES as f32)?;
         stage.glide(TIP_MOVE_S, &[tip])?;
     }
     Ok(())
@@ -58,7 +74,7 @@ fn cup_at(stage: &mut Stage, glass_m: Vector, tilt_rad: f32) -> Result<HandMove,
     let [mouth_m, lip_m] =
         [("glass", "mouth"), ("cup", "lip")].map(|(object, site)| facts.site(object, site).position_m());
     let rotation = Rotation::from_rotation_x(-tilt_rad);
-    let to_go = 1.0 - tilt_rad / TIP_RAD;
+    let to_go = (1.0 - tilt_rad / TIP_RAD).max(0.0);
     let goal_m = glass_m + mouth_m + ABOVE_MOUTH_M + BEFORE_TIPPING_M * to_go;
     CUP.bring(stage, Pose::from_parts(goal_m - rotation * lip_m, rotation))
 }

@@ -14,7 +14,7 @@ impl Facts {
         };
         let object = |spot: &crate::tasks::ObjectSpot| ObjectFacts {
             name: spot.name.into(),
-            sites: tandem_sim::ObjectModel::load(spot.file).unwrap().sites.into(),
+            model: ObjectModel::load(spot.file).unwrap().into(),
             pose_in_world: Pose::from_translation(spot.position_m.into()),
             velocity_m_s: Vector::ZERO,
             angular_velocity_rad_s: Vector::ZERO,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tandem_sim::{Pose, Side, Sides, Vector, mjcf::Site};
+use tandem_sim::{ObjectModel, Pose, Side, Sides, Vector, mjcf::Site};
 
 /// Index of robot A in [`Facts::robots`].
 pub const A: usize = 0;
@@ -34,8 +34,8 @@ pub struct RobotFacts {
 #[derive(Clone, Debug)]
 pub struct ObjectFacts {
     pub name: String,
-    /// Points and regions that the object's file gives a name to.
-    pub sites: Arc<[Site]>,
+    /// Its shapes, and the points and regions that its file gives a name to.
+    pub model: Arc<ObjectModel>,
     pub pose_in_world: Pose,
     pub velocity_m_s: Vector,
     pub angular_velocity_rad_s: Vector,
@@ -85,6 +85,13 @@ impl Facts {
         object.pose_in_world.translation.z - object.rest_height_m
     }
 
+    /// How far the lowest point of `object` is above where its origin rested when the episode began: for what stood upright,
+    /// how far all of it is off what it stood on.
+    pub fn clearance_m(&self, object: &str) -> f32 {
+        let object = self.object(object);
+        object.model.lowest_m(&object.pose_in_world) - object.rest_height_m
+    }
+
     /// Angle between the z axis of `object` and the world's.
     pub fn tilt_rad(&self, object: &str) -> f32 {
         let up_in_world = self.object(object).pose_in_world.rotation * Vector::Z;
@@ -114,12 +121,10 @@ impl Facts {
         self.point_m(object, self.site(object, site).position_m())
     }
 
-    /// Whether the origin of `object` is inside a site of `container` that is an upright cylinder.
-    pub fn inside_cylinder(&self, object: &str, container: &str, site: &str) -> bool {
-        let site = self.site(container, site);
-        let [low_m, high_m] = site.heights_m();
-        let local = self.object(container).pose_in_world.inverse() * self.position_m(object);
-        local.truncate().length() <= site.radius_m() && (low_m..=high_m).contains(&local.z)
+    /// Whether the origin of `object` is between the walls of `vessel` and over its floor, as its shapes have them.
+    pub fn inside_vessel(&self, object: &str, vessel: &str) -> bool {
+        let vessel = self.object(vessel);
+        vessel.model.encloses(vessel.pose_in_world.inverse() * self.position_m(object))
     }
 
     /// Whether the origin of `object` is inside a site of `container` that is a box.
@@ -145,7 +150,7 @@ impl Facts {
 
     /// A site of `object`. Objects' files name their sites, so one that is not there is a mistake in task or file.
     pub fn site(&self, object: &str, name: &str) -> &Site {
-        match self.object(object).sites.iter().find(|site| site.name == name) {
+        match self.object(object).model.site(name) {
             Some(site) => site,
             None => {
                 panic!("the file of {object:?} has no site {name:?}, which a task or its expert asks for")

@@ -1,7 +1,16 @@
 //! What an object's file says of it, whichever world it is put into.
 
+use rapier3d::math::{Pose, Vector};
+use rapier3d::parry::query::Ray;
+use rapier3d::prelude::SharedShape;
+
 use crate::mjcf::{BodyLink, BodyTree, Document, Geom, LinkJoint, Site};
 use crate::{SimError, assets};
+
+/// Ways to look from a point that may be enclosed; the staves of a vessel leave no gaps between them.
+const HEADINGS: u32 = 16;
+/// No object is as wide as this.
+const SIGHT_M: f32 = 10.0;
 
 /// A rigid body of a file as tasks and pictures see it, in its own frame.
 #[derive(Clone, Debug)]
@@ -13,7 +22,7 @@ pub struct ObjectModel {
 }
 
 impl ObjectModel {
-    /// Reads the top-level body of an embedded object file, without a world: a scorer needs the sites alone.
+    /// Reads the top-level body of an embedded object file, without a world: a scorer needs sites and shapes alone.
     pub fn load(file: &str) -> Result<ObjectModel, SimError> {
         let (_, tree) = ObjectModel::read(file)?;
         Ok(ObjectModel::of(&tree.links[0]))
@@ -21,6 +30,34 @@ impl ObjectModel {
 
     pub fn site(&self, name: &str) -> Option<&Site> {
         self.sites.iter().find(|site| site.name == name)
+    }
+
+    /// Height above the floor of the lowest point of what collides, with the object at `world_from_object`.
+    pub fn lowest_m(&self, world_from_object: &Pose) -> f32 {
+        let bottoms_m = self.colliders().map(|(object_from_shape, shape)| {
+            shape.compute_aabb(&(*world_from_object * object_from_shape)).mins.z
+        });
+        bottoms_m.fold(f32::INFINITY, f32::min)
+    }
+
+    /// Whether a point of the object's frame lies in the open between walls and over a floor: whichever way one looks from
+    /// there, level in the object's own frame or down, one sees the object.
+    pub fn encloses(&self, point_m: Vector) -> bool {
+        let colliders: Vec<(Pose, SharedShape)> = self.colliders().collect();
+        let solid = colliders.iter().any(|(pose, shape)| shape.contains_point(pose, point_m));
+        let sees = |direction: Vector| {
+            let ray = Ray::new(point_m, direction);
+            colliders.iter().any(|(pose, shape)| shape.intersects_ray(pose, &ray, SIGHT_M))
+        };
+        let headings_rad = (0..HEADINGS).map(|i| i as f32 * std::f32::consts::TAU / HEADINGS as f32);
+        let mut level =
+            headings_rad.map(|heading_rad| Vector::new(heading_rad.cos(), heading_rad.sin(), 0.0));
+        !solid && sees(Vector::NEG_Z) && level.all(sees)
+    }
+
+    /// What collides, with its pose in the object's frame.
+    fn colliders(&self) -> impl Iterator<Item = (Pose, SharedShape)> {
+        self.geoms.iter().filter(|geom| geom.collides).filter_map(Geom::collider)
     }
 
     /// An embedded object file, and the one body that lies directly in its world with all that is on it.

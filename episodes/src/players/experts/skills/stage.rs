@@ -7,7 +7,7 @@ use crate::players::{Backstage, PlayerError};
 use crate::scoring::Facts;
 use crate::tasks::Task;
 
-/// Control steps of one command: short enough to correct for a swaying pelvis.
+/// Control steps of one command: short enough to start and stop smoothly.
 const STEPS_PER_COMMAND: u32 = 10;
 
 /// Part of one hand in a motion. What is not said stays as it is.

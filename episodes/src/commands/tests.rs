@@ -1,0 +1,130 @@
+//! Where hands go while the pelvis moves under them, by kinematics alone: joints are where they are told to be.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Translation3, Vector3};
+use tandem_sim::{BaseCommand, BaseLimits, RobotCommand, RobotModel, Side, Sides, UPPER, assets};
+use tandem_tools_spec::{MoveWrists, Protocol, ToolCall, WristMove};
+
+use super::*;
+use crate::protocol::rules;
+use crate::tasks;
+
+/// A robot called A that stands at rest with its pelvis 0.78 m over the world's origin.
+fn standing() -> Motion {
+    let mjcf = assets::robot(assets::DEFAULT_ROBOT).unwrap();
+    let model = Arc::new(RobotModel::parse(assets::DEFAULT_ROBOT, mjcf).unwrap());
+    let base = BaseCommand { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m: 0.78 };
+    let rest = RobotCommand { upper_rad: UPPER.map(|joint| model.joints[joint].rest_rad), base };
+    let body = Arc::new(UpperBody::new(mjcf, &rest).unwrap());
+    let range = [-1.0, 1.0];
+    let base_limits =
+        BaseLimits { vx_m_s: range, vy_m_s: range, yaw_rate_rad_s: range, pelvis_height_m: range };
+    let robot = RobotSheet { name: "A".into(), model, base_limits };
+    Motion::new(robot, &body, &rest, Isometry3::translation(0.0, 0.0, 0.78))
+}
+
+/// The movement that moves A as `entry` says, in one command of 50 steps.
+fn movement(entry: WristMove, motion: &Motion) -> Movement {
+    let rules = rules(Protocol::Benchmark, tasks::find("handover").unwrap());
+    let ToolCall::Act(call) = MoveWrists { steps: 50, robots: vec![entry] }.into() else { panic!("a look") };
+    let command = Command::read(&call, &rules, std::slice::from_ref(motion)).unwrap();
+    command.orders.into_iter().next().unwrap().movement
+}
+
+/// Plays 50 steps, in each of which the pelvis moves by `pelvis_step_m`.
+fn play(movement: Movement, pelvis_step_m: Vector3<f64>, motion: &mut Motion) {
+    let mut run = Run::begin(movement, 50, motion);
+    for _ in 0..50 {
+        run.command(motion);
+        motion.sense(Translation3::from(pelvis_step_m) * motion.world_from_pelvis());
+    }
+}
+
+fn right_hand(carried: bool) -> WristMove {
+    WristMove {
+        right_position_m: Some([0.28, -0.24, 0.22]),
+        right_quaternion_wxyz: Some([1.0, 0.0, 0.0, 0.0]),
+        carried: Some(carried),
+        ..WristMove::hold("A")
+    }
+}
+
+/// Where the commanded joints put the right wrist.
+fn wrist_in_world_m(motion: &Motion) -> Vector3<f64> {
+    (motion.world_from_pelvis() * motion.commanded_wrists().right).translation.vector
+}
+
+/// A robot whose right hand has arrived before its chest.
+fn arrived() -> Motion {
+    let mut motion = standing();
+    let goal = movement(right_hand(false), &motion);
+    play(goal, Vector3::zeros(), &mut motion);
+    play(Movement::Hold, Vector3::zeros(), &mut motion);
+    motion
+}
+
+#[test]
+fn a_hand_stays_in_the_world_under_a_moving_pelvis_until_it_is_out_of_reach() {
+    let mut motion = arrived();
+    let there_m = wrist_in_world_m(&motion);
+    assert!((there_m - Vector3::new(0.28, -0.24, 1.0)).norm() < 1e-3, "{there_m}");
+    let back = |distance_m: f64| Vector3::new(-distance_m / 50.0, 0.0, 0.0);
+    for distance_m in [0.01, -0.02, 0.06] {
+        play(Movement::Hold, back(distance_m), &mut motion);
+        let off_m = (wrist_in_world_m(&motion) - there_m).norm();
+        // Inverse kinematics comes two control steps after the pelvis.
+        assert!(off_m < 5e-3, "{off_m} m off after {distance_m} m back");
+    }
+    play(Movement::Hold, back(0.6), &mut motion);
+    let off_m = (wrist_in_world_m(&motion) - there_m).norm();
+    assert!(off_m > 0.1, "{off_m} m off, with the arm's length between pelvis and target");
+}
+
+#[test]
+fn targets_are_of_the_pelvis_at_the_beginning_and_only_carried_ones_move_with_it() {
+    let step_m = Vector3::new(0.001, 0.0005, 0.0);
+    for (carried, walked) in [(false, 0.0), (true, 50.0)] {
+        let mut motion = arrived();
+        let began_m = wrist_in_world_m(&motion);
+        let goal = movement(right_hand(carried), &motion);
+        play(goal, step_m, &mut motion);
+        let off_m = (wrist_in_world_m(&motion) - began_m - walked * step_m).norm();
+        assert!(off_m < 3e-3, "{off_m} m off with carried {carried}");
+        // The target in force is told in the frame of the pelvis that has moved on.
+        let told_m = motion.targets().right.translation.vector;
+        let expected_m = Vector3::new(0.28, -0.24, 0.22) + (walked - 50.0) * step_m;
+        assert!((told_m - expected_m).norm() < 1e-9, "{told_m} with carried {carried}");
+    }
+}
+
+#[test]
+fn an_arm_without_a_target_keeps_its_joints() {
+    let mut motion = arrived();
+    let left = columns::arm(Side::Left);
+    let before_rad = motion.state().upper_rad;
+    let low = WristMove { right_position_m: Some([0.30, -0.10, -0.05]), ..WristMove::hold("A") };
+    let goal = movement(low, &motion);
+    play(goal, Vector3::new(0.001, 0.0, 0.0), &mut motion);
+    let after_rad = motion.state().upper_rad;
+    assert_eq!(after_rad[left.clone()], before_rad[left], "the left arm was given no target");
+    assert_ne!(after_rad[columns::arm(Side::Right)], before_rad[columns::arm(Side::Right)]);
+
+    // Walking takes both arms along, whatever they were told before.
+    let mut walking = arrived();
+    let walk = Movement::Walk(walking.base());
+    play(walk, Vector3::new(0.002, 0.0, 0.0), &mut walking);
+    assert_eq!(walking.state().upper_rad, before_rad);
+}
+
+#[test]
+fn reach_is_asked_of_the_named_arm_alone() {
+    let motion = standing();
+    for (x_m, within) in [(0.3, true), (0.9, false)] {
+        let pose = Isometry3::translation(x_m, -0.2, 0.1);
+        let (errors, at_limit) = motion.reach(&Sides { left: None, right: Some(pose) });
+        assert!(errors.left.is_none());
+        assert_eq!(errors.right.unwrap().position_m < 0.005, within);
+        assert!(at_limit.iter().all(|joint| !joint.starts_with("left")), "{at_limit:?}");
+    }
+}

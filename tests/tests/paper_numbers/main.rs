@@ -1,0 +1,5 @@
+//! What the benchmark has published against what the program does: one table of numbers, and tests on both sides of each.
+
+mod rules;
+mod table;
+mod thresholds;

@@ -1,0 +1,132 @@
+//! The numbers that the benchmark has published, as it published them: degrees stay degrees. Nothing here is read from a task.
+
+/// One task that is done standing.
+pub struct Published {
+    pub id: &'static str,
+    pub robots: usize,
+    /// Number of the scene in the collection that it was taken from.
+    pub scene: &'static str,
+    pub episode_steps: u32,
+    pub moves: &'static [Moves],
+    /// Of p1, p2, p3: whether more than one robot has to work on it.
+    pub collaborative: [bool; 3],
+}
+
+/// What is drawn uniformly for some objects together, from the first to the second number.
+#[derive(Debug, PartialEq)]
+pub struct Moves {
+    pub objects: &'static [&'static str],
+    pub x_m: [f32; 2],
+    pub y_m: [f32; 2],
+    pub z_m: [f32; 2],
+    pub yaw_deg: [f32; 2],
+}
+
+const fn moves(objects: &'static [&'static str], x_m: [f32; 2], y_m: [f32; 2]) -> Moves {
+    Moves { objects, x_m, y_m, z_m: [0.0, 0.0], yaw_deg: [0.0, 0.0] }
+}
+
+const fn apple_in_tub(apple: &'static [&'static str]) -> Moves {
+    moves(apple, [-0.008, 0.008], [-0.008, 0.008])
+}
+
+/// Stacks follow the containers that stand on them, and so does what is in a container.
+pub const TASKS: [Published; 4] = [
+    Published {
+        id: "handover",
+        robots: 2,
+        scene: "084",
+        episode_steps: 1000,
+        moves: &[
+            moves(&["bottle"], [-0.025, 0.025], [-0.025, 0.025]),
+            moves(&["target_pad"], [-0.025, 0.025], [-0.025, 0.025]),
+        ],
+        collaborative: [false, true, false],
+    },
+    Published {
+        id: "pouring",
+        robots: 2,
+        scene: "085",
+        episode_steps: 1000,
+        moves: &[
+            Moves { yaw_deg: [-30.0, 30.0], ..moves(&["cup", "marble"], [-0.03, 0.03], [-0.06, 0.06]) },
+            Moves { yaw_deg: [-30.0, 30.0], ..moves(&["glass"], [-0.03, 0.03], [-0.06, 0.06]) },
+            moves(&["marble"], [-0.006, 0.006], [-0.006, 0.006]),
+        ],
+        collaborative: [false, false, true],
+    },
+    Published {
+        id: "frame_hang",
+        robots: 2,
+        scene: "136",
+        episode_steps: 1000,
+        moves: &[
+            moves(&["frame", "frame_rack", "wall_peg"], [-0.05, 0.05], [-0.025, 0.025]),
+            Moves { z_m: [-0.04, 0.0], ..moves(&["wall_peg"], [0.0, 0.0], [0.0, 0.0]) },
+            moves(&["frame", "frame_rack"], [-0.03, 0.03], [-0.01, 0.01]),
+        ],
+        collaborative: [false, true, true],
+    },
+    Published {
+        id: "co_pouring",
+        robots: 2,
+        scene: "102",
+        episode_steps: 1000,
+        moves: &[
+            moves(
+                &["tub", "tub_stack", "apple_1", "apple_2", "apple_3", "apple_4", "apple_5", "apple_6"],
+                [-0.02, 0.02],
+                [-0.01, 0.01],
+            ),
+            moves(&["crate", "crate_stack"], [-0.06, 0.06], [-0.005, 0.005]),
+            apple_in_tub(&["apple_1"]),
+            apple_in_tub(&["apple_2"]),
+            apple_in_tub(&["apple_3"]),
+            apple_in_tub(&["apple_4"]),
+            apple_in_tub(&["apple_5"]),
+            apple_in_tub(&["apple_6"]),
+        ],
+        collaborative: [true, true, true],
+    },
+];
+
+pub const HANDOVER_LIFT_M: f32 = 0.03;
+pub const HANDOVER_PLACE_M: f32 = 0.06;
+pub const POURING_LIFT_M: f32 = 0.03;
+pub const POURING_TIP_DEG: f32 = 60.0;
+pub const POURING_INSIDE_S: f64 = 0.5;
+pub const FRAME_LIFT_M: f32 = 0.10;
+pub const TUB_LIFT_M: f32 = 0.03;
+pub const TUB_TIP_DEG: f32 = 25.0;
+
+/// How an object has to stand or hang at the end.
+pub struct AtRest {
+    pub tilt_deg: f32,
+    pub speed_m_s: f32,
+    pub turning_rad_s: f32,
+    pub released_s: f64,
+}
+
+pub const PLACED: AtRest = AtRest { tilt_deg: 15.0, speed_m_s: 0.05, turning_rad_s: 0.15, released_s: 0.2 };
+pub const HUNG: AtRest = AtRest { tilt_deg: 35.0, speed_m_s: 0.20, turning_rad_s: 0.80, released_s: 0.2 };
+
+pub const PHYSICS_HZ: f64 = 200.0;
+pub const CONTROL_HZ: f64 = 50.0;
+pub const CAMERA_PX: [u32; 2] = [320, 240];
+pub const CAMERA_HORIZONTAL_FOV_DEG: f64 = 102.0;
+pub const CAMERA_DOWN_DEG: f64 = 25.0;
+
+/// Joints of one robot's state by group.
+pub const STATE: [(&str, usize); 4] = [("leg", 12), ("waist", 3), ("arm", 14), ("hand", 14)];
+/// What an action row holds, in order: joints by group, then the base.
+pub const ACTION: [(&str, usize); 3] = [("arm", 14), ("hand", 14), ("waist", 3)];
+pub const ACTION_BASE: [&str; 4] = ["vx_m_s", "vy_m_s", "yaw_rate_rad_s", "pelvis_height_m"];
+
+pub const AGENTIC_STEPS_PER_COMMAND: u32 = 25;
+pub const AGENTIC_EPISODE_STEPS: u32 = 6000;
+pub const AGENTIC_HOLD_STEPS: u32 = 300;
+pub const AGENTIC_THINKING_S: u64 = 30 * 60;
+pub const AGENTIC_SEEDS: (u32, u32) = (0, 9);
+/// The longest chunk that a policy of the benchmark executes before it looks again.
+pub const BENCHMARK_STEPS_PER_COMMAND: u32 = 50;
+pub const BENCHMARK_SEEDS: (u32, u32) = (1, 100);
