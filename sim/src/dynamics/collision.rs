@@ -5,8 +5,8 @@
 
 use rapier3d::math::Vector;
 use rapier3d::parry::bounding_volume::BoundingVolume;
-use rapier3d::parry::shape::PackedFeatureId;
 use rapier3d::parry::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
+use rapier3d::parry::shape::PackedFeatureId;
 
 use serde::{Deserialize, Serialize};
 
