@@ -80,7 +80,7 @@ fn nullable_fields_may_be_left_out() {
     };
     assert_eq!(call.robots[0].left_position_m, Some([0.3, 0.2, 0.1]));
     assert_eq!(call.robots[0].right_position_m, None);
-    assert!(ToolCall::parse("observe", Value::Null).is_ok());
+    assert!(ToolCall::parse("observe", json!({})).is_ok());
 }
 
 /// A refusal must contain every one of `says`.
@@ -105,7 +105,9 @@ fn refusals_say_what_would_work() {
     refused("wait", json!({ "steps": 2.5 }), &["2.5", "{\"steps\":25}"]);
     refused("wait", json!({ "step": 25 }), &["unknown field `step`", "`steps`"]);
     refused("wait", json!({}), &["missing field `steps`"]);
-    refused("wait", json!([]), &["wait: ", "{\"steps\":25}"]);
+    refused("wait", json!([5]), &["wait: ", "sequence, expected an object", "{\"steps\":25}"]);
+    refused("observe", Value::Null, &["observe: ", "null, expected an object"]);
+    refused("walk", json!({ "steps": 5, "robots": [["A", 0, 0, 0, null]] }), &["robots[0]: ", "an object"]);
     refused(
         "send_joint_chunk",
         chunk(json!([row(35), row(34)])),

@@ -20,6 +20,13 @@ const DROPPED: &[&str] = &[
     "maxItems",
     "minLength",
     "maxLength",
+    "pattern",
+    "prefixItems",
+    "uniqueItems",
+    "contains",
+    "minContains",
+    "maxContains",
+    "allOf",
 ];
 
 /// The description of `T` and its schema without it.

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::checks;
+use crate::limits;
 use crate::parts::CommandReply;
 use crate::tool::Tool;
 
@@ -15,10 +16,10 @@ use crate::tool::Tool;
 #[serde(deny_unknown_fields)]
 pub struct MoveWrists {
     /// Control steps of 20 ms: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark protocol.
-    #[schemars(range(min = 1))]
+    #[schemars(range(min = 1, max = limits::MOST_STEPS))]
     pub steps: u32,
     /// One entry per robot that is to move; each robot at most once.
-    #[schemars(length(min = 1))]
+    #[schemars(length(min = 1), extend("allOf" = limits::each_robot_once()))]
     pub robots: Vec<WristMove>,
 }
 
@@ -32,14 +33,17 @@ pub struct MoveWrists {
 #[serde(deny_unknown_fields)]
 pub struct WristMove {
     /// The robot, as "A".
+    #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
     /// Left wrist position [x, y, z] in metres, as [0.30, 0.20, 0.10]. Null keeps the target.
     pub left_position_m: Option<[f64; 3]>,
     /// Left wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null keeps the target.
+    #[schemars(extend("contains" = limits::direction()))]
     pub left_quaternion_wxyz: Option<[f64; 4]>,
     /// Right wrist position [x, y, z] in metres, as [0.30, -0.20, 0.10]. Null keeps the target.
     pub right_position_m: Option<[f64; 3]>,
     /// Right wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null keeps the target.
+    #[schemars(extend("contains" = limits::direction()))]
     pub right_quaternion_wxyz: Option<[f64; 4]>,
     /// Left finger joint angles in radians: [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1]. Closed
     /// around a bottle: [0, 0.75, 0.8, -1.1, -1.3, -1.1, -1.3]; open: [0, -0.3, 0, 0, 0, 0, 0]. Null keeps the target.
