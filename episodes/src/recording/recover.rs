@@ -30,8 +30,8 @@ pub enum RecoverError {
     Exists(PathBuf),
     #[error(transparent)]
     Read(#[from] RecordingError),
-    #[error("{} holds no record that can be read: {source}", path.display())]
-    Nothing { path: PathBuf, source: mcap::McapError },
+    #[error("{} holds no message that can be read: {reason}", path.display())]
+    Nothing { path: PathBuf, reason: String },
     #[error(transparent)]
     Output(#[from] OutputError),
 }
@@ -48,19 +48,21 @@ pub fn recover(partial: &Path) -> Result<Recovered, RecoverError> {
     }
     let bytes =
         std::fs::read(partial).map_err(|source| RecordingError::Read { path: partial.into(), source })?;
-    let nothing = |source| RecoverError::Nothing { path: partial.into(), source };
+    let nothing = |reason: String| RecoverError::Nothing { path: partial.into(), reason };
     let records =
         ChunkFlattener::new_with_options(&bytes, Options::IgnoreEndMagic | Options::ValidateChunkCrcs);
     let mut copy = Copy::create(&path)?;
-    for record in records.map_err(nothing)? {
+    for record in records.map_err(|error| nothing(error.to_string()))? {
         match record {
             Ok(record) => copy.add(record)?,
-            Err(source) if copy.messages == 0 => return Err(nothing(source)),
             Err(error) => {
                 copy.torn = Some(error.to_string());
                 break;
             }
         }
+    }
+    if copy.messages == 0 {
+        return Err(nothing(copy.torn.unwrap_or_else(|| "it has none".into())));
     }
     Ok(copy.finish()?)
 }

@@ -132,8 +132,8 @@ fn a_torn_end_is_left_out() {
     }
     for (name, content, says) in [
         ("episode.mcap", &b""[..], "does not end in .partial"),
-        ("empty.mcap.partial", b"", "holds no record"),
-        ("notes.mcap.partial", b"not MCAP", "holds no record"),
+        ("empty.mcap.partial", b"", "holds no message"),
+        ("notes.mcap.partial", b"not MCAP", "holds no message"),
     ] {
         let path = folder.path().join(name);
         std::fs::write(&path, content).unwrap();

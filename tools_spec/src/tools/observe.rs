@@ -17,7 +17,7 @@ use crate::tool::Tool;
 pub struct Observe {
     /// The robots to look through, as ["A", "B"]. Null: all of them.
     #[schemars(
-        length(min = 1),
+        length(min = 1, max = limits::ROBOT_NAMES.len()),
         inner(regex(pattern = limits::ROBOT_PATTERN)),
         extend("uniqueItems" = true)
     )]
