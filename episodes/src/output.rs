@@ -41,11 +41,11 @@ pub fn partial_path(path: &Path) -> PathBuf {
 pub fn put_in_place(file: &File, partial: &Path, path: &Path) -> io::Result<()> {
     file.sync_all()?;
     fs::rename(partial, path)?;
-    match path.parent() {
-        // The name is part of the folder, which has to reach the disk, too.
-        Some(folder) if cfg!(unix) && !folder.as_os_str().is_empty() => File::open(folder)?.sync_all(),
-        _ => Ok(()),
+    // The name is part of the folder, which has to reach the disk, too; not every file system can be told.
+    if let Some(Ok(folder)) = path.parent().map(File::open) {
+        let _ = folder.sync_all();
     }
+    Ok(())
 }
 
 /// Makes a folder, and those above it that are missing, for nobody but their owner: recordings hold what policies must not see.

@@ -26,13 +26,19 @@ pub fn direction() -> Value {
     json!({ "anyOf": [{ "minimum": SMALLEST_COMPONENT }, { "maximum": -SMALLEST_COMPONENT }] })
 }
 
-/// `allOf` of a list with an entry per robot: none is named twice.
-pub fn each_robot_once() -> Value {
-    let once = |name: &&str| {
-        let named = json!({ "properties": { "robot": { "const": name } }, "required": ["robot"] });
-        json!({ "contains": named, "minContains": 0, "maxContains": 1 })
+/// `not` of a list with an entry per robot: one is named twice. (`maxContains` would be shorter, but readers of older drafts take
+/// the `contains` beside it for a demand.)
+pub fn a_robot_twice() -> Value {
+    let twice = |name: &str, first: usize, second: usize| {
+        let mut entries = vec![json!({}); second + 1];
+        let named = json!({ "properties": { "robot": { "const": name } } });
+        entries[first] = named.clone();
+        entries[second] = named;
+        json!({ "prefixItems": entries, "minItems": second + 1 })
     };
-    ROBOT_NAMES.iter().map(once).collect()
+    let places = (1..ROBOT_NAMES.len()).flat_map(|second| (0..second).map(move |first| (first, second)));
+    let all = places.flat_map(|(first, second)| ROBOT_NAMES.map(|name| twice(name, first, second)));
+    json!({ "anyOf": all.collect::<Vec<_>>() })
 }
 
 /// `items` of a list of pixels.

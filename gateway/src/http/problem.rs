@@ -254,6 +254,7 @@ fn spec_kind(error: &SpecError) -> Kind {
 #[cfg(test)]
 mod tests {
     use std::io;
+    use std::sync::{Arc, Mutex};
 
     use super::*;
 
@@ -273,6 +274,38 @@ mod tests {
         check(HostingError::TooManyWaiting { limit: 16 }, 429, "call again when");
         check(HostingError::ShuttingDown, 503, "try again");
         check(HostingError::EpisodeStopped, 410, "start another");
+    }
+
+    /// What is logged while `work` is done.
+    fn logged(work: impl FnOnce()) -> String {
+        let lines = Arc::new(Mutex::new(Vec::new()));
+        let writer = lines.clone();
+        let log = tracing_subscriber::fmt().with_writer(move || Lines(writer.clone())).finish();
+        tracing::subscriber::with_default(log, work);
+        let lines = lines.lock().unwrap();
+        String::from_utf8(lines.clone()).unwrap()
+    }
+
+    struct Lines(Arc<Mutex<Vec<u8>>>);
+
+    impl io::Write for Lines {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.lock().unwrap().write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    /// MCP takes the body and REST the response.
+    #[test]
+    fn our_own_faults_are_logged_once_whatever_the_caller_speaks() {
+        let fault = || ApiError::from(HostingError::Thread(io::Error::other("no more threads")));
+        for log in [logged(|| drop(fault().body())), logged(|| drop(fault().into_response()))] {
+            assert_eq!(log.matches("no more threads").count(), 1, "{log}");
+        }
+        assert_eq!(logged(|| drop(ApiError::from(HostingError::EpisodeStopped).body())), "");
     }
 
     #[test]

@@ -24,9 +24,7 @@ const DROPPED: &[&str] = &[
     "prefixItems",
     "uniqueItems",
     "contains",
-    "minContains",
-    "maxContains",
-    "allOf",
+    "not",
 ];
 
 /// The description of `T` and its schema without it.

@@ -29,7 +29,7 @@ pub fn action_row_layout() -> String {
 #[serde(deny_unknown_fields)]
 pub struct SendJointChunk {
     /// One entry per robot that is to move; each robot at most once.
-    #[schemars(length(min = 1, max = limits::ROBOT_NAMES.len()), extend("allOf" = limits::each_robot_once()))]
+    #[schemars(length(min = 1, max = limits::ROBOT_NAMES.len()), extend("not" = limits::a_robot_twice()))]
     pub robots: Vec<JointChunk>,
 }
 

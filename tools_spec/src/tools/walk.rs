@@ -17,7 +17,7 @@ pub struct Walk {
     #[schemars(range(min = 1, max = limits::MOST_STEPS))]
     pub steps: u32,
     /// One entry per robot that is to move; each robot at most once. Robots that are not named hold still.
-    #[schemars(length(min = 1, max = limits::ROBOT_NAMES.len()), extend("allOf" = limits::each_robot_once()))]
+    #[schemars(length(min = 1, max = limits::ROBOT_NAMES.len()), extend("not" = limits::a_robot_twice()))]
     pub robots: Vec<WalkMove>,
 }
 
