@@ -71,7 +71,7 @@ fn a_moment_is_pictured_once() {
     let folder = tempfile::tempdir().unwrap();
     let spec = spec("handover", 3, Protocol::Benchmark);
     let mut session = Session::start(&spec, Some(folder.path())).unwrap();
-    let mut look = |session: &mut Session, robots: Option<Vec<String>>| {
+    let look = |session: &mut Session, robots: Option<Vec<String>>| {
         session.call(Observe { robots }.into()).unwrap();
     };
     look(&mut session, Some(vec!["A".into()]));

@@ -105,10 +105,13 @@ impl EpisodeThread {
         answer.blocking_recv().map_err(|_| HostingError::EpisodeStopped)?
     }
 
-    /// Ends the episode, once it has nothing else to do, if its policy has gone or made no call for as long as `idle`.
+    /// Ends the episode if its policy's clock has run out, or if it has made no call for as long as `idle`.
     pub fn end_if_abandoned(&self, idle: Duration) {
-        // An episode whose inbox is full is not abandoned, and one that has stopped has ended.
-        let _ = self.commands.try_send(Command::EndIfAbandoned { idle });
+        // Where something waits already, nobody is gone, and the places to wait are for calls.
+        if self.commands.capacity() == self.commands.max_capacity() {
+            // An episode that has stopped meanwhile has ended.
+            let _ = self.commands.try_send(Command::EndIfAbandoned { idle });
+        }
     }
 
     /// Ends the episode after the calls already waiting, closes its recording and returns the result.
