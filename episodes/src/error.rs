@@ -64,5 +64,7 @@ fn reason_text(reason: EndReason) -> &'static str {
         EndReason::StepBudgetExhausted => "its control steps are used up",
         EndReason::WallClockExhausted => "the policy's wall clock ran out",
         EndReason::Finished => "it was finished",
+        EndReason::Abandoned => "no call came for too long",
+        EndReason::SimulatorFailed => "the simulator failed",
     }
 }

@@ -21,11 +21,12 @@ pub mod tasks;
 pub use describe::task_list;
 pub use error::{CheckpointError, EpisodeError};
 pub use instructions::{Instructions, InstructionsError};
-pub use output::OutputError;
+pub use output::{OutputError, create_new_private_folder, create_private_folder};
 pub use protocol::{Rules, rules};
-pub use recording::{RecordedCall, Recorder, Recording, RecordingError};
-pub use reports::EpisodeResult;
+pub use recording::{
+    RecordedCall, Recorder, Recording, RecordingError, RecoverError, Recovered, Visibility, recover,
+};
 pub use scoring::{A, B, Done, Facts, Grip, ObjectFacts, Phase, RobotFacts, Scored, Scores};
-pub use session::{Checkpoint, Clock, RunFiles, Session, monotonic};
+pub use session::{Checkpoint, Clock, RunFiles, RunFolder, Session, monotonic};
 pub use spec::{Controller, EpisodeSpec, RendererKind, RobotFile, Start};
 pub use tandem_sim::{BaseLimits, LocomotionChoice, SimError};

@@ -1,7 +1,8 @@
 //! How files of an episode are written, and why that can fail.
 
 use std::{
-    fs, io,
+    fs::{self, File},
+    io::{self, Write},
     path::{Path, PathBuf},
 };
 
@@ -18,11 +19,49 @@ pub enum OutputError {
     Encode(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
 
-/// Writes a file under another name first and renames it when it is complete: a reader sees the whole of it or nothing.
+/// Writes a file under another name first and renames it when it is complete and on the disk: a reader sees the whole of it
+/// or nothing, even after a power cut.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    let partial = partial_path(path);
+    let written = File::create(&partial).and_then(|mut file| {
+        file.write_all(bytes)?;
+        put_in_place(&file, &partial, path)
+    });
+    written.map_err(|source| OutputError::Io { path: path.into(), source })
+}
+
+/// What a file is called until it is complete.
+pub fn partial_path(path: &Path) -> PathBuf {
     let mut partial = path.to_path_buf().into_os_string();
     partial.push(".partial");
-    fs::write(&partial, bytes)
-        .and_then(|()| fs::rename(&partial, path))
-        .map_err(|source| OutputError::Io { path: path.into(), source })
+    partial.into()
+}
+
+/// Gives a complete file its name, once its bytes are on the disk.
+pub fn put_in_place(file: &File, partial: &Path, path: &Path) -> io::Result<()> {
+    file.sync_all()?;
+    fs::rename(partial, path)?;
+    // The name is part of the folder, which has to reach the disk, too; not every file system can be told.
+    if let Some(Ok(folder)) = path.parent().map(File::open) {
+        let _ = folder.sync_all();
+    }
+    Ok(())
+}
+
+/// Makes a folder, and those above it that are missing, for nobody but their owner: recordings hold what policies must not see.
+pub fn create_private_folder(folder: &Path) -> io::Result<()> {
+    private_folder(true).create(folder)
+}
+
+/// As [`create_private_folder`], but it is an error if the folder exists or the one above it does not.
+pub fn create_new_private_folder(folder: &Path) -> io::Result<()> {
+    private_folder(false).create(folder)
+}
+
+fn private_folder(with_parents: bool) -> fs::DirBuilder {
+    let mut builder = fs::DirBuilder::new();
+    builder.recursive(with_parents);
+    #[cfg(unix)]
+    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
+    builder
 }

@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::commands::{Outcome, bench, collect, demo, evaluate, locomotion, serve, tasks};
+use crate::commands::{Outcome, bench, collect, demo, evaluate, locomotion, recover, serve, tasks};
 
 /// Physics of humanoids that must work together, behind an HTTP API.
 #[derive(Debug, Parser)]
@@ -22,6 +22,7 @@ enum Command {
     Collect(collect::Args),
     Locomotion(locomotion::Args),
     Tasks(tasks::Args),
+    Recover(recover::Args),
     Bench(bench::Args),
 }
 
@@ -35,6 +36,7 @@ impl Cli {
             Command::Collect(args) => collect::run(args),
             Command::Locomotion(args) => locomotion::run(args),
             Command::Tasks(args) => tasks::run(args),
+            Command::Recover(args) => recover::run(args),
             Command::Bench(args) => bench::run(args),
         }
     }

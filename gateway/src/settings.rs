@@ -4,14 +4,15 @@ use std::{
     net::SocketAddr,
     path::{Path, PathBuf},
     sync::Arc,
+    time::Duration,
 };
 
 use clap::{
-    Args,
+    Args, ValueEnum,
     builder::{PossibleValuesParser, TypedValueParser},
 };
 use serde::Deserialize;
-use tandem_episodes::{BaseLimits, Controller, Instructions, InstructionsError, SimError};
+use tandem_episodes::{BaseLimits, Controller, Instructions, InstructionsError, SimError, Visibility};
 use tandem_tools_spec::Disclosure;
 
 /// One source of settings; what it leaves out comes from the next. The doc comments are the help text.
@@ -21,9 +22,17 @@ pub struct Layer {
     /// Address to serve on [default: 127.0.0.1:8700].
     #[arg(long, env = "TANDEM_LISTEN", value_name = "ADDRESS:PORT")]
     pub listen: Option<SocketAddr>,
+    /// Further names that the server is reached by, separated by commas; a request for another host is refused
+    /// [default: the address of --listen and localhost].
+    #[arg(long, env = "TANDEM_ALLOWED_HOST", value_name = "NAMES", value_delimiter = ',')]
+    pub allowed_host: Option<Vec<String>>,
     /// Folder that recordings are written to, one folder per episode [default: runs].
     #[arg(long, env = "TANDEM_RUNS", value_name = "DIR")]
     pub runs: Option<PathBuf>,
+    /// When recordings can be read: under way, or only after the end, which keeps them in memory until then
+    /// [default: live].
+    #[arg(long, env = "TANDEM_RECORD")]
+    pub record: Option<Record>,
     /// JSON file with instructions in place of the tasks' own: {"handover": {"joint": "...", "robots": {"A": "..."}}}.
     #[arg(long, env = "TANDEM_INSTRUCTIONS", value_name = "FILE")]
     pub instructions: Option<PathBuf>,
@@ -40,18 +49,42 @@ pub struct Layer {
     /// Largest request body that is read [default: 2000000].
     #[arg(long, env = "TANDEM_MAX_BODY_BYTES", value_name = "BYTES")]
     pub max_body_bytes: Option<usize>,
+    /// Longest that the header of a request may take to arrive, and its body as well [default: 30].
+    #[arg(long, env = "TANDEM_REQUEST_TIMEOUT", value_name = "SECONDS")]
+    pub request_timeout: Option<u32>,
+    /// An episode without a call for so long is ended and gives its place back [default: 900].
+    #[arg(long, env = "TANDEM_IDLE_TIMEOUT", value_name = "SECONDS")]
+    pub idle_timeout: Option<u32>,
+    /// Longest that closing the episodes may take when the server stops [default: 30].
+    #[arg(long, env = "TANDEM_STOP_TIMEOUT", value_name = "SECONDS")]
+    pub stop_timeout: Option<u32>,
+}
+
+/// When recordings can be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Record {
+    /// Under way, as `episode.mcap.partial`.
+    Live,
+    /// After the end of the episode.
+    After,
 }
 
 impl Layer {
     fn or(self, next: Layer) -> Layer {
         Layer {
             listen: self.listen.or(next.listen),
+            allowed_host: self.allowed_host.or(next.allowed_host),
             runs: self.runs.or(next.runs),
+            record: self.record.or(next.record),
             instructions: self.instructions.or(next.instructions),
             locomotion: self.locomotion.or(next.locomotion),
             disclosure: self.disclosure.or(next.disclosure),
             max_episodes: self.max_episodes.or(next.max_episodes),
             max_body_bytes: self.max_body_bytes.or(next.max_body_bytes),
+            request_timeout: self.request_timeout.or(next.request_timeout),
+            idle_timeout: self.idle_timeout.or(next.idle_timeout),
+            stop_timeout: self.stop_timeout.or(next.stop_timeout),
         }
     }
 }
@@ -61,8 +94,12 @@ impl Layer {
 pub struct Settings {
     /// Address to serve on; port 0 takes a free one.
     pub listen: SocketAddr,
+    /// Names that the server is reached by, besides its address and localhost.
+    pub allowed_hosts: Vec<String>,
     /// Folder that recordings are written to, one folder per episode.
     pub runs: PathBuf,
+    /// When recordings can be read.
+    pub record: Visibility,
     /// Instructions in place of the tasks' own.
     pub instructions: Instructions,
     /// The base controller of every robot.
@@ -75,6 +112,12 @@ pub struct Settings {
     pub max_episodes: u32,
     /// Largest request body that is read.
     pub max_body_bytes: usize,
+    /// Longest that a header may take to arrive, and a body as well.
+    pub request_timeout: Duration,
+    /// How long after its last call an episode is taken for abandoned.
+    pub idle_timeout: Duration,
+    /// Longest that closing the episodes may take at the end.
+    pub stop_timeout: Duration,
 }
 
 /// Why settings cannot be resolved.
@@ -113,9 +156,15 @@ impl Settings {
         };
         let layer = flags.or(file);
         let locomotion = Controller::from_file(layer.locomotion.as_deref());
+        let seconds = |given: Option<u32>, default: u32| Duration::from_secs(given.unwrap_or(default).into());
         Ok(Arc::new(Settings {
             listen: layer.listen.unwrap_or(SocketAddr::from(([127, 0, 0, 1], 8700))),
+            allowed_hosts: layer.allowed_host.unwrap_or_default(),
             runs: layer.runs.unwrap_or_else(|| "runs".into()),
+            record: match layer.record {
+                None | Some(Record::Live) => Visibility::Live,
+                Some(Record::After) => Visibility::After,
+            },
             instructions: match &layer.instructions {
                 Some(path) => Instructions::read(path)?,
                 None => Instructions::default(),
@@ -125,6 +174,9 @@ impl Settings {
             disclosure: layer.disclosure.unwrap_or_default(),
             max_episodes: layer.max_episodes.unwrap_or(8),
             max_body_bytes: layer.max_body_bytes.unwrap_or(2_000_000),
+            request_timeout: seconds(layer.request_timeout, 30),
+            idle_timeout: seconds(layer.idle_timeout, 15 * 60),
+            stop_timeout: seconds(layer.stop_timeout, 30),
         }))
     }
 }

@@ -13,8 +13,7 @@ use ureq::{Agent, Body, SendBody, http};
 #[derive(Debug)]
 pub struct Answer {
     pub status: u16,
-    pub content_type: String,
-    pub location: Option<String>,
+    pub headers: http::HeaderMap,
     pub body: Value,
 }
 
@@ -26,11 +25,16 @@ impl Answer {
         self.body
     }
 
+    /// A header, empty where there is none.
+    pub fn header(&self, name: &str) -> &str {
+        self.headers.get(name).and_then(|value| value.to_str().ok()).unwrap_or_default()
+    }
+
     /// Checks a refusal: problem details of this status whose text says each of `says`.
     #[track_caller]
     pub fn refused(&self, status: u16, says: &[&str]) {
         assert_eq!(
-            (self.status, self.content_type.as_str()),
+            (self.status, self.header("content-type")),
             (status, "application/problem+json"),
             "{self:?}"
         );
@@ -52,12 +56,17 @@ pub struct TestServer {
 
 impl TestServer {
     pub fn start() -> TestServer {
+        TestServer::with(Layer::default())
+    }
+
+    /// As [`TestServer::start`], with further settings.
+    pub fn with(flags: Layer) -> TestServer {
         let runs = tempfile::tempdir().expect("a temporary folder");
         let flags = Layer {
             listen: Some("127.0.0.1:0".parse().expect("an address")),
             runs: Some(runs.path().into()),
             max_episodes: Some(2),
-            ..Layer::default()
+            ..flags
         };
         let settings = Settings::resolve(flags, None).expect("settings without a file");
         let server = Server::start(settings).expect("a free port");
@@ -69,7 +78,8 @@ impl TestServer {
 
     /// Stops the server as SIGTERM does.
     pub fn stop(&mut self) {
-        self.server.take().expect("a running server").stop();
+        let left = self.server.take().expect("a running server").stop();
+        assert!(left.is_empty(), "{left:?} did not end");
     }
 
     /// Starts an episode of Handover and returns its id.
@@ -120,9 +130,8 @@ impl TestServer {
 }
 
 fn read(mut response: http::Response<Body>) -> Answer {
-    let header = |name| response.headers().get(name).and_then(|value| value.to_str().ok()).map(str::to_owned);
-    let (content_type, location) = (header("content-type").unwrap_or_default(), header("location"));
+    let headers = response.headers().clone();
     let text = response.body_mut().with_config().limit(50_000_000).read_to_string().expect("a body");
     let body = serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error}: {text}"));
-    Answer { status: response.status().as_u16(), content_type, location, body }
+    Answer { status: response.status().as_u16(), headers, body }
 }

@@ -30,6 +30,7 @@ fn refused_calls() -> Vec<(&'static str, Value, u16, &'static [&'static str])> {
         ("check_reach", json!({ "robot": "Z", "left_position_m": [0.3, 0.2, 0.1] }), 404, &["\"Z\"", "A, B"]),
         ("wait", json!({ "steps": 26 }), 422, &["26", "agentic", "1 to 25"]),
         ("wait", json!({ "steps": 0 }), 422, &["at least 1"]),
+        ("wait", json!({ "steps": 2.0, "seconds": 1 }), 422, &["`seconds`"]),
         ("wait", json!({ "steps": "25" }), 422, &["steps", "{\"steps\":25}"]),
         ("wait", json!({ "steps": 2.5 }), 422, &["steps", "a whole number"]),
         ("wait", json!({ "seconds": 1 }), 422, &["`seconds`", "`steps`"]),
@@ -62,6 +63,9 @@ fn refused_bodies() -> Vec<(&'static str, Vec<u8>, u16, &'static [&'static str])
         (json, b"[".repeat(100_000), 400, &["no JSON"]),
         ("application/x-www-form-urlencoded", b"{\"steps\": 5}".to_vec(), 415, &["application/json"]),
         ("text/plain", b"{\"steps\": 5}".to_vec(), 415, &["application/json"]),
+        (json, b"[5]".to_vec(), 422, &["the body is an array", "one JSON object"]),
+        (json, b"null".to_vec(), 422, &["the body is null"]),
+        (json, b"{\"steps\": 5, \"steps\": 6}".to_vec(), 400, &["\"steps\" stands there twice"]),
     ]
 }
 
@@ -89,7 +93,7 @@ fn bad_input_changes_nothing() {
         assert_eq!(status(), before, "{content_type}, {} bytes", body.len());
     }
 
-    let after = server.tool(&id, "wait", &json!({ "steps": 1 })).ok();
+    let after = server.tool(&id, "wait", &json!({ "steps": 1.0 })).ok();
     assert_eq!(after["executed_steps"], 1, "the episode goes on: {after}");
     assert_ne!(status()["state_hash"], before["state_hash"]);
 }
@@ -99,7 +103,7 @@ fn what_does_not_exist_is_refused_with_what_does() {
     let server = TestServer::start();
     server.get("/v1/episodes/nope").refused(404, &["\"nope\"", "POST /v1/episodes"]);
     server.delete("/v1/episodes/nope").refused(404, &["\"nope\""]);
-    server.tool("nope", "wait", &json!({ "steps": 1 })).refused(404, &["\"nope\"", "have: none"]);
+    server.tool("nope", "wait", &json!({ "steps": 1 })).refused(404, &["\"nope\"", "POST /v1/episodes"]);
     server.get("/v1/episode").refused(404, &["GET /v1/episode ", "POST /v1/episodes"]);
     server.get("/").refused(404, &["GET /v1/tools"]);
     server.get("/v1/episodes").refused(405, &["POST /v1/episodes"]);
@@ -111,7 +115,8 @@ fn what_does_not_exist_is_refused_with_what_does() {
     start(json!({ "task": "handover", "seed": 0, "protocol": "fast" }))
         .refused(422, &["agentic", "benchmark"]);
     start(json!({ "task": "../x", "seed": 0 })).refused(404, &["handover"]);
-    start(Value::Null).refused(422, &["missing field `task`"]);
+    start(json!({})).refused(422, &["missing field `task`"]);
+    start(Value::Null).refused(422, &["the body is null"]);
     assert_eq!(server.get("/healthz").ok()["episodes"], 0);
 }
 

@@ -15,7 +15,7 @@ fn an_episode_lives_from_start_to_recording() {
     let server = TestServer::start();
     let answer =
         server.post("/v1/episodes", &json!({ "task": "handover", "seed": 3, "protocol": "benchmark" }));
-    assert_eq!((answer.status, answer.location.as_deref()), (201, Some("/v1/episodes/handover-seed3")));
+    assert_eq!((answer.status, answer.header("location")), (201, "/v1/episodes/handover-seed3"));
     let started = answer.ok();
     assert_eq!(started["robots"].as_array().map(Vec::len), Some(2));
     assert_eq!(started["robots"][0]["joints"].as_array().map(Vec::len), Some(43));
@@ -78,7 +78,9 @@ fn places_are_limited_and_an_ended_episode_makes_room() {
     let (first, _second) = (server.episode("benchmark"), server.episode("benchmark"));
     let third =
         || server.post("/v1/episodes", &json!({ "task": "handover", "seed": 0, "protocol": "benchmark" }));
-    third().refused(429, &["all 2 places", "DELETE"]);
+    let refused = third();
+    refused.refused(429, &["all 2 places", "DELETE"]);
+    assert_eq!(refused.header("retry-after"), "10");
     server.tool(&first, "finish", &json!({})).ok();
     assert_eq!(third().status, 201);
     server.get(&format!("/v1/episodes/{first}")).refused(404, &[]);
@@ -91,7 +93,7 @@ fn send_only(server: &TestServer, id: &str, tool: &str, args: &Value) -> TcpStre
     let mut stream = TcpStream::connect(server.address).expect("a connection");
     write!(
         stream,
-        "POST /v1/episodes/{id}/tools/{tool} HTTP/1.1\r\nhost: test\r\ncontent-type: application/json\r\ncontent-length: {}\r\n\r\n{body}",
+        "POST /v1/episodes/{id}/tools/{tool} HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\ncontent-length: {}\r\n\r\n{body}",
         body.len()
     )
     .expect("a request");

@@ -1,10 +1,7 @@
 //! Checks that need no world. Each returns the sentence a caller needs: what is wrong, where, and what would work.
 
+use crate::limits::{LARGEST, SMALLEST_COMPONENT};
 use crate::parts::BASE_COLUMNS;
-
-/// No number of this contract, in metres, radians or metres per second, is anywhere near this large; a larger one would
-/// overflow the single precision of the physics.
-const LARGEST: f64 = 1e6;
 
 /// Every number is finite and of sane size.
 pub fn finite(place: &str, values: &[f64]) -> Result<(), String> {
@@ -22,8 +19,8 @@ pub fn base(command: [Option<f64>; 4]) -> Result<(), String> {
 /// A quaternion that has a direction. Its length does not matter: it is normalised before use.
 pub fn quaternion(place: &str, quaternion_wxyz: &[f64; 4]) -> Result<(), String> {
     finite(place, quaternion_wxyz)?;
-    let norm = quaternion_wxyz.iter().map(|part| part * part).sum::<f64>().sqrt();
-    if norm < 1e-6 {
+    if quaternion_wxyz.iter().all(|part| part.abs() < SMALLEST_COMPONENT) {
+        let norm = quaternion_wxyz.iter().map(|part| part * part).sum::<f64>().sqrt();
         return Err(format!(
             "{place} has norm {norm}, so it has no direction; give [w, x, y, z] with norm 1, as [1, 0, 0, 0] for no rotation"
         ));

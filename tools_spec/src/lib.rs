@@ -9,9 +9,11 @@
 
 mod checks;
 mod error;
+mod limits;
 mod list;
 mod parts;
 mod schema;
+mod strict_value;
 mod tool;
 mod tools;
 

@@ -5,6 +5,7 @@ use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Value, json};
 
 use crate::error::SpecError;
+use crate::strict_value::StrictValue;
 
 /// The arguments of one tool. The type's doc comment is the tool's description.
 pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
@@ -25,10 +26,9 @@ pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
     }
 }
 
-/// Reads and checks the arguments of `T`. `null` stands for no arguments.
+/// Reads and checks the arguments of `T`, which have to be an object.
 pub fn parse_args<T: Tool>(args: Value) -> Result<T, SpecError> {
-    let args = if args.is_null() { json!({}) } else { args };
-    let parsed: T = serde_path_to_error::deserialize(args).map_err(|error| {
+    let parsed: T = serde_path_to_error::deserialize(StrictValue(args)).map_err(|error| {
         let path = error.path().to_string();
         SpecError::Malformed {
             tool: T::NAME,

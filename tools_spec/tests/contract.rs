@@ -3,8 +3,22 @@
 use serde_json::{Value, json};
 use tandem_tools_spec::{ActCall, EPISODE_TOOLS, ToolCall, tool_specs};
 
-const REFUSED_KEYWORDS: &[&str] =
-    &["$ref", "$schema", "default", "format", "maxItems", "maximum", "minItems", "minimum", "title"];
+const REFUSED_KEYWORDS: &[&str] = &[
+    "$ref",
+    "$schema",
+    "default",
+    "format",
+    "maxItems",
+    "maximum",
+    "minItems",
+    "minimum",
+    "title",
+    "pattern",
+    "contains",
+    "not",
+    "prefixItems",
+    "uniqueItems",
+];
 
 /// Walks every object schema below `schema`, the schema itself included.
 fn for_each_schema(schema: &Value, visit: &mut impl FnMut(&Value)) {
@@ -80,7 +94,7 @@ fn nullable_fields_may_be_left_out() {
     };
     assert_eq!(call.robots[0].left_position_m, Some([0.3, 0.2, 0.1]));
     assert_eq!(call.robots[0].right_position_m, None);
-    assert!(ToolCall::parse("observe", Value::Null).is_ok());
+    assert!(ToolCall::parse("observe", json!({})).is_ok());
 }
 
 /// A refusal must contain every one of `says`.
@@ -105,7 +119,9 @@ fn refusals_say_what_would_work() {
     refused("wait", json!({ "steps": 2.5 }), &["2.5", "{\"steps\":25}"]);
     refused("wait", json!({ "step": 25 }), &["unknown field `step`", "`steps`"]);
     refused("wait", json!({}), &["missing field `steps`"]);
-    refused("wait", json!([]), &["wait: ", "{\"steps\":25}"]);
+    refused("wait", json!([5]), &["wait: ", "sequence, expected an object", "{\"steps\":25}"]);
+    refused("observe", Value::Null, &["observe: ", "null, expected an object"]);
+    refused("walk", json!({ "steps": 5, "robots": [["A", 0, 0, 0, null]] }), &["robots[0]: ", "an object"]);
     refused(
         "send_joint_chunk",
         chunk(json!([row(35), row(34)])),
@@ -200,6 +216,35 @@ fn openapi_has_a_path_for_every_tool() {
         start["responses"]["201"]["content"]["application/json"]["schema"]["properties"]["episode_id"]
             .is_object()
     );
+}
+
+/// What the checks refuse in a body, its schema does not allow.
+#[test]
+fn openapi_says_what_is_refused() {
+    let document = tandem_tools_spec::openapi("1.2.3");
+    let field = |tool: &str, pointer: &str| {
+        let body =
+            &document["paths"][format!("/v1/episodes/{{episode_id}}/tools/{tool}")]["post"]["requestBody"];
+        let schema = &body["content"]["application/json"]["schema"]["properties"];
+        schema.pointer(pointer).unwrap_or_else(|| panic!("{tool} has no {pointer}: {schema}")).clone()
+    };
+    for tool in ["move_wrists", "walk", "send_joint_chunk"] {
+        assert_eq!((field(tool, "/robots/minItems"), field(tool, "/robots/maxItems")), (json!(1), json!(3)));
+        let twice = json!({ "properties": { "robot": { "const": "A" } } });
+        let not = json!({ "prefixItems": [twice, twice], "minItems": 2 });
+        assert_eq!(field(tool, "/robots/not/anyOf/0"), not);
+        assert_eq!(field(tool, "/robots/items/properties/robot/pattern"), "^[ABC]$");
+    }
+    for tool in ["move_wrists", "walk", "wait"] {
+        assert_eq!((field(tool, "/steps/minimum"), field(tool, "/steps/maximum")), (json!(1), json!(50)));
+    }
+    let quaternion = field("check_reach", "/left_quaternion_wxyz");
+    assert_eq!(quaternion["contains"], json!({ "anyOf": [{ "minimum": 1e-6 }, { "maximum": -1e-6 }] }));
+    assert_eq!((&quaternion["minItems"], &quaternion["maxItems"]), (&json!(4), &json!(4)));
+    assert_eq!(field("walk", "/robots/items/properties/vx_m_s/maximum"), 1e6);
+    assert_eq!(field("send_joint_chunk", "/robots/items/properties/rows/items/items/minimum"), -1e6);
+    assert_eq!(field("query_depth", "/pixels/items/prefixItems/1/maximum"), 239);
+    assert_eq!(field("observe", "/robots/uniqueItems"), true);
 }
 
 #[test]

@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use tandem_tools_spec::ResultReply;
 
 use super::{EvaluationError, Plan};
 use crate::Session;
 use crate::output::write_whole;
 use crate::players::InProcess;
-use crate::reports::EpisodeResult;
+use crate::reports::RESULT_FILE;
 use crate::spec::EpisodeSpec;
 use crate::tasks::Task;
 
@@ -23,7 +24,7 @@ pub struct Played {
     /// Version and fingerprint of the program; what another build played is played again.
     pub build: String,
     #[serde(flatten)]
-    pub result: EpisodeResult,
+    pub result: ResultReply,
     /// Why the episode fell short: what stopped the policy, or the first phase that was missed.
     pub note: Option<String>,
 }
@@ -52,7 +53,7 @@ impl Keeper<'_> {
         let same = by == (self.plan.player.name, &self.locomotion, self.build)
             && kept.spec == self.plan.spec(task, seed)
             && (kept.result.task.as_str(), kept.result.seed) == (task.id, seed)
-            && self.recording(task, seed).is_none_or(|folder| folder.join(EpisodeResult::FILE_NAME).exists());
+            && self.recording(task, seed).is_none_or(|folder| folder.join(RESULT_FILE).exists());
         same.then_some(kept)
     }
 
@@ -66,7 +67,10 @@ impl Keeper<'_> {
         let session = Session::start(&spec, self.recording(task, seed).as_deref())?;
         let mut episode = InProcess(session);
         let outcome = self.plan.player.play(&spec, &mut episode);
-        let result = EpisodeResult::from(&episode.0.close()?);
+        let result = episode.0.close();
+        if let Some(reason) = result.recording_failed.clone() {
+            return Err(EvaluationError::Recording { task: task.id, seed, reason });
+        }
         let played = Played {
             policy: self.plan.player.name.into(),
             spec,
@@ -86,7 +90,7 @@ fn file_name(task: &Task, seed: u32) -> String {
 }
 
 /// The first phase that was not reached.
-pub fn missed(result: &EpisodeResult) -> Option<String> {
+pub fn missed(result: &ResultReply) -> Option<String> {
     let (phase, _) = result.phases.0.iter().find(|(_, time_s)| time_s.is_none())?;
     Some(format!("{phase} was not reached in {} steps", result.env_steps))
 }

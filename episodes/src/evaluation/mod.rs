@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use tandem_tools_spec::Protocol;
 
-use crate::output::{OutputError, write_whole};
+use crate::output::{OutputError, create_private_folder, write_whole};
 use crate::players;
 use crate::spec::{Controller, EpisodeSpec, RobotFile};
 use crate::tasks::Task;
@@ -56,6 +56,8 @@ pub enum EvaluationError {
     Output(#[from] OutputError),
     #[error("cannot write {path}: {source}")]
     Io { path: PathBuf, source: std::io::Error },
+    #[error("{task} seed {seed} was played and not recorded: {reason}")]
+    Recording { task: &'static str, seed: u32, reason: String },
     #[error("an episode cannot be written as JSON: {0}")]
     Json(#[from] serde_json::Error),
 }
@@ -70,7 +72,7 @@ pub fn evaluate(
     progress: &(dyn Fn(&Played) + Sync),
 ) -> Result<Evaluation, EvaluationError> {
     let kept = folder.join(EPISODES);
-    std::fs::create_dir_all(&kept).map_err(|source| EvaluationError::Io { path: kept.clone(), source })?;
+    create_private_folder(&kept).map_err(|source| EvaluationError::Io { path: kept.clone(), source })?;
     let build = fingerprint::build().map_err(EpisodeError::Build)?;
     let locomotion = plan.locomotion.load().map_err(EpisodeError::from)?.name().to_string();
     let keeper = Keeper { plan, folder: &kept, locomotion, build };

@@ -1,10 +1,10 @@
 //! Which episodes are kept, what is noted, and how they are counted.
 
-use tandem_tools_spec::PhaseTimes;
+use tandem_tools_spec::{EndReason, PhaseTimes, ResultReply};
 
 use super::keep::missed;
 use super::*;
-use crate::reports::EpisodeResult;
+use crate::reports::write_result;
 
 /// Against R's `binom.test(k, n)$conf.int`.
 #[test]
@@ -20,16 +20,19 @@ fn intervals_are_clopper_and_pearsons() {
     }
 }
 
-fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> EpisodeResult {
-    EpisodeResult {
+fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultReply {
+    ResultReply {
         task: task.into(),
         seed,
+        protocol: Protocol::Benchmark,
         phases: PhaseTimes(phases),
+        ended: EndReason::Finished,
         env_steps: 812,
         tool_calls: 61,
         falls: 0,
         realtime_factor: 3.5,
         state_hash: "00c0ffee00c0ffee".into(),
+        recording_failed: None,
     }
 }
 
@@ -102,6 +105,6 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
     std::fs::write(folder.path().join("pouring-7.json"), &text).unwrap();
     assert_eq!(collector.kept(task, 7), None, "no recording");
     std::fs::create_dir(folder.path().join("pouring-7")).unwrap();
-    same.result.write(&folder.path().join("pouring-7")).unwrap();
+    write_result(&same.result, &folder.path().join("pouring-7")).unwrap();
     assert_eq!(collector.kept(task, 7), Some(same));
 }

@@ -2,24 +2,27 @@
 
 use std::{
     collections::BTreeMap,
-    fs::{self, File},
-    io::BufWriter,
     marker::PhantomData,
     path::{Path, PathBuf},
+    time::{Duration, Instant},
 };
 
 use foxglove::Encode;
 use mcap::records::{MessageHeader, Metadata};
 
+use super::store::{Store, Visibility};
 use crate::output::OutputError;
+
+/// No more than this much of an episode is lost with the process.
+const FLUSHED_EVERY: Duration = Duration::from_millis(500);
 
 /// A file that is being written.
 pub struct McapFile {
-    writer: mcap::Writer<BufWriter<File>>,
-    partial_path: PathBuf,
+    writer: mcap::Writer<Store>,
     path: PathBuf,
     /// Reused between messages.
     buffer: Vec<u8>,
+    flushed: Instant,
 }
 
 /// A channel that carries messages of one type.
@@ -30,18 +33,12 @@ pub struct Topic<M> {
 }
 
 impl McapFile {
-    /// Opens `<name>.partial` in an existing folder; a file of that name is overwritten.
-    pub fn create(folder: &Path, name: &str) -> Result<McapFile, OutputError> {
-        let path = folder.join(name);
-        let partial_path = folder.join(format!("{name}.partial"));
-        let file = File::create(&partial_path)
-            .map_err(|source| OutputError::Io { path: partial_path.clone(), source })?;
-        let writer = mcap::WriteOptions::new()
-            .library(concat!("tandem ", env!("CARGO_PKG_VERSION")))
-            .compression(Some(mcap::Compression::Lz4))
-            .create(BufWriter::new(file))
-            .map_err(|source| OutputError::Mcap { path: partial_path.clone(), source })?;
-        Ok(McapFile { writer, partial_path, path, buffer: Vec::new() })
+    /// Begins what will be `path`, in an existing folder.
+    pub fn create(path: &Path, visibility: Visibility) -> Result<McapFile, OutputError> {
+        let store = Store::create(path, visibility)
+            .map_err(|source| OutputError::Io { path: path.into(), source })?;
+        let writer = writer(store).map_err(|source| OutputError::Mcap { path: path.into(), source })?;
+        Ok(McapFile { writer, path: path.into(), buffer: Vec::new(), flushed: Instant::now() })
     }
 
     /// Opens a topic. `metadata` describes the channel, as the names of an array's columns.
@@ -81,7 +78,14 @@ impl McapFile {
         };
         let written = self.writer.write_to_known_channel(&header, &self.buffer);
         topic.messages += 1;
-        written.map_err(|e| self.failed(e))
+        written.map_err(|e| self.failed(e))?;
+        if self.flushed.elapsed() >= FLUSHED_EVERY { self.flush() } else { Ok(()) }
+    }
+
+    /// Hands the system everything that has been written, as whole chunks: it outlives the process, and can be read.
+    pub fn flush(&mut self) -> Result<(), OutputError> {
+        self.flushed = Instant::now();
+        self.writer.flush().map_err(|e| self.failed(e))
     }
 
     /// Appends a named set of texts that belong to the whole file.
@@ -93,18 +97,23 @@ impl McapFile {
     /// Writes the index and gives the file its name.
     pub fn finish(mut self) -> Result<PathBuf, OutputError> {
         self.writer.finish().map_err(|e| self.failed(e))?;
-        let McapFile { writer, partial_path, path, .. } = self;
-        let closed = writer.into_inner().into_inner().map_err(|error| error.into_error());
-        closed
-            .and_then(|file| file.sync_all())
-            .and_then(|()| fs::rename(&partial_path, &path))
-            .map_err(|source| OutputError::Io { path: path.clone(), source })?;
+        let McapFile { writer, path, .. } = self;
+        writer.into_inner().keep(&path)?;
         Ok(path)
     }
 
     fn failed(&self, source: mcap::McapError) -> OutputError {
-        OutputError::Mcap { path: self.partial_path.clone(), source }
+        OutputError::Mcap { path: self.path.clone(), source }
     }
+}
+
+/// Writes chunks as wholes, so that no flush ends in the middle of one.
+pub fn writer(store: Store) -> Result<mcap::Writer<Store>, mcap::McapError> {
+    mcap::WriteOptions::new()
+        .library(concat!("tandem ", env!("CARGO_PKG_VERSION")))
+        .compression(Some(mcap::Compression::Lz4))
+        .disable_seeking(true)
+        .create(store)
 }
 
 /// MCAP counts time in nanoseconds.

@@ -5,14 +5,17 @@
 //! `A/egocentric`, objects by name. Numbers that have no well-known schema are JSON with a JSON Schema. `/steps` holds each
 //! [`tandem_sim::Step`] as it was, bit for bit, from the state before the first one on; everything else is for people.
 //!
-//! The file is `episode.mcap.partial` until [`Recorder::finish`] renames it. A recorder that is dropped earlier still
-//! writes the index, so the partial file can be opened, but an `episode.mcap` is always complete.
+//! The file is `episode.mcap.partial` until [`Recorder::finish`] renames it, so an `episode.mcap` is always complete. A
+//! recorder that is dropped earlier still writes the index; one whose process is killed leaves whole chunks without an index,
+//! which [`recover`] adds.
 
 mod file;
 mod messages;
 mod read;
+mod recover;
 mod robot_topics;
 mod scene;
+mod store;
 #[cfg(test)]
 mod tests;
 mod transforms;
@@ -20,6 +23,8 @@ mod write;
 
 pub use messages::ToolCallRecord;
 pub use read::{RecordedCall, Recording, RecordingError};
+pub use recover::{RecoverError, Recovered, recover};
+pub use store::Visibility;
 pub use write::{Recorder, RecordingHeader};
 
 /// Topics that are read back.

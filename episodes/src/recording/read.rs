@@ -7,11 +7,11 @@ use base64::{Engine, prelude::BASE64_STANDARD};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use tandem_sim::{SimError, Step};
-use tandem_tools_spec::PhaseReached;
+use tandem_tools_spec::{PhaseReached, ResultReply};
 
 use super::messages::{Phase, StepError, StepMessage, ToolCallMessage};
 use super::{metadata, topics};
-use crate::reports::EpisodeResult;
+use crate::reports::RESULT_FILE;
 use crate::scoring::{ScoreMemory, Scores};
 use crate::spec::EpisodeSpec;
 
@@ -25,7 +25,7 @@ pub struct Recording {
     /// Which build of Tandem played it.
     pub build: String,
     /// `None` where the episode was interrupted.
-    pub result: Option<EpisodeResult>,
+    pub result: Option<ResultReply>,
     scores: ScoreMemory,
 }
 
@@ -45,7 +45,10 @@ pub struct RecordedCall {
 pub enum RecordingError {
     #[error("cannot read the recording {}: {source}", path.display())]
     Read { path: PathBuf, source: std::io::Error },
-    #[error("{} is no complete MCAP file: {source}", path.display())]
+    #[error(
+        "{} is no complete MCAP file: {source}; of a recording that was interrupted, `tandem recover {}` makes one",
+        path.display(), path.display()
+    )]
     Mcap { path: PathBuf, source: mcap::McapError },
     #[error("{} has no {what}; recordings that this version of Tandem makes have it", path.display())]
     Missing { path: PathBuf, what: String },
@@ -70,7 +73,7 @@ impl Recording {
         let entry = |name: &str| episode.get(name).ok_or_else(|| missing(name));
         let step = |source: StepError| RecordingError::Step { path: path.into(), source };
         let scores = BASE64_STANDARD.decode(entry(metadata::SCORES)?).map_err(|e| step(e.into()))?;
-        let result = records.get(metadata::RESULT).and_then(|entries| entries.get(EpisodeResult::FILE_NAME));
+        let result = records.get(metadata::RESULT).and_then(|entries| entries.get(RESULT_FILE));
         Ok(Recording {
             path: path.into(),
             spec: serde_json::from_str(entry(metadata::SPEC)?).map_err(json)?,

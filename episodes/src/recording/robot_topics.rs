@@ -23,6 +23,8 @@ pub struct RobotTopics {
 struct CameraTopics {
     image: Topic<CompressedImage>,
     calibration: Topic<CameraCalibration>,
+    /// When the last picture was taken.
+    last_s: f64,
 }
 
 impl RobotTopics {
@@ -54,7 +56,8 @@ impl RobotTopics {
         file.write(&mut self.hands, time_s, &Hands::of(&step.state, index, facts))
     }
 
-    /// Appends a PNG seen through the robot's head camera.
+    /// Appends a PNG seen through the robot's head camera, unless there is one of this moment: physics stands still between
+    /// commands, and so do pictures.
     pub fn picture(
         &mut self,
         file: &mut McapFile,
@@ -65,17 +68,20 @@ impl RobotTopics {
         let name = &robot.name;
         let frame_id = robot_frame(name, EGOCENTRIC);
         let camera = match &mut self.camera {
+            Some(camera) if camera.last_s == time_s => return Ok(()),
             Some(camera) => camera,
             unopened => {
                 let mut camera = CameraTopics {
                     image: file.topic(&format!("/{name}/egocentric"), &[])?,
                     calibration: file.topic(&format!("/{name}/egocentric/calibration"), &[])?,
+                    last_s: time_s,
                 };
                 let calibration = calibration(&robot.model.egocentric, &frame_id, time_s);
                 file.write(&mut camera.calibration, time_s, &calibration)?;
                 unopened.insert(camera)
             }
         };
+        camera.last_s = time_s;
         let image = CompressedImage {
             timestamp: Some(timestamp(time_s)),
             frame_id,

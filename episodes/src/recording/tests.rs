@@ -10,12 +10,12 @@ use foxglove::Decode;
 use foxglove::messages::{CompressedImage, FrameTransforms, SceneUpdate};
 use tandem_sim::{ObjectPlacement, Pose, RobotCommand, RobotPlacement, Rotation, Vector, World, WorldSpec};
 use tandem_tools_spec::{
-    Budget, CameraImage, LookReply, Observation, PhaseReached, PhaseTimes, Png, Protocol, ToolCall, ToolReply,
+    Budget, CameraImage, EndReason, LookReply, Observation, PhaseReached, PhaseTimes, Png, Protocol,
+    ResultReply, ToolCall, ToolReply,
 };
 
 use super::*;
 use crate::commands::RobotSheet;
-use crate::reports::EpisodeResult;
 use crate::scoring::Scores;
 use crate::spec::EpisodeSpec;
 use crate::tasks;
@@ -62,7 +62,7 @@ fn recorder(folder: &Path, world: &World) -> (Recorder, Scores) {
         robots: world.robots().iter().map(sheet).collect(),
         scores: scores.memory(),
     };
-    (Recorder::create(folder, header, &start).unwrap(), scores)
+    (Recorder::create(folder, Visibility::Live, header, &start).unwrap(), scores)
 }
 
 fn record_step(recorder: &mut Recorder, scores: &mut Scores, world: &mut World, commands: &[RobotCommand]) {
@@ -96,16 +96,19 @@ fn record(folder: &Path) -> (World, PathBuf) {
     (world, path)
 }
 
-fn result() -> EpisodeResult {
-    EpisodeResult {
+fn result() -> ResultReply {
+    ResultReply {
         task: "handover".into(),
         seed: 7,
+        protocol: Protocol::Agentic,
         phases: PhaseTimes(vec![("p1".into(), Some(0.2))]),
+        ended: EndReason::Finished,
         env_steps: STEPS,
         tool_calls: 2,
         falls: 0,
         realtime_factor: 4.0,
         state_hash: "0123456789abcdef".into(),
+        recording_failed: None,
     }
 }
 

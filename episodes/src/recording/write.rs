@@ -5,16 +5,17 @@ use std::path::{Path, PathBuf};
 use base64::{Engine, prelude::BASE64_STANDARD};
 use foxglove::messages::{FrameTransforms, SceneUpdate};
 use tandem_sim::{Step, mjcf::Geom, render::robot_rgba};
-use tandem_tools_spec::{Budget, LookReply, PhaseReached, ToolReply};
+use tandem_tools_spec::{Budget, LookReply, PhaseReached, ResultReply, ToolReply};
 
 use super::file::{McapFile, Topic};
 use super::messages::{BudgetLeft, Json, Phase, StepMessage, ToolCallMessage, ToolCallRecord};
 use super::robot_topics::RobotTopics;
+use super::store::Visibility;
 use super::transforms::{self, robot_frame};
 use super::{metadata, scene, topics};
 use crate::commands::RobotSheet;
 use crate::output::OutputError;
-use crate::reports::EpisodeResult;
+use crate::reports::RESULT_FILE;
 use crate::scoring::{Facts, ScoreMemory};
 use crate::spec::EpisodeSpec;
 
@@ -51,8 +52,13 @@ impl Recorder {
 
     /// Opens a recording in an existing run folder and writes what the episode is, what its robots look like, and `start`,
     /// the state before the first step that will be recorded.
-    pub fn create(folder: &Path, header: RecordingHeader, start: &Step) -> Result<Recorder, OutputError> {
-        let mut file = McapFile::create(folder, Self::FILE_NAME)?;
+    pub fn create(
+        folder: &Path,
+        visibility: Visibility,
+        header: RecordingHeader,
+        start: &Step,
+    ) -> Result<Recorder, OutputError> {
+        let mut file = McapFile::create(&folder.join(Self::FILE_NAME), visibility)?;
         write_header(&mut file, &header)?;
         let robot_topics = header
             .robots
@@ -114,7 +120,8 @@ impl Recorder {
         self.file.write(&mut self.phases, phase.time_s, &Json::from(phase))
     }
 
-    /// Appends a tool call and its answer. Pictures of the answer go to the topics of their robots' cameras.
+    /// Appends a tool call and its answer, and hands everything to the system: what a policy has been told is not lost with
+    /// the process. Pictures of the answer go to the topics of their robots' cameras, one for each state.
     pub fn tool_call(&mut self, record: &ToolCallRecord) -> Result<(), OutputError> {
         self.file.write(&mut self.tool_calls, record.time_s, &ToolCallMessage::new(record)?)?;
         if let Ok(ToolReply::Look(LookReply::Observe(observation))) = record.outcome {
@@ -126,13 +133,17 @@ impl Recorder {
                 }
             }
         }
-        Ok(())
+        self.flush()
+    }
+
+    /// Hands everything that has been appended to the system.
+    pub fn flush(&mut self) -> Result<(), OutputError> {
+        self.file.flush()
     }
 
     /// Writes the result and the index, and gives the file its name.
-    pub fn finish(mut self, result: &EpisodeResult) -> Result<PathBuf, OutputError> {
-        self.file
-            .metadata(metadata::RESULT, &[(EpisodeResult::FILE_NAME, &serde_json::to_string(result)?)])?;
+    pub fn finish(mut self, result: &ResultReply) -> Result<PathBuf, OutputError> {
+        self.file.metadata(metadata::RESULT, &[(RESULT_FILE, &serde_json::to_string(result)?)])?;
         self.file.finish()
     }
 }

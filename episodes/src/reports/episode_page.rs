@@ -91,6 +91,8 @@ impl EpisodePage<'_> {
             EndReason::StepBudgetExhausted => "The steps ran out.",
             EndReason::WallClockExhausted => "The policy's time ran out.",
             EndReason::Finished => "The policy ended the episode.",
+            EndReason::Abandoned => "The policy went away.",
+            EndReason::SimulatorFailed => "The simulator failed.",
         };
         format!(r#"<span class="{class}">{reached} of {phases} phases reached.</span> {why}"#)
     }

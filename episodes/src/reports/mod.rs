@@ -5,5 +5,5 @@ mod results;
 mod strip;
 
 pub use episode_page::{CallCounts, EpisodePage};
-pub use results::EpisodeResult;
+pub use results::{RESULT_FILE, write_result};
 pub use strip::{CELL_HEIGHT, CELL_WIDTH, Moment, View, png};

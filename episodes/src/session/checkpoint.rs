@@ -145,6 +145,7 @@ impl Session {
         self.tool_calls = progress.tool_calls;
         self.clock.set_spent(progress.thought);
         self.ended = progress.ended;
+        self.result = None;
         Ok(())
     }
 }

@@ -40,8 +40,13 @@ impl ThinkingClock {
 
     /// What the policy has left; `None` for as long as it likes.
     pub fn left(&self) -> Option<Duration> {
-        let thinking = self.since.map_or(Duration::ZERO, |since| (self.now)().saturating_sub(since));
-        self.allowed.map(|allowed| allowed.saturating_sub(self.spent + thinking))
+        let allowed = self.allowed?;
+        Some(allowed.saturating_sub(self.spent + self.thinking()))
+    }
+
+    /// How long the policy has been thinking since the last reply.
+    pub fn thinking(&self) -> Duration {
+        self.since.map_or(Duration::ZERO, |since| (self.now)().saturating_sub(since))
     }
 
     pub fn exhausted(&self) -> bool {

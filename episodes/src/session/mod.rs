@@ -12,13 +12,13 @@ mod status;
 
 pub use checkpoint::Checkpoint;
 pub use clock::{Clock, monotonic};
-pub use run_files::RunFiles;
+pub use run_files::{RunFiles, RunFolder};
 
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use tandem_sim::{RobotCommand, Step, World};
-use tandem_tools_spec::{EndReason, ResultReply, ToolCall, ToolReply};
+use tandem_tools_spec::{EndReason, ManageReply, ResultReply, ToolCall, ToolReply};
 
 use crate::commands::{Command, Motion, Run};
 use crate::convert::isometry_from_sim;
@@ -43,23 +43,26 @@ pub struct Session {
     clock: ThinkingClock,
     eyes: Eyes,
     files: Option<RunFiles>,
+    /// Up to the end.
     tool_calls: u32,
     /// Time that physics took, for the real-time factor.
     physics: Duration,
     ended: Option<EndReason>,
+    /// What it came to, from when the files were closed: the one truth that everybody is told.
+    result: Option<ResultReply>,
 }
 
 impl Session {
     /// Builds the world of `spec` and takes it to where the episode begins, which under some protocols is after an initial
     /// hold. With a folder, the episode is recorded there.
     pub fn start(spec: &EpisodeSpec, folder: Option<&Path>) -> Result<Session, EpisodeError> {
-        Session::start_with_clock(spec, folder, monotonic())
+        Session::start_with_clock(spec, folder.map(RunFolder::from), monotonic())
     }
 
     /// As [`Session::start`], with the policy's wall clock read from `clock`.
     pub fn start_with_clock(
         spec: &EpisodeSpec,
-        folder: Option<&Path>,
+        folder: Option<RunFolder>,
         clock: Clock,
     ) -> Result<Session, EpisodeError> {
         let Built { world, motions, robot, locomotion } = build::build(spec)?;
@@ -76,6 +79,7 @@ impl Session {
             tool_calls: 0,
             physics: Duration::ZERO,
             ended: None,
+            result: None,
             present,
             world,
         };
@@ -85,7 +89,7 @@ impl Session {
     }
 
     /// Takes a world that has just been built to where its episode begins.
-    fn begin(&mut self, folder: Option<&Path>) -> Result<(), EpisodeError> {
+    fn begin(&mut self, folder: Option<RunFolder>) -> Result<(), EpisodeError> {
         let hold_steps = match &self.origin.spec.start {
             Start::Task => self.rules.initial_hold_steps,
             Start::Checkpoint(path) => {
@@ -97,26 +101,63 @@ impl Session {
         if let Some(folder) = folder {
             self.files = Some(RunFiles::create(folder, self)?);
         }
-        self.keep_picture("start")?;
+        self.keep_picture("start");
         if hold_steps > 0 {
             self.run(Command::hold(hold_steps, self.motions.len()))?;
         }
         Ok(())
     }
 
-    /// Answers a tool call. An error changes nothing but the count of calls.
+    /// Answers a tool call. An error changes nothing but the count of calls. The call that ends the episode, and no later one,
+    /// is counted and recorded, and closes the files.
     pub fn call(&mut self, call: ToolCall) -> Result<ToolReply, EpisodeError> {
         self.clock.pause();
         if self.ended.is_none() && self.clock.exhausted() {
             self.ended = Some(EndReason::WallClockExhausted);
         }
-        let answer = call.validate().map_err(EpisodeError::from).and_then(|()| self.answer(&call));
-        self.tool_calls += 1;
-        if let Some(files) = &mut self.files {
-            files.tool_call(self.present.time_s, &call, &answer)?;
+        let underway = self.result.is_none();
+        self.tool_calls += u32::from(underway);
+        let mut answer = call.validate().map_err(EpisodeError::from).and_then(|()| self.answer(&call));
+        if let (true, Some(files)) = (underway, &mut self.files) {
+            files.tool_call(self.present.time_s, &call, &answer);
+        }
+        if self.ended.is_some() {
+            self.settle();
+        }
+        if let Ok(ToolReply::Manage(ManageReply::Finish(reply))) = &mut answer {
+            // Closing the files may have failed, which the reply has to say.
+            *reply = self.result().told(self.spec().disclosure);
         }
         self.clock.resume();
         answer
+    }
+
+    /// Ends the episode of a policy that has gone: its wall clock has run out, or its last call was `idle` ago.
+    pub fn end_if_abandoned(&mut self, idle: Duration) {
+        let reason = if self.clock.exhausted() {
+            EndReason::WallClockExhausted
+        } else if self.clock.thinking() >= idle {
+            EndReason::Abandoned
+        } else {
+            return;
+        };
+        self.ended.get_or_insert(reason);
+        self.settle();
+    }
+
+    /// Closes the files, once; from here on the result stays as it is.
+    fn settle(&mut self) {
+        if self.result.is_some() {
+            return;
+        }
+        if !self.scores.complete() {
+            self.keep_picture("end");
+        }
+        let mut result = self.result();
+        if let Some(files) = &mut self.files {
+            files.finish(&mut result, self.origin.spec.task);
+        }
+        self.result = Some(result);
     }
 
     /// Executes a command; fewer of its steps if the last phase is reached or the budget ends. Returns how many.
@@ -144,7 +185,7 @@ impl Session {
         let stepped = self.world.control_step(&commands);
         self.physics += started.elapsed();
         if stepped.is_err() {
-            self.ended = Some(EndReason::Finished);
+            self.ended = Some(EndReason::SimulatorFailed);
         }
         self.present = stepped?;
         for (motion, robot) in self.motions.iter_mut().zip(&self.present.robots) {
@@ -154,33 +195,30 @@ impl Session {
         let scored = self.scores.update(&self.present);
         let budget = self.budget();
         if let Some(files) = &mut self.files {
-            files.step(&self.present, &scored.facts, budget)?;
+            files.step(&self.present, &scored.facts, budget);
         }
         if scored.reached {
-            self.phase_reached()
+            self.phase_reached();
         } else if self.scores.underway() && !was_underway {
-            self.keep_picture("together")
-        } else {
-            Ok(())
-        }
-    }
-
-    fn phase_reached(&mut self) -> Result<(), EpisodeError> {
-        let Some(phase) = self.reached().pop() else { return Ok(()) };
-        self.keep_picture(&format!("{} {}", phase.id, phase.name.replace('_', " ")))?;
-        if let Some(files) = &mut self.files {
-            files.phase(&phase)?;
+            self.keep_picture("together");
         }
         Ok(())
     }
 
+    fn phase_reached(&mut self) {
+        let Some(phase) = self.reached().pop() else { return };
+        self.keep_picture(&format!("{} {}", phase.id, phase.name.replace('_', " ")));
+        if let Some(files) = &mut self.files {
+            files.phase(&phase);
+        }
+    }
+
     /// Keeps a picture of this moment for the strip, if the episode is recorded.
-    fn keep_picture(&mut self, caption: &str) -> Result<(), EpisodeError> {
+    fn keep_picture(&mut self, caption: &str) {
         if let Some(files) = &mut self.files {
             let names = self.motions.iter().map(|motion| motion.robot.name.as_str());
             files.keep(moment::capture(caption, &self.present, names, &mut self.eyes));
         }
-        Ok(())
     }
 
     /// What the episode is.
@@ -208,17 +246,25 @@ impl Session {
         format!("{:016x}", self.world.state_hash())
     }
 
+    /// Why the recording is not complete, if it is not; the episode goes on without it.
+    pub fn recording_failed(&self) -> Option<&str> {
+        self.files.as_ref().and_then(RunFiles::failed)
+    }
+
     /// Ends the episode and writes what a recorded one leaves behind.
-    pub fn close(mut self) -> Result<ResultReply, EpisodeError> {
-        self.ended.get_or_insert(EndReason::Finished);
-        if !self.scores.complete() {
-            self.keep_picture("end")?;
-        }
-        let result = self.result();
-        if let Some(files) = self.files {
-            files.finish(&result, self.origin.spec.task)?;
-        }
-        Ok(result)
+    pub fn close(self) -> ResultReply {
+        self.close_as(EndReason::Finished)
+    }
+
+    /// As [`Session::close`], of an episode that could not be played on.
+    pub fn close_failed(self) -> ResultReply {
+        self.close_as(EndReason::SimulatorFailed)
+    }
+
+    fn close_as(mut self, reason: EndReason) -> ResultReply {
+        self.ended.get_or_insert(reason);
+        self.settle();
+        self.result()
     }
 }
 

@@ -1,5 +1,7 @@
-//! What an episode leaves in its folder: `episode.mcap`, `result.json`, `strip.png`, `report.html`.
+//! What an episode leaves in its folder: `episode.mcap`, `result.json`, `strip.png`, `report.html`. None of them can fail the
+//! episode: what cannot be written is named in the result, and the episode goes on without it.
 
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use tandem_sim::Step;
@@ -7,16 +9,32 @@ use tandem_tools_spec::{Budget, PhaseReached, ResultReply, ToolCall, ToolReply};
 
 use super::{Session, this_build};
 use crate::EpisodeError;
-use crate::output::{OutputError, write_whole};
-use crate::recording::{Recorder, RecordingHeader, ToolCallRecord};
-use crate::reports::{self, CallCounts, EpisodePage, EpisodeResult, Moment};
+use crate::output::{OutputError, create_private_folder, write_whole};
+use crate::recording::{Recorder, RecordingHeader, ToolCallRecord, Visibility};
+use crate::reports::{self, CallCounts, EpisodePage, Moment};
 use crate::scoring::Facts;
 use crate::tasks::Task;
 
-/// The files of an episode under way.
+/// Where an episode is recorded.
+#[derive(Clone, Debug)]
+pub struct RunFolder {
+    pub path: PathBuf,
+    pub visibility: Visibility,
+}
+
+impl From<&Path> for RunFolder {
+    fn from(path: &Path) -> RunFolder {
+        RunFolder { path: path.into(), visibility: Visibility::default() }
+    }
+}
+
+/// The files of an episode.
 pub struct RunFiles {
     folder: PathBuf,
-    recorder: Recorder,
+    /// `None` once it is closed or has failed.
+    recorder: Option<Recorder>,
+    /// The first failure.
+    failed: Option<String>,
     moments: Vec<Moment>,
     calls: CallCounts,
     budget_left: Option<Budget>,
@@ -27,8 +45,9 @@ impl RunFiles {
     pub const REPORT: &str = "report.html";
 
     /// Makes the folder and begins the recording where `session` stands.
-    pub(super) fn create(folder: &Path, session: &Session) -> Result<RunFiles, EpisodeError> {
-        std::fs::create_dir_all(folder).map_err(|source| OutputError::Io { path: folder.into(), source })?;
+    pub(super) fn create(folder: RunFolder, session: &Session) -> Result<RunFiles, EpisodeError> {
+        let RunFolder { path, visibility } = folder;
+        create_private_folder(&path).map_err(|source| OutputError::Io { path: path.clone(), source })?;
         let header = RecordingHeader {
             spec: session.spec().clone(),
             locomotion: session.origin.locomotion.clone(),
@@ -36,27 +55,29 @@ impl RunFiles {
             robots: session.motions.iter().map(|motion| motion.robot.clone()).collect(),
             scores: session.scores.memory(),
         };
-        let mut recorder = Recorder::create(folder, header, &session.present)?;
+        let mut recorder = Recorder::create(&path, visibility, header, &session.present)?;
         recorder.draw("world", session.world.room())?;
         for (name, model) in session.world.object_models() {
             recorder.draw(name, &model.geoms)?;
         }
+        recorder.flush()?;
         Ok(RunFiles {
-            folder: folder.into(),
-            recorder,
+            folder: path,
+            recorder: Some(recorder),
+            failed: None,
             moments: Vec::new(),
             calls: CallCounts::default(),
             budget_left: None,
         })
     }
 
-    pub(super) fn step(&mut self, step: &Step, facts: &Facts, budget: Budget) -> Result<(), EpisodeError> {
+    pub(super) fn step(&mut self, step: &Step, facts: &Facts, budget: Budget) {
         self.budget_left = Some(budget);
-        Ok(self.recorder.step(step, facts, budget)?)
+        self.record(|recorder| recorder.step(step, facts, budget));
     }
 
-    pub(super) fn phase(&mut self, phase: &PhaseReached) -> Result<(), EpisodeError> {
-        Ok(self.recorder.phase(phase)?)
+    pub(super) fn phase(&mut self, phase: &PhaseReached) {
+        self.record(|recorder| recorder.phase(phase));
     }
 
     pub(super) fn tool_call(
@@ -64,14 +85,14 @@ impl RunFiles {
         time_s: f64,
         call: &ToolCall,
         answer: &Result<ToolReply, EpisodeError>,
-    ) -> Result<(), EpisodeError> {
+    ) {
         self.calls.count(call.name(), answer.is_ok());
         let problem = answer.as_ref().err().map(|error| error.to_string());
         let outcome = match (answer, &problem) {
             (Ok(reply), _) => Ok(reply),
             (Err(_), text) => Err(text.as_deref().unwrap_or_default()),
         };
-        Ok(self.recorder.tool_call(&ToolCallRecord { time_s, call, outcome })?)
+        self.record(|recorder| recorder.tool_call(&ToolCallRecord { time_s, call, outcome }));
     }
 
     /// Keeps a moment for the strip.
@@ -79,16 +100,45 @@ impl RunFiles {
         self.moments.push(moment);
     }
 
-    /// Closes the recording and writes the rest.
-    pub(super) fn finish(self, result: &ResultReply, task: &Task) -> Result<(), EpisodeError> {
-        let summary = EpisodeResult::from(result);
-        self.recorder.finish(&summary)?;
+    /// Why the recording is not complete, if it is not.
+    pub(super) fn failed(&self) -> Option<&str> {
+        self.failed.as_deref()
+    }
+
+    /// Closes the recording and writes the rest; `result` then names what failed.
+    pub(super) fn finish(&mut self, result: &mut ResultReply, task: &Task) {
+        result.recording_failed = self.failed.clone();
+        if let Some(recorder) = self.recorder.take() {
+            self.note(recorder.finish(result).map(drop));
+        }
+        let reported = self.report(result, task);
+        self.note(reported);
+        result.recording_failed = self.failed.clone();
+        self.note(reports::write_result(result, &self.folder).map(drop));
+        result.recording_failed = self.failed.clone();
+    }
+
+    fn report(&self, result: &ResultReply, task: &Task) -> Result<(), EpisodeError> {
         let strip = reports::png(&self.moments)?;
         write_whole(&self.folder.join(Self::STRIP), &strip)?;
         let page =
             EpisodePage { task, result, calls: &self.calls, budget_left: self.budget_left, strip: &strip };
-        write_whole(&self.folder.join(Self::REPORT), page.html().as_bytes())?;
-        summary.write(&self.folder)?;
-        Ok(())
+        Ok(write_whole(&self.folder.join(Self::REPORT), page.html().as_bytes())?)
+    }
+
+    /// Appends to the recording. After a failure it would have a hole, so it ends there.
+    fn record(&mut self, append: impl FnOnce(&mut Recorder) -> Result<(), OutputError>) {
+        let Some(recorder) = &mut self.recorder else { return };
+        let appended = append(recorder);
+        if appended.is_err() {
+            self.recorder = None;
+        }
+        self.note(appended);
+    }
+
+    fn note(&mut self, outcome: Result<(), impl Display>) {
+        if let Err(error) = outcome {
+            self.failed.get_or_insert(error.to_string());
+        }
     }
 }

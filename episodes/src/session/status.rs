@@ -58,7 +58,8 @@ impl Session {
             .collect()
     }
 
-    pub(super) fn status(&self) -> StatusReply {
+    /// Where the episode stands, for those who look on: asking is no call.
+    pub fn status(&self) -> StatusReply {
         StatusReply {
             task: self.spec().task.id.into(),
             seed: self.spec().seed,
@@ -86,8 +87,15 @@ impl Session {
         }
     }
 
-    /// The result as it stands, whatever the policy is told of it.
+    /// The result as it stands, whatever the policy is told of it; after the end, as it was then.
     pub fn result(&self) -> ResultReply {
+        match &self.result {
+            Some(result) => result.clone(),
+            None => self.result_so_far(),
+        }
+    }
+
+    fn result_so_far(&self) -> ResultReply {
         let mut times_s = self.scores.reached().map(|(_, time_s)| time_s);
         let phases = (0..self.spec().task.phases.len()).map(|index| (Phase::number(index), times_s.next()));
         let physics_s = self.physics.as_secs_f64();
@@ -102,6 +110,7 @@ impl Session {
             falls: self.fallen().iter().filter(|robot| robot.fallen).count() as u32,
             realtime_factor: if physics_s > 0.0 { self.present.time_s / physics_s } else { 0.0 },
             state_hash: self.state_hash(),
+            recording_failed: self.recording_failed().map(str::to_owned),
         }
     }
 }

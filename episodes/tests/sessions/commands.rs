@@ -214,3 +214,22 @@ fn the_wall_clock_charges_thinking_and_ends_the_episode() {
     assert_eq!(status(&mut session).ended, Some(EndReason::WallClockExhausted));
     assert_eq!(session.state_hash(), hash);
 }
+
+#[test]
+fn an_episode_ends_when_its_policy_has_gone() {
+    let ended_after = |protocol: Protocol, thinking_s: u64, idle_s: u64| {
+        let hands_s = Arc::new(AtomicU64::new(0));
+        let read = hands_s.clone();
+        let clock: Clock = Box::new(move || Duration::from_secs(read.load(Relaxed)));
+        let mut session = Session::start_with_clock(&spec("handover", 0, protocol), None, clock).unwrap();
+        hands_s.fetch_add(thinking_s, Relaxed);
+        session.end_if_abandoned(Duration::from_secs(idle_s));
+        let ended = session.ended();
+        assert_eq!(session.close().ended, ended.unwrap_or(EndReason::Finished));
+        ended
+    };
+    assert_eq!(ended_after(Protocol::Benchmark, 899, 900), None);
+    assert_eq!(ended_after(Protocol::Benchmark, 900, 900), Some(EndReason::Abandoned));
+    assert_eq!(ended_after(Protocol::Agentic, 1799, 3600), None);
+    assert_eq!(ended_after(Protocol::Agentic, 1800, 3600), Some(EndReason::WallClockExhausted));
+}

@@ -1,9 +1,11 @@
 //! Recordings read back: every step as it was, and phases scored again from the steps alone.
 
 use crate::common::*;
+use std::path::{Path, PathBuf};
 use tandem_episodes::players::{self, InProcess};
-use tandem_episodes::{Recorder, Recording, Session, tasks};
-use tandem_tools_spec::{EndReason, Protocol};
+
+use tandem_episodes::{Recorder, Recording, Session, recover, tasks};
+use tandem_tools_spec::{EndReason, Finish, Observe, Protocol};
 
 #[test]
 fn recorded_steps_are_the_steps_bit_for_bit() {
@@ -17,7 +19,7 @@ fn recorded_steps_are_the_steps_bit_for_bit() {
     }
     command(&mut session, raise_hand(5));
     let last = session.present().clone();
-    let result = session.close().unwrap();
+    let result = session.close();
 
     let recording = Recording::read(&folder.path().join(Recorder::FILE_NAME)).unwrap();
     assert_eq!((&recording.spec, recording.locomotion.as_str()), (&spec, "balance"));
@@ -41,7 +43,7 @@ fn a_recording_scored_again_reaches_the_phases_that_the_episode_reached() {
         let spec = spec(task.id, 3, Protocol::Benchmark);
         let mut episode = InProcess(Session::start(&spec, Some(folder.path())).unwrap());
         players::find("expert").unwrap().play(&spec, &mut episode).unwrap();
-        let result = episode.0.close().unwrap();
+        let result = episode.0.close();
         assert_eq!(result.ended, EndReason::TaskComplete, "{}", task.id);
 
         let recording = Recording::read(&folder.path().join(Recorder::FILE_NAME)).unwrap();
@@ -62,4 +64,80 @@ fn what_is_no_recording_is_refused_by_name() {
     std::fs::write(&path, "not MCAP").unwrap();
     let text = Recording::read(&path).map(drop).unwrap_err().to_string();
     assert!(text.contains("notes.mcap is no complete MCAP file"), "{text}");
+}
+
+#[test]
+fn a_moment_is_pictured_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let spec = spec("handover", 3, Protocol::Benchmark);
+    let mut session = Session::start(&spec, Some(folder.path())).unwrap();
+    let look = |session: &mut Session, robots: Option<Vec<String>>| {
+        session.call(Observe { robots }.into()).unwrap();
+    };
+    look(&mut session, Some(vec!["A".into()]));
+    (0..5).for_each(|_| look(&mut session, None));
+    wait(&mut session, 1);
+    (0..5).for_each(|_| look(&mut session, Some(vec!["B".into()])));
+    session.call(Finish {}.into()).unwrap();
+
+    let bytes = std::fs::read(folder.path().join(Recorder::FILE_NAME)).unwrap();
+    let pictures_s = |topic: &str| -> Vec<f64> {
+        let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
+        messages.filter(|m| m.channel.topic == topic).map(|m| m.log_time as f64 / 1e9).collect()
+    };
+    assert_eq!((pictures_s("/A/egocentric"), pictures_s("/B/egocentric")), (vec![0.0], vec![0.0, 0.02]));
+}
+
+/// What an episode of `calls` waits of 5 steps leaves whose process is killed: the bytes that are on the disk by then.
+fn interrupted(folder: &Path, calls: u32) -> PathBuf {
+    let spec = spec("handover", 3, Protocol::Benchmark);
+    let mut session = Session::start(&spec, Some(folder)).unwrap();
+    (0..calls).for_each(|_| drop(wait(&mut session, 5)));
+    let partial = folder.join("episode.mcap.partial");
+    let bytes = std::fs::read(&partial).unwrap();
+    drop(session);
+    std::fs::write(&partial, bytes).unwrap();
+    partial
+}
+
+#[test]
+fn an_interrupted_recording_is_recovered_up_to_the_last_reply() {
+    let folder = tempfile::tempdir().unwrap();
+    let partial = interrupted(folder.path(), 3);
+    let text = Recording::read(&partial).map(drop).unwrap_err().to_string();
+    assert!(text.contains("tandem recover") && text.contains("episode.mcap.partial"), "{text}");
+
+    let recovered = recover(&partial).unwrap();
+    assert_eq!((recovered.path.clone(), recovered.last_s), (folder.path().join(Recorder::FILE_NAME), 0.3));
+    let recording = Recording::read(&recovered.path).unwrap();
+    assert_eq!((recording.steps().unwrap().count(), recording.tool_calls().unwrap().len()), (16, 3));
+    assert_eq!((recording.spec.seed, recording.result.clone()), (3, None));
+    assert_eq!(recording.score().unwrap().reached().count(), 0);
+    let text = recover(&partial).unwrap_err().to_string();
+    assert!(text.contains("episode.mcap exists"), "{text}");
+}
+
+#[test]
+fn a_torn_end_is_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let partial = interrupted(folder.path(), 2);
+    let bytes = std::fs::read(&partial).unwrap();
+    let whole = recover(&partial).unwrap();
+    for left_bytes in [bytes.len() - 1, bytes.len() - 100, bytes.len() * 3 / 4] {
+        std::fs::remove_file(&whole.path).unwrap();
+        std::fs::write(&partial, &bytes[..left_bytes]).unwrap();
+        let recovered = recover(&partial).unwrap();
+        assert!(recovered.torn.is_some() && recovered.messages <= whole.messages, "{recovered:?}");
+        Recording::read(&whole.path).unwrap().steps().unwrap().for_each(|step| drop(step.unwrap()));
+    }
+    for (name, content, says) in [
+        ("episode.mcap", &b""[..], "does not end in .partial"),
+        ("empty.mcap.partial", b"", "holds no message"),
+        ("notes.mcap.partial", b"not MCAP", "holds no message"),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, content).unwrap();
+        let text = recover(&path).unwrap_err().to_string();
+        assert!(text.contains(says) && text.contains(name), "{text}");
+    }
 }

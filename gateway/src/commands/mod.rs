@@ -8,6 +8,7 @@ pub mod evaluate;
 pub mod locomotion;
 mod log;
 mod played;
+pub mod recover;
 mod seeds;
 pub mod serve;
 pub mod tasks;

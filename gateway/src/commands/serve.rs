@@ -25,6 +25,6 @@ pub struct Args {
 pub fn run(args: Args) -> Outcome {
     log::to_stderr(LevelFilter::INFO);
     let settings = Settings::resolve(args.flags, args.config.as_deref())?;
-    Server::start(settings)?.run_until_signal();
-    Ok(ExitCode::SUCCESS)
+    let left = Server::start(settings)?.run_until_signal();
+    Ok(if left.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

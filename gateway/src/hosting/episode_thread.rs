@@ -7,13 +7,14 @@ use std::{
         Arc,
         atomic::{AtomicBool, Ordering},
     },
+    time::Duration,
 };
 
-use tandem_episodes::{EpisodeError, EpisodeSpec, Facts, Session};
-use tandem_tools_spec::{Briefing, ResultReply, ToolCall, ToolReply};
+use tandem_episodes::{Clock, EpisodeError, EpisodeSpec, Facts, RunFolder, Session, monotonic};
+use tandem_tools_spec::{Briefing, ManageReply, ResultReply, ToolCall, ToolReply};
 use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 
-use super::HostingError;
+use super::{Answer, HostingError, guarded::Guarded};
 
 /// Calls that may wait for one episode. A policy has no use for more than one at a time; a few more are a burst.
 const WAITING_CALLS: usize = 16;
@@ -22,8 +23,10 @@ const WAITING_CALLS: usize = 16;
 const STACK_BYTES: usize = 8 << 20;
 
 enum Command {
-    Call { call: ToolCall, reply: oneshot::Sender<Result<ToolReply, EpisodeError>> },
-    Facts { reply: oneshot::Sender<Facts> },
+    Call { call: ToolCall, reply: oneshot::Sender<Result<Answer, HostingError>> },
+    Status { reply: oneshot::Sender<Result<Answer, HostingError>> },
+    Facts { reply: oneshot::Sender<Result<Facts, HostingError>> },
+    EndIfAbandoned { idle: Duration },
     Close { reply: oneshot::Sender<Closing> },
 }
 
@@ -41,20 +44,30 @@ impl EpisodeThread {
     pub async fn start(
         id: &str,
         spec: EpisodeSpec,
-        folder: PathBuf,
+        folder: RunFolder,
         permit: OwnedSemaphorePermit,
+    ) -> Result<(EpisodeThread, Briefing), HostingError> {
+        EpisodeThread::start_with_clock(id, spec, folder, permit, monotonic()).await
+    }
+
+    /// As [`EpisodeThread::start`], with the policy's wall clock read from `clock`.
+    pub async fn start_with_clock(
+        id: &str,
+        spec: EpisodeSpec,
+        folder: RunFolder,
+        permit: OwnedSemaphorePermit,
+        clock: Clock,
     ) -> Result<(EpisodeThread, Briefing), HostingError> {
         let (commands, inbox) = mpsc::channel(WAITING_CALLS);
         let (started, start) = oneshot::channel();
         let ended = Arc::new(AtomicBool::new(false));
-        let thread_ended = ended.clone();
-        let thread_folder = folder.clone();
+        let (thread_ended, name, path) = (ended.clone(), id.to_owned(), folder.path.clone());
         let thread = move || {
-            match open_session(&spec, &thread_folder) {
+            match open_session(&spec, folder, clock) {
                 Ok((session, briefing)) => {
                     // A caller that went away during the start has dropped the inbox's other end, and serve returns.
                     let _ = started.send(Ok(briefing));
-                    let closed = serve(session, inbox, &thread_ended);
+                    let closed = serve(Guarded::new(&name, session), inbox, &thread_ended);
                     // The place is free before the caller hears of the end, so that it can start the next episode.
                     drop(permit);
                     closed.answer();
@@ -67,30 +80,45 @@ impl EpisodeThread {
             .stack_size(STACK_BYTES)
             .spawn(thread)
             .map_err(HostingError::Thread)?;
-        let briefing = start.await.map_err(|_| HostingError::EpisodeStopped)??;
-        Ok((EpisodeThread { commands, ended, folder }, briefing))
+        let briefing = start.await.map_err(|_| HostingError::EpisodePanicked)??;
+        Ok((EpisodeThread { commands, ended, folder: path }, briefing))
     }
 
     /// Runs a call and returns its reply.
-    pub async fn call(&self, call: ToolCall) -> Result<ToolReply, HostingError> {
+    pub async fn call(&self, call: ToolCall) -> Result<Answer, HostingError> {
         let (reply, answer) = oneshot::channel();
         self.send(Command::Call { call, reply })?;
-        Ok(answer.await.map_err(|_| HostingError::EpisodeStopped)??)
+        answer.await.map_err(|_| HostingError::EpisodeStopped)?
+    }
+
+    /// Where the episode stands, for those who look on: asking is no call of the policy's.
+    pub async fn status(&self) -> Result<Answer, HostingError> {
+        let (reply, answer) = oneshot::channel();
+        self.send(Command::Status { reply })?;
+        answer.await.map_err(|_| HostingError::EpisodeStopped)?
     }
 
     /// Where everything is and who touches what: for experts and scoring in this process, never for policies.
     pub fn facts_blocking(&self) -> Result<Facts, HostingError> {
         let (reply, answer) = oneshot::channel();
         self.send(Command::Facts { reply })?;
-        answer.blocking_recv().map_err(|_| HostingError::EpisodeStopped)
+        answer.blocking_recv().map_err(|_| HostingError::EpisodeStopped)?
+    }
+
+    /// Ends the episode if its policy's clock has run out, or if it has made no call for as long as `idle`.
+    pub fn end_if_abandoned(&self, idle: Duration) {
+        // Where something waits already, nobody is gone, and the places to wait are for calls.
+        if self.commands.capacity() == self.commands.max_capacity() {
+            // An episode that has stopped meanwhile has ended.
+            let _ = self.commands.try_send(Command::EndIfAbandoned { idle });
+        }
     }
 
     /// Ends the episode after the calls already waiting, closes its recording and returns the result.
     pub async fn close(&self) -> Result<ResultReply, HostingError> {
         let (reply, answer) = oneshot::channel();
         self.commands.send(Command::Close { reply }).await.map_err(|_| HostingError::EpisodeStopped)?;
-        let result = answer.await.map_err(|_| HostingError::EpisodeStopped)??;
-        Ok(result)
+        answer.await.map_err(|_| HostingError::EpisodeStopped)?
     }
 
     /// Whether the episode takes no more commands.
@@ -111,8 +139,12 @@ impl EpisodeThread {
     }
 }
 
-fn open_session(spec: &EpisodeSpec, folder: &Path) -> Result<(Session, Briefing), EpisodeError> {
-    let session = Session::start(spec, Some(folder))?;
+fn open_session(
+    spec: &EpisodeSpec,
+    folder: RunFolder,
+    clock: Clock,
+) -> Result<(Session, Briefing), EpisodeError> {
+    let session = Session::start_with_clock(spec, Some(folder), clock)?;
     let briefing = session.briefing();
     Ok((session, briefing))
 }
@@ -120,7 +152,7 @@ fn open_session(spec: &EpisodeSpec, folder: &Path) -> Result<(Session, Briefing)
 /// Who asked for the end, and what they are to be told once the place is free.
 struct Closed(Option<(oneshot::Sender<Closing>, Closing)>);
 
-type Closing = Result<ResultReply, EpisodeError>;
+type Closing = Result<ResultReply, HostingError>;
 
 impl Closed {
     fn answer(self) {
@@ -131,21 +163,36 @@ impl Closed {
 }
 
 /// Answers commands until one asks for the end, or nobody is left who could send one.
-fn serve(mut session: Session, mut inbox: mpsc::Receiver<Command>, ended: &AtomicBool) -> Closed {
+fn serve(mut session: Guarded, mut inbox: mpsc::Receiver<Command>, ended: &AtomicBool) -> Closed {
     while let Some(command) = inbox.blocking_recv() {
         // A reply that cannot be sent means that the caller has gone. What was done stays done.
         match command {
             Command::Call { call, reply } => {
-                let answer = session.call(call);
-                ended.store(session.ended().is_some(), Ordering::Relaxed);
-                let _ = reply.send(answer);
+                let answer = session.run(|session| {
+                    let answered = session.call(call)?;
+                    Ok(Answer::new(answered, session))
+                });
+                ended.store(session.ended(), Ordering::Relaxed);
+                let _ = reply.send(answer.and_then(|answer| answer));
             }
-            Command::Facts { reply } => drop(reply.send(session.facts())),
+            Command::Status { reply } => drop(reply.send(session.run(|session| status(session)))),
+            Command::Facts { reply } => drop(reply.send(session.run(|session| session.facts()))),
+            Command::EndIfAbandoned { idle } => {
+                // The log has the reason of a refusal.
+                let _ = session.run(|session| session.end_if_abandoned(idle));
+                if session.ended() {
+                    ended.store(true, Ordering::Relaxed);
+                    tracing::info!(episode = std::thread::current().name(), "abandoned, and ended");
+                }
+            }
             Command::Close { reply } => return Closed(Some((reply, session.close()))),
         }
     }
-    if let Err(error) = session.close() {
-        tracing::error!(%error, "a recording was not closed");
-    }
+    // Nobody is left who could be told.
+    let _ = session.close();
     Closed(None)
+}
+
+fn status(session: &Session) -> Answer {
+    Answer::new(ToolReply::Manage(ManageReply::GetStatus(session.status())), session)
 }

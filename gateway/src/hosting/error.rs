@@ -10,13 +10,11 @@ pub enum HostingError {
     /// The episode refused.
     #[error(transparent)]
     Episode(#[from] EpisodeError),
-    /// No such episode.
-    #[error("no episode {id:?}; have: {}", list(.have))]
+    /// No such episode. Which there are is their callers' business.
+    #[error("no episode {id:?}")]
     UnknownEpisode {
         /// What was asked for.
         id: String,
-        /// The episodes that are held.
-        have: Vec<String>,
     },
     /// Every place for an episode is taken.
     #[error("all {limit} places for episodes are taken")]
@@ -33,9 +31,14 @@ pub enum HostingError {
     /// The server is going down.
     #[error("the server is shutting down and takes no new episodes; try again when it is back")]
     ShuttingDown,
-    /// The episode's thread is gone without having been asked to.
+    /// The episode was closed meanwhile.
     #[error("the episode has stopped")]
     EpisodeStopped,
+    /// The episode's thread panicked.
+    #[error(
+        "the simulator failed in this episode and the episode ends here; its recording holds what went before"
+    )]
+    EpisodePanicked,
     /// The episode has no folder to be recorded into.
     #[error("no folder in {}: {source}", .runs.display())]
     Folder {
@@ -47,8 +50,4 @@ pub enum HostingError {
     /// The system gives no thread for the world.
     #[error("no thread for an episode: {0}")]
     Thread(#[source] io::Error),
-}
-
-fn list(names: &[String]) -> String {
-    if names.is_empty() { "none".into() } else { names.join(", ") }
 }

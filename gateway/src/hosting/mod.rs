@@ -1,11 +1,16 @@
 //! The episodes that a server holds: their table, the thread of each, and the folder that each is recorded into.
 //! Nothing here knows how callers reach it.
 
+mod answer;
 mod episode_thread;
 mod error;
+mod guarded;
 mod run_folder;
 mod table;
+#[cfg(test)]
+mod tests;
 
+pub use answer::Answer;
 pub use episode_thread::EpisodeThread;
 pub use error::HostingError;
 pub use table::EpisodeTable;

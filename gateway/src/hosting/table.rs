@@ -2,15 +2,17 @@
 
 use std::{
     collections::BTreeMap,
-    sync::{
-        Arc, Mutex, MutexGuard,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::{Arc, Mutex, MutexGuard},
+    time::Duration,
 };
 
-use tandem_episodes::{EpisodeSpec, tasks};
+use tandem_episodes::{EpisodeSpec, RunFolder, tasks};
 use tandem_tools_spec::{Protocol, ResultReply, StartEpisode, StartReply, TaskList};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::{
+    sync::{OwnedSemaphorePermit, Semaphore},
+    task::JoinSet,
+    time::{Instant, timeout_at},
+};
 
 use super::{EpisodeThread, HostingError, run_folder};
 use crate::settings::Settings;
@@ -18,19 +20,24 @@ use crate::settings::Settings;
 /// The episodes of one server.
 #[derive(Debug)]
 pub struct EpisodeTable {
-    episodes: Mutex<BTreeMap<String, Arc<EpisodeThread>>>,
+    held: Mutex<Held>,
     places: Arc<Semaphore>,
-    closing: AtomicBool,
     settings: Arc<Settings>,
+}
+
+#[derive(Debug, Default)]
+struct Held {
+    episodes: BTreeMap<String, Arc<EpisodeThread>>,
+    /// From here on nothing is added.
+    closing: bool,
 }
 
 impl EpisodeTable {
     /// An empty table with as many places, words and robots as `settings` say.
     pub fn new(settings: Arc<Settings>) -> EpisodeTable {
         EpisodeTable {
-            episodes: Mutex::default(),
+            held: Mutex::default(),
             places: Arc::new(Semaphore::new(settings.max_episodes as usize)),
-            closing: AtomicBool::new(false),
             settings,
         }
     }
@@ -45,11 +52,15 @@ impl EpisodeTable {
         };
         let place = self.take_place().await?;
         let runs = &self.settings.runs;
-        let (id, folder) = run_folder::create(runs, spec.task.id, spec.seed)
+        let (id, path) = run_folder::create(runs, spec.task.id, spec.seed)
             .map_err(|source| HostingError::Folder { runs: runs.clone(), source })?;
+        let folder = RunFolder { path, visibility: self.settings.record };
         let (episode, mut briefing) = EpisodeThread::start(&id, spec, folder, place).await?;
         self.settings.instructions.rephrase_briefing(&mut briefing);
-        self.lock().insert(id.clone(), Arc::new(episode));
+        if let Err(late) = self.insert(&id, Arc::new(episode)) {
+            late.close().await?;
+            return Err(HostingError::ShuttingDown);
+        }
         tracing::info!(episode = id, "started");
         Ok(StartReply { episode_id: id, briefing })
     }
@@ -61,16 +72,12 @@ impl EpisodeTable {
 
     /// The episode `id`.
     pub fn get(&self, id: &str) -> Result<Arc<EpisodeThread>, HostingError> {
-        let episodes = self.lock();
-        episodes.get(id).cloned().ok_or_else(|| unknown(id, &episodes))
+        self.lock().episodes.get(id).cloned().ok_or_else(|| unknown(id))
     }
 
     /// Ends the episode `id`, forgets it and returns its result.
     pub async fn remove(&self, id: &str) -> Result<ResultReply, HostingError> {
-        let episode = {
-            let mut episodes = self.lock();
-            episodes.remove(id).ok_or_else(|| unknown(id, &episodes))?
-        };
+        let episode = self.lock().episodes.remove(id).ok_or_else(|| unknown(id))?;
         let result = episode.close().await?;
         tracing::info!(episode = id, "closed");
         Ok(result.told(self.settings.disclosure))
@@ -78,7 +85,7 @@ impl EpisodeTable {
 
     /// How many episodes are held.
     pub fn len(&self) -> usize {
-        self.lock().len()
+        self.lock().episodes.len()
     }
 
     /// Whether no episode is held.
@@ -86,47 +93,80 @@ impl EpisodeTable {
         self.len() == 0
     }
 
-    /// Takes no more episodes, ends those that are held after the calls already waiting, and returns when every file is
-    /// closed.
-    pub async fn close_all(&self) {
-        self.closing.store(true, Ordering::SeqCst);
-        let episodes = std::mem::take(&mut *self.lock());
-        for (id, episode) in episodes {
-            match episode.close().await {
-                Ok(_) => tracing::info!(episode = id, "closed"),
-                Err(error) => tracing::error!(episode = id, %error, "not closed"),
-            }
+    /// Ends the episodes that nobody plays any more. To be called every now and then.
+    pub fn end_abandoned(&self) {
+        for episode in self.lock().episodes.values().filter(|episode| !episode.ended()) {
+            episode.end_if_abandoned(self.settings.idle_timeout);
         }
-        // Also waits for threads that no handle names any more, as after a client that left during its start.
-        let _ = self.places.acquire_many(self.settings.max_episodes).await;
+    }
+
+    /// Takes no more episodes, ends those that are held after the calls already waiting, and returns when every file is
+    /// closed, or after `limit`. What was not closed by then is returned by name.
+    pub async fn close_all(&self, limit: Duration) -> Vec<String> {
+        let deadline = Instant::now() + limit;
+        let episodes = {
+            let mut held = self.lock();
+            held.closing = true;
+            std::mem::take(&mut held.episodes)
+        };
+        let mut closings = JoinSet::new();
+        for (id, episode) in episodes {
+            closings.spawn(async move {
+                match timeout_at(deadline, episode.close()).await {
+                    Ok(Ok(_)) => tracing::info!(episode = id, "closed"),
+                    Ok(Err(error)) => tracing::error!(episode = id, %error, "not closed"),
+                    Err(_) => return Some(format!("{id} in {}", episode.folder().display())),
+                }
+                None
+            });
+        }
+        let mut left: Vec<String> = closings.join_all().await.into_iter().flatten().collect();
+        // Also waits for episodes that are just starting, and for those whose client left during the start.
+        let places = self.settings.max_episodes;
+        if timeout_at(deadline, self.places.acquire_many(places)).await.is_err() {
+            let starting = (places as usize).saturating_sub(self.places.available_permits() + left.len());
+            left.extend((starting > 0).then(|| format!("{starting} that had not begun")));
+        }
+        left
+    }
+
+    /// Holds an episode, unless the table is closing: then it is given back.
+    pub(super) fn insert(&self, id: &str, episode: Arc<EpisodeThread>) -> Result<(), Arc<EpisodeThread>> {
+        let mut held = self.lock();
+        if held.closing {
+            return Err(episode);
+        }
+        held.episodes.insert(id.into(), episode);
+        Ok(())
     }
 
     async fn take_place(&self) -> Result<OwnedSemaphorePermit, HostingError> {
-        if self.closing.load(Ordering::SeqCst) {
+        if self.lock().closing {
             return Err(HostingError::ShuttingDown);
         }
         if let Ok(place) = self.places.clone().try_acquire_owned() {
             return Ok(place);
         }
         if let Some(ended) = self.remove_one_that_has_ended() {
-            ended.close().await?;
+            // Its own result is not this caller's business.
+            let _ = ended.close().await;
         }
         let limit = self.settings.max_episodes;
         self.places.clone().try_acquire_owned().map_err(|_| HostingError::TooManyEpisodes { limit })
     }
 
     fn remove_one_that_has_ended(&self) -> Option<Arc<EpisodeThread>> {
-        let mut episodes = self.lock();
+        let episodes = &mut self.lock().episodes;
         let id = episodes.iter().find(|(_, episode)| episode.ended()).map(|(id, _)| id.clone())?;
         episodes.remove(&id)
     }
 
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<String, Arc<EpisodeThread>>> {
+    fn lock(&self) -> MutexGuard<'_, Held> {
         // Nothing panics while it holds the lock; were it so, the map itself would still be whole.
-        self.episodes.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+        self.held.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 }
 
-fn unknown(id: &str, episodes: &BTreeMap<String, Arc<EpisodeThread>>) -> HostingError {
-    HostingError::UnknownEpisode { id: id.into(), have: episodes.keys().cloned().collect() }
+fn unknown(id: &str) -> HostingError {
+    HostingError::UnknownEpisode { id: id.into() }
 }

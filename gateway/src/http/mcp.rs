@@ -1,7 +1,7 @@
 //! The MCP route: the same tools for hosts that speak the Model Context Protocol. Every call names its episode, so the
 //! route keeps no sessions.
 
-use std::{net::IpAddr, sync::Arc};
+use std::sync::Arc;
 
 use rmcp::{
     ErrorData, RoleServer, ServerHandler,
@@ -28,14 +28,13 @@ const INSTRUCTIONS: &str = "Simulated humanoids that must work together. Call li
     with observe and act with move_wrists, walk, send_joint_chunk or wait until the task is done, then call finish. \
     Physics stands still between calls.";
 
-/// The service that is nested at `/mcp`. Where the server listens to the whole network its names are not known, so the
-/// `Host` header is checked only on loopback, where it keeps web pages out.
-pub fn service(app: App, listen: IpAddr) -> StreamableHttpService<McpServer, NeverSessionManager> {
+/// The service that is nested at `/mcp`, behind the gate, which has looked at `Host` and `Origin`.
+pub fn service(app: App) -> StreamableHttpService<McpServer, NeverSessionManager> {
     let config = StreamableHttpServerConfig::default()
         .with_legacy_session_mode(false)
         .with_json_response(true)
-        .with_max_request_body_bytes(app.settings.max_body_bytes);
-    let config = if listen.is_loopback() { config } else { config.disable_allowed_hosts() };
+        .with_max_request_body_bytes(app.settings.max_body_bytes)
+        .disable_allowed_hosts();
     StreamableHttpService::new(move || Ok(McpServer { app: app.clone() }), Arc::default(), config)
 }
 
@@ -65,7 +64,7 @@ impl ServerHandler for McpServer {
         request: CallToolRequestParams,
         _: RequestContext<RoleServer>,
     ) -> Result<CallToolResponse, ErrorData> {
-        let args = request.arguments.map_or(Value::Null, Value::Object);
+        let args = Value::Object(request.arguments.unwrap_or_default());
         let result = match self.call(&request.name, args).await {
             Ok(content) => CallToolResult::success(content),
             // A refusal is the tool's answer, which the model is to read; protocol errors often stay with the host.
@@ -93,11 +92,11 @@ impl McpServer {
         let Some(Value::String(id)) = handle else {
             return Err(ApiError::NoEpisodeNamed { tool: call.name() });
         };
-        let reply = self.app.table.get(&id)?.call(call).await?;
-        match reply {
-            ToolReply::Look(LookReply::Observe(mut observation)) => {
+        let mut answer = self.app.table.get(&id)?.call(call).await?;
+        match &mut answer.reply {
+            ToolReply::Look(LookReply::Observe(observation)) => {
                 let images = std::mem::take(&mut observation.images);
-                let mut content = json_block(&observation)?;
+                let mut content = json_block(&answer)?;
                 let robots: Vec<&str> = images.iter().map(|image| image.robot.as_str()).collect();
                 content.push(ContentBlock::text(format!(
                     "{} images follow: {}",
@@ -109,7 +108,7 @@ impl McpServer {
                 );
                 Ok(content)
             }
-            reply => json_block(&reply),
+            _ => json_block(&answer),
         }
     }
 }

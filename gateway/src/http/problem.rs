@@ -1,7 +1,9 @@
 //! Every refusal as RFC 9457 problem details. The detail says what would work; what is our own fault goes to the log only.
 
+use std::time::Duration;
+
 use axum::{
-    http::{StatusCode, header},
+    http::{HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
 };
 use tandem_episodes::EpisodeError;
@@ -49,9 +51,28 @@ pub enum ApiError {
         /// The tool that was called.
         tool: &'static str,
     },
+    /// The request is for another server.
+    #[error(
+        "host {0:?} is not this server; use the address it prints at its start, or name the host in --allowed-host"
+    )]
+    ForeignHost(String),
+    /// The request comes from a web page of somebody else.
+    #[error("origin {0:?} is another site, and pages of other sites may not call; call from a program")]
+    ForeignOrigin(String),
     /// The body is no JSON.
     #[error("the body is no JSON: {0}; send one JSON object, with finite numbers only, as {{\"steps\": 25}}")]
     MalformedJson(String),
+    /// The body is JSON, but no object.
+    #[error(
+        "the body is {0}; send one JSON object, as {{\"steps\": 25}}, or no body where there is nothing to say"
+    )]
+    NoObject(&'static str),
+    /// The body took too long.
+    #[error("the body did not arrive in {} s; send it again, in one go", .limit.as_secs())]
+    SlowBody {
+        /// The longest that is waited.
+        limit: Duration,
+    },
     /// The body did not arrive.
     #[error("the body could not be read: {0}; send it again")]
     BrokenBody(String),
@@ -82,7 +103,9 @@ fn way_out(error: &HostingError) -> &'static str {
     match error {
         HostingError::UnknownEpisode { .. } => "; start_episode (POST /v1/episodes) starts one",
         HostingError::TooManyEpisodes { .. } => "; finish or DELETE one, or try again later",
-        HostingError::EpisodeStopped => "; start another with start_episode (POST /v1/episodes)",
+        HostingError::EpisodeStopped | HostingError::EpisodePanicked => {
+            "; start another with start_episode (POST /v1/episodes)"
+        }
         HostingError::Episode(_)
         | HostingError::TooManyWaiting { .. }
         | HostingError::ShuttingDown
@@ -111,6 +134,10 @@ impl ApiError {
             ApiError::NoEpisodeNamed { .. } => {
                 ("no-episode-named", "No episode named", StatusCode::UNPROCESSABLE_ENTITY)
             }
+            ApiError::ForeignHost(_) => ("foreign-host", "Foreign host", StatusCode::FORBIDDEN),
+            ApiError::ForeignOrigin(_) => ("foreign-origin", "Foreign origin", StatusCode::FORBIDDEN),
+            ApiError::NoObject(_) => ("no-object", "No JSON object", StatusCode::UNPROCESSABLE_ENTITY),
+            ApiError::SlowBody { .. } => ("slow-body", "Body too slow", StatusCode::REQUEST_TIMEOUT),
             ApiError::MalformedJson(_) => ("malformed-json", "Malformed JSON", StatusCode::BAD_REQUEST),
             ApiError::BrokenBody(_) => ("broken-body", "Body not received", StatusCode::BAD_REQUEST),
             ApiError::BodyTooLarge { .. } => {
@@ -124,10 +151,13 @@ impl ApiError {
         }
     }
 
-    /// The body that this refusal is served with.
+    /// The body that this refusal is served with. What is our own fault is logged.
     pub fn body(&self) -> ProblemBody {
         let (kind, title, status) = self.kind();
-        let detail = if status == StatusCode::INTERNAL_SERVER_ERROR {
+        if status.is_server_error() {
+            tracing::error!(error = %self, "request failed");
+        }
+        let detail = if (kind, title, status) == INTERNAL {
             "the server failed; its log says why".into()
         } else {
             self.to_string()
@@ -139,19 +169,33 @@ impl ApiError {
             detail,
         }
     }
+
+    /// Seconds after which the same request may work.
+    fn retry_after_s(&self) -> Option<u16> {
+        match self {
+            ApiError::Hosting(HostingError::TooManyWaiting { .. }) => Some(1),
+            ApiError::Hosting(HostingError::TooManyEpisodes { .. }) => Some(10),
+            ApiError::Hosting(HostingError::ShuttingDown) => Some(60),
+            _ => None,
+        }
+    }
 }
 
 const INTERNAL: Kind = ("internal", "Internal error", StatusCode::INTERNAL_SERVER_ERROR);
 
 impl IntoResponse for ApiError {
     fn into_response(self) -> Response {
-        let body = self.body();
         let (_, _, status) = self.kind();
-        if status.is_server_error() {
-            tracing::error!(error = %self, "request failed");
+        let text = serde_json::json!(self.body()).to_string();
+        let mut response = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], text).into_response();
+        let headers = response.headers_mut();
+        if let Some(seconds) = self.retry_after_s() {
+            headers.insert(header::RETRY_AFTER, seconds.into());
         }
-        let text = serde_json::json!(body).to_string();
-        (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], text).into_response()
+        if status == StatusCode::REQUEST_TIMEOUT {
+            headers.insert(header::CONNECTION, HeaderValue::from_static("close"));
+        }
+        response
     }
 }
 
@@ -167,6 +211,9 @@ fn hosting_kind(error: &HostingError) -> Kind {
         }
         HostingError::ShuttingDown => ("shutting-down", "Shutting down", StatusCode::SERVICE_UNAVAILABLE),
         HostingError::EpisodeStopped => ("episode-stopped", "Episode stopped", StatusCode::GONE),
+        HostingError::EpisodePanicked => {
+            ("episode-failed", "The simulator failed", StatusCode::INTERNAL_SERVER_ERROR)
+        }
         HostingError::Folder { .. } | HostingError::Thread(_) => INTERNAL,
     }
 }
@@ -207,6 +254,7 @@ fn spec_kind(error: &SpecError) -> Kind {
 #[cfg(test)]
 mod tests {
     use std::io;
+    use std::sync::{Arc, Mutex};
 
     use super::*;
 
@@ -220,10 +268,56 @@ mod tests {
         let failure = || io::Error::other("disk full");
         check(HostingError::Folder { runs: "runs".into(), source: failure() }, 500, "its log says why");
         check(HostingError::Thread(failure()), 500, "the server failed; its log says why");
-        check(HostingError::UnknownEpisode { id: "x".into(), have: vec![] }, 404, "POST /v1/episodes");
+        check(HostingError::UnknownEpisode { id: "x".into() }, 404, "POST /v1/episodes");
+        check(HostingError::EpisodePanicked, 500, "its recording holds what went before; start another");
         check(HostingError::TooManyEpisodes { limit: 8 }, 429, "all 8 places for episodes are taken; finish");
         check(HostingError::TooManyWaiting { limit: 16 }, 429, "call again when");
         check(HostingError::ShuttingDown, 503, "try again");
         check(HostingError::EpisodeStopped, 410, "start another");
+    }
+
+    /// What is logged while `work` is done.
+    fn logged(work: impl FnOnce()) -> String {
+        let lines = Arc::new(Mutex::new(Vec::new()));
+        let writer = lines.clone();
+        let log = tracing_subscriber::fmt().with_writer(move || Lines(writer.clone())).finish();
+        tracing::subscriber::with_default(log, work);
+        let lines = lines.lock().unwrap();
+        String::from_utf8(lines.clone()).unwrap()
+    }
+
+    struct Lines(Arc<Mutex<Vec<u8>>>);
+
+    impl io::Write for Lines {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.lock().unwrap().write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    /// MCP takes the body and REST the response.
+    #[test]
+    fn our_own_faults_are_logged_once_whatever_the_caller_speaks() {
+        let fault = || ApiError::from(HostingError::Thread(io::Error::other("no more threads")));
+        for log in [logged(|| drop(fault().body())), logged(|| drop(fault().into_response()))] {
+            assert_eq!(log.matches("no more threads").count(), 1, "{log}");
+        }
+        assert_eq!(logged(|| drop(ApiError::from(HostingError::EpisodeStopped).body())), "");
+    }
+
+    #[test]
+    fn what_may_work_later_says_when() {
+        let check = |error: HostingError, expected: Option<&str>| {
+            let response = ApiError::from(error).into_response();
+            let header = response.headers().get(header::RETRY_AFTER).map(|value| value.to_str().unwrap());
+            assert_eq!(header, expected, "{}", response.status());
+        };
+        check(HostingError::TooManyEpisodes { limit: 8 }, Some("10"));
+        check(HostingError::TooManyWaiting { limit: 16 }, Some("1"));
+        check(HostingError::ShuttingDown, Some("60"));
+        check(HostingError::EpisodeStopped, None);
     }
 }

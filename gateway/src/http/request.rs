@@ -1,79 +1,129 @@
-//! Reads request bodies: of bounded size, JSON, and with a content type that says so.
+//! Reads request bodies: one JSON object, whose names are all different.
 
-use axum::{
-    body::{Body, Bytes},
-    extract::Request,
-    http::{HeaderMap, header},
+use std::fmt;
+
+use serde::{
+    Deserialize, Deserializer,
+    de::{DeserializeSeed, Error as _, MapAccess, SeqAccess, Visitor},
 };
-use serde_json::Value;
+use serde_json::{Map, Number, Value};
 
 use super::problem::ApiError;
 
-/// A body beyond the limit is read and thrown away up to this many times the limit, because a client that is still
-/// sending when the connection closes never sees the answer.
-const DRAINED_LIMITS: usize = 16;
-
-/// Reads the JSON body of `request`; an empty body is `null`.
-pub async fn json_body(request: Request, limit_bytes: usize) -> Result<Value, ApiError> {
-    let (parts, body) = request.into_parts();
-    let bytes = bounded(body, limit_bytes).await?;
-    if bytes.is_empty() {
-        return Ok(Value::Null);
+/// The JSON object in `body`; no body stands for an object without fields.
+pub fn json_object(body: &[u8]) -> Result<Value, ApiError> {
+    if body.is_empty() {
+        return Ok(Value::Object(Map::new()));
     }
-    check_content_type(&parts.headers)?;
-    serde_json::from_slice(&bytes).map_err(|error| ApiError::MalformedJson(error.to_string()))
+    let Unambiguous(value) =
+        serde_json::from_slice(body).map_err(|error| ApiError::MalformedJson(error.to_string()))?;
+    match value {
+        Value::Object(_) => Ok(value),
+        Value::Null => Err(ApiError::NoObject("null")),
+        Value::Bool(_) => Err(ApiError::NoObject("a truth value")),
+        Value::Number(_) => Err(ApiError::NoObject("a number")),
+        Value::String(_) => Err(ApiError::NoObject("a text")),
+        Value::Array(_) => Err(ApiError::NoObject("an array")),
+    }
 }
 
-async fn bounded(body: Body, limit_bytes: usize) -> Result<Bytes, ApiError> {
-    use http_body_util::BodyExt;
-    let mut body = body;
-    let mut kept = Vec::new();
-    let mut seen_bytes = 0;
-    while let Some(frame) = body.frame().await {
-        let frame = frame.map_err(|error| ApiError::BrokenBody(error.to_string()))?;
-        let Some(data) = frame.data_ref() else { continue };
-        seen_bytes += data.len();
-        if seen_bytes <= limit_bytes {
-            kept.extend_from_slice(data);
-        } else if seen_bytes > limit_bytes.saturating_mul(DRAINED_LIMITS) {
-            break;
+/// Any JSON in which no object names a field twice: readers of JSON differ in which of the two they take.
+struct Unambiguous(Value);
+
+impl<'de> Deserialize<'de> for Unambiguous {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Build.deserialize(deserializer).map(Unambiguous)
+    }
+}
+
+struct Build;
+
+impl<'de> DeserializeSeed<'de> for Build {
+    type Value = Value;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Value, D::Error> {
+        deserializer.deserialize_any(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Build {
+    type Value = Value;
+
+    fn expecting(&self, text: &mut fmt::Formatter) -> fmt::Result {
+        text.write_str("JSON")
+    }
+
+    fn visit_unit<E>(self) -> Result<Value, E> {
+        Ok(Value::Null)
+    }
+
+    fn visit_bool<E>(self, value: bool) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_f64<E: serde::de::Error>(self, value: f64) -> Result<Value, E> {
+        Number::from_f64(value).map(Value::Number).ok_or_else(|| E::custom("a number is too large"))
+    }
+
+    fn visit_str<E>(self, value: &str) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Value, A::Error> {
+        let mut array = Vec::new();
+        while let Some(item) = items.next_element_seed(Build)? {
+            array.push(item);
         }
+        Ok(array.into())
     }
-    if seen_bytes > limit_bytes {
-        return Err(ApiError::BodyTooLarge { limit_bytes });
-    }
-    Ok(kept.into())
-}
 
-fn check_content_type(headers: &HeaderMap) -> Result<(), ApiError> {
-    let Some(value) = headers.get(header::CONTENT_TYPE) else {
-        return Ok(());
-    };
-    let text = value.to_str().unwrap_or_default();
-    let essence = text.split(';').next().unwrap_or_default().trim().to_ascii_lowercase();
-    if essence == "application/json" || (essence.starts_with("application/") && essence.ends_with("+json")) {
-        return Ok(());
+    fn visit_map<A: MapAccess<'de>>(self, mut fields: A) -> Result<Value, A::Error> {
+        let mut object = Map::new();
+        while let Some(name) = fields.next_key::<String>()? {
+            let value = fields.next_value_seed(Build)?;
+            if object.contains_key(&name) {
+                return Err(A::Error::custom(format_args!("the field {name:?} stands there twice")));
+            }
+            object.insert(name, value);
+        }
+        Ok(object.into())
     }
-    Err(ApiError::ContentType(text.into()))
 }
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
 
     #[test]
-    fn content_types() {
-        let accepted = |text: &str| {
-            let mut headers = HeaderMap::new();
-            headers.insert(header::CONTENT_TYPE, text.parse().unwrap());
-            check_content_type(&headers).is_ok()
+    fn objects_come_as_they_were_sent() {
+        let sent = json!({ "a": [1, -2, 2.5, null, true, "text", {}], "b": { "a": 1e300 }, "c": u64::MAX });
+        assert_eq!(json_object(sent.to_string().as_bytes()).unwrap(), sent);
+        assert_eq!(json_object(b"").unwrap(), json!({}));
+    }
+
+    #[test]
+    fn what_is_no_object_or_two_is_refused() {
+        let check = |body: &str, says: &str| {
+            let text = json_object(body.as_bytes()).unwrap_err().to_string();
+            assert!(text.contains(says), "{body}: {text}");
         };
-        assert!(check_content_type(&HeaderMap::new()).is_ok());
-        assert!(accepted("application/json"));
-        assert!(accepted("Application/JSON; charset=utf-8"));
-        assert!(accepted("application/vnd.tandem+json"));
-        assert!(!accepted("application/x-www-form-urlencoded"));
-        assert!(!accepted("text/json"));
-        assert!(!accepted(""));
+        check("null", "the body is null");
+        check("[{\"steps\": 5}]", "the body is an array");
+        check("5", "the body is a number");
+        check("{\"steps\": 5, \"steps\": 6}", "\"steps\" stands there twice");
+        check("{\"robots\": [{\"robot\": \"A\", \"robot\": \"B\"}]}", "\"robot\" stands there twice");
+        check("{\"steps\": 5} {}", "no JSON");
+        check("{\"steps\": 1e999}", "no JSON");
+        check(&"[".repeat(100_000), "no JSON");
     }
 }

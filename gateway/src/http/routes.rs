@@ -1,22 +1,27 @@
 //! The REST routes under `/v1`.
 
-use std::net::IpAddr;
-
 use axum::{
     Json, Router,
-    extract::{Path, Request, State},
-    http::{Method, StatusCode, Uri, header},
+    body::Bytes,
+    extract::{DefaultBodyLimit, Path, Request, State},
+    http::{HeaderMap, Method, StatusCode, Uri, header},
     middleware::{self, Next},
     response::{IntoResponse, Response},
     routing::{MethodRouter, get, post},
 };
 use serde_json::{Value, json};
 use tandem_tools_spec::{
-    GetStatus, ResultReply, StartEpisode, StartReply, TaskList, ToolCall, ToolReply, ToolSpec, parse_args,
-    tool_specs,
+    ResultReply, StartEpisode, StartReply, TaskList, ToolCall, ToolSpec, parse_args, tool_specs,
 };
 
-use super::{app::App, mcp, problem::ApiError, request::json_body};
+use super::{
+    app::App,
+    gate::{self, Gate},
+    mcp,
+    problem::ApiError,
+    request::json_object,
+};
+use crate::hosting::Answer;
 
 /// Every route: path, methods, handlers.
 fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 7] {
@@ -32,14 +37,17 @@ fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 7] {
 }
 
 /// The whole service.
-pub fn router(app: App, listen: IpAddr) -> Router {
-    let mut router = Router::new().nest_service("/mcp", mcp::service(app.clone(), listen));
+pub fn router(app: App, gate: Gate) -> Router {
+    let mut router = Router::new().nest_service("/mcp", mcp::service(app.clone()));
     for (path, _, handlers) in routes() {
         router = router.route(path, handlers);
     }
     router
         .fallback(no_route)
         .method_not_allowed_fallback(no_method)
+        // The gate has a limit of its own.
+        .layer(DefaultBodyLimit::disable())
+        .layer(middleware::from_fn_with_state(gate, gate::pass))
         .layer(middleware::from_fn(log_and_describe))
         .with_state(app)
 }
@@ -60,23 +68,23 @@ async fn openapi() -> Json<Value> {
     Json(tandem_tools_spec::openapi(env!("CARGO_PKG_VERSION")))
 }
 
-async fn start(State(app): State<App>, request: Request) -> Result<Response, ApiError> {
-    let args: StartEpisode = parse_args(json_body(request, app.settings.max_body_bytes).await?)?;
+async fn start(State(app): State<App>, body: Bytes) -> Result<Response, ApiError> {
+    let args: StartEpisode = parse_args(json_object(&body)?)?;
     let reply: StartReply = app.table.start(args).await?;
     let location = format!("/v1/episodes/{}", reply.episode_id);
     Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(reply)).into_response())
 }
 
-async fn status(State(app): State<App>, Path(id): Path<String>) -> Result<Json<ToolReply>, ApiError> {
-    Ok(Json(app.table.get(&id)?.call(GetStatus {}.into()).await?))
+async fn status(State(app): State<App>, Path(id): Path<String>) -> Result<Json<Answer>, ApiError> {
+    Ok(Json(app.table.get(&id)?.status().await?))
 }
 
 async fn call(
     State(app): State<App>,
     Path((id, name)): Path<(String, String)>,
-    request: Request,
-) -> Result<Json<ToolReply>, ApiError> {
-    let args = json_body(request, app.settings.max_body_bytes).await?;
+    body: Bytes,
+) -> Result<Json<Answer>, ApiError> {
+    let args = json_object(&body)?;
     let episode = app.table.get(&id)?;
     let call = ToolCall::parse(&name, without_episode_id(args, &id)?)?;
     Ok(Json(episode.call(call).await?))
@@ -119,15 +127,18 @@ async fn log_and_describe(request: Request, next: Next) -> Response {
     let began = std::time::Instant::now();
     let mut response = next.run(request).await;
     let status = response.status();
-    let described = response
-        .headers()
-        .get(header::CONTENT_TYPE)
-        .is_some_and(|value| value.to_str().is_ok_and(|text| text.contains("json")));
-    if status.is_client_error() && !described {
+    if status.is_client_error() && !is_json(response.headers()) {
+        let allow = response.headers().get(header::ALLOW).cloned();
         let text = axum::body::to_bytes(response.into_body(), 10_000).await.unwrap_or_default();
         let detail = format!("{}; see GET /v1/tools for what is served", String::from_utf8_lossy(&text));
         response = ApiError::Protocol { status, detail }.into_response();
+        response.headers_mut().extend(allow.map(|methods| (header::ALLOW, methods)));
     }
     tracing::info!(%method, path, status = status.as_u16(), ms = began.elapsed().as_millis() as u64, "request");
     response
+}
+
+fn is_json(headers: &HeaderMap) -> bool {
+    let content_type = headers.get(header::CONTENT_TYPE);
+    content_type.is_some_and(|value| value.to_str().is_ok_and(|text| text.contains("json")))
 }

@@ -2,9 +2,9 @@
 
 use std::{io, net::SocketAddr, sync::Arc, time::Duration};
 
-use tokio::{net::TcpListener, runtime::Runtime, sync::oneshot, task::JoinHandle};
+use tokio::{net::TcpListener, runtime::Runtime, sync::oneshot, task::JoinHandle, time::interval};
 
-use super::{app::App, routes::router};
+use super::{app::App, connections, gate::Gate, routes::router};
 use crate::{hosting::EpisodeTable, settings::Settings};
 
 /// Requests only parse, wait and answer; the worlds have threads of their own.
@@ -13,6 +13,9 @@ const HTTP_THREADS: usize = 2;
 /// How long requests that are still arriving at the end may take.
 const LAST_REQUESTS: Duration = Duration::from_secs(5);
 
+/// How often episodes are looked at whose policies may have gone.
+const ROUNDS: Duration = Duration::from_secs(1);
+
 /// A running server. Dropping it stops it at once; [`Server::stop`] lets calls under way finish.
 #[derive(Debug)]
 pub struct Server {
@@ -20,7 +23,8 @@ pub struct Server {
     address: SocketAddr,
     table: Arc<EpisodeTable>,
     stop: oneshot::Sender<()>,
-    served: JoinHandle<io::Result<()>>,
+    served: JoinHandle<()>,
+    settings: Arc<Settings>,
 }
 
 impl Server {
@@ -39,14 +43,15 @@ impl Server {
         })?;
         let address = listener.local_addr()?;
         let table = Arc::new(EpisodeTable::new(settings.clone()));
-        let app = App { table: table.clone(), settings };
+        let app = App { table: table.clone(), settings: settings.clone() };
+        let router = router(app, Gate::new(settings.clone(), address.ip()));
         let (stop, stopped) = oneshot::channel::<()>();
-        let service = axum::serve(listener, router(app, address.ip())).with_graceful_shutdown(async {
+        let served = runtime.spawn(connections::serve(listener, router, settings.request_timeout, async {
             let _ = stopped.await;
-        });
-        let served = runtime.spawn(service.into_future());
+        }));
+        runtime.spawn(look_after(table.clone()));
         tracing::info!("serving on http://{address}");
-        Ok(Server { runtime, address, table, stop, served })
+        Ok(Server { runtime, address, table, stop, served, settings })
     }
 
     /// Where it serves.
@@ -60,27 +65,40 @@ impl Server {
     }
 
     /// Serves until SIGINT or SIGTERM, then stops as [`Server::stop`] does.
-    pub fn run_until_signal(self) {
+    pub fn run_until_signal(self) -> Vec<String> {
         self.runtime.block_on(shutdown_signal());
         tracing::info!("shutting down; calls under way finish first, a second signal ends at once");
         self.runtime.spawn(async {
             shutdown_signal().await;
             std::process::exit(1);
         });
-        self.stop();
+        self.stop()
     }
 
-    /// Takes no more requests, finishes the calls under way, and returns when every recording is closed.
-    pub fn stop(self) {
-        let Server { runtime, table, stop, served, .. } = self;
+    /// Takes no more requests, finishes the calls under way, and returns when every recording is closed, or after the time
+    /// that the settings allow; what was not closed by then is logged, and returned.
+    pub fn stop(self) -> Vec<String> {
+        let Server { runtime, table, stop, served, settings, .. } = self;
         let _ = stop.send(());
         runtime.block_on(async {
-            table.close_all().await;
+            let left = table.close_all(settings.stop_timeout).await;
+            if !left.is_empty() {
+                tracing::error!(left = left.join(", "), "ending without these, which did not end in time");
+            }
             // A client that never finishes its request must not keep the process alive; the recordings are closed by now.
             if tokio::time::timeout(LAST_REQUESTS, served).await.is_err() {
                 tracing::warn!("a request was cut off");
             }
-        });
+            left
+        })
+    }
+}
+
+async fn look_after(table: Arc<EpisodeTable>) {
+    let mut rounds = interval(ROUNDS);
+    loop {
+        rounds.tick().await;
+        table.end_abandoned();
     }
 }
 

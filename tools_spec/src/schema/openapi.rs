@@ -14,11 +14,11 @@ pub fn openapi(version: &str, on_episode: impl Iterator<Item = ToolSpec>) -> Val
     let mut paths = paths_without_episode();
     for spec in on_episode {
         let path = format!("/v1/episodes/{{episode_id}}/tools/{}", spec.name);
-        let mut call = operation(spec.name, &spec.description, "200", spec.reply_schema);
+        let mut call = operation(spec.name, &spec.description, "200", with_notice(spec.reply_schema));
         call["requestBody"] = json_body(spec.body_schema);
         paths.insert(path, json!({ "parameters": [episode_id()], "post": call }));
     }
-    let status = plain_schema::<<GetStatus as Tool>::Reply>();
+    let status = with_notice(plain_schema::<<GetStatus as Tool>::Reply>());
     let result = plain_schema::<<Finish as Tool>::Reply>();
     paths.insert(
         "/v1/episodes/{episode_id}".into(),
@@ -69,6 +69,15 @@ fn operation(id: &str, description: &str, success: &str, reply: Value) -> Value 
             },
         },
     })
+}
+
+/// Every reply of an episode says so when its recording has failed.
+fn with_notice(mut reply: Value) -> Value {
+    reply["properties"]["recording_failed"] = json!({
+        "type": ["string", "null"],
+        "description": "Why the recording is not complete; left out where it is.",
+    });
+    reply
 }
 
 /// A body may be left out where no field of it is required.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::plain::plain_schema;
+use super::plain::{body_schema, plain_schema};
 use super::strict::{require_episode_id, strict_schema};
 use crate::tool::Tool;
 
@@ -44,7 +44,7 @@ impl ToolSpec {
             name: T::NAME,
             description,
             input_schema,
-            body_schema: plain_schema::<T>(),
+            body_schema: body_schema::<T>(),
             reply_schema: plain_schema::<T::Reply>(),
             read_only: T::READ_ONLY,
             on_episode: false,

@@ -20,6 +20,11 @@ const DROPPED: &[&str] = &[
     "maxItems",
     "minLength",
     "maxLength",
+    "pattern",
+    "prefixItems",
+    "uniqueItems",
+    "contains",
+    "not",
 ];
 
 /// The description of `T` and its schema without it.

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::checks;
+use crate::limits;
 use crate::tool::Tool;
 
 /// Ask whether a robot's wrists could reach poses from where it stands, using the arms that are given a pose and the waist.
@@ -13,16 +14,19 @@ use crate::tool::Tool;
 #[serde(deny_unknown_fields)]
 pub struct CheckReach {
     /// The robot, as "A".
+    #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
     /// Left wrist position [x, y, z] in metres, as [0.30, 0.20, 0.10]. Null: where it is to be now, or, without an
     /// orientation either, this arm keeps its joints.
     pub left_position_m: Option<[f64; 3]>,
     /// Left wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null: as it is to be now.
+    #[schemars(extend("contains" = limits::direction()))]
     pub left_quaternion_wxyz: Option<[f64; 4]>,
     /// Right wrist position [x, y, z] in metres, as [0.30, -0.20, 0.10]. Null: where it is to be now, or, without an
     /// orientation either, this arm keeps its joints.
     pub right_position_m: Option<[f64; 3]>,
     /// Right wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null: as it is to be now.
+    #[schemars(extend("contains" = limits::direction()))]
     pub right_quaternion_wxyz: Option<[f64; 4]>,
 }
 

@@ -35,6 +35,10 @@ pub enum EndReason {
     WallClockExhausted,
     /// `finish` was called, or the episode was deleted.
     Finished,
+    /// No call came for so long that the server took the policy for gone.
+    Abandoned,
+    /// The simulator itself failed; the recording holds what went before.
+    SimulatorFailed,
 }
 
 /// The reply to `finish`, and the content of `result.json`.
@@ -52,7 +56,7 @@ pub struct ResultReply {
     pub ended: EndReason,
     /// Control steps of 20 ms, the initial hold included.
     pub env_steps: u32,
-    /// Calls that were answered, reads included.
+    /// Calls of tools up to the end, reads, refused calls and the one that ended the episode included.
     pub tool_calls: u32,
     /// Robots that fell.
     pub falls: u32,
@@ -60,6 +64,9 @@ pub struct ResultReply {
     pub realtime_factor: f64,
     /// Hash of the whole physical state at the end, 16 hexadecimal digits.
     pub state_hash: String,
+    /// Why the recording is not complete; left out where it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recording_failed: Option<String>,
 }
 
 impl ResultReply {

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::limits;
 use crate::parts::{BaseCommand, JointValues, Pose};
 use crate::tool::Tool;
 
@@ -12,6 +13,7 @@ use crate::tool::Tool;
 #[serde(deny_unknown_fields)]
 pub struct GetRobotState {
     /// The robot, as "A".
+    #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
 }
 

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::checks;
+use crate::limits;
 use crate::parts::CommandReply;
 use crate::tool::Tool;
 
@@ -15,10 +16,10 @@ use crate::tool::Tool;
 #[serde(deny_unknown_fields)]
 pub struct MoveWrists {
     /// Control steps of 20 ms: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark protocol.
-    #[schemars(range(min = 1))]
+    #[schemars(range(min = 1, max = limits::MOST_STEPS))]
     pub steps: u32,
     /// One entry per robot that is to move; each robot at most once.
-    #[schemars(length(min = 1))]
+    #[schemars(length(min = 1, max = limits::ROBOT_NAMES.len()), extend("not" = limits::a_robot_twice()))]
     pub robots: Vec<WristMove>,
 }
 
@@ -33,18 +34,21 @@ pub struct MoveWrists {
 #[serde(deny_unknown_fields)]
 pub struct WristMove {
     /// The robot, as "A".
+    #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
     /// Left wrist position [x, y, z] in metres, as [0.30, 0.20, 0.10]. Null keeps where it is to be; without an orientation
     /// either, the arm keeps its joints.
     pub left_position_m: Option<[f64; 3]>,
     /// Left wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null keeps how it is to be turned; without a position either, the
     /// arm keeps its joints.
+    #[schemars(extend("contains" = limits::direction()))]
     pub left_quaternion_wxyz: Option<[f64; 4]>,
     /// Right wrist position [x, y, z] in metres, as [0.30, -0.20, 0.10]. Null keeps where it is to be; without an orientation
     /// either, the arm keeps its joints.
     pub right_position_m: Option<[f64; 3]>,
     /// Right wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null keeps how it is to be turned; without a position either,
     /// the arm keeps its joints.
+    #[schemars(extend("contains" = limits::direction()))]
     pub right_quaternion_wxyz: Option<[f64; 4]>,
     /// True: the wrist targets move with the pelvis from the command's beginning on, as a robot that carries something wants
     /// it. False or null: they are fixed in the world.

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::get_robot_state::RobotState;
 use crate::checks;
+use crate::limits;
 use crate::parts::{Png, Pose};
 use crate::tool::Tool;
 
@@ -15,6 +16,11 @@ use crate::tool::Tool;
 #[serde(deny_unknown_fields)]
 pub struct Observe {
     /// The robots to look through, as ["A", "B"]. Null: all of them.
+    #[schemars(
+        length(min = 1, max = limits::ROBOT_NAMES.len()),
+        inner(regex(pattern = limits::ROBOT_PATTERN)),
+        extend("uniqueItems" = true)
+    )]
     pub robots: Option<Vec<String>>,
 }
 

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::checks;
+use crate::limits;
 use crate::tool::Tool;
 
 /// Measure depth at pixels of a robot's head camera. Returns for each pixel the distance along the optical axis and the
@@ -13,10 +14,11 @@ use crate::tool::Tool;
 #[serde(deny_unknown_fields)]
 pub struct QueryDepth {
     /// The robot whose camera measures, as "A".
+    #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
     /// Pixels as [u, v]: column 0 to 319 from the left, row 0 to 239 from the top, at most 256 of them.
     /// Example: [[160, 120], [170, 120]].
-    #[schemars(length(min = 1, max = 256))]
+    #[schemars(length(min = 1, max = 256), extend("items" = limits::pixel()))]
     pub pixels: Vec<[i64; 2]>,
 }
 

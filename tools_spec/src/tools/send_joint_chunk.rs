@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::checks;
+use crate::limits;
 use crate::parts::{BASE_COLUMNS, CommandReply};
 use crate::tool::Tool;
 
@@ -28,7 +29,7 @@ pub fn action_row_layout() -> String {
 #[serde(deny_unknown_fields)]
 pub struct SendJointChunk {
     /// One entry per robot that is to move; each robot at most once.
-    #[schemars(length(min = 1))]
+    #[schemars(length(min = 1, max = limits::ROBOT_NAMES.len()), extend("not" = limits::a_robot_twice()))]
     pub robots: Vec<JointChunk>,
 }
 
@@ -37,12 +38,13 @@ pub struct SendJointChunk {
 #[serde(deny_unknown_fields)]
 pub struct JointChunk {
     /// The robot, as "A".
+    #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
     /// Rows of 35 numbers: joint targets in radians for left_arm 7, right_arm 7, left_hand 7, right_hand 7, waist 3 (yaw,
     /// roll, pitch), then vx in m/s, vy in m/s, yaw rate in rad/s and pelvis height in m. An arm is shoulder_pitch,
     /// shoulder_roll, shoulder_yaw, elbow, wrist_roll, wrist_pitch, wrist_yaw; a hand is thumb_0, thumb_1, thumb_2,
     /// middle_0, middle_1, index_0, index_1.
-    #[schemars(length(min = 1), inner(length(equal = ACTION_ROW_LEN)))]
+    #[schemars(length(min = 1, max = limits::MOST_STEPS), inner(length(equal = ACTION_ROW_LEN)))]
     pub rows: Vec<Vec<f64>>,
 }
 

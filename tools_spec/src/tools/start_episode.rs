@@ -16,6 +16,7 @@ pub struct StartEpisode {
     /// The id of a task from list_tasks, as "handover".
     pub task: String,
     /// Decides where the objects stand: 0 to 4294967295. Results are reported on the seeds that list_tasks names.
+    #[schemars(range(max = u32::MAX))]
     pub seed: u32,
     /// The rules: "agentic" for agents that think between commands, "benchmark" for learned policies. Null: "agentic".
     pub protocol: Option<Protocol>,

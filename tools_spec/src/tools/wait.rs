@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::checks;
+use crate::limits;
 use crate::parts::CommandReply;
 use crate::tool::Tool;
 
@@ -13,7 +14,7 @@ use crate::tool::Tool;
 #[serde(deny_unknown_fields)]
 pub struct Wait {
     /// Control steps of 20 ms: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark protocol.
-    #[schemars(range(min = 1))]
+    #[schemars(range(min = 1, max = limits::MOST_STEPS))]
     pub steps: u32,
 }
 

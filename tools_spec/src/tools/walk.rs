@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::checks;
+use crate::limits;
 use crate::parts::CommandReply;
 use crate::tool::Tool;
 
@@ -14,10 +15,10 @@ use crate::tool::Tool;
 #[serde(deny_unknown_fields)]
 pub struct Walk {
     /// Control steps of 20 ms: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark protocol.
-    #[schemars(range(min = 1))]
+    #[schemars(range(min = 1, max = limits::MOST_STEPS))]
     pub steps: u32,
     /// One entry per robot that is to move; each robot at most once. Robots that are not named hold still.
-    #[schemars(length(min = 1))]
+    #[schemars(length(min = 1, max = limits::ROBOT_NAMES.len()), extend("not" = limits::a_robot_twice()))]
     pub robots: Vec<WalkMove>,
 }
 
@@ -26,6 +27,7 @@ pub struct Walk {
 #[serde(deny_unknown_fields)]
 pub struct WalkMove {
     /// The robot, as "A".
+    #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
     /// Forward velocity in metres per second, as 0.3.
     pub vx_m_s: f64,

@@ -18,6 +18,7 @@ fn page(phase_times_s: [Option<f64>; 3], protocol: Protocol) -> String {
         falls: 0,
         realtime_factor: 3.5,
         state_hash: "<script>".into(),
+        recording_failed: None,
     };
     let mut calls = CallCounts::default();
     [true, true, false].into_iter().for_each(|answered| calls.count("move_wrists", answered));

@@ -1,0 +1,28 @@
+//! `tandem recover`: the recording of an episode whose process was killed.
+
+use std::{path::PathBuf, process::ExitCode};
+
+use super::Outcome;
+
+/// Make a whole recording of one that was interrupted: FILE.mcap of FILE.mcap.partial.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// What the interrupted episode left, as runs/handover-seed0/episode.mcap.partial. It stays as it is.
+    #[arg(value_name = "FILE")]
+    partial: PathBuf,
+}
+
+/// Recovers, and says how much there was.
+pub fn run(args: Args) -> Outcome {
+    let recovered = tandem_episodes::recover(&args.partial)?;
+    println!(
+        "{}: {} messages, up to {:.2} s of the episode",
+        recovered.path.display(),
+        recovered.messages,
+        recovered.last_s
+    );
+    if let Some(torn) = recovered.torn {
+        println!("the end of {} is torn and was left out: {torn}", args.partial.display());
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,82 @@
+//! A session that a panic ends, and nothing but it.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use tandem_episodes::Session;
+use tandem_tools_spec::ResultReply;
+
+use super::HostingError;
+
+/// A session, until it has panicked.
+pub struct Guarded {
+    id: String,
+    state: State,
+}
+
+enum State {
+    Sound(Box<Session>),
+    /// After a panic the world may be anything, and nobody looks at it again. The result is of what could be closed.
+    Panicked(Option<ResultReply>),
+}
+
+impl Guarded {
+    /// A session that the log calls `id`.
+    pub fn new(id: &str, session: Session) -> Guarded {
+        Guarded { id: id.into(), state: State::Sound(Box::new(session)) }
+    }
+
+    /// Lets the session do `work`. A panic ends the episode: its recording is closed, and this and every later work is refused.
+    pub fn run<T>(&mut self, work: impl FnOnce(&mut Session) -> T) -> Result<T, HostingError> {
+        let State::Sound(session) = &mut self.state else { return Err(HostingError::EpisodePanicked) };
+        match catch_unwind(AssertUnwindSafe(|| work(session))) {
+            Ok(done) => Ok(done),
+            Err(panic) => {
+                self.after(panic);
+                Err(HostingError::EpisodePanicked)
+            }
+        }
+    }
+
+    /// Whether the episode takes no more commands.
+    pub fn ended(&self) -> bool {
+        match &self.state {
+            State::Sound(session) => session.ended().is_some(),
+            State::Panicked(_) => true,
+        }
+    }
+
+    /// Ends the episode and closes its recording.
+    pub fn close(self) -> Result<ResultReply, HostingError> {
+        match self.state {
+            State::Sound(session) => closed(|| session.close()).map_err(|panic| {
+                tracing::error!(episode = self.id, panic = text(&*panic), "not closed");
+                HostingError::EpisodePanicked
+            }),
+            State::Panicked(result) => result.ok_or(HostingError::EpisodePanicked),
+        }
+    }
+
+    fn after(&mut self, panic: Box<dyn Any + Send>) {
+        tracing::error!(
+            episode = self.id,
+            panic = text(&*panic),
+            "the simulator panicked; this episode ends"
+        );
+        let State::Sound(session) = std::mem::replace(&mut self.state, State::Panicked(None)) else { return };
+        // The broken world may panic once more under way; what is flushed by then can be read nevertheless.
+        match closed(|| session.close_failed()) {
+            Ok(result) => self.state = State::Panicked(Some(result)),
+            Err(panic) => tracing::error!(episode = self.id, panic = text(&*panic), "not closed"),
+        }
+    }
+}
+
+fn closed(close: impl FnOnce() -> ResultReply) -> Result<ResultReply, Box<dyn Any + Send>> {
+    catch_unwind(AssertUnwindSafe(close))
+}
+
+fn text(panic: &(dyn Any + Send)) -> &str {
+    let owned = panic.downcast_ref::<String>().map(String::as_str);
+    owned.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no text")
+}

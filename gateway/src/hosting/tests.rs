@@ -1,0 +1,125 @@
+//! Episodes that go wrong: each ends alone, and leaves a recording that can be read. Their clocks are the tests' own hands.
+
+use std::{
+    path::Path,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, AtomicU64, Ordering::Relaxed},
+        mpsc,
+    },
+    time::Duration,
+};
+
+use tandem_episodes::{Clock, EpisodeSpec, Recorder, Recording, RunFolder, tasks};
+use tandem_tools_spec::{Briefing, EndReason, ManageReply, Protocol, StatusReply, ToolCall, ToolReply, Wait};
+use tokio::sync::Semaphore;
+
+use super::*;
+use crate::settings::{Layer, Settings};
+
+const IDLE: Duration = Duration::from_secs(900);
+
+async fn start(id: &str, folder: &Path, clock: Clock) -> (Arc<EpisodeThread>, Arc<Semaphore>, Briefing) {
+    let spec = EpisodeSpec::new(tasks::find("handover").unwrap(), 0, Protocol::Benchmark);
+    let places = Arc::new(Semaphore::new(1));
+    let permit = places.clone().try_acquire_owned().unwrap();
+    let folder = RunFolder::from(folder);
+    let (episode, briefing) = EpisodeThread::start_with_clock(id, spec, folder, permit, clock).await.unwrap();
+    (Arc::new(episode), places, briefing)
+}
+
+fn wait() -> ToolCall {
+    Wait { steps: 2 }.into()
+}
+
+async fn status(episode: &EpisodeThread) -> StatusReply {
+    match episode.status().await.unwrap().reply {
+        ToolReply::Manage(ManageReply::GetStatus(status)) => status,
+        other => panic!("{other:?} is no status"),
+    }
+}
+
+/// A clock that stands at a time that is set from outside, in seconds.
+fn hands() -> (Arc<AtomicU64>, Clock) {
+    let hands_s = Arc::new(AtomicU64::new(0));
+    let read = hands_s.clone();
+    (hands_s, Box::new(move || Duration::from_secs(read.load(Relaxed))))
+}
+
+#[tokio::test]
+async fn a_panic_ends_its_own_episode_and_no_other() {
+    let [broken_folder, sound_folder] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let broken = Arc::new(AtomicBool::new(false));
+    let breaks = broken.clone();
+    let clock: Clock = Box::new(move || {
+        // Once: closing the episode asks for the time, too.
+        assert!(!breaks.swap(false, Relaxed), "the clock is broken");
+        Duration::ZERO
+    });
+    let (episode, places, _) = start("broken", broken_folder.path(), clock).await;
+    let (other, _, _) = start("sound", sound_folder.path(), hands().1).await;
+    episode.call(wait()).await.unwrap();
+    broken.store(true, Relaxed);
+    let refused = episode.call(wait()).await.unwrap_err();
+    assert!(refused.to_string().contains("the simulator failed in this episode"), "{refused}");
+    assert!(episode.ended());
+    assert!(matches!(episode.status().await, Err(HostingError::EpisodePanicked)));
+
+    let recording = Recording::read(&broken_folder.path().join(Recorder::FILE_NAME)).unwrap();
+    assert_eq!(recording.steps().unwrap().map(Result::unwrap).count(), 3);
+    let result = episode.close().await.unwrap();
+    assert_eq!((result.ended, result.env_steps), (EndReason::SimulatorFailed, 2));
+    assert_eq!(places.available_permits(), 1);
+    other.call(wait()).await.unwrap();
+    assert_eq!((status(&other).await.ended, other.close().await.unwrap().env_steps), (None, 2));
+}
+
+#[tokio::test]
+async fn an_episode_without_calls_is_ended_and_closed() {
+    let folder = tempfile::tempdir().unwrap();
+    let (hands_s, clock) = hands();
+    let (episode, _, _) = start("idle", folder.path(), clock).await;
+    hands_s.store(800, Relaxed);
+    episode.call(wait()).await.unwrap();
+    hands_s.store(1699, Relaxed);
+    episode.end_if_abandoned(IDLE);
+    assert_eq!(status(&episode).await.ended, None, "the last call was 899 s ago");
+    hands_s.store(1700, Relaxed);
+    episode.end_if_abandoned(IDLE);
+    assert_eq!(status(&episode).await.ended, Some(EndReason::Abandoned));
+    assert!(episode.ended(), "its place can be taken");
+
+    let recording = Recording::read(&folder.path().join(Recorder::FILE_NAME)).unwrap();
+    let result = episode.close().await.unwrap();
+    assert_eq!((result.ended, result.tool_calls), (EndReason::Abandoned, 1), "looking on is no call");
+    assert_eq!(recording.result, Some(result));
+}
+
+#[tokio::test]
+async fn closing_ends_in_time_and_says_what_it_left() {
+    let runs = tempfile::tempdir().unwrap();
+    let flags = Layer { runs: Some(runs.path().into()), max_episodes: Some(1), ..Layer::default() };
+    let table = EpisodeTable::new(Settings::resolve(flags, None).unwrap());
+    let (go_on, stuck) = mpsc::channel::<()>();
+    let hangs = Arc::new(AtomicBool::new(false));
+    let hanging = hangs.clone();
+    let clock: Clock = Box::new(move || {
+        if hanging.load(Relaxed) {
+            // Until the test lets go of the other end.
+            let _ = stuck.recv();
+        }
+        Duration::ZERO
+    });
+    let (episode, _, _) = start("stuck", runs.path(), clock).await;
+    table.insert("stuck", episode.clone()).unwrap();
+    hangs.store(true, Relaxed);
+    let call = tokio::spawn(async move { episode.call(wait()).await });
+    tokio::task::yield_now().await;
+    let left = table.close_all(Duration::from_millis(50)).await;
+    assert_eq!(left, [format!("stuck in {}", runs.path().display())]);
+    drop(go_on);
+    assert!(call.await.unwrap().is_ok(), "the call still finishes");
+    let (late, _, _) = start("late", runs.path(), hands().1).await;
+    let late = table.insert("late", late).expect_err("nothing is added after closing");
+    late.close().await.unwrap();
+}

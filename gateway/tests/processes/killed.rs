@@ -1,0 +1,62 @@
+//! SIGKILL under way: what a policy has been told is on the disk, and can be read.
+
+use std::{path::Path, process::Command, thread};
+
+use mcap::read::{MessageStream, Options};
+use serde_json::json;
+use tandem_episodes::Recording;
+
+use crate::{Delays, Server, partials};
+
+#[test]
+fn a_killed_server_leaves_every_step_that_a_policy_was_told_of() {
+    let mut delays = Delays(2);
+    for round in 0..20 {
+        let runs = tempfile::tempdir().expect("a temporary folder");
+        let delay = delays.next(2000);
+        let told_steps = play_and_kill(runs.path(), round, delay);
+        let [partial] = &partials(runs.path())[..] else { panic!("no recording after {delay:?}") };
+        let bytes = std::fs::read(partial).expect("the partial file");
+        let stream = MessageStream::new_with_options(&bytes, Options::IgnoreEndMagic.into()).expect("MCAP");
+        // An error, if there is one, is the end.
+        let messages = stream.take_while(Result::is_ok).count();
+
+        let recovered = Command::new(env!("CARGO_BIN_EXE_tandem")).arg("recover").arg(partial).output();
+        let recovered = recovered.expect("tandem recover");
+        let said = String::from_utf8_lossy(&recovered.stdout).into_owned();
+        assert!(recovered.status.success(), "{recovered:?}");
+        assert!(said.contains(&format!("{messages} messages")), "{said}, not {messages}");
+        let recording = Recording::read(&partial.with_extension("")).expect("a whole recording");
+        let steps: Vec<u64> =
+            recording.steps().expect("its steps").map(|step| step.expect("a step").control_step).collect();
+        assert!(steps.windows(2).all(|pair| pair[1] == pair[0] + 1), "a hole: {steps:?}");
+        assert!(steps.last() >= Some(&told_steps), "told of {told_steps}, recorded {:?}", steps.last());
+        assert_eq!(recording.result, None);
+    }
+}
+
+/// Plays until the server is killed, `delay` after the episode began. Returns the control steps that the last answer told of.
+fn play_and_kill(runs: &Path, seed: u32, delay: std::time::Duration) -> u64 {
+    let server = Server::start(runs);
+    let start = json!({ "task": "handover", "seed": seed, "protocol": "benchmark" });
+    let started = server.post("/v1/episodes", &start).expect("an episode");
+    let tools = format!("/v1/episodes/{}/tools", started["episode_id"].as_str().expect("an id"));
+    let id = server.id().to_string();
+    let mut told_steps = 0;
+    thread::scope(|scope| {
+        scope.spawn(move || {
+            thread::sleep(delay);
+            Command::new("kill").args(["-KILL", &id]).status().expect("kill")
+        });
+        for steps in (1..=9).cycle() {
+            let Some(reply) = server.post(&format!("{tools}/wait"), &json!({ "steps": steps })) else {
+                break;
+            };
+            told_steps += reply["executed_steps"].as_u64().unwrap_or(0);
+            if server.post(&format!("{tools}/observe"), &json!({ "robots": ["A"] })).is_none() {
+                break;
+            }
+        }
+    });
+    told_steps
+}

@@ -1,0 +1,8 @@
+//! The program itself: stopped, killed, and on a full disk.
+
+mod killed;
+mod server;
+mod stopped;
+mod without_space;
+
+pub use server::{Delays, Server, partials};

@@ -1,0 +1,101 @@
+//! A server in a process of its own.
+
+use std::{
+    fs,
+    io::{BufRead, BufReader},
+    path::{Path, PathBuf},
+    process::{Child, Command, ExitStatus, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
+
+use serde_json::Value;
+use ureq::Agent;
+
+/// A server that is still there after so long does not end.
+const FOR_EVER: Duration = Duration::from_secs(90);
+
+/// A running process, killed when it is dropped.
+pub struct Server {
+    child: Child,
+    pub url: String,
+    agent: Agent,
+}
+
+impl Server {
+    /// Serves on a free port and records into `runs`.
+    pub fn start(runs: &Path) -> Server {
+        Server::of(Command::new(env!("CARGO_BIN_EXE_tandem")), runs)
+    }
+
+    /// As [`Server::start`], by a command that begins as `tandem` does.
+    pub fn of(mut program: Command, runs: &Path) -> Server {
+        let flags = ["serve", "--listen", "127.0.0.1:0", "--runs"];
+        let mut child =
+            program.args(flags).arg(runs).stderr(Stdio::piped()).spawn().expect("the program starts");
+        let mut log = BufReader::new(child.stderr.take().expect("its log")).lines().map_while(Result::ok);
+        let serving = |line: String| Some(line.split_once("http://")?.1.trim().to_owned());
+        let address = log.find_map(serving).expect("the log says where it serves");
+        // Somebody has to read on, lest the program wait for it.
+        thread::spawn(move || log.for_each(drop));
+        let agent = Agent::config_builder().http_status_as_error(false).build().new_agent();
+        Server { child, url: format!("http://{address}"), agent }
+    }
+
+    /// The answer to a call, or `None` where the server went away meanwhile.
+    pub fn post(&self, path: &str, body: &Value) -> Option<Value> {
+        let mut response = self.agent.post(format!("{}{path}", self.url)).send_json(body).ok()?;
+        response.body_mut().read_json().ok()
+    }
+
+    /// A call that has to be answered.
+    #[track_caller]
+    pub fn tool(&self, id: &str, tool: &str, args: &Value) -> Value {
+        self.post(&format!("/v1/episodes/{id}/tools/{tool}"), args).expect("an answer")
+    }
+
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Waits until the process has ended.
+    #[track_caller]
+    pub fn ended(&mut self) -> ExitStatus {
+        let deadline = Instant::now() + FOR_EVER;
+        loop {
+            if let Some(status) = self.child.try_wait().expect("the state of our own child") {
+                return status;
+            }
+            assert!(Instant::now() < deadline, "the server does not end");
+            thread::sleep(Duration::from_millis(10));
+        }
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Every partial file of the run folders in `runs`.
+pub fn partials(runs: &Path) -> Vec<PathBuf> {
+    let entries = |folder: &Path| {
+        let entries = fs::read_dir(folder).into_iter().flatten();
+        entries.map(|entry| entry.expect("an entry").path()).collect::<Vec<_>>()
+    };
+    let files = entries(runs).into_iter().flat_map(|folder| entries(&folder));
+    files.filter(|path| path.extension().is_some_and(|extension| extension == "partial")).collect()
+}
+
+/// Delays that look like chance and are the same in every run (Knuth's MMIX generator).
+pub struct Delays(pub u64);
+
+impl Delays {
+    /// Up to `most_ms`.
+    pub fn next(&mut self, most_ms: u64) -> Duration {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        Duration::from_millis((self.0 >> 33) % most_ms)
+    }
+}

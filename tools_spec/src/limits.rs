@@ -1,0 +1,70 @@
+//! What [`crate::checks`] refuses, as JSON Schema says it, so that a caller who keeps to the schema is not refused for it.
+
+use serde_json::{Value, json};
+
+/// No number of this contract, in metres, radians or metres per second, is anywhere near this large; a larger one would
+/// overflow the single precision of the physics.
+pub const LARGEST: f64 = 1e6;
+
+/// A quaternion whose largest component is smaller has no direction.
+pub const SMALLEST_COMPONENT: f64 = 1e-6;
+
+/// The most control steps that any protocol allows for one command.
+pub const MOST_STEPS: usize = 50;
+
+/// Names of robots, of which an episode has the first two or three.
+pub const ROBOT_NAMES: [&str; 3] = ["A", "B", "C"];
+
+/// The names as a pattern.
+pub const ROBOT_PATTERN: &str = "^[ABC]$";
+
+/// What head cameras see, in pixels: columns and rows.
+const PICTURE_PX: [u32; 2] = [320, 240];
+
+/// `contains` of a quaternion: it has a direction.
+pub fn direction() -> Value {
+    json!({ "anyOf": [{ "minimum": SMALLEST_COMPONENT }, { "maximum": -SMALLEST_COMPONENT }] })
+}
+
+/// `not` of a list with an entry per robot: one is named twice. (`maxContains` would be shorter, but readers of older drafts take
+/// the `contains` beside it for a demand.)
+pub fn a_robot_twice() -> Value {
+    let twice = |name: &str, first: usize, second: usize| {
+        let mut entries = vec![json!({}); second + 1];
+        let named = json!({ "properties": { "robot": { "const": name } } });
+        entries[first] = named.clone();
+        entries[second] = named;
+        json!({ "prefixItems": entries, "minItems": second + 1 })
+    };
+    let places = (1..ROBOT_NAMES.len()).flat_map(|second| (0..second).map(move |first| (first, second)));
+    let all = places.flat_map(|(first, second)| ROBOT_NAMES.map(|name| twice(name, first, second)));
+    json!({ "anyOf": all.collect::<Vec<_>>() })
+}
+
+/// `items` of a list of pixels.
+pub fn pixel() -> Value {
+    let inside = PICTURE_PX.map(|px| json!({ "type": "integer", "minimum": 0, "maximum": px - 1 }));
+    json!({
+        "type": "array", "prefixItems": inside, "items": { "type": "integer" }, "minItems": 2, "maxItems": 2,
+    })
+}
+
+/// Bounds every number of a schema that has none: integers are left alone, whose types bound them.
+pub fn bound_numbers(schema: &mut Value) {
+    match schema {
+        Value::Array(items) => items.iter_mut().for_each(bound_numbers),
+        Value::Object(object) => {
+            let is_number = match object.get("type") {
+                Some(Value::String(kind)) => kind == "number",
+                Some(Value::Array(kinds)) => kinds.iter().any(|kind| kind == "number"),
+                _ => false,
+            };
+            if is_number {
+                object.insert("minimum".into(), json!(-LARGEST));
+                object.insert("maximum".into(), json!(LARGEST));
+            }
+            object.values_mut().for_each(bound_numbers);
+        }
+        _ => {}
+    }
+}
