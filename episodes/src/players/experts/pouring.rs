@@ -36,7 +36,7 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
     let lifts = [raise(stage, &CUP, 0.12)?, raise(stage, &GLASS, 0.06)?];
     stage.perform(1.0, &lifts)?;
     let glass = GLASS.carry(stage, GLASS_PLACE_M)?;
-    let cup = cup_at(stage, GLASS_PLACE_M, 0.0)?;
+    let cup = cup_at(stage, Pose::from_translation(GLASS_PLACE_M), 0.0)?;
     stage.perform(1.5, &[cup, glass])?;
     let mut tip_rad = TIP_RAD;
     loop {
@@ -52,7 +52,7 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
             return Err(PlayerError::GaveUp("the marble fell beside the glass".into()));
         }
         tip_rad = (tip_rad + MORE_RAD).min(DEEPEST_RAD);
-        let upright = cup_at(stage, facts.position_m("glass"), 0.0)?;
+        let upright = cup_at(stage, facts.object("glass").pose_in_world, 0.0)?;
         stage.perform(1.0, &[upright])?;
     }
 }
@@ -60,21 +60,21 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
 /// Tips the cup by `tip_rad`, its lip over the glass wherever that is by then.
 fn pour(stage: &mut Stage, tip_rad: f32) -> Result<(), PlayerError> {
     for part in 1..=TIP_MOVES {
-        let glass_m = stage.facts()?.position_m("glass");
-        let tip = cup_at(stage, glass_m, tip_rad * part as f32 / TIP_MOVES as f32)?;
+        let glass = stage.facts()?.object("glass").pose_in_world;
+        let tip = cup_at(stage, glass, tip_rad * part as f32 / TIP_MOVES as f32)?;
         stage.glide(TIP_MOVE_S, &[tip])?;
     }
     Ok(())
 }
 
-/// Wrist motion that puts the cup, tipped by `tilt_rad`, with its lip above the mouth of an upright glass at `glass_m`. The
-/// cup is tipped to +y, away from the palm.
-fn cup_at(stage: &mut Stage, glass_m: Vector, tilt_rad: f32) -> Result<HandMove, PlayerError> {
+/// Wrist motion that puts the cup, tipped by `tilt_rad`, with its lip above the mouth of the glass. The cup is tipped to
+/// +y, away from the palm.
+fn cup_at(stage: &mut Stage, world_from_glass: Pose, tilt_rad: f32) -> Result<HandMove, PlayerError> {
     let facts = stage.facts()?;
     let [mouth_m, lip_m] =
         [("glass", "mouth"), ("cup", "lip")].map(|(object, site)| facts.site(object, site).position_m());
     let rotation = Rotation::from_rotation_x(-tilt_rad);
     let to_go = (1.0 - tilt_rad / TIP_RAD).max(0.0);
-    let goal_m = glass_m + mouth_m + ABOVE_MOUTH_M + BEFORE_TIPPING_M * to_go;
+    let goal_m = world_from_glass * mouth_m + ABOVE_MOUTH_M + BEFORE_TIPPING_M * to_go;
     CUP.bring(stage, Pose::from_parts(goal_m - rotation * lip_m, rotation))
 }

@@ -13,7 +13,7 @@ use crate::locomotion::plane::flat;
 use crate::{GRAVITY_M_S2, Side, Sides};
 
 /// Horizontal force within what friction surely gives.
-const FRICTION_USED: f32 = 0.7;
+const FRICTION_USED: f32 = 0.5;
 /// A foot whose pressure is not in its middle spins more easily.
 const LARGEST_TURN_N_M: f32 = 22.0;
 const TURN_FADE_M: f32 = 0.12;
