@@ -183,3 +183,33 @@ impl Situation {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// In the frame of the wrist that holds it.
+    fn held_m(world: &World, robot: usize) -> Vector {
+        let present = world.present();
+        let state = &present.robots[robot].state;
+        let bottle = present.object(&bottle_name(robot)).expect("a bottle for every robot").world_from_object;
+        let world_from_wrist = state.world_from_pelvis * state.pelvis_from_wrist.right;
+        (world_from_wrist.inverse() * bottle).transform_point(Vector::Z * HELD_AT_M)
+    }
+
+    #[test]
+    fn held_bottles_do_not_slip() {
+        let (mut world, commands) = begin(Situation::Holding, MOST_ROBOTS).unwrap();
+        let mut hold_s = |time_s: f32| {
+            for _ in 0..(time_s / crate::CONTROL_DT_S) as usize {
+                world.control_step(&commands).unwrap();
+            }
+            (0..MOST_ROBOTS).map(|robot| held_m(&world, robot)).collect::<Vec<_>>()
+        };
+        let (before_m, after_m) = (hold_s(2.0), hold_s(5.0));
+        for (robot, (before_m, after_m)) in before_m.into_iter().zip(after_m).enumerate() {
+            let slipped_m = (after_m - before_m).length();
+            assert!(slipped_m < 2e-5, "the bottle of robot {robot} slipped by {slipped_m} m");
+        }
+    }
+}

@@ -13,7 +13,7 @@ pub enum Directions {
 
 impl Directions {
     /// From MJCF's `condim`; `None` for a number it does not have.
-    pub fn from_condim(condim: i32) -> Option<Directions> {
+    pub(crate) fn from_condim(condim: u32) -> Option<Directions> {
         match condim {
             1 => Some(Directions::None),
             3 => Some(Directions::Slide),
@@ -39,6 +39,7 @@ pub struct Friction {
 
 impl Friction {
     /// What acts between two colliders: the values of the one with the higher priority, else the larger of each.
+    /// Source: MuJoCo, "Contact parameters" in the chapter on modelling.
     pub fn between(a: &Friction, b: &Friction) -> Friction {
         match a.priority.cmp(&b.priority) {
             std::cmp::Ordering::Greater => *a,

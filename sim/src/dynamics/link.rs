@@ -25,7 +25,7 @@ pub enum Joint {
 }
 
 /// Joint of one degree of freedom. Positions are rad of a hinge and m of a slide, efforts N m and N.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
     /// Unit vector, link frame.
     pub direction: DVec3,

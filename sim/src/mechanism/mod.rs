@@ -12,10 +12,8 @@ pub(crate) use equality::{Placed, add_equalities};
 pub(crate) use machinery::{Machinery, START};
 pub(crate) use start::begin;
 
-use crate::dynamics::{
-    Axis, Collider, DPose3, DQuat, Directions, Dynamics, Friction, Joint, Link, LinkId, Mass,
-};
-use crate::mjcf::{Actuator, AxisJoint, BodyLink, BodyTree, ContactKind, Geom, LinkJoint, Surface};
+use crate::dynamics::{Axis, Collider, DPose3, DQuat, Dynamics, Joint, Link, LinkId, Mass};
+use crate::mjcf::{Actuator, AxisJoint, BodyLink, BodyTree, Geom, LinkJoint};
 use crate::owner::Owner;
 
 /// In full precision; the rotation is a unit quaternion again.
@@ -36,26 +34,9 @@ pub(crate) fn add_collider(dynamics: &mut Dynamics, geom: &Geom, on: Option<Link
         shape,
         on,
         body_from_shape: precise(&body_from_shape),
-        friction: friction(&geom.surface),
+        friction: geom.friction,
         tag: owner.map_or(0, Owner::tag),
     });
-}
-
-fn friction(surface: &Surface) -> Friction {
-    let coefficients = &surface.coefficients;
-    let directions = match surface.contact {
-        ContactKind::Normal => Directions::None,
-        ContactKind::Sliding => Directions::Slide,
-        ContactKind::Spinning => Directions::SlideSpin,
-        ContactKind::Rolling => Directions::SlideSpinRoll,
-    };
-    Friction {
-        directions,
-        slide: f64::from(coefficients.slide),
-        spin_m: f64::from(coefficients.spin_m),
-        roll_m: f64::from(coefficients.roll_m),
-        priority: surface.priority,
-    }
 }
 
 /// Links of a tree of a file, which is put at `world_from_file` with its top. Drives of its joints are as strong as the
@@ -85,15 +66,5 @@ fn link(link: &BodyLink, world_from_file: &DPose3, actuators: &[Actuator]) -> Li
 fn axis(joint: &AxisJoint, actuators: &[Actuator]) -> Axis {
     let actuator = actuators.iter().find(|actuator| actuator.joint == joint.name);
     let effort_range = actuator.and_then(|actuator| actuator.effort_range);
-    Axis {
-        direction: joint.direction,
-        anchor_m: joint.anchor_m,
-        armature: joint.armature,
-        friction_loss: joint.friction_loss,
-        damping: joint.damping,
-        stiffness: joint.stiffness,
-        spring_rest: joint.spring_rest,
-        range: joint.range,
-        effort_limit: effort_range.map_or(f64::INFINITY, |[_, most]| most),
-    }
+    Axis { effort_limit: effort_range.map_or(f64::INFINITY, |[_, most]| most), ..joint.axis.clone() }
 }

@@ -4,8 +4,9 @@ use mjcf_rs::body::GeomType;
 use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::prelude::SharedShape;
 
-use super::{ContactKind, Document, Friction, Surface, pose, vector};
+use super::{Document, pose, vector};
 use crate::SimError;
+use crate::dynamics::{Directions, Friction};
 
 /// Shape in its own frame; axial shapes lie along z, as in MJCF.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +29,7 @@ pub struct Geom {
     pub material: Option<String>,
     /// The material's texture is MuJoCo's builtin checker.
     pub checkered: bool,
-    pub surface: Surface,
+    pub friction: Friction,
     pub density_kg_m3: f32,
     pub mass_kg: Option<f32>,
     pub collides: bool,
@@ -73,7 +74,7 @@ impl Geom {
             rgba: rgba.map(|c| c as f32),
             material: geom.material.clone(),
             checkered: material.is_some_and(|material| is_checkered(document, material)),
-            surface: surface(document, geom)?,
+            friction: friction(document, geom)?,
             density_kg_m3: geom.density.unwrap_or(DEFAULT_DENSITY_KG_M3) as f32,
             mass_kg: geom.mass.map(|m| m as f32),
             collides: geom.contype != 0 || geom.conaffinity != 0,
@@ -108,11 +109,11 @@ impl Geom {
     }
 }
 
-fn surface(document: &Document, geom: &mjcf_rs::body::Geom) -> Result<Surface, SimError> {
-    let contact = ContactKind::from_condim(geom.condim)
+fn friction(document: &Document, geom: &mjcf_rs::body::Geom) -> Result<Friction, SimError> {
+    let directions = Directions::from_condim(geom.condim)
         .ok_or_else(|| document.unsupported(format!("condim {}; use 1, 3, 4 or 6", geom.condim)))?;
-    let [slide, spin_m, roll_m] = geom.friction.map(|coefficient| coefficient as f32);
-    Ok(Surface { coefficients: Friction { slide, spin_m, roll_m }, contact, priority: geom.priority })
+    let [slide, spin_m, roll_m] = geom.friction;
+    Ok(Friction { directions, slide, spin_m, roll_m, priority: geom.priority })
 }
 
 fn is_checkered(document: &Document, material: &mjcf_rs::assets::Material) -> bool {

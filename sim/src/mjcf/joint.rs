@@ -5,6 +5,7 @@ use rapier3d::glamx::DVec3;
 
 use super::Document;
 use crate::SimError;
+use crate::dynamics::Axis;
 
 /// What a body may do against its parent.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,25 +19,12 @@ pub enum LinkJoint {
     Slide(AxisJoint),
 }
 
-/// A joint of one degree of freedom. Positions are rad of a hinge and m of a slide, efforts N m and N.
+/// A joint of one degree of freedom.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisJoint {
     pub name: String,
-    /// Unit vector, link frame.
-    pub direction: DVec3,
-    /// Where the axis runs through, link frame.
-    pub anchor_m: DVec3,
-    /// kg m^2 or kg.
-    pub armature: f64,
-    /// Effort of dry friction.
-    pub friction_loss: f64,
-    /// Effort per velocity.
-    pub damping: f64,
-    /// Effort per position away from `spring_rest`.
-    pub stiffness: f64,
-    pub spring_rest: f64,
-    /// Lowest and highest position.
-    pub range: Option<[f64; 2]>,
+    /// Without a limit of effort, which is the actuator's.
+    pub axis: Axis,
 }
 
 impl LinkJoint {
@@ -44,14 +32,14 @@ impl LinkJoint {
         match self {
             LinkJoint::Fixed => None,
             LinkJoint::Free { name } => Some(name),
-            LinkJoint::Hinge(axis) | LinkJoint::Slide(axis) => Some(&axis.name),
+            LinkJoint::Hinge(joint) | LinkJoint::Slide(joint) => Some(&joint.name),
         }
     }
 
-    pub fn axis(&self) -> Option<&AxisJoint> {
+    pub fn axis(&self) -> Option<&Axis> {
         match self {
             LinkJoint::Fixed | LinkJoint::Free { .. } => None,
-            LinkJoint::Hinge(axis) | LinkJoint::Slide(axis) => Some(axis),
+            LinkJoint::Hinge(joint) | LinkJoint::Slide(joint) => Some(&joint.axis),
         }
     }
 
@@ -107,9 +95,7 @@ pub(super) fn read(document: &Document, id: usize) -> Result<LinkJoint, SimError
 
 fn axis(document: &Document, name: String, joint: &mjcf_rs::body::Joint) -> AxisJoint {
     let limited = joint.limited.resolve(document.model.compiler.autolimits, joint.range.is_some());
-    AxisJoint {
-        name,
-        direction: DVec3::from_array(joint.axis).normalize(),
+    let axis = Axis {
         anchor_m: DVec3::from_array(joint.pos),
         armature: joint.armature,
         friction_loss: joint.frictionloss,
@@ -117,5 +103,7 @@ fn axis(document: &Document, name: String, joint: &mjcf_rs::body::Joint) -> Axis
         stiffness: joint.stiffness,
         spring_rest: joint.springref,
         range: joint.range.filter(|_| limited),
-    }
+        ..Axis::along(DVec3::from_array(joint.axis))
+    };
+    AxisJoint { name, axis }
 }

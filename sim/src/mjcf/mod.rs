@@ -8,7 +8,6 @@ mod joint;
 mod key;
 mod mass;
 mod site;
-mod surface;
 mod tree;
 #[cfg(test)]
 mod tree_tests;
@@ -21,7 +20,6 @@ pub use joint::{AxisJoint, LinkJoint};
 pub use key::Key;
 pub(crate) use mass::mass_properties;
 pub use site::Site;
-pub use surface::{ContactKind, Friction, Surface};
 pub use tree::{BodyLink, BodyTree, PlacedBody};
 
 use std::path::Path;

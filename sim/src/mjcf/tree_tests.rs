@@ -2,10 +2,8 @@
 
 use rapier3d::glamx::{DPose3, DQuat, DVec3};
 
-use super::{
-    Actuator, ActuatorKind, AxisJoint, BodyTree, ContactKind, Document, Equality, EqualityKind, Friction,
-    LinkJoint,
-};
+use super::{Actuator, ActuatorKind, AxisJoint, BodyTree, Document, Equality, EqualityKind, LinkJoint};
+use crate::dynamics::{Axis, Directions, Friction};
 
 fn document(inside: &str) -> Document {
     let xml = format!("<mujoco><compiler angle=\"radian\" autolimits=\"true\"/>{inside}</mujoco>");
@@ -87,9 +85,7 @@ fn masses_come_from_all_geoms_of_a_link() {
 #[test]
 fn joints_keep_everything_the_file_says() {
     let trees = trees(DOOR);
-    let hinge = AxisJoint {
-        name: "hinge".into(),
-        direction: DVec3::Z,
+    let axis = Axis {
         anchor_m: DVec3::new(0.1, 0.0, 0.0),
         armature: 0.01,
         friction_loss: 0.3,
@@ -97,7 +93,9 @@ fn joints_keep_everything_the_file_says() {
         stiffness: 0.5,
         spring_rest: 0.1,
         range: Some([0.0, 1.5]),
+        ..Axis::along(DVec3::Z)
     };
+    let hinge = AxisJoint { name: "hinge".into(), axis };
     assert_eq!(trees[1].links[1].joint, LinkJoint::Hinge(hinge));
     let bolt = trees[1].links[2].joint.axis().expect("a slide");
     assert_eq!(bolt.range, None, "`limited` is false");
@@ -151,16 +149,21 @@ fn a_weld_keeps_the_pose_it_states() {
 
 #[test]
 fn geoms_have_mujocos_friction_unless_they_state_it() {
-    let surface = |attributes: &str| {
+    let friction = |attributes: &str| {
         let inside = format!("<worldbody><geom type=\"plane\" size=\"1 1 1\" {attributes}/></worldbody>");
-        trees(&inside)[0].links[0].geoms[0].surface
+        trees(&inside)[0].links[0].geoms[0].friction
     };
-    let usual = surface("");
-    assert_eq!(usual.coefficients, Friction { slide: 1.0, spin_m: 0.005, roll_m: 0.0001 });
-    assert_eq!((usual.contact, usual.priority), (ContactKind::Sliding, 0));
-    let stated = surface(r#"friction="0.6 0.01 0.002" condim="6" priority="2""#);
-    assert_eq!(stated.coefficients, Friction { slide: 0.6, spin_m: 0.01, roll_m: 0.002 });
-    assert_eq!((stated.contact, stated.priority), (ContactKind::Rolling, 2));
+    let usual =
+        Friction { directions: Directions::Slide, slide: 1.0, spin_m: 0.005, roll_m: 0.0001, priority: 0 };
+    assert_eq!(friction(""), usual);
+    let stated = Friction {
+        directions: Directions::SlideSpinRoll,
+        slide: 0.6,
+        spin_m: 0.01,
+        roll_m: 0.002,
+        priority: 2,
+    };
+    assert_eq!(friction(r#"friction="0.6 0.01 0.002" condim="6" priority="2""#), stated);
 }
 
 #[test]

@@ -177,3 +177,13 @@ fn dynamics_friction_of_a_pair() {
     assert_eq!(Friction::between(&sole, &ball), sole);
     assert_eq!(Friction::between(&ball, &sole), sole);
 }
+
+#[test]
+fn dynamics_kinds_of_contact_are_mjcfs() {
+    use Directions::{None as Normal, Slide, SlideSpin, SlideSpinRoll};
+    let read = [0, 1, 2, 3, 4, 5, 6, 7].map(Directions::from_condim);
+    assert_eq!(
+        read,
+        [None, Some(Normal), None, Some(Slide), Some(SlideSpin), None, Some(SlideSpinRoll), None]
+    );
+}
