@@ -1,10 +1,12 @@
 //! Two robots, a counter and a bottle: standing, following commands, repeating bit for bit.
 
 use std::f32::consts::PI;
+use std::sync::Arc;
 
+use tandem_sim::body::RobotModel;
 use tandem_sim::{
     CONTROL_DT_S, HandContacts, ObjectPlacement, Pose, RobotCommand, RobotPlacement, Side, SimError, Step,
-    Vector, World, WorldSpec,
+    Vector, World, WorldSpec, assets,
 };
 
 fn kitchen() -> WorldSpec {
@@ -79,6 +81,22 @@ fn robots_stand_while_their_arms_move() {
     }
     let sway = high - low;
     assert!(sway.x < 0.015 && sway.y < 0.015 && sway.z < 0.005, "pelvis sways {sway} m");
+}
+
+/// A robot is its file: one with a torso of 10 kg stands and waves without a word of code.
+#[test]
+fn another_robots_file_is_all_it_takes() {
+    let ours = assets::robot(assets::DEFAULT_ROBOT).expect("embedded");
+    let other = ours.replacen("mass=\"7.818\"", "mass=\"10\"", 1);
+    assert_ne!(ours, other);
+    let mass_kg = |text: &str| RobotModel::parse("robot.xml", text).expect("a robot").mass_kg;
+    let heavier_kg = mass_kg(&other) - mass_kg(ours);
+    assert!((heavier_kg - 2.182).abs() < 1e-3, "{heavier_kg} kg");
+    let model = Arc::new(RobotModel::parse("robot.xml", &other).expect("a robot"));
+    let mut world = World::with_robot(&kitchen(), model).expect("a world");
+    let rest = rest(&world);
+    let step = run(&mut world, &rest, 200);
+    assert!(step.robots.iter().all(|robot| !robot.state.fallen));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use nalgebra::Isometry3;
 
 use super::frame_error::FrameError;
 use super::goal::{Goal, Sink, StepContext, TaskScratch};
-use super::pose::{clamped, weighted_square, write_pose_rows};
+use super::pose::{clamped, read_columns, weighted_square, write_pose_rows};
 use crate::model::{Configuration, FrameId, Model};
 use crate::spatial::Log6;
 
@@ -63,13 +63,8 @@ impl Goal for FrameTask {
         scratch: &mut TaskScratch,
         sink: &mut dyn Sink,
     ) {
-        let root_from_frame = configuration.root_from_frame(self.frame);
         let missing = Log6::of(&clamped(&self.missing(configuration), context.error_clamp));
-        scratch.columns.clear();
-        for &joint in configuration.model().support(self.frame) {
-            let (linear, angular) = configuration.body_jacobian_column(&root_from_frame, joint);
-            scratch.columns.push((joint, missing.transform(&linear, &angular)));
-        }
+        read_columns(scratch, configuration, self.frame, &missing);
         let weights = [self.position_cost, self.orientation_cost];
         write_pose_rows(scratch, &missing.twist, weights, self.gain, sink);
         sink.damp(self.lm_damping * self.gain * self.gain * weighted_square(&missing.twist, weights));

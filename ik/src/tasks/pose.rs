@@ -1,9 +1,11 @@
-//! What tasks on poses share: how the least squares weigh their error, how it is cut down, and its six rows.
+//! What tasks on poses share: how the least squares weigh their error, how it is cut down, its columns and its six rows.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector6};
 
 use super::frame_error::FrameError;
 use super::goal::{Sink, TaskScratch};
+use crate::model::{Configuration, FrameId};
+use crate::spatial::Log6;
 
 /// |W e|^2 of a pose's error.
 pub(super) fn weighted_square(error: &Vector6<f64>, [position, orientation]: [f64; 2]) -> f64 {
@@ -19,6 +21,21 @@ pub(super) fn clamped(missing: &Isometry3<f64>, clamp: Option<FrameError>) -> Is
     let translation = way * part(clamp.position_m, way.norm());
     let rotation = UnitQuaternion::from_scaled_axis(turn * part(clamp.orientation_rad, turn.norm()));
     Isometry3::from_parts(translation.into(), rotation)
+}
+
+/// Sets the columns of the joints that move a frame, as the logarithm of its error sees them.
+pub(super) fn read_columns(
+    scratch: &mut TaskScratch,
+    configuration: &Configuration,
+    frame: FrameId,
+    missing: &Log6,
+) {
+    let root_from_frame = configuration.root_from_frame(frame);
+    scratch.columns.clear();
+    for &joint in configuration.model().support(frame) {
+        let (linear, angular) = configuration.body_jacobian_column(&root_from_frame, joint);
+        scratch.columns.push((joint, missing.transform(&linear, &angular)));
+    }
 }
 
 /// One row per component of the error whose columns are in `scratch`.

@@ -4,7 +4,7 @@ use nalgebra::Isometry3;
 
 use super::frame_error::FrameError;
 use super::goal::{Goal, Sink, StepContext, TaskScratch};
-use super::pose::{clamped, weighted_square, write_pose_rows};
+use super::pose::{clamped, read_columns, weighted_square, write_pose_rows};
 use crate::model::{Configuration, FrameId, Model};
 use crate::spatial::Log6;
 
@@ -55,11 +55,7 @@ impl Goal for RelativeFrameTask {
     ) {
         let root_from_frame = configuration.root_from_frame(self.frame);
         let missing = Log6::of(&clamped(&self.missing(configuration), context.error_clamp));
-        scratch.columns.clear();
-        for &joint in configuration.model().support(self.frame) {
-            let (linear, angular) = configuration.body_jacobian_column(&root_from_frame, joint);
-            scratch.columns.push((joint, missing.transform(&linear, &angular)));
-        }
+        read_columns(scratch, configuration, self.frame, &missing);
         // The reference carries the goal along: the frame sees it move the other way.
         for &joint in configuration.model().support(self.reference) {
             let (linear, angular) =

@@ -49,6 +49,22 @@ const STEPS: &[Step] = &[
         may: &["episodes/src/tasks/", "sim/src/bench/"],
     },
     Step {
+        what: "object",
+        folder: "sim/assets/objects",
+        extension: "xml",
+        says: "<mujoco",
+        // Tasks place them, and their experts take hold of them; tests stand beside what they test.
+        may: &["episodes/src/tasks/", "episodes/src/players/experts/", "sim/src/bench/"],
+    },
+    Step {
+        what: "robot",
+        folder: "sim/assets/robots",
+        extension: "xml",
+        says: "<mujoco",
+        // The one that is used unless a file is given.
+        may: &["sim/src/assets.rs"],
+    },
+    Step {
         what: "tool",
         folder: "tools_spec/src/tools",
         extension: "rs",
@@ -114,7 +130,7 @@ impl<'ast> Visit<'ast> for Texts {
 /// The file's name, or that of its folder.
 fn name(path: &Path) -> String {
     let parts = path.with_extension("");
-    let last = parts.iter().rev().find(|part| *part != "mod").unwrap_or_default();
+    let last = parts.iter().rev().find(|part| *part != "mod" && *part != "robot").unwrap_or_default();
     last.to_string_lossy().into_owned()
 }
 

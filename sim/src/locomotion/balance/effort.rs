@@ -13,9 +13,9 @@ use crate::locomotion::plane::flat;
 use crate::{GRAVITY_M_S2, Side, Sides};
 
 /// Horizontal force within what friction surely gives.
-const FRICTION_USED: f32 = 0.5;
+const FRICTION_USED: f32 = 0.43;
 /// A foot whose pressure is not in its middle spins more easily.
-const LARGEST_TURN_N_M: f32 = 13.0;
+const LARGEST_TURN_N_M: f32 = 12.0;
 const TURN_FADE_M: f32 = 0.12;
 /// Of trunk and arms about the vertical.
 const TURN_INERTIA_KG_M2: f32 = 1.2;

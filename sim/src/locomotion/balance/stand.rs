@@ -34,7 +34,7 @@ const VERTICAL_DAMPING_1_S: f32 = 15.0;
 const TRUNK_STIFFNESS_N_M_RAD: f32 = 150.0;
 const TRUNK_DAMPING_N_M_S_RAD: f32 = 15.0;
 /// Horizontal force stays within this share of the vertical one: the feet must not slip.
-const FRICTION_USED: f32 = 0.5;
+const FRICTION_USED: f32 = 0.53;
 const SMALLEST_LOAD_SHARE: f32 = 0.2;
 
 /// Inverse kinematics is warm-started from the last step, so that two iterations are enough.

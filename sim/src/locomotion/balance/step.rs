@@ -28,17 +28,17 @@ const SHIFT_GAIN: f32 = 3.0;
 const SHIFTED_M: f32 = 0.012;
 const LATEST_M: f32 = 0.1;
 /// One foot holds little against turning: a robot that is turned by force gives way, and turns back slowly.
-const HEADING_LEASH_RAD: f32 = 0.2;
+const HEADING_LEASH_RAD: f32 = 0.24;
 const RETURN_RAD_S: f32 = 0.4;
 const LIFT_STIFFNESS_1_S2: f32 = 111.0;
 const LIFT_DAMPING_1_S: f32 = 15.0;
 /// Vertical acceleration stays within these parts of gravity.
 const LIFT_RANGE: [f32; 2] = [-0.3, 0.6];
-const TRUNK_STIFFNESS_1_S2: f32 = 115.0;
-const TRUNK_DAMPING_1_S: f32 = 28.0;
+const TRUNK_STIFFNESS_1_S2: f32 = 90.0;
+const TRUNK_DAMPING_1_S: f32 = 19.0;
 const LARGEST_TURN_RAD_S2: f32 = 50.0;
 /// Turning about the vertical is the least of a robot's worries.
-const YAW_PART: f32 = 0.42;
+const YAW_PART: f32 = 0.32;
 /// Walking is neither stretched nor crouched.
 const HIGHEST_M: f32 = 0.745;
 const LOWEST_M: f32 = 0.62;
