@@ -1,12 +1,13 @@
 //! Colliders: convex shapes on links and in the world, and where they are in a step.
 
+use rapier3d::math::Pose;
 use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::prelude::SharedShape;
 use serde::{Deserialize, Serialize};
 
 use super::friction::Friction;
 use super::settings::Settings;
-use super::spatial::pose_to_rapier;
+use super::spatial::rounded;
 use super::trees::{LinkId, Trees};
 use super::{DMat3, DPose3, DVec3};
 
@@ -90,7 +91,8 @@ impl Surface {
         self.world_from_shape.inverse() * middle_m - self.middle_m
     }
 
-    pub fn pose_of(&self, other: &Surface) -> rapier3d::math::Pose {
-        pose_to_rapier(&(self.world_from_shape.inverse() * other.world_from_shape))
+    /// Of another one in the frame of this one.
+    pub fn pose_of(&self, other: &Surface) -> Pose {
+        rounded(&(self.world_from_shape.inverse() * other.world_from_shape))
     }
 }

@@ -7,7 +7,6 @@ use rapier3d::math::Vector;
 use rapier3d::parry::bounding_volume::BoundingVolume;
 use rapier3d::parry::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
 use rapier3d::parry::shape::PackedFeatureId;
-
 use serde::{Deserialize, Serialize};
 
 use super::DVec3;
@@ -66,10 +65,10 @@ impl Collision {
         for &colliders in &self.near.pairs {
             while last.next_if(|manifold| manifold.colliders < colliders).is_some() {}
             let surfaces = colliders.map(|id| &self.surfaces[id.index()]);
-            let between = Between { colliders, surfaces, trees, settings };
             if !surfaces[0].bounds.intersects(&surfaces[1].bounds) {
                 continue;
             }
+            let between = Between { colliders, surfaces, trees, settings };
             let mut points = self.spare.pop().unwrap_or_default();
             let before = last.next_if(|manifold| manifold.colliders == colliders);
             between.find(before.map(|manifold| &manifold.points), &mut points);

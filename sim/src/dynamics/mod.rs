@@ -48,6 +48,7 @@ pub use link::{Axis, Joint, Link, Mass};
 pub use rapier3d::glamx::{DMat3, DPose3, DQuat, DVec3};
 pub use settings::{Settings, Softness};
 pub use snapshot::DynamicsState;
+pub(crate) use spatial::rounded;
 pub use state::TreeState;
 pub use touch::Touch;
 pub use tree::Tree;

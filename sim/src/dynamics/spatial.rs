@@ -232,6 +232,7 @@ pub(super) fn turned(rotation: DQuat, turn_rad: DVec3) -> DQuat {
     (DQuat::from_scaled_axis(turn_rad) * rotation).normalize()
 }
 
-pub(super) fn pose_to_rapier(pose: &DPose3) -> Pose {
+/// As colliders and everything outside of dynamics have it.
+pub(crate) fn rounded(pose: &DPose3) -> Pose {
     Pose::from_parts(pose.translation.as_vec3(), pose.rotation.as_quat())
 }

@@ -12,6 +12,8 @@ pub(crate) use equality::{Placed, add_equalities};
 pub(crate) use machinery::{Machinery, START};
 pub(crate) use start::begin;
 
+pub(crate) use crate::dynamics::rounded;
+
 use crate::dynamics::{Axis, Collider, DPose3, DQuat, Dynamics, Joint, Link, LinkId, Mass};
 use crate::mjcf::{Actuator, AxisJoint, BodyLink, BodyTree, Geom, LinkJoint};
 use crate::owner::Owner;
@@ -20,11 +22,6 @@ use crate::owner::Owner;
 pub(crate) fn precise(pose: &Pose) -> DPose3 {
     let [x, y, z, w] = pose.rotation.to_array().map(f64::from);
     DPose3::from_parts(pose.translation.as_dvec3(), DQuat::from_xyzw(x, y, z, w).normalize())
-}
-
-/// As everything outside of dynamics has it.
-pub(crate) fn rounded(pose: &DPose3) -> Pose {
-    Pose::from_parts(pose.translation.as_vec3(), pose.rotation.as_quat())
 }
 
 /// Adds the collision shape of a geom, if it has one, to a link or to the world; the geom's pose is in the frame of either.
