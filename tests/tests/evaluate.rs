@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use tandem_episodes::evaluation::{Plan, Played, evaluate};
 use tandem_episodes::{Controller, RobotFile, players, tasks};
-use tandem_tools_spec::Protocol;
+use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
 fn plan(jobs: usize, seeds: Vec<u32>) -> Plan {
     let handover = tasks::find("handover").expect("a task");
@@ -13,6 +13,8 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> Plan {
         protocol: Protocol::Benchmark,
         robot: RobotFile::default(),
         locomotion: Controller::Balance,
+        disclosure: Disclosure::Live,
+        hints: Hints::On,
         tasks: vec![handover],
         seeds,
         jobs,

@@ -1,7 +1,7 @@
 //! The contract as its two readers meet it: strict hosts read the schemas, policies read the refusals.
 
 use serde_json::{Value, json};
-use tandem_tools_spec::{ActCall, EPISODE_TOOLS, ToolCall, tool_specs};
+use tandem_tools_spec::{ActCall, EPISODE_TOOLS, Hints, ToolCall, tool_specs};
 
 const REFUSED_KEYWORDS: &[&str] = &[
     "$ref",
@@ -36,7 +36,7 @@ fn for_each_schema(schema: &Value, visit: &mut impl FnMut(&Value)) {
 
 #[test]
 fn schemas_are_strict() {
-    for spec in tool_specs() {
+    for spec in tool_specs(Hints::On) {
         assert!(spec.description.len() > 40, "{} needs a description", spec.name);
         assert_eq!(
             spec.on_episode,
@@ -65,7 +65,7 @@ fn schemas_are_strict() {
 
 #[test]
 fn the_two_lists_name_the_same_tools() {
-    let specs = tool_specs();
+    let specs = tool_specs(Hints::On);
     let on_episode: Vec<&str> = specs.iter().filter(|spec| spec.on_episode).map(|spec| spec.name).collect();
     assert_eq!(on_episode, EPISODE_TOOLS);
 }
@@ -73,9 +73,9 @@ fn the_two_lists_name_the_same_tools() {
 #[test]
 fn calls_survive_the_wire() {
     let calls = [
-        ("observe", json!({ "robots": null })),
+        ("observe", json!({ "robots": null, "short": true })),
         ("get_robot_state", json!({ "robot": "B" })),
-        ("query_depth", json!({ "robot": "A", "pixels": [[0, 0], [319, 239]] })),
+        ("query_depth", json!({ "robot": "A", "pixels": [[0, 0], [319, 239]], "region": null })),
         ("wait", json!({ "steps": 25 })),
         ("get_status", json!({})),
         ("finish", json!({})),
@@ -198,7 +198,7 @@ fn numbers_that_json_cannot_hold_are_refused_too() {
 
 #[test]
 fn openapi_has_a_path_for_every_tool() {
-    let document = tandem_tools_spec::openapi("1.2.3");
+    let document = tandem_tools_spec::openapi("1.2.3", Hints::On);
     assert_eq!((&document["openapi"], &document["info"]["version"]), (&json!("3.1.0"), &json!("1.2.3")));
     for tool in EPISODE_TOOLS {
         let call = &document["paths"][format!("/v1/episodes/{{episode_id}}/tools/{tool}")]["post"];
@@ -221,7 +221,7 @@ fn openapi_has_a_path_for_every_tool() {
 /// What the checks refuse in a body, its schema does not allow.
 #[test]
 fn openapi_says_what_is_refused() {
-    let document = tandem_tools_spec::openapi("1.2.3");
+    let document = tandem_tools_spec::openapi("1.2.3", Hints::On);
     let field = |tool: &str, pointer: &str| {
         let body =
             &document["paths"][format!("/v1/episodes/{{episode_id}}/tools/{tool}")]["post"]["requestBody"];
@@ -249,8 +249,8 @@ fn openapi_says_what_is_refused() {
 
 #[test]
 fn openapi_describes_every_tool() {
-    let document = tandem_tools_spec::openapi("1.2.3").to_string();
-    for spec in tool_specs() {
+    let document = tandem_tools_spec::openapi("1.2.3", Hints::On).to_string();
+    for spec in tool_specs(Hints::On) {
         assert!(
             document.contains(&format!("\"operationId\":\"{}\"", spec.name)),
             "{} has no path",
