@@ -53,6 +53,35 @@ fn an_episode_can_be_played() {
     assert!(seen["content"][2]["data"].as_str().is_some_and(|data| data.starts_with("iVBORw0KGgo")));
 }
 
+/// Readers of JSON differ in which of two fields of one name they take, so neither is taken.
+#[test]
+fn fields_that_stand_there_twice_are_refused() {
+    let server = TestServer::start();
+    let id = server.episode("benchmark");
+    for (once, twice) in [
+        (r#""steps": 1"#, r#""steps": 1, "steps": 2"#),
+        (
+            r#""robots": [{"robot": "A"}], "steps": 1"#,
+            r#""robots": [{"robot": "A", "robot": "B"}], "steps": 1"#,
+        ),
+    ] {
+        let tool = if once.contains("robots") { "move_wrists" } else { "wait" };
+        let ask = |args: &str| {
+            let body = format!(
+                r#"{{"jsonrpc": "2.0", "id": 1, "method": "tools/call",
+                "params": {{"name": "{tool}", "arguments": {{"episode_id": "{id}", {args}}}}}}}"#
+            );
+            server.send("POST", "/mcp", Some("application/json"), body.as_bytes()).ok()["result"].clone()
+        };
+        let before = server.get(&format!("/v1/episodes/{id}")).ok();
+        let refused = ask(twice);
+        assert_eq!(refused["isError"], true, "{refused}");
+        assert!(text(&refused).contains("stands there twice"), "{refused}");
+        assert_eq!(server.get(&format!("/v1/episodes/{id}")).ok(), before);
+        assert_ne!(ask(once)["isError"], true, "{once}");
+    }
+}
+
 #[test]
 fn refusals_are_answers_that_a_model_can_read() {
     let server = TestServer::start();

@@ -45,7 +45,7 @@ impl PixelRegion {
     /// How many pixels it names with another stride, which is not zero.
     pub(crate) fn count(&self, stride: u32) -> u128 {
         let along = |axis: usize| u128::from(self.from[axis].abs_diff(self.to[axis]) / u64::from(stride)) + 1;
-        along(0) * along(1)
+        along(0).saturating_mul(along(1))
     }
 
     fn pixels(&self) -> Vec<[i64; 2]> {
