@@ -1,8 +1,7 @@
 //! Checks that need no world. Each returns the sentence a caller needs: what is wrong, where, and what would work.
 
 use crate::limits::{LARGEST, MOST_PIXELS, SMALLEST_COMPONENT};
-use crate::parts::BASE_COLUMNS;
-use crate::tools::PixelRegion;
+use crate::parts::{BASE_COLUMNS, PixelRegion};
 
 /// Every number is finite and of sane size.
 pub fn finite(place: &str, values: &[f64]) -> Result<(), String> {

@@ -23,8 +23,8 @@ pub use list::{
 };
 pub use parts::{
     BASE_COLUMNS, BaseCommand, BaseLimits, BaseMotion, Budget, CommandReply, Disclosure, Effort,
-    FingerReport, HandReport, HandState, Hints, JointValues, PhaseReached, Png, Pose, Protocol, Range,
-    RobotFallen, RobotReport, StopReason,
+    FingerReport, HandReport, HandState, Hints, JointValues, PhaseReached, PixelRegion, Png, Pose, Protocol,
+    Range, RobotFallen, RobotReport, StopReason,
 };
 pub use schema::{EpisodeToolSpec, ToolSpec};
 pub use tool::{Route, Tool, parse_args};

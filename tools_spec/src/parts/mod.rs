@@ -10,6 +10,7 @@ mod joint_values;
 mod png;
 mod pose;
 mod protocol;
+mod region;
 
 pub use base::{BASE_COLUMNS, BaseCommand, BaseLimits, Range};
 pub use command::{BaseMotion, CommandReply, RobotReport, StopReason};
@@ -21,3 +22,4 @@ pub use joint_values::JointValues;
 pub use png::Png;
 pub use pose::Pose;
 pub use protocol::Protocol;
+pub use region::PixelRegion;

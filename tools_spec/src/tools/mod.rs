@@ -20,7 +20,7 @@ pub use get_status::{GetStatus, StatusReply};
 pub use list_tasks::{ListTasks, PhaseInfo, ProtocolInfo, TaskInfo, TaskList};
 pub use move_wrists::{MoveWrists, WristMove};
 pub use observe::{CameraCalibration, CameraImage, Observation, Observe};
-pub use query_depth::{DepthPoint, DepthReply, PixelRegion, QueryDepth};
+pub use query_depth::{DepthPoint, DepthReply, QueryDepth};
 pub use send_joint_chunk::{ACTION_ROW_LEN, JointChunk, SendJointChunk, action_row_layout};
 pub use start_episode::{
     Brief, Briefing, Instruction, JointInfo, RobotInfo, RobotKind, StartEpisode, StartReply,
