@@ -48,6 +48,8 @@ fn what_may_be_null_may_be_left_out_but_of_the_strict_schema() {
     check("move_wrists", "/required", json!(["episode_id", "steps", "robots"]));
     check("move_wrists", "/properties/robots/items/required", json!(["robot"]));
     assert_eq!(json!(spec("observe").input_schema)["required"], json!(["episode_id", "robots", "short"]));
+    let body = |name: &str| spec(name).body_schema(50)["required"].clone();
+    assert_eq!((body("query_depth"), body("observe")), (json!(["robot"]), Value::Null));
 }
 
 #[test]

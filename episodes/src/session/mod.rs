@@ -105,6 +105,9 @@ impl Session {
         if hold_steps > 0 {
             self.run(Command::hold(hold_steps, self.motions.len()))?;
         }
+        if let Some(files) = &mut self.files {
+            files.flush();
+        }
         Ok(())
     }
 

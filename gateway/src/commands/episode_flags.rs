@@ -30,10 +30,12 @@ pub struct EpisodeFlags {
     #[arg(long, value_parser = protocol_parser(), default_value = Protocol::Agentic.name())]
     protocol: Protocol,
     /// What policies are told, as for `serve`: only `live` ends an episode on success. Results have every phase all the same.
-    #[arg(long, env = "TANDEM_DISCLOSURE", value_name = "WHEN", value_parser = disclosure_parser(), default_value = Disclosure::Live.name())]
+    #[arg(long, env = "TANDEM_DISCLOSURE", value_name = "WHEN", value_parser = disclosure_parser())]
+    #[arg(default_value = Disclosure::Live.name())]
     disclosure: Disclosure,
     /// Whether policies are told how to grasp, as for `serve`.
-    #[arg(long, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = hints_parser(), default_value = Hints::On.name())]
+    #[arg(long, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = hints_parser())]
+    #[arg(default_value = Hints::On.name())]
     hints: Hints,
     /// Worlds that run side by side.
     #[arg(long, default_value_t = 1, value_name = "N")]
