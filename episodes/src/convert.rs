@@ -31,6 +31,12 @@ pub fn rounded(value: f64) -> f64 {
     (value * 1e6).round() / 1e6 + 0.0
 }
 
+/// Fewer decimals, for what is estimated or measured coarsely.
+pub fn rounded_to(decimals: i32, value: f64) -> f64 {
+    let scale = 10f64.powi(decimals);
+    (value * scale).round() / scale + 0.0
+}
+
 pub fn wire_pose_from_sim(pose: &Pose) -> wire::Pose {
     wire_pose(&isometry_from_sim(pose))
 }

@@ -15,7 +15,7 @@ pub enum EpisodeError {
     TooManySteps { asked: usize, most: u32, protocol: &'static str },
     #[error("pixel [{u}, {v}] is outside the image; u goes from 0 to {}, v from 0 to {}", .width - 1, .height - 1)]
     PixelOutside { u: i64, v: i64, width: u32, height: u32 },
-    #[error("the episode has ended ({}); get_status and finish still answer; start_episode begins another", reason_text(*.reason))]
+    #[error("the episode has ended ({}); observe, get_robot_state, get_status and finish still answer; start_episode begins another", reason_text(*.reason))]
     Ended { reason: EndReason },
     #[error(transparent)]
     Spec(#[from] SpecError),

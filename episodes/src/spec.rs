@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use tandem_sim::{LocomotionChoice, SimError};
-use tandem_tools_spec::{Disclosure, Protocol};
+use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
 use crate::tasks::{self, Task};
 
@@ -23,6 +23,9 @@ pub struct EpisodeSpec {
     /// What the policy is told about its success.
     #[serde(default)]
     pub disclosure: Disclosure,
+    /// Whether it is told how to grasp.
+    #[serde(default)]
+    pub hints: Hints,
 }
 
 /// Which file describes the robots.
@@ -77,6 +80,7 @@ impl EpisodeSpec {
             renderer: RendererKind::default(),
             start: Start::default(),
             disclosure: Disclosure::default(),
+            hints: Hints::default(),
         }
     }
 }
@@ -93,6 +97,14 @@ impl RobotFile {
         match self {
             RobotFile::Embedded(name) => name.clone(),
             RobotFile::File(path) => path.display().to_string(),
+        }
+    }
+
+    /// What policies call the kind of robot: the file's name without its folder.
+    pub fn kind(&self) -> String {
+        match self {
+            RobotFile::Embedded(name) => name.clone(),
+            RobotFile::File(path) => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         }
     }
 

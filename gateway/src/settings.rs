@@ -13,7 +13,7 @@ use clap::{
 };
 use serde::Deserialize;
 use tandem_episodes::{BaseLimits, Controller, Instructions, InstructionsError, SimError, Visibility};
-use tandem_tools_spec::Disclosure;
+use tandem_tools_spec::{Disclosure, Hints};
 
 /// One source of settings; what it leaves out comes from the next. The doc comments are the help text.
 #[derive(Debug, Clone, Default, PartialEq, Args, Deserialize)]
@@ -43,6 +43,9 @@ pub struct Layer {
     /// `never` only in the files; neither of these two ends an episode on success [default: live].
     #[arg(long, env = "TANDEM_DISCLOSURE", value_name = "WHEN", value_parser = disclosure_parser())]
     pub disclosure: Option<Disclosure>,
+    /// Whether tools' texts and the start's brief say how to grasp, or geometry only [default: on].
+    #[arg(long, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = hints_parser())]
+    pub hints: Option<Hints>,
     /// Episodes that may be held at once; each costs a thread and about 30 MB [default: 8].
     #[arg(long, env = "TANDEM_MAX_EPISODES", value_name = "N")]
     pub max_episodes: Option<u32>,
@@ -80,6 +83,7 @@ impl Layer {
             instructions: self.instructions.or(next.instructions),
             locomotion: self.locomotion.or(next.locomotion),
             disclosure: self.disclosure.or(next.disclosure),
+            hints: self.hints.or(next.hints),
             max_episodes: self.max_episodes.or(next.max_episodes),
             max_body_bytes: self.max_body_bytes.or(next.max_body_bytes),
             request_timeout: self.request_timeout.or(next.request_timeout),
@@ -108,6 +112,8 @@ pub struct Settings {
     pub base_limits: BaseLimits,
     /// What policies are told about their success.
     pub disclosure: Disclosure,
+    /// Whether they are told how to grasp.
+    pub hints: Hints,
     /// Episodes that may be held at once.
     pub max_episodes: u32,
     /// Largest request body that is read.
@@ -172,6 +178,7 @@ impl Settings {
             base_limits: locomotion.load()?.limits(),
             locomotion,
             disclosure: layer.disclosure.unwrap_or_default(),
+            hints: layer.hints.unwrap_or_default(),
             max_episodes: layer.max_episodes.unwrap_or(8),
             max_body_bytes: layer.max_body_bytes.unwrap_or(2_000_000),
             request_timeout: seconds(layer.request_timeout, 30),
@@ -182,10 +189,17 @@ impl Settings {
 }
 
 /// One of the kinds of disclosure, by name.
-fn disclosure_parser() -> impl TypedValueParser<Value = Disclosure> {
+pub fn disclosure_parser() -> impl TypedValueParser<Value = Disclosure> {
     let find = |name: String| Disclosure::ALL.into_iter().find(|disclosure| disclosure.name() == name);
     PossibleValuesParser::new(Disclosure::ALL.map(Disclosure::name))
         .try_map(move |name| find(name).ok_or("not one of the kinds"))
+}
+
+/// Whether there are hints, by name.
+pub fn hints_parser() -> impl TypedValueParser<Value = Hints> {
+    let find = |name: String| Hints::ALL.into_iter().find(|hints| hints.name() == name);
+    PossibleValuesParser::new(Hints::ALL.map(Hints::name))
+        .try_map(move |name| find(name).ok_or("neither of the two"))
 }
 
 fn read_layer(path: &Path) -> Result<Layer, SettingsError> {

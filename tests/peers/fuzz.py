@@ -5,7 +5,7 @@
     python tests/peers/fuzz.py http://127.0.0.1:8700
 
 Every operation has an episode of its own, under the benchmark protocol. One thing JSON Schema cannot say, and it is left
-out here: that the robots of one `send_joint_chunk` have equally many rows.
+out here: that a region names at most 256 pixels.
 """
 
 import json
@@ -45,8 +45,10 @@ def fuzz(url, document, operation, folder):
 
 def check(url):
     openapi = read(f"{url}/v1/openapi.json")
-    chunk = openapi["paths"]["/v1/episodes/{episode_id}/tools/send_joint_chunk"]["post"]["requestBody"]
-    chunk["content"]["application/json"]["schema"]["properties"]["robots"]["maxItems"] = 1
+    depth = openapi["paths"]["/v1/episodes/{episode_id}/tools/query_depth"]["post"]["requestBody"]
+    region = depth["content"]["application/json"]["schema"]["properties"]["region"]["properties"]
+    for corner in ("from", "to"):
+        region[corner]["prefixItems"] = [{"type": "integer", "minimum": 0, "maximum": 15}] * 2
     operations = [method["operationId"] for path in openapi["paths"].values() for name, method in path.items() if name != "parameters"]
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)

@@ -2,9 +2,10 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use serde_json::json;
 use tandem_episodes::evaluation::{Plan, Played, evaluate};
 use tandem_episodes::{Controller, RobotFile, players, tasks};
-use tandem_tools_spec::Protocol;
+use tandem_tools_spec::{Disclosure, EndReason, Hints, Protocol};
 
 fn plan(jobs: usize, seeds: Vec<u32>) -> Plan {
     let handover = tasks::find("handover").expect("a task");
@@ -13,11 +14,31 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> Plan {
         protocol: Protocol::Benchmark,
         robot: RobotFile::default(),
         locomotion: Controller::Balance,
+        disclosure: Disclosure::Live,
+        hints: Hints::On,
         tasks: vec![handover],
         seeds,
         jobs,
         record: false,
     }
+}
+
+#[test]
+fn what_policies_are_told_is_recorded_and_not_mixed() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let play = |disclosure: Disclosure, hints: Hints| {
+        let plan = Plan { disclosure, hints, ..plan(1, vec![1]) };
+        let told = evaluate(&plan, folder.path(), &|_| {}).expect("it is played").episodes.remove(0);
+        let text = std::fs::read_to_string(folder.path().join("results.json")).expect("it was written");
+        let results: serde_json::Value = serde_json::from_str(&text).expect("valid JSON");
+        assert_eq!((&results["disclosure"], &results["hints"]), (&json!(disclosure), &json!(hints)));
+        told
+    };
+    let live = play(Disclosure::Live, Hints::On);
+    assert_eq!((live.result.ended, live.note), (EndReason::TaskComplete, None));
+    let never = play(Disclosure::Never, Hints::Off);
+    assert_eq!((never.result.ended, never.note), (EndReason::Finished, None), "it is played anew");
+    assert_eq!(never.result.phases, live.result.phases, "results have every phase");
 }
 
 /// State hashes without the times that a machine took.

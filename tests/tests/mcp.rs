@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 use tandem_tests::TestServer;
+use tandem_tools_spec::Hints;
 
 /// One JSON-RPC request, without any session.
 fn rpc(server: &TestServer, method: &str, params: Value) -> Value {
@@ -22,10 +23,10 @@ fn tools_are_those_of_the_contract() {
     let server = TestServer::start();
     let listed = rpc(&server, "tools/list", json!({}));
     let tools = listed["tools"].as_array().expect("tools");
-    let specs = tandem_tools_spec::tool_specs();
+    let specs = tandem_tools_spec::tool_specs(Hints::On);
     assert_eq!(tools.len(), specs.len());
     for (tool, spec) in tools.iter().zip(specs) {
-        assert_eq!((&tool["name"], &tool["inputSchema"]), (&json!(spec.name), &json!(spec.input_schema)));
+        assert_eq!((&tool["name"], &tool["inputSchema"]), (&json!(spec.name), &json!(spec.lenient_schema())));
         assert_eq!(tool["annotations"]["readOnlyHint"], json!(spec.read_only), "{tool}");
         assert!(tool.get("outputSchema").is_none(), "clients drop the pictures of such tools: {tool}");
     }
@@ -50,6 +51,35 @@ fn an_episode_can_be_played() {
     assert_eq!(seen["content"][1]["text"], "2 images follow: A, B");
     assert!(!text(&seen).contains("png_base64"));
     assert!(seen["content"][2]["data"].as_str().is_some_and(|data| data.starts_with("iVBORw0KGgo")));
+}
+
+/// Readers of JSON differ in which of two fields of one name they take, so neither is taken.
+#[test]
+fn fields_that_stand_there_twice_are_refused() {
+    let server = TestServer::start();
+    let id = server.episode("benchmark");
+    for (once, twice) in [
+        (r#""steps": 1"#, r#""steps": 1, "steps": 2"#),
+        (
+            r#""robots": [{"robot": "A"}], "steps": 1"#,
+            r#""robots": [{"robot": "A", "robot": "B"}], "steps": 1"#,
+        ),
+    ] {
+        let tool = if once.contains("robots") { "move_wrists" } else { "wait" };
+        let ask = |args: &str| {
+            let body = format!(
+                r#"{{"jsonrpc": "2.0", "id": 1, "method": "tools/call",
+                "params": {{"name": "{tool}", "arguments": {{"episode_id": "{id}", {args}}}}}}}"#
+            );
+            server.send("POST", "/mcp", Some("application/json"), body.as_bytes()).ok()["result"].clone()
+        };
+        let before = server.get(&format!("/v1/episodes/{id}")).ok();
+        let refused = ask(twice);
+        assert_eq!(refused["isError"], true, "{refused}");
+        assert!(text(&refused).contains("stands there twice"), "{refused}");
+        assert_eq!(server.get(&format!("/v1/episodes/{id}")).ok(), before);
+        assert_ne!(ask(once)["isError"], true, "{once}");
+    }
 }
 
 #[test]

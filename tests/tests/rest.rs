@@ -9,6 +9,7 @@ use std::{
 
 use serde_json::{Value, json};
 use tandem_tests::TestServer;
+use tandem_tools_spec::Hints;
 
 #[test]
 fn an_episode_lives_from_start_to_recording() {
@@ -18,7 +19,7 @@ fn an_episode_lives_from_start_to_recording() {
     assert_eq!((answer.status, answer.header("location")), (201, "/v1/episodes/handover-seed3"));
     let started = answer.ok();
     assert_eq!(started["robots"].as_array().map(Vec::len), Some(2));
-    assert_eq!(started["robots"][0]["joints"].as_array().map(Vec::len), Some(43));
+    assert_eq!(started["kinds"][0]["joints"].as_array().map(Vec::len), Some(43));
     assert_eq!(started["action_row"].as_array().map(Vec::len), Some(35));
 
     let id = started["episode_id"].as_str().expect("an id");
@@ -134,7 +135,7 @@ fn tools_and_tasks_are_listed() {
     let tools = server.get("/v1/tools").ok();
     let names: Vec<&str> =
         tools.as_array().into_iter().flatten().filter_map(|tool| tool["name"].as_str()).collect();
-    let specs = tandem_tools_spec::tool_specs();
+    let specs = tandem_tools_spec::tool_specs(Hints::On);
     assert_eq!(names, specs.iter().map(|spec| spec.name).collect::<Vec<_>>());
     let tasks = server.get("/v1/tasks").ok();
     let handover = tasks["tasks"].as_array().into_iter().flatten().find(|task| task["id"] == "handover");
@@ -146,6 +147,6 @@ fn tools_and_tasks_are_listed() {
     for field in ["vx_m_s", "vy_m_s", "yaw_rate_rad_s", "pelvis_height_m"] {
         let limits = &tasks["base_limits"][field];
         assert!(limits["min"].as_f64() < limits["max"].as_f64(), "{field}: {limits}");
-        assert_eq!(&started["robots"][0][field], limits);
+        assert_eq!(&started["kinds"][0][field], limits);
     }
 }

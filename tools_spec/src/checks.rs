@@ -1,7 +1,7 @@
 //! Checks that need no world. Each returns the sentence a caller needs: what is wrong, where, and what would work.
 
-use crate::limits::{LARGEST, SMALLEST_COMPONENT};
-use crate::parts::BASE_COLUMNS;
+use crate::limits::{LARGEST, MOST_PIXELS, SMALLEST_COMPONENT};
+use crate::parts::{BASE_COLUMNS, PixelRegion};
 
 /// Every number is finite and of sane size.
 pub fn finite(place: &str, values: &[f64]) -> Result<(), String> {
@@ -66,8 +66,8 @@ pub fn robots<'a>(names: impl Iterator<Item = &'a str>) -> Result<(), String> {
     Ok(())
 }
 
-/// The most pixels that one call may ask for.
-const MOST_PIXELS: usize = 256;
+/// With this stride a region of a whole picture fits.
+const WIDEST_STRIDE: u32 = 20;
 
 /// At least one pixel, and not too many. Whether they lie in the picture, the episode knows.
 pub fn pixels(pixels: &[[i64; 2]]) -> Result<(), String> {
@@ -76,11 +76,28 @@ pub fn pixels(pixels: &[[i64; 2]]) -> Result<(), String> {
     }
     if pixels.len() > MOST_PIXELS {
         return Err(format!(
-            "pixels holds {}; give at most {MOST_PIXELS}, as every fourth one of a region",
+            "pixels holds {}; give at most {MOST_PIXELS}, as every tenth one by a region with stride 10",
             pixels.len()
         ));
     }
     Ok(())
+}
+
+/// A region that names pixels, and not too many.
+pub fn region(region: &PixelRegion) -> Result<(), String> {
+    if region.stride == 0 {
+        return Err("region.stride is 0; give at least 1, as 10 for every tenth pixel across and down".into());
+    }
+    let fits = |stride: u32| region.count(stride) <= MOST_PIXELS as u128;
+    if fits(region.stride) {
+        return Ok(());
+    }
+    let count = region.count(region.stride);
+    let way = match (region.stride..=WIDEST_STRIDE).find(|stride| fits(*stride)) {
+        Some(stride) => format!("; with stride {stride} it fits"),
+        None => String::new(),
+    };
+    Err(format!("region names {count} pixels; name at most {MOST_PIXELS}{way}"))
 }
 
 /// Checks every entry of a list of robots, and says which robot a refusal is about.

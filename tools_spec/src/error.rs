@@ -48,4 +48,7 @@ pub struct ProblemBody {
     pub status: u16,
     /// What was wrong with this call and what would work.
     pub detail: String,
+    /// Why the recording of the episode is not complete; left out where it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recording_failed: Option<String>,
 }

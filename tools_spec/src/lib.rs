@@ -22,14 +22,21 @@ pub use list::{
     ActCall, EPISODE_TOOLS, LookCall, LookReply, ManageCall, ManageReply, ToolCall, ToolReply, tool_specs,
 };
 pub use parts::{
-    BASE_COLUMNS, BaseCommand, BaseLimits, Budget, CommandReply, Disclosure, HandReport, JointValues,
-    PhaseReached, Png, Pose, Protocol, Range, RobotFallen, RobotReport, StopReason,
+    BASE_COLUMNS, BaseCommand, BaseLimits, BaseMotion, Budget, CommandReply, Disclosure, Effort,
+    FingerReport, HandReport, HandState, Hints, JointValues, PhaseReached, PixelRegion, Png, Pose, Protocol,
+    Range, RobotFallen, RobotReport, StopReason,
 };
-pub use schema::ToolSpec;
-pub use tool::{Tool, parse_args};
+pub use schema::{EpisodeToolSpec, ToolSpec};
+pub use tool::{Route, Tool, parse_args};
 pub use tools::*;
 
 /// The REST interface of `version` as OpenAPI 3.1, from the same types that read and write it.
-pub fn openapi(version: &str) -> serde_json::Value {
-    schema::openapi(version, tool_specs().into_iter().filter(|spec| spec.on_episode))
+pub fn openapi(version: &str, hints: Hints) -> serde_json::Value {
+    schema::openapi(version, &tool_specs(hints))
+}
+
+/// The tools of the running episode `id`, whose commands may have up to `most_steps` control steps.
+pub fn episode_tool_specs(hints: Hints, id: &str, most_steps: u32) -> Vec<EpisodeToolSpec> {
+    let specs = tool_specs(hints).into_iter().filter(|spec| spec.on_episode);
+    specs.map(|spec| spec.of_episode(id, most_steps)).collect()
 }

@@ -10,7 +10,10 @@ pub const LARGEST: f64 = 1e6;
 pub const SMALLEST_COMPONENT: f64 = 1e-6;
 
 /// The most control steps that any protocol allows for one command.
-pub const MOST_STEPS: usize = 50;
+pub const MOST_STEPS: u32 = 50;
+
+/// The most pixels that one call may ask for.
+pub const MOST_PIXELS: usize = 256;
 
 /// Names of robots, of which an episode has the first two or three.
 pub const ROBOT_NAMES: [&str; 3] = ["A", "B", "C"];
@@ -43,10 +46,47 @@ pub fn a_robot_twice() -> Value {
 
 /// `items` of a list of pixels.
 pub fn pixel() -> Value {
-    let inside = PICTURE_PX.map(|px| json!({ "type": "integer", "minimum": 0, "maximum": px - 1 }));
     json!({
-        "type": "array", "prefixItems": inside, "items": { "type": "integer" }, "minItems": 2, "maxItems": 2,
+        "type": "array", "prefixItems": pixel_range(), "items": { "type": "integer" }, "minItems": 2, "maxItems": 2,
     })
+}
+
+/// `prefixItems` of a pixel.
+pub fn pixel_range() -> Value {
+    json!(PICTURE_PX.map(|px| json!({ "type": "integer", "minimum": 0, "maximum": px - 1 })))
+}
+
+/// `oneOf` of an object that has one of two fields, each given with the type that it has where it is not null.
+pub fn either(one: &str, kind: &str, other: &str, other_kind: &str) -> Value {
+    let has =
+        |field: &str, kind: &str| json!({ "required": [field], "properties": { field: { "type": kind } } });
+    json!([has(one, kind), has(other, other_kind)])
+}
+
+/// Says how many control steps a command may have wherever `most_steps` marks that something counts them: as `maximum`, as
+/// `maxItems`, or as `equal_rows`, a list with an entry per robot whose rows are equally many.
+pub fn bound_steps(schema: &mut Value, most_steps: u32) {
+    match schema {
+        Value::Array(items) => items.iter_mut().for_each(|item| bound_steps(item, most_steps)),
+        Value::Object(object) => {
+            if let Some(Value::String(marked)) = object.get("most_steps").cloned() {
+                object.remove("most_steps");
+                let (keyword, bound) = match marked.as_str() {
+                    "equal_rows" => ("anyOf", equal_rows(most_steps)),
+                    _ => (marked.as_str(), json!(most_steps)),
+                };
+                object.insert(keyword.into(), bound);
+            }
+            object.values_mut().for_each(|value| bound_steps(value, most_steps));
+        }
+        _ => {}
+    }
+}
+
+fn equal_rows(most_steps: u32) -> Value {
+    let rows = |count: u32| json!({ "minItems": count, "maxItems": count });
+    let each = |count: u32| json!({ "items": { "properties": { "rows": rows(count) } } });
+    (1..=most_steps).map(each).collect::<Vec<_>>().into()
 }
 
 /// Bounds every number of a schema that has none: integers are left alone, whose types bound them.

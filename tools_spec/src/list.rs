@@ -4,7 +4,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::error::SpecError;
-use crate::parts::CommandReply;
+use crate::parts::{CommandReply, Hints};
 use crate::schema::ToolSpec;
 use crate::tool::{Tool, parse_args};
 use crate::tools::*;
@@ -31,11 +31,11 @@ macro_rules! tools {
         without_episode { $($free:ident,)* }
         $( $(#[$doc:meta])* $group:ident($call:ident) -> $whose:ident $reply:ident { $($tool:ident,)* } )*
     ) => {
-        /// Every tool, in the order a policy meets them.
-        pub fn tool_specs() -> Vec<ToolSpec> {
+        /// Every tool, in the order a policy meets them, with or without hints in its texts.
+        pub fn tool_specs(hints: Hints) -> Vec<ToolSpec> {
             vec![
-                $( ToolSpec::without_episode::<$free>(), )*
-                $( $( ToolSpec::on_episode::<$tool>(), )* )*
+                $( ToolSpec::without_episode::<$free>(hints), )*
+                $( $( ToolSpec::on_episode::<$tool>(hints), )* )*
             ]
         }
 

@@ -7,7 +7,24 @@ use serde_json::{Value, json};
 use crate::error::SpecError;
 use crate::strict_value::StrictValue;
 
-/// The arguments of one tool. The type's doc comment is the tool's description.
+/// Where REST serves a tool.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Route {
+    /// As `POST`.
+    pub method: &'static str,
+    /// As `/v1/episodes/{episode_id}/tools/wait`.
+    pub path: String,
+}
+
+impl Route {
+    /// The route of a tool that acts on the episode `id`.
+    pub fn of_episode(id: &str, tool: &str) -> Route {
+        Route { method: "POST", path: format!("/v1/episodes/{id}/tools/{tool}") }
+    }
+}
+
+/// The arguments of one tool. The type's doc comment is the tool's description; how to grasp stands apart from it, as the
+/// schema's `hint`, which not every policy is told.
 pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
     /// What the tool answers.
     type Reply: Serialize + DeserializeOwned + JsonSchema;
@@ -18,6 +35,11 @@ pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
 
     /// Arguments that work, shown to callers whose own did not.
     fn example() -> Self;
+
+    /// Where REST serves it.
+    fn route() -> Route {
+        Route::of_episode("{episode_id}", Self::NAME)
+    }
 
     /// Checks what needs no world: lengths, finite numbers, quaternions that have a direction. The text says what
     /// would work.

@@ -1,7 +1,7 @@
 //! The contract as its two readers meet it: strict hosts read the schemas, policies read the refusals.
 
 use serde_json::{Value, json};
-use tandem_tools_spec::{ActCall, EPISODE_TOOLS, ToolCall, tool_specs};
+use tandem_tools_spec::{ActCall, EPISODE_TOOLS, Hints, LookCall, ToolCall, tool_specs};
 
 const REFUSED_KEYWORDS: &[&str] = &[
     "$ref",
@@ -36,7 +36,7 @@ fn for_each_schema(schema: &Value, visit: &mut impl FnMut(&Value)) {
 
 #[test]
 fn schemas_are_strict() {
-    for spec in tool_specs() {
+    for spec in tool_specs(Hints::On) {
         assert!(spec.description.len() > 40, "{} needs a description", spec.name);
         assert_eq!(
             spec.on_episode,
@@ -65,7 +65,7 @@ fn schemas_are_strict() {
 
 #[test]
 fn the_two_lists_name_the_same_tools() {
-    let specs = tool_specs();
+    let specs = tool_specs(Hints::On);
     let on_episode: Vec<&str> = specs.iter().filter(|spec| spec.on_episode).map(|spec| spec.name).collect();
     assert_eq!(on_episode, EPISODE_TOOLS);
 }
@@ -73,9 +73,9 @@ fn the_two_lists_name_the_same_tools() {
 #[test]
 fn calls_survive_the_wire() {
     let calls = [
-        ("observe", json!({ "robots": null })),
+        ("observe", json!({ "robots": null, "short": true })),
         ("get_robot_state", json!({ "robot": "B" })),
-        ("query_depth", json!({ "robot": "A", "pixels": [[0, 0], [319, 239]] })),
+        ("query_depth", json!({ "robot": "A", "pixels": [[0, 0], [319, 239]], "region": null })),
         ("wait", json!({ "steps": 25 })),
         ("get_status", json!({})),
         ("finish", json!({})),
@@ -137,6 +137,10 @@ fn refusals_say_what_would_work() {
     let pixels = |count: usize| json!({ "robot": "A", "pixels": vec![[160, 120]; count] });
     assert!(ToolCall::parse("query_depth", pixels(256)).is_ok());
     refused("query_depth", pixels(257), &["257", "at most 256"]);
+    refused("query_depth", json!({ "robot": "A" }), &["either pixels", "or region"]);
+    let both =
+        json!({ "robot": "A", "pixels": [[0, 0]], "region": { "from": [0, 0], "to": [1, 1], "stride": 1 } });
+    refused("query_depth", both, &["either pixels", "or region"]);
     refused("query_depth", json!({ "robot": "A", "pixels": [] }), &["pixels is empty", "[[160, 120]]"]);
     refused(
         "walk",
@@ -198,7 +202,7 @@ fn numbers_that_json_cannot_hold_are_refused_too() {
 
 #[test]
 fn openapi_has_a_path_for_every_tool() {
-    let document = tandem_tools_spec::openapi("1.2.3");
+    let document = tandem_tools_spec::openapi("1.2.3", Hints::On);
     assert_eq!((&document["openapi"], &document["info"]["version"]), (&json!("3.1.0"), &json!("1.2.3")));
     for tool in EPISODE_TOOLS {
         let call = &document["paths"][format!("/v1/episodes/{{episode_id}}/tools/{tool}")]["post"];
@@ -218,10 +222,35 @@ fn openapi_has_a_path_for_every_tool() {
     );
 }
 
+#[test]
+fn a_region_names_every_so_many_pixels_row_by_row() {
+    let region = |from: [i64; 2], to: [i64; 2], stride: i64| json!({ "robot": "A", "region": { "from": from, "to": to, "stride": stride } });
+    let named = |args: Value| match ToolCall::parse("query_depth", args).unwrap() {
+        ToolCall::Look(LookCall::QueryDepth(call)) => call.named(),
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(
+        named(region([10, 20], [31, 30], 10)),
+        [[10, 20], [20, 20], [30, 20], [10, 30], [20, 30], [30, 30]]
+    );
+    assert_eq!(named(region([5, 7], [5, 7], 1)), [[5, 7]]);
+    assert_eq!(named(region([3, 9], [1, 9], 2)), [[1, 9], [3, 9]], "either corner may come first");
+    assert_eq!(named(region([0, 0], [15, 15], 1)).len(), 256);
+    refused(
+        "query_depth",
+        region([0, 0], [16, 15], 1),
+        &["names 272", "at most 256", "with stride 2 it fits"],
+    );
+    refused("query_depth", region([0, 0], [319, 239], 4), &["names 4800", "with stride 18 it fits"]);
+    refused("query_depth", region([i64::MIN, i64::MIN], [i64::MAX, i64::MAX], 1), &["at most 256"]);
+    refused("query_depth", region([0, 0], [3, 3], 0), &["stride is 0", "at least 1"]);
+    refused("query_depth", region([0, 0], [3, 3], -1), &["region.stride"]);
+}
+
 /// What the checks refuse in a body, its schema does not allow.
 #[test]
 fn openapi_says_what_is_refused() {
-    let document = tandem_tools_spec::openapi("1.2.3");
+    let document = tandem_tools_spec::openapi("1.2.3", Hints::On);
     let field = |tool: &str, pointer: &str| {
         let body =
             &document["paths"][format!("/v1/episodes/{{episode_id}}/tools/{tool}")]["post"]["requestBody"];
@@ -244,13 +273,15 @@ fn openapi_says_what_is_refused() {
     assert_eq!(field("walk", "/robots/items/properties/vx_m_s/maximum"), 1e6);
     assert_eq!(field("send_joint_chunk", "/robots/items/properties/rows/items/items/minimum"), -1e6);
     assert_eq!(field("query_depth", "/pixels/items/prefixItems/1/maximum"), 239);
+    assert_eq!(field("query_depth", "/pixels/maxItems"), 256);
+    assert_eq!(field("send_joint_chunk", "/robots/anyOf").as_array().map(Vec::len), Some(50));
     assert_eq!(field("observe", "/robots/uniqueItems"), true);
 }
 
 #[test]
 fn openapi_describes_every_tool() {
-    let document = tandem_tools_spec::openapi("1.2.3").to_string();
-    for spec in tool_specs() {
+    let document = tandem_tools_spec::openapi("1.2.3", Hints::On).to_string();
+    for spec in tool_specs(Hints::On) {
         assert!(
             document.contains(&format!("\"operationId\":\"{}\"", spec.name)),
             "{} has no path",

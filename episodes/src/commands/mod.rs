@@ -28,7 +28,7 @@ pub struct Command {
     pub steps: u32,
     /// One per robot of the episode.
     pub orders: Vec<Order>,
-    /// Robots that the caller named, in its order: these are reported on.
+    /// Robots that the caller named, in its order, or all that wait: these are reported on.
     named: Vec<usize>,
 }
 
@@ -92,7 +92,10 @@ impl Command {
                 let entries = args.robots.iter().map(|chunk| (chunk.robot.as_str(), chunk.rows.as_slice()));
                 Command::of(rules.steps(rows)?, entries, motions, orders::rows)
             }
-            ActCall::Wait(args) => Ok(Command::hold(rules.steps(args.steps as usize)?, motions.len())),
+            ActCall::Wait(args) => {
+                let hold = Command::hold(rules.steps(args.steps as usize)?, motions.len());
+                Ok(Command { named: (0..motions.len()).collect(), ..hold })
+            }
         }
     }
 

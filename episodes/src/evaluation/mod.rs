@@ -8,7 +8,7 @@ mod workers;
 
 use std::path::{Path, PathBuf};
 
-use tandem_tools_spec::Protocol;
+use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
 use crate::output::{OutputError, create_private_folder, write_whole};
 use crate::players;
@@ -28,6 +28,10 @@ pub struct Plan {
     pub protocol: Protocol,
     pub robot: RobotFile,
     pub locomotion: Controller,
+    /// What policies are told about their success, and whether success ends an episode.
+    pub disclosure: Disclosure,
+    /// Whether policies are told how to grasp.
+    pub hints: Hints,
     pub tasks: Vec<&'static Task>,
     pub seeds: Vec<u32>,
     /// Worlds that run side by side, each on a thread of its own.
@@ -42,6 +46,8 @@ impl Plan {
         EpisodeSpec {
             robot: self.robot.clone(),
             locomotion: self.locomotion.clone(),
+            disclosure: self.disclosure,
+            hints: self.hints,
             ..EpisodeSpec::new(task, seed, self.protocol)
         }
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use statrs::distribution::{Beta, ContinuousCDF};
-use tandem_tools_spec::Protocol;
+use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
 use super::keep::{Keeper, Played};
 
@@ -26,6 +26,8 @@ pub struct Evaluation {
     pub policy: String,
     pub protocol: Protocol,
     pub locomotion: String,
+    pub disclosure: Disclosure,
+    pub hints: Hints,
     pub tasks: BTreeMap<String, TaskSummary>,
     pub episodes: Vec<Played>,
 }
@@ -49,6 +51,8 @@ pub fn summarise(keeper: &Keeper, episodes: Vec<Played>) -> Evaluation {
         policy: keeper.plan.player.name.into(),
         protocol: keeper.plan.protocol,
         locomotion: keeper.locomotion.clone(),
+        disclosure: keeper.plan.disclosure,
+        hints: keeper.plan.hints,
         tasks,
         episodes,
     }

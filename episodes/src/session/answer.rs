@@ -1,11 +1,13 @@
 //! From a tool call to its reply: looks, commands, and what concerns the episode as a whole.
 
+use tandem_sim::Pose;
 use tandem_tools_spec::{
     ActCall, CommandReply, EndReason, LookCall, LookReply, ManageCall, ManageReply, RobotReport, StopReason,
     ToolCall, ToolReply,
 };
 
-use super::{Session, replies};
+use super::Session;
+use super::replies::{self, Detail};
 use crate::EpisodeError;
 use crate::commands::{self, Command, check_reach, report};
 
@@ -13,8 +15,8 @@ impl Session {
     pub(super) fn answer(&mut self, call: &ToolCall) -> Result<ToolReply, EpisodeError> {
         match (call, self.ended) {
             (ToolCall::Manage(call), _) => Ok(ToolReply::Manage(self.manage(call))),
-            (ToolCall::Look(_) | ToolCall::Act(_), Some(reason)) => Err(EpisodeError::Ended { reason }),
-            (ToolCall::Look(call), None) => self.look(call).map(ToolReply::Look),
+            (ToolCall::Look(call), _) => self.look(call).map(ToolReply::Look),
+            (ToolCall::Act(_), Some(reason)) => Err(EpisodeError::Ended { reason }),
             (ToolCall::Act(call), None) => self.act(call).map(ToolReply::Act),
         }
     }
@@ -27,17 +29,18 @@ impl Session {
                     Some(names) => names.iter().map(find).collect::<Result<_, _>>()?,
                     None => (0..self.motions.len()).collect::<Vec<_>>(),
                 };
-                self.eyes.observe(&self.present, &robots, &self.motions).map(LookReply::Observe)
+                let detail = Detail::of(args);
+                self.eyes.observe(&self.present, &robots, &self.motions, detail).map(LookReply::Observe)
             }
             LookCall::GetRobotState(args) => {
                 let robot = find(&args.robot)?;
                 let sheet = &self.motions[robot].robot;
-                Ok(LookReply::GetRobotState(replies::robot_state(&self.present, robot, sheet)))
+                Ok(LookReply::GetRobotState(replies::robot_state(&self.present, robot, sheet, Detail::Full)))
             }
             LookCall::QueryDepth(args) => {
                 let robot = find(&args.robot)?;
                 let name = &self.motions[robot].robot.name;
-                self.eyes.depth(&self.present, robot, name, &args.pixels).map(LookReply::QueryDepth)
+                self.eyes.depth(&self.present, robot, name, &args.named()).map(LookReply::QueryDepth)
             }
             LookCall::CheckReach(args) => {
                 let robot = find(&args.robot)?;
@@ -60,11 +63,16 @@ impl Session {
     fn act(&mut self, call: &ActCall) -> Result<CommandReply, EpisodeError> {
         let command = Command::read(call, &self.rules, &self.motions)?;
         let cuts = command.cuts();
+        let began: Vec<Pose> =
+            self.present.robots.iter().map(|robot| robot.state.start_from_pelvis).collect();
         let executed_steps = self.run(command)?;
         let stop_reason = self.stop_reason();
         let robots: Vec<RobotReport> = cuts
             .iter()
-            .map(|(robot, cut)| report(cut, &self.present.robots[*robot].state, &self.motions[*robot]))
+            .map(|(robot, cut)| {
+                let state = &self.present.robots[*robot].state;
+                report(cut, &began[*robot], state, &self.motions[*robot])
+            })
             .collect();
         Ok(CommandReply {
             executed_steps,

@@ -4,7 +4,7 @@ use tandem_sim::render::{self, Camera, Cameras, Frame, Renderer, Scenery, encode
 use tandem_sim::{Step, World};
 use tandem_tools_spec::{CameraImage, DepthPoint, DepthReply, Observation, Png};
 
-use super::replies::{calibration, robot_state};
+use super::replies::{Detail, calibration, robot_state};
 use crate::EpisodeError;
 use crate::commands::Motion;
 use crate::convert::{rounded, wire_vector};
@@ -36,6 +36,7 @@ impl Eyes {
         step: &Step,
         robots: &[usize],
         motions: &[Motion],
+        detail: Detail,
     ) -> Result<Observation, EpisodeError> {
         let mut images = Vec::with_capacity(robots.len());
         let mut cameras = Vec::with_capacity(robots.len());
@@ -47,7 +48,7 @@ impl Eyes {
             images.push(CameraImage { robot: name.clone(), png_base64: Png(png) });
             cameras.push(calibration(step, robot, name, &camera));
         }
-        let states = robots.iter().map(|robot| robot_state(step, *robot, &motions[*robot].robot));
+        let states = robots.iter().map(|robot| robot_state(step, *robot, &motions[*robot].robot, detail));
         Ok(Observation { time_s: step.time_s, states: states.collect(), cameras, images })
     }
 

@@ -105,6 +105,9 @@ impl Session {
         if hold_steps > 0 {
             self.run(Command::hold(hold_steps, self.motions.len()))?;
         }
+        if let Some(files) = &mut self.files {
+            files.flush();
+        }
         Ok(())
     }
 
@@ -128,7 +131,9 @@ impl Session {
             // Closing the files may have failed, which the reply has to say.
             *reply = self.result().told(self.spec().disclosure);
         }
-        self.clock.resume();
+        if self.ended.is_none() {
+            self.clock.resume();
+        }
         answer
     }
 
@@ -150,6 +155,8 @@ impl Session {
         if self.result.is_some() {
             return;
         }
+        // Nothing is left to think about.
+        self.clock.pause();
         if !self.scores.complete() {
             self.keep_picture("end");
         }

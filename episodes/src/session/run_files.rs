@@ -60,6 +60,7 @@ impl RunFiles {
         for (name, model) in session.world.object_models() {
             recorder.draw(name, &model.geoms)?;
         }
+        // What fails here fails the start; what fails later does not.
         recorder.flush()?;
         Ok(RunFiles {
             folder: path,
@@ -93,6 +94,11 @@ impl RunFiles {
             (Err(_), text) => Err(text.as_deref().unwrap_or_default()),
         };
         self.record(|recorder| recorder.tool_call(&ToolCallRecord { time_s, call, outcome }));
+    }
+
+    /// Hands everything recorded to the system: what a policy is told from here on is on the disk.
+    pub(super) fn flush(&mut self) {
+        self.record(Recorder::flush);
     }
 
     /// Keeps a moment for the strip.

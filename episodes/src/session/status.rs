@@ -1,7 +1,7 @@
 //! How the episode stands: budget, phases, falls, result.
 
 use tandem_tools_spec::{
-    Briefing, Budget, EndReason, PhaseReached, PhaseTimes, ResultReply, RobotFallen, StatusReply,
+    Briefing, Budget, EndReason, PhaseReached, PhaseTimes, ResultReply, RobotFallen, RobotInfo, StatusReply,
 };
 
 use super::Session;
@@ -78,12 +78,18 @@ impl Session {
     /// What has to be known to begin.
     pub fn briefing(&self) -> Briefing {
         let task = self.spec().task;
+        // All robots of an episode are of one file.
+        let kind = self.spec().robot.kind();
+        let info = |name: &String| RobotInfo { robot: name.clone(), kind: kind.clone() };
         Briefing {
             instruction: task.instruction.into(),
             instructions: describe::instructions(task),
-            robots: self.motions.iter().map(|motion| describe::robot(&motion.robot)).collect(),
+            robots: self.motions.iter().map(|motion| info(&motion.robot.name)).collect(),
+            kinds: vec![describe::robot_kind(kind.clone(), &self.motions[0].robot)],
+            brief: describe::brief(self.spec().hints),
             action_row: action_row(&self.motions[0].robot.model),
             status: self.status(),
+            recording_failed: self.recording_failed().map(str::to_owned),
         }
     }
 

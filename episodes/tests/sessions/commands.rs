@@ -144,7 +144,7 @@ fn depth_finds_the_bottle_where_it_is() {
     let label = pelvis_from_bottle * Vector::new(0.0, 0.0, 0.09);
 
     let ToolReply::Look(LookReply::Observe(seen)) =
-        session.call(Observe { robots: Some(vec!["A".into()]) }.into()).unwrap()
+        session.call(Observe { robots: Some(vec!["A".into()]), short: None }.into()).unwrap()
     else {
         panic!("no observation")
     };
@@ -159,7 +159,11 @@ fn depth_finds_the_bottle_where_it_is() {
     let u = f64::from(aim.x / aim.z) * camera.fx + camera.cx;
     let v = f64::from(aim.y / aim.z) * camera.fy + camera.cy;
 
-    let query = QueryDepth { robot: "A".into(), pixels: vec![[u.round() as i64, v.round() as i64]] };
+    let query = QueryDepth {
+        robot: "A".into(),
+        pixels: Some(vec![[u.round() as i64, v.round() as i64]]),
+        region: None,
+    };
     let ToolReply::Look(LookReply::QueryDepth(reply)) = session.call(query.into()).unwrap() else {
         panic!("no depth")
     };

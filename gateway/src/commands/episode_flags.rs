@@ -12,9 +12,10 @@ use tandem_episodes::{
     players,
     tasks::{self, Task},
 };
-use tandem_tools_spec::Protocol;
+use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
 use super::Seeds;
+use crate::settings::{disclosure_parser, hints_parser};
 
 /// Which episodes to play.
 #[derive(Debug, Args)]
@@ -28,6 +29,14 @@ pub struct EpisodeFlags {
     /// The rules.
     #[arg(long, value_parser = protocol_parser(), default_value = Protocol::Agentic.name())]
     protocol: Protocol,
+    /// What policies are told, as for `serve`: only `live` ends an episode on success. Results have every phase all the same.
+    #[arg(long, env = "TANDEM_DISCLOSURE", value_name = "WHEN", value_parser = disclosure_parser())]
+    #[arg(default_value = Disclosure::Live.name())]
+    disclosure: Disclosure,
+    /// Whether policies are told how to grasp, as for `serve`.
+    #[arg(long, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = hints_parser())]
+    #[arg(default_value = Hints::On.name())]
+    hints: Hints,
     /// Worlds that run side by side.
     #[arg(long, default_value_t = 1, value_name = "N")]
     jobs: usize,
@@ -84,6 +93,8 @@ impl EpisodeFlags {
             protocol: self.protocol,
             robot: RobotFile::default(),
             locomotion: self.locomotion.controller(),
+            disclosure: self.disclosure,
+            hints: self.hints,
             tasks: self.tasks.0,
             seeds: self.seeds.0.collect(),
             jobs: self.jobs,

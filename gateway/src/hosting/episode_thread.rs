@@ -4,7 +4,7 @@
 use std::{
     path::{Path, PathBuf},
     sync::{
-        Arc,
+        Arc, OnceLock,
         atomic::{AtomicBool, Ordering},
     },
     time::Duration,
@@ -34,8 +34,27 @@ enum Command {
 #[derive(Debug)]
 pub struct EpisodeThread {
     commands: mpsc::Sender<Command>,
-    ended: Arc<AtomicBool>,
+    news: Arc<News>,
     folder: PathBuf,
+    steps_per_command: u32,
+}
+
+/// What the thread lets everybody know without being asked.
+#[derive(Debug, Default)]
+struct News {
+    ended: AtomicBool,
+    /// The first failure of the recording.
+    recording_failed: OnceLock<String>,
+}
+
+impl News {
+    /// As `session` stands.
+    fn spread(&self, session: &Guarded) {
+        self.ended.store(session.ended(), Ordering::Relaxed);
+        if let Some(reason) = session.recording_failed() {
+            self.recording_failed.get_or_init(|| reason.to_owned());
+        }
+    }
 }
 
 impl EpisodeThread {
@@ -60,14 +79,14 @@ impl EpisodeThread {
     ) -> Result<(EpisodeThread, Briefing), HostingError> {
         let (commands, inbox) = mpsc::channel(WAITING_CALLS);
         let (started, start) = oneshot::channel();
-        let ended = Arc::new(AtomicBool::new(false));
-        let (thread_ended, name, path) = (ended.clone(), id.to_owned(), folder.path.clone());
+        let news = Arc::new(News::default());
+        let (from_thread, name, path) = (news.clone(), id.to_owned(), folder.path.clone());
         let thread = move || {
             match open_session(&spec, folder, clock) {
                 Ok((session, briefing)) => {
                     // A caller that went away during the start has dropped the inbox's other end, and serve returns.
                     let _ = started.send(Ok(briefing));
-                    let closed = serve(Guarded::new(&name, session), inbox, &thread_ended);
+                    let closed = serve(Guarded::new(&name, session), inbox, &from_thread);
                     // The place is free before the caller hears of the end, so that it can start the next episode.
                     drop(permit);
                     closed.answer();
@@ -81,7 +100,8 @@ impl EpisodeThread {
             .spawn(thread)
             .map_err(HostingError::Thread)?;
         let briefing = start.await.map_err(|_| HostingError::EpisodePanicked)??;
-        Ok((EpisodeThread { commands, ended, folder: path }, briefing))
+        let steps_per_command = briefing.status.budget.steps_per_command;
+        Ok((EpisodeThread { commands, news, folder: path, steps_per_command }, briefing))
     }
 
     /// Runs a call and returns its reply.
@@ -123,7 +143,17 @@ impl EpisodeThread {
 
     /// Whether the episode takes no more commands.
     pub fn ended(&self) -> bool {
-        self.ended.load(Ordering::Relaxed)
+        self.news.ended.load(Ordering::Relaxed)
+    }
+
+    /// Why the recording is not complete, if it is not.
+    pub fn recording_failed(&self) -> Option<&str> {
+        self.news.recording_failed.get().map(String::as_str)
+    }
+
+    /// The most control steps that one command may ask for.
+    pub fn steps_per_command(&self) -> u32 {
+        self.steps_per_command
     }
 
     /// Where the recording lies.
@@ -163,7 +193,8 @@ impl Closed {
 }
 
 /// Answers commands until one asks for the end, or nobody is left who could send one.
-fn serve(mut session: Guarded, mut inbox: mpsc::Receiver<Command>, ended: &AtomicBool) -> Closed {
+fn serve(mut session: Guarded, mut inbox: mpsc::Receiver<Command>, news: &News) -> Closed {
+    news.spread(&session);
     while let Some(command) = inbox.blocking_recv() {
         // A reply that cannot be sent means that the caller has gone. What was done stays done.
         match command {
@@ -172,7 +203,7 @@ fn serve(mut session: Guarded, mut inbox: mpsc::Receiver<Command>, ended: &Atomi
                     let answered = session.call(call)?;
                     Ok(Answer::new(answered, session))
                 });
-                ended.store(session.ended(), Ordering::Relaxed);
+                news.spread(&session);
                 let _ = reply.send(answer.and_then(|answer| answer));
             }
             Command::Status { reply } => drop(reply.send(session.run(|session| status(session)))),
@@ -180,8 +211,8 @@ fn serve(mut session: Guarded, mut inbox: mpsc::Receiver<Command>, ended: &Atomi
             Command::EndIfAbandoned { idle } => {
                 // The log has the reason of a refusal.
                 let _ = session.run(|session| session.end_if_abandoned(idle));
+                news.spread(&session);
                 if session.ended() {
-                    ended.store(true, Ordering::Relaxed);
                     tracing::info!(episode = std::thread::current().name(), "abandoned, and ended");
                 }
             }

@@ -46,6 +46,14 @@ impl Guarded {
         }
     }
 
+    /// Why the recording is not complete, if it is not.
+    pub fn recording_failed(&self) -> Option<&str> {
+        match &self.state {
+            State::Sound(session) => session.recording_failed(),
+            State::Panicked(result) => result.as_ref()?.recording_failed.as_deref(),
+        }
+    }
+
     /// Ends the episode and closes its recording.
     pub fn close(self) -> Result<ResultReply, HostingError> {
         match self.state {

@@ -48,6 +48,7 @@ impl EpisodeTable {
         let spec = EpisodeSpec {
             locomotion: self.settings.locomotion.clone(),
             disclosure: self.settings.disclosure,
+            hints: self.settings.hints,
             ..EpisodeSpec::new(tasks::find(&args.task)?, args.seed, protocol)
         };
         let place = self.take_place().await?;
@@ -131,7 +132,7 @@ impl EpisodeTable {
     }
 
     /// Holds an episode, unless the table is closing: then it is given back.
-    pub(super) fn insert(&self, id: &str, episode: Arc<EpisodeThread>) -> Result<(), Arc<EpisodeThread>> {
+    pub(crate) fn insert(&self, id: &str, episode: Arc<EpisodeThread>) -> Result<(), Arc<EpisodeThread>> {
         let mut held = self.lock();
         if held.closing {
             return Err(episode);

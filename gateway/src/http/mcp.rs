@@ -3,6 +3,13 @@
 
 use std::sync::Arc;
 
+use axum::{
+    Router, body,
+    extract::Request,
+    http::request::Parts,
+    middleware::{self, Next},
+    response::Response,
+};
 use rmcp::{
     ErrorData, RoleServer, ServerHandler,
     model::{
@@ -17,19 +24,23 @@ use rmcp::{
 use serde::Serialize;
 use serde_json::Value;
 use tandem_tools_spec::{
-    ListTasks, LookReply, SpecError, StartEpisode, Tool as _, ToolCall, ToolReply, ToolSpec, parse_args,
-    tool_specs,
+    Hints, ListTasks, LookReply, SpecError, StartEpisode, Tool as _, ToolCall, ToolReply, ToolSpec,
+    parse_args, tool_specs,
 };
 
-use super::{app::App, problem::ApiError};
+use super::{app::App, problem::ApiError, request::unambiguous};
 
 /// What a host tells its model about the server as a whole.
 const INSTRUCTIONS: &str = "Simulated humanoids that must work together. Call list_tasks, then start_episode, then look \
     with observe and act with move_wrists, walk, send_joint_chunk or wait until the task is done, then call finish. \
     Physics stands still between calls.";
 
-/// The service that is nested at `/mcp`, behind the gate, which has looked at `Host` and `Origin`.
-pub fn service(app: App) -> StreamableHttpService<McpServer, NeverSessionManager> {
+/// What is nested at `/mcp`, behind the gate, which has looked at `Host` and `Origin`.
+pub fn router(app: App) -> Router {
+    Router::new().fallback_service(service(app)).layer(middleware::from_fn(note_ambiguity))
+}
+
+fn service(app: App) -> StreamableHttpService<McpServer, NeverSessionManager> {
     let config = StreamableHttpServerConfig::default()
         .with_legacy_session_mode(false)
         .with_json_response(true)
@@ -40,7 +51,7 @@ pub fn service(app: App) -> StreamableHttpService<McpServer, NeverSessionManager
 
 /// Answers MCP requests from the table of episodes.
 #[derive(Debug, Clone)]
-pub struct McpServer {
+struct McpServer {
     app: App,
 }
 
@@ -56,19 +67,24 @@ impl ServerHandler for McpServer {
         _: Option<PaginatedRequestParams>,
         _: RequestContext<RoleServer>,
     ) -> Result<ListToolsResult, ErrorData> {
-        Ok(ListToolsResult::with_all_items(tool_specs().into_iter().map(described).collect()))
+        let specs = tool_specs(self.app.settings.hints);
+        Ok(ListToolsResult::with_all_items(specs.iter().map(described).collect()))
     }
 
     async fn call_tool(
         &self,
         request: CallToolRequestParams,
-        _: RequestContext<RoleServer>,
+        context: RequestContext<RoleServer>,
     ) -> Result<CallToolResponse, ErrorData> {
         let args = Value::Object(request.arguments.unwrap_or_default());
-        let result = match self.call(&request.name, args).await {
+        let called = match ambiguity(&context) {
+            Some(Ambiguous(reason)) => Err(ApiError::MalformedJson(reason.clone())),
+            None => self.call(&request.name, args).await,
+        };
+        let result = match called {
             Ok(content) => CallToolResult::success(content),
             // A refusal is the tool's answer, which the model is to read; protocol errors often stay with the host.
-            Err(error) => CallToolResult::error(vec![ContentBlock::text(error.body().detail)]),
+            Err(error) => CallToolResult::error(refused(&error)),
         };
         Ok(result.into())
     }
@@ -88,11 +104,17 @@ impl McpServer {
 
     async fn call_episode(&self, name: &str, mut args: Value) -> Result<Vec<ContentBlock>, ApiError> {
         let handle = args.as_object_mut().and_then(|object| object.shift_remove("episode_id"));
-        let call = ToolCall::parse(name, args).map_err(with_every_tool)?;
+        let call = ToolCall::parse(name, args).map_err(|error| ApiError::from(with_every_tool(error)));
         let Some(Value::String(id)) = handle else {
-            return Err(ApiError::NoEpisodeNamed { tool: call.name() });
+            return Err(ApiError::NoEpisodeNamed { tool: call?.name() });
         };
-        let mut answer = self.app.table.get(&id)?.call(call).await?;
+        let episode = self.app.table.get(&id);
+        let call = match &episode {
+            Ok(episode) => call.map_err(|refusal| refusal.of(episode))?,
+            Err(_) => call?,
+        };
+        let episode = episode?;
+        let mut answer = episode.call(call).await.map_err(|error| ApiError::from(error).of(&episode))?;
         match &mut answer.reply {
             ToolReply::Look(LookReply::Observe(observation)) => {
                 let images = std::mem::take(&mut observation.images);
@@ -116,11 +138,38 @@ impl McpServer {
 /// This route serves the tools that need no episode, too.
 fn with_every_tool(error: SpecError) -> SpecError {
     match error {
-        SpecError::UnknownTool { name, .. } => {
-            SpecError::UnknownTool { name, have: tool_specs().iter().map(|spec| spec.name).collect() }
-        }
+        SpecError::UnknownTool { name, .. } => SpecError::UnknownTool { name, have: every_tool() },
         error => error,
     }
+}
+
+fn every_tool() -> Vec<&'static str> {
+    tool_specs(Hints::default()).iter().map(|spec| spec.name).collect()
+}
+
+/// A refusal as a model reads it.
+fn refused(error: &ApiError) -> Vec<ContentBlock> {
+    let failed = error.recording_failed().map(|reason| format!("recording_failed: {reason}"));
+    [error.body().detail].into_iter().chain(failed).map(ContentBlock::text).collect()
+}
+
+/// Why a request can be read in two ways. What reads JSON-RPC behind this keeps the last of two fields of one name.
+#[derive(Clone)]
+struct Ambiguous(String);
+
+/// Notes on a request whether its body names a field twice, for when its call is answered.
+async fn note_ambiguity(request: Request, next: Next) -> Response {
+    let (mut parts, body) = request.into_parts();
+    // The gate has received it, within its limit.
+    let bytes = body::to_bytes(body, usize::MAX).await.unwrap_or_default();
+    if let Err(reason) = unambiguous(&bytes) {
+        parts.extensions.insert(Ambiguous(reason));
+    }
+    next.run(Request::from_parts(parts, bytes.into())).await
+}
+
+fn ambiguity(context: &RequestContext<RoleServer>) -> Option<&Ambiguous> {
+    context.extensions.get::<Parts>()?.extensions.get()
 }
 
 fn json_block(reply: &impl Serialize) -> Result<Vec<ContentBlock>, ApiError> {
@@ -129,8 +178,8 @@ fn json_block(reply: &impl Serialize) -> Result<Vec<ContentBlock>, ApiError> {
 }
 
 /// The tool as MCP describes it. No output schema: clients drop the pictures of tools that declare one.
-fn described(spec: ToolSpec) -> Tool {
-    Tool::new(spec.name, spec.description, Arc::new(spec.input_schema)).with_annotations(
+fn described(spec: &ToolSpec) -> Tool {
+    Tool::new(spec.name, spec.description.clone(), Arc::new(spec.lenient_schema())).with_annotations(
         ToolAnnotations::new().read_only(spec.read_only).destructive(false).open_world(false),
     )
 }

@@ -8,5 +8,7 @@ mod problem;
 mod request;
 mod routes;
 mod server;
+#[cfg(test)]
+mod tests;
 
 pub use server::Server;

@@ -9,7 +9,7 @@ use axum::{
 use tandem_episodes::EpisodeError;
 use tandem_tools_spec::{ProblemBody, SpecError};
 
-use crate::hosting::HostingError;
+use crate::hosting::{EpisodeThread, HostingError};
 
 /// The media type of RFC 9457.
 pub const PROBLEM_JSON: &str = "application/problem+json";
@@ -20,6 +20,14 @@ pub enum ApiError {
     /// The call does not fit the contract.
     #[error(transparent)]
     Spec(#[from] SpecError),
+    /// A refusal that concerns an episode whose recording has failed, which every answer of it says.
+    #[error("{error}")]
+    Unrecorded {
+        /// The refusal.
+        error: Box<ApiError>,
+        /// Why the recording is not complete.
+        recording_failed: String,
+    },
     /// The host of the episodes, or the episode itself, refused.
     #[error("{0}{way}", way = way_out(.0))]
     Hosting(#[from] HostingError),
@@ -121,6 +129,7 @@ impl ApiError {
     fn kind(&self) -> Kind {
         match self {
             ApiError::Spec(error) => spec_kind(error),
+            ApiError::Unrecorded { error, .. } => error.kind(),
             ApiError::Hosting(error) => hosting_kind(error),
             ApiError::NoRoute { other_method: false, .. } => {
                 ("no-route", "No such route", StatusCode::NOT_FOUND)
@@ -167,12 +176,32 @@ impl ApiError {
             title: title.into(),
             status: status.as_u16(),
             detail,
+            recording_failed: self.recording_failed().map(str::to_owned),
+        }
+    }
+
+    /// Why the recording of the episode that it concerns is not complete, if that has to be said.
+    pub fn recording_failed(&self) -> Option<&str> {
+        match self {
+            ApiError::Unrecorded { recording_failed, .. } => Some(recording_failed),
+            _ => None,
+        }
+    }
+
+    /// The refusal as `episode` makes it.
+    pub fn of(self, episode: &EpisodeThread) -> ApiError {
+        match episode.recording_failed() {
+            Some(reason) => {
+                ApiError::Unrecorded { error: Box::new(self), recording_failed: reason.to_owned() }
+            }
+            None => self,
         }
     }
 
     /// Seconds after which the same request may work.
     fn retry_after_s(&self) -> Option<u16> {
         match self {
+            ApiError::Unrecorded { error, .. } => error.retry_after_s(),
             ApiError::Hosting(HostingError::TooManyWaiting { .. }) => Some(1),
             ApiError::Hosting(HostingError::TooManyEpisodes { .. }) => Some(10),
             ApiError::Hosting(HostingError::ShuttingDown) => Some(60),

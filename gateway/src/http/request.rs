@@ -27,6 +27,12 @@ pub fn json_object(body: &[u8]) -> Result<Value, ApiError> {
     }
 }
 
+/// Why a body can be read in two ways, or cannot be read at all.
+pub fn unambiguous(body: &[u8]) -> Result<(), String> {
+    let read: Result<Unambiguous, _> = serde_json::from_slice(body);
+    read.map(drop).map_err(|error| error.to_string())
+}
+
 /// Any JSON in which no object names a field twice: readers of JSON differ in which of the two they take.
 struct Unambiguous(Value);
 

@@ -11,7 +11,8 @@ use axum::{
 };
 use serde_json::{Value, json};
 use tandem_tools_spec::{
-    ResultReply, StartEpisode, StartReply, TaskList, ToolCall, ToolSpec, parse_args, tool_specs,
+    EpisodeToolSpec, ResultReply, StartEpisode, StartReply, TaskList, ToolCall, ToolSpec, episode_tool_specs,
+    parse_args, tool_specs,
 };
 
 use super::{
@@ -24,7 +25,7 @@ use super::{
 use crate::hosting::Answer;
 
 /// Every route: path, methods, handlers.
-fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 7] {
+fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 8] {
     [
         ("/healthz", &["GET"], get(health)),
         ("/v1/tasks", &["GET"], get(tasks)),
@@ -32,13 +33,14 @@ fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 7] {
         ("/v1/openapi.json", &["GET"], get(openapi)),
         ("/v1/episodes", &["POST"], post(start)),
         ("/v1/episodes/{id}", &["GET", "DELETE"], get(status).delete(remove)),
+        ("/v1/episodes/{id}/tools", &["GET"], get(episode_tools)),
         ("/v1/episodes/{id}/tools/{name}", &["POST"], post(call)),
     ]
 }
 
 /// The whole service.
 pub fn router(app: App, gate: Gate) -> Router {
-    let mut router = Router::new().nest_service("/mcp", mcp::service(app.clone()));
+    let mut router = Router::new().nest_service("/mcp", mcp::router(app.clone()));
     for (path, _, handlers) in routes() {
         router = router.route(path, handlers);
     }
@@ -60,12 +62,20 @@ async fn tasks(State(app): State<App>) -> Json<TaskList> {
     Json(app.table.task_list())
 }
 
-async fn tools() -> Json<Vec<ToolSpec>> {
-    Json(tool_specs())
+async fn tools(State(app): State<App>) -> Json<Vec<ToolSpec>> {
+    Json(tool_specs(app.settings.hints))
 }
 
-async fn openapi() -> Json<Value> {
-    Json(tandem_tools_spec::openapi(env!("CARGO_PKG_VERSION")))
+async fn episode_tools(
+    State(app): State<App>,
+    Path(id): Path<String>,
+) -> Result<Json<Vec<EpisodeToolSpec>>, ApiError> {
+    let most_steps = app.table.get(&id)?.steps_per_command();
+    Ok(Json(episode_tool_specs(app.settings.hints, &id, most_steps)))
+}
+
+async fn openapi(State(app): State<App>) -> Json<Value> {
+    Json(tandem_tools_spec::openapi(env!("CARGO_PKG_VERSION"), app.settings.hints))
 }
 
 async fn start(State(app): State<App>, body: Bytes) -> Result<Response, ApiError> {
@@ -84,10 +94,15 @@ async fn call(
     Path((id, name)): Path<(String, String)>,
     body: Bytes,
 ) -> Result<Json<Answer>, ApiError> {
-    let args = json_object(&body)?;
     let episode = app.table.get(&id)?;
-    let call = ToolCall::parse(&name, without_episode_id(args, &id)?)?;
-    Ok(Json(episode.call(call).await?))
+    let read = || -> Result<ToolCall, ApiError> {
+        Ok(ToolCall::parse(&name, without_episode_id(json_object(&body)?, &id)?)?)
+    };
+    let answer = match read() {
+        Ok(call) => episode.call(call).await.map_err(ApiError::from),
+        Err(refusal) => Err(refusal),
+    };
+    answer.map(Json).map_err(|refusal| refusal.of(&episode))
 }
 
 async fn remove(State(app): State<App>, Path(id): Path<String>) -> Result<Json<ResultReply>, ApiError> {

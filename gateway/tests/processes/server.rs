@@ -44,7 +44,10 @@ impl Server {
 
     /// The answer to a call, or `None` where the server went away meanwhile.
     pub fn post(&self, path: &str, body: &Value) -> Option<Value> {
-        let mut response = self.agent.post(format!("{}{path}", self.url)).send_json(body).ok()?;
+        let request = self.agent.post(format!("{}{path}", self.url));
+        // What MCP asks for, and what REST takes as well.
+        let request = request.header("accept", "application/json, text/event-stream");
+        let mut response = request.send_json(body).ok()?;
         response.body_mut().read_json().ok()
     }
 

@@ -4,6 +4,7 @@ mod arm;
 mod feeling;
 mod hand_force;
 mod joints;
+mod odometry;
 mod payload;
 mod per_joint;
 mod spawn;
@@ -25,6 +26,7 @@ use crate::dynamics::{Dynamics, TreeId};
 use crate::locomotion::{BaseCommand, BaseLimits, LegCommand, Locomotion};
 use crate::{CONTROL_DT_S, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError};
 use feeling::Feeling;
+use odometry::Odometry;
 
 /// What one robot is told for one control step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -50,6 +52,7 @@ struct Memory {
     /// Upper-body targets at the last control step; within a step they move linearly to the new command.
     last_upper_rad: Vec<f32>,
     feeling: Feeling,
+    odometry: Odometry,
     base: BaseCommand,
     fallen: bool,
 }
@@ -74,6 +77,7 @@ impl Robot {
         let tree = dynamics.tree_mut(self.tree);
         let body = self.sense(&model, tree);
         let load_n_m = self.feel(&body, &joints::torques_n_m(tree, &model));
+        self.memory.odometry.update(&body, PHYSICS_DT_S);
         let legs = self.locomotion.tick(&body, &command.base, PHYSICS_DT_S);
         let mut drives = [Drive::default(); JOINTS];
         self.set_upper_body(&mut drives, &load_n_m, command, substep);

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use rapier3d::math::{Pose, Rotation, Vector};
 
 use super::feeling::Feeling;
+use super::odometry::Odometry;
 use super::{Memory, Robot};
 use crate::SimError;
 use crate::body::{self, RobotModel, UPPER, check_joint_order};
@@ -51,6 +52,7 @@ impl Robot {
         let memory = Memory {
             last_upper_rad: UPPER.iter().map(|joint| q_rad[*joint]).collect(),
             feeling: Feeling::default(),
+            odometry: Odometry::default(),
             base: BaseCommand::standing(pelvis.translation.z),
             fallen: false,
         };

@@ -4,11 +4,11 @@ use rapier3d::math::{Pose, Vector};
 use serde::{Deserialize, Serialize};
 
 use super::{Robot, RobotCommand, joints, per_joint};
-use crate::Sides;
 use crate::body::{JOINTS, RobotModel, UPPER, WholeBody};
 use crate::dynamics::{Dynamics, Tree};
 use crate::locomotion::BaseCommand;
 use crate::mechanism::rounded;
+use crate::{PHYSICS_DT_S, Sides};
 
 /// What a robot can measure of itself; poses as named.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -21,6 +21,9 @@ pub struct RobotState {
     #[serde(with = "per_joint")]
     pub torque_n_m: [f32; JOINTS],
     pub world_from_pelvis: Pose,
+    /// By the robot's own odometry: the start frame lies on the floor under the pelvis as it was put into the world, z up, x
+    /// where the pelvis faced.
+    pub start_from_pelvis: Pose,
     pub pelvis_from_wrist: Sides<Pose>,
     /// Axes as [`crate::mjcf::MjcfCamera`]'s.
     pub pelvis_from_camera: Pose,
@@ -75,6 +78,7 @@ impl Robot {
             qd_rad_s: body.qd_rad_s,
             torque_n_m: joints::torques_n_m(dynamics.tree(self.tree), model),
             world_from_pelvis: body.world_from_pelvis(),
+            start_from_pelvis: self.memory.odometry.start_from_pelvis(body, PHYSICS_DT_S),
             pelvis_from_wrist: model
                 .wrists
                 .each_ref()
@@ -108,7 +112,6 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::PHYSICS_DT_S;
     use crate::body::posed::{Posed, model};
     use crate::dynamics::{DVec3, Settings};
     use crate::robot::RobotPlacement;

@@ -64,7 +64,8 @@ fn budgets_are_as_published() {
 fn the_camera_and_the_joints_are_as_published() {
     let task = tasks::find("handover").unwrap();
     let mut session = Session::start(&EpisodeSpec::new(task, 0, Protocol::Benchmark), None).unwrap();
-    let ToolReply::Look(LookReply::Observe(seen)) = session.call(Observe { robots: None }.into()).unwrap()
+    let ToolReply::Look(LookReply::Observe(seen)) =
+        session.call(Observe { robots: None, short: None }.into()).unwrap()
     else {
         panic!("no observation")
     };
@@ -79,7 +80,7 @@ fn the_camera_and_the_joints_are_as_published() {
     }
     let briefing = session.briefing();
     for (group, count) in table::STATE {
-        let names = briefing.robots[0].joints.iter().map(|joint| joint.name.as_str());
+        let names = briefing.kinds[0].joints.iter().map(|joint| joint.name.as_str());
         assert_eq!(names.filter(|name| self::group(name) == group).count(), count, "{group}");
     }
     let (joints, base) = briefing.action_row.split_at(briefing.action_row.len() - table::ACTION_BASE.len());

@@ -62,7 +62,7 @@ mod with_wave {
 #[test]
 fn a_line_names_and_describes_the_tool() {
     assert_eq!(with_wave::EPISODE_TOOLS, ["get_status", "wave", "wait"]);
-    let specs = with_wave::tool_specs();
+    let specs = with_wave::tool_specs(Hints::On);
     let names: Vec<_> = specs.iter().map(|spec| (spec.name, spec.on_episode)).collect();
     assert_eq!(names, [("list_tasks", false), ("get_status", true), ("wave", true), ("wait", true)]);
     let wave = &specs[2];
@@ -107,7 +107,7 @@ fn a_line_reads_replies() {
 
 #[test]
 fn every_example_works_and_only_looking_promises_to_change_nothing() {
-    let specs = tool_specs();
+    let specs = tool_specs(Hints::On);
     for example in ToolCall::examples() {
         assert_eq!(ToolCall::parse(example.name(), json!(example)), Ok(example.clone()));
         let read_only = specs.iter().any(|spec| spec.name == example.name() && spec.read_only);

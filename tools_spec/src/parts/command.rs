@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::episode::{Budget, PhaseReached, RobotFallen};
+use super::hand::HandReport;
 use super::pose::Pose;
 
 /// The reply to every command: `move_wrists`, `walk`, `send_joint_chunk` and `wait`.
@@ -15,7 +16,7 @@ pub struct CommandReply {
     pub stop_reason: StopReason,
     /// Simulated seconds since the episode began.
     pub time_s: f64,
-    /// One report per robot that the command named.
+    /// One report per robot that the command named; after `wait`, one per robot of the episode.
     pub robots: Vec<RobotReport>,
     /// Every robot of the episode.
     pub fallen: Vec<RobotFallen>,
@@ -37,24 +38,6 @@ pub enum StopReason {
     StepBudgetExhausted,
 }
 
-/// How one hand did under a command, at its last step.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct HandReport {
-    /// The wrist pose that was asked for, in the pelvis frame as it is now; of an arm without a wrist target, the pose that
-    /// its joint targets stand for.
-    pub target: Pose,
-    /// The wrist pose that was measured, in the pelvis frame as it is now.
-    pub measured: Pose,
-    /// Distance from target to measured, in metres.
-    pub position_error_m: f64,
-    /// Angle from target to measured, in radians.
-    pub orientation_error_rad: f64,
-    /// Joints of this arm and hand whose target lay beyond a limit and was moved to it.
-    pub joints_clamped: Vec<String>,
-    /// Joints of this arm and hand that rest at a limit.
-    pub joints_at_limit: Vec<String>,
-}
-
 /// How one robot did under a command.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotReport {
@@ -64,10 +47,28 @@ pub struct RobotReport {
     pub left: HandReport,
     /// Its right arm and hand.
     pub right: HandReport,
+    /// Where its own legs and gyro have it: the pose of its pelvis in the start frame, which lies on the floor under the pelvis as
+    /// it was when the episode began, z up, x where the robot faced. Drifts by up to 1 % of the way walked.
+    pub pelvis_in_start: Pose,
+    /// How far the command took the base, by the same odometry.
+    pub base_motion: BaseMotion,
     /// Waist joints whose target lay beyond a limit and was moved to it.
     pub waist_joints_clamped: Vec<String>,
     /// Waist joints that rest at a limit.
     pub waist_joints_at_limit: Vec<String>,
     /// Fields of the base command that lay beyond what locomotion accepts and were moved to it, as `vx_m_s`.
     pub base_command_clamped: Vec<String>,
+}
+
+/// How a pelvis moved during a command, forward and left as the robot faced when the command began.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct BaseMotion {
+    /// Forward, in metres.
+    pub forward_m: f64,
+    /// To the left, in metres.
+    pub left_m: f64,
+    /// Upwards, in metres.
+    pub up_m: f64,
+    /// How far it turned, in radians, counter-clockwise seen from above.
+    pub turned_rad: f64,
 }

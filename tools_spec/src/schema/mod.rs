@@ -1,9 +1,10 @@
 //! The contract as machines read it: strict JSON Schema for the hosts of language models, OpenAPI for everybody else.
 
+mod lenient;
 mod openapi;
 mod plain;
 mod spec;
 mod strict;
 
 pub use openapi::openapi;
-pub use spec::ToolSpec;
+pub use spec::{EpisodeToolSpec, ToolSpec};

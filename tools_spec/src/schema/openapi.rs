@@ -5,18 +5,20 @@ use serde_json::{Map, Value, json};
 use super::plain::plain_schema;
 use super::spec::ToolSpec;
 use crate::error::ProblemBody;
+use crate::limits::MOST_STEPS;
 use crate::tool::Tool;
-use crate::tools::{Finish, GetStatus, ListTasks, StartEpisode};
+use crate::tools::{Finish, GetStatus, StartEpisode};
 
-/// The document of a server of `version` whose episodes have the tools `on_episode`. Each tool has a path of its own, so
-/// that generated clients have a method for each.
-pub fn openapi(version: &str, on_episode: impl Iterator<Item = ToolSpec>) -> Value {
-    let mut paths = paths_without_episode();
-    for spec in on_episode {
-        let path = format!("/v1/episodes/{{episode_id}}/tools/{}", spec.name);
-        let mut call = operation(spec.name, &spec.description, "200", with_notice(spec.reply_schema));
-        call["requestBody"] = json_body(spec.body_schema);
-        paths.insert(path, json!({ "parameters": [episode_id()], "post": call }));
+/// The document of a server of `version` with these tools. Each tool has a path of its own, so that generated clients have a
+/// method for each.
+pub fn openapi(version: &str, tools: &[ToolSpec]) -> Value {
+    let mut paths = paths_without_tools();
+    for spec in tools {
+        let mut path = json!({ (spec.route.method.to_lowercase()): tool(spec) });
+        if spec.on_episode {
+            path["parameters"] = json!([episode_id()]);
+        }
+        paths.insert(spec.route.path.clone(), path);
     }
     let status = with_notice(plain_schema::<<GetStatus as Tool>::Reply>());
     let result = plain_schema::<<Finish as Tool>::Reply>();
@@ -36,23 +38,31 @@ pub fn openapi(version: &str, on_episode: impl Iterator<Item = ToolSpec>) -> Val
     })
 }
 
-fn paths_without_episode() -> Map<String, Value> {
+fn tool(spec: &ToolSpec) -> Value {
+    let reply = spec.reply_schema.clone();
+    let reply = if spec.on_episode { with_notice(reply) } else { reply };
+    let success = if spec.name == StartEpisode::NAME { "201" } else { "200" };
+    let mut call = operation(spec.name, &spec.description, success, reply);
+    if spec.route.method == "POST" {
+        call["requestBody"] = json_body(spec.body_schema(MOST_STEPS));
+    }
+    call
+}
+
+fn paths_without_tools() -> Map<String, Value> {
     let health = json!({ "type": "object", "description": "The server answers." });
     let health = operation("health", "Whether the server answers.", "200", health);
     let specs = json!({ "type": "array", "items": { "type": "object" } });
     let tools =
         "The tools as specifications for language models, which name the episode among the arguments.";
-    let tools = operation("list_tools", tools, "200", specs);
-    let list = ToolSpec::without_episode::<ListTasks>();
-    let list = operation(list.name, &list.description, "200", list.reply_schema);
-    let start = ToolSpec::without_episode::<StartEpisode>();
-    let mut post = operation(start.name, &start.description, "201", start.reply_schema);
-    post["requestBody"] = json_body(start.body_schema);
+    let tools = operation("list_tools", tools, "200", specs.clone());
+    let of_episode = "The tools of a running episode: each with its route and with the schema of its body, which says how \
+        many control steps the episode's protocol allows for one command.";
+    let of_episode = operation("list_episode_tools", of_episode, "200", specs);
     let paths = [
         ("/healthz", json!({ "get": health })),
         ("/v1/tools", json!({ "get": tools })),
-        ("/v1/tasks", json!({ "get": list })),
-        ("/v1/episodes", json!({ "post": post })),
+        ("/v1/episodes/{episode_id}/tools", json!({ "parameters": [episode_id()], "get": of_episode })),
     ];
     paths.into_iter().map(|(path, methods)| (path.into(), methods)).collect()
 }

@@ -3,9 +3,12 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::lenient::lenient_schema;
 use super::plain::{body_schema, plain_schema};
 use super::strict::{require_episode_id, strict_schema};
-use crate::tool::Tool;
+use crate::limits::bound_steps;
+use crate::parts::Hints;
+use crate::tool::{Route, Tool};
 
 /// A tool as a policy's host needs it: for OpenAI, Anthropic and MCP alike.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -16,9 +19,9 @@ pub struct ToolSpec {
     pub description: String,
     /// Strict JSON Schema of the arguments, with `episode_id` where the tool acts on an episode.
     pub input_schema: Map<String, Value>,
-    /// JSON Schema of a REST body, which need not be strict: what may be null may be left out, and lengths are said.
+    /// As [`ToolSpec::body_schema`], where what counts control steps is only marked.
     #[serde(skip)]
-    pub body_schema: Value,
+    marked_body: Value,
     /// JSON Schema of the reply. Hosts of language models do not want it (MCP clients drop the pictures of a tool that
     /// declares one), so it is only part of the OpenAPI description.
     #[serde(skip)]
@@ -27,27 +30,60 @@ pub struct ToolSpec {
     pub read_only: bool,
     /// Whether the tool acts on an episode that `start_episode` made.
     pub on_episode: bool,
+    /// Where REST serves it.
+    pub route: Route,
+}
+
+/// A tool of an episode that runs: its route names the episode, and its body is described as the episode's rules have it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EpisodeToolSpec {
+    /// The tool.
+    #[serde(flatten)]
+    pub spec: ToolSpec,
+    /// See [`ToolSpec::body_schema`].
+    pub body_schema: Value,
 }
 
 impl ToolSpec {
     /// The specification of `T`, which acts on an episode; without a path to name it, the arguments carry `episode_id`.
-    pub fn on_episode<T: Tool>() -> ToolSpec {
-        let mut spec = ToolSpec::without_episode::<T>();
+    pub fn on_episode<T: Tool>(hints: Hints) -> ToolSpec {
+        let mut spec = ToolSpec::without_episode::<T>(hints);
         require_episode_id(&mut spec.input_schema);
         ToolSpec { on_episode: true, ..spec }
     }
 
     /// The specification of `T`, which needs no episode.
-    pub fn without_episode<T: Tool>() -> ToolSpec {
-        let (description, input_schema) = strict_schema::<T>();
+    pub fn without_episode<T: Tool>(hints: Hints) -> ToolSpec {
+        let (description, input_schema) = strict_schema::<T>(hints);
         ToolSpec {
             name: T::NAME,
             description,
             input_schema,
-            body_schema: body_schema::<T>(),
+            marked_body: body_schema::<T>(hints),
             reply_schema: plain_schema::<T::Reply>(),
             read_only: T::READ_ONLY,
             on_episode: false,
+            route: T::route(),
         }
+    }
+
+    /// JSON Schema of a REST body, which need not be strict: what may be null may be left out, and lengths are said. A command
+    /// may have up to `most_steps` control steps.
+    pub fn body_schema(&self, most_steps: u32) -> Value {
+        let mut schema = self.marked_body.clone();
+        bound_steps(&mut schema, most_steps);
+        schema
+    }
+
+    /// The strict schema in which a field that may be null may be left out.
+    pub fn lenient_schema(&self) -> Map<String, Value> {
+        lenient_schema(&self.input_schema)
+    }
+
+    /// The tool as the running episode `id` has it.
+    pub fn of_episode(self, id: &str, most_steps: u32) -> EpisodeToolSpec {
+        let body_schema = self.body_schema(most_steps);
+        let route = Route::of_episode(id, self.name);
+        EpisodeToolSpec { spec: ToolSpec { route, ..self }, body_schema }
     }
 }

@@ -4,7 +4,8 @@
 use schemars::JsonSchema;
 use serde_json::{Map, Value, json};
 
-use super::plain::plain_schema;
+use super::plain::argument_schema;
+use crate::parts::Hints;
 
 /// Keywords that OpenAI's strict mode or common MCP clients refuse or warn about.
 const DROPPED: &[&str] = &[
@@ -25,11 +26,13 @@ const DROPPED: &[&str] = &[
     "uniqueItems",
     "contains",
     "not",
+    // Ours, for schemas of bodies.
+    "most_steps",
 ];
 
 /// The description of `T` and its schema without it.
-pub fn strict_schema<T: JsonSchema>() -> (String, Map<String, Value>) {
-    let mut schema = plain_schema::<T>();
+pub fn strict_schema<T: JsonSchema>(hints: Hints) -> (String, Map<String, Value>) {
+    let mut schema = argument_schema::<T>(hints);
     make_strict(&mut schema);
     let mut object = schema.as_object_mut().map(std::mem::take).unwrap_or_default();
     let description = match object.remove("description") {
@@ -82,11 +85,14 @@ fn unwrap_lines(object: &mut Map<String, Value>) {
 }
 
 /// Strict hosts refuse `oneOf`, which is how schemars writes an enum whose variants are described: the names become an
-/// `enum` and their descriptions part of the enum's own.
+/// `enum` and their descriptions part of the enum's own. Of any other `oneOf` only the texts are left.
 fn list_choices(object: &mut Map<String, Value>) {
     let Some(Value::Array(choices)) = object.remove("oneOf") else {
         return;
     };
+    if choices.iter().any(|choice| choice.get("const").is_none()) {
+        return;
+    }
     let mut description = object["description"].as_str().unwrap_or_default().to_owned();
     for choice in &choices {
         if let (Some(name), Some(text)) = (choice["const"].as_str(), choice["description"].as_str()) {

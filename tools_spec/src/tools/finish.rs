@@ -7,8 +7,8 @@ use serde_json::{Map, Value};
 use crate::parts::{Disclosure, Protocol};
 use crate::tool::Tool;
 
-/// End the episode and get its result. Call it when the task is done or cannot be done any more. After that only
-/// get_status and finish answer.
+/// End the episode and get its result. Call it when the task is done or cannot be done any more. After that no
+/// command is executed; observe, get_robot_state, get_status and finish still answer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Finish {}

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::start_episode::Instruction;
 use crate::parts::{BaseLimits, Protocol};
-use crate::tool::Tool;
+use crate::tool::{Route, Tool};
 
 /// List the tasks that start_episode can start: their instructions, the phases they are scored by, and the budgets of
 /// each protocol; and how fast and how low the robots can move.
@@ -20,6 +20,10 @@ impl Tool for ListTasks {
 
     fn example() -> Self {
         ListTasks {}
+    }
+
+    fn route() -> Route {
+        Route { method: "GET", path: "/v1/tasks".into() }
     }
 }
 

@@ -22,6 +22,8 @@ pub use move_wrists::{MoveWrists, WristMove};
 pub use observe::{CameraCalibration, CameraImage, Observation, Observe};
 pub use query_depth::{DepthPoint, DepthReply, QueryDepth};
 pub use send_joint_chunk::{ACTION_ROW_LEN, JointChunk, SendJointChunk, action_row_layout};
-pub use start_episode::{Briefing, Instruction, JointInfo, RobotInfo, StartEpisode, StartReply};
+pub use start_episode::{
+    Brief, Briefing, Instruction, JointInfo, RobotInfo, RobotKind, StartEpisode, StartReply,
+};
 pub use wait::Wait;
 pub use walk::{Walk, WalkMove};

@@ -10,13 +10,13 @@ use crate::tool::Tool;
 
 /// Move wrists, fingers and base of one or more robots for a number of control steps of 20 ms. Inverse kinematics turns
 /// wrist poses into arm and waist joints. Robots that are not named hold still; a hand without a wrist target keeps its
-/// arm's joints, and fingers that are not given keep theirs. The reply says for each hand how far it is from its target: if
-/// it is still moving, repeat the command or call wait; if it has stopped short, joints_at_limit says why.
+/// arm's joints, and fingers that are not given keep theirs. The reply says of each wrist and its fingers whether they have
+/// arrived, are moving (repeat the command or call wait), are blocked by load or contact, or are out of reach.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MoveWrists {
     /// Control steps of 20 ms: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark protocol.
-    #[schemars(range(min = 1, max = limits::MOST_STEPS))]
+    #[schemars(range(min = 1), extend("most_steps" = "maximum"))]
     pub steps: u32,
     /// One entry per robot that is to move; each robot at most once.
     #[schemars(length(min = 1, max = limits::ROBOT_NAMES.len()), extend("not" = limits::a_robot_twice()))]
@@ -27,10 +27,10 @@ pub struct MoveWrists {
 /// own pelvis frame as it is when the command begins: x forward, y left, z up, metres. From then on they are fixed in the
 /// world: a robot that walks or sways does not take its hands along, unless `carried` is true. The fingers point along a
 /// wrist's x axis; the right palm faces along its y axis, the left palm against it, so that with [1, 0, 0, 0] the fingers
-/// point forward and the palms face each other. A hand closes on what lies 0.12 m along x and 0.055 m before its palm. To
-/// grasp an upright bottle from the side with [1, 0, 0, 0], open the thumb, bring the right wrist to [-0.12, -0.135, 0] from
-/// the bottle's axis, then to [-0.12, -0.055, 0], palm first, then close the fingers.
+/// point forward and the palms face each other. A hand closes on what lies 0.12 m along x and 0.055 m before its palm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(extend("hint" = "To grasp an upright bottle from the side with [1, 0, 0, 0], open the thumb, bring the right wrist \
+    to [-0.12, -0.135, 0] from the bottle's axis, then to [-0.12, -0.055, 0], palm first, then close the fingers."))]
 #[serde(deny_unknown_fields)]
 pub struct WristMove {
     /// The robot, as "A".
@@ -53,11 +53,13 @@ pub struct WristMove {
     /// True: the wrist targets move with the pelvis from the command's beginning on, as a robot that carries something wants
     /// it. False or null: they are fixed in the world.
     pub carried: Option<bool>,
-    /// Left finger joint angles in radians: [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1]. Closed
-    /// around a bottle: [0, 0.75, 0.8, -1.1, -1.3, -1.1, -1.3]; open: [0, -0.3, 0, 0, 0, 0, 0]. Null keeps the target.
+    /// Left finger joint angles in radians: [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1]. Positive angles
+    /// close thumb_1 and thumb_2, negative ones middle and index. Null keeps the target.
+    #[schemars(extend("hint" = "Closed around a bottle: [0, 0.75, 0.8, -1.1, -1.3, -1.1, -1.3]; open: [0, -0.3, 0, 0, 0, 0, 0]."))]
     pub left_fingers_rad: Option<[f64; 7]>,
-    /// Right finger joint angles in radians: [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1]. Closed
-    /// around a bottle: [0, -0.75, -0.8, 1.1, 1.3, 1.1, 1.3]; open: [0, 0.3, 0, 0, 0, 0, 0]. Null keeps the target.
+    /// Right finger joint angles in radians: [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1]. Negative angles
+    /// close thumb_1 and thumb_2, positive ones middle and index. Null keeps the target.
+    #[schemars(extend("hint" = "Closed around a bottle: [0, -0.75, -0.8, 1.1, 1.3, 1.1, 1.3]; open: [0, 0.3, 0, 0, 0, 0, 0]."))]
     pub right_fingers_rad: Option<[f64; 7]>,
     /// Forward velocity in metres per second during this command. Null: 0.
     pub vx_m_s: Option<f64>,

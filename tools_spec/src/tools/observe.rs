@@ -11,7 +11,7 @@ use crate::tool::Tool;
 
 /// Look through the robots' own head cameras and read their proprioception. Returns for each robot the same numbers as
 /// get_robot_state, the calibration of its camera, and one PNG image of 320x240 pixels. Costs no steps; physics stands
-/// still.
+/// still. Also answers after the episode has ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Observe {
@@ -22,6 +22,8 @@ pub struct Observe {
         extend("uniqueItems" = true)
     )]
     pub robots: Option<Vec<String>>,
+    /// True: without joint velocities and torques, which halves the text. False or null: with them.
+    pub short: Option<bool>,
 }
 
 impl Tool for Observe {
@@ -30,7 +32,7 @@ impl Tool for Observe {
     const READ_ONLY: bool = true;
 
     fn example() -> Self {
-        Observe { robots: Some(vec!["A".into()]) }
+        Observe { robots: Some(vec!["A".into()]), short: Some(true) }
     }
 
     fn validate(&self) -> Result<(), String> {

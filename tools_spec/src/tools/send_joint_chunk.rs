@@ -29,7 +29,10 @@ pub fn action_row_layout() -> String {
 #[serde(deny_unknown_fields)]
 pub struct SendJointChunk {
     /// One entry per robot that is to move; each robot at most once.
-    #[schemars(length(min = 1, max = limits::ROBOT_NAMES.len()), extend("not" = limits::a_robot_twice()))]
+    #[schemars(
+        length(min = 1, max = limits::ROBOT_NAMES.len()),
+        extend("not" = limits::a_robot_twice(), "most_steps" = "equal_rows")
+    )]
     pub robots: Vec<JointChunk>,
 }
 
@@ -40,11 +43,12 @@ pub struct JointChunk {
     /// The robot, as "A".
     #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
-    /// Rows of 35 numbers: joint targets in radians for left_arm 7, right_arm 7, left_hand 7, right_hand 7, waist 3 (yaw,
+    /// Rows of 35 numbers each, as many as every other robot has; 1 to 25 rows in the agentic protocol, 1 to 50 in the benchmark
+    /// protocol. A row: joint targets in radians for left_arm 7, right_arm 7, left_hand 7, right_hand 7, waist 3 (yaw,
     /// roll, pitch), then vx in m/s, vy in m/s, yaw rate in rad/s and pelvis height in m. An arm is shoulder_pitch,
     /// shoulder_roll, shoulder_yaw, elbow, wrist_roll, wrist_pitch, wrist_yaw; a hand is thumb_0, thumb_1, thumb_2,
     /// middle_0, middle_1, index_0, index_1.
-    #[schemars(length(min = 1, max = limits::MOST_STEPS), inner(length(equal = ACTION_ROW_LEN)))]
+    #[schemars(length(min = 1), inner(length(equal = ACTION_ROW_LEN)), extend("most_steps" = "maxItems"))]
     pub rows: Vec<Vec<f64>>,
 }
 

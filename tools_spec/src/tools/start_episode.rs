@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 
 use super::get_status::StatusReply;
 use crate::parts::{BaseLimits, Protocol};
-use crate::tool::Tool;
+use crate::tool::{Route, Tool};
 
-/// Start an episode of a task. Returns episode_id, which every other tool needs, the instruction, the robots with their
-/// joints and limits, and the budget. The same task, seed and commands always give the same episode. Physics stands
+/// Start an episode of a task. Returns episode_id, which every other tool needs, the instruction, a brief on frames, cameras
+/// and hands, the robots with their joints and limits, and the budget. The same task, seed and commands always give the same episode. Physics stands
 /// still between calls.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -30,6 +30,10 @@ impl Tool for StartEpisode {
     fn example() -> Self {
         StartEpisode { task: "handover".into(), seed: 0, protocol: Some(Protocol::Agentic) }
     }
+
+    fn route() -> Route {
+        Route { method: "POST", path: "/v1/episodes".into() }
+    }
 }
 
 /// The reply to `start_episode`.
@@ -49,12 +53,19 @@ pub struct Briefing {
     pub instruction: String,
     /// What each robot has to do.
     pub instructions: Vec<Instruction>,
-    /// The robots and what can be asked of them.
+    /// The robots.
     pub robots: Vec<RobotInfo>,
+    /// What can be asked of robots of each kind.
+    pub kinds: Vec<RobotKind>,
+    /// What has to be known to see and to act.
+    pub brief: Brief,
     /// The columns of a row of send_joint_chunk.
     pub action_row: Vec<String>,
     /// Where the episode stands after the initial hold.
     pub status: StatusReply,
+    /// Why the recording is not complete; left out where it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recording_failed: Option<String>,
 }
 
 /// What one robot has to do.
@@ -66,11 +77,20 @@ pub struct Instruction {
     pub instruction: String,
 }
 
-/// One robot: its joints in published order, and what its locomotion accepts.
+/// One robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotInfo {
     /// The robot, as "A".
     pub robot: String,
+    /// Which of `kinds` it is.
+    pub kind: String,
+}
+
+/// A kind of robot: its joints in published order, and what its locomotion accepts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RobotKind {
+    /// What `robots` call it.
+    pub kind: String,
     /// Its joints.
     pub joints: Vec<JointInfo>,
     /// The base commands that its locomotion accepts.
@@ -87,4 +107,24 @@ pub struct JointInfo {
     pub lower_rad: f64,
     /// Upper limit in radians.
     pub upper_rad: f64,
+    /// The largest torque that its drive exerts, in newton metres.
+    pub effort_n_m: f64,
+}
+
+/// What has to be known of the robots to see and to act, in words.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Brief {
+    /// The frames that poses are given in.
+    pub frames: String,
+    /// How the frames of different robots are related.
+    pub partners: String,
+    /// What is known of a robot's own way.
+    pub odometry: String,
+    /// The camera's convention, and what moves it.
+    pub camera: String,
+    /// The shape of a hand.
+    pub hands: String,
+    /// How to grasp; left out where the server gives no hints.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grasping: Option<String>,
 }

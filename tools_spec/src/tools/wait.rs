@@ -4,17 +4,16 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::checks;
-use crate::limits;
 use crate::parts::CommandReply;
 use crate::tool::Tool;
 
 /// Let all robots hold their targets for a number of control steps of 20 ms: for a hand to arrive, for an object to come to
-/// rest. Wrist targets of the last command stay fixed in the world, or carried, as they were given.
+/// rest. The reply reports on every robot. Wrist targets of the last command stay fixed in the world, or carried, as they were given.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Wait {
     /// Control steps of 20 ms: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark protocol.
-    #[schemars(range(min = 1, max = limits::MOST_STEPS))]
+    #[schemars(range(min = 1), extend("most_steps" = "maximum"))]
     pub steps: u32,
 }
 

@@ -15,7 +15,7 @@ use crate::tool::Tool;
 #[serde(deny_unknown_fields)]
 pub struct Walk {
     /// Control steps of 20 ms: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark protocol.
-    #[schemars(range(min = 1, max = limits::MOST_STEPS))]
+    #[schemars(range(min = 1), extend("most_steps" = "maximum"))]
     pub steps: u32,
     /// One entry per robot that is to move; each robot at most once. Robots that are not named hold still.
     #[schemars(length(min = 1, max = limits::ROBOT_NAMES.len()), extend("not" = limits::a_robot_twice()))]

@@ -48,6 +48,8 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
         if facts.inside_vessel("marble", "glass") {
             return Ok(());
         }
+        // On worktop and floor a marble of glass rolls on: where it misses, it is off the worktop within two seconds and comes
+        // to rest on the floor, where no hand reaches.
         if !facts.inside_vessel("marble", "cup") {
             return Err(PlayerError::GaveUp("the marble fell beside the glass".into()));
         }

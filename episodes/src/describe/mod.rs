@@ -1,8 +1,12 @@
 //! What policies are told about tasks, protocols and robots.
 
+mod brief;
+
+pub use brief::brief;
+
 use tandem_sim::BaseLimits;
 use tandem_tools_spec::{
-    Instruction, JointInfo, PhaseInfo, Protocol, ProtocolInfo, RobotInfo, TaskInfo, TaskList,
+    Instruction, JointInfo, PhaseInfo, Protocol, ProtocolInfo, RobotKind, TaskInfo, TaskList,
 };
 
 use crate::commands::RobotSheet;
@@ -57,9 +61,10 @@ pub fn instructions(task: &Task) -> Vec<Instruction> {
     task.robots.iter().map(part).collect()
 }
 
-pub fn robot(robot: &RobotSheet) -> RobotInfo {
-    RobotInfo {
-        robot: robot.name.clone(),
+/// The kind called `kind`, of which `robot` is one.
+pub fn robot_kind(kind: String, robot: &RobotSheet) -> RobotKind {
+    RobotKind {
+        kind,
         joints: robot
             .model
             .joints
@@ -68,6 +73,7 @@ pub fn robot(robot: &RobotSheet) -> RobotInfo {
                 name: joint.name.clone(),
                 lower_rad: rounded(joint.lower_rad.into()),
                 upper_rad: rounded(joint.upper_rad.into()),
+                effort_n_m: rounded(joint.effort_n_m.into()),
             })
             .collect(),
         base_limits: wire_limits(&robot.base_limits),

@@ -1,0 +1,84 @@
+//! What replies say of hands and of the way of the base.
+
+use crate::common::*;
+use tandem_episodes::{B, Session};
+use tandem_sim::{Pose, Vector};
+use tandem_tools_spec::{HandReport, HandState, MoveWrists, Walk, WalkMove, WristMove};
+
+/// A's right hand after a move of it in 25 steps and `still` steps of rest.
+fn moved_to(session: &mut Session, position_m: [f64; 3], still: u32) -> HandReport {
+    let goal = WristMove { right_position_m: Some(position_m), ..hand_up() };
+    let mut reply = command(session, MoveWrists { steps: 25, robots: vec![goal] }.into());
+    for _ in 0..still / 50 {
+        reply = wait(session, 50);
+    }
+    reply.robots[0].right.clone()
+}
+
+#[test]
+fn a_wrist_says_how_it_stands_to_its_target() {
+    let mut session = handover(0);
+    let up_m = [0.28, -0.24, 0.22];
+    let right = moved_to(&mut session, up_m, 0);
+    assert_eq!(right.state, HandState::Moving, "{right:?}");
+    let right = moved_to(&mut session, up_m, 50);
+    assert_eq!((right.state, right.fingers.state), (HandState::Arrived, HandState::Arrived), "{right:?}");
+    assert_eq!(right.fingers.target_rad, hand_up().right_fingers_rad.unwrap());
+    for (target_rad, measured_rad) in right.fingers.target_rad.iter().zip(right.fingers.measured_rad) {
+        assert!((target_rad - measured_rad).abs() < 0.06, "{right:?}");
+    }
+    assert!(right.largest_effort.joint.starts_with("right_"), "{right:?}");
+    assert!((0.05..0.5).contains(&right.largest_effort.share), "arms are not weightless: {right:?}");
+    assert!(right.force_n.iter().all(|part_n| part_n.abs() < 1.5), "it touches nothing: {right:?}");
+
+    // Into the counter, whose top is 4 cm over the pelvis; half a hand is as much.
+    let right = moved_to(&mut session, [0.30, -0.24, 0.05], 100);
+    assert_eq!(right.state, HandState::Blocked, "{right:?}");
+    assert!(right.force_n[2] > 5.0, "the counter holds it: {right:?}");
+
+    moved_to(&mut session, up_m, 50);
+    let right = moved_to(&mut session, [0.2, -1.1, 0.2], 150);
+    assert_eq!(right.state, HandState::OutOfReach, "{right:?}");
+}
+
+#[test]
+fn those_who_wait_are_told_of_every_robot() {
+    let mut session = handover(0);
+    let robots: Vec<String> = wait(&mut session, 1).robots.into_iter().map(|robot| robot.robot).collect();
+    assert_eq!(robots, ["A", "B"]);
+}
+
+#[test]
+fn the_way_of_the_base_is_told_by_its_own_odometry() {
+    let mut session = handover(0);
+    let pelvis = |session: &Session| session.facts().robots[B].pelvis_in_world;
+    let heading = |pelvis: &Pose| {
+        let ahead = pelvis.rotation * Vector::X;
+        Vector::new(ahead.x, ahead.y, 0.0).normalize()
+    };
+    let began = pelvis(&session);
+    let back =
+        WalkMove { robot: "B".into(), vx_m_s: -0.2, vy_m_s: 0.1, yaw_rate_rad_s: 0.3, pelvis_height_m: None };
+    command(&mut session, Walk { steps: 50, robots: vec![back.clone()] }.into());
+    let before = pelvis(&session);
+    let reply = command(&mut session, Walk { steps: 50, robots: vec![back] }.into());
+    let after = pelvis(&session);
+    let moved_m = after.translation - before.translation;
+    let ahead = heading(&before);
+    let expected = [
+        moved_m.dot(ahead),
+        moved_m.dot(Vector::Z.cross(ahead)),
+        moved_m.z,
+        ahead.cross(heading(&after)).z.asin(),
+    ];
+    assert!(expected[0] < -0.05 && expected[3] > 0.1, "it has walked: {expected:?}");
+    let told = reply.robots[0].base_motion;
+    let told = [told.forward_m, told.left_m, told.up_m, told.turned_rad];
+    for (told, expected) in told.into_iter().zip(expected) {
+        assert!((told - f64::from(expected)).abs() < 0.01, "{told}, not {expected}");
+    }
+    let in_start = reply.robots[0].pelvis_in_start;
+    let way_m = heading(&began).dot(after.translation - began.translation);
+    assert!((in_start.position_m[0] - f64::from(way_m)).abs() < 0.01, "{in_start:?}, not {way_m} m along x");
+    assert_eq!(state(&mut session, "B").pelvis_in_start, in_start);
+}

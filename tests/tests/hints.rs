@@ -1,0 +1,59 @@
+//! Whether texts say how to grasp, as a policy meets them: on every face of the server, and in the recording.
+
+use serde_json::{Value, json};
+use tandem::settings::Layer;
+use tandem_episodes::Recording;
+use tandem_tests::TestServer;
+use tandem_tools_spec::Hints;
+
+/// Every text about tools and hands that a server with these hints shows.
+fn texts(hints: Hints) -> Vec<(&'static str, Value)> {
+    let server = TestServer::with(Layer { hints: Some(hints), ..Layer::default() });
+    let start = json!({ "task": "handover", "seed": 0, "protocol": "benchmark" });
+    let started = server.post("/v1/episodes", &start).ok();
+    let id = started["episode_id"].as_str().expect("an id").to_owned();
+    let listed = json!({ "jsonrpc": "2.0", "id": 1, "method": "tools/list", "params": {} });
+    let texts = vec![
+        ("the list of tools", server.get("/v1/tools").ok()),
+        ("the episode's list of tools", server.get(&format!("/v1/episodes/{id}/tools")).ok()),
+        ("OpenAPI", server.get("/v1/openapi.json").ok()),
+        ("MCP", server.post("/mcp", &listed).ok()),
+        ("the brief", started["brief"].clone()),
+    ];
+    server.delete(&format!("/v1/episodes/{id}")).ok();
+    let recording = Recording::read(&server.folder(&id).join("episode.mcap")).expect("a recording");
+    assert_eq!(recording.spec.hints, hints);
+    texts
+}
+
+#[test]
+fn every_face_says_how_to_grasp_or_none_does() {
+    let recipes = |text: &Value| {
+        let text = text.to_string();
+        ["Closed around a bottle", "To grasp an", "close the outer finger joints"]
+            .into_iter()
+            .any(|recipe| text.contains(recipe))
+    };
+    for (face, text) in texts(Hints::On) {
+        assert!(recipes(&text), "{face} says nothing of grasps: {text}");
+    }
+    for (face, text) in texts(Hints::Off) {
+        assert!(!recipes(&text), "{face} says how to grasp: {text}");
+        assert!(text.to_string().contains("0.12"), "{face} says nothing of a hand's geometry: {text}");
+    }
+}
+
+#[test]
+fn a_running_episode_lists_its_tools_with_its_own_limits() {
+    let server = TestServer::start();
+    for (protocol, most_steps) in [("agentic", 25), ("benchmark", 50)] {
+        let id = server.episode(protocol);
+        let tools = server.get(&format!("/v1/episodes/{id}/tools")).ok();
+        let wait = tools.as_array().into_iter().flatten().find(|tool| tool["name"] == "wait").expect("wait");
+        assert_eq!(wait["body_schema"]["properties"]["steps"]["maximum"], most_steps);
+        let path = wait["route"]["path"].as_str().expect("a path");
+        assert_eq!(server.post(path, &json!({ "steps": most_steps })).status, 200);
+        server.post(path, &json!({ "steps": most_steps + 1 })).refused(422, &[]);
+    }
+    server.get("/v1/episodes/nope/tools").refused(404, &["\"nope\""]);
+}
