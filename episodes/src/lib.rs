@@ -12,6 +12,7 @@ mod output;
 pub mod players;
 mod protocol;
 mod recording;
+pub mod replay;
 mod reports;
 mod scoring;
 mod session;
@@ -24,9 +25,10 @@ pub use instructions::{Instructions, InstructionsError};
 pub use output::{OutputError, create_new_private_folder, create_private_folder};
 pub use protocol::{Rules, rules};
 pub use recording::{
-    RecordedCall, Recorder, Recording, RecordingError, RecoverError, Recovered, Visibility, recover,
+    RecordedCall, RecordedCheckpoint, Recorder, Recording, RecordingError, RecoverError, Recovered,
+    Visibility, recover,
 };
 pub use scoring::{A, B, Done, Facts, Grip, ObjectFacts, Phase, RobotFacts, Scored, Scores};
 pub use session::{Checkpoint, Clock, RunFiles, RunFolder, Session, monotonic};
-pub use spec::{Controller, EpisodeSpec, RendererKind, RobotFile, Start};
+pub use spec::{Controller, EpisodeSpec, PhaseStart, RendererKind, RobotFile, Start};
 pub use tandem_sim::{BaseLimits, LocomotionChoice, SimError};

@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::commands::{Outcome, bench, collect, demo, evaluate, locomotion, recover, serve, tasks};
+use crate::commands::{Outcome, bench, collect, demo, evaluate, locomotion, recover, replay, serve, tasks};
 
 /// Physics of humanoids that must work together, behind an HTTP API.
 #[derive(Debug, Parser)]
@@ -23,6 +23,7 @@ enum Command {
     Locomotion(locomotion::Args),
     Tasks(tasks::Args),
     Recover(recover::Args),
+    Replay(replay::Args),
     Bench(bench::Args),
 }
 
@@ -37,6 +38,7 @@ impl Cli {
             Command::Locomotion(args) => locomotion::run(args),
             Command::Tasks(args) => tasks::run(args),
             Command::Recover(args) => recover::run(args),
+            Command::Replay(args) => replay::run(args),
             Command::Bench(args) => bench::run(args),
         }
     }

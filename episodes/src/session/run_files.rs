@@ -3,6 +3,7 @@
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use tandem_sim::Step;
 use tandem_tools_spec::{Budget, PhaseReached, ResultReply, ToolCall, ToolReply};
@@ -55,7 +56,8 @@ impl RunFiles {
             robots: session.motions.iter().map(|motion| motion.robot.clone()).collect(),
             scores: session.scores.memory(),
         };
-        let mut recorder = Recorder::create(&path, visibility, header, &session.present)?;
+        let mut recorder =
+            Recorder::create(&path, visibility, header, &session.present, &session.state_hash())?;
         recorder.draw("world", session.world.room())?;
         for (name, model) in session.world.object_models() {
             recorder.draw(name, &model.geoms)?;
@@ -71,9 +73,16 @@ impl RunFiles {
         })
     }
 
-    pub(super) fn step(&mut self, step: &Step, facts: &Facts, budget: Budget) {
+    pub(super) fn step(&mut self, step: &Step, state_hash: &str, facts: &Facts, budget: Budget) {
         self.budget_left = Some(budget);
-        self.record(|recorder| recorder.step(step, facts, budget));
+        self.record(|recorder| recorder.step(step, state_hash, facts, budget));
+    }
+
+    pub(super) fn checkpoint(&mut self, name: &str, time_s: f64, bytes: Result<Vec<u8>, EpisodeError>) {
+        match bytes {
+            Ok(bytes) => self.record(|recorder| recorder.checkpoint(name, time_s, &bytes)),
+            Err(error) => self.note(Err(error)),
+        }
     }
 
     pub(super) fn phase(&mut self, phase: &PhaseReached) {
@@ -83,6 +92,7 @@ impl RunFiles {
     pub(super) fn tool_call(
         &mut self,
         time_s: f64,
+        thought: Duration,
         call: &ToolCall,
         answer: &Result<ToolReply, EpisodeError>,
     ) {
@@ -92,7 +102,7 @@ impl RunFiles {
             (Ok(reply), _) => Ok(reply),
             (Err(_), text) => Err(text.as_deref().unwrap_or_default()),
         };
-        self.record(|recorder| recorder.tool_call(&ToolCallRecord { time_s, call, outcome }));
+        self.record(|recorder| recorder.tool_call(&ToolCallRecord { time_s, thought, call, outcome }));
     }
 
     /// Keeps a moment for the strip.

@@ -9,6 +9,7 @@ pub mod locomotion;
 mod log;
 mod played;
 pub mod recover;
+pub mod replay;
 mod seeds;
 pub mod serve;
 pub mod tasks;

@@ -34,7 +34,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
             &["commands", "reports"],
             &["describe", "recording", "bench"],
             &["instructions", "session"],
-            &["players"],
+            &["players", "replay"],
             &["evaluation"],
         ],
     ),
