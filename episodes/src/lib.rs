@@ -17,6 +17,7 @@ mod reports;
 mod scoring;
 mod session;
 mod spec;
+pub mod statistics;
 pub mod tasks;
 
 pub use describe::task_list;

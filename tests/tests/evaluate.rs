@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use tandem_episodes::evaluation::{Plan, Played, evaluate};
+use tandem_episodes::evaluation::{Plan, Played, Shard, Starts, evaluate};
 use tandem_episodes::{Controller, RobotFile, players, tasks};
 use tandem_tools_spec::Protocol;
 
@@ -15,6 +15,8 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> Plan {
         locomotion: Controller::Balance,
         tasks: vec![handover],
         seeds,
+        starts: Starts::Task,
+        shard: Shard::WHOLE,
         jobs,
         record: false,
     }

@@ -92,12 +92,21 @@ fn record(folder: &Path) -> (World, PathBuf) {
     let time_s = world.present().time_s;
     recorder.phase(&PhaseReached { id: "p1".into(), name: "grasp_and_lift".into(), time_s }).unwrap();
     let wait = ToolCall::parse("wait", serde_json::json!({ "steps": 10 })).unwrap();
-    recorder.tool_call(&ToolCallRecord { time_s, thought: THOUGHT, call: &wait, outcome: Err("no steps are left") }).unwrap();
+    recorder
+        .tool_call(&ToolCallRecord {
+            time_s,
+            thought: THOUGHT,
+            call: &wait,
+            outcome: Err("no steps are left"),
+        })
+        .unwrap();
     let observe = ToolCall::parse("observe", serde_json::json!({ "robots": ["A"] })).unwrap();
     let image = CameraImage { robot: "A".into(), png_base64: Png(PICTURE.into()) };
     let seen = Observation { time_s, states: vec![], cameras: vec![], images: vec![image] };
     let reply = ToolReply::Look(LookReply::Observe(seen));
-    recorder.tool_call(&ToolCallRecord { time_s, thought: THOUGHT, call: &observe, outcome: Ok(&reply) }).unwrap();
+    recorder
+        .tool_call(&ToolCallRecord { time_s, thought: THOUGHT, call: &observe, outcome: Ok(&reply) })
+        .unwrap();
     let path = recorder.finish(&result()).unwrap();
     (world, path)
 }

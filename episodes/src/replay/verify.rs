@@ -142,9 +142,8 @@ fn compare_results(
     recorded: &ResultReply,
     again: ResultReply,
 ) -> Result<Outcome, ReplayError> {
-    let times_s = |result: &ResultReply| {
-        result.phases.0.iter().filter_map(|(_, time_s)| *time_s).collect::<Vec<f64>>()
-    };
+    let times_s =
+        |result: &ResultReply| result.phases.0.iter().filter_map(|(_, time_s)| *time_s).collect::<Vec<f64>>();
     let scored_s: Vec<f64> = recording.score()?.reached().map(|(_, time_s)| time_s).collect();
     let text = |times_s: &[f64]| format!("{times_s:?}");
     let facts = |result: &ResultReply| (result.env_steps, result.tool_calls, result.falls);

@@ -283,6 +283,16 @@ impl Session {
         self.scores.facts(&self.present)
     }
 
+    /// How many phases have been reached.
+    pub fn reached_phases(&self) -> usize {
+        self.scores.reached().count()
+    }
+
+    /// How long the policy has thought, up to its last call.
+    pub fn thought(&self) -> Duration {
+        self.clock.spent()
+    }
+
     /// Why the episode has ended, if it has.
     pub fn ended(&self) -> Option<EndReason> {
         self.ended

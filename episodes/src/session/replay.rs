@@ -23,11 +23,14 @@ pub struct Replay {
 impl Replay {
     /// Takes the episode `spec` to where its policy took over. Where it did not begin at its task's own beginning, `begin` is
     /// the checkpoint that it began with, of the recording at `path`.
-    pub fn start(spec: &EpisodeSpec, begin: Option<&RecordedCheckpoint>, path: &Path) -> Result<Replay, EpisodeError> {
+    pub fn start(
+        spec: &EpisodeSpec,
+        begin: Option<&RecordedCheckpoint>,
+        path: &Path,
+    ) -> Result<Replay, EpisodeError> {
         let hands_ns = Arc::new(AtomicU64::new(0));
         let read = hands_ns.clone();
-        let mut session =
-            Session::build(spec, Box::new(move || Duration::from_nanos(read.load(Relaxed))))?;
+        let mut session = Session::build(spec, Box::new(move || Duration::from_nanos(read.load(Relaxed))))?;
         if let Some(begin) = begin {
             session.resume(&Checkpoint::from_bytes(&begin.bytes, path)?)?;
         } else if spec.start != Start::Task {

@@ -5,5 +5,7 @@ mod checkpoints;
 mod commands;
 mod common;
 mod disclosure;
+mod films;
 mod hand_force;
 mod recordings;
+mod replays;

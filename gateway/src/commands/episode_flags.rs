@@ -8,7 +8,7 @@ use clap::{
 };
 use tandem_episodes::{
     Controller, RobotFile,
-    evaluation::Plan,
+    evaluation::{Plan, Shard, Starts},
     players,
     tasks::{self, Task},
 };
@@ -86,6 +86,8 @@ impl EpisodeFlags {
             locomotion: self.locomotion.controller(),
             tasks: self.tasks.0,
             seeds: self.seeds.0.collect(),
+            starts: Starts::Task,
+            shard: Shard::WHOLE,
             jobs: self.jobs,
             record,
         }

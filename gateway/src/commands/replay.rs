@@ -110,14 +110,18 @@ fn describe(recording: &Recording) {
 /// Says how the recording compares; whether it is the same.
 fn print_verified(verified: &Verified) -> bool {
     if let Some(build) = &verified.other_build {
-        println!("  warning: {build} recorded it, and builds may differ in their physics; a difference may be theirs");
+        println!(
+            "  warning: {build} recorded it, and builds may differ in their physics; a difference may be theirs"
+        );
     }
     let Verified { steps, calls, unanswered_steps, .. } = verified;
     match &verified.outcome {
         Comparison::Same => {
             println!("  verified: {steps} states over {calls} calls, result and phases are as recorded");
             if *unanswered_steps > 0 {
-                println!("  the last {unanswered_steps} steps belong to a call that was not answered any more");
+                println!(
+                    "  the last {unanswered_steps} steps belong to a call that was not answered any more"
+                );
             }
             true
         }
@@ -133,7 +137,9 @@ fn print_verified(verified: &Verified) -> bool {
             false
         }
         Comparison::Result { what, recorded, again } => {
-            println!("  DIFFERS: {what}: recorded {recorded}, again {again}; all {steps} states are as recorded");
+            println!(
+                "  DIFFERS: {what}: recorded {recorded}, again {again}; all {steps} states are as recorded"
+            );
             false
         }
     }
@@ -148,7 +154,11 @@ fn folder_for(folder: &Path, recording: &Path, recordings: usize) -> PathBuf {
     }
 }
 
-fn render(recording: &Recording, plan: &PicturesPlan, folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
+fn render(
+    recording: &Recording,
+    plan: &PicturesPlan,
+    folder: &Path,
+) -> Result<(), Box<dyn std::error::Error>> {
     let bar = ProgressBar::no_length();
     bar.set_style(ProgressStyle::with_template("  {pos} moments, {elapsed}")?);
     let Drawn { moments, kept, cameras } = draw_all(recording, plan, folder, &|| bar.inc(1))?;

@@ -27,7 +27,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "episodes",
         &[
-            &["output", "fingerprint", "scoring", "convert"],
+            &["output", "fingerprint", "scoring", "convert", "statistics"],
             &["error"],
             &["tasks"],
             &["protocol", "spec"],
