@@ -1,5 +1,6 @@
 //! Episodes: tasks and their phases, budgets, grasp detection, and the session that runs tool calls on a world.
 
+pub mod assessment;
 pub mod bench;
 mod commands;
 mod convert;
@@ -23,7 +24,7 @@ pub mod tasks;
 pub use describe::task_list;
 pub use error::{CheckpointError, EpisodeError};
 pub use instructions::{Instructions, InstructionsError};
-pub use output::{OutputError, create_new_private_folder, create_private_folder};
+pub use output::{OutputError, create_new_private_folder, create_private_folder, write_whole};
 pub use protocol::{Rules, rules};
 pub use recording::{
     RecordedCall, RecordedCheckpoint, Recorder, Recording, RecordingError, RecoverError, Recovered,

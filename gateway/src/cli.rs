@@ -2,7 +2,9 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::commands::{Outcome, bench, collect, demo, evaluate, locomotion, recover, replay, serve, tasks};
+use crate::commands::{
+    Outcome, bench, collect, demo, evaluate, locomotion, recover, replay, report, serve, tasks,
+};
 
 /// Physics of humanoids that must work together, behind an HTTP API.
 #[derive(Debug, Parser)]
@@ -24,6 +26,7 @@ enum Command {
     Tasks(tasks::Args),
     Recover(recover::Args),
     Replay(replay::Args),
+    Report(report::Args),
     Bench(bench::Args),
 }
 
@@ -39,6 +42,7 @@ impl Cli {
             Command::Tasks(args) => tasks::run(args),
             Command::Recover(args) => recover::run(args),
             Command::Replay(args) => replay::run(args),
+            Command::Report(args) => report::run(args),
             Command::Bench(args) => bench::run(args),
         }
     }

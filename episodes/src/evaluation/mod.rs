@@ -14,7 +14,7 @@ use crate::output::{OutputError, create_private_folder, write_whole};
 use crate::{EpisodeError, fingerprint};
 use keep::Keeper;
 
-pub use keep::{EPISODES, Played};
+pub use keep::{EPISODES, Played, missed};
 pub use phase_level::{PhaseLevel, PhaseRate};
 pub use plan::{Plan, Shard, Starts};
 pub use summary::{Evaluation, TaskSummary};

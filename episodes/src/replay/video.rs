@@ -165,8 +165,17 @@ impl Reel {
     }
 }
 
+/// One RGB picture, three bytes a pixel, as a file.
+pub fn webp_picture(width: u32, height: u32, rgb: &[u8]) -> Result<Vec<u8>, VideoError> {
+    let encoded = webp((width, height)).and_then(|mut encoder| {
+        encoder.add_frame(rgb, 0)?;
+        encoder.finalize(1)
+    });
+    encoded.map(|webp| webp.to_vec()).map_err(|source| webp_failed(Path::new("picture"), source))
+}
+
 /// An encoder of RGB pictures.
-pub fn webp(size_px: (u32, u32)) -> Result<Encoder, webp_animation::Error> {
+fn webp(size_px: (u32, u32)) -> Result<Encoder, webp_animation::Error> {
     let options = EncoderOptions {
         color_mode: ColorMode::Rgb,
         encoding_config: Some(EncodingConfig::new_lossy(WEBP_QUALITY)),

@@ -203,7 +203,7 @@ impl EpisodePage<'_> {
 }
 
 /// Text as it may stand in HTML, in attributes too.
-fn escape(text: &str) -> String {
+pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
         match character {

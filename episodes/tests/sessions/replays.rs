@@ -133,8 +133,7 @@ fn a_changed_number_is_found_at_its_step() {
     };
     // A wrist that goes elsewhere is seen in the command's first step; so is a height.
     check("0.28,-0.24,0.22", "0.28,-0.24,0.2200001", 8, 2, "move_wrists");
-    check("0.7,", "0.7000001,", 43, 4, "walk");
-    check("\"pelvis_height_m\\\":0.7", "\"pelvis_height_m\\\":0.71", 43, 4, "walk");
+    check("\"pelvis_height_m\\\":0.7", "\"pelvis_height_m\\\":0.7000001", 43, 4, "walk");
     // A wait that is shorter brings what follows forward.
     check("{\\\"steps\\\":7}", "{\\\"steps\\\":6}", 7, 2, "move_wrists");
     // One that is longer at the end has states that were never recorded.

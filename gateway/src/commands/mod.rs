@@ -10,6 +10,7 @@ mod log;
 mod played;
 pub mod recover;
 pub mod replay;
+pub mod report;
 mod seeds;
 pub mod serve;
 pub mod tasks;

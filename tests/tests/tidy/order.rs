@@ -36,6 +36,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
             &["instructions", "session"],
             &["players", "replay"],
             &["evaluation"],
+            &["assessment"],
         ],
     ),
     ("gateway", &[&["settings"], &["hosting"], &["http"], &["drivers"], &["commands"], &["cli"], &["main"]]),
