@@ -267,6 +267,8 @@ fn reasons(episodes: &[&Played]) -> Vec<Reason> {
             }
         }
     }
+    let rank = |reason: &Reason| tasks::ALL.iter().position(|task| task.id == reason.task);
+    reasons.sort_by_key(|reason| (rank(reason), reason.phase.clone()));
     reasons
 }
 

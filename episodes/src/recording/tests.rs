@@ -316,3 +316,43 @@ fn the_scene_shows_every_drawn_geom() {
     };
     assert_ne!(colours("A/"), colours("B/"), "partners differ in colour");
 }
+
+/// Every text of a JSON value.
+fn texts(value: &serde_json::Value, found: &mut Vec<String>) {
+    match value {
+        serde_json::Value::String(text) => found.push(text.clone()),
+        serde_json::Value::Array(values) => values.iter().for_each(|value| texts(value, found)),
+        serde_json::Value::Object(fields) => fields.values().for_each(|value| texts(value, found)),
+        _ => {}
+    }
+}
+
+/// The layout that README has people open in Foxglove shows what recordings hold.
+#[test]
+fn the_layout_names_topics_and_fields_that_there_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, path) = record(folder.path());
+    let summary = mcap::Summary::read(&fs::read(path).unwrap()).unwrap().expect("a summary");
+    let layout: serde_json::Value = serde_json::from_str(include_str!("../../foxglove_layout.json")).unwrap();
+    let mut named = Vec::new();
+    texts(&layout["configById"], &mut named);
+    named.extend(layout["configById"]["3D!room"]["topics"].as_object().unwrap().keys().cloned());
+    let paths: Vec<&String> = named.iter().filter(|text| text.starts_with('/')).collect();
+    assert!(paths.len() > 15, "{paths:?}");
+    for path in paths {
+        // Robots' topics are alike, and only A's camera has taken a picture here.
+        let of_a = path.replacen("/B/", "/A/", 1).replacen("/C/", "/A/", 1);
+        let (topic, field) = of_a.split_once('.').unwrap_or((&of_a, ""));
+        let channel = summary.channels.values().find(|channel| channel.topic == topic);
+        let channel = channel.unwrap_or_else(|| panic!("the layout names {path}, and there is no {topic}"));
+        if !field.is_empty() {
+            let schema: serde_json::Value =
+                serde_json::from_slice(&channel.schema.as_ref().unwrap().data).unwrap();
+            let field = field.split('[').next().unwrap();
+            assert!(
+                schema["properties"][field].is_object(),
+                "the layout names {path}, and there is no {field}"
+            );
+        }
+    }
+}

@@ -7,7 +7,7 @@ use base64::{Engine, prelude::BASE64_STANDARD};
 use super::Assessment;
 use super::gallery::Failure;
 use super::policy::PolicyReport;
-use super::rate::Mean;
+use super::rate::percent;
 use super::tables::{self, Table};
 use crate::reports::escape;
 use plot::{SERIES, task_plot};
@@ -41,7 +41,7 @@ pub fn html(assessment: &Assessment, failures: &[Failure]) -> String {
 </body>
 </html>
 "#,
-        title = names.join(" and "),
+        title = in_words(&names),
         episodes = policies.iter().map(|policy| policy.episodes).sum::<usize>(),
         tasks = tasks(assessment).len(),
         cards = policies.iter().enumerate().map(|(index, policy)| card(index, policy)).collect::<String>(),
@@ -53,6 +53,14 @@ pub fn html(assessment: &Assessment, failures: &[Failure]) -> String {
     )
 }
 
+/// As "a, b and c".
+fn in_words(names: &[String]) -> String {
+    match names.split_last() {
+        Some((last, others)) if !others.is_empty() => format!("{} and {last}", others.join(", ")),
+        _ => names.concat(),
+    }
+}
+
 /// The tasks that any policy has played, in the order of the list of tasks.
 fn tasks(assessment: &Assessment) -> Vec<&'static str> {
     let played =
@@ -60,28 +68,32 @@ fn tasks(assessment: &Assessment) -> Vec<&'static str> {
     crate::tasks::ALL.iter().map(|task| task.id).filter(|id| played(id)).collect()
 }
 
-/// A policy at a glance: whole tasks by number of robots, falls, rules and build.
+/// A policy at a glance: whole tasks by number of robots, phases by who works on them, rules and build.
 fn card(index: usize, policy: &PolicyReport) -> String {
-    let mut facts = String::new();
-    let mut fact = |name: &str, value: &str| {
-        facts += &format!("<div><dt>{}</dt><dd>{}</dd></div>", escape(name), escape(value));
-    };
-    let percent = |mean: &Mean| format!("{} %", mean.text());
+    let mut facts: Vec<(String, String)> = Vec::new();
     for average in &policy.averages {
         if let Some(Some(mean)) = average.phases.last() {
-            fact(&format!("Whole task, {} robots", average.robots), &percent(mean));
+            facts.push((format!("Tasks of {} robots, %", average.robots), mean.text()));
         }
     }
-    let phases = [("Alone", &policy.together.alone), ("Together", &policy.together.together)];
-    for (name, mean) in phases.into_iter().filter_map(|(name, mean)| Some((name, mean.as_ref()?))) {
-        fact(&format!("{name}, given the phase before"), &percent(mean));
+    let phases = [("alone", &policy.together.alone), ("together", &policy.together.together)];
+    for (who, mean) in phases.into_iter().filter_map(|(who, mean)| Some((who, mean.as_ref()?))) {
+        facts.push((format!("Phases {who}, conditional, %"), mean.text()));
     }
-    fact("Episodes", &policy.episodes.to_string());
-    fact("Robots that fell", &policy.falls.to_string());
+    if let Some(level) = &policy.phase_level {
+        let shares = [("alone", level.non_collaborative_share), ("together", level.collaborative_share)];
+        for (who, share) in shares.into_iter().filter_map(|(who, share)| Some((who, share?))) {
+            facts.push((format!("Phases {who}, begun at, %"), percent(share)));
+        }
+    }
+    facts.push(("Episodes".into(), policy.episodes.to_string()));
+    facts.push(("Robots that fell".into(), policy.falls.to_string()));
+    let fact = |(name, value): &(String, String)| format!("<div><dt>{name}</dt><dd>{value}</dd></div>");
     format!(
-        r#"<section class="card" style="--c: var(--s{})"><h3><span class="swatch"></span>{}</h3><dl>{facts}</dl><p class="soft">{} protocol, controller {}, build <code>{}</code></p></section>"#,
+        r#"<section class="card" style="--c: var(--s{})"><h3><span class="swatch"></span>{}</h3><dl>{}</dl><p class="soft">{} protocol, controller {}, build <code>{}</code></p></section>"#,
         index % SERIES,
         escape(&policy.name),
+        facts.iter().map(fact).collect::<String>(),
         policy.protocol,
         escape(&policy.locomotion),
         escape(&policy.build),
@@ -118,17 +130,19 @@ fn table(table: &Table) -> String {
     };
     let head: String = table.head.iter().enumerate().map(|of| cell("th", of)).collect();
     let mut rows = String::new();
-    let mut above: &[String] = &[];
-    for row in &table.rows {
-        // What stands in the first columns above need not be said again.
-        let words = &row[..table.figures_from];
-        let same = words.iter().zip(above).take_while(|(one, other)| one == other).count();
-        let same = same.min(words.len().saturating_sub(1));
+    // What stands in the first columns above need not be said again.
+    let same = |index: usize| {
+        let above = index.checked_sub(1).map_or(&[][..], |above| &table.rows[above][..table.figures_from]);
+        let same = table.rows[index].iter().zip(above).take_while(|(one, other)| one == other).count();
+        same.min(table.figures_from.saturating_sub(1))
+    };
+    let grouped = (0..table.rows.len()).any(|index| same(index) > 0);
+    for (index, row) in table.rows.iter().enumerate() {
+        let same = same(index);
         let said = |column: usize, text: &String| if column < same { String::new() } else { text.clone() };
         let cells = row.iter().enumerate().map(|(column, text)| cell("td", (column, &said(column, text))));
-        let class = if same == 0 && !above.is_empty() { r#" class="first""# } else { "" };
+        let class = if same == 0 && index > 0 && grouped { r#" class="first""# } else { "" };
         rows += &format!("<tr{class}>{}</tr>", cells.collect::<String>());
-        above = words;
     }
     format!(
         r#"<h2>{}</h2><p class="soft">{}</p><div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"#,
