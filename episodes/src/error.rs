@@ -52,6 +52,13 @@ pub enum CheckpointError {
         path.display()
     )]
     Torn { path: PathBuf, have: usize, expected: usize },
+    #[error(
+        "{} has no checkpoint where {phase} begins; an episode that reached the phase before it has one",
+        path.display()
+    )]
+    NoPhase { path: PathBuf, phase: String },
+    #[error("{0}")]
+    Recording(String),
     #[error("the checkpoint was made of {made_of}; it fits that episode, and this one is {wanted}")]
     OtherEpisode { made_of: String, wanted: String },
     #[error("the progress in a checkpoint cannot be read or written: {0}")]

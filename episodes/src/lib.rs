@@ -1,5 +1,6 @@
 //! Episodes: tasks and their phases, budgets, grasp detection, and the session that runs tool calls on a world.
 
+pub mod assessment;
 pub mod bench;
 mod commands;
 mod convert;
@@ -12,21 +13,24 @@ mod output;
 pub mod players;
 mod protocol;
 mod recording;
+pub mod replay;
 mod reports;
 mod scoring;
 mod session;
 mod spec;
+pub mod statistics;
 pub mod tasks;
 
 pub use describe::task_list;
 pub use error::{CheckpointError, EpisodeError};
 pub use instructions::{Instructions, InstructionsError};
-pub use output::{OutputError, create_new_private_folder, create_private_folder};
+pub use output::{OutputError, create_new_private_folder, create_private_folder, write_whole};
 pub use protocol::{Rules, rules};
 pub use recording::{
-    RecordedCall, Recorder, Recording, RecordingError, RecoverError, Recovered, Visibility, recover,
+    RecordedCall, RecordedCheckpoint, Recorder, Recording, RecordingError, RecoverError, Recovered,
+    Visibility, recover,
 };
 pub use scoring::{A, B, Done, Facts, Grip, ObjectFacts, Phase, RobotFacts, Scored, Scores};
 pub use session::{Checkpoint, Clock, RunFiles, RunFolder, Session, monotonic};
-pub use spec::{Controller, EpisodeSpec, RendererKind, RobotFile, Start};
+pub use spec::{Controller, EpisodeSpec, PhaseStart, RendererKind, RobotFile, Start};
 pub use tandem_sim::{BaseLimits, LocomotionChoice, SimError};

@@ -66,6 +66,17 @@ pub enum Start {
     Task,
     /// Where another episode of the same task, seed, protocol, robot and controller stood: a [`crate::Checkpoint`]'s file.
     Checkpoint(PathBuf),
+    /// Where a phase began in a recorded episode of the same task, seed, robot and controller, with the whole budget ahead.
+    Phase(PhaseStart),
+}
+
+/// The beginning of a phase of a recorded episode.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PhaseStart {
+    /// An `episode.mcap`.
+    pub recording: PathBuf,
+    /// As results call it: `p2`.
+    pub phase: String,
 }
 
 impl EpisodeSpec {

@@ -2,7 +2,9 @@
 
 use clap::{Parser, Subcommand};
 
-use crate::commands::{Outcome, bench, collect, demo, evaluate, locomotion, recover, serve, tasks};
+use crate::commands::{
+    Outcome, bench, collect, demo, evaluate, locomotion, recover, replay, report, serve, tasks,
+};
 
 /// Physics of humanoids that must work together, behind an HTTP API.
 #[derive(Debug, Parser)]
@@ -23,6 +25,8 @@ enum Command {
     Locomotion(locomotion::Args),
     Tasks(tasks::Args),
     Recover(recover::Args),
+    Replay(replay::Args),
+    Report(report::Args),
     Bench(bench::Args),
 }
 
@@ -37,6 +41,8 @@ impl Cli {
             Command::Locomotion(args) => locomotion::run(args),
             Command::Tasks(args) => tasks::run(args),
             Command::Recover(args) => recover::run(args),
+            Command::Replay(args) => replay::run(args),
+            Command::Report(args) => report::run(args),
             Command::Bench(args) => bench::run(args),
         }
     }

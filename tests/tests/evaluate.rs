@@ -3,7 +3,8 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use serde_json::json;
-use tandem_episodes::evaluation::{Plan, Played, evaluate};
+use tandem_episodes::assessment::{Assessment, load};
+use tandem_episodes::evaluation::{Plan, Played, Shard, Starts, evaluate};
 use tandem_episodes::{Controller, RobotFile, players, tasks};
 use tandem_tools_spec::{Disclosure, EndReason, Hints, Protocol};
 
@@ -18,6 +19,8 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> Plan {
         hints: Hints::On,
         tasks: vec![handover],
         seeds,
+        starts: Starts::Task,
+        shard: Shard::WHOLE,
         jobs,
         record: false,
     }
@@ -70,4 +73,33 @@ fn jobs_change_nothing_and_kept_episodes_are_not_played_again() {
     let results: serde_json::Value = serde_json::from_str(&text).expect("valid JSON");
     assert_eq!(results["tasks"]["handover"]["episodes"], 2);
     assert!(results["episodes"][0]["phases"]["p3"].is_number());
+}
+
+#[test]
+fn phases_are_played_on_their_own_by_shares_and_joined_by_a_report() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let [demos, out] = ["demos", "out"].map(|name| folder.path().join(name));
+    evaluate(&Plan { record: true, ..plan(1, vec![1]) }, &demos, &|_| {}).expect("it is played");
+    let phases = ["p1", "p2", "p3"].map(String::from).to_vec();
+    let starts = Starts::Phases { demonstrations: demos, phases };
+    let mut left_out = 0;
+    for index in 0..2 {
+        let plan = Plan {
+            player: players::find("demonstration").expect("a player"),
+            starts: starts.clone(),
+            shard: Shard { index, of: 2 },
+            ..plan(1, vec![1, 2])
+        };
+        let evaluation = evaluate(&plan, &out, &|_| {}).expect("it is played");
+        assert!(evaluation.tasks.is_empty() && !evaluation.episodes.is_empty());
+        left_out += evaluation.left_out.len();
+        assert!(out.join(format!("results-{index}-of-2.json")).exists());
+    }
+    assert_eq!(left_out, 3, "nobody has demonstrated seed 2");
+    let report = Assessment::of(&load(&[out]).expect("episodes"));
+    let level = report.policies[0].phase_level.as_ref().expect("phases on their own");
+    let reached: Vec<_> =
+        level.phases.iter().map(|rate| (&*rate.phase, rate.reached, rate.episodes)).collect();
+    assert_eq!(reached, [("p1", 1, 1), ("p2", 1, 1), ("p3", 1, 1)]);
+    assert_eq!((level.collaborative_share, level.drop_share), (Some(1.0), Some(0.0)));
 }

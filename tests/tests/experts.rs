@@ -2,7 +2,7 @@
 
 use std::thread::available_parallelism;
 
-use tandem_episodes::evaluation::{Plan, evaluate};
+use tandem_episodes::evaluation::{Plan, Shard, Starts, evaluate};
 use tandem_episodes::{Controller, RobotFile, players, tasks};
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
@@ -17,6 +17,8 @@ fn every_task_is_solved_in_order_and_nobody_falls() {
         hints: Hints::On,
         tasks: tasks::ALL.iter().collect(),
         seeds: vec![3],
+        starts: Starts::Task,
+        shard: Shard::WHOLE,
         jobs: available_parallelism().map_or(1, usize::from),
         record: false,
     };

@@ -1,6 +1,8 @@
 //! Episodes over seeds: plays them in parallel worlds, keeps each result, and counts.
 
 mod keep;
+mod phase_level;
+mod plan;
 mod summary;
 #[cfg(test)]
 mod tests;
@@ -8,50 +10,14 @@ mod workers;
 
 use std::path::{Path, PathBuf};
 
-use tandem_tools_spec::{Disclosure, Hints, Protocol};
-
 use crate::output::{OutputError, create_private_folder, write_whole};
-use crate::players;
-use crate::spec::{Controller, EpisodeSpec, RobotFile};
-use crate::tasks::Task;
 use crate::{EpisodeError, fingerprint};
 use keep::Keeper;
 
-pub use keep::Played;
-pub use summary::{Evaluation, TaskSummary, clopper_pearson};
-
-/// What to play.
-#[derive(Clone, Debug)]
-pub struct Plan {
-    /// Who plays.
-    pub player: &'static players::Entry,
-    pub protocol: Protocol,
-    pub robot: RobotFile,
-    pub locomotion: Controller,
-    /// What policies are told about their success, and whether success ends an episode.
-    pub disclosure: Disclosure,
-    /// Whether policies are told how to grasp.
-    pub hints: Hints,
-    pub tasks: Vec<&'static Task>,
-    pub seeds: Vec<u32>,
-    /// Worlds that run side by side, each on a thread of its own.
-    pub jobs: usize,
-    /// Record every episode in a folder of its own (`episode.mcap`, `strip.png`, `report.html`).
-    pub record: bool,
-}
-
-impl Plan {
-    /// One of the episodes to play.
-    pub fn spec(&self, task: &'static Task, seed: u32) -> EpisodeSpec {
-        EpisodeSpec {
-            robot: self.robot.clone(),
-            locomotion: self.locomotion.clone(),
-            disclosure: self.disclosure,
-            hints: self.hints,
-            ..EpisodeSpec::new(task, seed, self.protocol)
-        }
-    }
-}
+pub use keep::{EPISODES, Played, missed};
+pub use phase_level::{PhaseLevel, PhaseRate};
+pub use plan::{Plan, Shard, Starts};
+pub use summary::{Evaluation, TaskSummary};
 
 /// Why an evaluation stopped. Episodes that were played are kept, and the next run goes on from there.
 #[derive(Debug, thiserror::Error)]
@@ -68,10 +34,8 @@ pub enum EvaluationError {
     Json(#[from] serde_json::Error),
 }
 
-const RESULTS: &str = "results.json";
-const EPISODES: &str = "episodes";
-
-/// Plays what `folder` does not hold yet, writes `results.json` there, and calls `progress` after each episode.
+/// Plays what `folder` does not hold yet of the plan's share, writes `results.json` there, and calls `progress` after each
+/// episode.
 pub fn evaluate(
     plan: &Plan,
     folder: &Path,
@@ -82,8 +46,18 @@ pub fn evaluate(
     let build = fingerprint::build().map_err(EpisodeError::Build)?;
     let locomotion = plan.locomotion.load().map_err(EpisodeError::from)?.name().to_string();
     let keeper = Keeper { plan, folder: &kept, locomotion, build };
-    let episodes = workers::play_all(&keeper, progress)?;
-    let evaluation = summary::summarise(&keeper, episodes);
-    write_whole(&folder.join(RESULTS), serde_json::to_string_pretty(&evaluation)?.as_bytes())?;
+    let (work, mut left_out) = plan.episodes();
+    let episodes = workers::play_all(&keeper, &work, &mut left_out, progress)?;
+    let evaluation = summary::summarise(&keeper, episodes, left_out);
+    let text = serde_json::to_string_pretty(&evaluation)?;
+    write_whole(&folder.join(results_name(plan.shard)), text.as_bytes())?;
     Ok(evaluation)
+}
+
+/// Shares may lie in one folder.
+fn results_name(shard: Shard) -> String {
+    match shard {
+        Shard::WHOLE => "results.json".into(),
+        Shard { index, of } => format!("results-{index}-of-{of}.json"),
+    }
 }

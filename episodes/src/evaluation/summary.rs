@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
-use statrs::distribution::{Beta, ContinuousCDF};
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
 use super::keep::{Keeper, Played};
+use super::phase_level::PhaseLevel;
 
 /// How a task went over its seeds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -28,13 +28,20 @@ pub struct Evaluation {
     pub locomotion: String,
     pub disclosure: Disclosure,
     pub hints: Hints,
+    /// Of the episodes that began at their task's beginning.
     pub tasks: BTreeMap<String, TaskSummary>,
+    /// Of those that began at a phase.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub phase_level: Option<PhaseLevel>,
+    /// Episodes that could not be begun, and why.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<String>,
     pub episodes: Vec<Played>,
 }
 
-pub fn summarise(keeper: &Keeper, episodes: Vec<Played>) -> Evaluation {
+pub fn summarise(keeper: &Keeper, episodes: Vec<Played>, left_out: Vec<String>) -> Evaluation {
     let mut tasks: BTreeMap<String, TaskSummary> = BTreeMap::new();
-    for episode in &episodes {
+    for episode in episodes.iter().filter(|played| played.begun_phase().is_none()) {
         let task = tasks.entry(episode.result.task.clone()).or_default();
         let reached = |phase: &str| usize::from(episode.result.phases.reached_s(phase).is_some());
         task.episodes += 1;
@@ -54,16 +61,8 @@ pub fn summarise(keeper: &Keeper, episodes: Vec<Played>) -> Evaluation {
         disclosure: keeper.plan.disclosure,
         hints: keeper.plan.hints,
         tasks,
+        phase_level: PhaseLevel::of(episodes.iter()),
+        left_out,
         episodes,
     }
-}
-
-/// Exact 95 % interval of a rate, `successes` of `trials` (Clopper and Pearson, 1934).
-pub fn clopper_pearson(successes: usize, trials: usize) -> [f64; 2] {
-    const TAIL: f64 = 0.025;
-    let (k, n) = (successes as f64, trials as f64);
-    let quantile = |a: f64, b: f64, p: f64| Beta::new(a, b).map_or(f64::NAN, |beta| beta.inverse_cdf(p));
-    let low = if successes == 0 { 0.0 } else { quantile(k, n - k + 1.0, TAIL) };
-    let high = if successes == trials { 1.0 } else { quantile(k + 1.0, n - k, 1.0 - TAIL) };
-    [low, high]
 }

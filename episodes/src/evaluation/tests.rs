@@ -1,24 +1,15 @@
 //! Which episodes are kept, what is noted, and how they are counted.
 
-use tandem_tools_spec::{EndReason, PhaseTimes, ResultReply};
+use std::path::PathBuf;
+
+use tandem_tools_spec::{Disclosure, EndReason, Hints, PhaseTimes, Protocol, ResultReply};
 
 use super::keep::missed;
 use super::*;
 use crate::reports::write_result;
-
-/// Against R's `binom.test(k, n)$conf.int`.
-#[test]
-fn intervals_are_clopper_and_pearsons() {
-    for (successes, trials, [low, high]) in [
-        (10, 10, [0.6915, 1.0]),
-        (0, 10, [0.0, 0.3085]),
-        (17, 20, [0.6211, 0.9679]),
-        (95, 100, [0.8872, 0.9836]),
-    ] {
-        let interval = clopper_pearson(successes, trials);
-        assert!((interval[0] - low).abs() < 1e-4 && (interval[1] - high).abs() < 1e-4, "{interval:?}");
-    }
-}
+use crate::spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, Start};
+use crate::tasks::{self, Task};
+use crate::{players, scoring::Phase};
 
 fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultReply {
     ResultReply {
@@ -37,13 +28,14 @@ fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultRe
 }
 
 /// An episode that was played under `keeper`'s rules.
-fn played(keeper: &Keeper, task: &'static Task, seed: u32) -> Played {
+fn played(keeper: &Keeper, spec: &EpisodeSpec) -> Played {
     Played {
         policy: keeper.plan.player.name.into(),
-        spec: keeper.plan.spec(task, seed),
+        spec: spec.clone(),
         locomotion: keeper.locomotion.clone(),
         build: keeper.build.into(),
-        result: result(task.id, seed, vec![("p1".into(), Some(4.2))]),
+        result: result(spec.task.id, spec.seed, vec![("p1".into(), Some(4.2))]),
+        thought_s: 1.5,
         note: None,
     }
 }
@@ -52,37 +44,121 @@ fn played(keeper: &Keeper, task: &'static Task, seed: u32) -> Played {
 fn the_first_phase_that_was_missed_is_noted() {
     let note = |times: [Option<f64>; 3]| {
         let phases = ["p1", "p2", "p3"].into_iter().map(String::from).zip(times).collect();
-        missed(&result("handover", 7, phases))
+        missed(&result("handover", 7, phases), None)
     };
     let second = note([Some(4.2), None, None]);
     assert_eq!(second.as_deref(), Some("p2 was not reached in 812 steps"));
     assert_eq!(note([Some(4.2), Some(5.0), Some(6.0)]), None);
+
+    // Where one phase counts, no other is missed.
+    let times = [Some(4.2), Some(5.0), None].into_iter().enumerate();
+    let result = result("handover", 7, times.map(|(i, time_s)| (Phase::number(i), time_s)).collect());
+    assert_eq!(missed(&result, Some(1)), None);
+    assert_eq!(missed(&result, Some(2)).as_deref(), Some("p3 was not reached in 812 steps"));
 }
 
-#[test]
-fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
-    let folder = tempfile::tempdir().unwrap();
-    let task = crate::tasks::find("pouring").unwrap();
-    let plan = Plan {
+fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> Plan {
+    Plan {
         player: players::find("expert").unwrap(),
         protocol: Protocol::Agentic,
         robot: RobotFile::default(),
         locomotion: Controller::Balance,
         disclosure: Disclosure::Live,
         hints: Hints::On,
-        tasks: vec![task],
-        seeds: vec![7],
+        tasks,
+        seeds,
+        starts: Starts::Task,
+        shard: Shard::WHOLE,
         jobs: 1,
         record: false,
+    }
+}
+
+#[test]
+fn shares_are_fair_and_together_the_whole() {
+    let whole = plan(tasks::ALL.iter().collect(), (0..10).collect());
+    let (all, _) = whole.episodes();
+    assert_eq!(all.len(), 10 * tasks::ALL.len());
+    let mut joined = Vec::new();
+    for index in 0..3 {
+        let (share, _) = Plan { shard: Shard { index, of: 3 }, ..whole.clone() }.episodes();
+        assert!(share.len().abs_diff(all.len() / 3) <= 1, "{index}: {}", share.len());
+        for task in tasks::ALL {
+            let of_task = share.iter().filter(|spec| spec.task == task).count();
+            assert!((3..=4).contains(&of_task), "{index}: {of_task} of {}", task.id);
+        }
+        joined.extend(share);
+    }
+    joined.sort_by_key(|spec| (tasks::ALL.iter().position(|task| *task == *spec.task), spec.seed));
+    assert_eq!(joined, all);
+}
+
+#[test]
+fn episodes_from_phases_need_demonstrations() {
+    let folder = tempfile::tempdir().unwrap();
+    let recordings =
+        ["episodes/pouring-1", "pouring-2", "pouring-seed3"].map(|name| folder.path().join(name));
+    for recording in &recordings {
+        std::fs::create_dir_all(recording).unwrap();
+        std::fs::write(recording.join("episode.mcap"), "").unwrap();
+    }
+    let starts =
+        Starts::Phases { demonstrations: folder.path().into(), phases: vec!["p3".into(), "p1".into()] };
+    let plan = Plan { starts, ..plan(vec![tasks::find("pouring").unwrap()], vec![1, 2, 3, 4]) };
+    let (episodes, left_out) = plan.episodes();
+    let begun = |spec: &EpisodeSpec| match &spec.start {
+        Start::Phase(PhaseStart { recording, phase }) => {
+            (spec.seed, recording.parent().map(PathBuf::from).unwrap(), phase.clone())
+        }
+        other => panic!("{other:?}"),
     };
+    let expected =
+        |index: usize, phase: &str| (index as u32 + 1, recordings[index].clone(), phase.to_owned());
+    let all = (0..3).flat_map(|index| [expected(index, "p1"), expected(index, "p3")]).collect::<Vec<_>>();
+    assert_eq!(episodes.iter().map(begun).collect::<Vec<_>>(), all);
+    assert_eq!(left_out, ["p1", "p3"].map(|phase| format!("pouring seed 4 {phase}: no demonstration")));
+}
+
+#[test]
+fn phases_on_their_own_are_averaged_by_who_works_on_them() {
+    let plan = plan(Vec::new(), Vec::new());
+    let keeper = Keeper { plan: &plan, folder: Path::new(""), locomotion: "balance".into(), build: "test" };
+    let from = |id: &str, seed: u32, phase: usize, reached: bool| {
+        let start = PhaseStart { recording: "demonstration".into(), phase: Phase::number(phase) };
+        let spec = plan.spec(tasks::find(id).unwrap(), seed, Start::Phase(start));
+        let times = vec![(Phase::number(phase), reached.then_some(4.2))];
+        Played { result: result(id, seed, times), ..played(&keeper, &spec) }
+    };
+    // Of Handover p2 is collaborative; of CoPouring every phase is.
+    let mut episodes = vec![from("handover", 0, 0, true), from("handover", 1, 0, true)];
+    episodes.extend((0..4).map(|seed| from("handover", seed, 1, seed == 0)));
+    episodes.extend((0..4).map(|seed| from("co_pouring", seed, 2, seed < 3)));
+    episodes.push(from("handover", 0, 2, false));
+    let level = PhaseLevel::of(episodes.iter()).unwrap();
+    let rates: Vec<_> =
+        level.phases.iter().map(|rate| (rate.task, &*rate.phase, rate.reached, rate.episodes)).collect();
+    let handover = [("handover", "p1", 2, 2), ("handover", "p2", 1, 4), ("handover", "p3", 0, 1)];
+    assert_eq!(rates, [&handover[..], &[("co_pouring", "p3", 3, 4)]].concat());
+    assert_eq!((level.non_collaborative_share, level.collaborative_share), (Some(0.5), Some(0.5)));
+    assert_eq!(level.drop_share, Some(0.0));
+    let whole = played(&keeper, &plan.spec(tasks::find("handover").unwrap(), 0, Start::Task));
+    assert_eq!(PhaseLevel::of([whole].iter()), None);
+}
+
+#[test]
+fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let task = crate::tasks::find("pouring").unwrap();
+    let plan = plan(vec![task], vec![7]);
+    let spec = plan.spec(task, 7, Start::Task);
     let build = fingerprint::build().unwrap();
     let keeper = Keeper { plan: &plan, folder: folder.path(), locomotion: "balance".into(), build };
     let kept_after = |text: &str| {
         std::fs::write(folder.path().join("pouring-7.json"), text).unwrap();
-        keeper.kept(task, 7)
+        keeper.kept(&spec)
     };
-    assert_eq!(keeper.kept(task, 7), None, "nothing was played");
-    let same = played(&keeper, task, 7);
+    assert_eq!(keeper.kept(&spec), None, "nothing was played");
+    let same = played(&keeper, &spec);
     let text = serde_json::to_string(&same).unwrap();
     assert_eq!(kept_after(&text), Some(same.clone()));
     assert_eq!(kept_after(&text[..text.len() / 2]), None, "a torn file");
@@ -93,6 +169,7 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
         ("protocol", |played| played.spec.protocol = Protocol::Benchmark),
         ("disclosure", |played| played.spec.disclosure = Disclosure::End),
         ("hints", |played| played.spec.hints = Hints::Off),
+        ("start", |played| played.spec.start = Start::Checkpoint("other".into())),
         ("robot", |played| played.spec.robot = RobotFile::File("other.xml".into())),
         ("policy", |played| played.policy = "idle".into()),
         ("controller", |played| played.locomotion.push('0')),
@@ -107,8 +184,8 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
     let recorded = Plan { record: true, ..plan.clone() };
     let collector = Keeper { plan: &recorded, ..keeper };
     std::fs::write(folder.path().join("pouring-7.json"), &text).unwrap();
-    assert_eq!(collector.kept(task, 7), None, "no recording");
+    assert_eq!(collector.kept(&spec), None, "no recording");
     std::fs::create_dir(folder.path().join("pouring-7")).unwrap();
     write_result(&same.result, &folder.path().join("pouring-7")).unwrap();
-    assert_eq!(collector.kept(task, 7), Some(same));
+    assert_eq!(collector.kept(&spec), Some(same));
 }

@@ -5,27 +5,28 @@ use std::sync::{Mutex, mpsc};
 
 use super::EvaluationError;
 use super::keep::{Keeper, Played};
-use crate::tasks::Task;
+use crate::spec::EpisodeSpec;
 
-/// Every episode of the plan, kept or played, in the plan's order.
+/// Every episode of `work`, kept or played, in its order; those that do not exist are added to `left_out`.
 pub fn play_all(
     keeper: &Keeper,
+    work: &[EpisodeSpec],
+    left_out: &mut Vec<String>,
     progress: &(dyn Fn(&Played) + Sync),
 ) -> Result<Vec<Played>, EvaluationError> {
-    let plan = keeper.plan;
-    let work: Vec<(&'static Task, u32)> =
-        plan.tasks.iter().flat_map(|task| plan.seeds.iter().map(|seed| (*task, *seed))).collect();
     let next = AtomicUsize::new(0);
     let failure = Mutex::new(None);
     let (done, played) = mpsc::channel();
-    let mut episodes: Vec<Played> = std::thread::scope(|scope| {
-        for _ in 0..plan.jobs.max(1) {
+    let mut episodes: Vec<(usize, Option<Played>)> = std::thread::scope(|scope| {
+        for _ in 0..keeper.plan.jobs.max(1) {
             let done = done.clone();
-            let (work, next, failure) = (&work, &next, &failure);
+            let (next, failure) = (&next, &failure);
             scope.spawn(move || {
-                while let Some((task, seed)) = work.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    match keeper.kept_or_played(task, *seed) {
-                        Ok(episode) => drop(done.send(episode)),
+                loop {
+                    let number = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(spec) = work.get(number) else { break };
+                    match keeper.kept_or_played(spec) {
+                        Ok(episode) => drop(done.send((number, episode))),
                         Err(error) => {
                             // Nobody else begins another episode.
                             next.store(work.len(), Ordering::Relaxed);
@@ -39,12 +40,15 @@ pub fn play_all(
             });
         }
         drop(done);
-        played.iter().inspect(progress).collect()
+        played.iter().inspect(|(_, episode)| episode.iter().for_each(progress)).collect()
     });
     if let Some(error) = failure.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()) {
         return Err(error);
     }
-    let rank = |episode: &Played| plan.tasks.iter().position(|task| task.id == episode.result.task);
-    episodes.sort_by_key(|episode| (rank(episode), episode.result.seed));
-    Ok(episodes)
+    episodes.sort_by_key(|(number, _)| *number);
+    for (number, _) in episodes.iter().filter(|(_, episode)| episode.is_none()) {
+        let EpisodeSpec { task, seed, .. } = &work[*number];
+        left_out.push(format!("{} seed {seed}: its demonstration did not come so far", task.id));
+    }
+    Ok(episodes.into_iter().filter_map(|(_, episode)| episode).collect())
 }

@@ -7,12 +7,31 @@ use crate::scoring::Facts;
 use crate::{EpisodeError, Session};
 
 /// An episode in this process.
-pub struct InProcess(pub Session);
+pub struct InProcess {
+    pub session: Session,
+    /// Number of phases after which it is over for the player, whatever is left of it.
+    until: usize,
+}
+
+impl InProcess {
+    /// An episode that is played to its end.
+    pub fn new(session: Session) -> InProcess {
+        InProcess { session, until: usize::MAX }
+    }
+
+    /// An episode that is played until `phases` phases have been reached.
+    pub fn until(phases: usize, session: Session) -> InProcess {
+        InProcess { session, until: phases }
+    }
+}
 
 impl Caller for InProcess {
     fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {
+        if self.session.reached_phases() >= self.until {
+            return Err(PlayerError::EpisodeOver);
+        }
         let tool = call.name();
-        self.0.call(call).map_err(|error| match error {
+        self.session.call(call).map_err(|error| match error {
             EpisodeError::Ended { .. } => PlayerError::EpisodeOver,
             error => PlayerError::Call { tool, reason: error.to_string() },
         })
@@ -21,6 +40,6 @@ impl Caller for InProcess {
 
 impl Backstage for InProcess {
     fn facts(&mut self) -> Result<Facts, PlayerError> {
-        Ok(self.0.facts())
+        Ok(self.session.facts())
     }
 }

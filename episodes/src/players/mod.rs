@@ -3,6 +3,7 @@
 //!
 //! To add a player: one file or folder here and its line in [`ALL`].
 
+mod demonstration;
 pub mod experts;
 mod idle;
 mod in_process;
@@ -76,6 +77,11 @@ pub static ALL: &[Entry] = &[
         about: "nobody: robots hold still until the steps of the benchmark protocol are used up",
         make: Make::Player(|spec| Ok(Box::new(idle::Idle::new(spec.task)))),
     },
+    Entry {
+        name: "demonstration",
+        about: "what the robots were told in the recording that the episode starts from, told again",
+        make: Make::Player(|spec| Ok(Box::new(demonstration::Demonstration::new(spec)))),
+    },
 ];
 
 /// The player called `name`.
@@ -120,6 +126,6 @@ mod tests {
             }
         }
         let text = find("expart").unwrap_err().to_string();
-        assert_eq!(text, "no player \"expart\"; have: expert, idle");
+        assert_eq!(text, "no player \"expart\"; have: expert, idle, demonstration");
     }
 }

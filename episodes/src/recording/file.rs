@@ -8,6 +8,7 @@ use std::{
 };
 
 use foxglove::Encode;
+use mcap::Attachment;
 use mcap::records::{MessageHeader, Metadata};
 
 use super::store::{Store, Visibility};
@@ -92,6 +93,19 @@ impl McapFile {
     pub fn metadata(&mut self, name: &str, entries: &[(&str, &str)]) -> Result<(), OutputError> {
         let record = Metadata { name: name.into(), metadata: string_map(entries) };
         self.writer.write_metadata(&record).map_err(|e| self.failed(e))
+    }
+
+    /// Appends a file of its own, as it is.
+    pub fn attach(&mut self, name: &str, time_s: f64, bytes: &[u8]) -> Result<(), OutputError> {
+        let time_ns = time_ns(time_s);
+        let attached = self.writer.attach(&Attachment {
+            log_time: time_ns,
+            create_time: time_ns,
+            name: name.into(),
+            media_type: "application/octet-stream".into(),
+            data: bytes.into(),
+        });
+        attached.map_err(|e| self.failed(e))
     }
 
     /// Writes the index and gives the file its name.

@@ -1,6 +1,8 @@
 //! Messages that have no well-known schema: flat JSON objects, because Foxglove's plots address numbers by field name and
 //! its schema reader takes neither references nor nullable types.
 
+use std::time::Duration;
+
 use base64::{DecodeError, Engine, prelude::BASE64_STANDARD};
 use foxglove::{Encode, Schema, bytes::BufMut};
 use schemars::JsonSchema;
@@ -42,6 +44,8 @@ impl<T: JsonMessage> Encode for Json<T> {
 #[derive(Serialize, Deserialize, JsonSchema)]
 pub struct StepMessage {
     control_step: u64,
+    /// Of everything that decides the future, more than the step shows; 16 hexadecimal digits.
+    state_hash: String,
     /// [`Step`] in postcard's encoding, base64.
     #[schemars(extend("contentEncoding" = "base64"))]
     postcard: String,
@@ -61,13 +65,22 @@ pub enum StepError {
 }
 
 impl StepMessage {
-    pub fn new(step: &Step) -> Result<Json<StepMessage>, OutputError> {
+    pub fn new(step: &Step, state_hash: &str) -> Result<Json<StepMessage>, OutputError> {
         let bytes = postcard::to_stdvec(step).map_err(|source| OutputError::Encode(source.into()))?;
-        Ok(Json(StepMessage { control_step: step.control_step, postcard: BASE64_STANDARD.encode(bytes) }))
+        Ok(Json(StepMessage {
+            control_step: step.control_step,
+            state_hash: state_hash.into(),
+            postcard: BASE64_STANDARD.encode(bytes),
+        }))
     }
 
     pub fn step(&self) -> Result<Step, StepError> {
         Ok(postcard::from_bytes(&BASE64_STANDARD.decode(&self.postcard)?)?)
+    }
+
+    /// Number of the step, and hash of the state that it left.
+    pub fn state(self) -> (u64, String) {
+        (self.control_step, self.state_hash)
     }
 }
 
@@ -183,6 +196,8 @@ impl From<&Budget> for Json<BudgetLeft> {
 pub struct ToolCallRecord<'a> {
     /// When it was answered.
     pub time_s: f64,
+    /// How long the policy has thought since the episode began: what its clock is charged up to this call.
+    pub thought: Duration,
     pub call: &'a ToolCall,
     pub outcome: Result<&'a ToolReply, &'a str>,
 }
@@ -191,6 +206,8 @@ pub struct ToolCallRecord<'a> {
 #[derive(Serialize, Deserialize, JsonSchema)]
 pub struct ToolCallMessage {
     pub tool: String,
+    /// How long the policy has thought since the episode began, this call's own thinking included.
+    pub thought_ns: u64,
     pub arguments: String,
     pub ok: bool,
     /// The reply without pictures, or the text of the problem.
@@ -208,7 +225,8 @@ impl ToolCallMessage {
             Err(problem) => (false, problem.to_string()),
         };
         let arguments = serde_json::to_string(record.call)?;
-        Ok(Json(ToolCallMessage { tool: record.call.name().into(), arguments, ok, reply }))
+        let thought_ns = u64::try_from(record.thought.as_nanos()).unwrap_or(u64::MAX);
+        Ok(Json(ToolCallMessage { tool: record.call.name().into(), thought_ns, arguments, ok, reply }))
     }
 }
 

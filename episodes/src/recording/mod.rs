@@ -5,6 +5,10 @@
 //! `A/egocentric`, objects by name. Numbers that have no well-known schema are JSON with a JSON Schema. `/steps` holds each
 //! [`tandem_sim::Step`] as it was, bit for bit, from the state before the first one on; everything else is for people.
 //!
+//! All that a replay needs is there: what the episode is, the build, each tool call with what the policy's clock was charged, the
+//! hash of the whole state after every step, and as attachments checkpoints of where the policy took over and where every
+//! later phase begins.
+//!
 //! The file is `episode.mcap.partial` until [`Recorder::finish`] renames it, so an `episode.mcap` is always complete. A
 //! recorder that is dropped earlier still writes the index; one whose process is killed leaves whole chunks without an index,
 //! which [`recover`] adds.
@@ -22,7 +26,7 @@ mod transforms;
 mod write;
 
 pub use messages::ToolCallRecord;
-pub use read::{RecordedCall, Recording, RecordingError};
+pub use read::{RecordedCall, RecordedCheckpoint, Recording, RecordingError};
 pub use recover::{RecoverError, Recovered, recover};
 pub use store::Visibility;
 pub use write::{Recorder, RecordingHeader};
@@ -32,6 +36,14 @@ mod topics {
     pub const STEPS: &str = "/steps";
     pub const PHASES: &str = "/phases";
     pub const TOOL_CALLS: &str = "/tool_calls";
+}
+
+/// What the checkpoint is called that an episode began with, where that is not its task's own beginning.
+pub const BEGIN: &str = "begin";
+
+/// Name of the attachment that is the checkpoint of a phase's beginning, or of [`BEGIN`].
+fn checkpoint_name(of: &str) -> String {
+    format!("{of}.checkpoint")
 }
 
 /// Records of metadata that are read back, and their entries.

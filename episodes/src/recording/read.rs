@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use base64::{Engine, prelude::BASE64_STANDARD};
 use serde::de::DeserializeOwned;
@@ -10,7 +11,7 @@ use tandem_sim::{SimError, Step};
 use tandem_tools_spec::{PhaseReached, ResultReply};
 
 use super::messages::{Phase, StepError, StepMessage, ToolCallMessage};
-use super::{metadata, topics};
+use super::{checkpoint_name, metadata, topics};
 use crate::reports::RESULT_FILE;
 use crate::scoring::{ScoreMemory, Scores};
 use crate::spec::EpisodeSpec;
@@ -34,10 +35,21 @@ pub struct Recording {
 pub struct RecordedCall {
     /// When it was answered.
     pub time_s: f64,
+    /// How long the policy had thought by then since the episode began.
+    pub thought: Duration,
     pub tool: String,
     pub arguments: Value,
     /// The reply as JSON, without pictures; or the text of the problem.
     pub outcome: Result<String, String>,
+}
+
+/// A checkpoint of the episode, as its recording holds it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedCheckpoint {
+    /// The simulated time at which it was made.
+    pub time_s: f64,
+    /// What [`crate::Checkpoint`] reads.
+    pub bytes: Vec<u8>,
 }
 
 /// Why a recording cannot be read.
@@ -94,6 +106,32 @@ impl Recording {
         }))
     }
 
+    /// Number and state hash of every step, that before the first one included.
+    pub fn state_hashes(
+        &self,
+    ) -> Result<impl Iterator<Item = Result<(u64, String), RecordingError>>, RecordingError> {
+        let steps = self.messages::<StepMessage>(topics::STEPS)?;
+        Ok(steps.map(|message| message.map(|(_, message)| message.state())))
+    }
+
+    /// The checkpoint of `what`: a phase's beginning, or [`super::BEGIN`]; `None` where there is none.
+    pub fn checkpoint(&self, what: &str) -> Result<Option<RecordedCheckpoint>, RecordingError> {
+        let failed = |source| RecordingError::Mcap { path: self.path.clone(), source };
+        let summary = mcap::Summary::read(&self.bytes).map_err(failed)?.unwrap_or_default();
+        let name = checkpoint_name(what);
+        let Some(index) = summary.attachment_indexes.iter().find(|index| index.name == name) else {
+            return Ok(None);
+        };
+        let attachment = mcap::read::attachment(&self.bytes, index).map_err(failed)?;
+        let (time_s, bytes) = (attachment.log_time as f64 / 1e9, attachment.data.into_owned());
+        Ok(Some(RecordedCheckpoint { time_s, bytes }))
+    }
+
+    /// Where it was read from.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// The phases that the episode reached.
     pub fn phases(&self) -> Result<Vec<PhaseReached>, RecordingError> {
         let phase = |message: Result<(f64, Phase), RecordingError>| {
@@ -106,9 +144,11 @@ impl Recording {
     /// The tool calls of the episode, in their order.
     pub fn tool_calls(&self) -> Result<Vec<RecordedCall>, RecordingError> {
         let call = |message: Result<(f64, ToolCallMessage), RecordingError>| {
-            let (time_s, ToolCallMessage { tool, arguments, ok, reply }) = message?;
+            let (time_s, ToolCallMessage { tool, thought_ns, arguments, ok, reply }) = message?;
             let arguments = serde_json::from_str(&arguments).map_err(|source| self.json(source))?;
-            Ok(RecordedCall { time_s, tool, arguments, outcome: if ok { Ok(reply) } else { Err(reply) } })
+            let (thought, outcome) =
+                (Duration::from_nanos(thought_ns), if ok { Ok(reply) } else { Err(reply) });
+            Ok(RecordedCall { time_s, thought, tool, arguments, outcome })
         };
         self.messages(topics::TOOL_CALLS)?.map(call).collect()
     }

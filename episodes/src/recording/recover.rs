@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use mcap::Attachment;
 use mcap::read::{ChunkFlattener, Options};
 use mcap::records::Record;
 
@@ -36,7 +37,7 @@ pub enum RecoverError {
     Output(#[from] OutputError),
 }
 
-/// Writes every message and all metadata of `FILE.partial` up to its last whole record to `FILE`, with an index. What is
+/// Writes every message, attachment and all metadata of `FILE.partial` up to its last whole record to `FILE`, with an index. What is
 /// read stays as it is.
 pub fn recover(partial: &Path) -> Result<Recovered, RecoverError> {
     let path = match partial.extension() {
@@ -106,7 +107,14 @@ impl Copy {
                 self.writer.write_to_known_channel(&header, &data)
             }
             Record::Metadata(metadata) => self.writer.write_metadata(&metadata),
-            // Our recordings have no attachments, and the rest is what the writer makes anew.
+            Record::Attachment { header, data, .. } => self.writer.attach(&Attachment {
+                log_time: header.log_time,
+                create_time: header.create_time,
+                name: header.name,
+                media_type: header.media_type,
+                data,
+            }),
+            // The rest is what the writer makes anew.
             _ => Ok(()),
         };
         written.map_err(|source| OutputError::Mcap { path: self.path.clone(), source })

@@ -4,6 +4,7 @@ use std::{
     collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
+    time::Duration,
 };
 
 use foxglove::Decode;
@@ -21,6 +22,7 @@ use crate::spec::EpisodeSpec;
 use crate::tasks;
 
 const STEPS: u32 = 10;
+const THOUGHT: Duration = Duration::from_nanos(1_234_567_891);
 const PICTURE: &[u8] = b"the bytes of a PNG";
 
 fn world() -> World {
@@ -62,7 +64,11 @@ fn recorder(folder: &Path, world: &World) -> (Recorder, Scores) {
         robots: world.robots().iter().map(sheet).collect(),
         scores: scores.memory(),
     };
-    (Recorder::create(folder, Visibility::Live, header, &start).unwrap(), scores)
+    (Recorder::create(folder, Visibility::Live, header, &start, &hash(world)).unwrap(), scores)
+}
+
+fn hash(world: &World) -> String {
+    format!("{:016x}", world.state_hash())
 }
 
 fn record_step(recorder: &mut Recorder, scores: &mut Scores, world: &mut World, commands: &[RobotCommand]) {
@@ -72,7 +78,7 @@ fn record_step(recorder: &mut Recorder, scores: &mut Scores, world: &mut World, 
         wall_clock_left_s: Some(1800.0),
         steps_per_command: 25,
     };
-    recorder.step(&step, &scores.update(&step).facts, budget).unwrap();
+    recorder.step(&step, &hash(world), &scores.update(&step).facts, budget).unwrap();
 }
 
 /// Records `STEPS` steps, a phase, a refused call and an observation with a picture.
@@ -86,12 +92,21 @@ fn record(folder: &Path) -> (World, PathBuf) {
     let time_s = world.present().time_s;
     recorder.phase(&PhaseReached { id: "p1".into(), name: "grasp_and_lift".into(), time_s }).unwrap();
     let wait = ToolCall::parse("wait", serde_json::json!({ "steps": 10 })).unwrap();
-    recorder.tool_call(&ToolCallRecord { time_s, call: &wait, outcome: Err("no steps are left") }).unwrap();
+    recorder
+        .tool_call(&ToolCallRecord {
+            time_s,
+            thought: THOUGHT,
+            call: &wait,
+            outcome: Err("no steps are left"),
+        })
+        .unwrap();
     let observe = ToolCall::parse("observe", serde_json::json!({ "robots": ["A"] })).unwrap();
     let image = CameraImage { robot: "A".into(), png_base64: Png(PICTURE.into()) };
     let seen = Observation { time_s, states: vec![], cameras: vec![], images: vec![image] };
     let reply = ToolReply::Look(LookReply::Observe(seen));
-    recorder.tool_call(&ToolCallRecord { time_s, call: &observe, outcome: Ok(&reply) }).unwrap();
+    recorder
+        .tool_call(&ToolCallRecord { time_s, thought: THOUGHT, call: &observe, outcome: Ok(&reply) })
+        .unwrap();
     let path = recorder.finish(&result()).unwrap();
     (world, path)
 }
@@ -175,8 +190,11 @@ fn a_recording_reads_back() {
     let recording = Recording::read(&path).unwrap();
     assert_eq!((recording.spec.clone(), recording.build.as_str()), (spec(), "0.1.0+test"));
     assert_eq!(recording.steps().unwrap().last().unwrap().unwrap(), world.present());
+    let last_hash = recording.state_hashes().unwrap().last().unwrap().unwrap();
+    assert_eq!(last_hash, (STEPS.into(), hash(&world)));
     assert_eq!(recording.phases().unwrap()[0].time_s, 0.2);
     let calls = recording.tool_calls().unwrap();
+    assert!(calls.iter().all(|call| call.thought == THOUGHT));
     assert_eq!((calls[0].tool.as_str(), &calls[0].outcome), ("wait", &Err("no steps are left".into())));
     assert_eq!((calls[1].arguments["robots"][0].as_str(), calls[1].outcome.is_ok()), (Some("A"), true));
     assert_eq!(recording.result.unwrap(), result());
@@ -297,4 +315,44 @@ fn the_scene_shows_every_drawn_geom() {
         entities.flat_map(|e| e.triangles.iter()).map(|t| format!("{:?}", t.color)).collect()
     };
     assert_ne!(colours("A/"), colours("B/"), "partners differ in colour");
+}
+
+/// Every text of a JSON value.
+fn texts(value: &serde_json::Value, found: &mut Vec<String>) {
+    match value {
+        serde_json::Value::String(text) => found.push(text.clone()),
+        serde_json::Value::Array(values) => values.iter().for_each(|value| texts(value, found)),
+        serde_json::Value::Object(fields) => fields.values().for_each(|value| texts(value, found)),
+        _ => {}
+    }
+}
+
+/// The layout that README has people open in Foxglove shows what recordings hold.
+#[test]
+fn the_layout_names_topics_and_fields_that_there_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, path) = record(folder.path());
+    let summary = mcap::Summary::read(&fs::read(path).unwrap()).unwrap().expect("a summary");
+    let layout: serde_json::Value = serde_json::from_str(include_str!("../../foxglove_layout.json")).unwrap();
+    let mut named = Vec::new();
+    texts(&layout["configById"], &mut named);
+    named.extend(layout["configById"]["3D!room"]["topics"].as_object().unwrap().keys().cloned());
+    let paths: Vec<&String> = named.iter().filter(|text| text.starts_with('/')).collect();
+    assert!(paths.len() > 15, "{paths:?}");
+    for path in paths {
+        // Robots' topics are alike, and only A's camera has taken a picture here.
+        let of_a = path.replacen("/B/", "/A/", 1).replacen("/C/", "/A/", 1);
+        let (topic, field) = of_a.split_once('.').unwrap_or((&of_a, ""));
+        let channel = summary.channels.values().find(|channel| channel.topic == topic);
+        let channel = channel.unwrap_or_else(|| panic!("the layout names {path}, and there is no {topic}"));
+        if !field.is_empty() {
+            let schema: serde_json::Value =
+                serde_json::from_slice(&channel.schema.as_ref().unwrap().data).unwrap();
+            let field = field.split('[').next().unwrap();
+            assert!(
+                schema["properties"][field].is_object(),
+                "the layout names {path}, and there is no {field}"
+            );
+        }
+    }
 }

@@ -12,7 +12,7 @@ use super::messages::{BudgetLeft, Json, Phase, StepMessage, ToolCallMessage, Too
 use super::robot_topics::RobotTopics;
 use super::store::Visibility;
 use super::transforms::{self, robot_frame};
-use super::{metadata, scene, topics};
+use super::{checkpoint_name, metadata, scene, topics};
 use crate::commands::RobotSheet;
 use crate::output::OutputError;
 use crate::reports::RESULT_FILE;
@@ -57,6 +57,7 @@ impl Recorder {
         visibility: Visibility,
         header: RecordingHeader,
         start: &Step,
+        state_hash: &str,
     ) -> Result<Recorder, OutputError> {
         let mut file = McapFile::create(&folder.join(Self::FILE_NAME), visibility)?;
         write_header(&mut file, &header)?;
@@ -78,7 +79,7 @@ impl Recorder {
             file,
         };
         recorder.draw_robots()?;
-        recorder.file.write(&mut recorder.steps, start.time_s, &StepMessage::new(start)?)?;
+        recorder.file.write(&mut recorder.steps, start.time_s, &StepMessage::new(start, state_hash)?)?;
         Ok(recorder)
     }
 
@@ -103,10 +104,16 @@ impl Recorder {
         self.file.write(&mut self.scene, self.start_s, &SceneUpdate { entities, deletions: vec![] })
     }
 
-    /// Appends one control step, of which scoring sees `facts`.
-    pub fn step(&mut self, step: &Step, facts: &Facts, budget: Budget) -> Result<(), OutputError> {
+    /// Appends one control step, of which scoring sees `facts`, and the hash of the whole state that it left.
+    pub fn step(
+        &mut self,
+        step: &Step,
+        state_hash: &str,
+        facts: &Facts,
+        budget: Budget,
+    ) -> Result<(), OutputError> {
         let time_s = step.time_s;
-        self.file.write(&mut self.steps, time_s, &StepMessage::new(step)?)?;
+        self.file.write(&mut self.steps, time_s, &StepMessage::new(step, state_hash)?)?;
         self.file.write(&mut self.transforms, time_s, &transforms::transforms(&self.robots, step))?;
         let robots = self.robots.iter().zip(&mut self.robot_topics).zip(&step.robots);
         for (index, ((robot, topics), moved)) in robots.enumerate() {
@@ -118,6 +125,11 @@ impl Recorder {
     /// Appends a phase at the time it was reached.
     pub fn phase(&mut self, phase: &PhaseReached) -> Result<(), OutputError> {
         self.file.write(&mut self.phases, phase.time_s, &Json::from(phase))
+    }
+
+    /// Attaches a checkpoint of the episode as it stands at `time_s`.
+    pub fn checkpoint(&mut self, name: &str, time_s: f64, bytes: &[u8]) -> Result<(), OutputError> {
+        self.file.attach(&checkpoint_name(name), time_s, bytes)
     }
 
     /// Appends a tool call and its answer, and hands everything to the system: what a policy has been told is not lost with

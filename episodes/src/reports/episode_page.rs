@@ -27,6 +27,8 @@ pub struct EpisodePage<'a> {
     pub task: &'a Task,
     pub result: &'a ResultReply,
     pub calls: &'a CallCounts,
+    /// Simulated time at which it began: later than 0 where it began at a phase of another episode.
+    pub begin_s: f64,
     /// As it stood at the last control step; `None` if there was none.
     pub budget_left: Option<Budget>,
     /// A PNG file.
@@ -111,21 +113,25 @@ impl EpisodePage<'_> {
     /// One segment per phase that was reached, as long as it took, and the rest of the episode.
     fn timeline(&self) -> String {
         let mut segments = String::new();
-        let mut from_s = 0.0;
+        let mut from_s = self.begin_s;
         let percent = |span_s: f64| 100.0 * span_s / self.duration_s().max(f64::MIN_POSITIVE);
         for (id, time_s) in &self.result.phases.0 {
             let Some(time_s) = *time_s else { break };
+            if time_s <= self.begin_s && self.begin_s > 0.0 {
+                continue;
+            }
             let (id, width) = (escape(id), percent(time_s - from_s));
             segments += &format!(r#"<span style="width:{width:.2}%">{id} {time_s:.2} s</span>"#);
             from_s = time_s;
         }
-        let rest = percent(self.duration_s() - from_s);
+        let end_s = self.begin_s + self.duration_s();
+        let rest = percent(end_s - from_s);
         if rest > 0.0 {
             segments += &format!(r#"<span class="rest" style="width:{rest:.2}%"></span>"#);
         }
-        let end_s = self.duration_s();
+        let begin_s = self.begin_s;
         format!(
-            r#"<div class="timeline">{segments}</div><div class="scale"><span>0 s</span><span>{end_s:.2} s</span></div>"#
+            r#"<div class="timeline">{segments}</div><div class="scale"><span>{begin_s} s</span><span>{end_s:.2} s</span></div>"#
         )
     }
 
@@ -203,7 +209,7 @@ impl EpisodePage<'_> {
 }
 
 /// Text as it may stand in HTML, in attributes too.
-fn escape(text: &str) -> String {
+pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
         match character {

@@ -4,6 +4,6 @@ mod episode_page;
 mod results;
 mod strip;
 
-pub use episode_page::{CallCounts, EpisodePage};
+pub use episode_page::{CallCounts, EpisodePage, escape};
 pub use results::{RESULT_FILE, write_result};
 pub use strip::{CELL_HEIGHT, CELL_WIDTH, Moment, View, png};

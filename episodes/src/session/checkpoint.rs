@@ -14,8 +14,9 @@ use super::{Session, this_build};
 use crate::commands::MotionState;
 use crate::error::{CheckpointError, EpisodeError};
 use crate::output::write_whole;
+use crate::recording::Recording;
 use crate::scoring::ScoreMemory;
-use crate::spec::EpisodeSpec;
+use crate::spec::{EpisodeSpec, PhaseStart};
 
 /// An episode at one instant. It fits episodes of the same task, seed, protocol, robot and controller.
 #[derive(Clone)]
@@ -39,6 +40,8 @@ struct Progress {
     world: Snapshot,
     motions: Vec<MotionState>,
     scores: ScoreMemory,
+    /// Control steps of the world that are not the episode's.
+    steps_before: u64,
     tool_calls: u32,
     thought: Duration,
     ended: Option<EndReason>,
@@ -58,6 +61,11 @@ struct Header {
 impl Checkpoint {
     /// Writes a file. A reader sees the whole of it or nothing.
     pub fn write(&self, path: &Path) -> Result<(), EpisodeError> {
+        Ok(write_whole(path, &self.to_bytes()?)?)
+    }
+
+    /// What a file of it holds.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, EpisodeError> {
         let progress = postcard::to_stdvec(&self.progress).map_err(CheckpointError::from)?;
         let header = Header {
             build: this_build()?.into(),
@@ -68,14 +76,29 @@ impl Checkpoint {
         let mut bytes = serde_json::to_vec(&header).map_err(crate::OutputError::from)?;
         bytes.push(b'\n');
         bytes.extend(progress);
-        write_whole(path, &bytes)?;
-        Ok(())
+        Ok(bytes)
     }
 
     /// Reads a file that this build has written.
     pub fn read(path: &Path) -> Result<Checkpoint, EpisodeError> {
         let bytes =
             std::fs::read(path).map_err(|source| CheckpointError::Read { path: path.into(), source })?;
+        Checkpoint::from_bytes(&bytes, path)
+    }
+
+    /// Reads where a phase of a recorded episode began; this build has to have recorded it.
+    pub fn of_phase(start: &PhaseStart) -> Result<Checkpoint, EpisodeError> {
+        let PhaseStart { recording: path, phase } = start;
+        let unreadable = |error: crate::RecordingError| CheckpointError::Recording(error.to_string());
+        let found = Recording::read(path).and_then(|recording| recording.checkpoint(phase));
+        match found.map_err(unreadable)? {
+            Some(found) => Checkpoint::from_bytes(&found.bytes, path),
+            None => Err(CheckpointError::NoPhase { path: path.clone(), phase: phase.clone() }.into()),
+        }
+    }
+
+    /// Reads what `path` holds.
+    pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Checkpoint, EpisodeError> {
         let line = bytes.iter().position(|byte| *byte == b'\n').unwrap_or(bytes.len());
         let header: Header = serde_json::from_slice(&bytes[..line])
             .map_err(|source| CheckpointError::NotOne { path: path.into(), source })?;
@@ -102,11 +125,17 @@ impl Checkpoint {
 impl Origin {
     /// What has to be the same for progress to fit, in words.
     fn episode(&self) -> String {
-        let EpisodeSpec { task, seed, protocol, .. } = &self.spec;
-        let (task, protocol, robot, locomotion) = (task.id, protocol.name(), &self.robot, &self.locomotion);
-        format!(
-            "task {task} seed {seed} under the {protocol} protocol with robot {robot} and controller {locomotion}"
-        )
+        let (task, seed, protocol) = (self.spec.task.id, self.spec.seed, self.spec.protocol.name());
+        format!("task {task} seed {seed} under the {protocol} protocol with {}", self.machine())
+    }
+
+    /// As [`Origin::episode`], under whatever protocol.
+    fn world(&self) -> String {
+        format!("task {} seed {} with {}", self.spec.task.id, self.spec.seed, self.machine())
+    }
+
+    fn machine(&self) -> String {
+        format!("robot {} and controller {}", self.robot, self.locomotion)
     }
 }
 
@@ -121,6 +150,7 @@ impl Session {
             world: self.world.snapshot()?,
             motions: self.motions.iter().map(|motion| motion.state().clone()).collect(),
             scores: self.scores.memory(),
+            steps_before: self.steps_before,
             tool_calls: self.tool_calls,
             thought: self.clock.spent(),
             ended: self.ended,
@@ -131,13 +161,26 @@ impl Session {
     /// Takes the episode to a checkpoint of an episode of the same task, seed, protocol, robot and controller. On an error
     /// the episode is as it was.
     pub fn resume(&mut self, checkpoint: &Checkpoint) -> Result<(), EpisodeError> {
-        let (made_of, wanted) = (checkpoint.origin.episode(), self.origin.episode());
-        if made_of != wanted {
-            return Err(CheckpointError::OtherEpisode { made_of, wanted }.into());
-        }
-        let progress = &checkpoint.progress;
+        expect_same(checkpoint.origin.episode(), self.origin.episode())?;
+        self.restore(&checkpoint.progress)
+    }
+
+    /// As [`Session::resume`], under whatever protocol, with the whole budget ahead: what was done so far is not this
+    /// episode's.
+    pub fn take_up(&mut self, checkpoint: &Checkpoint) -> Result<(), EpisodeError> {
+        expect_same(checkpoint.origin.world(), self.origin.world())?;
+        self.restore(&checkpoint.progress)?;
+        self.steps_before = self.present.control_step;
+        self.tool_calls = 0;
+        self.clock.set_spent(Duration::ZERO);
+        self.ended = None;
+        Ok(())
+    }
+
+    fn restore(&mut self, progress: &Progress) -> Result<(), EpisodeError> {
         self.world.restore(&progress.world)?;
         self.present = self.world.present();
+        self.steps_before = progress.steps_before;
         for (motion, state) in self.motions.iter_mut().zip(&progress.motions) {
             motion.set_state(state.clone());
         }
@@ -147,5 +190,12 @@ impl Session {
         self.ended = progress.ended;
         self.result = None;
         Ok(())
+    }
+}
+
+fn expect_same(made_of: String, wanted: String) -> Result<(), CheckpointError> {
+    match made_of == wanted {
+        true => Ok(()),
+        false => Err(CheckpointError::OtherEpisode { made_of, wanted }),
     }
 }

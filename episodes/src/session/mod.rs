@@ -6,12 +6,16 @@ mod checkpoint;
 mod clock;
 mod eyes;
 mod moment;
+mod replay;
 mod replies;
 mod run_files;
 mod status;
 
+pub(crate) use build::build;
 pub use checkpoint::Checkpoint;
 pub use clock::{Clock, monotonic};
+pub(crate) use eyes::Eyes;
+pub(crate) use replay::Replay;
 pub use run_files::{RunFiles, RunFolder};
 
 use std::path::Path;
@@ -23,13 +27,13 @@ use tandem_tools_spec::{EndReason, ManageReply, ResultReply, ToolCall, ToolReply
 use crate::commands::{Command, Motion, Run};
 use crate::convert::isometry_from_sim;
 use crate::protocol::{Rules, rules};
-use crate::scoring::{Facts, Scores};
+use crate::recording::BEGIN;
+use crate::scoring::{Facts, Phase, Scores};
 use crate::spec::{EpisodeSpec, Start};
 use crate::{EpisodeError, fingerprint};
 use build::Built;
 use checkpoint::Origin;
 use clock::ThinkingClock;
-use eyes::Eyes;
 
 /// One episode from start to result.
 pub struct Session {
@@ -40,6 +44,8 @@ pub struct Session {
     present: Step,
     motions: Vec<Motion>,
     scores: Scores,
+    /// Control steps of the world before the episode, where it begins at a phase of another one.
+    steps_before: u64,
     clock: ThinkingClock,
     eyes: Eyes,
     files: Option<RunFiles>,
@@ -48,6 +54,8 @@ pub struct Session {
     /// Time that physics took, for the real-time factor.
     physics: Duration,
     ended: Option<EndReason>,
+    /// State hashes of the steps since they were last taken, where somebody wants them.
+    hashes: Option<Vec<u64>>,
     /// What it came to, from when the files were closed: the one truth that everybody is told.
     result: Option<ResultReply>,
 }
@@ -65,10 +73,18 @@ impl Session {
         folder: Option<RunFolder>,
         clock: Clock,
     ) -> Result<Session, EpisodeError> {
-        let Built { world, motions, robot, locomotion } = build::build(spec)?;
+        let mut session = Session::build(spec, clock)?;
+        session.begin(folder)?;
+        session.clock.resume();
+        Ok(session)
+    }
+
+    /// Builds the world of `spec`, at the task's own beginning.
+    fn build(spec: &EpisodeSpec, clock: Clock) -> Result<Session, EpisodeError> {
+        let Built { world, motions, robot, locomotion } = build(spec)?;
         let rules = rules(spec.protocol, spec.task);
         let present = world.present();
-        let mut session = Session {
+        Ok(Session {
             origin: Origin { spec: spec.clone(), robot, locomotion },
             rules,
             motions,
@@ -76,16 +92,15 @@ impl Session {
             clock: ThinkingClock::new(rules.thinking, clock),
             eyes: Eyes::new(spec.renderer, &world),
             files: None,
+            steps_before: 0,
             tool_calls: 0,
             physics: Duration::ZERO,
             ended: None,
+            hashes: None,
             result: None,
             present,
             world,
-        };
-        session.begin(folder)?;
-        session.clock.resume();
-        Ok(session)
+        })
     }
 
     /// Takes a world that has just been built to where its episode begins.
@@ -93,8 +108,11 @@ impl Session {
         let hold_steps = match &self.origin.spec.start {
             Start::Task => self.rules.initial_hold_steps,
             Start::Checkpoint(path) => {
-                let checkpoint = Checkpoint::read(path)?;
-                self.resume(&checkpoint)?;
+                self.resume(&Checkpoint::read(path)?)?;
+                0
+            }
+            Start::Phase(start) => {
+                self.take_up(&Checkpoint::of_phase(start)?)?;
                 0
             }
         };
@@ -102,13 +120,23 @@ impl Session {
             self.files = Some(RunFiles::create(folder, self)?);
         }
         self.keep_picture("start");
-        if hold_steps > 0 {
-            self.run(Command::hold(hold_steps, self.motions.len()))?;
+        self.hold(hold_steps)?;
+        match self.origin.spec.start {
+            Start::Task => self.keep_checkpoint(&Phase::number(0)),
+            Start::Checkpoint(_) | Start::Phase(_) => self.keep_checkpoint(BEGIN),
         }
         if let Some(files) = &mut self.files {
             files.flush();
         }
         Ok(())
+    }
+
+    /// All robots stand still for so many control steps.
+    fn hold(&mut self, steps: u32) -> Result<(), EpisodeError> {
+        match steps {
+            0 => Ok(()),
+            steps => self.run(Command::hold(steps, self.motions.len())).map(drop),
+        }
     }
 
     /// Answers a tool call. An error changes nothing but the count of calls. The call that ends the episode, and no later one,
@@ -122,7 +150,7 @@ impl Session {
         self.tool_calls += u32::from(underway);
         let mut answer = call.validate().map_err(EpisodeError::from).and_then(|()| self.answer(&call));
         if let (true, Some(files)) = (underway, &mut self.files) {
-            files.tool_call(self.present.time_s, &call, &answer);
+            files.tool_call(self.present.time_s, self.clock.spent(), &call, &answer);
         }
         if self.ended.is_some() {
             self.settle();
@@ -198,25 +226,44 @@ impl Session {
         for (motion, robot) in self.motions.iter_mut().zip(&self.present.robots) {
             motion.sense(isometry_from_sim(&robot.state.world_from_pelvis));
         }
-        let was_underway = self.scores.underway();
+        let (was_underway, reached_before) = (self.scores.underway(), self.scores.reached().count());
         let scored = self.scores.update(&self.present);
         let budget = self.budget();
+        if let Some(hashes) = &mut self.hashes {
+            hashes.push(self.world.state_hash());
+        }
         if let Some(files) = &mut self.files {
-            files.step(&self.present, &scored.facts, budget);
+            files.step(&self.present, &state_hash(&self.world), &scored.facts, budget);
         }
         if scored.reached {
-            self.phase_reached();
+            self.phases_reached(reached_before);
         } else if self.scores.underway() && !was_underway {
             self.keep_picture("together");
         }
         Ok(())
     }
 
-    fn phase_reached(&mut self) {
-        let Some(phase) = self.reached().pop() else { return };
-        self.keep_picture(&format!("{} {}", phase.id, phase.name.replace('_', " ")));
-        if let Some(files) = &mut self.files {
-            files.phase(&phase);
+    /// Keeps what this step has reached, of phases that had a number from `first` on.
+    fn phases_reached(&mut self, first: usize) {
+        let reached = self.reached();
+        for phase in &reached[first..] {
+            self.keep_picture(&format!("{} {}", phase.id, phase.name.replace('_', " ")));
+            if let Some(files) = &mut self.files {
+                files.phase(phase);
+            }
+        }
+        if !self.scores.complete() {
+            self.keep_checkpoint(&Phase::number(reached.len()));
+        }
+    }
+
+    /// Keeps a checkpoint where a phase begins, if the episode is recorded.
+    fn keep_checkpoint(&mut self, name: &str) {
+        if self.files.is_some() {
+            let checkpoint = self.checkpoint().and_then(|checkpoint| checkpoint.to_bytes());
+            if let Some(files) = &mut self.files {
+                files.checkpoint(name, self.present.time_s, checkpoint);
+            }
         }
     }
 
@@ -243,6 +290,16 @@ impl Session {
         self.scores.facts(&self.present)
     }
 
+    /// How many phases have been reached.
+    pub fn reached_phases(&self) -> usize {
+        self.scores.reached().count()
+    }
+
+    /// How long the policy has thought, up to its last call.
+    pub fn thought(&self) -> Duration {
+        self.clock.spent()
+    }
+
     /// Why the episode has ended, if it has.
     pub fn ended(&self) -> Option<EndReason> {
         self.ended
@@ -250,7 +307,7 @@ impl Session {
 
     /// Equal for equal physical states, 16 hexadecimal digits.
     pub fn state_hash(&self) -> String {
-        format!("{:016x}", self.world.state_hash())
+        state_hash(&self.world)
     }
 
     /// Why the recording is not complete, if it is not; the episode goes on without it.
@@ -273,6 +330,10 @@ impl Session {
         self.settle();
         self.result()
     }
+}
+
+fn state_hash(world: &World) -> String {
+    format!("{:016x}", world.state_hash())
 }
 
 /// [`fingerprint::build`] as an episode's own error.

@@ -3,8 +3,9 @@
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
-use tandem_sim::Step;
+use tandem_sim::{CONTROL_HZ, Step};
 use tandem_tools_spec::{Budget, PhaseReached, ResultReply, ToolCall, ToolReply};
 
 use super::{Session, this_build};
@@ -36,6 +37,7 @@ pub struct RunFiles {
     /// The first failure.
     failed: Option<String>,
     moments: Vec<Moment>,
+    begin_s: f64,
     calls: CallCounts,
     budget_left: Option<Budget>,
 }
@@ -55,7 +57,8 @@ impl RunFiles {
             robots: session.motions.iter().map(|motion| motion.robot.clone()).collect(),
             scores: session.scores.memory(),
         };
-        let mut recorder = Recorder::create(&path, visibility, header, &session.present)?;
+        let mut recorder =
+            Recorder::create(&path, visibility, header, &session.present, &session.state_hash())?;
         recorder.draw("world", session.world.room())?;
         for (name, model) in session.world.object_models() {
             recorder.draw(name, &model.geoms)?;
@@ -67,14 +70,22 @@ impl RunFiles {
             recorder: Some(recorder),
             failed: None,
             moments: Vec::new(),
+            begin_s: session.steps_before as f64 / CONTROL_HZ,
             calls: CallCounts::default(),
             budget_left: None,
         })
     }
 
-    pub(super) fn step(&mut self, step: &Step, facts: &Facts, budget: Budget) {
+    pub(super) fn step(&mut self, step: &Step, state_hash: &str, facts: &Facts, budget: Budget) {
         self.budget_left = Some(budget);
-        self.record(|recorder| recorder.step(step, facts, budget));
+        self.record(|recorder| recorder.step(step, state_hash, facts, budget));
+    }
+
+    pub(super) fn checkpoint(&mut self, name: &str, time_s: f64, bytes: Result<Vec<u8>, EpisodeError>) {
+        match bytes {
+            Ok(bytes) => self.record(|recorder| recorder.checkpoint(name, time_s, &bytes)),
+            Err(error) => self.note(Err(error)),
+        }
     }
 
     pub(super) fn phase(&mut self, phase: &PhaseReached) {
@@ -84,6 +95,7 @@ impl RunFiles {
     pub(super) fn tool_call(
         &mut self,
         time_s: f64,
+        thought: Duration,
         call: &ToolCall,
         answer: &Result<ToolReply, EpisodeError>,
     ) {
@@ -93,7 +105,7 @@ impl RunFiles {
             (Ok(reply), _) => Ok(reply),
             (Err(_), text) => Err(text.as_deref().unwrap_or_default()),
         };
-        self.record(|recorder| recorder.tool_call(&ToolCallRecord { time_s, call, outcome }));
+        self.record(|recorder| recorder.tool_call(&ToolCallRecord { time_s, thought, call, outcome }));
     }
 
     /// Hands everything recorded to the system: what a policy is told from here on is on the disk.
@@ -127,8 +139,14 @@ impl RunFiles {
     fn report(&self, result: &ResultReply, task: &Task) -> Result<(), EpisodeError> {
         let strip = reports::png(&self.moments)?;
         write_whole(&self.folder.join(Self::STRIP), &strip)?;
-        let page =
-            EpisodePage { task, result, calls: &self.calls, budget_left: self.budget_left, strip: &strip };
+        let page = EpisodePage {
+            task,
+            result,
+            calls: &self.calls,
+            begin_s: self.begin_s,
+            budget_left: self.budget_left,
+            strip: &strip,
+        };
         Ok(write_whole(&self.folder.join(Self::REPORT), page.html().as_bytes())?)
     }
 

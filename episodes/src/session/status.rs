@@ -16,7 +16,7 @@ impl Session {
     }
 
     fn env_steps(&self) -> u32 {
-        self.present.control_step as u32
+        self.present.control_step.saturating_sub(self.steps_before) as u32
     }
 
     pub(super) fn budget(&self) -> Budget {

@@ -14,9 +14,9 @@ fn success_is_told_and_ends_the_episode_as_the_disclosure_says() {
         (Disclosure::Never, 0, 0, EndReason::Finished),
     ] {
         let spec = EpisodeSpec { disclosure, ..spec("pouring", 3, Protocol::Benchmark) };
-        let mut episode = InProcess(Session::start(&spec, None).unwrap());
+        let mut episode = InProcess::new(Session::start(&spec, None).unwrap());
         players::find("expert").unwrap().play(&spec, &mut episode).unwrap();
-        let mut session = episode.0;
+        let mut session = episode.session;
         let before = status(&mut session);
         assert_eq!((before.disclosure, before.phases.len()), (disclosure, told_under_way));
         assert_eq!(before.ended.is_some(), disclosure == Disclosure::Live, "{disclosure}");

@@ -6,6 +6,8 @@ mod checkpoints;
 mod commands;
 mod common;
 mod disclosure;
+mod films;
 mod hand_force;
 mod hands;
 mod recordings;
+mod replays;

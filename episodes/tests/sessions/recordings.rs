@@ -41,9 +41,9 @@ fn a_recording_scored_again_reaches_the_phases_that_the_episode_reached() {
     for task in tasks::ALL {
         let folder = tempfile::tempdir().unwrap();
         let spec = spec(task.id, 3, Protocol::Benchmark);
-        let mut episode = InProcess(Session::start(&spec, Some(folder.path())).unwrap());
+        let mut episode = InProcess::new(Session::start(&spec, Some(folder.path())).unwrap());
         players::find("expert").unwrap().play(&spec, &mut episode).unwrap();
-        let result = episode.0.close();
+        let result = episode.session.close();
         assert_eq!(result.ended, EndReason::TaskComplete, "{}", task.id);
 
         let recording = Recording::read(&folder.path().join(Recorder::FILE_NAME)).unwrap();

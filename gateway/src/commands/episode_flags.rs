@@ -8,7 +8,7 @@ use clap::{
 };
 use tandem_episodes::{
     Controller, RobotFile,
-    evaluation::Plan,
+    evaluation::{Plan, Shard, Starts},
     players,
     tasks::{self, Task},
 };
@@ -97,6 +97,8 @@ impl EpisodeFlags {
             hints: self.hints,
             tasks: self.tasks.0,
             seeds: self.seeds.0.collect(),
+            starts: Starts::Task,
+            shard: Shard::WHOLE,
             jobs: self.jobs,
             record,
         }

@@ -1,8 +1,12 @@
 //! `tandem evaluate`: how far a policy gets, over tasks and seeds.
 
-use std::{path::PathBuf, process::ExitCode};
+use std::{path::PathBuf, process::ExitCode, str::FromStr};
 
-use tandem_episodes::players;
+use tandem_episodes::{
+    Phase,
+    evaluation::{Plan, Shard, Starts},
+    players, tasks,
+};
 
 use super::{
     Outcome,
@@ -18,13 +22,67 @@ pub struct Args {
     policy: &'static players::Entry,
     #[command(flatten)]
     episodes: EpisodeFlags,
+    /// Phases to begin at, as p2 or p1,p2, or `all`: each episode starts where that phase began in the demonstration of its
+    /// task and seed, with the whole budget ahead, and that phase alone counts.
+    #[arg(long, value_name = "PHASES", value_parser = parse_phases, requires = "demos")]
+    from: Option<PhaseList>,
+    /// Folder of demonstrations, as `collect` or `serve` writes them; this build has to have recorded them.
+    #[arg(long, value_name = "DIR", requires = "from")]
+    demos: Option<PathBuf>,
+    /// Play share I of N, counted from 0, as 0/10; shares may write to one folder, and `report` joins folders.
+    #[arg(long, value_name = "I/N", default_value = "0/1")]
+    shard: ShardFlag,
+    /// Record every episode in a folder of its own, for `replay` and for the pictures of a report.
+    #[arg(long)]
+    record: bool,
     /// Folder for `results.json` and one file per episode.
     #[arg(long, value_name = "DIR", default_value = "runs/evaluation")]
     out: PathBuf,
 }
 
+/// Phases named on the command line.
+#[derive(Debug, Clone)]
+struct PhaseList(Vec<String>);
+
+/// The phases that `text` names: `all`, or ids separated by commas.
+fn parse_phases(text: &str) -> Result<PhaseList, String> {
+    let most = tasks::ALL.iter().map(|task| task.phases.len()).max().unwrap_or_default();
+    let have: Vec<String> = (0..most).map(Phase::number).collect();
+    if text == "all" {
+        return Ok(PhaseList(have));
+    }
+    let known = |phase: &str| match have.iter().any(|known| known == phase) {
+        true => Ok(phase.to_owned()),
+        false => Err(format!("no phase {phase:?}; have: {}, or all", have.join(", "))),
+    };
+    text.split(',').map(|phase| known(phase.trim())).collect::<Result<_, _>>().map(PhaseList)
+}
+
+/// A share on the command line.
+#[derive(Debug, Clone, Copy)]
+struct ShardFlag(Shard);
+
+impl FromStr for ShardFlag {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<ShardFlag, String> {
+        let parts =
+            text.split_once('/').and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
+        match parts {
+            Some((index, of)) if index < of => Ok(ShardFlag(Shard { index, of })),
+            _ => Err("no share; give I/N with I from 0 to N - 1, as 0/10".into()),
+        }
+    }
+}
+
 /// Plays and counts.
 pub fn run(args: Args) -> Outcome {
-    played::play_and_print(&args.episodes.plan(args.policy, false), &args.out)?;
+    let starts = match (args.demos, args.from) {
+        (Some(demonstrations), Some(PhaseList(phases))) => Starts::Phases { demonstrations, phases },
+        _ => Starts::Task,
+    };
+    let ShardFlag(shard) = args.shard;
+    let plan = Plan { starts, shard, ..args.episodes.plan(args.policy, args.record) };
+    played::play_and_print(&plan, &args.out)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -9,6 +9,8 @@ pub mod locomotion;
 mod log;
 mod played;
 pub mod recover;
+pub mod replay;
+pub mod report;
 mod seeds;
 pub mod serve;
 pub mod tasks;

@@ -27,15 +27,16 @@ const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "episodes",
         &[
-            &["output", "fingerprint", "scoring", "convert"],
+            &["output", "fingerprint", "scoring", "convert", "statistics"],
             &["error"],
             &["tasks"],
             &["protocol", "spec"],
             &["commands", "reports"],
             &["describe", "recording", "bench"],
             &["instructions", "session"],
-            &["players"],
+            &["players", "replay"],
             &["evaluation"],
+            &["assessment"],
         ],
     ),
     ("gateway", &[&["settings"], &["hosting"], &["http"], &["drivers"], &["commands"], &["cli"], &["main"]]),

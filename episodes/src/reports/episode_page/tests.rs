@@ -6,6 +6,10 @@ use super::*;
 use crate::tasks;
 
 fn page(phase_times_s: [Option<f64>; 3], protocol: Protocol) -> String {
+    page_from(0.0, phase_times_s, protocol)
+}
+
+fn page_from(begin_s: f64, phase_times_s: [Option<f64>; 3], protocol: Protocol) -> String {
     let phases = phase_times_s.into_iter().enumerate().map(|(index, time_s)| (Phase::number(index), time_s));
     let result = ResultReply {
         task: "handover".into(),
@@ -25,7 +29,7 @@ fn page(phase_times_s: [Option<f64>; 3], protocol: Protocol) -> String {
     let wall_clock_left_s = (protocol == Protocol::Agentic).then_some(1740.0);
     let budget_left = Some(Budget { steps_left: 5500, wall_clock_left_s, steps_per_command: 25 });
     let task = tasks::find("handover").unwrap();
-    EpisodePage { task, result: &result, calls: &calls, budget_left, strip: b"png" }.html()
+    EpisodePage { task, result: &result, calls: &calls, begin_s, budget_left, strip: b"png" }.html()
 }
 
 #[test]
@@ -49,8 +53,17 @@ fn pages_tell_what_happened() {
     );
     check(
         &page([Some(4.0), Some(5.0), Some(10.0)], Protocol::Benchmark),
-        &["3 of 3 phases reached", "500 of 1000"],
+        &["3 of 3 phases reached", "500 of 1000", "<span>0 s</span><span>10.00 s</span>"],
         &["not reached", "Policy's own time", "initial hold"],
+    );
+    // What was reached before it began is not part of it.
+    check(
+        &page_from(6.5, [Some(4.0), Some(8.5), None], Protocol::Benchmark),
+        &[
+            r#"<div class="timeline"><span style="width:20.00%">p2 8.50 s</span><span class="rest" style="width:80.00%">"#,
+            "<span>6.5 s</span><span>16.50 s</span>",
+        ],
+        &["p1 4.00 s</span>"],
     );
 }
 

@@ -1,0 +1,96 @@
+//! Two policies on the same tasks and seeds: what one reached and the other did not.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::policy::{Group, reached};
+use crate::evaluation::Played;
+use crate::scoring::Phase;
+use crate::statistics::{Pairs, mcnemar, newcombe};
+use crate::tasks;
+
+/// The second policy against the first.
+#[derive(Debug, Serialize)]
+pub struct Comparison {
+    pub first: String,
+    pub second: String,
+    /// By task, then over all tasks.
+    pub rows: Vec<PairedRow>,
+}
+
+/// One phase of one task or of all.
+#[derive(Debug, Serialize)]
+pub struct PairedRow {
+    /// `None` for all tasks together.
+    pub task: Option<&'static str>,
+    pub phase: String,
+    /// Whether it is the task's last.
+    pub last: bool,
+    pub pairs: Pairs,
+    /// Rate of the second less that of the first.
+    pub difference_share: f64,
+    /// Newcombe's, 95 %.
+    pub interval_share: [f64; 2],
+    /// McNemar's exact test, two-sided.
+    pub mcnemar_p_value: f64,
+}
+
+/// By task, seed and where it began; of several the first.
+type Episodes<'a> = BTreeMap<(&'static str, u32, Option<usize>), &'a Played>;
+
+impl Comparison {
+    pub fn of(first: &Group, second: &Group) -> Comparison {
+        let (ones, others) = (episodes(first), episodes(second));
+        let shared: Vec<(&Played, &Played)> =
+            ones.iter().filter_map(|(key, one)| Some((*one, *others.get(key)?))).collect();
+        let most = tasks::ALL.iter().map(|task| task.phases.len()).max().unwrap_or_default();
+        let mut rows = Vec::new();
+        for task in tasks::ALL {
+            let of_task = shared.iter().filter(|(one, _)| one.spec.task == task).copied();
+            let of_task: Vec<_> = of_task.collect();
+            let last = task.phases.len() - 1;
+            rows.extend((0..=last).filter_map(|phase| row(Some(task.id), phase, phase == last, &of_task)));
+        }
+        let everything = (0..most).filter_map(|phase| row(None, phase, phase + 1 == most, &shared));
+        rows.extend(everything);
+        Comparison { first: first.name.clone(), second: second.name.clone(), rows }
+    }
+}
+
+fn episodes<'a>(group: &'a Group) -> Episodes<'a> {
+    let mut found = Episodes::new();
+    for played in group.episodes.iter().map(|found| &found.played) {
+        let key = (played.spec.task.id, played.spec.seed, played.begun_phase());
+        found.entry(key).or_insert(played);
+    }
+    found
+}
+
+/// `None` where the two have no such episode in common. An episode that began at a phase counts for that phase alone.
+fn row(
+    task: Option<&'static str>,
+    phase: usize,
+    last: bool,
+    shared: &[(&Played, &Played)],
+) -> Option<PairedRow> {
+    let mut pairs = Pairs::default();
+    let counts = |played: &Played| played.begun_phase().is_none_or(|only| only == phase);
+    for (one, other) in shared.iter().filter(|(one, _)| counts(one)) {
+        match (reached(one, phase), reached(other, phase)) {
+            (true, true) => pairs.both += 1,
+            (true, false) => pairs.first_only += 1,
+            (false, true) => pairs.second_only += 1,
+            (false, false) => pairs.neither += 1,
+        }
+    }
+    Some(PairedRow {
+        task,
+        phase: Phase::number(phase),
+        last,
+        difference_share: pairs.difference_share()?,
+        interval_share: newcombe(pairs)?,
+        mcnemar_p_value: mcnemar(pairs),
+        pairs,
+    })
+}

@@ -1,0 +1,83 @@
+//! Failures with their key moments, as small pictures.
+
+use std::path::Path;
+
+use image::imageops::{self, FilterType};
+
+use super::load::{Found, Loaded};
+use super::policy::{Group, first_missed, groups, succeeded, why};
+use crate::replay::webp_picture;
+
+/// One failed episode.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Failure {
+    pub policy: String,
+    pub task: &'static str,
+    pub seed: u32,
+    /// The first phase that counts and was not reached.
+    pub phase: String,
+    pub why: String,
+    /// `None` where its strip cannot be read.
+    pub picture: Option<Picture>,
+}
+
+/// A small picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    pub webp: Vec<u8>,
+    pub width: u32,
+    pub height: u32,
+}
+
+/// Columns of a strip are 400 pixels wide; on the page they need no more than this.
+const SCALE: f64 = 0.5;
+
+/// At most so many failures with a picture, by turns from every policy and task; those without one are left out.
+pub fn gallery(loaded: &Loaded, most: usize) -> Vec<Failure> {
+    let groups = groups(&loaded.episodes);
+    let all: Vec<(Failure, &Found)> = groups.iter().flat_map(failed).collect();
+    let total = all.len();
+    let turn = |index: usize| {
+        let (failure, _) = &all[index];
+        let earlier = all[..index].iter().filter(|(other, found)| {
+            (&other.policy, other.task) == (&failure.policy, failure.task) && found.strip.is_some()
+        });
+        earlier.count()
+    };
+    let mut order: Vec<usize> = (0..total).filter(|index| all[*index].1.strip.is_some()).collect();
+    order.sort_by_key(|index| turn(*index));
+    order.truncate(most);
+    order.sort_unstable();
+    let pictured = order.into_iter().map(|index| {
+        let (failure, found) = &all[index];
+        Failure { picture: found.strip.as_deref().and_then(shrunk), ..failure.clone() }
+    });
+    pictured.collect()
+}
+
+fn failed<'a>(group: &Group<'a>) -> Vec<(Failure, &'a Found)> {
+    let found = group.episodes.iter().filter(|found| !succeeded(&found.played));
+    found.map(|found| (failure(group, found), *found)).collect()
+}
+
+fn failure(group: &Group, found: &Found) -> Failure {
+    let spec = &found.played.spec;
+    Failure {
+        policy: group.name.clone(),
+        task: spec.task.id,
+        seed: spec.seed,
+        phase: first_missed(&found.played),
+        why: why(&found.played),
+        picture: None,
+    }
+}
+
+/// `None` where the file is no picture.
+fn shrunk(strip: &Path) -> Option<Picture> {
+    let strip = image::open(strip).ok()?.into_rgb8();
+    let [width, height] =
+        [strip.width(), strip.height()].map(|px| (f64::from(px) * SCALE).round().max(1.0) as u32);
+    let small = imageops::resize(&strip, width, height, FilterType::Triangle);
+    let webp = webp_picture(width, height, small.as_raw()).ok()?;
+    Some(Picture { webp, width, height })
+}

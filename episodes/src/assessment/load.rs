@@ -1,0 +1,116 @@
+//! Finds the episodes in folders: single results as `evaluate` and `collect` keep them, and recordings as `serve` leaves them.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::evaluation::{EPISODES, Played, missed};
+use crate::recording::{Recorder, Recording};
+use crate::session::RunFiles;
+
+/// One episode.
+#[derive(Clone, Debug)]
+pub struct Found {
+    pub played: Played,
+    /// Its picture strip, where it was recorded.
+    pub strip: Option<PathBuf>,
+}
+
+/// What folders hold.
+#[derive(Clone, Debug, Default)]
+pub struct Loaded {
+    pub episodes: Vec<Found>,
+    /// Files that are no episodes, and why.
+    pub skipped: Vec<String>,
+}
+
+/// Why there is nothing to report on.
+#[derive(Debug, thiserror::Error)]
+pub enum LoadError {
+    #[error("cannot read {}: {source}", path.display())]
+    Read { path: PathBuf, source: io::Error },
+    #[error("no episodes in {}; give folders that `evaluate`, `collect` or `serve` wrote", .0.display())]
+    Nothing(PathBuf),
+}
+
+/// Every episode of every folder, each once.
+pub fn load(folders: &[PathBuf]) -> Result<Loaded, LoadError> {
+    let mut loaded = Loaded::default();
+    for folder in folders {
+        let before = loaded.episodes.len() + loaded.skipped.len();
+        let kept = folder.join(EPISODES);
+        if kept.is_dir() {
+            load_kept(&kept, &mut loaded)?;
+        } else {
+            load_recordings(folder, &mut loaded)?;
+        }
+        if loaded.episodes.len() + loaded.skipped.len() == before {
+            return Err(LoadError::Nothing(folder.clone()));
+        }
+    }
+    Ok(loaded)
+}
+
+impl Loaded {
+    /// Folders may overlap.
+    fn add(&mut self, found: Found) {
+        if !self.episodes.iter().any(|known| known.played == found.played) {
+            self.episodes.push(found);
+        }
+    }
+}
+
+/// Results of single episodes, each in a file.
+fn load_kept(folder: &Path, loaded: &mut Loaded) -> Result<(), LoadError> {
+    for path in entries(folder)?.into_iter().filter(|path| path.extension().is_some_and(|e| e == "json")) {
+        let read = std::fs::read(&path).map_err(|error| error.to_string());
+        match read.and_then(|bytes| serde_json::from_slice(&bytes).map_err(|error| error.to_string())) {
+            Ok(played) => loaded.add(Found { played, strip: strip(&path.with_extension("")) }),
+            Err(reason) => loaded.skipped.push(format!("{}: {reason}", path.display())),
+        }
+    }
+    Ok(())
+}
+
+/// Recordings of a server, each in a folder; the policy is called as the folder that they lie in.
+fn load_recordings(folder: &Path, loaded: &mut Loaded) -> Result<(), LoadError> {
+    let absolute = folder.canonicalize().unwrap_or_else(|_| folder.into());
+    let policy = absolute.file_name().map_or("policy".into(), |name| name.to_string_lossy().into_owned());
+    let folders = std::iter::once(folder.to_owned()).chain(entries(folder)?);
+    for run in folders.filter(|run| run.join(Recorder::FILE_NAME).exists()) {
+        match recorded(&run.join(Recorder::FILE_NAME), &policy) {
+            Ok(played) => loaded.add(Found { played, strip: strip(&run) }),
+            Err(reason) => loaded.skipped.push(reason),
+        }
+    }
+    Ok(())
+}
+
+fn recorded(path: &Path, policy: &str) -> Result<Played, String> {
+    let recording = Recording::read(path).map_err(|error| error.to_string())?;
+    let calls = recording.tool_calls().map_err(|error| error.to_string())?;
+    let result = recording.result.clone().ok_or_else(|| format!("{} was interrupted", path.display()))?;
+    Ok(Played {
+        policy: policy.into(),
+        spec: recording.spec.clone(),
+        locomotion: recording.locomotion.clone(),
+        build: recording.build.clone(),
+        note: missed(&result, None),
+        thought_s: calls.last().map_or(0.0, |call| call.thought.as_secs_f64()),
+        result,
+    })
+}
+
+fn strip(run: &Path) -> Option<PathBuf> {
+    let strip = run.join(RunFiles::STRIP);
+    strip.exists().then_some(strip)
+}
+
+/// What a folder holds, by name.
+fn entries(folder: &Path) -> Result<Vec<PathBuf>, LoadError> {
+    let failed = |source| LoadError::Read { path: folder.into(), source };
+    let entries = std::fs::read_dir(folder).map_err(failed)?;
+    let mut paths: Vec<PathBuf> =
+        entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<_, _>>().map_err(failed)?;
+    paths.sort();
+    Ok(paths)
+}

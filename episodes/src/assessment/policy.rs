@@ -1,0 +1,302 @@
+//! How one policy fared: rates of phases, averages, effort, and why episodes failed.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use tandem_tools_spec::EndReason;
+
+use super::load::Found;
+use super::rate::{Mean, Rate};
+use crate::evaluation::{PhaseLevel, Played, missed};
+use crate::scoring::Phase;
+use crate::statistics::Count;
+use crate::tasks::{self, Task};
+
+/// One policy, under one set of rules and on one build.
+pub struct Group<'a> {
+    pub name: String,
+    pub episodes: Vec<&'a Found>,
+}
+
+/// How it fared.
+#[derive(Debug, Serialize)]
+pub struct PolicyReport {
+    pub name: String,
+    pub protocol: &'static str,
+    pub locomotion: String,
+    pub build: String,
+    pub episodes: usize,
+    pub falls: u32,
+    /// In the order of the list of tasks; those that were played.
+    pub tasks: Vec<TaskReport>,
+    /// Over the tasks of so many robots.
+    pub averages: Vec<Average>,
+    pub together: Together,
+    /// Every phase on its own, where episodes began at phases.
+    pub phase_level: Option<PhaseLevel>,
+    pub reasons: Vec<Reason>,
+}
+
+/// One task.
+#[derive(Debug, Serialize)]
+pub struct TaskReport {
+    pub task: &'static str,
+    pub robots: usize,
+    /// Those that began at the task's own beginning.
+    pub episodes: usize,
+    pub phases: Vec<PhaseReport>,
+    pub effort: Option<Effort>,
+    pub falls: u32,
+}
+
+/// One phase of a task.
+#[derive(Debug, Serialize)]
+pub struct PhaseReport {
+    /// As results call it: `p2`.
+    pub phase: String,
+    pub name: &'static str,
+    pub collaborative: bool,
+    /// Of all episodes.
+    pub cumulative: Option<Rate>,
+    /// Of those that reached the phase before it.
+    pub conditional: Option<Rate>,
+    /// Of those that began where it begins.
+    pub from_its_beginning: Option<Rate>,
+}
+
+/// Mean rates over the tasks of one number of robots, phase by phase.
+#[derive(Debug, Serialize)]
+pub struct Average {
+    pub robots: usize,
+    pub tasks: usize,
+    pub phases: Vec<Option<Mean>>,
+}
+
+/// Phases on which robots work together against those on which they do not: means of conditional rates.
+#[derive(Debug, Serialize)]
+pub struct Together {
+    pub alone: Option<Mean>,
+    pub together: Option<Mean>,
+}
+
+/// What whole episodes cost.
+#[derive(Debug, Serialize)]
+pub struct Effort {
+    pub steps: Spread,
+    pub calls: Spread,
+    pub thought: Spread,
+}
+
+/// Some numbers, seen from afar.
+#[derive(Debug, Serialize)]
+pub struct Spread {
+    pub min: f64,
+    pub median_value: f64,
+    pub max: f64,
+}
+
+/// Why some episodes failed.
+#[derive(Debug, Serialize)]
+pub struct Reason {
+    pub task: &'static str,
+    /// The first phase that counts and was not reached.
+    pub phase: String,
+    pub why: String,
+    pub seeds: Vec<u32>,
+}
+
+/// Policies in the order in which they were found, with names that tell them apart.
+pub fn groups(episodes: &[Found]) -> Vec<Group<'_>> {
+    let mut groups: Vec<(Vec<String>, Vec<&Found>)> = Vec::new();
+    for found in episodes {
+        let key = rules_of(&found.played);
+        match groups.iter_mut().find(|(known, _)| *known == key) {
+            Some((_, group)) => group.push(found),
+            None => groups.push((key, vec![found])),
+        }
+    }
+    let keys: Vec<Vec<String>> = groups.iter().map(|(key, _)| key.clone()).collect();
+    let name = |key: &Vec<String>| {
+        let namesakes: Vec<&Vec<String>> = keys.iter().filter(|other| other[0] == key[0]).collect();
+        let differs = |part: &usize| namesakes.iter().any(|other| other[*part] != key[*part]);
+        let parts: Vec<&str> = (1..key.len()).filter(differs).map(|part| key[part].as_str()).collect();
+        match parts.is_empty() {
+            true => key[0].clone(),
+            false => format!("{} ({})", key[0], parts.join(", ")),
+        }
+    };
+    groups.into_iter().map(|(key, episodes)| Group { name: name(&key), episodes }).collect()
+}
+
+/// What has to agree for episodes to be of one policy: its name first, then all that may tell namesakes apart.
+fn rules_of(played: &Played) -> Vec<String> {
+    let spec = &played.spec;
+    let short = played.build.chars().rev().take(6).collect::<Vec<_>>();
+    vec![
+        played.policy.clone(),
+        spec.protocol.name().into(),
+        played.locomotion.clone(),
+        spec.robot.name(),
+        format!("tells {}", spec.disclosure),
+        format!("build ..{}", short.iter().rev().collect::<String>()),
+    ]
+}
+
+/// Whether phase number `phase` was reached.
+pub fn reached(played: &Played, phase: usize) -> bool {
+    played.result.phases.reached_s(&Phase::number(phase)).is_some()
+}
+
+/// Whether the phase that counts was reached: the one that the episode began at, or the last.
+pub fn succeeded(played: &Played) -> bool {
+    reached(played, played.begun_phase().unwrap_or(played.spec.task.phases.len() - 1))
+}
+
+fn count<'a>(episodes: impl Iterator<Item = &'a Played>, phase: usize) -> Count {
+    let reached: Vec<bool> = episodes.map(|played| reached(played, phase)).collect();
+    Count { successes: reached.iter().filter(|reached| **reached).count(), trials: reached.len() }
+}
+
+impl PolicyReport {
+    pub fn of(group: &Group) -> PolicyReport {
+        let played: Vec<&Played> = group.episodes.iter().map(|found| &found.played).collect();
+        let first = played.first();
+        let of_tasks = tasks::ALL.iter().map(|task| TaskReport::of(task, &played));
+        let tasks: Vec<TaskReport> = of_tasks.flatten().collect();
+        PolicyReport {
+            name: group.name.clone(),
+            protocol: first.map_or("", |played| played.spec.protocol.name()),
+            locomotion: first.map(|played| played.locomotion.clone()).unwrap_or_default(),
+            build: first.map(|played| played.build.clone()).unwrap_or_default(),
+            episodes: played.len(),
+            falls: played.iter().map(|played| played.result.falls).sum(),
+            averages: averages(&tasks),
+            together: Together { alone: conditional(&tasks, false), together: conditional(&tasks, true) },
+            phase_level: PhaseLevel::of(played.iter().copied()),
+            reasons: reasons(&played),
+            tasks,
+        }
+    }
+}
+
+impl TaskReport {
+    /// `None` where the task was not played.
+    fn of(task: &'static Task, played: &[&Played]) -> Option<TaskReport> {
+        let of_task: Vec<&Played> = played.iter().copied().filter(|one| one.spec.task == task).collect();
+        let whole: Vec<&Played> = of_task.iter().copied().filter(|one| one.begun_phase().is_none()).collect();
+        let phase = |(index, phase): (usize, &'static Phase)| {
+            let before = whole.iter().filter(|one| index == 0 || reached(one, index - 1)).copied();
+            let from_it = of_task.iter().filter(|one| one.begun_phase() == Some(index)).copied();
+            PhaseReport {
+                phase: Phase::number(index),
+                name: phase.id,
+                collaborative: phase.collaborative,
+                cumulative: Rate::of(count(whole.iter().copied(), index)),
+                conditional: Rate::of(count(before, index)),
+                from_its_beginning: Rate::of(count(from_it, index)),
+            }
+        };
+        (!of_task.is_empty()).then(|| TaskReport {
+            task: task.id,
+            robots: task.robots.len(),
+            episodes: whole.len(),
+            phases: task.phases.iter().enumerate().map(phase).collect(),
+            effort: Effort::of(&whole),
+            falls: of_task.iter().map(|one| one.result.falls).sum(),
+        })
+    }
+}
+
+impl Effort {
+    fn of(episodes: &[&Played]) -> Option<Effort> {
+        let spread = |of: fn(&Played) -> f64| Spread::of(episodes.iter().map(|played| of(played)).collect());
+        Some(Effort {
+            steps: spread(|played| played.result.env_steps.into())?,
+            calls: spread(|played| played.result.tool_calls.into())?,
+            thought: spread(|played| played.thought_s)?,
+        })
+    }
+}
+
+impl Spread {
+    fn of(mut values: Vec<f64>) -> Option<Spread> {
+        values.sort_by(f64::total_cmp);
+        let (min, max) = (*values.first()?, *values.last()?);
+        let middle = values.len() / 2;
+        let median_value = match values.len() % 2 {
+            0 => (values[middle - 1] + values[middle]) / 2.0,
+            _ => values[middle],
+        };
+        Some(Spread { min, median_value, max })
+    }
+}
+
+fn averages(tasks: &[TaskReport]) -> Vec<Average> {
+    let mut by_robots: BTreeMap<usize, Vec<&TaskReport>> = BTreeMap::new();
+    for task in tasks.iter().filter(|task| task.episodes > 0) {
+        by_robots.entry(task.robots).or_default().push(task);
+    }
+    let average = |(robots, tasks): (usize, Vec<&TaskReport>)| {
+        let phases = tasks.iter().map(|task| task.phases.len()).max().unwrap_or_default();
+        let rates = |phase: usize| {
+            let of_task = tasks.iter().filter_map(move |task| task.phases.get(phase)?.cumulative);
+            Mean::of(of_task.map(Rate::count))
+        };
+        Average { robots, tasks: tasks.len(), phases: (0..phases).map(rates).collect() }
+    };
+    by_robots.into_iter().map(average).collect()
+}
+
+/// Mean of the conditional rates of phases on which robots work together, or of those on which they do not.
+fn conditional(tasks: &[TaskReport], together: bool) -> Option<Mean> {
+    let phases = tasks.iter().flat_map(|task| &task.phases).filter(|phase| phase.collaborative == together);
+    Mean::of(phases.filter_map(|phase| phase.conditional).map(Rate::count))
+}
+
+fn reasons(episodes: &[&Played]) -> Vec<Reason> {
+    let mut reasons: Vec<Reason> = Vec::new();
+    for played in episodes.iter().filter(|played| !succeeded(played)) {
+        let (phase, why) = (first_missed(played), why(played));
+        let same = |known: &&mut Reason| {
+            (known.task, &known.phase, &known.why) == (played.spec.task.id, &phase, &why)
+        };
+        match reasons.iter_mut().find(same) {
+            Some(known) => known.seeds.push(played.spec.seed),
+            None => {
+                reasons.push(Reason { task: played.spec.task.id, phase, why, seeds: vec![played.spec.seed] })
+            }
+        }
+    }
+    let rank = |reason: &Reason| tasks::ALL.iter().position(|task| task.id == reason.task);
+    reasons.sort_by_key(|reason| (rank(reason), reason.phase.clone()));
+    reasons
+}
+
+/// The first phase that counts and was not reached.
+pub fn first_missed(played: &Played) -> String {
+    let counts = |phase: &usize| played.begun_phase().is_none_or(|only| only == *phase);
+    let mut phases = (0..played.spec.task.phases.len()).filter(counts);
+    phases.find(|phase| !reached(played, *phase)).map(Phase::number).unwrap_or_default()
+}
+
+/// What the policy said when it gave up, or why the episode ended; and who fell.
+pub fn why(played: &Played) -> String {
+    let ended = match played.result.ended {
+        EndReason::TaskComplete => "the task was completed",
+        EndReason::StepBudgetExhausted => "the steps ran out",
+        EndReason::WallClockExhausted => "the policy's time ran out",
+        EndReason::Finished => "the policy ended the episode",
+        EndReason::Abandoned => "the policy went away",
+        EndReason::SimulatorFailed => "the simulator failed",
+    };
+    let own = played
+        .note
+        .clone()
+        .filter(|note| Some(note) != missed(&played.result, played.begun_phase()).as_ref());
+    let why = own.unwrap_or_else(|| ended.into());
+    match played.result.falls {
+        0 => why,
+        1 => format!("{why}; a robot fell"),
+        falls => format!("{why}; {falls} robots fell"),
+    }
+}

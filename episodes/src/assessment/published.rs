@@ -1,0 +1,51 @@
+//! What was published of the benchmark's tasks, in another simulator with other robots' controllers: for orientation, not for
+//! comparison. Facts and figures only.
+
+use serde::Serialize;
+
+const PHASES: &str = include_str!("published.csv");
+const PHASE_LEVEL: &str = include_str!("published_phase_level.csv");
+
+/// Rates of one method on one task.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Published {
+    pub method: String,
+    pub task: String,
+    pub episodes: usize,
+    /// Cumulative, by phase.
+    pub phases_share: Vec<f64>,
+}
+
+/// Means of one method over phases that were each begun at.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PublishedAverages {
+    pub method: String,
+    pub non_collaborative_share: f64,
+    pub collaborative_share: f64,
+}
+
+/// By method, then by task.
+pub fn rows() -> Vec<Published> {
+    let row = |line: &str| {
+        let mut cells = line.split(',');
+        let (method, task) = (cells.next()?.into(), cells.next()?.into());
+        let episodes = cells.next()?.parse().ok()?;
+        Some(Published { method, task, episodes, phases_share: shares(cells)? })
+    };
+    PHASES.lines().skip(1).filter_map(row).collect()
+}
+
+/// By method.
+pub fn averages() -> Vec<PublishedAverages> {
+    let row = |line: &str| {
+        let (method, rest) = line.split_once(',')?;
+        let [non_collaborative_share, collaborative_share] = shares(rest.split(','))?.try_into().ok()?;
+        Some(PublishedAverages { method: method.into(), non_collaborative_share, collaborative_share })
+    };
+    PHASE_LEVEL.lines().skip(1).filter_map(row).collect()
+}
+
+/// Cells that are percent.
+fn shares<'a>(cells: impl Iterator<Item = &'a str>) -> Option<Vec<f64>> {
+    cells.map(|cell| cell.parse::<f64>().ok().map(|percent| percent / 100.0)).collect()
+}

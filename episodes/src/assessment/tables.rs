@@ -1,0 +1,269 @@
+//! The report's tables, made once for every way of writing them.
+
+use super::compare::{Comparison, PairedRow};
+use super::policy::{Effort, PolicyReport, Spread, TaskReport};
+use super::rate::{Mean, Rate, percent};
+use super::{Assessment, Published};
+
+/// Words in rows and columns.
+pub struct Table {
+    pub title: String,
+    /// What has to be known to read it.
+    pub note: String,
+    pub head: Vec<String>,
+    pub rows: Vec<Vec<String>>,
+    /// Columns from this one on hold figures.
+    pub figures_from: usize,
+}
+
+/// What there is nothing to say of.
+const NONE: &str = "-";
+
+impl Table {
+    fn new(title: impl Into<String>, note: &str, head: &[&str], figures_from: usize) -> Table {
+        let head = head.iter().map(|text| text.to_string()).collect();
+        Table { title: title.into(), note: note.into(), head, rows: Vec::new(), figures_from }
+    }
+}
+
+/// Every table that has rows.
+pub fn all(assessment: &Assessment) -> Vec<Table> {
+    let policies = &assessment.policies;
+    let mut tables: Vec<Table> = policies.iter().map(rates).collect();
+    tables.push(averages(policies));
+    tables.push(together(policies));
+    tables.push(effort(policies));
+    tables.push(reasons(policies));
+    tables.extend(assessment.comparisons.iter().map(comparison));
+    tables.push(published(&assessment.published));
+    tables.push(published_together(assessment));
+    tables.retain(|table| !table.rows.is_empty());
+    tables
+}
+
+pub fn rates(policy: &PolicyReport) -> Table {
+    let mut table = Table::new(
+        format!("Phases: {}", policy.name),
+        "Percent with the exact 95 % interval (Clopper-Pearson). Cumulative: of all episodes. Conditional: of those that reached \
+         the phase before. From its beginning: of episodes that began where the phase begins.",
+        &["Task", "Phase", "Robots work", "Cumulative", "Conditional", "From its beginning"],
+        3,
+    );
+    let text =
+        |rate: Option<Rate>| rate.map_or(NONE.into(), |rate| format!("{} {}", rate.text(), rate.fraction()));
+    for task in &policy.tasks {
+        for phase in &task.phases {
+            table.rows.push(vec![
+                task.task.into(),
+                format!("{} {}", phase.phase, phase.name.replace('_', " ")),
+                if phase.collaborative { "together" } else { "alone" }.into(),
+                text(phase.cumulative),
+                text(phase.conditional),
+                text(phase.from_its_beginning),
+            ]);
+        }
+    }
+    table
+}
+
+fn averages(policies: &[PolicyReport]) -> Table {
+    let mut table = Table::new(
+        "Averages over tasks",
+        "Mean of the tasks' cumulative rates in percent; the last phase is the whole task. Intervals of 95 % from the tasks' exact \
+         limits (Zou and Donner).",
+        &["Policy", "Tasks"],
+        2,
+    );
+    let phases = policies.iter().flat_map(|policy| &policy.averages).map(|average| average.phases.len());
+    table.head.extend((0..phases.max().unwrap_or_default()).map(crate::scoring::Phase::number));
+    for policy in policies {
+        for average in &policy.averages {
+            let tasks = format!("{} of {} robots", average.tasks, average.robots);
+            let means = average.phases.iter().map(|mean| mean_text(mean.as_ref()));
+            table.rows.push([policy.name.clone(), tasks].into_iter().chain(means).collect());
+        }
+    }
+    table
+}
+
+fn mean_text(mean: Option<&Mean>) -> String {
+    mean.map_or(NONE.into(), Mean::text)
+}
+
+fn together(policies: &[PolicyReport]) -> Table {
+    let mut table = Table::new(
+        "Working alone and working together",
+        "Means of phases in percent. Conditional: given the phase before. From their beginnings: each episode begins where the \
+         phase begins in a demonstration. The drop is relative to working alone.",
+        &["Policy", "Rates", "Alone", "Together", "Gap (points)", "Drop"],
+        2,
+    );
+    let mut add = |policy: &PolicyReport, rates: &str, texts: [String; 2], shares: [Option<f64>; 2]| {
+        let gap = shares[0].zip(shares[1]).map(|(alone, together)| together - alone);
+        let drop = gap.zip(shares[0]).filter(|(_, alone)| *alone > 0.0).map(|(gap, alone)| -gap / alone);
+        let [alone, together] = texts;
+        table.rows.push(vec![
+            policy.name.clone(),
+            rates.into(),
+            alone,
+            together,
+            gap.map_or(NONE.into(), signed),
+            drop.map_or(NONE.into(), |drop| format!("{} %", percent(drop))),
+        ]);
+    };
+    for policy in policies {
+        let means = [&policy.together.alone, &policy.together.together];
+        if means.iter().any(|mean| mean.is_some()) {
+            let shares = means.map(|mean| mean.as_ref().map(|mean| mean.mean_share));
+            add(policy, "conditional", means.map(|mean| mean_text(mean.as_ref())), shares);
+        }
+        if let Some(level) = &policy.phase_level {
+            let mean =
+                |together: bool| {
+                    let phases = level.phases.iter().filter(|rate| rate.collaborative == together);
+                    Mean::of(phases.map(|rate| crate::statistics::Count {
+                        successes: rate.reached,
+                        trials: rate.episodes,
+                    }))
+                };
+            let texts = [mean(false), mean(true)].map(|mean| mean_text(mean.as_ref()));
+            let shares = [level.non_collaborative_share, level.collaborative_share];
+            add(policy, "from their beginnings", texts, shares);
+        }
+    }
+    table
+}
+
+/// In percent, with its sign.
+pub fn signed(share: f64) -> String {
+    let text = percent(share);
+    if share > 0.0 && text != "0" { format!("+{text}") } else { text }
+}
+
+fn effort(policies: &[PolicyReport]) -> Table {
+    let mut table = Table::new(
+        "Effort and falls",
+        "Of episodes from the task's beginning: median, least to most. A control step is 20 ms; thinking is the policy's own time.",
+        &["Policy", "Task", "Episodes", "Steps", "Calls", "Thinking (s)", "Falls"],
+        2,
+    );
+    let row = |policy: &PolicyReport, task: &TaskReport, effort: &Effort| {
+        let text = |spread: &Spread, decimals: usize| {
+            let Spread { min, median_value, max } = spread;
+            format!("{median_value:.decimals$} ({min:.decimals$}-{max:.decimals$})")
+        };
+        vec![
+            policy.name.clone(),
+            task.task.into(),
+            task.episodes.to_string(),
+            text(&effort.steps, 0),
+            text(&effort.calls, 0),
+            text(&effort.thought, 1),
+            task.falls.to_string(),
+        ]
+    };
+    for policy in policies {
+        let rows = policy.tasks.iter().filter_map(|task| Some(row(policy, task, task.effort.as_ref()?)));
+        table.rows.extend(rows);
+    }
+    table
+}
+
+fn reasons(policies: &[PolicyReport]) -> Table {
+    let mut table = Table::new(
+        "Why episodes failed",
+        "The first phase that was missed, and what the policy said or why the episode ended.",
+        &["Policy", "Task", "Stuck before", "Why", "Episodes", "Seeds"],
+        4,
+    );
+    for policy in policies {
+        for reason in &policy.reasons {
+            let seeds: Vec<String> = reason.seeds.iter().map(u32::to_string).collect();
+            table.rows.push(vec![
+                policy.name.clone(),
+                reason.task.into(),
+                reason.phase.clone(),
+                reason.why.clone(),
+                seeds.len().to_string(),
+                seeds.join(", "),
+            ]);
+        }
+    }
+    table
+}
+
+fn comparison(comparison: &Comparison) -> Table {
+    let Comparison { first, second, rows } = comparison;
+    let mut table = Table::new(
+        format!("{second} against {first}, on the same seeds"),
+        "Pairs of episodes of the same task and seed. The difference is the second rate less the first, in points, with Newcombe's \
+         95 % interval for paired rates; p is McNemar's exact test, two-sided, not corrected for the number of rows.",
+        &["Task", "Phase", "Pairs", "Both", "Only first", "Only second", "Neither", "Difference", "p"],
+        2,
+    );
+    let counted = rows.iter().filter(|row| row.last || row.task.is_none());
+    table.rows.extend(counted.map(paired_row));
+    table
+}
+
+fn paired_row(row: &PairedRow) -> Vec<String> {
+    let pairs = row.pairs;
+    let counts = [pairs.total(), pairs.both, pairs.first_only, pairs.second_only, pairs.neither];
+    let [low, high] = row.interval_share.map(signed);
+    let words = [row.task.unwrap_or("all tasks").to_owned(), row.phase.clone()];
+    let figures = [format!("{} [{low}, {high}]", signed(row.difference_share)), p_text(row.mcnemar_p_value)];
+    words.into_iter().chain(counts.map(|count| count.to_string())).chain(figures).collect()
+}
+
+fn p_text(p_value: f64) -> String {
+    if p_value < 0.0001 { "< 0.0001".into() } else { format!("{p_value:.4}") }
+}
+
+/// By method, and a column for each task that was played.
+pub fn published(rows: &[Published]) -> Table {
+    let mut table = Table::new(
+        "Published, in another simulator",
+        "CoHuB's own figures for its baselines in Isaac Sim, percent of p1 / p2 / p3, over 100 episodes, of GPT-6 Astra over 10. \
+         Physics, controller and pictures differ: for orientation, not for comparison.",
+        &["Method"],
+        1,
+    );
+    let mut tasks: Vec<&str> = Vec::new();
+    let mut methods: Vec<&str> = Vec::new();
+    for row in rows {
+        for (names, name) in [(&mut tasks, &row.task), (&mut methods, &row.method)] {
+            if !names.contains(&name.as_str()) {
+                names.push(name);
+            }
+        }
+    }
+    table.head.extend(tasks.iter().map(|task| task.to_string()));
+    for method in methods {
+        let cell = |task: &&str| {
+            let found = rows.iter().find(|row| row.method == method && row.task == **task);
+            let text =
+                |row: &Published| row.phases_share.iter().map(|share| percent(*share)).collect::<Vec<_>>();
+            found.map_or(NONE.into(), |row| text(row).join(" / "))
+        };
+        table.rows.push(std::iter::once(method.to_owned()).chain(tasks.iter().map(cell)).collect());
+    }
+    table
+}
+
+/// Only beside our own.
+fn published_together(assessment: &Assessment) -> Table {
+    let mut table = Table::new(
+        "Published from the phases' beginnings, in another simulator",
+        "CoHuB's means over the phases of its tasks of two robots, each phase begun at in 50 demonstrations, percent.",
+        &["Method", "Alone", "Together", "Gap (points)", "Drop"],
+        1,
+    );
+    if assessment.policies.iter().any(|policy| policy.phase_level.is_some()) {
+        table.rows.extend(assessment.published_averages.iter().map(|row| {
+            let (alone, together) = (row.non_collaborative_share, row.collaborative_share);
+            let drop = format!("{} %", percent((alone - together) / alone));
+            vec![row.method.clone(), percent(alone), percent(together), signed(together - alone), drop]
+        }));
+    }
+    table
+}

@@ -1,0 +1,210 @@
+//! What a report counts, joins, compares and says.
+
+use std::path::Path;
+
+use tandem_tools_spec::{EndReason, PhaseTimes, Protocol, ResultReply};
+
+use super::*;
+use crate::evaluation::Played;
+use crate::spec::{EpisodeSpec, PhaseStart, Start};
+use crate::tasks::{self, Task};
+
+/// An episode that reached the first `phases` phases.
+fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Played {
+    let reached = |index: usize| (index < phases).then(|| 4.0 * (index as f64 + 1.0));
+    let times = (0..task.phases.len()).map(|index| (crate::Phase::number(index), reached(index)));
+    let ended = if phases == task.phases.len() { EndReason::TaskComplete } else { EndReason::Finished };
+    Played {
+        policy: policy.into(),
+        spec: EpisodeSpec::new(task, seed, Protocol::Benchmark),
+        locomotion: "balance".into(),
+        build: "0.1.0+test".into(),
+        result: ResultReply {
+            task: task.id.into(),
+            seed,
+            protocol: Protocol::Benchmark,
+            phases: PhaseTimes(times.collect()),
+            ended,
+            env_steps: 500 + seed,
+            tool_calls: 60,
+            falls: u32::from(phases == 0),
+            realtime_factor: 3.5,
+            state_hash: format!("{seed:016x}"),
+            recording_failed: None,
+        },
+        thought_s: f64::from(seed),
+        note: None,
+    }
+}
+
+/// Ten episodes of Handover, of which nine, six and three reach its phases.
+fn nine_six_three(policy: &str) -> Vec<Played> {
+    let task = tasks::find("handover").unwrap();
+    let reached = [3, 3, 3, 2, 2, 2, 1, 1, 1, 0];
+    (0..).zip(reached).map(|(seed, phases)| played(policy, task, seed, phases)).collect()
+}
+
+fn write(folder: &Path, episodes: &[Played]) {
+    std::fs::create_dir_all(folder.join("episodes")).unwrap();
+    for played in episodes {
+        let name = format!("{}-{}.json", played.spec.task.id, played.spec.seed);
+        let text = serde_json::to_string(played).unwrap();
+        std::fs::write(folder.join("episodes").join(name), text).unwrap();
+    }
+}
+
+fn found(episodes: Vec<Played>) -> Loaded {
+    let episodes = episodes.into_iter().map(|played| Found { played, strip: None }).collect();
+    Loaded { episodes, skipped: Vec::new() }
+}
+
+#[test]
+fn folders_are_joined_and_nothing_counts_twice() {
+    let folder = tempfile::tempdir().unwrap();
+    let [one, other] = ["one", "other"].map(|name| folder.path().join(name));
+    let episodes = nine_six_three("agent");
+    write(&one, &episodes[..7]);
+    write(&other, &episodes[5..]);
+    std::fs::write(one.join("episodes/torn.json"), "{\"policy\"").unwrap();
+    let loaded = load(&[one.clone(), other]).unwrap();
+    assert_eq!((loaded.episodes.len(), loaded.skipped.len()), (10, 1));
+    assert!(loaded.skipped[0].contains("torn.json"), "{:?}", loaded.skipped);
+    let report = Assessment::of(&loaded);
+    assert_eq!((report.policies.len(), report.policies[0].episodes), (1, 10));
+    let text = load(&[folder.path().into()]).unwrap_err().to_string();
+    assert!(text.contains("no episodes in"), "{text}");
+}
+
+#[test]
+fn rates_are_counted_by_phase() {
+    let report = Assessment::of(&found(nine_six_three("agent")));
+    let handover = &report.policies[0].tasks[0];
+    let fractions = |rate: fn(&PhaseReport) -> Option<Rate>| -> Vec<String> {
+        handover.phases.iter().map(|phase| rate(phase).map_or("-".into(), Rate::fraction)).collect()
+    };
+    assert_eq!(fractions(|phase| phase.cumulative), ["9/10", "6/10", "3/10"]);
+    assert_eq!(fractions(|phase| phase.conditional), ["9/10", "6/9", "3/6"]);
+    assert_eq!(fractions(|phase| phase.from_its_beginning), ["-", "-", "-"]);
+    let together = &report.policies[0].together;
+    let mean = |mean: &Option<Mean>| mean.as_ref().map(|mean| mean.mean_share);
+    assert_eq!((mean(&together.alone), mean(&together.together)), (Some(0.7), Some(6.0 / 9.0)));
+    let effort = handover.effort.as_ref().unwrap();
+    assert_eq!((effort.steps.min, effort.steps.median_value, effort.steps.max), (500.0, 504.5, 509.0));
+    let reasons: Vec<_> =
+        report.policies[0].reasons.iter().map(|r| (&*r.phase, &*r.why, &*r.seeds)).collect();
+    let ended = "the policy ended the episode";
+    let fell = "the policy ended the episode; a robot fell";
+    let expected: [(&str, &str, &[u32]); 3] =
+        [("p1", fell, &[9]), ("p2", ended, &[6, 7, 8]), ("p3", ended, &[3, 4, 5])];
+    assert_eq!(reasons, expected);
+}
+
+#[test]
+fn averages_are_by_number_of_robots() {
+    let everything = tasks::ALL.iter().flat_map(|task| {
+        (0..4).map(move |seed| played("agent", task, seed, if seed == 0 { 0 } else { task.phases.len() }))
+    });
+    let report = Assessment::of(&found(everything.collect()));
+    let averages = &report.policies[0].averages;
+    assert_eq!(averages.iter().map(|average| average.tasks).sum::<usize>(), tasks::ALL.len());
+    for average in averages {
+        let of_robots = tasks::ALL.iter().filter(|task| task.robots.len() == average.robots).count();
+        assert_eq!(average.tasks, of_robots);
+        assert!(average.phases.iter().flatten().all(|mean| mean.mean_share == 0.75), "{average:?}");
+    }
+    let published = published::rows();
+    for task in tasks::ALL {
+        assert!(published.iter().any(|row| row.task == task.id), "nothing is published of {}", task.id);
+    }
+    assert!(published.iter().all(|row| row.phases_share.is_sorted_by(|one, next| one >= next)));
+}
+
+#[test]
+fn policies_are_compared_on_the_seeds_that_both_played() {
+    let mut episodes = nine_six_three("one");
+    let handover = tasks::find("handover").unwrap();
+    // Seed 0 worse, seeds 3 to 8 better, and one that the first did not play.
+    let others = [(0, 2), (1, 3), (3, 3), (4, 3), (5, 3), (6, 3), (7, 3), (8, 3), (9, 0), (70, 3)];
+    episodes.extend(others.map(|(seed, phases)| played("other", handover, seed, phases)));
+    let report = Assessment::of(&found(episodes));
+    let last = report.comparisons[0].rows.iter().find(|row| row.last && row.task.is_some()).unwrap();
+    let pairs = last.pairs;
+    assert_eq!((pairs.both, pairs.first_only, pairs.second_only, pairs.neither), (1, 1, 6, 1));
+    assert!((last.difference_share - 5.0 / 9.0).abs() < 1e-12, "{last:?}");
+    assert!((last.mcnemar_p_value - 0.125).abs() < 1e-12, "{last:?}");
+    let all = report.comparisons[0].rows.last().unwrap();
+    assert_eq!((all.task, all.pairs), (None, pairs));
+}
+
+#[test]
+fn namesakes_are_told_apart_by_what_differs() {
+    let [one, mut other] = [nine_six_three("agent"), nine_six_three("agent")];
+    other.iter_mut().for_each(|played| played.spec.protocol = Protocol::Agentic);
+    let report = Assessment::of(&found([one, other].concat()));
+    let names: Vec<&str> = report.policies.iter().map(|policy| policy.name.as_str()).collect();
+    assert_eq!(names, ["agent (benchmark)", "agent (agentic)"]);
+}
+
+/// Every format, of a policy whose name has to be escaped everywhere.
+#[test]
+fn reports_quote_what_they_are_told() {
+    let mut episodes = nine_six_three("a<b>&\"|_,%");
+    let start = PhaseStart { recording: "demonstration".into(), phase: "p2".into() };
+    let mut begun = played("a<b>&\"|_,%", tasks::find("handover").unwrap(), 0, 2);
+    begun.spec.start = Start::Phase(start);
+    episodes.push(begun);
+    let report = Assessment::of(&found(episodes));
+    let check = |format: Format, expected: &[&str], absent: &[&str]| {
+        let text = report.write(format, &[]).unwrap();
+        for wanted in expected {
+            assert!(text.contains(wanted), "{format:?} has no {wanted}: {text}");
+        }
+        for unwanted in absent {
+            assert!(!text.contains(unwanted), "{format:?} has {unwanted}: {text}");
+        }
+    };
+    check(
+        Format::Html,
+        &[
+            "a&lt;b&gt;&amp;&quot;|_,%",
+            "prefers-color-scheme: dark",
+            "60 [26.2, 87.8] 6/10",
+            "9/10</text>",
+            "another simulator",
+        ],
+        &["<script", "<link", "url(", "src=\"http", "href=", "a<b>"],
+    );
+    check(Format::Markdown, &["a<b>&\"\\|_,%", "| p2 transfer | together | 60 [26.2, 87.8] 6/10 |"], &[]);
+    check(
+        Format::Csv,
+        &[
+            "\"a<b>&\"\"|_,%\",benchmark,handover,2,p2,transfer,true,cumulative,6,10,0.6,",
+            ",from_its_beginning,1,1,1,0.025",
+        ],
+        &[],
+    );
+    check(Format::Tex, &["a$<$b$>$\\&\"|\\_,\\%", "\\toprule", "60 [26.2, 87.8] 6/10"], &["a<b>"]);
+    let json: serde_json::Value = serde_json::from_str(&report.write(Format::Json, &[]).unwrap()).unwrap();
+    assert_eq!(json["policies"][0]["tasks"][0]["phases"][1]["cumulative"]["successes"], 6);
+}
+
+#[test]
+fn failures_are_shown_by_turns() {
+    let folder = tempfile::tempdir().unwrap();
+    let strip = folder.path().join("strip.png");
+    image::RgbImage::new(812, 40).save(&strip).unwrap();
+    let mut loaded = found(nine_six_three("agent"));
+    let other = tasks::find("pouring").unwrap();
+    loaded.episodes.push(Found { played: played("agent", other, 1, 0), strip: None });
+    loaded.episodes.iter_mut().for_each(|found| found.strip = Some(strip.clone()));
+    let shown = gallery(&loaded, 2);
+    let seeds: Vec<_> = shown.iter().map(|failure| (failure.task, failure.seed, &*failure.phase)).collect();
+    assert_eq!(seeds, [("handover", 3, "p3"), ("pouring", 1, "p1")]);
+    let picture = shown[0].picture.as_ref().unwrap();
+    assert_eq!((picture.width, picture.height, &picture.webp[..4]), (406, 20, &b"RIFF"[..]));
+    let page = Assessment::of(&loaded).write(Format::Html, &shown).unwrap();
+    assert!(
+        page.contains("2 of 8 episodes that failed") && page.contains("data:image/webp;base64,"),
+        "{page}"
+    );
+}

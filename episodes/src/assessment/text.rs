@@ -1,0 +1,103 @@
+//! Reports without pictures: Markdown, CSV with a line for each rate, and tables for LaTeX.
+
+use super::Assessment;
+use super::rate::Rate;
+use super::tables::{Table, all};
+
+pub fn markdown(assessment: &Assessment) -> String {
+    let mut text = String::from("# Tandem: report\n");
+    for table in all(assessment) {
+        let line = |cells: &[String]| {
+            format!("| {} |\n", cells.iter().map(|c| escape_pipe(c)).collect::<Vec<_>>().join(" | "))
+        };
+        let rules =
+            (0..table.head.len()).map(|column| if column < table.figures_from { "---" } else { "---:" });
+        text += &format!("\n## {}\n\n{}\n\n", table.title, table.note);
+        text += &line(&table.head);
+        text += &format!("|{}|\n", rules.collect::<Vec<_>>().join("|"));
+        text.extend(table.rows.iter().map(|row| line(row)));
+    }
+    text.extend(assessment.skipped.iter().map(|skipped| format!("\nLeft out: {skipped}\n")));
+    text
+}
+
+fn escape_pipe(cell: &str) -> String {
+    cell.replace('|', "\\|").replace('\n', " ")
+}
+
+/// A line for each rate of each phase, for whoever counts on.
+pub fn csv(assessment: &Assessment) -> String {
+    let mut text = String::from(
+        "policy,protocol,task,robots,phase,name,collaborative,rate,successes,trials,share,low_share,high_share\n",
+    );
+    for policy in &assessment.policies {
+        for task in &policy.tasks {
+            for phase in &task.phases {
+                let rates = [
+                    ("cumulative", phase.cumulative),
+                    ("conditional", phase.conditional),
+                    ("from_its_beginning", phase.from_its_beginning),
+                ];
+                for (name, rate) in rates.into_iter().filter_map(|(name, rate)| Some((name, rate?))) {
+                    let Rate { successes, trials, share, interval_share: [low_share, high_share] } = rate;
+                    let (policy_name, protocol) = (quoted(&policy.name), policy.protocol);
+                    let of = format!("{policy_name},{protocol},{},{}", task.task, task.robots);
+                    let which = format!("{},{},{}", phase.phase, phase.name, phase.collaborative);
+                    text += &format!(
+                        "{of},{which},{name},{successes},{trials},{share},{low_share},{high_share}\n"
+                    );
+                }
+            }
+        }
+    }
+    text
+}
+
+/// As RFC 4180 has it.
+fn quoted(cell: &str) -> String {
+    match cell.contains([',', '"', '\n', '\r']) {
+        true => format!("\"{}\"", cell.replace('"', "\"\"")),
+        false => cell.into(),
+    }
+}
+
+/// Needs the package `booktabs`.
+pub fn tex(assessment: &Assessment) -> String {
+    let mut text = String::from("% Needs \\usepackage{booktabs}.\n");
+    text.extend(all(assessment).iter().map(tex_table));
+    text
+}
+
+fn tex_table(table: &Table) -> String {
+    let line = |cells: &[String]| {
+        format!("    {} \\\\\n", cells.iter().map(|cell| escape_tex(cell)).collect::<Vec<_>>().join(" & "))
+    };
+    let figures = table.head.len() - table.figures_from;
+    let columns = "l".repeat(table.figures_from) + &"r".repeat(figures);
+    let rows: String = table.rows.iter().map(|row| line(row)).collect();
+    format!(
+        "\n\\begin{{table}}\n  \\centering\n  \\caption{{\\textbf{{{}.}} {}}}\n  \\begin{{tabular}}{{{columns}}}\n    \
+         \\toprule\n{}    \\midrule\n{rows}    \\bottomrule\n  \\end{{tabular}}\n\\end{{table}}\n",
+        escape_tex(&table.title),
+        escape_tex(&table.note),
+        line(&table.head),
+    )
+}
+
+fn escape_tex(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' | '%' | '$' | '#' | '_' | '{' | '}' => escaped.extend(['\\', character]),
+            '\\' => escaped += "\\textbackslash{}",
+            '~' => escaped += "\\textasciitilde{}",
+            '^' => escaped += "\\textasciicircum{}",
+            '<' => escaped += "$<$",
+            '>' => escaped += "$>$",
+            'π' => escaped += "$\\pi$",
+            'Ψ' => escaped += "$\\Psi$",
+            other => escaped.push(other),
+        }
+    }
+    escaped
+}

@@ -1,0 +1,76 @@
+//! Every phase on its own: how often it was reached by episodes that began where it begins. What went wrong earlier in a task
+//! has no part in it, so phases that need several robots can be compared with those that do not.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::keep::Played;
+use crate::scoring::Phase;
+use crate::tasks;
+
+/// The rates of all phases that were begun at.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PhaseLevel {
+    /// In the order of the tasks and their phases.
+    pub phases: Vec<PhaseRate>,
+    /// Mean of the rates of phases that one robot works on at a time; `None` where there is none.
+    pub non_collaborative_share: Option<f64>,
+    /// Of phases on which robots work together.
+    pub collaborative_share: Option<f64>,
+    /// How much lower the second is, as a share of the first.
+    pub drop_share: Option<f64>,
+}
+
+/// One phase of one task.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PhaseRate {
+    pub task: &'static str,
+    /// As results call it: `p2`.
+    pub phase: String,
+    pub collaborative: bool,
+    pub episodes: usize,
+    pub reached: usize,
+}
+
+impl PhaseRate {
+    pub fn share(&self) -> f64 {
+        self.reached as f64 / self.episodes as f64
+    }
+}
+
+impl PhaseLevel {
+    /// Counts the episodes that began at a phase; `None` where none did.
+    pub fn of<'a>(episodes: impl Iterator<Item = &'a Played>) -> Option<PhaseLevel> {
+        let mut counts: BTreeMap<(usize, usize), [usize; 2]> = BTreeMap::new();
+        for played in episodes {
+            let task = tasks::ALL.iter().position(|task| task == played.spec.task);
+            let Some((key, phase)) = task.zip(played.begun_phase()) else { continue };
+            let [episodes, reached] = counts.entry((key, phase)).or_default();
+            *episodes += 1;
+            *reached += usize::from(played.result.phases.reached_s(&Phase::number(phase)).is_some());
+        }
+        let rate = |((task, phase), [episodes, reached]): ((usize, usize), [usize; 2])| {
+            let task = &tasks::ALL[task];
+            let collaborative = task.phases[phase].collaborative;
+            PhaseRate { task: task.id, phase: Phase::number(phase), collaborative, episodes, reached }
+        };
+        let phases: Vec<PhaseRate> = counts.into_iter().map(rate).collect();
+        let mean = |together: bool| mean(phases.iter().filter(|rate| rate.collaborative == together));
+        let (non_collaborative_share, collaborative_share) = (mean(false), mean(true));
+        let drop = |(alone, together): (f64, f64)| (alone > 0.0).then(|| (alone - together) / alone);
+        let drop_share = non_collaborative_share.zip(collaborative_share).and_then(drop);
+        (!phases.is_empty()).then_some(PhaseLevel {
+            phases,
+            non_collaborative_share,
+            collaborative_share,
+            drop_share,
+        })
+    }
+}
+
+/// Every phase counts the same, however many episodes it has.
+fn mean<'a>(rates: impl Iterator<Item = &'a PhaseRate>) -> Option<f64> {
+    let shares: Vec<f64> = rates.map(PhaseRate::share).collect();
+    (!shares.is_empty()).then(|| shares.iter().sum::<f64>() / shares.len() as f64)
+}

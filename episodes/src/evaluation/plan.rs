@@ -1,0 +1,118 @@
+//! What to play: which episodes there are, and which of them are this process's share.
+
+use std::path::{Path, PathBuf};
+
+use tandem_tools_spec::{Disclosure, Hints, Protocol};
+
+use crate::players;
+use crate::recording::Recorder;
+use crate::scoring::Phase;
+use crate::spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, Start};
+use crate::tasks::Task;
+
+/// What to play.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Who plays.
+    pub player: &'static players::Entry,
+    pub protocol: Protocol,
+    pub robot: RobotFile,
+    pub locomotion: Controller,
+    /// What policies are told about their success, and whether success ends an episode.
+    pub disclosure: Disclosure,
+    /// Whether policies are told how to grasp.
+    pub hints: Hints,
+    pub tasks: Vec<&'static Task>,
+    pub seeds: Vec<u32>,
+    pub starts: Starts,
+    pub shard: Shard,
+    /// Worlds that run side by side, each on a thread of its own.
+    pub jobs: usize,
+    /// Record every episode in a folder of its own (`episode.mcap`, `strip.png`, `report.html`).
+    pub record: bool,
+}
+
+/// Where the episodes begin.
+#[derive(Clone, Debug)]
+pub enum Starts {
+    /// At the task's own beginning; every phase counts.
+    Task,
+    /// Where one of these phases began in a demonstration of the same task and seed; that phase alone counts.
+    Phases {
+        /// What `tandem collect` or `tandem serve` wrote.
+        demonstrations: PathBuf,
+        /// As results call them; a task without such a phase has no episode of it.
+        phases: Vec<String>,
+    },
+}
+
+/// The share of one process: every episode whose number leaves this remainder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    pub index: usize,
+    pub of: usize,
+}
+
+impl Shard {
+    /// All of it.
+    pub const WHOLE: Shard = Shard { index: 0, of: 1 };
+}
+
+impl Plan {
+    /// One of the episodes to play.
+    pub fn spec(&self, task: &'static Task, seed: u32, start: Start) -> EpisodeSpec {
+        EpisodeSpec {
+            robot: self.robot.clone(),
+            locomotion: self.locomotion.clone(),
+            disclosure: self.disclosure,
+            hints: self.hints,
+            start,
+            ..EpisodeSpec::new(task, seed, self.protocol)
+        }
+    }
+
+    /// This share of the episodes, and which of it are left out because nobody has demonstrated them.
+    pub fn episodes(&self) -> (Vec<EpisodeSpec>, Vec<String>) {
+        let (mut found, mut left_out) = (Vec::new(), Vec::new());
+        let everything =
+            self.tasks.iter().flat_map(|task| self.seeds.iter().map(|seed| (*task, *seed))).flat_map(
+                |(task, seed)| self.starts_of(task).into_iter().map(move |phase| (task, seed, phase)),
+            );
+        let own = everything.enumerate().filter(|(number, _)| number % self.shard.of == self.shard.index);
+        for (_, (task, seed, phase)) in own {
+            let start = match (&self.starts, phase) {
+                (Starts::Phases { demonstrations, .. }, Some(phase)) => {
+                    match demonstration(demonstrations, task, seed) {
+                        Some(recording) => Start::Phase(PhaseStart { recording, phase }),
+                        None => {
+                            left_out.push(format!("{} seed {seed} {phase}: no demonstration", task.id));
+                            continue;
+                        }
+                    }
+                }
+                (Starts::Task | Starts::Phases { .. }, _) => Start::Task,
+            };
+            found.push(self.spec(task, seed, start));
+        }
+        (found, left_out)
+    }
+
+    /// The phases that episodes of `task` begin at; `None` for its own beginning.
+    fn starts_of(&self, task: &Task) -> Vec<Option<String>> {
+        match &self.starts {
+            Starts::Task => vec![None],
+            Starts::Phases { phases, .. } => {
+                let of_task = (0..task.phases.len()).map(Phase::number);
+                of_task.filter(|phase| phases.contains(phase)).map(Some).collect()
+            }
+        }
+    }
+}
+
+/// The recording of a task and seed, in a folder as `collect` or as `serve` writes them.
+fn demonstration(folder: &Path, task: &Task, seed: u32) -> Option<PathBuf> {
+    let id = task.id;
+    let names = [format!("episodes/{id}-{seed}"), format!("{id}-{seed}"), format!("{id}-seed{seed}")];
+    let recordings = names.iter().map(|name| folder.join(name).join(Recorder::FILE_NAME));
+    recordings.into_iter().find(|recording| recording.exists())
+}

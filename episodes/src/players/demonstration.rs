@@ -1,0 +1,55 @@
+//! Repeats what the robots of a recorded episode were told, from where this one starts in it: on the build that recorded it
+//! every phase is reached as it was then, which is the most that a start leaves possible.
+
+use tandem_sim::Step;
+use tandem_tools_spec::{JointChunk, SendJointChunk};
+
+use super::{Caller, Player, PlayerError};
+use crate::commands::base_row;
+use crate::protocol::rules;
+use crate::recording::{Recording, RecordingError};
+use crate::spec::{EpisodeSpec, PhaseStart, Start};
+
+/// Sends recorded action rows.
+pub struct Demonstration {
+    spec: EpisodeSpec,
+}
+
+impl Demonstration {
+    pub fn new(spec: &EpisodeSpec) -> Demonstration {
+        Demonstration { spec: spec.clone() }
+    }
+
+    /// The recorded steps after the start.
+    fn steps(&self) -> Result<Vec<Step>, PlayerError> {
+        let unreadable = |error: RecordingError| PlayerError::GaveUp(error.to_string());
+        let Start::Phase(PhaseStart { recording, phase }) = &self.spec.start else {
+            return Err(PlayerError::GaveUp("it starts at no phase of a demonstration".into()));
+        };
+        let recording = Recording::read(recording).map_err(unreadable)?;
+        let start = recording.checkpoint(phase).map_err(unreadable)?;
+        let from_s = start.map_or(f64::INFINITY, |start| start.time_s);
+        let steps = recording.steps().map_err(unreadable)?;
+        let later = steps.filter(|step| step.as_ref().map_or(true, |step| step.time_s > from_s));
+        later.collect::<Result<_, _>>().map_err(unreadable)
+    }
+}
+
+impl Player for Demonstration {
+    fn play(&mut self, episode: &mut dyn Caller) -> Result<(), PlayerError> {
+        let most = rules(self.spec.protocol, self.spec.task).steps_per_command;
+        for steps in self.steps()?.chunks(most as usize) {
+            let names = self.spec.task.robot_names().enumerate();
+            let rows = |robot: usize| steps.iter().map(|step| action(step, robot)).collect();
+            let robots = names.map(|(robot, name)| JointChunk { robot: name.into(), rows: rows(robot) });
+            episode.call(SendJointChunk { robots: robots.collect() }.into())?;
+        }
+        Ok(())
+    }
+}
+
+/// What robot number `robot` was told for `step`.
+fn action(step: &Step, robot: usize) -> Vec<f64> {
+    let command = &step.robots[robot].command;
+    command.upper_rad.into_iter().chain(base_row(&command.base)).map(f64::from).collect()
+}

@@ -1,0 +1,25 @@
+//! Recordings brought back: simulated again and compared step by step, or drawn again by any camera.
+
+mod pictures;
+mod scene;
+mod verify;
+mod video;
+
+pub use pictures::{Drawn, PicturesError, PicturesPlan, draw_all};
+pub use scene::{Scene, Size, View};
+pub use verify::{Difference, Outcome, Verified, verify};
+pub use video::{VideoError, VideoFormat, film, webp_picture};
+
+use crate::EpisodeError;
+use crate::recording::RecordingError;
+
+/// Why a recording cannot be played again.
+#[derive(Debug, thiserror::Error)]
+pub enum ReplayError {
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    #[error(transparent)]
+    Episode(#[from] EpisodeError),
+    #[error("call {number} of the recording is no tool call of this build: {source}")]
+    Call { number: usize, source: tandem_tools_spec::SpecError },
+}

@@ -1,0 +1,257 @@
+//! A recording as pictures and depth of every camera: the second stage of a pipeline that records states first.
+//!
+//! Files: `CAMERA/rgb/STEP.png`, 8 bits a channel; `CAMERA/depth/STEP.png`, 16 bits, millimetres along the optical axis, 0 where
+//! nothing is or it is further than 65.535 m; `pictures.json`, which says what is drawn and with which intrinsics; and
+//! `poses.json`, where each camera was at each picture. Every file is whole or not there, so a run that was stopped goes on.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
+use serde::{Deserialize, Serialize};
+use tandem_sim::render::{Camera, encode_png};
+use tandem_sim::{Pose, Step};
+
+use super::video::step_of_picture;
+use super::{ReplayError, Scene, Size, View};
+use crate::convert::opencv_axes;
+use crate::output::{OutputError, create_private_folder, write_whole};
+use crate::recording::Recording;
+use crate::spec::EpisodeSpec;
+use crate::tasks::Task;
+
+/// What to draw.
+#[derive(Clone, Copy, Debug)]
+pub struct PicturesPlan {
+    /// Pictures a second of each camera.
+    pub rate_hz: u32,
+    /// Of every camera's pictures, where it is not to be the camera's own.
+    pub size: Option<Size>,
+    /// Threads that draw.
+    pub jobs: usize,
+}
+
+/// What has been drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Drawn {
+    /// Moments at which every camera has a picture.
+    pub moments: usize,
+    /// Of these, how many an earlier run had drawn.
+    pub kept: usize,
+    pub cameras: usize,
+}
+
+/// Why pictures are missing. What was drawn is kept, and the next run goes on from there.
+#[derive(Debug, thiserror::Error)]
+pub enum PicturesError {
+    #[error("{} holds pictures of another recording, rate or size; give another folder", .0.display())]
+    OtherPictures(PathBuf),
+    #[error("a picture cannot be encoded: {0}")]
+    Picture(#[from] image::ImageError),
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
+}
+
+/// The content of `pictures.json`.
+#[derive(PartialEq, Serialize, Deserialize)]
+struct Manifest {
+    spec: EpisodeSpec,
+    /// Of the state that the episode ended in, or of its last recorded one.
+    state_hash: String,
+    rate_hz: u32,
+    depth_unit_m: f64,
+    cameras: Vec<Intrinsics>,
+}
+
+/// A camera without distortion; the centre of pixel (0, 0) lies at (0, 0).
+#[derive(PartialEq, Serialize, Deserialize)]
+struct Intrinsics {
+    name: String,
+    width: u32,
+    height: u32,
+    focal_px: f32,
+    cx: f32,
+    cy: f32,
+}
+
+/// Where a camera was, in `poses.json`: x right, y down, z along the optical axis, as OpenCV has it.
+#[derive(Serialize)]
+struct Placed {
+    control_step: u64,
+    time_s: f64,
+    camera: &'static str,
+    position_m: [f32; 3],
+    quaternion_wxyz: [f32; 4],
+}
+
+const MANIFEST: &str = "pictures.json";
+const POSES: &str = "poses.json";
+const DEPTH_UNIT_M: f64 = 0.001;
+
+/// Draws what `folder` does not hold yet, on several threads.
+pub fn draw_all(
+    recording: &Recording,
+    plan: &PicturesPlan,
+    folder: &Path,
+    progress: &(dyn Fn() + Sync),
+) -> Result<Drawn, PicturesError> {
+    let steps = moments(recording, plan.rate_hz)?;
+    let scene = Scene::of(&recording.spec).map_err(ReplayError::from)?;
+    let task = recording.spec.task;
+    let views = View::all(task);
+    prepare(recording, plan, folder, &scene, &steps)?;
+    let poses: Vec<Placed> = steps
+        .iter()
+        .flat_map(|step| views.iter().map(move |view| (step, *view)))
+        .map(|(step, view)| placed(step, view.name(task), &scene.camera(view, step, plan.size)))
+        .collect();
+    write_whole(&folder.join(POSES), &serde_json::to_vec(&poses).map_err(OutputError::from)?)?;
+    let kept = AtomicUsize::new(0);
+    let next = AtomicUsize::new(0);
+    let failure: Mutex<Option<PicturesError>> = Mutex::new(None);
+    let work = || -> Result<(), PicturesError> {
+        let mut scene = Scene::of(&recording.spec).map_err(ReplayError::from)?;
+        while let Some(step) = steps.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let before = views.iter().all(|view| Files::of(folder, view.name(task), step).are_there());
+            kept.fetch_add(usize::from(before), Ordering::Relaxed);
+            if !before {
+                views.iter().try_for_each(|view| draw(&mut scene, *view, step, plan, folder, task))?;
+            }
+            progress();
+        }
+        Ok(())
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..plan.jobs.max(1) {
+            scope.spawn(|| {
+                if let Err(error) = work() {
+                    // Nobody else begins another moment.
+                    next.store(steps.len(), Ordering::Relaxed);
+                    failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+                }
+            });
+        }
+    });
+    match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        Some(error) => Err(error),
+        None => Ok(Drawn { moments: steps.len(), kept: kept.into_inner(), cameras: views.len() }),
+    }
+}
+
+/// The steps that are drawn.
+fn moments(recording: &Recording, rate_hz: u32) -> Result<Vec<Step>, ReplayError> {
+    let mut moments = Vec::new();
+    for (index, step) in recording.steps()?.enumerate() {
+        let step = step?;
+        if index >= step_of_picture(moments.len(), rate_hz) {
+            moments.push(step);
+        }
+    }
+    Ok(moments)
+}
+
+/// Makes the folders, and sees to it that what lies there already is of the same kind.
+fn prepare(
+    recording: &Recording,
+    plan: &PicturesPlan,
+    folder: &Path,
+    scene: &Scene,
+    steps: &[Step],
+) -> Result<(), PicturesError> {
+    let task = recording.spec.task;
+    let intrinsics = |view: View, step: &Step| {
+        let camera = scene.camera(view, step, plan.size);
+        let [cx, cy] = camera.principal_point_px().map(|px| px - 0.5);
+        let (name, focal_px) = (view.name(task).into(), camera.focal_px());
+        Intrinsics { name, width: camera.width, height: camera.height, focal_px, cx, cy }
+    };
+    let views = View::all(task).into_iter();
+    let state_hash = recording.state_hashes().map_err(ReplayError::from)?.last();
+    let (_, state_hash) = state_hash.transpose().map_err(ReplayError::from)?.unwrap_or_default();
+    let manifest = Manifest {
+        spec: recording.spec.clone(),
+        state_hash,
+        rate_hz: plan.rate_hz,
+        depth_unit_m: DEPTH_UNIT_M,
+        cameras: views.filter_map(|view| Some(intrinsics(view, steps.first()?))).collect(),
+    };
+    let path = folder.join(MANIFEST);
+    if let Ok(bytes) = std::fs::read(&path) {
+        let there: Option<Manifest> = serde_json::from_slice(&bytes).ok();
+        return match there == Some(manifest) {
+            true => Ok(()),
+            false => Err(PicturesError::OtherPictures(folder.into())),
+        };
+    }
+    for camera in &manifest.cameras {
+        for kind in ["rgb", "depth"] {
+            let path = folder.join(&camera.name).join(kind);
+            create_private_folder(&path).map_err(|source| OutputError::Io { path, source })?;
+        }
+    }
+    let text = serde_json::to_vec_pretty(&manifest).map_err(OutputError::from)?;
+    Ok(write_whole(&path, &text)?)
+}
+
+fn placed(step: &Step, name: &'static str, camera: &Camera) -> Placed {
+    let pose: Pose = opencv_axes(&camera.world_from_camera);
+    let q = pose.rotation;
+    Placed {
+        control_step: step.control_step,
+        time_s: step.time_s,
+        camera: name,
+        position_m: pose.translation.to_array(),
+        quaternion_wxyz: [q.w, q.x, q.y, q.z],
+    }
+}
+
+/// The files of one camera at one moment; depth is written last.
+struct Files {
+    rgb: PathBuf,
+    depth: PathBuf,
+}
+
+impl Files {
+    fn of(folder: &Path, camera: &str, step: &Step) -> Files {
+        let file = |kind: &str| folder.join(camera).join(kind).join(format!("{:06}.png", step.control_step));
+        Files { rgb: file("rgb"), depth: file("depth") }
+    }
+
+    fn are_there(&self) -> bool {
+        self.rgb.exists() && self.depth.exists()
+    }
+}
+
+fn draw(
+    scene: &mut Scene,
+    view: View,
+    step: &Step,
+    plan: &PicturesPlan,
+    folder: &Path,
+    task: &Task,
+) -> Result<(), PicturesError> {
+    let files = Files::of(folder, view.name(task), step);
+    if files.are_there() {
+        return Ok(());
+    }
+    let camera = scene.camera(view, step, plan.size);
+    let frame = scene.draw(step, &camera);
+    write_whole(&files.rgb, &encode_png(frame.width, frame.height, &frame.rgb)?)?;
+    Ok(write_whole(&files.depth, &depth_png(frame.width, frame.height, &frame.depth_m)?)?)
+}
+
+fn depth_png(width: u32, height: u32, depth_m: &[f32]) -> Result<Vec<u8>, image::ImageError> {
+    let units = |depth_m: &f32| {
+        let units = (f64::from(*depth_m) / DEPTH_UNIT_M).round();
+        if units <= f64::from(u16::MAX) { units as u16 } else { 0 }
+    };
+    let samples: Vec<u8> = depth_m.iter().map(units).flat_map(u16::to_ne_bytes).collect();
+    let mut bytes = Vec::with_capacity(samples.len() / 4);
+    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive);
+    encoder.write_image(&samples, width, height, ExtendedColorType::L16)?;
+    Ok(bytes)
+}

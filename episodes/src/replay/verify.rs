@@ -1,0 +1,161 @@
+//! Simulates a recorded episode again, and compares the state after every step.
+
+use tandem_tools_spec::{ResultReply, ToolCall};
+
+use super::ReplayError;
+use crate::EpisodeError;
+use crate::fingerprint;
+use crate::recording::{BEGIN, RecordedCall, Recording};
+use crate::session::Replay;
+
+/// What came of simulating a recording again.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Verified {
+    /// Steps whose states are the recorded ones, that before the first one included.
+    pub steps: usize,
+    pub calls: usize,
+    /// Steps at the end of an interrupted recording that belong to a call of which it has no answer.
+    pub unanswered_steps: usize,
+    /// The build that recorded it, where that is another: builds may differ in their physics.
+    pub other_build: Option<String>,
+    pub outcome: Outcome,
+}
+
+/// How what was simulated compares with what was recorded.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// Every state, the result, and the phases scored from the recorded steps agree.
+    Same,
+    State(Difference),
+    /// The states agree and the result does not: what of it differs, as recorded and as it is.
+    Result {
+        what: &'static str,
+        recorded: String,
+        again: String,
+    },
+}
+
+/// The first step that differs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    pub control_step: u64,
+    /// Recorded and simulated state hash; `None` where there is no such step.
+    pub recorded: Option<String>,
+    pub again: Option<String>,
+    /// Number, from 1, and tool of the call that made the step; `None` before the first call.
+    pub call: Option<(usize, String)>,
+}
+
+/// Simulates the episode of `recording` again.
+pub fn verify(recording: &Recording) -> Result<Verified, ReplayError> {
+    let this = fingerprint::build().map_err(EpisodeError::Build)?;
+    let begin = recording.checkpoint(BEGIN)?;
+    let mut replay = Replay::start(&recording.spec, begin.as_ref(), recording.path())?;
+    let mut compared = Compared { recorded: recording.state_hashes()?.collect::<Result<_, _>>()?, steps: 0 };
+    let calls = recording.tool_calls()?;
+    let mut difference = compared.compare(replay.take_hashes()).map(|found| (None, found));
+    for (index, call) in calls.iter().enumerate() {
+        if difference.is_some() {
+            break;
+        }
+        let again = |source| ReplayError::Call { number: index + 1, source };
+        let parsed = ToolCall::parse(&call.tool, call.arguments.clone()).map_err(again)?;
+        // A call that was refused is refused again, and what it says is not compared.
+        let _ = replay.call(parsed, call.thought);
+        difference = compared.compare(replay.take_hashes()).map(|found| (Some((index, call)), found));
+    }
+    let outcome = match (difference, &recording.result) {
+        (Some((call, found)), _) => Outcome::State(found.by(call)),
+        (None, Some(result)) => match compared.missing() {
+            Some(found) => Outcome::State(found.by(calls.iter().enumerate().last())),
+            None => compare_results(recording, result, replay.result().0)?,
+        },
+        (None, None) => Outcome::Same,
+    };
+    Ok(Verified {
+        steps: compared.steps,
+        calls: calls.len(),
+        unanswered_steps: match recording.result {
+            Some(_) => 0,
+            None => compared.recorded.len() - compared.steps,
+        },
+        other_build: (recording.build != this).then(|| recording.build.clone()),
+        outcome,
+    })
+}
+
+/// Recorded states, and how many of them have been compared and were the same.
+struct Compared {
+    recorded: Vec<(u64, String)>,
+    steps: usize,
+}
+
+/// A difference that belongs to no call yet.
+struct Found {
+    control_step: u64,
+    recorded: Option<String>,
+    again: Option<String>,
+}
+
+impl Compared {
+    /// Compares the states that follow; the first difference, if there is one.
+    fn compare(&mut self, again: Vec<u64>) -> Option<Found> {
+        for hash in again {
+            let again = format!("{hash:016x}");
+            match self.recorded.get(self.steps) {
+                Some((_, recorded)) if *recorded == again => self.steps += 1,
+                other => {
+                    let last = self.recorded.last().map_or(0, |(step, _)| *step);
+                    return Some(Found {
+                        control_step: other.map_or(last + 1, |(step, _)| *step),
+                        recorded: other.map(|(_, recorded)| recorded.clone()),
+                        again: Some(again),
+                    });
+                }
+            }
+        }
+        None
+    }
+
+    /// The first recorded state that was not simulated again.
+    fn missing(&self) -> Option<Found> {
+        let (control_step, recorded) = self.recorded.get(self.steps)?;
+        Some(Found { control_step: *control_step, recorded: Some(recorded.clone()), again: None })
+    }
+}
+
+impl Found {
+    fn by(self, call: Option<(usize, &RecordedCall)>) -> Difference {
+        let Found { control_step, recorded, again } = self;
+        Difference {
+            control_step,
+            recorded,
+            again,
+            call: call.map(|(index, call)| (index + 1, call.tool.clone())),
+        }
+    }
+}
+
+/// The recorded result against the one of the simulation, and against the phases scored from the recorded steps.
+fn compare_results(
+    recording: &Recording,
+    recorded: &ResultReply,
+    again: ResultReply,
+) -> Result<Outcome, ReplayError> {
+    let times_s =
+        |result: &ResultReply| result.phases.0.iter().filter_map(|(_, time_s)| *time_s).collect::<Vec<f64>>();
+    let scored_s: Vec<f64> = recording.score()?.reached().map(|(_, time_s)| time_s).collect();
+    let text = |times_s: &[f64]| format!("{times_s:?}");
+    let facts = |result: &ResultReply| (result.env_steps, result.tool_calls, result.falls);
+    let pairs = [
+        ("state hash at the end", recorded.state_hash.clone(), again.state_hash.clone()),
+        ("times of phases", text(&times_s(recorded)), text(&times_s(&again))),
+        ("times of phases scored from the steps", text(&times_s(recorded)), text(&scored_s)),
+        ("steps, calls and falls", format!("{:?}", facts(recorded)), format!("{:?}", facts(&again))),
+    ];
+    let differs = pairs.into_iter().find(|(_, recorded, again)| recorded != again);
+    Ok(match differs {
+        Some((what, recorded, again)) => Outcome::Result { what, recorded, again },
+        None => Outcome::Same,
+    })
+}

@@ -1,0 +1,216 @@
+//! A recording as a film of one camera.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+use image::codecs::gif::{GifEncoder, Repeat};
+use image::{Delay, DynamicImage, RgbImage};
+use tandem_sim::CONTROL_HZ;
+use tandem_sim::render::Frame;
+use webp_animation::{ColorMode, Encoder, EncoderOptions, EncodingConfig};
+
+use super::{ReplayError, Scene, Size, View};
+use crate::output::{OutputError, partial_path, put_in_place, write_whole};
+use crate::recording::Recording;
+
+/// What kind of film; the file's extension says it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VideoFormat {
+    Webp,
+    Gif,
+    Mp4,
+}
+
+/// Why there is no film.
+#[derive(Debug, thiserror::Error)]
+pub enum VideoError {
+    #[error("{} is no film that can be made; give a file that ends in .webp, .gif or .mp4", .0.display())]
+    Format(PathBuf),
+    #[error("no ffmpeg to make {} with ({source}); install one, or give a file that ends in .webp or .gif", path.display())]
+    NoFfmpeg { path: PathBuf, source: io::Error },
+    #[error("ffmpeg made no {}: {says}", path.display())]
+    Ffmpeg { path: PathBuf, says: String },
+    #[error("libwebp made no {}: {source:?}", path.display())]
+    Webp { path: PathBuf, source: webp_animation::Error },
+    #[error("no GIF can be made: {0}")]
+    Gif(#[from] image::ImageError),
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
+}
+
+impl VideoFormat {
+    /// What the file's extension asks for.
+    pub fn of(path: &Path) -> Result<VideoFormat, VideoError> {
+        match path.extension().and_then(|extension| extension.to_str()) {
+            Some("webp") => Ok(VideoFormat::Webp),
+            Some("gif") => Ok(VideoFormat::Gif),
+            Some("mp4") => Ok(VideoFormat::Mp4),
+            _ => Err(VideoError::Format(path.into())),
+        }
+    }
+}
+
+/// Films a whole recording at `rate_hz` pictures a second, as fast as it was, and returns how many pictures that is.
+pub fn film(
+    recording: &Recording,
+    view: View,
+    size: Option<Size>,
+    rate_hz: u32,
+    path: &Path,
+) -> Result<usize, VideoError> {
+    let format = VideoFormat::of(path)?;
+    let mut scene = Scene::of(&recording.spec).map_err(ReplayError::from)?;
+    let mut reel: Option<Reel> = None;
+    let mut pictures = 0;
+    for (index, step) in recording.steps().map_err(ReplayError::from)?.enumerate() {
+        let step = step.map_err(ReplayError::from)?;
+        if index < step_of_picture(pictures, rate_hz) {
+            continue;
+        }
+        let camera = scene.camera(view, &step, size);
+        let frame = scene.draw(&step, &camera);
+        let reel = match &mut reel {
+            Some(reel) => reel,
+            unbegun => unbegun.insert(Reel::begin(format, &frame, rate_hz, path)?),
+        };
+        reel.add(&frame, pictures, rate_hz, path)?;
+        pictures += 1;
+    }
+    if let Some(reel) = reel {
+        reel.finish(pictures, rate_hz, path)?;
+    }
+    Ok(pictures)
+}
+
+/// Which step, counted from the recording's first, picture number `picture` shows.
+pub fn step_of_picture(picture: usize, rate_hz: u32) -> usize {
+    (picture as f64 * CONTROL_HZ / f64::from(rate_hz)).round() as usize
+}
+
+/// A film under way.
+enum Reel {
+    Webp(Encoder),
+    Gif { encoder: GifEncoder<BufWriter<File>>, file: File },
+    Mp4(Child),
+}
+
+/// Of 100; the robots' edges stay clean.
+const WEBP_QUALITY: f32 = 80.0;
+/// From 1, the slowest, to 30.
+const GIF_SPEED: i32 = 10;
+
+impl Reel {
+    /// Begins a film with pictures of the size of `frame`.
+    fn begin(format: VideoFormat, frame: &Frame, rate_hz: u32, path: &Path) -> Result<Reel, VideoError> {
+        let Frame { width, height, .. } = *frame;
+        Ok(match format {
+            VideoFormat::Webp => Reel::Webp(webp((width, height)).map_err(|e| webp_failed(path, e))?),
+            VideoFormat::Gif => {
+                let file = File::create(partial_path(path)).map_err(|e| io_failed(path, e))?;
+                let written = file.try_clone().map_err(|e| io_failed(path, e))?;
+                let mut encoder = GifEncoder::new_with_speed(BufWriter::new(written), GIF_SPEED);
+                encoder.set_repeat(Repeat::Infinite)?;
+                Reel::Gif { encoder, file }
+            }
+            VideoFormat::Mp4 => Reel::Mp4(ffmpeg([width, height], rate_hz, path)?),
+        })
+    }
+
+    fn add(&mut self, frame: &Frame, picture: usize, rate_hz: u32, path: &Path) -> Result<(), VideoError> {
+        match self {
+            Reel::Webp(encoder) => encoder
+                .add_frame(&frame.rgb, time_ms(picture, rate_hz))
+                .map_err(|source| webp_failed(path, source)),
+            Reel::Gif { encoder, .. } => {
+                let picture = RgbImage::from_raw(frame.width, frame.height, frame.rgb.clone());
+                let rgba = DynamicImage::from(picture.unwrap_or_default()).into_rgba8();
+                let delay = Delay::from_numer_denom_ms(1000, rate_hz);
+                Ok(encoder.encode_frame(image::Frame::from_parts(rgba, 0, 0, delay))?)
+            }
+            Reel::Mp4(child) => match &mut child.stdin {
+                // A pipe that is closed early has its reason in what ffmpeg says at the end.
+                Some(pipe) => Ok(drop(pipe.write_all(&frame.rgb))),
+                None => Ok(()),
+            },
+        }
+    }
+
+    fn finish(self, pictures: usize, rate_hz: u32, path: &Path) -> Result<(), VideoError> {
+        match self {
+            Reel::Webp(encoder) => {
+                let film = encoder.finalize(time_ms(pictures, rate_hz));
+                Ok(write_whole(path, &film.map_err(|e| webp_failed(path, e))?)?)
+            }
+            Reel::Gif { encoder, file } => {
+                // The encoder writes the end of the file when it is dropped.
+                drop(encoder);
+                put_in_place(&file, &partial_path(path), path).map_err(|e| io_failed(path, e))
+            }
+            Reel::Mp4(child) => {
+                let output = child.wait_with_output().map_err(|e| io_failed(path, e))?;
+                if !output.status.success() {
+                    let says = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+                    return Err(VideoError::Ffmpeg { path: path.into(), says });
+                }
+                let whole = File::open(partial_path(path));
+                whole
+                    .and_then(|file| put_in_place(&file, &partial_path(path), path))
+                    .map_err(|e| io_failed(path, e))
+            }
+        }
+    }
+}
+
+/// One RGB picture, three bytes a pixel, as a file.
+pub fn webp_picture(width: u32, height: u32, rgb: &[u8]) -> Result<Vec<u8>, VideoError> {
+    let encoded = webp((width, height)).and_then(|mut encoder| {
+        encoder.add_frame(rgb, 0)?;
+        encoder.finalize(1)
+    });
+    encoded.map(|webp| webp.to_vec()).map_err(|source| webp_failed(Path::new("picture"), source))
+}
+
+/// An encoder of RGB pictures.
+fn webp(size_px: (u32, u32)) -> Result<Encoder, webp_animation::Error> {
+    let options = EncoderOptions {
+        color_mode: ColorMode::Rgb,
+        encoding_config: Some(EncodingConfig::new_lossy(WEBP_QUALITY)),
+        ..EncoderOptions::default()
+    };
+    Encoder::new_with_options(size_px, options)
+}
+
+/// An ffmpeg that takes raw pictures and writes what every player plays.
+fn ffmpeg([width, height]: [u32; 2], rate_hz: u32, path: &Path) -> Result<Child, VideoError> {
+    let (size, rate) = (format!("{width}x{height}"), rate_hz.to_string());
+    let takes = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", &size, "-r", &rate, "-i", "-"];
+    // Players want an even number of pixels each way, and the index in front.
+    let even = "pad=ceil(iw/2)*2:ceil(ih/2)*2";
+    let writes = ["-vf", even, "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4"];
+    let ffmpeg = Command::new("ffmpeg")
+        .args(["-loglevel", "error", "-y"])
+        .args(takes)
+        .args(writes)
+        .arg(partial_path(path))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn();
+    ffmpeg.map_err(|source| VideoError::NoFfmpeg { path: path.into(), source })
+}
+
+fn time_ms(picture: usize, rate_hz: u32) -> i32 {
+    (picture as f64 * 1000.0 / f64::from(rate_hz)).round() as i32
+}
+
+fn webp_failed(path: &Path, source: webp_animation::Error) -> VideoError {
+    VideoError::Webp { path: path.into(), source }
+}
+
+fn io_failed(path: &Path, source: io::Error) -> VideoError {
+    OutputError::Io { path: path.into(), source }.into()
+}

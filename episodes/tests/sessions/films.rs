@@ -1,0 +1,110 @@
+//! Recordings drawn again: films, and pictures with depth.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use crate::common::*;
+use image::AnimationDecoder;
+use tandem_episodes::replay::{PicturesPlan, Scene, Size, VideoError, View, draw_all, film};
+use tandem_episodes::{Recorder, Recording, Session};
+use tandem_tools_spec::Protocol;
+
+const STEPS: u32 = 12;
+const SIZE: Size = Size { width: 64, height: 48 };
+
+/// A quarter of a second of Handover.
+fn recorded(folder: &Path) -> Recording {
+    let mut session = Session::start(&spec("handover", 3, Protocol::Benchmark), Some(folder)).unwrap();
+    command(&mut session, raise_hand(STEPS));
+    session.close();
+    Recording::read(&folder.join(Recorder::FILE_NAME)).unwrap()
+}
+
+#[test]
+fn films_have_a_picture_for_every_moment() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = recorded(folder.path());
+    let make = |name: &str, view: View, rate_hz: u32| {
+        let path = folder.path().join(name);
+        film(&recording, view, Some(SIZE), rate_hz, &path).map(|pictures| (pictures, path))
+    };
+    let (pictures, gif) = make("a.gif", View::ThirdPerson, 25).unwrap();
+    assert_eq!(pictures, 7, "steps 0, 2, .. 12");
+    let file = std::io::BufReader::new(std::fs::File::open(gif).unwrap());
+    let frames = image::codecs::gif::GifDecoder::new(file).unwrap().into_frames().collect_frames().unwrap();
+    assert_eq!((frames.len(), frames[0].buffer().dimensions()), (7, (SIZE.width, SIZE.height)));
+    assert_eq!(frames[0].delay().numer_denom_ms(), (40, 1));
+
+    let (pictures, webp) = make("a.webp", View::Egocentric(1), 50).unwrap();
+    assert_eq!(pictures, 13);
+    let bytes = std::fs::read(webp).unwrap();
+    let decoder = webp_animation::Decoder::new(&bytes).unwrap();
+    let times_ms: Vec<i32> = decoder.into_iter().map(|frame| frame.timestamp()).collect();
+    assert_eq!(times_ms.last(), Some(&(13 * 20)), "{times_ms:?}");
+
+    match make("a.mp4", View::Egocentric(0), 10) {
+        Ok((pictures, mp4)) => {
+            let bytes = std::fs::read(mp4).unwrap();
+            assert_eq!((pictures, &bytes[4..8]), (3, &b"ftyp"[..]));
+        }
+        Err(error @ VideoError::NoFfmpeg { .. }) => assert!(error.to_string().contains(".webp or .gif")),
+        Err(error) => panic!("{error}"),
+    }
+    let text = make("a.avi", View::ThirdPerson, 25).unwrap_err().to_string();
+    assert!(text.contains("ends in .webp, .gif or .mp4"), "{text}");
+    let text = View::find("C", recording.spec.task).unwrap_err();
+    assert!(text.ends_with("have: third_person, A, B"), "{text}");
+    let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert!(left.iter().all(|path| path.extension().is_none_or(|e| e != "partial")), "{left:?}");
+}
+
+/// Every file below `folder` and when it was written.
+fn files(folder: &Path) -> BTreeMap<PathBuf, SystemTime> {
+    let mut found = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
+        match entry.file_type().unwrap().is_dir() {
+            true => found.extend(files(&entry.path())),
+            false => drop(found.insert(entry.path(), entry.metadata().unwrap().modified().unwrap())),
+        }
+    }
+    found
+}
+
+#[test]
+fn pictures_are_drawn_once_whatever_stops_the_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = recorded(&folder.path().join("episode"));
+    let out = folder.path().join("pictures");
+    let draw = |rate_hz: u32, jobs: usize| {
+        draw_all(&recording, &PicturesPlan { rate_hz, size: Some(SIZE), jobs }, &out, &|| {})
+    };
+    let drawn = draw(10, 2).unwrap();
+    assert_eq!((drawn.moments, drawn.kept, drawn.cameras), (3, 0, 3), "steps 0, 5 and 10");
+    let before = files(&out);
+    assert_eq!(before.len(), 3 * 3 * 2 + 2, "{before:?}");
+
+    // A run that was killed while it drew left a camera without its depth.
+    let lost = out.join("A/depth/000005.png");
+    let depth_mm = image::open(&lost).unwrap().into_luma16();
+    std::fs::remove_file(&lost).unwrap();
+    let drawn = draw(10, 1).unwrap();
+    assert_eq!((drawn.moments, drawn.kept), (3, 2));
+    let after = files(&out);
+    let written = |path: &&PathBuf| before.get(*path) != after.get(*path) && !path.ends_with("poses.json");
+    let written: Vec<_> = after.keys().filter(written).collect();
+    assert_eq!(written, [&out.join("A/depth/000005.png"), &out.join("A/rgb/000005.png")]);
+    assert_eq!(image::open(&lost).unwrap().into_luma16(), depth_mm);
+
+    // It is the depth that the camera sees.
+    let step = recording.steps().unwrap().nth(5).unwrap().unwrap();
+    let mut scene = Scene::of(&recording.spec).unwrap();
+    let camera = scene.camera(View::Egocentric(0), &step, Some(SIZE));
+    let seen = scene.draw(&step, &camera);
+    for (mm, depth_m) in depth_mm.pixels().zip(&seen.depth_m) {
+        let expected_m = if depth_m.is_finite() { *depth_m } else { 0.0 };
+        assert!((f32::from(mm.0[0]) / 1000.0 - expected_m).abs() < 0.0006, "{mm:?} for {depth_m} m");
+    }
+    let text = draw(25, 1).unwrap_err().to_string();
+    assert!(text.contains("pictures of another recording, rate or size"), "{text}");
+}

@@ -1,0 +1,190 @@
+//! Recordings simulated again: the same where they are whole, and found out where a number was changed.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::time::Duration;
+
+use crate::common::*;
+use tandem_episodes::players::{self, InProcess, PlayerError};
+use tandem_episodes::replay::{Outcome, Verified, verify};
+use tandem_episodes::{
+    Clock, EpisodeSpec, Phase, PhaseStart, Recorder, Recording, Session, Start, recover, tasks,
+};
+use tandem_tools_spec::{EndReason, Finish, GetStatus, Observe, Protocol, Wait};
+
+fn verified(path: &Path) -> Verified {
+    verify(&Recording::read(path).unwrap()).unwrap()
+}
+
+/// Records the expert of a task and returns where; `None` where it has none.
+fn demonstration(task: &str, folder: &Path) -> Option<PathBuf> {
+    let spec = spec(task, 3, Protocol::Benchmark);
+    let mut episode = InProcess::new(Session::start(&spec, Some(folder)).unwrap());
+    let played = players::find("expert").unwrap().play(&spec, &mut episode);
+    episode.session.close();
+    match played {
+        Err(PlayerError::NoExpert { .. }) => None,
+        _ => Some(folder.join(Recorder::FILE_NAME)),
+    }
+}
+
+#[test]
+fn every_task_is_verified_and_goes_on_where_each_phase_begins() {
+    for task in tasks::ALL {
+        let folder = tempfile::tempdir().unwrap();
+        let Some(recording) = demonstration(task.id, folder.path()) else { continue };
+        let found = verified(&recording);
+        let steps = Recording::read(&recording).unwrap().state_hashes().unwrap().count();
+        assert_eq!((found.outcome, found.steps), (Outcome::Same, steps), "{}", task.id);
+        assert_eq!((found.unanswered_steps, found.other_build), (0, None), "{}", task.id);
+
+        // What the robots were told from there on, told again, ends as it did.
+        let recorded = Recording::read(&recording).unwrap().result.unwrap();
+        let reached = recorded.phases.0.iter().filter(|(_, time_s)| time_s.is_some()).count();
+        for index in 0..task.phases.len().min(reached + 1) {
+            let phase = Phase::number(index);
+            let start = Start::Phase(PhaseStart { recording: recording.clone(), phase: phase.clone() });
+            let spec = EpisodeSpec { start, ..spec(task.id, 3, Protocol::Benchmark) };
+            let mut episode = InProcess::new(Session::start(&spec, None).unwrap());
+            let begun = episode.session.result();
+            assert_eq!((begun.env_steps, begun.tool_calls), (0, 0), "the whole budget is ahead");
+            assert_eq!(episode.session.reached_phases(), index, "{} {phase}", task.id);
+            players::find("demonstration").unwrap().play(&spec, &mut episode).unwrap();
+            let result = episode.session.close();
+            assert_eq!(
+                (&result.state_hash, &result.phases),
+                (&recorded.state_hash, &recorded.phases),
+                "{} {phase}",
+                task.id
+            );
+        }
+    }
+}
+
+/// Three commands of A, in which a second is thought; the policy's clock runs out after `thinking_s` more.
+fn agentic(folder: &Path, thinking_s: u64) -> PathBuf {
+    let hands_ns = Arc::new(AtomicU64::new(0));
+    let read = hands_ns.clone();
+    let clock: Clock = Box::new(move || Duration::from_nanos(read.load(Relaxed)));
+    let spec = spec("handover", 5, Protocol::Agentic);
+    let mut session = Session::start_with_clock(&spec, Some(folder.into()), clock).unwrap();
+    hands_ns.fetch_add(333_333_333, Relaxed);
+    session.call(Observe { robots: None, short: None }.into()).unwrap();
+    hands_ns.fetch_add(666_666_667, Relaxed);
+    command(&mut session, raise_hand(25));
+    wait(&mut session, 3);
+    hands_ns.fetch_add(thinking_s * 1_000_000_000, Relaxed);
+    let _ = session.call(Wait { steps: 25 }.into());
+    session.call(GetStatus {}.into()).unwrap();
+    session.call(Finish {}.into()).unwrap();
+    folder.join(Recorder::FILE_NAME)
+}
+
+#[test]
+fn the_clock_is_charged_again_as_it_was() {
+    for (thinking_s, ended, steps) in
+        [(10, EndReason::Finished, 300 + 53), (1799, EndReason::WallClockExhausted, 300 + 28)]
+    {
+        let folder = tempfile::tempdir().unwrap();
+        let path = agentic(folder.path(), thinking_s);
+        let recording = Recording::read(&path).unwrap();
+        let result = recording.result.clone().unwrap();
+        assert_eq!((result.ended, result.env_steps), (ended, steps));
+        let calls = recording.tool_calls().unwrap();
+        assert_eq!(calls[1].thought, Duration::from_secs(1), "{thinking_s}");
+        let found = verify(&recording).unwrap();
+        assert_eq!((found.outcome, found.steps), (Outcome::Same, steps as usize + 1));
+    }
+}
+
+/// A copy of a recording in which `change` was made to the JSON of the tool calls.
+fn changed(path: &Path, change: impl Fn(&str) -> String) -> PathBuf {
+    let bytes = std::fs::read(path).unwrap();
+    let copy = path.with_file_name("changed.mcap");
+    let mut writer = mcap::Writer::new(std::fs::File::create(&copy).unwrap()).unwrap();
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let mut message = message.unwrap();
+        if message.channel.topic == "/tool_calls" {
+            let text = String::from_utf8(message.data.to_vec()).unwrap();
+            message.data = change(&text).into_bytes().into();
+        }
+        writer.write(&message).unwrap();
+    }
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    for index in &summary.metadata_indexes {
+        writer.write_metadata(&mcap::read::metadata(&bytes, index).unwrap()).unwrap();
+    }
+    writer.finish().unwrap();
+    copy
+}
+
+#[test]
+fn a_changed_number_is_found_at_its_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut session = Session::start(&spec("handover", 5, Protocol::Benchmark), Some(folder.path())).unwrap();
+    wait(&mut session, 7);
+    command(&mut session, raise_hand(25));
+    wait(&mut session, 10);
+    command(&mut session, squat(0.70));
+    session.close();
+    let path = folder.path().join(Recorder::FILE_NAME);
+    assert_eq!(verified(&path).outcome, Outcome::Same);
+    let check = |from: &str, to: &str, step: u64, number: usize, tool: &str| {
+        let copy = changed(&path, |text| text.replace(from, to));
+        let Outcome::State(found) = verified(&copy).outcome else { panic!("{from} -> {to} is not found") };
+        assert_eq!((found.control_step, found.call), (step, Some((number, tool.into()))), "{from} -> {to}");
+    };
+    // A wrist that goes elsewhere is seen in the command's first step; so is a height.
+    check("0.28,-0.24,0.22", "0.28,-0.24,0.2200001", 8, 2, "move_wrists");
+    check("\"pelvis_height_m\\\":0.7", "\"pelvis_height_m\\\":0.7000001", 43, 4, "walk");
+    // A wait that is shorter brings what follows forward.
+    check("{\\\"steps\\\":7}", "{\\\"steps\\\":6}", 7, 2, "move_wrists");
+    // One that is longer at the end has states that were never recorded.
+    check("{\\\"steps\\\":10}", "{\\\"steps\\\":11}", 43, 3, "wait");
+}
+
+#[test]
+fn an_interrupted_recording_is_verified_as_far_as_it_goes() {
+    let folder = tempfile::tempdir().unwrap();
+    let spec = spec("handover", 3, Protocol::Benchmark);
+    let mut session = Session::start(&spec, Some(folder.path())).unwrap();
+    wait(&mut session, 5);
+    wait(&mut session, 5);
+    let partial = folder.path().join("episode.mcap.partial");
+    let bytes = std::fs::read(&partial).unwrap();
+    drop(session);
+    std::fs::write(&partial, bytes).unwrap();
+    let found = verified(&recover(&partial).unwrap().path);
+    assert_eq!((found.outcome, found.steps, found.calls), (Outcome::Same, 11, 2));
+}
+
+#[test]
+fn a_start_at_a_phase_is_recorded_and_verified_without_the_demonstration() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = demonstration("pouring", folder.path()).unwrap();
+    let begin = |phase: &str| Start::Phase(PhaseStart { recording: recording.clone(), phase: phase.into() });
+    // Under another protocol, too: the budget is the new episode's own.
+    let own = EpisodeSpec { start: begin("p2"), ..spec("pouring", 3, Protocol::Agentic) };
+    let again = folder.path().join("again");
+    let mut session = Session::start(&own, Some(&again)).unwrap();
+    wait(&mut session, 20);
+    let result = session.close();
+    assert_eq!((result.env_steps, result.tool_calls), (20, 1));
+    assert!(result.phases.reached_s("p1").is_some() && result.phases.reached_s("p2").is_none());
+
+    let refused = |start: Start, seed: u32| {
+        let spec = EpisodeSpec { start, ..spec("pouring", seed, Protocol::Agentic) };
+        Session::start(&spec, None).map(drop).unwrap_err().to_string()
+    };
+    let text = refused(begin("p7"), 3);
+    assert!(text.contains("no checkpoint where p7 begins"), "{text}");
+    let text = refused(begin("p2"), 4);
+    assert!(text.contains("made of task pouring seed 3") && text.contains("pouring seed 4"), "{text}");
+
+    std::fs::remove_file(&recording).unwrap();
+    let found = verified(&again.join(Recorder::FILE_NAME));
+    assert_eq!((found.outcome, found.steps), (Outcome::Same, 21));
+    let text = refused(begin("p2"), 3);
+    assert!(text.contains("cannot read the recording"), "{text}");
+}

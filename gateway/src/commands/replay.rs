@@ -1,0 +1,168 @@
+//! `tandem replay`: recordings simulated again, filmed, or drawn with depth.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::str::FromStr;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use tandem_episodes::Recording;
+use tandem_episodes::replay::{
+    Difference, Drawn, Outcome as Comparison, PicturesPlan, Size, Verified, View, draw_all, film, verify,
+};
+
+use super::Outcome;
+
+/// Play recordings again: say what they hold, verify them, film them, or draw what every camera saw with depth.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Recordings, as runs/handover-seed0/episode.mcap.
+    #[arg(value_name = "FILES", required = true)]
+    recordings: Vec<PathBuf>,
+    /// Simulate again and compare the state after every step, result and phases; names the first step that differs.
+    #[arg(long)]
+    verify: bool,
+    /// Film of one recording: FILE.webp, FILE.gif, or where an ffmpeg is installed FILE.mp4.
+    #[arg(long, value_name = "FILE")]
+    video: Option<PathBuf>,
+    /// What films: `third_person`, or a robot's name.
+    #[arg(long, value_name = "CAMERA", default_value = "third_person")]
+    camera: String,
+    /// Folder for pictures and depth of every camera; of several recordings, a folder in it for each. Goes on where an
+    /// interrupted run stopped.
+    #[arg(long, value_name = "DIR")]
+    render: Option<PathBuf>,
+    /// Pictures a second, of simulated time.
+    #[arg(long, value_name = "HZ", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=50))]
+    rate: u32,
+    /// Size of the pictures, as 640x480 [default: the camera's own].
+    #[arg(long, value_name = "WIDTHxHEIGHT")]
+    size: Option<PictureSize>,
+    /// Threads that draw.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    jobs: usize,
+}
+
+/// A size on the command line.
+#[derive(Clone, Copy, Debug)]
+struct PictureSize(Size);
+
+impl FromStr for PictureSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<PictureSize, String> {
+        const SIDES_PX: std::ops::RangeInclusive<u32> = 16..=3840;
+        let side = |text: &str| text.parse().ok().filter(|side| SIDES_PX.contains(side));
+        let sides = text.split_once('x').and_then(|(width, height)| Some((side(width)?, side(height)?)));
+        let (width, height) = sides.ok_or(format!(
+            "no size; give width and height in pixels, each {} to {}, as 640x480",
+            SIDES_PX.start(),
+            SIDES_PX.end()
+        ))?;
+        Ok(PictureSize(Size { width, height }))
+    }
+}
+
+/// Does what the flags say with each recording; without any, says what it holds.
+pub fn run(args: Args) -> Outcome {
+    if args.video.is_some() && args.recordings.len() > 1 {
+        return Err("--video films one recording; give one".into());
+    }
+    let mut all_same = true;
+    for path in &args.recordings {
+        let recording = Recording::read(path)?;
+        describe(&recording);
+        if args.verify {
+            all_same &= print_verified(&verify(&recording)?);
+        }
+        let size = args.size.map(|PictureSize(size)| size);
+        if let Some(video) = &args.video {
+            let view = View::find(&args.camera, recording.spec.task)?;
+            let pictures = film(&recording, view, size, args.rate, video)?;
+            println!("  {}: {pictures} pictures, {} a second", video.display(), args.rate);
+        }
+        if let Some(folder) = &args.render {
+            let plan = PicturesPlan { rate_hz: args.rate, size, jobs: args.jobs };
+            render(&recording, &plan, &folder_for(folder, path, args.recordings.len()))?;
+        }
+    }
+    Ok(if all_same { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn describe(recording: &Recording) {
+    let spec = &recording.spec;
+    let (task, seed, protocol) = (spec.task.id, spec.seed, spec.protocol);
+    println!("{}: {task} seed {seed}, {protocol}, build {}", recording.path().display(), recording.build);
+    match &recording.result {
+        Some(result) => {
+            let reached = result.phases.0.iter().filter(|(_, time_s)| time_s.is_some()).count();
+            println!(
+                "  {reached} of {} phases, {} steps, {} calls, {} falls",
+                result.phases.0.len(),
+                result.env_steps,
+                result.tool_calls,
+                result.falls
+            );
+        }
+        None => println!("  interrupted before its end"),
+    }
+}
+
+/// Says how the recording compares; whether it is the same.
+fn print_verified(verified: &Verified) -> bool {
+    if let Some(build) = &verified.other_build {
+        println!(
+            "  warning: {build} recorded it, and builds may differ in their physics; a difference may be theirs"
+        );
+    }
+    let Verified { steps, calls, unanswered_steps, .. } = verified;
+    match &verified.outcome {
+        Comparison::Same => {
+            println!("  verified: {steps} states over {calls} calls, result and phases are as recorded");
+            if *unanswered_steps > 0 {
+                println!(
+                    "  the last {unanswered_steps} steps belong to a call that was not answered any more"
+                );
+            }
+            true
+        }
+        Comparison::State(Difference { control_step, recorded, again, call }) => {
+            let hash = |hash: &Option<String>| hash.clone().unwrap_or("no such step".into());
+            let by = match call {
+                Some((number, tool)) => format!("in call {number}, {tool}"),
+                None => "before the first call".into(),
+            };
+            let (recorded, again) = (hash(recorded), hash(again));
+            println!("  DIFFERS at step {control_step}, {by}: recorded {recorded}, again {again}");
+            println!("  {steps} states before it are as recorded");
+            false
+        }
+        Comparison::Result { what, recorded, again } => {
+            println!(
+                "  DIFFERS: {what}: recorded {recorded}, again {again}; all {steps} states are as recorded"
+            );
+            false
+        }
+    }
+}
+
+/// Several recordings have a folder each, called as the one that they lie in.
+fn folder_for(folder: &Path, recording: &Path, recordings: usize) -> PathBuf {
+    let own = recording.parent().and_then(Path::file_name);
+    match (recordings, own) {
+        (0 | 1, _) | (_, None) => folder.into(),
+        (_, Some(name)) => folder.join(name),
+    }
+}
+
+fn render(
+    recording: &Recording,
+    plan: &PicturesPlan,
+    folder: &Path,
+) -> Result<(), Box<dyn std::error::Error>> {
+    let bar = ProgressBar::no_length();
+    bar.set_style(ProgressStyle::with_template("  {pos} moments, {elapsed}")?);
+    let Drawn { moments, kept, cameras } = draw_all(recording, plan, folder, &|| bar.inc(1))?;
+    bar.finish_and_clear();
+    println!("  {}: {moments} moments of {cameras} cameras, {kept} of them kept", folder.display());
+    Ok(())
+}

@@ -1,0 +1,51 @@
+//! `tandem report`: what episodes came to, for people and for programs.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use tandem_episodes::assessment::{Assessment, Format, gallery, load};
+use tandem_episodes::write_whole;
+
+use super::Outcome;
+
+/// Report on episodes: rates with intervals, averages, effort, failures, and policies compared on the same seeds.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Folders that `evaluate`, `collect` or `serve` wrote; what they hold of one policy is joined.
+    #[arg(value_name = "DIR", required = true)]
+    folders: Vec<PathBuf>,
+    /// What to write: a page that needs nothing else, Markdown, a line for each rate, all figures, or tables for LaTeX.
+    #[arg(long, default_value = Format::Html.name(), value_parser = format_parser())]
+    format: Format,
+    /// File to write [default: report.FORMAT in the first folder].
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Failures to show pictures of, where episodes were recorded.
+    #[arg(long, value_name = "N", default_value_t = 12)]
+    failures: usize,
+}
+
+/// One of the formats, by name.
+fn format_parser() -> impl TypedValueParser<Value = Format> {
+    let find = |name: String| Format::ALL.into_iter().find(|format| format.name() == name);
+    PossibleValuesParser::new(Format::ALL.map(Format::name))
+        .try_map(move |name| find(name).ok_or("not one of the formats"))
+}
+
+/// Counts and writes.
+pub fn run(args: Args) -> Outcome {
+    let loaded = load(&args.folders)?;
+    let assessment = Assessment::of(&loaded);
+    let failures = match args.format {
+        Format::Html => gallery(&loaded, args.failures),
+        Format::Markdown | Format::Csv | Format::Json | Format::Tex => Vec::new(),
+    };
+    let text = assessment.write(args.format, &failures)?;
+    let default = args.folders.first().map(|folder| folder.join(format!("report.{}", args.format.name())));
+    let path = args.out.or(default).unwrap_or_else(|| "report.html".into());
+    write_whole(&path, text.as_bytes())?;
+    println!("{}: {} episodes", path.display(), loaded.episodes.len());
+    loaded.skipped.iter().for_each(|skipped| eprintln!("left out: {skipped}"));
+    Ok(ExitCode::SUCCESS)
+}
