@@ -58,9 +58,17 @@ pub fn pixel_range() -> Value {
 
 /// `oneOf` of an object that has one of two fields, each given with the type that it has where it is not null.
 pub fn either(one: &str, kind: &str, other: &str, other_kind: &str) -> Value {
-    let has =
-        |field: &str, kind: &str| json!({ "required": [field], "properties": { field: { "type": kind } } });
     json!([has(one, kind), has(other, other_kind)])
+}
+
+/// `allOf` of an object in which at least one of these fields is given, each a list.
+pub fn at_least_one(fields: &[&str]) -> Value {
+    let given: Vec<Value> = fields.iter().map(|field| has(field, "array")).collect();
+    json!([{ "anyOf": given }])
+}
+
+fn has(field: &str, kind: &str) -> Value {
+    json!({ "required": [field], "properties": { field: { "type": kind } } })
 }
 
 /// Says how many control steps a command may have wherever `most_steps` marks that something counts them: as `maximum`, as

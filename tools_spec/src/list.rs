@@ -124,6 +124,7 @@ macro_rules! tools {
         #[derive(Debug, Clone, PartialEq, Serialize)]
         #[serde(untagged)]
         #[allow(missing_docs, reason = "each variant is the reply to the tool of its name")]
+        #[allow(clippy::large_enum_variant, reason = "one reply at a time is on its way")]
         pub enum $reply {
             $( $tool(<$tool as Tool>::Reply), )*
         }

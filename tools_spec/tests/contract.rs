@@ -18,6 +18,8 @@ const REFUSED_KEYWORDS: &[&str] = &[
     "not",
     "prefixItems",
     "uniqueItems",
+    "allOf",
+    "oneOf",
 ];
 
 /// Walks every object schema below `schema`, the schema itself included.
@@ -273,6 +275,12 @@ fn openapi_says_what_is_refused() {
     assert_eq!(field("walk", "/robots/items/properties/vx_m_s/maximum"), 1e6);
     assert_eq!(field("send_joint_chunk", "/robots/items/properties/rows/items/items/minimum"), -1e6);
     assert_eq!(field("query_depth", "/pixels/items/prefixItems/1/maximum"), 239);
+    let whole = |tool: &str| {
+        let path = &document["paths"][format!("/v1/episodes/{{episode_id}}/tools/{tool}")]["post"];
+        path["requestBody"]["content"]["application/json"]["schema"].clone()
+    };
+    assert_eq!(whole("query_depth")["oneOf"][1]["required"], json!(["region"]));
+    assert_eq!(whole("check_reach")["allOf"][0]["anyOf"].as_array().map(Vec::len), Some(4));
     assert_eq!(field("query_depth", "/pixels/maxItems"), 256);
     assert_eq!(field("send_joint_chunk", "/robots/anyOf").as_array().map(Vec::len), Some(50));
     assert_eq!(field("observe", "/robots/uniqueItems"), true);

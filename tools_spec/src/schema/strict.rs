@@ -26,6 +26,7 @@ const DROPPED: &[&str] = &[
     "uniqueItems",
     "contains",
     "not",
+    "allOf",
     // Ours, for schemas of bodies.
     "most_steps",
 ];

@@ -11,6 +11,7 @@ use crate::tool::Tool;
 /// Nothing moves and no steps are spent. Poses are of the wrist links (`left_wrist_yaw_link`, `right_wrist_yaw_link`) in the robot's pelvis
 /// frame: x forward, y left, z up, metres.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(extend("allOf" = limits::at_least_one(&POSES)))]
 #[serde(deny_unknown_fields)]
 pub struct CheckReach {
     /// The robot, as "A".
@@ -29,6 +30,10 @@ pub struct CheckReach {
     #[schemars(extend("contains" = limits::direction()))]
     pub right_quaternion_wxyz: Option<[f64; 4]>,
 }
+
+/// The fields of which at least one has to be given.
+const POSES: [&str; 4] =
+    ["left_position_m", "left_quaternion_wxyz", "right_position_m", "right_quaternion_wxyz"];
 
 impl Tool for CheckReach {
     type Reply = ReachReply;
