@@ -78,7 +78,8 @@ fn averages(policies: &[PolicyReport]) -> Table {
     table.head.extend((0..phases.max().unwrap_or_default()).map(crate::scoring::Phase::number));
     for policy in policies {
         for average in &policy.averages {
-            let tasks = format!("{} of {} robots", average.tasks, average.robots);
+            let plural = if average.tasks == 1 { "" } else { "s" };
+            let tasks = format!("{} task{plural} of {} robots", average.tasks, average.robots);
             let means = average.phases.iter().map(|mean| mean_text(mean.as_ref()));
             table.rows.push([policy.name.clone(), tasks].into_iter().chain(means).collect());
         }

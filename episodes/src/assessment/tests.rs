@@ -179,7 +179,7 @@ fn reports_quote_what_they_are_told() {
         Format::Csv,
         &[
             "\"a<b>&\"\"|_,%\",benchmark,handover,2,p2,transfer,true,cumulative,6,10,0.6,",
-            ",from_its_beginning,1,1,1,0.025",
+            ",from_its_beginning,1,1,1,0.02",
         ],
         &[],
     );

@@ -30,7 +30,7 @@ impl Demonstration {
         let start = recording.checkpoint(phase).map_err(unreadable)?;
         let from_s = start.map_or(f64::INFINITY, |start| start.time_s);
         let steps = recording.steps().map_err(unreadable)?;
-        let later = steps.filter(|step| step.as_ref().map_or(true, |step| step.time_s > from_s));
+        let later = steps.filter(|step| !matches!(step, Ok(step) if step.time_s <= from_s));
         later.collect::<Result<_, _>>().map_err(unreadable)
     }
 }

@@ -131,11 +131,13 @@ impl Reel {
                 let delay = Delay::from_numer_denom_ms(1000, rate_hz);
                 Ok(encoder.encode_frame(image::Frame::from_parts(rgba, 0, 0, delay))?)
             }
-            Reel::Mp4(child) => match &mut child.stdin {
-                // A pipe that is closed early has its reason in what ffmpeg says at the end.
-                Some(pipe) => Ok(drop(pipe.write_all(&frame.rgb))),
-                None => Ok(()),
-            },
+            Reel::Mp4(child) => {
+                if let Some(pipe) = &mut child.stdin {
+                    // A pipe that is closed early has its reason in what ffmpeg says at the end.
+                    let _ = pipe.write_all(&frame.rgb);
+                }
+                Ok(())
+            }
         }
     }
 

@@ -59,7 +59,7 @@ fn kills_lose_nothing_but_the_episode_and_the_picture_under_way() {
         "--tasks",
         "pouring",
         "--seeds",
-        "0-3",
+        "0-2",
         "--protocol",
         "benchmark",
         "--out",
@@ -82,14 +82,14 @@ fn kills_lose_nothing_but_the_episode_and_the_picture_under_way() {
     finish(&play);
     let whole = results();
     assert!(kept.iter().all(|(path, bytes)| whole.get(path) == Some(bytes)));
-    assert!(whole.keys().any(|path| path.ends_with("pouring-3.json")), "{:?}", whole.keys());
+    assert!(whole.keys().any(|path| path.ends_with("pouring-2.json")), "{:?}", whole.keys());
 
     let recording = text(&folder.path().join("demos/episodes/pouring-0/episode.mcap"));
     let verified = finish(&["replay", &recording, "--verify"]);
     assert!(verified.contains("  verified: "), "{verified}");
     let [once, often] = ["once", "often"].map(|name| folder.path().join(name));
     let draw = |out: &str| {
-        ["replay", &recording, "--rate", "25", "--size", "160x120", "--render", out].map(str::to_owned)
+        ["replay", &recording, "--rate", "10", "--size", "64x48", "--render", out].map(str::to_owned)
     };
     let run = |out: &Path| draw(&text(out));
     let arguments = run(&often);
@@ -105,5 +105,5 @@ fn kills_lose_nothing_but_the_episode_and_the_picture_under_way() {
     let arguments = run(&once);
     finish(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
     let [one, other] = [&once, &often].map(|folder| below(files(folder), folder));
-    assert!(one.len() > 600 && one == other, "{} and {} files", one.len(), other.len());
+    assert!(one.len() > 500 && one == other, "{} and {} files", one.len(), other.len());
 }
