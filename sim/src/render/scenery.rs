@@ -3,7 +3,7 @@
 use rapier3d::math::{Pose, Vector};
 
 use super::{Mesh, robot_rgba};
-use crate::mjcf::Geom;
+use crate::mjcf::{Geom, Primitive};
 use crate::{Step, World};
 
 /// Shapes and colours of a world, made once.
@@ -72,7 +72,7 @@ impl Scenery {
         let mut parts: Vec<Part> =
             drawn(world.room()).map(|geom| part(geom, Carrier::Room, geom.rgba, ROOM_ID)).collect();
         for part in &mut parts {
-            part.casts_shadow = top_m(part) < LAMPS_M;
+            part.casts_shadow &= top_m(part) < LAMPS_M;
         }
         let first_robot = ROOM_ID + 1;
         for (robot, id) in (0..world.robots().len()).zip(first_robot..) {
@@ -122,7 +122,8 @@ fn part(geom: &Geom, carrier: Carrier, [r, g, b, _]: [f32; 4], id: u32) -> Part 
         rgb: [r, g, b],
         pattern: if geom.checkered { Pattern::Checker } else { Pattern::Plain },
         id,
-        casts_shadow: true,
+        // Nothing is below a floor.
+        casts_shadow: !matches!(geom.primitive, Primitive::Plane { .. }),
     }
 }
 

@@ -1,18 +1,24 @@
 //! The embedded renderer: a visibility buffer of triangle numbers, shaded afterwards, four samples a pixel.
 
+mod facets;
 mod prepared;
 mod raster;
+mod rows;
 mod shade;
 mod shadow;
 mod srgb;
+mod target;
 mod view;
+
+use pulp::{Arch, Simd, WithSimd};
 
 use super::{Camera, Frame, Placed, Renderer, Scenery};
 use crate::Step;
+use facets::Facets;
 use prepared::Prepared;
-use raster::Target;
 use shadow::ShadowMap;
 use srgb::SrgbTable;
+use target::Target;
 use view::View;
 
 /// Renders on the calling thread. It keeps its buffers, and the shadows of the last state.
@@ -22,7 +28,8 @@ pub(super) struct CpuRenderer {
     /// What the shadows are of.
     placed: Placed,
     shadow: ShadowMap,
-    target: Target,
+    facets: Facets,
+    samples: Target,
     /// One sample a pixel, at its centre: what depth and ids are read from.
     centres: Target,
 }
@@ -34,7 +41,8 @@ impl CpuRenderer {
             srgb: SrgbTable::default(),
             placed: Placed::default(),
             shadow: ShadowMap::default(),
-            target: Target::default(),
+            facets: Facets::default(),
+            samples: Target::default(),
             centres: Target::default(),
         }
     }
@@ -42,26 +50,49 @@ impl CpuRenderer {
 
 impl Renderer for CpuRenderer {
     fn render(&mut self, step: &Step, camera: &Camera) -> Frame {
+        Arch::new().dispatch(Drawing { renderer: self, step, camera })
+    }
+}
+
+/// A picture to draw. It is compiled once more for processors with wide registers, with everything that is inlined into it;
+/// its bits are the same.
+struct Drawing<'a> {
+    renderer: &'a mut CpuRenderer,
+    step: &'a Step,
+    camera: &'a Camera,
+}
+
+impl WithSimd for Drawing<'_> {
+    type Output = Frame;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Frame {
+        self.renderer.draw(simd, self.step, self.camera)
+    }
+}
+
+impl CpuRenderer {
+    #[inline(always)]
+    fn draw<S: Simd>(&mut self, simd: S, step: &Step, camera: &Camera) -> Frame {
         let placed = self.prepared.scenery.place(step);
         if self.placed != placed {
-            self.shadow.draw(&self.prepared.scenery, &placed);
+            self.shadow.draw(simd, &self.prepared, &placed);
+            self.facets.reset(&self.prepared, &placed);
             self.placed = placed;
         }
-        self.target.draw(&mut self.centres, &self.prepared, &self.placed, camera);
-        let view = View::new(&self.prepared, &self.placed, &self.target, &self.shadow, camera);
-        let pixels = (camera.width * camera.height) as usize;
-        let mut rgb = Vec::with_capacity(pixels * 3);
-        for y in 0..camera.height as usize {
-            for x in 0..camera.width as usize {
-                rgb.extend(self.srgb.encode(view.pixel(x, y)));
-            }
-        }
-        Frame {
+        target::draw(simd, &mut self.samples, &mut self.centres, &self.prepared, &self.placed, camera);
+        let view = View::new(&self.prepared, &self.samples, &self.shadow, camera);
+        let mut frame = Frame {
             width: camera.width,
             height: camera.height,
-            rgb,
-            depth_m: self.centres.nearness_1_m.iter().map(|nearness| 1.0 / nearness).collect(),
-            ids: self.centres.triangle.iter().map(|triangle| view.id(*triangle)).collect(),
+            rgb: view.rgb(&mut self.facets, &self.srgb),
+            depth_m: Vec::with_capacity((camera.width * camera.height) as usize),
+            ids: Vec::with_capacity((camera.width * camera.height) as usize),
+        };
+        for row in 0..camera.height as usize {
+            frame.depth_m.extend(self.centres.nearness_1_m(row).iter().map(|nearness| 1.0 / nearness));
+            frame.ids.extend(self.centres.triangles(row).iter().map(|triangle| self.prepared.id(*triangle)));
         }
+        frame
     }
 }

@@ -3,6 +3,7 @@
 use rapier3d::math::{Matrix, Vector};
 
 use super::srgb::linear;
+use super::target::NOTHING;
 use crate::render::{Mesh, Scenery};
 
 pub(super) struct Prepared {
@@ -12,7 +13,7 @@ pub(super) struct Prepared {
     /// Of each triangle.
     pub faces: Vec<Face>,
     /// What a picture's ids show for each triangle.
-    pub ids: Vec<u32>,
+    ids: Vec<u32>,
     /// Centre and radius of a sphere around each part, in its mesh's frame.
     pub bounds: Vec<(Vector, f32)>,
     /// Of each part.
@@ -20,6 +21,7 @@ pub(super) struct Prepared {
 }
 
 /// A triangle as shading wants it, in its mesh's frame.
+#[derive(Clone, Copy)]
 pub(super) struct Face {
     pub part: u32,
     pub corner_m: Vector,
@@ -45,6 +47,14 @@ impl Prepared {
             bounds: scenery.parts.iter().map(|part| part.mesh.bounds()).collect(),
             linear_rgb: scenery.parts.iter().map(|part| linear(part.rgb)).collect(),
             scenery,
+        }
+    }
+
+    /// What a picture's ids show where it shows a triangle.
+    pub(super) fn id(&self, triangle: u32) -> u32 {
+        match triangle {
+            NOTHING => 0,
+            _ => self.ids[triangle as usize],
         }
     }
 }

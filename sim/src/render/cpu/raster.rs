@@ -1,196 +1,233 @@
-//! Rasteriser: for each sample of a picture, the nearest triangle and how near it is.
+//! Rasteriser: which samples of a picture lie in a triangle, and how near it is there.
 
-use std::ops::Range;
+use pulp::Simd;
 
-use rapier3d::math::{Pose, Vector};
+use super::rows::{Grid, LANES};
 
-use super::prepared::Prepared;
-use crate::render::camera::NEAR_M;
-use crate::render::{Camera, Placed};
-
-/// Samples a pixel along each axis; a power of two, so that dividing by it is exact.
-pub(super) const SAMPLES: usize = 2;
-/// Marks a sample at which nothing is.
-pub(super) const NOTHING: u32 = u32::MAX;
-
-/// Nearest surface per sample. `nearness_1_m` is 1 / depth, which is linear over a triangle's picture.
-#[derive(Default)]
-pub(super) struct Target {
-    pub width: usize,
-    pub height: usize,
-    pub nearness_1_m: Vec<f32>,
-    pub triangle: Vec<u32>,
+/// The picture of a triangle that faces the camera.
+///
+/// Its plane and the edges of large ones are f64: a floor triangle clipped at the near plane has corners 1e4 pixels off the
+/// picture, and f32 gradients would err by centimetres. In f64 the edge that two triangles share also comes out
+/// the same for both, to the bit, and leaves no gap.
+pub(super) struct Outline {
+    /// Picture coordinates.
+    corners: [[f64; 2]; 3],
+    /// Nearness at the first corner, and how it changes.
+    nearness: f64,
+    along_x: f64,
+    along_y: f64,
 }
 
-impl Target {
-    /// Fills the target, [`SAMPLES`] a pixel along each axis, and `centres`, one a pixel, with all that `camera` sees.
-    pub(super) fn draw(
-        &mut self,
-        centres: &mut Target,
-        prepared: &Prepared,
-        placed: &Placed,
-        camera: &Camera,
-    ) {
-        let (width, height) = (camera.width as usize, camera.height as usize);
-        self.reset(width * SAMPLES, height * SAMPLES);
-        centres.reset(width, height);
-        let mut fill = |corners: [[f32; 3]; 3], number: u32| {
-            self.fill(corners, number);
-            let centred = |[x, y, nearness]: [f32; 3]| [x / SAMPLES as f32, y / SAMPLES as f32, nearness];
-            centres.fill(corners.map(centred), number);
-        };
-        let camera_from_world = camera.world_from_camera.inverse();
-        let focal = camera.focal_px() * SAMPLES as f32;
-        let [cx, cy] = [width, height].map(|pixels| (pixels * SAMPLES) as f32 * 0.5);
-        let screen = |p: Vector| {
-            let nearness = -1.0 / p.z;
-            [cx + p.x * focal * nearness, cy - p.y * focal * nearness, nearness]
-        };
-        let mut corners = Vec::new();
-        for (number, part) in prepared.scenery.parts.iter().enumerate() {
-            let camera_from_mesh = camera_from_world * placed.world_from_mesh[number];
-            if !in_view(prepared.bounds[number], camera_from_mesh, cx / focal, cy / focal) {
-                continue;
+/// The samples of a grid that a triangle can reach, the last ones included.
+#[derive(Clone, Copy)]
+struct Reach {
+    x0: u32,
+    x1: u32,
+    y0: u32,
+    y1: u32,
+}
+
+/// Where a line crosses a height: `x = slope * y + offset`.
+#[derive(Clone, Copy)]
+struct Edge {
+    slope: f64,
+    offset: f64,
+}
+
+/// The samples of a triangle in one row of a grid: nearness at the first, and from each to the next.
+#[derive(Clone, Copy)]
+struct Span {
+    row: usize,
+    first: u32,
+    end: u32,
+    start: f32,
+    step: f32,
+}
+
+/// Rows of a large triangle that are measured at once.
+const ROWS: usize = 4;
+/// A triangle is small if it is no higher, and reaches into no more than two blocks of each row.
+const SMALL_ROWS: u32 = 16;
+/// So far beyond its edges, in parts of their lengths, a small triangle is drawn: f32 then leaves no gaps.
+const OVERLAP: f32 = 1e-5;
+const LANE: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+
+impl Outline {
+    /// Corners are picture coordinates and nearness, counter-clockwise as the camera sees them; `None` for a back face.
+    #[inline(always)]
+    pub(super) fn new(corners: [[f32; 3]; 3]) -> Option<Outline> {
+        let [[ax, ay, an], [bx, by, bn], [cx, cy, cn]] = corners.map(|p| p.map(f64::from));
+        let (ux, uy, un, vx, vy, vn) = (bx - ax, by - ay, bn - an, cx - ax, cy - ay, cn - an);
+        // Rows count downwards, so that what is counter-clockwise has a negative area.
+        let area = ux * vy - uy * vx;
+        if area >= 0.0 || !area.is_finite() {
+            return None;
+        }
+        let per_area = 1.0 / area;
+        Some(Outline {
+            corners: [[ax, ay], [bx, by], [cx, cy]],
+            nearness: an,
+            along_x: (un * vy - vn * uy) * per_area,
+            along_y: (vn * ux - un * vx) * per_area,
+        })
+    }
+
+    /// Calls `each` for all vectors of samples that the triangle reaches into, with their number in the grid and the nearness
+    /// of their samples: 0 for those outside of it.
+    #[inline(always)]
+    pub(super) fn draw<S: Simd>(&self, simd: S, grid: Grid, each: impl FnMut(usize, S::f32s)) {
+        let Some(reach) = self.reach(grid) else { return };
+        let blocks = reach.x1 / LANES as u32 - reach.x0 / LANES as u32;
+        if blocks <= 1 && reach.y1 - reach.y0 < SMALL_ROWS {
+            self.draw_small(simd, grid, reach, each);
+        } else {
+            self.draw_large(simd, grid, reach, each);
+        }
+    }
+
+    #[inline(always)]
+    fn reach(&self, grid: Grid) -> Option<Reach> {
+        let [[ax, ay], [bx, by], [cx, cy]] = self.corners;
+        let per_pitch = 1.0 / grid.pitch;
+        let first = |low: f64| larger(low * per_pitch - 0.5, 0.0).ceil();
+        let last = |high: f64, count: usize| smaller(high * per_pitch - 0.5, (count - 1) as f64).floor();
+        let x0 = first(smaller(smaller(ax, bx), cx));
+        let x1 = last(larger(larger(ax, bx), cx), grid.width);
+        let y0 = first(smaller(smaller(ay, by), cy));
+        let y1 = last(larger(larger(ay, by), cy), grid.height);
+        let some = x0 <= x1 && y0 <= y1;
+        some.then(|| Reach { x0: whole(x0), x1: whole(x1), y0: whole(y0), y1: whole(y1) })
+    }
+
+    /// Looks at each sample: an edge from p to q has those on its inner side where
+    /// `(x - px) (qy - py) - (y - py) (qx - px) >= 0`.
+    #[inline(always)]
+    fn draw_small<S: Simd>(&self, simd: S, grid: Grid, reach: Reach, mut each: impl FnMut(usize, S::f32s)) {
+        let lanes = S::F32_LANES;
+        let (first, last) = (reach.x0 as usize / lanes, reach.x1 as usize / lanes);
+        let y = (f64::from(reach.y0) + 0.5) * grid.pitch;
+        let nothing = simd.splat_f32s(0.0);
+        for vector in first..=last {
+            let x = ((vector * lanes) as f64 + 0.5) * grid.pitch;
+            // What changes from sample to sample, from row to row, and what it is at the first sample of the first row.
+            let linear = |across: f32, start: f32| {
+                let lane = S::as_simd_f32s(&LANE).0[0];
+                simd.add_f32s(simd.splat_f32s(start), simd.mul_f32s(simd.splat_f32s(across), lane))
+            };
+            let pitch = grid.pitch as f32;
+            let edge = |from: usize, to: usize| {
+                let ([px, py], [qx, qy]) = (self.corners[from], self.corners[to]);
+                let (right, down) = ((qx - px) as f32, (qy - py) as f32);
+                let overlap = OVERLAP * (right.abs() + down.abs());
+                let start = (x - px) as f32 * down - (y - py) as f32 * right + overlap;
+                (linear(down * pitch, start), simd.splat_f32s(-right * pitch))
+            };
+            let edges = [edge(0, 1), edge(1, 2), edge(2, 0)];
+            let [mut a, mut b, mut c] = edges.map(|(start, _)| start);
+            let [down_a, down_b, down_c] = edges.map(|(_, down)| down);
+            let [ax, ay] = self.corners[0];
+            let start = self.nearness + self.along_x * (x - ax) + self.along_y * (y - ay);
+            let mut nearness = linear((self.along_x * grid.pitch) as f32, start as f32);
+            let down = simd.splat_f32s((self.along_y * grid.pitch) as f32);
+            for row in reach.y0..=reach.y1 {
+                let inside = simd.greater_than_or_equal_f32s(simd.min_f32s(a, simd.min_f32s(b, c)), nothing);
+                let index = row as usize * (grid.stride() / lanes) + vector;
+                each(index, simd.select_f32s(inside, nearness, nothing));
+                (a, b, c) = (simd.add_f32s(a, down_a), simd.add_f32s(b, down_b), simd.add_f32s(c, down_c));
+                nearness = simd.add_f32s(nearness, down);
             }
-            corners.clear();
-            corners.extend(part.mesh.vertices.iter().map(|vertex| camera_from_mesh * vertex.position_m));
-            for (number, triangle) in (prepared.first[number]..).zip(&part.mesh.triangles) {
-                let p = triangle.map(|corner| corners[corner as usize]);
-                if p.iter().all(|p| p.z < -NEAR_M) {
-                    fill(p.map(screen), number);
-                } else if p.iter().any(|p| p.z < -NEAR_M) {
-                    let (clipped, count) = clip_near(p);
-                    for i in 1..count - 1 {
-                        fill([clipped[0], clipped[i], clipped[i + 1]].map(screen), number);
-                    }
+        }
+    }
+
+    /// Measures where each row begins and ends.
+    #[inline(always)]
+    fn draw_large<S: Simd>(&self, simd: S, grid: Grid, reach: Reach, mut each: impl FnMut(usize, S::f32s)) {
+        let (left, right) = self.edges();
+        let per_pitch = 1.0 / grid.pitch;
+        let (x0, x1) = (f64::from(reach.x0), f64::from(reach.x1));
+        let [ax, ay] = self.corners[0];
+        for top in (reach.y0..=reach.y1).step_by(ROWS) {
+            let (mut firsts, mut ends, mut starts) = ([0; ROWS], [0; ROWS], [0.0; ROWS]);
+            for row in 0..ROWS {
+                let y = (f64::from(top + row as u32) + 0.5) * grid.pitch;
+                let x = |edge: Edge| (edge.slope * y + edge.offset) * per_pitch - 0.5;
+                let first = smaller(larger(larger(x(left[0]), x(left[1])), x0).ceil(), x1 + 1.0);
+                let end = larger(smaller(smaller(x(right[0]), x(right[1])), x1).floor() + 1.0, x0);
+                let start = self.along_x * ((first + 0.5) * grid.pitch - ax) + self.along_y * (y - ay);
+                (firsts[row], ends[row]) = (whole(first), whole(end));
+                starts[row] = (self.nearness + start) as f32;
+            }
+            for row in 0..ROWS.min((reach.y1 - top + 1) as usize) {
+                if firsts[row] < ends[row] {
+                    let (first, end, start) = (firsts[row], ends[row], starts[row]);
+                    let step = (self.along_x * grid.pitch) as f32;
+                    Span { row: top as usize + row, first, end, start, step }.draw(simd, grid, &mut each);
                 }
             }
         }
     }
 
-    fn reset(&mut self, width: usize, height: usize) {
-        (self.width, self.height) = (width, height);
-        self.nearness_1_m.clear();
-        self.nearness_1_m.resize(width * height, 0.0);
-        self.triangle.clear();
-        self.triangle.resize(width * height, NOTHING);
-    }
-
-    fn fill(&mut self, corners: [[f32; 3]; 3], number: u32) {
-        for_spans(corners, self.width, self.height, |span, start, step| {
-            nearest(&mut self.nearness_1_m[span.clone()], &mut self.triangle[span], start, step, number);
-        });
-    }
-}
-
-/// Puts a triangle into those samples of a row that it is the nearest of. Nothing branches, and the slices are arguments,
-/// known not to overlap: so several samples are done at once.
-fn nearest(nearness_1_m: &mut [f32], triangle: &mut [u32], start_1_m: f32, step_1_m: f32, number: u32) {
-    for (i, (nearest, owner)) in nearness_1_m.iter_mut().zip(triangle).enumerate() {
-        let nearness = start_1_m + step_1_m * i as i32 as f32;
-        // All bits of it are set, or none.
-        let nearer = u32::from(nearness > *nearest).wrapping_neg();
-        *nearest = nearest.max(nearness);
-        *owner = (number & nearer) | (*owner & !nearer);
-    }
-}
-
-/// Calls `fill` for each row of samples in a triangle, which is given by picture coordinates and nearness, with their
-/// indices, the nearness of the first and the step to the next. Back faces are left out.
-///
-/// Everything but the samples is f64: a floor triangle clipped at the near plane has corners 1e4 pixels off the
-/// picture, and f32 gradients would err by centimetres. In f64 the edge that two triangles share also comes out
-/// the same for both, to the bit, and leaves no gap.
-pub(super) fn for_spans(
-    corners: [[f32; 3]; 3],
-    width: usize,
-    height: usize,
-    mut fill: impl FnMut(Range<usize>, f32, f32),
-) {
-    let [[ax, ay, an], [bx, by, bn], [cx, cy, cn]] = corners.map(|p| p.map(f64::from));
-    let (ux, uy, un, vx, vy, vn) = (bx - ax, by - ay, bn - an, cx - ax, cy - ay, cn - an);
-    // Rows count downwards, so that what is counter-clockwise has a negative area.
-    let area = ux * vy - uy * vx;
-    if area >= 0.0 || !area.is_finite() {
-        return;
-    }
-    let x0 = ceil(ax.min(bx).min(cx) - 0.5).max(0);
-    let x1 = floor(ax.max(bx).max(cx) - 0.5).min(width as i32 - 1);
-    let y0 = ceil(ay.min(by).min(cy) - 0.5).max(0);
-    let y1 = floor(ay.max(by).max(cy) - 0.5).min(height as i32 - 1);
-    if x0 > x1 || y0 > y1 {
-        return;
-    }
-    let along_x = (un * vy - vn * uy) / area;
-    let along_y = (vn * ux - un * vx) / area;
-    // Inside where x * ex + y * ey + e0 >= 0 for all three edges.
-    let edge = |px: f64, py: f64, qx: f64, qy: f64| {
-        let ex = qy - py;
-        (ex, 1.0 / ex, px - qx, qx * py - px * qy)
-    };
-    let edges = [edge(ax, ay, bx, by), edge(bx, by, cx, cy), edge(cx, cy, ax, ay)];
-    for row in y0..=y1 {
-        let y = f64::from(row) + 0.5;
-        // Compared as they are: both are rounded once, not for each edge.
-        let (mut from, mut to) = (f64::from(x0), f64::from(x1));
-        for (ex, per_ex, ey, e0) in edges {
-            let rest = ey * y + e0;
-            let x = -rest * per_ex - 0.5;
-            if ex > 0.0 {
-                from = if x > from { x } else { from };
-            } else if ex < 0.0 {
-                to = if x < to { x } else { to };
-            } else if rest < 0.0 {
-                to = -1.0;
+    /// What is inside lies to the right of the first two, and to the left of the others.
+    #[inline(always)]
+    fn edges(&self) -> ([Edge; 2], [Edge; 2]) {
+        let mut left = [Edge { slope: 0.0, offset: f64::NEG_INFINITY }; 2];
+        let mut right = [Edge { slope: 0.0, offset: f64::INFINITY }; 2];
+        let (mut lefts, mut rights) = (0, 0);
+        for (from, to) in [(0, 1), (1, 2), (2, 0)] {
+            let ([px, py], [qx, qy]) = (self.corners[from], self.corners[to]);
+            // A level edge bounds no row.
+            let down = qy - py;
+            let per_down = 1.0 / down;
+            let edge = Edge { slope: (qx - px) * per_down, offset: (px * qy - qx * py) * per_down };
+            if down > 0.0 {
+                left[lefts] = edge;
+                lefts += 1;
+            } else if down < 0.0 {
+                right[rights] = edge;
+                rights += 1;
             }
         }
-        let (left, right) = (ceil(from), floor(to));
-        if left > right {
-            continue;
-        }
-        let start = an + along_x * (f64::from(left) + 0.5 - ax) + along_y * (y - ay);
-        let line = row as usize * width;
-        fill(line + left as usize..line + right as usize + 1, start as f32, along_x as f32);
+        (left, right)
     }
 }
 
-/// Whether a mesh's bounding sphere reaches into the pyramid of view, given by the tangents of its half angles.
-fn in_view((centre, radius): (Vector, f32), camera_from_mesh: Pose, x_tan: f32, y_tan: f32) -> bool {
-    let c = camera_from_mesh * centre;
-    let inside = |across: f32, tan: f32| across.abs() + c.z * tan <= radius * (1.0 + tan * tan).sqrt();
-    c.z - radius < -NEAR_M && inside(c.x, x_tan) && inside(c.y, y_tan)
-}
-
-/// The part of a triangle beyond the near plane: three or four corners.
-fn clip_near(corners_m: [Vector; 3]) -> ([Vector; 4], usize) {
-    let visible = |p: Vector| p.z < -NEAR_M;
-    let mut kept = [Vector::ZERO; 4];
-    let mut count = 0;
-    for i in 0..3 {
-        let (a, b) = (corners_m[i], corners_m[(i + 1) % 3]);
-        if visible(a) {
-            kept[count] = a;
-            count += 1;
-        }
-        if visible(a) != visible(b) {
-            // Always from the visible end, so that neighbours cut their common edge at the same point.
-            let (from, to) = if visible(a) { (a, b) } else { (b, a) };
-            kept[count] = from + (to - from) * ((-NEAR_M - from.z) / (to.z - from.z));
-            // Rounding must not put the corner back in front of the plane.
-            kept[count].z = -NEAR_M;
-            count += 1;
+impl Span {
+    #[inline(always)]
+    fn draw<S: Simd>(self, simd: S, grid: Grid, each: &mut impl FnMut(usize, S::f32s)) {
+        let lanes = S::F32_LANES;
+        let (first, last) = (self.first as usize / lanes, (self.end as usize - 1) / lanes);
+        let nothing = simd.splat_f32s(0.0);
+        let (start, step) = (simd.splat_f32s(self.start), simd.splat_f32s(self.step));
+        let length = simd.splat_f32s((self.end - self.first) as f32);
+        let before = simd.splat_f32s(self.first as f32 - (first * lanes) as f32);
+        // Of each sample, how far it is from the first of the span.
+        let mut offset = simd.sub_f32s(S::as_simd_f32s(&LANE).0[0], before);
+        for vector in first..=last {
+            let inside = simd.and_m32s(
+                simd.greater_than_or_equal_f32s(offset, nothing),
+                simd.less_than_f32s(offset, length),
+            );
+            let nearness = simd.add_f32s(start, simd.mul_f32s(step, offset));
+            each(self.row * (grid.stride() / lanes) + vector, simd.select_f32s(inside, nearness, nothing));
+            offset = simd.add_f32s(offset, simd.splat_f32s(lanes as f32));
         }
     }
-    (kept, count)
 }
 
-/// As `f64::floor`, which without SSE 4.1 is a call; clamped to the range of `i32`.
-pub(super) fn floor(value: f64) -> i32 {
-    let truncated = value as i32;
-    if f64::from(truncated) > value { truncated.saturating_sub(1) } else { truncated }
+/// As `f64::max` and `f64::min`, which care for what is no number.
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
-fn ceil(value: f64) -> i32 {
-    let truncated = value as i32;
-    if f64::from(truncated) < value { truncated.saturating_add(1) } else { truncated }
+#[inline(always)]
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// A number that is whole and not negative. It becomes the lowest bits of the sum; a cast would look at each for itself.
+#[inline(always)]
+fn whole(value: f64) -> u32 {
+    const ALL_BITS_WHOLE: f64 = (1u64 << 52) as f64;
+    (value + ALL_BITS_WHOLE).to_bits() as u32
 }

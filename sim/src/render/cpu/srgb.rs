@@ -22,6 +22,7 @@ impl Default for SrgbTable {
 }
 
 impl SrgbTable {
+    #[inline(always)]
     pub(super) fn encode(&self, colour: Vector) -> [u8; 3] {
         let index = colour.clamp(Vector::ZERO, Vector::ONE) * TABLE_LAST + 0.5;
         index.to_array().map(|i| self.0[usize::from(i as u16)])

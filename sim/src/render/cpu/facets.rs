@@ -1,0 +1,69 @@
+//! Triangles as shading wants them in one state of the world.
+
+use rapier3d::math::{Matrix, Vector};
+
+use super::prepared::{Face, Prepared};
+use crate::render::{Pattern, Placed};
+
+/// The triangles that have been seen since the world last moved: most never are, and those that are in many pixels.
+#[derive(Default)]
+pub(super) struct Facets {
+    /// Rotation and translation from each part's mesh to the world. Matrices, for they turn a vector fastest.
+    world_from_mesh: Vec<(Matrix, Vector)>,
+    /// Of each triangle.
+    facets: Vec<Option<Facet>>,
+}
+
+/// A triangle in the world.
+#[derive(Clone, Copy)]
+pub(super) struct Facet {
+    /// The normal at a point p of the triangle is `normal + bend * p`.
+    normal: Vector,
+    bend: Option<Matrix>,
+    pub linear_rgb: Vector,
+    pub pattern: Pattern,
+}
+
+impl Facets {
+    /// Forgets what was seen before the world was `placed` like this.
+    pub(super) fn reset(&mut self, prepared: &Prepared, placed: &Placed) {
+        let poses = placed.world_from_mesh.iter();
+        self.world_from_mesh.clear();
+        self.world_from_mesh.extend(poses.map(|pose| (Matrix::from_quat(pose.rotation), pose.translation)));
+        self.facets.clear();
+        self.facets.resize(prepared.faces.len(), None);
+    }
+
+    #[inline(always)]
+    pub(super) fn get(&mut self, prepared: &Prepared, triangle: u32) -> &Facet {
+        let world_from_mesh = &self.world_from_mesh;
+        self.facets[triangle as usize]
+            .get_or_insert_with(|| Facet::new(prepared, world_from_mesh, &prepared.faces[triangle as usize]))
+    }
+}
+
+impl Facet {
+    /// The normal at a point p, of a mesh whose frame is the world: n + B (p - corner).
+    fn new(prepared: &Prepared, world_from_mesh: &[(Matrix, Vector)], face: &Face) -> Facet {
+        let part = face.part as usize;
+        let (rotation, translation_m) = world_from_mesh[part];
+        let bend = face.bend_1_m.map(|bend_1_m| rotation * bend_1_m * rotation.transpose());
+        let corner_m = rotation * face.corner_m + translation_m;
+        let at_origin = bend.map_or(Vector::ZERO, |bend| bend * corner_m);
+        Facet {
+            normal: rotation * face.normal - at_origin,
+            bend,
+            linear_rgb: prepared.linear_rgb[part],
+            pattern: prepared.scenery.parts[part].pattern,
+        }
+    }
+
+    /// Of any length.
+    #[inline(always)]
+    pub(super) fn normal(&self, point_m: Vector) -> Vector {
+        match self.bend {
+            None => self.normal,
+            Some(bend) => self.normal + bend * point_m,
+        }
+    }
+}
