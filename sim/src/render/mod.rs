@@ -7,8 +7,10 @@ mod accents;
 mod camera;
 mod cameras;
 mod cpu;
+mod light;
 mod mesh;
 mod png;
+mod prepared;
 mod scenery;
 
 pub use accents::robot_rgba;

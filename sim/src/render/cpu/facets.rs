@@ -2,7 +2,7 @@
 
 use rapier3d::math::{Matrix, Vector};
 
-use super::prepared::{Face, Prepared};
+use crate::render::prepared::{Face, Prepared};
 use crate::render::{Pattern, Placed};
 
 /// The triangles that have been seen since the world last moved: most never are, and those that are in many pixels.

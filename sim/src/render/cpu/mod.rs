@@ -1,7 +1,6 @@
 //! The embedded renderer: a visibility buffer of triangle numbers, shaded afterwards, four samples a pixel.
 
 mod facets;
-mod prepared;
 mod raster;
 mod rows;
 mod shade;
@@ -12,10 +11,10 @@ mod view;
 
 use pulp::{Arch, Simd, WithSimd};
 
+use super::prepared::Prepared;
 use super::{Camera, Frame, Placed, Renderer, Scenery};
 use crate::Step;
 use facets::Facets;
-use prepared::Prepared;
 use shadow::ShadowMap;
 use srgb::SrgbTable;
 use target::Target;
@@ -25,7 +24,7 @@ use view::View;
 pub(super) struct CpuRenderer {
     prepared: Prepared,
     srgb: SrgbTable,
-    /// What the shadows are of.
+    /// What shadow and facets are of.
     placed: Placed,
     shadow: ShadowMap,
     facets: Facets,

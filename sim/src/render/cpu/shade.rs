@@ -3,18 +3,11 @@
 use rapier3d::math::Vector;
 
 use super::rows::LANES;
-use super::shadow::{ShadowMap, TO_SUN};
+use super::shadow::ShadowMap;
 use crate::render::Pattern;
-
-const SUN: Vector = Vector::new(0.80, 0.77, 0.72);
-const FROM_BELOW: Vector = Vector::new(0.20, 0.19, 0.18);
-const FROM_ABOVE: Vector = Vector::new(0.40, 0.42, 0.45);
-const LAMP: f32 = 0.15;
-const HIGHLIGHT: f32 = 0.15;
-/// Linear.
-pub(super) const SKY: Vector = Vector::new(0.45, 0.55, 0.70);
-const CHECKER_DARK: f32 = 0.72;
-const CHECKER_PER_M: f32 = 2.0;
+use crate::render::light::{
+    CHECKER_DARK, CHECKER_PER_M, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, SUN, TO_SUN,
+};
 
 /// As many points as are shaded together: enough for a loop to be worth its beginning, few enough to stay near the processor.
 pub(super) const BATCH: usize = 64;
@@ -82,8 +75,9 @@ impl Surfaces {
         }
     }
 
-    pub(super) fn is_full(&self) -> bool {
-        self.count == BATCH
+    /// How many more can be pushed.
+    pub(super) fn room(&self) -> usize {
+        BATCH - self.count
     }
 
     #[inline(always)]
@@ -105,8 +99,7 @@ impl Surfaces {
             self.face(i, shadow);
         }
         for i in 0..count {
-            self.sunlit[i] =
-                if self.facing_sun[i] > 0.0 { shadow.sunlit(self.texel.get(i)) } else { 0.0 };
+            self.sunlit[i] = if self.facing_sun[i] > 0.0 { shadow.sunlit(self.texel.get(i)) } else { 0.0 };
         }
         for i in 0..whole {
             self.light(i);

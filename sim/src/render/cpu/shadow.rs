@@ -5,20 +5,12 @@ use std::f32::consts::SQRT_2;
 use pulp::Simd;
 use rapier3d::math::Vector;
 
-use super::prepared::Prepared;
 use super::raster::Outline;
 use super::rows::{Grid, LANES, Rows};
 use crate::render::Placed;
+use crate::render::light::{BIAS_M, NORMAL_OFFSET_M, SunMap, TEXELS, TO_SUN, sun_map};
+use crate::render::prepared::Prepared;
 
-/// Direction to the sun; high, so that hands over a counter cast their shadow on it.
-pub(super) const TO_SUN: Vector = Vector::new(-0.306_186_2, 0.353_553_4, 0.883_883_5);
-/// Texels along each side: 2.4 mm at a focus of 1.25 m, so that fingers cast shadows.
-const TEXELS: usize = 1024;
-/// The sun's camera stands this far from the focus.
-const DISTANCE_M: f32 = 8.0;
-/// A surface does not shade itself: it is looked up this far along its normal, and this much nearer to the sun.
-const NORMAL_OFFSET_M: f32 = 0.006;
-const BIAS_M: f32 = 0.004;
 /// Texels along each side of a cell: what is nearer than all of a cell is in the sun there, without a look at its texels.
 const CELL: usize = LANES;
 
@@ -28,32 +20,31 @@ pub(super) struct ShadowMap {
     nearness_m: Rows<f32>,
     /// Least and greatest nearness of each cell, row by row.
     cells_m: Vec<[f32; 2]>,
-    /// Column, row and nearness are each a scalar product with a point of the world, and a number more.
-    map_from_world: Map,
+    map_from_world: SunMap,
 }
-
-type Map = [(Vector, f32); 3];
 
 impl ShadowMap {
     /// Draws the shadows of everything that casts one.
     #[inline(always)]
     pub(super) fn draw<S: Simd>(&mut self, simd: S, prepared: &Prepared, placed: &Placed) {
         let radius_m = prepared.scenery.focus_radius_m;
-        self.map_from_world = map_from_world(placed.focus_m, radius_m);
+        self.map_from_world = sun_map(placed.focus_m, radius_m);
         let grid = Grid { width: TEXELS, height: TEXELS, pitch: 1.0 };
         self.nearness_m.reset(grid, 0.0);
         let nearest = S::as_mut_simd_f32s(self.nearness_m.all_mut()).0;
         let mut corners = Vec::new();
         let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).zip(&prepared.bounds);
-        for ((part, world_from_mesh), (centre_m, around_m)) in parts.filter(|((part, _), _)| part.casts_shadow) {
+        for ((part, world_from_mesh), (centre_m, around_m)) in
+            parts.filter(|((part, _), _)| part.casts_shadow)
+        {
             let from_focus_m = *world_from_mesh * *centre_m - placed.focus_m;
             if from_focus_m.reject_from_normalized(TO_SUN).length() > radius_m * SQRT_2 + around_m {
                 continue;
             }
             let to_mesh = world_from_mesh.rotation.inverse();
-            let map_from_mesh = self.map_from_world.map(|(axis, constant)| {
-                (to_mesh * axis, constant + axis.dot(world_from_mesh.translation))
-            });
+            let map_from_mesh = self
+                .map_from_world
+                .map(|(axis, constant)| (to_mesh * axis, constant + axis.dot(world_from_mesh.translation)));
             corners.clear();
             corners.extend(part.mesh.vertices.iter().map(|vertex| place(map_from_mesh, vertex.position_m)));
             for triangle in &part.mesh.triangles {
@@ -86,7 +77,10 @@ impl ShadowMap {
                 }
             }
             self.cells_m.extend(least.iter().zip(&greatest).map(|(least, greatest)| {
-                [least.iter().copied().fold(f32::INFINITY, f32::min), greatest.iter().copied().fold(0.0, f32::max)]
+                [
+                    least.iter().copied().fold(f32::INFINITY, f32::min),
+                    greatest.iter().copied().fold(0.0, f32::max),
+                ]
             }));
         }
     }
@@ -143,16 +137,8 @@ impl ShadowMap {
     }
 }
 
-fn map_from_world(focus_m: Vector, radius_m: f32) -> Map {
-    let half = 0.5 * TEXELS as f32;
-    let right = Vector::Z.cross(TO_SUN).normalize() * (half / radius_m);
-    let down = TO_SUN.cross(right) * -1.0;
-    let about_focus = |axis: Vector, at_focus: f32| (axis, at_focus - axis.dot(focus_m));
-    [about_focus(right, half), about_focus(down, half), about_focus(TO_SUN, DISTANCE_M)]
-}
-
 /// Where a point is on the map: column and row, counted from its corner, and nearness.
 #[inline(always)]
-fn place(map: Map, point_m: Vector) -> [f32; 3] {
+fn place(map: SunMap, point_m: Vector) -> [f32; 3] {
     map.map(|(axis, constant)| axis.dot(point_m) + constant)
 }

@@ -3,16 +3,12 @@
 use pulp::Simd;
 use rapier3d::math::{Matrix, Pose, Vector};
 
-use super::prepared::Prepared;
 use super::raster::Outline;
 use super::rows::{Grid, Rows};
 use crate::render::camera::NEAR_M;
+use crate::render::light::SAMPLES;
+use crate::render::prepared::{NOTHING, Prepared};
 use crate::render::{Camera, Placed};
-
-/// Samples a pixel along each axis; a power of two, so that dividing by it is exact.
-pub(super) const SAMPLES: usize = 2;
-/// Marks a sample at which nothing is.
-pub(super) const NOTHING: u32 = u32::MAX;
 
 /// Nearest surface per sample. `nearness_1_m` is 1 / depth, which is linear over a triangle's picture.
 #[derive(Default)]
@@ -62,7 +58,13 @@ pub(super) fn draw<S: Simd>(
             } else if visible != [false; 3] {
                 let (clipped, count) = clip_near(corners.map(|(corner_m, _)| corner_m));
                 for i in 1..count - 1 {
-                    fill(simd, samples, centres, [clipped[0], clipped[i], clipped[i + 1]].map(screen), number);
+                    fill(
+                        simd,
+                        samples,
+                        centres,
+                        [clipped[0], clipped[i], clipped[i + 1]].map(screen),
+                        number,
+                    );
                 }
             }
         }

@@ -1,19 +1,18 @@
 //! From samples to pixels: colour where a camera's rays meet triangles, and outlines between things.
 
+use std::ops::Range;
+
 use rapier3d::math::Vector;
 
-use super::facets::Facets;
-use super::prepared::Prepared;
-use super::shade::{SKY, Surface, Surfaces, albedo};
+use super::facets::{Facet, Facets};
+use super::shade::{Surface, Surfaces, albedo};
 use super::shadow::ShadowMap;
 use super::srgb::SrgbTable;
-use super::target::{NOTHING, SAMPLES, Target};
+use super::target::Target;
 use crate::render::Camera;
+use crate::render::light::{OUTLINE, OUTLINE_DEPTH_STEP, SAMPLES, SKY};
+use crate::render::prepared::{NOTHING, Prepared};
 
-/// How much the outline between two things darkens.
-const OUTLINE: f32 = 0.45;
-/// Two things are outlined where their depths differ by more than this part: not where they touch.
-const OUTLINE_DEPTH_STEP: f32 = 0.02;
 const PER_PIXEL: usize = SAMPLES * SAMPLES;
 
 /// A filled target, ready to be shaded.
@@ -70,7 +69,9 @@ impl<'a> View<'a> {
             row.sums.clear();
             row.sums.resize(width, Vector::ZERO);
             self.row(y, &mut row);
-            rgb.extend(row.sums.iter().flat_map(|colour| srgb.encode(*colour)));
+            rgb.extend(
+                row.sums.iter().flat_map(|colour| colour.to_array()).map(|linear| srgb.encode(linear)),
+            );
         }
         rgb
     }
@@ -82,15 +83,37 @@ impl<'a> View<'a> {
         let rows: [&[u32]; SAMPLES + 1] =
             std::array::from_fn(|i| self.target.triangles((y * SAMPLES + i).min(last)));
         mark_edges(rows, &mut row.edges);
-        for x in 0..row.sums.len() {
-            let sx = x * SAMPLES;
-            if row.edges[sx] | row.edges[sx + 1] == 0 {
-                self.add(row, x, [sx, y * SAMPLES], rows[0][sx], 1.0);
-            } else {
+        let plain = |edges: &[u32], x: usize| edges[x * SAMPLES] | edges[x * SAMPLES + 1] == 0;
+        let mut x = 0;
+        while x < row.sums.len() {
+            row.make_room(self.shadow);
+            if !plain(&row.edges, x) {
                 self.mixed(row, x, y, rows);
+                x += 1;
+                continue;
             }
+            // Of one triangle as far as they are plain: an edge would be in the last of them.
+            let most = row.sums.len().min(x + row.surfaces.room());
+            let end = (x + 1..most).find(|x| !plain(&row.edges, *x)).unwrap_or(most);
+            self.run(row, x..end, y, rows[0][x * SAMPLES]);
+            x = end;
         }
         row.flush(self.shadow);
+    }
+
+    /// Neighbouring pixels that one triangle covers.
+    #[inline(always)]
+    fn run(&self, row: &mut Row<'_>, pixels: Range<usize>, y: usize, triangle: u32) {
+        if triangle == NOTHING {
+            row.sums[pixels].fill(SKY);
+            return;
+        }
+        let facet = *row.facets.get(self.prepared, triangle);
+        let nearness_1_m = self.target.nearness_1_m(y * SAMPLES);
+        for x in pixels {
+            let surface = self.surface(&facet, [x * SAMPLES, y * SAMPLES], nearness_1_m[x * SAMPLES]);
+            row.push(surface, x, 1.0);
+        }
     }
 
     /// A pixel with an edge in or beside it, `rows` being those of its samples and the one below.
@@ -109,7 +132,16 @@ impl<'a> View<'a> {
         for (i, triangle) in triangles.iter().enumerate() {
             if !triangles[..i].contains(triangle) {
                 let covered = triangles[i..].iter().filter(|other| *other == triangle).count();
-                self.add(row, x, at(i), *triangle, share * covered as f32 / PER_PIXEL as f32);
+                let share = share * covered as f32 / PER_PIXEL as f32;
+                match *triangle {
+                    NOTHING => row.sums[x] += SKY * share,
+                    triangle => {
+                        let (_, nearness_1_m) = self.sample(at(i));
+                        let surface =
+                            self.surface(row.facets.get(self.prepared, triangle), at(i), nearness_1_m);
+                        row.push(surface, x, share);
+                    }
+                }
             }
         }
     }
@@ -149,35 +181,32 @@ impl<'a> View<'a> {
             && self.prepared.id(a) != self.prepared.id(b)
     }
 
-    /// Adds what a sample sees to a pixel.
+    /// Where the ray of a sample meets a triangle.
     #[inline(always)]
-    fn add(&self, row: &mut Row<'_>, pixel: usize, [sx, sy]: [usize; 2], triangle: u32, share: f32) {
-        if triangle == NOTHING {
-            row.sums[pixel] += SKY * share;
-            return;
-        }
-        let nearness_1_m = self.target.nearness_1_m(sy)[sx];
+    fn surface(&self, facet: &Facet, [sx, sy]: [usize; 2], nearness_1_m: f32) -> Surface {
         let ray = self.corner_ray + self.right_ray * (sx as f32 + 0.5) + self.down_ray * (sy as f32 + 0.5);
         let point_m = self.eye_m + ray * (1.0 / nearness_1_m);
-        let facet = row.facets.get(self.prepared, triangle);
-        let normal = facet.normal(point_m);
         let albedo = albedo(facet.pattern, facet.linear_rgb, point_m);
-        row.surfaces.push(Surface { point_m, ray, normal, albedo });
-        row.shares.push((pixel, share));
-        if row.surfaces.is_full() {
-            row.flush(self.shadow);
-        }
+        Surface { point_m, ray, normal: facet.normal(point_m), albedo }
     }
 }
 
 impl Row<'_> {
     fn new(facets: &mut Facets) -> Row<'_> {
-        Row {
-            facets,
-            surfaces: Surfaces::new(),
-            shares: Vec::new(),
-            edges: Vec::new(),
-            sums: Vec::new(),
+        Row { facets, surfaces: Surfaces::new(), shares: Vec::new(), edges: Vec::new(), sums: Vec::new() }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, surface: Surface, pixel: usize, share: f32) {
+        self.surfaces.push(surface);
+        self.shares.push((pixel, share));
+    }
+
+    /// Shades the surfaces that have come together if another pixel's may be too many.
+    #[inline(always)]
+    fn make_room(&mut self, shadow: &ShadowMap) {
+        if self.surfaces.room() < PER_PIXEL {
+            self.flush(shadow);
         }
     }
 

@@ -2,9 +2,11 @@
 
 use rapier3d::math::{Matrix, Vector};
 
-use super::srgb::linear;
-use super::target::NOTHING;
-use crate::render::{Mesh, Scenery};
+use super::light::linear;
+use super::{Mesh, Scenery};
+
+/// Marks a sample at which nothing is.
+pub(super) const NOTHING: u32 = u32::MAX;
 
 pub(super) struct Prepared {
     pub scenery: Scenery,
