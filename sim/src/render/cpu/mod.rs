@@ -48,8 +48,13 @@ impl CpuRenderer {
 }
 
 impl Renderer for CpuRenderer {
+    fn name(&self) -> &str {
+        "cpu"
+    }
+
     fn render(&mut self, step: &Step, camera: &Camera) -> Frame {
-        Arch::new().dispatch(Drawing { renderer: self, step, camera })
+        let placed = self.prepared.scenery.place(step);
+        self.draw_placed(placed, camera)
     }
 }
 
@@ -57,7 +62,7 @@ impl Renderer for CpuRenderer {
 /// its bits are the same.
 struct Drawing<'a> {
     renderer: &'a mut CpuRenderer,
-    step: &'a Step,
+    placed: Placed,
     camera: &'a Camera,
 }
 
@@ -66,14 +71,17 @@ impl WithSimd for Drawing<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Frame {
-        self.renderer.draw(simd, self.step, self.camera)
+        self.renderer.draw(simd, self.placed, self.camera)
     }
 }
 
 impl CpuRenderer {
+    pub(super) fn draw_placed(&mut self, placed: Placed, camera: &Camera) -> Frame {
+        Arch::new().dispatch(Drawing { renderer: self, placed, camera })
+    }
+
     #[inline(always)]
-    fn draw<S: Simd>(&mut self, simd: S, step: &Step, camera: &Camera) -> Frame {
-        let placed = self.prepared.scenery.place(step);
+    fn draw<S: Simd>(&mut self, simd: S, placed: Placed, camera: &Camera) -> Frame {
         if self.placed != placed {
             self.shadow.draw(simd, &self.prepared, &placed);
             self.facets.reset(&self.prepared, &placed);

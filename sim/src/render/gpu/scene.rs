@@ -1,0 +1,120 @@
+//! A scenery in a device's memory, and where it is in one state.
+
+use rapier3d::math::{Matrix, Pose, Vector};
+use wgpu::util::{BufferInitDescriptor, DeviceExt};
+use wgpu::{BindGroup, Buffer, BufferUsages};
+
+use super::device::Gpu;
+use super::targets::bind;
+use crate::render::light::{SAMPLES, sun_map};
+use crate::render::prepared::{Face, Prepared};
+use crate::render::{Camera, Part, Pattern, Placed};
+
+/// What `picture.wgsl` calls its group 0.
+pub(super) struct Scene {
+    view: Buffer,
+    parts: Buffer,
+    pub group: BindGroup,
+    /// Corners of all triangles.
+    pub corners: u32,
+}
+
+impl Scene {
+    pub(super) fn new(gpu: &Gpu, prepared: &Prepared) -> Scene {
+        let parts = prepared.scenery.parts.iter();
+        let corners: Vec<[u32; 4]> =
+            parts.zip(0..).flat_map(|(part, number)| part_corners(part, number)).collect();
+        let faces: Vec<[u32; 16]> = prepared.faces.iter().map(face).collect();
+        let initialised = |numbers: &[u32], usage: BufferUsages| {
+            // A buffer must not be empty.
+            let contents = bytes(if numbers.is_empty() { &[0; 64] } else { numbers });
+            gpu.device.create_buffer_init(&BufferInitDescriptor { label: None, contents: &contents, usage })
+        };
+        let written = BufferUsages::COPY_DST | BufferUsages::STORAGE;
+        let view = initialised(&[0; 44], BufferUsages::COPY_DST | BufferUsages::UNIFORM);
+        let numbers = initialised(corners.as_flattened(), BufferUsages::STORAGE);
+        let faces = initialised(faces.as_flattened(), BufferUsages::STORAGE);
+        let parts = initialised(&vec![0; prepared.scenery.parts.len() * 20], written);
+        let resources = [&view, &numbers, &faces, &parts].map(|buffer| buffer.as_entire_binding());
+        let group = bind(gpu, &gpu.passes.scene, resources);
+        Scene { view, parts, group, corners: corners.len() as u32 }
+    }
+
+    /// Puts every part where it is.
+    pub(super) fn place(&self, gpu: &Gpu, prepared: &Prepared, placed: &Placed) {
+        let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).zip(&prepared.linear_rgb);
+        let numbers: Vec<[u32; 20]> = parts.map(|((part, pose), rgb)| placed_part(part, *pose, *rgb)).collect();
+        gpu.queue.write_buffer(&self.parts, 0, &bytes(numbers.as_flattened()));
+    }
+
+    /// Looks through a camera.
+    pub(super) fn look(&self, gpu: &Gpu, prepared: &Prepared, placed: &Placed, camera: &Camera) {
+        let rotation = camera.world_from_camera.rotation;
+        let sample = 1.0 / (camera.focal_px() * SAMPLES as f32);
+        let (width, height) = (camera.width as f32, camera.height as f32);
+        let direction = |axis: Vector| [axis.x, axis.y, axis.z, 0.0];
+        let map = sun_map(placed.focus_m, prepared.scenery.focus_radius_m);
+        let [column, row, nearness] = map.map(|(axis, constant)| [axis.x, axis.y, axis.z, constant]);
+        let numbers = [
+            direction(rotation * Vector::X),
+            direction(rotation * Vector::Y),
+            direction(rotation * Vector::Z),
+            direction(camera.world_from_camera.translation),
+            direction(rotation * camera.unproject([0.0, 0.0], 1.0)),
+            direction(rotation * Vector::X * sample),
+            direction(rotation * Vector::NEG_Y * sample),
+            column,
+            row,
+            nearness,
+            [2.0 * camera.focal_px() / width, 2.0 * camera.focal_px() / height, width, height],
+        ];
+        gpu.queue.write_buffer(&self.view, 0, &bytes(&numbers.as_flattened().iter().map(|x| x.to_bits()).collect::<Vec<_>>()));
+    }
+}
+
+/// Three corners a triangle, with the number of their part.
+fn part_corners(part: &Part, number: u32) -> impl Iterator<Item = [u32; 4]> {
+    part.mesh.triangles.iter().flatten().map(move |corner| {
+        let Vector { x, y, z } = part.mesh.vertices[*corner as usize].position_m;
+        [x.to_bits(), y.to_bits(), z.to_bits(), number]
+    })
+}
+
+fn face(face: &Face) -> [u32; 16] {
+    let bend = face.bend_1_m.unwrap_or(Matrix::ZERO);
+    let mut numbers = [0; 16];
+    for (four, vector) in numbers.as_chunks_mut::<4>().0.iter_mut().zip([
+        face.normal,
+        bend.x_axis,
+        bend.y_axis,
+        bend.z_axis,
+    ]) {
+        *four = [vector.x.to_bits(), vector.y.to_bits(), vector.z.to_bits(), 0];
+    }
+    numbers
+}
+
+fn placed_part(part: &Part, pose: Pose, linear_rgb: Vector) -> [u32; 20] {
+    let (matrix, t) = (Matrix::from_quat(pose.rotation), pose.translation);
+    let (x, y, z) = (matrix.row(0), matrix.row(1), matrix.row(2));
+    let checkered = match part.pattern {
+        Pattern::Plain => 0.0,
+        Pattern::Checker => 1.0,
+    };
+    let rows = [
+        [x.x, x.y, x.z, t.x],
+        [y.x, y.y, y.z, t.y],
+        [z.x, z.y, z.z, t.z],
+        [linear_rgb.x, linear_rgb.y, linear_rgb.z, checkered],
+    ];
+    let mut numbers = [0; 20];
+    let flags = [part.id, part.casts_shadow.into(), 0, 0];
+    for (number, bits) in numbers.iter_mut().zip(rows.as_flattened().iter().map(|x| x.to_bits()).chain(flags)) {
+        *number = bits;
+    }
+    numbers
+}
+
+fn bytes(numbers: &[u32]) -> Vec<u8> {
+    numbers.iter().flat_map(|number| number.to_ne_bytes()).collect()
+}
