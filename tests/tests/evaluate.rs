@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use tandem_episodes::evaluation::{Plan, Played, evaluate};
-use tandem_episodes::{Controller, RobotFile, players, tasks};
+use tandem_episodes::{Controller, RendererKind, RobotFile, players, tasks};
 use tandem_tools_spec::Protocol;
 
 fn plan(jobs: usize, seeds: Vec<u32>) -> Plan {
@@ -13,6 +13,7 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> Plan {
         protocol: Protocol::Benchmark,
         robot: RobotFile::default(),
         locomotion: Controller::Balance,
+        renderer: RendererKind::Cpu,
         tasks: vec![handover],
         seeds,
         jobs,

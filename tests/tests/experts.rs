@@ -3,7 +3,7 @@
 use std::thread::available_parallelism;
 
 use tandem_episodes::evaluation::{Plan, evaluate};
-use tandem_episodes::{Controller, RobotFile, players, tasks};
+use tandem_episodes::{Controller, RendererKind, RobotFile, players, tasks};
 use tandem_tools_spec::Protocol;
 
 #[test]
@@ -13,6 +13,7 @@ fn every_task_is_solved_in_order_and_nobody_falls() {
         protocol: Protocol::Benchmark,
         robot: RobotFile::default(),
         locomotion: Controller::Balance,
+        renderer: RendererKind::Cpu,
         tasks: tasks::ALL.iter().collect(),
         seeds: vec![3],
         jobs: available_parallelism().map_or(1, usize::from),

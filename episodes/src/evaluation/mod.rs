@@ -16,6 +16,7 @@ use crate::spec::{Controller, EpisodeSpec, RobotFile};
 use crate::tasks::Task;
 use crate::{EpisodeError, fingerprint};
 use keep::Keeper;
+use tandem_sim::render::RendererKind;
 
 pub use keep::Played;
 pub use summary::{Evaluation, TaskSummary, clopper_pearson};
@@ -28,6 +29,7 @@ pub struct Plan {
     pub protocol: Protocol,
     pub robot: RobotFile,
     pub locomotion: Controller,
+    pub renderer: RendererKind,
     pub tasks: Vec<&'static Task>,
     pub seeds: Vec<u32>,
     /// Worlds that run side by side, each on a thread of its own.
@@ -42,6 +44,7 @@ impl Plan {
         EpisodeSpec {
             robot: self.robot.clone(),
             locomotion: self.locomotion.clone(),
+            renderer: self.renderer,
             ..EpisodeSpec::new(task, seed, self.protocol)
         }
     }

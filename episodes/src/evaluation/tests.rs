@@ -68,6 +68,7 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
         protocol: Protocol::Agentic,
         robot: RobotFile::default(),
         locomotion: Controller::Balance,
+        renderer: RendererKind::Cpu,
         tasks: vec![task],
         seeds: vec![7],
         jobs: 1,

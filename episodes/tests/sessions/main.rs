@@ -7,3 +7,4 @@ mod common;
 mod disclosure;
 mod hand_force;
 mod recordings;
+mod renderers;

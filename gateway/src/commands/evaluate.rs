@@ -3,11 +3,12 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use tandem_episodes::players;
+use tracing_subscriber::filter::LevelFilter;
 
 use super::{
     Outcome,
     episode_flags::{EpisodeFlags, player_parser},
-    played,
+    log, played,
 };
 
 /// Play tasks over seeds in parallel worlds and count the phases reached. Goes on where an interrupted run stopped.
@@ -25,6 +26,7 @@ pub struct Args {
 
 /// Plays and counts.
 pub fn run(args: Args) -> Outcome {
-    played::play_and_print(&args.episodes.plan(args.policy, false), &args.out)?;
+    log::to_stderr(LevelFilter::INFO);
+    played::play_and_print(&args.episodes.plan(args.policy, false)?, &args.out)?;
     Ok(ExitCode::SUCCESS)
 }

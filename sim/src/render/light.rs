@@ -35,6 +35,11 @@ pub(super) const SUN_DISTANCE_M: f32 = 8.0;
 pub(super) const NORMAL_OFFSET_M: f32 = 0.006;
 pub(super) const BIAS_M: f32 = 0.004;
 
+/// Texels along each side of the map of contacts: 1 cm at a focus of 1.25 m.
+pub(super) const CONTACT_TEXELS: usize = 256;
+/// How much darker it is where things stand.
+pub(super) const CONTACT: f32 = 0.5;
+
 /// Steps of the table from linear light to sRGB bytes.
 pub(super) const SRGB_STEPS: usize = 4096;
 

@@ -6,6 +6,7 @@
 mod accents;
 mod camera;
 mod cameras;
+mod contact;
 mod cpu;
 #[cfg(feature = "gpu")]
 mod gpu;
@@ -16,6 +17,8 @@ mod png;
 mod prepared;
 #[cfg(feature = "gpu")]
 mod proof;
+mod raster;
+mod rows;
 mod scenery;
 
 pub use accents::robot_rgba;

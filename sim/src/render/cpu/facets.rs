@@ -3,7 +3,7 @@
 use rapier3d::math::{Matrix, Vector};
 
 use crate::render::prepared::{Face, Prepared};
-use crate::render::{Pattern, Placed};
+use crate::render::{Carrier, Pattern, Placed};
 
 /// The triangles that have been seen since the world last moved: most never are, and those that are in many pixels.
 #[derive(Default)]
@@ -22,6 +22,8 @@ pub(super) struct Facet {
     bend: Option<Matrix>,
     pub linear_rgb: Vector,
     pub pattern: Pattern,
+    /// Whether things stand on it, which darken it.
+    pub carries: bool,
 }
 
 impl Facets {
@@ -55,6 +57,7 @@ impl Facet {
             bend,
             linear_rgb: prepared.linear_rgb[part],
             pattern: prepared.scenery.parts[part].pattern,
+            carries: prepared.scenery.parts[part].carrier == Carrier::Room,
         }
     }
 

@@ -1,8 +1,6 @@
 //! The embedded renderer: a visibility buffer of triangle numbers, shaded afterwards, four samples a pixel.
 
 mod facets;
-mod raster;
-mod rows;
 mod shade;
 mod shadow;
 mod srgb;
@@ -11,6 +9,7 @@ mod view;
 
 use pulp::{Arch, Simd, WithSimd};
 
+use super::contact::ContactMap;
 use super::prepared::Prepared;
 use super::{Camera, Frame, Placed, Renderer, Scenery};
 use crate::Step;
@@ -24,9 +23,10 @@ use view::View;
 pub(super) struct CpuRenderer {
     prepared: Prepared,
     srgb: SrgbTable,
-    /// What shadow and facets are of.
+    /// What shadow, contacts and facets are of.
     placed: Placed,
     shadow: ShadowMap,
+    contact: ContactMap,
     facets: Facets,
     samples: Target,
     /// One sample a pixel, at its centre: what depth and ids are read from.
@@ -40,6 +40,7 @@ impl CpuRenderer {
             srgb: SrgbTable::default(),
             placed: Placed::default(),
             shadow: ShadowMap::default(),
+            contact: ContactMap::default(),
             facets: Facets::default(),
             samples: Target::default(),
             centres: Target::default(),
@@ -84,11 +85,12 @@ impl CpuRenderer {
     fn draw<S: Simd>(&mut self, simd: S, placed: Placed, camera: &Camera) -> Frame {
         if self.placed != placed {
             self.shadow.draw(simd, &self.prepared, &placed);
+            self.contact.draw(&self.prepared, &placed);
             self.facets.reset(&self.prepared, &placed);
             self.placed = placed;
         }
         target::draw(simd, &mut self.samples, &mut self.centres, &self.prepared, &self.placed, camera);
-        let view = View::new(&self.prepared, &self.samples, &self.shadow, camera);
+        let view = View::new(&self.prepared, &self.samples, &self.shadow, &self.contact, camera);
         let mut frame = Frame {
             width: camera.width,
             height: camera.height,

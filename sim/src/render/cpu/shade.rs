@@ -2,12 +2,12 @@
 
 use rapier3d::math::Vector;
 
-use super::rows::LANES;
 use super::shadow::ShadowMap;
 use crate::render::Pattern;
 use crate::render::light::{
     CHECKER_DARK, CHECKER_PER_M, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, SUN, TO_SUN,
 };
+use crate::render::rows::LANES;
 
 /// As many points as are shaded together: enough for a loop to be worth its beginning, few enough to stay near the processor.
 pub(super) const BATCH: usize = 64;
@@ -21,6 +21,8 @@ pub(super) struct Surface {
     pub ray: Vector,
     pub normal: Vector,
     pub albedo: Vector,
+    /// What contacts leave of all light.
+    pub open: f32,
 }
 
 /// Points that are shaded together. They are kept coordinate by coordinate and worked on in loops that do not branch: so
@@ -38,6 +40,7 @@ pub(super) struct Surfaces {
     facing_eye: [f32; BATCH],
     highlight: [f32; BATCH],
     sunlit: [f32; BATCH],
+    open: [f32; BATCH],
     colour: Vectors,
 }
 
@@ -71,6 +74,7 @@ impl Surfaces {
             facing_eye: [0.0; BATCH],
             highlight: [0.0; BATCH],
             sunlit: [0.0; BATCH],
+            open: [1.0; BATCH],
             colour: Vectors::ZERO,
         }
     }
@@ -88,6 +92,7 @@ impl Surfaces {
         self.ray.set(i, surface.ray);
         self.normal.set(i, surface.normal);
         self.albedo.set(i, surface.albedo);
+        self.open[i] = surface.open;
     }
 
     /// Linear colours of all that were pushed, in their order; then they are forgotten.
@@ -136,7 +141,7 @@ impl Surfaces {
         let ambient = FROM_BELOW + (FROM_ABOVE - FROM_BELOW) * up;
         let sunlight = self.facing_sun[i] * self.sunlit[i];
         let unlit = albedo * (ambient + LAMP * self.facing_eye[i]);
-        self.colour.set(i, unlit + (albedo * SUN + self.highlight[i]) * sunlight);
+        self.colour.set(i, (unlit + (albedo * SUN + self.highlight[i]) * sunlight) * self.open[i]);
     }
 }
 

@@ -5,11 +5,11 @@ use std::f32::consts::SQRT_2;
 use pulp::Simd;
 use rapier3d::math::Vector;
 
-use super::raster::Outline;
-use super::rows::{Grid, LANES, Rows};
 use crate::render::Placed;
 use crate::render::light::{BIAS_M, NORMAL_OFFSET_M, SunMap, TEXELS, TO_SUN, sun_map};
 use crate::render::prepared::Prepared;
+use crate::render::raster::Outline;
+use crate::render::rows::{Grid, LANES, Rows};
 
 /// Texels along each side of a cell: what is nearer than all of a cell is in the sun there, without a look at its texels.
 const CELL: usize = LANES;

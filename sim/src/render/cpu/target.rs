@@ -3,11 +3,11 @@
 use pulp::Simd;
 use rapier3d::math::{Matrix, Pose, Vector};
 
-use super::raster::Outline;
-use super::rows::{Grid, Rows};
 use crate::render::camera::NEAR_M;
 use crate::render::light::SAMPLES;
 use crate::render::prepared::{NOTHING, Prepared};
+use crate::render::raster::Outline;
+use crate::render::rows::{Grid, Rows};
 use crate::render::{Camera, Placed};
 
 /// Nearest surface per sample. `nearness_1_m` is 1 / depth, which is linear over a triangle's picture.

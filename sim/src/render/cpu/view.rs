@@ -10,7 +10,8 @@ use super::shadow::ShadowMap;
 use super::srgb::SrgbTable;
 use super::target::Target;
 use crate::render::Camera;
-use crate::render::light::{OUTLINE, OUTLINE_DEPTH_STEP, SAMPLES, SKY};
+use crate::render::contact::ContactMap;
+use crate::render::light::{CONTACT, OUTLINE, OUTLINE_DEPTH_STEP, SAMPLES, SKY};
 use crate::render::prepared::{NOTHING, Prepared};
 
 const PER_PIXEL: usize = SAMPLES * SAMPLES;
@@ -20,6 +21,7 @@ pub(super) struct View<'a> {
     prepared: &'a Prepared,
     target: &'a Target,
     shadow: &'a ShadowMap,
+    contact: &'a ContactMap,
     eye_m: Vector,
     /// Ray through the target's top left corner, and from one sample to the next, at a depth of 1 m in the world.
     corner_ray: Vector,
@@ -44,6 +46,7 @@ impl<'a> View<'a> {
         prepared: &'a Prepared,
         target: &'a Target,
         shadow: &'a ShadowMap,
+        contact: &'a ContactMap,
         camera: &Camera,
     ) -> View<'a> {
         let rotation = camera.world_from_camera.rotation;
@@ -52,6 +55,7 @@ impl<'a> View<'a> {
             prepared,
             target,
             shadow,
+            contact,
             eye_m: camera.world_from_camera.translation,
             corner_ray: rotation * camera.unproject([0.0, 0.0], 1.0),
             right_ray: rotation * Vector::X * sample,
@@ -187,7 +191,8 @@ impl<'a> View<'a> {
         let ray = self.corner_ray + self.right_ray * (sx as f32 + 0.5) + self.down_ray * (sy as f32 + 0.5);
         let point_m = self.eye_m + ray * (1.0 / nearness_1_m);
         let albedo = albedo(facet.pattern, facet.linear_rgb, point_m);
-        Surface { point_m, ray, normal: facet.normal(point_m), albedo }
+        let open = if facet.carries { 1.0 - CONTACT * self.contact.darkness(point_m) } else { 1.0 };
+        Surface { point_m, ray, normal: facet.normal(point_m), albedo, open }
     }
 }
 

@@ -43,7 +43,7 @@ impl Gpu {
         let name = name(&adapter);
         let unusable = |reason: String| GpuError::Unusable { name: name.clone(), reason };
         let descriptor = DeviceDescriptor {
-            required_limits: Limits::downlevel_defaults().using_resolution(adapter.limits()),
+            required_limits: Limits::default().using_resolution(adapter.limits()),
             ..DeviceDescriptor::default()
         };
         let opened = pollster::block_on(adapter.request_device(&descriptor));

@@ -14,6 +14,7 @@ use wgpu::{
     RenderPassDepthStencilAttachment, RenderPassDescriptor, StoreOp, TextureView,
 };
 
+use super::contact::ContactMap;
 use super::prepared::{NOTHING, Prepared};
 use super::{Camera, Frame, Placed, Renderer, Scenery, cpu, proof};
 use crate::Step;
@@ -47,6 +48,7 @@ struct GpuRenderer {
     shadow: TextureView,
     /// Where the parts are in the device's memory, and what the shadow is of.
     placed: Option<Placed>,
+    contact: ContactMap,
     /// Of the last picture's size.
     targets: Option<Targets>,
     embedded: Option<Box<dyn Renderer>>,
@@ -72,21 +74,31 @@ impl GpuRenderer {
     fn new(gpu: Arc<Gpu>, scenery: Scenery) -> GpuRenderer {
         let prepared = Prepared::new(scenery);
         let (scene, shadow) = (Scene::new(&gpu, &prepared), targets::shadow_map(&gpu));
-        GpuRenderer { gpu, prepared, scene, shadow, placed: None, targets: None, embedded: None }
+        GpuRenderer {
+            gpu,
+            prepared,
+            scene,
+            shadow,
+            placed: None,
+            contact: ContactMap::default(),
+            targets: None,
+            embedded: None,
+        }
     }
 
     fn draw(&mut self, placed: &Placed, camera: &Camera) -> Result<Frame, GpuError> {
-        let GpuRenderer { gpu, prepared, scene, shadow, .. } = self;
+        let GpuRenderer { gpu, prepared, scene, shadow, contact, .. } = self;
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let targets = match self.targets.take() {
             Some(targets) if (targets.width, targets.height) == (camera.width, camera.height) => targets,
             _ => Targets::new(gpu, shadow, camera.width, camera.height)?,
         };
         if self.placed.as_ref() != Some(placed) {
-            scene.place(gpu, prepared, placed);
+            contact.draw(prepared, placed);
+            scene.place(gpu, prepared, placed, contact);
             self.placed = Some(placed.clone());
         }
-        scene.look(gpu, prepared, placed, camera);
+        scene.look(gpu, prepared, placed, contact, camera);
         self.encode(&mut encoder, &targets);
         self.gpu.queue.submit([encoder.finish()]);
         let frame = self.read(&targets)?;
@@ -97,7 +109,8 @@ impl GpuRenderer {
     /// All that the device does for a picture.
     fn encode(&self, encoder: &mut CommandEncoder, targets: &Targets) {
         let passes = &self.gpu.passes;
-        let Targets { width, height, ref samples, ref centres, ref picture, ref readable, ref group } = *targets;
+        let Targets { width, height, ref samples, ref centres, ref picture, ref readable, ref group } =
+            *targets;
         {
             let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
                 depth_stencil_attachment: Some(nearest(&self.shadow)),
@@ -137,14 +150,19 @@ impl GpuRenderer {
     fn read(&self, targets: &Targets) -> Result<Frame, GpuError> {
         targets.readable.map_async(MapMode::Read, .., |_| ());
         self.gpu.settle()?;
-        let mapped = targets.readable.get_mapped_range(..).map_err(|error| self.gpu.unusable(error.to_string()))?;
+        let mapped =
+            targets.readable.get_mapped_range(..).map_err(|error| self.gpu.unusable(error.to_string()))?;
         let numbers = mapped.as_chunks::<4>().0;
         let pixels = numbers.len() / 3;
         let number = |bytes: &[u8; 4]| u32::from_ne_bytes(*bytes);
         let frame = Frame {
             width: targets.width,
             height: targets.height,
-            rgb: numbers[..pixels].iter().map(number).flat_map(|rgb| [rgb, rgb >> 8, rgb >> 16].map(|c| c as u8)).collect(),
+            rgb: numbers[..pixels]
+                .iter()
+                .map(number)
+                .flat_map(|rgb| [rgb, rgb >> 8, rgb >> 16].map(|c| c as u8))
+                .collect(),
             depth_m: numbers[pixels..2 * pixels].iter().map(number).map(f32::from_bits).collect(),
             ids: numbers[2 * pixels..].iter().map(number).collect(),
         };

@@ -4,8 +4,8 @@ use wgpu::{
     BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType, BufferBindingType,
     ColorTargetState, CompareFunction, ComputePipeline, ComputePipelineDescriptor, DepthStencilState, Device,
     Face, FragmentState, PipelineLayout, PipelineLayoutDescriptor, PrimitiveState, RenderPipeline,
-    RenderPipelineDescriptor, ShaderModule, ShaderModuleDescriptor, ShaderSource, ShaderStages, TextureFormat,
-    TextureSampleType, TextureViewDimension, VertexState,
+    RenderPipelineDescriptor, ShaderModule, ShaderModuleDescriptor, ShaderSource, ShaderStages,
+    TextureFormat, TextureSampleType, TextureViewDimension, VertexState,
 };
 
 use super::shader;
@@ -36,7 +36,7 @@ impl Passes {
         let scene = layout(
             device,
             all,
-            &[buffer(BufferBindingType::Uniform), storage(true), storage(true), storage(true)],
+            &[buffer(BufferBindingType::Uniform), storage(true), storage(true), storage(true), storage(true)],
         );
         let targets = layout(
             device,

@@ -16,6 +16,8 @@ struct View {
     sun_nearness: vec4f,
     // Twice the focal length by width and by height; width and height in pixels.
     scale: vec4f,
+    // Of the map of contacts: world coordinates of its corner, and texels per metre.
+    contact: vec4f,
 }
 
 struct Part {
@@ -25,7 +27,7 @@ struct Part {
     z: vec4f,
     // Linear, and whether it is checkered.
     rgb: vec4f,
-    // Id, and whether it casts a shadow.
+    // Id, whether it casts a shadow, and whether things stand on it.
     flags: vec4u,
 }
 
@@ -42,6 +44,8 @@ struct Face {
 @group(0) @binding(1) var<storage, read> corners: array<vec4u>;
 @group(0) @binding(2) var<storage, read> faces: array<Face>;
 @group(0) @binding(3) var<storage, read> parts: array<Part>;
+// Heights of what carries things, and how dark it is there.
+@group(0) @binding(4) var<storage, read> contacts: array<vec2f>;
 
 @group(1) @binding(0) var shadow: texture_depth_2d;
 @group(1) @binding(1) var samples: texture_2d<u32>;
@@ -135,6 +139,27 @@ fn sunlit(point_m: vec3f, normal: vec3f) -> f32 {
     return sum / 9.0;
 }
 
+// How dark contacts make a point of what carries things.
+fn darkness(point_m: vec3f) -> f32 {
+    let place = (point_m.xy - view.contact.xy) * view.contact.z - 0.5;
+    if any(place < vec2f(0.0)) || any(place >= vec2f(f32(CONTACT_TEXELS - 1u))) {
+        return 0.0;
+    }
+    let low = vec2u(place);
+    let part = place - vec2f(low);
+    let first = low.y * CONTACT_TEXELS + low.x;
+    let nearest = first + select(0u, CONTACT_TEXELS, part.y >= 0.5) + select(0u, 1u, part.x >= 0.5);
+    if abs(point_m.z - contacts[nearest].x) > SINK_M {
+        return 0.0;
+    }
+    let below = first + CONTACT_TEXELS;
+    return mix(
+        mix(contacts[first].y, contacts[first + 1u].y, part.x),
+        mix(contacts[below].y, contacts[below + 1u].y, part.x),
+        part.y,
+    );
+}
+
 fn albedo(part: Part, point_m: vec3f) -> vec3f {
     let square = vec2i(floor(point_m.xy * CHECKER_PER_M));
     let dark = part.rgb.w != 0.0 && ((square.x + square.y) & 1) == 0;
@@ -155,13 +180,14 @@ fn colour(triangle: u32, ray: vec3f) -> vec3f {
     let base = albedo(part, point_m);
     let ambient = mix(FROM_BELOW, FROM_ABOVE, normal.z * 0.5 + 0.5);
     let unlit = base * (ambient + LAMP * abs(towards_eye));
+    let open = select(1.0, 1.0 - CONTACT * darkness(point_m), part.flags.z != 0u);
     let facing_sun = dot(normal, TO_SUN);
     if facing_sun <= 0.0 {
-        return unlit;
+        return unlit * open;
     }
     let half_way = normalize(eye_direction + TO_SUN);
     let highlight = HIGHLIGHT * pow(max(dot(normal, half_way), 0.0), 40.0);
-    return unlit + (base * SUN + highlight) * (facing_sun * sunlit(point_m, normal));
+    return (unlit + (base * SUN + highlight) * (facing_sun * sunlit(point_m, normal))) * open;
 }
 
 fn ray_at(sample: vec2u) -> vec3f {

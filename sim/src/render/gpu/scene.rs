@@ -6,14 +6,19 @@ use wgpu::{BindGroup, Buffer, BufferUsages};
 
 use super::device::Gpu;
 use super::targets::bind;
-use crate::render::light::{SAMPLES, sun_map};
+use crate::render::contact::ContactMap;
+use crate::render::light::{CONTACT_TEXELS, SAMPLES, sun_map};
 use crate::render::prepared::{Face, Prepared};
-use crate::render::{Camera, Part, Pattern, Placed};
+use crate::render::{Camera, Carrier, Part, Pattern, Placed};
+
+/// Of `picture.wgsl`'s `View`.
+const VIEW_NUMBERS: usize = 48;
 
 /// What `picture.wgsl` calls its group 0.
 pub(super) struct Scene {
     view: Buffer,
     parts: Buffer,
+    contacts: Buffer,
     pub group: BindGroup,
     /// Corners of all triangles.
     pub corners: u32,
@@ -31,31 +36,42 @@ impl Scene {
             gpu.device.create_buffer_init(&BufferInitDescriptor { label: None, contents: &contents, usage })
         };
         let written = BufferUsages::COPY_DST | BufferUsages::STORAGE;
-        let view = initialised(&[0; 44], BufferUsages::COPY_DST | BufferUsages::UNIFORM);
+        let view = initialised(&[0; VIEW_NUMBERS], BufferUsages::COPY_DST | BufferUsages::UNIFORM);
         let numbers = initialised(corners.as_flattened(), BufferUsages::STORAGE);
         let faces = initialised(faces.as_flattened(), BufferUsages::STORAGE);
         let parts = initialised(&vec![0; prepared.scenery.parts.len() * 20], written);
-        let resources = [&view, &numbers, &faces, &parts].map(|buffer| buffer.as_entire_binding());
+        let contacts = initialised(&vec![0; 2 * CONTACT_TEXELS * CONTACT_TEXELS], written);
+        let resources = [&view, &numbers, &faces, &parts, &contacts].map(|buffer| buffer.as_entire_binding());
         let group = bind(gpu, &gpu.passes.scene, resources);
-        Scene { view, parts, group, corners: corners.len() as u32 }
+        Scene { view, parts, contacts, group, corners: corners.len() as u32 }
     }
 
     /// Puts every part where it is.
-    pub(super) fn place(&self, gpu: &Gpu, prepared: &Prepared, placed: &Placed) {
+    pub(super) fn place(&self, gpu: &Gpu, prepared: &Prepared, placed: &Placed, contact: &ContactMap) {
         let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).zip(&prepared.linear_rgb);
-        let numbers: Vec<[u32; 20]> = parts.map(|((part, pose), rgb)| placed_part(part, *pose, *rgb)).collect();
+        let numbers: Vec<[u32; 20]> =
+            parts.map(|((part, pose), rgb)| placed_part(part, *pose, *rgb)).collect();
         gpu.queue.write_buffer(&self.parts, 0, &bytes(numbers.as_flattened()));
+        gpu.queue.write_buffer(&self.contacts, 0, &bytes(&bits(contact.texels.as_flattened())));
     }
 
     /// Looks through a camera.
-    pub(super) fn look(&self, gpu: &Gpu, prepared: &Prepared, placed: &Placed, camera: &Camera) {
+    pub(super) fn look(
+        &self,
+        gpu: &Gpu,
+        prepared: &Prepared,
+        placed: &Placed,
+        contact: &ContactMap,
+        camera: &Camera,
+    ) {
         let rotation = camera.world_from_camera.rotation;
         let sample = 1.0 / (camera.focal_px() * SAMPLES as f32);
         let (width, height) = (camera.width as f32, camera.height as f32);
         let direction = |axis: Vector| [axis.x, axis.y, axis.z, 0.0];
         let map = sun_map(placed.focus_m, prepared.scenery.focus_radius_m);
         let [column, row, nearness] = map.map(|(axis, constant)| [axis.x, axis.y, axis.z, constant]);
-        let numbers = [
+        let [x_m, y_m] = contact.corner_m;
+        let numbers: [[f32; 4]; VIEW_NUMBERS / 4] = [
             direction(rotation * Vector::X),
             direction(rotation * Vector::Y),
             direction(rotation * Vector::Z),
@@ -67,8 +83,9 @@ impl Scene {
             row,
             nearness,
             [2.0 * camera.focal_px() / width, 2.0 * camera.focal_px() / height, width, height],
+            [x_m, y_m, contact.texels_per_m, 0.0],
         ];
-        gpu.queue.write_buffer(&self.view, 0, &bytes(&numbers.as_flattened().iter().map(|x| x.to_bits()).collect::<Vec<_>>()));
+        gpu.queue.write_buffer(&self.view, 0, &bytes(&bits(numbers.as_flattened())));
     }
 }
 
@@ -83,12 +100,9 @@ fn part_corners(part: &Part, number: u32) -> impl Iterator<Item = [u32; 4]> {
 fn face(face: &Face) -> [u32; 16] {
     let bend = face.bend_1_m.unwrap_or(Matrix::ZERO);
     let mut numbers = [0; 16];
-    for (four, vector) in numbers.as_chunks_mut::<4>().0.iter_mut().zip([
-        face.normal,
-        bend.x_axis,
-        bend.y_axis,
-        bend.z_axis,
-    ]) {
+    for (four, vector) in
+        numbers.as_chunks_mut::<4>().0.iter_mut().zip([face.normal, bend.x_axis, bend.y_axis, bend.z_axis])
+    {
         *four = [vector.x.to_bits(), vector.y.to_bits(), vector.z.to_bits(), 0];
     }
     numbers
@@ -108,11 +122,16 @@ fn placed_part(part: &Part, pose: Pose, linear_rgb: Vector) -> [u32; 20] {
         [linear_rgb.x, linear_rgb.y, linear_rgb.z, checkered],
     ];
     let mut numbers = [0; 20];
-    let flags = [part.id, part.casts_shadow.into(), 0, 0];
-    for (number, bits) in numbers.iter_mut().zip(rows.as_flattened().iter().map(|x| x.to_bits()).chain(flags)) {
+    let flags = [part.id, part.casts_shadow.into(), (part.carrier == Carrier::Room).into(), 0];
+    for (number, bits) in numbers.iter_mut().zip(rows.as_flattened().iter().map(|x| x.to_bits()).chain(flags))
+    {
         *number = bits;
     }
     numbers
+}
+
+fn bits(numbers: &[f32]) -> Vec<u32> {
+    numbers.iter().map(|number| number.to_bits()).collect()
 }
 
 fn bytes(numbers: &[u32]) -> Vec<u8> {

@@ -3,9 +3,10 @@
 use rapier3d::math::Vector;
 
 use crate::render::camera::NEAR_M;
+use crate::render::contact::SINK_M;
 use crate::render::light::{
-    BIAS_M, CHECKER_DARK, CHECKER_PER_M, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, NORMAL_OFFSET_M, OUTLINE,
-    OUTLINE_DEPTH_STEP, SKY, SRGB_STEPS, SUN, SUN_DISTANCE_M, TEXELS, TO_SUN,
+    BIAS_M, CHECKER_DARK, CHECKER_PER_M, CONTACT, CONTACT_TEXELS, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP,
+    NORMAL_OFFSET_M, OUTLINE, OUTLINE_DEPTH_STEP, SKY, SRGB_STEPS, SUN, SUN_DISTANCE_M, TEXELS, TO_SUN,
 };
 use crate::render::prepared::NOTHING;
 
@@ -17,6 +18,7 @@ pub(super) fn text() -> String {
         ("SUN_DISTANCE_M", SUN_DISTANCE_M),
         ("TEXELS", TEXELS as f32),
         ("LAMP", LAMP),
+        ("CONTACT", CONTACT),
         ("HIGHLIGHT", HIGHLIGHT),
         ("CHECKER_DARK", CHECKER_DARK),
         ("CHECKER_PER_M", CHECKER_PER_M),
@@ -36,6 +38,7 @@ pub(super) fn text() -> String {
         format!("const {name} = vec3f({x:?}f, {y:?}f, {z:?}f);\n")
     };
     let bits = format!("const NOTHING = {NOTHING}u;\nconst INFINITY_BITS = {}u;\n", f32::INFINITY.to_bits());
-    let constants = numbers.map(number).into_iter().chain(vectors.map(vector)).chain([bits]);
+    let texels = format!("const CONTACT_TEXELS = {CONTACT_TEXELS}u;\nconst SINK_M = {SINK_M:?}f;\n");
+    let constants = numbers.map(number).into_iter().chain(vectors.map(vector)).chain([bits, texels]);
     constants.chain([include_str!("picture.wgsl").into()]).collect()
 }

@@ -1,8 +1,9 @@
 //! What pictures of one size are drawn into.
 
 use wgpu::{
-    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindingResource, Buffer, BufferDescriptor,
-    BufferUsages, Extent3d, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView,
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindingResource, Buffer,
+    BufferDescriptor, BufferUsages, Extent3d, TextureDescriptor, TextureDimension, TextureFormat,
+    TextureUsages, TextureView,
 };
 
 use super::device::{Gpu, GpuError};
@@ -43,7 +44,12 @@ impl Targets {
         let (samples, centres) = (layer(SAMPLES as u32), layer(1));
         let buffer = |usage: BufferUsages| {
             let size = u64::from(width) * u64::from(height) * BYTES_PER_PIXEL;
-            gpu.device.create_buffer(&BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
+            gpu.device.create_buffer(&BufferDescriptor {
+                label: None,
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
         };
         let picture = buffer(BufferUsages::STORAGE | BufferUsages::COPY_SRC);
         let readable = buffer(BufferUsages::MAP_READ | BufferUsages::COPY_DST);
