@@ -58,8 +58,7 @@ fn psnr_db(a: &Frame, b: &Frame) -> f64 {
 /// Depth difference that 99 of 100 pixels do not exceed.
 fn depth_p99_m(a: &Frame, b: &Frame) -> f32 {
     let pairs = a.depth_m.iter().zip(&b.depth_m);
-    let mut differences_m: Vec<f32> =
-        pairs.map(|(a, b)| if a == b { 0.0 } else { (a - b).abs() }).collect();
+    let mut differences_m: Vec<f32> = pairs.map(|(a, b)| if a == b { 0.0 } else { (a - b).abs() }).collect();
     differences_m.sort_by(f32::total_cmp);
     differences_m[differences_m.len() * 99 / 100]
 }
@@ -72,7 +71,8 @@ fn both_renderers_draw_the_same() {
     let commands: Vec<_> = (0..world.robots().len()).map(|robot| world.rest_command(robot)).collect();
     // Twice, for what moves has to be seen to have moved.
     for _ in 0..2 {
-        let step = (0..25).map(|_| world.control_step(&commands).expect("it stays finite")).last().expect("one");
+        let step =
+            (0..25).map(|_| world.control_step(&commands).expect("it stays finite")).last().expect("one");
         for camera in views(&world, &step) {
             let (drawn, expected) = (gpu.render(&step, &camera), embedded.render(&step, &camera));
             let size = format!("{} x {}", camera.width, camera.height);

@@ -246,6 +246,44 @@ fn fingers_cast_shadows() {
 }
 
 #[test]
+fn what_stands_darkens_the_floor_around_it_and_what_hovers_does_not() {
+    let camera = overhead(2.0);
+    let mut renderer = cpu(floor_and(Mesh::cuboid(Vector::splat(0.05))));
+    let mut at_height = |z: f32| {
+        let frame = renderer.render(&step(&[at(0.0, 0.0, z)]), &camera);
+        // Beside the block, and on the side that the sun shines on.
+        [-0.065, -0.3].map(|x| rgb(&frame, pixel_at(&camera, Vector::new(x, 0.0, 0.0)))[0])
+    };
+    let (standing, hovering) = (at_height(0.05), at_height(0.5));
+    assert!(f32::from(standing[0]) < 0.97 * f32::from(hovering[0]), "{standing:?} against {hovering:?}");
+    assert_eq!(standing[1], hovering[1], "further away, it makes no difference");
+    assert_eq!(hovering[0], hovering[1]);
+}
+
+#[test]
+fn textures_are_made_of_two_colours_and_leave_depth_and_ids_as_they_are() {
+    let camera = overhead(1.5);
+    let mut scenery = scenery(vec![(Mesh::cuboid(Vector::new(1.0, 0.5, 0.01)), Pose::IDENTITY)]);
+    let plain = render(&scenery, &camera);
+    // Along a line, how many colours there are.
+    let colours = |frame: &Frame, along: Vector| {
+        let points = (0..100).map(|i| along * (0.004 * i as f32 - 0.2) + Vector::new(0.013, 0.017, 0.01));
+        let seen: std::collections::BTreeSet<_> =
+            points.map(|point_m| rgb(frame, pixel_at(&camera, point_m))).collect();
+        seen.len()
+    };
+    for pattern in [Pattern::of("oak_dark"), Pattern::of("velvet"), Pattern::Checker([0.1, 0.1, 0.1])] {
+        scenery.parts[0].pattern = pattern;
+        let textured = render(&scenery, &camera);
+        assert_eq!((&textured.depth_m, &textured.ids), (&plain.depth_m, &plain.ids));
+        assert!(colours(&textured, Vector::Y) > colours(&plain, Vector::Y), "{pattern:?}");
+        let brighter = textured.rgb.iter().zip(&plain.rgb).filter(|(textured, plain)| textured > plain);
+        assert_eq!(brighter.count(), 0, "{pattern:?}: the second colour is the darker one");
+    }
+    assert_eq!(Pattern::of("wall"), Pattern::Plain);
+}
+
+#[test]
 fn an_edge_is_the_mean_of_both_sides_in_linear_light() {
     // A wall whose edge runs through the middle of the picture's column 80, half a pixel to the right.
     let camera = overhead(1.0);

@@ -18,9 +18,6 @@ pub(super) const HIGHLIGHT: f32 = 0.15;
 /// Where nothing is.
 pub(super) const SKY: Vector = Vector::new(0.45, 0.55, 0.70);
 
-pub(super) const CHECKER_DARK: f32 = 0.72;
-pub(super) const CHECKER_PER_M: f32 = 2.0;
-
 /// How much the outline between two things darkens.
 pub(super) const OUTLINE: f32 = 0.45;
 /// Two things are outlined where their depths differ by more than this part: not where they touch.

@@ -13,6 +13,7 @@ mod gpu;
 mod kind;
 mod light;
 mod mesh;
+mod pattern;
 mod png;
 mod prepared;
 #[cfg(feature = "gpu")]
@@ -26,8 +27,9 @@ pub use camera::Camera;
 pub use cameras::Cameras;
 pub use kind::RendererKind;
 pub use mesh::{Mesh, Vertex};
+pub use pattern::Pattern;
 pub use png::{PictureError, encode_png};
-pub use scenery::{Carrier, Part, Pattern, Placed, Scenery};
+pub use scenery::{Carrier, Part, Placed, Scenery};
 
 use crate::Step;
 

@@ -3,7 +3,7 @@
 use rapier3d::math::{Matrix, Vector};
 
 use super::light::linear;
-use super::{Mesh, Scenery};
+use super::{Mesh, Part, Scenery};
 
 /// Marks a sample at which nothing is.
 pub(super) const NOTHING: u32 = u32::MAX;
@@ -18,8 +18,10 @@ pub(super) struct Prepared {
     ids: Vec<u32>,
     /// Centre and radius of a sphere around each part, in its mesh's frame.
     pub bounds: Vec<(Vector, f32)>,
-    /// Of each part.
-    pub linear_rgb: Vec<Vector>,
+    /// The two colours of each part.
+    pub linear_rgb: Vec<[Vector; 2]>,
+    /// Of each part, which axis of its mesh the grain runs along.
+    pub grain: Vec<usize>,
 }
 
 /// A triangle as shading wants it, in its mesh's frame.
@@ -47,7 +49,8 @@ impl Prepared {
             faces,
             ids,
             bounds: scenery.parts.iter().map(|part| part.mesh.bounds()).collect(),
-            linear_rgb: scenery.parts.iter().map(|part| linear(part.rgb)).collect(),
+            linear_rgb: scenery.parts.iter().map(colours).collect(),
+            grain: scenery.parts.iter().map(|part| part.mesh.longest_axis()).collect(),
             scenery,
         }
     }
@@ -59,6 +62,12 @@ impl Prepared {
             _ => self.ids[triangle as usize],
         }
     }
+}
+
+/// Linear, of a part.
+fn colours(part: &Part) -> [Vector; 2] {
+    let first = linear(part.rgb);
+    [first, part.pattern.second_rgb(first)]
 }
 
 impl Face {

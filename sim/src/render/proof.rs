@@ -22,7 +22,7 @@ pub(super) fn scenery() -> Scenery {
         id,
         casts_shadow: true,
     };
-    let floor = part(Mesh::plane([1.0, 1.0]), [0.8, 0.7, 0.6], Pattern::Checker, 1);
+    let floor = part(Mesh::plane([1.0, 1.0]), [0.8, 0.7, 0.6], Pattern::Checker([0.5, 0.4, 0.4]), 1);
     let ball = part(Mesh::sphere(0.2), [0.7, 0.2, 0.2], Pattern::Plain, 2);
     Scenery { parts: vec![floor, ball], focus_radius_m: 1.0 }
 }

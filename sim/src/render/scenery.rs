@@ -2,7 +2,7 @@
 
 use rapier3d::math::{Pose, Vector};
 
-use super::{Mesh, robot_rgba};
+use super::{Mesh, Pattern, robot_rgba};
 use crate::mjcf::{Geom, Primitive};
 use crate::{Step, World};
 
@@ -38,15 +38,6 @@ pub enum Carrier {
         link: usize,
     },
     Object(usize),
-}
-
-/// How a surface varies.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Pattern {
-    #[default]
-    Plain,
-    /// Squares of half a metre in the world's ground plane.
-    Checker,
 }
 
 /// Where everything is after a step.
@@ -119,8 +110,11 @@ fn part(geom: &Geom, carrier: Carrier, [r, g, b, _]: [f32; 4], id: u32) -> Part 
         mesh: Mesh::of(&geom.primitive),
         carrier,
         carrier_from_mesh: geom.body_from_geom,
-        rgb: [r, g, b],
-        pattern: if geom.checkered { Pattern::Checker } else { Pattern::Plain },
+        rgb: geom.checker_rgb.map_or([r, g, b], |[first, _]| first),
+        pattern: match geom.checker_rgb {
+            Some([_, second]) => Pattern::Checker(second),
+            None => Pattern::of(geom.material.as_deref().unwrap_or_default()),
+        },
         id,
         // Nothing is below a floor.
         casts_shadow: !matches!(geom.primitive, Primitive::Plane { .. }),

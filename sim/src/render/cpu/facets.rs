@@ -20,8 +20,9 @@ pub(super) struct Facet {
     /// The normal at a point p of the triangle is `normal + bend * p`.
     normal: Vector,
     bend: Option<Matrix>,
-    pub linear_rgb: Vector,
-    pub pattern: Pattern,
+    part: u32,
+    linear_rgb: [Vector; 2],
+    pattern: Pattern,
     /// Whether things stand on it, which darken it.
     pub carries: bool,
 }
@@ -44,6 +45,24 @@ impl Facets {
     }
 }
 
+impl Facets {
+    /// Linear colour of a triangle's surface at a point of the world.
+    #[inline(always)]
+    pub(super) fn albedo(&self, prepared: &Prepared, facet: &Facet, point_m: Vector) -> Vector {
+        let [first, second] = facet.linear_rgb;
+        if facet.pattern == Pattern::Plain {
+            return first;
+        }
+        let share = facet.pattern.share(point_m, || {
+            let (rotation, translation_m) = self.world_from_mesh[facet.part as usize];
+            let in_mesh_m = rotation.transpose() * (point_m - translation_m);
+            let grain = prepared.grain[facet.part as usize];
+            Vector::new(in_mesh_m[grain], in_mesh_m[(grain + 1) % 3], in_mesh_m[(grain + 2) % 3])
+        });
+        first + (second - first) * share
+    }
+}
+
 impl Facet {
     /// The normal at a point p, of a mesh whose frame is the world: n + B (p - corner).
     fn new(prepared: &Prepared, world_from_mesh: &[(Matrix, Vector)], face: &Face) -> Facet {
@@ -55,6 +74,7 @@ impl Facet {
         Facet {
             normal: rotation * face.normal - at_origin,
             bend,
+            part: face.part,
             linear_rgb: prepared.linear_rgb[part],
             pattern: prepared.scenery.parts[part].pattern,
             carries: prepared.scenery.parts[part].carrier == Carrier::Room,

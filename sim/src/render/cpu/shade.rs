@@ -3,10 +3,7 @@
 use rapier3d::math::Vector;
 
 use super::shadow::ShadowMap;
-use crate::render::Pattern;
-use crate::render::light::{
-    CHECKER_DARK, CHECKER_PER_M, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, SUN, TO_SUN,
-};
+use crate::render::light::{FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, SUN, TO_SUN};
 use crate::render::rows::LANES;
 
 /// As many points as are shaded together: enough for a loop to be worth its beginning, few enough to stay near the processor.
@@ -142,18 +139,5 @@ impl Surfaces {
         let sunlight = self.facing_sun[i] * self.sunlit[i];
         let unlit = albedo * (ambient + LAMP * self.facing_eye[i]);
         self.colour.set(i, (unlit + (albedo * SUN + self.highlight[i]) * sunlight) * self.open[i]);
-    }
-}
-
-/// Linear colour of a part's surface at a point of the world.
-#[inline(always)]
-pub(super) fn albedo(pattern: Pattern, linear_rgb: Vector, point_m: Vector) -> Vector {
-    match pattern {
-        Pattern::Plain => linear_rgb,
-        Pattern::Checker => {
-            let square = |metres: f32| (metres * CHECKER_PER_M).floor() as i32;
-            let dark = (square(point_m.x) + square(point_m.y)) & 1 == 0;
-            if dark { linear_rgb * CHECKER_DARK } else { linear_rgb }
-        }
     }
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use rapier3d::math::Vector;
 
 use super::facets::{Facet, Facets};
-use super::shade::{Surface, Surfaces, albedo};
+use super::shade::{Surface, Surfaces};
 use super::shadow::ShadowMap;
 use super::srgb::SrgbTable;
 use super::target::Target;
@@ -115,7 +115,8 @@ impl<'a> View<'a> {
         let facet = *row.facets.get(self.prepared, triangle);
         let nearness_1_m = self.target.nearness_1_m(y * SAMPLES);
         for x in pixels {
-            let surface = self.surface(&facet, [x * SAMPLES, y * SAMPLES], nearness_1_m[x * SAMPLES]);
+            let surface =
+                self.surface(row.facets, &facet, [x * SAMPLES, y * SAMPLES], nearness_1_m[x * SAMPLES]);
             row.push(surface, x, 1.0);
         }
     }
@@ -141,8 +142,8 @@ impl<'a> View<'a> {
                     NOTHING => row.sums[x] += SKY * share,
                     triangle => {
                         let (_, nearness_1_m) = self.sample(at(i));
-                        let surface =
-                            self.surface(row.facets.get(self.prepared, triangle), at(i), nearness_1_m);
+                        let facet = *row.facets.get(self.prepared, triangle);
+                        let surface = self.surface(row.facets, &facet, at(i), nearness_1_m);
                         row.push(surface, x, share);
                     }
                 }
@@ -187,10 +188,10 @@ impl<'a> View<'a> {
 
     /// Where the ray of a sample meets a triangle.
     #[inline(always)]
-    fn surface(&self, facet: &Facet, [sx, sy]: [usize; 2], nearness_1_m: f32) -> Surface {
+    fn surface(&self, facets: &Facets, facet: &Facet, [sx, sy]: [usize; 2], nearness_1_m: f32) -> Surface {
         let ray = self.corner_ray + self.right_ray * (sx as f32 + 0.5) + self.down_ray * (sy as f32 + 0.5);
         let point_m = self.eye_m + ray * (1.0 / nearness_1_m);
-        let albedo = albedo(facet.pattern, facet.linear_rgb, point_m);
+        let albedo = facets.albedo(self.prepared, facet, point_m);
         let open = if facet.carries { 1.0 - CONTACT * self.contact.darkness(point_m) } else { 1.0 };
         Surface { point_m, ray, normal: facet.normal(point_m), albedo, open }
     }

@@ -25,8 +25,9 @@ struct Part {
     x: vec4f,
     y: vec4f,
     z: vec4f,
-    // Linear, and whether it is checkered.
+    // Linear colours, with the pattern between them and the axis of the mesh that its grain runs along.
     rgb: vec4f,
+    second_rgb: vec4f,
     // Id, whether it casts a shadow, and whether things stand on it.
     flags: vec4u,
 }
@@ -160,10 +161,38 @@ fn darkness(point_m: vec3f) -> f32 {
     );
 }
 
+// Up and down between 0 and 1 with a period of 1.
+fn wave(x: f32) -> f32 {
+    return abs(2.0 * fract(x) - 1.0);
+}
+
+// How much of the second colour there is at a point.
+fn second_share(part: Part, point_m: vec3f) -> f32 {
+    if part.rgb.w == 0.0 {
+        return 0.0;
+    }
+    if part.rgb.w == 1.0 {
+        let square = vec2i(floor(point_m.xy * CHECKER_PER_M));
+        return select(0.0, 1.0, ((square.x + square.y) & 1) == 0);
+    }
+    let in_mesh = turned_back(part, point_m - vec3f(part.x.w, part.y.w, part.z.w));
+    var p = in_mesh;
+    if part.second_rgb.w == 1.0 {
+        p = in_mesh.yzx;
+    } else if part.second_rgb.w == 2.0 {
+        p = in_mesh.zxy;
+    }
+    if part.rgb.w == 2.0 {
+        let across = p.y + p.z;
+        let band = wave(across * BANDS_PER_M + STRAY * wave(p.x * 1.1 + across));
+        return 0.7 * band * band + 0.3 * wave(across * LINES_PER_M + p.x);
+    }
+    let thread = p * THREADS_PER_M;
+    return wave(thread.x + thread.z) * wave(thread.y + thread.z);
+}
+
 fn albedo(part: Part, point_m: vec3f) -> vec3f {
-    let square = vec2i(floor(point_m.xy * CHECKER_PER_M));
-    let dark = part.rgb.w != 0.0 && ((square.x + square.y) & 1) == 0;
-    return part.rgb.xyz * select(1.0, CHECKER_DARK, dark);
+    return mix(part.rgb.xyz, part.second_rgb.xyz, second_share(part, point_m));
 }
 
 // Linear colour of what a ray sees.

@@ -11,8 +11,9 @@ use crate::render::light::{CONTACT_TEXELS, SAMPLES, sun_map};
 use crate::render::prepared::{Face, Prepared};
 use crate::render::{Camera, Carrier, Part, Pattern, Placed};
 
-/// Of `picture.wgsl`'s `View`.
+/// Of `picture.wgsl`'s `View`, and of its `Part`.
 const VIEW_NUMBERS: usize = 48;
+const PART_NUMBERS: usize = 24;
 
 /// What `picture.wgsl` calls its group 0.
 pub(super) struct Scene {
@@ -39,7 +40,7 @@ impl Scene {
         let view = initialised(&[0; VIEW_NUMBERS], BufferUsages::COPY_DST | BufferUsages::UNIFORM);
         let numbers = initialised(corners.as_flattened(), BufferUsages::STORAGE);
         let faces = initialised(faces.as_flattened(), BufferUsages::STORAGE);
-        let parts = initialised(&vec![0; prepared.scenery.parts.len() * 20], written);
+        let parts = initialised(&vec![0; prepared.scenery.parts.len() * PART_NUMBERS], written);
         let contacts = initialised(&vec![0; 2 * CONTACT_TEXELS * CONTACT_TEXELS], written);
         let resources = [&view, &numbers, &faces, &parts, &contacts].map(|buffer| buffer.as_entire_binding());
         let group = bind(gpu, &gpu.passes.scene, resources);
@@ -48,9 +49,10 @@ impl Scene {
 
     /// Puts every part where it is.
     pub(super) fn place(&self, gpu: &Gpu, prepared: &Prepared, placed: &Placed, contact: &ContactMap) {
-        let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).zip(&prepared.linear_rgb);
-        let numbers: Vec<[u32; 20]> =
-            parts.map(|((part, pose), rgb)| placed_part(part, *pose, *rgb)).collect();
+        let colours = prepared.linear_rgb.iter().zip(&prepared.grain);
+        let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).zip(colours);
+        let numbers: Vec<[u32; PART_NUMBERS]> =
+            parts.map(|((part, pose), (rgb, grain))| placed_part(part, *pose, *rgb, *grain)).collect();
         gpu.queue.write_buffer(&self.parts, 0, &bytes(numbers.as_flattened()));
         gpu.queue.write_buffer(&self.contacts, 0, &bytes(&bits(contact.texels.as_flattened())));
     }
@@ -108,20 +110,23 @@ fn face(face: &Face) -> [u32; 16] {
     numbers
 }
 
-fn placed_part(part: &Part, pose: Pose, linear_rgb: Vector) -> [u32; 20] {
+fn placed_part(part: &Part, pose: Pose, [first, second]: [Vector; 2], grain: usize) -> [u32; PART_NUMBERS] {
     let (matrix, t) = (Matrix::from_quat(pose.rotation), pose.translation);
     let (x, y, z) = (matrix.row(0), matrix.row(1), matrix.row(2));
-    let checkered = match part.pattern {
+    let pattern = match part.pattern {
         Pattern::Plain => 0.0,
-        Pattern::Checker => 1.0,
+        Pattern::Checker(_) => 1.0,
+        Pattern::Wood => 2.0,
+        Pattern::Fabric => 3.0,
     };
     let rows = [
         [x.x, x.y, x.z, t.x],
         [y.x, y.y, y.z, t.y],
         [z.x, z.y, z.z, t.z],
-        [linear_rgb.x, linear_rgb.y, linear_rgb.z, checkered],
+        [first.x, first.y, first.z, pattern],
+        [second.x, second.y, second.z, grain as f32],
     ];
-    let mut numbers = [0; 20];
+    let mut numbers = [0; PART_NUMBERS];
     let flags = [part.id, part.casts_shadow.into(), (part.carrier == Carrier::Room).into(), 0];
     for (number, bits) in numbers.iter_mut().zip(rows.as_flattened().iter().map(|x| x.to_bits()).chain(flags))
     {

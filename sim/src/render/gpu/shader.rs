@@ -5,9 +5,10 @@ use rapier3d::math::Vector;
 use crate::render::camera::NEAR_M;
 use crate::render::contact::SINK_M;
 use crate::render::light::{
-    BIAS_M, CHECKER_DARK, CHECKER_PER_M, CONTACT, CONTACT_TEXELS, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP,
-    NORMAL_OFFSET_M, OUTLINE, OUTLINE_DEPTH_STEP, SKY, SRGB_STEPS, SUN, SUN_DISTANCE_M, TEXELS, TO_SUN,
+    BIAS_M, CONTACT, CONTACT_TEXELS, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, NORMAL_OFFSET_M, OUTLINE,
+    OUTLINE_DEPTH_STEP, SKY, SRGB_STEPS, SUN, SUN_DISTANCE_M, TEXELS, TO_SUN,
 };
+use crate::render::pattern::{BANDS_PER_M, CHECKER_PER_M, LINES_PER_M, STRAY, THREADS_PER_M};
 use crate::render::prepared::NOTHING;
 
 pub(super) fn text() -> String {
@@ -20,8 +21,11 @@ pub(super) fn text() -> String {
         ("LAMP", LAMP),
         ("CONTACT", CONTACT),
         ("HIGHLIGHT", HIGHLIGHT),
-        ("CHECKER_DARK", CHECKER_DARK),
         ("CHECKER_PER_M", CHECKER_PER_M),
+        ("BANDS_PER_M", BANDS_PER_M),
+        ("LINES_PER_M", LINES_PER_M),
+        ("STRAY", STRAY),
+        ("THREADS_PER_M", THREADS_PER_M),
         ("OUTLINE", OUTLINE),
         ("OUTLINE_DEPTH_STEP", OUTLINE_DEPTH_STEP),
         ("SRGB_STEPS", SRGB_STEPS as f32),
