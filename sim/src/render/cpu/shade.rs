@@ -83,7 +83,8 @@ impl Surfaces {
 
     #[inline(always)]
     pub(super) fn push(&mut self, surface: Surface) {
-        let i = self.count;
+        // There is room, which the compiler cannot know: so it need not check.
+        let i = self.count % BATCH;
         self.count += 1;
         self.point_m.set(i, surface.point_m);
         self.ray.set(i, surface.ray);
