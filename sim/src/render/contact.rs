@@ -19,7 +19,7 @@ const HIGHEST_SUPPORT_M: f32 = 1.5;
 const DATUM_M: f32 = 4.0;
 /// Weights of a texel's neighbours in each direction.
 const BLUR: [f32; 5] = [1.0 / 9.0, 2.0 / 9.0, 3.0 / 9.0, 2.0 / 9.0, 1.0 / 9.0];
-const GRID: Grid = Grid { width: CONTACT_TEXELS, height: CONTACT_TEXELS, pitch: 1.0 };
+const GRID: Grid = Grid { width: CONTACT_TEXELS, height: CONTACT_TEXELS, pitch_px: 1.0 };
 
 /// The surroundings of the focus, seen from above. Columns run along the world's x, rows along y.
 #[derive(Default)]
@@ -28,7 +28,7 @@ pub(super) struct ContactMap {
     pub corner_m: [f32; 2],
     pub texels_per_m: f32,
     /// Of each texel, row by row: the height of what can carry things, and how dark it is there, from 0 to 1.
-    pub texels: Vec<[f32; 2]>,
+    pub texel_values: Vec<[f32; 2]>,
     support: Rows<f32>,
     underside: Rows<f32>,
 }
@@ -138,11 +138,11 @@ impl ContactMap {
             }
         }
         let across: Vec<_> = dark.iter().map(|row| blurred(|offset, i| row[shifted(i, offset)])).collect();
-        self.texels.clear();
+        self.texel_values.clear();
         for row in 0..CONTACT_TEXELS {
             let dark = blurred(|offset, i| across[shifted(row, offset)][i]);
             let heights_m = self.support.row(row).iter().map(|nearness_m| nearness_m - DATUM_M);
-            self.texels.extend(heights_m.zip(dark).map(|(height_m, dark)| [height_m, dark]));
+            self.texel_values.extend(heights_m.zip(dark).map(|(height_m, dark)| [height_m, dark]));
         }
     }
 
@@ -155,7 +155,7 @@ impl ContactMap {
             return 0.0;
         }
         let (column, row) = (usize::from(u as u16), usize::from(v as u16));
-        let at = |j: usize, i: usize| self.texels[(row + j) * CONTACT_TEXELS + column + i];
+        let at = |j: usize, i: usize| self.texel_values[(row + j) * CONTACT_TEXELS + column + i];
         let (right, down) = (u - column as f32, v - row as f32);
         let [height_m, _] = at(usize::from(down >= 0.5), usize::from(right >= 0.5));
         if (point_m.z - height_m).abs() > SINK_M {

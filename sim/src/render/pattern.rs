@@ -75,6 +75,6 @@ impl Pattern {
 
 /// Up and down between 0 and 1 with a period of 1.
 #[inline(always)]
-fn wave(x: f32) -> f32 {
-    (2.0 * (x - x.floor()) - 1.0).abs()
+fn wave(value: f32) -> f32 {
+    (2.0 * (value - value.floor()) - 1.0).abs()
 }

@@ -13,9 +13,9 @@ pub(super) struct Outline {
     /// Picture coordinates.
     corners: [[f64; 2]; 3],
     /// Nearness at the first corner, and how it changes.
-    nearness: f64,
-    along_x: f64,
-    along_y: f64,
+    nearness_value: f64,
+    x_factor: f64,
+    y_factor: f64,
 }
 
 /// The samples of a grid that a triangle can reach, the last ones included.
@@ -27,11 +27,11 @@ struct Reach {
     y1: u32,
 }
 
-/// Where a line crosses a height: `x = slope * y + offset`.
+/// Where a line crosses a height: `x = slope_ratio * y + offset_value`.
 #[derive(Clone, Copy)]
 struct Edge {
-    slope: f64,
-    offset: f64,
+    slope_ratio: f64,
+    offset_value: f64,
 }
 
 /// The samples of a triangle in one row of a grid: nearness at the first, and from each to the next.
@@ -40,8 +40,8 @@ struct Span {
     row: usize,
     first: u32,
     end: u32,
-    start: f32,
-    step: f32,
+    start_value: f32,
+    step_value: f32,
 }
 
 /// Rows of a large triangle that are measured at once.
@@ -66,9 +66,9 @@ impl Outline {
         let per_area = 1.0 / area;
         Some(Outline {
             corners: [[ax, ay], [bx, by], [cx, cy]],
-            nearness: an,
-            along_x: (un * vy - vn * uy) * per_area,
-            along_y: (vn * ux - un * vx) * per_area,
+            nearness_value: an,
+            x_factor: (un * vy - vn * uy) * per_area,
+            y_factor: (vn * ux - un * vx) * per_area,
         })
     }
 
@@ -88,7 +88,7 @@ impl Outline {
     #[inline(always)]
     fn reach(&self, grid: Grid) -> Option<Reach> {
         let [[ax, ay], [bx, by], [cx, cy]] = self.corners;
-        let per_pitch = 1.0 / grid.pitch;
+        let per_pitch = 1.0 / grid.pitch_px;
         let first = |low: f64| larger(low * per_pitch - 0.5, 0.0).ceil();
         let last = |high: f64, count: usize| smaller(high * per_pitch - 0.5, (count - 1) as f64).floor();
         let x0 = first(smaller(smaller(ax, bx), cx));
@@ -105,16 +105,16 @@ impl Outline {
     fn draw_small<S: Simd>(&self, simd: S, grid: Grid, reach: Reach, mut each: impl FnMut(usize, S::f32s)) {
         let lanes = S::F32_LANES;
         let (first, last) = (reach.x0 as usize / lanes, reach.x1 as usize / lanes);
-        let y = (f64::from(reach.y0) + 0.5) * grid.pitch;
+        let y = (f64::from(reach.y0) + 0.5) * grid.pitch_px;
         let nothing = simd.splat_f32s(0.0);
         for vector in first..=last {
-            let x = ((vector * lanes) as f64 + 0.5) * grid.pitch;
+            let x = ((vector * lanes) as f64 + 0.5) * grid.pitch_px;
             // What changes from sample to sample, from row to row, and what it is at the first sample of the first row.
             let linear = |across: f32, start: f32| {
                 let lane = S::as_simd_f32s(&LANE).0[0];
                 simd.add_f32s(simd.splat_f32s(start), simd.mul_f32s(simd.splat_f32s(across), lane))
             };
-            let pitch = grid.pitch as f32;
+            let pitch = grid.pitch_px as f32;
             let edge = |from: usize, to: usize| {
                 let ([px, py], [qx, qy]) = (self.corners[from], self.corners[to]);
                 let (right, down) = ((qx - px) as f32, (qy - py) as f32);
@@ -126,9 +126,9 @@ impl Outline {
             let [mut a, mut b, mut c] = edges.map(|(start, _)| start);
             let [down_a, down_b, down_c] = edges.map(|(_, down)| down);
             let [ax, ay] = self.corners[0];
-            let start = self.nearness + self.along_x * (x - ax) + self.along_y * (y - ay);
-            let mut nearness = linear((self.along_x * grid.pitch) as f32, start as f32);
-            let down = simd.splat_f32s((self.along_y * grid.pitch) as f32);
+            let start = self.nearness_value + self.x_factor * (x - ax) + self.y_factor * (y - ay);
+            let mut nearness = linear((self.x_factor * grid.pitch_px) as f32, start as f32);
+            let down = simd.splat_f32s((self.y_factor * grid.pitch_px) as f32);
             for row in reach.y0..=reach.y1 {
                 let inside = simd.greater_than_or_equal_f32s(simd.min_f32s(a, simd.min_f32s(b, c)), nothing);
                 let index = row as usize * (grid.stride() / lanes) + vector;
@@ -143,25 +143,26 @@ impl Outline {
     #[inline(always)]
     fn draw_large<S: Simd>(&self, simd: S, grid: Grid, reach: Reach, mut each: impl FnMut(usize, S::f32s)) {
         let (left, right) = self.edges();
-        let per_pitch = 1.0 / grid.pitch;
+        let per_pitch = 1.0 / grid.pitch_px;
         let (x0, x1) = (f64::from(reach.x0), f64::from(reach.x1));
         let [ax, ay] = self.corners[0];
         for top in (reach.y0..=reach.y1).step_by(ROWS) {
             let (mut firsts, mut ends, mut starts) = ([0; ROWS], [0; ROWS], [0.0; ROWS]);
             for row in 0..ROWS {
-                let y = (f64::from(top + row as u32) + 0.5) * grid.pitch;
-                let x = |edge: Edge| (edge.slope * y + edge.offset) * per_pitch - 0.5;
+                let y = (f64::from(top + row as u32) + 0.5) * grid.pitch_px;
+                let x = |edge: Edge| (edge.slope_ratio * y + edge.offset_value) * per_pitch - 0.5;
                 let first = smaller(larger(larger(x(left[0]), x(left[1])), x0).ceil(), x1 + 1.0);
                 let end = larger(smaller(smaller(x(right[0]), x(right[1])), x1).floor() + 1.0, x0);
-                let start = self.along_x * ((first + 0.5) * grid.pitch - ax) + self.along_y * (y - ay);
+                let start = self.x_factor * ((first + 0.5) * grid.pitch_px - ax) + self.y_factor * (y - ay);
                 (firsts[row], ends[row]) = (whole(first), whole(end));
-                starts[row] = (self.nearness + start) as f32;
+                starts[row] = (self.nearness_value + start) as f32;
             }
             for row in 0..ROWS.min((reach.y1 - top + 1) as usize) {
                 if firsts[row] < ends[row] {
-                    let (first, end, start) = (firsts[row], ends[row], starts[row]);
-                    let step = (self.along_x * grid.pitch) as f32;
-                    Span { row: top as usize + row, first, end, start, step }.draw(simd, grid, &mut each);
+                    let (first, end, start_value) = (firsts[row], ends[row], starts[row]);
+                    let step_value = (self.x_factor * grid.pitch_px) as f32;
+                    let span = Span { row: top as usize + row, first, end, start_value, step_value };
+                    span.draw(simd, grid, &mut each);
                 }
             }
         }
@@ -170,15 +171,16 @@ impl Outline {
     /// What is inside lies to the right of the first two, and to the left of the others.
     #[inline(always)]
     fn edges(&self) -> ([Edge; 2], [Edge; 2]) {
-        let mut left = [Edge { slope: 0.0, offset: f64::NEG_INFINITY }; 2];
-        let mut right = [Edge { slope: 0.0, offset: f64::INFINITY }; 2];
+        let mut left = [Edge { slope_ratio: 0.0, offset_value: f64::NEG_INFINITY }; 2];
+        let mut right = [Edge { slope_ratio: 0.0, offset_value: f64::INFINITY }; 2];
         let (mut lefts, mut rights) = (0, 0);
         for (from, to) in [(0, 1), (1, 2), (2, 0)] {
             let ([px, py], [qx, qy]) = (self.corners[from], self.corners[to]);
             // A level edge bounds no row.
             let down = qy - py;
             let per_down = 1.0 / down;
-            let edge = Edge { slope: (qx - px) * per_down, offset: (px * qy - qx * py) * per_down };
+            let edge =
+                Edge { slope_ratio: (qx - px) * per_down, offset_value: (px * qy - qx * py) * per_down };
             if down > 0.0 {
                 left[lefts] = edge;
                 lefts += 1;
@@ -197,7 +199,7 @@ impl Span {
         let lanes = S::F32_LANES;
         let (first, last) = (self.first as usize / lanes, (self.end as usize - 1) / lanes);
         let nothing = simd.splat_f32s(0.0);
-        let (start, step) = (simd.splat_f32s(self.start), simd.splat_f32s(self.step));
+        let (start, step) = (simd.splat_f32s(self.start_value), simd.splat_f32s(self.step_value));
         let length = simd.splat_f32s((self.end - self.first) as f32);
         let before = simd.splat_f32s(self.first as f32 - (first * lanes) as f32);
         // Of each sample, how far it is from the first of the span.
@@ -216,13 +218,13 @@ impl Span {
 
 /// As `f64::max` and `f64::min`, which care for what is no number.
 #[inline(always)]
-fn larger(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
+fn larger(value: f64, min: f64) -> f64 {
+    if value > min { value } else { min }
 }
 
 #[inline(always)]
-fn smaller(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
+fn smaller(value: f64, max: f64) -> f64 {
+    if value < max { value } else { max }
 }
 
 /// A number that is whole and not negative. It becomes the lowest bits of the sum; a cast would look at each for itself.

@@ -9,7 +9,7 @@ pub(super) struct Grid {
     pub width: usize,
     pub height: usize,
     /// Between neighbours, in the unit that triangles are given in.
-    pub pitch: f64,
+    pub pitch_px: f64,
 }
 
 impl Grid {

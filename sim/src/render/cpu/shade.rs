@@ -19,7 +19,7 @@ pub(super) struct Surface {
     pub normal: Vector,
     pub albedo: Vector,
     /// What contacts leave of all light.
-    pub open: f32,
+    pub open_share: f32,
 }
 
 /// Points that are shaded together. They are kept coordinate by coordinate and worked on in loops that do not branch: so
@@ -33,11 +33,11 @@ pub(super) struct Surfaces {
     /// Place in the shadow map.
     texel: Vectors,
     /// Light that comes from everywhere, and what the sun adds; and the sun's reflection.
-    facing_sun: [f32; BATCH],
-    facing_eye: [f32; BATCH],
-    highlight: [f32; BATCH],
-    sunlit: [f32; BATCH],
-    open: [f32; BATCH],
+    sun_factor: [f32; BATCH],
+    eye_factor: [f32; BATCH],
+    highlight_factor: [f32; BATCH],
+    sunlit_share: [f32; BATCH],
+    open_share: [f32; BATCH],
     colour: Vectors,
 }
 
@@ -67,11 +67,11 @@ impl Surfaces {
             normal: Vectors::ZERO,
             albedo: Vectors::ZERO,
             texel: Vectors::ZERO,
-            facing_sun: [0.0; BATCH],
-            facing_eye: [0.0; BATCH],
-            highlight: [0.0; BATCH],
-            sunlit: [0.0; BATCH],
-            open: [1.0; BATCH],
+            sun_factor: [0.0; BATCH],
+            eye_factor: [0.0; BATCH],
+            highlight_factor: [0.0; BATCH],
+            sunlit_share: [0.0; BATCH],
+            open_share: [1.0; BATCH],
             colour: Vectors::ZERO,
         }
     }
@@ -90,7 +90,7 @@ impl Surfaces {
         self.ray.set(i, surface.ray);
         self.normal.set(i, surface.normal);
         self.albedo.set(i, surface.albedo);
-        self.open[i] = surface.open;
+        self.open_share[i] = surface.open_share;
     }
 
     /// Linear colours of all that were pushed, in their order; then they are forgotten.
@@ -102,7 +102,8 @@ impl Surfaces {
             self.face(i, shadow);
         }
         for i in 0..count {
-            self.sunlit[i] = if self.facing_sun[i] > 0.0 { shadow.sunlit(self.texel.get(i)) } else { 0.0 };
+            self.sunlit_share[i] =
+                if self.sun_factor[i] > 0.0 { shadow.sunlit(self.texel.get(i)) } else { 0.0 };
         }
         for i in 0..whole {
             self.light(i);
@@ -125,9 +126,9 @@ impl Surfaces {
         let cosine_8 = cosine_2 * cosine_2 * cosine_2 * cosine_2;
         let cosine_40 = cosine_8 * cosine_8 * cosine_8 * cosine_8 * cosine_8;
         self.normal.set(i, normal);
-        self.facing_eye[i] = towards_eye.abs();
-        self.facing_sun[i] = facing_sun;
-        self.highlight[i] = if along > 0.0 { HIGHLIGHT * cosine_40 } else { 0.0 };
+        self.eye_factor[i] = towards_eye.abs();
+        self.sun_factor[i] = facing_sun;
+        self.highlight_factor[i] = if along > 0.0 { HIGHLIGHT * cosine_40 } else { 0.0 };
         self.texel.set(i, shadow.texel(self.point_m.get(i), normal));
     }
 
@@ -137,8 +138,9 @@ impl Surfaces {
         let albedo = self.albedo.get(i);
         let up = self.normal.0[2][i] * 0.5 + 0.5;
         let ambient = FROM_BELOW + (FROM_ABOVE - FROM_BELOW) * up;
-        let sunlight = self.facing_sun[i] * self.sunlit[i];
-        let unlit = albedo * (ambient + LAMP * self.facing_eye[i]);
-        self.colour.set(i, (unlit + (albedo * SUN + self.highlight[i]) * sunlight) * self.open[i]);
+        let sunlight = self.sun_factor[i] * self.sunlit_share[i];
+        let unlit = albedo * (ambient + LAMP * self.eye_factor[i]);
+        self.colour
+            .set(i, (unlit + (albedo * SUN + self.highlight_factor[i]) * sunlight) * self.open_share[i]);
     }
 }

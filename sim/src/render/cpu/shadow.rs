@@ -29,7 +29,7 @@ impl ShadowMap {
     pub(super) fn draw<S: Simd>(&mut self, simd: S, prepared: &Prepared, placed: &Placed) {
         let radius_m = prepared.scenery.focus_radius_m;
         self.map_from_world = sun_map(placed.focus_m, radius_m);
-        let grid = Grid { width: TEXELS, height: TEXELS, pitch: 1.0 };
+        let grid = Grid { width: TEXELS, height: TEXELS, pitch_px: 1.0 };
         self.nearness_m.reset(grid, 0.0);
         let nearest = S::as_mut_simd_f32s(self.nearness_m.all_mut()).0;
         let mut corners = Vec::new();
@@ -94,8 +94,8 @@ impl ShadowMap {
 
     /// 1 in the sun, 0 in the shadow, smooth over three texels; points outside the map are in the sun.
     #[inline(always)]
-    pub(super) fn sunlit(&self, texel: Vector) -> f32 {
-        let (u, v, nearness_m) = (texel.x, texel.y, texel.z);
+    pub(super) fn sunlit(&self, texel_values: Vector) -> f32 {
+        let [u, v, nearness_m] = texel_values.to_array();
         let inside = |i: f32| i >= 1.0 && i < (TEXELS - 3) as f32;
         if !inside(u) || !inside(v) {
             return 1.0;
@@ -104,7 +104,7 @@ impl ShadowMap {
         match self.cells(column, row) {
             [_, greatest_m] if nearness_m >= greatest_m => 1.0,
             [least_m, _] if nearness_m < least_m => 0.0,
-            _ => self.filtered(u, v, nearness_m),
+            _ => self.filtered(texel_values),
         }
     }
 
@@ -121,7 +121,8 @@ impl ShadowMap {
     }
 
     /// Four taps with a tent's weights along each axis are a bilinear filter three texels wide.
-    fn filtered(&self, u: f32, v: f32, nearness_m: f32) -> f32 {
+    fn filtered(&self, texel_values: Vector) -> f32 {
+        let [u, v, nearness_m] = texel_values.to_array();
         let (column, row) = (usize::from(u as u16), usize::from(v as u16));
         let weights = |part: f32| [1.0 - part, 1.0, 1.0, part];
         let (across, down) = (weights(u - column as f32), weights(v - row as f32));

@@ -16,10 +16,10 @@ impl Default for SrgbTable {
 
 impl SrgbTable {
     #[inline(always)]
-    pub(super) fn encode(&self, linear: f32) -> u8 {
+    pub(super) fn encode(&self, linear_value: f32) -> u8 {
         // The sum's lowest bits are the rounded number.
         const ALL_BITS_WHOLE: f32 = (1 << 23) as f32;
-        let index = (linear.clamp(0.0, 1.0) * LAST + ALL_BITS_WHOLE).to_bits();
+        let index = (linear_value.clamp(0.0, 1.0) * LAST + ALL_BITS_WHOLE).to_bits();
         self.0[index as usize % SRGB_STEPS]
     }
 }

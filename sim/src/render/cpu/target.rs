@@ -29,8 +29,8 @@ pub(super) fn draw<S: Simd>(
     camera: &Camera,
 ) {
     let (width, height) = (camera.width as usize, camera.height as usize);
-    samples.reset(Grid { width: width * SAMPLES, height: height * SAMPLES, pitch: 1.0 });
-    centres.reset(Grid { width, height, pitch: SAMPLES as f64 });
+    samples.reset(Grid { width: width * SAMPLES, height: height * SAMPLES, pitch_px: 1.0 });
+    centres.reset(Grid { width, height, pitch_px: SAMPLES as f64 });
     let camera_from_world = camera.world_from_camera.inverse();
     let focal = camera.focal_px() * SAMPLES as f32;
     let [cx, cy] = [width, height].map(|pixels| (pixels * SAMPLES) as f32 * 0.5);

@@ -38,7 +38,7 @@ struct Row<'a> {
     /// For each column of samples, whether an edge is in it or to its right: some bits are set.
     edges: Vec<u32>,
     /// Linear colours of the pixels, as far as they are known.
-    sums: Vec<Vector>,
+    sum_rgb: Vec<Vector>,
 }
 
 impl<'a> View<'a> {
@@ -70,11 +70,11 @@ impl<'a> View<'a> {
         let mut rgb = Vec::with_capacity(width * height * 3);
         let mut row = Row::new(facets);
         for y in 0..height {
-            row.sums.clear();
-            row.sums.resize(width, Vector::ZERO);
+            row.sum_rgb.clear();
+            row.sum_rgb.resize(width, Vector::ZERO);
             self.row(y, &mut row);
             rgb.extend(
-                row.sums.iter().flat_map(|colour| colour.to_array()).map(|linear| srgb.encode(linear)),
+                row.sum_rgb.iter().flat_map(|colour| colour.to_array()).map(|linear| srgb.encode(linear)),
             );
         }
         rgb
@@ -89,7 +89,7 @@ impl<'a> View<'a> {
         mark_edges(rows, &mut row.edges);
         let plain = |edges: &[u32], x: usize| edges[x * SAMPLES] | edges[x * SAMPLES + 1] == 0;
         let mut x = 0;
-        while x < row.sums.len() {
+        while x < row.sum_rgb.len() {
             row.make_room(self.shadow);
             if !plain(&row.edges, x) {
                 self.mixed(row, x, y, rows);
@@ -97,7 +97,7 @@ impl<'a> View<'a> {
                 continue;
             }
             // Of one triangle as far as they are plain: an edge would be in the last of them.
-            let most = row.sums.len().min(x + row.surfaces.room());
+            let most = row.sum_rgb.len().min(x + row.surfaces.room());
             let end = (x + 1..most).find(|x| !plain(&row.edges, *x)).unwrap_or(most);
             self.run(row, x..end, y, rows[0][x * SAMPLES]);
             x = end;
@@ -109,7 +109,7 @@ impl<'a> View<'a> {
     #[inline(always)]
     fn run(&self, row: &mut Row<'_>, pixels: Range<usize>, y: usize, triangle: u32) {
         if triangle == NOTHING {
-            row.sums[pixels].fill(SKY);
+            row.sum_rgb[pixels].fill(SKY);
             return;
         }
         let facet = *row.facets.get(self.prepared, triangle);
@@ -139,7 +139,7 @@ impl<'a> View<'a> {
                 let covered = triangles[i..].iter().filter(|other| *other == triangle).count();
                 let share = share * covered as f32 / PER_PIXEL as f32;
                 match *triangle {
-                    NOTHING => row.sums[x] += SKY * share,
+                    NOTHING => row.sum_rgb[x] += SKY * share,
                     triangle => {
                         let (_, nearness_1_m) = self.sample(at(i));
                         let facet = *row.facets.get(self.prepared, triangle);
@@ -192,14 +192,14 @@ impl<'a> View<'a> {
         let ray = self.corner_ray + self.right_ray * (sx as f32 + 0.5) + self.down_ray * (sy as f32 + 0.5);
         let point_m = self.eye_m + ray * (1.0 / nearness_1_m);
         let albedo = facets.albedo(self.prepared, facet, point_m);
-        let open = if facet.carries { 1.0 - CONTACT * self.contact.darkness(point_m) } else { 1.0 };
-        Surface { point_m, ray, normal: facet.normal(point_m), albedo, open }
+        let open_share = if facet.carries { 1.0 - CONTACT * self.contact.darkness(point_m) } else { 1.0 };
+        Surface { point_m, ray, normal: facet.normal(point_m), albedo, open_share }
     }
 }
 
 impl Row<'_> {
     fn new(facets: &mut Facets) -> Row<'_> {
-        Row { facets, surfaces: Surfaces::new(), shares: Vec::new(), edges: Vec::new(), sums: Vec::new() }
+        Row { facets, surfaces: Surfaces::new(), shares: Vec::new(), edges: Vec::new(), sum_rgb: Vec::new() }
     }
 
     #[inline(always)]
@@ -220,7 +220,7 @@ impl Row<'_> {
     #[inline(always)]
     fn flush(&mut self, shadow: &ShadowMap) {
         for ((pixel, share), colour) in self.shares.drain(..).zip(self.surfaces.shade(shadow)) {
-            self.sums[pixel] += colour * share;
+            self.sum_rgb[pixel] += colour * share;
         }
     }
 }

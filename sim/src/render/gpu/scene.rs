@@ -54,7 +54,7 @@ impl Scene {
         let numbers: Vec<[u32; PART_NUMBERS]> =
             parts.map(|((part, pose), (rgb, grain))| placed_part(part, *pose, *rgb, *grain)).collect();
         gpu.queue.write_buffer(&self.parts, 0, &bytes(numbers.as_flattened()));
-        gpu.queue.write_buffer(&self.contacts, 0, &bytes(&bits(contact.texels.as_flattened())));
+        gpu.queue.write_buffer(&self.contacts, 0, &bytes(&bits(contact.texel_values.as_flattened())));
     }
 
     /// Looks through a camera.
@@ -135,8 +135,8 @@ fn placed_part(part: &Part, pose: Pose, [first, second]: [Vector; 2], grain: usi
     numbers
 }
 
-fn bits(numbers: &[f32]) -> Vec<u32> {
-    numbers.iter().map(|number| number.to_bits()).collect()
+fn bits(values: &[f32]) -> Vec<u32> {
+    values.iter().map(|value| value.to_bits()).collect()
 }
 
 fn bytes(numbers: &[u32]) -> Vec<u8> {
