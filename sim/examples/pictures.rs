@@ -1,6 +1,6 @@
 //! Times two egocentric pictures of one state, over and over, and says how long they kept the processor busy.
 //!
-//! `cargo run --release -p tandem-sim --example pictures -- 30` times 30 states of the kitchen.
+//! `cargo build --release --workspace --examples; target/release/examples/pictures 30` times 30 states of the kitchen.
 
 use std::f32::consts::PI;
 use std::time::{Duration, Instant};
