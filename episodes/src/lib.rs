@@ -32,5 +32,5 @@ pub use recording::{
 };
 pub use scoring::{A, B, Done, Facts, Grip, ObjectFacts, Phase, RobotFacts, Scored, Scores};
 pub use session::{Checkpoint, Clock, RunFiles, RunFolder, Session, monotonic};
-pub use spec::{Controller, EpisodeSpec, PhaseStart, RendererKind, RobotFile, Start};
-pub use tandem_sim::{BaseLimits, LocomotionChoice, SimError};
+pub use spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, Start};
+pub use tandem_sim::{BaseLimits, LocomotionChoice, SimError, render::RendererKind};

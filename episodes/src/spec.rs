@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use tandem_sim::{LocomotionChoice, SimError};
+use tandem_sim::{LocomotionChoice, SimError, render::RendererKind};
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
 use crate::tasks::{self, Task};
@@ -18,6 +18,7 @@ pub struct EpisodeSpec {
     pub protocol: Protocol,
     pub robot: RobotFile,
     pub locomotion: Controller,
+    /// Who draws what robots see; nothing else depends on it.
     pub renderer: RendererKind,
     pub start: Start,
     /// What the policy is told about its success.
@@ -47,14 +48,6 @@ pub enum Controller {
     Balance,
     /// A velocity policy in an ONNX file.
     File(PathBuf),
-}
-
-/// Who draws what robots see.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum RendererKind {
-    #[default]
-    Cpu,
 }
 
 /// Where an episode begins.

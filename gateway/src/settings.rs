@@ -12,7 +12,9 @@ use clap::{
     builder::{PossibleValuesParser, TypedValueParser},
 };
 use serde::Deserialize;
-use tandem_episodes::{BaseLimits, Controller, Instructions, InstructionsError, SimError, Visibility};
+use tandem_episodes::{
+    BaseLimits, Controller, Instructions, InstructionsError, RendererKind, SimError, Visibility,
+};
 use tandem_tools_spec::{Disclosure, Hints};
 
 /// One source of settings; what it leaves out comes from the next. The doc comments are the help text.
@@ -39,6 +41,9 @@ pub struct Layer {
     /// ONNX file with a velocity policy for the G1 in place of our own base controller.
     #[arg(long, env = "TANDEM_LOCOMOTION", value_name = "FILE")]
     pub locomotion: Option<PathBuf>,
+    /// Who draws pictures: a graphics processor, the embedded renderer, or whichever is there [default: auto].
+    #[arg(long, env = "TANDEM_RENDERER", value_name = "NAME", value_parser = renderer_parser())]
+    pub renderer: Option<RendererKind>,
     /// What policies are told: `live` tells phases in every reply and ends an episode on success, `end` tells them at the end,
     /// `never` only in the files; neither of these two ends an episode on success [default: live].
     #[arg(long, env = "TANDEM_DISCLOSURE", value_name = "WHEN", value_parser = disclosure_parser())]
@@ -82,6 +87,7 @@ impl Layer {
             record: self.record.or(next.record),
             instructions: self.instructions.or(next.instructions),
             locomotion: self.locomotion.or(next.locomotion),
+            renderer: self.renderer.or(next.renderer),
             disclosure: self.disclosure.or(next.disclosure),
             hints: self.hints.or(next.hints),
             max_episodes: self.max_episodes.or(next.max_episodes),
@@ -110,6 +116,8 @@ pub struct Settings {
     pub locomotion: Controller,
     /// What that controller follows.
     pub base_limits: BaseLimits,
+    /// Who draws pictures.
+    pub renderer: RendererKind,
     /// What policies are told about their success.
     pub disclosure: Disclosure,
     /// Whether they are told how to grasp.
@@ -140,9 +148,9 @@ pub enum SettingsError {
     /// The file with instructions cannot be used.
     #[error(transparent)]
     Instructions(#[from] InstructionsError),
-    /// The policy for the robots' legs cannot be used.
+    /// The policy for the robots' legs, or the renderer, cannot be used.
     #[error(transparent)]
-    Locomotion(#[from] SimError),
+    Sim(#[from] SimError),
     /// The file is no TOML, or holds a setting that does not exist.
     #[error("{path}: {source}")]
     Parse {
@@ -162,6 +170,8 @@ impl Settings {
         };
         let layer = flags.or(file);
         let locomotion = Controller::from_file(layer.locomotion.as_deref());
+        let renderer = layer.renderer.unwrap_or_default();
+        tracing::info!("{}", renderer.describe()?);
         let seconds = |given: Option<u32>, default: u32| Duration::from_secs(given.unwrap_or(default).into());
         Ok(Arc::new(Settings {
             listen: layer.listen.unwrap_or(SocketAddr::from(([127, 0, 0, 1], 8700))),
@@ -177,6 +187,7 @@ impl Settings {
             },
             base_limits: locomotion.load()?.limits(),
             locomotion,
+            renderer,
             disclosure: layer.disclosure.unwrap_or_default(),
             hints: layer.hints.unwrap_or_default(),
             max_episodes: layer.max_episodes.unwrap_or(8),
@@ -200,6 +211,13 @@ pub fn hints_parser() -> impl TypedValueParser<Value = Hints> {
     let find = |name: String| Hints::ALL.into_iter().find(|hints| hints.name() == name);
     PossibleValuesParser::new(Hints::ALL.map(Hints::name))
         .try_map(move |name| find(name).ok_or("neither of the two"))
+}
+
+/// One of the renderers, by name.
+pub fn renderer_parser() -> impl TypedValueParser<Value = RendererKind> {
+    let find = |name: String| RendererKind::ALL.into_iter().find(|kind| kind.name() == name);
+    PossibleValuesParser::new(RendererKind::ALL.map(RendererKind::name))
+        .try_map(move |name| find(name).ok_or("not one of the renderers"))
 }
 
 fn read_layer(path: &Path) -> Result<Layer, SettingsError> {

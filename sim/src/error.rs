@@ -20,6 +20,10 @@ pub enum SimError {
     )]
     WithoutOnnx { path: String },
     #[error(
+        "this build cannot draw on a graphics processor: that is an extra; build with `cargo build --release --features gpu`"
+    )]
+    WithoutGpu,
+    #[error(
         "`{path}` is not an ONNX file ({source}); a velocity policy for the G1 as AGILE exports it would work"
     )]
     NotOnnx { path: String, source: Box<dyn std::error::Error + Send + Sync> },

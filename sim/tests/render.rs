@@ -246,6 +246,42 @@ fn fingers_cast_shadows() {
 }
 
 #[test]
+fn what_stands_darkens_the_floor_beside_it_and_what_hovers_leaves_it_bright() {
+    let camera = look_at(Vector::new(-0.4, 0.0, 0.3), Vector::ZERO);
+    let mut renderer = cpu(floor_and(Mesh::cuboid(Vector::new(0.05, 0.05, 0.005))));
+    // Of the floor on the side that the sun shines on.
+    let mut brightness = |height_m: f32, x: f32| {
+        let frame = renderer.render(&step(&[at(0.0, 0.0, height_m)]), &camera);
+        let pixel = pixel_at(&camera, Vector::new(x, 0.02, 0.0));
+        assert_eq!(frame.ids[pixel], 1, "the pixel shows the floor");
+        f32::from(rgb(&frame, pixel)[0])
+    };
+    // A board at -5 m is not to be seen.
+    assert!(brightness(0.005, -0.058) < 0.95 * brightness(-5.0, -0.058), "beside it");
+    assert_eq!(brightness(0.005, -0.12), brightness(-5.0, -0.12), "further away");
+    assert_eq!(brightness(0.1, -0.03), brightness(-5.0, -0.03), "below a board in the air");
+}
+
+#[test]
+fn textures_darken_parts_of_a_surface_and_leave_depth_and_ids_as_they_are() {
+    let camera = overhead(1.5);
+    let mut scenery = scenery(vec![(Mesh::cuboid(Vector::new(1.0, 0.5, 0.01)), Pose::IDENTITY)]);
+    let plain = render(&scenery, &camera);
+    for pattern in [Pattern::of("oak_dark"), Pattern::of("velvet"), Pattern::Checker([0.1, 0.1, 0.1])] {
+        scenery.parts[0].pattern = pattern;
+        let textured = render(&scenery, &camera);
+        assert_eq!((&textured.depth_m, &textured.ids), (&plain.depth_m, &plain.ids));
+        let pairs = || textured.rgb.iter().zip(&plain.rgb).map(|(a, b)| (f32::from(*a), f32::from(*b)));
+        let darkened = pairs().filter(|(textured, plain)| *textured < 0.95 * plain).count();
+        assert!(20 * darkened > plain.rgb.len(), "{pattern:?} darkens {darkened} values");
+        let kept = pairs().filter(|(textured, plain)| *textured > 0.97 * plain).count();
+        assert!(20 * kept > plain.rgb.len(), "{pattern:?} keeps {kept} values");
+        assert!(pairs().all(|(textured, plain)| textured <= plain), "{pattern:?} makes something brighter");
+    }
+    assert_eq!(Pattern::of("wall"), Pattern::Plain);
+}
+
+#[test]
 fn an_edge_is_the_mean_of_both_sides_in_linear_light() {
     // A wall whose edge runs through the middle of the picture's column 80, half a pixel to the right.
     let camera = overhead(1.0);

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use serde_json::json;
 use tandem_episodes::assessment::{Assessment, load};
 use tandem_episodes::evaluation::{Plan, Played, Shard, Starts, evaluate};
-use tandem_episodes::{Controller, RobotFile, players, tasks};
+use tandem_episodes::{Controller, RendererKind, RobotFile, players, tasks};
 use tandem_tools_spec::{Disclosure, EndReason, Hints, Protocol};
 
 fn plan(jobs: usize, seeds: Vec<u32>) -> Plan {
@@ -17,6 +17,7 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> Plan {
         locomotion: Controller::Balance,
         disclosure: Disclosure::Live,
         hints: Hints::On,
+        renderer: RendererKind::Cpu,
         tasks: vec![handover],
         seeds,
         starts: Starts::Task,

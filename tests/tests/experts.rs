@@ -3,7 +3,7 @@
 use std::thread::available_parallelism;
 
 use tandem_episodes::evaluation::{Plan, Shard, Starts, evaluate};
-use tandem_episodes::{Controller, RobotFile, players, tasks};
+use tandem_episodes::{Controller, RendererKind, RobotFile, players, tasks};
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
 #[test]
@@ -15,6 +15,7 @@ fn every_task_is_solved_in_order_and_nobody_falls() {
         locomotion: Controller::Balance,
         disclosure: Disclosure::Live,
         hints: Hints::On,
+        renderer: RendererKind::Cpu,
         tasks: tasks::ALL.iter().collect(),
         seeds: vec![3],
         starts: Starts::Task,

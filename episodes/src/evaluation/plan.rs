@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use tandem_sim::render::RendererKind;
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
 use crate::players;
@@ -18,6 +19,7 @@ pub struct Plan {
     pub protocol: Protocol,
     pub robot: RobotFile,
     pub locomotion: Controller,
+    pub renderer: RendererKind,
     /// What policies are told about their success, and whether success ends an episode.
     pub disclosure: Disclosure,
     /// Whether policies are told how to grasp.
@@ -64,6 +66,7 @@ impl Plan {
         EpisodeSpec {
             robot: self.robot.clone(),
             locomotion: self.locomotion.clone(),
+            renderer: self.renderer,
             disclosure: self.disclosure,
             hints: self.hints,
             start,

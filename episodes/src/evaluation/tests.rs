@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use tandem_sim::render::RendererKind;
 use tandem_tools_spec::{Disclosure, EndReason, Hints, PhaseTimes, Protocol, ResultReply};
 
 use super::keep::missed;
@@ -63,6 +64,7 @@ fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> Plan {
         protocol: Protocol::Agentic,
         robot: RobotFile::default(),
         locomotion: Controller::Balance,
+        renderer: RendererKind::Cpu,
         disclosure: Disclosure::Live,
         hints: Hints::On,
         tasks,

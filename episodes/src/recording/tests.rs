@@ -60,6 +60,7 @@ fn recorder(folder: &Path, world: &World) -> (Recorder, Scores) {
     let header = RecordingHeader {
         spec: spec(),
         locomotion: "balance".into(),
+        renderer: "by hand".into(),
         build: "0.1.0+test".into(),
         robots: world.robots().iter().map(sheet).collect(),
         scores: scores.memory(),
@@ -181,6 +182,7 @@ fn a_recording_has_a_message_a_step_on_every_topic() {
     assert_eq!(metadata["episode"]["seed"], "7");
     assert_eq!(metadata["episode"]["protocol"], "agentic");
     assert_eq!(metadata["episode"]["locomotion"], "balance");
+    assert_eq!(metadata["episode"]["renderer"], "by hand");
 }
 
 #[test]

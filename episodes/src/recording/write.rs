@@ -24,6 +24,8 @@ pub struct RecordingHeader {
     pub spec: EpisodeSpec,
     /// Which base controller the robots have; the name tells files of different content apart.
     pub locomotion: String,
+    /// Who draws its pictures, and on what device.
+    pub renderer: String,
     /// Which build of Tandem plays it.
     pub build: String,
     /// In their order in the world.
@@ -169,6 +171,7 @@ fn write_header(file: &mut McapFile, header: &RecordingHeader) -> Result<(), Out
         ("seed", &header.spec.seed.to_string()),
         ("protocol", header.spec.protocol.name()),
         (metadata::LOCOMOTION, header.locomotion.as_str()),
+        ("renderer", &header.renderer),
         ("robots", &names.join(",")),
         ("tandem_version", env!("CARGO_PKG_VERSION")),
         (metadata::BUILD, header.build.as_str()),

@@ -1,6 +1,6 @@
 //! What the robots of a world see: pictures, and depth at pixels.
 
-use tandem_sim::render::{self, Camera, Cameras, Frame, Renderer, Scenery, encode_png};
+use tandem_sim::render::{Camera, Cameras, Frame, Renderer, RendererKind, Scenery, encode_png};
 use tandem_sim::{Step, World};
 use tandem_tools_spec::{CameraImage, DepthPoint, DepthReply, Observation, Png};
 
@@ -8,7 +8,6 @@ use super::replies::{Detail, calibration, robot_state};
 use crate::EpisodeError;
 use crate::commands::Motion;
 use crate::convert::{rounded, wire_vector};
-use crate::spec::RendererKind;
 
 /// Renders what the robots of a world see.
 pub struct Eyes {
@@ -18,11 +17,12 @@ pub struct Eyes {
 
 impl Eyes {
     pub fn new(kind: RendererKind, world: &World) -> Eyes {
-        let scenery = Scenery::of(world);
-        let renderer = match kind {
-            RendererKind::Cpu => render::cpu(scenery),
-        };
-        Eyes { renderer, cameras: Cameras::of(world) }
+        Eyes { renderer: kind.renderer(Scenery::of(world)), cameras: Cameras::of(world) }
+    }
+
+    /// Who draws.
+    pub fn renderer(&self) -> &str {
+        self.renderer.name()
     }
 
     /// What any camera sees after `step`.

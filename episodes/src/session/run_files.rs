@@ -53,6 +53,7 @@ impl RunFiles {
         let header = RecordingHeader {
             spec: session.spec().clone(),
             locomotion: session.origin.locomotion.clone(),
+            renderer: session.eyes.renderer().into(),
             build: this_build()?.into(),
             robots: session.motions.iter().map(|motion| motion.robot.clone()).collect(),
             scores: session.scores.memory(),

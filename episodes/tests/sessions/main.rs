@@ -10,4 +10,5 @@ mod films;
 mod hand_force;
 mod hands;
 mod recordings;
+mod renderers;
 mod replays;

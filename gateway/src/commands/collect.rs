@@ -3,8 +3,9 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use tandem_episodes::players;
+use tracing_subscriber::filter::LevelFilter;
 
-use super::{Outcome, episode_flags::EpisodeFlags, played};
+use super::{Outcome, episode_flags::EpisodeFlags, log, played};
 
 /// Record demonstrations of the experts as MCAP, one folder per episode.
 #[derive(Debug, clap::Args)]
@@ -18,7 +19,8 @@ pub struct Args {
 
 /// Plays and records.
 pub fn run(args: Args) -> Outcome {
-    let plan = args.episodes.plan(players::find("expert")?, true);
+    log::to_stderr(LevelFilter::INFO);
+    let plan = args.episodes.plan(players::find("expert")?, true)?;
     played::play_and_print(&plan, &args.out)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -10,14 +10,18 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressStyle};
 use tandem_episodes::{
-    EpisodeSpec, Facts,
+    EpisodeSpec, Facts, RendererKind,
     players::{self, Backstage, Caller, PlayerError},
     tasks::{self, Task},
 };
 use tandem_tools_spec::{CommandReply, Protocol, ResultReply, StartEpisode, ToolCall, ToolReply};
 use tracing_subscriber::filter::LevelFilter;
 
-use super::{Outcome, Seeds, episode_flags::LocomotionFlag, log};
+use super::{
+    Outcome, Seeds,
+    episode_flags::{LocomotionFlag, RendererFlag},
+    log,
+};
 use crate::{
     drivers::HttpEpisode,
     hosting::EpisodeThread,
@@ -44,26 +48,30 @@ pub struct Args {
     runs: PathBuf,
     #[command(flatten)]
     locomotion: LocomotionFlag,
+    #[command(flatten)]
+    renderer: RendererFlag,
 }
 
 /// Plays; it is a failure if too few episodes reach the last phase.
 pub fn run(args: Args) -> Outcome {
     log::to_stderr(LevelFilter::WARN);
-    let results = play_all(&args.runs, args.seeds, args.locomotion.file)?;
+    let results = play_all(&args.runs, args.seeds, args.locomotion.file, args.renderer.kind)?;
     Ok(if passed(&results) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Plays every seed in turn, recorded under `runs`, by robots that walk by the policy of a file if one is given, and prints
-/// what came of it.
+/// Plays every seed in turn, recorded under `runs`, by robots that walk by the policy of a file if one is given, with
+/// pictures by `renderer`, and prints what came of it.
 pub fn play_all(
     runs: &Path,
     seeds: Seeds,
     locomotion: Option<PathBuf>,
+    renderer: RendererKind,
 ) -> Result<Vec<ResultReply>, Box<dyn Error>> {
     let flags = Layer {
         listen: Some(SocketAddr::from((Ipv4Addr::LOCALHOST, FREE_PORT))),
         runs: Some(runs.into()),
         locomotion,
+        renderer: Some(renderer),
         ..Layer::default()
     };
     let server = Server::start(Settings::resolve(flags, None)?)?;

@@ -7,7 +7,7 @@ use clap::{
     builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
 };
 use tandem_episodes::{
-    Controller, RobotFile,
+    Controller, RendererKind, RobotFile, SimError,
     evaluation::{Plan, Shard, Starts},
     players,
     tasks::{self, Task},
@@ -15,7 +15,7 @@ use tandem_episodes::{
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
 use super::Seeds;
-use crate::settings::{disclosure_parser, hints_parser};
+use crate::settings::{disclosure_parser, hints_parser, renderer_parser};
 
 /// Which episodes to play.
 #[derive(Debug, Args)]
@@ -42,6 +42,8 @@ pub struct EpisodeFlags {
     jobs: usize,
     #[command(flatten)]
     locomotion: LocomotionFlag,
+    #[command(flatten)]
+    renderer: RendererFlag,
 }
 
 /// The base controller on the command line.
@@ -57,6 +59,15 @@ impl LocomotionFlag {
     pub fn controller(&self) -> Controller {
         Controller::from_file(self.file.as_deref())
     }
+}
+
+/// The renderer on the command line.
+#[derive(Debug, Args)]
+pub struct RendererFlag {
+    /// Who draws pictures: a graphics processor, the embedded renderer, or whichever is there.
+    #[arg(long = "renderer", env = "TANDEM_RENDERER", value_name = "NAME", value_parser = renderer_parser(),
+          default_value = RendererKind::default().name())]
+    pub kind: RendererKind,
 }
 
 /// Tasks named on the command line. The name keeps clap from taking it for a flag that is given several times.
@@ -87,20 +98,22 @@ pub fn player_parser() -> impl TypedValueParser<Value = &'static players::Entry>
 
 impl EpisodeFlags {
     /// The plan to have `player` play these episodes.
-    pub fn plan(self, player: &'static players::Entry, record: bool) -> Plan {
-        Plan {
+    pub fn plan(self, player: &'static players::Entry, record: bool) -> Result<Plan, SimError> {
+        tracing::info!("{}", self.renderer.kind.describe()?);
+        Ok(Plan {
             player,
             protocol: self.protocol,
             robot: RobotFile::default(),
             locomotion: self.locomotion.controller(),
             disclosure: self.disclosure,
             hints: self.hints,
+            renderer: self.renderer.kind,
             tasks: self.tasks.0,
             seeds: self.seeds.0.collect(),
             starts: Starts::Task,
             shard: Shard::WHOLE,
             jobs: self.jobs,
             record,
-        }
+        })
     }
 }

@@ -7,11 +7,12 @@ use tandem_episodes::{
     evaluation::{Plan, Shard, Starts},
     players, tasks,
 };
+use tracing_subscriber::filter::LevelFilter;
 
 use super::{
     Outcome,
     episode_flags::{EpisodeFlags, player_parser},
-    played,
+    log, played,
 };
 
 /// Play tasks over seeds in parallel worlds and count the phases reached. Goes on where an interrupted run stopped.
@@ -77,12 +78,13 @@ impl FromStr for ShardFlag {
 
 /// Plays and counts.
 pub fn run(args: Args) -> Outcome {
+    log::to_stderr(LevelFilter::INFO);
     let starts = match (args.demos, args.from) {
         (Some(demonstrations), Some(PhaseList(phases))) => Starts::Phases { demonstrations, phases },
         _ => Starts::Task,
     };
     let ShardFlag(shard) = args.shard;
-    let plan = Plan { starts, shard, ..args.episodes.plan(args.policy, args.record) };
+    let plan = Plan { starts, shard, ..args.episodes.plan(args.policy, args.record)? };
     played::play_and_print(&plan, &args.out)?;
     Ok(ExitCode::SUCCESS)
 }

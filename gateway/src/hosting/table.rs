@@ -47,6 +47,7 @@ impl EpisodeTable {
         let protocol = args.protocol.unwrap_or(Protocol::Agentic);
         let spec = EpisodeSpec {
             locomotion: self.settings.locomotion.clone(),
+            renderer: self.settings.renderer,
             disclosure: self.settings.disclosure,
             hints: self.settings.hints,
             ..EpisodeSpec::new(tasks::find(&args.task)?, args.seed, protocol)

@@ -27,8 +27,8 @@ pub struct Geom {
     pub body_from_geom: Pose,
     pub rgba: [f32; 4],
     pub material: Option<String>,
-    /// The material's texture is MuJoCo's builtin checker.
-    pub checkered: bool,
+    /// The two colours of the material's texture if it is MuJoCo's builtin checker.
+    pub checker_rgb: Option<[[f32; 3]; 2]>,
     pub friction: Friction,
     pub density_kg_m3: f32,
     pub mass_kg: Option<f32>,
@@ -73,7 +73,7 @@ impl Geom {
             body_from_geom,
             rgba: rgba.map(|c| c as f32),
             material: geom.material.clone(),
-            checkered: material.is_some_and(|material| is_checkered(document, material)),
+            checker_rgb: material.and_then(|material| checker_rgb(document, material)),
             friction: friction(document, geom)?,
             density_kg_m3: geom.density.unwrap_or(DEFAULT_DENSITY_KG_M3) as f32,
             mass_kg: geom.mass.map(|m| m as f32),
@@ -116,9 +116,12 @@ fn friction(document: &Document, geom: &mjcf_rs::body::Geom) -> Result<Friction,
     Ok(Friction { directions, slide, spin_m, roll_m, priority: geom.priority })
 }
 
-fn is_checkered(document: &Document, material: &mjcf_rs::assets::Material) -> bool {
-    let texture = material.texture.as_ref().and_then(|name| document.model.assets.texture(name));
-    texture.is_some_and(|texture| texture.builtin.as_deref() == Some("checker"))
+fn checker_rgb(document: &Document, material: &mjcf_rs::assets::Material) -> Option<[[f32; 3]; 2]> {
+    let texture = document.model.assets.texture(material.texture.as_ref()?)?;
+    let checker = texture.builtin.as_deref() == Some("checker");
+    // MuJoCo's own colours where the file gives none.
+    let rgb = [texture.rgb1.unwrap_or([0.8; 3]), texture.rgb2.unwrap_or([0.5; 3])];
+    checker.then(|| rgb.map(|rgb| rgb.map(|c| c as f32)))
 }
 
 /// Pose with z from the first to the second end point, centred between them, and half the distance.

@@ -150,6 +150,13 @@ impl Mesh {
         ((low + high) * 0.5, (high - low).length() * 0.5)
     }
 
+    /// The number of the axis along which the mesh is longest.
+    pub fn longest_axis(&self) -> usize {
+        let points = self.vertices.iter().map(|vertex| vertex.position_m);
+        let low = points.clone().fold(Vector::INFINITY, Vector::min);
+        (points.fold(Vector::NEG_INFINITY, Vector::max) - low).max_position()
+    }
+
     /// One circle of a sphere, moved along z.
     fn ring(&mut self, polar_rad: f32, radius_m: f32, shift_m: f32) {
         // Rounding makes the sine negative at the lower pole, where all points must be one.

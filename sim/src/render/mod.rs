@@ -1,27 +1,43 @@
 //! Pictures of a world: RGB, metric depth and instance ids for any camera.
 //!
-//! [`Scenery`] is what there is to see, built once per world; a [`Step`] says where it is; a [`Renderer`] draws it. [`cpu`] is
-//! the embedded back end and needs nothing of the system.
+//! [`Scenery`] is what there is to see, built once per world; a [`Step`] says where it is; a [`Renderer`] draws it:
+//! [`RendererKind`] says which. The embedded one needs nothing of the system.
 
 mod accents;
 mod camera;
 mod cameras;
+mod contact;
 mod cpu;
+#[cfg(feature = "gpu")]
+mod gpu;
+mod kind;
+mod light;
 mod mesh;
+mod pattern;
 mod png;
+mod prepared;
+#[cfg(feature = "gpu")]
+mod proof;
+mod raster;
+mod rows;
 mod scenery;
 
 pub use accents::robot_rgba;
 pub use camera::Camera;
 pub use cameras::Cameras;
+pub use kind::RendererKind;
 pub use mesh::{Mesh, Vertex};
+pub use pattern::Pattern;
 pub use png::{PictureError, encode_png};
-pub use scenery::{Carrier, Part, Pattern, Placed, Scenery};
+pub use scenery::{Carrier, Part, Placed, Scenery};
 
 use crate::Step;
 
 /// Draws the scenery that it was made for.
 pub trait Renderer: Send {
+    /// What it is, and on what device.
+    fn name(&self) -> &str;
+
     /// What `camera` sees after `step`.
     fn render(&mut self, step: &Step, camera: &Camera) -> Frame;
 }

@@ -2,8 +2,8 @@
 
 use rapier3d::math::{Pose, Vector};
 
-use super::{Mesh, robot_rgba};
-use crate::mjcf::Geom;
+use super::{Mesh, Pattern, robot_rgba};
+use crate::mjcf::{Geom, Primitive};
 use crate::{Step, World};
 
 /// Shapes and colours of a world, made once.
@@ -40,15 +40,6 @@ pub enum Carrier {
     Object(usize),
 }
 
-/// How a surface varies.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Pattern {
-    #[default]
-    Plain,
-    /// Squares of half a metre in the world's ground plane.
-    Checker,
-}
-
 /// Where everything is after a step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Placed {
@@ -72,7 +63,7 @@ impl Scenery {
         let mut parts: Vec<Part> =
             drawn(world.room()).map(|geom| part(geom, Carrier::Room, geom.rgba, ROOM_ID)).collect();
         for part in &mut parts {
-            part.casts_shadow = top_m(part) < LAMPS_M;
+            part.casts_shadow &= top_m(part) < LAMPS_M;
         }
         let first_robot = ROOM_ID + 1;
         for (robot, id) in (0..world.robots().len()).zip(first_robot..) {
@@ -119,10 +110,14 @@ fn part(geom: &Geom, carrier: Carrier, [r, g, b, _]: [f32; 4], id: u32) -> Part 
         mesh: Mesh::of(&geom.primitive),
         carrier,
         carrier_from_mesh: geom.body_from_geom,
-        rgb: [r, g, b],
-        pattern: if geom.checkered { Pattern::Checker } else { Pattern::Plain },
+        rgb: geom.checker_rgb.map_or([r, g, b], |[first, _]| first),
+        pattern: match geom.checker_rgb {
+            Some([_, second]) => Pattern::Checker(second),
+            None => Pattern::of(geom.material.as_deref().unwrap_or_default()),
+        },
         id,
-        casts_shadow: true,
+        // Nothing is below a floor.
+        casts_shadow: !matches!(geom.primitive, Primitive::Plane { .. }),
     }
 }
 

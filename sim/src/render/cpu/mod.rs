@@ -1,28 +1,34 @@
 //! The embedded renderer: a visibility buffer of triangle numbers, shaded afterwards, four samples a pixel.
 
-mod prepared;
-mod raster;
+mod facets;
 mod shade;
 mod shadow;
 mod srgb;
+mod target;
 mod view;
 
+use pulp::{Arch, Simd, WithSimd};
+
+use super::contact::ContactMap;
+use super::prepared::Prepared;
 use super::{Camera, Frame, Placed, Renderer, Scenery};
 use crate::Step;
-use prepared::Prepared;
-use raster::Target;
+use facets::Facets;
 use shadow::ShadowMap;
 use srgb::SrgbTable;
+use target::Target;
 use view::View;
 
 /// Renders on the calling thread. It keeps its buffers, and the shadows of the last state.
 pub(super) struct CpuRenderer {
     prepared: Prepared,
     srgb: SrgbTable,
-    /// What the shadows are of.
+    /// What shadow, contacts and facets are of.
     placed: Placed,
     shadow: ShadowMap,
-    target: Target,
+    contact: ContactMap,
+    facets: Facets,
+    samples: Target,
     /// One sample a pixel, at its centre: what depth and ids are read from.
     centres: Target,
 }
@@ -34,34 +40,68 @@ impl CpuRenderer {
             srgb: SrgbTable::default(),
             placed: Placed::default(),
             shadow: ShadowMap::default(),
-            target: Target::default(),
+            contact: ContactMap::default(),
+            facets: Facets::default(),
+            samples: Target::default(),
             centres: Target::default(),
         }
     }
 }
 
 impl Renderer for CpuRenderer {
+    fn name(&self) -> &str {
+        "cpu"
+    }
+
     fn render(&mut self, step: &Step, camera: &Camera) -> Frame {
         let placed = self.prepared.scenery.place(step);
+        self.draw_placed(placed, camera)
+    }
+}
+
+/// A picture to draw. It is compiled once more for processors with wide registers, with everything that is inlined into it;
+/// its bits are the same.
+struct Drawing<'a> {
+    renderer: &'a mut CpuRenderer,
+    placed: Placed,
+    camera: &'a Camera,
+}
+
+impl WithSimd for Drawing<'_> {
+    type Output = Frame;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Frame {
+        self.renderer.draw(simd, self.placed, self.camera)
+    }
+}
+
+impl CpuRenderer {
+    pub(super) fn draw_placed(&mut self, placed: Placed, camera: &Camera) -> Frame {
+        Arch::new().dispatch(Drawing { renderer: self, placed, camera })
+    }
+
+    #[inline(always)]
+    fn draw<S: Simd>(&mut self, simd: S, placed: Placed, camera: &Camera) -> Frame {
         if self.placed != placed {
-            self.shadow.draw(&self.prepared.scenery, &placed);
+            self.shadow.draw(simd, &self.prepared, &placed);
+            self.contact.draw(&self.prepared, &placed);
+            self.facets.reset(&self.prepared, &placed);
             self.placed = placed;
         }
-        self.target.draw(&mut self.centres, &self.prepared, &self.placed, camera);
-        let view = View::new(&self.prepared, &self.placed, &self.target, &self.shadow, camera);
-        let pixels = (camera.width * camera.height) as usize;
-        let mut rgb = Vec::with_capacity(pixels * 3);
-        for y in 0..camera.height as usize {
-            for x in 0..camera.width as usize {
-                rgb.extend(self.srgb.encode(view.pixel(x, y)));
-            }
-        }
-        Frame {
+        target::draw(simd, &mut self.samples, &mut self.centres, &self.prepared, &self.placed, camera);
+        let view = View::new(&self.prepared, &self.samples, &self.shadow, &self.contact, camera);
+        let mut frame = Frame {
             width: camera.width,
             height: camera.height,
-            rgb,
-            depth_m: self.centres.nearness_1_m.iter().map(|nearness| 1.0 / nearness).collect(),
-            ids: self.centres.triangle.iter().map(|triangle| view.id(*triangle)).collect(),
+            rgb: view.rgb(&mut self.facets, &self.srgb),
+            depth_m: Vec::with_capacity((camera.width * camera.height) as usize),
+            ids: Vec::with_capacity((camera.width * camera.height) as usize),
+        };
+        for row in 0..camera.height as usize {
+            frame.depth_m.extend(self.centres.nearness_1_m(row).iter().map(|nearness| 1.0 / nearness));
+            frame.ids.extend(self.centres.triangles(row).iter().map(|triangle| self.prepared.id(*triangle)));
         }
+        frame
     }
 }

@@ -1,29 +1,25 @@
-//! Between sRGB, as files and pictures have it, and linear light.
+//! From linear light to sRGB, as pictures have it.
 
-use rapier3d::math::Vector;
-
-pub(super) fn linear(rgb: [f32; 3]) -> Vector {
-    let decode = |v: f32| if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
-    Vector::from(rgb.map(decode))
-}
+use crate::render::light::SRGB_STEPS;
 
 /// Table from linear light to sRGB bytes.
-pub(super) struct SrgbTable(Vec<u8>);
+pub(super) struct SrgbTable([u8; SRGB_STEPS]);
 
-const TABLE_LAST: f32 = 4095.0;
+const LAST: f32 = (SRGB_STEPS - 1) as f32;
 
 impl Default for SrgbTable {
     fn default() -> SrgbTable {
         let encode = |v: f32| if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
-        SrgbTable(
-            (0..=TABLE_LAST as usize).map(|i| (encode(i as f32 / TABLE_LAST) * 255.0 + 0.5) as u8).collect(),
-        )
+        SrgbTable(std::array::from_fn(|i| (encode(i as f32 / LAST) * 255.0 + 0.5) as u8))
     }
 }
 
 impl SrgbTable {
-    pub(super) fn encode(&self, colour: Vector) -> [u8; 3] {
-        let index = colour.clamp(Vector::ZERO, Vector::ONE) * TABLE_LAST + 0.5;
-        index.to_array().map(|i| self.0[usize::from(i as u16)])
+    #[inline(always)]
+    pub(super) fn encode(&self, linear_value: f32) -> u8 {
+        // The sum's lowest bits are the rounded number.
+        const ALL_BITS_WHOLE: f32 = (1 << 23) as f32;
+        let index = (linear_value.clamp(0.0, 1.0) * LAST + ALL_BITS_WHOLE).to_bits();
+        self.0[index as usize % SRGB_STEPS]
     }
 }

@@ -2,8 +2,11 @@
 
 use rapier3d::math::{Matrix, Vector};
 
-use super::srgb::linear;
-use crate::render::{Mesh, Scenery};
+use super::light::linear;
+use super::{Mesh, Part, Scenery};
+
+/// Marks a sample at which nothing is.
+pub(super) const NOTHING: u32 = u32::MAX;
 
 pub(super) struct Prepared {
     pub scenery: Scenery,
@@ -12,14 +15,17 @@ pub(super) struct Prepared {
     /// Of each triangle.
     pub faces: Vec<Face>,
     /// What a picture's ids show for each triangle.
-    pub ids: Vec<u32>,
+    ids: Vec<u32>,
     /// Centre and radius of a sphere around each part, in its mesh's frame.
     pub bounds: Vec<(Vector, f32)>,
-    /// Of each part.
-    pub linear_rgb: Vec<Vector>,
+    /// The two colours of each part.
+    pub linear_rgb: Vec<[Vector; 2]>,
+    /// Of each part, which axis of its mesh the grain runs along.
+    pub grain: Vec<usize>,
 }
 
 /// A triangle as shading wants it, in its mesh's frame.
+#[derive(Clone, Copy)]
 pub(super) struct Face {
     pub part: u32,
     pub corner_m: Vector,
@@ -43,10 +49,25 @@ impl Prepared {
             faces,
             ids,
             bounds: scenery.parts.iter().map(|part| part.mesh.bounds()).collect(),
-            linear_rgb: scenery.parts.iter().map(|part| linear(part.rgb)).collect(),
+            linear_rgb: scenery.parts.iter().map(colours).collect(),
+            grain: scenery.parts.iter().map(|part| part.mesh.longest_axis()).collect(),
             scenery,
         }
     }
+
+    /// What a picture's ids show where it shows a triangle.
+    pub(super) fn id(&self, triangle: u32) -> u32 {
+        match triangle {
+            NOTHING => 0,
+            _ => self.ids[triangle as usize],
+        }
+    }
+}
+
+/// Linear, of a part.
+fn colours(part: &Part) -> [Vector; 2] {
+    let first = linear(part.rgb);
+    [first, part.pattern.second_rgb(first)]
 }
 
 impl Face {

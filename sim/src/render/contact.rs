@@ -1,0 +1,200 @@
+//! Where things nearly touch what carries them: a soft darkness that tells standing from hovering.
+
+use pulp::{Arch, Simd, WithSimd};
+use rapier3d::math::Vector;
+
+use super::light::CONTACT_TEXELS;
+use super::prepared::Prepared;
+use super::raster::Outline;
+use super::rows::{Grid, Rows};
+use super::{Carrier, Part, Placed};
+
+/// What is this far above a surface darkens it no more.
+const REACH_M: f32 = 0.06;
+/// So deep, things sink into what carries them.
+pub(super) const SINK_M: f32 = 0.03;
+/// Nothing higher carries anything.
+const HIGHEST_SUPPORT_M: f32 = 1.5;
+/// Heights are drawn as nearness, which is positive.
+const DATUM_M: f32 = 4.0;
+/// Weights of a texel's neighbours in each direction.
+const BLUR: [f32; 5] = [1.0 / 9.0, 2.0 / 9.0, 3.0 / 9.0, 2.0 / 9.0, 1.0 / 9.0];
+const GRID: Grid = Grid { width: CONTACT_TEXELS, height: CONTACT_TEXELS, pitch_px: 1.0 };
+
+/// The surroundings of the focus, seen from above. Columns run along the world's x, rows along y.
+#[derive(Default)]
+pub(super) struct ContactMap {
+    /// World coordinates of its first corner, and texels per metre.
+    pub corner_m: [f32; 2],
+    pub texels_per_m: f32,
+    /// Of each texel, row by row: the height of what can carry things, and how dark it is there, from 0 to 1.
+    pub texel_values: Vec<[f32; 2]>,
+    support: Rows<f32>,
+    underside: Rows<f32>,
+}
+
+/// A map to draw, compiled for the registers that there are.
+struct Drawing<'a> {
+    map: &'a mut ContactMap,
+    prepared: &'a Prepared,
+    placed: &'a Placed,
+}
+
+impl WithSimd for Drawing<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        self.map.draw_with(simd, self.prepared, self.placed);
+    }
+}
+
+impl ContactMap {
+    pub(super) fn draw(&mut self, prepared: &Prepared, placed: &Placed) {
+        Arch::new().dispatch(Drawing { map: self, prepared, placed });
+    }
+
+    #[inline(always)]
+    fn draw_with<S: Simd>(&mut self, simd: S, prepared: &Prepared, placed: &Placed) {
+        let radius_m = prepared.scenery.focus_radius_m;
+        self.corner_m = [placed.focus_m.x - radius_m, placed.focus_m.y - radius_m];
+        self.texels_per_m = CONTACT_TEXELS as f32 / (2.0 * radius_m);
+        self.support.reset(GRID, 0.0);
+        self.underside.reset(GRID, 0.0);
+        let mut corners_m = Vec::new();
+        for layer in [Layer::Support, Layer::Underside] {
+            let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).zip(&prepared.bounds);
+            for ((part, pose), (centre_m, around_m)) in parts {
+                if layer != Layer::of(part) || !self.concerns(layer, *pose * *centre_m, *around_m) {
+                    continue;
+                }
+                corners_m.clear();
+                corners_m.extend(part.mesh.vertices.iter().map(|vertex| *pose * vertex.position_m));
+                if corners_m.iter().any(|corner_m| corner_m.z > HIGHEST_SUPPORT_M) && layer == Layer::Support
+                {
+                    continue;
+                }
+                for triangle in &part.mesh.triangles {
+                    self.fill(simd, layer, triangle.map(|corner| corners_m[corner as usize]));
+                }
+            }
+        }
+        self.darken();
+    }
+
+    /// Whether a part, given by a sphere around it, is over the map and near what it could touch.
+    fn concerns(&self, layer: Layer, centre_m: Vector, around_m: f32) -> bool {
+        let [u, v] = self.place(centre_m);
+        let around = around_m * self.texels_per_m;
+        let over = |i: f32| i > -around && i < CONTACT_TEXELS as f32 + around;
+        if !over(u) || !over(v) || layer == Layer::Support {
+            return over(u) && over(v);
+        }
+        let column = (u.max(0.0) as usize).min(CONTACT_TEXELS - 1);
+        let row = (v.max(0.0) as usize).min(CONTACT_TEXELS - 1);
+        let support_m = self.support.row(row)[column] - DATUM_M;
+        let (low_m, high_m) = (centre_m.z - around_m, centre_m.z + around_m);
+        low_m < support_m + REACH_M && high_m > support_m - SINK_M
+    }
+
+    /// Column and row above which a point is, counted from the corner.
+    #[inline(always)]
+    fn place(&self, point_m: Vector) -> [f32; 2] {
+        let [x_m, y_m] = self.corner_m;
+        [(point_m.x - x_m) * self.texels_per_m, (point_m.y - y_m) * self.texels_per_m]
+    }
+
+    /// Rows run along y as they do not in pictures: what is seen to turn counter-clockwise faces down.
+    #[inline(always)]
+    fn fill<S: Simd>(&mut self, simd: S, layer: Layer, [a, b, c]: [Vector; 3]) {
+        let (corners_m, rows, sign) = match layer {
+            Layer::Support => ([a, c, b], &mut self.support, 1.0),
+            Layer::Underside => ([a, b, c], &mut self.underside, -1.0),
+        };
+        let ([x_m, y_m], scale) = (self.corner_m, self.texels_per_m);
+        let corners = corners_m.map(|p| [(p.x - x_m) * scale, (p.y - y_m) * scale, DATUM_M + sign * p.z]);
+        let nearest = S::as_mut_simd_f32s(rows.all_mut()).0;
+        if let Some(outline) = Outline::new(corners) {
+            outline.draw(
+                simd,
+                GRID,
+                #[inline(always)]
+                |i, nearness_m| nearest[i] = simd.max_f32s(nearest[i], nearness_m),
+            );
+        }
+    }
+
+    /// Dark where the lowest underside is near, smoothed.
+    #[inline(always)]
+    fn darken(&mut self) {
+        let mut dark = vec![[0.0f32; CONTACT_TEXELS]; CONTACT_TEXELS];
+        for (row, dark) in dark.iter_mut().enumerate() {
+            let layers = self.support.row(row).iter().zip(self.underside.row(row));
+            for (dark, (support, underside)) in dark.iter_mut().zip(layers) {
+                // Nothing is above a texel without an underside.
+                let gap_m = 2.0 * DATUM_M - underside - support;
+                let near = (1.0 - gap_m / REACH_M).clamp(0.0, 1.0);
+                *dark = if gap_m > -SINK_M { near } else { 0.0 };
+            }
+        }
+        let across: Vec<_> = dark.iter().map(|row| blurred(|offset, i| row[shifted(i, offset)])).collect();
+        self.texel_values.clear();
+        for row in 0..CONTACT_TEXELS {
+            let dark = blurred(|offset, i| across[shifted(row, offset)][i]);
+            let heights_m = self.support.row(row).iter().map(|nearness_m| nearness_m - DATUM_M);
+            self.texel_values.extend(heights_m.zip(dark).map(|(height_m, dark)| [height_m, dark]));
+        }
+    }
+
+    /// How dark it is at a point of the world: 0 if it is not near what carries things.
+    #[inline(always)]
+    pub(super) fn darkness(&self, point_m: Vector) -> f32 {
+        let [u, v] = self.place(point_m).map(|i| i - 0.5);
+        let last = (CONTACT_TEXELS - 1) as f32;
+        if !(u >= 0.0 && u < last && v >= 0.0 && v < last) {
+            return 0.0;
+        }
+        let (column, row) = (usize::from(u as u16), usize::from(v as u16));
+        let at = |j: usize, i: usize| self.texel_values[(row + j) * CONTACT_TEXELS + column + i];
+        let (right, down) = (u - column as f32, v - row as f32);
+        let [height_m, _] = at(usize::from(down >= 0.5), usize::from(right >= 0.5));
+        if (point_m.z - height_m).abs() > SINK_M {
+            return 0.0;
+        }
+        let along = |j: usize| at(j, 0)[1] * (1.0 - right) + at(j, 1)[1] * right;
+        along(0) * (1.0 - down) + along(1) * down
+    }
+}
+
+/// What is drawn from above, and what from below.
+#[derive(Clone, Copy, PartialEq)]
+enum Layer {
+    Support,
+    Underside,
+}
+
+impl Layer {
+    fn of(part: &Part) -> Layer {
+        match part.carrier {
+            Carrier::Room => Layer::Support,
+            Carrier::Link { .. } | Carrier::Object(_) => Layer::Underside,
+        }
+    }
+}
+
+#[inline(always)]
+fn blurred(at: impl Fn(usize, usize) -> f32) -> [f32; CONTACT_TEXELS] {
+    let mut sums = [0.0; CONTACT_TEXELS];
+    for (offset, weight) in BLUR.into_iter().enumerate() {
+        for (i, sum) in sums.iter_mut().enumerate() {
+            *sum += weight * at(offset, i);
+        }
+    }
+    sums
+}
+
+/// The neighbour that a weight is for; at the rim, the rim itself.
+#[inline(always)]
+fn shifted(i: usize, offset: usize) -> usize {
+    (i + offset).saturating_sub(BLUR.len() / 2).min(CONTACT_TEXELS - 1)
+}

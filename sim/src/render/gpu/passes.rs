@@ -1,0 +1,129 @@
+//! The passes of a picture: shadow, samples, centres, and the mean of the samples.
+
+use wgpu::{
+    BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType, BufferBindingType,
+    ColorTargetState, CompareFunction, ComputePipeline, ComputePipelineDescriptor, DepthStencilState, Device,
+    Face, FragmentState, PipelineLayout, PipelineLayoutDescriptor, PrimitiveState, RenderPipeline,
+    RenderPipelineDescriptor, ShaderModule, ShaderModuleDescriptor, ShaderSource, ShaderStages,
+    TextureFormat, TextureSampleType, TextureViewDimension, VertexState,
+};
+
+use super::shader;
+
+pub(super) const DEPTH: TextureFormat = TextureFormat::Depth32Float;
+/// Numbers of triangles.
+pub(super) const TRIANGLES: TextureFormat = TextureFormat::R32Uint;
+
+pub(super) struct Passes {
+    /// What there is to see, and from where.
+    pub scene: BindGroupLayout,
+    /// What the first passes have drawn, and where the picture goes.
+    pub targets: BindGroupLayout,
+    pub shadow: RenderPipeline,
+    /// Of samples, and of centres.
+    pub triangles: RenderPipeline,
+    pub resolve: ComputePipeline,
+}
+
+impl Passes {
+    pub(super) fn new(device: &Device) -> Passes {
+        let module = device.create_shader_module(ShaderModuleDescriptor {
+            label: None,
+            source: ShaderSource::Wgsl(shader::text().into()),
+        });
+        let all = ShaderStages::VERTEX_FRAGMENT | ShaderStages::COMPUTE;
+        let storage = |read_only| buffer(BufferBindingType::Storage { read_only });
+        let scene = layout(
+            device,
+            all,
+            &[buffer(BufferBindingType::Uniform), storage(true), storage(true), storage(true), storage(true)],
+        );
+        let targets = layout(
+            device,
+            ShaderStages::COMPUTE,
+            &[
+                texture(TextureSampleType::Depth),
+                texture(TextureSampleType::Uint),
+                texture(TextureSampleType::Uint),
+                storage(false),
+            ],
+        );
+        let pipeline_layout = |groups: &[Option<&BindGroupLayout>]| {
+            device.create_pipeline_layout(&PipelineLayoutDescriptor {
+                bind_group_layouts: groups,
+                ..PipelineLayoutDescriptor::default()
+            })
+        };
+        let drawing = pipeline_layout(&[Some(&scene)]);
+        let resolving = pipeline_layout(&[Some(&scene), Some(&targets)]);
+        Passes {
+            shadow: render_pipeline(device, &drawing, &module, "cast_shadow", None),
+            triangles: render_pipeline(device, &drawing, &module, "see", Some("mark")),
+            resolve: device.create_compute_pipeline(&ComputePipelineDescriptor {
+                label: None,
+                layout: Some(&resolving),
+                module: &module,
+                entry_point: Some("resolve"),
+                compilation_options: Default::default(),
+                cache: None,
+            }),
+            scene,
+            targets,
+        }
+    }
+}
+
+fn buffer(ty: BufferBindingType) -> BindingType {
+    BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None }
+}
+
+fn texture(sample_type: TextureSampleType) -> BindingType {
+    BindingType::Texture { sample_type, view_dimension: TextureViewDimension::D2, multisampled: false }
+}
+
+/// Bindings numbered in their order.
+fn layout(device: &Device, visibility: ShaderStages, types: &[BindingType]) -> BindGroupLayout {
+    let entries: Vec<BindGroupLayoutEntry> = (0..)
+        .zip(types)
+        .map(|(binding, ty)| BindGroupLayoutEntry { binding, visibility, ty: *ty, count: None })
+        .collect();
+    device.create_bind_group_layout(&BindGroupLayoutDescriptor { label: None, entries: &entries })
+}
+
+/// Draws front faces, the greatest depth first: depths are nearness. Corners come from the scene, not from vertex buffers.
+fn render_pipeline(
+    device: &Device,
+    layout: &PipelineLayout,
+    module: &ShaderModule,
+    vertex: &str,
+    fragment: Option<&str>,
+) -> RenderPipeline {
+    let targets = [Some(ColorTargetState::from(TRIANGLES))];
+    device.create_render_pipeline(&RenderPipelineDescriptor {
+        label: None,
+        layout: Some(layout),
+        vertex: VertexState {
+            module,
+            entry_point: Some(vertex),
+            compilation_options: Default::default(),
+            buffers: &[],
+        },
+        primitive: PrimitiveState { cull_mode: Some(Face::Back), ..PrimitiveState::default() },
+        depth_stencil: Some(DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(CompareFunction::Greater),
+            stencil: Default::default(),
+            bias: Default::default(),
+        }),
+        multisample: Default::default(),
+        fragment: fragment.map(|entry_point| FragmentState {
+            module,
+            entry_point: Some(entry_point),
+            compilation_options: Default::default(),
+            targets: &targets,
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}

@@ -1,0 +1,305 @@
+// The constants that both renderers share stand before this text.
+
+struct View {
+    // Rows from directions of the world to the camera's frame.
+    right: vec4f,
+    up: vec4f,
+    back: vec4f,
+    eye_m: vec4f,
+    // Rays of the world, 1 m deep: through the picture's top left corner, and from a sample to the next.
+    corner_ray: vec4f,
+    right_ray: vec4f,
+    down_ray: vec4f,
+    // Column, row and nearness on the shadow's map: scalar product with a point of the world, and a number more.
+    sun_column: vec4f,
+    sun_row: vec4f,
+    sun_nearness: vec4f,
+    // Twice the focal length by width and by height; width and height in pixels.
+    scale: vec4f,
+    // Of the map of contacts: world coordinates of its corner, and texels per metre.
+    contact: vec4f,
+}
+
+struct Part {
+    // Rows from its mesh to the world.
+    x: vec4f,
+    y: vec4f,
+    z: vec4f,
+    // Linear colours, with the pattern between them and the axis of the mesh that its grain runs along.
+    rgb: vec4f,
+    second_rgb: vec4f,
+    // Id, whether it casts a shadow, and whether things stand on it.
+    flags: vec4u,
+}
+
+struct Face {
+    normal: vec4f,
+    // Columns: how the normal changes with the point, per metre.
+    bend_x: vec4f,
+    bend_y: vec4f,
+    bend_z: vec4f,
+}
+
+@group(0) @binding(0) var<uniform> view: View;
+// Three for each triangle: the bits of its coordinates in its mesh's frame, and the number of its part.
+@group(0) @binding(1) var<storage, read> corners: array<vec4u>;
+@group(0) @binding(2) var<storage, read> faces: array<Face>;
+@group(0) @binding(3) var<storage, read> parts: array<Part>;
+// Heights of what carries things, and how dark it is there.
+@group(0) @binding(4) var<storage, read> contacts: array<vec2f>;
+
+@group(1) @binding(0) var shadow: texture_depth_2d;
+@group(1) @binding(1) var samples: texture_2d<u32>;
+@group(1) @binding(2) var centres: texture_2d<u32>;
+// Colours, then depths, then ids.
+@group(1) @binding(3) var<storage, read_write> picture: array<u32>;
+
+fn corner_m(number: u32) -> vec3f {
+    return bitcast<vec3f>(corners[number].xyz);
+}
+
+fn part_of(triangle: u32) -> Part {
+    return parts[corners[3u * triangle].w];
+}
+
+fn turned(part: Part, direction: vec3f) -> vec3f {
+    return vec3f(dot(part.x.xyz, direction), dot(part.y.xyz, direction), dot(part.z.xyz, direction));
+}
+
+fn turned_back(part: Part, direction: vec3f) -> vec3f {
+    return part.x.xyz * direction.x + part.y.xyz * direction.y + part.z.xyz * direction.z;
+}
+
+fn in_world(part: Part, point_m: vec3f) -> vec3f {
+    return turned(part, point_m) + vec3f(part.x.w, part.y.w, part.z.w);
+}
+
+fn on_sun_map(point_m: vec3f) -> vec3f {
+    let point = vec4f(point_m, 1.0);
+    return vec3f(dot(view.sun_column, point), dot(view.sun_row, point), dot(view.sun_nearness, point));
+}
+
+@vertex
+fn cast_shadow(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
+    let part = parts[corners[vertex].w];
+    if part.flags.y == 0u {
+        return vec4f(0.0, 0.0, 0.0, 1.0);
+    }
+    let place = on_sun_map(in_world(part, corner_m(vertex))) / vec3f(TEXELS, TEXELS, 2.0 * SUN_DISTANCE_M);
+    return vec4f(2.0 * place.x - 1.0, 1.0 - 2.0 * place.y, place.z, 1.0);
+}
+
+struct Seen {
+    @builtin(position) position: vec4f,
+    @location(0) @interpolate(flat, either) triangle: u32,
+}
+
+@vertex
+fn see(@builtin(vertex_index) vertex: u32) -> Seen {
+    let part = parts[corners[vertex].w];
+    let from_eye_m = in_world(part, corner_m(vertex)) - view.eye_m.xyz;
+    let across = vec2f(dot(view.right.xyz, from_eye_m), dot(view.up.xyz, from_eye_m));
+    let depth_m = -dot(view.back.xyz, from_eye_m);
+    return Seen(vec4f(across * view.scale.xy, NEAR_M, depth_m), vertex / 3u);
+}
+
+@fragment
+fn mark(seen: Seen) -> @location(0) u32 {
+    return seen.triangle;
+}
+
+// Of where a ray, 1 m deep, meets the plane of a triangle: 1 / depth.
+fn nearness_1_m(triangle: u32, ray: vec3f) -> f32 {
+    let part = part_of(triangle);
+    let corner = corner_m(3u * triangle);
+    let first = corner_m(3u * triangle + 1u) - corner;
+    let second = corner_m(3u * triangle + 2u) - corner;
+    let across = turned(part, cross(first, second));
+    return dot(across, ray) / dot(across, in_world(part, corner) - view.eye_m.xyz);
+}
+
+// 1 in the sun, 0 in the shadow: a bilinear filter three texels wide.
+fn sunlit(point_m: vec3f, normal: vec3f) -> f32 {
+    let place = on_sun_map(point_m + normal * NORMAL_OFFSET_M);
+    let texel = place.xy - 0.5;
+    if any(texel < vec2f(1.0)) || any(texel >= vec2f(TEXELS - 3.0)) {
+        return 1.0;
+    }
+    let low = floor(texel);
+    let part = texel - low;
+    let nearness_m = place.z + BIAS_M;
+    var sum = 0.0;
+    for (var j = -1; j <= 2; j++) {
+        let down = select(select(1.0, part.y, j == 2), 1.0 - part.y, j == -1);
+        for (var i = -1; i <= 2; i++) {
+            let across = select(select(1.0, part.x, i == 2), 1.0 - part.x, i == -1);
+            let occluder_m = textureLoad(shadow, vec2i(low) + vec2i(i, j), 0) * 2.0 * SUN_DISTANCE_M;
+            sum += select(0.0, across * down, nearness_m >= occluder_m);
+        }
+    }
+    return sum / 9.0;
+}
+
+// How dark contacts make a point of what carries things.
+fn darkness(point_m: vec3f) -> f32 {
+    let place = (point_m.xy - view.contact.xy) * view.contact.z - 0.5;
+    if any(place < vec2f(0.0)) || any(place >= vec2f(f32(CONTACT_TEXELS - 1u))) {
+        return 0.0;
+    }
+    let low = vec2u(place);
+    let part = place - vec2f(low);
+    let first = low.y * CONTACT_TEXELS + low.x;
+    let nearest = first + select(0u, CONTACT_TEXELS, part.y >= 0.5) + select(0u, 1u, part.x >= 0.5);
+    if abs(point_m.z - contacts[nearest].x) > SINK_M {
+        return 0.0;
+    }
+    let below = first + CONTACT_TEXELS;
+    return mix(
+        mix(contacts[first].y, contacts[first + 1u].y, part.x),
+        mix(contacts[below].y, contacts[below + 1u].y, part.x),
+        part.y,
+    );
+}
+
+// Up and down between 0 and 1 with a period of 1.
+fn wave(x: f32) -> f32 {
+    return abs(2.0 * fract(x) - 1.0);
+}
+
+// How much of the second colour there is at a point.
+fn second_share(part: Part, point_m: vec3f) -> f32 {
+    if part.rgb.w == 0.0 {
+        return 0.0;
+    }
+    if part.rgb.w == 1.0 {
+        let square = vec2i(floor(point_m.xy * CHECKER_PER_M));
+        return select(0.0, 1.0, ((square.x + square.y) & 1) == 0);
+    }
+    let in_mesh = turned_back(part, point_m - vec3f(part.x.w, part.y.w, part.z.w));
+    var p = in_mesh;
+    if part.second_rgb.w == 1.0 {
+        p = in_mesh.yzx;
+    } else if part.second_rgb.w == 2.0 {
+        p = in_mesh.zxy;
+    }
+    if part.rgb.w == 2.0 {
+        let across = p.y + p.z;
+        let band = wave(across * BANDS_PER_M + STRAY * wave(p.x * 1.1 + across));
+        return 0.7 * band * band + 0.3 * wave(across * LINES_PER_M + p.x);
+    }
+    let thread = p * THREADS_PER_M;
+    return wave(thread.x + thread.z) * wave(thread.y + thread.z);
+}
+
+fn albedo(part: Part, point_m: vec3f) -> vec3f {
+    return mix(part.rgb.xyz, part.second_rgb.xyz, second_share(part, point_m));
+}
+
+// Linear colour of what a ray sees.
+fn colour(triangle: u32, ray: vec3f) -> vec3f {
+    let part = part_of(triangle);
+    let face = faces[triangle];
+    let point_m = view.eye_m.xyz + ray / nearness_1_m(triangle, ray);
+    let from_corner_m = turned_back(part, point_m - in_world(part, corner_m(3u * triangle)));
+    let bend = mat3x3f(face.bend_x.xyz, face.bend_y.xyz, face.bend_z.xyz);
+    let eye_direction = -normalize(ray);
+    let outwards = normalize(turned(part, face.normal.xyz + bend * from_corner_m));
+    let towards_eye = dot(outwards, eye_direction);
+    let normal = outwards * select(1.0, -1.0, towards_eye < 0.0);
+    let base = albedo(part, point_m);
+    let ambient = mix(FROM_BELOW, FROM_ABOVE, normal.z * 0.5 + 0.5);
+    let unlit = base * (ambient + LAMP * abs(towards_eye));
+    let open = select(1.0, 1.0 - CONTACT * darkness(point_m), part.flags.z != 0u);
+    let facing_sun = dot(normal, TO_SUN);
+    if facing_sun <= 0.0 {
+        return unlit * open;
+    }
+    let half_way = normalize(eye_direction + TO_SUN);
+    let highlight = HIGHLIGHT * pow(max(dot(normal, half_way), 0.0), 40.0);
+    return (unlit + (base * SUN + highlight) * (facing_sun * sunlit(point_m, normal))) * open;
+}
+
+fn ray_at(sample: vec2u) -> vec3f {
+    let middle = vec2f(sample) + 0.5;
+    return view.corner_ray.xyz + view.right_ray.xyz * middle.x + view.down_ray.xyz * middle.y;
+}
+
+// Whether neighbouring samples show different things at different depths.
+fn differ(a: u32, a_at: vec2u, b_at: vec2u) -> bool {
+    let b = textureLoad(samples, b_at, 0).x;
+    if a == b || a == NOTHING || b == NOTHING || part_of(a).flags.x == part_of(b).flags.x {
+        return false;
+    }
+    let near_a = nearness_1_m(a, ray_at(a_at));
+    let near_b = nearness_1_m(b, ray_at(b_at));
+    return abs(near_a - near_b) > OUTLINE_DEPTH_STEP * max(near_a, near_b);
+}
+
+// How many of the neighbours to the right and below are outlined against a sample.
+fn outlines(triangle: u32, at: vec2u, size: vec2u) -> f32 {
+    if any(at + 1u >= size) {
+        return 0.0;
+    }
+    return select(0.0, 1.0, differ(triangle, at, at + vec2u(1u, 0u)))
+        + select(0.0, 1.0, differ(triangle, at, at + vec2u(0u, 1u)));
+}
+
+// Mean of a pixel's samples; a triangle that covers several of them is shaded once.
+fn mean(pixel: vec2u, size: vec2u) -> vec3f {
+    var triangles: array<u32, 4>;
+    var sum = vec3f(0.0);
+    var edges = 0.0;
+    for (var i = 0u; i < 4u; i++) {
+        let at = pixel * 2u + vec2u(i % 2u, i / 2u);
+        triangles[i] = textureLoad(samples, at, 0).x;
+        edges += outlines(triangles[i], at, size * 2u);
+    }
+    for (var i = 0u; i < 4u; i++) {
+        var covered = 0.0;
+        var first = true;
+        for (var j = 0u; j < 4u; j++) {
+            let same = triangles[j] == triangles[i];
+            first = first && !(same && j < i);
+            covered += select(0.0, 1.0, same);
+        }
+        if first {
+            if triangles[i] == NOTHING {
+                sum += SKY * covered;
+            } else {
+                sum += colour(triangles[i], ray_at(pixel * 2u + vec2u(i % 2u, i / 2u))) * covered;
+            }
+        }
+    }
+    return sum * (1.0 - OUTLINE * min(edges / 4.0, 1.0)) / 4.0;
+}
+
+// Linear light to sRGB bytes, in the steps of the embedded renderer's table.
+fn bytes(linear: vec3f) -> u32 {
+    let stepped = round(clamp(linear, vec3f(0.0), vec3f(1.0)) * (SRGB_STEPS - 1.0)) / (SRGB_STEPS - 1.0);
+    let low = 12.92 * stepped;
+    let high = 1.055 * pow(stepped, vec3f(1.0 / 2.4)) - 0.055;
+    let byte = vec3u(select(high, low, stepped <= vec3f(0.0031308)) * 255.0 + 0.5);
+    return byte.x | (byte.y << 8u) | (byte.z << 16u);
+}
+
+@compute @workgroup_size(8, 8)
+fn resolve(@builtin(global_invocation_id) place: vec3u) {
+    let size = vec2u(view.scale.zw);
+    let pixel = place.xy;
+    if any(pixel >= size) {
+        return;
+    }
+    let count = size.x * size.y;
+    let i = pixel.y * size.x + pixel.x;
+    picture[i] = bytes(mean(pixel, size));
+    let triangle = textureLoad(centres, pixel, 0).x;
+    if triangle == NOTHING {
+        picture[count + i] = INFINITY_BITS;
+        picture[2u * count + i] = 0u;
+    } else {
+        // The pixel's centre is the corner between its samples.
+        let ray = ray_at(pixel * 2u) + 0.5 * (view.right_ray.xyz + view.down_ray.xyz);
+        picture[count + i] = bitcast<u32>(1.0 / nearness_1_m(triangle, ray));
+        picture[2u * count + i] = part_of(triangle).flags.x;
+    }
+}

@@ -1,0 +1,144 @@
+//! A scenery in a device's memory, and where it is in one state.
+
+use rapier3d::math::{Matrix, Pose, Vector};
+use wgpu::util::{BufferInitDescriptor, DeviceExt};
+use wgpu::{BindGroup, Buffer, BufferUsages};
+
+use super::device::Gpu;
+use super::targets::bind;
+use crate::render::contact::ContactMap;
+use crate::render::light::{CONTACT_TEXELS, SAMPLES, sun_map};
+use crate::render::prepared::{Face, Prepared};
+use crate::render::{Camera, Carrier, Part, Pattern, Placed};
+
+/// Of `picture.wgsl`'s `View`, and of its `Part`.
+const VIEW_NUMBERS: usize = 48;
+const PART_NUMBERS: usize = 24;
+
+/// What `picture.wgsl` calls its group 0.
+pub(super) struct Scene {
+    view: Buffer,
+    parts: Buffer,
+    contacts: Buffer,
+    pub group: BindGroup,
+    /// Corners of all triangles.
+    pub corners: u32,
+}
+
+impl Scene {
+    pub(super) fn new(gpu: &Gpu, prepared: &Prepared) -> Scene {
+        let parts = prepared.scenery.parts.iter();
+        let corners: Vec<[u32; 4]> =
+            parts.zip(0..).flat_map(|(part, number)| part_corners(part, number)).collect();
+        let faces: Vec<[u32; 16]> = prepared.faces.iter().map(face).collect();
+        let initialised = |numbers: &[u32], usage: BufferUsages| {
+            // A buffer must not be empty.
+            let contents = bytes(if numbers.is_empty() { &[0; 64] } else { numbers });
+            gpu.device.create_buffer_init(&BufferInitDescriptor { label: None, contents: &contents, usage })
+        };
+        let written = BufferUsages::COPY_DST | BufferUsages::STORAGE;
+        let view = initialised(&[0; VIEW_NUMBERS], BufferUsages::COPY_DST | BufferUsages::UNIFORM);
+        let numbers = initialised(corners.as_flattened(), BufferUsages::STORAGE);
+        let faces = initialised(faces.as_flattened(), BufferUsages::STORAGE);
+        let parts = initialised(&vec![0; prepared.scenery.parts.len() * PART_NUMBERS], written);
+        let contacts = initialised(&vec![0; 2 * CONTACT_TEXELS * CONTACT_TEXELS], written);
+        let resources = [&view, &numbers, &faces, &parts, &contacts].map(|buffer| buffer.as_entire_binding());
+        let group = bind(gpu, &gpu.passes.scene, resources);
+        Scene { view, parts, contacts, group, corners: corners.len() as u32 }
+    }
+
+    /// Puts every part where it is.
+    pub(super) fn place(&self, gpu: &Gpu, prepared: &Prepared, placed: &Placed, contact: &ContactMap) {
+        let colours = prepared.linear_rgb.iter().zip(&prepared.grain);
+        let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).zip(colours);
+        let numbers: Vec<[u32; PART_NUMBERS]> =
+            parts.map(|((part, pose), (rgb, grain))| placed_part(part, *pose, *rgb, *grain)).collect();
+        gpu.queue.write_buffer(&self.parts, 0, &bytes(numbers.as_flattened()));
+        gpu.queue.write_buffer(&self.contacts, 0, &bytes(&bits(contact.texel_values.as_flattened())));
+    }
+
+    /// Looks through a camera.
+    pub(super) fn look(
+        &self,
+        gpu: &Gpu,
+        prepared: &Prepared,
+        placed: &Placed,
+        contact: &ContactMap,
+        camera: &Camera,
+    ) {
+        let rotation = camera.world_from_camera.rotation;
+        let sample = 1.0 / (camera.focal_px() * SAMPLES as f32);
+        let (width, height) = (camera.width as f32, camera.height as f32);
+        let direction = |axis: Vector| [axis.x, axis.y, axis.z, 0.0];
+        let map = sun_map(placed.focus_m, prepared.scenery.focus_radius_m);
+        let [column, row, nearness] = map.map(|(axis, constant)| [axis.x, axis.y, axis.z, constant]);
+        let [x_m, y_m] = contact.corner_m;
+        let numbers: [[f32; 4]; VIEW_NUMBERS / 4] = [
+            direction(rotation * Vector::X),
+            direction(rotation * Vector::Y),
+            direction(rotation * Vector::Z),
+            direction(camera.world_from_camera.translation),
+            direction(rotation * camera.unproject([0.0, 0.0], 1.0)),
+            direction(rotation * Vector::X * sample),
+            direction(rotation * Vector::NEG_Y * sample),
+            column,
+            row,
+            nearness,
+            [2.0 * camera.focal_px() / width, 2.0 * camera.focal_px() / height, width, height],
+            [x_m, y_m, contact.texels_per_m, 0.0],
+        ];
+        gpu.queue.write_buffer(&self.view, 0, &bytes(&bits(numbers.as_flattened())));
+    }
+}
+
+/// Three corners a triangle, with the number of their part.
+fn part_corners(part: &Part, number: u32) -> impl Iterator<Item = [u32; 4]> {
+    part.mesh.triangles.iter().flatten().map(move |corner| {
+        let Vector { x, y, z } = part.mesh.vertices[*corner as usize].position_m;
+        [x.to_bits(), y.to_bits(), z.to_bits(), number]
+    })
+}
+
+fn face(face: &Face) -> [u32; 16] {
+    let bend = face.bend_1_m.unwrap_or(Matrix::ZERO);
+    let mut numbers = [0; 16];
+    for (four, vector) in
+        numbers.as_chunks_mut::<4>().0.iter_mut().zip([face.normal, bend.x_axis, bend.y_axis, bend.z_axis])
+    {
+        *four = [vector.x.to_bits(), vector.y.to_bits(), vector.z.to_bits(), 0];
+    }
+    numbers
+}
+
+fn placed_part(part: &Part, pose: Pose, [first, second]: [Vector; 2], grain: usize) -> [u32; PART_NUMBERS] {
+    let (matrix, t) = (Matrix::from_quat(pose.rotation), pose.translation);
+    let (x, y, z) = (matrix.row(0), matrix.row(1), matrix.row(2));
+    let pattern = match part.pattern {
+        Pattern::Plain => 0.0,
+        Pattern::Checker(_) => 1.0,
+        Pattern::Wood => 2.0,
+        Pattern::Fabric => 3.0,
+    };
+    let rows = [
+        [x.x, x.y, x.z, t.x],
+        [y.x, y.y, y.z, t.y],
+        [z.x, z.y, z.z, t.z],
+        [first.x, first.y, first.z, pattern],
+        [second.x, second.y, second.z, grain as f32],
+    ];
+    let mut numbers = [0; PART_NUMBERS];
+    let flags = [part.id, part.casts_shadow.into(), (part.carrier == Carrier::Room).into(), 0];
+    for (number, bits) in numbers.iter_mut().zip(rows.as_flattened().iter().map(|x| x.to_bits()).chain(flags))
+    {
+        *number = bits;
+    }
+    numbers
+}
+
+fn bits(values: &[f32]) -> Vec<u32> {
+    values.iter().map(|value| value.to_bits()).collect()
+}
+
+fn bytes(numbers: &[u32]) -> Vec<u8> {
+    numbers.iter().flat_map(|number| number.to_ne_bytes()).collect()
+}

@@ -1,0 +1,48 @@
+//! The shader's text: the constants that renderers share, written out, then `picture.wgsl`.
+
+use rapier3d::math::Vector;
+
+use crate::render::camera::NEAR_M;
+use crate::render::contact::SINK_M;
+use crate::render::light::{
+    BIAS_M, CONTACT, CONTACT_TEXELS, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, NORMAL_OFFSET_M, OUTLINE,
+    OUTLINE_DEPTH_STEP, SKY, SRGB_STEPS, SUN, SUN_DISTANCE_M, TEXELS, TO_SUN,
+};
+use crate::render::pattern::{BANDS_PER_M, CHECKER_PER_M, LINES_PER_M, STRAY, THREADS_PER_M};
+use crate::render::prepared::NOTHING;
+
+pub(super) fn text() -> String {
+    let numbers = [
+        ("NEAR_M", NEAR_M),
+        ("BIAS_M", BIAS_M),
+        ("NORMAL_OFFSET_M", NORMAL_OFFSET_M),
+        ("SUN_DISTANCE_M", SUN_DISTANCE_M),
+        ("TEXELS", TEXELS as f32),
+        ("LAMP", LAMP),
+        ("CONTACT", CONTACT),
+        ("HIGHLIGHT", HIGHLIGHT),
+        ("CHECKER_PER_M", CHECKER_PER_M),
+        ("BANDS_PER_M", BANDS_PER_M),
+        ("LINES_PER_M", LINES_PER_M),
+        ("STRAY", STRAY),
+        ("THREADS_PER_M", THREADS_PER_M),
+        ("OUTLINE", OUTLINE),
+        ("OUTLINE_DEPTH_STEP", OUTLINE_DEPTH_STEP),
+        ("SRGB_STEPS", SRGB_STEPS as f32),
+    ];
+    let vectors = [
+        ("SUN", SUN),
+        ("TO_SUN", TO_SUN),
+        ("FROM_BELOW", FROM_BELOW),
+        ("FROM_ABOVE", FROM_ABOVE),
+        ("SKY", SKY),
+    ];
+    let number = |(name, value): (&str, f32)| format!("const {name} = {value:?}f;\n");
+    let vector = |(name, Vector { x, y, z }): (&str, Vector)| {
+        format!("const {name} = vec3f({x:?}f, {y:?}f, {z:?}f);\n")
+    };
+    let bits = format!("const NOTHING = {NOTHING}u;\nconst INFINITY_BITS = {}u;\n", f32::INFINITY.to_bits());
+    let texels = format!("const CONTACT_TEXELS = {CONTACT_TEXELS}u;\nconst SINK_M = {SINK_M:?}f;\n");
+    let constants = numbers.map(number).into_iter().chain(vectors.map(vector)).chain([bits, texels]);
+    constants.chain([include_str!("picture.wgsl").into()]).collect()
+}

@@ -1,0 +1,46 @@
+//! A picture's numbers, row by row, in blocks that are worked on at once.
+
+/// As many as the widest registers in common use hold.
+pub(super) const LANES: usize = 8;
+
+/// Samples in rows and columns, whose first are half a pitch from the picture's corner.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Grid {
+    pub width: usize,
+    pub height: usize,
+    /// Between neighbours, in the unit that triangles are given in.
+    pub pitch_px: f64,
+}
+
+impl Grid {
+    /// From a row to the next: rows consist of whole blocks, the last of which may reach beyond the picture.
+    pub(super) fn stride(self) -> usize {
+        self.width.next_multiple_of(LANES)
+    }
+}
+
+/// A number for each sample of a grid.
+#[derive(Default)]
+pub(super) struct Rows<T> {
+    grid: Grid,
+    numbers: Vec<T>,
+}
+
+impl<T: Copy> Rows<T> {
+    /// Makes every number `value`.
+    pub(super) fn reset(&mut self, grid: Grid, value: T) {
+        self.grid = grid;
+        self.numbers.clear();
+        self.numbers.resize(grid.stride() * grid.height, value);
+    }
+
+    pub(super) fn row(&self, row: usize) -> &[T] {
+        let start = row * self.grid.stride();
+        &self.numbers[start..start + self.grid.width]
+    }
+
+    /// All of them, row by row.
+    pub(super) fn all_mut(&mut self) -> &mut [T] {
+        &mut self.numbers
+    }
+}

@@ -1,0 +1,107 @@
+//! The renderer on a graphics processor draws what the embedded one draws. Software such as Mesa's will do for one; where there
+//! is none, these tests say so and pass.
+#![cfg(feature = "gpu")]
+
+use std::f32::consts::PI;
+
+use tandem_sim::render::{Camera, Cameras, Frame, Renderer, RendererKind, Scenery, cpu};
+use tandem_sim::{ObjectPlacement, Pose, RobotPlacement, Step, Vector, World, WorldSpec};
+
+const LEAST_PSNR_DB: f64 = 40.0;
+const DEPTH_TOLERANCE_M: f32 = 1e-4;
+/// Of the pixels.
+const STRAY_IDS: f64 = 0.002;
+
+/// `None`, and a line, where pictures are drawn by the embedded renderer anyway.
+fn gpu(scenery: Scenery) -> Option<Box<dyn Renderer>> {
+    let renderer = RendererKind::Gpu.renderer(scenery);
+    let found = renderer.name() != RendererKind::Cpu.name();
+    if !found {
+        println!("skipped: {}", RendererKind::Gpu.describe().expect("this build has it"));
+    }
+    found.then_some(renderer)
+}
+
+fn kitchen() -> World {
+    let robot = |name: &str, position_m: [f32; 2], yaw_rad: f32| RobotPlacement {
+        name: name.into(),
+        position_m,
+        yaw_rad,
+    };
+    let bottle = Pose::from_translation(Vector::new(0.30, -0.07, 0.80));
+    World::new(&WorldSpec {
+        scene: "kitchen_084".into(),
+        robots: vec![robot("A", [0.0, 0.0], 0.0), robot("B", [0.74, -0.12], PI)],
+        objects: vec![ObjectPlacement {
+            name: "bottle".into(),
+            file: "bottle".into(),
+            world_from_object: bottle,
+        }],
+    })
+    .expect("embedded files")
+}
+
+/// Every camera of the world, and one whose picture is of an odd size.
+fn views(world: &World, step: &Step) -> Vec<Camera> {
+    let cameras = Cameras::of(world);
+    let heads = (0..world.robots().len()).map(|robot| cameras.egocentric(step, robot));
+    let odd = Camera { width: 97, height: 61, ..cameras.third_person() };
+    heads.chain([cameras.third_person(), odd]).collect()
+}
+
+/// Peak signal-to-noise ratio.
+fn psnr_db(a: &Frame, b: &Frame) -> f64 {
+    let squares = a.rgb.iter().zip(&b.rgb).map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2));
+    10.0 * (255.0 * 255.0 * a.rgb.len() as f64 / squares.sum::<f64>()).log10()
+}
+
+/// Depth difference that 99 of 100 pixels do not exceed.
+fn depth_p99_m(a: &Frame, b: &Frame) -> f32 {
+    let pairs = a.depth_m.iter().zip(&b.depth_m);
+    let mut differences_m: Vec<f32> = pairs.map(|(a, b)| if a == b { 0.0 } else { (a - b).abs() }).collect();
+    differences_m.sort_by(f32::total_cmp);
+    differences_m[differences_m.len() * 99 / 100]
+}
+
+#[test]
+fn both_renderers_draw_the_same() {
+    let mut world = kitchen();
+    let Some(mut gpu) = gpu(Scenery::of(&world)) else { return };
+    let mut embedded = cpu(Scenery::of(&world));
+    let commands: Vec<_> = (0..world.robots().len()).map(|robot| world.rest_command(robot)).collect();
+    // Twice, for what moves has to be seen to have moved.
+    for _ in 0..2 {
+        let step =
+            (0..25).map(|_| world.control_step(&commands).expect("it stays finite")).last().expect("one");
+        for camera in views(&world, &step) {
+            let (drawn, expected) = (gpu.render(&step, &camera), embedded.render(&step, &camera));
+            let size = format!("{} x {}", camera.width, camera.height);
+            let (psnr_db, depth_m) = (psnr_db(&drawn, &expected), depth_p99_m(&drawn, &expected));
+            assert!(psnr_db >= LEAST_PSNR_DB, "{size}: {psnr_db:.1} dB");
+            assert!(depth_m <= DEPTH_TOLERANCE_M, "{size}: depths differ by {depth_m} m");
+            let stray = drawn.ids.iter().zip(&expected.ids).filter(|(a, b)| a != b).count();
+            assert!(stray as f64 <= STRAY_IDS * expected.ids.len() as f64, "{size}: {stray} other ids");
+            assert!(drawn.rgb.iter().any(|value| *value > 128), "{size}: it is dark");
+        }
+    }
+    assert_ne!(gpu.name(), embedded.name(), "the device did not fail");
+}
+
+#[test]
+fn a_picture_too_large_for_the_device_is_drawn_by_the_embedded_renderer() {
+    let world = kitchen();
+    let Some(mut gpu) = gpu(Scenery::of(&world)) else { return };
+    let wide = Camera { width: 70_000, height: 2, ..Cameras::of(&world).third_person() };
+    let frame = gpu.render(&world.present(), &wide);
+    assert_eq!(frame, cpu(Scenery::of(&world)).render(&world.present(), &wide));
+    assert_eq!(gpu.name(), RendererKind::Cpu.name(), "it says who draws now");
+}
+
+#[test]
+fn an_empty_scenery_is_sky() {
+    let world = kitchen();
+    let Some(mut gpu) = gpu(Scenery::default()) else { return };
+    let camera = Camera { width: 16, height: 8, ..Cameras::of(&world).third_person() };
+    let expected = cpu(Scenery::default()).render(&world.present(), &camera);
+    assert_eq!(gpu.render(&world.present(), &camera), expected);
+}
