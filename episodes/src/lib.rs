@@ -26,7 +26,7 @@ pub use protocol::{Rules, rules};
 pub use recording::{
     RecordedCall, Recorder, Recording, RecordingError, RecoverError, Recovered, Visibility, recover,
 };
-pub use scoring::{A, B, Done, Facts, Grip, ObjectFacts, Phase, RobotFacts, Scored, Scores};
+pub use scoring::{A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, RobotFacts, Scored, Scores};
 pub use session::{Checkpoint, Clock, RunFiles, RunFolder, Session, monotonic};
 pub use spec::{Controller, EpisodeSpec, RendererKind, RobotFile, Start};
 pub use tandem_sim::{BaseLimits, LocomotionChoice, SimError};

@@ -31,6 +31,7 @@ impl Scene {
             Done::When(condition) => condition(&facts),
             Done::Sequence { then, .. } => then(&facts),
             Done::Lasting { condition, at_end, .. } => condition(&facts) && at_end(&facts),
+            Done::Milestones(milestones) => milestones.iter().all(|milestone| (milestone.condition)(&facts)),
         }
     }
 
