@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use tandem_sim::Pose;
 
-use super::skills::{BarGrasp, Path, Stage, Team, let_go, take_softly, upright};
+use super::skills::{BEHIND_BAR_M, BarGrasp, Path, Stage, Team, let_go, take_softly, upright};
 use crate::players::PlayerError;
 use crate::scoring::{A, B, C};
 
@@ -17,16 +17,16 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
     let [b_left, b_right] = BarGrasp::from_above(B, "round_table", ["b_left", "b_right"], third_rad);
     let [c_left, c_right] = BarGrasp::from_above(C, "round_table", ["c_left", "c_right"], -third_rad);
     let grasps = [a_left, a_right, b_left, b_right, c_left, c_right];
-    let mut team = Team::new(stage, &grasps)?;
+    let mut team = Team::new(stage, &grasps, BEHIND_BAR_M)?;
     team.gather(stage)?;
     take_softly(stage, &grasps)?;
     team.lift(stage, LIFT_M)?;
-    let facts = stage.facts()?;
-    let from = upright(&facts.object("round_table").pose_in_world);
-    let way_m = (facts.position_m("goal_disc") - from.translation).with_z(0.0);
-    let length_m = way_m.length();
-    let at = |gone_m: f32| Pose::from_parts(from.translation + way_m * (gone_m / length_m), from.rotation);
+    let from = upright(&team.object(stage)?);
+    let disc_m = stage.facts()?.position_m("goal_disc");
+    let over = Pose::from_parts(disc_m.with_z(from.translation.z), from.rotation);
+    let length_m = (over.translation - from.translation).length();
+    let at = |gone_m: f32| from.lerp(&over, gone_m / length_m);
     team.carry(stage, &Path { at: &at, length_m, pace_m_s: PACE_M_S })?;
-    team.lower(stage, 0.0)?;
+    team.set_down(stage, &Pose::from_parts(disc_m, from.rotation))?;
     let_go(stage, &grasps)
 }

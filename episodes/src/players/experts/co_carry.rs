@@ -2,9 +2,9 @@
 
 use std::f32::consts::PI;
 
-use tandem_sim::{Pose, Vector};
+use tandem_sim::Pose;
 
-use super::skills::{BarGrasp, Path, Stage, Team, let_go, take_softly, upright};
+use super::skills::{BEHIND_BAR_M, BarGrasp, Path, Stage, Team, let_go, take_softly, upright};
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
@@ -15,20 +15,16 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
     let [a_left, a_right] = BarGrasp::from_above(A, "basket", ["a_left", "a_right"], 0.0);
     let [b_left, b_right] = BarGrasp::from_above(B, "basket", ["b_left", "b_right"], PI);
     let grasps = [a_left, a_right, b_left, b_right];
-    let mut team = Team::new(stage, &grasps)?;
+    let mut team = Team::new(stage, &grasps, BEHIND_BAR_M)?;
     team.gather(stage)?;
     take_softly(stage, &grasps)?;
     team.lift(stage, LIFT_M)?;
-    let facts = stage.facts()?;
-    let from = upright(&facts.object("basket").pose_in_world);
-    let shelf_m = facts.position_m("basket_patch").z;
-    let way_m = (facts.position_m("basket_patch") - from.translation).with_z(0.0);
-    let length_m = way_m.length();
-    let at = |gone_m: f32| {
-        let along_m: Vector = way_m * (gone_m / length_m);
-        Pose::from_parts(from.translation + along_m, from.rotation)
-    };
+    let from = upright(&team.object(stage)?);
+    let patch_m = stage.facts()?.position_m("basket_patch");
+    let over = Pose::from_parts(patch_m.with_z(from.translation.z), from.rotation);
+    let length_m = (over.translation - from.translation).length();
+    let at = |gone_m: f32| from.lerp(&over, gone_m / length_m);
     team.carry(stage, &Path { at: &at, length_m, pace_m_s: PACE_M_S })?;
-    team.lower(stage, shelf_m)?;
+    team.set_down(stage, &Pose::from_parts(patch_m, from.rotation))?;
     let_go(stage, &grasps)
 }

@@ -49,6 +49,13 @@ impl<'a> BarGrasp<'a> {
         };
         [grasp(Side::Left, bars[0]), grasp(Side::Right, bars[1])]
     }
+
+    /// As [`BarGrasp::from_above`], on upright bars, palms towards each other.
+    pub fn between(robot: usize, object: &'a str, bars: [&'a str; 2], heading_rad: f32) -> [BarGrasp<'a>; 2] {
+        let upright = Rotation::from_rotation_z(heading_rad);
+        BarGrasp::from_above(robot, object, bars, heading_rad)
+            .map(|grasp| BarGrasp { object_from_wrist: upright, ..grasp })
+    }
 }
 
 impl BarGrasp<'_> {

@@ -20,7 +20,7 @@ pub fn upright(pose: &Pose) -> Pose {
     Pose::from_parts(pose.translation, Rotation::from_rotation_z(heading_rad(pose)))
 }
 
-/// A place on the floor.
-pub fn place(x_m: f32, y_m: f32, heading_rad: f32) -> Pose {
-    Pose::from_parts(Vector::new(x_m, y_m, 0.0), Rotation::from_rotation_z(heading_rad))
+/// A place and a heading.
+pub fn place(position_m: Vector, heading_rad: f32) -> Pose {
+    Pose::from_parts(position_m, Rotation::from_rotation_z(heading_rad))
 }

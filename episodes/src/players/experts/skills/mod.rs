@@ -1,6 +1,7 @@
 //! What several experts use: hands that move together, grasps, the shapes of a hand, walking, and carrying in step.
 
 mod bar;
+mod course;
 mod cylinder;
 mod ground;
 mod hand;
@@ -10,8 +11,11 @@ mod team;
 mod walk;
 
 pub use bar::{BarGrasp, move_together, take_together};
+pub use course::{Course, Posture, follow};
 pub use cylinder::{CylinderGrasp, pick_up_all};
-pub use ground::upright;
+pub use ground::{place, upright};
+pub use hand::closed_rad;
 pub use soft::{let_go, take_softly};
 pub use stage::{HandMove, Stage};
-pub use team::{Path, Team};
+pub use team::{BEHIND_BAR_M, Path, Team};
+pub use walk::{Way, walk_to};

@@ -23,16 +23,15 @@ const LEASH_M: f32 = 0.03;
 pub fn take_softly(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
     for _ in 0..ATTEMPTS {
         let before = each(stage, grasps, |grasp, stage| grasp.before(stage, STANDOFF_M))?;
-        stage.perform(1.4, &before)?;
+        stage.perform(1.1, &before)?;
         let around = each(stage, grasps, |grasp, stage| grasp.around(stage))?;
-        stage.perform(0.8, &around)?;
+        stage.perform(0.7, &around)?;
         close_softly(stage, grasps, &around)?;
         let facts = stage.facts()?;
         if grasps.iter().all(|grasp| facts.holds(grasp.robot, grasp.side, grasp.object)) {
             return Ok(());
         }
-        let open: Vec<HandMove> = grasps.iter().map(BarGrasp::open).collect();
-        stage.perform(0.5, &open)?;
+        open_in_place(stage, grasps)?;
     }
     Err(PlayerError::GaveUp("not every hand could take its bar".into()))
 }
@@ -62,15 +61,10 @@ fn close_softly(stage: &mut Stage, grasps: &[BarGrasp], around: &[HandMove]) -> 
     Ok(())
 }
 
-/// Hands open where they are, for opening fingers push; then they rise. Those that still touch try it again.
+/// Hands open where they are, for opening fingers push; then they rise. Those that still touch try it again, and give way to what they
+/// are caught on.
 pub fn let_go(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
-    for _ in 0..6 {
-        let moves = each(stage, grasps, |grasp, stage| {
-            let wrist = stage.world_from_wrist(grasp.robot, grasp.side)?;
-            Ok(HandMove { world_from_wrist: Some(wrist), ..grasp.open() })
-        })?;
-        stage.perform(0.1, &moves)?;
-    }
+    open_in_place(stage, grasps)?;
     let away = each(stage, grasps, |grasp, stage| {
         let wrist = stage.world_from_wrist(grasp.robot, grasp.side)?;
         let raised = Pose::from_parts(wrist.translation + Vector::Z * 0.10, wrist.rotation);
@@ -96,8 +90,21 @@ pub fn let_go(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError>
         let before = each(stage, &hooked, |grasp, stage| grasp.before(stage, standoff_m))?;
         stage.perform(0.8, &before)?;
     }
+    stage.set_compliance(None);
     let open: Vec<HandMove> = grasps.iter().map(BarGrasp::open).collect();
     stage.perform(0.5, &open)
+}
+
+/// Opens hands; the wrists stay wherever the fingers push them.
+fn open_in_place(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
+    for _ in 0..6 {
+        let moves = each(stage, grasps, |grasp, stage| {
+            let wrist = stage.world_from_wrist(grasp.robot, grasp.side)?;
+            Ok(HandMove { world_from_wrist: Some(wrist), ..grasp.open() })
+        })?;
+        stage.perform(0.1, &moves)?;
+    }
+    Ok(())
 }
 
 fn each(

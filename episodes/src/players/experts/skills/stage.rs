@@ -35,7 +35,6 @@ pub struct RobotMove {
     pub robot: usize,
     pub walk: Walk,
     pub hands: Hands,
-    pub compliance_n_s_m: Option<f64>,
 }
 
 /// Part of one hand in a motion. What is not said stays as it is.
@@ -78,6 +77,8 @@ pub struct Stage<'a> {
     goals: Vec<Sides<HandGoal>>,
     /// By robot: how high its pelvis is to be, where that has been said.
     heights_m: Vec<Option<f32>>,
+    /// How hands give way to partners.
+    compliance_n_s_m: Option<f64>,
 }
 
 impl<'a> Stage<'a> {
@@ -92,7 +93,7 @@ impl<'a> Stage<'a> {
                 })
             })
             .collect();
-        Ok(Stage { task, episode, goals, heights_m })
+        Ok(Stage { task, episode, goals, heights_m, compliance_n_s_m: None })
     }
 
     pub fn facts(&mut self) -> Result<Facts, PlayerError> {
@@ -102,6 +103,11 @@ impl<'a> Stage<'a> {
     /// How high a robot's pelvis is to be from its next command on.
     pub fn set_height(&mut self, robot: usize, height_m: f32) {
         self.heights_m[robot] = Some(height_m);
+    }
+
+    /// How all hands give way from the next command on.
+    pub fn set_compliance(&mut self, compliance_n_s_m: Option<f64>) {
+        self.compliance_n_s_m = compliance_n_s_m;
     }
 
     /// Moves hands along straight lines for `duration_s`, starting and arriving at rest; robots not named hold still.
@@ -159,7 +165,6 @@ impl<'a> Stage<'a> {
             }
             robots.push(WristMove {
                 carried: Some(carried),
-                compliance_n_s_m: part.compliance_n_s_m,
                 vx_m_s: Some(part.walk.forward_m_s.into()),
                 vy_m_s: Some(part.walk.left_m_s.into()),
                 yaw_rate_rad_s: Some(part.walk.turning_rad_s.into()),
@@ -216,6 +221,7 @@ impl<'a> Stage<'a> {
             left_fingers_rad: fingers(Side::Left),
             right_fingers_rad: fingers(Side::Right),
             pelvis_height_m: self.heights_m[robot].map(f64::from),
+            compliance_n_s_m: self.compliance_n_s_m,
             ..WristMove::hold(self.task.robots[robot].name)
         }
     }

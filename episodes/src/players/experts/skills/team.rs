@@ -1,25 +1,23 @@
-//! Robots that carry one object together, in step: all follow one path of the object, and hands give way to the partners.
+//! Robots that carry one object together, in step: all follow one path of the object, and hands give way to the partners. One robot
+//! that carries or pushes something with both hands is the smallest team.
 
-use tandem_sim::{CONTROL_DT_S, Pose, Sides, Vector};
+use tandem_sim::{Pose, Sides, Vector};
 
 use super::bar::{BarGrasp, move_together};
-use super::ground::{heading_rad, upright, wrapped_rad};
-use super::stage::{Hands, RobotMove, Stage, WALK_STEPS};
-use super::walk::{Drift, Way, steer, walk_to};
+use super::course::{Course, Posture, follow};
+use super::ground::upright;
+use super::stage::Stage;
+use super::walk::{Way, walk_to};
 use crate::players::PlayerError;
 
-/// How far behind the bar in its hands a robot stands.
-const BEHIND_BAR_M: f32 = 0.29;
+/// How far behind a bar in its hands a robot stands.
+pub const BEHIND_BAR_M: f32 = 0.29;
 /// Towards their places, before anything is held.
 const APPROACH_M_S: f32 = 0.3;
-const ACCELERATION_M_S2: f32 = 0.3;
-/// The slowest that a path is followed.
-const CREEP_M_S: f32 = 0.02;
+/// What two robots that walk with a load need.
 const COMPLIANCE_N_S_M: f64 = 250.0;
 /// Robots still correct their places for so long once the object has arrived.
-const HOLD_S: f32 = 2.0;
-/// Base commands are limited to what a robot does with its hands on a load.
-const PACE_M_S: f32 = 0.35;
+const HOLD_S: f32 = 1.4;
 /// An object that is set down is pressed on the floor by so much.
 const PRESS_M: f32 = 0.004;
 
@@ -41,16 +39,20 @@ pub struct Team<'a> {
 }
 
 impl<'a> Team<'a> {
-    /// Robots that have both hands in `grasps`, left first.
-    pub fn new(stage: &mut Stage, grasps: &'a [BarGrasp<'a>]) -> Result<Team<'a>, PlayerError> {
+    /// Robots that have both hands in `grasps`, left first, and stand `behind_m` behind them.
+    pub fn new(
+        stage: &mut Stage,
+        grasps: &'a [BarGrasp<'a>],
+        behind_m: f32,
+    ) -> Result<Team<'a>, PlayerError> {
         let facts = stage.facts()?;
         let pairs = grasps.chunks_exact(2);
         let stand = |pair: &[BarGrasp]| {
             let bar_m = |grasp: &BarGrasp| facts.site(grasp.object, grasp.bar).position_m();
             let middle_m = (bar_m(&pair[0]) + bar_m(&pair[1])) * 0.5;
             let ahead = upright(&Pose::from_rotation(pair[0].object_from_wrist));
-            let behind_m = ahead.rotation * Vector::new(-BEHIND_BAR_M, 0.0, 0.0);
-            Pose::from_parts((middle_m + behind_m).with_z(0.0), ahead.rotation)
+            let back_m = ahead.rotation * Vector::new(-behind_m, 0.0, 0.0);
+            Pose::from_parts((middle_m + back_m).with_z(0.0), ahead.rotation)
         };
         Ok(Team {
             grasps,
@@ -60,29 +62,30 @@ impl<'a> Team<'a> {
         })
     }
 
-    fn object(&self, stage: &mut Stage) -> Result<Pose, PlayerError> {
+    /// The object as it is now.
+    pub fn object(&self, stage: &mut Stage) -> Result<Pose, PlayerError> {
         Ok(stage.facts()?.object(self.grasps[0].object).pose_in_world)
     }
 
     /// Robots walk to where they stand beside the object as it is now.
     pub fn gather(&self, stage: &mut Stage) -> Result<(), PlayerError> {
+        let ways = self.ways(stage)?;
+        walk_to(stage, &ways)
+    }
+
+    /// The ways to where the robots stand beside the object as it is now.
+    pub fn ways(&self, stage: &mut Stage) -> Result<Vec<Way>, PlayerError> {
         let object = upright(&self.object(stage)?);
         let way = |(robot, stand): (&usize, &Pose)| Way {
             robot: *robot,
             to: object * *stand,
             pace_m_s: APPROACH_M_S,
         };
-        let ways: Vec<Way> = self.robots.iter().zip(&self.object_from_stand).map(way).collect();
-        walk_to(stage, &ways)
+        Ok(self.robots.iter().zip(&self.object_from_stand).map(way).collect())
     }
 
-    /// Lifts what all hands hold straight up, and measures the grips.
-    pub fn lift(&mut self, stage: &mut Stage, by_m: f32) -> Result<(), PlayerError> {
-        let start = self.object(stage)?;
-        let raised =
-            |share: f32| Pose::from_parts(start.translation + Vector::Z * by_m * share, start.rotation);
-        move_together(stage, self.grasps, &raised, 5, 0.3)?;
-        move_together(stage, self.grasps, &|_| raised(1.0), 1, 0.4)?;
+    /// Remembers where in the object's frame the hands are that hold it.
+    pub fn measure(&mut self, stage: &mut Stage) -> Result<(), PlayerError> {
         let object = self.object(stage)?;
         self.object_from_wrist.clear();
         for grasp in self.grasps {
@@ -92,54 +95,41 @@ impl<'a> Team<'a> {
         Ok(())
     }
 
-    /// Carries the lifted object along a path.
+    /// Lifts what all hands hold straight up, and measures the grips.
+    pub fn lift(&mut self, stage: &mut Stage, by_m: f32) -> Result<(), PlayerError> {
+        let start = self.object(stage)?;
+        let raised =
+            |share: f32| Pose::from_parts(start.translation + Vector::Z * by_m * share, start.rotation);
+        move_together(stage, self.grasps, &raised, 5, 0.25)?;
+        move_together(stage, self.grasps, &|_| raised(1.0), 1, 0.3)?;
+        self.measure(stage)
+    }
+
+    /// Takes the held object along a path, at the end of which it stays for a moment.
     pub fn carry(&self, stage: &mut Stage, path: &Path) -> Result<(), PlayerError> {
-        let dt_s = WALK_STEPS as f32 * CONTROL_DT_S;
-        let (mut gone_m, mut pace_m_s, mut held_s) = (0.0f32, 0.0f32, 0.0f32);
-        while held_s < HOLD_S {
-            let left_m = path.length_m - gone_m;
-            if left_m > 1e-4 {
-                let can_stop_m_s = (2.0 * ACCELERATION_M_S2 * left_m).sqrt();
-                let most_m_s = path.pace_m_s.min(can_stop_m_s).max(CREEP_M_S);
-                pace_m_s = (pace_m_s + ACCELERATION_M_S2 * dt_s).min(most_m_s);
-                gone_m += (pace_m_s * dt_s).min(left_m);
-            } else {
-                pace_m_s = 0.0;
-                held_s += dt_s;
-            }
-            let goal = (path.at)(gone_m);
-            let next = (path.at)((gone_m + pace_m_s * dt_s).min(path.length_m));
-            self.step(stage, &goal, &next, dt_s)?;
-        }
-        Ok(())
+        let postures = |gone_m: f32| self.postures(&(path.at)(gone_m));
+        stage.set_compliance((self.robots.len() > 1).then_some(COMPLIANCE_N_S_M));
+        let Path { length_m, pace_m_s, .. } = *path;
+        follow(stage, &Course { at: &postures, length_m, pace_m_s, hold_s: HOLD_S })
     }
 
-    /// One command: hands where the object is to be, bases where the robots stand beside it, which goes on to `next`.
-    fn step(&self, stage: &mut Stage, goal: &Pose, next: &Pose, dt_s: f32) -> Result<(), PlayerError> {
-        let facts = stage.facts()?;
-        let mut moves = Vec::with_capacity(self.robots.len());
-        for (index, (robot, stand)) in self.robots.iter().zip(&self.object_from_stand).enumerate() {
-            let (here, there) = (*goal * *stand, *next * *stand);
-            let drift = Drift {
-                velocity_m_s: (there.translation - here.translation) / dt_s,
-                turning_rad_s: wrapped_rad(heading_rad(&there) - heading_rad(&here)) / dt_s,
-            };
-            let wrist = |hand: usize| *goal * self.object_from_wrist[2 * index + hand];
-            moves.push(RobotMove {
-                robot: *robot,
-                walk: steer(&facts.robots[*robot].pelvis_in_world, &here, drift, PACE_M_S),
-                hands: Hands::World(Sides { left: wrist(0), right: wrist(1) }),
-                compliance_n_s_m: Some(COMPLIANCE_N_S_M),
-            });
-        }
-        stage.advance(WALK_STEPS, &moves)
+    /// How the robots stand and hold the object where it is to be.
+    fn postures(&self, world_from_object: &Pose) -> Vec<Posture> {
+        let hand = |hand: usize| *world_from_object * self.object_from_wrist[hand];
+        let posture = |(index, (robot, stand)): (usize, (&usize, &Pose))| Posture {
+            robot: *robot,
+            stand: *world_from_object * *stand,
+            wrists: Sides { left: hand(2 * index), right: hand(2 * index + 1) },
+        };
+        self.robots.iter().zip(&self.object_from_stand).enumerate().map(posture).collect()
     }
 
-    /// Sets the object down straight below, at a height of its origin.
-    pub fn lower(&self, stage: &mut Stage, height_m: f32) -> Result<(), PlayerError> {
+    /// Sets the object down: over its place first, then straight below.
+    pub fn set_down(&self, stage: &mut Stage, place: &Pose) -> Result<(), PlayerError> {
         let from = self.object(stage)?;
-        let mut down = upright(&from);
-        down.translation.z = height_m - PRESS_M;
-        move_together(stage, self.grasps, &|share| from.lerp(&down, share), 6, 0.3)
+        let over = Pose::from_parts(place.translation.with_z(from.translation.z), place.rotation);
+        let down = Pose::from_parts(place.translation - Vector::Z * PRESS_M, place.rotation);
+        move_together(stage, self.grasps, &|share| from.lerp(&over, share), 2, 0.25)?;
+        move_together(stage, self.grasps, &|share| over.lerp(&down, share), 5, 0.28)
     }
 }

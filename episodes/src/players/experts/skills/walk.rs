@@ -10,11 +10,14 @@ use crate::players::PlayerError;
 const GAIN_1_S: f32 = 1.0;
 /// A place is reached within this.
 const CLOSE_M: f32 = 0.02;
-const CLOSE_RAD: f32 = 0.03;
+const CLOSE_RAD: f32 = 0.04;
+/// One who stands is not asked to walk again within this.
+const AT_REST_M: f32 = 0.03;
+const TRIES: u32 = 3;
 /// A robot that has not come to rest by then stands close enough, or never will.
 const LONGEST_S: f32 = 20.0;
 /// Feet come together, and what sways comes to rest.
-const SETTLE_S: f32 = 0.6;
+const SETTLE_COMMANDS: u32 = 6;
 
 /// The way to a place.
 #[derive(Clone, Copy)]
@@ -54,36 +57,41 @@ pub fn walk_to(stage: &mut Stage, ways: &[Way]) -> Result<(), PlayerError> {
         hands.push(stage.facts()?.robots[way.robot].wrist_in_pelvis);
     }
     let mut left_s = LONGEST_S;
-    while left_s > 0.0 {
-        let facts = stage.facts()?;
-        let pelvis = |way: &Way| facts.robots[way.robot].pelvis_in_world;
-        if ways.iter().all(|way| is_at(&pelvis(way), &way.to)) {
+    for _ in 0..TRIES {
+        while left_s > 0.0 && !are_there(stage, ways, CLOSE_M)? {
+            let facts = stage.facts()?;
+            let walk = |way: &Way| {
+                steer(&facts.robots[way.robot].pelvis_in_world, &way.to, Drift::default(), way.pace_m_s)
+            };
+            stage.advance(WALK_STEPS, &moves(ways, &hands, walk))?;
+            left_s -= WALK_STEPS as f32 * CONTROL_DT_S;
+        }
+        for _ in 0..SETTLE_COMMANDS {
+            stage.advance(WALK_STEPS, &moves(ways, &hands, |_| Walk::default()))?;
+        }
+        // Where a robot came by with a sway, it does not come to rest.
+        if are_there(stage, ways, AT_REST_M)? {
             break;
         }
-        let walk = |(way, hands): (&Way, &Sides<Pose>)| RobotMove {
-            robot: way.robot,
-            walk: steer(&pelvis(way), &way.to, Drift::default(), way.pace_m_s),
-            hands: Hands::Carried(*hands),
-            compliance_n_s_m: None,
-        };
-        let moves: Vec<RobotMove> = ways.iter().zip(&hands).map(walk).collect();
-        stage.advance(WALK_STEPS, &moves)?;
-        left_s -= WALK_STEPS as f32 * CONTROL_DT_S;
-    }
-    let stand = |(way, hands): (&Way, &Sides<Pose>)| RobotMove {
-        robot: way.robot,
-        walk: Walk::default(),
-        hands: Hands::Carried(*hands),
-        compliance_n_s_m: None,
-    };
-    let moves: Vec<RobotMove> = ways.iter().zip(&hands).map(stand).collect();
-    for _ in 0..(SETTLE_S / CONTROL_DT_S) as u32 / WALK_STEPS {
-        stage.advance(WALK_STEPS, &moves)?;
     }
     Ok(())
 }
 
-fn is_at(at: &Pose, to: &Pose) -> bool {
-    let off_m = (to.translation - at.translation).truncate().length();
-    off_m < CLOSE_M && wrapped_rad(heading_rad(to) - heading_rad(at)).abs() < CLOSE_RAD
+fn moves(ways: &[Way], hands: &[Sides<Pose>], walk: impl Fn(&Way) -> Walk) -> Vec<RobotMove> {
+    let part = |(way, hands): (&Way, &Sides<Pose>)| RobotMove {
+        robot: way.robot,
+        walk: walk(way),
+        hands: Hands::Carried(*hands),
+    };
+    ways.iter().zip(hands).map(part).collect()
+}
+
+fn are_there(stage: &mut Stage, ways: &[Way], within_m: f32) -> Result<bool, PlayerError> {
+    let facts = stage.facts()?;
+    let is_there = |way: &Way| {
+        let at = facts.robots[way.robot].pelvis_in_world;
+        let off_m = (way.to.translation - at.translation).truncate().length();
+        off_m < within_m && wrapped_rad(heading_rad(&way.to) - heading_rad(&at)).abs() < CLOSE_RAD
+    };
+    Ok(ways.iter().all(is_there))
 }
