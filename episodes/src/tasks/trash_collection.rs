@@ -1,7 +1,7 @@
 //! TrashCollection: A carries a bin to the end of a bench and holds it there; B sweeps a bottle off the bench into it.
 //!
 //! Conditions, tolerances and randomisation are the benchmark's. Where it is silent we chose what a G1 carries between its hands: a
-//! bin of 1.4 kg, 0.66 m tall, with upright handles, which stands so far away that it walks at least 1.2 m before it counts as
+//! bin of 1.5 kg, 0.72 m tall, with upright handles, which stands so far away that it walks at least 1.2 m before it counts as
 //! delivered; and a bench of 0.80 m, over whose end a bottle rolls that lies across it. A bin is held aloft if it is held as
 //! high off the floor as for the first phase.
 
@@ -15,7 +15,7 @@ const BENCH_M: f32 = 0.80;
 /// Half the thickness of the bottle.
 const BOTTLE_M: f32 = 0.033;
 const BIN_Y_M: f32 = 1.77;
-const CARRY_POINT_Y_M: f32 = 0.13;
+const CARRY_POINT_Y_M: f32 = 0.105;
 const LIFTED_M: f32 = 0.02;
 const DELIVERED_M: f32 = 0.25;
 /// How far the rim of the bin may be above the bench's top.
@@ -29,7 +29,7 @@ pub const TASK: Task = Task {
             name: "A",
             position_m: [0.0, BIN_Y_M + 0.55],
             yaw_rad: -FRAC_PI_2,
-            instruction: "Walk to the bin, bend your knees and take it by the yellow handles, one in each hand. Carry it upright \
+            instruction: "Walk to the bin, bend your knees a little and take it by the yellow handles, one in each hand. Carry it upright \
                           straight ahead to the end of the bench, and hold it there with its rim a little lower than the \
                           bench's top until the bottle is in it.",
         },

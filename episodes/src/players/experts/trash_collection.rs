@@ -1,21 +1,18 @@
-//! TrashCollection: A squats, takes the bin by its handles and holds it under the end of the bench, where B sweeps the bottle with the
-//! back of its left hand.
+//! TrashCollection: A bends its knees, takes the bin by its handles and holds it at the end of the bench, over which B sweeps the bottle with
+//! the back of its left hand.
 
 use std::f32::consts::FRAC_PI_2;
 
 use tandem_sim::{Pose, Rotation, Side, Vector};
 
-use super::skills::{BarGrasp, HandMove, Path, Stage, Team, take_softly, upright};
+use super::skills::{BEHIND_BAR_M, BarGrasp, HandMove, Path, Stage, Team, take_softly, upright};
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
-/// How far behind the handles A stands.
-const BEHIND_M: f32 = 0.345;
-const SQUAT_M: f32 = 0.60;
-const TALL_M: f32 = 0.74;
-/// The bench stands over the rim of a bin that is held so high, whose near wall is then below its top.
-const LIFT_M: f32 = 0.09;
-const BELOW_BENCH_M: f32 = 0.06;
+const BENT_M: f32 = 0.62;
+const TALL_M: f32 = 0.72;
+/// The rim of the bin is then a little lower than the bench's top.
+const LIFT_M: f32 = 0.055;
 const PACE_M_S: f32 = 0.28;
 /// From the middle of the bottle to the left wrist: the bottle rolls before the middle of the hand's back.
 const BEHIND_BOTTLE_M: Vector = Vector::new(-0.12, -0.075, 0.022);
@@ -27,9 +24,9 @@ const TRIES: u32 = 3;
 
 pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
     let grasps = BarGrasp::between(A, "bin", ["left", "right"], -FRAC_PI_2);
-    let mut team = Team::new(stage, &grasps, BEHIND_M)?;
+    let mut team = Team::new(stage, &grasps, BEHIND_BAR_M)?;
+    stage.set_height(A, BENT_M);
     team.gather(stage)?;
-    stage.set_height(A, SQUAT_M);
     take_softly(stage, &grasps)?;
     team.lift(stage, LIFT_M)?;
     stage.set_height(A, TALL_M);
@@ -37,7 +34,6 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
     let facts = stage.facts()?;
     let mut end_m = facts.position_m("carry_point");
     end_m.x = facts.position_m("pet_bottle").x;
-    end_m.y -= BELOW_BENCH_M;
     let over = Pose::from_parts(end_m.with_z(from.translation.z), from.rotation);
     let length_m = (over.translation - from.translation).length();
     let at = |gone_m: f32| from.lerp(&over, gone_m / length_m);

@@ -33,13 +33,13 @@ fn deliver_on_both_sides_of_every_threshold() {
     for (beside_m, base_m, expected) in [
         (Vector::ZERO, 0.0201, true),
         (Vector::ZERO, 0.0199, false),
-        // The bin is 0.66 m tall, the bench 0.80 m.
-        (Vector::ZERO, 0.1499, true),
-        (Vector::ZERO, 0.1501, false),
-        (Vector::X * 0.2499, 0.12, true),
-        (Vector::X * 0.2501, 0.12, false),
-        (Vector::new(0.17, 0.18, 0.0), 0.12, true),
-        (Vector::new(-0.18, 0.18, 0.0), 0.12, false),
+        // The bin is 0.72 m tall, the bench 0.80 m.
+        (Vector::ZERO, 0.0899, true),
+        (Vector::ZERO, 0.0903, false),
+        (Vector::X * 0.2499, 0.06, true),
+        (Vector::X * 0.2501, 0.06, false),
+        (Vector::new(0.17, 0.18, 0.0), 0.06, true),
+        (Vector::new(-0.18, 0.18, 0.0), 0.06, false),
     ] {
         assert_eq!(delivered(&held_at(beside_m, base_m)), expected, "{beside_m} {base_m}");
     }
@@ -48,7 +48,7 @@ fn deliver_on_both_sides_of_every_threshold() {
 #[test]
 fn the_bottle_is_between_the_walls_of_the_bin_that_a_holds() {
     let with_bottle_at = |in_bin_m: Vector| {
-        let mut facts = held_at(Vector::ZERO, 0.12);
+        let mut facts = held_at(Vector::ZERO, 0.06);
         let bottle_m = facts.point_m("bin", in_bin_m);
         facts.object_mut("pet_bottle").pose_in_world.translation = bottle_m;
         facts
@@ -57,10 +57,10 @@ fn the_bottle_is_between_the_walls_of_the_bin_that_a_holds() {
         (Vector::new(0.0, 0.0, 0.1), true),
         (Vector::new(0.143, 0.0, 0.1), true),
         (Vector::new(0.145, 0.0, 0.1), false),
-        (Vector::new(0.0, -0.098, 0.1), true),
-        (Vector::new(0.0, -0.100, 0.1), false),
-        (Vector::new(0.0, 0.0, 0.659), true),
-        (Vector::new(0.0, 0.0, 0.661), false),
+        (Vector::new(0.0, -0.078, 0.1), true),
+        (Vector::new(0.0, -0.080, 0.1), false),
+        (Vector::new(0.0, 0.0, 0.719), true),
+        (Vector::new(0.0, 0.0, 0.721), false),
         (Vector::new(0.0, 0.0, 0.001), true),
         (Vector::new(0.0, 0.0, -0.001), false),
     ] {

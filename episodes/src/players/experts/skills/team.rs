@@ -108,7 +108,7 @@ impl<'a> Team<'a> {
     /// Takes the held object along a path, at the end of which it stays for a moment.
     pub fn carry(&self, stage: &mut Stage, path: &Path) -> Result<(), PlayerError> {
         let postures = |gone_m: f32| self.postures(&(path.at)(gone_m));
-        stage.set_compliance((self.robots.len() > 1).then_some(COMPLIANCE_N_S_M));
+        stage.set_compliance(self.compliance_n_s_m());
         let Path { length_m, pace_m_s, .. } = *path;
         follow(stage, &Course { at: &postures, length_m, pace_m_s, hold_s: HOLD_S })
     }
@@ -124,12 +124,20 @@ impl<'a> Team<'a> {
         self.robots.iter().zip(&self.object_from_stand).enumerate().map(posture).collect()
     }
 
-    /// Sets the object down: over its place first, then straight below.
+    /// Sets the object down: over its place first, for which hands must not give way, then straight below.
     pub fn set_down(&self, stage: &mut Stage, place: &Pose) -> Result<(), PlayerError> {
         let from = self.object(stage)?;
         let over = Pose::from_parts(place.translation.with_z(from.translation.z), place.rotation);
         let down = Pose::from_parts(place.translation - Vector::Z * PRESS_M, place.rotation);
-        move_together(stage, self.grasps, &|share| from.lerp(&over, share), 2, 0.25)?;
-        move_together(stage, self.grasps, &|share| over.lerp(&down, share), 5, 0.28)
+        stage.set_compliance(None);
+        move_together(stage, self.grasps, &|share| from.lerp(&over, share), 4, 0.25)?;
+        move_together(stage, self.grasps, &|share| over.lerp(&down, share), 5, 0.28)?;
+        stage.set_compliance(self.compliance_n_s_m());
+        Ok(())
+    }
+
+    /// One who has no partner gives way to nobody.
+    fn compliance_n_s_m(&self) -> Option<f64> {
+        (self.robots.len() > 1).then_some(COMPLIANCE_N_S_M)
     }
 }
