@@ -30,7 +30,7 @@ pub use recording::{
     RecordedCall, RecordedCheckpoint, Recorder, Recording, RecordingError, RecoverError, Recovered,
     Visibility, recover,
 };
-pub use scoring::{A, B, Done, Facts, Grip, ObjectFacts, Phase, RobotFacts, Scored, Scores};
+pub use scoring::{A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, RobotFacts, Scored, Scores};
 pub use session::{Checkpoint, Clock, RunFiles, RunFolder, Session, monotonic};
 pub use spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, Start};
 pub use tandem_sim::{BaseLimits, LocomotionChoice, SimError, render::RendererKind};

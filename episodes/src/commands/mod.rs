@@ -55,6 +55,8 @@ pub enum Movement {
 #[derive(Clone, Debug)]
 pub struct Goals {
     pub wrists: Sides<Aim>,
+    /// How the wrists give way; `None` for not at all.
+    pub compliance_n_s_m: Option<f64>,
     pub fingers_rad: Sides<Option<[f64; HAND_JOINTS]>>,
     pub base: BaseCommand,
 }

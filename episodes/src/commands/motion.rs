@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Translation3, Vector3};
 use serde::{Deserialize, Serialize};
 use tandem_ik::{Configuration, FrameError, Outcome, SolveOptions, Solver, frame_errors};
-use tandem_sim::{BaseCommand, BaseLimits, HAND_JOINTS, RobotCommand, RobotModel, Side, Sides, UPPER_JOINTS};
+use tandem_sim::{
+    BaseCommand, BaseLimits, CONTROL_HZ, HAND_JOINTS, RobotCommand, RobotModel, Side, Sides, UPPER_JOINTS,
+};
 
 use super::aim::Aim;
 use super::columns;
@@ -14,6 +16,10 @@ use super::upper_body::{REACH_TOLERANCE, UpperBody};
 /// Part of the remaining error that one control step removes: smooth, and a lag of two steps.
 const GAIN: f64 = 0.5;
 const REACH_RESTARTS: usize = 8;
+/// Hands give way by no more than this, and creep back at this rate while they may give way, faster when they may no more.
+const MOST_YIELD_M: f64 = 0.06;
+const LEAK_1_S: f64 = 0.1;
+const RETURN_1_S: f64 = 3.0;
 
 /// What of a robot stays the same throughout an episode.
 #[derive(Clone)]
@@ -41,6 +47,10 @@ pub struct MotionState {
     pub(super) aims: Sides<Aim>,
     /// The pelvis as it was last sensed.
     world_from_pelvis: Isometry3<f64>,
+    /// What pulled both hands the way the robot faces, as it was last sensed.
+    pull_n: f64,
+    /// How far the hands have given way to it.
+    yielded_m: f64,
     /// What the solver remembers of steps that did not help; see [`Solver::caution`].
     caution: f64,
 }
@@ -58,14 +68,44 @@ impl Motion {
             base: rest.base,
             aims: Sides::both(Aim::Joints),
             world_from_pelvis,
+            pull_n: 0.0,
+            yielded_m: 0.0,
             caution: 1.0,
         };
         Motion { robot, solver: body.solver(), body: body.clone(), state }
     }
 
-    /// What the robot's hands are steered by until the pelvis is sensed anew.
-    pub fn sense(&mut self, world_from_pelvis: Isometry3<f64>) {
+    /// What the robot's hands are steered by until it is sensed anew: the pelvis, and the force of the world on both hands together
+    /// (world frame).
+    pub fn sense(&mut self, world_from_pelvis: Isometry3<f64>, hands_n: Vector3<f64>) {
         self.state.world_from_pelvis = world_from_pelvis;
+        self.state.pull_n = hands_n.dot(&self.ahead());
+    }
+
+    /// The way the robot faces, level, in the world.
+    fn ahead(&self) -> Vector3<f64> {
+        let x = self.state.world_from_pelvis.rotation * Vector3::x();
+        Vector3::new(x.x, x.y, 0.0).normalize()
+    }
+
+    /// Hands give way for one control step; without compliance they come back to where they were told to be.
+    ///   dy/dt = F / c - l y,   |y| <= y_max
+    pub(super) fn give_way(&mut self, compliance_n_s_m: Option<f64>) {
+        let MotionState { pull_n, yielded_m, .. } = self.state;
+        let rate_m_s = match compliance_n_s_m {
+            Some(compliance_n_s_m) => pull_n / compliance_n_s_m - LEAK_1_S * yielded_m,
+            None => -RETURN_1_S * yielded_m,
+        };
+        self.state.yielded_m = (yielded_m + rate_m_s / CONTROL_HZ).clamp(-MOST_YIELD_M, MOST_YIELD_M);
+    }
+
+    /// A wrist in the pelvis frame as it would be had it not given way.
+    pub(super) fn without_yield(&self, pelvis_from_wrist: &Isometry3<f64>) -> Isometry3<f64> {
+        Translation3::from(-self.yielded_in_pelvis_m()) * pelvis_from_wrist
+    }
+
+    fn yielded_in_pelvis_m(&self) -> Vector3<f64> {
+        self.state.world_from_pelvis.rotation.inverse() * (self.ahead() * self.state.yielded_m)
     }
 
     pub fn world_from_pelvis(&self) -> &Isometry3<f64> {
@@ -165,7 +205,8 @@ impl Motion {
     }
 
     fn in_pelvis(&self, aims: &Sides<Aim>) -> Sides<Option<Isometry3<f64>>> {
-        aims.map(|aim| aim.in_pelvis(&self.state.world_from_pelvis))
+        let yielded = Translation3::from(self.yielded_in_pelvis_m());
+        aims.map(|aim| aim.in_pelvis(&self.state.world_from_pelvis).map(|asked| yielded * asked))
     }
 
     fn configuration(&self) -> Configuration<'_> {

@@ -37,7 +37,8 @@ pub fn reach(entry: &WristMove, motion: &Motion) -> Order {
         left: fingers(Side::Left, &entry.left_fingers_rad),
         right: fingers(Side::Right, &entry.right_fingers_rad),
     };
-    Order { movement: Movement::Reach(Box::new(Goals { wrists, fingers_rad, base })), cut }
+    let compliance_n_s_m = entry.compliance_n_s_m;
+    Order { movement: Movement::Reach(Box::new(Goals { wrists, compliance_n_s_m, fingers_rad, base })), cut }
 }
 
 pub fn walk(entry: &WalkMove, motion: &Motion) -> Order {

@@ -26,7 +26,7 @@ impl Run {
             Movement::Reach(goals) => motion.aim(goals.wrists),
             Movement::Walk(_) | Movement::Rows(_) => motion.aim(Sides::both(Aim::Joints)),
         }
-        let commanded = motion.commanded_wrists();
+        let commanded = motion.commanded_wrists().map(|wrist| motion.without_yield(&wrist));
         let arrived = |side| motion.state().aims[side].at(motion.world_from_pelvis(), &commanded[side]);
         let from = Sides::from_fn(arrived);
         Run { movement, steps, done: 0, from, from_rad: motion.state().upper_rad }
@@ -35,6 +35,10 @@ impl Run {
     /// The next control step's command.
     pub fn command(&mut self, motion: &mut Motion) -> RobotCommand {
         self.done += 1;
+        motion.give_way(match &self.movement {
+            Movement::Reach(goals) => goals.compliance_n_s_m,
+            Movement::Hold | Movement::Walk(_) | Movement::Rows(_) => None,
+        });
         match &self.movement {
             Movement::Hold => {
                 motion.stand();

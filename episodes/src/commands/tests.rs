@@ -34,10 +34,15 @@ fn movement(entry: WristMove, motion: &Motion) -> Movement {
 
 /// Plays 50 steps, in each of which the pelvis moves by `pelvis_step_m`.
 fn play(movement: Movement, pelvis_step_m: Vector3<f64>, motion: &mut Motion) {
+    play_pulled(movement, pelvis_step_m, Vector3::zeros(), motion);
+}
+
+/// As [`play`], while the hands feel `hands_n`.
+fn play_pulled(movement: Movement, pelvis_step_m: Vector3<f64>, hands_n: Vector3<f64>, motion: &mut Motion) {
     let mut run = Run::begin(movement, 50, motion);
     for _ in 0..50 {
         run.command(motion);
-        motion.sense(Translation3::from(pelvis_step_m) * motion.world_from_pelvis());
+        motion.sense(Translation3::from(pelvis_step_m) * motion.world_from_pelvis(), hands_n);
     }
 }
 
@@ -96,6 +101,33 @@ fn targets_are_of_the_pelvis_at_the_beginning_and_only_carried_ones_move_with_it
         let expected_m = Vector3::new(0.28, -0.24, 0.22) + (walked - 50.0) * step_m;
         assert!((told_m - expected_m).norm() < 1e-9, "{told_m} with carried {carried}");
     }
+}
+
+#[test]
+fn hands_give_way_as_they_were_told_to_and_come_back() {
+    let ahead_n = Vector3::new(10.0, 0.0, 0.0);
+    let soft = || WristMove { compliance_n_s_m: Some(250.0), ..right_hand(false) };
+    let mut motion = arrived();
+    let there_m = wrist_in_world_m(&motion);
+    let off_m = |motion: &Motion| wrist_in_world_m(motion) - there_m;
+    // What pulls a stiff hand, or a soft one sideways, does not move it.
+    for (entry, hands_n) in [(right_hand(false), ahead_n), (soft(), Vector3::new(0.0, 30.0, -20.0))] {
+        let goal = movement(entry, &motion);
+        play_pulled(goal, Vector3::zeros(), hands_n, &mut motion);
+        assert!(off_m(&motion).norm() < 1e-3, "{} under {hands_n}", off_m(&motion));
+        play(Movement::Hold, Vector3::zeros(), &mut motion);
+    }
+    // 10 N for a second, at 1 m/s for 250 N: 4 cm, less what creeps back and what the hand is behind.
+    let goal = movement(soft(), &motion);
+    play_pulled(goal, Vector3::zeros(), ahead_n, &mut motion);
+    assert!((0.036..0.040).contains(&off_m(&motion).x), "{}", off_m(&motion));
+    // The next command begins where the hand is, and goes on to the limit.
+    let goal = movement(soft(), &motion);
+    play_pulled(goal, Vector3::zeros(), 3.0 * ahead_n, &mut motion);
+    assert!((0.058..0.0605).contains(&off_m(&motion).x), "{}", off_m(&motion));
+    play(Movement::Hold, Vector3::zeros(), &mut motion);
+    play(Movement::Hold, Vector3::zeros(), &mut motion);
+    assert!(off_m(&motion).norm() < 1e-3, "{}", off_m(&motion));
 }
 
 #[test]

@@ -6,6 +6,6 @@ mod phases;
 mod scorekeeper;
 mod scores;
 
-pub use facts::{A, B, Facts, Grip, ObjectFacts, RobotFacts};
-pub use phases::{Done, Phase};
+pub use facts::{A, B, C, Facts, Grip, ObjectFacts, RobotFacts};
+pub use phases::{Done, Milestone, Phase};
 pub use scores::{ScoreMemory, Scored, Scores};

@@ -25,19 +25,22 @@ pub struct Watched {
 }
 
 impl Scorekeeper {
-    /// Begins to watch `objects`, given by name and file, with the state before the first control step.
+    /// Begins to watch `objects`, given by name and file, and what moves on them, with the state before the first control step.
     pub fn new<'a>(
         objects: impl Iterator<Item = (&'a str, &'a str)>,
         start: &Step,
     ) -> Result<Scorekeeper, SimError> {
         let mut keeper = Scorekeeper { models: Vec::new(), watched: Vec::new() };
         for (name, file) in objects {
-            keeper.models.push(ObjectModel::load(file)?.into());
-            keeper.watched.push(Watched {
-                name: name.into(),
-                rest_height_m: start.object(name).map_or(0.0, |state| state.world_from_object.translation.z),
-                grasps: ObjectGrasps::new(name, start.robots.len()),
-            });
+            for part in ObjectModel::parts(file, name)? {
+                let at_start = start.object(&part.name);
+                keeper.watched.push(Watched {
+                    rest_height_m: at_start.map_or(0.0, |state| state.world_from_object.translation.z),
+                    grasps: ObjectGrasps::new(&part.name, start.robots.len()),
+                    name: part.name,
+                });
+                keeper.models.push(part.model.into());
+            }
         }
         Ok(keeper)
     }

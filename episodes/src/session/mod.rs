@@ -21,7 +21,8 @@ pub use run_files::{RunFiles, RunFolder};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use tandem_sim::{RobotCommand, Step, World};
+use nalgebra::Vector3;
+use tandem_sim::{RobotCommand, Side, Step, World};
 use tandem_tools_spec::{EndReason, ManageReply, ResultReply, ToolCall, ToolReply};
 
 use crate::commands::{Command, Motion, Run};
@@ -224,7 +225,9 @@ impl Session {
         }
         self.present = stepped?;
         for (motion, robot) in self.motions.iter_mut().zip(&self.present.robots) {
-            motion.sense(isometry_from_sim(&robot.state.world_from_pelvis));
+            let [left_n, right_n] = [Side::Left, Side::Right].map(|side| robot.state.hand_force_n[side]);
+            let hands_n = Vector3::from((left_n + right_n).to_array().map(f64::from));
+            motion.sense(isometry_from_sim(&robot.state.world_from_pelvis), hands_n);
         }
         let (was_underway, reached_before) = (self.scores.underway(), self.scores.reached().count());
         let scored = self.scores.update(&self.present);

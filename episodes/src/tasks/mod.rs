@@ -2,12 +2,18 @@
 //!
 //! To add a task: one file here and its line in [`ALL`].
 
+mod big_table;
+mod cart_service;
+mod co_carry;
 mod co_pouring;
 mod frame_hang;
 mod handover;
+mod move_house;
 mod placement;
 mod pouring;
 mod randomize;
+mod table_align;
+mod trash_collection;
 
 pub use randomize::{Offset, Start, uniform_xy};
 
@@ -17,7 +23,18 @@ use crate::EpisodeError;
 use crate::scoring::{Phase, Scores};
 
 /// Every task, in the benchmark's order.
-pub static ALL: &[Task] = &[handover::TASK, pouring::TASK, frame_hang::TASK, co_pouring::TASK];
+pub static ALL: &[Task] = &[
+    handover::TASK,
+    pouring::TASK,
+    frame_hang::TASK,
+    co_pouring::TASK,
+    trash_collection::TASK,
+    cart_service::TASK,
+    co_carry::TASK,
+    table_align::TASK,
+    move_house::TASK,
+    big_table::TASK,
+];
 
 /// One benchmark task.
 #[derive(Debug)]

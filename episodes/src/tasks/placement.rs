@@ -24,3 +24,14 @@ pub fn within_box(f: &Facts, object: &str, target: &str, half_m: f32) -> bool {
     let apart = f.position_m(object) - f.position_m(target);
     apart.abs().max_element() <= half_m
 }
+
+/// `object` is within `half_m` of `target` on both horizontal axes of the world.
+pub fn above_box(f: &Facts, object: &str, target: &str, half_m: f32) -> bool {
+    let apart = f.position_m(object) - f.position_m(target);
+    apart.truncate().abs().max_element() <= half_m
+}
+
+/// The origin of `object` is as high as it was when it stood at the beginning, to `within_m` either way.
+pub fn stands_as_high(f: &Facts, object: &str, within_m: f32) -> bool {
+    f.lift_m(object).abs() <= within_m
+}

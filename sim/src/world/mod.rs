@@ -8,7 +8,7 @@ mod step;
 
 use std::sync::Arc;
 
-pub use objects::{ObjectModel, ObjectPlacement, ObjectState};
+pub use objects::{ObjectModel, ObjectPart, ObjectPlacement, ObjectState};
 pub use snapshot::Snapshot;
 pub use step::{HandContacts, ObjectStep, RobotStep, Step, Touch};
 

@@ -1,6 +1,6 @@
 //! The numbers that the benchmark has published, as it published them: degrees stay degrees. Nothing here is read from a task.
 
-/// One task that is done standing.
+/// One task.
 pub struct Published {
     pub id: &'static str,
     pub robots: usize,
@@ -8,8 +8,8 @@ pub struct Published {
     pub scene: &'static str,
     pub episode_steps: u32,
     pub moves: &'static [Moves],
-    /// Of p1, p2, p3: whether more than one robot has to work on it.
-    pub collaborative: [bool; 3],
+    /// Of p1, p2, p3: whether more than one robot has to work on it; published for tasks of two robots.
+    pub collaborative: Option<[bool; 3]>,
 }
 
 /// What is drawn uniformly for some objects together, from the first to the second number.
@@ -30,8 +30,8 @@ const fn apple_in_tub(apple: &'static [&'static str]) -> Moves {
     moves(apple, [-0.008, 0.008], [-0.008, 0.008])
 }
 
-/// Stacks follow the containers that stand on them, and so does what is in a container.
-pub const TASKS: [Published; 4] = [
+/// Stacks follow the containers that stand on them, and so does what is in a container or on a trolley.
+pub const TASKS: [Published; 10] = [
     Published {
         id: "handover",
         robots: 2,
@@ -41,7 +41,7 @@ pub const TASKS: [Published; 4] = [
             moves(&["bottle"], [-0.025, 0.025], [-0.025, 0.025]),
             moves(&["target_pad"], [-0.025, 0.025], [-0.025, 0.025]),
         ],
-        collaborative: [false, true, false],
+        collaborative: Some([false, true, false]),
     },
     Published {
         id: "pouring",
@@ -53,7 +53,7 @@ pub const TASKS: [Published; 4] = [
             Moves { yaw_deg: [-30.0, 30.0], ..moves(&["glass"], [-0.03, 0.03], [-0.06, 0.06]) },
             moves(&["marble"], [-0.006, 0.006], [-0.006, 0.006]),
         ],
-        collaborative: [false, false, true],
+        collaborative: Some([false, false, true]),
     },
     Published {
         id: "frame_hang",
@@ -65,7 +65,7 @@ pub const TASKS: [Published; 4] = [
             Moves { z_m: [-0.04, 0.0], ..moves(&["wall_peg"], [0.0, 0.0], [0.0, 0.0]) },
             moves(&["frame", "frame_rack"], [-0.03, 0.03], [-0.01, 0.01]),
         ],
-        collaborative: [false, true, true],
+        collaborative: Some([false, true, true]),
     },
     Published {
         id: "co_pouring",
@@ -86,7 +86,61 @@ pub const TASKS: [Published; 4] = [
             apple_in_tub(&["apple_5"]),
             apple_in_tub(&["apple_6"]),
         ],
-        collaborative: [true, true, true],
+        collaborative: Some([true, true, true]),
+    },
+    Published {
+        id: "trash_collection",
+        robots: 2,
+        scene: "147",
+        episode_steps: 1000,
+        moves: &[
+            moves(&["bin"], [-0.15, 0.15], [-0.15, -0.04]),
+            moves(&["pet_bottle"], [-0.10, 0.10], [-0.04, 0.12]),
+        ],
+        collaborative: Some([false, false, true]),
+    },
+    Published {
+        id: "cart_service",
+        robots: 2,
+        scene: "110",
+        episode_steps: 2000,
+        moves: &[
+            moves(&["service_trolley", "bottle"], [-0.10, 0.10], [-0.30, 0.08]),
+            moves(&["serving_patch"], [0.0, 0.0], [-0.16, -0.12]),
+        ],
+        collaborative: Some([false, false, false]),
+    },
+    Published {
+        id: "co_carry",
+        robots: 2,
+        scene: "143",
+        episode_steps: 1000,
+        moves: &[moves(&["basket"], [-0.05, 0.05], [-0.05, 0.05])],
+        collaborative: Some([true, true, true]),
+    },
+    Published {
+        id: "table_align",
+        robots: 2,
+        scene: "115",
+        episode_steps: 1100,
+        moves: &[moves(&["office_table"], [-0.05, 0.05], [-0.05, 0.05])],
+        collaborative: Some([true, true, true]),
+    },
+    Published {
+        id: "move_house",
+        robots: 3,
+        scene: "098",
+        episode_steps: 1500,
+        moves: &[moves(&["console_table"], [-0.05, 0.05], [-0.05, 0.05])],
+        collaborative: None,
+    },
+    Published {
+        id: "big_table",
+        robots: 3,
+        scene: "046",
+        episode_steps: 1000,
+        moves: &[Moves { yaw_deg: [-4.0, 4.0], ..moves(&["round_table"], [-0.04, 0.04], [-0.04, 0.04]) }],
+        collaborative: None,
     },
 ];
 
@@ -98,6 +152,33 @@ pub const POURING_INSIDE_S: f64 = 0.5;
 pub const FRAME_LIFT_M: f32 = 0.10;
 pub const TUB_LIFT_M: f32 = 0.03;
 pub const TUB_TIP_DEG: f32 = 25.0;
+pub const BIN_LIFT_M: f32 = 0.02;
+pub const BIN_DELIVERED_M: f32 = 0.25;
+pub const BIN_RIM_ABOVE_BENCH_M: f32 = 0.01;
+pub const TROLLEY_PARKED_M: f32 = 0.35;
+pub const WINE_LIFT_M: f32 = 0.10;
+pub const WINE_CARRIED_M: f32 = 0.15;
+pub const WINE_PLACE_M: f32 = 0.06;
+pub const BASKET_LIFT_M: f32 = 0.03;
+pub const BASKET_BOUNDS_M: f32 = 0.15;
+pub const BASKET_CLEAR_M: f32 = 0.01;
+pub const BASKET_HEIGHT_M: f32 = 0.06;
+pub const TABLE_LIFT_M: f32 = 0.03;
+pub const TABLE_CLEAR_M: f32 = 0.01;
+pub const TABLE_BEFORE_CHAIR_M: [f32; 2] = [0.335, 0.465];
+pub const TABLE_ACROSS_M: f32 = 0.13;
+pub const TABLE_HEIGHT_M: f32 = 0.04;
+pub const TABLE_SQUARE_DEG: f32 = 4.0;
+pub const CONSOLE_LIFT_M: f32 = 0.03;
+pub const CONSOLE_CARRIED_M: f32 = 0.15;
+/// Side of the square that each foot has to stand on.
+pub const CONSOLE_MARK_M: f32 = 0.10;
+pub const CONSOLE_HEIGHT_M: f32 = 0.04;
+pub const DOOR_OPEN_RAD: f32 = 1.45;
+pub const DOOR_OPEN_S: f64 = 0.5;
+pub const ROUND_LIFT_M: f32 = 0.03;
+pub const ROUND_CLEAR_M: f32 = 0.01;
+pub const ROUND_HEIGHT_M: f32 = 0.05;
 
 /// How an object has to stand or hang at the end.
 pub struct AtRest {

@@ -1,89 +1,10 @@
-//! Phases on both sides of every published threshold, in worlds that were changed by hand.
+//! Phases on both sides of every published threshold, in worlds that were changed by hand: the tasks that are done standing.
 
-use tandem_episodes::{A, B, Done, EpisodeSpec, Facts, Grip, ObjectFacts, Session, tasks};
+use tandem_episodes::{A, B, Done, Facts};
 use tandem_sim::{Rotation, Side, Vector};
-use tandem_tools_spec::Protocol;
 
-use super::table::{self, AtRest};
-
-/// A hair's breadth to either side of a threshold, as a share of it.
-const INSIDE: f32 = 0.999;
-const OUTSIDE: f32 = 1.001;
-
-/// A task's world before anything has happened.
-struct Scene {
-    task: &'static tasks::Task,
-    start: Facts,
-}
-
-impl Scene {
-    fn of(id: &str) -> Scene {
-        let task = tasks::find(id).unwrap();
-        let session = Session::start(&EpisodeSpec::new(task, 0, Protocol::Benchmark), None).unwrap();
-        Scene { task, start: session.facts() }
-    }
-
-    /// Whether the last condition of phase `p` holds in the world as `change` leaves it.
-    fn done(&self, p: usize, change: impl Fn(&mut Facts)) -> bool {
-        let mut facts = self.start.clone();
-        change(&mut facts);
-        match &self.task.phases[p - 1].done {
-            Done::When(condition) => condition(&facts),
-            Done::Sequence { then, .. } => then(&facts),
-            Done::Lasting { condition, at_end, .. } => condition(&facts) && at_end(&facts),
-        }
-    }
-
-    /// Phase `p` is done at the good side of `threshold` and not at the other; `large` says that more is better.
-    fn threshold(&self, p: usize, threshold: f32, large: bool, change: impl Fn(&mut Facts, f32)) {
-        let at = |share: f32| self.done(p, |facts| change(facts, threshold * share));
-        let (good, bad) = if large { (OUTSIDE, INSIDE) } else { (INSIDE, OUTSIDE) };
-        assert!(at(good), "{} p{p} at {}", self.task.id, threshold * good);
-        assert!(!at(bad), "{} p{p} at {}", self.task.id, threshold * bad);
-    }
-
-    /// Phase `p` asks for `object` to be let go and at rest; `settle` puts it where it belongs.
-    fn rest(&self, p: usize, object: &str, limits: &AtRest, settle: impl Fn(&mut Facts)) {
-        let settled = |facts: &mut Facts| {
-            settle(facts);
-            let object = changed(facts, object);
-            (object.velocity_m_s, object.angular_velocity_rad_s) = (Vector::ZERO, Vector::ZERO);
-            object.untouched_s = 10.0;
-        };
-        self.threshold(p, limits.speed_m_s, false, |facts, m_s| {
-            settled(facts);
-            changed(facts, object).velocity_m_s = Vector::new(m_s, 0.0, 0.0);
-        });
-        self.threshold(p, limits.turning_rad_s, false, |facts, rad_s| {
-            settled(facts);
-            changed(facts, object).angular_velocity_rad_s = Vector::new(0.0, 0.0, rad_s);
-        });
-        self.threshold(p, limits.released_s as f32, true, |facts, since_s| {
-            settled(facts);
-            changed(facts, object).untouched_s = since_s.into();
-        });
-    }
-}
-
-fn changed<'a>(facts: &'a mut Facts, name: &str) -> &'a mut ObjectFacts {
-    facts.objects.iter_mut().find(|object| object.name == name).unwrap()
-}
-
-fn hold(facts: &mut Facts, robot: usize, side: Side, object: &str) {
-    let object = changed(facts, object);
-    object.hands[robot][side] = Grip::Holding;
-    object.untouched_s = 0.0;
-}
-
-fn raise(facts: &mut Facts, object: &str, by_m: f32) {
-    let object = changed(facts, object);
-    object.pose_in_world.translation.z = object.rest_height_m + by_m;
-}
-
-/// About the object's own origin, over x of the world.
-fn tilt(facts: &mut Facts, object: &str, by_deg: f32) {
-    changed(facts, object).pose_in_world.rotation = Rotation::from_rotation_x(by_deg.to_radians());
-}
+use super::scene::{Scene, changed, hold, raise, tilt};
+use super::table;
 
 #[test]
 fn handover() {

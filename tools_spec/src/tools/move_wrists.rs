@@ -8,6 +8,9 @@ use crate::limits;
 use crate::parts::CommandReply;
 use crate::tool::Tool;
 
+/// Softer hands would be thrown about by what they feel of their own motion.
+const LEAST_COMPLIANCE_N_S_M: f64 = 50.0;
+
 /// Move wrists, fingers and base of one or more robots for a number of control steps of 20 ms. Inverse kinematics turns
 /// wrist poses into arm and waist joints. Robots that are not named hold still; a hand without a wrist target keeps its
 /// arm's joints, and fingers that are not given keep theirs. The reply says of each wrist and its fingers whether they have
@@ -53,6 +56,11 @@ pub struct WristMove {
     /// True: the wrist targets move with the pelvis from the command's beginning on, as a robot that carries something wants
     /// it. False or null: they are fixed in the world.
     pub carried: Option<bool>,
+    /// How both hands give way to what pulls or pushes them along the way that the robot faces, as a partner at the other end of
+    /// a load does: at 1 m/s under as many newtons, up to 6 cm. 250 suits two robots that walk with a load; at least 50.
+    /// Null: hands keep to their targets.
+    #[schemars(range(min = LEAST_COMPLIANCE_N_S_M))]
+    pub compliance_n_s_m: Option<f64>,
     /// Left finger joint angles in radians: [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1]. Positive angles
     /// close thumb_1 and thumb_2, negative ones middle and index. Null keeps the target.
     #[schemars(extend("hint" = "Closed around a bottle: [0, 0.75, 0.8, -1.1, -1.3, -1.1, -1.3]; open: [0, -0.3, 0, 0, 0, 0, 0]."))]
@@ -81,6 +89,7 @@ impl WristMove {
             right_position_m: None,
             right_quaternion_wxyz: None,
             carried: None,
+            compliance_n_s_m: None,
             left_fingers_rad: None,
             right_fingers_rad: None,
             vx_m_s: None,
@@ -101,6 +110,12 @@ impl WristMove {
             "right_fingers_rad",
             self.right_fingers_rad.as_ref().map_or(&[], |fingers| &fingers[..]),
         )?;
+        checks::finite("compliance_n_s_m", self.compliance_n_s_m.as_slice())?;
+        if let Some(soft) = self.compliance_n_s_m.filter(|given| *given < LEAST_COMPLIANCE_N_S_M) {
+            return Err(format!(
+                "compliance_n_s_m is {soft}; give at least {LEAST_COMPLIANCE_N_S_M}, as 250, or null for hands that do not give way"
+            ));
+        }
         checks::base([self.vx_m_s, self.vy_m_s, self.yaw_rate_rad_s, self.pelvis_height_m])
     }
 }

@@ -5,14 +5,20 @@
 //!
 //! To add an expert: one file here, named as its task, and its line in `ALL`; what several use is in `skills`.
 
+mod big_table;
+mod cart_service;
+mod co_carry;
 mod co_pouring;
 mod frame_hang;
 mod handover;
+mod move_house;
 mod pouring;
 mod skills;
+mod table_align;
+mod trash_collection;
 
 use super::{Backstage, Insider, PlayerError};
-use crate::tasks::Task;
+use crate::tasks::{self, Task};
 use skills::Stage;
 
 /// Performs a task to its end.
@@ -23,7 +29,18 @@ const ALL: &[(&str, Script)] = &[
     ("pouring", pouring::perform),
     ("frame_hang", frame_hang::perform),
     ("co_pouring", co_pouring::perform),
+    ("trash_collection", trash_collection::perform),
+    ("cart_service", cart_service::perform),
+    ("co_carry", co_carry::perform),
+    ("table_align", table_align::perform),
+    ("move_house", move_house::perform),
+    ("big_table", big_table::perform),
 ];
+
+/// The tasks that have an expert, in the order of all tasks.
+pub fn solved() -> impl Iterator<Item = &'static Task> {
+    tasks::ALL.iter().filter(|task| Expert::of(task).is_ok())
+}
 
 /// The script of one task.
 pub struct Expert {

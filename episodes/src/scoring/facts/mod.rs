@@ -8,6 +8,8 @@ use tandem_sim::{ObjectModel, Pose, Side, Sides, Vector, mjcf::Site};
 pub const A: usize = 0;
 /// Index of robot B.
 pub const B: usize = 1;
+/// Index of robot C.
+pub const C: usize = 2;
 
 /// The world at one control step.
 #[derive(Clone, Debug)]
@@ -104,6 +106,28 @@ impl Facts {
 
     pub fn turn_rate_rad_s(&self, object: &str) -> f32 {
         self.object(object).angular_velocity_rad_s.length()
+    }
+
+    /// Whether each of these robots holds `object` with a hand.
+    pub fn held_by_all(&self, robots: &[usize], object: &str) -> bool {
+        robots.iter().all(|robot| self.holds_any(*robot, object))
+    }
+
+    /// Distance on the floor between the origins of two objects.
+    pub fn apart_m(&self, object: &str, other: &str) -> f32 {
+        (self.position_m(object) - self.position_m(other)).truncate().length()
+    }
+
+    /// Position of the origin of `object` in the frame of another.
+    pub fn seen_from_m(&self, frame: &str, object: &str) -> Vector {
+        self.object(frame).pose_in_world.inverse() * self.position_m(object)
+    }
+
+    /// How far `object` is turned about the vertical against another, from -pi to pi.
+    pub fn turned_rad(&self, frame: &str, object: &str) -> f32 {
+        let [frame, object] = [frame, object].map(|name| self.object(name).pose_in_world.rotation);
+        let x = frame.inverse() * (object * Vector::X);
+        x.y.atan2(x.x)
     }
 
     /// World position of the origin of `object`.

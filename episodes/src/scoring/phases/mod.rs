@@ -24,6 +24,16 @@ pub enum Done {
     Sequence { first: fn(&Facts) -> bool, then: fn(&Facts) -> bool, broken: fn(&Facts) -> bool },
     /// When `condition` has held without a break for `for_s`, and `at_end` holds then too.
     Lasting { condition: fn(&Facts) -> bool, for_s: f64, at_end: fn(&Facts) -> bool },
+    /// When every one of these has been passed, in any order.
+    Milestones(&'static [Milestone]),
+}
+
+/// One of several things that have to happen once.
+#[derive(Debug)]
+pub struct Milestone {
+    pub condition: fn(&Facts) -> bool,
+    /// For how long it has to hold without a break.
+    pub for_s: f64,
 }
 
 impl Phase {
@@ -49,6 +59,16 @@ pub struct PhaseMemory {
     underway: bool,
     /// Since when the present phase's lasting condition has held, in simulated seconds.
     since_s: Option<f64>,
+    /// Of the present phase's milestones, those that have been begun.
+    milestones: Vec<MilestoneMemory>,
+}
+
+/// How far a milestone is.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+struct MilestoneMemory {
+    /// Since when its condition has held, in simulated seconds.
+    since_s: Option<f64>,
+    passed: bool,
 }
 
 impl PhaseTracker {
@@ -76,6 +96,7 @@ impl PhaseTracker {
             memory.reached_s.push(facts.time_s);
             memory.underway = false;
             memory.since_s = None;
+            memory.milestones.clear();
         }
         memory.reached_s.len() > before
     }
@@ -105,14 +126,24 @@ impl PhaseMemory {
                 self.underway && then(facts)
             }
             Done::Lasting { condition, for_s, at_end } => {
-                self.since_s = condition(facts).then(|| self.since_s.unwrap_or(facts.time_s));
-                // Times are sums of control steps; half of one keeps rounding out.
-                let lasted =
-                    self.since_s.is_some_and(|since_s| facts.time_s - since_s >= for_s - HALF_STEP_S);
-                lasted && at_end(facts)
+                lasted(&mut self.since_s, *condition, *for_s, facts) && at_end(facts)
+            }
+            Done::Milestones(milestones) => {
+                self.milestones.resize(milestones.len(), MilestoneMemory::default());
+                for (milestone, memory) in milestones.iter().zip(&mut self.milestones) {
+                    memory.passed |= lasted(&mut memory.since_s, milestone.condition, milestone.for_s, facts);
+                }
+                self.milestones.iter().all(|memory| memory.passed)
             }
         }
     }
+}
+
+/// Whether `condition` has held without a break for `for_s`; `since_s` remembers since when.
+fn lasted(since_s: &mut Option<f64>, condition: fn(&Facts) -> bool, for_s: f64, facts: &Facts) -> bool {
+    *since_s = condition(facts).then(|| since_s.unwrap_or(facts.time_s));
+    // Times are sums of control steps; half of one keeps rounding out.
+    since_s.is_some_and(|since_s| facts.time_s - since_s >= for_s - HALF_STEP_S)
 }
 
 const HALF_STEP_S: f64 = 0.5 / tandem_sim::CONTROL_HZ;

@@ -1,10 +1,12 @@
 //! Sequences of control steps, and the phases that they reach.
 
-use tandem_sim::{CONTROL_HZ, Side::Right, Vector};
+use std::f32::consts::FRAC_PI_2;
+
+use tandem_sim::{CONTROL_HZ, Pose, Rotation, Side::Right, Vector};
 
 use super::*;
 use crate::{
-    scoring::{A, B, Grip::Holding},
+    scoring::{A, B, C, Grip::Holding},
     tasks::{self, Task},
 };
 
@@ -107,17 +109,31 @@ fn a_lasting_condition_needs_its_whole_time_without_a_break() {
 /// Objects of `task` where they belong in the end, put there by nobody.
 fn objects_in_place(task: &'static Task) -> Facts {
     let apples = ["apple_1", "apple_2", "apple_3", "apple_4", "apple_5", "apple_6"];
-    let moves: Vec<(&str, &str, Vector)> = match task.id {
-        "handover" => vec![("bottle", "target_pad", Vector::ZERO)],
-        "pouring" => vec![("marble", "glass", Vector::new(0.0, 0.0, 0.02))],
-        "frame_hang" => vec![("frame", "wall_peg", Vector::new(0.0, -0.05, -0.98))],
-        "co_pouring" => apples.map(|apple| (apple, "crate", Vector::new(0.0, 0.0, 0.05))).into(),
+    let at = |x_m: f32, y_m: f32, z_m: f32| Pose::from_translation(Vector::new(x_m, y_m, z_m));
+    let turned = |by_rad: f32| Pose::from_rotation(Rotation::from_rotation_z(by_rad));
+    // Object, another one, and where the first belongs in the other's frame.
+    let moves: Vec<(&str, &str, Pose)> = match task.id {
+        "handover" => vec![("bottle", "target_pad", at(0.0, 0.0, 0.0))],
+        "pouring" => vec![("marble", "glass", at(0.0, 0.0, 0.02))],
+        "frame_hang" => vec![("frame", "wall_peg", at(0.0, -0.05, -0.98))],
+        "co_pouring" => apples.map(|apple| (apple, "crate", at(0.0, 0.0, 0.05))).into(),
+        "trash_collection" => {
+            vec![("bin", "carry_point", at(0.0, 0.0, 0.12)), ("pet_bottle", "bin", at(0.0, 0.0, 0.1))]
+        }
+        "cart_service" => vec![("bottle", "serving_patch", at(0.0, 0.0, 0.0))],
+        "co_carry" => vec![("basket", "basket_patch", at(0.0, 0.0, 0.0))],
+        "table_align" => vec![("office_table", "office_chair", at(0.4, 0.0, 0.0) * turned(FRAC_PI_2))],
+        "move_house" => vec![
+            ("console_table", "foot_marks", at(0.0, 0.0, 0.0)),
+            ("lever_door leaf", "lever_door", at(0.025, 0.475, 0.0) * turned(1.5)),
+        ],
+        "big_table" => vec![("round_table", "goal_disc", at(0.0, 0.0, 0.0))],
         other => panic!("say where the objects of {other} belong in the end"),
     };
     let mut facts = Facts::at_rest(task);
-    for (object, to, offset_m) in moves {
-        let goal_m = facts.point_m(to, offset_m);
-        facts.object_mut(object).pose_in_world.translation = goal_m;
+    for (object, to, to_from_object) in moves {
+        let goal = facts.object(to).pose_in_world * to_from_object;
+        facts.object_mut(object).pose_in_world = goal;
     }
     facts
 }
@@ -131,6 +147,40 @@ fn the_right_final_pose_alone_is_never_a_success() {
             tracker.update(&Facts { time_s: f64::from(step) / CONTROL_HZ, ..facts.clone() });
         }
         assert_eq!(tracker.reached().count(), 0, "{}", task.id);
+    }
+}
+
+/// MoveHouse's first phase, one step of 20 ms at a time: whether the table is lifted, and how far the door is open.
+#[test]
+fn milestones_are_passed_in_any_order_and_stay_passed() {
+    const NOTHING: (bool, f32) = (false, 0.0);
+    const LIFTED: (bool, f32) = (true, 0.0);
+    const OPEN: (bool, f32) = (false, 1.5);
+    let move_house = tasks::find("move_house").unwrap();
+    let facts = |step: usize, (lifted, door_rad): (bool, f32)| {
+        let mut facts = Facts::at_rest(move_house).turned("lever_door leaf", Vector::Z, door_rad);
+        facts.time_s = step as f64 / CONTROL_HZ;
+        if lifted {
+            facts = facts.held_by(&[B, C], "console_table").raised("console_table", 0.05);
+        }
+        facts
+    };
+    // Half a second are 25 steps, from the first of 26 to the last.
+    for (runs, expected) in [
+        (&[(LIFTED, 1), (OPEN, 25)][..], 0),
+        (&[(LIFTED, 1), (OPEN, 26)], 1),
+        (&[(OPEN, 26), (NOTHING, 10), (LIFTED, 1)], 1),
+        (&[(LIFTED, 1), (NOTHING, 10), (OPEN, 26)], 1),
+        (&[(LIFTED, 1), (OPEN, 25), (NOTHING, 1), (OPEN, 25)], 0),
+        (&[(OPEN, 60)], 0),
+        (&[(LIFTED, 60)], 0),
+    ] {
+        let mut tracker = PhaseTracker::new(move_house.phases);
+        let steps = runs.iter().flat_map(|(scene, count)| std::iter::repeat_n(*scene, *count));
+        for (step, scene) in steps.enumerate() {
+            tracker.update(&facts(step, scene));
+        }
+        assert_eq!(tracker.reached().count(), expected, "{runs:?}");
     }
 }
 

@@ -2,6 +2,7 @@
 
 use rapier3d::math::Pose;
 
+use super::model::part_name;
 use super::{Object, ObjectModel, ObjectPlacement};
 use crate::SimError;
 use crate::dynamics::{DPose3, Dynamics, Link, Tree, TreeId};
@@ -93,10 +94,7 @@ pub(in crate::world) fn insert_object(
         });
         return Ok(());
     }
-    let name = |link: &BodyLink| match link.parent {
-        None => placement.name.clone(),
-        Some(_) => format!("{} {}", placement.name, link.name),
-    };
+    let name = |link: &BodyLink| part_name(&placement.name, link);
     let tree_links = links(&tree, &world_from_file, &[]);
     let id = insert_moving(dynamics, &tree, tree_links, name, objects)?;
     add_equalities(dynamics, &document, &[Placed { tree: &tree, id: Some(id) }], &world_from_file)

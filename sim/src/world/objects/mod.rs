@@ -8,7 +8,7 @@ mod site_tests;
 use rapier3d::math::{Pose, Vector};
 use serde::{Deserialize, Serialize};
 
-pub use model::ObjectModel;
+pub use model::{ObjectModel, ObjectPart};
 
 use crate::dynamics::{Dynamics, LinkId};
 use crate::mechanism::rounded;

@@ -4,6 +4,7 @@ use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::query::Ray;
 use rapier3d::prelude::SharedShape;
 
+use crate::mechanism::rounded;
 use crate::mjcf::{BodyLink, BodyTree, Document, Geom, LinkJoint, Site};
 use crate::{SimError, assets};
 
@@ -21,11 +22,31 @@ pub struct ObjectModel {
     pub sites: Vec<Site>,
 }
 
+/// A rigid part of an object, as the file has it with every joint at 0.
+#[derive(Clone, Debug)]
+pub struct ObjectPart {
+    /// What it is called in a world.
+    pub name: String,
+    /// The object's frame is that of its first part.
+    pub object_from_part: Pose,
+    pub model: ObjectModel,
+}
+
 impl ObjectModel {
-    /// Reads the top-level body of an embedded object file, without a world: a scorer needs sites and shapes alone.
-    pub fn load(file: &str) -> Result<ObjectModel, SimError> {
+    /// Reads what an embedded object file becomes in a world where it is called `name`, without a world: a scorer needs sites and
+    /// shapes alone. The object itself is first, then come the parts that move on it.
+    pub fn parts(file: &str, name: &str) -> Result<Vec<ObjectPart>, SimError> {
         let (_, tree) = ObjectModel::read(file)?;
-        Ok(ObjectModel::of(&tree.links[0]))
+        let mut parts: Vec<ObjectPart> = Vec::with_capacity(tree.links.len());
+        for link in &tree.links {
+            let on_parent = |parent: usize| parts[parent].object_from_part * rounded(&link.parent_from_link);
+            parts.push(ObjectPart {
+                name: part_name(name, link),
+                object_from_part: link.parent.map_or(Pose::IDENTITY, on_parent),
+                model: ObjectModel::of(link),
+            });
+        }
+        Ok(parts)
     }
 
     pub fn site(&self, name: &str) -> Option<&Site> {
@@ -79,5 +100,13 @@ impl ObjectModel {
 
     pub(super) fn of(link: &BodyLink) -> ObjectModel {
         ObjectModel { name: link.name.clone(), geoms: link.geoms.clone(), sites: link.sites.clone() }
+    }
+}
+
+/// What a part of an object is called: as the object, or with its own name after the object's.
+pub(super) fn part_name(object: &str, link: &BodyLink) -> String {
+    match link.parent {
+        None => object.into(),
+        Some(_) => format!("{object} {}", link.name),
     }
 }

@@ -12,7 +12,8 @@ fn clearance_m(model: &ObjectModel, point_m: Vector) -> f32 {
 }
 
 fn object(name: &str) -> ObjectModel {
-    ObjectModel::load(name).unwrap_or_else(|error| panic!("{error}"))
+    let mut parts = ObjectModel::parts(name, name).unwrap_or_else(|error| panic!("{error}"));
+    parts.remove(0).model
 }
 
 fn site<'a>(model: &'a ObjectModel, name: &str) -> &'a Site {
@@ -27,6 +28,13 @@ fn sites_lie_on_the_shapes_or_in_the_open() {
         ("bottle", &["grip_low", "grip_high"][..], SOLID_M),
         ("tub", &["bar_a", "bar_b"], SOLID_M),
         ("frame", &["left_side", "right_side"], SOLID_M),
+        ("basket", &["a_left", "a_right", "b_left", "b_right"], SOLID_M),
+        ("office_table", &["a_left", "a_right", "b_left", "b_right"], SOLID_M),
+        ("console_table", &["b_left", "b_right", "c_left", "c_right"], SOLID_M),
+        ("console_table", &["foot_1", "foot_2", "foot_3", "foot_4"], SOLID_M),
+        ("round_table", &["a_left", "a_right", "b_left", "b_right", "c_left", "c_right", "foot"], SOLID_M),
+        ("bin", &["left", "right", "rim"], SOLID_M),
+        ("service_trolley", &["left", "right", "ring"], SOLID_M),
         ("wall_peg", &["root", "tip"], SOLID_M),
         ("cup", &["lip"], [0.0, 0.003]),
         // The axes of vessels, as far from the wall as they are wide inside.

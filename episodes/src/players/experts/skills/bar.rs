@@ -1,5 +1,7 @@
 //! Grasps of a bar from outside: the fingers go round it, the palm lies on it, and what it belongs to is moved as one.
 
+use std::f32::consts::FRAC_PI_2;
+
 use tandem_sim::{Pose, Rotation, Side, Vector};
 
 use super::hand::{closed_rad, mirrored_m, open_rad};
@@ -20,6 +22,40 @@ pub struct BarGrasp<'a> {
     pub object_from_wrist: Rotation,
     /// How far the fingers close, 1 for a 7 cm cylinder.
     pub closure: f32,
+}
+
+/// Where a 36 mm bar lies in a hand whose palm is on it.
+const BAR_IN_WRIST_M: Vector = Vector::new(0.105, 0.042, 0.0);
+/// Closed farther than round a bottle: a bar is thinner, and the thumb has to oppose the fingers.
+const BAR_CLOSURE: f32 = 1.3;
+
+impl<'a> BarGrasp<'a> {
+    /// Both hands of a robot on bars of 36 mm, left and right, palms down, fingers pointing along a heading in the object's frame.
+    pub fn from_above(
+        robot: usize,
+        object: &'a str,
+        bars: [&'a str; 2],
+        heading_rad: f32,
+    ) -> [BarGrasp<'a>; 2] {
+        let grasp = |side: Side, bar| BarGrasp {
+            robot,
+            side,
+            object,
+            bar,
+            bar_in_wrist_m: BAR_IN_WRIST_M,
+            object_from_wrist: Rotation::from_rotation_z(heading_rad)
+                * Rotation::from_rotation_x(side.sign() * FRAC_PI_2),
+            closure: BAR_CLOSURE,
+        };
+        [grasp(Side::Left, bars[0]), grasp(Side::Right, bars[1])]
+    }
+
+    /// As [`BarGrasp::from_above`], on upright bars, palms towards each other.
+    pub fn between(robot: usize, object: &'a str, bars: [&'a str; 2], heading_rad: f32) -> [BarGrasp<'a>; 2] {
+        let upright = Rotation::from_rotation_z(heading_rad);
+        BarGrasp::from_above(robot, object, bars, heading_rad)
+            .map(|grasp| BarGrasp { object_from_wrist: upright, ..grasp })
+    }
 }
 
 impl BarGrasp<'_> {
@@ -45,11 +81,14 @@ impl BarGrasp<'_> {
     }
 
     pub fn close(&self) -> HandMove {
-        HandMove::shape(
-            self.robot,
-            self.side,
-            closed_rad(self.side).map(|angle_rad| angle_rad * self.closure),
-        )
+        self.closing(1.0)
+    }
+
+    /// Fingers on their way from open to closed.
+    pub fn closing(&self, share: f32) -> HandMove {
+        let (open_rad, closed_rad) = (open_rad(self.side), closed_rad(self.side));
+        let between = |i: usize| open_rad[i] + (closed_rad[i] * self.closure - open_rad[i]) * share;
+        HandMove::shape(self.robot, self.side, std::array::from_fn(between))
     }
 
     pub fn open(&self) -> HandMove {

@@ -1,10 +1,21 @@
-//! What several experts use: hands that move together, grasps, and the shapes of a hand.
+//! What several experts use: hands that move together, grasps, the shapes of a hand, walking, and carrying in step.
 
 mod bar;
+mod course;
 mod cylinder;
+mod ground;
 mod hand;
+mod soft;
 mod stage;
+mod team;
+mod walk;
 
 pub use bar::{BarGrasp, move_together, take_together};
+pub use course::{Course, Posture, follow};
 pub use cylinder::{CylinderGrasp, pick_up_all};
+pub use ground::{place, upright};
+pub use hand::closed_rad;
+pub use soft::{let_go, take_softly};
 pub use stage::{HandMove, Stage};
+pub use team::{BEHIND_BAR_M, Path, Team};
+pub use walk::{Way, walk_to};

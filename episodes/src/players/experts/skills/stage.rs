@@ -9,6 +9,33 @@ use crate::tasks::Task;
 
 /// Control steps of one command: short enough to start and stop smoothly.
 const STEPS_PER_COMMAND: u32 = 10;
+/// Control steps of one command of a robot that walks: hands that are fixed in the world fall behind one that does not say anew where
+/// they are to be.
+pub const WALK_STEPS: u32 = 5;
+
+/// How a base goes, in its own heading frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Walk {
+    pub forward_m_s: f32,
+    pub left_m_s: f32,
+    pub turning_rad_s: f32,
+}
+
+/// Where both wrists go.
+#[derive(Clone, Copy, Debug)]
+pub enum Hands {
+    World(Sides<Pose>),
+    /// In the pelvis frame, along with the pelvis.
+    Carried(Sides<Pose>),
+}
+
+/// What one robot does during one command; its fingers stay.
+#[derive(Clone, Copy, Debug)]
+pub struct RobotMove {
+    pub robot: usize,
+    pub walk: Walk,
+    pub hands: Hands,
+}
 
 /// Part of one hand in a motion. What is not said stays as it is.
 #[derive(Clone, Copy, Debug)]
@@ -48,11 +75,16 @@ pub struct Stage<'a> {
     episode: &'a mut dyn Backstage,
     /// By robot.
     goals: Vec<Sides<HandGoal>>,
+    /// By robot: how high its pelvis is to be, where that has been said.
+    heights_m: Vec<Option<f32>>,
+    /// How hands give way to partners.
+    compliance_n_s_m: Option<f64>,
 }
 
 impl<'a> Stage<'a> {
     pub fn new(task: &'static Task, episode: &'a mut dyn Backstage) -> Result<Stage<'a>, PlayerError> {
         let facts = episode.facts()?;
+        let heights_m = vec![None; facts.robots.len()];
         let goals = (0..facts.robots.len())
             .map(|robot| {
                 Sides::from_fn(|side| HandGoal {
@@ -61,11 +93,21 @@ impl<'a> Stage<'a> {
                 })
             })
             .collect();
-        Ok(Stage { task, episode, goals })
+        Ok(Stage { task, episode, goals, heights_m, compliance_n_s_m: None })
     }
 
     pub fn facts(&mut self) -> Result<Facts, PlayerError> {
         self.episode.facts()
+    }
+
+    /// How high a robot's pelvis is to be from its next command on.
+    pub fn set_height(&mut self, robot: usize, height_m: f32) {
+        self.heights_m[robot] = Some(height_m);
+    }
+
+    /// How all hands give way from the next command on.
+    pub fn set_compliance(&mut self, compliance_n_s_m: Option<f64>) {
+        self.compliance_n_s_m = compliance_n_s_m;
     }
 
     /// Moves hands along straight lines for `duration_s`, starting and arriving at rest; robots not named hold still.
@@ -108,11 +150,49 @@ impl<'a> Stage<'a> {
         Ok(())
     }
 
+    /// One command in which robots walk or stand; those that `moves` does not name hold still.
+    pub fn advance(&mut self, steps: u32, moves: &[RobotMove]) -> Result<(), PlayerError> {
+        let facts = self.episode.facts()?;
+        let mut robots = Vec::with_capacity(moves.len());
+        for part in moves {
+            let world_from_pelvis = facts.robots[part.robot].pelvis_in_world;
+            let (world_from_wrist, carried) = match part.hands {
+                Hands::World(wrists) => (wrists, false),
+                Hands::Carried(wrists) => (wrists.map(|wrist| world_from_pelvis * wrist), true),
+            };
+            for side in Side::BOTH {
+                self.goals[part.robot][side].world_from_wrist = world_from_wrist[side];
+            }
+            robots.push(WristMove {
+                carried: Some(carried),
+                vx_m_s: Some(part.walk.forward_m_s.into()),
+                vy_m_s: Some(part.walk.left_m_s.into()),
+                yaw_rate_rad_s: Some(part.walk.turning_rad_s.into()),
+                ..self.wrist_move(&facts, part.robot)
+            });
+        }
+        self.call(steps, robots)?;
+        let after = self.episode.facts()?;
+        for part in moves {
+            if let Hands::Carried(wrists) = part.hands {
+                let world_from_pelvis = after.robots[part.robot].pelvis_in_world;
+                for side in Side::BOTH {
+                    self.goals[part.robot][side].world_from_wrist = world_from_pelvis * wrists[side];
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// One `move_wrists` with the present goals of all robots that `moves` name.
     fn command(&mut self, steps: u32, moves: &[HandMove]) -> Result<(), PlayerError> {
         let facts = self.episode.facts()?;
         let named = (0..self.goals.len()).filter(|robot| moves.iter().any(|hand| hand.robot == *robot));
         let robots = named.map(|robot| self.wrist_move(&facts, robot)).collect();
+        self.call(steps, robots)
+    }
+
+    fn call(&mut self, steps: u32, robots: Vec<WristMove>) -> Result<(), PlayerError> {
         match self.episode.call(MoveWrists { steps, robots }.into())? {
             ToolReply::Act(reply) if reply.stop_reason == StopReason::StepsDone => Ok(()),
             ToolReply::Act(_) => Err(PlayerError::EpisodeOver),
@@ -140,6 +220,8 @@ impl<'a> Stage<'a> {
             right_quaternion_wxyz: quaternion(Side::Right),
             left_fingers_rad: fingers(Side::Left),
             right_fingers_rad: fingers(Side::Right),
+            pelvis_height_m: self.heights_m[robot].map(f64::from),
+            compliance_n_s_m: self.compliance_n_s_m,
             ..WristMove::hold(self.task.robots[robot].name)
         }
     }

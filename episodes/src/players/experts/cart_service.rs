@@ -1,0 +1,89 @@
+//! CartService: A takes the trolley's bar and pushes it to the mark; B walks up, lifts the bottle out of its ring, steps back, turns to the
+//! table and stands the bottle on the patch.
+
+use std::f32::consts::FRAC_PI_2;
+
+use tandem_sim::{Pose, Side, Vector};
+
+use super::skills::{
+    BEHIND_BAR_M, BarGrasp, CylinderGrasp, Path, Stage, Team, Way, let_go, pick_up_all, place, take_softly,
+    upright, walk_to,
+};
+use crate::players::PlayerError;
+use crate::scoring::{A, B};
+
+const PUSH_M_S: f32 = 0.24;
+const WALK_M_S: f32 = 0.35;
+/// With the bottle in hand.
+const CARRY_M_S: f32 = 0.25;
+/// Where a robot has what its right hand takes: ahead of the pelvis, and to the right.
+const AT_HAND_M: Vector = Vector::new(0.40, -0.10, 0.0);
+const LIFT_M: f32 = 0.16;
+/// Away from the trolley before B turns.
+const BACK_M: f32 = 0.30;
+const OVER_PATCH_M: f32 = 0.10;
+/// A bottle that is let go of falls so far.
+const DROP_M: f32 = 0.003;
+
+pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
+    let grasps = BarGrasp::from_above(A, "service_trolley", ["left", "right"], -FRAC_PI_2);
+    let mut team = Team::new(stage, &grasps, BEHIND_BAR_M)?;
+    // B walks to where it will find the bottle while A walks to the bar.
+    let facts = stage.facts()?;
+    let ring_m = facts.position_m("parking_mark") + facts.site("service_trolley", "ring").position_m();
+    let mut ways = team.ways(stage)?;
+    ways.push(Way { robot: B, to: at_hand(ring_m, FRAC_PI_2), pace_m_s: WALK_M_S });
+    walk_to(stage, &ways)?;
+    park(stage, &mut team, &grasps)?;
+    let bottle = |heading_rad: f32| CylinderGrasp {
+        robot: B,
+        side: Side::Right,
+        object: "bottle",
+        grip: "grip_high",
+        heading_rad,
+    };
+    let before_m = stage.facts()?.position_m("bottle");
+    go(stage, at_hand(before_m, FRAC_PI_2), WALK_M_S)?;
+    let grasp = bottle(FRAC_PI_2);
+    pick_up_all(stage, &[grasp])?;
+    let standing_m = stage.facts()?.position_m("bottle");
+    let lift = grasp.carry(stage, standing_m + Vector::Z * LIFT_M)?;
+    stage.perform(1.0, &[lift])?;
+
+    let back_m = standing_m - Vector::Y * BACK_M;
+    go(stage, at_hand(back_m, FRAC_PI_2), CARRY_M_S)?;
+    let patch_m = stage.facts()?.position_m("serving_patch");
+    go(stage, at_hand(patch_m, 0.0), CARRY_M_S)?;
+    let grasp = bottle(0.0);
+    for (height_m, duration_s) in [(OVER_PATCH_M, 1.2), (DROP_M, 1.0)] {
+        let over = grasp.carry(stage, patch_m + Vector::Z * height_m)?;
+        stage.perform(duration_s, &[over])?;
+    }
+    stage.perform(0.6, &[grasp.open()])?;
+    let away = grasp.away(stage)?;
+    stage.perform(0.8, &[away])?;
+    stage.perform(1.0, &[grasp.open()])
+}
+
+/// A pushes the trolley to the mark and leaves it there.
+fn park(stage: &mut Stage, team: &mut Team, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
+    take_softly(stage, grasps)?;
+    team.measure(stage)?;
+    let from = upright(&team.object(stage)?);
+    let mark_m = stage.facts()?.position_m("parking_mark");
+    let parked = place(mark_m.with_z(from.translation.z), 0.0);
+    let length_m = (parked.translation - from.translation).length();
+    let at = |gone_m: f32| from.lerp(&parked, gone_m / length_m);
+    team.carry(stage, &Path { at: &at, length_m, pace_m_s: PUSH_M_S })?;
+    let_go(stage, grasps)
+}
+
+/// Where B stands to have `point_m` before its right hand.
+fn at_hand(point_m: Vector, heading_rad: f32) -> Pose {
+    let facing = place(Vector::ZERO, heading_rad);
+    place(point_m - facing * AT_HAND_M, heading_rad)
+}
+
+fn go(stage: &mut Stage, to: Pose, pace_m_s: f32) -> Result<(), PlayerError> {
+    walk_to(stage, &[Way { robot: B, to, pace_m_s }])
+}

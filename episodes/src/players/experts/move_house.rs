@@ -1,0 +1,115 @@
+//! MoveHouse: A presses the lever, pushes the door open along its swing and stands aside in the other room; B and C carry the table through
+//! the doorway in step and set it down on the marks.
+
+use std::f32::consts::{FRAC_PI_2, PI};
+
+use tandem_sim::{Pose, Rotation, Side, Sides, Vector};
+
+use super::skills::{
+    BEHIND_BAR_M, BarGrasp, Course, HandMove, Path, Posture, Stage, Team, Way, closed_rad, follow, let_go,
+    place, take_softly, upright, walk_to,
+};
+use crate::players::PlayerError;
+use crate::scoring::{A, B, C, Facts};
+
+const LIFT_M: f32 = 0.07;
+const PACE_M_S: f32 = 0.24;
+/// A fist with its palm down: from the wrist to what it presses with, and to its front.
+const PRESSING_M: f32 = 0.115;
+const FRONT_M: f32 = 0.16;
+/// The fist is made behind the lever and above it; then the wrist is as high above the lever's end, and is pressed farther and farther until
+/// the bolt has been drawn.
+const BACK_M: f32 = 0.10;
+const ABOVE_LEVER_M: f32 = 0.11;
+const DOWN_M: [f32; 4] = [-0.02, -0.05, -0.08, -0.11];
+/// The bolt reaches 20 mm into its hole.
+const DRAWN_M: f32 = 0.022;
+/// The leaf, seen by the one who pushes: where its face is, and how far from the hinge it is pushed, first beside the lever, then farther in,
+/// so that the robot passes through the middle of the doorway.
+const FACE_X_M: f32 = -0.045;
+const FIRST_RADIUS_M: f32 = 0.785;
+const LAST_RADIUS_M: f32 = 0.50;
+const MOVED_IN_RAD: f32 = 0.6;
+const OPEN_RAD: f32 = 1.53;
+/// The front's goal is so far beyond the face: that is what pushes.
+const PRESS_M: f32 = 0.02;
+const PUSH_M_S: f32 = 0.2;
+/// The robot turns by this part of the leaf's angle.
+const TURN_RATIO: f32 = 0.6;
+/// From the robot to where it pushes: ahead, and to its right.
+const AHEAD_M: f32 = 0.45;
+const RIGHT_M: f32 = 0.10;
+/// Where A stands aside, in the door's frame.
+const ASIDE_M: Vector = Vector::new(0.75, -1.10, 0.0);
+const WALK_M_S: f32 = 0.3;
+
+pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
+    open_door(stage)?;
+    let door = stage.facts()?.object("lever_door").pose_in_world;
+    walk_to(stage, &[Way { robot: A, to: place(door * ASIDE_M, FRAC_PI_2), pace_m_s: WALK_M_S }])?;
+
+    let [b_left, b_right] = BarGrasp::from_above(B, "console_table", ["b_left", "b_right"], PI);
+    let [c_left, c_right] = BarGrasp::from_above(C, "console_table", ["c_left", "c_right"], 0.0);
+    let grasps = [b_left, b_right, c_left, c_right];
+    let mut team = Team::new(stage, &grasps, BEHIND_BAR_M)?;
+    team.gather(stage)?;
+    take_softly(stage, &grasps)?;
+    team.lift(stage, LIFT_M)?;
+    let from = upright(&team.object(stage)?);
+    let marks = stage.facts()?.object("foot_marks").pose_in_world;
+    let over = Pose::from_parts(marks.translation.with_z(from.translation.z), marks.rotation);
+    let length_m = (over.translation - from.translation).length();
+    let at = |gone_m: f32| from.lerp(&over, gone_m / length_m);
+    team.carry(stage, &Path { at: &at, length_m, pace_m_s: PACE_M_S })?;
+    team.set_down(stage, &marks)?;
+    let_go(stage, &grasps)
+}
+
+/// A lays its right fist on the lever, presses it down and follows the leaf on its swing.
+fn open_door(stage: &mut Stage) -> Result<(), PlayerError> {
+    let leaf = stage.facts()?.object("lever_door leaf").pose_in_world;
+    walk_to(stage, &[Way { robot: A, to: push(&leaf, 0.0, 0.0).0, pace_m_s: WALK_M_S }])?;
+    let pressed_m = press_lever(stage)?;
+    let robot = &stage.facts()?.robots[A];
+    let (left_in_pelvis, pelvis_m) = (robot.wrist_in_pelvis.left, robot.pelvis_in_world.translation.z);
+    let at = |gone_m: f32| {
+        let (stand, wrist) = push(&leaf, gone_m / FIRST_RADIUS_M, pressed_m);
+        let pelvis = Pose::from_parts(stand.translation.with_z(pelvis_m), stand.rotation);
+        vec![Posture { robot: A, stand, wrists: Sides { left: pelvis * left_in_pelvis, right: wrist } }]
+    };
+    let length_m = OPEN_RAD * FIRST_RADIUS_M;
+    follow(stage, &Course { at: &at, length_m, pace_m_s: PUSH_M_S, hold_s: 0.8 })
+}
+
+/// Presses the lever down until the bolt is drawn, and says how high the wrist is then.
+fn press_lever(stage: &mut Stage) -> Result<f32, PlayerError> {
+    let facts = stage.facts()?;
+    let end_m = facts.site_m("lever_door lever", "end");
+    let bolt_m = |facts: &Facts| facts.seen_from_m("lever_door leaf", "lever_door bolt").y;
+    let shut_m = bolt_m(&facts);
+    let reach = |back_m: f32, above_m: f32| {
+        let wrist_m = end_m + Vector::new(-PRESSING_M - back_m, 0.0, above_m);
+        HandMove::reach(A, Side::Right, Pose::from_parts(wrist_m, Rotation::from_rotation_x(-FRAC_PI_2)))
+    };
+    stage.perform(1.2, &[reach(BACK_M, ABOVE_LEVER_M).shaped(closed_rad(Side::Right))])?;
+    stage.perform(0.6, &[reach(0.0, ABOVE_LEVER_M)])?;
+    for down_m in DOWN_M {
+        stage.perform(0.6, &[reach(0.0, down_m)])?;
+        if bolt_m(&stage.facts()?) - shut_m >= DRAWN_M {
+            return Ok(end_m.z + down_m);
+        }
+    }
+    Err(PlayerError::GaveUp("the lever could not be pressed down".into()))
+}
+
+/// Where A stands, and its right wrist at a height, to push the leaf that was shut at `shut` to an angle.
+fn push(shut: &Pose, angle_rad: f32, height_m: f32) -> (Pose, Pose) {
+    let share = (angle_rad / MOVED_IN_RAD).min(1.0);
+    let radius_m = FIRST_RADIUS_M + (LAST_RADIUS_M - FIRST_RADIUS_M) * share;
+    let leaf = *shut * Pose::from_rotation(Rotation::from_rotation_z(angle_rad));
+    let wrist_in_leaf_m = Vector::new(FACE_X_M - FRONT_M + PRESS_M, -radius_m, height_m);
+    let wrist = leaf * Pose::from_parts(wrist_in_leaf_m, Rotation::from_rotation_x(-FRAC_PI_2));
+    let point_m = leaf * Vector::new(FACE_X_M, -radius_m, 0.0);
+    let facing = place(Vector::ZERO, TURN_RATIO * angle_rad);
+    (place(point_m - facing * Vector::new(AHEAD_M, -RIGHT_M, 0.0), TURN_RATIO * angle_rad), wrist)
+}

@@ -1,0 +1,66 @@
+//! Robots that walk along a course with their hands where the course has them.
+
+use tandem_sim::{CONTROL_DT_S, Pose, Sides};
+
+use super::ground::{heading_rad, wrapped_rad};
+use super::stage::{Hands, RobotMove, Stage, WALK_STEPS};
+use super::walk::{Drift, steer};
+use crate::players::PlayerError;
+
+const ACCELERATION_M_S2: f32 = 0.3;
+/// The slowest that a course is followed.
+const CREEP_M_S: f32 = 0.02;
+/// What a robot's base is asked for, corrections included.
+const MOST_M_S: f32 = 0.35;
+
+/// How one robot stands and where its hands are, world frame.
+#[derive(Clone, Copy)]
+pub struct Posture {
+    pub robot: usize,
+    pub stand: Pose,
+    pub wrists: Sides<Pose>,
+}
+
+/// Postures by the distance gone.
+pub struct Course<'a> {
+    pub at: &'a dyn Fn(f32) -> Vec<Posture>,
+    pub length_m: f32,
+    pub pace_m_s: f32,
+    /// For how long robots still correct their places at the end.
+    pub hold_s: f32,
+}
+
+/// Goes along a course from its beginning to its end, from rest to rest.
+pub fn follow(stage: &mut Stage, course: &Course) -> Result<(), PlayerError> {
+    let dt_s = WALK_STEPS as f32 * CONTROL_DT_S;
+    let (mut gone_m, mut pace_m_s, mut held_s) = (0.0f32, 0.0f32, 0.0f32);
+    while held_s < course.hold_s {
+        let left_m = course.length_m - gone_m;
+        if left_m > 1e-4 {
+            let can_stop_m_s = (2.0 * ACCELERATION_M_S2 * left_m).sqrt();
+            let most_m_s = course.pace_m_s.min(can_stop_m_s).max(CREEP_M_S);
+            pace_m_s = (pace_m_s + ACCELERATION_M_S2 * dt_s).min(most_m_s);
+            gone_m += (pace_m_s * dt_s).min(left_m);
+        } else {
+            pace_m_s = 0.0;
+            held_s += dt_s;
+        }
+        let now = (course.at)(gone_m);
+        let next = (course.at)((gone_m + pace_m_s * dt_s).min(course.length_m));
+        let facts = stage.facts()?;
+        let step = |(now, next): (&Posture, &Posture)| {
+            let drift = Drift {
+                velocity_m_s: (next.stand.translation - now.stand.translation) / dt_s,
+                turning_rad_s: wrapped_rad(heading_rad(&next.stand) - heading_rad(&now.stand)) / dt_s,
+            };
+            RobotMove {
+                robot: now.robot,
+                walk: steer(&facts.robots[now.robot].pelvis_in_world, &now.stand, drift, MOST_M_S),
+                hands: Hands::World(now.wrists),
+            }
+        };
+        let moves: Vec<RobotMove> = now.iter().zip(&next).map(step).collect();
+        stage.advance(WALK_STEPS, &moves)?;
+    }
+    Ok(())
+}

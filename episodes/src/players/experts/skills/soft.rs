@@ -1,0 +1,116 @@
+//! Taking and letting go of bars that partners hold, too: hands give way to what they feel, so that nobody is pulled.
+
+use tandem_sim::{Pose, Vector};
+
+use super::bar::BarGrasp;
+use super::stage::{HandMove, Stage};
+use crate::players::PlayerError;
+use crate::scoring::Grip;
+
+const ATTEMPTS: usize = 4;
+/// From here hands come at bars.
+const STANDOFF_M: f32 = 0.08;
+/// One step of a soft grasp; fingers close over half of them.
+const GIVE_S: f32 = 0.1;
+const GIVES: usize = 16;
+/// A wrist gives way by a metre for so many newtons in each step, and by no more than this.
+const STIFFNESS_N_M: f32 = 300.0;
+const MOST_GIVE_M: f32 = 0.01;
+/// A wrist's goal is never farther than this from the wrist.
+const LEASH_M: f32 = 0.03;
+
+/// Closes all hands on their bars at once; hands that miss try again.
+pub fn take_softly(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
+    for _ in 0..ATTEMPTS {
+        let before = each(stage, grasps, |grasp, stage| grasp.before(stage, STANDOFF_M))?;
+        stage.perform(1.1, &before)?;
+        let around = each(stage, grasps, |grasp, stage| grasp.around(stage))?;
+        stage.perform(0.7, &around)?;
+        close_softly(stage, grasps, &around)?;
+        let facts = stage.facts()?;
+        if grasps.iter().all(|grasp| facts.holds(grasp.robot, grasp.side, grasp.object)) {
+            return Ok(());
+        }
+        open_in_place(stage, grasps)?;
+    }
+    Err(PlayerError::GaveUp("not every hand could take its bar".into()))
+}
+
+/// Closes hands whose palms are at the bars, as `around` has them. Each wrist's goal gives way to what the hand feels.
+fn close_softly(stage: &mut Stage, grasps: &[BarGrasp], around: &[HandMove]) -> Result<(), PlayerError> {
+    let mut goals = Vec::with_capacity(grasps.len());
+    for (grasp, reach) in grasps.iter().zip(around) {
+        let now = stage.world_from_wrist(grasp.robot, grasp.side)?;
+        goals.push(reach.world_from_wrist.unwrap_or(now));
+    }
+    for step in 1..=GIVES {
+        let closed = (2.0 * step as f32 / GIVES as f32).min(1.0);
+        let facts = stage.facts()?;
+        let mut moves = Vec::with_capacity(grasps.len());
+        for (grasp, goal) in grasps.iter().zip(&mut goals) {
+            let wrist = stage.world_from_wrist(grasp.robot, grasp.side)?;
+            let mut felt_n = facts.robots[grasp.robot].hand_force_n[grasp.side];
+            // Up and down, a hand feels its weight.
+            felt_n.z = 0.0;
+            let given_m = goal.translation + (felt_n / STIFFNESS_N_M).clamp_length_max(MOST_GIVE_M);
+            goal.translation = wrist.translation + (given_m - wrist.translation).clamp_length_max(LEASH_M);
+            moves.push(HandMove { world_from_wrist: Some(*goal), ..grasp.closing(closed) });
+        }
+        stage.glide(GIVE_S, &moves)?;
+    }
+    Ok(())
+}
+
+/// Hands open where they are, for opening fingers push; then they rise. Those that still touch try it again, and give way to what they
+/// are caught on.
+pub fn let_go(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
+    open_in_place(stage, grasps)?;
+    let away = each(stage, grasps, |grasp, stage| {
+        let wrist = stage.world_from_wrist(grasp.robot, grasp.side)?;
+        let raised = Pose::from_parts(wrist.translation + Vector::Z * 0.10, wrist.rotation);
+        Ok(HandMove::reach(grasp.robot, grasp.side, raised))
+    })?;
+    stage.perform(1.0, &away)?;
+    for attempt in 0..ATTEMPTS {
+        let facts = stage.facts()?;
+        let hooked: Vec<BarGrasp> = grasps
+            .iter()
+            .copied()
+            .filter(|grasp| facts.object(grasp.object).hands[grasp.robot][grasp.side] != Grip::Off)
+            .collect();
+        if hooked.is_empty() {
+            break;
+        }
+        // Back into the gap behind the bar, and out again, farther.
+        let around = each(stage, &hooked, |grasp, stage| {
+            Ok(HandMove { fingers_rad: grasp.open().fingers_rad, ..grasp.around(stage)? })
+        })?;
+        stage.perform(0.6, &around)?;
+        let standoff_m = 0.10 + 0.02 * attempt as f32;
+        let before = each(stage, &hooked, |grasp, stage| grasp.before(stage, standoff_m))?;
+        stage.perform(0.8, &before)?;
+    }
+    stage.set_compliance(None);
+    let open: Vec<HandMove> = grasps.iter().map(BarGrasp::open).collect();
+    stage.perform(0.5, &open)
+}
+
+/// Opens hands; the wrists stay wherever the fingers push them.
+fn open_in_place(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
+    for _ in 0..6 {
+        let moves = each(stage, grasps, |grasp, stage| {
+            let wrist = stage.world_from_wrist(grasp.robot, grasp.side)?;
+            Ok(HandMove { world_from_wrist: Some(wrist), ..grasp.open() })
+        })?;
+        stage.perform(0.1, &moves)?;
+    }
+    Ok(())
+}
+
+fn each(
+    stage: &mut Stage,
+    grasps: &[BarGrasp],
+    part: impl Fn(&BarGrasp, &mut Stage) -> Result<HandMove, PlayerError>,
+) -> Result<Vec<HandMove>, PlayerError> {
+    grasps.iter().map(|grasp| part(grasp, stage)).collect()
+}

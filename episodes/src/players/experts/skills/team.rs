@@ -1,0 +1,143 @@
+//! Robots that carry one object together, in step: all follow one path of the object, and hands give way to the partners. One robot
+//! that carries or pushes something with both hands is the smallest team.
+
+use tandem_sim::{Pose, Sides, Vector};
+
+use super::bar::{BarGrasp, move_together};
+use super::course::{Course, Posture, follow};
+use super::ground::upright;
+use super::stage::Stage;
+use super::walk::{Way, walk_to};
+use crate::players::PlayerError;
+
+/// How far behind a bar in its hands a robot stands.
+pub const BEHIND_BAR_M: f32 = 0.29;
+/// Towards their places, before anything is held.
+const APPROACH_M_S: f32 = 0.3;
+/// What two robots that walk with a load need.
+const COMPLIANCE_N_S_M: f64 = 250.0;
+/// Robots still correct their places for so long once the object has arrived.
+const HOLD_S: f32 = 1.4;
+/// An object that is set down is pressed on the floor by so much.
+const PRESS_M: f32 = 0.004;
+
+/// The way of a carried object, by the distance it has gone, and how fast.
+pub struct Path<'a> {
+    pub at: &'a dyn Fn(f32) -> Pose,
+    pub length_m: f32,
+    pub pace_m_s: f32,
+}
+
+/// Robots and their grasps of one object.
+pub struct Team<'a> {
+    grasps: &'a [BarGrasp<'a>],
+    robots: Vec<usize>,
+    /// Where each robot stands, in the object's frame.
+    object_from_stand: Vec<Pose>,
+    /// Where each hand is, in the object's frame, since it was measured.
+    object_from_wrist: Vec<Pose>,
+}
+
+impl<'a> Team<'a> {
+    /// Robots that have both hands in `grasps`, left first, and stand `behind_m` behind them.
+    pub fn new(
+        stage: &mut Stage,
+        grasps: &'a [BarGrasp<'a>],
+        behind_m: f32,
+    ) -> Result<Team<'a>, PlayerError> {
+        let facts = stage.facts()?;
+        let pairs = grasps.chunks_exact(2);
+        let stand = |pair: &[BarGrasp]| {
+            let bar_m = |grasp: &BarGrasp| facts.site(grasp.object, grasp.bar).position_m();
+            let middle_m = (bar_m(&pair[0]) + bar_m(&pair[1])) * 0.5;
+            let ahead = upright(&Pose::from_rotation(pair[0].object_from_wrist));
+            let back_m = ahead.rotation * Vector::new(-behind_m, 0.0, 0.0);
+            Pose::from_parts((middle_m + back_m).with_z(0.0), ahead.rotation)
+        };
+        Ok(Team {
+            grasps,
+            robots: pairs.clone().map(|pair| pair[0].robot).collect(),
+            object_from_stand: pairs.map(stand).collect(),
+            object_from_wrist: Vec::new(),
+        })
+    }
+
+    /// The object as it is now.
+    pub fn object(&self, stage: &mut Stage) -> Result<Pose, PlayerError> {
+        Ok(stage.facts()?.object(self.grasps[0].object).pose_in_world)
+    }
+
+    /// Robots walk to where they stand beside the object as it is now.
+    pub fn gather(&self, stage: &mut Stage) -> Result<(), PlayerError> {
+        let ways = self.ways(stage)?;
+        walk_to(stage, &ways)
+    }
+
+    /// The ways to where the robots stand beside the object as it is now.
+    pub fn ways(&self, stage: &mut Stage) -> Result<Vec<Way>, PlayerError> {
+        let object = upright(&self.object(stage)?);
+        let way = |(robot, stand): (&usize, &Pose)| Way {
+            robot: *robot,
+            to: object * *stand,
+            pace_m_s: APPROACH_M_S,
+        };
+        Ok(self.robots.iter().zip(&self.object_from_stand).map(way).collect())
+    }
+
+    /// Remembers where in the object's frame the hands are that hold it.
+    pub fn measure(&mut self, stage: &mut Stage) -> Result<(), PlayerError> {
+        let object = self.object(stage)?;
+        self.object_from_wrist.clear();
+        for grasp in self.grasps {
+            let wrist = stage.world_from_wrist(grasp.robot, grasp.side)?;
+            self.object_from_wrist.push(object.inverse() * wrist);
+        }
+        Ok(())
+    }
+
+    /// Lifts what all hands hold straight up, and measures the grips.
+    pub fn lift(&mut self, stage: &mut Stage, by_m: f32) -> Result<(), PlayerError> {
+        let start = self.object(stage)?;
+        let raised =
+            |share: f32| Pose::from_parts(start.translation + Vector::Z * by_m * share, start.rotation);
+        move_together(stage, self.grasps, &raised, 5, 0.25)?;
+        move_together(stage, self.grasps, &|_| raised(1.0), 1, 0.3)?;
+        self.measure(stage)
+    }
+
+    /// Takes the held object along a path, at the end of which it stays for a moment.
+    pub fn carry(&self, stage: &mut Stage, path: &Path) -> Result<(), PlayerError> {
+        let postures = |gone_m: f32| self.postures(&(path.at)(gone_m));
+        stage.set_compliance(self.compliance_n_s_m());
+        let Path { length_m, pace_m_s, .. } = *path;
+        follow(stage, &Course { at: &postures, length_m, pace_m_s, hold_s: HOLD_S })
+    }
+
+    /// How the robots stand and hold the object where it is to be.
+    fn postures(&self, world_from_object: &Pose) -> Vec<Posture> {
+        let hand = |hand: usize| *world_from_object * self.object_from_wrist[hand];
+        let posture = |(index, (robot, stand)): (usize, (&usize, &Pose))| Posture {
+            robot: *robot,
+            stand: *world_from_object * *stand,
+            wrists: Sides { left: hand(2 * index), right: hand(2 * index + 1) },
+        };
+        self.robots.iter().zip(&self.object_from_stand).enumerate().map(posture).collect()
+    }
+
+    /// Sets the object down: over its place first, for which hands must not give way, then straight below.
+    pub fn set_down(&self, stage: &mut Stage, place: &Pose) -> Result<(), PlayerError> {
+        let from = self.object(stage)?;
+        let over = Pose::from_parts(place.translation.with_z(from.translation.z), place.rotation);
+        let down = Pose::from_parts(place.translation - Vector::Z * PRESS_M, place.rotation);
+        stage.set_compliance(None);
+        move_together(stage, self.grasps, &|share| from.lerp(&over, share), 4, 0.25)?;
+        move_together(stage, self.grasps, &|share| over.lerp(&down, share), 5, 0.28)?;
+        stage.set_compliance(self.compliance_n_s_m());
+        Ok(())
+    }
+
+    /// One who has no partner gives way to nobody.
+    fn compliance_n_s_m(&self) -> Option<f64> {
+        (self.robots.len() > 1).then_some(COMPLIANCE_N_S_M)
+    }
+}

@@ -1,0 +1,40 @@
+//! TableAlign: both robots take the rails, lift, carry the table down the room while they turn it by a quarter, come at the chair from
+//! its front, set down and let go.
+
+use std::f32::consts::{FRAC_PI_2, PI};
+
+use tandem_sim::Vector;
+
+use super::skills::{BEHIND_BAR_M, BarGrasp, Path, Stage, Team, let_go, place, take_softly, upright};
+use crate::players::PlayerError;
+use crate::scoring::{A, B};
+
+const LIFT_M: f32 = 0.07;
+const PACE_M_S: f32 = 0.17;
+/// The table's middle in the chair's frame: where the turn ends, clear of the chair, and where it is set down.
+const BEFORE_CHAIR_M: Vector = Vector::new(0.65, 0.0, 0.0);
+const AT_CHAIR_M: Vector = Vector::new(0.40, 0.0, 0.0);
+
+pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
+    let [a_left, a_right] = BarGrasp::from_above(A, "office_table", ["a_left", "a_right"], 0.0);
+    let [b_left, b_right] = BarGrasp::from_above(B, "office_table", ["b_left", "b_right"], PI);
+    let grasps = [a_left, a_right, b_left, b_right];
+    let mut team = Team::new(stage, &grasps, BEHIND_BAR_M)?;
+    team.gather(stage)?;
+    take_softly(stage, &grasps)?;
+    team.lift(stage, LIFT_M)?;
+    let chair = stage.facts()?.object("office_chair").pose_in_world;
+    let from = upright(&team.object(stage)?);
+    let aloft = Vector::Z * from.translation.z;
+    let [before, over] =
+        [BEFORE_CHAIR_M, AT_CHAIR_M].map(|chair_m| place(chair * chair_m + aloft, FRAC_PI_2));
+    let turn_m = (before.translation - from.translation).length();
+    let length_m = turn_m + (over.translation - before.translation).length();
+    let at = |gone_m: f32| match gone_m < turn_m {
+        true => from.lerp(&before, gone_m / turn_m),
+        false => before.lerp(&over, (gone_m - turn_m) / (length_m - turn_m)),
+    };
+    team.carry(stage, &Path { at: &at, length_m, pace_m_s: PACE_M_S })?;
+    team.set_down(stage, &place(chair * AT_CHAIR_M, FRAC_PI_2))?;
+    let_go(stage, &grasps)
+}

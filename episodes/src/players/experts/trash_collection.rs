@@ -1,0 +1,56 @@
+//! TrashCollection: A bends its knees, takes the bin by its handles and holds it at the end of the bench, over which B sweeps the bottle with
+//! the back of its left hand.
+
+use std::f32::consts::FRAC_PI_2;
+
+use tandem_sim::{Pose, Rotation, Side, Vector};
+
+use super::skills::{BEHIND_BAR_M, BarGrasp, HandMove, Path, Stage, Team, take_softly, upright};
+use crate::players::PlayerError;
+use crate::scoring::{A, B};
+
+const BENT_M: f32 = 0.62;
+const TALL_M: f32 = 0.72;
+/// The rim of the bin is then a little lower than the bench's top.
+const LIFT_M: f32 = 0.055;
+const PACE_M_S: f32 = 0.28;
+/// From the middle of the bottle to the left wrist: the bottle rolls before the middle of the hand's back.
+const BEHIND_BOTTLE_M: Vector = Vector::new(-0.12, -0.075, 0.022);
+const ABOVE_M: f32 = 0.14;
+/// The hand stops here, short of the end of the bench; the bottle rolls on.
+const END_Y_M: f32 = -0.05;
+const SWEEP_M_S: f32 = 0.35;
+const TRIES: u32 = 3;
+
+pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
+    let grasps = BarGrasp::between(A, "bin", ["left", "right"], -FRAC_PI_2);
+    let mut team = Team::new(stage, &grasps, BEHIND_BAR_M)?;
+    stage.set_height(A, BENT_M);
+    team.gather(stage)?;
+    take_softly(stage, &grasps)?;
+    team.lift(stage, LIFT_M)?;
+    stage.set_height(A, TALL_M);
+    let from = upright(&team.object(stage)?);
+    let facts = stage.facts()?;
+    let mut end_m = facts.position_m("carry_point");
+    end_m.x = facts.position_m("pet_bottle").x;
+    let over = Pose::from_parts(end_m.with_z(from.translation.z), from.rotation);
+    let length_m = (over.translation - from.translation).length();
+    let at = |gone_m: f32| from.lerp(&over, gone_m / length_m);
+    team.carry(stage, &Path { at: &at, length_m, pace_m_s: PACE_M_S })?;
+    for _ in 0..TRIES {
+        sweep(stage)?;
+    }
+    Err(PlayerError::GaveUp("the bottle did not fall into the bin".into()))
+}
+
+/// Puts the hand down behind the bottle, wherever that is on the bench, and sweeps it to the end.
+fn sweep(stage: &mut Stage) -> Result<(), PlayerError> {
+    let behind_m = stage.facts()?.position_m("pet_bottle") + BEHIND_BOTTLE_M;
+    let reach = |at_m: Vector| HandMove::reach(B, Side::Left, Pose::from_parts(at_m, Rotation::IDENTITY));
+    stage.perform(1.2, &[reach(behind_m + Vector::Z * ABOVE_M)])?;
+    stage.perform(0.7, &[reach(behind_m)])?;
+    let end_m = Vector::new(behind_m.x, END_Y_M, behind_m.z);
+    stage.glide((end_m.y - behind_m.y).max(0.1) / SWEEP_M_S, &[reach(end_m)])?;
+    stage.perform(1.0, &[reach(end_m)])
+}

@@ -1,0 +1,126 @@
+//! Both sides of every threshold of MoveHouse.
+
+use tandem_sim::{Pose, Rotation, Side::Left, Side::Right};
+
+use super::*;
+use crate::scoring::Grip::Touching;
+use crate::scoring::{A, ObjectFacts};
+
+fn held() -> Facts {
+    Facts::at_rest(&TASK).held_by(&[B, C], "console_table")
+}
+
+/// The table's middle on that of the marks, `beside_m` off and turned by `degrees`.
+fn at_marks(mut facts: Facts, beside_m: Vector, degrees: f32) -> Facts {
+    let marks_m = facts.position_m("foot_marks");
+    facts.object_mut("console_table").pose_in_world =
+        Pose::from_parts(marks_m + beside_m, Rotation::from_rotation_z(degrees.to_radians()));
+    facts
+}
+
+#[test]
+fn lift_on_both_sides_of_3_cm_of_every_foot_and_by_b_and_c() {
+    assert!(lifted(&held().raised("console_table", 0.0301)));
+    assert!(!lifted(&held().raised("console_table", 0.0299)));
+    for lean_rad in [0.01, -0.01] {
+        assert!(!lifted(&held().raised("console_table", 0.0301).turned(
+            "console_table",
+            Vector::Y,
+            lean_rad
+        )));
+    }
+    let let_go = |robot| {
+        [Left, Right]
+            .into_iter()
+            .fold(held(), |facts, side| facts.grip(robot, side, "console_table", Touching))
+    };
+    for robot in [B, C] {
+        assert!(!lifted(&let_go(robot).held_by(&[A], "console_table").raised("console_table", 0.0301)));
+    }
+}
+
+#[test]
+fn the_door_is_open_on_both_sides_of_its_angle() {
+    let turned = |angle_rad: f32| Facts::at_rest(&TASK).turned("lever_door leaf", Vector::Z, angle_rad);
+    assert!(open(&turned(1.4501)));
+    assert!(!open(&turned(1.4499)));
+    assert!(!open(&turned(0.0)));
+    let Done::Milestones(milestones) = TASK.phases[0].done else { panic!("two milestones") };
+    assert_eq!(milestones.len(), 2);
+    assert!(milestones.iter().any(|milestone| milestone.for_s == 0.5 && (milestone.condition)(&turned(1.5))));
+}
+
+/// B and C hold the table with its middle at `table_x_m`; their pelvises at these.
+fn walking(table_x_m: f32, b_x_m: f32, c_x_m: f32, lift_m: f32) -> Facts {
+    let mut facts = held();
+    facts.object_mut("console_table").pose_in_world.translation = Vector::new(table_x_m, 0.0, lift_m);
+    facts.robots[B].pelvis_in_world.translation = Vector::new(b_x_m, 0.0, 0.75);
+    facts.robots[C].pelvis_in_world.translation = Vector::new(c_x_m, 0.0, 0.75);
+    facts
+}
+
+#[test]
+fn table_and_carriers_pass_the_plane_together() {
+    for (facts, expected) in [
+        (walking(1.0, 1.75, 0.25, 0.05), true),
+        (walking(1.0, 1.75, 0.2001, 0.05), true),
+        (walking(1.0, 1.75, 0.1999, 0.05), false),
+        (walking(1.0, 0.1999, 0.25, 0.05), false),
+        // The rail that follows is 0.463 m behind the middle.
+        (walking(0.664, 1.4, 0.25, 0.05), true),
+        (walking(0.662, 1.4, 0.25, 0.05), false),
+        (walking(1.0, 1.75, 0.25, 0.0101), true),
+        (walking(1.0, 1.75, 0.25, 0.0099), false),
+    ] {
+        assert_eq!(passed(&facts), expected, "{:?}", facts.object("console_table").pose_in_world);
+    }
+    let let_go = walking(1.0, 1.75, 0.25, 0.05).grip(C, Left, "console_table", Touching);
+    assert!(!passed(&let_go.grip(C, Right, "console_table", Touching)));
+}
+
+#[test]
+fn table_is_carried_to_15_cm_and_is_away_beyond() {
+    for (beside_m, expected) in [
+        (Vector::new(0.1499, 0.0, 0.05), true),
+        (Vector::new(0.0, -0.1501, 0.05), false),
+        (Vector::new(0.11, 0.10, 0.0101), true),
+        (Vector::new(0.11, 0.11, 0.05), false),
+    ] {
+        assert_eq!(carried_to_goal(&at_marks(held(), beside_m, 0.0)), expected, "{beside_m}");
+        assert_eq!(away_from_goal(&at_marks(held(), beside_m, 0.0)), !expected, "{beside_m}");
+    }
+    assert!(!carried_to_goal(&at_marks(held(), Vector::Z * 0.0099, 0.0)));
+}
+
+#[test]
+fn place_on_both_sides_of_every_threshold() {
+    let stands = |beside_m: Vector, degrees: f32| at_marks(Facts::at_rest(&TASK), beside_m, degrees);
+    let changed = |change: &dyn Fn(&mut ObjectFacts)| {
+        let mut facts = stands(Vector::ZERO, 0.0);
+        change(facts.object_mut("console_table"));
+        facts
+    };
+    for (what, inside, outside) in [
+        ("x", stands(Vector::X * 0.0499, 0.0), stands(Vector::X * 0.0501, 0.0)),
+        ("-y", stands(Vector::Y * -0.0499, 0.0), stands(Vector::Y * -0.0501, 0.0)),
+        // Feet 0.37 m ahead and 0.13 m aside go sideways by 5 cm.
+        ("turned", stands(Vector::ZERO, 7.5), stands(Vector::ZERO, 7.7)),
+        ("height", stands(Vector::Z * 0.0399, 0.0), stands(Vector::Z * 0.0401, 0.0)),
+        (
+            "speed",
+            changed(&|table| table.velocity_m_s = Vector::X * 0.0499),
+            changed(&|table| table.velocity_m_s = Vector::X * 0.0501),
+        ),
+        (
+            "turning",
+            changed(&|table| table.angular_velocity_rad_s = Vector::Z * 0.1499),
+            changed(&|table| table.angular_velocity_rad_s = Vector::Z * 0.1501),
+        ),
+        ("hands", changed(&|table| table.untouched_s = 0.2), changed(&|table| table.untouched_s = 0.18)),
+    ] {
+        assert!(placed(&inside), "{what} inside");
+        assert!(!placed(&outside), "{what} outside");
+    }
+    // A tilt of 15 degrees would take feet off their marks; the limit is that of every placement.
+    assert!(!placed(&stands(Vector::ZERO, 0.0).turned("console_table", Vector::X, 0.3)));
+}
