@@ -11,7 +11,7 @@ fn episodes_go_the_same_way_whoever_draws() {
         let spec = EpisodeSpec { renderer, ..spec("handover", 5, Protocol::Benchmark) };
         let mut session = Session::start(&spec, None).unwrap();
         for _ in 0..2 {
-            session.call(Observe { robots: None }.into()).unwrap();
+            session.call(Observe { robots: None, short: None }.into()).unwrap();
             command(&mut session, raise_hand(10));
         }
         session.close().state_hash

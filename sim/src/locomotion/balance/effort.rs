@@ -23,7 +23,7 @@ const CORRECTIONS: usize = 2;
 /// Of the centre of mass over the ground: a robot that is lower has fallen.
 const LEAST_HEIGHT_M: f32 = 0.4;
 /// A knee that is almost straight must not ask for the impossible.
-const DAMPING: f32 = 0.012;
+const DAMPING: f32 = 0.004;
 /// Of the ground force that torques give away.
 const FORCE_DAMPING: f32 = 0.004;
 const LARGEST_JOINT_ACCELERATION_RAD_S2: f32 = 400.0;
@@ -31,7 +31,7 @@ const LARGEST_JOINT_ACCELERATION_RAD_S2: f32 = 400.0;
 /// Torques stay within this part of the joints' limits as long as easing off helps.
 const EFFORT_USED: f32 = 0.9;
 /// What is left of the wanted turning and of the feet's acceleration when a robot eases off altogether.
-const EASED_TURN: f32 = 0.6;
+const EASED_TURN: f32 = 0.64;
 const EASED_FEET: f32 = 0.2;
 
 /// Wanted accelerations, world frame.

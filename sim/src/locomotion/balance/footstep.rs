@@ -21,7 +21,7 @@ const FASTER: [f32; 4] = [1.25, 1.5, 1.75, 2.0];
 const HURRY_M: f32 = 0.01;
 const MISS: f32 = 0.1;
 /// How far the centre of pressure goes from the sole's centre: along and across the foot.
-const PRESSURE_M: [f32; 2] = [0.069, 0.018];
+const PRESSURE_M: [f32; 2] = [0.075, 0.018];
 
 /// What a footstep is planned from. Horizontal vectors, world frame.
 pub(super) struct Situation<'a> {

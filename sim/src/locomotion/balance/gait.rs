@@ -11,7 +11,7 @@ const WIDTH_M: f32 = 0.25;
 /// Walking sideways brings the feet together at every other step.
 const WIDENING: f32 = 0.4;
 /// Angular momentum of a swinging leg per speed of its foot, over mass times height of the robot.
-const SWING_INERTIA: f32 = 0.09;
+const SWING_INERTIA: f32 = 0.104;
 
 /// Where the feet and the capture point of a steady gait are, one step ahead, relative to the stance foot.
 pub(super) struct Gait {

@@ -30,10 +30,12 @@ const LATEST_M: f32 = 0.1;
 /// One foot holds little against turning: a robot that is turned by force gives way, and turns back slowly.
 const HEADING_LEASH_RAD: f32 = 0.24;
 const RETURN_RAD_S: f32 = 0.4;
+/// The pelvis sways about the vertical with every step: it faces where it points in the mean of this time.
+const FACING_TIME_S: f32 = 0.2;
 const LIFT_STIFFNESS_1_S2: f32 = 111.0;
 const LIFT_DAMPING_1_S: f32 = 15.0;
 /// Vertical acceleration stays within these parts of gravity.
-const LIFT_RANGE: [f32; 2] = [-0.3, 0.6];
+const LIFT_RANGE: [f32; 2] = [-0.45, 0.6];
 const TRUNK_STIFFNESS_1_S2: f32 = 90.0;
 const TRUNK_DAMPING_1_S: f32 = 19.0;
 const LARGEST_TURN_RAD_S2: f32 = 50.0;
@@ -43,7 +45,7 @@ const YAW_PART: f32 = 0.32;
 const HIGHEST_M: f32 = 0.745;
 const LOWEST_M: f32 = 0.62;
 const RAISING_M_S: f32 = 0.15;
-const LOWERING_M_S: f32 = 0.4;
+const LOWERING_M_S: f32 = 0.8;
 /// From the hip's roll axis to the ankle roll link of a leg that is bent enough.
 const LEG_M: f32 = 0.49;
 const ANKLE_HEIGHT_M: f32 = 0.053;
@@ -62,6 +64,8 @@ pub(super) struct Step {
     pub(super) heading_rad: f32,
     /// Where the commands alone would have turned the heading.
     goal_rad: f32,
+    /// How far where the pelvis faces stays behind the heading.
+    lag_rad: f32,
     stance: Side,
     /// Before the first step: the capture point moves over the first stance foot.
     shifting: bool,
@@ -81,6 +85,7 @@ impl Step {
         let mut step = Step {
             heading_rad,
             goal_rad: heading_rad,
+            lag_rad: 0.0,
             stance,
             shifting: true,
             time_s: 0.0,
@@ -118,10 +123,10 @@ impl Step {
         let (ahead, left) = (heading * Vector::X, heading * Vector::Y);
         let rate_1_s = (GRAVITY_M_S2 / (body.com_m.z - ground_m).max(0.4)).sqrt();
         let pelvis_m = body.world_from_pelvis().translation;
-        let [forward_m_s, left_m_s] =
-            self.course.corrected_velocity(velocity, self.steps > 0, pelvis_m, [ahead, left], dt_s);
+        let faced = self.faced_axes(body, dt_s);
+        let velocity_m_s = self.course.corrected_velocity(velocity, self.steps > 0, pelvis_m, faced, dt_s);
         let outside = left * self.stance.sign();
-        let gait = Gait::new(rate_1_s, ahead * forward_m_s + left * left_m_s, outside);
+        let gait = Gait::new(rate_1_s, faced[0] * velocity_m_s[0] + faced[1] * velocity_m_s[1], outside);
         let situation = Situation {
             gait: &gait,
             swing: &self.swing,
@@ -159,6 +164,14 @@ impl Step {
         self.heading_rad += ahead_rad.clamp(-HEADING_LEASH_RAD, HEADING_LEASH_RAD) - ahead_rad;
     }
 
+    /// Ahead and left of where the pelvis faces: a velocity is meant along these, and it may stay behind the heading.
+    fn faced_axes(&mut self, body: &WholeBody, dt_s: f32) -> [Vector; 2] {
+        let lag_rad = wrapped_rad(self.heading_rad - heading_rad(body.world_from_pelvis()));
+        self.lag_rad += (lag_rad - self.lag_rad) * (dt_s / FACING_TIME_S);
+        let facing = Rotation::from_rotation_z(self.heading_rad - self.lag_rad);
+        [facing * Vector::X, facing * Vector::Y]
+    }
+
     /// One physics step of the swinging foot.
     fn advance(&mut self, footstep: &Footstep, yaw_rate_rad_s: f32, ground_m: f32, dt_s: f32) {
         self.time_s += dt_s * footstep.pace;
@@ -169,19 +182,20 @@ impl Step {
         self.swing.advance(goal, self.time_s - TRANSFER_S, footstep.pace, dt_s);
     }
 
-    /// Largest height of the pelvis at which both legs reach: the carrying one now, the other where it will land.
+    /// Largest height of the pelvis at which both legs reach, now and where the swinging one will land: a leg that is
+    /// straight can neither lift its foot nor let the pelvis down.
     fn within_reach_m(&self, body: &WholeBody) -> f32 {
         let pelvis_m = body.world_from_pelvis().translation;
         let remaining_s = (PERIOD_S - self.time_s).max(0.0);
         let height_m = |side: Side| {
             let (hip_m, _) = body.joint_axis(LEGS[side] + 1);
-            let ankle_m = body.world_from_foot(side).translation;
-            let away_m = if side == self.stance || self.shifting {
-                ankle_m - hip_m
+            let now_m = flat(body.world_from_foot(side).translation - hip_m).length();
+            let landing_m = if side == self.stance || self.shifting {
+                0.0
             } else {
-                self.swing.goal_m() - hip_m - body.com_velocity_m_s * remaining_s
+                flat(self.swing.goal_m() - hip_m - body.com_velocity_m_s * remaining_s).length()
             };
-            let away_m = flat(away_m).length().min(0.8 * LEG_M);
+            let away_m = now_m.max(landing_m).min(0.8 * LEG_M);
             pelvis_m.z - hip_m.z + ANKLE_HEIGHT_M + (LEG_M * LEG_M - away_m * away_m).sqrt()
         };
         height_m(Side::Left).min(height_m(Side::Right))
