@@ -135,7 +135,7 @@ fn placed(f: &Facts) -> bool {
         beside_m.x.abs() <= mark.size_m.x && beside_m.y.abs() <= mark.size_m.y
     };
     stands_released(f, "console_table")
-        && FEET.iter().all(|foot| on_mark(&foot))
+        && FEET.iter().all(on_mark)
         && stands_as_high(f, "console_table", AS_HIGH_M)
 }
 

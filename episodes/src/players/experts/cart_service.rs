@@ -6,8 +6,7 @@ use std::f32::consts::FRAC_PI_2;
 use tandem_sim::{Pose, Side, Vector};
 
 use super::skills::{
-    BEHIND_BAR_M, BarGrasp, CylinderGrasp, Path, Stage, Team, Way, let_go, pick_up_all, place, take_softly,
-    upright, walk_to,
+    BarGrasp, CylinderGrasp, Stage, Team, Way, let_go, pick_up_all, place, take_softly, walk_to,
 };
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
@@ -27,7 +26,7 @@ const DROP_M: f32 = 0.003;
 
 pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
     let grasps = BarGrasp::from_above(A, "service_trolley", ["left", "right"], -FRAC_PI_2);
-    let mut team = Team::new(stage, &grasps, BEHIND_BAR_M)?;
+    let mut team = Team::new(stage, &grasps)?;
     // B walks to where it will find the bottle while A walks to the bar.
     let facts = stage.facts()?;
     let ring_m = facts.position_m("parking_mark") + facts.site("service_trolley", "ring").position_m();
@@ -69,12 +68,8 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
 fn park(stage: &mut Stage, team: &mut Team, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
     take_softly(stage, grasps)?;
     team.measure(stage)?;
-    let from = upright(&team.object(stage)?);
-    let mark_m = stage.facts()?.position_m("parking_mark");
-    let parked = place(mark_m.with_z(from.translation.z), 0.0);
-    let length_m = (parked.translation - from.translation).length();
-    let at = |gone_m: f32| from.lerp(&parked, gone_m / length_m);
-    team.carry(stage, &Path { at: &at, length_m, pace_m_s: PUSH_M_S })?;
+    let mark = stage.facts()?.object("parking_mark").pose_in_world;
+    team.carry_to(stage, &mark, PUSH_M_S)?;
     let_go(stage, grasps)
 }
 

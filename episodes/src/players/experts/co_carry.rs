@@ -2,9 +2,7 @@
 
 use std::f32::consts::PI;
 
-use tandem_sim::Pose;
-
-use super::skills::{BEHIND_BAR_M, BarGrasp, Path, Stage, Team, let_go, take_softly, upright};
+use super::skills::{BarGrasp, Stage, Team, let_go, take_softly};
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
@@ -15,16 +13,12 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
     let [a_left, a_right] = BarGrasp::from_above(A, "basket", ["a_left", "a_right"], 0.0);
     let [b_left, b_right] = BarGrasp::from_above(B, "basket", ["b_left", "b_right"], PI);
     let grasps = [a_left, a_right, b_left, b_right];
-    let mut team = Team::new(stage, &grasps, BEHIND_BAR_M)?;
+    let mut team = Team::new(stage, &grasps)?;
     team.gather(stage)?;
     take_softly(stage, &grasps)?;
     team.lift(stage, LIFT_M)?;
-    let from = upright(&team.object(stage)?);
-    let patch_m = stage.facts()?.position_m("basket_patch");
-    let over = Pose::from_parts(patch_m.with_z(from.translation.z), from.rotation);
-    let length_m = (over.translation - from.translation).length();
-    let at = |gone_m: f32| from.lerp(&over, gone_m / length_m);
-    team.carry(stage, &Path { at: &at, length_m, pace_m_s: PACE_M_S })?;
-    team.set_down(stage, &Pose::from_parts(patch_m, from.rotation))?;
+    let patch = stage.facts()?.object("basket_patch").pose_in_world;
+    team.carry_to(stage, &patch, PACE_M_S)?;
+    team.set_down(stage, &patch)?;
     let_go(stage, &grasps)
 }

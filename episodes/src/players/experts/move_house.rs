@@ -6,8 +6,8 @@ use std::f32::consts::{FRAC_PI_2, PI};
 use tandem_sim::{Pose, Rotation, Side, Sides, Vector};
 
 use super::skills::{
-    BEHIND_BAR_M, BarGrasp, Course, HandMove, Path, Posture, Stage, Team, Way, closed_rad, follow, let_go,
-    place, take_softly, upright, walk_to,
+    BarGrasp, Course, HandMove, Posture, Stage, Team, Way, closed_rad, follow, let_go, place, take_softly,
+    walk_to,
 };
 use crate::players::PlayerError;
 use crate::scoring::{A, B, C, Facts};
@@ -40,7 +40,7 @@ const TURN_RATIO: f32 = 0.6;
 const AHEAD_M: f32 = 0.45;
 const RIGHT_M: f32 = 0.10;
 /// Where A stands aside, in the door's frame.
-const ASIDE_M: Vector = Vector::new(0.75, -1.10, 0.0);
+const ASIDE_M: Vector = Vector::new(1.60, -1.25, 0.0);
 const WALK_M_S: f32 = 0.3;
 
 pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
@@ -51,16 +51,12 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
     let [b_left, b_right] = BarGrasp::from_above(B, "console_table", ["b_left", "b_right"], PI);
     let [c_left, c_right] = BarGrasp::from_above(C, "console_table", ["c_left", "c_right"], 0.0);
     let grasps = [b_left, b_right, c_left, c_right];
-    let mut team = Team::new(stage, &grasps, BEHIND_BAR_M)?;
+    let mut team = Team::new(stage, &grasps)?;
     team.gather(stage)?;
     take_softly(stage, &grasps)?;
     team.lift(stage, LIFT_M)?;
-    let from = upright(&team.object(stage)?);
     let marks = stage.facts()?.object("foot_marks").pose_in_world;
-    let over = Pose::from_parts(marks.translation.with_z(from.translation.z), marks.rotation);
-    let length_m = (over.translation - from.translation).length();
-    let at = |gone_m: f32| from.lerp(&over, gone_m / length_m);
-    team.carry(stage, &Path { at: &at, length_m, pace_m_s: PACE_M_S })?;
+    team.carry_to(stage, &marks, PACE_M_S)?;
     team.set_down(stage, &marks)?;
     let_go(stage, &grasps)
 }

@@ -5,7 +5,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 use tandem_sim::Vector;
 
-use super::skills::{BEHIND_BAR_M, BarGrasp, Path, Stage, Team, let_go, place, take_softly, upright};
+use super::skills::{BarGrasp, Path, Stage, Team, let_go, place, take_softly, upright};
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
@@ -19,7 +19,7 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
     let [a_left, a_right] = BarGrasp::from_above(A, "office_table", ["a_left", "a_right"], 0.0);
     let [b_left, b_right] = BarGrasp::from_above(B, "office_table", ["b_left", "b_right"], PI);
     let grasps = [a_left, a_right, b_left, b_right];
-    let mut team = Team::new(stage, &grasps, BEHIND_BAR_M)?;
+    let mut team = Team::new(stage, &grasps)?;
     team.gather(stage)?;
     take_softly(stage, &grasps)?;
     team.lift(stage, LIFT_M)?;

@@ -5,7 +5,7 @@ use std::f32::consts::FRAC_PI_2;
 
 use tandem_sim::{Pose, Rotation, Side, Vector};
 
-use super::skills::{BEHIND_BAR_M, BarGrasp, HandMove, Path, Stage, Team, take_softly, upright};
+use super::skills::{BarGrasp, HandMove, Stage, Team, take_softly};
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
@@ -24,20 +24,17 @@ const TRIES: u32 = 3;
 
 pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
     let grasps = BarGrasp::between(A, "bin", ["left", "right"], -FRAC_PI_2);
-    let mut team = Team::new(stage, &grasps, BEHIND_BAR_M)?;
+    let mut team = Team::new(stage, &grasps)?;
     stage.set_height(A, BENT_M);
     team.gather(stage)?;
     take_softly(stage, &grasps)?;
     team.lift(stage, LIFT_M)?;
     stage.set_height(A, TALL_M);
-    let from = upright(&team.object(stage)?);
     let facts = stage.facts()?;
-    let mut end_m = facts.position_m("carry_point");
-    end_m.x = facts.position_m("pet_bottle").x;
-    let over = Pose::from_parts(end_m.with_z(from.translation.z), from.rotation);
-    let length_m = (over.translation - from.translation).length();
-    let at = |gone_m: f32| from.lerp(&over, gone_m / length_m);
-    team.carry(stage, &Path { at: &at, length_m, pace_m_s: PACE_M_S })?;
+    let point_m = facts.position_m("carry_point");
+    // Before the bottle, wherever that lies across the bench.
+    let end_m = Vector::new(facts.position_m("pet_bottle").x, point_m.y, point_m.z);
+    team.carry_to(stage, &Pose::from_translation(end_m), PACE_M_S)?;
     for _ in 0..TRIES {
         sweep(stage)?;
     }

@@ -17,5 +17,5 @@ pub use ground::{place, upright};
 pub use hand::closed_rad;
 pub use soft::{let_go, take_softly};
 pub use stage::{HandMove, Stage};
-pub use team::{BEHIND_BAR_M, Path, Team};
+pub use team::{Path, Team};
 pub use walk::{Way, walk_to};

@@ -11,7 +11,7 @@ use super::walk::{Way, walk_to};
 use crate::players::PlayerError;
 
 /// How far behind a bar in its hands a robot stands.
-pub const BEHIND_BAR_M: f32 = 0.29;
+const BEHIND_BAR_M: f32 = 0.29;
 /// Towards their places, before anything is held.
 const APPROACH_M_S: f32 = 0.3;
 /// What two robots that walk with a load need.
@@ -39,19 +39,15 @@ pub struct Team<'a> {
 }
 
 impl<'a> Team<'a> {
-    /// Robots that have both hands in `grasps`, left first, and stand `behind_m` behind them.
-    pub fn new(
-        stage: &mut Stage,
-        grasps: &'a [BarGrasp<'a>],
-        behind_m: f32,
-    ) -> Result<Team<'a>, PlayerError> {
+    /// Robots that have both hands in `grasps`, left first.
+    pub fn new(stage: &mut Stage, grasps: &'a [BarGrasp<'a>]) -> Result<Team<'a>, PlayerError> {
         let facts = stage.facts()?;
         let pairs = grasps.chunks_exact(2);
         let stand = |pair: &[BarGrasp]| {
             let bar_m = |grasp: &BarGrasp| facts.site(grasp.object, grasp.bar).position_m();
             let middle_m = (bar_m(&pair[0]) + bar_m(&pair[1])) * 0.5;
             let ahead = upright(&Pose::from_rotation(pair[0].object_from_wrist));
-            let back_m = ahead.rotation * Vector::new(-behind_m, 0.0, 0.0);
+            let back_m = ahead.rotation * Vector::new(-BEHIND_BAR_M, 0.0, 0.0);
             Pose::from_parts((middle_m + back_m).with_z(0.0), ahead.rotation)
         };
         Ok(Team {
@@ -111,6 +107,15 @@ impl<'a> Team<'a> {
         stage.set_compliance(self.compliance_n_s_m());
         let Path { length_m, pace_m_s, .. } = *path;
         follow(stage, &Course { at: &postures, length_m, pace_m_s, hold_s: HOLD_S })
+    }
+
+    /// Takes the held object straight over a place, as high as it is.
+    pub fn carry_to(&self, stage: &mut Stage, place: &Pose, pace_m_s: f32) -> Result<(), PlayerError> {
+        let from = upright(&self.object(stage)?);
+        let over = Pose::from_parts(place.translation.with_z(from.translation.z), place.rotation);
+        let length_m = (over.translation - from.translation).length();
+        let at = |gone_m: f32| from.lerp(&over, gone_m / length_m);
+        self.carry(stage, &Path { at: &at, length_m, pace_m_s })
     }
 
     /// How the robots stand and hold the object where it is to be.
