@@ -53,7 +53,13 @@ pub enum PicturesError {
     #[error(transparent)]
     Output(#[from] OutputError),
     #[error(transparent)]
-    Replay(#[from] ReplayError),
+    Replay(Box<ReplayError>),
+}
+
+impl From<ReplayError> for PicturesError {
+    fn from(error: ReplayError) -> PicturesError {
+        PicturesError::Replay(error.into())
+    }
 }
 
 /// The content of `pictures.json`.

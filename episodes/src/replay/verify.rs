@@ -67,7 +67,7 @@ pub fn verify(recording: &Recording) -> Result<Verified, ReplayError> {
     let outcome = match (difference, &recording.result) {
         (Some((call, found)), _) => Outcome::State(found.by(call)),
         (None, Some(result)) => match compared.missing() {
-            Some(found) => Outcome::State(found.by(calls.iter().enumerate().last())),
+            Some(found) => Outcome::State(found.by(calls.iter().enumerate().next_back())),
             None => compare_results(recording, result, replay.result().0)?,
         },
         (None, None) => Outcome::Same,

@@ -39,7 +39,13 @@ pub enum VideoError {
     #[error(transparent)]
     Output(#[from] OutputError),
     #[error(transparent)]
-    Replay(#[from] ReplayError),
+    Replay(Box<ReplayError>),
+}
+
+impl From<ReplayError> for VideoError {
+    fn from(error: ReplayError) -> VideoError {
+        VideoError::Replay(error.into())
+    }
 }
 
 impl VideoFormat {
@@ -93,8 +99,8 @@ pub fn step_of_picture(picture: usize, rate_hz: u32) -> usize {
 
 /// A film under way.
 enum Reel {
-    Webp(Encoder),
-    Gif { encoder: GifEncoder<BufWriter<File>>, file: File },
+    Webp(Box<Encoder>),
+    Gif { encoder: Box<GifEncoder<BufWriter<File>>>, file: File },
     Mp4(Child),
 }
 
@@ -108,13 +114,13 @@ impl Reel {
     fn begin(format: VideoFormat, frame: &Frame, rate_hz: u32, path: &Path) -> Result<Reel, VideoError> {
         let Frame { width, height, .. } = *frame;
         Ok(match format {
-            VideoFormat::Webp => Reel::Webp(webp((width, height)).map_err(|e| webp_failed(path, e))?),
+            VideoFormat::Webp => Reel::Webp(webp((width, height)).map_err(|e| webp_failed(path, e))?.into()),
             VideoFormat::Gif => {
                 let file = File::create(partial_path(path)).map_err(|e| io_failed(path, e))?;
                 let written = file.try_clone().map_err(|e| io_failed(path, e))?;
                 let mut encoder = GifEncoder::new_with_speed(BufWriter::new(written), GIF_SPEED);
                 encoder.set_repeat(Repeat::Infinite)?;
-                Reel::Gif { encoder, file }
+                Reel::Gif { encoder: encoder.into(), file }
             }
             VideoFormat::Mp4 => Reel::Mp4(ffmpeg([width, height], rate_hz, path)?),
         })
