@@ -11,7 +11,10 @@ use tandem_tools_spec::{Disclosure, Hints, Protocol};
 /// Tasks whose experts keep within the benchmark protocol's steps; the others take the time of the agentic protocol.
 const IN_TIME: [&str; 4] = ["handover", "pouring", "frame_hang", "co_pouring"];
 
-/// Plays the experts of `tasks` on one seed: phases in order, and nobody falls.
+/// Seeds on which nobody tuned anything.
+const SEEDS: [u32; 3] = [3, 6100, 6101];
+
+/// Plays the experts of `tasks`: phases in order, and nobody falls.
 fn solve(protocol: Protocol, tasks: Vec<&'static Task>) {
     let plan = Plan {
         player: players::find("expert").expect("a player"),
@@ -22,7 +25,7 @@ fn solve(protocol: Protocol, tasks: Vec<&'static Task>) {
         hints: Hints::On,
         renderer: RendererKind::Cpu,
         tasks: tasks.clone(),
-        seeds: vec![3],
+        seeds: SEEDS.into(),
         starts: Starts::Task,
         shard: Shard::WHOLE,
         jobs: available_parallelism().map_or(1, usize::from),
@@ -30,8 +33,9 @@ fn solve(protocol: Protocol, tasks: Vec<&'static Task>) {
     };
     let folder = tempfile::tempdir().expect("a temporary folder");
     let played = evaluate(&plan, folder.path(), &|_| {}).expect("worlds can be built").episodes;
-    assert_eq!(played.len(), tasks.len());
-    for (episode, task) in played.iter().zip(tasks) {
+    assert_eq!(played.len(), tasks.len() * SEEDS.len());
+    for episode in &played {
+        let task = tasks.iter().find(|task| task.id == episode.result.task).expect("a task of the plan");
         let result = &episode.result;
         let times_s: Vec<f64> = result.phases.0.iter().filter_map(|(_, time_s)| *time_s).collect();
         assert_eq!((result.task.as_str(), times_s.len()), (task.id, task.phases.len()), "{episode:?}");
