@@ -11,6 +11,14 @@ pub enum EpisodeError {
     UnknownTask { id: String, have: Vec<&'static str> },
     #[error("no robot {name:?} in this episode; have: {}", .have.join(", "))]
     UnknownRobot { name: String, have: Vec<String> },
+    #[error(
+        "robot {name:?} is another operator's; yours is {own:?}, and you look through it and command it alone"
+    )]
+    ForeignRobot { name: String, own: String },
+    #[error(
+        "the {protocol} protocol gives no depth images; measure at pixels with query_depth, or start the episode under the benchmark protocol"
+    )]
+    DepthImage { protocol: &'static str },
     #[error("{asked} control steps in one command; the {protocol} protocol allows 1 to {most}")]
     TooManySteps { asked: usize, most: u32, protocol: &'static str },
     #[error("pixel [{u}, {v}] is outside the image; u goes from 0 to {}, v from 0 to {}", .width - 1, .height - 1)]

@@ -21,6 +21,7 @@ mod spec;
 pub mod statistics;
 pub mod tasks;
 
+pub use commands::{Called, OperatorCommand, own as own_call};
 pub use describe::task_list;
 pub use error::{CheckpointError, EpisodeError};
 pub use instructions::{Instructions, InstructionsError};

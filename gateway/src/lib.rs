@@ -9,3 +9,4 @@ pub mod drivers;
 pub mod hosting;
 pub mod http;
 pub mod settings;
+pub mod token;

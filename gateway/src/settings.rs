@@ -17,6 +17,8 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{Disclosure, Hints};
 
+use crate::token::{Token, TokenError};
+
 /// One source of settings; what it leaves out comes from the next. The doc comments are the help text.
 #[derive(Debug, Clone, Default, PartialEq, Args, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -28,6 +30,14 @@ pub struct Layer {
     /// [default: the address of --listen and localhost].
     #[arg(long, env = "TANDEM_ALLOWED_HOST", value_name = "NAMES", value_delimiter = ',')]
     pub allowed_host: Option<Vec<String>>,
+    /// File with the token that every request has to send, as `Authorization: Bearer TOKEN`; or give the token itself in the
+    /// environment, as TANDEM_TOKEN. An address that other machines reach is refused without [default: none].
+    #[arg(long, env = "TANDEM_TOKEN_FILE", value_name = "FILE")]
+    pub token_file: Option<PathBuf>,
+    /// The token itself: never a flag, which the list of processes would show, nor a line of a file with other settings.
+    #[arg(skip)]
+    #[serde(skip)]
+    pub token: Option<Token>,
     /// Folder that recordings are written to, one folder per episode [default: runs].
     #[arg(long, env = "TANDEM_RUNS", value_name = "DIR")]
     pub runs: Option<PathBuf>,
@@ -83,6 +93,8 @@ impl Layer {
         Layer {
             listen: self.listen.or(next.listen),
             allowed_host: self.allowed_host.or(next.allowed_host),
+            token_file: self.token_file.or(next.token_file.filter(|_| self.token.is_none())),
+            token: self.token.or(next.token),
             runs: self.runs.or(next.runs),
             record: self.record.or(next.record),
             instructions: self.instructions.or(next.instructions),
@@ -106,6 +118,8 @@ pub struct Settings {
     pub listen: SocketAddr,
     /// Names that the server is reached by, besides its address and localhost.
     pub allowed_hosts: Vec<String>,
+    /// What every request has to send.
+    pub token: Option<Token>,
     /// Folder that recordings are written to, one folder per episode.
     pub runs: PathBuf,
     /// When recordings can be read.
@@ -145,6 +159,20 @@ pub enum SettingsError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// The token cannot be used.
+    #[error(transparent)]
+    Token(#[from] TokenError),
+    /// There are two tokens.
+    #[error("both --token-file and TANDEM_TOKEN give a token; give one of them")]
+    TwoTokens,
+    /// Other machines would reach the server, and nothing keeps them out.
+    #[error(
+        "other machines reach {listen}; give a token that every request has to send, by --token-file FILE or in TANDEM_TOKEN (`openssl rand -hex 32` makes one), or listen on 127.0.0.1"
+    )]
+    Open {
+        /// The address to serve on.
+        listen: SocketAddr,
+    },
     /// The file with instructions cannot be used.
     #[error(transparent)]
     Instructions(#[from] InstructionsError),
@@ -169,13 +197,16 @@ impl Settings {
             None => Layer::default(),
         };
         let layer = flags.or(file);
+        let listen = layer.listen.unwrap_or(SocketAddr::from(([127, 0, 0, 1], 8700)));
+        let token = token(&layer, listen)?;
         let locomotion = Controller::from_file(layer.locomotion.as_deref());
         let renderer = layer.renderer.unwrap_or_default();
         tracing::info!("{}", renderer.describe()?);
         let seconds = |given: Option<u32>, default: u32| Duration::from_secs(given.unwrap_or(default).into());
         Ok(Arc::new(Settings {
-            listen: layer.listen.unwrap_or(SocketAddr::from(([127, 0, 0, 1], 8700))),
+            listen,
             allowed_hosts: layer.allowed_host.unwrap_or_default(),
+            token,
             runs: layer.runs.unwrap_or_else(|| "runs".into()),
             record: match layer.record {
                 None | Some(Record::Live) => Visibility::Live,
@@ -197,6 +228,19 @@ impl Settings {
             stop_timeout: seconds(layer.stop_timeout, 30),
         }))
     }
+}
+
+/// The token that `layer` gives; none is needed where no other machine reaches `listen`.
+fn token(layer: &Layer, listen: SocketAddr) -> Result<Option<Token>, SettingsError> {
+    let token = match (&layer.token_file, &layer.token) {
+        (Some(_), Some(_)) => return Err(SettingsError::TwoTokens),
+        (Some(path), None) => Some(Token::read(path)?),
+        (None, token) => token.clone(),
+    };
+    if token.is_none() && !listen.ip().to_canonical().is_loopback() {
+        return Err(SettingsError::Open { listen });
+    }
+    Ok(token)
 }
 
 /// One of the kinds of disclosure, by name.
@@ -247,5 +291,26 @@ mod tests {
         assert!(text.contains("ONNX") && text.contains("tandem-settings"), "{text}");
         std::fs::remove_file(&path).unwrap();
         assert!(Settings::resolve(Layer::default(), Some(&path)).is_err());
+    }
+    #[test]
+    fn an_address_that_others_reach_needs_a_token() {
+        let token = || Token::of("0123456789abcdef", "a test").unwrap();
+        let resolve = |listen: &str, token: Option<Token>| {
+            let flags = Layer { listen: Some(listen.parse().unwrap()), token, ..Layer::default() };
+            Settings::resolve(flags, None)
+        };
+        for listen in ["127.0.0.1:0", "127.9.9.9:0", "[::1]:0", "[::ffff:127.0.0.1]:0"] {
+            assert!(resolve(listen, None).is_ok(), "{listen}");
+        }
+        for listen in ["0.0.0.0:0", "[::]:0", "10.0.0.5:8700", "[fe80::1]:0"] {
+            let refused = resolve(listen, None).unwrap_err().to_string();
+            assert!(refused.contains("--token-file") && refused.contains("TANDEM_TOKEN"), "{refused}");
+            assert!(resolve(listen, Some(token())).is_ok(), "{listen}");
+        }
+        let both = Layer { token_file: Some("x".into()), token: Some(token()), ..Layer::default() };
+        assert!(matches!(Settings::resolve(both, None), Err(SettingsError::TwoTokens)));
+        let missing = Layer { token_file: Some("/nowhere/token".into()), ..Layer::default() };
+        let refused = Settings::resolve(missing, None).unwrap_err().to_string();
+        assert!(refused.contains("/nowhere/token"), "{refused}");
     }
 }

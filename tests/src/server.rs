@@ -7,7 +7,7 @@ use tandem::{
     http::Server,
     settings::{Layer, Settings},
 };
-use ureq::{Agent, Body, SendBody, http};
+use ureq::{Agent, SendBody, http};
 
 /// An answer of the server, refused or not.
 #[derive(Debug)]
@@ -111,27 +111,52 @@ impl TestServer {
         self.send("DELETE", path, None, b"")
     }
 
-    /// Sends any bytes as any type.
-    pub fn send(&self, method: &str, path: &str, content_type: Option<&str>, body: &[u8]) -> Answer {
+    /// As [`TestServer::post`], with further headers.
+    pub fn post_with(&self, path: &str, headers: &[(&str, &str)], body: &Value) -> Answer {
+        let headers = [&[("content-type", "application/json")], headers].concat();
+        json_answer(self.ask("POST", path, &headers, body.to_string().as_bytes()))
+    }
+
+    /// Calls a tool as who has this token.
+    pub fn tool_as(&self, token: &str, id: &str, tool: &str, args: &Value) -> Answer {
+        let path = format!("/v1/episodes/{id}/tools/{tool}");
+        self.post_with(&path, &[("authorization", &format!("Bearer {token}"))], args)
+    }
+
+    /// The answer to a request as it comes: status, headers and bytes.
+    pub fn ask(
+        &self,
+        method: &str,
+        path: &str,
+        headers: &[(&str, &str)],
+        body: &[u8],
+    ) -> (u16, http::HeaderMap, Vec<u8>) {
         let mut request =
             http::Request::builder().method(method).uri(format!("http://{}{path}", self.address));
-        // What MCP asks for, and what REST takes as well.
-        request = request.header("accept", "application/json, text/event-stream");
-        if let Some(content_type) = content_type {
-            request = request.header("content-type", content_type);
+        for (name, value) in headers {
+            request = request.header(*name, *value);
         }
-        let answer = if body.is_empty() {
-            self.agent.run(request.body(SendBody::none()).expect("a request"))
-        } else {
-            self.agent.run(request.body(body).expect("a request"))
+        let answer = match body.is_empty() {
+            true => self.agent.run(request.body(SendBody::none()).expect("a request")),
+            false => self.agent.run(request.body(body).expect("a request")),
         };
-        read(answer.unwrap_or_else(|error| panic!("{method} {path}: {error}")))
+        let mut answer = answer.unwrap_or_else(|error| panic!("{method} {path}: {error}"));
+        let bytes = answer.body_mut().with_config().limit(50_000_000).read_to_vec().expect("a body");
+        (answer.status().as_u16(), answer.headers().clone(), bytes)
+    }
+
+    /// Sends any bytes as any type.
+    pub fn send(&self, method: &str, path: &str, content_type: Option<&str>, body: &[u8]) -> Answer {
+        // What MCP asks for, and what REST takes as well.
+        let accept = ("accept", "application/json, text/event-stream");
+        let content_type = content_type.map(|kind| ("content-type", kind));
+        let headers: Vec<(&str, &str)> = [accept].into_iter().chain(content_type).collect();
+        json_answer(self.ask(method, path, &headers, body))
     }
 }
 
-fn read(mut response: http::Response<Body>) -> Answer {
-    let headers = response.headers().clone();
-    let text = response.body_mut().with_config().limit(50_000_000).read_to_string().expect("a body");
+fn json_answer((status, headers, bytes): (u16, http::HeaderMap, Vec<u8>)) -> Answer {
+    let text = String::from_utf8_lossy(&bytes);
     let body = serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error}: {text}"));
-    Answer { status: response.status().as_u16(), headers, body }
+    Answer { status, headers, body }
 }

@@ -7,6 +7,7 @@
 
 #![warn(missing_docs)]
 
+mod asked;
 mod checks;
 mod error;
 mod limits;
@@ -17,14 +18,16 @@ mod strict_value;
 mod tool;
 mod tools;
 
+pub use asked::{Asked, Look, parse_start};
 pub use error::{ProblemBody, SpecError};
 pub use list::{
     ActCall, EPISODE_TOOLS, LookCall, LookReply, ManageCall, ManageReply, ToolCall, ToolReply, tool_specs,
 };
 pub use parts::{
-    BASE_COLUMNS, BaseCommand, BaseLimits, BaseMotion, Budget, CommandReply, Disclosure, Effort,
-    FingerReport, HandReport, HandState, Hints, JointValues, PhaseReached, PixelRegion, Png, Pose, Protocol,
-    Range, RobotFallen, RobotReport, StopReason,
+    BASE_COLUMNS, BaseCommand, BaseLimits, BaseMotion, Budget, Bytes, CameraArrays, CommandReply,
+    DepthFormat, Disclosure, Driving, Effort, FingerReport, Formats, HandReport, HandState, Heard, Hints,
+    ImageFormat, JointValues, OperatorToken, Operators, Partner, PartnerDid, PhaseReached, PixelRegion, Png,
+    Pose, Protocol, Range, RobotFallen, RobotReport, StopReason,
 };
 pub use schema::{EpisodeToolSpec, ToolSpec};
 pub use tool::{Route, Tool, parse_args};
@@ -32,11 +35,16 @@ pub use tools::*;
 
 /// The REST interface of `version` as OpenAPI 3.1, from the same types that read and write it.
 pub fn openapi(version: &str, hints: Hints) -> serde_json::Value {
-    schema::openapi(version, &tool_specs(hints))
+    schema::openapi(version, &asked::specs_for_programs(hints))
 }
 
 /// The tools of the running episode `id`, whose commands may have up to `most_steps` control steps.
 pub fn episode_tool_specs(hints: Hints, id: &str, most_steps: u32) -> Vec<EpisodeToolSpec> {
-    let specs = tool_specs(hints).into_iter().filter(|spec| spec.on_episode);
+    let specs = asked::specs_for_programs(hints).into_iter().filter(|spec| spec.on_episode);
     specs.map(|spec| spec.of_episode(id, most_steps)).collect()
+}
+
+/// The tool `say` of the running episode `id`, which has it where its operators may talk.
+pub fn say_spec(hints: Hints, id: &str) -> EpisodeToolSpec {
+    ToolSpec::on_episode::<Say>(hints).of_episode(id, 0)
 }

@@ -51,6 +51,11 @@ macro_rules! tools {
                 $( $tool($tool), )*
             }
 
+            impl $call {
+                /// The tools of this group, by name.
+                pub const TOOLS: &[&str] = &[$( $tool::NAME, )*];
+            }
+
             tools!(@replies $whose $reply $call { $($tool)* });
         )*
 

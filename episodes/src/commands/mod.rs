@@ -1,17 +1,21 @@
 //! Commands: an acting tool call becomes one order per robot, once; orders become joint targets, step by step.
 
 mod aim;
+mod called;
 mod columns;
 mod motion;
 mod orders;
+mod own;
 mod reach;
 mod report;
 mod run;
 mod upper_body;
 
 pub use aim::Aim;
+pub use called::{Called, OperatorCommand};
 pub use columns::{action_row, base_row};
 pub use motion::{Motion, MotionState, RobotSheet};
+pub use own::own;
 pub use reach::check_reach;
 pub use report::report;
 pub use run::Run;
@@ -28,6 +32,8 @@ pub struct Command {
     pub steps: u32,
     /// One per robot of the episode.
     pub orders: Vec<Order>,
+    /// Control steps that each robot's order is made for: of a longer one, only the beginning is executed.
+    pub made_for: Vec<u32>,
     /// Robots that the caller named, in its order, or all that wait: these are reported on.
     named: Vec<usize>,
 }
@@ -103,7 +109,20 @@ impl Command {
 
     /// `robots` robots stand still for `steps` control steps.
     pub fn hold(steps: u32, robots: usize) -> Command {
-        Command { steps, orders: (0..robots).map(|_| Order::hold()).collect(), named: Vec::new() }
+        let orders = (0..robots).map(|_| Order::hold()).collect();
+        Command { steps, orders, made_for: vec![steps; robots], named: Vec::new() }
+    }
+
+    /// What several robots, by index, are told each by a command of its own, side by side and for as long as the shortest of them.
+    pub fn together(parts: Vec<(usize, Command)>, robots: usize) -> Command {
+        let steps = parts.iter().map(|(_, part)| part.steps).min().unwrap_or_default();
+        let mut command = Command::hold(steps, robots);
+        for (robot, part) in parts {
+            command.made_for[robot] = part.steps;
+            command.orders.splice(robot..=robot, part.orders.into_iter().nth(robot));
+            command.named.push(robot);
+        }
+        command
     }
 
     /// The robots to report on, and what of their orders had to be cut down.

@@ -9,9 +9,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tandem_sim::{BaseCommand, RobotCommand, RobotState, Side, Step};
-use tandem_tools_spec::{Budget, LookReply, PhaseReached, ToolCall, ToolReply};
+use tandem_tools_spec::{Budget, LookReply, PhaseReached, ToolReply};
 
-use crate::commands::base_row;
+use crate::commands::{Called, base_row};
 use crate::output::OutputError;
 use crate::scoring::{Facts, Grip};
 
@@ -198,7 +198,9 @@ pub struct ToolCallRecord<'a> {
     pub time_s: f64,
     /// How long the policy has thought since the episode began: what its clock is charged up to this call.
     pub thought: Duration,
-    pub call: &'a ToolCall,
+    /// The robot whose operator made it; `None` where one policy directs all.
+    pub operator: Option<&'a str>,
+    pub called: &'a Called,
     pub outcome: Result<&'a ToolReply, &'a str>,
 }
 
@@ -209,6 +211,10 @@ pub struct ToolCallMessage {
     /// How long the policy has thought since the episode began, this call's own thinking included.
     pub thought_ns: u64,
     pub arguments: String,
+    /// The robot whose operator made the call; absent where one policy directs all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "String")]
+    pub operator: Option<String>,
     pub ok: bool,
     /// The reply without pictures, or the text of the problem.
     pub reply: String,
@@ -224,9 +230,10 @@ impl ToolCallMessage {
             Ok(reply) => (true, without_pictures(reply)?.to_string()),
             Err(problem) => (false, problem.to_string()),
         };
-        let arguments = serde_json::to_string(record.call)?;
+        let arguments = record.called.arguments()?;
         let thought_ns = u64::try_from(record.thought.as_nanos()).unwrap_or(u64::MAX);
-        Ok(Json(ToolCallMessage { tool: record.call.name().into(), thought_ns, arguments, ok, reply }))
+        let (tool, operator) = (record.called.name().into(), record.operator.map(str::to_owned));
+        Ok(Json(ToolCallMessage { tool, thought_ns, arguments, operator, ok, reply }))
     }
 }
 

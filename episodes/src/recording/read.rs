@@ -39,6 +39,8 @@ pub struct RecordedCall {
     pub thought: Duration,
     pub tool: String,
     pub arguments: Value,
+    /// The robot whose operator made it; `None` where one policy directed all.
+    pub operator: Option<String>,
     /// The reply as JSON, without pictures; or the text of the problem.
     pub outcome: Result<String, String>,
 }
@@ -144,11 +146,11 @@ impl Recording {
     /// The tool calls of the episode, in their order.
     pub fn tool_calls(&self) -> Result<Vec<RecordedCall>, RecordingError> {
         let call = |message: Result<(f64, ToolCallMessage), RecordingError>| {
-            let (time_s, ToolCallMessage { tool, thought_ns, arguments, ok, reply }) = message?;
+            let (time_s, ToolCallMessage { tool, thought_ns, arguments, operator, ok, reply }) = message?;
             let arguments = serde_json::from_str(&arguments).map_err(|source| self.json(source))?;
             let (thought, outcome) =
                 (Duration::from_nanos(thought_ns), if ok { Ok(reply) } else { Err(reply) });
-            Ok(RecordedCall { time_s, thought, tool, arguments, outcome })
+            Ok(RecordedCall { time_s, thought, tool, arguments, operator, outcome })
         };
         self.messages(topics::TOOL_CALLS)?.map(call).collect()
     }

@@ -97,16 +97,23 @@ fn record(folder: &Path) -> (World, PathBuf) {
         .tool_call(&ToolCallRecord {
             time_s,
             thought: THOUGHT,
-            call: &wait,
+            operator: None,
+            called: &wait.into(),
             outcome: Err("no steps are left"),
         })
         .unwrap();
     let observe = ToolCall::parse("observe", serde_json::json!({ "robots": ["A"] })).unwrap();
     let image = CameraImage { robot: "A".into(), png_base64: Png(PICTURE.into()) };
-    let seen = Observation { time_s, states: vec![], cameras: vec![], images: vec![image] };
+    let seen = Observation { time_s, states: vec![], cameras: vec![], images: vec![image], arrays: vec![] };
     let reply = ToolReply::Look(LookReply::Observe(seen));
     recorder
-        .tool_call(&ToolCallRecord { time_s, thought: THOUGHT, call: &observe, outcome: Ok(&reply) })
+        .tool_call(&ToolCallRecord {
+            time_s,
+            thought: THOUGHT,
+            operator: Some("A"),
+            called: &observe.into(),
+            outcome: Ok(&reply),
+        })
         .unwrap();
     let path = recorder.finish(&result()).unwrap();
     (world, path)
@@ -199,6 +206,7 @@ fn a_recording_reads_back() {
     assert!(calls.iter().all(|call| call.thought == THOUGHT));
     assert_eq!((calls[0].tool.as_str(), &calls[0].outcome), ("wait", &Err("no steps are left".into())));
     assert_eq!((calls[1].arguments["robots"][0].as_str(), calls[1].outcome.is_ok()), (Some("A"), true));
+    assert_eq!((&calls[0].operator, &calls[1].operator), (&None, &Some("A".into())));
     assert_eq!(recording.result.unwrap(), result());
 }
 

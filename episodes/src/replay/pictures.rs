@@ -8,10 +8,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
 use serde::{Deserialize, Serialize};
-use tandem_sim::render::{Camera, encode_png};
+use tandem_sim::render::{Camera, DEPTH_UNIT_M, PictureError, encode_depth_png, encode_png};
 use tandem_sim::{Pose, Step};
 
 use super::video::step_of_picture;
@@ -49,7 +47,7 @@ pub enum PicturesError {
     #[error("{} holds pictures of another recording, rate or size; give another folder", .0.display())]
     OtherPictures(PathBuf),
     #[error("a picture cannot be encoded: {0}")]
-    Picture(#[from] image::ImageError),
+    Picture(#[from] PictureError),
     #[error(transparent)]
     Output(#[from] OutputError),
     #[error(transparent)]
@@ -96,7 +94,6 @@ struct Placed {
 
 const MANIFEST: &str = "pictures.json";
 const POSES: &str = "poses.json";
-const DEPTH_UNIT_M: f64 = 0.001;
 
 /// Draws what `folder` does not hold yet, on several threads.
 pub fn draw_all(
@@ -247,17 +244,5 @@ fn draw(
     let camera = scene.camera(view, step, plan.size);
     let frame = scene.draw(step, &camera);
     write_whole(&files.rgb, &encode_png(frame.width, frame.height, &frame.rgb)?)?;
-    Ok(write_whole(&files.depth, &depth_png(frame.width, frame.height, &frame.depth_m)?)?)
-}
-
-fn depth_png(width: u32, height: u32, depth_m: &[f32]) -> Result<Vec<u8>, image::ImageError> {
-    let units = |depth_m: &f32| {
-        let units = (f64::from(*depth_m) / DEPTH_UNIT_M).round();
-        if units <= f64::from(u16::MAX) { units as u16 } else { 0 }
-    };
-    let samples: Vec<u8> = depth_m.iter().map(units).flat_map(u16::to_ne_bytes).collect();
-    let mut bytes = Vec::with_capacity(samples.len() / 4);
-    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive);
-    encoder.write_image(&samples, width, height, ExtendedColorType::L16)?;
-    Ok(bytes)
+    Ok(write_whole(&files.depth, &encode_depth_png(frame.width, frame.height, &frame.depth_m)?)?)
 }

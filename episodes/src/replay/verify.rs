@@ -1,9 +1,10 @@
 //! Simulates a recorded episode again, and compares the state after every step.
 
-use tandem_tools_spec::{ResultReply, ToolCall};
+use tandem_tools_spec::ResultReply;
 
 use super::ReplayError;
 use crate::EpisodeError;
+use crate::commands::Called;
 use crate::fingerprint;
 use crate::recording::{BEGIN, RecordedCall, Recording};
 use crate::session::Replay;
@@ -59,9 +60,9 @@ pub fn verify(recording: &Recording) -> Result<Verified, ReplayError> {
             break;
         }
         let again = |source| ReplayError::Call { number: index + 1, source };
-        let parsed = ToolCall::parse(&call.tool, call.arguments.clone()).map_err(again)?;
+        let parsed = Called::parse(&call.tool, call.arguments.clone()).map_err(again)?;
         // A call that was refused is refused again, and what it says is not compared.
-        let _ = replay.call(parsed, call.thought);
+        let _ = replay.call(&parsed, call.thought);
         difference = compared.compare(replay.take_hashes()).map(|found| (Some((index, call)), found));
     }
     let outcome = match (difference, &recording.result) {

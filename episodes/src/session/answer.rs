@@ -2,36 +2,43 @@
 
 use tandem_sim::Pose;
 use tandem_tools_spec::{
-    ActCall, CommandReply, EndReason, LookCall, LookReply, ManageCall, ManageReply, RobotReport, StopReason,
-    ToolCall, ToolReply,
+    CommandReply, EndReason, Formats, Look, LookCall, LookReply, ManageCall, ManageReply, Observation,
+    Observe, RobotReport, StopReason, ToolCall, ToolReply,
 };
 
-use super::Session;
 use super::replies::{self, Detail};
+use super::{Session, arrays};
 use crate::EpisodeError;
-use crate::commands::{self, Command, check_reach, report};
+use crate::commands::{self, Called, Command, check_reach, report};
 
 impl Session {
-    pub(super) fn answer(&mut self, call: &ToolCall) -> Result<ToolReply, EpisodeError> {
-        match (call, self.ended) {
-            (ToolCall::Manage(call), _) => Ok(ToolReply::Manage(self.manage(call))),
-            (ToolCall::Look(call), _) => self.look(call).map(ToolReply::Look),
-            (ToolCall::Act(_), Some(reason)) => Err(EpisodeError::Ended { reason }),
-            (ToolCall::Act(call), None) => self.act(call).map(ToolReply::Act),
+    pub(super) fn answer(&mut self, called: &Called) -> Result<ToolReply, EpisodeError> {
+        match (called, self.ended) {
+            (Called::Tool(ToolCall::Manage(call)), _) => Ok(ToolReply::Manage(self.manage(call))),
+            (Called::Tool(ToolCall::Look(call)), _) => self.look(call).map(ToolReply::Look),
+            (Called::Look(look), _) => {
+                self.observe(&look.observe, &look.formats).map(LookReply::Observe).map(ToolReply::Look)
+            }
+            (Called::Tool(ToolCall::Act(_)) | Called::Together(_) | Called::Say(_), Some(reason)) => {
+                Err(EpisodeError::Ended { reason })
+            }
+            (Called::Tool(ToolCall::Act(call)), None) => {
+                let command = Command::read(call, &self.rules, &self.motions)?;
+                self.act(command).map(ToolReply::Act)
+            }
+            (Called::Together(commands), None) => {
+                let parts = commands.iter().map(|command| command.read(&self.rules, &self.motions));
+                let command = Command::together(parts.collect::<Result<_, _>>()?, self.motions.len());
+                self.act(command).map(ToolReply::Act)
+            }
+            (Called::Say(_), None) => Ok(ToolReply::Manage(ManageReply::GetStatus(self.status()))),
         }
     }
 
     fn look(&mut self, call: &LookCall) -> Result<LookReply, EpisodeError> {
         let find = |name: &String| commands::find(name, &self.motions);
         match call {
-            LookCall::Observe(args) => {
-                let robots = match &args.robots {
-                    Some(names) => names.iter().map(find).collect::<Result<_, _>>()?,
-                    None => (0..self.motions.len()).collect::<Vec<_>>(),
-                };
-                let detail = Detail::of(args);
-                self.eyes.observe(&self.present, &robots, &self.motions, detail).map(LookReply::Observe)
-            }
+            LookCall::Observe(args) => self.observe(args, &Formats::default()).map(LookReply::Observe),
             LookCall::GetRobotState(args) => {
                 let robot = find(&args.robot)?;
                 let sheet = &self.motions[robot].robot;
@@ -49,6 +56,24 @@ impl Session {
         }
     }
 
+    fn observe(&mut self, args: &Observe, formats: &Formats) -> Result<Observation, EpisodeError> {
+        let robots = self.looked_through(args, formats)?;
+        self.eyes.observe(&self.present, &robots, &self.motions, Detail::of(args), formats)
+    }
+
+    /// Whether an observation can be made as asked.
+    pub fn check_look(&self, look: &Look) -> Result<(), EpisodeError> {
+        self.looked_through(&look.observe, &look.formats).map(drop)
+    }
+
+    fn looked_through(&self, args: &Observe, formats: &Formats) -> Result<Vec<usize>, EpisodeError> {
+        arrays::allowed(formats, self.spec().protocol)?;
+        match &args.robots {
+            Some(names) => names.iter().map(|name| commands::find(name, &self.motions)).collect(),
+            None => Ok((0..self.motions.len()).collect()),
+        }
+    }
+
     fn manage(&mut self, call: &ManageCall) -> ManageReply {
         match call {
             ManageCall::GetStatus(_) => ManageReply::GetStatus(self.status()),
@@ -59,9 +84,8 @@ impl Session {
         }
     }
 
-    /// Checks a command as a whole, then executes it.
-    fn act(&mut self, call: &ActCall) -> Result<CommandReply, EpisodeError> {
-        let command = Command::read(call, &self.rules, &self.motions)?;
+    /// Executes a command that has been checked as a whole.
+    fn act(&mut self, command: Command) -> Result<CommandReply, EpisodeError> {
         let cuts = command.cuts();
         let began: Vec<Pose> =
             self.present.robots.iter().map(|robot| robot.state.start_from_pelvis).collect();

@@ -2,8 +2,9 @@
 
 use tandem_sim::render::{Camera, Cameras, Frame, Renderer, RendererKind, Scenery, encode_png};
 use tandem_sim::{Step, World};
-use tandem_tools_spec::{CameraImage, DepthPoint, DepthReply, Observation, Png};
+use tandem_tools_spec::{CameraImage, DepthPoint, DepthReply, Formats, Observation, Png};
 
+use super::arrays::arrays;
 use super::replies::{Detail, calibration, robot_state};
 use crate::EpisodeError;
 use crate::commands::Motion;
@@ -30,26 +31,29 @@ impl Eyes {
         self.renderer.render(step, camera)
     }
 
-    /// The reply to `observe` for the robots numbered `robots`, all of which `motions` move.
+    /// The reply to `observe` for the robots numbered `robots`, all of which `motions` move; with PNGs in any case, for the recording.
     pub fn observe(
         &mut self,
         step: &Step,
         robots: &[usize],
         motions: &[Motion],
         detail: Detail,
+        formats: &Formats,
     ) -> Result<Observation, EpisodeError> {
         let mut images = Vec::with_capacity(robots.len());
         let mut cameras = Vec::with_capacity(robots.len());
+        let mut raw = Vec::new();
         for &robot in robots {
             let name = &motions[robot].robot.name;
             let camera = self.cameras.egocentric(step, robot);
             let frame = self.render(step, &camera);
             let png = encode_png(frame.width, frame.height, &frame.rgb)?;
             images.push(CameraImage { robot: name.clone(), png_base64: Png(png) });
+            raw.extend(arrays(name, &frame, formats)?);
             cameras.push(calibration(step, robot, name, &camera));
         }
         let states = robots.iter().map(|robot| robot_state(step, *robot, &motions[*robot].robot, detail));
-        Ok(Observation { time_s: step.time_s, states: states.collect(), cameras, images })
+        Ok(Observation { time_s: step.time_s, states: states.collect(), cameras, images, arrays: raw })
     }
 
     /// The reply to `query_depth` for robot number `robot`, called `name`.

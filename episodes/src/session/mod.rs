@@ -1,6 +1,7 @@
 //! An episode: a world, its rules, and the tool calls that act on it. Synchronous; it lives on a thread of its own.
 
 mod answer;
+mod arrays;
 mod build;
 mod checkpoint;
 mod clock;
@@ -23,9 +24,9 @@ use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
 use tandem_sim::{RobotCommand, Side, Step, World};
-use tandem_tools_spec::{EndReason, ManageReply, ResultReply, ToolCall, ToolReply};
+use tandem_tools_spec::{EndReason, ImageFormat, LookReply, ManageReply, ResultReply, ToolCall, ToolReply};
 
-use crate::commands::{Command, Motion, Run};
+use crate::commands::{Called, Command, Motion, OperatorCommand, Run};
 use crate::convert::isometry_from_sim;
 use crate::protocol::{Rules, rules};
 use crate::recording::BEGIN;
@@ -143,15 +144,56 @@ impl Session {
     /// Answers a tool call. An error changes nothing but the count of calls. The call that ends the episode, and no later one,
     /// is counted and recorded, and closes the files.
     pub fn call(&mut self, call: ToolCall) -> Result<ToolReply, EpisodeError> {
+        self.make(None, &call.into())
+    }
+
+    /// As [`Session::call`], of whatever can be called, made by the operator of a robot or by the policy of all.
+    pub fn make(&mut self, operator: Option<&str>, called: &Called) -> Result<ToolReply, EpisodeError> {
+        let underway = self.arrived();
+        let answer = called.validate().map_err(EpisodeError::from).and_then(|()| self.answer(called));
+        let mut answer = self.answered(underway, operator, called, answer);
+        if let (Called::Look(look), Ok(ToolReply::Look(LookReply::Observe(seen)))) = (called, &mut answer)
+            && look.formats.images == Some(ImageFormat::Rgb)
+        {
+            // The recording has them.
+            seen.images.clear();
+        }
+        answer
+    }
+
+    /// Whether an operator's command could be executed as things stand. A refusal is counted and recorded as that of any call.
+    pub fn check(&mut self, command: &OperatorCommand) -> Result<(), EpisodeError> {
+        let read = match self.ended {
+            Some(reason) => Err(EpisodeError::Ended { reason }),
+            None => command.read(&self.rules, &self.motions).map(drop),
+        };
+        let Err(refusal) = read else { return Ok(()) };
+        let underway = self.arrived();
+        let called = Called::Together(vec![command.clone()]);
+        self.answered(underway, Some(&command.robot), &called, Err(refusal)).map(drop)
+    }
+
+    /// A call has arrived. Returns whether it is one of the episode's.
+    fn arrived(&mut self) -> bool {
         self.clock.pause();
         if self.ended.is_none() && self.clock.exhausted() {
             self.ended = Some(EndReason::WallClockExhausted);
         }
         let underway = self.result.is_none();
         self.tool_calls += u32::from(underway);
-        let mut answer = call.validate().map_err(EpisodeError::from).and_then(|()| self.answer(&call));
+        underway
+    }
+
+    /// A call has its answer: records it, and lets the policy think on, or closes the files if it has ended the episode.
+    fn answered(
+        &mut self,
+        underway: bool,
+        operator: Option<&str>,
+        called: &Called,
+        mut answer: Result<ToolReply, EpisodeError>,
+    ) -> Result<ToolReply, EpisodeError> {
         if let (true, Some(files)) = (underway, &mut self.files) {
-            files.tool_call(self.present.time_s, self.clock.spent(), &call, &answer);
+            files.tool_call(self.present.time_s, self.clock.spent(), operator, called, &answer);
         }
         if self.ended.is_some() {
             self.settle();
@@ -198,11 +240,12 @@ impl Session {
 
     /// Executes a command; fewer of its steps if the last phase is reached or the budget ends. Returns how many.
     fn run(&mut self, command: Command) -> Result<u32, EpisodeError> {
-        let steps = command.steps.min(self.steps_left());
-        let movements = command.orders.into_iter().map(|order| order.movement);
+        let left = self.steps_left();
+        let steps = command.steps.min(left);
+        let movements = command.orders.into_iter().map(|order| order.movement).zip(command.made_for);
         let mut runs: Vec<Run> = movements
             .zip(&mut self.motions)
-            .map(|(movement, motion)| Run::begin(movement, steps, motion))
+            .map(|((movement, made_for), motion)| Run::begin(movement, made_for.min(left), motion))
             .collect();
         for step in 1..=steps {
             self.step(&mut runs)?;

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
-use tandem_tools_spec::{ResultReply, ToolCall};
+use tandem_tools_spec::ResultReply;
 
 use super::{Checkpoint, Session};
 use crate::EpisodeError;
+use crate::commands::Called;
 use crate::protocol::rules;
 use crate::recording::RecordedCheckpoint;
 use crate::spec::{EpisodeSpec, Start};
@@ -45,10 +46,10 @@ impl Replay {
     }
 
     /// Makes a call that was made when the policy had thought for as long as `thought`.
-    pub fn call(&mut self, call: ToolCall, thought: Duration) -> Result<(), EpisodeError> {
+    pub fn call(&mut self, called: &Called, thought: Duration) -> Result<(), EpisodeError> {
         let passed = thought.saturating_sub(self.session.clock.spent());
         self.hands_ns.fetch_add(u64::try_from(passed.as_nanos()).unwrap_or(u64::MAX), Relaxed);
-        self.session.call(call).map(drop)
+        self.session.make(None, called).map(drop)
     }
 
     /// The hashes of the states since they were last taken, the first of all included.

@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use tandem_sim::{CONTROL_HZ, Step};
-use tandem_tools_spec::{Budget, PhaseReached, ResultReply, ToolCall, ToolReply};
+use tandem_tools_spec::{Budget, PhaseReached, ResultReply, ToolReply};
 
 use super::{Session, this_build};
 use crate::EpisodeError;
+use crate::commands::Called;
 use crate::output::{OutputError, create_private_folder, write_whole};
 use crate::recording::{Recorder, RecordingHeader, ToolCallRecord, Visibility};
 use crate::reports::{self, CallCounts, EpisodePage, Moment};
@@ -97,16 +98,18 @@ impl RunFiles {
         &mut self,
         time_s: f64,
         thought: Duration,
-        call: &ToolCall,
+        operator: Option<&str>,
+        called: &Called,
         answer: &Result<ToolReply, EpisodeError>,
     ) {
-        self.calls.count(call.name(), answer.is_ok());
+        self.calls.count(called.name(), answer.is_ok());
         let problem = answer.as_ref().err().map(|error| error.to_string());
         let outcome = match (answer, &problem) {
             (Ok(reply), _) => Ok(reply),
             (Err(_), text) => Err(text.as_deref().unwrap_or_default()),
         };
-        self.record(|recorder| recorder.tool_call(&ToolCallRecord { time_s, thought, call, outcome }));
+        let record = ToolCallRecord { time_s, thought, operator, called, outcome };
+        self.record(|recorder| recorder.tool_call(&record));
     }
 
     /// Hands everything recorded to the system: what a policy is told from here on is on the disk.

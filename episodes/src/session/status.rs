@@ -15,7 +15,8 @@ impl Session {
         self.rules.episode_steps.saturating_sub(self.env_steps())
     }
 
-    fn env_steps(&self) -> u32 {
+    /// Control steps executed so far, the initial hold included.
+    pub fn env_steps(&self) -> u32 {
         self.present.control_step.saturating_sub(self.steps_before) as u32
     }
 

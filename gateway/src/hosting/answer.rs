@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use tandem_episodes::Session;
-use tandem_tools_spec::{ManageReply, ToolReply};
+use tandem_tools_spec::{Heard, ManageReply, Observation, Partner, ToolReply};
 
 /// A tool's reply, and what has to be said with every reply.
 #[derive(Debug, Serialize)]
@@ -10,9 +10,23 @@ pub struct Answer {
     /// The reply.
     #[serde(flatten)]
     pub reply: ToolReply,
+    /// Control steps executed so far, the initial hold included: what a caller may expect the episode to stand at.
+    pub step: u32,
+    /// What was seen after a command that asked for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub observation: Option<Observation>,
+    /// What the robots of the other operators did meanwhile.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub partners: Vec<Partner>,
+    /// What the other operators have said.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub heard: Vec<Heard>,
     /// Why the recording is not complete; left out where it is, and where the reply itself says it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recording_failed: Option<String>,
+    /// Whether the operator has left an episode that others still play: its end is not known yet.
+    #[serde(skip)]
+    pub others_play_on: bool,
 }
 
 impl Answer {
@@ -20,6 +34,14 @@ impl Answer {
     pub fn new(reply: ToolReply, session: &Session) -> Answer {
         let says_it = matches!(reply, ToolReply::Manage(ManageReply::Finish(_)));
         let failed = session.recording_failed().filter(|_| !says_it);
-        Answer { reply, recording_failed: failed.map(str::to_owned) }
+        Answer {
+            reply,
+            step: session.env_steps(),
+            observation: None,
+            partners: Vec::new(),
+            heard: Vec::new(),
+            recording_failed: failed.map(str::to_owned),
+            others_play_on: false,
+        }
     }
 }

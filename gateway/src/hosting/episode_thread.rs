@@ -10,11 +10,19 @@ use std::{
     time::Duration,
 };
 
-use tandem_episodes::{Clock, EpisodeError, EpisodeSpec, Facts, RunFolder, Session, monotonic};
-use tandem_tools_spec::{Briefing, ManageReply, ResultReply, ToolCall, ToolReply};
+use tandem_episodes::{
+    Called, Clock, EpisodeError, EpisodeSpec, Facts, OperatorCommand, RunFolder, Session, monotonic,
+};
+use tandem_tools_spec::{
+    Asked, Briefing, Look, LookCall, ManageReply, ResultReply, Say, ToolCall, ToolReply,
+};
 use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 
-use super::{Answer, HostingError, guarded::Guarded};
+use super::{
+    Answer, HostingError,
+    guarded::Guarded,
+    work::{self, Made},
+};
 
 /// Calls that may wait for one episode. A policy has no use for more than one at a time; a few more are a burst.
 const WAITING_CALLS: usize = 16;
@@ -23,11 +31,36 @@ const WAITING_CALLS: usize = 16;
 const STACK_BYTES: usize = 8 << 20;
 
 enum Command {
-    Call { call: ToolCall, reply: oneshot::Sender<Result<Answer, HostingError>> },
-    Status { reply: oneshot::Sender<Result<Answer, HostingError>> },
-    Facts { reply: oneshot::Sender<Result<Facts, HostingError>> },
-    EndIfAbandoned { idle: Duration },
-    Close { reply: oneshot::Sender<Closing> },
+    Make {
+        made: Box<Made>,
+        reply: oneshot::Sender<Result<Answer, HostingError>>,
+    },
+    Check(Box<Check>),
+    Together {
+        commands: Vec<OperatorCommand>,
+        looks: Vec<Option<Look>>,
+        reply: oneshot::Sender<Result<Vec<Answer>, HostingError>>,
+    },
+    Status {
+        reply: oneshot::Sender<Result<Answer, HostingError>>,
+    },
+    Facts {
+        reply: oneshot::Sender<Result<Facts, HostingError>>,
+    },
+    EndIfAbandoned {
+        idle: Duration,
+    },
+    Close {
+        reply: oneshot::Sender<Closing>,
+    },
+}
+
+/// Asks whether an operator's command could be executed.
+struct Check {
+    command: OperatorCommand,
+    expected_step: Option<u32>,
+    then: Option<Look>,
+    reply: oneshot::Sender<Result<(), HostingError>>,
 }
 
 /// A running episode. Dropping the last handle ends the episode and closes its recording.
@@ -106,8 +139,53 @@ impl EpisodeThread {
 
     /// Runs a call and returns its reply.
     pub async fn call(&self, call: ToolCall) -> Result<Answer, HostingError> {
+        self.ask(None, call.into()).await
+    }
+
+    /// As [`EpisodeThread::call`], with what programs ask for besides, and for the operator of a robot where each has one.
+    pub async fn ask(&self, operator: Option<&str>, asked: Asked) -> Result<Answer, HostingError> {
+        let Asked { call, formats, expected_step, then } = asked;
+        let called = match call {
+            ToolCall::Look(LookCall::Observe(observe)) => Called::look(Look { observe, formats }),
+            call => Called::Tool(call),
+        };
+        self.make(Made { operator: operator.map(str::to_owned), called, expected_step, then }).await
+    }
+
+    /// Records what the operator of `robot` says.
+    pub async fn say(&self, robot: &str, say: Say) -> Result<Answer, HostingError> {
+        let called = Called::Say(say);
+        self.make(Made { operator: Some(robot.into()), called, expected_step: None, then: None }).await
+    }
+
+    async fn make(&self, made: Made) -> Result<Answer, HostingError> {
         let (reply, answer) = oneshot::channel();
-        self.send(Command::Call { call, reply })?;
+        self.send(Command::Make { made: made.into(), reply })?;
+        answer.await.map_err(|_| HostingError::EpisodeStopped)?
+    }
+
+    /// Whether an operator's command could be executed now, and what it wants to see then could be seen.
+    pub async fn check(
+        &self,
+        command: OperatorCommand,
+        expected_step: Option<u32>,
+        then: Option<Look>,
+    ) -> Result<(), HostingError> {
+        let (reply, answer) = oneshot::channel();
+        self.send(Command::Check(Check { command, expected_step, then, reply }.into()))?;
+        answer.await.map_err(|_| HostingError::EpisodeStopped)?
+    }
+
+    /// Executes commands of several operators side by side. Returns an answer for each, with what each looks at then.
+    pub async fn together(
+        &self,
+        commands: Vec<OperatorCommand>,
+        looks: Vec<Option<Look>>,
+    ) -> Result<Vec<Answer>, HostingError> {
+        let (reply, answer) = oneshot::channel();
+        // Callers wait for it already, so it waits for its turn.
+        let together = Command::Together { commands, looks, reply };
+        self.commands.send(together).await.map_err(|_| HostingError::EpisodeStopped)?;
         answer.await.map_err(|_| HostingError::EpisodeStopped)?
     }
 
@@ -198,13 +276,22 @@ fn serve(mut session: Guarded, mut inbox: mpsc::Receiver<Command>, news: &News) 
     while let Some(command) = inbox.blocking_recv() {
         // A reply that cannot be sent means that the caller has gone. What was done stays done.
         match command {
-            Command::Call { call, reply } => {
-                let answer = session.run(|session| {
-                    let answered = session.call(call)?;
-                    Ok(Answer::new(answered, session))
-                });
+            Command::Make { made, reply } => {
+                let answer = session.run(|session| work::make(session, &made));
                 news.spread(&session);
                 let _ = reply.send(answer.and_then(|answer| answer));
+            }
+            Command::Check(check) => {
+                let Check { command, expected_step, then, reply } = *check;
+                let checked =
+                    session.run(|session| work::check(session, &command, expected_step, then.as_ref()));
+                news.spread(&session);
+                let _ = reply.send(checked.and_then(|checked| checked));
+            }
+            Command::Together { commands, looks, reply } => {
+                let answers = session.run(|session| work::together(session, commands, &looks));
+                news.spread(&session);
+                let _ = reply.send(answers.and_then(|answers| answers));
             }
             Command::Status { reply } => drop(reply.send(session.run(|session| status(session)))),
             Command::Facts { reply } => drop(reply.send(session.run(|session| session.facts()))),

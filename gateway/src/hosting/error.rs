@@ -1,8 +1,10 @@
 //! Why the host of episodes refuses.
 
-use std::{io, path::PathBuf};
+use std::{io, path::PathBuf, sync::Arc};
 
 use tandem_episodes::EpisodeError;
+
+use crate::token::TokenError;
 
 /// Refusals of the host, and those of the episode that it passes on.
 #[derive(Debug, thiserror::Error)]
@@ -47,7 +49,105 @@ pub enum HostingError {
         /// What the system said.
         source: io::Error,
     },
+    /// The episode has moved on since the caller looked.
+    #[error(
+        "the episode stands at step {now} and not at {expected}; look again, then command with expected_step {now}"
+    )]
+    OtherStep {
+        /// Where the caller had it.
+        expected: u32,
+        /// Where it is.
+        now: u32,
+    },
+    /// The operator has commanded already.
+    #[error(
+        "robot {robot:?} has its command for this step already; its reply comes when {}",
+        waiting_text(.waits_for)
+    )]
+    DoubleCommand {
+        /// The operator's robot.
+        robot: String,
+        /// The robots whose operators have not commanded yet.
+        waits_for: Vec<String>,
+    },
+    /// The operator has let the others' patience run out, and does not know it yet.
+    #[error(
+        "robot {robot:?} was held still from step {from_step} to {to_step}, because the others' patience ran out before a command came; look again, then command"
+    )]
+    LateCommand {
+        /// The operator's robot.
+        robot: String,
+        /// Where it was held first.
+        from_step: u32,
+        /// Where it was held last, which is now.
+        to_step: u32,
+    },
+    /// The operator has called finish.
+    #[error(
+        "robot {robot:?} has finished and holds still until the others have, too; observe and get_status still answer"
+    )]
+    OperatorFinished {
+        /// The operator's robot.
+        robot: String,
+    },
+    /// A call on an episode whose robots have operators, by none of them.
+    #[error(
+        "each robot of this episode is driven by its own operator; send its token, which the start of the episode returned, as Authorization: Bearer TOKEN"
+    )]
+    NeedsOperator,
+    /// A request of an operator that concerns more than its robot.
+    #[error(
+        "an operator looks through its robot and commands it; this request is for who started the episode"
+    )]
+    HostsBusiness,
+    /// Nobody may talk here.
+    #[error(
+        "nobody hears you: operators talk in an episode that was started with operators \"per_robot\" and talk true"
+    )]
+    NoTalk,
+    /// Somebody has not heard what was said before.
+    #[error(
+        "robot {robot:?} has {unheard} messages that its operator has not heard yet; say more after its next call"
+    )]
+    TooMuchSaid {
+        /// The robot of who does not listen.
+        robot: String,
+        /// How many wait.
+        unheard: usize,
+    },
+    /// The key of a request that was another one.
+    #[error(
+        "this Idempotency-Key came with another request before; a key stands for one request, so take a new one for each"
+    )]
+    KeyUsed,
+    /// No token for an operator.
+    #[error(transparent)]
+    Token(#[from] TokenError),
+    /// A refusal of several callers at once.
+    #[error(transparent)]
+    Shared(Arc<HostingError>),
     /// The system gives no thread for the world.
     #[error("no thread for an episode: {0}")]
     Thread(#[source] io::Error),
+}
+
+impl HostingError {
+    /// Whether the same request may be answered later.
+    pub fn may_work_later(&self) -> bool {
+        match self {
+            HostingError::TooManyEpisodes { .. }
+            | HostingError::TooManyWaiting { .. }
+            | HostingError::ShuttingDown
+            | HostingError::TooMuchSaid { .. } => true,
+            HostingError::Shared(error) => error.may_work_later(),
+            _ => false,
+        }
+    }
+}
+
+fn waiting_text(waits_for: &[String]) -> String {
+    match waits_for {
+        [] => "the step is made".into(),
+        robots => format!("{} commands, too, or the patience ends", robots.join(" and ")),
+    }
 }

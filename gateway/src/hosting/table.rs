@@ -7,14 +7,19 @@ use std::{
 };
 
 use tandem_episodes::{EpisodeSpec, RunFolder, tasks};
-use tandem_tools_spec::{Protocol, ResultReply, StartEpisode, StartReply, TaskList};
+use tandem_tools_spec::{Driving, Protocol, ResultReply, StartEpisode, StartReply, TaskList};
 use tokio::{
     sync::{OwnedSemaphorePermit, Semaphore},
     task::JoinSet,
     time::{Instant, timeout_at},
 };
 
-use super::{EpisodeThread, HostingError, run_folder};
+use super::{
+    Caller, EpisodeThread, Hosted, HostingError,
+    kept::{Kept, Once},
+    run_folder,
+    team::Team,
+};
 use crate::settings::Settings;
 
 /// The episodes of one server.
@@ -23,11 +28,15 @@ pub struct EpisodeTable {
     held: Mutex<Held>,
     places: Arc<Semaphore>,
     settings: Arc<Settings>,
+    starts: Kept<(StartEpisode, Driving), Started>,
 }
+
+/// What came of a start, for as many as want to know.
+type Started = Result<StartReply, Arc<HostingError>>;
 
 #[derive(Debug, Default)]
 struct Held {
-    episodes: BTreeMap<String, Arc<EpisodeThread>>,
+    episodes: BTreeMap<String, Hosted>,
     /// From here on nothing is added.
     closing: bool,
 }
@@ -39,11 +48,35 @@ impl EpisodeTable {
             held: Mutex::default(),
             places: Arc::new(Semaphore::new(settings.max_episodes as usize)),
             settings,
+            starts: Kept::default(),
         }
     }
 
-    /// Starts an episode. Where every place is taken, an episode that has ended makes room.
+    /// As [`EpisodeTable::start_driven`], once for a key.
+    pub async fn start_once(
+        self: &Arc<Self>,
+        args: StartEpisode,
+        driving: Driving,
+        key: &str,
+    ) -> Result<Once<StartReply>, HostingError> {
+        let (table, request) = (self.clone(), (args.clone(), driving));
+        let work = async move { table.start_driven(args, driving).await.map_err(Arc::new) };
+        let lasting = |made: &Started| made.as_ref().map_or_else(|error| !error.may_work_later(), |_| true);
+        let Once { reply, again } = self.starts.once(key, request, work, lasting).await?;
+        Ok(Once { reply: reply.map_err(HostingError::Shared)?, again })
+    }
+
+    /// Starts an episode in which one policy directs all robots.
     pub async fn start(&self, args: StartEpisode) -> Result<StartReply, HostingError> {
+        self.start_driven(args, Driving::default()).await
+    }
+
+    /// Starts an episode. Where every place is taken, an episode that has ended makes room.
+    pub async fn start_driven(
+        &self,
+        args: StartEpisode,
+        driving: Driving,
+    ) -> Result<StartReply, HostingError> {
         let protocol = args.protocol.unwrap_or(Protocol::Agentic);
         let spec = EpisodeSpec {
             locomotion: self.settings.locomotion.clone(),
@@ -52,6 +85,12 @@ impl EpisodeTable {
             hints: self.settings.hints,
             ..EpisodeSpec::new(tasks::find(&args.task)?, args.seed, protocol)
         };
+        let (team, operators) = match driving.is_per_robot() {
+            true => {
+                Team::new(spec.task.robot_names(), &driving).map(|(team, tokens)| (Some(team), tokens))?
+            }
+            false => (None, Vec::new()),
+        };
         let place = self.take_place().await?;
         let runs = &self.settings.runs;
         let (id, path) = run_folder::create(runs, spec.task.id, spec.seed)
@@ -59,12 +98,12 @@ impl EpisodeTable {
         let folder = RunFolder { path, visibility: self.settings.record };
         let (episode, mut briefing) = EpisodeThread::start(&id, spec, folder, place).await?;
         self.settings.instructions.rephrase_briefing(&mut briefing);
-        if let Err(late) = self.insert(&id, Arc::new(episode)) {
-            late.close().await?;
+        if let Err(late) = self.hold(Hosted::new(&id, Arc::new(episode), team)) {
+            late.thread.close().await?;
             return Err(HostingError::ShuttingDown);
         }
         tracing::info!(episode = id, "started");
-        Ok(StartReply { episode_id: id, briefing })
+        Ok(StartReply { episode_id: id, operators, briefing })
     }
 
     /// The reply to `list_tasks`.
@@ -72,15 +111,29 @@ impl EpisodeTable {
         self.settings.instructions.task_list(&self.settings.base_limits)
     }
 
-    /// The episode `id`.
+    /// The thread of the episode `id`.
     pub fn get(&self, id: &str) -> Result<Arc<EpisodeThread>, HostingError> {
+        self.hosted(id).map(|hosted| hosted.thread)
+    }
+
+    /// The episode `id`.
+    pub fn hosted(&self, id: &str) -> Result<Hosted, HostingError> {
         self.lock().episodes.get(id).cloned().ok_or_else(|| unknown(id))
+    }
+
+    /// The operator whose token `text` is. Every token of every episode is compared.
+    pub fn operator(&self, text: &str) -> Option<Caller> {
+        let held = self.lock();
+        held.episodes.iter().fold(None, |found, (id, hosted)| {
+            let robot = hosted.team.as_ref().and_then(|team| team.robot_of(text));
+            robot.map(|robot| Caller::Operator { episode: id.clone(), robot: robot.into() }).or(found)
+        })
     }
 
     /// Ends the episode `id`, forgets it and returns its result.
     pub async fn remove(&self, id: &str) -> Result<ResultReply, HostingError> {
         let episode = self.lock().episodes.remove(id).ok_or_else(|| unknown(id))?;
-        let result = episode.close().await?;
+        let result = episode.thread.close().await?;
         tracing::info!(episode = id, "closed");
         Ok(result.told(self.settings.disclosure))
     }
@@ -97,8 +150,8 @@ impl EpisodeTable {
 
     /// Ends the episodes that nobody plays any more. To be called every now and then.
     pub fn end_abandoned(&self) {
-        for episode in self.lock().episodes.values().filter(|episode| !episode.ended()) {
-            episode.end_if_abandoned(self.settings.idle_timeout);
+        for episode in self.lock().episodes.values().filter(|episode| !episode.thread.ended()) {
+            episode.thread.end_if_abandoned(self.settings.idle_timeout);
         }
     }
 
@@ -112,7 +165,7 @@ impl EpisodeTable {
             std::mem::take(&mut held.episodes)
         };
         let mut closings = JoinSet::new();
-        for (id, episode) in episodes {
+        for (id, Hosted { thread: episode, .. }) in episodes {
             closings.spawn(async move {
                 match timeout_at(deadline, episode.close()).await {
                     Ok(Ok(_)) => tracing::info!(episode = id, "closed"),
@@ -132,13 +185,18 @@ impl EpisodeTable {
         left
     }
 
-    /// Holds an episode, unless the table is closing: then it is given back.
+    /// Holds an episode that one policy directs, unless the table is closing: then it is given back.
+    #[cfg(test)]
     pub(crate) fn insert(&self, id: &str, episode: Arc<EpisodeThread>) -> Result<(), Arc<EpisodeThread>> {
+        self.hold(Hosted::new(id, episode, None)).map_err(|hosted| hosted.thread)
+    }
+
+    fn hold(&self, episode: Hosted) -> Result<(), Box<Hosted>> {
         let mut held = self.lock();
         if held.closing {
-            return Err(episode);
+            return Err(episode.into());
         }
-        held.episodes.insert(id.into(), episode);
+        held.episodes.insert(episode.id().into(), episode);
         Ok(())
     }
 
@@ -159,8 +217,9 @@ impl EpisodeTable {
 
     fn remove_one_that_has_ended(&self) -> Option<Arc<EpisodeThread>> {
         let episodes = &mut self.lock().episodes;
-        let id = episodes.iter().find(|(_, episode)| episode.ended()).map(|(id, _)| id.clone())?;
-        episodes.remove(&id)
+        let ended = episodes.iter().find(|(_, episode)| episode.thread.ended());
+        let id = ended.map(|(id, _)| id.clone())?;
+        episodes.remove(&id).map(|hosted| hosted.thread)
     }
 
     fn lock(&self) -> MutexGuard<'_, Held> {

@@ -13,7 +13,7 @@ use axum::{
 use http_body_util::BodyExt;
 use tokio::time::timeout;
 
-use super::problem::ApiError;
+use super::{encoding, problem::ApiError};
 use crate::settings::Settings;
 
 /// A body beyond the limit is read and thrown away up to this many times the limit, because a client that is still
@@ -103,15 +103,14 @@ async fn received(mut body: Body, limit_bytes: usize) -> Result<Bytes, ApiError>
     Ok(kept.into())
 }
 
-/// A body has to be called JSON. Where there is none, nothing has to be said about it.
+/// A body has to be called JSON or MessagePack. Where there is none, nothing has to be said about it.
 fn check_content_type(headers: &HeaderMap, body: &[u8]) -> Result<(), ApiError> {
     let text = match headers.get(header::CONTENT_TYPE) {
         None if body.is_empty() => return Ok(()),
         None => "",
         Some(value) => value.to_str().unwrap_or("no text"),
     };
-    let essence = text.split(';').next().unwrap_or_default().trim();
-    if essence.eq_ignore_ascii_case("application/json") {
+    if encoding::is_read(text) {
         return Ok(());
     }
     Err(ApiError::ContentType(text.into()))
@@ -174,7 +173,7 @@ mod tests {
             check_content_type(&headers, body).is_ok()
         };
         assert!(accepted(None, b"") && !accepted(None, b"{}"));
-        for text in ["application/json", "Application/JSON; charset=utf-8"] {
+        for text in ["application/json", "Application/JSON; charset=utf-8", "application/msgpack"] {
             assert!(accepted(Some(text), b"{}") && accepted(Some(text), b""), "{text}");
         }
         for text in ["application/x-www-form-urlencoded", "text/plain", "text/json", "application/jsonp", ""]

@@ -4,8 +4,7 @@
 use std::sync::Arc;
 
 use axum::{
-    Router, body,
-    extract::Request,
+    Router, body, extract,
     http::request::Parts,
     middleware::{self, Next},
     response::Response,
@@ -24,11 +23,12 @@ use rmcp::{
 use serde::Serialize;
 use serde_json::Value;
 use tandem_tools_spec::{
-    Hints, ListTasks, LookReply, SpecError, StartEpisode, Tool as _, ToolCall, ToolReply, ToolSpec,
-    parse_args, tool_specs,
+    Hints, ListTasks, LookReply, SpecError, StartEpisode, Tool as _, ToolReply, ToolSpec, parse_args,
+    parse_start, tool_specs,
 };
 
 use super::{app::App, problem::ApiError, request::unambiguous};
+use crate::hosting::{Answer, Caller, HostingError, Request};
 
 /// What a host tells its model about the server as a whole.
 const INSTRUCTIONS: &str = "Simulated humanoids that must work together. Call list_tasks, then start_episode, then look \
@@ -79,7 +79,10 @@ impl ServerHandler for McpServer {
         let args = Value::Object(request.arguments.unwrap_or_default());
         let called = match ambiguity(&context) {
             Some(Ambiguous(reason)) => Err(ApiError::MalformedJson(reason.clone())),
-            None => self.call(&request.name, args).await,
+            None => match caller(&context) {
+                Some(who) => self.call(&who, &request.name, args).await,
+                None => Err(ApiError::NoToken),
+            },
         };
         let result = match called {
             Ok(content) => CallToolResult::success(content),
@@ -91,48 +94,79 @@ impl ServerHandler for McpServer {
 }
 
 impl McpServer {
-    async fn call(&self, name: &str, args: Value) -> Result<Vec<ContentBlock>, ApiError> {
+    async fn call(&self, who: &Caller, name: &str, args: Value) -> Result<Vec<ContentBlock>, ApiError> {
         match name {
             ListTasks::NAME => {
                 parse_args::<ListTasks>(args)?;
                 json_block(&self.app.table.task_list())
             }
-            StartEpisode::NAME => json_block(&self.app.table.start(parse_args(args)?).await?),
-            _ => self.call_episode(name, args).await,
+            StartEpisode::NAME => {
+                if let Caller::Operator { .. } = who {
+                    return Err(HostingError::HostsBusiness.into());
+                }
+                let (args, driving) = parse_start(args)?;
+                json_block(&self.app.table.start_driven(args, driving).await?)
+            }
+            _ => self.call_episode(who, name, args).await,
         }
     }
 
-    async fn call_episode(&self, name: &str, mut args: Value) -> Result<Vec<ContentBlock>, ApiError> {
+    async fn call_episode(
+        &self,
+        who: &Caller,
+        name: &str,
+        mut args: Value,
+    ) -> Result<Vec<ContentBlock>, ApiError> {
         let handle = args.as_object_mut().and_then(|object| object.shift_remove("episode_id"));
-        let call = ToolCall::parse(name, args).map_err(|error| ApiError::from(with_every_tool(error)));
-        let Some(Value::String(id)) = handle else {
-            return Err(ApiError::NoEpisodeNamed { tool: call?.name() });
+        let request = Request::parse(name, args).map_err(|error| ApiError::from(with_every_tool(error)));
+        let id = match (handle, who) {
+            (Some(Value::String(id)), _) => id,
+            // An operator's token says which.
+            (None, Caller::Operator { episode, .. }) => episode.clone(),
+            _ => {
+                request?;
+                return Err(ApiError::NoEpisodeNamed { tool: name.into() });
+            }
         };
-        let episode = self.app.table.get(&id);
-        let call = match &episode {
-            Ok(episode) => call.map_err(|refusal| refusal.of(episode))?,
-            Err(_) => call?,
+        let episode = self.app.table.hosted(&id);
+        let request = match &episode {
+            Ok(episode) => request.map_err(|refusal| refusal.of(&episode.thread))?,
+            Err(_) => request?,
         };
         let episode = episode?;
-        let mut answer = episode.call(call).await.map_err(|error| ApiError::from(error).of(&episode))?;
-        match &mut answer.reply {
-            ToolReply::Look(LookReply::Observe(observation)) => {
-                let images = std::mem::take(&mut observation.images);
-                let mut content = json_block(&answer)?;
-                let robots: Vec<&str> = images.iter().map(|image| image.robot.as_str()).collect();
-                content.push(ContentBlock::text(format!(
-                    "{} images follow: {}",
-                    robots.len(),
-                    robots.join(", ")
-                )));
-                content.extend(
-                    images.iter().map(|image| ContentBlock::image(image.png_base64.to_base64(), "image/png")),
-                );
-                Ok(content)
-            }
-            _ => json_block(&answer),
-        }
+        let answered = episode.call(who, request, None).await;
+        content(&answered.map_err(|error| ApiError::from(error).of(&episode.thread))?.reply)
     }
+}
+
+/// An answer as blocks: its text without pictures, then the pictures.
+fn content(answer: &Answer) -> Result<Vec<ContentBlock>, ApiError> {
+    let mut text = serde_json::to_value(answer).map_err(|error| ApiError::Reply(error.into()))?;
+    let seen = match (&answer.reply, &answer.observation) {
+        (ToolReply::Look(LookReply::Observe(seen)), _) => seen,
+        (_, Some(seen)) => {
+            if let Value::Object(observation) = &mut text["observation"] {
+                observation.shift_remove("images");
+            }
+            seen
+        }
+        _ => return json_block(&text),
+    };
+    if let Value::Object(object) = &mut text {
+        object.shift_remove("images");
+    }
+    let mut content = json_block(&text)?;
+    let robots: Vec<&str> = seen.images.iter().map(|image| image.robot.as_str()).collect();
+    content.push(ContentBlock::text(format!("{} images follow: {}", robots.len(), robots.join(", "))));
+    content.extend(
+        seen.images.iter().map(|image| ContentBlock::image(image.png_base64.to_base64(), "image/png")),
+    );
+    Ok(content)
+}
+
+/// Who calls, as the gate has found out.
+fn caller(context: &RequestContext<RoleServer>) -> Option<Caller> {
+    context.extensions.get::<Parts>()?.extensions.get().cloned()
 }
 
 /// This route serves the tools that need no episode, too.
@@ -158,14 +192,14 @@ fn refused(error: &ApiError) -> Vec<ContentBlock> {
 struct Ambiguous(String);
 
 /// Notes on a request whether its body names a field twice, for when its call is answered.
-async fn note_ambiguity(request: Request, next: Next) -> Response {
+async fn note_ambiguity(request: extract::Request, next: Next) -> Response {
     let (mut parts, body) = request.into_parts();
     // The gate has received it, within its limit.
     let bytes = body::to_bytes(body, usize::MAX).await.unwrap_or_default();
     if let Err(reason) = unambiguous(&bytes) {
         parts.extensions.insert(Ambiguous(reason));
     }
-    next.run(Request::from_parts(parts, bytes.into())).await
+    next.run(extract::Request::from_parts(parts, bytes.into())).await
 }
 
 fn ambiguity(context: &RequestContext<RoleServer>) -> Option<&Ambiguous> {
@@ -173,7 +207,7 @@ fn ambiguity(context: &RequestContext<RoleServer>) -> Option<&Ambiguous> {
 }
 
 fn json_block(reply: &impl Serialize) -> Result<Vec<ContentBlock>, ApiError> {
-    let text = serde_json::to_string(reply).map_err(ApiError::Reply)?;
+    let text = serde_json::to_string(reply).map_err(|error| ApiError::Reply(error.into()))?;
     Ok(vec![ContentBlock::text(text)])
 }
 

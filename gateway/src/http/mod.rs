@@ -1,8 +1,11 @@
 //! Episodes over HTTP: REST under `/v1`, MCP at `/mcp`, and problem details for whatever is refused.
 
+mod access;
 mod app;
 mod connections;
+mod encoding;
 mod gate;
+mod key;
 mod mcp;
 mod problem;
 mod request;

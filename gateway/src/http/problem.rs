@@ -57,7 +57,7 @@ pub enum ApiError {
     #[error("{tool} needs episode_id, a text, as start_episode returned it")]
     NoEpisodeNamed {
         /// The tool that was called.
-        tool: &'static str,
+        tool: String,
     },
     /// The request is for another server.
     #[error(
@@ -70,6 +70,17 @@ pub enum ApiError {
     /// The body is no JSON.
     #[error("the body is no JSON: {0}; send one JSON object, with finite numbers only, as {{\"steps\": 25}}")]
     MalformedJson(String),
+    /// The body is no MessagePack.
+    #[error("the body is no MessagePack: {0}; send one map with names for keys and finite numbers only")]
+    MalformedMsgpack(String),
+    /// Nothing says who calls.
+    #[error("send the token as Authorization: Bearer TOKEN")]
+    NoToken,
+    /// A key that cannot be kept.
+    #[error(
+        "Idempotency-Key has to be 1 to 255 letters, digits and signs, as a UUID; a new one for each request"
+    )]
+    Key,
     /// The body is JSON, but no object.
     #[error(
         "the body is {0}; send one JSON object, as {{\"steps\": 25}}, or no body where there is nothing to say"
@@ -91,7 +102,9 @@ pub enum ApiError {
         limit_bytes: usize,
     },
     /// The body is said to be something else than JSON.
-    #[error("content-type {0:?} is not read; send JSON with content-type: application/json")]
+    #[error(
+        "content-type {0:?} is not read; send JSON with content-type: application/json, or MessagePack with application/msgpack"
+    )]
     ContentType(String),
     /// A request that axum refused before any handler saw it.
     #[error("{detail}")]
@@ -102,8 +115,8 @@ pub enum ApiError {
         detail: String,
     },
     /// A reply of ours that cannot be written.
-    #[error("a reply is no JSON: {0}")]
-    Reply(#[source] serde_json::Error),
+    #[error("a reply cannot be written: {0}")]
+    Reply(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
 
 /// What a caller over HTTP can do about a refusal whose text does not say so: the host does not know the routes.
@@ -118,7 +131,18 @@ fn way_out(error: &HostingError) -> &'static str {
         | HostingError::TooManyWaiting { .. }
         | HostingError::ShuttingDown
         | HostingError::Folder { .. }
+        | HostingError::OtherStep { .. }
+        | HostingError::DoubleCommand { .. }
+        | HostingError::LateCommand { .. }
+        | HostingError::OperatorFinished { .. }
+        | HostingError::NeedsOperator
+        | HostingError::HostsBusiness
+        | HostingError::NoTalk
+        | HostingError::TooMuchSaid { .. }
+        | HostingError::KeyUsed
+        | HostingError::Token(_)
         | HostingError::Thread(_) => "",
+        HostingError::Shared(error) => way_out(error),
     }
 }
 
@@ -148,6 +172,11 @@ impl ApiError {
             ApiError::NoObject(_) => ("no-object", "No JSON object", StatusCode::UNPROCESSABLE_ENTITY),
             ApiError::SlowBody { .. } => ("slow-body", "Body too slow", StatusCode::REQUEST_TIMEOUT),
             ApiError::MalformedJson(_) => ("malformed-json", "Malformed JSON", StatusCode::BAD_REQUEST),
+            ApiError::MalformedMsgpack(_) => {
+                ("malformed-msgpack", "Malformed MessagePack", StatusCode::BAD_REQUEST)
+            }
+            ApiError::NoToken => ("no-token", "No token", StatusCode::UNAUTHORIZED),
+            ApiError::Key => ("invalid-key", "Invalid key", StatusCode::BAD_REQUEST),
             ApiError::BrokenBody(_) => ("broken-body", "Body not received", StatusCode::BAD_REQUEST),
             ApiError::BodyTooLarge { .. } => {
                 ("body-too-large", "Body too large", StatusCode::PAYLOAD_TOO_LARGE)
@@ -202,11 +231,19 @@ impl ApiError {
     fn retry_after_s(&self) -> Option<u16> {
         match self {
             ApiError::Unrecorded { error, .. } => error.retry_after_s(),
-            ApiError::Hosting(HostingError::TooManyWaiting { .. }) => Some(1),
-            ApiError::Hosting(HostingError::TooManyEpisodes { .. }) => Some(10),
-            ApiError::Hosting(HostingError::ShuttingDown) => Some(60),
+            ApiError::Hosting(error) => hosting_retry_s(error),
             _ => None,
         }
+    }
+}
+
+fn hosting_retry_s(error: &HostingError) -> Option<u16> {
+    match error {
+        HostingError::TooManyWaiting { .. } | HostingError::TooMuchSaid { .. } => Some(1),
+        HostingError::TooManyEpisodes { .. } => Some(10),
+        HostingError::ShuttingDown => Some(60),
+        HostingError::Shared(error) => hosting_retry_s(error),
+        _ => None,
     }
 }
 
@@ -220,6 +257,9 @@ impl IntoResponse for ApiError {
         let headers = response.headers_mut();
         if let Some(seconds) = self.retry_after_s() {
             headers.insert(header::RETRY_AFTER, seconds.into());
+        }
+        if status == StatusCode::UNAUTHORIZED {
+            headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
         }
         if status == StatusCode::REQUEST_TIMEOUT {
             headers.insert(header::CONNECTION, HeaderValue::from_static("close"));
@@ -243,7 +283,19 @@ fn hosting_kind(error: &HostingError) -> Kind {
         HostingError::EpisodePanicked => {
             ("episode-failed", "The simulator failed", StatusCode::INTERNAL_SERVER_ERROR)
         }
-        HostingError::Folder { .. } | HostingError::Thread(_) => INTERNAL,
+        HostingError::OtherStep { .. } => ("other-step", "Another step", StatusCode::CONFLICT),
+        HostingError::DoubleCommand { .. } => ("double-command", "Commanded already", StatusCode::CONFLICT),
+        HostingError::LateCommand { .. } => ("late-command", "Commanded late", StatusCode::CONFLICT),
+        HostingError::OperatorFinished { .. } => {
+            ("operator-finished", "Operator has finished", StatusCode::CONFLICT)
+        }
+        HostingError::NeedsOperator => ("needs-operator", "Driven by operators", StatusCode::FORBIDDEN),
+        HostingError::HostsBusiness => ("hosts-business", "Not for operators", StatusCode::FORBIDDEN),
+        HostingError::NoTalk => ("no-talk", "Nobody hears", StatusCode::CONFLICT),
+        HostingError::TooMuchSaid { .. } => ("too-much-said", "Too much said", StatusCode::TOO_MANY_REQUESTS),
+        HostingError::KeyUsed => ("key-used", "Key used", StatusCode::UNPROCESSABLE_ENTITY),
+        HostingError::Shared(error) => hosting_kind(error),
+        HostingError::Folder { .. } | HostingError::Token(_) | HostingError::Thread(_) => INTERNAL,
     }
 }
 
@@ -257,6 +309,10 @@ fn episode_kind(error: &EpisodeError) -> Kind {
         EpisodeError::PixelOutside { .. } => {
             ("pixel-outside", "Pixel outside the image", StatusCode::UNPROCESSABLE_ENTITY)
         }
+        EpisodeError::ForeignRobot { .. } => {
+            ("foreign-robot", "Another operator's robot", StatusCode::CONFLICT)
+        }
+        EpisodeError::DepthImage { .. } => ("depth-image", "No depth images", StatusCode::CONFLICT),
         EpisodeError::Ended { .. } => ("ended", "Episode ended", StatusCode::CONFLICT),
         EpisodeError::Spec(error) => spec_kind(error),
         EpisodeError::Checkpoint(_) => {

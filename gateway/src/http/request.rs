@@ -1,4 +1,4 @@
-//! Reads request bodies: one JSON object, whose names are all different.
+//! Reads request bodies: one object in JSON or MessagePack, whose names are all different.
 
 use std::fmt;
 
@@ -17,6 +17,30 @@ pub fn json_object(body: &[u8]) -> Result<Value, ApiError> {
     }
     let Unambiguous(value) =
         serde_json::from_slice(body).map_err(|error| ApiError::MalformedJson(error.to_string()))?;
+    object(value)
+}
+
+/// As deep as JSON may be.
+const DEEPEST: usize = 128;
+
+/// As [`json_object`], of MessagePack.
+pub fn msgpack_object(body: &[u8]) -> Result<Value, ApiError> {
+    if body.is_empty() {
+        return Ok(Value::Object(Map::new()));
+    }
+    let mut left = body;
+    let mut reader = rmp_serde::Deserializer::new(&mut left);
+    reader.set_max_depth(DEEPEST);
+    let malformed = |error: String| ApiError::MalformedMsgpack(error);
+    let Unambiguous(value) =
+        Deserialize::deserialize(&mut reader).map_err(|error| malformed(error.to_string()))?;
+    match left.len() {
+        0 => object(value),
+        more => Err(malformed(format!("{more} bytes follow it"))),
+    }
+}
+
+fn object(value: Value) -> Result<Value, ApiError> {
     match value {
         Value::Object(_) => Ok(value),
         Value::Null => Err(ApiError::NoObject("null")),
@@ -60,6 +84,11 @@ impl<'de> Visitor<'de> for Build {
     }
 
     fn visit_unit<E>(self) -> Result<Value, E> {
+        Ok(Value::Null)
+    }
+
+    // MessagePack has nothing, and something, of its own.
+    fn visit_none<E>(self) -> Result<Value, E> {
         Ok(Value::Null)
     }
 
@@ -115,6 +144,26 @@ mod tests {
         let sent = json!({ "a": [1, -2, 2.5, null, true, "text", {}], "b": { "a": 1e300 }, "c": u64::MAX });
         assert_eq!(json_object(sent.to_string().as_bytes()).unwrap(), sent);
         assert_eq!(json_object(b"").unwrap(), json!({}));
+    }
+
+    #[test]
+    fn msgpack_is_read_as_json_is() {
+        let sent = json!({ "a": [1, -2, 2.5, null, true, "text", {}], "b": { "a": 1e300 }, "c": u64::MAX });
+        assert_eq!(msgpack_object(&rmp_serde::to_vec(&sent).unwrap()).unwrap(), sent);
+        assert_eq!(msgpack_object(b"").unwrap(), json!({}));
+        let check = |body: &[u8], says: &str| {
+            let text = msgpack_object(body).unwrap_err().to_string();
+            assert!(text.contains(says), "{body:?}: {text}");
+        };
+        check(b"\xc0", "the body is null");
+        check(b"\x91\x05", "the body is an array");
+        check(b"\x82\xa1a\x01\xa1a\x02", "\"a\" stands there twice");
+        check(b"\x81\xa1a", "no MessagePack");
+        check(b"\x81\xa1a\x01\x80", "1 bytes follow it");
+        check(b"\x81\xa1a\xcb\x7f\xf0\0\0\0\0\0\0", "too large");
+        check(b"\x81\xa1a\xc4\x01\0", "no MessagePack");
+        check(&[0x91; 100_000], "no MessagePack");
+        check(b"\xdf\xff\xff\xff\xff", "no MessagePack");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use axum::{
     Json, Router,
     body::Bytes,
-    extract::{DefaultBodyLimit, Path, Request, State},
+    extract::{DefaultBodyLimit, Extension, MatchedPath, Path, Request, State},
     http::{HeaderMap, Method, StatusCode, Uri, header},
     middleware::{self, Next},
     response::{IntoResponse, Response},
@@ -11,18 +11,19 @@ use axum::{
 };
 use serde_json::{Value, json};
 use tandem_tools_spec::{
-    EpisodeToolSpec, ResultReply, StartEpisode, StartReply, TaskList, ToolCall, ToolSpec, episode_tool_specs,
-    parse_args, tool_specs,
+    EpisodeToolSpec, ResultReply, TaskList, ToolSpec, episode_tool_specs, parse_start, say_spec, tool_specs,
 };
 
 use super::{
+    access,
     app::App,
+    encoding::Encoding,
     gate::{self, Gate},
+    key::{Key, say_again},
     mcp,
     problem::ApiError,
-    request::json_object,
 };
-use crate::hosting::Answer;
+use crate::hosting::{Caller, HostingError, Once, Request as Asked};
 
 /// Every route: path, methods, handlers.
 fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 8] {
@@ -50,7 +51,8 @@ pub fn router(app: App, gate: Gate) -> Router {
         // The gate has a limit of its own.
         .layer(DefaultBodyLimit::disable())
         .layer(middleware::from_fn_with_state(gate, gate::pass))
-        .layer(middleware::from_fn(log_and_describe))
+        .layer(middleware::from_fn_with_state(app.clone(), access::identify))
+        .layer(middleware::from_fn_with_state(app.clone(), log_and_describe))
         .with_state(app)
 }
 
@@ -68,45 +70,84 @@ async fn tools(State(app): State<App>) -> Json<Vec<ToolSpec>> {
 
 async fn episode_tools(
     State(app): State<App>,
+    Extension(who): Extension<Caller>,
     Path(id): Path<String>,
 ) -> Result<Json<Vec<EpisodeToolSpec>>, ApiError> {
-    let most_steps = app.table.get(&id)?.steps_per_command();
-    Ok(Json(episode_tool_specs(app.settings.hints, &id, most_steps)))
+    let episode = app.table.hosted(&id)?;
+    episode.admit(&who)?;
+    let (hints, most_steps) = (app.settings.hints, episode.thread.steps_per_command());
+    let mut specs = episode_tool_specs(hints, &id, most_steps);
+    specs.extend(episode.may_talk().then(|| say_spec(hints, &id)));
+    Ok(Json(specs))
 }
 
 async fn openapi(State(app): State<App>) -> Json<Value> {
     Json(tandem_tools_spec::openapi(env!("CARGO_PKG_VERSION"), app.settings.hints))
 }
 
-async fn start(State(app): State<App>, body: Bytes) -> Result<Response, ApiError> {
-    let args: StartEpisode = parse_args(json_object(&body)?)?;
-    let reply: StartReply = app.table.start(args).await?;
+async fn start(
+    State(app): State<App>,
+    Extension(who): Extension<Caller>,
+    encoding: Encoding,
+    Key(key): Key,
+    body: Bytes,
+) -> Result<Response, ApiError> {
+    only_hosts(&who)?;
+    let (args, driving) = parse_start(encoding.read(&body)?)?;
+    let Once { reply, again } = match key {
+        Some(key) => app.table.start_once(args, driving, &key).await?,
+        None => Once { reply: app.table.start_driven(args, driving).await?, again: false },
+    };
     let location = format!("/v1/episodes/{}", reply.episode_id);
-    Ok((StatusCode::CREATED, [(header::LOCATION, location)], Json(reply)).into_response())
+    let written = encoding.write(StatusCode::CREATED, &reply)?;
+    Ok(say_again(([(header::LOCATION, location)], written).into_response(), again))
 }
 
-async fn status(State(app): State<App>, Path(id): Path<String>) -> Result<Json<Answer>, ApiError> {
-    Ok(Json(app.table.get(&id)?.status().await?))
+async fn status(
+    State(app): State<App>,
+    Extension(who): Extension<Caller>,
+    encoding: Encoding,
+    Path(id): Path<String>,
+) -> Result<Response, ApiError> {
+    encoding.write(StatusCode::OK, &app.table.hosted(&id)?.status(&who).await?)
 }
 
 async fn call(
     State(app): State<App>,
+    Extension(who): Extension<Caller>,
+    encoding: Encoding,
+    Key(key): Key,
     Path((id, name)): Path<(String, String)>,
     body: Bytes,
-) -> Result<Json<Answer>, ApiError> {
-    let episode = app.table.get(&id)?;
-    let read = || -> Result<ToolCall, ApiError> {
-        Ok(ToolCall::parse(&name, without_episode_id(json_object(&body)?, &id)?)?)
-    };
+) -> Result<Response, ApiError> {
+    let episode = app.table.hosted(&id)?;
+    episode.admit(&who)?;
+    let read = || Ok(Asked::parse(&name, without_episode_id(encoding.read(&body)?, &id)?)?);
     let answer = match read() {
-        Ok(call) => episode.call(call).await.map_err(ApiError::from),
+        Ok(request) => episode.call(&who, request, key.as_deref()).await.map_err(ApiError::from),
         Err(refusal) => Err(refusal),
     };
-    answer.map(Json).map_err(|refusal| refusal.of(&episode))
+    let Once { reply, again } = answer.map_err(|refusal: ApiError| refusal.of(&episode.thread))?;
+    let status = if reply.others_play_on { StatusCode::ACCEPTED } else { StatusCode::OK };
+    Ok(say_again(encoding.write(status, &*reply)?, again))
 }
 
-async fn remove(State(app): State<App>, Path(id): Path<String>) -> Result<Json<ResultReply>, ApiError> {
+async fn remove(
+    State(app): State<App>,
+    Extension(who): Extension<Caller>,
+    Path(id): Path<String>,
+) -> Result<Json<ResultReply>, ApiError> {
+    app.table.hosted(&id)?.admit(&who)?;
+    only_hosts(&who)?;
     Ok(Json(app.table.remove(&id).await?))
+}
+
+/// Operators drive their robots; what concerns the whole is for who started the episode.
+fn only_hosts(who: &Caller) -> Result<(), HostingError> {
+    match who {
+        Caller::Host => Ok(()),
+        Caller::Operator { .. } => Err(HostingError::HostsBusiness),
+    }
 }
 
 /// Clients made for MCP send `episode_id` among the arguments; that is fine as long as it is the path's.
@@ -136,9 +177,12 @@ fn refused_route(method: Method, uri: Uri, other_method: bool) -> ApiError {
     ApiError::NoRoute { method: method.to_string(), path: uri.path().into(), have, other_method }
 }
 
-/// Logs every request, and turns refusals of axum's own (as of a path that is not UTF-8) into problem details.
-async fn log_and_describe(request: Request, next: Next) -> Response {
-    let (method, path) = (request.method().clone(), request.uri().path().to_owned());
+/// Logs every request, and turns refusals of axum's own (as of a path that is not UTF-8) into problem details. Of what a caller
+/// wrote, the log has the route, and the episode where there is such an episode: whatever else there is may be a secret.
+async fn log_and_describe(State(app): State<App>, request: Request, next: Next) -> Response {
+    let method = request.method().clone();
+    let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str).to_owned();
+    let episode = episode_of(request.uri().path()).filter(|id| app.table.get(id).is_ok()).map(str::to_owned);
     let began = std::time::Instant::now();
     let mut response = next.run(request).await;
     let status = response.status();
@@ -149,8 +193,14 @@ async fn log_and_describe(request: Request, next: Next) -> Response {
         response = ApiError::Protocol { status, detail }.into_response();
         response.headers_mut().extend(allow.map(|methods| (header::ALLOW, methods)));
     }
-    tracing::info!(%method, path, status = status.as_u16(), ms = began.elapsed().as_millis() as u64, "request");
+    let ms = began.elapsed().as_millis() as u64;
+    tracing::info!(%method, route, episode, status = status.as_u16(), ms, "request");
     response
+}
+
+/// What a path names as the episode.
+fn episode_of(path: &str) -> Option<&str> {
+    path.strip_prefix("/v1/episodes/")?.split('/').next()
 }
 
 fn is_json(headers: &HeaderMap) -> bool {

@@ -28,7 +28,7 @@ pub use cameras::Cameras;
 pub use kind::RendererKind;
 pub use mesh::{Mesh, Vertex};
 pub use pattern::Pattern;
-pub use png::{PictureError, encode_png};
+pub use png::{DEPTH_UNIT_M, PictureError, encode_depth_png, encode_png};
 pub use scenery::{Carrier, Part, Placed, Scenery};
 
 use crate::Step;

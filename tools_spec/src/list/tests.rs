@@ -62,6 +62,8 @@ mod with_wave {
 #[test]
 fn a_line_names_and_describes_the_tool() {
     assert_eq!(with_wave::EPISODE_TOOLS, ["get_status", "wave", "wait"]);
+    assert_eq!(with_wave::LookCall::TOOLS, ["get_status", "wave"]);
+    assert_eq!(with_wave::ActCall::TOOLS, ["wait"]);
     let specs = with_wave::tool_specs(Hints::On);
     let names: Vec<_> = specs.iter().map(|spec| (spec.name, spec.on_episode)).collect();
     assert_eq!(names, [("list_tasks", false), ("get_status", true), ("wave", true), ("wait", true)]);

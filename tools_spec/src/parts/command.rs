@@ -36,6 +36,8 @@ pub enum StopReason {
     TaskComplete,
     /// The episode's steps ran out; the episode has ended.
     StepBudgetExhausted,
+    /// The command of another operator was shorter, and this one was cut off with it; it goes on where a further command takes it.
+    PartnerDone,
 }
 
 /// How one robot did under a command.

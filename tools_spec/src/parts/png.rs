@@ -4,7 +4,7 @@ use base64::{Engine, prelude::BASE64_STANDARD};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::Error as _};
 
-/// A PNG file; base64 in JSON.
+/// A PNG file; base64 in JSON, bytes as they are in MessagePack.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Png(pub Vec<u8>);
 
@@ -17,7 +17,10 @@ impl Png {
 
 impl Serialize for Png {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(&self.to_base64())
+        match serializer.is_human_readable() {
+            true => serializer.serialize_str(&self.to_base64()),
+            false => serializer.serialize_bytes(&self.0),
+        }
     }
 }
 

@@ -7,4 +7,5 @@ mod spec;
 mod strict;
 
 pub use openapi::openapi;
+pub use plain::{body_schema, plain_schema};
 pub use spec::{EpisodeToolSpec, ToolSpec};

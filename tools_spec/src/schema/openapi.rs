@@ -6,6 +6,7 @@ use super::plain::plain_schema;
 use super::spec::ToolSpec;
 use crate::error::ProblemBody;
 use crate::limits::MOST_STEPS;
+use crate::parts::{Heard, Partner};
 use crate::tool::Tool;
 use crate::tools::{Finish, GetStatus, StartEpisode};
 
@@ -81,8 +82,23 @@ fn operation(id: &str, description: &str, success: &str, reply: Value) -> Value 
     })
 }
 
-/// Every reply of an episode says so when its recording has failed.
+/// Every reply of an episode says at which step it stands, and so when its recording has failed; operators of single robots hear of
+/// each other.
 fn with_notice(mut reply: Value) -> Value {
+    let list =
+        |of: Value, description: &str| json!({ "type": "array", "items": of, "description": description });
+    reply["properties"]["step"] = json!({
+        "type": "integer",
+        "description": "Control steps executed so far, the initial hold included: what expected_step is compared with.",
+    });
+    reply["properties"]["partners"] = list(
+        plain_schema::<Partner>(),
+        "What the robots of the other operators did meanwhile; left out where one policy directs all.",
+    );
+    reply["properties"]["heard"] = list(
+        plain_schema::<Heard>(),
+        "What the other operators have said since the last reply; left out where they have said nothing.",
+    );
     reply["properties"]["recording_failed"] = json!({
         "type": ["string", "null"],
         "description": "Why the recording is not complete; left out where it is.",

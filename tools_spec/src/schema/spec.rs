@@ -67,6 +67,13 @@ impl ToolSpec {
         }
     }
 
+    /// Lets a body have further fields, each with its schema.
+    pub(crate) fn allow(&mut self, fields: &Map<String, Value>) {
+        if let Value::Object(properties) = &mut self.marked_body["properties"] {
+            properties.extend(fields.clone());
+        }
+    }
+
     /// JSON Schema of a REST body, which need not be strict: what may be null may be left out, and lengths are said. A command
     /// may have up to `most_steps` control steps.
     pub fn body_schema(&self, most_steps: u32) -> Value {

@@ -8,6 +8,7 @@ mod list_tasks;
 mod move_wrists;
 mod observe;
 mod query_depth;
+mod say;
 mod send_joint_chunk;
 mod start_episode;
 mod wait;
@@ -21,6 +22,7 @@ pub use list_tasks::{ListTasks, PhaseInfo, ProtocolInfo, TaskInfo, TaskList};
 pub use move_wrists::{MoveWrists, WristMove};
 pub use observe::{CameraCalibration, CameraImage, Observation, Observe};
 pub use query_depth::{DepthPoint, DepthReply, QueryDepth};
+pub use say::Say;
 pub use send_joint_chunk::{ACTION_ROW_LEN, JointChunk, SendJointChunk, action_row_layout};
 pub use start_episode::{
     Brief, Briefing, Instruction, JointInfo, RobotInfo, RobotKind, StartEpisode, StartReply,

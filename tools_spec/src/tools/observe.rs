@@ -1,12 +1,12 @@
 //! `observe`: what the robots see and feel.
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, ser::SerializeStruct};
 
 use super::get_robot_state::RobotState;
 use crate::checks;
 use crate::limits;
-use crate::parts::{Png, Pose};
+use crate::parts::{CameraArrays, Png, Pose};
 use crate::tool::Tool;
 
 /// Look through the robots' own head cameras and read their proprioception. Returns for each robot the same numbers as
@@ -55,6 +55,9 @@ pub struct Observation {
     /// The pictures, in the order of `cameras`. Over MCP they follow as image blocks and are left out here.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub images: Vec<CameraImage>,
+    /// What a program asked for besides PNGs or in place of them, one entry per robot; left out otherwise.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub arrays: Vec<CameraArrays>,
 }
 
 /// A pinhole camera without distortion: a point (x, y, z) in the camera's frame is seen at u = fx x / z + cx,
@@ -80,11 +83,21 @@ pub struct CameraCalibration {
     pub camera_in_pelvis: Pose,
 }
 
-/// One picture.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// One picture. In MessagePack, the file is called `png` and no base64.
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 pub struct CameraImage {
     /// The robot whose head camera took it.
     pub robot: String,
     /// The picture.
     pub png_base64: Png,
+}
+
+impl Serialize for CameraImage {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let file = if serializer.is_human_readable() { "png_base64" } else { "png" };
+        let mut image = serializer.serialize_struct("CameraImage", 2)?;
+        image.serialize_field("robot", &self.robot)?;
+        image.serialize_field(file, &self.png_base64)?;
+        image.end()
+    }
 }

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::get_status::StatusReply;
-use crate::parts::{BaseLimits, Protocol};
+use crate::parts::{BaseLimits, OperatorToken, Protocol};
 use crate::tool::{Route, Tool};
 
 /// Start an episode of a task. Returns episode_id, which every other tool needs, the instruction, a brief on frames, cameras
@@ -41,6 +41,9 @@ impl Tool for StartEpisode {
 pub struct StartReply {
     /// The handle that every other tool needs.
     pub episode_id: String,
+    /// What each robot's operator needs, where each robot has one of its own; left out otherwise.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub operators: Vec<OperatorToken>,
     /// What the policy has to know.
     #[serde(flatten)]
     pub briefing: Briefing,

@@ -1,0 +1,166 @@
+//! Replies that are kept, so that a caller who never saw one can ask again without anything being done twice.
+
+use std::{
+    collections::VecDeque,
+    sync::{Mutex, MutexGuard},
+};
+
+use tokio::sync::watch;
+
+use super::HostingError;
+
+/// How many replies an episode keeps; with pictures, one may have a megabyte.
+const KEPT: usize = 16;
+
+/// Kept replies `R` to requests `Q`, by the key that came with each.
+#[derive(Debug)]
+pub struct Kept<Q, R> {
+    entries: Mutex<VecDeque<Entry<Q, R>>>,
+}
+
+#[derive(Debug)]
+struct Entry<Q, R> {
+    key: String,
+    request: Q,
+    reply: watch::Receiver<Option<R>>,
+}
+
+/// A reply, and whether it had been made before.
+#[derive(Debug, PartialEq)]
+pub struct Once<R> {
+    /// The reply.
+    pub reply: R,
+    /// Whether an earlier request with the same key has had it.
+    pub again: bool,
+}
+
+impl<Q, R> Default for Kept<Q, R> {
+    fn default() -> Kept<Q, R> {
+        Kept { entries: Mutex::default() }
+    }
+}
+
+impl<Q: PartialEq + Clone, R: Clone + Send + Sync + 'static> Kept<Q, R> {
+    /// Lets `work` make the reply to `request`, once for a key: who asks again with the key gets that reply, or waits for it. A
+    /// reply that is not `lasting` is forgotten, so that asking again tries again. The work goes on if its caller leaves.
+    pub async fn once(
+        &self,
+        key: &str,
+        request: Q,
+        work: impl Future<Output = R> + Send + 'static,
+        lasting: impl Fn(&R) -> bool,
+    ) -> Result<Once<R>, HostingError> {
+        let (mut reply, again) = self.find_or_begin(key, request, work)?;
+        let made = reply.wait_for(Option::is_some).await.map(|made| made.clone());
+        // A work that panicked made no reply, and says so as an episode that stopped under way.
+        let Ok(Some(made)) = made else {
+            self.forget(key);
+            return Err(HostingError::EpisodeStopped);
+        };
+        if !lasting(&made) {
+            self.forget(key);
+        }
+        Ok(Once { reply: made, again })
+    }
+
+    /// Where the reply comes, and whether the work on it had begun before.
+    fn find_or_begin(
+        &self,
+        key: &str,
+        request: Q,
+        work: impl Future<Output = R> + Send + 'static,
+    ) -> Result<(watch::Receiver<Option<R>>, bool), HostingError> {
+        let mut entries = self.lock();
+        if let Some(entry) = entries.iter().find(|entry| entry.key == key) {
+            return match entry.request == request {
+                true => Ok((entry.reply.clone(), true)),
+                false => Err(HostingError::KeyUsed),
+            };
+        }
+        let (sender, reply) = watch::channel(None);
+        entries.push_back(Entry { key: key.into(), request, reply: reply.clone() });
+        if entries.len() > KEPT {
+            entries.pop_front();
+        }
+        tokio::spawn(async move {
+            sender.send_replace(Some(work.await));
+        });
+        Ok((reply, false))
+    }
+
+    fn forget(&self, key: &str) {
+        self.lock().retain(|entry| entry.key != key);
+    }
+
+    fn lock(&self) -> MutexGuard<'_, VecDeque<Entry<Q, R>>> {
+        // Nothing panics while it holds the lock.
+        self.entries.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::{
+        Arc,
+        atomic::{AtomicU32, Ordering::Relaxed},
+    };
+
+    use super::*;
+
+    /// Keeps counts: each work counts on and replies with the count.
+    struct Counting {
+        kept: Kept<&'static str, u32>,
+        count: Arc<AtomicU32>,
+    }
+
+    impl Counting {
+        fn new() -> Counting {
+            Counting { kept: Kept::default(), count: Arc::default() }
+        }
+
+        async fn ask(&self, key: &str, request: &'static str) -> Result<Once<u32>, HostingError> {
+            let count = self.count.clone();
+            let work = async move {
+                tokio::task::yield_now().await;
+                count.fetch_add(1, Relaxed) + 1
+            };
+            self.kept.once(key, request, work, |count| count % 2 == 1).await
+        }
+    }
+
+    #[tokio::test]
+    async fn a_key_stands_for_one_reply() {
+        let counting = Counting::new();
+        assert_eq!(counting.ask("k", "wait").await.unwrap(), Once { reply: 1, again: false });
+        assert_eq!(counting.ask("k", "wait").await.unwrap(), Once { reply: 1, again: true });
+        let refused = counting.ask("k", "walk").await.unwrap_err();
+        assert!(matches!(refused, HostingError::KeyUsed), "{refused}");
+        assert_eq!(counting.count.load(Relaxed), 1);
+    }
+
+    #[tokio::test]
+    async fn what_does_not_last_is_made_anew() {
+        let counting = Counting::new();
+        counting.ask("k", "wait").await.unwrap();
+        assert_eq!(counting.ask("l", "wait").await.unwrap(), Once { reply: 2, again: false });
+        assert_eq!(counting.ask("l", "wait").await.unwrap(), Once { reply: 3, again: false });
+    }
+
+    #[tokio::test]
+    async fn who_asks_meanwhile_waits_for_the_same() {
+        let counting = Counting::new();
+        let (one, other) = tokio::join!(counting.ask("k", "wait"), counting.ask("k", "wait"));
+        assert_eq!((one.unwrap().reply, other.unwrap().reply), (1, 1));
+    }
+
+    #[tokio::test]
+    async fn the_oldest_replies_are_forgotten() {
+        let counting = Counting::new();
+        for key in 0..=KEPT {
+            counting.kept.once(&key.to_string(), "wait", async { 1 }, |_| true).await.unwrap();
+        }
+        let again =
+            async |key: &str| counting.kept.once(key, "wait", async { 1 }, |_| true).await.unwrap().again;
+        assert!(again("1").await && !again("0").await);
+    }
+}

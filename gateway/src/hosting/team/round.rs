@@ -1,0 +1,208 @@
+//! Who has commanded what for the step that is made next.
+
+use tandem_episodes::OperatorCommand;
+use tandem_tools_spec::{Heard, Look, PartnerDid, ToolReply};
+use tokio::{sync::oneshot, task::AbortHandle};
+
+use crate::hosting::{Answer, HostingError};
+
+/// The most that waits for one operator to hear it.
+const MOST_UNHEARD: usize = 32;
+
+/// The operators, by seat, as they stand before a step.
+#[derive(Debug)]
+pub struct Round {
+    operators: Vec<Operator>,
+    /// Of the step that is made next.
+    number: u64,
+    /// Ends the patience that is running.
+    patience: Option<AbortHandle>,
+}
+
+#[derive(Debug)]
+struct Operator {
+    robot: String,
+    state: State,
+    /// Steps through which its robot was held without it knowing.
+    missed: Option<[u32; 2]>,
+    heard: Vec<Heard>,
+}
+
+#[derive(Debug)]
+enum State {
+    Thinking,
+    /// Has commanded; the step is not yet made.
+    Waiting(Box<Pending>),
+    /// Its command is being executed.
+    Acting,
+    /// Has used up the others' patience; nobody waits for it.
+    Silent,
+    /// Has called finish.
+    Finished,
+}
+
+/// A command, and what is to become of its reply.
+#[derive(Debug)]
+pub struct Pending {
+    pub command: OperatorCommand,
+    /// What its operator looks at when it is done.
+    pub then: Option<Look>,
+    pub reply: oneshot::Sender<Result<Answer, HostingError>>,
+}
+
+impl Round {
+    /// The first one, of the operators of `robots`.
+    pub fn new(robots: Vec<String>) -> Round {
+        let operator = |robot| Operator { robot, state: State::Thinking, missed: None, heard: Vec::new() };
+        Round { operators: robots.into_iter().map(operator).collect(), number: 0, patience: None }
+    }
+
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// Whether the operator on `seat` may command now. One that kept silent is told what it missed first, once.
+    pub fn admit(&mut self, seat: usize) -> Result<(), HostingError> {
+        let waits_for = self.awaited();
+        let operator = &mut self.operators[seat];
+        let robot = operator.robot.clone();
+        match operator.state {
+            State::Waiting(_) | State::Acting => {
+                return Err(HostingError::DoubleCommand { robot, waits_for });
+            }
+            State::Finished => return Err(HostingError::OperatorFinished { robot }),
+            State::Silent => operator.state = State::Thinking,
+            State::Thinking => {}
+        }
+        match operator.missed.take() {
+            Some([from_step, to_step]) => Err(HostingError::LateCommand { robot, from_step, to_step }),
+            None => Ok(()),
+        }
+    }
+
+    pub fn command(&mut self, seat: usize, pending: Pending) {
+        self.operators[seat].state = State::Waiting(pending.into());
+    }
+
+    /// The operator on `seat` has looked at how things stand.
+    pub fn has_looked(&mut self, seat: usize) {
+        let operator = &mut self.operators[seat];
+        operator.missed = None;
+        if let State::Silent = operator.state {
+            operator.state = State::Thinking;
+        }
+    }
+
+    /// The operator on `seat` leaves. Returns whether others play on.
+    pub fn finish(&mut self, seat: usize) -> Result<bool, HostingError> {
+        let waits_for = self.awaited();
+        let operator = &mut self.operators[seat];
+        if let State::Waiting(_) | State::Acting = operator.state {
+            return Err(HostingError::DoubleCommand { robot: operator.robot.clone(), waits_for });
+        }
+        operator.state = State::Finished;
+        Ok(self.operators.iter().any(|other| !matches!(other.state, State::Finished | State::Silent)))
+    }
+
+    /// The robots whose operators have not commanded yet.
+    pub fn awaited(&self) -> Vec<String> {
+        let thinking = self.operators.iter().filter(|operator| matches!(operator.state, State::Thinking));
+        thinking.map(|operator| operator.robot.clone()).collect()
+    }
+
+    /// Whether a step could be made: somebody has commanded, and none is being made.
+    pub fn may_begin(&self) -> bool {
+        let any = |of: fn(&State) -> bool| self.operators.iter().any(|operator| of(&operator.state));
+        any(|state| matches!(state, State::Waiting(_))) && !any(|state| matches!(state, State::Acting))
+    }
+
+    /// Whether the others' patience is running.
+    pub fn is_timed(&self) -> bool {
+        self.patience.is_some()
+    }
+
+    /// From now on the others' patience runs, until it is stopped by `patience`.
+    pub fn time(&mut self, patience: AbortHandle) {
+        self.patience = Some(patience);
+    }
+
+    /// Nobody waits any longer for those who have not commanded.
+    pub fn lose_patience(&mut self) {
+        for operator in &mut self.operators {
+            if let State::Thinking = operator.state {
+                operator.state = State::Silent;
+            }
+        }
+    }
+
+    /// Takes the commands of the step that is made now, by seat.
+    pub fn begin(&mut self) -> Vec<(usize, Pending)> {
+        if let Some(patience) = self.patience.take() {
+            patience.abort();
+        }
+        let mut taken = Vec::new();
+        for (seat, operator) in self.operators.iter_mut().enumerate() {
+            match std::mem::replace(&mut operator.state, State::Acting) {
+                State::Waiting(pending) => taken.push((seat, *pending)),
+                other => operator.state = other,
+            }
+        }
+        taken
+    }
+
+    /// The step has been made, which `answer` is about, or has failed. Returns what each robot did, by seat.
+    pub fn end(&mut self, answer: Option<&Answer>) -> Vec<PartnerDid> {
+        self.number += 1;
+        let made = answer.and_then(|answer| match &answer.reply {
+            ToolReply::Act(reply) => Some([answer.step.saturating_sub(reply.executed_steps), answer.step]),
+            ToolReply::Look(_) | ToolReply::Manage(_) => None,
+        });
+        self.operators.iter_mut().map(|operator| operator.end(made)).collect()
+    }
+
+    /// Refuses words that would be too many for those who are to hear them.
+    pub fn check_unheard(&self, from: usize) -> Result<(), HostingError> {
+        let others = self.operators.iter().enumerate().filter(|(seat, _)| *seat != from);
+        match others.map(|(_, other)| other).find(|other| other.heard.len() >= MOST_UNHEARD) {
+            Some(other) => {
+                Err(HostingError::TooMuchSaid { robot: other.robot.clone(), unheard: MOST_UNHEARD })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Lets all but the operator on `from` hear what it said.
+    pub fn spread(&mut self, from: usize, words: &Heard) {
+        for (seat, operator) in self.operators.iter_mut().enumerate() {
+            if seat != from {
+                operator.heard.push(words.clone());
+            }
+        }
+    }
+
+    /// What the operator on `seat` has not heard yet.
+    pub fn take_heard(&mut self, seat: usize) -> Vec<Heard> {
+        std::mem::take(&mut self.operators[seat].heard)
+    }
+}
+
+impl Operator {
+    /// The step is over, and was made from the first to the second of `made`.
+    fn end(&mut self, made: Option<[u32; 2]>) -> PartnerDid {
+        match self.state {
+            State::Acting => {
+                self.state = State::Thinking;
+                PartnerDid::Acted
+            }
+            State::Finished => PartnerDid::HeldFinished,
+            // It has looked and commanded again while the step was made; the command is for the next one.
+            State::Waiting(_) => PartnerDid::HeldSilent,
+            State::Thinking | State::Silent => {
+                if let Some([from_step, to_step]) = made {
+                    self.missed.get_or_insert([from_step, to_step])[1] = to_step;
+                }
+                PartnerDid::HeldSilent
+            }
+        }
+    }
+}

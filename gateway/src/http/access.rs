@@ -1,0 +1,62 @@
+//! Who may come in: whoever has the server's token, or that of a robot's operator; where the server has none, everybody whom the
+//! gate lets through. Who has no token learns that it needs one, and nothing else.
+
+use axum::{
+    extract::{Request, State},
+    http::{HeaderMap, header},
+    middleware::Next,
+    response::{IntoResponse, Response},
+};
+
+use super::{app::App, problem::ApiError};
+use crate::hosting::Caller;
+
+/// Lets a request on with its [`Caller`], and without the token that said who that is.
+pub async fn identify(State(app): State<App>, mut request: Request, next: Next) -> Response {
+    let Some(caller) = caller(&app, request.headers()) else {
+        return ApiError::NoToken.into_response();
+    };
+    request.headers_mut().remove(header::AUTHORIZATION);
+    request.extensions_mut().insert(caller);
+    next.run(request).await
+}
+
+fn caller(app: &App, headers: &HeaderMap) -> Option<Caller> {
+    let token = bearer(headers);
+    let operator = token.and_then(|token| app.table.operator(token));
+    match (&app.settings.token, token) {
+        (Some(expected), Some(token)) => operator.or_else(|| expected.is(token).then_some(Caller::Host)),
+        (Some(_), None) => None,
+        // A token that nobody asked for says nothing.
+        (None, _) => operator.or(Some(Caller::Host)),
+    }
+}
+
+/// The token of a request that has one, and one only.
+fn bearer(headers: &HeaderMap) -> Option<&str> {
+    let mut values = headers.get_all(header::AUTHORIZATION).iter();
+    let (value, None) = (values.next()?.to_str().ok()?, values.next()) else { return None };
+    let (scheme, token) = value.split_once(' ')?;
+    scheme.eq_ignore_ascii_case("bearer").then(|| token.trim())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tokens_are_found() {
+        let found = |values: &[&str]| {
+            let mut headers = HeaderMap::new();
+            for value in values {
+                headers.append(header::AUTHORIZATION, value.parse().unwrap());
+            }
+            bearer(&headers).map(str::to_owned)
+        };
+        assert_eq!(found(&["Bearer abc"]).as_deref(), Some("abc"));
+        assert_eq!(found(&["bearer  abc "]).as_deref(), Some("abc"));
+        for values in [&[][..], &["abc"], &["Basic abc"], &["Bearerabc"], &["Bearer abc", "Bearer def"]] {
+            assert_eq!(found(values), None, "{values:?}");
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! JSON and MessagePack: what a body is read as, and what a reply is written as.
+
+use axum::{
+    extract::FromRequestParts,
+    http::{HeaderMap, StatusCode, header, request::Parts},
+    response::{IntoResponse, Response},
+};
+use serde::Serialize;
+use serde_json::Value;
+
+use super::{
+    problem::ApiError,
+    request::{json_object, msgpack_object},
+};
+
+/// What MessagePack is called: its registered name, and one that was used before.
+const MSGPACK: [&str; 2] = ["application/msgpack", "application/x-msgpack"];
+
+/// How a request is written, and how its reply is to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Encoding {
+    body: Format,
+    reply: Format,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Json,
+    Msgpack,
+}
+
+/// Whether bodies of this type are read.
+pub fn is_read(content_type: &str) -> bool {
+    is(content_type, "application/json") || is_msgpack(content_type)
+}
+
+fn is_msgpack(content_type: &str) -> bool {
+    MSGPACK.iter().any(|name| is(content_type, name))
+}
+
+fn is(content_type: &str, name: &str) -> bool {
+    let essence = content_type.split(';').next().unwrap_or_default().trim();
+    essence.eq_ignore_ascii_case(name)
+}
+
+impl Encoding {
+    fn of(headers: &HeaderMap) -> Encoding {
+        let text = |name| headers.get(name).and_then(|value| value.to_str().ok()).unwrap_or_default();
+        let format = |msgpack: bool| if msgpack { Format::Msgpack } else { Format::Json };
+        let body = format(is_msgpack(text(header::CONTENT_TYPE)));
+        // Who accepts both is answered in the form that it writes.
+        let accepted = text(header::ACCEPT);
+        let (json, msgpack) = accepted.split(',').fold((false, false), |(json, msgpack), one| {
+            (json || is(one, "application/json"), msgpack || is_msgpack(one))
+        });
+        let reply = if json == msgpack { body } else { format(msgpack) };
+        Encoding { body, reply }
+    }
+
+    /// Reads a body; none stands for an object without fields.
+    pub fn read(self, body: &[u8]) -> Result<Value, ApiError> {
+        match self.body {
+            Format::Json => json_object(body),
+            Format::Msgpack => msgpack_object(body),
+        }
+    }
+
+    /// Writes a reply.
+    pub fn write(self, status: StatusCode, reply: &impl Serialize) -> Result<Response, ApiError> {
+        let (kind, bytes) = match self.reply {
+            Format::Json => (
+                "application/json",
+                serde_json::to_vec(reply).map_err(|error| ApiError::Reply(error.into()))?,
+            ),
+            Format::Msgpack => {
+                (MSGPACK[0], rmp_serde::to_vec_named(reply).map_err(|error| ApiError::Reply(error.into()))?)
+            }
+        };
+        Ok((status, [(header::CONTENT_TYPE, kind)], bytes).into_response())
+    }
+}
+
+impl<S: Sync> FromRequestParts<S> for Encoding {
+    type Rejection = std::convert::Infallible;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Encoding, Self::Rejection> {
+        Ok(Encoding::of(&parts.headers))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn replies_come_as_they_are_wanted() {
+        let check = |content_type: &str, accept: &str, expected: [Format; 2]| {
+            let mut headers = HeaderMap::new();
+            for (name, value) in [(header::CONTENT_TYPE, content_type), (header::ACCEPT, accept)] {
+                if !value.is_empty() {
+                    headers.insert(name, value.parse().unwrap());
+                }
+            }
+            let [body, reply] = expected;
+            assert_eq!(Encoding::of(&headers), Encoding { body, reply }, "{content_type}, {accept}");
+        };
+        let (json, msgpack) = ("application/json", "application/msgpack");
+        check("", "", [Format::Json, Format::Json]);
+        check(json, "*/*", [Format::Json, Format::Json]);
+        check(msgpack, "", [Format::Msgpack, Format::Msgpack]);
+        check("application/x-msgpack", "*/*", [Format::Msgpack, Format::Msgpack]);
+        check(json, "application/MsgPack;q=1", [Format::Json, Format::Msgpack]);
+        check(msgpack, json, [Format::Msgpack, Format::Json]);
+        check(msgpack, "application/json, application/msgpack", [Format::Msgpack, Format::Msgpack]);
+        check(json, "application/json, text/event-stream", [Format::Json, Format::Json]);
+    }
+
+    #[test]
+    fn bytes_are_bytes_in_msgpack_and_base64_in_json() {
+        use tandem_tools_spec::{Bytes, CameraArrays};
+        let arrays = CameraArrays {
+            robot: "A".into(),
+            rgb: Some(Bytes(vec![1, 2])),
+            depth_float16: None,
+            depth_png16: None,
+        };
+        assert_eq!(serde_json::to_string(&arrays).unwrap(), r#"{"robot":"A","rgb":"AQI="}"#);
+        let packed = rmp_serde::to_vec_named(&arrays).unwrap();
+        assert_eq!(packed, b"\x82\xa5robot\xa1A\xa3rgb\xc4\x02\x01\x02");
+    }
+}

@@ -1,0 +1,62 @@
+//! The header by which a request may be repeated without being done twice.
+
+use axum::{
+    extract::FromRequestParts,
+    http::{HeaderValue, request::Parts},
+    response::Response,
+};
+
+use super::problem::ApiError;
+
+const KEY: &str = "idempotency-key";
+const REPLAYED: &str = "idempotency-replayed";
+
+/// The longest key.
+const LONGEST: usize = 255;
+
+/// The key of a request, if it has one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Key(pub Option<String>);
+
+impl<S: Sync> FromRequestParts<S> for Key {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Key, ApiError> {
+        parts.headers.get(KEY).map(read).transpose().map(Key)
+    }
+}
+
+fn read(value: &HeaderValue) -> Result<String, ApiError> {
+    let text = value.to_str().map_err(|_| ApiError::Key)?;
+    match (1..=LONGEST).contains(&text.len()) {
+        true => Ok(text.into()),
+        false => Err(ApiError::Key),
+    }
+}
+
+/// Says of a reply that it had been made before.
+pub fn say_again(mut response: Response, again: bool) -> Response {
+    if again {
+        response.headers_mut().insert(REPLAYED, HeaderValue::from_static("true"));
+    }
+    response
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_are_short_texts() {
+        let long = "x".repeat(LONGEST + 1);
+        for (value, accepted) in [
+            (&b"8e03978e-40d5"[..], true),
+            (b"a b", true),
+            (b"", false),
+            (long.as_bytes(), false),
+            (b"\xff", false),
+        ] {
+            assert_eq!(read(&HeaderValue::from_bytes(value).unwrap()).is_ok(), accepted, "{value:?}");
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! Who may command when, and what each operator sees and hears.
+
+use std::sync::mpsc;
+
+use serde_json::{Value, json};
+use tandem_tests::TestServer;
+
+use super::team::Team;
+
+fn names<'a>(list: &'a Value, field: &str) -> Vec<&'a str> {
+    list.as_array().into_iter().flatten().filter_map(|entry| entry[field].as_str()).collect()
+}
+
+/// A row that lets a robot stand as it is told by its joints.
+fn row() -> Vec<f64> {
+    let mut row = vec![0.0; 35];
+    row[34] = 0.75;
+    row
+}
+
+#[test]
+fn an_operator_sees_and_commands_its_own_robot_alone() {
+    let team = Team::start(json!({}));
+    let seen = team.ask(1, "observe", json!({ "short": true })).ok();
+    assert_eq!((names(&seen["states"], "robot"), names(&seen["images"], "robot")), (vec!["B"], vec!["B"]));
+    assert_eq!(names(&team.ask(1, "get_status", json!({})).ok()["fallen"], "robot"), ["B"]);
+    for (tool, args) in [
+        ("observe", json!({ "robots": ["A"] })),
+        ("get_robot_state", json!({ "robot": "A" })),
+        ("query_depth", json!({ "robot": "A", "pixels": [[160, 120]] })),
+        ("move_wrists", json!({ "steps": 5, "robots": [{ "robot": "B" }, { "robot": "A" }] })),
+        ("send_joint_chunk", json!({ "robots": [{ "robot": "A", "rows": [row()] }] })),
+        ("wait", json!({ "steps": 5, "observe": { "robots": ["A"] } })),
+    ] {
+        team.ask(1, tool, args).refused(409, &["robot \"A\" is another operator's", "yours is \"B\""]);
+    }
+    let episode = format!("/v1/episodes/{}", team.id);
+    let bearer = format!("Bearer {}", team.tokens[1]);
+    let own = [("authorization", bearer.as_str())];
+    let status = |method: &str, path: &str| team.server.ask(method, path, &own, b"").0;
+    assert_eq!(status("GET", &episode), 200);
+    assert_eq!(status("DELETE", &episode), 403);
+    let start = json!({ "task": "handover", "seed": 0, "protocol": "benchmark" });
+    team.server.post_with("/v1/episodes", &own, &start).refused(403, &["who started the episode"]);
+    let other = team.server.episode("benchmark");
+    assert_eq!(status("GET", &format!("/v1/episodes/{other}")), 404, "it is not theirs to know of");
+    team.server.tool_as(&team.tokens[1], &other, "wait", &json!({ "steps": 1 })).refused(404, &[]);
+    // Nobody commands past the operators, and who directs all has no partner to talk to.
+    team.server.tool(&team.id, "wait", &json!({ "steps": 1 })).refused(403, &["Authorization: Bearer"]);
+    team.server.tool(&other, "say", &json!({ "text": "Hello." })).refused(409, &["per_robot"]);
+    assert_eq!(team.server.get(&episode).ok()["env_steps"], 0);
+}
+
+#[test]
+fn a_step_is_made_when_both_have_commanded_and_the_shorter_command_ends_it() {
+    let team = Team::start(json!({}));
+    let reach = json!({ "steps": 10, "robots": [{ "robot": "A", "right_position_m": [0.3, -0.2, 0.15] }] });
+    let rows =
+        json!({ "robots": [{ "robot": "B", "rows": vec![row(); 4] }], "observe": { "images": "rgb" } });
+    let [a, b] = team.both(("move_wrists", reach), ("send_joint_chunk", rows)).map(|answer| answer.ok());
+    for reply in [&a, &b] {
+        assert_eq!((&reply["executed_steps"], &reply["step"]), (&json!(4), &json!(4)), "{reply}");
+    }
+    assert_eq!((&a["stop_reason"], &b["stop_reason"]), (&json!("partner_done"), &json!("steps_done")));
+    assert_eq!(a["partners"], json!([{ "robot": "B", "did": "acted" }]));
+    assert_eq!((names(&a["robots"], "robot"), names(&b["robots"], "robot")), (vec!["A"], vec!["B"]));
+    assert_eq!(a["robots"][0]["right"]["state"], "moving", "four tenths of the way: {a}");
+    assert!(a.get("observation").is_none());
+    assert_eq!(names(&b["observation"]["arrays"], "robot"), ["B"]);
+
+    // The look beside the next command does not get in its way, nor does a refused command.
+    team.ask(0, "wait", json!({ "steps": 51 })).refused(422, &["1 to 50"]);
+    team.ask(0, "wait", json!({ "steps": 5, "expected_step": 3 })).refused(409, &["stands at step 4"]);
+    let wait = || ("wait", json!({ "steps": 6, "expected_step": 4 }));
+    let both = team.both(wait(), wait()).map(|answer| answer.ok()["step"].clone());
+    assert_eq!(both, [10, 10]);
+    let (result, recording) = team.verified();
+    assert_eq!(result["env_steps"], 10);
+    let calls = recording.tool_calls().expect("its calls");
+    let calls: Vec<_> = calls
+        .iter()
+        .map(|call| (call.tool.as_str(), call.operator.as_deref(), call.outcome.is_ok()))
+        .collect();
+    assert_eq!(
+        calls,
+        [
+            ("together", None, true),
+            ("observe", Some("B"), true),
+            ("together", Some("A"), false),
+            ("together", None, true)
+        ]
+    );
+}
+
+#[test]
+fn a_second_command_for_one_step_is_refused() {
+    let team = Team::start(json!({}));
+    std::thread::scope(|scope| {
+        let (answered, answers) = mpsc::channel();
+        for _ in 0..2 {
+            let (team, answered) = (&team, answered.clone());
+            scope.spawn(move || answered.send(team.ask(0, "wait", json!({ "steps": 3 }))));
+        }
+        let refused = answers.recv().expect("one of the two answers at once");
+        refused.refused(409, &["robot \"A\" has its command for this step already", "B commands"]);
+        team.ask(1, "wait", json!({ "steps": 3 })).ok();
+        assert_eq!(answers.recv().expect("the other answer").ok()["step"], 3);
+    });
+}
+
+#[test]
+fn who_keeps_silent_is_held_and_told_so() {
+    let team = Team::start(json!({ "patience_s": 0.1 }));
+    for step in [5, 10] {
+        let reply = team.ask(0, "wait", json!({ "steps": 5 })).ok();
+        assert_eq!(reply["partners"], json!([{ "robot": "B", "did": "held_silent" }]));
+        assert_eq!(reply["step"], step);
+    }
+    let late = || team.ask(1, "wait", json!({ "steps": 5 }));
+    late().refused(409, &["robot \"B\" was held still from step 0 to 10", "look again"]);
+    // From here on it is waited for, and its next command counts.
+    let [a, b] = team.both(("wait", json!({ "steps": 5 })), ("wait", json!({ "steps": 5 })));
+    let replies = [a.ok(), b.ok()];
+    assert_eq!(replies.map(|reply| reply["step"].clone()), [15, 15]);
+    // Who looks knows where it stands, and need not be told.
+    team.ask(0, "wait", json!({ "steps": 5 })).ok();
+    team.ask(1, "get_robot_state", json!({ "robot": "B" })).ok();
+    let [a, b] = team.both(("wait", json!({ "steps": 5 })), ("wait", json!({ "steps": 5 })));
+    assert_eq!((a.status, b.status), (200, 200), "{a:?} {b:?}");
+    team.verified();
+}
+
+#[test]
+fn operators_talk_where_they_may() {
+    let quiet = Team::start(json!({}));
+    quiet.ask(0, "say", json!({ "text": "Hello." })).refused(409, &["talk true"]);
+    let team = Team::start(json!({ "talk": true, "patience_s": 0.1 }));
+    team.ask(0, "say", json!({ "text": "" })).refused(422, &["text is empty"]);
+    let words = ["I lift it.", "Take it by the top."];
+    words.iter().for_each(|text| drop(team.ask(0, "say", json!({ "text": text })).ok()));
+    let heard = words.map(|text| json!({ "from": "A", "text": text }));
+    let reply = team.ask(1, "wait", json!({ "steps": 2 })).ok();
+    assert_eq!(reply["heard"], json!(heard));
+    assert!(team.ask(1, "get_status", json!({})).ok().get("heard").is_none(), "once is enough");
+    let (path, bearer) = (format!("/v1/episodes/{}/tools", team.id), format!("Bearer {}", team.tokens[0]));
+    let (_, _, tools) = team.server.ask("GET", &path, &[("authorization", &bearer)], b"");
+    let tools: Value = serde_json::from_slice(&tools).expect("JSON");
+    assert!(names(&tools, "name").contains(&"say"), "{tools}");
+    let (_, recording) = team.verified();
+    let calls = recording.tool_calls().expect("its calls");
+    let said: Vec<_> = calls.iter().filter(|call| call.tool == "say").collect();
+    assert_eq!((said.len(), said[1].operator.as_deref()), (2, Some("A")));
+    assert_eq!(said[1].arguments["text"], words[1]);
+}
+
+#[test]
+fn the_episode_ends_when_every_operator_has_finished() {
+    let team = Team::start(json!({}));
+    let left = team.ask(0, "finish", json!({}));
+    assert_eq!((left.status, &left.body["ended"]), (202, &Value::Null));
+    team.ask(0, "wait", json!({ "steps": 1 })).refused(409, &["has finished"]);
+    let reply = team.ask(1, "wait", json!({ "steps": 4 })).ok();
+    assert_eq!(reply["partners"], json!([{ "robot": "A", "did": "held_finished" }]));
+    let result = team.ask(1, "finish", json!({})).ok();
+    assert_eq!((&result["ended"], &result["env_steps"]), (&json!("finished"), &json!(4)));
+    assert_eq!(team.ask(0, "finish", json!({})).ok()["state_hash"], result["state_hash"]);
+    let (closed, _) = team.verified();
+    assert_eq!(closed["state_hash"], result["state_hash"]);
+}
+
+/// Over MCP the token says which episode is meant.
+#[test]
+fn operators_may_speak_mcp() {
+    let team = Team::start(json!({ "patience_s": 0.1 }));
+    let call = |token: &str, tool: &str, args: Value| {
+        let request = json!({
+            "jsonrpc": "2.0", "id": 1, "method": "tools/call", "params": { "name": tool, "arguments": args },
+        });
+        let bearer = format!("Bearer {token}");
+        let headers = [("authorization", bearer.as_str()), ("accept", "application/json, text/event-stream")];
+        let result = team.server.post_with("/mcp", &headers, &request).ok()["result"].clone();
+        (result["isError"] == true, result["content"][0]["text"].as_str().expect("text").to_owned())
+    };
+    let (failed, text) = call(&team.tokens[0], "wait", json!({ "steps": 3, "observe": {} }));
+    assert!(!failed && text.contains("held_silent") && !text.contains("png_base64"), "{text}");
+    let (failed, text) = call(&team.tokens[0], "get_robot_state", json!({ "robot": "B" }));
+    assert!(failed && text.contains("yours is \"A\""), "{text}");
+    let (failed, text) = call("nobody-has-this-token", "wait", json!({ "episode_id": team.id, "steps": 1 }));
+    assert!(failed && text.contains("driven by its own operator"), "{text}");
+    let start = json!({ "task": "handover", "seed": 0 });
+    assert!(call(&team.tokens[0], "start_episode", start).0);
+}
+
+#[test]
+fn only_who_asks_for_operators_gets_them() {
+    let server = TestServer::start();
+    let start = |fields: Value| {
+        let mut body = json!({ "task": "handover", "seed": 0, "protocol": "benchmark" });
+        body.as_object_mut().expect("an object").extend(fields.as_object().cloned().unwrap_or_default());
+        server.post("/v1/episodes", &body)
+    };
+    assert!(start(json!({ "operators": "one", "talk": null })).ok().get("operators").is_none());
+    start(json!({ "operators": "two" })).refused(422, &["per_robot"]);
+    start(json!({ "operators": "per_robot", "patience_s": 0 })).refused(422, &["patience_s is 0", "120"]);
+}

@@ -1,0 +1,126 @@
+//! By whom an episode is driven.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The shortest and the longest patience, in seconds.
+const PATIENCE_S: [f64; 2] = [0.05, 600.0];
+
+/// By whom an episode is driven.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Driving {
+    /// "per_robot": each robot has an operator of its own, who sees and commands that robot alone, by the token that the reply
+    /// has for it. "one" or null: one policy directs all robots.
+    pub operators: Option<Operators>,
+    /// How long operators wait for one who does not command, in seconds, before its robot holds still. Null: 120. Says nothing
+    /// where one policy directs all.
+    #[schemars(range(min = PATIENCE_S[0], max = PATIENCE_S[1]))]
+    pub patience_s: Option<f64>,
+    /// True: operators may talk to each other by the tool say. False or null: they may not.
+    pub talk: Option<bool>,
+}
+
+impl Driving {
+    /// The fields, as JSON names them.
+    pub const FIELDS: [&str; 3] = ["operators", "patience_s", "talk"];
+
+    const PATIENCE_S: f64 = 120.0;
+
+    /// Whether each robot has an operator of its own.
+    pub fn is_per_robot(&self) -> bool {
+        self.operators == Some(Operators::PerRobot)
+    }
+
+    /// How long operators wait for one who does not command.
+    pub fn patience_s(&self) -> f64 {
+        self.patience_s.unwrap_or(Driving::PATIENCE_S)
+    }
+
+    /// Checks the patience. The text says what would work.
+    pub fn validate(&self) -> Result<(), String> {
+        let [shortest, longest] = PATIENCE_S;
+        match self.patience_s {
+            Some(given) if !(shortest..=longest).contains(&given) => Err(format!(
+                "patience_s is {given}; give {shortest} to {longest} seconds, as 120 for agents that think or 1 for learned policies"
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// How many operators an episode has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Operators {
+    /// One for all robots.
+    One,
+    /// One for each robot.
+    PerRobot,
+}
+
+/// What a robot's operator needs to drive it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OperatorToken {
+    /// The robot, as "A".
+    pub robot: String,
+    /// What its operator sends with every request, as `Authorization: Bearer TOKEN`.
+    pub token: String,
+}
+
+/// What an operator hears with a reply.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Partner {
+    /// The partner's robot, as "B".
+    pub robot: String,
+    /// What it did while the command was executed.
+    pub did: PartnerDid,
+}
+
+/// What the robot of another operator did during a command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PartnerDid {
+    /// What its operator told it.
+    Acted,
+    /// It held still: no command came for as long as the episode's patience lasts. Nobody waits for its operator until it calls again.
+    HeldSilent,
+    /// It held still: its operator has called finish.
+    HeldFinished,
+}
+
+/// Words of another operator.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Heard {
+    /// The robot whose operator spoke, as "B".
+    pub from: String,
+    /// What it said.
+    pub text: String,
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn the_fields_are_those_of_the_type() {
+        let driving = Driving { operators: Some(Operators::PerRobot), patience_s: None, talk: Some(true) };
+        let written = json!(driving);
+        let names: Vec<&String> = written.as_object().into_iter().flatten().map(|(name, _)| name).collect();
+        assert_eq!(names, Driving::FIELDS);
+        assert_eq!(written["operators"], "per_robot");
+    }
+
+    #[test]
+    fn patience_has_its_limits() {
+        let with = |patience_s: f64| Driving { patience_s: Some(patience_s), ..Driving::default() };
+        for patience_s in PATIENCE_S {
+            assert_eq!(with(patience_s).validate(), Ok(()));
+        }
+        for patience_s in [0.0, -1.0, 601.0, f64::NAN, f64::INFINITY] {
+            assert!(with(patience_s).validate().is_err(), "{patience_s}");
+        }
+        assert_eq!((Driving::default().patience_s(), Driving::default().is_per_robot()), (120.0, false));
+    }
+}
