@@ -8,4 +8,5 @@ pub mod commands;
 pub mod drivers;
 pub mod hosting;
 pub mod http;
+pub mod metrics;
 pub mod settings;

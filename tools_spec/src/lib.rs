@@ -26,7 +26,7 @@ pub use parts::{
     FingerReport, HandReport, HandState, Hints, JointValues, PhaseReached, PixelRegion, Png, Pose, Protocol,
     Range, RobotFallen, RobotReport, StopReason,
 };
-pub use schema::{EpisodeToolSpec, ToolSpec};
+pub use schema::{EpisodeToolSpec, Format, ToolSpec};
 pub use tool::{Route, Tool, parse_args};
 pub use tools::*;
 

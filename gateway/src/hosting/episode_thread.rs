@@ -14,7 +14,8 @@ use tandem_episodes::{Clock, EpisodeError, EpisodeSpec, Facts, RunFolder, Sessio
 use tandem_tools_spec::{Briefing, ManageReply, ResultReply, ToolCall, ToolReply};
 use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 
-use super::{Answer, HostingError, guarded::Guarded};
+use super::{Answer, HostingError, guarded::Guarded, tally::Tally};
+use crate::metrics::Metrics;
 
 /// Calls that may wait for one episode. A policy has no use for more than one at a time; a few more are a burst.
 const WAITING_CALLS: usize = 16;
@@ -65,8 +66,9 @@ impl EpisodeThread {
         spec: EpisodeSpec,
         folder: RunFolder,
         permit: OwnedSemaphorePermit,
+        metrics: Arc<Metrics>,
     ) -> Result<(EpisodeThread, Briefing), HostingError> {
-        EpisodeThread::start_with_clock(id, spec, folder, permit, monotonic()).await
+        EpisodeThread::start_with_clock(id, spec, folder, permit, metrics, monotonic()).await
     }
 
     /// As [`EpisodeThread::start`], with the policy's wall clock read from `clock`.
@@ -75,6 +77,7 @@ impl EpisodeThread {
         spec: EpisodeSpec,
         folder: RunFolder,
         permit: OwnedSemaphorePermit,
+        metrics: Arc<Metrics>,
         clock: Clock,
     ) -> Result<(EpisodeThread, Briefing), HostingError> {
         let (commands, inbox) = mpsc::channel(WAITING_CALLS);
@@ -82,11 +85,13 @@ impl EpisodeThread {
         let news = Arc::new(News::default());
         let (from_thread, name, path) = (news.clone(), id.to_owned(), folder.path.clone());
         let thread = move || {
+            // Every line that is logged on this thread names the episode.
+            let _named = tracing::info_span!("thread", episode = name).entered();
             match open_session(&spec, folder, clock) {
                 Ok((session, briefing)) => {
                     // A caller that went away during the start has dropped the inbox's other end, and serve returns.
                     let _ = started.send(Ok(briefing));
-                    let closed = serve(Guarded::new(&name, session), inbox, &from_thread);
+                    let closed = serve(Guarded::new(session, Tally::new(metrics)), inbox, &from_thread);
                     // The place is free before the caller hears of the end, so that it can start the next episode.
                     drop(permit);
                     closed.answer();
@@ -213,7 +218,7 @@ fn serve(mut session: Guarded, mut inbox: mpsc::Receiver<Command>, news: &News) 
                 let _ = session.run(|session| session.end_if_abandoned(idle));
                 news.spread(&session);
                 if session.ended() {
-                    tracing::info!(episode = std::thread::current().name(), "abandoned, and ended");
+                    tracing::info!("abandoned, and ended");
                 }
             }
             Command::Close { reply } => return Closed(Some((reply, session.close()))),

@@ -7,6 +7,7 @@ mod error;
 mod guarded;
 mod run_folder;
 mod table;
+mod tally;
 #[cfg(test)]
 mod tests;
 

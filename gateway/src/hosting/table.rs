@@ -15,7 +15,7 @@ use tokio::{
 };
 
 use super::{EpisodeThread, HostingError, run_folder};
-use crate::settings::Settings;
+use crate::{metrics::Metrics, settings::Settings};
 
 /// The episodes of one server.
 #[derive(Debug)]
@@ -23,6 +23,7 @@ pub struct EpisodeTable {
     held: Mutex<Held>,
     places: Arc<Semaphore>,
     settings: Arc<Settings>,
+    metrics: Arc<Metrics>,
 }
 
 #[derive(Debug, Default)]
@@ -39,7 +40,13 @@ impl EpisodeTable {
             held: Mutex::default(),
             places: Arc::new(Semaphore::new(settings.max_episodes as usize)),
             settings,
+            metrics: Arc::default(),
         }
+    }
+
+    /// What has been counted.
+    pub fn metrics(&self) -> &Arc<Metrics> {
+        &self.metrics
     }
 
     /// Starts an episode. Where every place is taken, an episode that has ended makes room.
@@ -57,7 +64,8 @@ impl EpisodeTable {
         let (id, path) = run_folder::create(runs, spec.task.id, spec.seed)
             .map_err(|source| HostingError::Folder { runs: runs.clone(), source })?;
         let folder = RunFolder { path, visibility: self.settings.record };
-        let (episode, mut briefing) = EpisodeThread::start(&id, spec, folder, place).await?;
+        let (episode, mut briefing) =
+            EpisodeThread::start(&id, spec, folder, place, self.metrics.clone()).await?;
         self.settings.instructions.rephrase_briefing(&mut briefing);
         if let Err(late) = self.insert(&id, Arc::new(episode)) {
             late.close().await?;
@@ -93,6 +101,11 @@ impl EpisodeTable {
     /// Whether no episode is held.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// How many of them go on.
+    pub fn running(&self) -> usize {
+        self.lock().episodes.values().filter(|episode| !episode.ended()).count()
     }
 
     /// Ends the episodes that nobody plays any more. To be called every now and then.

@@ -2,9 +2,14 @@
 
 mod app;
 mod connections;
+mod counted;
+mod docs;
+mod envelope;
 mod gate;
+mod limits;
 mod mcp;
 mod problem;
+mod prompt;
 mod request;
 mod routes;
 mod server;

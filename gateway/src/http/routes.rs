@@ -3,43 +3,49 @@
 use axum::{
     Json, Router,
     body::Bytes,
-    extract::{DefaultBodyLimit, Path, Request, State},
+    extract::{DefaultBodyLimit, Path, Query, Request, State},
     http::{HeaderMap, Method, StatusCode, Uri, header},
     middleware::{self, Next},
-    response::{IntoResponse, Response},
+    response::{Html, IntoResponse, Response},
     routing::{MethodRouter, get, post},
 };
+use serde::Deserialize;
 use serde_json::{Value, json};
 use tandem_tools_spec::{
-    EpisodeToolSpec, ResultReply, StartEpisode, StartReply, TaskList, ToolCall, ToolSpec, episode_tool_specs,
-    parse_args, tool_specs,
+    EpisodeToolSpec, Format, ResultReply, StartEpisode, StartReply, TaskList, Tool as _, ToolCall,
+    episode_tool_specs, parse_args, tool_specs,
 };
 
 use super::{
     app::App,
+    counted::counted,
+    docs,
     gate::{self, Gate},
+    limits::{self, Limits},
     mcp,
-    problem::ApiError,
+    problem::{ApiError, Refused},
     request::json_object,
 };
-use crate::hosting::Answer;
+use crate::{hosting::Answer, metrics::Page};
 
 /// Every route: path, methods, handlers.
-fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 8] {
+fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 10] {
     [
         ("/healthz", &["GET"], get(health)),
+        ("/metrics", &["GET"], get(metrics)),
+        ("/docs", &["GET"], get(docs)),
         ("/v1/tasks", &["GET"], get(tasks)),
         ("/v1/tools", &["GET"], get(tools)),
         ("/v1/openapi.json", &["GET"], get(openapi)),
-        ("/v1/episodes", &["POST"], post(start)),
+        ("/v1/episodes", &["POST"], post(counted_start)),
         ("/v1/episodes/{id}", &["GET", "DELETE"], get(status).delete(remove)),
         ("/v1/episodes/{id}/tools", &["GET"], get(episode_tools)),
-        ("/v1/episodes/{id}/tools/{name}", &["POST"], post(call)),
+        ("/v1/episodes/{id}/tools/{name}", &["POST"], post(counted_call)),
     ]
 }
 
 /// The whole service.
-pub fn router(app: App, gate: Gate) -> Router {
+pub fn router(app: App, gate: Gate, limits: Limits) -> Router {
     let mut router = Router::new().nest_service("/mcp", mcp::router(app.clone()));
     for (path, _, handlers) in routes() {
         router = router.route(path, handlers);
@@ -50,7 +56,8 @@ pub fn router(app: App, gate: Gate) -> Router {
         // The gate has a limit of its own.
         .layer(DefaultBodyLimit::disable())
         .layer(middleware::from_fn_with_state(gate, gate::pass))
-        .layer(middleware::from_fn(log_and_describe))
+        .layer(middleware::from_fn_with_state(limits, limits::pass))
+        .layer(middleware::from_fn_with_state(app.clone(), log_and_describe))
         .with_state(app)
 }
 
@@ -62,8 +69,17 @@ async fn tasks(State(app): State<App>) -> Json<TaskList> {
     Json(app.table.task_list())
 }
 
-async fn tools(State(app): State<App>) -> Json<Vec<ToolSpec>> {
-    Json(tool_specs(app.settings.hints))
+/// What `GET /v1/tools` may be asked for.
+#[derive(Debug, Deserialize)]
+struct ToolsQuery {
+    format: Option<String>,
+}
+
+async fn tools(State(app): State<App>, Query(query): Query<ToolsQuery>) -> Result<Json<Value>, ApiError> {
+    let specs = tool_specs(app.settings.hints);
+    let Some(name) = query.format else { return Ok(Json(json!(specs))) };
+    let format = Format::find(&name).ok_or(ApiError::UnknownFormat { name })?;
+    Ok(Json(specs.iter().map(|spec| spec.formatted(format)).collect()))
 }
 
 async fn episode_tools(
@@ -76,6 +92,30 @@ async fn episode_tools(
 
 async fn openapi(State(app): State<App>) -> Json<Value> {
     Json(tandem_tools_spec::openapi(env!("CARGO_PKG_VERSION"), app.settings.hints))
+}
+
+/// The description of the interface as a page, which needs and may load nothing else.
+async fn docs(State(app): State<App>) -> Response {
+    let document = tandem_tools_spec::openapi(env!("CARGO_PKG_VERSION"), app.settings.hints);
+    let policy = (header::CONTENT_SECURITY_POLICY, "default-src 'none'; style-src 'unsafe-inline'");
+    ([policy], Html(docs::page(&document))).into_response()
+}
+
+async fn metrics(State(app): State<App>) -> Response {
+    let page = app.table.metrics().page(app.table.len(), app.table.running());
+    ([(header::CONTENT_TYPE, Page::CONTENT_TYPE)], page).into_response()
+}
+
+async fn counted_start(State(app): State<App>, body: Bytes) -> Result<Response, ApiError> {
+    counted(&app, StartEpisode::NAME, start(State(app.clone()), body)).await
+}
+
+async fn counted_call(
+    State(app): State<App>,
+    Path((id, name)): Path<(String, String)>,
+    body: Bytes,
+) -> Result<Json<Answer>, ApiError> {
+    counted(&app, &name, call(State(app.clone()), Path((id, name.clone())), body)).await
 }
 
 async fn start(State(app): State<App>, body: Bytes) -> Result<Response, ApiError> {
@@ -136,8 +176,8 @@ fn refused_route(method: Method, uri: Uri, other_method: bool) -> ApiError {
     ApiError::NoRoute { method: method.to_string(), path: uri.path().into(), have, other_method }
 }
 
-/// Logs every request, and turns refusals of axum's own (as of a path that is not UTF-8) into problem details.
-async fn log_and_describe(request: Request, next: Next) -> Response {
+/// Logs and counts every request, and turns refusals of axum's own (as of a path that is not UTF-8) into problem details.
+async fn log_and_describe(State(app): State<App>, request: Request, next: Next) -> Response {
     let (method, path) = (request.method().clone(), request.uri().path().to_owned());
     let began = std::time::Instant::now();
     let mut response = next.run(request).await;
@@ -149,8 +189,18 @@ async fn log_and_describe(request: Request, next: Next) -> Response {
         response = ApiError::Protocol { status, detail }.into_response();
         response.headers_mut().extend(allow.map(|methods| (header::ALLOW, methods)));
     }
-    tracing::info!(%method, path, status = status.as_u16(), ms = began.elapsed().as_millis() as u64, "request");
+    let problem = response.extensions().get().map(|Refused(kind)| *kind);
+    if let Some(kind) = problem {
+        app.table.metrics().refusal(kind);
+    }
+    let (status, ms) = (status.as_u16(), began.elapsed().as_millis() as u64);
+    tracing::info!(%method, path, status, problem, ms, episode = episode(&path), "request");
     response
+}
+
+/// The episode that a path is about.
+fn episode(path: &str) -> Option<&str> {
+    path.strip_prefix("/v1/episodes/")?.split('/').next()
 }
 
 fn is_json(headers: &HeaderMap) -> bool {

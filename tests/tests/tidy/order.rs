@@ -39,7 +39,18 @@ const ORDER: &[(&str, &[&[&str]])] = &[
             &["assessment"],
         ],
     ),
-    ("gateway", &[&["settings"], &["hosting"], &["http"], &["drivers"], &["commands"], &["cli"], &["main"]]),
+    (
+        "gateway",
+        &[
+            &["settings", "metrics"],
+            &["hosting"],
+            &["http"],
+            &["drivers"],
+            &["commands"],
+            &["cli"],
+            &["main"],
+        ],
+    ),
 ];
 
 fn misplaced(rows: &[&[&str]], names: &BTreeSet<String>, arrows: &[Arrow]) -> Vec<String> {
