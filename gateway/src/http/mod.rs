@@ -6,6 +6,8 @@ mod counted;
 mod docs;
 mod envelope;
 mod gate;
+#[cfg(test)]
+mod hostile;
 mod limits;
 mod mcp;
 mod problem;

@@ -3,7 +3,7 @@
 use axum::{
     Json, Router,
     body::Bytes,
-    extract::{DefaultBodyLimit, Path, Query, Request, State},
+    extract::{DefaultBodyLimit, MatchedPath, Path, Query, Request, State},
     http::{HeaderMap, Method, StatusCode, Uri, header},
     middleware::{self, Next},
     response::{Html, IntoResponse, Response},
@@ -176,9 +176,12 @@ fn refused_route(method: Method, uri: Uri, other_method: bool) -> ApiError {
     ApiError::NoRoute { method: method.to_string(), path: uri.path().into(), have, other_method }
 }
 
-/// Logs and counts every request, and turns refusals of axum's own (as of a path that is not UTF-8) into problem details.
+/// Logs and counts every request, and turns refusals of axum's own (as of a path that is not UTF-8) into problem details. Of what
+/// a caller wrote, the log has the route, and the episode where there is such an episode: whatever else there is may be a secret.
 async fn log_and_describe(State(app): State<App>, request: Request, next: Next) -> Response {
-    let (method, path) = (request.method().clone(), request.uri().path().to_owned());
+    let method = request.method().clone();
+    let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str).to_owned();
+    let episode = episode_of(request.uri().path()).filter(|id| app.table.get(id).is_ok()).map(str::to_owned);
     let began = std::time::Instant::now();
     let mut response = next.run(request).await;
     let status = response.status();
@@ -193,13 +196,13 @@ async fn log_and_describe(State(app): State<App>, request: Request, next: Next) 
     if let Some(kind) = problem {
         app.table.metrics().refusal(kind);
     }
-    let (status, ms) = (status.as_u16(), began.elapsed().as_millis() as u64);
-    tracing::info!(%method, path, status, problem, ms, episode = episode(&path), "request");
+    let ms = began.elapsed().as_millis() as u64;
+    tracing::info!(%method, route, episode, status = status.as_u16(), problem, ms, "request");
     response
 }
 
-/// The episode that a path is about.
-fn episode(path: &str) -> Option<&str> {
+/// What a path names as the episode.
+fn episode_of(path: &str) -> Option<&str> {
     path.strip_prefix("/v1/episodes/")?.split('/').next()
 }
 
