@@ -22,7 +22,7 @@ pub mod statistics;
 pub mod tasks;
 
 pub use commands::{Called, OperatorCommand, own as own_call};
-pub use describe::task_list;
+pub use describe::{brief, task_list};
 pub use error::{CheckpointError, EpisodeError};
 pub use instructions::{Instructions, InstructionsError};
 pub use output::{OutputError, create_new_private_folder, create_private_folder, write_whole};

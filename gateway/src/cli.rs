@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    Outcome, bench, collect, demo, evaluate, locomotion, recover, replay, report, serve, tasks,
+    Outcome, bench, collect, demo, doctor, evaluate, locomotion, recover, replay, report, serve, tasks,
 };
 
 /// Physics of humanoids that must work together, behind an HTTP API.
@@ -28,6 +28,7 @@ enum Command {
     Replay(replay::Args),
     Report(report::Args),
     Bench(bench::Args),
+    Doctor(doctor::Args),
 }
 
 impl Cli {
@@ -44,6 +45,7 @@ impl Cli {
             Command::Replay(args) => replay::run(args),
             Command::Report(args) => report::run(args),
             Command::Bench(args) => bench::run(args),
+            Command::Doctor(args) => doctor::run(args),
         }
     }
 }

@@ -8,5 +8,6 @@ pub mod commands;
 pub mod drivers;
 pub mod hosting;
 pub mod http;
+pub mod metrics;
 pub mod settings;
 pub mod token;

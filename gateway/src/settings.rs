@@ -70,6 +70,12 @@ pub struct Layer {
     /// Longest that the header of a request may take to arrive, and its body as well [default: 30].
     #[arg(long, env = "TANDEM_REQUEST_TIMEOUT", value_name = "SECONDS")]
     pub request_timeout: Option<u32>,
+    /// Requests that may be under way at once; further ones get 503 [default: 256].
+    #[arg(long, env = "TANDEM_MAX_REQUESTS", value_name = "N")]
+    pub max_requests: Option<usize>,
+    /// Requests that one address may send per second; further ones get 429 [default: any number].
+    #[arg(long, env = "TANDEM_RATE_LIMIT", value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub rate_limit: Option<u32>,
     /// An episode without a call for so long is ended and gives its place back [default: 900].
     #[arg(long, env = "TANDEM_IDLE_TIMEOUT", value_name = "SECONDS")]
     pub idle_timeout: Option<u32>,
@@ -105,6 +111,8 @@ impl Layer {
             max_episodes: self.max_episodes.or(next.max_episodes),
             max_body_bytes: self.max_body_bytes.or(next.max_body_bytes),
             request_timeout: self.request_timeout.or(next.request_timeout),
+            max_requests: self.max_requests.or(next.max_requests),
+            rate_limit: self.rate_limit.or(next.rate_limit),
             idle_timeout: self.idle_timeout.or(next.idle_timeout),
             stop_timeout: self.stop_timeout.or(next.stop_timeout),
         }
@@ -142,6 +150,10 @@ pub struct Settings {
     pub max_body_bytes: usize,
     /// Longest that a header may take to arrive, and a body as well.
     pub request_timeout: Duration,
+    /// Requests that may be under way at once.
+    pub max_requests: usize,
+    /// Requests that one address may send per second, if there is a limit.
+    pub rate_limit: Option<u32>,
     /// How long after its last call an episode is taken for abandoned.
     pub idle_timeout: Duration,
     /// Longest that closing the episodes may take at the end.
@@ -224,6 +236,8 @@ impl Settings {
             max_episodes: layer.max_episodes.unwrap_or(8),
             max_body_bytes: layer.max_body_bytes.unwrap_or(2_000_000),
             request_timeout: seconds(layer.request_timeout, 30),
+            max_requests: layer.max_requests.unwrap_or(256),
+            rate_limit: layer.rate_limit,
             idle_timeout: seconds(layer.idle_timeout, 15 * 60),
             stop_timeout: seconds(layer.stop_timeout, 30),
         }))

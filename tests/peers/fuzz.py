@@ -2,7 +2,7 @@
 
     pip install -r tests/peers/fuzz.txt
     tandem serve --max-episodes 64 &
-    python tests/peers/fuzz.py http://127.0.0.1:8700
+    python tests/peers/fuzz.py http://127.0.0.1:8700 [OPERATION ...]
 
 Every operation has an episode of its own, under the benchmark protocol. One thing JSON Schema cannot say, and it is left
 out here: that a region names at most 256 pixels.
@@ -43,7 +43,7 @@ def fuzz(url, document, operation, folder):
     return done.returncode == 0
 
 
-def check(url):
+def check(url, only):
     openapi = read(f"{url}/v1/openapi.json")
     depth = openapi["paths"]["/v1/episodes/{episode_id}/tools/query_depth"]["post"]["requestBody"]
     region = depth["content"]["application/json"]["schema"]["properties"]["region"]["properties"]
@@ -55,6 +55,7 @@ def check(url):
     for corner in ("from", "to"):
         region[corner]["prefixItems"] = [{"type": "integer", "minimum": 0, "maximum": 15}] * 2
     operations = [method["operationId"] for path in openapi["paths"].values() for name, method in path.items() if name != "parameters"]
+    operations = [operation for operation in operations if not only or operation in only]
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
         document = folder / "openapi.json"
@@ -63,4 +64,4 @@ def check(url):
 
 
 if __name__ == "__main__":
-    sys.exit(0 if check(sys.argv[1]) else 1)
+    sys.exit(0 if check(sys.argv[1], sys.argv[2:]) else 1)

@@ -99,6 +99,14 @@ impl TestServer {
         self.post(&format!("/v1/episodes/{id}/tools/{tool}"), args)
     }
 
+    /// Headers and text of a page that is not JSON.
+    #[track_caller]
+    pub fn page(&self, path: &str) -> (http::HeaderMap, String) {
+        let mut page = self.agent.get(format!("http://{}{path}", self.address)).call().expect("a page");
+        assert_eq!(page.status(), 200, "{path}");
+        (page.headers().clone(), page.body_mut().read_to_string().expect("a text"))
+    }
+
     pub fn post(&self, path: &str, body: &Value) -> Answer {
         self.send("POST", path, Some("application/json"), body.to_string().as_bytes())
     }

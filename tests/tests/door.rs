@@ -40,8 +40,10 @@ fn header<'a>(answer: &'a str, name: &str) -> &'a str {
 const JSON: &str = "content-type: application/json";
 
 /// A request to every route, with a body where one is read; the episode is the first of seed 0.
-const REQUESTS: [(&str, &str); 11] = [
+const REQUESTS: [(&str, &str); 13] = [
     ("GET /healthz", ""),
+    ("GET /metrics", ""),
+    ("GET /docs", ""),
     ("GET /v1/tasks", ""),
     ("GET /v1/tools", ""),
     ("GET /v1/openapi.json", ""),
@@ -92,7 +94,7 @@ fn programs_and_pages_of_our_own_come_in() {
         {
             let host = format!("host: {host}");
             let headers: Vec<&str> = [host.as_str(), JSON].into_iter().chain(origin.as_deref()).collect();
-            for (line, body) in [REQUESTS[0], REQUESTS[5]] {
+            for (line, body) in [REQUESTS[0], REQUESTS[7]] {
                 let answer = ask(&server, line, &headers, body);
                 assert_eq!(status(&answer), "200", "{line} {headers:?}: {answer}");
             }

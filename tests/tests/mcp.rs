@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 use tandem_tests::TestServer;
-use tandem_tools_spec::Hints;
+use tandem_tools_spec::{Format, Hints};
 
 /// One JSON-RPC request, without any session.
 fn rpc(server: &TestServer, method: &str, params: Value) -> Value {
@@ -25,11 +25,11 @@ fn tools_are_those_of_the_contract() {
     let tools = listed["tools"].as_array().expect("tools");
     let specs = tandem_tools_spec::tool_specs(Hints::On);
     assert_eq!(tools.len(), specs.len());
-    for (tool, spec) in tools.iter().zip(specs) {
-        assert_eq!((&tool["name"], &tool["inputSchema"]), (&json!(spec.name), &json!(spec.lenient_schema())));
-        assert_eq!(tool["annotations"]["readOnlyHint"], json!(spec.read_only), "{tool}");
+    for (tool, spec) in tools.iter().zip(&specs) {
+        assert_eq!(*tool, spec.formatted(Format::Mcp));
         assert!(tool.get("outputSchema").is_none(), "clients drop the pictures of such tools: {tool}");
     }
+    assert_eq!(listed["tools"], server.get("/v1/tools?format=mcp").ok());
 }
 
 #[test]
@@ -48,7 +48,7 @@ fn an_episode_can_be_played() {
     let kinds: Vec<&str> =
         seen["content"].as_array().into_iter().flatten().filter_map(|block| block["type"].as_str()).collect();
     assert_eq!(kinds, ["text", "text", "image", "image"]);
-    assert_eq!(seen["content"][1]["text"], "2 images follow: A, B");
+    assert_eq!(seen["content"][1]["text"], "2 images follow. Image 1: A. Image 2: B.");
     assert!(!text(&seen).contains("png_base64"));
     assert!(seen["content"][2]["data"].as_str().is_some_and(|data| data.starts_with("iVBORw0KGgo")));
 }
@@ -86,7 +86,6 @@ fn fields_that_stand_there_twice_are_refused() {
 fn refusals_are_answers_that_a_model_can_read() {
     let server = TestServer::start();
     for (tool, args, says) in [
-        ("grasp", json!({}), "have: list_tasks, start_episode, observe"),
         ("wait", json!({ "steps": 3 }), "wait needs episode_id"),
         ("wait", json!({ "steps": 3, "episode_id": "nope" }), "no episode \"nope\""),
         ("wait", json!({ "steps": 0, "episode_id": "nope" }), "at least 1"),
@@ -96,4 +95,49 @@ fn refusals_are_answers_that_a_model_can_read() {
         assert_eq!(result["isError"], true, "{result}");
         assert!(text(&result).contains(says), "{result}");
     }
+}
+
+#[test]
+fn a_prompt_tells_what_has_to_be_known_of_a_task() {
+    let server = TestServer::start();
+    let listed = rpc(&server, "prompts/list", json!({}));
+    let prompt = &listed["prompts"][0];
+    assert_eq!(prompt["arguments"][0]["name"], "task", "{listed}");
+    let arguments = json!({ "task": "handover", "seed": "7" });
+    let told = rpc(&server, "prompts/get", json!({ "name": prompt["name"], "arguments": arguments }));
+    let told = told["messages"][0]["content"]["text"].as_str().expect("a text");
+    let tasks = server.get("/v1/tasks").ok();
+    let task = &tasks["tasks"][0];
+    for part in [&task["instruction"], &task["robots"][1]["instruction"], &task["phases"][2]["description"]] {
+        assert!(told.contains(part.as_str().expect("a text")), "{told:?} lacks {part}");
+    }
+    for part in ["pelvis frame", "6000 control steps", "1800 s", "task handover, seed 7, protocol agentic"] {
+        assert!(told.contains(part), "{told:?} lacks {part:?}");
+    }
+}
+
+#[test]
+fn what_is_no_call_is_refused_with_the_codes_of_json_rpc() {
+    let server = TestServer::start();
+    let check = |body: &str, code: i32, says: &str| {
+        let answer = server.send("POST", "/mcp", Some("application/json"), body.as_bytes());
+        assert_eq!(answer.body["error"]["code"], code, "{body}: {answer:?}");
+        let message = answer.body["error"]["message"].as_str().unwrap_or_default();
+        assert!(message.contains(says), "{body}: {message:?}");
+        assert_eq!(answer.header("content-type"), "application/json", "{body}");
+    };
+    let ask = |method: &str, params: Value| {
+        json!({ "jsonrpc": "2.0", "id": 1, "method": method, "params": params }).to_string()
+    };
+    check("{", -32700, "no JSON");
+    check("[]", -32600, "batches");
+    check(&ask("tools/shout", json!({})), -32601, "tools/shout");
+    check(&ask("tools/call", json!({})), -32602, "params.name");
+    check(&ask("tools/call", json!({ "name": "grasp" })), -32602, "have: list_tasks, start_episode, observe");
+    check(&ask("prompts/get", json!({ "name": "nod" })), -32602, "no prompt \"nod\"; have: play_task");
+    let of_task =
+        |arguments: Value| ask("prompts/get", json!({ "name": "play_task", "arguments": arguments }));
+    check(&of_task(json!({})), -32602, "missing field `task`");
+    check(&of_task(json!({ "task": "handove" })), -32602, "have: handover");
+    check(&of_task(json!({ "task": "handover", "seed": "x" })), -32602, "give one as 0");
 }

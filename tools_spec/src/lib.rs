@@ -29,7 +29,7 @@ pub use parts::{
     ImageFormat, JointValues, OperatorToken, Operators, Partner, PartnerDid, PhaseReached, PixelRegion, Png,
     Pose, Protocol, Range, RobotFallen, RobotReport, StopReason,
 };
-pub use schema::{EpisodeToolSpec, ToolSpec};
+pub use schema::{EpisodeToolSpec, Format, ToolSpec};
 pub use tool::{Route, Tool, parse_args};
 pub use tools::*;
 

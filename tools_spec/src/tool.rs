@@ -32,6 +32,8 @@ pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
     const NAME: &'static str;
     /// Whether the call leaves the world exactly as it was and costs no steps.
     const READ_ONLY: bool;
+    /// Whether calling it again with the same arguments changes nothing more.
+    const IDEMPOTENT: bool = Self::READ_ONLY;
 
     /// Arguments that work, shown to callers whose own did not.
     fn example() -> Self;

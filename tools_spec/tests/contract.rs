@@ -50,6 +50,7 @@ fn schemas_are_strict() {
             for keyword in REFUSED_KEYWORDS {
                 assert!(schema.get(*keyword).is_none(), "{}: {keyword} in {schema}", spec.name);
             }
+            assert!(!schema["type"].is_array(), "{}: two types in {schema}", spec.name);
             let Some(properties) = schema["properties"].as_object() else {
                 return;
             };

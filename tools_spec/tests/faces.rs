@@ -1,16 +1,17 @@
 //! The faces that one contract has: with and without hints, strict and lenient, of any episode and of one that runs.
 
-use serde_json::{Value, json};
-use tandem_tools_spec::{Hints, ToolSpec, episode_tool_specs, openapi, tool_specs};
+use serde_json::{Map, Value, json};
+use tandem_tools_spec::{Format, Hints, ToolSpec, episode_tool_specs, openapi, tool_specs};
 
 /// Everything that a policy is told of the tools, face by face.
 fn faces(hints: Hints) -> Vec<String> {
     let specs = tool_specs(hints);
-    let lenient: Vec<_> = specs.iter().map(ToolSpec::lenient_schema).collect();
-    let faces =
-        [json!(specs), json!(lenient), json!(episode_tool_specs(hints, "x", 25)), openapi("1.2.3", hints)];
+    let mut faces = vec![json!(specs), json!(episode_tool_specs(hints, "x", 25)), openapi("1.2.3", hints)];
+    for format in Format::ALL {
+        faces.push(specs.iter().map(|spec| spec.formatted(format)).collect());
+    }
     // Texts of OpenAPI break their lines where the source does.
-    faces.map(|face| face.to_string().replace("\\n", " ")).to_vec()
+    faces.iter().map(|face| face.to_string().replace("\\n", " ")).collect()
 }
 
 #[test]
@@ -33,6 +34,76 @@ fn recipes_are_told_on_every_face_or_on_none() {
 
 fn spec(name: &str) -> ToolSpec {
     tool_specs(Hints::On).into_iter().find(|spec| spec.name == name).expect("a tool")
+}
+
+/// Calls `visit` with every object below `value`, `value` included.
+fn for_each_object(value: &Value, visit: &mut impl FnMut(&Map<String, Value>)) {
+    match value {
+        Value::Array(items) => items.iter().for_each(|item| for_each_object(item, visit)),
+        Value::Object(object) => {
+            visit(object);
+            object.values().for_each(|value| for_each_object(value, visit));
+        }
+        _ => {}
+    }
+}
+
+/// How many fields of all tools may be left out, and how many have a choice of types.
+fn optional_and_unions(tools: &Value) -> (usize, usize) {
+    let (mut optional, mut unions) = (0, 0);
+    for_each_object(tools, &mut |object| {
+        if let (Some(Value::Object(all)), Some(Value::Array(required))) =
+            (object.get("properties"), object.get("required"))
+        {
+            optional += all.len() - required.len();
+        }
+        unions += usize::from(object.contains_key("anyOf"));
+    });
+    (optional, unions)
+}
+
+/// https://platform.claude.com/docs/en/build-with-claude/structured-outputs: at most 20 strict tools, 24 fields that may be left
+/// out and 16 that have a union of types, over all tools of a request.
+#[test]
+fn anthropic_takes_all_tools_at_once() {
+    let tools: Value = tool_specs(Hints::On).iter().map(|spec| spec.formatted(Format::Anthropic)).collect();
+    let (optional, unions) = optional_and_unions(&tools);
+    assert!(tools.as_array().is_some_and(|tools| tools.len() <= 20));
+    assert!(optional <= 24 && unions <= 16, "{optional} fields may be left out, {unions} are unions");
+}
+
+#[test]
+fn a_face_without_null_does_not_speak_of_it() {
+    let tools: Value = tool_specs(Hints::On).iter().map(|spec| spec.formatted(Format::Mcp)).collect();
+    assert_eq!(optional_and_unions(&tools).1, 0);
+    for_each_object(&tools, &mut |object| {
+        let text = object.get("description").and_then(Value::as_str).unwrap_or_default();
+        assert!(
+            !text.to_lowercase().contains("null"),
+            "{text:?}: say \"Null: ...\" of a field that may be null"
+        );
+        assert!(object.get("type").is_none_or(|kind| kind != "null"), "{object:?}");
+    });
+}
+
+#[test]
+fn every_format_has_the_tools_under_their_names() {
+    let specs = tool_specs(Hints::On);
+    for format in Format::ALL {
+        assert_eq!(Format::find(format.name()), Some(format));
+        for spec in &specs {
+            let tool = spec.formatted(format);
+            let tool = if format == Format::OpenAiChat { &tool["function"] } else { &tool };
+            assert_eq!(tool["name"], spec.name, "{format:?}");
+            // What OpenAI accepts at most.
+            assert!(tool["description"].as_str().is_some_and(|text| text.len() <= 1024), "{tool}");
+        }
+    }
+    assert_eq!(Format::find("OpenAI"), None);
+    let hints = |name: &str| spec(name).formatted(Format::Mcp)["annotations"].clone();
+    let (finish, look) = (hints("finish"), hints("get_status"));
+    assert_eq!((&finish["readOnlyHint"], &finish["idempotentHint"]), (&json!(false), &json!(true)));
+    assert_eq!((&look["readOnlyHint"], &look["title"]), (&json!(true), &json!("Get status")));
 }
 
 #[test]

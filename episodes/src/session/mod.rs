@@ -341,6 +341,11 @@ impl Session {
         self.scores.reached().count()
     }
 
+    /// How long physics has taken.
+    pub fn physics(&self) -> Duration {
+        self.physics
+    }
+
     /// How long the policy has thought, up to its last call.
     pub fn thought(&self) -> Duration {
         self.clock.spent()

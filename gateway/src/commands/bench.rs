@@ -7,7 +7,7 @@ use std::{
 
 use clap::Subcommand;
 
-use super::Outcome;
+use super::{Outcome, bench_tools};
 
 /// Measure a part of Tandem on this machine.
 #[derive(Debug, clap::Args)]
@@ -28,6 +28,12 @@ enum Part {
         #[arg(long)]
         json: bool,
     },
+    /// Calls of tools over HTTP on this machine: their time without physics, and that of `wait` against its physics.
+    Tools {
+        /// Print JSON instead of a table.
+        #[arg(long)]
+        json: bool,
+    },
     /// Physics: time of a step of 5 ms with one to three robots that stand, walk or hold a bottle.
     Physics {
         /// Write the cases to this file as JSON, too.
@@ -40,8 +46,27 @@ enum Part {
 pub fn run(args: Args) -> Outcome {
     match args.part {
         Part::Ik { targets, json } => ik(targets.as_deref(), json),
+        Part::Tools { json } => tools(json),
         Part::Physics { json } => physics(json.as_deref()),
     }
+}
+
+fn tools(json: bool) -> Outcome {
+    let report = bench_tools::tools()?;
+    if json {
+        println!("{}", serde_json::to_string_pretty(&report)?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    println!("{:20}{:>8}{:>10}{:>10}", "call", "times", "p50 ms", "p99 ms");
+    for call in &report.calls {
+        println!("{:20}{:>8}{:>10.2}{:>10.2}", call.tool, call.calls, call.p50_ms, call.p99_ms);
+    }
+    let wait = &report.wait;
+    println!(
+        "wait of {} steps: {:.1} ms, of which {:.1} ms physics; {:.3} times its physics (medians of {})",
+        wait.steps, wait.call_p50_ms, wait.physics_p50_ms, wait.ratio_p50, wait.calls
+    );
+    Ok(ExitCode::SUCCESS)
 }
 
 fn physics(json: Option<&Path>) -> Outcome {

@@ -2,16 +2,34 @@
 
 use std::io::IsTerminal;
 
+use clap::ValueEnum;
+use tracing_subscriber::Layer;
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
 
+/// How lines are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// For people.
+    Text,
+    /// One JSON object per line.
+    Json,
+}
+
 /// `TANDEM_LOG` sets what is logged, as `debug` or `tandem=debug`.
 pub fn to_stderr(default: LevelFilter) {
+    write(default, Format::Text);
+}
+
+/// As [`to_stderr`], in the form of `format`.
+pub fn write(default: LevelFilter, format: Format) {
     let wanted = std::env::var("TANDEM_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
-    let lines = tracing_subscriber::fmt::layer()
-        .with_ansi(std::io::stderr().is_terminal())
-        .with_writer(std::io::stderr);
+    let lines = tracing_subscriber::fmt::layer().with_writer(std::io::stderr);
+    let lines = match format {
+        Format::Text => lines.with_ansi(std::io::stderr().is_terminal()).boxed(),
+        Format::Json => lines.json().flatten_event(true).with_span_list(false).boxed(),
+    };
     let filter = wanted.unwrap_or_else(|| Targets::new().with_default(default));
     tracing_subscriber::registry().with(filter).with(lines).init();
 }

@@ -1,8 +1,10 @@
 //! What `tandem` can do: one file per subcommand, each with its flags and its `run`.
 
 pub mod bench;
+mod bench_tools;
 pub mod collect;
 pub mod demo;
+pub mod doctor;
 mod episode_flags;
 pub mod evaluate;
 pub mod locomotion;

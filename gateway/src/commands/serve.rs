@@ -17,6 +17,9 @@ pub struct Args {
     /// TOML file with any of the settings below; flags and environment come first.
     #[arg(long, env = "TANDEM_CONFIG", value_name = "FILE")]
     config: Option<PathBuf>,
+    /// Log for people, or one JSON object per line.
+    #[arg(long, env = "TANDEM_LOG_FORMAT", value_name = "FORMAT", default_value = "text")]
+    log_format: log::Format,
     /// Settings given as flags or environment.
     #[command(flatten)]
     flags: Layer,
@@ -24,7 +27,7 @@ pub struct Args {
 
 /// Serves.
 pub fn run(args: Args) -> Outcome {
-    log::to_stderr(LevelFilter::INFO);
+    log::write(LevelFilter::INFO, args.log_format);
     let flags = Layer { token: token_of_environment()?, ..args.flags };
     let settings = Settings::resolve(flags, args.config.as_deref())?;
     let left = Server::start(settings)?.run_until_signal();

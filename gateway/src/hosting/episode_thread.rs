@@ -21,8 +21,10 @@ use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 use super::{
     Answer, HostingError,
     guarded::Guarded,
+    tally::Tally,
     work::{self, Made},
 };
+use crate::metrics::Metrics;
 
 /// Calls that may wait for one episode. A policy has no use for more than one at a time; a few more are a burst.
 const WAITING_CALLS: usize = 16;
@@ -98,8 +100,9 @@ impl EpisodeThread {
         spec: EpisodeSpec,
         folder: RunFolder,
         permit: OwnedSemaphorePermit,
+        metrics: Arc<Metrics>,
     ) -> Result<(EpisodeThread, Briefing), HostingError> {
-        EpisodeThread::start_with_clock(id, spec, folder, permit, monotonic()).await
+        EpisodeThread::start_with_clock(id, spec, folder, permit, metrics, monotonic()).await
     }
 
     /// As [`EpisodeThread::start`], with the policy's wall clock read from `clock`.
@@ -108,6 +111,7 @@ impl EpisodeThread {
         spec: EpisodeSpec,
         folder: RunFolder,
         permit: OwnedSemaphorePermit,
+        metrics: Arc<Metrics>,
         clock: Clock,
     ) -> Result<(EpisodeThread, Briefing), HostingError> {
         let (commands, inbox) = mpsc::channel(WAITING_CALLS);
@@ -115,11 +119,13 @@ impl EpisodeThread {
         let news = Arc::new(News::default());
         let (from_thread, name, path) = (news.clone(), id.to_owned(), folder.path.clone());
         let thread = move || {
+            // Every line that is logged on this thread names the episode.
+            let _named = tracing::info_span!("thread", episode = name).entered();
             match open_session(&spec, folder, clock) {
                 Ok((session, briefing)) => {
                     // A caller that went away during the start has dropped the inbox's other end, and serve returns.
                     let _ = started.send(Ok(briefing));
-                    let closed = serve(Guarded::new(&name, session), inbox, &from_thread);
+                    let closed = serve(Guarded::new(session, Tally::new(metrics)), inbox, &from_thread);
                     // The place is free before the caller hears of the end, so that it can start the next episode.
                     drop(permit);
                     closed.answer();
@@ -300,7 +306,7 @@ fn serve(mut session: Guarded, mut inbox: mpsc::Receiver<Command>, news: &News) 
                 let _ = session.run(|session| session.end_if_abandoned(idle));
                 news.spread(&session);
                 if session.ended() {
-                    tracing::info!(episode = std::thread::current().name(), "abandoned, and ended");
+                    tracing::info!("abandoned, and ended");
                 }
             }
             Command::Close { reply } => return Closed(Some((reply, session.close()))),

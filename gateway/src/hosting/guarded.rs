@@ -4,14 +4,14 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use tandem_episodes::Session;
-use tandem_tools_spec::ResultReply;
+use tandem_tools_spec::{EndReason, ResultReply};
 
-use super::HostingError;
+use super::{HostingError, tally::Tally};
 
 /// A session, until it has panicked.
 pub struct Guarded {
-    id: String,
     state: State,
+    tally: Tally,
 }
 
 enum State {
@@ -21,16 +21,20 @@ enum State {
 }
 
 impl Guarded {
-    /// A session that the log calls `id`.
-    pub fn new(id: &str, session: Session) -> Guarded {
-        Guarded { id: id.into(), state: State::Sound(Box::new(session)) }
+    /// A session whose doings are counted by `tally`.
+    pub fn new(session: Session, mut tally: Tally) -> Guarded {
+        tally.begin(&session);
+        Guarded { state: State::Sound(Box::new(session)), tally }
     }
 
     /// Lets the session do `work`. A panic ends the episode: its recording is closed, and this and every later work is refused.
     pub fn run<T>(&mut self, work: impl FnOnce(&mut Session) -> T) -> Result<T, HostingError> {
         let State::Sound(session) = &mut self.state else { return Err(HostingError::EpisodePanicked) };
         match catch_unwind(AssertUnwindSafe(|| work(session))) {
-            Ok(done) => Ok(done),
+            Ok(done) => {
+                self.tally.count(session);
+                Ok(done)
+            }
             Err(panic) => {
                 self.after(panic);
                 Err(HostingError::EpisodePanicked)
@@ -55,27 +59,29 @@ impl Guarded {
     }
 
     /// Ends the episode and closes its recording.
-    pub fn close(self) -> Result<ResultReply, HostingError> {
+    pub fn close(mut self) -> Result<ResultReply, HostingError> {
         match self.state {
-            State::Sound(session) => closed(|| session.close()).map_err(|panic| {
-                tracing::error!(episode = self.id, panic = text(&*panic), "not closed");
-                HostingError::EpisodePanicked
-            }),
+            State::Sound(session) => {
+                let result = closed(|| session.close()).map_err(|panic| {
+                    tracing::error!(panic = text(&*panic), "not closed");
+                    HostingError::EpisodePanicked
+                });
+                let reason = result.as_ref().map_or(EndReason::SimulatorFailed, |result| result.ended);
+                self.tally.end(reason);
+                result
+            }
             State::Panicked(result) => result.ok_or(HostingError::EpisodePanicked),
         }
     }
 
     fn after(&mut self, panic: Box<dyn Any + Send>) {
-        tracing::error!(
-            episode = self.id,
-            panic = text(&*panic),
-            "the simulator panicked; this episode ends"
-        );
+        tracing::error!(panic = text(&*panic), "the simulator panicked; this episode ends");
+        self.tally.end(EndReason::SimulatorFailed);
         let State::Sound(session) = std::mem::replace(&mut self.state, State::Panicked(None)) else { return };
         // The broken world may panic once more under way; what is flushed by then can be read nevertheless.
         match closed(|| session.close_failed()) {
             Ok(result) => self.state = State::Panicked(Some(result)),
-            Err(panic) => tracing::error!(episode = self.id, panic = text(&*panic), "not closed"),
+            Err(panic) => tracing::error!(panic = text(&*panic), "not closed"),
         }
     }
 }

@@ -10,6 +10,7 @@ mod hosted;
 mod kept;
 mod run_folder;
 mod table;
+mod tally;
 mod team;
 #[cfg(test)]
 mod tests;

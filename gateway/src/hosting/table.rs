@@ -20,7 +20,7 @@ use super::{
     run_folder,
     team::Team,
 };
-use crate::settings::Settings;
+use crate::{metrics::Metrics, settings::Settings};
 
 /// The episodes of one server.
 #[derive(Debug)]
@@ -29,6 +29,7 @@ pub struct EpisodeTable {
     places: Arc<Semaphore>,
     settings: Arc<Settings>,
     starts: Kept<(StartEpisode, Driving), Started>,
+    metrics: Arc<Metrics>,
 }
 
 /// What came of a start, for as many as want to know.
@@ -49,7 +50,13 @@ impl EpisodeTable {
             places: Arc::new(Semaphore::new(settings.max_episodes as usize)),
             settings,
             starts: Kept::default(),
+            metrics: Arc::default(),
         }
+    }
+
+    /// What has been counted.
+    pub fn metrics(&self) -> &Arc<Metrics> {
+        &self.metrics
     }
 
     /// As [`EpisodeTable::start_driven`], once for a key.
@@ -96,7 +103,8 @@ impl EpisodeTable {
         let (id, path) = run_folder::create(runs, spec.task.id, spec.seed)
             .map_err(|source| HostingError::Folder { runs: runs.clone(), source })?;
         let folder = RunFolder { path, visibility: self.settings.record };
-        let (episode, mut briefing) = EpisodeThread::start(&id, spec, folder, place).await?;
+        let (episode, mut briefing) =
+            EpisodeThread::start(&id, spec, folder, place, self.metrics.clone()).await?;
         self.settings.instructions.rephrase_briefing(&mut briefing);
         if let Err(late) = self.hold(Hosted::new(&id, Arc::new(episode), team)) {
             late.thread.close().await?;
@@ -146,6 +154,11 @@ impl EpisodeTable {
     /// Whether no episode is held.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// How many of them go on.
+    pub fn running(&self) -> usize {
+        self.lock().episodes.values().filter(|episode| !episode.thread.ended()).count()
     }
 
     /// Ends the episodes that nobody plays any more. To be called every now and then.

@@ -24,7 +24,8 @@ async fn start(id: &str, folder: &Path, clock: Clock) -> (Arc<EpisodeThread>, Ar
     let places = Arc::new(Semaphore::new(1));
     let permit = places.clone().try_acquire_owned().unwrap();
     let folder = RunFolder::from(folder);
-    let (episode, briefing) = EpisodeThread::start_with_clock(id, spec, folder, permit, clock).await.unwrap();
+    let (episode, briefing) =
+        EpisodeThread::start_with_clock(id, spec, folder, permit, Arc::default(), clock).await.unwrap();
     (Arc::new(episode), places, briefing)
 }
 

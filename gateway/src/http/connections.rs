@@ -3,7 +3,12 @@
 use std::time::Duration;
 
 use axum::Router;
-use hyper::server::conn::http1;
+use hyper::{
+    Request,
+    body::Incoming,
+    server::conn::http1,
+    service::{Service, service_fn},
+};
 use hyper_util::{
     rt::{TokioIo, TokioTimer},
     service::TowerToHyperService,
@@ -14,6 +19,8 @@ use tokio::{
     task::JoinSet,
     time::sleep,
 };
+
+use super::limits::Peer;
 
 /// How long to wait after the system refused a connection, as where all its file handles are taken.
 const AFTER_REFUSAL: Duration = Duration::from_millis(200);
@@ -30,8 +37,15 @@ pub async fn serve(
     let accepting = async {
         loop {
             match listener.accept().await {
-                Ok((stream, _)) => {
-                    connections.spawn(connection(stream, router.clone(), header_limit, stopping.clone()));
+                Ok((stream, peer)) => {
+                    let peer = Peer(peer.ip());
+                    connections.spawn(connection(
+                        stream,
+                        peer,
+                        router.clone(),
+                        header_limit,
+                        stopping.clone(),
+                    ));
                     while connections.try_join_next().is_some() {}
                 }
                 Err(error) => {
@@ -52,14 +66,20 @@ pub async fn serve(
 
 async fn connection(
     stream: TcpStream,
+    peer: Peer,
     router: Router,
     header_limit: Duration,
     mut stopping: watch::Receiver<bool>,
 ) {
+    let router = TowerToHyperService::new(router);
+    let of_peer = service_fn(move |mut request: Request<Incoming>| {
+        request.extensions_mut().insert(peer);
+        router.call(request)
+    });
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(header_limit)
-        .serve_connection(TokioIo::new(stream), TowerToHyperService::new(router));
+        .serve_connection(TokioIo::new(stream), of_peer);
     let mut connection = std::pin::pin!(connection);
     let stopped = async move {
         let _ = stopping.wait_for(|stopping| *stopping).await;

@@ -5,15 +5,16 @@ use std::sync::Arc;
 
 use axum::{
     Router, body, extract,
-    http::request::Parts,
+    http::{Method, request::Parts},
     middleware::{self, Next},
-    response::Response,
+    response::{IntoResponse, Response},
 };
 use rmcp::{
     ErrorData, RoleServer, ServerHandler,
     model::{
-        CallToolRequestParams, CallToolResponse, CallToolResult, ContentBlock, Implementation,
-        ListToolsResult, PaginatedRequestParams, ServerCapabilities, ServerConfig, Tool, ToolAnnotations,
+        CallToolRequestParams, CallToolResponse, CallToolResult, ContentBlock, GetPromptRequestParams,
+        GetPromptResponse, Implementation, ListPromptsResult, ListToolsResult, PaginatedRequestParams,
+        ServerCapabilities, ServerConfig, Tool,
     },
     service::RequestContext,
     transport::streamable_http_server::{
@@ -23,11 +24,18 @@ use rmcp::{
 use serde::Serialize;
 use serde_json::Value;
 use tandem_tools_spec::{
-    Hints, ListTasks, LookReply, SpecError, StartEpisode, Tool as _, ToolReply, ToolSpec, parse_args,
-    parse_start, tool_specs,
+    CameraImage, Format, ListTasks, LookReply, StartEpisode, Tool as _, ToolReply, ToolSpec, parse_args,
+    parse_start, say_spec, tool_specs,
 };
 
-use super::{app::App, problem::ApiError, request::unambiguous};
+use super::{
+    app::App,
+    counted::{counted, every_tool},
+    envelope,
+    problem::ApiError,
+    prompt,
+    request::unambiguous,
+};
 use crate::hosting::{Answer, Caller, HostingError, Request};
 
 /// What a host tells its model about the server as a whole.
@@ -37,7 +45,7 @@ const INSTRUCTIONS: &str = "Simulated humanoids that must work together. Call li
 
 /// What is nested at `/mcp`, behind the gate, which has looked at `Host` and `Origin`.
 pub fn router(app: App) -> Router {
-    Router::new().fallback_service(service(app)).layer(middleware::from_fn(note_ambiguity))
+    Router::new().fallback_service(service(app)).layer(middleware::from_fn(check_body))
 }
 
 fn service(app: App) -> StreamableHttpService<McpServer, NeverSessionManager> {
@@ -57,7 +65,7 @@ struct McpServer {
 
 impl ServerHandler for McpServer {
     fn get_info(&self) -> ServerConfig {
-        ServerConfig::new(ServerCapabilities::builder().enable_tools().build())
+        ServerConfig::new(ServerCapabilities::builder().enable_tools().enable_prompts().build())
             .with_server_info(Implementation::new("tandem", env!("CARGO_PKG_VERSION")))
             .with_instructions(INSTRUCTIONS)
     }
@@ -65,10 +73,32 @@ impl ServerHandler for McpServer {
     async fn list_tools(
         &self,
         _: Option<PaginatedRequestParams>,
-        _: RequestContext<RoleServer>,
+        context: RequestContext<RoleServer>,
     ) -> Result<ListToolsResult, ErrorData> {
-        let specs = tool_specs(self.app.settings.hints);
-        Ok(ListToolsResult::with_all_items(specs.iter().map(described).collect()))
+        let mut specs = tool_specs(self.app.settings.hints);
+        specs.extend(caller(&context).and_then(|who| self.say_of(who)));
+        let tools: Result<Vec<Tool>, _> =
+            specs.iter().map(|spec| serde_json::from_value(spec.formatted(Format::Mcp))).collect();
+        let tools = tools.map_err(|error| ErrorData::internal_error(error.to_string(), None))?;
+        Ok(ListToolsResult::with_all_items(tools))
+    }
+
+    async fn list_prompts(
+        &self,
+        _: Option<PaginatedRequestParams>,
+        _: RequestContext<RoleServer>,
+    ) -> Result<ListPromptsResult, ErrorData> {
+        Ok(ListPromptsResult::with_all_items(prompt::prompts()))
+    }
+
+    async fn get_prompt(
+        &self,
+        request: GetPromptRequestParams,
+        _: RequestContext<RoleServer>,
+    ) -> Result<GetPromptResponse, ErrorData> {
+        let arguments = request.arguments.unwrap_or_default();
+        let list = self.app.table.task_list();
+        Ok(prompt::prompt(&request.name, arguments, list, self.app.settings.hints)?.into())
     }
 
     async fn call_tool(
@@ -76,14 +106,20 @@ impl ServerHandler for McpServer {
         request: CallToolRequestParams,
         context: RequestContext<RoleServer>,
     ) -> Result<CallToolResponse, ErrorData> {
+        if !every_tool().contains(&request.name.as_ref()) {
+            let text = format!("no tool {:?}; have: {}", request.name, every_tool().join(", "));
+            return Err(ErrorData::invalid_params(text, None));
+        }
         let args = Value::Object(request.arguments.unwrap_or_default());
+        let episode = args["episode_id"].as_str().map(str::to_owned);
         let called = match ambiguity(&context) {
             Some(Ambiguous(reason)) => Err(ApiError::MalformedJson(reason.clone())),
             None => match caller(&context) {
-                Some(who) => self.call(&who, &request.name, args).await,
+                Some(who) => counted(&self.app, &request.name, self.call(who, &request.name, args)).await,
                 None => Err(ApiError::NoToken),
             },
         };
+        self.note(&request.name, episode.as_deref(), called.as_ref().err());
         let result = match called {
             Ok(content) => CallToolResult::success(content),
             // A refusal is the tool's answer, which the model is to read; protocol errors often stay with the host.
@@ -94,6 +130,13 @@ impl ServerHandler for McpServer {
 }
 
 impl McpServer {
+    /// The tool `say`, where `who` may talk.
+    fn say_of(&self, who: &Caller) -> Option<ToolSpec> {
+        let Caller::Operator { episode, .. } = who else { return None };
+        let hosted = self.app.table.hosted(episode).ok()?;
+        hosted.may_talk().then(|| say_spec(self.app.settings.hints, episode).spec)
+    }
+
     async fn call(&self, who: &Caller, name: &str, args: Value) -> Result<Vec<ContentBlock>, ApiError> {
         match name {
             ListTasks::NAME => {
@@ -111,6 +154,17 @@ impl McpServer {
         }
     }
 
+    /// Logs a call and counts a refusal. The line about the request itself knows neither.
+    fn note(&self, tool: &str, episode: Option<&str>, refusal: Option<&ApiError>) {
+        // What callers make up is not logged.
+        let episode = episode.filter(|id| self.app.table.get(id).is_ok());
+        let problem = refusal.map(ApiError::name);
+        if let Some(kind) = problem {
+            self.app.table.metrics().refusal(kind);
+        }
+        tracing::info!(tool, problem, episode, "call");
+    }
+
     async fn call_episode(
         &self,
         who: &Caller,
@@ -118,7 +172,7 @@ impl McpServer {
         mut args: Value,
     ) -> Result<Vec<ContentBlock>, ApiError> {
         let handle = args.as_object_mut().and_then(|object| object.shift_remove("episode_id"));
-        let request = Request::parse(name, args).map_err(|error| ApiError::from(with_every_tool(error)));
+        let request = Request::parse(name, args).map_err(ApiError::from);
         let id = match (handle, who) {
             (Some(Value::String(id)), _) => id,
             // An operator's token says which.
@@ -156,8 +210,7 @@ fn content(answer: &Answer) -> Result<Vec<ContentBlock>, ApiError> {
         object.shift_remove("images");
     }
     let mut content = json_block(&text)?;
-    let robots: Vec<&str> = seen.images.iter().map(|image| image.robot.as_str()).collect();
-    content.push(ContentBlock::text(format!("{} images follow: {}", robots.len(), robots.join(", "))));
+    content.push(ContentBlock::text(numbered(&seen.images)));
     content.extend(
         seen.images.iter().map(|image| ContentBlock::image(image.png_base64.to_base64(), "image/png")),
     );
@@ -165,20 +218,14 @@ fn content(answer: &Answer) -> Result<Vec<ContentBlock>, ApiError> {
 }
 
 /// Who calls, as the gate has found out.
-fn caller(context: &RequestContext<RoleServer>) -> Option<Caller> {
-    context.extensions.get::<Parts>()?.extensions.get().cloned()
+fn caller(context: &RequestContext<RoleServer>) -> Option<&Caller> {
+    context.extensions.get::<Parts>()?.extensions.get()
 }
 
-/// This route serves the tools that need no episode, too.
-fn with_every_tool(error: SpecError) -> SpecError {
-    match error {
-        SpecError::UnknownTool { name, .. } => SpecError::UnknownTool { name, have: every_tool() },
-        error => error,
-    }
-}
-
-fn every_tool() -> Vec<&'static str> {
-    tool_specs(Hints::default()).iter().map(|spec| spec.name).collect()
+/// Says which picture is whose, before they follow.
+fn numbered(images: &[CameraImage]) -> String {
+    let of = |(index, image): (usize, &CameraImage)| format!(" Image {}: {}.", index + 1, image.robot);
+    format!("{} images follow.{}", images.len(), images.iter().enumerate().map(of).collect::<String>())
 }
 
 /// A refusal as a model reads it.
@@ -191,11 +238,16 @@ fn refused(error: &ApiError) -> Vec<ContentBlock> {
 #[derive(Clone)]
 struct Ambiguous(String);
 
-/// Notes on a request whether its body names a field twice, for when its call is answered.
-async fn note_ambiguity(request: extract::Request, next: Next) -> Response {
+/// Refuses what is no message, and notes on a request whether its body names a field twice, for when its call is answered.
+async fn check_body(request: extract::Request, next: Next) -> Response {
     let (mut parts, body) = request.into_parts();
     // The gate has received it, within its limit.
     let bytes = body::to_bytes(body, usize::MAX).await.unwrap_or_default();
+    if parts.method == Method::POST
+        && let Err(error) = envelope::check(&bytes)
+    {
+        return error.into_response();
+    }
     if let Err(reason) = unambiguous(&bytes) {
         parts.extensions.insert(Ambiguous(reason));
     }
@@ -209,11 +261,4 @@ fn ambiguity(context: &RequestContext<RoleServer>) -> Option<&Ambiguous> {
 fn json_block(reply: &impl Serialize) -> Result<Vec<ContentBlock>, ApiError> {
     let text = serde_json::to_string(reply).map_err(|error| ApiError::Reply(error.into()))?;
     Ok(vec![ContentBlock::text(text)])
-}
-
-/// The tool as MCP describes it. No output schema: clients drop the pictures of tools that declare one.
-fn described(spec: &ToolSpec) -> Tool {
-    Tool::new(spec.name, spec.description.clone(), Arc::new(spec.lenient_schema())).with_annotations(
-        ToolAnnotations::new().read_only(spec.read_only).destructive(false).open_world(false),
-    )
 }

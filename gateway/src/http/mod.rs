@@ -3,11 +3,18 @@
 mod access;
 mod app;
 mod connections;
+mod counted;
+mod docs;
 mod encoding;
+mod envelope;
 mod gate;
+#[cfg(test)]
+mod hostile;
 mod key;
+mod limits;
 mod mcp;
 mod problem;
+mod prompt;
 mod request;
 mod routes;
 mod server;

@@ -7,7 +7,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use tandem_episodes::EpisodeError;
-use tandem_tools_spec::{ProblemBody, SpecError};
+use tandem_tools_spec::{Format, ProblemBody, SpecError};
 
 use crate::hosting::{EpisodeThread, HostingError};
 
@@ -106,6 +106,24 @@ pub enum ApiError {
         "content-type {0:?} is not read; send JSON with content-type: application/json, or MessagePack with application/msgpack"
     )]
     ContentType(String),
+    /// More requests are under way than are let in at once.
+    #[error("{limit} requests are under way, which is the most; send it again")]
+    Busy {
+        /// How many may be under way.
+        limit: usize,
+    },
+    /// The caller's address sends more than its share.
+    #[error("an address may send {per_second} requests a second; send it again, and fewer")]
+    TooManyRequests {
+        /// How many it may send.
+        per_second: u32,
+    },
+    /// No such form of the tools' specifications.
+    #[error("no format {name:?}; have: {}", Format::ALL.map(Format::name).join(", "))]
+    UnknownFormat {
+        /// What was asked for.
+        name: String,
+    },
     /// A request that axum refused before any handler saw it.
     #[error("{detail}")]
     Protocol {
@@ -184,9 +202,26 @@ impl ApiError {
             ApiError::ContentType(_) => {
                 ("content-type", "Unsupported content type", StatusCode::UNSUPPORTED_MEDIA_TYPE)
             }
+            ApiError::Busy { .. } => ("busy", "Too many requests at once", StatusCode::SERVICE_UNAVAILABLE),
+            ApiError::TooManyRequests { .. } => {
+                ("too-many-requests", "Too many requests", StatusCode::TOO_MANY_REQUESTS)
+            }
+            ApiError::UnknownFormat { .. } => {
+                ("unknown-format", "Unknown format", StatusCode::UNPROCESSABLE_ENTITY)
+            }
             ApiError::Protocol { status, .. } => ("bad-request", "Bad request", *status),
             ApiError::Reply(_) => INTERNAL,
         }
+    }
+
+    /// The status that it is served with.
+    pub fn status(&self) -> StatusCode {
+        self.kind().2
+    }
+
+    /// The kind's stable name.
+    pub fn name(&self) -> &'static str {
+        self.kind().0
     }
 
     /// The body that this refusal is served with. What is our own fault is logged.
@@ -232,6 +267,7 @@ impl ApiError {
         match self {
             ApiError::Unrecorded { error, .. } => error.retry_after_s(),
             ApiError::Hosting(error) => hosting_retry_s(error),
+            ApiError::Busy { .. } | ApiError::TooManyRequests { .. } => Some(1),
             _ => None,
         }
     }
@@ -249,11 +285,16 @@ fn hosting_retry_s(error: &HostingError) -> Option<u16> {
 
 const INTERNAL: Kind = ("internal", "Internal error", StatusCode::INTERNAL_SERVER_ERROR);
 
+/// That a response refuses, and the name of the problem's kind.
+#[derive(Debug, Clone, Copy)]
+pub struct Refused(pub &'static str);
+
 impl IntoResponse for ApiError {
     fn into_response(self) -> Response {
         let (_, _, status) = self.kind();
         let text = serde_json::json!(self.body()).to_string();
         let mut response = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], text).into_response();
+        response.extensions_mut().insert(Refused(self.name()));
         let headers = response.headers_mut();
         if let Some(seconds) = self.retry_after_s() {
             headers.insert(header::RETRY_AFTER, seconds.into());
@@ -395,14 +436,16 @@ mod tests {
 
     #[test]
     fn what_may_work_later_says_when() {
-        let check = |error: HostingError, expected: Option<&str>| {
-            let response = ApiError::from(error).into_response();
+        let check = |error: ApiError, expected: Option<&str>| {
+            let response = error.into_response();
             let header = response.headers().get(header::RETRY_AFTER).map(|value| value.to_str().unwrap());
             assert_eq!(header, expected, "{}", response.status());
         };
-        check(HostingError::TooManyEpisodes { limit: 8 }, Some("10"));
-        check(HostingError::TooManyWaiting { limit: 16 }, Some("1"));
-        check(HostingError::ShuttingDown, Some("60"));
-        check(HostingError::EpisodeStopped, None);
+        check(HostingError::TooManyEpisodes { limit: 8 }.into(), Some("10"));
+        check(HostingError::TooManyWaiting { limit: 16 }.into(), Some("1"));
+        check(HostingError::ShuttingDown.into(), Some("60"));
+        check(HostingError::EpisodeStopped.into(), None);
+        check(ApiError::Busy { limit: 256 }, Some("1"));
+        check(ApiError::TooManyRequests { per_second: 10 }, Some("1"));
     }
 }

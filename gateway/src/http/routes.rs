@@ -3,32 +3,42 @@
 use axum::{
     Json, Router,
     body::Bytes,
-    extract::{DefaultBodyLimit, Extension, MatchedPath, Path, Request, State},
+    extract::{DefaultBodyLimit, Extension, MatchedPath, Path, Query, Request, State},
     http::{HeaderMap, Method, StatusCode, Uri, header},
     middleware::{self, Next},
-    response::{IntoResponse, Response},
+    response::{Html, IntoResponse, Response},
     routing::{MethodRouter, get, post},
 };
+use serde::Deserialize;
 use serde_json::{Value, json};
 use tandem_tools_spec::{
-    EpisodeToolSpec, ResultReply, TaskList, ToolSpec, episode_tool_specs, parse_start, say_spec, tool_specs,
+    EpisodeToolSpec, Format, ResultReply, StartEpisode, TaskList, Tool as _, episode_tool_specs, parse_start,
+    say_spec, tool_specs,
 };
 
 use super::{
     access,
     app::App,
+    counted::counted,
+    docs,
     encoding::Encoding,
     gate::{self, Gate},
     key::{Key, say_again},
+    limits::{self, Limits},
     mcp,
-    problem::ApiError,
+    problem::{ApiError, Refused},
 };
-use crate::hosting::{Caller, HostingError, Once, Request as Asked};
+use crate::{
+    hosting::{Caller, HostingError, Once, Request as Asked},
+    metrics::Page,
+};
 
 /// Every route: path, methods, handlers.
-fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 8] {
+fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 10] {
     [
         ("/healthz", &["GET"], get(health)),
+        ("/metrics", &["GET"], get(metrics)),
+        ("/docs", &["GET"], get(docs)),
         ("/v1/tasks", &["GET"], get(tasks)),
         ("/v1/tools", &["GET"], get(tools)),
         ("/v1/openapi.json", &["GET"], get(openapi)),
@@ -40,7 +50,7 @@ fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 8] {
 }
 
 /// The whole service.
-pub fn router(app: App, gate: Gate) -> Router {
+pub fn router(app: App, gate: Gate, limits: Limits) -> Router {
     let mut router = Router::new().nest_service("/mcp", mcp::router(app.clone()));
     for (path, _, handlers) in routes() {
         router = router.route(path, handlers);
@@ -52,6 +62,8 @@ pub fn router(app: App, gate: Gate) -> Router {
         .layer(DefaultBodyLimit::disable())
         .layer(middleware::from_fn_with_state(gate, gate::pass))
         .layer(middleware::from_fn_with_state(app.clone(), access::identify))
+        // Before it, so that nobody tries tokens faster than requests are let in.
+        .layer(middleware::from_fn_with_state(limits, limits::pass))
         .layer(middleware::from_fn_with_state(app.clone(), log_and_describe))
         .with_state(app)
 }
@@ -64,8 +76,17 @@ async fn tasks(State(app): State<App>) -> Json<TaskList> {
     Json(app.table.task_list())
 }
 
-async fn tools(State(app): State<App>) -> Json<Vec<ToolSpec>> {
-    Json(tool_specs(app.settings.hints))
+/// What `GET /v1/tools` may be asked for.
+#[derive(Debug, Deserialize)]
+struct ToolsQuery {
+    format: Option<String>,
+}
+
+async fn tools(State(app): State<App>, Query(query): Query<ToolsQuery>) -> Result<Json<Value>, ApiError> {
+    let specs = tool_specs(app.settings.hints);
+    let Some(name) = query.format else { return Ok(Json(json!(specs))) };
+    let format = Format::find(&name).ok_or(ApiError::UnknownFormat { name })?;
+    Ok(Json(specs.iter().map(|spec| spec.formatted(format)).collect()))
 }
 
 async fn episode_tools(
@@ -85,6 +106,19 @@ async fn openapi(State(app): State<App>) -> Json<Value> {
     Json(tandem_tools_spec::openapi(env!("CARGO_PKG_VERSION"), app.settings.hints))
 }
 
+/// The description of the interface as a page, which needs and may load nothing else.
+async fn docs(State(app): State<App>) -> Response {
+    let document = tandem_tools_spec::openapi(env!("CARGO_PKG_VERSION"), app.settings.hints);
+    let policy = (header::CONTENT_SECURITY_POLICY, "default-src 'none'; style-src 'unsafe-inline'");
+    ([policy], Html(docs::page(&document))).into_response()
+}
+
+async fn metrics(State(app): State<App>, Extension(who): Extension<Caller>) -> Result<Response, ApiError> {
+    only_hosts(&who)?;
+    let page = app.table.metrics().page(app.table.len(), app.table.running());
+    Ok(([(header::CONTENT_TYPE, Page::CONTENT_TYPE)], page).into_response())
+}
+
 async fn start(
     State(app): State<App>,
     Extension(who): Extension<Caller>,
@@ -92,15 +126,18 @@ async fn start(
     Key(key): Key,
     body: Bytes,
 ) -> Result<Response, ApiError> {
-    only_hosts(&who)?;
-    let (args, driving) = parse_start(encoding.read(&body)?)?;
-    let Once { reply, again } = match key {
-        Some(key) => app.table.start_once(args, driving, &key).await?,
-        None => Once { reply: app.table.start_driven(args, driving).await?, again: false },
-    };
-    let location = format!("/v1/episodes/{}", reply.episode_id);
-    let written = encoding.write(StatusCode::CREATED, &reply)?;
-    Ok(say_again(([(header::LOCATION, location)], written).into_response(), again))
+    counted(&app, StartEpisode::NAME, async {
+        only_hosts(&who)?;
+        let (args, driving) = parse_start(encoding.read(&body)?)?;
+        let Once { reply, again } = match key {
+            Some(key) => app.table.start_once(args, driving, &key).await?,
+            None => Once { reply: app.table.start_driven(args, driving).await?, again: false },
+        };
+        let location = format!("/v1/episodes/{}", reply.episode_id);
+        let written = encoding.write(StatusCode::CREATED, &reply)?;
+        Ok(say_again(([(header::LOCATION, location)], written).into_response(), again))
+    })
+    .await
 }
 
 async fn status(
@@ -120,16 +157,19 @@ async fn call(
     Path((id, name)): Path<(String, String)>,
     body: Bytes,
 ) -> Result<Response, ApiError> {
-    let episode = app.table.hosted(&id)?;
-    episode.admit(&who)?;
-    let read = || Ok(Asked::parse(&name, without_episode_id(encoding.read(&body)?, &id)?)?);
-    let answer = match read() {
-        Ok(request) => episode.call(&who, request, key.as_deref()).await.map_err(ApiError::from),
-        Err(refusal) => Err(refusal),
-    };
-    let Once { reply, again } = answer.map_err(|refusal: ApiError| refusal.of(&episode.thread))?;
-    let status = if reply.others_play_on { StatusCode::ACCEPTED } else { StatusCode::OK };
-    Ok(say_again(encoding.write(status, &*reply)?, again))
+    counted(&app, &name, async {
+        let episode = app.table.hosted(&id)?;
+        episode.admit(&who)?;
+        let read = || Ok(Asked::parse(&name, without_episode_id(encoding.read(&body)?, &id)?)?);
+        let answer = match read() {
+            Ok(request) => episode.call(&who, request, key.as_deref()).await.map_err(ApiError::from),
+            Err(refusal) => Err(refusal),
+        };
+        let Once { reply, again } = answer.map_err(|refusal: ApiError| refusal.of(&episode.thread))?;
+        let status = if reply.others_play_on { StatusCode::ACCEPTED } else { StatusCode::OK };
+        Ok(say_again(encoding.write(status, &*reply)?, again))
+    })
+    .await
 }
 
 async fn remove(
@@ -177,8 +217,8 @@ fn refused_route(method: Method, uri: Uri, other_method: bool) -> ApiError {
     ApiError::NoRoute { method: method.to_string(), path: uri.path().into(), have, other_method }
 }
 
-/// Logs every request, and turns refusals of axum's own (as of a path that is not UTF-8) into problem details. Of what a caller
-/// wrote, the log has the route, and the episode where there is such an episode: whatever else there is may be a secret.
+/// Logs and counts every request, and turns refusals of axum's own (as of a path that is not UTF-8) into problem details. Of what
+/// a caller wrote, the log has the route, and the episode where there is such an episode: whatever else there is may be a secret.
 async fn log_and_describe(State(app): State<App>, request: Request, next: Next) -> Response {
     let method = request.method().clone();
     let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str).to_owned();
@@ -193,8 +233,12 @@ async fn log_and_describe(State(app): State<App>, request: Request, next: Next) 
         response = ApiError::Protocol { status, detail }.into_response();
         response.headers_mut().extend(allow.map(|methods| (header::ALLOW, methods)));
     }
+    let problem = response.extensions().get().map(|Refused(kind)| *kind);
+    if let Some(kind) = problem {
+        app.table.metrics().refusal(kind);
+    }
     let ms = began.elapsed().as_millis() as u64;
-    tracing::info!(%method, route, episode, status = status.as_u16(), ms, "request");
+    tracing::info!(%method, route, episode, status = status.as_u16(), problem, ms, "request");
     response
 }
 

@@ -4,7 +4,7 @@ use std::{io, net::SocketAddr, sync::Arc, time::Duration};
 
 use tokio::{net::TcpListener, runtime::Runtime, sync::oneshot, task::JoinHandle, time::interval};
 
-use super::{app::App, connections, gate::Gate, routes::router};
+use super::{app::App, connections, gate::Gate, limits::Limits, routes::router};
 use crate::{hosting::EpisodeTable, settings::Settings};
 
 /// Requests only parse, wait and answer; the worlds have threads of their own.
@@ -44,7 +44,7 @@ impl Server {
         let address = listener.local_addr()?;
         let table = Arc::new(EpisodeTable::new(settings.clone()));
         let app = App { table: table.clone(), settings: settings.clone() };
-        let router = router(app, Gate::new(settings.clone(), address.ip()));
+        let router = router(app, Gate::new(settings.clone(), address.ip()), Limits::new(&settings));
         let (stop, stopped) = oneshot::channel::<()>();
         let served = runtime.spawn(connections::serve(listener, router, settings.request_timeout, async {
             let _ = stopped.await;

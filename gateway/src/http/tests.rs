@@ -30,7 +30,7 @@ fn hold(server: &Server, id: &str, robot: &Path, folder: &Path) {
         ..EpisodeSpec::new(handover, 0, Protocol::Benchmark)
     };
     let permit = Arc::new(Semaphore::new(1)).try_acquire_owned().unwrap();
-    let started = EpisodeThread::start(id, spec, RunFolder::from(folder), permit);
+    let started = EpisodeThread::start(id, spec, RunFolder::from(folder), permit, Arc::default());
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
     let (episode, _) = runtime.block_on(started).unwrap();
     server.table().insert(id, Arc::new(episode)).map_err(drop).unwrap();

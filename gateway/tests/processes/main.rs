@@ -1,6 +1,7 @@
 //! The program itself: stopped, killed, and on a full disk.
 
 mod killed;
+mod logs;
 mod resumed;
 mod server;
 mod stopped;

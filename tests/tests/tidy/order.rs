@@ -42,7 +42,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "gateway",
         &[
-            &["token"],
+            &["token", "metrics"],
             &["settings"],
             &["hosting"],
             &["http"],

@@ -1,11 +1,13 @@
 //! The contract as machines read it: strict JSON Schema for the hosts of language models, OpenAPI for everybody else.
 
-mod lenient;
+mod format;
+mod nullable;
 mod openapi;
 mod plain;
 mod spec;
 mod strict;
 
+pub use format::Format;
 pub use openapi::openapi;
 pub use plain::{body_schema, plain_schema};
 pub use spec::{EpisodeToolSpec, ToolSpec};

@@ -2,6 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
+use super::format::Format;
 use super::plain::plain_schema;
 use super::spec::ToolSpec;
 use crate::error::ProblemBody;
@@ -54,18 +55,42 @@ fn paths_without_tools() -> Map<String, Value> {
     let health = json!({ "type": "object", "description": "The server answers." });
     let health = operation("health", "Whether the server answers.", "200", health);
     let specs = json!({ "type": "array", "items": { "type": "object" } });
-    let tools =
-        "The tools as specifications for language models, which name the episode among the arguments.";
-    let tools = operation("list_tools", tools, "200", specs.clone());
     let of_episode = "The tools of a running episode: each with its route and with the schema of its body, which says how \
         many control steps the episode's protocol allows for one command.";
-    let of_episode = operation("list_episode_tools", of_episode, "200", specs);
+    let of_episode = operation("list_episode_tools", of_episode, "200", specs.clone());
+    let docs = text("docs", "This description as a page.", "text/html");
+    let metrics =
+        text("metrics", "What the server has done and does, in the text format of Prometheus.", "text/plain");
     let paths = [
         ("/healthz", json!({ "get": health })),
-        ("/v1/tools", json!({ "get": tools })),
+        ("/metrics", json!({ "get": metrics })),
+        ("/docs", json!({ "get": docs })),
+        ("/v1/tools", json!({ "get": list_tools(specs) })),
         ("/v1/episodes/{episode_id}/tools", json!({ "parameters": [episode_id()], "get": of_episode })),
     ];
     paths.into_iter().map(|(path, methods)| (path.into(), methods)).collect()
+}
+
+fn list_tools(specs: Value) -> Value {
+    let tools =
+        "The tools as specifications for language models, which name the episode among the arguments.";
+    let mut list = operation("list_tools", tools, "200", specs);
+    list["parameters"] = json!([{
+        "name": "format",
+        "in": "query",
+        "required": false,
+        "description": "The form that the SDKs of OpenAI (Responses, or Chat Completions) and Anthropic take as it is, or that of \
+            MCP. Left out: one form with the route of each tool.",
+        "schema": { "type": "string", "enum": Format::ALL.map(Format::name) },
+    }]);
+    list
+}
+
+/// What is answered with a text that has no schema.
+fn text(id: &str, description: &str, kind: &str) -> Value {
+    let mut operation = operation(id, description, "200", Value::Null);
+    operation["responses"]["200"]["content"] = json!({ (kind): { "schema": { "type": "string" } } });
+    operation
 }
 
 fn operation(id: &str, description: &str, success: &str, reply: Value) -> Value {

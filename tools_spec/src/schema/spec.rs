@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::lenient::lenient_schema;
+use super::nullable::leave_out;
 use super::plain::{body_schema, plain_schema};
 use super::strict::{require_episode_id, strict_schema};
 use crate::limits::bound_steps;
@@ -28,6 +28,9 @@ pub struct ToolSpec {
     pub reply_schema: Value,
     /// Whether the call leaves the world as it was.
     pub read_only: bool,
+    /// Whether calling it again changes nothing more.
+    #[serde(skip)]
+    pub idempotent: bool,
     /// Whether the tool acts on an episode that `start_episode` made.
     pub on_episode: bool,
     /// Where REST serves it.
@@ -62,6 +65,7 @@ impl ToolSpec {
             marked_body: body_schema::<T>(hints),
             reply_schema: plain_schema::<T::Reply>(),
             read_only: T::READ_ONLY,
+            idempotent: T::IDEMPOTENT,
             on_episode: false,
             route: T::route(),
         }
@@ -82,9 +86,22 @@ impl ToolSpec {
         schema
     }
 
-    /// The strict schema in which a field that may be null may be left out.
+    /// The strict schema with one thing let go: what may be null is left out instead. For hosts that check arguments against the
+    /// schema and do not insist on strictness, as those of MCP.
     pub fn lenient_schema(&self) -> Map<String, Value> {
-        lenient_schema(&self.input_schema)
+        self.leaving_out(true)
+    }
+
+    /// A strict schema for hosts that limit both how many fields of all tools may be left out and how many may be of two types:
+    /// the call's own fields may be null, those of the entries of its lists may be left out.
+    pub fn few_unions_schema(&self) -> Map<String, Value> {
+        self.leaving_out(false)
+    }
+
+    fn leaving_out(&self, own_fields: bool) -> Map<String, Value> {
+        let mut schema = Value::Object(self.input_schema.clone());
+        leave_out(&mut schema, own_fields);
+        schema.as_object_mut().map(std::mem::take).unwrap_or_default()
     }
 
     /// The tool as the running episode `id` has it.

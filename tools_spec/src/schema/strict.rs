@@ -4,6 +4,7 @@
 use schemars::JsonSchema;
 use serde_json::{Map, Value, json};
 
+use super::nullable::as_choices;
 use super::plain::argument_schema;
 use crate::parts::Hints;
 
@@ -61,6 +62,7 @@ fn make_strict(schema: &mut Value) {
             DROPPED.iter().for_each(|keyword| drop(object.remove(*keyword)));
             unwrap_lines(object);
             list_choices(object);
+            as_choices(object);
             if object.get("type").is_some_and(|kind| kind == "object") {
                 close_object(object);
             }

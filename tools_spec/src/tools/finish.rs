@@ -17,6 +17,7 @@ impl Tool for Finish {
     type Reply = ResultReply;
     const NAME: &'static str = "finish";
     const READ_ONLY: bool = false;
+    const IDEMPOTENT: bool = true;
 
     fn example() -> Self {
         Finish {}

@@ -39,17 +39,17 @@ pub struct WristMove {
     /// The robot, as "A".
     #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
-    /// Left wrist position [x, y, z] in metres, as [0.30, 0.20, 0.10]. Null keeps where it is to be; without an orientation
+    /// Left wrist position [x, y, z] in metres, as [0.30, 0.20, 0.10]. Null: it stays where it is to be; without an orientation
     /// either, the arm keeps its joints.
     pub left_position_m: Option<[f64; 3]>,
-    /// Left wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null keeps how it is to be turned; without a position either, the
+    /// Left wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null: it stays as it is to be turned; without a position either, the
     /// arm keeps its joints.
     #[schemars(extend("contains" = limits::direction()))]
     pub left_quaternion_wxyz: Option<[f64; 4]>,
-    /// Right wrist position [x, y, z] in metres, as [0.30, -0.20, 0.10]. Null keeps where it is to be; without an orientation
+    /// Right wrist position [x, y, z] in metres, as [0.30, -0.20, 0.10]. Null: it stays where it is to be; without an orientation
     /// either, the arm keeps its joints.
     pub right_position_m: Option<[f64; 3]>,
-    /// Right wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null keeps how it is to be turned; without a position either,
+    /// Right wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null: it stays as it is to be turned; without a position either,
     /// the arm keeps its joints.
     #[schemars(extend("contains" = limits::direction()))]
     pub right_quaternion_wxyz: Option<[f64; 4]>,
@@ -62,11 +62,11 @@ pub struct WristMove {
     #[schemars(range(min = LEAST_COMPLIANCE_N_S_M))]
     pub compliance_n_s_m: Option<f64>,
     /// Left finger joint angles in radians: [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1]. Positive angles
-    /// close thumb_1 and thumb_2, negative ones middle and index. Null keeps the target.
+    /// close thumb_1 and thumb_2, negative ones middle and index. Null: the target stays.
     #[schemars(extend("hint" = "Closed around a bottle: [0, 0.75, 0.8, -1.1, -1.3, -1.1, -1.3]; open: [0, -0.3, 0, 0, 0, 0, 0]."))]
     pub left_fingers_rad: Option<[f64; 7]>,
     /// Right finger joint angles in radians: [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1]. Negative angles
-    /// close thumb_1 and thumb_2, positive ones middle and index. Null keeps the target.
+    /// close thumb_1 and thumb_2, positive ones middle and index. Null: the target stays.
     #[schemars(extend("hint" = "Closed around a bottle: [0, -0.75, -0.8, 1.1, 1.3, 1.1, 1.3]; open: [0, 0.3, 0, 0, 0, 0, 0]."))]
     pub right_fingers_rad: Option<[f64; 7]>,
     /// Forward velocity in metres per second during this command. Null: 0.
@@ -75,7 +75,7 @@ pub struct WristMove {
     pub vy_m_s: Option<f64>,
     /// Turning rate in radians per second during this command, counter-clockwise seen from above. Null: 0.
     pub yaw_rate_rad_s: Option<f64>,
-    /// Height of the pelvis above the floor in metres. Null keeps the target.
+    /// Height of the pelvis above the floor in metres. Null: the target stays.
     pub pelvis_height_m: Option<f64>,
 }
 

@@ -35,7 +35,7 @@ pub struct WalkMove {
     pub vy_m_s: f64,
     /// Turning rate in radians per second, counter-clockwise seen from above.
     pub yaw_rate_rad_s: f64,
-    /// Height of the pelvis above the floor in metres. Null keeps the target.
+    /// Height of the pelvis above the floor in metres. Null: the target stays.
     pub pelvis_height_m: Option<f64>,
 }
 

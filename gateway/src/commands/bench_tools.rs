@@ -1,0 +1,141 @@
+//! `tandem bench tools`: what a call costs beside its physics, over real HTTP on this machine.
+
+use std::{
+    error::Error,
+    net::{Ipv4Addr, SocketAddr},
+    time::{Duration, Instant},
+};
+
+use serde::Serialize;
+use tandem_episodes::{players::Caller, tasks};
+use tandem_tools_spec::{GetRobotState, GetStatus, Protocol, StartEpisode, ToolCall, Wait};
+
+use crate::{
+    drivers::HttpEpisode,
+    http::Server,
+    settings::{Layer, Settings},
+};
+
+/// Calls of each kind that are timed.
+const CALLS: usize = 2000;
+/// Calls before, which warm up.
+const WARM_UP: usize = 100;
+/// Waits that are timed; an episode of the benchmark protocol has the steps for them.
+const WAITS: usize = 30;
+/// Control steps of each wait.
+const STEPS: u32 = 25;
+
+/// Figures of calls on one episode of two robots, that is recorded as any is.
+#[derive(Debug, Serialize)]
+pub struct ToolsReport {
+    /// Of calls without physics.
+    pub calls: Vec<CallTimes>,
+    /// Of `wait`, against its physics.
+    pub wait: WaitTimes,
+}
+
+/// Times of one tool, from the first byte sent to the reply read.
+#[derive(Debug, Serialize)]
+pub struct CallTimes {
+    /// The tool.
+    pub tool: &'static str,
+    /// How often it was called.
+    pub calls: usize,
+    /// Median, in milliseconds.
+    pub p50_ms: f64,
+    /// The 99th percentile, in milliseconds.
+    pub p99_ms: f64,
+}
+
+/// Times of `wait` with [`STEPS`] steps.
+#[derive(Debug, Serialize)]
+pub struct WaitTimes {
+    /// Control steps of each.
+    pub steps: u32,
+    /// How often it was called.
+    pub calls: usize,
+    /// Median of the whole call, in milliseconds.
+    pub call_p50_ms: f64,
+    /// Median of its physics, in milliseconds.
+    pub physics_p50_ms: f64,
+    /// Median of the one over the other, call by call.
+    pub ratio_p50: f64,
+}
+
+/// Plays an episode on a server of its own and times its calls.
+pub fn tools() -> Result<ToolsReport, Box<dyn Error>> {
+    let runs = tempfile::tempdir()?;
+    let flags = Layer {
+        listen: Some(SocketAddr::from((Ipv4Addr::LOCALHOST, 0))),
+        runs: Some(runs.path().into()),
+        ..Layer::default()
+    };
+    let server = Server::start(Settings::resolve(flags, None)?)?;
+    let task = tasks::ALL[0].id.into();
+    let args = StartEpisode { task, seed: 0, protocol: Some(Protocol::Benchmark) };
+    let (mut episode, _) = HttpEpisode::start(server.address(), &args)?;
+    let looks = [GetStatus {}.into(), GetRobotState { robot: "A".into() }.into()];
+    let calls = looks.into_iter().map(|call| times(&mut episode, &call)).collect::<Result<_, _>>()?;
+    let wait = waits(&mut episode, || server.table().metrics().physics())?;
+    episode.delete()?;
+    server.stop();
+    Ok(ToolsReport { calls, wait })
+}
+
+fn times(episode: &mut HttpEpisode, call: &ToolCall) -> Result<CallTimes, Box<dyn Error>> {
+    let mut times_ms = Vec::with_capacity(CALLS);
+    for number in 0..WARM_UP + CALLS {
+        let began = Instant::now();
+        episode.call(call.clone())?;
+        if number >= WARM_UP {
+            times_ms.push(ms(began.elapsed()));
+        }
+    }
+    let [p50_ms, p99_ms] = [0.5, 0.99].map(|share| percentile(&mut times_ms, share));
+    Ok(CallTimes { tool: call.name(), calls: CALLS, p50_ms, p99_ms })
+}
+
+fn waits(episode: &mut HttpEpisode, physics: impl Fn() -> Duration) -> Result<WaitTimes, Box<dyn Error>> {
+    let (mut calls_ms, mut physics_ms, mut ratios) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..WAITS {
+        let (began, physics_before) = (Instant::now(), physics());
+        episode.call(Wait { steps: STEPS }.into())?;
+        let (whole_ms, of_it_ms) = (ms(began.elapsed()), ms(physics() - physics_before));
+        calls_ms.push(whole_ms);
+        physics_ms.push(of_it_ms);
+        ratios.push(whole_ms / of_it_ms);
+    }
+    Ok(WaitTimes {
+        steps: STEPS,
+        calls: WAITS,
+        call_p50_ms: percentile(&mut calls_ms, 0.5),
+        physics_p50_ms: percentile(&mut physics_ms, 0.5),
+        ratio_p50: percentile(&mut ratios, 0.5),
+    })
+}
+
+fn ms(time: Duration) -> f64 {
+    time.as_secs_f64() * 1e3
+}
+
+/// The smallest of `values` that at least `share` of them do not exceed.
+fn percentile(values: &mut [f64], share: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let rank = (share * values.len() as f64).ceil() as usize;
+    values[rank.clamp(1, values.len()) - 1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percentiles_are_values_that_occurred() {
+        let mut values: Vec<f64> = (1..=100).rev().map(f64::from).collect();
+        assert_eq!(
+            [0.5, 0.99, 1.0, 0.0].map(|share| percentile(&mut values, share)),
+            [50.0, 99.0, 100.0, 1.0]
+        );
+        assert_eq!(percentile(&mut [7.0], 0.99), 7.0);
+    }
+}

@@ -1,0 +1,162 @@
+//! `tandem doctor`: what works on this machine, and what to do about what does not.
+
+use std::{
+    fs,
+    net::TcpListener,
+    path::Path,
+    process::ExitCode,
+    thread::available_parallelism,
+    time::{Duration, Instant, SystemTime, UNIX_EPOCH},
+};
+
+use tandem_episodes::{EpisodeSpec, RendererKind, Session, create_private_folder, tasks};
+use tandem_tools_spec::{Observe, Protocol, ToolCall, Wait};
+
+use super::Outcome;
+use crate::settings::{Layer, Settings};
+
+/// Control steps that are tried.
+const TRIED_STEPS: u32 = 25;
+/// Slower than this, a call that asks for physics keeps its caller waiting longer than the robots would.
+const REAL_TIME: f64 = 1.0;
+/// No clock that is set right shows an earlier time than this program was written at: 2026.
+const WRITTEN: Duration = Duration::from_secs(1_767_225_600);
+/// Shares of a second that the clock has to tell apart, to time calls.
+const FINEST: Duration = Duration::from_millis(1);
+/// Fewer cores let episodes wait for each other.
+const CORES: usize = 2;
+
+/// Say what works on this machine: pictures, physics, the port, the folder of recordings, clocks and cores.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The settings of the server that is to run here.
+    #[command(flatten)]
+    flags: Layer,
+}
+
+/// What was found: a line, and where something is wrong, what to do.
+type Finding = Result<String, String>;
+
+/// Prints a line for each check. What does not work makes it a failure.
+pub fn run(args: Args) -> Outcome {
+    let renderer = args.flags.renderer.unwrap_or_default();
+    let settings = Settings::resolve(args.flags, None)?;
+    let findings = [
+        ("renderer", renderer.describe().map_err(|error| error.to_string())),
+        ("physics", physics(renderer)),
+        ("port", port(&settings)),
+        ("runs", runs(&settings.runs)),
+        ("clock", clock()),
+        ("cores", cores()),
+    ];
+    for (what, finding) in &findings {
+        let (word, text) = match finding {
+            Ok(text) => ("ok", text),
+            Err(text) => ("WRONG", text),
+        };
+        println!("{what:10}{word:7}{text}");
+    }
+    let sound = findings.iter().all(|(_, finding)| finding.is_ok());
+    Ok(if sound { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Plays half a second of the first task, and looks.
+fn physics(renderer: RendererKind) -> Finding {
+    let play = || {
+        let spec = EpisodeSpec { renderer, ..EpisodeSpec::new(&tasks::ALL[0], 0, Protocol::Benchmark) };
+        let mut session = Session::start(&spec, None)?;
+        session.call(Wait { steps: TRIED_STEPS }.into())?;
+        let simulated_s = session.present().time_s;
+        let began = Instant::now();
+        session.call(ToolCall::from(Observe { robots: None, short: None }))?;
+        Ok((simulated_s / session.physics().as_secs_f64(), began.elapsed()))
+    };
+    let (factor, look) =
+        play().map_err(|error: tandem_episodes::EpisodeError| format!("{error}; please report it"))?;
+    let text = format!("{factor:.0} times real time, {} ms for a look of two robots", look.as_millis());
+    if factor < REAL_TIME {
+        return Err(format!("{text}; build with --release, and run fewer episodes at once"));
+    }
+    Ok(text)
+}
+
+fn port(settings: &Settings) -> Finding {
+    match TcpListener::bind(settings.listen) {
+        Ok(_) => Ok(format!("{} is free", settings.listen)),
+        Err(error) => {
+            Err(format!("{}: {error}; stop what listens there, or give another --listen", settings.listen))
+        }
+    }
+}
+
+fn runs(folder: &Path) -> Finding {
+    let shown = folder.display();
+    let there = folder.exists();
+    let probe = folder.join(format!(".doctor-{}", std::process::id()));
+    let tried = create_private_folder(folder).and_then(|()| fs::write(&probe, "probe"));
+    let cleared = fs::remove_file(&probe);
+    if !there {
+        // What was not there before is not left behind; nor is it taken away where somebody has put something in.
+        let _ = fs::remove_dir(folder);
+    }
+    match tried.and(cleared) {
+        Ok(()) => Ok(format!("{shown} can be written")),
+        Err(error) => Err(format!("{shown}: {error}; make it writable, or give another --runs")),
+    }
+}
+
+fn clock() -> Finding {
+    let began = Instant::now();
+    let mut tick = Duration::ZERO;
+    while tick.is_zero() {
+        tick = began.elapsed();
+    }
+    if tick > FINEST {
+        return Err(format!("ticks every {tick:?}, too coarse to time calls; run on another machine"));
+    }
+    match SystemTime::now().duration_since(UNIX_EPOCH) {
+        Ok(now) if now >= WRITTEN => Ok(format!("ticks within {tick:?}, and its date can be")),
+        _ => Err("shows a time before 2026, and recordings name theirs; set the date".into()),
+    }
+}
+
+fn cores() -> Finding {
+    match available_parallelism() {
+        Ok(cores) if cores.get() < CORES => {
+            Err(format!("{cores}; give at least {CORES}, or run one episode at a time with --max-episodes 1"))
+        }
+        Ok(cores) => Ok(format!("{cores}, as many episodes run at full speed")),
+        Err(error) => Err(format!("not known: {error}; the program runs, as fast as it can")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_port_that_is_taken_and_a_folder_that_cannot_be_written_say_what_to_do() {
+        let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+        let flags = Layer { listen: Some(taken.local_addr().unwrap()), ..Layer::default() };
+        let settings = Settings::resolve(flags, None).unwrap();
+        assert!(port(&settings).unwrap_err().contains("give another --listen"));
+        drop(taken);
+        assert!(port(&settings).is_ok());
+
+        let place = tempfile::tempdir().unwrap();
+        let file = place.path().join("file");
+        fs::write(&file, "no folder").unwrap();
+        assert!(runs(&file.join("runs")).unwrap_err().contains("give another --runs"));
+        assert_eq!(fs::read_to_string(&file).unwrap(), "no folder");
+    }
+
+    #[test]
+    fn looking_leaves_nothing_behind() {
+        let place = tempfile::tempdir().unwrap();
+        let (new, kept) = (place.path().join("new"), place.path().join("kept"));
+        fs::create_dir(&kept).unwrap();
+        assert!(runs(&new).is_ok() && runs(&kept).is_ok());
+        assert!(!new.exists() && kept.exists());
+        assert_eq!(fs::read_dir(&kept).unwrap().count(), 0);
+    }
+}

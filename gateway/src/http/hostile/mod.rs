@@ -1,0 +1,209 @@
+//! Calls that nobody means well with, some thousand of them: what is refused changes no state, tells nothing of the server, and
+//! ends nothing.
+
+mod generate;
+
+use std::sync::Arc;
+
+use axum::{
+    Router,
+    body::{Body, to_bytes},
+    http::{Request, StatusCode, header},
+};
+use hyper::service::Service as _;
+use hyper_util::service::TowerToHyperService;
+use serde_json::{Value, json};
+use tandem_episodes::tasks;
+use tandem_tools_spec::{Hints, ManageReply, Protocol, StartEpisode, ToolReply, ToolSpec, tool_specs};
+use tokio::runtime::Runtime;
+
+use super::{app::App, gate::Gate, limits::Limits, routes::router};
+use crate::{
+    hosting::EpisodeTable,
+    settings::{Layer, Settings},
+};
+use generate::{Chance, allowed, bytes, spoil, text};
+
+/// A server without a network, and the one episode that it holds.
+struct Target {
+    runtime: Runtime,
+    router: TowerToHyperService<Router>,
+    table: Arc<EpisodeTable>,
+    specs: Vec<ToolSpec>,
+    runs: tempfile::TempDir,
+    id: String,
+}
+
+/// What came back.
+struct Answer {
+    status: StatusCode,
+    body: Value,
+}
+
+impl Answer {
+    /// Refused over HTTP, by JSON-RPC, or as a tool's answer over MCP.
+    fn refuses(&self) -> bool {
+        !self.status.is_success() || self.body["error"].is_object() || self.body["result"]["isError"] == true
+    }
+}
+
+impl Target {
+    fn new() -> Target {
+        let runs = tempfile::tempdir().unwrap();
+        let flags = Layer { runs: Some(runs.path().into()), max_episodes: Some(1), ..Layer::default() };
+        let settings = Settings::resolve(flags, None).unwrap();
+        let table = Arc::new(EpisodeTable::new(settings.clone()));
+        let app = App { table: table.clone(), settings: settings.clone() };
+        let gate = Gate::new(settings.clone(), [127, 0, 0, 1].into());
+        let router = TowerToHyperService::new(router(app, gate, Limits::new(&settings)));
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+        let specs = tool_specs(Hints::On);
+        let mut target = Target { runtime, router, table, specs, runs, id: String::new() };
+        target.start();
+        target
+    }
+
+    fn start(&mut self) {
+        let task = tasks::ALL[0].id.into();
+        let args = StartEpisode { task, seed: 0, protocol: Some(Protocol::Benchmark) };
+        self.id = self.runtime.block_on(self.table.start(args)).unwrap().episode_id;
+    }
+
+    /// State hash and control steps of the episode, and whether it has ended.
+    fn state(&self) -> (String, u32, bool) {
+        let episode = self.table.get(&self.id).unwrap();
+        match self.runtime.block_on(episode.status()).unwrap().reply {
+            ToolReply::Manage(ManageReply::GetStatus(status)) => {
+                (status.state_hash, status.env_steps, status.ended.is_some())
+            }
+            other => panic!("{other:?} is no status"),
+        }
+    }
+
+    fn send(&self, request: Request<Body>) -> Answer {
+        self.runtime.block_on(async {
+            let response = self.router.call(request).await.unwrap_or_else(|never| match never {});
+            let status = response.status();
+            let bytes = to_bytes(Body::new(response.into_body()), usize::MAX).await.unwrap();
+            let body = serde_json::from_slice(&bytes).unwrap_or_default();
+            Answer { status, body }
+        })
+    }
+
+    /// Some request, by chance.
+    fn request(&self, chance: &mut Chance) -> (String, Vec<u8>) {
+        let spec = chance.of(&self.specs);
+        let mut args = allowed(&spec.body_schema(50), chance);
+        for _ in 0..*chance.of(&[0, 1, 1, 1, 1, 1, 2, 3]) {
+            spoil(&mut args, chance);
+        }
+        match chance.below(20) {
+            0 => ("/v1/episodes".into(), bytes(&args, chance)),
+            1 => (format!("/v1/episodes/{}/tools/x{}", self.id, chance.below(9)), bytes(&args, chance)),
+            2 => (format!("/v1/episodes/nope{}/tools/{}", chance.below(9), spec.name), bytes(&args, chance)),
+            3..=6 => ("/mcp".into(), bytes(&self.over_mcp(spec.name, args, chance), chance)),
+            _ => (format!("/v1/episodes/{}/tools/{}", self.id, spec.name), bytes(&args, chance)),
+        }
+    }
+
+    fn over_mcp(&self, tool: &str, mut args: Value, chance: &mut Chance) -> Value {
+        let name = if chance.percent(90) { tool.to_owned() } else { text(chance) };
+        if let (true, Some(args)) = (chance.percent(90), args.as_object_mut()) {
+            args.insert("episode_id".into(), json!(self.id));
+        }
+        let method =
+            *chance.of(&["tools/call", "tools/call", "tools/call", "prompts/get", "tools/list", "x"]);
+        let params = json!({ "name": name, "arguments": args });
+        let mut message = json!({ "jsonrpc": "2.0", "id": 1, "method": method, "params": params });
+        if chance.percent(10) {
+            spoil(&mut message, chance);
+        }
+        message
+    }
+}
+
+/// Checks what a refusal says.
+fn check_refusal(target: &Target, answer: &Answer, sent: &str) {
+    let told = answer.body.to_string();
+    assert_ne!(answer.status, StatusCode::INTERNAL_SERVER_ERROR, "{sent}: {told}");
+    let runs = target.runs.path().to_string_lossy().into_owned();
+    for secret in [&*runs, "panicked", ".rs:", "RUST_BACKTRACE"] {
+        assert!(!told.contains(secret), "{sent}: {told} tells {secret:?}");
+    }
+    let says_something = told.contains("detail") || told.contains("message") || told.contains("text");
+    assert!(says_something, "{sent}: refused with {told:?}");
+    assert!(told.len() < 4 * sent.len() + 4096, "{sent}: refused with {} bytes", told.len());
+}
+
+/// Plays so many calls; returns how many were refused.
+fn play(calls: usize, seed: u64) -> usize {
+    let mut target = Target::new();
+    let mut chance = Chance(seed);
+    let mut before = target.state();
+    let mut refused = 0;
+    for number in 0..calls {
+        let (path, body) = target.request(&mut chance);
+        let request = Request::post(&path)
+            .header(header::HOST, "localhost")
+            .header(header::CONTENT_TYPE, "application/json")
+            .header(header::ACCEPT, "application/json, text/event-stream")
+            .body(Body::from(body.clone()))
+            .unwrap();
+        let sent = format!("seed {seed}, call {number}: POST {path} {}", String::from_utf8_lossy(&body));
+        let answer = target.send(request);
+        if answer.refuses() {
+            refused += 1;
+            check_refusal(&target, &answer, &sent);
+        }
+        // An episode that has ended made room for another.
+        if target.table.get(&target.id).is_err() {
+            target.id = answer.body["episode_id"].as_str().unwrap_or(&target.id).to_owned();
+            assert!(target.table.get(&target.id).is_ok(), "{sent}: the episode is gone");
+            before = target.state();
+            continue;
+        }
+        let after = target.state();
+        assert!(!answer.refuses() || after == before, "{sent}: refused, and yet {before:?} became {after:?}");
+        before = after;
+        if before.2 {
+            target.start();
+            before = target.state();
+        }
+    }
+    refused
+}
+
+fn check(calls: usize, seed: u64) {
+    let refused = play(calls, seed);
+    assert!(refused * 2 > calls, "of {calls} calls only {refused} were hostile enough to be refused");
+    assert!(refused < calls, "none of {calls} calls was taken");
+}
+
+#[test]
+fn hostile_calls_change_nothing() {
+    check(2_000, 0);
+}
+
+#[test]
+#[ignore = "a minute or two"]
+fn a_quarter_of_a_hundred_thousand_hostile_calls() {
+    check(25_000, 1);
+}
+
+#[test]
+#[ignore = "a minute or two"]
+fn the_second_quarter() {
+    check(25_000, 2);
+}
+
+#[test]
+#[ignore = "a minute or two"]
+fn the_third_quarter() {
+    check(25_000, 3);
+}
+
+#[test]
+#[ignore = "a minute or two"]
+fn the_last_quarter() {
+    check(25_000, 4);
+}

@@ -1,0 +1,132 @@
+//! How much is let in at once, and how much from one address.
+
+use std::{
+    collections::HashMap,
+    net::IpAddr,
+    sync::{Arc, Mutex},
+    time::Instant,
+};
+
+use axum::{
+    extract::{Request, State},
+    middleware::Next,
+    response::{IntoResponse, Response},
+};
+use tokio::sync::Semaphore;
+
+use super::problem::ApiError;
+use crate::settings::Settings;
+
+/// Addresses that are remembered. Beyond, those are forgotten that might ask at their full rate again.
+const REMEMBERED: usize = 1024;
+
+/// From which address a request came.
+#[derive(Debug, Clone, Copy)]
+pub struct Peer(pub IpAddr);
+
+/// Counts who is in, and who has asked how often.
+#[derive(Debug, Clone)]
+pub struct Limits {
+    places: Arc<Semaphore>,
+    most_requests: usize,
+    rates: Option<Arc<Mutex<Rates>>>,
+}
+
+impl Limits {
+    /// The limits that `settings` set.
+    pub fn new(settings: &Settings) -> Limits {
+        Limits {
+            places: Arc::new(Semaphore::new(settings.max_requests)),
+            most_requests: settings.max_requests,
+            rates: settings.rate_limit.map(|per_second| Arc::new(Mutex::new(Rates::new(per_second)))),
+        }
+    }
+
+    fn admits(&self, peer: Option<&Peer>) -> Result<(), ApiError> {
+        let (Some(rates), Some(Peer(address))) = (&self.rates, peer) else { return Ok(()) };
+        // Were there a panic in between, each allowance would still be one.
+        let mut rates = rates.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        if rates.take(*address, Instant::now()) {
+            return Ok(());
+        }
+        Err(ApiError::TooManyRequests { per_second: rates.per_second })
+    }
+}
+
+/// Lets a request in where there is room, or answers when to come again.
+pub async fn pass(State(limits): State<Limits>, request: Request, next: Next) -> Response {
+    if let Err(refusal) = limits.admits(request.extensions().get()) {
+        return refusal.into_response();
+    }
+    match limits.places.try_acquire() {
+        Ok(_place) => next.run(request).await,
+        Err(_) => ApiError::Busy { limit: limits.most_requests }.into_response(),
+    }
+}
+
+/// What each address may still ask for: its allowance grows evenly up to the requests of one second.
+#[derive(Debug)]
+struct Rates {
+    per_second: u32,
+    /// Requests allowed, as of when.
+    allowances: HashMap<IpAddr, (f64, Instant)>,
+}
+
+impl Rates {
+    fn new(per_second: u32) -> Rates {
+        Rates { per_second, allowances: HashMap::new() }
+    }
+
+    /// Whether `address` may send one more request `now`.
+    fn take(&mut self, address: IpAddr, now: Instant) -> bool {
+        let most = f64::from(self.per_second);
+        let grown = |(allowed, since): (f64, Instant)| {
+            (allowed + now.saturating_duration_since(since).as_secs_f64() * most).min(most)
+        };
+        if self.allowances.len() >= REMEMBERED && !self.allowances.contains_key(&address) {
+            self.allowances.retain(|_, allowance| grown(*allowance) < most);
+            if self.allowances.len() >= REMEMBERED {
+                return false;
+            }
+        }
+        let allowance = self.allowances.entry(address).or_insert((most, now));
+        let allowed = grown(*allowance);
+        let may = allowed >= 1.0;
+        *allowance = (if may { allowed - 1.0 } else { allowed }, now);
+        may
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{net::Ipv4Addr, time::Duration};
+
+    use super::*;
+
+    fn address(number: u32) -> IpAddr {
+        Ipv4Addr::from_bits(number).into()
+    }
+
+    #[test]
+    fn an_allowance_is_spent_and_grows_again() {
+        let (mut rates, began) = (Rates::new(4), Instant::now());
+        let mut at = |ms: u64, number: u32| rates.take(address(number), began + Duration::from_millis(ms));
+        assert_eq!([at(0, 1), at(0, 1), at(0, 1), at(0, 1), at(0, 1)], [true, true, true, true, false]);
+        assert!(at(0, 2), "every address has its own");
+        assert_eq!([at(249, 1), at(251, 1), at(252, 1)], [false, true, false]);
+        let burst: Vec<bool> = (0..5).map(|_| at(60_000, 1)).collect();
+        assert_eq!(burst, [true, true, true, true, false], "never more than those of a second");
+    }
+
+    #[test]
+    fn addresses_are_forgotten_that_have_their_allowance_back() {
+        let (mut rates, began) = (Rates::new(1), Instant::now());
+        for number in 0..REMEMBERED as u32 {
+            assert!(rates.take(address(number), began));
+        }
+        assert!(!rates.take(address(u32::MAX), began), "no room to remember one more");
+        let later = began + Duration::from_secs(2);
+        assert!(rates.take(address(u32::MAX), later));
+        assert_eq!(rates.allowances.len(), 1);
+    }
+}

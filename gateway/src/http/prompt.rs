@@ -1,0 +1,95 @@
+//! The prompt that MCP hosts offer their users: all that a policy has to know of a task before it begins.
+
+use rmcp::{
+    ErrorData,
+    model::{GetPromptResult, JsonObject, Prompt, PromptArgument, PromptMessage, Role},
+};
+use tandem_episodes::{brief, tasks};
+use tandem_tools_spec::{Brief, Hints, Protocol, ProtocolInfo, StartEpisode, TaskInfo, TaskList, parse_args};
+
+/// What hosts call it.
+const NAME: &str = "play_task";
+
+/// The prompts that there are.
+pub fn prompts() -> Vec<Prompt> {
+    let argument = |name: &str, text: &str, required: bool| {
+        PromptArgument::new(name).with_description(text).with_required(required)
+    };
+    let ids: Vec<&str> = tasks::ALL.iter().map(|task| task.id).collect();
+    let arguments = vec![
+        argument("task", &format!("What to play: {}.", ids.join(", ")), true),
+        argument("seed", "Decides where the objects stand; 0 if it is not given.", false),
+        argument("protocol", "agentic or benchmark; agentic if it is not given.", false),
+    ];
+    let prompt =
+        Prompt::new(NAME, Some("Play a task: what has to be done, and what to know."), Some(arguments));
+    vec![prompt.with_title("Play a task")]
+}
+
+/// The prompt called `name`, for what `arguments` say, of the tasks in `list`.
+pub fn prompt(
+    name: &str,
+    arguments: JsonObject,
+    list: TaskList,
+    hints: Hints,
+) -> Result<GetPromptResult, ErrorData> {
+    let refused = |text: String| ErrorData::invalid_params(text, None);
+    if name != NAME {
+        return Err(refused(format!("no prompt {name:?}; have: {NAME}")));
+    }
+    let start = start(arguments).map_err(refused)?;
+    let task = tasks::find(&start.task).map_err(|error| refused(error.to_string()))?;
+    let info = list.tasks.iter().find(|info| info.id == task.id);
+    let info = info.ok_or_else(|| refused(format!("{} is not listed", task.id)))?;
+    let text = text(info, &start, &brief(hints));
+    let mut result = GetPromptResult::new(vec![PromptMessage::new_text(Role::User, text)]);
+    result.description = Some(info.instruction.clone());
+    Ok(result)
+}
+
+/// The arguments of a prompt are texts, the seed among them.
+fn start(mut arguments: JsonObject) -> Result<StartEpisode, String> {
+    let seed = match arguments.remove("seed") {
+        None => 0,
+        Some(seed) => {
+            let text = seed.as_str().map_or_else(|| seed.to_string(), str::to_owned);
+            text.trim().parse::<u32>().map_err(|error| format!("seed {text:?}: {error}; give one as 0"))?
+        }
+    };
+    arguments.insert("seed".into(), seed.into());
+    parse_args(arguments.into()).map_err(|error| error.to_string())
+}
+
+fn text(task: &TaskInfo, start: &StartEpisode, brief: &Brief) -> String {
+    let protocol = start.protocol.unwrap_or(Protocol::Agentic);
+    let robots = task.robots.iter().map(|robot| format!("* {}: {}", robot.robot, robot.instruction));
+    let phases =
+        task.phases.iter().map(|phase| format!("* {} {}: {}", phase.id, phase.name, phase.description));
+    let budget = task.protocols.iter().find(|info| info.protocol == protocol).map(budget);
+    let brief = [&brief.frames, &brief.partners, &brief.odometry, &brief.camera, &brief.hands];
+    let lines = |lines: &mut dyn Iterator<Item = String>| lines.collect::<Vec<_>>().join("\n");
+    [
+        task.instruction.clone(),
+        format!("The robots:\n{}", lines(&mut robots.into_iter())),
+        format!("The phases that are scored:\n{}", lines(&mut phases.into_iter())),
+        budget.unwrap_or_default(),
+        lines(&mut brief.into_iter().cloned()),
+        format!(
+            "Begin with start_episode, task {}, seed {}, protocol {protocol}. Look with observe, measure with query_depth, act \
+             with move_wrists, walk and wait, and check with every reply what came of it. Call finish when the task is done.",
+            task.id, start.seed
+        ),
+    ]
+    .join("\n\n")
+}
+
+fn budget(info: &ProtocolInfo) -> String {
+    let thinking = match info.wall_clock_s {
+        Some(wall_clock_s) => format!(", and {wall_clock_s} s for your own thinking"),
+        None => String::new(),
+    };
+    format!(
+        "You have {} control steps of 20 ms, {} of them held still at the start, at most {} per command{thinking}.",
+        info.episode_steps, info.initial_hold_steps, info.steps_per_command
+    )
+}

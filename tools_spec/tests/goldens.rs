@@ -1,0 +1,54 @@
+//! The contract as its callers see it, kept in files: a change of the one shows as a change of the other.
+//!
+//! `UPDATE_EXPECT=1 cargo test --release --workspace --test goldens` writes them anew.
+
+use std::{env, fs, path::Path};
+
+use serde_json::{Value, json};
+use tandem_tools_spec::{Format, Hints, ToolSpec, openapi, tool_specs};
+
+/// Compares `face` with the file `name`, or writes the file.
+fn check(name: &str, face: &Value) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/goldens").join(format!("{name}.json"));
+    let text = serde_json::to_string_pretty(face).expect("JSON") + "\n";
+    if env::var_os("UPDATE_EXPECT").is_some() {
+        fs::write(&path, &text).expect("the file can be written");
+    }
+    let kept = fs::read_to_string(&path).unwrap_or_default();
+    let differs = kept.lines().zip(text.lines()).find(|(kept, now)| kept != now);
+    assert!(
+        kept == text,
+        "the contract has changed at {differs:?}; if that is meant, write {} anew with UPDATE_EXPECT=1",
+        path.display()
+    );
+}
+
+#[test]
+fn tools_in_every_format() {
+    let specs = tool_specs(Hints::On);
+    for format in Format::ALL {
+        let tools: Vec<Value> = specs.iter().map(|spec| spec.formatted(format)).collect();
+        check(format.name(), &json!(tools));
+    }
+}
+
+/// What hints say is kept apart: with them only the texts differ.
+#[test]
+fn tools_without_hints() {
+    let without: Vec<ToolSpec> = tool_specs(Hints::Off);
+    let differ = tool_specs(Hints::On).into_iter().zip(without).filter(|(with, without)| with != without);
+    let texts: Vec<Value> = differ.map(|(_, without)| json!(without)).collect();
+    check("without_hints", &json!(texts));
+}
+
+/// That robots have equally many rows is said in fifty alternatives, of which three are kept.
+#[test]
+fn openapi_document() {
+    let mut document = openapi("0.0.0", Hints::On);
+    let chunk = "/paths/~1v1~1episodes~1{episode_id}~1tools~1send_joint_chunk/post/requestBody/content/application~1json/schema";
+    let rows = document.pointer_mut(&format!("{chunk}/properties/robots/anyOf"));
+    let rows = rows.and_then(Value::as_array_mut).expect("the alternatives");
+    assert_eq!(rows.len(), 50);
+    rows.truncate(3);
+    check("openapi", &document);
+}
