@@ -97,7 +97,7 @@ fn equal_rows(most_steps: u32) -> Value {
     (1..=most_steps).map(each).collect::<Vec<_>>().into()
 }
 
-/// Bounds every number of a schema that has none: integers are left alone, whose types bound them.
+/// Bounds every number of a schema where it has no bound of its own. Integers are left alone, whose types bound them.
 pub fn bound_numbers(schema: &mut Value) {
     match schema {
         Value::Array(items) => items.iter_mut().for_each(bound_numbers),
@@ -108,8 +108,8 @@ pub fn bound_numbers(schema: &mut Value) {
                 _ => false,
             };
             if is_number {
-                object.insert("minimum".into(), json!(-LARGEST));
-                object.insert("maximum".into(), json!(LARGEST));
+                object.entry("minimum").or_insert(json!(-LARGEST));
+                object.entry("maximum").or_insert(json!(LARGEST));
             }
             object.values_mut().for_each(bound_numbers);
         }

@@ -64,7 +64,7 @@ fn tools(json: bool) -> Outcome {
     let wait = &report.wait;
     println!(
         "wait of {} steps: {:.1} ms, of which {:.1} ms physics; {:.3} times its physics (medians of {})",
-        wait.steps, wait.call_p50_ms, wait.physics_p50_ms, wait.ratio_p50, wait.calls
+        wait.steps, wait.call_p50_ms, wait.physics_p50_ms, wait.p50_ratio, wait.calls
     );
     Ok(ExitCode::SUCCESS)
 }

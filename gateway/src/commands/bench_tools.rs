@@ -59,7 +59,7 @@ pub struct WaitTimes {
     /// Median of its physics, in milliseconds.
     pub physics_p50_ms: f64,
     /// Median of the one over the other, call by call.
-    pub ratio_p50: f64,
+    pub p50_ratio: f64,
 }
 
 /// Plays an episode on a server of its own and times its calls.
@@ -110,7 +110,7 @@ fn waits(episode: &mut HttpEpisode, physics: impl Fn() -> Duration) -> Result<Wa
         calls: WAITS,
         call_p50_ms: percentile(&mut calls_ms, 0.5),
         physics_p50_ms: percentile(&mut physics_ms, 0.5),
-        ratio_p50: percentile(&mut ratios, 0.5),
+        p50_ratio: percentile(&mut ratios, 0.5),
     })
 }
 

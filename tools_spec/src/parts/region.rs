@@ -16,7 +16,7 @@ pub struct PixelRegion {
     #[schemars(extend("prefixItems" = limits::pixel_range()))]
     pub to: [i64; 2],
     /// 1 for every pixel, 10 for every tenth one across and down.
-    #[schemars(range(min = 1))]
+    #[schemars(range(min = 1, max = u32::MAX))]
     pub stride: u32,
 }
 
