@@ -45,15 +45,16 @@ pub fn router(app: App, gate: Gate) -> Router {
     for (path, _, handlers) in routes() {
         router = router.route(path, handlers);
     }
-    router
+    let routed = router
         .fallback(no_route)
         .method_not_allowed_fallback(no_method)
         // The gate has a limit of its own.
         .layer(DefaultBodyLimit::disable())
         .layer(middleware::from_fn_with_state(gate, gate::pass))
-        .layer(middleware::from_fn_with_state(app.clone(), access::identify))
         .layer(middleware::from_fn_with_state(app.clone(), log_and_describe))
-        .with_state(app)
+        .with_state(app.clone());
+    // Around all of it: what axum itself adds to an answer, as the methods of a path, would say which paths there are.
+    Router::new().fallback_service(routed).layer(middleware::from_fn_with_state(app, access::identify))
 }
 
 async fn health(State(app): State<App>) -> Json<Value> {
