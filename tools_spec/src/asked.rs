@@ -49,7 +49,7 @@ struct WithCommand {
 }
 
 impl WithCommand {
-    const FIELDS: [&str; 2] = ["expected_step", "observe"];
+    const FIELDS: [&str; 2] = ["expected_step", Observe::NAME];
 }
 
 impl Asked {

@@ -131,6 +131,7 @@ fn result() -> ResultReply {
         falls: 0,
         realtime_factor: 4.0,
         state_hash: "0123456789abcdef".into(),
+        extra_information: vec![],
         recording_failed: None,
     }
 }

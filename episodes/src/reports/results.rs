@@ -43,6 +43,7 @@ mod tests {
             falls: 0,
             realtime_factor: 3.5,
             state_hash: "00c0ffee00c0ffee".into(),
+            extra_information: vec![],
             recording_failed: None,
         }
     }

@@ -58,6 +58,7 @@ impl Session {
 
     fn observe(&mut self, args: &Observe, formats: &Formats) -> Result<Observation, EpisodeError> {
         let robots = self.looked_through(args, formats)?;
+        self.saw_depth_images |= formats.depth.is_some() && self.ended.is_none();
         self.eyes.observe(&self.present, &robots, &self.motions, Detail::of(args), formats)
     }
 

@@ -32,14 +32,14 @@ pub fn arrays(robot: &str, frame: &Frame, formats: &Formats) -> Result<Option<Ca
 }
 
 /// A number from 0 to infinity in half precision (IEEE 754 binary16), rounded to the nearest, ties to even.
-fn half_bits(number: f32) -> u16 {
+fn half_bits(value: f32) -> u16 {
     const INFINITY: u16 = 0x7c00;
     /// 2^-112 takes exponents from the bias of single precision, 127, to that of half, 15.
     const REBIAS: f32 = f32::from_bits((127 - 112) << 23);
-    if !number.is_finite() {
+    if !value.is_finite() {
         return INFINITY;
     }
-    let bits = (number * REBIAS).to_bits();
+    let bits = (value * REBIAS).to_bits();
     let tie_to_even = (bits >> 13) & 1;
     ((bits + 0xfff + tie_to_even) >> 13).min(INFINITY.into()) as u16
 }

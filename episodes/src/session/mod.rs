@@ -56,6 +56,8 @@ pub struct Session {
     /// Time that physics took, for the real-time factor.
     physics: Duration,
     ended: Option<EndReason>,
+    /// Whether the policy has been given depth at every pixel.
+    saw_depth_images: bool,
     /// State hashes of the steps since they were last taken, where somebody wants them.
     hashes: Option<Vec<u64>>,
     /// What it came to, from when the files were closed: the one truth that everybody is told.
@@ -98,6 +100,7 @@ impl Session {
             tool_calls: 0,
             physics: Duration::ZERO,
             ended: None,
+            saw_depth_images: false,
             hashes: None,
             result: None,
             present,

@@ -102,6 +102,11 @@ impl Session {
         }
     }
 
+    /// What the policy was shown beyond what the benchmark's own policies see.
+    fn extra_information(&self) -> Vec<String> {
+        self.saw_depth_images.then(|| "depth_images".into()).into_iter().collect()
+    }
+
     fn result_so_far(&self) -> ResultReply {
         let mut times_s = self.scores.reached().map(|(_, time_s)| time_s);
         let phases = (0..self.spec().task.phases.len()).map(|index| (Phase::number(index), times_s.next()));
@@ -117,6 +122,7 @@ impl Session {
             falls: self.fallen().iter().filter(|robot| robot.fallen).count() as u32,
             realtime_factor: if physics_s > 0.0 { self.present.time_s / physics_s } else { 0.0 },
             state_hash: self.state_hash(),
+            extra_information: self.extra_information(),
             recording_failed: self.recording_failed().map(str::to_owned),
         }
     }

@@ -14,6 +14,7 @@ use crate::hosting::Caller;
 /// Lets a request on with its [`Caller`], and without the token that said who that is.
 pub async fn identify(State(app): State<App>, mut request: Request, next: Next) -> Response {
     let Some(caller) = caller(&app, request.headers()) else {
+        tracing::info!("a request without a token was refused");
         return ApiError::NoToken.into_response();
     };
     request.headers_mut().remove(header::AUTHORIZATION);

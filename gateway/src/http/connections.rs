@@ -92,6 +92,6 @@ async fn connection(
         }
     };
     if let Err(error) = served {
-        tracing::debug!(%error, "a connection broke");
+        tracing::info!(%error, "a connection broke");
     }
 }

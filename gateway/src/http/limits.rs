@@ -55,13 +55,13 @@ impl Limits {
 
 /// Lets a request in where there is room, or answers when to come again.
 pub async fn pass(State(limits): State<Limits>, request: Request, next: Next) -> Response {
-    if let Err(refusal) = limits.admits(request.extensions().get()) {
-        return refusal.into_response();
-    }
-    match limits.places.try_acquire() {
-        Ok(_place) => next.run(request).await,
-        Err(_) => ApiError::Busy { limit: limits.most_requests }.into_response(),
-    }
+    let refusal = match (limits.admits(request.extensions().get()), limits.places.try_acquire()) {
+        (Ok(()), Ok(_place)) => return next.run(request).await,
+        (Err(refusal), _) => refusal,
+        (Ok(()), Err(_)) => ApiError::Busy { limit: limits.most_requests },
+    };
+    tracing::info!(problem = refusal.name(), "a request was not let in");
+    refusal.into_response()
 }
 
 /// What each address may still ask for: its allowance grows evenly up to the requests of one second.

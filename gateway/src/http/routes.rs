@@ -55,17 +55,21 @@ pub fn router(app: App, gate: Gate, limits: Limits) -> Router {
     for (path, _, handlers) in routes() {
         router = router.route(path, handlers);
     }
-    router
+    let routed = router
         .fallback(no_route)
         .method_not_allowed_fallback(no_method)
         // The gate has a limit of its own.
         .layer(DefaultBodyLimit::disable())
         .layer(middleware::from_fn_with_state(gate, gate::pass))
+        .layer(middleware::from_fn_with_state(app.clone(), log_and_describe))
+        .with_state(app.clone());
+    // Around all of it: what axum itself adds to an answer, as the methods of a path, would say which paths there are.
+    Router::new()
+        .fallback_service(routed)
         .layer(middleware::from_fn_with_state(app.clone(), access::identify))
         // Before it, so that nobody tries tokens faster than requests are let in.
         .layer(middleware::from_fn_with_state(limits, limits::pass))
-        .layer(middleware::from_fn_with_state(app.clone(), log_and_describe))
-        .with_state(app)
+        .layer(middleware::from_fn_with_state(app, count_refusal))
 }
 
 async fn health(State(app): State<App>) -> Json<Value> {
@@ -217,7 +221,16 @@ fn refused_route(method: Method, uri: Uri, other_method: bool) -> ApiError {
     ApiError::NoRoute { method: method.to_string(), path: uri.path().into(), have, other_method }
 }
 
-/// Logs and counts every request, and turns refusals of axum's own (as of a path that is not UTF-8) into problem details. Of what
+/// Counts what is refused, wherever that was.
+async fn count_refusal(State(app): State<App>, request: Request, next: Next) -> Response {
+    let response = next.run(request).await;
+    if let Some(Refused(kind)) = response.extensions().get() {
+        app.table.metrics().refusal(kind);
+    }
+    response
+}
+
+/// Logs every request, and turns refusals of axum's own (as of a path that is not UTF-8) into problem details. Of what
 /// a caller wrote, the log has the route, and the episode where there is such an episode: whatever else there is may be a secret.
 async fn log_and_describe(State(app): State<App>, request: Request, next: Next) -> Response {
     let method = request.method().clone();
@@ -234,9 +247,6 @@ async fn log_and_describe(State(app): State<App>, request: Request, next: Next) 
         response.headers_mut().extend(allow.map(|methods| (header::ALLOW, methods)));
     }
     let problem = response.extensions().get().map(|Refused(kind)| *kind);
-    if let Some(kind) = problem {
-        app.table.metrics().refusal(kind);
-    }
     let ms = began.elapsed().as_millis() as u64;
     tracing::info!(%method, route, episode, status = status.as_u16(), problem, ms, "request");
     response
