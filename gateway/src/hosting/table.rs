@@ -57,14 +57,35 @@ impl EpisodeTable {
         let (id, path) = run_folder::create(runs, spec.task.id, spec.seed)
             .map_err(|source| HostingError::Folder { runs: runs.clone(), source })?;
         let folder = RunFolder { path, visibility: self.settings.record };
-        let (episode, mut briefing) = EpisodeThread::start(&id, spec, folder, place).await?;
+        self.begin(&id, spec, folder, place).await
+    }
+
+    /// Starts `spec` under the name `id` with its files in `folder`, for an evaluation in this process.
+    pub async fn host(
+        &self,
+        id: &str,
+        spec: EpisodeSpec,
+        folder: RunFolder,
+    ) -> Result<StartReply, HostingError> {
+        let place = self.take_place().await?;
+        self.begin(id, spec, folder, place).await
+    }
+
+    async fn begin(
+        &self,
+        id: &str,
+        spec: EpisodeSpec,
+        folder: RunFolder,
+        place: OwnedSemaphorePermit,
+    ) -> Result<StartReply, HostingError> {
+        let (episode, mut briefing) = EpisodeThread::start(id, spec, folder, place).await?;
         self.settings.instructions.rephrase_briefing(&mut briefing);
-        if let Err(late) = self.insert(&id, Arc::new(episode)) {
+        if let Err(late) = self.insert(id, Arc::new(episode)) {
             late.close().await?;
             return Err(HostingError::ShuttingDown);
         }
         tracing::info!(episode = id, "started");
-        Ok(StartReply { episode_id: id, briefing })
+        Ok(StartReply { episode_id: id.into(), briefing })
     }
 
     /// The reply to `list_tasks`.

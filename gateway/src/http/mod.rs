@@ -11,4 +11,4 @@ mod server;
 #[cfg(test)]
 mod tests;
 
-pub use server::Server;
+pub use server::{Server, shutdown_signal};
