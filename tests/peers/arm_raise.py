@@ -21,14 +21,19 @@ HEIGHT_M = 0.74
 class ArmRaise:
     def __init__(self):
         self.seen = []
+        self.first = {}  # by words, which are a robot's own
 
     def infer(self, observation):
         """Rows of actions for an observation under the keys of the preset `openpi`."""
         state = observation["observation/state"]
         self.seen.append(observation)
-        target = np.concatenate([state[UPPER], [0, 0, 0, HEIGHT_M]]).astype(np.float32)
+        if not observation["observation/image"].any():
+            first = state  # a trial without a robot
+        else:
+            first = self.first.setdefault(observation["prompt"], state)
+        target = np.concatenate([first[UPPER], [0, 0, 0, HEIGHT_M]]).astype(np.float32)
         rows = np.repeat(target[None], ROWS, axis=0)
-        if "pick up" in observation["prompt"]:
+        if "in front of you" in observation["prompt"]:
             rows[:, 0] = np.linspace(state[SHOULDER], RAISED_RAD, ROWS)
         return {"actions": rows}
 

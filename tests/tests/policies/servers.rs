@@ -1,6 +1,6 @@
 //! Learned policies at servers that work: what they are shown, and that robots do what they answer.
 
-use std::{fs, path::Path};
+use std::{collections::BTreeMap, fs, path::Path, sync::Mutex};
 
 use rmpv::Value;
 use serde_json::json;
@@ -9,16 +9,18 @@ use tandem_tools_spec::EndReason;
 
 use super::{
     act_server::ActServer,
-    openpi_server::{OpenpiServer, Reply, entry, floats},
+    openpi_server::{Decide, OpenpiServer, Reply, entry, floats},
     plans::{last_angles_rad, plan, play},
 };
 
 /// Of 43 joints.
-const LEFT_ELBOW: usize = 18;
-const RIGHT_ELBOW: usize = 32;
+const LEFT_WRIST: usize = 21;
+const RIGHT_WRIST: usize = 35;
+/// Of what A alone is told.
+const WORDS_OF_A: &str = "in front of you";
 /// Of an action row.
-const LEFT_ELBOW_COLUMN: usize = 3;
-const RIGHT_ELBOW_COLUMN: usize = 10;
+pub const LEFT_WRIST_COLUMN: usize = 6;
+const RIGHT_WRIST_COLUMN: usize = 13;
 
 /// The map in a file that says `text`.
 pub fn map(folder: &Path, text: &str) -> PolicyMap {
@@ -27,26 +29,35 @@ pub fn map(folder: &Path, text: &str) -> PolicyMap {
     PolicyMap::find(&path.display().to_string()).expect("a map")
 }
 
-/// Rows that hold the upper body as the state of 43 joints has it and bend an elbow.
-pub fn bending(state: &[f32], column: usize, target_rad: f32, rows: usize) -> Vec<Vec<f32>> {
-    let groups = [15..22, 29..36, 22..29, 36..43, 12..15];
-    let mut row: Vec<f32> = groups.into_iter().flat_map(|group| state[group].to_vec()).collect();
-    row.extend([0.0, 0.0, 0.0, 0.74]);
-    row[column] = target_rad;
-    vec![row; rows]
+/// A policy that keeps every robot as it first felt it, but for a wrist, whose column and angle follow from its words.
+pub fn turning(wrist: impl Fn(&str) -> (usize, f32) + Send + Sync + 'static, rows: usize) -> Box<Decide> {
+    // By words, which are a robot's own.
+    let first: Mutex<BTreeMap<String, Vec<f32>>> = Mutex::default();
+    Box::new(move |number, request| {
+        let state = floats(request, "observation/state");
+        let words = entry(request, "prompt").as_str().expect("a text");
+        let mut first = first.lock().expect("no panic");
+        // The first request is a trial without a robot.
+        let state = if number == 0 { state } else { first.entry(words.into()).or_insert(state).clone() };
+        let groups = [15..22, 29..36, 22..29, 36..43, 12..15];
+        let mut row: Vec<f32> = groups.into_iter().flat_map(|group| state[group].to_vec()).collect();
+        row.extend([0.0, 0.0, 0.0, 0.74]);
+        let (column, target_rad) = wrist(words);
+        row[column] = target_rad;
+        Reply::Rows(vec![row; rows])
+    })
 }
 
 #[test]
-fn an_openpi_policy_sees_feels_and_bends_elbows() {
+fn an_openpi_policy_sees_feels_and_turns_wrists() {
     // A shared policy that knows from its words which robot it is asked for.
     let server = OpenpiServer::start(|_| {
-        Box::new(|_, request: &Value| {
-            let state = floats(request, "observation/state");
-            let is_a = entry(request, "prompt").as_str().expect("a text").contains("pick up");
-            let (column, target_rad) =
-                if is_a { (LEFT_ELBOW_COLUMN, 0.3) } else { (RIGHT_ELBOW_COLUMN, 0.5) };
-            Reply::Rows(bending(&state, column, target_rad, 50))
-        })
+        turning(
+            |words| {
+                if words.contains(WORDS_OF_A) { (LEFT_WRIST_COLUMN, 0.3) } else { (RIGHT_WRIST_COLUMN, 0.5) }
+            },
+            50,
+        )
     });
     let folder = tempfile::tempdir().expect("a temporary folder");
     let policy =
@@ -64,10 +75,10 @@ fn an_openpi_policy_sees_feels_and_bends_elbows() {
         let angle_rad = last_angles_rad(folder.path(), "handover-1", joint)[robot];
         assert!((angle_rad - target_rad).abs() < 0.03, "{joint} of {robot}: {angle_rad}");
     };
-    near(LEFT_ELBOW, 0, 0.3);
-    near(RIGHT_ELBOW, 1, 0.5);
+    near(LEFT_WRIST, 0, 0.3);
+    near(RIGHT_WRIST, 1, 0.5);
 
-    // One trial with black pictures, then twenty for each robot, in which A feels that its elbow bends.
+    // One trial with black pictures, then twenty for each robot, in which A feels that its wrist turns.
     let requests = server.requests.lock().expect("no panic");
     assert_eq!(requests.len(), 41);
     let bright = |request: &Value| {
@@ -78,33 +89,28 @@ fn an_openpi_policy_sees_feels_and_bends_elbows() {
     assert_eq!(bright(&requests[0]), 0);
     assert!(bright(&requests[1]) > 20_000 && bright(&requests[2]) > 20_000);
     assert_ne!(entry(&requests[1], "observation/image"), entry(&requests[2], "observation/image"));
-    let elbows_rad: Vec<f32> = requests
+    let wrists_rad: Vec<f32> = requests
         .iter()
         .skip(1)
         .step_by(2)
-        .map(|request| floats(request, "observation/state")[LEFT_ELBOW])
+        .map(|request| floats(request, "observation/state")[LEFT_WRIST])
         .collect();
-    assert!((elbows_rad[0] - 0.3).abs() > 0.2 && (elbows_rad[3] - 0.3).abs() < 0.03, "{elbows_rad:?}");
+    assert!((wrists_rad[0] - 0.3).abs() > 0.2 && (wrists_rad[3] - 0.3).abs() < 0.03, "{wrists_rad:?}");
 }
 
 #[test]
 fn each_robot_may_have_a_policy_of_its_own() {
-    let of_own = |column: usize, target_rad: f32| {
-        OpenpiServer::start(move |_| {
-            Box::new(move |_, request: &Value| {
-                Reply::Rows(bending(&floats(request, "observation/state"), column, target_rad, 25))
-            })
-        })
-    };
-    let servers = [of_own(LEFT_ELBOW_COLUMN, 0.2), of_own(LEFT_ELBOW_COLUMN, 0.6)];
+    let of_own =
+        |target_rad: f32| OpenpiServer::start(move |_| turning(move |_| (LEFT_WRIST_COLUMN, target_rad), 25));
+    let servers = [of_own(0.2), of_own(0.6)];
     let urls = servers.iter().map(OpenpiServer::url).collect();
     let folder = tempfile::tempdir().expect("a temporary folder");
     let first_twenty = map(folder.path(), "preset = \"openpi\"\n[chunk]\nrows = 25\nexecute = 20\n");
     let policy = Remote::new(Protocol::Openpi, urls, first_twenty.clone());
     let evaluation = play(&plan(&policy, vec![1], true), folder.path());
     assert_eq!(evaluation.episodes[0].result.tool_calls, 100, "50 times 20 steps");
-    let elbows_rad = last_angles_rad(folder.path(), "handover-1", LEFT_ELBOW);
-    assert!((elbows_rad[0] - 0.2).abs() < 0.03 && (elbows_rad[1] - 0.6).abs() < 0.03, "{elbows_rad:?}");
+    let wrists_rad = last_angles_rad(folder.path(), "handover-1", LEFT_WRIST);
+    assert!((wrists_rad[0] - 0.2).abs() < 0.03 && (wrists_rad[1] - 0.6).abs() < 0.03, "{wrists_rad:?}");
     assert!(servers.iter().all(|server| server.requests.lock().expect("no panic").len() == 51));
 
     let three = Remote::new(Protocol::Openpi, vec![servers[0].url(); 3], first_twenty);
@@ -125,11 +131,11 @@ instruction = "joint"
 "observation > {robot}" = { camera = "egocentric", size = [64, 48] }
 "observation > room" = { camera = "third_person", size = [64, 48] }
 [state]
-"observation > elbow_{robot}" = ["left_elbow_joint"]
+"observation > wrist_{robot}" = ["left_wrist_yaw_joint"]
 [prompt]
 "observation > words" = "list"
 [action]
-"" = ["left_elbow_joint", "pelvis_height"]
+"" = ["left_wrist_yaw_joint", "pelvis_height"]
 "#;
 
 #[test]
@@ -146,16 +152,16 @@ fn one_policy_behind_act_may_direct_all_and_see_the_room() {
     let results: serde_json::Value = serde_json::from_str(&text).expect("JSON");
     assert_eq!(results["extra_information"], json!(["third_person"]));
     assert_eq!(results["episodes"][0]["policy_settings"]["answer"], "all");
-    let elbows_rad = last_angles_rad(folder.path(), "handover-1", LEFT_ELBOW);
-    assert!((elbows_rad[0] - 0.2).abs() < 0.03 && (elbows_rad[1] - 0.6).abs() < 0.03, "{elbows_rad:?}");
+    let wrists_rad = last_angles_rad(folder.path(), "handover-1", LEFT_WRIST);
+    assert!((wrists_rad[0] - 0.2).abs() < 0.03 && (wrists_rad[1] - 0.6).abs() < 0.03, "{wrists_rad:?}");
 
     let requests = server.requests.lock().expect("no panic");
     assert_eq!(requests.len(), 21);
     let asked = requests[1]["observation"].as_object().expect("an object");
     let keys: Vec<&str> = asked.keys().map(String::as_str).collect();
-    assert_eq!(keys, ["A", "B", "room", "elbow_A", "elbow_B", "words"]);
+    assert_eq!(keys, ["room", "A", "B", "wrist_A", "wrist_B", "words"]);
     assert_eq!((&asked["room"]["shape"], &asked["A"]["dtype"]), (&json!([48, 64, 3]), &json!("|u1")));
-    assert_eq!((&asked["elbow_B"]["shape"], &asked["elbow_B"]["dtype"]), (&json!([1]), &json!("<f4")));
+    assert_eq!((&asked["wrist_B"]["shape"], &asked["wrist_B"]["dtype"]), (&json!([1]), &json!("<f4")));
     assert!(
         asked["A"]["__numpy__"] != asked["B"]["__numpy__"]
             && asked["A"]["__numpy__"] != asked["room"]["__numpy__"]

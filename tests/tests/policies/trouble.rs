@@ -1,51 +1,45 @@
 //! Learned policies at servers that fail: each ends its own episode, with a result that says why, and no other.
 
-use rmpv::Value;
 use serde_json::json;
 use tandem::drivers::{PolicyMap, Protocol, Remote};
 use tandem_tools_spec::EndReason;
 
 use super::{
     act_server::ActServer,
-    openpi_server::{Decide, OpenpiServer, Reply, floats},
+    openpi_server::{Decide, OpenpiServer, Reply},
     plans::{plan, play},
-    servers::{bending, map},
+    servers::{LEFT_WRIST_COLUMN, map, turning},
 };
 
-const FAST: &str = "preset = \"openpi\"\nconnect_s = 0.0\nreply_s = 0.3\n";
+const FAST: &str = "preset = \"openpi\"\nconnect_s = 0.0\nreply_s = 5.0\n";
 
-/// Holds for the trial and the first answers, then does something else.
-fn until_then(number: usize, request: &Value, then: Reply) -> Reply {
-    match number {
-        0..4 => Reply::Rows(bending(&floats(request, "observation/state"), 3, 0.3, 20)),
-        _ => then,
-    }
+/// Holds for the trial and the first three answers, then does something else.
+fn until_then(then: impl Fn() -> Reply + Send + Sync + 'static) -> Box<Decide> {
+    let hold = still(20);
+    Box::new(move |number, request| if number < 4 { hold(number, request) } else { then() })
+}
+
+fn still(rows: usize) -> Box<Decide> {
+    turning(|_| (LEFT_WRIST_COLUMN, 0.3), rows)
+}
+
+fn array(columns: usize, value: f32) -> Reply {
+    Reply::Rows(vec![vec![value; columns]; 20])
 }
 
 #[test]
 fn a_server_that_fails_ends_its_episode_and_no_other() {
-    let server = OpenpiServer::start(|connection| {
-        let decide: Box<Decide> = Box::new(move |number, request| {
-            let rows =
-                |rows: usize, columns: usize, value: f32| Reply::Rows(vec![vec![value; columns]; rows]);
-            until_then(
-                number,
-                request,
-                match connection {
-                    0 => Reply::Nothing,
-                    1 => Reply::Text(
-                        "Traceback (most recent call last):\n  ...\nRuntimeError: CUDA out of memory",
-                    ),
-                    2 => rows(20, 35, f32::NAN),
-                    3 => rows(20, 32, 0.0),
-                    4 => Reply::Silence,
-                    5 => Reply::Bytes(b"\xc1".into()),
-                    6 => rows(20, 35, 1e9),
-                    _ => rows(20, 35, 0.0),
-                },
-            )
-        });
-        decide
+    let server = OpenpiServer::start(|connection| match connection {
+        0 => until_then(|| Reply::Nothing),
+        1 => until_then(|| {
+            Reply::Text("Traceback (most recent call last):\n  ...\nRuntimeError: CUDA out of memory")
+        }),
+        2 => until_then(|| array(35, f32::NAN)),
+        3 => until_then(|| array(32, 0.0)),
+        4 => until_then(|| Reply::Silence),
+        5 => until_then(|| Reply::Bytes(b"\xc1".into())),
+        6 => until_then(|| array(35, 1e9)),
+        _ => still(20),
     });
     let folder = tempfile::tempdir().expect("a temporary folder");
     let policy = Remote::new(Protocol::Openpi, vec![server.url()], map(folder.path(), FAST));
@@ -62,7 +56,7 @@ fn a_server_that_fails_ends_its_episode_and_no_other() {
             4,
             "expected an array of shape [rows, 35] under the key \"actions\"; came an array of shape [20, 32]",
         ),
-        (5, "gave no answer within 0.3 s"),
+        (5, "gave no answer within 5 s"),
         (6, "cannot be read: "),
         (7, "left_shoulder_pitch_joint is beyond 1000"),
     ] {
@@ -96,16 +90,14 @@ fn a_policy_that_is_not_ready_is_left_out_and_played_the_next_time() {
     assert!(text.contains("expected an array of shape [rows, 35]") && text.contains("[50, 32]"), "{text}");
     assert!(!folder.path().join("episodes/handover-1").exists(), "no world was made");
 
-    let sound = OpenpiServer::start(|_| {
-        Box::new(|_, request| Reply::Rows(bending(&floats(request, "observation/state"), 3, 0.3, 50)))
-    });
+    let sound = OpenpiServer::start(|_| still(50));
     let policy = Remote::new(Protocol::Openpi, vec![sound.url()], fast());
     assert_eq!(play(&plan(&policy, vec![1], false), folder.path()).episodes.len(), 1);
     let asked = || sound.requests.lock().expect("no panic").len();
     let before = asked();
     play(&plan(&policy, vec![1], false), folder.path());
     assert_eq!(asked(), before, "it is kept");
-    let longer = PolicyMap { reply_s: 0.5, ..fast() };
+    let longer = PolicyMap { reply_s: 6.0, ..fast() };
     play(&plan(&Remote::new(Protocol::Openpi, vec![sound.url()], longer), vec![1], false), folder.path());
     assert!(asked() > before, "another map is another policy");
 }

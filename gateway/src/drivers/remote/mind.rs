@@ -7,7 +7,7 @@ use std::{
 };
 
 use tandem_episodes::players::{Onlooker, PlayerError};
-use tandem_tools_spec::{JointChunk, SendJointChunk};
+use tandem_tools_spec::{JointChunk, SendJointChunk, StopReason, ToolReply};
 
 use super::{
     answer, columns,
@@ -160,7 +160,12 @@ fn execute(episode: &mut dyn Onlooker, chunks: &[JointChunk], most_steps: usize)
             robot: chunk.robot.clone(),
             rows: chunk.rows[from..to].to_vec(),
         };
-        episode.call(SendJointChunk { robots: chunks.iter().map(part).collect() }.into())?;
+        let command = SendJointChunk { robots: chunks.iter().map(part).collect() };
+        if let ToolReply::Act(reply) = episode.call(command.into())?
+            && reply.stop_reason != StopReason::StepsDone
+        {
+            return Err(PlayerError::EpisodeOver);
+        }
     }
     Ok(())
 }

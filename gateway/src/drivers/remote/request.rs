@@ -137,9 +137,9 @@ mod tests {
         sight.robots[1].felt_values[63] = 0.7;
         let sent = request(&map, &cast(), &sight, None);
         let expected = [
+            "images room |u1 [6, 8, 3]",
             "images A |u1 [3, 6, 8]",
             "images B |u1 [3, 6, 8]",
-            "images room |u1 [6, 8, 3]",
             "state_A <f4 [4]",
             "state_B <f4 [4]",
             "prompt pass it on",

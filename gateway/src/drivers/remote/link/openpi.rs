@@ -6,7 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use tungstenite::{Error, HandshakeError, Message, WebSocket};
+use tungstenite::{Error, HandshakeError, Message, WebSocket, error::ProtocolError};
 
 use super::{Link, Protocol, msgpack_numpy};
 use crate::drivers::remote::{
@@ -63,6 +63,9 @@ impl Openpi {
         let url = self.url.clone();
         match error {
             Error::Io(error) if is_late(&error) => RemoteError::Slow { url, within },
+            Error::Protocol(ProtocolError::ResetWithoutClosingHandshake) => {
+                RemoteError::Gone { url, reason: error.to_string() }
+            }
             Error::Protocol(_) | Error::Utf8(_) | Error::Capacity(_) => self.unreadable(error.to_string()),
             error => RemoteError::Gone { url, reason: error.to_string() },
         }
