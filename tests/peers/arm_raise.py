@@ -33,7 +33,7 @@ class ArmRaise:
             first = self.first.setdefault(observation["prompt"], state)
         target = np.concatenate([first[UPPER], [0, 0, 0, HEIGHT_M]]).astype(np.float32)
         rows = np.repeat(target[None], ROWS, axis=0)
-        if "in front of you" in observation["prompt"]:
+        if "Take the bottle" in observation["prompt"]:
             rows[:, 0] = np.linspace(state[SHOULDER], RAISED_RAD, ROWS)
         return {"actions": rows}
 

@@ -17,7 +17,7 @@ use super::{
 const LEFT_WRIST: usize = 21;
 const RIGHT_WRIST: usize = 35;
 /// Of what A alone is told.
-const WORDS_OF_A: &str = "in front of you";
+const WORDS_OF_A: &str = "Take the bottle";
 /// Of an action row.
 pub const LEFT_WRIST_COLUMN: usize = 6;
 const RIGHT_WRIST_COLUMN: usize = 13;

@@ -37,7 +37,7 @@ fn a_server_that_fails_ends_its_episode_and_no_other() {
         2 => until_then(|| array(35, f32::NAN)),
         3 => until_then(|| array(32, 0.0)),
         4 => until_then(|| Reply::Silence),
-        5 => until_then(|| Reply::Bytes(b"\xc1".into())),
+        5 => until_then(|| Reply::Bytes(b"\x82\xa1".into())),
         6 => until_then(|| array(35, 1e9)),
         _ => still(20),
     });

@@ -2,6 +2,7 @@
 //! environment, and is stopped with all that it started when the episode or its time is over.
 
 mod brief;
+mod ending;
 mod process;
 
 use std::{
@@ -18,15 +19,16 @@ use tandem_episodes::{
     players::{Fared, Place, PlayError, Policy, PolicyCard},
     write_whole,
 };
-use tandem_tools_spec::{EndReason, ResultReply, StartReply};
+use tandem_tools_spec::{ResultReply, StartReply};
 
 use crate::{
     hosting::{EpisodeThread, HostingError},
     http::Server,
-    settings::{Layer, Settings, SettingsError},
+    settings::{Layer, Record, Settings, SettingsError},
 };
 use brief::brief;
-use process::{Crowd, Group, last_words};
+use ending::Leaving;
+use process::{Crowd, Group};
 
 /// How long a program may go on when its episode has ended.
 const LAST_WORDS: Duration = Duration::from_secs(10);
@@ -44,16 +46,6 @@ pub struct Program {
     processes: Arc<Crowd>,
 }
 
-/// Why a program is looked at no longer.
-enum Leaving {
-    /// It ended by itself.
-    Left,
-    /// Its episode is over, and it is still there.
-    Stays,
-    /// It took too long.
-    OutOfTime,
-}
-
 impl Program {
     /// Episodes played by `command`, which a shell reads. A signal that ends this process ends those of the program, too.
     pub fn new(command: String, limit: Duration) -> Result<Program, SettingsError> {
@@ -61,12 +53,24 @@ impl Program {
             listen: Some(([127, 0, 0, 1], 0).into()),
             max_episodes: Some(1),
             // Where a program that has a shell could look behind the curtain, nothing lies while it runs.
-            record: Some(crate::settings::Record::After),
+            record: Some(Record::After),
             ..Layer::default()
         };
         let processes = Arc::new(Crowd::default());
         process::end_with_us(&processes);
         Ok(Program { command, limit, settings: Settings::resolve(flags, None)?, processes })
+    }
+
+    /// Those of a server for this episode alone.
+    fn settings_for(&self, spec: &EpisodeSpec, folder: &Path) -> Arc<Settings> {
+        Arc::new(Settings {
+            runs: folder.join("others"),
+            disclosure: spec.disclosure,
+            hints: spec.hints,
+            locomotion: spec.locomotion.clone(),
+            renderer: spec.renderer,
+            ..(*self.settings).clone()
+        })
     }
 
     /// Starts a process for the episode and waits until it is gone.
@@ -102,7 +106,7 @@ impl Program {
                 return Ok(Leaving::Left);
             }
             if began.elapsed() >= self.limit {
-                return Ok(Leaving::OutOfTime);
+                return Ok(Leaving::OutOfTime(self.limit));
             }
             if episode.ended() && over.get_or_insert_with(Instant::now).elapsed() >= LAST_WORDS {
                 return Ok(Leaving::Stays);
@@ -148,53 +152,8 @@ impl Policy for Program {
         server.stop();
         let (leaving, status) = ran?;
         let result = read_result(&absolute)?;
-        let stopped = self.stopped(&leaving, &status, over, &result, &absolute);
+        let stopped = leaving.reason(&status, over, &result, &absolute);
         Ok(Fared { result, thought, stopped })
-    }
-}
-
-impl Program {
-    /// Those of a server for this episode alone.
-    fn settings_for(&self, spec: &EpisodeSpec, folder: &Path) -> Arc<Settings> {
-        Arc::new(Settings {
-            runs: folder.join("others"),
-            disclosure: spec.disclosure,
-            hints: spec.hints,
-            locomotion: spec.locomotion.clone(),
-            renderer: spec.renderer,
-            ..(*self.settings).clone()
-        })
-    }
-
-    /// What kept the program from the end of its episode, if anything did.
-    fn stopped(
-        &self,
-        leaving: &Leaving,
-        status: &str,
-        over: bool,
-        result: &ResultReply,
-        folder: &Path,
-    ) -> Option<String> {
-        match (leaving, over, result.ended) {
-            (Leaving::OutOfTime, ..) => {
-                Some(format!("the program was stopped after {} s", self.limit.as_secs_f64()))
-            }
-            (_, true, EndReason::WallClockExhausted) => Some("the policy's wall clock ran out".into()),
-            (_, true, EndReason::Abandoned) => Some("the program made no call for too long".into()),
-            (Leaving::Left, false, _) => {
-                let calls = match result.tool_calls {
-                    0 => "without a call".into(),
-                    1 => "after 1 call".into(),
-                    calls => format!("after {calls} calls"),
-                };
-                let words = last_words(folder).map(|words| format!("; its last words: {words}"));
-                Some(format!(
-                    "the program ended {calls}, before its episode did ({status}){}",
-                    words.unwrap_or_default()
-                ))
-            }
-            (Leaving::Left | Leaving::Stays, ..) => None,
-        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! A program and all that it starts, as one group of processes, which is stopped as one.
 
 use std::{
-    fs::{self, File},
+    fs::File,
     io,
     path::Path,
     process::{Child, Command, ExitStatus, Stdio},
@@ -13,14 +13,12 @@ use std::{
 use super::brief;
 
 /// Where its output is kept.
-const STDOUT_FILE: &str = "stdout.txt";
-const STDERR_FILE: &str = "stderr.txt";
+pub const STDOUT_FILE: &str = "stdout.txt";
+pub const STDERR_FILE: &str = "stderr.txt";
 
 /// How long a group may take to end once it has been asked to.
 const PATIENCE: Duration = Duration::from_secs(5);
 const ROUND: Duration = Duration::from_millis(20);
-
-const LONGEST_WORDS_CHARS: usize = 300;
 
 /// The groups that are running.
 #[derive(Debug, Default)]
@@ -103,16 +101,6 @@ impl Drop for Group {
         // Nobody is left who could be told.
         let _ = self.end();
     }
-}
-
-/// The last line that a program has written, to where it complains or else to where it speaks.
-pub fn last_words(folder: &Path) -> Option<String> {
-    [STDERR_FILE, STDOUT_FILE].into_iter().find_map(|name| {
-        let bytes = fs::read(folder.join(name)).ok()?;
-        let text = String::from_utf8_lossy(&bytes);
-        let line = text.lines().map(str::trim).rfind(|line| !line.is_empty())?;
-        Some(line.chars().take(LONGEST_WORDS_CHARS).collect())
-    })
 }
 
 /// From here on a signal that ends this process ends every group first.
