@@ -31,7 +31,8 @@ pub use recording::{
     RecordedCall, RecordedCheckpoint, Recorder, Recording, RecordingError, RecoverError, Recovered,
     Visibility, recover,
 };
+pub use reports::RESULT_FILE;
 pub use scoring::{A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, RobotFacts, Scored, Scores};
 pub use session::{Checkpoint, Clock, RunFiles, RunFolder, Session, monotonic};
 pub use spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, Start};
-pub use tandem_sim::{BaseLimits, LocomotionChoice, SimError, render::RendererKind};
+pub use tandem_sim::{BaseLimits, LocomotionChoice, SimError, joint_names, render::RendererKind};

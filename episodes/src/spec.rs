@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use tandem_sim::{LocomotionChoice, SimError, render::RendererKind};
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
+use crate::scoring::Phase;
 use crate::tasks::{self, Task};
 
 /// Everything that makes an episode what it is. Equal values, played by equal calls on the same build, end in the same
@@ -85,6 +86,16 @@ impl EpisodeSpec {
             start: Start::default(),
             disclosure: Disclosure::default(),
             hints: Hints::default(),
+        }
+    }
+
+    /// Index of the phase that it begins at and that alone counts; `None` where it begins elsewhere, and all count.
+    pub fn begun_phase(&self) -> Option<usize> {
+        match &self.start {
+            Start::Phase(start) => {
+                (0..self.task.phases.len()).find(|phase| Phase::number(*phase) == start.phase)
+            }
+            Start::Task | Start::Checkpoint(_) => None,
         }
     }
 }

@@ -8,7 +8,7 @@ use tandem_episodes::evaluation::{Plan, Played, Shard, Starts, evaluate};
 use tandem_episodes::{Controller, RendererKind, RobotFile, players, tasks};
 use tandem_tools_spec::{Disclosure, EndReason, Hints, Protocol};
 
-fn plan(jobs: usize, seeds: Vec<u32>) -> Plan {
+fn plan(jobs: usize, seeds: Vec<u32>) -> Plan<'static> {
     let handover = tasks::find("handover").expect("a task");
     Plan {
         player: players::find("expert").expect("a player"),

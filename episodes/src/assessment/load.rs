@@ -90,7 +90,7 @@ fn recorded(path: &Path, policy: &str) -> Result<Played, String> {
     let calls = recording.tool_calls().map_err(|error| error.to_string())?;
     let result = recording.result.clone().ok_or_else(|| format!("{} was interrupted", path.display()))?;
     Ok(Played {
-        policy: policy.into(),
+        by: policy.into(),
         spec: recording.spec.clone(),
         locomotion: recording.locomotion.clone(),
         build: recording.build.clone(),

@@ -3,11 +3,14 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
+use serde_json::Value;
 use tandem_tools_spec::EndReason;
+use xxhash_rust::xxh3::xxh3_64;
 
 use super::load::Found;
 use super::rate::{Mean, Rate};
 use crate::evaluation::{PhaseLevel, Played, missed};
+use crate::players::PolicyCard;
 use crate::scoring::Phase;
 use crate::statistics::Count;
 use crate::tasks::{self, Task};
@@ -133,14 +136,21 @@ fn rules_of(played: &Played) -> Vec<String> {
     let spec = &played.spec;
     let short = played.build.chars().rev().take(6).collect::<Vec<_>>();
     vec![
-        played.policy.clone(),
+        played.by.full_name(),
         spec.protocol.name().into(),
         played.locomotion.clone(),
         spec.robot.name(),
         format!("tells {}", spec.disclosure),
         format!("hints {}", spec.hints.name()),
+        settings_of(&played.by),
         format!("build ..{}", short.iter().rev().collect::<String>()),
     ]
+}
+
+/// A short name for how a policy was driven.
+fn settings_of(card: &PolicyCard) -> String {
+    let text = card.settings.as_ref().map(Value::to_string).unwrap_or_default();
+    format!("settings {:06x}", xxh3_64(text.as_bytes()) & 0xff_ffff)
 }
 
 /// Whether phase number `phase` was reached.

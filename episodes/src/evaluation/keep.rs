@@ -6,13 +6,11 @@ use serde::{Deserialize, Serialize};
 use tandem_tools_spec::ResultReply;
 
 use super::{EvaluationError, Plan};
-use crate::error::CheckpointError;
 use crate::output::write_whole;
-use crate::players::InProcess;
+use crate::players::{Fared, Place, PlayError, PolicyCard};
 use crate::reports::RESULT_FILE;
-use crate::scoring::Phase;
 use crate::spec::{EpisodeSpec, Start};
-use crate::{EpisodeError, Session};
+use crate::{CheckpointError, EpisodeError};
 
 /// Folder of single episodes in the folder of an evaluation.
 pub const EPISODES: &str = "episodes";
@@ -20,8 +18,9 @@ pub const EPISODES: &str = "episodes";
 /// One episode that was played, as it is kept in a file of its own.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Played {
-    /// Name of the player.
-    pub policy: String,
+    /// Who played.
+    #[serde(flatten)]
+    pub by: PolicyCard,
     pub spec: EpisodeSpec,
     /// Which base controller the robots had; the name tells files of different content apart.
     pub locomotion: String,
@@ -39,36 +38,40 @@ pub struct Played {
 impl Played {
     /// Index of the phase that it began at and that alone counts; `None` where it began at the task's beginning.
     pub fn begun_phase(&self) -> Option<usize> {
-        begun_phase(&self.spec)
+        self.spec.begun_phase()
     }
 }
 
-fn begun_phase(spec: &EpisodeSpec) -> Option<usize> {
-    match &spec.start {
-        Start::Phase(start) => (0..spec.task.phases.len()).find(|phase| Phase::number(*phase) == start.phase),
-        Start::Task | Start::Checkpoint(_) => None,
-    }
+/// What became of an episode of the plan.
+pub enum Outcome {
+    /// Boxed, because the other is small.
+    Played(Box<Played>),
+    /// It could not be begun, and why.
+    LeftOut(String),
 }
 
 /// The folder of single episodes, and what has to agree for one of them to be taken instead of played.
 pub struct Keeper<'a> {
-    pub plan: &'a Plan,
+    pub plan: &'a Plan<'a>,
     pub folder: &'a Path,
     pub locomotion: String,
     pub build: &'static str,
 }
 
 impl Keeper<'_> {
-    /// `None` where there is no such episode: the demonstration did not come to the phase that it begins at.
-    pub fn kept_or_played(&self, spec: &EpisodeSpec) -> Result<Option<Played>, EvaluationError> {
-        match self.kept(spec) {
-            Some(kept) => Ok(Some(kept)),
-            None => match self.play(spec) {
-                Err(EvaluationError::Episode(EpisodeError::Checkpoint(CheckpointError::NoPhase {
-                    ..
-                }))) => Ok(None),
-                played => played.map(Some),
-            },
+    pub fn kept_or_played(&self, spec: &EpisodeSpec) -> Result<Outcome, EvaluationError> {
+        if let Some(kept) = self.kept(spec) {
+            return Ok(Outcome::Played(Box::new(kept)));
+        }
+        let folder = self.folder.join(name(spec));
+        match self.plan.player.play_whole(spec, Place { folder: &folder, record: self.plan.record }) {
+            Ok(fared) => self.keep(spec, fared).map(|played| Outcome::Played(Box::new(played))),
+            Err(PlayError::Episode(EpisodeError::Checkpoint(CheckpointError::NoPhase { .. }))) => {
+                Ok(Outcome::LeftOut("its demonstration did not come so far".into()))
+            }
+            Err(PlayError::NotReady(reason)) => Ok(Outcome::LeftOut(reason)),
+            Err(PlayError::Episode(error)) => Err(error.into()),
+            Err(PlayError::Lost(reason)) => Err(unrecorded(spec, reason)),
         }
     }
 
@@ -76,8 +79,8 @@ impl Keeper<'_> {
     pub fn kept(&self, spec: &EpisodeSpec) -> Option<Played> {
         let bytes = std::fs::read(self.folder.join(format!("{}.json", name(spec)))).ok()?;
         let kept: Played = serde_json::from_slice(&bytes).ok()?;
-        let by = (kept.policy.as_str(), kept.locomotion.as_str(), kept.build.as_str());
-        let same = by == (self.plan.player.name, &self.locomotion, self.build)
+        let by = (&kept.by, kept.locomotion.as_str(), kept.build.as_str());
+        let same = by == (&self.plan.player.card(), &self.locomotion, self.build)
             && kept.spec == *spec
             && (kept.result.task.as_str(), kept.result.seed) == (spec.task.id, spec.seed)
             && self.recording(spec).is_none_or(|folder| folder.join(RESULT_FILE).exists());
@@ -89,33 +92,29 @@ impl Keeper<'_> {
         self.plan.record.then(|| self.folder.join(name(spec)))
     }
 
-    fn play(&self, spec: &EpisodeSpec) -> Result<Played, EvaluationError> {
-        let session = Session::start(spec, self.recording(spec).as_deref())?;
-        let mut episode = match begun_phase(spec) {
-            Some(phase) => InProcess::until(phase + 1, session),
-            None => InProcess::new(session),
-        };
-        let outcome = self.plan.player.play(spec, &mut episode);
-        let thought_s = episode.session.thought().as_secs_f64();
-        let result = episode.session.close();
-        if let Some(reason) = result.recording_failed.clone() {
-            return Err(EvaluationError::Recording { task: spec.task.id, seed: spec.seed, reason });
+    /// Writes what an episode came to.
+    fn keep(&self, spec: &EpisodeSpec, fared: Fared) -> Result<Played, EvaluationError> {
+        let Fared { result, thought, stopped } = fared;
+        if let Some(reason) = result.recording_failed {
+            return Err(unrecorded(spec, reason));
         }
-        let gave_up = outcome.err().map(|error| error.to_string());
-        let fell_short = missed(&result, begun_phase(spec));
         let played = Played {
-            policy: self.plan.player.name.into(),
+            by: self.plan.player.card(),
             spec: spec.clone(),
             locomotion: self.locomotion.clone(),
             build: self.build.into(),
-            note: gave_up.or(fell_short),
-            thought_s,
+            note: stopped.or_else(|| missed(&result, spec.begun_phase())),
+            thought_s: thought.as_secs_f64(),
             result,
         };
         let text = serde_json::to_string_pretty(&played)?;
         write_whole(&self.folder.join(format!("{}.json", name(spec))), text.as_bytes())?;
         Ok(played)
     }
+}
+
+fn unrecorded(spec: &EpisodeSpec, reason: String) -> EvaluationError {
+    EvaluationError::Recording { task: spec.task.id, seed: spec.seed, reason }
 }
 
 /// What the episode's file and folder are called.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use tandem_sim::render::RendererKind;
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
-use crate::players;
+use crate::players::Policy;
 use crate::recording::Recorder;
 use crate::scoring::Phase;
 use crate::spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, Start};
@@ -13,9 +13,9 @@ use crate::tasks::Task;
 
 /// What to play.
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub struct Plan<'a> {
     /// Who plays.
-    pub player: &'static players::Entry,
+    pub player: &'a dyn Policy,
     pub protocol: Protocol,
     pub robot: RobotFile,
     pub locomotion: Controller,
@@ -60,7 +60,7 @@ impl Shard {
     pub const WHOLE: Shard = Shard { index: 0, of: 1 };
 }
 
-impl Plan {
+impl Plan<'_> {
     /// One of the episodes to play.
     pub fn spec(&self, task: &'static Task, seed: u32, start: Start) -> EpisodeSpec {
         EpisodeSpec {

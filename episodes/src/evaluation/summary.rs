@@ -7,6 +7,7 @@ use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
 use super::keep::{Keeper, Played};
 use super::phase_level::PhaseLevel;
+use crate::players::PolicyCard;
 
 /// How a task went over its seeds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -22,8 +23,9 @@ pub struct TaskSummary {
 /// The content of `results.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Evaluation {
-    /// Name of the player.
-    pub policy: String,
+    /// Who played.
+    #[serde(flatten)]
+    pub by: PolicyCard,
     pub protocol: Protocol,
     pub locomotion: String,
     pub disclosure: Disclosure,
@@ -55,7 +57,7 @@ pub fn summarise(keeper: &Keeper, episodes: Vec<Played>, left_out: Vec<String>) 
         task.mean_env_steps /= task.episodes as f64;
     }
     Evaluation {
-        policy: keeper.plan.player.name.into(),
+        by: keeper.plan.player.card(),
         protocol: keeper.plan.protocol,
         locomotion: keeper.locomotion.clone(),
         disclosure: keeper.plan.disclosure,

@@ -32,7 +32,7 @@ fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultRe
 /// An episode that was played under `keeper`'s rules.
 fn played(keeper: &Keeper, spec: &EpisodeSpec) -> Played {
     Played {
-        policy: keeper.plan.player.name.into(),
+        by: keeper.plan.player.card(),
         spec: spec.clone(),
         locomotion: keeper.locomotion.clone(),
         build: keeper.build.into(),
@@ -59,7 +59,7 @@ fn the_first_phase_that_was_missed_is_noted() {
     assert_eq!(missed(&result, Some(2)).as_deref(), Some("p3 was not reached in 812 steps"));
 }
 
-fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> Plan {
+fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> Plan<'static> {
     Plan {
         player: players::find("expert").unwrap(),
         protocol: Protocol::Agentic,
@@ -174,7 +174,9 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
         ("hints", |played| played.spec.hints = Hints::Off),
         ("start", |played| played.spec.start = Start::Checkpoint("other".into())),
         ("robot", |played| played.spec.robot = RobotFile::File("other.xml".into())),
-        ("policy", |played| played.policy = "idle".into()),
+        ("policy", |played| played.by = "idle".into()),
+        ("settings", |played| played.by.settings = Some(serde_json::json!({ "execute": 25 }))),
+        ("extra information", |played| played.by.extra_information.push("third_person".into())),
         ("controller", |played| played.locomotion.push('0')),
         ("build", |played| played.build.push('0')),
     ] {

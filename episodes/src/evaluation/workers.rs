@@ -4,10 +4,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, mpsc};
 
 use super::EvaluationError;
-use super::keep::{Keeper, Played};
+use super::keep::{Keeper, Outcome, Played};
 use crate::spec::EpisodeSpec;
 
-/// Every episode of `work`, kept or played, in its order; those that do not exist are added to `left_out`.
+/// Every episode of `work`, kept or played, in its order; those that could not be begun are added to `left_out`.
 pub fn play_all(
     keeper: &Keeper,
     work: &[EpisodeSpec],
@@ -17,7 +17,7 @@ pub fn play_all(
     let next = AtomicUsize::new(0);
     let failure = Mutex::new(None);
     let (done, played) = mpsc::channel();
-    let mut episodes: Vec<(usize, Option<Played>)> = std::thread::scope(|scope| {
+    let mut outcomes: Vec<(usize, Outcome)> = std::thread::scope(|scope| {
         for _ in 0..keeper.plan.jobs.max(1) {
             let done = done.clone();
             let (next, failure) = (&next, &failure);
@@ -26,7 +26,7 @@ pub fn play_all(
                     let number = next.fetch_add(1, Ordering::Relaxed);
                     let Some(spec) = work.get(number) else { break };
                     match keeper.kept_or_played(spec) {
-                        Ok(episode) => drop(done.send((number, episode))),
+                        Ok(outcome) => drop(done.send((number, outcome))),
                         Err(error) => {
                             // Nobody else begins another episode.
                             next.store(work.len(), Ordering::Relaxed);
@@ -40,15 +40,28 @@ pub fn play_all(
             });
         }
         drop(done);
-        played.iter().inspect(|(_, episode)| episode.iter().for_each(progress)).collect()
+        played.iter().inspect(|(_, outcome)| tell(outcome, progress)).collect()
     });
     if let Some(error) = failure.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()) {
         return Err(error);
     }
-    episodes.sort_by_key(|(number, _)| *number);
-    for (number, _) in episodes.iter().filter(|(_, episode)| episode.is_none()) {
-        let EpisodeSpec { task, seed, .. } = &work[*number];
-        left_out.push(format!("{} seed {seed}: its demonstration did not come so far", task.id));
+    outcomes.sort_by_key(|(number, _)| *number);
+    let mut episodes = Vec::with_capacity(outcomes.len());
+    for (number, outcome) in outcomes {
+        match outcome {
+            Outcome::Played(played) => episodes.push(*played),
+            Outcome::LeftOut(reason) => {
+                let EpisodeSpec { task, seed, .. } = &work[number];
+                left_out.push(format!("{} seed {seed}: {reason}", task.id));
+            }
+        }
     }
-    Ok(episodes.into_iter().filter_map(|(_, episode)| episode).collect())
+    Ok(episodes)
+}
+
+fn tell(outcome: &Outcome, progress: &(dyn Fn(&Played) + Sync)) {
+    match outcome {
+        Outcome::Played(played) => progress(played),
+        Outcome::LeftOut(_) => {}
+    }
 }

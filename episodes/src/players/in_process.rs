@@ -1,8 +1,8 @@
 //! An episode in this process, as a player meets it.
 
-use tandem_tools_spec::{ToolCall, ToolReply};
+use tandem_tools_spec::{Png, ToolCall, ToolReply};
 
-use super::{Backstage, Caller, PlayerError};
+use super::{Backstage, Caller, Onlooker, PlayerError};
 use crate::scoring::Facts;
 use crate::{EpisodeError, Session};
 
@@ -35,6 +35,13 @@ impl Caller for InProcess {
             EpisodeError::Ended { .. } => PlayerError::EpisodeOver,
             error => PlayerError::Call { tool, reason: error.to_string() },
         })
+    }
+}
+
+impl Onlooker for InProcess {
+    fn third_person(&mut self) -> Result<Png, PlayerError> {
+        let seen = self.session.third_person();
+        seen.map_err(|error| PlayerError::Call { tool: "third_person", reason: error.to_string() })
     }
 }
 

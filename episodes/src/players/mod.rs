@@ -7,13 +7,15 @@ mod demonstration;
 pub mod experts;
 mod idle;
 mod in_process;
+mod policy;
 
-use tandem_tools_spec::{ToolCall, ToolReply};
+use tandem_tools_spec::{Png, ToolCall, ToolReply};
 
 use crate::scoring::Facts;
 use crate::spec::EpisodeSpec;
 
 pub use in_process::InProcess;
+pub use policy::{Fared, Place, PlayError, Policy, PolicyCard, play_in_process};
 
 /// Makes tool calls on one episode, which is in this process or behind HTTP.
 pub trait Caller {
@@ -23,6 +25,11 @@ pub trait Caller {
 /// A caller who also sees what no policy does.
 pub trait Backstage: Caller {
     fn facts(&mut self) -> Result<Facts, PlayerError>;
+}
+
+/// A caller who also sees the room from where no robot stands: more than a policy has, and results say so.
+pub trait Onlooker: Caller {
+    fn third_person(&mut self) -> Result<Png, PlayerError>;
 }
 
 /// Plays one episode to its end by tool calls alone; made anew for each episode.

@@ -23,8 +23,11 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
+use tandem_sim::render::encode_png;
 use tandem_sim::{RobotCommand, Side, Step, World};
-use tandem_tools_spec::{EndReason, ImageFormat, LookReply, ManageReply, ResultReply, ToolCall, ToolReply};
+use tandem_tools_spec::{
+    EndReason, ImageFormat, LookReply, ManageReply, Png, ResultReply, ToolCall, ToolReply,
+};
 
 use crate::commands::{Called, Command, Motion, OperatorCommand, Run};
 use crate::convert::isometry_from_sim;
@@ -337,6 +340,18 @@ impl Session {
     /// What scoring and experts see.
     pub fn facts(&self) -> Facts {
         self.scores.facts(&self.present)
+    }
+
+    /// What the scene's camera sees that sees all robots, which no tool shows. The policy's clock stands meanwhile.
+    pub fn third_person(&mut self) -> Result<Png, EpisodeError> {
+        self.clock.pause();
+        let camera = self.eyes.cameras.third_person();
+        let frame = self.eyes.render(&self.present, &camera);
+        let png = encode_png(frame.width, frame.height, &frame.rgb);
+        if self.ended.is_none() {
+            self.clock.resume();
+        }
+        Ok(Png(png?))
     }
 
     /// How many phases have been reached.

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use clap::{
     Args,
-    builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
+    builder::{PossibleValuesParser, TypedValueParser},
 };
 use tandem_episodes::{
     Controller, RendererKind, RobotFile, SimError,
     evaluation::{Plan, Shard, Starts},
-    players,
+    players::Policy,
     tasks::{self, Task},
 };
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
@@ -90,15 +90,9 @@ fn protocol_parser() -> impl TypedValueParser<Value = Protocol> {
         .try_map(move |name| find(name).ok_or("not one of the protocols"))
 }
 
-/// One of the players, by name.
-pub fn player_parser() -> impl TypedValueParser<Value = &'static players::Entry> {
-    let names = players::ALL.iter().map(|player| PossibleValue::new(player.name).help(player.about));
-    PossibleValuesParser::new(names).try_map(|name| players::find(&name))
-}
-
 impl EpisodeFlags {
     /// The plan to have `player` play these episodes.
-    pub fn plan(self, player: &'static players::Entry, record: bool) -> Result<Plan, SimError> {
+    pub fn plan(self, player: &dyn Policy, record: bool) -> Result<Plan<'_>, SimError> {
         tracing::info!("{}", self.renderer.kind.describe()?);
         Ok(Plan {
             player,

@@ -5,22 +5,17 @@ use std::{path::PathBuf, process::ExitCode, str::FromStr};
 use tandem_episodes::{
     Phase,
     evaluation::{Plan, Shard, Starts},
-    players, tasks,
+    tasks,
 };
 use tracing_subscriber::filter::LevelFilter;
 
-use super::{
-    Outcome,
-    episode_flags::{EpisodeFlags, player_parser},
-    log, played,
-};
+use super::{Outcome, episode_flags::EpisodeFlags, log, played, policy_flags::PolicyFlags};
 
 /// Play tasks over seeds in parallel worlds and count the phases reached. Goes on where an interrupted run stopped.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Who plays.
-    #[arg(long, value_parser = player_parser(), default_value = "expert")]
-    policy: &'static players::Entry,
+    #[command(flatten)]
+    policy: PolicyFlags,
     #[command(flatten)]
     episodes: EpisodeFlags,
     /// Phases to begin at, as p2 or p1,p2, or `all`: each episode starts where that phase began in the demonstration of its
@@ -76,7 +71,7 @@ impl FromStr for ShardFlag {
     }
 }
 
-/// Plays and counts.
+/// Plays and counts; it is a failure if of some episodes none could be begun.
 pub fn run(args: Args) -> Outcome {
     log::to_stderr(LevelFilter::INFO);
     let starts = match (args.demos, args.from) {
@@ -84,7 +79,10 @@ pub fn run(args: Args) -> Outcome {
         _ => Starts::Task,
     };
     let ShardFlag(shard) = args.shard;
-    let plan = Plan { starts, shard, ..args.episodes.plan(args.policy, args.record)? };
-    played::play_and_print(&plan, &args.out)?;
-    Ok(ExitCode::SUCCESS)
+    let policy = args.policy.policy()?;
+    let plan = Plan { starts, shard, ..args.episodes.plan(&*policy, args.record)? };
+    Ok(match played::play_and_print(&plan, &args.out)? {
+        0 if !plan.episodes().0.is_empty() => ExitCode::FAILURE,
+        _ => ExitCode::SUCCESS,
+    })
 }

@@ -10,6 +10,7 @@ pub mod evaluate;
 pub mod locomotion;
 mod log;
 mod played;
+mod policy_flags;
 pub mod recover;
 pub mod replay;
 pub mod report;

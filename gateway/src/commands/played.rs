@@ -9,8 +9,8 @@ use tandem_episodes::statistics::{Count, clopper_pearson};
 /// Notes on failures below the table.
 const NOTES_SHOWN: usize = 20;
 
-/// Plays `plan` into `folder`, with a progress bar, and prints a table.
-pub fn play_and_print(plan: &Plan, folder: &Path) -> Result<(), Box<dyn Error>> {
+/// Plays `plan` into `folder`, with a progress bar, prints a table, and says how many episodes were played.
+pub fn play_and_print(plan: &Plan, folder: &Path) -> Result<usize, Box<dyn Error>> {
     let bar = ProgressBar::new(plan.episodes().0.len() as u64);
     bar.set_style(ProgressStyle::with_template("  [{bar:30}] {pos} of {len} episodes, {elapsed}, {msg}")?);
     let evaluation = evaluation::evaluate(plan, folder, &|played| {
@@ -32,7 +32,7 @@ pub fn play_and_print(plan: &Plan, folder: &Path) -> Result<(), Box<dyn Error>> 
     }
     evaluation.left_out.iter().for_each(|left_out| println!("  left out: {left_out}"));
     println!("  results in {}", folder.display());
-    Ok(())
+    Ok(evaluation.episodes.len())
 }
 
 fn print_table(evaluation: &Evaluation) {

@@ -1,5 +1,9 @@
-//! Policies that are not in the episode's process: how they reach it.
+//! Policies that are not in the episode's process: how they reach it, or it them.
 
 mod http_episode;
+mod program;
+mod remote;
 
 pub use http_episode::HttpEpisode;
+pub use program::Program;
+pub use remote::{MapError, PRESETS, PolicyMap, Protocol, Remote};

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
     sync::{
         Arc, OnceLock,
-        atomic::{AtomicBool, Ordering},
+        atomic::{AtomicBool, AtomicU64, Ordering},
     },
     time::Duration,
 };
@@ -80,12 +80,15 @@ struct News {
     ended: AtomicBool,
     /// The first failure of the recording.
     recording_failed: OnceLock<String>,
+    /// How long the policy has thought, in nanoseconds.
+    thought: AtomicU64,
 }
 
 impl News {
     /// As `session` stands.
     fn spread(&self, session: &Guarded) {
         self.ended.store(session.ended(), Ordering::Relaxed);
+        self.thought.store(session.thought().as_nanos() as u64, Ordering::Relaxed);
         if let Some(reason) = session.recording_failed() {
             self.recording_failed.get_or_init(|| reason.to_owned());
         }
@@ -227,7 +230,12 @@ impl EpisodeThread {
 
     /// Whether the episode takes no more commands.
     pub fn ended(&self) -> bool {
-        self.news.ended.load(Ordering::Relaxed)
+        self.news.ended.load(Ordering::Relaxed) || self.commands.is_closed()
+    }
+
+    /// How long the policy has thought, up to its last call.
+    pub fn thought(&self) -> Duration {
+        Duration::from_nanos(self.news.thought.load(Ordering::Relaxed))
     }
 
     /// Why the recording is not complete, if it is not.

@@ -2,6 +2,7 @@
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Duration;
 
 use tandem_episodes::Session;
 use tandem_tools_spec::{EndReason, ResultReply};
@@ -47,6 +48,14 @@ impl Guarded {
         match &self.state {
             State::Sound(session) => session.ended().is_some(),
             State::Panicked(_) => true,
+        }
+    }
+
+    /// How long the policy has thought, up to its last call; nothing that is known after a panic.
+    pub fn thought(&self) -> Duration {
+        match &self.state {
+            State::Sound(session) => session.thought(),
+            State::Panicked(_) => Duration::ZERO,
         }
     }
 

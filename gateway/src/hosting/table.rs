@@ -92,26 +92,49 @@ impl EpisodeTable {
             hints: self.settings.hints,
             ..EpisodeSpec::new(tasks::find(&args.task)?, args.seed, protocol)
         };
-        let (team, operators) = match driving.is_per_robot() {
-            true => {
-                Team::new(spec.task.robot_names(), &driving).map(|(team, tokens)| (Some(team), tokens))?
-            }
-            false => (None, Vec::new()),
-        };
         let place = self.take_place().await?;
         let runs = &self.settings.runs;
         let (id, path) = run_folder::create(runs, spec.task.id, spec.seed)
             .map_err(|source| HostingError::Folder { runs: runs.clone(), source })?;
         let folder = RunFolder { path, visibility: self.settings.record };
+        self.begin(&id, spec, &driving, folder, place).await
+    }
+
+    /// Starts `spec` under the name `id` with its files in `folder`, for an evaluation in this process.
+    pub async fn host(
+        &self,
+        id: &str,
+        spec: EpisodeSpec,
+        driving: &Driving,
+        folder: RunFolder,
+    ) -> Result<StartReply, HostingError> {
+        let place = self.take_place().await?;
+        self.begin(id, spec, driving, folder, place).await
+    }
+
+    async fn begin(
+        &self,
+        id: &str,
+        spec: EpisodeSpec,
+        driving: &Driving,
+        folder: RunFolder,
+        place: OwnedSemaphorePermit,
+    ) -> Result<StartReply, HostingError> {
+        let (team, operators) = match driving.is_per_robot() {
+            true => {
+                Team::new(spec.task.robot_names(), driving).map(|(team, tokens)| (Some(team), tokens))?
+            }
+            false => (None, Vec::new()),
+        };
         let (episode, mut briefing) =
-            EpisodeThread::start(&id, spec, folder, place, self.metrics.clone()).await?;
+            EpisodeThread::start(id, spec, folder, place, self.metrics.clone()).await?;
         self.settings.instructions.rephrase_briefing(&mut briefing);
-        if let Err(late) = self.hold(Hosted::new(&id, Arc::new(episode), team)) {
+        if let Err(late) = self.hold(Hosted::new(id, Arc::new(episode), team)) {
             late.thread.close().await?;
             return Err(HostingError::ShuttingDown);
         }
         tracing::info!(episode = id, "started");
-        Ok(StartReply { episode_id: id, operators, briefing })
+        Ok(StartReply { episode_id: id.into(), operators, briefing })
     }
 
     /// The reply to `list_tasks`.

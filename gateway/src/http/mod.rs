@@ -21,4 +21,4 @@ mod server;
 #[cfg(test)]
 mod tests;
 
-pub use server::Server;
+pub use server::{Server, shutdown_signal};

@@ -2,10 +2,15 @@
 
 use std::{io, net::SocketAddr, sync::Arc, time::Duration};
 
+use tandem_episodes::{EpisodeSpec, RunFolder};
+use tandem_tools_spec::StartReply;
 use tokio::{net::TcpListener, runtime::Runtime, sync::oneshot, task::JoinHandle, time::interval};
 
 use super::{app::App, connections, gate::Gate, limits::Limits, routes::router};
-use crate::{hosting::EpisodeTable, settings::Settings};
+use crate::{
+    hosting::{EpisodeTable, EpisodeThread, HostingError},
+    settings::Settings,
+};
 
 /// Requests only parse, wait and answer; the worlds have threads of their own.
 const HTTP_THREADS: usize = 2;
@@ -59,6 +64,17 @@ impl Server {
         self.address
     }
 
+    /// Starts `spec` under the name `id` with its files in `folder`, for an evaluation in this process.
+    pub fn host(
+        &self,
+        id: &str,
+        spec: EpisodeSpec,
+        folder: RunFolder,
+    ) -> Result<(Arc<EpisodeThread>, StartReply), HostingError> {
+        let start = self.runtime.block_on(self.table.host(id, spec, folder))?;
+        Ok((self.table.get(id)?, start))
+    }
+
     /// The episodes, for experts and scoring in this process.
     pub fn table(&self) -> &Arc<EpisodeTable> {
         &self.table
@@ -102,8 +118,9 @@ async fn look_after(table: Arc<EpisodeTable>) {
     }
 }
 
+/// When this process is asked to end.
 #[cfg(unix)]
-async fn shutdown_signal() {
+pub async fn shutdown_signal() {
     use tokio::signal::unix::{SignalKind, signal};
     let terminate = async {
         match signal(SignalKind::terminate()) {
@@ -120,7 +137,8 @@ async fn shutdown_signal() {
     }
 }
 
+/// When this process is asked to end.
 #[cfg(not(unix))]
-async fn shutdown_signal() {
+pub async fn shutdown_signal() {
     let _ = tokio::signal::ctrl_c().await;
 }

@@ -1,0 +1,119 @@
+//! Whoever plays the episodes of an evaluation: a player of [`super::ALL`], or a policy that lives elsewhere.
+
+use std::fmt::Debug;
+use std::path::Path;
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use tandem_tools_spec::ResultReply;
+
+use super::{Entry, InProcess, PlayerError};
+use crate::spec::EpisodeSpec;
+use crate::{EpisodeError, Session};
+
+/// Plays episodes, several of them side by side.
+pub trait Policy: Debug + Send + Sync {
+    /// What results say of it.
+    fn card(&self) -> PolicyCard;
+
+    /// Plays `spec` from its start to its result.
+    fn play_whole(&self, spec: &EpisodeSpec, place: Place) -> Result<Fared, PlayError>;
+}
+
+/// What results say of a policy. Episodes of policies with different cards are never taken for each other.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PolicyCard {
+    /// What results call it.
+    #[serde(rename = "policy")]
+    pub name: String,
+    /// How it is reached and driven, as far as its name does not say it.
+    #[serde(rename = "policy_settings", default, skip_serializing_if = "Option::is_none")]
+    pub settings: Option<Value>,
+    /// What it is shown beyond what the robots themselves see and feel.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub extra_information: Vec<String>,
+}
+
+/// Where an episode leaves its files.
+#[derive(Clone, Copy, Debug)]
+pub struct Place<'a> {
+    /// The episode's own folder; nobody has made it yet.
+    pub folder: &'a Path,
+    /// Whether the episode is to be recorded there.
+    pub record: bool,
+}
+
+impl<'a> Place<'a> {
+    /// Where the episode is recorded, if it is.
+    pub fn recording(self) -> Option<&'a Path> {
+        self.record.then_some(self.folder)
+    }
+}
+
+/// How a policy fared.
+#[derive(Debug)]
+pub struct Fared {
+    pub result: ResultReply,
+    /// How long it thought.
+    pub thought: Duration,
+    /// What stopped it before the episode's end, if anything did.
+    pub stopped: Option<String>,
+}
+
+/// Why an episode has no result.
+#[derive(Debug, thiserror::Error)]
+pub enum PlayError {
+    #[error(transparent)]
+    Episode(#[from] EpisodeError),
+    /// The policy was not ready, and the episode has not begun; another time it may be.
+    #[error("{0}")]
+    NotReady(String),
+    /// The episode was played, and what came of it is lost.
+    #[error("{0}")]
+    Lost(String),
+}
+
+impl PolicyCard {
+    /// The name, and what the policy is shown beyond what others see.
+    pub fn full_name(&self) -> String {
+        let extra = self.extra_information.iter().map(|what| format!(" + {what}"));
+        std::iter::once(self.name.clone()).chain(extra).collect()
+    }
+}
+
+impl From<&str> for PolicyCard {
+    /// A policy of which nothing but the name is known.
+    fn from(name: &str) -> PolicyCard {
+        PolicyCard { name: name.into(), ..PolicyCard::default() }
+    }
+}
+
+impl Policy for Entry {
+    fn card(&self) -> PolicyCard {
+        self.name.into()
+    }
+
+    fn play_whole(&self, spec: &EpisodeSpec, place: Place) -> Result<Fared, PlayError> {
+        Ok(play_in_process(spec, place, |episode| self.play(spec, episode))?)
+    }
+}
+
+/// Plays `spec` in this process: `act` makes the calls. That the episode ends under way is no error.
+pub fn play_in_process(
+    spec: &EpisodeSpec,
+    place: Place,
+    act: impl FnOnce(&mut InProcess) -> Result<(), PlayerError>,
+) -> Result<Fared, EpisodeError> {
+    let session = Session::start(spec, place.recording())?;
+    let mut episode = match spec.begun_phase() {
+        Some(phase) => InProcess::until(phase + 1, session),
+        None => InProcess::new(session),
+    };
+    let stopped = match act(&mut episode) {
+        Ok(()) | Err(PlayerError::EpisodeOver) => None,
+        Err(error) => Some(error.to_string()),
+    };
+    let thought = episode.session.thought();
+    Ok(Fared { result: episode.session.close(), thought, stopped })
+}

@@ -1,0 +1,45 @@
+"""The smallest agent, of Python's standard library alone: every robot lifts its right hand by 10 cm, then the episode is finished.
+
+    tandem evaluate --policy exec:"python3 examples/agent.py" --tasks handover --seeds 0 --out runs/agent
+"""
+
+import json
+import os
+import sys
+import urllib.request
+
+EPISODE = f"{os.environ['TANDEM_URL']}/v1/episodes/{os.environ['TANDEM_EPISODE']}"
+RISE_M = 0.1
+MOST_COMMANDS = 8
+
+
+def call(tool, **arguments):
+    headers = {"content-type": "application/json", "authorization": f"Bearer {os.environ.get('TANDEM_TOKEN', 'none')}"}
+    request = urllib.request.Request(f"{EPISODE}/tools/{tool}", json.dumps(arguments).encode(), headers)
+    with urllib.request.urlopen(request) as answer:
+        return json.load(answer)
+
+
+def raised(robot):
+    """The pose of a robot's right wrist, 10 cm further up."""
+    wrist = call("get_robot_state", robot=robot)["right_wrist"]
+    x, y, z = wrist["position_m"]
+    return {"robot": robot, "right_position_m": [x, y, z + RISE_M], "right_quaternion_wxyz": wrist["quaternion_wxyz"]}
+
+
+def main():
+    print(sys.stdin.read())  # the brief: what a language model would be told
+    with open(os.environ["TANDEM_START"]) as file:
+        start = json.load(file)
+    steps = start["status"]["budget"]["steps_per_command"]
+    targets = [raised(robot["robot"]) for robot in start["robots"]]
+    for _ in range(MOST_COMMANDS):
+        reports = call("move_wrists", steps=steps, robots=targets)["robots"]
+        if all(report["right"]["state"] == "arrived" for report in reports):
+            break
+    for report in reports:
+        print(report["robot"], report["right"]["state"], report["right"]["measured"])
+    print(call("finish"))
+
+
+main()

@@ -1,0 +1,189 @@
+//! The flags that say who plays: one of the program's own players, a program, or a learned policy at a server.
+
+use std::{error::Error, time::Duration};
+
+use tandem_episodes::{
+    EpisodeSpec,
+    players::{self, Fared, Place, PlayError, Policy, PolicyCard},
+};
+
+use crate::drivers::{PRESETS, PolicyMap, Program, Protocol, Remote};
+
+/// What the name of a program begins with.
+const EXEC: &str = "exec:";
+
+/// Longest that a program may run in an episode, unless a flag says otherwise.
+const LIMIT_S: u32 = 3600;
+
+/// Who plays.
+#[derive(Debug, clap::Args)]
+pub struct PolicyFlags {
+    #[arg(long, value_name = "POLICY", default_value = "expert", value_parser = parse_who, help = help())]
+    policy: Who,
+    /// How the policy at a server is asked and understood: a preset, openpi or gr00t_n17_g1, or a TOML file [default: openpi for
+    /// openpi:, none for act:].
+    #[arg(long, value_name = "NAME|FILE")]
+    policy_map: Option<String>,
+    /// Longest that a program may run in one episode [default: 3600].
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..))]
+    policy_limit: Option<u32>,
+    /// What results and reports call the policy, where the text of --policy is no good name.
+    #[arg(long, value_name = "NAME")]
+    policy_name: Option<String>,
+}
+
+/// A policy on the command line.
+#[derive(Clone, Debug)]
+enum Who {
+    Player(&'static players::Entry),
+    Program(String),
+    Remote(Protocol, Vec<String>),
+}
+
+fn help() -> String {
+    let players = players::ALL.iter().map(|player| format!("{} ({})", player.name, player.about));
+    let players: Vec<String> = players.collect();
+    format!(
+        "Who plays: {}; exec:COMMAND, a program that is started anew for every episode; openpi:ws://HOST:PORT or act:http://HOST:PORT/act, \
+         a learned policy at a server, or one for each robot, separated by commas",
+        players.join(", ")
+    )
+}
+
+fn parse_who(text: &str) -> Result<Who, String> {
+    if let Some(command) = text.strip_prefix(EXEC) {
+        return match command.trim().is_empty() {
+            true => Err("no command; give one, as exec:\"python3 agent.py\"".into()),
+            false => Ok(Who::Program(command.into())),
+        };
+    }
+    for protocol in Protocol::ALL {
+        if let Some(urls) = text.strip_prefix(&format!("{protocol}:")) {
+            return parse_urls(protocol, urls).map(|urls| Who::Remote(protocol, urls));
+        }
+    }
+    players::find(text)
+        .map(Who::Player)
+        .map_err(|error| format!("{error}, exec:COMMAND, openpi:ws://HOST:PORT, act:http://HOST:PORT/act"))
+}
+
+fn parse_urls(protocol: Protocol, urls: &str) -> Result<Vec<String>, String> {
+    let check = |url: &str| match url.trim().strip_prefix(protocol.scheme()) {
+        Some(rest) if !rest.is_empty() => Ok(url.trim().to_owned()),
+        _ => {
+            Err(format!("{url:?} is no address of a server; give {protocol}:{}HOST:PORT", protocol.scheme()))
+        }
+    };
+    urls.split(',').map(check).collect()
+}
+
+impl PolicyFlags {
+    /// Makes the policy; what it needs is read, and no server is asked yet.
+    pub fn policy(self) -> Result<Box<dyn Policy>, Box<dyn Error>> {
+        let misplaced = |flag: &str, who: &str| Err(format!("{flag} is for {who}").into());
+        let policy: Box<dyn Policy> = match (self.policy, self.policy_map, self.policy_limit) {
+            (Who::Player(_) | Who::Program(_), Some(_), _) => {
+                return misplaced("--policy-map", "policies at a server");
+            }
+            (Who::Player(_) | Who::Remote(..), _, Some(_)) => return misplaced("--policy-limit", "programs"),
+            (Who::Player(entry), None, None) => Box::new(Borrowed(entry)),
+            (Who::Program(command), None, limit_s) => {
+                let limit = Duration::from_secs(limit_s.unwrap_or(LIMIT_S).into());
+                Box::new(Program::new(command, limit)?)
+            }
+            (Who::Remote(protocol, urls), map, None) => {
+                let default = (protocol == Protocol::Openpi).then(|| Protocol::Openpi.name().to_owned());
+                let Some(map) = map.or(default) else {
+                    let presets = PRESETS.map(|(name, _)| name).join(", ");
+                    return Err(format!("{protocol}: needs --policy-map, a file or one of {presets}").into());
+                };
+                Box::new(Remote::new(protocol, urls, PolicyMap::find(&map)?))
+            }
+        };
+        Ok(match self.policy_name {
+            Some(name) => Box::new(Renamed { name, policy }),
+            None => policy,
+        })
+    }
+}
+
+/// One of the program's own players.
+#[derive(Debug)]
+struct Borrowed(&'static players::Entry);
+
+impl Policy for Borrowed {
+    fn card(&self) -> PolicyCard {
+        self.0.card()
+    }
+
+    fn play_whole(&self, spec: &EpisodeSpec, place: Place) -> Result<Fared, PlayError> {
+        self.0.play_whole(spec, place)
+    }
+}
+
+/// A policy under another name.
+#[derive(Debug)]
+struct Renamed {
+    name: String,
+    policy: Box<dyn Policy>,
+}
+
+impl Policy for Renamed {
+    fn card(&self) -> PolicyCard {
+        PolicyCard { name: self.name.clone(), ..self.policy.card() }
+    }
+
+    fn play_whole(&self, spec: &EpisodeSpec, place: Place) -> Result<Fared, PlayError> {
+        self.policy.play_whole(spec, place)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Debug, Parser)]
+    struct Line {
+        #[command(flatten)]
+        flags: PolicyFlags,
+    }
+
+    fn card(flags: &[&str]) -> Result<PolicyCard, String> {
+        let line = Line::try_parse_from([&["tandem"], flags].concat()).map_err(|error| error.to_string())?;
+        line.flags.policy().map(|policy| policy.card()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn policies_are_named_by_what_they_are() {
+        assert_eq!(card(&[]), Ok("expert".into()));
+        let remote = card(&["--policy", "openpi:ws://a:1,ws://b:2"]).unwrap();
+        assert_eq!(remote.name, "openpi:ws://a:1,ws://b:2");
+        let gr00t = card(&["--policy", "openpi:ws://a:1,ws://b:2", "--policy-map", "gr00t_n17_g1"]).unwrap();
+        assert!(gr00t.name == remote.name && gr00t.settings != remote.settings);
+        let program = card(&["--policy", "exec:true", "--policy-name", "mine"]).unwrap();
+        assert_eq!((&*program.name, &program.settings.unwrap()["command"]), ("mine", &"true".into()));
+    }
+
+    #[test]
+    fn what_is_no_policy_is_told_what_is() {
+        let check = |flags: &[&str], says: &str| {
+            let told = card(flags).unwrap_err();
+            assert!(told.contains(says), "{told}");
+        };
+        check(&["--policy", "expart"], "have: expert, idle, demonstration, exec:COMMAND");
+        check(&["--policy", "exec: "], "give one, as exec:");
+        check(&["--policy", "openpi:http://a"], "give openpi:ws://HOST:PORT");
+        check(
+            &["--policy", "act:http://a/act"],
+            "act: needs --policy-map, a file or one of openpi, gr00t_n17_g1",
+        );
+        check(
+            &["--policy", "openpi:ws://a", "--policy-map", "nothing.toml"],
+            "no policy map \"nothing.toml\"",
+        );
+        check(&["--policy-map", "openpi"], "--policy-map is for policies at a server");
+        check(&["--policy-limit", "5"], "--policy-limit is for programs");
+    }
+}

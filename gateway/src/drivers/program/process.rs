@@ -1,0 +1,191 @@
+//! A program and all that it starts, as one group of processes, which is stopped as one.
+
+use std::{
+    fs::File,
+    io,
+    path::Path,
+    process::{Child, Command, ExitStatus, Stdio},
+    sync::{Arc, Mutex, MutexGuard},
+    thread,
+    time::{Duration, Instant},
+};
+
+use super::brief;
+
+/// Where its output is kept.
+pub const STDOUT_FILE: &str = "stdout.txt";
+pub const STDERR_FILE: &str = "stderr.txt";
+
+/// How long a group may take to end once it has been asked to.
+const PATIENCE: Duration = Duration::from_secs(5);
+const ROUND: Duration = Duration::from_millis(20);
+
+/// The groups that are running.
+#[derive(Debug, Default)]
+pub struct Crowd(Mutex<Vec<u32>>);
+
+impl Crowd {
+    fn lock(&self) -> MutexGuard<'_, Vec<u32>> {
+        // Nothing panics while it holds the lock.
+        self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+}
+
+/// One group. Dropping it stops it.
+pub struct Group {
+    child: Child,
+    crowd: Arc<Crowd>,
+    /// From when it has been stopped.
+    status: Option<ExitStatus>,
+}
+
+impl Group {
+    /// Starts `command` by a shell, with the brief in `folder` on its standard input and its output kept there.
+    pub fn start(
+        crowd: &Arc<Crowd>,
+        command: &str,
+        environment: &[(&str, String)],
+        folder: &Path,
+    ) -> io::Result<Group> {
+        let output = |name: &str| File::create(folder.join(name));
+        let mut shell = Command::new(SHELL[0]);
+        shell
+            .arg(SHELL[1])
+            .arg(command)
+            .envs(environment.iter().map(|(name, value)| (name, value)))
+            .stdin(Stdio::from(File::open(folder.join(brief::FILE))?))
+            .stdout(output(STDOUT_FILE)?)
+            .stderr(output(STDERR_FILE)?);
+        apart(&mut shell);
+        // No signal may fall between the start and the note of it.
+        let mut running = crowd.lock();
+        let child = shell.spawn()?;
+        running.push(child.id());
+        drop(running);
+        Ok(Group { child, crowd: crowd.clone(), status: None })
+    }
+
+    /// Whether the program has ended, whatever it has left running.
+    pub fn has_ended(&mut self) -> io::Result<bool> {
+        has_ended(&mut self.child)
+    }
+
+    /// Asks the group to end, ends it if it does not, and says how the program ended.
+    pub fn stop(mut self) -> io::Result<String> {
+        self.end().map(|status| status.to_string())
+    }
+
+    fn end(&mut self) -> io::Result<ExitStatus> {
+        if let Some(status) = self.status {
+            return Ok(status);
+        }
+        if !self.has_ended()? {
+            ask(self.child.id());
+            let asked = Instant::now();
+            while !self.has_ended()? && asked.elapsed() < PATIENCE {
+                thread::sleep(ROUND);
+            }
+        }
+        // The number is this group's for as long as the program has not been waited for.
+        let mut running = self.crowd.lock();
+        kill(&mut self.child);
+        running.retain(|id| *id != self.child.id());
+        let status = self.child.wait()?;
+        self.status = Some(status);
+        Ok(status)
+    }
+}
+
+impl Drop for Group {
+    fn drop(&mut self) {
+        // Nobody is left who could be told.
+        let _ = self.end();
+    }
+}
+
+/// From here on a signal that ends this process ends every group first.
+pub fn end_with_us(crowd: &Arc<Crowd>) {
+    let crowd = Arc::downgrade(crowd);
+    thread::spawn(move || {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+        let Ok(runtime) = runtime else { return };
+        runtime.block_on(crate::http::shutdown_signal());
+        if let Some(crowd) = crowd.upgrade() {
+            // Held to the end, so that no further group starts.
+            let running = crowd.lock();
+            running.iter().for_each(|id| kill_group(*id));
+            std::process::exit(INTERRUPTED);
+        }
+        std::process::exit(INTERRUPTED);
+    });
+}
+
+/// What shells report of a process that SIGINT has ended.
+const INTERRUPTED: i32 = 130;
+
+#[cfg(unix)]
+mod system {
+    use std::{io, os::unix::process::CommandExt, process::Child, process::Command};
+
+    use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
+
+    pub const SHELL: [&str; 2] = ["sh", "-c"];
+
+    /// In a group of its own.
+    pub fn apart(command: &mut Command) {
+        command.process_group(0);
+    }
+
+    /// Looks without waiting for it, so that its number stays its own.
+    pub fn has_ended(child: &mut Child) -> io::Result<bool> {
+        let Some(pid) = number(child.id()) else { return Ok(true) };
+        let look = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
+        Ok(waitid(WaitId::Pid(pid), look)?.is_some())
+    }
+
+    pub fn ask(id: u32) {
+        signal(id, Signal::TERM);
+    }
+
+    pub fn kill(child: &mut Child) {
+        kill_group(child.id());
+    }
+
+    pub fn kill_group(id: u32) {
+        signal(id, Signal::KILL);
+    }
+
+    fn signal(id: u32, signal: Signal) {
+        if let Some(pid) = number(id) {
+            // It fails where nobody is left, which is what is wanted.
+            let _ = kill_process_group(pid, signal);
+        }
+    }
+
+    fn number(id: u32) -> Option<Pid> {
+        Pid::from_raw(id.try_into().ok()?)
+    }
+}
+
+#[cfg(not(unix))]
+mod system {
+    use std::{io, process::Child, process::Command};
+
+    pub const SHELL: [&str; 2] = ["cmd", "/C"];
+
+    pub fn apart(_: &mut Command) {}
+
+    pub fn has_ended(child: &mut Child) -> io::Result<bool> {
+        Ok(child.try_wait()?.is_some())
+    }
+
+    pub fn ask(_: u32) {}
+
+    pub fn kill(child: &mut Child) {
+        let _ = child.kill();
+    }
+
+    pub fn kill_group(_: u32) {}
+}
+
+use system::{SHELL, apart, ask, has_ended, kill, kill_group};

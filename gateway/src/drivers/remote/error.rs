@@ -1,0 +1,57 @@
+//! Why a policy behind a socket gives no action. Each text says what came, and what would have been right.
+
+use std::time::Duration;
+
+/// What went wrong with a server.
+#[derive(Debug, thiserror::Error)]
+pub enum RemoteError {
+    /// Nobody listens, yet.
+    #[error("no policy answers at {url}: {reason}; start its server first")]
+    Unreachable { url: String, reason: String },
+    /// It was there, and is gone.
+    #[error("the policy at {url} is gone: {reason}")]
+    Gone { url: String, reason: String },
+    /// It takes too long.
+    #[error("the policy at {url} gave no answer within {} s", .within.as_secs_f64())]
+    Slow { url: String, within: Duration },
+    /// It says itself that it failed.
+    #[error("the policy at {url} failed: {text}")]
+    Failed { url: String, text: String },
+    /// What it sends is not of its protocol.
+    #[error("the policy at {url} sent what cannot be read: {reason}")]
+    Unreadable { url: String, reason: String },
+    /// What it sends does not fit the map.
+    #[error("the policy's answer does not fit its map: {0}")]
+    Misfit(String),
+    /// A picture of ours cannot be read, which is a fault of ours.
+    #[error("a picture cannot be read: {0}")]
+    Picture(#[from] image::ImageError),
+}
+
+/// The line of a text that says most: of a Python traceback the last, of everything else the first; not too much of it.
+pub fn gist(text: &str) -> String {
+    let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    let line = match text.starts_with("Traceback") {
+        true => lines.next_back(),
+        false => lines.next(),
+    };
+    line.unwrap_or("no text").chars().take(LONGEST_GIST_CHARS).collect()
+}
+
+const LONGEST_GIST_CHARS: usize = 300;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_traceback_is_told_by_its_last_line() {
+        assert_eq!(
+            gist("Traceback (most recent call last):\n  File\nKeyError: 'state'\n"),
+            "KeyError: 'state'"
+        );
+        assert_eq!(gist("out of memory\nmore"), "out of memory");
+        assert_eq!(gist(" \n"), "no text");
+        assert_eq!(gist(&"x".repeat(1000)).len(), LONGEST_GIST_CHARS);
+    }
+}

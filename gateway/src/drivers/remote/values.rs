@@ -1,0 +1,192 @@
+//! What goes to a policy and what comes back, before it is written as one protocol or the other wants it.
+
+/// An array as numpy has it, C order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Array {
+    pub shape: Vec<usize>,
+    pub elements: Elements,
+}
+
+/// Elements of an array that goes out.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Elements {
+    Bytes(Vec<u8>),
+    Floats(Vec<f32>),
+}
+
+impl Array {
+    /// As numpy calls the type of the elements.
+    pub fn dtype(&self) -> &'static str {
+        match self.elements {
+            Elements::Bytes(_) => "|u1",
+            Elements::Floats(_) => "<f4",
+        }
+    }
+
+    /// The elements as they lie in memory.
+    pub fn bytes(&self) -> Vec<u8> {
+        match &self.elements {
+            Elements::Bytes(bytes) => bytes.clone(),
+            Elements::Floats(values) => values.iter().flat_map(|value| value.to_le_bytes()).collect(),
+        }
+    }
+}
+
+/// What goes to a policy.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Sent {
+    Map(Vec<(String, Sent)>),
+    Array(Array),
+    Text(String),
+    Texts(Vec<String>),
+}
+
+/// Parts of a key: `video > ego_view` is `ego_view` in the map `video`.
+pub fn path(key: &str) -> impl Iterator<Item = &str> {
+    key.split('>').map(str::trim).filter(|part| !part.is_empty())
+}
+
+impl Sent {
+    /// Puts `value` where `key` says, and makes the maps on the way.
+    pub fn put(&mut self, key: &str, value: Sent) {
+        let mut at = self;
+        for part in path(key) {
+            let Sent::Map(entries) = at else { return };
+            let index = entries.iter().position(|(name, _)| name == part).unwrap_or_else(|| {
+                entries.push((part.into(), Sent::Map(Vec::new())));
+                entries.len() - 1
+            });
+            at = &mut entries[index].1;
+        }
+        *at = value;
+    }
+}
+
+/// What a policy says.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Told {
+    Map(Vec<(String, Told)>),
+    Array {
+        shape: Vec<usize>,
+        values: Vec<f64>,
+    },
+    Text(String),
+    /// Anything else, in words.
+    Other(String),
+}
+
+impl Told {
+    /// A single number.
+    pub fn number(value: f64) -> Told {
+        Told::Array { shape: Vec::new(), values: vec![value] }
+    }
+
+    /// A list, which is an array if all in it are arrays of one shape.
+    pub fn list(items: Vec<Told>) -> Told {
+        let (length, mut joined, mut inner) = (items.len(), Vec::new(), None);
+        for item in items {
+            match item {
+                Told::Array { shape, values } if inner.as_ref().is_none_or(|known| *known == shape) => {
+                    inner = Some(shape);
+                    joined.extend(values);
+                }
+                _ => return Told::Other(format!("a list of {length} that is no array of numbers")),
+            }
+        }
+        let shape = std::iter::once(length).chain(inner.unwrap_or_default()).collect();
+        Told::Array { shape, values: joined }
+    }
+
+    /// An array from the bytes that numpy has of it, or what is wrong with them.
+    pub fn from_bytes(dtype: &str, shape: Vec<usize>, bytes: &[u8]) -> Result<Told, String> {
+        let values: Vec<f64> = match dtype {
+            "<f4" => read(bytes, |four| f32::from_le_bytes(four).into()),
+            "<f8" => read(bytes, f64::from_le_bytes),
+            "<i4" => read(bytes, |four| i32::from_le_bytes(four).into()),
+            "<i8" => read(bytes, |eight| i64::from_le_bytes(eight) as f64),
+            "|u1" => read(bytes, |one: [u8; 1]| one[0].into()),
+            _ => return Err(format!("an array of dtype {dtype:?}; send \"<f4\" (float32) or \"<f8\"")),
+        };
+        let length = shape.iter().try_fold(1usize, |length, side| length.checked_mul(*side));
+        match length == Some(values.len()) {
+            true => Ok(Told::Array { shape, values }),
+            false => Err(format!("an array of shape {shape:?} with {} elements", values.len())),
+        }
+    }
+
+    /// What `key` names; the whole where it names nothing.
+    pub fn at(&self, key: &str) -> Option<&Told> {
+        path(key).try_fold(self, |at, part| match at {
+            Told::Map(entries) => entries.iter().find(|(name, _)| name == part).map(|(_, told)| told),
+            _ => None,
+        })
+    }
+
+    /// In words, for whoever has to mend a map.
+    pub fn describe(&self) -> String {
+        match self {
+            Told::Map(entries) if entries.is_empty() => "an empty map".into(),
+            Told::Map(entries) => {
+                let parts = entries.iter().map(|(name, told)| match told {
+                    Told::Map(_) => format!("{name:?}: {{{}}}", told.describe()),
+                    _ => format!("{name:?}: {}", told.describe()),
+                });
+                parts.collect::<Vec<_>>().join(", ")
+            }
+            Told::Array { shape, .. } if shape.is_empty() => "a number".into(),
+            Told::Array { shape, .. } => format!("an array of shape {shape:?}"),
+            Told::Text(text) => format!("the text {text:?}"),
+            Told::Other(what) => what.clone(),
+        }
+    }
+}
+
+fn read<const N: usize>(bytes: &[u8], value: impl Fn([u8; N]) -> f64) -> Vec<f64> {
+    bytes.as_chunks::<N>().0.iter().map(|chunk| value(*chunk)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_lead_into_maps() {
+        let mut sent = Sent::Map(Vec::new());
+        sent.put("video > a", Sent::Text("1".into()));
+        sent.put("video > b", Sent::Text("2".into()));
+        sent.put("observation/state", Sent::Text("3".into()));
+        let text = |name: &str, text: &str| (name.to_owned(), Sent::Text(text.into()));
+        let video = Sent::Map(vec![text("a", "1"), text("b", "2")]);
+        assert_eq!(sent, Sent::Map(vec![("video".into(), video), text("observation/state", "3")]));
+
+        let told = Told::Map(vec![("x".into(), Told::Map(vec![("y".into(), Told::number(4.0))]))]);
+        assert_eq!(told.at("x > y"), Some(&Told::number(4.0)));
+        assert_eq!((told.at("x > z"), told.at("")), (None, Some(&told)));
+        assert_eq!(told.describe(), "\"x\": {\"y\": a number}");
+    }
+
+    #[test]
+    fn arrays_come_as_bytes_or_as_lists() {
+        let array =
+            |shape: &[usize], values: &[f64]| Told::Array { shape: shape.into(), values: values.into() };
+        let bytes: Vec<u8> = [1.5f32, -2.0].iter().flat_map(|value| value.to_le_bytes()).collect();
+        assert_eq!(Told::from_bytes("<f4", vec![1, 2], &bytes), Ok(array(&[1, 2], &[1.5, -2.0])));
+        assert_eq!(Told::from_bytes("|u1", vec![2], &[7, 8]), Ok(array(&[2], &[7.0, 8.0])));
+        for (dtype, shape, says) in [
+            ("<f2", vec![4], "\"<f2\""),
+            ("<f4", vec![3], "shape [3] with 2"),
+            ("<f4", vec![usize::MAX, 2], "with 2"),
+        ] {
+            let text = Told::from_bytes(dtype, shape, &bytes).unwrap_err();
+            assert!(text.contains(says), "{text}");
+        }
+
+        let row = |values: &[f64]| Told::list(values.iter().map(|value| Told::number(*value)).collect());
+        assert_eq!(
+            Told::list(vec![row(&[1.0, 2.0]), row(&[3.0, 4.0])]),
+            array(&[2, 2], &[1.0, 2.0, 3.0, 4.0])
+        );
+        let ragged = Told::list(vec![row(&[1.0, 2.0]), row(&[3.0])]);
+        assert_eq!(ragged.describe(), "a list of 2 that is no array of numbers");
+    }
+}

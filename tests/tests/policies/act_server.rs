@@ -1,0 +1,73 @@
+//! A policy behind `/act`: each request is a POST of JSON, answered by JSON.
+
+use std::{
+    io::{BufRead, BufReader, Read, Write},
+    net::{SocketAddr, TcpListener, TcpStream},
+    sync::{Arc, Mutex},
+    thread,
+};
+
+use serde_json::Value;
+
+/// A server that lives until the test ends.
+pub struct ActServer {
+    pub address: SocketAddr,
+    /// What was asked for.
+    pub requests: Arc<Mutex<Vec<Value>>>,
+}
+
+impl ActServer {
+    /// Every request is answered by `decide`, with a status and JSON.
+    pub fn start(decide: impl Fn(&Value) -> (u16, Value) + Send + Sync + 'static) -> ActServer {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+        let address = listener.local_addr().expect("an address");
+        let requests = Arc::new(Mutex::new(Vec::new()));
+        let (heard, decide) = (requests.clone(), Arc::new(decide));
+        thread::spawn(move || {
+            for stream in listener.incoming() {
+                let (heard, decide) = (heard.clone(), decide.clone());
+                let stream = stream.expect("a connection");
+                thread::spawn(move || while serve(&stream, &*decide, &heard).is_some() {});
+            }
+        });
+        ActServer { address, requests }
+    }
+
+    pub fn url(&self) -> String {
+        format!("http://{}/act", self.address)
+    }
+}
+
+/// Answers one request; `None` when the client has gone.
+fn serve(
+    mut stream: &TcpStream,
+    decide: &(dyn Fn(&Value) -> (u16, Value) + Send + Sync),
+    heard: &Mutex<Vec<Value>>,
+) -> Option<()> {
+    let mut reader = BufReader::new(stream);
+    let mut length = 0;
+    loop {
+        let mut line = String::new();
+        reader.read_line(&mut line).ok().filter(|read| *read > 0)?;
+        if let Some((name, value)) = line.split_once(':')
+            && name.eq_ignore_ascii_case("content-length")
+        {
+            length = value.trim().parse().expect("a number");
+        }
+        if line == "\r\n" {
+            break;
+        }
+    }
+    let mut body = vec![0; length];
+    reader.read_exact(&mut body).ok()?;
+    let request: Value = serde_json::from_slice(&body).expect("JSON");
+    let (status, reply) = decide(&request);
+    heard.lock().expect("no panic").push(request);
+    let text = reply.to_string();
+    let head = format!(
+        "HTTP/1.1 {status} OK\r\ncontent-type: application/json\r\ncontent-length: {}\r\n\r\n",
+        text.len()
+    );
+    stream.write_all(head.as_bytes()).ok()?;
+    stream.write_all(text.as_bytes()).ok()
+}

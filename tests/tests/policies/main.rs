@@ -1,0 +1,8 @@
+//! Policies that live elsewhere: programs that are started for an episode, and learned policies at servers.
+
+mod act_server;
+mod openpi_server;
+mod plans;
+mod programs;
+mod servers;
+mod trouble;

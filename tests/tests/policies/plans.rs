@@ -1,0 +1,43 @@
+//! What the tests here play.
+
+use std::path::Path;
+
+use tandem_episodes::{
+    Controller, Recorder, Recording, RendererKind, RobotFile,
+    evaluation::{Evaluation, Plan, Shard, Starts, evaluate},
+    players::Policy,
+    tasks,
+};
+use tandem_tools_spec::{Disclosure, Hints, Protocol};
+
+/// Handover on `seeds`, under the benchmark protocol.
+pub fn plan(player: &dyn Policy, seeds: Vec<u32>, record: bool) -> Plan<'_> {
+    Plan {
+        player,
+        protocol: Protocol::Benchmark,
+        robot: RobotFile::default(),
+        locomotion: Controller::Balance,
+        disclosure: Disclosure::Live,
+        hints: Hints::On,
+        renderer: RendererKind::Cpu,
+        tasks: vec![tasks::find("handover").expect("a task")],
+        seeds,
+        starts: Starts::Task,
+        shard: Shard::WHOLE,
+        jobs: 2,
+        record,
+    }
+}
+
+/// Plays into `folder`.
+pub fn play(plan: &Plan, folder: &Path) -> Evaluation {
+    evaluate(plan, folder, &|_| {}).expect("it is played")
+}
+
+/// The measured angle of joint number `joint` of every robot, at the end of the recorded episode `name`.
+pub fn last_angles_rad(folder: &Path, name: &str, joint: usize) -> Vec<f32> {
+    let path = folder.join("episodes").join(name).join(Recorder::FILE_NAME);
+    let recording = Recording::read(&path).expect("a recording");
+    let last = recording.steps().expect("steps").last().expect("a step").expect("a whole step");
+    last.robots.iter().map(|robot| robot.state.q_rad[joint]).collect()
+}

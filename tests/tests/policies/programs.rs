@@ -1,0 +1,144 @@
+//! Agents as programs. The programs are this test's own binary, started anew to run `agent` below.
+
+use std::{env, fs, io::Read, path::Path, time::Duration};
+
+use serde_json::{Value, json};
+use tandem::drivers::Program;
+use tandem_episodes::evaluation::Played;
+use tandem_tools_spec::EndReason;
+
+use super::plans::{plan, play};
+
+const LONG: Duration = Duration::from_secs(100);
+
+/// What a program does that is started with `ROLE=role`, if it is none for the shell alone.
+fn agent_command(role: &str) -> String {
+    let binary = env::current_exe().expect("this binary");
+    format!("ROLE={role} '{}' --exact programs::agent --ignored --nocapture", binary.display())
+}
+
+#[test]
+#[ignore = "the program that the tests here start"]
+fn agent() {
+    let (Ok(url), Ok(id), Ok(start)) =
+        (env::var("TANDEM_URL"), env::var("TANDEM_EPISODE"), env::var("TANDEM_START"))
+    else {
+        return;
+    };
+    let mut brief = String::new();
+    std::io::stdin().read_to_string(&mut brief).expect("a brief");
+    println!("{brief}");
+    let start: Value = serde_json::from_slice(&fs::read(start).expect("a file")).expect("JSON");
+    assert_eq!((&start["episode_id"], start["action_row"].as_array().map(Vec::len)), (&json!(id), Some(35)));
+    let episode = format!("{url}/v1/episodes/{id}");
+    let tool =
+        |name: &str, args: Value| ureq::post(format!("{episode}/tools/{name}")).send_json(args).map(drop);
+    tool("wait", json!({ "steps": 10 })).expect("it waits");
+    match env::var("ROLE").as_deref() {
+        Ok("finish") => tool("finish", json!({})).expect("it finishes"),
+        Ok("delete") => drop(ureq::delete(&episode).call().expect("it is deleted")),
+        Ok("leave") => eprintln!("it is too hard"),
+        role => panic!("{role:?} is no role"),
+    }
+}
+
+fn program(command: &str, limit: Duration) -> Program {
+    Program::new(command.into(), limit).expect("settings")
+}
+
+fn play_one(command: &str, limit: Duration, folder: &Path) -> Played {
+    let mut evaluation = play(&plan(&program(command, limit), vec![1], false), folder);
+    evaluation.episodes.remove(0)
+}
+
+#[test]
+fn a_program_plays_and_its_words_are_kept() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let agent = program(&agent_command("finish"), LONG);
+    let plan = plan(&agent, vec![1, 2], true);
+    let evaluation = play(&plan, folder.path());
+    assert_eq!(evaluation.episodes.len(), 2, "{:?}", evaluation.left_out);
+    for (played, name) in evaluation.episodes.iter().zip(["handover-1", "handover-2"]) {
+        assert_eq!((played.result.ended, played.result.tool_calls), (EndReason::Finished, 2));
+        assert_eq!(played.note.as_deref(), Some("p1 was not reached in 10 steps"));
+        assert!(played.thought_s > 0.0);
+        let kept = |file: &str| {
+            let path = folder.path().join("episodes").join(name).join(file);
+            fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+        };
+        let brief = kept("brief.txt");
+        assert!(kept("stdout.txt").contains(&brief), "it has heard its brief");
+        for says in [
+            "You direct the humanoid robots A, B",
+            "Task: ",
+            "Robot B: ",
+            "/mcp",
+            "1000 control steps",
+            "as much time",
+        ] {
+            assert!(brief.contains(says), "{says:?} in {brief}");
+        }
+        let result: Value = serde_json::from_str(&kept("result.json")).expect("JSON");
+        assert_eq!(result["state_hash"], json!(played.result.state_hash));
+    }
+    let again = play(&plan, folder.path());
+    assert_eq!(again.episodes, evaluation.episodes, "what was played is kept");
+    let longer = program(&agent_command("finish"), LONG * 2);
+    let other = play(&super::plans::plan(&longer, vec![1], true), folder.path());
+    assert_ne!(
+        other.episodes[0].thought_s, evaluation.episodes[0].thought_s,
+        "another limit is another policy"
+    );
+}
+
+#[test]
+fn a_program_may_end_its_episode_in_any_way() {
+    for (role, steps, says) in [
+        ("delete", 10, "p1 was not reached in 10 steps"),
+        ("leave", 10, "the program ended after 1 call, before its episode did (exit status: 0)"),
+    ] {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let played = play_one(&agent_command(role), LONG, folder.path());
+        assert_eq!((played.result.ended, played.result.env_steps), (EndReason::Finished, steps));
+        let note = played.note.expect("a note");
+        assert!(note.starts_with(says), "{note}");
+    }
+}
+
+#[test]
+fn a_program_that_fails_has_its_last_words_in_the_result() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let played = play_one("echo out of ideas >&2; echo; exit 3", LONG, folder.path());
+    assert_eq!((played.result.ended, played.result.env_steps), (EndReason::Finished, 0));
+    assert_eq!(
+        played.note.as_deref(),
+        Some(
+            "the program ended without a call, before its episode did (exit status: 3); its last words: out of ideas"
+        )
+    );
+    let missing = play_one("/no/such/program", LONG, folder.path());
+    assert!(missing.note.is_some_and(|note| note.contains("exit status: 127")));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_program_is_stopped_with_all_that_it_started() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let pids = folder.path().join("pids");
+    // It does not care about being asked, and has a child that outlives it.
+    let command =
+        format!("trap '' TERM; sleep 1000 & echo $! > '{}'; while :; do sleep 1; done", pids.display());
+    let played = play_one(&command, Duration::from_millis(300), folder.path());
+    assert_eq!(played.note.as_deref(), Some("the program was stopped after 0.3 s"));
+    // And one that is left behind by a program that ends.
+    let left = play_one(&format!("sleep 1000 & echo $! >> '{}'", pids.display()), LONG, folder.path());
+    assert!(left.note.is_some_and(|note| note.starts_with("the program ended without a call")));
+    let text = fs::read_to_string(&pids).expect("it was written");
+    let pids: Vec<&str> = text.lines().collect();
+    assert_eq!(pids.len(), 2);
+    for pid in pids {
+        // A process that has ended stays a zombie until its new parent looks.
+        let state = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+        assert!(state.is_empty() || state.contains(") Z "), "{state}");
+    }
+}

@@ -1,0 +1,126 @@
+//! Learned policies at servers that fail: each ends its own episode, with a result that says why, and no other.
+
+use serde_json::json;
+use tandem::drivers::{PolicyMap, Protocol, Remote};
+use tandem_tools_spec::EndReason;
+
+use super::{
+    act_server::ActServer,
+    openpi_server::{Decide, OpenpiServer, Reply},
+    plans::{plan, play},
+    servers::{LEFT_WRIST_COLUMN, map, turning},
+};
+
+const FAST: &str = "preset = \"openpi\"\nconnect_s = 0.0\nreply_s = 5.0\n";
+
+/// Holds for the trial and the first three answers, then does something else.
+fn until_then(then: impl Fn() -> Reply + Send + Sync + 'static) -> Box<Decide> {
+    let hold = still(20);
+    Box::new(move |number, request| if number < 4 { hold(number, request) } else { then() })
+}
+
+fn still(rows: usize) -> Box<Decide> {
+    turning(|_| (LEFT_WRIST_COLUMN, 0.3), rows)
+}
+
+fn array(columns: usize, value: f32) -> Reply {
+    Reply::Rows(vec![vec![value; columns]; 20])
+}
+
+#[test]
+fn a_server_that_fails_ends_its_episode_and_no_other() {
+    let server = OpenpiServer::start(|connection| match connection {
+        0 => until_then(|| Reply::Nothing),
+        1 => until_then(|| {
+            Reply::Text("Traceback (most recent call last):\n  ...\nRuntimeError: CUDA out of memory")
+        }),
+        2 => until_then(|| array(35, f32::NAN)),
+        3 => until_then(|| array(32, 0.0)),
+        4 => until_then(|| Reply::Silence),
+        5 => until_then(|| Reply::Bytes(b"\x82\xa1".into())),
+        6 => until_then(|| array(35, 1e9)),
+        _ => still(20),
+    });
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let policy = Remote::new(Protocol::Openpi, vec![server.url()], map(folder.path(), FAST));
+    let one_by_one = |seed: u32| {
+        let evaluation = play(&plan(&policy, vec![seed], false), folder.path());
+        let [played] = &evaluation.episodes[..] else { panic!("{evaluation:?}") };
+        (played.result.ended, played.result.env_steps, played.note.clone().unwrap_or_default())
+    };
+    for (seed, says) in [
+        (1, "is gone: "),
+        (2, "failed: RuntimeError: CUDA out of memory"),
+        (3, "row 0, column 0 under the key \"actions\" is NaN"),
+        (
+            4,
+            "expected an array of shape [rows, 35] under the key \"actions\"; came an array of shape [20, 32]",
+        ),
+        (5, "gave no answer within 5 s"),
+        (6, "cannot be read: "),
+        (7, "left_shoulder_pitch_joint is beyond 1000"),
+    ] {
+        let (ended, steps, note) = one_by_one(seed);
+        assert_eq!((ended, steps), (EndReason::Finished, 20), "{note}");
+        assert!(note.contains(says), "{note}");
+    }
+    let (ended, steps, note) = one_by_one(8);
+    assert_eq!((ended, steps), (EndReason::StepBudgetExhausted, 1000), "{note}");
+}
+
+#[test]
+fn a_policy_that_is_not_ready_is_left_out_and_played_the_next_time() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let fast = || map(folder.path(), FAST);
+    let left_out = |policy: &Remote| {
+        let evaluation = play(&plan(policy, vec![1], true), folder.path());
+        assert_eq!(evaluation.episodes, [], "nothing was begun");
+        evaluation.left_out.join(", ")
+    };
+    let unheard =
+        std::net::TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("an address");
+    let absent =
+        [(Protocol::Openpi, format!("ws://{unheard}")), (Protocol::Act, format!("http://{unheard}/act"))];
+    for (protocol, url) in absent {
+        let text = left_out(&Remote::new(protocol, vec![url.clone()], fast()));
+        assert!(text.starts_with(&format!("handover seed 1: no policy answers at {url}")), "{text}");
+    }
+    let narrow = OpenpiServer::start(|_| Box::new(|_, _| Reply::Rows(vec![vec![0.0; 32]; 50])));
+    let text = left_out(&Remote::new(Protocol::Openpi, vec![narrow.url()], fast()));
+    assert!(text.contains("expected an array of shape [rows, 35]") && text.contains("[50, 32]"), "{text}");
+    assert!(!folder.path().join("episodes/handover-1").exists(), "no world was made");
+
+    let sound = OpenpiServer::start(|_| still(50));
+    let policy = Remote::new(Protocol::Openpi, vec![sound.url()], fast());
+    assert_eq!(play(&plan(&policy, vec![1], false), folder.path()).episodes.len(), 1);
+    let asked = || sound.requests.lock().expect("no panic").len();
+    let before = asked();
+    play(&plan(&policy, vec![1], false), folder.path());
+    assert_eq!(asked(), before, "it is kept");
+    let longer = PolicyMap { reply_s: 6.0, ..fast() };
+    play(&plan(&Remote::new(Protocol::Openpi, vec![sound.url()], longer), vec![1], false), folder.path());
+    assert!(asked() > before, "another map is another policy");
+}
+
+#[test]
+fn what_a_server_behind_act_refuses_is_told() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let told = |status: u16, reply: serde_json::Value| {
+        let server = ActServer::start(move |_| (status, reply.clone()));
+        let policy = Remote::new(Protocol::Act, vec![server.url()], map(folder.path(), FAST));
+        play(&plan(&policy, vec![1], false), folder.path()).left_out.join(", ")
+    };
+    for (status, reply, says) in [
+        (500, json!({ "detail": "no model" }), "failed: 500"),
+        (200, json!("error"), "came the text \"error\""),
+        (200, json!({ "actions": [[1, 2], [3]] }), "came a list of 2 that is no array of numbers"),
+        (
+            200,
+            json!({ "actions": { "__numpy__": "AA==", "dtype": "<f4", "shape": [1] } }),
+            "shape [1] with 0 elements",
+        ),
+    ] {
+        let text = told(status, reply);
+        assert!(text.contains(says), "{text}");
+    }
+}
