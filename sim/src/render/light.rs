@@ -2,6 +2,8 @@
 
 use rapier3d::math::Vector;
 
+use super::affine::Affine;
+
 /// Samples a pixel along each axis; a power of two, so that dividing by it is exact.
 pub(super) const SAMPLES: usize = 2;
 
@@ -40,17 +42,13 @@ pub(super) const CONTACT: f32 = 0.5;
 /// Steps of the table from linear light to sRGB bytes.
 pub(super) const SRGB_STEPS: usize = 4096;
 
-/// Column and row of the shadow's map, counted from its corner, and nearness: each is a scalar product with a point, and a
-/// number more.
-pub(super) type SunMap = [(Vector, f32); 3];
-
-/// From points of the world to the map around a focus.
-pub(super) fn sun_map(focus_m: Vector, radius_m: f32) -> SunMap {
+/// From points of the world to the shadow's map around a focus: column and row, counted from its corner, and nearness.
+pub(super) fn sun_map(focus_m: Vector, radius_m: f32) -> Affine {
     let half = 0.5 * TEXELS as f32;
     let right = Vector::Z.cross(TO_SUN).normalize() * (half / radius_m);
     let down = TO_SUN.cross(right) * -1.0;
     let about_focus = |axis: Vector, at_focus: f32| (axis, at_focus - axis.dot(focus_m));
-    [about_focus(right, half), about_focus(down, half), about_focus(TO_SUN, SUN_DISTANCE_M)]
+    Affine([about_focus(right, half), about_focus(down, half), about_focus(TO_SUN, SUN_DISTANCE_M)])
 }
 
 /// sRGB, as files have it, to linear light.
