@@ -34,6 +34,9 @@ pub(super) const SUN_DISTANCE_M: f32 = 8.0;
 pub(super) const NORMAL_OFFSET_M: f32 = 0.006;
 pub(super) const BIAS_M: f32 = 0.004;
 
+/// Shadows fade out this far from the map's border, so that none ends in a line.
+pub(super) const FADE_TEXELS: f32 = 120.0;
+
 /// Texels along each side of the map of contacts: 1 cm at a focus of 1.25 m.
 pub(super) const CONTACT_TEXELS: usize = 256;
 /// How much darker it is where things stand.

@@ -16,14 +16,18 @@ pub enum Pattern {
     Wood,
     /// A coarse weave.
     Fabric,
+    /// Lines of words, one above the other along the mesh's z: what stands on labels and boxes.
+    Print,
 }
 
 /// Words in names of materials that make them so. The names are those of MJCF files; no scene has to say more.
 const WOODS: [&str; 8] = ["wood", "birch", "oak", "walnut", "pine", "beech", "plank", "batten"];
 const FABRICS: [&str; 7] = ["fabric", "cloth", "velvet", "curtain", "carpet", "rug", "cushion"];
+const PRINTS: [&str; 2] = ["label", "print"];
 /// The second colour, as a part of the first: calm enough for what lies on it to stand out.
 const WOOD_DARK: f32 = 0.70;
 const FABRIC_DARK: f32 = 0.75;
+const INK_DARK: f32 = 0.45;
 
 pub(super) const CHECKER_PER_M: f32 = 2.0;
 /// Broad bands, fine lines, and how far a band strays along the grain.
@@ -31,6 +35,12 @@ pub(super) const BANDS_PER_M: f32 = 13.0;
 pub(super) const LINES_PER_M: f32 = 41.0;
 pub(super) const STRAY: f32 = 0.4;
 pub(super) const THREADS_PER_M: f32 = 18.0;
+/// Lines of print and words in them; the gaps are parts of half a period, and words of the next line are set off.
+pub(super) const TEXT_PER_M: f32 = 48.0;
+pub(super) const TEXT_GAP: f32 = 0.55;
+pub(super) const WORDS_PER_M: f32 = 27.0;
+pub(super) const WORD_GAP: f32 = 0.3;
+pub(super) const WORD_STRAY: f32 = 0.37;
 
 impl Pattern {
     /// Of a material, by its name.
@@ -39,6 +49,7 @@ impl Pattern {
         match () {
             () if has(&WOODS) => Pattern::Wood,
             () if has(&FABRICS) => Pattern::Fabric,
+            () if has(&PRINTS) => Pattern::Print,
             () => Pattern::Plain,
         }
     }
@@ -50,6 +61,7 @@ impl Pattern {
             Pattern::Checker(rgb) => super::light::linear(rgb),
             Pattern::Wood => linear_rgb * WOOD_DARK,
             Pattern::Fabric => linear_rgb * FABRIC_DARK,
+            Pattern::Print => linear_rgb * INK_DARK,
         }
     }
 
@@ -77,6 +89,7 @@ impl Pattern {
             Pattern::Checker(_) => lanes(|i| checker(point(i))),
             Pattern::Wood => lanes(|i| wood(point(i))),
             Pattern::Fabric => lanes(|i| fabric(point(i))),
+            Pattern::Print => lanes(|i| print(point(i))),
         }
     }
 }
@@ -98,6 +111,13 @@ fn wood([x_m, y_m, z_m]: [f32; 3]) -> f32 {
 #[inline(always)]
 fn fabric([x_m, y_m, z_m]: [f32; 3]) -> f32 {
     wave((x_m + z_m) * THREADS_PER_M) * wave((y_m + z_m) * THREADS_PER_M)
+}
+
+#[inline(always)]
+fn print([x_m, y_m, z_m]: [f32; 3]) -> f32 {
+    let line = z_m * TEXT_PER_M;
+    let word = wave((x_m + y_m) * WORDS_PER_M + WORD_STRAY * floor(line));
+    if wave(line) > TEXT_GAP && word > WORD_GAP { 1.0 } else { 0.0 }
 }
 
 /// Up and down between 0 and 1 with a period of 1.

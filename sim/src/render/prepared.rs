@@ -5,7 +5,7 @@ use rapier3d::math::Vector;
 use super::affine::Points;
 use super::bend::Bend;
 use super::light::linear;
-use super::{Part, Scenery};
+use super::{Part, Pattern, Scenery};
 
 /// Marks a sample at which nothing is.
 pub(super) const NOTHING: u32 = u32::MAX;
@@ -25,7 +25,7 @@ pub(super) struct Prepared {
     pub bounds: Vec<(Vector, f32)>,
     /// The two colours of each part.
     pub linear_rgb: Vec<[Vector; 2]>,
-    /// Of each part, which axis of its mesh the grain runs along.
+    /// Of each part, which axis of its mesh comes first in its pattern: the one that a grain runs along.
     pub grain: Vec<usize>,
 }
 
@@ -55,7 +55,7 @@ impl Prepared {
             first,
             bounds: scenery.parts.iter().map(|part| part.mesh.bounds()).collect(),
             linear_rgb: scenery.parts.iter().map(colours).collect(),
-            grain: scenery.parts.iter().map(|part| part.mesh.longest_axis()).collect(),
+            grain: scenery.parts.iter().map(grain).collect(),
             scenery,
         }
     }
@@ -73,6 +73,11 @@ impl Prepared {
             _ => self.ids[sheet as usize],
         }
     }
+}
+
+/// Print stands upright, whatever is longest.
+fn grain(part: &Part) -> usize {
+    if part.pattern == Pattern::Print { 0 } else { part.mesh.longest_axis() }
 }
 
 fn points(part: &Part) -> Points {

@@ -6,7 +6,7 @@ use pulp::Simd;
 use rapier3d::math::Vector;
 
 use crate::render::affine::Affine;
-use crate::render::light::{BIAS_M, NORMAL_OFFSET_M, TEXELS, sun_map};
+use crate::render::light::{BIAS_M, FADE_TEXELS, NORMAL_OFFSET_M, TEXELS, sun_map};
 use crate::render::prepared::Prepared;
 use crate::render::raster::Outline;
 use crate::render::rows::{Grid, Lanes, Rows, axes, lanes};
@@ -124,11 +124,14 @@ impl ShadowMap {
             return 1.0;
         }
         let (column, row) = (usize::from(u as u16), usize::from(v as u16));
-        match self.all.cells_m[(row - 1) / CELL * CELLS + (column - 1) / CELL] {
-            [_, greatest_m] if nearness_m >= greatest_m => 1.0,
+        let lit = match self.all.cells_m[(row - 1) / CELL * CELLS + (column - 1) / CELL] {
+            [_, greatest_m] if nearness_m >= greatest_m => return 1.0,
             [least_m, _] if nearness_m < least_m => 0.0,
             _ => self.filtered([u, v, nearness_m]),
-        }
+        };
+        let last = (TEXELS - 1) as f32;
+        let to_border = u.min(last - u).min(v.min(last - v));
+        1.0 - (1.0 - lit) * (to_border / FADE_TEXELS).min(1.0)
     }
 
     /// Four taps with a tent's weights along each axis are a bilinear filter three texels wide.

@@ -124,6 +124,7 @@ fn placed_part(part: &Part, pose: Pose, [first, second]: [Vector; 2], grain: usi
         Pattern::Checker(_) => 1.0,
         Pattern::Wood => 2.0,
         Pattern::Fabric => 3.0,
+        Pattern::Print => 4.0,
     };
     let rows = [
         [x.x, x.y, x.z, t.x],
