@@ -7,6 +7,7 @@ mod episode_flags;
 pub mod evaluate;
 pub mod locomotion;
 mod log;
+mod machine;
 mod played;
 pub mod recover;
 pub mod replay;
