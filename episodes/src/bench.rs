@@ -2,10 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use tandem_ik::bench::{Report, TargetSet, run};
+pub use tandem_ik::bench::Report as IkReport;
+use tandem_ik::bench::{TargetSet, run};
 use tandem_ik::{IkError, Model};
 use tandem_sim::assets;
-pub use tandem_sim::bench::{CaseReport, PhysicsCase, PhysicsReport, Report as LocomotionReport};
+pub use tandem_sim::bench::{
+    CaseReport, PhysicsCase, PhysicsReport, PicturesCase, PicturesReport, Report as LocomotionReport,
+};
+use tandem_sim::render::RendererKind;
 use tandem_sim::{LocomotionChoice, bench};
 
 use crate::commands;
@@ -42,8 +46,16 @@ pub fn physics(done: impl FnMut(&PhysicsCase)) -> Result<PhysicsReport, BenchErr
     Ok(bench::physics(done)?)
 }
 
+/// Times pictures of the kitchen; `done` hears of each set as it ends.
+pub fn pictures(
+    renderer: RendererKind,
+    done: impl FnMut(&PicturesCase),
+) -> Result<PicturesReport, BenchError> {
+    Ok(bench::pictures(renderer, done)?)
+}
+
 /// Solves the targets of a file, or 200 that are drawn from the robot's own joint ranges.
-pub fn ik(targets: Option<&Path>) -> Result<Report, BenchError> {
+pub fn ik(targets: Option<&Path>) -> Result<IkReport, BenchError> {
     let whole = Model::from_mjcf(assets::robot(assets::DEFAULT_ROBOT)?)?;
     let set = match targets {
         Some(path) => {

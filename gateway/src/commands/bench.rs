@@ -1,13 +1,23 @@
 //! `tandem bench`: figures that anybody can repeat.
 
 use std::{
+    error::Error,
     path::{Path, PathBuf},
     process::ExitCode,
 };
 
 use clap::Subcommand;
+use serde::Serialize;
+use serde_json::{Map, Value};
+use tandem_episodes::{
+    RendererKind,
+    bench::{IkReport, PhysicsReport, PicturesReport},
+};
 
-use super::{Outcome, bench_tools};
+use super::Outcome;
+use super::bench_tools::{self, ToolsReport};
+use super::machine::Measured;
+use crate::settings::renderer_parser;
 
 /// Measure a part of Tandem on this machine.
 #[derive(Debug, clap::Args)]
@@ -30,9 +40,9 @@ enum Part {
     },
     /// Calls of tools over HTTP on this machine: their time without physics, and that of `wait` against its physics.
     Tools {
-        /// Print JSON instead of a table.
-        #[arg(long)]
-        json: bool,
+        /// Write the figures to this file as JSON, too.
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
     },
     /// Physics: time of a step of 5 ms with one to three robots that stand, walk or hold a bottle.
     Physics {
@@ -40,23 +50,69 @@ enum Part {
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
     },
+    /// Pictures: those of both robots' eyes in one state, and the one from the room.
+    Render {
+        /// Who draws: `cpu`, `gpu`, or `auto`.
+        #[arg(long, default_value = "cpu", value_name = "NAME", value_parser = renderer_parser())]
+        renderer: RendererKind,
+        /// Write the cases to this file as JSON, too.
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+    },
+    /// All parts one after the other, each as it is without flags.
+    All {
+        /// Write everything to this file as JSON, too.
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+    },
 }
+
+/// Measures, prints, and gives what JSON says of it.
+type Measure = fn() -> Result<Value, Box<dyn Error>>;
+
+/// What `bench all` measures; a new part adds its line.
+const PARTS: [(&str, Measure); 4] = [
+    ("physics", || Ok(serde_json::to_value(measure_physics()?)?)),
+    ("render", || Ok(serde_json::to_value(measure_pictures(RendererKind::Cpu)?)?)),
+    ("tools", || Ok(serde_json::to_value(measure_tools()?)?)),
+    ("ik", || {
+        let report = tandem_episodes::bench::ik(None)?;
+        print_ik(&report);
+        Ok(serde_json::to_value(report)?)
+    }),
+];
 
 /// Measures and prints.
 pub fn run(args: Args) -> Outcome {
     match args.part {
         Part::Ik { targets, json } => ik(targets.as_deref(), json),
-        Part::Tools { json } => tools(json),
-        Part::Physics { json } => physics(json.as_deref()),
+        Part::Tools { json } => write(measure_tools()?, json.as_deref()),
+        Part::Physics { json } => write(measure_physics()?, json.as_deref()),
+        Part::Render { renderer, json } => write(measure_pictures(renderer)?, json.as_deref()),
+        Part::All { json } => all(json.as_deref()),
     }
 }
 
-fn tools(json: bool) -> Outcome {
-    let report = bench_tools::tools()?;
-    if json {
-        println!("{}", serde_json::to_string_pretty(&report)?);
-        return Ok(ExitCode::SUCCESS);
+fn all(json: Option<&Path>) -> Outcome {
+    let mut reports = Map::new();
+    for (name, measure) in PARTS {
+        println!("{name}");
+        reports.insert(name.into(), measure()?);
+        println!();
     }
+    write(reports, json)
+}
+
+/// Writes a report, and what it was measured on, where that is asked for.
+fn write(report: impl Serialize, json: Option<&Path>) -> Outcome {
+    if let Some(path) = json {
+        Measured::here(report).write(path)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn measure_tools() -> Result<ToolsReport, Box<dyn Error>> {
+    let report = bench_tools::tools()?;
     println!("{:20}{:>8}{:>10}{:>10}", "call", "times", "p50 ms", "p99 ms");
     for call in &report.calls {
         println!("{:20}{:>8}{:>10.2}{:>10.2}", call.tool, call.calls, call.p50_ms, call.p99_ms);
@@ -66,29 +122,41 @@ fn tools(json: bool) -> Outcome {
         "wait of {} steps: {:.1} ms, of which {:.1} ms physics; {:.3} times its physics (medians of {})",
         wait.steps, wait.call_p50_ms, wait.physics_p50_ms, wait.p50_ratio, wait.calls
     );
-    Ok(ExitCode::SUCCESS)
+    Ok(report)
 }
 
-fn physics(json: Option<&Path>) -> Outcome {
+fn measure_physics() -> Result<PhysicsReport, Box<dyn Error>> {
     println!("{:14}{:>7}{:>10}{:>11}", "case", "robots", "us/step", "real time");
-    let report = tandem_episodes::bench::physics(|case| {
+    Ok(tandem_episodes::bench::physics(|case| {
         println!(
             "{:14}{:>7}{:>10.1}{:>10.1}x",
             case.name, case.robots, case.median_step_us, case.realtime_factor
         );
-    })?;
-    if let Some(path) = json {
-        std::fs::write(path, serde_json::to_string_pretty(&report)? + "\n")?;
-    }
-    Ok(ExitCode::SUCCESS)
+    })?)
+}
+
+fn measure_pictures(renderer: RendererKind) -> Result<PicturesReport, Box<dyn Error>> {
+    println!("{:14}{:>9}{:>11}{:>11}{:>11}", "pictures", "count", "size", "busy ms", "wall ms");
+    Ok(tandem_episodes::bench::pictures(renderer, |case| {
+        let size = format!("{}x{}", case.width, case.height);
+        println!(
+            "{:14}{:>9}{size:>11}{:>11.2}{:>11.2}",
+            case.name, case.pictures, case.busy_ms.median, case.wall_ms.median
+        );
+    })?)
 }
 
 fn ik(targets: Option<&Path>, json: bool) -> Outcome {
     let report = tandem_episodes::bench::ik(targets)?;
     if json {
-        println!("{}", serde_json::to_string_pretty(&report)?);
-        return Ok(ExitCode::SUCCESS);
+        println!("{}", serde_json::to_string_pretty(&Measured::here(report))?);
+    } else {
+        print_ik(&report);
     }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn print_ik(report: &IkReport) {
     println!(
         "{:24} {:>8} {:>11} {:>9} {:>10}",
         "configuration", "reached", "iterations", "us/step", "ms/solve"
@@ -99,5 +167,4 @@ fn ik(targets: Option<&Path>, json: bool) -> Outcome {
             way.name, way.reached, way.iterations_median, way.step_us_median, way.solve_ms_median
         );
     }
-    Ok(ExitCode::SUCCESS)
 }

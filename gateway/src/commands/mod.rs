@@ -9,6 +9,7 @@ mod episode_flags;
 pub mod evaluate;
 pub mod locomotion;
 mod log;
+mod machine;
 mod played;
 mod policy_flags;
 pub mod recover;

@@ -1,10 +1,12 @@
 //! What a base controller can do: standing, loads, walking, stopping, squatting, pushes and a tour, several seeds each. And
-//! how long a step of physics takes.
+//! how long a step of physics and a picture take.
 
 mod cases;
 mod measure;
 mod motion;
 mod physics;
+mod pictures;
+mod spread;
 mod tour;
 mod trial;
 
@@ -16,6 +18,8 @@ use serde::Serialize;
 
 pub use cases::{CASES, Case};
 pub use physics::{PhysicsCase, PhysicsReport, physics};
+pub use pictures::{PicturesCase, PicturesReport, pictures};
+pub use spread::Spread;
 
 use crate::SimError;
 use crate::locomotion::Locomotion;

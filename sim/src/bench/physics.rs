@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use rapier3d::math::{Pose, Vector};
 use serde::Serialize;
 
+use super::spread::Spread;
 use crate::body::{HAND_COLUMNS, HAND_JOINTS};
 use crate::{
     ObjectPlacement, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, RobotCommand, RobotPlacement, SimError, World,
@@ -26,6 +27,8 @@ pub struct PhysicsCase {
     /// Collision detection and dynamics of one physics step.
     #[serde(rename = "step_us_median")]
     pub median_step_us: f64,
+    #[serde(rename = "step_us_quartiles")]
+    pub quartiles_step_us: [f64; 2],
     /// Of the whole: physics, sensing and the robots' controllers.
     pub realtime_factor: f64,
 }
@@ -87,11 +90,14 @@ fn measure(situation: Situation, robots: usize) -> Result<PhysicsCase, SimError>
         }
         check(&world, situation);
     }
+    let [step_us, whole_us] = [steps, whole]
+        .map(|spans| Spread::of(&mut spans.iter().map(|span| span.as_secs_f64() * 1e6).collect::<Vec<_>>()));
     Ok(PhysicsCase {
         name: situation.name(),
         robots,
-        median_step_us: median_us(&mut steps),
-        realtime_factor: f64::from(PHYSICS_DT_S) * 1e6 / median_us(&mut whole),
+        median_step_us: step_us.median,
+        quartiles_step_us: step_us.quartiles,
+        realtime_factor: f64::from(PHYSICS_DT_S) * 1e6 / whole_us.median,
     })
 }
 
@@ -167,11 +173,6 @@ fn kitchen(robots: usize, bottles: usize) -> WorldSpec {
 
 fn bottle_name(index: usize) -> String {
     format!("bottle {index}")
-}
-
-fn median_us(spans: &mut [Duration]) -> f64 {
-    spans.sort_unstable();
-    spans[spans.len() / 2].as_secs_f64() * 1e6
 }
 
 impl Situation {

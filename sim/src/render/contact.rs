@@ -3,10 +3,11 @@
 use pulp::{Arch, Simd, WithSimd};
 use rapier3d::math::Vector;
 
+use super::affine::Affine;
 use super::light::CONTACT_TEXELS;
 use super::prepared::Prepared;
 use super::raster::Outline;
-use super::rows::{Grid, Rows};
+use super::rows::{Grid, Lanes, Rows, lanes};
 use super::{Carrier, Part, Placed};
 
 /// What is this far above a surface darkens it no more.
@@ -19,6 +20,9 @@ const HIGHEST_SUPPORT_M: f32 = 1.5;
 const DATUM_M: f32 = 4.0;
 /// Weights of a texel's neighbours in each direction.
 const BLUR: [f32; 5] = [1.0 / 9.0, 2.0 / 9.0, 3.0 / 9.0, 2.0 / 9.0, 1.0 / 9.0];
+/// Texels along each side of a square that is looked at as a whole.
+const CELL: usize = 8;
+const CELLS: usize = CONTACT_TEXELS / CELL;
 const GRID: Grid = Grid { width: CONTACT_TEXELS, height: CONTACT_TEXELS, pitch_px: 1.0 };
 
 /// The surroundings of the focus, seen from above. Columns run along the world's x, rows along y.
@@ -29,8 +33,16 @@ pub(super) struct ContactMap {
     pub texels_per_m: f32,
     /// Of each texel, row by row: the height of what can carry things, and how dark it is there, from 0 to 1.
     pub texel_values: Vec<[f32; 2]>,
+    /// What the map is around; `None` before the first. What can carry things is drawn when it changes.
+    focus_m: Option<Vector>,
     support: Rows<f32>,
     underside: Rows<f32>,
+    corners_m: Vec<[f32; 3]>,
+    /// How dark it is, and that smoothed along the rows.
+    dark: Vec<[f32; CONTACT_TEXELS]>,
+    across: Vec<[f32; CONTACT_TEXELS]>,
+    /// Of squares of texels, row by row: whether it is dark in or right beside them. Mostly it is not.
+    dark_cells: Vec<bool>,
 }
 
 /// A map to draw, compiled for the registers that there are.
@@ -56,30 +68,37 @@ impl ContactMap {
 
     #[inline(always)]
     fn draw_with<S: Simd>(&mut self, simd: S, prepared: &Prepared, placed: &Placed) {
-        let radius_m = prepared.scenery.focus_radius_m;
-        self.corner_m = [placed.focus_m.x - radius_m, placed.focus_m.y - radius_m];
-        self.texels_per_m = CONTACT_TEXELS as f32 / (2.0 * radius_m);
-        self.support.reset(GRID, 0.0);
+        if self.focus_m != Some(placed.focus_m) {
+            let radius_m = prepared.scenery.focus_radius_m;
+            self.focus_m = Some(placed.focus_m);
+            self.corner_m = [placed.focus_m.x - radius_m, placed.focus_m.y - radius_m];
+            self.texels_per_m = CONTACT_TEXELS as f32 / (2.0 * radius_m);
+            self.support.reset(GRID, 0.0);
+            self.draw_layer(simd, prepared, placed, Layer::Support);
+        }
         self.underside.reset(GRID, 0.0);
-        let mut corners_m = Vec::new();
-        for layer in [Layer::Support, Layer::Underside] {
-            let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).zip(&prepared.bounds);
-            for ((part, pose), (centre_m, around_m)) in parts {
-                if layer != Layer::of(part) || !self.concerns(layer, *pose * *centre_m, *around_m) {
-                    continue;
-                }
-                corners_m.clear();
-                corners_m.extend(part.mesh.vertices.iter().map(|vertex| *pose * vertex.position_m));
-                if corners_m.iter().any(|corner_m| corner_m.z > HIGHEST_SUPPORT_M) && layer == Layer::Support
-                {
-                    continue;
-                }
-                for triangle in &part.mesh.triangles {
-                    self.fill(simd, layer, triangle.map(|corner| corners_m[corner as usize]));
-                }
+        self.draw_layer(simd, prepared, placed, Layer::Underside);
+        self.darken();
+    }
+
+    #[inline(always)]
+    fn draw_layer<S: Simd>(&mut self, simd: S, prepared: &Prepared, placed: &Placed, layer: Layer) {
+        for (number, part) in prepared.scenery.parts.iter().enumerate() {
+            let (pose, (centre_m, around_m)) = (placed.world_from_mesh[number], prepared.bounds[number]);
+            if layer != Layer::of(part) || !self.concerns(layer, pose * centre_m, around_m) {
+                continue;
+            }
+            let world_from_mesh = Affine::of(pose);
+            prepared.points[number].map_into(&mut self.corners_m, |block| world_from_mesh.map_lanes(block));
+            let too_high = |[_, _, z_m]: &[f32; 3]| *z_m > HIGHEST_SUPPORT_M;
+            if layer == Layer::Support && self.corners_m.iter().any(too_high) {
+                continue;
+            }
+            for [a, b, c] in &part.mesh.triangles {
+                let corner_m = |corner: u32| self.corners_m[corner as usize];
+                self.fill(simd, layer, [corner_m(*a), corner_m(*b), corner_m(*c)]);
             }
         }
-        self.darken();
     }
 
     /// Whether a part, given by a sphere around it, is over the map and near what it could touch.
@@ -106,15 +125,16 @@ impl ContactMap {
 
     /// Rows run along y as they do not in pictures: what is seen to turn counter-clockwise faces down.
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, layer: Layer, [a, b, c]: [Vector; 3]) {
+    fn fill<S: Simd>(&mut self, simd: S, layer: Layer, [a, b, c]: [[f32; 3]; 3]) {
         let (corners_m, rows, sign) = match layer {
             Layer::Support => ([a, c, b], &mut self.support, 1.0),
             Layer::Underside => ([a, b, c], &mut self.underside, -1.0),
         };
         let ([x_m, y_m], scale) = (self.corner_m, self.texels_per_m);
-        let corners = corners_m.map(|p| [(p.x - x_m) * scale, (p.y - y_m) * scale, DATUM_M + sign * p.z]);
         let nearest = S::as_mut_simd_f32s(rows.all_mut()).0;
-        if let Some(outline) = Outline::new(corners) {
+        let [a, b, c] = corners_m;
+        let place = |[x, y, z]: [f32; 3]| [(x - x_m) * scale, (y - y_m) * scale, DATUM_M + sign * z];
+        if let Some(outline) = Outline::new([place(a), place(b), place(c)]) {
             outline.draw(
                 simd,
                 GRID,
@@ -127,9 +147,15 @@ impl ContactMap {
     /// Dark where the lowest underside is near, smoothed.
     #[inline(always)]
     fn darken(&mut self) {
-        let mut dark = vec![[0.0f32; CONTACT_TEXELS]; CONTACT_TEXELS];
+        let ContactMap { support, underside, dark, across, texel_values, dark_cells, .. } = self;
+        dark_cells.clear();
+        dark_cells.resize(CELLS * CELLS, false);
+        for rows in [&mut *dark, &mut *across] {
+            rows.resize(CONTACT_TEXELS, [0.0; CONTACT_TEXELS]);
+        }
+        texel_values.resize(CONTACT_TEXELS * CONTACT_TEXELS, [0.0; 2]);
         for (row, dark) in dark.iter_mut().enumerate() {
-            let layers = self.support.row(row).iter().zip(self.underside.row(row));
+            let layers = support.row(row).iter().zip(underside.row(row));
             for (dark, (support, underside)) in dark.iter_mut().zip(layers) {
                 // Nothing is above a texel without an underside.
                 let gap_m = 2.0 * DATUM_M - underside - support;
@@ -137,28 +163,49 @@ impl ContactMap {
                 *dark = if gap_m > -SINK_M { near } else { 0.0 };
             }
         }
-        let across: Vec<_> = dark.iter().map(|row| blurred(|offset, i| row[shifted(i, offset)])).collect();
-        self.texel_values.clear();
-        for row in 0..CONTACT_TEXELS {
-            let dark = blurred(|offset, i| across[shifted(row, offset)][i]);
-            let heights_m = self.support.row(row).iter().map(|nearness_m| nearness_m - DATUM_M);
-            self.texel_values.extend(heights_m.zip(dark).map(|(height_m, dark)| [height_m, dark]));
+        for (across, dark) in across.iter_mut().zip(dark.iter()) {
+            *across = blurred(|offset, i| dark[shifted(i, offset)]);
+        }
+        for (row, texels) in texel_values.chunks_exact_mut(CONTACT_TEXELS).enumerate() {
+            let near: [_; BLUR.len()] = std::array::from_fn(|offset| &across[shifted(row, offset)]);
+            let dark = blurred(|offset, i| near[offset][i]);
+            for (column, _) in dark.iter().enumerate().filter(|(_, dark)| **dark > 0.0) {
+                for row in [row.saturating_sub(1), row] {
+                    dark_cells[row / CELL * CELLS + column.saturating_sub(1) / CELL] = true;
+                    dark_cells[row / CELL * CELLS + column / CELL] = true;
+                }
+            }
+            for ((texel, nearness_m), dark) in texels.iter_mut().zip(support.row(row)).zip(dark) {
+                *texel = [nearness_m - DATUM_M, dark];
+            }
         }
     }
 
-    /// How dark it is at a point of the world: 0 if it is not near what carries things.
+    /// How dark it is at points of the world: 0 where they are not near what carries things.
     #[inline(always)]
-    pub(super) fn darkness(&self, point_m: Vector) -> f32 {
-        let [u, v] = self.place(point_m).map(|i| i - 0.5);
-        let last = (CONTACT_TEXELS - 1) as f32;
-        if !(u >= 0.0 && u < last && v >= 0.0 && v < last) {
+    pub(super) fn darkness<const N: usize>(&self, [x_m, y_m, z_m]: &[Lanes<N>; 3]) -> Lanes<N> {
+        let u: Lanes<N> = lanes(|i| (x_m[i] - self.corner_m[0]) * self.texels_per_m - 0.5);
+        let v: Lanes<N> = lanes(|i| (y_m[i] - self.corner_m[1]) * self.texels_per_m - 0.5);
+        let mut darkness = [0.0; N];
+        for i in 0..N {
+            let last = (CONTACT_TEXELS - 1) as f32;
+            if u[i] >= 0.0 && u[i] < last && v[i] >= 0.0 && v[i] < last {
+                darkness[i] = self.darkness_at(u[i], v[i], z_m[i]);
+            }
+        }
+        darkness
+    }
+
+    #[inline(always)]
+    fn darkness_at(&self, u: f32, v: f32, z_m: f32) -> f32 {
+        let (column, row) = (usize::from(u as u16), usize::from(v as u16));
+        if !self.dark_cells[row / CELL * CELLS + column / CELL] {
             return 0.0;
         }
-        let (column, row) = (usize::from(u as u16), usize::from(v as u16));
         let at = |j: usize, i: usize| self.texel_values[(row + j) * CONTACT_TEXELS + column + i];
         let (right, down) = (u - column as f32, v - row as f32);
         let [height_m, _] = at(usize::from(down >= 0.5), usize::from(right >= 0.5));
-        if (point_m.z - height_m).abs() > SINK_M {
+        if (z_m - height_m).abs() > SINK_M {
             return 0.0;
         }
         let along = |j: usize| at(j, 0)[1] * (1.0 - right) + at(j, 1)[1] * right;

@@ -2,6 +2,8 @@
 
 use rapier3d::math::Vector;
 
+use super::affine::Affine;
+
 /// Samples a pixel along each axis; a power of two, so that dividing by it is exact.
 pub(super) const SAMPLES: usize = 2;
 
@@ -32,6 +34,9 @@ pub(super) const SUN_DISTANCE_M: f32 = 8.0;
 pub(super) const NORMAL_OFFSET_M: f32 = 0.006;
 pub(super) const BIAS_M: f32 = 0.004;
 
+/// Shadows fade out this far from the map's border, so that none ends in a line.
+pub(super) const FADE_TEXELS: f32 = 120.0;
+
 /// Texels along each side of the map of contacts: 1 cm at a focus of 1.25 m.
 pub(super) const CONTACT_TEXELS: usize = 256;
 /// How much darker it is where things stand.
@@ -40,17 +45,13 @@ pub(super) const CONTACT: f32 = 0.5;
 /// Steps of the table from linear light to sRGB bytes.
 pub(super) const SRGB_STEPS: usize = 4096;
 
-/// Column and row of the shadow's map, counted from its corner, and nearness: each is a scalar product with a point, and a
-/// number more.
-pub(super) type SunMap = [(Vector, f32); 3];
-
-/// From points of the world to the map around a focus.
-pub(super) fn sun_map(focus_m: Vector, radius_m: f32) -> SunMap {
+/// From points of the world to the shadow's map around a focus: column and row, counted from its corner, and nearness.
+pub(super) fn sun_map(focus_m: Vector, radius_m: f32) -> Affine {
     let half = 0.5 * TEXELS as f32;
     let right = Vector::Z.cross(TO_SUN).normalize() * (half / radius_m);
     let down = TO_SUN.cross(right) * -1.0;
     let about_focus = |axis: Vector, at_focus: f32| (axis, at_focus - axis.dot(focus_m));
-    [about_focus(right, half), about_focus(down, half), about_focus(TO_SUN, SUN_DISTANCE_M)]
+    Affine([about_focus(right, half), about_focus(down, half), about_focus(TO_SUN, SUN_DISTANCE_M)])
 }
 
 /// sRGB, as files have it, to linear light.

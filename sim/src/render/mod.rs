@@ -4,6 +4,8 @@
 //! [`RendererKind`] says which. The embedded one needs nothing of the system.
 
 mod accents;
+mod affine;
+mod bend;
 mod camera;
 mod cameras;
 mod contact;

@@ -1,89 +1,91 @@
 //! A scenery with what drawing wants to know of it and what never changes.
 
-use rapier3d::math::{Matrix, Vector};
+use rapier3d::math::Vector;
 
+use super::affine::Points;
+use super::bend::Bend;
 use super::light::linear;
-use super::{Mesh, Part, Scenery};
+use super::{Part, Pattern, Scenery};
 
 /// Marks a sample at which nothing is.
 pub(super) const NOTHING: u32 = u32::MAX;
 
 pub(super) struct Prepared {
     pub scenery: Scenery,
-    /// Number of the first triangle of each part: triangles are counted part by part.
-    pub first: Vec<u32>,
-    /// Of each triangle.
-    pub faces: Vec<Face>,
-    /// What a picture's ids show for each triangle.
+    /// Corners of each part's triangles.
+    pub points: Vec<Points>,
+    pub sheets: Vec<Sheet>,
+    /// Of each triangle, counted part by part, the number of its sheet.
+    pub sheet_of: Vec<u32>,
+    /// Number of the first triangle of each part.
+    first: Vec<usize>,
+    /// What a picture's ids show for each sheet.
     ids: Vec<u32>,
     /// Centre and radius of a sphere around each part, in its mesh's frame.
     pub bounds: Vec<(Vector, f32)>,
     /// The two colours of each part.
     pub linear_rgb: Vec<[Vector; 2]>,
-    /// Of each part, which axis of its mesh the grain runs along.
+    /// Of each part, which axis of its mesh comes first in its pattern: the one that a grain runs along.
     pub grain: Vec<usize>,
 }
 
-/// A triangle as shading wants it, in its mesh's frame.
+/// Neighbouring triangles of a part, as shading wants them.
 #[derive(Clone, Copy)]
-pub(super) struct Face {
+pub(super) struct Sheet {
     pub part: u32,
-    pub corner_m: Vector,
-    /// At the corner.
-    pub normal: Vector,
-    /// How the normal changes with the point, per metre; `None` where the triangle is flat.
-    pub bend_1_m: Option<Matrix>,
+    pub bend: Bend,
 }
 
 impl Prepared {
     pub(super) fn new(scenery: Scenery) -> Prepared {
-        let (mut first, mut faces, mut ids) = (Vec::new(), Vec::new(), Vec::new());
-        for (number, part) in scenery.parts.iter().enumerate() {
-            first.push(faces.len() as u32);
-            let triangles = part.mesh.triangles.iter();
-            faces.extend(triangles.map(|corners| Face::new(number as u32, &part.mesh, *corners)));
-            ids.resize(faces.len(), part.id);
+        let (mut sheets, mut sheet_of, mut first) = (Vec::new(), Vec::new(), Vec::new());
+        for (part, number) in scenery.parts.iter().zip(0..) {
+            first.push(sheet_of.len());
+            let (bends, bend_of) = part.mesh.bends();
+            sheet_of.extend(bend_of.iter().map(|bend| (sheets.len() + bend) as u32));
+            sheets.extend(bends.iter().map(|bend| Sheet { part: number, bend: *bend }));
         }
+        first.push(sheet_of.len());
+        let id = |sheet: &Sheet| scenery.parts[sheet.part as usize].id;
         Prepared {
+            points: scenery.parts.iter().map(points).collect(),
+            ids: sheets.iter().map(id).collect(),
+            sheets,
+            sheet_of,
             first,
-            faces,
-            ids,
             bounds: scenery.parts.iter().map(|part| part.mesh.bounds()).collect(),
             linear_rgb: scenery.parts.iter().map(colours).collect(),
-            grain: scenery.parts.iter().map(|part| part.mesh.longest_axis()).collect(),
+            grain: scenery.parts.iter().map(grain).collect(),
             scenery,
         }
     }
 
-    /// What a picture's ids show where it shows a triangle.
-    pub(super) fn id(&self, triangle: u32) -> u32 {
-        match triangle {
+    /// Of each triangle of a part.
+    pub(super) fn sheets_of(&self, part: usize) -> &[u32] {
+        &self.sheet_of[self.first[part]..self.first[part + 1]]
+    }
+
+    /// What a picture's ids show where it shows a sheet.
+    #[inline(always)]
+    pub(super) fn id(&self, sheet: u32) -> u32 {
+        match sheet {
             NOTHING => 0,
-            _ => self.ids[triangle as usize],
+            _ => self.ids[sheet as usize],
         }
     }
+}
+
+/// Print stands upright, whatever is longest.
+fn grain(part: &Part) -> usize {
+    if part.pattern == Pattern::Print { 0 } else { part.mesh.longest_axis() }
+}
+
+fn points(part: &Part) -> Points {
+    Points::new(part.mesh.vertices.iter().map(|vertex| vertex.position_m))
 }
 
 /// Linear, of a part.
 fn colours(part: &Part) -> [Vector; 2] {
     let first = linear(part.rgb);
     [first, part.pattern.second_rgb(first)]
-}
-
-impl Face {
-    /// A point p of triangle a, b, c with face f = ab x ac has the weights
-    ///   w_b = (ac x f) . ap / |f|^2,   w_c = (f x ab) . ap / |f|^2
-    /// and the normal n_a + w_b (n_b - n_a) + w_c (n_c - n_a).
-    fn new(part: u32, mesh: &Mesh, corners: [u32; 3]) -> Face {
-        let [a, b, c] = corners.map(|corner| mesh.vertices[corner as usize]);
-        let (ab, ac) = (b.position_m - a.position_m, c.position_m - a.position_m);
-        let face = ab.cross(ac);
-        let outer =
-            |column: Vector, row: Vector| Matrix::from_cols(column * row.x, column * row.y, column * row.z);
-        let scale = 1.0 / face.length_squared();
-        let bend_1_m = outer(b.normal - a.normal, ac.cross(face) * scale)
-            + outer(c.normal - a.normal, face.cross(ab) * scale);
-        let flat = a.normal == b.normal && a.normal == c.normal;
-        Face { part, corner_m: a.position_m, normal: a.normal, bend_1_m: (!flat).then_some(bend_1_m) }
-    }
 }

@@ -56,7 +56,10 @@ impl Outline {
     /// Corners are picture coordinates and nearness, counter-clockwise as the camera sees them; `None` for a back face.
     #[inline(always)]
     pub(super) fn new(corners: [[f32; 3]; 3]) -> Option<Outline> {
-        let [[ax, ay, an], [bx, by, bn], [cx, cy, cn]] = corners.map(|p| p.map(f64::from));
+        let wide = |corner: usize, axis: usize| f64::from(corners[corner][axis]);
+        let (ax, ay, an) = (wide(0, 0), wide(0, 1), wide(0, 2));
+        let (bx, by, bn) = (wide(1, 0), wide(1, 1), wide(1, 2));
+        let (cx, cy, cn) = (wide(2, 0), wide(2, 1), wide(2, 2));
         let (ux, uy, un, vx, vy, vn) = (bx - ax, by - ay, bn - an, cx - ax, cy - ay, cn - an);
         // Rows count downwards, so that what is counter-clockwise has a negative area.
         let area = ux * vy - uy * vx;

@@ -3,6 +3,25 @@
 /// As many as the widest registers in common use hold.
 pub(super) const LANES: usize = 8;
 
+/// A block of numbers, or a smaller one.
+pub(super) type Lanes<const N: usize = LANES> = [f32; N];
+
+/// Numbers of a block. A loop, for compilers make few instructions of it.
+#[inline(always)]
+pub(super) fn lanes<const N: usize>(each: impl Fn(usize) -> f32) -> Lanes<N> {
+    let mut numbers = [0.0; N];
+    for (i, number) in numbers.iter_mut().enumerate() {
+        *number = each(i);
+    }
+    numbers
+}
+
+/// Three of something, by their axes.
+#[inline(always)]
+pub(super) fn axes<T>(each: impl Fn(usize) -> T) -> [T; 3] {
+    [each(0), each(1), each(2)]
+}
+
 /// Samples in rows and columns, whose first are half a pitch from the picture's corner.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Grid {
@@ -37,6 +56,17 @@ impl<T: Copy> Rows<T> {
     pub(super) fn row(&self, row: usize) -> &[T] {
         let start = row * self.grid.stride();
         &self.numbers[start..start + self.grid.width]
+    }
+
+    pub(super) fn row_mut(&mut self, row: usize) -> &mut [T] {
+        let start = row * self.grid.stride();
+        &mut self.numbers[start..start + self.grid.width]
+    }
+
+    /// Makes every number what it is there.
+    pub(super) fn copy(&mut self, other: &Rows<T>) {
+        self.grid = other.grid;
+        self.numbers.clone_from(&other.numbers);
     }
 
     /// All of them, row by row.

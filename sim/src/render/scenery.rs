@@ -45,7 +45,7 @@ pub enum Carrier {
 pub struct Placed {
     /// Of each part.
     pub world_from_mesh: Vec<Pose>,
-    /// Between the robots: what shadows have to be sharp on.
+    /// Between the robots: what shadows have to be sharp on. It moves in steps, so that the room's shadows need seldom be drawn.
     pub focus_m: Vector,
 }
 
@@ -53,6 +53,7 @@ pub struct Placed {
 const ROOM_ID: u32 = 1;
 /// Around the middle between the robots: counter, objects and all hands.
 const FOCUS_HEIGHT_M: f32 = 0.8;
+const FOCUS_STEP_M: f32 = 0.1;
 const FOCUS_RADIUS_M: f32 = 1.25;
 /// The light stands for lamps at this height: walls and what hangs above them cast no shadow into the room.
 const LAMPS_M: f32 = 2.2;
@@ -96,7 +97,8 @@ impl Scenery {
             self.parts.iter().map(|part| world_from_carrier(part.carrier) * part.carrier_from_mesh);
         Placed {
             world_from_mesh: world_from_mesh.collect(),
-            focus_m: Vector::new(middle_m.x, middle_m.y, FOCUS_HEIGHT_M),
+            focus_m: (Vector::new(middle_m.x, middle_m.y, FOCUS_HEIGHT_M) / FOCUS_STEP_M).round()
+                * FOCUS_STEP_M,
         }
     }
 }

@@ -13,11 +13,12 @@ use super::contact::ContactMap;
 use super::prepared::Prepared;
 use super::{Camera, Frame, Placed, Renderer, Scenery};
 use crate::Step;
-use facets::Facets;
+use facets::Facet;
+use shade::Rays;
 use shadow::ShadowMap;
 use srgb::SrgbTable;
 use target::Target;
-use view::View;
+use view::{Row, View};
 
 /// Renders on the calling thread. It keeps its buffers, and the shadows of the last state.
 pub(super) struct CpuRenderer {
@@ -27,7 +28,8 @@ pub(super) struct CpuRenderer {
     placed: Placed,
     shadow: ShadowMap,
     contact: ContactMap,
-    facets: Facets,
+    row: Row,
+    facets: Vec<Facet>,
     samples: Target,
     /// One sample a pixel, at its centre: what depth and ids are read from.
     centres: Target,
@@ -41,7 +43,8 @@ impl CpuRenderer {
             placed: Placed::default(),
             shadow: ShadowMap::default(),
             contact: ContactMap::default(),
-            facets: Facets::default(),
+            row: Row::default(),
+            facets: Vec::new(),
             samples: Target::default(),
             centres: Target::default(),
         }
@@ -86,21 +89,28 @@ impl CpuRenderer {
         if self.placed != placed {
             self.shadow.draw(simd, &self.prepared, &placed);
             self.contact.draw(&self.prepared, &placed);
-            self.facets.reset(&self.prepared, &placed);
+            facets::place(&mut self.facets, &self.prepared, &placed);
             self.placed = placed;
         }
         target::draw(simd, &mut self.samples, &mut self.centres, &self.prepared, &self.placed, camera);
-        let view = View::new(&self.prepared, &self.samples, &self.shadow, &self.contact, camera);
+        let view = View {
+            prepared: &self.prepared,
+            facets: &self.facets,
+            target: &self.samples,
+            shadow: &self.shadow,
+            contact: &self.contact,
+            rays: Rays::new(camera),
+        };
         let mut frame = Frame {
             width: camera.width,
             height: camera.height,
-            rgb: view.rgb(&mut self.facets, &self.srgb),
+            rgb: view.rgb(&mut self.row, &self.srgb),
             depth_m: Vec::with_capacity((camera.width * camera.height) as usize),
             ids: Vec::with_capacity((camera.width * camera.height) as usize),
         };
         for row in 0..camera.height as usize {
             frame.depth_m.extend(self.centres.nearness_1_m(row).iter().map(|nearness| 1.0 / nearness));
-            frame.ids.extend(self.centres.triangles(row).iter().map(|triangle| self.prepared.id(*triangle)));
+            frame.ids.extend(self.centres.sheets(row).iter().map(|sheet| self.prepared.id(*sheet)));
         }
         frame
     }

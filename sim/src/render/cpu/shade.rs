@@ -2,59 +2,111 @@
 
 use rapier3d::math::Vector;
 
+use super::facets::Facet;
 use super::shadow::ShadowMap;
-use crate::render::light::{FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, SUN, TO_SUN};
-use crate::render::rows::LANES;
+use crate::render::contact::ContactMap;
+use crate::render::light::{CONTACT, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, SAMPLES, SUN, TO_SUN};
+use crate::render::rows::{LANES, Lanes, axes, lanes};
+use crate::render::{Camera, Pattern};
 
 /// As many points as are shaded together: enough for a loop to be worth its beginning, few enough to stay near the processor.
 pub(super) const BATCH: usize = 64;
+/// Points are worked on in whole blocks, the last of which may reach beyond the batch.
+const ROOM: usize = BATCH + LANES;
 
-/// A point that is seen.
-#[derive(Clone, Copy)]
-pub(super) struct Surface {
-    /// In the world, as the directions are.
-    pub point_m: Vector,
-    /// From the camera to the point; of any length, as the normal is.
-    pub ray: Vector,
-    pub normal: Vector,
-    pub albedo: Vector,
-    /// What contacts leave of all light.
-    pub open_share: f32,
+/// Where the rays of a picture's samples begin, and how they go in the world, to a depth of 1 m.
+pub(super) struct Rays {
+    eye_m: Vector,
+    /// Through the first sample, and from one to the next.
+    first: Vector,
+    right: Vector,
+    down: Vector,
+}
+
+/// Pixels side by side that show one sheet.
+pub(super) struct Strip<'a> {
+    pub facet: &'a Facet,
+    /// Column and row of the first sample.
+    pub sample: [usize; 2],
+    /// From the first sample to the right.
+    pub nearness_1_m: &'a [f32],
+    pub first_pixel: usize,
+    pub count: usize,
+    /// How much of the pixels it is.
+    pub share: f32,
 }
 
 /// Points that are shaded together. They are kept coordinate by coordinate and worked on in loops that do not branch: so
 /// several of them are done at once.
 pub(super) struct Surfaces {
     count: usize,
+    /// In the world, as the directions are.
     point_m: Vectors,
+    /// From the camera to the point; of any length, as the normal is.
     ray: Vectors,
     normal: Vectors,
     albedo: Vectors,
+    /// What contacts leave of all light.
+    open_share: [f32; ROOM],
+    /// For each, the pixel and how much it counts there.
+    pixels: [u32; ROOM],
+    shares: [f32; ROOM],
     /// Place in the shadow map.
     texel: Vectors,
-    /// Light that comes from everywhere, and what the sun adds; and the sun's reflection.
-    sun_factor: [f32; BATCH],
-    eye_factor: [f32; BATCH],
-    highlight_factor: [f32; BATCH],
-    sunlit_share: [f32; BATCH],
-    open_share: [f32; BATCH],
-    colour: Vectors,
+    sun_factor: [f32; ROOM],
+    eye_factor: [f32; ROOM],
+    highlight_factor: [f32; ROOM],
+    sunlit_share: [f32; ROOM],
 }
 
 /// As many vectors as there are points.
-struct Vectors([[f32; BATCH]; 3]);
+struct Vectors([[f32; ROOM]; 3]);
 
 impl Vectors {
-    const ZERO: Vectors = Vectors([[0.0; BATCH]; 3]);
+    const ZERO: Vectors = Vectors([[0.0; ROOM]; 3]);
 
     #[inline(always)]
-    fn get(&self, i: usize) -> Vector {
-        Vector::new(self.0[0][i], self.0[1][i], self.0[2][i])
+    fn block(&self, at: usize) -> [Lanes; 3] {
+        axes(
+            #[inline(always)]
+            |axis| *block(&self.0[axis], at),
+        )
     }
 
     #[inline(always)]
-    fn set(&mut self, i: usize, value: Vector) {
-        (self.0[0][i], self.0[1][i], self.0[2][i]) = (value.x, value.y, value.z);
+    fn set<const N: usize>(&mut self, at: usize, values: [Lanes<N>; 3]) {
+        for (numbers, values) in self.0.iter_mut().zip(values) {
+            *block_mut(numbers, at) = values;
+        }
+    }
+}
+
+#[inline(always)]
+fn block(numbers: &[f32; ROOM], at: usize) -> &Lanes {
+    numbers[at..].first_chunk().expect("there is room for a block after each point")
+}
+
+#[inline(always)]
+fn block_mut<const N: usize>(numbers: &mut [f32; ROOM], at: usize) -> &mut Lanes<N> {
+    numbers[at..].first_chunk_mut().expect("there is room for a block after each point")
+}
+
+#[inline(always)]
+fn dot(a: &[Lanes; 3], b: &[Lanes; 3], i: usize) -> f32 {
+    a[0][i] * b[0][i] + a[1][i] * b[1][i] + a[2][i] * b[2][i]
+}
+
+impl Rays {
+    pub(super) fn new(camera: &Camera) -> Rays {
+        let rotation = camera.world_from_camera.rotation;
+        let sample = 1.0 / (camera.focal_px() * SAMPLES as f32);
+        let (right, down) = (rotation * Vector::X * sample, rotation * Vector::NEG_Y * sample);
+        Rays {
+            eye_m: camera.world_from_camera.translation,
+            first: rotation * camera.unproject([0.0, 0.0], 1.0) + (right + down) * 0.5,
+            right,
+            down,
+        }
     }
 }
 
@@ -66,13 +118,14 @@ impl Surfaces {
             ray: Vectors::ZERO,
             normal: Vectors::ZERO,
             albedo: Vectors::ZERO,
+            open_share: [1.0; ROOM],
+            pixels: [0; ROOM],
+            shares: [0.0; ROOM],
             texel: Vectors::ZERO,
-            sun_factor: [0.0; BATCH],
-            eye_factor: [0.0; BATCH],
-            highlight_factor: [0.0; BATCH],
-            sunlit_share: [0.0; BATCH],
-            open_share: [1.0; BATCH],
-            colour: Vectors::ZERO,
+            sun_factor: [0.0; ROOM],
+            eye_factor: [0.0; ROOM],
+            highlight_factor: [0.0; ROOM],
+            sunlit_share: [0.0; ROOM],
         }
     }
 
@@ -82,65 +135,152 @@ impl Surfaces {
     }
 
     #[inline(always)]
-    pub(super) fn push(&mut self, surface: Surface) {
-        // There is room, which the compiler cannot know: so it need not check.
-        let i = self.count % BATCH;
-        self.count += 1;
-        self.point_m.set(i, surface.point_m);
-        self.ray.set(i, surface.ray);
-        self.normal.set(i, surface.normal);
-        self.albedo.set(i, surface.albedo);
-        self.open_share[i] = surface.open_share;
+    pub(super) fn push(&mut self, rays: &Rays, contact: &ContactMap, strip: &Strip<'_>) {
+        if strip.count == 1 {
+            self.push_blocks::<1>(rays, contact, strip);
+        } else {
+            self.push_blocks::<LANES>(rays, contact, strip);
+        }
+        self.count += strip.count;
     }
 
-    /// Linear colours of all that were pushed, in their order; then they are forgotten.
     #[inline(always)]
-    pub(super) fn shade(&mut self, shadow: &ShadowMap) -> impl Iterator<Item = Vector> {
+    fn push_blocks<const N: usize>(&mut self, rays: &Rays, contact: &ContactMap, strip: &Strip<'_>) {
+        let (x, y) = (strip.sample[0] as f32, strip.sample[1] as f32);
+        let first_ray = rays.first + rays.right * x + rays.down * y;
+        for start in (0..strip.count).step_by(N) {
+            let at = self.count + start;
+            let nearness_1_m: Lanes<N> =
+                lanes(|i| strip.nearness_1_m[(start + i).min(strip.count - 1) * SAMPLES]);
+            let depth_m: Lanes<N> = lanes(|i| 1.0 / nearness_1_m[i]);
+            let across: Lanes<N> = lanes(|i| ((start + i) * SAMPLES) as f32);
+            let ray: [Lanes<N>; 3] = axes(
+                #[inline(always)]
+                |axis| lanes(|i| first_ray[axis] + rays.right[axis] * across[i]),
+            );
+            let point_m: [Lanes<N>; 3] = axes(
+                #[inline(always)]
+                |axis| lanes(|i| rays.eye_m[axis] + ray[axis][i] * depth_m[i]),
+            );
+            self.ray.set(at, ray);
+            self.point_m.set(at, point_m);
+            self.normal.set(at, strip.facet.normals(&point_m));
+            self.albedo.set(at, strip.facet.albedo(&point_m));
+            *block_mut(&mut self.shares, at) = [strip.share; N];
+            *block_mut(&mut self.open_share, at) = [1.0; N];
+            for i in 0..N.min(strip.count - start) {
+                self.pixels[at + i] = (strip.first_pixel + start + i) as u32;
+            }
+            if strip.facet.carries {
+                let darkness = contact.darkness(&point_m);
+                *block_mut(&mut self.open_share, at) = lanes::<N>(|i| 1.0 - CONTACT * darkness[i]);
+            }
+        }
+    }
+
+    /// Adds the linear colours of all that were pushed to their pixels; then they are forgotten.
+    #[inline(always)]
+    pub(super) fn shade(&mut self, shadow: &ShadowMap, sum_rgb: &mut [[f32; 3]]) {
         let count = std::mem::take(&mut self.count);
-        let whole = count.next_multiple_of(LANES).min(BATCH);
-        for i in 0..whole {
-            self.face(i, shadow);
+        for at in (0..count).step_by(LANES) {
+            self.face(at, shadow);
         }
         for i in 0..count {
-            self.sunlit_share[i] =
-                if self.sun_factor[i] > 0.0 { shadow.sunlit(self.texel.get(i)) } else { 0.0 };
+            let texel = axes(
+                #[inline(always)]
+                |axis| self.texel.0[axis][i],
+            );
+            self.sunlit_share[i] = if self.sun_factor[i] > 0.0 { shadow.sunlit(texel) } else { 0.0 };
         }
-        for i in 0..whole {
-            self.light(i);
+        for at in (0..count).step_by(LANES) {
+            let colours = self.light(at);
+            for i in 0..LANES.min(count - at) {
+                let sum = &mut sum_rgb[self.pixels[at + i] as usize];
+                *sum = axes(
+                    #[inline(always)]
+                    |axis| sum[axis] + colours[axis][i],
+                );
+            }
         }
-        (0..count).map(|i| self.colour.get(i))
     }
 
-    /// How a point faces what it is lit by.
+    /// How points face what they are lit by.
     #[inline(always)]
-    fn face(&mut self, i: usize, shadow: &ShadowMap) {
-        let (ray, normal) = (self.ray.get(i), self.normal.get(i));
-        let eye_direction = ray * (-1.0 / ray.length_squared().sqrt());
-        let normal = normal * (1.0 / normal.length_squared().sqrt());
-        let towards_eye = normal.dot(eye_direction);
-        let normal = normal * 1f32.copysign(towards_eye);
-        let facing_sun = normal.dot(TO_SUN);
-        let half_way = eye_direction + TO_SUN;
-        let along = normal.dot(half_way);
-        let cosine_2 = along * along / half_way.length_squared();
-        let cosine_8 = cosine_2 * cosine_2 * cosine_2 * cosine_2;
-        let cosine_40 = cosine_8 * cosine_8 * cosine_8 * cosine_8 * cosine_8;
-        self.normal.set(i, normal);
-        self.eye_factor[i] = towards_eye.abs();
-        self.sun_factor[i] = facing_sun;
-        self.highlight_factor[i] = if along > 0.0 { HIGHLIGHT * cosine_40 } else { 0.0 };
-        self.texel.set(i, shadow.texel(self.point_m.get(i), normal));
+    fn face(&mut self, at: usize, shadow: &ShadowMap) {
+        let (ray, normal) = (self.ray.block(at), self.normal.block(at));
+        let per_ray: Lanes = lanes(|i| -1.0 / dot(&ray, &ray, i).sqrt());
+        let per_normal: Lanes = lanes(|i| 1.0 / dot(&normal, &normal, i).sqrt());
+        let towards_eye: Lanes = lanes(|i| dot(&normal, &ray, i) * per_ray[i] * per_normal[i]);
+        let outwards: Lanes = lanes(|i| per_normal[i].copysign(towards_eye[i]));
+        let normal: [Lanes; 3] = axes(
+            #[inline(always)]
+            |axis| lanes(|i| normal[axis][i] * outwards[i]),
+        );
+        let sun = TO_SUN.to_array();
+        let half_way: [Lanes; 3] = axes(
+            #[inline(always)]
+            |axis| lanes(|i| ray[axis][i] * per_ray[i] + sun[axis]),
+        );
+        let along: Lanes = lanes(|i| dot(&normal, &half_way, i));
+        let cosine_2: Lanes = lanes(|i| along[i] * along[i] / dot(&half_way, &half_way, i));
+        let cosine_8: Lanes = lanes(|i| cosine_2[i] * cosine_2[i] * cosine_2[i] * cosine_2[i]);
+        let cosine_40: Lanes = lanes(|i| cosine_8[i] * cosine_8[i] * cosine_8[i] * cosine_8[i] * cosine_8[i]);
+        *block_mut::<LANES>(&mut self.eye_factor, at) = lanes(|i| towards_eye[i].abs());
+        *block_mut::<LANES>(&mut self.sun_factor, at) =
+            lanes(|i| normal[0][i] * sun[0] + normal[1][i] * sun[1] + normal[2][i] * sun[2]);
+        *block_mut::<LANES>(&mut self.highlight_factor, at) =
+            lanes(|i| if along[i] > 0.0 { HIGHLIGHT * cosine_40[i] } else { 0.0 });
+        self.texel.set(at, shadow.texels(&self.point_m.block(at), &normal));
+        self.normal.set(at, normal);
     }
 
-    /// Adds up the light.
+    /// Adds up the light, as far as the points count.
     #[inline(always)]
-    fn light(&mut self, i: usize) {
-        let albedo = self.albedo.get(i);
-        let up = self.normal.0[2][i] * 0.5 + 0.5;
-        let ambient = FROM_BELOW + (FROM_ABOVE - FROM_BELOW) * up;
-        let sunlight = self.sun_factor[i] * self.sunlit_share[i];
-        let unlit = albedo * (ambient + LAMP * self.eye_factor[i]);
-        self.colour
-            .set(i, (unlit + (albedo * SUN + self.highlight_factor[i]) * sunlight) * self.open_share[i]);
+    fn light(&self, at: usize) -> [Lanes; 3] {
+        let (albedo, normal) = (self.albedo.block(at), self.normal.block(at));
+        let (eye_factor, highlight) = (block(&self.eye_factor, at), block(&self.highlight_factor, at));
+        let (sun_factor, sunlit) = (block(&self.sun_factor, at), block(&self.sunlit_share, at));
+        let (open, share) = (block(&self.open_share, at), block(&self.shares, at));
+        axes(
+            #[inline(always)]
+            |axis| {
+                let (below, above, sun) = (FROM_BELOW[axis], FROM_ABOVE[axis], SUN[axis]);
+                lanes(|i| {
+                    let ambient = below + (above - below) * (normal[2][i] * 0.5 + 0.5);
+                    let unlit = albedo[axis][i] * (ambient + LAMP * eye_factor[i]);
+                    let sunlight = (albedo[axis][i] * sun + highlight[i]) * (sun_factor[i] * sunlit[i]);
+                    (unlit + sunlight) * (open[i] * share[i])
+                })
+            },
+        )
+    }
+}
+
+impl Facet {
+    /// Of any length.
+    #[inline(always)]
+    fn normals<const N: usize>(&self, point_m: &[Lanes<N>; 3]) -> [Lanes<N>; 3] {
+        let normal = axes(|axis| [self.normal[axis]; N]);
+        let Some(slope_1_m) = &self.slope_1_m else { return normal };
+        let (x, y, z) = (slope_1_m.x_axis, slope_1_m.y_axis, slope_1_m.z_axis);
+        let [x_m, y_m, z_m] = point_m;
+        axes(
+            #[inline(always)]
+            |axis| lanes(|i| normal[axis][i] + (x[axis] * x_m[i] + y[axis] * y_m[i] + z[axis] * z_m[i])),
+        )
+    }
+
+    /// Linear.
+    #[inline(always)]
+    fn albedo<const N: usize>(&self, point_m: &[Lanes<N>; 3]) -> [Lanes<N>; 3] {
+        let [first, second] = self.linear_rgb;
+        if self.pattern == Pattern::Plain {
+            return axes(|axis| [first[axis]; N]);
+        }
+        let share = self.pattern.shares(self.pattern_from_world.map_lanes(point_m));
+        axes(
+            #[inline(always)]
+            |axis| lanes(|i| first[axis] + (second[axis] - first[axis]) * share[i]),
+        )
     }
 }

@@ -1,145 +1,206 @@
 //! Shadow of the sun around the focus.
 
-use std::f32::consts::SQRT_2;
+use std::ops::Range;
 
 use pulp::Simd;
 use rapier3d::math::Vector;
 
-use crate::render::Placed;
-use crate::render::light::{BIAS_M, NORMAL_OFFSET_M, SunMap, TEXELS, TO_SUN, sun_map};
+use crate::render::affine::Affine;
+use crate::render::light::{BIAS_M, FADE_TEXELS, NORMAL_OFFSET_M, TEXELS, sun_map};
 use crate::render::prepared::Prepared;
 use crate::render::raster::Outline;
-use crate::render::rows::{Grid, LANES, Rows};
+use crate::render::rows::{Grid, Lanes, Rows, axes, lanes};
+use crate::render::{Carrier, Placed};
 
 /// Texels along each side of a cell: what is nearer than all of a cell is in the sun there, without a look at its texels.
-const CELL: usize = LANES;
+const CELL: usize = 8;
+const CELLS: usize = TEXELS / CELL;
+/// Texels that the filter takes along each axis: a cell counts those that a filter begun in it can reach.
+const TAPS: usize = 4;
+const GRID: Grid = Grid { width: TEXELS, height: TEXELS, pitch_px: 1.0 };
 
 #[derive(Default)]
 pub(super) struct ShadowMap {
-    /// "Nearness" here is [`DISTANCE_M`] minus the distance from the sun's plane, and grows towards the sun.
+    /// What the map is around; `None` before the first.
+    focus_m: Option<Vector>,
+    map_from_world: Affine,
+    /// The room's shadows, which stay while the focus does.
+    still: Layer,
+    /// The shadows of everything.
+    all: Layer,
+    /// Of each row of cells, the columns of those in which `all` may differ from `still`.
+    moving: Vec<Range<usize>>,
+    corners: Vec<[f32; 3]>,
+}
+
+/// "Nearness" here is [`SUN_DISTANCE_M`] minus the distance from the sun's plane, and grows towards the sun.
+///
+/// [`SUN_DISTANCE_M`]: crate::render::light::SUN_DISTANCE_M
+#[derive(Default)]
+struct Layer {
     nearness_m: Rows<f32>,
     /// Least and greatest nearness of each cell, row by row.
     cells_m: Vec<[f32; 2]>,
-    map_from_world: SunMap,
 }
 
 impl ShadowMap {
     /// Draws the shadows of everything that casts one.
     #[inline(always)]
     pub(super) fn draw<S: Simd>(&mut self, simd: S, prepared: &Prepared, placed: &Placed) {
-        let radius_m = prepared.scenery.focus_radius_m;
-        self.map_from_world = sun_map(placed.focus_m, radius_m);
-        let grid = Grid { width: TEXELS, height: TEXELS, pitch_px: 1.0 };
-        self.nearness_m.reset(grid, 0.0);
-        let nearest = S::as_mut_simd_f32s(self.nearness_m.all_mut()).0;
-        let mut corners = Vec::new();
-        let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).zip(&prepared.bounds);
-        for ((part, world_from_mesh), (centre_m, around_m)) in
-            parts.filter(|((part, _), _)| part.casts_shadow)
-        {
-            let from_focus_m = *world_from_mesh * *centre_m - placed.focus_m;
-            if from_focus_m.reject_from_normalized(TO_SUN).length() > radius_m * SQRT_2 + around_m {
+        if self.focus_m != Some(placed.focus_m) {
+            self.focus_m = Some(placed.focus_m);
+            self.map_from_world = sun_map(placed.focus_m, prepared.scenery.focus_radius_m);
+            self.still.nearness_m.reset(GRID, 0.0);
+            self.still.cells_m.resize(CELLS * CELLS, [0.0; 2]);
+            self.moving = vec![CELLS..0; CELLS];
+            self.draw_parts(simd, prepared, placed, |carrier| carrier == Carrier::Room);
+            self.still.measure(&vec![0..CELLS; CELLS]);
+            self.all.nearness_m.copy(&self.still.nearness_m);
+            self.all.cells_m.clone_from(&self.still.cells_m);
+        }
+        self.all.restore(&self.still, &self.moving);
+        self.moving.fill(CELLS..0);
+        self.draw_parts(simd, prepared, placed, |carrier| carrier != Carrier::Room);
+        self.all.measure(&self.moving);
+    }
+
+    /// Draws the shadows of those parts that `belong`, into the layer that is theirs.
+    #[inline(always)]
+    fn draw_parts<S: Simd>(
+        &mut self,
+        simd: S,
+        prepared: &Prepared,
+        placed: &Placed,
+        belong: impl Fn(Carrier) -> bool,
+    ) {
+        for (number, part) in prepared.scenery.parts.iter().enumerate() {
+            if !part.casts_shadow || !belong(part.carrier) {
                 continue;
             }
-            let to_mesh = world_from_mesh.rotation.inverse();
-            let map_from_mesh = self
-                .map_from_world
-                .map(|(axis, constant)| (to_mesh * axis, constant + axis.dot(world_from_mesh.translation)));
-            corners.clear();
-            corners.extend(part.mesh.vertices.iter().map(|vertex| place(map_from_mesh, vertex.position_m)));
-            for triangle in &part.mesh.triangles {
-                if let Some(outline) = Outline::new(triangle.map(|corner| corners[corner as usize])) {
+            let map_from_mesh = self.map_from_world.after(placed.world_from_mesh[number]);
+            let (centre_m, around_m) = prepared.bounds[number];
+            let texels = around_m * 0.5 * TEXELS as f32 / prepared.scenery.focus_radius_m;
+            let [u, v, _] = map_from_mesh.map(centre_m);
+            let [columns, rows] = [u, v].map(|middle| cells(middle - texels, middle + texels));
+            if columns.is_empty() || rows.is_empty() {
+                continue;
+            }
+            let layer = if part.carrier == Carrier::Room { &mut self.still } else { &mut self.all };
+            for range in &mut self.moving[rows] {
+                *range = range.start.min(columns.start)..range.end.max(columns.end);
+            }
+            let nearest = S::as_mut_simd_f32s(layer.nearness_m.all_mut()).0;
+            prepared.points[number].map_into(&mut self.corners, |block| map_from_mesh.map_lanes(block));
+            for [a, b, c] in &part.mesh.triangles {
+                let [a, b, c] = [*a as usize, *b as usize, *c as usize];
+                if let Some(outline) = Outline::new([self.corners[a], self.corners[b], self.corners[c]]) {
                     outline.draw(
                         simd,
-                        grid,
+                        GRID,
                         #[inline(always)]
                         |i, nearness_m| nearest[i] = simd.max_f32s(nearest[i], nearness_m),
                     );
                 }
             }
         }
-        self.measure_cells();
     }
 
+    /// Where surfaces are looked up: column and row, counted from the first texel's centre, and nearness.
     #[inline(always)]
-    fn measure_cells(&mut self) {
-        self.cells_m.clear();
-        for top in (0..TEXELS).step_by(CELL) {
-            let mut least = [[f32::INFINITY; LANES]; TEXELS / LANES];
-            let mut greatest = [[0.0f32; LANES]; TEXELS / LANES];
-            for row in top..top + CELL {
-                let blocks = self.nearness_m.row(row).as_chunks::<LANES>().0.iter();
-                for ((block, least), greatest) in blocks.zip(&mut least).zip(&mut greatest) {
-                    for i in 0..LANES {
-                        least[i] = if block[i] < least[i] { block[i] } else { least[i] };
-                        greatest[i] = if block[i] > greatest[i] { block[i] } else { greatest[i] };
-                    }
-                }
-            }
-            self.cells_m.extend(least.iter().zip(&greatest).map(|(least, greatest)| {
-                [
-                    least.iter().copied().fold(f32::INFINITY, f32::min),
-                    greatest.iter().copied().fold(0.0, f32::max),
-                ]
-            }));
-        }
-    }
-
-    /// Where a surface is looked up: column and row, counted from the first texel's centre, and nearness.
-    #[inline(always)]
-    pub(super) fn texel(&self, point_m: Vector, normal: Vector) -> Vector {
-        let [u, v, nearness_m] = place(self.map_from_world, point_m + normal * NORMAL_OFFSET_M);
-        Vector::new(u - 0.5, v - 0.5, nearness_m + BIAS_M)
+    pub(super) fn texels(&self, points_m: &[Lanes; 3], normals: &[Lanes; 3]) -> [Lanes; 3] {
+        let shifted: [Lanes; 3] = axes(
+            #[inline(always)]
+            |axis| lanes(|i| points_m[axis][i] + normals[axis][i] * NORMAL_OFFSET_M),
+        );
+        let [u, v, nearness_m] = self.map_from_world.map_lanes(&shifted);
+        [lanes(|i| u[i] - 0.5), lanes(|i| v[i] - 0.5), lanes(|i| nearness_m[i] + BIAS_M)]
     }
 
     /// 1 in the sun, 0 in the shadow, smooth over three texels; points outside the map are in the sun.
     #[inline(always)]
-    pub(super) fn sunlit(&self, texel_values: Vector) -> f32 {
-        let [u, v, nearness_m] = texel_values.to_array();
+    pub(super) fn sunlit(&self, [u, v, nearness_m]: [f32; 3]) -> f32 {
         let inside = |i: f32| i >= 1.0 && i < (TEXELS - 3) as f32;
         if !inside(u) || !inside(v) {
             return 1.0;
         }
         let (column, row) = (usize::from(u as u16), usize::from(v as u16));
-        match self.cells(column, row) {
-            [_, greatest_m] if nearness_m >= greatest_m => 1.0,
+        let lit = match self.all.cells_m[(row - 1) / CELL * CELLS + (column - 1) / CELL] {
+            [_, greatest_m] if nearness_m >= greatest_m => return 1.0,
             [least_m, _] if nearness_m < least_m => 0.0,
-            _ => self.filtered(texel_values),
-        }
-    }
-
-    /// Least and greatest nearness around a texel, at least as far as the filter reaches.
-    fn cells(&self, column: usize, row: usize) -> [f32; 2] {
-        let mut both = [f32::INFINITY, 0.0];
-        for y in [(row - 1) / CELL, (row + 2) / CELL] {
-            for x in [(column - 1) / CELL, (column + 2) / CELL] {
-                let [least, greatest] = self.cells_m[y * (TEXELS / CELL) + x];
-                both = [both[0].min(least), both[1].max(greatest)];
-            }
-        }
-        both
+            _ => self.filtered([u, v, nearness_m]),
+        };
+        let last = (TEXELS - 1) as f32;
+        let to_border = u.min(last - u).min(v.min(last - v));
+        1.0 - (1.0 - lit) * (to_border / FADE_TEXELS).min(1.0)
     }
 
     /// Four taps with a tent's weights along each axis are a bilinear filter three texels wide.
-    fn filtered(&self, texel_values: Vector) -> f32 {
-        let [u, v, nearness_m] = texel_values.to_array();
+    #[inline(always)]
+    fn filtered(&self, [u, v, nearness_m]: [f32; 3]) -> f32 {
         let (column, row) = (usize::from(u as u16), usize::from(v as u16));
         let weights = |part: f32| [1.0 - part, 1.0, 1.0, part];
         let (across, down) = (weights(u - column as f32), weights(v - row as f32));
-        let mut columns = [0.0; 4];
-        for (j, weight) in down.into_iter().enumerate() {
-            let occluders = &self.nearness_m.row(row - 1 + j)[column - 1..column + 3];
-            for (sum, occluder) in columns.iter_mut().zip(occluders) {
-                *sum += if nearness_m >= *occluder { weight } else { 0.0 };
+        let mut columns = [0.0; TAPS];
+        for j in 0..TAPS {
+            let occluders = &self.all.nearness_m.row(row - 1 + j)[column - 1..column - 1 + TAPS];
+            for i in 0..TAPS {
+                columns[i] += if nearness_m >= occluders[i] { down[j] } else { 0.0 };
             }
         }
-        let sum: f32 = columns.into_iter().zip(across).map(|(sum, weight)| sum * weight).sum();
-        sum / 9.0
+        (columns[0] * across[0] + columns[1] * across[1] + columns[2] * across[2] + columns[3] * across[3])
+            / 9.0
     }
 }
 
-/// Where a point is on the map: column and row, counted from its corner, and nearness.
-#[inline(always)]
-fn place(map: SunMap, point_m: Vector) -> [f32; 3] {
-    map.map(|(axis, constant)| axis.dot(point_m) + constant)
+impl Layer {
+    /// Makes what moved as it is without.
+    fn restore(&mut self, still: &Layer, moving: &[Range<usize>]) {
+        for (row, columns) in moving.iter().enumerate().filter(|(_, columns)| !columns.is_empty()) {
+            let of_row = row * CELLS + columns.start..row * CELLS + columns.end;
+            self.cells_m[of_row.clone()].copy_from_slice(&still.cells_m[of_row]);
+            for row in row * CELL..(row + 1) * CELL {
+                let texels = columns.start * CELL..columns.end * CELL;
+                let kept = &still.nearness_m.row(row)[texels.clone()];
+                self.nearness_m.row_mut(row)[texels].copy_from_slice(kept);
+            }
+        }
+    }
+
+    /// Finds the least and the greatest of some cells.
+    #[inline(always)]
+    fn measure(&mut self, drawn: &[Range<usize>]) {
+        for (row, columns) in drawn.iter().enumerate().filter(|(_, columns)| !columns.is_empty()) {
+            self.measure_row(row, columns.clone());
+        }
+    }
+
+    #[inline(always)]
+    fn measure_row(&mut self, row: usize, columns: Range<usize>) {
+        let mut least = [f32::INFINITY; TEXELS + CELL];
+        let mut greatest = [0.0f32; TEXELS + CELL];
+        let reached = columns.start * CELL..((columns.end + 1) * CELL).min(TEXELS);
+        for row in row * CELL..((row + 1) * CELL + TAPS - 1).min(TEXELS) {
+            let texels = &self.nearness_m.row(row)[reached.clone()];
+            let (least, greatest) = (&mut least[reached.clone()], &mut greatest[reached.clone()]);
+            for ((texel, least), greatest) in texels.iter().zip(least).zip(greatest) {
+                *least = if texel < least { *texel } else { *least };
+                *greatest = if texel > greatest { *texel } else { *greatest };
+            }
+        }
+        for column in columns {
+            let reached = column * CELL..(column + 1) * CELL + TAPS - 1;
+            let mut both = [f32::INFINITY, 0.0f32];
+            for (least, greatest) in least[reached.clone()].iter().zip(&greatest[reached]) {
+                both[0] = if *least < both[0] { *least } else { both[0] };
+                both[1] = if *greatest > both[1] { *greatest } else { both[1] };
+            }
+            self.cells_m[row * CELLS + column] = both;
+        }
+    }
+}
+
+/// The cells whose filters reach what is between two texels.
+fn cells(low: f32, high: f32) -> Range<usize> {
+    let cell = |texel: f32| texel.clamp(0.0, TEXELS as f32) as usize / CELL;
+    cell(low - TAPS as f32)..(cell(high) + 1).min(CELLS)
 }

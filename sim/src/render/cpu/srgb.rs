@@ -1,6 +1,7 @@
 //! From linear light to sRGB, as pictures have it.
 
 use crate::render::light::SRGB_STEPS;
+use crate::render::rows::{LANES, Lanes, lanes};
 
 /// Table from linear light to sRGB bytes.
 pub(super) struct SrgbTable([u8; SRGB_STEPS]);
@@ -15,11 +16,32 @@ impl Default for SrgbTable {
 }
 
 impl SrgbTable {
+    /// Bytes of linear numbers.
     #[inline(always)]
-    pub(super) fn encode(&self, linear_value: f32) -> u8 {
-        // The sum's lowest bits are the rounded number.
-        const ALL_BITS_WHOLE: f32 = (1 << 23) as f32;
-        let index = (linear_value.clamp(0.0, 1.0) * LAST + ALL_BITS_WHOLE).to_bits();
-        self.0[index as usize % SRGB_STEPS]
+    pub(super) fn encode(&self, linear_values: &[f32], bytes: &mut [u8]) {
+        let (value_blocks, values) = linear_values.as_chunks::<LANES>();
+        let (byte_blocks, rest) = bytes.as_chunks_mut::<LANES>();
+        for (bytes, values) in byte_blocks.iter_mut().zip(value_blocks) {
+            let places: Lanes = lanes(|i| place(values[i]));
+            for (byte, place) in bytes.iter_mut().zip(places) {
+                *byte = self.at(place);
+            }
+        }
+        for (byte, value) in rest.iter_mut().zip(values) {
+            *byte = self.at(place(*value));
+        }
     }
+
+    #[inline(always)]
+    fn at(&self, place: f32) -> u8 {
+        self.0[place.to_bits() as usize % SRGB_STEPS]
+    }
+}
+
+/// A number whose lowest bits are the place in the table.
+#[inline(always)]
+fn place(linear_value: f32) -> f32 {
+    const ALL_BITS_WHOLE: f32 = (1 << 23) as f32;
+    let within = if linear_value > 0.0 { linear_value } else { 0.0 };
+    (if within < 1.0 { within } else { 1.0 }) * LAST + ALL_BITS_WHOLE
 }

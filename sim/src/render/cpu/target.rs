@@ -1,13 +1,14 @@
-//! For each sample of a picture, the nearest triangle and how near it is.
+//! For each sample of a picture, the nearest sheet and how near it is.
 
 use pulp::Simd;
-use rapier3d::math::{Matrix, Pose, Vector};
+use rapier3d::math::{Pose, Vector};
 
+use crate::render::affine::Affine;
 use crate::render::camera::NEAR_M;
 use crate::render::light::SAMPLES;
 use crate::render::prepared::{NOTHING, Prepared};
 use crate::render::raster::Outline;
-use crate::render::rows::{Grid, Rows};
+use crate::render::rows::{Grid, Lanes, Rows, lanes};
 use crate::render::{Camera, Placed};
 
 /// Nearest surface per sample. `nearness_1_m` is 1 / depth, which is linear over a triangle's picture.
@@ -15,7 +16,7 @@ use crate::render::{Camera, Placed};
 pub(super) struct Target {
     grid: Grid,
     nearness_1_m: Rows<f32>,
-    triangle: Rows<u32>,
+    sheet: Rows<u32>,
 }
 
 /// Fills `samples`, [`SAMPLES`] a pixel along each axis, and `centres`, one a pixel, with all that `camera` sees.
@@ -32,50 +33,77 @@ pub(super) fn draw<S: Simd>(
     samples.reset(Grid { width: width * SAMPLES, height: height * SAMPLES, pitch_px: 1.0 });
     centres.reset(Grid { width, height, pitch_px: SAMPLES as f64 });
     let camera_from_world = camera.world_from_camera.inverse();
-    let focal = camera.focal_px() * SAMPLES as f32;
-    let [cx, cy] = [width, height].map(|pixels| (pixels * SAMPLES) as f32 * 0.5);
-    let screen = |p: Vector| {
-        let nearness = -1.0 / p.z;
-        [cx + p.x * focal * nearness, cy - p.y * focal * nearness, nearness]
-    };
-    let mut corners: Vec<(Vector, [f32; 3])> = Vec::new();
+    let lens = Lens::new(camera);
+    let mut corners: Vec<[f32; 4]> = Vec::new();
     for (number, part) in prepared.scenery.parts.iter().enumerate() {
         let camera_from_mesh = camera_from_world * placed.world_from_mesh[number];
-        if !in_view(prepared.bounds[number], camera_from_mesh, cx / focal, cy / focal) {
+        if !lens.sees(prepared.bounds[number], camera_from_mesh) {
             continue;
         }
-        let rotation = Matrix::from_quat(camera_from_mesh.rotation);
-        corners.clear();
-        corners.extend(part.mesh.vertices.iter().map(|vertex| {
-            let corner_m = rotation * vertex.position_m + camera_from_mesh.translation;
-            (corner_m, screen(corner_m))
-        }));
-        for (number, triangle) in (prepared.first[number]..).zip(&part.mesh.triangles) {
-            let corners = triangle.map(|corner| corners[corner as usize]);
-            let visible = corners.map(|(corner_m, _)| corner_m.z < -NEAR_M);
-            if visible == [true; 3] {
-                fill(simd, samples, centres, corners.map(|(_, on_screen)| on_screen), number);
-            } else if visible != [false; 3] {
-                let (clipped, count) = clip_near(corners.map(|(corner_m, _)| corner_m));
+        let camera_from_mesh = Affine::of(camera_from_mesh);
+        prepared.points[number].map_into(&mut corners, |block| {
+            let [x, y, z] = camera_from_mesh.map_lanes(block);
+            let nearness: Lanes = lanes(|i| -1.0 / z[i]);
+            let ([cx, cy], focal) = (lens.centre, lens.focal);
+            let column = lanes(|i| cx + x[i] * focal * nearness[i]);
+            let row = lanes(|i| cy - y[i] * focal * nearness[i]);
+            [column, row, nearness, z]
+        });
+        for (sheet, triangle) in prepared.sheets_of(number).iter().zip(&part.mesh.triangles) {
+            let corner = |i: usize| corners[triangle[i] as usize];
+            let ([au, av, an, az], [bu, bv, bn, bz], [cu, cv, cn, cz]) = (corner(0), corner(1), corner(2));
+            let visible = u32::from(az < -NEAR_M) + u32::from(bz < -NEAR_M) + u32::from(cz < -NEAR_M);
+            if visible == 3 {
+                fill(simd, samples, centres, [[au, av, an], [bu, bv, bn], [cu, cv, cn]], *sheet);
+            } else if visible > 0 {
+                let position = |corner: u32| part.mesh.vertices[corner as usize].position_m;
+                let (clipped, count) =
+                    clip_near(triangle.map(|corner| Vector::from(camera_from_mesh.map(position(corner)))));
                 for i in 1..count - 1 {
-                    fill(
-                        simd,
-                        samples,
-                        centres,
-                        [clipped[0], clipped[i], clipped[i + 1]].map(screen),
-                        number,
-                    );
+                    let corners = [clipped[0], clipped[i], clipped[i + 1]];
+                    fill(simd, samples, centres, corners.map(|p| lens.screen(p.to_array())), *sheet);
                 }
             }
         }
     }
 }
 
+/// How a camera's frame comes onto the picture's samples.
+struct Lens {
+    focal: f32,
+    centre: [f32; 2],
+}
+
+impl Lens {
+    fn new(camera: &Camera) -> Lens {
+        let [width, height] = [camera.width, camera.height].map(|pixels| (pixels as usize * SAMPLES) as f32);
+        Lens { focal: camera.focal_px() * SAMPLES as f32, centre: [width * 0.5, height * 0.5] }
+    }
+
+    /// Column, row and nearness.
+    #[inline(always)]
+    fn screen(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+        let nearness = -1.0 / z;
+        let [cx, cy] = self.centre;
+        [cx + x * self.focal * nearness, cy - y * self.focal * nearness, nearness]
+    }
+
+    /// Whether a mesh's bounding sphere reaches into the pyramid of view.
+    fn sees(&self, (centre, radius): (Vector, f32), camera_from_mesh: Pose) -> bool {
+        let c = camera_from_mesh * centre;
+        let inside = |across: f32, half: f32| {
+            let tan = half / self.focal;
+            across.abs() + c.z * tan <= radius * (1.0 + tan * tan).sqrt()
+        };
+        c.z - radius < -NEAR_M && inside(c.x, self.centre[0]) && inside(c.y, self.centre[1])
+    }
+}
+
 #[inline(always)]
-fn fill<S: Simd>(simd: S, samples: &mut Target, centres: &mut Target, corners: [[f32; 3]; 3], number: u32) {
+fn fill<S: Simd>(simd: S, samples: &mut Target, centres: &mut Target, corners: [[f32; 3]; 3], sheet: u32) {
     if let Some(outline) = Outline::new(corners) {
-        samples.fill(simd, &outline, number);
-        centres.fill(simd, &outline, number);
+        samples.fill(simd, &outline, sheet);
+        centres.fill(simd, &outline, sheet);
     }
 }
 
@@ -93,23 +121,23 @@ impl Target {
         self.nearness_1_m.row(row)
     }
 
-    /// Numbers of the triangles that a row shows.
-    pub(super) fn triangles(&self, row: usize) -> &[u32] {
-        self.triangle.row(row)
+    /// Numbers of the sheets that a row shows.
+    pub(super) fn sheets(&self, row: usize) -> &[u32] {
+        self.sheet.row(row)
     }
 
     fn reset(&mut self, grid: Grid) {
         self.grid = grid;
         self.nearness_1_m.reset(grid, 0.0);
-        self.triangle.reset(grid, NOTHING);
+        self.sheet.reset(grid, NOTHING);
     }
 
     /// Puts a triangle into those samples that it is the nearest of.
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, outline: &Outline, number: u32) {
+    fn fill<S: Simd>(&mut self, simd: S, outline: &Outline, sheet: u32) {
         let nearest = S::as_mut_simd_f32s(self.nearness_1_m.all_mut()).0;
-        let owner = S::as_mut_simd_u32s(self.triangle.all_mut()).0;
-        let number = simd.splat_u32s(number);
+        let owner = S::as_mut_simd_u32s(self.sheet.all_mut()).0;
+        let sheet = simd.splat_u32s(sheet);
         outline.draw(
             simd,
             self.grid,
@@ -117,17 +145,10 @@ impl Target {
             |i, nearness| {
                 let nearer = simd.greater_than_f32s(nearness, nearest[i]);
                 nearest[i] = simd.select_f32s(nearer, nearness, nearest[i]);
-                owner[i] = simd.select_u32s(nearer, number, owner[i]);
+                owner[i] = simd.select_u32s(nearer, sheet, owner[i]);
             },
         );
     }
-}
-
-/// Whether a mesh's bounding sphere reaches into the pyramid of view, given by the tangents of its half angles.
-fn in_view((centre, radius): (Vector, f32), camera_from_mesh: Pose, x_tan: f32, y_tan: f32) -> bool {
-    let c = camera_from_mesh * centre;
-    let inside = |across: f32, tan: f32| across.abs() + c.z * tan <= radius * (1.0 + tan * tan).sqrt();
-    c.z - radius < -NEAR_M && inside(c.x, x_tan) && inside(c.y, y_tan)
 }
 
 /// The part of a triangle beyond the near plane: three or four corners.

@@ -2,151 +2,117 @@
 
 use std::ops::Range;
 
-use rapier3d::math::Vector;
-
-use super::facets::{Facet, Facets};
-use super::shade::{Surface, Surfaces};
+use super::facets::Facet;
+use super::shade::{Rays, Strip, Surfaces};
 use super::shadow::ShadowMap;
 use super::srgb::SrgbTable;
 use super::target::Target;
-use crate::render::Camera;
 use crate::render::contact::ContactMap;
-use crate::render::light::{CONTACT, OUTLINE, OUTLINE_DEPTH_STEP, SAMPLES, SKY};
+use crate::render::light::{OUTLINE, OUTLINE_DEPTH_STEP, SAMPLES, SKY};
 use crate::render::prepared::{NOTHING, Prepared};
 
 const PER_PIXEL: usize = SAMPLES * SAMPLES;
 
 /// A filled target, ready to be shaded.
 pub(super) struct View<'a> {
-    prepared: &'a Prepared,
-    target: &'a Target,
-    shadow: &'a ShadowMap,
-    contact: &'a ContactMap,
-    eye_m: Vector,
-    /// Ray through the target's top left corner, and from one sample to the next, at a depth of 1 m in the world.
-    corner_ray: Vector,
-    right_ray: Vector,
-    down_ray: Vector,
+    pub prepared: &'a Prepared,
+    /// Of each sheet.
+    pub facets: &'a [Facet],
+    pub target: &'a Target,
+    pub shadow: &'a ShadowMap,
+    pub contact: &'a ContactMap,
+    pub rays: Rays,
 }
 
-/// A row of pixels under way.
-struct Row<'a> {
-    facets: &'a mut Facets,
+/// What is kept from picture to picture, so that it need not be made anew.
+pub(super) struct Row {
     surfaces: Surfaces,
-    /// For each surface, the pixel and how much it counts there.
-    shares: Vec<(usize, f32)>,
     /// For each column of samples, whether an edge is in it or to its right: some bits are set.
     edges: Vec<u32>,
     /// Linear colours of the pixels, as far as they are known.
-    sum_rgb: Vec<Vector>,
+    sum_rgb: Vec<[f32; 3]>,
 }
 
-impl<'a> View<'a> {
-    pub(super) fn new(
-        prepared: &'a Prepared,
-        target: &'a Target,
-        shadow: &'a ShadowMap,
-        contact: &'a ContactMap,
-        camera: &Camera,
-    ) -> View<'a> {
-        let rotation = camera.world_from_camera.rotation;
-        let sample = 1.0 / (camera.focal_px() * SAMPLES as f32);
-        View {
-            prepared,
-            target,
-            shadow,
-            contact,
-            eye_m: camera.world_from_camera.translation,
-            corner_ray: rotation * camera.unproject([0.0, 0.0], 1.0),
-            right_ray: rotation * Vector::X * sample,
-            down_ray: rotation * Vector::NEG_Y * sample,
-        }
-    }
-
+impl View<'_> {
     /// The picture, three bytes a pixel.
     #[inline(always)]
-    pub(super) fn rgb(&self, facets: &mut Facets, srgb: &SrgbTable) -> Vec<u8> {
+    pub(super) fn rgb(&self, row: &mut Row, srgb: &SrgbTable) -> Vec<u8> {
         let (width, height) = (self.target.width() / SAMPLES, self.target.height() / SAMPLES);
-        let mut rgb = Vec::with_capacity(width * height * 3);
-        let mut row = Row::new(facets);
-        for y in 0..height {
+        let mut rgb = vec![0; width * height * 3];
+        for (y, bytes) in rgb.chunks_exact_mut(width * 3).enumerate() {
             row.sum_rgb.clear();
-            row.sum_rgb.resize(width, Vector::ZERO);
-            self.row(y, &mut row);
-            rgb.extend(
-                row.sum_rgb.iter().flat_map(|colour| colour.to_array()).map(|linear| srgb.encode(linear)),
-            );
+            row.sum_rgb.resize(width, [0.0; 3]);
+            self.row(y, row);
+            srgb.encode(row.sum_rgb.as_flattened(), bytes);
         }
         rgb
     }
 
-    /// Colours of a row of pixels: means of their samples. A triangle that covers several of them is shaded once.
+    /// Colours of a row of pixels: means of their samples. A sheet that covers several of them is shaded once.
     #[inline(always)]
-    fn row(&self, y: usize, row: &mut Row<'_>) {
+    fn row(&self, y: usize, row: &mut Row) {
         let last = self.target.height() - 1;
         let rows: [&[u32]; SAMPLES + 1] =
-            std::array::from_fn(|i| self.target.triangles((y * SAMPLES + i).min(last)));
+            std::array::from_fn(|i| self.target.sheets((y * SAMPLES + i).min(last)));
         mark_edges(rows, &mut row.edges);
         let plain = |edges: &[u32], x: usize| edges[x * SAMPLES] | edges[x * SAMPLES + 1] == 0;
         let mut x = 0;
         while x < row.sum_rgb.len() {
-            row.make_room(self.shadow);
+            if row.surfaces.room() < PER_PIXEL {
+                row.surfaces.shade(self.shadow, &mut row.sum_rgb);
+            }
             if !plain(&row.edges, x) {
-                self.mixed(row, x, y, rows);
+                self.mixed(row, [x, y], rows);
                 x += 1;
                 continue;
             }
-            // Of one triangle as far as they are plain: an edge would be in the last of them.
+            // Of one sheet as far as they are plain: an edge would be in the last of them.
             let most = row.sum_rgb.len().min(x + row.surfaces.room());
             let end = (x + 1..most).find(|x| !plain(&row.edges, *x)).unwrap_or(most);
-            self.run(row, x..end, y, rows[0][x * SAMPLES]);
+            self.show(row, x..end, [x * SAMPLES, y * SAMPLES], rows[0][x * SAMPLES], 1.0);
             x = end;
         }
-        row.flush(self.shadow);
+        row.surfaces.shade(self.shadow, &mut row.sum_rgb);
     }
 
-    /// Neighbouring pixels that one triangle covers.
+    /// Neighbouring pixels that one sheet covers, or a share of them, seen where the first one's `sample` is.
     #[inline(always)]
-    fn run(&self, row: &mut Row<'_>, pixels: Range<usize>, y: usize, triangle: u32) {
-        if triangle == NOTHING {
-            row.sum_rgb[pixels].fill(SKY);
+    fn show(&self, row: &mut Row, pixels: Range<usize>, sample: [usize; 2], sheet: u32, share: f32) {
+        if sheet == NOTHING {
+            for sum in &mut row.sum_rgb[pixels] {
+                *sum = [sum[0] + SKY.x * share, sum[1] + SKY.y * share, sum[2] + SKY.z * share];
+            }
             return;
         }
-        let facet = *row.facets.get(self.prepared, triangle);
-        let nearness_1_m = self.target.nearness_1_m(y * SAMPLES);
-        for x in pixels {
-            let surface =
-                self.surface(row.facets, &facet, [x * SAMPLES, y * SAMPLES], nearness_1_m[x * SAMPLES]);
-            row.push(surface, x, 1.0);
-        }
+        let strip = Strip {
+            facet: &self.facets[sheet as usize],
+            sample,
+            nearness_1_m: &self.target.nearness_1_m(sample[1])[sample[0]..],
+            first_pixel: pixels.start,
+            count: pixels.len(),
+            share,
+        };
+        row.surfaces.push(&self.rays, self.contact, &strip);
     }
 
     /// A pixel with an edge in or beside it, `rows` being those of its samples and the one below.
     #[inline(always)]
-    fn mixed(&self, row: &mut Row<'_>, x: usize, y: usize, rows: [&[u32]; SAMPLES + 1]) {
+    fn mixed(&self, row: &mut Row, [x, y]: [usize; 2], rows: [&[u32]; SAMPLES + 1]) {
         let sx = x * SAMPLES;
         let at = |i: usize| [sx + i % SAMPLES, y * SAMPLES + i / SAMPLES];
-        let triangles: [u32; PER_PIXEL] = std::array::from_fn(|i| rows[i / SAMPLES][sx + i % SAMPLES]);
+        let sheets = [rows[0][sx], rows[0][sx + 1], rows[1][sx], rows[1][sx + 1]];
         let last = (sx + SAMPLES).min(self.target.width() - 1);
-        let share = if self.one_thing(rows.map(|row| &row[sx..=last])) {
+        let share = if self.one_thing([&rows[0][sx..=last], &rows[1][sx..=last], &rows[2][sx..=last]]) {
             1.0
         } else {
-            let edges: u32 = (0..PER_PIXEL).map(|i| self.outlines(at(i))).sum();
+            let edges =
+                self.outlines(at(0)) + self.outlines(at(1)) + self.outlines(at(2)) + self.outlines(at(3));
             1.0 - OUTLINE * (edges as f32 / (2 * SAMPLES) as f32).min(1.0)
         };
-        for (i, triangle) in triangles.iter().enumerate() {
-            if !triangles[..i].contains(triangle) {
-                let covered = triangles[i..].iter().filter(|other| *other == triangle).count();
-                let share = share * covered as f32 / PER_PIXEL as f32;
-                match *triangle {
-                    NOTHING => row.sum_rgb[x] += SKY * share,
-                    triangle => {
-                        let (_, nearness_1_m) = self.sample(at(i));
-                        let facet = *row.facets.get(self.prepared, triangle);
-                        let surface = self.surface(row.facets, &facet, at(i), nearness_1_m);
-                        row.push(surface, x, share);
-                    }
-                }
+        for (i, sheet) in sheets.iter().enumerate() {
+            if !sheets[..i].contains(sheet) {
+                let covered = sheets[i..].iter().filter(|other| *other == sheet).count();
+                self.show(row, x..x + 1, at(i), *sheet, share * covered as f32 / PER_PIXEL as f32);
             }
         }
     }
@@ -156,7 +122,8 @@ impl<'a> View<'a> {
     fn one_thing(&self, rows: [&[u32]; SAMPLES + 1]) -> bool {
         let first = rows[0][0];
         let id = self.prepared.id(first);
-        rows.iter().all(|row| row.iter().all(|other| *other == first || self.prepared.id(*other) == id))
+        let same = |other: &u32| *other == first || self.prepared.id(*other) == id;
+        rows[0].iter().all(same) && rows[1].iter().all(same) && rows[2].iter().all(same)
     }
 
     /// How many of the neighbours to the right and below belong to another thing at another depth.
@@ -170,10 +137,10 @@ impl<'a> View<'a> {
             + u32::from(self.differ(here, self.sample([sx, sy + 1])))
     }
 
-    /// Triangle and nearness that a sample shows.
+    /// Sheet and nearness that a sample shows.
     #[inline(always)]
     fn sample(&self, [sx, sy]: [usize; 2]) -> (u32, f32) {
-        (self.target.triangles(sy)[sx], self.target.nearness_1_m(sy)[sx])
+        (self.target.sheets(sy)[sx], self.target.nearness_1_m(sy)[sx])
     }
 
     /// Whether two samples show different things at different depths.
@@ -185,59 +152,25 @@ impl<'a> View<'a> {
             && (near_a - near_b).abs() > OUTLINE_DEPTH_STEP * near_a.max(near_b)
             && self.prepared.id(a) != self.prepared.id(b)
     }
+}
 
-    /// Where the ray of a sample meets a triangle.
-    #[inline(always)]
-    fn surface(&self, facets: &Facets, facet: &Facet, [sx, sy]: [usize; 2], nearness_1_m: f32) -> Surface {
-        let ray = self.corner_ray + self.right_ray * (sx as f32 + 0.5) + self.down_ray * (sy as f32 + 0.5);
-        let point_m = self.eye_m + ray * (1.0 / nearness_1_m);
-        let albedo = facets.albedo(self.prepared, facet, point_m);
-        let open_share = if facet.carries { 1.0 - CONTACT * self.contact.darkness(point_m) } else { 1.0 };
-        Surface { point_m, ray, normal: facet.normal(point_m), albedo, open_share }
+impl Default for Row {
+    fn default() -> Row {
+        Row { surfaces: Surfaces::new(), edges: Vec::new(), sum_rgb: Vec::new() }
     }
 }
 
-impl Row<'_> {
-    fn new(facets: &mut Facets) -> Row<'_> {
-        Row { facets, surfaces: Surfaces::new(), shares: Vec::new(), edges: Vec::new(), sum_rgb: Vec::new() }
-    }
-
-    #[inline(always)]
-    fn push(&mut self, surface: Surface, pixel: usize, share: f32) {
-        self.surfaces.push(surface);
-        self.shares.push((pixel, share));
-    }
-
-    /// Shades the surfaces that have come together if another pixel's may be too many.
-    #[inline(always)]
-    fn make_room(&mut self, shadow: &ShadowMap) {
-        if self.surfaces.room() < PER_PIXEL {
-            self.flush(shadow);
-        }
-    }
-
-    /// Shades the surfaces that have come together.
-    #[inline(always)]
-    fn flush(&mut self, shadow: &ShadowMap) {
-        for ((pixel, share), colour) in self.shares.drain(..).zip(self.surfaces.shade(shadow)) {
-            self.sum_rgb[pixel] += colour * share;
-        }
-    }
-}
-
-/// Finds the columns in which samples show another triangle than the one below or to the right.
+/// Finds the columns in which samples show another sheet than the one below or to the right.
 #[inline(always)]
-fn mark_edges(rows: [&[u32]; SAMPLES + 1], edges: &mut Vec<u32>) {
-    let [top, middle, bottom] = rows;
-    let count = top.len() - 1;
-    let differ = |row: &[u32], i: usize| row[i] ^ row[i + 1];
-    edges.clear();
-    edges.extend((0..count).map(|i| {
-        differ(&top[..=count], i)
-            | differ(&middle[..=count], i)
-            | differ(&bottom[..=count], i)
-            | (top[i] ^ middle[i])
-            | (middle[i] ^ bottom[i])
-    }));
-    edges.push((top[count] ^ middle[count]) | (middle[count] ^ bottom[count]));
+fn mark_edges([top, middle, bottom]: [&[u32]; SAMPLES + 1], edges: &mut Vec<u32>) {
+    edges.resize(top.len(), 0);
+    let down = top.iter().zip(middle).zip(bottom);
+    for (edge, ((top, middle), bottom)) in edges.iter_mut().zip(down) {
+        *edge = (top ^ middle) | (middle ^ bottom);
+    }
+    for row in [top, middle, bottom] {
+        for (edge, (here, right)) in edges.iter_mut().zip(row.iter().zip(&row[1..])) {
+            *edge |= here ^ right;
+        }
+    }
 }

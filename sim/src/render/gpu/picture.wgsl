@@ -137,7 +137,8 @@ fn sunlit(point_m: vec3f, normal: vec3f) -> f32 {
             sum += select(0.0, across * down, nearness_m >= occluder_m);
         }
     }
-    return sum / 9.0;
+    let border = min(texel, TEXELS - 1.0 - texel);
+    return 1.0 - (1.0 - sum / 9.0) * min(min(border.x, border.y) / FADE_TEXELS, 1.0);
 }
 
 // How dark contacts make a point of what carries things.
@@ -186,6 +187,11 @@ fn second_share(part: Part, point_m: vec3f) -> f32 {
         let across = p.y + p.z;
         let band = wave(across * BANDS_PER_M + STRAY * wave(p.x * 1.1 + across));
         return 0.7 * band * band + 0.3 * wave(across * LINES_PER_M + p.x);
+    }
+    if part.rgb.w == 4.0 {
+        let line = p.z * TEXT_PER_M;
+        let word = wave((p.x + p.y) * WORDS_PER_M + WORD_STRAY * floor(line));
+        return select(0.0, 1.0, wave(line) > TEXT_GAP && word > WORD_GAP);
     }
     let thread = p * THREADS_PER_M;
     return wave(thread.x + thread.z) * wave(thread.y + thread.z);

@@ -6,9 +6,10 @@ use wgpu::{BindGroup, Buffer, BufferUsages};
 
 use super::device::Gpu;
 use super::targets::bind;
+use crate::render::bend::Bend;
 use crate::render::contact::ContactMap;
 use crate::render::light::{CONTACT_TEXELS, SAMPLES, sun_map};
-use crate::render::prepared::{Face, Prepared};
+use crate::render::prepared::Prepared;
 use crate::render::{Camera, Carrier, Part, Pattern, Placed};
 
 /// Of `picture.wgsl`'s `View`, and of its `Part`.
@@ -30,7 +31,9 @@ impl Scene {
         let parts = prepared.scenery.parts.iter();
         let corners: Vec<[u32; 4]> =
             parts.zip(0..).flat_map(|(part, number)| part_corners(part, number)).collect();
-        let faces: Vec<[u32; 16]> = prepared.faces.iter().map(face).collect();
+        let bends = prepared.sheet_of.iter().map(|sheet| prepared.sheets[*sheet as usize].bend);
+        let firsts = corners.iter().step_by(3);
+        let faces: Vec<[u32; 16]> = bends.zip(firsts).map(|(bend, corner)| face(bend, *corner)).collect();
         let initialised = |numbers: &[u32], usage: BufferUsages| {
             // A buffer must not be empty.
             let contents = bytes(if numbers.is_empty() { &[0; 64] } else { numbers });
@@ -71,7 +74,7 @@ impl Scene {
         let (width, height) = (camera.width as f32, camera.height as f32);
         let direction = |axis: Vector| [axis.x, axis.y, axis.z, 0.0];
         let map = sun_map(placed.focus_m, prepared.scenery.focus_radius_m);
-        let [column, row, nearness] = map.map(|(axis, constant)| [axis.x, axis.y, axis.z, constant]);
+        let [column, row, nearness] = map.0.map(|(axis, constant)| [axis.x, axis.y, axis.z, constant]);
         let [x_m, y_m] = contact.corner_m;
         let numbers: [[f32; 4]; VIEW_NUMBERS / 4] = [
             direction(rotation * Vector::X),
@@ -99,11 +102,14 @@ fn part_corners(part: &Part, number: u32) -> impl Iterator<Item = [u32; 4]> {
     })
 }
 
-fn face(face: &Face) -> [u32; 16] {
-    let bend = face.bend_1_m.unwrap_or(Matrix::ZERO);
+/// The normal at a triangle's first corner, and how it changes from there.
+fn face(bend: Bend, [x, y, z, _]: [u32; 4]) -> [u32; 16] {
+    let slope_1_m = bend.slope_1_m.unwrap_or(Matrix::ZERO);
+    let corner_m = Vector::from([x, y, z].map(f32::from_bits));
+    let [x, y, z] = [slope_1_m.x_axis, slope_1_m.y_axis, slope_1_m.z_axis];
     let mut numbers = [0; 16];
     for (four, vector) in
-        numbers.as_chunks_mut::<4>().0.iter_mut().zip([face.normal, bend.x_axis, bend.y_axis, bend.z_axis])
+        numbers.as_chunks_mut::<4>().0.iter_mut().zip([bend.normal + slope_1_m * corner_m, x, y, z])
     {
         *four = [vector.x.to_bits(), vector.y.to_bits(), vector.z.to_bits(), 0];
     }
@@ -118,6 +124,7 @@ fn placed_part(part: &Part, pose: Pose, [first, second]: [Vector; 2], grain: usi
         Pattern::Checker(_) => 1.0,
         Pattern::Wood => 2.0,
         Pattern::Fabric => 3.0,
+        Pattern::Print => 4.0,
     };
     let rows = [
         [x.x, x.y, x.z, t.x],

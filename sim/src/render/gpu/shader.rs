@@ -5,10 +5,13 @@ use rapier3d::math::Vector;
 use crate::render::camera::NEAR_M;
 use crate::render::contact::SINK_M;
 use crate::render::light::{
-    BIAS_M, CONTACT, CONTACT_TEXELS, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, NORMAL_OFFSET_M, OUTLINE,
-    OUTLINE_DEPTH_STEP, SKY, SRGB_STEPS, SUN, SUN_DISTANCE_M, TEXELS, TO_SUN,
+    BIAS_M, CONTACT, CONTACT_TEXELS, FADE_TEXELS, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, NORMAL_OFFSET_M,
+    OUTLINE, OUTLINE_DEPTH_STEP, SKY, SRGB_STEPS, SUN, SUN_DISTANCE_M, TEXELS, TO_SUN,
 };
-use crate::render::pattern::{BANDS_PER_M, CHECKER_PER_M, LINES_PER_M, STRAY, THREADS_PER_M};
+use crate::render::pattern::{
+    BANDS_PER_M, CHECKER_PER_M, LINES_PER_M, STRAY, TEXT_GAP, TEXT_PER_M, THREADS_PER_M, WORD_GAP,
+    WORD_STRAY, WORDS_PER_M,
+};
 use crate::render::prepared::NOTHING;
 
 pub(super) fn text() -> String {
@@ -26,6 +29,12 @@ pub(super) fn text() -> String {
         ("LINES_PER_M", LINES_PER_M),
         ("STRAY", STRAY),
         ("THREADS_PER_M", THREADS_PER_M),
+        ("TEXT_PER_M", TEXT_PER_M),
+        ("TEXT_GAP", TEXT_GAP),
+        ("WORDS_PER_M", WORDS_PER_M),
+        ("WORD_GAP", WORD_GAP),
+        ("WORD_STRAY", WORD_STRAY),
+        ("FADE_TEXELS", FADE_TEXELS),
         ("OUTLINE", OUTLINE),
         ("OUTLINE_DEPTH_STEP", OUTLINE_DEPTH_STEP),
         ("SRGB_STEPS", SRGB_STEPS as f32),

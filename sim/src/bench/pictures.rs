@@ -1,0 +1,107 @@
+//! How long pictures take: those of both robots' eyes in one state of Handover's kitchen, and that of the camera in the room.
+
+use std::f32::consts::PI;
+use std::time::{Duration, Instant};
+
+use rapier3d::math::{Pose, Vector};
+use serde::Serialize;
+
+use super::spread::Spread;
+use crate::render::{Camera, Cameras, RendererKind, Scenery};
+use crate::{ObjectPlacement, RobotPlacement, SimError, Step, World, WorldSpec};
+
+/// Times of all sets of pictures.
+#[derive(Clone, Debug, Serialize)]
+pub struct PicturesReport {
+    /// Who drew, and on what device.
+    pub renderer: String,
+    pub cases: Vec<PicturesCase>,
+}
+
+/// Pictures of one state, colour, depth and ids.
+#[derive(Clone, Debug, Serialize)]
+pub struct PicturesCase {
+    pub name: &'static str,
+    pub pictures: usize,
+    pub width: u32,
+    pub height: u32,
+    /// Processor time of the thread that asks for them; where the system does not tell, as `wall_ms`.
+    pub busy_ms: Spread,
+    pub wall_ms: Spread,
+}
+
+/// Each gives a time; processor time is counted in ticks of some milliseconds, so that many states go into one.
+const BATCHES: usize = 9;
+const STATES: usize = 10;
+/// Time that this thread has been running, in nanoseconds, is the first word of this file of Linux.
+const BUSY: &str = "/proc/thread-self/schedstat";
+
+/// Times both sets; `done` hears of each as it ends.
+pub fn pictures(kind: RendererKind, mut done: impl FnMut(&PicturesCase)) -> Result<PicturesReport, SimError> {
+    let world = World::new(&kitchen())?;
+    let cameras = Cameras::of(&world);
+    let renderer = kind.renderer(Scenery::of(&world)).name().to_owned();
+    let eyes = |step: &Step| (0..2).map(|robot| cameras.egocentric(step, robot)).collect();
+    let room = |_: &Step| vec![cameras.third_person()];
+    let mut cases = Vec::new();
+    for (name, views) in [("eyes of both", &eyes as &dyn Fn(&Step) -> Vec<Camera>), ("third person", &room)] {
+        let case = measure(kind, name, views)?;
+        done(&case);
+        cases.push(case);
+    }
+    Ok(PicturesReport { renderer, cases })
+}
+
+fn measure(
+    kind: RendererKind,
+    name: &'static str,
+    views: &dyn Fn(&Step) -> Vec<Camera>,
+) -> Result<PicturesCase, SimError> {
+    let mut world = World::new(&kitchen())?;
+    let commands = [world.rest_command(0), world.rest_command(1)];
+    let mut renderer = kind.renderer(Scenery::of(&world));
+    let (mut busy_ms, mut wall_ms) = (Vec::new(), Vec::new());
+    // The first batch warms up.
+    for _ in 0..=BATCHES {
+        let (mut busy, mut wall) = (Duration::ZERO, Duration::ZERO);
+        for _ in 0..STATES {
+            let step = world.control_step(&commands)?;
+            let (cameras, started) = (views(&step), Instant::now());
+            let before = busy_since(started);
+            cameras.iter().for_each(|camera| drop(renderer.render(&step, camera)));
+            busy += busy_since(started) - before;
+            wall += started.elapsed();
+        }
+        let each_ms = |whole: Duration| whole.as_secs_f64() * 1e3 / STATES as f64;
+        busy_ms.push(each_ms(busy));
+        wall_ms.push(each_ms(wall));
+    }
+    let cameras = views(&world.present());
+    let Camera { width, height, .. } = cameras[0];
+    let [busy_ms, wall_ms] = [busy_ms, wall_ms].map(|mut all| Spread::of(&mut all[1..]));
+    Ok(PicturesCase { name, pictures: cameras.len(), width, height, busy_ms, wall_ms })
+}
+
+/// Processor time of this thread, or the time since `started`.
+fn busy_since(started: Instant) -> Duration {
+    let text = std::fs::read_to_string(BUSY).unwrap_or_default();
+    let ns = text.split_whitespace().next().and_then(|word| word.parse().ok());
+    ns.map_or_else(|| started.elapsed(), Duration::from_nanos)
+}
+
+fn kitchen() -> WorldSpec {
+    let robot = |name: &str, position_m: [f32; 2], yaw_rad: f32| RobotPlacement {
+        name: name.into(),
+        position_m,
+        yaw_rad,
+    };
+    WorldSpec {
+        scene: "kitchen_084".into(),
+        robots: vec![robot("A", [0.0, 0.0], 0.0), robot("B", [0.74, -0.12], PI)],
+        objects: vec![ObjectPlacement {
+            name: "bottle".into(),
+            file: "bottle".into(),
+            world_from_object: Pose::from_translation(Vector::new(0.30, -0.07, 0.80)),
+        }],
+    }
+}
