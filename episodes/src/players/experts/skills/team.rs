@@ -4,20 +4,22 @@
 use tandem_sim::{Pose, Sides, Vector};
 
 use super::bar::{BarGrasp, move_together};
-use super::course::{Course, Posture, follow};
+use super::course::{Course, FREE, Posture, follow};
 use super::ground::upright;
 use super::stage::Stage;
-use super::walk::{Way, walk_to};
+use super::walk::{Way, Within, come_near};
 use crate::players::PlayerError;
+use crate::scoring::Facts;
 
 /// How far behind a bar in its hands a robot stands.
 const BEHIND_BAR_M: f32 = 0.29;
-/// Towards their places, before anything is held.
+/// Towards their places, before anything is held. Hands that reach out correct the rest.
 const APPROACH_M_S: f32 = 0.3;
+const NEAR: Within = Within { m: 0.03, rad: 0.05 };
 /// What two robots that walk with a load need.
 const COMPLIANCE_N_S_M: f64 = 250.0;
 /// Robots still correct their places for so long once the object has arrived.
-const HOLD_S: f32 = 1.4;
+const HOLD_S: f32 = 0.7;
 /// An object that is set down is pressed on the floor by so much.
 const PRESS_M: f32 = 0.004;
 
@@ -26,6 +28,8 @@ pub struct Path<'a> {
     pub at: &'a dyn Fn(f32) -> Pose,
     pub length_m: f32,
     pub pace_m_s: f32,
+    /// How much of it may have been gone by now.
+    pub free_m: &'a dyn Fn(&Facts) -> f32,
 }
 
 /// Robots and their grasps of one object.
@@ -66,7 +70,7 @@ impl<'a> Team<'a> {
     /// Robots walk to where they stand beside the object as it is now.
     pub fn gather(&self, stage: &mut Stage) -> Result<(), PlayerError> {
         let ways = self.ways(stage)?;
-        walk_to(stage, &ways)
+        come_near(stage, &ways, NEAR)
     }
 
     /// The ways to where the robots stand beside the object as it is now.
@@ -96,26 +100,37 @@ impl<'a> Team<'a> {
         let start = self.object(stage)?;
         let raised =
             |share: f32| Pose::from_parts(start.translation + Vector::Z * by_m * share, start.rotation);
-        move_together(stage, self.grasps, &raised, 5, 0.25)?;
-        move_together(stage, self.grasps, &|_| raised(1.0), 1, 0.3)?;
+        move_together(stage, self.grasps, &raised, 5, 0.2)?;
+        move_together(stage, self.grasps, &|_| raised(1.0), 1, 0.2)?;
         self.measure(stage)
     }
 
     /// Takes the held object along a path, at the end of which it stays for a moment.
     pub fn carry(&self, stage: &mut Stage, path: &Path) -> Result<(), PlayerError> {
         let postures = |gone_m: f32| self.postures(&(path.at)(gone_m));
-        stage.set_compliance(self.compliance_n_s_m());
+        self.give_way(stage, true);
         let Path { length_m, pace_m_s, .. } = *path;
-        follow(stage, &Course { at: &postures, length_m, pace_m_s, hold_s: HOLD_S })
+        follow(stage, &Course { at: &postures, length_m, pace_m_s, hold_s: HOLD_S, free_m: path.free_m })
     }
 
     /// Takes the held object straight over a place, as high as it is.
     pub fn carry_to(&self, stage: &mut Stage, place: &Pose, pace_m_s: f32) -> Result<(), PlayerError> {
+        self.carry_where_free(stage, place, pace_m_s, &FREE)
+    }
+
+    /// As [`Team::carry_to`], no farther than is free by now.
+    pub fn carry_where_free(
+        &self,
+        stage: &mut Stage,
+        place: &Pose,
+        pace_m_s: f32,
+        free_m: &dyn Fn(&Facts) -> f32,
+    ) -> Result<(), PlayerError> {
         let from = upright(&self.object(stage)?);
         let over = Pose::from_parts(place.translation.with_z(from.translation.z), place.rotation);
         let length_m = (over.translation - from.translation).length();
         let at = |gone_m: f32| from.lerp(&over, gone_m / length_m);
-        self.carry(stage, &Path { at: &at, length_m, pace_m_s })
+        self.carry(stage, &Path { at: &at, length_m, pace_m_s, free_m })
     }
 
     /// How the robots stand and hold the object where it is to be.
@@ -134,15 +149,18 @@ impl<'a> Team<'a> {
         let from = self.object(stage)?;
         let over = Pose::from_parts(place.translation.with_z(from.translation.z), place.rotation);
         let down = Pose::from_parts(place.translation - Vector::Z * PRESS_M, place.rotation);
-        stage.set_compliance(None);
-        move_together(stage, self.grasps, &|share| from.lerp(&over, share), 4, 0.25)?;
-        move_together(stage, self.grasps, &|share| over.lerp(&down, share), 5, 0.28)?;
-        stage.set_compliance(self.compliance_n_s_m());
+        self.give_way(stage, false);
+        move_together(stage, self.grasps, &|share| from.lerp(&over, share), 4, 0.15)?;
+        move_together(stage, self.grasps, &|share| over.lerp(&down, share), 5, 0.22)?;
+        self.give_way(stage, true);
         Ok(())
     }
 
-    /// One who has no partner gives way to nobody.
-    fn compliance_n_s_m(&self) -> Option<f64> {
-        (self.robots.len() > 1).then_some(COMPLIANCE_N_S_M)
+    /// Whether hands give way to partners from now on. One who has no partner gives way to nobody.
+    fn give_way(&self, stage: &mut Stage, give_way: bool) {
+        let compliance_n_s_m = (give_way && self.robots.len() > 1).then_some(COMPLIANCE_N_S_M);
+        for robot in &self.robots {
+            stage.set_compliance(*robot, compliance_n_s_m);
+        }
     }
 }
