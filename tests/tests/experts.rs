@@ -19,6 +19,7 @@ fn solve(protocol: Protocol, tasks: Vec<&'static Task>) {
     let plan = Plan {
         player: players::find("expert").expect("a player"),
         protocol,
+        scene: None,
         robot: RobotFile::default(),
         locomotion: Controller::Balance,
         disclosure: Disclosure::Live,

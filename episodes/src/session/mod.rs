@@ -10,6 +10,7 @@ mod replay;
 mod replies;
 mod run_files;
 mod status;
+mod venue;
 
 pub(crate) use build::build;
 pub use checkpoint::Checkpoint;

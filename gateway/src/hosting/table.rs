@@ -46,6 +46,7 @@ impl EpisodeTable {
     pub async fn start(&self, args: StartEpisode) -> Result<StartReply, HostingError> {
         let protocol = args.protocol.unwrap_or(Protocol::Agentic);
         let spec = EpisodeSpec {
+            scene: self.settings.scene.clone(),
             locomotion: self.settings.locomotion.clone(),
             renderer: self.settings.renderer,
             disclosure: self.settings.disclosure,
