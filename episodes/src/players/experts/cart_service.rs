@@ -17,6 +17,8 @@ const WALK_M_S: f32 = 0.35;
 /// B takes a trolley that has been this near to the mark, once it is slower than this.
 const CAME_M: f32 = 0.3;
 const STANDS_M_S: f32 = 0.03;
+/// For so many commands A waits for that, too.
+const MOST_STOPPING_BEATS: u32 = 20;
 /// With the bottle in hand.
 const CARRY_M_S: f32 = 0.25;
 /// Where a robot has what its right hand takes: ahead of the pelvis, and to the right.
@@ -46,6 +48,13 @@ fn park(stage: &mut Stage) -> Result<(), PlayerError> {
     team.measure(stage)?;
     let mark = stage.facts()?.object("parking_mark").pose_in_world;
     team.carry_to(stage, &mark, PUSH_M_S)?;
+    // What is let go of while it rolls rolls on.
+    for _ in 0..MOST_STOPPING_BEATS {
+        if stage.facts()?.speed_m_s("service_trolley") < STANDS_M_S {
+            break;
+        }
+        stage.hold(A)?;
+    }
     let_go(stage, &grasps)
 }
 

@@ -37,13 +37,36 @@ pub struct Course<'a> {
     pub hold_s: f32,
 }
 
+/// How far a course was followed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Followed {
+    ToItsEnd,
+    /// Something went wrong here.
+    UpTo {
+        gone_m: f32,
+    },
+}
+
 /// Goes along a course from its beginning to its end, from rest to rest.
 pub fn follow(stage: &mut Stage, course: &Course) -> Result<(), PlayerError> {
+    follow_while(stage, course, 0.0, &mut |_| true).map(drop)
+}
+
+/// As [`follow`], from where `gone_m` of it have been gone, and for as long as all is `well`.
+pub fn follow_while(
+    stage: &mut Stage,
+    course: &Course,
+    mut gone_m: f32,
+    well: &mut dyn FnMut(&Facts) -> bool,
+) -> Result<Followed, PlayerError> {
     let dt_s = WALK_STEPS as f32 * CONTROL_DT_S;
-    let (mut gone_m, mut pace_m_s, mut held_s) = (0.0f32, 0.0f32, 0.0f32);
+    let (mut pace_m_s, mut held_s) = (0.0f32, 0.0f32);
     while held_s < course.hold_s {
         let left_m = course.length_m - gone_m;
         let facts = stage.facts()?;
+        if !well(&facts) {
+            return Ok(Followed::UpTo { gone_m });
+        }
         let free_m = (course.free_m)(&facts) - gone_m;
         if left_m > AT_END_M && free_m < AT_END_M {
             pace_m_s = 0.0;
@@ -73,5 +96,5 @@ pub fn follow(stage: &mut Stage, course: &Course) -> Result<(), PlayerError> {
         let moves: Vec<RobotMove> = now.iter().zip(&next).map(step).collect();
         stage.advance(WALK_STEPS, &moves)?;
     }
-    Ok(())
+    Ok(Followed::ToItsEnd)
 }

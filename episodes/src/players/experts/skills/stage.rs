@@ -59,6 +59,11 @@ impl HandMove {
         HandMove { robot, side, world_from_wrist: None, fingers_rad: Some(fingers_rad) }
     }
 
+    /// As it was told last.
+    pub fn still(robot: usize, side: Side) -> HandMove {
+        HandMove { robot, side, world_from_wrist: None, fingers_rad: None }
+    }
+
     pub fn shaped(self, fingers_rad: [f32; 7]) -> HandMove {
         HandMove { fingers_rad: Some(fingers_rad), ..self }
     }

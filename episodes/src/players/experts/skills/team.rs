@@ -4,12 +4,13 @@
 use tandem_sim::{Pose, Sides, Vector};
 
 use super::bar::{BarGrasp, move_together};
-use super::course::{Course, FREE, Posture, follow};
+use super::course::{Course, FREE, Followed, Posture, follow_while};
 use super::ground::upright;
-use super::stage::Stage;
+use super::soft::take_softly;
+use super::stage::{HandMove, Stage};
 use super::walk::{Way, Within, come_near};
 use crate::players::PlayerError;
-use crate::scoring::Facts;
+use crate::scoring::{Facts, Grip};
 
 /// How far behind a bar in its hands a robot stands.
 const BEHIND_BAR_M: f32 = 0.29;
@@ -20,6 +21,10 @@ const NEAR: Within = Within { m: 0.03, rad: 0.05 };
 const COMPLIANCE_N_S_M: f64 = 250.0;
 /// Robots still correct their places for so long once the object has arrived.
 const HOLD_S: f32 = 0.7;
+/// A hand has lost what it does not touch for so many commands; the robots then stop for a moment, and take it again no more often.
+const LOST_BEATS: u32 = 5;
+const STOP_S: f32 = 0.6;
+const CARRIES: u32 = 4;
 /// An object that is set down is pressed on the floor by so much.
 const PRESS_M: f32 = 0.004;
 
@@ -105,22 +110,56 @@ impl<'a> Team<'a> {
         self.measure(stage)
     }
 
-    /// Takes the held object along a path, at the end of which it stays for a moment.
-    pub fn carry(&self, stage: &mut Stage, path: &Path) -> Result<(), PlayerError> {
-        let postures = |gone_m: f32| self.postures(&(path.at)(gone_m));
-        self.give_way(stage, true);
-        let Path { length_m, pace_m_s, .. } = *path;
-        follow(stage, &Course { at: &postures, length_m, pace_m_s, hold_s: HOLD_S, free_m: path.free_m })
+    /// Takes the held object along a path, at the end of which it stays for a moment. Hands that lose it on the way take it again.
+    pub fn carry(&mut self, stage: &mut Stage, path: &Path) -> Result<(), PlayerError> {
+        let Path { length_m, pace_m_s, free_m, .. } = *path;
+        let mut from_m = 0.0;
+        for _ in 0..CARRIES {
+            self.give_way(stage, true);
+            let at = |gone_m: f32| self.postures(&(path.at)(gone_m));
+            let course = Course { at: &at, length_m, pace_m_s, hold_s: HOLD_S, free_m };
+            let mut off_beats = 0;
+            let mut well = |facts: &Facts| {
+                off_beats = if self.hands_off(facts).next().is_some() { off_beats + 1 } else { 0 };
+                off_beats < LOST_BEATS
+            };
+            match follow_while(stage, &course, from_m, &mut well)? {
+                Followed::ToItsEnd => return Ok(()),
+                Followed::UpTo { gone_m } => from_m = gone_m,
+            }
+            self.take_again(stage, &(path.at)(from_m))?;
+        }
+        Err(PlayerError::GaveUp("hands lost the load again and again".into()))
+    }
+
+    /// Grasps whose hands do not even touch the object.
+    fn hands_off(&self, facts: &Facts) -> impl Iterator<Item = BarGrasp<'a>> {
+        let off = |grasp: &BarGrasp| facts.object(grasp.object).hands[grasp.robot][grasp.side] == Grip::Off;
+        self.grasps.iter().copied().filter(off).collect::<Vec<_>>().into_iter()
+    }
+
+    /// The robots stand, the hands that have lost the object take it where it is now, and all bring it back to its way.
+    fn take_again(&mut self, stage: &mut Stage, on_its_way: &Pose) -> Result<(), PlayerError> {
+        let still: Vec<HandMove> =
+            self.grasps.iter().map(|grasp| HandMove::still(grasp.robot, grasp.side)).collect();
+        stage.perform(STOP_S, &still)?;
+        let lost: Vec<BarGrasp> = self.hands_off(&stage.facts()?).collect();
+        if !lost.is_empty() {
+            take_softly(stage, &lost)?;
+        }
+        let now = self.object(stage)?;
+        move_together(stage, self.grasps, &|share| now.lerp(on_its_way, share), 4, 0.2)?;
+        self.measure(stage)
     }
 
     /// Takes the held object straight over a place, as high as it is.
-    pub fn carry_to(&self, stage: &mut Stage, place: &Pose, pace_m_s: f32) -> Result<(), PlayerError> {
+    pub fn carry_to(&mut self, stage: &mut Stage, place: &Pose, pace_m_s: f32) -> Result<(), PlayerError> {
         self.carry_where_free(stage, place, pace_m_s, &FREE)
     }
 
     /// As [`Team::carry_to`], no farther than is free by now.
     pub fn carry_where_free(
-        &self,
+        &mut self,
         stage: &mut Stage,
         place: &Pose,
         pace_m_s: f32,
