@@ -89,22 +89,10 @@ impl Geom {
             }
         };
         let material = geom.material.as_ref().and_then(|name| document.model.assets.material(name));
-        let texture = material.and_then(|material| document.texture_rgb.get(material.texture.as_ref()?));
-        let rgba = match (geom.rgba.or(material.and_then(|m| m.rgba)), texture) {
-            (Some([r, g, b, a]), Some(rgb)) => {
-                let [x, y, z] = rgb.map(f64::from);
-                [r * x, g * y, b * z, a]
-            }
-            (None, Some(rgb)) => {
-                let [r, g, b] = rgb.map(f64::from);
-                [r, g, b, 1.0]
-            }
-            (rgba, None) => rgba.unwrap_or(DEFAULT_RGBA),
-        };
         Ok(Geom {
             primitive,
             body_from_geom,
-            rgba: rgba.map(|c| c as f32),
+            rgba: rgba(document, geom, material),
             material: geom.material.clone(),
             checker_rgb: material.and_then(|material| checker_rgb(document, material)),
             friction: friction(document, geom)?,
@@ -141,6 +129,20 @@ impl Geom {
         };
         Some((body_from_shape, shape))
     }
+}
+
+/// The geom's own colour, or its material's; a picture on the material tints it.
+fn rgba(
+    document: &Document,
+    geom: &mjcf_rs::body::Geom,
+    material: Option<&mjcf_rs::assets::Material>,
+) -> [f32; 4] {
+    let texture = material.and_then(|material| document.texture_rgb.get(material.texture.as_ref()?));
+    let plain = if texture.is_some() { [1.0; 4] } else { DEFAULT_RGBA };
+    let [r, g, b, a] =
+        geom.rgba.or(material.and_then(|material| material.rgba)).unwrap_or(plain).map(|c| c as f32);
+    let [x, y, z] = texture.copied().unwrap_or([1.0; 3]);
+    [r * x, g * y, b * z, a]
 }
 
 fn friction(document: &Document, geom: &mjcf_rs::body::Geom) -> Result<Friction, SimError> {
