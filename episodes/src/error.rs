@@ -52,12 +52,12 @@ pub enum SceneError {
         path.display(), .may.join(", ")
     )]
     NoPlace { path: PathBuf, task: &'static str, may: Vec<String>, have: String },
-    #[error("site {site:?} of the scene {} is tilted by {degrees:.1} degrees; its z axis has to be up", path.display())]
-    Tilted { path: PathBuf, site: String, degrees: f32 },
+    #[error("site {site:?} of the scene {} is tilted by {tilt_deg:.1} degrees; its z axis has to be up", path.display())]
+    Tilted { path: PathBuf, site: String, tilt_deg: f32 },
     #[error("the scene {} has a body {name:?}, as {task} calls an object of its own; rename it", path.display())]
     SameName { path: PathBuf, task: &'static str, name: String },
     #[error(
-        "in the scene {}, {name} does not stay where {task} puts it, ({:.2}, {:.2}, {:.2}) m from site \"task\": in {seconds:.0} s it goes {moved_m:.2} m; it needs something to stand on and nothing in its way; a site {site:?} puts it elsewhere",
+        "in the scene {}, {name} does not stay where {task} puts it, ({:.2}, {:.2}, {:.2}) m from site \"task\": in {trial_s:.0} s it goes {moved_m:.2} m; it needs something to stand on and nothing in its way; a site {site:?} puts it elsewhere",
         path.display(), .at_m[0], .at_m[1], .at_m[2]
     )]
     Unsteady {
@@ -67,7 +67,7 @@ pub enum SceneError {
         site: String,
         at_m: [f32; 3],
         moved_m: f32,
-        seconds: f64,
+        trial_s: f64,
     },
 }
 

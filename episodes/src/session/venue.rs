@@ -121,7 +121,7 @@ pub fn check(
             site: site.clone(),
             at_m: at_m.to_array(),
             moved_m,
-            seconds: f64::from(TRIAL_STEPS) / CONTROL_HZ,
+            trial_s: f64::from(TRIAL_STEPS) / CONTROL_HZ,
         }
         .into()),
     }
@@ -159,7 +159,7 @@ fn upright(path: &Path, site: &Site) -> Result<Pose, SceneError> {
     let tilt_rad = (pose.rotation * Vector::Z).angle_between(Vector::Z);
     if tilt_rad > LEVEL_RAD {
         let (path, site) = (path.into(), site.name.clone());
-        return Err(SceneError::Tilted { path, site, degrees: tilt_rad.to_degrees() });
+        return Err(SceneError::Tilted { path, site, tilt_deg: tilt_rad.to_degrees() });
     }
     Ok(Pose::from_parts(pose.translation, Rotation::from_rotation_z(heading_rad(&pose))))
 }

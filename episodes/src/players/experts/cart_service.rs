@@ -28,9 +28,9 @@ const LIFT_M: f32 = 0.16;
 const BACK_M: f32 = 0.30;
 const OVER_PATCH_M: f32 = 0.10;
 /// Nearer than a walking robot sways, B would wait for itself.
-const AT_HAND: Within = Within { m: 0.045, rad: 0.09 };
+const AT_HAND: Within = Within { off_m: 0.045, off_rad: 0.09 };
 /// On the way back B already turns.
-const ON_THE_WAY: Within = Within { m: 0.10, rad: 0.8 };
+const ON_THE_WAY: Within = Within { off_m: 0.10, off_rad: 0.8 };
 /// A bottle that is let go of falls so far.
 const DROP_M: f32 = 0.003;
 

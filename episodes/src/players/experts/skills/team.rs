@@ -16,7 +16,7 @@ use crate::scoring::{Facts, Grip};
 const BEHIND_BAR_M: f32 = 0.29;
 /// Towards their places, before anything is held. Hands that reach out correct the rest.
 const APPROACH_M_S: f32 = 0.3;
-const NEAR: Within = Within { m: 0.03, rad: 0.05 };
+const NEAR: Within = Within { off_m: 0.03, off_rad: 0.05 };
 /// What two robots that walk with a load need.
 const COMPLIANCE_N_S_M: f64 = 250.0;
 /// Robots still correct their places for so long once the object has arrived.

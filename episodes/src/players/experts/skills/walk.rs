@@ -9,9 +9,9 @@ use crate::players::PlayerError;
 /// Velocity for each metre that a robot is off its place, and turning for each radian.
 const GAIN_1_S: f32 = 1.0;
 /// A place is reached within this.
-const CLOSE: Within = Within { m: 0.02, rad: 0.04 };
+const CLOSE: Within = Within { off_m: 0.02, off_rad: 0.04 };
 /// One who stands is not asked to walk again within this.
-const AT_REST: Within = Within { m: 0.03, rad: 0.04 };
+const AT_REST: Within = Within { off_m: 0.03, off_rad: 0.04 };
 const TRIES: u32 = 3;
 /// A robot that has not come to rest by then stands close enough, or never will.
 const LONGEST_S: f32 = 20.0;
@@ -31,8 +31,8 @@ pub struct Way {
 /// How near to a place is near enough.
 #[derive(Clone, Copy)]
 pub struct Within {
-    pub m: f32,
-    pub rad: f32,
+    pub off_m: f32,
+    pub off_rad: f32,
 }
 
 /// What a place that itself moves does meanwhile, world frame.
@@ -115,7 +115,7 @@ fn are_there(stage: &mut Stage, ways: &[Way], within: Within) -> Result<bool, Pl
     let is_there = |way: &Way| {
         let at = facts.robots[way.robot].pelvis_in_world;
         let off_m = (way.to.translation - at.translation).truncate().length();
-        off_m < within.m && wrapped_rad(heading_rad(&way.to) - heading_rad(&at)).abs() < within.rad
+        off_m < within.off_m && wrapped_rad(heading_rad(&way.to) - heading_rad(&at)).abs() < within.off_rad
     };
     Ok(ways.iter().all(is_there))
 }
