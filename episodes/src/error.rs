@@ -36,11 +36,47 @@ pub enum EpisodeError {
     #[error("a picture cannot be encoded: {0}")]
     Picture(#[from] tandem_sim::render::PictureError),
     #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
     #[error("cannot read this program's own file, which tells it from other builds: {0}")]
     Build(#[source] std::io::Error),
     #[error(transparent)]
     Output(#[from] crate::output::OutputError),
+}
+
+/// Why a task cannot take place in a scene.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    #[error(transparent)]
+    Sim(#[from] tandem_sim::SimError),
+    #[error(
+        "the scene {} has changed: it was {was} and is {now}, with the files that it names; an episode is replayed and resumed in the scene that it was played in",
+        path.display()
+    )]
+    Changed { path: PathBuf, was: String, now: String },
+    #[error(
+        "the scene {} has no site \"task\" on what never moves: give it one where the origin of {task} is to be, its z axis up; sites {} may place robots and objects one by one; have: {have}",
+        path.display(), .may.join(", ")
+    )]
+    NoPlace { path: PathBuf, task: &'static str, may: Vec<String>, have: String },
+    #[error("site {site:?} of the scene {} is tilted by {tilt_deg:.1} degrees; its z axis has to be up", path.display())]
+    Tilted { path: PathBuf, site: String, tilt_deg: f32 },
+    #[error("the scene {} has a body {name:?}, as {task} calls an object of its own; rename it", path.display())]
+    SameName { path: PathBuf, task: &'static str, name: String },
+    #[error(
+        "in the scene {}, {name} does not stay where {task} puts it, ({:.2}, {:.2}, {:.2}) m from site \"task\": in {trial_s:.0} s it goes {moved_m:.2} m; it needs something to stand on and nothing in its way; a site {site:?} puts it elsewhere",
+        path.display(), .at_m[0], .at_m[1], .at_m[2]
+    )]
+    Unsteady {
+        path: PathBuf,
+        task: &'static str,
+        name: String,
+        site: String,
+        at_m: [f32; 3],
+        moved_m: f32,
+        trial_s: f64,
+    },
 }
 
 /// Why a checkpoint cannot be gone on from.

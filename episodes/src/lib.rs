@@ -23,7 +23,7 @@ pub mod tasks;
 
 pub use commands::{Called, OperatorCommand, own as own_call};
 pub use describe::{brief, task_list};
-pub use error::{CheckpointError, EpisodeError};
+pub use error::{CheckpointError, EpisodeError, SceneError};
 pub use instructions::{Instructions, InstructionsError};
 pub use output::{OutputError, create_new_private_folder, create_private_folder, write_whole};
 pub use protocol::{Rules, rules};
@@ -34,5 +34,5 @@ pub use recording::{
 pub use reports::RESULT_FILE;
 pub use scoring::{A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, RobotFacts, Scored, Scores};
 pub use session::{Checkpoint, Clock, RunFiles, RunFolder, Session, monotonic};
-pub use spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, Start};
+pub use spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, SceneFile, Start};
 pub use tandem_sim::{BaseLimits, LocomotionChoice, SimError, joint_names, render::RendererKind};

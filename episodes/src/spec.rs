@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use tandem_sim::{LocomotionChoice, SimError, render::RendererKind};
+use tandem_sim::{LocomotionChoice, SimError, mjcf::Document, render::RendererKind};
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
+use crate::error::SceneError;
 use crate::scoring::Phase;
 use crate::tasks::{self, Task};
 
@@ -17,6 +18,9 @@ pub struct EpisodeSpec {
     pub task: &'static Task,
     pub seed: u32,
     pub protocol: Protocol,
+    /// Where it takes place, if not in the task's own scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scene: Option<SceneFile>,
     pub robot: RobotFile,
     pub locomotion: Controller,
     /// Who draws what robots see; nothing else depends on it.
@@ -38,6 +42,14 @@ pub enum RobotFile {
     Embedded(String),
     /// An MJCF file.
     File(PathBuf),
+}
+
+/// A scene in place of the task's own: an MJCF file with what that names.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SceneFile {
+    pub path: PathBuf,
+    /// Of the content when the episode was planned; see [`Document::fingerprint`].
+    pub xxh3: String,
 }
 
 /// Which base controller the robots have.
@@ -80,6 +92,7 @@ impl EpisodeSpec {
             task,
             seed,
             protocol,
+            scene: None,
             robot: RobotFile::default(),
             locomotion: Controller::default(),
             renderer: RendererKind::default(),
@@ -131,6 +144,30 @@ impl RobotFile {
                 .map_err(|source| SimError::Read { path: path.display().to_string(), source }),
         }
     }
+}
+
+impl SceneFile {
+    /// The scene that a file holds now.
+    pub fn of(path: &Path) -> Result<SceneFile, SimError> {
+        let xxh3 = fingerprint(&Document::read(path)?);
+        // Whoever replays the episode may be in another folder.
+        let path = std::path::absolute(path).unwrap_or_else(|_| path.into());
+        Ok(SceneFile { path, xxh3 })
+    }
+
+    /// Reads the file, which has to be as it was.
+    pub fn load(&self) -> Result<Document, SceneError> {
+        let document = Document::read(&self.path)?;
+        let now = fingerprint(&document);
+        match now == self.xxh3 {
+            true => Ok(document),
+            false => Err(SceneError::Changed { path: self.path.clone(), was: self.xxh3.clone(), now }),
+        }
+    }
+}
+
+fn fingerprint(document: &Document) -> String {
+    format!("{:016x}", document.fingerprint())
 }
 
 impl Controller {

@@ -13,7 +13,7 @@ use clap::{
 };
 use serde::Deserialize;
 use tandem_episodes::{
-    BaseLimits, Controller, Instructions, InstructionsError, RendererKind, SimError, Visibility,
+    BaseLimits, Controller, Instructions, InstructionsError, RendererKind, SceneFile, SimError, Visibility,
 };
 use tandem_tools_spec::{Disclosure, Hints};
 
@@ -48,6 +48,9 @@ pub struct Layer {
     /// JSON file with instructions in place of the tasks' own: {"handover": {"joint": "...", "robots": {"A": "..."}}}.
     #[arg(long, env = "TANDEM_INSTRUCTIONS", value_name = "FILE")]
     pub instructions: Option<PathBuf>,
+    /// MJCF file of a scene in place of the tasks' own; its site `task` says where.
+    #[arg(long, env = "TANDEM_SCENE", value_name = "FILE")]
+    pub scene: Option<PathBuf>,
     /// ONNX file with a velocity policy for the G1 in place of our own base controller.
     #[arg(long, env = "TANDEM_LOCOMOTION", value_name = "FILE")]
     pub locomotion: Option<PathBuf>,
@@ -104,6 +107,7 @@ impl Layer {
             runs: self.runs.or(next.runs),
             record: self.record.or(next.record),
             instructions: self.instructions.or(next.instructions),
+            scene: self.scene.or(next.scene),
             locomotion: self.locomotion.or(next.locomotion),
             renderer: self.renderer.or(next.renderer),
             disclosure: self.disclosure.or(next.disclosure),
@@ -134,6 +138,8 @@ pub struct Settings {
     pub record: Visibility,
     /// Instructions in place of the tasks' own.
     pub instructions: Instructions,
+    /// The scene in place of the tasks' own.
+    pub scene: Option<SceneFile>,
     /// The base controller of every robot.
     pub locomotion: Controller,
     /// What that controller follows.
@@ -188,7 +194,7 @@ pub enum SettingsError {
     /// The file with instructions cannot be used.
     #[error(transparent)]
     Instructions(#[from] InstructionsError),
-    /// The policy for the robots' legs, or the renderer, cannot be used.
+    /// The scene, the policy for the robots' legs, or the renderer, cannot be used.
     #[error(transparent)]
     Sim(#[from] SimError),
     /// The file is no TOML, or holds a setting that does not exist.
@@ -228,6 +234,7 @@ impl Settings {
                 Some(path) => Instructions::read(path)?,
                 None => Instructions::default(),
             },
+            scene: layer.scene.as_deref().map(SceneFile::of).transpose()?,
             base_limits: locomotion.load()?.limits(),
             locomotion,
             renderer,

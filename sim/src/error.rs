@@ -13,6 +13,12 @@ pub enum SimError {
     Mjcf { file: String, source: mjcf_rs::ParseError },
     #[error("`{file}` is not valid XML: {source}")]
     Xml { file: String, source: roxmltree::Error },
+    #[error("`{path}` is not a mesh that can be read: {source}")]
+    Mesh { path: String, source: Box<dyn std::error::Error + Send + Sync> },
+    #[error("mesh file `{path}` is of a kind that is not read; use .obj or .stl")]
+    MeshKind { path: String },
+    #[error("`{path}` is not a picture that can be read: {source}; use .png")]
+    Texture { path: String, source: image::ImageError },
     #[error("`{file}`: {what}")]
     Unsupported { file: String, what: String },
     #[error(

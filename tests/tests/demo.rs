@@ -3,13 +3,14 @@
 use std::{fs, path::Path, thread};
 
 use serde_json::Value;
-use tandem::commands::demo;
+use tandem::{commands::demo, settings::Layer};
 use tandem_episodes::RendererKind;
 use tandem_tools_spec::ResultReply;
 
 fn play(runs: &Path) -> ResultReply {
     let seeds = "0".parse().expect("a seed");
-    demo::play_all(runs, seeds, None, RendererKind::Cpu).expect("an episode").remove(0)
+    let flags = Layer { renderer: Some(RendererKind::Cpu), ..Layer::default() };
+    demo::play_all(runs, seeds, flags).expect("an episode").remove(0)
 }
 
 #[test]

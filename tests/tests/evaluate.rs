@@ -13,6 +13,7 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> Plan<'static> {
     Plan {
         player: players::find("expert").expect("a player"),
         protocol: Protocol::Benchmark,
+        scene: None,
         robot: RobotFile::default(),
         locomotion: Controller::Balance,
         disclosure: Disclosure::Live,

@@ -8,7 +8,7 @@ use tandem_tools_spec::{Disclosure, Hints, Protocol};
 use crate::players::Policy;
 use crate::recording::Recorder;
 use crate::scoring::Phase;
-use crate::spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, Start};
+use crate::spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, SceneFile, Start};
 use crate::tasks::Task;
 
 /// What to play.
@@ -17,6 +17,8 @@ pub struct Plan<'a> {
     /// Who plays.
     pub player: &'a dyn Policy,
     pub protocol: Protocol,
+    /// In place of the tasks' own scenes.
+    pub scene: Option<SceneFile>,
     pub robot: RobotFile,
     pub locomotion: Controller,
     pub renderer: RendererKind,
@@ -65,6 +67,7 @@ impl Plan<'_> {
     pub fn spec(&self, task: &'static Task, seed: u32, start: Start) -> EpisodeSpec {
         EpisodeSpec {
             robot: self.robot.clone(),
+            scene: self.scene.clone(),
             locomotion: self.locomotion.clone(),
             renderer: self.renderer,
             disclosure: self.disclosure,

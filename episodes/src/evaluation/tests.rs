@@ -63,6 +63,7 @@ fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> Plan<'static> {
     Plan {
         player: players::find("expert").unwrap(),
         protocol: Protocol::Agentic,
+        scene: None,
         robot: RobotFile::default(),
         locomotion: Controller::Balance,
         renderer: RendererKind::Cpu,

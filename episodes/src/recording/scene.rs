@@ -57,19 +57,23 @@ fn add(entity: &mut SceneEntity, geom: &Geom, color: Color) {
         }
         Primitive::Convex { vertices_m } => {
             // A degenerate mesh has no hull and nothing to show.
-            if let Ok((points, triangles)) = try_convex_hull(vertices_m) {
-                entity.triangles.push(TriangleListPrimitive {
-                    pose: Some(foxglove_pose(pose)),
-                    points: points
-                        .iter()
-                        .map(|p| Point3 { x: p.x.into(), y: p.y.into(), z: p.z.into() })
-                        .collect(),
-                    indices: triangles.into_iter().flatten().collect(),
-                    color: Some(color),
-                    colors: Vec::new(),
-                });
+            if let Ok((points_m, corners)) = try_convex_hull(vertices_m) {
+                entity.triangles.push(triangles(pose, &points_m, &corners, color));
             }
         }
+        Primitive::Mesh(mesh) => {
+            entity.triangles.push(triangles(pose, &mesh.vertices_m, &mesh.triangles, color));
+        }
+    }
+}
+
+fn triangles(pose: Pose, points_m: &[Vector], corners: &[[u32; 3]], color: Color) -> TriangleListPrimitive {
+    TriangleListPrimitive {
+        pose: Some(foxglove_pose(pose)),
+        points: points_m.iter().map(|p| Point3 { x: p.x.into(), y: p.y.into(), z: p.z.into() }).collect(),
+        indices: corners.iter().flatten().copied().collect(),
+        color: Some(color),
+        colors: Vec::new(),
     }
 }
 

@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use tandem_sim::{ObjectPlacement, Pose, Robot, RobotModel, RobotPlacement, Rotation, World, WorldSpec};
+use tandem_sim::{Robot, RobotModel, World};
 use xxhash_rust::xxh3::xxh3_64;
 
+use super::venue;
 use crate::EpisodeError;
 use crate::commands::{Motion, RobotSheet, UpperBody};
 use crate::convert::isometry_from_sim;
 use crate::spec::{EpisodeSpec, RobotFile};
-use crate::tasks::Task;
 
 /// What an episode is made of.
 pub struct Built {
@@ -27,7 +27,9 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
     let locomotion = spec.locomotion.load()?;
     let mjcf = spec.robot.read()?;
     let model = Arc::new(RobotModel::parse(&spec.robot.name(), &mjcf)?);
-    let mut world = World::with_robot(&world_spec(spec.task, spec.seed), model)?;
+    let world_spec = venue::world_spec(spec)?;
+    venue::check(spec, &world_spec, &model)?;
+    let mut world = World::with_robot(&world_spec, model)?;
     for robot in 0..world.robots().len() {
         world.set_locomotion(robot, locomotion.controller());
     }
@@ -48,21 +50,4 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
         RobotFile::File(_) => format!("{}-{:016x}", spec.robot.name(), xxh3_64(mjcf.as_bytes())),
     };
     Ok(Built { world, motions, robot, locomotion: locomotion.name().into() })
-}
-
-fn world_spec(task: &Task, seed: u32) -> WorldSpec {
-    let robots = task.robots.iter().map(|robot| RobotPlacement {
-        name: robot.name.into(),
-        position_m: robot.position_m,
-        yaw_rad: robot.yaw_rad,
-    });
-    let objects = task.objects.iter().zip(task.starts(seed)).map(|(spot, start)| ObjectPlacement {
-        name: spot.name.into(),
-        file: spot.file.into(),
-        world_from_object: Pose::from_parts(
-            start.position_m.into(),
-            Rotation::from_rotation_z(start.yaw_rad),
-        ),
-    });
-    WorldSpec { scene: task.scene.into(), robots: robots.collect(), objects: objects.collect() }
 }

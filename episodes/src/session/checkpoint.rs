@@ -135,7 +135,9 @@ impl Origin {
     }
 
     fn machine(&self) -> String {
-        format!("robot {} and controller {}", self.robot, self.locomotion)
+        let scene = self.spec.scene.as_ref().map(|scene| format!(" in scene {}", scene.xxh3));
+        let scene = scene.unwrap_or_default();
+        format!("robot {} and controller {}{scene}", self.robot, self.locomotion)
     }
 }
 

@@ -11,6 +11,7 @@ mod replay;
 mod replies;
 mod run_files;
 mod status;
+mod venue;
 
 pub(crate) use build::build;
 pub use checkpoint::Checkpoint;

@@ -35,3 +35,6 @@ pub fn above_box(f: &Facts, object: &str, target: &str, half_m: f32) -> bool {
 pub fn stands_as_high(f: &Facts, object: &str, within_m: f32) -> bool {
     f.lift_m(object).abs() <= within_m
 }
+
+#[cfg(test)]
+pub mod sides;

@@ -12,3 +12,4 @@ mod hands;
 mod recordings;
 mod renderers;
 mod replays;
+mod scenes;

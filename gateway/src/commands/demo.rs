@@ -10,7 +10,7 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressStyle};
 use tandem_episodes::{
-    EpisodeSpec, Facts, RendererKind,
+    EpisodeSpec, Facts,
     players::{self, Backstage, Caller, PlayerError},
     tasks::{self, Task},
 };
@@ -19,7 +19,7 @@ use tracing_subscriber::filter::LevelFilter;
 
 use super::{
     Outcome, Seeds,
-    episode_flags::{LocomotionFlag, RendererFlag},
+    episode_flags::{LocomotionFlag, RendererFlag, SceneFlag},
     log,
 };
 use crate::{
@@ -47,6 +47,8 @@ pub struct Args {
     #[arg(long, env = "TANDEM_RUNS", default_value = "runs", value_name = "DIR")]
     runs: PathBuf,
     #[command(flatten)]
+    scene: SceneFlag,
+    #[command(flatten)]
     locomotion: LocomotionFlag,
     #[command(flatten)]
     renderer: RendererFlag,
@@ -55,24 +57,22 @@ pub struct Args {
 /// Plays; it is a failure if too few episodes reach the last phase.
 pub fn run(args: Args) -> Outcome {
     log::to_stderr(LevelFilter::WARN);
-    let results = play_all(&args.runs, args.seeds, args.locomotion.file, args.renderer.kind)?;
+    let flags = Layer {
+        scene: args.scene.file,
+        locomotion: args.locomotion.file,
+        renderer: Some(args.renderer.kind),
+        ..Layer::default()
+    };
+    let results = play_all(&args.runs, args.seeds, flags)?;
     Ok(if passed(&results) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Plays every seed in turn, recorded under `runs`, by robots that walk by the policy of a file if one is given, with
-/// pictures by `renderer`, and prints what came of it.
-pub fn play_all(
-    runs: &Path,
-    seeds: Seeds,
-    locomotion: Option<PathBuf>,
-    renderer: RendererKind,
-) -> Result<Vec<ResultReply>, Box<dyn Error>> {
+/// Plays every seed in turn on a server with these flags, recorded under `runs`, and prints what came of it.
+pub fn play_all(runs: &Path, seeds: Seeds, flags: Layer) -> Result<Vec<ResultReply>, Box<dyn Error>> {
     let flags = Layer {
         listen: Some(SocketAddr::from((Ipv4Addr::LOCALHOST, FREE_PORT))),
         runs: Some(runs.into()),
-        locomotion,
-        renderer: Some(renderer),
-        ..Layer::default()
+        ..flags
     };
     let server = Server::start(Settings::resolve(flags, None)?)?;
     let results = seeds.0.map(|seed| play(&server, seed)).collect::<Result<Vec<_>, _>>()?;

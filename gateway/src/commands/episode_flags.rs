@@ -7,7 +7,7 @@ use clap::{
     builder::{PossibleValuesParser, TypedValueParser},
 };
 use tandem_episodes::{
-    Controller, RendererKind, RobotFile, SimError,
+    Controller, RendererKind, RobotFile, SceneFile, SimError,
     evaluation::{Plan, Shard, Starts},
     players::Policy,
     tasks::{self, Task},
@@ -41,9 +41,26 @@ pub struct EpisodeFlags {
     #[arg(long, default_value_t = 1, value_name = "N")]
     jobs: usize,
     #[command(flatten)]
+    scene: SceneFlag,
+    #[command(flatten)]
     locomotion: LocomotionFlag,
     #[command(flatten)]
     renderer: RendererFlag,
+}
+
+/// The scene on the command line.
+#[derive(Debug, Args)]
+pub struct SceneFlag {
+    /// MJCF file of a scene in place of the tasks' own; its site `task` says where.
+    #[arg(long = "scene", env = "TANDEM_SCENE", value_name = "FILE")]
+    pub file: Option<PathBuf>,
+}
+
+impl SceneFlag {
+    /// The scene as the file has it now.
+    fn read(&self) -> Result<Option<SceneFile>, SimError> {
+        self.file.as_deref().map(SceneFile::of).transpose()
+    }
 }
 
 /// The base controller on the command line.
@@ -97,6 +114,7 @@ impl EpisodeFlags {
         Ok(Plan {
             player,
             protocol: self.protocol,
+            scene: self.scene.read()?,
             robot: RobotFile::default(),
             locomotion: self.locomotion.controller(),
             disclosure: self.disclosure,

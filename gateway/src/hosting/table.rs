@@ -86,6 +86,7 @@ impl EpisodeTable {
     ) -> Result<StartReply, HostingError> {
         let protocol = args.protocol.unwrap_or(Protocol::Agentic);
         let spec = EpisodeSpec {
+            scene: self.settings.scene.clone(),
             locomotion: self.settings.locomotion.clone(),
             renderer: self.settings.renderer,
             disclosure: self.settings.disclosure,

@@ -359,6 +359,7 @@ fn episode_kind(error: &EpisodeError) -> Kind {
         EpisodeError::Checkpoint(_) => {
             ("checkpoint", "Checkpoint does not fit", StatusCode::UNPROCESSABLE_ENTITY)
         }
+        EpisodeError::Scene(_) => ("scene", "Scene does not fit the task", StatusCode::UNPROCESSABLE_ENTITY),
         EpisodeError::Diverged(_) => ("diverged", "Physics diverged", StatusCode::CONFLICT),
         EpisodeError::Sim(_)
         | EpisodeError::Ik(_)

@@ -16,6 +16,17 @@ pub struct MjcfCamera {
     pub resolution_px: (u32, u32),
 }
 
+impl MjcfCamera {
+    /// As seen from a frame in which the file's world lies at `frame_from_file`.
+    pub fn moved(&self, frame_from_file: &Pose) -> MjcfCamera {
+        let body_from_camera = match self.body {
+            Some(_) => self.body_from_camera,
+            None => *frame_from_file * self.body_from_camera,
+        };
+        MjcfCamera { body_from_camera, ..self.clone() }
+    }
+}
+
 /// MuJoCo's default `fovy`.
 const DEFAULT_FOVY_DEG: f32 = 45.0;
 const DEFAULT_RESOLUTION_PX: (u32, u32) = (320, 240);

@@ -1,23 +1,44 @@
 //! Geoms: primitive shapes with pose, material and friction, as Rapier colliders and as things to draw.
 
+use std::sync::Arc;
+
 use mjcf_rs::body::GeomType;
 use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::prelude::SharedShape;
 
-use super::{Document, pose, vector};
+use super::{Document, Mesh, pose, vector};
 use crate::SimError;
 use crate::dynamics::{Directions, Friction};
 
 /// Shape in its own frame; axial shapes lie along z, as in MJCF.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Primitive {
-    Sphere { radius_m: f32 },
-    Capsule { radius_m: f32, half_length_m: f32 },
-    Cylinder { radius_m: f32, half_length_m: f32 },
-    Box { half_extents_m: Vector },
-    Ellipsoid { radii_m: Vector },
-    Plane { half_extents_m: [f32; 2] },
-    Convex { vertices_m: Vec<Vector> },
+    Sphere {
+        radius_m: f32,
+    },
+    Capsule {
+        radius_m: f32,
+        half_length_m: f32,
+    },
+    Cylinder {
+        radius_m: f32,
+        half_length_m: f32,
+    },
+    Box {
+        half_extents_m: Vector,
+    },
+    Ellipsoid {
+        radii_m: Vector,
+    },
+    Plane {
+        half_extents_m: [f32; 2],
+    },
+    /// The hull of some points.
+    Convex {
+        vertices_m: Vec<Vector>,
+    },
+    /// Drawn as it is; it collides as its hull, as in MuJoCo.
+    Mesh(Arc<Mesh>),
 }
 
 /// One geom in its body's frame.
@@ -58,20 +79,20 @@ impl Geom {
             GeomType::Box => Primitive::Box { half_extents_m: size },
             GeomType::Ellipsoid => Primitive::Ellipsoid { radii_m: size },
             GeomType::Plane => Primitive::Plane { half_extents_m: [size.x, size.y] },
-            GeomType::Mesh => Primitive::Convex { vertices_m: mesh_vertices(document, geom)? },
+            GeomType::Mesh => mesh(document, geom)?,
             other => {
                 let what = format!(
-                    "geom type {other:?}; use sphere, capsule, cylinder, box, ellipsoid, plane or mesh"
+                    "geom `{}` is of type {other:?}; use sphere, capsule, cylinder, box, ellipsoid, plane or mesh",
+                    geom.name.as_deref().unwrap_or_default()
                 );
                 return Err(document.unsupported(what));
             }
         };
         let material = geom.material.as_ref().and_then(|name| document.model.assets.material(name));
-        let rgba = geom.rgba.or(material.and_then(|m| m.rgba)).unwrap_or(DEFAULT_RGBA);
         Ok(Geom {
             primitive,
             body_from_geom,
-            rgba: rgba.map(|c| c as f32),
+            rgba: rgba(document, geom, material),
             material: geom.material.clone(),
             checker_rgb: material.and_then(|material| checker_rgb(document, material)),
             friction: friction(document, geom)?,
@@ -104,9 +125,24 @@ impl Geom {
                 SharedShape::cuboid(extent(*x), extent(*y), PLANE_THICKNESS_M / 2.0)
             }
             Primitive::Convex { vertices_m } => SharedShape::convex_hull(vertices_m)?,
+            Primitive::Mesh(mesh) => SharedShape::convex_hull(&mesh.vertices_m)?,
         };
         Some((body_from_shape, shape))
     }
+}
+
+/// The geom's own colour, or its material's; a picture on the material tints it.
+fn rgba(
+    document: &Document,
+    geom: &mjcf_rs::body::Geom,
+    material: Option<&mjcf_rs::assets::Material>,
+) -> [f32; 4] {
+    let texture = material.and_then(|material| document.texture_rgb.get(material.texture.as_ref()?));
+    let plain = if texture.is_some() { [1.0; 4] } else { DEFAULT_RGBA };
+    let [r, g, b, a] =
+        geom.rgba.or(material.and_then(|material| material.rgba)).unwrap_or(plain).map(|c| c as f32);
+    let [x, y, z] = texture.copied().unwrap_or([1.0; 3]);
+    [r * x, g * y, b * z, a]
 }
 
 fn friction(document: &Document, geom: &mjcf_rs::body::Geom) -> Result<Friction, SimError> {
@@ -133,15 +169,18 @@ fn between(ends_m: [f64; 6]) -> (Pose, f32) {
     (Pose::from_parts(a + half, rotation), half.length())
 }
 
-fn mesh_vertices(document: &Document, geom: &mjcf_rs::body::Geom) -> Result<Vec<Vector>, SimError> {
+fn mesh(document: &Document, geom: &mjcf_rs::body::Geom) -> Result<Primitive, SimError> {
     let name = geom.mesh.as_deref().unwrap_or_default();
-    let mesh = document.model.assets.mesh(name);
-    let Some(vertices) = mesh.and_then(|mesh| mesh.inline_vertices.as_ref()) else {
-        return Err(
-            document.unsupported(format!("mesh `{name}` has no inline vertices; mesh files are not read"))
-        );
+    if let Some(mesh) = document.meshes.get(name) {
+        return Ok(Primitive::Mesh(mesh.clone()));
+    }
+    let asset = document.model.assets.mesh(name);
+    let Some(vertices) = asset.and_then(|asset| asset.inline_vertices.as_ref()) else {
+        return Err(document.unsupported(format!("mesh `{name}` is no asset with a file or vertices")));
     };
-    Ok(vertices.chunks_exact(3).map(|v| vector([v[0], v[1], v[2]])).collect())
+    Ok(Primitive::Convex {
+        vertices_m: vertices.chunks_exact(3).map(|v| vector([v[0], v[1], v[2]])).collect(),
+    })
 }
 
 /// Points of a Fibonacci sphere, scaled: an ellipsoid's convex hull for collision.

@@ -30,7 +30,8 @@ pub(super) fn of_geom(geom: &Geom) -> MassProperties {
         | Primitive::Capsule { .. }
         | Primitive::Cylinder { .. }
         | Primitive::Box { .. }
-        | Primitive::Convex { .. } => shape.mass_properties(1.0).transform_by(&body_from_shape),
+        | Primitive::Convex { .. }
+        | Primitive::Mesh(_) => shape.mass_properties(1.0).transform_by(&body_from_shape),
     };
     let mass_kg = geom.mass_kg.unwrap_or(geom.density_kg_m3 * of_unit_density.mass());
     let mut mass = of_unit_density;

@@ -27,7 +27,7 @@ const RINGS: u32 = 6;
 const PLANE_M: f32 = 20.0;
 
 impl Mesh {
-    /// The surface of a shape; of a mesh, its convex hull.
+    /// The surface of a shape; of points, their convex hull.
     pub fn of(primitive: &Primitive) -> Mesh {
         match primitive {
             Primitive::Sphere { radius_m } => Mesh::sphere(*radius_m),
@@ -40,6 +40,7 @@ impl Mesh {
                 let (points_m, triangles) = rapier3d::parry::transformation::convex_hull(vertices_m);
                 Mesh::faceted(&points_m, &triangles)
             }
+            Primitive::Mesh(mesh) => Mesh::faceted(&mesh.vertices_m, &mesh.triangles),
         }
     }
 

@@ -12,6 +12,8 @@ pub use objects::{ObjectModel, ObjectPart, ObjectPlacement, ObjectState};
 pub use snapshot::Snapshot;
 pub use step::{HandContacts, ObjectStep, RobotStep, Step, Touch};
 
+use rapier3d::math::Pose;
+
 use crate::body::RobotModel;
 use crate::dynamics::{DVec3, Diverged, Dynamics, Settings};
 use crate::mechanism::Machinery;
@@ -24,10 +26,24 @@ use objects::{Furniture, Object};
 /// Everything a world is made of.
 #[derive(Clone, Debug)]
 pub struct WorldSpec {
-    /// Name of an embedded scene file.
-    pub scene: String,
+    pub scene: Scene,
     pub robots: Vec<RobotPlacement>,
     pub objects: Vec<ObjectPlacement>,
+}
+
+/// Which room a world is in.
+#[derive(Clone, Debug)]
+pub enum Scene {
+    /// One that the binary carries, by name.
+    Embedded(String),
+    /// One that was read, and where its own origin lies.
+    Read { document: Arc<Document>, world_from_scene: Pose },
+}
+
+impl From<&str> for Scene {
+    fn from(name: &str) -> Scene {
+        Scene::Embedded(name.into())
+    }
 }
 
 /// A simulated room. One thread owns it.
@@ -54,7 +70,10 @@ impl World {
 
     /// As [`World::new`], of robots of another file.
     pub fn with_robot(spec: &WorldSpec, model: Arc<RobotModel>) -> Result<World, SimError> {
-        let mut world = World::of_scene(Document::parse(&spec.scene, assets::scene(&spec.scene)?)?)?;
+        let mut world = match &spec.scene {
+            Scene::Embedded(name) => World::of_scene(Document::parse(name, assets::scene(name)?)?)?,
+            Scene::Read { document, world_from_scene } => World::furnished(document, world_from_scene)?,
+        };
         let dynamics = &mut world.dynamics;
         for placement in &spec.objects {
             objects::insert_object(dynamics, placement, &mut world.objects)?;
@@ -68,16 +87,22 @@ impl World {
     /// A scene with what its own file has in it, and no more. It begins as its key `start` has it; its actuators do what
     /// that key tells them, and from the time of every later key what that one does.
     pub fn of_scene(scene: Document) -> Result<World, SimError> {
+        World::furnished(&scene, &Pose::IDENTITY)
+    }
+
+    /// As [`World::of_scene`], with the scene's own origin at `world_from_scene`.
+    fn furnished(scene: &Document, world_from_scene: &Pose) -> Result<World, SimError> {
         let gravity_m_s2 = DVec3::new(0.0, 0.0, -f64::from(GRAVITY_M_S2));
         let mut dynamics = Dynamics::new(Settings::new(f64::from(PHYSICS_DT_S), gravity_m_s2));
-        let Furniture { fixed, objects, machinery } = objects::insert_scene(&mut dynamics, &scene)?;
+        let Furniture { fixed, objects, machinery } =
+            objects::insert_scene(&mut dynamics, scene, world_from_scene)?;
         Ok(World {
             dynamics,
             robots: Vec::new(),
             objects,
             machinery,
             fixed,
-            cameras: scene.cameras,
+            cameras: scene.cameras.iter().map(|camera| camera.moved(world_from_scene)).collect(),
             pushes: Vec::new(),
             control_steps: 0,
         })

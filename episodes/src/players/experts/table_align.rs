@@ -5,7 +5,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 use tandem_sim::Vector;
 
-use super::skills::{BarGrasp, Path, Stage, Team, let_go, place, take_softly, upright};
+use super::skills::{BarGrasp, FREE, Path, Stage, Team, let_go, place, take_softly, upright};
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
@@ -34,7 +34,7 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
         true => from.lerp(&before, gone_m / turn_m),
         false => before.lerp(&over, (gone_m - turn_m) / (length_m - turn_m)),
     };
-    team.carry(stage, &Path { at: &at, length_m, pace_m_s: PACE_M_S })?;
+    team.carry(stage, &Path { at: &at, length_m, pace_m_s: PACE_M_S, free_m: &FREE })?;
     team.set_down(stage, &place(chair * AT_CHAIR_M, FRAC_PI_2))?;
     let_go(stage, &grasps)
 }

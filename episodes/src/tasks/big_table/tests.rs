@@ -3,7 +3,7 @@
 use tandem_sim::Vector;
 
 use super::*;
-use crate::scoring::ObjectFacts;
+use crate::tasks::placement::sides::still_and_released;
 
 fn over_goal(mut facts: Facts, beside_m: Vector) -> Facts {
     let disc_m = facts.position_m("goal_disc");
@@ -48,29 +48,16 @@ fn carry_on_both_sides_of_the_disc_and_of_1_cm() {
 #[test]
 fn release_on_both_sides_of_every_threshold() {
     let placed = |beside_m: Vector| over_goal(Facts::at_rest(&TASK), beside_m);
-    let changed = |change: &dyn Fn(&mut ObjectFacts)| {
-        let mut facts = placed(Vector::ZERO);
-        change(facts.object_mut("round_table"));
-        facts
-    };
     let tilted = |degrees: f32| placed(Vector::ZERO).turned("round_table", Vector::Y, degrees.to_radians());
     for (what, inside, outside) in [
         ("beside", placed(Vector::Y * 0.1499), placed(Vector::Y * 0.1501)),
         ("height", placed(Vector::Z * 0.0499), placed(Vector::Z * 0.0501)),
         ("depth", placed(Vector::Z * -0.0499), placed(Vector::Z * -0.0501)),
         ("tilt", tilted(14.9), tilted(15.1)),
-        (
-            "speed",
-            changed(&|table| table.velocity_m_s = Vector::X * 0.0499),
-            changed(&|table| table.velocity_m_s = Vector::X * 0.0501),
-        ),
-        (
-            "turning",
-            changed(&|table| table.angular_velocity_rad_s = Vector::Z * 0.1499),
-            changed(&|table| table.angular_velocity_rad_s = Vector::Z * 0.1501),
-        ),
-        ("hands", changed(&|table| table.untouched_s = 0.2), changed(&|table| table.untouched_s = 0.18)),
-    ] {
+    ]
+    .into_iter()
+    .chain(still_and_released(&placed(Vector::ZERO), "round_table"))
+    {
         assert!(released(&inside), "{what} inside");
         assert!(!released(&outside), "{what} outside");
     }

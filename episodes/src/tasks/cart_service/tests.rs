@@ -4,8 +4,9 @@ use tandem_sim::Side::{Left, Right};
 use tandem_sim::Vector;
 
 use super::*;
+use crate::scoring::A;
 use crate::scoring::Grip::{Holding, Touching};
-use crate::scoring::{A, ObjectFacts};
+use crate::tasks::placement::sides::still_and_released;
 
 fn bottle_at(beside_m: Vector) -> Facts {
     let mut facts = Facts::at_rest(&TASK);
@@ -54,29 +55,16 @@ fn bottle_is_carried_to_15_cm_by_b_and_is_away_beyond() {
 
 #[test]
 fn serve_on_both_sides_of_every_threshold() {
-    let changed = |change: &dyn Fn(&mut ObjectFacts)| {
-        let mut facts = bottle_at(Vector::ZERO);
-        change(facts.object_mut("bottle"));
-        facts
-    };
     let tilted = |degrees: f32| bottle_at(Vector::ZERO).turned("bottle", Vector::Y, degrees.to_radians());
     for (what, inside, outside) in [
         ("x", bottle_at(Vector::X * 0.0599), bottle_at(Vector::X * 0.0601)),
         ("-y", bottle_at(Vector::Y * -0.0599), bottle_at(Vector::Y * -0.0601)),
         ("z", bottle_at(Vector::Z * 0.0599), bottle_at(Vector::Z * 0.0601)),
         ("tilt", tilted(14.9), tilted(15.1)),
-        (
-            "speed",
-            changed(&|bottle| bottle.velocity_m_s = Vector::X * 0.0499),
-            changed(&|bottle| bottle.velocity_m_s = Vector::X * 0.0501),
-        ),
-        (
-            "turning",
-            changed(&|bottle| bottle.angular_velocity_rad_s = Vector::Z * 0.1499),
-            changed(&|bottle| bottle.angular_velocity_rad_s = Vector::Z * 0.1501),
-        ),
-        ("hands", changed(&|bottle| bottle.untouched_s = 0.2), changed(&|bottle| bottle.untouched_s = 0.18)),
-    ] {
+    ]
+    .into_iter()
+    .chain(still_and_released(&bottle_at(Vector::ZERO), "bottle"))
+    {
         assert!(served(&inside), "{what} inside");
         assert!(!served(&outside), "{what} outside");
     }

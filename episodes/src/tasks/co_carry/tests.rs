@@ -5,7 +5,7 @@ use tandem_sim::Vector;
 
 use super::*;
 use crate::scoring::Grip::{Holding, Touching};
-use crate::scoring::ObjectFacts;
+use crate::tasks::placement::sides::still_and_released;
 
 fn held() -> Facts {
     Facts::at_rest(&TASK).grip(A, Left, "basket", Holding).grip(B, Right, "basket", Holding)
@@ -49,11 +49,6 @@ fn carry_on_both_sides_of_every_bound() {
 #[test]
 fn release_on_both_sides_of_every_threshold() {
     let placed = |beside_m: Vector| at_patch(Facts::at_rest(&TASK), beside_m);
-    let changed = |change: &dyn Fn(&mut ObjectFacts)| {
-        let mut facts = placed(Vector::ZERO);
-        change(facts.object_mut("basket"));
-        facts
-    };
     let tilted = |degrees: f32| placed(Vector::ZERO).turned("basket", Vector::Y, degrees.to_radians());
     for (what, inside, outside) in [
         ("x", placed(Vector::X * 0.1499), placed(Vector::X * 0.1501)),
@@ -61,18 +56,10 @@ fn release_on_both_sides_of_every_threshold() {
         ("height", placed(Vector::Z * 0.0599), placed(Vector::Z * 0.0601)),
         ("depth", placed(Vector::Z * -0.0599), placed(Vector::Z * -0.0601)),
         ("tilt", tilted(14.9), tilted(15.1)),
-        (
-            "speed",
-            changed(&|basket| basket.velocity_m_s = Vector::X * 0.0499),
-            changed(&|basket| basket.velocity_m_s = Vector::X * 0.0501),
-        ),
-        (
-            "turning",
-            changed(&|basket| basket.angular_velocity_rad_s = Vector::Z * 0.1499),
-            changed(&|basket| basket.angular_velocity_rad_s = Vector::Z * 0.1501),
-        ),
-        ("hands", changed(&|basket| basket.untouched_s = 0.2), changed(&|basket| basket.untouched_s = 0.18)),
-    ] {
+    ]
+    .into_iter()
+    .chain(still_and_released(&placed(Vector::ZERO), "basket"))
+    {
         assert!(released(&inside), "{what} inside");
         assert!(!released(&outside), "{what} outside");
     }

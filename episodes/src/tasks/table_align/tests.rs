@@ -5,6 +5,7 @@ use tandem_sim::{Pose, Rotation, Side::Left, Vector};
 use super::*;
 use crate::scoring::Grip::Touching;
 use crate::scoring::ObjectFacts;
+use crate::tasks::placement::sides::still_and_released;
 
 fn held() -> Facts {
     Facts::at_rest(&TASK).held_by(&[A, B], "office_table")
@@ -79,18 +80,10 @@ fn align_on_both_sides_of_every_threshold() {
             placed(0.40, 0.0, 0.0).raised("office_table", 0.0401),
         ),
         ("tilt", tilted(14.9), tilted(15.1)),
-        (
-            "speed",
-            changed(&|table| table.velocity_m_s = Vector::X * 0.0499),
-            changed(&|table| table.velocity_m_s = Vector::X * 0.0501),
-        ),
-        (
-            "turning",
-            changed(&|table| table.angular_velocity_rad_s = Vector::Z * 0.1499),
-            changed(&|table| table.angular_velocity_rad_s = Vector::Z * 0.1501),
-        ),
-        ("hands", changed(&|table| table.untouched_s = 0.2), changed(&|table| table.untouched_s = 0.18)),
-    ] {
+    ]
+    .into_iter()
+    .chain(still_and_released(&placed(0.40, 0.0, 0.0), "office_table"))
+    {
         assert!(aligned(&inside), "{what} inside");
         assert!(!aligned(&outside), "{what} outside");
     }

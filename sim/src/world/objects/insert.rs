@@ -5,7 +5,7 @@ use rapier3d::math::Pose;
 use super::model::part_name;
 use super::{Object, ObjectModel, ObjectPlacement};
 use crate::SimError;
-use crate::dynamics::{DPose3, Dynamics, Link, Tree, TreeId};
+use crate::dynamics::{Dynamics, Link, Tree, TreeId};
 use crate::mechanism::{
     Machinery, Placed, START, add_collider, add_equalities, begin, links, precise, rounded,
 };
@@ -20,12 +20,14 @@ pub(in crate::world) struct Furniture {
     pub machinery: Machinery,
 }
 
-/// Inserts a scene: bodies that no joint moves are its room, the links of the others become objects. All begin as the key
-/// `start` has them, if there is one.
+/// Inserts a scene with its origin at `world_from_scene`: bodies that no joint moves are its room, the links of the others become
+/// objects. All begin as the key `start` has them, if there is one.
 pub(in crate::world) fn insert_scene(
     dynamics: &mut Dynamics,
     scene: &Document,
+    world_from_scene: &Pose,
 ) -> Result<Furniture, SimError> {
+    let world_from_file = precise(world_from_scene);
     let mut fixed = Vec::new();
     let mut objects = Vec::new();
     let trees = scene.trees()?;
@@ -33,39 +35,49 @@ pub(in crate::world) fn insert_scene(
     let mut placed = Vec::with_capacity(trees.len());
     for tree in &trees {
         let id = if tree.is_fixed() {
-            for geom in tree.links.iter().flat_map(in_file) {
+            for mut geom in tree.links.iter().flat_map(in_file) {
+                geom.body_from_geom = *world_from_scene * geom.body_from_geom;
                 add_collider(dynamics, &geom, None, None);
                 fixed.push(geom);
             }
             None
         } else {
             let name = |link: &BodyLink| link.name.clone();
-            let tree_links = links(tree, &DPose3::IDENTITY, &actuators);
+            let tree_links = links(tree, &world_from_file, &actuators);
             Some(insert_moving(dynamics, tree, tree_links, name, &mut objects)?)
         };
         placed.push(Placed { tree, id });
     }
     // Welds hold bodies as they are placed, whatever they begin with.
-    add_equalities(dynamics, scene, &placed, &DPose3::IDENTITY)?;
+    add_equalities(dynamics, scene, &placed, &world_from_file)?;
     let machinery = Machinery::of(scene, &placed)?;
     if let Some(start) = scene.keys()?.iter().find(|key| key.name == START) {
-        begin(dynamics, &placed, start);
+        begin(dynamics, &placed, start, &world_from_file);
     }
     keep_apart(dynamics, scene, &placed)?;
     Ok(Furniture { fixed, objects, machinery })
 }
 
-/// What the file's `<exclude>` names never touches.
+/// What the file's `<exclude>` names never touches. Two parts of the room do not anyway.
 fn keep_apart(dynamics: &mut Dynamics, scene: &Document, placed: &[Placed]) -> Result<(), SimError> {
     let link_of = |name: &str| {
+        let has = |link: &BodyLink| link.bodies.iter().any(|body| body.name == name);
         let found = placed.iter().find_map(|Placed { tree, id }| {
-            let has = |link: &BodyLink| link.bodies.iter().any(|body| body.name == name);
-            Some((*id)?.link(tree.links.iter().position(has)?))
+            let link = tree.links.iter().position(has)?;
+            Some(id.map(|id| id.link(link)))
         });
-        found.ok_or_else(|| scene.unsupported(format!("exclude of `{name}`, which is no body that moves")))
+        found.ok_or_else(|| scene.unsupported(format!("exclude of `{name}`, which is no body")))
     };
     for pair in &scene.model.contact.excludes {
-        dynamics.keep_apart(link_of(&pair.body1)?, link_of(&pair.body2)?);
+        match (link_of(&pair.body1)?, link_of(&pair.body2)?) {
+            (Some(a), Some(b)) => dynamics.keep_apart(a, b),
+            (None, None) => {}
+            (Some(_), None) | (None, Some(_)) => {
+                let what =
+                    format!("exclude of `{}` and `{}`, one of which never moves", pair.body1, pair.body2);
+                return Err(scene.unsupported(what));
+            }
+        }
     }
     Ok(())
 }

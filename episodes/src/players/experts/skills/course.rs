@@ -6,8 +6,10 @@ use super::ground::{heading_rad, wrapped_rad};
 use super::stage::{Hands, RobotMove, Stage, WALK_STEPS};
 use super::walk::{Drift, steer};
 use crate::players::PlayerError;
+use crate::scoring::Facts;
 
 const ACCELERATION_M_S2: f32 = 0.3;
+const AT_END_M: f32 = 1e-4;
 /// The slowest that a course is followed.
 const CREEP_M_S: f32 = 0.02;
 /// What a robot's base is asked for, corrections included.
@@ -21,22 +23,55 @@ pub struct Posture {
     pub wrists: Sides<Pose>,
 }
 
+/// Of a course on which nothing is in the way.
+pub const FREE: fn(&Facts) -> f32 = |_| f32::INFINITY;
+
 /// Postures by the distance gone.
 pub struct Course<'a> {
     pub at: &'a dyn Fn(f32) -> Vec<Posture>,
     pub length_m: f32,
     pub pace_m_s: f32,
+    /// How much of it may have been gone by now.
+    pub free_m: &'a dyn Fn(&Facts) -> f32,
     /// For how long robots still correct their places at the end.
     pub hold_s: f32,
 }
 
+/// How far a course was followed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Followed {
+    ToItsEnd,
+    /// Something went wrong here.
+    UpTo {
+        gone_m: f32,
+    },
+}
+
 /// Goes along a course from its beginning to its end, from rest to rest.
 pub fn follow(stage: &mut Stage, course: &Course) -> Result<(), PlayerError> {
+    follow_while(stage, course, 0.0, &mut |_| true).map(drop)
+}
+
+/// As [`follow`], from where `gone_m` of it have been gone, and for as long as all is `well`.
+pub fn follow_while(
+    stage: &mut Stage,
+    course: &Course,
+    mut gone_m: f32,
+    well: &mut dyn FnMut(&Facts) -> bool,
+) -> Result<Followed, PlayerError> {
     let dt_s = WALK_STEPS as f32 * CONTROL_DT_S;
-    let (mut gone_m, mut pace_m_s, mut held_s) = (0.0f32, 0.0f32, 0.0f32);
+    let (mut pace_m_s, mut held_s) = (0.0f32, 0.0f32);
     while held_s < course.hold_s {
         let left_m = course.length_m - gone_m;
-        if left_m > 1e-4 {
+        let facts = stage.facts()?;
+        if !well(&facts) {
+            return Ok(Followed::UpTo { gone_m });
+        }
+        let free_m = (course.free_m)(&facts) - gone_m;
+        if left_m > AT_END_M && free_m < AT_END_M {
+            pace_m_s = 0.0;
+        } else if left_m > AT_END_M {
+            let left_m = left_m.min(free_m);
             let can_stop_m_s = (2.0 * ACCELERATION_M_S2 * left_m).sqrt();
             let most_m_s = course.pace_m_s.min(can_stop_m_s).max(CREEP_M_S);
             pace_m_s = (pace_m_s + ACCELERATION_M_S2 * dt_s).min(most_m_s);
@@ -47,7 +82,6 @@ pub fn follow(stage: &mut Stage, course: &Course) -> Result<(), PlayerError> {
         }
         let now = (course.at)(gone_m);
         let next = (course.at)((gone_m + pace_m_s * dt_s).min(course.length_m));
-        let facts = stage.facts()?;
         let step = |(now, next): (&Posture, &Posture)| {
             let drift = Drift {
                 velocity_m_s: (next.stand.translation - now.stand.translation) / dt_s,
@@ -62,5 +96,5 @@ pub fn follow(stage: &mut Stage, course: &Course) -> Result<(), PlayerError> {
         let moves: Vec<RobotMove> = now.iter().zip(&next).map(step).collect();
         stage.advance(WALK_STEPS, &moves)?;
     }
-    Ok(())
+    Ok(Followed::ToItsEnd)
 }

@@ -5,14 +5,15 @@ use tandem_sim::{Pose, Vector};
 use super::bar::BarGrasp;
 use super::stage::{HandMove, Stage};
 use crate::players::PlayerError;
-use crate::scoring::Grip;
+use crate::scoring::{Facts, Grip};
 
 const ATTEMPTS: usize = 4;
 /// From here hands come at bars.
 const STANDOFF_M: f32 = 0.08;
-/// One step of a soft grasp; fingers close over half of them.
+/// One step of a soft grasp; fingers close over the first of them.
 const GIVE_S: f32 = 0.1;
 const GIVES: usize = 16;
+const CLOSING_GIVES: usize = 6;
 /// A wrist gives way by a metre for so many newtons in each step, and by no more than this.
 const STIFFNESS_N_M: f32 = 300.0;
 const MOST_GIVE_M: f32 = 0.01;
@@ -23,12 +24,12 @@ const LEASH_M: f32 = 0.03;
 pub fn take_softly(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
     for _ in 0..ATTEMPTS {
         let before = each(stage, grasps, |grasp, stage| grasp.before(stage, STANDOFF_M))?;
-        stage.perform(1.1, &before)?;
+        stage.perform(0.9, &before)?;
         let around = each(stage, grasps, |grasp, stage| grasp.around(stage))?;
-        stage.perform(0.7, &around)?;
+        stage.perform(0.5, &around)?;
         close_softly(stage, grasps, &around)?;
         let facts = stage.facts()?;
-        if grasps.iter().all(|grasp| facts.holds(grasp.robot, grasp.side, grasp.object)) {
+        if all_hold(&facts, grasps) {
             return Ok(());
         }
         open_in_place(stage, grasps)?;
@@ -44,8 +45,11 @@ fn close_softly(stage: &mut Stage, grasps: &[BarGrasp], around: &[HandMove]) -> 
         goals.push(reach.world_from_wrist.unwrap_or(now));
     }
     for step in 1..=GIVES {
-        let closed = (2.0 * step as f32 / GIVES as f32).min(1.0);
         let facts = stage.facts()?;
+        if step > CLOSING_GIVES + 1 && all_hold(&facts, grasps) {
+            break;
+        }
+        let closed = (step as f32 / CLOSING_GIVES as f32).min(1.0);
         let mut moves = Vec::with_capacity(grasps.len());
         for (grasp, goal) in grasps.iter().zip(&mut goals) {
             let wrist = stage.world_from_wrist(grasp.robot, grasp.side)?;
@@ -59,6 +63,10 @@ fn close_softly(stage: &mut Stage, grasps: &[BarGrasp], around: &[HandMove]) -> 
         stage.glide(GIVE_S, &moves)?;
     }
     Ok(())
+}
+
+fn all_hold(facts: &Facts, grasps: &[BarGrasp]) -> bool {
+    grasps.iter().all(|grasp| facts.holds(grasp.robot, grasp.side, grasp.object))
 }
 
 /// Hands open where they are, for opening fingers push; then they rise. Those that still touch try it again, and give way to what they
@@ -90,7 +98,9 @@ pub fn let_go(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError>
         let before = each(stage, &hooked, |grasp, stage| grasp.before(stage, standoff_m))?;
         stage.perform(0.8, &before)?;
     }
-    stage.set_compliance(None);
+    for grasp in grasps {
+        stage.set_compliance(grasp.robot, None);
+    }
     let open: Vec<HandMove> = grasps.iter().map(BarGrasp::open).collect();
     stage.perform(0.5, &open)
 }

@@ -12,6 +12,8 @@ const STEPS_PER_COMMAND: u32 = 10;
 /// Control steps of one command of a robot that walks: hands that are fixed in the world fall behind one that does not say anew where
 /// they are to be.
 pub const WALK_STEPS: u32 = 5;
+/// Control steps of every command while several scripts are played at once.
+pub const BEAT_STEPS: u32 = WALK_STEPS;
 
 /// How a base goes, in its own heading frame.
 #[derive(Clone, Copy, Debug, Default)]
@@ -57,6 +59,11 @@ impl HandMove {
         HandMove { robot, side, world_from_wrist: None, fingers_rad: Some(fingers_rad) }
     }
 
+    /// As it was told last.
+    pub fn still(robot: usize, side: Side) -> HandMove {
+        HandMove { robot, side, world_from_wrist: None, fingers_rad: None }
+    }
+
     pub fn shaped(self, fingers_rad: [f32; 7]) -> HandMove {
         HandMove { fingers_rad: Some(fingers_rad), ..self }
     }
@@ -69,31 +76,60 @@ struct HandGoal {
     fingers_rad: [f32; 7],
 }
 
-/// An episode and what its hands were last told.
+/// What a robot was last told.
+#[derive(Clone)]
+pub struct Told {
+    goals: Sides<HandGoal>,
+    /// How high its pelvis is to be, where that has been said.
+    height_m: Option<f32>,
+    /// How its hands give way to partners.
+    compliance_n_s_m: Option<f64>,
+}
+
+/// An episode and what its robots were last told.
 pub struct Stage<'a> {
     task: &'static Task,
     episode: &'a mut dyn Backstage,
     /// By robot.
-    goals: Vec<Sides<HandGoal>>,
-    /// By robot: how high its pelvis is to be, where that has been said.
-    heights_m: Vec<Option<f32>>,
-    /// How hands give way to partners.
-    compliance_n_s_m: Option<f64>,
+    told: Vec<Told>,
+    /// Others play at the same time, so that all commands are equally long.
+    in_step: bool,
 }
 
 impl<'a> Stage<'a> {
     pub fn new(task: &'static Task, episode: &'a mut dyn Backstage) -> Result<Stage<'a>, PlayerError> {
         let facts = episode.facts()?;
-        let heights_m = vec![None; facts.robots.len()];
-        let goals = (0..facts.robots.len())
-            .map(|robot| {
-                Sides::from_fn(|side| HandGoal {
-                    world_from_wrist: world_from_wrist(&facts, robot, side),
-                    fingers_rad: [0.0; 7],
-                })
-            })
-            .collect();
-        Ok(Stage { task, episode, goals, heights_m, compliance_n_s_m: None })
+        let told = |robot: usize| Told {
+            goals: Sides::from_fn(|side| HandGoal {
+                world_from_wrist: world_from_wrist(&facts, robot, side),
+                fingers_rad: [0.0; 7],
+            }),
+            height_m: None,
+            compliance_n_s_m: None,
+        };
+        let told = (0..facts.robots.len()).map(told).collect();
+        Ok(Stage { task, episode, told, in_step: false })
+    }
+
+    /// The stage of one of several scripts that are played at once, of which robots were `told` something before.
+    pub fn in_step(task: &'static Task, told: Vec<Told>, episode: &'a mut dyn Backstage) -> Stage<'a> {
+        Stage { task, episode, told, in_step: true }
+    }
+
+    pub fn task(&self) -> &'static Task {
+        self.task
+    }
+
+    /// What robots were last told.
+    pub fn told(&self) -> &[Told] {
+        &self.told
+    }
+
+    /// Takes over what robots were told on another stage.
+    pub fn take_over(&mut self, robots: &[usize], told: &[Told]) {
+        for robot in robots {
+            self.told[*robot] = told[*robot].clone();
+        }
     }
 
     pub fn facts(&mut self) -> Result<Facts, PlayerError> {
@@ -102,12 +138,12 @@ impl<'a> Stage<'a> {
 
     /// How high a robot's pelvis is to be from its next command on.
     pub fn set_height(&mut self, robot: usize, height_m: f32) {
-        self.heights_m[robot] = Some(height_m);
+        self.told[robot].height_m = Some(height_m);
     }
 
-    /// How all hands give way from the next command on.
-    pub fn set_compliance(&mut self, compliance_n_s_m: Option<f64>) {
-        self.compliance_n_s_m = compliance_n_s_m;
+    /// How the hands of a robot give way from its next command on.
+    pub fn set_compliance(&mut self, robot: usize, compliance_n_s_m: Option<f64>) {
+        self.told[robot].compliance_n_s_m = compliance_n_s_m;
     }
 
     /// Moves hands along straight lines for `duration_s`, starting and arriving at rest; robots not named hold still.
@@ -126,15 +162,17 @@ impl<'a> Stage<'a> {
         moves: &[HandMove],
         pace: fn(f32) -> f32,
     ) -> Result<(), PlayerError> {
-        let from = self.goals.clone();
-        let total = (duration_s / CONTROL_DT_S).round().max(1.0) as u32;
+        let from = self.told.clone();
+        let beat = if self.in_step { BEAT_STEPS } else { 1 };
+        let most = if self.in_step { BEAT_STEPS } else { STEPS_PER_COMMAND };
+        let total = ((duration_s / CONTROL_DT_S).round().max(1.0) as u32).next_multiple_of(beat);
         let mut done = 0;
         while done < total {
-            let steps = STEPS_PER_COMMAND.min(total - done);
+            let steps = most.min(total - done);
             let part = pace((done + steps) as f32 / total as f32);
             for hand in moves {
-                let start = from[hand.robot][hand.side];
-                let goal = &mut self.goals[hand.robot][hand.side];
+                let start = from[hand.robot].goals[hand.side];
+                let goal = &mut self.told[hand.robot].goals[hand.side];
                 if let Some(end) = hand.world_from_wrist {
                     goal.world_from_wrist = start.world_from_wrist.lerp(&end, part);
                 }
@@ -150,6 +188,13 @@ impl<'a> Stage<'a> {
         Ok(())
     }
 
+    /// A robot stays as it was told to be for one short command.
+    pub fn hold(&mut self, robot: usize) -> Result<(), PlayerError> {
+        let facts = self.episode.facts()?;
+        let robots = vec![self.wrist_move(&facts, robot)];
+        self.call(BEAT_STEPS, robots)
+    }
+
     /// One command in which robots walk or stand; those that `moves` does not name hold still.
     pub fn advance(&mut self, steps: u32, moves: &[RobotMove]) -> Result<(), PlayerError> {
         let facts = self.episode.facts()?;
@@ -161,7 +206,7 @@ impl<'a> Stage<'a> {
                 Hands::Carried(wrists) => (wrists.map(|wrist| world_from_pelvis * wrist), true),
             };
             for side in Side::BOTH {
-                self.goals[part.robot][side].world_from_wrist = world_from_wrist[side];
+                self.told[part.robot].goals[side].world_from_wrist = world_from_wrist[side];
             }
             robots.push(WristMove {
                 carried: Some(carried),
@@ -177,7 +222,7 @@ impl<'a> Stage<'a> {
             if let Hands::Carried(wrists) = part.hands {
                 let world_from_pelvis = after.robots[part.robot].pelvis_in_world;
                 for side in Side::BOTH {
-                    self.goals[part.robot][side].world_from_wrist = world_from_pelvis * wrists[side];
+                    self.told[part.robot].goals[side].world_from_wrist = world_from_pelvis * wrists[side];
                 }
             }
         }
@@ -187,13 +232,13 @@ impl<'a> Stage<'a> {
     /// One `move_wrists` with the present goals of all robots that `moves` name.
     fn command(&mut self, steps: u32, moves: &[HandMove]) -> Result<(), PlayerError> {
         let facts = self.episode.facts()?;
-        let named = (0..self.goals.len()).filter(|robot| moves.iter().any(|hand| hand.robot == *robot));
+        let named = (0..self.told.len()).filter(|robot| moves.iter().any(|hand| hand.robot == *robot));
         let robots = named.map(|robot| self.wrist_move(&facts, robot)).collect();
         self.call(steps, robots)
     }
 
     fn call(&mut self, steps: u32, robots: Vec<WristMove>) -> Result<(), PlayerError> {
-        match self.episode.call(MoveWrists { steps, robots }.into())? {
+        match self.pass_on(MoveWrists { steps, robots })? {
             ToolReply::Act(reply) if reply.stop_reason == StopReason::StepsDone => Ok(()),
             ToolReply::Act(_) => Err(PlayerError::EpisodeOver),
             other @ (ToolReply::Look(_) | ToolReply::Manage(_)) => Err(PlayerError::Call {
@@ -203,9 +248,15 @@ impl<'a> Stage<'a> {
         }
     }
 
+    /// Makes a call that is known to be sound.
+    pub fn pass_on(&mut self, command: MoveWrists) -> Result<ToolReply, PlayerError> {
+        self.episode.call(command.into())
+    }
+
     fn wrist_move(&self, facts: &Facts, robot: usize) -> WristMove {
+        let told = &self.told[robot];
         let pelvis_from_world = facts.robots[robot].pelvis_in_world.inverse();
-        let goal = |side: Side| self.goals[robot][side];
+        let goal = |side: Side| told.goals[side];
         let pose = |side: Side| pelvis_from_world * goal(side).world_from_wrist;
         let position = |side: Side| Some(pose(side).translation.to_array().map(f64::from));
         let quaternion = |side: Side| {
@@ -220,8 +271,8 @@ impl<'a> Stage<'a> {
             right_quaternion_wxyz: quaternion(Side::Right),
             left_fingers_rad: fingers(Side::Left),
             right_fingers_rad: fingers(Side::Right),
-            pelvis_height_m: self.heights_m[robot].map(f64::from),
-            compliance_n_s_m: self.compliance_n_s_m,
+            pelvis_height_m: told.height_m.map(f64::from),
+            compliance_n_s_m: told.compliance_n_s_m,
             ..WristMove::hold(self.task.robots[robot].name)
         }
     }

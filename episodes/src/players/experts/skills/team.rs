@@ -4,20 +4,27 @@
 use tandem_sim::{Pose, Sides, Vector};
 
 use super::bar::{BarGrasp, move_together};
-use super::course::{Course, Posture, follow};
+use super::course::{Course, FREE, Followed, Posture, follow_while};
 use super::ground::upright;
-use super::stage::Stage;
-use super::walk::{Way, walk_to};
+use super::soft::take_softly;
+use super::stage::{HandMove, Stage};
+use super::walk::{Way, Within, come_near};
 use crate::players::PlayerError;
+use crate::scoring::{Facts, Grip};
 
 /// How far behind a bar in its hands a robot stands.
 const BEHIND_BAR_M: f32 = 0.29;
-/// Towards their places, before anything is held.
+/// Towards their places, before anything is held. Hands that reach out correct the rest.
 const APPROACH_M_S: f32 = 0.3;
+const NEAR: Within = Within { off_m: 0.03, off_rad: 0.05 };
 /// What two robots that walk with a load need.
 const COMPLIANCE_N_S_M: f64 = 250.0;
 /// Robots still correct their places for so long once the object has arrived.
-const HOLD_S: f32 = 1.4;
+const HOLD_S: f32 = 0.7;
+/// A hand has lost what it does not touch for so many commands; the robots then stop for a moment, and take it again no more often.
+const LOST_BEATS: u32 = 5;
+const STOP_S: f32 = 0.6;
+const CARRIES: u32 = 4;
 /// An object that is set down is pressed on the floor by so much.
 const PRESS_M: f32 = 0.004;
 
@@ -26,6 +33,8 @@ pub struct Path<'a> {
     pub at: &'a dyn Fn(f32) -> Pose,
     pub length_m: f32,
     pub pace_m_s: f32,
+    /// How much of it may have been gone by now.
+    pub free_m: &'a dyn Fn(&Facts) -> f32,
 }
 
 /// Robots and their grasps of one object.
@@ -66,7 +75,7 @@ impl<'a> Team<'a> {
     /// Robots walk to where they stand beside the object as it is now.
     pub fn gather(&self, stage: &mut Stage) -> Result<(), PlayerError> {
         let ways = self.ways(stage)?;
-        walk_to(stage, &ways)
+        come_near(stage, &ways, NEAR)
     }
 
     /// The ways to where the robots stand beside the object as it is now.
@@ -96,26 +105,71 @@ impl<'a> Team<'a> {
         let start = self.object(stage)?;
         let raised =
             |share: f32| Pose::from_parts(start.translation + Vector::Z * by_m * share, start.rotation);
-        move_together(stage, self.grasps, &raised, 5, 0.25)?;
-        move_together(stage, self.grasps, &|_| raised(1.0), 1, 0.3)?;
+        move_together(stage, self.grasps, &raised, 5, 0.2)?;
+        move_together(stage, self.grasps, &|_| raised(1.0), 1, 0.2)?;
         self.measure(stage)
     }
 
-    /// Takes the held object along a path, at the end of which it stays for a moment.
-    pub fn carry(&self, stage: &mut Stage, path: &Path) -> Result<(), PlayerError> {
-        let postures = |gone_m: f32| self.postures(&(path.at)(gone_m));
-        stage.set_compliance(self.compliance_n_s_m());
-        let Path { length_m, pace_m_s, .. } = *path;
-        follow(stage, &Course { at: &postures, length_m, pace_m_s, hold_s: HOLD_S })
+    /// Takes the held object along a path, at the end of which it stays for a moment. Hands that lose it on the way take it again.
+    pub fn carry(&mut self, stage: &mut Stage, path: &Path) -> Result<(), PlayerError> {
+        let Path { length_m, pace_m_s, free_m, .. } = *path;
+        let mut from_m = 0.0;
+        for _ in 0..CARRIES {
+            self.give_way(stage, true);
+            let at = |gone_m: f32| self.postures(&(path.at)(gone_m));
+            let course = Course { at: &at, length_m, pace_m_s, hold_s: HOLD_S, free_m };
+            let mut off_beats = 0;
+            let mut well = |facts: &Facts| {
+                off_beats = if self.hands_off(facts).next().is_some() { off_beats + 1 } else { 0 };
+                off_beats < LOST_BEATS
+            };
+            match follow_while(stage, &course, from_m, &mut well)? {
+                Followed::ToItsEnd => return Ok(()),
+                Followed::UpTo { gone_m } => from_m = gone_m,
+            }
+            self.take_again(stage, &(path.at)(from_m))?;
+        }
+        Err(PlayerError::GaveUp("hands lost the load again and again".into()))
+    }
+
+    /// Grasps whose hands do not even touch the object.
+    fn hands_off(&self, facts: &Facts) -> impl Iterator<Item = BarGrasp<'a>> {
+        let off = |grasp: &BarGrasp| facts.object(grasp.object).hands[grasp.robot][grasp.side] == Grip::Off;
+        self.grasps.iter().copied().filter(off).collect::<Vec<_>>().into_iter()
+    }
+
+    /// The robots stand, the hands that have lost the object take it where it is now, and all bring it back to its way.
+    fn take_again(&mut self, stage: &mut Stage, on_its_way: &Pose) -> Result<(), PlayerError> {
+        let still: Vec<HandMove> =
+            self.grasps.iter().map(|grasp| HandMove::still(grasp.robot, grasp.side)).collect();
+        stage.perform(STOP_S, &still)?;
+        let lost: Vec<BarGrasp> = self.hands_off(&stage.facts()?).collect();
+        if !lost.is_empty() {
+            take_softly(stage, &lost)?;
+        }
+        let now = self.object(stage)?;
+        move_together(stage, self.grasps, &|share| now.lerp(on_its_way, share), 4, 0.2)?;
+        self.measure(stage)
     }
 
     /// Takes the held object straight over a place, as high as it is.
-    pub fn carry_to(&self, stage: &mut Stage, place: &Pose, pace_m_s: f32) -> Result<(), PlayerError> {
+    pub fn carry_to(&mut self, stage: &mut Stage, place: &Pose, pace_m_s: f32) -> Result<(), PlayerError> {
+        self.carry_where_free(stage, place, pace_m_s, &FREE)
+    }
+
+    /// As [`Team::carry_to`], no farther than is free by now.
+    pub fn carry_where_free(
+        &mut self,
+        stage: &mut Stage,
+        place: &Pose,
+        pace_m_s: f32,
+        free_m: &dyn Fn(&Facts) -> f32,
+    ) -> Result<(), PlayerError> {
         let from = upright(&self.object(stage)?);
         let over = Pose::from_parts(place.translation.with_z(from.translation.z), place.rotation);
         let length_m = (over.translation - from.translation).length();
         let at = |gone_m: f32| from.lerp(&over, gone_m / length_m);
-        self.carry(stage, &Path { at: &at, length_m, pace_m_s })
+        self.carry(stage, &Path { at: &at, length_m, pace_m_s, free_m })
     }
 
     /// How the robots stand and hold the object where it is to be.
@@ -134,15 +188,18 @@ impl<'a> Team<'a> {
         let from = self.object(stage)?;
         let over = Pose::from_parts(place.translation.with_z(from.translation.z), place.rotation);
         let down = Pose::from_parts(place.translation - Vector::Z * PRESS_M, place.rotation);
-        stage.set_compliance(None);
-        move_together(stage, self.grasps, &|share| from.lerp(&over, share), 4, 0.25)?;
-        move_together(stage, self.grasps, &|share| over.lerp(&down, share), 5, 0.28)?;
-        stage.set_compliance(self.compliance_n_s_m());
+        self.give_way(stage, false);
+        move_together(stage, self.grasps, &|share| from.lerp(&over, share), 4, 0.15)?;
+        move_together(stage, self.grasps, &|share| over.lerp(&down, share), 5, 0.22)?;
+        self.give_way(stage, true);
         Ok(())
     }
 
-    /// One who has no partner gives way to nobody.
-    fn compliance_n_s_m(&self) -> Option<f64> {
-        (self.robots.len() > 1).then_some(COMPLIANCE_N_S_M)
+    /// Whether hands give way to partners from now on. One who has no partner gives way to nobody.
+    fn give_way(&self, stage: &mut Stage, give_way: bool) {
+        let compliance_n_s_m = (give_way && self.robots.len() > 1).then_some(COMPLIANCE_N_S_M);
+        for robot in &self.robots {
+            stage.set_compliance(*robot, compliance_n_s_m);
+        }
     }
 }

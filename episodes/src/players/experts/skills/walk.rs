@@ -9,10 +9,9 @@ use crate::players::PlayerError;
 /// Velocity for each metre that a robot is off its place, and turning for each radian.
 const GAIN_1_S: f32 = 1.0;
 /// A place is reached within this.
-const CLOSE_M: f32 = 0.02;
-const CLOSE_RAD: f32 = 0.04;
+const CLOSE: Within = Within { off_m: 0.02, off_rad: 0.04 };
 /// One who stands is not asked to walk again within this.
-const AT_REST_M: f32 = 0.03;
+const AT_REST: Within = Within { off_m: 0.03, off_rad: 0.04 };
 const TRIES: u32 = 3;
 /// A robot that has not come to rest by then stands close enough, or never will.
 const LONGEST_S: f32 = 20.0;
@@ -27,6 +26,13 @@ pub struct Way {
     pub to: Pose,
     /// No faster than this.
     pub pace_m_s: f32,
+}
+
+/// How near to a place is near enough.
+#[derive(Clone, Copy)]
+pub struct Within {
+    pub off_m: f32,
+    pub off_rad: f32,
 }
 
 /// What a place that itself moves does meanwhile, world frame.
@@ -50,6 +56,24 @@ pub fn steer(at: &Pose, to: &Pose, drift: Drift, pace_m_s: f32) -> Walk {
     }
 }
 
+/// Brings robots near their places, hands kept as they are relative to the body, without waiting for them to come to rest.
+pub fn come_near(stage: &mut Stage, ways: &[Way], within: Within) -> Result<(), PlayerError> {
+    let mut hands = Vec::with_capacity(ways.len());
+    for way in ways {
+        hands.push(stage.facts()?.robots[way.robot].wrist_in_pelvis);
+    }
+    let mut left_s = LONGEST_S;
+    while left_s > 0.0 && !are_there(stage, ways, within)? {
+        let facts = stage.facts()?;
+        let walk = |way: &Way| {
+            steer(&facts.robots[way.robot].pelvis_in_world, &way.to, Drift::default(), way.pace_m_s)
+        };
+        stage.advance(WALK_STEPS, &moves(ways, &hands, walk))?;
+        left_s -= WALK_STEPS as f32 * CONTROL_DT_S;
+    }
+    Ok(())
+}
+
 /// Brings robots to their places, hands kept as they are relative to the body. The others hold still.
 pub fn walk_to(stage: &mut Stage, ways: &[Way]) -> Result<(), PlayerError> {
     let mut hands = Vec::with_capacity(ways.len());
@@ -58,7 +82,7 @@ pub fn walk_to(stage: &mut Stage, ways: &[Way]) -> Result<(), PlayerError> {
     }
     let mut left_s = LONGEST_S;
     for _ in 0..TRIES {
-        while left_s > 0.0 && !are_there(stage, ways, CLOSE_M)? {
+        while left_s > 0.0 && !are_there(stage, ways, CLOSE)? {
             let facts = stage.facts()?;
             let walk = |way: &Way| {
                 steer(&facts.robots[way.robot].pelvis_in_world, &way.to, Drift::default(), way.pace_m_s)
@@ -70,7 +94,7 @@ pub fn walk_to(stage: &mut Stage, ways: &[Way]) -> Result<(), PlayerError> {
             stage.advance(WALK_STEPS, &moves(ways, &hands, |_| Walk::default()))?;
         }
         // Where a robot came by with a sway, it does not come to rest.
-        if are_there(stage, ways, AT_REST_M)? {
+        if are_there(stage, ways, AT_REST)? {
             break;
         }
     }
@@ -86,12 +110,12 @@ fn moves(ways: &[Way], hands: &[Sides<Pose>], walk: impl Fn(&Way) -> Walk) -> Ve
     ways.iter().zip(hands).map(part).collect()
 }
 
-fn are_there(stage: &mut Stage, ways: &[Way], within_m: f32) -> Result<bool, PlayerError> {
+fn are_there(stage: &mut Stage, ways: &[Way], within: Within) -> Result<bool, PlayerError> {
     let facts = stage.facts()?;
     let is_there = |way: &Way| {
         let at = facts.robots[way.robot].pelvis_in_world;
         let off_m = (way.to.translation - at.translation).truncate().length();
-        off_m < within_m && wrapped_rad(heading_rad(&way.to) - heading_rad(&at)).abs() < CLOSE_RAD
+        off_m < within.off_m && wrapped_rad(heading_rad(&way.to) - heading_rad(&at)).abs() < within.off_rad
     };
     Ok(ways.iter().all(is_there))
 }
