@@ -1,6 +1,6 @@
 """The smallest agent, of Python's standard library alone: every robot lifts its right hand by 10 cm, then the episode is finished.
 
-    tandem evaluate --policy exec:"python3 examples/agent.py" --tasks handover --seeds 0 --out runs/agent
+    tandem evaluate --policy exec:"python3 gateway/examples/agents/agent.py" --tasks handover --seeds 0 --out runs/agent
 """
 
 import json

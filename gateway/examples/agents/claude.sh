@@ -1,10 +1,10 @@
 #!/bin/sh
 # Claude Code directs an episode over MCP, with Tandem's tools and no others:
 #
-#     tandem evaluate --policy exec:examples/claude.sh --policy-name claude --tasks handover --seeds 0 --out runs/claude
+#     tandem evaluate --policy exec:gateway/examples/agents/claude.sh --policy-name claude --tasks handover --seeds 0 --out runs/claude
 #
 # Its standard input is the brief; what it says and calls is in stdout.txt beside the episode. Arguments go to `claude`, as
-# exec:"examples/claude.sh --model opus".
+# exec:"gateway/examples/agents/claude.sh --model opus".
 set -eu
 server="{\"type\": \"http\", \"url\": \"$TANDEM_URL/mcp\", \"headers\": {\"Authorization\": \"Bearer ${TANDEM_TOKEN:-none}\"}}"
 exec claude --print --verbose --output-format stream-json \

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Codex directs an episode over MCP:
 #
-#     tandem evaluate --policy exec:examples/codex.sh --policy-name codex --tasks handover --seeds 0 --out runs/codex
+#     tandem evaluate --policy exec:gateway/examples/agents/codex.sh --policy-name codex --tasks handover --seeds 0 --out runs/codex
 #
 # Its standard input is the brief; what it says and calls is in stdout.txt beside the episode. It has a shell of its own that may
 # read files, so run it as a user who may not read the folder of --out of other evaluations.
