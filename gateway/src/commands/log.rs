@@ -19,17 +19,26 @@ pub enum Format {
 
 /// `TANDEM_LOG` sets what is logged, as `debug` or `tandem=debug`.
 pub fn to_stderr(default: LevelFilter) {
-    write(default, Format::Text);
+    write(Targets::new().with_default(default), Format::Text);
 }
 
 /// As [`to_stderr`], in the form of `format`.
-pub fn write(default: LevelFilter, format: Format) {
+pub fn of_server(default: LevelFilter, format: Format) {
+    write(Targets::new().with_default(default), format);
+}
+
+/// As [`to_stderr`], for evaluations: of the servers on which programs play, nothing but warnings.
+pub fn of_evaluations() {
+    let quiet = ["tandem::http", "tandem::hosting"].map(|target| (target, LevelFilter::WARN));
+    write(Targets::new().with_default(LevelFilter::INFO).with_targets(quiet), Format::Text);
+}
+
+fn write(default: Targets, format: Format) {
     let wanted = std::env::var("TANDEM_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
     let lines = tracing_subscriber::fmt::layer().with_writer(std::io::stderr);
     let lines = match format {
         Format::Text => lines.with_ansi(std::io::stderr().is_terminal()).boxed(),
         Format::Json => lines.json().flatten_event(true).with_span_list(false).boxed(),
     };
-    let filter = wanted.unwrap_or_else(|| Targets::new().with_default(default));
-    tracing_subscriber::registry().with(filter).with(lines).init();
+    tracing_subscriber::registry().with(wanted.unwrap_or(default)).with(lines).init();
 }

@@ -27,7 +27,7 @@ pub struct Args {
 
 /// Serves.
 pub fn run(args: Args) -> Outcome {
-    log::write(LevelFilter::INFO, args.log_format);
+    log::of_server(LevelFilter::INFO, args.log_format);
     let flags = Layer { token: token_of_environment()?, ..args.flags };
     let settings = Settings::resolve(flags, args.config.as_deref())?;
     let left = Server::start(settings)?.run_until_signal();
