@@ -24,7 +24,7 @@ use serde::Serialize;
 use serde_json::Value;
 use tandem_tools_spec::{
     Hints, ListTasks, LookReply, SpecError, StartEpisode, Tool as _, ToolReply, ToolSpec, parse_args,
-    parse_start, tool_specs,
+    parse_start, say_tool, tool_specs,
 };
 
 use super::{app::App, problem::ApiError, request::unambiguous};
@@ -65,9 +65,13 @@ impl ServerHandler for McpServer {
     async fn list_tools(
         &self,
         _: Option<PaginatedRequestParams>,
-        _: RequestContext<RoleServer>,
+        context: RequestContext<RoleServer>,
     ) -> Result<ListToolsResult, ErrorData> {
-        let specs = tool_specs(self.app.settings.hints);
+        let hints = self.app.settings.hints;
+        let mut specs = tool_specs(hints);
+        if caller(&context).is_some_and(|who| self.app.table.may_talk(&who)) {
+            specs.push(say_tool(hints));
+        }
         Ok(ListToolsResult::with_all_items(specs.iter().map(described).collect()))
     }
 

@@ -26,7 +26,7 @@ use super::{
 use crate::hosting::{Caller, HostingError, Once, Request as Asked};
 
 /// Every route: path, methods, handlers.
-fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 8] {
+fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 9] {
     [
         ("/healthz", &["GET"], get(health)),
         ("/v1/tasks", &["GET"], get(tasks)),
@@ -34,6 +34,7 @@ fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 8] {
         ("/v1/openapi.json", &["GET"], get(openapi)),
         ("/v1/episodes", &["POST"], post(start)),
         ("/v1/episodes/{id}", &["GET", "DELETE"], get(status).delete(remove)),
+        ("/v1/episodes/{id}/briefing", &["GET"], get(briefing)),
         ("/v1/episodes/{id}/tools", &["GET"], get(episode_tools)),
         ("/v1/episodes/{id}/tools/{name}", &["POST"], post(call)),
     ]
@@ -111,6 +112,15 @@ async fn status(
     Path(id): Path<String>,
 ) -> Result<Response, ApiError> {
     encoding.write(StatusCode::OK, &app.table.hosted(&id)?.status(&who).await?)
+}
+
+async fn briefing(
+    State(app): State<App>,
+    Extension(who): Extension<Caller>,
+    encoding: Encoding,
+    Path(id): Path<String>,
+) -> Result<Response, ApiError> {
+    encoding.write(StatusCode::OK, &app.table.briefing(&id, &who).await?)
 }
 
 async fn call(
