@@ -40,5 +40,7 @@ fn write(default: Targets, format: Format) {
         Format::Text => lines.with_ansi(std::io::stderr().is_terminal()).boxed(),
         Format::Json => lines.json().flatten_event(true).with_span_list(false).boxed(),
     };
-    tracing_subscriber::registry().with(wanted.unwrap_or(default)).with(lines).init();
+    // The library that speaks MCP has three lines for each of our own.
+    let usual = default.with_target("rmcp", LevelFilter::WARN);
+    tracing_subscriber::registry().with(wanted.unwrap_or(usual)).with(lines).init();
 }
