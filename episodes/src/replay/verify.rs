@@ -54,7 +54,10 @@ pub fn verify(recording: &Recording) -> Result<Verified, ReplayError> {
     let mut replay = Replay::start(&recording.spec, begin.as_ref(), recording.path())?;
     let mut compared = Compared { recorded: recording.state_hashes()?.collect::<Result<_, _>>()?, steps: 0 };
     let calls = recording.tool_calls()?;
-    let mut difference = compared.compare(replay.take_hashes()).map(|found| (None, found));
+    // A recording may have been cut before its first call, within the hold that an episode begins with.
+    let cut = recording.result.is_none() && calls.is_empty();
+    let begun = compared.compare(replay.take_hashes()).filter(|found| !cut || found.recorded.is_some());
+    let mut difference = begun.map(|found| (None, found));
     for (index, call) in calls.iter().enumerate() {
         if difference.is_some() {
             break;

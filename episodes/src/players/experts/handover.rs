@@ -21,11 +21,18 @@ const LIFT_M: Vector = Vector::new(0.0, 0.0, 0.10);
 const ABOVE_PAD_M: Vector = Vector::new(0.0, 0.0, 0.05);
 const ATTEMPTS: usize = 4;
 
+/// Whoever has the bottle already has done what comes before.
 pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
-    pick_up(stage)?;
-    let bring = GIVER.carry(stage, MEETING_M)?;
-    stage.perform(1.0, &[bring])?;
-    hand_over(stage)?;
+    if !TAKER.holds(stage)? {
+        if !GIVER.holds(stage)? {
+            pick_up(stage)?;
+        }
+        let bring = GIVER.carry(stage, MEETING_M)?;
+        stage.perform(1.0, &[bring])?;
+        hand_over(stage)?;
+    } else if GIVER.holds(stage)? {
+        release(stage, &GIVER)?;
+    }
     put_down(stage)
 }
 

@@ -27,17 +27,28 @@ const DEEPEST_RAD: f32 = 2.6;
 const TIP_MOVES: u32 = 8;
 const TIP_MOVE_S: f32 = 0.3;
 
+/// Vessels that are held already have been lifted.
 pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
+    if !(CUP.holds(stage)? && GLASS.holds(stage)?) {
+        lift(stage)?;
+    }
+    let glass = GLASS.carry(stage, GLASS_PLACE_M)?;
+    let cup = cup_at(stage, Pose::from_translation(GLASS_PLACE_M), 0.0)?;
+    stage.perform(1.5, &[cup, glass])?;
+    pour_until_it_is_in(stage)
+}
+
+fn lift(stage: &mut Stage) -> Result<(), PlayerError> {
     pick_up_all(stage, &[CUP, GLASS])?;
     let raise = |stage: &mut Stage, grasp: &CylinderGrasp, by_m: f32| {
         let from_m = stage.facts()?.position_m(grasp.object);
         grasp.carry(stage, from_m + Vector::new(0.0, 0.0, by_m))
     };
     let lifts = [raise(stage, &CUP, 0.12)?, raise(stage, &GLASS, 0.06)?];
-    stage.perform(1.0, &lifts)?;
-    let glass = GLASS.carry(stage, GLASS_PLACE_M)?;
-    let cup = cup_at(stage, Pose::from_translation(GLASS_PLACE_M), 0.0)?;
-    stage.perform(1.5, &[cup, glass])?;
+    stage.perform(1.0, &lifts)
+}
+
+fn pour_until_it_is_in(stage: &mut Stage) -> Result<(), PlayerError> {
     let mut tip_rad = TIP_RAD;
     loop {
         pour(stage, tip_rad)?;

@@ -1,0 +1,128 @@
+"""Kills `tandem` at random moments while it records, and while it evaluates and draws pictures; looks at what is left.
+
+    cargo build --release
+    python tests/peers/kills.py [KILLS] [SEED]          # 20 kills while recording and 5 each of the others
+
+A recording that was under way has to hold every call but those of the last second, and `recover` has to make it whole;
+what was stopped has to go on, and to end as it ends when nobody stops it. Needs nothing but Python.
+"""
+
+import json
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+TANDEM = Path(__file__).resolve().parents[2] / "target/release/tandem"
+TASKS, SEEDS = "handover", "0-1"
+LEAST_S, MOST_S = 0.3, 2.5
+LOST_S = 1.0
+
+
+def tandem(*words):
+    return [str(TANDEM), *map(str, words)]
+
+
+def killed(command, after_s):
+    """Whether it was still running when it was killed."""
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        process.wait(timeout=after_s)
+    except subprocess.TimeoutExpired:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        return True
+    return False
+
+
+def run(command):
+    return subprocess.run(command, capture_output=True, text=True, timeout=600)
+
+
+def steps_in(text):
+    """How many control steps `replay --verify` found in a recording."""
+    return int(text.split("verified: ")[1].split()[0])
+
+
+def recordings(chance, kills, work):
+    """Kills a demo that records; what is left becomes whole and verifies, and lacks at most the last second."""
+    faults = []
+    for number in range(kills):
+        runs = work / f"recording{number}"
+        after_s = chance.uniform(LEAST_S, MOST_S)
+        stopped = killed(tandem("demo", "--seed", number, "--runs", runs, "--renderer", "cpu"), after_s)
+        left = list(runs.glob("*/episode.mcap.partial"))
+        if not stopped or not left:
+            print(f"recording {number}: killed after {after_s:.1f} s, nothing under way")
+            continue
+        (partial,) = left
+        size, age_s = partial.stat().st_size, time.time() - partial.stat().st_mtime
+        if size == 0 or age_s > LOST_S + 1.0:
+            faults.append(f"recording {number}: {size} bytes, last written {age_s:.1f} s before the kill")
+        recovered = run(tandem("recover", partial))
+        whole = partial.with_name("episode.mcap")
+        verified = run(tandem("replay", whole, "--verify"))
+        if recovered.returncode or verified.returncode:
+            faults.append(f"recording {number}: {recovered.stderr}{verified.stdout}{verified.stderr}")
+        else:
+            print(f"recording {number}: killed after {after_s:.1f} s, {steps_in(verified.stdout)} states verified")
+    return faults
+
+
+def tree(folder):
+    """Every picture's bytes."""
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*.png"))}
+
+
+def scores(folder):
+    """Of every episode, what it ended with."""
+    episodes = {path.name: json.loads(path.read_text()) for path in sorted((folder / "episodes").glob("*.json"))}
+    keys = ("state_hash", "phases", "steps", "ended")
+    return {name: {key: str(find(episode, key)) for key in keys} for name, episode in episodes.items()}
+
+
+def find(value, key):
+    """The first field of that name, however deep."""
+    if isinstance(value, dict):
+        if key in value:
+            return value[key]
+        value = list(value.values())
+    if isinstance(value, list):
+        return next((found for found in (find(item, key) for item in value) if found is not None), None)
+    return None
+
+
+def resumed(chance, kills, work, name, command, outcome):
+    """Kills `command` again and again in one folder, lets it end, and compares with a run that nobody stopped."""
+    stopped, whole = work / f"{name}-stopped", work / f"{name}-whole"
+    hits = sum(killed(command(stopped), chance.uniform(LEAST_S, MOST_S)) for _ in range(kills))
+    ends = [run(command(folder)) for folder in (stopped, whole)]
+    faults = [f"{name}: {end.stderr}" for end in ends if end.returncode]
+    here, there = outcome(stopped), outcome(whole)
+    if here != there or not here:
+        differing = sorted(key for key in here.keys() | there.keys() if here.get(key) != there.get(key))
+        faults.append(f"{name}: after {hits} kills {differing[:4]} differ ({len(here)} and {len(there)} files)")
+    print(f"{name}: {hits} kills, {len(here)} files as without")
+    return faults
+
+
+def main(kills=20, seed=0):
+    chance = random.Random(seed)
+    with tempfile.TemporaryDirectory() as folder:
+        work = Path(folder)
+        faults = recordings(chance, kills, work)
+        few = max(1, kills // 4)
+        evaluate = lambda out: tandem("evaluate", "--tasks", TASKS, "--seeds", SEEDS, "--record", "--out", out)
+        faults += resumed(chance, few, work, "evaluate", evaluate, scores)
+        mcap = next((work / "evaluate-whole").rglob("episode.mcap"))
+        pictures = lambda out: tandem("replay", mcap, "--render", out, "--rate", 5)
+        faults += resumed(chance, few, work, "render", pictures, tree)
+    print("\n".join(faults) or "nothing was lost")
+    return not faults
+
+
+if __name__ == "__main__":
+    sys.exit(0 if main(*map(int, sys.argv[1:])) else 1)
