@@ -18,17 +18,16 @@ const WALK_M_S: f32 = 0.35;
 const CAME_M: f32 = 0.3;
 const STANDS_M_S: f32 = 0.03;
 /// For so many commands A waits for that, too.
-const MOST_STOPPING_BEATS: u32 = 30;
+const MOST_STOPPING_BEATS: u32 = 20;
 /// With the bottle in hand.
-const CARRY_M_S: f32 = 0.3;
+const CARRY_M_S: f32 = 0.25;
 /// Where a robot has what its right hand takes: ahead of the pelvis, and to the right.
 const AT_HAND_M: Vector = Vector::new(0.40, -0.10, 0.0);
 const LIFT_M: f32 = 0.16;
 /// Away from the trolley before B turns.
 const BACK_M: f32 = 0.30;
 const OVER_PATCH_M: f32 = 0.10;
-/// Nearer than a walking robot sways, B would wait for itself.
-const AT_HAND: Within = Within { off_m: 0.045, off_rad: 0.09 };
+const AT_HAND: Within = Within { off_m: 0.03, off_rad: 0.05 };
 /// On the way back B already turns.
 const ON_THE_WAY: Within = Within { off_m: 0.10, off_rad: 0.8 };
 /// A bottle that is let go of falls so far.
