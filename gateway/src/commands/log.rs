@@ -30,6 +30,8 @@ pub fn write(default: LevelFilter, format: Format) {
         Format::Text => lines.with_ansi(std::io::stderr().is_terminal()).boxed(),
         Format::Json => lines.json().flatten_event(true).with_span_list(false).boxed(),
     };
-    let filter = wanted.unwrap_or_else(|| Targets::new().with_default(default));
+    // The library that speaks MCP has three lines for each of our own.
+    let usual = || Targets::new().with_default(default).with_target("rmcp", LevelFilter::WARN);
+    let filter = wanted.unwrap_or_else(usual);
     tracing_subscriber::registry().with(filter).with(lines).init();
 }
