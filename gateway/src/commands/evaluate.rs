@@ -7,7 +7,6 @@ use tandem_episodes::{
     evaluation::{Plan, Shard, Starts},
     tasks,
 };
-use tracing_subscriber::filter::LevelFilter;
 
 use super::{Outcome, episode_flags::EpisodeFlags, log, played, policy_flags::PolicyFlags};
 
@@ -73,7 +72,7 @@ impl FromStr for ShardFlag {
 
 /// Plays and counts; it is a failure if of some episodes none could be begun.
 pub fn run(args: Args) -> Outcome {
-    log::to_stderr(LevelFilter::INFO);
+    log::of_evaluations();
     let starts = match (args.demos, args.from) {
         (Some(demonstrations), Some(PhaseList(phases))) => Starts::Phases { demonstrations, phases },
         _ => Starts::Task,

@@ -17,13 +17,23 @@ pub enum Format {
     Json,
 }
 
-/// `TANDEM_LOG` sets what is logged, as `debug` or `tandem=debug`.
+/// `TANDEM_LOG` sets what is logged, as `warn` or `tandem=warn`.
 pub fn to_stderr(default: LevelFilter) {
     write(default, Format::Text);
 }
 
 /// As [`to_stderr`], in the form of `format`.
 pub fn write(default: LevelFilter, format: Format) {
+    start(Targets::new().with_default(default), format);
+}
+
+/// As [`to_stderr`], for evaluations: of the servers on which programs play, nothing but warnings.
+pub fn of_evaluations() {
+    let quiet = ["tandem::http", "tandem::hosting"].map(|target| (target, LevelFilter::WARN));
+    start(Targets::new().with_default(LevelFilter::INFO).with_targets(quiet), Format::Text);
+}
+
+fn start(default: Targets, format: Format) {
     let wanted = std::env::var("TANDEM_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
     let lines = tracing_subscriber::fmt::layer().with_writer(std::io::stderr);
     let lines = match format {
@@ -31,7 +41,6 @@ pub fn write(default: LevelFilter, format: Format) {
         Format::Json => lines.json().flatten_event(true).with_span_list(false).boxed(),
     };
     // The library that speaks MCP has three lines for each of our own.
-    let usual = || Targets::new().with_default(default).with_target("rmcp", LevelFilter::WARN);
-    let filter = wanted.unwrap_or_else(usual);
+    let filter = wanted.unwrap_or_else(|| default.with_target("rmcp", LevelFilter::WARN));
     tracing_subscriber::registry().with(filter).with(lines).init();
 }
