@@ -1,6 +1,8 @@
 """The smallest agent, of Python's standard library alone: every robot lifts its right hand by 10 cm, then the episode is finished.
 
     tandem evaluate --policy exec:"python3 gateway/examples/agents/agent.py" --tasks handover --seeds 0 --out runs/agent
+
+With --per-robot it is started for each robot, and lifts the hand of that one.
 """
 
 import json
@@ -14,7 +16,7 @@ MOST_COMMANDS = 8
 
 
 def call(tool, **arguments):
-    headers = {"content-type": "application/json", "authorization": f"Bearer {os.environ.get('TANDEM_TOKEN', 'none')}"}
+    headers = {"content-type": "application/json", "authorization": f"Bearer {os.environ['TANDEM_TOKEN']}"}
     request = urllib.request.Request(f"{EPISODE}/tools/{tool}", json.dumps(arguments).encode(), headers)
     with urllib.request.urlopen(request) as answer:
         return json.load(answer)
@@ -32,7 +34,8 @@ def main():
     with open(os.environ["TANDEM_START"]) as file:
         start = json.load(file)
     steps = start["status"]["budget"]["steps_per_command"]
-    targets = [raised(robot["robot"]) for robot in start["robots"]]
+    mine = os.environ.get("TANDEM_ROBOT")
+    targets = [raised(robot["robot"]) for robot in start["robots"] if mine in (None, robot["robot"])]
     for _ in range(MOST_COMMANDS):
         reports = call("move_wrists", steps=steps, robots=targets)["robots"]
         if all(report["right"]["state"] == "arrived" for report in reports):

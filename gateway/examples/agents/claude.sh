@@ -6,6 +6,6 @@
 # Its standard input is the brief; what it says and calls is in stdout.txt beside the episode. Arguments go to `claude`, as
 # exec:"gateway/examples/agents/claude.sh --model opus".
 set -eu
-server="{\"type\": \"http\", \"url\": \"$TANDEM_URL/mcp\", \"headers\": {\"Authorization\": \"Bearer ${TANDEM_TOKEN:-none}\"}}"
+server="{\"type\": \"http\", \"url\": \"$TANDEM_URL/mcp\", \"headers\": {\"Authorization\": \"Bearer $TANDEM_TOKEN\"}}"
 exec claude --print --verbose --output-format stream-json \
     --tools "" --strict-mcp-config --mcp-config "{\"mcpServers\": {\"tandem\": $server}}" --allowedTools mcp__tandem "$@"

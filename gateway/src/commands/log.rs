@@ -17,7 +17,7 @@ pub enum Format {
     Json,
 }
 
-/// `TANDEM_LOG` sets what is logged, as `debug` or `tandem=debug`.
+/// `TANDEM_LOG` sets what is logged, as `warn` or `tandem=warn`.
 pub fn to_stderr(default: LevelFilter) {
     write(Targets::new().with_default(default), Format::Text);
 }

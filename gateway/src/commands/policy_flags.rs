@@ -6,6 +6,7 @@ use tandem_episodes::{
     EpisodeSpec,
     players::{self, Fared, Place, PlayError, Policy, PolicyCard},
 };
+use tandem_tools_spec::{Driving, Operators};
 
 use crate::drivers::{PRESETS, PolicyMap, Program, Protocol, Remote};
 
@@ -27,6 +28,15 @@ pub struct PolicyFlags {
     /// Longest that a program may run in one episode [default: 3600].
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..))]
     policy_limit: Option<u32>,
+    /// Start one program for each robot, which sees and commands that robot alone.
+    #[arg(long)]
+    per_robot: bool,
+    /// With --per-robot: let the programs talk to each other by the tool say.
+    #[arg(long, requires = "per_robot")]
+    talk: bool,
+    /// With --per-robot: how long the others wait for one that does not command, before its robot holds still [default: 120].
+    #[arg(long, value_name = "SECONDS", requires = "per_robot")]
+    patience: Option<f64>,
     /// What results and reports call the policy, where the text of --policy is no good name.
     #[arg(long, value_name = "NAME")]
     policy_name: Option<String>,
@@ -81,15 +91,19 @@ impl PolicyFlags {
     /// Makes the policy; what it needs is read, and no server is asked yet.
     pub fn policy(self) -> Result<Box<dyn Policy>, Box<dyn Error>> {
         let misplaced = |flag: &str, who: &str| Err(format!("{flag} is for {who}").into());
+        let driving = self.driving()?;
         let policy: Box<dyn Policy> = match (self.policy, self.policy_map, self.policy_limit) {
             (Who::Player(_) | Who::Program(_), Some(_), _) => {
                 return misplaced("--policy-map", "policies at a server");
             }
             (Who::Player(_) | Who::Remote(..), _, Some(_)) => return misplaced("--policy-limit", "programs"),
+            (Who::Player(_) | Who::Remote(..), _, None) if driving.is_per_robot() => {
+                return misplaced("--per-robot", "programs; a policy at a server has one address for each robot");
+            }
             (Who::Player(entry), None, None) => Box::new(Borrowed(entry)),
             (Who::Program(command), None, limit_s) => {
                 let limit = Duration::from_secs(limit_s.unwrap_or(LIMIT_S).into());
-                Box::new(Program::new(command, limit)?)
+                Box::new(Program::new(command, driving, limit)?)
             }
             (Who::Remote(protocol, urls), map, None) => {
                 let default = (protocol == Protocol::Openpi).then(|| Protocol::Openpi.name().to_owned());
@@ -104,6 +118,12 @@ impl PolicyFlags {
             Some(name) => Box::new(Renamed { name, policy }),
             None => policy,
         })
+    }
+
+    fn driving(&self) -> Result<Driving, String> {
+        let operators = self.per_robot.then_some(Operators::PerRobot);
+        let driving = Driving { operators, patience_s: self.patience, talk: self.talk.then_some(true) };
+        driving.validate().map(|()| driving)
     }
 }
 
@@ -164,6 +184,8 @@ mod tests {
         assert!(gr00t.name == remote.name && gr00t.settings != remote.settings);
         let program = card(&["--policy", "exec:true", "--policy-name", "mine"]).unwrap();
         assert_eq!((&*program.name, &program.settings.unwrap()["command"]), ("mine", &"true".into()));
+        let each = card(&["--policy", "exec:true", "--per-robot", "--talk"]).unwrap();
+        assert_eq!((&*each.name, &each.settings.unwrap()["talk"]), ("exec:true per robot", &true.into()));
     }
 
     #[test]
@@ -185,5 +207,8 @@ mod tests {
         );
         check(&["--policy-map", "openpi"], "--policy-map is for policies at a server");
         check(&["--policy-limit", "5"], "--policy-limit is for programs");
+        check(&["--per-robot"], "--per-robot is for programs");
+        check(&["--policy", "exec:true", "--talk"], "--per-robot");
+        check(&["--policy", "exec:true", "--per-robot", "--patience", "0"], "give 0.05 to 600 seconds");
     }
 }

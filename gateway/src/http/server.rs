@@ -3,7 +3,7 @@
 use std::{io, net::SocketAddr, sync::Arc, time::Duration};
 
 use tandem_episodes::{EpisodeSpec, RunFolder};
-use tandem_tools_spec::StartReply;
+use tandem_tools_spec::{Driving, StartReply};
 use tokio::{net::TcpListener, runtime::Runtime, sync::oneshot, task::JoinHandle, time::interval};
 
 use super::{app::App, connections, gate::Gate, limits::Limits, routes::router};
@@ -69,9 +69,10 @@ impl Server {
         &self,
         id: &str,
         spec: EpisodeSpec,
+        driving: &Driving,
         folder: RunFolder,
     ) -> Result<(Arc<EpisodeThread>, StartReply), HostingError> {
-        let start = self.runtime.block_on(self.table.host(id, spec, folder))?;
+        let start = self.runtime.block_on(self.table.host(id, spec, driving, folder))?;
         Ok((self.table.get(id)?, start))
     }
 

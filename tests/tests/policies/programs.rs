@@ -5,7 +5,7 @@ use std::{env, fs, io::Read, path::Path, time::Duration};
 use serde_json::{Value, json};
 use tandem::drivers::Program;
 use tandem_episodes::evaluation::Played;
-use tandem_tools_spec::EndReason;
+use tandem_tools_spec::{Driving, EndReason, Operators};
 
 use super::plans::{plan, play};
 
@@ -20,8 +20,9 @@ fn agent_command(role: &str) -> String {
 #[test]
 #[ignore = "the program that the tests here start"]
 fn agent() {
-    let (Ok(url), Ok(id), Ok(start)) =
-        (env::var("TANDEM_URL"), env::var("TANDEM_EPISODE"), env::var("TANDEM_START"))
+    let variable = |name: &str| env::var(format!("TANDEM_{name}"));
+    let (Ok(url), Ok(id), Ok(start), Ok(token)) =
+        (variable("URL"), variable("EPISODE"), variable("START"), variable("TOKEN"))
     else {
         return;
     };
@@ -31,19 +32,39 @@ fn agent() {
     let start: Value = serde_json::from_slice(&fs::read(start).expect("a file")).expect("JSON");
     assert_eq!((&start["episode_id"], start["action_row"].as_array().map(Vec::len)), (&json!(id), Some(35)));
     let episode = format!("{url}/v1/episodes/{id}");
-    let tool =
-        |name: &str, args: Value| ureq::post(format!("{episode}/tools/{name}")).send_json(args).map(drop);
+    let token = format!("Bearer {token}");
+    assert!(ureq::get(&episode).call().is_err(), "nobody is let in without the token");
+    let tool = |name: &str, args: Value| {
+        ureq::post(format!("{episode}/tools/{name}")).header("authorization", &token).send_json(args)
+    };
     tool("wait", json!({ "steps": 10 })).expect("it waits");
     match env::var("ROLE").as_deref() {
-        Ok("finish") => tool("finish", json!({})).expect("it finishes"),
-        Ok("delete") => drop(ureq::delete(&episode).call().expect("it is deleted")),
+        Ok("finish") => drop(tool("finish", json!({})).expect("it finishes")),
+        Ok("operate") => operate(&variable("ROBOT").expect("a robot"), &tool),
+        Ok("delete") => {
+            drop(ureq::delete(&episode).header("authorization", &token).call().expect("it is deleted"));
+        }
         Ok("leave") => eprintln!("it is too hard"),
         role => panic!("{role:?} is no role"),
     }
 }
 
+/// What the program of one robot does.
+fn operate(robot: &str, tool: &dyn Fn(&str, Value) -> Result<ureq::http::Response<ureq::Body>, ureq::Error>) {
+    let partner = if robot == "A" { "B" } else { "A" };
+    assert!(tool("get_robot_state", json!({ "robot": robot })).is_ok());
+    assert!(tool("get_robot_state", json!({ "robot": partner })).is_err(), "{partner} is another's");
+    for (name, args) in
+        [("say", json!({ "text": format!("I am {robot}.") })), ("wait", json!({ "steps": 5 }))]
+    {
+        let reply: Value = tool(name, args).expect(name).body_mut().read_json().expect("JSON");
+        println!("heard after {name}: {}", reply["heard"]);
+    }
+    tool("finish", json!({})).expect("it finishes");
+}
+
 fn program(command: &str, limit: Duration) -> Program {
-    Program::new(command.into(), limit).expect("settings")
+    Program::new(command.into(), Driving::default(), limit).expect("settings")
 }
 
 fn play_one(command: &str, limit: Duration, folder: &Path) -> Played {
@@ -89,6 +110,29 @@ fn a_program_plays_and_its_words_are_kept() {
         other.episodes[0].thought_s, evaluation.episodes[0].thought_s,
         "another limit is another policy"
     );
+}
+
+#[test]
+fn each_robot_may_have_a_program_of_its_own() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let driving =
+        Driving { operators: Some(Operators::PerRobot), patience_s: None, talk: Some(true) };
+    let programs = Program::new(agent_command("operate"), driving, LONG).expect("settings");
+    let evaluation = play(&plan(&programs, vec![1], false), folder.path());
+    let played = &evaluation.episodes[0];
+    assert_eq!((played.result.ended, played.result.env_steps), (EndReason::Finished, 15));
+    assert_eq!(played.note.as_deref(), Some("p1 was not reached in 15 steps"));
+    for (robot, partner) in [("A", "B"), ("B", "A")] {
+        let kept = |file: &str| {
+            let path = folder.path().join("episodes/handover-1").join(robot).join(file);
+            fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+        };
+        let (brief, said) = (kept("brief.txt"), kept("stdout.txt"));
+        assert!(brief.starts_with(&format!("You direct the humanoid robot {robot} in")), "{brief}");
+        assert!(brief.contains(&format!("Others direct {partner}")) && brief.contains("tool say"), "{brief}");
+        assert!(said.contains(&brief) && said.contains(&format!("I am {partner}.")), "{said}");
+        assert!(!kept("start.json").contains("token"));
+    }
 }
 
 #[test]

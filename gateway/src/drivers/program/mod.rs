@@ -1,8 +1,9 @@
-//! Agents as programs: a fresh process for each episode, which finds a server with that one episode at an address in its
-//! environment, and is stopped with all that it started when the episode or its time is over.
+//! Agents as programs: a fresh process for each episode, or for each of its robots, which finds a server with that one episode at
+//! an address in its environment, and is stopped with all that it started when the episode or its time is over.
 
 mod brief;
 mod ending;
+mod part;
 mod process;
 
 use std::{
@@ -15,19 +16,19 @@ use std::{
 
 use serde_json::json;
 use tandem_episodes::{
-    EpisodeError, EpisodeSpec, OutputError, RunFolder, Visibility, create_private_folder,
+    EpisodeSpec, RunFolder, Visibility, create_private_folder,
     players::{Fared, Place, PlayError, Policy, PolicyCard},
-    write_whole,
 };
-use tandem_tools_spec::{ResultReply, StartReply};
+use tandem_tools_spec::{Driving, ResultReply, StartReply};
 
 use crate::{
     hosting::{EpisodeThread, HostingError},
     http::Server,
     settings::{Layer, Record, Settings, SettingsError},
+    token::Token,
 };
-use brief::brief;
 use ending::Leaving;
+use part::Part;
 use process::{Crowd, Group};
 
 /// How long a program may go on when its episode has ended.
@@ -40,6 +41,8 @@ const ROUND: Duration = Duration::from_millis(50);
 #[derive(Debug)]
 pub struct Program {
     command: String,
+    /// Whether one process directs all robots, or one each.
+    driving: Driving,
     /// Longest that one of its processes may run.
     limit: Duration,
     settings: Arc<Settings>,
@@ -48,7 +51,7 @@ pub struct Program {
 
 impl Program {
     /// Episodes played by `command`, which a shell reads. A signal that ends this process ends those of the program, too.
-    pub fn new(command: String, limit: Duration) -> Result<Program, SettingsError> {
+    pub fn new(command: String, driving: Driving, limit: Duration) -> Result<Program, SettingsError> {
         let flags = Layer {
             listen: Some(([127, 0, 0, 1], 0).into()),
             max_episodes: Some(1),
@@ -58,12 +61,13 @@ impl Program {
         };
         let processes = Arc::new(Crowd::default());
         process::end_with_us(&processes);
-        Ok(Program { command, limit, settings: Settings::resolve(flags, None)?, processes })
+        Ok(Program { command, driving, limit, settings: Settings::resolve(flags, None)?, processes })
     }
 
     /// Those of a server for this episode alone.
-    fn settings_for(&self, spec: &EpisodeSpec, folder: &Path) -> Arc<Settings> {
+    fn settings_for(&self, spec: &EpisodeSpec, token: Token, folder: &Path) -> Arc<Settings> {
         Arc::new(Settings {
+            token: Some(token),
             runs: folder.join("others"),
             disclosure: spec.disclosure,
             hints: spec.hints,
@@ -73,66 +77,60 @@ impl Program {
         })
     }
 
-    /// Starts a process for the episode and waits until it is gone.
+    /// Starts a process for each part and waits until they are gone. Returns how each left, and its status.
     fn run(
         &self,
         server: &Server,
         episode: &EpisodeThread,
         start: &StartReply,
-        folder: &Path,
-    ) -> Result<(Leaving, String), PlayError> {
+        parts: &[Part],
+    ) -> Result<Vec<(Leaving, String)>, PlayError> {
         let url = format!("http://{}", server.address());
-        let kept = |name: &str, text: &str| {
-            write_whole(&folder.join(name), text.as_bytes()).map_err(EpisodeError::from)
-        };
-        kept(brief::FILE, &brief(start, &url))?;
-        kept(
-            START_FILE,
-            &serde_json::to_string_pretty(start).map_err(OutputError::from).map_err(EpisodeError::from)?,
-        )?;
-        let environment = environment(&url, start, folder);
-        let group = Group::start(&self.processes, &self.command, &environment, folder);
-        let mut group = group.map_err(|error| lost("the program cannot be started", error))?;
-        let leaving = self.watch(&mut group, episode).map_err(|error| lost("the program is lost", error))?;
-        let status = group.stop().map_err(|error| lost("the program is lost", error))?;
-        Ok((leaving, status))
+        let mut groups = Vec::new();
+        for part in parts {
+            part.write(start, &url, &self.driving)?;
+        }
+        for part in parts {
+            let environment = part.environment(start, &url);
+            let group = Group::start(&self.processes, &self.command, &environment, &part.folder);
+            groups.push(group.map_err(|error| lost("the program cannot be started", error))?);
+        }
+        let leavings = self.watch(&mut groups, episode).map_err(|error| lost("the program is lost", error))?;
+        let statuses: io::Result<Vec<String>> = groups.into_iter().map(Group::stop).collect();
+        let statuses = statuses.map_err(|error| lost("the program is lost", error))?;
+        Ok(leavings.into_iter().zip(statuses).collect())
     }
 
-    fn watch(&self, group: &mut Group, episode: &EpisodeThread) -> io::Result<Leaving> {
+    fn watch(&self, groups: &mut [Group], episode: &EpisodeThread) -> io::Result<Vec<Leaving>> {
         let began = Instant::now();
         let mut over: Option<Instant> = None;
         loop {
-            if group.has_ended()? {
-                return Ok(Leaving::Left);
-            }
-            if began.elapsed() >= self.limit {
-                return Ok(Leaving::OutOfTime(self.limit));
-            }
-            if episode.ended() && over.get_or_insert_with(Instant::now).elapsed() >= LAST_WORDS {
-                return Ok(Leaving::Stays);
+            let ended: Vec<bool> = groups.iter_mut().map(Group::has_ended).collect::<io::Result<_>>()?;
+            let late = began.elapsed() >= self.limit;
+            let stay = episode.ended() && over.get_or_insert_with(Instant::now).elapsed() >= LAST_WORDS;
+            if late || stay || ended.iter().all(|ended| *ended) {
+                let leaving = |ended: bool| match (ended, late) {
+                    (true, _) => Leaving::Left,
+                    (false, true) => Leaving::OutOfTime(self.limit),
+                    (false, false) => Leaving::Stays,
+                };
+                return Ok(ended.into_iter().map(leaving).collect());
             }
             thread::sleep(ROUND);
         }
     }
 }
 
-/// What the server said at the start, for programs that read JSON.
-const START_FILE: &str = "start.json";
-
-/// What the program finds in its environment, beside ours.
-fn environment(url: &str, start: &StartReply, folder: &Path) -> Vec<(&'static str, String)> {
-    // A server that asks for a token would have it told here, as TANDEM_TOKEN.
-    vec![
-        ("TANDEM_URL", url.into()),
-        ("TANDEM_EPISODE", start.episode_id.clone()),
-        ("TANDEM_START", folder.join(START_FILE).display().to_string()),
-    ]
-}
-
 impl Policy for Program {
     fn card(&self) -> PolicyCard {
-        let settings = json!({ "command": self.command, "limit_s": self.limit.as_secs_f64() });
-        PolicyCard { settings: Some(settings), ..format!("exec:{}", self.command).as_str().into() }
+        let mut settings = json!({ "command": self.command, "limit_s": self.limit.as_secs_f64() });
+        let mut name = format!("exec:{}", self.command);
+        if self.driving.is_per_robot() {
+            name.push_str(" per robot");
+            settings["patience_s"] = self.driving.patience_s().into();
+            settings["talk"] = (self.driving.talk == Some(true)).into();
+        }
+        PolicyCard { settings: Some(settings), ..name.as_str().into() }
     }
 
     fn play_whole(&self, spec: &EpisodeSpec, place: Place) -> Result<Fared, PlayError> {
@@ -140,19 +138,26 @@ impl Policy for Program {
         create_private_folder(folder).map_err(|error| lost("no folder for the episode", error))?;
         let absolute = folder.canonicalize().map_err(|error| lost("no folder for the episode", error))?;
         forget(&absolute.join(tandem_episodes::RESULT_FILE))?;
-        let server = Server::start(self.settings_for(spec, &absolute));
+        let (token, text) = Token::random().map_err(HostingError::from)?;
+        let server = Server::start(self.settings_for(spec, token, &absolute));
         let server = server.map_err(|error| lost("no server", error))?;
         let id = format!("{}-seed{}", spec.task.id, spec.seed);
         let files = RunFolder { path: absolute.clone(), visibility: Visibility::After };
-        let (episode, start) = server.host(&id, spec.clone(), files)?;
-        let ran = self.run(&server, &episode, &start, &absolute);
+        let (episode, start) = server.host(&id, spec.clone(), &self.driving, files)?;
+        let parts = Part::all(&start, &text, &absolute);
+        let ran = self.run(&server, &episode, &start, &parts);
         let over = episode.ended();
         let thought = episode.thought();
         drop(episode);
         server.stop();
-        let (leaving, status) = ran?;
+        let ran = ran?;
         let result = read_result(&absolute)?;
-        let stopped = leaving.reason(&status, over, &result, &absolute);
+        let reasons = ran.iter().zip(&parts).filter_map(|((leaving, status), part)| {
+            let reason = leaving.reason(status, over, &result, &part.folder)?;
+            Some(part.robot.map_or(reason.clone(), |robot| format!("{robot}: {reason}")))
+        });
+        let reasons: Vec<String> = reasons.collect();
+        let stopped = (!reasons.is_empty()).then(|| reasons.join("; "));
         Ok(Fared { result, thought, stopped })
     }
 }
