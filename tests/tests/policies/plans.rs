@@ -16,6 +16,7 @@ pub fn plan(player: &dyn Policy, seeds: Vec<u32>, record: bool) -> Plan<'_> {
         player,
         protocol: Protocol::Benchmark,
         robot: RobotFile::default(),
+        scene: None,
         locomotion: Controller::Balance,
         disclosure: Disclosure::Live,
         hints: Hints::On,
