@@ -7,7 +7,7 @@ use std::{
 };
 
 use serde_json::{Value, json};
-use tandem::commands::demo;
+use tandem::{commands::demo, settings::Layer};
 use tandem_episodes::{Recorder, Recording, RendererKind};
 use tandem_tools_spec::{ActCall, ResultReply};
 use ureq::Agent;
@@ -20,7 +20,8 @@ const TASK: &str = "TANDEM_TEST_OPERATOR";
 /// What the expert of all robots did on seed 0 of Handover, and what came of it.
 fn expert(runs: &Path) -> (Vec<(String, Value)>, ResultReply) {
     let seeds = "0".parse().expect("a seed");
-    let result = demo::play_all(runs, seeds, None, RendererKind::Cpu).expect("an episode").remove(0);
+    let flags = Layer { renderer: Some(RendererKind::Cpu), ..Layer::default() };
+    let result = demo::play_all(runs, seeds, flags).expect("an episode").remove(0);
     let path = runs.join("handover-seed0").join(Recorder::FILE_NAME);
     let calls = Recording::read(&path).expect("a recording").tool_calls().expect("its calls");
     let commands = calls.into_iter().filter(|call| ActCall::TOOLS.contains(&call.tool.as_str()));
