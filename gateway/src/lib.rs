@@ -9,5 +9,6 @@ pub mod drivers;
 pub mod hosting;
 pub mod http;
 pub mod metrics;
+mod one_of;
 pub mod settings;
 pub mod token;

@@ -7,16 +7,14 @@ use std::{
     time::Duration,
 };
 
-use clap::{
-    Args, ValueEnum,
-    builder::{PossibleValuesParser, TypedValueParser},
-};
+use clap::{Args, ValueEnum};
 use serde::Deserialize;
 use tandem_episodes::{
     BaseLimits, Controller, Instructions, InstructionsError, RendererKind, SceneFile, SimError, Visibility,
 };
 use tandem_tools_spec::{Disclosure, Hints};
 
+use crate::one_of::one_of;
 use crate::token::{Token, TokenError};
 
 /// One source of settings; what it leaves out comes from the next. The doc comments are the help text.
@@ -55,14 +53,14 @@ pub struct Layer {
     #[arg(long, env = "TANDEM_LOCOMOTION", value_name = "FILE")]
     pub locomotion: Option<PathBuf>,
     /// Who draws pictures: a graphics processor, the embedded renderer, or whichever is there [default: auto].
-    #[arg(long, env = "TANDEM_RENDERER", value_name = "NAME", value_parser = renderer_parser())]
+    #[arg(long, env = "TANDEM_RENDERER", value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name))]
     pub renderer: Option<RendererKind>,
     /// What policies are told: `live` tells phases in every reply and ends an episode on success, `end` tells them at the end,
     /// `never` only in the files; neither of these two ends an episode on success [default: live].
-    #[arg(long, env = "TANDEM_DISCLOSURE", value_name = "WHEN", value_parser = disclosure_parser())]
+    #[arg(long, env = "TANDEM_DISCLOSURE", value_name = "WHEN", value_parser = one_of(Disclosure::ALL, Disclosure::name))]
     pub disclosure: Option<Disclosure>,
     /// Whether tools' texts and the start's brief say how to grasp, or geometry only [default: on].
-    #[arg(long, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = hints_parser())]
+    #[arg(long, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = one_of(Hints::ALL, Hints::name))]
     pub hints: Option<Hints>,
     /// Episodes that may be held at once; each costs a thread and about 30 MB [default: 8].
     #[arg(long, env = "TANDEM_MAX_EPISODES", value_name = "N")]
@@ -262,27 +260,6 @@ fn token(layer: &Layer, listen: SocketAddr) -> Result<Option<Token>, SettingsErr
         return Err(SettingsError::Open { listen });
     }
     Ok(token)
-}
-
-/// One of the kinds of disclosure, by name.
-pub fn disclosure_parser() -> impl TypedValueParser<Value = Disclosure> {
-    let find = |name: String| Disclosure::ALL.into_iter().find(|disclosure| disclosure.name() == name);
-    PossibleValuesParser::new(Disclosure::ALL.map(Disclosure::name))
-        .try_map(move |name| find(name).ok_or("not one of the kinds"))
-}
-
-/// Whether there are hints, by name.
-pub fn hints_parser() -> impl TypedValueParser<Value = Hints> {
-    let find = |name: String| Hints::ALL.into_iter().find(|hints| hints.name() == name);
-    PossibleValuesParser::new(Hints::ALL.map(Hints::name))
-        .try_map(move |name| find(name).ok_or("neither of the two"))
-}
-
-/// One of the renderers, by name.
-pub fn renderer_parser() -> impl TypedValueParser<Value = RendererKind> {
-    let find = |name: String| RendererKind::ALL.into_iter().find(|kind| kind.name() == name);
-    PossibleValuesParser::new(RendererKind::ALL.map(RendererKind::name))
-        .try_map(move |name| find(name).ok_or("not one of the renderers"))
 }
 
 fn read_layer(path: &Path) -> Result<Layer, SettingsError> {

@@ -17,7 +17,7 @@ use tandem_episodes::{
 use super::Outcome;
 use super::bench_tools::{self, ToolsReport};
 use super::machine::Measured;
-use crate::settings::renderer_parser;
+use crate::one_of::one_of;
 
 /// Measure a part of Tandem on this machine.
 #[derive(Debug, clap::Args)]
@@ -53,7 +53,7 @@ enum Part {
     /// Pictures: those of both robots' eyes in one state, and the one from the room.
     Render {
         /// Who draws: `cpu`, `gpu`, or `auto`.
-        #[arg(long, default_value = "cpu", value_name = "NAME", value_parser = renderer_parser())]
+        #[arg(long, default_value = "cpu", value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name))]
         renderer: RendererKind,
         /// Write the cases to this file as JSON, too.
         #[arg(long, value_name = "FILE")]

@@ -2,10 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{
-    Args,
-    builder::{PossibleValuesParser, TypedValueParser},
-};
+use clap::Args;
 use tandem_episodes::{
     Controller, RendererKind, RobotFile, SceneFile, SimError,
     evaluation::{Plan, Shard, Starts},
@@ -15,7 +12,7 @@ use tandem_episodes::{
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
 use super::Seeds;
-use crate::settings::{disclosure_parser, hints_parser, renderer_parser};
+use crate::one_of::one_of;
 
 /// Which episodes to play.
 #[derive(Debug, Args)]
@@ -27,14 +24,14 @@ pub struct EpisodeFlags {
     #[arg(long, default_value = "0-9", value_name = "SEEDS")]
     seeds: Seeds,
     /// The rules.
-    #[arg(long, value_parser = protocol_parser(), default_value = Protocol::Agentic.name())]
+    #[arg(long, value_parser = one_of(Protocol::ALL, Protocol::name), default_value = Protocol::Agentic.name())]
     protocol: Protocol,
     /// What policies are told, as for `serve`: only `live` ends an episode on success. Results have every phase all the same.
-    #[arg(long, env = "TANDEM_DISCLOSURE", value_name = "WHEN", value_parser = disclosure_parser())]
+    #[arg(long, env = "TANDEM_DISCLOSURE", value_name = "WHEN", value_parser = one_of(Disclosure::ALL, Disclosure::name))]
     #[arg(default_value = Disclosure::Live.name())]
     disclosure: Disclosure,
     /// Whether policies are told how to grasp, as for `serve`.
-    #[arg(long, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = hints_parser())]
+    #[arg(long, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = one_of(Hints::ALL, Hints::name))]
     #[arg(default_value = Hints::On.name())]
     hints: Hints,
     /// Worlds that run side by side.
@@ -82,7 +79,7 @@ impl LocomotionFlag {
 #[derive(Debug, Args)]
 pub struct RendererFlag {
     /// Who draws pictures: a graphics processor, the embedded renderer, or whichever is there.
-    #[arg(long = "renderer", env = "TANDEM_RENDERER", value_name = "NAME", value_parser = renderer_parser(),
+    #[arg(long = "renderer", env = "TANDEM_RENDERER", value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name),
           default_value = RendererKind::default().name())]
     pub kind: RendererKind,
 }
@@ -98,13 +95,6 @@ fn parse_tasks(text: &str) -> Result<TaskList, String> {
         ids => ids.split(',').map(|id| tasks::find(id.trim())).collect(),
     };
     found.map(TaskList).map_err(|error: tandem_episodes::EpisodeError| error.to_string())
-}
-
-/// One of the protocols, by name.
-fn protocol_parser() -> impl TypedValueParser<Value = Protocol> {
-    let find = |name: String| Protocol::ALL.into_iter().find(|protocol| protocol.name() == name);
-    PossibleValuesParser::new(Protocol::ALL.map(Protocol::name))
-        .try_map(move |name| find(name).ok_or("not one of the protocols"))
 }
 
 impl EpisodeFlags {

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use tandem_episodes::assessment::{Assessment, Format, gallery, load};
 use tandem_episodes::write_whole;
 
 use super::Outcome;
+use crate::one_of::one_of;
 
 /// Report on episodes: rates with intervals, averages, effort, failures, and policies compared on the same seeds.
 #[derive(Debug, clap::Args)]
@@ -16,7 +16,7 @@ pub struct Args {
     #[arg(value_name = "DIR", required = true)]
     folders: Vec<PathBuf>,
     /// What to write: a page that needs nothing else, Markdown, a line for each rate, all figures, or tables for LaTeX.
-    #[arg(long, default_value = Format::Html.name(), value_parser = format_parser())]
+    #[arg(long, default_value = Format::Html.name(), value_parser = one_of(Format::ALL, Format::name))]
     format: Format,
     /// File to write [default: report.FORMAT in the first folder].
     #[arg(long, value_name = "FILE")]
@@ -24,13 +24,6 @@ pub struct Args {
     /// Failures to show pictures of, where episodes were recorded.
     #[arg(long, value_name = "N", default_value_t = 12)]
     failures: usize,
-}
-
-/// One of the formats, by name.
-fn format_parser() -> impl TypedValueParser<Value = Format> {
-    let find = |name: String| Format::ALL.into_iter().find(|format| format.name() == name);
-    PossibleValuesParser::new(Format::ALL.map(Format::name))
-        .try_map(move |name| find(name).ok_or("not one of the formats"))
 }
 
 /// Counts and writes.

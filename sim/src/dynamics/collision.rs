@@ -129,6 +129,10 @@ impl Between<'_> {
         DefaultQueryDispatcher
             .contact_manifold_convex_convex(&first.pose_of(second), a, b, None, None, near_m, manifold)
             .expect("Parry knows all convex shapes");
+        // Of two that only just touch it may find no direction; in the next step they are a little deeper, or apart.
+        if !manifold.local_n1.is_normalized() {
+            manifold.clear();
+        }
     }
 
     /// Those of the points that touch, or will within the step.

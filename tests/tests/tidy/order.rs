@@ -42,7 +42,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "gateway",
         &[
-            &["token", "metrics"],
+            &["token", "metrics", "one_of"],
             &["settings"],
             &["hosting"],
             &["http"],
