@@ -106,6 +106,12 @@ fn every_form_says_the_same() {
         let expected_m = point["depth_m"].as_f64().expect("a depth");
         assert!((depth_m - expected_m).abs() < 1e-3 * expected_m, "{depth_m} {expected_m}");
     }
+    let result = server.delete(&format!("/v1/episodes/{id}")).ok();
+    assert_eq!(
+        result["extra_information"],
+        json!(["depth_images"]),
+        "more than the benchmark's policies see"
+    );
 }
 
 /// A positive normal number of half precision.

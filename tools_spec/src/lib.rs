@@ -46,5 +46,10 @@ pub fn episode_tool_specs(hints: Hints, id: &str, most_steps: u32) -> Vec<Episod
 
 /// The tool `say` of the running episode `id`, which has it where its operators may talk.
 pub fn say_spec(hints: Hints, id: &str) -> EpisodeToolSpec {
-    ToolSpec::on_episode::<Say>(hints).of_episode(id, 0)
+    say_tool(hints).of_episode(id, 0)
+}
+
+/// The tool `say` as hosts of language models need it.
+pub fn say_tool(hints: Hints) -> ToolSpec {
+    ToolSpec::on_episode::<Say>(hints)
 }

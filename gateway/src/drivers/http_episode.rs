@@ -5,7 +5,7 @@ use std::{net::SocketAddr, time::Duration};
 use serde::Serialize;
 use serde_json::Value;
 use tandem_episodes::players::{Caller, PlayerError};
-use tandem_tools_spec::{ProblemBody, ResultReply, StartEpisode, StartReply, ToolCall, ToolReply};
+use tandem_tools_spec::{Driving, ProblemBody, ResultReply, StartEpisode, StartReply, ToolCall, ToolReply};
 use ureq::{Agent, http::Response};
 
 /// Longer than any call takes: the slowest, the start with its initial hold, takes a few seconds.
@@ -16,6 +16,15 @@ const TIMEOUT: Duration = Duration::from_secs(120);
 pub struct HttpEpisode {
     agent: Agent,
     url: String,
+}
+
+/// The body of a start.
+#[derive(Debug, Serialize)]
+struct Start<'a> {
+    #[serde(flatten)]
+    args: &'a StartEpisode,
+    #[serde(flatten)]
+    driving: &'a Driving,
 }
 
 /// Why a call over HTTP has no reply.
@@ -35,13 +44,24 @@ pub enum HttpError {
 impl HttpEpisode {
     /// Starts an episode on the server at `address`.
     pub fn start(address: SocketAddr, args: &StartEpisode) -> Result<(HttpEpisode, StartReply), HttpError> {
+        HttpEpisode::start_driven(address, args, &Driving::default())
+    }
+
+    /// As [`HttpEpisode::start`]; where each robot has an operator of its own, the reply has what each needs, and what is returned
+    /// with it can end the episode but not play it.
+    pub fn start_driven(
+        address: SocketAddr,
+        args: &StartEpisode,
+        driving: &Driving,
+    ) -> Result<(HttpEpisode, StartReply), HttpError> {
         let agent = Agent::config_builder()
             .http_status_as_error(false)
             .timeout_global(Some(TIMEOUT))
             .build()
             .new_agent();
         let episodes = format!("http://{address}/v1/episodes");
-        let started: StartReply = serde_json::from_value(post(&agent, &episodes, args)?)?;
+        let body = Start { args, driving };
+        let started: StartReply = serde_json::from_value(post(&agent, &episodes, &body)?)?;
         let url = format!("{episodes}/{}", started.episode_id);
         Ok((HttpEpisode { agent, url }, started))
     }

@@ -46,6 +46,9 @@ enum Command {
     Status {
         reply: oneshot::Sender<Result<Answer, HostingError>>,
     },
+    Briefing {
+        reply: oneshot::Sender<Result<Briefing, HostingError>>,
+    },
     Facts {
         reply: oneshot::Sender<Result<Facts, HostingError>>,
     },
@@ -205,6 +208,13 @@ impl EpisodeThread {
         answer.await.map_err(|_| HostingError::EpisodeStopped)?
     }
 
+    /// What has to be known to begin, as it stands now.
+    pub async fn briefing(&self) -> Result<Briefing, HostingError> {
+        let (reply, answer) = oneshot::channel();
+        self.send(Command::Briefing { reply })?;
+        answer.await.map_err(|_| HostingError::EpisodeStopped)?
+    }
+
     /// Where everything is and who touches what: for experts and scoring in this process, never for policies.
     pub fn facts_blocking(&self) -> Result<Facts, HostingError> {
         let (reply, answer) = oneshot::channel();
@@ -308,6 +318,7 @@ fn serve(mut session: Guarded, mut inbox: mpsc::Receiver<Command>, news: &News) 
                 let _ = reply.send(answers.and_then(|answers| answers));
             }
             Command::Status { reply } => drop(reply.send(session.run(|session| status(session)))),
+            Command::Briefing { reply } => drop(reply.send(session.run(|session| session.briefing()))),
             Command::Facts { reply } => drop(reply.send(session.run(|session| session.facts()))),
             Command::EndIfAbandoned { idle } => {
                 // The log has the reason of a refusal.

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use serde_json::Value;
-use tandem_tools_spec::{Asked, ManageReply, Say, SpecError, StatusReply, Tool, ToolReply, parse_args};
+use tandem_tools_spec::{
+    Asked, Briefing, ManageReply, ResultReply, Say, SpecError, StatusReply, Tool, ToolReply, parse_args,
+};
 
 use super::{
     Answer, Caller, EpisodeThread, HostingError,
@@ -89,9 +91,29 @@ impl Hosted {
         Ok(answer)
     }
 
+    /// What `who` has to know to begin.
+    pub async fn briefing(&self, who: &Caller) -> Result<Briefing, HostingError> {
+        self.admit(who)?;
+        let mut briefing = self.thread.briefing().await?;
+        if let Caller::Operator { robot, .. } = who {
+            briefing.instructions.retain(|entry| entry.robot == *robot);
+            briefing.status.fallen.retain(|entry| entry.robot == *robot);
+        }
+        Ok(briefing)
+    }
+
     /// Whether operators may talk.
     pub fn may_talk(&self) -> bool {
         self.team.as_ref().is_some_and(|team| team.may_talk())
+    }
+
+    /// Ends the episode, as [`EpisodeThread::close`] does; operators who wait for each other are told.
+    pub async fn close(&self) -> Result<ResultReply, HostingError> {
+        let result = self.thread.close().await;
+        if let Some(team) = &self.team {
+            team.stop();
+        }
+        result
     }
 
     /// Whether `who` may know of this episode.

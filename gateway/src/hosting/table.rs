@@ -7,7 +7,7 @@ use std::{
 };
 
 use tandem_episodes::{EpisodeSpec, RunFolder, tasks};
-use tandem_tools_spec::{Driving, Protocol, ResultReply, StartEpisode, StartReply, TaskList};
+use tandem_tools_spec::{Briefing, Driving, Protocol, ResultReply, StartEpisode, StartReply, TaskList};
 use tokio::{
     sync::{OwnedSemaphorePermit, Semaphore},
     task::JoinSet,
@@ -152,6 +152,21 @@ impl EpisodeTable {
         self.lock().episodes.get(id).cloned().ok_or_else(|| unknown(id))
     }
 
+    /// What `who` has to know to play the episode `id`, in this server's words.
+    pub async fn briefing(&self, id: &str, who: &Caller) -> Result<Briefing, HostingError> {
+        let mut briefing = self.hosted(id)?.briefing(who).await?;
+        self.settings.instructions.rephrase_briefing(&mut briefing);
+        Ok(briefing)
+    }
+
+    /// Whether `who` is an operator who may talk to others.
+    pub fn may_talk(&self, who: &Caller) -> bool {
+        match who {
+            Caller::Operator { episode, .. } => self.hosted(episode).is_ok_and(|hosted| hosted.may_talk()),
+            Caller::Host => false,
+        }
+    }
+
     /// The operator whose token `text` is. Every token of every episode is compared.
     pub fn operator(&self, text: &str) -> Option<Caller> {
         let held = self.lock();
@@ -164,7 +179,7 @@ impl EpisodeTable {
     /// Ends the episode `id`, forgets it and returns its result.
     pub async fn remove(&self, id: &str) -> Result<ResultReply, HostingError> {
         let episode = self.lock().episodes.remove(id).ok_or_else(|| unknown(id))?;
-        let result = episode.thread.close().await?;
+        let result = episode.close().await?;
         tracing::info!(episode = id, "closed");
         Ok(result.told(self.settings.disclosure))
     }
@@ -201,12 +216,12 @@ impl EpisodeTable {
             std::mem::take(&mut held.episodes)
         };
         let mut closings = JoinSet::new();
-        for (id, Hosted { thread: episode, .. }) in episodes {
+        for (id, episode) in episodes {
             closings.spawn(async move {
                 match timeout_at(deadline, episode.close()).await {
                     Ok(Ok(_)) => tracing::info!(episode = id, "closed"),
                     Ok(Err(error)) => tracing::error!(episode = id, %error, "not closed"),
-                    Err(_) => return Some(format!("{id} in {}", episode.folder().display())),
+                    Err(_) => return Some(format!("{id} in {}", episode.thread.folder().display())),
                 }
                 None
             });

@@ -24,8 +24,8 @@ use rmcp::{
 use serde::Serialize;
 use serde_json::Value;
 use tandem_tools_spec::{
-    CameraImage, Format, ListTasks, LookReply, StartEpisode, Tool as _, ToolReply, ToolSpec, parse_args,
-    parse_start, say_spec, tool_specs,
+    CameraImage, Format, ListTasks, LookReply, StartEpisode, Tool as _, ToolReply, parse_args, parse_start,
+    say_tool, tool_specs,
 };
 
 use super::{
@@ -75,8 +75,11 @@ impl ServerHandler for McpServer {
         _: Option<PaginatedRequestParams>,
         context: RequestContext<RoleServer>,
     ) -> Result<ListToolsResult, ErrorData> {
-        let mut specs = tool_specs(self.app.settings.hints);
-        specs.extend(caller(&context).and_then(|who| self.say_of(who)));
+        let hints = self.app.settings.hints;
+        let mut specs = tool_specs(hints);
+        if caller(&context).is_some_and(|who| self.app.table.may_talk(who)) {
+            specs.push(say_tool(hints));
+        }
         let tools: Result<Vec<Tool>, _> =
             specs.iter().map(|spec| serde_json::from_value(spec.formatted(Format::Mcp))).collect();
         let tools = tools.map_err(|error| ErrorData::internal_error(error.to_string(), None))?;
@@ -130,13 +133,6 @@ impl ServerHandler for McpServer {
 }
 
 impl McpServer {
-    /// The tool `say`, where `who` may talk.
-    fn say_of(&self, who: &Caller) -> Option<ToolSpec> {
-        let Caller::Operator { episode, .. } = who else { return None };
-        let hosted = self.app.table.hosted(episode).ok()?;
-        hosted.may_talk().then(|| say_spec(self.app.settings.hints, episode).spec)
-    }
-
     async fn call(&self, who: &Caller, name: &str, args: Value) -> Result<Vec<ContentBlock>, ApiError> {
         match name {
             ListTasks::NAME => {

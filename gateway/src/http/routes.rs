@@ -34,7 +34,7 @@ use crate::{
 };
 
 /// Every route: path, methods, handlers.
-fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 10] {
+fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 11] {
     [
         ("/healthz", &["GET"], get(health)),
         ("/metrics", &["GET"], get(metrics)),
@@ -44,6 +44,7 @@ fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 10] 
         ("/v1/openapi.json", &["GET"], get(openapi)),
         ("/v1/episodes", &["POST"], post(start)),
         ("/v1/episodes/{id}", &["GET", "DELETE"], get(status).delete(remove)),
+        ("/v1/episodes/{id}/briefing", &["GET"], get(briefing)),
         ("/v1/episodes/{id}/tools", &["GET"], get(episode_tools)),
         ("/v1/episodes/{id}/tools/{name}", &["POST"], post(call)),
     ]
@@ -151,6 +152,15 @@ async fn status(
     Path(id): Path<String>,
 ) -> Result<Response, ApiError> {
     encoding.write(StatusCode::OK, &app.table.hosted(&id)?.status(&who).await?)
+}
+
+async fn briefing(
+    State(app): State<App>,
+    Extension(who): Extension<Caller>,
+    encoding: Encoding,
+    Path(id): Path<String>,
+) -> Result<Response, ApiError> {
+    encoding.write(StatusCode::OK, &app.table.briefing(&id, &who).await?)
 }
 
 async fn call(

@@ -39,6 +39,10 @@ fn an_operator_sees_and_commands_its_own_robot_alone() {
     let own = [("authorization", bearer.as_str())];
     let status = |method: &str, path: &str| team.server.ask(method, path, &own, b"").0;
     assert_eq!(status("GET", &episode), 200);
+    let (_, _, briefing) = team.server.ask("GET", &format!("{episode}/briefing"), &own, b"");
+    let briefing: Value = serde_json::from_slice(&briefing).expect("JSON");
+    assert_eq!(names(&briefing["instructions"], "robot"), ["B"]);
+    assert!(briefing["brief"]["frames"].is_string() && !briefing.to_string().contains(&team.tokens[0]));
     assert_eq!(status("DELETE", &episode), 403);
     let start = json!({ "task": "handover", "seed": 0, "protocol": "benchmark" });
     team.server.post_with("/v1/episodes", &own, &start).refused(403, &["who started the episode"]);
@@ -109,6 +113,21 @@ fn a_second_command_for_one_step_is_refused() {
 }
 
 #[test]
+fn who_waits_is_told_when_the_episode_is_deleted() {
+    let team = Team::start(json!({}));
+    std::thread::scope(|scope| {
+        let (answered, answers) = mpsc::channel();
+        for _ in 0..2 {
+            let (team, answered) = (&team, answered.clone());
+            scope.spawn(move || answered.send(team.ask(0, "wait", json!({ "steps": 3 }))));
+        }
+        answers.recv().expect("one of the two answers at once").refused(409, &["already"]);
+        team.server.delete(&format!("/v1/episodes/{}", team.id)).ok();
+        answers.recv().expect("the other answer").refused(410, &["the episode has stopped"]);
+    });
+}
+
+#[test]
 fn who_keeps_silent_is_held_and_told_so() {
     let team = Team::start(json!({ "patience_s": 0.1 }));
     for step in [5, 10] {
@@ -146,6 +165,10 @@ fn operators_talk_where_they_may() {
     let (_, _, tools) = team.server.ask("GET", &path, &[("authorization", &bearer)], b"");
     let tools: Value = serde_json::from_slice(&tools).expect("JSON");
     assert!(names(&tools, "name").contains(&"say"), "{tools}");
+    let list = json!({ "jsonrpc": "2.0", "id": 1, "method": "tools/list", "params": {} });
+    let headers = [("authorization", &*bearer), ("accept", "application/json, text/event-stream")];
+    let listed = team.server.post_with("/mcp", &headers, &list).ok();
+    assert!(names(&listed["result"]["tools"], "name").contains(&"say"), "{listed}");
     let (_, recording) = team.verified();
     let calls = recording.tool_calls().expect("its calls");
     let said: Vec<_> = calls.iter().filter(|call| call.tool == "say").collect();

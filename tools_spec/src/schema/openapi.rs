@@ -9,7 +9,7 @@ use crate::error::ProblemBody;
 use crate::limits::MOST_STEPS;
 use crate::parts::{Heard, Partner};
 use crate::tool::Tool;
-use crate::tools::{Finish, GetStatus, StartEpisode};
+use crate::tools::{Briefing, Finish, GetStatus, StartEpisode};
 
 /// The document of a server of `version` with these tools. Each tool has a path of its own, so that generated clients have a
 /// method for each.
@@ -24,6 +24,12 @@ pub fn openapi(version: &str, tools: &[ToolSpec]) -> Value {
     }
     let status = with_notice(plain_schema::<<GetStatus as Tool>::Reply>());
     let result = plain_schema::<<Finish as Tool>::Reply>();
+    let briefing = "What has to be known to play the episode, as its start said it; for the operator of a robot, its own part.";
+    let briefing = operation("episode_briefing", briefing, "200", plain_schema::<Briefing>());
+    paths.insert(
+        "/v1/episodes/{episode_id}/briefing".into(),
+        json!({ "parameters": [episode_id()], "get": briefing }),
+    );
     paths.insert(
         "/v1/episodes/{episode_id}".into(),
         json!({

@@ -150,6 +150,12 @@ impl Team {
         Ok(Answer { others_play_on, ..status })
     }
 
+    /// Nothing is executed any more: whoever waits is told so.
+    pub fn stop(&self) {
+        // Their replies end with their commands.
+        drop(self.round().begin());
+    }
+
     /// Makes the step if nobody has to be waited for, or else begins to wait.
     fn go_on(self: &Arc<Self>, episode: &Arc<EpisodeThread>) {
         let mut round = self.round();
