@@ -98,7 +98,10 @@ impl PolicyFlags {
             }
             (Who::Player(_) | Who::Remote(..), _, Some(_)) => return misplaced("--policy-limit", "programs"),
             (Who::Player(_) | Who::Remote(..), _, None) if driving.is_per_robot() => {
-                return misplaced("--per-robot", "programs; a policy at a server has one address for each robot");
+                return misplaced(
+                    "--per-robot",
+                    "programs; a policy at a server has one address for each robot",
+                );
             }
             (Who::Player(entry), None, None) => Box::new(Borrowed(entry)),
             (Who::Program(command), None, limit_s) => {

@@ -121,9 +121,7 @@ impl EpisodeTable {
         place: OwnedSemaphorePermit,
     ) -> Result<StartReply, HostingError> {
         let (team, operators) = match driving.is_per_robot() {
-            true => {
-                Team::new(spec.task.robot_names(), driving).map(|(team, tokens)| (Some(team), tokens))?
-            }
+            true => Team::new(spec.task.robot_names(), driving).map(|(team, tokens)| (Some(team), tokens))?,
             false => (None, Vec::new()),
         };
         let (episode, mut briefing) =

@@ -26,5 +26,9 @@ fn known(name: &str) -> Option<&'static str> {
 
 /// The names of all tools, with those that need no episode and the one that only some episodes have.
 pub fn every_tool() -> Vec<&'static str> {
-    [ListTasks::NAME, StartEpisode::NAME].into_iter().chain(EPISODE_TOOLS.iter().copied()).chain([Say::NAME]).collect()
+    [ListTasks::NAME, StartEpisode::NAME]
+        .into_iter()
+        .chain(EPISODE_TOOLS.iter().copied())
+        .chain([Say::NAME])
+        .collect()
 }

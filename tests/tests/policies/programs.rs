@@ -115,8 +115,7 @@ fn a_program_plays_and_its_words_are_kept() {
 #[test]
 fn each_robot_may_have_a_program_of_its_own() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let driving =
-        Driving { operators: Some(Operators::PerRobot), patience_s: None, talk: Some(true) };
+    let driving = Driving { operators: Some(Operators::PerRobot), patience_s: None, talk: Some(true) };
     let programs = Program::new(agent_command("operate"), driving, LONG).expect("settings");
     let evaluation = play(&plan(&programs, vec![1], false), folder.path());
     let played = &evaluation.episodes[0];

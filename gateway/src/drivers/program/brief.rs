@@ -43,7 +43,9 @@ fn whom(start: &StartReply, robot: Option<&str>) -> String {
     };
     let others = match others.is_empty() {
         true => String::new(),
-        false => format!(" Others direct {}, one each; you see and command your own alone.", others.join(", ")),
+        false => {
+            format!(" Others direct {}, one each; you see and command your own alone.", others.join(", "))
+        }
     };
     format!(
         "You direct the {whom} in the episode {id:?} on a Tandem server. The episode has begun; you need no other.{others}"

@@ -95,7 +95,8 @@ impl Program {
             let group = Group::start(&self.processes, &self.command, &environment, &part.folder);
             groups.push(group.map_err(|error| lost("the program cannot be started", error))?);
         }
-        let leavings = self.watch(&mut groups, episode).map_err(|error| lost("the program is lost", error))?;
+        let leavings =
+            self.watch(&mut groups, episode).map_err(|error| lost("the program is lost", error))?;
         let statuses: io::Result<Vec<String>> = groups.into_iter().map(Group::stop).collect();
         let statuses = statuses.map_err(|error| lost("the program is lost", error))?;
         Ok(leavings.into_iter().zip(statuses).collect())

@@ -25,7 +25,8 @@ impl<'a> Part<'a> {
         if start.operators.is_empty() {
             return vec![Part { robot: None, token, folder: folder.into() }];
         }
-        let part = |robot: &'a str, token: &'a str| Part { robot: Some(robot), token, folder: folder.join(robot) };
+        let part =
+            |robot: &'a str, token: &'a str| Part { robot: Some(robot), token, folder: folder.join(robot) };
         start.operators.iter().map(|operator| part(&operator.robot, &operator.token)).collect()
     }
 
