@@ -39,7 +39,8 @@ impl<'a> Part<'a> {
         let text = brief(start, url, self.robot, driving);
         write_whole(&self.folder.join(brief::FILE), text.as_bytes())?;
         // Tokens are told to whom they belong, and kept nowhere.
-        let told = StartReply { operators: Vec::new(), ..start.clone() };
+        let mut told = StartReply { operators: Vec::new(), ..start.clone() };
+        told.briefing.instructions.retain(|part| self.robot.is_none_or(|robot| robot == part.robot));
         let text = serde_json::to_string_pretty(&told).map_err(OutputError::from)?;
         Ok(write_whole(&self.folder.join(START_FILE), text.as_bytes())?)
     }
