@@ -18,7 +18,7 @@ const FRICTION_USED: f32 = 0.43;
 const LARGEST_TURN_N_M: f32 = 12.0;
 const TURN_FADE_M: f32 = 0.12;
 /// Of trunk and arms about the vertical.
-pub(super) const TURN_INERTIA_KG_M2: f32 = 1.2;
+const TURN_INERTIA_KG_M2: f32 = 1.2;
 const CORRECTIONS: usize = 2;
 /// Of the centre of mass over the ground: a robot that is lower has fallen.
 const LEAST_HEIGHT_M: f32 = 0.4;

@@ -5,7 +5,6 @@ mod effort;
 mod footstep;
 mod gait;
 mod ground;
-mod heading;
 mod legs;
 mod load;
 mod observer;
@@ -101,7 +100,7 @@ impl Locomotion for Balance {
             Mode::Stand(stand) => stand.tick(body, &load, command.pelvis_height_m, dt_s),
             Mode::Step(step) => {
                 let done = step.tick(body, &load, state.velocity, command.pelvis_height_m, dt_s);
-                state.heading_rad = step.heading.wanted_rad;
+                state.heading_rad = step.heading_rad;
                 done
             }
         };

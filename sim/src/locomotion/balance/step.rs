@@ -14,12 +14,11 @@ use super::effort::{Contact, Motion, Torques, leg_torques_within_limits};
 use super::footstep::{Footstep, Situation};
 use super::gait::{Gait, PERIOD_S, TRANSFER_S};
 use super::ground::nearest_support_m;
-use super::heading::Heading;
 use super::legs::rotation_vector_rad;
 use super::load::Load;
 use super::swing::{SOLE_IN_FOOT_M, SWING_S, Swing};
 use crate::body::{Acceleration, Drive, LEGS, WholeBody};
-use crate::locomotion::plane::{flat, heading_rad};
+use crate::locomotion::plane::{flat, heading_rad, wrapped_rad};
 use crate::locomotion::{BaseVelocity, LegCommand};
 use crate::{GRAVITY_M_S2, Side, Sides};
 
@@ -28,6 +27,11 @@ const SHIFT_GAIN: f32 = 3.0;
 /// falls forward or backward has no time to shift.
 const SHIFTED_M: f32 = 0.012;
 const LATEST_M: f32 = 0.1;
+/// One foot holds little against turning: a robot that is turned by force gives way, and turns back slowly.
+const HEADING_LEASH_RAD: f32 = 0.24;
+const RETURN_RAD_S: f32 = 0.4;
+/// The pelvis sways about the vertical with every step: it faces where it points in the mean of this time.
+const FACING_TIME_S: f32 = 0.2;
 const LIFT_STIFFNESS_1_S2: f32 = 111.0;
 const LIFT_DAMPING_1_S: f32 = 15.0;
 /// Vertical acceleration stays within these parts of gravity.
@@ -57,7 +61,11 @@ const KD_N_M_S_RAD: f32 = 1.0;
 /// A robot that steps; see the module's text.
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct Step {
-    pub(super) heading: Heading,
+    pub(super) heading_rad: f32,
+    /// Where the commands alone would have turned the heading.
+    goal_rad: f32,
+    /// How far where the pelvis faces stays behind the heading.
+    lag_rad: f32,
     stance: Side,
     /// Before the first step: the capture point moves over the first stance foot.
     shifting: bool,
@@ -75,7 +83,9 @@ impl Step {
         let stance = if left_carries { Side::Left } else { Side::Right };
         let ground_m = body.world_from_soles()[stance].translation.z;
         let mut step = Step {
-            heading: Heading::from(heading_rad),
+            heading_rad,
+            goal_rad: heading_rad,
+            lag_rad: 0.0,
             stance,
             shifting: true,
             time_s: 0.0,
@@ -108,18 +118,15 @@ impl Step {
     ) -> (LegCommand, Vector) {
         let soles = body.world_from_soles();
         let ground_m = soles[self.stance].translation.z;
-        let facing_rad = heading_rad(body.world_from_pelvis());
-        self.heading.turn(facing_rad, velocity.turning_rad_s, load.moment_n_m.z, dt_s);
-        let heading = self.heading.rotation();
+        self.turn(body, velocity.turning_rad_s, dt_s);
+        let heading = Rotation::from_rotation_z(self.heading_rad);
         let (ahead, left) = (heading * Vector::X, heading * Vector::Y);
         let rate_1_s = (GRAVITY_M_S2 / (body.com_m.z - ground_m).max(0.4)).sqrt();
         let pelvis_m = body.world_from_pelvis().translation;
-        let faced = self.heading.faced_axes();
+        let faced = self.faced_axes(body, dt_s);
         let velocity_m_s = self.course.corrected_velocity(velocity, self.steps > 0, pelvis_m, faced, dt_s);
         let outside = left * self.stance.sign();
-        let course_m_s = faced[0] * velocity_m_s[0] + faced[1] * velocity_m_s[1];
-        let stagger_m = ahead * (-self.stance.sign() * self.heading.left_ahead_m());
-        let gait = Gait::new(rate_1_s, course_m_s, outside, stagger_m);
+        let gait = Gait::new(rate_1_s, faced[0] * velocity_m_s[0] + faced[1] * velocity_m_s[1], outside);
         let situation = Situation {
             gait: &gait,
             swing: &self.swing,
@@ -147,11 +154,29 @@ impl Step {
         (drives(body, &torques), torques.acceleration_m_s2)
     }
 
+    /// Turns the heading as commanded, within the leash of where the robot faces.
+    fn turn(&mut self, body: &WholeBody, yaw_rate_rad_s: f32, dt_s: f32) {
+        self.goal_rad += yaw_rate_rad_s * dt_s;
+        let return_rad =
+            wrapped_rad(self.goal_rad - self.heading_rad).clamp(-RETURN_RAD_S * dt_s, RETURN_RAD_S * dt_s);
+        self.heading_rad += yaw_rate_rad_s * dt_s + return_rad;
+        let ahead_rad = wrapped_rad(self.heading_rad - heading_rad(body.world_from_pelvis()));
+        self.heading_rad += ahead_rad.clamp(-HEADING_LEASH_RAD, HEADING_LEASH_RAD) - ahead_rad;
+    }
+
+    /// Ahead and left of where the pelvis faces: a velocity is meant along these, and it may stay behind the heading.
+    fn faced_axes(&mut self, body: &WholeBody, dt_s: f32) -> [Vector; 2] {
+        let lag_rad = wrapped_rad(self.heading_rad - heading_rad(body.world_from_pelvis()));
+        self.lag_rad += (lag_rad - self.lag_rad) * (dt_s / FACING_TIME_S);
+        let facing = Rotation::from_rotation_z(self.heading_rad - self.lag_rad);
+        [facing * Vector::X, facing * Vector::Y]
+    }
+
     /// One physics step of the swinging foot.
     fn advance(&mut self, footstep: &Footstep, yaw_rate_rad_s: f32, ground_m: f32, dt_s: f32) {
         self.time_s += dt_s * footstep.pace;
         let remaining_s = (PERIOD_S - self.time_s).max(0.0) / footstep.pace;
-        let turned = Rotation::from_rotation_z(self.heading.wanted_rad + yaw_rate_rad_s * remaining_s);
+        let turned = Rotation::from_rotation_z(self.heading_rad + yaw_rate_rad_s * remaining_s);
         let sole_m = footstep.foothold_m + Vector::Z * ground_m;
         let goal = Pose::from_parts(sole_m - turned * SOLE_IN_FOOT_M, turned);
         self.swing.advance(goal, self.time_s - TRANSFER_S, footstep.pace, dt_s);
@@ -211,7 +236,7 @@ impl Step {
         let tilt_rad = rotation_vector_rad(heading * pelvis.rotation.inverse());
         let spin_rad_s = Vector::Z * yaw_rate_rad_s - body.pelvis_angular_velocity_rad_s;
         let turn = tilt_rad * TRUNK_STIFFNESS_1_S2 + spin_rad_s * TRUNK_DAMPING_1_S;
-        let turn = turn * Vector::new(1.0, 1.0, YAW_PART) + Vector::Z * self.heading.bias_rad_s2();
+        let turn = turn * Vector::new(1.0, 1.0, YAW_PART);
         let most = Vector::splat(LARGEST_TURN_RAD_S2);
         let both = self.shifting || self.time_s < TRANSFER_S;
         let mut feet = Sides::<Acceleration>::default();
