@@ -35,8 +35,8 @@ pub struct PolicyFlags {
     #[arg(long, requires = "per_robot")]
     talk: bool,
     /// With --per-robot: how long the others wait for one that does not command, before its robot holds still [default: 120].
-    #[arg(long, value_name = "SECONDS", requires = "per_robot")]
-    patience: Option<f64>,
+    #[arg(long = "patience", value_name = "SECONDS", requires = "per_robot")]
+    patience_s: Option<f64>,
     /// What results and reports call the policy, where the text of --policy is no good name.
     #[arg(long, value_name = "NAME")]
     policy_name: Option<String>,
@@ -125,7 +125,7 @@ impl PolicyFlags {
 
     fn driving(&self) -> Result<Driving, String> {
         let operators = self.per_robot.then_some(Operators::PerRobot);
-        let driving = Driving { operators, patience_s: self.patience, talk: self.talk.then_some(true) };
+        let driving = Driving { operators, patience_s: self.patience_s, talk: self.talk.then_some(true) };
         driving.validate().map(|()| driving)
     }
 }

@@ -10,8 +10,10 @@ pub struct Answer {
     /// The reply.
     #[serde(flatten)]
     pub reply: ToolReply,
-    /// Control steps executed so far, the initial hold included: what a caller may expect the episode to stand at.
-    pub step: u32,
+    /// Control steps executed so far, the initial hold included: what a caller may expect the episode to stand at. Left out of a
+    /// result, which says it itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step: Option<u32>,
     /// What was seen after a command that asked for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub observation: Option<Observation>,
@@ -32,11 +34,11 @@ pub struct Answer {
 impl Answer {
     /// The answer of `session` with `reply`.
     pub fn new(reply: ToolReply, session: &Session) -> Answer {
-        let says_it = matches!(reply, ToolReply::Manage(ManageReply::Finish(_)));
-        let failed = session.recording_failed().filter(|_| !says_it);
+        let is_result = matches!(reply, ToolReply::Manage(ManageReply::Finish(_)));
+        let failed = session.recording_failed().filter(|_| !is_result);
         Answer {
             reply,
-            step: session.env_steps(),
+            step: (!is_result).then(|| session.env_steps()),
             observation: None,
             partners: Vec::new(),
             heard: Vec::new(),

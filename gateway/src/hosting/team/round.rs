@@ -154,7 +154,9 @@ impl Round {
     pub fn end(&mut self, answer: Option<&Answer>) -> Vec<PartnerDid> {
         self.number += 1;
         let made = answer.and_then(|answer| match &answer.reply {
-            ToolReply::Act(reply) => Some([answer.step.saturating_sub(reply.executed_steps), answer.step]),
+            ToolReply::Act(reply) => {
+                answer.step.map(|step| [step.saturating_sub(reply.executed_steps), step])
+            }
             ToolReply::Look(_) | ToolReply::Manage(_) => None,
         });
         self.operators.iter_mut().map(|operator| operator.end(made)).collect()
