@@ -16,7 +16,7 @@ pub struct Machine {
     rustc: &'static str,
     profile: &'static str,
     /// Processes that wanted to run, means of the last 1, 5 and 15 minutes: figures of a loaded machine are larger.
-    load: Option<[f64; 3]>,
+    load_values: Option<[f64; 3]>,
 }
 
 /// A report with the machine that it is of.
@@ -56,7 +56,7 @@ impl Machine {
             tandem: env!("CARGO_PKG_VERSION"),
             rustc: env!("TANDEM_RUSTC"),
             profile: env!("TANDEM_PROFILE"),
-            load: load(&read("/proc/loadavg")),
+            load_values: load(&read("/proc/loadavg")),
         }
     }
 }

@@ -30,12 +30,12 @@ impl Affine {
     }
 
     #[inline(always)]
-    pub(super) fn map(&self, point: Vector) -> [f32; 3] {
+    pub(super) fn map(&self, point_m: Vector) -> [f32; 3] {
         axes(
             #[inline(always)]
             |i| {
                 let (axis, constant) = self.0[i];
-                axis.x * point.x + axis.y * point.y + axis.z * point.z + constant
+                axis.x * point_m.x + axis.y * point_m.y + axis.z * point_m.z + constant
             },
         )
     }
@@ -67,15 +67,15 @@ impl Points {
     #[inline(always)]
     pub(super) fn map_into<const N: usize>(
         &self,
-        mapped: &mut Vec<[f32; N]>,
+        mapped_values: &mut Vec<[f32; N]>,
         map: impl Fn(&[Lanes; 3]) -> [Lanes; N],
     ) {
-        mapped.resize(self.blocks_m.len() * LANES, [0.0; N]);
-        for (block, mapped) in self.blocks_m.iter().zip(mapped.as_chunks_mut::<LANES>().0) {
+        mapped_values.resize(self.blocks_m.len() * LANES, [0.0; N]);
+        for (block, mapped_values) in self.blocks_m.iter().zip(mapped_values.as_chunks_mut::<LANES>().0) {
             let numbers = map(block);
-            for (i, mapped) in mapped.iter_mut().enumerate() {
-                for (mapped, numbers) in mapped.iter_mut().zip(&numbers) {
-                    *mapped = numbers[i];
+            for (i, mapped_values) in mapped_values.iter_mut().enumerate() {
+                for (mapped_values, numbers) in mapped_values.iter_mut().zip(&numbers) {
+                    *mapped_values = numbers[i];
                 }
             }
         }

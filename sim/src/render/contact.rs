@@ -39,8 +39,8 @@ pub(super) struct ContactMap {
     underside: Rows<f32>,
     corners_m: Vec<[f32; 3]>,
     /// How dark it is, and that smoothed along the rows.
-    dark: Vec<[f32; CONTACT_TEXELS]>,
-    across: Vec<[f32; CONTACT_TEXELS]>,
+    dark_share: Vec<[f32; CONTACT_TEXELS]>,
+    across_share: Vec<[f32; CONTACT_TEXELS]>,
     /// Of squares of texels, row by row: whether it is dark in or right beside them. Mostly it is not.
     dark_cells: Vec<bool>,
 }
@@ -147,7 +147,15 @@ impl ContactMap {
     /// Dark where the lowest underside is near, smoothed.
     #[inline(always)]
     fn darken(&mut self) {
-        let ContactMap { support, underside, dark, across, texel_values, dark_cells, .. } = self;
+        let ContactMap {
+            support,
+            underside,
+            dark_share: dark,
+            across_share: across,
+            texel_values,
+            dark_cells,
+            ..
+        } = self;
         dark_cells.clear();
         dark_cells.resize(CELLS * CELLS, false);
         for rows in [&mut *dark, &mut *across] {
@@ -197,13 +205,13 @@ impl ContactMap {
     }
 
     #[inline(always)]
-    fn darkness_at(&self, u: f32, v: f32, z_m: f32) -> f32 {
-        let (column, row) = (usize::from(u as u16), usize::from(v as u16));
+    fn darkness_at(&self, u_px: f32, v_px: f32, z_m: f32) -> f32 {
+        let (column, row) = (usize::from(u_px as u16), usize::from(v_px as u16));
         if !self.dark_cells[row / CELL * CELLS + column / CELL] {
             return 0.0;
         }
         let at = |j: usize, i: usize| self.texel_values[(row + j) * CONTACT_TEXELS + column + i];
-        let (right, down) = (u - column as f32, v - row as f32);
+        let (right, down) = (u_px - column as f32, v_px - row as f32);
         let [height_m, _] = at(usize::from(down >= 0.5), usize::from(right >= 0.5));
         if (z_m - height_m).abs() > SINK_M {
             return 0.0;

@@ -21,7 +21,8 @@ const ORDER: &[(&str, &[&[&str]])] = &[
             &["locomotion"],
             &["robot"],
             &["world"],
-            &["render", "bench"],
+            &["render"],
+            &["bench"],
         ],
     ),
     (

@@ -93,6 +93,8 @@ const DIMENSIONLESS: &[&str] = &[
     // Any number: of conversions and checks, and of ranges whose own names carry the unit.
     "value",
     "values",
+    "median",
+    "quartiles",
     "min",
     "max",
     // Columns of the contract: joints in rad, then m/s, m/s, rad/s and m of the base.

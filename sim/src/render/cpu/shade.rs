@@ -18,9 +18,9 @@ const ROOM: usize = BATCH + LANES;
 pub(super) struct Rays {
     eye_m: Vector,
     /// Through the first sample, and from one to the next.
-    first: Vector,
-    right: Vector,
-    down: Vector,
+    first_ray: Vector,
+    right_ray: Vector,
+    down_ray: Vector,
 }
 
 /// Pixels side by side that show one sheet.
@@ -50,7 +50,7 @@ pub(super) struct Surfaces {
     open_share: [f32; ROOM],
     /// For each, the pixel and how much it counts there.
     pixels: [u32; ROOM],
-    shares: [f32; ROOM],
+    pixel_share: [f32; ROOM],
     /// Place in the shadow map.
     texel: Vectors,
     sun_factor: [f32; ROOM],
@@ -82,13 +82,13 @@ impl Vectors {
 }
 
 #[inline(always)]
-fn block(numbers: &[f32; ROOM], at: usize) -> &Lanes {
-    numbers[at..].first_chunk().expect("there is room for a block after each point")
+fn block(values: &[f32; ROOM], at: usize) -> &Lanes {
+    values[at..].first_chunk().expect("there is room for a block after each point")
 }
 
 #[inline(always)]
-fn block_mut<const N: usize>(numbers: &mut [f32; ROOM], at: usize) -> &mut Lanes<N> {
-    numbers[at..].first_chunk_mut().expect("there is room for a block after each point")
+fn block_mut<const N: usize>(values: &mut [f32; ROOM], at: usize) -> &mut Lanes<N> {
+    values[at..].first_chunk_mut().expect("there is room for a block after each point")
 }
 
 #[inline(always)]
@@ -103,9 +103,9 @@ impl Rays {
         let (right, down) = (rotation * Vector::X * sample, rotation * Vector::NEG_Y * sample);
         Rays {
             eye_m: camera.world_from_camera.translation,
-            first: rotation * camera.unproject([0.0, 0.0], 1.0) + (right + down) * 0.5,
-            right,
-            down,
+            first_ray: rotation * camera.unproject([0.0, 0.0], 1.0) + (right + down) * 0.5,
+            right_ray: right,
+            down_ray: down,
         }
     }
 }
@@ -120,7 +120,7 @@ impl Surfaces {
             albedo: Vectors::ZERO,
             open_share: [1.0; ROOM],
             pixels: [0; ROOM],
-            shares: [0.0; ROOM],
+            pixel_share: [0.0; ROOM],
             texel: Vectors::ZERO,
             sun_factor: [0.0; ROOM],
             eye_factor: [0.0; ROOM],
@@ -147,7 +147,7 @@ impl Surfaces {
     #[inline(always)]
     fn push_blocks<const N: usize>(&mut self, rays: &Rays, contact: &ContactMap, strip: &Strip<'_>) {
         let (x, y) = (strip.sample[0] as f32, strip.sample[1] as f32);
-        let first_ray = rays.first + rays.right * x + rays.down * y;
+        let first_ray = rays.first_ray + rays.right_ray * x + rays.down_ray * y;
         for start in (0..strip.count).step_by(N) {
             let at = self.count + start;
             let nearness_1_m: Lanes<N> =
@@ -156,7 +156,7 @@ impl Surfaces {
             let across: Lanes<N> = lanes(|i| ((start + i) * SAMPLES) as f32);
             let ray: [Lanes<N>; 3] = axes(
                 #[inline(always)]
-                |axis| lanes(|i| first_ray[axis] + rays.right[axis] * across[i]),
+                |axis| lanes(|i| first_ray[axis] + rays.right_ray[axis] * across[i]),
             );
             let point_m: [Lanes<N>; 3] = axes(
                 #[inline(always)]
@@ -166,7 +166,7 @@ impl Surfaces {
             self.point_m.set(at, point_m);
             self.normal.set(at, strip.facet.normals(&point_m));
             self.albedo.set(at, strip.facet.albedo(&point_m));
-            *block_mut(&mut self.shares, at) = [strip.share; N];
+            *block_mut(&mut self.pixel_share, at) = [strip.share; N];
             *block_mut(&mut self.open_share, at) = [1.0; N];
             for i in 0..N.min(strip.count - start) {
                 self.pixels[at + i] = (strip.first_pixel + start + i) as u32;
@@ -240,7 +240,7 @@ impl Surfaces {
         let (albedo, normal) = (self.albedo.block(at), self.normal.block(at));
         let (eye_factor, highlight) = (block(&self.eye_factor, at), block(&self.highlight_factor, at));
         let (sun_factor, sunlit) = (block(&self.sun_factor, at), block(&self.sunlit_share, at));
-        let (open, share) = (block(&self.open_share, at), block(&self.shares, at));
+        let (open, share) = (block(&self.open_share, at), block(&self.pixel_share, at));
         axes(
             #[inline(always)]
             |axis| {

@@ -200,7 +200,7 @@ impl Layer {
 }
 
 /// The cells whose filters reach what is between two texels.
-fn cells(low: f32, high: f32) -> Range<usize> {
+fn cells(low_px: f32, high_px: f32) -> Range<usize> {
     let cell = |texel: f32| texel.clamp(0.0, TEXELS as f32) as usize / CELL;
-    cell(low - TAPS as f32)..(cell(high) + 1).min(CELLS)
+    cell(low_px - TAPS as f32)..(cell(high_px) + 1).min(CELLS)
 }

@@ -33,8 +33,8 @@ impl SrgbTable {
     }
 
     #[inline(always)]
-    fn at(&self, place: f32) -> u8 {
-        self.0[place.to_bits() as usize % SRGB_STEPS]
+    fn at(&self, place_value: f32) -> u8 {
+        self.0[place_value.to_bits() as usize % SRGB_STEPS]
     }
 }
 

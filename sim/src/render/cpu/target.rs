@@ -44,7 +44,7 @@ pub(super) fn draw<S: Simd>(
         prepared.points[number].map_into(&mut corners, |block| {
             let [x, y, z] = camera_from_mesh.map_lanes(block);
             let nearness: Lanes = lanes(|i| -1.0 / z[i]);
-            let ([cx, cy], focal) = (lens.centre, lens.focal);
+            let ([cx, cy], focal) = (lens.centre_px, lens.focal_px);
             let column = lanes(|i| cx + x[i] * focal * nearness[i]);
             let row = lanes(|i| cy - y[i] * focal * nearness[i]);
             [column, row, nearness, z]
@@ -70,32 +70,32 @@ pub(super) fn draw<S: Simd>(
 
 /// How a camera's frame comes onto the picture's samples.
 struct Lens {
-    focal: f32,
-    centre: [f32; 2],
+    focal_px: f32,
+    centre_px: [f32; 2],
 }
 
 impl Lens {
     fn new(camera: &Camera) -> Lens {
         let [width, height] = [camera.width, camera.height].map(|pixels| (pixels as usize * SAMPLES) as f32);
-        Lens { focal: camera.focal_px() * SAMPLES as f32, centre: [width * 0.5, height * 0.5] }
+        Lens { focal_px: camera.focal_px() * SAMPLES as f32, centre_px: [width * 0.5, height * 0.5] }
     }
 
     /// Column, row and nearness.
     #[inline(always)]
     fn screen(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
         let nearness = -1.0 / z;
-        let [cx, cy] = self.centre;
-        [cx + x * self.focal * nearness, cy - y * self.focal * nearness, nearness]
+        let [cx, cy] = self.centre_px;
+        [cx + x * self.focal_px * nearness, cy - y * self.focal_px * nearness, nearness]
     }
 
     /// Whether a mesh's bounding sphere reaches into the pyramid of view.
     fn sees(&self, (centre, radius): (Vector, f32), camera_from_mesh: Pose) -> bool {
         let c = camera_from_mesh * centre;
         let inside = |across: f32, half: f32| {
-            let tan = half / self.focal;
+            let tan = half / self.focal_px;
             across.abs() + c.z * tan <= radius * (1.0 + tan * tan).sqrt()
         };
-        c.z - radius < -NEAR_M && inside(c.x, self.centre[0]) && inside(c.y, self.centre[1])
+        c.z - radius < -NEAR_M && inside(c.x, self.centre_px[0]) && inside(c.y, self.centre_px[1])
     }
 }
 
