@@ -36,13 +36,19 @@ pub enum EpisodeError {
     #[error("a picture cannot be encoded: {0}")]
     Picture(#[from] tandem_sim::render::PictureError),
     #[error(transparent)]
-    Scene(#[from] SceneError),
+    Scene(Box<SceneError>),
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
     #[error("cannot read this program's own file, which tells it from other builds: {0}")]
     Build(#[source] std::io::Error),
     #[error(transparent)]
     Output(#[from] crate::output::OutputError),
+}
+
+impl From<SceneError> for EpisodeError {
+    fn from(error: SceneError) -> EpisodeError {
+        EpisodeError::Scene(Box::new(error))
+    }
 }
 
 /// Why a task cannot take place in a scene.

@@ -103,7 +103,8 @@ fn a_second_command_for_one_step_is_refused() {
         let (answered, answers) = mpsc::channel();
         for _ in 0..2 {
             let (team, answered) = (&team, answered.clone());
-            scope.spawn(move || answered.send(team.ask(0, "wait", json!({ "steps": 3 }))));
+            scope
+                .spawn(move || answered.send(team.ask(0, "wait", json!({ "steps": 3 }))).expect("who waits"));
         }
         let refused = answers.recv().expect("one of the two answers at once");
         refused.refused(409, &["robot \"A\" has its command for this step already", "B commands"]);
@@ -119,7 +120,8 @@ fn who_waits_is_told_when_the_episode_is_deleted() {
         let (answered, answers) = mpsc::channel();
         for _ in 0..2 {
             let (team, answered) = (&team, answered.clone());
-            scope.spawn(move || answered.send(team.ask(0, "wait", json!({ "steps": 3 }))));
+            scope
+                .spawn(move || answered.send(team.ask(0, "wait", json!({ "steps": 3 }))).expect("who waits"));
         }
         answers.recv().expect("one of the two answers at once").refused(409, &["already"]);
         team.server.delete(&format!("/v1/episodes/{}", team.id)).ok();

@@ -15,6 +15,8 @@ use crate::render::{Carrier, Placed};
 /// Texels along each side of a cell: what is nearer than all of a cell is in the sun there, without a look at its texels.
 const CELL: usize = 8;
 const CELLS: usize = TEXELS / CELL;
+/// Columns of cells that are widened, beginning with none.
+const NO_CELLS: Range<usize> = Range { start: CELLS, end: 0 };
 /// Texels that the filter takes along each axis: a cell counts those that a filter begun in it can reach.
 const TAPS: usize = 4;
 const GRID: Grid = Grid { width: TEXELS, height: TEXELS, pitch_px: 1.0 };
@@ -52,14 +54,14 @@ impl ShadowMap {
             self.map_from_world = sun_map(placed.focus_m, prepared.scenery.focus_radius_m);
             self.still.nearness_m.reset(GRID, 0.0);
             self.still.cells_m.resize(CELLS * CELLS, [0.0; 2]);
-            self.moving = vec![CELLS..0; CELLS];
+            self.moving = vec![NO_CELLS; CELLS];
             self.draw_parts(simd, prepared, placed, |carrier| carrier == Carrier::Room);
             self.still.measure(&vec![0..CELLS; CELLS]);
             self.all.nearness_m.copy(&self.still.nearness_m);
             self.all.cells_m.clone_from(&self.still.cells_m);
         }
         self.all.restore(&self.still, &self.moving);
-        self.moving.fill(CELLS..0);
+        self.moving.fill(NO_CELLS);
         self.draw_parts(simd, prepared, placed, |carrier| carrier != Carrier::Room);
         self.all.measure(&self.moving);
     }
@@ -141,10 +143,10 @@ impl ShadowMap {
         let weights = |part: f32| [1.0 - part, 1.0, 1.0, part];
         let (across, down) = (weights(u - column as f32), weights(v - row as f32));
         let mut columns = [0.0; TAPS];
-        for j in 0..TAPS {
+        for (j, weight) in down.into_iter().enumerate() {
             let occluders = &self.all.nearness_m.row(row - 1 + j)[column - 1..column - 1 + TAPS];
             for i in 0..TAPS {
-                columns[i] += if nearness_m >= occluders[i] { down[j] } else { 0.0 };
+                columns[i] += if nearness_m >= occluders[i] { weight } else { 0.0 };
             }
         }
         (columns[0] * across[0] + columns[1] * across[1] + columns[2] * across[2] + columns[3] * across[3])

@@ -13,8 +13,10 @@ use crate::scoring::Facts;
 /// What some of the robots do while others do something else.
 pub struct Part<'a> {
     pub robots: &'a [usize],
-    pub script: Box<dyn FnOnce(&mut Stage) -> Result<(), PlayerError> + Send + 'a>,
+    pub script: Script<'a>,
 }
+
+type Script<'a> = Box<dyn FnOnce(&mut Stage) -> Result<(), PlayerError> + Send + 'a>;
 
 /// What a part hears once its command has been executed.
 struct Answer {
