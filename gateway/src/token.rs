@@ -1,6 +1,7 @@
 //! Bearer tokens: words that only who may come in knows. They are compared in a time that says nothing of them, and never printed.
 
 use std::{
+    env,
     fmt::{self, Write},
     fs, io,
     path::{Path, PathBuf},
@@ -45,11 +46,24 @@ pub enum TokenError {
     Random(getrandom::Error),
 }
 
+/// The environment's variable with the server's token.
+const TOKEN: &str = "TANDEM_TOKEN";
+
 impl Token {
+    /// The token in the environment's variable `TANDEM_TOKEN`, if it is set.
+    pub fn of_environment() -> Result<Option<Token>, TokenError> {
+        let text = env::var_os(TOKEN).filter(|text| !text.is_empty());
+        // What is no text has no form of a token.
+        text.map(|text| Token::of(&text.to_string_lossy(), TOKEN)).transpose()
+    }
+
     /// The token in a file, without the white space around it.
     pub fn read(path: &Path) -> Result<Token, TokenError> {
         let text =
             fs::read_to_string(path).map_err(|source| TokenError::Read { path: path.into(), source })?;
+        if readable_by_others(path) {
+            tracing::warn!(file = %path.display(), "others on this machine can read the token; chmod 600 keeps it");
+        }
         Token::of(text.trim(), &path.display().to_string())
     }
 
@@ -81,6 +95,17 @@ impl Token {
     }
 }
 
+#[cfg(unix)]
+fn readable_by_others(path: &Path) -> bool {
+    use std::os::unix::fs::PermissionsExt;
+    fs::metadata(path).is_ok_and(|file| file.permissions().mode() & 0o077 != 0)
+}
+
+#[cfg(not(unix))]
+fn readable_by_others(_: &Path) -> bool {
+    false
+}
+
 fn has_form(text: &str) -> bool {
     text.len() <= LONGEST && text.bytes().all(|byte| byte.is_ascii_graphic())
 }
@@ -105,6 +130,8 @@ impl PartialEq for Token {
 
 #[cfg(test)]
 mod tests {
+    use std::os::unix::fs::PermissionsExt;
+
     use super::*;
 
     const GOOD: &str = "0123456789abcdef";
@@ -145,6 +172,10 @@ mod tests {
         let path = folder.path().join("token");
         fs::write(&path, format!("{GOOD}\n")).unwrap();
         assert!(Token::read(&path).unwrap().is(GOOD));
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).unwrap();
+        assert!(!readable_by_others(&path));
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o640)).unwrap();
+        assert!(readable_by_others(&path));
         fs::write(&path, "short\n").unwrap();
         assert!(Token::read(&path).unwrap_err().to_string().contains("16 to 256"));
         assert!(Token::read(folder.path()).unwrap_err().to_string().contains("cannot read"));

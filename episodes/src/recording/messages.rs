@@ -7,9 +7,8 @@ use base64::{DecodeError, Engine, prelude::BASE64_STANDARD};
 use foxglove::{Encode, Schema, bytes::BufMut};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use tandem_sim::{BaseCommand, RobotCommand, RobotState, Side, Step};
-use tandem_tools_spec::{Budget, LookReply, PhaseReached, ToolReply};
+use tandem_tools_spec::{Budget, LookReply, PhaseReached, Png, ToolReply};
 
 use crate::commands::{Called, base_row};
 use crate::output::OutputError;
@@ -40,6 +39,11 @@ impl<T: JsonMessage> Encode for Json<T> {
     }
 }
 
+/// How the hash of a state is written.
+pub fn state_hash_text(state_hash: u64) -> String {
+    format!("{state_hash:016x}")
+}
+
 /// Everything that a control step left behind, as bytes: thousands of numbers that have to come back as they were.
 #[derive(Serialize, Deserialize, JsonSchema)]
 pub struct StepMessage {
@@ -65,11 +69,11 @@ pub enum StepError {
 }
 
 impl StepMessage {
-    pub fn new(step: &Step, state_hash: &str) -> Result<Json<StepMessage>, OutputError> {
+    pub fn new(step: &Step, state_hash: u64) -> Result<Json<StepMessage>, OutputError> {
         let bytes = postcard::to_stdvec(step).map_err(|source| OutputError::Encode(source.into()))?;
         Ok(Json(StepMessage {
             control_step: step.control_step,
-            state_hash: state_hash.into(),
+            state_hash: state_hash_text(state_hash),
             postcard: BASE64_STANDARD.encode(bytes),
         }))
     }
@@ -192,16 +196,45 @@ impl From<&Budget> for Json<BudgetLeft> {
     }
 }
 
-/// A tool call and how it was answered: a reply, or the text of the problem.
-pub struct ToolCallRecord<'a> {
+/// A tool call as it is recorded: the call with its answer, and the pictures of that, which have topics of their own.
+pub struct ToolCallRecord {
     /// When it was answered.
     pub time_s: f64,
-    /// How long the policy has thought since the episode began: what its clock is charged up to this call.
-    pub thought: Duration,
-    /// The robot whose operator made it; `None` where one policy directs all.
-    pub operator: Option<&'a str>,
-    pub called: &'a Called,
-    pub outcome: Result<&'a ToolReply, &'a str>,
+    pub message: ToolCallMessage,
+    /// By robot.
+    pub pictures: Vec<(String, Png)>,
+}
+
+impl ToolCallRecord {
+    /// What `operator` called (`None` where one policy directs all) and how it was answered, by a reply or the text of the
+    /// problem; the policy has `thought` since the episode began, up to this call.
+    pub fn new(
+        time_s: f64,
+        thought: Duration,
+        operator: Option<&str>,
+        called: &Called,
+        outcome: Result<&ToolReply, &str>,
+    ) -> Result<ToolCallRecord, OutputError> {
+        let reply = match outcome {
+            Ok(reply) => without_pictures(reply)?,
+            Err(problem) => problem.to_string(),
+        };
+        let message = ToolCallMessage {
+            tool: called.name().into(),
+            thought_ns: u64::try_from(thought.as_nanos()).unwrap_or(u64::MAX),
+            arguments: called.arguments()?,
+            operator: operator.map(str::to_owned),
+            ok: outcome.is_ok(),
+            reply,
+        };
+        let pictures = match outcome {
+            Ok(ToolReply::Look(LookReply::Observe(seen))) => {
+                seen.images.iter().map(|image| (image.robot.clone(), image.png_base64.clone())).collect()
+            }
+            _ => Vec::new(),
+        };
+        Ok(ToolCallRecord { time_s, message, pictures })
+    }
 }
 
 /// A tool call and its answer. Arguments and reply are JSON texts, since every tool has others.
@@ -224,27 +257,16 @@ impl JsonMessage for ToolCallMessage {
     const SCHEMA_NAME: &str = "tandem.ToolCall";
 }
 
-impl ToolCallMessage {
-    pub fn new(record: &ToolCallRecord) -> Result<Json<Self>, OutputError> {
-        let (ok, reply) = match record.outcome {
-            Ok(reply) => (true, without_pictures(reply)?.to_string()),
-            Err(problem) => (false, problem.to_string()),
-        };
-        let arguments = record.called.arguments()?;
-        let thought_ns = u64::try_from(record.thought.as_nanos()).unwrap_or(u64::MAX);
-        let (tool, operator) = (record.called.name().into(), record.operator.map(str::to_owned));
-        Ok(Json(ToolCallMessage { tool, thought_ns, arguments, operator, ok, reply }))
-    }
-}
-
 /// A reply as JSON. Pictures have a topic of their own and would make this one unreadable.
-fn without_pictures(reply: &ToolReply) -> Result<Value, serde_json::Error> {
+fn without_pictures(reply: &ToolReply) -> Result<String, serde_json::Error> {
     match reply {
         ToolReply::Look(LookReply::Observe(observation)) => {
             let states = serde_json::to_value(&observation.states)?;
             let robots: Vec<&str> = observation.images.iter().map(|image| image.robot.as_str()).collect();
-            Ok(serde_json::json!({ "time_s": observation.time_s, "states": states, "pictures_of": robots }))
+            let told =
+                serde_json::json!({ "time_s": observation.time_s, "states": states, "pictures_of": robots });
+            Ok(told.to_string())
         }
-        other => serde_json::to_value(other),
+        other => serde_json::to_string(other),
     }
 }

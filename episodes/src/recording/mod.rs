@@ -22,13 +22,15 @@ mod scene;
 mod store;
 #[cfg(test)]
 mod tests;
+mod thread;
 mod transforms;
 mod write;
 
-pub use messages::ToolCallRecord;
+pub use messages::{ToolCallRecord, state_hash_text};
 pub use read::{RecordedCall, RecordedCheckpoint, Recording, RecordingError};
 pub use recover::{RecoverError, Recovered, recover};
 pub use store::Visibility;
+pub use thread::RecorderThread;
 pub use write::{Recorder, RecordingHeader};
 
 /// Topics that are read back.

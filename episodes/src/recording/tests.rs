@@ -65,11 +65,11 @@ fn recorder(folder: &Path, world: &World) -> (Recorder, Scores) {
         robots: world.robots().iter().map(sheet).collect(),
         scores: scores.memory(),
     };
-    (Recorder::create(folder, Visibility::Live, header, &start, &hash(world)).unwrap(), scores)
+    (Recorder::create(folder, Visibility::Live, header, &start, world.state_hash()).unwrap(), scores)
 }
 
 fn hash(world: &World) -> String {
-    format!("{:016x}", world.state_hash())
+    state_hash_text(world.state_hash())
 }
 
 fn record_step(recorder: &mut Recorder, scores: &mut Scores, world: &mut World, commands: &[RobotCommand]) {
@@ -79,7 +79,7 @@ fn record_step(recorder: &mut Recorder, scores: &mut Scores, world: &mut World, 
         wall_clock_left_s: Some(1800.0),
         steps_per_command: 25,
     };
-    recorder.step(&step, &hash(world), &scores.update(&step).facts, budget).unwrap();
+    recorder.step(&step, world.state_hash(), &scores.update(&step).facts, budget).unwrap();
 }
 
 /// Records `STEPS` steps, a phase, a refused call and an observation with a picture.
@@ -94,26 +94,16 @@ fn record(folder: &Path) -> (World, PathBuf) {
     recorder.phase(&PhaseReached { id: "p1".into(), name: "grasp_and_lift".into(), time_s }).unwrap();
     let wait = ToolCall::parse("wait", serde_json::json!({ "steps": 10 })).unwrap();
     recorder
-        .tool_call(&ToolCallRecord {
-            time_s,
-            thought: THOUGHT,
-            operator: None,
-            called: &wait.into(),
-            outcome: Err("no steps are left"),
-        })
+        .tool_call(
+            ToolCallRecord::new(time_s, THOUGHT, None, &wait.into(), Err("no steps are left")).unwrap(),
+        )
         .unwrap();
     let observe = ToolCall::parse("observe", serde_json::json!({ "robots": ["A"] })).unwrap();
     let image = CameraImage { robot: "A".into(), png_base64: Png(PICTURE.into()) };
     let seen = Observation { time_s, states: vec![], cameras: vec![], images: vec![image], arrays: vec![] };
     let reply = ToolReply::Look(LookReply::Observe(seen));
     recorder
-        .tool_call(&ToolCallRecord {
-            time_s,
-            thought: THOUGHT,
-            operator: Some("A"),
-            called: &observe.into(),
-            outcome: Ok(&reply),
-        })
+        .tool_call(ToolCallRecord::new(time_s, THOUGHT, Some("A"), &observe.into(), Ok(&reply)).unwrap())
         .unwrap();
     let path = recorder.finish(&result()).unwrap();
     (world, path)

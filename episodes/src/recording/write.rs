@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use base64::{Engine, prelude::BASE64_STANDARD};
 use foxglove::messages::{FrameTransforms, SceneUpdate};
 use tandem_sim::{Step, mjcf::Geom, render::robot_rgba};
-use tandem_tools_spec::{Budget, LookReply, PhaseReached, ResultReply, ToolReply};
+use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
 
 use super::file::{McapFile, Topic};
 use super::messages::{BudgetLeft, Json, Phase, StepMessage, ToolCallMessage, ToolCallRecord};
@@ -59,7 +59,7 @@ impl Recorder {
         visibility: Visibility,
         header: RecordingHeader,
         start: &Step,
-        state_hash: &str,
+        state_hash: u64,
     ) -> Result<Recorder, OutputError> {
         let mut file = McapFile::create(&folder.join(Self::FILE_NAME), visibility)?;
         write_header(&mut file, &header)?;
@@ -110,7 +110,7 @@ impl Recorder {
     pub fn step(
         &mut self,
         step: &Step,
-        state_hash: &str,
+        state_hash: u64,
         facts: &Facts,
         budget: Budget,
     ) -> Result<(), OutputError> {
@@ -134,20 +134,17 @@ impl Recorder {
         self.file.attach(&checkpoint_name(name), time_s, bytes)
     }
 
-    /// Appends a tool call and its answer, and hands everything to the system: what a policy has been told is not lost with
-    /// the process. Pictures of the answer go to the topics of their robots' cameras, one for each state.
-    pub fn tool_call(&mut self, record: &ToolCallRecord) -> Result<(), OutputError> {
-        self.file.write(&mut self.tool_calls, record.time_s, &ToolCallMessage::new(record)?)?;
-        if let Ok(ToolReply::Look(LookReply::Observe(observation))) = record.outcome {
-            for image in &observation.images {
-                let robots = self.robots.iter().zip(&mut self.robot_topics);
-                for (robot, topics) in robots.filter(|(robot, _)| robot.name == image.robot) {
-                    let png = image.png_base64.0.clone();
-                    topics.picture(&mut self.file, robot, record.time_s, png)?;
-                }
+    /// Appends a tool call and its answer. Pictures of the answer go to the topics of their robots' cameras, one for each state.
+    pub fn tool_call(&mut self, record: ToolCallRecord) -> Result<(), OutputError> {
+        let ToolCallRecord { time_s, message, pictures } = record;
+        self.file.write(&mut self.tool_calls, time_s, &Json(message))?;
+        for (name, png) in pictures {
+            let robots = self.robots.iter().zip(&mut self.robot_topics);
+            if let Some((robot, topics)) = robots.into_iter().find(|(robot, _)| robot.name == name) {
+                topics.picture(&mut self.file, robot, time_s, png.0)?;
             }
         }
-        self.flush()
+        Ok(())
     }
 
     /// Hands everything that has been appended to the system.

@@ -6,7 +6,7 @@ use super::ReplayError;
 use crate::EpisodeError;
 use crate::commands::Called;
 use crate::fingerprint;
-use crate::recording::{BEGIN, RecordedCall, Recording};
+use crate::recording::{BEGIN, RecordedCall, Recording, state_hash_text};
 use crate::session::Replay;
 
 /// What came of simulating a recording again.
@@ -105,7 +105,7 @@ impl Compared {
     /// Compares the states that follow; the first difference, if there is one.
     fn compare(&mut self, again: Vec<u64>) -> Option<Found> {
         for hash in again {
-            let again = format!("{hash:016x}");
+            let again = state_hash_text(hash);
             match self.recorded.get(self.steps) {
                 Some((_, recorded)) if *recorded == again => self.steps += 1,
                 other => {

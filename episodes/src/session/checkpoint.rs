@@ -3,6 +3,7 @@
 //! The file is one line of JSON that says whose progress follows, so that `head -1` shows it, then the progress itself.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
@@ -181,7 +182,7 @@ impl Session {
 
     fn restore(&mut self, progress: &Progress) -> Result<(), EpisodeError> {
         self.world.restore(&progress.world)?;
-        self.present = self.world.present();
+        self.present = Arc::new(self.world.present());
         self.steps_before = progress.steps_before;
         for (motion, state) in self.motions.iter_mut().zip(&progress.motions) {
             motion.set_state(state.clone());

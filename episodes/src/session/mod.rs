@@ -21,6 +21,7 @@ pub(crate) use replay::Replay;
 pub use run_files::{RunFiles, RunFolder};
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
@@ -33,7 +34,7 @@ use tandem_tools_spec::{
 use crate::commands::{Called, Command, Motion, OperatorCommand, Run};
 use crate::convert::isometry_from_sim;
 use crate::protocol::{Rules, rules};
-use crate::recording::BEGIN;
+use crate::recording::{BEGIN, state_hash_text};
 use crate::scoring::{Facts, Phase, Scores};
 use crate::spec::{EpisodeSpec, Start};
 use crate::{EpisodeError, fingerprint};
@@ -47,7 +48,7 @@ pub struct Session {
     rules: Rules,
     world: World,
     /// What the last control step left behind.
-    present: Step,
+    present: Arc<Step>,
     motions: Vec<Motion>,
     scores: Scores,
     /// Control steps of the world before the episode, where it begins at a phase of another one.
@@ -91,7 +92,7 @@ impl Session {
     fn build(spec: &EpisodeSpec, clock: Clock) -> Result<Session, EpisodeError> {
         let Built { world, motions, robot, locomotion } = build(spec)?;
         let rules = rules(spec.protocol, spec.task);
-        let present = world.present();
+        let present = Arc::new(world.present());
         Ok(Session {
             origin: Origin { spec: spec.clone(), robot, locomotion },
             rules,
@@ -273,7 +274,7 @@ impl Session {
         if stepped.is_err() {
             self.ended = Some(EndReason::SimulatorFailed);
         }
-        self.present = stepped?;
+        self.present = Arc::new(stepped?);
         for (motion, robot) in self.motions.iter_mut().zip(&self.present.robots) {
             let [left_n, right_n] = [Side::Left, Side::Right].map(|side| robot.state.hand_force_n[side]);
             let hands_n = Vector3::from((left_n + right_n).to_array().map(f64::from));
@@ -286,7 +287,7 @@ impl Session {
             hashes.push(self.world.state_hash());
         }
         if let Some(files) = &mut self.files {
-            files.step(&self.present, &state_hash(&self.world), &scored.facts, budget);
+            files.step(self.present.clone(), self.world.state_hash(), scored.facts, budget);
         }
         if scored.reached {
             self.phases_reached(reached_before);
@@ -377,7 +378,7 @@ impl Session {
 
     /// Equal for equal physical states, 16 hexadecimal digits.
     pub fn state_hash(&self) -> String {
-        state_hash(&self.world)
+        state_hash_text(self.world.state_hash())
     }
 
     /// Why the recording is not complete, if it is not; the episode goes on without it.
@@ -400,10 +401,6 @@ impl Session {
         self.settle();
         self.result()
     }
-}
-
-fn state_hash(world: &World) -> String {
-    format!("{:016x}", world.state_hash())
 }
 
 /// [`fingerprint::build`] as an episode's own error.

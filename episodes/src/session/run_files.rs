@@ -3,6 +3,7 @@
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
 use tandem_sim::{CONTROL_HZ, Step};
@@ -12,7 +13,7 @@ use super::{Session, this_build};
 use crate::EpisodeError;
 use crate::commands::Called;
 use crate::output::{OutputError, create_private_folder, write_whole};
-use crate::recording::{Recorder, RecordingHeader, ToolCallRecord, Visibility};
+use crate::recording::{Recorder, RecorderThread, RecordingHeader, ToolCallRecord, Visibility};
 use crate::reports::{self, CallCounts, EpisodePage, Moment};
 use crate::scoring::Facts;
 use crate::tasks::Task;
@@ -33,9 +34,8 @@ impl From<&Path> for RunFolder {
 /// The files of an episode.
 pub struct RunFiles {
     folder: PathBuf,
-    /// `None` once it is closed or has failed.
-    recorder: Option<Recorder>,
-    /// The first failure.
+    recorder: RecorderThread,
+    /// The first failure of anything but the recorder.
     failed: Option<String>,
     moments: Vec<Moment>,
     begin_s: f64,
@@ -60,16 +60,18 @@ impl RunFiles {
             scores: session.scores.memory(),
         };
         let mut recorder =
-            Recorder::create(&path, visibility, header, &session.present, &session.state_hash())?;
+            Recorder::create(&path, visibility, header, &session.present, session.world.state_hash())?;
         recorder.draw("world", session.world.room())?;
         for (name, model) in session.world.object_models() {
             recorder.draw(name, &model.geoms)?;
         }
         // What fails here fails the start; what fails later does not.
         recorder.flush()?;
+        let recorder = RecorderThread::start(recorder)
+            .map_err(|source| OutputError::Io { path: path.clone(), source })?;
         Ok(RunFiles {
             folder: path,
-            recorder: Some(recorder),
+            recorder,
             failed: None,
             moments: Vec::new(),
             begin_s: session.steps_before as f64 / CONTROL_HZ,
@@ -78,20 +80,22 @@ impl RunFiles {
         })
     }
 
-    pub(super) fn step(&mut self, step: &Step, state_hash: &str, facts: &Facts, budget: Budget) {
+    pub(super) fn step(&mut self, step: Arc<Step>, state_hash: u64, facts: Facts, budget: Budget) {
         self.budget_left = Some(budget);
-        self.record(|recorder| recorder.step(step, state_hash, facts, budget));
+        self.recorder.append(move |recorder| recorder.step(&step, state_hash, &facts, budget));
     }
 
     pub(super) fn checkpoint(&mut self, name: &str, time_s: f64, bytes: Result<Vec<u8>, EpisodeError>) {
+        let name = name.to_owned();
         match bytes {
-            Ok(bytes) => self.record(|recorder| recorder.checkpoint(name, time_s, &bytes)),
+            Ok(bytes) => self.recorder.append(move |recorder| recorder.checkpoint(&name, time_s, &bytes)),
             Err(error) => self.note(Err(error)),
         }
     }
 
     pub(super) fn phase(&mut self, phase: &PhaseReached) {
-        self.record(|recorder| recorder.phase(phase));
+        let phase = phase.clone();
+        self.recorder.append(move |recorder| recorder.phase(&phase));
     }
 
     pub(super) fn tool_call(
@@ -104,17 +108,14 @@ impl RunFiles {
     ) {
         self.calls.count(called.name(), answer.is_ok());
         let problem = answer.as_ref().err().map(|error| error.to_string());
-        let outcome = match (answer, &problem) {
-            (Ok(reply), _) => Ok(reply),
-            (Err(_), text) => Err(text.as_deref().unwrap_or_default()),
-        };
-        let record = ToolCallRecord { time_s, thought, operator, called, outcome };
-        self.record(|recorder| recorder.tool_call(&record));
+        let outcome = answer.as_ref().map_err(|_| problem.as_deref().unwrap_or_default());
+        let record = ToolCallRecord::new(time_s, thought, operator, called, outcome);
+        self.recorder.append(move |recorder| recorder.tool_call(record?));
     }
 
-    /// Hands everything recorded to the system: what a policy is told from here on is on the disk.
+    /// Waits until everything recorded is on its way to the disk, or has failed.
     pub(super) fn flush(&mut self) {
-        self.record(Recorder::flush);
+        self.recorder.flush();
     }
 
     /// Keeps a moment for the strip.
@@ -124,20 +125,21 @@ impl RunFiles {
 
     /// Why the recording is not complete, if it is not.
     pub(super) fn failed(&self) -> Option<&str> {
-        self.failed.as_deref()
+        self.failed.as_deref().or_else(|| self.recorder.failed())
     }
 
     /// Closes the recording and writes the rest; `result` then names what failed.
     pub(super) fn finish(&mut self, result: &mut ResultReply, task: &Task) {
-        result.recording_failed = self.failed.clone();
-        if let Some(recorder) = self.recorder.take() {
+        let recorder = self.recorder.stop();
+        result.recording_failed = self.failed().map(str::to_owned);
+        if let Some(recorder) = recorder {
             self.note(recorder.finish(result).map(drop));
         }
         let reported = self.report(result, task);
         self.note(reported);
-        result.recording_failed = self.failed.clone();
+        result.recording_failed = self.failed().map(str::to_owned);
         self.note(reports::write_result(result, &self.folder).map(drop));
-        result.recording_failed = self.failed.clone();
+        result.recording_failed = self.failed().map(str::to_owned);
     }
 
     fn report(&self, result: &ResultReply, task: &Task) -> Result<(), EpisodeError> {
@@ -152,16 +154,6 @@ impl RunFiles {
             strip: &strip,
         };
         Ok(write_whole(&self.folder.join(Self::REPORT), page.html().as_bytes())?)
-    }
-
-    /// Appends to the recording. After a failure it would have a hole, so it ends there.
-    fn record(&mut self, append: impl FnOnce(&mut Recorder) -> Result<(), OutputError>) {
-        let Some(recorder) = &mut self.recorder else { return };
-        let appended = append(recorder);
-        if appended.is_err() {
-            self.recorder = None;
-        }
-        self.note(appended);
     }
 
     fn note(&mut self, outcome: Result<(), impl Display>) {

@@ -88,12 +88,13 @@ fn a_moment_is_pictured_once() {
     assert_eq!((pictures_s("/A/egocentric"), pictures_s("/B/egocentric")), (vec![0.0], vec![0.0, 0.02]));
 }
 
-/// What an episode of `calls` waits of 5 steps leaves whose process is killed: the bytes that are on the disk by then.
+/// What an episode of `calls` waits of 5 steps leaves whose process is killed a second later: the bytes that are on the disk.
 fn interrupted(folder: &Path, calls: u32) -> PathBuf {
     let spec = spec("handover", 3, Protocol::Benchmark);
     let mut session = Session::start(&spec, Some(folder)).unwrap();
     (0..calls).for_each(|_| drop(wait(&mut session, 5)));
     let partial = folder.join("episode.mcap.partial");
+    std::thread::sleep(std::time::Duration::from_secs(1));
     let bytes = std::fs::read(&partial).unwrap();
     drop(session);
     std::fs::write(&partial, bytes).unwrap();

@@ -13,7 +13,10 @@ use tandem_episodes::{EpisodeSpec, RendererKind, Session, create_private_folder,
 use tandem_tools_spec::{Observe, Protocol, ToolCall, Wait};
 
 use super::Outcome;
-use crate::settings::{Layer, Settings};
+use crate::{
+    settings::{Layer, Settings},
+    token::Token,
+};
 
 /// Control steps that are tried.
 const TRIED_STEPS: u32 = 25;
@@ -40,7 +43,7 @@ type Finding = Result<String, String>;
 /// Prints a line for each check. What does not work makes it a failure.
 pub fn run(args: Args) -> Outcome {
     let renderer = args.flags.renderer.unwrap_or_default();
-    let settings = Settings::resolve(args.flags, None)?;
+    let settings = Settings::resolve(Layer { token: Token::of_environment()?, ..args.flags }, None)?;
     let findings = [
         ("renderer", renderer.describe().map_err(|error| error.to_string())),
         ("physics", physics(renderer)),

@@ -1,6 +1,6 @@
 //! `tandem serve`: episodes for policies.
 
-use std::{env, path::PathBuf, process::ExitCode};
+use std::{path::PathBuf, process::ExitCode};
 
 use tracing_subscriber::filter::LevelFilter;
 
@@ -8,7 +8,7 @@ use super::{Outcome, log};
 use crate::{
     http::Server,
     settings::{Layer, Settings},
-    token::{Token, TokenError},
+    token::Token,
 };
 
 /// Serve episodes over HTTP until SIGINT or SIGTERM.
@@ -28,17 +28,8 @@ pub struct Args {
 /// Serves.
 pub fn run(args: Args) -> Outcome {
     log::of_server(LevelFilter::INFO, args.log_format);
-    let flags = Layer { token: token_of_environment()?, ..args.flags };
+    let flags = Layer { token: Token::of_environment()?, ..args.flags };
     let settings = Settings::resolve(flags, args.config.as_deref())?;
     let left = Server::start(settings)?.run_until_signal();
     Ok(if left.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
-}
-
-/// The environment's variable with the server's token.
-const TOKEN: &str = "TANDEM_TOKEN";
-
-fn token_of_environment() -> Result<Option<Token>, TokenError> {
-    let text = env::var_os(TOKEN).filter(|text| !text.is_empty());
-    // What is no text has no form of a token.
-    text.map(|text| Token::of(&text.to_string_lossy(), TOKEN)).transpose()
 }

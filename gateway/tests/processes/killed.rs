@@ -1,6 +1,11 @@
-//! SIGKILL under way: what a policy has been told is on the disk, and can be read.
+//! SIGKILL under way: what a policy was told a second ago is on the disk, and can be read.
 
-use std::{path::Path, process::Command, thread};
+use std::{
+    path::Path,
+    process::Command,
+    thread,
+    time::{Duration, Instant},
+};
 
 use mcap::read::{MessageStream, Options};
 use serde_json::json;
@@ -9,11 +14,11 @@ use tandem_episodes::Recording;
 use crate::{Delays, Server, partials};
 
 #[test]
-fn a_killed_server_leaves_every_step_that_a_policy_was_told_of() {
+fn a_killed_server_leaves_every_step_that_a_policy_was_told_of_a_second_ago() {
     let mut delays = Delays(2);
     for round in 0..20 {
         let runs = tempfile::tempdir().expect("a temporary folder");
-        let delay = delays.next(2000);
+        let delay = delays.next(3000);
         let told_steps = play_and_kill(runs.path(), round, delay);
         let [partial] = &partials(runs.path())[..] else { panic!("no recording after {delay:?}") };
         let bytes = std::fs::read(partial).expect("the partial file");
@@ -35,28 +40,34 @@ fn a_killed_server_leaves_every_step_that_a_policy_was_told_of() {
     }
 }
 
-/// Plays until the server is killed, `delay` after the episode began. Returns the control steps that the last answer told of.
-fn play_and_kill(runs: &Path, seed: u32, delay: std::time::Duration) -> u64 {
+/// Plays until the server is killed, `delay` after the episode began. Returns the control steps that answers had told of a
+/// second before.
+fn play_and_kill(runs: &Path, seed: u32, delay: Duration) -> u64 {
     let server = Server::start(runs);
     let start = json!({ "task": "handover", "seed": seed, "protocol": "benchmark" });
     let started = server.post("/v1/episodes", &start).expect("an episode");
     let tools = format!("/v1/episodes/{}/tools", started["episode_id"].as_str().expect("an id"));
     let id = server.id().to_string();
-    let mut told_steps = 0;
-    thread::scope(|scope| {
-        scope.spawn(move || {
+    let (mut told_steps, mut told) = (0, Vec::new());
+    let killed = thread::scope(|scope| {
+        let killer = scope.spawn(move || {
             thread::sleep(delay);
-            Command::new("kill").args(["-KILL", &id]).status().expect("kill")
+            let now = Instant::now();
+            Command::new("kill").args(["-KILL", &id]).status().expect("kill");
+            now
         });
         for steps in (1..=9).cycle() {
             let Some(reply) = server.post(&format!("{tools}/wait"), &json!({ "steps": steps })) else {
                 break;
             };
             told_steps += reply["executed_steps"].as_u64().unwrap_or(0);
+            told.push((Instant::now(), told_steps));
             if server.post(&format!("{tools}/observe"), &json!({ "robots": ["A"] })).is_none() {
                 break;
             }
         }
+        killer.join().expect("kill")
     });
-    told_steps
+    let long_ago = told.iter().filter(|(when, _)| *when + Duration::from_secs(1) <= killed);
+    long_ago.last().map_or(0, |(_, steps)| *steps)
 }

@@ -44,6 +44,7 @@ fn an_operator_sees_and_commands_its_own_robot_alone() {
     assert_eq!(names(&briefing["instructions"], "robot"), ["B"]);
     assert!(briefing["brief"]["frames"].is_string() && !briefing.to_string().contains(&team.tokens[0]));
     assert_eq!(status("DELETE", &episode), 403);
+    assert_eq!(status("GET", "/metrics"), 403);
     let start = json!({ "task": "handover", "seed": 0, "protocol": "benchmark" });
     team.server.post_with("/v1/episodes", &own, &start).refused(403, &["who started the episode"]);
     let other = team.server.episode("benchmark");
