@@ -42,6 +42,7 @@ pub struct Look {
 struct WithCommand {
     /// The step that the episode has to stand at, as the `step` of an earlier reply has it; where it stands at another, the
     /// command is refused with 409 and nothing moves. Null: at any.
+    #[schemars(range(max = u32::MAX))]
     expected_step: Option<u32>,
     /// Arguments of observe: the reply then has as `observation` what is seen when the command is done. Null: nothing.
     #[schemars(extend("properties" = observe_properties(), "additionalProperties" = false))]

@@ -57,15 +57,16 @@ impl RecorderThread {
 
     /// Waits until the system has everything that was appended so far, or one of it has failed.
     pub fn flush(&self) {
-        let (flushed, wait) = sync_channel(1);
+        let (flushed, wait) = sync_channel::<()>(0);
+        let failed = self.failed.clone();
         self.append(move |recorder| {
-            recorder.flush()?;
-            // The caller waits for it.
-            let _ = flushed.send(());
-            Ok(())
+            let outcome = recorder.flush();
+            note(&failed, &outcome);
+            drop(flushed);
+            outcome
         });
         self.hurry();
-        // After a failure nobody is left who could send.
+        // Nothing is ever sent; it ends when the other side is gone, be it by a failure before.
         let _ = wait.recv();
     }
 
@@ -109,11 +110,17 @@ fn append_all(
     while let Ok(first) = inbox.recv() {
         park_timeout(GATHERED);
         let mut appends = iter::once(first).chain(inbox.try_iter());
-        let appended = appends.try_for_each(|append| append(&mut recorder));
-        if let Err(error) = appended.and_then(|()| recorder.flush()) {
-            failed.get_or_init(|| error.to_string());
+        let appended = appends.try_for_each(|append| append(&mut recorder)).and_then(|()| recorder.flush());
+        note(failed, &appended);
+        if appended.is_err() {
             return None;
         }
     }
     Some(recorder)
+}
+
+fn note(failed: &OnceLock<String>, outcome: &Result<(), OutputError>) {
+    if let Err(error) = outcome {
+        failed.get_or_init(|| error.to_string());
+    }
 }

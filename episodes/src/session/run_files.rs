@@ -35,7 +35,7 @@ impl From<&Path> for RunFolder {
 pub struct RunFiles {
     folder: PathBuf,
     recorder: RecorderThread,
-    /// The first failure of anything but the recorder.
+    /// The first failure, unless it is the recorder's.
     failed: Option<String>,
     moments: Vec<Moment>,
     begin_s: f64,
@@ -157,8 +157,10 @@ impl RunFiles {
     }
 
     fn note(&mut self, outcome: Result<(), impl Display>) {
-        if let Err(error) = outcome {
-            self.failed.get_or_insert(error.to_string());
+        if let Err(error) = outcome
+            && self.failed().is_none()
+        {
+            self.failed = Some(error.to_string());
         }
     }
 }

@@ -89,7 +89,7 @@ fn a_moment_is_pictured_once() {
 }
 
 /// What an episode of `calls` waits of 5 steps leaves whose process is killed a second later: the bytes that are on the disk.
-fn interrupted(folder: &Path, calls: u32) -> PathBuf {
+pub fn interrupted(folder: &Path, calls: u32) -> PathBuf {
     let spec = spec("handover", 3, Protocol::Benchmark);
     let mut session = Session::start(&spec, Some(folder)).unwrap();
     (0..calls).for_each(|_| drop(wait(&mut session, 5)));

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
 use crate::common::*;
+use crate::recordings::interrupted;
 use tandem_episodes::players::{self, InProcess, PlayerError};
 use tandem_episodes::replay::{Outcome, Verified, verify};
 use tandem_episodes::{
@@ -147,14 +148,7 @@ fn a_changed_number_is_found_at_its_step() {
 #[test]
 fn an_interrupted_recording_is_verified_as_far_as_it_goes() {
     let folder = tempfile::tempdir().unwrap();
-    let spec = spec("handover", 3, Protocol::Benchmark);
-    let mut session = Session::start(&spec, Some(folder.path())).unwrap();
-    wait(&mut session, 5);
-    wait(&mut session, 5);
-    let partial = folder.path().join("episode.mcap.partial");
-    let bytes = std::fs::read(&partial).unwrap();
-    drop(session);
-    std::fs::write(&partial, bytes).unwrap();
+    let partial = interrupted(folder.path(), 2);
     let found = verified(&recover(&partial).unwrap().path);
     assert_eq!((found.outcome, found.steps, found.calls), (Outcome::Same, 11, 2));
 }

@@ -56,7 +56,9 @@ impl HttpEpisode {
     ) -> Result<(HttpEpisode, StartReply), HttpError> {
         let agent = Agent::config_builder()
             .http_status_as_error(false)
-            .timeout_global(Some(TIMEOUT))
+            // A limit on the whole would have every call look up the address on a thread of its own.
+            .timeout_recv_response(Some(TIMEOUT))
+            .timeout_recv_body(Some(TIMEOUT))
             .build()
             .new_agent();
         let episodes = format!("http://{address}/v1/episodes");

@@ -44,11 +44,11 @@ fn a_killed_server_leaves_every_step_that_a_policy_was_told_of_a_second_ago() {
 /// second before.
 fn play_and_kill(runs: &Path, seed: u32, delay: Duration) -> u64 {
     let server = Server::start(runs);
-    let start = json!({ "task": "handover", "seed": seed, "protocol": "benchmark" });
+    let start = json!({ "task": "handover", "seed": seed, "protocol": "agentic" });
     let started = server.post("/v1/episodes", &start).expect("an episode");
     let tools = format!("/v1/episodes/{}/tools", started["episode_id"].as_str().expect("an id"));
     let id = server.id().to_string();
-    let (mut told_steps, mut told) = (0, Vec::new());
+    let mut told = Vec::new();
     let killed = thread::scope(|scope| {
         let killer = scope.spawn(move || {
             thread::sleep(delay);
@@ -60,8 +60,7 @@ fn play_and_kill(runs: &Path, seed: u32, delay: Duration) -> u64 {
             let Some(reply) = server.post(&format!("{tools}/wait"), &json!({ "steps": steps })) else {
                 break;
             };
-            told_steps += reply["executed_steps"].as_u64().unwrap_or(0);
-            told.push((Instant::now(), told_steps));
+            told.push((Instant::now(), reply["step"].as_u64().expect("a step")));
             if server.post(&format!("{tools}/observe"), &json!({ "robots": ["A"] })).is_none() {
                 break;
             }
@@ -69,5 +68,5 @@ fn play_and_kill(runs: &Path, seed: u32, delay: Duration) -> u64 {
         killer.join().expect("kill")
     });
     let long_ago = told.iter().filter(|(when, _)| *when + Duration::from_secs(1) <= killed);
-    long_ago.last().map_or(0, |(_, steps)| *steps)
+    long_ago.last().map_or(0, |(_, step)| *step)
 }

@@ -18,7 +18,26 @@ pub struct DynamicsState {
     manifolds: Vec<Manifold>,
 }
 
+/// [`DynamicsState`] where it lies; serialised, both are the same bytes.
+#[derive(Serialize)]
+struct Present<'a> {
+    trees: Vec<TreeState>,
+    equalities: &'a [Memory],
+    touches: &'a [Touch],
+    manifolds: &'a [Manifold],
+}
+
 impl Dynamics {
+    /// The present state, to be serialised at once.
+    pub fn present(&self) -> impl Serialize {
+        Present {
+            trees: self.trees.all.iter().map(|tree| tree.state()).collect(),
+            equalities: &self.solver.equalities.memory,
+            touches: &self.solver.touches,
+            manifolds: &self.collision.manifolds,
+        }
+    }
+
     pub fn state(&self) -> DynamicsState {
         DynamicsState {
             trees: self.trees.all.iter().map(|tree| tree.state()).collect(),
