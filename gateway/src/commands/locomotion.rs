@@ -17,7 +17,7 @@ pub struct Args {
 
 #[derive(Debug, Subcommand)]
 enum Part {
-    /// Stand, walk, squat, carry, be pulled and pushed; report survival, errors and power per case.
+    /// Stand, walk, squat, carry, be pulled and pushed, two robots carry a bar; report survival, errors and power per case.
     Bench {
         #[command(flatten)]
         locomotion: LocomotionFlag,
@@ -36,9 +36,8 @@ enum Part {
 /// Plays the cases, prints a line per case as it ends, and writes JSON where it is asked for.
 pub fn run(args: Args) -> Outcome {
     let Part::Bench { locomotion, cases, seeds, json } = args.part;
-    let choice = locomotion.controller().load()?;
     println!("{}", CaseReport::HEAD);
-    let report = bench::locomotion(&choice, &cases, seeds, |case| println!("{case}"))?;
+    let report = bench::locomotion(&locomotion.controller(), &cases, seeds, |case| println!("{case}"))?;
     if let Some(path) = json {
         std::fs::write(path, serde_json::to_string_pretty(&report)?)?;
     }

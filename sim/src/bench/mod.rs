@@ -51,12 +51,18 @@ pub struct CaseReport {
     /// From the zero command until the pelvis stays slower than 0.1 m/s, and than 0.02 m/s.
     pub standing_after_s: Option<f32>,
     pub still_after_s: Option<f32>,
+    /// The most that what robots carried between them was ever tilted.
+    pub load_tilt_deg: Option<f32>,
     /// Mean absolute mechanical power of all joints.
     pub power_w: f32,
 }
 
-/// Runs every case whose name contains one of the comma-separated parts of `filter`, with seeds 0 up to `seeds`;
-/// `done` hears of each case as it ends.
+/// Whether a case's name contains one of the comma-separated words of `filter`.
+pub fn is_asked(filter: &str, case: &str) -> bool {
+    filter.split(',').any(|word| case.contains(word))
+}
+
+/// Runs every case that `filter` asks for, with seeds 0 up to `seeds`; `done` hears of each case as it ends.
 pub fn run(
     new_locomotion: NewLocomotion,
     filter: &str,
@@ -64,8 +70,9 @@ pub fn run(
     mut done: impl FnMut(&CaseReport),
 ) -> Result<Report, SimError> {
     let mut cases = Vec::new();
-    for case in CASES.iter().filter(|case| filter.split(",").any(|f| case.name.contains(f))) {
-        let trials = trials(case, seeds, new_locomotion)?;
+    for case in CASES.iter().filter(|case| is_asked(filter, case.name)) {
+        let trials = over_seeds(seeds, |seed| trial::run(case, seed, new_locomotion()));
+        let trials = trials.into_iter().collect::<Result<Vec<_>, _>>()?;
         let report = summarise(case, &trials);
         done(&report);
         cases.push(report);
@@ -73,8 +80,8 @@ pub fn run(
     Ok(Report { cases })
 }
 
-/// One trial per seed, as many at once as there are processors.
-fn trials(case: &Case, seeds: usize, new_locomotion: NewLocomotion) -> Result<Vec<Trial>, SimError> {
+/// What `trial` makes of each of the seeds 0 up to `seeds`, as many at once as there are processors.
+pub fn over_seeds<T: Send>(seeds: usize, trial: impl Fn(u64) -> T + Sync) -> Vec<T> {
     let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
     let next = AtomicUsize::new(0);
     let work = || {
@@ -84,7 +91,7 @@ fn trials(case: &Case, seeds: usize, new_locomotion: NewLocomotion) -> Result<Ve
             if seed >= seeds {
                 return done;
             }
-            done.push((seed, trial::run(case, seed as u64, new_locomotion())));
+            done.push((seed, trial(seed as u64)));
         }
     };
     let mut trials: Vec<_> = std::thread::scope(|scope| {
@@ -104,8 +111,6 @@ fn summarise(case: &Case, trials: &[Trial]) -> CaseReport {
         (!values.is_empty()).then(|| values.iter().sum::<f32>() / values.len() as f32)
     };
     CaseReport {
-        case: case.name.into(),
-        seeds: trials.len(),
         survived: standing.len(),
         velocity_error_share: mean(|trial| trial.velocity_error_share),
         heading_error_deg: worst(|trial| trial.heading_error_deg),
@@ -115,13 +120,31 @@ fn summarise(case: &Case, trials: &[Trial]) -> CaseReport {
         standing_after_s: worst(|trial| trial.standing_after_s),
         still_after_s: worst(|trial| trial.still_after_s),
         power_w: mean(|trial| Some(trial.power_w)).unwrap_or(0.0),
+        ..CaseReport::of(case.name, trials.len())
     }
 }
 
 impl CaseReport {
     /// Column heads of [`CaseReport`]'s lines.
-    pub const HEAD: &str =
-        "case                        alive  v err  heading    drift     sway   height  stands  still  power";
+    pub const HEAD: &str = "case                        alive  v err  heading    drift     sway   height  stands  still   tilt  power";
+
+    /// Of a case in which nothing has been measured yet.
+    pub fn of(case: &str, seeds: usize) -> CaseReport {
+        CaseReport {
+            case: case.into(),
+            seeds,
+            survived: 0,
+            velocity_error_share: None,
+            heading_error_deg: None,
+            final_drift_m: None,
+            sway_m: None,
+            height_error_m: None,
+            standing_after_s: None,
+            still_after_s: None,
+            load_tilt_deg: None,
+            power_w: 0.0,
+        }
+    }
 }
 
 impl fmt::Display for CaseReport {
@@ -131,7 +154,7 @@ impl fmt::Display for CaseReport {
         };
         write!(
             f,
-            "{:26} {:>2}/{:<2}  {:>5}  {:>7}  {:>7}  {:>7}  {:>7}  {:>6}  {:>5}  {:>5}",
+            "{:26} {:>2}/{:<2}  {:>5}  {:>7}  {:>7}  {:>7}  {:>7}  {:>6}  {:>5}  {:>5}  {:>5}",
             self.case,
             self.survived,
             self.seeds,
@@ -142,6 +165,7 @@ impl fmt::Display for CaseReport {
             show(self.height_error_m, 100.0, "cm"),
             show(self.standing_after_s, 1.0, "s"),
             show(self.still_after_s, 1.0, "s"),
+            show(self.load_tilt_deg, 1.0, "°"),
             show(Some(self.power_w), 1.0, "W"),
         )
     }

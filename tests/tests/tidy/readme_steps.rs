@@ -46,7 +46,7 @@ const STEPS: &[Step] = &[
         folder: "sim/assets/scenes",
         extension: "xml",
         says: "<mujoco",
-        may: &["episodes/src/tasks/", "sim/src/bench/"],
+        may: &["episodes/src/tasks/", "episodes/src/bench/", "sim/src/bench/"],
     },
     Step {
         what: "object",
@@ -54,7 +54,12 @@ const STEPS: &[Step] = &[
         extension: "xml",
         says: "<mujoco",
         // Tasks place them, and their experts take hold of them; tests stand beside what they test.
-        may: &["episodes/src/tasks/", "episodes/src/players/experts/", "sim/src/bench/"],
+        may: &[
+            "episodes/src/tasks/",
+            "episodes/src/players/experts/",
+            "episodes/src/bench/",
+            "sim/src/bench/",
+        ],
     },
     Step {
         what: "robot",

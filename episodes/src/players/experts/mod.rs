@@ -13,7 +13,7 @@ mod frame_hang;
 mod handover;
 mod move_house;
 mod pouring;
-mod skills;
+pub(crate) mod skills;
 mod table_align;
 mod trash_collection;
 

@@ -1,18 +1,23 @@
 //! Parts of Tandem measured on their own, on the robot that the episodes use.
 
+mod carrying;
+
 use std::path::{Path, PathBuf};
 
 pub use tandem_ik::bench::Report as IkReport;
 use tandem_ik::bench::{TargetSet, run};
 use tandem_ik::{IkError, Model};
 use tandem_sim::assets;
+use tandem_sim::bench;
 pub use tandem_sim::bench::{
     CaseReport, PhysicsCase, PhysicsReport, PicturesCase, PicturesReport, Report as LocomotionReport,
 };
 use tandem_sim::render::RendererKind;
-use tandem_sim::{LocomotionChoice, bench};
 
+use crate::EpisodeError;
 use crate::commands;
+use crate::players::PlayerError;
+use crate::spec::Controller;
 
 /// Targets drawn where no file gives any.
 const SAMPLED_TARGETS: usize = 200;
@@ -28,17 +33,28 @@ pub enum BenchError {
     Ik(#[from] IkError),
     #[error(transparent)]
     Sim(#[from] tandem_sim::SimError),
+    #[error(transparent)]
+    Episode(#[from] Box<EpisodeError>),
+    #[error(transparent)]
+    Player(#[from] PlayerError),
 }
 
-/// Plays the bench's cases whose names contain one of the words of `filter`, separated by commas, on seeds 0 to
-/// `seeds` - 1, by controllers of `choice`, and calls `done` after each case.
+/// Plays the cases whose names contain one of the words of `filter`, separated by commas, on seeds 0 to `seeds` - 1, robots of their
+/// own first, then two that carry something between them; calls `done` after each case.
 pub fn locomotion(
-    choice: &LocomotionChoice,
+    controller: &Controller,
     filter: &str,
     seeds: usize,
-    done: impl FnMut(&CaseReport),
+    mut done: impl FnMut(&CaseReport),
 ) -> Result<LocomotionReport, BenchError> {
-    Ok(bench::run(&|| choice.controller(), filter, seeds, done)?)
+    let choice = controller.load()?;
+    let mut report = bench::run(&|| choice.controller(), filter, seeds, &mut done)?;
+    for case in carrying::CASES.iter().filter(|case| bench::is_asked(filter, case.name)) {
+        let carried = carrying::run(case, controller, seeds)?;
+        done(&carried);
+        report.cases.push(carried);
+    }
+    Ok(report)
 }
 
 /// Times physics steps of one to three robots; `done` hears of each case as it ends.

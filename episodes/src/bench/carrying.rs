@@ -1,0 +1,225 @@
+//! Two robots that carry a bar between them: cases of the bench of base controllers that need hands.
+//!
+//! They take the bar from its stand by the skills of the experts, lift it, and walk it along the case's way side by side. Nothing
+//! joins them but what their fingers hold.
+
+use std::cell::Cell;
+use std::f32::consts::FRAC_PI_2;
+
+use tandem_sim::bench::{CaseReport, over_seeds};
+use tandem_sim::render::RendererKind;
+use tandem_sim::{CONTROL_HZ, Pose, RobotState, Rotation, Sides, Vector};
+use tandem_tools_spec::{Protocol, ToolCall, ToolReply};
+
+use super::BenchError;
+use crate::Session;
+use crate::players::experts::skills::{
+    BarGrasp, FREE, Path, Stage, Team, heading_rad, take_softly, wrapped_rad,
+};
+use crate::players::{Backstage, Caller, InProcess, PlayerError};
+use crate::scoring::{A, B, Done, Facts, Grip, Phase};
+use crate::spec::{Controller, EpisodeSpec};
+use crate::tasks::{RobotSpot, Task, spot, uniform_xy};
+
+/// A way of the bar.
+pub struct Case {
+    pub name: &'static str,
+    legs: &'static [Leg],
+}
+
+/// Part of a way, from rest to rest.
+struct Leg {
+    /// Ahead and to the left, as the robots look at the beginning.
+    by_m: [f32; 2],
+    /// Of the bar about its middle.
+    turn_rad: f32,
+}
+
+pub const CASES: [Case; 3] = [
+    // The first leg takes the robot on the right clear of the stand, which it passes.
+    Case { name: "carry_bar_left", legs: &[straight(-0.3, 0.0), straight(0.0, 2.0)] },
+    Case { name: "carry_bar_forward_back", legs: &[straight(2.0, 0.0), straight(-2.0, 0.0)] },
+    Case { name: "carry_bar_turn", legs: &[Leg { by_m: [0.0; 2], turn_rad: FRAC_PI_2 }] },
+];
+
+const fn straight(ahead_m: f32, left_m: f32) -> Leg {
+    Leg { by_m: [ahead_m, left_m], turn_rad: 0.0 }
+}
+
+/// Robots stand so far to the left and right of the bar's middle.
+const APART_M: f32 = 0.65;
+const BAR_M: [f32; 3] = [0.29, 0.0, 0.85];
+const LIFT_M: f32 = 0.1;
+const PACE_M_S: f32 = 0.2;
+/// A way is looked at in so many points a leg.
+const WAY_POINTS: usize = 200;
+
+const TASK: Task = Task {
+    id: "carry_bar",
+    scene: "floor",
+    robots: &[beside("A", APART_M), beside("B", -APART_M)],
+    objects: &[spot("bar", BAR_M), spot("bar_stand", BAR_M)],
+    randomize: &[uniform_xy(&["bar", "bar_stand"], 0.03, 0.03)],
+    instruction: "",
+    benchmark_steps: 60 * CONTROL_HZ as u32,
+    phases: &[Phase {
+        id: "none",
+        description: "A bench has no success that would end it early.",
+        collaborative: true,
+        done: Done::When(|_| false),
+    }],
+};
+
+const fn beside(name: &'static str, left_m: f32) -> RobotSpot {
+    RobotSpot { name, position_m: [0.0, left_m], yaw_rad: 0.0, instruction: "" }
+}
+
+/// Plays one case on seeds 0 to `seeds` - 1.
+pub fn run(case: &Case, controller: &Controller, seeds: usize) -> Result<CaseReport, BenchError> {
+    let trials = over_seeds(seeds, |seed| trial(case, controller, seed as u32));
+    let trials = trials.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let done: Vec<&Carried> = trials.iter().flatten().collect();
+    let worst = |value: fn(&Carried) -> f32| done.iter().map(|carried| value(carried)).reduce(f32::max);
+    Ok(CaseReport {
+        survived: done.len(),
+        heading_error_deg: worst(|carried| carried.heading_error_deg),
+        final_drift_m: worst(|carried| carried.final_drift_m),
+        sway_m: worst(|carried| carried.off_way_m),
+        load_tilt_deg: worst(|carried| carried.tilt_deg),
+        power_w: done.iter().map(|carried| carried.power_w).sum::<f32>() / done.len().max(1) as f32,
+        ..CaseReport::of(case.name, seeds)
+    })
+}
+
+/// What came of a bar that was carried to the end of its way.
+struct Carried {
+    /// Of the robot that ends up the most turned.
+    heading_error_deg: f32,
+    /// The bar's middle from the end of its way, and the farthest from the way itself.
+    final_drift_m: f32,
+    off_way_m: f32,
+    /// The most that the bar was ever tilted.
+    tilt_deg: f32,
+    /// Of a robot.
+    power_w: f32,
+}
+
+/// One seed; `None` if a robot fell, or hands lost the bar for good.
+fn trial(case: &Case, controller: &Controller, seed: u32) -> Result<Option<Carried>, BenchError> {
+    let spec = EpisodeSpec {
+        locomotion: controller.clone(),
+        renderer: RendererKind::Cpu,
+        ..EpisodeSpec::new(&TASK, seed, Protocol::Benchmark)
+    };
+    let aloft = Cell::new(None);
+    let session = Session::start(&spec, None).map_err(Box::new)?;
+    let mut watched = Watched { episode: InProcess::new(session), aloft: &aloft, log: Vec::new() };
+    match carry(case, &mut watched, &aloft) {
+        Ok(()) => {}
+        Err(PlayerError::GaveUp(_) | PlayerError::EpisodeOver) => return Ok(None),
+        Err(error) => return Err(error.into()),
+    }
+    let held =
+        watched.facts()?.object("bar").hands.iter().flat_map(Sides::iter).all(|grip| *grip != Grip::Off);
+    Ok(aloft.get().filter(|_| held).map(|start| measure(case, &start, &watched.log)))
+}
+
+/// Takes the bar, lifts it, from when on it is watched, and carries it.
+fn carry(case: &Case, episode: &mut dyn Backstage, aloft: &Cell<Option<Pose>>) -> Result<(), PlayerError> {
+    let stage = &mut Stage::new(&TASK, episode)?;
+    let [a_left, a_right] = BarGrasp::from_above(A, "bar", ["a_left", "a_right"], 0.0);
+    let [b_left, b_right] = BarGrasp::from_above(B, "bar", ["b_left", "b_right"], 0.0);
+    let grasps = [a_left, a_right, b_left, b_right];
+    let mut team = Team::new(stage, &grasps)?;
+    team.gather(stage)?;
+    take_softly(stage, &grasps)?;
+    team.lift(stage, LIFT_M)?;
+    let mut from = team.object(stage)?;
+    aloft.set(Some(from));
+    for leg in case.legs {
+        let length_m = leg.length_m();
+        let at = |gone_m: f32| leg.at(&from, gone_m / length_m);
+        team.carry(stage, &Path { at: &at, length_m, pace_m_s: PACE_M_S, free_m: &FREE })?;
+        from = leg.at(&from, 1.0);
+    }
+    Ok(())
+}
+
+impl Leg {
+    /// How far the robots go.
+    fn length_m(&self) -> f32 {
+        Vector::from([self.by_m[0], self.by_m[1], 0.0]).length() + self.turn_rad.abs() * APART_M
+    }
+
+    /// The bar when this share of the leg has been gone.
+    fn at(&self, from: &Pose, share: f32) -> Pose {
+        let by_m = Vector::new(self.by_m[0], self.by_m[1], 0.0) * share;
+        let turned = Rotation::from_rotation_z(self.turn_rad * share);
+        Pose::from_parts(from.translation + by_m, turned * from.rotation)
+    }
+}
+
+/// After one command.
+struct Moment {
+    bar: Pose,
+    pelvises: Vec<Pose>,
+    power_w: f32,
+}
+
+/// An episode that keeps what happens while the bar is aloft.
+struct Watched<'a> {
+    episode: InProcess,
+    aloft: &'a Cell<Option<Pose>>,
+    log: Vec<Moment>,
+}
+
+impl Caller for Watched<'_> {
+    fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {
+        let reply = self.episode.call(call)?;
+        let facts = self.episode.facts()?;
+        if facts.robots.iter().any(|robot| robot.fallen) {
+            return Err(PlayerError::EpisodeOver);
+        }
+        if self.aloft.get().is_some() {
+            let robots = &self.episode.session.present().robots;
+            let power_w = |state: &RobotState| -> f32 {
+                state.torque_n_m.iter().zip(&state.qd_rad_s).map(|(torque, rate)| (torque * rate).abs()).sum()
+            };
+            self.log.push(Moment {
+                bar: facts.object("bar").pose_in_world,
+                pelvises: facts.robots.iter().map(|robot| robot.pelvis_in_world).collect(),
+                power_w: robots.iter().map(|robot| power_w(&robot.state)).sum::<f32>() / robots.len() as f32,
+            });
+        }
+        Ok(reply)
+    }
+}
+
+impl Backstage for Watched<'_> {
+    fn facts(&mut self) -> Result<Facts, PlayerError> {
+        self.episode.facts()
+    }
+}
+
+fn measure(case: &Case, start: &Pose, log: &[Moment]) -> Carried {
+    let (mut way, mut end, mut turned_rad) = (Vec::new(), *start, 0.0);
+    for leg in case.legs {
+        way.extend((0..=WAY_POINTS).map(|i| leg.at(&end, i as f32 / WAY_POINTS as f32).translation));
+        end = leg.at(&end, 1.0);
+        turned_rad += leg.turn_rad;
+    }
+    let away_m = |moment: &Moment, from_m: &Vector| (moment.bar.translation - *from_m).truncate().length();
+    let off_way_m =
+        |moment: &Moment| way.iter().map(|at_m| away_m(moment, at_m)).fold(f32::INFINITY, f32::min);
+    let tilt_deg = |moment: &Moment| (moment.bar.rotation * Vector::Y).z.abs().asin().to_degrees();
+    let most = |value: &dyn Fn(&Moment) -> f32| log.iter().map(value).fold(0.0, f32::max);
+    let turned_deg = |pelvis: &Pose| wrapped_rad(heading_rad(pelvis) - turned_rad).abs().to_degrees();
+    let last = log.last();
+    Carried {
+        heading_error_deg: last.map_or(0.0, |last| last.pelvises.iter().map(turned_deg).fold(0.0, f32::max)),
+        final_drift_m: last.map_or(0.0, |last| away_m(last, &end.translation)),
+        off_way_m: most(&off_way_m),
+        tilt_deg: most(&tilt_deg),
+        power_w: log.iter().map(|moment| moment.power_w).sum::<f32>() / log.len().max(1) as f32,
+    }
+}
