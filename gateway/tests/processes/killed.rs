@@ -67,6 +67,6 @@ fn play_and_kill(runs: &Path, seed: u32, delay: Duration) -> u64 {
         }
         killer.join().expect("kill")
     });
-    let long_ago = told.iter().filter(|(when, _)| *when + Duration::from_secs(1) <= killed);
-    long_ago.last().map_or(0, |(_, step)| *step)
+    let long_ago = told.iter().rfind(|(when, _)| *when + Duration::from_secs(1) <= killed);
+    long_ago.map_or(0, |(_, step)| *step)
 }
