@@ -24,9 +24,8 @@ const CORRECTIONS: usize = 2;
 const LEAST_HEIGHT_M: f32 = 0.4;
 /// A knee that is almost straight must not ask for the impossible.
 const DAMPING: f32 = 0.004;
-/// Of the ground force that torques give away. With twenty times as much, half of a pull on a robot that leans is not seen: its legs
-/// are almost straight.
-const FORCE_DAMPING: f32 = 0.0002;
+/// Of the ground force that torques give away.
+const FORCE_DAMPING: f32 = 0.004;
 const LARGEST_JOINT_ACCELERATION_RAD_S2: f32 = 400.0;
 
 /// Torques stay within this part of the joints' limits as long as easing off helps.

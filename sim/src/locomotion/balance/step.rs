@@ -1,14 +1,10 @@
 //! Stepping: one foot carries the robot, the other swings to where the capture point asks for it.
 //!
-//! With x the balance point, v its velocity, u that of the swinging foot, s = [`SWING_INERTIA`] and w = sqrt(g / h), the
-//! capture point  xi = x + (v - s u) / w  obeys
+//! With x the balance point, v its velocity and w = sqrt(g / h), the capture point xi = x + v / w obeys
 //!   xi' = w (xi - p),   p the centre of pressure,
 //! which moves from the old foot to the new one within the transfer time and stays there. A foot put down at
 //! u = xi(T) - b  leaves the capture point the offset b of a steady gait from the new foot; see [`Gait`].
-//! The centre of mass moves along with a leg that swings, and stops with it: v - s u is the speed that lasts, known
-//! from the angular momentum about the ground. Without it a robot that was hit steps too far, the farther the faster it
-//! steps, and at the next step too far the other way.
-//! Source: Englsberger, Ott, Albu-Schaeffer 2015; Khadiv et al. 2016; angular momentum: Gong, Grizzle 2022.
+//! Source: Englsberger, Ott, Albu-Schaeffer 2015; Khadiv et al. 2016.
 
 use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
@@ -16,11 +12,11 @@ use serde::{Deserialize, Serialize};
 use super::course::Course;
 use super::effort::{Contact, Motion, Torques, leg_torques_within_limits};
 use super::footstep::{Footstep, Situation};
-use super::gait::{Gait, PERIOD_S, SWING_INERTIA, TRANSFER_S};
+use super::gait::{Gait, PERIOD_S, TRANSFER_S};
 use super::ground::nearest_support_m;
 use super::legs::rotation_vector_rad;
 use super::load::Load;
-use super::swing::{SOLE_IN_FOOT_M, SWING_S, Swing, foot_motion};
+use super::swing::{SOLE_IN_FOOT_M, SWING_S, Swing};
 use crate::body::{Acceleration, Drive, LEGS, WholeBody};
 use crate::locomotion::plane::{flat, heading_rad, wrapped_rad};
 use crate::locomotion::{BaseVelocity, LegCommand};
@@ -131,12 +127,10 @@ impl Step {
         let velocity_m_s = self.course.corrected_velocity(velocity, self.steps > 0, pelvis_m, faced, dt_s);
         let outside = left * self.stance.sign();
         let gait = Gait::new(rate_1_s, faced[0] * velocity_m_s[0] + faced[1] * velocity_m_s[1], outside);
-        let (_, foot_m_s, _) = foot_motion(body, self.stance.other());
-        let lasting_m_s = body.com_velocity_m_s - foot_m_s * SWING_INERTIA;
         let situation = Situation {
             gait: &gait,
             swing: &self.swing,
-            capture_m: flat(load.balance_point_m + lasting_m_s / rate_1_s),
+            capture_m: flat(load.balance_point_m + body.com_velocity_m_s / rate_1_s),
             stance: soles[self.stance],
             old_m: flat(soles[self.stance.other()].translation),
             ahead_axis: ahead,
