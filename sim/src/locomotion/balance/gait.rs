@@ -24,18 +24,20 @@ pub(super) struct Gait {
 
 impl Gait {
     /// With E = e^{w t}, t the transfer, G = e^{w (T - t)} and K = G (E - 1) / (w t):
-    ///   b = v T (1 - E G + K) / (E G - 1)  along the motion,   width (E G + 1 - K) / (E G + 1)  to the inside.
-    pub(super) fn new(rate_1_s: f32, velocity_m_s: Vector, outside_axis: Vector) -> Gait {
+    ///   b = v T (1 - E G + K) / (E G - 1)  along the motion,   -a (E G + 1 - K) / (E G + 1)  of what alternates.
+    /// What alternates from step to step, a, is the width to the inside, and the stagger: the one foot always that far ahead.
+    pub(super) fn new(rate_1_s: f32, velocity_m_s: Vector, outside_axis: Vector, stagger_m: Vector) -> Gait {
         let transfer = (rate_1_s * TRANSFER_S).exp();
         let whole = (rate_1_s * PERIOD_S).exp();
         let ramp = whole / transfer * (transfer - 1.0) / (rate_1_s * TRANSFER_S);
         let along_m = velocity_m_s * PERIOD_S;
         let width_m = WIDTH_M + WIDENING * along_m.dot(outside_axis).abs();
+        let apart_m = stagger_m - outside_axis * width_m;
         Gait {
             rate_1_s,
-            step_m: along_m - outside_axis * width_m,
+            step_m: along_m + apart_m,
             offset_m: along_m * ((1.0 - whole + ramp + 2.0 * recoil(rate_1_s, SWING_S)) / (whole - 1.0))
-                + outside_axis * (width_m * (whole + 1.0 - ramp) / (whole + 1.0)),
+                - apart_m * ((whole + 1.0 - ramp) / (whole + 1.0)),
         }
     }
 
@@ -73,7 +75,7 @@ mod tests {
     /// Pressure from `now` to `then` within the ramp, in small steps:  xi' = w (xi - p).
     #[test]
     fn prediction_solves_the_capture_point_equation() {
-        let gait = Gait::new(RATE_1_S, Vector::ZERO, Vector::Y);
+        let gait = Gait::new(RATE_1_S, Vector::ZERO, Vector::Y, Vector::ZERO);
         let (old_m, then_m) = (Vector::new(-0.1, 0.05, 0.0), Vector::new(0.1, -0.02, 0.0));
         for (now_m, ramp_s, time_s) in [(old_m, 0.05, 0.3), (then_m, 0.0, 0.2), (old_m, 0.02, 0.02)] {
             let mut capture_m = Vector::new(0.03, 0.01, 0.0);
@@ -92,11 +94,14 @@ mod tests {
     /// A capture point that lands with the offset of the steady gait does so again one step later, whatever the velocity.
     #[test]
     fn a_steady_gait_repeats() {
-        for (x, y) in [(0.0, 0.0), (0.4, 0.0), (-0.3, 0.0), (0.0, 0.3), (0.2, -0.25)] {
+        for (x, y, ahead_m) in
+            [(0.0, 0.0, 0.0), (0.4, 0.0, 0.1), (-0.3, 0.0, 0.0), (0.0, 0.3, -0.1), (0.2, -0.25, 0.0)]
+        {
             for outside in [Vector::Y, -Vector::Y] {
                 let velocity_m_s = Vector::new(x, y, 0.0);
-                let before = Gait::new(RATE_1_S, velocity_m_s, -outside);
-                let gait = Gait::new(RATE_1_S, velocity_m_s, outside);
+                let stagger_m = Vector::X * (ahead_m * outside.y);
+                let before = Gait::new(RATE_1_S, velocity_m_s, -outside, -stagger_m);
+                let gait = Gait::new(RATE_1_S, velocity_m_s, outside, stagger_m);
                 // The stance foot is the origin; the old one is a step behind.
                 let old_m = -before.step_m;
                 let moved_m = gait.step_m - old_m;
@@ -112,7 +117,8 @@ mod tests {
 
     #[test]
     fn feet_stay_apart_when_walking_sideways() {
-        let inside_m = |y: f32| -Gait::new(RATE_1_S, Vector::new(0.0, y, 0.0), Vector::Y).step_m.y;
+        let inside_m =
+            |y: f32| -Gait::new(RATE_1_S, Vector::new(0.0, y, 0.0), Vector::Y, Vector::ZERO).step_m.y;
         assert!((inside_m(0.0) - WIDTH_M).abs() < 1e-6);
         let narrow_m = inside_m(0.3).min(inside_m(-0.3));
         assert!((narrow_m - (WIDTH_M + (WIDENING - 1.0) * 0.3 * PERIOD_S)).abs() < 1e-6, "{narrow_m}");

@@ -13,6 +13,9 @@ pub(super) struct Load {
     pub moment_n_m: Vector,
     /// Where the centre of pressure of a robot at rest lies: the centre of mass, moved by the wrench and the push.
     pub balance_point_m: Vector,
+    /// Moment about the vertical of what pulls both hands alike. What one hand feels more than the other may be the other's doing:
+    /// robots that held against that would wring what they have in both hands.
+    pub pulled_n_m: f32,
 }
 
 /// Pushes and pulls are taken to act this high over the centre of mass: at the chest and the hands.
@@ -21,6 +24,8 @@ const PUSH_LEVER_M: f32 = 0.19;
 const DEAD_ZONE_N: f32 = 6.0;
 /// More about the vertical than a foot can hold is not fed forward.
 const LARGEST_TURN_N_M: f32 = 20.0;
+/// An arm does not feel along itself: a pull turns the robot more than its hands feel by about this factor.
+const TURN_PER_FELT: f32 = 1.3;
 
 impl Load {
     /// With height h of the centre of mass c over the ground and vertical load N = m g - f_z:
@@ -36,6 +41,10 @@ impl Load {
             moment_n_m.z += (palm_m - body.com_m).cross(flat(hand_n)).z;
         }
         moment_n_m.z = moment_n_m.z.clamp(-LARGEST_TURN_N_M, LARGEST_TURN_N_M);
+        let palms_m: Vector = body.palms_m().into_iter().sum();
+        let pull_n = flat(body.hand_force_n.left + body.hand_force_n.right);
+        let pulled_n_m = (palms_m * 0.5 - body.com_m).cross(pull_n).z * TURN_PER_FELT;
+        let pulled_n_m = pulled_n_m.clamp(-LARGEST_TURN_N_M, LARGEST_TURN_N_M);
         let pushing_n = push_m_s2 * body.model.mass_kg;
         force_n += pushing_n;
         moment_n_m += Vector::new(0.0, 0.0, PUSH_LEVER_M).cross(pushing_n);
@@ -43,7 +52,7 @@ impl Load {
         let vertical_n = body.model.mass_kg * GRAVITY_M_S2 - force_n.z;
         let away_m =
             Vector::new(moment_n_m.y + height_m * force_n.x, height_m * force_n.y - moment_n_m.x, 0.0);
-        Load { force_n, moment_n_m, balance_point_m: body.com_m + away_m / vertical_n }
+        Load { force_n, moment_n_m, balance_point_m: body.com_m + away_m / vertical_n, pulled_n_m }
     }
 }
 

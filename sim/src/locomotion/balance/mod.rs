@@ -5,6 +5,7 @@ mod effort;
 mod footstep;
 mod gait;
 mod ground;
+mod holding;
 mod legs;
 mod load;
 mod observer;

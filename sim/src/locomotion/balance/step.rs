@@ -14,6 +14,7 @@ use super::effort::{Contact, Motion, Torques, leg_torques_within_limits};
 use super::footstep::{Footstep, Situation};
 use super::gait::{Gait, PERIOD_S, TRANSFER_S};
 use super::ground::nearest_support_m;
+use super::holding::Holding;
 use super::legs::rotation_vector_rad;
 use super::load::Load;
 use super::swing::{SOLE_IN_FOOT_M, SWING_S, Swing};
@@ -66,6 +67,7 @@ pub(super) struct Step {
     goal_rad: f32,
     /// How far where the pelvis faces stays behind the heading.
     lag_rad: f32,
+    holding: Holding,
     stance: Side,
     /// Before the first step: the capture point moves over the first stance foot.
     shifting: bool,
@@ -86,6 +88,7 @@ impl Step {
             heading_rad,
             goal_rad: heading_rad,
             lag_rad: 0.0,
+            holding: Holding::default(),
             stance,
             shifting: true,
             time_s: 0.0,
@@ -119,6 +122,7 @@ impl Step {
         let soles = body.world_from_soles();
         let ground_m = soles[self.stance].translation.z;
         self.turn(body, velocity.turning_rad_s, dt_s);
+        self.holding.update(load.pulled_n_m, dt_s);
         let heading = Rotation::from_rotation_z(self.heading_rad);
         let (ahead, left) = (heading * Vector::X, heading * Vector::Y);
         let rate_1_s = (GRAVITY_M_S2 / (body.com_m.z - ground_m).max(0.4)).sqrt();
@@ -126,7 +130,9 @@ impl Step {
         let faced = self.faced_axes(body, dt_s);
         let velocity_m_s = self.course.corrected_velocity(velocity, self.steps > 0, pelvis_m, faced, dt_s);
         let outside = left * self.stance.sign();
-        let gait = Gait::new(rate_1_s, faced[0] * velocity_m_s[0] + faced[1] * velocity_m_s[1], outside);
+        let course_m_s = faced[0] * velocity_m_s[0] + faced[1] * velocity_m_s[1];
+        let stagger_m = ahead * (-self.stance.sign() * self.holding.left_ahead_m());
+        let gait = Gait::new(rate_1_s, course_m_s, outside, stagger_m);
         let situation = Situation {
             gait: &gait,
             swing: &self.swing,
@@ -244,7 +250,8 @@ impl Step {
             let swing = self.stance.other();
             feet[swing] = self.swing.wanted(body, swing, self.time_s - TRANSFER_S);
         }
-        let motion = Motion { lift_m_s2, turn_rad_s2: turn.clamp(-most, most), feet };
+        let holding_n_m = self.holding.moment_n_m();
+        let motion = Motion { lift_m_s2, turn_rad_s2: turn.clamp(-most, most), holding_n_m, feet };
         let contact = Contact {
             pressure_m: Vector::new(pressure_m.x, pressure_m.y, ground_m),
             foot: (!both).then_some(self.stance),

@@ -3,7 +3,8 @@
 use super::*;
 use crate::body::posed::Posed;
 
-const STILL: Motion = Motion { lift_m_s2: 0.0, turn_rad_s2: Vector::ZERO, feet: Sides::both(AT_REST) };
+const STILL: Motion =
+    Motion { lift_m_s2: 0.0, turn_rad_s2: Vector::ZERO, holding_n_m: 0.0, feet: Sides::both(AT_REST) };
 const AT_REST: Acceleration = Acceleration { linear_m_s2: Vector::ZERO, angular_rad_s2: Vector::ZERO };
 
 fn solve(body: &WholeBody, motion: &Motion, pressure_m: Vector, foot: Option<Side>) -> Torques {

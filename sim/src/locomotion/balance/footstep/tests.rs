@@ -20,7 +20,7 @@ struct Pendulum {
 impl Pendulum {
     /// In the middle of stepping in place, as a steady gait is when its foot lands.
     fn stepping() -> Pendulum {
-        let gait = Gait::new(RATE_1_S, Vector::ZERO, Vector::Y);
+        let gait = Gait::new(RATE_1_S, Vector::ZERO, Vector::Y, Vector::ZERO);
         let stance_m = Vector::ZERO;
         Pendulum {
             com_m: stance_m - gait.offset_m,
@@ -35,7 +35,7 @@ impl Pendulum {
     fn step(&mut self, velocity_m_s: Vector) {
         let foot = |sole_m: Vector| Pose::from_translation(sole_m - SOLE_IN_FOOT_M);
         let outside = Vector::Y * self.stance.sign();
-        let gait = Gait::new(RATE_1_S, velocity_m_s, outside);
+        let gait = Gait::new(RATE_1_S, velocity_m_s, outside, Vector::ZERO);
         let mut swing = Swing::at(foot(self.swing_m));
         let old_m = self.swing_m;
         let mut time_s = 0.0;
@@ -102,7 +102,7 @@ fn a_commanded_velocity_is_walked() {
 
 #[test]
 fn feet_do_not_cross_and_hurry_only_when_they_must() {
-    let gait = Gait::new(RATE_1_S, Vector::ZERO, Vector::Y);
+    let gait = Gait::new(RATE_1_S, Vector::ZERO, Vector::Y, Vector::ZERO);
     let swing = Swing::at(Pose::from_translation(gait.step_m - SOLE_IN_FOOT_M));
     let plan = |push_m: Vector| {
         let mut situation = Situation {
