@@ -8,7 +8,7 @@ use std::f32::consts::FRAC_PI_2;
 
 use tandem_sim::bench::{CaseReport, over_seeds};
 use tandem_sim::render::RendererKind;
-use tandem_sim::{CONTROL_HZ, Pose, RobotState, Rotation, Sides, Vector};
+use tandem_sim::{CONTROL_HZ, Pose, Rotation, Sides, Vector};
 use tandem_tools_spec::{Protocol, ToolCall, ToolReply};
 
 use super::BenchError;
@@ -182,13 +182,10 @@ impl Caller for Watched<'_> {
         }
         if self.aloft.get().is_some() {
             let robots = &self.episode.session.present().robots;
-            let power_w = |state: &RobotState| -> f32 {
-                state.torque_n_m.iter().zip(&state.qd_rad_s).map(|(torque, rate)| (torque * rate).abs()).sum()
-            };
             self.log.push(Moment {
                 bar: facts.object("bar").pose_in_world,
                 pelvises: facts.robots.iter().map(|robot| robot.pelvis_in_world).collect(),
-                power_w: robots.iter().map(|robot| power_w(&robot.state)).sum::<f32>() / robots.len() as f32,
+                power_w: robots.iter().map(|robot| robot.state.power_w()).sum::<f32>() / robots.len() as f32,
             });
         }
         Ok(reply)

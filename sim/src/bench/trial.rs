@@ -45,7 +45,7 @@ pub(super) fn run(case: &Case, seed: u64, locomotion: Box<dyn Locomotion>) -> Re
         let base = base_command(case, &world, &state, heading_rad, &legs, time_s, rest.base);
         disturb(case, &mut world, seed, direction, &legs, time_s);
         let upper_rad = arms.at(&rest.upper_rad, time_s);
-        work_j += power_w(&state) * DT_S;
+        work_j += state.power_w() * DT_S;
         log.push(Sample { pelvis_m: state.world_from_pelvis.translation, heading_rad, command: base });
         state = world.control_step(&[RobotCommand { upper_rad, base }])?.robots.remove(0).state;
     }
@@ -120,10 +120,6 @@ fn disturb(case: &Case, world: &mut World, seed: u64, direction: Vector, legs: &
 fn pull_direction(random: &mut Random) -> Vector {
     let (angle, rise) = (random.uniform([0.0, TAU]), random.uniform([-PI / 4.0, PI / 4.0]));
     Vector::new(angle.cos() * rise.cos(), angle.sin() * rise.cos(), rise.sin())
-}
-
-fn power_w(state: &RobotState) -> f32 {
-    state.torque_n_m.iter().zip(&state.qd_rad_s).map(|(torque, rate)| (torque * rate).abs()).sum()
 }
 
 fn unwrap(angle_rad: f32, last_rad: f32) -> f32 {

@@ -35,6 +35,13 @@ pub struct RobotState {
     pub fallen: bool,
 }
 
+impl RobotState {
+    /// Mechanical power of all joints, each counted whichever way it works.
+    pub fn power_w(&self) -> f32 {
+        self.torque_n_m.iter().zip(&self.qd_rad_s).map(|(torque, rate)| (torque * rate).abs()).sum()
+    }
+}
+
 impl Robot {
     /// The robot as its controller may know it.
     pub(crate) fn measure(&self, dynamics: &Dynamics) -> WholeBody<'_> {

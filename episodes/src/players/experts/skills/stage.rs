@@ -73,7 +73,8 @@ impl HandMove {
 #[derive(Clone, Copy)]
 struct HandGoal {
     world_from_wrist: Pose,
-    fingers_rad: [f32; 7],
+    /// `None` until they are told: they stay as they are where the episode begins, be it around something.
+    fingers_rad: Option<[f32; 7]>,
 }
 
 /// What a robot was last told.
@@ -102,7 +103,7 @@ impl<'a> Stage<'a> {
         let told = |robot: usize| Told {
             goals: Sides::from_fn(|side| HandGoal {
                 world_from_wrist: world_from_wrist(&facts, robot, side),
-                fingers_rad: [0.0; 7],
+                fingers_rad: None,
             }),
             height_m: None,
             compliance_n_s_m: None,
@@ -177,9 +178,9 @@ impl<'a> Stage<'a> {
                     goal.world_from_wrist = start.world_from_wrist.lerp(&end, part);
                 }
                 if let Some(end_rad) = hand.fingers_rad {
-                    let between =
-                        |i: usize| start.fingers_rad[i] + (end_rad[i] - start.fingers_rad[i]) * part;
-                    goal.fingers_rad = std::array::from_fn(between);
+                    let start_rad = start.fingers_rad.unwrap_or([0.0; 7]);
+                    let between = |i: usize| start_rad[i] + (end_rad[i] - start_rad[i]) * part;
+                    goal.fingers_rad = Some(std::array::from_fn(between));
                 }
             }
             self.command(steps, moves)?;
@@ -263,7 +264,7 @@ impl<'a> Stage<'a> {
             let q = pose(side).rotation;
             Some([q.w, q.x, q.y, q.z].map(f64::from))
         };
-        let fingers = |side: Side| Some(goal(side).fingers_rad.map(f64::from));
+        let fingers = |side: Side| Some(goal(side).fingers_rad?.map(f64::from));
         WristMove {
             left_position_m: position(Side::Left),
             left_quaternion_wxyz: quaternion(Side::Left),
