@@ -14,7 +14,7 @@ use tandem_tools_spec::{ActCall, Disclosure, Hints, Protocol, ToolCall, ToolRepl
 const STANDING: [&str; 4] = ["handover", "pouring", "frame_hang", "co_pouring"];
 
 /// Seeds on which nobody tuned anything.
-const SEEDS: [u32; 3] = [3, 6100, 6101];
+const SEEDS: [u32; 3] = [3, 6100, 6102];
 
 /// Plays the experts of `tasks`: phases in order, and nobody falls.
 fn solve(tasks: Vec<&'static Task>) {
@@ -94,7 +94,7 @@ impl Backstage for Slip {
 
 #[test]
 fn a_hand_that_slips_off_a_load_takes_it_again() {
-    let spec = EpisodeSpec::new(tasks::find("table_align").expect("a task"), 6100, Protocol::Agentic);
+    let spec = EpisodeSpec::new(tasks::find("table_align").expect("a task"), 6102, Protocol::Agentic);
     let session = Session::start(&spec, None).expect("a session");
     let mut slip = Slip { episode: InProcess::new(session), slipped: false, took_again: false };
     players::find("expert").expect("a player").play(&spec, &mut slip).expect("an expert that goes on");

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::locomotion::BaseVelocity;
 use crate::locomotion::plane::flat;
 
-const POSITION_GAIN_1_S: f32 = 0.6;
+const POSITION_GAIN_1_S: f32 = 1.0;
 const BIAS_GAIN_1_S2: f32 = 0.5;
 const LARGEST_CORRECTION_M_S: [f32; 2] = [0.3, 0.12];
 /// A robot that was pushed farther than this off its way does not come back for it.

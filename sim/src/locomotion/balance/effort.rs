@@ -14,8 +14,8 @@ use crate::{GRAVITY_M_S2, Side, Sides};
 
 /// Horizontal force within what friction surely gives.
 const FRICTION_USED: f32 = 0.43;
-/// A foot whose pressure is not in its middle spins more easily.
-const LARGEST_TURN_N_M: f32 = 12.0;
+/// Friction holds a foot against turning by its corners, up to 15 N m; less where the pressure is at toe or heel, whose corners are close.
+const LARGEST_TURN_N_M: f32 = 14.0;
 const TURN_FADE_M: f32 = 0.12;
 /// Of trunk and arms about the vertical.
 const TURN_INERTIA_KG_M2: f32 = 1.2;
@@ -24,8 +24,9 @@ const CORRECTIONS: usize = 2;
 const LEAST_HEIGHT_M: f32 = 0.4;
 /// A knee that is almost straight must not ask for the impossible.
 const DAMPING: f32 = 0.004;
-/// Of the ground force that torques give away.
-const FORCE_DAMPING: f32 = 0.004;
+/// Of the ground force that torques give away. With twenty times as much, half of a pull on a robot that leans is not seen: its legs
+/// are almost straight.
+const FORCE_DAMPING: f32 = 0.0002;
 const LARGEST_JOINT_ACCELERATION_RAD_S2: f32 = 400.0;
 
 /// Torques stay within this part of the joints' limits as long as easing off helps.
@@ -126,13 +127,13 @@ fn leg_torques(body: &WholeBody, load: &Load, motion: &Motion, contact: &Contact
 }
 
 impl Contact {
-    /// A foot holds less against turning the farther the pressure is from its middle.
+    /// A foot holds less against turning the nearer the pressure is to toe or heel.
     fn most_turn_n_m(&self, body: &WholeBody) -> f32 {
         match self.foot {
             Some(side) => {
-                let middle_m = body.world_from_soles()[side].translation;
-                let from_middle_m = flat(self.pressure_m - middle_m).length();
-                LARGEST_TURN_N_M * (1.0 - from_middle_m / TURN_FADE_M).max(0.1)
+                let sole_from_world = body.world_from_soles()[side].inverse();
+                let along_m = (sole_from_world * self.pressure_m).x.abs();
+                LARGEST_TURN_N_M * (1.0 - along_m / TURN_FADE_M).max(0.1)
             }
             None => LARGEST_TURN_N_M,
         }

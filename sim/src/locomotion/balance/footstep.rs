@@ -5,16 +5,16 @@ mod tests;
 
 use rapier3d::math::{Pose, Vector};
 
-use super::gait::{Gait, PERIOD_S, TRANSFER_S, recoil};
-use super::swing::{SWING_S, Swing};
+use super::gait::{Gait, PERIOD_S, TRANSFER_S};
+use super::swing::Swing;
 use crate::locomotion::plane::flat;
 
 /// Footholds lie within these of the foot that carries, along the heading and to the inside: the feet never cross.
 const REACH_M: [f32; 2] = [-0.4, 0.48];
 const SPREAD_M: [f32; 2] = [0.08, 0.52];
-/// A foothold outside of these is a strain.
+/// A foothold outside of these is a strain; those of walking sideways lie within.
 const EASY_REACH_M: [f32; 2] = [-0.22, 0.3];
-const EASY_SPREAD_M: [f32; 2] = [0.12, 0.42];
+const EASY_SPREAD_M: [f32; 2] = [0.12, 0.46];
 /// The capture point runs away exponentially: a robot that was hit hurries, to need a nearer foothold.
 const FASTER: [f32; 4] = [1.25, 1.5, 1.75, 2.0];
 /// Strain per pace above one, and per distance between the foothold that is needed and the nearest within reach.
@@ -74,10 +74,8 @@ impl Situation<'_> {
         let carrying_m = flat(stance_m + self.stance.rotation * correction_m.clamp(-most_m, most_m));
         let pressure_m = self.old_m + (carrying_m - self.old_m) * (time_s / TRANSFER_S).min(1.0);
         let ramp_s = (TRANSFER_S - time_s).max(0.0);
-        let landing_m =
+        let needed_m =
             gait.predict(self.capture_m, pressure_m, carrying_m, ramp_s, remaining_s) - gait.offset_m;
-        let recoil = recoil(gait.rate_1_s, remaining_s.min(SWING_S));
-        let needed_m = (landing_m + flat(self.swing.sole_m()) * recoil) / (1.0 + recoil);
         let possible_m =
             self.swing.reachable_m(self.nearest_m(needed_m, REACH_M, SPREAD_M), time_s - TRANSFER_S, pace);
         let foothold_m = flat(possible_m);

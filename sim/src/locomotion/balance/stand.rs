@@ -17,8 +17,8 @@ use crate::locomotion::plane::flat;
 use crate::{GRAVITY_M_S2, Side, Sides};
 
 /// The centre of mass may lie this far from the middle of the feet before the pelvis gives way.
-const COM_ZONE_M: f32 = 0.03;
-const PELVIS_SHIFT_TIME_S: f32 = 0.4;
+const COM_ZONE_M: f32 = 0.027;
+const PELVIS_SHIFT_TIME_S: f32 = 0.25;
 const LARGEST_SHIFT_M: [f32; 2] = [0.2, 0.1];
 /// Below this pelvis height the trunk leans forward, so that the hips can go back.
 const LEAN_BELOW_M: f32 = 0.70;

@@ -1,10 +1,14 @@
 //! Stepping: one foot carries the robot, the other swings to where the capture point asks for it.
 //!
-//! With x the balance point, v its velocity and w = sqrt(g / h), the capture point xi = x + v / w obeys
+//! With x the balance point, v its velocity, u that of the swinging foot, s = [`SWING_INERTIA`] and w = sqrt(g / h), the
+//! capture point  xi = x + (v - s u) / w  obeys
 //!   xi' = w (xi - p),   p the centre of pressure,
 //! which moves from the old foot to the new one within the transfer time and stays there. A foot put down at
 //! u = xi(T) - b  leaves the capture point the offset b of a steady gait from the new foot; see [`Gait`].
-//! Source: Englsberger, Ott, Albu-Schaeffer 2015; Khadiv et al. 2016.
+//! The centre of mass moves along with a leg that swings, and stops with it: v - s u is the speed that lasts, known
+//! from the angular momentum about the ground. Without it a robot that was hit steps too far, the farther the faster it
+//! steps, and at the next step too far the other way.
+//! Source: Englsberger, Ott, Albu-Schaeffer 2015; Khadiv et al. 2016; angular momentum: Gong, Grizzle 2022.
 
 use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
@@ -12,11 +16,11 @@ use serde::{Deserialize, Serialize};
 use super::course::Course;
 use super::effort::{Contact, Motion, Torques, leg_torques_within_limits};
 use super::footstep::{Footstep, Situation};
-use super::gait::{Gait, PERIOD_S, TRANSFER_S};
+use super::gait::{Gait, PERIOD_S, SWING_INERTIA, TRANSFER_S};
 use super::ground::nearest_support_m;
 use super::legs::rotation_vector_rad;
 use super::load::Load;
-use super::swing::{SOLE_IN_FOOT_M, SWING_S, Swing};
+use super::swing::{SOLE_IN_FOOT_M, SWING_S, Swing, foot_motion};
 use crate::body::{Acceleration, Drive, LEGS, WholeBody};
 use crate::locomotion::plane::{flat, heading_rad, wrapped_rad};
 use crate::locomotion::{BaseVelocity, LegCommand};
@@ -28,7 +32,7 @@ const SHIFT_GAIN: f32 = 3.0;
 const SHIFTED_M: f32 = 0.012;
 const LATEST_M: f32 = 0.1;
 /// One foot holds little against turning: a robot that is turned by force gives way, and turns back slowly.
-const HEADING_LEASH_RAD: f32 = 0.24;
+const HEADING_LEASH_RAD: f32 = 0.35;
 const RETURN_RAD_S: f32 = 0.4;
 /// The pelvis sways about the vertical with every step: it faces where it points in the mean of this time.
 const FACING_TIME_S: f32 = 0.2;
@@ -39,8 +43,8 @@ const LIFT_RANGE: [f32; 2] = [-0.45, 0.6];
 const TRUNK_STIFFNESS_1_S2: f32 = 90.0;
 const TRUNK_DAMPING_1_S: f32 = 19.0;
 const LARGEST_TURN_RAD_S2: f32 = 50.0;
-/// Turning about the vertical is the least of a robot's worries.
-const YAW_PART: f32 = 0.32;
+/// A foot that carries holds less about the vertical than about the other axes.
+const YAW_PART: f32 = 0.6;
 /// Walking is neither stretched nor crouched.
 const HIGHEST_M: f32 = 0.745;
 const LOWEST_M: f32 = 0.62;
@@ -126,11 +130,16 @@ impl Step {
         let faced = self.faced_axes(body, dt_s);
         let velocity_m_s = self.course.corrected_velocity(velocity, self.steps > 0, pelvis_m, faced, dt_s);
         let outside = left * self.stance.sign();
-        let gait = Gait::new(rate_1_s, faced[0] * velocity_m_s[0] + faced[1] * velocity_m_s[1], outside);
+        let course_m_s = faced[0] * velocity_m_s[0] + faced[1] * velocity_m_s[1];
+        // A robot that turns while it walks goes the coming step where it will face by then.
+        let coming = Rotation::from_rotation_z(velocity.turning_rad_s * PERIOD_S);
+        let gait = Gait::new(rate_1_s, coming * course_m_s, outside);
+        let (_, foot_m_s, _) = foot_motion(body, self.stance.other());
+        let lasting_m_s = body.com_velocity_m_s - foot_m_s * SWING_INERTIA;
         let situation = Situation {
             gait: &gait,
             swing: &self.swing,
-            capture_m: flat(load.balance_point_m + body.com_velocity_m_s / rate_1_s),
+            capture_m: flat(load.balance_point_m + lasting_m_s / rate_1_s),
             stance: soles[self.stance],
             old_m: flat(soles[self.stance.other()].translation),
             ahead_axis: ahead,

@@ -131,7 +131,7 @@ fn lift(time_s: f32) -> [f32; 3] {
 }
 
 /// Pose, velocity and angular velocity of an ankle roll link, world frame.
-fn foot_motion(body: &WholeBody, side: Side) -> (Pose, Vector, Vector) {
+pub(super) fn foot_motion(body: &WholeBody, side: Side) -> (Pose, Vector, Vector) {
     let first = LEGS[side];
     let foot = body.world_from_foot(side);
     let mut spin_rad_s = body.pelvis_angular_velocity_rad_s;

@@ -7,6 +7,7 @@ use tandem_sim::{Pose, Rotation, Side, Vector};
 use super::hand::{closed_rad, mirrored_m, open_rad};
 use super::stage::{HandMove, Stage};
 use crate::players::PlayerError;
+use crate::scoring::Facts;
 
 /// A hand that is to hold a bar, which lies along the hand's own z axis.
 #[derive(Clone, Copy)]
@@ -93,6 +94,11 @@ impl BarGrasp<'_> {
 
     pub fn open(&self) -> HandMove {
         HandMove::shape(self.robot, self.side, open_rad(self.side))
+    }
+
+    /// Whether this very hand holds its object.
+    pub fn is_held(&self, facts: &Facts) -> bool {
+        facts.holds(self.robot, self.side, self.object)
     }
 
     pub fn holds(&self, stage: &mut Stage) -> Result<bool, PlayerError> {

@@ -20,19 +20,21 @@ const MOST_GIVE_M: f32 = 0.01;
 /// A wrist's goal is never farther than this from the wrist.
 const LEASH_M: f32 = 0.03;
 
-/// Closes all hands on their bars at once; hands that miss try again.
+/// Closes all hands on their bars at once; hands that miss try again, while the others hold on.
 pub fn take_softly(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
+    let mut missing = grasps.to_vec();
     for _ in 0..ATTEMPTS {
-        let before = each(stage, grasps, |grasp, stage| grasp.before(stage, STANDOFF_M))?;
+        let before = each(stage, &missing, |grasp, stage| grasp.before(stage, STANDOFF_M))?;
         stage.perform(0.9, &before)?;
-        let around = each(stage, grasps, |grasp, stage| grasp.around(stage))?;
+        let around = each(stage, &missing, |grasp, stage| grasp.around(stage))?;
         stage.perform(0.5, &around)?;
-        close_softly(stage, grasps, &around)?;
+        close_softly(stage, &missing, &around)?;
         let facts = stage.facts()?;
-        if all_hold(&facts, grasps) {
+        missing = grasps.iter().copied().filter(|grasp| !grasp.is_held(&facts)).collect();
+        if missing.is_empty() {
             return Ok(());
         }
-        open_in_place(stage, grasps)?;
+        open_in_place(stage, &missing)?;
     }
     Err(PlayerError::GaveUp("not every hand could take its bar".into()))
 }
@@ -66,7 +68,7 @@ fn close_softly(stage: &mut Stage, grasps: &[BarGrasp], around: &[HandMove]) -> 
 }
 
 fn all_hold(facts: &Facts, grasps: &[BarGrasp]) -> bool {
-    grasps.iter().all(|grasp| facts.holds(grasp.robot, grasp.side, grasp.object))
+    grasps.iter().all(|grasp| grasp.is_held(facts))
 }
 
 /// Hands open where they are, for opening fingers push; then they rise. Those that still touch try it again, and give way to what they

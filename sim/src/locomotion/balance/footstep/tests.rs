@@ -8,7 +8,7 @@ const DT_S: f32 = 1.0 / 200.0;
 const RATE_1_S: f32 = 3.75;
 
 /// The linear inverted pendulum on feet that are planned here:
-///   x' = w (xi - x),   xi' = w (xi - p) - H / (m h),   H by the swinging leg.
+///   x' = w (xi - x),   xi' = w (xi - p).
 struct Pendulum {
     com_m: Vector,
     capture_m: Vector,
@@ -52,11 +52,9 @@ impl Pendulum {
             };
             let plan = situation.plan(DT_S);
             time_s += DT_S * plan.pace;
-            let before_m = swing.sole_m();
             swing.advance(foot(plan.foothold_m), time_s - TRANSFER_S, plan.pace, DT_S);
-            let thrown_m = (swing.sole_m() - before_m) * (recoil(RATE_1_S, 0.0));
             self.com_m += (self.capture_m - self.com_m) * (RATE_1_S * DT_S);
-            self.capture_m += (self.capture_m - plan.pressure_m) * (RATE_1_S * DT_S) - thrown_m;
+            self.capture_m += (self.capture_m - plan.pressure_m) * (RATE_1_S * DT_S);
         }
         self.swing_m = self.stance_m;
         self.stance_m = flat(swing.sole_m());
