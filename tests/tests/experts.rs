@@ -13,7 +13,8 @@ use tandem_tools_spec::{ActCall, Disclosure, Hints, Protocol, ToolCall, ToolRepl
 /// Tasks in which nobody walks.
 const STANDING: [&str; 4] = ["handover", "pouring", "frame_hang", "co_pouring"];
 
-/// Seeds on which nobody tuned anything.
+/// Seeds on which nothing was tuned, but chosen as ones that are solved: on 6101 a robot falls as it lets go of the round table. README has
+/// how often experts fail.
 const SEEDS: [u32; 3] = [3, 6100, 6102];
 
 /// Plays the experts of `tasks`: phases in order, and nobody falls.
