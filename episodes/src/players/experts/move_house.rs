@@ -80,9 +80,7 @@ fn carry_table(stage: &mut Stage) -> Result<(), PlayerError> {
     team.carry_where_free(stage, &marks, PACE_M_S, &free_m)?;
     team.set_down(stage, &marks)?;
     // The squares are small, and hands that gave way now would shift the table as they open.
-    for carrier in [B, C] {
-        stage.set_compliance(carrier, None);
-    }
+    team.give_way(stage, false);
     let_go(stage, &grasps)
 }
 

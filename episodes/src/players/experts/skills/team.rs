@@ -196,7 +196,7 @@ impl<'a> Team<'a> {
     }
 
     /// Whether hands give way to partners from now on. One who has no partner gives way to nobody.
-    fn give_way(&self, stage: &mut Stage, give_way: bool) {
+    pub fn give_way(&self, stage: &mut Stage, give_way: bool) {
         let compliance_n_s_m = (give_way && self.robots.len() > 1).then_some(COMPLIANCE_N_S_M);
         for robot in &self.robots {
             stage.set_compliance(*robot, compliance_n_s_m);
