@@ -97,6 +97,7 @@ impl Posed {
             pelvis_angular_velocity_rad_s: self.pelvis_angular_velocity_rad_s,
             com_m,
             com_velocity_m_s,
+            palm_velocity_m_s: Sides::both(Vector::ZERO),
             hand_force_n: Sides::both(Vector::ZERO),
             waist_target_rad: [0.0; 3],
         }

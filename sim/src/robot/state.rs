@@ -4,7 +4,7 @@ use rapier3d::math::{Pose, Vector};
 use serde::{Deserialize, Serialize};
 
 use super::{Robot, RobotCommand, joints, per_joint};
-use crate::body::{JOINTS, RobotModel, UPPER, WholeBody};
+use crate::body::{JOINTS, PALM_IN_WRIST_M, RobotModel, UPPER, WholeBody};
 use crate::dynamics::{Dynamics, Tree};
 use crate::locomotion::BaseCommand;
 use crate::mechanism::rounded;
@@ -62,6 +62,10 @@ impl Robot {
             com_velocity_m_s += tree.point_velocity_m_s(index, centre_m).as_vec3() * link.mass.mass();
             world_from_link.push(rounded(&world));
         }
+        let palm_velocity_m_s = model.hands.each_ref().map(|hand| {
+            let palm_m = tree.world_from_link(hand.wrist) * PALM_IN_WRIST_M.as_dvec3();
+            tree.point_velocity_m_s(hand.wrist, palm_m).as_vec3()
+        });
         WholeBody {
             model,
             q_rad,
@@ -71,6 +75,7 @@ impl Robot {
             world_from_link,
             com_m: com_m / model.mass_kg,
             com_velocity_m_s: com_velocity_m_s / model.mass_kg,
+            palm_velocity_m_s,
             hand_force_n: self.memory.feeling.force_n(),
             waist_target_rad: self.waist_target_rad(),
         }

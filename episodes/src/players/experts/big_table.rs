@@ -25,6 +25,7 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
     let heading = upright(&team.object(stage)?).rotation;
     let place = Pose::from_parts(stage.facts()?.position_m("goal_disc"), heading);
     team.carry_to(stage, &place, PACE_M_S)?;
+    team.rest(stage)?;
     team.set_down(stage, &place)?;
     let_go(stage, &grasps)
 }

@@ -14,7 +14,7 @@ const BAR_IN_WRIST_M: Vector = Vector::new(0.105, 0.042, 0.0);
 const CLOSURE: f32 = 1.15;
 
 const LIFT_M: f32 = 0.12;
-/// While it tips, the tub moves sideways until its lip is over the crate.
+/// While it tips, the tub moves sideways until its lip is over the crate, and along the bars to the crate's middle.
 const OVER_CRATE_M: f32 = 0.18;
 const TIP_RAD: f32 = 1.25;
 
@@ -40,19 +40,14 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
     let start = facts.object("tub").pose_in_world;
     // The bars are the axis: hands turn, and move little.
     let bars = Vector::new(0.0, 0.0, facts.site("tub", "bar_a").position_m().z);
-    let tub_at = |lift_m: f32, sideways_m: f32, tip_rad: f32| {
+    let along_m = facts.position_m("crate").x - start.translation.x;
+    let tub_at = |lift_m: f32, over: f32, tip_rad: f32| {
         let rotation = Rotation::from_rotation_x(-tip_rad) * start.rotation;
-        let axis_m = start.translation + bars + Vector::new(0.0, sideways_m, lift_m);
+        let axis_m = start.translation + bars + Vector::new(along_m * over, OVER_CRATE_M * over, lift_m);
         Pose::from_parts(axis_m - rotation * bars, rotation)
     };
     move_together(stage, &grasps, &|part| tub_at(LIFT_M * part, 0.0, 0.0), 5, 0.3)?;
-    move_together(stage, &grasps, &|part| tub_at(LIFT_M, OVER_CRATE_M * part, 0.5 * part), 6, 0.3)?;
-    move_together(
-        stage,
-        &grasps,
-        &|part| tub_at(LIFT_M, OVER_CRATE_M, 0.5 + (TIP_RAD - 0.5) * part),
-        8,
-        0.3,
-    )?;
-    move_together(stage, &grasps, &|_| tub_at(LIFT_M, OVER_CRATE_M, TIP_RAD), 8, 0.4)
+    move_together(stage, &grasps, &|part| tub_at(LIFT_M, part, 0.5 * part), 6, 0.3)?;
+    move_together(stage, &grasps, &|part| tub_at(LIFT_M, 1.0, 0.5 + (TIP_RAD - 0.5) * part), 8, 0.3)?;
+    move_together(stage, &grasps, &|_| tub_at(LIFT_M, 1.0, TIP_RAD), 8, 0.4)
 }

@@ -78,6 +78,7 @@ fn carry_table(stage: &mut Stage) -> Result<(), PlayerError> {
         a_m => a_m.x - APART_M - b_x_m,
     };
     team.carry_where_free(stage, &marks, PACE_M_S, &free_m)?;
+    team.rest(stage)?;
     team.set_down(stage, &marks)?;
     // The squares are small, and hands that gave way now would shift the table as they open.
     team.give_way(stage, false);

@@ -7,7 +7,7 @@ use crate::locomotion::BaseVelocity;
 use crate::locomotion::plane::flat;
 
 const POSITION_GAIN_1_S: f32 = 1.0;
-const BIAS_GAIN_1_S2: f32 = 0.5;
+const BIAS_GAIN_1_S2: f32 = 1.0;
 const LARGEST_CORRECTION_M_S: [f32; 2] = [0.3, 0.12];
 /// A robot that was pushed farther than this off its way does not come back for it.
 const LEASH_M: f32 = 0.15;
@@ -26,18 +26,18 @@ impl Course {
     }
 
     /// Velocity to plan with: the command, plus what brings the pelvis back to where it should be
-    /// by now. Before the first step, while a robot has not `stepped`, there is nothing to make up for.
+    /// by now. A robot that still `starts` gathers speed: what it stays behind then is not made up for.
     pub(super) fn corrected_velocity(
         &mut self,
         velocity: BaseVelocity,
-        stepped: bool,
+        starts: bool,
         pelvis_m: Vector,
         [ahead, left]: [Vector; 2],
         dt_s: f32,
     ) -> [f32; 2] {
         // A robot that is to stop stops where it can: the bias was learned in another direction of motion.
         let stopping = velocity == BaseVelocity::STILL;
-        if !stepped || stopping {
+        if starts || stopping {
             self.reference_m = pelvis_m;
         }
         if stopping {
@@ -53,7 +53,7 @@ impl Course {
         let command_m_s = [velocity.forward_m_s, velocity.left_m_s];
         std::array::from_fn(|i| {
             let most_m_s = LARGEST_CORRECTION_M_S[i];
-            if stepped {
+            if !starts {
                 let felt_m = error_m[i].clamp(-LARGEST_ERROR_M, LARGEST_ERROR_M);
                 self.bias_m_s[i] =
                     (self.bias_m_s[i] + BIAS_GAIN_1_S2 * felt_m * dt_s).clamp(-most_m_s, most_m_s);
@@ -78,7 +78,7 @@ mod tests {
         let (mut course, mut pelvis_m) = (Course::from(Vector::ZERO), Vector::ZERO);
         let mut told_m_s = [0.0; 2];
         for _ in 0..6000 {
-            told_m_s = course.corrected_velocity(command, true, pelvis_m, AXES, DT_S);
+            told_m_s = course.corrected_velocity(command, false, pelvis_m, AXES, DT_S);
             pelvis_m += Vector::X * (0.8 * told_m_s[0] * DT_S);
         }
         assert!((0.8 * told_m_s[0] - 0.3).abs() < 1e-3 && told_m_s[1] == 0.0, "{told_m_s:?}");
@@ -89,8 +89,8 @@ mod tests {
         let mut course = Course::from(Vector::ZERO);
         let far_m = Vector::X * -5.0;
         let command = BaseVelocity { forward_m_s: 0.2, ..BaseVelocity::STILL };
-        let told_m_s = course.corrected_velocity(command, true, far_m, AXES, DT_S);
+        let told_m_s = course.corrected_velocity(command, false, far_m, AXES, DT_S);
         assert!((told_m_s[0] - 0.2 - POSITION_GAIN_1_S * LEASH_M).abs() < 1e-3, "{told_m_s:?}");
-        assert_eq!(course.corrected_velocity(BaseVelocity::STILL, true, Vector::Y, AXES, DT_S), [0.0; 2]);
+        assert_eq!(course.corrected_velocity(BaseVelocity::STILL, false, Vector::Y, AXES, DT_S), [0.0; 2]);
     }
 }

@@ -2,7 +2,7 @@
 
 use rapier3d::math::Vector;
 
-use super::swing::SWING_S;
+use super::swing::{AIR_S, SWING_S};
 
 /// The pressure moves from the old foot to the new one.
 pub(super) const TRANSFER_S: f32 = 0.05;
@@ -25,16 +25,21 @@ pub(super) struct Gait {
 impl Gait {
     /// With E = e^{w t}, t the transfer, G = e^{w (T - t)} and K = G (E - 1) / (w t):
     ///   b = v T (1 - E G + K) / (E G - 1)  along the motion,   width (E G + 1 - K) / (E G + 1)  to the inside.
+    /// The foot that swings 2 v T ahead adds to the capture point what is left of s u when it lands, 2 v T s e^{w a} with a the time
+    /// from the middle of its flight: b is smaller by that over E G - 1. To the sides b stays as it is, for robots that
+    /// start to walk sideways have no room for the narrower step.
     pub(super) fn new(rate_1_s: f32, velocity_m_s: Vector, outside_axis: Vector) -> Gait {
         let transfer = (rate_1_s * TRANSFER_S).exp();
         let whole = (rate_1_s * PERIOD_S).exp();
         let ramp = whole / transfer * (transfer - 1.0) / (rate_1_s * TRANSFER_S);
         let along_m = velocity_m_s * PERIOD_S;
+        let ahead_m = along_m - outside_axis * along_m.dot(outside_axis);
+        let swung = 2.0 * SWING_INERTIA * (rate_1_s * (SWING_S - 0.5 * AIR_S)).exp();
         let width_m = WIDTH_M + WIDENING * along_m.dot(outside_axis).abs();
         Gait {
             rate_1_s,
             step_m: along_m - outside_axis * width_m,
-            offset_m: along_m * ((1.0 - whole + ramp) / (whole - 1.0))
+            offset_m: along_m * ((1.0 - whole + ramp) / (whole - 1.0)) - ahead_m * (swung / (whole - 1.0))
                 + outside_axis * (width_m * (whole + 1.0 - ramp) / (whole + 1.0)),
         }
     }
@@ -93,7 +98,9 @@ mod tests {
                 let gait = Gait::new(RATE_1_S, velocity_m_s, outside);
                 // The stance foot is the origin; the old one is a step behind.
                 let old_m = -before.step_m;
-                let landing_m = gait.predict(before.offset_m, old_m, Vector::ZERO, TRANSFER_S, PERIOD_S);
+                let swung = 2.0 * SWING_INERTIA * (RATE_1_S * (SWING_S - 0.5 * AIR_S)).exp();
+                let landing_m = gait.predict(before.offset_m, old_m, Vector::ZERO, TRANSFER_S, PERIOD_S)
+                    + Vector::X * (swung * x * PERIOD_S);
                 let expected_m = gait.step_m + gait.offset_m;
                 assert!((landing_m - expected_m).length() < 1e-4, "{velocity_m_s}: {landing_m} {expected_m}");
                 let pace_m_s = (before.step_m + gait.step_m) / (2.0 * PERIOD_S);

@@ -2,9 +2,29 @@
 
 use rapier3d::math::Vector;
 
-use crate::GRAVITY_M_S2;
 use crate::body::WholeBody;
 use crate::locomotion::plane::flat;
+use crate::{GRAVITY_M_S2, Sides};
+
+/// A robot and what its hands carry, as one body: what is carried is a mass in each palm. Its swing does not push the robot.
+pub(super) struct Laden {
+    carried_kg: Sides<f32>,
+    pub mass_kg: f32,
+    pub velocity_m_s: Vector,
+}
+
+impl Laden {
+    pub(super) fn of(body: &WholeBody) -> Laden {
+        let carried_kg = body.hand_force_n.map(|force_n| (-force_n.z - DEAD_ZONE_N).max(0.0) / GRAVITY_M_S2);
+        let mut mass_kg = body.model.mass_kg;
+        let mut momentum_kg_m_s = body.com_velocity_m_s * mass_kg;
+        for (carried_kg, palm_m_s) in carried_kg.into_iter().zip(body.palm_velocity_m_s) {
+            mass_kg += carried_kg;
+            momentum_kg_m_s += palm_m_s * carried_kg;
+        }
+        Laden { carried_kg, mass_kg, velocity_m_s: momentum_kg_m_s / mass_kg }
+    }
+}
 
 /// External wrench, world frame, and its effect on balance: weights in the hands and an observed push.
 pub(super) struct Load {
@@ -13,6 +33,10 @@ pub(super) struct Load {
     pub moment_n_m: Vector,
     /// Where the centre of pressure of a robot at rest lies: the centre of mass, moved by the wrench and the push.
     pub balance_point_m: Vector,
+    /// The same without the push: where the robot and what it carries have their centre of mass.
+    pub weights_point_m: Vector,
+    /// Of robot and what it carries.
+    pub velocity_m_s: Vector,
 }
 
 /// Pushes and pulls are taken to act this high over the centre of mass: at the chest and the hands.
@@ -25,25 +49,31 @@ const LARGEST_TURN_N_M: f32 = 20.0;
 impl Load {
     /// With height h of the centre of mass c over the ground and vertical load N = m g - f_z:
     ///   p = c + ( m_y + h f_x, -m_x + h f_y ) / N.
-    pub(super) fn of(body: &WholeBody, ground_m: f32, push_m_s2: Vector) -> Load {
+    pub(super) fn of(body: &WholeBody, laden: &Laden, ground_m: f32, push_m_s2: Vector) -> Load {
+        let height_m = body.com_m.z - ground_m;
+        let balanced_m = |force_n: Vector, moment_n_m: Vector| {
+            let away_m =
+                Vector::new(moment_n_m.y + height_m * force_n.x, height_m * force_n.y - moment_n_m.x, 0.0);
+            body.com_m + away_m / (body.model.mass_kg * GRAVITY_M_S2 - force_n.z)
+        };
         let (mut force_n, mut moment_n_m) = (Vector::ZERO, Vector::ZERO);
-        for (hand_n, palm_m) in body.hand_force_n.into_iter().zip(body.palms_m()) {
-            // What pulls sideways is part of the push.
-            let felt_n = Vector::new(0.0, 0.0, (hand_n.z + DEAD_ZONE_N).min(0.0));
-            force_n += felt_n;
-            moment_n_m += (palm_m - body.com_m).cross(felt_n);
-            // What turns the robot, the hands alone tell: the push acts over the centre of mass.
+        let palms_m = body.palms_m();
+        for (carried_kg, palm_m) in laden.carried_kg.into_iter().zip(palms_m) {
+            let weight_n = Vector::new(0.0, 0.0, -carried_kg * GRAVITY_M_S2);
+            force_n += weight_n;
+            moment_n_m += (palm_m - body.com_m).cross(weight_n);
+        }
+        let weights_point_m = balanced_m(force_n, moment_n_m);
+        for (hand_n, palm_m) in body.hand_force_n.into_iter().zip(palms_m) {
+            // What pulls sideways is part of the push. What turns the robot, the hands alone tell: the push acts over the centre of mass.
             moment_n_m.z += (palm_m - body.com_m).cross(flat(hand_n)).z;
         }
         moment_n_m.z = moment_n_m.z.clamp(-LARGEST_TURN_N_M, LARGEST_TURN_N_M);
-        let pushing_n = push_m_s2 * body.model.mass_kg;
+        let pushing_n = push_m_s2 * laden.mass_kg;
         force_n += pushing_n;
         moment_n_m += Vector::new(0.0, 0.0, PUSH_LEVER_M).cross(pushing_n);
-        let height_m = body.com_m.z - ground_m;
-        let vertical_n = body.model.mass_kg * GRAVITY_M_S2 - force_n.z;
-        let away_m =
-            Vector::new(moment_n_m.y + height_m * force_n.x, height_m * force_n.y - moment_n_m.x, 0.0);
-        Load { force_n, moment_n_m, balance_point_m: body.com_m + away_m / vertical_n }
+        let balance_point_m = balanced_m(force_n, moment_n_m);
+        Load { force_n, moment_n_m, balance_point_m, weights_point_m, velocity_m_s: laden.velocity_m_s }
     }
 }
 
@@ -56,7 +86,7 @@ mod tests {
     #[test]
     fn a_robot_stands_under_what_it_carries() {
         let mut body = Posed::standing().body();
-        let free = Load::of(&body, 0.0, Vector::ZERO);
+        let free = Load::of(&body, &Laden::of(&body), 0.0, Vector::ZERO);
         assert_eq!(
             (free.force_n, free.moment_n_m, free.balance_point_m),
             (Vector::ZERO, Vector::ZERO, body.com_m)
@@ -65,7 +95,7 @@ mod tests {
         // Equal weights in both hands act as one in the middle: the common centre of mass.
         let weight_n = 20.0;
         body.hand_force_n = Sides::both(Vector::new(0.0, 0.0, -weight_n - DEAD_ZONE_N));
-        let loaded = Load::of(&body, 0.0, Vector::ZERO);
+        let loaded = Load::of(&body, &Laden::of(&body), 0.0, Vector::ZERO);
         let palms_m: Vector = body.palms_m().into_iter().sum();
         let robot_n = body.model.mass_kg * GRAVITY_M_S2;
         let common_m = (body.com_m * robot_n + palms_m * weight_n) / (robot_n + 2.0 * weight_n);
@@ -74,7 +104,21 @@ mod tests {
 
         // What lifts, and what is lighter than the dead zone, is no load.
         body.hand_force_n = Sides { left: Vector::Z * 30.0, right: Vector::Z * -0.9 * DEAD_ZONE_N };
-        assert_eq!(Load::of(&body, 0.0, Vector::ZERO).force_n, Vector::ZERO);
+        assert_eq!(Load::of(&body, &Laden::of(&body), 0.0, Vector::ZERO).force_n, Vector::ZERO);
+    }
+
+    /// A robot at rest whose hands swing 3 kg each forward: momentum is shared by all that moves.
+    #[test]
+    fn what_swings_in_the_hands_belongs_to_the_robot() {
+        let mut body = Posed::standing().body();
+        body.com_velocity_m_s = Vector::ZERO;
+        body.palm_velocity_m_s = Sides::both(Vector::X);
+        assert_eq!(Laden::of(&body).velocity_m_s, Vector::ZERO, "empty hands");
+        body.hand_force_n = Sides::both(Vector::new(0.0, 0.0, -3.0 * GRAVITY_M_S2 - DEAD_ZONE_N));
+        let laden = Laden::of(&body);
+        let mass_kg = body.model.mass_kg + 6.0;
+        assert!((laden.mass_kg - mass_kg).abs() < 1e-4, "{}", laden.mass_kg);
+        assert!((laden.velocity_m_s - Vector::X * (6.0 / mass_kg)).length() < 1e-5, "{}", laden.velocity_m_s);
     }
 
     /// Against a steady push a robot leans: moments about the pressure point cancel.
@@ -82,7 +126,7 @@ mod tests {
     fn a_push_is_leant_against() {
         let body = Posed::standing().body();
         let push_m_s2 = Vector::new(0.5, 0.0, 0.0);
-        let load = Load::of(&body, 0.0, push_m_s2);
+        let load = Load::of(&body, &Laden::of(&body), 0.0, push_m_s2);
         let lean_m = body.com_m.x - load.balance_point_m.x;
         let expected_m = -push_m_s2.x * (body.com_m.z + PUSH_LEVER_M) / GRAVITY_M_S2;
         assert!((lean_m - expected_m).abs() < 1e-5, "{lean_m} {expected_m}");

@@ -19,7 +19,7 @@ use super::plane::heading_rad;
 use super::{BaseCommand, BaseLimits, BaseVelocity, LegCommand, Locomotion};
 use crate::body::WholeBody;
 use crate::{GRAVITY_M_S2, Sides};
-use load::Load;
+use load::{Laden, Load};
 use observer::Observer;
 use stand::Stand;
 use step::Step;
@@ -93,8 +93,9 @@ impl Locomotion for Balance {
         state.time_in_mode_s += dt_s;
         let ground_m =
             body.world_from_soles().iter().map(|sole| sole.translation.z).fold(f32::INFINITY, f32::min);
-        state.observer.update(body.com_velocity_m_s, dt_s);
-        let load = Load::of(body, ground_m, state.observer.push_m_s2());
+        let laden = Laden::of(body);
+        state.observer.update(laden.velocity_m_s, dt_s);
+        let load = Load::of(body, &laden, ground_m, state.observer.push_m_s2());
         state.change_mode(body, &load);
         let (legs, expected_m_s2) = match &mut state.mode {
             Mode::Stand(stand) => stand.tick(body, &load, command.pelvis_height_m, dt_s),
@@ -104,7 +105,7 @@ impl Locomotion for Balance {
                 done
             }
         };
-        state.observer.expect(expected_m_s2);
+        state.observer.expect(expected_m_s2 * (body.model.mass_kg / laden.mass_kg));
         legs
     }
 
@@ -174,7 +175,7 @@ impl State {
         let Sides { left, right } = body.world_from_soles();
         let middle_m = (left.translation + right.translation) * 0.5;
         let height_m = body.com_m.z - middle_m.z;
-        let capture_m = load.balance_point_m + body.com_velocity_m_s * (height_m / GRAVITY_M_S2).sqrt();
+        let capture_m = load.balance_point_m + load.velocity_m_s * (height_m / GRAVITY_M_S2).sqrt();
         let into_heading = Rotation::from_rotation_z(-self.heading_rad);
         Stance {
             capture_m: into_heading * (capture_m - middle_m),

@@ -3,7 +3,7 @@
 use rapier3d::math::Vector;
 use serde::{Deserialize, Serialize};
 
-const RATE_1_S: f32 = 11.5;
+const RATE_1_S: f32 = 16.0;
 const LARGEST_PUSH_M_S2: f32 = 2.0;
 /// A blow is over before a foot lands: only what lasts is a push.
 const LARGEST_CHANGE_M_S3: f32 = 4.5;

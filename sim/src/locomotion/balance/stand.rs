@@ -16,10 +16,17 @@ use crate::locomotion::LegCommand;
 use crate::locomotion::plane::flat;
 use crate::{GRAVITY_M_S2, Side, Sides};
 
-/// The centre of mass may lie this far from the middle of the feet before the pelvis gives way.
-const COM_ZONE_M: f32 = 0.027;
-const PELVIS_SHIFT_TIME_S: f32 = 0.25;
+/// The centre of mass, with what the hands carry, may lie this far from the middle of the feet before the pelvis gives way.
+const COM_ZONE_M: f32 = 0.044;
+/// A robot that walked comes to rest nearer to where it is: its centre of mass so far from the middle.
+const RESTING_ZONE_M: f32 = 0.01;
 const LARGEST_SHIFT_M: [f32; 2] = [0.2, 0.1];
+/// The pelvis leans against this part of a push: robots that hold one thing and leaned against all of it would pull each other
+/// harder and harder. It leaves out little changes: one that followed them would sway for ever, for joints rub, and what a
+/// hand leans on slides.
+const LEAN_SHARE: f32 = 0.7;
+const LEAN_PLAY_M: f32 = 0.01;
+const LEANING_TIME_S: f32 = 0.25;
 /// Below this pelvis height the trunk leans forward, so that the hips can go back.
 const LEAN_BELOW_M: f32 = 0.70;
 const LEAN_RAD_PER_M: f32 = 2.0;
@@ -27,8 +34,8 @@ const LARGEST_LEAN_RAD: f32 = 0.5;
 const HEIGHT_RATE_M_S: f32 = 0.15;
 
 /// Virtual spring and damper, per kg of robot: horizontal, vertical.
-const HORIZONTAL_STIFFNESS_1_S2: f32 = 60.0;
-const HORIZONTAL_DAMPING_1_S: f32 = 14.0;
+const HORIZONTAL_STIFFNESS_1_S2: f32 = 100.0;
+const HORIZONTAL_DAMPING_1_S: f32 = 20.0;
 const VERTICAL_STIFFNESS_1_S2: f32 = 80.0;
 const VERTICAL_DAMPING_1_S: f32 = 15.0;
 const TRUNK_STIFFNESS_N_M_RAD: f32 = 150.0;
@@ -41,7 +48,7 @@ const SMALLEST_LOAD_SHARE: f32 = 0.2;
 const IK_ITERATIONS: usize = 2;
 
 /// How fast a robot that plants its feet while moving comes to rest over them.
-const SETTLING_1_S: f32 = 3.5;
+const SETTLING_1_S: f32 = 5.0;
 const TILT_SETTLING_TIME_S: f32 = 0.15;
 
 /// A robot with both feet planted; see the module's text.
@@ -56,7 +63,8 @@ pub(super) struct Stand {
     offset_rate_m_s: Vector,
     tilt: Rotation,
     heading_rad: f32,
-    shift_m: Vector,
+    /// Of the pelvis, against a push.
+    lean_m: Vector,
     height_m: f32,
     q_rad: Sides<LegAngles>,
 }
@@ -74,32 +82,30 @@ impl Stand {
             feet: Sides::from_fn(|side| body.world_from_foot(side)),
             soles,
             home_m,
-            offset_m: flat(pelvis.translation - home_m),
+            offset_m: Vector::ZERO,
             offset_rate_m_s: Vector::ZERO,
             tilt: heading.inverse() * pelvis.rotation,
             heading_rad,
-            shift_m: Vector::ZERO,
+            lean_m: Vector::ZERO,
             height_m: pelvis.translation.z - middle_m.z,
             q_rad: Sides::from_fn(|side| std::array::from_fn(|i| body.q_rad[LEGS[side] + i])),
         };
         if let Some((_, load)) = moving {
+            stand.home_m += stand.back_into_m(RESTING_ZONE_M, body, load);
+            stand.lean_m = against_push_m(load);
+            stand.offset_m = flat(pelvis.translation - stand.home_m) - stand.lean_m;
             stand.offset_rate_m_s = flat(body.com_velocity_m_s);
-            stand.shift_m = stand.wanted_shift_m(body, load);
-            stand.offset_m -= stand.shift_m;
         }
         stand
     }
 
-    /// Shift of the pelvis from home that keeps the balance point within [`COM_ZONE_M`] of the middle of the feet.
-    fn wanted_shift_m(&self, body: &WholeBody, load: &Load) -> Vector {
+    /// Shift of the pelvis from home that keeps the centre of mass, with what is carried, within a zone round the middle of the
+    /// feet.
+    fn back_into_m(&self, zone_m: f32, body: &WholeBody, load: &Load) -> Vector {
         let middle_m = (self.soles.left.translation + self.soles.right.translation) * 0.5;
-        let at_home_m = self.home_m + load.balance_point_m - body.world_from_pelvis().translation - middle_m;
-        let excess = |offset_m: f32| offset_m.clamp(-COM_ZONE_M, COM_ZONE_M) - offset_m;
-        Vector::new(
-            excess(at_home_m.x).clamp(-LARGEST_SHIFT_M[0], LARGEST_SHIFT_M[0]),
-            excess(at_home_m.y).clamp(-LARGEST_SHIFT_M[1], LARGEST_SHIFT_M[1]),
-            0.0,
-        )
+        let at_home_m = self.home_m + load.weights_point_m - body.world_from_pelvis().translation - middle_m;
+        let zone_m = Vector::new(zone_m, zone_m, 0.0);
+        within_reach_m(flat(at_home_m.clamp(-zone_m, zone_m) - at_home_m))
     }
 
     /// One physics step towards a pelvis height over the soles.
@@ -143,18 +149,30 @@ impl Stand {
     }
 
     /// Pelvis pose (world) that keeps the centre of mass within [`COM_ZONE_M`] of the middle of the planted feet,
-    /// as near to home as that allows.
+    /// as near to home as that and a push allow.
     fn pelvis_goal(&mut self, body: &WholeBody, load: &Load, dt_s: f32) -> Pose {
         let middle_m = (self.soles.left.translation + self.soles.right.translation) * 0.5;
-        self.shift_m += (self.wanted_shift_m(body, load) - self.shift_m) * (dt_s / PELVIS_SHIFT_TIME_S);
+        let change_m = against_push_m(load) - self.lean_m;
+        self.lean_m += (change_m - change_m.clamp_length_max(LEAN_PLAY_M)) * (dt_s / LEANING_TIME_S);
         let lean_rad = ((LEAN_BELOW_M - self.height_m) * LEAN_RAD_PER_M).clamp(0.0, LARGEST_LEAN_RAD);
-        let mut position_m = self.home_m + self.offset_m + self.shift_m;
+        let shift_m = self.back_into_m(COM_ZONE_M, body, load);
+        let mut position_m = self.home_m + self.offset_m + shift_m + self.lean_m;
         position_m.z = middle_m.z + self.height_m;
         Pose::from_parts(
             position_m,
             Rotation::from_rotation_z(self.heading_rad) * Rotation::from_rotation_y(lean_rad) * self.tilt,
         )
     }
+}
+
+/// Shift of the pelvis against a push, which moves the balance point.
+fn against_push_m(load: &Load) -> Vector {
+    within_reach_m(flat(load.weights_point_m - load.balance_point_m)) * LEAN_SHARE
+}
+
+fn within_reach_m(shift_m: Vector) -> Vector {
+    let most_m = Vector::new(LARGEST_SHIFT_M[0], LARGEST_SHIFT_M[1], 0.0);
+    shift_m.clamp(-most_m, most_m)
 }
 
 /// Force with which the ground answers the drives of one leg.
@@ -177,12 +195,12 @@ fn balance_torques_n_m(
     let mass_kg = body.model.mass_kg;
     let pelvis = body.world_from_pelvis();
     let error_m = goal.translation - pelvis.translation;
-    let rate_m_s = goal_velocity_m_s - body.com_velocity_m_s;
+    // Of the pelvis: it holds still while arms swing.
+    let rate_m_s = goal_velocity_m_s - body.pelvis_velocity_m_s;
     let acceleration_m_s2 = Vector::new(
         HORIZONTAL_STIFFNESS_1_S2 * error_m.x + HORIZONTAL_DAMPING_1_S * rate_m_s.x,
         HORIZONTAL_STIFFNESS_1_S2 * error_m.y + HORIZONTAL_DAMPING_1_S * rate_m_s.y,
-        VERTICAL_STIFFNESS_1_S2 * error_m.z
-            + VERTICAL_DAMPING_1_S * (goal_velocity_m_s.z - body.pelvis_velocity_m_s.z),
+        VERTICAL_STIFFNESS_1_S2 * error_m.z + VERTICAL_DAMPING_1_S * rate_m_s.z,
     );
     let weight_n = mass_kg * GRAVITY_M_S2;
     let mut force_n = acceleration_m_s2 * mass_kg;

@@ -3,9 +3,9 @@
 //! With x the balance point, v its velocity, u that of the swinging foot, s = [`SWING_INERTIA`] and w = sqrt(g / h), the
 //! capture point  xi = x + (v - s u) / w  obeys
 //!   xi' = w (xi - p) + s u,   p the centre of pressure,
-//! which moves from the old foot to the new one within the transfer time and stays there. What s u still adds until the foot lands is
-//! left out of the plan: it won nothing where it was tried. A foot put down at  xi(T) - b  leaves the capture point the offset b
-//! of a steady gait from the new foot; see [`Gait`].
+//! which moves from the old foot to the new one within the transfer time and stays there. What s u still adds until the foot lands,
+//! the offset b of the steady gait takes into account, the plan of a step does not: that won nothing. A foot put down at
+//! xi(T) - b  leaves the capture point the offset b from the new foot; see [`Gait`].
 //! The centre of mass moves along with a leg that swings, and stops with it: v - s u is the speed that lasts, known
 //! from the angular momentum about the ground. Without it a robot that was hit steps too far, the farther the faster it
 //! steps, and at the next step too far the other way.
@@ -32,12 +32,16 @@ const SHIFT_GAIN: f32 = 3.0;
 /// falls forward or backward has no time to shift.
 const SHIFTED_M: f32 = 0.012;
 const LATEST_M: f32 = 0.1;
+/// One who leans against partners would shift for ever: they pull the more the farther it leans.
+const LONGEST_SHIFT_S: f32 = 0.5;
+/// A robot gathers speed over so many steps.
+const STARTING_STEPS: u32 = 4;
 /// One foot holds little against turning: a robot that is turned by force gives way, and turns back slowly.
 const HEADING_LEASH_RAD: f32 = 0.35;
 const RETURN_RAD_S: f32 = 0.4;
 /// The pelvis sways about the vertical with every step: it faces where it points in the mean of this time.
 const FACING_TIME_S: f32 = 0.2;
-const LIFT_STIFFNESS_1_S2: f32 = 111.0;
+const LIFT_STIFFNESS_1_S2: f32 = 90.0;
 const LIFT_DAMPING_1_S: f32 = 15.0;
 /// Vertical acceleration stays within these parts of gravity.
 const LIFT_RANGE: [f32; 2] = [-0.45, 0.6];
@@ -72,8 +76,8 @@ pub(super) struct Step {
     /// How far where the pelvis faces stays behind the heading.
     lag_rad: f32,
     stance: Side,
-    /// Before the first step: the capture point moves over the first stance foot.
-    shifting: bool,
+    /// Before the first step: for how long the capture point has been moving over the first stance foot.
+    shifting_s: Option<f32>,
     /// Since the stance foot landed.
     time_s: f32,
     steps: u32,
@@ -92,7 +96,7 @@ impl Step {
             goal_rad: heading_rad,
             lag_rad: 0.0,
             stance,
-            shifting: true,
+            shifting_s: Some(0.0),
             time_s: 0.0,
             steps: 0,
             swing: Swing::default(),
@@ -109,7 +113,7 @@ impl Step {
 
     /// The swing foot touched down in the last physics step.
     pub(super) fn just_landed(&self) -> bool {
-        self.time_s == 0.0 && !self.shifting
+        self.time_s == 0.0 && self.shifting_s.is_none()
     }
 
     /// One physics step; also gives the horizontal acceleration of the centre of mass that it should bring.
@@ -129,14 +133,15 @@ impl Step {
         let rate_1_s = (GRAVITY_M_S2 / (body.com_m.z - ground_m).max(0.4)).sqrt();
         let pelvis_m = body.world_from_pelvis().translation;
         let faced = self.faced_axes(body, dt_s);
-        let velocity_m_s = self.course.corrected_velocity(velocity, self.steps > 0, pelvis_m, faced, dt_s);
+        let starts = self.steps <= STARTING_STEPS;
+        let velocity_m_s = self.course.corrected_velocity(velocity, starts, pelvis_m, faced, dt_s);
         let outside = left * self.stance.sign();
         let course_m_s = faced[0] * velocity_m_s[0] + faced[1] * velocity_m_s[1];
         // A robot that turns while it walks goes the coming step where it will face by then.
         let coming = Rotation::from_rotation_z(velocity.turning_rad_s * PERIOD_S);
         let gait = Gait::new(rate_1_s, coming * course_m_s, outside);
         let (_, foot_m_s, _) = foot_motion(body, self.stance.other());
-        let lasting_m_s = body.com_velocity_m_s - foot_m_s * SWING_INERTIA;
+        let lasting_m_s = load.velocity_m_s - foot_m_s * SWING_INERTIA;
         let situation = Situation {
             gait: &gait,
             swing: &self.swing,
@@ -147,9 +152,10 @@ impl Step {
             outside_axis: outside,
             time_s: self.time_s,
         };
-        let pressure_m = if self.shifting {
+        let pressure_m = if let Some(shifting_s) = self.shifting_s {
             let (target_m, shifted) = shift(&situation);
-            self.shifting = !shifted;
+            let ends = shifted || shifting_s + dt_s > LONGEST_SHIFT_S;
+            self.shifting_s = (!ends).then_some(shifting_s + dt_s);
             nearest_support_m(situation.capture_m + (situation.capture_m - target_m) * SHIFT_GAIN, soles)
         } else {
             let footstep = situation.plan(dt_s);
@@ -200,7 +206,7 @@ impl Step {
         let height_m = |side: Side| {
             let (hip_m, _) = body.joint_axis(LEGS[side] + 1);
             let now_m = flat(body.world_from_foot(side).translation - hip_m).length();
-            let landing_m = if side == self.stance || self.shifting {
+            let landing_m = if side == self.stance || self.shifting_s.is_some() {
                 0.0
             } else {
                 flat(self.swing.goal_m() - hip_m - body.com_velocity_m_s * remaining_s).length()
@@ -215,7 +221,7 @@ impl Step {
     fn land(&mut self, body: &WholeBody, soles: &Sides<Pose>, ground_m: f32) {
         let swinging_s = self.time_s - TRANSFER_S;
         let swing = self.stance.other();
-        if self.shifting || swinging_s < 0.0 {
+        if self.shifting_s.is_some() || swinging_s < 0.0 {
             self.swing.plant(body, swing);
             return;
         }
@@ -248,7 +254,7 @@ impl Step {
         let turn = tilt_rad * TRUNK_STIFFNESS_1_S2 + spin_rad_s * TRUNK_DAMPING_1_S;
         let turn = turn * Vector::new(1.0, 1.0, YAW_PART);
         let most = Vector::splat(LARGEST_TURN_RAD_S2);
-        let both = self.shifting || self.time_s < TRANSFER_S;
+        let both = self.shifting_s.is_some() || self.time_s < TRANSFER_S;
         let mut feet = Sides::<Acceleration>::default();
         if !both {
             let swing = self.stance.other();

@@ -21,9 +21,10 @@ const NEAR: Within = Within { off_m: 0.03, off_rad: 0.05 };
 const COMPLIANCE_N_S_M: f64 = 250.0;
 /// Robots still correct their places for so long once the object has arrived.
 const HOLD_S: f32 = 0.7;
-/// A hand has lost what it does not touch for so many commands; the robots then stop for a moment, and take it again no more often.
+/// Feet come together, and what pulls between the hands fades.
+const REST_S: f32 = 0.6;
+/// A hand has lost what it does not touch for so many commands; the robots then rest, and take it again no more often.
 const LOST_BEATS: u32 = 5;
-const STOP_S: f32 = 0.6;
 const CARRIES: u32 = 4;
 /// An object that is set down is pressed on the floor by so much.
 const PRESS_M: f32 = 0.004;
@@ -140,9 +141,7 @@ impl<'a> Team<'a> {
 
     /// The robots stand, the hands that have lost the object take it where it is now, and all bring it back to its way.
     fn take_again(&mut self, stage: &mut Stage, on_its_way: &Pose) -> Result<(), PlayerError> {
-        let still: Vec<HandMove> =
-            self.grasps.iter().map(|grasp| HandMove::still(grasp.robot, grasp.side)).collect();
-        stage.perform(STOP_S, &still)?;
+        self.rest(stage)?;
         let lost: Vec<BarGrasp> = self.hands_off(&stage.facts()?).collect();
         if !lost.is_empty() {
             take_softly(stage, &lost)?;
@@ -181,6 +180,13 @@ impl<'a> Team<'a> {
             wrists: Sides { left: hand(2 * index), right: hand(2 * index + 1) },
         };
         self.robots.iter().zip(&self.object_from_stand).enumerate().map(posture).collect()
+    }
+
+    /// All stand still with what they hold. Set down without it, a load that robots pull to and fro as they stop is dragged along.
+    pub fn rest(&self, stage: &mut Stage) -> Result<(), PlayerError> {
+        let still: Vec<HandMove> =
+            self.grasps.iter().map(|grasp| HandMove::still(grasp.robot, grasp.side)).collect();
+        stage.perform(REST_S, &still)
     }
 
     /// Sets the object down: over its place first, for which hands must not give way, then straight below.
