@@ -104,7 +104,7 @@ fn height_command_is_followed_without_drift() {
     let mut world = world();
     let mut commands = rest(&world);
     let start = pelvis_m(&world.present(), 0);
-    for (height_m, steps) in [(0.60, 200), (0.74, 200)] {
+    for (height_m, steps) in [(0.66, 200), (0.74, 200)] {
         commands[0].base.pelvis_height_m = height_m;
         (0..steps).for_each(|_| drop(world.control_step(&commands).expect("it stays finite")));
         let pelvis = pelvis_m(&world.present(), 0);
