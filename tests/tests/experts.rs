@@ -13,9 +13,8 @@ use tandem_tools_spec::{ActCall, Disclosure, Hints, Protocol, ToolCall, ToolRepl
 /// Tasks in which nobody walks.
 const STANDING: [&str; 4] = ["handover", "pouring", "frame_hang", "co_pouring"];
 
-/// Seeds on which nothing was tuned, but chosen as ones that are solved: on 6101 a robot falls as it lets go of the round table. README has
-/// how often experts fail.
-const SEEDS: [u32; 3] = [3, 6100, 6102];
+/// Seeds on which nobody tuned anything.
+const SEEDS: [u32; 3] = [3, 6100, 6101];
 
 /// Plays the experts of `tasks`: phases in order, and nobody falls.
 fn solve(tasks: Vec<&'static Task>) {
@@ -95,7 +94,7 @@ impl Backstage for Slip {
 
 #[test]
 fn a_hand_that_slips_off_a_load_takes_it_again() {
-    let spec = EpisodeSpec::new(tasks::find("table_align").expect("a task"), 6102, Protocol::Agentic);
+    let spec = EpisodeSpec::new(tasks::find("table_align").expect("a task"), 6100, Protocol::Agentic);
     let session = Session::start(&spec, None).expect("a session");
     let mut slip = Slip { episode: InProcess::new(session), slipped: false, took_again: false };
     players::find("expert").expect("a player").play(&spec, &mut slip).expect("an expert that goes on");

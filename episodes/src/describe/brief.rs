@@ -10,7 +10,7 @@ const PARTNERS: &str = "The pelvis frames of different robots are unrelated. To 
     those of the other. pelvis_in_start keeps that valid while robots move.";
 
 const ODOMETRY: &str = "pelvis_in_start is where a robot's own legs and gyro have it: the pose of its pelvis in a frame that lies on \
-    the floor under where the pelvis was when the episode began, z up, x where the robot faced. It drifts by up to 2 % of the way \
+    the floor under where the pelvis was when the episode began, z up, x where the robot faced. It drifts by up to 1 % of the way \
     walked. base_motion is the same over one command.";
 
 const CAMERA: &str = "The camera is in the head, above the waist: waist joints turn and tilt it, and wrist targets may move the \

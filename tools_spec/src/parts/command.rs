@@ -50,7 +50,7 @@ pub struct RobotReport {
     /// Its right arm and hand.
     pub right: HandReport,
     /// Where its own legs and gyro have it: the pose of its pelvis in the start frame, which lies on the floor under the pelvis as
-    /// it was when the episode began, z up, x where the robot faced. Drifts by up to 2 % of the way walked.
+    /// it was when the episode began, z up, x where the robot faced. Drifts by up to 1 % of the way walked.
     pub pelvis_in_start: Pose,
     /// How far the command took the base, by the same odometry.
     pub base_motion: BaseMotion,

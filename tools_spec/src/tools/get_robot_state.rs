@@ -50,7 +50,7 @@ pub struct RobotState {
     /// The direction of gravity in the pelvis frame, length 1: [0, 0, -1] when upright.
     pub gravity_in_pelvis: [f64; 3],
     /// Where its own legs and gyro have it: the pose of its pelvis in the start frame, which lies on the floor under the pelvis as
-    /// it was when the episode began, z up, x where the robot faced. Drifts by up to 2 % of the way walked.
+    /// it was when the episode began, z up, x where the robot faced. Drifts by up to 1 % of the way walked.
     pub pelvis_in_start: Pose,
     /// What locomotion is doing.
     pub base_command: BaseCommand,

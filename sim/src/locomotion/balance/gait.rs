@@ -7,9 +7,9 @@ use super::swing::{AIR_S, SWING_S};
 /// The pressure moves from the old foot to the new one.
 pub(super) const TRANSFER_S: f32 = 0.05;
 pub(super) const PERIOD_S: f32 = TRANSFER_S + SWING_S;
-const WIDTH_M: f32 = 0.25;
+const WIDTH_M: f32 = 0.24;
 /// Walking sideways brings the feet together at every other step.
-const WIDENING: f32 = 0.4;
+const WIDENING: f32 = 0.3;
 /// Angular momentum of a swinging leg per speed of its foot, over mass times height of the robot; tuned on punches, seeds 2000-3149.
 pub(super) const SWING_INERTIA: f32 = 0.09;
 

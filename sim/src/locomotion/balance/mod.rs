@@ -40,6 +40,8 @@ const STILL_RAD_S: f32 = 0.01;
 const FORWARD_M: f32 = 0.075;
 const BACKWARD_M: f32 = 0.07;
 const SIDEWAYS_M: f32 = 0.005;
+/// A capture point so near to the middle of the feet is as near to one as to the other.
+const EITHER_FOOT_M: f32 = 0.01;
 /// No change of mind within this time after planting.
 const LEAST_STANDING_S: f32 = 0.1;
 /// Feet and capture point from which standing succeeds.
@@ -150,7 +152,7 @@ impl State {
                     || stance.capture_m.x < -BACKWARD_M
                     || stance.capture_m.y.abs() > half_width_m + SIDEWAYS_M;
                 if (moving || lost) && self.time_in_mode_s > LEAST_STANDING_S {
-                    let left_carries = stance.capture_m.y > 0.0;
+                    let left_carries = self.left_carries_first(&stance);
                     self.mode = Mode::Step(Step::start(body, self.heading_rad, left_carries));
                     self.time_in_mode_s = 0.0;
                 }
@@ -168,6 +170,16 @@ impl State {
                     self.time_in_mode_s = 0.0;
                 }
             }
+        }
+    }
+
+    /// The foot nearer to the capture point; of feet that are as near, the one from which the robot turns away.
+    fn left_carries_first(&self, stance: &Stance) -> bool {
+        let turning_rad_s = self.velocity.turning_rad_s;
+        if turning_rad_s.abs() > STILL_RAD_S && stance.capture_m.y.abs() < EITHER_FOOT_M {
+            turning_rad_s < 0.0
+        } else {
+            stance.capture_m.y > 0.0
         }
     }
 

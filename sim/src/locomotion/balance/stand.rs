@@ -17,14 +17,15 @@ use crate::locomotion::plane::flat;
 use crate::{GRAVITY_M_S2, Side, Sides};
 
 /// The centre of mass, with what the hands carry, may lie this far from the middle of the feet before the pelvis gives way.
-const COM_ZONE_M: f32 = 0.044;
+const COM_ZONE_M: f32 = 0.0435;
 /// A robot that walked comes to rest nearer to where it is: its centre of mass so far from the middle.
 const RESTING_ZONE_M: f32 = 0.01;
+/// The feet hold a push that takes the balance point no farther from their middle; the pelvis leans against the rest. Hands
+/// that come down on a table push the robot back, and harder the farther it leans into them: one that leaned against every
+/// push would run away.
+const PUSH_ZONE_M: f32 = 0.03;
 const LARGEST_SHIFT_M: [f32; 2] = [0.2, 0.1];
-/// The pelvis leans against this part of a push: robots that hold one thing and leaned against all of it would pull each other
-/// harder and harder. It leaves out little changes: one that followed them would sway for ever, for joints rub, and what a
-/// hand leans on slides.
-const LEAN_SHARE: f32 = 0.7;
+/// The lean leaves out little changes of the push: one that followed them would sway for ever, for joints rub.
 const LEAN_PLAY_M: f32 = 0.01;
 const LEANING_TIME_S: f32 = 0.25;
 /// Below this pelvis height the trunk leans forward, so that the hips can go back.
@@ -63,7 +64,7 @@ pub(super) struct Stand {
     offset_rate_m_s: Vector,
     tilt: Rotation,
     heading_rad: f32,
-    /// Of the pelvis, against a push.
+    /// Of the pelvis, against a push, in the heading frame.
     lean_m: Vector,
     height_m: f32,
     q_rad: Sides<LegAngles>,
@@ -91,21 +92,34 @@ impl Stand {
             q_rad: Sides::from_fn(|side| std::array::from_fn(|i| body.q_rad[LEGS[side] + i])),
         };
         if let Some((_, load)) = moving {
-            stand.home_m += stand.back_into_m(RESTING_ZONE_M, body, load);
-            stand.lean_m = against_push_m(load);
-            stand.offset_m = flat(pelvis.translation - stand.home_m) - stand.lean_m;
+            stand.home_m += heading * back_into_m(RESTING_ZONE_M, stand.weights_m(body, load));
+            stand.lean_m = stand.against_push_m(body, load);
+            stand.offset_m = flat(pelvis.translation - stand.home_m) - heading * stand.lean_m;
             stand.offset_rate_m_s = flat(body.com_velocity_m_s);
         }
         stand
     }
 
-    /// Shift of the pelvis from home that keeps the centre of mass, with what is carried, within a zone round the middle of the
-    /// feet.
-    fn back_into_m(&self, zone_m: f32, body: &WholeBody, load: &Load) -> Vector {
-        let middle_m = (self.soles.left.translation + self.soles.right.translation) * 0.5;
-        let at_home_m = self.home_m + load.weights_point_m - body.world_from_pelvis().translation - middle_m;
-        let zone_m = Vector::new(zone_m, zone_m, 0.0);
-        within_reach_m(flat(at_home_m.clamp(-zone_m, zone_m) - at_home_m))
+    /// Where the centre of mass, with what is carried, would be with the pelvis at home: from the middle of the feet, in the
+    /// heading frame.
+    fn weights_m(&self, body: &WholeBody, load: &Load) -> Vector {
+        let away_m = load.weights_point_m - body.world_from_pelvis().translation;
+        Rotation::from_rotation_z(-self.heading_rad) * flat(self.home_m + away_m - self.middle_m())
+    }
+
+    fn middle_m(&self) -> Vector {
+        (self.soles.left.translation + self.soles.right.translation) * 0.5
+    }
+
+    /// Shift of the pelvis against what of a push the feet do not hold, in the heading frame.
+    fn against_push_m(&self, body: &WholeBody, load: &Load) -> Vector {
+        let mut weights_m = self.weights_m(body, load);
+        weights_m += back_into_m(COM_ZONE_M, weights_m);
+        let push_m = flat(load.balance_point_m - load.weights_point_m);
+        let balance_m = weights_m + Rotation::from_rotation_z(-self.heading_rad) * push_m;
+        let zone_m = Vector::new(PUSH_ZONE_M, PUSH_ZONE_M, 0.0);
+        let held_m = balance_m.clamp(weights_m.min(-zone_m), weights_m.max(zone_m));
+        within_reach_m(held_m - balance_m)
     }
 
     /// One physics step towards a pelvis height over the soles.
@@ -151,23 +165,21 @@ impl Stand {
     /// Pelvis pose (world) that keeps the centre of mass within [`COM_ZONE_M`] of the middle of the planted feet,
     /// as near to home as that and a push allow.
     fn pelvis_goal(&mut self, body: &WholeBody, load: &Load, dt_s: f32) -> Pose {
-        let middle_m = (self.soles.left.translation + self.soles.right.translation) * 0.5;
-        let change_m = against_push_m(load) - self.lean_m;
+        let heading = Rotation::from_rotation_z(self.heading_rad);
+        let change_m = self.against_push_m(body, load) - self.lean_m;
         self.lean_m += (change_m - change_m.clamp_length_max(LEAN_PLAY_M)) * (dt_s / LEANING_TIME_S);
+        let shift_m = back_into_m(COM_ZONE_M, self.weights_m(body, load)) + self.lean_m;
+        let mut position_m = self.home_m + self.offset_m + heading * shift_m;
+        position_m.z = self.middle_m().z + self.height_m;
         let lean_rad = ((LEAN_BELOW_M - self.height_m) * LEAN_RAD_PER_M).clamp(0.0, LARGEST_LEAN_RAD);
-        let shift_m = self.back_into_m(COM_ZONE_M, body, load);
-        let mut position_m = self.home_m + self.offset_m + shift_m + self.lean_m;
-        position_m.z = middle_m.z + self.height_m;
-        Pose::from_parts(
-            position_m,
-            Rotation::from_rotation_z(self.heading_rad) * Rotation::from_rotation_y(lean_rad) * self.tilt,
-        )
+        Pose::from_parts(position_m, heading * Rotation::from_rotation_y(lean_rad) * self.tilt)
     }
 }
 
-/// Shift of the pelvis against a push, which moves the balance point.
-fn against_push_m(load: &Load) -> Vector {
-    within_reach_m(flat(load.weights_point_m - load.balance_point_m)) * LEAN_SHARE
+/// Shift that brings a point back into a zone round the middle of the feet.
+fn back_into_m(zone_m: f32, point_m: Vector) -> Vector {
+    let zone_m = Vector::new(zone_m, zone_m, 0.0);
+    within_reach_m(point_m.clamp(-zone_m, zone_m) - point_m)
 }
 
 fn within_reach_m(shift_m: Vector) -> Vector {
@@ -220,4 +232,26 @@ fn balance_torques_n_m(
     let feet = distribute(body.com_m, ground_force_n, moment_n_m - load.moment_n_m, soles);
     let turning_n_m = Vector::new(0.0, 0.0, (moment_n_m.z - load.moment_n_m.z) * 0.5);
     Sides::from_fn(|side| leg_torques_n_m(body, side, feet[side], turning_n_m))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::load::Laden;
+    use super::*;
+    use crate::body::posed::Posed;
+
+    #[test]
+    fn feet_hold_a_small_push_and_the_pelvis_leans_against_the_rest() {
+        let body = Posed::standing().body();
+        let stand = Stand::plant(&body, 0.0, None);
+        for push_m_s2 in [0.0, 0.2, -0.2, 1.0, -1.0] {
+            let load = Load::of(&body, &Laden::of(&body), 0.0, Vector::Y * push_m_s2);
+            let moved_m = (load.balance_point_m - load.weights_point_m).y;
+            let beyond_m = (moved_m.abs() - PUSH_ZONE_M).max(0.0);
+            assert_eq!(beyond_m > 0.0, push_m_s2.abs() == 1.0, "{moved_m}");
+            let lean_m = stand.against_push_m(&body, &load);
+            let expected_m = -moved_m.signum() * beyond_m;
+            assert!((lean_m.y - expected_m).abs() < 1e-4 && lean_m.x == 0.0, "{lean_m}, not {expected_m}");
+        }
+    }
 }

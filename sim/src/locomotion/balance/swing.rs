@@ -13,7 +13,7 @@ use crate::body::{Acceleration, LEG_JOINTS, LEGS, WholeBody};
 pub(super) const SWING_S: f32 = 0.25;
 /// The foot is down a little before the step ends.
 pub(super) const AIR_S: f32 = 0.93 * SWING_S;
-const HEIGHT_M: f32 = 0.045;
+const HEIGHT_M: f32 = 0.044;
 /// A foot that meets no ground goes on down.
 const PROBING_M_S: f32 = 0.25;
 /// The goal stands still for the last part of the way.

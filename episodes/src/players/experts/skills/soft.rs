@@ -39,12 +39,15 @@ pub fn take_softly(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerE
     Err(PlayerError::GaveUp("not every hand could take its bar".into()))
 }
 
-/// Closes hands whose palms are at the bars, as `around` has them. Each wrist's goal gives way to what the hand feels.
+/// Closes hands whose palms are at the bars, as `around` has them. Each wrist's goal makes up for what it is off, as the hands of a
+/// robot are that has given way to partners, and gives way to what the hand feels.
 fn close_softly(stage: &mut Stage, grasps: &[BarGrasp], around: &[HandMove]) -> Result<(), PlayerError> {
     let mut goals = Vec::with_capacity(grasps.len());
     for (grasp, reach) in grasps.iter().zip(around) {
         let now = stage.world_from_wrist(grasp.robot, grasp.side)?;
-        goals.push(reach.world_from_wrist.unwrap_or(now));
+        let mut goal = reach.world_from_wrist.unwrap_or(now);
+        goal.translation += goal.translation - now.translation;
+        goals.push(goal);
     }
     for step in 1..=GIVES {
         let facts = stage.facts()?;
