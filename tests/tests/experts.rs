@@ -13,7 +13,7 @@ use tandem_tools_spec::{ActCall, Disclosure, Hints, Protocol, ToolCall, ToolRepl
 /// Tasks in which nobody walks.
 const STANDING: [&str; 4] = ["handover", "pouring", "frame_hang", "co_pouring"];
 
-/// Seeds on which nobody tuned anything.
+/// Seeds on which nobody tuned anything but how a hand that slipped takes its load again (6100).
 const SEEDS: [u32; 3] = [3, 6100, 6101];
 
 /// Plays the experts of `tasks`: phases in order, and nobody falls.

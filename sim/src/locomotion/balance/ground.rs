@@ -24,6 +24,11 @@ const SMALLEST_SHARE: f32 = 0.03;
 /// Below this the centre of pressure is undefined.
 const SMALLEST_VERTICAL_FORCE_N: f32 = 20.0;
 
+/// The middle between two soles.
+pub(super) fn middle_m(soles: &Sides<Pose>) -> Vector {
+    (soles.left.translation + soles.right.translation) * 0.5
+}
+
 /// The point nearest to `point_m` where two planted feet can have their centre of pressure.
 pub(super) fn nearest_support_m(point_m: Vector, soles: Sides<Pose>) -> Vector {
     let share = share(point_m, soles);

@@ -17,8 +17,9 @@ use serde::{Deserialize, Serialize};
 
 use super::plane::heading_rad;
 use super::{BaseCommand, BaseLimits, BaseVelocity, LegCommand, Locomotion};
+use crate::GRAVITY_M_S2;
 use crate::body::WholeBody;
-use crate::{GRAVITY_M_S2, Sides};
+use ground::middle_m;
 use load::{Laden, Load};
 use observer::Observer;
 use stand::Stand;
@@ -125,8 +126,7 @@ impl State {
     fn new(body: &WholeBody) -> State {
         let pelvis = body.world_from_pelvis();
         let heading_rad = heading_rad(pelvis);
-        let Sides { left, right } = body.world_from_soles();
-        let middle_m = (left.translation + right.translation) * 0.5;
+        let middle_m = middle_m(&body.world_from_soles());
         let mut pelvis_from_middle_m =
             Rotation::from_rotation_z(-heading_rad) * (pelvis.translation - middle_m);
         pelvis_from_middle_m.z = 0.0;
@@ -184,15 +184,15 @@ impl State {
     }
 
     fn stance(&self, body: &WholeBody, load: &Load) -> Stance {
-        let Sides { left, right } = body.world_from_soles();
-        let middle_m = (left.translation + right.translation) * 0.5;
+        let soles = body.world_from_soles();
+        let middle_m = middle_m(&soles);
         let height_m = body.com_m.z - middle_m.z;
         let capture_m = load.balance_point_m + load.velocity_m_s * (height_m / GRAVITY_M_S2).sqrt();
         let into_heading = Rotation::from_rotation_z(-self.heading_rad);
         Stance {
             capture_m: into_heading * (capture_m - middle_m),
             com_m: into_heading * (body.com_m - middle_m),
-            left_from_right_m: into_heading * (left.translation - right.translation),
+            left_from_right_m: into_heading * (soles.left.translation - soles.right.translation),
         }
     }
 }

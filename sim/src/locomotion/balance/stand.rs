@@ -8,7 +8,7 @@ use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
 use super::effort::ground_force_n;
-use super::ground::{distribute, leg_torques_n_m, supported_force_n};
+use super::ground::{distribute, leg_torques_n_m, middle_m, supported_force_n};
 use super::legs::{LegAngles, inverse, rotation_vector_rad};
 use super::load::Load;
 use crate::body::{Drive, JOINTS, LEG_JOINTS, LEGS, WholeBody};
@@ -24,6 +24,7 @@ const RESTING_ZONE_M: f32 = 0.01;
 /// that come down on a table push the robot back, and harder the farther it leans into them: one that leaned against every
 /// push would run away.
 const PUSH_ZONE_M: f32 = 0.03;
+/// Ahead and to the sides.
 const LARGEST_SHIFT_M: [f32; 2] = [0.2, 0.1];
 /// The lean leaves out little changes of the push: one that followed them would sway for ever, for joints rub.
 const LEAN_PLAY_M: f32 = 0.01;
@@ -76,7 +77,7 @@ impl Stand {
     pub(super) fn plant(body: &WholeBody, heading_rad: f32, moving: Option<(Vector, &Load)>) -> Stand {
         let pelvis = body.world_from_pelvis();
         let soles = body.world_from_soles();
-        let middle_m = (soles.left.translation + soles.right.translation) * 0.5;
+        let middle_m = middle_m(&soles);
         let heading = Rotation::from_rotation_z(heading_rad);
         let home_m = moving.map_or(pelvis.translation, |(rest_m, _)| middle_m + heading * rest_m);
         let mut stand = Stand {
@@ -93,7 +94,7 @@ impl Stand {
         };
         if let Some((_, load)) = moving {
             stand.home_m += heading * back_into_m(RESTING_ZONE_M, stand.weights_m(body, load));
-            stand.lean_m = stand.against_push_m(body, load);
+            stand.lean_m = stand.against_push_m(stand.weights_m(body, load), load);
             stand.offset_m = flat(pelvis.translation - stand.home_m) - heading * stand.lean_m;
             stand.offset_rate_m_s = flat(body.com_velocity_m_s);
         }
@@ -104,17 +105,12 @@ impl Stand {
     /// heading frame.
     fn weights_m(&self, body: &WholeBody, load: &Load) -> Vector {
         let away_m = load.weights_point_m - body.world_from_pelvis().translation;
-        Rotation::from_rotation_z(-self.heading_rad) * flat(self.home_m + away_m - self.middle_m())
+        Rotation::from_rotation_z(-self.heading_rad) * flat(self.home_m + away_m - middle_m(&self.soles))
     }
 
-    fn middle_m(&self) -> Vector {
-        (self.soles.left.translation + self.soles.right.translation) * 0.5
-    }
-
-    /// Shift of the pelvis against what of a push the feet do not hold, in the heading frame.
-    fn against_push_m(&self, body: &WholeBody, load: &Load) -> Vector {
-        let mut weights_m = self.weights_m(body, load);
-        weights_m += back_into_m(COM_ZONE_M, weights_m);
+    /// Shift of the pelvis against what of a push the feet do not hold, with the centre of mass at `weights_m`; all in the heading
+    /// frame, from the middle of the feet.
+    fn against_push_m(&self, weights_m: Vector, load: &Load) -> Vector {
         let push_m = flat(load.balance_point_m - load.weights_point_m);
         let balance_m = weights_m + Rotation::from_rotation_z(-self.heading_rad) * push_m;
         let zone_m = Vector::new(PUSH_ZONE_M, PUSH_ZONE_M, 0.0);
@@ -166,11 +162,12 @@ impl Stand {
     /// as near to home as that and a push allow.
     fn pelvis_goal(&mut self, body: &WholeBody, load: &Load, dt_s: f32) -> Pose {
         let heading = Rotation::from_rotation_z(self.heading_rad);
-        let change_m = self.against_push_m(body, load) - self.lean_m;
+        let weights_m = self.weights_m(body, load);
+        let shift_m = back_into_m(COM_ZONE_M, weights_m);
+        let change_m = self.against_push_m(weights_m + shift_m, load) - self.lean_m;
         self.lean_m += (change_m - change_m.clamp_length_max(LEAN_PLAY_M)) * (dt_s / LEANING_TIME_S);
-        let shift_m = back_into_m(COM_ZONE_M, self.weights_m(body, load)) + self.lean_m;
-        let mut position_m = self.home_m + self.offset_m + heading * shift_m;
-        position_m.z = self.middle_m().z + self.height_m;
+        let mut position_m = self.home_m + self.offset_m + heading * (shift_m + self.lean_m);
+        position_m.z = middle_m(&self.soles).z + self.height_m;
         let lean_rad = ((LEAN_BELOW_M - self.height_m) * LEAN_RAD_PER_M).clamp(0.0, LARGEST_LEAN_RAD);
         Pose::from_parts(position_m, heading * Rotation::from_rotation_y(lean_rad) * self.tilt)
     }
@@ -249,7 +246,7 @@ mod tests {
             let moved_m = (load.balance_point_m - load.weights_point_m).y;
             let beyond_m = (moved_m.abs() - PUSH_ZONE_M).max(0.0);
             assert_eq!(beyond_m > 0.0, push_m_s2.abs() == 1.0, "{moved_m}");
-            let lean_m = stand.against_push_m(&body, &load);
+            let lean_m = stand.against_push_m(stand.weights_m(&body, &load), &load);
             let expected_m = -moved_m.signum() * beyond_m;
             assert!((lean_m.y - expected_m).abs() < 1e-4 && lean_m.x == 0.0, "{lean_m}, not {expected_m}");
         }

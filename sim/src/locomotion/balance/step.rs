@@ -35,7 +35,7 @@ const LATEST_M: f32 = 0.1;
 /// One who leans against partners would shift for ever: they pull the more the farther it leans.
 const LONGEST_SHIFT_S: f32 = 0.5;
 /// A robot gathers speed over so many steps.
-const STARTING_STEPS: u32 = 4;
+const STARTING_STEPS: u32 = 5;
 /// One foot holds little against turning: a robot that is turned by force gives way, and turns back slowly.
 const HEADING_LEASH_RAD: f32 = 0.35;
 const RETURN_RAD_S: f32 = 0.4;
@@ -133,7 +133,7 @@ impl Step {
         let rate_1_s = (GRAVITY_M_S2 / (body.com_m.z - ground_m).max(0.4)).sqrt();
         let pelvis_m = body.world_from_pelvis().translation;
         let faced = self.faced_axes(body, dt_s);
-        let starts = self.steps <= STARTING_STEPS;
+        let starts = self.steps < STARTING_STEPS;
         let velocity_m_s = self.course.corrected_velocity(velocity, starts, pelvis_m, faced, dt_s);
         let outside = left * self.stance.sign();
         let course_m_s = faced[0] * velocity_m_s[0] + faced[1] * velocity_m_s[1];
