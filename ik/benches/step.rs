@@ -4,7 +4,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::Vector3;
 use tandem_ik::{Configuration, DampingTask, FrameTask, Model, PostureTask, SolveOptions, Solver, Task};
 
-#[path = "../tests/common/mod.rs"]
+#[path = "../tests/kinematics/common.rs"]
 mod common;
 
 /// Both wrists 12 cm away from where they are, posture and damping.

@@ -6,7 +6,7 @@ use tandem_ik::bench::{DT_S, TUNED_DAMPING_COST, Target, TargetSet};
 use tandem_ik::{Configuration, Limits, Model, Outcome, SolveOptions, Solver, Task};
 
 const MAX_ITERATIONS: u64 = 300;
-const TARGETS: &str = include_str!("data/wrist_targets.json");
+const TARGETS: &str = include_str!("../data/wrist_targets.json");
 
 struct Bench {
     model: Model,
@@ -15,7 +15,7 @@ struct Bench {
 
 fn bench() -> Bench {
     let set = TargetSet::from_json(TARGETS).expect("valid targets");
-    let model = Model::from_urdf(include_str!("data/g1_upper_body.urdf")).expect("valid URDF");
+    let model = Model::from_urdf(include_str!("../data/g1_upper_body.urdf")).expect("valid URDF");
     Bench { model: set.reduce(&model).expect("the same joints"), set }
 }
 

@@ -14,7 +14,7 @@ const LONG: Duration = Duration::from_secs(100);
 /// What a program does that is started with `ROLE=role`, if it is none for the shell alone.
 fn agent_command(role: &str) -> String {
     let binary = env::current_exe().expect("this binary");
-    format!("ROLE={role} '{}' --exact programs::agent --ignored --nocapture", binary.display())
+    format!("ROLE={role} '{}' --exact policies::programs::agent --ignored --nocapture", binary.display())
 }
 
 #[test]

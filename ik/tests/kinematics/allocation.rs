@@ -10,7 +10,7 @@ use tandem_ik::{
     PositionBarrier, PostureTask, RelativeFrameTask, Solver, Task,
 };
 
-mod common;
+use super::common;
 
 thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };

@@ -1,6 +1,6 @@
 //! The contract as its callers see it, kept in files: a change of the one shows as a change of the other.
 //!
-//! `UPDATE_EXPECT=1 cargo test --release --workspace --test goldens` writes them anew.
+//! `UPDATE_EXPECT=1 cargo test --release --package tandem-tools-spec --test contract goldens` writes them anew.
 
 use std::{env, fs, path::Path};
 

@@ -6,7 +6,7 @@ use tandem_ik::{
     SolveOptions, Solver, Task,
 };
 
-mod common;
+use super::common;
 
 const DT_S: f64 = 0.02;
 
@@ -139,7 +139,7 @@ fn a_frame_stays_beyond_its_plane() {
 #[test]
 fn planned_solutions_do_not_overlap() {
     let model = common::g1();
-    let file = include_str!("data/wrist_targets.json");
+    let file = include_str!("../data/wrist_targets.json");
     let set = tandem_ik::bench::TargetSet::from_json(file).expect("valid targets");
     let json: serde_json::Value = serde_json::from_str(file).expect("valid JSON");
     let mut reached = [0, 0];

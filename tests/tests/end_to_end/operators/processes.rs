@@ -52,7 +52,7 @@ fn operator(team: &Team, robot: usize, commands: &[(String, Value)], folder: &Pa
     let url = format!("http://{}/v1/episodes/{}/tools", team.server.address, team.id);
     let task = json!({ "url": url, "token": team.tokens[robot], "commands": file });
     let mut process = Command::new(env::current_exe().expect("this program"));
-    process.args(["--exact", "processes::an_operator", "--ignored"]).env(TASK, task.to_string());
+    process.args(["--exact", "operators::processes::an_operator", "--ignored"]).env(TASK, task.to_string());
     process.spawn().expect("a process")
 }
 

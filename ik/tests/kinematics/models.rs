@@ -3,10 +3,10 @@
 use serde_json::Value;
 use tandem_ik::{Configuration, Model, bench::TargetSet};
 
-mod common;
+use super::common;
 
-const TARGETS: &str = include_str!("data/wrist_targets.json");
-const URDF: &str = include_str!("data/g1_upper_body.urdf");
+const TARGETS: &str = include_str!("../data/wrist_targets.json");
+const URDF: &str = include_str!("../data/g1_upper_body.urdf");
 
 /// The files round lengths to 1e-7 m or so.
 const POSE_TOLERANCE: f64 = 2e-6;

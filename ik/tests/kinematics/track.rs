@@ -4,7 +4,7 @@ use nalgebra::{Translation3, Vector3};
 use tandem_ik::bench::TargetSet;
 use tandem_ik::{FrameTask, Model, Outcome, PostureTask, Solver, Task};
 
-mod common;
+use super::common;
 
 const DT_S: f64 = 0.02;
 const SPEED_RAD_S: f64 = 4.0;
@@ -20,7 +20,7 @@ fn solver(model: &Model, apart: bool) -> Solver {
 #[test]
 fn unreachable_targets_bring_the_joints_to_rest() {
     let model = common::g1();
-    let set = TargetSet::from_json(include_str!("data/wrist_targets.json")).expect("valid targets");
+    let set = TargetSet::from_json(include_str!("../data/wrist_targets.json")).expect("valid targets");
     let cases = [("plain", 1.0, 0.0, false), ("damped", 0.5, 2e-4, false), ("apart", 0.5, 2e-4, true)];
     for (case, gain, damping, apart) in cases {
         let mut resting = 0;

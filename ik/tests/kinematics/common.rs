@@ -31,13 +31,11 @@ pub fn g1() -> Model {
 }
 
 /// The robot at [`READY_RAD`].
-#[allow(dead_code, reason = "not every test file starts there")]
 pub fn ready(model: &Model) -> Configuration<'_> {
     Configuration::new(model, &READY_RAD).expect("17 numbers")
 }
 
 /// Ten pairs: both forearms and hands against the trunk, the head and each other.
-#[allow(dead_code, reason = "not every test file has barriers")]
 pub fn self_collision(model: &Model) -> SelfCollision {
     let capsule = |link: &str, a: [f64; 3], b: [f64; 3], radius_m: f64| Capsule {
         frame: model.frame(link).expect("a link"),

@@ -1,5 +1,4 @@
 //! That episodes leave no memory behind.
-#![cfg(target_os = "linux")]
 
 use std::fs;
 

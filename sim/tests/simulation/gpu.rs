@@ -1,6 +1,5 @@
 //! The renderer on a graphics processor draws what the embedded one draws. Software such as Mesa's will do for one; where there
 //! is none, these tests say so and pass.
-#![cfg(feature = "gpu")]
 
 use std::f32::consts::PI;
 

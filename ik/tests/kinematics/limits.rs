@@ -6,7 +6,7 @@ use tandem_ik::{
     RelativeFrameTask, SolveOptions, Solver, Task,
 };
 
-mod common;
+use super::common;
 
 const DT_S: f64 = 0.02;
 

@@ -1,0 +1,11 @@
+//! The server as callers meet it: its routes, who is let in, and what is refused.
+
+mod access;
+mod bad_input;
+mod crowd;
+mod door;
+mod hints;
+mod mcp;
+mod operations;
+mod repeats;
+mod rest;

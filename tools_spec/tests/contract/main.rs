@@ -1,0 +1,5 @@
+//! The wire contract, as hosts and policies read it.
+
+mod faces;
+mod goldens;
+mod schemas;
