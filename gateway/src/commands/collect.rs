@@ -5,7 +5,7 @@ use std::{path::PathBuf, process::ExitCode};
 use tandem_episodes::players;
 use tracing_subscriber::filter::LevelFilter;
 
-use super::{Outcome, episode_flags::EpisodeFlags, log, played};
+use super::{Outcome, flags::EpisodeFlags, log, played};
 
 /// Record demonstrations of the experts as MCAP, one folder per episode.
 #[derive(Debug, clap::Args)]

@@ -19,7 +19,7 @@ use tracing_subscriber::filter::LevelFilter;
 
 use super::{
     Outcome, Seeds,
-    episode_flags::{LocomotionFlag, RendererFlag, SceneFlag},
+    flags::{LocomotionFlag, RendererFlag, SceneFlag},
     log,
 };
 use crate::{

@@ -8,7 +8,11 @@ use tandem_episodes::{
     tasks,
 };
 
-use super::{Outcome, episode_flags::EpisodeFlags, log, played, policy_flags::PolicyFlags};
+use super::{
+    Outcome,
+    flags::{EpisodeFlags, PolicyFlags},
+    log, played,
+};
 
 /// Play tasks over seeds in parallel worlds and count the phases reached. Goes on where an interrupted run stopped.
 #[derive(Debug, clap::Args)]

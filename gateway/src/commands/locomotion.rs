@@ -5,7 +5,7 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::Subcommand;
 use tandem_episodes::bench::{self, CaseReport};
 
-use super::{Outcome, episode_flags::LocomotionFlag};
+use super::{Outcome, flags::LocomotionFlag};
 
 /// The base controller.
 #[derive(Debug, clap::Args)]

@@ -6,7 +6,11 @@ use tandem_episodes::{EpisodeSpec, RunFolder};
 use tandem_tools_spec::{Driving, StartReply};
 use tokio::{net::TcpListener, runtime::Runtime, sync::oneshot, task::JoinHandle, time::interval};
 
-use super::{app::App, connections, gate::Gate, limits::Limits, routes::router};
+use super::{
+    app::App,
+    gate::{Gate, connections, limits::Limits},
+    rest::router,
+};
 use crate::{
     hosting::{EpisodeTable, EpisodeThread, HostingError},
     settings::Settings,

@@ -17,7 +17,11 @@ use tandem_episodes::tasks;
 use tandem_tools_spec::{Hints, ManageReply, Protocol, StartEpisode, ToolReply, ToolSpec, tool_specs};
 use tokio::runtime::Runtime;
 
-use super::{app::App, gate::Gate, limits::Limits, routes::router};
+use super::{
+    app::App,
+    gate::{Gate, limits::Limits},
+    rest::router,
+};
 use crate::{
     hosting::EpisodeTable,
     settings::{Layer, Settings},

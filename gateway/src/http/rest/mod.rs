@@ -1,5 +1,8 @@
 //! The REST routes under `/v1`.
 
+mod docs;
+mod idempotency;
+
 use axum::{
     Json, Router,
     body::Bytes,
@@ -17,14 +20,14 @@ use tandem_tools_spec::{
 };
 
 use super::{
-    access,
     app::App,
     counted::counted,
-    docs,
     encoding::Encoding,
-    gate::{self, Gate},
-    key::{Key, say_again},
-    limits::{self, Limits},
+    gate::{
+        self, Gate,
+        limits::{self, Limits},
+        tokens,
+    },
     mcp,
     problem::{ApiError, Refused},
 };
@@ -32,6 +35,7 @@ use crate::{
     hosting::{Caller, HostingError, Once, Request as Asked},
     metrics::Page,
 };
+use idempotency::{Key, say_again};
 
 /// Every route: path, methods, handlers.
 fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 11] {
@@ -67,7 +71,7 @@ pub fn router(app: App, gate: Gate, limits: Limits) -> Router {
     // Around all of it: what axum itself adds to an answer, as the methods of a path, would say which paths there are.
     Router::new()
         .fallback_service(routed)
-        .layer(middleware::from_fn_with_state(app.clone(), access::identify))
+        .layer(middleware::from_fn_with_state(app.clone(), tokens::identify))
         // Before it, so that nobody tries tokens faster than requests are let in.
         .layer(middleware::from_fn_with_state(limits, limits::pass))
         .layer(middleware::from_fn_with_state(app, count_refusal))

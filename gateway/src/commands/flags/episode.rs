@@ -11,7 +11,7 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
-use super::Seeds;
+use super::seeds::Seeds;
 use crate::one_of::one_of;
 
 /// Which episodes to play.

@@ -1,6 +1,9 @@
 //! The MCP route: the same tools for hosts that speak the Model Context Protocol. Every call names its episode, so the
 //! route keeps no sessions.
 
+mod envelope;
+mod prompt;
+
 use std::sync::Arc;
 
 use axum::{
@@ -31,9 +34,7 @@ use tandem_tools_spec::{
 use super::{
     app::App,
     counted::{counted, every_tool},
-    envelope,
     problem::ApiError,
-    prompt,
     request::unambiguous,
 };
 use crate::hosting::{Answer, Caller, HostingError, Request};

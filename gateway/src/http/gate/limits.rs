@@ -14,7 +14,7 @@ use axum::{
 };
 use tokio::sync::Semaphore;
 
-use super::problem::ApiError;
+use crate::http::problem::ApiError;
 use crate::settings::Settings;
 
 /// Addresses that are remembered. Beyond, those are forgotten that might ask at their full rate again.

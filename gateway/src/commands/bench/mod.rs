@@ -1,5 +1,8 @@
 //! `tandem bench`: figures that anybody can repeat.
 
+mod machine;
+mod tools;
+
 use std::{
     error::Error,
     path::{Path, PathBuf},
@@ -15,9 +18,9 @@ use tandem_episodes::{
 };
 
 use super::Outcome;
-use super::bench_tools::{self, ToolsReport};
-use super::machine::Measured;
 use crate::one_of::one_of;
+pub use machine::Measured;
+use tools::ToolsReport;
 
 /// Measure a part of Tandem on this machine.
 #[derive(Debug, clap::Args)]
@@ -112,7 +115,7 @@ fn write(report: impl Serialize, json: Option<&Path>) -> Outcome {
 }
 
 fn measure_tools() -> Result<ToolsReport, Box<dyn Error>> {
-    let report = bench_tools::tools()?;
+    let report = tools::tools()?;
     println!("{:20}{:>8}{:>10}{:>10}", "call", "times", "p50 ms", "p99 ms");
     for call in &report.calls {
         println!("{:20}{:>8}{:>10.2}{:>10.2}", call.tool, call.calls, call.p50_ms, call.p99_ms);

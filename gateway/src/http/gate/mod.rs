@@ -1,6 +1,10 @@
 //! What every request has to pass before a route sees it. Browsers let any web page send requests to this machine; what keeps
 //! pages out is that they cannot forge `Host` and `Origin`, nor call a body JSON without asking first.
 
+pub mod connections;
+pub mod limits;
+pub mod tokens;
+
 use std::{net::IpAddr, sync::Arc};
 
 use axum::{
@@ -13,8 +17,10 @@ use axum::{
 use http_body_util::BodyExt;
 use tokio::time::timeout;
 
-use super::{encoding, problem::ApiError};
-use crate::settings::Settings;
+use crate::{
+    http::{encoding, problem::ApiError},
+    settings::Settings,
+};
 
 /// A body beyond the limit is read and thrown away up to this many times the limit, because a client that is still
 /// sending when the connection closes never sees the answer.

@@ -6,7 +6,7 @@ use axum::{
     response::Response,
 };
 
-use super::problem::ApiError;
+use crate::http::problem::ApiError;
 
 const KEY: &str = "idempotency-key";
 const REPLAYED: &str = "idempotency-replayed";

@@ -8,8 +8,10 @@ use axum::{
     response::{IntoResponse, Response},
 };
 
-use super::{app::App, problem::ApiError};
-use crate::hosting::Caller;
+use crate::{
+    hosting::Caller,
+    http::{app::App, problem::ApiError},
+};
 
 /// Lets a request on with its [`Caller`], and without the token that said who that is.
 pub async fn identify(State(app): State<App>, mut request: Request, next: Next) -> Response {
