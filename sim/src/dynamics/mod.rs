@@ -1,61 +1,40 @@
 //! Articulated trees and their contacts: dynamics in reduced coordinates on the collision detection of Rapier and Parry.
 //!
-//! A step ([`Dynamics::step`]) finds what is near (`near`: Rapier's broad phase) and where it touches (`collision`: Parry's
-//! manifolds). Then it is, for every [`Tree`]: bias forces (`bias`), mass matrix (`inertia`), its factor M = L^T D L and
-//! whitened velocities (`factor`); then rows of contacts (`contact`), joints (`joint_rows`) and equalities
-//! (`equality`), Gauss-Seidel on them (`solver`), and new positions (`kinematics`). It knows no robot and no file format.
+//! A step ([`Dynamics::step`], in `solving`) finds what is near (`contacts::near`: Rapier's broad phase) and where it touches
+//! (`contacts::collision`: Parry's manifolds). Then it is, for every [`Tree`]: bias forces (`trees::bias`), mass matrix
+//! (`trees::inertia`), its factor M = L^T D L and whitened velocities (`trees::factor`); then rows of contacts
+//! (`contacts::contact`), joints (`joints::bounds`) and equalities (`joints::equality`), Gauss-Seidel on them
+//! (`solving::solver`), and new positions (`trees::kinematics`). It knows no robot and no file format.
 //!
 //! SI units, radians, world axes with z wherever gravity says, f64 throughout. The same sequence of calls gives the same
 //! bits: trees and colliders count in the order in which they were added, and so do contacts.
 
-mod bias;
-mod collider;
-mod collision;
-mod contact;
-mod drive;
-mod efforts;
-mod equality;
+mod contacts;
 mod error;
-mod factor;
-mod free_spin;
-mod friction;
-mod inertia;
-mod jacobian;
-mod joint_rows;
-mod kinematics;
-mod layout;
-mod link;
-mod near;
+mod joints;
 mod settings;
 mod snapshot;
-mod solver;
-mod spatial;
-mod state;
-mod step;
+mod solving;
 #[cfg(test)]
 mod tests;
-mod touch;
-mod tree;
 mod trees;
-mod whiten;
 
-pub use collider::{Collider, ColliderId};
-pub use drive::Drive;
-pub use equality::{Equality, EqualityId};
+pub use contacts::collider::{Collider, ColliderId};
+pub use contacts::friction::{Directions, Friction};
+pub use contacts::touch::Touch;
 pub use error::{Diverged, OtherWorld, TreeError};
-pub use friction::{Directions, Friction};
-pub use link::{Axis, Joint, Link, Mass};
+pub use joints::equality::{Equality, EqualityId};
 pub use rapier3d::glamx::{DMat3, DPose3, DQuat, DVec3};
 pub use settings::{Settings, Softness};
 pub use snapshot::DynamicsState;
-pub(crate) use spatial::rounded;
-pub use state::TreeState;
-pub use touch::Touch;
-pub use tree::Tree;
+pub use trees::link::{Axis, Drive, Joint, Link, Mass};
+pub(crate) use trees::spatial::rounded;
+pub use trees::state::TreeState;
+pub use trees::tree::Tree;
 pub use trees::{LinkId, TreeId};
 
-use collision::Collision;
-use solver::Solver;
+use contacts::collision::Collision;
+use solving::solver::Solver;
 use trees::Trees;
 
 /// Everything that moves in a world.

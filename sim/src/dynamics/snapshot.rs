@@ -3,11 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 use super::Dynamics;
-use super::collision::Manifold;
-use super::equality::Memory;
+use super::contacts::collision::Manifold;
+use super::contacts::touch::Touch;
 use super::error::OtherWorld;
-use super::state::TreeState;
-use super::touch::Touch;
+use super::joints::equality::Memory;
+use super::trees::state::TreeState;
 
 /// State of all trees, equalities and contacts, in full precision.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -3,35 +3,22 @@
 //! [`Scenery`] is what there is to see, built once per world; a [`Step`] says where it is; a [`Renderer`] draws it:
 //! [`RendererKind`] says which. The embedded one needs nothing of the system.
 
-mod accents;
-mod affine;
-mod bend;
-mod camera;
-mod cameras;
-mod contact;
 mod cpu;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod kind;
-mod light;
-mod mesh;
-mod pattern;
 mod png;
-mod prepared;
-#[cfg(feature = "gpu")]
-mod proof;
-mod raster;
-mod rows;
-mod scenery;
+mod scene;
+mod shading;
 
-pub use accents::robot_rgba;
-pub use camera::Camera;
-pub use cameras::Cameras;
 pub use kind::RendererKind;
-pub use mesh::{Mesh, Vertex};
-pub use pattern::Pattern;
 pub use png::{DEPTH_UNIT_M, PictureError, encode_depth_png, encode_png};
-pub use scenery::{Carrier, Part, Placed, Scenery};
+pub use scene::accents::robot_rgba;
+pub use scene::camera::Camera;
+pub use scene::cameras::Cameras;
+pub use scene::mesh::{Mesh, Vertex};
+pub use scene::scenery::{Carrier, Part, Placed, Scenery};
+pub use shading::pattern::Pattern;
 
 use crate::Step;
 

@@ -2,8 +2,8 @@
 
 use rapier3d::math::{Matrix, Vector};
 
-use crate::render::affine::Affine;
-use crate::render::prepared::{Prepared, Sheet};
+use crate::render::scene::prepared::{Prepared, Sheet};
+use crate::render::shading::affine::Affine;
 use crate::render::{Carrier, Pattern, Placed};
 
 /// A sheet in the world.

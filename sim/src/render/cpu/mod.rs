@@ -1,6 +1,8 @@
 //! The embedded renderer: a visibility buffer of triangle numbers, shaded afterwards, four samples a pixel.
 
+pub mod contact;
 mod facets;
+mod raster;
 mod shade;
 mod shadow;
 mod srgb;
@@ -9,10 +11,10 @@ mod view;
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::contact::ContactMap;
-use super::prepared::Prepared;
-use super::{Camera, Frame, Placed, Renderer, Scenery};
 use crate::Step;
+use crate::render::scene::prepared::Prepared;
+use crate::render::{Camera, Frame, Placed, Renderer, Scenery};
+use contact::ContactMap;
 use facets::Facet;
 use shade::Rays;
 use shadow::ShadowMap;

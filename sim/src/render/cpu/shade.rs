@@ -2,11 +2,11 @@
 
 use rapier3d::math::Vector;
 
+use super::contact::ContactMap;
 use super::facets::Facet;
 use super::shadow::ShadowMap;
-use crate::render::contact::ContactMap;
-use crate::render::light::{CONTACT, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, SAMPLES, SUN, TO_SUN};
-use crate::render::rows::{LANES, Lanes, axes, lanes};
+use crate::render::shading::light::{CONTACT, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, SAMPLES, SUN, TO_SUN};
+use crate::render::shading::rows::{LANES, Lanes, axes, lanes};
 use crate::render::{Camera, Pattern};
 
 /// As many points as are shaded together: enough for a loop to be worth its beginning, few enough to stay near the processor.

@@ -5,11 +5,11 @@ use std::ops::Range;
 use pulp::Simd;
 use rapier3d::math::Vector;
 
-use crate::render::affine::Affine;
-use crate::render::light::{BIAS_M, FADE_TEXELS, NORMAL_OFFSET_M, TEXELS, sun_map};
-use crate::render::prepared::Prepared;
-use crate::render::raster::Outline;
-use crate::render::rows::{Grid, Lanes, Rows, axes, lanes};
+use super::raster::Outline;
+use crate::render::scene::prepared::Prepared;
+use crate::render::shading::affine::Affine;
+use crate::render::shading::light::{BIAS_M, FADE_TEXELS, NORMAL_OFFSET_M, TEXELS, sun_map};
+use crate::render::shading::rows::{Grid, Lanes, Rows, axes, lanes};
 use crate::render::{Carrier, Placed};
 
 /// Texels along each side of a cell: what is nearer than all of a cell is in the sun there, without a look at its texels.
@@ -37,7 +37,7 @@ pub(super) struct ShadowMap {
 
 /// "Nearness" here is [`SUN_DISTANCE_M`] minus the distance from the sun's plane, and grows towards the sun.
 ///
-/// [`SUN_DISTANCE_M`]: crate::render::light::SUN_DISTANCE_M
+/// [`SUN_DISTANCE_M`]: crate::render::shading::light::SUN_DISTANCE_M
 #[derive(Default)]
 struct Layer {
     nearness_m: Rows<f32>,

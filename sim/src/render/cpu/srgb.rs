@@ -1,7 +1,7 @@
 //! From linear light to sRGB, as pictures have it.
 
-use crate::render::light::SRGB_STEPS;
-use crate::render::rows::{LANES, Lanes, lanes};
+use crate::render::shading::light::SRGB_STEPS;
+use crate::render::shading::rows::{LANES, Lanes, lanes};
 
 /// Table from linear light to sRGB bytes.
 pub(super) struct SrgbTable([u8; SRGB_STEPS]);

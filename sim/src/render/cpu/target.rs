@@ -3,12 +3,12 @@
 use pulp::Simd;
 use rapier3d::math::{Pose, Vector};
 
-use crate::render::affine::Affine;
-use crate::render::camera::NEAR_M;
-use crate::render::light::SAMPLES;
-use crate::render::prepared::{NOTHING, Prepared};
-use crate::render::raster::Outline;
-use crate::render::rows::{Grid, Lanes, Rows, lanes};
+use super::raster::Outline;
+use crate::render::scene::camera::NEAR_M;
+use crate::render::scene::prepared::{NOTHING, Prepared};
+use crate::render::shading::affine::Affine;
+use crate::render::shading::light::SAMPLES;
+use crate::render::shading::rows::{Grid, Lanes, Rows, lanes};
 use crate::render::{Camera, Placed};
 
 /// Nearest surface per sample. `nearness_1_m` is 1 / depth, which is linear over a triangle's picture.

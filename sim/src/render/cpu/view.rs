@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
+use super::contact::ContactMap;
 use super::facets::Facet;
 use super::shade::{Rays, Strip, Surfaces};
 use super::shadow::ShadowMap;
 use super::srgb::SrgbTable;
 use super::target::Target;
-use crate::render::contact::ContactMap;
-use crate::render::light::{OUTLINE, OUTLINE_DEPTH_STEP, SAMPLES, SKY};
-use crate::render::prepared::{NOTHING, Prepared};
+use crate::render::scene::prepared::{NOTHING, Prepared};
+use crate::render::shading::light::{OUTLINE, OUTLINE_DEPTH_STEP, SAMPLES, SKY};
 
 const PER_PIXEL: usize = SAMPLES * SAMPLES;
 

@@ -15,7 +15,7 @@ const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Why there is no picture from a graphics processor.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub(in crate::render) enum GpuError {
+pub enum GpuError {
     #[error("there is no graphics processor with a Vulkan, Metal or Direct3D 12 driver")]
     Missing,
     #[error("{name} cannot be used: {reason}")]

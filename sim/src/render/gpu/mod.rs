@@ -3,6 +3,7 @@
 
 mod device;
 mod passes;
+mod proof;
 mod scene;
 mod shader;
 mod targets;
@@ -14,10 +15,10 @@ use wgpu::{
     RenderPassDepthStencilAttachment, RenderPassDescriptor, StoreOp, TextureView,
 };
 
-use super::contact::ContactMap;
-use super::prepared::{NOTHING, Prepared};
-use super::{Camera, Frame, Placed, Renderer, Scenery, cpu, proof};
 use crate::Step;
+use crate::render::cpu::contact::ContactMap;
+use crate::render::scene::prepared::{NOTHING, Prepared};
+use crate::render::{Camera, Frame, Placed, Renderer, Scenery, cpu};
 use device::{Gpu, GpuError};
 use scene::Scene;
 use targets::{Layer, Targets};

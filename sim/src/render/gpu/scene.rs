@@ -6,10 +6,10 @@ use wgpu::{BindGroup, Buffer, BufferUsages};
 
 use super::device::Gpu;
 use super::targets::bind;
-use crate::render::bend::Bend;
-use crate::render::contact::ContactMap;
-use crate::render::light::{CONTACT_TEXELS, SAMPLES, sun_map};
-use crate::render::prepared::Prepared;
+use crate::render::cpu::contact::ContactMap;
+use crate::render::scene::bend::Bend;
+use crate::render::scene::prepared::Prepared;
+use crate::render::shading::light::{CONTACT_TEXELS, SAMPLES, sun_map};
 use crate::render::{Camera, Carrier, Part, Pattern, Placed};
 
 /// Of `picture.wgsl`'s `View`, and of its `Part`.

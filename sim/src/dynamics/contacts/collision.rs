@@ -1,0 +1,176 @@
+//! From where the colliders are to candidates for contacts.
+//!
+//! Parry moves the points of a pair along while it hardly turns: of two faces that lie on each other it would choose now the
+//! one and now the other. So the points of the last step are part of the state.
+
+use rapier3d::math::Vector;
+use rapier3d::parry::bounding_volume::BoundingVolume;
+use rapier3d::parry::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
+use rapier3d::parry::shape::PackedFeatureId;
+use serde::{Deserialize, Serialize};
+
+use super::collider::{Collider, ColliderId, Surface};
+use super::friction::Friction;
+use super::near::Near;
+use super::touch::{Candidate, Impulses, Touch};
+use crate::dynamics::DVec3;
+use crate::dynamics::settings::Settings;
+use crate::dynamics::trees::{LinkId, Trees};
+
+#[derive(Default)]
+pub struct Collision {
+    surfaces: Vec<Surface>,
+    near: Near,
+    /// Of this step, in the order of their colliders.
+    pub candidates: Vec<Candidate>,
+    /// Of the last step, in the order of their colliders: those that have points.
+    pub manifolds: Vec<Manifold>,
+    /// Of this step; [`Collision::commit`] makes them those of the last.
+    found: Vec<Manifold>,
+    spare: Vec<ContactManifold<(), ()>>,
+}
+
+/// Parry's points of two colliders.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Manifold {
+    colliders: [ColliderId; 2],
+    points: ContactManifold<(), ()>,
+}
+
+impl Collision {
+    /// A shape that is not convex is a bug of the caller.
+    pub fn add(&mut self, collider: Collider, trees: &Trees, settings: &Settings) -> ColliderId {
+        assert!(collider.shape.is_convex(), "a collider has a convex shape");
+        let surface = Surface::new(collider, trees, settings);
+        let id = self.near.add(&surface);
+        self.surfaces.push(surface);
+        id
+    }
+
+    pub fn keep_apart(&mut self, a: LinkId, b: LinkId) {
+        self.near.keep_apart(a, b);
+    }
+
+    pub fn collider(&self, id: ColliderId) -> &Collider {
+        &self.surfaces[id.index()].collider
+    }
+
+    /// Collects what touches, or will within the step.
+    pub fn detect(&mut self, trees: &Trees, settings: &Settings) {
+        self.place(trees, settings);
+        self.near.update(&self.surfaces, trees);
+        self.candidates.clear();
+        self.spare.extend(self.found.drain(..).map(|manifold| manifold.points));
+        let mut last = self.manifolds.iter().peekable();
+        for &colliders in &self.near.pairs {
+            while last.next_if(|manifold| manifold.colliders < colliders).is_some() {}
+            let surfaces = colliders.map(|id| &self.surfaces[id.index()]);
+            if !surfaces[0].bounds.intersects(&surfaces[1].bounds) {
+                continue;
+            }
+            let between = Between { colliders, surfaces, trees, settings };
+            let mut points = self.spare.pop().unwrap_or_default();
+            let before = last.next_if(|manifold| manifold.colliders == colliders);
+            between.find(before.map(|manifold| &manifold.points), &mut points);
+            if points.points.is_empty() {
+                self.spare.push(points);
+            } else {
+                between.collect(&points, &mut self.candidates);
+                self.found.push(Manifold { colliders, points });
+            }
+        }
+    }
+
+    /// Keeps what the next step begins with.
+    pub fn commit(&mut self) {
+        std::mem::swap(&mut self.manifolds, &mut self.found);
+    }
+
+    /// Puts the colliders that move where their links are.
+    fn place(&mut self, trees: &Trees, settings: &Settings) {
+        let mut last = None;
+        for (index, surface) in self.surfaces.iter_mut().enumerate() {
+            let Some(body) = surface.body else { continue };
+            // Colliders of a link follow each other.
+            let pose = match last {
+                Some((link, pose)) if link == body => pose,
+                _ => trees.world_from(body),
+            };
+            last = Some((body, pose));
+            surface.place(&pose, trees, settings);
+            self.near.place(ColliderId(index as u32), surface);
+        }
+    }
+}
+
+/// Two colliders that are near each other.
+struct Between<'a> {
+    colliders: [ColliderId; 2],
+    surfaces: [&'a Surface; 2],
+    trees: &'a Trees,
+    settings: &'a Settings,
+}
+
+impl Between<'_> {
+    /// Points of contact, from those of the last step on if there were any.
+    fn find(&self, before: Option<&ContactManifold<(), ()>>, manifold: &mut ContactManifold<(), ()>) {
+        let [first, second] = self.surfaces;
+        manifold.clear();
+        match before {
+            Some(before) => {
+                (manifold.local_n1, manifold.local_n2) = (before.local_n1, before.local_n2);
+                manifold.points.extend_from_slice(&before.points);
+            }
+            // Where Parry begins to look.
+            None => manifold.local_n1 = first.towards(second).as_vec3(),
+        }
+        let near_m = (first.reach_m + second.reach_m) as f32;
+        let [a, b] = self.surfaces.map(|surface| &*surface.collider.shape);
+        DefaultQueryDispatcher
+            .contact_manifold_convex_convex(&first.pose_of(second), a, b, None, None, near_m, manifold)
+            .expect("Parry knows all convex shapes");
+        // Of two that only just touch it may find no direction; in the next step they are a little deeper, or apart.
+        if !manifold.local_n1.is_normalized() {
+            manifold.clear();
+        }
+    }
+
+    /// Those of the points that touch, or will within the step.
+    fn collect(&self, manifold: &ContactManifold<(), ()>, candidates: &mut Vec<Candidate>) {
+        let [first, second] = self.surfaces;
+        let normal = (first.world_from_shape.rotation * manifold.local_n1.as_dvec3()).normalize();
+        let (t1, t2) = normal.any_orthonormal_pair();
+        let friction = Friction::between(&first.collider.friction, &second.collider.friction);
+        let bodies = self.surfaces.map(|surface| surface.body);
+        let mut number = 0;
+        // The nearest point is added to the corners of two faces that lie on each other; it lies between them and wanders.
+        let faces = manifold.points.len() > 3;
+        for point in manifold.points.iter().filter(|point| !faces || point.fid1 != PackedFeatureId::UNKNOWN) {
+            let local_m = [point.local_p1, point.local_p2].map(Vector::as_dvec3);
+            let [on_a_m, on_b_m] = [0, 1].map(|side| self.surfaces[side].world_from_shape * local_m[side]);
+            let (gap_m, point_m) = ((on_b_m - on_a_m).dot(normal), (on_a_m + on_b_m) * 0.5);
+            let [before_m_s, after_m_s] = bodies.map(|body| self.velocity_m_s(body, point_m));
+            let parting_m_s = (after_m_s - before_m_s).dot(normal);
+            if gap_m + (parting_m_s - self.settings.margin_m_s) * self.settings.dt_s > 0.0 {
+                continue;
+            }
+            let touch = Touch {
+                colliders: self.colliders,
+                number,
+                point_m,
+                normal,
+                gap_m,
+                impulse_n_s: DVec3::ZERO,
+                normal_impulse_n_s: 0.0,
+                local_m,
+                memory: Impulses::default(),
+            };
+            number += 1;
+            candidates.push(Candidate { touch, bodies, friction, directions: [normal, t1, t2] });
+        }
+    }
+
+    fn velocity_m_s(&self, body: Option<LinkId>, point_m: DVec3) -> DVec3 {
+        body.map_or(DVec3::ZERO, |id| self.trees.all[id.tree.index()].point_velocity_m_s(id.link, point_m))
+    }
+}

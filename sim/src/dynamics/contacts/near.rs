@@ -1,0 +1,95 @@
+//! Which colliders are near each other: Rapier's broad phase, on bounds that reach as far as things come in a step.
+
+use std::collections::BTreeSet;
+
+use rapier3d::prelude::{
+    ActiveCollisionTypes, BroadPhaseBvh, BroadPhasePairEvent, ColliderBuilder, ColliderHandle, ColliderPair,
+    ColliderSet, IntegrationParameters, RigidBodySet,
+};
+
+use super::collider::{ColliderId, Surface};
+use crate::dynamics::trees::{LinkId, Trees};
+
+#[derive(Default)]
+pub struct Near {
+    /// In order, the smaller first: all that could touch in this step, and some that could not. Which of those are among them
+    /// depends on the past, so that nothing else may.
+    pub pairs: Vec<[ColliderId; 2]>,
+    /// Links that never touch, smaller first.
+    apart: BTreeSet<(LinkId, LinkId)>,
+    broad_phase: BroadPhaseBvh,
+    /// What the broad phase asks of the colliders; it has no bodies to ask.
+    colliders: ColliderSet,
+    handles: Vec<ColliderHandle>,
+    bodies: RigidBodySet,
+    parameters: IntegrationParameters,
+    events: Vec<BroadPhasePairEvent>,
+}
+
+impl Near {
+    pub fn add(&mut self, surface: &Surface) -> ColliderId {
+        // All are fixed for Rapier; of two that no tree moves it makes no pair.
+        let kinds = match surface.body {
+            Some(_) => ActiveCollisionTypes::FIXED_FIXED,
+            None => ActiveCollisionTypes::empty(),
+        };
+        let shape = surface.collider.shape.clone();
+        let handle = self.colliders.insert(ColliderBuilder::new(shape).active_collision_types(kinds));
+        let id = ColliderId(self.handles.len() as u32);
+        assert_eq!(handle.into_raw_parts().0, id.0, "Rapier counts colliders as we do");
+        self.handles.push(handle);
+        self.place(id, surface);
+        id
+    }
+
+    pub fn keep_apart(&mut self, a: LinkId, b: LinkId) {
+        self.apart.insert((a.min(b), a.max(b)));
+    }
+
+    /// Tells where a collider is; [`Near::update`] follows.
+    pub fn place(&mut self, id: ColliderId, surface: &Surface) {
+        self.broad_phase.set_aabb(&self.parameters, self.handles[id.index()], surface.bounds);
+    }
+
+    pub fn update(&mut self, surfaces: &[Surface], trees: &Trees) {
+        self.events.clear();
+        let (broad_phase, events) = (&mut self.broad_phase, &mut self.events);
+        broad_phase.update(&self.parameters, &self.colliders, &self.bodies, &[], &[], events);
+        for event in &self.events {
+            match event {
+                BroadPhasePairEvent::AddPair(pair) => {
+                    let pair = in_order(pair);
+                    let may_touch = may_touch(pair, surfaces, trees, &self.apart);
+                    if let Err(place) = self.pairs.binary_search(&pair)
+                        && may_touch
+                    {
+                        self.pairs.insert(place, pair);
+                    }
+                }
+                BroadPhasePairEvent::DeletePair(pair) => {
+                    if let Ok(place) = self.pairs.binary_search(&in_order(pair)) {
+                        self.pairs.remove(place);
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn in_order(pair: &ColliderPair) -> [ColliderId; 2] {
+    let [a, b] = [pair.collider1, pair.collider2].map(|handle| ColliderId(handle.into_raw_parts().0));
+    [a.min(b), a.max(b)]
+}
+
+/// Bodies of one tree that a joint joins do not collide, as in MuJoCo; nor do two that are kept apart.
+fn may_touch(
+    pair: [ColliderId; 2],
+    surfaces: &[Surface],
+    trees: &Trees,
+    apart: &BTreeSet<(LinkId, LinkId)>,
+) -> bool {
+    let [a, b] = pair.map(|id| surfaces[id.index()].body);
+    let (Some(a), Some(b)) = (a, b) else { return true };
+    let joined = a.tree == b.tree && trees.all[a.tree.index()].layout.are_neighbours(a.link, b.link);
+    !joined && !apart.contains(&(a.min(b), a.max(b)))
+}

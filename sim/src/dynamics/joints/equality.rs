@@ -1,0 +1,196 @@
+//! Equalities: coupled joints, points held together, and welds that can be switched, such as a latch.
+
+use rapier3d::glamx::{DMat3, DPose3, DVec3};
+use serde::{Deserialize, Serialize};
+
+use crate::dynamics::settings::{Pass, Settings};
+use crate::dynamics::trees::rows::Rows;
+use crate::dynamics::trees::spatial::Force;
+use crate::dynamics::trees::{LinkId, Trees};
+
+#[derive(Clone, Debug)]
+pub enum Equality {
+    /// MJCF's `joint`:  follower = a0 + a1 leader + ... + a4 leader^4; without a leader the follower is held at a0.
+    Couple { follower: LinkId, leader: Option<LinkId>, polynomial: [f64; 5] },
+    /// MJCF's `connect`: a point of `a` and one of `b` coincide; `None` is the world.
+    Connect { a: LinkId, a_point_m: DVec3, b: Option<LinkId>, b_point_m: DVec3 },
+    /// MJCF's `weld`: `b` stays where it is in `a`.
+    Weld { a: LinkId, a_from_b: DPose3, b: Option<LinkId> },
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EqualityId(pub(in crate::dynamics) usize);
+
+/// What of an equality outlasts a step.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Memory {
+    pub active: bool,
+    /// Impulses of its rows in the last step.
+    impulse: [DVec3; 2],
+}
+
+#[derive(Default)]
+pub struct Equalities {
+    pub all: Vec<Equality>,
+    pub memory: Vec<Memory>,
+    rows: Rows<3>,
+    blocks: Vec<Block>,
+}
+
+/// Three rows that are solved together; a coupling uses the first only.
+struct Block {
+    equality: usize,
+    /// First or second block of its equality.
+    part: usize,
+    /// Velocity that takes the error back.
+    correction: DVec3,
+    mass: DMat3,
+    impulse: DVec3,
+    /// Its value after the correcting sweeps.
+    remembered: DVec3,
+}
+
+/// Added to the diagonal of a block's inverse mass, as a share of its trace: rows that nothing can move stay solvable.
+const REGULARISATION: f64 = 1e-9;
+
+impl Equalities {
+    pub fn push(&mut self, equality: Equality, active: bool) -> EqualityId {
+        self.all.push(equality);
+        self.memory.push(Memory { active, impulse: [DVec3::ZERO; 2] });
+        EqualityId(self.all.len() - 1)
+    }
+
+    pub fn set_active(&mut self, id: EqualityId, active: bool) {
+        if self.memory[id.0].active != active {
+            self.memory[id.0] = Memory { active, impulse: [DVec3::ZERO; 2] };
+        }
+    }
+
+    pub fn prepare(&mut self, trees: &Trees, settings: &Settings) {
+        self.rows.clear();
+        self.blocks.clear();
+        for index in 0..self.all.len() {
+            if !self.memory[index].active {
+                continue;
+            }
+            match self.all[index].clone() {
+                Equality::Couple { follower, leader, polynomial } => {
+                    let error = self.couple(trees, follower, leader, &polynomial);
+                    self.close(index, 0, DVec3::new(error, 0.0, 0.0), settings);
+                }
+                Equality::Connect { a, a_point_m, b, b_point_m } => {
+                    let ends = [world_from(trees, Some(a)) * a_point_m, world_from(trees, b) * b_point_m];
+                    self.hold_point(trees, index, [Some(a), b], ends, settings);
+                }
+                Equality::Weld { a, a_from_b, b } => {
+                    let (wanted, is) = (world_from(trees, Some(a)) * a_from_b, world_from(trees, b));
+                    let ends = [wanted.translation, is.translation];
+                    self.hold_point(trees, index, [Some(a), b], ends, settings);
+                    let error = (is.rotation * wanted.rotation.inverse()).to_scaled_axis();
+                    trees.push_rows(&mut self.rows, [Some(a), b], |_| DVec3::AXES.map(Force::moment));
+                    self.close(index, 1, error, settings);
+                }
+            }
+        }
+    }
+
+    fn hold_point(
+        &mut self,
+        trees: &Trees,
+        index: usize,
+        bodies: [Option<LinkId>; 2],
+        ends_m: [DVec3; 2],
+        settings: &Settings,
+    ) {
+        let middle_m = (ends_m[0] + ends_m[1]) * 0.5;
+        let at = |reference_m| DVec3::AXES.map(|axis| Force::at(middle_m - reference_m, axis));
+        trees.push_rows(&mut self.rows, bodies, at);
+        self.close(index, 0, ends_m[1] - ends_m[0], settings);
+    }
+
+    /// Row of  follower' - p'(leader) leader' = 0;  gives the error  follower - p(leader).
+    fn couple(
+        &mut self,
+        trees: &Trees,
+        follower: LinkId,
+        leader: Option<LinkId>,
+        polynomial: &[f64; 5],
+    ) -> f64 {
+        let start = self.rows.column.len();
+        let push = |rows: &mut Rows<3>, id: LinkId, scale: f64| {
+            let tree = &trees.all[id.tree.index()];
+            let dof = tree.layout.first_dof[id.link];
+            rows.push_dof(tree, trees.offset[id.tree.index()], dof, [scale, 0.0, 0.0]);
+            tree.q[id.link]
+        };
+        let position = push(&mut self.rows, follower, 1.0);
+        let Some(leader) = leader else {
+            self.rows.close(start);
+            return position - polynomial[0];
+        };
+        let second = self.rows.column.len();
+        let x = trees.all[leader.tree.index()].q[leader.link];
+        let (mut value, mut slope) = (0.0, 0.0);
+        for coefficient in polynomial.iter().rev() {
+            slope = slope * x + value;
+            value = value * x + coefficient;
+        }
+        push(&mut self.rows, leader, -slope);
+        if leader.tree == follower.tree {
+            self.rows.merge(start, second);
+        }
+        self.rows.close(start);
+        position - value
+    }
+
+    fn close(&mut self, equality: usize, part: usize, error: DVec3, settings: &Settings) {
+        let a = self.rows.last_inverse_mass();
+        let regularisation = REGULARISATION * (a[0][0] + a[1][1] + a[2][2]);
+        let mut matrix = DMat3::from_cols_array_2d(&a);
+        for c in 0..3 {
+            matrix.col_mut(c)[c] += regularisation;
+        }
+        self.blocks.push(Block {
+            equality,
+            part,
+            correction: error * settings.joint_correction_per_s,
+            mass: matrix.inverse(),
+            impulse: self.memory[equality].impulse[part],
+            remembered: DVec3::ZERO,
+        });
+    }
+
+    pub fn warm_start(&self, w: &mut [f64]) {
+        for (group, block) in self.blocks.iter().enumerate() {
+            self.rows.push_impulse(group, &block.impulse.to_array(), w);
+        }
+    }
+
+    pub fn sweep(&mut self, pass: Pass, w: &mut [f64]) {
+        for (group, block) in self.blocks.iter_mut().enumerate() {
+            let mut velocity = DVec3::from_array(self.rows.velocity(group, w));
+            if pass == Pass::Correcting {
+                velocity += block.correction;
+            }
+            let change = block.mass * -velocity;
+            block.impulse += change;
+            self.rows.push_impulse(group, &change.to_array(), w);
+        }
+    }
+
+    pub fn remember(&mut self) {
+        for block in &mut self.blocks {
+            block.remembered = block.impulse;
+        }
+    }
+
+    pub fn commit(&mut self) {
+        for block in &self.blocks {
+            self.memory[block.equality].impulse[block.part] = block.remembered;
+        }
+    }
+}
+
+fn world_from(trees: &Trees, body: Option<LinkId>) -> DPose3 {
+    body.map_or(DPose3::IDENTITY, |id| trees.all[id.tree.index()].world_from_link(id.link))
+}

@@ -1,0 +1,58 @@
+//! Bias forces: what the joints must exert so that nothing accelerates, from Newton and Euler.
+//!
+//! Outwards:  a_i = a_p + v_p x S q',  f_i = I_i a_i + v_i x* I_i v_i,  with a_0 = -g.
+//! Inwards:   bias_k = S_k . f,  f_p += f_i.
+//! Source: Featherstone 2008, section 5.3, in world axes about the tree's reference.
+
+use rapier3d::glamx::DVec3;
+
+use super::link::Joint;
+use super::spatial::{Force, Inertia, Motion, Symmetric};
+use super::tree::Tree;
+
+impl Tree {
+    /// Sets `rhs` to -bias with the forces from outside, and each link's own spatial inertia.
+    pub(in crate::dynamics) fn bias(&mut self, gravity_m_s2: DVec3) {
+        let count = self.links.len();
+        for i in 0..count {
+            let acceleration = self.velocity_product(i, gravity_m_s2);
+            let link = &self.links[i];
+            let (mass_kg, com_m) = (link.mass.mass_kg, self.centre_m(i));
+            let mut second_kg_m2 = self.own_inertia[i].rotated(&self.rotation[i]);
+            second_kg_m2 += Symmetric::of_point(mass_kg, com_m);
+            let inertia = Inertia { mass_kg, first_kg_m: com_m * mass_kg, second_kg_m2 };
+            self.inertia[i] = inertia;
+            self.acceleration[i] = acceleration;
+            let velocity = self.velocity[i];
+            self.force[i] =
+                inertia.mul(acceleration) + velocity.cross_force(inertia.mul(velocity)) - self.external[i];
+        }
+        for i in (0..count).rev() {
+            let force: Force = self.force[i];
+            let dof = self.layout.first_dof[i];
+            for k in dof..dof + self.links[i].joint.dofs() {
+                self.rhs[k] = -self.axis[k].dot(force);
+            }
+            if let Some(parent) = self.links[i].parent {
+                self.force[parent] += force;
+            }
+        }
+    }
+
+    /// a_p + v_p x S q', the acceleration with q'' = 0. Gravity is an acceleration of the world upwards.
+    fn velocity_product(&self, i: usize, gravity_m_s2: DVec3) -> Motion {
+        let lifted = Motion { angular: DVec3::ZERO, linear: -gravity_m_s2 };
+        let velocity = self.velocity[i];
+        match self.links[i].parent {
+            Some(parent) => {
+                let before = self.velocity[parent];
+                self.acceleration[parent] + before.cross(velocity - before)
+            }
+            // The velocity of a free joint is that of a point that moves, the spatial one that of where it passes.
+            None if matches!(self.links[i].joint, Joint::Free) => {
+                lifted - Motion { angular: DVec3::ZERO, linear: velocity.angular.cross(velocity.linear) }
+            }
+            None => lifted,
+        }
+    }
+}

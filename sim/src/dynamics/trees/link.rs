@@ -1,0 +1,129 @@
+//! What a tree is made of: links, their joints and masses. Nothing here knows robots or file formats.
+
+use rapier3d::glamx::{DMat3, DPose3, DVec3};
+use rapier3d::prelude::MassProperties;
+
+/// A rigid body and the joint that holds it to its parent.
+#[derive(Clone, Debug)]
+pub struct Link {
+    pub name: String,
+    /// An earlier link of the tree; `None` is the world.
+    pub parent: Option<usize>,
+    /// With the joint at 0. For a free link: where it starts in the world.
+    pub parent_from_link: DPose3,
+    pub joint: Joint,
+    pub mass: Mass,
+}
+
+#[derive(Clone, Debug)]
+pub enum Joint {
+    /// Six degrees of freedom; only the first link of a tree may be free.
+    Free,
+    Fixed,
+    Hinge(Axis),
+    Slide(Axis),
+}
+
+/// Joint of one degree of freedom. Positions are rad of a hinge and m of a slide, efforts N m and N.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Axis {
+    /// Unit vector, link frame.
+    pub direction: DVec3,
+    /// Where a hinge's axis runs through, link frame.
+    pub anchor_m: DVec3,
+    /// Inertia of the drive as the joint feels it: kg m^2 or kg.
+    pub armature: f64,
+    /// Effort of dry friction.
+    pub friction_loss: f64,
+    /// Effort per velocity.
+    pub damping: f64,
+    /// Effort per position away from `spring_rest`.
+    pub stiffness: f64,
+    pub spring_rest: f64,
+    /// Lowest and highest position.
+    pub range: Option<[f64; 2]>,
+    /// What a drive can exert at most; infinite for a joint that is never driven to its limit.
+    pub effort_limit: f64,
+}
+
+/// What a joint's drive is told; it stays until it is told again and is not part of a state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drive {
+    /// rad or m.
+    pub target: f64,
+    /// Effort per position.
+    pub kp: f64,
+    /// Effort per velocity; the damper acts on the joint's own velocity.
+    pub kd: f64,
+    /// Effort.
+    pub feedforward: f64,
+}
+
+impl Drive {
+    pub const NONE: Drive = Drive { target: 0.0, kp: 0.0, kd: 0.0, feedforward: 0.0 };
+}
+
+impl Axis {
+    /// An axis through the link's origin with nothing on it.
+    pub fn along(direction: DVec3) -> Axis {
+        Axis {
+            direction: direction.normalize(),
+            anchor_m: DVec3::ZERO,
+            armature: 0.0,
+            friction_loss: 0.0,
+            damping: 0.0,
+            stiffness: 0.0,
+            spring_rest: 0.0,
+            range: None,
+            effort_limit: f64::INFINITY,
+        }
+    }
+}
+
+impl Joint {
+    pub(in crate::dynamics) fn axis(&self) -> Option<&Axis> {
+        match self {
+            Joint::Free | Joint::Fixed => None,
+            Joint::Hinge(axis) | Joint::Slide(axis) => Some(axis),
+        }
+    }
+
+    pub(in crate::dynamics) fn dofs(&self) -> usize {
+        match self {
+            Joint::Free => 6,
+            Joint::Fixed => 0,
+            Joint::Hinge(_) | Joint::Slide(_) => 1,
+        }
+    }
+}
+
+/// Mass of a link, link frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Mass {
+    pub mass_kg: f64,
+    pub com_m: DVec3,
+    /// About the centre of mass, link axes.
+    pub inertia_kg_m2: DMat3,
+}
+
+impl Mass {
+    /// For links that only carry others: two joints in a row have one between them.
+    pub const NONE: Mass = Mass { mass_kg: 0.0, com_m: DVec3::ZERO, inertia_kg_m2: DMat3::ZERO };
+
+    pub fn from_rapier(mass: &MassProperties) -> Mass {
+        let axes = DMat3::from_quat(mass.principal_inertia_local_frame.as_dquat().normalize());
+        let principal = DMat3::from_diagonal(mass.principal_inertia().as_dvec3());
+        Mass {
+            mass_kg: f64::from(mass.mass()),
+            com_m: mass.local_com.as_dvec3(),
+            inertia_kg_m2: axes * principal * axes.transpose(),
+        }
+    }
+
+    /// Solid box of even density, centred.
+    pub fn of_box(mass_kg: f64, half_extents_m: DVec3) -> Mass {
+        let s = half_extents_m * half_extents_m * (mass_kg / 3.0);
+        let inertia_kg_m2 = DMat3::from_diagonal(DVec3::new(s.y + s.z, s.x + s.z, s.x + s.y));
+        Mass { mass_kg, com_m: DVec3::ZERO, inertia_kg_m2 }
+    }
+}

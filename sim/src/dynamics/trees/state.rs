@@ -1,0 +1,97 @@
+//! Reading and setting the state of a tree.
+
+use rapier3d::glamx::{DPose3, DVec3};
+use serde::{Deserialize, Serialize};
+
+use super::link::Joint;
+use super::spatial::Force;
+use super::tree::Tree;
+
+/// Everything of a tree that outlasts a step, in full precision.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TreeState {
+    base: DPose3,
+    q: Vec<f64>,
+    v: Vec<f64>,
+    effort: Vec<f64>,
+    dry_friction: Vec<f64>,
+}
+
+impl Tree {
+    /// Position of a hinge (rad) or slide (m); 0 of other joints.
+    pub fn joint_position(&self, link: usize) -> f64 {
+        self.q[link]
+    }
+
+    /// Velocity of a hinge (rad/s) or slide (m/s); 0 of other joints.
+    pub fn joint_velocity(&self, link: usize) -> f64 {
+        self.links[link].joint.axis().map_or(0.0, |_| self.v[self.layout.first_dof[link]])
+    }
+
+    /// What the drive of a joint exerted on average over the last step (N m or N), within its effort limit.
+    pub fn drive_effort(&self, link: usize) -> f64 {
+        self.effort[link]
+    }
+
+    /// Sets a hinge or slide; nothing happens to other joints.
+    pub fn set_joint(&mut self, link: usize, position: f64, velocity: f64) {
+        if self.links[link].joint.axis().is_some() {
+            self.q[link] = position;
+            self.v[self.layout.first_dof[link]] = velocity;
+            self.kinematics();
+        }
+    }
+
+    /// Puts a free tree somewhere; the velocity is that of the first link's origin. Nothing happens to a fixed tree.
+    pub fn set_base(&mut self, world_from_base: DPose3, velocity_m_s: DVec3, spin_rad_s: DVec3) {
+        if matches!(self.links[0].joint, Joint::Free) {
+            self.base = world_from_base;
+            let arm_m = world_from_base.rotation * self.links[0].mass.com_m;
+            (velocity_m_s + spin_rad_s.cross(arm_m)).write_to_slice(&mut self.v[..3]);
+            spin_rad_s.write_to_slice(&mut self.v[3..6]);
+            self.kinematics();
+        }
+    }
+
+    /// A force (N, world axes) at a point (world frame) of a link, for the next step; forces add up.
+    pub fn push(&mut self, link: usize, point_m: DVec3, force_n: DVec3) {
+        self.external[link] += Force::at(point_m - self.reference_m, force_n);
+    }
+
+    /// A torque (N m, world axes) on a link, for the next step.
+    pub fn twist(&mut self, link: usize, torque_n_m: DVec3) {
+        self.external[link] += Force::moment(torque_n_m);
+    }
+
+    /// Centre of mass of the whole tree, world frame.
+    pub fn com_m(&self) -> DVec3 {
+        let moment = |(i, link): (usize, &crate::dynamics::Link)| self.centre_m(i) * link.mass.mass_kg;
+        let sum: DVec3 = self.links.iter().enumerate().map(moment).sum();
+        self.reference_m + sum / self.mass_kg()
+    }
+
+    pub fn state(&self) -> TreeState {
+        TreeState {
+            base: self.base,
+            q: self.q.clone(),
+            v: self.v.clone(),
+            effort: self.effort.clone(),
+            dry_friction: self.dry_friction.clone(),
+        }
+    }
+
+    /// Whether a state is one of a tree like this.
+    pub(in crate::dynamics) fn fits(&self, state: &TreeState) -> bool {
+        state.q.len() == self.q.len() && state.v.len() == self.v.len()
+    }
+
+    /// Takes back a state that fits.
+    pub(in crate::dynamics) fn restore(&mut self, state: &TreeState) {
+        self.base = state.base;
+        self.q.clone_from(&state.q);
+        self.v.clone_from(&state.v);
+        self.effort.clone_from(&state.effort);
+        self.dry_friction.clone_from(&state.dry_friction);
+        self.kinematics();
+    }
+}

@@ -1,0 +1,143 @@
+//! An articulated tree: links, their state, and the working memory of a step.
+
+use rapier3d::glamx::{DMat3, DPose3, DVec3};
+
+use super::factor::Factor;
+use super::layout::Layout;
+use super::link::{Drive, Joint, Link, Mass};
+use super::spatial::{Force, Inertia, Motion, Symmetric};
+use crate::dynamics::error::TreeError;
+
+/// Links joined into a tree. A robot is a tree with a free first link, a door one on a fixed first link, a lone
+/// object a tree of one free link.
+///
+/// Degrees of freedom, in the order of the links: a free joint has the velocity of the link's centre of mass and its
+/// angular velocity, both in world axes; a hinge or slide has one. The centre of mass and not the origin, because then
+/// a lone body's mass matrix has no coupling and its centre flies straight.
+pub struct Tree {
+    pub name: String,
+    pub(in crate::dynamics) links: Vec<Link>,
+    pub(in crate::dynamics) layout: Layout,
+    /// Of a free first link, in the world.
+    pub(in crate::dynamics) base: DPose3,
+    /// Joint positions, by link; 0 where the joint has none.
+    pub(in crate::dynamics) q: Vec<f64>,
+    pub(in crate::dynamics) v: Vec<f64>,
+    /// By link.
+    pub(in crate::dynamics) drives: Vec<Drive>,
+    /// By link: the drive is a row of the solver in this step.
+    pub(in crate::dynamics) bounded: Vec<bool>,
+    /// From outside, by link, about the reference; for the next step only.
+    pub(in crate::dynamics) external: Vec<Force>,
+    /// What the drives exerted in the last step, by link.
+    pub(in crate::dynamics) effort: Vec<f64>,
+    /// Impulses of dry friction in the last step, by link, with which the next begins.
+    pub(in crate::dynamics) dry_friction: Vec<f64>,
+    /// Where the step would end without constraints, by degree of freedom.
+    pub(in crate::dynamics) unconstrained: Vec<f64>,
+    /// Origin of the spatial vectors, world frame: centre of mass of a free first link, origin of a fixed one.
+    pub(in crate::dynamics) reference_m: DVec3,
+    pub(in crate::dynamics) rotation: Vec<DMat3>,
+    /// Origins of the links relative to the reference.
+    pub(in crate::dynamics) position_m: Vec<DVec3>,
+    /// Joint axes S, by degree of freedom.
+    pub(in crate::dynamics) axis: Vec<Motion>,
+    pub(in crate::dynamics) velocity: Vec<Motion>,
+    pub(in crate::dynamics) acceleration: Vec<Motion>,
+    pub(in crate::dynamics) force: Vec<Force>,
+    /// Composite, by link.
+    pub(in crate::dynamics) inertia: Vec<Inertia>,
+    /// Of each link about its centre of mass, link axes.
+    pub(in crate::dynamics) own_inertia: Vec<Symmetric>,
+    /// What springs, dampers and drives add to the diagonal of the mass matrix.
+    pub(in crate::dynamics) implicit: Vec<f64>,
+    pub(in crate::dynamics) rhs: Vec<f64>,
+    pub(in crate::dynamics) factor: Factor,
+    /// Half of what [`Tree::spin_freely`] added to the spin.
+    pub(in crate::dynamics) half_gyration_rad_s: DVec3,
+}
+
+impl Tree {
+    pub fn new(name: &str, links: Vec<Link>) -> Result<Tree, TreeError> {
+        check(name, &links)?;
+        let layout = Layout::of(&links);
+        let (count, dofs) = (links.len(), layout.dofs());
+        let mut tree = Tree {
+            name: name.into(),
+            base: links[0].parent_from_link,
+            q: vec![0.0; count],
+            v: vec![0.0; dofs],
+            drives: vec![Drive::NONE; count],
+            bounded: vec![false; count],
+            external: vec![Force::default(); count],
+            effort: vec![0.0; count],
+            dry_friction: vec![0.0; count],
+            unconstrained: vec![0.0; dofs],
+            reference_m: DVec3::ZERO,
+            rotation: vec![DMat3::IDENTITY; count],
+            position_m: vec![DVec3::ZERO; count],
+            axis: vec![Motion::default(); dofs],
+            velocity: vec![Motion::default(); count],
+            acceleration: vec![Motion::default(); count],
+            force: vec![Force::default(); count],
+            inertia: vec![Inertia::default(); count],
+            own_inertia: links.iter().map(|link| Symmetric::of(&link.mass.inertia_kg_m2)).collect(),
+            implicit: vec![0.0; dofs],
+            rhs: vec![0.0; dofs],
+            factor: Factor::sized(&layout),
+            half_gyration_rad_s: DVec3::ZERO,
+            layout,
+            links,
+        };
+        tree.kinematics();
+        tree.bias(DVec3::ZERO);
+        tree.composite_mass_matrix();
+        tree.factorise();
+        match (0..dofs).find(|dof| !tree.factor.is_positive(*dof)) {
+            None => Ok(tree),
+            Some(dof) => Err(TreeError::Massless {
+                tree: name.into(),
+                link: tree.links[tree.layout.link_of[dof]].name.clone(),
+            }),
+        }
+    }
+
+    pub fn links(&self) -> &[Link] {
+        &self.links
+    }
+
+    pub fn dofs(&self) -> usize {
+        self.v.len()
+    }
+
+    /// One free body: its mass matrix is block diagonal and its gyroscopic motion integrated on its own.
+    pub(in crate::dynamics) fn is_lone(&self) -> bool {
+        self.links.len() == 1 && matches!(self.links[0].joint, Joint::Free)
+    }
+
+    /// Another mass for a link, from the next step on. It is part of the set-up, not of the state.
+    pub fn set_mass(&mut self, link: usize, mass: Mass) {
+        self.own_inertia[link] = Symmetric::of(&mass.inertia_kg_m2);
+        self.links[link].mass = mass;
+        self.kinematics();
+    }
+
+    pub fn mass_kg(&self) -> f64 {
+        self.links.iter().map(|link| link.mass.mass_kg).sum()
+    }
+}
+
+fn check(tree: &str, links: &[Link]) -> Result<(), TreeError> {
+    if links.is_empty() {
+        return Err(TreeError::Empty { tree: tree.into() });
+    }
+    for (index, link) in links.iter().enumerate() {
+        if link.parent.is_none() != (index == 0) || link.parent.is_some_and(|parent| parent >= index) {
+            return Err(TreeError::Parent { tree: tree.into(), link: link.name.clone() });
+        }
+        if index > 0 && matches!(link.joint, Joint::Free) {
+            return Err(TreeError::Free { tree: tree.into(), link: link.name.clone() });
+        }
+    }
+    Ok(())
+}

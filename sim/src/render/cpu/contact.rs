@@ -1,0 +1,255 @@
+//! Where things nearly touch what carries them: a soft darkness that tells standing from hovering.
+
+use pulp::{Arch, Simd, WithSimd};
+use rapier3d::math::Vector;
+
+use super::raster::Outline;
+use crate::render::scene::prepared::Prepared;
+use crate::render::shading::affine::Affine;
+use crate::render::shading::light::CONTACT_TEXELS;
+use crate::render::shading::rows::{Grid, Lanes, Rows, lanes};
+use crate::render::{Carrier, Part, Placed};
+
+/// What is this far above a surface darkens it no more.
+const REACH_M: f32 = 0.06;
+/// So deep, things sink into what carries them.
+pub const SINK_M: f32 = 0.03;
+/// Nothing higher carries anything.
+const HIGHEST_SUPPORT_M: f32 = 1.5;
+/// Heights are drawn as nearness, which is positive.
+const DATUM_M: f32 = 4.0;
+/// Weights of a texel's neighbours in each direction.
+const BLUR: [f32; 5] = [1.0 / 9.0, 2.0 / 9.0, 3.0 / 9.0, 2.0 / 9.0, 1.0 / 9.0];
+/// Texels along each side of a square that is looked at as a whole.
+const CELL: usize = 8;
+const CELLS: usize = CONTACT_TEXELS / CELL;
+const GRID: Grid = Grid { width: CONTACT_TEXELS, height: CONTACT_TEXELS, pitch_px: 1.0 };
+
+/// The surroundings of the focus, seen from above. Columns run along the world's x, rows along y.
+#[derive(Default)]
+pub struct ContactMap {
+    /// World coordinates of its first corner, and texels per metre.
+    pub corner_m: [f32; 2],
+    pub texels_per_m: f32,
+    /// Of each texel, row by row: the height of what can carry things, and how dark it is there, from 0 to 1.
+    pub texel_values: Vec<[f32; 2]>,
+    /// What the map is around; `None` before the first. What can carry things is drawn when it changes.
+    focus_m: Option<Vector>,
+    support: Rows<f32>,
+    underside: Rows<f32>,
+    corners_m: Vec<[f32; 3]>,
+    /// How dark it is, and that smoothed along the rows.
+    dark_share: Vec<[f32; CONTACT_TEXELS]>,
+    across_share: Vec<[f32; CONTACT_TEXELS]>,
+    /// Of squares of texels, row by row: whether it is dark in or right beside them. Mostly it is not.
+    dark_cells: Vec<bool>,
+}
+
+/// A map to draw, compiled for the registers that there are.
+struct Drawing<'a> {
+    map: &'a mut ContactMap,
+    prepared: &'a Prepared,
+    placed: &'a Placed,
+}
+
+impl WithSimd for Drawing<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        self.map.draw_with(simd, self.prepared, self.placed);
+    }
+}
+
+impl ContactMap {
+    pub fn draw(&mut self, prepared: &Prepared, placed: &Placed) {
+        Arch::new().dispatch(Drawing { map: self, prepared, placed });
+    }
+
+    #[inline(always)]
+    fn draw_with<S: Simd>(&mut self, simd: S, prepared: &Prepared, placed: &Placed) {
+        if self.focus_m != Some(placed.focus_m) {
+            let radius_m = prepared.scenery.focus_radius_m;
+            self.focus_m = Some(placed.focus_m);
+            self.corner_m = [placed.focus_m.x - radius_m, placed.focus_m.y - radius_m];
+            self.texels_per_m = CONTACT_TEXELS as f32 / (2.0 * radius_m);
+            self.support.reset(GRID, 0.0);
+            self.draw_layer(simd, prepared, placed, Layer::Support);
+        }
+        self.underside.reset(GRID, 0.0);
+        self.draw_layer(simd, prepared, placed, Layer::Underside);
+        self.darken();
+    }
+
+    #[inline(always)]
+    fn draw_layer<S: Simd>(&mut self, simd: S, prepared: &Prepared, placed: &Placed, layer: Layer) {
+        for (number, part) in prepared.scenery.parts.iter().enumerate() {
+            let (pose, (centre_m, around_m)) = (placed.world_from_mesh[number], prepared.bounds[number]);
+            if layer != Layer::of(part) || !self.concerns(layer, pose * centre_m, around_m) {
+                continue;
+            }
+            let world_from_mesh = Affine::of(pose);
+            prepared.points[number].map_into(&mut self.corners_m, |block| world_from_mesh.map_lanes(block));
+            let too_high = |[_, _, z_m]: &[f32; 3]| *z_m > HIGHEST_SUPPORT_M;
+            if layer == Layer::Support && self.corners_m.iter().any(too_high) {
+                continue;
+            }
+            for [a, b, c] in &part.mesh.triangles {
+                let corner_m = |corner: u32| self.corners_m[corner as usize];
+                self.fill(simd, layer, [corner_m(*a), corner_m(*b), corner_m(*c)]);
+            }
+        }
+    }
+
+    /// Whether a part, given by a sphere around it, is over the map and near what it could touch.
+    fn concerns(&self, layer: Layer, centre_m: Vector, around_m: f32) -> bool {
+        let [u, v] = self.place(centre_m);
+        let around = around_m * self.texels_per_m;
+        let over = |i: f32| i > -around && i < CONTACT_TEXELS as f32 + around;
+        if !over(u) || !over(v) || layer == Layer::Support {
+            return over(u) && over(v);
+        }
+        let column = (u.max(0.0) as usize).min(CONTACT_TEXELS - 1);
+        let row = (v.max(0.0) as usize).min(CONTACT_TEXELS - 1);
+        let support_m = self.support.row(row)[column] - DATUM_M;
+        let (low_m, high_m) = (centre_m.z - around_m, centre_m.z + around_m);
+        low_m < support_m + REACH_M && high_m > support_m - SINK_M
+    }
+
+    /// Column and row above which a point is, counted from the corner.
+    #[inline(always)]
+    fn place(&self, point_m: Vector) -> [f32; 2] {
+        let [x_m, y_m] = self.corner_m;
+        [(point_m.x - x_m) * self.texels_per_m, (point_m.y - y_m) * self.texels_per_m]
+    }
+
+    /// Rows run along y as they do not in pictures: what is seen to turn counter-clockwise faces down.
+    #[inline(always)]
+    fn fill<S: Simd>(&mut self, simd: S, layer: Layer, [a, b, c]: [[f32; 3]; 3]) {
+        let (corners_m, rows, sign) = match layer {
+            Layer::Support => ([a, c, b], &mut self.support, 1.0),
+            Layer::Underside => ([a, b, c], &mut self.underside, -1.0),
+        };
+        let ([x_m, y_m], scale) = (self.corner_m, self.texels_per_m);
+        let nearest = S::as_mut_simd_f32s(rows.all_mut()).0;
+        let [a, b, c] = corners_m;
+        let place = |[x, y, z]: [f32; 3]| [(x - x_m) * scale, (y - y_m) * scale, DATUM_M + sign * z];
+        if let Some(outline) = Outline::new([place(a), place(b), place(c)]) {
+            outline.draw(
+                simd,
+                GRID,
+                #[inline(always)]
+                |i, nearness_m| nearest[i] = simd.max_f32s(nearest[i], nearness_m),
+            );
+        }
+    }
+
+    /// Dark where the lowest underside is near, smoothed.
+    #[inline(always)]
+    fn darken(&mut self) {
+        let ContactMap {
+            support,
+            underside,
+            dark_share: dark,
+            across_share: across,
+            texel_values,
+            dark_cells,
+            ..
+        } = self;
+        dark_cells.clear();
+        dark_cells.resize(CELLS * CELLS, false);
+        for rows in [&mut *dark, &mut *across] {
+            rows.resize(CONTACT_TEXELS, [0.0; CONTACT_TEXELS]);
+        }
+        texel_values.resize(CONTACT_TEXELS * CONTACT_TEXELS, [0.0; 2]);
+        for (row, dark) in dark.iter_mut().enumerate() {
+            let layers = support.row(row).iter().zip(underside.row(row));
+            for (dark, (support, underside)) in dark.iter_mut().zip(layers) {
+                // Nothing is above a texel without an underside.
+                let gap_m = 2.0 * DATUM_M - underside - support;
+                let near = (1.0 - gap_m / REACH_M).clamp(0.0, 1.0);
+                *dark = if gap_m > -SINK_M { near } else { 0.0 };
+            }
+        }
+        for (across, dark) in across.iter_mut().zip(dark.iter()) {
+            *across = blurred(|offset, i| dark[shifted(i, offset)]);
+        }
+        for (row, texels) in texel_values.chunks_exact_mut(CONTACT_TEXELS).enumerate() {
+            let near: [_; BLUR.len()] = std::array::from_fn(|offset| &across[shifted(row, offset)]);
+            let dark = blurred(|offset, i| near[offset][i]);
+            for (column, _) in dark.iter().enumerate().filter(|(_, dark)| **dark > 0.0) {
+                for row in [row.saturating_sub(1), row] {
+                    dark_cells[row / CELL * CELLS + column.saturating_sub(1) / CELL] = true;
+                    dark_cells[row / CELL * CELLS + column / CELL] = true;
+                }
+            }
+            for ((texel, nearness_m), dark) in texels.iter_mut().zip(support.row(row)).zip(dark) {
+                *texel = [nearness_m - DATUM_M, dark];
+            }
+        }
+    }
+
+    /// How dark it is at points of the world: 0 where they are not near what carries things.
+    #[inline(always)]
+    pub fn darkness<const N: usize>(&self, [x_m, y_m, z_m]: &[Lanes<N>; 3]) -> Lanes<N> {
+        let u: Lanes<N> = lanes(|i| (x_m[i] - self.corner_m[0]) * self.texels_per_m - 0.5);
+        let v: Lanes<N> = lanes(|i| (y_m[i] - self.corner_m[1]) * self.texels_per_m - 0.5);
+        let mut darkness = [0.0; N];
+        for i in 0..N {
+            let last = (CONTACT_TEXELS - 1) as f32;
+            if u[i] >= 0.0 && u[i] < last && v[i] >= 0.0 && v[i] < last {
+                darkness[i] = self.darkness_at(u[i], v[i], z_m[i]);
+            }
+        }
+        darkness
+    }
+
+    #[inline(always)]
+    fn darkness_at(&self, u_px: f32, v_px: f32, z_m: f32) -> f32 {
+        let (column, row) = (usize::from(u_px as u16), usize::from(v_px as u16));
+        if !self.dark_cells[row / CELL * CELLS + column / CELL] {
+            return 0.0;
+        }
+        let at = |j: usize, i: usize| self.texel_values[(row + j) * CONTACT_TEXELS + column + i];
+        let (right, down) = (u_px - column as f32, v_px - row as f32);
+        let [height_m, _] = at(usize::from(down >= 0.5), usize::from(right >= 0.5));
+        if (z_m - height_m).abs() > SINK_M {
+            return 0.0;
+        }
+        let along = |j: usize| at(j, 0)[1] * (1.0 - right) + at(j, 1)[1] * right;
+        along(0) * (1.0 - down) + along(1) * down
+    }
+}
+
+/// What is drawn from above, and what from below.
+#[derive(Clone, Copy, PartialEq)]
+enum Layer {
+    Support,
+    Underside,
+}
+
+impl Layer {
+    fn of(part: &Part) -> Layer {
+        match part.carrier {
+            Carrier::Room => Layer::Support,
+            Carrier::Link { .. } | Carrier::Object(_) => Layer::Underside,
+        }
+    }
+}
+
+#[inline(always)]
+fn blurred(at: impl Fn(usize, usize) -> f32) -> [f32; CONTACT_TEXELS] {
+    let mut sums = [0.0; CONTACT_TEXELS];
+    for (offset, weight) in BLUR.into_iter().enumerate() {
+        for (i, sum) in sums.iter_mut().enumerate() {
+            *sum += weight * at(offset, i);
+        }
+    }
+    sums
+}
+
+/// The neighbour that a weight is for; at the rim, the rim itself.
+#[inline(always)]
+fn shifted(i: usize, offset: usize) -> usize {
+    (i + offset).saturating_sub(BLUR.len() / 2).min(CONTACT_TEXELS - 1)
+}

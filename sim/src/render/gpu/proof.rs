@@ -1,0 +1,52 @@
+//! A picture by which a renderer shows that it draws what the embedded one draws.
+
+use rapier3d::math::{Pose, Vector};
+
+use crate::render::cpu::CpuRenderer;
+use crate::render::{Camera, Carrier, Frame, Mesh, Part, Pattern, Placed, Scenery};
+
+const SIDE_PX: u32 = 64;
+/// Of the pixels, as many may show another thing: on edges, renderers may decide otherwise.
+const STRAY_IDS: f32 = 0.02;
+/// Mean difference of colours, in steps of 255.
+const MEAN_DIFFERENCE: f32 = 1.0;
+
+/// A ball over a checkered floor, with its shadow.
+pub fn scenery() -> Scenery {
+    let part = |mesh: Mesh, rgb: [f32; 3], pattern: Pattern, id: u32| Part {
+        mesh,
+        carrier: Carrier::Room,
+        carrier_from_mesh: Pose::IDENTITY,
+        rgb,
+        pattern,
+        id,
+        casts_shadow: true,
+    };
+    let floor = part(Mesh::plane([1.0, 1.0]), [0.8, 0.7, 0.6], Pattern::Checker([0.5, 0.4, 0.4]), 1);
+    let ball = part(Mesh::sphere(0.2), [0.7, 0.2, 0.2], Pattern::Plain, 2);
+    Scenery { parts: vec![floor, ball], focus_radius_m: 1.0 }
+}
+
+pub fn placed() -> Placed {
+    let ball = Pose::from_translation(Vector::new(0.0, 0.0, 0.3));
+    Placed { world_from_mesh: vec![Pose::IDENTITY, ball], focus_m: Vector::ZERO }
+}
+
+pub fn camera() -> Camera {
+    let eye_m = Vector::new(0.8, -1.2, 1.0);
+    Camera {
+        world_from_camera: Pose::look_at_rh(eye_m, Vector::ZERO, Vector::Z).inverse(),
+        vertical_fov_rad: 1.0,
+        width: SIDE_PX,
+        height: SIDE_PX,
+    }
+}
+
+/// Whether another renderer's picture of it is right.
+pub fn accepts(drawn: &Frame) -> bool {
+    let expected = CpuRenderer::new(scenery()).draw_placed(placed(), &camera());
+    let count = expected.ids.len() as f32;
+    let stray = drawn.ids.iter().zip(&expected.ids).filter(|(drawn, expected)| drawn != expected).count();
+    let differences = drawn.rgb.iter().zip(&expected.rgb).map(|(a, b)| f32::from(a.abs_diff(*b)));
+    stray as f32 <= STRAY_IDS * count && differences.sum::<f32>() <= MEAN_DIFFERENCE * 3.0 * count
+}

@@ -1,0 +1,91 @@
+//! A scenery with what drawing wants to know of it and what never changes.
+
+use rapier3d::math::Vector;
+
+use super::bend::Bend;
+use crate::render::shading::affine::Points;
+use crate::render::shading::light::linear;
+use crate::render::{Part, Pattern, Scenery};
+
+/// Marks a sample at which nothing is.
+pub const NOTHING: u32 = u32::MAX;
+
+pub struct Prepared {
+    pub scenery: Scenery,
+    /// Corners of each part's triangles.
+    pub points: Vec<Points>,
+    pub sheets: Vec<Sheet>,
+    /// Of each triangle, counted part by part, the number of its sheet.
+    pub sheet_of: Vec<u32>,
+    /// Number of the first triangle of each part.
+    first: Vec<usize>,
+    /// What a picture's ids show for each sheet.
+    ids: Vec<u32>,
+    /// Centre and radius of a sphere around each part, in its mesh's frame.
+    pub bounds: Vec<(Vector, f32)>,
+    /// The two colours of each part.
+    pub linear_rgb: Vec<[Vector; 2]>,
+    /// Of each part, which axis of its mesh comes first in its pattern: the one that a grain runs along.
+    pub grain: Vec<usize>,
+}
+
+/// Neighbouring triangles of a part, as shading wants them.
+#[derive(Clone, Copy)]
+pub struct Sheet {
+    pub part: u32,
+    pub bend: Bend,
+}
+
+impl Prepared {
+    pub fn new(scenery: Scenery) -> Prepared {
+        let (mut sheets, mut sheet_of, mut first) = (Vec::new(), Vec::new(), Vec::new());
+        for (part, number) in scenery.parts.iter().zip(0..) {
+            first.push(sheet_of.len());
+            let (bends, bend_of) = part.mesh.bends();
+            sheet_of.extend(bend_of.iter().map(|bend| (sheets.len() + bend) as u32));
+            sheets.extend(bends.iter().map(|bend| Sheet { part: number, bend: *bend }));
+        }
+        first.push(sheet_of.len());
+        let id = |sheet: &Sheet| scenery.parts[sheet.part as usize].id;
+        Prepared {
+            points: scenery.parts.iter().map(points).collect(),
+            ids: sheets.iter().map(id).collect(),
+            sheets,
+            sheet_of,
+            first,
+            bounds: scenery.parts.iter().map(|part| part.mesh.bounds()).collect(),
+            linear_rgb: scenery.parts.iter().map(colours).collect(),
+            grain: scenery.parts.iter().map(grain).collect(),
+            scenery,
+        }
+    }
+
+    /// Of each triangle of a part.
+    pub fn sheets_of(&self, part: usize) -> &[u32] {
+        &self.sheet_of[self.first[part]..self.first[part + 1]]
+    }
+
+    /// What a picture's ids show where it shows a sheet.
+    #[inline(always)]
+    pub fn id(&self, sheet: u32) -> u32 {
+        match sheet {
+            NOTHING => 0,
+            _ => self.ids[sheet as usize],
+        }
+    }
+}
+
+/// Print stands upright, whatever is longest.
+fn grain(part: &Part) -> usize {
+    if part.pattern == Pattern::Print { 0 } else { part.mesh.longest_axis() }
+}
+
+fn points(part: &Part) -> Points {
+    Points::new(part.mesh.vertices.iter().map(|vertex| vertex.position_m))
+}
+
+/// Linear, of a part.
+fn colours(part: &Part) -> [Vector; 2] {
+    let first = linear(part.rgb);
+    [first, part.pattern.second_rgb(first)]
+}

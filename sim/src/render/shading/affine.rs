@@ -1,0 +1,83 @@
+//! Maps of points, worked on several at once.
+
+use rapier3d::math::{Matrix, Pose, Vector};
+
+use super::rows::{LANES, Lanes, axes, lanes};
+
+/// From points to points: each coordinate is a scalar product, and a number more.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Affine(pub [(Vector, f32); 3]);
+
+/// Points, coordinate by coordinate, in whole blocks: the last one may hold a few of no meaning.
+#[derive(Default)]
+pub struct Points {
+    blocks_m: Vec<[Lanes; 3]>,
+}
+
+impl Affine {
+    pub const IDENTITY: Affine = Affine([(Vector::X, 0.0), (Vector::Y, 0.0), (Vector::Z, 0.0)]);
+
+    pub fn of(pose: Pose) -> Affine {
+        let matrix = Matrix::from_quat(pose.rotation);
+        let row = |i: usize| (matrix.row(i), pose.translation[i]);
+        Affine([row(0), row(1), row(2)])
+    }
+
+    /// What first moves as `pose` does and then as this.
+    pub fn after(self, pose: Pose) -> Affine {
+        let back = pose.rotation.inverse();
+        Affine(self.0.map(|(axis, constant)| (back * axis, constant + axis.dot(pose.translation))))
+    }
+
+    #[inline(always)]
+    pub fn map(&self, point_m: Vector) -> [f32; 3] {
+        axes(
+            #[inline(always)]
+            |i| {
+                let (axis, constant) = self.0[i];
+                axis.x * point_m.x + axis.y * point_m.y + axis.z * point_m.z + constant
+            },
+        )
+    }
+
+    #[inline(always)]
+    pub fn map_lanes<const N: usize>(&self, [x, y, z]: &[Lanes<N>; 3]) -> [Lanes<N>; 3] {
+        axes(
+            #[inline(always)]
+            |row| {
+                let (axis, constant) = self.0[row];
+                lanes(|i| axis.x * x[i] + axis.y * y[i] + axis.z * z[i] + constant)
+            },
+        )
+    }
+}
+
+impl Points {
+    pub fn new(points_m: impl ExactSizeIterator<Item = Vector>) -> Points {
+        let mut blocks_m = vec![[[0.0; LANES]; 3]; points_m.len().div_ceil(LANES)];
+        for (number, point_m) in points_m.enumerate() {
+            for (axis, coordinates_m) in blocks_m[number / LANES].iter_mut().enumerate() {
+                coordinates_m[number % LANES] = point_m[axis];
+            }
+        }
+        Points { blocks_m }
+    }
+
+    /// Puts what `map` makes of each point, by the points' numbers.
+    #[inline(always)]
+    pub fn map_into<const N: usize>(
+        &self,
+        mapped_values: &mut Vec<[f32; N]>,
+        map: impl Fn(&[Lanes; 3]) -> [Lanes; N],
+    ) {
+        mapped_values.resize(self.blocks_m.len() * LANES, [0.0; N]);
+        for (block, mapped_values) in self.blocks_m.iter().zip(mapped_values.as_chunks_mut::<LANES>().0) {
+            let numbers = map(block);
+            for (i, mapped_values) in mapped_values.iter_mut().enumerate() {
+                for (mapped_values, numbers) in mapped_values.iter_mut().zip(&numbers) {
+                    *mapped_values = numbers[i];
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! Textures made in code: how much of a surface's second colour there is at a point.
+
+use rapier3d::math::{Matrix, Pose, Vector};
+
+use super::affine::Affine;
+use super::rows::{Lanes, lanes};
+
+/// How a surface varies between two colours.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Pattern {
+    #[default]
+    Plain,
+    /// Squares of half a metre in the world's ground plane; every other one has this colour, sRGB, 0 to 1.
+    Checker([f32; 3]),
+    /// Grain along the longest side.
+    Wood,
+    /// A coarse weave.
+    Fabric,
+    /// Lines of words, one above the other along the mesh's z: what stands on labels and boxes.
+    Print,
+}
+
+/// Words in names of materials that make them so. The names are those of MJCF files; no scene has to say more.
+const WOODS: [&str; 8] = ["wood", "birch", "oak", "walnut", "pine", "beech", "plank", "batten"];
+const FABRICS: [&str; 7] = ["fabric", "cloth", "velvet", "curtain", "carpet", "rug", "cushion"];
+const PRINTS: [&str; 2] = ["label", "print"];
+/// The second colour, as a part of the first: calm enough for what lies on it to stand out.
+const WOOD_DARK: f32 = 0.70;
+const FABRIC_DARK: f32 = 0.75;
+const INK_DARK: f32 = 0.45;
+
+pub const CHECKER_PER_M: f32 = 2.0;
+/// Broad bands, fine lines, and how far a band strays along the grain.
+pub const BANDS_PER_M: f32 = 13.0;
+pub const LINES_PER_M: f32 = 41.0;
+pub const STRAY: f32 = 0.4;
+pub const THREADS_PER_M: f32 = 18.0;
+/// Lines of print and words in them; the gaps are parts of half a period, and words of the next line are set off.
+pub const TEXT_PER_M: f32 = 48.0;
+pub const TEXT_GAP: f32 = 0.55;
+pub const WORDS_PER_M: f32 = 27.0;
+pub const WORD_GAP: f32 = 0.3;
+pub const WORD_STRAY: f32 = 0.37;
+
+impl Pattern {
+    /// Of a material, by its name.
+    pub fn of(material: &str) -> Pattern {
+        let has = |words: &[&str]| words.iter().any(|word| material.contains(word));
+        match () {
+            () if has(&WOODS) => Pattern::Wood,
+            () if has(&FABRICS) => Pattern::Fabric,
+            () if has(&PRINTS) => Pattern::Print,
+            () => Pattern::Plain,
+        }
+    }
+
+    /// Linear; the first colour is given.
+    pub(in crate::render) fn second_rgb(self, linear_rgb: Vector) -> Vector {
+        match self {
+            Pattern::Plain => linear_rgb,
+            Pattern::Checker(rgb) => super::light::linear(rgb),
+            Pattern::Wood => linear_rgb * WOOD_DARK,
+            Pattern::Fabric => linear_rgb * FABRIC_DARK,
+            Pattern::Print => linear_rgb * INK_DARK,
+        }
+    }
+
+    /// Takes a point of the world to the frame in which the pattern is told: a checker's is the world, all others' is the mesh's
+    /// with x along the grain.
+    pub(in crate::render) fn frame(self, world_from_mesh: Pose, grain: usize) -> Affine {
+        if let Pattern::Checker(_) = self {
+            return Affine::IDENTITY;
+        }
+        let axes = Matrix::from_quat(world_from_mesh.rotation);
+        let axis = |i: usize| {
+            let axis = axes.col((grain + i) % 3);
+            (axis, -axis.dot(world_from_mesh.translation))
+        };
+        Affine([axis(0), axis(1), axis(2)])
+    }
+
+    /// From 0 to 1, at several points of [`Pattern::frame`].
+    #[inline(always)]
+    pub(in crate::render) fn shares<const N: usize>(self, points_m: [Lanes<N>; 3]) -> Lanes<N> {
+        let [x_m, y_m, z_m] = points_m;
+        let point = |i: usize| [x_m[i], y_m[i], z_m[i]];
+        match self {
+            Pattern::Plain => lanes(|_| 0.0),
+            Pattern::Checker(_) => lanes(|i| checker(point(i))),
+            Pattern::Wood => lanes(|i| wood(point(i))),
+            Pattern::Fabric => lanes(|i| fabric(point(i))),
+            Pattern::Print => lanes(|i| print(point(i))),
+        }
+    }
+}
+
+/// 1 where the sum of two whole numbers is even.
+#[inline(always)]
+fn checker([x_m, y_m, _]: [f32; 3]) -> f32 {
+    let half = 0.5 * (floor(x_m * CHECKER_PER_M) + floor(y_m * CHECKER_PER_M));
+    if half == rounded(half) { 1.0 } else { 0.0 }
+}
+
+#[inline(always)]
+fn wood([x_m, y_m, z_m]: [f32; 3]) -> f32 {
+    let across_m = y_m + z_m;
+    let band = wave(across_m * BANDS_PER_M + STRAY * wave(x_m * 1.1 + across_m));
+    0.7 * band * band + 0.3 * wave(across_m * LINES_PER_M + x_m)
+}
+
+#[inline(always)]
+fn fabric([x_m, y_m, z_m]: [f32; 3]) -> f32 {
+    wave((x_m + z_m) * THREADS_PER_M) * wave((y_m + z_m) * THREADS_PER_M)
+}
+
+#[inline(always)]
+fn print([x_m, y_m, z_m]: [f32; 3]) -> f32 {
+    let line = z_m * TEXT_PER_M;
+    let word = wave((x_m + y_m) * WORDS_PER_M + WORD_STRAY * floor(line));
+    if wave(line) > TEXT_GAP && word > WORD_GAP { 1.0 } else { 0.0 }
+}
+
+/// Up and down between 0 and 1 with a period of 1.
+#[inline(always)]
+fn wave(value: f32) -> f32 {
+    1.0 - 2.0 * (value - rounded(value)).abs()
+}
+
+#[inline(always)]
+fn floor(value: f32) -> f32 {
+    rounded(value - 0.5)
+}
+
+/// The nearest whole number, if there are no more than four million: a sum has no digits left for parts.
+#[inline(always)]
+fn rounded(value: f32) -> f32 {
+    const NO_PARTS: f32 = (3 << 22) as f32;
+    (value + NO_PARTS) - NO_PARTS
+}
