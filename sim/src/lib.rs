@@ -32,6 +32,6 @@ pub use robot::{Robot, RobotCommand, RobotPlacement, RobotState};
 pub use sides::{Side, Sides};
 pub use units::{CONTROL_DT_S, CONTROL_HZ, GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL};
 pub use world::{
-    HandContacts, ObjectModel, ObjectPart, ObjectPlacement, ObjectState, ObjectStep, RobotStep, Scene,
+    HandContacts, ObjectModel, ObjectPart, ObjectPlacement, ObjectState, ObjectStep, RobotStep, SceneSource,
     Snapshot, Step, Touch, World, WorldSpec,
 };

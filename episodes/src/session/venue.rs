@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use tandem_sim::mjcf::{Document, Site};
 use tandem_sim::{
-    CONTROL_HZ, ObjectPlacement, Pose, RobotModel, RobotPlacement, Rotation, Scene, Step, Vector, World,
-    WorldSpec, assets,
+    CONTROL_HZ, ObjectPlacement, Pose, RobotModel, RobotPlacement, Rotation, SceneSource, Step, Vector,
+    World, WorldSpec, assets,
 };
 
 use crate::EpisodeError;
@@ -87,7 +87,7 @@ fn elsewhere(
         let seen = own.cameras.iter().filter(|camera| camera.name == THIRD_PERSON);
         document.cameras.extend(seen.map(|camera| camera.moved(&world_from_scene.inverse())));
     }
-    spec.scene = Scene::Read { document: Arc::new(document), world_from_scene };
+    spec.scene = SceneSource::Read { document: Arc::new(document), world_from_scene };
     Ok(spec)
 }
 

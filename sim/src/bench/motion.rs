@@ -4,9 +4,9 @@ use crate::Sides;
 use crate::body::{ARM_COLUMNS, ARM_JOINTS, MIRRORED_ARM, UPPER_JOINTS};
 
 /// SplitMix64: the same numbers everywhere.
-pub(super) struct Random(pub u64);
+pub(super) struct SplitMix64(pub u64);
 
-impl Random {
+impl SplitMix64 {
     /// Uniform between the two.
     pub(super) fn uniform(&mut self, [low, high]: [f32; 2]) -> f32 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -50,7 +50,7 @@ impl Wave {
 }
 
 impl ArmMotion {
-    pub(super) fn new(arms: Arms, random: &mut Random) -> ArmMotion {
+    pub(super) fn new(arms: Arms, random: &mut SplitMix64) -> ArmMotion {
         let amplitude_rad = if arms == Arms::Waving { [0.1, 0.35] } else { [0.0, 0.03] };
         let mut wave = || Wave {
             amplitude_rad: random.uniform(amplitude_rad),

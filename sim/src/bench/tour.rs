@@ -2,7 +2,7 @@
 
 use rapier3d::math::Vector;
 
-use super::motion::Random;
+use super::motion::SplitMix64;
 use crate::locomotion::{BaseCommand, BaseLimits};
 
 /// Parameters of a tour.
@@ -40,7 +40,7 @@ pub(super) struct Leg {
 }
 
 /// Legs of a seed.
-pub(super) fn legs(tour: &Tour, random: &mut Random) -> Vec<Leg> {
+pub(super) fn legs(tour: &Tour, random: &mut SplitMix64) -> Vec<Leg> {
     let reach_m = tour.leg_s * 0.25;
     let mut from_m = Vector::ZERO;
     (0..tour.waypoints)

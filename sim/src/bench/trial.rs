@@ -6,7 +6,7 @@ use rapier3d::math::Vector;
 
 use super::cases::{Case, Disturbance, Plan, STOP_S};
 use super::measure::{SETTLE_S, Sample, Trial, measure};
-use super::motion::{ArmMotion, Random};
+use super::motion::{ArmMotion, SplitMix64};
 use super::tour::{self, Leg};
 use crate::body::PALM_IN_WRIST_M;
 use crate::locomotion::plane::{heading_rad, wrapped_rad};
@@ -22,7 +22,7 @@ pub(super) fn run(case: &Case, seed: u64, locomotion: Box<dyn Locomotion>) -> Re
     let spec = WorldSpec { scene: "floor".into(), robots: vec![placement], objects: vec![] };
     let mut world = World::new(&spec)?;
     world.set_locomotion(0, locomotion);
-    let mut random = Random(seed);
+    let mut random = SplitMix64(seed);
     let arms = ArmMotion::new(case.arms, &mut random);
     let legs = if let Plan::Tour(tour) = &case.plan { tour::legs(tour, &mut random) } else { Vec::new() };
     let direction = pull_direction(&mut random);
@@ -117,7 +117,7 @@ fn disturb(case: &Case, world: &mut World, seed: u64, direction: Vector, legs: &
 }
 
 /// Any direction, no more than 45 degrees out of the horizontal.
-fn pull_direction(random: &mut Random) -> Vector {
+fn pull_direction(random: &mut SplitMix64) -> Vector {
     let (angle, rise) = (random.uniform([0.0, TAU]), random.uniform([-PI / 4.0, PI / 4.0]));
     Vector::new(angle.cos() * rise.cos(), angle.sin() * rise.cos(), rise.sin())
 }

@@ -11,13 +11,13 @@ pub(crate) mod posed;
 mod tests;
 mod whole_body;
 
-pub use drive::Drive;
+pub use drive::JointDrive;
 pub use inverse_dynamics::{Acceleration, Effort};
 pub use layout::{
     ARM_COLUMNS, ARM_JOINTS, HAND_COLUMNS, HAND_JOINTS, JOINTS, UPPER, UPPER_JOINTS, WAIST_COLUMN,
     joint_names,
 };
-pub use model::{HandLinks, JointModel, Link, RobotModel, SiteModel};
+pub use model::{HandLinks, JointModel, LinkModel, RobotModel, SiteModel};
 pub use whole_body::WholeBody;
 
 pub(crate) use layout::{ARMS, LEG_JOINTS, LEGS, MIRRORED_ARM, WAIST, WAIST_JOINTS, check_joint_order};

@@ -21,7 +21,7 @@ mod trees;
 
 pub use contacts::collider::{Collider, ColliderId};
 pub use contacts::friction::{Directions, Friction};
-pub use contacts::touch::Touch;
+pub use contacts::touch::ContactPoint;
 pub use error::{Diverged, OtherWorld, TreeError};
 pub use joints::equality::{Equality, EqualityId};
 pub use rapier3d::glamx::{DMat3, DPose3, DQuat, DVec3};
@@ -101,7 +101,7 @@ impl Dynamics {
     }
 
     /// All points of contact of the last step.
-    pub fn touches(&self) -> &[Touch] {
+    pub fn touches(&self) -> &[ContactPoint] {
         &self.solver.touches
     }
 

@@ -4,17 +4,17 @@ use serde::{Deserialize, Serialize};
 
 use super::Dynamics;
 use super::contacts::collision::Manifold;
-use super::contacts::touch::Touch;
+use super::contacts::touch::ContactPoint;
 use super::error::OtherWorld;
-use super::joints::equality::Memory;
+use super::joints::equality::EqualityState;
 use super::trees::state::TreeState;
 
 /// State of all trees, equalities and contacts, in full precision.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DynamicsState {
     pub(super) trees: Vec<TreeState>,
-    equalities: Vec<Memory>,
-    touches: Vec<Touch>,
+    equalities: Vec<EqualityState>,
+    touches: Vec<ContactPoint>,
     manifolds: Vec<Manifold>,
 }
 
@@ -22,8 +22,8 @@ pub struct DynamicsState {
 #[derive(Serialize)]
 struct Present<'a> {
     trees: Vec<TreeState>,
-    equalities: &'a [Memory],
-    touches: &'a [Touch],
+    equalities: &'a [EqualityState],
+    touches: &'a [ContactPoint],
     manifolds: &'a [Manifold],
 }
 

@@ -14,7 +14,7 @@ pub use choice::LocomotionChoice;
 use serde::{Deserialize, Serialize};
 
 use crate::Sides;
-use crate::body::{Drive, LEG_JOINTS, WAIST_JOINTS, WholeBody};
+use crate::body::{JointDrive, LEG_JOINTS, WAIST_JOINTS, WholeBody};
 
 /// What a policy asks of the base, in the robot's own heading frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -71,7 +71,7 @@ impl BaseLimits {
 }
 
 /// Drives of both legs, from the hip to the ankle.
-pub type LegCommand = Sides<[Drive; LEG_JOINTS]>;
+pub type LegCommand = Sides<[JointDrive; LEG_JOINTS]>;
 
 /// A base controller. It sees its own robot only, and acts through joint drives of legs and waist only.
 pub trait Locomotion: Send {

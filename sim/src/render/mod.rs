@@ -16,8 +16,8 @@ pub use png::{DEPTH_UNIT_M, PictureError, encode_depth_png, encode_png};
 pub use scene::accents::robot_rgba;
 pub use scene::camera::Camera;
 pub use scene::cameras::Cameras;
-pub use scene::mesh::{Mesh, Vertex};
-pub use scene::scenery::{Carrier, Part, Placed, Scenery};
+pub use scene::mesh::{TriangleMesh, Vertex};
+pub use scene::scenery::{Carrier, Part, PlacedScenery, Scenery};
 pub use shading::pattern::Pattern;
 
 use crate::Step;

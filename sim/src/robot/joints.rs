@@ -16,7 +16,7 @@ pub(super) fn torques_n_m(tree: &Tree, model: &RobotModel) -> [f32; JOINTS] {
     std::array::from_fn(|joint| tree.drive_effort(model.joints[joint].link) as f32)
 }
 
-pub(super) fn drive(tree: &mut Tree, model: &RobotModel, drives: &[body::Drive; JOINTS]) {
+pub(super) fn drive(tree: &mut Tree, model: &RobotModel, drives: &[JointDrive; JOINTS]) {
     for (joint, drive) in model.joints.iter().zip(drives) {
         let drive = Drive {
             target: f64::from(drive.target_rad),

@@ -19,7 +19,7 @@ pub use spawn::RobotPlacement;
 pub use state::RobotState;
 
 use crate::body::{
-    Drive, JOINTS, LEG_JOINTS, LEGS, RobotModel, UPPER, UPPER_JOINTS, WAIST, WAIST_COLUMN, WAIST_JOINTS,
+    JOINTS, JointDrive, LEG_JOINTS, LEGS, RobotModel, UPPER, UPPER_JOINTS, WAIST, WAIST_COLUMN, WAIST_JOINTS,
     WholeBody,
 };
 use crate::dynamics::{Dynamics, TreeId};
@@ -43,12 +43,12 @@ pub struct Robot {
     /// Its links are the model's.
     pub(crate) tree: TreeId,
     locomotion: Box<dyn Locomotion>,
-    memory: Memory,
+    memory: RobotMemory,
 }
 
 /// Everything of a robot that lives outside dynamics and outlasts a step.
 #[derive(Clone, Serialize, Deserialize)]
-struct Memory {
+struct RobotMemory {
     /// Upper-body targets at the last control step; within a step they move linearly to the new command.
     last_upper_rad: Vec<f32>,
     feeling: Feeling,
@@ -79,7 +79,7 @@ impl Robot {
         let load_n_m = self.feel(&body, &joints::torques_n_m(tree, &model));
         self.memory.odometry.update(&body, PHYSICS_DT_S);
         let legs = self.locomotion.tick(&body, &command.base, PHYSICS_DT_S);
-        let mut drives = [Drive::default(); JOINTS];
+        let mut drives = [JointDrive::default(); JOINTS];
         self.set_upper_body(&mut drives, &load_n_m, command, substep);
         set_legs(&mut drives, &legs);
         joints::drive(tree, &model, &drives);
@@ -99,7 +99,7 @@ impl Robot {
     /// the waist's targets.
     fn set_upper_body(
         &self,
-        drives: &mut [Drive; JOINTS],
+        drives: &mut [JointDrive; JOINTS],
         load_n_m: &[f32; JOINTS],
         command: &RobotCommand,
         substep: u32,
@@ -108,7 +108,7 @@ impl Robot {
         for (i, joint) in UPPER.into_iter().enumerate() {
             let model = &self.model.joints[joint];
             let (from, to) = (self.memory.last_upper_rad[i], command.upper_rad[i]);
-            drives[joint] = Drive {
+            drives[joint] = JointDrive {
                 target_rad: from + (to - from) * part,
                 kp_n_m_rad: model.kp_n_m_rad,
                 kd_n_m_s_rad: model.kd_n_m_s_rad,
@@ -139,14 +139,14 @@ impl Robot {
     }
 
     pub(crate) fn load(&mut self, bytes: &[u8]) -> Result<(), SimError> {
-        let (memory, locomotion): (Memory, Vec<u8>) = postcard::from_bytes(bytes)?;
+        let (memory, locomotion): (RobotMemory, Vec<u8>) = postcard::from_bytes(bytes)?;
         self.locomotion.load(&locomotion)?;
         self.memory = memory;
         Ok(())
     }
 }
 
-fn set_legs(drives: &mut [Drive; JOINTS], legs: &LegCommand) {
+fn set_legs(drives: &mut [JointDrive; JOINTS], legs: &LegCommand) {
     for (first, leg) in LEGS.into_iter().zip(legs.iter()) {
         drives[first..first + LEG_JOINTS].copy_from_slice(leg);
     }

@@ -6,7 +6,7 @@ use rapier3d::math::{Pose, Rotation, Vector};
 
 use super::feeling::Feeling;
 use super::odometry::Odometry;
-use super::{Memory, Robot};
+use super::{Robot, RobotMemory};
 use crate::SimError;
 use crate::body::{self, RobotModel, UPPER, check_joint_order};
 use crate::dynamics::{Axis, DVec3, Dynamics, Joint, Link, Mass, Tree};
@@ -49,7 +49,7 @@ impl Robot {
         for (a, b) in model.apart() {
             dynamics.keep_apart(tree.link(a), tree.link(b));
         }
-        let memory = Memory {
+        let memory = RobotMemory {
             last_upper_rad: UPPER.iter().map(|joint| q_rad[*joint]).collect(),
             feeling: Feeling::default(),
             odometry: Odometry::default(),
@@ -80,7 +80,7 @@ fn standing_pelvis(model: &RobotModel, placement: &RobotPlacement, q_rad: &[f32]
 }
 
 /// A link of the model with the joint that carries it; the first is free.
-fn tree_link(model: &RobotModel, link: &body::Link) -> Link {
+fn tree_link(model: &RobotModel, link: &body::LinkModel) -> Link {
     let joint = link.joint.map_or(Joint::Free, |joint| {
         let joint = &model.joints[joint];
         Joint::Hinge(Axis {

@@ -26,23 +26,23 @@ use objects::{Furniture, Object};
 /// Everything a world is made of.
 #[derive(Clone, Debug)]
 pub struct WorldSpec {
-    pub scene: Scene,
+    pub scene: SceneSource,
     pub robots: Vec<RobotPlacement>,
     pub objects: Vec<ObjectPlacement>,
 }
 
 /// Which room a world is in.
 #[derive(Clone, Debug)]
-pub enum Scene {
+pub enum SceneSource {
     /// One that the binary carries, by name.
     Embedded(String),
     /// One that was read, and where its own origin lies.
     Read { document: Arc<Document>, world_from_scene: Pose },
 }
 
-impl From<&str> for Scene {
-    fn from(name: &str) -> Scene {
-        Scene::Embedded(name.into())
+impl From<&str> for SceneSource {
+    fn from(name: &str) -> SceneSource {
+        SceneSource::Embedded(name.into())
     }
 }
 
@@ -71,8 +71,8 @@ impl World {
     /// As [`World::new`], of robots of another file.
     pub fn with_robot(spec: &WorldSpec, model: Arc<RobotModel>) -> Result<World, SimError> {
         let mut world = match &spec.scene {
-            Scene::Embedded(name) => World::of_scene(Document::parse(name, assets::scene(name)?)?)?,
-            Scene::Read { document, world_from_scene } => World::furnished(document, world_from_scene)?,
+            SceneSource::Embedded(name) => World::of_scene(Document::parse(name, assets::scene(name)?)?)?,
+            SceneSource::Read { document, world_from_scene } => World::furnished(document, world_from_scene)?,
         };
         let dynamics = &mut world.dynamics;
         for placement in &spec.objects {

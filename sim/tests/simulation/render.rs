@@ -2,13 +2,13 @@
 
 use std::f32::consts::{FRAC_PI_3, PI};
 
-use tandem_sim::render::{Camera, Carrier, Frame, Mesh, Part, Pattern, Scenery, cpu, encode_png};
+use tandem_sim::render::{Camera, Carrier, Frame, Part, Pattern, Scenery, TriangleMesh, cpu, encode_png};
 use tandem_sim::{ObjectState, ObjectStep, Pose, Rotation, Step, Vector};
 
 const GREY: [f32; 3] = [0.6, 0.6, 0.6];
 
 /// Parts around the origin that do not move; the first has id 1.
-fn scenery(parts: Vec<(Mesh, Pose)>) -> Scenery {
+fn scenery(parts: Vec<(TriangleMesh, Pose)>) -> Scenery {
     let part = |((mesh, carrier_from_mesh), id)| Part {
         mesh,
         carrier: Carrier::Room,
@@ -22,7 +22,7 @@ fn scenery(parts: Vec<(Mesh, Pose)>) -> Scenery {
 }
 
 /// A floor, and something that moves.
-fn floor_and(mesh: Mesh) -> Scenery {
+fn floor_and(mesh: TriangleMesh) -> Scenery {
     let mut scenery = scenery(vec![floor(), (mesh, Pose::IDENTITY)]);
     scenery.parts[1].carrier = Carrier::Object(0);
     scenery
@@ -43,8 +43,8 @@ fn at(x: f32, y: f32, z: f32) -> Pose {
     Pose::from_translation(Vector::new(x, y, z))
 }
 
-fn floor() -> (Mesh, Pose) {
-    (Mesh::plane([0.0, 0.0]), Pose::IDENTITY)
+fn floor() -> (TriangleMesh, Pose) {
+    (TriangleMesh::plane([0.0, 0.0]), Pose::IDENTITY)
 }
 
 fn camera(world_from_camera: Pose) -> Camera {
@@ -121,7 +121,7 @@ fn floor_depth_is_that_of_the_ray() {
 fn sphere_depth_is_that_of_the_ray() {
     let (radius_m, distance_m) = (0.1, 0.5);
     let compared = check_depth(
-        &scenery(vec![(Mesh::sphere(radius_m), at(0.0, 0.0, 0.0))]),
+        &scenery(vec![(TriangleMesh::sphere(radius_m), at(0.0, 0.0, 0.0))]),
         &overhead(distance_m),
         0.008,
         |ray| {
@@ -136,7 +136,7 @@ fn sphere_depth_is_that_of_the_ray() {
 
 #[test]
 fn what_nothing_covers_is_infinitely_far() {
-    let frame = render(&scenery(vec![(Mesh::sphere(0.1), at(0.0, 0.0, 5.0))]), &overhead(1.0));
+    let frame = render(&scenery(vec![(TriangleMesh::sphere(0.1), at(0.0, 0.0, 5.0))]), &overhead(1.0));
     assert!(frame.depth_m.iter().all(|depth_m| *depth_m == f32::INFINITY));
     assert!(frame.ids.iter().all(|id| *id == 0));
 }
@@ -168,8 +168,8 @@ fn ids_name_the_nearest_thing() {
     let frame = render(
         &scenery(vec![
             floor(),
-            (Mesh::cuboid(Vector::splat(0.1)), at(0.3, 0.0, 0.1)),
-            (Mesh::sphere(0.05), at(0.3, 0.0, 0.5)),
+            (TriangleMesh::cuboid(Vector::splat(0.1)), at(0.3, 0.0, 0.1)),
+            (TriangleMesh::sphere(0.05), at(0.3, 0.0, 0.5)),
         ]),
         &camera,
     );
@@ -192,7 +192,11 @@ fn neighbouring_triangles_leave_no_gap() {
     for step in 0..24 {
         let rotation =
             Rotation::from_rotation_x(0.37 * step as f32) * Rotation::from_rotation_z(0.61 * step as f32);
-        for mesh in [Mesh::sphere(0.3), Mesh::cuboid(Vector::splat(0.3)), Mesh::cylinder(0.3, 0.3)] {
+        for mesh in [
+            TriangleMesh::sphere(0.3),
+            TriangleMesh::cuboid(Vector::splat(0.3)),
+            TriangleMesh::cylinder(0.3, 0.3),
+        ] {
             let shape = (mesh, Pose::from_parts(Vector::new(0.0, 0.0, 0.5), rotation));
             let camera = overhead(1.2);
             let frame = render(&scenery(vec![floor(), shape]), &camera);
@@ -213,7 +217,7 @@ fn a_thing_in_the_sun_darkens_the_floor() {
     let camera = overhead(2.0);
     let block_at = |x: f32, z: f32| step(&[at(x, 0.0, z)]);
     // One renderer for all three pictures: shadows must follow the step. The first block is below the floor.
-    let mut renderer = cpu(floor_and(Mesh::cuboid(Vector::splat(0.05))));
+    let mut renderer = cpu(floor_and(TriangleMesh::cuboid(Vector::splat(0.05))));
     let empty = renderer.render(&block_at(0.0, -5.0), &camera);
     let left = renderer.render(&block_at(-0.3, 0.3), &camera);
     let right = renderer.render(&block_at(0.3, 0.3), &camera);
@@ -231,7 +235,7 @@ fn fingers_cast_shadows() {
     // 16 mm thick and 40 mm above a counter, as a finger over a table.
     let camera = overhead(1.0);
     let finger = (
-        Mesh::capsule(0.008, 0.04),
+        TriangleMesh::capsule(0.008, 0.04),
         Pose::from_parts(Vector::new(0.0, 0.0, 0.04), Rotation::from_rotation_y(PI / 2.0)),
     );
     let pixel = pixel_at(&camera, Vector::new(0.014, -0.016, 0.0));
@@ -248,7 +252,7 @@ fn fingers_cast_shadows() {
 #[test]
 fn what_stands_darkens_the_floor_beside_it_and_what_hovers_leaves_it_bright() {
     let camera = look_at(Vector::new(-0.4, 0.0, 0.3), Vector::ZERO);
-    let mut renderer = cpu(floor_and(Mesh::cuboid(Vector::new(0.05, 0.05, 0.005))));
+    let mut renderer = cpu(floor_and(TriangleMesh::cuboid(Vector::new(0.05, 0.05, 0.005))));
     // Of the floor on the side that the sun shines on.
     let mut brightness = |height_m: f32, x: f32| {
         let frame = renderer.render(&step(&[at(0.0, 0.0, height_m)]), &camera);
@@ -265,7 +269,7 @@ fn what_stands_darkens_the_floor_beside_it_and_what_hovers_leaves_it_bright() {
 #[test]
 fn textures_darken_parts_of_a_surface_and_leave_depth_and_ids_as_they_are() {
     let camera = overhead(1.5);
-    let mut scenery = scenery(vec![(Mesh::cuboid(Vector::new(1.0, 0.5, 0.01)), Pose::IDENTITY)]);
+    let mut scenery = scenery(vec![(TriangleMesh::cuboid(Vector::new(1.0, 0.5, 0.01)), Pose::IDENTITY)]);
     let plain = render(&scenery, &camera);
     for pattern in [Pattern::of("oak_dark"), Pattern::of("velvet"), Pattern::Checker([0.1, 0.1, 0.1])] {
         scenery.parts[0].pattern = pattern;
@@ -286,7 +290,8 @@ fn an_edge_is_the_mean_of_both_sides_in_linear_light() {
     // A wall whose edge runs through the middle of the picture's column 80, half a pixel to the right.
     let camera = overhead(1.0);
     let half_pixel_m = 0.5 / camera.focal_px();
-    let frame = render(&scenery(vec![(Mesh::plane([1.0, 1.0]), at(-1.0 + half_pixel_m, 0.0, 0.0))]), &camera);
+    let frame =
+        render(&scenery(vec![(TriangleMesh::plane([1.0, 1.0]), at(-1.0 + half_pixel_m, 0.0, 0.0))]), &camera);
     let row = 60 * camera.width as usize;
     let linear = |value: u8| ((f32::from(value) / 255.0 + 0.055) / 1.055).powf(2.4);
     let [wall, edge, sky] = [79, 80, 81].map(|column| rgb(&frame, row + column).map(linear));
@@ -299,7 +304,7 @@ fn an_edge_is_the_mean_of_both_sides_in_linear_light() {
 #[test]
 fn things_at_different_depths_are_outlined() {
     let camera = overhead(1.0);
-    let mut scenery = scenery(vec![floor(), (Mesh::plane([0.2, 0.2]), at(0.0, 0.0, 0.3))]);
+    let mut scenery = scenery(vec![floor(), (TriangleMesh::plane([0.2, 0.2]), at(0.0, 0.0, 0.3))]);
     let darkest = |scenery: &Scenery| {
         let frame = render(scenery, &camera);
         let row = 60 * camera.width as usize;
@@ -313,7 +318,7 @@ fn things_at_different_depths_are_outlined() {
 #[test]
 fn the_same_step_gives_the_same_bits() {
     let camera = look_at(Vector::new(0.8, -1.2, 1.0), Vector::ZERO);
-    let scenery = floor_and(Mesh::capsule(0.1, 0.2));
+    let scenery = floor_and(TriangleMesh::capsule(0.1, 0.2));
     let (first, other) = (step(&[at(0.0, 0.0, 0.3)]), step(&[at(0.1, 0.0, 0.3)]));
     let mut renderer = cpu(scenery.clone());
     let before = renderer.render(&first, &camera);
@@ -330,12 +335,12 @@ fn meshes_have_the_volume_of_their_shapes_and_normals_that_point_out() {
     let tetrahedron = [Vector::ZERO, Vector::X, Vector::Y, Vector::Z];
     let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
     for (name, mesh, volume_m3, tolerance) in [
-        ("sphere", Mesh::sphere(0.1), 4.0 / 3.0 * PI * 1e-3, ball),
-        ("capsule", Mesh::capsule(0.1, 0.3), 4.0 / 3.0 * PI * 1e-3 + PI * 1e-2 * 0.6, ball),
-        ("ellipsoid", Mesh::ellipsoid(Vector::new(0.1, 0.2, 0.3)), 4.0 / 3.0 * PI * 6e-3, ball),
-        ("cylinder", Mesh::cylinder(0.1, 0.3), PI * 1e-2 * 0.6, round),
-        ("box", Mesh::cuboid(Vector::new(0.1, 0.2, 0.3)), 0.2 * 0.4 * 0.6, 1e-5),
-        ("tetrahedron", Mesh::faceted(&tetrahedron, &faces), 1.0 / 6.0, 1e-5),
+        ("sphere", TriangleMesh::sphere(0.1), 4.0 / 3.0 * PI * 1e-3, ball),
+        ("capsule", TriangleMesh::capsule(0.1, 0.3), 4.0 / 3.0 * PI * 1e-3 + PI * 1e-2 * 0.6, ball),
+        ("ellipsoid", TriangleMesh::ellipsoid(Vector::new(0.1, 0.2, 0.3)), 4.0 / 3.0 * PI * 6e-3, ball),
+        ("cylinder", TriangleMesh::cylinder(0.1, 0.3), PI * 1e-2 * 0.6, round),
+        ("box", TriangleMesh::cuboid(Vector::new(0.1, 0.2, 0.3)), 0.2 * 0.4 * 0.6, 1e-5),
+        ("tetrahedron", TriangleMesh::faceted(&tetrahedron, &faces), 1.0 / 6.0, 1e-5),
     ] {
         let mut sum_m3 = 0.0;
         for triangle in &mesh.triangles {
@@ -354,7 +359,8 @@ fn meshes_have_the_volume_of_their_shapes_and_normals_that_point_out() {
 
 #[test]
 fn png_keeps_every_byte() {
-    let frame = render(&scenery(vec![floor(), (Mesh::sphere(0.2), at(0.0, 0.0, 0.2))]), &overhead(1.0));
+    let frame =
+        render(&scenery(vec![floor(), (TriangleMesh::sphere(0.2), at(0.0, 0.0, 0.2))]), &overhead(1.0));
     let png = encode_png(frame.width, frame.height, &frame.rgb).expect("the size fits");
     let decoded = image::load_from_memory(&png).expect("it is a PNG file").into_rgb8();
     assert_eq!((decoded.width(), decoded.height()), (frame.width, frame.height));

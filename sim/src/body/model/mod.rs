@@ -12,7 +12,7 @@ use crate::mjcf::{Geom, MjcfCamera};
 
 /// One rigid link. Bodies without a joint are merged into their parent's link.
 #[derive(Clone, Debug)]
-pub struct Link {
+pub struct LinkModel {
     pub name: String,
     pub parent: Option<usize>,
     /// Joint origin in the parent link's frame, at joint coordinate 0.
@@ -52,7 +52,7 @@ pub struct SiteModel {
 #[derive(Clone, Debug)]
 pub struct RobotModel {
     /// Parents before children; 0 is the pelvis.
-    pub links: Vec<Link>,
+    pub links: Vec<LinkModel>,
     /// Published order: the file's actuators.
     pub joints: Vec<JointModel>,
     /// Where tasks put a hand.

@@ -6,7 +6,7 @@ use mjcf_rs::body::{Body, Joint, JointType};
 use rapier3d::math::Pose;
 use rapier3d::prelude::MassProperties;
 
-use super::{HandLinks, JointModel, Link, RobotModel, SiteModel};
+use super::{HandLinks, JointModel, LinkModel, RobotModel, SiteModel};
 use crate::mjcf::{Document, MjcfCamera, mass_properties, pose, vector};
 use crate::{Side, Sides, SimError};
 
@@ -43,7 +43,7 @@ impl RobotModel {
 /// What has been read of a file's bodies.
 struct Tree<'a> {
     document: &'a Document,
-    links: Vec<Link>,
+    links: Vec<LinkModel>,
     joints: Vec<JointModel>,
     sites: HashMap<String, SiteModel>,
     /// By the body's number in the file.
@@ -173,9 +173,9 @@ impl<'a> Tree<'a> {
     }
 }
 
-fn new_link(name: &str, parent: Option<usize>, parent_from_link: Pose, joint: Option<usize>) -> Link {
+fn new_link(name: &str, parent: Option<usize>, parent_from_link: Pose, joint: Option<usize>) -> LinkModel {
     let mass = MassProperties::default();
-    Link { name: name.into(), parent, parent_from_link, joint, mass, geoms: Vec::new() }
+    LinkModel { name: name.into(), parent, parent_from_link, joint, mass, geoms: Vec::new() }
 }
 
 fn find_camera(document: &Document) -> Result<MjcfCamera, SimError> {

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::collider::{Collider, ColliderId, Surface};
 use super::friction::Friction;
 use super::near::Near;
-use super::touch::{Candidate, Impulses, Touch};
+use super::touch::{Candidate, ContactPoint, Impulses};
 use crate::dynamics::DVec3;
 use crate::dynamics::settings::Settings;
 use crate::dynamics::trees::{LinkId, Trees};
@@ -154,7 +154,7 @@ impl Between<'_> {
             if gap_m + (parting_m_s - self.settings.margin_m_s) * self.settings.dt_s > 0.0 {
                 continue;
             }
-            let touch = Touch {
+            let touch = ContactPoint {
                 colliders: self.colliders,
                 number,
                 point_m,

@@ -7,10 +7,10 @@
 //! cone friction stops what moves; on its surface it dissipates most, f_c ~ -mu_c^2 v_c: no direction is preferred.
 
 use crate::dynamics::settings::Pass;
-use crate::dynamics::trees::rows::Rows;
+use crate::dynamics::trees::rows::ConstraintRows;
 
 pub struct Contacts<const N: usize> {
-    pub rows: Rows<N>,
+    pub rows: ConstraintRows<N>,
     pub all: Vec<Contact<N>>,
 }
 
@@ -34,7 +34,7 @@ pub struct Contact<const N: usize> {
     /// Y Y^T, the inverses of its diagonal, and of its blocks over the tangents and over the rolls.
     inverse_mass: [[f64; N]; N],
     mass: [f64; N],
-    pair_mass: [Block; 2],
+    pair_mass: [Symmetric2; 2],
     /// s mu_c^2, with s below the inverse of the largest eigenvalue of  diag(mu) A diag(mu)  over the friction lanes.
     slide_gain: [f64; N],
     pub impulse: [f64; N],
@@ -42,7 +42,7 @@ pub struct Contact<const N: usize> {
 
 impl<const N: usize> Default for Contacts<N> {
     fn default() -> Self {
-        Contacts { rows: Rows::default(), all: Vec::new() }
+        Contacts { rows: ConstraintRows::default(), all: Vec::new() }
     }
 }
 
@@ -69,7 +69,7 @@ impl<const N: usize> Contacts<N> {
             firmness: 1.0 / (1.0 + terms.softness),
             inverse_friction: mu.map(|mu| if mu > 0.0 { 1.0 / mu } else { 0.0 }),
             mass: std::array::from_fn(|lane| inverse(inverse_mass[lane][lane])),
-            pair_mass: [1, 4].map(|lane| Block::inverse_of(&inverse_mass, lane)),
+            pair_mass: [1, 4].map(|lane| Symmetric2::inverse_of(&inverse_mass, lane)),
             inverse_mass,
             slide_gain: mu.map(|mu| step * mu * mu),
             impulse: terms.impulse,
@@ -175,7 +175,7 @@ impl<const N: usize> Contact<N> {
 
     /// Solves for two lanes together.
     #[inline]
-    fn stop_pair(&self, lane: usize, mass: &Block, v: &[f64; N], impulse: &mut [f64; N]) {
+    fn stop_pair(&self, lane: usize, mass: &Symmetric2, v: &[f64; N], impulse: &mut [f64; N]) {
         if self.inverse_friction[lane] == 0.0 {
             (impulse[lane], impulse[lane + 1]) = (0.0, 0.0);
             return;
@@ -187,25 +187,25 @@ impl<const N: usize> Contact<N> {
 
 /// Symmetric 2 x 2 matrix.
 #[derive(Default)]
-struct Block {
+struct Symmetric2 {
     first: f64,
     across: f64,
     second: f64,
 }
 
-impl Block {
+impl Symmetric2 {
     /// Inverse of the block of two lanes that begins at `lane`, if there is one. Of two that are not independent each is taken
     /// by itself and does half.
-    fn inverse_of<const N: usize>(a: &[[f64; N]; N], lane: usize) -> Block {
+    fn inverse_of<const N: usize>(a: &[[f64; N]; N], lane: usize) -> Symmetric2 {
         if lane + 1 >= N {
-            return Block::default();
+            return Symmetric2::default();
         }
         let (p, q, r) = (a[lane][lane], a[lane][lane + 1], a[lane + 1][lane + 1]);
         let determinant = p * r - q * q;
         if determinant > DEPENDENT * p * r {
-            Block { first: r / determinant, across: -q / determinant, second: p / determinant }
+            Symmetric2 { first: r / determinant, across: -q / determinant, second: p / determinant }
         } else {
-            Block { first: 0.5 * inverse(p), across: 0.0, second: 0.5 * inverse(r) }
+            Symmetric2 { first: 0.5 * inverse(p), across: 0.0, second: 0.5 * inverse(r) }
         }
     }
 }

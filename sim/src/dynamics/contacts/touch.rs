@@ -9,7 +9,7 @@ use crate::dynamics::trees::LinkId;
 
 /// A point at which two colliders touched in the last step.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct Touch {
+pub struct ContactPoint {
     /// The one that was added earlier first.
     pub colliders: [ColliderId; 2],
     /// World frame, midway between the surfaces.
@@ -55,7 +55,7 @@ impl Impulses {
 /// A touch on its way through a step.
 #[derive(Clone, Copy)]
 pub struct Candidate {
-    pub touch: Touch,
+    pub touch: ContactPoint,
     pub bodies: [Option<LinkId>; 2],
     pub friction: Friction,
     /// Normal and two tangents, world frame.
@@ -63,8 +63,8 @@ pub struct Candidate {
 }
 
 /// The touch of the last step that this one continues, among those of the same pair: the nearest on either surface.
-pub fn continued(touch: &Touch, before: &[Touch], match_m: f64) -> Option<Impulses> {
-    let away = |old: &Touch| {
+pub fn continued(touch: &ContactPoint, before: &[ContactPoint], match_m: f64) -> Option<Impulses> {
+    let away = |old: &ContactPoint| {
         let on = |side: usize| old.local_m[side].distance_squared(touch.local_m[side]);
         on(0).min(on(1))
     };

@@ -2,12 +2,12 @@
 
 use super::drive::Law;
 use crate::dynamics::settings::{Pass, Settings};
-use crate::dynamics::trees::rows::Rows;
+use crate::dynamics::trees::rows::ConstraintRows;
 use crate::dynamics::trees::tree::Tree;
 
 #[derive(Default)]
 pub struct JointRows {
-    rows: Rows<1>,
+    rows: ConstraintRows<1>,
     all: Vec<JointRow>,
 }
 

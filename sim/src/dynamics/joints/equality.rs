@@ -4,8 +4,8 @@ use rapier3d::glamx::{DMat3, DPose3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::dynamics::settings::{Pass, Settings};
-use crate::dynamics::trees::rows::Rows;
-use crate::dynamics::trees::spatial::Force;
+use crate::dynamics::trees::rows::ConstraintRows;
+use crate::dynamics::trees::spatial::ForceVector;
 use crate::dynamics::trees::{LinkId, Trees};
 
 #[derive(Clone, Debug)]
@@ -23,7 +23,7 @@ pub struct EqualityId(pub(in crate::dynamics) usize);
 
 /// What of an equality outlasts a step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Memory {
+pub struct EqualityState {
     pub active: bool,
     /// Impulses of its rows in the last step.
     impulse: [DVec3; 2],
@@ -32,8 +32,8 @@ pub struct Memory {
 #[derive(Default)]
 pub struct Equalities {
     pub all: Vec<Equality>,
-    pub memory: Vec<Memory>,
-    rows: Rows<3>,
+    pub memory: Vec<EqualityState>,
+    rows: ConstraintRows<3>,
     blocks: Vec<Block>,
 }
 
@@ -56,13 +56,13 @@ const REGULARISATION: f64 = 1e-9;
 impl Equalities {
     pub fn push(&mut self, equality: Equality, active: bool) -> EqualityId {
         self.all.push(equality);
-        self.memory.push(Memory { active, impulse: [DVec3::ZERO; 2] });
+        self.memory.push(EqualityState { active, impulse: [DVec3::ZERO; 2] });
         EqualityId(self.all.len() - 1)
     }
 
     pub fn set_active(&mut self, id: EqualityId, active: bool) {
         if self.memory[id.0].active != active {
-            self.memory[id.0] = Memory { active, impulse: [DVec3::ZERO; 2] };
+            self.memory[id.0] = EqualityState { active, impulse: [DVec3::ZERO; 2] };
         }
     }
 
@@ -87,7 +87,7 @@ impl Equalities {
                     let ends = [wanted.translation, is.translation];
                     self.hold_point(trees, index, [Some(a), b], ends, settings);
                     let error = (is.rotation * wanted.rotation.inverse()).to_scaled_axis();
-                    trees.push_rows(&mut self.rows, [Some(a), b], |_| DVec3::AXES.map(Force::moment));
+                    trees.push_rows(&mut self.rows, [Some(a), b], |_| DVec3::AXES.map(ForceVector::moment));
                     self.close(index, 1, error, settings);
                 }
             }
@@ -103,7 +103,7 @@ impl Equalities {
         settings: &Settings,
     ) {
         let middle_m = (ends_m[0] + ends_m[1]) * 0.5;
-        let at = |reference_m| DVec3::AXES.map(|axis| Force::at(middle_m - reference_m, axis));
+        let at = |reference_m| DVec3::AXES.map(|axis| ForceVector::at(middle_m - reference_m, axis));
         trees.push_rows(&mut self.rows, bodies, at);
         self.close(index, 0, ends_m[1] - ends_m[0], settings);
     }
@@ -117,7 +117,7 @@ impl Equalities {
         polynomial: &[f64; 5],
     ) -> f64 {
         let start = self.rows.column.len();
-        let push = |rows: &mut Rows<3>, id: LinkId, scale: f64| {
+        let push = |rows: &mut ConstraintRows<3>, id: LinkId, scale: f64| {
             let tree = &trees.all[id.tree.index()];
             let dof = tree.layout.first_dof[id.link];
             rows.push_dof(tree, trees.offset[id.tree.index()], dof, [scale, 0.0, 0.0]);

@@ -2,12 +2,12 @@
 
 use crate::dynamics::contacts::contact::{Contact, Contacts, Terms};
 use crate::dynamics::contacts::friction::Directions;
-use crate::dynamics::contacts::touch::{Candidate, Impulses, Touch, continued};
+use crate::dynamics::contacts::touch::{Candidate, ContactPoint, Impulses, continued};
 use crate::dynamics::joints::bounds::JointRows;
 use crate::dynamics::joints::equality::Equalities;
 use crate::dynamics::settings::{Pass, Settings};
 use crate::dynamics::trees::Trees;
-use crate::dynamics::trees::spatial::Force;
+use crate::dynamics::trees::spatial::ForceVector;
 
 #[derive(Default)]
 pub struct Solver {
@@ -19,9 +19,9 @@ pub struct Solver {
     plain: Contacts<4>,
     rolling: Contacts<6>,
     /// Of the last step, in the order of their colliders.
-    pub touches: Vec<Touch>,
+    pub touches: Vec<ContactPoint>,
     /// Of this step; [`Solver::commit`] makes them those of the last.
-    found: Vec<Touch>,
+    found: Vec<ContactPoint>,
 }
 
 impl Solver {
@@ -40,7 +40,7 @@ impl Solver {
             while self.touches.get(before).is_some_and(|old| old.colliders < touch.colliders) {
                 before += 1;
             }
-            let of_pair = |old: &&Touch| old.colliders == touch.colliders;
+            let of_pair = |old: &&ContactPoint| old.colliders == touch.colliders;
             let same = self.touches[before..].iter().take_while(of_pair).count();
             let old = continued(touch, &self.touches[before..before + same], settings.match_m);
             let impulse = old.unwrap_or_default().lanes(candidate.directions);
@@ -68,7 +68,7 @@ impl Solver {
         for candidate in candidates {
             let lanes = next_impulse(candidate, &mut plain, &mut rolling);
             let memory = Impulses::of_lanes(lanes, candidate.directions);
-            self.found.push(Touch { memory, ..candidate.touch });
+            self.found.push(ContactPoint { memory, ..candidate.touch });
         }
     }
 
@@ -111,8 +111,15 @@ fn push<const N: usize>(
     let [normal, t1, t2] = candidate.directions;
     let point_m = candidate.touch.point_m;
     trees.push_rows(&mut contacts.rows, candidate.bodies, |reference_m| {
-        let at = |direction| Force::at(point_m - reference_m, direction);
-        let lanes = [at(normal), at(t1), at(t2), Force::moment(normal), Force::moment(t1), Force::moment(t2)];
+        let at = |direction| ForceVector::at(point_m - reference_m, direction);
+        let lanes = [
+            at(normal),
+            at(t1),
+            at(t2),
+            ForceVector::moment(normal),
+            ForceVector::moment(t1),
+            ForceVector::moment(t2),
+        ];
         std::array::from_fn(|lane| lanes[lane])
     });
     let grounded = candidate.bodies.iter().any(|body| body.is_none());

@@ -2,7 +2,7 @@
 
 use crate::dynamics::Dynamics;
 use crate::dynamics::error::Diverged;
-use crate::dynamics::trees::spatial::Force;
+use crate::dynamics::trees::spatial::ForceVector;
 use crate::dynamics::trees::tree::Tree;
 
 impl Dynamics {
@@ -15,7 +15,7 @@ impl Dynamics {
         while self.bound_more() {
             self.solve();
         }
-        self.trees.all.iter_mut().for_each(|tree| tree.external.fill(Force::default()));
+        self.trees.all.iter_mut().for_each(|tree| tree.external.fill(ForceVector::default()));
         self.check()?;
         self.solver.commit(&mut self.trees, self.settings.dt_s);
         self.collision.commit();

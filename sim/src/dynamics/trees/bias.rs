@@ -7,7 +7,7 @@
 use rapier3d::glamx::DVec3;
 
 use super::link::Joint;
-use super::spatial::{Force, Inertia, Motion, Symmetric};
+use super::spatial::{ForceVector, Inertia, MotionVector, Symmetric};
 use super::tree::Tree;
 
 impl Tree {
@@ -28,7 +28,7 @@ impl Tree {
                 inertia.mul(acceleration) + velocity.cross_force(inertia.mul(velocity)) - self.external[i];
         }
         for i in (0..count).rev() {
-            let force: Force = self.force[i];
+            let force: ForceVector = self.force[i];
             let dof = self.layout.first_dof[i];
             for k in dof..dof + self.links[i].joint.dofs() {
                 self.rhs[k] = -self.axis[k].dot(force);
@@ -40,8 +40,8 @@ impl Tree {
     }
 
     /// a_p + v_p x S q', the acceleration with q'' = 0. Gravity is an acceleration of the world upwards.
-    fn velocity_product(&self, i: usize, gravity_m_s2: DVec3) -> Motion {
-        let lifted = Motion { angular: DVec3::ZERO, linear: -gravity_m_s2 };
+    fn velocity_product(&self, i: usize, gravity_m_s2: DVec3) -> MotionVector {
+        let lifted = MotionVector { angular: DVec3::ZERO, linear: -gravity_m_s2 };
         let velocity = self.velocity[i];
         match self.links[i].parent {
             Some(parent) => {
@@ -50,7 +50,8 @@ impl Tree {
             }
             // The velocity of a free joint is that of a point that moves, the spatial one that of where it passes.
             None if matches!(self.links[i].joint, Joint::Free) => {
-                lifted - Motion { angular: DVec3::ZERO, linear: velocity.angular.cross(velocity.linear) }
+                lifted
+                    - MotionVector { angular: DVec3::ZERO, linear: velocity.angular.cross(velocity.linear) }
             }
             None => lifted,
         }

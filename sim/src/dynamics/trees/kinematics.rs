@@ -3,7 +3,7 @@
 use rapier3d::glamx::{DMat3, DPose3, DQuat, DVec3};
 
 use super::link::Joint;
-use super::spatial::{Motion, turned};
+use super::spatial::{MotionVector, turned};
 use super::tree::Tree;
 
 impl Tree {
@@ -30,21 +30,21 @@ impl Tree {
                 Joint::Fixed => (rotation, origin_m),
                 Joint::Free => {
                     for (c, unit) in DVec3::AXES.into_iter().enumerate() {
-                        self.axis[dof + c] = Motion { angular: DVec3::ZERO, linear: unit };
-                        self.axis[dof + 3 + c] = Motion { angular: unit, linear: DVec3::ZERO };
+                        self.axis[dof + c] = MotionVector { angular: DVec3::ZERO, linear: unit };
+                        self.axis[dof + 3 + c] = MotionVector { angular: unit, linear: DVec3::ZERO };
                     }
                     (rotation, origin_m)
                 }
                 Joint::Hinge(axis) => {
                     let angular = rotation * axis.direction;
                     let through_m = origin_m + rotation * axis.anchor_m;
-                    self.axis[dof] = Motion { angular, linear: through_m.cross(angular) };
+                    self.axis[dof] = MotionVector { angular, linear: through_m.cross(angular) };
                     let rotation = rotation * DMat3::from_axis_angle(axis.direction, self.q[i]);
                     (rotation, through_m - rotation * axis.anchor_m)
                 }
                 Joint::Slide(axis) => {
                     let linear = rotation * axis.direction;
-                    self.axis[dof] = Motion { angular: DVec3::ZERO, linear };
+                    self.axis[dof] = MotionVector { angular: DVec3::ZERO, linear };
                     (rotation, origin_m + linear * self.q[i])
                 }
             };
@@ -56,7 +56,7 @@ impl Tree {
     pub(in crate::dynamics) fn velocities(&mut self) {
         for (i, link) in self.links.iter().enumerate() {
             let dof = self.layout.first_dof[i];
-            let mut velocity = link.parent.map_or(Motion::default(), |parent| self.velocity[parent]);
+            let mut velocity = link.parent.map_or(MotionVector::default(), |parent| self.velocity[parent]);
             for k in dof..dof + link.joint.dofs() {
                 velocity += self.axis[k] * self.v[k];
             }

@@ -16,8 +16,8 @@ mod whiten;
 use rapier3d::glamx::{DPose3, DVec3};
 use serde::{Deserialize, Serialize};
 
-use rows::Rows;
-use spatial::Force;
+use rows::ConstraintRows;
+use spatial::ForceVector;
 use tree::Tree;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -86,9 +86,9 @@ impl Trees {
     /// `None` is the world. `wrenches` gets the tree's reference point.
     pub fn push_rows<const N: usize>(
         &self,
-        rows: &mut Rows<N>,
+        rows: &mut ConstraintRows<N>,
         bodies: [Option<LinkId>; 2],
-        wrenches: impl Fn(DVec3) -> [Force; N],
+        wrenches: impl Fn(DVec3) -> [ForceVector; N],
     ) {
         let start = rows.column.len();
         let mut second = start;

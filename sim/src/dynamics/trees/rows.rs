@@ -1,10 +1,10 @@
 //! Sparse whitened rows of constraints.
 
-use super::spatial::Force;
+use super::spatial::ForceVector;
 use super::tree::Tree;
 
 /// Groups of N rows that share their columns: of each group the columns that are not zero, and in them Y (see `factor`).
-pub struct Rows<const N: usize> {
+pub struct ConstraintRows<const N: usize> {
     pub y: Vec<[f64; N]>,
     pub column: Vec<u16>,
     /// Where each group begins, and the end of the last.
@@ -14,13 +14,13 @@ pub struct Rows<const N: usize> {
 /// Sums that grow side by side: an addition waits for the one before it.
 const CHAINS: usize = 4;
 
-impl<const N: usize> Default for Rows<N> {
+impl<const N: usize> Default for ConstraintRows<N> {
     fn default() -> Self {
-        Rows { y: Vec::new(), column: Vec::new(), start: vec![0] }
+        ConstraintRows { y: Vec::new(), column: Vec::new(), start: vec![0] }
     }
 }
 
-impl<const N: usize> Rows<N> {
+impl<const N: usize> ConstraintRows<N> {
     pub fn clear(&mut self) {
         self.y.clear();
         self.column.clear();
@@ -34,7 +34,7 @@ impl<const N: usize> Rows<N> {
     }
 
     /// Appends what wrenches about the tree's reference do on a link: J^T = S . wrench along the path, then whitened.
-    pub fn push_link(&mut self, tree: &Tree, offset: usize, link: usize, wrenches: &[Force; N]) {
+    pub fn push_link(&mut self, tree: &Tree, offset: usize, link: usize, wrenches: &[ForceVector; N]) {
         let Some(last) = tree.layout.last_dof[link] else { return };
         let first = self.y.len();
         for k in tree.layout.path(last) {

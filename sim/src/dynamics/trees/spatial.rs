@@ -9,23 +9,23 @@ use rapier3d::math::Pose;
 
 /// Velocity, acceleration or joint axis: `angular` [rad/s], `linear` [m/s] of the point at the reference.
 #[derive(Clone, Copy, Default, Debug)]
-pub struct Motion {
+pub struct MotionVector {
     pub angular: DVec3,
     pub linear: DVec3,
 }
 
 /// Force or momentum: `linear` [N] and the moment `angular` [N m] about the reference.
 #[derive(Clone, Copy, Default, Debug)]
-pub struct Force {
+pub struct ForceVector {
     pub angular: DVec3,
     pub linear: DVec3,
 }
 
-impl Motion {
+impl MotionVector {
     /// v x m, the rate of a motion vector that is carried along by v.
     #[inline]
-    pub fn cross(self, m: Motion) -> Motion {
-        Motion {
+    pub fn cross(self, m: MotionVector) -> MotionVector {
+        MotionVector {
             angular: self.angular.cross(m.angular),
             linear: self.angular.cross(m.linear) + self.linear.cross(m.angular),
         }
@@ -33,15 +33,15 @@ impl Motion {
 
     /// v x* f, the rate of a force vector that is carried along by v.
     #[inline]
-    pub fn cross_force(self, f: Force) -> Force {
-        Force {
+    pub fn cross_force(self, f: ForceVector) -> ForceVector {
+        ForceVector {
             angular: self.angular.cross(f.angular) + self.linear.cross(f.linear),
             linear: self.angular.cross(f.linear),
         }
     }
 
     #[inline]
-    pub fn dot(self, f: Force) -> f64 {
+    pub fn dot(self, f: ForceVector) -> f64 {
         self.angular.dot(f.angular) + self.linear.dot(f.linear)
     }
 
@@ -52,15 +52,15 @@ impl Motion {
     }
 }
 
-impl Force {
+impl ForceVector {
     /// A force that acts at a point given relative to the reference.
     #[inline]
-    pub fn at(point_m: DVec3, force_n: DVec3) -> Force {
-        Force { angular: point_m.cross(force_n), linear: force_n }
+    pub fn at(point_m: DVec3, force_n: DVec3) -> ForceVector {
+        ForceVector { angular: point_m.cross(force_n), linear: force_n }
     }
 
-    pub fn moment(moment_n_m: DVec3) -> Force {
-        Force { angular: moment_n_m, linear: DVec3::ZERO }
+    pub fn moment(moment_n_m: DVec3) -> ForceVector {
+        ForceVector { angular: moment_n_m, linear: DVec3::ZERO }
     }
 }
 
@@ -108,8 +108,8 @@ macro_rules! vector_space {
         }
     };
 }
-vector_space!(Motion);
-vector_space!(Force);
+vector_space!(MotionVector);
+vector_space!(ForceVector);
 
 /// Symmetric 3 x 3 matrix.
 #[derive(Clone, Copy, Default, Debug)]
@@ -206,8 +206,8 @@ pub struct Inertia {
 impl Inertia {
     /// I v: momentum of a velocity, force of an acceleration.
     #[inline]
-    pub fn mul(&self, v: Motion) -> Force {
-        Force {
+    pub fn mul(&self, v: MotionVector) -> ForceVector {
+        ForceVector {
             angular: self.second_kg_m2.mul(v.angular) + self.first_kg_m.cross(v.linear),
             linear: v.linear * self.mass_kg - self.first_kg_m.cross(v.angular),
         }

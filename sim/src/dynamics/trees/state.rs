@@ -4,7 +4,7 @@ use rapier3d::glamx::{DPose3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::link::Joint;
-use super::spatial::Force;
+use super::spatial::ForceVector;
 use super::tree::Tree;
 
 /// Everything of a tree that outlasts a step, in full precision.
@@ -55,12 +55,12 @@ impl Tree {
 
     /// A force (N, world axes) at a point (world frame) of a link, for the next step; forces add up.
     pub fn push(&mut self, link: usize, point_m: DVec3, force_n: DVec3) {
-        self.external[link] += Force::at(point_m - self.reference_m, force_n);
+        self.external[link] += ForceVector::at(point_m - self.reference_m, force_n);
     }
 
     /// A torque (N m, world axes) on a link, for the next step.
     pub fn twist(&mut self, link: usize, torque_n_m: DVec3) {
-        self.external[link] += Force::moment(torque_n_m);
+        self.external[link] += ForceVector::moment(torque_n_m);
     }
 
     /// Centre of mass of the whole tree, world frame.

@@ -5,7 +5,7 @@ use rapier3d::glamx::{DMat3, DPose3, DVec3};
 use super::factor::Factor;
 use super::layout::Layout;
 use super::link::{Drive, Joint, Link, Mass};
-use super::spatial::{Force, Inertia, Motion, Symmetric};
+use super::spatial::{ForceVector, Inertia, MotionVector, Symmetric};
 use crate::dynamics::error::TreeError;
 
 /// Links joined into a tree. A robot is a tree with a free first link, a door one on a fixed first link, a lone
@@ -28,7 +28,7 @@ pub struct Tree {
     /// By link: the drive is a row of the solver in this step.
     pub(in crate::dynamics) bounded: Vec<bool>,
     /// From outside, by link, about the reference; for the next step only.
-    pub(in crate::dynamics) external: Vec<Force>,
+    pub(in crate::dynamics) external: Vec<ForceVector>,
     /// What the drives exerted in the last step, by link.
     pub(in crate::dynamics) effort: Vec<f64>,
     /// Impulses of dry friction in the last step, by link, with which the next begins.
@@ -41,10 +41,10 @@ pub struct Tree {
     /// Origins of the links relative to the reference.
     pub(in crate::dynamics) position_m: Vec<DVec3>,
     /// Joint axes S, by degree of freedom.
-    pub(in crate::dynamics) axis: Vec<Motion>,
-    pub(in crate::dynamics) velocity: Vec<Motion>,
-    pub(in crate::dynamics) acceleration: Vec<Motion>,
-    pub(in crate::dynamics) force: Vec<Force>,
+    pub(in crate::dynamics) axis: Vec<MotionVector>,
+    pub(in crate::dynamics) velocity: Vec<MotionVector>,
+    pub(in crate::dynamics) acceleration: Vec<MotionVector>,
+    pub(in crate::dynamics) force: Vec<ForceVector>,
     /// Composite, by link.
     pub(in crate::dynamics) inertia: Vec<Inertia>,
     /// Of each link about its centre of mass, link axes.
@@ -69,17 +69,17 @@ impl Tree {
             v: vec![0.0; dofs],
             drives: vec![Drive::NONE; count],
             bounded: vec![false; count],
-            external: vec![Force::default(); count],
+            external: vec![ForceVector::default(); count],
             effort: vec![0.0; count],
             dry_friction: vec![0.0; count],
             unconstrained: vec![0.0; dofs],
             reference_m: DVec3::ZERO,
             rotation: vec![DMat3::IDENTITY; count],
             position_m: vec![DVec3::ZERO; count],
-            axis: vec![Motion::default(); dofs],
-            velocity: vec![Motion::default(); count],
-            acceleration: vec![Motion::default(); count],
-            force: vec![Force::default(); count],
+            axis: vec![MotionVector::default(); dofs],
+            velocity: vec![MotionVector::default(); count],
+            acceleration: vec![MotionVector::default(); count],
+            force: vec![ForceVector::default(); count],
             inertia: vec![Inertia::default(); count],
             own_inertia: links.iter().map(|link| Symmetric::of(&link.mass.inertia_kg_m2)).collect(),
             implicit: vec![0.0; dofs],

@@ -19,10 +19,10 @@ pub use network::Network;
 
 use super::{BaseCommand, BaseLimits, LegCommand, Locomotion};
 use crate::PHYSICS_STEPS_PER_CONTROL;
-use crate::body::{Drive, JOINTS, LEGS, WAIST, WholeBody};
+use crate::body::{JOINTS, JointDrive, LEGS, WAIST, WholeBody};
 use joints::JointMap;
-use network::{Action, Memory, Observation};
-use place::Place;
+use network::{Action, Observation, RecurrentState};
+use place::ReferencePlace;
 
 const LIMITS: BaseLimits = BaseLimits {
     vx_m_s: [-0.3, 0.4],
@@ -38,14 +38,14 @@ const HEAVY_N: f32 = 50.0;
 pub struct Agile {
     network: Arc<Network>,
     joints: JointMap,
-    state: Option<State>,
+    state: Option<AgileState>,
 }
 
 #[derive(Clone, Serialize, Deserialize)]
-struct State {
-    memory: Memory,
+struct AgileState {
+    memory: RecurrentState,
     action: Action,
-    place: Place,
+    place: ReferencePlace,
     /// Physics steps so far.
     ticks: u32,
 }
@@ -69,26 +69,26 @@ impl Agile {
     }
 
     /// Stands as it is until the policy has spoken.
-    fn begin(&self, body: &WholeBody) -> State {
+    fn begin(&self, body: &WholeBody) -> AgileState {
         let q_rad = less_waist_targets(body);
         let joints = &body.model.joints;
         let observation = self.observe(body, [0.0; 3]);
-        State {
+        AgileState {
             memory: self.network.remember(&observation).unwrap_or_else(|_| self.network.blank()),
             action: Action {
                 target_rad: self.joints.controlled.map(|joint| q_rad[joint]),
                 kp_n_m_rad: self.joints.controlled.map(|joint| joints[joint].kp_n_m_rad),
                 kd_n_m_s_rad: self.joints.controlled.map(|joint| joints[joint].kd_n_m_s_rad),
             },
-            place: Place::of(body.world_from_pelvis()),
+            place: ReferencePlace::of(body.world_from_pelvis()),
             ticks: 0,
         }
     }
 
     fn legs(&self, action: &Action) -> LegCommand {
-        let mut drives = [Drive::default(); JOINTS];
+        let mut drives = [JointDrive::default(); JOINTS];
         for (i, joint) in self.joints.controlled.into_iter().enumerate() {
-            drives[joint] = Drive {
+            drives[joint] = JointDrive {
                 target_rad: action.target_rad[i],
                 kp_n_m_rad: action.kp_n_m_rad[i],
                 kd_n_m_s_rad: action.kd_n_m_s_rad[i],
@@ -112,7 +112,7 @@ impl Locomotion for Agile {
             let pelvis = body.world_from_pelvis();
             let pulled_down_n: f32 = body.hand_force_n.into_iter().map(|force| -force.z).sum();
             if pulled_down_n > HEAVY_N {
-                state.place = Place::of(pelvis);
+                state.place = ReferencePlace::of(pelvis);
             } else {
                 velocity = state.place.follow(pelvis, velocity, dt_s * PHYSICS_STEPS_PER_CONTROL as f32);
             }

@@ -61,9 +61,9 @@ pub(super) struct Action {
 
 /// Values of the memory inputs, in the order of the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Memory(pub(super) Vec<Vec<f32>>);
+pub(super) struct RecurrentState(pub(super) Vec<Vec<f32>>);
 
-/// A checked file, ready to run. Robots share it; what differs between them is [`Memory`].
+/// A checked file, ready to run. Robots share it; what differs between them is [`RecurrentState`].
 pub struct Network {
     name: String,
     model: Model,
@@ -83,7 +83,7 @@ struct Input {
 
 enum Source {
     Sensed(&'static str),
-    Memory(usize),
+    Recurrent(usize),
 }
 
 /// Should a run fail.
@@ -151,7 +151,7 @@ impl Network {
                 None => {
                     outputs.push(output(&format!("{name}{FED_BACK}"))?);
                     memories.push(have);
-                    Source::Memory(memories.len() - 1)
+                    Source::Recurrent(memories.len() - 1)
                 }
             };
             inputs.push(Input { node: *node, source });
@@ -172,7 +172,7 @@ impl Network {
 
     /// The memory of a robot that has stood as in `observation` for half a second, acting as the policy wanted. One that
     /// had not acted before would be thrown into the policy's own stance: it hops a third of a metre.
-    pub(super) fn remember(&self, observation: &Observation) -> RunResult<Memory> {
+    pub(super) fn remember(&self, observation: &Observation) -> RunResult<RecurrentState> {
         let mut memory = self.blank();
         for _ in 0..STEPS_TO_REMEMBER {
             memory = self.run(observation, &memory)?.1;
@@ -180,17 +180,21 @@ impl Network {
         Ok(memory)
     }
 
-    pub(super) fn blank(&self) -> Memory {
-        Memory(self.memories.iter().map(|shape| vec![0.0; shape.iter().product()]).collect())
+    pub(super) fn blank(&self) -> RecurrentState {
+        RecurrentState(self.memories.iter().map(|shape| vec![0.0; shape.iter().product()]).collect())
     }
 
     /// One control step.
-    pub(super) fn run(&self, observation: &Observation, memory: &Memory) -> RunResult<(Action, Memory)> {
+    pub(super) fn run(
+        &self,
+        observation: &Observation,
+        memory: &RecurrentState,
+    ) -> RunResult<(Action, RecurrentState)> {
         self.split(self.evaluate(observation, memory)?)
     }
 
     /// Values of [`Network::outputs`].
-    fn evaluate(&self, observation: &Observation, memory: &Memory) -> RunResult<Vec<Value>> {
+    fn evaluate(&self, observation: &Observation, memory: &RecurrentState) -> RunResult<Vec<Value>> {
         let mut inputs = Vec::with_capacity(self.inputs.len());
         for input in &self.inputs {
             let value = match input.source {
@@ -198,7 +202,7 @@ impl Network {
                     let values = observation.values(name);
                     ValueView::from_shape([1, values.len()], values)?
                 }
-                Source::Memory(index) => ValueView::from_shape(&self.memories[index], &memory.0[index])?,
+                Source::Recurrent(index) => ValueView::from_shape(&self.memories[index], &memory.0[index])?,
             };
             inputs.push((input.node, value.into()));
         }
@@ -207,13 +211,13 @@ impl Network {
     }
 
     /// Shapes have been checked, so that none is left out.
-    fn split(&self, outputs: Vec<Value>) -> RunResult<(Action, Memory)> {
+    fn split(&self, outputs: Vec<Value>) -> RunResult<(Action, RecurrentState)> {
         let floats = |value: Value| {
             let tensor: Option<Tensor<f32>> = value.into_tensor();
             Ok(tensor.ok_or("an output is not of 32-bit floats")?.into_data())
         };
         let mut values = outputs.into_iter().map(floats).collect::<RunResult<Vec<Vec<f32>>>>()?;
-        let memory = Memory(values.split_off(ACTIONS.len()));
+        let memory = RecurrentState(values.split_off(ACTIONS.len()));
         let joints = |index: usize| {
             let values: &Vec<f32> = &values[index];
             std::array::from_fn(|joint| values.get(joint).copied().unwrap_or(f32::NAN))

@@ -29,7 +29,7 @@ const LARGEST_COMMAND: [f32; 3] = [0.8, 0.4, 0.8];
 
 /// Where the robot should be.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Place {
+pub(super) struct ReferencePlace {
     position_m: [f32; 2],
     heading_rad: f32,
     integral_m_s: [f32; 2],
@@ -37,11 +37,11 @@ pub(super) struct Place {
     correcting: bool,
 }
 
-impl Place {
+impl ReferencePlace {
     /// Here.
-    pub(super) fn of(world_from_pelvis: Pose) -> Place {
+    pub(super) fn of(world_from_pelvis: Pose) -> ReferencePlace {
         let at = world_from_pelvis.translation;
-        Place {
+        ReferencePlace {
             position_m: [at.x, at.y],
             heading_rad: heading_rad(world_from_pelvis),
             integral_m_s: [0.0; 2],
@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn a_standing_robot_corrects_only_what_is_far() {
-        let mut place = Place::of(at(0.0, 0.0, 0.0));
+        let mut place = ReferencePlace::of(at(0.0, 0.0, 0.0));
         for (pose, [forward, left, turning]) in [
             (at(0.08, 0.0, 0.0), [0.0, 0.0, 0.0]),
             (at(0.12, 0.0, 0.0), [-1.0, 0.0, 0.0]),
@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn a_slow_robot_is_told_to_hurry_but_the_reference_stays_near() {
-        let mut place = Place::of(at(0.0, 0.0, 0.0));
+        let mut place = ReferencePlace::of(at(0.0, 0.0, 0.0));
         let mut told = [0.0; 3];
         for _ in 0..200 {
             told = place.follow(at(0.0, 0.0, 0.0), [0.3, 0.0, 0.0], DT_S);

@@ -36,7 +36,7 @@ const EASED_TURN: f32 = 0.64;
 const EASED_FEET: f32 = 0.2;
 
 /// Wanted accelerations, world frame.
-pub(super) struct Motion {
+pub(super) struct WantedMotion {
     pub lift_m_s2: f32,
     pub turn_rad_s2: Vector,
     /// Of the ankle roll links; zero for a foot that stands.
@@ -44,14 +44,14 @@ pub(super) struct Motion {
 }
 
 /// Where the ground acts.
-pub(super) struct Contact {
+pub(super) struct GroundContact {
     pub pressure_m: Vector,
     /// The only foot that carries; `None` for both.
     pub foot: Option<Side>,
 }
 
 /// Of both legs.
-pub(super) struct Torques {
+pub(super) struct LegTorques {
     pub torque_n_m: Sides<[f32; LEG_JOINTS]>,
     /// Horizontal acceleration of the centre of mass that they bring.
     pub acceleration_m_s2: Vector,
@@ -62,16 +62,16 @@ pub(super) struct Torques {
 pub(super) fn leg_torques_within_limits(
     body: &WholeBody,
     load: &Load,
-    motion: &Motion,
-    contact: &Contact,
-) -> Torques {
+    motion: &WantedMotion,
+    contact: &GroundContact,
+) -> LegTorques {
     let full = leg_torques(body, load, motion, contact);
     let most_n_m = |side: Side, i: usize| body.model.joints[LEGS[side] + i].effort_n_m * EFFORT_USED;
     let joints = || Side::BOTH.into_iter().flat_map(|side| (0..LEG_JOINTS).map(move |i| (side, i)));
     if joints().all(|(side, i)| full.torque_n_m[side][i].abs() <= most_n_m(side, i)) {
         return full;
     }
-    let eased = Motion {
+    let eased = WantedMotion {
         lift_m_s2: motion.lift_m_s2,
         turn_rad_s2: motion.turn_rad_s2 * EASED_TURN,
         feet: motion.feet.map(|foot| Acceleration {
@@ -89,7 +89,7 @@ pub(super) fn leg_torques_within_limits(
         }
     }
     let between = |low: f32, high: f32| low + (high - low) * share;
-    Torques {
+    LegTorques {
         torque_n_m: Sides::from_fn(|side| {
             std::array::from_fn(|i| between(eased.torque_n_m[side][i], full.torque_n_m[side][i]))
         }),
@@ -101,7 +101,7 @@ pub(super) fn leg_torques_within_limits(
 /// Torques of both legs. The pelvis accelerates sideways as it must for the ground force to have no moment about the
 /// pressure point, and turns no harder than one foot can hold: both are linear in its acceleration, and found by correcting
 /// it [`CORRECTIONS`] times.
-fn leg_torques(body: &WholeBody, load: &Load, motion: &Motion, contact: &Contact) -> Torques {
+fn leg_torques(body: &WholeBody, load: &Load, motion: &WantedMotion, contact: &GroundContact) -> LegTorques {
     let point_m = contact.pressure_m;
     let height_m = (body.com_m.z - point_m.z).max(LEAST_HEIGHT_M);
     let away_m = flat(body.com_m - point_m);
@@ -118,7 +118,7 @@ fn leg_torques(body: &WholeBody, load: &Load, motion: &Motion, contact: &Contact
     }
     let turn_n_m = Vector::Z * reaction.rest_n_m.z.clamp(-most_turn_n_m, most_turn_n_m);
     let pushes_n_m = reaction.pushes_n_m(body, contact, turn_n_m);
-    Torques {
+    LegTorques {
         torque_n_m: Sides::from_fn(|side| {
             std::array::from_fn(|i| reaction.effort.torque_n_m[LEGS[side] + i] + pushes_n_m[side][i])
         }),
@@ -126,7 +126,7 @@ fn leg_torques(body: &WholeBody, load: &Load, motion: &Motion, contact: &Contact
     }
 }
 
-impl Contact {
+impl GroundContact {
     /// A foot holds less against turning the nearer the pressure is to toe or heel.
     fn most_turn_n_m(&self, body: &WholeBody) -> f32 {
         match self.foot {
@@ -152,7 +152,7 @@ impl Reaction {
     fn of(
         body: &WholeBody,
         load: &Load,
-        motion: &Motion,
+        motion: &WantedMotion,
         pelvis: Acceleration,
         point_m: Vector,
         qdd_rad_s2: &mut [f32; JOINTS],
@@ -182,7 +182,12 @@ impl Reaction {
     }
 
     /// Torques with which the legs push on the ground.
-    fn pushes_n_m(&self, body: &WholeBody, contact: &Contact, turn_n_m: Vector) -> Sides<[f32; LEG_JOINTS]> {
+    fn pushes_n_m(
+        &self,
+        body: &WholeBody,
+        contact: &GroundContact,
+        turn_n_m: Vector,
+    ) -> Sides<[f32; LEG_JOINTS]> {
         let (force_n, point_m) = (self.force_n, contact.pressure_m);
         match contact.foot {
             Some(side) => {
@@ -231,7 +236,7 @@ fn foot_jacobian(body: &WholeBody, side: Side) -> SMatrix<f32, 6, 6> {
 
 /// Changes the joint accelerations of both legs so that the feet accelerate as wanted:
 ///   (J^T J + damping I) d = J^T (wanted - now).
-fn move_feet(body: &WholeBody, motion: &Motion, effort: &Effort, qdd_rad_s2: &mut [f32; JOINTS]) {
+fn move_feet(body: &WholeBody, motion: &WantedMotion, effort: &Effort, qdd_rad_s2: &mut [f32; JOINTS]) {
     for side in Side::BOTH {
         let first = LEGS[side];
         let foot = body.model.joints[first + 5].link;

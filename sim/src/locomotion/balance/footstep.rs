@@ -24,7 +24,7 @@ const MISS: f32 = 0.1;
 const PRESSURE_M: [f32; 2] = [0.075, 0.018];
 
 /// What a footstep is planned from. Horizontal vectors, world frame.
-pub(super) struct Situation<'a> {
+pub(super) struct FootstepInputs<'a> {
     pub gait: &'a Gait,
     pub swing: &'a Swing,
     pub capture_m: Vector,
@@ -45,7 +45,7 @@ pub(super) struct Footstep {
     strain_m: f32,
 }
 
-impl Situation<'_> {
+impl FootstepInputs<'_> {
     /// The footstep of the pace that strains least. A foot that has not left the ground does not hurry.
     pub(super) fn plan(&self, dt_s: f32) -> Footstep {
         let swinging = self.time_s > TRANSFER_S && self.time_s < PERIOD_S;

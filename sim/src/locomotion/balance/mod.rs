@@ -23,7 +23,7 @@ use ground::middle_m;
 use load::{Laden, Load};
 use observer::Observer;
 use stand::Stand;
-use step::Step;
+use step::Stepping;
 
 const LIMITS: BaseLimits = BaseLimits {
     vx_m_s: [-0.3, 0.4],
@@ -56,11 +56,11 @@ const LARGEST_LEAN_M: f32 = 0.1;
 /// Stands or steps; see the module's text.
 #[derive(Default)]
 pub struct Balance {
-    state: Option<State>,
+    state: Option<BalanceState>,
 }
 
 #[derive(Clone, Serialize, Deserialize)]
-struct State {
+struct BalanceState {
     mode: Mode,
     heading_rad: f32,
     /// Velocity command after the ramp.
@@ -74,7 +74,7 @@ struct State {
 #[derive(Clone, Serialize, Deserialize)]
 enum Mode {
     Stand(Stand),
-    Step(Step),
+    Step(Stepping),
 }
 
 /// Capture point relative to the feet, in the heading frame.
@@ -90,7 +90,7 @@ impl Locomotion for Balance {
     }
 
     fn tick(&mut self, body: &WholeBody, command: &BaseCommand, dt_s: f32) -> LegCommand {
-        let state = self.state.get_or_insert_with(|| State::new(body));
+        let state = self.state.get_or_insert_with(|| BalanceState::new(body));
         let command = LIMITS.clamp(*command);
         state.velocity = ramped(state.velocity, command.velocity(), dt_s);
         state.time_in_mode_s += dt_s;
@@ -122,15 +122,15 @@ impl Locomotion for Balance {
     }
 }
 
-impl State {
-    fn new(body: &WholeBody) -> State {
+impl BalanceState {
+    fn new(body: &WholeBody) -> BalanceState {
         let pelvis = body.world_from_pelvis();
         let heading_rad = heading_rad(pelvis);
         let middle_m = middle_m(&body.world_from_soles());
         let mut pelvis_from_middle_m =
             Rotation::from_rotation_z(-heading_rad) * (pelvis.translation - middle_m);
         pelvis_from_middle_m.z = 0.0;
-        State {
+        BalanceState {
             mode: Mode::Stand(Stand::plant(body, heading_rad, None)),
             heading_rad,
             velocity: BaseVelocity::STILL,
@@ -153,7 +153,7 @@ impl State {
                     || stance.capture_m.y.abs() > half_width_m + SIDEWAYS_M;
                 if (moving || lost) && self.time_in_mode_s > LEAST_STANDING_S {
                     let left_carries = self.left_carries_first(&stance);
-                    self.mode = Mode::Step(Step::start(body, self.heading_rad, left_carries));
+                    self.mode = Mode::Step(Stepping::start(body, self.heading_rad, left_carries));
                     self.time_in_mode_s = 0.0;
                 }
             }

@@ -11,7 +11,7 @@ use super::effort::ground_force_n;
 use super::ground::{distribute, leg_torques_n_m, middle_m, supported_force_n};
 use super::legs::{LegAngles, inverse, rotation_vector_rad};
 use super::load::Load;
-use crate::body::{Drive, JOINTS, LEG_JOINTS, LEGS, WholeBody};
+use crate::body::{JOINTS, JointDrive, LEG_JOINTS, LEGS, WholeBody};
 use crate::locomotion::LegCommand;
 use crate::locomotion::plane::flat;
 use crate::{GRAVITY_M_S2, Side, Sides};
@@ -145,7 +145,7 @@ impl Stand {
             std::array::from_fn(|i| {
                 let joint = LEGS[side] + i;
                 let model = &body.model.joints[joint];
-                Drive {
+                JointDrive {
                     target_rad: self.q_rad[side][i],
                     kp_n_m_rad: model.kp_n_m_rad,
                     kd_n_m_s_rad: model.kd_n_m_s_rad,
@@ -185,7 +185,12 @@ fn within_reach_m(shift_m: Vector) -> Vector {
 }
 
 /// Force with which the ground answers the drives of one leg.
-fn push_n(body: &WholeBody, side: Side, drives: &[Drive; LEG_JOINTS], gravity_n_m: &[f32; JOINTS]) -> Vector {
+fn push_n(
+    body: &WholeBody,
+    side: Side,
+    drives: &[JointDrive; LEG_JOINTS],
+    gravity_n_m: &[f32; JOINTS],
+) -> Vector {
     let applied_n_m = std::array::from_fn(|i| {
         let (joint, drive) = (LEGS[side] + i, &drives[i]);
         drive.kp_n_m_rad * (drive.target_rad - body.q_rad[joint]) - drive.kd_n_m_s_rad * body.qd_rad_s[joint]

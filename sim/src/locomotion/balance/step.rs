@@ -15,14 +15,14 @@ use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
 use super::course::Course;
-use super::effort::{Contact, Motion, Torques, leg_torques_within_limits};
-use super::footstep::{Footstep, Situation};
+use super::effort::{GroundContact, LegTorques, WantedMotion, leg_torques_within_limits};
+use super::footstep::{Footstep, FootstepInputs};
 use super::gait::{Gait, PERIOD_S, SWING_INERTIA, TRANSFER_S};
 use super::ground::nearest_support_m;
 use super::legs::rotation_vector_rad;
 use super::load::Load;
 use super::swing::{SOLE_IN_FOOT_M, SWING_S, Swing, foot_motion};
-use crate::body::{Acceleration, Drive, LEGS, WholeBody};
+use crate::body::{Acceleration, JointDrive, LEGS, WholeBody};
 use crate::locomotion::plane::{flat, heading_rad, wrapped_rad};
 use crate::locomotion::{BaseVelocity, LegCommand};
 use crate::{GRAVITY_M_S2, Side, Sides};
@@ -69,7 +69,7 @@ const KD_N_M_S_RAD: f32 = 1.0;
 
 /// A robot that steps; see the module's text.
 #[derive(Clone, Serialize, Deserialize)]
-pub(super) struct Step {
+pub(super) struct Stepping {
     pub(super) heading_rad: f32,
     /// Where the commands alone would have turned the heading.
     goal_rad: f32,
@@ -86,12 +86,12 @@ pub(super) struct Step {
     course: Course,
 }
 
-impl Step {
+impl Stepping {
     /// Starts stepping; the first foot to carry is the one nearer to the capture point.
-    pub(super) fn start(body: &WholeBody, heading_rad: f32, left_carries: bool) -> Step {
+    pub(super) fn start(body: &WholeBody, heading_rad: f32, left_carries: bool) -> Stepping {
         let stance = if left_carries { Side::Left } else { Side::Right };
         let ground_m = body.world_from_soles()[stance].translation.z;
-        let mut step = Step {
+        let mut step = Stepping {
             heading_rad,
             goal_rad: heading_rad,
             lag_rad: 0.0,
@@ -142,7 +142,7 @@ impl Step {
         let gait = Gait::new(rate_1_s, coming * course_m_s, outside);
         let (_, foot_m_s, _) = foot_motion(body, self.stance.other());
         let lasting_m_s = load.velocity_m_s - foot_m_s * SWING_INERTIA;
-        let situation = Situation {
+        let situation = FootstepInputs {
             gait: &gait,
             swing: &self.swing,
             capture_m: flat(load.balance_point_m + lasting_m_s / rate_1_s),
@@ -244,7 +244,7 @@ impl Step {
         ground_m: f32,
         heading: Rotation,
         yaw_rate_rad_s: f32,
-    ) -> Torques {
+    ) -> LegTorques {
         let pelvis = body.world_from_pelvis();
         let lift_m_s2 = (LIFT_STIFFNESS_1_S2 * (self.height_m + ground_m - pelvis.translation.z)
             - LIFT_DAMPING_1_S * body.pelvis_velocity_m_s.z)
@@ -260,8 +260,8 @@ impl Step {
             let swing = self.stance.other();
             feet[swing] = self.swing.wanted(body, swing, self.time_s - TRANSFER_S);
         }
-        let motion = Motion { lift_m_s2, turn_rad_s2: turn.clamp(-most, most), feet };
-        let contact = Contact {
+        let motion = WantedMotion { lift_m_s2, turn_rad_s2: turn.clamp(-most, most), feet };
+        let contact = GroundContact {
             pressure_m: Vector::new(pressure_m.x, pressure_m.y, ground_m),
             foot: (!both).then_some(self.stance),
         };
@@ -270,11 +270,11 @@ impl Step {
 }
 
 /// Torques as drives: of their springs and dampers nothing is left at the measured angle and velocity.
-fn drives(body: &WholeBody, torques: &Torques) -> LegCommand {
+fn drives(body: &WholeBody, torques: &LegTorques) -> LegCommand {
     Sides::from_fn(|side| {
         std::array::from_fn(|i| {
             let joint = LEGS[side] + i;
-            Drive {
+            JointDrive {
                 target_rad: body.q_rad[joint],
                 kp_n_m_rad: KP_N_M_RAD,
                 kd_n_m_s_rad: KD_N_M_S_RAD,
@@ -286,7 +286,7 @@ fn drives(body: &WholeBody, torques: &Torques) -> LegCommand {
 
 /// Where the capture point has to be when the first foot lifts, as a step that just ended would leave it; and whether
 /// the foot lifts now.
-fn shift(now: &Situation) -> (Vector, bool) {
+fn shift(now: &FootstepInputs) -> (Vector, bool) {
     let target_m = now.steady_capture_m(SWING_S);
     let middle_m = (flat(now.stance.translation) + now.old_m) * 0.5;
     let late = (now.capture_m - middle_m).dot(now.ahead_axis).abs() > LATEST_M;

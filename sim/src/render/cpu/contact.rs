@@ -3,12 +3,12 @@
 use pulp::{Arch, Simd, WithSimd};
 use rapier3d::math::Vector;
 
-use super::raster::Outline;
+use super::raster::ProjectedTriangle;
 use crate::render::scene::prepared::Prepared;
 use crate::render::shading::affine::Affine;
 use crate::render::shading::light::CONTACT_TEXELS;
-use crate::render::shading::rows::{Grid, Lanes, Rows, lanes};
-use crate::render::{Carrier, Part, Placed};
+use crate::render::shading::rows::{Grid, Lanes, SampleRows, lanes};
+use crate::render::{Carrier, Part, PlacedScenery};
 
 /// What is this far above a surface darkens it no more.
 const REACH_M: f32 = 0.06;
@@ -35,8 +35,8 @@ pub struct ContactMap {
     pub texel_values: Vec<[f32; 2]>,
     /// What the map is around; `None` before the first. What can carry things is drawn when it changes.
     focus_m: Option<Vector>,
-    support: Rows<f32>,
-    underside: Rows<f32>,
+    support: SampleRows<f32>,
+    underside: SampleRows<f32>,
     corners_m: Vec<[f32; 3]>,
     /// How dark it is, and that smoothed along the rows.
     dark_share: Vec<[f32; CONTACT_TEXELS]>,
@@ -46,13 +46,13 @@ pub struct ContactMap {
 }
 
 /// A map to draw, compiled for the registers that there are.
-struct Drawing<'a> {
+struct ContactDrawing<'a> {
     map: &'a mut ContactMap,
     prepared: &'a Prepared,
-    placed: &'a Placed,
+    placed: &'a PlacedScenery,
 }
 
-impl WithSimd for Drawing<'_> {
+impl WithSimd for ContactDrawing<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -62,36 +62,42 @@ impl WithSimd for Drawing<'_> {
 }
 
 impl ContactMap {
-    pub fn draw(&mut self, prepared: &Prepared, placed: &Placed) {
-        Arch::new().dispatch(Drawing { map: self, prepared, placed });
+    pub fn draw(&mut self, prepared: &Prepared, placed: &PlacedScenery) {
+        Arch::new().dispatch(ContactDrawing { map: self, prepared, placed });
     }
 
     #[inline(always)]
-    fn draw_with<S: Simd>(&mut self, simd: S, prepared: &Prepared, placed: &Placed) {
+    fn draw_with<S: Simd>(&mut self, simd: S, prepared: &Prepared, placed: &PlacedScenery) {
         if self.focus_m != Some(placed.focus_m) {
             let radius_m = prepared.scenery.focus_radius_m;
             self.focus_m = Some(placed.focus_m);
             self.corner_m = [placed.focus_m.x - radius_m, placed.focus_m.y - radius_m];
             self.texels_per_m = CONTACT_TEXELS as f32 / (2.0 * radius_m);
             self.support.reset(GRID, 0.0);
-            self.draw_layer(simd, prepared, placed, Layer::Support);
+            self.draw_layer(simd, prepared, placed, HeightLayer::Support);
         }
         self.underside.reset(GRID, 0.0);
-        self.draw_layer(simd, prepared, placed, Layer::Underside);
+        self.draw_layer(simd, prepared, placed, HeightLayer::Underside);
         self.darken();
     }
 
     #[inline(always)]
-    fn draw_layer<S: Simd>(&mut self, simd: S, prepared: &Prepared, placed: &Placed, layer: Layer) {
+    fn draw_layer<S: Simd>(
+        &mut self,
+        simd: S,
+        prepared: &Prepared,
+        placed: &PlacedScenery,
+        layer: HeightLayer,
+    ) {
         for (number, part) in prepared.scenery.parts.iter().enumerate() {
             let (pose, (centre_m, around_m)) = (placed.world_from_mesh[number], prepared.bounds[number]);
-            if layer != Layer::of(part) || !self.concerns(layer, pose * centre_m, around_m) {
+            if layer != HeightLayer::of(part) || !self.concerns(layer, pose * centre_m, around_m) {
                 continue;
             }
             let world_from_mesh = Affine::of(pose);
             prepared.points[number].map_into(&mut self.corners_m, |block| world_from_mesh.map_lanes(block));
             let too_high = |[_, _, z_m]: &[f32; 3]| *z_m > HIGHEST_SUPPORT_M;
-            if layer == Layer::Support && self.corners_m.iter().any(too_high) {
+            if layer == HeightLayer::Support && self.corners_m.iter().any(too_high) {
                 continue;
             }
             for [a, b, c] in &part.mesh.triangles {
@@ -102,11 +108,11 @@ impl ContactMap {
     }
 
     /// Whether a part, given by a sphere around it, is over the map and near what it could touch.
-    fn concerns(&self, layer: Layer, centre_m: Vector, around_m: f32) -> bool {
+    fn concerns(&self, layer: HeightLayer, centre_m: Vector, around_m: f32) -> bool {
         let [u, v] = self.place(centre_m);
         let around = around_m * self.texels_per_m;
         let over = |i: f32| i > -around && i < CONTACT_TEXELS as f32 + around;
-        if !over(u) || !over(v) || layer == Layer::Support {
+        if !over(u) || !over(v) || layer == HeightLayer::Support {
             return over(u) && over(v);
         }
         let column = (u.max(0.0) as usize).min(CONTACT_TEXELS - 1);
@@ -125,16 +131,16 @@ impl ContactMap {
 
     /// Rows run along y as they do not in pictures: what is seen to turn counter-clockwise faces down.
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, layer: Layer, [a, b, c]: [[f32; 3]; 3]) {
+    fn fill<S: Simd>(&mut self, simd: S, layer: HeightLayer, [a, b, c]: [[f32; 3]; 3]) {
         let (corners_m, rows, sign) = match layer {
-            Layer::Support => ([a, c, b], &mut self.support, 1.0),
-            Layer::Underside => ([a, b, c], &mut self.underside, -1.0),
+            HeightLayer::Support => ([a, c, b], &mut self.support, 1.0),
+            HeightLayer::Underside => ([a, b, c], &mut self.underside, -1.0),
         };
         let ([x_m, y_m], scale) = (self.corner_m, self.texels_per_m);
         let nearest = S::as_mut_simd_f32s(rows.all_mut()).0;
         let [a, b, c] = corners_m;
         let place = |[x, y, z]: [f32; 3]| [(x - x_m) * scale, (y - y_m) * scale, DATUM_M + sign * z];
-        if let Some(outline) = Outline::new([place(a), place(b), place(c)]) {
+        if let Some(outline) = ProjectedTriangle::new([place(a), place(b), place(c)]) {
             outline.draw(
                 simd,
                 GRID,
@@ -223,16 +229,16 @@ impl ContactMap {
 
 /// What is drawn from above, and what from below.
 #[derive(Clone, Copy, PartialEq)]
-enum Layer {
+enum HeightLayer {
     Support,
     Underside,
 }
 
-impl Layer {
-    fn of(part: &Part) -> Layer {
+impl HeightLayer {
+    fn of(part: &Part) -> HeightLayer {
         match part.carrier {
-            Carrier::Room => Layer::Support,
-            Carrier::Link { .. } | Carrier::Object(_) => Layer::Underside,
+            Carrier::Room => HeightLayer::Support,
+            Carrier::Link { .. } | Carrier::Object(_) => HeightLayer::Underside,
         }
     }
 }

@@ -4,7 +4,7 @@ use rapier3d::math::{Matrix, Vector};
 
 use crate::render::scene::prepared::{Prepared, Sheet};
 use crate::render::shading::affine::Affine;
-use crate::render::{Carrier, Pattern, Placed};
+use crate::render::{Carrier, Pattern, PlacedScenery};
 
 /// A sheet in the world.
 #[derive(Clone, Copy)]
@@ -20,7 +20,7 @@ pub(super) struct Facet {
 }
 
 /// The facets of a state, by their sheets' numbers.
-pub(super) fn place(facets: &mut Vec<Facet>, prepared: &Prepared, placed: &Placed) {
+pub(super) fn place(facets: &mut Vec<Facet>, prepared: &Prepared, placed: &PlacedScenery) {
     let rotations: Vec<_> =
         placed.world_from_mesh.iter().map(|pose| Matrix::from_quat(pose.rotation)).collect();
     facets.clear();
@@ -28,7 +28,7 @@ pub(super) fn place(facets: &mut Vec<Facet>, prepared: &Prepared, placed: &Place
 }
 
 impl Facet {
-    fn new(prepared: &Prepared, placed: &Placed, rotations: &[Matrix], sheet: &Sheet) -> Facet {
+    fn new(prepared: &Prepared, placed: &PlacedScenery, rotations: &[Matrix], sheet: &Sheet) -> Facet {
         let number = sheet.part as usize;
         let (part, pose) = (&prepared.scenery.parts[number], placed.world_from_mesh[number]);
         let rotation = rotations[number];

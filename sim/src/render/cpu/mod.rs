@@ -13,7 +13,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 use crate::Step;
 use crate::render::scene::prepared::Prepared;
-use crate::render::{Camera, Frame, Placed, Renderer, Scenery};
+use crate::render::{Camera, Frame, PlacedScenery, Renderer, Scenery};
 use contact::ContactMap;
 use facets::Facet;
 use shade::Rays;
@@ -27,7 +27,7 @@ pub(super) struct CpuRenderer {
     prepared: Prepared,
     srgb: SrgbTable,
     /// What shadow, contacts and facets are of.
-    placed: Placed,
+    placed: PlacedScenery,
     shadow: ShadowMap,
     contact: ContactMap,
     row: Row,
@@ -42,7 +42,7 @@ impl CpuRenderer {
         CpuRenderer {
             prepared: Prepared::new(scenery),
             srgb: SrgbTable::default(),
-            placed: Placed::default(),
+            placed: PlacedScenery::default(),
             shadow: ShadowMap::default(),
             contact: ContactMap::default(),
             row: Row::default(),
@@ -66,13 +66,13 @@ impl Renderer for CpuRenderer {
 
 /// A picture to draw. It is compiled once more for processors with wide registers, with everything that is inlined into it;
 /// its bits are the same.
-struct Drawing<'a> {
+struct PictureDrawing<'a> {
     renderer: &'a mut CpuRenderer,
-    placed: Placed,
+    placed: PlacedScenery,
     camera: &'a Camera,
 }
 
-impl WithSimd for Drawing<'_> {
+impl WithSimd for PictureDrawing<'_> {
     type Output = Frame;
 
     #[inline(always)]
@@ -82,12 +82,12 @@ impl WithSimd for Drawing<'_> {
 }
 
 impl CpuRenderer {
-    pub(super) fn draw_placed(&mut self, placed: Placed, camera: &Camera) -> Frame {
-        Arch::new().dispatch(Drawing { renderer: self, placed, camera })
+    pub(super) fn draw_placed(&mut self, placed: PlacedScenery, camera: &Camera) -> Frame {
+        Arch::new().dispatch(PictureDrawing { renderer: self, placed, camera })
     }
 
     #[inline(always)]
-    fn draw<S: Simd>(&mut self, simd: S, placed: Placed, camera: &Camera) -> Frame {
+    fn draw<S: Simd>(&mut self, simd: S, placed: PlacedScenery, camera: &Camera) -> Frame {
         if self.placed != placed {
             self.shadow.draw(simd, &self.prepared, &placed);
             self.contact.draw(&self.prepared, &placed);

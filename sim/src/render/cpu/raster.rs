@@ -9,7 +9,7 @@ use crate::render::shading::rows::{Grid, LANES};
 /// Its plane and the edges of large ones are f64: a floor triangle clipped at the near plane has corners 1e4 pixels off the
 /// picture, and f32 gradients would err by centimetres. In f64 the edge that two triangles share also comes out
 /// the same for both, to the bit, and leaves no gap.
-pub struct Outline {
+pub struct ProjectedTriangle {
     /// Picture coordinates.
     corners: [[f64; 2]; 3],
     /// Nearness at the first corner, and how it changes.
@@ -52,10 +52,10 @@ const SMALL_ROWS: u32 = 16;
 const OVERLAP: f32 = 1e-5;
 const LANE: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
-impl Outline {
+impl ProjectedTriangle {
     /// Corners are picture coordinates and nearness, counter-clockwise as the camera sees them; `None` for a back face.
     #[inline(always)]
-    pub fn new(corners: [[f32; 3]; 3]) -> Option<Outline> {
+    pub fn new(corners: [[f32; 3]; 3]) -> Option<ProjectedTriangle> {
         let wide = |corner: usize, axis: usize| f64::from(corners[corner][axis]);
         let (ax, ay, an) = (wide(0, 0), wide(0, 1), wide(0, 2));
         let (bx, by, bn) = (wide(1, 0), wide(1, 1), wide(1, 2));
@@ -67,7 +67,7 @@ impl Outline {
             return None;
         }
         let per_area = 1.0 / area;
-        Some(Outline {
+        Some(ProjectedTriangle {
             corners: [[ax, ay], [bx, by], [cx, cy]],
             nearness_value: an,
             x_factor: (un * vy - vn * uy) * per_area,

@@ -5,12 +5,12 @@ use std::ops::Range;
 use pulp::Simd;
 use rapier3d::math::Vector;
 
-use super::raster::Outline;
+use super::raster::ProjectedTriangle;
 use crate::render::scene::prepared::Prepared;
 use crate::render::shading::affine::Affine;
 use crate::render::shading::light::{BIAS_M, FADE_TEXELS, NORMAL_OFFSET_M, TEXELS, sun_map};
-use crate::render::shading::rows::{Grid, Lanes, Rows, axes, lanes};
-use crate::render::{Carrier, Placed};
+use crate::render::shading::rows::{Grid, Lanes, SampleRows, axes, lanes};
+use crate::render::{Carrier, PlacedScenery};
 
 /// Texels along each side of a cell: what is nearer than all of a cell is in the sun there, without a look at its texels.
 const CELL: usize = 8;
@@ -27,9 +27,9 @@ pub(super) struct ShadowMap {
     focus_m: Option<Vector>,
     map_from_world: Affine,
     /// The room's shadows, which stay while the focus does.
-    still: Layer,
+    still: ShadowLayer,
     /// The shadows of everything.
-    all: Layer,
+    all: ShadowLayer,
     /// Of each row of cells, the columns of those in which `all` may differ from `still`.
     moving: Vec<Range<usize>>,
     corners: Vec<[f32; 3]>,
@@ -39,8 +39,8 @@ pub(super) struct ShadowMap {
 ///
 /// [`SUN_DISTANCE_M`]: crate::render::shading::light::SUN_DISTANCE_M
 #[derive(Default)]
-struct Layer {
-    nearness_m: Rows<f32>,
+struct ShadowLayer {
+    nearness_m: SampleRows<f32>,
     /// Least and greatest nearness of each cell, row by row.
     cells_m: Vec<[f32; 2]>,
 }
@@ -48,7 +48,7 @@ struct Layer {
 impl ShadowMap {
     /// Draws the shadows of everything that casts one.
     #[inline(always)]
-    pub(super) fn draw<S: Simd>(&mut self, simd: S, prepared: &Prepared, placed: &Placed) {
+    pub(super) fn draw<S: Simd>(&mut self, simd: S, prepared: &Prepared, placed: &PlacedScenery) {
         if self.focus_m != Some(placed.focus_m) {
             self.focus_m = Some(placed.focus_m);
             self.map_from_world = sun_map(placed.focus_m, prepared.scenery.focus_radius_m);
@@ -72,7 +72,7 @@ impl ShadowMap {
         &mut self,
         simd: S,
         prepared: &Prepared,
-        placed: &Placed,
+        placed: &PlacedScenery,
         belong: impl Fn(Carrier) -> bool,
     ) {
         for (number, part) in prepared.scenery.parts.iter().enumerate() {
@@ -95,7 +95,9 @@ impl ShadowMap {
             prepared.points[number].map_into(&mut self.corners, |block| map_from_mesh.map_lanes(block));
             for [a, b, c] in &part.mesh.triangles {
                 let [a, b, c] = [*a as usize, *b as usize, *c as usize];
-                if let Some(outline) = Outline::new([self.corners[a], self.corners[b], self.corners[c]]) {
+                if let Some(outline) =
+                    ProjectedTriangle::new([self.corners[a], self.corners[b], self.corners[c]])
+                {
                     outline.draw(
                         simd,
                         GRID,
@@ -154,9 +156,9 @@ impl ShadowMap {
     }
 }
 
-impl Layer {
+impl ShadowLayer {
     /// Makes what moved as it is without.
-    fn restore(&mut self, still: &Layer, moving: &[Range<usize>]) {
+    fn restore(&mut self, still: &ShadowLayer, moving: &[Range<usize>]) {
         for (row, columns) in moving.iter().enumerate().filter(|(_, columns)| !columns.is_empty()) {
             let of_row = row * CELLS + columns.start..row * CELLS + columns.end;
             self.cells_m[of_row.clone()].copy_from_slice(&still.cells_m[of_row]);

@@ -3,20 +3,20 @@
 use pulp::Simd;
 use rapier3d::math::{Pose, Vector};
 
-use super::raster::Outline;
+use super::raster::ProjectedTriangle;
 use crate::render::scene::camera::NEAR_M;
 use crate::render::scene::prepared::{NOTHING, Prepared};
 use crate::render::shading::affine::Affine;
 use crate::render::shading::light::SAMPLES;
-use crate::render::shading::rows::{Grid, Lanes, Rows, lanes};
-use crate::render::{Camera, Placed};
+use crate::render::shading::rows::{Grid, Lanes, SampleRows, lanes};
+use crate::render::{Camera, PlacedScenery};
 
 /// Nearest surface per sample. `nearness_1_m` is 1 / depth, which is linear over a triangle's picture.
 #[derive(Default)]
 pub(super) struct Target {
     grid: Grid,
-    nearness_1_m: Rows<f32>,
-    sheet: Rows<u32>,
+    nearness_1_m: SampleRows<f32>,
+    sheet: SampleRows<u32>,
 }
 
 /// Fills `samples`, [`SAMPLES`] a pixel along each axis, and `centres`, one a pixel, with all that `camera` sees.
@@ -26,7 +26,7 @@ pub(super) fn draw<S: Simd>(
     samples: &mut Target,
     centres: &mut Target,
     prepared: &Prepared,
-    placed: &Placed,
+    placed: &PlacedScenery,
     camera: &Camera,
 ) {
     let (width, height) = (camera.width as usize, camera.height as usize);
@@ -101,7 +101,7 @@ impl Lens {
 
 #[inline(always)]
 fn fill<S: Simd>(simd: S, samples: &mut Target, centres: &mut Target, corners: [[f32; 3]; 3], sheet: u32) {
-    if let Some(outline) = Outline::new(corners) {
+    if let Some(outline) = ProjectedTriangle::new(corners) {
         samples.fill(simd, &outline, sheet);
         centres.fill(simd, &outline, sheet);
     }
@@ -134,7 +134,7 @@ impl Target {
 
     /// Puts a triangle into those samples that it is the nearest of.
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, outline: &Outline, sheet: u32) {
+    fn fill<S: Simd>(&mut self, simd: S, outline: &ProjectedTriangle, sheet: u32) {
         let nearest = S::as_mut_simd_f32s(self.nearness_1_m.all_mut()).0;
         let owner = S::as_mut_simd_u32s(self.sheet.all_mut()).0;
         let sheet = simd.splat_u32s(sheet);

@@ -18,10 +18,10 @@ use wgpu::{
 use crate::Step;
 use crate::render::cpu::contact::ContactMap;
 use crate::render::scene::prepared::{NOTHING, Prepared};
-use crate::render::{Camera, Frame, Placed, Renderer, Scenery, cpu};
+use crate::render::{Camera, Frame, PlacedScenery, Renderer, Scenery, cpu};
 use device::{Gpu, GpuError};
-use scene::Scene;
-use targets::{Layer, Targets};
+use scene::SceneBuffers;
+use targets::{Attachments, Targets};
 
 /// Name of the device that draws.
 pub(super) fn name() -> Result<String, GpuError> {
@@ -45,10 +45,10 @@ const GROUP: u32 = 8;
 struct GpuRenderer {
     gpu: Arc<Gpu>,
     prepared: Prepared,
-    scene: Scene,
+    scene: SceneBuffers,
     shadow: TextureView,
     /// Where the parts are in the device's memory, and what the shadow is of.
-    placed: Option<Placed>,
+    placed: Option<PlacedScenery>,
     contact: ContactMap,
     /// Of the last picture's size.
     targets: Option<Targets>,
@@ -74,7 +74,7 @@ fn open() -> Result<Arc<Gpu>, GpuError> {
 impl GpuRenderer {
     fn new(gpu: Arc<Gpu>, scenery: Scenery) -> GpuRenderer {
         let prepared = Prepared::new(scenery);
-        let (scene, shadow) = (Scene::new(&gpu, &prepared), targets::shadow_map(&gpu));
+        let (scene, shadow) = (SceneBuffers::new(&gpu, &prepared), targets::shadow_map(&gpu));
         GpuRenderer {
             gpu,
             prepared,
@@ -87,7 +87,7 @@ impl GpuRenderer {
         }
     }
 
-    fn draw(&mut self, placed: &Placed, camera: &Camera) -> Result<Frame, GpuError> {
+    fn draw(&mut self, placed: &PlacedScenery, camera: &Camera) -> Result<Frame, GpuError> {
         let GpuRenderer { gpu, prepared, scene, shadow, contact, .. } = self;
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let targets = match self.targets.take() {
@@ -121,7 +121,7 @@ impl GpuRenderer {
             pass.set_bind_group(0, &self.scene.group, &[]);
             pass.draw(0..self.scene.corners, 0..1);
         }
-        for Layer { triangles, depth } in [samples, centres] {
+        for Attachments { triangles, depth } in [samples, centres] {
             let nothing = Color { r: f64::from(NOTHING), ..Color::BLACK };
             let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
                 color_attachments: &[Some(RenderPassColorAttachment {

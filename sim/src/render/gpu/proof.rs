@@ -3,7 +3,7 @@
 use rapier3d::math::{Pose, Vector};
 
 use crate::render::cpu::CpuRenderer;
-use crate::render::{Camera, Carrier, Frame, Mesh, Part, Pattern, Placed, Scenery};
+use crate::render::{Camera, Carrier, Frame, Part, Pattern, PlacedScenery, Scenery, TriangleMesh};
 
 const SIDE_PX: u32 = 64;
 /// Of the pixels, as many may show another thing: on edges, renderers may decide otherwise.
@@ -13,7 +13,7 @@ const MEAN_DIFFERENCE: f32 = 1.0;
 
 /// A ball over a checkered floor, with its shadow.
 pub fn scenery() -> Scenery {
-    let part = |mesh: Mesh, rgb: [f32; 3], pattern: Pattern, id: u32| Part {
+    let part = |mesh: TriangleMesh, rgb: [f32; 3], pattern: Pattern, id: u32| Part {
         mesh,
         carrier: Carrier::Room,
         carrier_from_mesh: Pose::IDENTITY,
@@ -22,14 +22,14 @@ pub fn scenery() -> Scenery {
         id,
         casts_shadow: true,
     };
-    let floor = part(Mesh::plane([1.0, 1.0]), [0.8, 0.7, 0.6], Pattern::Checker([0.5, 0.4, 0.4]), 1);
-    let ball = part(Mesh::sphere(0.2), [0.7, 0.2, 0.2], Pattern::Plain, 2);
+    let floor = part(TriangleMesh::plane([1.0, 1.0]), [0.8, 0.7, 0.6], Pattern::Checker([0.5, 0.4, 0.4]), 1);
+    let ball = part(TriangleMesh::sphere(0.2), [0.7, 0.2, 0.2], Pattern::Plain, 2);
     Scenery { parts: vec![floor, ball], focus_radius_m: 1.0 }
 }
 
-pub fn placed() -> Placed {
+pub fn placed() -> PlacedScenery {
     let ball = Pose::from_translation(Vector::new(0.0, 0.0, 0.3));
-    Placed { world_from_mesh: vec![Pose::IDENTITY, ball], focus_m: Vector::ZERO }
+    PlacedScenery { world_from_mesh: vec![Pose::IDENTITY, ball], focus_m: Vector::ZERO }
 }
 
 pub fn camera() -> Camera {

@@ -10,14 +10,14 @@ use crate::render::cpu::contact::ContactMap;
 use crate::render::scene::bend::Bend;
 use crate::render::scene::prepared::Prepared;
 use crate::render::shading::light::{CONTACT_TEXELS, SAMPLES, sun_map};
-use crate::render::{Camera, Carrier, Part, Pattern, Placed};
+use crate::render::{Camera, Carrier, Part, Pattern, PlacedScenery};
 
 /// Of `picture.wgsl`'s `View`, and of its `Part`.
 const VIEW_NUMBERS: usize = 48;
 const PART_NUMBERS: usize = 24;
 
 /// What `picture.wgsl` calls its group 0.
-pub(super) struct Scene {
+pub(super) struct SceneBuffers {
     view: Buffer,
     parts: Buffer,
     contacts: Buffer,
@@ -26,8 +26,8 @@ pub(super) struct Scene {
     pub corners: u32,
 }
 
-impl Scene {
-    pub(super) fn new(gpu: &Gpu, prepared: &Prepared) -> Scene {
+impl SceneBuffers {
+    pub(super) fn new(gpu: &Gpu, prepared: &Prepared) -> SceneBuffers {
         let parts = prepared.scenery.parts.iter();
         let corners: Vec<[u32; 4]> =
             parts.zip(0..).flat_map(|(part, number)| part_corners(part, number)).collect();
@@ -47,11 +47,11 @@ impl Scene {
         let contacts = initialised(&vec![0; 2 * CONTACT_TEXELS * CONTACT_TEXELS], written);
         let resources = [&view, &numbers, &faces, &parts, &contacts].map(|buffer| buffer.as_entire_binding());
         let group = bind(gpu, &gpu.passes.scene, resources);
-        Scene { view, parts, contacts, group, corners: corners.len() as u32 }
+        SceneBuffers { view, parts, contacts, group, corners: corners.len() as u32 }
     }
 
     /// Puts every part where it is.
-    pub(super) fn place(&self, gpu: &Gpu, prepared: &Prepared, placed: &Placed, contact: &ContactMap) {
+    pub(super) fn place(&self, gpu: &Gpu, prepared: &Prepared, placed: &PlacedScenery, contact: &ContactMap) {
         let colours = prepared.linear_rgb.iter().zip(&prepared.grain);
         let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).zip(colours);
         let numbers: Vec<[u32; PART_NUMBERS]> =
@@ -65,7 +65,7 @@ impl Scene {
         &self,
         gpu: &Gpu,
         prepared: &Prepared,
-        placed: &Placed,
+        placed: &PlacedScenery,
         contact: &ContactMap,
         camera: &Camera,
     ) {

@@ -16,8 +16,8 @@ const BYTES_PER_PIXEL: u64 = 12;
 pub(super) struct Targets {
     pub width: u32,
     pub height: u32,
-    pub samples: Layer,
-    pub centres: Layer,
+    pub samples: Attachments,
+    pub centres: Attachments,
     /// Written by the device, and copied from there to where the processor can read it.
     pub picture: Buffer,
     pub readable: Buffer,
@@ -26,7 +26,7 @@ pub(super) struct Targets {
 }
 
 /// Triangles, and how near they are.
-pub(super) struct Layer {
+pub(super) struct Attachments {
     pub triangles: TextureView,
     pub depth: TextureView,
 }
@@ -37,7 +37,7 @@ impl Targets {
         if width > most || height > most {
             return Err(GpuError::TooLarge { name: gpu.name.clone(), width, height });
         }
-        let layer = |samples: u32| Layer {
+        let layer = |samples: u32| Attachments {
             triangles: texture(gpu, TRIANGLES, width * samples, height * samples),
             depth: texture(gpu, DEPTH, width * samples, height * samples),
         };

@@ -2,7 +2,7 @@
 
 use rapier3d::math::{Matrix, Vector};
 
-use crate::render::{Mesh, Vertex};
+use crate::render::{TriangleMesh, Vertex};
 
 /// The normal at a point p of some triangles, in their mesh's frame and of any length: `normal + slope_1_m * p`.
 #[derive(Clone, Copy, Debug)]
@@ -15,7 +15,7 @@ pub struct Bend {
 /// Corners have the normals that a bend gives them, but for this.
 const TOLERANCE: f32 = 1e-3;
 
-impl Mesh {
+impl TriangleMesh {
     /// The bends of the mesh, and of each triangle which of them is its.
     pub(in crate::render) fn bends(&self) -> (Vec<Bend>, Vec<usize>) {
         let mut bends: Vec<Bend> = Vec::new();

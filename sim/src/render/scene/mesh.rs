@@ -15,7 +15,7 @@ pub struct Vertex {
 
 /// Triangles, counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Mesh {
+pub struct TriangleMesh {
     pub vertices: Vec<Vertex>,
     pub triangles: Vec<[u32; 3]>,
 }
@@ -26,31 +26,35 @@ const RINGS: u32 = 6;
 /// An unbounded plane is drawn this large.
 const PLANE_M: f32 = 20.0;
 
-impl Mesh {
+impl TriangleMesh {
     /// The surface of a shape; of points, their convex hull.
-    pub fn of(primitive: &Primitive) -> Mesh {
+    pub fn of(primitive: &Primitive) -> TriangleMesh {
         match primitive {
-            Primitive::Sphere { radius_m } => Mesh::sphere(*radius_m),
-            Primitive::Capsule { radius_m, half_length_m } => Mesh::capsule(*radius_m, *half_length_m),
-            Primitive::Cylinder { radius_m, half_length_m } => Mesh::cylinder(*radius_m, *half_length_m),
-            Primitive::Box { half_extents_m } => Mesh::cuboid(*half_extents_m),
-            Primitive::Ellipsoid { radii_m } => Mesh::ellipsoid(*radii_m),
-            Primitive::Plane { half_extents_m } => Mesh::plane(*half_extents_m),
+            Primitive::Sphere { radius_m } => TriangleMesh::sphere(*radius_m),
+            Primitive::Capsule { radius_m, half_length_m } => {
+                TriangleMesh::capsule(*radius_m, *half_length_m)
+            }
+            Primitive::Cylinder { radius_m, half_length_m } => {
+                TriangleMesh::cylinder(*radius_m, *half_length_m)
+            }
+            Primitive::Box { half_extents_m } => TriangleMesh::cuboid(*half_extents_m),
+            Primitive::Ellipsoid { radii_m } => TriangleMesh::ellipsoid(*radii_m),
+            Primitive::Plane { half_extents_m } => TriangleMesh::plane(*half_extents_m),
             Primitive::Convex { vertices_m } => {
                 let (points_m, triangles) = rapier3d::parry::transformation::convex_hull(vertices_m);
-                Mesh::faceted(&points_m, &triangles)
+                TriangleMesh::faceted(&points_m, &triangles)
             }
-            Primitive::Mesh(mesh) => Mesh::faceted(&mesh.vertices_m, &mesh.triangles),
+            Primitive::Mesh(mesh) => TriangleMesh::faceted(&mesh.vertices_m, &mesh.triangles),
         }
     }
 
-    pub fn sphere(radius_m: f32) -> Mesh {
-        Mesh::capsule(radius_m, 0.0)
+    pub fn sphere(radius_m: f32) -> TriangleMesh {
+        TriangleMesh::capsule(radius_m, 0.0)
     }
 
     /// A capsule along z; with no length, a sphere.
-    pub fn capsule(radius_m: f32, half_length_m: f32) -> Mesh {
-        let mut mesh = Mesh::default();
+    pub fn capsule(radius_m: f32, half_length_m: f32) -> TriangleMesh {
+        let mut mesh = TriangleMesh::default();
         for ring in 0..=RINGS {
             let polar_rad = PI * ring as f32 / RINGS as f32;
             let middle = 2 * ring == RINGS;
@@ -67,8 +71,8 @@ impl Mesh {
         mesh
     }
 
-    pub fn ellipsoid(radii_m: Vector) -> Mesh {
-        let mut mesh = Mesh::sphere(1.0);
+    pub fn ellipsoid(radii_m: Vector) -> TriangleMesh {
+        let mut mesh = TriangleMesh::sphere(1.0);
         for vertex in &mut mesh.vertices {
             vertex.position_m *= radii_m;
             vertex.normal = (vertex.normal / radii_m).normalize();
@@ -77,8 +81,8 @@ impl Mesh {
     }
 
     /// A cylinder along z.
-    pub fn cylinder(radius_m: f32, half_length_m: f32) -> Mesh {
-        let mut mesh = Mesh::default();
+    pub fn cylinder(radius_m: f32, half_length_m: f32) -> TriangleMesh {
+        let mut mesh = TriangleMesh::default();
         let rim = |z| {
             (0..=SEGMENTS).map(move |i| {
                 let (sin, cos) = (TAU * i as f32 / SEGMENTS as f32).sin_cos();
@@ -101,8 +105,8 @@ impl Mesh {
         mesh
     }
 
-    pub fn cuboid(half_extents_m: Vector) -> Mesh {
-        let mut mesh = Mesh::default();
+    pub fn cuboid(half_extents_m: Vector) -> TriangleMesh {
+        let mut mesh = TriangleMesh::default();
         for axis in 0..3 {
             for sign in [1.0, -1.0] {
                 let mut normal = Vector::ZERO;
@@ -123,16 +127,16 @@ impl Mesh {
     }
 
     /// A rectangle at z = 0; 0 stands for no bound.
-    pub fn plane(half_extents_m: [f32; 2]) -> Mesh {
+    pub fn plane(half_extents_m: [f32; 2]) -> TriangleMesh {
         let [x, y] = half_extents_m.map(|half_m| if half_m > 0.0 { half_m } else { PLANE_M });
         let corners = [(-x, -y), (x, -y), (x, y), (-x, y)];
         let vertex = |(x, y)| Vertex { position_m: Vector::new(x, y, 0.0), normal: Vector::Z };
-        Mesh { vertices: corners.map(vertex).to_vec(), triangles: vec![[0, 1, 2], [0, 2, 3]] }
+        TriangleMesh { vertices: corners.map(vertex).to_vec(), triangles: vec![[0, 1, 2], [0, 2, 3]] }
     }
 
     /// Triangles with flat faces.
-    pub fn faceted(points_m: &[Vector], triangles: &[[u32; 3]]) -> Mesh {
-        let mut mesh = Mesh::default();
+    pub fn faceted(points_m: &[Vector], triangles: &[[u32; 3]]) -> TriangleMesh {
+        let mut mesh = TriangleMesh::default();
         for triangle in triangles {
             let [a, b, c] = triangle.map(|corner| points_m[corner as usize]);
             let normal = (b - a).cross(c - a).normalize_or_zero();

@@ -3,21 +3,21 @@
 use rapier3d::math::{Pose, Vector};
 
 use crate::mjcf::{Geom, Primitive};
-use crate::render::{Mesh, Pattern, robot_rgba};
+use crate::render::{Pattern, TriangleMesh, robot_rgba};
 use crate::{Step, World};
 
 /// Shapes and colours of a world, made once.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scenery {
     pub parts: Vec<Part>,
-    /// Shadows are drawn within this distance of [`Placed::focus_m`]: the smaller, the sharper.
+    /// Shadows are drawn within this distance of [`PlacedScenery::focus_m`]: the smaller, the sharper.
     pub focus_radius_m: f32,
 }
 
 /// One mesh that moves with its carrier.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
-    pub mesh: Mesh,
+    pub mesh: TriangleMesh,
     pub carrier: Carrier,
     pub carrier_from_mesh: Pose,
     /// sRGB, 0 to 1.
@@ -42,7 +42,7 @@ pub enum Carrier {
 
 /// Where everything is after a step.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Placed {
+pub struct PlacedScenery {
     /// Of each part.
     pub world_from_mesh: Vec<Pose>,
     /// Between the robots: what shadows have to be sharp on. It moves in steps, so that the room's shadows need seldom be drawn.
@@ -83,7 +83,7 @@ impl Scenery {
     }
 
     /// Where `step`, a step of the world that this is the scenery of, has put every part.
-    pub fn place(&self, step: &Step) -> Placed {
+    pub fn place(&self, step: &Step) -> PlacedScenery {
         let world_from_carrier = |carrier: Carrier| match carrier {
             Carrier::Room => Pose::IDENTITY,
             Carrier::Link { robot, link } => step.robots[robot].world_from_link[link],
@@ -95,7 +95,7 @@ impl Scenery {
         }
         let world_from_mesh =
             self.parts.iter().map(|part| world_from_carrier(part.carrier) * part.carrier_from_mesh);
-        Placed {
+        PlacedScenery {
             world_from_mesh: world_from_mesh.collect(),
             focus_m: (Vector::new(middle_m.x, middle_m.y, FOCUS_HEIGHT_M) / FOCUS_STEP_M).round()
                 * FOCUS_STEP_M,
@@ -109,7 +109,7 @@ fn drawn(geoms: &[Geom]) -> impl Iterator<Item = &Geom> {
 
 fn part(geom: &Geom, carrier: Carrier, [r, g, b, _]: [f32; 4], id: u32) -> Part {
     Part {
-        mesh: Mesh::of(&geom.primitive),
+        mesh: TriangleMesh::of(&geom.primitive),
         carrier,
         carrier_from_mesh: geom.body_from_geom,
         rgb: geom.checker_rgb.map_or([r, g, b], |[first, _]| first),

@@ -40,12 +40,12 @@ impl Grid {
 
 /// A number for each sample of a grid.
 #[derive(Default)]
-pub struct Rows<T> {
+pub struct SampleRows<T> {
     grid: Grid,
     numbers: Vec<T>,
 }
 
-impl<T: Copy> Rows<T> {
+impl<T: Copy> SampleRows<T> {
     /// Makes every number `value`.
     pub fn reset(&mut self, grid: Grid, value: T) {
         self.grid = grid;
@@ -64,7 +64,7 @@ impl<T: Copy> Rows<T> {
     }
 
     /// Makes every number what it is there.
-    pub fn copy(&mut self, other: &Rows<T>) {
+    pub fn copy(&mut self, other: &SampleRows<T>) {
         self.grid = other.grid;
         self.numbers.clone_from(&other.numbers);
     }

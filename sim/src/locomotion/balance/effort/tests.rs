@@ -4,12 +4,13 @@ use super::*;
 use crate::body::posed::Posed;
 use crate::locomotion::balance::load::Laden;
 
-const STILL: Motion = Motion { lift_m_s2: 0.0, turn_rad_s2: Vector::ZERO, feet: Sides::both(AT_REST) };
+const STILL: WantedMotion =
+    WantedMotion { lift_m_s2: 0.0, turn_rad_s2: Vector::ZERO, feet: Sides::both(AT_REST) };
 const AT_REST: Acceleration = Acceleration { linear_m_s2: Vector::ZERO, angular_rad_s2: Vector::ZERO };
 
-fn solve(body: &WholeBody, motion: &Motion, pressure_m: Vector, foot: Option<Side>) -> Torques {
+fn solve(body: &WholeBody, motion: &WantedMotion, pressure_m: Vector, foot: Option<Side>) -> LegTorques {
     let load = Load::of(body, &Laden::of(body), 0.0, Vector::ZERO);
-    leg_torques_within_limits(body, &load, motion, &Contact { pressure_m: flat(pressure_m), foot })
+    leg_torques_within_limits(body, &load, motion, &GroundContact { pressure_m: flat(pressure_m), foot })
 }
 
 /// On one foot under the centre of mass: each joint of that leg holds up all that is above it, and the other leg hangs.
@@ -57,10 +58,10 @@ fn the_robot_falls_away_from_the_pressure() {
 fn torques_ease_off_rather_than_saturate() {
     let body = Posed::standing().body();
     let kick = Acceleration { linear_m_s2: Vector::new(70.0, 0.0, 20.0), ..AT_REST };
-    let motion = Motion { feet: Sides { left: AT_REST, right: kick }, ..STILL };
-    let contact = Contact { pressure_m: flat(body.com_m), foot: Some(Side::Left) };
+    let motion = WantedMotion { feet: Sides { left: AT_REST, right: kick }, ..STILL };
+    let contact = GroundContact { pressure_m: flat(body.com_m), foot: Some(Side::Left) };
     let load = Load::of(&body, &Laden::of(&body), 0.0, Vector::ZERO);
-    let most_used = |torques: &Torques| {
+    let most_used = |torques: &LegTorques| {
         let used = torques.torque_n_m.by_side().flat_map(|(side, leg)| {
             let joints = &body.model.joints[LEGS[side]..];
             std::iter::zip(leg, joints)

@@ -40,7 +40,7 @@ impl Pendulum {
         let old_m = self.swing_m;
         let mut time_s = 0.0;
         while time_s < PERIOD_S {
-            let situation = Situation {
+            let situation = FootstepInputs {
                 gait: &gait,
                 swing: &swing,
                 capture_m: self.capture_m,
@@ -104,7 +104,7 @@ fn feet_do_not_cross_and_hurry_only_when_they_must() {
     let gait = Gait::new(RATE_1_S, Vector::ZERO, Vector::Y);
     let swing = Swing::at(Pose::from_translation(gait.step_m - SOLE_IN_FOOT_M));
     let plan = |push_m: Vector| {
-        let mut situation = Situation {
+        let mut situation = FootstepInputs {
             gait: &gait,
             swing: &swing,
             capture_m: Vector::ZERO,
