@@ -45,7 +45,7 @@
 mod barriers;
 pub mod bench;
 #[cfg(test)]
-mod differences;
+mod derivatives;
 mod error;
 mod model;
 pub mod qp;

@@ -15,6 +15,7 @@ pub mod locomotion;
 mod mechanism;
 pub mod mjcf;
 mod owner;
+mod plane;
 pub mod render;
 pub mod robot;
 mod sides;
@@ -27,6 +28,7 @@ pub use body::{
 };
 pub use error::SimError;
 pub use locomotion::{BaseCommand, BaseLimits, LocomotionChoice};
+pub use plane::{heading_rad, wrapped_rad};
 pub use rapier3d::math::{Pose, Rotation, Vector};
 pub use robot::{Robot, RobotCommand, RobotPlacement, RobotState};
 pub use sides::{Side, Sides};

@@ -8,14 +8,12 @@ use std::f32::consts::FRAC_PI_2;
 
 use tandem_sim::bench::{CaseReport, over_seeds};
 use tandem_sim::render::RendererKind;
-use tandem_sim::{CONTROL_HZ, Pose, Rotation, Sides, Vector};
+use tandem_sim::{CONTROL_HZ, Pose, Rotation, Sides, Vector, heading_rad, wrapped_rad};
 use tandem_tools_spec::{Protocol, ToolCall, ToolReply};
 
 use super::BenchError;
 use crate::Session;
-use crate::players::experts::skills::{
-    BarGrasp, FREE, Path, Stage, Team, heading_rad, take_softly, wrapped_rad,
-};
+use crate::players::experts::skills::{BarGrasp, FREE, Path, Stage, Team, take_softly};
 use crate::players::{Backstage, Caller, InProcess, PlayerError};
 use crate::scoring::{A, B, Done, Facts, Grip, Phase};
 use crate::spec::{Controller, EpisodeSpec};

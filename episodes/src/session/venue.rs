@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tandem_sim::mjcf::{Document, Site};
 use tandem_sim::{
     CONTROL_HZ, ObjectPlacement, Pose, RobotModel, RobotPlacement, Rotation, SceneSource, Step, Vector,
-    World, WorldSpec, assets,
+    World, WorldSpec, assets, heading_rad,
 };
 
 use crate::EpisodeError;
@@ -162,9 +162,4 @@ fn upright(path: &Path, site: &Site) -> Result<Pose, SceneError> {
         return Err(SceneError::Tilted { path, site, tilt_deg: tilt_rad.to_degrees() });
     }
     Ok(Pose::from_parts(pose.translation, Rotation::from_rotation_z(heading_rad(&pose))))
-}
-
-fn heading_rad(pose: &Pose) -> f32 {
-    let x = pose.rotation * Vector::X;
-    x.y.atan2(x.x)
 }

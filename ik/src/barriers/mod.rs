@@ -7,13 +7,41 @@
 //! not bind there:  gain (range - margin) >= what the joints can close in one step.
 
 mod capsule;
-mod position;
 mod self_collision;
-
-#[cfg(test)]
-mod tests;
 
 pub use capsule::Capsule;
 pub(crate) use capsule::Segment;
-pub use position::PositionBarrier;
 pub use self_collision::{ClosestPair, SelfCollision};
+
+use nalgebra::Vector3;
+
+use crate::model::{Configuration, FrameId};
+use crate::qp::Row;
+
+/// A plane that a frame stays beyond: normal . p >= offset with p the origin of the frame, in the root's frame.
+#[derive(Clone, Debug)]
+pub struct PositionBarrier {
+    /// The frame.
+    pub frame: FrameId,
+    /// Unit vector to the free side.
+    pub normal: Vector3<f64>,
+    /// m.
+    pub offset_m: f64,
+    /// Part of the distance that one step may take.
+    pub gain: f64,
+}
+
+impl PositionBarrier {
+    /// Distance of the frame's origin to the plane, m; negative beyond it.
+    pub fn height_m(&self, configuration: &Configuration) -> f64 {
+        self.normal.dot(&configuration.root_from_frame(self.frame).translation.vector) - self.offset_m
+    }
+
+    pub(crate) fn write(&self, configuration: &Configuration, row: &mut Row) {
+        let point = configuration.root_from_frame(self.frame).translation.vector;
+        for &joint in configuration.model().support(self.frame) {
+            row.coefficients[joint] = self.normal.dot(&configuration.velocity_of_point(&point, joint).0);
+        }
+        row.bound = -self.gain * self.height_m(configuration);
+    }
+}

@@ -4,13 +4,9 @@
 mod configuration;
 mod mjcf;
 mod parts;
-mod reduced;
 mod tree;
 #[cfg(feature = "urdf")]
 mod urdf;
-
-#[cfg(test)]
-mod tests;
 
 pub use configuration::Configuration;
 pub use parts::{Frame, FrameId, Joint, JointKind};

@@ -3,8 +3,7 @@
 use faer::Par;
 use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
 
-use super::constraint::Constraint;
-use super::problem::{Qp, QpFailure};
+use super::problem::{Constraint, Qp, QpFailure};
 
 /// A violation below this is rounding.
 const TOLERANCE: f64 = 1e-11;

@@ -8,10 +8,7 @@
 //! Source: Goldfarb and Idnani, A numerically stable dual method for solving strictly convex quadratic programs, 1983.
 
 mod active_set;
-mod constraint;
 mod problem;
-mod rows;
 
-pub use constraint::{Constraint, Row};
-pub use problem::{Qp, QpFailure};
-pub(crate) use rows::Rows;
+pub(crate) use problem::Rows;
+pub use problem::{Constraint, Qp, QpFailure, Row};

@@ -2,8 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::frame_error::FrameError;
-use super::goal::{Goal, Sink, StepContext, TaskScratch};
+use super::goal::{FrameError, Goal, Sink, StepContext, TaskScratch};
 use crate::model::{Configuration, Model};
 
 /// Puts the centre of mass at a point. e = target - centre, 3, m.

@@ -2,8 +2,7 @@
 
 use nalgebra::Isometry3;
 
-use super::frame_error::FrameError;
-use super::goal::{Goal, Sink, StepContext, TaskScratch};
+use super::goal::{FrameError, Goal, Sink, StepContext, TaskScratch};
 use super::pose::{clamped, read_columns, weighted_square, write_pose_rows};
 use crate::model::{Configuration, FrameId, Model};
 use crate::spatial::Log6;

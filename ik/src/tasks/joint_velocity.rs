@@ -1,4 +1,4 @@
-//! Joints that move at given speeds.
+//! Tasks on the speeds of all joints: given ones, none, or those of the last step.
 
 use super::goal::{Goal, Sink, StepContext, TaskScratch};
 use crate::model::{Configuration, Model};
@@ -19,5 +19,39 @@ impl Goal for JointVelocityTask {
 
     fn write(&self, _: &Configuration, context: &StepContext, _: &mut TaskScratch, sink: &mut dyn Sink) {
         sink.diagonal(self.cost / context.dt_s, &|joint| self.target[joint] * context.dt_s);
+    }
+}
+
+/// Costs joint speed: J = 1 / dt, e = 0, nv, rad/s. Pink's damping task leaves dt out; its cost is this one's over dt.
+#[derive(Clone, Debug)]
+pub struct DampingTask {
+    /// Cost per rad/s or m/s.
+    pub cost: f64,
+}
+
+impl Goal for DampingTask {
+    fn describe(&self, _: &Model) -> String {
+        "damping".into()
+    }
+
+    fn write(&self, _: &Configuration, context: &StepContext, _: &mut TaskScratch, sink: &mut dyn Sink) {
+        sink.diagonal(self.cost / context.dt_s, &|_| 0.0);
+    }
+}
+
+/// Costs changes of joint speed since the last step. J = 1 / dt, e = last velocity, nv, rad/s.
+#[derive(Clone, Debug)]
+pub struct LowAccelerationTask {
+    /// Cost per rad/s or m/s.
+    pub cost: f64,
+}
+
+impl Goal for LowAccelerationTask {
+    fn describe(&self, _: &Model) -> String {
+        "low acceleration".into()
+    }
+
+    fn write(&self, _: &Configuration, context: &StepContext, _: &mut TaskScratch, sink: &mut dyn Sink) {
+        sink.diagonal(self.cost / context.dt_s, &|joint| context.last_velocity[joint] * context.dt_s);
     }
 }

@@ -7,30 +7,19 @@
 //! Source: Sugihara, Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method, 2011.
 
 mod center_of_mass;
-mod damping;
 mod frame;
-mod frame_error;
 mod goal;
-mod joint_coupling;
+mod joint_position;
 mod joint_velocity;
-mod low_acceleration;
 mod pose;
-mod posture;
 mod relative_frame;
 
-#[cfg(test)]
-mod tests;
-
 pub use center_of_mass::CenterOfMassTask;
-pub use damping::DampingTask;
 pub use frame::FrameTask;
-pub(crate) use frame_error::ERROR_CLAMP;
-pub use frame_error::FrameError;
-pub(crate) use goal::{Goal, Sink, StepContext, TaskScratch};
-pub use joint_coupling::JointCouplingTask;
-pub use joint_velocity::JointVelocityTask;
-pub use low_acceleration::LowAccelerationTask;
-pub use posture::PostureTask;
+pub use goal::FrameError;
+pub(crate) use goal::{ERROR_CLAMP, Goal, Sink, StepContext, TaskScratch};
+pub use joint_position::{JointCouplingTask, PostureTask};
+pub use joint_velocity::{DampingTask, JointVelocityTask, LowAccelerationTask};
 pub use relative_frame::RelativeFrameTask;
 
 use crate::model::Configuration;

@@ -2,8 +2,7 @@
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector6};
 
-use super::frame_error::FrameError;
-use super::goal::{Sink, TaskScratch};
+use super::goal::{FrameError, Sink, TaskScratch};
 use crate::model::{Configuration, FrameId};
 use crate::spatial::Log6;
 

@@ -5,8 +5,8 @@ use rapier3d::math::Vector;
 use super::cases::{Case, Plan, STOP_S};
 use super::tour::Leg;
 use crate::CONTROL_DT_S as DT_S;
-use crate::locomotion::plane::flat;
 use crate::locomotion::{BaseCommand, BaseVelocity};
+use crate::plane::flat;
 
 /// Arms rise and loads swing out before anything is asked or measured.
 pub(super) const SETTLE_S: f32 = 2.0;

@@ -6,7 +6,6 @@ mod measure;
 mod motion;
 mod physics;
 mod pictures;
-mod spread;
 mod tour;
 mod trial;
 
@@ -19,7 +18,6 @@ use serde::Serialize;
 pub use cases::{CASES, Case};
 pub use physics::{PhysicsCase, PhysicsReport, physics};
 pub use pictures::{PicturesCase, PicturesReport, pictures};
-pub use spread::Spread;
 
 use crate::SimError;
 use crate::locomotion::Locomotion;
@@ -55,6 +53,22 @@ pub struct CaseReport {
     pub load_tilt_deg: Option<f32>,
     /// Mean absolute mechanical power of all joints.
     pub power_w: f32,
+}
+
+/// A figure and how much it varies: median and quartiles.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    pub median: f64,
+    pub quartiles: [f64; 2],
+}
+
+impl Spread {
+    /// Of at least one number; it puts them in order.
+    fn of(values: &mut [f64]) -> Spread {
+        values.sort_unstable_by(f64::total_cmp);
+        let at = |share: f64| values[((values.len() - 1) as f64 * share).round() as usize];
+        Spread { median: at(0.5), quartiles: [at(0.25), at(0.75)] }
+    }
 }
 
 /// Whether a case's name contains one of the comma-separated words of `filter`.
@@ -168,5 +182,17 @@ impl fmt::Display for CaseReport {
             show(self.load_tilt_deg, 1.0, "°"),
             show(Some(self.power_w), 1.0, "W"),
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quartiles_leave_a_quarter_on_each_side() {
+        let mut values = [5.0, 1.0, 4.0, 2.0, 3.0];
+        assert_eq!(Spread::of(&mut values), Spread { median: 3.0, quartiles: [2.0, 4.0] });
+        assert_eq!(Spread::of(&mut [7.0]), Spread { median: 7.0, quartiles: [7.0, 7.0] });
     }
 }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use rapier3d::math::{Pose, Vector};
 use serde::Serialize;
 
-use super::spread::Spread;
+use super::Spread;
 use crate::body::{HAND_COLUMNS, HAND_JOINTS};
 use crate::{
     ObjectPlacement, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, RobotCommand, RobotPlacement, SimError, World,

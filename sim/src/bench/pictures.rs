@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use rapier3d::math::{Pose, Vector};
 use serde::Serialize;
 
-use super::spread::Spread;
+use super::Spread;
 use crate::render::{Camera, Cameras, RendererKind, Scenery};
 use crate::{ObjectPlacement, RobotPlacement, SimError, Step, World, WorldSpec};
 

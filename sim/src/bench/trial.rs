@@ -9,8 +9,8 @@ use super::measure::{SETTLE_S, Sample, Trial, measure};
 use super::motion::{ArmMotion, SplitMix64};
 use super::tour::{self, Leg};
 use crate::body::PALM_IN_WRIST_M;
-use crate::locomotion::plane::{heading_rad, wrapped_rad};
 use crate::locomotion::{BaseCommand, BaseVelocity, Locomotion};
+use crate::plane::{heading_rad, wrapped_rad};
 use crate::robot::{RobotCommand, RobotState};
 use crate::{CONTROL_DT_S as DT_S, RobotPlacement, Side, SimError, World, WorldSpec};
 
@@ -41,7 +41,7 @@ pub(super) fn run(case: &Case, seed: u64, locomotion: Box<dyn Locomotion>) -> Re
             break;
         }
         let heading_rad =
-            unwrap(heading_rad(state.world_from_pelvis), log.last().map_or(0.0, |s| s.heading_rad));
+            unwrap(heading_rad(&state.world_from_pelvis), log.last().map_or(0.0, |s| s.heading_rad));
         let base = base_command(case, &world, &state, heading_rad, &legs, time_s, rest.base);
         disturb(case, &mut world, seed, direction, &legs, time_s);
         let upper_rad = arms.at(&rest.upper_rad, time_s);

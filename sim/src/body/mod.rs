@@ -1,7 +1,6 @@
 //! What a controller may know of a robot: its model, the order of its joints, kinematics and inverse dynamics. It knows no
 //! physics world: whoever senses a robot there fills in a [`WholeBody`].
 
-mod drive;
 mod inverse_dynamics;
 mod layout;
 mod model;
@@ -11,7 +10,6 @@ pub(crate) mod posed;
 mod tests;
 mod whole_body;
 
-pub use drive::JointDrive;
 pub use inverse_dynamics::{Acceleration, Effort};
 pub use layout::{
     ARM_COLUMNS, ARM_JOINTS, HAND_COLUMNS, HAND_JOINTS, JOINTS, UPPER, UPPER_JOINTS, WAIST_COLUMN,
@@ -22,3 +20,12 @@ pub use whole_body::WholeBody;
 
 pub(crate) use layout::{ARMS, LEG_JOINTS, LEGS, MIRRORED_ARM, WAIST, WAIST_JOINTS, check_joint_order};
 pub(crate) use whole_body::PALM_IN_WRIST_M;
+
+/// Spring, damper and feedforward of one joint for one physics step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct JointDrive {
+    pub target_rad: f32,
+    pub kp_n_m_rad: f32,
+    pub kd_n_m_s_rad: f32,
+    pub feedforward_n_m: f32,
+}

@@ -1,16 +1,15 @@
 //! Articulated trees and their contacts: dynamics in reduced coordinates on the collision detection of Rapier and Parry.
 //!
 //! A step ([`Dynamics::step`], in `solving`) finds what is near (`contacts::near`: Rapier's broad phase) and where it touches
-//! (`contacts::collision`: Parry's manifolds). Then it is, for every [`Tree`]: bias forces (`trees::bias`), mass matrix
-//! (`trees::inertia`), its factor M = L^T D L and whitened velocities (`trees::factor`); then rows of contacts
-//! (`contacts::contact`), joints (`joints::bounds`) and equalities (`joints::equality`), Gauss-Seidel on them
-//! (`solving::solver`), and new positions (`trees::kinematics`). It knows no robot and no file format.
+//! (`contacts::collision`: Parry's manifolds). Then it is, for every [`Tree`]: bias forces and mass matrix
+//! (`trees::equations`), its factor M = L^T D L and whitened velocities (`trees::factor`); then rows of contacts
+//! (`contacts::friction`), joints (`joints::bounds`) and equalities (`joints::equality`), Gauss-Seidel on them
+//! (`solving`), and new positions (`trees::kinematics`). It knows no robot and no file format.
 //!
 //! SI units, radians, world axes with z wherever gravity says, f64 throughout. The same sequence of calls gives the same
 //! bits: trees and colliders count in the order in which they were added, and so do contacts.
 
 mod contacts;
-mod error;
 mod joints;
 mod settings;
 mod snapshot;
@@ -19,22 +18,22 @@ mod solving;
 mod tests;
 mod trees;
 
+pub use contacts::ContactPoint;
 pub use contacts::collider::{Collider, ColliderId};
 pub use contacts::friction::{Directions, Friction};
-pub use contacts::touch::ContactPoint;
-pub use error::{Diverged, OtherWorld, TreeError};
 pub use joints::equality::{Equality, EqualityId};
 pub use rapier3d::glamx::{DMat3, DPose3, DQuat, DVec3};
 pub use settings::{Settings, Softness};
-pub use snapshot::DynamicsState;
+pub use snapshot::{DynamicsState, OtherWorld};
+pub use solving::Diverged;
 pub use trees::link::{Axis, Drive, Joint, Link, Mass};
 pub(crate) use trees::spatial::rounded;
 pub use trees::state::TreeState;
-pub use trees::tree::Tree;
+pub use trees::tree::{Tree, TreeError};
 pub use trees::{LinkId, TreeId};
 
 use contacts::collision::Collision;
-use solving::solver::Solver;
+use solving::Solver;
 use trees::Trees;
 
 /// Everything that moves in a world.

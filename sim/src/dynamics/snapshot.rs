@@ -1,11 +1,11 @@
 //! Saving and restoring everything that outlasts a step.
 
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 use super::Dynamics;
+use super::contacts::ContactPoint;
 use super::contacts::collision::Manifold;
-use super::contacts::touch::ContactPoint;
-use super::error::OtherWorld;
 use super::joints::equality::EqualityState;
 use super::trees::state::TreeState;
 
@@ -17,6 +17,13 @@ pub struct DynamicsState {
     touches: Vec<ContactPoint>,
     manifolds: Vec<Manifold>,
 }
+
+/// A state that belongs to another world.
+#[derive(Debug, Error, PartialEq)]
+#[error(
+    "the state has other trees or equalities than this world; one taken from a world of the same making would fit"
+)]
+pub struct OtherWorld;
 
 /// [`DynamicsState`] where it lies; serialised, both are the same bytes.
 #[derive(Serialize)]

@@ -4,7 +4,6 @@
 mod agile;
 mod balance;
 mod choice;
-pub(crate) mod plane;
 
 #[cfg(feature = "onnx")]
 pub use agile::{Agile, Network};

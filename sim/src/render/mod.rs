@@ -13,11 +13,9 @@ mod shading;
 
 pub use kind::RendererKind;
 pub use png::{DEPTH_UNIT_M, PictureError, encode_depth_png, encode_png};
-pub use scene::accents::robot_rgba;
-pub use scene::camera::Camera;
-pub use scene::cameras::Cameras;
+pub use scene::camera::{Camera, Cameras};
 pub use scene::mesh::{TriangleMesh, Vertex};
-pub use scene::scenery::{Carrier, Part, PlacedScenery, Scenery};
+pub use scene::{Carrier, Part, PlacedScenery, Scenery, robot_rgba};
 pub use shading::pattern::Pattern;
 
 use crate::Step;

@@ -1,12 +1,8 @@
 //! One robot in a world: put there, sensed, driven.
 
-mod arm;
-mod feeling;
-mod hand_force;
+mod hand_loads;
 mod joints;
 mod odometry;
-mod payload;
-mod per_joint;
 mod spawn;
 mod state;
 
@@ -25,7 +21,7 @@ use crate::body::{
 use crate::dynamics::{Dynamics, TreeId};
 use crate::locomotion::{BaseCommand, BaseLimits, LegCommand, Locomotion};
 use crate::{CONTROL_DT_S, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError};
-use feeling::Feeling;
+use hand_loads::HandLoads;
 use odometry::Odometry;
 
 /// What one robot is told for one control step.
@@ -51,7 +47,7 @@ pub struct Robot {
 struct RobotMemory {
     /// Upper-body targets at the last control step; within a step they move linearly to the new command.
     last_upper_rad: Vec<f32>,
-    feeling: Feeling,
+    hand_loads: HandLoads,
     odometry: Odometry,
     base: BaseCommand,
     fallen: bool,
@@ -92,7 +88,7 @@ impl Robot {
         let pelvis = body.world_from_pelvis();
         let upright = (pelvis.rotation * Vector::Z).z;
         self.memory.fallen |= pelvis.translation.z < FALLEN_HEIGHT_M || upright < FALLEN_TILT_COSINE;
-        self.memory.feeling.update(body, torque_n_m, PHYSICS_DT_S)
+        self.memory.hand_loads.update(body, torque_n_m, PHYSICS_DT_S)
     }
 
     /// The upper body goes linearly from the last command to this one. A controller that balances with the waist adds to

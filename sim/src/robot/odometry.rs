@@ -11,7 +11,7 @@ use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
 use crate::body::WholeBody;
-use crate::locomotion::plane::flat;
+use crate::plane::flat;
 
 /// What a robot knows of its way since it was put into the world.
 #[derive(Clone, Default, Serialize, Deserialize)]

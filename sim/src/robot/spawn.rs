@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rapier3d::math::{Pose, Rotation, Vector};
 
-use super::feeling::Feeling;
+use super::hand_loads::HandLoads;
 use super::odometry::Odometry;
 use super::{Robot, RobotMemory};
 use crate::SimError;
@@ -51,7 +51,7 @@ impl Robot {
         }
         let memory = RobotMemory {
             last_upper_rad: UPPER.iter().map(|joint| q_rad[*joint]).collect(),
-            feeling: Feeling::default(),
+            hand_loads: HandLoads::default(),
             odometry: Odometry::default(),
             base: BaseCommand::standing(pelvis.translation.z),
             fallen: false,

@@ -3,7 +3,7 @@
 use rapier3d::math::{Pose, Vector};
 use serde::{Deserialize, Serialize};
 
-use super::{Robot, RobotCommand, joints, per_joint};
+use super::{Robot, RobotCommand, joints};
 use crate::body::{JOINTS, PALM_IN_WRIST_M, RobotModel, UPPER, WholeBody};
 use crate::dynamics::{Dynamics, Tree};
 use crate::locomotion::BaseCommand;
@@ -14,11 +14,11 @@ use crate::{PHYSICS_DT_S, Sides};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotState {
     /// Published order, as the velocities and torques.
-    #[serde(with = "per_joint")]
+    #[serde(with = "joints")]
     pub q_rad: [f32; JOINTS],
-    #[serde(with = "per_joint")]
+    #[serde(with = "joints")]
     pub qd_rad_s: [f32; JOINTS],
-    #[serde(with = "per_joint")]
+    #[serde(with = "joints")]
     pub torque_n_m: [f32; JOINTS],
     pub world_from_pelvis: Pose,
     /// By the robot's own odometry: the start frame lies on the floor under the pelvis as it was put into the world, z up, x
@@ -76,7 +76,7 @@ impl Robot {
             com_m: com_m / model.mass_kg,
             com_velocity_m_s: com_velocity_m_s / model.mass_kg,
             palm_velocity_m_s,
-            hand_force_n: self.memory.feeling.force_n(),
+            hand_force_n: self.memory.hand_loads.force_n(),
             waist_target_rad: self.waist_target_rad(),
         }
     }
@@ -98,7 +98,7 @@ impl Robot {
             pelvis_from_camera: pelvis_from_world
                 * body.world_from_link[model.egocentric_link]
                 * model.egocentric.body_from_camera,
-            payload_n: self.memory.feeling.weight_n(),
+            payload_n: self.memory.hand_loads.weight_n(),
             hand_force_n: body.hand_force_n,
             fallen: self.memory.fallen,
         }

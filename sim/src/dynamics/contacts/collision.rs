@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::collider::{Collider, ColliderId, Surface};
 use super::friction::Friction;
 use super::near::Near;
-use super::touch::{Candidate, ContactPoint, Impulses};
+use super::{Candidate, ContactPoint, Impulses};
 use crate::dynamics::DVec3;
 use crate::dynamics::settings::Settings;
 use crate::dynamics::trees::{LinkId, Trees};

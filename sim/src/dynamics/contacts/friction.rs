@@ -1,6 +1,15 @@
-//! Friction of colliders, and of a pair of them, as MJCF has it.
+//! Friction of colliders as MJCF has it, and contacts as rows: one normal, and friction in a cone.
+//!
+//! Of a contact with N lanes, lane 0 is the normal impulse n >= 0, lanes 1 and 2 the tangents, 3 the spin about the
+//! normal, 4 and 5 the roll about the tangents (N = 4 leaves them out). Friction keeps to
+//!   sum_c (f_c / mu_c)^2 <= n^2,   mu_c the coefficient of lane c: 1 for the tangents, m for spin and roll,
+//! the elliptic cone of MuJoCo, which for sliding and spin is the limit surface of Howe and Cutkosky 1996. Within the
+//! cone friction stops what moves; on its surface it dissipates most, f_c ~ -mu_c^2 v_c: no direction is preferred.
 
 use serde::{Deserialize, Serialize};
+
+use crate::dynamics::settings::Pass;
+use crate::dynamics::trees::rows::ConstraintRows;
 
 /// Which of the three coefficients act: MJCF's `condim` 1, 3, 4 and 6.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -54,7 +63,7 @@ impl Friction {
         }
     }
 
-    /// Coefficients of the lanes of a contact (see `contact`); 0 where none acts.
+    /// Coefficients of the lanes of a contact (see the module's text); 0 where none acts.
     pub(in crate::dynamics) fn lanes(&self) -> [f64; 6] {
         let [slide, spin, roll] = match self.directions {
             Directions::None => [0.0; 3],
@@ -64,4 +73,220 @@ impl Friction {
         };
         [1.0, slide, slide, spin, roll, roll]
     }
+}
+
+pub struct Contacts<const N: usize> {
+    pub rows: ConstraintRows<N>,
+    pub all: Vec<Contact<N>>,
+}
+
+/// What a contact asks for beside its rows.
+pub struct Terms<const N: usize> {
+    /// Added to the normal velocity, with correction of the position and without.
+    pub bias_m_s: [f64; 2],
+    /// Share of the effective mass by which the contact gives way.
+    pub softness: f64,
+    /// mu_c; that of the normal is not used.
+    pub friction: [f64; N],
+    /// Impulses to begin with.
+    pub impulse: [f64; N],
+}
+
+pub struct Contact<const N: usize> {
+    bias_m_s: [f64; 2],
+    /// 1 / (1 + softness).
+    firmness: f64,
+    inverse_friction: [f64; N],
+    /// Y Y^T, the inverses of its diagonal, and of its blocks over the tangents and over the rolls.
+    inverse_mass: [[f64; N]; N],
+    mass: [f64; N],
+    pair_mass: [Symmetric2; 2],
+    /// s mu_c^2, with s below the inverse of the largest eigenvalue of  diag(mu) A diag(mu)  over the friction lanes.
+    slide_gain: [f64; N],
+    pub impulse: [f64; N],
+}
+
+impl<const N: usize> Default for Contacts<N> {
+    fn default() -> Self {
+        Contacts { rows: ConstraintRows::default(), all: Vec::new() }
+    }
+}
+
+impl<const N: usize> Contacts<N> {
+    pub fn clear(&mut self) {
+        self.rows.clear();
+        self.all.clear();
+    }
+
+    /// The rows of the contact were pushed just before.
+    pub fn push(&mut self, terms: Terms<N>) {
+        let inverse_mass = self.rows.last_inverse_mass();
+        let mu = terms.friction;
+        let mut most = 0.0;
+        for lane in [1, 4].into_iter().filter(|lane| lane + 1 < N) {
+            most += mu[lane] * mu[lane] * largest_of_pair(&inverse_mass, lane);
+        }
+        if N > 3 {
+            most += mu[3] * mu[3] * inverse_mass[3][3];
+        }
+        let step = if most > 0.0 { 1.0 / most } else { 0.0 };
+        self.all.push(Contact {
+            bias_m_s: terms.bias_m_s,
+            firmness: 1.0 / (1.0 + terms.softness),
+            inverse_friction: mu.map(|mu| if mu > 0.0 { 1.0 / mu } else { 0.0 }),
+            mass: std::array::from_fn(|lane| inverse(inverse_mass[lane][lane])),
+            pair_mass: [1, 4].map(|lane| Symmetric2::inverse_of(&inverse_mass, lane)),
+            inverse_mass,
+            slide_gain: mu.map(|mu| step * mu * mu),
+            impulse: terms.impulse,
+        });
+    }
+
+    pub fn warm_start(&self, w: &mut [f64]) {
+        for (group, contact) in self.all.iter().enumerate() {
+            if contact.impulse != [0.0; N] {
+                self.rows.push_impulse(group, &contact.impulse, w);
+            }
+        }
+    }
+
+    /// One sweep of Gauss-Seidel, contact by contact.
+    pub fn sweep(&mut self, pass: Pass, w: &mut [f64]) {
+        for (group, contact) in self.all.iter_mut().enumerate() {
+            let velocity = self.rows.velocity(group, w);
+            let impulse = contact.update(pass, velocity);
+            let mut change = impulse;
+            for (change, old) in change.iter_mut().zip(contact.impulse) {
+                *change -= old;
+            }
+            if change != [0.0; N] {
+                contact.impulse = impulse;
+                self.rows.push_impulse(group, &change, w);
+            }
+        }
+    }
+}
+
+impl<const N: usize> Contact<N> {
+    /// The impulses that this contact alone would choose at the velocities `v` along its lanes.
+    #[inline]
+    fn update(&self, pass: Pass, mut v: [f64; N]) -> [f64; N] {
+        let (a, old) = (&self.inverse_mass, &self.impulse);
+        let (bias_m_s, firmness) = match pass {
+            Pass::Correcting => (self.bias_m_s[0], self.firmness),
+            Pass::Relaxing => (self.bias_m_s[1], 1.0),
+        };
+        let normal = (firmness * (old[0] - (v[0] + bias_m_s) * self.mass[0])).max(0.0);
+        if normal == 0.0 {
+            return [0.0; N];
+        }
+        for c in 1..N {
+            v[c] += a[0][c] * (normal - old[0]);
+        }
+        let mut stuck = self.stick(v);
+        stuck[0] = normal;
+        if self.fullness(&stuck) <= normal * normal {
+            return stuck;
+        }
+        let slid = self.slide(old, &v, normal);
+        if N < 6 {
+            return slid;
+        }
+        // The step suits the tangents; rolls, of less inertia and friction, need a second to keep up with a ball that speeds up.
+        for c in 1..N {
+            v[c] += (1..N).map(|d| a[d][c] * (slid[d] - old[d])).sum::<f64>();
+        }
+        self.slide(&slid, &v, normal)
+    }
+
+    /// One step of projected gradients from the impulses `from`, at the velocities `v`.
+    #[inline]
+    fn slide(&self, from: &[f64; N], v: &[f64; N], normal: f64) -> [f64; N] {
+        let mut slid = [normal; N];
+        for c in 1..N {
+            slid[c] = from[c] - self.slide_gain[c] * v[c];
+        }
+        let fullness = self.fullness(&slid);
+        if fullness > normal * normal {
+            let scale = normal / fullness.sqrt();
+            slid[1..].iter_mut().for_each(|impulse| *impulse *= scale);
+        }
+        slid
+    }
+
+    /// sum_c (f_c / mu_c)^2 over the friction lanes.
+    #[inline]
+    fn fullness(&self, impulse: &[f64; N]) -> f64 {
+        (1..N).map(|c| impulse[c] * self.inverse_friction[c]).map(|share| share * share).sum()
+    }
+
+    /// Impulses that stop all lanes: the two tangents together, then spin, then the two rolls together.
+    #[inline]
+    fn stick(&self, mut v: [f64; N]) -> [f64; N] {
+        let (a, old) = (&self.inverse_mass, &self.impulse);
+        let mut new = *old;
+        self.stop_pair(1, &self.pair_mass[0], &v, &mut new);
+        if N > 3 {
+            v[3] += a[1][3] * (new[1] - old[1]) + a[2][3] * (new[2] - old[2]);
+            new[3] = if self.inverse_friction[3] > 0.0 { old[3] - v[3] * self.mass[3] } else { 0.0 };
+        }
+        if N > 5 {
+            for c in 4..6 {
+                v[c] += (1..4).map(|d| a[d][c] * (new[d] - old[d])).sum::<f64>();
+            }
+            self.stop_pair(4, &self.pair_mass[1], &v, &mut new);
+        }
+        new
+    }
+
+    /// Solves for two lanes together.
+    #[inline]
+    fn stop_pair(&self, lane: usize, mass: &Symmetric2, v: &[f64; N], impulse: &mut [f64; N]) {
+        if self.inverse_friction[lane] == 0.0 {
+            (impulse[lane], impulse[lane + 1]) = (0.0, 0.0);
+            return;
+        }
+        impulse[lane] -= mass.first * v[lane] + mass.across * v[lane + 1];
+        impulse[lane + 1] -= mass.across * v[lane] + mass.second * v[lane + 1];
+    }
+}
+
+/// Symmetric 2 x 2 matrix.
+#[derive(Default)]
+struct Symmetric2 {
+    first: f64,
+    across: f64,
+    second: f64,
+}
+
+impl Symmetric2 {
+    /// Inverse of the block of two lanes that begins at `lane`, if there is one. Of two that are not independent each is taken
+    /// by itself and does half.
+    fn inverse_of<const N: usize>(a: &[[f64; N]; N], lane: usize) -> Symmetric2 {
+        if lane + 1 >= N {
+            return Symmetric2::default();
+        }
+        let (p, q, r) = (a[lane][lane], a[lane][lane + 1], a[lane + 1][lane + 1]);
+        let determinant = p * r - q * q;
+        if determinant > DEPENDENT * p * r {
+            Symmetric2 { first: r / determinant, across: -q / determinant, second: p / determinant }
+        } else {
+            Symmetric2 { first: 0.5 * inverse(p), across: 0.0, second: 0.5 * inverse(r) }
+        }
+    }
+}
+
+/// 0 for what nothing moves.
+fn inverse(inverse_mass: f64) -> f64 {
+    if inverse_mass > 0.0 { inverse_mass.recip() } else { 0.0 }
+}
+
+/// Two directions whose determinant is below this share are one.
+const DEPENDENT: f64 = 1e-12;
+
+/// Larger eigenvalue of the 2 x 2 block that begins at `lane`.
+fn largest_of_pair<const N: usize>(a: &[[f64; N]; N], lane: usize) -> f64 {
+    let (p, q, r) = (a[lane][lane], a[lane][lane + 1], a[lane + 1][lane + 1]);
+    let half = 0.5 * (p - r);
+    0.5 * (p + r) + (half * half + q * q).sqrt()
 }

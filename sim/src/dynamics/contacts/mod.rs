@@ -2,7 +2,84 @@
 
 pub mod collider;
 pub mod collision;
-pub mod contact;
 pub mod friction;
 mod near;
-pub mod touch;
+
+use rapier3d::glamx::DVec3;
+use serde::{Deserialize, Serialize};
+
+use crate::dynamics::trees::LinkId;
+use collider::ColliderId;
+use friction::Friction;
+
+/// A point at which two colliders touched in the last step.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct ContactPoint {
+    /// The one that was added earlier first.
+    pub colliders: [ColliderId; 2],
+    /// World frame, midway between the surfaces.
+    pub point_m: DVec3,
+    /// Unit, from the first collider to the second.
+    pub normal: DVec3,
+    /// Negative where they overlap.
+    pub gap_m: f64,
+    /// Impulse on the second collider in the last step, friction included, N s.
+    pub impulse_n_s: DVec3,
+    /// Part of it along the normal.
+    pub normal_impulse_n_s: f64,
+    /// Of the point, among those of the same colliders.
+    pub(in crate::dynamics) number: u32,
+    /// The point on each collider, in its own frame.
+    pub(in crate::dynamics) local_m: [DVec3; 2],
+    /// With which the next step begins.
+    pub(in crate::dynamics) memory: Impulses,
+}
+
+/// Impulses of the correcting pass: normal, tangent (world axes), spin about the normal, roll (world axes).
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct Impulses {
+    pub normal: f64,
+    pub tangent: DVec3,
+    pub spin: f64,
+    pub roll: DVec3,
+}
+
+impl Impulses {
+    /// As lanes of a contact with these directions (normal, two tangents).
+    pub fn lanes(&self, [_, t1, t2]: [DVec3; 3]) -> [f64; 6] {
+        let (tangent, roll) = (self.tangent, self.roll);
+        [self.normal, tangent.dot(t1), tangent.dot(t2), self.spin, roll.dot(t1), roll.dot(t2)]
+    }
+
+    pub fn of_lanes(lanes: [f64; 6], [_, t1, t2]: [DVec3; 3]) -> Impulses {
+        let [normal, a, b, spin, c, d] = lanes;
+        Impulses { normal, tangent: t1 * a + t2 * b, spin, roll: t1 * c + t2 * d }
+    }
+}
+
+/// A touch on its way through a step.
+#[derive(Clone, Copy)]
+pub struct Candidate {
+    pub touch: ContactPoint,
+    pub bodies: [Option<LinkId>; 2],
+    pub friction: Friction,
+    /// Normal and two tangents, world frame.
+    pub directions: [DVec3; 3],
+}
+
+/// The touch of the last step that this one continues, among those of the same pair: the nearest on either surface.
+pub fn continued(touch: &ContactPoint, before: &[ContactPoint], match_m: f64) -> Option<Impulses> {
+    let away = |old: &ContactPoint| {
+        let on = |side: usize| old.local_m[side].distance_squared(touch.local_m[side]);
+        on(0).min(on(1))
+    };
+    let mut nearest = match_m * match_m;
+    let mut found = None;
+    for old in before {
+        let distance = away(old);
+        if distance < nearest {
+            (nearest, found) = (distance, Some(old.memory));
+        }
+    }
+    found
+}

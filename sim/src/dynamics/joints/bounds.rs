@@ -1,6 +1,6 @@
 //! Rows of single joints: drives at their effort limits, dry friction and limits of position, all along one degree of freedom.
 
-use super::drive::Law;
+use super::DriveLaw;
 use crate::dynamics::settings::{Pass, Settings};
 use crate::dynamics::trees::rows::ConstraintRows;
 use crate::dynamics::trees::tree::Tree;
@@ -24,7 +24,7 @@ struct JointRow {
 
 /// A drive near its effort limit, which the mass matrix leaves out.
 struct BoundedDrive {
-    law: Law,
+    law: DriveLaw,
     impulse: f64,
 }
 
@@ -145,7 +145,7 @@ impl BoundedDrive {
 
     /// T' = rest - implicit v' with  v' = v + (T' - T) Y.Y,  within the limit.
     fn update(&mut self, inverse_mass: f64, v: &mut f64) {
-        let Law { rest, implicit, most } = self.law;
+        let DriveLaw { rest, implicit, most } = self.law;
         let change = (rest - implicit * *v - self.impulse) / (1.0 + implicit * inverse_mass);
         let impulse = (self.impulse + change).clamp(-most, most);
         *v += inverse_mass * (impulse - self.impulse);

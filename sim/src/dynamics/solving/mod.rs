@@ -1,4 +1,163 @@
-//! A step: the impulses that meet all contacts, joints and equalities, and what the trees do by them.
+//! Contacts, joints and equalities of a step, and the impulses that meet them: projected Gauss-Seidel on whitened velocities.
 
-pub mod solver;
 mod step;
+
+pub use step::Diverged;
+
+use crate::dynamics::contacts::friction::{Contact, Contacts, Directions, Terms};
+use crate::dynamics::contacts::{Candidate, ContactPoint, Impulses, continued};
+use crate::dynamics::joints::bounds::JointRows;
+use crate::dynamics::joints::equality::Equalities;
+use crate::dynamics::settings::{Pass, Settings};
+use crate::dynamics::trees::Trees;
+use crate::dynamics::trees::spatial::ForceVector;
+
+#[derive(Default)]
+pub struct Solver {
+    /// Whitened velocities of all trees.
+    pub w: Vec<f64>,
+    joints: JointRows,
+    pub equalities: Equalities,
+    /// Contacts that slide and spin, and contacts that also resist rolling; both in the order of the candidates.
+    plain: Contacts<4>,
+    rolling: Contacts<6>,
+    /// Of the last step, in the order of their colliders.
+    pub touches: Vec<ContactPoint>,
+    /// Of this step; [`Solver::commit`] makes them those of the last.
+    found: Vec<ContactPoint>,
+}
+
+impl Solver {
+    /// Builds all rows. The trees are factorised, and `w` holds the velocities without constraints.
+    pub fn prepare(&mut self, trees: &Trees, candidates: &[Candidate], settings: &Settings) {
+        self.joints.clear();
+        for (index, (tree, offset)) in trees.all.iter().zip(&trees.offset).enumerate() {
+            self.joints.push_tree(tree, index, *offset, settings);
+        }
+        self.equalities.prepare(trees, settings);
+        self.plain.clear();
+        self.rolling.clear();
+        let mut before = 0;
+        for candidate in candidates {
+            let touch = &candidate.touch;
+            while self.touches.get(before).is_some_and(|old| old.colliders < touch.colliders) {
+                before += 1;
+            }
+            let of_pair = |old: &&ContactPoint| old.colliders == touch.colliders;
+            let same = self.touches[before..].iter().take_while(of_pair).count();
+            let old = continued(touch, &self.touches[before..before + same], settings.match_m);
+            let impulse = old.unwrap_or_default().lanes(candidate.directions);
+            match candidate.friction.directions {
+                Directions::None | Directions::Slide | Directions::SlideSpin => {
+                    push(&mut self.plain, candidate, impulse, trees, settings);
+                }
+                Directions::SlideSpinRoll => push(&mut self.rolling, candidate, impulse, trees, settings),
+            }
+        }
+    }
+
+    /// Impulses that correct positions; `w` is what positions move by. They are what the next step begins with.
+    pub fn correct(&mut self, candidates: &[Candidate], sweeps: usize) {
+        self.joints.warm_start(&mut self.w);
+        self.equalities.warm_start(&mut self.w);
+        self.plain.warm_start(&mut self.w);
+        self.rolling.warm_start(&mut self.w);
+        for _ in 0..sweeps {
+            self.sweep(Pass::Correcting);
+        }
+        self.equalities.remember();
+        self.found.clear();
+        let (mut plain, mut rolling) = (self.plain.all.iter(), self.rolling.all.iter());
+        for candidate in candidates {
+            let lanes = next_impulse(candidate, &mut plain, &mut rolling);
+            let memory = Impulses::of_lanes(lanes, candidate.directions);
+            self.found.push(ContactPoint { memory, ..candidate.touch });
+        }
+    }
+
+    /// Impulses without correction; `w` is then the velocity at the end of the step, and the touches tell what acted.
+    pub fn relax(&mut self, candidates: &[Candidate], sweeps: usize) {
+        for _ in 0..sweeps {
+            self.sweep(Pass::Relaxing);
+        }
+        let (mut plain, mut rolling) = (self.plain.all.iter(), self.rolling.all.iter());
+        for (touch, candidate) in self.found.iter_mut().zip(candidates) {
+            let lanes = next_impulse(candidate, &mut plain, &mut rolling);
+            let acted = Impulses::of_lanes(lanes, candidate.directions);
+            touch.normal_impulse_n_s = acted.normal;
+            touch.impulse_n_s = touch.normal * acted.normal + acted.tangent;
+        }
+    }
+
+    /// Keeps what the next step begins with. Before, nothing of the last step has changed.
+    pub fn commit(&mut self, trees: &mut Trees, dt_s: f64) {
+        self.joints.commit(&mut trees.all, dt_s);
+        self.equalities.commit();
+        std::mem::swap(&mut self.touches, &mut self.found);
+    }
+
+    fn sweep(&mut self, pass: Pass) {
+        self.joints.sweep(pass, &mut self.w);
+        self.equalities.sweep(pass, &mut self.w);
+        self.plain.sweep(pass, &mut self.w);
+        self.rolling.sweep(pass, &mut self.w);
+    }
+}
+
+fn push<const N: usize>(
+    contacts: &mut Contacts<N>,
+    candidate: &Candidate,
+    impulse: [f64; 6],
+    trees: &Trees,
+    settings: &Settings,
+) {
+    let [normal, t1, t2] = candidate.directions;
+    let point_m = candidate.touch.point_m;
+    trees.push_rows(&mut contacts.rows, candidate.bodies, |reference_m| {
+        let at = |direction| ForceVector::at(point_m - reference_m, direction);
+        let lanes = [
+            at(normal),
+            at(t1),
+            at(t2),
+            ForceVector::moment(normal),
+            ForceVector::moment(t1),
+            ForceVector::moment(t2),
+        ];
+        std::array::from_fn(|lane| lanes[lane])
+    });
+    let grounded = candidate.bodies.iter().any(|body| body.is_none());
+    let softness = if grounded { settings.ground_contact } else { settings.contact };
+    let gap_m = candidate.touch.gap_m;
+    let open_m_s = gap_m.max(0.0) / settings.dt_s;
+    let depth_m = (gap_m + settings.slop_m).min(0.0);
+    let correction_m_s = depth_m * softness.correction_per_s(settings.dt_s);
+    let mut friction = candidate.friction.lanes();
+    if gap_m > 0.0 {
+        // Only what is pressed resists rolling. A ball in a bowl would lose a part of its spin to every face that it is about to
+        // reach.
+        friction[4..].fill(0.0);
+    }
+    contacts.push(Terms {
+        bias_m_s: [open_m_s + correction_m_s.max(-settings.fastest_correction_m_s), open_m_s],
+        softness: softness.compliance(settings.dt_s),
+        friction: std::array::from_fn(|lane| friction[lane]),
+        impulse: std::array::from_fn(|lane| if friction[lane] > 0.0 { impulse[lane] } else { 0.0 }),
+    });
+}
+
+/// Impulses of the contact that a candidate became; candidates and contacts are in the same order.
+fn next_impulse<'a>(
+    candidate: &Candidate,
+    plain: &mut impl Iterator<Item = &'a Contact<4>>,
+    rolling: &mut impl Iterator<Item = &'a Contact<6>>,
+) -> [f64; 6] {
+    let mut lanes = [0.0; 6];
+    match candidate.friction.directions {
+        Directions::None | Directions::Slide | Directions::SlideSpin => {
+            let impulse = plain.next().map_or([0.0; 4], |contact| contact.impulse);
+            lanes[..4].copy_from_slice(&impulse);
+        }
+        Directions::SlideSpinRoll => lanes = rolling.next().map_or(lanes, |contact| contact.impulse),
+    }
+    lanes
+}

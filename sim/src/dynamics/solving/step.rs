@@ -1,7 +1,8 @@
 //! One step of everything.
 
+use thiserror::Error;
+
 use crate::dynamics::Dynamics;
-use crate::dynamics::error::Diverged;
 use crate::dynamics::trees::spatial::ForceVector;
 use crate::dynamics::trees::tree::Tree;
 
@@ -66,6 +67,16 @@ impl Dynamics {
     }
 }
 
+/// The step gave a number that is not finite; the state is that before the step.
+#[derive(Debug, Error, PartialEq)]
+#[error(
+    "physics diverged at link `{link}` of `{tree}`: a velocity or position is not finite; command less effort or slower motion"
+)]
+pub struct Diverged {
+    pub tree: String,
+    pub link: String,
+}
+
 /// m/s or rad/s. Nothing real comes near; beyond, Rapier's f32 would soon overflow.
 const FASTEST: f64 = 1e6;
 
@@ -73,7 +84,7 @@ fn unwhiten(trees: &[Tree], w: &[f64], v: &mut [f64]) {
     let mut offset = 0;
     for tree in trees {
         let range = offset..offset + tree.dofs();
-        tree.unwhiten(&w[range.clone()], &mut v[range.clone()]);
+        tree.factor.unwhiten(&tree.layout, &w[range.clone()], &mut v[range.clone()]);
         offset = range.end;
     }
 }
@@ -84,10 +95,10 @@ impl Tree {
         self.bias(gravity_m_s2);
         self.joint_forces(dt_s);
         self.composite_mass_matrix();
-        self.factorise();
+        self.factor.factorise(&self.layout);
         let mut start = std::mem::take(&mut self.unconstrained);
         self.spin_freely(dt_s, &mut start);
-        self.whiten(dt_s, &start, w);
+        self.factor.whiten(&self.layout, dt_s, &start, &mut self.rhs, w);
         self.unconstrained = start;
     }
 }

@@ -1,4 +1,4 @@
-//! M = L^T D L along the tree, and the whitened velocities w = D^1/2 L v.
+//! The factor of a mass matrix, M = L^T D L along the tree, and the whitened velocities w = D^1/2 L v.
 //!
 //! Rows of constraints are whitened as Y = D^-1/2 L^-T J^T: then the kinetic energy is |w|^2 / 2, an impulse lambda
 //! changes w by Y lambda, and the effective inverse mass of a row is Y . Y. Neither M^-1 J^T nor J M^-1 J^T is formed.
@@ -8,10 +8,10 @@
 use super::layout::Layout;
 
 pub struct Factor {
-    /// Packed rows: M, after [`Tree::factorise`] L, whose diagonal is 1 and not stored.
+    /// Packed rows: M, after [`Factor::factorise`] L, whose diagonal is 1 and not stored.
     pub h: Vec<f64>,
-    pub d: Vec<f64>,
-    pub inverse_root_d: Vec<f64>,
+    d: Vec<f64>,
+    inverse_root_d: Vec<f64>,
 }
 
 /// Anything below is rounding, not inertia: a gram at a tenth of a millimetre has 1e-11 kg m^2.
@@ -25,5 +25,77 @@ impl Factor {
 
     pub fn is_positive(&self, dof: usize) -> bool {
         self.d[dof] > SMALLEST_INERTIA
+    }
+
+    /// M = L^T D L in place, from the leaves inwards.
+    pub fn factorise(&mut self, layout: &Layout) {
+        for k in (0..layout.dofs()).rev() {
+            let range = layout.row(k);
+            let (before, from) = self.h.split_at_mut(range.start);
+            let row = &mut from[..range.len()];
+            let last = row.len() - 1;
+            let d = row[last];
+            self.d[k] = d;
+            self.inverse_root_d[k] = 1.0 / d.sqrt();
+            let path = layout.path(k);
+            for p in (0..last).rev() {
+                let share = row[p] / d;
+                let target = layout.row(usize::from(path[p]));
+                for (t, x) in before[target].iter_mut().zip(&row[..=p]) {
+                    *t -= share * x;
+                }
+                row[p] = share;
+            }
+        }
+    }
+
+    /// w = D^1/2 L v + D^-1/2 L^-T (dt rhs): the whitened velocity at the end of a step without constraints. It uses up `rhs`.
+    pub fn whiten(&self, layout: &Layout, dt_s: f64, v: &[f64], rhs: &mut [f64], w: &mut [f64]) {
+        for k in (0..layout.dofs()).rev() {
+            let row = &self.h[layout.row(k)];
+            let path = layout.path(k);
+            let force = rhs[k];
+            let mut lv = v[k];
+            for (l, j) in row.iter().zip(&path[..path.len() - 1]) {
+                let j = usize::from(*j);
+                rhs[j] -= l * force;
+                lv += l * v[j];
+            }
+            let inverse_root_d = self.inverse_root_d[k];
+            w[k] = lv / inverse_root_d + force * dt_s * inverse_root_d;
+        }
+    }
+
+    /// v = L^-1 D^-1/2 w.
+    pub fn unwhiten(&self, layout: &Layout, w: &[f64], v: &mut [f64]) {
+        for k in 0..layout.dofs() {
+            let row = &self.h[layout.row(k)];
+            let path = layout.path(k);
+            let mut lv = w[k] * self.inverse_root_d[k];
+            for (l, j) in row.iter().zip(&path[..path.len() - 1]) {
+                lv -= l * v[usize::from(*j)];
+            }
+            v[k] = lv;
+        }
+    }
+
+    /// Y = D^-1/2 L^-T J^T in place, for N rows at once that are zero outside the path of degree of freedom `k`.
+    #[inline]
+    pub fn whiten_rows<const N: usize>(&self, layout: &Layout, k: usize, y: &mut [[f64; N]]) {
+        let path = layout.path(k);
+        for p in (0..path.len()).rev() {
+            let i = usize::from(path[p]);
+            let row = &self.h[layout.row(i)];
+            let (left, right) = y.split_at_mut(p);
+            let pivot = right[0];
+            for (t, l) in left.iter_mut().zip(row) {
+                for c in 0..N {
+                    t[c] -= l * pivot[c];
+                }
+            }
+            for entry in &mut right[0] {
+                *entry *= self.inverse_root_d[i];
+            }
+        }
     }
 }

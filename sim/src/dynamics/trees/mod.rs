@@ -1,9 +1,8 @@
 //! All trees of a world, and where each one's degrees of freedom lie among all.
 
-mod bias;
+mod equations;
 mod factor;
 mod free_spin;
-mod inertia;
 mod kinematics;
 mod layout;
 pub mod link;
@@ -11,7 +10,6 @@ pub mod rows;
 pub mod spatial;
 pub mod state;
 pub mod tree;
-mod whiten;
 
 use rapier3d::glamx::{DPose3, DVec3};
 use serde::{Deserialize, Serialize};

@@ -42,7 +42,7 @@ impl<const N: usize> ConstraintRows<N> {
             self.y.push(std::array::from_fn(|row| axis.dot(wrenches[row])));
             self.column.push(k + offset as u16);
         }
-        tree.whiten_rows(last, &mut self.y[first..]);
+        tree.factor.whiten_rows(&tree.layout, last, &mut self.y[first..]);
     }
 
     /// Appends unit rows of one degree of freedom, `scale` in every row.
@@ -54,7 +54,7 @@ impl<const N: usize> ConstraintRows<N> {
         if let Some(last) = self.y.last_mut() {
             *last = scale;
         }
-        tree.whiten_rows(dof, &mut self.y[first..]);
+        tree.factor.whiten_rows(&tree.layout, dof, &mut self.y[first..]);
     }
 
     /// Adds a second part on the same tree, from `second` on, to the first, from `start` on, where their paths coincide.

@@ -1,12 +1,12 @@
 //! An articulated tree: links, their state, and the working memory of a step.
 
 use rapier3d::glamx::{DMat3, DPose3, DVec3};
+use thiserror::Error;
 
 use super::factor::Factor;
 use super::layout::Layout;
 use super::link::{Drive, Joint, Link, Mass};
 use super::spatial::{ForceVector, Inertia, MotionVector, Symmetric};
-use crate::dynamics::error::TreeError;
 
 /// Links joined into a tree. A robot is a tree with a free first link, a door one on a fixed first link, a lone
 /// object a tree of one free link.
@@ -92,7 +92,7 @@ impl Tree {
         tree.kinematics();
         tree.bias(DVec3::ZERO);
         tree.composite_mass_matrix();
-        tree.factorise();
+        tree.factor.factorise(&tree.layout);
         match (0..dofs).find(|dof| !tree.factor.is_positive(*dof)) {
             None => Ok(tree),
             Some(dof) => Err(TreeError::Massless {
@@ -125,6 +125,23 @@ impl Tree {
     pub fn mass_kg(&self) -> f64 {
         self.links.iter().map(|link| link.mass.mass_kg).sum()
     }
+}
+
+/// A tree that cannot be built.
+#[derive(Debug, Error, PartialEq)]
+pub enum TreeError {
+    #[error("tree `{tree}` has no link")]
+    Empty { tree: String },
+    #[error(
+        "link `{link}` of tree `{tree}`: its parent must be an earlier link; only the first link hangs on the world"
+    )]
+    Parent { tree: String, link: String },
+    #[error("link `{link}` of tree `{tree}` has a free joint; only the first link of a tree may be free")]
+    Free { tree: String, link: String },
+    #[error(
+        "the joint of link `{link}` of tree `{tree}` moves nothing that has inertia; give the link a mass or the joint an armature"
+    )]
+    Massless { tree: String, link: String },
 }
 
 fn check(tree: &str, links: &[Link]) -> Result<(), TreeError> {

@@ -9,7 +9,7 @@ use std::f32::consts::PI;
 use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
-use crate::locomotion::plane::{heading_rad, wrapped_rad};
+use crate::plane::{heading_rad, wrapped_rad};
 
 const GAIN_1_S: f32 = 1.5;
 const INTEGRAL_1_S: f32 = 0.5 * GAIN_1_S;
@@ -43,7 +43,7 @@ impl ReferencePlace {
         let at = world_from_pelvis.translation;
         ReferencePlace {
             position_m: [at.x, at.y],
-            heading_rad: heading_rad(world_from_pelvis),
+            heading_rad: heading_rad(&world_from_pelvis),
             integral_m_s: [0.0; 2],
             moving: false,
             correcting: false,
@@ -54,7 +54,7 @@ impl ReferencePlace {
     pub(super) fn follow(&mut self, world_from_pelvis: Pose, command: [f32; 3], dt_s: f32) -> [f32; 3] {
         let moving = command != [0.0; 3];
         let (leash_m, leash_rad) = if moving { (LEASH_M, LEASH_RAD) } else { (f32::MAX, PI) };
-        let heading_now_rad = heading_rad(world_from_pelvis);
+        let heading_now_rad = heading_rad(&world_from_pelvis);
         self.heading_rad += command[2] * dt_s;
         let turned_rad = wrapped_rad(self.heading_rad - heading_now_rad).clamp(-leash_rad, leash_rad);
         self.heading_rad = heading_now_rad + turned_rad;

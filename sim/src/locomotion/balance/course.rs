@@ -4,7 +4,7 @@ use rapier3d::math::Vector;
 use serde::{Deserialize, Serialize};
 
 use crate::locomotion::BaseVelocity;
-use crate::locomotion::plane::flat;
+use crate::plane::flat;
 
 const POSITION_GAIN_1_S: f32 = 1.0;
 const BIAS_GAIN_1_S2: f32 = 1.0;

@@ -9,7 +9,7 @@ use rapier3d::na::{SMatrix, SVector};
 use super::ground::{FootForce, distribute, leg_torques_n_m};
 use super::load::Load;
 use crate::body::{Acceleration, Effort, JOINTS, LEG_JOINTS, LEGS, WholeBody};
-use crate::locomotion::plane::flat;
+use crate::plane::flat;
 use crate::{GRAVITY_M_S2, Side, Sides};
 
 /// Horizontal force within what friction surely gives.

@@ -7,7 +7,7 @@ use rapier3d::math::{Pose, Vector};
 
 use super::gait::{Gait, PERIOD_S, TRANSFER_S};
 use super::swing::Swing;
-use crate::locomotion::plane::flat;
+use crate::plane::flat;
 
 /// Footholds lie within these of the foot that carries, along the heading and to the inside: the feet never cross.
 const REACH_M: [f32; 2] = [-0.4, 0.48];

@@ -6,7 +6,7 @@ mod tests;
 use rapier3d::math::{Pose, Vector};
 
 use crate::body::{LEG_JOINTS, LEGS, WholeBody};
-use crate::locomotion::plane::flat;
+use crate::plane::flat;
 use crate::{Side, Sides};
 
 /// Force on one foot and the point of the ground where it acts, world frame.

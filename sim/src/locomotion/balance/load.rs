@@ -3,7 +3,7 @@
 use rapier3d::math::Vector;
 
 use crate::body::WholeBody;
-use crate::locomotion::plane::flat;
+use crate::plane::flat;
 use crate::{GRAVITY_M_S2, Sides};
 
 /// A robot and what its hands carry, as one body: what is carried is a mass in each palm. Its swing does not push the robot.

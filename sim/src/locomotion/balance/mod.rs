@@ -15,10 +15,10 @@ mod swing;
 use rapier3d::math::{Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
-use super::plane::heading_rad;
 use super::{BaseCommand, BaseLimits, BaseVelocity, LegCommand, Locomotion};
 use crate::GRAVITY_M_S2;
 use crate::body::WholeBody;
+use crate::plane::heading_rad;
 use ground::middle_m;
 use load::{Laden, Load};
 use observer::Observer;
@@ -125,7 +125,7 @@ impl Locomotion for Balance {
 impl BalanceState {
     fn new(body: &WholeBody) -> BalanceState {
         let pelvis = body.world_from_pelvis();
-        let heading_rad = heading_rad(pelvis);
+        let heading_rad = heading_rad(&pelvis);
         let middle_m = middle_m(&body.world_from_soles());
         let mut pelvis_from_middle_m =
             Rotation::from_rotation_z(-heading_rad) * (pelvis.translation - middle_m);

@@ -13,7 +13,7 @@ use super::legs::{LegAngles, inverse, rotation_vector_rad};
 use super::load::Load;
 use crate::body::{JOINTS, JointDrive, LEG_JOINTS, LEGS, WholeBody};
 use crate::locomotion::LegCommand;
-use crate::locomotion::plane::flat;
+use crate::plane::flat;
 use crate::{GRAVITY_M_S2, Side, Sides};
 
 /// The centre of mass, with what the hands carry, may lie this far from the middle of the feet before the pelvis gives way.

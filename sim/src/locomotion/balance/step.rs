@@ -23,8 +23,8 @@ use super::legs::rotation_vector_rad;
 use super::load::Load;
 use super::swing::{SOLE_IN_FOOT_M, SWING_S, Swing, foot_motion};
 use crate::body::{Acceleration, JointDrive, LEGS, WholeBody};
-use crate::locomotion::plane::{flat, heading_rad, wrapped_rad};
 use crate::locomotion::{BaseVelocity, LegCommand};
+use crate::plane::{flat, heading_rad, wrapped_rad};
 use crate::{GRAVITY_M_S2, Side, Sides};
 
 const SHIFT_GAIN: f32 = 3.0;
@@ -176,13 +176,13 @@ impl Stepping {
         let return_rad =
             wrapped_rad(self.goal_rad - self.heading_rad).clamp(-RETURN_RAD_S * dt_s, RETURN_RAD_S * dt_s);
         self.heading_rad += yaw_rate_rad_s * dt_s + return_rad;
-        let ahead_rad = wrapped_rad(self.heading_rad - heading_rad(body.world_from_pelvis()));
+        let ahead_rad = wrapped_rad(self.heading_rad - heading_rad(&body.world_from_pelvis()));
         self.heading_rad += ahead_rad.clamp(-HEADING_LEASH_RAD, HEADING_LEASH_RAD) - ahead_rad;
     }
 
     /// Ahead and left of where the pelvis faces: a velocity is meant along these, and it may stay behind the heading.
     fn faced_axes(&mut self, body: &WholeBody, dt_s: f32) -> [Vector; 2] {
-        let lag_rad = wrapped_rad(self.heading_rad - heading_rad(body.world_from_pelvis()));
+        let lag_rad = wrapped_rad(self.heading_rad - heading_rad(&body.world_from_pelvis()));
         self.lag_rad += (lag_rad - self.lag_rad) * (dt_s / FACING_TIME_S);
         let facing = Rotation::from_rotation_z(self.heading_rad - self.lag_rad);
         [facing * Vector::X, facing * Vector::Y]

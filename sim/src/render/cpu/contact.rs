@@ -3,11 +3,10 @@
 use pulp::{Arch, Simd, WithSimd};
 use rapier3d::math::Vector;
 
-use super::raster::ProjectedTriangle;
+use super::raster::{Grid, ProjectedTriangle, SampleRows};
 use crate::render::scene::prepared::Prepared;
-use crate::render::shading::affine::Affine;
-use crate::render::shading::light::CONTACT_TEXELS;
-use crate::render::shading::rows::{Grid, Lanes, SampleRows, lanes};
+use crate::render::shading::CONTACT_TEXELS;
+use crate::render::shading::lanes::{Affine, Lanes, lanes};
 use crate::render::{Carrier, Part, PlacedScenery};
 
 /// What is this far above a surface darkens it no more.

@@ -1,11 +1,9 @@
 //! The embedded renderer: a visibility buffer of triangle numbers, shaded afterwards, four samples a pixel.
 
 pub mod contact;
-mod facets;
 mod raster;
 mod shade;
 mod shadow;
-mod srgb;
 mod target;
 mod view;
 
@@ -15,12 +13,10 @@ use crate::Step;
 use crate::render::scene::prepared::Prepared;
 use crate::render::{Camera, Frame, PlacedScenery, Renderer, Scenery};
 use contact::ContactMap;
-use facets::Facet;
-use shade::Rays;
+use shade::{Facet, Rays};
 use shadow::ShadowMap;
-use srgb::SrgbTable;
 use target::Target;
-use view::{Row, View};
+use view::{Row, SrgbTable, View};
 
 /// Renders on the calling thread. It keeps its buffers, and the shadows of the last state.
 pub(super) struct CpuRenderer {
@@ -91,7 +87,7 @@ impl CpuRenderer {
         if self.placed != placed {
             self.shadow.draw(simd, &self.prepared, &placed);
             self.contact.draw(&self.prepared, &placed);
-            facets::place(&mut self.facets, &self.prepared, &placed);
+            shade::place(&mut self.facets, &self.prepared, &placed);
             self.placed = placed;
         }
         target::draw(simd, &mut self.samples, &mut self.centres, &self.prepared, &self.placed, camera);

@@ -1,8 +1,61 @@
-//! Rasteriser: which samples of a picture lie in a triangle, and how near it is there.
+//! Rasteriser: the samples of a picture, row by row; which of them lie in a triangle, and how near it is there.
 
 use pulp::Simd;
 
-use crate::render::shading::rows::{Grid, LANES};
+use crate::render::shading::lanes::LANES;
+
+/// Samples in rows and columns, whose first are half a pitch from the picture's corner.
+#[derive(Clone, Copy, Default)]
+pub struct Grid {
+    pub width: usize,
+    pub height: usize,
+    /// Between neighbours, in the unit that triangles are given in.
+    pub pitch_px: f64,
+}
+
+impl Grid {
+    /// From a row to the next: rows consist of whole blocks, the last of which may reach beyond the picture.
+    pub fn stride(self) -> usize {
+        self.width.next_multiple_of(LANES)
+    }
+}
+
+/// A number for each sample of a grid.
+#[derive(Default)]
+pub struct SampleRows<T> {
+    grid: Grid,
+    numbers: Vec<T>,
+}
+
+impl<T: Copy> SampleRows<T> {
+    /// Makes every number `value`.
+    pub fn reset(&mut self, grid: Grid, value: T) {
+        self.grid = grid;
+        self.numbers.clear();
+        self.numbers.resize(grid.stride() * grid.height, value);
+    }
+
+    pub fn row(&self, row: usize) -> &[T] {
+        let start = row * self.grid.stride();
+        &self.numbers[start..start + self.grid.width]
+    }
+
+    pub fn row_mut(&mut self, row: usize) -> &mut [T] {
+        let start = row * self.grid.stride();
+        &mut self.numbers[start..start + self.grid.width]
+    }
+
+    /// Makes every number what it is there.
+    pub fn copy(&mut self, other: &SampleRows<T>) {
+        self.grid = other.grid;
+        self.numbers.clone_from(&other.numbers);
+    }
+
+    /// All of them, row by row.
+    pub fn all_mut(&mut self) -> &mut [T] {
+        &mut self.numbers
+    }
+}
 
 /// The picture of a triangle that faces the camera.
 ///

@@ -1,18 +1,31 @@
-//! Light: one sun with shadow, a sky that lights from above, a faint lamp at the camera.
+//! Sheets in one state of the world, and their light: one sun with shadow, a sky that lights from above, a faint lamp at the camera.
 
-use rapier3d::math::Vector;
+use rapier3d::math::{Matrix, Vector};
 
 use super::contact::ContactMap;
-use super::facets::Facet;
 use super::shadow::ShadowMap;
-use crate::render::shading::light::{CONTACT, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, SAMPLES, SUN, TO_SUN};
-use crate::render::shading::rows::{LANES, Lanes, axes, lanes};
-use crate::render::{Camera, Pattern};
+use crate::render::scene::prepared::{Prepared, Sheet};
+use crate::render::shading::lanes::{Affine, LANES, Lanes, axes, lanes};
+use crate::render::shading::{CONTACT, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, SAMPLES, SUN, TO_SUN};
+use crate::render::{Camera, Carrier, Pattern, PlacedScenery};
 
 /// As many points as are shaded together: enough for a loop to be worth its beginning, few enough to stay near the processor.
 pub(super) const BATCH: usize = 64;
 /// Points are worked on in whole blocks, the last of which may reach beyond the batch.
 const ROOM: usize = BATCH + LANES;
+
+/// A sheet in the world.
+#[derive(Clone, Copy)]
+pub(super) struct Facet {
+    /// The normal at a point p, of any length, is `normal + slope_1_m * p`.
+    pub normal: Vector,
+    pub slope_1_m: Option<Matrix>,
+    pub linear_rgb: [Vector; 2],
+    pub pattern: Pattern,
+    pub pattern_from_world: Affine,
+    /// Whether it is the room's, and darkened by what stands on it.
+    pub carries: bool,
+}
 
 /// Where the rays of a picture's samples begin, and how they go in the world, to a depth of 1 m.
 pub(super) struct Rays {
@@ -94,6 +107,14 @@ fn block_mut<const N: usize>(values: &mut [f32; ROOM], at: usize) -> &mut Lanes<
 #[inline(always)]
 fn dot(a: &[Lanes; 3], b: &[Lanes; 3], i: usize) -> f32 {
     a[0][i] * b[0][i] + a[1][i] * b[1][i] + a[2][i] * b[2][i]
+}
+
+/// The facets of a state, by their sheets' numbers.
+pub(super) fn place(facets: &mut Vec<Facet>, prepared: &Prepared, placed: &PlacedScenery) {
+    let rotations: Vec<_> =
+        placed.world_from_mesh.iter().map(|pose| Matrix::from_quat(pose.rotation)).collect();
+    facets.clear();
+    facets.extend(prepared.sheets.iter().map(|sheet| Facet::new(prepared, placed, &rotations, sheet)));
 }
 
 impl Rays {
@@ -257,6 +278,22 @@ impl Surfaces {
 }
 
 impl Facet {
+    fn new(prepared: &Prepared, placed: &PlacedScenery, rotations: &[Matrix], sheet: &Sheet) -> Facet {
+        let number = sheet.part as usize;
+        let (part, pose) = (&prepared.scenery.parts[number], placed.world_from_mesh[number]);
+        let rotation = rotations[number];
+        let slope_1_m = sheet.bend.slope_1_m.map(|slope_1_m| rotation * slope_1_m * rotation.transpose());
+        let at_origin = slope_1_m.map_or(Vector::ZERO, |slope_1_m| slope_1_m * pose.translation);
+        Facet {
+            normal: rotation * sheet.bend.normal - at_origin,
+            slope_1_m,
+            linear_rgb: prepared.linear_rgb[number],
+            pattern: part.pattern,
+            pattern_from_world: part.pattern.frame(pose, prepared.grain[number]),
+            carries: part.carrier == Carrier::Room,
+        }
+    }
+
     /// Of any length.
     #[inline(always)]
     fn normals<const N: usize>(&self, point_m: &[Lanes<N>; 3]) -> [Lanes<N>; 3] {

@@ -5,11 +5,10 @@ use std::ops::Range;
 use pulp::Simd;
 use rapier3d::math::Vector;
 
-use super::raster::ProjectedTriangle;
+use super::raster::{Grid, ProjectedTriangle, SampleRows};
 use crate::render::scene::prepared::Prepared;
-use crate::render::shading::affine::Affine;
-use crate::render::shading::light::{BIAS_M, FADE_TEXELS, NORMAL_OFFSET_M, TEXELS, sun_map};
-use crate::render::shading::rows::{Grid, Lanes, SampleRows, axes, lanes};
+use crate::render::shading::lanes::{Affine, Lanes, axes, lanes};
+use crate::render::shading::{BIAS_M, FADE_TEXELS, NORMAL_OFFSET_M, TEXELS, sun_map};
 use crate::render::{Carrier, PlacedScenery};
 
 /// Texels along each side of a cell: what is nearer than all of a cell is in the sun there, without a look at its texels.
@@ -37,7 +36,7 @@ pub(super) struct ShadowMap {
 
 /// "Nearness" here is [`SUN_DISTANCE_M`] minus the distance from the sun's plane, and grows towards the sun.
 ///
-/// [`SUN_DISTANCE_M`]: crate::render::shading::light::SUN_DISTANCE_M
+/// [`SUN_DISTANCE_M`]: crate::render::shading::SUN_DISTANCE_M
 #[derive(Default)]
 struct ShadowLayer {
     nearness_m: SampleRows<f32>,

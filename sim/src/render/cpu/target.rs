@@ -3,12 +3,11 @@
 use pulp::Simd;
 use rapier3d::math::{Pose, Vector};
 
-use super::raster::ProjectedTriangle;
+use super::raster::{Grid, ProjectedTriangle, SampleRows};
 use crate::render::scene::camera::NEAR_M;
 use crate::render::scene::prepared::{NOTHING, Prepared};
-use crate::render::shading::affine::Affine;
-use crate::render::shading::light::SAMPLES;
-use crate::render::shading::rows::{Grid, Lanes, SampleRows, lanes};
+use crate::render::shading::SAMPLES;
+use crate::render::shading::lanes::{Affine, Lanes, lanes};
 use crate::render::{Camera, PlacedScenery};
 
 /// Nearest surface per sample. `nearness_1_m` is 1 / depth, which is linear over a triangle's picture.

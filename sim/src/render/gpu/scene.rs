@@ -9,7 +9,7 @@ use super::targets::bind;
 use crate::render::cpu::contact::ContactMap;
 use crate::render::scene::bend::Bend;
 use crate::render::scene::prepared::Prepared;
-use crate::render::shading::light::{CONTACT_TEXELS, SAMPLES, sun_map};
+use crate::render::shading::{CONTACT_TEXELS, SAMPLES, sun_map};
 use crate::render::{Camera, Carrier, Part, Pattern, PlacedScenery};
 
 /// Of `picture.wgsl`'s `View`, and of its `Part`.

@@ -5,13 +5,13 @@ use rapier3d::math::Vector;
 use crate::render::cpu::contact::SINK_M;
 use crate::render::scene::camera::NEAR_M;
 use crate::render::scene::prepared::NOTHING;
-use crate::render::shading::light::{
-    BIAS_M, CONTACT, CONTACT_TEXELS, FADE_TEXELS, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, NORMAL_OFFSET_M,
-    OUTLINE, OUTLINE_DEPTH_STEP, SKY, SRGB_STEPS, SUN, SUN_DISTANCE_M, TEXELS, TO_SUN,
-};
 use crate::render::shading::pattern::{
     BANDS_PER_M, CHECKER_PER_M, LINES_PER_M, STRAY, TEXT_GAP, TEXT_PER_M, THREADS_PER_M, WORD_GAP,
     WORD_STRAY, WORDS_PER_M,
+};
+use crate::render::shading::{
+    BIAS_M, CONTACT, CONTACT_TEXELS, FADE_TEXELS, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, NORMAL_OFFSET_M,
+    OUTLINE, OUTLINE_DEPTH_STEP, SKY, SRGB_STEPS, SUN, SUN_DISTANCE_M, TEXELS, TO_SUN,
 };
 
 pub(super) fn text() -> String {

@@ -8,7 +8,7 @@ use wgpu::{
 
 use super::device::{Gpu, GpuError};
 use super::passes::{DEPTH, TRIANGLES};
-use crate::render::shading::light::{SAMPLES, TEXELS};
+use crate::render::shading::{SAMPLES, TEXELS};
 
 /// Colours, depths and ids, four bytes each.
 const BYTES_PER_PIXEL: u64 = 12;

@@ -1,9 +1,146 @@
-//! What is drawn: the meshes and colours of a world, where a step has put them, and the cameras that look at them.
+//! What is drawn: the meshes and colours of a world, and where a step has put them. Cameras look at it.
 
-pub mod accents;
 pub mod bend;
 pub mod camera;
-pub mod cameras;
 pub mod mesh;
 pub mod prepared;
-pub mod scenery;
+
+use rapier3d::math::{Pose, Vector};
+
+use crate::mjcf::{Geom, Primitive};
+use crate::render::{Pattern, TriangleMesh};
+use crate::{Step, World};
+
+/// Shapes and colours of a world, made once.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Scenery {
+    pub parts: Vec<Part>,
+    /// Shadows are drawn within this distance of [`PlacedScenery::focus_m`]: the smaller, the sharper.
+    pub focus_radius_m: f32,
+}
+
+/// One mesh that moves with its carrier.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    pub mesh: TriangleMesh,
+    pub carrier: Carrier,
+    pub carrier_from_mesh: Pose,
+    /// sRGB, 0 to 1.
+    pub rgb: [f32; 3],
+    pub pattern: Pattern,
+    /// What [`crate::render::Frame::ids`] shows for it; parts of one thing share one. 0 is the background.
+    pub id: u32,
+    pub casts_shadow: bool,
+}
+
+/// What a part belongs to, by its place in a [`Step`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Carrier {
+    /// It never moves; its frame is the world's.
+    Room,
+    Link {
+        robot: usize,
+        link: usize,
+    },
+    Object(usize),
+}
+
+/// Where everything is after a step.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlacedScenery {
+    /// Of each part.
+    pub world_from_mesh: Vec<Pose>,
+    /// Between the robots: what shadows have to be sharp on. It moves in steps, so that the room's shadows need seldom be drawn.
+    pub focus_m: Vector,
+}
+
+/// Ids: 0 the background, 1 the room, then robots, then objects.
+const ROOM_ID: u32 = 1;
+/// Around the middle between the robots: counter, objects and all hands.
+const FOCUS_HEIGHT_M: f32 = 0.8;
+const FOCUS_STEP_M: f32 = 0.1;
+const FOCUS_RADIUS_M: f32 = 1.25;
+/// The light stands for lamps at this height: walls and what hangs above them cast no shadow into the room.
+const LAMPS_M: f32 = 2.2;
+/// By robot, in place of the material `accent` of the robot's file.
+const ACCENTS: [[f32; 4]; 3] = [[0.12, 0.35, 0.85, 1.0], [0.95, 0.48, 0.08, 1.0], [0.15, 0.62, 0.28, 1.0]];
+const ACCENT_MATERIAL: &str = "accent";
+
+impl Scenery {
+    /// Everything in `world` that is drawn.
+    pub fn of(world: &World) -> Scenery {
+        let mut parts: Vec<Part> =
+            drawn(world.room()).map(|geom| part(geom, Carrier::Room, geom.rgba, ROOM_ID)).collect();
+        for part in &mut parts {
+            part.casts_shadow &= top_m(part) < LAMPS_M;
+        }
+        let first_robot = ROOM_ID + 1;
+        for (robot, id) in (0..world.robots().len()).zip(first_robot..) {
+            for (link, model) in world.robots()[robot].model.links.iter().enumerate() {
+                let carrier = Carrier::Link { robot, link };
+                parts
+                    .extend(drawn(&model.geoms).map(|geom| part(geom, carrier, robot_rgba(geom, robot), id)));
+            }
+        }
+        let first_object = first_robot + world.robots().len() as u32;
+        for ((object, (_, model)), id) in world.object_models().enumerate().zip(first_object..) {
+            let carrier = Carrier::Object(object);
+            parts.extend(drawn(&model.geoms).map(|geom| part(geom, carrier, geom.rgba, id)));
+        }
+        Scenery { parts, focus_radius_m: FOCUS_RADIUS_M }
+    }
+
+    /// Where `step`, a step of the world that this is the scenery of, has put every part.
+    pub fn place(&self, step: &Step) -> PlacedScenery {
+        let world_from_carrier = |carrier: Carrier| match carrier {
+            Carrier::Room => Pose::IDENTITY,
+            Carrier::Link { robot, link } => step.robots[robot].world_from_link[link],
+            Carrier::Object(object) => step.objects[object].state.world_from_object,
+        };
+        let mut middle_m = Vector::ZERO;
+        for robot in &step.robots {
+            middle_m += robot.state.world_from_pelvis.translation / step.robots.len() as f32;
+        }
+        let world_from_mesh =
+            self.parts.iter().map(|part| world_from_carrier(part.carrier) * part.carrier_from_mesh);
+        PlacedScenery {
+            world_from_mesh: world_from_mesh.collect(),
+            focus_m: (Vector::new(middle_m.x, middle_m.y, FOCUS_HEIGHT_M) / FOCUS_STEP_M).round()
+                * FOCUS_STEP_M,
+        }
+    }
+}
+
+/// Colour of a geom of robot number `robot`. Robots differ in their accents alone, so that partners can be told apart.
+pub fn robot_rgba(geom: &Geom, robot: usize) -> [f32; 4] {
+    match geom.material.as_deref() {
+        Some(ACCENT_MATERIAL) => ACCENTS[robot % ACCENTS.len()],
+        _ => geom.rgba,
+    }
+}
+
+fn drawn(geoms: &[Geom]) -> impl Iterator<Item = &Geom> {
+    geoms.iter().filter(|geom| geom.drawn)
+}
+
+fn part(geom: &Geom, carrier: Carrier, [r, g, b, _]: [f32; 4], id: u32) -> Part {
+    Part {
+        mesh: TriangleMesh::of(&geom.primitive),
+        carrier,
+        carrier_from_mesh: geom.body_from_geom,
+        rgb: geom.checker_rgb.map_or([r, g, b], |[first, _]| first),
+        pattern: match geom.checker_rgb {
+            Some([_, second]) => Pattern::Checker(second),
+            None => Pattern::of(geom.material.as_deref().unwrap_or_default()),
+        },
+        id,
+        // Nothing is below a floor.
+        casts_shadow: !matches!(geom.primitive, Primitive::Plane { .. }),
+    }
+}
+
+/// Height of the highest point of a part of the room.
+fn top_m(part: &Part) -> f32 {
+    let heights_m = part.mesh.vertices.iter().map(|vertex| (part.carrier_from_mesh * vertex.position_m).z);
+    heights_m.fold(0.0, f32::max)
+}

@@ -3,8 +3,8 @@
 use rapier3d::math::Vector;
 
 use super::bend::Bend;
-use crate::render::shading::affine::Points;
-use crate::render::shading::light::linear;
+use crate::render::shading::lanes::Points;
+use crate::render::shading::linear;
 use crate::render::{Part, Pattern, Scenery};
 
 /// Marks a sample at which nothing is.

@@ -2,8 +2,7 @@
 
 use rapier3d::math::{Matrix, Pose, Vector};
 
-use super::affine::Affine;
-use super::rows::{Lanes, lanes};
+use super::lanes::{Affine, Lanes, lanes};
 
 /// How a surface varies between two colours.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -58,7 +57,7 @@ impl Pattern {
     pub(in crate::render) fn second_rgb(self, linear_rgb: Vector) -> Vector {
         match self {
             Pattern::Plain => linear_rgb,
-            Pattern::Checker(rgb) => super::light::linear(rgb),
+            Pattern::Checker(rgb) => super::linear(rgb),
             Pattern::Wood => linear_rgb * WOOD_DARK,
             Pattern::Fabric => linear_rgb * FABRIC_DARK,
             Pattern::Print => linear_rgb * INK_DARK,

@@ -1,8 +1,7 @@
 //! Robots that walk along a course with their hands where the course has them.
 
-use tandem_sim::{CONTROL_DT_S, Pose, Sides};
+use tandem_sim::{CONTROL_DT_S, Pose, Sides, heading_rad, wrapped_rad};
 
-use super::ground::{heading_rad, wrapped_rad};
 use super::stage::{Hands, RobotMove, Stage, WALK_STEPS};
 use super::walk::{Drift, steer};
 use crate::players::PlayerError;

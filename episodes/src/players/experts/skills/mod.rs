@@ -15,7 +15,7 @@ pub use at_once::{Part, at_once};
 pub use bar::{BarGrasp, move_together, take_together};
 pub use course::{Course, FREE, Posture, follow};
 pub use cylinder::{CylinderGrasp, pick_up_all};
-pub use ground::{heading_rad, place, upright, wrapped_rad};
+pub use ground::{place, upright};
 pub use hand::closed_rad;
 pub use soft::{let_go, take_softly};
 pub use stage::{HandMove, Stage};

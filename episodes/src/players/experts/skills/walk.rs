@@ -1,8 +1,7 @@
 //! Walking to a place, several robots at once.
 
-use tandem_sim::{CONTROL_DT_S, Pose, Rotation, Sides, Vector};
+use tandem_sim::{CONTROL_DT_S, Pose, Rotation, Sides, Vector, heading_rad, wrapped_rad};
 
-use super::ground::{heading_rad, wrapped_rad};
 use super::stage::{Hands, RobotMove, Stage, WALK_STEPS, Walk};
 use crate::players::PlayerError;
 

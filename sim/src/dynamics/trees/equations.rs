@@ -1,8 +1,13 @@
-//! Bias forces: what the joints must exert so that nothing accelerates, from Newton and Euler.
+//! The equations of motion of a tree, M v' + bias = tau: the bias forces and the mass matrix M.
 //!
-//! Outwards:  a_i = a_p + v_p x S q',  f_i = I_i a_i + v_i x* I_i v_i,  with a_0 = -g.
-//! Inwards:   bias_k = S_k . f,  f_p += f_i.
+//! Bias forces are what the joints must exert so that nothing accelerates, from Newton and Euler. Outwards:
+//!   a_i = a_p + v_p x S q',  f_i = I_i a_i + v_i x* I_i v_i,  with a_0 = -g;
+//! inwards:  bias_k = S_k . f,  f_p += f_i.
 //! Source: Featherstone 2008, section 5.3, in world axes about the tree's reference.
+//!
+//! The mass matrix comes by composite rigid bodies. With I_c the inertia of a link and everything beyond it:
+//!   M_jk = S_j . I_c(k) S_k for j on the path to k.
+//! Source: Featherstone 2008, section 6.2.
 
 use rapier3d::glamx::DVec3;
 
@@ -54,6 +59,30 @@ impl Tree {
                     - MotionVector { angular: DVec3::ZERO, linear: velocity.angular.cross(velocity.linear) }
             }
             None => lifted,
+        }
+    }
+
+    /// Fills the packed rows from the links' own inertias (see [`Tree::bias`]), armatures and implicit terms.
+    pub(in crate::dynamics) fn composite_mass_matrix(&mut self) {
+        for i in (0..self.links.len()).rev() {
+            let composite = self.inertia[i];
+            let link = &self.links[i];
+            let dof = self.layout.first_dof[i];
+            for k in dof..dof + link.joint.dofs() {
+                let force = composite.mul(self.axis[k]);
+                let path = self.layout.path(k);
+                let row = &mut self.factor.h[self.layout.row(k)];
+                for (entry, j) in row.iter_mut().zip(path) {
+                    *entry = self.axis[usize::from(*j)].dot(force);
+                }
+                let armature = link.joint.axis().map_or(0.0, |axis| axis.armature);
+                if let Some(diagonal) = row.last_mut() {
+                    *diagonal += armature + self.implicit[k];
+                }
+            }
+            if let Some(parent) = link.parent {
+                self.inertia[parent] += composite;
+            }
         }
     }
 }

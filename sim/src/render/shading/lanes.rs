@@ -1,8 +1,28 @@
-//! Maps of points, worked on several at once.
+//! Numbers and maps of points, worked on several at once.
 
 use rapier3d::math::{Matrix, Pose, Vector};
 
-use super::rows::{LANES, Lanes, axes, lanes};
+/// As many as the widest registers in common use hold.
+pub const LANES: usize = 8;
+
+/// A block of numbers, or a smaller one.
+pub type Lanes<const N: usize = LANES> = [f32; N];
+
+/// Numbers of a block. A loop, for compilers make few instructions of it.
+#[inline(always)]
+pub fn lanes<const N: usize>(each: impl Fn(usize) -> f32) -> Lanes<N> {
+    let mut numbers = [0.0; N];
+    for (i, number) in numbers.iter_mut().enumerate() {
+        *number = each(i);
+    }
+    numbers
+}
+
+/// Three of something, by their axes.
+#[inline(always)]
+pub fn axes<T>(each: impl Fn(usize) -> T) -> [T; 3] {
+    [each(0), each(1), each(2)]
+}
 
 /// From points to points: each coordinate is a scalar product, and a number more.
 #[derive(Clone, Copy, Debug, Default)]

@@ -1,22 +1,51 @@
 //! What a robot's hands feel: the force on each, and the weight that each carries. Both are read from the arms' own joint
 //! torques, as far as gravity does not explain them.
+//!
+//! Force: at rest  tau - tau_gravity = -J^T f  with f the force on the palm, so
+//!   f = -(J J^T + damping I)^-1 J (tau - tau_gravity),   J: 3 x 7 [m],
+//! low-passed. Damping keeps a stretched arm, which cannot feel along itself, from reporting nonsense.
+//!
+//! Weight: at rest the torque beyond gravity is J^T f with f the load at the palm. Only the vertical part is estimated, as the
+//! least squares fit  w = -(J_z . tau) / (J_z . J_z),  low-passed, and never negative: pushing on a table is not a load.
+//! The arms' torques that carry it are fed forward.
 
 use rapier3d::math::Vector;
+use rapier3d::na::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-use super::arm::Arm;
-use super::hand_force::HandForce;
-use super::payload::Payload;
 use crate::Sides;
-use crate::body::{ARMS, JOINTS, WholeBody};
+use crate::body::{ARM_JOINTS, ARMS, JOINTS, WholeBody};
 
 #[derive(Clone, Default, Serialize, Deserialize)]
-pub(super) struct Feeling {
+pub(super) struct HandLoads {
     payload: Sides<Payload>,
     force: Sides<HandForce>,
 }
 
-impl Feeling {
+/// One arm at one instant.
+struct Arm {
+    /// Torque of each joint per newton at the palm along world x, y, z: the rows of J.
+    levers_m: [[f32; ARM_JOINTS]; 3],
+    /// Torques of the drives beyond those that hold the arm against gravity.
+    excess_n_m: [f32; ARM_JOINTS],
+}
+
+/// Slow against the arm's own motion, fast against a partner who starts to pull.
+const FORCE_FILTER_TIME_S: f32 = 0.2;
+const FORCE_DAMPING_M2: f32 = 0.002;
+/// More than an arm can hold is an impact.
+const LARGEST_FORCE_N: f32 = 80.0;
+
+/// Slow against the arm's own motion, fast against a lift of one second.
+const WEIGHT_FILTER_TIME_S: f32 = 0.12;
+/// Part of the estimate that is fed forward. At 1 two robots that pull on one object would pull without end.
+const FED_FORWARD_SHARE: f32 = 0.85;
+/// A weight explains at least this part of the torques; an arm that presses sideways shows another pattern.
+const LEAST_EXPLAINED: f32 = 0.6;
+/// Dex3-1 hands are not made for more.
+const LARGEST_WEIGHT_N: f32 = 35.0;
+
+impl HandLoads {
     /// One physics step: `torque_n_m` are the drives' torques of the last step. Returns the torques that hold all joints
     /// against gravity and the arms against the weights in the hands.
     pub(super) fn update(&mut self, body: &WholeBody, torque_n_m: &[f32], dt_s: f32) -> [f32; JOINTS] {
@@ -49,10 +78,60 @@ impl Feeling {
     }
 }
 
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct HandForce {
+    force_n: Vector,
+}
+
+impl HandForce {
+    /// World frame.
+    fn force_n(&self) -> Vector {
+        self.force_n
+    }
+
+    /// One physics step.
+    fn update(&mut self, arm: &Arm, dt_s: f32) {
+        let jacobian_m = SMatrix::<f32, 3, ARM_JOINTS>::from_fn(|row, column| arm.levers_m[row][column]);
+        let excess_n_m = SVector::from(arm.excess_n_m);
+        let normal_m2 = jacobian_m * jacobian_m.transpose() + SMatrix::identity() * FORCE_DAMPING_M2;
+        let Some(factor) = normal_m2.cholesky() else { return };
+        let fitted = factor.solve(&(jacobian_m * -excess_n_m));
+        let measured_n = Vector::new(fitted.x, fitted.y, fitted.z).clamp_length_max(LARGEST_FORCE_N);
+        self.force_n += (measured_n - self.force_n) * (dt_s / FORCE_FILTER_TIME_S);
+    }
+}
+
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Payload {
+    weight_n: f32,
+}
+
+impl Payload {
+    fn weight_n(&self) -> f32 {
+        self.weight_n
+    }
+
+    /// One physics step.
+    fn update(&mut self, arm: &Arm, dt_s: f32) {
+        let lever_m = &arm.levers_m[2];
+        let square: f32 = lever_m.iter().map(|lever| lever * lever).sum();
+        let along: f32 = lever_m.iter().zip(&arm.excess_n_m).map(|(lever, excess)| lever * excess).sum();
+        let total: f32 = arm.excess_n_m.iter().map(|excess| excess * excess).sum();
+        let explained = along * along / (square * total).max(1e-6);
+        let measured_n = if explained > LEAST_EXPLAINED { along / square } else { 0.0 };
+        let measured_n = measured_n.clamp(0.0, LARGEST_WEIGHT_N);
+        self.weight_n += (measured_n - self.weight_n) * (dt_s / WEIGHT_FILTER_TIME_S);
+    }
+
+    /// Torques of the arm's joints that carry the estimated weight.
+    fn torques_n_m(&self, arm: &Arm) -> [f32; ARM_JOINTS] {
+        arm.levers_m[2].map(|lever_m| FED_FORWARD_SHARE * self.weight_n * lever_m)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::ARM_JOINTS;
     use crate::body::posed::{Posed, model};
     use crate::{PHYSICS_DT_S, Side};
 
@@ -67,7 +146,7 @@ mod tests {
     }
 
     /// Feels long enough for the filters, with torques that hold the arms against gravity and a force on each palm.
-    fn feel(body: &WholeBody, force_n: Sides<Vector>) -> (Feeling, [f32; JOINTS]) {
+    fn feel(body: &WholeBody, force_n: Sides<Vector>) -> (HandLoads, [f32; JOINTS]) {
         let mut torque_n_m = body.gravity_torques_n_m();
         for (side, first) in ARMS.by_side() {
             let (palm_m, force_n) = (body.palms_m()[side], force_n[side]);
@@ -75,7 +154,7 @@ mod tests {
                 *torque_n_m -= body.moment_n_m(joint, palm_m, force_n);
             }
         }
-        let mut feeling = Feeling::default();
+        let mut feeling = HandLoads::default();
         let mut load_n_m = [0.0; JOINTS];
         for _ in 0..400 {
             load_n_m = feeling.update(body, &torque_n_m, PHYSICS_DT_S);
