@@ -1,4 +1,4 @@
-//! Against what scipy and statsmodels compute; `tests/peers/statistics.py` writes their figures anew.
+//! Against what scipy and statsmodels compute; `tests/peers/numerics/statistics.py` writes their figures anew.
 
 use serde::Deserialize;
 

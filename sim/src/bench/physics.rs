@@ -1,5 +1,5 @@
 //! How long a physics step of 5 ms takes: robots in the kitchen of Handover that stand, walk, or hold a bottle each.
-//! `tests/peers/physics_timing.py` steps the same situations in MuJoCo.
+//! `tests/peers/simulation/physics_timing.py` steps the same situations in MuJoCo.
 
 use std::f32::consts::PI;
 use std::time::{Duration, Instant};

@@ -1,7 +1,7 @@
 """Kills `tandem` at random moments while it records, and while it evaluates and draws pictures; looks at what is left.
 
     cargo build --release
-    python tests/peers/kills.py [KILLS] [SEED]          # 20 kills while recording and 5 each of the others
+    python tests/peers/clients/kills.py [KILLS] [SEED]          # 20 kills while recording and 5 each of the others
 
 A recording that was under way has to hold every call but those of the last second, and `recover` has to make it whole;
 what was stopped has to go on, and to end as it ends when nobody stops it. Needs nothing but Python.
@@ -16,7 +16,7 @@ import tempfile
 import time
 from pathlib import Path
 
-TANDEM = Path(__file__).resolve().parents[2] / "target/release/tandem"
+TANDEM = Path(__file__).resolve().parents[3] / "target/release/tandem"
 TASKS, SEEDS = "handover", "0-1"
 LEAST_S, MOST_S = 0.3, 2.5
 LOST_S = 1.0

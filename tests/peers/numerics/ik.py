@@ -1,8 +1,8 @@
 """Inverse kinematics against Pink and mink, and forward kinematics against MuJoCo, in one run on this machine.
 
-    python -m venv /tmp/peers && /tmp/peers/bin/pip install -r tests/peers/ik.txt
+    python -m venv /tmp/peers && /tmp/peers/bin/pip install -r tests/peers/numerics/ik.txt
     cargo build --release -p tandem-ik --examples
-    /tmp/peers/bin/python tests/peers/ik.py
+    /tmp/peers/bin/python tests/peers/numerics/ik.py
 
 Same robot file, same 200 pairs of wrist poses, same costs, limits, time step and tolerances for all. Prints a table,
 and fails if Pink's iteration counts are not the recorded ones, which `cargo test -p tandem-ik` holds ours against, if
@@ -27,7 +27,7 @@ import numpy as np
 import pinocchio as pin
 import pink
 
-REPOSITORY = Path(__file__).resolve().parents[2]
+REPOSITORY = Path(__file__).resolve().parents[3]
 DATA = REPOSITORY / "ik/tests/data"
 URDF = DATA / "g1_upper_body.urdf"
 ROBOT = REPOSITORY / "sim/assets/robots/g1_dex3/robot.xml"

@@ -1,8 +1,8 @@
 """Plays an episode by a policy behind `/act`, with arrays as the package json_numpy writes them.
 
-    pip install -r tests/peers/act.txt
+    pip install -r tests/peers/policies/act.txt
     cargo build --release
-    python tests/peers/act.py target/release/tandem
+    python tests/peers/policies/act.py target/release/tandem
 """
 
 import http.server

@@ -1,9 +1,9 @@
 """Checks a running server with the official clients of its faces: MCP (the Python SDK, one major version or the other, and the
 inspector), the types and strict modes of the OpenAI and Anthropic SDKs, and the OpenAPI validator.
 
-    pip install -r tests/peers/clients.txt                 # or, in another environment, -r tests/peers/clients_mcp2.txt
+    pip install -r tests/peers/clients/clients.txt                 # or, in another environment, -r tests/peers/clients/clients_mcp2.txt
     tandem serve &
-    python tests/peers/clients.py http://127.0.0.1:8700
+    python tests/peers/clients/clients.py http://127.0.0.1:8700
 
 Where `npx` is installed, the inspector is checked, too. What of an SDK is not installed is left out, and said.
 """

@@ -4,7 +4,7 @@ Both draw the kitchen of Handover from the same files with a shadow and four sam
 time of all their threads. MuJoCo draws colour alone; ours are colour, depth and ids.
 
     cargo build --release
-    MUJOCO_GL=osmesa python tests/peers/render.py      # needs Mesa: apt-get install libosmesa6
+    MUJOCO_GL=osmesa python tests/peers/simulation/render.py      # needs Mesa: apt-get install libosmesa6
 """
 
 import json

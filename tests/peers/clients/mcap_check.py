@@ -1,8 +1,8 @@
 """Reads a recording with software that others wrote: the `mcap` package's validating reader, Foxglove's protobuf
 descriptors as the file carries them, and `jsonschema`.
 
-    pip install -r tests/peers/mcap_check.txt
-    python tests/peers/mcap_check.py runs/<name>/episode.mcap       # or what a killed server left, episode.mcap.partial
+    pip install -r tests/peers/clients/mcap_check.txt
+    python tests/peers/clients/mcap_check.py runs/<name>/episode.mcap       # or what a killed server left, episode.mcap.partial
 
 Prints one line per topic; exits 1 with the reason if anything is wrong.
 """

@@ -1,9 +1,9 @@
 """Our physics against MuJoCo's: the same fourteen scenes, and the time of a step of the same robots.
 
-    python -m venv /tmp/peers && /tmp/peers/bin/pip install -r tests/peers/physics.txt
+    python -m venv /tmp/peers && /tmp/peers/bin/pip install -r tests/peers/simulation/physics.txt
     cargo build --release
-    /tmp/peers/bin/python tests/peers/physics.py timing --json physics.json
-    /tmp/peers/bin/python tests/peers/physics.py references
+    /tmp/peers/bin/python tests/peers/simulation/physics.py timing --json physics.json
+    /tmp/peers/bin/python tests/peers/simulation/physics.py references
 
 `timing` steps robots in the kitchen on one thread, with MuJoCo and then with `tandem bench physics`, prints the ratios
 and fails where we take more than LARGEST_RATIO of MuJoCo's time. CARGO_TARGET_DIR is respected.
@@ -29,7 +29,7 @@ import numpy as np
 import physics_by_hand
 import physics_timing
 
-SCENES = Path(__file__).resolve().parent / "scenes"
+SCENES = Path(__file__).resolve().parents[1] / "scenes"
 TRUTH_DT_S = 0.00025
 # Time constant of every soft constraint of the truth; MuJoCo's default is 0.02.
 TRUTH_TIME_CONSTANT_S = 0.002

@@ -1,9 +1,9 @@
 """Plays an episode by a policy behind openpi's own wire format: `msgpack_numpy` of the package openpi-client, and the protocol of
 openpi's `websocket_policy_server`. Its client is tried on the same server first.
 
-    pip install -r tests/peers/openpi.txt
+    pip install -r tests/peers/policies/openpi.txt
     cargo build --release
-    python tests/peers/openpi.py target/release/tandem
+    python tests/peers/policies/openpi.py target/release/tandem
 """
 
 import threading

@@ -1,7 +1,7 @@
 """Plays episodes by `gateway/examples/agents/agent.py`, two at a time, and looks at what is kept of them.
 
     cargo build --release
-    python tests/peers/agent.py target/release/tandem
+    python tests/peers/policies/agent.py target/release/tandem
 """
 
 import json
@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 
-AGENT = pathlib.Path(__file__).resolve().parents[2] / "gateway/examples/agents/agent.py"
+AGENT = pathlib.Path(__file__).resolve().parents[3] / "gateway/examples/agents/agent.py"
 
 
 def main():

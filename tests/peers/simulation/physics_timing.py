@@ -14,7 +14,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-REPOSITORY = Path(__file__).resolve().parents[2]
+REPOSITORY = Path(__file__).resolve().parents[3]
 ASSETS = REPOSITORY / "sim/assets"
 TANDEM = Path(os.environ.get("CARGO_TARGET_DIR", REPOSITORY / "target")) / "release/tandem"
 

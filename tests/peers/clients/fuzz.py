@@ -1,8 +1,8 @@
 """Calls a running server with what its own OpenAPI description allows and with what it does not, by `schemathesis`, all checks.
 
-    pip install -r tests/peers/fuzz.txt
+    pip install -r tests/peers/clients/fuzz.txt
     tandem serve --max-episodes 64 &
-    python tests/peers/fuzz.py http://127.0.0.1:8700 [OPERATION ...]
+    python tests/peers/clients/fuzz.py http://127.0.0.1:8700 [OPERATION ...]
 
 Every operation has an episode of its own, under the benchmark protocol. One thing JSON Schema cannot say, and it is left
 out here: that a region names at most 256 pixels.

@@ -1,8 +1,8 @@
 """Drives a running server as learned policies do: MessagePack, numpy, one call per chunk; then one operator per robot.
 
-    pip install -r tests/peers/client.txt
+    pip install -r tests/peers/clients/client.txt
     tandem serve --max-episodes 16 &
-    python tests/peers/client.py http://127.0.0.1:8700
+    python tests/peers/clients/client.py http://127.0.0.1:8700
 
 A token that the server wants is read from the environment, TANDEM_TOKEN.
 """
