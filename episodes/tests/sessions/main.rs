@@ -1,13 +1,11 @@
 //! Sessions on real physics.
 
-mod after_the_end;
 mod at_rest;
 mod checkpoints;
 mod commands;
 mod common;
-mod disclosure;
+mod endings;
 mod films;
-mod hand_force;
 mod hands;
 mod recordings;
 mod renderers;

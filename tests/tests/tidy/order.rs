@@ -12,7 +12,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "sim",
         &[
-            &["units", "sides", "dynamics", "owner"],
+            &["units", "sides", "plane", "dynamics", "owner"],
             &["error"],
             &["assets"],
             &["mjcf"],

@@ -9,7 +9,7 @@ const PIXELS: usize = 320 * 240;
 
 /// What such a policy reads of a reply.
 #[derive(Debug, Deserialize)]
-struct Reply {
+struct StepReply {
     step: u32,
     observation: Observation,
 }
@@ -67,7 +67,7 @@ fn one_call_steps_and_returns_what_is_seen_then() {
         let args = json!({ "robots": rows(robots, 20), "observe": look });
         let (status, bytes) = call(&server, &id, "send_joint_chunk", &args);
         assert_eq!(status, 200);
-        let reply: Reply = rmp_serde::from_slice(&bytes).expect("a reply");
+        let reply: StepReply = rmp_serde::from_slice(&bytes).expect("a reply");
         let seen = &reply.observation;
         assert_eq!((reply.step, seen.images.len(), seen.states[1].robot.as_str()), (step, 0, "B"));
         assert_eq!(seen.states[0].joint_positions_rad.len(), 43);
