@@ -1,5 +1,8 @@
 //! Every refusal as RFC 9457 problem details. The detail says what would work; what is our own fault goes to the log only.
 
+#[cfg(test)]
+mod goldens;
+
 use std::time::Duration;
 
 use axum::{

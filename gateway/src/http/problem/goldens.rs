@@ -1,0 +1,149 @@
+//! Every refusal as its caller gets it, kept in a file: a change of code shows as a change of what is served.
+//!
+//! `UPDATE_EXPECT=1 cargo test --release -p tandem --lib goldens` writes the file anew.
+
+use std::{env, fs, io, path::Path, sync::Arc, time::Duration};
+
+use axum::{
+    body::to_bytes,
+    http::{HeaderName, StatusCode, header},
+    response::IntoResponse,
+};
+use serde_json::{Value, json};
+use tandem_episodes::{CheckpointError, EpisodeError, OutputError, SceneError, SimError};
+use tandem_tools_spec::{EndReason, SpecError};
+
+use super::ApiError;
+use crate::{hosting::HostingError, token::TokenError};
+
+fn failure() -> io::Error {
+    io::Error::other("disk full")
+}
+
+fn own_refusals() -> Vec<ApiError> {
+    let no_route = |other_method| ApiError::NoRoute {
+        method: "PUT".into(),
+        path: "/v1/x".into(),
+        have: vec!["GET /healthz".into(), "POST /mcp".into()],
+        other_method,
+    };
+    vec![
+        no_route(false),
+        no_route(true),
+        ApiError::EpisodeMismatch { path: "a".into(), body: "\"b\"".into() },
+        ApiError::NoEpisodeNamed { tool: "wait".into() },
+        ApiError::ForeignHost("evil.example".into()),
+        ApiError::ForeignOrigin("http://evil.example".into()),
+        ApiError::MalformedJson("expected value at line 1".into()),
+        ApiError::MalformedMsgpack("it ends too early".into()),
+        ApiError::NoToken,
+        ApiError::Key,
+        ApiError::NoObject("a number"),
+        ApiError::SlowBody { limit: Duration::from_secs(30) },
+        ApiError::BrokenBody("connection reset".into()),
+        ApiError::BodyTooLarge { limit_bytes: 2_000_000 },
+        ApiError::ContentType("text/plain".into()),
+        ApiError::Busy { limit: 256 },
+        ApiError::TooManyRequests { per_second: 10 },
+        ApiError::UnknownFormat { name: "yaml".into() },
+        ApiError::Protocol { status: StatusCode::BAD_REQUEST, detail: "the path is no text".into() },
+        ApiError::Protocol { status: StatusCode::UNPROCESSABLE_ENTITY, detail: "no query".into() },
+        ApiError::Reply(failure().into()),
+        ApiError::Unrecorded {
+            error: Box::new(HostingError::TooManyWaiting { limit: 16 }.into()),
+            recording_failed: "disk full".into(),
+        },
+    ]
+}
+
+fn hosting_refusals() -> Vec<HostingError> {
+    let robot = || "A".to_owned();
+    vec![
+        HostingError::UnknownEpisode { id: "x".into() },
+        HostingError::TooManyEpisodes { limit: 8 },
+        HostingError::TooManyWaiting { limit: 16 },
+        HostingError::ShuttingDown,
+        HostingError::EpisodeStopped,
+        HostingError::EpisodePanicked,
+        HostingError::Folder { runs: "runs".into(), source: failure() },
+        HostingError::OtherStep { expected: 1, now: 2 },
+        HostingError::DoubleCommand { robot: robot(), waits_for: vec!["B".into(), "C".into()] },
+        HostingError::DoubleCommand { robot: robot(), waits_for: Vec::new() },
+        HostingError::LateCommand { robot: robot(), from_step: 1, to_step: 9 },
+        HostingError::OperatorFinished { robot: robot() },
+        HostingError::NeedsOperator,
+        HostingError::HostsBusiness,
+        HostingError::NoTalk,
+        HostingError::TooMuchSaid { robot: robot(), unheard: 8 },
+        HostingError::KeyUsed,
+        HostingError::Token(TokenError::Form { place: "the environment".into() }),
+        HostingError::Thread(failure()),
+        HostingError::Shared(Arc::new(HostingError::TooManyEpisodes { limit: 8 })),
+        HostingError::Shared(Arc::new(HostingError::EpisodeStopped)),
+    ]
+}
+
+fn episode_refusals() -> Vec<EpisodeError> {
+    vec![
+        EpisodeError::UnknownTask { id: "x".into(), have: vec!["handover"] },
+        EpisodeError::UnknownRobot { name: "Z".into(), have: vec!["A".into(), "B".into()] },
+        EpisodeError::ForeignRobot { name: "B".into(), own: "A".into() },
+        EpisodeError::DepthImage { protocol: "agentic" },
+        EpisodeError::TooManySteps { asked: 60, most: 25, protocol: "agentic" },
+        EpisodeError::PixelOutside { u: 320, v: 0, width: 320, height: 240 },
+        EpisodeError::Ended { reason: EndReason::Finished },
+        EpisodeError::Sim(SimError::WithoutGpu),
+        EpisodeError::from(SceneError::Tilted { path: "s.xml".into(), site: "task".into(), tilt_deg: 3.0 }),
+        CheckpointError::NoPhase { path: "c".into(), phase: "p2".into() }.into(),
+        EpisodeError::Build(failure()),
+        OutputError::Io { path: "runs".into(), source: failure() }.into(),
+    ]
+}
+
+fn spec_refusals() -> Vec<SpecError> {
+    vec![
+        SpecError::UnknownTool { name: "fly".into(), have: vec!["wait", "walk"] },
+        SpecError::Malformed {
+            tool: "wait",
+            place: "steps: ".into(),
+            reason: "no number".into(),
+            example: "{}".into(),
+        },
+        SpecError::Invalid { tool: "wait", reason: "steps is 0".into() },
+    ]
+}
+
+async fn served(error: ApiError) -> Value {
+    let response = error.into_response();
+    let names = [header::CONTENT_TYPE, header::RETRY_AFTER, header::WWW_AUTHENTICATE, header::CONNECTION];
+    let header =
+        |name: &HeaderName| Some(format!("{name}: {}", response.headers().get(name)?.to_str().unwrap()));
+    let headers: Vec<String> = names.iter().filter_map(header).collect();
+    let status = response.status().as_u16();
+    let body = to_bytes(response.into_body(), usize::MAX).await.unwrap();
+    json!({ "status": status, "headers": headers, "body": String::from_utf8(body.into()).unwrap() })
+}
+
+#[tokio::test]
+async fn every_refusal_is_served_as_its_golden_has_it() {
+    let hosting = hosting_refusals().into_iter().map(ApiError::from);
+    let episode = episode_refusals().into_iter().map(|error| HostingError::from(error).into());
+    let within =
+        spec_refusals().into_iter().map(|error| HostingError::from(EpisodeError::from(error)).into());
+    let spec = spec_refusals().into_iter().map(ApiError::from);
+    let mut all = Vec::new();
+    for error in own_refusals().into_iter().chain(hosting).chain(episode).chain(within).chain(spec) {
+        all.push(served(error).await);
+    }
+    let text = serde_json::to_string_pretty(&all).unwrap() + "\n";
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/http/problem/goldens.json");
+    if env::var_os("UPDATE_EXPECT").is_some() {
+        fs::write(&path, &text).unwrap();
+    }
+    let kept = fs::read_to_string(&path).unwrap_or_default();
+    let differs = kept.lines().zip(text.lines()).find(|(kept, now)| kept != now);
+    assert!(
+        kept == text,
+        "what is served has changed at {differs:?}; if that is meant, write the golden anew with UPDATE_EXPECT=1"
+    );
+}
