@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use tandem_tools_spec::{EndReason, SpecError};
+use tandem_tools_spec::{EndReason, Refusal, RefusalClass, SpecError};
 
 /// The text says what would work, because its reader is often a language model.
 #[derive(Debug, thiserror::Error)]
@@ -43,6 +43,35 @@ pub enum EpisodeError {
     Build(#[source] std::io::Error),
     #[error(transparent)]
     Output(#[from] crate::output::OutputError),
+}
+
+impl EpisodeError {
+    /// What this error is to its caller.
+    pub const fn refusal(&self) -> Refusal {
+        use RefusalClass::{Conflict, Invalid, NotFound};
+        match self {
+            EpisodeError::UnknownTask { .. } => Refusal::new("unknown-task", "Unknown task", NotFound),
+            EpisodeError::UnknownRobot { .. } => Refusal::new("unknown-robot", "Unknown robot", NotFound),
+            EpisodeError::ForeignRobot { .. } => {
+                Refusal::new("foreign-robot", "Another operator's robot", Conflict)
+            }
+            EpisodeError::DepthImage { .. } => Refusal::new("depth-image", "No depth images", Conflict),
+            EpisodeError::TooManySteps { .. } => Refusal::new("too-many-steps", "Too many steps", Invalid),
+            EpisodeError::PixelOutside { .. } => {
+                Refusal::new("pixel-outside", "Pixel outside the image", Invalid)
+            }
+            EpisodeError::Ended { .. } => Refusal::new("ended", "Episode ended", Conflict),
+            EpisodeError::Spec(error) => error.refusal(),
+            EpisodeError::Diverged(_) => Refusal::new("diverged", "Physics diverged", Conflict),
+            EpisodeError::Scene(_) => Refusal::new("scene", "Scene does not fit the task", Invalid),
+            EpisodeError::Checkpoint(_) => Refusal::new("checkpoint", "Checkpoint does not fit", Invalid),
+            EpisodeError::Sim(_)
+            | EpisodeError::Ik(_)
+            | EpisodeError::Picture(_)
+            | EpisodeError::Build(_)
+            | EpisodeError::Output(_) => Refusal::INTERNAL,
+        }
+    }
 }
 
 impl From<SceneError> for EpisodeError {

@@ -1,7 +1,6 @@
-//! What can be wrong with a call before any world is asked, and the body every refusal is served with.
+//! What can be wrong with a call before any world is asked.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use crate::refusal::{Refusal, RefusalClass};
 
 /// A call that does not fit the contract. The text says what would work, because its reader is often a language model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -36,19 +35,16 @@ pub enum SpecError {
     },
 }
 
-/// The body of every refusal: RFC 9457 problem details, served as `application/problem+json`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct ProblemBody {
-    /// A stable name for the kind of problem, as `urn:tandem:problem:unknown-robot`.
-    #[serde(rename = "type")]
-    pub kind: String,
-    /// The kind in words; the same for all problems of one kind.
-    pub title: String,
-    /// The HTTP status.
-    pub status: u16,
-    /// What was wrong with this call and what would work.
-    pub detail: String,
-    /// Why the recording of the episode is not complete; left out where it is.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub recording_failed: Option<String>,
+impl SpecError {
+    /// What this error is to its caller.
+    pub const fn refusal(&self) -> Refusal {
+        match self {
+            SpecError::UnknownTool { .. } => {
+                Refusal::new("unknown-tool", "Unknown tool", RefusalClass::NotFound)
+            }
+            SpecError::Malformed { .. } | SpecError::Invalid { .. } => {
+                Refusal::new("invalid-arguments", "Invalid arguments", RefusalClass::Invalid)
+            }
+        }
+    }
 }

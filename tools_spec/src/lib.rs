@@ -13,13 +13,14 @@ mod error;
 mod limits;
 mod list;
 mod parts;
+mod refusal;
 mod schema;
 mod strict_value;
 mod tool;
 mod tools;
 
 pub use asked::{Asked, Look, parse_start};
-pub use error::{ProblemBody, SpecError};
+pub use error::SpecError;
 pub use list::{
     ActCall, EPISODE_TOOLS, LookCall, LookReply, ManageCall, ManageReply, ToolCall, ToolReply, tool_specs,
 };
@@ -29,6 +30,7 @@ pub use parts::{
     ImageFormat, JointValues, OperatorToken, Operators, Partner, PartnerDid, PhaseReached, PixelRegion, Png,
     Pose, Protocol, Range, RobotFallen, RobotReport, StopReason,
 };
+pub use refusal::{ProblemBody, Refusal, RefusalClass};
 pub use schema::{EpisodeToolSpec, Format, ToolSpec};
 pub use tool::{Route, Tool, parse_args};
 pub use tools::*;

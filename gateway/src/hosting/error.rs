@@ -3,6 +3,7 @@
 use std::{io, path::PathBuf, sync::Arc};
 
 use tandem_episodes::EpisodeError;
+use tandem_tools_spec::{Refusal, RefusalClass};
 
 use crate::token::TokenError;
 
@@ -132,18 +133,61 @@ pub enum HostingError {
 }
 
 impl HostingError {
-    /// Whether the same request may be answered later.
-    pub fn may_work_later(&self) -> bool {
+    /// What this error is to its caller.
+    pub fn refusal(&self) -> Refusal {
+        use RefusalClass::{Conflict, Failed, Forbidden, Gone, Invalid, NotFound, TooMany, Unavailable};
         match self {
-            HostingError::TooManyEpisodes { .. }
-            | HostingError::TooManyWaiting { .. }
-            | HostingError::ShuttingDown
-            | HostingError::TooMuchSaid { .. } => true,
-            HostingError::Shared(error) => error.may_work_later(),
-            _ => false,
+            HostingError::Episode(error) => error.refusal(),
+            HostingError::UnknownEpisode { .. } => {
+                Refusal::new("unknown-episode", "Unknown episode", NotFound)
+                    .hint("start_episode (POST /v1/episodes) starts one")
+            }
+            HostingError::TooManyEpisodes { .. } => {
+                Refusal::new("too-many-episodes", "Too many episodes", TooMany)
+                    .retry_after_s(10)
+                    .hint("finish or DELETE one, or try again later")
+            }
+            HostingError::TooManyWaiting { .. } => {
+                Refusal::new("too-many-calls", "Too many calls at once", TooMany).retry_after_s(1)
+            }
+            HostingError::ShuttingDown => {
+                Refusal::new("shutting-down", "Shutting down", Unavailable).retry_after_s(60)
+            }
+            HostingError::EpisodeStopped => {
+                Refusal::new("episode-stopped", "Episode stopped", Gone).hint(START_ANOTHER)
+            }
+            HostingError::EpisodePanicked => {
+                Refusal::new("episode-failed", "The simulator failed", Failed).hint(START_ANOTHER)
+            }
+            HostingError::OtherStep { .. } => Refusal::new("other-step", "Another step", Conflict),
+            HostingError::DoubleCommand { .. } => {
+                Refusal::new("double-command", "Commanded already", Conflict)
+            }
+            HostingError::LateCommand { .. } => Refusal::new("late-command", "Commanded late", Conflict),
+            HostingError::OperatorFinished { .. } => {
+                Refusal::new("operator-finished", "Operator has finished", Conflict)
+            }
+            HostingError::NeedsOperator => Refusal::new("needs-operator", "Driven by operators", Forbidden),
+            HostingError::HostsBusiness => Refusal::new("hosts-business", "Not for operators", Forbidden),
+            HostingError::NoTalk => Refusal::new("no-talk", "Nobody hears", Conflict),
+            HostingError::TooMuchSaid { .. } => {
+                Refusal::new("too-much-said", "Too much said", TooMany).retry_after_s(1)
+            }
+            HostingError::KeyUsed => Refusal::new("key-used", "Key used", Invalid),
+            HostingError::Shared(error) => error.refusal(),
+            HostingError::Folder { .. } | HostingError::Token(_) | HostingError::Thread(_) => {
+                Refusal::INTERNAL
+            }
         }
     }
+
+    /// Whether the same request will be refused again.
+    pub fn is_final(&self) -> bool {
+        self.refusal().retry_after_s.is_none()
+    }
 }
+
+const START_ANOTHER: &str = "start another with start_episode (POST /v1/episodes)";
 
 fn waiting_text(waits_for: &[String]) -> String {
     match waits_for {

@@ -73,7 +73,7 @@ impl Hosted {
         let key = format!("{}:{key}", robot.as_deref().unwrap_or_default());
         let (hosted, asked) = (self.clone(), request.clone());
         let work = async move { hosted.answer(robot, asked).await.map(Arc::new).map_err(Arc::new) };
-        let lasting = |made: &Outcome| made.as_ref().map_or_else(|error| !error.may_work_later(), |_| true);
+        let lasting = |made: &Outcome| made.as_ref().map_or_else(|error| error.is_final(), |_| true);
         let Once { reply, again } = self.kept.once(&key, request, work, lasting).await?;
         Ok(Once { reply: reply.map_err(HostingError::Shared)?, again })
     }

@@ -68,7 +68,7 @@ impl EpisodeTable {
     ) -> Result<Once<StartReply>, HostingError> {
         let (table, request) = (self.clone(), (args.clone(), driving));
         let work = async move { table.start_driven(args, driving).await.map_err(Arc::new) };
-        let lasting = |made: &Started| made.as_ref().map_or_else(|error| !error.may_work_later(), |_| true);
+        let lasting = |made: &Started| made.as_ref().map_or_else(|error| error.is_final(), |_| true);
         let Once { reply, again } = self.starts.once(key, request, work, lasting).await?;
         Ok(Once { reply: reply.map_err(HostingError::Shared)?, again })
     }

@@ -5,9 +5,9 @@ use serde_json::{Map, Value, json};
 use super::format::Format;
 use super::plain::plain_schema;
 use super::spec::ToolSpec;
-use crate::error::ProblemBody;
 use crate::limits::MOST_STEPS;
 use crate::parts::{Heard, Partner};
+use crate::refusal::ProblemBody;
 use crate::tool::Tool;
 use crate::tools::{Briefing, Finish, GetStatus, StartEpisode};
 

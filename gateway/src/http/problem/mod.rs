@@ -9,8 +9,7 @@ use axum::{
     http::{HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
 };
-use tandem_episodes::EpisodeError;
-use tandem_tools_spec::{Format, ProblemBody, SpecError};
+use tandem_tools_spec::{Format, ProblemBody, Refusal, RefusalClass, SpecError};
 
 use crate::hosting::{EpisodeThread, HostingError};
 
@@ -32,7 +31,7 @@ pub enum ApiError {
         recording_failed: String,
     },
     /// The host of the episodes, or the episode itself, refused.
-    #[error("{0}{way}", way = way_out(.0))]
+    #[error("{0}{hint}", hint = hint(.0))]
     Hosting(#[from] HostingError),
     /// No such route, or not with this method.
     #[error("{method} {path} is not served; have: {}", .have.join(", "))]
@@ -140,104 +139,126 @@ pub enum ApiError {
     Reply(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
 
-/// What a caller over HTTP can do about a refusal whose text does not say so: the host does not know the routes.
-fn way_out(error: &HostingError) -> &'static str {
-    match error {
-        HostingError::UnknownEpisode { .. } => "; start_episode (POST /v1/episodes) starts one",
-        HostingError::TooManyEpisodes { .. } => "; finish or DELETE one, or try again later",
-        HostingError::EpisodeStopped | HostingError::EpisodePanicked => {
-            "; start another with start_episode (POST /v1/episodes)"
-        }
-        HostingError::Episode(_)
-        | HostingError::TooManyWaiting { .. }
-        | HostingError::ShuttingDown
-        | HostingError::Folder { .. }
-        | HostingError::OtherStep { .. }
-        | HostingError::DoubleCommand { .. }
-        | HostingError::LateCommand { .. }
-        | HostingError::OperatorFinished { .. }
-        | HostingError::NeedsOperator
-        | HostingError::HostsBusiness
-        | HostingError::NoTalk
-        | HostingError::TooMuchSaid { .. }
-        | HostingError::KeyUsed
-        | HostingError::Token(_)
-        | HostingError::Thread(_) => "",
-        HostingError::Shared(error) => way_out(error),
+/// What the caller can do, as it follows the text of an error that does not say it.
+fn hint(error: &HostingError) -> String {
+    error.refusal().hint.map_or_else(String::new, |hint| format!("; {hint}"))
+}
+
+/// What a refusal is over HTTP.
+#[derive(Debug, Clone, Copy)]
+struct Problem {
+    /// A stable name.
+    kind: &'static str,
+    /// The name in words.
+    title: &'static str,
+    status: StatusCode,
+    /// Seconds after which the same request may work.
+    retry_after_s: Option<u16>,
+    /// Whether the text is for the log only.
+    internal: bool,
+}
+
+impl Problem {
+    /// One that HTTP alone knows.
+    const fn new(kind: &'static str, title: &'static str, status: StatusCode) -> Problem {
+        Problem { kind, title, status, retry_after_s: None, internal: false }
     }
 }
 
-/// A kind of problem: a stable name, the name in words, and the status it is served with.
-type Kind = (&'static str, &'static str, StatusCode);
+impl From<Refusal> for Problem {
+    fn from(refusal: Refusal) -> Problem {
+        let Refusal { kind, title, class, retry_after_s, .. } = refusal;
+        let internal = class == RefusalClass::Internal;
+        Problem { kind, title, status: status(class), retry_after_s, internal }
+    }
+}
+
+fn status(class: RefusalClass) -> StatusCode {
+    match class {
+        RefusalClass::NotFound => StatusCode::NOT_FOUND,
+        RefusalClass::Invalid => StatusCode::UNPROCESSABLE_ENTITY,
+        RefusalClass::Conflict => StatusCode::CONFLICT,
+        RefusalClass::Forbidden => StatusCode::FORBIDDEN,
+        RefusalClass::Gone => StatusCode::GONE,
+        RefusalClass::TooMany => StatusCode::TOO_MANY_REQUESTS,
+        RefusalClass::Unavailable => StatusCode::SERVICE_UNAVAILABLE,
+        RefusalClass::Failed | RefusalClass::Internal => StatusCode::INTERNAL_SERVER_ERROR,
+    }
+}
 
 impl ApiError {
-    fn kind(&self) -> Kind {
+    fn problem(&self) -> Problem {
+        use RefusalClass::{Forbidden, Invalid, NotFound, TooMany, Unavailable};
         match self {
-            ApiError::Spec(error) => spec_kind(error),
-            ApiError::Unrecorded { error, .. } => error.kind(),
-            ApiError::Hosting(error) => hosting_kind(error),
+            ApiError::Spec(error) => error.refusal().into(),
+            ApiError::Hosting(error) => error.refusal().into(),
+            ApiError::Unrecorded { error, .. } => error.problem(),
             ApiError::NoRoute { other_method: false, .. } => {
-                ("no-route", "No such route", StatusCode::NOT_FOUND)
+                Refusal::new("no-route", "No such route", NotFound).into()
             }
             ApiError::NoRoute { other_method: true, .. } => {
-                ("no-method", "Method not allowed", StatusCode::METHOD_NOT_ALLOWED)
+                Problem::new("no-method", "Method not allowed", StatusCode::METHOD_NOT_ALLOWED)
             }
             ApiError::EpisodeMismatch { .. } => {
-                ("episode-mismatch", "Two episodes named", StatusCode::UNPROCESSABLE_ENTITY)
+                Refusal::new("episode-mismatch", "Two episodes named", Invalid).into()
             }
             ApiError::NoEpisodeNamed { .. } => {
-                ("no-episode-named", "No episode named", StatusCode::UNPROCESSABLE_ENTITY)
+                Refusal::new("no-episode-named", "No episode named", Invalid).into()
             }
-            ApiError::ForeignHost(_) => ("foreign-host", "Foreign host", StatusCode::FORBIDDEN),
-            ApiError::ForeignOrigin(_) => ("foreign-origin", "Foreign origin", StatusCode::FORBIDDEN),
-            ApiError::NoObject(_) => ("no-object", "No JSON object", StatusCode::UNPROCESSABLE_ENTITY),
-            ApiError::SlowBody { .. } => ("slow-body", "Body too slow", StatusCode::REQUEST_TIMEOUT),
-            ApiError::MalformedJson(_) => ("malformed-json", "Malformed JSON", StatusCode::BAD_REQUEST),
+            ApiError::ForeignHost(_) => Refusal::new("foreign-host", "Foreign host", Forbidden).into(),
+            ApiError::ForeignOrigin(_) => Refusal::new("foreign-origin", "Foreign origin", Forbidden).into(),
+            ApiError::NoObject(_) => Refusal::new("no-object", "No JSON object", Invalid).into(),
+            ApiError::SlowBody { .. } => {
+                Problem::new("slow-body", "Body too slow", StatusCode::REQUEST_TIMEOUT)
+            }
+            ApiError::MalformedJson(_) => {
+                Problem::new("malformed-json", "Malformed JSON", StatusCode::BAD_REQUEST)
+            }
             ApiError::MalformedMsgpack(_) => {
-                ("malformed-msgpack", "Malformed MessagePack", StatusCode::BAD_REQUEST)
+                Problem::new("malformed-msgpack", "Malformed MessagePack", StatusCode::BAD_REQUEST)
             }
-            ApiError::NoToken => ("no-token", "No token", StatusCode::UNAUTHORIZED),
-            ApiError::Key => ("invalid-key", "Invalid key", StatusCode::BAD_REQUEST),
-            ApiError::BrokenBody(_) => ("broken-body", "Body not received", StatusCode::BAD_REQUEST),
+            ApiError::NoToken => Problem::new("no-token", "No token", StatusCode::UNAUTHORIZED),
+            ApiError::Key => Problem::new("invalid-key", "Invalid key", StatusCode::BAD_REQUEST),
+            ApiError::BrokenBody(_) => {
+                Problem::new("broken-body", "Body not received", StatusCode::BAD_REQUEST)
+            }
             ApiError::BodyTooLarge { .. } => {
-                ("body-too-large", "Body too large", StatusCode::PAYLOAD_TOO_LARGE)
+                Problem::new("body-too-large", "Body too large", StatusCode::PAYLOAD_TOO_LARGE)
             }
             ApiError::ContentType(_) => {
-                ("content-type", "Unsupported content type", StatusCode::UNSUPPORTED_MEDIA_TYPE)
+                Problem::new("content-type", "Unsupported content type", StatusCode::UNSUPPORTED_MEDIA_TYPE)
             }
-            ApiError::Busy { .. } => ("busy", "Too many requests at once", StatusCode::SERVICE_UNAVAILABLE),
+            ApiError::Busy { .. } => {
+                Refusal::new("busy", "Too many requests at once", Unavailable).retry_after_s(1).into()
+            }
             ApiError::TooManyRequests { .. } => {
-                ("too-many-requests", "Too many requests", StatusCode::TOO_MANY_REQUESTS)
+                Refusal::new("too-many-requests", "Too many requests", TooMany).retry_after_s(1).into()
             }
             ApiError::UnknownFormat { .. } => {
-                ("unknown-format", "Unknown format", StatusCode::UNPROCESSABLE_ENTITY)
+                Refusal::new("unknown-format", "Unknown format", Invalid).into()
             }
-            ApiError::Protocol { status, .. } => ("bad-request", "Bad request", *status),
-            ApiError::Reply(_) => INTERNAL,
+            ApiError::Protocol { status, .. } => Problem::new("bad-request", "Bad request", *status),
+            ApiError::Reply(_) => Refusal::INTERNAL.into(),
         }
     }
 
     /// The status that it is served with.
     pub fn status(&self) -> StatusCode {
-        self.kind().2
+        self.problem().status
     }
 
     /// The kind's stable name.
     pub fn name(&self) -> &'static str {
-        self.kind().0
+        self.problem().kind
     }
 
-    /// The body that this refusal is served with. What is our own fault is logged.
+    /// The body that this refusal is served with. What is the server's own fault is logged.
     pub fn body(&self) -> ProblemBody {
-        let (kind, title, status) = self.kind();
+        let Problem { kind, title, status, internal, .. } = self.problem();
         if status.is_server_error() {
             tracing::error!(error = %self, "request failed");
         }
-        let detail = if (kind, title, status) == INTERNAL {
-            "the server failed; its log says why".into()
-        } else {
-            self.to_string()
-        };
+        let detail = if internal { "the server failed; its log says why".into() } else { self.to_string() };
         ProblemBody {
             kind: format!("urn:tandem:problem:{kind}"),
             title: title.into(),
@@ -264,29 +285,7 @@ impl ApiError {
             None => self,
         }
     }
-
-    /// Seconds after which the same request may work.
-    fn retry_after_s(&self) -> Option<u16> {
-        match self {
-            ApiError::Unrecorded { error, .. } => error.retry_after_s(),
-            ApiError::Hosting(error) => hosting_retry_s(error),
-            ApiError::Busy { .. } | ApiError::TooManyRequests { .. } => Some(1),
-            _ => None,
-        }
-    }
 }
-
-fn hosting_retry_s(error: &HostingError) -> Option<u16> {
-    match error {
-        HostingError::TooManyWaiting { .. } | HostingError::TooMuchSaid { .. } => Some(1),
-        HostingError::TooManyEpisodes { .. } => Some(10),
-        HostingError::ShuttingDown => Some(60),
-        HostingError::Shared(error) => hosting_retry_s(error),
-        _ => None,
-    }
-}
-
-const INTERNAL: Kind = ("internal", "Internal error", StatusCode::INTERNAL_SERVER_ERROR);
 
 /// That a response refuses, and the name of the problem's kind.
 #[derive(Debug, Clone, Copy)]
@@ -294,12 +293,12 @@ pub struct Refused(pub &'static str);
 
 impl IntoResponse for ApiError {
     fn into_response(self) -> Response {
-        let (_, _, status) = self.kind();
+        let Problem { kind, status, retry_after_s, .. } = self.problem();
         let text = serde_json::json!(self.body()).to_string();
         let mut response = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], text).into_response();
-        response.extensions_mut().insert(Refused(self.name()));
+        response.extensions_mut().insert(Refused(kind));
         let headers = response.headers_mut();
-        if let Some(seconds) = self.retry_after_s() {
+        if let Some(seconds) = retry_after_s {
             headers.insert(header::RETRY_AFTER, seconds.into());
         }
         if status == StatusCode::UNAUTHORIZED {
@@ -309,75 +308,6 @@ impl IntoResponse for ApiError {
             headers.insert(header::CONNECTION, HeaderValue::from_static("close"));
         }
         response
-    }
-}
-
-fn hosting_kind(error: &HostingError) -> Kind {
-    match error {
-        HostingError::Episode(error) => episode_kind(error),
-        HostingError::UnknownEpisode { .. } => ("unknown-episode", "Unknown episode", StatusCode::NOT_FOUND),
-        HostingError::TooManyEpisodes { .. } => {
-            ("too-many-episodes", "Too many episodes", StatusCode::TOO_MANY_REQUESTS)
-        }
-        HostingError::TooManyWaiting { .. } => {
-            ("too-many-calls", "Too many calls at once", StatusCode::TOO_MANY_REQUESTS)
-        }
-        HostingError::ShuttingDown => ("shutting-down", "Shutting down", StatusCode::SERVICE_UNAVAILABLE),
-        HostingError::EpisodeStopped => ("episode-stopped", "Episode stopped", StatusCode::GONE),
-        HostingError::EpisodePanicked => {
-            ("episode-failed", "The simulator failed", StatusCode::INTERNAL_SERVER_ERROR)
-        }
-        HostingError::OtherStep { .. } => ("other-step", "Another step", StatusCode::CONFLICT),
-        HostingError::DoubleCommand { .. } => ("double-command", "Commanded already", StatusCode::CONFLICT),
-        HostingError::LateCommand { .. } => ("late-command", "Commanded late", StatusCode::CONFLICT),
-        HostingError::OperatorFinished { .. } => {
-            ("operator-finished", "Operator has finished", StatusCode::CONFLICT)
-        }
-        HostingError::NeedsOperator => ("needs-operator", "Driven by operators", StatusCode::FORBIDDEN),
-        HostingError::HostsBusiness => ("hosts-business", "Not for operators", StatusCode::FORBIDDEN),
-        HostingError::NoTalk => ("no-talk", "Nobody hears", StatusCode::CONFLICT),
-        HostingError::TooMuchSaid { .. } => ("too-much-said", "Too much said", StatusCode::TOO_MANY_REQUESTS),
-        HostingError::KeyUsed => ("key-used", "Key used", StatusCode::UNPROCESSABLE_ENTITY),
-        HostingError::Shared(error) => hosting_kind(error),
-        HostingError::Folder { .. } | HostingError::Token(_) | HostingError::Thread(_) => INTERNAL,
-    }
-}
-
-fn episode_kind(error: &EpisodeError) -> Kind {
-    match error {
-        EpisodeError::UnknownTask { .. } => ("unknown-task", "Unknown task", StatusCode::NOT_FOUND),
-        EpisodeError::UnknownRobot { .. } => ("unknown-robot", "Unknown robot", StatusCode::NOT_FOUND),
-        EpisodeError::TooManySteps { .. } => {
-            ("too-many-steps", "Too many steps", StatusCode::UNPROCESSABLE_ENTITY)
-        }
-        EpisodeError::PixelOutside { .. } => {
-            ("pixel-outside", "Pixel outside the image", StatusCode::UNPROCESSABLE_ENTITY)
-        }
-        EpisodeError::ForeignRobot { .. } => {
-            ("foreign-robot", "Another operator's robot", StatusCode::CONFLICT)
-        }
-        EpisodeError::DepthImage { .. } => ("depth-image", "No depth images", StatusCode::CONFLICT),
-        EpisodeError::Ended { .. } => ("ended", "Episode ended", StatusCode::CONFLICT),
-        EpisodeError::Spec(error) => spec_kind(error),
-        EpisodeError::Checkpoint(_) => {
-            ("checkpoint", "Checkpoint does not fit", StatusCode::UNPROCESSABLE_ENTITY)
-        }
-        EpisodeError::Scene(_) => ("scene", "Scene does not fit the task", StatusCode::UNPROCESSABLE_ENTITY),
-        EpisodeError::Diverged(_) => ("diverged", "Physics diverged", StatusCode::CONFLICT),
-        EpisodeError::Sim(_)
-        | EpisodeError::Ik(_)
-        | EpisodeError::Picture(_)
-        | EpisodeError::Build(_)
-        | EpisodeError::Output(_) => INTERNAL,
-    }
-}
-
-fn spec_kind(error: &SpecError) -> Kind {
-    match error {
-        SpecError::UnknownTool { .. } => ("unknown-tool", "Unknown tool", StatusCode::NOT_FOUND),
-        SpecError::Malformed { .. } | SpecError::Invalid { .. } => {
-            ("invalid-arguments", "Invalid arguments", StatusCode::UNPROCESSABLE_ENTITY)
-        }
     }
 }
 

@@ -1,0 +1,79 @@
+//! What a refusal is to its caller, whatever protocol carries it, and its form over HTTP: RFC 9457 problem details.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What an error is to its caller. Each error enum gives one for every variant; its text is the error's own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Refusal {
+    /// A stable name for the kind of problem, as `unknown-robot`.
+    pub kind: &'static str,
+    /// The kind in words.
+    pub title: &'static str,
+    /// What is wrong in general, which a protocol maps to its own codes.
+    pub class: RefusalClass,
+    /// Seconds after which the same request may work; without, it will be refused again.
+    pub retry_after_s: Option<u16>,
+    /// What the caller can do, where the error's own text does not say it.
+    pub hint: Option<&'static str>,
+}
+
+/// Classes of refusals.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RefusalClass {
+    /// What the request names does not exist.
+    NotFound,
+    /// The request can be read and says something that can never work.
+    Invalid,
+    /// The request does not fit the present state.
+    Conflict,
+    /// The caller may not do this.
+    Forbidden,
+    /// What the request names has existed and exists no longer.
+    Gone,
+    /// The caller asks for more than there is room for.
+    TooMany,
+    /// The server takes no requests of this kind at present.
+    Unavailable,
+    /// The simulator failed, and the caller has to know it.
+    Failed,
+    /// A fault of the server, whose text is for its log only.
+    Internal,
+}
+
+impl Refusal {
+    /// A fault of the server.
+    pub const INTERNAL: Refusal = Refusal::new("internal", "Internal error", RefusalClass::Internal);
+
+    /// A refusal that stands, and whose error's text says what would work.
+    pub const fn new(kind: &'static str, title: &'static str, class: RefusalClass) -> Refusal {
+        Refusal { kind, title, class, retry_after_s: None, hint: None }
+    }
+
+    /// As this one, for a request that may work after so many seconds.
+    pub const fn retry_after_s(self, seconds: u16) -> Refusal {
+        Refusal { retry_after_s: Some(seconds), ..self }
+    }
+
+    /// As this one, with what the caller can do.
+    pub const fn hint(self, hint: &'static str) -> Refusal {
+        Refusal { hint: Some(hint), ..self }
+    }
+}
+
+/// The body of every refusal: RFC 9457 problem details, served as `application/problem+json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ProblemBody {
+    /// A stable name for the kind of problem, as `urn:tandem:problem:unknown-robot`.
+    #[serde(rename = "type")]
+    pub kind: String,
+    /// The kind in words; the same for all problems of one kind.
+    pub title: String,
+    /// The HTTP status.
+    pub status: u16,
+    /// What was wrong with this call and what would work.
+    pub detail: String,
+    /// Why the recording of the episode is not complete; left out where it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recording_failed: Option<String>,
+}
