@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    Outcome, bench, collect, demo, doctor, evaluate, locomotion, recover, replay, report, serve, tasks,
+    CommandResult, bench, collect, demo, doctor, evaluate, locomotion, recover, replay, report, serve, tasks,
 };
 
 /// Physics of humanoids that must work together, behind an HTTP API.
@@ -18,22 +18,22 @@ pub struct Cli {
 /// What `tandem` can do. The help text of each is the doc comment of its flags.
 #[derive(Debug, Subcommand)]
 enum Command {
-    Serve(serve::Args),
-    Demo(demo::Args),
-    Evaluate(evaluate::Args),
-    Collect(collect::Args),
-    Locomotion(locomotion::Args),
-    Tasks(tasks::Args),
-    Recover(recover::Args),
-    Replay(replay::Args),
-    Report(report::Args),
-    Bench(bench::Args),
-    Doctor(doctor::Args),
+    Serve(serve::ServeArgs),
+    Demo(demo::DemoArgs),
+    Evaluate(evaluate::EvaluateArgs),
+    Collect(collect::CollectArgs),
+    Locomotion(locomotion::LocomotionArgs),
+    Tasks(tasks::TasksArgs),
+    Recover(recover::RecoverArgs),
+    Replay(replay::ReplayArgs),
+    Report(report::ReportArgs),
+    Bench(bench::BenchArgs),
+    Doctor(doctor::DoctorArgs),
 }
 
 impl Cli {
     /// Does what the command line says.
-    pub fn run(self) -> Outcome {
+    pub fn run(self) -> CommandResult {
         match self.command {
             Command::Serve(args) => serve::run(args),
             Command::Demo(args) => demo::run(args),

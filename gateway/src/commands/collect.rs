@@ -5,11 +5,11 @@ use std::{path::PathBuf, process::ExitCode};
 use tandem_episodes::players;
 use tracing_subscriber::filter::LevelFilter;
 
-use super::{Outcome, flags::EpisodeFlags, log, played};
+use super::{CommandResult, evaluate::play_and_print, flags::EpisodeFlags, logging::log_to_stderr};
 
 /// Record demonstrations of the experts as MCAP, one folder per episode.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct CollectArgs {
     #[command(flatten)]
     episodes: EpisodeFlags,
     /// Folder for the recordings.
@@ -18,9 +18,9 @@ pub struct Args {
 }
 
 /// Plays and records.
-pub fn run(args: Args) -> Outcome {
-    log::to_stderr(LevelFilter::INFO);
+pub fn run(args: CollectArgs) -> CommandResult {
+    log_to_stderr(LevelFilter::INFO);
     let plan = args.episodes.plan(players::find("expert")?, true)?;
-    played::play_and_print(&plan, &args.out)?;
+    play_and_print(&plan, &args.out)?;
     Ok(ExitCode::SUCCESS)
 }

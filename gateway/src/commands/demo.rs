@@ -18,9 +18,9 @@ use tandem_tools_spec::{CommandReply, Protocol, ResultReply, StartEpisode, ToolC
 use tracing_subscriber::filter::LevelFilter;
 
 use super::{
-    Outcome, Seeds,
+    CommandResult, Seeds,
     flags::{LocomotionFlag, RendererFlag, SceneFlag},
-    log,
+    logging::log_to_stderr,
 };
 use crate::{
     drivers::HttpEpisode,
@@ -39,7 +39,7 @@ const PASS_PERCENT: usize = 80;
 
 /// Play the Handover task by a scripted expert over real HTTP, and write what happened.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct DemoArgs {
     /// One seed, or a range of seeds as 0..9, both ends included.
     #[arg(long = "seed", default_value = "0", value_name = "SEED")]
     seeds: Seeds,
@@ -55,8 +55,8 @@ pub struct Args {
 }
 
 /// Plays; it is a failure if too few episodes reach the last phase.
-pub fn run(args: Args) -> Outcome {
-    log::to_stderr(LevelFilter::WARN);
+pub fn run(args: DemoArgs) -> CommandResult {
+    log_to_stderr(LevelFilter::WARN);
     let flags = Layer {
         scene: args.scene.file,
         locomotion: args.locomotion.file,

@@ -12,7 +12,7 @@ use std::{
 use tandem_episodes::{EpisodeSpec, RendererKind, Session, create_private_folder, tasks};
 use tandem_tools_spec::{Observe, Protocol, ToolCall, Wait};
 
-use super::Outcome;
+use super::CommandResult;
 use crate::{
     settings::{Layer, Settings},
     token::Token,
@@ -31,7 +31,7 @@ const CORES: usize = 2;
 
 /// Say what works on this machine: pictures, physics, the port, the folder of recordings, clocks and cores.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct DoctorArgs {
     /// The settings of the server that is to run here.
     #[command(flatten)]
     flags: Layer,
@@ -41,7 +41,7 @@ pub struct Args {
 type Finding = Result<String, String>;
 
 /// Prints a line for each check. What does not work makes it a failure.
-pub fn run(args: Args) -> Outcome {
+pub fn run(args: DoctorArgs) -> CommandResult {
     let renderer = args.flags.renderer.unwrap_or_default();
     let settings = Settings::resolve(Layer { token: Token::of_environment()?, ..args.flags }, None)?;
     let findings = [

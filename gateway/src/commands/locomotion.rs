@@ -5,18 +5,18 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::Subcommand;
 use tandem_episodes::bench::{self, CaseReport};
 
-use super::{Outcome, flags::LocomotionFlag};
+use super::{CommandResult, flags::LocomotionFlag};
 
 /// The base controller.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct LocomotionArgs {
     /// What to do with it.
     #[command(subcommand)]
-    part: Part,
+    part: LocomotionPart,
 }
 
 #[derive(Debug, Subcommand)]
-enum Part {
+enum LocomotionPart {
     /// Stand, walk, squat, carry, be pulled and pushed, two robots carry a bar; report survival, errors and power per case.
     Bench {
         #[command(flatten)]
@@ -34,8 +34,8 @@ enum Part {
 }
 
 /// Plays the cases, prints a line per case as it ends, and writes JSON where it is asked for.
-pub fn run(args: Args) -> Outcome {
-    let Part::Bench { locomotion, cases, seeds, json } = args.part;
+pub fn run(args: LocomotionArgs) -> CommandResult {
+    let LocomotionPart::Bench { locomotion, cases, seeds, json } = args.part;
     println!("{}", CaseReport::HEAD);
     let report = bench::locomotion(&locomotion.controller(), &cases, seeds, |case| println!("{case}"))?;
     if let Some(path) = json {

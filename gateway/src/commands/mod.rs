@@ -1,4 +1,4 @@
-//! What `tandem` can do: one file per subcommand, each with its flags and its `run`.
+//! What `tandem` can do: one file or folder per subcommand, each with its flags and its `run`; what several share is in `flags`.
 
 pub mod bench;
 pub mod collect;
@@ -7,8 +7,7 @@ pub mod doctor;
 pub mod evaluate;
 mod flags;
 pub mod locomotion;
-mod log;
-mod played;
+mod logging;
 pub mod recover;
 pub mod replay;
 pub mod report;
@@ -19,5 +18,5 @@ use std::{error::Error, process::ExitCode};
 
 pub use flags::Seeds;
 
-/// What the program ends with: an error is printed and is a failure, too.
-pub type Outcome = Result<ExitCode, Box<dyn Error>>;
+/// What a subcommand ends with: an error is printed and is a failure, too.
+pub type CommandResult = Result<ExitCode, Box<dyn Error>>;

@@ -2,18 +2,18 @@
 
 use std::{path::PathBuf, process::ExitCode};
 
-use super::Outcome;
+use super::CommandResult;
 
 /// Make a whole recording of one that was interrupted: FILE.mcap of FILE.mcap.partial.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct RecoverArgs {
     /// What the interrupted episode left, as runs/handover-seed0/episode.mcap.partial. It stays as it is.
     #[arg(value_name = "FILE")]
     partial: PathBuf,
 }
 
 /// Recovers, and says how much there was.
-pub fn run(args: Args) -> Outcome {
+pub fn run(args: RecoverArgs) -> CommandResult {
     let recovered = tandem_episodes::recover(&args.partial)?;
     println!(
         "{}: {} messages, up to {:.2} s of the episode",

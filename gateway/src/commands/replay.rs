@@ -10,11 +10,11 @@ use tandem_episodes::replay::{
     Difference, Drawn, Outcome as Comparison, PicturesPlan, Size, Verified, View, draw_all, film, verify,
 };
 
-use super::Outcome;
+use super::CommandResult;
 
 /// Play recordings again: say what they hold, verify them, film them, or draw what every camera saw with depth.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct ReplayArgs {
     /// Recordings, as runs/handover-seed0/episode.mcap.
     #[arg(value_name = "FILES", required = true)]
     recordings: Vec<PathBuf>,
@@ -63,7 +63,7 @@ impl FromStr for PictureSize {
 }
 
 /// Does what the flags say with each recording; without any, says what it holds.
-pub fn run(args: Args) -> Outcome {
+pub fn run(args: ReplayArgs) -> CommandResult {
     if args.video.is_some() && args.recordings.len() > 1 {
         return Err("--video films one recording; give one".into());
     }

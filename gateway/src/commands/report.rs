@@ -6,12 +6,12 @@ use std::process::ExitCode;
 use tandem_episodes::assessment::{Assessment, Format, gallery, load};
 use tandem_episodes::write_whole;
 
-use super::Outcome;
+use super::CommandResult;
 use crate::one_of::one_of;
 
 /// Report on episodes: rates with intervals, averages, effort, failures, and policies compared on the same seeds.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct ReportArgs {
     /// Folders that `evaluate`, `collect` or `serve` wrote; what they hold of one policy is joined.
     #[arg(value_name = "DIR", required = true)]
     folders: Vec<PathBuf>,
@@ -27,7 +27,7 @@ pub struct Args {
 }
 
 /// Counts and writes.
-pub fn run(args: Args) -> Outcome {
+pub fn run(args: ReportArgs) -> CommandResult {
     let loaded = load(&args.folders)?;
     let assessment = Assessment::of(&loaded);
     let failures = match args.format {

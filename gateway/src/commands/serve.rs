@@ -4,7 +4,10 @@ use std::{path::PathBuf, process::ExitCode};
 
 use tracing_subscriber::filter::LevelFilter;
 
-use super::{Outcome, log};
+use super::{
+    CommandResult,
+    logging::{LogFormat, log_server},
+};
 use crate::{
     http::Server,
     settings::{Layer, Settings},
@@ -13,21 +16,21 @@ use crate::{
 
 /// Serve episodes over HTTP until SIGINT or SIGTERM.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct ServeArgs {
     /// TOML file with any of the settings below; flags and environment come first.
     #[arg(long, env = "TANDEM_CONFIG", value_name = "FILE")]
     config: Option<PathBuf>,
     /// Log for people, or one JSON object per line.
     #[arg(long, env = "TANDEM_LOG_FORMAT", value_name = "FORMAT", default_value = "text")]
-    log_format: log::Format,
+    log_format: LogFormat,
     /// Settings given as flags or environment.
     #[command(flatten)]
     flags: Layer,
 }
 
 /// Serves.
-pub fn run(args: Args) -> Outcome {
-    log::of_server(LevelFilter::INFO, args.log_format);
+pub fn run(args: ServeArgs) -> CommandResult {
+    log_server(LevelFilter::INFO, args.log_format);
     let flags = Layer { token: Token::of_environment()?, ..args.flags };
     let settings = Settings::resolve(flags, args.config.as_deref())?;
     let left = Server::start(settings)?.run_until_signal();

@@ -19,17 +19,17 @@ const MSGPACK: [&str; 2] = ["application/msgpack", "application/x-msgpack"];
 /// How a request is written, and how its reply is to be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Encoding {
-    body: Format,
-    reply: Format,
+    body: BodyFormat,
+    reply: BodyFormat,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Format {
+enum BodyFormat {
     Json,
     Msgpack,
 }
 
-/// Whether bodies of this type are read.
+/// Whether bodies of this media type can be read.
 pub fn is_read(content_type: &str) -> bool {
     is(content_type, "application/json") || is_msgpack(content_type)
 }
@@ -46,9 +46,9 @@ fn is(content_type: &str, name: &str) -> bool {
 impl Encoding {
     fn of(headers: &HeaderMap) -> Encoding {
         let text = |name| headers.get(name).and_then(|value| value.to_str().ok()).unwrap_or_default();
-        let format = |msgpack: bool| if msgpack { Format::Msgpack } else { Format::Json };
+        let format = |msgpack: bool| if msgpack { BodyFormat::Msgpack } else { BodyFormat::Json };
         let body = format(is_msgpack(text(header::CONTENT_TYPE)));
-        // Who accepts both is answered in the form that it writes.
+        // A caller that accepts both gets its reply in the form of its request.
         let accepted = text(header::ACCEPT);
         let (json, msgpack) = accepted.split(',').fold((false, false), |(json, msgpack), one| {
             (json || is(one, "application/json"), msgpack || is_msgpack(one))
@@ -60,19 +60,19 @@ impl Encoding {
     /// Reads a body; none stands for an object without fields.
     pub fn read(self, body: &[u8]) -> Result<Value, ApiError> {
         match self.body {
-            Format::Json => json_object(body),
-            Format::Msgpack => msgpack_object(body),
+            BodyFormat::Json => json_object(body),
+            BodyFormat::Msgpack => msgpack_object(body),
         }
     }
 
     /// Writes a reply.
     pub fn write(self, status: StatusCode, reply: &impl Serialize) -> Result<Response, ApiError> {
         let (kind, bytes) = match self.reply {
-            Format::Json => (
+            BodyFormat::Json => (
                 "application/json",
                 serde_json::to_vec(reply).map_err(|error| ApiError::Reply(error.into()))?,
             ),
-            Format::Msgpack => {
+            BodyFormat::Msgpack => {
                 (MSGPACK[0], rmp_serde::to_vec_named(reply).map_err(|error| ApiError::Reply(error.into()))?)
             }
         };
@@ -94,7 +94,7 @@ mod tests {
 
     #[test]
     fn replies_come_as_they_are_wanted() {
-        let check = |content_type: &str, accept: &str, expected: [Format; 2]| {
+        let check = |content_type: &str, accept: &str, expected: [BodyFormat; 2]| {
             let mut headers = HeaderMap::new();
             for (name, value) in [(header::CONTENT_TYPE, content_type), (header::ACCEPT, accept)] {
                 if !value.is_empty() {
@@ -105,14 +105,14 @@ mod tests {
             assert_eq!(Encoding::of(&headers), Encoding { body, reply }, "{content_type}, {accept}");
         };
         let (json, msgpack) = ("application/json", "application/msgpack");
-        check("", "", [Format::Json, Format::Json]);
-        check(json, "*/*", [Format::Json, Format::Json]);
-        check(msgpack, "", [Format::Msgpack, Format::Msgpack]);
-        check("application/x-msgpack", "*/*", [Format::Msgpack, Format::Msgpack]);
-        check(json, "application/MsgPack;q=1", [Format::Json, Format::Msgpack]);
-        check(msgpack, json, [Format::Msgpack, Format::Json]);
-        check(msgpack, "application/json, application/msgpack", [Format::Msgpack, Format::Msgpack]);
-        check(json, "application/json, text/event-stream", [Format::Json, Format::Json]);
+        check("", "", [BodyFormat::Json, BodyFormat::Json]);
+        check(json, "*/*", [BodyFormat::Json, BodyFormat::Json]);
+        check(msgpack, "", [BodyFormat::Msgpack, BodyFormat::Msgpack]);
+        check("application/x-msgpack", "*/*", [BodyFormat::Msgpack, BodyFormat::Msgpack]);
+        check(json, "application/MsgPack;q=1", [BodyFormat::Json, BodyFormat::Msgpack]);
+        check(msgpack, json, [BodyFormat::Msgpack, BodyFormat::Json]);
+        check(msgpack, "application/json, application/msgpack", [BodyFormat::Msgpack, BodyFormat::Msgpack]);
+        check(json, "application/json, text/event-stream", [BodyFormat::Json, BodyFormat::Json]);
     }
 
     #[test]

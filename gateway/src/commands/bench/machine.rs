@@ -1,4 +1,4 @@
-//! What a figure was measured on.
+//! The machine that a figure was measured on.
 
 use std::{env::consts, fs, path::Path, thread::available_parallelism};
 
@@ -19,22 +19,22 @@ pub struct Machine {
     load_values: Option<[f64; 3]>,
 }
 
-/// A report with the machine that it is of.
+/// A report with the machine that it was measured on.
 #[derive(Debug, Serialize)]
-pub struct Measured<R> {
+pub struct WithMachine<R> {
     machine: Machine,
     #[serde(flatten)]
     report: R,
 }
 
-impl<R> Measured<R> {
-    /// Here and now.
-    pub fn here(report: R) -> Measured<R> {
-        Measured { machine: Machine::here(), report }
+impl<R> WithMachine<R> {
+    /// Adds this machine, and its load at present, to `report`.
+    pub fn here(report: R) -> WithMachine<R> {
+        WithMachine { machine: Machine::here(), report }
     }
 }
 
-impl<R: Serialize> Measured<R> {
+impl<R: Serialize> WithMachine<R> {
     /// Writes it as JSON.
     pub fn write(&self, path: &Path) -> Result<(), Box<dyn std::error::Error>> {
         Ok(fs::write(path, serde_json::to_string_pretty(self)? + "\n")?)
@@ -42,7 +42,7 @@ impl<R: Serialize> Measured<R> {
 }
 
 impl Machine {
-    /// The one that this runs on, as Linux tells it.
+    /// The machine that this program runs on, as Linux describes it.
     pub fn here() -> Machine {
         let read = |path: &str| fs::read_to_string(path).unwrap_or_default();
         let name = value_of(&read("/etc/os-release"), "PRETTY_NAME", '=');
@@ -61,7 +61,7 @@ impl Machine {
     }
 }
 
-/// Of the first line `key = "value"`, with any sign between them.
+/// The value in the first line `key = "value"`, where `sign` stands between them.
 fn value_of(text: &str, key: &str, sign: char) -> Option<String> {
     let line = |line: &str| {
         let (name, value) = line.split_once(sign)?;
@@ -96,7 +96,7 @@ mod tests {
         struct Report {
             step_us: f64,
         }
-        let json = serde_json::to_value(Measured::here(Report { step_us: 1.5 })).unwrap();
+        let json = serde_json::to_value(WithMachine::here(Report { step_us: 1.5 })).unwrap();
         assert_eq!(json["step_us"], 1.5);
         assert!(json["machine"]["rustc"].as_str().unwrap().starts_with("rustc "), "{json}");
     }

@@ -17,21 +17,21 @@ use tandem_episodes::{
     bench::{IkReport, PhysicsReport, PicturesReport},
 };
 
-use super::Outcome;
+use super::CommandResult;
 use crate::one_of::one_of;
-pub use machine::Measured;
+use machine::WithMachine;
 use tools::ToolsReport;
 
 /// Measure a part of Tandem on this machine.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct BenchArgs {
     /// Which part.
     #[command(subcommand)]
-    part: Part,
+    part: BenchPart,
 }
 
 #[derive(Debug, Subcommand)]
-enum Part {
+enum BenchPart {
     /// Inverse kinematics of both wrists: share of targets reached, iterations, time.
     Ik {
         /// JSON file with targets; without it, 200 are drawn from the robot's joint ranges.
@@ -86,17 +86,17 @@ const PARTS: [(&str, Measure); 4] = [
 ];
 
 /// Measures and prints.
-pub fn run(args: Args) -> Outcome {
+pub fn run(args: BenchArgs) -> CommandResult {
     match args.part {
-        Part::Ik { targets, json } => ik(targets.as_deref(), json),
-        Part::Tools { json } => write(measure_tools()?, json.as_deref()),
-        Part::Physics { json } => write(measure_physics()?, json.as_deref()),
-        Part::Render { renderer, json } => write(measure_pictures(renderer)?, json.as_deref()),
-        Part::All { json } => all(json.as_deref()),
+        BenchPart::Ik { targets, json } => ik(targets.as_deref(), json),
+        BenchPart::Tools { json } => write(measure_tools()?, json.as_deref()),
+        BenchPart::Physics { json } => write(measure_physics()?, json.as_deref()),
+        BenchPart::Render { renderer, json } => write(measure_pictures(renderer)?, json.as_deref()),
+        BenchPart::All { json } => all(json.as_deref()),
     }
 }
 
-fn all(json: Option<&Path>) -> Outcome {
+fn all(json: Option<&Path>) -> CommandResult {
     let mut reports = Map::new();
     for (name, measure) in PARTS {
         println!("{name}");
@@ -107,9 +107,9 @@ fn all(json: Option<&Path>) -> Outcome {
 }
 
 /// Writes a report, and what it was measured on, where that is asked for.
-fn write(report: impl Serialize, json: Option<&Path>) -> Outcome {
+fn write(report: impl Serialize, json: Option<&Path>) -> CommandResult {
     if let Some(path) = json {
-        Measured::here(report).write(path)?;
+        WithMachine::here(report).write(path)?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -149,10 +149,10 @@ fn measure_pictures(renderer: RendererKind) -> Result<PicturesReport, Box<dyn Er
     })?)
 }
 
-fn ik(targets: Option<&Path>, json: bool) -> Outcome {
+fn ik(targets: Option<&Path>, json: bool) -> CommandResult {
     let report = tandem_episodes::bench::ik(targets)?;
     if json {
-        println!("{}", serde_json::to_string_pretty(&Measured::here(report))?);
+        println!("{}", serde_json::to_string_pretty(&WithMachine::here(report))?);
     } else {
         print_ik(&report);
     }

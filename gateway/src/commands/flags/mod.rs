@@ -2,8 +2,6 @@
 
 mod episode;
 mod policy;
-mod seeds;
 
-pub use episode::{EpisodeFlags, LocomotionFlag, RendererFlag, SceneFlag};
+pub use episode::{EpisodeFlags, LocomotionFlag, RendererFlag, SceneFlag, Seeds};
 pub use policy::PolicyFlags;
-pub use seeds::Seeds;

@@ -19,8 +19,8 @@ const LIMIT_S: u32 = 3600;
 /// Who plays.
 #[derive(Debug, clap::Args)]
 pub struct PolicyFlags {
-    #[arg(long, value_name = "POLICY", default_value = "expert", value_parser = parse_who, help = help())]
-    policy: Who,
+    #[arg(long, value_name = "POLICY", default_value = "expert", value_parser = parse_policy, help = help())]
+    policy: PolicyChoice,
     /// How the policy at a server is asked and understood: a preset, openpi or gr00t_n17_g1, or a TOML file [default: openpi for
     /// openpi:, none for act:].
     #[arg(long, value_name = "NAME|FILE")]
@@ -44,7 +44,7 @@ pub struct PolicyFlags {
 
 /// A policy on the command line.
 #[derive(Clone, Debug)]
-enum Who {
+enum PolicyChoice {
     Player(&'static players::Entry),
     Program(String),
     Remote(Protocol, Vec<String>),
@@ -60,20 +60,20 @@ fn help() -> String {
     )
 }
 
-fn parse_who(text: &str) -> Result<Who, String> {
+fn parse_policy(text: &str) -> Result<PolicyChoice, String> {
     if let Some(command) = text.strip_prefix(EXEC) {
         return match command.trim().is_empty() {
             true => Err("no command; give one, as exec:\"python3 agent.py\"".into()),
-            false => Ok(Who::Program(command.into())),
+            false => Ok(PolicyChoice::Program(command.into())),
         };
     }
     for protocol in Protocol::ALL {
         if let Some(urls) = text.strip_prefix(&format!("{protocol}:")) {
-            return parse_urls(protocol, urls).map(|urls| Who::Remote(protocol, urls));
+            return parse_urls(protocol, urls).map(|urls| PolicyChoice::Remote(protocol, urls));
         }
     }
     players::find(text)
-        .map(Who::Player)
+        .map(PolicyChoice::Player)
         .map_err(|error| format!("{error}, exec:COMMAND, openpi:ws://HOST:PORT, act:http://HOST:PORT/act"))
 }
 
@@ -93,22 +93,22 @@ impl PolicyFlags {
         let misplaced = |flag: &str, who: &str| Err(format!("{flag} is for {who}").into());
         let driving = self.driving()?;
         let policy: Box<dyn Policy> = match (self.policy, self.policy_map, self.policy_limit) {
-            (Who::Player(_) | Who::Program(_), Some(_), _) => {
+            (PolicyChoice::Player(_) | PolicyChoice::Program(_), Some(_), _) => {
                 return misplaced("--policy-map", "policies at a server");
             }
-            (Who::Player(_) | Who::Remote(..), _, Some(_)) => return misplaced("--policy-limit", "programs"),
-            (Who::Player(_) | Who::Remote(..), _, None) if driving.is_per_robot() => {
+            (PolicyChoice::Player(_) | PolicyChoice::Remote(..), _, Some(_)) => return misplaced("--policy-limit", "programs"),
+            (PolicyChoice::Player(_) | PolicyChoice::Remote(..), _, None) if driving.is_per_robot() => {
                 return misplaced(
                     "--per-robot",
                     "programs; a policy at a server has one address for each robot",
                 );
             }
-            (Who::Player(entry), None, None) => Box::new(Borrowed(entry)),
-            (Who::Program(command), None, limit_s) => {
+            (PolicyChoice::Player(entry), None, None) => Box::new(BuiltIn(entry)),
+            (PolicyChoice::Program(command), None, limit_s) => {
                 let limit = Duration::from_secs(limit_s.unwrap_or(LIMIT_S).into());
                 Box::new(Program::new(command, driving, limit)?)
             }
-            (Who::Remote(protocol, urls), map, None) => {
+            (PolicyChoice::Remote(protocol, urls), map, None) => {
                 let default = (protocol == Protocol::Openpi).then(|| Protocol::Openpi.name().to_owned());
                 let Some(map) = map.or(default) else {
                     let presets = PRESETS.map(|(name, _)| name).join(", ");
@@ -132,9 +132,9 @@ impl PolicyFlags {
 
 /// One of the program's own players.
 #[derive(Debug)]
-struct Borrowed(&'static players::Entry);
+struct BuiltIn(&'static players::Entry);
 
-impl Policy for Borrowed {
+impl Policy for BuiltIn {
     fn card(&self) -> PolicyCard {
         self.0.card()
     }

@@ -38,13 +38,13 @@ struct Target {
     id: String,
 }
 
-/// What came back.
-struct Answer {
+/// What came back for a request.
+struct RawReply {
     status: StatusCode,
     body: Value,
 }
 
-impl Answer {
+impl RawReply {
     /// Refused over HTTP, by JSON-RPC, or as a tool's answer over MCP.
     fn refuses(&self) -> bool {
         !self.status.is_success() || self.body["error"].is_object() || self.body["result"]["isError"] == true
@@ -84,13 +84,13 @@ impl Target {
         }
     }
 
-    fn send(&self, request: Request<Body>) -> Answer {
+    fn send(&self, request: Request<Body>) -> RawReply {
         self.runtime.block_on(async {
             let response = self.router.call(request).await.unwrap_or_else(|never| match never {});
             let status = response.status();
             let bytes = to_bytes(Body::new(response.into_body()), usize::MAX).await.unwrap();
             let body = serde_json::from_slice(&bytes).unwrap_or_default();
-            Answer { status, body }
+            RawReply { status, body }
         })
     }
 
@@ -127,7 +127,7 @@ impl Target {
 }
 
 /// Checks what a refusal says.
-fn check_refusal(target: &Target, answer: &Answer, sent: &str) {
+fn check_refusal(target: &Target, answer: &RawReply, sent: &str) {
     let told = answer.body.to_string();
     assert_ne!(answer.status, StatusCode::INTERNAL_SERVER_ERROR, "{sent}: {told}");
     let runs = target.runs.path().to_string_lossy().into_owned();

@@ -1,0 +1,46 @@
+//! The log, which subcommands write to stderr.
+
+use std::io::IsTerminal;
+
+use clap::ValueEnum;
+use tracing_subscriber::Layer;
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
+
+/// How lines are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum LogFormat {
+    /// For people.
+    Text,
+    /// One JSON object per line.
+    Json,
+}
+
+/// Logs to stderr. The environment's `TANDEM_LOG` sets what is logged, as `warn` or `tandem=warn`; without it, `default` and above.
+pub fn log_to_stderr(default: LevelFilter) {
+    install(Targets::new().with_default(default), LogFormat::Text);
+}
+
+/// Logs what a server does, as [`log_to_stderr`] does, with lines in the form of `format`.
+pub fn log_server(default: LevelFilter, format: LogFormat) {
+    install(Targets::new().with_default(default), format);
+}
+
+/// Logs an evaluation, as [`log_to_stderr`] does; the servers on which programs play log nothing but warnings.
+pub fn log_evaluation() {
+    let quiet = ["tandem::http", "tandem::hosting"].map(|target| (target, LevelFilter::WARN));
+    install(Targets::new().with_default(LevelFilter::INFO).with_targets(quiet), LogFormat::Text);
+}
+
+fn install(default: Targets, format: LogFormat) {
+    let wanted = std::env::var("TANDEM_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
+    let lines = tracing_subscriber::fmt::layer().with_writer(std::io::stderr);
+    let lines = match format {
+        LogFormat::Text => lines.with_ansi(std::io::stderr().is_terminal()).boxed(),
+        LogFormat::Json => lines.json().flatten_event(true).with_span_list(false).boxed(),
+    };
+    // The library that speaks MCP has three lines for each of our own.
+    let usual = default.with_target("rmcp", LevelFilter::WARN);
+    tracing_subscriber::registry().with(wanted.unwrap_or(usual)).with(lines).init();
+}
