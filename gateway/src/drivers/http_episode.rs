@@ -20,7 +20,7 @@ pub struct HttpEpisode {
 
 /// The body of a start.
 #[derive(Debug, Serialize)]
-struct Start<'a> {
+struct StartBody<'a> {
     #[serde(flatten)]
     args: &'a StartEpisode,
     #[serde(flatten)]
@@ -47,8 +47,8 @@ impl HttpEpisode {
         HttpEpisode::start_driven(address, args, &Driving::default())
     }
 
-    /// As [`HttpEpisode::start`]; where each robot has an operator of its own, the reply has what each needs, and what is returned
-    /// with it can end the episode but not play it.
+    /// Starts an episode as [`HttpEpisode::start`] does, driven as `driving` says. Where each robot has an operator of its own, the
+    /// reply has what each of them needs, and the client that is returned with it can end the episode but not play it.
     pub fn start_driven(
         address: SocketAddr,
         args: &StartEpisode,
@@ -56,13 +56,13 @@ impl HttpEpisode {
     ) -> Result<(HttpEpisode, StartReply), HttpError> {
         let agent = Agent::config_builder()
             .http_status_as_error(false)
-            // A limit on the whole would have every call look up the address on a thread of its own.
+            // A limit on the whole call would have ureq look up the address of each on a thread of its own.
             .timeout_recv_response(Some(TIMEOUT))
             .timeout_recv_body(Some(TIMEOUT))
             .build()
             .new_agent();
         let episodes = format!("http://{address}/v1/episodes");
-        let body = Start { args, driving };
+        let body = StartBody { args, driving };
         let started: StartReply = serde_json::from_value(post(&agent, &episodes, &body)?)?;
         let url = format!("{episodes}/{}", started.episode_id);
         Ok((HttpEpisode { agent, url }, started))

@@ -15,7 +15,7 @@ pub async fn counted<T>(
     let began = Instant::now();
     let answer = work.await;
     let status = answer.as_ref().map_or_else(|refusal| refusal.status().as_u16(), |_| 200);
-    app.table.metrics().call(known(name).unwrap_or("unknown"), status, began.elapsed());
+    app.table.metrics().call_answered(known(name).unwrap_or("unknown"), status, began.elapsed());
     answer
 }
 

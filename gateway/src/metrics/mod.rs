@@ -1,11 +1,8 @@
 //! What a server has done, counted, in the text format that Prometheus reads.
 
-mod histogram;
 mod page;
-#[cfg(test)]
-mod tests;
 
-pub use page::Page;
+pub use page::MetricsPage;
 
 use std::{
     collections::BTreeMap,
@@ -13,7 +10,7 @@ use std::{
     time::Duration,
 };
 
-use histogram::Histogram;
+use page::Histogram;
 use tandem_tools_spec::EndReason;
 
 /// Counts since the server began.
@@ -49,19 +46,19 @@ impl Metrics {
         *self.lock().ended.entry(name).or_default() += 1;
     }
 
-    /// A call was answered, whatever the answer was, after so long.
-    pub fn call(&self, tool: &'static str, status: u16, took: Duration) {
+    /// A call was answered, by a reply or a refusal, after the time `took`.
+    pub fn call_answered(&self, tool: &'static str, status: u16, took: Duration) {
         let mut counts = self.lock();
         *counts.calls.entry((tool, status)).or_default() += 1;
         counts.answered.entry(tool).or_default().add(took);
     }
 
     /// A request was refused with a problem of this kind.
-    pub fn refusal(&self, problem: &str) {
+    pub fn request_refused(&self, problem: &str) {
         *self.lock().refused.entry(problem.to_owned()).or_default() += 1;
     }
 
-    /// An episode went on by so many control steps, for which physics took so long.
+    /// An episode went on by `control_steps`, for which physics took the time `physics`.
     pub fn simulated(&self, control_steps: u64, physics: Duration) {
         let mut counts = self.lock();
         counts.control_steps += control_steps;
@@ -73,10 +70,10 @@ impl Metrics {
         self.lock().physics
     }
 
-    /// Everything, where `held` episodes are held of which `running` go on.
+    /// All counts as Prometheus reads them; `held` episodes are held at present, of which `running` go on.
     pub fn page(&self, held: usize, running: usize) -> String {
         let counts = self.lock();
-        let mut page = Page::default();
+        let mut page = MetricsPage::default();
         page.gauge("tandem_episodes_held", "Episodes that are held, those that have ended included.", held);
         page.gauge("tandem_episodes_running", "Episodes that go on.", running);
         page.counter("tandem_episodes_started_total", "Episodes that have begun.", [("", counts.started)]);
@@ -100,7 +97,69 @@ impl Metrics {
     }
 
     fn lock(&self) -> MutexGuard<'_, Counts> {
-        // Counts stay whole whatever happens to who counts.
+        // A thread that panics while it counts leaves every count valid.
         self.counts.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn everything_that_was_counted_is_on_the_page() {
+        let metrics = Metrics::default();
+        metrics.episode_started();
+        metrics.episode_ended(EndReason::StepBudgetExhausted);
+        metrics.call_answered("wait", 200, Duration::from_millis(1));
+        metrics.call_answered("wait", 422, Duration::from_secs(9));
+        metrics.request_refused("invalid-arguments");
+        metrics.simulated(25, Duration::from_millis(2500));
+        metrics.simulated(5, Duration::from_millis(500));
+        assert_eq!(metrics.physics(), Duration::from_secs(3));
+        let page = metrics.page(3, 2);
+        for line in [
+            "# TYPE tandem_episodes_running gauge",
+            "tandem_episodes_running 2",
+            "tandem_episodes_held 3",
+            "tandem_episodes_started_total 1",
+            "tandem_episodes_ended_total{reason=\"step_budget_exhausted\"} 1",
+            "tandem_calls_total{tool=\"wait\",status=\"200\"} 1",
+            "tandem_calls_total{tool=\"wait\",status=\"422\"} 1",
+            "# TYPE tandem_call_duration_seconds histogram",
+            "tandem_call_duration_seconds_bucket{tool=\"wait\",le=\"0.0005\"} 0",
+            "tandem_call_duration_seconds_bucket{tool=\"wait\",le=\"0.001\"} 1",
+            "tandem_call_duration_seconds_bucket{tool=\"wait\",le=\"5\"} 1",
+            "tandem_call_duration_seconds_bucket{tool=\"wait\",le=\"+Inf\"} 2",
+            "tandem_call_duration_seconds_sum{tool=\"wait\"} 9.001",
+            "tandem_call_duration_seconds_count{tool=\"wait\"} 2",
+            "tandem_refused_requests_total{problem=\"invalid-arguments\"} 1",
+            "tandem_physics_seconds_total 3",
+            "tandem_control_steps_total 30",
+        ] {
+            assert!(page.lines().any(|found| found == line), "no {line:?} in\n{page}");
+        }
+    }
+
+    #[test]
+    fn every_line_has_help_and_a_type_before_it() {
+        let metrics = Metrics::default();
+        metrics.call_answered("wait", 200, Duration::ZERO);
+        let page = metrics.page(0, 0);
+        let mut known: Vec<&str> = Vec::new();
+        for line in page.lines() {
+            match line.split(' ').collect::<Vec<_>>()[..] {
+                ["#", "HELP", name, _, ..] => known.push(name),
+                ["#", "TYPE", name, "gauge" | "counter" | "histogram"] => {
+                    assert_eq!(known.last(), Some(&name))
+                }
+                [sample, value] => {
+                    assert!(known.last().is_some_and(|name| sample.starts_with(name)), "{line}");
+                    assert!(value.parse::<f64>().is_ok(), "{line}");
+                }
+                _ => panic!("{line:?} is no line of the format"),
+            }
+        }
+        assert!(page.ends_with('\n'));
     }
 }

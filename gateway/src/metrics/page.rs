@@ -1,16 +1,17 @@
-//! The text format of Prometheus, version 0.0.4.
+//! The text format of Prometheus, version 0.0.4, and the histograms that stand in it.
 
-use std::fmt::{Display, Write};
+use std::{
+    fmt::{Display, Write},
+    time::Duration,
+};
 
-use super::histogram::{BOUNDS_S, Histogram};
-
-/// A page under way.
+/// A page that is being written.
 #[derive(Debug, Default)]
-pub struct Page {
+pub struct MetricsPage {
     text: String,
 }
 
-impl Page {
+impl MetricsPage {
     /// The media type.
     pub const CONTENT_TYPE: &str = "text/plain; version=0.0.4; charset=utf-8";
 
@@ -33,7 +34,7 @@ impl Page {
         }
     }
 
-    /// Times, by label.
+    /// Durations, by label.
     pub fn histograms<'a>(
         &mut self,
         name: &str,
@@ -52,7 +53,7 @@ impl Page {
         }
     }
 
-    /// What was written.
+    /// The whole page.
     pub fn text(self) -> String {
         self.text
     }
@@ -64,5 +65,39 @@ impl Page {
     fn line(&mut self, line: impl Display) {
         // Writing to a text does not fail.
         let _ = writeln!(self.text, "{line}");
+    }
+}
+
+/// Upper ends of the buckets, in seconds: calls without physics take less than a millisecond, commands and pictures a few hundred.
+const BOUNDS_S: [f64; 12] = [0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 5.0];
+
+/// Durations, counted in buckets.
+#[derive(Debug, Default)]
+pub struct Histogram {
+    /// How many durations fell into each bucket; the last counts those above every bound.
+    counts: [u64; BOUNDS_S.len() + 1],
+    sum: Duration,
+}
+
+impl Histogram {
+    /// Counts a duration.
+    pub fn add(&mut self, took: Duration) {
+        let bucket = BOUNDS_S.iter().position(|bound_s| took.as_secs_f64() <= *bound_s);
+        self.counts[bucket.unwrap_or(BOUNDS_S.len())] += 1;
+        self.sum += took;
+    }
+
+    /// How many durations are at most as long as each bound; the last counts all.
+    fn cumulative(&self) -> [u64; BOUNDS_S.len() + 1] {
+        let mut sum = 0;
+        self.counts.map(|count| {
+            sum += count;
+            sum
+        })
+    }
+
+    /// The sum of all durations.
+    fn sum(&self) -> Duration {
+        self.sum
     }
 }

@@ -96,7 +96,9 @@ impl PolicyFlags {
             (PolicyChoice::Player(_) | PolicyChoice::Program(_), Some(_), _) => {
                 return misplaced("--policy-map", "policies at a server");
             }
-            (PolicyChoice::Player(_) | PolicyChoice::Remote(..), _, Some(_)) => return misplaced("--policy-limit", "programs"),
+            (PolicyChoice::Player(_) | PolicyChoice::Remote(..), _, Some(_)) => {
+                return misplaced("--policy-limit", "programs");
+            }
             (PolicyChoice::Player(_) | PolicyChoice::Remote(..), _, None) if driving.is_per_robot() => {
                 return misplaced(
                     "--per-robot",

@@ -1,9 +1,7 @@
 //! Agents as programs: a fresh process for each episode, or for each of its robots, which finds a server with that one episode at
 //! an address in its environment, and is stopped with all that it started when the episode or its time is over.
 
-mod brief;
-mod ending;
-mod part;
+mod participant;
 mod process;
 
 use std::{
@@ -19,7 +17,7 @@ use tandem_episodes::{
     EpisodeSpec, RunFolder, Visibility, create_private_folder,
     players::{Fared, Place, PlayError, Policy, PolicyCard},
 };
-use tandem_tools_spec::{Driving, ResultReply, StartReply};
+use tandem_tools_spec::{Driving, EndReason, ResultReply, StartReply};
 
 use crate::{
     hosting::{EpisodeThread, HostingError},
@@ -27,15 +25,17 @@ use crate::{
     settings::{Layer, Record, Settings, SettingsError},
     token::Token,
 };
-use ending::Leaving;
-use part::Part;
-use process::{Crowd, Group};
+use participant::Participant;
+use process::{ProcessGroup, ProcessGroups, STDERR_FILE, STDOUT_FILE};
 
 /// How long a program may go on when its episode has ended.
-const LAST_WORDS: Duration = Duration::from_secs(10);
+const GRACE_PERIOD: Duration = Duration::from_secs(10);
 
-/// How often it is looked at.
-const ROUND: Duration = Duration::from_millis(50);
+/// How often programs are looked at.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
+
+/// How much of a program's last line a result quotes.
+const LAST_LINE_CHARS: usize = 300;
 
 /// A command that plays.
 #[derive(Debug)]
@@ -46,7 +46,7 @@ pub struct Program {
     /// Longest that one of its processes may run.
     limit: Duration,
     settings: Arc<Settings>,
-    processes: Arc<Crowd>,
+    processes: Arc<ProcessGroups>,
 }
 
 impl Program {
@@ -55,16 +55,16 @@ impl Program {
         let flags = Layer {
             listen: Some(([127, 0, 0, 1], 0).into()),
             max_episodes: Some(1),
-            // Where a program that has a shell could look behind the curtain, nothing lies while it runs.
+            // A program that has a shell could read files, so nothing is written where it could look while it runs.
             record: Some(Record::After),
             ..Layer::default()
         };
-        let processes = Arc::new(Crowd::default());
-        process::end_with_us(&processes);
+        let processes = Arc::new(ProcessGroups::default());
+        process::stop_on_shutdown(&processes);
         Ok(Program { command, driving, limit, settings: Settings::resolve(flags, None)?, processes })
     }
 
-    /// Those of a server for this episode alone.
+    /// The settings of a server for this episode alone.
     fn settings_for(&self, spec: &EpisodeSpec, token: Token, folder: &Path) -> Arc<Settings> {
         Arc::new(Settings {
             token: Some(token),
@@ -77,47 +77,48 @@ impl Program {
         })
     }
 
-    /// Starts a process for each part and waits until they are gone. Returns how each left, and its status.
+    /// Starts a process for each participant and waits until all are gone. Returns how each was found, and its exit status.
     fn run(
         &self,
         server: &Server,
         episode: &EpisodeThread,
         start: &StartReply,
-        parts: &[Part],
-    ) -> Result<Vec<(Leaving, String)>, PlayError> {
+        participants: &[Participant],
+    ) -> Result<Vec<(ProgramExit, String)>, PlayError> {
         let url = format!("http://{}", server.address());
         let mut groups = Vec::new();
-        for part in parts {
-            part.write(start, &url, &self.driving)?;
+        for participant in participants {
+            participant.write(start, &url, &self.driving)?;
         }
-        for part in parts {
-            let environment = part.environment(start, &url);
-            let group = Group::start(&self.processes, &self.command, &environment, &part.folder);
+        for participant in participants {
+            let environment = participant.environment(start, &url);
+            let group =
+                ProcessGroup::start(&self.processes, &self.command, &environment, &participant.folder);
             groups.push(group.map_err(|error| lost("the program cannot be started", error))?);
         }
-        let leavings =
-            self.watch(&mut groups, episode).map_err(|error| lost("the program is lost", error))?;
-        let statuses: io::Result<Vec<String>> = groups.into_iter().map(Group::stop).collect();
+        let exits = self.watch(&mut groups, episode).map_err(|error| lost("the program is lost", error))?;
+        let statuses: io::Result<Vec<String>> = groups.into_iter().map(ProcessGroup::stop).collect();
         let statuses = statuses.map_err(|error| lost("the program is lost", error))?;
-        Ok(leavings.into_iter().zip(statuses).collect())
+        Ok(exits.into_iter().zip(statuses).collect())
     }
 
-    fn watch(&self, groups: &mut [Group], episode: &EpisodeThread) -> io::Result<Vec<Leaving>> {
+    fn watch(&self, groups: &mut [ProcessGroup], episode: &EpisodeThread) -> io::Result<Vec<ProgramExit>> {
         let began = Instant::now();
         let mut over: Option<Instant> = None;
         loop {
-            let ended: Vec<bool> = groups.iter_mut().map(Group::has_ended).collect::<io::Result<_>>()?;
+            let ended: Vec<bool> =
+                groups.iter_mut().map(ProcessGroup::has_ended).collect::<io::Result<_>>()?;
             let late = began.elapsed() >= self.limit;
-            let stay = episode.ended() && over.get_or_insert_with(Instant::now).elapsed() >= LAST_WORDS;
+            let stay = episode.ended() && over.get_or_insert_with(Instant::now).elapsed() >= GRACE_PERIOD;
             if late || stay || ended.iter().all(|ended| *ended) {
-                let leaving = |ended: bool| match (ended, late) {
-                    (true, _) => Leaving::Left,
-                    (false, true) => Leaving::OutOfTime(self.limit),
-                    (false, false) => Leaving::Stays,
+                let exit = |ended: bool| match (ended, late) {
+                    (true, _) => ProgramExit::Ended,
+                    (false, true) => ProgramExit::TimedOut(self.limit),
+                    (false, false) => ProgramExit::StillRunning,
                 };
-                return Ok(ended.into_iter().map(leaving).collect());
+                return Ok(ended.into_iter().map(exit).collect());
             }
-            thread::sleep(ROUND);
+            thread::sleep(POLL_INTERVAL);
         }
     }
 }
@@ -138,24 +139,24 @@ impl Policy for Program {
         let folder = place.folder;
         create_private_folder(folder).map_err(|error| lost("no folder for the episode", error))?;
         let absolute = folder.canonicalize().map_err(|error| lost("no folder for the episode", error))?;
-        forget(&absolute.join(tandem_episodes::RESULT_FILE))?;
+        remove_old_result(&absolute.join(tandem_episodes::RESULT_FILE))?;
         let (token, text) = Token::random().map_err(HostingError::from)?;
         let server = Server::start(self.settings_for(spec, token, &absolute));
         let server = server.map_err(|error| lost("no server", error))?;
         let id = format!("{}-seed{}", spec.task.id, spec.seed);
         let files = RunFolder { path: absolute.clone(), visibility: Visibility::After };
         let (episode, start) = server.host(&id, spec.clone(), &self.driving, files)?;
-        let parts = Part::all(&start, &text, &absolute);
-        let ran = self.run(&server, &episode, &start, &parts);
+        let participants = Participant::all(&start, &text, &absolute);
+        let ran = self.run(&server, &episode, &start, &participants);
         let over = episode.ended();
         let thought = episode.thought();
         drop(episode);
         server.stop();
         let ran = ran?;
         let result = read_result(&absolute)?;
-        let reasons = ran.iter().zip(&parts).filter_map(|((leaving, status), part)| {
-            let reason = leaving.reason(status, over, &result, &part.folder)?;
-            Some(part.robot.map_or(reason.clone(), |robot| format!("{robot}: {reason}")))
+        let reasons = ran.iter().zip(&participants).filter_map(|((exit, status), participant)| {
+            let reason = exit.failure(status, over, &result, &participant.folder)?;
+            Some(participant.robot.map_or(reason.clone(), |robot| format!("{robot}: {reason}")))
         });
         let reasons: Vec<String> = reasons.collect();
         let stopped = (!reasons.is_empty()).then(|| reasons.join("; "));
@@ -163,8 +164,53 @@ impl Policy for Program {
     }
 }
 
-/// Removes what an interrupted run has left.
-fn forget(path: &Path) -> Result<(), PlayError> {
+/// How a program was found when the wait for it was over.
+enum ProgramExit {
+    /// It ended by itself.
+    Ended,
+    /// Its episode is over, and it still runs.
+    StillRunning,
+    /// It ran for longer than this limit.
+    TimedOut(Duration),
+}
+
+impl ProgramExit {
+    /// What kept a program from playing its episode to the end, if anything did. `status` is the exit status of the program, `over`
+    /// says whether the episode had ended by then, and `folder` has the program's output.
+    fn failure(&self, status: &str, over: bool, result: &ResultReply, folder: &Path) -> Option<String> {
+        match (self, over, result.ended) {
+            (ProgramExit::TimedOut(limit), ..) => {
+                Some(format!("the program was stopped after {} s", limit.as_secs_f64()))
+            }
+            (_, true, EndReason::WallClockExhausted) => Some("the policy's wall clock ran out".into()),
+            (_, true, EndReason::Abandoned) => Some("the program made no call for too long".into()),
+            (ProgramExit::Ended, false, _) => {
+                let calls = match result.tool_calls {
+                    0 => "without a call".into(),
+                    1 => "after 1 call".into(),
+                    calls => format!("after {calls} calls"),
+                };
+                let line = last_line(folder).map(|line| format!("; its last words: {line}"));
+                let line = line.unwrap_or_default();
+                Some(format!("the program ended {calls}, before its episode did ({status}){line}"))
+            }
+            (ProgramExit::Ended | ProgramExit::StillRunning, ..) => None,
+        }
+    }
+}
+
+/// The last line that a program has written to stderr, or else to stdout.
+fn last_line(folder: &Path) -> Option<String> {
+    [STDERR_FILE, STDOUT_FILE].into_iter().find_map(|name| {
+        let bytes = fs::read(folder.join(name)).ok()?;
+        let text = String::from_utf8_lossy(&bytes);
+        let line = text.lines().map(str::trim).rfind(|line| !line.is_empty())?;
+        Some(line.chars().take(LAST_LINE_CHARS).collect())
+    })
+}
+
+/// Removes the result that an interrupted run has left.
+fn remove_old_result(path: &Path) -> Result<(), PlayError> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(lost("an old result stays", error)),
         _ => Ok(()),

@@ -10,59 +10,59 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::brief;
+use super::participant::BRIEF_FILE;
 
-/// Where its output is kept.
+/// The files in a program's folder that its output is written to.
 pub const STDOUT_FILE: &str = "stdout.txt";
 pub const STDERR_FILE: &str = "stderr.txt";
 
 /// How long a group may take to end once it has been asked to.
-const PATIENCE: Duration = Duration::from_secs(5);
-const ROUND: Duration = Duration::from_millis(20);
+const TERMINATION_GRACE: Duration = Duration::from_secs(5);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
-/// The groups that are running.
+/// The numbers of the groups that are running.
 #[derive(Debug, Default)]
-pub struct Crowd(Mutex<Vec<u32>>);
+pub struct ProcessGroups(Mutex<Vec<u32>>);
 
-impl Crowd {
+impl ProcessGroups {
     fn lock(&self) -> MutexGuard<'_, Vec<u32>> {
         // Nothing panics while it holds the lock.
         self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 }
 
-/// One group. Dropping it stops it.
-pub struct Group {
+/// A program and all that it has started. Dropping it stops them.
+pub struct ProcessGroup {
     child: Child,
-    crowd: Arc<Crowd>,
-    /// From when it has been stopped.
+    groups: Arc<ProcessGroups>,
+    /// How the program ended, once the group has been stopped.
     status: Option<ExitStatus>,
 }
 
-impl Group {
+impl ProcessGroup {
     /// Starts `command` by a shell, with the brief in `folder` on its standard input and its output kept there.
     pub fn start(
-        crowd: &Arc<Crowd>,
+        groups: &Arc<ProcessGroups>,
         command: &str,
         environment: &[(&str, String)],
         folder: &Path,
-    ) -> io::Result<Group> {
+    ) -> io::Result<ProcessGroup> {
         let output = |name: &str| File::create(folder.join(name));
         let mut shell = Command::new(SHELL[0]);
         shell
             .arg(SHELL[1])
             .arg(command)
             .envs(environment.iter().map(|(name, value)| (name, value)))
-            .stdin(Stdio::from(File::open(folder.join(brief::FILE))?))
+            .stdin(Stdio::from(File::open(folder.join(BRIEF_FILE))?))
             .stdout(output(STDOUT_FILE)?)
             .stderr(output(STDERR_FILE)?);
-        apart(&mut shell);
-        // No signal may fall between the start and the note of it.
-        let mut running = crowd.lock();
+        in_own_group(&mut shell);
+        // A signal that comes between the start and the note of it would miss the program.
+        let mut running = groups.lock();
         let child = shell.spawn()?;
         running.push(child.id());
         drop(running);
-        Ok(Group { child, crowd: crowd.clone(), status: None })
+        Ok(ProcessGroup { child, groups: groups.clone(), status: None })
     }
 
     /// Whether the program has ended, whatever it has left running.
@@ -80,14 +80,14 @@ impl Group {
             return Ok(status);
         }
         if !self.has_ended()? {
-            ask(self.child.id());
+            terminate(self.child.id());
             let asked = Instant::now();
-            while !self.has_ended()? && asked.elapsed() < PATIENCE {
-                thread::sleep(ROUND);
+            while !self.has_ended()? && asked.elapsed() < TERMINATION_GRACE {
+                thread::sleep(POLL_INTERVAL);
             }
         }
-        // The number is this group's for as long as the program has not been waited for.
-        let mut running = self.crowd.lock();
+        // No other process gets the group's number before the program has been waited for.
+        let mut running = self.groups.lock();
         kill(&mut self.child);
         running.retain(|id| *id != self.child.id());
         let status = self.child.wait()?;
@@ -96,23 +96,23 @@ impl Group {
     }
 }
 
-impl Drop for Group {
+impl Drop for ProcessGroup {
     fn drop(&mut self) {
-        // Nobody is left who could be told.
+        // Nobody is left to whom an error could be reported.
         let _ = self.end();
     }
 }
 
-/// From here on a signal that ends this process ends every group first.
-pub fn end_with_us(crowd: &Arc<Crowd>) {
-    let crowd = Arc::downgrade(crowd);
+/// Has a signal that ends this process end every group first, from now on.
+pub fn stop_on_shutdown(groups: &Arc<ProcessGroups>) {
+    let groups = Arc::downgrade(groups);
     thread::spawn(move || {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
         let Ok(runtime) = runtime else { return };
         runtime.block_on(crate::http::shutdown_signal());
-        if let Some(crowd) = crowd.upgrade() {
+        if let Some(groups) = groups.upgrade() {
             // Held to the end, so that no further group starts.
-            let running = crowd.lock();
+            let running = groups.lock();
             running.iter().for_each(|id| kill_group(*id));
             std::process::exit(INTERRUPTED);
         }
@@ -131,19 +131,19 @@ mod system {
 
     pub const SHELL: [&str; 2] = ["sh", "-c"];
 
-    /// In a group of its own.
-    pub fn apart(command: &mut Command) {
+    /// Has the command start in a process group of its own.
+    pub fn in_own_group(command: &mut Command) {
         command.process_group(0);
     }
 
-    /// Looks without waiting for it, so that its number stays its own.
+    /// Whether the child has ended. It is not waited for, so that no other process gets its number.
     pub fn has_ended(child: &mut Child) -> io::Result<bool> {
         let Some(pid) = number(child.id()) else { return Ok(true) };
         let look = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
         Ok(waitid(WaitId::Pid(pid), look)?.is_some())
     }
 
-    pub fn ask(id: u32) {
+    pub fn terminate(id: u32) {
         signal(id, Signal::TERM);
     }
 
@@ -157,7 +157,7 @@ mod system {
 
     fn signal(id: u32, signal: Signal) {
         if let Some(pid) = number(id) {
-            // It fails where nobody is left, which is what is wanted.
+            // The call fails where no process of the group is left, which is what is wanted.
             let _ = kill_process_group(pid, signal);
         }
     }
@@ -173,13 +173,13 @@ mod system {
 
     pub const SHELL: [&str; 2] = ["cmd", "/C"];
 
-    pub fn apart(_: &mut Command) {}
+    pub fn in_own_group(_: &mut Command) {}
 
     pub fn has_ended(child: &mut Child) -> io::Result<bool> {
         Ok(child.try_wait()?.is_some())
     }
 
-    pub fn ask(_: u32) {}
+    pub fn terminate(_: u32) {}
 
     pub fn kill(child: &mut Child) {
         let _ = child.kill();
@@ -188,4 +188,4 @@ mod system {
     pub fn kill_group(_: u32) {}
 }
 
-use system::{SHELL, apart, ask, has_ended, kill, kill_group};
+use system::{SHELL, has_ended, in_own_group, kill, kill_group, terminate};

@@ -157,7 +157,7 @@ impl McpServer {
         let episode = episode.filter(|id| self.app.table.get(id).is_ok());
         let problem = refusal.map(ApiError::name);
         if let Some(kind) = problem {
-            self.app.table.metrics().refusal(kind);
+            self.app.table.metrics().request_refused(kind);
         }
         tracing::info!(tool, problem, episode, "call");
     }

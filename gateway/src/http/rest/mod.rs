@@ -33,7 +33,7 @@ use super::{
 };
 use crate::{
     hosting::{Caller, HostingError, Once, Request as Asked},
-    metrics::Page,
+    metrics::MetricsPage,
 };
 use idempotency::{Key, say_again};
 
@@ -125,7 +125,7 @@ async fn docs(State(app): State<App>) -> Response {
 async fn metrics(State(app): State<App>, Extension(who): Extension<Caller>) -> Result<Response, ApiError> {
     only_hosts(&who)?;
     let page = app.table.metrics().page(app.table.len(), app.table.running());
-    Ok(([(header::CONTENT_TYPE, Page::CONTENT_TYPE)], page).into_response())
+    Ok(([(header::CONTENT_TYPE, MetricsPage::CONTENT_TYPE)], page).into_response())
 }
 
 async fn start(
@@ -239,7 +239,7 @@ fn refused_route(method: Method, uri: Uri, other_method: bool) -> ApiError {
 async fn count_refusal(State(app): State<App>, request: Request, next: Next) -> Response {
     let response = next.run(request).await;
     if let Some(Refused(kind)) = response.extensions().get() {
-        app.table.metrics().refusal(kind);
+        app.table.metrics().request_refused(kind);
     }
     response
 }

@@ -1,0 +1,127 @@
+//! What one of the programs of an episode is given: its folder, its environment, and its brief, which says the task and how to act
+//! in words that a language model can be given as they are.
+
+use std::path::{Path, PathBuf};
+
+use tandem_episodes::{EpisodeError, OutputError, create_private_folder, write_whole};
+use tandem_tools_spec::{Brief, Driving, StartReply};
+
+/// The file with the brief, which the program reads on its standard input, too.
+pub const BRIEF_FILE: &str = "brief.txt";
+
+/// The file with the server's reply to the start, for programs that read JSON.
+const START_FILE: &str = "start.json";
+
+/// A program that directs all robots, or one robot.
+#[derive(Debug)]
+pub struct Participant<'a> {
+    /// The robot that it directs, where it directs one alone.
+    pub robot: Option<&'a str>,
+    token: &'a str,
+    /// Where its brief and its output are kept.
+    pub folder: PathBuf,
+}
+
+impl<'a> Participant<'a> {
+    /// The programs of the episode `start`, whose files are in `folder`: one with the server's own `token`, or one for each operator.
+    pub fn all(start: &'a StartReply, token: &'a str, folder: &Path) -> Vec<Participant<'a>> {
+        if start.operators.is_empty() {
+            return vec![Participant { robot: None, token, folder: folder.into() }];
+        }
+        let participant = |robot: &'a str, token: &'a str| Participant {
+            robot: Some(robot),
+            token,
+            folder: folder.join(robot),
+        };
+        start.operators.iter().map(|operator| participant(&operator.robot, &operator.token)).collect()
+    }
+
+    /// Writes what the program reads.
+    pub fn write(&self, start: &StartReply, url: &str, driving: &Driving) -> Result<(), EpisodeError> {
+        if self.robot.is_some() {
+            create_private_folder(&self.folder)
+                .map_err(|source| OutputError::Io { path: self.folder.clone(), source })?;
+        }
+        let text = brief(start, url, self.robot, driving);
+        write_whole(&self.folder.join(BRIEF_FILE), text.as_bytes())?;
+        // A token is given to whom it belongs and is written to no file.
+        let mut shown = StartReply { operators: Vec::new(), ..start.clone() };
+        shown
+            .briefing
+            .instructions
+            .retain(|instruction| self.robot.is_none_or(|robot| robot == instruction.robot));
+        let text = serde_json::to_string_pretty(&shown).map_err(OutputError::from)?;
+        Ok(write_whole(&self.folder.join(START_FILE), text.as_bytes())?)
+    }
+
+    /// Variables that the program's environment has beside those of this process.
+    pub fn environment(&self, start: &StartReply, url: &str) -> Vec<(&'static str, String)> {
+        let common = [
+            ("TANDEM_URL", url.into()),
+            ("TANDEM_EPISODE", start.episode_id.clone()),
+            ("TANDEM_TOKEN", self.token.into()),
+            ("TANDEM_START", self.folder.join(START_FILE).display().to_string()),
+        ];
+        common.into_iter().chain(self.robot.map(|robot| ("TANDEM_ROBOT", robot.into()))).collect()
+    }
+}
+
+/// The brief for the episode `start` on the server at `url`, whose reader directs all robots, or `robot` alone.
+fn brief(start: &StartReply, url: &str, robot: Option<&str>, driving: &Driving) -> String {
+    let StartReply { episode_id: id, briefing, .. } = start;
+    let mut paragraphs = vec![addressee(start, robot), format!("Task: {}", briefing.instruction)];
+    let own = briefing.instructions.iter().filter(|entry| robot.is_none_or(|robot| entry.robot == robot));
+    paragraphs.extend(own.map(|entry| format!("Robot {}: {}", entry.robot, entry.instruction)));
+    paragraphs.extend(robot.map(|_| partners(driving)));
+    paragraphs.push(format!(
+        "Tools: over MCP at {url}/mcp, each with the argument episode_id {id:?}; or by HTTP, POST {url}/v1/episodes/{id}/tools/NAME \
+         with JSON. GET {url}/v1/episodes/{id}/tools describes each of them and the JSON that it takes. Every request has the header \
+         Authorization: Bearer TOKEN, with the token in the environment's TANDEM_TOKEN."
+    ));
+    let budget = &briefing.status.budget;
+    let clock = match budget.wall_clock_left_s {
+        Some(left_s) => format!("{left_s:.0} seconds to think between calls"),
+        None => "as much time to think as you like".into(),
+    };
+    paragraphs.push(format!(
+        "Budget: {} control steps of 20 ms, at most {} in one command; {clock}. Call finish when the task is done, or cannot be done.",
+        budget.steps_left, budget.steps_per_command
+    ));
+    let Brief { frames, partners, odometry, camera, hands, grasping } = &briefing.brief;
+    paragraphs.extend([frames, partners, odometry, camera, hands].into_iter().chain(grasping).cloned());
+    paragraphs.join("\n\n") + "\n"
+}
+
+/// Says which robots the reader directs.
+fn addressee(start: &StartReply, robot: Option<&str>) -> String {
+    let StartReply { episode_id: id, briefing, .. } = start;
+    let names = briefing.robots.iter().map(|robot| robot.robot.as_str());
+    let (directed, others): (Vec<&str>, Vec<&str>) =
+        names.partition(|name| robot.is_none_or(|robot| robot == *name));
+    let whom = match robot {
+        None => format!("humanoid robots {}", directed.join(", ")),
+        Some(robot) => format!("humanoid robot {robot}"),
+    };
+    let others = match others.is_empty() {
+        true => String::new(),
+        false => {
+            format!(" Others direct {}, one each; you see and command your own alone.", others.join(", "))
+        }
+    };
+    format!(
+        "You direct the {whom} in the episode {id:?} on a Tandem server. The episode has begun; you need no other.{others}"
+    )
+}
+
+/// Says how programs that direct one robot each act together.
+fn partners(driving: &Driving) -> String {
+    let talk = match driving.talk {
+        Some(true) => " You may talk to the others with the tool say; what they say comes with your replies.",
+        _ => "",
+    };
+    format!(
+        "A command is executed when every robot has one, and the shortest ends them all; a robot whose director keeps silent for {} \
+         seconds holds still meanwhile.{talk}",
+        driving.patience_s()
+    )
+}
