@@ -1,6 +1,5 @@
 //! Episodes: tasks and their phases, budgets, grasp detection, and the session that runs tool calls on a world.
 
-pub mod assessment;
 pub mod bench;
 mod commands;
 mod convert;
@@ -14,7 +13,8 @@ pub mod players;
 mod protocol;
 mod recording;
 pub mod replay;
-mod reports;
+pub mod reports;
+pub mod results;
 mod scoring;
 mod session;
 mod spec;
@@ -25,13 +25,13 @@ pub use commands::{Called, OperatorCommand, own as own_call};
 pub use describe::{brief, task_list};
 pub use error::{CheckpointError, EpisodeError, SceneError};
 pub use instructions::{Instructions, InstructionsError};
-pub use output::{OutputError, create_new_private_folder, create_private_folder, write_whole};
+pub use output::{OutputError, create_new_private_folder, create_private_folder, html, write_whole};
 pub use protocol::{Rules, rules};
 pub use recording::{
     RecordedCall, RecordedCheckpoint, Recorder, Recording, RecordingError, RecoverError, Recovered,
     Visibility, recover,
 };
-pub use reports::RESULT_FILE;
+pub use results::RESULT_FILE;
 pub use scoring::{A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, RobotFacts, Scored, Scores};
 pub use session::{Checkpoint, Clock, RunFiles, RunFolder, Session, monotonic};
 pub use spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, SceneFile, Start};

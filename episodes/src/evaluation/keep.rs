@@ -2,45 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
-use tandem_tools_spec::ResultReply;
-
 use super::{EvaluationError, Plan};
 use crate::output::write_whole;
-use crate::players::{Fared, Place, PlayError, PolicyCard};
-use crate::reports::RESULT_FILE;
+use crate::players::{Fared, Place, PlayError};
+use crate::results::{Played, RESULT_FILE, missed};
 use crate::spec::{EpisodeSpec, Start};
 use crate::{CheckpointError, EpisodeError};
-
-/// Folder of single episodes in the folder of an evaluation.
-pub const EPISODES: &str = "episodes";
-
-/// One episode that was played, as it is kept in a file of its own.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Played {
-    /// Who played.
-    #[serde(flatten)]
-    pub by: PolicyCard,
-    pub spec: EpisodeSpec,
-    /// Which base controller the robots had; the name tells files of different content apart.
-    pub locomotion: String,
-    /// Version and fingerprint of the program; what another build played is played again.
-    pub build: String,
-    #[serde(flatten)]
-    pub result: ResultReply,
-    /// How long the policy thought.
-    #[serde(default)]
-    pub thought_s: f64,
-    /// Why the episode fell short: what stopped the policy, or the first phase that was missed.
-    pub note: Option<String>,
-}
-
-impl Played {
-    /// Index of the phase that it began at and that alone counts; `None` where it began at the task's beginning.
-    pub fn begun_phase(&self) -> Option<usize> {
-        self.spec.begun_phase()
-    }
-}
 
 /// What became of an episode of the plan.
 pub enum Outcome {
@@ -124,13 +91,4 @@ fn name(spec: &EpisodeSpec) -> String {
         Start::Phase(start) => format!("{task}-{seed}-{}", start.phase),
         Start::Task | Start::Checkpoint(_) => format!("{task}-{seed}"),
     }
-}
-
-/// The first phase that was not reached; where one phase counts, that one.
-pub fn missed(result: &ResultReply, counts: Option<usize>) -> Option<String> {
-    let counted = |index: usize| counts.is_none_or(|only| only == index);
-    let phases = result.phases.0.iter().enumerate();
-    let (_, (phase, _)) =
-        phases.filter(|(index, _)| counted(*index)).find(|(_, (_, time_s))| time_s.is_none())?;
-    Some(format!("{phase} was not reached in {} steps", result.env_steps))
 }

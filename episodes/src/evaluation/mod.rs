@@ -1,7 +1,6 @@
 //! Episodes over seeds: plays them in parallel worlds, keeps each result, and counts.
 
 mod keep;
-mod phase_level;
 mod plan;
 mod summary;
 #[cfg(test)]
@@ -11,11 +10,10 @@ mod workers;
 use std::path::{Path, PathBuf};
 
 use crate::output::{OutputError, create_private_folder, write_whole};
+use crate::results::{EPISODES, Played};
 use crate::{EpisodeError, fingerprint};
 use keep::Keeper;
 
-pub use keep::{EPISODES, Played, missed};
-pub use phase_level::{PhaseLevel, PhaseRate};
 pub use plan::{Plan, Shard, Starts};
 pub use summary::{Evaluation, TaskSummary};
 

@@ -5,9 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
-use super::keep::{Keeper, Played};
-use super::phase_level::PhaseLevel;
-use crate::players::PolicyCard;
+use super::keep::Keeper;
+use crate::results::{PhaseLevel, Played, PolicyCard};
 
 /// How a task went over its seeds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]

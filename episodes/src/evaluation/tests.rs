@@ -7,7 +7,7 @@ use tandem_tools_spec::{Disclosure, EndReason, Hints, PhaseTimes, Protocol, Resu
 
 use super::keep::missed;
 use super::*;
-use crate::reports::write_result;
+use crate::results::write_result;
 use crate::spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, Start};
 use crate::tasks::{self, Task};
 use crate::{players, scoring::Phase};

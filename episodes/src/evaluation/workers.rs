@@ -4,7 +4,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, mpsc};
 
 use super::EvaluationError;
-use super::keep::{Keeper, Outcome, Played};
+use super::keep::{Keeper, Outcome};
+use crate::results::Played;
 use crate::spec::EpisodeSpec;
 
 /// Every episode of `work`, kept or played, in its order; those that could not be begun are added to `left_out`.

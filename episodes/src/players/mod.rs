@@ -15,7 +15,7 @@ use crate::scoring::Facts;
 use crate::spec::EpisodeSpec;
 
 pub use in_process::InProcess;
-pub use policy::{Fared, Place, PlayError, Policy, PolicyCard, play_in_process};
+pub use policy::{Fared, Place, PlayError, Policy, play_in_process};
 
 /// Makes tool calls on one episode, which is in this process or behind HTTP.
 pub trait Caller {

@@ -4,11 +4,10 @@ use std::fmt::Debug;
 use std::path::Path;
 use std::time::Duration;
 
-use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use tandem_tools_spec::ResultReply;
 
 use super::{Entry, InProcess, PlayerError};
+use crate::results::PolicyCard;
 use crate::spec::EpisodeSpec;
 use crate::{EpisodeError, Session};
 
@@ -19,20 +18,6 @@ pub trait Policy: Debug + Send + Sync {
 
     /// Plays `spec` from its start to its result.
     fn play_whole(&self, spec: &EpisodeSpec, place: Place) -> Result<Fared, PlayError>;
-}
-
-/// What results say of a policy. Episodes of policies with different cards are never taken for each other.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct PolicyCard {
-    /// What results call it.
-    #[serde(rename = "policy")]
-    pub name: String,
-    /// How it is reached and driven, as far as its name does not say it.
-    #[serde(rename = "policy_settings", default, skip_serializing_if = "Option::is_none")]
-    pub settings: Option<Value>,
-    /// What it is shown beyond what the robots themselves see and feel.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub extra_information: Vec<String>,
 }
 
 /// Where an episode leaves its files.
@@ -72,21 +57,6 @@ pub enum PlayError {
     /// The episode was played, and what came of it is lost.
     #[error("{0}")]
     Lost(String),
-}
-
-impl PolicyCard {
-    /// The name, and what the policy is shown beyond what others see.
-    pub fn full_name(&self) -> String {
-        let extra = self.extra_information.iter().map(|what| format!(" + {what}"));
-        std::iter::once(self.name.clone()).chain(extra).collect()
-    }
-}
-
-impl From<&str> for PolicyCard {
-    /// A policy of which nothing but the name is known.
-    fn from(name: &str) -> PolicyCard {
-        PolicyCard { name: name.into(), ..PolicyCard::default() }
-    }
 }
 
 impl Policy for Entry {

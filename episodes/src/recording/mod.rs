@@ -14,31 +14,21 @@
 //! which [`recover`] adds.
 
 mod file;
-mod messages;
 mod read;
 mod recover;
-mod robot_topics;
-mod scene;
 mod store;
 #[cfg(test)]
 mod tests;
 mod thread;
-mod transforms;
+mod topics;
 mod write;
 
-pub use messages::{ToolCallRecord, state_hash_text};
 pub use read::{RecordedCall, RecordedCheckpoint, Recording, RecordingError};
 pub use recover::{RecoverError, Recovered, recover};
 pub use store::Visibility;
 pub use thread::RecorderThread;
+pub use topics::messages::{ToolCallRecord, state_hash_text};
 pub use write::{Recorder, RecordingHeader};
-
-/// Topics that are read back.
-mod topics {
-    pub const STEPS: &str = "/steps";
-    pub const PHASES: &str = "/phases";
-    pub const TOOL_CALLS: &str = "/tool_calls";
-}
 
 /// What the checkpoint is called that an episode began with, where that is not its task's own beginning.
 pub const BEGIN: &str = "begin";

@@ -10,9 +10,9 @@ use serde_json::Value;
 use tandem_sim::{SimError, Step};
 use tandem_tools_spec::{PhaseReached, ResultReply};
 
-use super::messages::{Phase, StepError, StepMessage, ToolCallMessage};
+use super::topics::messages::{Phase, StepError, StepMessage, ToolCallMessage};
 use super::{checkpoint_name, metadata, topics};
-use crate::reports::RESULT_FILE;
+use crate::results::RESULT_FILE;
 use crate::scoring::{ScoreMemory, Scores};
 use crate::spec::EpisodeSpec;
 

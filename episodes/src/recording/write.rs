@@ -8,14 +8,15 @@ use tandem_sim::{Step, mjcf::Geom, render::robot_rgba};
 use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
 
 use super::file::{McapFile, Topic};
-use super::messages::{BudgetLeft, Json, Phase, StepMessage, ToolCallMessage, ToolCallRecord};
-use super::robot_topics::RobotTopics;
 use super::store::Visibility;
-use super::transforms::{self, robot_frame};
-use super::{checkpoint_name, metadata, scene, topics};
+use super::topics::messages::{BudgetLeft, Json, Phase, StepMessage, ToolCallMessage, ToolCallRecord};
+use super::topics::robot::RobotTopics;
+use super::topics::transforms::{self, robot_frame};
+use super::topics::{self, scene};
+use super::{checkpoint_name, metadata};
 use crate::commands::RobotSheet;
 use crate::output::OutputError;
-use crate::reports::RESULT_FILE;
+use crate::results::RESULT_FILE;
 use crate::scoring::{Facts, ScoreMemory};
 use crate::spec::EpisodeSpec;
 

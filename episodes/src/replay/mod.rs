@@ -8,7 +8,7 @@ mod video;
 pub use pictures::{Drawn, PicturesError, PicturesPlan, draw_all};
 pub use scene::{Scene, Size, View};
 pub use verify::{Difference, Outcome, Verified, verify};
-pub use video::{VideoError, VideoFormat, film, webp_picture};
+pub use video::{VideoError, VideoFormat, film};
 
 use crate::EpisodeError;
 use crate::recording::RecordingError;

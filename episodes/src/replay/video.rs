@@ -9,10 +9,10 @@ use image::codecs::gif::{GifEncoder, Repeat};
 use image::{Delay, DynamicImage, RgbImage};
 use tandem_sim::CONTROL_HZ;
 use tandem_sim::render::Frame;
-use webp_animation::{ColorMode, Encoder, EncoderOptions, EncodingConfig};
+use webp_animation::Encoder;
 
 use super::{ReplayError, Scene, Size, View};
-use crate::output::{OutputError, partial_path, put_in_place, write_whole};
+use crate::output::{OutputError, partial_path, put_in_place, webp, write_whole};
 use crate::recording::Recording;
 
 /// What kind of film; the file's extension says it.
@@ -104,8 +104,6 @@ enum Reel {
     Mp4(Child),
 }
 
-/// Of 100; the robots' edges stay clean.
-const WEBP_QUALITY: f32 = 80.0;
 /// From 1, the slowest, to 30.
 const GIF_SPEED: i32 = 10;
 
@@ -114,7 +112,9 @@ impl Reel {
     fn begin(format: VideoFormat, frame: &Frame, rate_hz: u32, path: &Path) -> Result<Reel, VideoError> {
         let Frame { width, height, .. } = *frame;
         Ok(match format {
-            VideoFormat::Webp => Reel::Webp(webp((width, height)).map_err(|e| webp_failed(path, e))?.into()),
+            VideoFormat::Webp => {
+                Reel::Webp(webp::encoder((width, height)).map_err(|e| webp_failed(path, e))?.into())
+            }
             VideoFormat::Gif => {
                 let file = File::create(partial_path(path)).map_err(|e| io_failed(path, e))?;
                 let written = file.try_clone().map_err(|e| io_failed(path, e))?;
@@ -171,25 +171,6 @@ impl Reel {
             }
         }
     }
-}
-
-/// One RGB picture, three bytes a pixel, as a file.
-pub fn webp_picture(width: u32, height: u32, rgb: &[u8]) -> Result<Vec<u8>, VideoError> {
-    let encoded = webp((width, height)).and_then(|mut encoder| {
-        encoder.add_frame(rgb, 0)?;
-        encoder.finalize(1)
-    });
-    encoded.map(|webp| webp.to_vec()).map_err(|source| webp_failed(Path::new("picture"), source))
-}
-
-/// An encoder of RGB pictures.
-fn webp(size_px: (u32, u32)) -> Result<Encoder, webp_animation::Error> {
-    let options = EncoderOptions {
-        color_mode: ColorMode::Rgb,
-        encoding_config: Some(EncodingConfig::new_lossy(WEBP_QUALITY)),
-        ..EncoderOptions::default()
-    };
-    Encoder::new_with_options(size_px, options)
 }
 
 /// An ffmpeg that takes raw pictures and writes what every player plays.

@@ -1,9 +1,10 @@
-//! What an episode leaves for people to read: its result, a page, a strip of pictures.
+//! Pages for people: of one episode, and of evaluations.
 
-mod episode_page;
-mod results;
-mod strip;
+pub(crate) mod episode;
+mod evaluation;
 
-pub use episode_page::{CallCounts, EpisodePage, escape};
-pub use results::{RESULT_FILE, write_result};
-pub use strip::{CELL_HEIGHT, CELL_WIDTH, Moment, View, png};
+pub use evaluation::{
+    Assessment, Average, Comparison, Effort, Failure, Format, Found, LoadError, Loaded, Mean, PairedRow,
+    PhaseReport, PolicyReport, Published, PublishedAverages, Rate, Reason, Spread, TaskReport, Together,
+    gallery, load,
+};

@@ -3,6 +3,7 @@
 mod facts;
 mod grasps;
 mod phases;
+pub mod placement;
 mod scorekeeper;
 mod scores;
 

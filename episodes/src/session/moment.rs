@@ -4,7 +4,7 @@ use tandem_sim::Step;
 use tandem_sim::render::Camera;
 
 use super::eyes::Eyes;
-use crate::reports::{CELL_HEIGHT, CELL_WIDTH, Moment, View};
+use crate::reports::episode::{CELL_HEIGHT, CELL_WIDTH, Moment, View};
 
 /// What there is to see after `step`, of robots called `names`.
 pub fn capture<'a>(

@@ -14,7 +14,8 @@ use crate::EpisodeError;
 use crate::commands::Called;
 use crate::output::{OutputError, create_private_folder, write_whole};
 use crate::recording::{Recorder, RecorderThread, RecordingHeader, ToolCallRecord, Visibility};
-use crate::reports::{self, CallCounts, EpisodePage, Moment};
+use crate::reports::episode::{CallCounts, EpisodePage, Moment, PAGE_FILE, STRIP_FILE, png};
+use crate::results::write_result;
 use crate::scoring::Facts;
 use crate::tasks::Task;
 
@@ -44,9 +45,6 @@ pub struct RunFiles {
 }
 
 impl RunFiles {
-    pub const STRIP: &str = "strip.png";
-    pub const REPORT: &str = "report.html";
-
     /// Makes the folder and begins the recording where `session` stands.
     pub(super) fn create(folder: RunFolder, session: &Session) -> Result<RunFiles, EpisodeError> {
         let RunFolder { path, visibility } = folder;
@@ -138,13 +136,13 @@ impl RunFiles {
         let reported = self.report(result, task);
         self.note(reported);
         result.recording_failed = self.failed().map(str::to_owned);
-        self.note(reports::write_result(result, &self.folder).map(drop));
+        self.note(write_result(result, &self.folder).map(drop));
         result.recording_failed = self.failed().map(str::to_owned);
     }
 
     fn report(&self, result: &ResultReply, task: &Task) -> Result<(), EpisodeError> {
-        let strip = reports::png(&self.moments)?;
-        write_whole(&self.folder.join(Self::STRIP), &strip)?;
+        let strip = png(&self.moments)?;
+        write_whole(&self.folder.join(STRIP_FILE), &strip)?;
         let page = EpisodePage {
             task,
             result,
@@ -153,7 +151,7 @@ impl RunFiles {
             budget_left: self.budget_left,
             strip: &strip,
         };
-        Ok(write_whole(&self.folder.join(Self::REPORT), page.html().as_bytes())?)
+        Ok(write_whole(&self.folder.join(PAGE_FILE), page.html().as_bytes())?)
     }
 
     fn note(&mut self, outcome: Result<(), impl Display>) {

@@ -6,8 +6,8 @@
 
 use std::f32::consts::PI;
 
-use super::placement::{stands_as_high, stands_released};
 use super::{Offset, RobotSpot, Task, spot, uniform_xy};
+use crate::scoring::placement::{stands_as_high, stands_released};
 use crate::scoring::{A, B, C, Done, Facts, Phase};
 
 /// From the middle of the table to the robots round it, which look at it.

@@ -7,8 +7,8 @@
 
 use std::f32::consts::FRAC_PI_2;
 
-use super::placement::{stands_released, within_box};
 use super::{Offset, RobotSpot, Task, spot, uniform_xy};
+use crate::scoring::placement::{stands_released, within_box};
 use crate::scoring::{B, Done, Facts, Phase};
 
 const TROLLEY_Y_M: f32 = 2.2;

@@ -6,8 +6,8 @@
 
 use std::f32::consts::PI;
 
-use super::placement::{above_box, stands_as_high, stands_released};
 use super::{RobotSpot, Task, spot, uniform_xy};
+use crate::scoring::placement::{above_box, stands_as_high, stands_released};
 use crate::scoring::{A, B, Done, Facts, Phase};
 
 const SHELF_M: f32 = 0.75;

@@ -5,8 +5,8 @@
 
 use std::f32::consts::FRAC_PI_2;
 
-use super::placement::RELEASE_S;
 use super::{Offset, RobotSpot, Task, spot, uniform_xy};
+use crate::scoring::placement::RELEASE_S;
 use crate::scoring::{A, B, Done, Facts, Phase};
 
 const FRAME_Y_M: f32 = 0.34;

@@ -9,7 +9,6 @@ mod co_pouring;
 mod frame_hang;
 mod handover;
 mod move_house;
-mod placement;
 mod pouring;
 mod randomize;
 mod table_align;

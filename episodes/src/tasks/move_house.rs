@@ -9,8 +9,8 @@ use std::f32::consts::PI;
 
 use tandem_sim::Vector;
 
-use super::placement::{stands_as_high, stands_released};
 use super::{RobotSpot, Task, spot, uniform_xy};
+use crate::scoring::placement::{stands_as_high, stands_released};
 use crate::scoring::{B, C, Done, Facts, Milestone, Phase};
 
 const START_X_M: f32 = -1.95;

@@ -7,8 +7,8 @@
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
-use super::placement::{stands_as_high, stands_released};
 use super::{ObjectSpot, RobotSpot, Task, spot, uniform_xy};
+use crate::scoring::placement::{stands_as_high, stands_released};
 use crate::scoring::{A, B, Done, Facts, Phase};
 
 /// From the middle of the table to a robot that holds its end.

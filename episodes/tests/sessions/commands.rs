@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
 use crate::common::*;
-use tandem_episodes::{A, B, Clock, EpisodeError, Session};
+use tandem_episodes::{A, B, Clock, EpisodeError, EpisodeSpec, RendererKind, Session};
 use tandem_sim::Vector;
 use tandem_tools_spec::{
     CheckReach, EndReason, Finish, LookReply, ManageReply, MoveWrists, Observe, Protocol, QueryDepth,
@@ -240,4 +240,19 @@ fn an_episode_ends_when_its_policy_has_gone() {
     assert_eq!(ended_after(Protocol::Benchmark, 900, 900), Some(EndReason::Abandoned));
     assert_eq!(ended_after(Protocol::Agentic, 1799, 3600), None);
     assert_eq!(ended_after(Protocol::Agentic, 1800, 3600), Some(EndReason::WallClockExhausted));
+}
+
+#[test]
+fn episodes_go_the_same_way_whoever_draws() {
+    let played = |renderer: RendererKind| {
+        let spec = EpisodeSpec { renderer, ..spec("handover", 5, Protocol::Benchmark) };
+        let mut session = Session::start(&spec, None).unwrap();
+        for _ in 0..2 {
+            session.call(Observe { robots: None, short: None }.into()).unwrap();
+            command(&mut session, raise_hand(10));
+        }
+        session.close().state_hash
+    };
+    let hashes = RendererKind::ALL.map(played);
+    assert!(hashes.iter().all(|hash| *hash == hashes[0]), "{hashes:?}");
 }

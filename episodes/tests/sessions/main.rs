@@ -8,6 +8,5 @@ mod endings;
 mod films;
 mod hands;
 mod recordings;
-mod renderers;
 mod replays;
 mod scenes;

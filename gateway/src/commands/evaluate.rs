@@ -10,8 +10,9 @@ use std::{
 use indicatif::{ProgressBar, ProgressStyle};
 use tandem_episodes::{
     Phase,
-    evaluation::{self, Evaluation, PhaseLevel, Plan, Shard, Starts},
+    evaluation::{self, Evaluation, Plan, Shard, Starts},
     statistics::{Count, clopper_pearson},
+    results::PhaseLevel,
     tasks,
 };
 

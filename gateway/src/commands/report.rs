@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use tandem_episodes::assessment::{Assessment, Format, gallery, load};
+use tandem_episodes::reports::{Assessment, Format, gallery, load};
 use tandem_episodes::write_whole;
 
 use super::CommandResult;

@@ -3,7 +3,7 @@
 use tandem_sim::Vector;
 
 use super::*;
-use crate::tasks::placement::sides::still_and_released;
+use crate::scoring::placement::sides::still_and_released;
 
 fn over_goal(mut facts: Facts, beside_m: Vector) -> Facts {
     let disc_m = facts.position_m("goal_disc");

@@ -6,7 +6,7 @@ use tandem_sim::Vector;
 use super::*;
 use crate::scoring::A;
 use crate::scoring::Grip::{Holding, Touching};
-use crate::tasks::placement::sides::still_and_released;
+use crate::scoring::placement::sides::still_and_released;
 
 fn bottle_at(beside_m: Vector) -> Facts {
     let mut facts = Facts::at_rest(&TASK);

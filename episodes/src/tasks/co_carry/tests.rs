@@ -5,7 +5,7 @@ use tandem_sim::Vector;
 
 use super::*;
 use crate::scoring::Grip::{Holding, Touching};
-use crate::tasks::placement::sides::still_and_released;
+use crate::scoring::placement::sides::still_and_released;
 
 fn held() -> Facts {
     Facts::at_rest(&TASK).grip(A, Left, "basket", Holding).grip(B, Right, "basket", Holding)

@@ -5,7 +5,7 @@ use tandem_sim::{Pose, Rotation, Side::Left, Side::Right};
 use super::*;
 use crate::scoring::A;
 use crate::scoring::Grip::Touching;
-use crate::tasks::placement::sides::still_and_released;
+use crate::scoring::placement::sides::still_and_released;
 
 fn held() -> Facts {
     Facts::at_rest(&TASK).held_by(&[B, C], "console_table")

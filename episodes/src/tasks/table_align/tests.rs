@@ -5,7 +5,7 @@ use tandem_sim::{Pose, Rotation, Side::Left, Vector};
 use super::*;
 use crate::scoring::Grip::Touching;
 use crate::scoring::ObjectFacts;
-use crate::tasks::placement::sides::still_and_released;
+use crate::scoring::placement::sides::still_and_released;
 
 fn held() -> Facts {
     Facts::at_rest(&TASK).held_by(&[A, B], "office_table")

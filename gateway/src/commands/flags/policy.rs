@@ -4,7 +4,8 @@ use std::{error::Error, time::Duration};
 
 use tandem_episodes::{
     EpisodeSpec,
-    players::{self, Fared, Place, PlayError, Policy, PolicyCard},
+    players::{self, Fared, Place, PlayError, Policy},
+    results::PolicyCard,
 };
 use tandem_tools_spec::{Driving, Operators};
 

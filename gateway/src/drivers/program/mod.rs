@@ -15,7 +15,8 @@ use std::{
 use serde_json::json;
 use tandem_episodes::{
     EpisodeSpec, RunFolder, Visibility, create_private_folder,
-    players::{Fared, Place, PlayError, Policy, PolicyCard},
+    players::{Fared, Place, PlayError, Policy},
+    results::PolicyCard,
 };
 use tandem_tools_spec::{Driving, EndReason, ResultReply, StartReply};
 

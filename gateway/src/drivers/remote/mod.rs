@@ -15,7 +15,8 @@ mod values;
 use serde_json::json;
 use tandem_episodes::{
     EpisodeSpec,
-    players::{Fared, Place, PlayError, Policy, PolicyCard, play_in_process},
+    players::{Fared, Place, PlayError, Policy, play_in_process},
+    results::PolicyCard,
     rules,
     tasks::Task,
 };

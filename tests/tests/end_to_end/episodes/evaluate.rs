@@ -3,8 +3,9 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use serde_json::json;
-use tandem_episodes::assessment::{Assessment, load};
-use tandem_episodes::evaluation::{Plan, Played, Shard, Starts, evaluate};
+use tandem_episodes::evaluation::{Plan, Shard, Starts, evaluate};
+use tandem_episodes::reports::{Assessment, load};
+use tandem_episodes::results::Played;
 use tandem_episodes::{Controller, RendererKind, RobotFile, players, tasks};
 use tandem_tools_spec::{Disclosure, EndReason, Hints, Protocol};
 

@@ -4,7 +4,7 @@ use std::{env, fs, io::Read, path::Path, time::Duration};
 
 use serde_json::{Value, json};
 use tandem::drivers::Program;
-use tandem_episodes::evaluation::Played;
+use tandem_episodes::results::Played;
 use tandem_tools_spec::{Driving, EndReason, Operators};
 
 use super::plans::{plan, play};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::policy::{Group, reached};
-use crate::evaluation::Played;
+use crate::results::Played;
 use crate::scoring::Phase;
 use crate::statistics::{Pairs, mcnemar, newcombe};
 use crate::tasks;

@@ -6,9 +6,13 @@ use base64::{Engine, prelude::BASE64_STANDARD};
 use tandem_sim::CONTROL_HZ;
 use tandem_tools_spec::{Budget, EndReason, ResultReply};
 
+use crate::output::html::escape;
 use crate::protocol::{Rules, rules};
 use crate::scoring::Phase;
 use crate::tasks::Task;
+
+/// The page's name in a run folder.
+pub const PAGE_FILE: &str = "report.html";
 
 const STYLE: &str = include_str!("style.css");
 
@@ -206,22 +210,6 @@ impl EpisodePage<'_> {
 <p>The same binary, seed and calls end in the same state, bit for bit: <code>{hash}</code>.</p>"#
         )
     }
-}
-
-/// Text as it may stand in HTML, in attributes too.
-pub fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => escaped += "&amp;",
-            '<' => escaped += "&lt;",
-            '>' => escaped += "&gt;",
-            '"' => escaped += "&quot;",
-            '\'' => escaped += "&#39;",
-            other => escaped.push(other),
-        }
-    }
-    escaped
 }
 
 #[cfg(test)]

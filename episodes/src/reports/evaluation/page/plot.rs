@@ -1,8 +1,8 @@
 //! Rates of one task's phases as a drawing: a mark for each rate on a line from 0 to 100 %, and its interval.
 
-use crate::assessment::policy::{PhaseReport, PolicyReport};
-use crate::assessment::rate::Rate;
-use crate::reports::escape;
+use crate::output::html::escape;
+use crate::reports::evaluation::policy::{PhaseReport, PolicyReport};
+use crate::reports::evaluation::rate::Rate;
 
 /// Colours there are; more policies share them.
 pub const SERIES: usize = 6;

@@ -3,9 +3,9 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::evaluation::{EPISODES, Played, missed};
 use crate::recording::{Recorder, Recording};
-use crate::session::RunFiles;
+use crate::reports::episode::STRIP_FILE;
+use crate::results::{EPISODES, Played, missed};
 
 /// One episode.
 #[derive(Clone, Debug)]
@@ -101,7 +101,7 @@ fn recorded(path: &Path, policy: &str) -> Result<Played, String> {
 }
 
 fn strip(run: &Path) -> Option<PathBuf> {
-    let strip = run.join(RunFiles::STRIP);
+    let strip = run.join(STRIP_FILE);
     strip.exists().then_some(strip)
 }
 

@@ -3,11 +3,11 @@
 use foxglove::messages::{CameraCalibration, CompressedImage, JointState, JointStates};
 use tandem_sim::{RobotModel, RobotState, RobotStep, mjcf::MjcfCamera};
 
-use super::file::{McapFile, Topic};
 use super::messages::{Action, Base, Hands, Json};
 use super::transforms::{EGOCENTRIC, robot_frame, timestamp};
 use crate::commands::{RobotSheet, action_row};
 use crate::output::OutputError;
+use crate::recording::file::{McapFile, Topic};
 use crate::scoring::Facts;
 
 /// The topics of one robot.

@@ -6,7 +6,7 @@ use image::imageops::{self, FilterType};
 
 use super::load::{Found, Loaded};
 use super::policy::{Group, first_missed, groups, succeeded, why};
-use crate::replay::webp_picture;
+use crate::output::webp;
 
 /// One failed episode.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,6 +78,6 @@ fn shrunk(strip: &Path) -> Option<Picture> {
     let [width, height] =
         [strip.width(), strip.height()].map(|px| (f64::from(px) * SCALE).round().max(1.0) as u32);
     let small = imageops::resize(&strip, width, height, FilterType::Triangle);
-    let webp = webp_picture(width, height, small.as_raw()).ok()?;
+    let webp = webp::picture(width, height, small.as_raw()).ok()?;
     Some(Picture { webp, width, height })
 }

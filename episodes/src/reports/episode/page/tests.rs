@@ -74,5 +74,4 @@ fn pages_load_nothing_and_escape_what_they_quote() {
     assert!(page.contains("<code>&lt;script&gt;</code>"));
     assert!(!page.contains("<script"));
     assert!(!page.contains("<link") && !page.contains("url(") && !page.contains("src=\"http"));
-    assert_eq!(escape(r#"a<b>&"c"'d'"#), "a&lt;b&gt;&amp;&quot;c&quot;&#39;d&#39;");
 }

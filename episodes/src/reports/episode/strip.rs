@@ -3,6 +3,9 @@
 use font8x8::legacy::BASIC_LEGACY;
 use tandem_sim::render::{Frame, PictureError, encode_png};
 
+/// The strip's name in a run folder.
+pub const STRIP_FILE: &str = "strip.png";
+
 /// One column.
 #[derive(Clone)]
 pub struct Moment {

@@ -9,8 +9,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use super::load::Found;
 use super::rate::{Mean, Rate};
-use crate::evaluation::{PhaseLevel, Played, missed};
-use crate::players::PolicyCard;
+use crate::results::{PhaseLevel, Played, PolicyCard, missed};
 use crate::scoring::Phase;
 use crate::statistics::Count;
 use crate::tasks::{self, Task};

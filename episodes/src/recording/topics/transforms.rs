@@ -3,9 +3,9 @@
 use foxglove::messages::{FrameTransform, FrameTransforms, Quaternion, Timestamp, Vector3};
 use tandem_sim::{Pose, RobotModel, RobotState, Rotation, Step, Vector};
 
-use super::file::time_ns;
 use crate::commands::RobotSheet;
 use crate::convert::opencv_axes;
+use crate::recording::file::time_ns;
 
 /// The frame that everything else hangs on.
 pub const WORLD: &str = "world";

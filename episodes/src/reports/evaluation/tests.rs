@@ -5,7 +5,7 @@ use std::path::Path;
 use tandem_tools_spec::{EndReason, PhaseTimes, Protocol, ResultReply};
 
 use super::*;
-use crate::evaluation::Played;
+use crate::results::Played;
 use crate::spec::{EpisodeSpec, PhaseStart, Start};
 use crate::tasks::{self, Task};
 

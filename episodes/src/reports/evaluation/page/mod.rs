@@ -9,7 +9,7 @@ use super::gallery::Failure;
 use super::policy::PolicyReport;
 use super::rate::percent;
 use super::tables::{self, Table};
-use crate::reports::escape;
+use crate::output::html::escape;
 use plot::{SERIES, task_plot};
 
 const STYLE: &str = include_str!("style.css");

@@ -1,5 +1,8 @@
 //! How files of an episode are written, and why that can fail.
 
+pub mod html;
+pub mod webp;
+
 use std::{
     fs::{self, File},
     io::{self, Write},

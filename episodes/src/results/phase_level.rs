@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::keep::Played;
+use super::played::Played;
 use crate::scoring::Phase;
 use crate::tasks;
 

@@ -1,0 +1,11 @@
+//! What each topic of a recording holds.
+
+pub mod messages;
+pub mod robot;
+pub mod scene;
+pub mod transforms;
+
+/// Topics that are read back.
+pub const STEPS: &str = "/steps";
+pub const PHASES: &str = "/phases";
+pub const TOOL_CALLS: &str = "/tool_calls";
