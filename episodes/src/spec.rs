@@ -81,7 +81,7 @@ pub enum Start {
 pub struct PhaseStart {
     /// An `episode.mcap`.
     pub recording: PathBuf,
-    /// As results call it: `p2`.
+    /// Its number, as `p2`.
     pub phase: String,
 }
 

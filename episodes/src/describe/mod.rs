@@ -30,8 +30,8 @@ fn task_info(task: &Task) -> TaskInfo {
             .iter()
             .enumerate()
             .map(|(index, phase)| PhaseInfo {
-                id: Phase::number(index),
-                name: phase.id.into(),
+                id: phase.id.into(),
+                number: Phase::number(index),
                 description: phase.description.into(),
                 collaborative: phase.collaborative,
             })

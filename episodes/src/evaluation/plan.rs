@@ -45,7 +45,7 @@ pub enum Starts {
     Phases {
         /// What `tandem collect` or `tandem serve` wrote.
         demonstrations: PathBuf,
-        /// As results call them; a task without such a phase has no episode of it.
+        /// Numbers or ids, as `p2` or `transfer`; a task without such a phase has no episode of it.
         phases: Vec<String>,
     },
 }
@@ -103,13 +103,17 @@ impl Plan<'_> {
         (found, left_out)
     }
 
-    /// The phases that episodes of `task` begin at; `None` for its own beginning.
+    /// Numbers of the phases that episodes of `task` begin at; `None` for its own beginning.
     fn starts_of(&self, task: &Task) -> Vec<Option<String>> {
         match &self.starts {
             Starts::Task => vec![None],
             Starts::Phases { phases, .. } => {
-                let of_task = (0..task.phases.len()).map(Phase::number);
-                of_task.filter(|phase| phases.contains(phase)).map(Some).collect()
+                let of_task =
+                    task.phases.iter().enumerate().map(|(index, phase)| (Phase::number(index), phase.id));
+                let named = |(number, id): (String, &str)| {
+                    phases.iter().any(|name| *name == number || name == id).then_some(number)
+                };
+                of_task.filter_map(named).map(Some).collect()
             }
         }
     }

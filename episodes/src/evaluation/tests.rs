@@ -140,7 +140,7 @@ fn phases_on_their_own_are_averaged_by_who_works_on_them() {
     episodes.push(from("handover", 0, 2, false));
     let level = PhaseLevel::of(episodes.iter()).unwrap();
     let rates: Vec<_> =
-        level.phases.iter().map(|rate| (rate.task, &*rate.phase, rate.reached, rate.episodes)).collect();
+        level.phases.iter().map(|rate| (rate.task, &*rate.number, rate.reached, rate.episodes)).collect();
     let handover = [("handover", "p1", 2, 2), ("handover", "p2", 1, 4), ("handover", "p3", 0, 1)];
     assert_eq!(rates, [&handover[..], &[("co_pouring", "p3", 3, 4)]].concat());
     assert_eq!((level.non_collaborative_share, level.collaborative_share), (Some(0.5), Some(0.5)));

@@ -137,8 +137,8 @@ impl Recording {
     /// The phases that the episode reached.
     pub fn phases(&self) -> Result<Vec<PhaseReached>, RecordingError> {
         let phase = |message: Result<(f64, Phase), RecordingError>| {
-            let (_, Phase { id, name, time_s }) = message?;
-            Ok(PhaseReached { id, name, time_s })
+            let (_, Phase { id, number, time_s }) = message?;
+            Ok(PhaseReached { id, number, time_s })
         };
         self.messages(topics::PHASES)?.map(phase).collect()
     }

@@ -91,7 +91,7 @@ fn record(folder: &Path) -> (World, PathBuf) {
         record_step(&mut recorder, &mut scores, &mut world, &commands);
     }
     let time_s = world.present().time_s;
-    recorder.phase(&PhaseReached { id: "p1".into(), name: "grasp_and_lift".into(), time_s }).unwrap();
+    recorder.phase(&PhaseReached { id: "grasp_and_lift".into(), number: "p1".into(), time_s }).unwrap();
     let wait = ToolCall::parse("wait", serde_json::json!({ "steps": 10 })).unwrap();
     recorder
         .tool_call(

@@ -26,8 +26,10 @@ pub struct PhaseLevel {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhaseRate {
     pub task: &'static str,
-    /// As results call it: `p2`.
-    pub phase: String,
+    /// As `transfer`.
+    pub id: &'static str,
+    /// As `p2`.
+    pub number: String,
     pub collaborative: bool,
     pub episodes: usize,
     pub reached: usize,
@@ -52,8 +54,8 @@ impl PhaseLevel {
         }
         let rate = |((task, phase), [episodes, reached]): ((usize, usize), [usize; 2])| {
             let task = &tasks::ALL[task];
-            let collaborative = task.phases[phase].collaborative;
-            PhaseRate { task: task.id, phase: Phase::number(phase), collaborative, episodes, reached }
+            let Phase { id, collaborative, .. } = task.phases[phase];
+            PhaseRate { task: task.id, id, number: Phase::number(phase), collaborative, episodes, reached }
         };
         let phases: Vec<PhaseRate> = counts.into_iter().map(rate).collect();
         let mean = |together: bool| mean(phases.iter().filter(|rate| rate.collaborative == together));

@@ -301,7 +301,7 @@ impl Session {
     fn phases_reached(&mut self, first: usize) {
         let reached = self.reached();
         for phase in &reached[first..] {
-            self.keep_picture(&format!("{} {}", phase.id, phase.name.replace('_', " ")));
+            self.keep_picture(&format!("{} {}", phase.number, phase.id.replace('_', " ")));
             if let Some(files) = &mut self.files {
                 files.phase(phase);
             }

@@ -52,8 +52,8 @@ impl Session {
         let reached = self.scores.reached().enumerate();
         reached
             .map(|(index, (phase, time_s))| PhaseReached {
-                id: Phase::number(index),
-                name: phase.id.into(),
+                id: phase.id.into(),
+                number: Phase::number(index),
                 time_s,
             })
             .collect()

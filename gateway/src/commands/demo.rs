@@ -112,10 +112,10 @@ fn play(server: &Server, seed: u32) -> Result<ResultReply, Box<dyn Error>> {
 }
 
 fn print_result(task: &Task, result: &ResultReply, folder: &Path) {
-    for ((id, time_s), phase) in result.phases.0.iter().zip(task.phases) {
+    for ((number, time_s), phase) in result.phases.0.iter().zip(task.phases) {
         match time_s {
-            Some(time_s) => println!("  {id} {} reached at {time_s:.2} s", phase.id),
-            None => println!("  {id} {} not reached", phase.id),
+            Some(time_s) => println!("  {number} {} reached at {time_s:.2} s", phase.id),
+            None => println!("  {number} {} not reached", phase.id),
         }
     }
     println!(

@@ -11,8 +11,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use tandem_episodes::{
     Phase,
     evaluation::{self, Evaluation, Plan, Shard, Starts},
-    statistics::{Count, clopper_pearson},
     results::PhaseLevel,
+    statistics::{Count, clopper_pearson},
     tasks,
 };
 
@@ -32,7 +32,7 @@ pub struct EvaluateArgs {
     policy: PolicyFlags,
     #[command(flatten)]
     episodes: EpisodeFlags,
-    /// Phases to begin at, as p2 or p1,p2, or `all`: each episode starts where that phase began in the demonstration of its
+    /// Phases to begin at, by number or id, as p2 or p1,transfer, or `all`: each episode starts where that phase began in the demonstration of its
     /// task and seed, with the whole budget ahead, and that phase alone counts.
     #[arg(long, value_name = "PHASES", value_parser = parse_phases, requires = "demos")]
     from: Option<PhaseList>,
@@ -54,16 +54,20 @@ pub struct EvaluateArgs {
 #[derive(Debug, Clone)]
 struct PhaseList(Vec<String>);
 
-/// The phases that `text` names: `all`, or ids separated by commas.
+/// The phases that `text` names: `all`, or numbers and ids separated by commas.
 fn parse_phases(text: &str) -> Result<PhaseList, String> {
     let most = tasks::ALL.iter().map(|task| task.phases.len()).max().unwrap_or_default();
-    let have: Vec<String> = (0..most).map(Phase::number).collect();
+    let numbers: Vec<String> = (0..most).map(Phase::number).collect();
     if text == "all" {
-        return Ok(PhaseList(have));
+        return Ok(PhaseList(numbers));
     }
-    let known = |phase: &str| match have.iter().any(|known| known == phase) {
+    let is_id = |text: &str| tasks::ALL.iter().flat_map(|task| task.phases).any(|phase| phase.id == text);
+    let known = |phase: &str| match numbers.iter().any(|number| number == phase) || is_id(phase) {
         true => Ok(phase.to_owned()),
-        false => Err(format!("no phase {phase:?}; have: {}, or all", have.join(", "))),
+        false => Err(format!(
+            "no phase {phase:?}; have: {}, the id of a phase, as `tandem tasks` lists them, or all",
+            numbers.join(", ")
+        )),
     };
     text.split(',').map(|phase| known(phase.trim())).collect::<Result<_, _>>().map(PhaseList)
 }
@@ -152,7 +156,7 @@ fn print_phase_level(level: &PhaseLevel) {
     for phase in &level.phases {
         let reached = rate(Count { successes: phase.reached, trials: phase.episodes });
         let who = if phase.collaborative { "together" } else { "" };
-        println!("{:14} {:>8}  {:>8}  {reached:^22} {who}", phase.task, phase.phase, phase.episodes);
+        println!("{:14} {:>8}  {:>8}  {reached:^22} {who}", phase.task, phase.number, phase.episodes);
     }
     let percent = |share: Option<f64>| share.map_or("-".into(), |share| format!("{:.1}", 100.0 * share));
     println!(

@@ -16,7 +16,7 @@ pub fn run(_: TasksArgs) -> CommandResult {
         println!("{}: {}", task.id, task.instruction);
         for phase in task.phases {
             let who = if phase.collaborative { "together" } else { "alone" };
-            println!("  {} {} ({who}): {}", phase.id, phase.name, phase.description);
+            println!("  {} {} ({who}): {}", phase.number, phase.id, phase.description);
         }
     }
     Ok(ExitCode::SUCCESS)

@@ -18,10 +18,10 @@ pub struct Budget {
 /// A phase of the task, and when it was reached.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PhaseReached {
-    /// `p1`, `p2`, ... in the order they have to be reached.
-    pub id: String,
     /// What the phase is called, as `grasp_and_lift`.
-    pub name: String,
+    pub id: String,
+    /// `p1`, `p2`, ... in the order they have to be reached.
+    pub number: String,
     /// Simulated seconds since the episode began.
     pub time_s: f64,
 }

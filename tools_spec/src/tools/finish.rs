@@ -83,14 +83,14 @@ impl ResultReply {
     }
 }
 
-/// Seconds by phase id, in the task's order; JSON object from `p1`, `p2`, ... to seconds or null.
+/// Seconds by the number of the phase, in the task's order; JSON object from `p1`, `p2`, ... to seconds or null.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhaseTimes(pub Vec<(String, Option<f64>)>);
 
 impl PhaseTimes {
-    /// When phase `id` was reached.
-    pub fn reached_s(&self, id: &str) -> Option<f64> {
-        self.0.iter().find(|(phase, _)| phase == id).and_then(|(_, time_s)| *time_s)
+    /// When the phase with this number, as `p2`, was reached.
+    pub fn reached_s(&self, number: &str) -> Option<f64> {
+        self.0.iter().find(|(phase, _)| phase == number).and_then(|(_, time_s)| *time_s)
     }
 }
 

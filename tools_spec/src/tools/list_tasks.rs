@@ -54,10 +54,10 @@ pub struct TaskInfo {
 /// One phase of a task.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PhaseInfo {
-    /// `p1`, `p2`, ...
-    pub id: String,
     /// What the phase is called, as `transfer`.
-    pub name: String,
+    pub id: String,
+    /// `p1`, `p2`, ...
+    pub number: String,
     /// When the phase counts as reached.
     pub description: String,
     /// Whether more than one robot has to work on it.

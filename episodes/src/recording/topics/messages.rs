@@ -162,7 +162,7 @@ impl Hands {
 #[derive(Serialize, Deserialize, JsonSchema)]
 pub struct Phase {
     pub id: String,
-    pub name: String,
+    pub number: String,
     pub time_s: f64,
 }
 
@@ -172,7 +172,7 @@ impl JsonMessage for Phase {
 
 impl From<&PhaseReached> for Json<Phase> {
     fn from(phase: &PhaseReached) -> Self {
-        Json(Phase { id: phase.id.clone(), name: phase.name.clone(), time_s: phase.time_s })
+        Json(Phase { id: phase.id.clone(), number: phase.number.clone(), time_s: phase.time_s })
     }
 }
 

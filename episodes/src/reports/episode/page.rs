@@ -119,13 +119,13 @@ impl EpisodePage<'_> {
         let mut segments = String::new();
         let mut from_s = self.begin_s;
         let percent = |span_s: f64| 100.0 * span_s / self.duration_s().max(f64::MIN_POSITIVE);
-        for (id, time_s) in &self.result.phases.0 {
+        for (number, time_s) in &self.result.phases.0 {
             let Some(time_s) = *time_s else { break };
             if time_s <= self.begin_s && self.begin_s > 0.0 {
                 continue;
             }
-            let (id, width) = (escape(id), percent(time_s - from_s));
-            segments += &format!(r#"<span style="width:{width:.2}%">{id} {time_s:.2} s</span>"#);
+            let (number, width) = (escape(number), percent(time_s - from_s));
+            segments += &format!(r#"<span style="width:{width:.2}%">{number} {time_s:.2} s</span>"#);
             from_s = time_s;
         }
         let end_s = self.begin_s + self.duration_s();
@@ -142,8 +142,8 @@ impl EpisodePage<'_> {
     fn phases(&self) -> String {
         let mut rows = String::new();
         for (index, phase) in self.task.phases.iter().enumerate() {
-            let id = Phase::number(index);
-            let (class, reached) = match self.result.phases.reached_s(&id) {
+            let number = Phase::number(index);
+            let (class, reached) = match self.result.phases.reached_s(&number) {
                 Some(time_s) => ("good", format!("{time_s:.2} s")),
                 None => ("bad", "not reached".into()),
             };
@@ -151,7 +151,7 @@ impl EpisodePage<'_> {
             let who = if phase.collaborative { "together" } else { "alone" };
             let condition = escape(phase.description);
             rows += &format!(
-                r#"<tr><td>{id} {name}</td><td class="{class}">{reached}</td><td>{who}</td><td>{condition}</td></tr>"#
+                r#"<tr><td>{number} {name}</td><td class="{class}">{reached}</td><td>{who}</td><td>{condition}</td></tr>"#
             );
         }
         format!(

@@ -24,6 +24,7 @@ pub struct Comparison {
 pub struct PairedRow {
     /// `None` for all tasks together.
     pub task: Option<&'static str>,
+    /// The phase's number, as `p2`.
     pub phase: String,
     /// Whether it is the task's last.
     pub last: bool,

@@ -14,7 +14,7 @@ pub struct Failure {
     pub policy: String,
     pub task: &'static str,
     pub seed: u32,
-    /// The first phase that counts and was not reached.
+    /// Number of the first phase that counts and was not reached.
     pub phase: String,
     pub why: String,
     /// `None` where its strip cannot be read.

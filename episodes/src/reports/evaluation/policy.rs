@@ -54,9 +54,10 @@ pub struct TaskReport {
 /// One phase of a task.
 #[derive(Debug, Serialize)]
 pub struct PhaseReport {
-    /// As results call it: `p2`.
-    pub phase: String,
-    pub name: &'static str,
+    /// As `transfer`.
+    pub id: &'static str,
+    /// As `p2`.
+    pub number: String,
     pub collaborative: bool,
     /// Of all episodes.
     pub cumulative: Option<Rate>,
@@ -101,7 +102,7 @@ pub struct Spread {
 #[derive(Debug, Serialize)]
 pub struct Reason {
     pub task: &'static str,
-    /// The first phase that counts and was not reached.
+    /// Number of the first phase that counts and was not reached.
     pub phase: String,
     pub why: String,
     pub seeds: Vec<u32>,
@@ -198,8 +199,8 @@ impl TaskReport {
             let before = whole.iter().filter(|one| index == 0 || reached(one, index - 1)).copied();
             let from_it = of_task.iter().filter(|one| one.begun_phase() == Some(index)).copied();
             PhaseReport {
-                phase: Phase::number(index),
-                name: phase.id,
+                id: phase.id,
+                number: Phase::number(index),
                 collaborative: phase.collaborative,
                 cumulative: Rate::of(count(whole.iter().copied(), index)),
                 conditional: Rate::of(count(before, index)),
@@ -282,7 +283,7 @@ fn reasons(episodes: &[&Played]) -> Vec<Reason> {
     reasons
 }
 
-/// The first phase that counts and was not reached.
+/// Number of the first phase that counts and was not reached.
 pub fn first_missed(played: &Played) -> String {
     let counts = |phase: &usize| played.begun_phase().is_none_or(|only| only == *phase);
     let mut phases = (0..played.spec.task.phases.len()).filter(counts);

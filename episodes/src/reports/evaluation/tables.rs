@@ -55,7 +55,7 @@ pub fn rates(policy: &PolicyReport) -> Table {
         for phase in &task.phases {
             table.rows.push(vec![
                 task.task.into(),
-                format!("{} {}", phase.phase, phase.name.replace('_', " ")),
+                format!("{} {}", phase.number, phase.id.replace('_', " ")),
                 if phase.collaborative { "together" } else { "alone" }.into(),
                 text(phase.cumulative),
                 text(phase.conditional),

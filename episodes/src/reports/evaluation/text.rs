@@ -28,7 +28,7 @@ fn escape_pipe(cell: &str) -> String {
 /// A line for each rate of each phase, for whoever counts on.
 pub fn csv(assessment: &Assessment) -> String {
     let mut text = String::from(
-        "policy,protocol,task,robots,phase,name,collaborative,rate,successes,trials,share,low_share,high_share\n",
+        "policy,protocol,task,robots,phase_number,phase_id,collaborative,rate,successes,trials,share,low_share,high_share\n",
     );
     for policy in &assessment.policies {
         for task in &policy.tasks {
@@ -42,7 +42,7 @@ pub fn csv(assessment: &Assessment) -> String {
                     let Rate { successes, trials, share, interval_share: [low_share, high_share] } = rate;
                     let (policy_name, protocol) = (quoted(&policy.name), policy.protocol);
                     let of = format!("{policy_name},{protocol},{},{}", task.task, task.robots);
-                    let which = format!("{},{},{}", phase.phase, phase.name, phase.collaborative);
+                    let which = format!("{},{},{}", phase.number, phase.id, phase.collaborative);
                     text += &format!(
                         "{of},{which},{name},{successes},{trials},{share},{low_share},{high_share}\n"
                     );

@@ -64,7 +64,7 @@ fn text(task: &TaskInfo, start: &StartEpisode, brief: &Brief) -> String {
     let protocol = start.protocol.unwrap_or(Protocol::Agentic);
     let robots = task.robots.iter().map(|robot| format!("* {}: {}", robot.robot, robot.instruction));
     let phases =
-        task.phases.iter().map(|phase| format!("* {} {}: {}", phase.id, phase.name, phase.description));
+        task.phases.iter().map(|phase| format!("* {} {}: {}", phase.number, phase.id, phase.description));
     let budget = task.protocols.iter().find(|info| info.protocol == protocol).map(budget);
     let brief = [&brief.frames, &brief.partners, &brief.odometry, &brief.camera, &brief.hands];
     let lines = |lines: &mut dyn Iterator<Item = String>| lines.collect::<Vec<_>>().join("\n");

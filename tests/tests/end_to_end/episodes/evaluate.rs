@@ -102,7 +102,7 @@ fn phases_are_played_on_their_own_by_shares_and_joined_by_a_report() {
     let report = Assessment::of(&load(&[out]).expect("episodes"));
     let level = report.policies[0].phase_level.as_ref().expect("phases on their own");
     let reached: Vec<_> =
-        level.phases.iter().map(|rate| (&*rate.phase, rate.reached, rate.episodes)).collect();
+        level.phases.iter().map(|rate| (&*rate.number, rate.reached, rate.episodes)).collect();
     assert_eq!(reached, [("p1", 1, 1), ("p2", 1, 1), ("p3", 1, 1)]);
     assert_eq!((level.collaborative_share, level.drop_share), (Some(1.0), Some(0.0)));
 }

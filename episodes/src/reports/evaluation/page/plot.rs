@@ -61,7 +61,7 @@ pub fn task_plot(task: &str, policies: &[PolicyReport]) -> String {
 }
 
 fn heading(phase: &PhaseReport, y_px: f64) -> String {
-    let name = escape(&phase.name.replace('_', " "));
+    let name = escape(&phase.id.replace('_', " "));
     let together = match phase.collaborative {
         true => r#"<tspan class="together" dx="8">together</tspan>"#,
         false => "",
@@ -69,7 +69,7 @@ fn heading(phase: &PhaseReport, y_px: f64) -> String {
     format!(
         r#"<text class="phase" x="{LEFT_PX}" y="{:.1}">{} {name}{together}</text>"#,
         y_px + 15.0,
-        phase.phase
+        phase.number
     )
 }
 
@@ -77,13 +77,13 @@ fn heading(phase: &PhaseReport, y_px: f64) -> String {
 fn lanes(policy: &str, phase: &PhaseReport) -> Vec<(Mark, String, Rate)> {
     let rates = [phase.cumulative, phase.conditional, phase.from_its_beginning];
     // The first phase has no phase before it.
-    let said = |kind: usize| kind != 1 || phase.conditional != phase.cumulative || phase.phase != "p1";
+    let said = |kind: usize| kind != 1 || phase.conditional != phase.cumulative || phase.number != "p1";
     let lanes = MARKS.iter().zip(rates).enumerate().filter(|(kind, _)| said(*kind));
     lanes
         .filter_map(|(_, ((mark, meaning), rate))| {
             let rate = rate?;
             let label =
-                format!("{policy}, {} {meaning}: {} %, {}", phase.phase, rate.text(), rate.fraction());
+                format!("{policy}, {} {meaning}: {} %, {}", phase.number, rate.text(), rate.fraction());
             Some((*mark, label, rate))
         })
         .collect()
