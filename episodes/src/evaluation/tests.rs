@@ -5,9 +5,8 @@ use std::path::PathBuf;
 use tandem_sim::render::RendererKind;
 use tandem_tools_spec::{Disclosure, EndReason, Hints, PhaseTimes, Protocol, ResultReply};
 
-use super::keep::missed;
 use super::*;
-use crate::results::write_result;
+use crate::results::{PhaseLevel, missed, write_result};
 use crate::spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, Start};
 use crate::tasks::{self, Task};
 use crate::{players, scoring::Phase};

@@ -8,6 +8,7 @@ use std::f32::consts::PI;
 use tandem_sim::Side::Right;
 
 use super::{RobotSpot, Task, spot, uniform_xy};
+use crate::scoring::placement::{stands_released, within_box};
 use crate::scoring::{A, B, Done, Facts, Phase};
 
 /// Height of the counter's top above the floor.
