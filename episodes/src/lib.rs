@@ -32,7 +32,7 @@ pub use recording::{
     Visibility, recover,
 };
 pub use results::RESULT_FILE;
-pub use scoring::{A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, RobotFacts, Scored, Scores};
+pub use scoring::{A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, RobotFacts, Scores, StepScore};
 pub use session::{Checkpoint, Clock, RunFiles, RunFolder, Session, monotonic};
 pub use spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, SceneFile, Start};
 pub use tandem_sim::{BaseLimits, LocomotionChoice, SimError, joint_names, render::RendererKind};

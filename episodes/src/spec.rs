@@ -103,7 +103,7 @@ impl EpisodeSpec {
     }
 
     /// Index of the phase that it begins at and that alone counts; `None` where it begins elsewhere, and all count.
-    pub fn begun_phase(&self) -> Option<usize> {
+    pub fn start_phase(&self) -> Option<usize> {
         match &self.start {
             Start::Phase(start) => {
                 (0..self.task.phases.len()).find(|phase| Phase::number(*phase) == start.phase)

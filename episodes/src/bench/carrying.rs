@@ -13,35 +13,35 @@ use tandem_tools_spec::{Protocol, ToolCall, ToolReply};
 
 use super::BenchError;
 use crate::Session;
-use crate::players::experts::skills::{BarGrasp, FREE, Path, Stage, Team, take_softly};
-use crate::players::{Backstage, Caller, InProcess, PlayerError};
+use crate::players::experts::skills::{BarGrasp, CarryTeam, Commander, FREE, ObjectPath, grasp_compliantly};
+use crate::players::{Episode, InProcess, PlayerError, PrivilegedEpisode};
 use crate::scoring::{A, B, Done, Facts, Grip, Phase};
 use crate::spec::{Controller, EpisodeSpec};
 use crate::tasks::{RobotSpot, Task, spot, uniform_xy};
 
 /// A way of the bar.
-pub struct Case {
+pub struct CarryingCase {
     pub name: &'static str,
-    legs: &'static [Leg],
+    legs: &'static [PathLeg],
 }
 
 /// Part of a way, from rest to rest.
-struct Leg {
+struct PathLeg {
     /// Ahead and to the left, as the robots look at the beginning.
     by_m: [f32; 2],
     /// Of the bar about its middle.
     turn_rad: f32,
 }
 
-pub const CASES: [Case; 3] = [
+pub const CASES: [CarryingCase; 3] = [
     // The first leg takes the robot on the right clear of the stand, which it passes.
-    Case { name: "carry_bar_left", legs: &[straight(-0.3, 0.0), straight(0.0, 2.0)] },
-    Case { name: "carry_bar_forward_back", legs: &[straight(2.0, 0.0), straight(-2.0, 0.0)] },
-    Case { name: "carry_bar_turn", legs: &[Leg { by_m: [0.0; 2], turn_rad: FRAC_PI_2 }] },
+    CarryingCase { name: "carry_bar_left", legs: &[straight(-0.3, 0.0), straight(0.0, 2.0)] },
+    CarryingCase { name: "carry_bar_forward_back", legs: &[straight(2.0, 0.0), straight(-2.0, 0.0)] },
+    CarryingCase { name: "carry_bar_turn", legs: &[PathLeg { by_m: [0.0; 2], turn_rad: FRAC_PI_2 }] },
 ];
 
-const fn straight(ahead_m: f32, left_m: f32) -> Leg {
-    Leg { by_m: [ahead_m, left_m], turn_rad: 0.0 }
+const fn straight(ahead_m: f32, left_m: f32) -> PathLeg {
+    PathLeg { by_m: [ahead_m, left_m], turn_rad: 0.0 }
 }
 
 /// Robots stand so far to the left and right of the bar's middle.
@@ -73,11 +73,11 @@ const fn beside(name: &'static str, left_m: f32) -> RobotSpot {
 }
 
 /// Plays one case on seeds 0 to `seeds` - 1.
-pub fn run(case: &Case, controller: &Controller, seeds: usize) -> Result<CaseReport, BenchError> {
+pub fn run(case: &CarryingCase, controller: &Controller, seeds: usize) -> Result<CaseReport, BenchError> {
     let trials = over_seeds(seeds, |seed| trial(case, controller, seed as u32));
     let trials = trials.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let done: Vec<&Carried> = trials.iter().flatten().collect();
-    let worst = |value: fn(&Carried) -> f32| done.iter().map(|carried| value(carried)).reduce(f32::max);
+    let done: Vec<&CarryResult> = trials.iter().flatten().collect();
+    let worst = |value: fn(&CarryResult) -> f32| done.iter().map(|carried| value(carried)).reduce(f32::max);
     Ok(CaseReport {
         survived: done.len(),
         heading_error_deg: worst(|carried| carried.heading_error_deg),
@@ -90,7 +90,7 @@ pub fn run(case: &Case, controller: &Controller, seeds: usize) -> Result<CaseRep
 }
 
 /// What came of a bar that was carried to the end of its way.
-struct Carried {
+struct CarryResult {
     /// Of the robot that ends up the most turned.
     heading_error_deg: f32,
     /// The bar's middle from the end of its way, and the farthest from the way itself.
@@ -103,7 +103,7 @@ struct Carried {
 }
 
 /// One seed; `None` if a robot fell, or hands lost the bar for good.
-fn trial(case: &Case, controller: &Controller, seed: u32) -> Result<Option<Carried>, BenchError> {
+fn trial(case: &CarryingCase, controller: &Controller, seed: u32) -> Result<Option<CarryResult>, BenchError> {
     let spec = EpisodeSpec {
         locomotion: controller.clone(),
         renderer: RendererKind::Cpu,
@@ -111,39 +111,43 @@ fn trial(case: &Case, controller: &Controller, seed: u32) -> Result<Option<Carri
     };
     let aloft = Cell::new(None);
     let session = Session::start(&spec, None).map_err(Box::new)?;
-    let mut watched = Watched { episode: InProcess::new(session), aloft: &aloft, log: Vec::new() };
-    match carry(case, &mut watched, &aloft) {
+    let mut logged = LoggedEpisode { episode: InProcess::new(session), aloft: &aloft, log: Vec::new() };
+    match carry(case, &mut logged, &aloft) {
         Ok(()) => {}
         Err(PlayerError::GaveUp(_) | PlayerError::EpisodeOver) => return Ok(None),
         Err(error) => return Err(error.into()),
     }
     let held =
-        watched.facts()?.object("bar").hands.iter().flat_map(Sides::iter).all(|grip| *grip != Grip::Off);
-    Ok(aloft.get().filter(|_| held).map(|start| measure(case, &start, &watched.log)))
+        logged.facts()?.object("bar").hands.iter().flat_map(Sides::iter).all(|grip| *grip != Grip::Off);
+    Ok(aloft.get().filter(|_| held).map(|start| measure(case, &start, &logged.log)))
 }
 
-/// Takes the bar, lifts it, from when on it is watched, and carries it.
-fn carry(case: &Case, episode: &mut dyn Backstage, aloft: &Cell<Option<Pose>>) -> Result<(), PlayerError> {
-    let stage = &mut Stage::new(&TASK, episode)?;
+/// Takes the bar, lifts it, from when on it is logged, and carries it.
+fn carry(
+    case: &CarryingCase,
+    episode: &mut dyn PrivilegedEpisode,
+    aloft: &Cell<Option<Pose>>,
+) -> Result<(), PlayerError> {
+    let commander = &mut Commander::new(&TASK, episode)?;
     let [a_left, a_right] = BarGrasp::from_above(A, "bar", ["a_left", "a_right"], 0.0);
     let [b_left, b_right] = BarGrasp::from_above(B, "bar", ["b_left", "b_right"], 0.0);
     let grasps = [a_left, a_right, b_left, b_right];
-    let mut team = Team::new(stage, &grasps)?;
-    team.gather(stage)?;
-    take_softly(stage, &grasps)?;
-    team.lift(stage, LIFT_M)?;
-    let mut from = team.object(stage)?;
+    let mut team = CarryTeam::new(commander, &grasps)?;
+    team.gather(commander)?;
+    grasp_compliantly(commander, &grasps)?;
+    team.lift(commander, LIFT_M)?;
+    let mut from = team.object(commander)?;
     aloft.set(Some(from));
     for leg in case.legs {
         let length_m = leg.length_m();
         let at = |gone_m: f32| leg.at(&from, gone_m / length_m);
-        team.carry(stage, &Path { at: &at, length_m, pace_m_s: PACE_M_S, free_m: &FREE })?;
+        team.carry(commander, &ObjectPath { at: &at, length_m, pace_m_s: PACE_M_S, free_m: &FREE })?;
         from = leg.at(&from, 1.0);
     }
     Ok(())
 }
 
-impl Leg {
+impl PathLeg {
     /// How far the robots go.
     fn length_m(&self) -> f32 {
         Vector::from([self.by_m[0], self.by_m[1], 0.0]).length() + self.turn_rad.abs() * APART_M
@@ -158,20 +162,20 @@ impl Leg {
 }
 
 /// After one command.
-struct Moment {
+struct LogEntry {
     bar: Pose,
     pelvises: Vec<Pose>,
     power_w: f32,
 }
 
 /// An episode that keeps what happens while the bar is aloft.
-struct Watched<'a> {
+struct LoggedEpisode<'a> {
     episode: InProcess,
     aloft: &'a Cell<Option<Pose>>,
-    log: Vec<Moment>,
+    log: Vec<LogEntry>,
 }
 
-impl Caller for Watched<'_> {
+impl Episode for LoggedEpisode<'_> {
     fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {
         let reply = self.episode.call(call)?;
         let facts = self.episode.facts()?;
@@ -180,7 +184,7 @@ impl Caller for Watched<'_> {
         }
         if self.aloft.get().is_some() {
             let robots = &self.episode.session.present().robots;
-            self.log.push(Moment {
+            self.log.push(LogEntry {
                 bar: facts.object("bar").pose_in_world,
                 pelvises: facts.robots.iter().map(|robot| robot.pelvis_in_world).collect(),
                 power_w: robots.iter().map(|robot| robot.state.power_w()).sum::<f32>() / robots.len() as f32,
@@ -190,31 +194,31 @@ impl Caller for Watched<'_> {
     }
 }
 
-impl Backstage for Watched<'_> {
+impl PrivilegedEpisode for LoggedEpisode<'_> {
     fn facts(&mut self) -> Result<Facts, PlayerError> {
         self.episode.facts()
     }
 }
 
-fn measure(case: &Case, start: &Pose, log: &[Moment]) -> Carried {
+fn measure(case: &CarryingCase, start: &Pose, log: &[LogEntry]) -> CarryResult {
     let (mut way, mut end, mut turned_rad) = (Vec::new(), *start, 0.0);
     for leg in case.legs {
         way.extend((0..=WAY_POINTS).map(|i| leg.at(&end, i as f32 / WAY_POINTS as f32).translation));
         end = leg.at(&end, 1.0);
         turned_rad += leg.turn_rad;
     }
-    let away_m = |moment: &Moment, from_m: &Vector| (moment.bar.translation - *from_m).truncate().length();
+    let away_m = |entry: &LogEntry, from_m: &Vector| (entry.bar.translation - *from_m).truncate().length();
     let off_way_m =
-        |moment: &Moment| way.iter().map(|at_m| away_m(moment, at_m)).fold(f32::INFINITY, f32::min);
-    let tilt_deg = |moment: &Moment| (moment.bar.rotation * Vector::Y).z.abs().asin().to_degrees();
-    let most = |value: &dyn Fn(&Moment) -> f32| log.iter().map(value).fold(0.0, f32::max);
+        |entry: &LogEntry| way.iter().map(|at_m| away_m(entry, at_m)).fold(f32::INFINITY, f32::min);
+    let tilt_deg = |entry: &LogEntry| (entry.bar.rotation * Vector::Y).z.abs().asin().to_degrees();
+    let most = |value: &dyn Fn(&LogEntry) -> f32| log.iter().map(value).fold(0.0, f32::max);
     let turned_deg = |pelvis: &Pose| wrapped_rad(heading_rad(pelvis) - turned_rad).abs().to_degrees();
     let last = log.last();
-    Carried {
+    CarryResult {
         heading_error_deg: last.map_or(0.0, |last| last.pelvises.iter().map(turned_deg).fold(0.0, f32::max)),
         final_drift_m: last.map_or(0.0, |last| away_m(last, &end.translation)),
         off_way_m: most(&off_way_m),
         tilt_deg: most(&tilt_deg),
-        power_w: log.iter().map(|moment| moment.power_w).sum::<f32>() / log.len().max(1) as f32,
+        power_w: log.iter().map(|entry| entry.power_w).sum::<f32>() / log.len().max(1) as f32,
     }
 }

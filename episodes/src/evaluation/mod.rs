@@ -1,6 +1,6 @@
 //! Episodes over seeds: plays them in parallel worlds, keeps each result, and counts.
 
-mod keep;
+mod cache;
 mod plan;
 mod summary;
 #[cfg(test)]
@@ -10,14 +10,14 @@ mod workers;
 use std::path::{Path, PathBuf};
 
 use crate::output::{OutputError, create_private_folder, write_whole};
-use crate::results::{EPISODES, Played};
+use crate::results::{EPISODES, PlayedEpisode};
 use crate::{EpisodeError, fingerprint};
-use keep::Keeper;
+use cache::EpisodeCache;
 
-pub use plan::{Plan, Shard, Starts};
+pub use plan::{EvaluationPlan, Shard, Starts};
 pub use summary::{Evaluation, TaskSummary};
 
-/// Why an evaluation stopped. Episodes that were played are kept, and the next run goes on from there.
+/// Why an evaluation stopped. Episodes that were played are cached, and the next run goes on from there.
 #[derive(Debug, thiserror::Error)]
 pub enum EvaluationError {
     #[error(transparent)]
@@ -35,18 +35,18 @@ pub enum EvaluationError {
 /// Plays what `folder` does not hold yet of the plan's share, writes `results.json` there, and calls `progress` after each
 /// episode.
 pub fn evaluate(
-    plan: &Plan,
+    plan: &EvaluationPlan,
     folder: &Path,
-    progress: &(dyn Fn(&Played) + Sync),
+    progress: &(dyn Fn(&PlayedEpisode) + Sync),
 ) -> Result<Evaluation, EvaluationError> {
-    let kept = folder.join(EPISODES);
-    create_private_folder(&kept).map_err(|source| EvaluationError::Io { path: kept.clone(), source })?;
+    let cached = folder.join(EPISODES);
+    create_private_folder(&cached).map_err(|source| EvaluationError::Io { path: cached.clone(), source })?;
     let build = fingerprint::build().map_err(EpisodeError::Build)?;
     let locomotion = plan.locomotion.load().map_err(EpisodeError::from)?.name().to_string();
-    let keeper = Keeper { plan, folder: &kept, locomotion, build };
+    let cache = EpisodeCache { plan, folder: &cached, locomotion, build };
     let (work, mut left_out) = plan.episodes();
-    let episodes = workers::play_all(&keeper, &work, &mut left_out, progress)?;
-    let evaluation = summary::summarise(&keeper, episodes, left_out);
+    let episodes = workers::play_all(&cache, &work, &mut left_out, progress)?;
+    let evaluation = summary::summarise(&cache, episodes, left_out);
     let text = serde_json::to_string_pretty(&evaluation)?;
     write_whole(&folder.join(results_name(plan.shard)), text.as_bytes())?;
     Ok(evaluation)

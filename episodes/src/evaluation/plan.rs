@@ -13,7 +13,7 @@ use crate::tasks::Task;
 
 /// What to play.
 #[derive(Clone, Debug)]
-pub struct Plan<'a> {
+pub struct EvaluationPlan<'a> {
     /// Who plays.
     pub player: &'a dyn Policy,
     pub protocol: Protocol,
@@ -62,7 +62,7 @@ impl Shard {
     pub const WHOLE: Shard = Shard { index: 0, of: 1 };
 }
 
-impl Plan<'_> {
+impl EvaluationPlan<'_> {
     /// One of the episodes to play.
     pub fn spec(&self, task: &'static Task, seed: u32, start: Start) -> EpisodeSpec {
         EpisodeSpec {

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
-use super::keep::Keeper;
-use crate::results::{PhaseLevel, Played, PolicyCard};
+use super::cache::EpisodeCache;
+use crate::results::{PhaseLevel, PlayedEpisode, PolicyCard};
 
 /// How a task went over its seeds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -37,12 +37,12 @@ pub struct Evaluation {
     /// Episodes that could not be begun, and why.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<String>,
-    pub episodes: Vec<Played>,
+    pub episodes: Vec<PlayedEpisode>,
 }
 
-pub fn summarise(keeper: &Keeper, episodes: Vec<Played>, left_out: Vec<String>) -> Evaluation {
+pub fn summarise(cache: &EpisodeCache, episodes: Vec<PlayedEpisode>, left_out: Vec<String>) -> Evaluation {
     let mut tasks: BTreeMap<String, TaskSummary> = BTreeMap::new();
-    for episode in episodes.iter().filter(|played| played.begun_phase().is_none()) {
+    for episode in episodes.iter().filter(|played| played.start_phase().is_none()) {
         let task = tasks.entry(episode.result.task.clone()).or_default();
         let reached = |phase: &str| usize::from(episode.result.phases.reached_s(phase).is_some());
         task.episodes += 1;
@@ -56,11 +56,11 @@ pub fn summarise(keeper: &Keeper, episodes: Vec<Played>, left_out: Vec<String>) 
         task.mean_env_steps /= task.episodes as f64;
     }
     Evaluation {
-        by: keeper.plan.player.card(),
-        protocol: keeper.plan.protocol,
-        locomotion: keeper.locomotion.clone(),
-        disclosure: keeper.plan.disclosure,
-        hints: keeper.plan.hints,
+        by: cache.plan.player.card(),
+        protocol: cache.plan.protocol,
+        locomotion: cache.locomotion.clone(),
+        disclosure: cache.plan.disclosure,
+        hints: cache.plan.hints,
         tasks,
         phase_level: PhaseLevel::of(episodes.iter()),
         left_out,

@@ -1,4 +1,4 @@
-//! Which episodes are kept, what is noted, and how they are counted.
+//! Which episodes are cached, what is noted, and how they are counted.
 
 use std::path::PathBuf;
 
@@ -28,13 +28,13 @@ fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultRe
     }
 }
 
-/// An episode that was played under `keeper`'s rules.
-fn played(keeper: &Keeper, spec: &EpisodeSpec) -> Played {
-    Played {
-        by: keeper.plan.player.card(),
+/// An episode that was played under `cache`'s rules.
+fn played(cache: &EpisodeCache, spec: &EpisodeSpec) -> PlayedEpisode {
+    PlayedEpisode {
+        by: cache.plan.player.card(),
         spec: spec.clone(),
-        locomotion: keeper.locomotion.clone(),
-        build: keeper.build.into(),
+        locomotion: cache.locomotion.clone(),
+        build: cache.build.into(),
         result: result(spec.task.id, spec.seed, vec![("p1".into(), Some(4.2))]),
         thought_s: 1.5,
         note: None,
@@ -58,8 +58,8 @@ fn the_first_phase_that_was_missed_is_noted() {
     assert_eq!(missed(&result, Some(2)).as_deref(), Some("p3 was not reached in 812 steps"));
 }
 
-fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> Plan<'static> {
-    Plan {
+fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> EvaluationPlan<'static> {
+    EvaluationPlan {
         player: players::find("expert").unwrap(),
         protocol: Protocol::Agentic,
         scene: None,
@@ -84,7 +84,7 @@ fn shares_are_fair_and_together_the_whole() {
     assert_eq!(all.len(), 10 * tasks::ALL.len());
     let mut joined = Vec::new();
     for index in 0..3 {
-        let (share, _) = Plan { shard: Shard { index, of: 3 }, ..whole.clone() }.episodes();
+        let (share, _) = EvaluationPlan { shard: Shard { index, of: 3 }, ..whole.clone() }.episodes();
         assert!(share.len().abs_diff(all.len() / 3) <= 1, "{index}: {}", share.len());
         for task in tasks::ALL {
             let of_task = share.iter().filter(|spec| spec.task == task).count();
@@ -107,7 +107,7 @@ fn episodes_from_phases_need_demonstrations() {
     }
     let starts =
         Starts::Phases { demonstrations: folder.path().into(), phases: vec!["p3".into(), "p1".into()] };
-    let plan = Plan { starts, ..plan(vec![tasks::find("pouring").unwrap()], vec![1, 2, 3, 4]) };
+    let plan = EvaluationPlan { starts, ..plan(vec![tasks::find("pouring").unwrap()], vec![1, 2, 3, 4]) };
     let (episodes, left_out) = plan.episodes();
     let begun = |spec: &EpisodeSpec| match &spec.start {
         Start::Phase(PhaseStart { recording, phase }) => {
@@ -125,12 +125,13 @@ fn episodes_from_phases_need_demonstrations() {
 #[test]
 fn phases_on_their_own_are_averaged_by_who_works_on_them() {
     let plan = plan(Vec::new(), Vec::new());
-    let keeper = Keeper { plan: &plan, folder: Path::new(""), locomotion: "balance".into(), build: "test" };
+    let cache =
+        EpisodeCache { plan: &plan, folder: Path::new(""), locomotion: "balance".into(), build: "test" };
     let from = |id: &str, seed: u32, phase: usize, reached: bool| {
         let start = PhaseStart { recording: "demonstration".into(), phase: Phase::number(phase) };
         let spec = plan.spec(tasks::find(id).unwrap(), seed, Start::Phase(start));
         let times = vec![(Phase::number(phase), reached.then_some(4.2))];
-        Played { result: result(id, seed, times), ..played(&keeper, &spec) }
+        PlayedEpisode { result: result(id, seed, times), ..played(&cache, &spec) }
     };
     // Of Handover p2 is collaborative; of CoPouring every phase is.
     let mut episodes = vec![from("handover", 0, 0, true), from("handover", 1, 0, true)];
@@ -144,7 +145,7 @@ fn phases_on_their_own_are_averaged_by_who_works_on_them() {
     assert_eq!(rates, [&handover[..], &[("co_pouring", "p3", 3, 4)]].concat());
     assert_eq!((level.non_collaborative_share, level.collaborative_share), (Some(0.5), Some(0.5)));
     assert_eq!(level.drop_share, Some(0.0));
-    let whole = played(&keeper, &plan.spec(tasks::find("handover").unwrap(), 0, Start::Task));
+    let whole = played(&cache, &plan.spec(tasks::find("handover").unwrap(), 0, Start::Task));
     assert_eq!(PhaseLevel::of([whole].iter()), None);
 }
 
@@ -155,17 +156,17 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
     let plan = plan(vec![task], vec![7]);
     let spec = plan.spec(task, 7, Start::Task);
     let build = fingerprint::build().unwrap();
-    let keeper = Keeper { plan: &plan, folder: folder.path(), locomotion: "balance".into(), build };
+    let cache = EpisodeCache { plan: &plan, folder: folder.path(), locomotion: "balance".into(), build };
     let kept_after = |text: &str| {
         std::fs::write(folder.path().join("pouring-7.json"), text).unwrap();
-        keeper.kept(&spec)
+        cache.load(&spec)
     };
-    assert_eq!(keeper.kept(&spec), None, "nothing was played");
-    let same = played(&keeper, &spec);
+    assert_eq!(cache.load(&spec), None, "nothing was played");
+    let same = played(&cache, &spec);
     let text = serde_json::to_string(&same).unwrap();
     assert_eq!(kept_after(&text), Some(same.clone()));
     assert_eq!(kept_after(&text[..text.len() / 2]), None, "a torn file");
-    type Change = fn(&mut Played);
+    type Change = fn(&mut PlayedEpisode);
     for (what, change) in [
         ("task", (|played| played.result.task = "handover".into()) as Change),
         ("seed", |played| played.result.seed = 8),
@@ -186,11 +187,11 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
     }
 
     // One that was played without a recording is no demonstration.
-    let recorded = Plan { record: true, ..plan.clone() };
-    let collector = Keeper { plan: &recorded, ..keeper };
+    let recorded = EvaluationPlan { record: true, ..plan.clone() };
+    let collector = EpisodeCache { plan: &recorded, ..cache };
     std::fs::write(folder.path().join("pouring-7.json"), &text).unwrap();
-    assert_eq!(collector.kept(&spec), None, "no recording");
+    assert_eq!(collector.load(&spec), None, "no recording");
     std::fs::create_dir(folder.path().join("pouring-7")).unwrap();
     write_result(&same.result, &folder.path().join("pouring-7")).unwrap();
-    assert_eq!(collector.kept(&spec), Some(same));
+    assert_eq!(collector.load(&spec), Some(same));
 }

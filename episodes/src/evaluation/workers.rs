@@ -4,29 +4,29 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, mpsc};
 
 use super::EvaluationError;
-use super::keep::{Keeper, Outcome};
-use crate::results::Played;
+use super::cache::{EpisodeCache, PlannedOutcome};
+use crate::results::PlayedEpisode;
 use crate::spec::EpisodeSpec;
 
-/// Every episode of `work`, kept or played, in its order; those that could not be begun are added to `left_out`.
+/// Every episode of `work`, cached or played, in its order; those that could not be begun are added to `left_out`.
 pub fn play_all(
-    keeper: &Keeper,
+    cache: &EpisodeCache,
     work: &[EpisodeSpec],
     left_out: &mut Vec<String>,
-    progress: &(dyn Fn(&Played) + Sync),
-) -> Result<Vec<Played>, EvaluationError> {
+    progress: &(dyn Fn(&PlayedEpisode) + Sync),
+) -> Result<Vec<PlayedEpisode>, EvaluationError> {
     let next = AtomicUsize::new(0);
     let failure = Mutex::new(None);
     let (done, played) = mpsc::channel();
-    let mut outcomes: Vec<(usize, Outcome)> = std::thread::scope(|scope| {
-        for _ in 0..keeper.plan.jobs.max(1) {
+    let mut outcomes: Vec<(usize, PlannedOutcome)> = std::thread::scope(|scope| {
+        for _ in 0..cache.plan.jobs.max(1) {
             let done = done.clone();
             let (next, failure) = (&next, &failure);
             scope.spawn(move || {
                 loop {
                     let number = next.fetch_add(1, Ordering::Relaxed);
                     let Some(spec) = work.get(number) else { break };
-                    match keeper.kept_or_played(spec) {
+                    match cache.load_or_play(spec) {
                         Ok(outcome) => drop(done.send((number, outcome))),
                         Err(error) => {
                             // Nobody else begins another episode.
@@ -50,8 +50,8 @@ pub fn play_all(
     let mut episodes = Vec::with_capacity(outcomes.len());
     for (number, outcome) in outcomes {
         match outcome {
-            Outcome::Played(played) => episodes.push(*played),
-            Outcome::LeftOut(reason) => {
+            PlannedOutcome::Played(played) => episodes.push(*played),
+            PlannedOutcome::LeftOut(reason) => {
                 let EpisodeSpec { task, seed, .. } = &work[number];
                 left_out.push(format!("{} seed {seed}: {reason}", task.id));
             }
@@ -60,9 +60,9 @@ pub fn play_all(
     Ok(episodes)
 }
 
-fn tell(outcome: &Outcome, progress: &(dyn Fn(&Played) + Sync)) {
+fn tell(outcome: &PlannedOutcome, progress: &(dyn Fn(&PlayedEpisode) + Sync)) {
     match outcome {
-        Outcome::Played(played) => progress(played),
-        Outcome::LeftOut(_) => {}
+        PlannedOutcome::Played(played) => progress(played),
+        PlannedOutcome::LeftOut(_) => {}
     }
 }

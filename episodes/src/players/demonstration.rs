@@ -4,7 +4,7 @@
 use tandem_sim::Step;
 use tandem_tools_spec::{JointChunk, SendJointChunk};
 
-use super::{Caller, Player, PlayerError};
+use super::{Episode, Player, PlayerError};
 use crate::commands::base_row;
 use crate::protocol::rules;
 use crate::recording::{Recording, RecordingError};
@@ -36,7 +36,7 @@ impl Demonstration {
 }
 
 impl Player for Demonstration {
-    fn play(&mut self, episode: &mut dyn Caller) -> Result<(), PlayerError> {
+    fn play(&mut self, episode: &mut dyn Episode) -> Result<(), PlayerError> {
         let most = rules(self.spec.protocol, self.spec.task).steps_per_command;
         for steps in self.steps()?.chunks(most as usize) {
             let names = self.spec.task.robot_names().enumerate();

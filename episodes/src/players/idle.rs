@@ -2,7 +2,7 @@
 
 use tandem_tools_spec::Wait;
 
-use super::{Caller, Player, PlayerError};
+use super::{Episode, Player, PlayerError};
 use crate::tasks::Task;
 
 /// As many as the agentic protocol allows.
@@ -20,7 +20,7 @@ impl Idle {
 }
 
 impl Player for Idle {
-    fn play(&mut self, episode: &mut dyn Caller) -> Result<(), PlayerError> {
+    fn play(&mut self, episode: &mut dyn Episode) -> Result<(), PlayerError> {
         for _ in 0..self.commands {
             episode.call(Wait { steps: STEPS_PER_COMMAND }.into())?;
         }

@@ -2,7 +2,7 @@
 
 use tandem_tools_spec::{Png, ToolCall, ToolReply};
 
-use super::{Backstage, Caller, Onlooker, PlayerError};
+use super::{Episode, PlayerError, PrivilegedEpisode, ThirdPersonEpisode};
 use crate::scoring::Facts;
 use crate::{EpisodeError, Session};
 
@@ -25,7 +25,7 @@ impl InProcess {
     }
 }
 
-impl Caller for InProcess {
+impl Episode for InProcess {
     fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {
         if self.session.reached_phases() >= self.until {
             return Err(PlayerError::EpisodeOver);
@@ -38,14 +38,14 @@ impl Caller for InProcess {
     }
 }
 
-impl Onlooker for InProcess {
+impl ThirdPersonEpisode for InProcess {
     fn third_person(&mut self) -> Result<Png, PlayerError> {
         let seen = self.session.third_person();
         seen.map_err(|error| PlayerError::Call { tool: "third_person", reason: error.to_string() })
     }
 }
 
-impl Backstage for InProcess {
+impl PrivilegedEpisode for InProcess {
     fn facts(&mut self) -> Result<Facts, PlayerError> {
         Ok(self.session.facts())
     }

@@ -15,31 +15,31 @@ use crate::scoring::Facts;
 use crate::spec::EpisodeSpec;
 
 pub use in_process::InProcess;
-pub use policy::{Fared, Place, PlayError, Policy, play_in_process};
+pub use policy::{EpisodeOutput, PlayError, PlayOutcome, Policy, play_in_process};
 
 /// Makes tool calls on one episode, which is in this process or behind HTTP.
-pub trait Caller {
+pub trait Episode {
     fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError>;
 }
 
 /// A caller who also sees what no policy does.
-pub trait Backstage: Caller {
+pub trait PrivilegedEpisode: Episode {
     fn facts(&mut self) -> Result<Facts, PlayerError>;
 }
 
 /// A caller who also sees the room from where no robot stands: more than a policy has, and results say so.
-pub trait Onlooker: Caller {
+pub trait ThirdPersonEpisode: Episode {
     fn third_person(&mut self) -> Result<Png, PlayerError>;
 }
 
 /// Plays one episode to its end by tool calls alone; made anew for each episode.
 pub trait Player {
-    fn play(&mut self, episode: &mut dyn Caller) -> Result<(), PlayerError>;
+    fn play(&mut self, episode: &mut dyn Episode) -> Result<(), PlayerError>;
 }
 
 /// Plays one episode to its end with a look at the facts; made anew for each episode.
-pub trait Insider {
-    fn play(&mut self, episode: &mut dyn Backstage) -> Result<(), PlayerError>;
+pub trait PrivilegedPlayer {
+    fn play(&mut self, episode: &mut dyn PrivilegedEpisode) -> Result<(), PlayerError>;
 }
 
 /// Why a player stopped before the episode's end.
@@ -59,52 +59,52 @@ pub enum PlayerError {
 
 /// A player by name.
 #[derive(Debug)]
-pub struct Entry {
+pub struct PlayerEntry {
     pub name: &'static str,
     pub about: &'static str,
-    make: Make,
+    make: PlayerFactory,
 }
 
 /// How a player is made for an episode.
 #[derive(Debug)]
-enum Make {
+enum PlayerFactory {
     Player(fn(&EpisodeSpec) -> Result<Box<dyn Player>, PlayerError>),
-    Insider(fn(&EpisodeSpec) -> Result<Box<dyn Insider>, PlayerError>),
+    PrivilegedPlayer(fn(&EpisodeSpec) -> Result<Box<dyn PrivilegedPlayer>, PlayerError>),
 }
 
 /// Every player.
-pub static ALL: &[Entry] = &[
-    Entry {
+pub static ALL: &[PlayerEntry] = &[
+    PlayerEntry {
         name: "expert",
         about: "the task's scripted expert, which sees object poses",
-        make: Make::Insider(|spec| Ok(Box::new(experts::Expert::of(spec.task)?))),
+        make: PlayerFactory::PrivilegedPlayer(|spec| Ok(Box::new(experts::Expert::of(spec.task)?))),
     },
-    Entry {
+    PlayerEntry {
         name: "idle",
         about: "nobody: robots hold still until the steps of the benchmark protocol are used up",
-        make: Make::Player(|spec| Ok(Box::new(idle::Idle::new(spec.task)))),
+        make: PlayerFactory::Player(|spec| Ok(Box::new(idle::Idle::new(spec.task)))),
     },
-    Entry {
+    PlayerEntry {
         name: "demonstration",
         about: "what the robots were told in the recording that the episode starts from, told again",
-        make: Make::Player(|spec| Ok(Box::new(demonstration::Demonstration::new(spec)))),
+        make: PlayerFactory::Player(|spec| Ok(Box::new(demonstration::Demonstration::new(spec)))),
     },
 ];
 
 /// The player called `name`.
-pub fn find(name: &str) -> Result<&'static Entry, PlayerError> {
+pub fn find(name: &str) -> Result<&'static PlayerEntry, PlayerError> {
     ALL.iter().find(|entry| entry.name == name).ok_or_else(|| PlayerError::UnknownPlayer {
         name: name.into(),
         have: ALL.iter().map(|entry| entry.name).collect(),
     })
 }
 
-impl Entry {
+impl PlayerEntry {
     /// Plays the episode `spec`. That it ends under way is no error: the last phase may have been reached.
-    pub fn play(&self, spec: &EpisodeSpec, episode: &mut dyn Backstage) -> Result<(), PlayerError> {
+    pub fn play(&self, spec: &EpisodeSpec, episode: &mut dyn PrivilegedEpisode) -> Result<(), PlayerError> {
         let outcome = match self.make {
-            Make::Player(make) => make(spec)?.play(episode),
-            Make::Insider(make) => make(spec)?.play(episode),
+            PlayerFactory::Player(make) => make(spec)?.play(episode),
+            PlayerFactory::PrivilegedPlayer(make) => make(spec)?.play(episode),
         };
         match outcome {
             Err(PlayerError::EpisodeOver) => Ok(()),
@@ -126,8 +126,8 @@ mod tests {
             for task in tasks::ALL {
                 let spec = EpisodeSpec::new(task, 0, Protocol::Agentic);
                 let made = match entry.make {
-                    Make::Player(make) => make(&spec).map(drop),
-                    Make::Insider(make) => make(&spec).map(drop),
+                    PlayerFactory::Player(make) => make(&spec).map(drop),
+                    PlayerFactory::PrivilegedPlayer(make) => make(&spec).map(drop),
                 };
                 let solved = experts::solved().any(|solved| solved == task);
                 match made {

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use tandem_tools_spec::ResultReply;
 
-use super::{Entry, InProcess, PlayerError};
+use super::{InProcess, PlayerEntry, PlayerError};
 use crate::results::PolicyCard;
 use crate::spec::EpisodeSpec;
 use crate::{EpisodeError, Session};
@@ -17,19 +17,19 @@ pub trait Policy: Debug + Send + Sync {
     fn card(&self) -> PolicyCard;
 
     /// Plays `spec` from its start to its result.
-    fn play_whole(&self, spec: &EpisodeSpec, place: Place) -> Result<Fared, PlayError>;
+    fn play_episode(&self, spec: &EpisodeSpec, output: EpisodeOutput) -> Result<PlayOutcome, PlayError>;
 }
 
 /// Where an episode leaves its files.
 #[derive(Clone, Copy, Debug)]
-pub struct Place<'a> {
+pub struct EpisodeOutput<'a> {
     /// The episode's own folder; nobody has made it yet.
     pub folder: &'a Path,
     /// Whether the episode is to be recorded there.
     pub record: bool,
 }
 
-impl<'a> Place<'a> {
+impl<'a> EpisodeOutput<'a> {
     /// Where the episode is recorded, if it is.
     pub fn recording(self) -> Option<&'a Path> {
         self.record.then_some(self.folder)
@@ -38,7 +38,7 @@ impl<'a> Place<'a> {
 
 /// How a policy fared.
 #[derive(Debug)]
-pub struct Fared {
+pub struct PlayOutcome {
     pub result: ResultReply,
     /// How long it thought.
     pub thought: Duration,
@@ -59,24 +59,24 @@ pub enum PlayError {
     Lost(String),
 }
 
-impl Policy for Entry {
+impl Policy for PlayerEntry {
     fn card(&self) -> PolicyCard {
         self.name.into()
     }
 
-    fn play_whole(&self, spec: &EpisodeSpec, place: Place) -> Result<Fared, PlayError> {
-        Ok(play_in_process(spec, place, |episode| self.play(spec, episode))?)
+    fn play_episode(&self, spec: &EpisodeSpec, output: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
+        Ok(play_in_process(spec, output, |episode| self.play(spec, episode))?)
     }
 }
 
 /// Plays `spec` in this process: `act` makes the calls. That the episode ends under way is no error.
 pub fn play_in_process(
     spec: &EpisodeSpec,
-    place: Place,
+    output: EpisodeOutput,
     act: impl FnOnce(&mut InProcess) -> Result<(), PlayerError>,
-) -> Result<Fared, EpisodeError> {
-    let session = Session::start(spec, place.recording())?;
-    let mut episode = match spec.begun_phase() {
+) -> Result<PlayOutcome, EpisodeError> {
+    let session = Session::start(spec, output.recording())?;
+    let mut episode = match spec.start_phase() {
         Some(phase) => InProcess::until(phase + 1, session),
         None => InProcess::new(session),
     };
@@ -85,5 +85,5 @@ pub fn play_in_process(
         Err(error) => Some(error.to_string()),
     };
     let thought = episode.session.thought();
-    Ok(Fared { result: episode.session.close(), thought, stopped })
+    Ok(PlayOutcome { result: episode.session.close(), thought, stopped })
 }

@@ -13,19 +13,18 @@
 //! recorder that is dropped earlier still writes the index; one whose process is killed leaves whole chunks without an index,
 //! which [`recover`] adds.
 
-mod file;
+mod mcap_file;
 mod read;
 mod recover;
-mod store;
 #[cfg(test)]
 mod tests;
 mod thread;
 mod topics;
 mod write;
 
+pub use mcap_file::Visibility;
 pub use read::{RecordedCall, RecordedCheckpoint, Recording, RecordingError};
 pub use recover::{RecoverError, Recovered, recover};
-pub use store::Visibility;
 pub use thread::RecorderThread;
 pub use topics::messages::{ToolCallRecord, state_hash_text};
 pub use write::{Recorder, RecordingHeader};

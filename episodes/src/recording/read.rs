@@ -10,7 +10,7 @@ use serde_json::Value;
 use tandem_sim::{SimError, Step};
 use tandem_tools_spec::{PhaseReached, ResultReply};
 
-use super::topics::messages::{Phase, StepError, StepMessage, ToolCallMessage};
+use super::topics::messages::{PhaseMessage, StepError, StepMessage, ToolCallMessage};
 use super::{checkpoint_name, metadata, topics};
 use crate::results::RESULT_FILE;
 use crate::scoring::{ScoreMemory, Scores};
@@ -136,8 +136,8 @@ impl Recording {
 
     /// The phases that the episode reached.
     pub fn phases(&self) -> Result<Vec<PhaseReached>, RecordingError> {
-        let phase = |message: Result<(f64, Phase), RecordingError>| {
-            let (_, Phase { id, number, time_s }) = message?;
+        let phase = |message: Result<(f64, PhaseMessage), RecordingError>| {
+            let (_, PhaseMessage { id, number, time_s }) = message?;
             Ok(PhaseReached { id, number, time_s })
         };
         self.messages(topics::PHASES)?.map(phase).collect()

@@ -6,9 +6,8 @@ use mcap::Attachment;
 use mcap::read::{ChunkFlattener, Options};
 use mcap::records::Record;
 
-use super::file::writer;
+use super::mcap_file::{RecordingStore, Visibility, writer};
 use super::read::RecordingError;
-use super::store::{Store, Visibility};
 use crate::output::OutputError;
 
 /// What could be read, and where it is now.
@@ -52,7 +51,7 @@ pub fn recover(partial: &Path) -> Result<Recovered, RecoverError> {
     let nothing = |reason: String| RecoverError::Nothing { path: partial.into(), reason };
     let records =
         ChunkFlattener::new_with_options(&bytes, Options::IgnoreEndMagic | Options::ValidateChunkCrcs);
-    let mut copy = Copy::create(&path)?;
+    let mut copy = RecoveredFile::create(&path)?;
     for record in records.map_err(|error| nothing(error.to_string()))? {
         match record {
             Ok(record) => copy.add(record)?,
@@ -69,21 +68,21 @@ pub fn recover(partial: &Path) -> Result<Recovered, RecoverError> {
 }
 
 /// The whole recording, on its way.
-struct Copy {
+struct RecoveredFile {
     path: PathBuf,
-    writer: mcap::Writer<Store>,
+    writer: mcap::Writer<RecordingStore>,
     messages: u64,
     last_ns: u64,
     torn: Option<String>,
 }
 
-impl Copy {
-    fn create(path: &Path) -> Result<Copy, OutputError> {
+impl RecoveredFile {
+    fn create(path: &Path) -> Result<RecoveredFile, OutputError> {
         // Nothing is left behind where nothing can be recovered.
-        let store = Store::create(path, Visibility::After)
+        let store = RecordingStore::create(path, Visibility::After)
             .map_err(|source| OutputError::Io { path: path.into(), source })?;
         let writer = writer(store).map_err(|source| OutputError::Mcap { path: path.into(), source })?;
-        Ok(Copy { path: path.into(), writer, messages: 0, last_ns: 0, torn: None })
+        Ok(RecoveredFile { path: path.into(), writer, messages: 0, last_ns: 0, torn: None })
     }
 
     fn add(&mut self, record: Record) -> Result<(), OutputError> {
@@ -123,7 +122,7 @@ impl Copy {
     fn finish(mut self) -> Result<Recovered, OutputError> {
         self.writer.finish().map_err(|source| OutputError::Mcap { path: self.path.clone(), source })?;
         self.writer.into_inner().keep(&self.path)?;
-        let Copy { path, messages, last_ns, torn, .. } = self;
+        let RecoveredFile { path, messages, last_ns, torn, .. } = self;
         Ok(Recovered { path, messages, last_s: last_ns as f64 / 1e9, torn })
     }
 }

@@ -7,9 +7,10 @@ use foxglove::messages::{FrameTransforms, SceneUpdate};
 use tandem_sim::{Step, mjcf::Geom, render::robot_rgba};
 use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
 
-use super::file::{McapFile, Topic};
-use super::store::Visibility;
-use super::topics::messages::{BudgetLeft, Json, Phase, StepMessage, ToolCallMessage, ToolCallRecord};
+use super::mcap_file::{McapFile, Topic, Visibility};
+use super::topics::messages::{
+    BudgetMessage, Json, PhaseMessage, StepMessage, ToolCallMessage, ToolCallRecord,
+};
 use super::topics::robot::RobotTopics;
 use super::topics::transforms::{self, robot_frame};
 use super::topics::{self, scene};
@@ -45,8 +46,8 @@ pub struct Recorder {
     steps: Topic<Json<StepMessage>>,
     transforms: Topic<FrameTransforms>,
     scene: Topic<SceneUpdate>,
-    phases: Topic<Json<Phase>>,
-    budget: Topic<Json<BudgetLeft>>,
+    phases: Topic<Json<PhaseMessage>>,
+    budget: Topic<Json<BudgetMessage>>,
     tool_calls: Topic<Json<ToolCallMessage>>,
 }
 

@@ -5,9 +5,9 @@ mod scene;
 mod verify;
 mod video;
 
-pub use pictures::{Drawn, PicturesError, PicturesPlan, draw_all};
-pub use scene::{Scene, Size, View};
-pub use verify::{Difference, Outcome, Verified, verify};
+pub use pictures::{DrawnPictures, PicturesError, PicturesPlan, draw_all};
+pub use scene::{EpisodeCamera, EpisodeRenderer, PictureSize};
+pub use verify::{Difference, Verdict, Verification, verify};
 pub use video::{VideoError, VideoFormat, film};
 
 use crate::EpisodeError;

@@ -13,7 +13,7 @@ use tandem_sim::render::{Camera, DEPTH_UNIT_M, PictureError, encode_depth_png, e
 use tandem_sim::{Pose, Step};
 
 use super::video::step_of_picture;
-use super::{ReplayError, Scene, Size, View};
+use super::{EpisodeCamera, EpisodeRenderer, PictureSize, ReplayError};
 use crate::convert::opencv_axes;
 use crate::output::{OutputError, create_private_folder, write_whole};
 use crate::recording::Recording;
@@ -26,14 +26,14 @@ pub struct PicturesPlan {
     /// Pictures a second of each camera.
     pub rate_hz: u32,
     /// Of every camera's pictures, where it is not to be the camera's own.
-    pub size: Option<Size>,
+    pub size: Option<PictureSize>,
     /// Threads that draw.
     pub jobs: usize,
 }
 
 /// What has been drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Drawn {
+pub struct DrawnPictures {
     /// Moments at which every camera has a picture.
     pub moments: usize,
     /// Of these, how many an earlier run had drawn.
@@ -84,7 +84,7 @@ struct Intrinsics {
 
 /// Where a camera was, in `poses.json`: x right, y down, z along the optical axis, as OpenCV has it.
 #[derive(Serialize)]
-struct Placed {
+struct CameraPose {
     control_step: u64,
     time_s: f64,
     camera: &'static str,
@@ -101,25 +101,25 @@ pub fn draw_all(
     plan: &PicturesPlan,
     folder: &Path,
     progress: &(dyn Fn() + Sync),
-) -> Result<Drawn, PicturesError> {
+) -> Result<DrawnPictures, PicturesError> {
     let steps = moments(recording, plan.rate_hz)?;
-    let scene = Scene::of(&recording.spec).map_err(ReplayError::from)?;
+    let scene = EpisodeRenderer::of(&recording.spec).map_err(ReplayError::from)?;
     let task = recording.spec.task;
-    let views = View::all(task);
+    let views = EpisodeCamera::all(task);
     prepare(recording, plan, folder, &scene, &steps)?;
-    let poses: Vec<Placed> = steps
+    let poses: Vec<CameraPose> = steps
         .iter()
         .flat_map(|step| views.iter().map(move |view| (step, *view)))
-        .map(|(step, view)| placed(step, view.name(task), &scene.camera(view, step, plan.size)))
+        .map(|(step, view)| camera_pose(step, view.name(task), &scene.camera(view, step, plan.size)))
         .collect();
     write_whole(&folder.join(POSES), &serde_json::to_vec(&poses).map_err(OutputError::from)?)?;
     let kept = AtomicUsize::new(0);
     let next = AtomicUsize::new(0);
     let failure: Mutex<Option<PicturesError>> = Mutex::new(None);
     let work = || -> Result<(), PicturesError> {
-        let mut scene = Scene::of(&recording.spec).map_err(ReplayError::from)?;
+        let mut scene = EpisodeRenderer::of(&recording.spec).map_err(ReplayError::from)?;
         while let Some(step) = steps.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let before = views.iter().all(|view| Files::of(folder, view.name(task), step).are_there());
+            let before = views.iter().all(|view| PictureFiles::of(folder, view.name(task), step).are_there());
             kept.fetch_add(usize::from(before), Ordering::Relaxed);
             if !before {
                 views.iter().try_for_each(|view| draw(&mut scene, *view, step, plan, folder, task))?;
@@ -141,7 +141,7 @@ pub fn draw_all(
     });
     match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
         Some(error) => Err(error),
-        None => Ok(Drawn { moments: steps.len(), kept: kept.into_inner(), cameras: views.len() }),
+        None => Ok(DrawnPictures { moments: steps.len(), kept: kept.into_inner(), cameras: views.len() }),
     }
 }
 
@@ -162,17 +162,17 @@ fn prepare(
     recording: &Recording,
     plan: &PicturesPlan,
     folder: &Path,
-    scene: &Scene,
+    scene: &EpisodeRenderer,
     steps: &[Step],
 ) -> Result<(), PicturesError> {
     let task = recording.spec.task;
-    let intrinsics = |view: View, step: &Step| {
+    let intrinsics = |view: EpisodeCamera, step: &Step| {
         let camera = scene.camera(view, step, plan.size);
         let [cx, cy] = camera.principal_point_px().map(|px| px - 0.5);
         let (name, focal_px) = (view.name(task).into(), camera.focal_px());
         Intrinsics { name, width: camera.width, height: camera.height, focal_px, cx, cy }
     };
-    let views = View::all(task).into_iter();
+    let views = EpisodeCamera::all(task).into_iter();
     let state_hash = recording.state_hashes().map_err(ReplayError::from)?.last();
     let (_, state_hash) = state_hash.transpose().map_err(ReplayError::from)?.unwrap_or_default();
     let manifest = Manifest {
@@ -200,10 +200,10 @@ fn prepare(
     Ok(write_whole(&path, &text)?)
 }
 
-fn placed(step: &Step, name: &'static str, camera: &Camera) -> Placed {
+fn camera_pose(step: &Step, name: &'static str, camera: &Camera) -> CameraPose {
     let pose: Pose = opencv_axes(&camera.world_from_camera);
     let q = pose.rotation;
-    Placed {
+    CameraPose {
         control_step: step.control_step,
         time_s: step.time_s,
         camera: name,
@@ -213,15 +213,15 @@ fn placed(step: &Step, name: &'static str, camera: &Camera) -> Placed {
 }
 
 /// The files of one camera at one moment; depth is written last.
-struct Files {
+struct PictureFiles {
     rgb: PathBuf,
     depth: PathBuf,
 }
 
-impl Files {
-    fn of(folder: &Path, camera: &str, step: &Step) -> Files {
+impl PictureFiles {
+    fn of(folder: &Path, camera: &str, step: &Step) -> PictureFiles {
         let file = |kind: &str| folder.join(camera).join(kind).join(format!("{:06}.png", step.control_step));
-        Files { rgb: file("rgb"), depth: file("depth") }
+        PictureFiles { rgb: file("rgb"), depth: file("depth") }
     }
 
     fn are_there(&self) -> bool {
@@ -230,14 +230,14 @@ impl Files {
 }
 
 fn draw(
-    scene: &mut Scene,
-    view: View,
+    scene: &mut EpisodeRenderer,
+    view: EpisodeCamera,
     step: &Step,
     plan: &PicturesPlan,
     folder: &Path,
     task: &Task,
 ) -> Result<(), PicturesError> {
-    let files = Files::of(folder, view.name(task), step);
+    let files = PictureFiles::of(folder, view.name(task), step);
     if files.are_there() {
         return Ok(());
     }

@@ -10,7 +10,7 @@ use crate::tasks::Task;
 
 /// One of an episode's cameras.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum View {
+pub enum EpisodeCamera {
     ThirdPerson,
     /// In the head of robot number so-and-so.
     Egocentric(usize),
@@ -18,29 +18,29 @@ pub enum View {
 
 /// Width and height of a picture in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Size {
+pub struct PictureSize {
     pub width: u32,
     pub height: u32,
 }
 
-impl View {
+impl EpisodeCamera {
     /// Every camera of the task's episodes.
-    pub fn all(task: &Task) -> Vec<View> {
-        let heads = (0..task.robots.len()).map(View::Egocentric);
-        std::iter::once(View::ThirdPerson).chain(heads).collect()
+    pub fn all(task: &Task) -> Vec<EpisodeCamera> {
+        let heads = (0..task.robots.len()).map(EpisodeCamera::Egocentric);
+        std::iter::once(EpisodeCamera::ThirdPerson).chain(heads).collect()
     }
 
     /// `third_person`, or the robot's name.
     pub fn name(self, task: &Task) -> &'static str {
         match self {
-            View::ThirdPerson => "third_person",
-            View::Egocentric(robot) => task.robots[robot].name,
+            EpisodeCamera::ThirdPerson => "third_person",
+            EpisodeCamera::Egocentric(robot) => task.robots[robot].name,
         }
     }
 
     /// The camera called `name`; its error says which there are.
-    pub fn find(name: &str, task: &Task) -> Result<View, String> {
-        let all = View::all(task);
+    pub fn find(name: &str, task: &Task) -> Result<EpisodeCamera, String> {
+        let all = EpisodeCamera::all(task);
         let have: Vec<&str> = all.iter().map(|view| view.name(task)).collect();
         let found = have.iter().position(|known| *known == name);
         found.map(|index| all[index]).ok_or_else(|| {
@@ -50,24 +50,24 @@ impl View {
 }
 
 /// Draws the steps of one episode.
-pub struct Scene {
+pub struct EpisodeRenderer {
     eyes: Eyes,
 }
 
-impl Scene {
+impl EpisodeRenderer {
     /// Of the episode `spec`, at rest.
-    pub fn of(spec: &EpisodeSpec) -> Result<Scene, EpisodeError> {
-        Ok(Scene { eyes: Eyes::new(spec.renderer, &build(spec)?.world) })
+    pub fn of(spec: &EpisodeSpec) -> Result<EpisodeRenderer, EpisodeError> {
+        Ok(EpisodeRenderer { eyes: Eyes::new(spec.renderer, &build(spec)?.world) })
     }
 
     /// The camera after `step`, with pictures of another size if one is given: as high an angle, more or less wide.
-    pub fn camera(&self, view: View, step: &Step, size: Option<Size>) -> Camera {
+    pub fn camera(&self, view: EpisodeCamera, step: &Step, size: Option<PictureSize>) -> Camera {
         let camera = match view {
-            View::ThirdPerson => self.eyes.cameras.third_person(),
-            View::Egocentric(robot) => self.eyes.cameras.egocentric(step, robot),
+            EpisodeCamera::ThirdPerson => self.eyes.cameras.third_person(),
+            EpisodeCamera::Egocentric(robot) => self.eyes.cameras.egocentric(step, robot),
         };
         match size {
-            Some(Size { width, height }) => Camera { width, height, ..camera },
+            Some(PictureSize { width, height }) => Camera { width, height, ..camera },
             None => camera,
         }
     }

@@ -11,7 +11,7 @@ use crate::session::Replay;
 
 /// What came of simulating a recording again.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Verified {
+pub struct Verification {
     /// Steps whose states are the recorded ones, that before the first one included.
     pub steps: usize,
     pub calls: usize,
@@ -19,12 +19,12 @@ pub struct Verified {
     pub unanswered_steps: usize,
     /// The build that recorded it, where that is another: builds may differ in their physics.
     pub other_build: Option<String>,
-    pub outcome: Outcome,
+    pub outcome: Verdict,
 }
 
 /// How what was simulated compares with what was recorded.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Outcome {
+pub enum Verdict {
     /// Every state, the result, and the phases scored from the recorded steps agree.
     Same,
     State(Difference),
@@ -48,15 +48,16 @@ pub struct Difference {
 }
 
 /// Simulates the episode of `recording` again.
-pub fn verify(recording: &Recording) -> Result<Verified, ReplayError> {
+pub fn verify(recording: &Recording) -> Result<Verification, ReplayError> {
     let this = fingerprint::build().map_err(EpisodeError::Build)?;
     let begin = recording.checkpoint(BEGIN)?;
     let mut replay = Replay::start(&recording.spec, begin.as_ref(), recording.path())?;
-    let mut compared = Compared { recorded: recording.state_hashes()?.collect::<Result<_, _>>()?, steps: 0 };
+    let mut comparison =
+        HashComparison { recorded: recording.state_hashes()?.collect::<Result<_, _>>()?, steps: 0 };
     let calls = recording.tool_calls()?;
     // A recording may have been cut before its first call, within the hold that an episode begins with.
     let cut = recording.result.is_none() && calls.is_empty();
-    let begun = compared.compare(replay.take_hashes()).filter(|found| !cut || found.recorded.is_some());
+    let begun = comparison.compare(replay.take_hashes()).filter(|found| !cut || found.recorded.is_some());
     let mut difference = begun.map(|found| (None, found));
     for (index, call) in calls.iter().enumerate() {
         if difference.is_some() {
@@ -66,22 +67,22 @@ pub fn verify(recording: &Recording) -> Result<Verified, ReplayError> {
         let parsed = Called::parse(&call.tool, call.arguments.clone()).map_err(again)?;
         // A call that was refused is refused again, and what it says is not compared.
         let _ = replay.call(&parsed, call.thought);
-        difference = compared.compare(replay.take_hashes()).map(|found| (Some((index, call)), found));
+        difference = comparison.compare(replay.take_hashes()).map(|found| (Some((index, call)), found));
     }
     let outcome = match (difference, &recording.result) {
-        (Some((call, found)), _) => Outcome::State(found.by(call)),
-        (None, Some(result)) => match compared.missing() {
-            Some(found) => Outcome::State(found.by(calls.iter().enumerate().next_back())),
+        (Some((call, found)), _) => Verdict::State(found.by(call)),
+        (None, Some(result)) => match comparison.missing() {
+            Some(found) => Verdict::State(found.by(calls.iter().enumerate().next_back())),
             None => compare_results(recording, result, replay.result().0)?,
         },
-        (None, None) => Outcome::Same,
+        (None, None) => Verdict::Same,
     };
-    Ok(Verified {
-        steps: compared.steps,
+    Ok(Verification {
+        steps: comparison.steps,
         calls: calls.len(),
         unanswered_steps: match recording.result {
             Some(_) => 0,
-            None => compared.recorded.len() - compared.steps,
+            None => comparison.recorded.len() - comparison.steps,
         },
         other_build: (recording.build != this).then(|| recording.build.clone()),
         outcome,
@@ -89,28 +90,28 @@ pub fn verify(recording: &Recording) -> Result<Verified, ReplayError> {
 }
 
 /// Recorded states, and how many of them have been compared and were the same.
-struct Compared {
+struct HashComparison {
     recorded: Vec<(u64, String)>,
     steps: usize,
 }
 
 /// A difference that belongs to no call yet.
-struct Found {
+struct StateMismatch {
     control_step: u64,
     recorded: Option<String>,
     again: Option<String>,
 }
 
-impl Compared {
+impl HashComparison {
     /// Compares the states that follow; the first difference, if there is one.
-    fn compare(&mut self, again: Vec<u64>) -> Option<Found> {
+    fn compare(&mut self, again: Vec<u64>) -> Option<StateMismatch> {
         for hash in again {
             let again = state_hash_text(hash);
             match self.recorded.get(self.steps) {
                 Some((_, recorded)) if *recorded == again => self.steps += 1,
                 other => {
                     let last = self.recorded.last().map_or(0, |(step, _)| *step);
-                    return Some(Found {
+                    return Some(StateMismatch {
                         control_step: other.map_or(last + 1, |(step, _)| *step),
                         recorded: other.map(|(_, recorded)| recorded.clone()),
                         again: Some(again),
@@ -122,15 +123,15 @@ impl Compared {
     }
 
     /// The first recorded state that was not simulated again.
-    fn missing(&self) -> Option<Found> {
+    fn missing(&self) -> Option<StateMismatch> {
         let (control_step, recorded) = self.recorded.get(self.steps)?;
-        Some(Found { control_step: *control_step, recorded: Some(recorded.clone()), again: None })
+        Some(StateMismatch { control_step: *control_step, recorded: Some(recorded.clone()), again: None })
     }
 }
 
-impl Found {
+impl StateMismatch {
     fn by(self, call: Option<(usize, &RecordedCall)>) -> Difference {
-        let Found { control_step, recorded, again } = self;
+        let StateMismatch { control_step, recorded, again } = self;
         Difference {
             control_step,
             recorded,
@@ -145,7 +146,7 @@ fn compare_results(
     recording: &Recording,
     recorded: &ResultReply,
     again: ResultReply,
-) -> Result<Outcome, ReplayError> {
+) -> Result<Verdict, ReplayError> {
     let times_s =
         |result: &ResultReply| result.phases.0.iter().filter_map(|(_, time_s)| *time_s).collect::<Vec<f64>>();
     let scored_s: Vec<f64> = recording.score()?.reached().map(|(_, time_s)| time_s).collect();
@@ -159,7 +160,7 @@ fn compare_results(
     ];
     let differs = pairs.into_iter().find(|(_, recorded, again)| recorded != again);
     Ok(match differs {
-        Some((what, recorded, again)) => Outcome::Result { what, recorded, again },
-        None => Outcome::Same,
+        Some((what, recorded, again)) => Verdict::Result { what, recorded, again },
+        None => Verdict::Same,
     })
 }

@@ -11,7 +11,7 @@ use tandem_sim::CONTROL_HZ;
 use tandem_sim::render::Frame;
 use webp_animation::Encoder;
 
-use super::{ReplayError, Scene, Size, View};
+use super::{EpisodeCamera, EpisodeRenderer, PictureSize, ReplayError};
 use crate::output::{OutputError, partial_path, put_in_place, webp, write_whole};
 use crate::recording::Recording;
 
@@ -63,14 +63,14 @@ impl VideoFormat {
 /// Films a whole recording at `rate_hz` pictures a second, as fast as it was, and returns how many pictures that is.
 pub fn film(
     recording: &Recording,
-    view: View,
-    size: Option<Size>,
+    view: EpisodeCamera,
+    size: Option<PictureSize>,
     rate_hz: u32,
     path: &Path,
 ) -> Result<usize, VideoError> {
     let format = VideoFormat::of(path)?;
-    let mut scene = Scene::of(&recording.spec).map_err(ReplayError::from)?;
-    let mut reel: Option<Reel> = None;
+    let mut scene = EpisodeRenderer::of(&recording.spec).map_err(ReplayError::from)?;
+    let mut writer: Option<FilmWriter> = None;
     let mut pictures = 0;
     for (index, step) in recording.steps().map_err(ReplayError::from)?.enumerate() {
         let step = step.map_err(ReplayError::from)?;
@@ -79,15 +79,15 @@ pub fn film(
         }
         let camera = scene.camera(view, &step, size);
         let frame = scene.draw(&step, &camera);
-        let reel = match &mut reel {
-            Some(reel) => reel,
-            unbegun => unbegun.insert(Reel::begin(format, &frame, rate_hz, path)?),
+        let writer = match &mut writer {
+            Some(writer) => writer,
+            unbegun => unbegun.insert(FilmWriter::begin(format, &frame, rate_hz, path)?),
         };
-        reel.add(&frame, pictures, rate_hz, path)?;
+        writer.add(&frame, pictures, rate_hz, path)?;
         pictures += 1;
     }
-    if let Some(reel) = reel {
-        reel.finish(pictures, rate_hz, path)?;
+    if let Some(writer) = writer {
+        writer.finish(pictures, rate_hz, path)?;
     }
     Ok(pictures)
 }
@@ -98,7 +98,7 @@ pub fn step_of_picture(picture: usize, rate_hz: u32) -> usize {
 }
 
 /// A film under way.
-enum Reel {
+enum FilmWriter {
     Webp(Box<Encoder>),
     Gif { encoder: Box<GifEncoder<BufWriter<File>>>, file: File },
     Mp4(Child),
@@ -107,37 +107,42 @@ enum Reel {
 /// From 1, the slowest, to 30.
 const GIF_SPEED: i32 = 10;
 
-impl Reel {
+impl FilmWriter {
     /// Begins a film with pictures of the size of `frame`.
-    fn begin(format: VideoFormat, frame: &Frame, rate_hz: u32, path: &Path) -> Result<Reel, VideoError> {
+    fn begin(
+        format: VideoFormat,
+        frame: &Frame,
+        rate_hz: u32,
+        path: &Path,
+    ) -> Result<FilmWriter, VideoError> {
         let Frame { width, height, .. } = *frame;
         Ok(match format {
             VideoFormat::Webp => {
-                Reel::Webp(webp::encoder((width, height)).map_err(|e| webp_failed(path, e))?.into())
+                FilmWriter::Webp(webp::encoder((width, height)).map_err(|e| webp_failed(path, e))?.into())
             }
             VideoFormat::Gif => {
                 let file = File::create(partial_path(path)).map_err(|e| io_failed(path, e))?;
                 let written = file.try_clone().map_err(|e| io_failed(path, e))?;
                 let mut encoder = GifEncoder::new_with_speed(BufWriter::new(written), GIF_SPEED);
                 encoder.set_repeat(Repeat::Infinite)?;
-                Reel::Gif { encoder: encoder.into(), file }
+                FilmWriter::Gif { encoder: encoder.into(), file }
             }
-            VideoFormat::Mp4 => Reel::Mp4(ffmpeg([width, height], rate_hz, path)?),
+            VideoFormat::Mp4 => FilmWriter::Mp4(ffmpeg([width, height], rate_hz, path)?),
         })
     }
 
     fn add(&mut self, frame: &Frame, picture: usize, rate_hz: u32, path: &Path) -> Result<(), VideoError> {
         match self {
-            Reel::Webp(encoder) => encoder
+            FilmWriter::Webp(encoder) => encoder
                 .add_frame(&frame.rgb, time_ms(picture, rate_hz))
                 .map_err(|source| webp_failed(path, source)),
-            Reel::Gif { encoder, .. } => {
+            FilmWriter::Gif { encoder, .. } => {
                 let picture = RgbImage::from_raw(frame.width, frame.height, frame.rgb.clone());
                 let rgba = DynamicImage::from(picture.unwrap_or_default()).into_rgba8();
                 let delay = Delay::from_numer_denom_ms(1000, rate_hz);
                 Ok(encoder.encode_frame(image::Frame::from_parts(rgba, 0, 0, delay))?)
             }
-            Reel::Mp4(child) => {
+            FilmWriter::Mp4(child) => {
                 if let Some(pipe) = &mut child.stdin {
                     // A pipe that is closed early has its reason in what ffmpeg says at the end.
                     let _ = pipe.write_all(&frame.rgb);
@@ -149,16 +154,16 @@ impl Reel {
 
     fn finish(self, pictures: usize, rate_hz: u32, path: &Path) -> Result<(), VideoError> {
         match self {
-            Reel::Webp(encoder) => {
+            FilmWriter::Webp(encoder) => {
                 let film = encoder.finalize(time_ms(pictures, rate_hz));
                 Ok(write_whole(path, &film.map_err(|e| webp_failed(path, e))?)?)
             }
-            Reel::Gif { encoder, file } => {
+            FilmWriter::Gif { encoder, file } => {
                 // The encoder writes the end of the file when it is dropped.
                 drop(encoder);
                 put_in_place(&file, &partial_path(path), path).map_err(|e| io_failed(path, e))
             }
-            Reel::Mp4(child) => {
+            FilmWriter::Mp4(child) => {
                 let output = child.wait_with_output().map_err(|e| io_failed(path, e))?;
                 if !output.status.success() {
                     let says = String::from_utf8_lossy(&output.stderr).trim().to_owned();

@@ -4,7 +4,7 @@ pub(crate) mod episode;
 mod evaluation;
 
 pub use evaluation::{
-    Assessment, Average, Comparison, Effort, Failure, Format, Found, LoadError, Loaded, Mean, PairedRow,
-    PhaseReport, PolicyReport, Published, PublishedAverages, Rate, Reason, Spread, TaskReport, Together,
-    gallery, load,
+    ByCollaboration, Comparison, EpisodeCosts, EvaluationReport, Failure, FailureReason, FoundEpisode,
+    LoadError, LoadedEpisodes, MeanRate, PairedRow, PhaseReport, PolicyReport, PublishedAverages,
+    PublishedRates, Rate, ReportFormat, TaskAverage, TaskReport, ValueRange, gallery, load,
 };

@@ -1,9 +1,150 @@
 //! What episodes came to, as files and as counts.
 
 mod phase_level;
-mod played;
-mod result_file;
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use tandem_tools_spec::ResultReply;
 
 pub use phase_level::{PhaseLevel, PhaseRate};
-pub use played::{EPISODES, Played, PolicyCard, missed};
-pub use result_file::{RESULT_FILE, write_result};
+
+use crate::output::{OutputError, write_whole};
+use crate::spec::EpisodeSpec;
+
+/// The result's name in a run folder.
+pub const RESULT_FILE: &str = "result.json";
+
+/// Writes `result.json` into a run folder. A reader sees the old file or the new one, never a part.
+pub fn write_result(result: &ResultReply, folder: &Path) -> Result<PathBuf, OutputError> {
+    let mut text = serde_json::to_string_pretty(result)?;
+    text.push('\n');
+    let path = folder.join(RESULT_FILE);
+    write_whole(&path, text.as_bytes())?;
+    Ok(path)
+}
+
+/// Folder of single episodes in the folder of an evaluation.
+pub const EPISODES: &str = "episodes";
+
+/// One episode that was played, as it is kept in a file of its own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlayedEpisode {
+    /// Who played.
+    #[serde(flatten)]
+    pub by: PolicyCard,
+    pub spec: EpisodeSpec,
+    /// Which base controller the robots had; the name tells files of different content apart.
+    pub locomotion: String,
+    /// Version and fingerprint of the program; what another build played is played again.
+    pub build: String,
+    #[serde(flatten)]
+    pub result: ResultReply,
+    /// How long the policy thought.
+    #[serde(default)]
+    pub thought_s: f64,
+    /// Why the episode fell short: what stopped the policy, or the first phase that was missed.
+    pub note: Option<String>,
+}
+
+impl PlayedEpisode {
+    /// Index of the phase that it began at and that alone counts; `None` where it began at the task's beginning.
+    pub fn start_phase(&self) -> Option<usize> {
+        self.spec.start_phase()
+    }
+}
+
+/// What results say of a policy. Episodes of policies with different cards are never taken for each other.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PolicyCard {
+    /// What results call it.
+    #[serde(rename = "policy")]
+    pub name: String,
+    /// How it is reached and driven, as far as its name does not say it.
+    #[serde(rename = "policy_settings", default, skip_serializing_if = "Option::is_none")]
+    pub settings: Option<Value>,
+    /// What it is shown beyond what the robots themselves see and feel.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub extra_information: Vec<String>,
+}
+
+impl PolicyCard {
+    /// The name, and what the policy is shown beyond what others see.
+    pub fn full_name(&self) -> String {
+        let extra = self.extra_information.iter().map(|what| format!(" + {what}"));
+        std::iter::once(self.name.clone()).chain(extra).collect()
+    }
+}
+
+impl From<&str> for PolicyCard {
+    /// A policy of which nothing but the name is known.
+    fn from(name: &str) -> PolicyCard {
+        PolicyCard { name: name.into(), ..PolicyCard::default() }
+    }
+}
+
+/// The first phase that was not reached; where one phase counts, that one.
+pub fn missed(result: &ResultReply, counts: Option<usize>) -> Option<String> {
+    let counted = |index: usize| counts.is_none_or(|only| only == index);
+    let phases = result.phases.0.iter().enumerate();
+    let (_, (phase, _)) =
+        phases.filter(|(index, _)| counted(*index)).find(|(_, (_, time_s))| time_s.is_none())?;
+    Some(format!("{phase} was not reached in {} steps", result.env_steps))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use serde_json::json;
+    use tandem_tools_spec::{EndReason, PhaseTimes, Protocol};
+
+    use super::*;
+
+    fn result(p3_s: Option<f64>) -> ResultReply {
+        ResultReply {
+            task: "handover".into(),
+            seed: 3,
+            protocol: Protocol::Agentic,
+            phases: PhaseTimes(vec![
+                ("p1".into(), Some(4.2)),
+                ("p2".into(), Some(9.86)),
+                ("p3".into(), p3_s),
+            ]),
+            ended: EndReason::Finished,
+            env_steps: 812,
+            tool_calls: 61,
+            falls: 0,
+            realtime_factor: 3.5,
+            state_hash: "00c0ffee00c0ffee".into(),
+            extra_information: vec![],
+            recording_failed: None,
+        }
+    }
+
+    #[test]
+    fn result_json_has_the_agreed_keys() {
+        let folder = tempfile::tempdir().unwrap();
+        for (p3_s, p3) in [(None, json!(null)), (Some(14.0), json!(14.0))] {
+            let path = write_result(&result(p3_s), folder.path()).unwrap();
+            let written: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+            let expected = json!({
+                "task": "handover", "seed": 3, "protocol": "agentic", "phases": {"p1": 4.2, "p2": 9.86, "p3": p3},
+                "ended": "finished", "env_steps": 812, "tool_calls": 61, "falls": 0, "realtime_factor": 3.5,
+                "state_hash": "00c0ffee00c0ffee",
+            });
+            assert_eq!(written, expected);
+            assert_eq!(serde_json::from_value::<ResultReply>(written).unwrap(), result(p3_s));
+        }
+        let names: Vec<_> =
+            fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        assert_eq!(names, ["result.json"], "no partial file stays behind");
+    }
+
+    #[test]
+    fn a_missing_folder_is_an_error_that_names_the_file() {
+        let error = write_result(&result(None), Path::new("/nonexistent/run")).unwrap_err();
+        assert!(error.to_string().contains("/nonexistent/run/result.json"), "{error}");
+    }
+}

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::played::Played;
+use super::PlayedEpisode;
 use crate::scoring::Phase;
 use crate::tasks;
 
@@ -43,11 +43,11 @@ impl PhaseRate {
 
 impl PhaseLevel {
     /// Counts the episodes that began at a phase; `None` where none did.
-    pub fn of<'a>(episodes: impl Iterator<Item = &'a Played>) -> Option<PhaseLevel> {
+    pub fn of<'a>(episodes: impl Iterator<Item = &'a PlayedEpisode>) -> Option<PhaseLevel> {
         let mut counts: BTreeMap<(usize, usize), [usize; 2]> = BTreeMap::new();
         for played in episodes {
             let task = tasks::ALL.iter().position(|task| task == played.spec.task);
-            let Some((key, phase)) = task.zip(played.begun_phase()) else { continue };
+            let Some((key, phase)) = task.zip(played.start_phase()) else { continue };
             let [episodes, reached] = counts.entry((key, phase)).or_default();
             *episodes += 1;
             *reached += usize::from(played.result.phases.reached_s(&Phase::number(phase)).is_some());

@@ -1,12 +1,12 @@
 //! Scoring: what a control step shows of who holds what, and which phases that reaches. It reads steps and knows no task.
 
 mod facts;
+mod facts_tracker;
 mod grasps;
 mod phases;
 pub mod placement;
-mod scorekeeper;
 mod scores;
 
 pub use facts::{A, B, C, Facts, Grip, ObjectFacts, RobotFacts};
 pub use phases::{Done, Milestone, Phase};
-pub use scores::{ScoreMemory, Scored, Scores};
+pub use scores::{ScoreMemory, Scores, StepScore};

@@ -3,26 +3,26 @@
 use serde::{Deserialize, Serialize};
 use tandem_sim::{SimError, Step};
 
+use super::facts_tracker::{FactsTracker, ObjectMemory};
 use super::phases::{PhaseMemory, PhaseTracker};
-use super::scorekeeper::{Scorekeeper, Watched};
 use super::{Facts, Phase};
 
 /// How far an episode has come.
 #[derive(Clone, Debug)]
 pub struct Scores {
-    keeper: Scorekeeper,
+    tracker: FactsTracker,
     phases: PhaseTracker,
 }
 
 /// What [`Scores`] remember between control steps.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ScoreMemory {
-    objects: Vec<Watched>,
+    objects: Vec<ObjectMemory>,
     phases: PhaseMemory,
 }
 
 /// What one control step shows.
-pub struct Scored {
+pub struct StepScore {
     pub facts: Facts,
     /// Whether it reached a phase.
     pub reached: bool,
@@ -36,20 +36,20 @@ impl Scores {
         objects: impl Iterator<Item = (&'a str, &'a str)>,
         start: &Step,
     ) -> Result<Scores, SimError> {
-        Ok(Scores { keeper: Scorekeeper::new(objects, start)?, phases: PhaseTracker::new(phases) })
+        Ok(Scores { tracker: FactsTracker::new(objects, start)?, phases: PhaseTracker::new(phases) })
     }
 
     /// Looks at the control step that follows the last one.
-    pub fn update(&mut self, step: &Step) -> Scored {
-        self.keeper.update(step);
-        let facts = self.keeper.facts(step);
+    pub fn update(&mut self, step: &Step) -> StepScore {
+        self.tracker.update(step);
+        let facts = self.tracker.facts(step);
         let reached = self.phases.update(&facts);
-        Scored { facts, reached }
+        StepScore { facts, reached }
     }
 
     /// The facts after `step`, the last one that was looked at.
     pub fn facts(&self, step: &Step) -> Facts {
-        self.keeper.facts(step)
+        self.tracker.facts(step)
     }
 
     /// The phases reached so far, in order, with the simulated time of each.
@@ -68,12 +68,12 @@ impl Scores {
     }
 
     pub fn memory(&self) -> ScoreMemory {
-        ScoreMemory { objects: self.keeper.watched().to_vec(), phases: self.phases.memory().clone() }
+        ScoreMemory { objects: self.tracker.memory().to_vec(), phases: self.phases.memory().clone() }
     }
 
     /// Goes back to an earlier [`Scores::memory`] of the same phases and objects.
     pub fn set_memory(&mut self, memory: ScoreMemory) {
-        self.keeper.set_watched(memory.objects);
+        self.tracker.set_memory(memory.objects);
         self.phases.set_memory(memory.phases);
     }
 }

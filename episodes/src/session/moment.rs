@@ -4,7 +4,7 @@ use tandem_sim::Step;
 use tandem_sim::render::Camera;
 
 use super::eyes::Eyes;
-use crate::reports::episode::{CELL_HEIGHT, CELL_WIDTH, Moment, View};
+use crate::reports::episode::{CELL_HEIGHT, CELL_WIDTH, KeyMoment, LabelledFrame};
 
 /// What there is to see after `step`, of robots called `names`.
 pub fn capture<'a>(
@@ -12,15 +12,15 @@ pub fn capture<'a>(
     step: &Step,
     names: impl Iterator<Item = &'a str>,
     eyes: &mut Eyes,
-) -> Moment {
+) -> KeyMoment {
     let mut sights = vec![("the room".into(), eyes.cameras.third_person())];
     for (robot, name) in names.enumerate() {
         sights.push((format!("what {name} sees"), eyes.cameras.egocentric(step, robot)));
     }
     let see = |(label, camera): (String, Camera)| {
         let camera = Camera { width: CELL_WIDTH as u32, height: CELL_HEIGHT as u32, ..camera };
-        View { label, frame: eyes.render(step, &camera) }
+        LabelledFrame { label, frame: eyes.render(step, &camera) }
     };
     let views = sights.into_iter().map(see).collect();
-    Moment { caption: [caption.into(), format!("{:.1} s", step.time_s)], views }
+    KeyMoment { caption: [caption.into(), format!("{:.1} s", step.time_s)], views }
 }

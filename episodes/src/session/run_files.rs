@@ -14,7 +14,7 @@ use crate::EpisodeError;
 use crate::commands::Called;
 use crate::output::{OutputError, create_private_folder, write_whole};
 use crate::recording::{Recorder, RecorderThread, RecordingHeader, ToolCallRecord, Visibility};
-use crate::reports::episode::{CallCounts, EpisodePage, Moment, PAGE_FILE, STRIP_FILE, png};
+use crate::reports::episode::{CallCounts, EpisodePage, KeyMoment, PAGE_FILE, STRIP_FILE, png};
 use crate::results::write_result;
 use crate::scoring::Facts;
 use crate::tasks::Task;
@@ -38,7 +38,7 @@ pub struct RunFiles {
     recorder: RecorderThread,
     /// The first failure, unless it is the recorder's.
     failed: Option<String>,
-    moments: Vec<Moment>,
+    moments: Vec<KeyMoment>,
     begin_s: f64,
     calls: CallCounts,
     budget_left: Option<Budget>,
@@ -117,7 +117,7 @@ impl RunFiles {
     }
 
     /// Keeps a moment for the strip.
-    pub(super) fn keep(&mut self, moment: Moment) {
+    pub(super) fn keep(&mut self, moment: KeyMoment) {
         self.moments.push(moment);
     }
 

@@ -38,7 +38,7 @@ fn own_spec(task: &Task, seed: u32) -> WorldSpec {
         position_m: robot.position_m,
         yaw_rad: robot.yaw_rad,
     });
-    let objects = task.objects.iter().zip(task.starts(seed)).map(|(spot, start)| ObjectPlacement {
+    let objects = task.objects.iter().zip(task.start_poses(seed)).map(|(spot, start)| ObjectPlacement {
         name: spot.name.into(),
         file: spot.file.into(),
         world_from_object: Pose::from_parts(

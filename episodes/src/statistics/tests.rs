@@ -6,28 +6,28 @@ use super::*;
 
 #[derive(Deserialize)]
 struct Peers {
-    clopper_pearson: Vec<Rate>,
-    wilson: Vec<Rate>,
-    mean: Vec<Mean>,
-    pairs: Vec<Paired>,
+    clopper_pearson: Vec<PeerRate>,
+    wilson: Vec<PeerRate>,
+    mean: Vec<PeerMean>,
+    pairs: Vec<PeerPairs>,
 }
 
 #[derive(Deserialize)]
-struct Rate {
+struct PeerRate {
     count: [usize; 2],
     #[serde(rename = "interval")]
     interval_share: [f64; 2],
 }
 
 #[derive(Deserialize)]
-struct Mean {
+struct PeerMean {
     counts: Vec<[usize; 2]>,
     #[serde(rename = "mean_low_high")]
     mean_low_high_share: [f64; 3],
 }
 
 #[derive(Deserialize)]
-struct Paired {
+struct PeerPairs {
     pairs: [usize; 4],
     #[serde(rename = "mcnemar")]
     p_value: f64,
@@ -53,12 +53,13 @@ fn figures_are_those_of_scipy_and_statsmodels() {
     for rate in &peers.wilson {
         check("Wilson", &wilson(count(rate.count)), &rate.interval_share);
     }
-    for Mean { counts, mean_low_high_share } in &peers.mean {
+    for PeerMean { counts, mean_low_high_share } in &peers.mean {
         let counts: Vec<Count> = counts.iter().copied().map(count).collect();
         let (mean, [low, high]) = mean_share(&counts).unwrap();
         check("mean", &[mean, low, high], mean_low_high_share);
     }
-    for Paired { pairs: [both, first_only, second_only, neither], p_value, interval_share } in &peers.pairs {
+    for PeerPairs { pairs: [both, first_only, second_only, neither], p_value, interval_share } in &peers.pairs
+    {
         let pairs =
             Pairs { both: *both, first_only: *first_only, second_only: *second_only, neither: *neither };
         check(&format!("{pairs:?}"), &[mcnemar(pairs)], &[*p_value]);

@@ -14,7 +14,7 @@ mod randomize;
 mod table_align;
 mod trash_collection;
 
-pub use randomize::{Offset, Start, uniform_xy};
+pub use randomize::{Offset, StartPose, uniform_xy};
 
 use tandem_sim::{SimError, Step};
 

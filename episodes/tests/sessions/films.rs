@@ -6,12 +6,14 @@ use std::time::SystemTime;
 
 use crate::common::*;
 use image::AnimationDecoder;
-use tandem_episodes::replay::{PicturesPlan, Scene, Size, VideoError, View, draw_all, film};
+use tandem_episodes::replay::{
+    EpisodeCamera, EpisodeRenderer, PictureSize, PicturesPlan, VideoError, draw_all, film,
+};
 use tandem_episodes::{Recorder, Recording, Session};
 use tandem_tools_spec::Protocol;
 
 const STEPS: u32 = 12;
-const SIZE: Size = Size { width: 64, height: 48 };
+const SIZE: PictureSize = PictureSize { width: 64, height: 48 };
 
 /// A quarter of a second of Handover.
 fn recorded(folder: &Path) -> Recording {
@@ -25,25 +27,25 @@ fn recorded(folder: &Path) -> Recording {
 fn films_have_a_picture_for_every_moment() {
     let folder = tempfile::tempdir().unwrap();
     let recording = recorded(folder.path());
-    let make = |name: &str, view: View, rate_hz: u32| {
+    let make = |name: &str, view: EpisodeCamera, rate_hz: u32| {
         let path = folder.path().join(name);
         film(&recording, view, Some(SIZE), rate_hz, &path).map(|pictures| (pictures, path))
     };
-    let (pictures, gif) = make("a.gif", View::ThirdPerson, 25).unwrap();
+    let (pictures, gif) = make("a.gif", EpisodeCamera::ThirdPerson, 25).unwrap();
     assert_eq!(pictures, 7, "steps 0, 2, .. 12");
     let file = std::io::BufReader::new(std::fs::File::open(gif).unwrap());
     let frames = image::codecs::gif::GifDecoder::new(file).unwrap().into_frames().collect_frames().unwrap();
     assert_eq!((frames.len(), frames[0].buffer().dimensions()), (7, (SIZE.width, SIZE.height)));
     assert_eq!(frames[0].delay().numer_denom_ms(), (40, 1));
 
-    let (pictures, webp) = make("a.webp", View::Egocentric(1), 50).unwrap();
+    let (pictures, webp) = make("a.webp", EpisodeCamera::Egocentric(1), 50).unwrap();
     assert_eq!(pictures, 13);
     let bytes = std::fs::read(webp).unwrap();
     let decoder = webp_animation::Decoder::new(&bytes).unwrap();
     let times_ms: Vec<i32> = decoder.into_iter().map(|frame| frame.timestamp()).collect();
     assert_eq!(times_ms.last(), Some(&(13 * 20)), "{times_ms:?}");
 
-    match make("a.mp4", View::Egocentric(0), 10) {
+    match make("a.mp4", EpisodeCamera::Egocentric(0), 10) {
         Ok((pictures, mp4)) => {
             let bytes = std::fs::read(mp4).unwrap();
             assert_eq!((pictures, &bytes[4..8]), (3, &b"ftyp"[..]));
@@ -51,9 +53,9 @@ fn films_have_a_picture_for_every_moment() {
         Err(error @ VideoError::NoFfmpeg { .. }) => assert!(error.to_string().contains(".webp or .gif")),
         Err(error) => panic!("{error}"),
     }
-    let text = make("a.avi", View::ThirdPerson, 25).unwrap_err().to_string();
+    let text = make("a.avi", EpisodeCamera::ThirdPerson, 25).unwrap_err().to_string();
     assert!(text.contains("ends in .webp, .gif or .mp4"), "{text}");
-    let text = View::find("C", recording.spec.task).unwrap_err();
+    let text = EpisodeCamera::find("C", recording.spec.task).unwrap_err();
     assert!(text.ends_with("have: third_person, A, B"), "{text}");
     let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
     assert!(left.iter().all(|path| path.extension().is_none_or(|e| e != "partial")), "{left:?}");
@@ -98,8 +100,8 @@ fn pictures_are_drawn_once_whatever_stops_the_run() {
 
     // It is the depth that the camera sees.
     let step = recording.steps().unwrap().nth(5).unwrap().unwrap();
-    let mut scene = Scene::of(&recording.spec).unwrap();
-    let camera = scene.camera(View::Egocentric(0), &step, Some(SIZE));
+    let mut scene = EpisodeRenderer::of(&recording.spec).unwrap();
+    let camera = scene.camera(EpisodeCamera::Egocentric(0), &step, Some(SIZE));
     let seen = scene.draw(&step, &camera);
     for (mm, depth_m) in depth_mm.pixels().zip(&seen.depth_m) {
         let expected_m = if depth_m.is_finite() { *depth_m } else { 0.0 };

@@ -1,7 +1,7 @@
 //! What replies say of hands and of the way of the base, and what hands feel while an expert works.
 
 use crate::common::*;
-use tandem_episodes::players::{self, Backstage, Caller, PlayerError};
+use tandem_episodes::players::{self, Episode, PlayerError, PrivilegedEpisode};
 use tandem_episodes::{A, B, Facts, Session};
 use tandem_sim::{Pose, Side, Sides, Vector};
 use tandem_tools_spec::{
@@ -95,7 +95,7 @@ struct Lifting {
     told: Vec<HandReport>,
 }
 
-impl Caller for Lifting {
+impl Episode for Lifting {
     fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {
         let reply = self.session.call(call).map_err(|_| PlayerError::EpisodeOver)?;
         let facts = self.session.facts();
@@ -112,7 +112,7 @@ impl Caller for Lifting {
     }
 }
 
-impl Backstage for Lifting {
+impl PrivilegedEpisode for Lifting {
     fn facts(&mut self) -> Result<Facts, PlayerError> {
         Ok(self.session.facts())
     }

@@ -8,13 +8,13 @@ use std::time::Duration;
 use crate::common::*;
 use crate::recordings::interrupted;
 use tandem_episodes::players::{self, InProcess, PlayerError};
-use tandem_episodes::replay::{Outcome, Verified, verify};
+use tandem_episodes::replay::{Verdict, Verification, verify};
 use tandem_episodes::{
     Clock, EpisodeSpec, Phase, PhaseStart, Recorder, Recording, Session, Start, recover, tasks,
 };
 use tandem_tools_spec::{EndReason, Finish, GetStatus, Observe, Protocol, Wait};
 
-fn verified(path: &Path) -> Verified {
+fn verified(path: &Path) -> Verification {
     verify(&Recording::read(path).unwrap()).unwrap()
 }
 
@@ -37,7 +37,7 @@ fn every_task_is_verified_and_goes_on_where_each_phase_begins() {
         let Some(recording) = demonstration(task.id, folder.path()) else { continue };
         let found = verified(&recording);
         let steps = Recording::read(&recording).unwrap().state_hashes().unwrap().count();
-        assert_eq!((found.outcome, found.steps), (Outcome::Same, steps), "{}", task.id);
+        assert_eq!((found.outcome, found.steps), (Verdict::Same, steps), "{}", task.id);
         assert_eq!((found.unanswered_steps, found.other_build), (0, None), "{}", task.id);
 
         // What the robots were told from there on, told again, ends as it did.
@@ -95,7 +95,7 @@ fn the_clock_is_charged_again_as_it_was() {
         let calls = recording.tool_calls().unwrap();
         assert_eq!(calls[1].thought, Duration::from_secs(1), "{thinking_s}");
         let found = verify(&recording).unwrap();
-        assert_eq!((found.outcome, found.steps), (Outcome::Same, steps as usize + 1));
+        assert_eq!((found.outcome, found.steps), (Verdict::Same, steps as usize + 1));
     }
 }
 
@@ -130,10 +130,10 @@ fn a_changed_number_is_found_at_its_step() {
     command(&mut session, squat(0.70));
     session.close();
     let path = folder.path().join(Recorder::FILE_NAME);
-    assert_eq!(verified(&path).outcome, Outcome::Same);
+    assert_eq!(verified(&path).outcome, Verdict::Same);
     let check = |from: &str, to: &str, step: u64, number: usize, tool: &str| {
         let copy = changed(&path, |text| text.replace(from, to));
-        let Outcome::State(found) = verified(&copy).outcome else { panic!("{from} -> {to} is not found") };
+        let Verdict::State(found) = verified(&copy).outcome else { panic!("{from} -> {to} is not found") };
         assert_eq!((found.control_step, found.call), (step, Some((number, tool.into()))), "{from} -> {to}");
     };
     // A wrist that goes elsewhere is seen in the command's first step; so is a height.
@@ -150,7 +150,7 @@ fn an_interrupted_recording_is_verified_as_far_as_it_goes() {
     let folder = tempfile::tempdir().unwrap();
     let partial = interrupted(folder.path(), 2);
     let found = verified(&recover(&partial).unwrap().path);
-    assert_eq!((found.outcome, found.steps, found.calls), (Outcome::Same, 11, 2));
+    assert_eq!((found.outcome, found.steps, found.calls), (Verdict::Same, 11, 2));
 }
 
 #[test]
@@ -178,7 +178,7 @@ fn a_start_at_a_phase_is_recorded_and_verified_without_the_demonstration() {
 
     std::fs::remove_file(&recording).unwrap();
     let found = verified(&again.join(Recorder::FILE_NAME));
-    assert_eq!((found.outcome, found.steps), (Outcome::Same, 21));
+    assert_eq!((found.outcome, found.steps), (Verdict::Same, 21));
     let text = refused(begin("p2"), 3);
     assert!(text.contains("cannot read the recording"), "{text}");
 }

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use tandem_episodes::replay::{Outcome, verify};
+use tandem_episodes::replay::{Verdict, verify};
 use tandem_episodes::{EpisodeSpec, Recording, SceneFile, Session, players};
 use tandem_tools_spec::Protocol;
 
@@ -57,7 +57,7 @@ fn a_recording_is_replayed_in_the_scene_as_it_was() {
     session.close();
     let recording = Recording::read(&folder.path().join("run/episode.mcap")).unwrap();
     assert_eq!(recording.spec, spec);
-    assert_eq!(verify(&recording).unwrap().outcome, Outcome::Same);
+    assert_eq!(verify(&recording).unwrap().outcome, Verdict::Same);
 
     replace(&folder.path().join("meshes/island_convex_piece_000.obj"), "0.8", "0.81");
     let text = verify(&recording).unwrap_err().to_string();

@@ -11,7 +11,7 @@ use std::{
 use indicatif::{ProgressBar, ProgressStyle};
 use tandem_episodes::{
     EpisodeSpec, Facts,
-    players::{self, Backstage, Caller, PlayerError},
+    players::{self, Episode, PlayerError, PrivilegedEpisode},
     tasks::{self, Task},
 };
 use tandem_tools_spec::{CommandReply, Protocol, ResultReply, StartEpisode, ToolCall, ToolReply};
@@ -132,7 +132,7 @@ struct OverHttp {
     progress: Progress,
 }
 
-impl Caller for OverHttp {
+impl Episode for OverHttp {
     fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {
         let reply = self.http.call(call)?;
         if let ToolReply::Act(reply) = &reply {
@@ -142,7 +142,7 @@ impl Caller for OverHttp {
     }
 }
 
-impl Backstage for OverHttp {
+impl PrivilegedEpisode for OverHttp {
     fn facts(&mut self) -> Result<Facts, PlayerError> {
         self.thread
             .facts_blocking()

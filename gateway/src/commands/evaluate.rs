@@ -10,7 +10,7 @@ use std::{
 use indicatif::{ProgressBar, ProgressStyle};
 use tandem_episodes::{
     Phase,
-    evaluation::{self, Evaluation, Plan, Shard, Starts},
+    evaluation::{self, Evaluation, EvaluationPlan, Shard, Starts},
     results::PhaseLevel,
     statistics::{Count, clopper_pearson},
     tasks,
@@ -98,7 +98,7 @@ pub fn run(args: EvaluateArgs) -> CommandResult {
     };
     let ShardFlag(shard) = args.shard;
     let policy = args.policy.policy()?;
-    let plan = Plan { starts, shard, ..args.episodes.plan(&*policy, args.record)? };
+    let plan = EvaluationPlan { starts, shard, ..args.episodes.plan(&*policy, args.record)? };
     Ok(match play_and_print(&plan, &args.out)? {
         0 if !plan.episodes().0.is_empty() => ExitCode::FAILURE,
         _ => ExitCode::SUCCESS,
@@ -106,7 +106,7 @@ pub fn run(args: EvaluateArgs) -> CommandResult {
 }
 
 /// Plays `plan` into `folder`, with a progress bar, prints a table, and says how many episodes were played.
-pub fn play_and_print(plan: &Plan, folder: &Path) -> Result<usize, Box<dyn Error>> {
+pub fn play_and_print(plan: &EvaluationPlan, folder: &Path) -> Result<usize, Box<dyn Error>> {
     let bar = ProgressBar::new(plan.episodes().0.len() as u64);
     bar.set_style(ProgressStyle::with_template("  [{bar:30}] {pos} of {len} episodes, {elapsed}, {msg}")?);
     let evaluation = evaluation::evaluate(plan, folder, &|played| {

@@ -7,7 +7,8 @@ use std::str::FromStr;
 use indicatif::{ProgressBar, ProgressStyle};
 use tandem_episodes::Recording;
 use tandem_episodes::replay::{
-    Difference, Drawn, Outcome as Comparison, PicturesPlan, Size, Verified, View, draw_all, film, verify,
+    Difference, DrawnPictures, EpisodeCamera, PictureSize, PicturesPlan, Verdict, Verification, draw_all,
+    film, verify,
 };
 
 use super::CommandResult;
@@ -36,7 +37,7 @@ pub struct ReplayArgs {
     rate: u32,
     /// Size of the pictures, as 640x480 [default: the camera's own].
     #[arg(long, value_name = "WIDTHxHEIGHT")]
-    size: Option<PictureSize>,
+    size: Option<SizeFlag>,
     /// Threads that draw.
     #[arg(long, default_value_t = 1, value_name = "N")]
     jobs: usize,
@@ -44,12 +45,12 @@ pub struct ReplayArgs {
 
 /// A size on the command line.
 #[derive(Clone, Copy, Debug)]
-struct PictureSize(Size);
+struct SizeFlag(PictureSize);
 
-impl FromStr for PictureSize {
+impl FromStr for SizeFlag {
     type Err = String;
 
-    fn from_str(text: &str) -> Result<PictureSize, String> {
+    fn from_str(text: &str) -> Result<SizeFlag, String> {
         const SIDES_PX: std::ops::RangeInclusive<u32> = 16..=3840;
         let side = |text: &str| text.parse().ok().filter(|side| SIDES_PX.contains(side));
         let sides = text.split_once('x').and_then(|(width, height)| Some((side(width)?, side(height)?)));
@@ -58,7 +59,7 @@ impl FromStr for PictureSize {
             SIDES_PX.start(),
             SIDES_PX.end()
         ))?;
-        Ok(PictureSize(Size { width, height }))
+        Ok(SizeFlag(PictureSize { width, height }))
     }
 }
 
@@ -74,9 +75,9 @@ pub fn run(args: ReplayArgs) -> CommandResult {
         if args.verify {
             all_same &= print_verified(&verify(&recording)?);
         }
-        let size = args.size.map(|PictureSize(size)| size);
+        let size = args.size.map(|SizeFlag(size)| size);
         if let Some(video) = &args.video {
-            let view = View::find(&args.camera, recording.spec.task)?;
+            let view = EpisodeCamera::find(&args.camera, recording.spec.task)?;
             let pictures = film(&recording, view, size, args.rate, video)?;
             println!("  {}: {pictures} pictures, {} a second", video.display(), args.rate);
         }
@@ -108,15 +109,15 @@ fn describe(recording: &Recording) {
 }
 
 /// Says how the recording compares; whether it is the same.
-fn print_verified(verified: &Verified) -> bool {
+fn print_verified(verified: &Verification) -> bool {
     if let Some(build) = &verified.other_build {
         println!(
             "  warning: {build} recorded it, and builds may differ in their physics; a difference may be theirs"
         );
     }
-    let Verified { steps, calls, unanswered_steps, .. } = verified;
+    let Verification { steps, calls, unanswered_steps, .. } = verified;
     match &verified.outcome {
-        Comparison::Same => {
+        Verdict::Same => {
             println!("  verified: {steps} states over {calls} calls, result and phases are as recorded");
             if *unanswered_steps > 0 {
                 println!(
@@ -125,7 +126,7 @@ fn print_verified(verified: &Verified) -> bool {
             }
             true
         }
-        Comparison::State(Difference { control_step, recorded, again, call }) => {
+        Verdict::State(Difference { control_step, recorded, again, call }) => {
             let hash = |hash: &Option<String>| hash.clone().unwrap_or("no such step".into());
             let by = match call {
                 Some((number, tool)) => format!("in call {number}, {tool}"),
@@ -136,7 +137,7 @@ fn print_verified(verified: &Verified) -> bool {
             println!("  {steps} states before it are as recorded");
             false
         }
-        Comparison::Result { what, recorded, again } => {
+        Verdict::Result { what, recorded, again } => {
             println!(
                 "  DIFFERS: {what}: recorded {recorded}, again {again}; all {steps} states are as recorded"
             );
@@ -161,7 +162,7 @@ fn render(
 ) -> Result<(), Box<dyn std::error::Error>> {
     let bar = ProgressBar::no_length();
     bar.set_style(ProgressStyle::with_template("  {pos} moments, {elapsed}")?);
-    let Drawn { moments, kept, cameras } = draw_all(recording, plan, folder, &|| bar.inc(1))?;
+    let DrawnPictures { moments, kept, cameras } = draw_all(recording, plan, folder, &|| bar.inc(1))?;
     bar.finish_and_clear();
     println!("  {}: {moments} moments of {cameras} cameras, {kept} of them kept", folder.display());
     Ok(())

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use tandem_episodes::reports::{Assessment, Format, gallery, load};
+use tandem_episodes::reports::{EvaluationReport, ReportFormat, gallery, load};
 use tandem_episodes::write_whole;
 
 use super::CommandResult;
@@ -16,8 +16,8 @@ pub struct ReportArgs {
     #[arg(value_name = "DIR", required = true)]
     folders: Vec<PathBuf>,
     /// What to write: a page that needs nothing else, Markdown, a line for each rate, all figures, or tables for LaTeX.
-    #[arg(long, default_value = Format::Html.name(), value_parser = one_of(Format::ALL, Format::name))]
-    format: Format,
+    #[arg(long, default_value = ReportFormat::Html.name(), value_parser = one_of(ReportFormat::ALL, ReportFormat::name))]
+    format: ReportFormat,
     /// File to write [default: report.FORMAT in the first folder].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -29,12 +29,12 @@ pub struct ReportArgs {
 /// Counts and writes.
 pub fn run(args: ReportArgs) -> CommandResult {
     let loaded = load(&args.folders)?;
-    let assessment = Assessment::of(&loaded);
+    let report = EvaluationReport::of(&loaded);
     let failures = match args.format {
-        Format::Html => gallery(&loaded, args.failures),
-        Format::Markdown | Format::Csv | Format::Json | Format::Tex => Vec::new(),
+        ReportFormat::Html => gallery(&loaded, args.failures),
+        ReportFormat::Markdown | ReportFormat::Csv | ReportFormat::Json | ReportFormat::Tex => Vec::new(),
     };
-    let text = assessment.write(args.format, &failures)?;
+    let text = report.write(args.format, &failures)?;
     let default = args.folders.first().map(|folder| folder.join(format!("report.{}", args.format.name())));
     let path = args.out.or(default).unwrap_or_else(|| "report.html".into());
     write_whole(&path, text.as_bytes())?;

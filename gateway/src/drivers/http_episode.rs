@@ -4,7 +4,7 @@ use std::{net::SocketAddr, time::Duration};
 
 use serde::Serialize;
 use serde_json::Value;
-use tandem_episodes::players::{Caller, PlayerError};
+use tandem_episodes::players::{Episode, PlayerError};
 use tandem_tools_spec::{Driving, ProblemBody, ResultReply, StartEpisode, StartReply, ToolCall, ToolReply};
 use ureq::{Agent, http::Response};
 
@@ -74,7 +74,7 @@ impl HttpEpisode {
     }
 }
 
-impl Caller for HttpEpisode {
+impl Episode for HttpEpisode {
     fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {
         let url = format!("{}/tools/{}", self.url, call.name());
         let answer = post(&self.agent, &url, &call).and_then(|reply| Ok(call.parse_reply(reply)?));

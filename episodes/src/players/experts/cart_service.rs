@@ -6,8 +6,8 @@ use std::f32::consts::FRAC_PI_2;
 use tandem_sim::{Pose, Side, Vector};
 
 use super::skills::{
-    BarGrasp, CylinderGrasp, Part, Stage, Team, Way, Within, at_once, come_near, let_go, pick_up_all, place,
-    take_softly, walk_to,
+    BarGrasp, CarryTeam, Commander, CylinderGrasp, ParallelScript, Tolerance, WalkGoal, come_near,
+    grasp_compliantly, in_parallel, let_go, pick_up_all, place, walk_to,
 };
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
@@ -27,43 +27,43 @@ const LIFT_M: f32 = 0.16;
 /// Away from the trolley before B turns.
 const BACK_M: f32 = 0.30;
 const OVER_PATCH_M: f32 = 0.10;
-const AT_HAND: Within = Within { off_m: 0.03, off_rad: 0.05 };
+const AT_HAND: Tolerance = Tolerance { off_m: 0.03, off_rad: 0.05 };
 /// On the way back B already turns.
-const ON_THE_WAY: Within = Within { off_m: 0.10, off_rad: 0.8 };
+const ON_THE_WAY: Tolerance = Tolerance { off_m: 0.10, off_rad: 0.8 };
 /// A bottle that is let go of falls so far.
 const DROP_M: f32 = 0.003;
 
-pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
-    let trolley = Part { robots: &[A], script: Box::new(park) };
-    let bottle = Part { robots: &[B], script: Box::new(serve) };
-    at_once(stage, vec![trolley, bottle])
+pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
+    let trolley = ParallelScript { robots: &[A], script: Box::new(park) };
+    let bottle = ParallelScript { robots: &[B], script: Box::new(serve) };
+    in_parallel(commander, vec![trolley, bottle])
 }
 
 /// A pushes the trolley to the mark and leaves it there.
-fn park(stage: &mut Stage) -> Result<(), PlayerError> {
+fn park(commander: &mut Commander) -> Result<(), PlayerError> {
     let grasps = BarGrasp::from_above(A, "service_trolley", ["left", "right"], -FRAC_PI_2);
-    let mut team = Team::new(stage, &grasps)?;
-    team.gather(stage)?;
-    take_softly(stage, &grasps)?;
-    team.measure(stage)?;
-    let mark = stage.facts()?.object("parking_mark").pose_in_world;
-    team.carry_to(stage, &mark, PUSH_M_S)?;
+    let mut team = CarryTeam::new(commander, &grasps)?;
+    team.gather(commander)?;
+    grasp_compliantly(commander, &grasps)?;
+    team.measure(commander)?;
+    let mark = commander.facts()?.object("parking_mark").pose_in_world;
+    team.carry_to(commander, &mark, PUSH_M_S)?;
     // What is let go of while it rolls rolls on.
     for _ in 0..MOST_STOPPING_BEATS {
-        if stage.facts()?.speed_m_s("service_trolley") < STANDS_M_S {
+        if commander.facts()?.speed_m_s("service_trolley") < STANDS_M_S {
             break;
         }
-        stage.hold(A)?;
+        commander.hold(A)?;
     }
-    let_go(stage, &grasps)
+    let_go(commander, &grasps)
 }
 
 /// B walks to where it will find the bottle, and serves it once the trolley stands.
-fn serve(stage: &mut Stage) -> Result<(), PlayerError> {
-    let facts = stage.facts()?;
+fn serve(commander: &mut Commander) -> Result<(), PlayerError> {
+    let facts = commander.facts()?;
     let ring_m = facts.position_m("parking_mark") + facts.site("service_trolley", "ring").position_m();
-    go(stage, at_hand(ring_m, FRAC_PI_2), WALK_M_S)?;
-    await_trolley(stage)?;
+    go(commander, at_hand(ring_m, FRAC_PI_2), WALK_M_S)?;
+    await_trolley(commander)?;
     let bottle = |heading_rad: f32| CylinderGrasp {
         robot: B,
         side: Side::Right,
@@ -72,38 +72,38 @@ fn serve(stage: &mut Stage) -> Result<(), PlayerError> {
         heading_rad,
     };
     let grasp = bottle(FRAC_PI_2);
-    let before = at_hand(stage.facts()?.position_m("bottle"), FRAC_PI_2);
-    come_near(stage, &[Way { robot: B, to: before, pace_m_s: WALK_M_S }], AT_HAND)?;
-    pick_up_all(stage, &[grasp])?;
-    let standing_m = stage.facts()?.position_m("bottle");
-    let lift = grasp.carry(stage, standing_m + Vector::Z * LIFT_M)?;
-    stage.perform(1.0, &[lift])?;
+    let before = at_hand(commander.facts()?.position_m("bottle"), FRAC_PI_2);
+    come_near(commander, &[WalkGoal { robot: B, to: before, pace_m_s: WALK_M_S }], AT_HAND)?;
+    pick_up_all(commander, &[grasp])?;
+    let standing_m = commander.facts()?.position_m("bottle");
+    let lift = grasp.carry(commander, standing_m + Vector::Z * LIFT_M)?;
+    commander.perform(1.0, &[lift])?;
 
     let back = at_hand(standing_m - Vector::Y * BACK_M, FRAC_PI_2);
-    come_near(stage, &[Way { robot: B, to: back, pace_m_s: CARRY_M_S }], ON_THE_WAY)?;
-    let patch_m = stage.facts()?.position_m("serving_patch");
-    come_near(stage, &[Way { robot: B, to: at_hand(patch_m, 0.0), pace_m_s: CARRY_M_S }], AT_HAND)?;
+    come_near(commander, &[WalkGoal { robot: B, to: back, pace_m_s: CARRY_M_S }], ON_THE_WAY)?;
+    let patch_m = commander.facts()?.position_m("serving_patch");
+    come_near(commander, &[WalkGoal { robot: B, to: at_hand(patch_m, 0.0), pace_m_s: CARRY_M_S }], AT_HAND)?;
     let grasp = bottle(0.0);
     for (height_m, duration_s) in [(OVER_PATCH_M, 1.2), (DROP_M, 1.0)] {
-        let over = grasp.carry(stage, patch_m + Vector::Z * height_m)?;
-        stage.perform(duration_s, &[over])?;
+        let over = grasp.carry(commander, patch_m + Vector::Z * height_m)?;
+        commander.perform(duration_s, &[over])?;
     }
-    stage.perform(0.6, &[grasp.open()])?;
-    let away = grasp.away(stage)?;
-    stage.perform(0.8, &[away])?;
-    stage.perform(1.0, &[grasp.open()])
+    commander.perform(0.6, &[grasp.open()])?;
+    let away = grasp.away(commander)?;
+    commander.perform(0.8, &[away])?;
+    commander.perform(1.0, &[grasp.open()])
 }
 
 /// B waits until the trolley has come to the mark and stands.
-fn await_trolley(stage: &mut Stage) -> Result<(), PlayerError> {
+fn await_trolley(commander: &mut Commander) -> Result<(), PlayerError> {
     let mut came = false;
     loop {
-        let facts = stage.facts()?;
+        let facts = commander.facts()?;
         came |= facts.apart_m("service_trolley", "parking_mark") < CAME_M;
         if came && facts.speed_m_s("service_trolley") < STANDS_M_S {
             return Ok(());
         }
-        stage.hold(B)?;
+        commander.hold(B)?;
     }
 }
 
@@ -113,6 +113,6 @@ fn at_hand(point_m: Vector, heading_rad: f32) -> Pose {
     place(point_m - facing * AT_HAND_M, heading_rad)
 }
 
-fn go(stage: &mut Stage, to: Pose, pace_m_s: f32) -> Result<(), PlayerError> {
-    walk_to(stage, &[Way { robot: B, to, pace_m_s }])
+fn go(commander: &mut Commander, to: Pose, pace_m_s: f32) -> Result<(), PlayerError> {
+    walk_to(commander, &[WalkGoal { robot: B, to, pace_m_s }])
 }

@@ -2,23 +2,23 @@
 
 use std::f32::consts::PI;
 
-use super::skills::{BarGrasp, Stage, Team, let_go, take_softly};
+use super::skills::{BarGrasp, CarryTeam, Commander, grasp_compliantly, let_go};
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
 const LIFT_M: f32 = 0.09;
 const PACE_M_S: f32 = 0.2;
 
-pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
+pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     let [a_left, a_right] = BarGrasp::from_above(A, "basket", ["a_left", "a_right"], 0.0);
     let [b_left, b_right] = BarGrasp::from_above(B, "basket", ["b_left", "b_right"], PI);
     let grasps = [a_left, a_right, b_left, b_right];
-    let mut team = Team::new(stage, &grasps)?;
-    team.gather(stage)?;
-    take_softly(stage, &grasps)?;
-    team.lift(stage, LIFT_M)?;
-    let patch = stage.facts()?.object("basket_patch").pose_in_world;
-    team.carry_to(stage, &patch, PACE_M_S)?;
-    team.set_down(stage, &patch)?;
-    let_go(stage, &grasps)
+    let mut team = CarryTeam::new(commander, &grasps)?;
+    team.gather(commander)?;
+    grasp_compliantly(commander, &grasps)?;
+    team.lift(commander, LIFT_M)?;
+    let patch = commander.facts()?.object("basket_patch").pose_in_world;
+    team.carry_to(commander, &patch, PACE_M_S)?;
+    team.set_down(commander, &patch)?;
+    let_go(commander, &grasps)
 }

@@ -4,7 +4,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 use tandem_sim::{Pose, Rotation, Side, Vector};
 
-use super::skills::{BarGrasp, Stage, move_together, take_together};
+use super::skills::{BarGrasp, Commander, move_together, take_together};
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
@@ -18,7 +18,7 @@ const LIFT_M: f32 = 0.12;
 const OVER_CRATE_M: f32 = 0.18;
 const TIP_RAD: f32 = 1.25;
 
-pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
+pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     let palm_down = |heading_rad: f32, roll_rad: f32| {
         Rotation::from_rotation_z(heading_rad) * Rotation::from_rotation_x(roll_rad)
     };
@@ -35,8 +35,8 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
         grasp(A, Side::Left, "bar_a", palm_down(0.0, FRAC_PI_2)),
         grasp(B, Side::Right, "bar_b", palm_down(PI, -FRAC_PI_2)),
     ];
-    take_together(stage, &grasps)?;
-    let facts = stage.facts()?;
+    take_together(commander, &grasps)?;
+    let facts = commander.facts()?;
     let start = facts.object("tub").pose_in_world;
     // The bars are the axis: hands turn, and move little.
     let bars = Vector::new(0.0, 0.0, facts.site("tub", "bar_a").position_m().z);
@@ -46,8 +46,8 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
         let axis_m = start.translation + bars + Vector::new(along_m * over, OVER_CRATE_M * over, lift_m);
         Pose::from_parts(axis_m - rotation * bars, rotation)
     };
-    move_together(stage, &grasps, &|part| tub_at(LIFT_M * part, 0.0, 0.0), 5, 0.3)?;
-    move_together(stage, &grasps, &|part| tub_at(LIFT_M, part, 0.5 * part), 6, 0.3)?;
-    move_together(stage, &grasps, &|part| tub_at(LIFT_M, 1.0, 0.5 + (TIP_RAD - 0.5) * part), 8, 0.3)?;
-    move_together(stage, &grasps, &|_| tub_at(LIFT_M, 1.0, TIP_RAD), 8, 0.4)
+    move_together(commander, &grasps, &|part| tub_at(LIFT_M * part, 0.0, 0.0), 5, 0.3)?;
+    move_together(commander, &grasps, &|part| tub_at(LIFT_M, part, 0.5 * part), 6, 0.3)?;
+    move_together(commander, &grasps, &|part| tub_at(LIFT_M, 1.0, 0.5 + (TIP_RAD - 0.5) * part), 8, 0.3)?;
+    move_together(commander, &grasps, &|_| tub_at(LIFT_M, 1.0, TIP_RAD), 8, 0.4)
 }

@@ -4,7 +4,7 @@ use std::f32::consts::FRAC_PI_2;
 
 use tandem_sim::{Pose, Rotation, Side, Vector};
 
-use super::skills::{BarGrasp, HandMove, Stage, move_together, take_together};
+use super::skills::{BarGrasp, Commander, HandMove, move_together, take_together};
 use crate::players::PlayerError;
 use crate::scoring::{A, B, Facts};
 
@@ -26,7 +26,7 @@ const OUTWARDS_M: f32 = 0.13;
 const BACK_M: f32 = 0.14;
 
 /// A frame that both hold already is not taken again; one whose loop is over the peg is only let down.
-pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
+pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     let grasp = |robot, side, bar| BarGrasp {
         robot,
         side,
@@ -38,40 +38,40 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
     };
     let grasps = [grasp(A, Side::Left, "left_side"), grasp(B, Side::Right, "right_side")];
     let held = |facts: &Facts| [A, B].iter().all(|robot| facts.holds_any(*robot, "frame"));
-    if !held(&stage.facts()?) {
-        take_together(stage, &grasps)?;
+    if !held(&commander.facts()?) {
+        take_together(commander, &grasps)?;
     }
-    let facts = stage.facts()?;
+    let facts = commander.facts()?;
     let start = facts.object("frame").pose_in_world;
     let tip_m = facts.site_m("wall_peg", "tip");
     let upright = |loop_m: Vector| Pose::from_translation(loop_m - facts.site("frame", "loop").position_m());
     let before = upright(tip_m + BEFORE_M);
     let raised_m = Vector::new(start.translation.x, start.translation.y, before.translation.z);
     let raised = Pose::from_translation(raised_m);
-    let go = |stage: &mut Stage, from: Pose, to: Pose, count: u32| {
-        move_together(stage, &grasps, &|part| from.lerp(&to, part), count, LEG_S)
+    let go = |commander: &mut Commander, from: Pose, to: Pose, count: u32| {
+        move_together(commander, &grasps, &|part| from.lerp(&to, part), count, LEG_S)
     };
     let (past, resting) = (upright(tip_m + PAST_M), upright(tip_m + RESTING_M));
     if is_straight_on_peg(&facts) {
-        go(stage, start, resting, 4)?;
-        return let_go(stage, &grasps);
+        go(commander, start, resting, 4)?;
+        return let_go(commander, &grasps);
     }
-    go(stage, start, raised, 8)?;
-    go(stage, raised, before, 5)?;
+    go(commander, start, raised, 8)?;
+    go(commander, raised, before, 5)?;
     for _ in 0..TRIES {
-        go(stage, before, past, 6)?;
-        if is_straight_on_peg(&stage.facts()?) {
-            go(stage, past, resting, 4)?;
-            if is_straight_on_peg(&stage.facts()?) {
-                return let_go(stage, &grasps);
+        go(commander, before, past, 6)?;
+        if is_straight_on_peg(&commander.facts()?) {
+            go(commander, past, resting, 4)?;
+            if is_straight_on_peg(&commander.facts()?) {
+                return let_go(commander, &grasps);
             }
         }
         // Off again the way it came, and once more with the grips as they are now.
-        let missed = stage.facts()?.object("frame").pose_in_world;
+        let missed = commander.facts()?.object("frame").pose_in_world;
         let above_m = Vector::new(missed.translation.x, missed.translation.y, past.translation.z);
         let above = Pose::from_translation(above_m);
-        go(stage, missed, above, 4)?;
-        go(stage, above, before, 6)?;
+        go(commander, missed, above, 4)?;
+        go(commander, above, before, 6)?;
     }
     Err(PlayerError::GaveUp("the frame does not hang straight on the peg".into()))
 }
@@ -81,14 +81,14 @@ fn is_straight_on_peg(facts: &Facts) -> bool {
     facts.threads("wall_peg", ["root", "tip"], "frame", "loop") && facts.tilt_rad("frame") < ASKEW_RAD
 }
 
-fn let_go(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
+fn let_go(commander: &mut Commander, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
     let loose = |grasp: &BarGrasp| BarGrasp { closure: LOOSE, ..*grasp }.close();
     let loosen: Vec<HandMove> = grasps.iter().map(loose).collect();
-    stage.perform(0.5, &loosen)?;
+    commander.perform(0.5, &loosen)?;
     for step_m in [Vector::new(OUTWARDS_M, 0.0, 0.0), Vector::new(0.0, -BACK_M, 0.0)] {
         let mut moves = Vec::with_capacity(grasps.len());
         for grasp in grasps {
-            let wrist = stage.world_from_wrist(grasp.robot, grasp.side)?;
+            let wrist = commander.world_from_wrist(grasp.robot, grasp.side)?;
             let outwards = -grasp.side.sign();
             let by_m = Vector::new(step_m.x * outwards, step_m.y, step_m.z);
             moves.push(HandMove::reach(
@@ -97,8 +97,8 @@ fn let_go(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
                 Pose::from_parts(wrist.translation + by_m, wrist.rotation),
             ));
         }
-        stage.perform(0.9, &moves)?;
+        commander.perform(0.9, &moves)?;
     }
     // It still swings a little.
-    stage.perform(3.0, &grasps.iter().map(BarGrasp::open).collect::<Vec<_>>())
+    commander.perform(3.0, &grasps.iter().map(BarGrasp::open).collect::<Vec<_>>())
 }

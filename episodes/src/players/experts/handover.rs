@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use tandem_sim::{Side, Vector};
 
-use super::skills::{CylinderGrasp, Stage, pick_up_all};
+use super::skills::{Commander, CylinderGrasp, pick_up_all};
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
@@ -22,63 +22,63 @@ const ABOVE_PAD_M: Vector = Vector::new(0.0, 0.0, 0.05);
 const ATTEMPTS: usize = 4;
 
 /// Whoever has the bottle already has done what comes before.
-pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
-    if !TAKER.holds(stage)? {
-        if !GIVER.holds(stage)? {
-            pick_up(stage)?;
+pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
+    if !TAKER.holds(commander)? {
+        if !GIVER.holds(commander)? {
+            pick_up(commander)?;
         }
-        let bring = GIVER.carry(stage, MEETING_M)?;
-        stage.perform(1.0, &[bring])?;
-        hand_over(stage)?;
-    } else if GIVER.holds(stage)? {
-        release(stage, &GIVER)?;
+        let bring = GIVER.carry(commander, MEETING_M)?;
+        commander.perform(1.0, &[bring])?;
+        hand_over(commander)?;
+    } else if GIVER.holds(commander)? {
+        release(commander, &GIVER)?;
     }
-    put_down(stage)
+    put_down(commander)
 }
 
-fn pick_up(stage: &mut Stage) -> Result<(), PlayerError> {
+fn pick_up(commander: &mut Commander) -> Result<(), PlayerError> {
     for _ in 0..ATTEMPTS {
-        pick_up_all(stage, &[GIVER])?;
-        let resting_m = stage.facts()?.position_m(GIVER.object);
-        let lift = GIVER.carry(stage, resting_m + LIFT_M)?;
-        stage.perform(1.0, &[lift])?;
-        if GIVER.holds(stage)? {
+        pick_up_all(commander, &[GIVER])?;
+        let resting_m = commander.facts()?.position_m(GIVER.object);
+        let lift = GIVER.carry(commander, resting_m + LIFT_M)?;
+        commander.perform(1.0, &[lift])?;
+        if GIVER.holds(commander)? {
             return Ok(());
         }
-        release(stage, &GIVER)?;
+        release(commander, &GIVER)?;
     }
     Err(PlayerError::GaveUp("A lost the bottle".into()))
 }
 
-fn hand_over(stage: &mut Stage) -> Result<(), PlayerError> {
+fn hand_over(commander: &mut Commander) -> Result<(), PlayerError> {
     for _ in 0..ATTEMPTS {
-        let beside = TAKER.beside(stage, 0.0)?;
-        stage.perform(1.2, &[beside])?;
-        let around = TAKER.around(stage)?;
-        stage.perform(0.8, &[around])?;
-        stage.perform(0.8, &[TAKER.close()])?;
-        stage.perform(0.2, &[TAKER.close()])?;
-        if TAKER.holds(stage)? {
-            return release(stage, &GIVER);
+        let beside = TAKER.beside(commander, 0.0)?;
+        commander.perform(1.2, &[beside])?;
+        let around = TAKER.around(commander)?;
+        commander.perform(0.8, &[around])?;
+        commander.perform(0.8, &[TAKER.close()])?;
+        commander.perform(0.2, &[TAKER.close()])?;
+        if TAKER.holds(commander)? {
+            return release(commander, &GIVER);
         }
-        release(stage, &TAKER)?;
+        release(commander, &TAKER)?;
     }
     Err(PlayerError::GaveUp("B could not take the bottle".into()))
 }
 
-fn put_down(stage: &mut Stage) -> Result<(), PlayerError> {
-    let pad_m = stage.facts()?.position_m("target_pad");
-    let over = TAKER.carry(stage, pad_m + ABOVE_PAD_M)?;
-    stage.perform(1.0, &[over])?;
-    let down = TAKER.carry(stage, pad_m)?;
-    stage.perform(0.8, &[down])?;
-    release(stage, &TAKER)?;
+fn put_down(commander: &mut Commander) -> Result<(), PlayerError> {
+    let pad_m = commander.facts()?.position_m("target_pad");
+    let over = TAKER.carry(commander, pad_m + ABOVE_PAD_M)?;
+    commander.perform(1.0, &[over])?;
+    let down = TAKER.carry(commander, pad_m)?;
+    commander.perform(0.8, &[down])?;
+    release(commander, &TAKER)?;
     // The bottle has to have stood released for a moment.
-    stage.perform(1.0, &[TAKER.open()])
+    commander.perform(1.0, &[TAKER.open()])
 }
 
-fn release(stage: &mut Stage, grasp: &CylinderGrasp) -> Result<(), PlayerError> {
-    stage.perform(0.5, &[grasp.open()])?;
-    let away = grasp.away(stage)?;
-    stage.perform(0.6, &[away])
+fn release(commander: &mut Commander, grasp: &CylinderGrasp) -> Result<(), PlayerError> {
+    commander.perform(0.5, &[grasp.open()])?;
+    let away = grasp.away(commander)?;
+    commander.perform(0.6, &[away])
 }

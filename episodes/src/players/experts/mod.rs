@@ -17,14 +17,14 @@ pub(crate) mod skills;
 mod table_align;
 mod trash_collection;
 
-use super::{Backstage, Insider, PlayerError};
+use super::{PlayerError, PrivilegedEpisode, PrivilegedPlayer};
 use crate::tasks::{self, Task};
-use skills::Stage;
+use skills::Commander;
 
 /// Performs a task to its end.
-type Script = fn(&mut Stage) -> Result<(), PlayerError>;
+type ExpertScript = fn(&mut Commander) -> Result<(), PlayerError>;
 
-const ALL: &[(&str, Script)] = &[
+const ALL: &[(&str, ExpertScript)] = &[
     ("handover", handover::perform),
     ("pouring", pouring::perform),
     ("frame_hang", frame_hang::perform),
@@ -45,7 +45,7 @@ pub fn solved() -> impl Iterator<Item = &'static Task> {
 /// The script of one task.
 pub struct Expert {
     task: &'static Task,
-    script: Script,
+    script: ExpertScript,
 }
 
 impl Expert {
@@ -61,8 +61,8 @@ impl Expert {
     }
 }
 
-impl Insider for Expert {
-    fn play(&mut self, episode: &mut dyn Backstage) -> Result<(), PlayerError> {
-        (self.script)(&mut Stage::new(self.task, episode)?)
+impl PrivilegedPlayer for Expert {
+    fn play(&mut self, episode: &mut dyn PrivilegedEpisode) -> Result<(), PlayerError> {
+        (self.script)(&mut Commander::new(self.task, episode)?)
     }
 }

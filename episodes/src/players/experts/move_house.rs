@@ -6,8 +6,8 @@ use std::f32::consts::{FRAC_PI_2, PI};
 use tandem_sim::{Pose, Rotation, Side, Sides, Vector};
 
 use super::skills::{
-    BarGrasp, Course, FREE, HandMove, Part, Posture, Stage, Team, Way, at_once, closed_rad, follow, let_go,
-    place, take_softly, walk_to,
+    BarGrasp, CarryTeam, Commander, FREE, HandMove, ParallelScript, Posture, PosturePath, WalkGoal,
+    closed_rad, follow, grasp_compliantly, in_parallel, let_go, place, walk_to,
 };
 use crate::players::PlayerError;
 use crate::scoring::{A, B, C, Facts};
@@ -48,49 +48,49 @@ const BESIDE_Y_M: f32 = -0.75;
 const ASIDE_M: Vector = Vector::new(0.75, -1.05, 0.0);
 const WALK_M_S: f32 = 0.3;
 
-pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
-    let door = Part { robots: &[A], script: Box::new(clear_the_way) };
-    let table = Part { robots: &[B, C], script: Box::new(carry_table) };
-    at_once(stage, vec![door, table])
+pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
+    let door = ParallelScript { robots: &[A], script: Box::new(clear_the_way) };
+    let table = ParallelScript { robots: &[B, C], script: Box::new(carry_table) };
+    in_parallel(commander, vec![door, table])
 }
 
 /// A opens the door and stands aside.
-fn clear_the_way(stage: &mut Stage) -> Result<(), PlayerError> {
-    open_door(stage)?;
-    let door = stage.facts()?.object("lever_door").pose_in_world;
-    walk_to(stage, &[Way { robot: A, to: place(door * ASIDE_M, FRAC_PI_2), pace_m_s: WALK_M_S }])
+fn clear_the_way(commander: &mut Commander) -> Result<(), PlayerError> {
+    open_door(commander)?;
+    let door = commander.facts()?.object("lever_door").pose_in_world;
+    walk_to(commander, &[WalkGoal { robot: A, to: place(door * ASIDE_M, FRAC_PI_2), pace_m_s: WALK_M_S }])
 }
 
 /// B and C take the table, follow A through the doorway, and set it down on its marks.
-fn carry_table(stage: &mut Stage) -> Result<(), PlayerError> {
+fn carry_table(commander: &mut Commander) -> Result<(), PlayerError> {
     let [b_left, b_right] = BarGrasp::from_above(B, "console_table", ["b_left", "b_right"], PI);
     let [c_left, c_right] = BarGrasp::from_above(C, "console_table", ["c_left", "c_right"], 0.0);
     let grasps = [b_left, b_right, c_left, c_right];
-    let mut team = Team::new(stage, &grasps)?;
-    team.gather(stage)?;
-    take_softly(stage, &grasps)?;
-    team.lift(stage, LIFT_M)?;
-    let facts = stage.facts()?;
+    let mut team = CarryTeam::new(commander, &grasps)?;
+    team.gather(commander)?;
+    grasp_compliantly(commander, &grasps)?;
+    team.lift(commander, LIFT_M)?;
+    let facts = commander.facts()?;
     let marks = facts.object("foot_marks").pose_in_world;
     let b_x_m = facts.robots[B].pelvis_in_world.translation.x;
     let free_m = |facts: &Facts| match facts.robots[A].pelvis_in_world.translation {
         a_m if a_m.y < BESIDE_Y_M => f32::INFINITY,
         a_m => a_m.x - APART_M - b_x_m,
     };
-    team.carry_where_free(stage, &marks, PACE_M_S, &free_m)?;
-    team.rest(stage)?;
-    team.set_down(stage, &marks)?;
+    team.carry_where_free(commander, &marks, PACE_M_S, &free_m)?;
+    team.rest(commander)?;
+    team.set_down(commander, &marks)?;
     // The squares are small, and hands that gave way now would shift the table as they open.
-    team.give_way(stage, false);
-    let_go(stage, &grasps)
+    team.give_way(commander, false);
+    let_go(commander, &grasps)
 }
 
 /// A lays its right fist on the lever, presses it down and follows the leaf on its swing.
-fn open_door(stage: &mut Stage) -> Result<(), PlayerError> {
-    let leaf = stage.facts()?.object("lever_door leaf").pose_in_world;
-    walk_to(stage, &[Way { robot: A, to: push(&leaf, 0.0, 0.0).0, pace_m_s: WALK_M_S }])?;
-    let pressed_m = press_lever(stage)?;
-    let robot = &stage.facts()?.robots[A];
+fn open_door(commander: &mut Commander) -> Result<(), PlayerError> {
+    let leaf = commander.facts()?.object("lever_door leaf").pose_in_world;
+    walk_to(commander, &[WalkGoal { robot: A, to: push(&leaf, 0.0, 0.0).0, pace_m_s: WALK_M_S }])?;
+    let pressed_m = press_lever(commander)?;
+    let robot = &commander.facts()?.robots[A];
     let (left_in_pelvis, pelvis_m) = (robot.wrist_in_pelvis.left, robot.pelvis_in_world.translation.z);
     let at = |gone_m: f32| {
         let (stand, wrist) = push(&leaf, gone_m / FIRST_RADIUS_M, pressed_m);
@@ -98,12 +98,12 @@ fn open_door(stage: &mut Stage) -> Result<(), PlayerError> {
         vec![Posture { robot: A, stand, wrists: Sides { left: pelvis * left_in_pelvis, right: wrist } }]
     };
     let length_m = OPEN_RAD * FIRST_RADIUS_M;
-    follow(stage, &Course { at: &at, length_m, pace_m_s: PUSH_M_S, hold_s: OPENED_S, free_m: &FREE })
+    follow(commander, &PosturePath { at: &at, length_m, pace_m_s: PUSH_M_S, hold_s: OPENED_S, free_m: &FREE })
 }
 
 /// Presses the lever down until the bolt is drawn, and says how high the wrist is then.
-fn press_lever(stage: &mut Stage) -> Result<f32, PlayerError> {
-    let facts = stage.facts()?;
+fn press_lever(commander: &mut Commander) -> Result<f32, PlayerError> {
+    let facts = commander.facts()?;
     let end_m = facts.site_m("lever_door lever", "end");
     let bolt_m = |facts: &Facts| facts.seen_from_m("lever_door leaf", "lever_door bolt").y;
     let shut_m = bolt_m(&facts);
@@ -111,11 +111,11 @@ fn press_lever(stage: &mut Stage) -> Result<f32, PlayerError> {
         let wrist_m = end_m + Vector::new(-PRESSING_M - back_m, 0.0, above_m);
         HandMove::reach(A, Side::Right, Pose::from_parts(wrist_m, Rotation::from_rotation_x(-FRAC_PI_2)))
     };
-    stage.perform(1.2, &[reach(BACK_M, ABOVE_LEVER_M).shaped(closed_rad(Side::Right))])?;
-    stage.perform(0.6, &[reach(0.0, ABOVE_LEVER_M)])?;
+    commander.perform(1.2, &[reach(BACK_M, ABOVE_LEVER_M).shaped(closed_rad(Side::Right))])?;
+    commander.perform(0.6, &[reach(0.0, ABOVE_LEVER_M)])?;
     for down_m in DOWN_M {
-        stage.perform(0.6, &[reach(0.0, down_m)])?;
-        if bolt_m(&stage.facts()?) - shut_m >= DRAWN_M {
+        commander.perform(0.6, &[reach(0.0, down_m)])?;
+        if bolt_m(&commander.facts()?) - shut_m >= DRAWN_M {
             return Ok(end_m.z + down_m);
         }
     }

@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use tandem_sim::{Pose, Rotation, Side, Vector};
 
-use super::skills::{CylinderGrasp, HandMove, Stage, pick_up_all};
+use super::skills::{Commander, CylinderGrasp, HandMove, pick_up_all};
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
@@ -28,34 +28,34 @@ const TIP_MOVES: u32 = 8;
 const TIP_MOVE_S: f32 = 0.3;
 
 /// Vessels that are held already have been lifted.
-pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
-    if !(CUP.holds(stage)? && GLASS.holds(stage)?) {
-        lift(stage)?;
+pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
+    if !(CUP.holds(commander)? && GLASS.holds(commander)?) {
+        lift(commander)?;
     }
-    let glass = GLASS.carry(stage, GLASS_PLACE_M)?;
-    let cup = cup_at(stage, Pose::from_translation(GLASS_PLACE_M), 0.0)?;
-    stage.perform(1.5, &[cup, glass])?;
-    pour_until_it_is_in(stage)
+    let glass = GLASS.carry(commander, GLASS_PLACE_M)?;
+    let cup = cup_at(commander, Pose::from_translation(GLASS_PLACE_M), 0.0)?;
+    commander.perform(1.5, &[cup, glass])?;
+    pour_until_it_is_in(commander)
 }
 
-fn lift(stage: &mut Stage) -> Result<(), PlayerError> {
-    pick_up_all(stage, &[CUP, GLASS])?;
-    let raise = |stage: &mut Stage, grasp: &CylinderGrasp, by_m: f32| {
-        let from_m = stage.facts()?.position_m(grasp.object);
-        grasp.carry(stage, from_m + Vector::new(0.0, 0.0, by_m))
+fn lift(commander: &mut Commander) -> Result<(), PlayerError> {
+    pick_up_all(commander, &[CUP, GLASS])?;
+    let raise = |commander: &mut Commander, grasp: &CylinderGrasp, by_m: f32| {
+        let from_m = commander.facts()?.position_m(grasp.object);
+        grasp.carry(commander, from_m + Vector::new(0.0, 0.0, by_m))
     };
-    let lifts = [raise(stage, &CUP, 0.12)?, raise(stage, &GLASS, 0.06)?];
-    stage.perform(1.0, &lifts)
+    let lifts = [raise(commander, &CUP, 0.12)?, raise(commander, &GLASS, 0.06)?];
+    commander.perform(1.0, &lifts)
 }
 
-fn pour_until_it_is_in(stage: &mut Stage) -> Result<(), PlayerError> {
+fn pour_until_it_is_in(commander: &mut Commander) -> Result<(), PlayerError> {
     let mut tip_rad = TIP_RAD;
     loop {
-        pour(stage, tip_rad)?;
+        pour(commander, tip_rad)?;
         for _ in 0..4 {
-            stage.perform(0.5, &[GLASS.close()])?;
+            commander.perform(0.5, &[GLASS.close()])?;
         }
-        let facts = stage.facts()?;
+        let facts = commander.facts()?;
         if facts.inside_vessel("marble", "glass") {
             return Ok(());
         }
@@ -65,29 +65,29 @@ fn pour_until_it_is_in(stage: &mut Stage) -> Result<(), PlayerError> {
             return Err(PlayerError::GaveUp("the marble fell beside the glass".into()));
         }
         tip_rad = (tip_rad + MORE_RAD).min(DEEPEST_RAD);
-        let upright = cup_at(stage, facts.object("glass").pose_in_world, 0.0)?;
-        stage.perform(1.0, &[upright])?;
+        let upright = cup_at(commander, facts.object("glass").pose_in_world, 0.0)?;
+        commander.perform(1.0, &[upright])?;
     }
 }
 
 /// Tips the cup by `tip_rad`, its lip over the glass wherever that is by then.
-fn pour(stage: &mut Stage, tip_rad: f32) -> Result<(), PlayerError> {
+fn pour(commander: &mut Commander, tip_rad: f32) -> Result<(), PlayerError> {
     for part in 1..=TIP_MOVES {
-        let glass = stage.facts()?.object("glass").pose_in_world;
-        let tip = cup_at(stage, glass, tip_rad * part as f32 / TIP_MOVES as f32)?;
-        stage.glide(TIP_MOVE_S, &[tip])?;
+        let glass = commander.facts()?.object("glass").pose_in_world;
+        let tip = cup_at(commander, glass, tip_rad * part as f32 / TIP_MOVES as f32)?;
+        commander.glide(TIP_MOVE_S, &[tip])?;
     }
     Ok(())
 }
 
 /// Wrist motion that puts the cup, tipped by `tilt_rad`, with its lip above the mouth of the glass. The cup is tipped to
 /// +y, away from the palm.
-fn cup_at(stage: &mut Stage, world_from_glass: Pose, tilt_rad: f32) -> Result<HandMove, PlayerError> {
-    let facts = stage.facts()?;
+fn cup_at(commander: &mut Commander, world_from_glass: Pose, tilt_rad: f32) -> Result<HandMove, PlayerError> {
+    let facts = commander.facts()?;
     let [mouth_m, lip_m] =
         [("glass", "mouth"), ("cup", "lip")].map(|(object, site)| facts.site(object, site).position_m());
     let rotation = Rotation::from_rotation_x(-tilt_rad);
     let to_go = (1.0 - tilt_rad / TIP_RAD).max(0.0);
     let goal_m = world_from_glass * mouth_m + ABOVE_MOUTH_M + BEFORE_TIPPING_M * to_go;
-    CUP.bring(stage, Pose::from_parts(goal_m - rotation * lip_m, rotation))
+    CUP.bring(commander, Pose::from_parts(goal_m - rotation * lip_m, rotation))
 }

@@ -5,7 +5,9 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 use tandem_sim::Vector;
 
-use super::skills::{BarGrasp, FREE, Path, Stage, Team, let_go, place, take_softly, upright};
+use super::skills::{
+    BarGrasp, CarryTeam, Commander, FREE, ObjectPath, grasp_compliantly, let_go, place, upright,
+};
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
@@ -15,16 +17,16 @@ const PACE_M_S: f32 = 0.17;
 const BEFORE_CHAIR_M: Vector = Vector::new(0.65, 0.0, 0.0);
 const AT_CHAIR_M: Vector = Vector::new(0.40, 0.0, 0.0);
 
-pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
+pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     let [a_left, a_right] = BarGrasp::from_above(A, "office_table", ["a_left", "a_right"], 0.0);
     let [b_left, b_right] = BarGrasp::from_above(B, "office_table", ["b_left", "b_right"], PI);
     let grasps = [a_left, a_right, b_left, b_right];
-    let mut team = Team::new(stage, &grasps)?;
-    team.gather(stage)?;
-    take_softly(stage, &grasps)?;
-    team.lift(stage, LIFT_M)?;
-    let chair = stage.facts()?.object("office_chair").pose_in_world;
-    let from = upright(&team.object(stage)?);
+    let mut team = CarryTeam::new(commander, &grasps)?;
+    team.gather(commander)?;
+    grasp_compliantly(commander, &grasps)?;
+    team.lift(commander, LIFT_M)?;
+    let chair = commander.facts()?.object("office_chair").pose_in_world;
+    let from = upright(&team.object(commander)?);
     let aloft = Vector::Z * from.translation.z;
     let [before, over] =
         [BEFORE_CHAIR_M, AT_CHAIR_M].map(|chair_m| place(chair * chair_m + aloft, FRAC_PI_2));
@@ -34,7 +36,7 @@ pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
         true => from.lerp(&before, gone_m / turn_m),
         false => before.lerp(&over, (gone_m - turn_m) / (length_m - turn_m)),
     };
-    team.carry(stage, &Path { at: &at, length_m, pace_m_s: PACE_M_S, free_m: &FREE })?;
-    team.set_down(stage, &place(chair * AT_CHAIR_M, FRAC_PI_2))?;
-    let_go(stage, &grasps)
+    team.carry(commander, &ObjectPath { at: &at, length_m, pace_m_s: PACE_M_S, free_m: &FREE })?;
+    team.set_down(commander, &place(chair * AT_CHAIR_M, FRAC_PI_2))?;
+    let_go(commander, &grasps)
 }

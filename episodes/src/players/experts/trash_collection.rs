@@ -5,7 +5,7 @@ use std::f32::consts::FRAC_PI_2;
 
 use tandem_sim::{Pose, Rotation, Side, Vector};
 
-use super::skills::{BarGrasp, HandMove, Stage, Team, take_softly};
+use super::skills::{BarGrasp, CarryTeam, Commander, HandMove, grasp_compliantly};
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
@@ -22,32 +22,32 @@ const END_Y_M: f32 = -0.05;
 const SWEEP_M_S: f32 = 0.35;
 const TRIES: u32 = 3;
 
-pub fn perform(stage: &mut Stage) -> Result<(), PlayerError> {
+pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     let grasps = BarGrasp::between(A, "bin", ["left", "right"], -FRAC_PI_2);
-    let mut team = Team::new(stage, &grasps)?;
-    stage.set_height(A, BENT_M);
-    team.gather(stage)?;
-    take_softly(stage, &grasps)?;
-    team.lift(stage, LIFT_M)?;
-    stage.set_height(A, TALL_M);
-    let facts = stage.facts()?;
+    let mut team = CarryTeam::new(commander, &grasps)?;
+    commander.set_height(A, BENT_M);
+    team.gather(commander)?;
+    grasp_compliantly(commander, &grasps)?;
+    team.lift(commander, LIFT_M)?;
+    commander.set_height(A, TALL_M);
+    let facts = commander.facts()?;
     let point_m = facts.position_m("carry_point");
     // Before the bottle, wherever that lies across the bench.
     let end_m = Vector::new(facts.position_m("pet_bottle").x, point_m.y, point_m.z);
-    team.carry_to(stage, &Pose::from_translation(end_m), PACE_M_S)?;
+    team.carry_to(commander, &Pose::from_translation(end_m), PACE_M_S)?;
     for _ in 0..TRIES {
-        sweep(stage)?;
+        sweep(commander)?;
     }
     Err(PlayerError::GaveUp("the bottle did not fall into the bin".into()))
 }
 
 /// Puts the hand down behind the bottle, wherever that is on the bench, and sweeps it to the end.
-fn sweep(stage: &mut Stage) -> Result<(), PlayerError> {
-    let behind_m = stage.facts()?.position_m("pet_bottle") + BEHIND_BOTTLE_M;
+fn sweep(commander: &mut Commander) -> Result<(), PlayerError> {
+    let behind_m = commander.facts()?.position_m("pet_bottle") + BEHIND_BOTTLE_M;
     let reach = |at_m: Vector| HandMove::reach(B, Side::Left, Pose::from_parts(at_m, Rotation::IDENTITY));
-    stage.perform(1.2, &[reach(behind_m + Vector::Z * ABOVE_M)])?;
-    stage.perform(0.7, &[reach(behind_m)])?;
+    commander.perform(1.2, &[reach(behind_m + Vector::Z * ABOVE_M)])?;
+    commander.perform(0.7, &[reach(behind_m)])?;
     let end_m = Vector::new(behind_m.x, END_Y_M, behind_m.z);
-    stage.glide((end_m.y - behind_m.y).max(0.1) / SWEEP_M_S, &[reach(end_m)])?;
-    stage.perform(1.0, &[reach(end_m)])
+    commander.glide((end_m.y - behind_m.y).max(0.1) / SWEEP_M_S, &[reach(end_m)])?;
+    commander.perform(1.0, &[reach(end_m)])
 }

@@ -90,43 +90,43 @@ impl StepMessage {
 
 /// The 35 numbers one robot was commanded for one control step; the channel's metadata names the columns.
 #[derive(Serialize, JsonSchema)]
-pub struct Action {
+pub struct ActionMessage {
     row: Vec<f32>,
 }
 
-impl JsonMessage for Action {
+impl JsonMessage for ActionMessage {
     const SCHEMA_NAME: &str = "tandem.Action";
 }
 
-impl From<&RobotCommand> for Json<Action> {
+impl From<&RobotCommand> for Json<ActionMessage> {
     fn from(command: &RobotCommand) -> Self {
-        Json(Action { row: command.upper_rad.into_iter().chain(base_row(&command.base)).collect() })
+        Json(ActionMessage { row: command.upper_rad.into_iter().chain(base_row(&command.base)).collect() })
     }
 }
 
 /// The base command alone, with a name for each number.
 #[derive(Serialize, JsonSchema)]
-pub struct Base {
+pub struct BaseCommandMessage {
     vx_m_s: f32,
     vy_m_s: f32,
     yaw_rate_rad_s: f32,
     pelvis_height_m: f32,
 }
 
-impl JsonMessage for Base {
+impl JsonMessage for BaseCommandMessage {
     const SCHEMA_NAME: &str = "tandem.BaseCommand";
 }
 
-impl From<&RobotCommand> for Json<Base> {
+impl From<&RobotCommand> for Json<BaseCommandMessage> {
     fn from(command: &RobotCommand) -> Self {
         let BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m } = command.base;
-        Json(Base { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m })
+        Json(BaseCommandMessage { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m })
     }
 }
 
 /// What a robot's hands feel and hold: forces of the world on them (world frame), estimated from the arms' torques.
 #[derive(Serialize, JsonSchema)]
-pub struct Hands {
+pub struct HandsMessage {
     left_force_n: [f32; 3],
     right_force_n: [f32; 3],
     left_holds: Vec<String>,
@@ -135,19 +135,19 @@ pub struct Hands {
     right_touches: Vec<String>,
 }
 
-impl JsonMessage for Hands {
+impl JsonMessage for HandsMessage {
     const SCHEMA_NAME: &str = "tandem.Hands";
 }
 
-impl Hands {
+impl HandsMessage {
     /// Of robot number `robot`, which measures `state` where scoring sees `facts`.
-    pub fn of(state: &RobotState, robot: usize, facts: &Facts) -> Json<Hands> {
+    pub fn of(state: &RobotState, robot: usize, facts: &Facts) -> Json<HandsMessage> {
         let felt_n = state.hand_force_n.map(|force_n| force_n.to_array());
         let named = |side: Side, wanted: Grip| {
             let objects = facts.objects.iter().filter(|object| object.hands[robot][side] == wanted);
             objects.map(|object| object.name.clone()).collect()
         };
-        Json(Hands {
+        Json(HandsMessage {
             left_force_n: felt_n.left,
             right_force_n: felt_n.right,
             left_holds: named(Side::Left, Grip::Holding),
@@ -160,25 +160,25 @@ impl Hands {
 
 /// A phase that was reached.
 #[derive(Serialize, Deserialize, JsonSchema)]
-pub struct Phase {
+pub struct PhaseMessage {
     pub id: String,
     pub number: String,
     pub time_s: f64,
 }
 
-impl JsonMessage for Phase {
+impl JsonMessage for PhaseMessage {
     const SCHEMA_NAME: &str = "tandem.Phase";
 }
 
-impl From<&PhaseReached> for Json<Phase> {
+impl From<&PhaseReached> for Json<PhaseMessage> {
     fn from(phase: &PhaseReached) -> Self {
-        Json(Phase { id: phase.id.clone(), number: phase.number.clone(), time_s: phase.time_s })
+        Json(PhaseMessage { id: phase.id.clone(), number: phase.number.clone(), time_s: phase.time_s })
     }
 }
 
 /// What is left of the episode.
 #[derive(Serialize, JsonSchema)]
-pub struct BudgetLeft {
+pub struct BudgetMessage {
     steps_left: u32,
     /// Absent where the protocol sets no limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -186,13 +186,13 @@ pub struct BudgetLeft {
     wall_clock_left_s: Option<f64>,
 }
 
-impl JsonMessage for BudgetLeft {
+impl JsonMessage for BudgetMessage {
     const SCHEMA_NAME: &str = "tandem.Budget";
 }
 
-impl From<&Budget> for Json<BudgetLeft> {
+impl From<&Budget> for Json<BudgetMessage> {
     fn from(budget: &Budget) -> Self {
-        Json(BudgetLeft { steps_left: budget.steps_left, wall_clock_left_s: budget.wall_clock_left_s })
+        Json(BudgetMessage { steps_left: budget.steps_left, wall_clock_left_s: budget.wall_clock_left_s })
     }
 }
 

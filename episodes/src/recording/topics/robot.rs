@@ -3,19 +3,19 @@
 use foxglove::messages::{CameraCalibration, CompressedImage, JointState, JointStates};
 use tandem_sim::{RobotModel, RobotState, RobotStep, mjcf::MjcfCamera};
 
-use super::messages::{Action, Base, Hands, Json};
+use super::messages::{ActionMessage, BaseCommandMessage, HandsMessage, Json};
 use super::transforms::{EGOCENTRIC, robot_frame, timestamp};
 use crate::commands::{RobotSheet, action_row};
 use crate::output::OutputError;
-use crate::recording::file::{McapFile, Topic};
+use crate::recording::mcap_file::{McapFile, Topic};
 use crate::scoring::Facts;
 
 /// The topics of one robot.
 pub struct RobotTopics {
     joint_states: Topic<JointStates>,
-    action: Topic<Json<Action>>,
-    base_command: Topic<Json<Base>>,
-    hands: Topic<Json<Hands>>,
+    action: Topic<Json<ActionMessage>>,
+    base_command: Topic<Json<BaseCommandMessage>>,
+    hands: Topic<Json<HandsMessage>>,
     /// Opened by the first picture.
     camera: Option<CameraTopics>,
 }
@@ -53,7 +53,7 @@ impl RobotTopics {
         file.write(&mut self.joint_states, time_s, &joints)?;
         file.write(&mut self.action, time_s, &Json::from(&step.command))?;
         file.write(&mut self.base_command, time_s, &Json::from(&step.command))?;
-        file.write(&mut self.hands, time_s, &Hands::of(&step.state, index, facts))
+        file.write(&mut self.hands, time_s, &HandsMessage::of(&step.state, index, facts))
     }
 
     /// Appends a PNG seen through the robot's head camera, unless there is one of this moment: physics stands still between

@@ -5,7 +5,7 @@ use tandem_sim::{Pose, RobotModel, RobotState, Rotation, Step, Vector};
 
 use crate::commands::RobotSheet;
 use crate::convert::opencv_axes;
-use crate::recording::file::time_ns;
+use crate::recording::mcap_file::time_ns;
 
 /// The frame that everything else hangs on.
 pub const WORLD: &str = "world";

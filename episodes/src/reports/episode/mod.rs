@@ -4,4 +4,4 @@ mod page;
 mod strip;
 
 pub use page::{CallCounts, EpisodePage, PAGE_FILE};
-pub use strip::{CELL_HEIGHT, CELL_WIDTH, Moment, STRIP_FILE, View, png};
+pub use strip::{CELL_HEIGHT, CELL_WIDTH, KeyMoment, LabelledFrame, STRIP_FILE, png};

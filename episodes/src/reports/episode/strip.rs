@@ -8,16 +8,16 @@ pub const STRIP_FILE: &str = "strip.png";
 
 /// One column.
 #[derive(Clone)]
-pub struct Moment {
+pub struct KeyMoment {
     /// What happened, and when.
     pub caption: [String; 2],
     /// Third person, then each robot's view.
-    pub views: Vec<View>,
+    pub views: Vec<LabelledFrame>,
 }
 
 /// One picture and whose it is.
 #[derive(Clone)]
-pub struct View {
+pub struct LabelledFrame {
     pub label: String,
     pub frame: Frame,
 }
@@ -37,12 +37,12 @@ const FAINT_INK: [u8; 3] = [105; 3];
 const LABEL_INK: [u8; 3] = [250; 3];
 
 /// The strip as a PNG file.
-pub fn png(moments: &[Moment]) -> Result<Vec<u8>, PictureError> {
+pub fn png(moments: &[KeyMoment]) -> Result<Vec<u8>, PictureError> {
     let canvas = compose(moments);
     encode_png(canvas.width as u32, canvas.height() as u32, &canvas.rgb)
 }
 
-fn compose(moments: &[Moment]) -> Canvas {
+fn compose(moments: &[KeyMoment]) -> Canvas {
     let rows = moments.iter().map(|moment| moment.views.len()).max().unwrap_or(0);
     let width = GAP + moments.len() * (CELL_WIDTH + GAP);
     let height = CAPTION_HEIGHT + rows * (CELL_HEIGHT + GAP);
@@ -107,5 +107,46 @@ impl Canvas {
     }
 }
 
+/// Where the strip puts its pictures and its words.
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+
+    fn moment(caption: &str, colours: &[[u8; 3]]) -> KeyMoment {
+        let (width, height) = (CELL_WIDTH as u32, CELL_HEIGHT as u32);
+        let pixels = CELL_WIDTH * CELL_HEIGHT;
+        let view = |colour: &[u8; 3]| LabelledFrame {
+            label: "view".into(),
+            frame: Frame { width, height, rgb: colour.repeat(pixels), depth_m: vec![], ids: vec![] },
+        };
+        KeyMoment { caption: [caption.into(), "1.0 s".into()], views: colours.iter().map(view).collect() }
+    }
+
+    #[test]
+    fn every_moment_is_a_column_and_every_view_a_row() {
+        let long = "a caption that is longer than its column and says \u{e4}";
+        let columns = [[[9, 0, 0], [0, 9, 0]], [[0, 0, 9], [9, 9, 0]], [[0, 9, 9], [9, 0, 9]]];
+        let canvas = compose(&columns.map(|colours| moment(long, &colours)));
+        let last = (canvas.width - 1, canvas.height() - 1);
+        assert_eq!(last, (GAP + 3 * (CELL_WIDTH + GAP) - 1, CAPTION_HEIGHT + 2 * (CELL_HEIGHT + GAP) - 1));
+        let pixel = |x: usize, y: usize| &canvas.rgb[(y * canvas.width + x) * 3..][..3];
+        for (column, colours) in columns.iter().enumerate() {
+            for (row, colour) in colours.iter().enumerate() {
+                let x = GAP + column * (CELL_WIDTH + GAP) + CELL_WIDTH / 2;
+                assert_eq!(pixel(x, CAPTION_HEIGHT + row * (CELL_HEIGHT + GAP) + CELL_HEIGHT / 2), colour);
+            }
+            // A caption stays within its column, so the gap before the next one is blank.
+            for y in 0..CAPTION_HEIGHT {
+                assert_eq!(pixel(column * (CELL_WIDTH + GAP), y), [BACKGROUND; 3]);
+            }
+        }
+        let inked = |from_y: usize, to_y: usize, ink: [u8; 3]| {
+            (from_y..to_y)
+                .flat_map(|y| (0..canvas.width).map(move |x| (x, y)))
+                .filter(|(x, y)| pixel(*x, *y) == ink)
+                .count()
+        };
+        assert!(inked(0, LINE_HEIGHT, INK) > 1000 && inked(LINE_HEIGHT, CAPTION_HEIGHT, FAINT_INK) > 100);
+        assert!(inked(CAPTION_HEIGHT, canvas.height(), LABEL_INK) > 100);
+    }
+}

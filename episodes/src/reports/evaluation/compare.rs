@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::policy::{Group, reached};
-use crate::results::Played;
+use super::policy::{PolicyGroup, reached};
+use crate::results::PlayedEpisode;
 use crate::scoring::Phase;
 use crate::statistics::{Pairs, mcnemar, newcombe};
 use crate::tasks;
@@ -38,12 +38,12 @@ pub struct PairedRow {
 }
 
 /// By task, seed and where it began; of several the first.
-type Episodes<'a> = BTreeMap<(&'static str, u32, Option<usize>), &'a Played>;
+type Episodes<'a> = BTreeMap<(&'static str, u32, Option<usize>), &'a PlayedEpisode>;
 
 impl Comparison {
-    pub fn of(first: &Group, second: &Group) -> Comparison {
+    pub fn of(first: &PolicyGroup, second: &PolicyGroup) -> Comparison {
         let (ones, others) = (episodes(first), episodes(second));
-        let shared: Vec<(&Played, &Played)> =
+        let shared: Vec<(&PlayedEpisode, &PlayedEpisode)> =
             ones.iter().filter_map(|(key, one)| Some((*one, *others.get(key)?))).collect();
         let most = tasks::ALL.iter().map(|task| task.phases.len()).max().unwrap_or_default();
         let mut rows = Vec::new();
@@ -59,10 +59,10 @@ impl Comparison {
     }
 }
 
-fn episodes<'a>(group: &'a Group) -> Episodes<'a> {
+fn episodes<'a>(group: &'a PolicyGroup) -> Episodes<'a> {
     let mut found = Episodes::new();
     for played in group.episodes.iter().map(|found| &found.played) {
-        let key = (played.spec.task.id, played.spec.seed, played.begun_phase());
+        let key = (played.spec.task.id, played.spec.seed, played.start_phase());
         found.entry(key).or_insert(played);
     }
     found
@@ -73,10 +73,10 @@ fn row(
     task: Option<&'static str>,
     phase: usize,
     last: bool,
-    shared: &[(&Played, &Played)],
+    shared: &[(&PlayedEpisode, &PlayedEpisode)],
 ) -> Option<PairedRow> {
     let mut pairs = Pairs::default();
-    let counts = |played: &Played| played.begun_phase().is_none_or(|only| only == phase);
+    let counts = |played: &PlayedEpisode| played.start_phase().is_none_or(|only| only == phase);
     for (one, other) in shared.iter().filter(|(one, _)| counts(one)) {
         match (reached(one, phase), reached(other, phase)) {
             (true, true) => pairs.both += 1,

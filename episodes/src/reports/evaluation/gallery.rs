@@ -4,8 +4,8 @@ use std::path::Path;
 
 use image::imageops::{self, FilterType};
 
-use super::load::{Found, Loaded};
-use super::policy::{Group, first_missed, groups, succeeded, why};
+use super::load::{FoundEpisode, LoadedEpisodes};
+use super::policy::{PolicyGroup, first_missed, groups, succeeded, why};
 use crate::output::webp;
 
 /// One failed episode.
@@ -33,9 +33,9 @@ pub struct Picture {
 const SCALE: f64 = 0.5;
 
 /// At most so many failures with a picture, by turns from every policy and task; those without one are left out.
-pub fn gallery(loaded: &Loaded, most: usize) -> Vec<Failure> {
+pub fn gallery(loaded: &LoadedEpisodes, most: usize) -> Vec<Failure> {
     let groups = groups(&loaded.episodes);
-    let all: Vec<(Failure, &Found)> = groups.iter().flat_map(failed).collect();
+    let all: Vec<(Failure, &FoundEpisode)> = groups.iter().flat_map(failed).collect();
     let total = all.len();
     let turn = |index: usize| {
         let (failure, _) = &all[index];
@@ -55,12 +55,12 @@ pub fn gallery(loaded: &Loaded, most: usize) -> Vec<Failure> {
     pictured.collect()
 }
 
-fn failed<'a>(group: &Group<'a>) -> Vec<(Failure, &'a Found)> {
+fn failed<'a>(group: &PolicyGroup<'a>) -> Vec<(Failure, &'a FoundEpisode)> {
     let found = group.episodes.iter().filter(|found| !succeeded(&found.played));
     found.map(|found| (failure(group, found), *found)).collect()
 }
 
-fn failure(group: &Group, found: &Found) -> Failure {
+fn failure(group: &PolicyGroup, found: &FoundEpisode) -> Failure {
     let spec = &found.played.spec;
     Failure {
         policy: group.name.clone(),

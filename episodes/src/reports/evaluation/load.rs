@@ -5,20 +5,20 @@ use std::path::{Path, PathBuf};
 
 use crate::recording::{Recorder, Recording};
 use crate::reports::episode::STRIP_FILE;
-use crate::results::{EPISODES, Played, missed};
+use crate::results::{EPISODES, PlayedEpisode, missed};
 
 /// One episode.
 #[derive(Clone, Debug)]
-pub struct Found {
-    pub played: Played,
+pub struct FoundEpisode {
+    pub played: PlayedEpisode,
     /// Its picture strip, where it was recorded.
     pub strip: Option<PathBuf>,
 }
 
 /// What folders hold.
 #[derive(Clone, Debug, Default)]
-pub struct Loaded {
-    pub episodes: Vec<Found>,
+pub struct LoadedEpisodes {
+    pub episodes: Vec<FoundEpisode>,
     /// Files that are no episodes, and why.
     pub skipped: Vec<String>,
 }
@@ -33,8 +33,8 @@ pub enum LoadError {
 }
 
 /// Every episode of every folder, each once.
-pub fn load(folders: &[PathBuf]) -> Result<Loaded, LoadError> {
-    let mut loaded = Loaded::default();
+pub fn load(folders: &[PathBuf]) -> Result<LoadedEpisodes, LoadError> {
+    let mut loaded = LoadedEpisodes::default();
     for folder in folders {
         let before = loaded.episodes.len() + loaded.skipped.len();
         let kept = folder.join(EPISODES);
@@ -50,9 +50,9 @@ pub fn load(folders: &[PathBuf]) -> Result<Loaded, LoadError> {
     Ok(loaded)
 }
 
-impl Loaded {
+impl LoadedEpisodes {
     /// Folders may overlap.
-    fn add(&mut self, found: Found) {
+    fn add(&mut self, found: FoundEpisode) {
         if !self.episodes.iter().any(|known| known.played == found.played) {
             self.episodes.push(found);
         }
@@ -60,11 +60,11 @@ impl Loaded {
 }
 
 /// Results of single episodes, each in a file.
-fn load_kept(folder: &Path, loaded: &mut Loaded) -> Result<(), LoadError> {
+fn load_kept(folder: &Path, loaded: &mut LoadedEpisodes) -> Result<(), LoadError> {
     for path in entries(folder)?.into_iter().filter(|path| path.extension().is_some_and(|e| e == "json")) {
         let read = std::fs::read(&path).map_err(|error| error.to_string());
         match read.and_then(|bytes| serde_json::from_slice(&bytes).map_err(|error| error.to_string())) {
-            Ok(played) => loaded.add(Found { played, strip: strip(&path.with_extension("")) }),
+            Ok(played) => loaded.add(FoundEpisode { played, strip: strip(&path.with_extension("")) }),
             Err(reason) => loaded.skipped.push(format!("{}: {reason}", path.display())),
         }
     }
@@ -72,24 +72,24 @@ fn load_kept(folder: &Path, loaded: &mut Loaded) -> Result<(), LoadError> {
 }
 
 /// Recordings of a server, each in a folder; the policy is called as the folder that they lie in.
-fn load_recordings(folder: &Path, loaded: &mut Loaded) -> Result<(), LoadError> {
+fn load_recordings(folder: &Path, loaded: &mut LoadedEpisodes) -> Result<(), LoadError> {
     let absolute = folder.canonicalize().unwrap_or_else(|_| folder.into());
     let policy = absolute.file_name().map_or("policy".into(), |name| name.to_string_lossy().into_owned());
     let folders = std::iter::once(folder.to_owned()).chain(entries(folder)?);
     for run in folders.filter(|run| run.join(Recorder::FILE_NAME).exists()) {
         match recorded(&run.join(Recorder::FILE_NAME), &policy) {
-            Ok(played) => loaded.add(Found { played, strip: strip(&run) }),
+            Ok(played) => loaded.add(FoundEpisode { played, strip: strip(&run) }),
             Err(reason) => loaded.skipped.push(reason),
         }
     }
     Ok(())
 }
 
-fn recorded(path: &Path, policy: &str) -> Result<Played, String> {
+fn recorded(path: &Path, policy: &str) -> Result<PlayedEpisode, String> {
     let recording = Recording::read(path).map_err(|error| error.to_string())?;
     let calls = recording.tool_calls().map_err(|error| error.to_string())?;
     let result = recording.result.clone().ok_or_else(|| format!("{} was interrupted", path.display()))?;
-    Ok(Played {
+    Ok(PlayedEpisode {
         by: policy.into(),
         spec: recording.spec.clone(),
         locomotion: recording.locomotion.clone(),

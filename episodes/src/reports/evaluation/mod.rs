@@ -17,20 +17,23 @@ use serde::Serialize;
 
 pub use compare::{Comparison, PairedRow};
 pub use gallery::{Failure, gallery};
-pub use load::{Found, LoadError, Loaded, load};
-pub use policy::{Average, Effort, PhaseReport, PolicyReport, Reason, Spread, TaskReport, Together};
-pub use published::{Published, PublishedAverages};
-pub use rate::{Mean, Rate};
+pub use load::{FoundEpisode, LoadError, LoadedEpisodes, load};
+pub use policy::{
+    ByCollaboration, EpisodeCosts, FailureReason, PhaseReport, PolicyReport, TaskAverage, TaskReport,
+    ValueRange,
+};
+pub use published::{PublishedAverages, PublishedRates};
+pub use rate::{MeanRate, Rate};
 
 /// Everything that a report says in words and numbers.
 #[derive(Debug, Serialize)]
-pub struct Assessment {
+pub struct EvaluationReport {
     /// In the order in which they were found.
     pub policies: Vec<PolicyReport>,
     /// Each policy against the first.
     pub comparisons: Vec<Comparison>,
     /// What was published of the same tasks in another simulator.
-    pub published: Vec<Published>,
+    pub published: Vec<PublishedRates>,
     pub published_averages: Vec<PublishedAverages>,
     /// Files that are no episodes, and why.
     pub skipped: Vec<String>,
@@ -38,7 +41,7 @@ pub struct Assessment {
 
 /// How a report is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
+pub enum ReportFormat {
     Html,
     Markdown,
     Csv,
@@ -46,24 +49,30 @@ pub enum Format {
     Tex,
 }
 
-impl Format {
-    pub const ALL: [Format; 5] = [Format::Html, Format::Markdown, Format::Csv, Format::Json, Format::Tex];
+impl ReportFormat {
+    pub const ALL: [ReportFormat; 5] = [
+        ReportFormat::Html,
+        ReportFormat::Markdown,
+        ReportFormat::Csv,
+        ReportFormat::Json,
+        ReportFormat::Tex,
+    ];
 
     /// What the file's extension is.
     pub fn name(self) -> &'static str {
         match self {
-            Format::Html => "html",
-            Format::Markdown => "md",
-            Format::Csv => "csv",
-            Format::Json => "json",
-            Format::Tex => "tex",
+            ReportFormat::Html => "html",
+            ReportFormat::Markdown => "md",
+            ReportFormat::Csv => "csv",
+            ReportFormat::Json => "json",
+            ReportFormat::Tex => "tex",
         }
     }
 }
 
-impl Assessment {
+impl EvaluationReport {
     /// Counts what was found.
-    pub fn of(loaded: &Loaded) -> Assessment {
+    pub fn of(loaded: &LoadedEpisodes) -> EvaluationReport {
         let groups = policy::groups(&loaded.episodes);
         let policies: Vec<PolicyReport> = groups.iter().map(PolicyReport::of).collect();
         let comparisons = match groups.split_first() {
@@ -71,7 +80,7 @@ impl Assessment {
             None => Vec::new(),
         };
         let played = |task: &str| policies.iter().any(|policy| policy.tasks.iter().any(|of| of.task == task));
-        Assessment {
+        EvaluationReport {
             published: published::rows().into_iter().filter(|row| played(&row.task)).collect(),
             published_averages: published::averages(),
             skipped: loaded.skipped.clone(),
@@ -81,13 +90,13 @@ impl Assessment {
     }
 
     /// The report; a page shows `failures`, too.
-    pub fn write(&self, format: Format, failures: &[Failure]) -> Result<String, serde_json::Error> {
+    pub fn write(&self, format: ReportFormat, failures: &[Failure]) -> Result<String, serde_json::Error> {
         Ok(match format {
-            Format::Html => page::html(self, failures),
-            Format::Markdown => text::markdown(self),
-            Format::Csv => text::csv(self),
-            Format::Json => serde_json::to_string_pretty(self)? + "\n",
-            Format::Tex => text::tex(self),
+            ReportFormat::Html => page::html(self, failures),
+            ReportFormat::Markdown => text::markdown(self),
+            ReportFormat::Csv => text::csv(self),
+            ReportFormat::Json => serde_json::to_string_pretty(self)? + "\n",
+            ReportFormat::Tex => text::tex(self),
         })
     }
 }

@@ -7,17 +7,17 @@ use serde_json::Value;
 use tandem_tools_spec::EndReason;
 use xxhash_rust::xxh3::xxh3_64;
 
-use super::load::Found;
-use super::rate::{Mean, Rate};
-use crate::results::{PhaseLevel, Played, PolicyCard, missed};
+use super::load::FoundEpisode;
+use super::rate::{MeanRate, Rate};
+use crate::results::{PhaseLevel, PlayedEpisode, PolicyCard, missed};
 use crate::scoring::Phase;
 use crate::statistics::Count;
 use crate::tasks::{self, Task};
 
 /// One policy, under one set of rules and on one build.
-pub struct Group<'a> {
+pub struct PolicyGroup<'a> {
     pub name: String,
-    pub episodes: Vec<&'a Found>,
+    pub episodes: Vec<&'a FoundEpisode>,
 }
 
 /// How it fared.
@@ -32,11 +32,11 @@ pub struct PolicyReport {
     /// In the order of the list of tasks; those that were played.
     pub tasks: Vec<TaskReport>,
     /// Over the tasks of so many robots.
-    pub averages: Vec<Average>,
-    pub together: Together,
+    pub averages: Vec<TaskAverage>,
+    pub together: ByCollaboration,
     /// Every phase on its own, where episodes began at phases.
     pub phase_level: Option<PhaseLevel>,
-    pub reasons: Vec<Reason>,
+    pub reasons: Vec<FailureReason>,
 }
 
 /// One task.
@@ -47,7 +47,7 @@ pub struct TaskReport {
     /// Those that began at the task's own beginning.
     pub episodes: usize,
     pub phases: Vec<PhaseReport>,
-    pub effort: Option<Effort>,
+    pub effort: Option<EpisodeCosts>,
     pub falls: u32,
 }
 
@@ -69,30 +69,30 @@ pub struct PhaseReport {
 
 /// Mean rates over the tasks of one number of robots, phase by phase.
 #[derive(Debug, Serialize)]
-pub struct Average {
+pub struct TaskAverage {
     pub robots: usize,
     pub tasks: usize,
-    pub phases: Vec<Option<Mean>>,
+    pub phases: Vec<Option<MeanRate>>,
 }
 
 /// Phases on which robots work together against those on which they do not: means of conditional rates.
 #[derive(Debug, Serialize)]
-pub struct Together {
-    pub alone: Option<Mean>,
-    pub together: Option<Mean>,
+pub struct ByCollaboration {
+    pub alone: Option<MeanRate>,
+    pub together: Option<MeanRate>,
 }
 
 /// What whole episodes cost.
 #[derive(Debug, Serialize)]
-pub struct Effort {
-    pub steps: Spread,
-    pub calls: Spread,
-    pub thought: Spread,
+pub struct EpisodeCosts {
+    pub steps: ValueRange,
+    pub calls: ValueRange,
+    pub thought: ValueRange,
 }
 
 /// Some numbers, seen from afar.
 #[derive(Debug, Serialize)]
-pub struct Spread {
+pub struct ValueRange {
     pub min: f64,
     pub median_value: f64,
     pub max: f64,
@@ -100,7 +100,7 @@ pub struct Spread {
 
 /// Why some episodes failed.
 #[derive(Debug, Serialize)]
-pub struct Reason {
+pub struct FailureReason {
     pub task: &'static str,
     /// Number of the first phase that counts and was not reached.
     pub phase: String,
@@ -109,8 +109,8 @@ pub struct Reason {
 }
 
 /// Policies in the order in which they were found, with names that tell them apart.
-pub fn groups(episodes: &[Found]) -> Vec<Group<'_>> {
-    let mut groups: Vec<(Vec<String>, Vec<&Found>)> = Vec::new();
+pub fn groups(episodes: &[FoundEpisode]) -> Vec<PolicyGroup<'_>> {
+    let mut groups: Vec<(Vec<String>, Vec<&FoundEpisode>)> = Vec::new();
     for found in episodes {
         let key = rules_of(&found.played);
         match groups.iter_mut().find(|(known, _)| *known == key) {
@@ -128,11 +128,11 @@ pub fn groups(episodes: &[Found]) -> Vec<Group<'_>> {
             false => format!("{} ({})", key[0], parts.join(", ")),
         }
     };
-    groups.into_iter().map(|(key, episodes)| Group { name: name(&key), episodes }).collect()
+    groups.into_iter().map(|(key, episodes)| PolicyGroup { name: name(&key), episodes }).collect()
 }
 
 /// What has to agree for episodes to be of one policy: its name first, then all that may tell namesakes apart.
-fn rules_of(played: &Played) -> Vec<String> {
+fn rules_of(played: &PlayedEpisode) -> Vec<String> {
     let spec = &played.spec;
     let short = played.build.chars().rev().take(6).collect::<Vec<_>>();
     vec![
@@ -154,23 +154,23 @@ fn settings_of(card: &PolicyCard) -> String {
 }
 
 /// Whether phase number `phase` was reached.
-pub fn reached(played: &Played, phase: usize) -> bool {
+pub fn reached(played: &PlayedEpisode, phase: usize) -> bool {
     played.result.phases.reached_s(&Phase::number(phase)).is_some()
 }
 
 /// Whether the phase that counts was reached: the one that the episode began at, or the last.
-pub fn succeeded(played: &Played) -> bool {
-    reached(played, played.begun_phase().unwrap_or(played.spec.task.phases.len() - 1))
+pub fn succeeded(played: &PlayedEpisode) -> bool {
+    reached(played, played.start_phase().unwrap_or(played.spec.task.phases.len() - 1))
 }
 
-fn count<'a>(episodes: impl Iterator<Item = &'a Played>, phase: usize) -> Count {
+fn count<'a>(episodes: impl Iterator<Item = &'a PlayedEpisode>, phase: usize) -> Count {
     let reached: Vec<bool> = episodes.map(|played| reached(played, phase)).collect();
     Count { successes: reached.iter().filter(|reached| **reached).count(), trials: reached.len() }
 }
 
 impl PolicyReport {
-    pub fn of(group: &Group) -> PolicyReport {
-        let played: Vec<&Played> = group.episodes.iter().map(|found| &found.played).collect();
+    pub fn of(group: &PolicyGroup) -> PolicyReport {
+        let played: Vec<&PlayedEpisode> = group.episodes.iter().map(|found| &found.played).collect();
         let first = played.first();
         let of_tasks = tasks::ALL.iter().map(|task| TaskReport::of(task, &played));
         let tasks: Vec<TaskReport> = of_tasks.flatten().collect();
@@ -182,7 +182,10 @@ impl PolicyReport {
             episodes: played.len(),
             falls: played.iter().map(|played| played.result.falls).sum(),
             averages: averages(&tasks),
-            together: Together { alone: conditional(&tasks, false), together: conditional(&tasks, true) },
+            together: ByCollaboration {
+                alone: conditional(&tasks, false),
+                together: conditional(&tasks, true),
+            },
             phase_level: PhaseLevel::of(played.iter().copied()),
             reasons: reasons(&played),
             tasks,
@@ -192,12 +195,14 @@ impl PolicyReport {
 
 impl TaskReport {
     /// `None` where the task was not played.
-    fn of(task: &'static Task, played: &[&Played]) -> Option<TaskReport> {
-        let of_task: Vec<&Played> = played.iter().copied().filter(|one| one.spec.task == task).collect();
-        let whole: Vec<&Played> = of_task.iter().copied().filter(|one| one.begun_phase().is_none()).collect();
+    fn of(task: &'static Task, played: &[&PlayedEpisode]) -> Option<TaskReport> {
+        let of_task: Vec<&PlayedEpisode> =
+            played.iter().copied().filter(|one| one.spec.task == task).collect();
+        let whole: Vec<&PlayedEpisode> =
+            of_task.iter().copied().filter(|one| one.start_phase().is_none()).collect();
         let phase = |(index, phase): (usize, &'static Phase)| {
             let before = whole.iter().filter(|one| index == 0 || reached(one, index - 1)).copied();
-            let from_it = of_task.iter().filter(|one| one.begun_phase() == Some(index)).copied();
+            let from_it = of_task.iter().filter(|one| one.start_phase() == Some(index)).copied();
             PhaseReport {
                 id: phase.id,
                 number: Phase::number(index),
@@ -212,16 +217,18 @@ impl TaskReport {
             robots: task.robots.len(),
             episodes: whole.len(),
             phases: task.phases.iter().enumerate().map(phase).collect(),
-            effort: Effort::of(&whole),
+            effort: EpisodeCosts::of(&whole),
             falls: of_task.iter().map(|one| one.result.falls).sum(),
         })
     }
 }
 
-impl Effort {
-    fn of(episodes: &[&Played]) -> Option<Effort> {
-        let spread = |of: fn(&Played) -> f64| Spread::of(episodes.iter().map(|played| of(played)).collect());
-        Some(Effort {
+impl EpisodeCosts {
+    fn of(episodes: &[&PlayedEpisode]) -> Option<EpisodeCosts> {
+        let spread = |of: fn(&PlayedEpisode) -> f64| {
+            ValueRange::of(episodes.iter().map(|played| of(played)).collect())
+        };
+        Some(EpisodeCosts {
             steps: spread(|played| played.result.env_steps.into())?,
             calls: spread(|played| played.result.tool_calls.into())?,
             thought: spread(|played| played.thought_s)?,
@@ -229,8 +236,8 @@ impl Effort {
     }
 }
 
-impl Spread {
-    fn of(mut values: Vec<f64>) -> Option<Spread> {
+impl ValueRange {
+    fn of(mut values: Vec<f64>) -> Option<ValueRange> {
         values.sort_by(f64::total_cmp);
         let (min, max) = (*values.first()?, *values.last()?);
         let middle = values.len() / 2;
@@ -238,11 +245,11 @@ impl Spread {
             0 => (values[middle - 1] + values[middle]) / 2.0,
             _ => values[middle],
         };
-        Some(Spread { min, median_value, max })
+        Some(ValueRange { min, median_value, max })
     }
 }
 
-fn averages(tasks: &[TaskReport]) -> Vec<Average> {
+fn averages(tasks: &[TaskReport]) -> Vec<TaskAverage> {
     let mut by_robots: BTreeMap<usize, Vec<&TaskReport>> = BTreeMap::new();
     for task in tasks.iter().filter(|task| task.episodes > 0) {
         by_robots.entry(task.robots).or_default().push(task);
@@ -251,47 +258,50 @@ fn averages(tasks: &[TaskReport]) -> Vec<Average> {
         let phases = tasks.iter().map(|task| task.phases.len()).max().unwrap_or_default();
         let rates = |phase: usize| {
             let of_task = tasks.iter().filter_map(move |task| task.phases.get(phase)?.cumulative);
-            Mean::of(of_task.map(Rate::count))
+            MeanRate::of(of_task.map(Rate::count))
         };
-        Average { robots, tasks: tasks.len(), phases: (0..phases).map(rates).collect() }
+        TaskAverage { robots, tasks: tasks.len(), phases: (0..phases).map(rates).collect() }
     };
     by_robots.into_iter().map(average).collect()
 }
 
 /// Mean of the conditional rates of phases on which robots work together, or of those on which they do not.
-fn conditional(tasks: &[TaskReport], together: bool) -> Option<Mean> {
+fn conditional(tasks: &[TaskReport], together: bool) -> Option<MeanRate> {
     let phases = tasks.iter().flat_map(|task| &task.phases).filter(|phase| phase.collaborative == together);
-    Mean::of(phases.filter_map(|phase| phase.conditional).map(Rate::count))
+    MeanRate::of(phases.filter_map(|phase| phase.conditional).map(Rate::count))
 }
 
-fn reasons(episodes: &[&Played]) -> Vec<Reason> {
-    let mut reasons: Vec<Reason> = Vec::new();
+fn reasons(episodes: &[&PlayedEpisode]) -> Vec<FailureReason> {
+    let mut reasons: Vec<FailureReason> = Vec::new();
     for played in episodes.iter().filter(|played| !succeeded(played)) {
         let (phase, why) = (first_missed(played), why(played));
-        let same = |known: &&mut Reason| {
+        let same = |known: &&mut FailureReason| {
             (known.task, &known.phase, &known.why) == (played.spec.task.id, &phase, &why)
         };
         match reasons.iter_mut().find(same) {
             Some(known) => known.seeds.push(played.spec.seed),
-            None => {
-                reasons.push(Reason { task: played.spec.task.id, phase, why, seeds: vec![played.spec.seed] })
-            }
+            None => reasons.push(FailureReason {
+                task: played.spec.task.id,
+                phase,
+                why,
+                seeds: vec![played.spec.seed],
+            }),
         }
     }
-    let rank = |reason: &Reason| tasks::ALL.iter().position(|task| task.id == reason.task);
+    let rank = |reason: &FailureReason| tasks::ALL.iter().position(|task| task.id == reason.task);
     reasons.sort_by_key(|reason| (rank(reason), reason.phase.clone()));
     reasons
 }
 
 /// Number of the first phase that counts and was not reached.
-pub fn first_missed(played: &Played) -> String {
-    let counts = |phase: &usize| played.begun_phase().is_none_or(|only| only == *phase);
+pub fn first_missed(played: &PlayedEpisode) -> String {
+    let counts = |phase: &usize| played.start_phase().is_none_or(|only| only == *phase);
     let mut phases = (0..played.spec.task.phases.len()).filter(counts);
     phases.find(|phase| !reached(played, *phase)).map(Phase::number).unwrap_or_default()
 }
 
 /// What the policy said when it gave up, or why the episode ended; and who fell.
-pub fn why(played: &Played) -> String {
+pub fn why(played: &PlayedEpisode) -> String {
     let ended = match played.result.ended {
         EndReason::TaskComplete => "the task was completed",
         EndReason::StepBudgetExhausted => "the steps ran out",
@@ -303,7 +313,7 @@ pub fn why(played: &Played) -> String {
     let own = played
         .note
         .clone()
-        .filter(|note| Some(note) != missed(&played.result, played.begun_phase()).as_ref());
+        .filter(|note| Some(note) != missed(&played.result, played.start_phase()).as_ref());
     let why = own.unwrap_or_else(|| ended.into());
     match played.result.falls {
         0 => why,

@@ -8,7 +8,7 @@ const PHASE_LEVEL: &str = include_str!("published_phase_level.csv");
 
 /// Rates of one method on one task.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Published {
+pub struct PublishedRates {
     pub method: String,
     pub task: String,
     pub episodes: usize,
@@ -25,12 +25,12 @@ pub struct PublishedAverages {
 }
 
 /// By method, then by task.
-pub fn rows() -> Vec<Published> {
+pub fn rows() -> Vec<PublishedRates> {
     let row = |line: &str| {
         let mut cells = line.split(',');
         let (method, task) = (cells.next()?.into(), cells.next()?.into());
         let episodes = cells.next()?.parse().ok()?;
-        Some(Published { method, task, episodes, phases_share: shares(cells)? })
+        Some(PublishedRates { method, task, episodes, phases_share: shares(cells)? })
     };
     PHASES.lines().skip(1).filter_map(row).collect()
 }

@@ -38,19 +38,19 @@ impl Rate {
 
 /// A mean of rates that each count the same.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Mean {
+pub struct MeanRate {
     pub counts: Vec<Count>,
     pub mean_share: f64,
     /// 95 %.
     pub interval_share: [f64; 2],
 }
 
-impl Mean {
+impl MeanRate {
     /// Of those rates that have trials; `None` where none has.
-    pub fn of(counts: impl Iterator<Item = Count>) -> Option<Mean> {
+    pub fn of(counts: impl Iterator<Item = Count>) -> Option<MeanRate> {
         let counts: Vec<Count> = counts.filter(|count| count.trials > 0).collect();
         let (mean_share, interval_share) = mean_share(&counts)?;
-        Some(Mean { counts, mean_share, interval_share })
+        Some(MeanRate { counts, mean_share, interval_share })
     }
 
     /// As [`Rate::text`].

@@ -1,9 +1,9 @@
 //! The report's tables, made once for every way of writing them.
 
 use super::compare::{Comparison, PairedRow};
-use super::policy::{Effort, PolicyReport, Spread, TaskReport};
-use super::rate::{Mean, Rate, percent};
-use super::{Assessment, Published};
+use super::policy::{EpisodeCosts, PolicyReport, TaskReport, ValueRange};
+use super::rate::{MeanRate, Rate, percent};
+use super::{EvaluationReport, PublishedRates};
 
 /// Words in rows and columns.
 pub struct Table {
@@ -27,16 +27,16 @@ impl Table {
 }
 
 /// Every table that has rows.
-pub fn all(assessment: &Assessment) -> Vec<Table> {
-    let policies = &assessment.policies;
+pub fn all(report: &EvaluationReport) -> Vec<Table> {
+    let policies = &report.policies;
     let mut tables: Vec<Table> = policies.iter().map(rates).collect();
     tables.push(averages(policies));
     tables.push(together(policies));
     tables.push(effort(policies));
     tables.push(reasons(policies));
-    tables.extend(assessment.comparisons.iter().map(comparison));
-    tables.push(published(&assessment.published));
-    tables.push(published_together(assessment));
+    tables.extend(report.comparisons.iter().map(comparison));
+    tables.push(published(&report.published));
+    tables.push(published_together(report));
     tables.retain(|table| !table.rows.is_empty());
     tables
 }
@@ -87,8 +87,8 @@ fn averages(policies: &[PolicyReport]) -> Table {
     table
 }
 
-fn mean_text(mean: Option<&Mean>) -> String {
-    mean.map_or(NONE.into(), Mean::text)
+fn mean_text(mean: Option<&MeanRate>) -> String {
+    mean.map_or(NONE.into(), MeanRate::text)
 }
 
 fn together(policies: &[PolicyReport]) -> Table {
@@ -122,7 +122,7 @@ fn together(policies: &[PolicyReport]) -> Table {
             let mean =
                 |together: bool| {
                     let phases = level.phases.iter().filter(|rate| rate.collaborative == together);
-                    Mean::of(phases.map(|rate| crate::statistics::Count {
+                    MeanRate::of(phases.map(|rate| crate::statistics::Count {
                         successes: rate.reached,
                         trials: rate.episodes,
                     }))
@@ -148,9 +148,9 @@ fn effort(policies: &[PolicyReport]) -> Table {
         &["Policy", "Task", "Episodes", "Steps", "Calls", "Thinking (s)", "Falls"],
         2,
     );
-    let row = |policy: &PolicyReport, task: &TaskReport, effort: &Effort| {
-        let text = |spread: &Spread, decimals: usize| {
-            let Spread { min, median_value, max } = spread;
+    let row = |policy: &PolicyReport, task: &TaskReport, effort: &EpisodeCosts| {
+        let text = |spread: &ValueRange, decimals: usize| {
+            let ValueRange { min, median_value, max } = spread;
             format!("{median_value:.decimals$} ({min:.decimals$}-{max:.decimals$})")
         };
         vec![
@@ -221,7 +221,7 @@ fn p_text(p_value: f64) -> String {
 }
 
 /// By method, and a column for each task that was played.
-pub fn published(rows: &[Published]) -> Table {
+pub fn published(rows: &[PublishedRates]) -> Table {
     let mut table = Table::new(
         "Published, in another simulator",
         "CoHuB's own figures for its baselines in Isaac Sim, percent of p1 / p2 / p3, over 100 episodes, of GPT-6 Astra over 10. \
@@ -242,8 +242,9 @@ pub fn published(rows: &[Published]) -> Table {
     for method in methods {
         let cell = |task: &&str| {
             let found = rows.iter().find(|row| row.method == method && row.task == **task);
-            let text =
-                |row: &Published| row.phases_share.iter().map(|share| percent(*share)).collect::<Vec<_>>();
+            let text = |row: &PublishedRates| {
+                row.phases_share.iter().map(|share| percent(*share)).collect::<Vec<_>>()
+            };
             found.map_or(NONE.into(), |row| text(row).join(" / "))
         };
         table.rows.push(std::iter::once(method.to_owned()).chain(tasks.iter().map(cell)).collect());
@@ -252,15 +253,15 @@ pub fn published(rows: &[Published]) -> Table {
 }
 
 /// Only beside our own.
-fn published_together(assessment: &Assessment) -> Table {
+fn published_together(report: &EvaluationReport) -> Table {
     let mut table = Table::new(
         "Published from the phases' beginnings, in another simulator",
         "CoHuB's means over the phases of its tasks of two robots, each phase begun at in 50 demonstrations, percent.",
         &["Method", "Alone", "Together", "Gap (points)", "Drop"],
         1,
     );
-    if assessment.policies.iter().any(|policy| policy.phase_level.is_some()) {
-        table.rows.extend(assessment.published_averages.iter().map(|row| {
+    if report.policies.iter().any(|policy| policy.phase_level.is_some()) {
+        table.rows.extend(report.published_averages.iter().map(|row| {
             let (alone, together) = (row.non_collaborative_share, row.collaborative_share);
             let drop = format!("{} %", percent((alone - together) / alone));
             vec![row.method.clone(), percent(alone), percent(together), signed(together - alone), drop]

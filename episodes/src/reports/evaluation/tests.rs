@@ -5,16 +5,16 @@ use std::path::Path;
 use tandem_tools_spec::{EndReason, PhaseTimes, Protocol, ResultReply};
 
 use super::*;
-use crate::results::Played;
+use crate::results::PlayedEpisode;
 use crate::spec::{EpisodeSpec, PhaseStart, Start};
 use crate::tasks::{self, Task};
 
 /// An episode that reached the first `phases` phases.
-fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Played {
+fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> PlayedEpisode {
     let reached = |index: usize| (index < phases).then_some(4.0 * (index as f64 + 1.0));
     let times = (0..task.phases.len()).map(|index| (crate::Phase::number(index), reached(index)));
     let ended = if phases == task.phases.len() { EndReason::TaskComplete } else { EndReason::Finished };
-    Played {
+    PlayedEpisode {
         by: policy.into(),
         spec: EpisodeSpec::new(task, seed, Protocol::Benchmark),
         locomotion: "balance".into(),
@@ -39,13 +39,13 @@ fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Played
 }
 
 /// Ten episodes of Handover, of which nine, six and three reach its phases.
-fn nine_six_three(policy: &str) -> Vec<Played> {
+fn nine_six_three(policy: &str) -> Vec<PlayedEpisode> {
     let task = tasks::find("handover").unwrap();
     let reached = [3, 3, 3, 2, 2, 2, 1, 1, 1, 0];
     (0..).zip(reached).map(|(seed, phases)| played(policy, task, seed, phases)).collect()
 }
 
-fn write(folder: &Path, episodes: &[Played]) {
+fn write(folder: &Path, episodes: &[PlayedEpisode]) {
     std::fs::create_dir_all(folder.join("episodes")).unwrap();
     for played in episodes {
         let name = format!("{}-{}.json", played.spec.task.id, played.spec.seed);
@@ -54,9 +54,9 @@ fn write(folder: &Path, episodes: &[Played]) {
     }
 }
 
-fn found(episodes: Vec<Played>) -> Loaded {
-    let episodes = episodes.into_iter().map(|played| Found { played, strip: None }).collect();
-    Loaded { episodes, skipped: Vec::new() }
+fn found(episodes: Vec<PlayedEpisode>) -> LoadedEpisodes {
+    let episodes = episodes.into_iter().map(|played| FoundEpisode { played, strip: None }).collect();
+    LoadedEpisodes { episodes, skipped: Vec::new() }
 }
 
 #[test]
@@ -70,7 +70,7 @@ fn folders_are_joined_and_nothing_counts_twice() {
     let loaded = load(&[one.clone(), other]).unwrap();
     assert_eq!((loaded.episodes.len(), loaded.skipped.len()), (10, 1));
     assert!(loaded.skipped[0].contains("torn.json"), "{:?}", loaded.skipped);
-    let report = Assessment::of(&loaded);
+    let report = EvaluationReport::of(&loaded);
     assert_eq!((report.policies.len(), report.policies[0].episodes), (1, 10));
     let text = load(&[folder.path().into()]).unwrap_err().to_string();
     assert!(text.contains("no episodes in"), "{text}");
@@ -78,7 +78,7 @@ fn folders_are_joined_and_nothing_counts_twice() {
 
 #[test]
 fn rates_are_counted_by_phase() {
-    let report = Assessment::of(&found(nine_six_three("agent")));
+    let report = EvaluationReport::of(&found(nine_six_three("agent")));
     let handover = &report.policies[0].tasks[0];
     let fractions = |rate: fn(&PhaseReport) -> Option<Rate>| -> Vec<String> {
         handover.phases.iter().map(|phase| rate(phase).map_or("-".into(), Rate::fraction)).collect()
@@ -87,7 +87,7 @@ fn rates_are_counted_by_phase() {
     assert_eq!(fractions(|phase| phase.conditional), ["9/10", "6/9", "3/6"]);
     assert_eq!(fractions(|phase| phase.from_its_beginning), ["-", "-", "-"]);
     let together = &report.policies[0].together;
-    let mean = |mean: &Option<Mean>| mean.as_ref().map(|mean| mean.mean_share);
+    let mean = |mean: &Option<MeanRate>| mean.as_ref().map(|mean| mean.mean_share);
     assert_eq!((mean(&together.alone), mean(&together.together)), (Some(0.7), Some(6.0 / 9.0)));
     let effort = handover.effort.as_ref().unwrap();
     assert_eq!((effort.steps.min, effort.steps.median_value, effort.steps.max), (500.0, 504.5, 509.0));
@@ -105,7 +105,7 @@ fn averages_are_by_number_of_robots() {
     let everything = tasks::ALL.iter().flat_map(|task| {
         (0..4).map(move |seed| played("agent", task, seed, if seed == 0 { 0 } else { task.phases.len() }))
     });
-    let report = Assessment::of(&found(everything.collect()));
+    let report = EvaluationReport::of(&found(everything.collect()));
     let averages = &report.policies[0].averages;
     assert_eq!(averages.iter().map(|average| average.tasks).sum::<usize>(), tasks::ALL.len());
     for average in averages {
@@ -127,7 +127,7 @@ fn policies_are_compared_on_the_seeds_that_both_played() {
     // Seed 0 worse, seeds 3 to 8 better, and one that the first did not play.
     let others = [(0, 2), (1, 3), (3, 3), (4, 3), (5, 3), (6, 3), (7, 3), (8, 3), (9, 0), (70, 3)];
     episodes.extend(others.map(|(seed, phases)| played("other", handover, seed, phases)));
-    let report = Assessment::of(&found(episodes));
+    let report = EvaluationReport::of(&found(episodes));
     let last = report.comparisons[0].rows.iter().find(|row| row.last && row.task.is_some()).unwrap();
     let pairs = last.pairs;
     assert_eq!((pairs.both, pairs.first_only, pairs.second_only, pairs.neither), (1, 1, 6, 1));
@@ -141,7 +141,7 @@ fn policies_are_compared_on_the_seeds_that_both_played() {
 fn namesakes_are_told_apart_by_what_differs() {
     let [one, mut other] = [nine_six_three("agent"), nine_six_three("agent")];
     other.iter_mut().for_each(|played| played.spec.protocol = Protocol::Agentic);
-    let report = Assessment::of(&found([one, other].concat()));
+    let report = EvaluationReport::of(&found([one, other].concat()));
     let names: Vec<&str> = report.policies.iter().map(|policy| policy.name.as_str()).collect();
     assert_eq!(names, ["agent (benchmark)", "agent (agentic)"]);
 }
@@ -154,8 +154,8 @@ fn reports_quote_what_they_are_told() {
     let mut begun = played("a<b>&\"|_,%", tasks::find("handover").unwrap(), 0, 2);
     begun.spec.start = Start::Phase(start);
     episodes.push(begun);
-    let report = Assessment::of(&found(episodes));
-    let check = |format: Format, expected: &[&str], absent: &[&str]| {
+    let report = EvaluationReport::of(&found(episodes));
+    let check = |format: ReportFormat, expected: &[&str], absent: &[&str]| {
         let text = report.write(format, &[]).unwrap();
         for wanted in expected {
             assert!(text.contains(wanted), "{format:?} has no {wanted}: {text}");
@@ -165,7 +165,7 @@ fn reports_quote_what_they_are_told() {
         }
     };
     check(
-        Format::Html,
+        ReportFormat::Html,
         &[
             "a&lt;b&gt;&amp;&quot;|_,%",
             "prefers-color-scheme: dark",
@@ -175,17 +175,22 @@ fn reports_quote_what_they_are_told() {
         ],
         &["<script", "<link", "url(", "src=\"http", "href=", "a<b>"],
     );
-    check(Format::Markdown, &["a<b>&\"\\|_,%", "| p2 transfer | together | 60 [26.2, 87.8] 6/10 |"], &[]);
     check(
-        Format::Csv,
+        ReportFormat::Markdown,
+        &["a<b>&\"\\|_,%", "| p2 transfer | together | 60 [26.2, 87.8] 6/10 |"],
+        &[],
+    );
+    check(
+        ReportFormat::Csv,
         &[
             "\"a<b>&\"\"|_,%\",benchmark,handover,2,p2,transfer,true,cumulative,6,10,0.6,",
             ",from_its_beginning,1,1,1,0.02",
         ],
         &[],
     );
-    check(Format::Tex, &["a$<$b$>$\\&\"|\\_,\\%", "\\toprule", "60 [26.2, 87.8] 6/10"], &["a<b>"]);
-    let json: serde_json::Value = serde_json::from_str(&report.write(Format::Json, &[]).unwrap()).unwrap();
+    check(ReportFormat::Tex, &["a$<$b$>$\\&\"|\\_,\\%", "\\toprule", "60 [26.2, 87.8] 6/10"], &["a<b>"]);
+    let json: serde_json::Value =
+        serde_json::from_str(&report.write(ReportFormat::Json, &[]).unwrap()).unwrap();
     assert_eq!(json["policies"][0]["tasks"][0]["phases"][1]["cumulative"]["successes"], 6);
 }
 
@@ -196,14 +201,14 @@ fn failures_are_shown_by_turns() {
     image::RgbImage::new(812, 40).save(&strip).unwrap();
     let mut loaded = found(nine_six_three("agent"));
     let other = tasks::find("pouring").unwrap();
-    loaded.episodes.push(Found { played: played("agent", other, 1, 0), strip: None });
+    loaded.episodes.push(FoundEpisode { played: played("agent", other, 1, 0), strip: None });
     loaded.episodes.iter_mut().for_each(|found| found.strip = Some(strip.clone()));
     let shown = gallery(&loaded, 2);
     let seeds: Vec<_> = shown.iter().map(|failure| (failure.task, failure.seed, &*failure.phase)).collect();
     assert_eq!(seeds, [("handover", 3, "p3"), ("pouring", 1, "p1")]);
     let picture = shown[0].picture.as_ref().unwrap();
     assert_eq!((picture.width, picture.height, &picture.webp[..4]), (406, 20, &b"RIFF"[..]));
-    let page = Assessment::of(&loaded).write(Format::Html, &shown).unwrap();
+    let page = EvaluationReport::of(&loaded).write(ReportFormat::Html, &shown).unwrap();
     assert!(
         page.contains("2 of 8 episodes that failed") && page.contains("data:image/webp;base64,"),
         "{page}"

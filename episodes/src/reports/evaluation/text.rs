@@ -1,12 +1,12 @@
 //! Reports without pictures: Markdown, CSV with a line for each rate, and tables for LaTeX.
 
-use super::Assessment;
+use super::EvaluationReport;
 use super::rate::Rate;
 use super::tables::{Table, all};
 
-pub fn markdown(assessment: &Assessment) -> String {
+pub fn markdown(report: &EvaluationReport) -> String {
     let mut text = String::from("# Tandem: report\n");
-    for table in all(assessment) {
+    for table in all(report) {
         let line = |cells: &[String]| {
             format!("| {} |\n", cells.iter().map(|c| escape_pipe(c)).collect::<Vec<_>>().join(" | "))
         };
@@ -17,7 +17,7 @@ pub fn markdown(assessment: &Assessment) -> String {
         text += &format!("|{}|\n", rules.collect::<Vec<_>>().join("|"));
         text.extend(table.rows.iter().map(|row| line(row)));
     }
-    text.extend(assessment.skipped.iter().map(|skipped| format!("\nLeft out: {skipped}\n")));
+    text.extend(report.skipped.iter().map(|skipped| format!("\nLeft out: {skipped}\n")));
     text
 }
 
@@ -26,11 +26,11 @@ fn escape_pipe(cell: &str) -> String {
 }
 
 /// A line for each rate of each phase, for whoever counts on.
-pub fn csv(assessment: &Assessment) -> String {
+pub fn csv(report: &EvaluationReport) -> String {
     let mut text = String::from(
         "policy,protocol,task,robots,phase_number,phase_id,collaborative,rate,successes,trials,share,low_share,high_share\n",
     );
-    for policy in &assessment.policies {
+    for policy in &report.policies {
         for task in &policy.tasks {
             for phase in &task.phases {
                 let rates = [
@@ -62,9 +62,9 @@ fn quoted(cell: &str) -> String {
 }
 
 /// Needs the package `booktabs`.
-pub fn tex(assessment: &Assessment) -> String {
+pub fn tex(report: &EvaluationReport) -> String {
     let mut text = String::from("% Needs \\usepackage{booktabs}.\n");
-    text.extend(all(assessment).iter().map(tex_table));
+    text.extend(all(report).iter().map(tex_table));
     text
 }
 

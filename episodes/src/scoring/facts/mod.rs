@@ -193,5 +193,3 @@ impl Facts {
 
 #[cfg(test)]
 mod constructed;
-#[cfg(test)]
-mod tests;

@@ -12,16 +12,16 @@ use crate::{
 
 /// What a control step of Handover shows: who holds the bottle, and where it is.
 #[derive(Clone, Copy, Debug)]
-enum Scene {
+enum BottleState {
     Rests,
     Aloft(&'static [usize]),
     OnTarget,
 }
-use Scene::{Aloft, OnTarget, Rests};
+use BottleState::{Aloft, OnTarget, Rests};
 
-fn facts(scene: Scene) -> Facts {
+fn facts(state: BottleState) -> Facts {
     let mut facts = Facts::at_rest(tasks::find("handover").unwrap());
-    match scene {
+    match state {
         Rests => {}
         Aloft(holders) => {
             facts = facts.raised("bottle", 0.1);
@@ -37,20 +37,20 @@ fn facts(scene: Scene) -> Facts {
     facts
 }
 
-/// Phases reached after each of the scenes.
-fn play(scenes: &[Scene]) -> Vec<usize> {
+/// Phases reached after each of the states.
+fn play(states: &[BottleState]) -> Vec<usize> {
     let mut tracker = PhaseTracker::new(tasks::find("handover").unwrap().phases);
-    let step = |scene: &Scene| {
-        tracker.update(&facts(*scene));
+    let step = |state: &BottleState| {
+        tracker.update(&facts(*state));
         tracker.reached().count()
     };
-    scenes.iter().map(step).collect()
+    states.iter().map(step).collect()
 }
 
 #[test]
 fn order_is_enforced_and_sequences_are_unbroken() {
     let (by_a, by_both, by_b, by_nobody) = (Aloft(&[A]), Aloft(&[A, B]), Aloft(&[B]), Aloft(&[]));
-    for (scenes, reached) in [
+    for (states, reached) in [
         (&[Rests, by_a, by_both, by_b, OnTarget][..], &[0, 1, 1, 2, 3][..]),
         // The right final pose alone is nothing, nor is a transfer without A's lift.
         (&[OnTarget, OnTarget], &[0, 0]),
@@ -66,7 +66,7 @@ fn order_is_enforced_and_sequences_are_unbroken() {
         // What has been reached stays reached.
         (&[by_a, Rests, by_both, by_b, by_nobody, OnTarget, Rests], &[1, 1, 1, 2, 2, 3, 3]),
     ] {
-        assert_eq!(play(scenes), reached, "{scenes:?}");
+        assert_eq!(play(states), reached, "{states:?}");
     }
 }
 
@@ -98,9 +98,9 @@ fn a_lasting_condition_needs_its_whole_time_without_a_break() {
         (&[(OUT, 1), (LOW, 60), (IN, 1)], 3),
     ] {
         let mut tracker = PhaseTracker::new(pouring.phases);
-        let steps = runs.iter().flat_map(|(scene, count)| std::iter::repeat_n(*scene, *count));
-        for (step, scene) in steps.enumerate() {
-            tracker.update(&facts(step, scene));
+        let steps = runs.iter().flat_map(|(state, count)| std::iter::repeat_n(*state, *count));
+        for (step, state) in steps.enumerate() {
+            tracker.update(&facts(step, state));
         }
         assert_eq!(tracker.reached().count(), expected, "{runs:?}");
     }
@@ -176,9 +176,9 @@ fn milestones_are_passed_in_any_order_and_stay_passed() {
         (&[(LIFTED, 60)], 0),
     ] {
         let mut tracker = PhaseTracker::new(move_house.phases);
-        let steps = runs.iter().flat_map(|(scene, count)| std::iter::repeat_n(*scene, *count));
-        for (step, scene) in steps.enumerate() {
-            tracker.update(&facts(step, scene));
+        let steps = runs.iter().flat_map(|(state, count)| std::iter::repeat_n(*state, *count));
+        for (step, state) in steps.enumerate() {
+            tracker.update(&facts(step, state));
         }
         assert_eq!(tracker.reached().count(), expected, "{runs:?}");
     }
@@ -188,8 +188,8 @@ fn milestones_are_passed_in_any_order_and_stay_passed() {
 fn each_phase_has_the_time_of_its_step() {
     let handover = tasks::find("handover").unwrap();
     let mut tracker = PhaseTracker::new(handover.phases);
-    for (time_s, scene) in [(1.0, Rests), (2.0, Aloft(&[A])), (3.0, Aloft(&[A, B])), (4.0, Aloft(&[B]))] {
-        let facts = Facts { time_s, ..facts(scene) };
+    for (time_s, state) in [(1.0, Rests), (2.0, Aloft(&[A])), (3.0, Aloft(&[A, B])), (4.0, Aloft(&[B]))] {
+        let facts = Facts { time_s, ..facts(state) };
         assert_eq!(tracker.update(&facts), time_s == 2.0 || time_s == 4.0);
     }
     let reached: Vec<_> = tracker.reached().map(|(phase, time_s)| (phase.id, time_s)).collect();

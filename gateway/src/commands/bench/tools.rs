@@ -7,7 +7,7 @@ use std::{
 };
 
 use serde::Serialize;
-use tandem_episodes::{players::Caller, tasks};
+use tandem_episodes::{players::Episode, tasks};
 use tandem_tools_spec::{GetRobotState, GetStatus, Protocol, StartEpisode, ToolCall, Wait};
 
 use crate::{

@@ -5,7 +5,7 @@ use std::{ops::RangeInclusive, path::PathBuf, str::FromStr};
 use clap::Args;
 use tandem_episodes::{
     Controller, RendererKind, RobotFile, SceneFile, SimError,
-    evaluation::{Plan, Shard, Starts},
+    evaluation::{EvaluationPlan, Shard, Starts},
     players::Policy,
     tasks::{self, Task},
 };
@@ -98,9 +98,9 @@ fn parse_tasks(text: &str) -> Result<TaskList, String> {
 
 impl EpisodeFlags {
     /// The plan to have `player` play these episodes.
-    pub fn plan(self, player: &dyn Policy, record: bool) -> Result<Plan<'_>, SimError> {
+    pub fn plan(self, player: &dyn Policy, record: bool) -> Result<EvaluationPlan<'_>, SimError> {
         tracing::info!("{}", self.renderer.kind.describe()?);
-        Ok(Plan {
+        Ok(EvaluationPlan {
             player,
             protocol: self.protocol,
             scene: self.scene.read()?,

@@ -4,7 +4,7 @@ use std::{error::Error, time::Duration};
 
 use tandem_episodes::{
     EpisodeSpec,
-    players::{self, Fared, Place, PlayError, Policy},
+    players::{self, EpisodeOutput, PlayError, PlayOutcome, Policy},
     results::PolicyCard,
 };
 use tandem_tools_spec::{Driving, Operators};
@@ -46,7 +46,7 @@ pub struct PolicyFlags {
 /// A policy on the command line.
 #[derive(Clone, Debug)]
 enum PolicyChoice {
-    Player(&'static players::Entry),
+    Player(&'static players::PlayerEntry),
     Program(String),
     Remote(Protocol, Vec<String>),
 }
@@ -135,15 +135,15 @@ impl PolicyFlags {
 
 /// One of the program's own players.
 #[derive(Debug)]
-struct BuiltIn(&'static players::Entry);
+struct BuiltIn(&'static players::PlayerEntry);
 
 impl Policy for BuiltIn {
     fn card(&self) -> PolicyCard {
         self.0.card()
     }
 
-    fn play_whole(&self, spec: &EpisodeSpec, place: Place) -> Result<Fared, PlayError> {
-        self.0.play_whole(spec, place)
+    fn play_episode(&self, spec: &EpisodeSpec, output: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
+        self.0.play_episode(spec, output)
     }
 }
 
@@ -159,8 +159,8 @@ impl Policy for Renamed {
         PolicyCard { name: self.name.clone(), ..self.policy.card() }
     }
 
-    fn play_whole(&self, spec: &EpisodeSpec, place: Place) -> Result<Fared, PlayError> {
-        self.policy.play_whole(spec, place)
+    fn play_episode(&self, spec: &EpisodeSpec, output: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
+        self.policy.play_episode(spec, output)
     }
 }
 

@@ -15,7 +15,7 @@ use std::{
 use serde_json::json;
 use tandem_episodes::{
     EpisodeSpec, RunFolder, Visibility, create_private_folder,
-    players::{Fared, Place, PlayError, Policy},
+    players::{EpisodeOutput, PlayError, PlayOutcome, Policy},
     results::PolicyCard,
 };
 use tandem_tools_spec::{Driving, EndReason, ResultReply, StartReply};
@@ -136,7 +136,7 @@ impl Policy for Program {
         PolicyCard { settings: Some(settings), ..name.as_str().into() }
     }
 
-    fn play_whole(&self, spec: &EpisodeSpec, place: Place) -> Result<Fared, PlayError> {
+    fn play_episode(&self, spec: &EpisodeSpec, place: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
         let folder = place.folder;
         create_private_folder(folder).map_err(|error| lost("no folder for the episode", error))?;
         let absolute = folder.canonicalize().map_err(|error| lost("no folder for the episode", error))?;
@@ -161,7 +161,7 @@ impl Policy for Program {
         });
         let reasons: Vec<String> = reasons.collect();
         let stopped = (!reasons.is_empty()).then(|| reasons.join("; "));
-        Ok(Fared { result, thought, stopped })
+        Ok(PlayOutcome { result, thought, stopped })
     }
 }
 

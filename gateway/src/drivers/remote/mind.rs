@@ -6,7 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use tandem_episodes::players::{Onlooker, PlayerError};
+use tandem_episodes::players::{PlayerError, ThirdPersonEpisode};
 use tandem_tools_spec::{JointChunk, SendJointChunk, StopReason, ToolReply};
 
 use super::{
@@ -56,7 +56,7 @@ impl<'a> Mind<'a> {
     }
 
     /// Plays until the episode is over, or a policy fails.
-    pub fn play(&mut self, episode: &mut dyn Onlooker) -> Result<(), PlayerError> {
+    pub fn play(&mut self, episode: &mut dyn ThirdPersonEpisode) -> Result<(), PlayerError> {
         let mut held: Option<Vec<Vec<f64>>> = None;
         loop {
             let sight = Sight::take(episode, self.asker.map.shows_third_person())?;
@@ -152,7 +152,11 @@ fn patiently<T>(
 }
 
 /// Sends the rows of all robots, in as many commands as the protocol asks for; no more rows than every robot has.
-fn execute(episode: &mut dyn Onlooker, chunks: &[JointChunk], most_steps: usize) -> Result<(), PlayerError> {
+fn execute(
+    episode: &mut dyn ThirdPersonEpisode,
+    chunks: &[JointChunk],
+    most_steps: usize,
+) -> Result<(), PlayerError> {
     let rows = chunks.iter().map(|chunk| chunk.rows.len()).min().unwrap_or_default();
     for from in (0..rows).step_by(most_steps.max(1)) {
         let to = rows.min(from + most_steps);

@@ -15,7 +15,7 @@ mod values;
 use serde_json::json;
 use tandem_episodes::{
     EpisodeSpec,
-    players::{Fared, Place, PlayError, Policy, play_in_process},
+    players::{EpisodeOutput, PlayError, PlayOutcome, Policy, play_in_process},
     results::PolicyCard,
     rules,
     tasks::Task,
@@ -66,7 +66,7 @@ impl Policy for Remote {
         }
     }
 
-    fn play_whole(&self, spec: &EpisodeSpec, place: Place) -> Result<Fared, PlayError> {
+    fn play_episode(&self, spec: &EpisodeSpec, place: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
         self.check(spec.task).map_err(PlayError::NotReady)?;
         let most_steps = rules(spec.protocol, spec.task).steps_per_command;
         let mind = Mind::open(self.protocol, &self.urls, &self.map, cast(spec.task), most_steps);

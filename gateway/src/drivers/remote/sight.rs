@@ -1,7 +1,7 @@
 //! What all robots see and feel at one moment, read once for every request.
 
 use image::RgbImage;
-use tandem_episodes::players::{Onlooker, PlayerError};
+use tandem_episodes::players::{PlayerError, ThirdPersonEpisode};
 use tandem_tools_spec::{LookReply, Observe, ToolCall, ToolReply};
 
 use super::{columns, error::RemoteError};
@@ -27,7 +27,7 @@ const HEIGHT_PX: u32 = 240;
 
 impl Sight {
     /// What there is to see now.
-    pub fn take(episode: &mut dyn Onlooker, third_person: bool) -> Result<Sight, PlayerError> {
+    pub fn take(episode: &mut dyn ThirdPersonEpisode, third_person: bool) -> Result<Sight, PlayerError> {
         let call: ToolCall = Observe { robots: None, short: Some(true) }.into();
         let tool = call.name();
         let failed = |reason: String| PlayerError::Call { tool, reason };

@@ -3,15 +3,15 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use serde_json::json;
-use tandem_episodes::evaluation::{Plan, Shard, Starts, evaluate};
-use tandem_episodes::reports::{Assessment, load};
-use tandem_episodes::results::Played;
+use tandem_episodes::evaluation::{EvaluationPlan, Shard, Starts, evaluate};
+use tandem_episodes::reports::{EvaluationReport, load};
+use tandem_episodes::results::PlayedEpisode;
 use tandem_episodes::{Controller, RendererKind, RobotFile, players, tasks};
 use tandem_tools_spec::{Disclosure, EndReason, Hints, Protocol};
 
-fn plan(jobs: usize, seeds: Vec<u32>) -> Plan<'static> {
+fn plan(jobs: usize, seeds: Vec<u32>) -> EvaluationPlan<'static> {
     let handover = tasks::find("handover").expect("a task");
-    Plan {
+    EvaluationPlan {
         player: players::find("expert").expect("a player"),
         protocol: Protocol::Benchmark,
         scene: None,
@@ -33,7 +33,7 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> Plan<'static> {
 fn what_policies_are_told_is_recorded_and_not_mixed() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let play = |disclosure: Disclosure, hints: Hints| {
-        let plan = Plan { disclosure, hints, ..plan(1, vec![1]) };
+        let plan = EvaluationPlan { disclosure, hints, ..plan(1, vec![1]) };
         let told = evaluate(&plan, folder.path(), &|_| {}).expect("it is played").episodes.remove(0);
         let text = std::fs::read_to_string(folder.path().join("results.json")).expect("it was written");
         let results: serde_json::Value = serde_json::from_str(&text).expect("valid JSON");
@@ -48,7 +48,7 @@ fn what_policies_are_told_is_recorded_and_not_mixed() {
 }
 
 /// State hashes without the times that a machine took.
-fn hashes(episodes: &[Played]) -> Vec<(u32, &str)> {
+fn hashes(episodes: &[PlayedEpisode]) -> Vec<(u32, &str)> {
     episodes.iter().map(|episode| (episode.result.seed, episode.result.state_hash.as_str())).collect()
 }
 
@@ -64,7 +64,7 @@ fn jobs_change_nothing_and_kept_episodes_are_not_played_again() {
     // A kept episode comes back with the figures of the machine that played it; a lost one is played again.
     std::fs::remove_file(one.path().join("episodes/handover-2.json")).expect("the file was written");
     let finished = AtomicU32::new(0);
-    let count = |_: &Played| {
+    let count = |_: &PlayedEpisode| {
         finished.fetch_add(1, Ordering::Relaxed);
     };
     let resumed = evaluate(&plan(1, vec![1, 2]), one.path(), &count).expect("it is played");
@@ -82,12 +82,12 @@ fn jobs_change_nothing_and_kept_episodes_are_not_played_again() {
 fn phases_are_played_on_their_own_by_shares_and_joined_by_a_report() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let [demos, out] = ["demos", "out"].map(|name| folder.path().join(name));
-    evaluate(&Plan { record: true, ..plan(1, vec![1]) }, &demos, &|_| {}).expect("it is played");
+    evaluate(&EvaluationPlan { record: true, ..plan(1, vec![1]) }, &demos, &|_| {}).expect("it is played");
     let phases = ["p1", "p2", "p3"].map(String::from).to_vec();
     let starts = Starts::Phases { demonstrations: demos, phases };
     let mut left_out = 0;
     for index in 0..2 {
-        let plan = Plan {
+        let plan = EvaluationPlan {
             player: players::find("demonstration").expect("a player"),
             starts: starts.clone(),
             shard: Shard { index, of: 2 },
@@ -99,7 +99,7 @@ fn phases_are_played_on_their_own_by_shares_and_joined_by_a_report() {
         assert!(out.join(format!("results-{index}-of-2.json")).exists());
     }
     assert_eq!(left_out, 3, "nobody has demonstrated seed 2");
-    let report = Assessment::of(&load(&[out]).expect("episodes"));
+    let report = EvaluationReport::of(&load(&[out]).expect("episodes"));
     let level = report.policies[0].phase_level.as_ref().expect("phases on their own");
     let reached: Vec<_> =
         level.phases.iter().map(|rate| (&*rate.number, rate.reached, rate.episodes)).collect();

@@ -3,8 +3,8 @@
 use std::ops::RangeInclusive;
 use std::thread::available_parallelism;
 
-use tandem_episodes::evaluation::{Plan, Shard, Starts, evaluate};
-use tandem_episodes::players::{self, Backstage, Caller, InProcess, PlayerError, experts};
+use tandem_episodes::evaluation::{EvaluationPlan, Shard, Starts, evaluate};
+use tandem_episodes::players::{self, Episode, InProcess, PlayerError, PrivilegedEpisode, experts};
 use tandem_episodes::tasks::{self, Task};
 use tandem_episodes::{A, Controller, EpisodeSpec, Facts, RendererKind, RobotFile, Session};
 use tandem_sim::Side;
@@ -18,7 +18,7 @@ const SEEDS: [u32; 3] = [3, 6100, 6101];
 
 /// Plays the experts of `tasks`: phases in order, and nobody falls.
 fn solve(tasks: Vec<&'static Task>) {
-    let plan = Plan {
+    let plan = EvaluationPlan {
         player: players::find("expert").expect("a player"),
         protocol: Protocol::Benchmark,
         scene: None,
@@ -68,7 +68,7 @@ struct Slip {
 const TABLE: &str = "office_table";
 const SLIPS_AT_S: RangeInclusive<f64> = 14.0..=15.0;
 
-impl Caller for Slip {
+impl Episode for Slip {
     fn call(&mut self, mut call: ToolCall) -> Result<ToolReply, PlayerError> {
         let facts = self.episode.session.facts();
         let holds = facts.holds(A, Side::Left, TABLE);
@@ -86,7 +86,7 @@ impl Caller for Slip {
     }
 }
 
-impl Backstage for Slip {
+impl PrivilegedEpisode for Slip {
     fn facts(&mut self) -> Result<Facts, PlayerError> {
         self.episode.facts()
     }

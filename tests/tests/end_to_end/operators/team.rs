@@ -47,7 +47,7 @@ impl Team {
         let path = self.server.folder(&self.id).join(Recorder::FILE_NAME);
         let recording = Recording::read(&path).expect("a whole recording");
         let verified = replay::verify(&recording).expect("a replay");
-        assert_eq!(verified.outcome, replay::Outcome::Same);
+        assert_eq!(verified.outcome, replay::Verdict::Same);
         (result, recording)
     }
 }

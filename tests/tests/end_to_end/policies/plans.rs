@@ -4,15 +4,15 @@ use std::path::Path;
 
 use tandem_episodes::{
     Controller, Recorder, Recording, RendererKind, RobotFile,
-    evaluation::{Evaluation, Plan, Shard, Starts, evaluate},
+    evaluation::{Evaluation, EvaluationPlan, Shard, Starts, evaluate},
     players::Policy,
     tasks,
 };
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
 /// Handover on `seeds`, under the benchmark protocol.
-pub fn plan(player: &dyn Policy, seeds: Vec<u32>, record: bool) -> Plan<'_> {
-    Plan {
+pub fn plan(player: &dyn Policy, seeds: Vec<u32>, record: bool) -> EvaluationPlan<'_> {
+    EvaluationPlan {
         player,
         protocol: Protocol::Benchmark,
         robot: RobotFile::default(),
@@ -31,7 +31,7 @@ pub fn plan(player: &dyn Policy, seeds: Vec<u32>, record: bool) -> Plan<'_> {
 }
 
 /// Plays into `folder`.
-pub fn play(plan: &Plan, folder: &Path) -> Evaluation {
+pub fn play(plan: &EvaluationPlan, folder: &Path) -> Evaluation {
     evaluate(plan, folder, &|_| {}).expect("it is played")
 }
 

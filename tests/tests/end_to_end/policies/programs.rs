@@ -4,7 +4,7 @@ use std::{env, fs, io::Read, path::Path, time::Duration};
 
 use serde_json::{Value, json};
 use tandem::drivers::Program;
-use tandem_episodes::results::Played;
+use tandem_episodes::results::PlayedEpisode;
 use tandem_tools_spec::{Driving, EndReason, Operators};
 
 use super::plans::{plan, play};
@@ -66,7 +66,7 @@ fn program(command: &str, limit: Duration) -> Program {
     Program::new(command.into(), Driving::default(), limit).expect("settings")
 }
 
-fn play_one(command: &str, limit: Duration, folder: &Path) -> Played {
+fn play_one(command: &str, limit: Duration, folder: &Path) -> PlayedEpisode {
     let mut evaluation = play(&plan(&program(command, limit), vec![1], false), folder);
     evaluation.episodes.remove(0)
 }

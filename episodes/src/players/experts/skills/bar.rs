@@ -4,8 +4,8 @@ use std::f32::consts::FRAC_PI_2;
 
 use tandem_sim::{Pose, Rotation, Side, Vector};
 
-use super::hand::{closed_rad, mirrored_m, open_rad};
-use super::stage::{HandMove, Stage};
+use super::commander::{Commander, HandMove};
+use super::cylinder::{closed_rad, mirrored_m, open_rad};
 use crate::players::PlayerError;
 use crate::scoring::Facts;
 
@@ -61,8 +61,8 @@ impl<'a> BarGrasp<'a> {
 
 impl BarGrasp<'_> {
     /// Wrist motion to the bar, `standoff_m` short of it.
-    fn reach(&self, stage: &mut Stage, standoff_m: f32) -> Result<HandMove, PlayerError> {
-        let facts = stage.facts()?;
+    fn reach(&self, commander: &mut Commander, standoff_m: f32) -> Result<HandMove, PlayerError> {
+        let facts = commander.facts()?;
         let bar_in_wrist_m = mirrored_m(self.bar_in_wrist_m + Vector::new(0.0, standoff_m, 0.0), self.side);
         let bar_m = facts.site(self.object, self.bar).position_m();
         let origin_m = bar_m - self.object_from_wrist * bar_in_wrist_m;
@@ -72,13 +72,13 @@ impl BarGrasp<'_> {
     }
 
     /// Open hand, `standoff_m` short of the bar.
-    pub fn before(&self, stage: &mut Stage, standoff_m: f32) -> Result<HandMove, PlayerError> {
-        Ok(self.reach(stage, standoff_m)?.shaped(open_rad(self.side)))
+    pub fn before(&self, commander: &mut Commander, standoff_m: f32) -> Result<HandMove, PlayerError> {
+        Ok(self.reach(commander, standoff_m)?.shaped(open_rad(self.side)))
     }
 
     /// Palm on the bar.
-    pub fn around(&self, stage: &mut Stage) -> Result<HandMove, PlayerError> {
-        self.reach(stage, 0.0)
+    pub fn around(&self, commander: &mut Commander) -> Result<HandMove, PlayerError> {
+        self.reach(commander, 0.0)
     }
 
     pub fn close(&self) -> HandMove {
@@ -101,8 +101,8 @@ impl BarGrasp<'_> {
         facts.holds(self.robot, self.side, self.object)
     }
 
-    pub fn holds(&self, stage: &mut Stage) -> Result<bool, PlayerError> {
-        Ok(stage.facts()?.holds_any(self.robot, self.object))
+    pub fn holds(&self, commander: &mut Commander) -> Result<bool, PlayerError> {
+        Ok(commander.facts()?.holds_any(self.robot, self.object))
     }
 }
 
@@ -111,27 +111,28 @@ const ATTEMPTS: usize = 4;
 const STANDOFF_M: f32 = 0.08;
 
 /// Closes all hands on their bars at once; hands that miss try again.
-pub fn take_together(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
-    let each = |stage: &mut Stage, part: fn(&BarGrasp, &mut Stage) -> Result<HandMove, PlayerError>| {
-        grasps.iter().map(|grasp| part(grasp, stage)).collect::<Result<Vec<_>, _>>()
+pub fn take_together(commander: &mut Commander, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
+    let each = |commander: &mut Commander,
+                part: fn(&BarGrasp, &mut Commander) -> Result<HandMove, PlayerError>| {
+        grasps.iter().map(|grasp| part(grasp, commander)).collect::<Result<Vec<_>, _>>()
     };
     for _ in 0..ATTEMPTS {
-        let before = each(stage, |grasp, stage| grasp.before(stage, STANDOFF_M))?;
-        stage.perform(1.4, &before)?;
-        let around = each(stage, |grasp, stage| grasp.around(stage))?;
-        stage.perform(0.8, &around)?;
+        let before = each(commander, |grasp, commander| grasp.before(commander, STANDOFF_M))?;
+        commander.perform(1.4, &before)?;
+        let around = each(commander, |grasp, commander| grasp.around(commander))?;
+        commander.perform(0.8, &around)?;
         let close: Vec<HandMove> = grasps.iter().map(BarGrasp::close).collect();
-        stage.perform(0.8, &close)?;
-        stage.perform(0.4, &close)?;
+        commander.perform(0.8, &close)?;
+        commander.perform(0.4, &close)?;
         let mut held = true;
         for grasp in grasps {
-            held &= grasp.holds(stage)?;
+            held &= grasp.holds(commander)?;
         }
         if held {
             return Ok(());
         }
         let open: Vec<HandMove> = grasps.iter().map(BarGrasp::open).collect();
-        stage.perform(0.5, &open)?;
+        commander.perform(0.5, &open)?;
     }
     Err(PlayerError::GaveUp("not every hand could take its bar".into()))
 }
@@ -139,7 +140,7 @@ pub fn take_together(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), Playe
 /// Brings an object that all `grasps` hold to a pose (world) in `legs` short straight moves, so that hands and object
 /// stay together on a path that turns.
 pub fn move_together(
-    stage: &mut Stage,
+    commander: &mut Commander,
     grasps: &[BarGrasp],
     path: &dyn Fn(f32) -> Pose,
     legs: u32,
@@ -147,10 +148,10 @@ pub fn move_together(
 ) -> Result<(), PlayerError> {
     let Some(first) = grasps.first() else { return Ok(()) };
     // The grips are measured once: following the object's own lag would let hands drift apart.
-    let object = stage.facts()?.object(first.object).pose_in_world;
+    let object = commander.facts()?.object(first.object).pose_in_world;
     let mut grips = Vec::with_capacity(grasps.len());
     for grasp in grasps {
-        grips.push(object.inverse() * stage.world_from_wrist(grasp.robot, grasp.side)?);
+        grips.push(object.inverse() * commander.world_from_wrist(grasp.robot, grasp.side)?);
     }
     for leg in 1..=legs {
         let goal = path(leg as f32 / legs as f32);
@@ -159,7 +160,7 @@ pub fn move_together(
             .zip(&grips)
             .map(|(grasp, grip)| HandMove::reach(grasp.robot, grasp.side, goal * *grip))
             .collect();
-        stage.glide(leg_s, &moves)?;
+        commander.glide(leg_s, &moves)?;
     }
     Ok(())
 }

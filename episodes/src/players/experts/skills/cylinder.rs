@@ -1,9 +1,8 @@
-//! Grasps of upright cylinders, and moving what a hand holds.
+//! Shapes of a hand, grasps of upright cylinders, and moving what a hand holds.
 
 use tandem_sim::{Pose, Rotation, Side, Vector};
 
-use super::hand::{away, closed_rad, mirrored_m, open_rad};
-use super::stage::{HandMove, Stage};
+use super::commander::{Commander, HandMove};
 use crate::players::PlayerError;
 
 /// Where the axis of a held cylinder lies in a right wrist's frame: in front of the palm, between fingers and thumb.
@@ -26,8 +25,13 @@ pub struct CylinderGrasp<'a> {
 impl CylinderGrasp<'_> {
     /// Wrist motion that has the object in its grip, were the object upright and raised by `raise_m`; `standoff_m` short
     /// of it.
-    fn grip(&self, stage: &mut Stage, raise_m: f32, standoff_m: f32) -> Result<HandMove, PlayerError> {
-        let facts = stage.facts()?;
+    fn grip(
+        &self,
+        commander: &mut Commander,
+        raise_m: f32,
+        standoff_m: f32,
+    ) -> Result<HandMove, PlayerError> {
+        let facts = commander.facts()?;
         let height_m = facts.site(self.object, self.grip).position_m().z;
         let axis_m = facts.position_m(self.object) + Vector::new(0.0, 0.0, raise_m);
         let rotation = Rotation::from_rotation_z(self.heading_rad);
@@ -41,13 +45,13 @@ impl CylinderGrasp<'_> {
     }
 
     /// Open hand beside the object, `raise_m` above its grip; others may move at the same time.
-    pub fn beside(&self, stage: &mut Stage, raise_m: f32) -> Result<HandMove, PlayerError> {
-        Ok(self.grip(stage, raise_m, STANDOFF_M)?.shaped(open_rad(self.side)))
+    pub fn beside(&self, commander: &mut Commander, raise_m: f32) -> Result<HandMove, PlayerError> {
+        Ok(self.grip(commander, raise_m, STANDOFF_M)?.shaped(open_rad(self.side)))
     }
 
     /// Palm at the object.
-    pub fn around(&self, stage: &mut Stage) -> Result<HandMove, PlayerError> {
-        self.grip(stage, 0.0, 0.0)
+    pub fn around(&self, commander: &mut Commander) -> Result<HandMove, PlayerError> {
+        self.grip(commander, 0.0, 0.0)
     }
 
     pub fn close(&self) -> HandMove {
@@ -59,21 +63,21 @@ impl CylinderGrasp<'_> {
     }
 
     /// Away from the object, the way it came.
-    pub fn away(&self, stage: &mut Stage) -> Result<HandMove, PlayerError> {
-        let wrist = stage.world_from_wrist(self.robot, self.side)?;
+    pub fn away(&self, commander: &mut Commander) -> Result<HandMove, PlayerError> {
+        let wrist = commander.world_from_wrist(self.robot, self.side)?;
         let back = wrist.rotation * Vector::new(0.0, -STANDOFF_M * away(self.side), 0.0);
         Ok(self.reach(Pose::from_parts(wrist.translation + back, wrist.rotation)))
     }
 
     /// Wrist motion that brings the held object's origin to `object_m` (world), upright.
-    pub fn carry(&self, stage: &mut Stage, object_m: Vector) -> Result<HandMove, PlayerError> {
-        self.bring(stage, Pose::from_translation(object_m))
+    pub fn carry(&self, commander: &mut Commander, object_m: Vector) -> Result<HandMove, PlayerError> {
+        self.bring(commander, Pose::from_translation(object_m))
     }
 
     /// Wrist motion that brings the held object to a pose (world); its turn about its own axis does not matter.
-    pub fn bring(&self, stage: &mut Stage, world_from_object: Pose) -> Result<HandMove, PlayerError> {
-        let object = stage.facts()?.object(self.object).pose_in_world;
-        let wrist = stage.world_from_wrist(self.robot, self.side)?;
+    pub fn bring(&self, commander: &mut Commander, world_from_object: Pose) -> Result<HandMove, PlayerError> {
+        let object = commander.facts()?.object(self.object).pose_in_world;
+        let wrist = commander.world_from_wrist(self.robot, self.side)?;
         // How the object is turned about its axis relative to the hand stays as it was grasped.
         let upright = self.upright_rotation(object, wrist);
         let goal = Pose::from_parts(world_from_object.translation, world_from_object.rotation * upright);
@@ -87,43 +91,75 @@ impl CylinderGrasp<'_> {
         Rotation::from_rotation_arc(level * Vector::Z, Vector::Z) * level
     }
 
-    pub fn holds(&self, stage: &mut Stage) -> Result<bool, PlayerError> {
-        Ok(stage.facts()?.holds(self.robot, self.side, self.object))
+    pub fn holds(&self, commander: &mut Commander) -> Result<bool, PlayerError> {
+        Ok(commander.facts()?.holds(self.robot, self.side, self.object))
     }
 }
 
 const ATTEMPTS: usize = 4;
 
 /// Takes several objects at once, each with its hand; hands that miss try again.
-pub fn pick_up_all(stage: &mut Stage, grasps: &[CylinderGrasp]) -> Result<(), PlayerError> {
+pub fn pick_up_all(commander: &mut Commander, grasps: &[CylinderGrasp]) -> Result<(), PlayerError> {
     for _ in 0..ATTEMPTS {
         let mut missing = Vec::new();
         for grasp in grasps {
-            if !grasp.holds(stage)? {
+            if !grasp.holds(commander)? {
                 missing.push(*grasp);
             }
         }
         if missing.is_empty() {
             return Ok(());
         }
-        grasp_once(stage, &missing)?;
+        grasp_once(commander, &missing)?;
     }
     let names: Vec<&str> = grasps.iter().map(|grasp| grasp.object).collect();
     Err(PlayerError::GaveUp(format!("could not grasp {}", names.join(" and "))))
 }
 
 /// One attempt: over the objects, down beside them, around them, close.
-fn grasp_once(stage: &mut Stage, grasps: &[CylinderGrasp]) -> Result<(), PlayerError> {
-    let each = |stage: &mut Stage, part: fn(&CylinderGrasp, &mut Stage) -> Result<HandMove, PlayerError>| {
-        grasps.iter().map(|grasp| part(grasp, stage)).collect::<Result<Vec<_>, _>>()
+fn grasp_once(commander: &mut Commander, grasps: &[CylinderGrasp]) -> Result<(), PlayerError> {
+    let each = |commander: &mut Commander,
+                part: fn(&CylinderGrasp, &mut Commander) -> Result<HandMove, PlayerError>| {
+        grasps.iter().map(|grasp| part(grasp, commander)).collect::<Result<Vec<_>, _>>()
     };
-    let above = each(stage, |grasp, stage| grasp.beside(stage, 0.06))?;
-    stage.perform(0.8, &above)?;
-    let beside = each(stage, |grasp, stage| grasp.beside(stage, 0.0))?;
-    stage.perform(0.6, &beside)?;
-    let around = each(stage, |grasp, stage| grasp.around(stage))?;
-    stage.perform(0.8, &around)?;
+    let above = each(commander, |grasp, commander| grasp.beside(commander, 0.06))?;
+    commander.perform(0.8, &above)?;
+    let beside = each(commander, |grasp, commander| grasp.beside(commander, 0.0))?;
+    commander.perform(0.6, &beside)?;
+    let around = each(commander, |grasp, commander| grasp.around(commander))?;
+    commander.perform(0.8, &around)?;
     let close: Vec<HandMove> = grasps.iter().map(CylinderGrasp::close).collect();
-    stage.perform(0.8, &close)?;
-    stage.perform(0.2, &close)
+    commander.perform(0.8, &close)?;
+    commander.perform(0.2, &close)
+}
+
+/// Fingers of a right hand around a 7 cm cylinder; a left hand mirrors them.
+const CLOSED_RAD: [f32; 7] = [0.0, -0.75, -0.8, 1.1, 1.3, 1.1, 1.3];
+/// The thumb stands off, so that the cylinder passes it.
+const OPEN_RAD: [f32; 7] = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0];
+
+pub fn closed_rad(side: Side) -> [f32; 7] {
+    mirrored(CLOSED_RAD, side)
+}
+
+pub fn open_rad(side: Side) -> [f32; 7] {
+    mirrored(OPEN_RAD, side)
+}
+
+/// Every joint of a left hand turns the other way, but for the base of the thumb, which turns about the palm.
+fn mirrored(right_rad: [f32; 7], side: Side) -> [f32; 7] {
+    match side {
+        Side::Right => right_rad,
+        Side::Left => std::array::from_fn(|i| if i == 0 { right_rad[i] } else { -right_rad[i] }),
+    }
+}
+
+/// A point given in a right wrist's frame, in the wrist's frame of `side`.
+pub fn mirrored_m(right_m: Vector, side: Side) -> Vector {
+    Vector::new(right_m.x, right_m.y * away(side), right_m.z)
+}
+
+/// Sign of y, in the wrist's frame, on the side that the palm faces: 1 for a right hand.
+pub fn away(side: Side) -> f32 {
+    -side.sign()
 }

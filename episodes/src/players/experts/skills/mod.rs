@@ -1,23 +1,19 @@
 //! What several experts use: hands that move together, grasps, the shapes of a hand, walking, and carrying in step.
 
-mod at_once;
 mod bar;
-mod course;
+mod carry_team;
+mod commander;
+mod compliant;
 mod cylinder;
-mod ground;
-mod hand;
-mod soft;
-mod stage;
-mod team;
+mod parallel;
+mod posture_path;
 mod walk;
 
-pub use at_once::{Part, at_once};
 pub use bar::{BarGrasp, move_together, take_together};
-pub use course::{Course, FREE, Posture, follow};
-pub use cylinder::{CylinderGrasp, pick_up_all};
-pub use ground::{place, upright};
-pub use hand::closed_rad;
-pub use soft::{let_go, take_softly};
-pub use stage::{HandMove, Stage};
-pub use team::{Path, Team};
-pub use walk::{Way, Within, come_near, walk_to};
+pub use carry_team::{CarryTeam, ObjectPath};
+pub use commander::{Commander, HandMove};
+pub use compliant::{grasp_compliantly, let_go};
+pub use cylinder::{CylinderGrasp, closed_rad, pick_up_all};
+pub use parallel::{ParallelScript, in_parallel};
+pub use posture_path::{FREE, Posture, PosturePath, follow};
+pub use walk::{Tolerance, WalkGoal, come_near, place, upright, walk_to};

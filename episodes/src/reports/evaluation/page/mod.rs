@@ -4,7 +4,7 @@ mod plot;
 
 use base64::{Engine, prelude::BASE64_STANDARD};
 
-use super::Assessment;
+use super::EvaluationReport;
 use super::gallery::Failure;
 use super::policy::PolicyReport;
 use super::rate::percent;
@@ -15,8 +15,8 @@ use plot::{SERIES, task_plot};
 const STYLE: &str = include_str!("style.css");
 
 /// The page.
-pub fn html(assessment: &Assessment, failures: &[Failure]) -> String {
-    let policies = &assessment.policies;
+pub fn html(report: &EvaluationReport, failures: &[Failure]) -> String {
+    let policies = &report.policies;
     let names: Vec<String> = policies.iter().map(|policy| escape(&policy.name)).collect();
     format!(
         r#"<!doctype html>
@@ -43,13 +43,13 @@ pub fn html(assessment: &Assessment, failures: &[Failure]) -> String {
 "#,
         title = in_words(&names),
         episodes = policies.iter().map(|policy| policy.episodes).sum::<usize>(),
-        tasks = tasks(assessment).len(),
+        tasks = tasks(report).len(),
         cards = policies.iter().enumerate().map(|(index, policy)| card(index, policy)).collect::<String>(),
         legend = legend(policies),
-        plots = tasks(assessment).iter().map(|task| task_plot(task, policies)).collect::<String>(),
-        tables = tables::all(assessment).iter().map(table).collect::<String>(),
+        plots = tasks(report).iter().map(|task| task_plot(task, policies)).collect::<String>(),
+        tables = tables::all(report).iter().map(table).collect::<String>(),
         gallery = gallery(failures, policies),
-        skipped = skipped(assessment),
+        skipped = skipped(report),
     )
 }
 
@@ -62,9 +62,9 @@ fn in_words(names: &[String]) -> String {
 }
 
 /// The tasks that any policy has played, in the order of the list of tasks.
-fn tasks(assessment: &Assessment) -> Vec<&'static str> {
+fn tasks(report: &EvaluationReport) -> Vec<&'static str> {
     let played =
-        |id: &str| assessment.policies.iter().any(|policy| policy.tasks.iter().any(|task| task.task == id));
+        |id: &str| report.policies.iter().any(|policy| policy.tasks.iter().any(|task| task.task == id));
     crate::tasks::ALL.iter().map(|task| task.id).filter(|id| played(id)).collect()
 }
 
@@ -178,9 +178,9 @@ fn gallery(failures: &[Failure], policies: &[PolicyReport]) -> String {
     format!(r#"<h2>Failures</h2><p class="soft">{note}</p>{figures}"#)
 }
 
-fn skipped(assessment: &Assessment) -> String {
+fn skipped(report: &EvaluationReport) -> String {
     let items: String =
-        assessment.skipped.iter().map(|skipped| format!("<li>{}</li>", escape(skipped))).collect();
+        report.skipped.iter().map(|skipped| format!("<li>{}</li>", escape(skipped))).collect();
     match items.is_empty() {
         true => String::new(),
         false => format!("<h2>Left out</h2><ul>{items}</ul>"),

@@ -4,11 +4,10 @@
 use tandem_sim::{Pose, Sides, Vector};
 
 use super::bar::{BarGrasp, move_together};
-use super::course::{Course, FREE, Followed, Posture, follow_while};
-use super::ground::upright;
-use super::soft::take_softly;
-use super::stage::{HandMove, Stage};
-use super::walk::{Way, Within, come_near};
+use super::commander::{Commander, HandMove};
+use super::compliant::grasp_compliantly;
+use super::posture_path::{FREE, PathProgress, Posture, PosturePath, follow_while};
+use super::walk::{Tolerance, WalkGoal, come_near, upright};
 use crate::players::PlayerError;
 use crate::scoring::{Facts, Grip};
 
@@ -16,7 +15,7 @@ use crate::scoring::{Facts, Grip};
 const BEHIND_BAR_M: f32 = 0.29;
 /// Towards their places, before anything is held. Hands that reach out correct the rest.
 const APPROACH_M_S: f32 = 0.3;
-const NEAR: Within = Within { off_m: 0.03, off_rad: 0.05 };
+const NEAR: Tolerance = Tolerance { off_m: 0.03, off_rad: 0.05 };
 /// What two robots that walk with a load need.
 const COMPLIANCE_N_S_M: f64 = 250.0;
 /// Robots still correct their places for so long once the object has arrived.
@@ -30,7 +29,7 @@ const CARRIES: u32 = 4;
 const PRESS_M: f32 = 0.004;
 
 /// The way of a carried object, by the distance it has gone, and how fast.
-pub struct Path<'a> {
+pub struct ObjectPath<'a> {
     pub at: &'a dyn Fn(f32) -> Pose,
     pub length_m: f32,
     pub pace_m_s: f32,
@@ -39,7 +38,7 @@ pub struct Path<'a> {
 }
 
 /// Robots and their grasps of one object.
-pub struct Team<'a> {
+pub struct CarryTeam<'a> {
     grasps: &'a [BarGrasp<'a>],
     robots: Vec<usize>,
     /// Where each robot stands, in the object's frame.
@@ -48,10 +47,10 @@ pub struct Team<'a> {
     object_from_wrist: Vec<Pose>,
 }
 
-impl<'a> Team<'a> {
+impl<'a> CarryTeam<'a> {
     /// Robots that have both hands in `grasps`, left first.
-    pub fn new(stage: &mut Stage, grasps: &'a [BarGrasp<'a>]) -> Result<Team<'a>, PlayerError> {
-        let facts = stage.facts()?;
+    pub fn new(commander: &mut Commander, grasps: &'a [BarGrasp<'a>]) -> Result<CarryTeam<'a>, PlayerError> {
+        let facts = commander.facts()?;
         let pairs = grasps.chunks_exact(2);
         let stand = |pair: &[BarGrasp]| {
             let bar_m = |grasp: &BarGrasp| facts.site(grasp.object, grasp.bar).position_m();
@@ -60,7 +59,7 @@ impl<'a> Team<'a> {
             let back_m = ahead.rotation * Vector::new(-BEHIND_BAR_M, 0.0, 0.0);
             Pose::from_parts((middle_m + back_m).with_z(0.0), ahead.rotation)
         };
-        Ok(Team {
+        Ok(CarryTeam {
             grasps,
             robots: pairs.clone().map(|pair| pair[0].robot).collect(),
             object_from_stand: pairs.map(stand).collect(),
@@ -69,20 +68,20 @@ impl<'a> Team<'a> {
     }
 
     /// The object as it is now.
-    pub fn object(&self, stage: &mut Stage) -> Result<Pose, PlayerError> {
-        Ok(stage.facts()?.object(self.grasps[0].object).pose_in_world)
+    pub fn object(&self, commander: &mut Commander) -> Result<Pose, PlayerError> {
+        Ok(commander.facts()?.object(self.grasps[0].object).pose_in_world)
     }
 
     /// Robots walk to where they stand beside the object as it is now.
-    pub fn gather(&self, stage: &mut Stage) -> Result<(), PlayerError> {
-        let ways = self.ways(stage)?;
-        come_near(stage, &ways, NEAR)
+    pub fn gather(&self, commander: &mut Commander) -> Result<(), PlayerError> {
+        let walk_goals = self.walk_goals(commander)?;
+        come_near(commander, &walk_goals, NEAR)
     }
 
-    /// The ways to where the robots stand beside the object as it is now.
-    pub fn ways(&self, stage: &mut Stage) -> Result<Vec<Way>, PlayerError> {
-        let object = upright(&self.object(stage)?);
-        let way = |(robot, stand): (&usize, &Pose)| Way {
+    /// Where the robots have to walk to stand beside the object as it is now.
+    pub fn walk_goals(&self, commander: &mut Commander) -> Result<Vec<WalkGoal>, PlayerError> {
+        let object = upright(&self.object(commander)?);
+        let way = |(robot, stand): (&usize, &Pose)| WalkGoal {
             robot: *robot,
             to: object * *stand,
             pace_m_s: APPROACH_M_S,
@@ -91,44 +90,44 @@ impl<'a> Team<'a> {
     }
 
     /// Remembers where in the object's frame the hands are that hold it.
-    pub fn measure(&mut self, stage: &mut Stage) -> Result<(), PlayerError> {
-        let object = self.object(stage)?;
+    pub fn measure(&mut self, commander: &mut Commander) -> Result<(), PlayerError> {
+        let object = self.object(commander)?;
         self.object_from_wrist.clear();
         for grasp in self.grasps {
-            let wrist = stage.world_from_wrist(grasp.robot, grasp.side)?;
+            let wrist = commander.world_from_wrist(grasp.robot, grasp.side)?;
             self.object_from_wrist.push(object.inverse() * wrist);
         }
         Ok(())
     }
 
     /// Lifts what all hands hold straight up, and measures the grips.
-    pub fn lift(&mut self, stage: &mut Stage, by_m: f32) -> Result<(), PlayerError> {
-        let start = self.object(stage)?;
+    pub fn lift(&mut self, commander: &mut Commander, by_m: f32) -> Result<(), PlayerError> {
+        let start = self.object(commander)?;
         let raised =
             |share: f32| Pose::from_parts(start.translation + Vector::Z * by_m * share, start.rotation);
-        move_together(stage, self.grasps, &raised, 5, 0.2)?;
-        move_together(stage, self.grasps, &|_| raised(1.0), 1, 0.2)?;
-        self.measure(stage)
+        move_together(commander, self.grasps, &raised, 5, 0.2)?;
+        move_together(commander, self.grasps, &|_| raised(1.0), 1, 0.2)?;
+        self.measure(commander)
     }
 
     /// Takes the held object along a path, at the end of which it stays for a moment. Hands that lose it on the way take it again.
-    pub fn carry(&mut self, stage: &mut Stage, path: &Path) -> Result<(), PlayerError> {
-        let Path { length_m, pace_m_s, free_m, .. } = *path;
+    pub fn carry(&mut self, commander: &mut Commander, path: &ObjectPath) -> Result<(), PlayerError> {
+        let ObjectPath { length_m, pace_m_s, free_m, .. } = *path;
         let mut from_m = 0.0;
         for _ in 0..CARRIES {
-            self.give_way(stage, true);
+            self.give_way(commander, true);
             let at = |gone_m: f32| self.postures(&(path.at)(gone_m));
-            let course = Course { at: &at, length_m, pace_m_s, hold_s: HOLD_S, free_m };
+            let course = PosturePath { at: &at, length_m, pace_m_s, hold_s: HOLD_S, free_m };
             let mut off_beats = 0;
             let mut well = |facts: &Facts| {
                 off_beats = if self.hands_off(facts).next().is_some() { off_beats + 1 } else { 0 };
                 off_beats < LOST_BEATS
             };
-            match follow_while(stage, &course, from_m, &mut well)? {
-                Followed::ToItsEnd => return Ok(()),
-                Followed::UpTo { gone_m } => from_m = gone_m,
+            match follow_while(commander, &course, from_m, &mut well)? {
+                PathProgress::Completed => return Ok(()),
+                PathProgress::Interrupted { gone_m } => from_m = gone_m,
             }
-            self.take_again(stage, &(path.at)(from_m))?;
+            self.take_again(commander, &(path.at)(from_m))?;
         }
         Err(PlayerError::GaveUp("hands lost the load again and again".into()))
     }
@@ -140,35 +139,40 @@ impl<'a> Team<'a> {
     }
 
     /// The robots stand, the hands that have lost the object take it where it is now, and all bring it back to its way.
-    fn take_again(&mut self, stage: &mut Stage, on_its_way: &Pose) -> Result<(), PlayerError> {
-        self.rest(stage)?;
-        let lost: Vec<BarGrasp> = self.hands_off(&stage.facts()?).collect();
+    fn take_again(&mut self, commander: &mut Commander, on_its_way: &Pose) -> Result<(), PlayerError> {
+        self.rest(commander)?;
+        let lost: Vec<BarGrasp> = self.hands_off(&commander.facts()?).collect();
         if !lost.is_empty() {
-            take_softly(stage, &lost)?;
+            grasp_compliantly(commander, &lost)?;
         }
-        let now = self.object(stage)?;
-        move_together(stage, self.grasps, &|share| now.lerp(on_its_way, share), 4, 0.2)?;
-        self.measure(stage)
+        let now = self.object(commander)?;
+        move_together(commander, self.grasps, &|share| now.lerp(on_its_way, share), 4, 0.2)?;
+        self.measure(commander)
     }
 
     /// Takes the held object straight over a place, as high as it is.
-    pub fn carry_to(&mut self, stage: &mut Stage, place: &Pose, pace_m_s: f32) -> Result<(), PlayerError> {
-        self.carry_where_free(stage, place, pace_m_s, &FREE)
+    pub fn carry_to(
+        &mut self,
+        commander: &mut Commander,
+        place: &Pose,
+        pace_m_s: f32,
+    ) -> Result<(), PlayerError> {
+        self.carry_where_free(commander, place, pace_m_s, &FREE)
     }
 
-    /// As [`Team::carry_to`], no farther than is free by now.
+    /// As [`CarryTeam::carry_to`], no farther than is free by now.
     pub fn carry_where_free(
         &mut self,
-        stage: &mut Stage,
+        commander: &mut Commander,
         place: &Pose,
         pace_m_s: f32,
         free_m: &dyn Fn(&Facts) -> f32,
     ) -> Result<(), PlayerError> {
-        let from = upright(&self.object(stage)?);
+        let from = upright(&self.object(commander)?);
         let over = Pose::from_parts(place.translation.with_z(from.translation.z), place.rotation);
         let length_m = (over.translation - from.translation).length();
         let at = |gone_m: f32| from.lerp(&over, gone_m / length_m);
-        self.carry(stage, &Path { at: &at, length_m, pace_m_s, free_m })
+        self.carry(commander, &ObjectPath { at: &at, length_m, pace_m_s, free_m })
     }
 
     /// How the robots stand and hold the object where it is to be.
@@ -183,29 +187,29 @@ impl<'a> Team<'a> {
     }
 
     /// All stand still with what they hold. Set down without it, a load that robots pull to and fro as they stop is dragged along.
-    pub fn rest(&self, stage: &mut Stage) -> Result<(), PlayerError> {
+    pub fn rest(&self, commander: &mut Commander) -> Result<(), PlayerError> {
         let still: Vec<HandMove> =
             self.grasps.iter().map(|grasp| HandMove::still(grasp.robot, grasp.side)).collect();
-        stage.perform(REST_S, &still)
+        commander.perform(REST_S, &still)
     }
 
     /// Sets the object down: over its place first, for which hands must not give way, then straight below.
-    pub fn set_down(&self, stage: &mut Stage, place: &Pose) -> Result<(), PlayerError> {
-        let from = self.object(stage)?;
+    pub fn set_down(&self, commander: &mut Commander, place: &Pose) -> Result<(), PlayerError> {
+        let from = self.object(commander)?;
         let over = Pose::from_parts(place.translation.with_z(from.translation.z), place.rotation);
         let down = Pose::from_parts(place.translation - Vector::Z * PRESS_M, place.rotation);
-        self.give_way(stage, false);
-        move_together(stage, self.grasps, &|share| from.lerp(&over, share), 4, 0.15)?;
-        move_together(stage, self.grasps, &|share| over.lerp(&down, share), 5, 0.22)?;
-        self.give_way(stage, true);
+        self.give_way(commander, false);
+        move_together(commander, self.grasps, &|share| from.lerp(&over, share), 4, 0.15)?;
+        move_together(commander, self.grasps, &|share| over.lerp(&down, share), 5, 0.22)?;
+        self.give_way(commander, true);
         Ok(())
     }
 
     /// Whether hands give way to partners from now on. One who has no partner gives way to nobody.
-    pub fn give_way(&self, stage: &mut Stage, give_way: bool) {
+    pub fn give_way(&self, commander: &mut Commander, give_way: bool) {
         let compliance_n_s_m = (give_way && self.robots.len() > 1).then_some(COMPLIANCE_N_S_M);
         for robot in &self.robots {
-            stage.set_compliance(*robot, compliance_n_s_m);
+            commander.set_compliance(*robot, compliance_n_s_m);
         }
     }
 }

@@ -1,7 +1,10 @@
-//! An MCAP file with typed topics, under another name until it is complete.
+//! An MCAP file with typed topics, under another name until it is complete; and where its bytes go: to a file that others can read
+//! under way, or nowhere before the end.
 
 use std::{
     collections::BTreeMap,
+    fs::File,
+    io::{self, Seek, SeekFrom, Write},
     marker::PhantomData,
     path::{Path, PathBuf},
     time::{Duration, Instant},
@@ -11,15 +14,14 @@ use foxglove::Encode;
 use mcap::Attachment;
 use mcap::records::{MessageHeader, Metadata};
 
-use super::store::{Store, Visibility};
-use crate::output::OutputError;
+use crate::output::{OutputError, partial_path, put_in_place, write_whole};
 
 /// No more than this much of an episode is lost with the process.
 const FLUSHED_EVERY: Duration = Duration::from_millis(500);
 
 /// A file that is being written.
 pub struct McapFile {
-    writer: mcap::Writer<Store>,
+    writer: mcap::Writer<RecordingStore>,
     path: PathBuf,
     /// Reused between messages.
     buffer: Vec<u8>,
@@ -36,7 +38,7 @@ pub struct Topic<M> {
 impl McapFile {
     /// Begins what will be `path`, in an existing folder.
     pub fn create(path: &Path, visibility: Visibility) -> Result<McapFile, OutputError> {
-        let store = Store::create(path, visibility)
+        let store = RecordingStore::create(path, visibility)
             .map_err(|source| OutputError::Io { path: path.into(), source })?;
         let writer = writer(store).map_err(|source| OutputError::Mcap { path: path.into(), source })?;
         Ok(McapFile { writer, path: path.into(), buffer: Vec::new(), flushed: Instant::now() })
@@ -122,7 +124,7 @@ impl McapFile {
 }
 
 /// Writes chunks as wholes, so that no flush ends in the middle of one.
-pub fn writer(store: Store) -> Result<mcap::Writer<Store>, mcap::McapError> {
+pub fn writer(store: RecordingStore) -> Result<mcap::Writer<RecordingStore>, mcap::McapError> {
     mcap::WriteOptions::new()
         .library(concat!("tandem ", env!("CARGO_PKG_VERSION")))
         .compression(Some(mcap::Compression::Lz4))
@@ -137,4 +139,101 @@ pub fn time_ns(time_s: f64) -> u64 {
 
 fn string_map(entries: &[(&str, &str)]) -> BTreeMap<String, String> {
     entries.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect()
+}
+
+/// When a recording can be read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Visibility {
+    /// Under way, as `episode.mcap.partial`.
+    #[default]
+    Live,
+    /// After the end. Nobody can look behind the curtain meanwhile, and a process that is killed leaves nothing.
+    After,
+}
+
+/// What has been written since the last flush, and where it goes then. A flush is one write to the system, so that what lies
+/// on the disk ends where a flush ended.
+pub struct RecordingStore {
+    pending: Vec<u8>,
+    flushed_bytes: u64,
+    sink: Sink,
+}
+
+enum Sink {
+    File {
+        file: File,
+        partial: PathBuf,
+    },
+    Memory,
+    /// A flush has failed. Nothing more is written: what lies on the disk ends in the middle of a record.
+    Failed,
+}
+
+impl RecordingStore {
+    /// A store for what will be `path` when it is complete. A file of that partial name is overwritten.
+    pub fn create(path: &Path, visibility: Visibility) -> io::Result<RecordingStore> {
+        let sink = match visibility {
+            Visibility::Live => {
+                let partial = partial_path(path);
+                Sink::File { file: File::create(&partial)?, partial }
+            }
+            Visibility::After => Sink::Memory,
+        };
+        Ok(RecordingStore { pending: Vec::new(), flushed_bytes: 0, sink })
+    }
+
+    /// Puts everything on the disk under the name `path`.
+    pub fn keep(mut self, path: &Path) -> Result<(), OutputError> {
+        let failed = |source| OutputError::Io { path: path.into(), source };
+        self.flush().map_err(failed)?;
+        match &self.sink {
+            Sink::File { file, partial } => put_in_place(file, partial, path).map_err(failed),
+            Sink::Memory => write_whole(path, &self.pending),
+            Sink::Failed => Err(failed(after_a_failure())),
+        }
+    }
+}
+
+fn after_a_failure() -> io::Error {
+    io::Error::other("an earlier part could not be written")
+}
+
+impl Write for RecordingStore {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self.sink {
+            Sink::Failed => Err(after_a_failure()),
+            Sink::File { .. } | Sink::Memory => {
+                self.pending.extend_from_slice(bytes);
+                Ok(bytes.len())
+            }
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let Sink::File { file, .. } = &mut self.sink else { return Ok(()) };
+        let written = file.write_all(&self.pending);
+        self.flushed_bytes += self.pending.len() as u64;
+        self.pending.clear();
+        if written.is_err() {
+            self.sink = Sink::Failed;
+        }
+        written
+    }
+}
+
+/// MCAP's writer asks where it is; it is told not to go back.
+impl Seek for RecordingStore {
+    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
+        match position {
+            SeekFrom::Current(0) => Ok(self.flushed_bytes + self.pending.len() as u64),
+            _ => Err(io::ErrorKind::Unsupported.into()),
+        }
+    }
+}
+
+/// A recording that is dropped before its end stays readable to where it stopped.
+impl Drop for RecordingStore {
+    fn drop(&mut self) {
+        let _ = self.flush();
+    }
 }

@@ -8,46 +8,46 @@ use tandem_sim::{ObjectModel, SimError, Step};
 use super::facts::{Facts, ObjectFacts, RobotFacts};
 use super::grasps::ObjectGrasps;
 
-/// The objects that are watched.
+/// What is known of every object by the steps seen so far.
 #[derive(Clone, Debug)]
-pub struct Scorekeeper {
+pub struct FactsTracker {
     /// Of each object, as its file has it.
     models: Vec<Arc<ObjectModel>>,
-    watched: Vec<Watched>,
+    memory: Vec<ObjectMemory>,
 }
 
 /// What has to be remembered of one object between control steps: grasps, and where it began.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Watched {
+pub struct ObjectMemory {
     name: String,
     rest_height_m: f32,
     grasps: ObjectGrasps,
 }
 
-impl Scorekeeper {
+impl FactsTracker {
     /// Begins to watch `objects`, given by name and file, and what moves on them, with the state before the first control step.
     pub fn new<'a>(
         objects: impl Iterator<Item = (&'a str, &'a str)>,
         start: &Step,
-    ) -> Result<Scorekeeper, SimError> {
-        let mut keeper = Scorekeeper { models: Vec::new(), watched: Vec::new() };
+    ) -> Result<FactsTracker, SimError> {
+        let mut tracker = FactsTracker { models: Vec::new(), memory: Vec::new() };
         for (name, file) in objects {
             for part in ObjectModel::parts(file, name)? {
                 let at_start = start.object(&part.name);
-                keeper.watched.push(Watched {
+                tracker.memory.push(ObjectMemory {
                     rest_height_m: at_start.map_or(0.0, |state| state.world_from_object.translation.z),
                     grasps: ObjectGrasps::new(&part.name, start.robots.len()),
                     name: part.name,
                 });
-                keeper.models.push(part.model.into());
+                tracker.models.push(part.model.into());
             }
         }
-        Ok(keeper)
+        Ok(tracker)
     }
 
     /// Looks at the control step that follows the last one.
     pub fn update(&mut self, step: &Step) {
-        for object in &mut self.watched {
+        for object in &mut self.memory {
             object.grasps.update(step);
         }
     }
@@ -60,28 +60,28 @@ impl Scorekeeper {
             hand_force_n: robot.state.hand_force_n,
             fallen: robot.state.fallen,
         });
-        let objects = self.watched.iter().zip(&self.models).filter_map(|(watched, model)| {
-            let state = step.object(&watched.name)?;
+        let objects = self.memory.iter().zip(&self.models).filter_map(|(memory, model)| {
+            let state = step.object(&memory.name)?;
             Some(ObjectFacts {
-                name: watched.name.clone(),
+                name: memory.name.clone(),
                 model: model.clone(),
                 pose_in_world: state.world_from_object,
                 velocity_m_s: state.velocity_m_s,
                 angular_velocity_rad_s: state.angular_velocity_rad_s,
-                rest_height_m: watched.rest_height_m,
-                hands: watched.grasps.grips(),
-                untouched_s: watched.grasps.untouched_s(),
+                rest_height_m: memory.rest_height_m,
+                hands: memory.grasps.grips(),
+                untouched_s: memory.grasps.untouched_s(),
             })
         });
         Facts { time_s: step.time_s, robots: robots.collect(), objects: objects.collect() }
     }
 
-    pub fn watched(&self) -> &[Watched] {
-        &self.watched
+    pub fn memory(&self) -> &[ObjectMemory] {
+        &self.memory
     }
 
-    /// Goes back to an earlier [`Scorekeeper::watched`] of the same objects.
-    pub fn set_watched(&mut self, watched: Vec<Watched>) {
-        self.watched = watched;
+    /// Goes back to an earlier [`FactsTracker::memory`] of the same objects.
+    pub fn set_memory(&mut self, memory: Vec<ObjectMemory>) {
+        self.memory = memory;
     }
 }

@@ -1,8 +1,5 @@
 //! How files of an episode are written, and why that can fail.
 
-pub mod html;
-pub mod webp;
-
 use std::{
     fs::{self, File},
     io::{self, Write},
@@ -67,4 +64,58 @@ fn private_folder(with_parents: bool) -> fs::DirBuilder {
     #[cfg(unix)]
     std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
     builder
+}
+
+/// Text in pages of HTML.
+pub mod html {
+    /// Text as it may stand in HTML, in attributes too.
+    pub fn escape(text: &str) -> String {
+        let mut escaped = String::with_capacity(text.len());
+        for character in text.chars() {
+            match character {
+                '&' => escaped += "&amp;",
+                '<' => escaped += "&lt;",
+                '>' => escaped += "&gt;",
+                '"' => escaped += "&quot;",
+                '\'' => escaped += "&#39;",
+                other => escaped.push(other),
+            }
+        }
+        escaped
+    }
+
+    #[cfg(test)]
+    mod tests {
+        use super::escape;
+
+        #[test]
+        fn what_means_something_in_html_is_escaped() {
+            assert_eq!(escape(r#"a<b>&"c"'d'"#), "a&lt;b&gt;&amp;&quot;c&quot;&#39;d&#39;");
+        }
+    }
+}
+
+/// Pictures and films as WebP.
+pub mod webp {
+    use webp_animation::{ColorMode, Encoder, EncoderOptions, EncodingConfig, Error};
+
+    /// Of 100; the robots' edges stay clean.
+    const QUALITY: f32 = 80.0;
+
+    /// One RGB picture, three bytes a pixel, as a file.
+    pub fn picture(width: u32, height: u32, rgb: &[u8]) -> Result<Vec<u8>, Error> {
+        let mut encoder = encoder((width, height))?;
+        encoder.add_frame(rgb, 0)?;
+        Ok(encoder.finalize(1)?.to_vec())
+    }
+
+    /// An encoder of RGB pictures.
+    pub fn encoder(size_px: (u32, u32)) -> Result<Encoder, Error> {
+        let options = EncoderOptions {
+            color_mode: ColorMode::Rgb,
+            encoding_config: Some(EncodingConfig::new_lossy(QUALITY)),
+            ..EncoderOptions::default()
+        };
+        Encoder::new_with_options(size_px, options)
+    }
 }

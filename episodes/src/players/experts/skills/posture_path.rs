@@ -2,8 +2,8 @@
 
 use tandem_sim::{CONTROL_DT_S, Pose, Sides, heading_rad, wrapped_rad};
 
-use super::stage::{Hands, RobotMove, Stage, WALK_STEPS};
-use super::walk::{Drift, steer};
+use super::commander::{Commander, RobotMove, WALK_STEPS, WristTargets};
+use super::walk::{TargetVelocity, steer};
 use crate::players::PlayerError;
 use crate::scoring::Facts;
 
@@ -26,7 +26,7 @@ pub struct Posture {
 pub const FREE: fn(&Facts) -> f32 = |_| f32::INFINITY;
 
 /// Postures by the distance gone.
-pub struct Course<'a> {
+pub struct PosturePath<'a> {
     pub at: &'a dyn Fn(f32) -> Vec<Posture>,
     pub length_m: f32,
     pub pace_m_s: f32,
@@ -38,33 +38,33 @@ pub struct Course<'a> {
 
 /// How far a course was followed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Followed {
-    ToItsEnd,
+pub enum PathProgress {
+    Completed,
     /// Something went wrong here.
-    UpTo {
+    Interrupted {
         gone_m: f32,
     },
 }
 
 /// Goes along a course from its beginning to its end, from rest to rest.
-pub fn follow(stage: &mut Stage, course: &Course) -> Result<(), PlayerError> {
-    follow_while(stage, course, 0.0, &mut |_| true).map(drop)
+pub fn follow(commander: &mut Commander, course: &PosturePath) -> Result<(), PlayerError> {
+    follow_while(commander, course, 0.0, &mut |_| true).map(drop)
 }
 
 /// As [`follow`], from where `gone_m` of it have been gone, and for as long as all is `well`.
 pub fn follow_while(
-    stage: &mut Stage,
-    course: &Course,
+    commander: &mut Commander,
+    course: &PosturePath,
     mut gone_m: f32,
     well: &mut dyn FnMut(&Facts) -> bool,
-) -> Result<Followed, PlayerError> {
+) -> Result<PathProgress, PlayerError> {
     let dt_s = WALK_STEPS as f32 * CONTROL_DT_S;
     let (mut pace_m_s, mut held_s) = (0.0f32, 0.0f32);
     while held_s < course.hold_s {
         let left_m = course.length_m - gone_m;
-        let facts = stage.facts()?;
+        let facts = commander.facts()?;
         if !well(&facts) {
-            return Ok(Followed::UpTo { gone_m });
+            return Ok(PathProgress::Interrupted { gone_m });
         }
         let free_m = (course.free_m)(&facts) - gone_m;
         if left_m > AT_END_M && free_m < AT_END_M {
@@ -82,18 +82,18 @@ pub fn follow_while(
         let now = (course.at)(gone_m);
         let next = (course.at)((gone_m + pace_m_s * dt_s).min(course.length_m));
         let step = |(now, next): (&Posture, &Posture)| {
-            let drift = Drift {
+            let drift = TargetVelocity {
                 velocity_m_s: (next.stand.translation - now.stand.translation) / dt_s,
                 turning_rad_s: wrapped_rad(heading_rad(&next.stand) - heading_rad(&now.stand)) / dt_s,
             };
             RobotMove {
                 robot: now.robot,
-                walk: steer(&facts.robots[now.robot].pelvis_in_world, &now.stand, drift, MOST_M_S),
-                hands: Hands::World(now.wrists),
+                base: steer(&facts.robots[now.robot].pelvis_in_world, &now.stand, drift, MOST_M_S),
+                wrists: WristTargets::InWorld(now.wrists),
             }
         };
         let moves: Vec<RobotMove> = now.iter().zip(&next).map(step).collect();
-        stage.advance(WALK_STEPS, &moves)?;
+        commander.advance(WALK_STEPS, &moves)?;
     }
-    Ok(Followed::ToItsEnd)
+    Ok(PathProgress::Completed)
 }

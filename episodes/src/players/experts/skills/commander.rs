@@ -3,7 +3,7 @@
 use tandem_sim::{CONTROL_DT_S, Pose, Side, Sides};
 use tandem_tools_spec::{MoveWrists, StopReason, Tool as _, ToolReply, WristMove};
 
-use crate::players::{Backstage, PlayerError};
+use crate::players::{PlayerError, PrivilegedEpisode};
 use crate::scoring::Facts;
 use crate::tasks::Task;
 
@@ -15,9 +15,9 @@ pub const WALK_STEPS: u32 = 5;
 /// Control steps of every command while several scripts are played at once.
 pub const BEAT_STEPS: u32 = WALK_STEPS;
 
-/// How a base goes, in its own heading frame.
+/// How fast a base is to go, in its own heading frame.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Walk {
+pub struct BaseVelocity {
     pub forward_m_s: f32,
     pub left_m_s: f32,
     pub turning_rad_s: f32,
@@ -25,21 +25,22 @@ pub struct Walk {
 
 /// Where both wrists go.
 #[derive(Clone, Copy, Debug)]
-pub enum Hands {
-    World(Sides<Pose>),
+pub enum WristTargets {
+    /// In the world frame, where they stay.
+    InWorld(Sides<Pose>),
     /// In the pelvis frame, along with the pelvis.
-    Carried(Sides<Pose>),
+    InPelvis(Sides<Pose>),
 }
 
 /// What one robot does during one command; its fingers stay.
 #[derive(Clone, Copy, Debug)]
 pub struct RobotMove {
     pub robot: usize,
-    pub walk: Walk,
-    pub hands: Hands,
+    pub base: BaseVelocity,
+    pub wrists: WristTargets,
 }
 
-/// Part of one hand in a motion. What is not said stays as it is.
+/// What one hand does in a motion. What is not said stays as it is.
 #[derive(Clone, Copy, Debug)]
 pub struct HandMove {
     pub robot: usize,
@@ -59,7 +60,7 @@ impl HandMove {
         HandMove { robot, side, world_from_wrist: None, fingers_rad: Some(fingers_rad) }
     }
 
-    /// As it was told last.
+    /// The hand stays where it was last commanded to be.
     pub fn still(robot: usize, side: Side) -> HandMove {
         HandMove { robot, side, world_from_wrist: None, fingers_rad: None }
     }
@@ -69,67 +70,74 @@ impl HandMove {
     }
 }
 
-/// Where a hand was last told to be.
+/// Where a hand was last commanded to be.
 #[derive(Clone, Copy)]
-struct HandGoal {
+struct HandTarget {
     world_from_wrist: Pose,
-    /// `None` until they are told: they stay as they are where the episode begins, be it around something.
+    /// `None` until fingers are commanded: they stay as they are where the episode begins, be it around something.
     fingers_rad: Option<[f32; 7]>,
 }
 
-/// What a robot was last told.
+/// What a robot was last commanded.
 #[derive(Clone)]
-pub struct Told {
-    goals: Sides<HandGoal>,
+pub struct CommandedTargets {
+    hands: Sides<HandTarget>,
     /// How high its pelvis is to be, where that has been said.
     height_m: Option<f32>,
     /// How its hands give way to partners.
     compliance_n_s_m: Option<f64>,
 }
 
-/// An episode and what its robots were last told.
-pub struct Stage<'a> {
+/// Commands the robots of an episode, and remembers what they were last commanded.
+pub struct Commander<'a> {
     task: &'static Task,
-    episode: &'a mut dyn Backstage,
+    episode: &'a mut dyn PrivilegedEpisode,
     /// By robot.
-    told: Vec<Told>,
-    /// Others play at the same time, so that all commands are equally long.
+    targets: Vec<CommandedTargets>,
+    /// Whether other scripts play at the same time, so that all commands are equally long.
     in_step: bool,
 }
 
-impl<'a> Stage<'a> {
-    pub fn new(task: &'static Task, episode: &'a mut dyn Backstage) -> Result<Stage<'a>, PlayerError> {
+impl<'a> Commander<'a> {
+    pub fn new(
+        task: &'static Task,
+        episode: &'a mut dyn PrivilegedEpisode,
+    ) -> Result<Commander<'a>, PlayerError> {
         let facts = episode.facts()?;
-        let told = |robot: usize| Told {
-            goals: Sides::from_fn(|side| HandGoal {
+        let targets = |robot: usize| CommandedTargets {
+            hands: Sides::from_fn(|side| HandTarget {
                 world_from_wrist: world_from_wrist(&facts, robot, side),
                 fingers_rad: None,
             }),
             height_m: None,
             compliance_n_s_m: None,
         };
-        let told = (0..facts.robots.len()).map(told).collect();
-        Ok(Stage { task, episode, told, in_step: false })
+        let targets = (0..facts.robots.len()).map(targets).collect();
+        Ok(Commander { task, episode, targets, in_step: false })
     }
 
-    /// The stage of one of several scripts that are played at once, of which robots were `told` something before.
-    pub fn in_step(task: &'static Task, told: Vec<Told>, episode: &'a mut dyn Backstage) -> Stage<'a> {
-        Stage { task, episode, told, in_step: true }
+    /// The commander of one of several scripts that are played at once, with the targets that robots had before.
+    pub fn in_step(
+        task: &'static Task,
+        targets: Vec<CommandedTargets>,
+        episode: &'a mut dyn PrivilegedEpisode,
+    ) -> Commander<'a> {
+        Commander { task, episode, targets, in_step: true }
     }
 
     pub fn task(&self) -> &'static Task {
         self.task
     }
 
-    /// What robots were last told.
-    pub fn told(&self) -> &[Told] {
-        &self.told
+    /// What robots were last commanded.
+    pub fn targets(&self) -> &[CommandedTargets] {
+        &self.targets
     }
 
-    /// Takes over what robots were told on another stage.
-    pub fn take_over(&mut self, robots: &[usize], told: &[Told]) {
+    /// Takes over what another commander commanded these robots.
+    pub fn take_over(&mut self, robots: &[usize], targets: &[CommandedTargets]) {
         for robot in robots {
-            self.told[*robot] = told[*robot].clone();
+            self.targets[*robot] = targets[*robot].clone();
         }
     }
 
@@ -139,12 +147,12 @@ impl<'a> Stage<'a> {
 
     /// How high a robot's pelvis is to be from its next command on.
     pub fn set_height(&mut self, robot: usize, height_m: f32) {
-        self.told[robot].height_m = Some(height_m);
+        self.targets[robot].height_m = Some(height_m);
     }
 
     /// How the hands of a robot give way from its next command on.
     pub fn set_compliance(&mut self, robot: usize, compliance_n_s_m: Option<f64>) {
-        self.told[robot].compliance_n_s_m = compliance_n_s_m;
+        self.targets[robot].compliance_n_s_m = compliance_n_s_m;
     }
 
     /// Moves hands along straight lines for `duration_s`, starting and arriving at rest; robots not named hold still.
@@ -152,7 +160,7 @@ impl<'a> Stage<'a> {
         self.travel(duration_s, moves, smooth)
     }
 
-    /// As [`Stage::perform`], at constant speed: one leg of a longer path.
+    /// As [`Commander::perform`], at constant speed: one leg of a longer path.
     pub fn glide(&mut self, duration_s: f32, moves: &[HandMove]) -> Result<(), PlayerError> {
         self.travel(duration_s, moves, |part| part)
     }
@@ -163,7 +171,7 @@ impl<'a> Stage<'a> {
         moves: &[HandMove],
         pace: fn(f32) -> f32,
     ) -> Result<(), PlayerError> {
-        let from = self.told.clone();
+        let from = self.targets.clone();
         let beat = if self.in_step { BEAT_STEPS } else { 1 };
         let most = if self.in_step { BEAT_STEPS } else { STEPS_PER_COMMAND };
         let total = ((duration_s / CONTROL_DT_S).round().max(1.0) as u32).next_multiple_of(beat);
@@ -172,15 +180,15 @@ impl<'a> Stage<'a> {
             let steps = most.min(total - done);
             let part = pace((done + steps) as f32 / total as f32);
             for hand in moves {
-                let start = from[hand.robot].goals[hand.side];
-                let goal = &mut self.told[hand.robot].goals[hand.side];
+                let start = from[hand.robot].hands[hand.side];
+                let target = &mut self.targets[hand.robot].hands[hand.side];
                 if let Some(end) = hand.world_from_wrist {
-                    goal.world_from_wrist = start.world_from_wrist.lerp(&end, part);
+                    target.world_from_wrist = start.world_from_wrist.lerp(&end, part);
                 }
                 if let Some(end_rad) = hand.fingers_rad {
                     let start_rad = start.fingers_rad.unwrap_or([0.0; 7]);
                     let between = |i: usize| start_rad[i] + (end_rad[i] - start_rad[i]) * part;
-                    goal.fingers_rad = Some(std::array::from_fn(between));
+                    target.fingers_rad = Some(std::array::from_fn(between));
                 }
             }
             self.command(steps, moves)?;
@@ -189,7 +197,7 @@ impl<'a> Stage<'a> {
         Ok(())
     }
 
-    /// A robot stays as it was told to be for one short command.
+    /// A robot keeps its targets for one short command.
     pub fn hold(&mut self, robot: usize) -> Result<(), PlayerError> {
         let facts = self.episode.facts()?;
         let robots = vec![self.wrist_move(&facts, robot)];
@@ -202,28 +210,28 @@ impl<'a> Stage<'a> {
         let mut robots = Vec::with_capacity(moves.len());
         for part in moves {
             let world_from_pelvis = facts.robots[part.robot].pelvis_in_world;
-            let (world_from_wrist, carried) = match part.hands {
-                Hands::World(wrists) => (wrists, false),
-                Hands::Carried(wrists) => (wrists.map(|wrist| world_from_pelvis * wrist), true),
+            let (world_from_wrist, carried) = match part.wrists {
+                WristTargets::InWorld(wrists) => (wrists, false),
+                WristTargets::InPelvis(wrists) => (wrists.map(|wrist| world_from_pelvis * wrist), true),
             };
             for side in Side::BOTH {
-                self.told[part.robot].goals[side].world_from_wrist = world_from_wrist[side];
+                self.targets[part.robot].hands[side].world_from_wrist = world_from_wrist[side];
             }
             robots.push(WristMove {
                 carried: Some(carried),
-                vx_m_s: Some(part.walk.forward_m_s.into()),
-                vy_m_s: Some(part.walk.left_m_s.into()),
-                yaw_rate_rad_s: Some(part.walk.turning_rad_s.into()),
+                vx_m_s: Some(part.base.forward_m_s.into()),
+                vy_m_s: Some(part.base.left_m_s.into()),
+                yaw_rate_rad_s: Some(part.base.turning_rad_s.into()),
                 ..self.wrist_move(&facts, part.robot)
             });
         }
         self.call(steps, robots)?;
         let after = self.episode.facts()?;
         for part in moves {
-            if let Hands::Carried(wrists) = part.hands {
+            if let WristTargets::InPelvis(wrists) = part.wrists {
                 let world_from_pelvis = after.robots[part.robot].pelvis_in_world;
                 for side in Side::BOTH {
-                    self.told[part.robot].goals[side].world_from_wrist = world_from_pelvis * wrists[side];
+                    self.targets[part.robot].hands[side].world_from_wrist = world_from_pelvis * wrists[side];
                 }
             }
         }
@@ -233,7 +241,7 @@ impl<'a> Stage<'a> {
     /// One `move_wrists` with the present goals of all robots that `moves` name.
     fn command(&mut self, steps: u32, moves: &[HandMove]) -> Result<(), PlayerError> {
         let facts = self.episode.facts()?;
-        let named = (0..self.told.len()).filter(|robot| moves.iter().any(|hand| hand.robot == *robot));
+        let named = (0..self.targets.len()).filter(|robot| moves.iter().any(|hand| hand.robot == *robot));
         let robots = named.map(|robot| self.wrist_move(&facts, robot)).collect();
         self.call(steps, robots)
     }
@@ -249,22 +257,22 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// Makes a call that is known to be sound.
+    /// Makes a call for other commanders.
     pub fn pass_on(&mut self, command: MoveWrists) -> Result<ToolReply, PlayerError> {
         self.episode.call(command.into())
     }
 
     fn wrist_move(&self, facts: &Facts, robot: usize) -> WristMove {
-        let told = &self.told[robot];
+        let targets = &self.targets[robot];
         let pelvis_from_world = facts.robots[robot].pelvis_in_world.inverse();
-        let goal = |side: Side| told.goals[side];
-        let pose = |side: Side| pelvis_from_world * goal(side).world_from_wrist;
+        let target = |side: Side| targets.hands[side];
+        let pose = |side: Side| pelvis_from_world * target(side).world_from_wrist;
         let position = |side: Side| Some(pose(side).translation.to_array().map(f64::from));
         let quaternion = |side: Side| {
             let q = pose(side).rotation;
             Some([q.w, q.x, q.y, q.z].map(f64::from))
         };
-        let fingers = |side: Side| Some(goal(side).fingers_rad?.map(f64::from));
+        let fingers = |side: Side| Some(target(side).fingers_rad?.map(f64::from));
         WristMove {
             left_position_m: position(Side::Left),
             left_quaternion_wxyz: quaternion(Side::Left),
@@ -272,8 +280,8 @@ impl<'a> Stage<'a> {
             right_quaternion_wxyz: quaternion(Side::Right),
             left_fingers_rad: fingers(Side::Left),
             right_fingers_rad: fingers(Side::Right),
-            pelvis_height_m: told.height_m.map(f64::from),
-            compliance_n_s_m: told.compliance_n_s_m,
+            pelvis_height_m: targets.height_m.map(f64::from),
+            compliance_n_s_m: targets.compliance_n_s_m,
             ..WristMove::hold(self.task.robots[robot].name)
         }
     }

@@ -3,7 +3,7 @@
 use tandem_sim::{Pose, Vector};
 
 use super::bar::BarGrasp;
-use super::stage::{HandMove, Stage};
+use super::commander::{Commander, HandMove};
 use crate::players::PlayerError;
 use crate::scoring::{Facts, Grip};
 
@@ -21,43 +21,47 @@ const MOST_GIVE_M: f32 = 0.01;
 const LEASH_M: f32 = 0.03;
 
 /// Closes all hands on their bars at once; hands that miss try again, while the others hold on.
-pub fn take_softly(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
+pub fn grasp_compliantly(commander: &mut Commander, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
     let mut missing = grasps.to_vec();
     for _ in 0..ATTEMPTS {
-        let before = each(stage, &missing, |grasp, stage| grasp.before(stage, STANDOFF_M))?;
-        stage.perform(0.9, &before)?;
-        let around = each(stage, &missing, |grasp, stage| grasp.around(stage))?;
-        stage.perform(0.5, &around)?;
-        close_softly(stage, &missing, &around)?;
-        let facts = stage.facts()?;
+        let before = each(commander, &missing, |grasp, commander| grasp.before(commander, STANDOFF_M))?;
+        commander.perform(0.9, &before)?;
+        let around = each(commander, &missing, |grasp, commander| grasp.around(commander))?;
+        commander.perform(0.5, &around)?;
+        close_compliantly(commander, &missing, &around)?;
+        let facts = commander.facts()?;
         missing = grasps.iter().copied().filter(|grasp| !grasp.is_held(&facts)).collect();
         if missing.is_empty() {
             return Ok(());
         }
-        open_in_place(stage, &missing)?;
+        open_in_place(commander, &missing)?;
     }
     Err(PlayerError::GaveUp("not every hand could take its bar".into()))
 }
 
 /// Closes hands whose palms are at the bars, as `around` has them. Each wrist's goal makes up for what it is off, as the hands of a
 /// robot are that has given way to partners, and gives way to what the hand feels.
-fn close_softly(stage: &mut Stage, grasps: &[BarGrasp], around: &[HandMove]) -> Result<(), PlayerError> {
+fn close_compliantly(
+    commander: &mut Commander,
+    grasps: &[BarGrasp],
+    around: &[HandMove],
+) -> Result<(), PlayerError> {
     let mut goals = Vec::with_capacity(grasps.len());
     for (grasp, reach) in grasps.iter().zip(around) {
-        let now = stage.world_from_wrist(grasp.robot, grasp.side)?;
+        let now = commander.world_from_wrist(grasp.robot, grasp.side)?;
         let mut goal = reach.world_from_wrist.unwrap_or(now);
         goal.translation += goal.translation - now.translation;
         goals.push(goal);
     }
     for step in 1..=GIVES {
-        let facts = stage.facts()?;
+        let facts = commander.facts()?;
         if step > CLOSING_GIVES + 1 && all_hold(&facts, grasps) {
             break;
         }
         let closed = (step as f32 / CLOSING_GIVES as f32).min(1.0);
         let mut moves = Vec::with_capacity(grasps.len());
         for (grasp, goal) in grasps.iter().zip(&mut goals) {
-            let wrist = stage.world_from_wrist(grasp.robot, grasp.side)?;
+            let wrist = commander.world_from_wrist(grasp.robot, grasp.side)?;
             let mut felt_n = facts.robots[grasp.robot].hand_force_n[grasp.side];
             // Up and down, a hand feels its weight.
             felt_n.z = 0.0;
@@ -65,7 +69,7 @@ fn close_softly(stage: &mut Stage, grasps: &[BarGrasp], around: &[HandMove]) -> 
             goal.translation = wrist.translation + (given_m - wrist.translation).clamp_length_max(LEASH_M);
             moves.push(HandMove { world_from_wrist: Some(*goal), ..grasp.closing(closed) });
         }
-        stage.glide(GIVE_S, &moves)?;
+        commander.glide(GIVE_S, &moves)?;
     }
     Ok(())
 }
@@ -76,16 +80,16 @@ fn all_hold(facts: &Facts, grasps: &[BarGrasp]) -> bool {
 
 /// Hands open where they are, for opening fingers push; then they rise. Those that still touch try it again, and give way to what they
 /// are caught on.
-pub fn let_go(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
-    open_in_place(stage, grasps)?;
-    let away = each(stage, grasps, |grasp, stage| {
-        let wrist = stage.world_from_wrist(grasp.robot, grasp.side)?;
+pub fn let_go(commander: &mut Commander, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
+    open_in_place(commander, grasps)?;
+    let away = each(commander, grasps, |grasp, commander| {
+        let wrist = commander.world_from_wrist(grasp.robot, grasp.side)?;
         let raised = Pose::from_parts(wrist.translation + Vector::Z * 0.10, wrist.rotation);
         Ok(HandMove::reach(grasp.robot, grasp.side, raised))
     })?;
-    stage.perform(1.0, &away)?;
+    commander.perform(1.0, &away)?;
     for attempt in 0..ATTEMPTS {
-        let facts = stage.facts()?;
+        let facts = commander.facts()?;
         let hooked: Vec<BarGrasp> = grasps
             .iter()
             .copied()
@@ -95,37 +99,37 @@ pub fn let_go(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError>
             break;
         }
         // Back into the gap behind the bar, and out again, farther.
-        let around = each(stage, &hooked, |grasp, stage| {
-            Ok(HandMove { fingers_rad: grasp.open().fingers_rad, ..grasp.around(stage)? })
+        let around = each(commander, &hooked, |grasp, commander| {
+            Ok(HandMove { fingers_rad: grasp.open().fingers_rad, ..grasp.around(commander)? })
         })?;
-        stage.perform(0.6, &around)?;
+        commander.perform(0.6, &around)?;
         let standoff_m = 0.10 + 0.02 * attempt as f32;
-        let before = each(stage, &hooked, |grasp, stage| grasp.before(stage, standoff_m))?;
-        stage.perform(0.8, &before)?;
+        let before = each(commander, &hooked, |grasp, commander| grasp.before(commander, standoff_m))?;
+        commander.perform(0.8, &before)?;
     }
     for grasp in grasps {
-        stage.set_compliance(grasp.robot, None);
+        commander.set_compliance(grasp.robot, None);
     }
     let open: Vec<HandMove> = grasps.iter().map(BarGrasp::open).collect();
-    stage.perform(0.5, &open)
+    commander.perform(0.5, &open)
 }
 
 /// Opens hands; the wrists stay wherever the fingers push them.
-fn open_in_place(stage: &mut Stage, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
+fn open_in_place(commander: &mut Commander, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
     for _ in 0..6 {
-        let moves = each(stage, grasps, |grasp, stage| {
-            let wrist = stage.world_from_wrist(grasp.robot, grasp.side)?;
+        let moves = each(commander, grasps, |grasp, commander| {
+            let wrist = commander.world_from_wrist(grasp.robot, grasp.side)?;
             Ok(HandMove { world_from_wrist: Some(wrist), ..grasp.open() })
         })?;
-        stage.perform(0.1, &moves)?;
+        commander.perform(0.1, &moves)?;
     }
     Ok(())
 }
 
 fn each(
-    stage: &mut Stage,
+    commander: &mut Commander,
     grasps: &[BarGrasp],
-    part: impl Fn(&BarGrasp, &mut Stage) -> Result<HandMove, PlayerError>,
+    part: impl Fn(&BarGrasp, &mut Commander) -> Result<HandMove, PlayerError>,
 ) -> Result<Vec<HandMove>, PlayerError> {
-    grasps.iter().map(|grasp| part(grasp, stage)).collect()
+    grasps.iter().map(|grasp| part(grasp, commander)).collect()
 }
