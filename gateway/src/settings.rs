@@ -292,7 +292,7 @@ mod tests {
     }
     #[test]
     fn an_address_that_others_reach_needs_a_token() {
-        let token = || Token::of("0123456789abcdef", "a test").unwrap();
+        let token = || Token::parse("0123456789abcdef", "a test").unwrap();
         let resolve = |listen: &str, token: Option<Token>| {
             let flags = Layer { listen: Some(listen.parse().unwrap()), token, ..Layer::default() };
             Settings::resolve(flags, None)

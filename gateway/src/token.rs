@@ -1,4 +1,4 @@
-//! Bearer tokens: words that only who may come in knows. They are compared in a time that says nothing of them, and never printed.
+//! Bearer tokens, which only permitted callers know. They are compared in constant time, and never printed.
 
 use std::{
     env,
@@ -10,17 +10,17 @@ use std::{
 use subtle::{Choice, ConstantTimeEq};
 
 /// The most bytes of a token.
-const LONGEST: usize = 256;
+const MAX_LENGTH: usize = 256;
 
 /// A shorter one could be guessed.
-const SHORTEST: usize = 16;
+const MIN_LENGTH: usize = 16;
 
-/// What a made token is made of: 160 bits.
+/// How many random bytes a generated token has: 160 bits.
 const RANDOM_BYTES: usize = 20;
 
-/// A token, filled up with zeros, which no token contains.
+/// A token, padded with zeros, which no token contains.
 #[derive(Clone)]
-pub struct Token([u8; LONGEST]);
+pub struct Token([u8; MAX_LENGTH]);
 
 /// Why something is no token.
 #[derive(Debug, thiserror::Error)]
@@ -35,7 +35,7 @@ pub enum TokenError {
     },
     /// It does not have the form of a token.
     #[error(
-        "the token of {place} has to be {SHORTEST} to {LONGEST} letters, digits and signs without spaces; `openssl rand -hex 32` makes one"
+        "the token of {place} has to be {MIN_LENGTH} to {MAX_LENGTH} letters, digits and signs without spaces; `openssl rand -hex 32` makes one"
     )]
     Form {
         /// Where it came from.
@@ -47,14 +47,14 @@ pub enum TokenError {
 }
 
 /// The environment's variable with the server's token.
-const TOKEN: &str = "TANDEM_TOKEN";
+const TOKEN_VARIABLE: &str = "TANDEM_TOKEN";
 
 impl Token {
     /// The token in the environment's variable `TANDEM_TOKEN`, if it is set.
-    pub fn of_environment() -> Result<Option<Token>, TokenError> {
-        let text = env::var_os(TOKEN).filter(|text| !text.is_empty());
-        // What is no text has no form of a token.
-        text.map(|text| Token::of(&text.to_string_lossy(), TOKEN)).transpose()
+    pub fn from_environment() -> Result<Option<Token>, TokenError> {
+        let text = env::var_os(TOKEN_VARIABLE).filter(|text| !text.is_empty());
+        // Bytes that are no UTF-8 become characters that no token has, and are refused.
+        text.map(|text| Token::parse(&text.to_string_lossy(), TOKEN_VARIABLE)).transpose()
     }
 
     /// The token in a file, without the white space around it.
@@ -64,18 +64,18 @@ impl Token {
         if readable_by_others(path) {
             tracing::warn!(file = %path.display(), "others on this machine can read the token; chmod 600 keeps it");
         }
-        Token::of(text.trim(), &path.display().to_string())
+        Token::parse(text.trim(), &path.display().to_string())
     }
 
     /// The token `text`, which was given in `place`.
-    pub fn of(text: &str, place: &str) -> Result<Token, TokenError> {
-        if text.len() < SHORTEST || !has_form(text) {
+    pub fn parse(text: &str, place: &str) -> Result<Token, TokenError> {
+        if text.len() < MIN_LENGTH || !is_well_formed(text) {
             return Err(TokenError::Form { place: place.into() });
         }
-        Ok(filled(text))
+        Ok(padded(text))
     }
 
-    /// A new token that nobody can guess, and its text for whom it is made.
+    /// A new random token, and its text for its owner.
     pub fn random() -> Result<(Token, String), TokenError> {
         let mut bytes = [0; RANDOM_BYTES];
         getrandom::fill(&mut bytes).map_err(TokenError::Random)?;
@@ -84,13 +84,13 @@ impl Token {
             let _ = write!(text, "{byte:02x}");
             text
         });
-        Ok((filled(&text), text))
+        Ok((padded(&text), text))
     }
 
-    /// Whether `text` is this token, found out in the same time whatever it is.
-    pub fn is(&self, text: &str) -> bool {
-        let fits = Choice::from(u8::from(has_form(text)));
-        let given = if has_form(text) { filled(text) } else { Token([0; LONGEST]) };
+    /// Whether `text` is this token; the comparison takes the same time whatever the text is.
+    pub fn matches(&self, text: &str) -> bool {
+        let fits = Choice::from(u8::from(is_well_formed(text)));
+        let given = if is_well_formed(text) { padded(text) } else { Token([0; MAX_LENGTH]) };
         (fits & self.0.ct_eq(&given.0)).into()
     }
 }
@@ -106,12 +106,12 @@ fn readable_by_others(_: &Path) -> bool {
     false
 }
 
-fn has_form(text: &str) -> bool {
-    text.len() <= LONGEST && text.bytes().all(|byte| byte.is_ascii_graphic())
+fn is_well_formed(text: &str) -> bool {
+    text.len() <= MAX_LENGTH && text.bytes().all(|byte| byte.is_ascii_graphic())
 }
 
-fn filled(text: &str) -> Token {
-    let mut bytes = [0; LONGEST];
+fn padded(text: &str) -> Token {
+    let mut bytes = [0; MAX_LENGTH];
     bytes[..text.len()].copy_from_slice(text.as_bytes());
     Token(bytes)
 }
@@ -138,13 +138,13 @@ mod tests {
 
     #[test]
     fn a_token_is_its_own_text_and_no_other() {
-        let token = Token::of(GOOD, "a test").unwrap();
-        assert!(token.is(GOOD));
+        let token = Token::parse(GOOD, "a test").unwrap();
+        assert!(token.matches(GOOD));
         let longer = format!("{GOOD}0");
         for other in
             ["", "0123456789abcdeg", "0123456789abcde", &longer, "0123456789abcdef\0", &"x".repeat(300)]
         {
-            assert!(!token.is(other), "{other:?}");
+            assert!(!token.matches(other), "{other:?}");
         }
         assert_eq!(format!("{token:?}"), "Token(..)");
     }
@@ -153,7 +153,7 @@ mod tests {
     fn what_could_be_guessed_is_no_token() {
         let long = "x".repeat(257);
         for text in ["", "0123456789abcde", "0123456789 abcdef", "0123456789abcdeü", &long] {
-            let refused = Token::of(text, "TANDEM_TOKEN").unwrap_err().to_string();
+            let refused = Token::parse(text, "TANDEM_TOKEN").unwrap_err().to_string();
             assert!(refused.contains("TANDEM_TOKEN") && refused.contains("openssl"), "{refused}");
             assert!(text.is_empty() || !refused.contains(text), "{refused}");
         }
@@ -162,7 +162,7 @@ mod tests {
     #[test]
     fn made_tokens_differ() {
         let [(one, text), (other, _)] = [(); 2].map(|()| Token::random().unwrap());
-        assert!(one.is(&text) && !other.is(&text) && one != other);
+        assert!(one.matches(&text) && !other.matches(&text) && one != other);
         assert_eq!(text.len(), 2 * RANDOM_BYTES);
     }
 
@@ -171,7 +171,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("token");
         fs::write(&path, format!("{GOOD}\n")).unwrap();
-        assert!(Token::read(&path).unwrap().is(GOOD));
+        assert!(Token::read(&path).unwrap().matches(GOOD));
         fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).unwrap();
         assert!(!readable_by_others(&path));
         fs::set_permissions(&path, fs::Permissions::from_mode(0o640)).unwrap();

@@ -43,7 +43,7 @@ type Finding = Result<String, String>;
 /// Prints a line for each check. What does not work makes it a failure.
 pub fn run(args: DoctorArgs) -> CommandResult {
     let renderer = args.flags.renderer.unwrap_or_default();
-    let settings = Settings::resolve(Layer { token: Token::of_environment()?, ..args.flags }, None)?;
+    let settings = Settings::resolve(Layer { token: Token::from_environment()?, ..args.flags }, None)?;
     let findings = [
         ("renderer", renderer.describe().map_err(|error| error.to_string())),
         ("physics", physics(renderer)),

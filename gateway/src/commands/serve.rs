@@ -31,7 +31,7 @@ pub struct ServeArgs {
 /// Serves.
 pub fn run(args: ServeArgs) -> CommandResult {
     log_server(LevelFilter::INFO, args.log_format);
-    let flags = Layer { token: Token::of_environment()?, ..args.flags };
+    let flags = Layer { token: Token::from_environment()?, ..args.flags };
     let settings = Settings::resolve(flags, args.config.as_deref())?;
     let left = Server::start(settings)?.run_until_signal();
     Ok(if left.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })

@@ -9,8 +9,8 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::{
+    body::{json_object, msgpack_object},
     problem::ApiError,
-    request::{json_object, msgpack_object},
 };
 
 /// What MessagePack is called: its registered name, and one that was used before.
@@ -44,7 +44,7 @@ fn is(content_type: &str, name: &str) -> bool {
 }
 
 impl Encoding {
-    fn of(headers: &HeaderMap) -> Encoding {
+    fn from_headers(headers: &HeaderMap) -> Encoding {
         let text = |name| headers.get(name).and_then(|value| value.to_str().ok()).unwrap_or_default();
         let format = |msgpack: bool| if msgpack { BodyFormat::Msgpack } else { BodyFormat::Json };
         let body = format(is_msgpack(text(header::CONTENT_TYPE)));
@@ -84,7 +84,7 @@ impl<S: Sync> FromRequestParts<S> for Encoding {
     type Rejection = std::convert::Infallible;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Encoding, Self::Rejection> {
-        Ok(Encoding::of(&parts.headers))
+        Ok(Encoding::from_headers(&parts.headers))
     }
 }
 
@@ -102,7 +102,11 @@ mod tests {
                 }
             }
             let [body, reply] = expected;
-            assert_eq!(Encoding::of(&headers), Encoding { body, reply }, "{content_type}, {accept}");
+            assert_eq!(
+                Encoding::from_headers(&headers),
+                Encoding { body, reply },
+                "{content_type}, {accept}"
+            );
         };
         let (json, msgpack) = ("application/json", "application/msgpack");
         check("", "", [BodyFormat::Json, BodyFormat::Json]);

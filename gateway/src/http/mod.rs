@@ -1,15 +1,15 @@
 //! Episodes over HTTP: REST under `/v1`, MCP at `/mcp`, and problem details for whatever is refused.
 
 mod app;
-mod counted;
+mod body;
 mod encoding;
 mod gate;
 #[cfg(test)]
 mod hostile;
 mod mcp;
 mod problem;
-mod request;
 mod rest;
+mod router;
 mod server;
 #[cfg(test)]
 mod tests;

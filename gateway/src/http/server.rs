@@ -7,9 +7,9 @@ use tandem_tools_spec::{Driving, StartReply};
 use tokio::{net::TcpListener, runtime::Runtime, sync::oneshot, task::JoinHandle, time::interval};
 
 use super::{
-    app::App,
+    app::AppState,
     gate::{Gate, connections, limits::Limits},
-    rest::router,
+    router::router,
 };
 use crate::{
     hosting::{EpisodeTable, EpisodeThread, HostingError},
@@ -20,10 +20,10 @@ use crate::{
 const HTTP_THREADS: usize = 2;
 
 /// How long requests that are still arriving at the end may take.
-const LAST_REQUESTS: Duration = Duration::from_secs(5);
+const REQUEST_GRACE: Duration = Duration::from_secs(5);
 
-/// How often episodes are looked at whose policies may have gone.
-const ROUNDS: Duration = Duration::from_secs(1);
+/// How often episodes are looked for whose policies make no more calls.
+const ABANDONED_CHECK_INTERVAL: Duration = Duration::from_secs(1);
 
 /// A running server. Dropping it stops it at once; [`Server::stop`] lets calls under way finish.
 #[derive(Debug)]
@@ -52,18 +52,18 @@ impl Server {
         })?;
         let address = listener.local_addr()?;
         let table = Arc::new(EpisodeTable::new(settings.clone()));
-        let app = App { table: table.clone(), settings: settings.clone() };
+        let app = AppState { table: table.clone(), settings: settings.clone() };
         let router = router(app, Gate::new(settings.clone(), address.ip()), Limits::new(&settings));
         let (stop, stopped) = oneshot::channel::<()>();
         let served = runtime.spawn(connections::serve(listener, router, settings.request_timeout, async {
             let _ = stopped.await;
         }));
-        runtime.spawn(look_after(table.clone()));
+        runtime.spawn(end_abandoned_episodes(table.clone()));
         tracing::info!("serving on http://{address}");
         Ok(Server { runtime, address, table, stop, served, settings })
     }
 
-    /// Where it serves.
+    /// The address that it serves on.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
@@ -107,7 +107,7 @@ impl Server {
                 tracing::error!(left = left.join(", "), "ending without these, which did not end in time");
             }
             // A client that never finishes its request must not keep the process alive; the recordings are closed by now.
-            if tokio::time::timeout(LAST_REQUESTS, served).await.is_err() {
+            if tokio::time::timeout(REQUEST_GRACE, served).await.is_err() {
                 tracing::warn!("a request was cut off");
             }
             left
@@ -115,10 +115,10 @@ impl Server {
     }
 }
 
-async fn look_after(table: Arc<EpisodeTable>) {
-    let mut rounds = interval(ROUNDS);
+async fn end_abandoned_episodes(table: Arc<EpisodeTable>) {
+    let mut ticks = interval(ABANDONED_CHECK_INTERVAL);
     loop {
-        rounds.tick().await;
+        ticks.tick().await;
         table.end_abandoned();
     }
 }

@@ -61,7 +61,7 @@ impl Team {
     pub fn robot_of(&self, text: &str) -> Option<&str> {
         let mut robot = None;
         for seat in &self.seats {
-            if seat.token.is(text) {
+            if seat.token.matches(text) {
                 robot = Some(seat.robot.as_str());
             }
         }

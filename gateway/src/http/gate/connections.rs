@@ -1,4 +1,4 @@
-//! Accepts connections and serves each, with a limit on how long a request's header may take, until the server stops.
+//! Accepts connections and serves each until the server stops, with a limit on how long a request's header may take.
 
 use std::time::Duration;
 
@@ -23,7 +23,7 @@ use tokio::{
 use super::limits::Peer;
 
 /// How long to wait after the system refused a connection, as where all its file handles are taken.
-const AFTER_REFUSAL: Duration = Duration::from_millis(200);
+const ACCEPT_RETRY_DELAY: Duration = Duration::from_millis(200);
 
 /// Serves `router` until `stopped`, then lets the requests under way finish.
 pub async fn serve(
@@ -50,7 +50,7 @@ pub async fn serve(
                 }
                 Err(error) => {
                     tracing::warn!(%error, "a connection was not accepted");
-                    sleep(AFTER_REFUSAL).await;
+                    sleep(ACCEPT_RETRY_DELAY).await;
                 }
             }
         }
@@ -72,14 +72,14 @@ async fn connection(
     mut stopping: watch::Receiver<bool>,
 ) {
     let router = TowerToHyperService::new(router);
-    let of_peer = service_fn(move |mut request: Request<Incoming>| {
+    let with_peer = service_fn(move |mut request: Request<Incoming>| {
         request.extensions_mut().insert(peer);
         router.call(request)
     });
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(header_limit)
-        .serve_connection(TokioIo::new(stream), of_peer);
+        .serve_connection(TokioIo::new(stream), with_peer);
     let mut connection = std::pin::pin!(connection);
     let stopped = async move {
         let _ = stopping.wait_for(|stopping| *stopping).await;

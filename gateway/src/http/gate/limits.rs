@@ -1,4 +1,4 @@
-//! How much is let in at once, and how much from one address.
+//! How many requests may be under way at once, and how many one address may send per second.
 
 use std::{
     collections::HashMap,
@@ -17,17 +17,17 @@ use tokio::sync::Semaphore;
 use crate::http::problem::ApiError;
 use crate::settings::Settings;
 
-/// Addresses that are remembered. Beyond, those are forgotten that might ask at their full rate again.
-const REMEMBERED: usize = 1024;
+/// How many addresses are remembered. Beyond, those are forgotten that may send at their full rate again.
+const MOST_ADDRESSES: usize = 1024;
 
-/// From which address a request came.
+/// The address that a request came from.
 #[derive(Debug, Clone, Copy)]
 pub struct Peer(pub IpAddr);
 
-/// Counts who is in, and who has asked how often.
+/// Counts the requests under way, and those of each address.
 #[derive(Debug, Clone)]
 pub struct Limits {
-    places: Arc<Semaphore>,
+    permits: Arc<Semaphore>,
     most_requests: usize,
     rates: Option<Arc<Mutex<Rates>>>,
 }
@@ -36,15 +36,15 @@ impl Limits {
     /// The limits that `settings` set.
     pub fn new(settings: &Settings) -> Limits {
         Limits {
-            places: Arc::new(Semaphore::new(settings.max_requests)),
+            permits: Arc::new(Semaphore::new(settings.max_requests)),
             most_requests: settings.max_requests,
             rates: settings.rate_limit.map(|per_second| Arc::new(Mutex::new(Rates::new(per_second)))),
         }
     }
 
-    fn admits(&self, peer: Option<&Peer>) -> Result<(), ApiError> {
+    fn check_rate(&self, peer: Option<&Peer>) -> Result<(), ApiError> {
         let (Some(rates), Some(Peer(address))) = (&self.rates, peer) else { return Ok(()) };
-        // Were there a panic in between, each allowance would still be one.
+        // A panic while the lock was held would leave every allowance valid.
         let mut rates = rates.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         if rates.take(*address, Instant::now()) {
             return Ok(());
@@ -53,18 +53,18 @@ impl Limits {
     }
 }
 
-/// Lets a request in where there is room, or answers when to come again.
+/// Lets a request in within the limits, or answers when to send it again.
 pub async fn pass(State(limits): State<Limits>, request: Request, next: Next) -> Response {
-    let refusal = match (limits.admits(request.extensions().get()), limits.places.try_acquire()) {
-        (Ok(()), Ok(_place)) => return next.run(request).await,
+    let refusal = match (limits.check_rate(request.extensions().get()), limits.permits.try_acquire()) {
+        (Ok(()), Ok(_permit)) => return next.run(request).await,
         (Err(refusal), _) => refusal,
         (Ok(()), Err(_)) => ApiError::Busy { limit: limits.most_requests },
     };
-    tracing::info!(problem = refusal.name(), "a request was not let in");
+    tracing::info!(problem = refusal.kind(), "a request was not let in");
     refusal.into_response()
 }
 
-/// What each address may still ask for: its allowance grows evenly up to the requests of one second.
+/// How many requests each address may still send: its allowance grows evenly up to those of one second.
 #[derive(Debug)]
 struct Rates {
     per_second: u32,
@@ -83,9 +83,9 @@ impl Rates {
         let grown = |(allowed, since): (f64, Instant)| {
             (allowed + now.saturating_duration_since(since).as_secs_f64() * most).min(most)
         };
-        if self.allowances.len() >= REMEMBERED && !self.allowances.contains_key(&address) {
+        if self.allowances.len() >= MOST_ADDRESSES && !self.allowances.contains_key(&address) {
             self.allowances.retain(|_, allowance| grown(*allowance) < most);
-            if self.allowances.len() >= REMEMBERED {
+            if self.allowances.len() >= MOST_ADDRESSES {
                 return false;
             }
         }
@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn addresses_are_forgotten_that_have_their_allowance_back() {
         let (mut rates, began) = (Rates::new(1), Instant::now());
-        for number in 0..REMEMBERED as u32 {
+        for number in 0..MOST_ADDRESSES as u32 {
             assert!(rates.take(address(number), began));
         }
         assert!(!rates.take(address(u32::MAX), began), "no room to remember one more");

@@ -1,5 +1,5 @@
-//! Who may come in: whoever has the server's token, or that of a robot's operator; where the server has none, everybody whom the
-//! gate lets through. Who has no token learns that it needs one, and nothing else.
+//! Who may call: whoever has the server's token, or that of a robot's operator; where the server has none, everybody whom the gate
+//! lets through. A caller without a token learns that it needs one, and nothing else.
 
 use axum::{
     extract::{Request, State},
@@ -10,11 +10,11 @@ use axum::{
 
 use crate::{
     hosting::Caller,
-    http::{app::App, problem::ApiError},
+    http::{app::AppState, problem::ApiError},
 };
 
 /// Lets a request on with its [`Caller`], and without the token that said who that is.
-pub async fn identify(State(app): State<App>, mut request: Request, next: Next) -> Response {
+pub async fn identify(State(app): State<AppState>, mut request: Request, next: Next) -> Response {
     let Some(caller) = caller(&app, request.headers()) else {
         tracing::info!("a request without a token was refused");
         return ApiError::NoToken.into_response();
@@ -24,18 +24,18 @@ pub async fn identify(State(app): State<App>, mut request: Request, next: Next) 
     next.run(request).await
 }
 
-fn caller(app: &App, headers: &HeaderMap) -> Option<Caller> {
+fn caller(app: &AppState, headers: &HeaderMap) -> Option<Caller> {
     let token = bearer(headers);
     let operator = token.and_then(|token| app.table.operator(token));
     match (&app.settings.token, token) {
-        (Some(expected), Some(token)) => operator.or_else(|| expected.is(token).then_some(Caller::Host)),
+        (Some(expected), Some(token)) => operator.or_else(|| expected.matches(token).then_some(Caller::Host)),
         (Some(_), None) => None,
-        // A token that nobody asked for says nothing.
+        // Where the server has no token, a token that is no operator's is ignored.
         (None, _) => operator.or(Some(Caller::Host)),
     }
 }
 
-/// The token of a request that has one, and one only.
+/// The token of a request that has exactly one.
 fn bearer(headers: &HeaderMap) -> Option<&str> {
     let mut values = headers.get_all(header::AUTHORIZATION).iter();
     let (value, None) = (values.next()?.to_str().ok()?, values.next()) else { return None };

@@ -18,9 +18,9 @@ use tandem_tools_spec::{Hints, ManageReply, Protocol, StartEpisode, ToolReply, T
 use tokio::runtime::Runtime;
 
 use super::{
-    app::App,
+    app::AppState,
     gate::{Gate, limits::Limits},
-    rest::router,
+    router::router,
 };
 use crate::{
     hosting::EpisodeTable,
@@ -57,7 +57,7 @@ impl Target {
         let flags = Layer { runs: Some(runs.path().into()), max_episodes: Some(1), ..Layer::default() };
         let settings = Settings::resolve(flags, None).unwrap();
         let table = Arc::new(EpisodeTable::new(settings.clone()));
-        let app = App { table: table.clone(), settings: settings.clone() };
+        let app = AppState { table: table.clone(), settings: settings.clone() };
         let gate = Gate::new(settings.clone(), [127, 0, 0, 1].into());
         let router = TowerToHyperService::new(router(app, gate, Limits::new(&settings)));
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();

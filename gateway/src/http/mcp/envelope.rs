@@ -1,5 +1,5 @@
-//! What surrounds a call over MCP, as JSON-RPC 2.0 has it. Its mistakes are answered with the codes that it specifies; what reads
-//! requests behind this would take some for requests that it does not know, and answer others with no JSON at all.
+//! Checks the JSON-RPC 2.0 message around a call over MCP, and answers mistakes with the codes that JSON-RPC specifies: the library
+//! behind this would take some for requests that it does not know, and answer others with no JSON at all.
 
 use axum::{
     http::{StatusCode, header},
@@ -11,12 +11,12 @@ const PARSE_ERROR: i32 = -32700;
 const INVALID_REQUEST: i32 = -32600;
 const INVALID_PARAMS: i32 = -32602;
 
-/// Why a body is no message.
+/// Why a body is no JSON-RPC message.
 #[derive(Debug)]
 pub struct RpcError {
     code: i32,
     message: String,
-    /// Of the request, where it could be read. A text or a number.
+    /// The id of the request, a text or a number, where it could be read.
     id: Option<Value>,
 }
 
@@ -53,7 +53,7 @@ pub fn check(body: &[u8]) -> Result<(), RpcError> {
     match message.get("method") {
         Some(Value::String(method)) => check_params(method, message.get("params"))
             .map_err(|message| RpcError { code: INVALID_PARAMS, message, id: id.cloned() }),
-        // An answer of the client's.
+        // The client answers a request of the server.
         None if message.contains_key("result") || message.contains_key("error") => Ok(()),
         _ => refuse(INVALID_REQUEST, id, "method has to be a text, as \"tools/call\""),
     }

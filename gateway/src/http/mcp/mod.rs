@@ -32,10 +32,9 @@ use tandem_tools_spec::{
 };
 
 use super::{
-    app::App,
-    counted::{counted, every_tool},
+    app::{AppState, counted, every_tool},
+    body::check_unique_fields,
     problem::ApiError,
-    request::unambiguous,
 };
 use crate::hosting::{Answer, Caller, HostingError, Request};
 
@@ -44,12 +43,12 @@ const INSTRUCTIONS: &str = "Simulated humanoids that must work together. Call li
     with observe and act with move_wrists, walk, send_joint_chunk or wait until the task is done, then call finish. \
     Physics stands still between calls.";
 
-/// What is nested at `/mcp`, behind the gate, which has looked at `Host` and `Origin`.
-pub fn router(app: App) -> Router {
+/// The routes to nest at `/mcp`, behind the gate, which has checked `Host` and `Origin`.
+pub fn router(app: AppState) -> Router {
     Router::new().fallback_service(service(app)).layer(middleware::from_fn(check_body))
 }
 
-fn service(app: App) -> StreamableHttpService<McpServer, NeverSessionManager> {
+fn service(app: AppState) -> StreamableHttpService<McpServer, NeverSessionManager> {
     let config = StreamableHttpServerConfig::default()
         .with_legacy_session_mode(false)
         .with_json_response(true)
@@ -61,7 +60,7 @@ fn service(app: App) -> StreamableHttpService<McpServer, NeverSessionManager> {
 /// Answers MCP requests from the table of episodes.
 #[derive(Debug, Clone)]
 struct McpServer {
-    app: App,
+    app: AppState,
 }
 
 impl ServerHandler for McpServer {
@@ -116,18 +115,18 @@ impl ServerHandler for McpServer {
         }
         let args = Value::Object(request.arguments.unwrap_or_default());
         let episode = args["episode_id"].as_str().map(str::to_owned);
-        let called = match ambiguity(&context) {
-            Some(Ambiguous(reason)) => Err(ApiError::MalformedJson(reason.clone())),
+        let called = match duplicate_field(&context) {
+            Some(DuplicateField(reason)) => Err(ApiError::MalformedJson(reason.clone())),
             None => match caller(&context) {
                 Some(who) => counted(&self.app, &request.name, self.call(who, &request.name, args)).await,
                 None => Err(ApiError::NoToken),
             },
         };
-        self.note(&request.name, episode.as_deref(), called.as_ref().err());
+        self.log_call(&request.name, episode.as_deref(), called.as_ref().err());
         let result = match called {
             Ok(content) => CallToolResult::success(content),
-            // A refusal is the tool's answer, which the model is to read; protocol errors often stay with the host.
-            Err(error) => CallToolResult::error(refused(&error)),
+            // A refusal is served as the tool's answer, which the model reads; protocol errors often stay with the host.
+            Err(error) => CallToolResult::error(refusal_blocks(&error)),
         };
         Ok(result.into())
     }
@@ -151,11 +150,11 @@ impl McpServer {
         }
     }
 
-    /// Logs a call and counts a refusal. The line about the request itself knows neither.
-    fn note(&self, tool: &str, episode: Option<&str>, refusal: Option<&ApiError>) {
-        // What callers make up is not logged.
+    /// Logs a call and counts a refusal: the log line of the HTTP request knows neither the tool nor the problem.
+    fn log_call(&self, tool: &str, episode: Option<&str>, refusal: Option<&ApiError>) {
+        // An episode that does not exist may be anything that a caller made up, and is not logged.
         let episode = episode.filter(|id| self.app.table.get(id).is_ok());
-        let problem = refusal.map(ApiError::name);
+        let problem = refusal.map(ApiError::kind);
         if let Some(kind) = problem {
             self.app.table.metrics().request_refused(kind);
         }
@@ -172,7 +171,7 @@ impl McpServer {
         let request = Request::parse(name, args).map_err(ApiError::from);
         let id = match (handle, who) {
             (Some(Value::String(id)), _) => id,
-            // An operator's token says which.
+            // An operator's token says which episode.
             (None, Caller::Operator { episode, .. }) => episode.clone(),
             _ => {
                 request?;
@@ -181,16 +180,16 @@ impl McpServer {
         };
         let episode = self.app.table.hosted(&id);
         let request = match &episode {
-            Ok(episode) => request.map_err(|refusal| refusal.of(&episode.thread))?,
+            Ok(episode) => request.map_err(|refusal| refusal.in_episode(&episode.thread))?,
             Err(_) => request?,
         };
         let episode = episode?;
         let answered = episode.call(who, request, None).await;
-        content(&answered.map_err(|error| ApiError::from(error).of(&episode.thread))?.reply)
+        content(&answered.map_err(|error| ApiError::from(error).in_episode(&episode.thread))?.reply)
     }
 }
 
-/// An answer as blocks: its text without pictures, then the pictures.
+/// The content of an answer: its JSON without pictures, then the pictures.
 fn content(answer: &Answer) -> Result<Vec<ContentBlock>, ApiError> {
     let mut text = serde_json::to_value(answer).map_err(|error| ApiError::Reply(error.into()))?;
     let seen = match (&answer.reply, &answer.observation) {
@@ -207,35 +206,35 @@ fn content(answer: &Answer) -> Result<Vec<ContentBlock>, ApiError> {
         object.shift_remove("images");
     }
     let mut content = json_block(&text)?;
-    content.push(ContentBlock::text(numbered(&seen.images)));
+    content.push(ContentBlock::text(image_captions(&seen.images)));
     content.extend(
         seen.images.iter().map(|image| ContentBlock::image(image.png_base64.to_base64(), "image/png")),
     );
     Ok(content)
 }
 
-/// Who calls, as the gate has found out.
+/// The caller, as the gate has identified it.
 fn caller(context: &RequestContext<RoleServer>) -> Option<&Caller> {
     context.extensions.get::<Parts>()?.extensions.get()
 }
 
-/// Says which picture is whose, before they follow.
-fn numbered(images: &[CameraImage]) -> String {
+/// Says which robot each of the following pictures is from.
+fn image_captions(images: &[CameraImage]) -> String {
     let of = |(index, image): (usize, &CameraImage)| format!(" Image {}: {}.", index + 1, image.robot);
     format!("{} images follow.{}", images.len(), images.iter().enumerate().map(of).collect::<String>())
 }
 
 /// A refusal as a model reads it.
-fn refused(error: &ApiError) -> Vec<ContentBlock> {
+fn refusal_blocks(error: &ApiError) -> Vec<ContentBlock> {
     let failed = error.recording_failed().map(|reason| format!("recording_failed: {reason}"));
     [error.body().detail].into_iter().chain(failed).map(ContentBlock::text).collect()
 }
 
-/// Why a request can be read in two ways. What reads JSON-RPC behind this keeps the last of two fields of one name.
+/// Says that a body names a field twice. The JSON-RPC library behind this would keep the last of the two.
 #[derive(Clone)]
-struct Ambiguous(String);
+struct DuplicateField(String);
 
-/// Refuses what is no message, and notes on a request whether its body names a field twice, for when its call is answered.
+/// Refuses what is no message. A body that names a field twice is noted on the request, for the answer to its call.
 async fn check_body(request: extract::Request, next: Next) -> Response {
     let (mut parts, body) = request.into_parts();
     // The gate has received it, within its limit.
@@ -245,13 +244,13 @@ async fn check_body(request: extract::Request, next: Next) -> Response {
     {
         return error.into_response();
     }
-    if let Err(reason) = unambiguous(&bytes) {
-        parts.extensions.insert(Ambiguous(reason));
+    if let Err(reason) = check_unique_fields(&bytes) {
+        parts.extensions.insert(DuplicateField(reason));
     }
     next.run(extract::Request::from_parts(parts, bytes.into())).await
 }
 
-fn ambiguity(context: &RequestContext<RoleServer>) -> Option<&Ambiguous> {
+fn duplicate_field(context: &RequestContext<RoleServer>) -> Option<&DuplicateField> {
     context.extensions.get::<Parts>()?.extensions.get()
 }
 

@@ -7,10 +7,10 @@ use rmcp::{
 use tandem_episodes::{brief, tasks};
 use tandem_tools_spec::{Brief, Hints, Protocol, ProtocolInfo, StartEpisode, TaskInfo, TaskList, parse_args};
 
-/// What hosts call it.
+/// The name of the only prompt.
 const NAME: &str = "play_task";
 
-/// The prompts that there are.
+/// The prompts that hosts may offer.
 pub fn prompts() -> Vec<Prompt> {
     let argument = |name: &str, text: &str, required: bool| {
         PromptArgument::new(name).with_description(text).with_required(required)

@@ -49,7 +49,7 @@ fn own_refusals() -> Vec<ApiError> {
         ApiError::Protocol { status: StatusCode::BAD_REQUEST, detail: "the path is no text".into() },
         ApiError::Protocol { status: StatusCode::UNPROCESSABLE_ENTITY, detail: "no query".into() },
         ApiError::Reply(failure().into()),
-        ApiError::Unrecorded {
+        ApiError::RecordingFailed {
             error: Box::new(HostingError::TooManyWaiting { limit: 16 }.into()),
             recording_failed: "disk full".into(),
         },

@@ -1,4 +1,4 @@
-//! Every refusal as RFC 9457 problem details. The detail says what would work; what is our own fault goes to the log only.
+//! Every refusal as RFC 9457 problem details. The detail says what would work; the text of a fault of the server goes to the log only.
 
 #[cfg(test)]
 mod goldens;
@@ -22,9 +22,9 @@ pub enum ApiError {
     /// The call does not fit the contract.
     #[error(transparent)]
     Spec(#[from] SpecError),
-    /// A refusal that concerns an episode whose recording has failed, which every answer of it says.
+    /// A refusal of an episode whose recording has failed, which every answer of the episode says.
     #[error("{error}")]
-    Unrecorded {
+    RecordingFailed {
         /// The refusal.
         error: Box<ApiError>,
         /// Why the recording is not complete.
@@ -78,7 +78,7 @@ pub enum ApiError {
     /// Nothing says who calls.
     #[error("send the token as Authorization: Bearer TOKEN")]
     NoToken,
-    /// A key that cannot be kept.
+    /// An idempotency key that is no text of the right length.
     #[error(
         "Idempotency-Key has to be 1 to 255 letters, digits and signs, as a UUID; a new one for each request"
     )]
@@ -134,7 +134,7 @@ pub enum ApiError {
         /// What axum said.
         detail: String,
     },
-    /// A reply of ours that cannot be written.
+    /// A reply that cannot be written.
     #[error("a reply cannot be written: {0}")]
     Reply(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
@@ -192,7 +192,7 @@ impl ApiError {
         match self {
             ApiError::Spec(error) => error.refusal().into(),
             ApiError::Hosting(error) => error.refusal().into(),
-            ApiError::Unrecorded { error, .. } => error.problem(),
+            ApiError::RecordingFailed { error, .. } => error.problem(),
             ApiError::NoRoute { other_method: false, .. } => {
                 Refusal::new("no-route", "No such route", NotFound).into()
             }
@@ -248,7 +248,7 @@ impl ApiError {
     }
 
     /// The kind's stable name.
-    pub fn name(&self) -> &'static str {
+    pub fn kind(&self) -> &'static str {
         self.problem().kind
     }
 
@@ -271,32 +271,32 @@ impl ApiError {
     /// Why the recording of the episode that it concerns is not complete, if that has to be said.
     pub fn recording_failed(&self) -> Option<&str> {
         match self {
-            ApiError::Unrecorded { recording_failed, .. } => Some(recording_failed),
+            ApiError::RecordingFailed { recording_failed, .. } => Some(recording_failed),
             _ => None,
         }
     }
 
-    /// The refusal as `episode` makes it.
-    pub fn of(self, episode: &EpisodeThread) -> ApiError {
+    /// The refusal with why the recording of `episode` is not complete, where it is not.
+    pub fn in_episode(self, episode: &EpisodeThread) -> ApiError {
         match episode.recording_failed() {
             Some(reason) => {
-                ApiError::Unrecorded { error: Box::new(self), recording_failed: reason.to_owned() }
+                ApiError::RecordingFailed { error: Box::new(self), recording_failed: reason.to_owned() }
             }
             None => self,
         }
     }
 }
 
-/// That a response refuses, and the name of the problem's kind.
+/// An extension of a response that refuses: the name of the problem's kind.
 #[derive(Debug, Clone, Copy)]
-pub struct Refused(pub &'static str);
+pub struct RefusalKind(pub &'static str);
 
 impl IntoResponse for ApiError {
     fn into_response(self) -> Response {
         let Problem { kind, status, retry_after_s, .. } = self.problem();
         let text = serde_json::json!(self.body()).to_string();
         let mut response = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], text).into_response();
-        response.extensions_mut().insert(Refused(kind));
+        response.extensions_mut().insert(RefusalKind(kind));
         let headers = response.headers_mut();
         if let Some(seconds) = retry_after_s {
             headers.insert(header::RETRY_AFTER, seconds.into());

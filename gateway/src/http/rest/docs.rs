@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use serde_json::{Map, Value};
+use tandem_episodes::html::escape;
 
 const STYLE: &str = include_str!("docs.css");
 
@@ -94,7 +95,7 @@ fn row(name: &str, schema: &Value, described: &Value, required: bool) -> String 
     )
 }
 
-/// Of a field that may be null, what it is where it is not.
+/// The schema of a field; for one that may be null, the schema of its other values.
 fn described(schema: &Value) -> &Value {
     let choices = schema["anyOf"].as_array().filter(|_| schema.get("type").is_none());
     choices.into_iter().flatten().find(|choice| choice["type"] != "null").unwrap_or(schema)
@@ -128,10 +129,6 @@ fn entries(object: &Value) -> impl Iterator<Item = (&str, &Value)> {
 
 fn text(value: &Value) -> String {
     escape(value.as_str().unwrap_or_default())
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

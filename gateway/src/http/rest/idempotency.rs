@@ -11,18 +11,18 @@ use crate::http::problem::ApiError;
 const KEY: &str = "idempotency-key";
 const REPLAYED: &str = "idempotency-replayed";
 
-/// The longest key.
+/// The most bytes of a key.
 const LONGEST: usize = 255;
 
 /// The key of a request, if it has one.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Key(pub Option<String>);
+pub struct IdempotencyKey(pub Option<String>);
 
-impl<S: Sync> FromRequestParts<S> for Key {
+impl<S: Sync> FromRequestParts<S> for IdempotencyKey {
     type Rejection = ApiError;
 
-    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Key, ApiError> {
-        parts.headers.get(KEY).map(read).transpose().map(Key)
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<IdempotencyKey, ApiError> {
+        parts.headers.get(KEY).map(read).transpose().map(IdempotencyKey)
     }
 }
 
@@ -34,8 +34,8 @@ fn read(value: &HeaderValue) -> Result<String, ApiError> {
     }
 }
 
-/// Says of a reply that it had been made before.
-pub fn say_again(mut response: Response, again: bool) -> Response {
+/// Marks a reply that an earlier request with the same key has had.
+pub fn mark_replayed(mut response: Response, again: bool) -> Response {
     if again {
         response.headers_mut().insert(REPLAYED, HeaderValue::from_static("true"));
     }

@@ -6,9 +6,8 @@ mod idempotency;
 use axum::{
     Json, Router,
     body::Bytes,
-    extract::{DefaultBodyLimit, Extension, MatchedPath, Path, Query, Request, State},
-    http::{HeaderMap, Method, StatusCode, Uri, header},
-    middleware::{self, Next},
+    extract::{Extension, Path, Query, State},
+    http::{StatusCode, header},
     response::{Html, IntoResponse, Response},
     routing::{MethodRouter, get, post},
 };
@@ -20,25 +19,18 @@ use tandem_tools_spec::{
 };
 
 use super::{
-    app::App,
-    counted::counted,
+    app::{AppState, counted},
     encoding::Encoding,
-    gate::{
-        self, Gate,
-        limits::{self, Limits},
-        tokens,
-    },
-    mcp,
-    problem::{ApiError, Refused},
+    problem::ApiError,
 };
 use crate::{
     hosting::{Caller, HostingError, Once, Request as Asked},
     metrics::MetricsPage,
 };
-use idempotency::{Key, say_again};
+use idempotency::{IdempotencyKey, mark_replayed};
 
 /// Every route: path, methods, handlers.
-fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 11] {
+fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<AppState>); 11] {
     [
         ("/healthz", &["GET"], get(health)),
         ("/metrics", &["GET"], get(metrics)),
@@ -54,34 +46,21 @@ fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<App>); 11] 
     ]
 }
 
-/// The whole service.
-pub fn router(app: App, gate: Gate, limits: Limits) -> Router {
-    let mut router = Router::new().nest_service("/mcp", mcp::router(app.clone()));
-    for (path, _, handlers) in routes() {
-        router = router.route(path, handlers);
-    }
-    let routed = router
-        .fallback(no_route)
-        .method_not_allowed_fallback(no_method)
-        // The gate has a limit of its own.
-        .layer(DefaultBodyLimit::disable())
-        .layer(middleware::from_fn_with_state(gate, gate::pass))
-        .layer(middleware::from_fn_with_state(app.clone(), log_and_describe))
-        .with_state(app.clone());
-    // Around all of it: what axum itself adds to an answer, as the methods of a path, would say which paths there are.
-    Router::new()
-        .fallback_service(routed)
-        .layer(middleware::from_fn_with_state(app.clone(), tokens::identify))
-        // Before it, so that nobody tries tokens faster than requests are let in.
-        .layer(middleware::from_fn_with_state(limits, limits::pass))
-        .layer(middleware::from_fn_with_state(app, count_refusal))
+/// The routes under `/v1`, and those about the server itself.
+pub fn router() -> Router<AppState> {
+    routes().into_iter().fold(Router::new(), |router, (path, _, handlers)| router.route(path, handlers))
 }
 
-async fn health(State(app): State<App>) -> Json<Value> {
+/// Every route with its methods, as `GET /healthz`.
+pub fn served() -> Vec<String> {
+    routes().iter().map(|(path, methods, _)| format!("{} {path}", methods.join("|"))).collect()
+}
+
+async fn health(State(app): State<AppState>) -> Json<Value> {
     Json(json!({ "status": "ok", "version": env!("CARGO_PKG_VERSION"), "episodes": app.table.len() }))
 }
 
-async fn tasks(State(app): State<App>) -> Json<TaskList> {
+async fn tasks(State(app): State<AppState>) -> Json<TaskList> {
     Json(app.table.task_list())
 }
 
@@ -91,7 +70,10 @@ struct ToolsQuery {
     format: Option<String>,
 }
 
-async fn tools(State(app): State<App>, Query(query): Query<ToolsQuery>) -> Result<Json<Value>, ApiError> {
+async fn tools(
+    State(app): State<AppState>,
+    Query(query): Query<ToolsQuery>,
+) -> Result<Json<Value>, ApiError> {
     let specs = tool_specs(app.settings.hints);
     let Some(name) = query.format else { return Ok(Json(json!(specs))) };
     let format = Format::find(&name).ok_or(ApiError::UnknownFormat { name })?;
@@ -99,7 +81,7 @@ async fn tools(State(app): State<App>, Query(query): Query<ToolsQuery>) -> Resul
 }
 
 async fn episode_tools(
-    State(app): State<App>,
+    State(app): State<AppState>,
     Extension(who): Extension<Caller>,
     Path(id): Path<String>,
 ) -> Result<Json<Vec<EpisodeToolSpec>>, ApiError> {
@@ -111,32 +93,35 @@ async fn episode_tools(
     Ok(Json(specs))
 }
 
-async fn openapi(State(app): State<App>) -> Json<Value> {
+async fn openapi(State(app): State<AppState>) -> Json<Value> {
     Json(tandem_tools_spec::openapi(env!("CARGO_PKG_VERSION"), app.settings.hints))
 }
 
 /// The description of the interface as a page, which needs and may load nothing else.
-async fn docs(State(app): State<App>) -> Response {
+async fn docs(State(app): State<AppState>) -> Response {
     let document = tandem_tools_spec::openapi(env!("CARGO_PKG_VERSION"), app.settings.hints);
     let policy = (header::CONTENT_SECURITY_POLICY, "default-src 'none'; style-src 'unsafe-inline'");
     ([policy], Html(docs::page(&document))).into_response()
 }
 
-async fn metrics(State(app): State<App>, Extension(who): Extension<Caller>) -> Result<Response, ApiError> {
-    only_hosts(&who)?;
+async fn metrics(
+    State(app): State<AppState>,
+    Extension(who): Extension<Caller>,
+) -> Result<Response, ApiError> {
+    require_host(&who)?;
     let page = app.table.metrics().page(app.table.len(), app.table.running());
     Ok(([(header::CONTENT_TYPE, MetricsPage::CONTENT_TYPE)], page).into_response())
 }
 
 async fn start(
-    State(app): State<App>,
+    State(app): State<AppState>,
     Extension(who): Extension<Caller>,
     encoding: Encoding,
-    Key(key): Key,
+    IdempotencyKey(key): IdempotencyKey,
     body: Bytes,
 ) -> Result<Response, ApiError> {
     counted(&app, StartEpisode::NAME, async {
-        only_hosts(&who)?;
+        require_host(&who)?;
         let (args, driving) = parse_start(encoding.read(&body)?)?;
         let Once { reply, again } = match key {
             Some(key) => app.table.start_once(args, driving, &key).await?,
@@ -144,13 +129,13 @@ async fn start(
         };
         let location = format!("/v1/episodes/{}", reply.episode_id);
         let written = encoding.write(StatusCode::CREATED, &reply)?;
-        Ok(say_again(([(header::LOCATION, location)], written).into_response(), again))
+        Ok(mark_replayed(([(header::LOCATION, location)], written).into_response(), again))
     })
     .await
 }
 
 async fn status(
-    State(app): State<App>,
+    State(app): State<AppState>,
     Extension(who): Extension<Caller>,
     encoding: Encoding,
     Path(id): Path<String>,
@@ -159,7 +144,7 @@ async fn status(
 }
 
 async fn briefing(
-    State(app): State<App>,
+    State(app): State<AppState>,
     Extension(who): Extension<Caller>,
     encoding: Encoding,
     Path(id): Path<String>,
@@ -168,10 +153,10 @@ async fn briefing(
 }
 
 async fn call(
-    State(app): State<App>,
+    State(app): State<AppState>,
     Extension(who): Extension<Caller>,
     encoding: Encoding,
-    Key(key): Key,
+    IdempotencyKey(key): IdempotencyKey,
     Path((id, name)): Path<(String, String)>,
     body: Bytes,
 ) -> Result<Response, ApiError> {
@@ -183,25 +168,26 @@ async fn call(
             Ok(request) => episode.call(&who, request, key.as_deref()).await.map_err(ApiError::from),
             Err(refusal) => Err(refusal),
         };
-        let Once { reply, again } = answer.map_err(|refusal: ApiError| refusal.of(&episode.thread))?;
+        let Once { reply, again } =
+            answer.map_err(|refusal: ApiError| refusal.in_episode(&episode.thread))?;
         let status = if reply.others_play_on { StatusCode::ACCEPTED } else { StatusCode::OK };
-        Ok(say_again(encoding.write(status, &*reply)?, again))
+        Ok(mark_replayed(encoding.write(status, &*reply)?, again))
     })
     .await
 }
 
 async fn remove(
-    State(app): State<App>,
+    State(app): State<AppState>,
     Extension(who): Extension<Caller>,
     Path(id): Path<String>,
 ) -> Result<Json<ResultReply>, ApiError> {
     app.table.hosted(&id)?.admit(&who)?;
-    only_hosts(&who)?;
+    require_host(&who)?;
     Ok(Json(app.table.remove(&id).await?))
 }
 
-/// Operators drive their robots; what concerns the whole is for who started the episode.
-fn only_hosts(who: &Caller) -> Result<(), HostingError> {
+/// Refuses an operator: what concerns more than its robot is for the caller who started the episode.
+fn require_host(who: &Caller) -> Result<(), HostingError> {
     match who {
         Caller::Host => Ok(()),
         Caller::Operator { .. } => Err(HostingError::HostsBusiness),
@@ -216,62 +202,4 @@ fn without_episode_id(mut args: Value, id: &str) -> Result<Value, ApiError> {
         }
         _ => Ok(args),
     }
-}
-
-async fn no_route(method: Method, uri: Uri) -> ApiError {
-    refused_route(method, uri, false)
-}
-
-async fn no_method(method: Method, uri: Uri) -> ApiError {
-    refused_route(method, uri, true)
-}
-
-fn refused_route(method: Method, uri: Uri, other_method: bool) -> ApiError {
-    let have = routes()
-        .iter()
-        .map(|(path, methods, _)| format!("{} {path}", methods.join("|")))
-        .chain(["POST /mcp".into()])
-        .collect();
-    ApiError::NoRoute { method: method.to_string(), path: uri.path().into(), have, other_method }
-}
-
-/// Counts what is refused, wherever that was.
-async fn count_refusal(State(app): State<App>, request: Request, next: Next) -> Response {
-    let response = next.run(request).await;
-    if let Some(Refused(kind)) = response.extensions().get() {
-        app.table.metrics().request_refused(kind);
-    }
-    response
-}
-
-/// Logs every request, and turns refusals of axum's own (as of a path that is not UTF-8) into problem details. Of what
-/// a caller wrote, the log has the route, and the episode where there is such an episode: whatever else there is may be a secret.
-async fn log_and_describe(State(app): State<App>, request: Request, next: Next) -> Response {
-    let method = request.method().clone();
-    let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str).to_owned();
-    let episode = episode_of(request.uri().path()).filter(|id| app.table.get(id).is_ok()).map(str::to_owned);
-    let began = std::time::Instant::now();
-    let mut response = next.run(request).await;
-    let status = response.status();
-    if status.is_client_error() && !is_json(response.headers()) {
-        let allow = response.headers().get(header::ALLOW).cloned();
-        let text = axum::body::to_bytes(response.into_body(), 10_000).await.unwrap_or_default();
-        let detail = format!("{}; see GET /v1/tools for what is served", String::from_utf8_lossy(&text));
-        response = ApiError::Protocol { status, detail }.into_response();
-        response.headers_mut().extend(allow.map(|methods| (header::ALLOW, methods)));
-    }
-    let problem = response.extensions().get().map(|Refused(kind)| *kind);
-    let ms = began.elapsed().as_millis() as u64;
-    tracing::info!(%method, route, episode, status = status.as_u16(), problem, ms, "request");
-    response
-}
-
-/// What a path names as the episode.
-fn episode_of(path: &str) -> Option<&str> {
-    path.strip_prefix("/v1/episodes/")?.split('/').next()
-}
-
-fn is_json(headers: &HeaderMap) -> bool {
-    let content_type = headers.get(header::CONTENT_TYPE);
-    content_type.is_some_and(|value| value.to_str().is_ok_and(|text| text.contains("json")))
 }

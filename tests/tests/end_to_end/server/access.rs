@@ -13,7 +13,7 @@ use tracing::Level;
 const TOKEN: &str = "correct-horse-battery-staple";
 
 fn server() -> TestServer {
-    let token = Some(Token::of(TOKEN, "a test").expect("a token"));
+    let token = Some(Token::parse(TOKEN, "a test").expect("a token"));
     TestServer::with(Layer { token, ..Layer::default() })
 }
 

@@ -1,4 +1,4 @@
-//! Reads request bodies: one object in JSON or MessagePack, whose names are all different.
+//! Reads request bodies: one object in JSON or MessagePack, in which no object names a field twice.
 
 use std::fmt;
 
@@ -15,24 +15,24 @@ pub fn json_object(body: &[u8]) -> Result<Value, ApiError> {
     if body.is_empty() {
         return Ok(Value::Object(Map::new()));
     }
-    let Unambiguous(value) =
+    let UniqueFields(value) =
         serde_json::from_slice(body).map_err(|error| ApiError::MalformedJson(error.to_string()))?;
     object(value)
 }
 
-/// As deep as JSON may be.
-const DEEPEST: usize = 128;
+/// How deep arrays and maps may be nested: as deep as serde_json reads JSON.
+const MAX_DEPTH: usize = 128;
 
-/// As [`json_object`], of MessagePack.
+/// The MessagePack map in `body`; no body stands for a map without fields.
 pub fn msgpack_object(body: &[u8]) -> Result<Value, ApiError> {
     if body.is_empty() {
         return Ok(Value::Object(Map::new()));
     }
     let mut left = body;
     let mut reader = rmp_serde::Deserializer::new(&mut left);
-    reader.set_max_depth(DEEPEST);
+    reader.set_max_depth(MAX_DEPTH);
     let malformed = |error: String| ApiError::MalformedMsgpack(error);
-    let Unambiguous(value) =
+    let UniqueFields(value) =
         Deserialize::deserialize(&mut reader).map_err(|error| malformed(error.to_string()))?;
     match left.len() {
         0 => object(value),
@@ -52,23 +52,23 @@ fn object(value: Value) -> Result<Value, ApiError> {
 }
 
 /// Why a body can be read in two ways, or cannot be read at all.
-pub fn unambiguous(body: &[u8]) -> Result<(), String> {
-    let read: Result<Unambiguous, _> = serde_json::from_slice(body);
+pub fn check_unique_fields(body: &[u8]) -> Result<(), String> {
+    let read: Result<UniqueFields, _> = serde_json::from_slice(body);
     read.map(drop).map_err(|error| error.to_string())
 }
 
 /// Any JSON in which no object names a field twice: readers of JSON differ in which of the two they take.
-struct Unambiguous(Value);
+struct UniqueFields(Value);
 
-impl<'de> Deserialize<'de> for Unambiguous {
+impl<'de> Deserialize<'de> for UniqueFields {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Build.deserialize(deserializer).map(Unambiguous)
+        UniqueFieldsVisitor.deserialize(deserializer).map(UniqueFields)
     }
 }
 
-struct Build;
+struct UniqueFieldsVisitor;
 
-impl<'de> DeserializeSeed<'de> for Build {
+impl<'de> DeserializeSeed<'de> for UniqueFieldsVisitor {
     type Value = Value;
 
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Value, D::Error> {
@@ -76,7 +76,7 @@ impl<'de> DeserializeSeed<'de> for Build {
     }
 }
 
-impl<'de> Visitor<'de> for Build {
+impl<'de> Visitor<'de> for UniqueFieldsVisitor {
     type Value = Value;
 
     fn expecting(&self, text: &mut fmt::Formatter) -> fmt::Result {
@@ -87,7 +87,7 @@ impl<'de> Visitor<'de> for Build {
         Ok(Value::Null)
     }
 
-    // MessagePack has nothing, and something, of its own.
+    // What MessagePack calls nil.
     fn visit_none<E>(self) -> Result<Value, E> {
         Ok(Value::Null)
     }
@@ -114,7 +114,7 @@ impl<'de> Visitor<'de> for Build {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Value, A::Error> {
         let mut array = Vec::new();
-        while let Some(item) = items.next_element_seed(Build)? {
+        while let Some(item) = items.next_element_seed(UniqueFieldsVisitor)? {
             array.push(item);
         }
         Ok(array.into())
@@ -123,7 +123,7 @@ impl<'de> Visitor<'de> for Build {
     fn visit_map<A: MapAccess<'de>>(self, mut fields: A) -> Result<Value, A::Error> {
         let mut object = Map::new();
         while let Some(name) = fields.next_key::<String>()? {
-            let value = fields.next_value_seed(Build)?;
+            let value = fields.next_value_seed(UniqueFieldsVisitor)?;
             if object.contains_key(&name) {
                 return Err(A::Error::custom(format_args!("the field {name:?} stands there twice")));
             }

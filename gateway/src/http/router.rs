@@ -1,0 +1,95 @@
+//! The whole service: REST and MCP behind the gate, every request logged, and every refusal described and counted.
+
+use axum::{
+    Router,
+    extract::{DefaultBodyLimit, MatchedPath, Request, State},
+    http::{HeaderMap, Method, Uri, header},
+    middleware::{self, Next},
+    response::{IntoResponse, Response},
+};
+
+use super::{
+    app::AppState,
+    gate::{
+        self, Gate,
+        limits::{self, Limits},
+        tokens,
+    },
+    mcp,
+    problem::{ApiError, RefusalKind},
+    rest,
+};
+
+/// The whole service.
+pub fn router(app: AppState, gate: Gate, limits: Limits) -> Router {
+    let routed = rest::router()
+        .nest_service("/mcp", mcp::router(app.clone()))
+        .fallback(no_route)
+        .method_not_allowed_fallback(no_method)
+        // The gate has a limit of its own.
+        .layer(DefaultBodyLimit::disable())
+        .layer(middleware::from_fn_with_state(gate, gate::pass))
+        .layer(middleware::from_fn_with_state(app.clone(), log_and_describe))
+        .with_state(app.clone());
+    // Around all of it: what axum itself adds to an answer, as the methods of a path, would say which paths there are.
+    Router::new()
+        .fallback_service(routed)
+        .layer(middleware::from_fn_with_state(app.clone(), tokens::identify))
+        // Before it, so that nobody tries tokens faster than requests are let in.
+        .layer(middleware::from_fn_with_state(limits, limits::pass))
+        .layer(middleware::from_fn_with_state(app, count_refusal))
+}
+
+async fn no_route(method: Method, uri: Uri) -> ApiError {
+    refused_route(method, uri, false)
+}
+
+async fn no_method(method: Method, uri: Uri) -> ApiError {
+    refused_route(method, uri, true)
+}
+
+fn refused_route(method: Method, uri: Uri, other_method: bool) -> ApiError {
+    let have = rest::served().into_iter().chain(["POST /mcp".into()]).collect();
+    ApiError::NoRoute { method: method.to_string(), path: uri.path().into(), have, other_method }
+}
+
+/// Counts what is refused, wherever that was.
+async fn count_refusal(State(app): State<AppState>, request: Request, next: Next) -> Response {
+    let response = next.run(request).await;
+    if let Some(RefusalKind(kind)) = response.extensions().get() {
+        app.table.metrics().request_refused(kind);
+    }
+    response
+}
+
+/// Logs every request, and turns refusals of axum's own (as of a path that is not UTF-8) into problem details. Of what
+/// a caller wrote, the log has the route, and the episode where there is such an episode: whatever else there is may be a secret.
+async fn log_and_describe(State(app): State<AppState>, request: Request, next: Next) -> Response {
+    let method = request.method().clone();
+    let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str).to_owned();
+    let episode = episode_of(request.uri().path()).filter(|id| app.table.get(id).is_ok()).map(str::to_owned);
+    let began = std::time::Instant::now();
+    let mut response = next.run(request).await;
+    let status = response.status();
+    if status.is_client_error() && !is_json(response.headers()) {
+        let allow = response.headers().get(header::ALLOW).cloned();
+        let text = axum::body::to_bytes(response.into_body(), 10_000).await.unwrap_or_default();
+        let detail = format!("{}; see GET /v1/tools for what is served", String::from_utf8_lossy(&text));
+        response = ApiError::Protocol { status, detail }.into_response();
+        response.headers_mut().extend(allow.map(|methods| (header::ALLOW, methods)));
+    }
+    let problem = response.extensions().get().map(|RefusalKind(kind)| *kind);
+    let ms = began.elapsed().as_millis() as u64;
+    tracing::info!(%method, route, episode, status = status.as_u16(), problem, ms, "request");
+    response
+}
+
+/// What a path names as the episode.
+fn episode_of(path: &str) -> Option<&str> {
+    path.strip_prefix("/v1/episodes/")?.split('/').next()
+}
+
+fn is_json(headers: &HeaderMap) -> bool {
+    let content_type = headers.get(header::CONTENT_TYPE);
+    content_type.is_some_and(|value| value.to_str().is_ok_and(|text| text.contains("json")))
+}
