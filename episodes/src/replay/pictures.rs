@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
-use tandem_sim::render::{Camera, DEPTH_UNIT_M, PictureError, encode_depth_png, encode_png};
+use tandem_sim::render::{Camera, DEPTH_UNIT_M, Intrinsics, PictureError, encode_depth_png, encode_png};
 use tandem_sim::{Pose, Step};
 
 use super::video::step_of_picture;
@@ -68,12 +68,12 @@ struct Manifest {
     state_hash: String,
     rate_hz: u32,
     depth_unit_m: f64,
-    cameras: Vec<Intrinsics>,
+    cameras: Vec<CameraEntry>,
 }
 
-/// A camera without distortion; the centre of pixel (0, 0) lies at (0, 0).
+/// A camera and its [`Intrinsics`].
 #[derive(PartialEq, Serialize, Deserialize)]
-struct Intrinsics {
+struct CameraEntry {
     name: String,
     width: u32,
     height: u32,
@@ -166,11 +166,9 @@ fn prepare(
     steps: &[Step],
 ) -> Result<(), PicturesError> {
     let task = recording.spec.task;
-    let intrinsics = |view: EpisodeCamera, step: &Step| {
-        let camera = scene.camera(view, step, plan.size);
-        let [cx, cy] = camera.principal_point_px().map(|px| px - 0.5);
-        let (name, focal_px) = (view.name(task).into(), camera.focal_px());
-        Intrinsics { name, width: camera.width, height: camera.height, focal_px, cx, cy }
+    let entry = |view: EpisodeCamera, step: &Step| {
+        let Intrinsics { width, height, focal_px, cx, cy } = scene.camera(view, step, plan.size).intrinsics();
+        CameraEntry { name: view.name(task).into(), width, height, focal_px, cx, cy }
     };
     let views = EpisodeCamera::all(task).into_iter();
     let state_hash = recording.state_hashes().map_err(ReplayError::from)?.last();
@@ -180,7 +178,7 @@ fn prepare(
         state_hash,
         rate_hz: plan.rate_hz,
         depth_unit_m: DEPTH_UNIT_M,
-        cameras: views.filter_map(|view| Some(intrinsics(view, steps.first()?))).collect(),
+        cameras: views.filter_map(|view| Some(entry(view, steps.first()?))).collect(),
     };
     let path = folder.join(MANIFEST);
     if let Ok(bytes) = std::fs::read(&path) {

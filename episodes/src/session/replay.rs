@@ -18,7 +18,7 @@ use crate::spec::{EpisodeSpec, Start};
 pub struct Replay {
     session: Session,
     /// What the policy's clock shows, in nanoseconds.
-    hands_ns: Arc<AtomicU64>,
+    policy_clock_ns: Arc<AtomicU64>,
 }
 
 impl Replay {
@@ -29,8 +29,8 @@ impl Replay {
         begin: Option<&RecordedCheckpoint>,
         path: &Path,
     ) -> Result<Replay, EpisodeError> {
-        let hands_ns = Arc::new(AtomicU64::new(0));
-        let read = hands_ns.clone();
+        let policy_clock_ns = Arc::new(AtomicU64::new(0));
+        let read = policy_clock_ns.clone();
         let mut session = Session::build(spec, Box::new(move || Duration::from_nanos(read.load(Relaxed))))?;
         if let Some(begin) = begin {
             session.resume(&Checkpoint::from_bytes(&begin.bytes, path)?)?;
@@ -42,13 +42,13 @@ impl Replay {
             session.hold(rules(spec.protocol, spec.task).initial_hold_steps)?;
         }
         session.clock.resume();
-        Ok(Replay { session, hands_ns })
+        Ok(Replay { session, policy_clock_ns })
     }
 
     /// Makes a call that was made when the policy had thought for as long as `thought`.
     pub fn call(&mut self, called: &Called, thought: Duration) -> Result<(), EpisodeError> {
         let passed = thought.saturating_sub(self.session.clock.spent());
-        self.hands_ns.fetch_add(u64::try_from(passed.as_nanos()).unwrap_or(u64::MAX), Relaxed);
+        self.policy_clock_ns.fetch_add(u64::try_from(passed.as_nanos()).unwrap_or(u64::MAX), Relaxed);
         self.session.make(None, called).map(drop)
     }
 

@@ -1,6 +1,6 @@
 //! What a robot measures of itself, and its camera's calibration, as replies.
 
-use tandem_sim::render::Camera;
+use tandem_sim::render::{Camera, Intrinsics};
 use tandem_sim::{Step, Vector};
 use tandem_tools_spec::{CameraCalibration, JointValues, Observe, RobotState};
 
@@ -45,19 +45,18 @@ pub fn robot_state(step: &Step, robot: usize, sheet: &RobotSheet, detail: Detail
     }
 }
 
-/// Of the camera in the head of robot number `robot`, called `name`, after `step`.
+/// The calibration of the camera in the head of robot number `robot`, called `name`, after `step`.
 pub fn calibration(step: &Step, robot: usize, name: &str, camera: &Camera) -> CameraCalibration {
-    let [cx, cy] = camera.principal_point_px();
-    let focal_px = rounded(camera.focal_px().into());
+    let Intrinsics { width, height, focal_px, cx, cy } = camera.intrinsics();
+    let focal_px = rounded(focal_px.into());
     CameraCalibration {
         robot: name.into(),
-        width: camera.width,
-        height: camera.height,
+        width,
+        height,
         fx: focal_px,
         fy: focal_px,
-        // The wire counts from the first pixel's centre, the camera from its corner.
-        cx: f64::from(cx) - 0.5,
-        cy: f64::from(cy) - 0.5,
+        cx: cx.into(),
+        cy: cy.into(),
         camera_in_pelvis: wire_pose_from_sim(&opencv_axes(&step.robots[robot].state.pelvis_from_camera)),
     }
 }

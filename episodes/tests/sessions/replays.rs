@@ -65,17 +65,17 @@ fn every_task_is_verified_and_goes_on_where_each_phase_begins() {
 
 /// Three commands of A, in which a second is thought; the policy's clock runs out after `thinking_s` more.
 fn agentic(folder: &Path, thinking_s: u64) -> PathBuf {
-    let hands_ns = Arc::new(AtomicU64::new(0));
-    let read = hands_ns.clone();
+    let policy_clock_ns = Arc::new(AtomicU64::new(0));
+    let read = policy_clock_ns.clone();
     let clock: Clock = Box::new(move || Duration::from_nanos(read.load(Relaxed)));
     let spec = spec("handover", 5, Protocol::Agentic);
     let mut session = Session::start_with_clock(&spec, Some(folder.into()), clock).unwrap();
-    hands_ns.fetch_add(333_333_333, Relaxed);
+    policy_clock_ns.fetch_add(333_333_333, Relaxed);
     session.call(Observe { robots: None, short: None }.into()).unwrap();
-    hands_ns.fetch_add(666_666_667, Relaxed);
+    policy_clock_ns.fetch_add(666_666_667, Relaxed);
     command(&mut session, raise_hand(25));
     wait(&mut session, 3);
-    hands_ns.fetch_add(thinking_s * 1_000_000_000, Relaxed);
+    policy_clock_ns.fetch_add(thinking_s * 1_000_000_000, Relaxed);
     let _ = session.call(Wait { steps: 25 }.into());
     session.call(GetStatus {}.into()).unwrap();
     session.call(Finish {}.into()).unwrap();

@@ -51,8 +51,8 @@ const HOLD: Case = Case {
     disturbance: Disturbance::None,
 };
 
-const fn moving(name: &'static str, [forward_m_s, left_m_s, turning_rad_s]: [f32; 3]) -> Case {
-    let velocity = BaseVelocity { forward_m_s, left_m_s, turning_rad_s };
+const fn moving(name: &'static str, [vx_m_s, vy_m_s, yaw_rate_rad_s]: [f32; 3]) -> Case {
+    let velocity = BaseVelocity { vx_m_s, vy_m_s, yaw_rate_rad_s };
     Case { name, duration_s: 21.0 + STOP_S, plan: Plan::Move(velocity), ..HOLD }
 }
 

@@ -52,7 +52,7 @@ pub(super) fn measure(case: &Case, log: &[Sample], legs: &[Leg], trial: &mut Tri
         Plan::Move(velocity) => {
             let stop = at(case.duration_s - STOP_S);
             trial.velocity_error_share = Some(velocity_error(&log[at(SETTLE_S + RAMP_S)..stop], *velocity));
-            let turned_rad = velocity.turning_rad_s * (stop - start) as f32 * DT_S;
+            let turned_rad = velocity.yaw_rate_rad_s * (stop - start) as f32 * DT_S;
             trial.heading_error_deg =
                 Some((log[end].heading_rad - log[start].heading_rad - turned_rad).abs().to_degrees());
             trial.standing_after_s = Some(slower_after_s(&log[stop..], 0.1));
@@ -87,12 +87,12 @@ fn velocity_error(log: &[Sample], velocity: BaseVelocity) -> f32 {
         moved[2] += pair[1].heading_rad - pair[0].heading_rad;
     }
     let time_s = (log.len() - 1) as f32 * DT_S;
-    let BaseVelocity { forward_m_s, left_m_s, turning_rad_s } = velocity;
+    let BaseVelocity { vx_m_s, vy_m_s, yaw_rate_rad_s } = velocity;
     let [x, y, turn] = moved.map(|moved| moved / time_s);
-    let (x, y, turn) = (x - forward_m_s, y - left_m_s, turn - turning_rad_s);
-    let speed_m_s = forward_m_s.hypot(left_m_s);
+    let (x, y, turn) = (x - vx_m_s, y - vy_m_s, turn - yaw_rate_rad_s);
+    let speed_m_s = vx_m_s.hypot(vy_m_s);
     let linear = if speed_m_s > 0.0 { x.hypot(y) / speed_m_s } else { 0.0 };
-    let angular = if turning_rad_s != 0.0 { (turn / turning_rad_s).abs() } else { 0.0 };
+    let angular = if yaw_rate_rad_s != 0.0 { (turn / yaw_rate_rad_s).abs() } else { 0.0 };
     linear.max(angular)
 }
 

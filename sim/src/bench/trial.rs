@@ -68,13 +68,8 @@ fn base_command(
     match &case.plan {
         Plan::Hold => rest,
         Plan::Move(velocity) if time_s > SETTLE_S && time_s < case.duration_s - STOP_S => {
-            let BaseVelocity { forward_m_s, left_m_s, turning_rad_s } = *velocity;
-            BaseCommand {
-                vx_m_s: forward_m_s,
-                vy_m_s: left_m_s,
-                yaw_rate_rad_s: turning_rad_s,
-                pelvis_height_m: rest.pelvis_height_m,
-            }
+            let BaseVelocity { vx_m_s, vy_m_s, yaw_rate_rad_s } = *velocity;
+            BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m: rest.pelvis_height_m }
         }
         Plan::Move(_) => rest,
         Plan::Squat { high_m, low_m } => {

@@ -27,13 +27,13 @@ pub struct BaseCommand {
 /// How the base goes, in its own heading frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BaseVelocity {
-    pub forward_m_s: f32,
-    pub left_m_s: f32,
-    pub turning_rad_s: f32,
+    pub vx_m_s: f32,
+    pub vy_m_s: f32,
+    pub yaw_rate_rad_s: f32,
 }
 
 impl BaseVelocity {
-    pub const STILL: BaseVelocity = BaseVelocity { forward_m_s: 0.0, left_m_s: 0.0, turning_rad_s: 0.0 };
+    pub const STILL: BaseVelocity = BaseVelocity { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0 };
 }
 
 impl BaseCommand {
@@ -43,7 +43,7 @@ impl BaseCommand {
     }
 
     pub fn velocity(&self) -> BaseVelocity {
-        BaseVelocity { forward_m_s: self.vx_m_s, left_m_s: self.vy_m_s, turning_rad_s: self.yaw_rate_rad_s }
+        BaseVelocity { vx_m_s: self.vx_m_s, vy_m_s: self.vy_m_s, yaw_rate_rad_s: self.yaw_rate_rad_s }
     }
 }
 

@@ -13,7 +13,7 @@ mod shading;
 
 pub use kind::RendererKind;
 pub use png::{DEPTH_UNIT_M, PictureError, encode_depth_png, encode_png};
-pub use scene::camera::{Camera, Cameras};
+pub use scene::camera::{Camera, Cameras, Intrinsics};
 pub use scene::mesh::{TriangleMesh, Vertex};
 pub use scene::{Carrier, Part, PlacedScenery, Scenery, robot_rgba};
 pub use shading::pattern::Pattern;

@@ -45,7 +45,7 @@ pub struct JointChunk {
     pub robot: String,
     /// Rows of 35 numbers each, as many as every other robot has; 1 to 25 rows in the agentic protocol, 1 to 50 in the benchmark
     /// protocol. A row: joint targets in radians for left_arm 7, right_arm 7, left_hand 7, right_hand 7, waist 3 (yaw,
-    /// roll, pitch), then vx in m/s, vy in m/s, yaw rate in rad/s and pelvis height in m. An arm is shoulder_pitch,
+    /// roll, pitch), then the base command: vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m. An arm is shoulder_pitch,
     /// shoulder_roll, shoulder_yaw, elbow, wrist_roll, wrist_pitch, wrist_yaw; a hand is thumb_0, thumb_1, thumb_2,
     /// middle_0, middle_1, index_0, index_1.
     #[schemars(length(min = 1), inner(length(equal = ACTION_ROW_LEN)), extend("most_steps" = "maxItems"))]

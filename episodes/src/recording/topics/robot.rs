@@ -1,7 +1,7 @@
 //! The topics of one robot: what its joints do, what it was told, what its hands feel and what its camera saw.
 
 use foxglove::messages::{CameraCalibration, CompressedImage, JointState, JointStates};
-use tandem_sim::{RobotModel, RobotState, RobotStep, mjcf::MjcfCamera};
+use tandem_sim::{RobotModel, RobotState, RobotStep, mjcf::MjcfCamera, render::Intrinsics};
 
 use super::messages::{ActionMessage, BaseCommandMessage, HandsMessage, Json};
 use super::transforms::{EGOCENTRIC, robot_frame, timestamp};
@@ -103,11 +103,9 @@ fn joint_states(model: &RobotModel, time_s: f64, state: &RobotState) -> JointSta
     JointStates { timestamp: Some(timestamp(time_s)), joints: joints.collect() }
 }
 
-/// Pinhole calibration without distortion; the centre of pixel (0, 0) lies at (0, 0).
 fn calibration(camera: &MjcfCamera, frame_id: &str, time_s: f64) -> CameraCalibration {
-    let (width, height) = camera.resolution_px;
-    let focal_px = f64::from(height) / 2.0 / (f64::from(camera.vertical_fov_rad) / 2.0).tan();
-    let [cx, cy] = [width, height].map(|size| (f64::from(size) - 1.0) / 2.0);
+    let Intrinsics { width, height, focal_px, cx, cy } = camera.into();
+    let [focal_px, cx, cy] = [focal_px, cx, cy].map(f64::from);
     #[rustfmt::skip]
     let (k, p) = (
         vec![focal_px, 0.0, cx,  0.0, focal_px, cy,  0.0, 0.0, 1.0],

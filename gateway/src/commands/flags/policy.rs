@@ -9,7 +9,7 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{Driving, Operators};
 
-use crate::drivers::{PRESETS, PolicyMap, Program, Protocol, Remote};
+use crate::drivers::{PRESETS, PolicyMap, PolicyProtocol, Program, RemotePolicy};
 
 /// What the name of a program begins with.
 const EXEC: &str = "exec:";
@@ -48,7 +48,7 @@ pub struct PolicyFlags {
 enum PolicyChoice {
     Player(&'static players::PlayerEntry),
     Program(String),
-    Remote(Protocol, Vec<String>),
+    Remote(PolicyProtocol, Vec<String>),
 }
 
 fn help() -> String {
@@ -68,7 +68,7 @@ fn parse_policy(text: &str) -> Result<PolicyChoice, String> {
             false => Ok(PolicyChoice::Program(command.into())),
         };
     }
-    for protocol in Protocol::ALL {
+    for protocol in PolicyProtocol::ALL {
         if let Some(urls) = text.strip_prefix(&format!("{protocol}:")) {
             return parse_urls(protocol, urls).map(|urls| PolicyChoice::Remote(protocol, urls));
         }
@@ -78,7 +78,7 @@ fn parse_policy(text: &str) -> Result<PolicyChoice, String> {
         .map_err(|error| format!("{error}, exec:COMMAND, openpi:ws://HOST:PORT, act:http://HOST:PORT/act"))
 }
 
-fn parse_urls(protocol: Protocol, urls: &str) -> Result<Vec<String>, String> {
+fn parse_urls(protocol: PolicyProtocol, urls: &str) -> Result<Vec<String>, String> {
     let check = |url: &str| match url.trim().strip_prefix(protocol.scheme()) {
         Some(rest) if !rest.is_empty() => Ok(url.trim().to_owned()),
         _ => {
@@ -112,12 +112,13 @@ impl PolicyFlags {
                 Box::new(Program::new(command, driving, limit)?)
             }
             (PolicyChoice::Remote(protocol, urls), map, None) => {
-                let default = (protocol == Protocol::Openpi).then(|| Protocol::Openpi.name().to_owned());
+                let default =
+                    (protocol == PolicyProtocol::Openpi).then(|| PolicyProtocol::Openpi.name().to_owned());
                 let Some(map) = map.or(default) else {
                     let presets = PRESETS.map(|(name, _)| name).join(", ");
                     return Err(format!("{protocol}: needs --policy-map, a file or one of {presets}").into());
                 };
-                Box::new(Remote::new(protocol, urls, PolicyMap::find(&map)?))
+                Box::new(RemotePolicy::new(protocol, urls, PolicyMap::find(&map)?))
             }
         };
         Ok(match self.policy_name {

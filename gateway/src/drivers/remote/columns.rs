@@ -1,4 +1,4 @@
-//! Names for numbers: of what a robot feels, and of what it is told.
+//! Names of columns: of the numbers that a robot senses, and of those that command it.
 
 use std::ops::Range;
 
@@ -8,8 +8,8 @@ use tandem_tools_spec::{ACTION_ROW_LEN, BASE_COLUMNS, RobotState};
 /// Some columns by one name.
 type Block = (&'static str, Range<usize>);
 
-/// Blocks of a robot's numbers, in the order of [`felt`].
-const STATE: [Block; 13] = [
+/// Blocks of a robot's numbers, in the order of [`state_values`].
+const STATE: [Block; 12] = [
     ("left_leg", 0..6),
     ("right_leg", 6..12),
     ("waist", 12..15),
@@ -21,8 +21,7 @@ const STATE: [Block; 13] = [
     ("left_wrist", 43..50),
     ("right_wrist", 50..57),
     ("gravity", 57..60),
-    ("base_velocity", 60..63),
-    ("pelvis_height", 63..64),
+    ("base_command", STATE_BASE..STATE_LEN),
 ];
 const JOINTS: usize = 43;
 /// The base command comes last.
@@ -30,21 +29,20 @@ const STATE_BASE: usize = 60;
 const STATE_LEN: usize = 64;
 
 /// Blocks of an action row, in the order of `send_joint_chunk`.
-const ACTION: [Block; 8] = [
+const ACTION: [Block; 7] = [
     ("left_arm", 0..7),
     ("right_arm", 7..14),
     ("left_hand", 14..21),
     ("right_hand", 21..28),
     ("waist", 28..31),
-    ("base_velocity", 31..34),
-    ("pelvis_height", 34..35),
+    ("base_command", ACTION_BASE..ACTION_ROW_LEN),
     ("row", 0..ACTION_ROW_LEN),
 ];
 const ACTION_BASE: usize = 31;
 
-/// All that a robot feels: joints in rad; of each wrist x, y, z in m and w, x, y, z in the pelvis frame; which way is down; the
-/// base command in m/s, m/s, rad/s and m.
-pub fn felt(state: &RobotState) -> Vec<f64> {
+/// All that a robot senses: joints in rad; of each wrist x, y, z in m and w, x, y, z in the pelvis frame; which way is down; the
+/// base command in force, as [`BASE_COLUMNS`] has it.
+pub fn state_values(state: &RobotState) -> Vec<f64> {
     let joints = state.joint_positions_rad.0.iter().map(|(_, angle_rad)| *angle_rad);
     let wrists = [&state.left_wrist, &state.right_wrist];
     let wrists = wrists.into_iter().flat_map(|pose| pose.position_m.into_iter().chain(pose.quaternion_wxyz));
@@ -53,24 +51,25 @@ pub fn felt(state: &RobotState) -> Vec<f64> {
     joints.chain(wrists).chain(state.gravity_in_pelvis).chain(base).collect()
 }
 
-/// Numbers of the right length for [`felt`], of a robot of which nothing is known.
-pub fn felt_by_nobody() -> Vec<f64> {
+/// Numbers of the right length for [`state_values`], of a robot of which nothing is known.
+pub fn blank_state_values() -> Vec<f64> {
     vec![0.0; STATE_LEN]
 }
 
-/// The row that keeps a robot as it feels that it is: arms, hands, waist and height where they are, no walking.
-pub fn holding(felt_values: &[f64]) -> Vec<f64> {
+/// The row that keeps a robot as it senses that it is: arms, hands, waist and height where they are, no walking.
+pub fn held_row(state_values: &[f64]) -> Vec<f64> {
     let mut row = vec![0.0; ACTION_ROW_LEN];
     for (name, columns) in &ACTION {
-        let felt = STATE.iter().find(|(known, _)| known == name && *name != "base_velocity");
-        if let Some((_, felt)) = felt {
-            row[columns.clone()].copy_from_slice(&felt_values[felt.clone()]);
+        if let Some((_, sensed)) = STATE.iter().find(|(known, _)| known == name) {
+            row[columns.clone()].copy_from_slice(&state_values[sensed.clone()]);
         }
     }
+    // Of the base command the height alone persists.
+    row[ACTION_BASE..ACTION_ROW_LEN - 1].fill(0.0);
     row
 }
 
-/// Which of [`felt`] the `names` mean, in their order.
+/// Which of [`state_values`] the `names` mean, in their order.
 pub fn state_columns(names: &[String]) -> Result<Vec<usize>, String> {
     columns(names, &STATE, &state_singles())
 }
@@ -112,9 +111,9 @@ fn action_singles() -> Vec<(String, usize)> {
     let base = BASE_COLUMNS.map(String::from).into_iter().zip(ACTION_BASE..);
     let joints = joint_names().into_iter().enumerate();
     let upper = joints.filter_map(|(joint, name)| {
-        let (block, felt) = STATE.iter().find(|(_, columns)| columns.contains(&joint))?;
+        let (block, sensed) = STATE.iter().find(|(_, columns)| columns.contains(&joint))?;
         let (_, columns) = ACTION.iter().find(|(name, _)| name == block)?;
-        Some((name, columns.start + joint - felt.start))
+        Some((name, columns.start + joint - sensed.start))
     });
     upper.chain(base).collect()
 }
@@ -130,7 +129,7 @@ mod tests {
     #[test]
     fn names_are_blocks_or_single_columns() {
         assert_eq!(state_columns(&names("waist left_knee_joint vx_m_s")), Ok(vec![12, 13, 14, 3, 60]));
-        assert_eq!(action_columns(&names("pelvis_height waist_roll_joint")), Ok(vec![34, 29]));
+        assert_eq!(action_columns(&names("pelvis_height_m waist_roll_joint")), Ok(vec![34, 29]));
         assert_eq!(action_columns(&names("row")).map(|columns| columns.len()), Ok(35));
         let text = action_columns(&names("left_leg")).unwrap_err();
         assert!(text.starts_with("no column \"left_leg\"; have: left_arm, "), "{text}");
@@ -148,8 +147,8 @@ mod tests {
             ("left_elbow_joint", "right_hand_thumb_0_joint", "waist_yaw_joint")
         );
         assert_eq!(action[31..], BASE_COLUMNS);
-        let felt_values: Vec<f64> = (0..STATE_LEN as u32).map(f64::from).collect();
-        let row = holding(&felt_values);
+        let state_values: Vec<f64> = (0..STATE_LEN as u32).map(f64::from).collect();
+        let row = held_row(&state_values);
         assert_eq!((row[0], row[7], row[14], row[28], row[31], row[34]), (15.0, 29.0, 22.0, 12.0, 0.0, 63.0));
     }
 }

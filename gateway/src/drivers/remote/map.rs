@@ -28,7 +28,7 @@ const LONGEST_SIDE_PX: u32 = 4096;
 #[serde(deny_unknown_fields)]
 pub struct PolicyMap {
     pub scope: Scope,
-    pub answer: Answer,
+    pub answer: AnswerScope,
     pub instruction: Words,
     /// Axes of length 1 before those of pictures and states.
     pub leading_axes: usize,
@@ -56,7 +56,7 @@ pub enum Scope {
 /// Whom an answer moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Answer {
+pub enum AnswerScope {
     /// The robot that it was asked for.
     One,
     /// Every robot.
@@ -199,7 +199,7 @@ impl PolicyMap {
 
     /// One answer for all robots is asked with keys for all robots.
     fn check_keys(&self) -> Result<(), String> {
-        if self.answer == Answer::One {
+        if self.answer == AnswerScope::One {
             return Ok(());
         }
         let egocentric = self.images.iter().filter(|(_, image)| image.camera == CameraName::Egocentric);

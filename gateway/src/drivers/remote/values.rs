@@ -34,8 +34,8 @@ impl Array {
 
 /// What goes to a policy.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Sent {
-    Map(Vec<(String, Sent)>),
+pub enum RequestValue {
+    Map(Vec<(String, RequestValue)>),
     Array(Array),
     Text(String),
     Texts(Vec<String>),
@@ -46,14 +46,14 @@ pub fn path(key: &str) -> impl Iterator<Item = &str> {
     key.split('>').map(str::trim).filter(|part| !part.is_empty())
 }
 
-impl Sent {
+impl RequestValue {
     /// Puts `value` where `key` says, and makes the maps on the way.
-    pub fn put(&mut self, key: &str, value: Sent) {
+    pub fn put(&mut self, key: &str, value: RequestValue) {
         let mut at = self;
         for part in path(key) {
-            let Sent::Map(entries) = at else { return };
+            let RequestValue::Map(entries) = at else { return };
             let index = entries.iter().position(|(name, _)| name == part).unwrap_or_else(|| {
-                entries.push((part.into(), Sent::Map(Vec::new())));
+                entries.push((part.into(), RequestValue::Map(Vec::new())));
                 entries.len() - 1
             });
             at = &mut entries[index].1;
@@ -62,10 +62,10 @@ impl Sent {
     }
 }
 
-/// What a policy says.
+/// What a policy answers.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Told {
-    Map(Vec<(String, Told)>),
+pub enum ReplyValue {
+    Map(Vec<(String, ReplyValue)>),
     Array {
         shape: Vec<usize>,
         values: Vec<f64>,
@@ -75,30 +75,30 @@ pub enum Told {
     Other(String),
 }
 
-impl Told {
+impl ReplyValue {
     /// A single number.
-    pub fn number(value: f64) -> Told {
-        Told::Array { shape: Vec::new(), values: vec![value] }
+    pub fn number(value: f64) -> ReplyValue {
+        ReplyValue::Array { shape: Vec::new(), values: vec![value] }
     }
 
     /// A list, which is an array if all in it are arrays of one shape.
-    pub fn list(items: Vec<Told>) -> Told {
+    pub fn list(items: Vec<ReplyValue>) -> ReplyValue {
         let (length, mut joined, mut inner) = (items.len(), Vec::new(), None);
         for item in items {
             match item {
-                Told::Array { shape, values } if inner.as_ref().is_none_or(|known| *known == shape) => {
+                ReplyValue::Array { shape, values } if inner.as_ref().is_none_or(|known| *known == shape) => {
                     inner = Some(shape);
                     joined.extend(values);
                 }
-                _ => return Told::Other(format!("a list of {length} that is no array of numbers")),
+                _ => return ReplyValue::Other(format!("a list of {length} that is no array of numbers")),
             }
         }
         let shape = std::iter::once(length).chain(inner.unwrap_or_default()).collect();
-        Told::Array { shape, values: joined }
+        ReplyValue::Array { shape, values: joined }
     }
 
     /// An array from the bytes that numpy has of it, or what is wrong with them.
-    pub fn from_bytes(dtype: &str, shape: Vec<usize>, bytes: &[u8]) -> Result<Told, String> {
+    pub fn from_bytes(dtype: &str, shape: Vec<usize>, bytes: &[u8]) -> Result<ReplyValue, String> {
         let values: Vec<f64> = match dtype {
             "<f4" => read(bytes, |four| f32::from_le_bytes(four).into()),
             "<f8" => read(bytes, f64::from_le_bytes),
@@ -109,15 +109,15 @@ impl Told {
         };
         let length = shape.iter().try_fold(1usize, |length, side| length.checked_mul(*side));
         match length == Some(values.len()) {
-            true => Ok(Told::Array { shape, values }),
+            true => Ok(ReplyValue::Array { shape, values }),
             false => Err(format!("an array of shape {shape:?} with {} elements", values.len())),
         }
     }
 
     /// What `key` names; the whole where it names nothing.
-    pub fn at(&self, key: &str) -> Option<&Told> {
+    pub fn at(&self, key: &str) -> Option<&ReplyValue> {
         path(key).try_fold(self, |at, part| match at {
-            Told::Map(entries) => entries.iter().find(|(name, _)| name == part).map(|(_, told)| told),
+            ReplyValue::Map(entries) => entries.iter().find(|(name, _)| name == part).map(|(_, reply)| reply),
             _ => None,
         })
     }
@@ -125,18 +125,18 @@ impl Told {
     /// In words, for whoever has to mend a map.
     pub fn describe(&self) -> String {
         match self {
-            Told::Map(entries) if entries.is_empty() => "an empty map".into(),
-            Told::Map(entries) => {
-                let parts = entries.iter().map(|(name, told)| match told {
-                    Told::Map(_) => format!("{name:?}: {{{}}}", told.describe()),
-                    _ => format!("{name:?}: {}", told.describe()),
+            ReplyValue::Map(entries) if entries.is_empty() => "an empty map".into(),
+            ReplyValue::Map(entries) => {
+                let parts = entries.iter().map(|(name, reply)| match reply {
+                    ReplyValue::Map(_) => format!("{name:?}: {{{}}}", reply.describe()),
+                    _ => format!("{name:?}: {}", reply.describe()),
                 });
                 parts.collect::<Vec<_>>().join(", ")
             }
-            Told::Array { shape, .. } if shape.is_empty() => "a number".into(),
-            Told::Array { shape, .. } => format!("an array of shape {shape:?}"),
-            Told::Text(text) => format!("the text {text:?}"),
-            Told::Other(what) => what.clone(),
+            ReplyValue::Array { shape, .. } if shape.is_empty() => "a number".into(),
+            ReplyValue::Array { shape, .. } => format!("an array of shape {shape:?}"),
+            ReplyValue::Text(text) => format!("the text {text:?}"),
+            ReplyValue::Other(what) => what.clone(),
         }
     }
 }
@@ -151,42 +151,47 @@ mod tests {
 
     #[test]
     fn keys_lead_into_maps() {
-        let mut sent = Sent::Map(Vec::new());
-        sent.put("video > a", Sent::Text("1".into()));
-        sent.put("video > b", Sent::Text("2".into()));
-        sent.put("observation/state", Sent::Text("3".into()));
-        let text = |name: &str, text: &str| (name.to_owned(), Sent::Text(text.into()));
-        let video = Sent::Map(vec![text("a", "1"), text("b", "2")]);
-        assert_eq!(sent, Sent::Map(vec![("video".into(), video), text("observation/state", "3")]));
+        let mut sent = RequestValue::Map(Vec::new());
+        sent.put("video > a", RequestValue::Text("1".into()));
+        sent.put("video > b", RequestValue::Text("2".into()));
+        sent.put("observation/state", RequestValue::Text("3".into()));
+        let text = |name: &str, text: &str| (name.to_owned(), RequestValue::Text(text.into()));
+        let video = RequestValue::Map(vec![text("a", "1"), text("b", "2")]);
+        assert_eq!(sent, RequestValue::Map(vec![("video".into(), video), text("observation/state", "3")]));
 
-        let told = Told::Map(vec![("x".into(), Told::Map(vec![("y".into(), Told::number(4.0))]))]);
-        assert_eq!(told.at("x > y"), Some(&Told::number(4.0)));
-        assert_eq!((told.at("x > z"), told.at("")), (None, Some(&told)));
-        assert_eq!(told.describe(), "\"x\": {\"y\": a number}");
+        let reply =
+            ReplyValue::Map(vec![("x".into(), ReplyValue::Map(vec![("y".into(), ReplyValue::number(4.0))]))]);
+        assert_eq!(reply.at("x > y"), Some(&ReplyValue::number(4.0)));
+        assert_eq!((reply.at("x > z"), reply.at("")), (None, Some(&reply)));
+        assert_eq!(reply.describe(), "\"x\": {\"y\": a number}");
     }
 
     #[test]
     fn arrays_come_as_bytes_or_as_lists() {
-        let array =
-            |shape: &[usize], values: &[f64]| Told::Array { shape: shape.into(), values: values.into() };
+        let array = |shape: &[usize], values: &[f64]| ReplyValue::Array {
+            shape: shape.into(),
+            values: values.into(),
+        };
         let bytes: Vec<u8> = [1.5f32, -2.0].iter().flat_map(|value| value.to_le_bytes()).collect();
-        assert_eq!(Told::from_bytes("<f4", vec![1, 2], &bytes), Ok(array(&[1, 2], &[1.5, -2.0])));
-        assert_eq!(Told::from_bytes("|u1", vec![2], &[7, 8]), Ok(array(&[2], &[7.0, 8.0])));
+        assert_eq!(ReplyValue::from_bytes("<f4", vec![1, 2], &bytes), Ok(array(&[1, 2], &[1.5, -2.0])));
+        assert_eq!(ReplyValue::from_bytes("|u1", vec![2], &[7, 8]), Ok(array(&[2], &[7.0, 8.0])));
         for (dtype, shape, says) in [
             ("<f2", vec![4], "\"<f2\""),
             ("<f4", vec![3], "shape [3] with 2"),
             ("<f4", vec![usize::MAX, 2], "with 2"),
         ] {
-            let text = Told::from_bytes(dtype, shape, &bytes).unwrap_err();
+            let text = ReplyValue::from_bytes(dtype, shape, &bytes).unwrap_err();
             assert!(text.contains(says), "{text}");
         }
 
-        let row = |values: &[f64]| Told::list(values.iter().map(|value| Told::number(*value)).collect());
+        let row = |values: &[f64]| {
+            ReplyValue::list(values.iter().map(|value| ReplyValue::number(*value)).collect())
+        };
         assert_eq!(
-            Told::list(vec![row(&[1.0, 2.0]), row(&[3.0, 4.0])]),
+            ReplyValue::list(vec![row(&[1.0, 2.0]), row(&[3.0, 4.0])]),
             array(&[2, 2], &[1.0, 2.0, 3.0, 4.0])
         );
-        let ragged = Told::list(vec![row(&[1.0, 2.0]), row(&[3.0])]);
+        let ragged = ReplyValue::list(vec![row(&[1.0, 2.0]), row(&[3.0])]);
         assert_eq!(ragged.describe(), "a list of 2 that is no array of numbers");
     }
 }

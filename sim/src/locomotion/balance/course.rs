@@ -43,14 +43,14 @@ impl Course {
         if stopping {
             self.bias_m_s = [0.0; 2];
         }
-        self.reference_m += (ahead * velocity.forward_m_s + left * velocity.left_m_s) * dt_s;
+        self.reference_m += (ahead * velocity.vx_m_s + left * velocity.vy_m_s) * dt_s;
         let mut error_m = flat(self.reference_m - pelvis_m);
         if error_m.length() > LEASH_M {
             error_m *= LEASH_M / error_m.length();
             self.reference_m = pelvis_m + error_m;
         }
         let error_m = [error_m.dot(ahead), error_m.dot(left)];
-        let command_m_s = [velocity.forward_m_s, velocity.left_m_s];
+        let command_m_s = [velocity.vx_m_s, velocity.vy_m_s];
         std::array::from_fn(|i| {
             let most_m_s = LARGEST_CORRECTION_M_S[i];
             if !starts {
@@ -74,7 +74,7 @@ mod tests {
     /// A gait that goes 80 % of what it is told ends up at the commanded velocity.
     #[test]
     fn a_slow_gait_is_told_to_hurry() {
-        let command = BaseVelocity { forward_m_s: 0.3, ..BaseVelocity::STILL };
+        let command = BaseVelocity { vx_m_s: 0.3, ..BaseVelocity::STILL };
         let (mut course, mut pelvis_m) = (Course::from(Vector::ZERO), Vector::ZERO);
         let mut told_m_s = [0.0; 2];
         for _ in 0..6000 {
@@ -88,7 +88,7 @@ mod tests {
     fn a_stop_forgets_and_a_push_is_not_walked_back() {
         let mut course = Course::from(Vector::ZERO);
         let far_m = Vector::X * -5.0;
-        let command = BaseVelocity { forward_m_s: 0.2, ..BaseVelocity::STILL };
+        let command = BaseVelocity { vx_m_s: 0.2, ..BaseVelocity::STILL };
         let told_m_s = course.corrected_velocity(command, false, far_m, AXES, DT_S);
         assert!((told_m_s[0] - 0.2 - POSITION_GAIN_1_S * LEASH_M).abs() < 1e-3, "{told_m_s:?}");
         assert_eq!(course.corrected_velocity(BaseVelocity::STILL, false, Vector::Y, AXES, DT_S), [0.0; 2]);

@@ -141,9 +141,9 @@ impl BalanceState {
     }
 
     fn change_mode(&mut self, body: &WholeBody, load: &Load) {
-        let BaseVelocity { forward_m_s, left_m_s, turning_rad_s } = self.velocity;
+        let BaseVelocity { vx_m_s, vy_m_s, yaw_rate_rad_s } = self.velocity;
         let moving =
-            forward_m_s.abs() > STILL_M_S || left_m_s.abs() > STILL_M_S || turning_rad_s.abs() > STILL_RAD_S;
+            vx_m_s.abs() > STILL_M_S || vy_m_s.abs() > STILL_M_S || yaw_rate_rad_s.abs() > STILL_RAD_S;
         let stance = self.stance(body, load);
         let half_width_m = stance.left_from_right_m.y * 0.5;
         match &self.mode {
@@ -175,9 +175,9 @@ impl BalanceState {
 
     /// The foot nearer to the capture point; of feet that are as near, the one from which the robot turns away.
     fn left_carries_first(&self, stance: &Stance) -> bool {
-        let turning_rad_s = self.velocity.turning_rad_s;
-        if turning_rad_s.abs() > STILL_RAD_S && stance.capture_m.y.abs() < EITHER_FOOT_M {
-            turning_rad_s < 0.0
+        let yaw_rate_rad_s = self.velocity.yaw_rate_rad_s;
+        if yaw_rate_rad_s.abs() > STILL_RAD_S && stance.capture_m.y.abs() < EITHER_FOOT_M {
+            yaw_rate_rad_s < 0.0
         } else {
             stance.capture_m.y > 0.0
         }
@@ -202,8 +202,8 @@ fn ramped(from: BaseVelocity, to: BaseVelocity, dt_s: f32) -> BaseVelocity {
     let towards = |from: f32, to: f32, most: f32| from + (to - from).clamp(-most, most);
     let (most_m_s, most_rad_s) = (LARGEST_CHANGE_M_S2 * dt_s, LARGEST_CHANGE_RAD_S2 * dt_s);
     BaseVelocity {
-        forward_m_s: towards(from.forward_m_s, to.forward_m_s, most_m_s),
-        left_m_s: towards(from.left_m_s, to.left_m_s, most_m_s),
-        turning_rad_s: towards(from.turning_rad_s, to.turning_rad_s, most_rad_s),
+        vx_m_s: towards(from.vx_m_s, to.vx_m_s, most_m_s),
+        vy_m_s: towards(from.vy_m_s, to.vy_m_s, most_m_s),
+        yaw_rate_rad_s: towards(from.yaw_rate_rad_s, to.yaw_rate_rad_s, most_rad_s),
     }
 }

@@ -127,7 +127,7 @@ impl Stepping {
     ) -> (LegCommand, Vector) {
         let soles = body.world_from_soles();
         let ground_m = soles[self.stance].translation.z;
-        self.turn(body, velocity.turning_rad_s, dt_s);
+        self.turn(body, velocity.yaw_rate_rad_s, dt_s);
         let heading = Rotation::from_rotation_z(self.heading_rad);
         let (ahead, left) = (heading * Vector::X, heading * Vector::Y);
         let rate_1_s = (GRAVITY_M_S2 / (body.com_m.z - ground_m).max(0.4)).sqrt();
@@ -138,7 +138,7 @@ impl Stepping {
         let outside = left * self.stance.sign();
         let course_m_s = faced[0] * velocity_m_s[0] + faced[1] * velocity_m_s[1];
         // A robot that turns while it walks goes the coming step where it will face by then.
-        let coming = Rotation::from_rotation_z(velocity.turning_rad_s * PERIOD_S);
+        let coming = Rotation::from_rotation_z(velocity.yaw_rate_rad_s * PERIOD_S);
         let gait = Gait::new(rate_1_s, coming * course_m_s, outside);
         let (_, foot_m_s, _) = foot_motion(body, self.stance.other());
         let lasting_m_s = load.velocity_m_s - foot_m_s * SWING_INERTIA;
@@ -159,13 +159,13 @@ impl Stepping {
             nearest_support_m(situation.capture_m + (situation.capture_m - target_m) * SHIFT_GAIN, soles)
         } else {
             let footstep = situation.plan(dt_s);
-            self.advance(&footstep, velocity.turning_rad_s, ground_m, dt_s);
+            self.advance(&footstep, velocity.yaw_rate_rad_s, ground_m, dt_s);
             footstep.pressure_m
         };
         let wanted_m = height_m.min(HIGHEST_M).min(self.within_reach_m(body)).max(LOWEST_M);
         let rise = (wanted_m - self.height_m).clamp(-LOWERING_M_S * dt_s, RAISING_M_S * dt_s);
         self.height_m += rise;
-        let torques = self.carry(body, load, pressure_m, ground_m, heading, velocity.turning_rad_s);
+        let torques = self.carry(body, load, pressure_m, ground_m, heading, velocity.yaw_rate_rad_s);
         self.land(body, &soles, ground_m);
         (drives(body, &torques), torques.acceleration_m_s2)
     }

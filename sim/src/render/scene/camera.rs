@@ -14,6 +14,40 @@ pub struct Camera {
     pub height: u32,
 }
 
+/// What a picture's pixels mean, without distortion, as other libraries count: the centre of pixel (0, 0) lies at (0, 0), so a
+/// point (x, y, z) in the camera's frame (x right, y down, z forward) is seen at
+///
+///   u = f x / z + cx,   v = f y / z + cy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Intrinsics {
+    pub width: u32,
+    pub height: u32,
+    /// The same in both directions: pixels are square.
+    pub focal_px: f32,
+    pub cx: f32,
+    pub cy: f32,
+}
+
+impl Intrinsics {
+    /// The optical axis goes through the middle of the picture, which lies half a pixel from the centre of a pixel.
+    fn new(vertical_fov_rad: f32, width: u32, height: u32) -> Intrinsics {
+        Intrinsics {
+            width,
+            height,
+            focal_px: 0.5 * height as f32 / (0.5 * vertical_fov_rad).tan(),
+            cx: 0.5 * width as f32 - 0.5,
+            cy: 0.5 * height as f32 - 0.5,
+        }
+    }
+}
+
+impl From<&MjcfCamera> for Intrinsics {
+    fn from(camera: &MjcfCamera) -> Intrinsics {
+        let (width, height) = camera.resolution_px;
+        Intrinsics::new(camera.vertical_fov_rad, width, height)
+    }
+}
+
 /// Nothing nearer than this is drawn.
 pub const NEAR_M: f32 = 0.01;
 
@@ -31,9 +65,14 @@ const FALLBACK_TARGET_M: Vector = Vector::new(0.4, 0.0, 0.8);
 const THIRD_PERSON: &str = "third_person";
 
 impl Camera {
+    /// What this camera's pixels mean to others.
+    pub fn intrinsics(&self) -> Intrinsics {
+        Intrinsics::new(self.vertical_fov_rad, self.width, self.height)
+    }
+
     /// Focal length in pixels, the same in both directions.
     pub fn focal_px(&self) -> f32 {
-        0.5 * self.height as f32 / (0.5 * self.vertical_fov_rad).tan()
+        self.intrinsics().focal_px
     }
 
     /// Where the optical axis meets the picture, in pixels from the top left corner.

@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, fs, path::Path, sync::Mutex};
 
 use rmpv::Value;
 use serde_json::json;
-use tandem::drivers::{PolicyMap, Protocol, Remote};
+use tandem::drivers::{PolicyMap, PolicyProtocol, RemotePolicy};
 use tandem_tools_spec::EndReason;
 
 use super::{
@@ -60,8 +60,11 @@ fn an_openpi_policy_sees_feels_and_turns_wrists() {
         )
     });
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let policy =
-        Remote::new(Protocol::Openpi, vec![server.url()], PolicyMap::find("openpi").expect("a preset"));
+    let policy = RemotePolicy::new(
+        PolicyProtocol::Openpi,
+        vec![server.url()],
+        PolicyMap::find("openpi").expect("a preset"),
+    );
     let evaluation = play(&plan(&policy, vec![1], true), folder.path());
     let [played] = &evaluation.episodes[..] else { panic!("{evaluation:?}") };
     assert_eq!((played.result.ended, played.result.env_steps), (EndReason::StepBudgetExhausted, 1000));
@@ -106,14 +109,14 @@ fn each_robot_may_have_a_policy_of_its_own() {
     let urls = servers.iter().map(OpenpiServer::url).collect();
     let folder = tempfile::tempdir().expect("a temporary folder");
     let first_twenty = map(folder.path(), "preset = \"openpi\"\n[chunk]\nrows = 25\nexecute = 20\n");
-    let policy = Remote::new(Protocol::Openpi, urls, first_twenty.clone());
+    let policy = RemotePolicy::new(PolicyProtocol::Openpi, urls, first_twenty.clone());
     let evaluation = play(&plan(&policy, vec![1], true), folder.path());
     assert_eq!(evaluation.episodes[0].result.tool_calls, 100, "50 times 20 steps");
     let wrists_rad = last_angles_rad(folder.path(), "handover-1", LEFT_WRIST);
     assert!((wrists_rad[0] - 0.2).abs() < 0.03 && (wrists_rad[1] - 0.6).abs() < 0.03, "{wrists_rad:?}");
     assert!(servers.iter().all(|server| server.requests.lock().expect("no panic").len() == 51));
 
-    let three = Remote::new(Protocol::Openpi, vec![servers[0].url(); 3], first_twenty);
+    let three = RemotePolicy::new(PolicyProtocol::Openpi, vec![servers[0].url(); 3], first_twenty);
     let evaluation = play(&plan(&three, vec![2], false), folder.path());
     assert_eq!(
         evaluation.left_out,
@@ -135,7 +138,7 @@ instruction = "joint"
 [prompt]
 "observation > words" = "list"
 [action]
-"" = ["left_wrist_yaw_joint", "pelvis_height"]
+"" = ["left_wrist_yaw_joint", "pelvis_height_m"]
 "#;
 
 #[test]
@@ -143,7 +146,7 @@ fn one_policy_behind_act_may_direct_all_and_see_the_room() {
     let server = ActServer::start(|_| (200, json!(vec![[0.2, 0.74, 0.6, 0.74]; 50])));
     let folder = tempfile::tempdir().expect("a temporary folder");
     let central = map(folder.path(), CENTRAL);
-    let policy = Remote::new(Protocol::Act, vec![server.url()], central.clone());
+    let policy = RemotePolicy::new(PolicyProtocol::Act, vec![server.url()], central.clone());
     let evaluation = play(&plan(&policy, vec![1], true), folder.path());
     let played = &evaluation.episodes[0];
     assert_eq!(played.by.extra_information, ["third_person"]);

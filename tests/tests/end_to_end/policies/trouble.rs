@@ -1,7 +1,7 @@
 //! Learned policies at servers that fail: each ends its own episode, with a result that says why, and no other.
 
 use serde_json::json;
-use tandem::drivers::{PolicyMap, Protocol, Remote};
+use tandem::drivers::{PolicyMap, PolicyProtocol, RemotePolicy};
 use tandem_tools_spec::EndReason;
 
 use super::{
@@ -42,7 +42,7 @@ fn a_server_that_fails_ends_its_episode_and_no_other() {
         _ => still(20),
     });
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let policy = Remote::new(Protocol::Openpi, vec![server.url()], map(folder.path(), FAST));
+    let policy = RemotePolicy::new(PolicyProtocol::Openpi, vec![server.url()], map(folder.path(), FAST));
     let one_by_one = |seed: u32| {
         let evaluation = play(&plan(&policy, vec![seed], false), folder.path());
         let [played] = &evaluation.episodes[..] else { panic!("{evaluation:?}") };
@@ -72,33 +72,38 @@ fn a_server_that_fails_ends_its_episode_and_no_other() {
 fn a_policy_that_is_not_ready_is_left_out_and_played_the_next_time() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let fast = || map(folder.path(), FAST);
-    let left_out = |policy: &Remote| {
+    let left_out = |policy: &RemotePolicy| {
         let evaluation = play(&plan(policy, vec![1], true), folder.path());
         assert_eq!(evaluation.episodes, [], "nothing was begun");
         evaluation.left_out.join(", ")
     };
     let unheard =
         std::net::TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("an address");
-    let absent =
-        [(Protocol::Openpi, format!("ws://{unheard}")), (Protocol::Act, format!("http://{unheard}/act"))];
+    let absent = [
+        (PolicyProtocol::Openpi, format!("ws://{unheard}")),
+        (PolicyProtocol::Act, format!("http://{unheard}/act")),
+    ];
     for (protocol, url) in absent {
-        let text = left_out(&Remote::new(protocol, vec![url.clone()], fast()));
+        let text = left_out(&RemotePolicy::new(protocol, vec![url.clone()], fast()));
         assert!(text.starts_with(&format!("handover seed 1: no policy answers at {url}")), "{text}");
     }
     let narrow = OpenpiServer::start(|_| Box::new(|_, _| Reply::Rows(vec![vec![0.0; 32]; 50])));
-    let text = left_out(&Remote::new(Protocol::Openpi, vec![narrow.url()], fast()));
+    let text = left_out(&RemotePolicy::new(PolicyProtocol::Openpi, vec![narrow.url()], fast()));
     assert!(text.contains("expected an array of shape [rows, 35]") && text.contains("[50, 32]"), "{text}");
     assert!(!folder.path().join("episodes/handover-1").exists(), "no world was made");
 
     let sound = OpenpiServer::start(|_| still(50));
-    let policy = Remote::new(Protocol::Openpi, vec![sound.url()], fast());
+    let policy = RemotePolicy::new(PolicyProtocol::Openpi, vec![sound.url()], fast());
     assert_eq!(play(&plan(&policy, vec![1], false), folder.path()).episodes.len(), 1);
     let asked = || sound.requests.lock().expect("no panic").len();
     let before = asked();
     play(&plan(&policy, vec![1], false), folder.path());
     assert_eq!(asked(), before, "it is kept");
     let longer = PolicyMap { reply_s: 6.0, ..fast() };
-    play(&plan(&Remote::new(Protocol::Openpi, vec![sound.url()], longer), vec![1], false), folder.path());
+    play(
+        &plan(&RemotePolicy::new(PolicyProtocol::Openpi, vec![sound.url()], longer), vec![1], false),
+        folder.path(),
+    );
     assert!(asked() > before, "another map is another policy");
 }
 
@@ -107,7 +112,7 @@ fn what_a_server_behind_act_refuses_is_told() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let told = |status: u16, reply: serde_json::Value| {
         let server = ActServer::start(move |_| (status, reply.clone()));
-        let policy = Remote::new(Protocol::Act, vec![server.url()], map(folder.path(), FAST));
+        let policy = RemotePolicy::new(PolicyProtocol::Act, vec![server.url()], map(folder.path(), FAST));
         play(&plan(&policy, vec![1], false), folder.path()).left_out.join(", ")
     };
     for (status, reply, says) in [

@@ -18,9 +18,9 @@ pub const BEAT_STEPS: u32 = WALK_STEPS;
 /// How fast a base is to go, in its own heading frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BaseVelocity {
-    pub forward_m_s: f32,
-    pub left_m_s: f32,
-    pub turning_rad_s: f32,
+    pub vx_m_s: f32,
+    pub vy_m_s: f32,
+    pub yaw_rate_rad_s: f32,
 }
 
 /// Where both wrists go.
@@ -219,9 +219,9 @@ impl<'a> Commander<'a> {
             }
             robots.push(WristMove {
                 carried: Some(carried),
-                vx_m_s: Some(part.base.forward_m_s.into()),
-                vy_m_s: Some(part.base.left_m_s.into()),
-                yaw_rate_rad_s: Some(part.base.turning_rad_s.into()),
+                vx_m_s: Some(part.base.vx_m_s.into()),
+                vy_m_s: Some(part.base.vy_m_s.into()),
+                yaw_rate_rad_s: Some(part.base.yaw_rate_rad_s.into()),
                 ..self.wrist_move(&facts, part.robot)
             });
         }

@@ -49,9 +49,9 @@ pub fn steer(at: &Pose, to: &Pose, drift: TargetVelocity, pace_m_s: f32) -> Base
     let own_m_s = Rotation::from_rotation_z(-heading_rad(at)) * world_m_s;
     let off_rad = wrapped_rad(heading_rad(to) - heading_rad(at));
     BaseVelocity {
-        forward_m_s: own_m_s.x,
-        left_m_s: own_m_s.y,
-        turning_rad_s: drift.turning_rad_s + off_rad * GAIN_1_S,
+        vx_m_s: own_m_s.x,
+        vy_m_s: own_m_s.y,
+        yaw_rate_rad_s: drift.turning_rad_s + off_rad * GAIN_1_S,
     }
 }
 

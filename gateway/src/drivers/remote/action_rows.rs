@@ -1,17 +1,17 @@
-//! What a policy answers, as rows of `send_joint_chunk`: checked against its map before a robot moves.
+//! From a policy's reply to rows of `send_joint_chunk`: checked against its map before a robot moves.
 
 use tandem_tools_spec::JointChunk;
 
 use super::{
     columns::{action_columns, action_name},
     error::RemoteError,
-    map::{Answer, PolicyMap, ROBOT},
-    request::Cast,
-    values::Told,
+    map::{AnswerScope, PolicyMap, ROBOT},
+    request::TaskInstructions,
+    values::ReplyValue,
 };
 
-/// Some columns of every row of one robot.
-struct Part<'a> {
+/// Some columns of every row of one robot, as they stand in a reply.
+struct ColumnBlock<'a> {
     key: String,
     columns: Vec<usize>,
     /// Numbers by row; of each, those from `from` on are this robot's.
@@ -20,17 +20,18 @@ struct Part<'a> {
     width: usize,
 }
 
-/// The chunks of robots number `robots`, whose answer this is, with what their policy does not tell taken from `held_rows`.
+/// The chunks of the robots with the indices `robots`, for which `answer` came; columns that their policy leaves out are taken
+/// from `held_rows`.
 pub fn chunks(
     map: &PolicyMap,
-    cast: &Cast,
-    answer: &Told,
+    instructions: &TaskInstructions,
+    answer: &ReplyValue,
     robots: &[usize],
     held_rows: &[Vec<f64>],
 ) -> Result<Vec<JointChunk>, RemoteError> {
     let mut found = Vec::with_capacity(robots.len());
     for (place, robot) in robots.iter().enumerate() {
-        let name = &cast.names[*robot];
+        let name = &instructions.robots[*robot];
         let parts = parts(map, answer, name, place, robots.len())?;
         found.push(JointChunk { robot: name.clone(), rows: joined(map, &parts, &held_rows[*robot])? });
     }
@@ -40,31 +41,31 @@ pub fn chunks(
 /// What the answer has for the robot called `name`, the one at `place` of the `robots` that it moves.
 fn parts<'a>(
     map: &PolicyMap,
-    answer: &'a Told,
+    answer: &'a ReplyValue,
     name: &str,
     place: usize,
     robots: usize,
-) -> Result<Vec<Part<'a>>, RemoteError> {
+) -> Result<Vec<ColumnBlock<'a>>, RemoteError> {
     let mut parts = Vec::with_capacity(map.action.len());
     for (key, names) in &map.action {
         // The map was checked when it was read.
         let columns = action_columns(names).unwrap_or_default();
         // Without a robot's name in the key, the columns of all robots stand side by side.
-        let apart = key.contains(ROBOT) || map.answer == Answer::One;
+        let apart = key.contains(ROBOT) || map.answer == AnswerScope::One;
         let (width, from) = match apart {
             true => (columns.len(), 0),
             false => (columns.len() * robots, columns.len() * place),
         };
         let key = key.replace(ROBOT, name);
         let values = table(answer, &key, width, map.chunk.rows)?;
-        parts.push(Part { key, columns, values, from, width });
+        parts.push(ColumnBlock { key, columns, values, from, width });
     }
     Ok(parts)
 }
 
 /// The numbers under `key`, which have to be rows of `width` numbers.
 fn table<'a>(
-    answer: &'a Told,
+    answer: &'a ReplyValue,
     key: &str,
     width: usize,
     rows: Option<usize>,
@@ -74,8 +75,8 @@ fn table<'a>(
         None => format!("expected an array of shape [rows, {width}] under the key {key:?}"),
     };
     let misfit = |came: String| RemoteError::Misfit(format!("{expected}; came {came}"));
-    let told = answer.at(key).ok_or_else(|| misfit(answer.describe()))?;
-    let Told::Array { shape, values } = told else { return Err(misfit(told.describe())) };
+    let value = answer.at(key).ok_or_else(|| misfit(answer.describe()))?;
+    let ReplyValue::Array { shape, values } = value else { return Err(misfit(value.describe())) };
     let (have_rows, have_width) = match shape[..] {
         // One column, or one row.
         [length] if width == 1 => (length, 1),
@@ -85,7 +86,7 @@ fn table<'a>(
     };
     let batches: usize = shape.iter().rev().skip(2).product();
     if (batches, have_width) != (1, width) || have_rows == 0 || rows.is_some_and(|rows| rows != have_rows) {
-        return Err(misfit(told.describe()));
+        return Err(misfit(value.describe()));
     }
     match values.iter().position(|value| !value.is_finite()) {
         None => Ok(values),
@@ -99,7 +100,7 @@ fn table<'a>(
 }
 
 /// Whole rows, as many as are executed.
-fn joined(map: &PolicyMap, parts: &[Part], held_row: &[f64]) -> Result<Vec<Vec<f64>>, RemoteError> {
+fn joined(map: &PolicyMap, parts: &[ColumnBlock], held_row: &[f64]) -> Result<Vec<Vec<f64>>, RemoteError> {
     let Some(first) = parts.first() else { return Ok(Vec::new()) };
     let rows = first.values.len() / first.width;
     if let Some(other) = parts.iter().find(|part| part.values.len() / part.width != rows) {
@@ -118,8 +119,8 @@ fn joined(map: &PolicyMap, parts: &[Part], held_row: &[f64]) -> Result<Vec<Vec<f
     let row = |row: usize| {
         let mut whole = held_row.to_vec();
         for part in parts {
-            let told = &part.values[row * part.width + part.from..];
-            for (column, value) in part.columns.iter().zip(told) {
+            let numbers = &part.values[row * part.width + part.from..];
+            for (column, value) in part.columns.iter().zip(numbers) {
                 whole[*column] = *value;
             }
         }
@@ -137,16 +138,16 @@ fn joined(map: &PolicyMap, parts: &[Part], held_row: &[f64]) -> Result<Vec<Vec<f
     }
 }
 
-/// No joint turns and no robot walks as far; a policy whose numbers are larger has other units or has lost its mind.
+/// No joint turns and no robot walks as far; a policy whose numbers are larger has other units or has lost its session.
 const LARGEST_VALUE: f64 = 1000.0;
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn cast() -> Cast {
+    fn instructions() -> TaskInstructions {
         let names = ["A", "B"].map(String::from).to_vec();
-        Cast { instructions: names.clone(), joint_instruction: String::new(), names }
+        TaskInstructions { per_robot: names.clone(), joint: String::new(), robots: names }
     }
 
     fn map(text: &str) -> PolicyMap {
@@ -155,18 +156,18 @@ mod tests {
         PolicyMap::find(&file.path().display().to_string()).unwrap()
     }
 
-    fn array(shape: &[usize]) -> Told {
+    fn array(shape: &[usize]) -> ReplyValue {
         let values = (0..shape.iter().product::<usize>()).map(|index| index as f64 / 100.0).collect();
-        Told::Array { shape: shape.into(), values }
+        ReplyValue::Array { shape: shape.into(), values }
     }
 
-    fn keyed(entries: &[(&str, Told)]) -> Told {
-        Told::Map(entries.iter().map(|(key, told)| ((*key).to_owned(), told.clone())).collect())
+    fn keyed(entries: &[(&str, ReplyValue)]) -> ReplyValue {
+        ReplyValue::Map(entries.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect())
     }
 
-    fn read(map: &PolicyMap, answer: &Told, robots: &[usize]) -> Result<Vec<JointChunk>, String> {
+    fn read(map: &PolicyMap, answer: &ReplyValue, robots: &[usize]) -> Result<Vec<JointChunk>, String> {
         let held_rows = [vec![9.0; 35], vec![8.0; 35]];
-        chunks(map, &cast(), answer, robots, &held_rows).map_err(|error| error.to_string())
+        chunks(map, &instructions(), answer, robots, &held_rows).map_err(|error| error.to_string())
     }
 
     #[test]
@@ -184,7 +185,7 @@ mod tests {
 
     #[test]
     fn columns_come_in_any_order_and_the_rest_is_held() {
-        let own = map("[action]\n\"h\" = [\"pelvis_height\"]\n\"a\" = [\"waist\", \"left_arm\"]");
+        let own = map("[action]\n\"h\" = [\"pelvis_height_m\"]\n\"a\" = [\"waist\", \"left_arm\"]");
         let answer = keyed(&[("a", array(&[2, 10])), ("h", array(&[2]))]);
         let rows = &read(&own, &answer, &[0]).unwrap()[0].rows;
         assert_eq!((rows[1][28], rows[1][0], rows[1][34], rows[1][7]), (0.1, 0.13, 0.01, 9.0));
@@ -211,7 +212,7 @@ mod tests {
 
     #[test]
     fn what_came_and_what_was_expected_is_said() {
-        let check = |map: &PolicyMap, answer: &Told, says: &str| {
+        let check = |map: &PolicyMap, answer: &ReplyValue, says: &str| {
             let text = read(map, answer, &[0]).unwrap_err();
             assert!(text.contains(says), "{text}");
         };
@@ -230,8 +231,8 @@ mod tests {
         );
         check(&any, &keyed(&[("actions", array(&[2, 50, 35]))]), "came an array of shape [2, 50, 35]");
         check(&any, &keyed(&[("actions", array(&[0, 35]))]), "came an array of shape [0, 35]");
-        check(&any, &keyed(&[("actions", Told::number(1.0))]), "came a number");
-        check(&any, &Told::Text("error".into()), "came the text \"error\"");
+        check(&any, &keyed(&[("actions", ReplyValue::number(1.0))]), "came a number");
+        check(&any, &ReplyValue::Text("error".into()), "came the text \"error\"");
         check(
             &fixed,
             &keyed(&[("actions", array(&[20, 35]))]),
@@ -240,9 +241,9 @@ mod tests {
         check(&fixed, &keyed(&[("actions", array(&[50, 35]))]), "50 rows, of which 60 are to be executed");
         let mut values = vec![0.0; 70];
         values[37] = f64::NAN;
-        let broken = keyed(&[("actions", Told::Array { shape: vec![2, 35], values })]);
+        let broken = keyed(&[("actions", ReplyValue::Array { shape: vec![2, 35], values })]);
         check(&any, &broken, "row 1, column 2 under the key \"actions\" is NaN");
-        let far = keyed(&[("actions", Told::Array { shape: vec![35], values: vec![4e6; 35] })]);
+        let far = keyed(&[("actions", ReplyValue::Array { shape: vec![35], values: vec![4e6; 35] })]);
         check(&any, &far, "left_shoulder_pitch_joint is beyond 1000");
     }
 }

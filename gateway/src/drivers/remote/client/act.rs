@@ -1,0 +1,139 @@
+//! `/act`: a request is one POST of JSON, with arrays as the Python package `json_numpy` writes them.
+
+use std::{io, time::Duration};
+
+use ureq::{Agent, http::Response};
+
+use super::PolicyClient;
+use crate::drivers::remote::{
+    error::{RemoteError, gist},
+    values::{ReplyValue, RequestValue},
+};
+
+/// Answers beyond this are not read.
+const LARGEST_ANSWER_BYTES: u64 = 64 << 20;
+
+/// The policy at one address.
+pub struct Act {
+    url: String,
+    agent: Agent,
+}
+
+impl Act {
+    pub fn new(url: &str) -> Act {
+        let agent = Agent::config_builder().http_status_as_error(false).build().new_agent();
+        Act { url: url.into(), agent }
+    }
+
+    fn post(&self, body: String, within: Duration) -> Result<Response<ureq::Body>, ureq::Error> {
+        let request = self.agent.post(&self.url).config().timeout_global(Some(within)).build();
+        request.header("content-type", "application/json").send(body)
+    }
+
+    fn failed(&self, error: ureq::Error, within: Duration) -> RemoteError {
+        let (url, reason) = (self.url.clone(), error.to_string());
+        match error {
+            ureq::Error::Timeout(_) => RemoteError::Slow { url, within },
+            ureq::Error::ConnectionFailed | ureq::Error::HostNotFound => {
+                RemoteError::Unreachable { url, reason }
+            }
+            ureq::Error::Io(error) if error.kind() == io::ErrorKind::ConnectionRefused => {
+                RemoteError::Unreachable { url, reason }
+            }
+            _ => RemoteError::Gone { url, reason },
+        }
+    }
+}
+
+impl PolicyClient for Act {
+    fn ask(&mut self, request: &RequestValue, within: Duration) -> Result<ReplyValue, RemoteError> {
+        let body = to_json(request).to_string();
+        let mut response = self.post(body, within).map_err(|error| self.failed(error, within))?;
+        let status = response.status();
+        let read = response.body_mut().with_config().limit(LARGEST_ANSWER_BYTES).read_to_string();
+        let text = read.map_err(|error| self.failed(error, within))?;
+        if !status.is_success() {
+            let text = format!("{status}: {}", gist(&text));
+            return Err(RemoteError::Failed { url: self.url.clone(), text });
+        }
+        let reply = serde_json::from_str(&text).map_err(|error| error.to_string()).and_then(from_json);
+        reply.map_err(|reason| RemoteError::Unreadable { url: self.url.clone(), reason })
+    }
+}
+
+/// As JSON, with arrays as the Python package `json_numpy` writes them: `{"__numpy__": base64, "dtype": "<f4", "shape": [2, 3]}`.
+fn to_json(sent: &RequestValue) -> Value {
+    match sent {
+        RequestValue::Map(entries) => {
+            entries.iter().map(|(key, sent)| (key.clone(), to_json(sent))).collect()
+        }
+        RequestValue::Array(array) => json!({
+            "__numpy__": BASE64_STANDARD.encode(array.bytes()),
+            "dtype": array.dtype(),
+            "shape": array.shape,
+        }),
+        RequestValue::Text(text) => json!(text),
+        RequestValue::Texts(texts) => json!(texts),
+    }
+}
+
+/// Reads JSON; lists of numbers are arrays, too.
+fn from_json(value: Value) -> Result<ReplyValue, String> {
+    match value {
+        Value::Object(object) if object.contains_key("__numpy__") => {
+            let text = |key: &str| object.get(key).and_then(Value::as_str).unwrap_or_default();
+            let shape = object.get("shape").cloned().unwrap_or_default();
+            let shape = serde_json::from_value(shape).map_err(|_| "an array without a shape".to_owned())?;
+            let bytes = BASE64_STANDARD.decode(text("__numpy__")).map_err(|error| error.to_string())?;
+            ReplyValue::from_bytes(text("dtype"), shape, &bytes)
+        }
+        Value::Object(object) => {
+            let entries = object.into_iter().map(|(key, value)| Ok((key, from_json(value)?)));
+            entries.collect::<Result<_, String>>().map(ReplyValue::Map)
+        }
+        Value::Array(items) => {
+            items.into_iter().map(from_json).collect::<Result<_, _>>().map(ReplyValue::list)
+        }
+        // Python writes NaN as no JSON; `null` is what others make of it.
+        Value::Null => Ok(ReplyValue::number(f64::NAN)),
+        Value::Number(number) => Ok(ReplyValue::number(number.as_f64().unwrap_or(f64::NAN))),
+        Value::String(text) => Ok(ReplyValue::Text(text)),
+        Value::Bool(value) => Ok(ReplyValue::Other(value.to_string())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drivers::remote::values::{Array, Elements};
+
+    #[test]
+    fn arrays_are_written_and_read_as_json_numpy_does() {
+        let array = Array { shape: vec![1, 2], elements: Elements::Floats(vec![1.5, -2.0]) };
+        let sent = RequestValue::Map(vec![
+            ("x".into(), RequestValue::Array(array)),
+            ("y".into(), RequestValue::Texts(vec!["z".into()])),
+        ]);
+        let value = to_json(&sent);
+        // json_numpy.dumps(np.float32([[1.5, -2]]))
+        let known = json!({ "__numpy__": "AADAPwAAAMA=", "dtype": "<f4", "shape": [1, 2] });
+        assert_eq!(value, json!({ "x": known, "y": ["z"] }));
+        let reply = ReplyValue::Array { shape: vec![1, 2], values: vec![1.5, -2.0] };
+        assert_eq!(from_json(known), Ok(reply.clone()));
+        assert_eq!(from_json(json!([[1.5, -2]])), Ok(reply));
+    }
+
+    #[test]
+    fn what_is_no_array_is_told_in_words() {
+        let check = |value: Value, says: &str| {
+            let reply = from_json(value).map_or_else(|error| error, |reply| reply.describe());
+            assert!(reply.contains(says), "{reply}");
+        };
+        check(json!("error"), "the text \"error\"");
+        check(json!([1, "a"]), "a list of 2");
+        check(json!({ "__numpy__": "AADAPw==", "dtype": "<f2", "shape": [2] }), "dtype \"<f2\"");
+        check(json!({ "__numpy__": "AADAPw==", "dtype": "<f4" }), "without a shape");
+        check(json!({ "__numpy__": 7, "dtype": "<f4", "shape": [1] }), "shape [1] with 0");
+        check(json!({ "__numpy__": "?", "dtype": "<f4", "shape": [1] }), "Invalid");
+    }
+}

@@ -1,0 +1,183 @@
+//! A policy session: servers of one policy, connected for one episode. Look, ask, execute, until the episode is over.
+
+use std::{
+    panic::resume_unwind,
+    thread::{self, ScopedJoinHandle},
+    time::{Duration, Instant},
+};
+
+use tandem_episodes::players::{PlayerError, ThirdPersonEpisode};
+use tandem_tools_spec::{JointChunk, SendJointChunk, StopReason, ToolReply};
+
+use super::{
+    action_rows,
+    client::{PolicyClient, PolicyProtocol},
+    columns,
+    error::RemoteError,
+    map::{AnswerScope, PolicyMap},
+    observation::PolicyObservation,
+    request::{TaskInstructions, request},
+};
+
+/// How long the first answer may take: models are compiled then. No clock of an episode runs yet.
+const FIRST_ANSWER: Duration = Duration::from_secs(600);
+
+/// How soon a server is tried again where nobody listens yet.
+const RETRY_INTERVAL: Duration = Duration::from_millis(500);
+
+/// Servers of a policy, connected, each of which has answered once.
+pub struct PolicySession<'a> {
+    plan: QueryPlan<'a>,
+    /// One for all robots, or one for each.
+    clients: Vec<Box<dyn PolicyClient>>,
+    /// The most steps of one command.
+    most_steps: usize,
+}
+
+impl<'a> PolicySession<'a> {
+    /// Connects to the servers at `urls`, waiting for those that are not there yet, and tries each with black pictures and zeros.
+    pub fn open(
+        protocol: PolicyProtocol,
+        urls: &[String],
+        map: &'a PolicyMap,
+        instructions: TaskInstructions,
+        most_steps: u32,
+    ) -> Result<PolicySession<'a>, RemoteError> {
+        let plan = QueryPlan { map, instructions };
+        let deadline = Instant::now() + Duration::from_secs_f64(map.connect_s);
+        let mut clients = Vec::with_capacity(urls.len());
+        for (url, robots) in urls.iter().zip(plan.queries()) {
+            clients.push(retry_until(deadline, || {
+                let mut client = protocol.open(url, plan.within())?;
+                plan.probe(&mut *client, &robots)?;
+                Ok(client)
+            })?);
+        }
+        Ok(PolicySession { plan, clients, most_steps: most_steps as usize })
+    }
+
+    /// Plays until the episode is over, or a policy fails.
+    pub fn play(&mut self, episode: &mut dyn ThirdPersonEpisode) -> Result<(), PlayerError> {
+        let mut held: Option<Vec<Vec<f64>>> = None;
+        loop {
+            let observation = PolicyObservation::take(episode, self.plan.map.shows_third_person())?;
+            let held_rows = held.get_or_insert_with(|| held_rows(&observation));
+            let chunks = self.decide(&observation, held_rows);
+            let chunks = chunks.map_err(|error| PlayerError::GaveUp(error.to_string()))?;
+            execute(episode, &chunks, self.most_steps)?;
+        }
+    }
+
+    /// Asks for every robot: a shared policy once after the other, policies of their own at the same time.
+    fn decide(
+        &mut self,
+        observation: &PolicyObservation,
+        held_rows: &[Vec<f64>],
+    ) -> Result<Vec<JointChunk>, RemoteError> {
+        let PolicySession { plan, clients, .. } = self;
+        let queries = plan.queries();
+        let ask = |client: &mut dyn PolicyClient, robots: &[usize]| {
+            plan.ask(client, observation, robots, held_rows, plan.within())
+        };
+        let answers: Result<Vec<Vec<JointChunk>>, RemoteError> = match &mut clients[..] {
+            [shared] => queries.iter().map(|robots| ask(&mut **shared, robots)).collect(),
+            own => thread::scope(|scope| {
+                let ask = &ask;
+                let asking = own.iter_mut().zip(&queries);
+                let asked: Vec<_> =
+                    asking.map(|(client, robots)| scope.spawn(move || ask(&mut **client, robots))).collect();
+                let answer =
+                    |asked: ScopedJoinHandle<_>| asked.join().unwrap_or_else(|panic| resume_unwind(panic));
+                asked.into_iter().map(answer).collect()
+            }),
+        };
+        Ok(answers?.into_iter().flatten().collect())
+    }
+}
+
+/// Which requests are made for which robots, as a map says.
+struct QueryPlan<'a> {
+    map: &'a PolicyMap,
+    instructions: TaskInstructions,
+}
+
+impl QueryPlan<'_> {
+    /// How long an answer may take.
+    fn within(&self) -> Duration {
+        Duration::from_secs_f64(self.map.reply_s)
+    }
+
+    /// The robots of each request.
+    fn queries(&self) -> Vec<Vec<usize>> {
+        let robots = 0..self.instructions.robots.len();
+        match self.map.answer {
+            AnswerScope::One => robots.map(|robot| vec![robot]).collect(),
+            AnswerScope::All => vec![robots.collect()],
+        }
+    }
+
+    /// Whether a server answers what its map says.
+    fn probe(&self, client: &mut dyn PolicyClient, robots: &[usize]) -> Result<(), RemoteError> {
+        let observation = PolicyObservation::blank(self.instructions.robots.len());
+        self.ask(client, &observation, robots, &held_rows(&observation), FIRST_ANSWER).map(drop)
+    }
+
+    fn ask(
+        &self,
+        client: &mut dyn PolicyClient,
+        observation: &PolicyObservation,
+        robots: &[usize],
+        held_rows: &[Vec<f64>],
+        within: Duration,
+    ) -> Result<Vec<JointChunk>, RemoteError> {
+        let robot = match (self.map.answer, robots) {
+            (AnswerScope::One, [robot]) => Some(*robot),
+            _ => None,
+        };
+        let reply = client.ask(&request(self.map, &self.instructions, observation, robot), within)?;
+        action_rows::chunks(self.map, &self.instructions, &reply, robots, held_rows)
+    }
+}
+
+/// By robot, the action row that keeps it as it is.
+fn held_rows(observation: &PolicyObservation) -> Vec<Vec<f64>> {
+    observation.robots.iter().map(|robot| columns::held_row(&robot.state_values)).collect()
+}
+
+/// Tries again until the deadline while nobody listens.
+fn retry_until<T>(
+    deadline: Instant,
+    mut attempt: impl FnMut() -> Result<T, RemoteError>,
+) -> Result<T, RemoteError> {
+    loop {
+        match attempt() {
+            Err(RemoteError::Unreachable { .. }) if Instant::now() + RETRY_INTERVAL < deadline => {
+                thread::sleep(RETRY_INTERVAL)
+            }
+            outcome => return outcome,
+        }
+    }
+}
+
+/// Sends the rows of all robots, in as many commands as the protocol asks for; no more rows than every robot has.
+fn execute(
+    episode: &mut dyn ThirdPersonEpisode,
+    chunks: &[JointChunk],
+    most_steps: usize,
+) -> Result<(), PlayerError> {
+    let rows = chunks.iter().map(|chunk| chunk.rows.len()).min().unwrap_or_default();
+    for from in (0..rows).step_by(most_steps.max(1)) {
+        let to = rows.min(from + most_steps);
+        let part = |chunk: &JointChunk| JointChunk {
+            robot: chunk.robot.clone(),
+            rows: chunk.rows[from..to].to_vec(),
+        };
+        let command = SendJointChunk { robots: chunks.iter().map(part).collect() };
+        if let ToolReply::Act(reply) = episode.call(command.into())?
+            && reply.stop_reason != StopReason::StepsDone
+        {
+            return Err(PlayerError::EpisodeOver);
+        }
+    }
+    Ok(())
+}
