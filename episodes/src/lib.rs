@@ -8,6 +8,7 @@ mod error;
 pub mod evaluation;
 mod fingerprint;
 mod instructions;
+mod observation;
 mod output;
 pub mod players;
 mod protocol;
@@ -25,6 +26,7 @@ pub use commands::{Called, OperatorCommand, own as own_call};
 pub use describe::{brief, task_list};
 pub use error::{CheckpointError, EpisodeError, SceneError};
 pub use instructions::{Instructions, InstructionsError};
+pub use observation::{Picture, RobotObservation, RobotView, TeamObservation};
 pub use output::{OutputError, create_new_private_folder, create_private_folder, html, write_whole};
 pub use protocol::{Rules, rules};
 pub use recording::{

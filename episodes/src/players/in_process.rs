@@ -1,8 +1,9 @@
 //! An episode in this process, as a player meets it.
 
-use tandem_tools_spec::{Png, ToolCall, ToolReply};
+use tandem_tools_spec::{Observe, Tool as _, ToolCall, ToolReply};
 
-use super::{Episode, PlayerError, PrivilegedEpisode, ThirdPersonEpisode};
+use super::{Episode, LocalEpisode, PlayerError, PrivilegedEpisode};
+use crate::observation::{Picture, TeamObservation};
 use crate::scoring::Facts;
 use crate::{EpisodeError, Session};
 
@@ -23,25 +24,38 @@ impl InProcess {
     pub fn until(phases: usize, session: Session) -> InProcess {
         InProcess { session, until: phases }
     }
+
+    fn check_underway(&self) -> Result<(), PlayerError> {
+        match self.session.reached_phases() >= self.until {
+            true => Err(PlayerError::EpisodeOver),
+            false => Ok(()),
+        }
+    }
 }
 
 impl Episode for InProcess {
     fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {
-        if self.session.reached_phases() >= self.until {
-            return Err(PlayerError::EpisodeOver);
-        }
+        self.check_underway()?;
         let tool = call.name();
-        self.session.call(call).map_err(|error| match error {
-            EpisodeError::Ended { .. } => PlayerError::EpisodeOver,
-            error => PlayerError::Call { tool, reason: error.to_string() },
-        })
+        self.session.call(call).map_err(|error| refused(tool, error))
     }
 }
 
-impl ThirdPersonEpisode for InProcess {
-    fn third_person(&mut self) -> Result<Png, PlayerError> {
-        let seen = self.session.third_person();
-        seen.map_err(|error| PlayerError::Call { tool: "third_person", reason: error.to_string() })
+fn refused(tool: &'static str, error: EpisodeError) -> PlayerError {
+    match error {
+        EpisodeError::Ended { .. } => PlayerError::EpisodeOver,
+        error => PlayerError::Call { tool, reason: error.to_string() },
+    }
+}
+
+impl LocalEpisode for InProcess {
+    fn observe(&mut self, observe: &Observe) -> Result<TeamObservation, PlayerError> {
+        self.check_underway()?;
+        self.session.observe(observe).map_err(|error| refused(Observe::NAME, error))
+    }
+
+    fn third_person(&mut self) -> Picture {
+        self.session.third_person()
     }
 }
 

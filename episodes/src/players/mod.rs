@@ -9,8 +9,9 @@ mod idle;
 mod in_process;
 mod policy;
 
-use tandem_tools_spec::{Png, ToolCall, ToolReply};
+use tandem_tools_spec::{Observe, ToolCall, ToolReply};
 
+use crate::observation::{Picture, TeamObservation};
 use crate::scoring::Facts;
 use crate::spec::EpisodeSpec;
 
@@ -27,9 +28,13 @@ pub trait PrivilegedEpisode: Episode {
     fn facts(&mut self) -> Result<Facts, PlayerError>;
 }
 
-/// A caller who also sees the room from where no robot stands: more than a policy has, and results say so.
-pub trait ThirdPersonEpisode: Episode {
-    fn third_person(&mut self) -> Result<Png, PlayerError>;
+/// An episode in the caller's own process, which shows views as they were drawn.
+pub trait LocalEpisode: Episode {
+    /// As a call of `observe`.
+    fn observe(&mut self, observe: &Observe) -> Result<TeamObservation, PlayerError>;
+
+    /// The room, seen from where no robot stands: more than a policy has, and results say so.
+    fn third_person(&mut self) -> Picture;
 }
 
 /// Plays one episode to its end by tool calls alone; made anew for each episode.

@@ -9,21 +9,21 @@ use std::{
 
 use foxglove::Decode;
 use foxglove::messages::{CompressedImage, FrameTransforms, SceneUpdate};
-use tandem_sim::{ObjectPlacement, Pose, RobotCommand, RobotPlacement, Rotation, Vector, World, WorldSpec};
-use tandem_tools_spec::{
-    Budget, CameraImage, EndReason, LookReply, Observation, PhaseReached, PhaseTimes, Png, Protocol,
-    ResultReply, ToolCall, ToolReply,
+use tandem_sim::render::RendererKind;
+use tandem_sim::{
+    ObjectPlacement, Pose, Robot, RobotCommand, RobotPlacement, Rotation, Vector, World, WorldSpec,
 };
+use tandem_tools_spec::{Budget, EndReason, PhaseReached, PhaseTimes, Protocol, ResultReply, ToolCall};
 
 use super::*;
 use crate::commands::RobotSheet;
+use crate::observation::{Detail, Observer, TeamObservation};
 use crate::scoring::Scores;
 use crate::spec::EpisodeSpec;
 use crate::tasks;
 
 const STEPS: u32 = 10;
 const THOUGHT: Duration = Duration::from_nanos(1_234_567_891);
-const PICTURE: &[u8] = b"the bytes of a PNG";
 
 fn world() -> World {
     let robot = |name: &str, x_m: f32, yaw_rad: f32| RobotPlacement {
@@ -48,15 +48,21 @@ fn spec() -> EpisodeSpec {
     EpisodeSpec::new(tasks::find("handover").unwrap(), 7, Protocol::Agentic)
 }
 
+fn sheet(robot: &Robot) -> RobotSheet {
+    RobotSheet { name: robot.name.clone(), model: robot.model.clone(), base_limits: robot.base_limits() }
+}
+
+/// What robot A sees and senses.
+fn seen(world: &World) -> TeamObservation {
+    let sheets: Vec<RobotSheet> = world.robots().iter().map(sheet).collect();
+    let mut observer = Observer::new(RendererKind::Cpu, world);
+    observer.observe(&world.present().into(), &[0], &sheets.iter().collect::<Vec<_>>(), Detail::Full)
+}
+
 /// A recorder, and what scores the world's one object.
 fn recorder(folder: &Path, world: &World) -> (Recorder, Scores) {
     let start = world.present();
     let scores = Scores::new(spec().task.phases, [("bottle", "bottle")].into_iter(), &start).unwrap();
-    let sheet = |robot: &tandem_sim::Robot| RobotSheet {
-        name: robot.name.clone(),
-        model: robot.model.clone(),
-        base_limits: robot.base_limits(),
-    };
     let header = RecordingHeader {
         spec: spec(),
         locomotion: "balance".into(),
@@ -95,16 +101,20 @@ fn record(folder: &Path) -> (World, PathBuf) {
     let wait = ToolCall::parse("wait", serde_json::json!({ "steps": 10 })).unwrap();
     recorder
         .tool_call(
-            ToolCallRecord::new(time_s, THOUGHT, None, &wait.into(), Err("no steps are left")).unwrap(),
+            ToolCallRecord::new(
+                time_s,
+                THOUGHT,
+                None,
+                &wait.into(),
+                CallOutcome::refused(&"no steps are left"),
+            )
+            .unwrap(),
         )
         .unwrap();
     let observe = ToolCall::parse("observe", serde_json::json!({ "robots": ["A"] })).unwrap();
-    let image = CameraImage { robot: "A".into(), png_base64: Png(PICTURE.into()) };
-    let seen = Observation { time_s, states: vec![], cameras: vec![], images: vec![image], arrays: vec![] };
-    let reply = ToolReply::Look(LookReply::Observe(seen));
-    recorder
-        .tool_call(ToolCallRecord::new(time_s, THOUGHT, Some("A"), &observe.into(), Ok(&reply)).unwrap())
-        .unwrap();
+    let seen = seen(&world);
+    let record = ToolCallRecord::new(time_s, THOUGHT, Some("A"), &observe.into(), (&seen).into());
+    recorder.tool_call(record.unwrap()).unwrap();
     let path = recorder.finish(&result()).unwrap();
     (world, path)
 }
@@ -133,6 +143,8 @@ fn a_recording_has_a_message_a_step_on_every_topic() {
     assert_eq!(path, folder.path().join("episode.mcap"));
     let bytes = fs::read(&path).unwrap();
 
+    let seen = seen(&world);
+    let picture = seen.robots[0].view.picture.png().unwrap();
     let mut counts = BTreeMap::new();
     let mut last_ns = 0;
     let mut last_transforms = None;
@@ -146,7 +158,7 @@ fn a_recording_has_a_message_a_step_on_every_topic() {
         *count += 1;
         match message.channel.topic.as_str() {
             "/tf" => last_transforms = Some(FrameTransforms::decode(&*message.data).unwrap()),
-            "/A/egocentric" => assert_eq!(CompressedImage::decode(&*message.data).unwrap().data, PICTURE),
+            "/A/egocentric" => assert!(CompressedImage::decode(&*message.data).unwrap().data == picture),
             "/tool_calls" => assert!(!String::from_utf8_lossy(&message.data).contains("base64")),
             _ => {}
         }

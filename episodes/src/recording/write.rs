@@ -140,10 +140,10 @@ impl Recorder {
     pub fn tool_call(&mut self, record: ToolCallRecord) -> Result<(), OutputError> {
         let ToolCallRecord { time_s, message, pictures } = record;
         self.file.write(&mut self.tool_calls, time_s, &Json(message))?;
-        for (name, png) in pictures {
+        for (name, picture) in pictures {
             let robots = self.robots.iter().zip(&mut self.robot_topics);
             if let Some((robot, topics)) = robots.into_iter().find(|(robot, _)| robot.name == name) {
-                topics.picture(&mut self.file, robot, time_s, png.0)?;
+                topics.picture(&mut self.file, robot, time_s, &picture)?;
             }
         }
         Ok(())

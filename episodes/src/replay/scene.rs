@@ -4,7 +4,8 @@ use tandem_sim::Step;
 use tandem_sim::render::{Camera, Frame};
 
 use crate::EpisodeError;
-use crate::session::{Eyes, build};
+use crate::observation::Observer;
+use crate::session::build;
 use crate::spec::EpisodeSpec;
 use crate::tasks::Task;
 
@@ -51,20 +52,20 @@ impl EpisodeCamera {
 
 /// Draws the steps of one episode.
 pub struct EpisodeRenderer {
-    eyes: Eyes,
+    observer: Observer,
 }
 
 impl EpisodeRenderer {
     /// Of the episode `spec`, at rest.
     pub fn of(spec: &EpisodeSpec) -> Result<EpisodeRenderer, EpisodeError> {
-        Ok(EpisodeRenderer { eyes: Eyes::new(spec.renderer, &build(spec)?.world) })
+        Ok(EpisodeRenderer { observer: Observer::new(spec.renderer, &build(spec)?.world) })
     }
 
     /// The camera after `step`, with pictures of another size if one is given: as high an angle, more or less wide.
     pub fn camera(&self, view: EpisodeCamera, step: &Step, size: Option<PictureSize>) -> Camera {
         let camera = match view {
-            EpisodeCamera::ThirdPerson => self.eyes.cameras.third_person(),
-            EpisodeCamera::Egocentric(robot) => self.eyes.cameras.egocentric(step, robot),
+            EpisodeCamera::ThirdPerson => self.observer.cameras.third_person(),
+            EpisodeCamera::Egocentric(robot) => self.observer.cameras.egocentric(step, robot),
         };
         match size {
             Some(PictureSize { width, height }) => Camera { width, height, ..camera },
@@ -74,6 +75,6 @@ impl EpisodeRenderer {
 
     /// What `camera` sees after `step`.
     pub fn draw(&mut self, step: &Step, camera: &Camera) -> Frame {
-        self.eyes.render(step, camera)
+        self.observer.render(step, camera)
     }
 }

@@ -2,64 +2,105 @@
 
 use tandem_sim::Pose;
 use tandem_tools_spec::{
-    CommandReply, EndReason, Formats, Look, LookCall, LookReply, ManageCall, ManageReply, Observation,
-    Observe, RobotReport, StopReason, ToolCall, ToolReply,
+    CommandReply, EndReason, Formats, Look, LookCall, LookReply, ManageCall, ManageReply, Observe,
+    RobotReport, StopReason, ToolCall, ToolReply,
 };
 
-use super::replies::{self, Detail};
-use super::{Session, arrays};
+use super::Session;
 use crate::EpisodeError;
-use crate::commands::{self, Called, Command, check_reach, report};
+use crate::commands::{self, Called, Command, RobotSheet, check_reach, report};
+use crate::observation::{Detail, TeamObservation, check_formats, robot_state};
+use crate::recording::CallOutcome;
+
+/// What a call is answered with; views are not encoded yet.
+pub enum Answer {
+    Reply(ToolReply),
+    Observation(TeamObservation),
+}
+
+impl Answer {
+    /// As the one who called is told it.
+    pub fn reply(self, called: &Called) -> Result<ToolReply, EpisodeError> {
+        let formats = match called {
+            Called::Look(look) => look.formats,
+            Called::Tool(_) | Called::Together(_) | Called::Say(_) => Formats::default(),
+        };
+        match self {
+            Answer::Reply(reply) => Ok(reply),
+            Answer::Observation(seen) => Ok(ToolReply::Look(LookReply::Observe(seen.reply(&formats)?))),
+        }
+    }
+}
+
+impl<'a> From<&'a Answer> for CallOutcome<'a> {
+    fn from(answer: &'a Answer) -> CallOutcome<'a> {
+        match answer {
+            Answer::Reply(reply) => CallOutcome::Reply(reply),
+            Answer::Observation(seen) => CallOutcome::Observation(seen),
+        }
+    }
+}
 
 impl Session {
-    pub(super) fn answer(&mut self, called: &Called) -> Result<ToolReply, EpisodeError> {
+    pub(super) fn answer(&mut self, called: &Called) -> Result<Answer, EpisodeError> {
         match (called, self.ended) {
-            (Called::Tool(ToolCall::Manage(call)), _) => Ok(ToolReply::Manage(self.manage(call))),
-            (Called::Tool(ToolCall::Look(call)), _) => self.look(call).map(ToolReply::Look),
-            (Called::Look(look), _) => {
-                self.observe(&look.observe, &look.formats).map(LookReply::Observe).map(ToolReply::Look)
+            (Called::Tool(ToolCall::Manage(call)), _) => {
+                Ok(Answer::Reply(ToolReply::Manage(self.manage(call))))
             }
+            (Called::Tool(ToolCall::Look(call)), _) => self.look(call),
+            (Called::Look(look), _) => self.seen(&look.observe, &look.formats).map(Answer::Observation),
             (Called::Tool(ToolCall::Act(_)) | Called::Together(_) | Called::Say(_), Some(reason)) => {
                 Err(EpisodeError::Ended { reason })
             }
             (Called::Tool(ToolCall::Act(call)), None) => {
                 let command = Command::read(call, &self.rules, &self.motions)?;
-                self.act(command).map(ToolReply::Act)
+                Ok(Answer::Reply(ToolReply::Act(self.act(command)?)))
             }
             (Called::Together(commands), None) => {
                 let parts = commands.iter().map(|command| command.read(&self.rules, &self.motions));
                 let command = Command::together(parts.collect::<Result<_, _>>()?, self.motions.len());
-                self.act(command).map(ToolReply::Act)
+                Ok(Answer::Reply(ToolReply::Act(self.act(command)?)))
             }
-            (Called::Say(_), None) => Ok(ToolReply::Manage(ManageReply::GetStatus(self.status()))),
+            (Called::Say(_), None) => {
+                Ok(Answer::Reply(ToolReply::Manage(ManageReply::GetStatus(self.status()))))
+            }
         }
     }
 
-    fn look(&mut self, call: &LookCall) -> Result<LookReply, EpisodeError> {
+    fn look(&mut self, call: &LookCall) -> Result<Answer, EpisodeError> {
         let find = |name: &String| commands::find(name, &self.motions);
-        match call {
-            LookCall::Observe(args) => self.observe(args, &Formats::default()).map(LookReply::Observe),
+        let reply = match call {
+            LookCall::Observe(args) => {
+                return self.seen(args, &Formats::default()).map(Answer::Observation);
+            }
             LookCall::GetRobotState(args) => {
                 let robot = find(&args.robot)?;
                 let sheet = &self.motions[robot].robot;
-                Ok(LookReply::GetRobotState(replies::robot_state(&self.present, robot, sheet, Detail::Full)))
+                LookReply::GetRobotState(robot_state(&self.present, robot, sheet, Detail::Full))
             }
             LookCall::QueryDepth(args) => {
                 let robot = find(&args.robot)?;
                 let name = &self.motions[robot].robot.name;
-                self.eyes.depth(&self.present, robot, name, &args.named()).map(LookReply::QueryDepth)
+                LookReply::QueryDepth(self.observer.depth(&self.present, robot, name, &args.named())?)
             }
             LookCall::CheckReach(args) => {
                 let robot = find(&args.robot)?;
-                Ok(LookReply::CheckReach(check_reach(args, &self.motions[robot])))
+                LookReply::CheckReach(check_reach(args, &self.motions[robot]))
             }
-        }
+        };
+        Ok(Answer::Reply(ToolReply::Look(reply)))
     }
 
-    fn observe(&mut self, args: &Observe, formats: &Formats) -> Result<Observation, EpisodeError> {
+    /// What the robots that are looked through see and sense now.
+    pub(super) fn seen(
+        &mut self,
+        args: &Observe,
+        formats: &Formats,
+    ) -> Result<TeamObservation, EpisodeError> {
         let robots = self.looked_through(args, formats)?;
         self.saw_depth_images |= formats.depth.is_some() && self.ended.is_none();
-        self.eyes.observe(&self.present, &robots, &self.motions, Detail::of(args), formats)
+        let sheets: Vec<&RobotSheet> = self.motions.iter().map(|motion| &motion.robot).collect();
+        Ok(self.observer.observe(&self.present, &robots, &sheets, Detail::of(args)))
     }
 
     /// Whether an observation can be made as asked.
@@ -68,7 +109,7 @@ impl Session {
     }
 
     fn looked_through(&self, args: &Observe, formats: &Formats) -> Result<Vec<usize>, EpisodeError> {
-        arrays::allowed(formats, self.spec().protocol)?;
+        check_formats(formats, self.spec().protocol)?;
         match &args.robots {
             Some(names) => names.iter().map(|name| commands::find(name, &self.motions)).collect(),
             None => Ok((0..self.motions.len()).collect()),

@@ -1,14 +1,10 @@
 //! An episode: a world, its rules, and the tool calls that act on it. Synchronous; it lives on a thread of its own.
 
 mod answer;
-mod arrays;
 mod build;
 mod checkpoint;
 mod clock;
-mod eyes;
-mod moment;
 mod replay;
-mod replies;
 mod run_files;
 mod status;
 mod venue;
@@ -16,8 +12,8 @@ mod venue;
 pub(crate) use build::build;
 pub use checkpoint::Checkpoint;
 pub use clock::{Clock, monotonic};
-pub(crate) use eyes::Eyes;
 pub(crate) use replay::Replay;
+use run_files::moment;
 pub use run_files::{RunFiles, RunFolder};
 
 use std::path::Path;
@@ -25,19 +21,18 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
-use tandem_sim::render::encode_png;
 use tandem_sim::{RobotCommand, Side, Step, World};
-use tandem_tools_spec::{
-    EndReason, ImageFormat, LookReply, ManageReply, Png, ResultReply, ToolCall, ToolReply,
-};
+use tandem_tools_spec::{EndReason, Formats, ManageReply, Observe, ResultReply, ToolCall, ToolReply};
 
 use crate::commands::{Called, Command, Motion, OperatorCommand, Run};
 use crate::convert::isometry_from_sim;
+use crate::observation::{Observer, Picture, TeamObservation};
 use crate::protocol::{Rules, rules};
-use crate::recording::{BEGIN, state_hash_text};
+use crate::recording::{BEGIN, CallOutcome, state_hash_text};
 use crate::scoring::{Facts, Phase, Scores};
 use crate::spec::{EpisodeSpec, Start};
 use crate::{EpisodeError, fingerprint};
+use answer::Answer;
 use build::Built;
 use checkpoint::Origin;
 use clock::ThinkingClock;
@@ -54,7 +49,7 @@ pub struct Session {
     /// Control steps of the world before the episode, where it begins at a phase of another one.
     steps_before: u64,
     clock: ThinkingClock,
-    eyes: Eyes,
+    observer: Observer,
     files: Option<RunFiles>,
     /// Up to the end.
     tool_calls: u32,
@@ -99,7 +94,7 @@ impl Session {
             motions,
             scores: spec.task.scores(&present)?,
             clock: ThinkingClock::new(rules.thinking, clock),
-            eyes: Eyes::new(spec.renderer, &world),
+            observer: Observer::new(spec.renderer, &world),
             files: None,
             steps_before: 0,
             tool_calls: 0,
@@ -158,15 +153,26 @@ impl Session {
     /// As [`Session::call`], of whatever can be called, made by the operator of a robot or by the policy of all.
     pub fn make(&mut self, operator: Option<&str>, called: &Called) -> Result<ToolReply, EpisodeError> {
         let underway = self.arrived();
-        let answer = called.validate().map_err(EpisodeError::from).and_then(|()| self.answer(called));
-        let mut answer = self.answered(underway, operator, called, answer);
-        if let (Called::Look(look), Ok(ToolReply::Look(LookReply::Observe(seen)))) = (called, &mut answer)
-            && look.formats.images == Some(ImageFormat::Rgb)
-        {
-            // The recording has them.
-            seen.images.clear();
+        let mut answer = called.validate().map_err(EpisodeError::from).and_then(|()| self.answer(called));
+        self.came_out(underway, operator, called, CallOutcome::of(&answer));
+        if let Ok(Answer::Reply(ToolReply::Manage(ManageReply::Finish(reply)))) = &mut answer {
+            // Closing the files may have failed, which the reply has to say.
+            *reply = self.result().told(self.spec().disclosure);
         }
-        answer
+        let reply = answer.and_then(|answer| answer.reply(called));
+        self.let_think();
+        reply
+    }
+
+    /// As [`Session::call`] of `observe`, for a policy in this process: with views as they were drawn.
+    pub fn observe(&mut self, observe: &Observe) -> Result<TeamObservation, EpisodeError> {
+        let underway = self.arrived();
+        let called = Called::from(ToolCall::from(observe.clone()));
+        let seen = called.validate().map_err(EpisodeError::from);
+        let seen = seen.and_then(|()| self.seen(observe, &Formats::default()));
+        self.came_out(underway, None, &called, CallOutcome::of(&seen));
+        self.let_think();
+        seen
     }
 
     /// Whether an operator's command could be executed as things stand. A refusal is counted and recorded as that of any call.
@@ -178,7 +184,9 @@ impl Session {
         let Err(refusal) = read else { return Ok(()) };
         let underway = self.arrived();
         let called = Called::Together(vec![command.clone()]);
-        self.answered(underway, Some(&command.robot), &called, Err(refusal)).map(drop)
+        self.came_out(underway, Some(&command.robot), &called, CallOutcome::refused(&refusal));
+        self.let_think();
+        Err(refusal)
     }
 
     /// A call has arrived. Returns whether it is one of the episode's.
@@ -192,28 +200,21 @@ impl Session {
         underway
     }
 
-    /// A call has its answer: records it, and lets the policy think on, or closes the files if it has ended the episode.
-    fn answered(
-        &mut self,
-        underway: bool,
-        operator: Option<&str>,
-        called: &Called,
-        mut answer: Result<ToolReply, EpisodeError>,
-    ) -> Result<ToolReply, EpisodeError> {
+    /// A call has come out: records it, and closes the files if it has ended the episode.
+    fn came_out(&mut self, underway: bool, operator: Option<&str>, called: &Called, outcome: CallOutcome) {
         if let (true, Some(files)) = (underway, &mut self.files) {
-            files.tool_call(self.present.time_s, self.clock.spent(), operator, called, &answer);
+            files.tool_call(self.present.time_s, self.clock.spent(), operator, called, outcome);
         }
         if self.ended.is_some() {
             self.settle();
         }
-        if let Ok(ToolReply::Manage(ManageReply::Finish(reply))) = &mut answer {
-            // Closing the files may have failed, which the reply has to say.
-            *reply = self.result().told(self.spec().disclosure);
-        }
+    }
+
+    /// The policy's clock goes on, unless the episode has ended.
+    fn let_think(&mut self) {
         if self.ended.is_none() {
             self.clock.resume();
         }
-        answer
     }
 
     /// Ends the episode of a policy that has gone: its wall clock has run out, or its last call was `idle` ago.
@@ -325,7 +326,7 @@ impl Session {
     fn keep_picture(&mut self, caption: &str) {
         if let Some(files) = &mut self.files {
             let names = self.motions.iter().map(|motion| motion.robot.name.as_str());
-            files.keep(moment::capture(caption, &self.present, names, &mut self.eyes));
+            files.keep(moment(caption, &self.present, names, &mut self.observer));
         }
     }
 
@@ -345,15 +346,11 @@ impl Session {
     }
 
     /// What the scene's camera sees that sees all robots, which no tool shows. The policy's clock stands meanwhile.
-    pub fn third_person(&mut self) -> Result<Png, EpisodeError> {
+    pub fn third_person(&mut self) -> Picture {
         self.clock.pause();
-        let camera = self.eyes.cameras.third_person();
-        let frame = self.eyes.render(&self.present, &camera);
-        let png = encode_png(frame.width, frame.height, &frame.rgb);
-        if self.ended.is_none() {
-            self.clock.resume();
-        }
-        Ok(Png(png?))
+        let picture = self.observer.third_person(&self.present);
+        self.let_think();
+        picture
     }
 
     /// How many phases have been reached.

@@ -6,15 +6,19 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
+use tandem_sim::render::Camera;
 use tandem_sim::{CONTROL_HZ, Step};
-use tandem_tools_spec::{Budget, PhaseReached, ResultReply, ToolReply};
+use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
 
 use super::{Session, this_build};
 use crate::EpisodeError;
 use crate::commands::Called;
+use crate::observation::Observer;
 use crate::output::{OutputError, create_private_folder, write_whole};
-use crate::recording::{Recorder, RecorderThread, RecordingHeader, ToolCallRecord, Visibility};
-use crate::reports::episode::{CallCounts, EpisodePage, KeyMoment, PAGE_FILE, STRIP_FILE, png};
+use crate::recording::{CallOutcome, Recorder, RecorderThread, RecordingHeader, ToolCallRecord, Visibility};
+use crate::reports::episode::{
+    CELL_HEIGHT, CELL_WIDTH, CallCounts, EpisodePage, KeyMoment, LabelledFrame, PAGE_FILE, STRIP_FILE, png,
+};
 use crate::results::write_result;
 use crate::scoring::Facts;
 use crate::tasks::Task;
@@ -52,7 +56,7 @@ impl RunFiles {
         let header = RecordingHeader {
             spec: session.spec().clone(),
             locomotion: session.origin.locomotion.clone(),
-            renderer: session.eyes.renderer().into(),
+            renderer: session.observer.renderer().into(),
             build: this_build()?.into(),
             robots: session.motions.iter().map(|motion| motion.robot.clone()).collect(),
             scores: session.scores.memory(),
@@ -102,11 +106,9 @@ impl RunFiles {
         thought: Duration,
         operator: Option<&str>,
         called: &Called,
-        answer: &Result<ToolReply, EpisodeError>,
+        outcome: CallOutcome,
     ) {
-        self.calls.count(called.name(), answer.is_ok());
-        let problem = answer.as_ref().err().map(|error| error.to_string());
-        let outcome = answer.as_ref().map_err(|_| problem.as_deref().unwrap_or_default());
+        self.calls.count(called.name(), outcome.is_ok());
         let record = ToolCallRecord::new(time_s, thought, operator, called, outcome);
         self.recorder.append(move |recorder| recorder.tool_call(record?));
     }
@@ -161,4 +163,23 @@ impl RunFiles {
             self.failed = Some(error.to_string());
         }
     }
+}
+
+/// A moment for the picture strip: what the third-person camera and the robots called `names` see after `step`.
+pub(super) fn moment<'a>(
+    caption: &str,
+    step: &Step,
+    names: impl Iterator<Item = &'a str>,
+    observer: &mut Observer,
+) -> KeyMoment {
+    let mut cameras = vec![("the room".into(), observer.cameras.third_person())];
+    for (robot, name) in names.enumerate() {
+        cameras.push((format!("what {name} sees"), observer.cameras.egocentric(step, robot)));
+    }
+    let view = |(label, camera): (String, Camera)| {
+        let camera = Camera { width: CELL_WIDTH as u32, height: CELL_HEIGHT as u32, ..camera };
+        LabelledFrame { label, frame: observer.render(step, &camera) }
+    };
+    let views = cameras.into_iter().map(view).collect();
+    KeyMoment { caption: [caption.into(), format!("{:.1} s", step.time_s)], views }
 }

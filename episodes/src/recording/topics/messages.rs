@@ -1,6 +1,7 @@
 //! Messages that have no well-known schema: flat JSON objects, because Foxglove's plots address numbers by field name and
 //! its schema reader takes neither references nor nullable types.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use base64::{DecodeError, Engine, prelude::BASE64_STANDARD};
@@ -8,9 +9,10 @@ use foxglove::{Encode, Schema, bytes::BufMut};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tandem_sim::{BaseCommand, RobotCommand, RobotState, Side, Step};
-use tandem_tools_spec::{Budget, LookReply, PhaseReached, Png, ToolReply};
+use tandem_tools_spec::{Budget, PhaseReached, ToolReply};
 
 use crate::commands::{Called, base_row};
+use crate::observation::{Picture, TeamObservation};
 use crate::output::OutputError;
 use crate::scoring::{Facts, Grip};
 
@@ -196,44 +198,95 @@ impl From<&Budget> for Json<BudgetMessage> {
     }
 }
 
+/// How a tool call came out.
+pub enum CallOutcome<'a> {
+    Reply(&'a ToolReply),
+    Observation(&'a TeamObservation),
+    /// The text of the problem.
+    Problem(String),
+}
+
+impl<'a> CallOutcome<'a> {
+    /// How a call came out that was answered so.
+    pub fn of<T, E: ToString>(answer: &'a Result<T, E>) -> CallOutcome<'a>
+    where
+        &'a T: Into<CallOutcome<'a>>,
+    {
+        answer.as_ref().map_or_else(CallOutcome::refused, Into::into)
+    }
+
+    /// The call was refused, or failed.
+    pub fn refused(error: &impl ToString) -> CallOutcome<'a> {
+        CallOutcome::Problem(error.to_string())
+    }
+
+    /// Whether the call was answered.
+    pub fn is_ok(&self) -> bool {
+        !matches!(self, CallOutcome::Problem(_))
+    }
+
+    /// As text. Pictures have topics of their own and would make this one unreadable.
+    fn text(&self) -> Result<String, serde_json::Error> {
+        match self {
+            CallOutcome::Reply(reply) => serde_json::to_string(reply),
+            CallOutcome::Observation(seen) => {
+                let states: Vec<_> = seen.robots.iter().map(|robot| &robot.state).collect();
+                let robots: Vec<_> = states.iter().map(|state| state.robot.as_str()).collect();
+                let states = serde_json::to_value(&states)?;
+                let told =
+                    serde_json::json!({ "time_s": seen.time_s, "states": states, "pictures_of": robots });
+                Ok(told.to_string())
+            }
+            CallOutcome::Problem(problem) => Ok(problem.clone()),
+        }
+    }
+
+    /// The pictures that were seen, by robot.
+    fn pictures(&self) -> Vec<(String, Arc<Picture>)> {
+        match self {
+            CallOutcome::Observation(seen) => {
+                let seen = seen.robots.iter();
+                seen.map(|robot| (robot.state.robot.clone(), robot.view.picture.clone())).collect()
+            }
+            CallOutcome::Reply(_) | CallOutcome::Problem(_) => Vec::new(),
+        }
+    }
+}
+
+impl<'a> From<&'a TeamObservation> for CallOutcome<'a> {
+    fn from(seen: &'a TeamObservation) -> CallOutcome<'a> {
+        CallOutcome::Observation(seen)
+    }
+}
+
 /// A tool call as it is recorded: the call with its answer, and the pictures of that, which have topics of their own.
 pub struct ToolCallRecord {
     /// When it was answered.
     pub time_s: f64,
     pub message: ToolCallMessage,
     /// By robot.
-    pub pictures: Vec<(String, Png)>,
+    pub pictures: Vec<(String, Arc<Picture>)>,
 }
 
 impl ToolCallRecord {
-    /// What `operator` called (`None` where one policy directs all) and how it was answered, by a reply or the text of the
-    /// problem; the policy has `thought` since the episode began, up to this call.
+    /// What `operator` called (`None` where one policy directs all) and how it came out; the policy has `thought` since the
+    /// episode began, up to this call.
     pub fn new(
         time_s: f64,
         thought: Duration,
         operator: Option<&str>,
         called: &Called,
-        outcome: Result<&ToolReply, &str>,
+        outcome: CallOutcome,
     ) -> Result<ToolCallRecord, OutputError> {
-        let reply = match outcome {
-            Ok(reply) => without_pictures(reply)?,
-            Err(problem) => problem.to_string(),
-        };
         let message = ToolCallMessage {
             tool: called.name().into(),
             thought_ns: u64::try_from(thought.as_nanos()).unwrap_or(u64::MAX),
             arguments: called.arguments()?,
             operator: operator.map(str::to_owned),
             ok: outcome.is_ok(),
-            reply,
+            reply: outcome.text()?,
         };
-        let pictures = match outcome {
-            Ok(ToolReply::Look(LookReply::Observe(seen))) => {
-                seen.images.iter().map(|image| (image.robot.clone(), image.png_base64.clone())).collect()
-            }
-            _ => Vec::new(),
-        };
-        Ok(ToolCallRecord { time_s, message, pictures })
+        Ok(ToolCallRecord { time_s, message, pictures: outcome.pictures() })
     }
 }
 
@@ -255,18 +308,4 @@ pub struct ToolCallMessage {
 
 impl JsonMessage for ToolCallMessage {
     const SCHEMA_NAME: &str = "tandem.ToolCall";
-}
-
-/// A reply as JSON. Pictures have a topic of their own and would make this one unreadable.
-fn without_pictures(reply: &ToolReply) -> Result<String, serde_json::Error> {
-    match reply {
-        ToolReply::Look(LookReply::Observe(observation)) => {
-            let states = serde_json::to_value(&observation.states)?;
-            let robots: Vec<&str> = observation.images.iter().map(|image| image.robot.as_str()).collect();
-            let told =
-                serde_json::json!({ "time_s": observation.time_s, "states": states, "pictures_of": robots });
-            Ok(told.to_string())
-        }
-        other => serde_json::to_string(other),
-    }
 }

@@ -6,6 +6,7 @@ use tandem_sim::{RobotModel, RobotState, RobotStep, mjcf::MjcfCamera, render::In
 use super::messages::{ActionMessage, BaseCommandMessage, HandsMessage, Json};
 use super::transforms::{EGOCENTRIC, robot_frame, timestamp};
 use crate::commands::{RobotSheet, action_row};
+use crate::observation::Picture;
 use crate::output::OutputError;
 use crate::recording::mcap_file::{McapFile, Topic};
 use crate::scoring::Facts;
@@ -56,14 +57,14 @@ impl RobotTopics {
         file.write(&mut self.hands, time_s, &HandsMessage::of(&step.state, index, facts))
     }
 
-    /// Appends a PNG seen through the robot's head camera, unless there is one of this moment: physics stands still between
+    /// Appends a picture seen through the robot's head camera, unless there is one of this moment: physics stands still between
     /// commands, and so do pictures.
     pub fn picture(
         &mut self,
         file: &mut McapFile,
         robot: &RobotSheet,
         time_s: f64,
-        png: Vec<u8>,
+        picture: &Picture,
     ) -> Result<(), OutputError> {
         let name = &robot.name;
         let frame_id = robot_frame(name, EGOCENTRIC);
@@ -82,10 +83,11 @@ impl RobotTopics {
             }
         };
         camera.last_s = time_s;
+        let png = picture.png().map_err(|source| OutputError::Encode(source.into()))?;
         let image = CompressedImage {
             timestamp: Some(timestamp(time_s)),
             frame_id,
-            data: png.into(),
+            data: png.to_vec().into(),
             format: "png".into(),
         };
         file.write(&mut camera.image, time_s, &image)

@@ -23,9 +23,6 @@ pub enum RemoteError {
     /// What it sends does not fit the map.
     #[error("the policy's answer does not fit its map: {0}")]
     Misfit(String),
-    /// A picture of ours cannot be read, which is a fault of ours.
-    #[error("a picture cannot be read: {0}")]
-    Picture(#[from] image::ImageError),
 }
 
 /// The line of a text that says most: of a Python traceback the last, of everything else the first; not too much of it.

@@ -6,7 +6,6 @@ mod client;
 mod columns;
 mod error;
 mod map;
-mod observation;
 mod picture;
 mod policy_session;
 mod request;

@@ -1,7 +1,8 @@
 //! Pictures in the size and order that a policy wants.
 
-use image::{RgbImage, imageops};
+use image::{ImageBuffer, Rgb, RgbImage, imageops};
 use serde::{Deserialize, Serialize};
+use tandem_episodes::Picture;
 
 use super::values::{Array, Elements};
 
@@ -32,11 +33,21 @@ pub enum Layout {
 /// Smooth in both directions, as Pillow's bilinear filter.
 const FILTER: imageops::FilterType = imageops::FilterType::Triangle;
 
-/// The picture in another size.
-pub fn fitted(picture: &RgbImage, [width, height]: [u32; 2], fit: Fit) -> RgbImage {
-    if picture.dimensions() == (width, height) {
-        return picture.clone();
+/// The picture in the size that is wanted, as an array of bytes.
+pub fn array(picture: &Picture, size_px: [u32; 2], fit: Fit, layout: Layout) -> Array {
+    let Picture { width, height, ref rgb, .. } = *picture;
+    if [width, height] == size_px {
+        return arranged(rgb.clone(), size_px, layout);
     }
+    let pixels = ImageBuffer::from_raw(width, height, &rgb[..]).expect("three bytes a pixel");
+    arranged(fitted(&pixels, size_px, fit).into_raw(), size_px, layout)
+}
+
+/// A picture, for the functions of the library `image`.
+type Pixels<'a> = ImageBuffer<Rgb<u8>, &'a [u8]>;
+
+/// The picture in another size.
+fn fitted(picture: &Pixels, [width, height]: [u32; 2], fit: Fit) -> RgbImage {
     match fit {
         Fit::Stretch => imageops::resize(picture, width, height, FILTER),
         Fit::Pad => {
@@ -53,27 +64,25 @@ pub fn fitted(picture: &RgbImage, [width, height]: [u32; 2], fit: Fit) -> RgbIma
             let [w, h] = [width, height].map(|side| (f64::from(side) * ratio) as u32);
             let [w, h] = [w.clamp(1, picture.width()), h.clamp(1, picture.height())];
             let [left, top] = [(picture.width() - w) / 2, (picture.height() - h) / 2];
-            let part = imageops::crop_imm(picture, left, top, w, h).to_image();
+            let part = RgbImage::from_fn(w, h, |u, v| *picture.get_pixel(left + u, top + v));
             imageops::resize(&part, width, height, FILTER)
         }
     }
 }
 
 /// How many times smaller each side becomes.
-fn shrinking(picture: &RgbImage, size_px: [u32; 2]) -> [f64; 2] {
+fn shrinking(picture: &Pixels, size_px: [u32; 2]) -> [f64; 2] {
     let [width, height] = size_px.map(f64::from);
     [f64::from(picture.width()) / width, f64::from(picture.height()) / height]
 }
 
-/// The picture as an array of bytes.
-pub fn array(picture: &RgbImage, layout: Layout) -> Array {
-    let [width, height] = [picture.width() as usize, picture.height() as usize];
+/// Bytes that lie row by row, colours last, in the order that is wanted.
+fn arranged(rgb: Vec<u8>, [width, height]: [u32; 2], layout: Layout) -> Array {
+    let [width, height] = [width as usize, height as usize];
     match layout {
-        Layout::Hwc => {
-            Array { shape: vec![height, width, 3], elements: Elements::Bytes(picture.as_raw().clone()) }
-        }
+        Layout::Hwc => Array { shape: vec![height, width, 3], elements: Elements::Bytes(rgb) },
         Layout::Chw => {
-            let plane = |colour: usize| picture.as_raw().iter().skip(colour).step_by(3).copied();
+            let plane = |colour: usize| rgb.iter().skip(colour).step_by(3).copied();
             Array {
                 shape: vec![3, height, width],
                 elements: Elements::Bytes((0..3).flat_map(plane).collect()),
@@ -84,8 +93,6 @@ pub fn array(picture: &RgbImage, layout: Layout) -> Array {
 
 #[cfg(test)]
 mod tests {
-    use image::Rgb;
-
     use super::*;
 
     const RED: Rgb<u8> = Rgb([200, 0, 0]);
@@ -93,30 +100,36 @@ mod tests {
     const BLACK: Rgb<u8> = Rgb([0, 0, 0]);
 
     /// Left half red, right half blue.
-    fn halves() -> RgbImage {
-        RgbImage::from_fn(320, 240, |u, _| if u < 160 { RED } else { BLUE })
+    fn halves() -> Picture {
+        let image = RgbImage::from_fn(320, 240, |u, _| if u < 160 { RED } else { BLUE });
+        Picture::new(320, 240, image.into_raw())
+    }
+
+    fn fit_to_square(fit: Fit) -> RgbImage {
+        let array = array(&halves(), [224, 224], fit, Layout::Hwc);
+        assert_eq!(array.shape, [224, 224, 3]);
+        RgbImage::from_raw(224, 224, array.bytes()).unwrap()
     }
 
     #[test]
     fn pictures_fit_in_three_ways() {
         let seen = |fit: Fit| {
-            let picture = fitted(&halves(), [224, 224], fit);
-            assert_eq!(picture.dimensions(), (224, 224));
+            let picture = fit_to_square(fit);
             [(10, 10), (10, 112), (213, 112), (213, 213)].map(|(u, v)| *picture.get_pixel(u, v))
         };
         assert_eq!(seen(Fit::Pad), [BLACK, RED, BLUE, BLACK]);
         assert_eq!(seen(Fit::Stretch), [RED, RED, BLUE, BLUE]);
         assert_eq!(seen(Fit::Crop), [RED, RED, BLUE, BLUE]);
         // A quarter less high than wide: 224 by 168, with 28 black rows above and below.
-        let padded = fitted(&halves(), [224, 224], Fit::Pad);
+        let padded = fit_to_square(Fit::Pad);
         let rows = (0..224).filter(|v| *padded.get_pixel(5, *v) == RED).count();
         assert_eq!((rows, *padded.get_pixel(5, 27), *padded.get_pixel(5, 28)), (168, BLACK, RED));
     }
 
     #[test]
     fn colours_come_last_or_first() {
-        let picture = RgbImage::from_raw(2, 1, vec![1, 2, 3, 4, 5, 6]).unwrap();
-        let array = |layout| super::array(&picture, layout);
+        let picture = Picture::new(2, 1, vec![1, 2, 3, 4, 5, 6]);
+        let array = |layout| super::array(&picture, [2, 1], Fit::Pad, layout);
         let bytes = |bytes: [u8; 6]| Elements::Bytes(bytes.into());
         assert_eq!(array(Layout::Hwc), Array { shape: vec![1, 2, 3], elements: bytes([1, 2, 3, 4, 5, 6]) });
         assert_eq!(array(Layout::Chw), Array { shape: vec![3, 1, 2], elements: bytes([1, 4, 2, 5, 3, 6]) });

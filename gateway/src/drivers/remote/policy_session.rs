@@ -6,7 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use tandem_episodes::players::{PlayerError, ThirdPersonEpisode};
+use tandem_episodes::players::{LocalEpisode, PlayerError};
 use tandem_tools_spec::{JointChunk, SendJointChunk, StopReason, ToolReply};
 
 use super::{
@@ -15,8 +15,7 @@ use super::{
     columns,
     error::RemoteError,
     map::{AnswerScope, PolicyMap},
-    observation::PolicyObservation,
-    request::{TaskInstructions, request},
+    request::{PolicyObservation, TaskInstructions, request},
 };
 
 /// How long the first answer may take: models are compiled then. No clock of an episode runs yet.
@@ -57,7 +56,7 @@ impl<'a> PolicySession<'a> {
     }
 
     /// Plays until the episode is over, or a policy fails.
-    pub fn play(&mut self, episode: &mut dyn ThirdPersonEpisode) -> Result<(), PlayerError> {
+    pub fn play(&mut self, episode: &mut dyn LocalEpisode) -> Result<(), PlayerError> {
         let mut held: Option<Vec<Vec<f64>>> = None;
         loop {
             let observation = PolicyObservation::take(episode, self.plan.map.shows_third_person())?;
@@ -161,7 +160,7 @@ fn retry_until<T>(
 
 /// Sends the rows of all robots, in as many commands as the protocol asks for; no more rows than every robot has.
 fn execute(
-    episode: &mut dyn ThirdPersonEpisode,
+    episode: &mut dyn LocalEpisode,
     chunks: &[JointChunk],
     most_steps: usize,
 ) -> Result<(), PlayerError> {

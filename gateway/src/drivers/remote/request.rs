@@ -1,9 +1,16 @@
 //! What a policy is asked: pictures, states and words under the keys of its map.
 
+use std::sync::Arc;
+
+use tandem_episodes::{
+    Picture,
+    players::{Onlooker, PlayerError},
+};
+use tandem_tools_spec::Observe;
+
 use super::{
-    columns::state_columns,
+    columns::{self, state_columns},
     map::{CameraName, ImageKey, PolicyMap, PromptForm, ROBOT, Scope, Words},
-    observation::{PolicyObservation, RobotObservation},
     picture,
     values::{Array, Elements, RequestValue},
 };
@@ -17,6 +24,49 @@ pub struct TaskInstructions {
     pub per_robot: Vec<String>,
     /// What they have to do together.
     pub joint: String,
+}
+
+/// What a policy may be shown of one moment.
+pub struct PolicyObservation {
+    /// By robot, in the task's order.
+    pub robots: Vec<RobotInputs>,
+    /// The room, where the policy is shown it.
+    pub third_person: Option<Arc<Picture>>,
+}
+
+/// What one robot sees and senses.
+pub struct RobotInputs {
+    pub picture: Arc<Picture>,
+    /// Numbers in the order of [`columns::state_values`].
+    pub state_values: Vec<f64>,
+}
+
+/// Size of pictures that nobody has taken.
+const WIDTH_PX: u32 = 320;
+const HEIGHT_PX: u32 = 240;
+
+impl PolicyObservation {
+    /// Looks through all robots, and at the room where that is wanted.
+    pub fn take(episode: &mut dyn Onlooker, third_person: bool) -> Result<PolicyObservation, PlayerError> {
+        let seen = episode.observe(&Observe { robots: None, short: Some(true) })?;
+        let inputs = seen.robots.iter().map(|robot| RobotInputs {
+            picture: robot.view.picture.clone(),
+            state_values: columns::state_values(&robot.state),
+        });
+        let third_person = third_person.then(|| episode.third_person().into());
+        Ok(PolicyObservation { robots: inputs.collect(), third_person })
+    }
+
+    /// Black pictures and zeros, of the right sizes, to try a policy with before an episode begins.
+    pub fn blank(robots: usize) -> PolicyObservation {
+        let black = vec![0; (3 * WIDTH_PX * HEIGHT_PX) as usize];
+        let picture = Arc::new(Picture::new(WIDTH_PX, HEIGHT_PX, black));
+        let inputs = || RobotInputs { picture: picture.clone(), state_values: columns::blank_state_values() };
+        PolicyObservation {
+            robots: (0..robots).map(|_| inputs()).collect(),
+            third_person: Some(picture.clone()),
+        }
+    }
 }
 
 /// The request for robot number `robot`, or for all of them.
@@ -68,7 +118,7 @@ fn of_robots<'a>(
     instructions: &TaskInstructions,
     observation: &'a PolicyObservation,
     robot: Option<usize>,
-) -> Vec<(String, &'a RobotObservation)> {
+) -> Vec<(String, &'a RobotInputs)> {
     let named = |index: usize| (key.replace(ROBOT, &instructions.robots[index]), &observation.robots[index]);
     match (map.scope, key.contains(ROBOT)) {
         (Scope::Global, true) => (0..instructions.robots.len()).map(named).collect(),
@@ -76,10 +126,9 @@ fn of_robots<'a>(
     }
 }
 
-fn pixels(picture: &image::RgbImage, image: &ImageKey, map: &PolicyMap) -> RequestValue {
-    let size_px = image.size.unwrap_or([picture.width(), picture.height()]);
-    let fitted = picture::fitted(picture, size_px, image.fit);
-    RequestValue::Array(with_leading_axes(picture::array(&fitted, image.layout), map))
+fn pixels(picture: &Picture, image: &ImageKey, map: &PolicyMap) -> RequestValue {
+    let size_px = image.size.unwrap_or([picture.width, picture.height]);
+    RequestValue::Array(with_leading_axes(picture::array(picture, size_px, image.fit, image.layout), map))
 }
 
 fn with_leading_axes(array: Array, map: &PolicyMap) -> Array {

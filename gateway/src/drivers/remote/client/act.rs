@@ -2,6 +2,8 @@
 
 use std::{io, time::Duration};
 
+use base64::{Engine, prelude::BASE64_STANDARD};
+use serde_json::{Value, json};
 use ureq::{Agent, http::Response};
 
 use super::PolicyClient;
@@ -62,10 +64,10 @@ impl PolicyClient for Act {
 }
 
 /// As JSON, with arrays as the Python package `json_numpy` writes them: `{"__numpy__": base64, "dtype": "<f4", "shape": [2, 3]}`.
-fn to_json(sent: &RequestValue) -> Value {
-    match sent {
+fn to_json(request: &RequestValue) -> Value {
+    match request {
         RequestValue::Map(entries) => {
-            entries.iter().map(|(key, sent)| (key.clone(), to_json(sent))).collect()
+            entries.iter().map(|(key, request)| (key.clone(), to_json(request))).collect()
         }
         RequestValue::Array(array) => json!({
             "__numpy__": BASE64_STANDARD.encode(array.bytes()),
@@ -110,11 +112,11 @@ mod tests {
     #[test]
     fn arrays_are_written_and_read_as_json_numpy_does() {
         let array = Array { shape: vec![1, 2], elements: Elements::Floats(vec![1.5, -2.0]) };
-        let sent = RequestValue::Map(vec![
+        let request = RequestValue::Map(vec![
             ("x".into(), RequestValue::Array(array)),
             ("y".into(), RequestValue::Texts(vec!["z".into()])),
         ]);
-        let value = to_json(&sent);
+        let value = to_json(&request);
         // json_numpy.dumps(np.float32([[1.5, -2]]))
         let known = json!({ "__numpy__": "AADAPwAAAMA=", "dtype": "<f4", "shape": [1, 2] });
         assert_eq!(value, json!({ "x": known, "y": ["z"] }));

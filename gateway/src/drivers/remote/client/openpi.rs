@@ -6,12 +6,13 @@ use std::{
     time::{Duration, Instant},
 };
 
+use rmpv::{Value, decode, encode};
 use tungstenite::{Error, HandshakeError, Message, WebSocket, error::ProtocolError};
 
 use super::{PolicyClient, PolicyProtocol};
 use crate::drivers::remote::{
     error::{RemoteError, gist},
-    values::{ReplyValue, RequestValue},
+    values::{Array, ReplyValue, RequestValue},
 };
 
 /// A connection to one server.
@@ -141,18 +142,18 @@ impl Write for DeadlineStream {
 
 /// As msgpack, with arrays as openpi-client's `msgpack_numpy` writes them: a map of `__ndarray__`, `data`, `dtype` and `shape`, whose
 /// keys are bytes.
-fn to_msgpack(sent: &RequestValue) -> Vec<u8> {
+fn to_msgpack(request: &RequestValue) -> Vec<u8> {
     let mut bytes = Vec::new();
     // Nothing fails to be written into memory.
-    let _ = encode::write_value(&mut bytes, &value(sent));
+    let _ = encode::write_value(&mut bytes, &msgpack_value(request));
     bytes
 }
 
-fn value(sent: &RequestValue) -> Value {
-    match sent {
-        RequestValue::Map(entries) => {
-            Value::Map(entries.iter().map(|(key, sent)| (key.as_str().into(), value(sent))).collect())
-        }
+fn msgpack_value(request: &RequestValue) -> Value {
+    match request {
+        RequestValue::Map(entries) => Value::Map(
+            entries.iter().map(|(key, request)| (key.as_str().into(), msgpack_value(request))).collect(),
+        ),
         RequestValue::Array(array) => ndarray(array),
         RequestValue::Text(text) => text.as_str().into(),
         RequestValue::Texts(texts) => Value::Array(texts.iter().map(|text| text.as_str().into()).collect()),
@@ -255,11 +256,11 @@ mod tests {
     #[test]
     fn requests_read_back_as_they_were() {
         let array = Array { shape: vec![1, 2], elements: Elements::Bytes(vec![7, 200]) };
-        let sent = RequestValue::Map(vec![
+        let request = RequestValue::Map(vec![
             ("x".into(), RequestValue::Array(array)),
             ("y".into(), RequestValue::Text("z".into())),
         ]);
-        let bytes = to_msgpack(&sent);
+        let bytes = to_msgpack(&request);
         let reply = from_msgpack(&bytes).unwrap();
         assert_eq!(reply.at("x"), Some(&ReplyValue::Array { shape: vec![1, 2], values: vec![7.0, 200.0] }));
         assert_eq!(reply.at("y"), Some(&ReplyValue::Text("z".into())));

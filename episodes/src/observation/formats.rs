@@ -1,29 +1,35 @@
-//! Pictures as programs ask for them: raw colours, and depth at every pixel.
+//! Views as programs ask for them: raw colours, and depth at every pixel.
 
-use tandem_sim::render::{Frame, PictureError, encode_depth_png};
+use tandem_sim::render::{PictureError, encode_depth_png};
 use tandem_tools_spec::{Bytes, CameraArrays, DepthFormat, Formats, ImageFormat, Protocol};
 
+use super::RobotView;
 use crate::EpisodeError;
 
 /// Whether a protocol allows these formats: agents measure depth at pixels that they choose, which is part of their task.
-pub fn allowed(formats: &Formats, protocol: Protocol) -> Result<(), EpisodeError> {
+pub fn check_formats(formats: &Formats, protocol: Protocol) -> Result<(), EpisodeError> {
     match (formats.depth, protocol) {
         (Some(_), Protocol::Agentic) => Err(EpisodeError::DepthImage { protocol: protocol.name() }),
         (Some(_), Protocol::Benchmark) | (None, _) => Ok(()),
     }
 }
 
-/// What of `frame`, which the camera of `robot` saw, is asked for besides a PNG; `None` where nothing is.
-pub fn arrays(robot: &str, frame: &Frame, formats: &Formats) -> Result<Option<CameraArrays>, PictureError> {
-    let rgb = (formats.images == Some(ImageFormat::Rgb)).then(|| Bytes(frame.rgb.clone()));
+/// What is asked for besides a PNG of a view through the camera of `robot`; `None` where nothing is.
+pub fn arrays(
+    robot: &str,
+    view: &RobotView,
+    formats: &Formats,
+) -> Result<Option<CameraArrays>, PictureError> {
+    let RobotView { picture, depth_m, .. } = view;
+    let rgb = (formats.images == Some(ImageFormat::Rgb)).then(|| Bytes(picture.rgb.clone()));
     let (mut depth_float16, mut depth_png16) = (None, None);
     match formats.depth {
         Some(DepthFormat::Float16) => {
-            let halves = frame.depth_m.iter().map(|depth_m| half_bits(*depth_m));
+            let halves = depth_m.iter().map(|depth_m| half_bits(*depth_m));
             depth_float16 = Some(Bytes(halves.flat_map(u16::to_le_bytes).collect()));
         }
         Some(DepthFormat::Png16) => {
-            depth_png16 = Some(Bytes(encode_depth_png(frame.width, frame.height, &frame.depth_m)?));
+            depth_png16 = Some(Bytes(encode_depth_png(picture.width, picture.height, depth_m)?));
         }
         None => {}
     }
@@ -46,6 +52,9 @@ fn half_bits(value: f32) -> u16 {
 
 #[cfg(test)]
 mod tests {
+    use tandem_sim::Pose;
+    use tandem_sim::render::{Camera, Frame};
+
     use super::*;
 
     /// As `numpy.float16(x).view(numpy.uint16)` has them.
@@ -72,6 +81,7 @@ mod tests {
 
     #[test]
     fn only_what_is_asked_for_comes() {
+        let camera = Camera { world_from_camera: Pose::IDENTITY, vertical_fov_rad: 1.0, width: 2, height: 1 };
         let frame = Frame {
             width: 2,
             height: 1,
@@ -79,7 +89,8 @@ mod tests {
             depth_m: vec![1.5, f32::INFINITY],
             ids: vec![0; 2],
         };
-        let of = |images, depth| arrays("A", &frame, &Formats { images, depth }).unwrap();
+        let view = RobotView::new(camera, frame);
+        let of = |images, depth| arrays("A", &view, &Formats { images, depth }).unwrap();
         assert_eq!(of(None, None), None);
         assert_eq!(of(Some(ImageFormat::Png), None), None);
         let all = of(Some(ImageFormat::Rgb), Some(DepthFormat::Float16)).unwrap();
@@ -92,9 +103,9 @@ mod tests {
     #[test]
     fn agents_get_no_depth_images() {
         let depth = Formats { images: None, depth: Some(DepthFormat::Float16) };
-        let refused = allowed(&depth, Protocol::Agentic).unwrap_err().to_string();
+        let refused = check_formats(&depth, Protocol::Agentic).unwrap_err().to_string();
         assert!(refused.contains("query_depth") && refused.contains("benchmark"), "{refused}");
-        assert!(allowed(&depth, Protocol::Benchmark).is_ok());
-        assert!(allowed(&Formats::default(), Protocol::Agentic).is_ok());
+        assert!(check_formats(&depth, Protocol::Benchmark).is_ok());
+        assert!(check_formats(&Formats::default(), Protocol::Agentic).is_ok());
     }
 }

@@ -1,4 +1,4 @@
-//! What a robot measures of itself, and its camera's calibration, as replies.
+//! What a robot senses of itself, and its camera's calibration, as replies have them.
 
 use tandem_sim::render::{Camera, Intrinsics};
 use tandem_sim::{Step, Vector};

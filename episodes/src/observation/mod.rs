@@ -1,0 +1,96 @@
+//! What the robots of an episode see and sense at one moment. A view is drawn once for a step and a robot, and encoded only where it
+//! leaves the process: in a reply or in the recording.
+
+mod formats;
+mod observer;
+mod proprioception;
+
+use std::sync::{Arc, OnceLock};
+
+use tandem_sim::render::{Camera, Frame, PictureError, encode_png};
+use tandem_tools_spec::{CameraCalibration, CameraImage, Formats, ImageFormat, Observation, Png, RobotState};
+
+pub use formats::check_formats;
+pub use observer::Observer;
+pub use proprioception::{Detail, robot_state};
+
+/// What several robots see and sense at the same moment.
+#[derive(Clone, Debug)]
+pub struct TeamObservation {
+    pub time_s: f64,
+    pub robots: Vec<RobotObservation>,
+}
+
+/// What one robot sees and senses.
+#[derive(Clone, Debug)]
+pub struct RobotObservation {
+    pub state: RobotState,
+    pub calibration: CameraCalibration,
+    pub view: Arc<RobotView>,
+}
+
+/// What the camera in a robot's head sees.
+#[derive(Debug)]
+pub struct RobotView {
+    pub camera: Camera,
+    /// The recording may still need it when the rest of the view is gone.
+    pub picture: Arc<Picture>,
+    /// As [`Frame::depth_m`].
+    pub depth_m: Vec<f32>,
+    /// As [`Frame::ids`].
+    pub ids: Vec<u32>,
+}
+
+/// The colours of a frame, and its PNG file once somebody has asked for that.
+#[derive(Debug)]
+pub struct Picture {
+    pub width: u32,
+    pub height: u32,
+    /// Three bytes a pixel, sRGB.
+    pub rgb: Vec<u8>,
+    png: OnceLock<Vec<u8>>,
+}
+
+impl Picture {
+    pub fn new(width: u32, height: u32, rgb: Vec<u8>) -> Picture {
+        Picture { width, height, rgb, png: OnceLock::new() }
+    }
+
+    /// The picture as a PNG file, encoded the first time only.
+    pub fn png(&self) -> Result<&[u8], PictureError> {
+        if let Some(png) = self.png.get() {
+            return Ok(png);
+        }
+        let png = encode_png(self.width, self.height, &self.rgb)?;
+        Ok(self.png.get_or_init(|| png))
+    }
+}
+
+impl RobotView {
+    pub fn new(camera: Camera, frame: Frame) -> RobotView {
+        let Frame { width, height, rgb, depth_m, ids } = frame;
+        RobotView { camera, picture: Picture::new(width, height, rgb).into(), depth_m, ids }
+    }
+}
+
+impl TeamObservation {
+    /// The reply to `observe`, with pictures in the formats that were asked for.
+    pub fn reply(&self, formats: &Formats) -> Result<Observation, PictureError> {
+        let mut images = Vec::new();
+        let mut arrays = Vec::new();
+        for RobotObservation { state, view, .. } in &self.robots {
+            if formats.images != Some(ImageFormat::Rgb) {
+                let png_base64 = Png(view.picture.png()?.to_vec());
+                images.push(CameraImage { robot: state.robot.clone(), png_base64 });
+            }
+            arrays.extend(formats::arrays(&state.robot, view, formats)?);
+        }
+        Ok(Observation {
+            time_s: self.time_s,
+            states: self.robots.iter().map(|robot| robot.state.clone()).collect(),
+            cameras: self.robots.iter().map(|robot| robot.calibration.clone()).collect(),
+            images,
+            arrays,
+        })
+    }
+}

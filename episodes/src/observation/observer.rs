@@ -1,0 +1,115 @@
+//! Who looks at the world of an episode: draws what its cameras see, and measures depth at pixels.
+
+use std::sync::Arc;
+
+use tandem_sim::render::{Camera, Cameras, Frame, Renderer, RendererKind, Scenery};
+use tandem_sim::{Step, World};
+use tandem_tools_spec::{DepthPoint, DepthReply};
+
+use super::proprioception::{Detail, calibration, robot_state};
+use super::{Picture, RobotObservation, RobotView, TeamObservation};
+use crate::EpisodeError;
+use crate::commands::RobotSheet;
+use crate::convert::{rounded, wire_vector};
+
+/// Draws what the cameras of one world see.
+pub struct Observer {
+    renderer: Box<dyn Renderer>,
+    pub cameras: Cameras,
+    drawn: Option<DrawnStep>,
+}
+
+/// The views that have been drawn of the latest step that somebody looked at.
+struct DrawnStep {
+    /// Held, so that no other step can have its address.
+    step: Arc<Step>,
+    /// By robot.
+    views: Vec<Option<Arc<RobotView>>>,
+}
+
+impl Observer {
+    pub fn new(kind: RendererKind, world: &World) -> Observer {
+        Observer { renderer: kind.renderer(Scenery::of(world)), cameras: Cameras::of(world), drawn: None }
+    }
+
+    /// Who draws.
+    pub fn renderer(&self) -> &str {
+        self.renderer.name()
+    }
+
+    /// What any camera sees after `step`.
+    pub fn render(&mut self, step: &Step, camera: &Camera) -> Frame {
+        self.renderer.render(step, camera)
+    }
+
+    /// What robot number `robot` sees after `step`; drawn the first time only.
+    pub fn view(&mut self, step: &Arc<Step>, robot: usize) -> Arc<RobotView> {
+        let mut drawn = match self.drawn.take() {
+            Some(drawn) if Arc::ptr_eq(&drawn.step, step) => drawn,
+            _ => DrawnStep { step: step.clone(), views: vec![None; step.robots.len()] },
+        };
+        let view = drawn.views[robot].get_or_insert_with(|| {
+            let camera = self.cameras.egocentric(step, robot);
+            Arc::new(RobotView::new(camera, self.renderer.render(step, &camera)))
+        });
+        let view = view.clone();
+        self.drawn = Some(drawn);
+        view
+    }
+
+    /// What the robots numbered `robots` see and sense after `step`; `sheets` describe all robots.
+    pub fn observe(
+        &mut self,
+        step: &Arc<Step>,
+        robots: &[usize],
+        sheets: &[&RobotSheet],
+        detail: Detail,
+    ) -> TeamObservation {
+        let mut observe = |robot: usize| {
+            let view = self.view(step, robot);
+            RobotObservation {
+                state: robot_state(step, robot, sheets[robot], detail),
+                calibration: calibration(step, robot, &sheets[robot].name, &view.camera),
+                view,
+            }
+        };
+        TeamObservation { time_s: step.time_s, robots: robots.iter().map(|robot| observe(*robot)).collect() }
+    }
+
+    /// The reply to `query_depth` for robot number `robot`, called `name`.
+    pub fn depth(
+        &mut self,
+        step: &Arc<Step>,
+        robot: usize,
+        name: &str,
+        pixels: &[[i64; 2]],
+    ) -> Result<DepthReply, EpisodeError> {
+        let Camera { width, height, .. } = self.cameras.egocentric(step, robot);
+        let outside = |[u, v]: [i64; 2]| u < 0 || v < 0 || u >= width.into() || v >= height.into();
+        if let Some([u, v]) = pixels.iter().copied().find(|pixel| outside(*pixel)) {
+            return Err(EpisodeError::PixelOutside { u, v, width, height });
+        }
+        let view = self.view(step, robot);
+        let pelvis_from_camera = step.robots[robot].state.pelvis_from_camera;
+        let points = pixels.iter().map(|&pixel| {
+            let [u, v] = pixel;
+            let depth_m = view.depth_m[v as usize * width as usize + u as usize];
+            let seen = depth_m.is_finite();
+            let point_m =
+                pelvis_from_camera * view.camera.unproject([u as f32 + 0.5, v as f32 + 0.5], depth_m);
+            DepthPoint {
+                pixel,
+                depth_m: seen.then_some(rounded(depth_m.into())),
+                point_in_pelvis_m: seen.then_some(wire_vector(point_m)),
+            }
+        });
+        Ok(DepthReply { robot: name.into(), points: points.collect() })
+    }
+
+    /// What the scene's camera sees that sees all robots.
+    pub fn third_person(&mut self, step: &Step) -> Picture {
+        let camera = self.cameras.third_person();
+        let Frame { width, height, rgb, .. } = self.render(step, &camera);
+        Picture::new(width, height, rgb)
+    }
+}
