@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tandem_episodes::{
     Picture,
-    players::{Onlooker, PlayerError},
+    players::{LocalEpisode, PlayerError},
 };
 use tandem_tools_spec::Observe;
 
@@ -47,7 +47,10 @@ const HEIGHT_PX: u32 = 240;
 
 impl PolicyObservation {
     /// Looks through all robots, and at the room where that is wanted.
-    pub fn take(episode: &mut dyn Onlooker, third_person: bool) -> Result<PolicyObservation, PlayerError> {
+    pub fn take(
+        episode: &mut dyn LocalEpisode,
+        third_person: bool,
+    ) -> Result<PolicyObservation, PlayerError> {
         let seen = episode.observe(&Observe { robots: None, short: Some(true) })?;
         let inputs = seen.robots.iter().map(|robot| RobotInputs {
             picture: robot.view.picture.clone(),
