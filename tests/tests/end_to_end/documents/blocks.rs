@@ -1,0 +1,116 @@
+//! Every block of code says what becomes of it, and what is no command is what it says it is.
+
+use std::{fs, process::Command};
+
+use serde_json::Value;
+use tandem::{
+    drivers::PolicyMap,
+    settings::{Layer, Settings},
+};
+
+use super::{
+    command_lines,
+    pages::{Block, Page, pages, root},
+    scripts,
+};
+
+/// The scene that `xml,scene` shows.
+const SCENE: &str = "episodes/tests/scenes/kitchen/handover.xml";
+
+#[test]
+fn every_block_of_code_is_what_its_fence_says() {
+    let mut wrong = Vec::new();
+    for page in pages() {
+        for block in page.blocks() {
+            if let Err(reason) = check(&block) {
+                wrong.push(format!("{}: {reason}", page.at(block.line)));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Whether a block that nobody runs is right. Scripts and bodies of tools have tests of their own.
+fn check(block: &Block) -> Result<(), String> {
+    match (block.language.as_str(), block.purpose.as_str()) {
+        ("sh", "run") => Ok(()),
+        ("sh", "check") => command_lines::check(&block.text),
+        ("yaml", "") => command_lines::check_args(&block.text),
+        ("json", _) => {
+            serde_json::from_str::<Value>(&block.text).map(drop).map_err(|error| error.to_string())
+        }
+        ("toml", "map") => {
+            in_a_file(block, |path| PolicyMap::find(path).map(drop).map_err(|error| error.to_string()))
+        }
+        ("toml", "settings") => in_a_file(block, |path| {
+            let settings = Settings::resolve(Layer::default(), Some(path.as_ref()));
+            settings.map(drop).map_err(|error| error.to_string())
+        }),
+        ("python", "" | "run") => compile(block),
+        ("xml", "") => parse_xml(&block.text),
+        ("xml", "scene") => is_scene(block),
+        ("text", "") => Ok(()),
+        (language, purpose) => {
+            Err(format!("no fence {language:?} with {purpose:?}; see documents/mod.rs for those there are"))
+        }
+    }
+}
+
+/// Gives `read` a file with the block's text.
+fn in_a_file(block: &Block, read: impl Fn(&str) -> Result<(), String>) -> Result<(), String> {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join(format!("block.{}", block.language));
+    fs::write(&path, &block.text).expect("a file in a temporary folder");
+    read(path.to_str().expect("a path of ours"))
+}
+
+/// Whether Python reads it; without Python nobody knows.
+fn compile(block: &Block) -> Result<(), String> {
+    if !scripts::is_installed("python3") {
+        println!("skipped: no python3 to compile a block with");
+        return Ok(());
+    }
+    in_a_file(block, |path| {
+        let compiled = Command::new("python3").args(["-m", "py_compile", path]).output();
+        let compiled = compiled.map_err(|error| error.to_string())?;
+        match compiled.status.success() {
+            true => Ok(()),
+            false => Err(String::from_utf8_lossy(&compiled.stderr).into_owned()),
+        }
+    })
+}
+
+/// Parts of a document have no single root, so they are given one.
+fn parse_xml(text: &str) -> Result<(), String> {
+    roxmltree::Document::parse(&format!("<block>{text}</block>")).map(drop).map_err(|error| error.to_string())
+}
+
+fn is_scene(block: &Block) -> Result<(), String> {
+    let scene = fs::read_to_string(root().join(SCENE)).map_err(|error| error.to_string())?;
+    match words(&scene) == words(&block.text) {
+        true => Ok(()),
+        false => Err(format!("it is not what {SCENE} says")),
+    }
+}
+
+fn words(text: &str) -> Vec<&str> {
+    text.split_whitespace().collect()
+}
+
+#[test]
+fn blocks_are_found_with_what_their_fences_say() {
+    let text = "a\n```sh,run\ntandem tasks\n```\nb `c` d\n```\nx\n```\n";
+    let page = Page { path: "a.md".into(), text: text.into() };
+    let blocks: Vec<_> = page
+        .blocks()
+        .into_iter()
+        .map(|block| (block.language, block.purpose, block.text, block.line))
+        .collect();
+    let [one, two] = [("sh", "run", "tandem tasks\n", 2), ("", "", "x\n", 6)];
+    let owned = |(language, purpose, text, line): (&str, &str, &str, usize)| {
+        (language.to_owned(), purpose.to_owned(), text.to_owned(), line)
+    };
+    assert_eq!(blocks, [owned(one), owned(two)]);
+    assert_eq!(page.prose(), [(1, "a".to_owned()), (5, "b ` d".to_owned())]);
+    assert!(check(&page.blocks()[1]).is_err(), "a block has to say what it is");
+}

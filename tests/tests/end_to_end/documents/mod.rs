@@ -1,0 +1,23 @@
+//! README and the book in `docs/` are true: their commands run or are at least accepted, their bodies are answered, their links lead
+//! somewhere, and their tables say what the code says.
+//!
+//! Every block of code says in its fence what becomes of it here:
+//!
+//! | fence | what happens |
+//! |---|---|
+//! | `sh,run` | all such blocks of a page are one script, run beside a server of its own |
+//! | `sh,check` | the command line accepts every `tandem`, and files, packages and tests that other commands name are there |
+//! | `json` | parses; `json,tool=NAME` and `json,start` are sent to a server, `json,instructions` is read by one |
+//! | `toml,map`, `toml,settings` | read as a policy map, as settings |
+//! | `python` | compiles; `python,run` is run where its packages are installed |
+//! | `xml` | parses; `xml,scene` is the scene that a test plays in |
+//! | `yaml` | its `args` are accepted by the command line |
+//! | `text` | nothing: it is no command |
+
+mod blocks;
+mod bodies;
+mod command_lines;
+mod links;
+mod pages;
+mod scripts;
+mod tables;

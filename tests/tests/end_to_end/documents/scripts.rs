@@ -1,0 +1,160 @@
+//! Scripts of pages are run: all `sh,run` of a page as one script, beside a server of its own, in a folder of its own.
+//!
+//! In front of the programs that are installed stand `tandem`, which is this very program again, `cargo`, which runs it, and `curl`, which
+//! takes a refusal for a failure.
+
+use std::{
+    env, fs,
+    os::unix::fs::{PermissionsExt, symlink},
+    path::Path,
+    process::{Command, Output, exit},
+    thread,
+    time::Instant,
+};
+
+use clap::Parser;
+use tandem::cli::Cli;
+use tandem_tests::TestServer;
+
+use super::pages::{Page, pages, root};
+
+/// Where pages say that a server is.
+const ADDRESS: &str = "127.0.0.1:8700";
+
+/// The arguments of `tandem`, one a line, where this program is to be it.
+const ARGUMENTS: &str = "TANDEM_DOCUMENTS_ARGUMENTS";
+
+/// The test that is `tandem` then.
+const AS_TANDEM: &str = "documents::scripts::this_program_is_tandem_where_a_script_calls_it";
+
+/// A policy for the loop that a page shows: it does not move.
+const POLICY: &str = "import numpy as np
+def policy(image, state):
+    return np.tile([0.0] * 34 + [0.75], (20, 1))
+";
+
+#[test]
+fn scripts_of_pages_run() {
+    if !is_installed("curl") {
+        println!("skipped: no curl");
+        return;
+    }
+    thread::scope(|scope| {
+        for page in pages() {
+            let script = script(&page, "sh");
+            if !script.is_empty() {
+                scope.spawn(move || run_script(&page, &script));
+            }
+        }
+    });
+}
+
+#[test]
+fn loops_in_python_run() {
+    for page in pages() {
+        let script = script(&page, "python");
+        if script.is_empty() {
+            continue;
+        }
+        let imports: String =
+            script.lines().filter(|line| line.starts_with("import ")).collect::<Vec<_>>().join("\n");
+        if !is_installed("python3") || !succeeds(Command::new("python3").args(["-c", &imports])) {
+            println!("skipped: no python3, or not what {} asks for: {imports}", page.path.display());
+            continue;
+        }
+        let server = TestServer::start();
+        let script = format!("{POLICY}{}", script.replace(ADDRESS, &server.address.to_string()));
+        expect_success(&page, Command::new("python3").args(["-c", &script]).output());
+    }
+}
+
+#[test]
+fn this_program_is_tandem_where_a_script_calls_it() {
+    let Ok(arguments) = env::var(ARGUMENTS) else { return };
+    let cli = Cli::try_parse_from(["tandem"].into_iter().chain(arguments.lines()));
+    let outcome = cli.unwrap_or_else(|error| error.exit()).run();
+    let code = match outcome {
+        Ok(code) if code == std::process::ExitCode::SUCCESS => 0,
+        Ok(_) => 1,
+        Err(error) => {
+            eprintln!("tandem: {error}");
+            1
+        }
+    };
+    exit(code);
+}
+
+/// Whether a program can be called.
+pub fn is_installed(program: &str) -> bool {
+    succeeds(Command::new(program).arg("--version"))
+}
+
+fn succeeds(command: &mut Command) -> bool {
+    command.output().is_ok_and(|output| output.status.success())
+}
+
+/// All blocks of a page in one language that are to be run, as one text.
+fn script(page: &Page, language: &str) -> String {
+    let blocks =
+        page.blocks().into_iter().filter(|block| block.language == language && block.purpose == "run");
+    blocks.map(|block| block.text).collect()
+}
+
+fn run_script(page: &Page, script: &str) {
+    if script.contains("python3 ") && !is_installed("python3") {
+        println!("skipped: no python3 for {}", page.path.display());
+        return;
+    }
+    let began = Instant::now();
+    let server = TestServer::start();
+    let folder = workplace();
+    let path = format!("{}/bin:{}", folder.path().display(), env::var("PATH").unwrap_or_default());
+    let script = script.replace(ADDRESS, &server.address.to_string());
+    let mut shell = Command::new("sh");
+    shell.args(["-euc", &script]).current_dir(folder.path()).env("PATH", path);
+    expect_success(page, shell.output());
+    println!("{}: {:.1} s", page.path.display(), began.elapsed().as_secs_f64());
+}
+
+#[track_caller]
+fn expect_success(page: &Page, output: std::io::Result<Output>) {
+    let output = output.expect("a program that is installed");
+    let [told, failed] =
+        [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+    let end = told.len().saturating_sub(2000);
+    let told = told.get(end..).unwrap_or(&told);
+    assert!(output.status.success(), "{}: {}\n{failed}\n{told}", page.path.display(), output.status);
+}
+
+/// A folder in which the repository's folders can be named, with programs of ours in `bin`.
+fn workplace() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for name in ["episodes", "gateway", "sim", "tests"] {
+        symlink(root().join(name), folder.path().join(name)).expect("a link in a temporary folder");
+    }
+    let bin = folder.path().join("bin");
+    fs::create_dir(&bin).expect("a folder in a temporary folder");
+    let own = env::current_exe().expect("this program");
+    let tandem = format!(
+        "{ARGUMENTS}=$(printf '%s\\n' \"$@\") exec '{}' --exact {AS_TANDEM} --nocapture --quiet",
+        own.display()
+    );
+    write_program(&bin, "tandem", &tandem);
+    write_program(&bin, "cargo", "[ \"$1 $2 $3\" = 'run --release --' ] && shift 3 && exec tandem \"$@\"");
+    let curl = format!("exec '{}' --fail-with-body --max-time 100 \"$@\"", installed_path("curl"));
+    write_program(&bin, "curl", &curl);
+    folder
+}
+
+fn write_program(bin: &Path, name: &str, line: &str) {
+    let path = bin.join(name);
+    fs::write(&path, format!("#!/bin/sh\n{line}\n")).expect("a program in a temporary folder");
+    fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).expect("a program that may be run");
+}
+
+/// Where a program lies that is installed.
+fn installed_path(program: &str) -> String {
+    let found = Command::new("sh").args(["-c", &format!("command -v {program}")]).output();
+    let found = found.expect("a shell").stdout;
+    String::from_utf8_lossy(&found).trim().to_owned()
+}
