@@ -340,7 +340,7 @@ fn texts(value: &serde_json::Value, found: &mut Vec<String>) {
     }
 }
 
-/// The layout that README has people open in Foxglove shows what recordings hold.
+/// The layout that the book has people open in Foxglove shows what recordings hold.
 #[test]
 fn the_layout_names_topics_and_fields_that_there_are() {
     let folder = tempfile::tempdir().unwrap();

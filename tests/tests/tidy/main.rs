@@ -2,12 +2,12 @@
 
 mod circles;
 mod crates;
+mod extending;
 mod functions;
 mod lengths;
 mod modules;
 mod order;
 mod paths;
-mod readme_steps;
 mod sources;
 mod text;
 mod units;

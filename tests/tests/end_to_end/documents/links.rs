@@ -66,6 +66,29 @@ fn links_lead_somewhere() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// Whether a word in backticks is a path of this repository. Those of what evaluations write have parts in capitals.
+fn is_own_path(word: &str) -> bool {
+    let folders = ["docs/", "episodes/", "gateway/", "ik/", "sim/", "tests/", "tools_spec/"];
+    let begins = folders.iter().any(|folder| word.starts_with(folder));
+    begins && !word.contains(' ') && !word.contains("TASK")
+}
+
+#[test]
+fn files_that_are_named_are_there() {
+    let mut wrong = Vec::new();
+    for page in all_documents() {
+        for (index, line) in page.text.lines().enumerate() {
+            for word in line.split('`').skip(1).step_by(2).filter(|word| is_own_path(word)) {
+                let known = word.split_once('*').map_or(word, |(folder, _)| folder);
+                if !root().join(known).exists() {
+                    wrong.push(format!("{}: there is no {word}", page.at(index + 1)));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
 #[test]
 fn every_page_is_in_the_table_of_contents_and_every_picture_on_a_page() {
     let contents = page(&format!("{BOOK}/{CONTENTS}"));

@@ -1,4 +1,5 @@
-//! What README says about adding something is true: beside its own file and its line in a list, no code has to be told.
+//! What the book says about adding something (`docs/src/extending.md`) is true: beside its own file and its line in a list, no
+//! code has to be told.
 //! A list that somebody keeps by hand would name everything in it, so no text in the code may be such a name.
 
 use std::path::Path;
@@ -14,9 +15,9 @@ use super::{
     sources::{below, expect_none},
 };
 
-/// Something that README says how to add.
+/// Something that the book says how to add.
 struct Step {
-    /// As README calls it.
+    /// As the book calls it.
     what: &'static str,
     /// Folder of the files.
     folder: &'static str,
@@ -140,7 +141,7 @@ fn name(path: &Path) -> String {
 }
 
 #[test]
-fn what_is_added_is_named_only_where_readme_says() {
+fn what_is_added_is_named_only_where_the_book_says() {
     let code: Vec<_> = CRATES.iter().flat_map(|member| modules(member)).collect();
     let code: Vec<_> = code.iter().map(|module| (&module.path, Texts::of(&module.items))).collect();
     let mut wrong = Vec::new();
@@ -151,7 +152,7 @@ fn what_is_added_is_named_only_where_readme_says() {
             .collect();
         assert!(
             !files.is_empty(),
-            "README's step for a {} is about {}: nothing there",
+            "the book's step for a {} is about {}: nothing there",
             step.what,
             step.folder
         );
@@ -170,7 +171,7 @@ fn what_is_added_is_named_only_where_readme_says() {
     }
     expect_none(
         &wrong,
-        "these have to be told of what README says can be added without them; read the list instead",
+        "these have to be told of what the book says can be added without them; read the list instead",
     );
 }
 
