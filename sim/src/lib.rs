@@ -1,7 +1,7 @@
 //! Physics of the robots and their rooms: MJCF loading, dynamics, balance control, cameras and renderers.
 //!
 //! Rooms, each knowing only those before it: [`dynamics`], [`mjcf`], [`body`], [`locomotion`], [`robot`], [`world`], then
-//! [`render`] and [`bench`].
+//! [`render`] and [`mod@bench`].
 //!
 //! Units are SI, z is up, frames are right-handed, quaternions are written `wxyz`. One [`World`] is stepped by one
 //! thread; the same binary, specification and commands give the same [`World::state_hash`], bit for bit.

@@ -116,7 +116,7 @@ impl Recording {
         Ok(steps.map(|message| message.map(|(_, message)| message.state())))
     }
 
-    /// The checkpoint of `what`: a phase's beginning, or [`super::BEGIN`]; `None` where there is none.
+    /// The checkpoint of `what`: a phase's beginning, or `BEGIN`; `None` where there is none.
     pub fn checkpoint(&self, what: &str) -> Result<Option<RecordedCheckpoint>, RecordingError> {
         let failed = |source| RecordingError::Mcap { path: self.path.clone(), source };
         let summary = mcap::Summary::read(&self.bytes).map_err(failed)?.unwrap_or_default();

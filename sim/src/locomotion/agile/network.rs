@@ -63,7 +63,7 @@ pub(super) struct Action {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct RecurrentState(pub(super) Vec<Vec<f32>>);
 
-/// A checked file, ready to run. Robots share it; what differs between them is [`RecurrentState`].
+/// A checked file, ready to run. Robots share it; what differs between them is `RecurrentState`.
 pub struct Network {
     name: String,
     model: Model,
