@@ -1,7 +1,7 @@
 //! FrameHang: two robots lift a large picture frame and hang its loop on a peg in the wall.
 //!
 //! Conditions, tolerances and randomisation are the benchmark's. Where it is silent we chose what two G1s carry: a frame of
-//! 0.90 x 0.95 m and 1 kg that waits upright in a rack on the floor, so that its sides are at hand height.
+//! 0.90 x 0.95 m and 2.6 kg that waits upright in a rack on the floor, so that its sides are at hand height.
 
 use std::f32::consts::FRAC_PI_2;
 
