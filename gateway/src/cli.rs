@@ -32,7 +32,7 @@ enum Command {
 }
 
 impl Cli {
-    /// Does what the command line says.
+    /// Runs the subcommand that the command line names.
     pub fn run(self) -> CommandResult {
         match self.command {
             Command::Serve(args) => serve::run(args),

@@ -1,7 +1,7 @@
 //! Tandem's gateway: episodes of the simulator behind HTTP, and the command line around it.
 //!
 //! One request: [`http`] reads it, [`hosting`] finds the episode and hands the typed call to the thread that owns its
-//! world, and `http/problem.rs` turns every refusal into RFC 9457 problem details.
+//! world, and `http/problem` turns every refusal into RFC 9457 problem details.
 
 pub mod cli;
 pub mod commands;
@@ -9,6 +9,5 @@ pub mod drivers;
 pub mod hosting;
 pub mod http;
 pub mod metrics;
-mod one_of;
 pub mod settings;
 pub mod token;

@@ -1,4 +1,4 @@
-//! The binary `tandem`: from the command line to what it names.
+//! The binary `tandem`: reads the command line and runs the subcommand that it names.
 
 use std::process::ExitCode;
 

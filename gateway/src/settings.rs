@@ -7,14 +7,16 @@ use std::{
     time::Duration,
 };
 
-use clap::{Args, ValueEnum};
+use clap::{
+    Args, ValueEnum,
+    builder::{PossibleValuesParser, TypedValueParser},
+};
 use serde::Deserialize;
 use tandem_episodes::{
     BaseLimits, Controller, Instructions, InstructionsError, RendererKind, SceneFile, SimError, Visibility,
 };
 use tandem_tools_spec::{Disclosure, Hints};
 
-use crate::one_of::one_of;
 use crate::token::{Token, TokenError};
 
 /// One source of settings; what it leaves out comes from the next. The doc comments are the help text.
@@ -178,10 +180,10 @@ pub enum SettingsError {
     /// The token cannot be used.
     #[error(transparent)]
     Token(#[from] TokenError),
-    /// There are two tokens.
+    /// A file and the environment both give a token.
     #[error("both --token-file and TANDEM_TOKEN give a token; give one of them")]
     TwoTokens,
-    /// Other machines would reach the server, and nothing keeps them out.
+    /// Other machines would reach a server without a token.
     #[error(
         "other machines reach {listen}; give a token that every request has to send, by --token-file FILE or in TANDEM_TOKEN (`openssl rand -hex 32` makes one), or listen on 127.0.0.1"
     )]
@@ -192,7 +194,7 @@ pub enum SettingsError {
     /// The file with instructions cannot be used.
     #[error(transparent)]
     Instructions(#[from] InstructionsError),
-    /// The scene, the policy for the robots' legs, or the renderer, cannot be used.
+    /// The scene, the base controller or the renderer cannot be used.
     #[error(transparent)]
     Sim(#[from] SimError),
     /// The file is no TOML, or holds a setting that does not exist.
@@ -260,6 +262,16 @@ fn token(layer: &Layer, listen: SocketAddr) -> Result<Option<Token>, SettingsErr
         return Err(SettingsError::Open { listen });
     }
     Ok(token)
+}
+
+/// Parses a flag whose value is one of `all` by its name; `--help` and the error for a wrong name list the names.
+pub fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
+    all: [T; N],
+    name: fn(T) -> &'static str,
+) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(all.map(name)).try_map(move |found: String| {
+        all.into_iter().find(|value| name(*value) == found).ok_or("not one of the names")
+    })
 }
 
 fn read_layer(path: &Path) -> Result<Layer, SettingsError> {

@@ -31,10 +31,10 @@ use crate::{
 
 const TASK: &str = "handover";
 const LAST_PHASE: &str = "p3";
-/// The system picks one.
+/// Has the system pick a free port.
 const FREE_PORT: u16 = 0;
 
-/// Of the episodes played, how many in a hundred have to reach the last phase.
+/// How many of a hundred episodes have to reach the last phase.
 const PASS_PERCENT: usize = 80;
 
 /// Play the Handover task by a scripted expert over real HTTP, and write what happened.
@@ -54,7 +54,7 @@ pub struct DemoArgs {
     renderer: RendererFlag,
 }
 
-/// Plays; it is a failure if too few episodes reach the last phase.
+/// Plays every seed. The program fails if too few episodes reach the last phase.
 pub fn run(args: DemoArgs) -> CommandResult {
     log_to_stderr(LevelFilter::WARN);
     let flags = Layer {
@@ -78,17 +78,17 @@ pub fn play_all(runs: &Path, seeds: Seeds, flags: Layer) -> Result<Vec<ResultRep
     let results = seeds.0.map(|seed| play(&server, seed)).collect::<Result<Vec<_>, _>>()?;
     server.stop();
     if results.len() > 1 {
-        println!("{LAST_PHASE} on {} of {}", placed(&results), results.len());
+        println!("{LAST_PHASE} on {} of {}", count_last_phase(&results), results.len());
     }
     Ok(results)
 }
 
 /// Whether the last phase was reached on 80 % of the episodes; of a single one, whether it was reached.
 pub fn passed(results: &[ResultReply]) -> bool {
-    placed(results) * 100 >= results.len() * PASS_PERCENT
+    count_last_phase(results) * 100 >= results.len() * PASS_PERCENT
 }
 
-fn placed(results: &[ResultReply]) -> usize {
+fn count_last_phase(results: &[ResultReply]) -> usize {
     results.iter().filter(|result| result.phases.reached_s(LAST_PHASE).is_some()).count()
 }
 
@@ -125,7 +125,7 @@ fn print_result(task: &Task, result: &ResultReply, folder: &Path) {
     println!("  {}: result.json, episode.mcap, strip.png, report.html", folder.display());
 }
 
-/// The expert's way to its episode: it acts over HTTP like any policy, and looks behind the curtain in this process.
+/// The expert's episode: the expert acts over HTTP like any policy, and reads the true state in this process.
 struct OverHttp {
     http: HttpEpisode,
     thread: Arc<EpisodeThread>,
@@ -150,7 +150,7 @@ impl PrivilegedEpisode for OverHttp {
     }
 }
 
-/// A bar that counts phases, because how many steps a phase takes is not known before.
+/// A progress bar that counts phases, because nobody knows beforehand how many steps a phase takes.
 struct Progress {
     bar: ProgressBar,
 }

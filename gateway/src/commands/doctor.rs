@@ -18,16 +18,16 @@ use crate::{
     token::Token,
 };
 
-/// Control steps that are tried.
+/// How many control steps the check of physics simulates.
 const TRIED_STEPS: u32 = 25;
-/// Slower than this, a call that asks for physics keeps its caller waiting longer than the robots would.
-const REAL_TIME: f64 = 1.0;
-/// No clock that is set right shows an earlier time than this program was written at: 2026.
-const WRITTEN: Duration = Duration::from_secs(1_767_225_600);
-/// Shares of a second that the clock has to tell apart, to time calls.
-const FINEST: Duration = Duration::from_millis(1);
-/// Fewer cores let episodes wait for each other.
-const CORES: usize = 2;
+/// Below this factor, a call that simulates takes longer than the motion of its robots.
+const MIN_REALTIME_FACTOR: f64 = 1.0;
+/// A clock that is set right shows no earlier time than 2026, when this program was written.
+const PROGRAM_DATE: Duration = Duration::from_secs(1_767_225_600);
+/// The coarsest tick of a clock that can time calls.
+const COARSEST_TICK: Duration = Duration::from_millis(1);
+/// With fewer cores, episodes wait for each other.
+const MIN_CORES: usize = 2;
 
 /// Say what works on this machine: pictures, physics, the port, the folder of recordings, clocks and cores.
 #[derive(Debug, clap::Args)]
@@ -37,10 +37,10 @@ pub struct DoctorArgs {
     flags: Layer,
 }
 
-/// What was found: a line, and where something is wrong, what to do.
+/// The result of a check: a line for people, or what is wrong and what to do.
 type Finding = Result<String, String>;
 
-/// Prints a line for each check. What does not work makes it a failure.
+/// Prints a line for each check. The program fails if anything does not work.
 pub fn run(args: DoctorArgs) -> CommandResult {
     let renderer = args.flags.renderer.unwrap_or_default();
     let settings = Settings::resolve(Layer { token: Token::from_environment()?, ..args.flags }, None)?;
@@ -63,7 +63,7 @@ pub fn run(args: DoctorArgs) -> CommandResult {
     Ok(if sound { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Plays half a second of the first task, and looks.
+/// Plays half a second of the first task, and draws what both robots see.
 fn physics(renderer: RendererKind) -> Finding {
     let play = || {
         let spec = EpisodeSpec { renderer, ..EpisodeSpec::new(&tasks::ALL[0], 0, Protocol::Benchmark) };
@@ -77,7 +77,7 @@ fn physics(renderer: RendererKind) -> Finding {
     let (factor, look) =
         play().map_err(|error: tandem_episodes::EpisodeError| format!("{error}; please report it"))?;
     let text = format!("{factor:.0} times real time, {} ms for a look of two robots", look.as_millis());
-    if factor < REAL_TIME {
+    if factor < MIN_REALTIME_FACTOR {
         return Err(format!("{text}; build with --release, and run fewer episodes at once"));
     }
     Ok(text)
@@ -99,7 +99,7 @@ fn runs(folder: &Path) -> Finding {
     let tried = create_private_folder(folder).and_then(|()| fs::write(&probe, "probe"));
     let cleared = fs::remove_file(&probe);
     if !there {
-        // What was not there before is not left behind; nor is it taken away where somebody has put something in.
+        // A folder that this check has made is removed again, unless somebody has put something in.
         let _ = fs::remove_dir(folder);
     }
     match tried.and(cleared) {
@@ -114,20 +114,20 @@ fn clock() -> Finding {
     while tick.is_zero() {
         tick = began.elapsed();
     }
-    if tick > FINEST {
+    if tick > COARSEST_TICK {
         return Err(format!("ticks every {tick:?}, too coarse to time calls; run on another machine"));
     }
     match SystemTime::now().duration_since(UNIX_EPOCH) {
-        Ok(now) if now >= WRITTEN => Ok(format!("ticks within {tick:?}, and its date can be")),
+        Ok(now) if now >= PROGRAM_DATE => Ok(format!("ticks within {tick:?}, and its date can be")),
         _ => Err("shows a time before 2026, and recordings name theirs; set the date".into()),
     }
 }
 
 fn cores() -> Finding {
     match available_parallelism() {
-        Ok(cores) if cores.get() < CORES => {
-            Err(format!("{cores}; give at least {CORES}, or run one episode at a time with --max-episodes 1"))
-        }
+        Ok(cores) if cores.get() < MIN_CORES => Err(format!(
+            "{cores}; give at least {MIN_CORES}, or run one episode at a time with --max-episodes 1"
+        )),
         Ok(cores) => Ok(format!("{cores}, as many episodes run at full speed")),
         Err(error) => Err(format!("not known: {error}; the program runs, as fast as it can")),
     }

@@ -22,7 +22,7 @@ use super::{
     logging::log_evaluation,
 };
 
-/// Notes on failures below the table.
+/// How many notes on failures are printed below the table.
 const NOTES_SHOWN: usize = 20;
 
 /// Play tasks over seeds in parallel worlds and count the phases reached. Goes on where an interrupted run stopped.
@@ -89,7 +89,7 @@ impl FromStr for ShardFlag {
     }
 }
 
-/// Plays and counts; it is a failure if of some episodes none could be begun.
+/// Plays and counts. The program fails if there are episodes to play and none could begin.
 pub fn run(args: EvaluateArgs) -> CommandResult {
     log_evaluation();
     let starts = match (args.demos, args.from) {
@@ -105,7 +105,7 @@ pub fn run(args: EvaluateArgs) -> CommandResult {
     })
 }
 
-/// Plays `plan` into `folder`, with a progress bar, prints a table, and says how many episodes were played.
+/// Plays `plan` into `folder` with a progress bar, prints a table, and returns how many episodes were played.
 pub fn play_and_print(plan: &EvaluationPlan, folder: &Path) -> Result<usize, Box<dyn Error>> {
     let bar = ProgressBar::new(plan.episodes().0.len() as u64);
     bar.set_style(ProgressStyle::with_template("  [{bar:30}] {pos} of {len} episodes, {elapsed}, {msg}")?);
@@ -150,7 +150,7 @@ fn print_table(evaluation: &Evaluation) {
     println!("rates in %, with exact 95 % intervals (Clopper-Pearson)");
 }
 
-/// Every phase on its own, and what working together costs.
+/// Prints how often each phase was reached from its own start, and how much lower the rate of collaborative phases is.
 fn print_phase_level(level: &PhaseLevel) {
     println!("{:14} {:>8}  {:>8}  {:^22}", "task", "from", "episodes", "reached");
     for phase in &level.phases {

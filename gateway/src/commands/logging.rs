@@ -40,7 +40,7 @@ fn install(default: Targets, format: LogFormat) {
         LogFormat::Text => lines.with_ansi(std::io::stderr().is_terminal()).boxed(),
         LogFormat::Json => lines.json().flatten_event(true).with_span_list(false).boxed(),
     };
-    // The library that speaks MCP has three lines for each of our own.
+    // The MCP library logs three lines for each line of this program.
     let usual = default.with_target("rmcp", LevelFilter::WARN);
     tracing_subscriber::registry().with(wanted.unwrap_or(usual)).with(lines).init();
 }

@@ -63,7 +63,7 @@ impl FromStr for SizeFlag {
     }
 }
 
-/// Does what the flags say with each recording; without any, says what it holds.
+/// Does with each recording what the flags say; without any flag, prints what it holds.
 pub fn run(args: ReplayArgs) -> CommandResult {
     if args.video.is_some() && args.recordings.len() > 1 {
         return Err("--video films one recording; give one".into());
@@ -108,7 +108,7 @@ fn describe(recording: &Recording) {
     }
 }
 
-/// Says how the recording compares; whether it is the same.
+/// Prints how the recording compares, and returns whether it is the same.
 fn print_verified(verified: &Verification) -> bool {
     if let Some(build) = &verified.other_build {
         println!(
@@ -146,7 +146,7 @@ fn print_verified(verified: &Verification) -> bool {
     }
 }
 
-/// Several recordings have a folder each, called as the one that they lie in.
+/// The folder for the pictures of one recording. Of several recordings each has its own, named as the folder that it lies in.
 fn folder_for(folder: &Path, recording: &Path, recordings: usize) -> PathBuf {
     let own = recording.parent().and_then(Path::file_name);
     match (recordings, own) {

@@ -7,7 +7,7 @@ use tandem_episodes::reports::{EvaluationReport, ReportFormat, gallery, load};
 use tandem_episodes::write_whole;
 
 use super::CommandResult;
-use crate::one_of::one_of;
+use crate::settings::one_of;
 
 /// Report on episodes: rates with intervals, averages, effort, failures, and policies compared on the same seeds.
 #[derive(Debug, clap::Args)]
@@ -26,7 +26,7 @@ pub struct ReportArgs {
     failures: usize,
 }
 
-/// Counts and writes.
+/// Reads the results and writes the report.
 pub fn run(args: ReportArgs) -> CommandResult {
     let loaded = load(&args.folders)?;
     let report = EvaluationReport::of(&loaded);

@@ -51,13 +51,13 @@ fn object(value: Value) -> Result<Value, ApiError> {
     }
 }
 
-/// Why a body can be read in two ways, or cannot be read at all.
+/// Refuses JSON in which an object names a field twice, and what is no JSON.
 pub fn check_unique_fields(body: &[u8]) -> Result<(), String> {
     let read: Result<UniqueFields, _> = serde_json::from_slice(body);
     read.map(drop).map_err(|error| error.to_string())
 }
 
-/// Any JSON in which no object names a field twice: readers of JSON differ in which of the two they take.
+/// JSON in which no object names a field twice: readers of JSON differ in which of the two values they take.
 struct UniqueFields(Value);
 
 impl<'de> Deserialize<'de> for UniqueFields {

@@ -1,4 +1,4 @@
-//! JSON and MessagePack: what a body is read as, and what a reply is written as.
+//! JSON and MessagePack: the format that a request's body is read in, and that of its reply.
 
 use axum::{
     extract::FromRequestParts,
@@ -13,10 +13,10 @@ use super::{
     problem::ApiError,
 };
 
-/// What MessagePack is called: its registered name, and one that was used before.
+/// The media types of MessagePack: the registered one, and one that was used before.
 const MSGPACK: [&str; 2] = ["application/msgpack", "application/x-msgpack"];
 
-/// How a request is written, and how its reply is to be.
+/// The format of a request's body, and that of its reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Encoding {
     body: BodyFormat,

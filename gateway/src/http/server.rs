@@ -1,4 +1,4 @@
-//! The server: binds, serves, and closes every recording before it goes.
+//! The server: binds, serves, and closes every recording before it stops.
 
 use std::{io, net::SocketAddr, sync::Arc, time::Duration};
 
@@ -16,13 +16,13 @@ use crate::{
     settings::Settings,
 };
 
-/// Requests only parse, wait and answer; the worlds have threads of their own.
+/// How many threads serve requests: these only parse, wait and answer, because the worlds have threads of their own.
 const HTTP_THREADS: usize = 2;
 
 /// How long requests that are still arriving at the end may take.
 const REQUEST_GRACE: Duration = Duration::from_secs(5);
 
-/// How often episodes are looked for whose policies make no more calls.
+/// How often the server looks for episodes whose policies make no more calls.
 const ABANDONED_CHECK_INTERVAL: Duration = Duration::from_secs(1);
 
 /// A running server. Dropping it stops it at once; [`Server::stop`] lets calls under way finish.
@@ -123,7 +123,7 @@ async fn end_abandoned_episodes(table: Arc<EpisodeTable>) {
     }
 }
 
-/// When this process is asked to end.
+/// Waits until this process is asked to end.
 #[cfg(unix)]
 pub async fn shutdown_signal() {
     use tokio::signal::unix::{SignalKind, signal};
@@ -142,7 +142,7 @@ pub async fn shutdown_signal() {
     }
 }
 
-/// When this process is asked to end.
+/// Waits until this process is asked to end.
 #[cfg(not(unix))]
 pub async fn shutdown_signal() {
     let _ = tokio::signal::ctrl_c().await;

@@ -1,10 +1,9 @@
-//! The program itself: stopped, killed, and on a full disk.
+//! The program in a process of its own: stopped, killed, resumed, on a full disk, and what it logs.
 
-mod killed;
 mod logs;
 mod resumed;
 mod server;
-mod stopped;
+mod signals;
 mod without_space;
 
 pub use server::{Delays, Server, partials};

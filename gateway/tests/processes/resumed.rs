@@ -15,7 +15,7 @@ fn tandem(arguments: &[&str]) -> Command {
     command
 }
 
-/// Runs to the end; what it printed.
+/// Runs the program to its end and returns what it printed.
 fn finish(arguments: &[&str]) -> String {
     let output = tandem(arguments).output().expect("the program starts");
     assert!(output.status.success(), "{output:?}");
@@ -29,7 +29,7 @@ fn start_and_kill(arguments: &[&str], delays: &mut Delays, most_ms: u64) {
     child.wait().expect("it ends");
 }
 
-/// Every whole file below `folder`, with what it holds.
+/// Every complete file below `folder` with its contents.
 fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in std::fs::read_dir(folder).into_iter().flatten().map(|entry| entry.expect("an entry")) {

@@ -12,8 +12,8 @@ use std::{
 use serde_json::Value;
 use ureq::Agent;
 
-/// A server that is still there after so long does not end.
-const FOR_EVER: Duration = Duration::from_secs(90);
+/// How long a server may take to end.
+const END_TIMEOUT: Duration = Duration::from_secs(90);
 
 /// A running process, killed when it is dropped.
 pub struct Server {
@@ -25,18 +25,18 @@ pub struct Server {
 impl Server {
     /// Serves on a free port and records into `runs`.
     pub fn start(runs: &Path) -> Server {
-        Server::of(Command::new(env!("CARGO_BIN_EXE_tandem")), runs)
+        Server::run(Command::new(env!("CARGO_BIN_EXE_tandem")), runs)
     }
 
-    /// As [`Server::start`], by a command that begins as `tandem` does.
-    pub fn of(mut program: Command, runs: &Path) -> Server {
+    /// Starts a server as [`Server::start`] does, by a command that runs `tandem` with the arguments that follow it.
+    pub fn run(mut program: Command, runs: &Path) -> Server {
         let flags = ["serve", "--listen", "127.0.0.1:0", "--runs"];
         let mut child =
             program.args(flags).arg(runs).stderr(Stdio::piped()).spawn().expect("the program starts");
         let mut log = BufReader::new(child.stderr.take().expect("its log")).lines().map_while(Result::ok);
         let serving = |line: String| Some(line.split_once("http://")?.1.trim().to_owned());
         let address = log.find_map(serving).expect("the log says where it serves");
-        // Somebody has to read on, lest the program wait for it.
+        // The log is read to its end, because the program would wait for its reader.
         thread::spawn(move || log.for_each(drop));
         let agent = Agent::config_builder().http_status_as_error(false).build().new_agent();
         Server { child, url: format!("http://{address}"), agent }
@@ -45,13 +45,13 @@ impl Server {
     /// The answer to a call, or `None` where the server went away meanwhile.
     pub fn post(&self, path: &str, body: &Value) -> Option<Value> {
         let request = self.agent.post(format!("{}{path}", self.url));
-        // What MCP asks for, and what REST takes as well.
+        // MCP requires this header, and REST accepts it.
         let request = request.header("accept", "application/json, text/event-stream");
         let mut response = request.send_json(body).ok()?;
         response.body_mut().read_json().ok()
     }
 
-    /// A call that has to be answered.
+    /// The answer to a call of a tool, which has to come.
     #[track_caller]
     pub fn tool(&self, id: &str, tool: &str, args: &Value) -> Value {
         self.post(&format!("/v1/episodes/{id}/tools/{tool}"), args).expect("an answer")
@@ -64,7 +64,7 @@ impl Server {
     /// Waits until the process has ended.
     #[track_caller]
     pub fn ended(&mut self) -> ExitStatus {
-        let deadline = Instant::now() + FOR_EVER;
+        let deadline = Instant::now() + END_TIMEOUT;
         loop {
             if let Some(status) = self.child.try_wait().expect("the state of our own child") {
                 return status;
@@ -92,11 +92,11 @@ pub fn partials(runs: &Path) -> Vec<PathBuf> {
     files.filter(|path| path.extension().is_some_and(|extension| extension == "partial")).collect()
 }
 
-/// Delays that look like chance and are the same in every run (Knuth's MMIX generator).
+/// Random delays that are the same in every run (Knuth's MMIX generator).
 pub struct Delays(pub u64);
 
 impl Delays {
-    /// Up to `most_ms`.
+    /// A delay below `most_ms`.
     pub fn next(&mut self, most_ms: u64) -> Duration {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         Duration::from_millis((self.0 >> 33) % most_ms)

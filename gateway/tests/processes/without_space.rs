@@ -6,13 +6,13 @@ use serde_json::{Value, json};
 
 use crate::Server;
 
-/// A server none of whose files may have more than 256 or 512 kB, as the shell counts.
+/// A server whose files may each have at most 256 or 512 kB, depending on the shell's unit.
 fn limited(runs: &Path) -> Server {
     let mut limited = Command::new("sh");
     let program = env!("CARGO_BIN_EXE_tandem");
     // The signal would end the process; without it, writes fail as on a full disk.
     limited.args(["-c", "trap '' XFSZ; ulimit -f 512; exec \"$0\" \"$@\"", program]);
-    Server::of(limited, runs)
+    Server::run(limited, runs)
 }
 
 fn start(server: &Server, protocol: &str) -> (String, Value) {
@@ -40,7 +40,7 @@ fn an_episode_goes_on_when_its_recording_cannot() {
             break reply["recording_failed"].clone();
         }
         assert!(calls < 40, "the limit is never reached");
-        // The recorder writes a quarter of a second behind.
+        // The recorder writes a quarter of a second later.
         thread::sleep(Duration::from_millis(300));
     };
     assert!(says_why(&first), "{first}");
@@ -60,7 +60,7 @@ fn an_episode_goes_on_when_its_recording_cannot() {
 fn the_start_and_refusals_say_that_the_recording_has_failed() {
     let runs = tempfile::tempdir().expect("a temporary folder");
     let server = limited(runs.path());
-    // The initial hold is recorded, and too long for this disk.
+    // The initial hold is recorded, and its recording does not fit on this disk.
     let (id, started) = start(&server, "agentic");
     let failed = &started["recording_failed"];
     assert!(says_why(failed), "{failed}");

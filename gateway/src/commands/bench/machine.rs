@@ -4,18 +4,18 @@ use std::{env::consts, fs, path::Path, thread::available_parallelism};
 
 use serde::Serialize;
 
-/// Facts of this machine and this program. What the system does not tell is `None`.
+/// Facts about this machine and this program. What the system does not say is `None`.
 #[derive(Debug, Serialize)]
 pub struct Machine {
     cpu: Option<String>,
     cores: Option<usize>,
-    /// Name of the system, and of its kernel.
+    /// The names of the system and of its kernel.
     os: String,
     architecture: &'static str,
     tandem: &'static str,
     rustc: &'static str,
     profile: &'static str,
-    /// Processes that wanted to run, means of the last 1, 5 and 15 minutes: figures of a loaded machine are larger.
+    /// Load averages of the last 1, 5 and 15 minutes: times measured on a loaded machine are longer.
     load_values: Option<[f64; 3]>,
 }
 

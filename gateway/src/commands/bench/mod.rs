@@ -18,7 +18,7 @@ use tandem_episodes::{
 };
 
 use super::CommandResult;
-use crate::one_of::one_of;
+use crate::settings::one_of;
 use machine::WithMachine;
 use tools::ToolsReport;
 
@@ -70,10 +70,10 @@ enum BenchPart {
     },
 }
 
-/// Measures, prints, and gives what JSON says of it.
+/// Measures a part, prints a table, and returns the report as JSON.
 type Measure = fn() -> Result<Value, Box<dyn Error>>;
 
-/// What `bench all` measures; a new part adds its line.
+/// The parts that `bench all` measures; a new part adds its line.
 const PARTS: [(&str, Measure); 4] = [
     ("physics", || Ok(serde_json::to_value(measure_physics()?)?)),
     ("render", || Ok(serde_json::to_value(measure_pictures(RendererKind::Cpu)?)?)),
@@ -85,7 +85,7 @@ const PARTS: [(&str, Measure); 4] = [
     }),
 ];
 
-/// Measures and prints.
+/// Measures a part and prints a table.
 pub fn run(args: BenchArgs) -> CommandResult {
     match args.part {
         BenchPart::Ik { targets, json } => ik(targets.as_deref(), json),
@@ -106,7 +106,7 @@ fn all(json: Option<&Path>) -> CommandResult {
     write(reports, json)
 }
 
-/// Writes a report, and what it was measured on, where that is asked for.
+/// Writes a report, with the machine that it was measured on, where a file is named.
 fn write(report: impl Serialize, json: Option<&Path>) -> CommandResult {
     if let Some(path) = json {
         WithMachine::here(report).write(path)?;

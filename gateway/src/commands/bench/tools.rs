@@ -16,21 +16,21 @@ use crate::{
     settings::{Layer, Settings},
 };
 
-/// Calls of each kind that are timed.
+/// How many calls of each kind are timed.
 const CALLS: usize = 2000;
-/// Calls before, which warm up.
+/// How many calls before them warm up.
 const WARM_UP: usize = 100;
-/// Waits that are timed; an episode of the benchmark protocol has the steps for them.
+/// How many calls of `wait` are timed; an episode of the benchmark protocol has the steps for them.
 const WAITS: usize = 30;
 /// Control steps of each wait.
 const STEPS: u32 = 25;
 
-/// Figures of calls on one episode of two robots, that is recorded as any is.
+/// Times of calls on one episode of two robots, which is recorded as any is.
 #[derive(Debug, Serialize)]
 pub struct ToolsReport {
-    /// Of calls without physics.
+    /// Times of calls without physics.
     pub calls: Vec<CallTimes>,
-    /// Of `wait`, against its physics.
+    /// Times of `wait`, against its physics.
     pub wait: WaitTimes,
 }
 
@@ -50,7 +50,7 @@ pub struct CallTimes {
 /// Times of `wait` with [`STEPS`] steps.
 #[derive(Debug, Serialize)]
 pub struct WaitTimes {
-    /// Control steps of each.
+    /// Control steps of each call.
     pub steps: u32,
     /// How often it was called.
     pub calls: usize,
@@ -58,7 +58,7 @@ pub struct WaitTimes {
     pub call_p50_ms: f64,
     /// Median of its physics, in milliseconds.
     pub physics_p50_ms: f64,
-    /// Median of the one over the other, call by call.
+    /// Median of the ratio of both, call by call.
     pub p50_ratio: f64,
 }
 

@@ -11,7 +11,7 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
-use crate::one_of::one_of;
+use crate::settings::one_of;
 
 /// Which episodes to play.
 #[derive(Debug, Args)]
@@ -53,7 +53,7 @@ pub struct SceneFlag {
 }
 
 impl SceneFlag {
-    /// The scene as the file has it now.
+    /// Reads the scene from the file that the flag names.
     fn read(&self) -> Result<Option<SceneFile>, SimError> {
         self.file.as_deref().map(SceneFile::of).transpose()
     }
@@ -123,7 +123,7 @@ impl EpisodeFlags {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Seeds(pub RangeInclusive<u32>);
 
-/// Why a text names no seeds.
+/// A text that names no seeds.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 #[error("{0:?} names no seeds; give one, as 3, or a range with both ends included, as 0..9")]
 pub struct SeedsError(String);

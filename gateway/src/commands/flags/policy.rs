@@ -11,10 +11,10 @@ use tandem_tools_spec::{Driving, Operators};
 
 use crate::drivers::{PRESETS, PolicyMap, PolicyProtocol, Program, RemotePolicy};
 
-/// What the name of a program begins with.
+/// The prefix of --policy that names a program.
 const EXEC: &str = "exec:";
 
-/// Longest that a program may run in an episode, unless a flag says otherwise.
+/// How long a program may run in an episode, unless a flag says otherwise.
 const LIMIT_S: u32 = 3600;
 
 /// Who plays.

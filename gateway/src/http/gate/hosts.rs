@@ -1,4 +1,4 @@
-//! Which hosts and origins a request may name. Browsers let any web page send requests to this machine; what keeps pages out is that
+//! Which hosts and origins a request may name. Browsers let any web page send requests to this machine; pages are kept out because
 //! they cannot forge `Host` and `Origin`.
 
 use std::{net::IpAddr, sync::Arc};
@@ -28,7 +28,7 @@ impl OwnHosts {
         if !self.contains(host) {
             return Err(ApiError::ForeignHost(host.into()));
         }
-        // Other programs send no Origin; a browser's says from which page the request comes.
+        // Browsers say in Origin from which page a request comes; other programs send none.
         match text(header::ORIGIN) {
             Some(origin) if !is_same_origin(origin, host) => Err(ApiError::ForeignOrigin(origin.into())),
             _ => Ok(()),
@@ -36,7 +36,7 @@ impl OwnHosts {
     }
 
     /// Whether `host`, with or without a port, is a name of this server. A page that has its own name point here is refused;
-    /// an address cannot be made to point elsewhere, so where we listen to all of them, each is fine.
+    /// an address cannot be made to point elsewhere, so a server that listens on all addresses takes each.
     fn contains(&self, host: &str) -> bool {
         let Ok(authority) = host.parse::<Authority>() else { return false };
         let name = authority.host().trim_start_matches('[').trim_end_matches(']');

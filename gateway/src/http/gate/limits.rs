@@ -68,7 +68,7 @@ pub async fn pass(State(limits): State<Limits>, request: Request, next: Next) ->
 #[derive(Debug)]
 struct Rates {
     per_second: u32,
-    /// Requests allowed, as of when.
+    /// How many requests are allowed, as of which time.
     allowances: HashMap<IpAddr, (f64, Instant)>,
 }
 

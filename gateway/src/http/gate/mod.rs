@@ -1,5 +1,5 @@
-//! What every request has to pass before a route sees it: limits, a token, and what this file asks of its host and its body, which no
-//! page in a browser can call JSON without asking first.
+//! What every request has to pass before a route sees it: the limits, a token, a host of this server, and a body of a known type. The
+//! type is checked because pages in browsers cannot call a body JSON without asking first.
 
 pub mod connections;
 mod hosts;
@@ -28,7 +28,7 @@ use hosts::OwnHosts;
 /// sending when the connection closes never sees the answer.
 const DRAINED_LIMITS: usize = 16;
 
-/// Which requests may come in, and how much they may bring.
+/// Which hosts requests may be for, and how large and how slow their bodies may be.
 #[derive(Debug, Clone)]
 pub struct Gate {
     settings: Arc<Settings>,
@@ -79,7 +79,7 @@ async fn read_body(mut body: Body, limit_bytes: usize) -> Result<Bytes, ApiError
     Ok(kept.into())
 }
 
-/// A body has to be called JSON or MessagePack. Where there is none, nothing has to be said about it.
+/// Refuses a body whose content type is neither JSON nor MessagePack. An empty body needs no content type.
 fn check_content_type(headers: &HeaderMap, body: &[u8]) -> Result<(), ApiError> {
     let text = match headers.get(header::CONTENT_TYPE) {
         None if body.is_empty() => return Ok(()),

@@ -13,7 +13,7 @@ use crate::{
     http::{app::AppState, problem::ApiError},
 };
 
-/// Lets a request on with its [`Caller`], and without the token that said who that is.
+/// Lets a request pass with its [`Caller`], and without the token that identified the caller.
 pub async fn identify(State(app): State<AppState>, mut request: Request, next: Next) -> Response {
     let Some(caller) = caller(&app, request.headers()) else {
         tracing::info!("a request without a token was refused");

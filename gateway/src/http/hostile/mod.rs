@@ -1,5 +1,4 @@
-//! Calls that nobody means well with, some thousand of them: what is refused changes no state, tells nothing of the server, and
-//! ends nothing.
+//! Thousands of hostile calls: a refused call changes no state, reveals nothing about the server, and ends no episode.
 
 mod generate;
 
@@ -26,7 +25,7 @@ use crate::{
     hosting::EpisodeTable,
     settings::{Layer, Settings},
 };
-use generate::{Chance, allowed, bytes, spoil, text};
+use generate::{SplitMix64, allowed, bytes, spoil, text};
 
 /// A server without a network, and the one episode that it holds.
 struct Target {
@@ -45,7 +44,7 @@ struct RawReply {
 }
 
 impl RawReply {
-    /// Refused over HTTP, by JSON-RPC, or as a tool's answer over MCP.
+    /// Whether the request was refused over HTTP, by JSON-RPC, or as a tool's answer over MCP.
     fn refuses(&self) -> bool {
         !self.status.is_success() || self.body["error"].is_object() || self.body["result"]["isError"] == true
     }
@@ -94,39 +93,39 @@ impl Target {
         })
     }
 
-    /// Some request, by chance.
-    fn request(&self, chance: &mut Chance) -> (String, Vec<u8>) {
-        let spec = chance.of(&self.specs);
-        let mut args = allowed(&spec.body_schema(50), chance);
-        for _ in 0..*chance.of(&[0, 1, 1, 1, 1, 1, 2, 3]) {
-            spoil(&mut args, chance);
+    /// A random request: its path and body.
+    fn request(&self, random: &mut SplitMix64) -> (String, Vec<u8>) {
+        let spec = random.of(&self.specs);
+        let mut args = allowed(&spec.body_schema(50), random);
+        for _ in 0..*random.of(&[0, 1, 1, 1, 1, 1, 2, 3]) {
+            spoil(&mut args, random);
         }
-        match chance.below(20) {
-            0 => ("/v1/episodes".into(), bytes(&args, chance)),
-            1 => (format!("/v1/episodes/{}/tools/x{}", self.id, chance.below(9)), bytes(&args, chance)),
-            2 => (format!("/v1/episodes/nope{}/tools/{}", chance.below(9), spec.name), bytes(&args, chance)),
-            3..=6 => ("/mcp".into(), bytes(&self.over_mcp(spec.name, args, chance), chance)),
-            _ => (format!("/v1/episodes/{}/tools/{}", self.id, spec.name), bytes(&args, chance)),
+        match random.below(20) {
+            0 => ("/v1/episodes".into(), bytes(&args, random)),
+            1 => (format!("/v1/episodes/{}/tools/x{}", self.id, random.below(9)), bytes(&args, random)),
+            2 => (format!("/v1/episodes/nope{}/tools/{}", random.below(9), spec.name), bytes(&args, random)),
+            3..=6 => ("/mcp".into(), bytes(&self.over_mcp(spec.name, args, random), random)),
+            _ => (format!("/v1/episodes/{}/tools/{}", self.id, spec.name), bytes(&args, random)),
         }
     }
 
-    fn over_mcp(&self, tool: &str, mut args: Value, chance: &mut Chance) -> Value {
-        let name = if chance.percent(90) { tool.to_owned() } else { text(chance) };
-        if let (true, Some(args)) = (chance.percent(90), args.as_object_mut()) {
+    fn over_mcp(&self, tool: &str, mut args: Value, random: &mut SplitMix64) -> Value {
+        let name = if random.percent(90) { tool.to_owned() } else { text(random) };
+        if let (true, Some(args)) = (random.percent(90), args.as_object_mut()) {
             args.insert("episode_id".into(), json!(self.id));
         }
         let method =
-            *chance.of(&["tools/call", "tools/call", "tools/call", "prompts/get", "tools/list", "x"]);
+            *random.of(&["tools/call", "tools/call", "tools/call", "prompts/get", "tools/list", "x"]);
         let params = json!({ "name": name, "arguments": args });
         let mut message = json!({ "jsonrpc": "2.0", "id": 1, "method": method, "params": params });
-        if chance.percent(10) {
-            spoil(&mut message, chance);
+        if random.percent(10) {
+            spoil(&mut message, random);
         }
         message
     }
 }
 
-/// Checks what a refusal says.
+/// Checks that a refusal says something, and nothing secret.
 fn check_refusal(target: &Target, answer: &RawReply, sent: &str) {
     let told = answer.body.to_string();
     assert_ne!(answer.status, StatusCode::INTERNAL_SERVER_ERROR, "{sent}: {told}");
@@ -139,14 +138,14 @@ fn check_refusal(target: &Target, answer: &RawReply, sent: &str) {
     assert!(told.len() < 4 * sent.len() + 4096, "{sent}: refused with {} bytes", told.len());
 }
 
-/// Plays so many calls; returns how many were refused.
+/// Sends `calls` random requests and returns how many were refused.
 fn play(calls: usize, seed: u64) -> usize {
     let mut target = Target::new();
-    let mut chance = Chance(seed);
+    let mut random = SplitMix64(seed);
     let mut before = target.state();
     let mut refused = 0;
     for number in 0..calls {
-        let (path, body) = target.request(&mut chance);
+        let (path, body) = target.request(&mut random);
         let request = Request::post(&path)
             .header(header::HOST, "localhost")
             .header(header::CONTENT_TYPE, "application/json")

@@ -1,4 +1,4 @@
-//! The prompt that MCP hosts offer their users: all that a policy has to know of a task before it begins.
+//! The prompt that MCP hosts offer their users: all that a policy has to know about a task before it begins.
 
 use rmcp::{
     ErrorData,
@@ -26,7 +26,7 @@ pub fn prompts() -> Vec<Prompt> {
     vec![prompt.with_title("Play a task")]
 }
 
-/// The prompt called `name`, for what `arguments` say, of the tasks in `list`.
+/// The prompt called `name` for the task, seed and protocol in `arguments`; `list` has the tasks.
 pub fn prompt(
     name: &str,
     arguments: JsonObject,
@@ -47,7 +47,7 @@ pub fn prompt(
     Ok(result)
 }
 
-/// The arguments of a prompt are texts, the seed among them.
+/// Reads the arguments of a prompt, which are all texts; the seed becomes a number.
 fn start(mut arguments: JsonObject) -> Result<StartEpisode, String> {
     let seed = match arguments.remove("seed") {
         None => 0,

@@ -139,7 +139,7 @@ pub enum ApiError {
     Reply(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
 
-/// What the caller can do, as it follows the text of an error that does not say it.
+/// What the caller can do, where the error's own text does not say it.
 fn hint(error: &HostingError) -> String {
     error.refusal().hint.map_or_else(String::new, |hint| format!("; {hint}"))
 }
@@ -159,7 +159,7 @@ struct Problem {
 }
 
 impl Problem {
-    /// One that HTTP alone knows.
+    /// A problem of HTTP itself, which has no class.
     const fn new(kind: &'static str, title: &'static str, status: StatusCode) -> Problem {
         Problem { kind, title, status, retry_after_s: None, internal: false }
     }
@@ -270,10 +270,8 @@ impl ApiError {
 
     /// Why the recording of the episode that it concerns is not complete, if that has to be said.
     pub fn recording_failed(&self) -> Option<&str> {
-        match self {
-            ApiError::RecordingFailed { recording_failed, .. } => Some(recording_failed),
-            _ => None,
-        }
+        let ApiError::RecordingFailed { recording_failed, .. } = self else { return None };
+        Some(recording_failed)
     }
 
     /// The refusal with why the recording of `episode` is not complete, where it is not.

@@ -1,4 +1,4 @@
-//! `/docs`: the OpenAPI description as a page without scripts, for people.
+//! `/docs`: the OpenAPI description as a page for people, without scripts.
 
 use std::fmt::Write;
 
@@ -36,7 +36,7 @@ at <code>/mcp</code>, and as specifications for language models at <a href="/v1/
     )
 }
 
-/// One operation, closed until somebody opens it.
+/// The section of one operation, folded until its reader opens it.
 fn section(path: &str, method: &str, operation: &Value, shared: &Value) -> String {
     let id = text(&operation["operationId"]);
     let mut body = format!("<p>{}</p>\n", text(&operation["description"]));

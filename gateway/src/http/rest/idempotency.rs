@@ -1,4 +1,4 @@
-//! The header by which a request may be repeated without being done twice.
+//! The header `Idempotency-Key`, with which a request may be repeated without being carried out twice.
 
 use axum::{
     extract::FromRequestParts,

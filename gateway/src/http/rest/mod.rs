@@ -1,4 +1,4 @@
-//! The REST routes under `/v1`.
+//! The REST routes: those under `/v1`, and those about the server itself.
 
 mod docs;
 mod idempotency;
@@ -64,7 +64,7 @@ async fn tasks(State(app): State<AppState>) -> Json<TaskList> {
     Json(app.table.task_list())
 }
 
-/// What `GET /v1/tools` may be asked for.
+/// The query of `GET /v1/tools`.
 #[derive(Debug, Deserialize)]
 struct ToolsQuery {
     format: Option<String>,
@@ -97,7 +97,7 @@ async fn openapi(State(app): State<AppState>) -> Json<Value> {
     Json(tandem_tools_spec::openapi(env!("CARGO_PKG_VERSION"), app.settings.hints))
 }
 
-/// The description of the interface as a page, which needs and may load nothing else.
+/// The description of the interface as a page, which needs nothing else and may load nothing.
 async fn docs(State(app): State<AppState>) -> Response {
     let document = tandem_tools_spec::openapi(env!("CARGO_PKG_VERSION"), app.settings.hints);
     let policy = (header::CONTENT_SECURITY_POLICY, "default-src 'none'; style-src 'unsafe-inline'");
@@ -194,7 +194,7 @@ fn require_host(who: &Caller) -> Result<(), HostingError> {
     }
 }
 
-/// Clients made for MCP send `episode_id` among the arguments; that is fine as long as it is the path's.
+/// Removes `episode_id`, which clients made for MCP send among the arguments; it has to be the path's.
 fn without_episode_id(mut args: Value, id: &str) -> Result<Value, ApiError> {
     match args.as_object_mut().and_then(|object| object.shift_remove("episode_id")) {
         Some(body) if body != id => {

@@ -1,4 +1,5 @@
-//! SIGKILL under way: what a policy was told a second ago is on the disk, and can be read.
+//! SIGKILL in an episode: what a policy was told a second ago is on the disk, and can be read. SIGTERM while an episode starts: the
+//! server ends and leaves no partial file.
 
 use std::{
     path::Path,
@@ -23,7 +24,7 @@ fn a_killed_server_leaves_every_step_that_a_policy_was_told_of_a_second_ago() {
         let [partial] = &partials(runs.path())[..] else { panic!("no recording after {delay:?}") };
         let bytes = std::fs::read(partial).expect("the partial file");
         let stream = MessageStream::new_with_options(&bytes, Options::IgnoreEndMagic.into()).expect("MCAP");
-        // An error, if there is one, is the end.
+        // The messages end at the first error, if there is one.
         let messages = stream.take_while(Result::is_ok).count();
 
         let recovered = Command::new(env!("CARGO_BIN_EXE_tandem")).arg("recover").arg(partial).output();
@@ -69,4 +70,25 @@ fn play_and_kill(runs: &Path, seed: u32, delay: Duration) -> u64 {
     });
     let long_ago = told.iter().rfind(|(when, _)| *when + Duration::from_secs(1) <= killed);
     long_ago.map_or(0, |(_, step)| *step)
+}
+
+#[test]
+fn a_server_that_is_stopped_while_an_episode_starts_ends() {
+    let mut delays = Delays(1);
+    for round in 0..20 {
+        let runs = tempfile::tempdir().expect("a temporary folder");
+        let mut server = Server::start(runs.path());
+        let id = server.id().to_string();
+        let delay = delays.next(1000);
+        let answer = thread::scope(|scope| {
+            let starting =
+                scope.spawn(|| server.post("/v1/episodes", &json!({ "task": "handover", "seed": round })));
+            thread::sleep(delay);
+            assert!(Command::new("kill").args(["-TERM", &id]).status().expect("kill").success());
+            starting.join().expect("the client")
+        });
+        let status = server.ended();
+        assert!(status.success(), "after {delay:?}: {status}");
+        assert!(partials(runs.path()).is_empty(), "after {delay:?}: {answer:?}");
+    }
 }
