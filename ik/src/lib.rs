@@ -39,6 +39,29 @@
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! The same for a robot's file: its right arm is all that may move, and a wrist goes to a target.
+//!
+//! ```
+//! use tandem_ik::{Configuration, FrameTask, Model, Outcome, SolveOptions, Solver, Task};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../sim/assets/robots/g1_dex3/robot.xml");
+//! let robot = Model::from_mjcf(&std::fs::read_to_string(file)?)?;
+//! let moves = |name: &&str| ["right_shoulder", "right_elbow", "right_wrist"].iter().any(|part| name.contains(part));
+//! let free: Vec<&str> = robot.joints().iter().map(|joint| joint.name.as_str()).filter(moves).collect();
+//! let arm = robot.reduced(&free, &vec![0.0; robot.nv()])?;
+//! let mut configuration = Configuration::new(&arm, &[0.0, -0.2, 0.0, 0.9, 0.0, 0.0, 0.0])?;
+//! let wrist = arm.frame("right_wrist")?;
+//! let mut target = configuration.root_from_frame(wrist);
+//! target.translation.x += 0.05;
+//! target.translation.z += 0.10;
+//! let tasks = [Task::Frame(FrameTask::new(wrist, target))];
+//! let report = Solver::new(&arm, 0.02).solve(&mut configuration, &tasks, &SolveOptions::default());
+//! assert_eq!(report.outcome, Outcome::Reached);
+//! # Ok(())
+//! # }
+//! ```
 
 #![warn(missing_docs)]
 

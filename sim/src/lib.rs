@@ -5,6 +5,48 @@
 //!
 //! Units are SI, z is up, frames are right-handed, quaternions are written `wxyz`. One [`World`] is stepped by one
 //! thread; the same binary, specification and commands give the same [`World::state_hash`], bit for bit.
+//!
+//! A world is made from a specification, stepped with one command per robot, and read as a [`Step`]:
+//!
+//! ```
+//! use tandem_sim::{RobotPlacement, World, WorldSpec};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let robot = |name: &str, x_m: f32| RobotPlacement { name: name.into(), position_m: [x_m, 0.0], yaw_rad: 0.0 };
+//! let spec = WorldSpec { scene: "floor".into(), robots: vec![robot("A", 0.0), robot("B", 1.5)], objects: vec![] };
+//! let mut world = World::new(&spec)?;
+//! let commands = [world.rest_command(0), world.rest_command(1)];
+//! let mut step = world.present();
+//! for _ in 0..25 {
+//!     step = world.control_step(&commands)?;
+//! }
+//! assert_eq!(step.time_s, 0.5);
+//! for (robot, x_m) in step.robots.iter().zip([0.0, 1.5]) {
+//!     let pelvis_m = robot.world_from_link[0].translation;
+//!     assert!((pelvis_m.x - x_m).abs() < 0.05 && pelvis_m.z > 0.7, "it stands where it was put");
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! A renderer draws what a camera sees after a step:
+//!
+//! ```
+//! use tandem_sim::render::{Cameras, RendererKind, Scenery, encode_png};
+//! use tandem_sim::{RobotPlacement, World, WorldSpec};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let robot = RobotPlacement { name: "A".into(), position_m: [0.0, 0.0], yaw_rad: 0.0 };
+//! let world = World::new(&WorldSpec { scene: "kitchen_084".into(), robots: vec![robot], objects: vec![] })?;
+//! let mut renderer = RendererKind::Cpu.renderer(Scenery::of(&world));
+//! let step = world.present();
+//! let frame = renderer.render(&step, &Cameras::of(&world).egocentric(&step, 0));
+//! let png = encode_png(frame.width, frame.height, &frame.rgb)?;
+//! assert_eq!(&png[1..4], b"PNG");
+//! assert!(frame.depth_m.iter().any(|depth_m| *depth_m < 1.0), "it sees its own hands or the counter");
+//! # Ok(())
+//! # }
+//! ```
 
 pub mod assets;
 pub mod bench;

@@ -33,7 +33,7 @@ impl Side {
         }
     }
 
-    /// Of y on this side: 1 left, -1 right. What mirrors, mirrors by it: sideways parts of vectors, roll and yaw of joints.
+    /// The sign of y on this side: 1 left, -1 right. It mirrors sideways parts of vectors, and roll and yaw of joints.
     pub fn sign(self) -> f32 {
         match self {
             Side::Left => 1.0,
@@ -42,7 +42,7 @@ impl Side {
     }
 }
 
-/// One of a kind on each side: `feet[Side::Left]`. Written and hashed as the left one, then the right one.
+/// A pair with one value for each side: `feet[Side::Left]`. It is written and hashed as the left one, then the right one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sides<T> {
     pub left: T,

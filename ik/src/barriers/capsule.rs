@@ -19,7 +19,7 @@ pub struct Capsule {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Segment {
     pub centre: Vector3<f64>,
-    /// From the centre to the second end.
+    /// The vector from the centre to the second end.
     half: Vector3<f64>,
     pub half_length: f64,
 }

@@ -20,7 +20,7 @@ pub struct Joint {
     pub parent: Option<usize>,
     /// Pose at coordinate 0 in the parent joint's frame.
     pub parent_from_joint: Isometry3<f64>,
-    /// In the joint's frame.
+    /// Axis in the joint's frame.
     pub axis: Unit<Vector3<f64>>,
     /// Hinge or slide.
     pub kind: JointKind,

@@ -63,7 +63,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Of at least one number; it puts them in order.
+    /// The spread of at least one number; it puts them in order.
     fn of(values: &mut [f64]) -> Spread {
         values.sort_unstable_by(f64::total_cmp);
         let at = |share: f64| values[((values.len() - 1) as f64 * share).round() as usize];
@@ -142,7 +142,7 @@ impl CaseReport {
     /// Column heads of [`CaseReport`]'s lines.
     pub const HEAD: &str = "case                        alive  v err  heading    drift     sway   height  stands  still   tilt  power";
 
-    /// Of a case in which nothing has been measured yet.
+    /// The report of a case in which nothing has been measured yet.
     pub fn of(case: &str, seeds: usize) -> CaseReport {
         CaseReport {
             case: case.into(),

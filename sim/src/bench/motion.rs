@@ -22,7 +22,7 @@ impl SplitMix64 {
 pub(super) enum Arms {
     /// Held out with a little random motion.
     Forward,
-    /// As forward, with every joint swinging widely.
+    /// Held out as `Forward`, with every joint swinging widely.
     Waving,
 }
 
@@ -35,7 +35,7 @@ pub(super) struct ArmMotion {
     waves: Sides<[Wave; ARM_JOINTS]>,
 }
 
-/// Of one joint.
+/// The swing of one joint.
 #[derive(Clone, Copy)]
 struct Wave {
     amplitude_rad: f32,

@@ -29,7 +29,7 @@ pub struct PhysicsCase {
     pub median_step_us: f64,
     #[serde(rename = "step_us_quartiles")]
     pub quartiles_step_us: [f64; 2],
-    /// Of the whole: physics, sensing and the robots' controllers.
+    /// Simulated time per time of the whole: physics, sensing and the robots' controllers.
     pub realtime_factor: f64,
 }
 
@@ -42,13 +42,13 @@ enum Situation {
 
 const MOST_ROBOTS: usize = 3;
 const ROUNDS: usize = 3;
-/// In which robots come to rest, or into their stride.
+/// Control steps in which robots come to rest, or into their stride.
 const SETTLING_CONTROL_STEPS: usize = 75;
 const CONTROL_STEPS: usize = 150;
 /// Fingers have closed nearly before the bottle is put between them.
 const CLOSING_CONTROL_STEPS: usize = 25;
 const NEARLY: f32 = 0.8;
-/// Round an upright cylinder of 7 cm, right hand: thumb 0 to 2, middle 0 and 1, index 0 and 1.
+/// A hand closed round an upright cylinder of 7 cm, right hand: thumb 0 to 2, middle 0 and 1, index 0 and 1.
 const CLOSED_RAD: [f32; HAND_JOINTS] = [0.0, 0.75, -0.8, 1.1, 1.3, 1.1, 1.3];
 /// Middle of the grasped cylinder in the frame of the wrist, and how far above its base a bottle is held.
 const GRASP_IN_WRIST_M: Vector = Vector::new(0.12, 0.055, 0.0);

@@ -10,7 +10,7 @@ use rapier3d::math::Vector;
 use super::{JOINTS, WholeBody};
 use crate::GRAVITY_M_S2;
 
-/// Of a link, at its origin, world frame.
+/// Acceleration of a link at its origin, world frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Acceleration {
     pub linear_m_s2: Vector,
@@ -19,13 +19,13 @@ pub struct Acceleration {
 
 /// What a motion takes.
 pub struct Effort {
-    /// On each joint, in published order.
+    /// Torque on each joint, in published order.
     pub torque_n_m: [f32; JOINTS],
-    /// On the whole robot from outside, beside gravity.
+    /// Force on the whole robot from outside, beside gravity.
     pub force_n: Vector,
-    /// About the pelvis' origin.
+    /// Moment on the whole robot about the pelvis' origin.
     pub moment_n_m: Vector,
-    /// Of each link, in the order of the model.
+    /// Acceleration of each link, in the order of the model.
     pub links: Vec<Acceleration>,
 }
 

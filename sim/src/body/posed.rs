@@ -27,7 +27,7 @@ pub(crate) struct Posed {
 }
 
 impl Posed {
-    /// At rest as the robot's file has it, the soles on the ground.
+    /// The robot at rest as its file has it, the soles on the ground.
     pub(crate) fn standing() -> Posed {
         let mut posed = Posed {
             world_from_pelvis: Pose::IDENTITY,
@@ -40,7 +40,7 @@ impl Posed {
         posed
     }
 
-    /// Something of everything: turned, leaning and moving, each joint within its limits. `seed` varies it.
+    /// A robot with something of everything: turned, leaning and moving, each joint within its limits. `seed` varies it.
     pub(crate) fn tumbling(seed: u32) -> Posed {
         let wave = |i: usize, part: f32| (1.7 * i as f32 + 2.3 * seed as f32 + part).sin();
         let mut posed = Posed::standing();
@@ -78,7 +78,7 @@ impl Posed {
         }
     }
 
-    /// As a controller sees it, with nothing in the hands.
+    /// The robot as a controller sees it, with nothing in the hands.
     pub(crate) fn body(&self) -> WholeBody<'static> {
         let model = model();
         let world_from_link = model.forward_kinematics(self.world_from_pelvis, &self.q_rad);
@@ -121,7 +121,7 @@ impl Posed {
         energies_j.sum()
     }
 
-    /// Of all links, at their origins.
+    /// Motions of all links, at their origins.
     fn motions(&self) -> Vec<LinkMotion> {
         let model = model();
         let world_from_link = model.forward_kinematics(self.world_from_pelvis, &self.q_rad);

@@ -18,7 +18,7 @@ pub struct WholeBody<'a> {
     pub pelvis_angular_velocity_rad_s: Vector,
     pub com_m: Vector,
     pub com_velocity_m_s: Vector,
-    /// Of the middle of each palm.
+    /// Velocity of the middle of each palm.
     pub palm_velocity_m_s: Sides<Vector>,
     /// Measured external force on each hand, at its palm.
     pub hand_force_n: Sides<Vector>,

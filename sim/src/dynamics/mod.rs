@@ -73,7 +73,7 @@ impl Dynamics {
         self.collision.add(collider, &self.trees, &self.settings)
     }
 
-    /// From now on these links never touch. To be called before the first step.
+    /// Lets these links never touch from now on. It has to be called before the first step.
     pub fn keep_apart(&mut self, a: LinkId, b: LinkId) {
         self.collision.keep_apart(a, b);
     }

@@ -31,7 +31,7 @@ pub struct Settings {
     /// the next step began with their impulses, a held bottle would slip by a third of a millimetre.
     pub sweeps: usize,
     pub relaxing_sweeps: usize,
-    /// Between two things that move, and with what does not.
+    /// Softness of contacts between two things that move, and of contacts with what does not.
     pub contact: Softness,
     pub ground_contact: Softness,
     /// Depth that is left alone. At 0 a bottle precesses on its rim; at 1 mm hung frames slip.

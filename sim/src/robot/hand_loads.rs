@@ -22,7 +22,7 @@ pub(super) struct HandLoads {
     force: Sides<HandForce>,
 }
 
-/// One arm at one instant.
+/// What one arm tells of its hand at one instant.
 struct Arm {
     /// Torque of each joint per newton at the palm along world x, y, z: the rows of J.
     levers_m: [[f32; ARM_JOINTS]; 3],

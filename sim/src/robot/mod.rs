@@ -129,7 +129,7 @@ impl Robot {
         std::array::from_fn(|i| self.memory.last_upper_rad[WAIST_COLUMN + i])
     }
 
-    /// Bytes of everything outside dynamics.
+    /// Serialises everything of the robot that lives outside dynamics.
     pub(crate) fn save(&self) -> Result<Vec<u8>, SimError> {
         Ok(postcard::to_stdvec(&(&self.memory, self.locomotion.save()?))?)
     }

@@ -16,7 +16,7 @@ use crate::plane::flat;
 /// What a robot knows of its way since it was put into the world.
 #[derive(Clone, Default, Serialize, Deserialize)]
 pub(super) struct Odometry {
-    /// As of the last [`Odometry::update`]; `None` before the first.
+    /// The estimate of the last [`Odometry::update`]; `None` before the first.
     last: Option<Estimate>,
 }
 
@@ -30,7 +30,7 @@ struct Estimate {
 
 /// What the estimate is made of; nothing of it says where in the world the robot is.
 struct Sensed {
-    /// By the IMU, in the pelvis frame.
+    /// What the IMU measures, in the pelvis frame.
     down_direction: Vector,
     turning_rad_s: Vector,
     /// Middles of the shapes that both feet stand on and, lower by what is between, their soles; by the joints, in the pelvis

@@ -31,12 +31,12 @@ pub struct WorldSpec {
     pub objects: Vec<ObjectPlacement>,
 }
 
-/// Which room a world is in.
+/// Where the scene of a world comes from.
 #[derive(Clone, Debug)]
 pub enum SceneSource {
-    /// One that the binary carries, by name.
+    /// A scene that the binary carries, by name.
     Embedded(String),
-    /// One that was read, and where its own origin lies.
+    /// A scene that was read, and where its own origin lies.
     Read { document: Arc<Document>, world_from_scene: Pose },
 }
 
@@ -57,7 +57,7 @@ pub struct World {
     fixed: Vec<crate::mjcf::Geom>,
     cameras: Vec<MjcfCamera>,
     control_steps: u64,
-    /// For the next control step.
+    /// Pushes of the next control step.
     pushes: Vec<Push>,
 }
 
@@ -68,7 +68,7 @@ impl World {
         World::with_robot(spec, Arc::new(model))
     }
 
-    /// As [`World::new`], of robots of another file.
+    /// Builds the world as [`World::new`] does, with robots of another file.
     pub fn with_robot(spec: &WorldSpec, model: Arc<RobotModel>) -> Result<World, SimError> {
         let mut world = match &spec.scene {
             SceneSource::Embedded(name) => World::of_scene(Document::parse(name, assets::scene(name)?)?)?,
@@ -90,7 +90,7 @@ impl World {
         World::furnished(&scene, &Pose::IDENTITY)
     }
 
-    /// As [`World::of_scene`], with the scene's own origin at `world_from_scene`.
+    /// Builds the world as [`World::of_scene`] does, with the scene's own origin at `world_from_scene`.
     fn furnished(scene: &Document, world_from_scene: &Pose) -> Result<World, SimError> {
         let gravity_m_s2 = DVec3::new(0.0, 0.0, -f64::from(GRAVITY_M_S2));
         let mut dynamics = Dynamics::new(Settings::new(f64::from(PHYSICS_DT_S), gravity_m_s2));

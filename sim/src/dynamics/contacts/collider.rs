@@ -20,7 +20,7 @@ pub struct Collider {
     pub shape: SharedShape,
     /// The link that carries it, or the world.
     pub on: Option<LinkId>,
-    /// In the link's frame, or the world's.
+    /// Pose of the shape in the link's frame, or in the world's.
     pub body_from_shape: DPose3,
     pub friction: Friction,
     /// Tells whoever owns the world whose collider it is.
@@ -85,13 +85,13 @@ impl Surface {
         self.bounds = Aabb::new((middle_m - half_m).as_vec3(), (middle_m + half_m).as_vec3());
     }
 
-    /// From the middle of this one to that of another, in the frame of this one.
+    /// The vector from the middle of this surface to that of another, in the frame of this one.
     pub fn towards(&self, other: &Surface) -> DVec3 {
         let middle_m = other.world_from_shape * other.middle_m;
         self.world_from_shape.inverse() * middle_m - self.middle_m
     }
 
-    /// Of another one in the frame of this one.
+    /// Pose of another surface in the frame of this one.
     pub fn pose_of(&self, other: &Surface) -> Pose {
         rounded(&(self.world_from_shape.inverse() * other.world_from_shape))
     }

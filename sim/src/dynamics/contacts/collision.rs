@@ -21,11 +21,11 @@ use crate::dynamics::trees::{LinkId, Trees};
 pub struct Collision {
     surfaces: Vec<Surface>,
     near: Near,
-    /// Of this step, in the order of their colliders.
+    /// Candidates of this step, in the order of their colliders.
     pub candidates: Vec<Candidate>,
-    /// Of the last step, in the order of their colliders: those that have points.
+    /// Manifolds of the last step that have points, in the order of their colliders.
     pub manifolds: Vec<Manifold>,
-    /// Of this step; [`Collision::commit`] makes them those of the last.
+    /// Manifolds of this step; [`Collision::commit`] makes them those of the last.
     found: Vec<Manifold>,
     spare: Vec<ContactManifold<(), ()>>,
 }
@@ -129,13 +129,13 @@ impl Between<'_> {
         DefaultQueryDispatcher
             .contact_manifold_convex_convex(&first.pose_of(second), a, b, None, None, near_m, manifold)
             .expect("Parry knows all convex shapes");
-        // Of two that only just touch it may find no direction; in the next step they are a little deeper, or apart.
+        // Parry may find no direction between two that only just touch; in the next step they are a little deeper, or apart.
         if !manifold.local_n1.is_normalized() {
             manifold.clear();
         }
     }
 
-    /// Those of the points that touch, or will within the step.
+    /// Collects the points that touch, or will within the step.
     fn collect(&self, manifold: &ContactManifold<(), ()>, candidates: &mut Vec<Candidate>) {
         let [first, second] = self.surfaces;
         let normal = (first.world_from_shape.rotation * manifold.local_n1.as_dvec3()).normalize();

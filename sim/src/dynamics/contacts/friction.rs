@@ -21,7 +21,7 @@ pub enum Directions {
 }
 
 impl Directions {
-    /// From MJCF's `condim`; `None` for a number it does not have.
+    /// Reads MJCF's `condim`; `None` for a number that MJCF does not have.
     pub(crate) fn from_condim(condim: u32) -> Option<Directions> {
         match condim {
             1 => Some(Directions::None),
@@ -260,7 +260,7 @@ struct Symmetric2 {
 }
 
 impl Symmetric2 {
-    /// Inverse of the block of two lanes that begins at `lane`, if there is one. Of two that are not independent each is taken
+    /// Inverse of the block of two lanes that begins at `lane`, if there is one. Two lanes that are not independent are each taken
     /// by itself and does half.
     fn inverse_of<const N: usize>(a: &[[f64; N]; N], lane: usize) -> Symmetric2 {
         if lane + 1 >= N {

@@ -27,11 +27,11 @@ pub struct ContactPoint {
     pub impulse_n_s: DVec3,
     /// Part of it along the normal.
     pub normal_impulse_n_s: f64,
-    /// Of the point, among those of the same colliders.
+    /// Number of the point among those of the same colliders.
     pub(in crate::dynamics) number: u32,
     /// The point on each collider, in its own frame.
     pub(in crate::dynamics) local_m: [DVec3; 2],
-    /// With which the next step begins.
+    /// Impulses with which the next step begins.
     pub(in crate::dynamics) memory: Impulses,
 }
 
@@ -45,7 +45,7 @@ pub struct Impulses {
 }
 
 impl Impulses {
-    /// As lanes of a contact with these directions (normal, two tangents).
+    /// The same impulses as lanes of a contact with these directions (normal, two tangents).
     pub fn lanes(&self, [_, t1, t2]: [DVec3; 3]) -> [f64; 6] {
         let (tangent, roll) = (self.tangent, self.roll);
         [self.normal, tangent.dot(t1), tangent.dot(t2), self.spin, roll.dot(t1), roll.dot(t2)]
@@ -57,7 +57,7 @@ impl Impulses {
     }
 }
 
-/// A touch on its way through a step.
+/// A contact point on its way through a step.
 #[derive(Clone, Copy)]
 pub struct Candidate {
     pub touch: ContactPoint,
@@ -67,7 +67,7 @@ pub struct Candidate {
     pub directions: [DVec3; 3],
 }
 
-/// The touch of the last step that this one continues, among those of the same pair: the nearest on either surface.
+/// The point of the last step that this one continues, among those of the same pair: the nearest on either surface.
 pub fn continued(touch: &ContactPoint, before: &[ContactPoint], match_m: f64) -> Option<Impulses> {
     let away = |old: &ContactPoint| {
         let on = |side: usize| old.local_m[side].distance_squared(touch.local_m[side]);

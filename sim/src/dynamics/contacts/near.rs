@@ -12,7 +12,7 @@ use crate::dynamics::trees::{LinkId, Trees};
 
 #[derive(Default)]
 pub struct Near {
-    /// In order, the smaller first: all that could touch in this step, and some that could not. Which of those are among them
+    /// Pairs in order, the smaller collider first: all that could touch in this step, and some that could not. Which of those are among them
     /// depends on the past, so that nothing else may.
     pub pairs: Vec<[ColliderId; 2]>,
     /// Links that never touch, smaller first.

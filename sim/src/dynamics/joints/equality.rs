@@ -21,7 +21,7 @@ pub enum Equality {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EqualityId(pub(in crate::dynamics) usize);
 
-/// What of an equality outlasts a step.
+/// The part of an equality that outlasts a step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EqualityState {
     pub active: bool,

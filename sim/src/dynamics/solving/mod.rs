@@ -21,9 +21,9 @@ pub struct Solver {
     /// Contacts that slide and spin, and contacts that also resist rolling; both in the order of the candidates.
     plain: Contacts<4>,
     rolling: Contacts<6>,
-    /// Of the last step, in the order of their colliders.
+    /// Contact points of the last step, in the order of their colliders.
     pub touches: Vec<ContactPoint>,
-    /// Of this step; [`Solver::commit`] makes them those of the last.
+    /// Contact points of this step; [`Solver::commit`] makes them those of the last.
     found: Vec<ContactPoint>,
 }
 

@@ -12,7 +12,7 @@ use rapier3d::glamx::{DMat3, DQuat, DVec3};
 
 use super::tree::Tree;
 
-/// Enough for 40 rad per step; below 1 rad per step three do.
+/// Eight iterations suffice for 40 rad per step; below 1 rad per step three do.
 const MOST_ITERATIONS: usize = 8;
 const TOLERANCE: f64 = 1e-14;
 

@@ -89,12 +89,12 @@ impl Tree {
         DPose3::from_parts(self.reference_m + self.position_m[link], rotation)
     }
 
-    /// Of the link's origin, world frame.
+    /// Velocity of the link's origin, world frame.
     pub fn link_velocity_m_s(&self, link: usize) -> DVec3 {
         self.velocity[link].at(self.position_m[link])
     }
 
-    /// Of a point that is fixed to a link and now here in the world.
+    /// Velocity of a point that is fixed to a link and now lies at `point_m` in the world.
     pub fn point_velocity_m_s(&self, link: usize, point_m: DVec3) -> DVec3 {
         self.velocity[link].at(point_m - self.reference_m)
     }

@@ -10,7 +10,7 @@ pub struct Layout {
     /// Last degree of freedom on the path to each link; `None` where nothing moves it.
     pub last_dof: Vec<Option<usize>>,
     pub link_of: Vec<usize>,
-    /// Of each link the first link of those it is rigidly one with, and of that one its parent's.
+    /// For each link, the first of the links that it is rigidly one with; and for that one, the same of its parent.
     rigid: Vec<usize>,
     rigid_parent: Vec<Option<usize>>,
     start: Vec<usize>,

@@ -9,7 +9,7 @@ pub struct Link {
     pub name: String,
     /// An earlier link of the tree; `None` is the world.
     pub parent: Option<usize>,
-    /// With the joint at 0. For a free link: where it starts in the world.
+    /// Pose with the joint at 0. A free link starts there in the world.
     pub parent_from_link: DPose3,
     pub joint: Joint,
     pub mass: Mass,
@@ -102,12 +102,12 @@ impl Joint {
 pub struct Mass {
     pub mass_kg: f64,
     pub com_m: DVec3,
-    /// About the centre of mass, link axes.
+    /// Inertia about the centre of mass, link axes.
     pub inertia_kg_m2: DMat3,
 }
 
 impl Mass {
-    /// For links that only carry others: two joints in a row have one between them.
+    /// The mass of links that only carry others: two joints in a row have one between them.
     pub const NONE: Mass = Mass { mass_kg: 0.0, com_m: DVec3::ZERO, inertia_kg_m2: DMat3::ZERO };
 
     pub fn from_rapier(mass: &MassProperties) -> Mass {
@@ -120,7 +120,7 @@ impl Mass {
         }
     }
 
-    /// Solid box of even density, centred.
+    /// The mass of a solid box of even density, centred.
     pub fn of_box(mass_kg: f64, half_extents_m: DVec3) -> Mass {
         let s = half_extents_m * half_extents_m * (mass_kg / 3.0);
         let inertia_kg_m2 = DMat3::from_diagonal(DVec3::new(s.y + s.z, s.x + s.z, s.x + s.y));

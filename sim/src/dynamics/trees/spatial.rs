@@ -232,7 +232,7 @@ pub fn turned(rotation: DQuat, turn_rad: DVec3) -> DQuat {
     (DQuat::from_scaled_axis(turn_rad) * rotation).normalize()
 }
 
-/// As colliders and everything outside of dynamics have it.
+/// The pose in single precision, as colliders and everything outside of dynamics have it.
 pub(crate) fn rounded(pose: &DPose3) -> Pose {
     Pose::from_parts(pose.translation.as_vec3(), pose.rotation.as_quat())
 }

@@ -18,16 +18,16 @@ pub struct Tree {
     pub name: String,
     pub(in crate::dynamics) links: Vec<Link>,
     pub(in crate::dynamics) layout: Layout,
-    /// Of a free first link, in the world.
+    /// Pose of a free first link in the world.
     pub(in crate::dynamics) base: DPose3,
     /// Joint positions, by link; 0 where the joint has none.
     pub(in crate::dynamics) q: Vec<f64>,
     pub(in crate::dynamics) v: Vec<f64>,
-    /// By link.
+    /// What each link's drive is told, by link.
     pub(in crate::dynamics) drives: Vec<Drive>,
-    /// By link: the drive is a row of the solver in this step.
+    /// Whether a link's drive is a row of the solver in this step, by link.
     pub(in crate::dynamics) bounded: Vec<bool>,
-    /// From outside, by link, about the reference; for the next step only.
+    /// Forces from outside, by link, about the reference; they act in the next step only.
     pub(in crate::dynamics) external: Vec<ForceVector>,
     /// What the drives exerted in the last step, by link.
     pub(in crate::dynamics) effort: Vec<f64>,
@@ -45,9 +45,9 @@ pub struct Tree {
     pub(in crate::dynamics) velocity: Vec<MotionVector>,
     pub(in crate::dynamics) acceleration: Vec<MotionVector>,
     pub(in crate::dynamics) force: Vec<ForceVector>,
-    /// Composite, by link.
+    /// Composite inertias, by link.
     pub(in crate::dynamics) inertia: Vec<Inertia>,
-    /// Of each link about its centre of mass, link axes.
+    /// Inertia of each link about its centre of mass, link axes.
     pub(in crate::dynamics) own_inertia: Vec<Symmetric>,
     /// What springs, dampers and drives add to the diagonal of the mass matrix.
     pub(in crate::dynamics) implicit: Vec<f64>,
@@ -110,7 +110,7 @@ impl Tree {
         self.v.len()
     }
 
-    /// One free body: its mass matrix is block diagonal and its gyroscopic motion integrated on its own.
+    /// Whether the tree is one free body: its mass matrix is block diagonal and its gyroscopic motion integrated on its own.
     pub(in crate::dynamics) fn is_lone(&self) -> bool {
         self.links.len() == 1 && matches!(self.links[0].joint, Joint::Free)
     }

@@ -34,7 +34,7 @@ const LIMITS: BaseLimits = BaseLimits {
 /// A robot whose hands pull down by this much together leans, and would walk for ever to where it should be.
 const HEAVY_N: f32 = 50.0;
 
-/// One robot under a policy.
+/// The controller of one robot under a policy.
 pub struct Agile {
     network: Arc<Network>,
     joints: JointMap,

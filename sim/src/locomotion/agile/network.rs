@@ -34,7 +34,7 @@ const SENSED: [(&str, usize); 5] = [
 const ACTIONS: [&str; 3] = ["action_joint_pos", "action_joint_pos_kp_gains", "action_joint_pos_kd_gains"];
 /// What a memory's output is called beyond the input's name.
 const FED_BACK: &str = "_out";
-/// Beyond the five frames that histories have, so that the actions in them have settled.
+/// More steps than the five frames that histories have, so that the actions in them have settled.
 const STEPS_TO_REMEMBER: usize = 25;
 
 /// What the network sees at one control step.
@@ -42,7 +42,7 @@ const STEPS_TO_REMEMBER: usize = 25;
 pub(super) struct Observation {
     /// Pelvis in the world.
     pub quaternion_wxyz: [f32; 4],
-    /// Of the pelvis, in its own frame.
+    /// Angular velocity of the pelvis, in its own frame.
     pub angular_velocity_rad_s: [f32; 3],
     /// Forward m/s, left m/s, turning rad/s.
     pub velocity_command: [f32; 3],
@@ -68,7 +68,7 @@ pub struct Network {
     name: String,
     model: Model,
     inputs: Vec<Input>,
-    /// Those of [`ACTIONS`], then the next values of the memories.
+    /// Outputs: those of [`ACTIONS`], then the next values of the memories.
     outputs: Vec<NodeId>,
     /// Shapes of the memories.
     memories: Vec<Vec<usize>>,
@@ -86,7 +86,7 @@ enum Source {
     Recurrent(usize),
 }
 
-/// Should a run fail.
+/// The result of a run, which may fail.
 type RunResult<T> = Result<T, Box<dyn Error + Send + Sync>>;
 
 impl Network {
@@ -256,7 +256,7 @@ impl Action {
     }
 }
 
-/// Enough of an ONNX file to tell it from others: some files that are none would keep rten's reader busy for ever.
+/// The part of an ONNX file that tells it from others: some files that are none would keep rten's reader busy for ever.
 #[derive(Clone, PartialEq, Message)]
 struct Outline {
     #[prost(message, optional, tag = "7")]

@@ -27,7 +27,7 @@ const LARGEST_INTEGRAL_M_S: [f32; 2] = [0.5, 0.3];
 const SMALLEST_COMMAND: [f32; 3] = [-0.6, -0.4, -0.8];
 const LARGEST_COMMAND: [f32; 3] = [0.8, 0.4, 0.8];
 
-/// Where the robot should be.
+/// Where the robot should be, as its commands have moved that place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct ReferencePlace {
     position_m: [f32; 2],
@@ -38,7 +38,7 @@ pub(super) struct ReferencePlace {
 }
 
 impl ReferencePlace {
-    /// Here.
+    /// The place where the pelvis is.
     pub(super) fn of(world_from_pelvis: Pose) -> ReferencePlace {
         let at = world_from_pelvis.translation;
         ReferencePlace {

@@ -17,14 +17,14 @@ const FRICTION_USED: f32 = 0.43;
 /// Friction holds a foot against turning by its corners, up to 15 N m; less where the pressure is at toe or heel, whose corners are close.
 const LARGEST_TURN_N_M: f32 = 14.0;
 const TURN_FADE_M: f32 = 0.12;
-/// Of trunk and arms about the vertical.
+/// Inertia of trunk and arms about the vertical.
 const TURN_INERTIA_KG_M2: f32 = 1.2;
 const CORRECTIONS: usize = 2;
-/// Of the centre of mass over the ground: a robot that is lower has fallen.
+/// Height of the centre of mass over the ground: a robot that is lower has fallen.
 const LEAST_HEIGHT_M: f32 = 0.4;
 /// A knee that is almost straight must not ask for the impossible.
 const DAMPING: f32 = 0.004;
-/// Of the ground force that torques give away. With twenty times as much, half of a pull on a robot that leans is not seen: its legs
+/// Damping of the ground force that torques give away. With twenty times as much, half of a pull on a robot that leans is not seen: its legs
 /// are almost straight.
 const FORCE_DAMPING: f32 = 0.0002;
 const LARGEST_JOINT_ACCELERATION_RAD_S2: f32 = 400.0;
@@ -39,18 +39,18 @@ const EASED_FEET: f32 = 0.2;
 pub(super) struct WantedMotion {
     pub lift_m_s2: f32,
     pub turn_rad_s2: Vector,
-    /// Of the ankle roll links; zero for a foot that stands.
+    /// Accelerations of the ankle roll links; zero for a foot that stands.
     pub feet: Sides<Acceleration>,
 }
 
-/// Where the ground acts.
+/// Where the ground acts on the feet.
 pub(super) struct GroundContact {
     pub pressure_m: Vector,
     /// The only foot that carries; `None` for both.
     pub foot: Option<Side>,
 }
 
-/// Of both legs.
+/// Torques of both legs.
 pub(super) struct LegTorques {
     pub torque_n_m: Sides<[f32; LEG_JOINTS]>,
     /// Horizontal acceleration of the centre of mass that they bring.

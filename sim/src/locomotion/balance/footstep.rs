@@ -28,12 +28,12 @@ pub(super) struct FootstepInputs<'a> {
     pub gait: &'a Gait,
     pub swing: &'a Swing,
     pub capture_m: Vector,
-    /// Sole that carries, and the centre of the one that carried before.
+    /// Pose of the sole that carries, and the centre of the one that carried before.
     pub stance: Pose,
     pub old_m: Vector,
     pub ahead_axis: Vector,
     pub outside_axis: Vector,
-    /// Since the stance foot landed, at the pace of the gait.
+    /// Time since the stance foot landed, at the pace of the gait.
     pub time_s: f32,
 }
 

@@ -29,13 +29,13 @@ impl Laden {
 /// External wrench, world frame, and its effect on balance: weights in the hands and an observed push.
 pub(super) struct Load {
     pub force_n: Vector,
-    /// About the centre of mass.
+    /// Moment about the centre of mass.
     pub moment_n_m: Vector,
     /// Where the centre of pressure of a robot at rest lies: the centre of mass, moved by the wrench and the push.
     pub balance_point_m: Vector,
     /// The same without the push: where the robot and what it carries have their centre of mass.
     pub weights_point_m: Vector,
-    /// Of robot and what it carries.
+    /// Mass of the robot and of what it carries.
     pub velocity_m_s: Vector,
 }
 

@@ -65,7 +65,7 @@ pub(super) struct Stand {
     offset_rate_m_s: Vector,
     tilt: Rotation,
     heading_rad: f32,
-    /// Of the pelvis, against a push, in the heading frame.
+    /// Shift of the pelvis against a push, in the heading frame.
     lean_m: Vector,
     height_m: f32,
     q_rad: Sides<LegAngles>,
@@ -209,7 +209,7 @@ fn balance_torques_n_m(
     let mass_kg = body.model.mass_kg;
     let pelvis = body.world_from_pelvis();
     let error_m = goal.translation - pelvis.translation;
-    // Of the pelvis: it holds still while arms swing.
+    // The damping is that of the pelvis, which holds still while arms swing.
     let rate_m_s = goal_velocity_m_s - body.pelvis_velocity_m_s;
     let acceleration_m_s2 = Vector::new(
         HORIZONTAL_STIFFNESS_1_S2 * error_m.x + HORIZONTAL_DAMPING_1_S * rate_m_s.x,

@@ -32,7 +32,7 @@ const SHIFT_GAIN: f32 = 3.0;
 /// falls forward or backward has no time to shift.
 const SHIFTED_M: f32 = 0.012;
 const LATEST_M: f32 = 0.1;
-/// One who leans against partners would shift for ever: they pull the more the farther it leans.
+/// A robot that leans against partners would shift for ever: they pull the more the farther it leans.
 const LONGEST_SHIFT_S: f32 = 0.5;
 /// A robot gathers speed over so many steps.
 const STARTING_STEPS: u32 = 5;
@@ -55,7 +55,7 @@ const HIGHEST_M: f32 = 0.745;
 const LOWEST_M: f32 = 0.62;
 const RAISING_M_S: f32 = 0.15;
 const LOWERING_M_S: f32 = 0.8;
-/// From the hip's roll axis to the ankle roll link of a leg that is bent enough.
+/// Distance from the hip's roll axis to the ankle roll link of a leg that is bent enough.
 const LEG_M: f32 = 0.49;
 const ANKLE_HEIGHT_M: f32 = 0.053;
 /// A step ends when the foot meets the ground in the last part of the swing, or is overdue.
@@ -78,7 +78,7 @@ pub(super) struct Stepping {
     stance: Side,
     /// Before the first step: for how long the capture point has been moving over the first stance foot.
     shifting_s: Option<f32>,
-    /// Since the stance foot landed.
+    /// Time since the stance foot landed.
     time_s: f32,
     steps: u32,
     swing: Swing,
@@ -269,7 +269,7 @@ impl Stepping {
     }
 }
 
-/// Torques as drives: of their springs and dampers nothing is left at the measured angle and velocity.
+/// Torques as drives, whose springs and dampers add nothing at the measured angle and velocity.
 fn drives(body: &WholeBody, torques: &LegTorques) -> LegCommand {
     Sides::from_fn(|side| {
         std::array::from_fn(|i| {

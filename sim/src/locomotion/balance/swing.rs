@@ -32,7 +32,7 @@ pub(super) const SOLE_IN_FOOT_M: Vector = Vector::new(0.035, 0.0, -0.035);
 pub(super) struct Swing {
     from: Pose,
     to: Pose,
-    /// Along the ground; the lift is added to it.
+    /// The path along the ground; the lift is added to it.
     position_m: Vector,
     velocity_m_s: Vector,
     acceleration_m_s2: Vector,

@@ -11,7 +11,7 @@ use crate::render::{Carrier, Part, PlacedScenery};
 
 /// What is this far above a surface darkens it no more.
 const REACH_M: f32 = 0.06;
-/// So deep, things sink into what carries them.
+/// Things sink so deep into what carries them.
 pub const SINK_M: f32 = 0.03;
 /// Nothing higher carries anything.
 const HIGHEST_SUPPORT_M: f32 = 1.5;
@@ -30,7 +30,7 @@ pub struct ContactMap {
     /// World coordinates of its first corner, and texels per metre.
     pub corner_m: [f32; 2],
     pub texels_per_m: f32,
-    /// Of each texel, row by row: the height of what can carry things, and how dark it is there, from 0 to 1.
+    /// For each texel, row by row: the height of what can carry things, and how dark it is there, from 0 to 1.
     pub texel_values: Vec<[f32; 2]>,
     /// What the map is around; `None` before the first. What can carry things is drawn when it changes.
     focus_m: Option<Vector>,
@@ -40,7 +40,7 @@ pub struct ContactMap {
     /// How dark it is, and that smoothed along the rows.
     dark_share: Vec<[f32; CONTACT_TEXELS]>,
     across_share: Vec<[f32; CONTACT_TEXELS]>,
-    /// Of squares of texels, row by row: whether it is dark in or right beside them. Mostly it is not.
+    /// Whether it is dark in or right beside a square of texels, row by row. Mostly it is not.
     dark_cells: Vec<bool>,
 }
 

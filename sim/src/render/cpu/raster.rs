@@ -9,12 +9,12 @@ use crate::render::shading::lanes::LANES;
 pub struct Grid {
     pub width: usize,
     pub height: usize,
-    /// Between neighbours, in the unit that triangles are given in.
+    /// Distance between neighbours, in the unit that triangles are given in.
     pub pitch_px: f64,
 }
 
 impl Grid {
-    /// From a row to the next: rows consist of whole blocks, the last of which may reach beyond the picture.
+    /// Distance from a row to the next: rows consist of whole blocks, the last of which may reach beyond the picture.
     pub fn stride(self) -> usize {
         self.width.next_multiple_of(LANES)
     }
@@ -45,7 +45,7 @@ impl<T: Copy> SampleRows<T> {
         &mut self.numbers[start..start + self.grid.width]
     }
 
-    /// Makes every number what it is there.
+    /// Copies every number of another grid.
     pub fn copy(&mut self, other: &SampleRows<T>) {
         self.grid = other.grid;
         self.numbers.clone_from(&other.numbers);
@@ -101,7 +101,7 @@ struct Span {
 const ROWS: usize = 4;
 /// A triangle is small if it is no higher, and reaches into no more than two blocks of each row.
 const SMALL_ROWS: u32 = 16;
-/// So far beyond its edges, in parts of their lengths, a small triangle is drawn: f32 then leaves no gaps.
+/// A small triangle is drawn this far beyond its edges, in parts of their lengths: f32 then leaves no gaps.
 const OVERLAP: f32 = 1e-5;
 const LANE: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
@@ -258,7 +258,7 @@ impl Span {
         let (start, step) = (simd.splat_f32s(self.start_value), simd.splat_f32s(self.step_value));
         let length = simd.splat_f32s((self.end - self.first) as f32);
         let before = simd.splat_f32s(self.first as f32 - (first * lanes) as f32);
-        // Of each sample, how far it is from the first of the span.
+        // How far each sample is from the first of the span.
         let mut offset = simd.sub_f32s(S::as_simd_f32s(&LANE).0[0], before);
         for vector in first..=last {
             let inside = simd.and_m32s(

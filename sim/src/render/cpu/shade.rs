@@ -9,7 +9,7 @@ use crate::render::shading::lanes::{Affine, LANES, Lanes, axes, lanes};
 use crate::render::shading::{CONTACT, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, SAMPLES, SUN, TO_SUN};
 use crate::render::{Camera, Carrier, Pattern, PlacedScenery};
 
-/// As many points as are shaded together: enough for a loop to be worth its beginning, few enough to stay near the processor.
+/// So many points are shaded together: enough for a loop to be worth its beginning, few enough to stay near the processor.
 pub(super) const BATCH: usize = 64;
 /// Points are worked on in whole blocks, the last of which may reach beyond the batch.
 const ROOM: usize = BATCH + LANES;
@@ -30,7 +30,7 @@ pub(super) struct Facet {
 /// Where the rays of a picture's samples begin, and how they go in the world, to a depth of 1 m.
 pub(super) struct Rays {
     eye_m: Vector,
-    /// Through the first sample, and from one to the next.
+    /// The ray through the first sample, and the steps from one to the next.
     first_ray: Vector,
     right_ray: Vector,
     down_ray: Vector,
@@ -41,7 +41,7 @@ pub(super) struct Strip<'a> {
     pub facet: &'a Facet,
     /// Column and row of the first sample.
     pub sample: [usize; 2],
-    /// From the first sample to the right.
+    /// Nearness of the samples, from the first one to the right.
     pub nearness_1_m: &'a [f32],
     pub first_pixel: usize,
     pub count: usize,
@@ -53,15 +53,15 @@ pub(super) struct Strip<'a> {
 /// several of them are done at once.
 pub(super) struct Surfaces {
     count: usize,
-    /// In the world, as the directions are.
+    /// Points in the world; the directions are in the world, too.
     point_m: Vectors,
-    /// From the camera to the point; of any length, as the normal is.
+    /// Rays from the camera to the points; they have any length, as the normals have.
     ray: Vectors,
     normal: Vectors,
     albedo: Vectors,
     /// What contacts leave of all light.
     open_share: [f32; ROOM],
-    /// For each, the pixel and how much it counts there.
+    /// The pixel of each point, and how much it counts there.
     pixels: [u32; ROOM],
     pixel_share: [f32; ROOM],
     /// Place in the shadow map.
@@ -294,7 +294,7 @@ impl Facet {
         }
     }
 
-    /// Of any length.
+    /// Normals of any length.
     #[inline(always)]
     fn normals<const N: usize>(&self, point_m: &[Lanes<N>; 3]) -> [Lanes<N>; 3] {
         let normal = axes(|axis| [self.normal[axis]; N]);
@@ -307,7 +307,7 @@ impl Facet {
         )
     }
 
-    /// Linear.
+    /// Linear colours of the surface, without light.
     #[inline(always)]
     fn albedo<const N: usize>(&self, point_m: &[Lanes<N>; 3]) -> [Lanes<N>; 3] {
         let [first, second] = self.linear_rgb;

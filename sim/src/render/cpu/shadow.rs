@@ -29,7 +29,7 @@ pub(super) struct ShadowMap {
     still: ShadowLayer,
     /// The shadows of everything.
     all: ShadowLayer,
-    /// Of each row of cells, the columns of those in which `all` may differ from `still`.
+    /// For each row of cells, the columns of those in which `all` may differ from `still`.
     moving: Vec<Range<usize>>,
     corners: Vec<[f32; 3]>,
 }

@@ -115,7 +115,7 @@ impl Target {
         self.grid.height
     }
 
-    /// Of the samples of a row.
+    /// Nearness of the samples of a row.
     pub(super) fn nearness_1_m(&self, row: usize) -> &[f32] {
         self.nearness_1_m.row(row)
     }

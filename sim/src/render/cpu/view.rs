@@ -15,7 +15,7 @@ const PER_PIXEL: usize = SAMPLES * SAMPLES;
 /// A filled target, ready to be shaded.
 pub(super) struct View<'a> {
     pub prepared: &'a Prepared,
-    /// Of each sheet.
+    /// The facet of each sheet.
     pub facets: &'a [Facet],
     pub target: &'a Target,
     pub shadow: &'a ShadowMap,
@@ -65,7 +65,7 @@ impl View<'_> {
                 x += 1;
                 continue;
             }
-            // Of one sheet as far as they are plain: an edge would be in the last of them.
+            // Pixels show one sheet as far as they are plain: an edge would be in the last of them.
             let most = row.sum_rgb.len().min(x + row.surfaces.room());
             let end = (x + 1..most).find(|x| !plain(&row.edges, *x)).unwrap_or(most);
             self.show(row, x..end, [x * SAMPLES, y * SAMPLES], rows[0][x * SAMPLES], 1.0);
@@ -187,7 +187,7 @@ impl Default for SrgbTable {
 }
 
 impl SrgbTable {
-    /// Bytes of linear numbers.
+    /// Writes the bytes of linear numbers.
     #[inline(always)]
     pub(super) fn encode(&self, linear_values: &[f32], bytes: &mut [u8]) {
         let (value_blocks, values) = linear_values.as_chunks::<LANES>();

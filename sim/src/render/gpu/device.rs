@@ -99,7 +99,7 @@ fn rank(adapter: &Adapter) -> u32 {
     }
 }
 
-/// As `llvmpipe (LLVM 15.0.6, 256 bits) (Vulkan)`.
+/// Name as in `llvmpipe (LLVM 15.0.6, 256 bits) (Vulkan)`.
 fn name(adapter: &Adapter) -> String {
     let info = adapter.get_info();
     format!("{} ({:?})", info.name, info.backend)

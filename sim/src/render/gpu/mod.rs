@@ -50,7 +50,7 @@ struct GpuRenderer {
     /// Where the parts are in the device's memory, and what the shadow is of.
     placed: Option<PlacedScenery>,
     contact: ContactMap,
-    /// Of the last picture's size.
+    /// Targets of the last picture's size.
     targets: Option<Targets>,
     embedded: Option<Box<dyn Renderer>>,
 }

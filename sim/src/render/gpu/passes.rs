@@ -20,7 +20,7 @@ pub(super) struct Passes {
     /// What the first passes have drawn, and where the picture goes.
     pub targets: BindGroupLayout,
     pub shadow: RenderPipeline,
-    /// Of samples, and of centres.
+    /// Passes over samples, and over centres.
     pub triangles: RenderPipeline,
     pub resolve: ComputePipeline,
 }

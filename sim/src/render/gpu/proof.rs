@@ -6,7 +6,7 @@ use crate::render::cpu::CpuRenderer;
 use crate::render::{Camera, Carrier, Frame, Part, Pattern, PlacedScenery, Scenery, TriangleMesh};
 
 const SIDE_PX: u32 = 64;
-/// Of the pixels, as many may show another thing: on edges, renderers may decide otherwise.
+/// So large a share of the pixels may show another thing: on edges, renderers may decide otherwise.
 const STRAY_IDS: f32 = 0.02;
 /// Mean difference of colours, in steps of 255.
 const MEAN_DIFFERENCE: f32 = 1.0;

@@ -12,7 +12,7 @@ use crate::render::scene::prepared::Prepared;
 use crate::render::shading::{CONTACT_TEXELS, SAMPLES, sun_map};
 use crate::render::{Camera, Carrier, Part, Pattern, PlacedScenery};
 
-/// Of `picture.wgsl`'s `View`, and of its `Part`.
+/// Numbers in `picture.wgsl`'s `View`, and in its `Part`.
 const VIEW_NUMBERS: usize = 48;
 const PART_NUMBERS: usize = 24;
 

@@ -33,7 +33,7 @@ impl TriangleMesh {
 }
 
 impl Bend {
-    /// Of a plane, else of a cylinder along z, else of a sphere, else of these corners alone.
+    /// The bend of a plane, else of a cylinder along z, else of a sphere, else of these corners alone.
     fn of(corners: &[Vertex; 3]) -> Bend {
         let [a, b, c] = corners;
         let flat = Bend { normal: a.normal, slope_1_m: None };

@@ -54,7 +54,7 @@ pub const NEAR_M: f32 = 0.01;
 /// Cameras of one world, as its files describe them.
 #[derive(Clone, Debug)]
 pub struct Cameras {
-    /// By robot.
+    /// The camera in each robot's head, by robot.
     heads: Vec<MjcfCamera>,
     third_person: Camera,
 }

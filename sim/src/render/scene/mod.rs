@@ -45,12 +45,12 @@ pub enum Carrier {
     Object(usize),
 }
 
-/// Where everything is after a step.
+/// Where every part of a scenery is after a step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlacedScenery {
-    /// Of each part.
+    /// Pose of each part.
     pub world_from_mesh: Vec<Pose>,
-    /// Between the robots: what shadows have to be sharp on. It moves in steps, so that the room's shadows need seldom be drawn.
+    /// The point between the robots, around which shadows have to be sharp. It moves in steps, so that the room's shadows need seldom be drawn.
     pub focus_m: Vector,
 }
 
@@ -62,7 +62,7 @@ const FOCUS_STEP_M: f32 = 0.1;
 const FOCUS_RADIUS_M: f32 = 1.25;
 /// The light stands for lamps at this height: walls and what hangs above them cast no shadow into the room.
 const LAMPS_M: f32 = 2.2;
-/// By robot, in place of the material `accent` of the robot's file.
+/// The accent of each robot, in place of the material `accent` of the robot's file.
 const ACCENTS: [[f32; 4]; 3] = [[0.12, 0.35, 0.85, 1.0], [0.95, 0.48, 0.08, 1.0], [0.15, 0.62, 0.28, 1.0]];
 const ACCENT_MATERIAL: &str = "accent";
 

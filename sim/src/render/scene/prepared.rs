@@ -15,7 +15,7 @@ pub struct Prepared {
     /// Corners of each part's triangles.
     pub points: Vec<Points>,
     pub sheets: Vec<Sheet>,
-    /// Of each triangle, counted part by part, the number of its sheet.
+    /// The number of each triangle's sheet, with triangles counted part by part.
     pub sheet_of: Vec<u32>,
     /// Number of the first triangle of each part.
     first: Vec<usize>,
@@ -25,7 +25,7 @@ pub struct Prepared {
     pub bounds: Vec<(Vector, f32)>,
     /// The two colours of each part.
     pub linear_rgb: Vec<[Vector; 2]>,
-    /// Of each part, which axis of its mesh comes first in its pattern: the one that a grain runs along.
+    /// Which axis of each part's mesh comes first in its pattern: the one that a grain runs along.
     pub grain: Vec<usize>,
 }
 
@@ -60,7 +60,7 @@ impl Prepared {
         }
     }
 
-    /// Of each triangle of a part.
+    /// Numbers of the sheets of a part's triangles.
     pub fn sheets_of(&self, part: usize) -> &[u32] {
         &self.sheet_of[self.first[part]..self.first[part + 1]]
     }
@@ -84,7 +84,7 @@ fn points(part: &Part) -> Points {
     Points::new(part.mesh.vertices.iter().map(|vertex| vertex.position_m))
 }
 
-/// Linear, of a part.
+/// The two linear colours of a part.
 fn colours(part: &Part) -> [Vector; 2] {
     let first = linear(part.rgb);
     [first, part.pattern.second_rgb(first)]

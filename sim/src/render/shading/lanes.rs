@@ -2,7 +2,7 @@
 
 use rapier3d::math::{Matrix, Pose, Vector};
 
-/// As many as the widest registers in common use hold.
+/// As many numbers as the widest registers in common use hold.
 pub const LANES: usize = 8;
 
 /// A block of numbers, or a smaller one.
@@ -24,7 +24,7 @@ pub fn axes<T>(each: impl Fn(usize) -> T) -> [T; 3] {
     [each(0), each(1), each(2)]
 }
 
-/// From points to points: each coordinate is a scalar product, and a number more.
+/// An affine map of points: each coordinate is a scalar product, and a number more.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Affine(pub [(Vector, f32); 3]);
 
@@ -43,7 +43,7 @@ impl Affine {
         Affine([row(0), row(1), row(2)])
     }
 
-    /// What first moves as `pose` does and then as this.
+    /// The map that first moves a point as `pose` does and then as this one.
     pub fn after(self, pose: Pose) -> Affine {
         let back = pose.rotation.inverse();
         Affine(self.0.map(|(axis, constant)| (back * axis, constant + axis.dot(pose.translation))))

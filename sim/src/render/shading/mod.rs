@@ -21,7 +21,7 @@ pub const FROM_ABOVE: Vector = Vector::new(0.40, 0.42, 0.45);
 pub const LAMP: f32 = 0.15;
 /// The sun's reflection: its strength where a surface mirrors the sun to the camera. The exponent of the cosine is 40.
 pub const HIGHLIGHT: f32 = 0.15;
-/// Where nothing is.
+/// Colour where nothing is.
 pub const SKY: Vector = Vector::new(0.45, 0.55, 0.70);
 
 /// How much the outline between two things darkens.
@@ -49,7 +49,7 @@ pub const CONTACT: f32 = 0.5;
 /// Steps of the table from linear light to sRGB bytes.
 pub const SRGB_STEPS: usize = 4096;
 
-/// From points of the world to the shadow's map around a focus: column and row, counted from its corner, and nearness.
+/// Maps points of the world to the shadow's map around a focus: column and row, counted from its corner, and nearness.
 pub fn sun_map(focus_m: Vector, radius_m: f32) -> Affine {
     let half = 0.5 * TEXELS as f32;
     let right = Vector::Z.cross(TO_SUN).normalize() * (half / radius_m);

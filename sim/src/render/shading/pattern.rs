@@ -42,7 +42,7 @@ pub const WORD_GAP: f32 = 0.3;
 pub const WORD_STRAY: f32 = 0.37;
 
 impl Pattern {
-    /// Of a material, by its name.
+    /// The pattern of a material, by its name.
     pub fn of(material: &str) -> Pattern {
         let has = |words: &[&str]| words.iter().any(|word| material.contains(word));
         match () {
@@ -78,7 +78,7 @@ impl Pattern {
         Affine([axis(0), axis(1), axis(2)])
     }
 
-    /// From 0 to 1, at several points of [`Pattern::frame`].
+    /// Shares of the second colour, from 0 to 1, at several points of [`Pattern::frame`].
     #[inline(always)]
     pub(in crate::render) fn shares<const N: usize>(self, points_m: [Lanes<N>; 3]) -> Lanes<N> {
         let [x_m, y_m, z_m] = points_m;
@@ -119,7 +119,7 @@ fn print([x_m, y_m, z_m]: [f32; 3]) -> f32 {
     if wave(line) > TEXT_GAP && word > WORD_GAP { 1.0 } else { 0.0 }
 }
 
-/// Up and down between 0 and 1 with a period of 1.
+/// A wave that goes up and down between 0 and 1 with a period of 1.
 #[inline(always)]
 fn wave(value: f32) -> f32 {
     1.0 - 2.0 * (value - rounded(value)).abs()

@@ -39,7 +39,7 @@ pub(super) struct Object {
     pub name: String,
     pub model: ObjectModel,
     pub link: Option<LinkId>,
-    /// Of a link, as its file calls it.
+    /// Name of a link's joint in its file.
     pub joint: Option<String>,
     /// Where a mark lies; a link's pose is that of dynamics.
     pub world_from_mark: Pose,

@@ -16,7 +16,7 @@ const SIGHT_M: f32 = 10.0;
 /// A rigid body of a file as tasks and pictures see it, in its own frame.
 #[derive(Clone, Debug)]
 pub struct ObjectModel {
-    /// As the file calls it.
+    /// Name of the body in its file.
     pub name: String,
     pub geoms: Vec<Geom>,
     pub sites: Vec<Site>,
