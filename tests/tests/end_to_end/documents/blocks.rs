@@ -30,6 +30,19 @@ fn every_block_of_code_is_what_its_fence_says() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+#[test]
+fn commands_in_the_text_are_accepted() {
+    let mut wrong = Vec::new();
+    for page in pages() {
+        for (line, words) in page.in_backticks() {
+            if let Err(reason) = command_lines::check_mention(&words) {
+                wrong.push(format!("{}: {words}: {reason}", page.at(line)));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
 /// Whether a block that nobody runs is right. Scripts and bodies of tools have tests of their own.
 fn check(block: &Block) -> Result<(), String> {
     match (block.language.as_str(), block.purpose.as_str()) {

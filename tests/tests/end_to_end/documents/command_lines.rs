@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use clap::Parser;
+use clap::{Parser, error::ErrorKind};
 use tandem::cli::Cli;
 
 use super::pages::root;
@@ -36,6 +36,28 @@ pub fn check_args(manifest: &str) -> Result<(), String> {
     let args = VARIABLES.iter().fold(args.to_owned(), |text, (name, value)| text.replace(name, value));
     let args: Vec<&str> = args.split(',').map(str::trim).collect();
     check_tandem(&args)
+}
+
+/// Checks a command that prose mentions: it may leave out what has to be given besides, as a file. Other words in backticks pass.
+pub fn check_mention(text: &str) -> Result<(), String> {
+    let found = commands(text);
+    let words: Vec<&str> = found.first().into_iter().flatten().map(String::as_str).collect();
+    match words.as_slice() {
+        ["tandem", "SUBCOMMAND", ..] | ["cargo", "run", "--release", "--"] | ["cargo", "+nightly", ..] => {
+            Ok(())
+        }
+        ["tandem", args @ ..] => match Cli::try_parse_from([&["tandem"], args].concat()) {
+            Err(error)
+                if [ErrorKind::MissingRequiredArgument, ErrorKind::DisplayHelp].contains(&error.kind()) =>
+            {
+                Ok(())
+            }
+            _ if args.is_empty() => Ok(()),
+            parsed => parsed.map(drop).map_err(|error| error.to_string()),
+        },
+        ["cargo" | "python" | "pip", _, ..] => check_command(&words),
+        _ => Ok(()),
+    }
 }
 
 fn check_command(words: &[&str]) -> Result<(), String> {
@@ -226,6 +248,9 @@ fn what_would_not_work_is_refused() {
     ] {
         assert!(check(script).is_err(), "{script}");
     }
+    assert!(
+        check_mention("tandem replay --verfy").is_err() && check_mention("tandem replay --verify").is_ok()
+    );
     check("cargo test -p tandem-sim --release --test simulation odometry").expect("a test that is there");
     check("B=1 srun tandem evaluate --shard $SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT")
         .expect("a command line");

@@ -77,12 +77,10 @@ fn is_own_path(word: &str) -> bool {
 fn files_that_are_named_are_there() {
     let mut wrong = Vec::new();
     for page in all_documents() {
-        for (index, line) in page.text.lines().enumerate() {
-            for word in line.split('`').skip(1).step_by(2).filter(|word| is_own_path(word)) {
-                let known = word.split_once('*').map_or(word, |(folder, _)| folder);
-                if !root().join(known).exists() {
-                    wrong.push(format!("{}: there is no {word}", page.at(index + 1)));
-                }
+        for (line, word) in page.in_backticks().into_iter().filter(|(_, word)| is_own_path(word)) {
+            let known = word.split('*').next().unwrap_or(&word);
+            if !root().join(known).exists() {
+                wrong.push(format!("{}: there is no {word}", page.at(line)));
             }
         }
     }

@@ -109,17 +109,33 @@ impl Page {
         blocks
     }
 
-    /// The lines outside of blocks of code, with their numbers from 1, and without what stands in backticks.
-    pub fn prose(&self) -> Vec<(usize, String)> {
+    /// The lines outside of blocks of code, with their numbers from 1.
+    fn lines(&self) -> Vec<(usize, &str)> {
         let mut fenced = false;
         let mut lines = Vec::new();
         for (index, line) in self.text.lines().enumerate() {
             if line.trim_start().starts_with("```") {
                 fenced = !fenced;
             } else if !fenced {
-                lines.push((index + 1, line.split('`').step_by(2).collect::<Vec<_>>().join("`")));
+                lines.push((index + 1, line));
             }
         }
         lines
+    }
+
+    /// The text without blocks of code and without what stands in backticks, by lines.
+    pub fn prose(&self) -> Vec<(usize, String)> {
+        let outside = |line: &str| line.split('`').step_by(2).collect::<Vec<_>>().join("`");
+        self.lines().into_iter().map(|(number, line)| (number, outside(line))).collect()
+    }
+
+    /// What stands in backticks, with the numbers of the lines.
+    pub fn in_backticks(&self) -> Vec<(usize, String)> {
+        let inside = |(number, line): (usize, &'_ str)| {
+            let words: Vec<_> =
+                line.split('`').skip(1).step_by(2).map(|words| (number, words.to_owned())).collect();
+            words
+        };
+        self.lines().into_iter().flat_map(inside).collect()
     }
 }
