@@ -11,7 +11,6 @@ use tandem::{
 use super::{
     command_lines,
     pages::{Block, Page, pages, root},
-    scripts,
 };
 
 /// The scene that `xml,scene` shows.
@@ -79,7 +78,7 @@ fn in_a_file(block: &Block, read: impl Fn(&str) -> Result<(), String>) -> Result
 
 /// Whether Python reads it; without Python nobody knows.
 fn compile(block: &Block) -> Result<(), String> {
-    if !scripts::is_installed("python3") {
+    if !is_installed("python3") {
         println!("skipped: no python3 to compile a block with");
         return Ok(());
     }
@@ -91,6 +90,16 @@ fn compile(block: &Block) -> Result<(), String> {
             false => Err(String::from_utf8_lossy(&compiled.stderr).into_owned()),
         }
     })
+}
+
+/// Whether a program can be called.
+pub fn is_installed(program: &str) -> bool {
+    succeeds(Command::new(program).arg("--version"))
+}
+
+/// Whether a command ends well.
+pub fn succeeds(command: &mut Command) -> bool {
+    command.output().is_ok_and(|output| output.status.success())
 }
 
 /// Parts of a document have no single root, so they are given one.

@@ -19,5 +19,6 @@ mod bodies;
 mod command_lines;
 mod links;
 mod pages;
+#[cfg(unix)]
 mod scripts;
 mod tables;

@@ -16,7 +16,10 @@ use clap::Parser;
 use tandem::cli::Cli;
 use tandem_tests::TestServer;
 
-use super::pages::{Page, pages, root};
+use super::{
+    blocks::{is_installed, succeeds},
+    pages::{Page, pages, root},
+};
 
 /// Where pages say that a server is.
 const ADDRESS: &str = "127.0.0.1:8700";
@@ -82,15 +85,6 @@ fn this_program_is_tandem_where_a_script_calls_it() {
         }
     };
     exit(code);
-}
-
-/// Whether a program can be called.
-pub fn is_installed(program: &str) -> bool {
-    succeeds(Command::new(program).arg("--version"))
-}
-
-fn succeeds(command: &mut Command) -> bool {
-    command.output().is_ok_and(|output| output.status.success())
 }
 
 /// All blocks of a page in one language that are to be run, as one text.
