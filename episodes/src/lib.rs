@@ -1,4 +1,20 @@
 //! Episodes: tasks and their phases, budgets, grasp detection, and the session that runs tool calls on a world.
+//!
+//! A [`Session`] is one episode. It answers tool calls, and its result says which phases they reached:
+//!
+//! ```
+//! use tandem_episodes::{EpisodeError, EpisodeSpec, Session, tasks};
+//! use tandem_tools_spec::{GetStatus, Protocol, Wait};
+//!
+//! let spec = EpisodeSpec::new(tasks::find("handover")?, 0, Protocol::Benchmark);
+//! let mut session = Session::start(&spec, None)?;
+//! session.call(Wait { steps: 10 }.into())?;
+//! session.call(GetStatus {}.into())?;
+//! let result = session.close();
+//! assert_eq!((result.env_steps, result.tool_calls), (10, 2));
+//! assert_eq!(result.phases.reached_s("p1"), None);
+//! # Ok::<(), EpisodeError>(())
+//! ```
 
 pub mod bench;
 mod commands;

@@ -99,7 +99,7 @@ pub mod html {
 pub mod webp {
     use webp_animation::{ColorMode, Encoder, EncoderOptions, EncodingConfig, Error};
 
-    /// Of 100; the robots' edges stay clean.
+    /// Quality from 0 to 100; at this one the robots' edges stay clean.
     const QUALITY: f32 = 80.0;
 
     /// One RGB picture, three bytes a pixel, as a file.

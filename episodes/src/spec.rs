@@ -48,7 +48,7 @@ pub enum RobotFile {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SceneFile {
     pub path: PathBuf,
-    /// Of the content when the episode was planned; see [`Document::fingerprint`].
+    /// Hash of the content when the episode was planned; see [`Document::fingerprint`].
     pub xxh3: String,
 }
 
@@ -67,12 +67,12 @@ pub enum Controller {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Start {
-    /// At the task's own beginning under the seed.
+    /// It begins at the task's own beginning under the seed.
     #[default]
     Task,
-    /// Where another episode of the same task, seed, protocol, robot and controller stood: a [`crate::Checkpoint`]'s file.
+    /// It begins where another episode of the same task, seed, protocol, robot and controller stood: a [`crate::Checkpoint`]'s file.
     Checkpoint(PathBuf),
-    /// Where a phase began in a recorded episode of the same task, seed, robot and controller, with the whole budget ahead.
+    /// It begins where a phase began in a recorded episode of the same task, seed, robot and controller, with the whole budget ahead.
     Phase(PhaseStart),
 }
 
@@ -81,7 +81,7 @@ pub enum Start {
 pub struct PhaseStart {
     /// An `episode.mcap`.
     pub recording: PathBuf,
-    /// Its number, as `p2`.
+    /// The phase's number, as `p2`.
     pub phase: String,
 }
 
@@ -120,7 +120,7 @@ impl Default for RobotFile {
 }
 
 impl RobotFile {
-    /// For messages: the embedded file's name, or the path.
+    /// The embedded file's name, or the path, for messages.
     pub fn name(&self) -> String {
         match self {
             RobotFile::Embedded(name) => name.clone(),

@@ -22,7 +22,7 @@ impl Count {
     }
 }
 
-/// Exact 95 % interval of a rate (Clopper and Pearson, 1934): the limits are quantiles of beta distributions.
+/// The exact 95 % interval of a rate (Clopper and Pearson, 1934): the limits are quantiles of beta distributions.
 pub fn clopper_pearson(count: Count) -> [f64; 2] {
     let (k, n) = (count.successes as f64, count.trials as f64);
     let quantile = |a: f64, b: f64, p: f64| Beta::new(a, b).map_or(f64::NAN, |beta| beta.inverse_cdf(p));
@@ -53,7 +53,7 @@ pub fn mean_share(counts: &[Count]) -> Option<(f64, [f64; 2])> {
     (!known.is_empty()).then(|| (mean, [mean - reach(0), mean + reach(1)]))
 }
 
-/// How two policies fared on the same episodes.
+/// Which of two policies succeeded on the same episodes, counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Pairs {
     pub both: usize,

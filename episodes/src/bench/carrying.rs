@@ -27,9 +27,9 @@ pub struct CarryingCase {
 
 /// Part of a way, from rest to rest.
 struct PathLeg {
-    /// Ahead and to the left, as the robots look at the beginning.
+    /// Distances ahead and to the left, as the robots look at the beginning.
     by_m: [f32; 2],
-    /// Of the bar about its middle.
+    /// How far the bar turns about its middle.
     turn_rad: f32,
 }
 
@@ -91,14 +91,14 @@ pub fn run(case: &CarryingCase, controller: &Controller, seeds: usize) -> Result
 
 /// What came of a bar that was carried to the end of its way.
 struct CarryResult {
-    /// Of the robot that ends up the most turned.
+    /// The heading error of the robot that ends up the most turned.
     heading_error_deg: f32,
-    /// The bar's middle from the end of its way, and the farthest from the way itself.
+    /// How far the bar's middle is from the end of its way, and the farthest that it was from the way itself.
     final_drift_m: f32,
     off_way_m: f32,
     /// The most that the bar was ever tilted.
     tilt_deg: f32,
-    /// Of a robot.
+    /// The mean power of a robot.
     power_w: f32,
 }
 
@@ -161,14 +161,14 @@ impl PathLeg {
     }
 }
 
-/// After one command.
+/// What there was after one command.
 struct LogEntry {
     bar: Pose,
     pelvises: Vec<Pose>,
     power_w: f32,
 }
 
-/// An episode that keeps what happens while the bar is aloft.
+/// An episode that logs what happens while the bar is aloft.
 struct LoggedEpisode<'a> {
     episode: InProcess,
     aloft: &'a Cell<Option<Pose>>,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{EvaluationError, EvaluationPlan};
 use crate::output::write_whole;
 use crate::players::{EpisodeOutput, PlayError, PlayOutcome};
-use crate::results::{PlayedEpisode, RESULT_FILE, missed};
+use crate::results::{PlayedEpisode, RESULT_FILE, missed_phase_note};
 use crate::spec::{EpisodeSpec, Start};
 use crate::{CheckpointError, EpisodeError};
 
@@ -71,7 +71,7 @@ impl EpisodeCache<'_> {
             spec: spec.clone(),
             locomotion: self.locomotion.clone(),
             build: self.build.into(),
-            note: stopped.or_else(|| missed(&result, spec.start_phase())),
+            note: stopped.or_else(|| missed_phase_note(&result, spec.start_phase())),
             thought_s: thought.as_secs_f64(),
             result,
         };

@@ -17,7 +17,7 @@ pub struct EvaluationPlan<'a> {
     /// Who plays.
     pub player: &'a dyn Policy,
     pub protocol: Protocol,
-    /// In place of the tasks' own scenes.
+    /// The scene, in place of the tasks' own.
     pub scene: Option<SceneFile>,
     pub robot: RobotFile,
     pub locomotion: Controller,
@@ -39,9 +39,9 @@ pub struct EvaluationPlan<'a> {
 /// Where the episodes begin.
 #[derive(Clone, Debug)]
 pub enum Starts {
-    /// At the task's own beginning; every phase counts.
+    /// They begin at the task's own beginning, and every phase counts.
     Task,
-    /// Where one of these phases began in a demonstration of the same task and seed; that phase alone counts.
+    /// Each begins where one of these phases began in a demonstration of the same task and seed, and that phase alone counts.
     Phases {
         /// What `tandem collect` or `tandem serve` wrote.
         demonstrations: PathBuf,
@@ -58,7 +58,7 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// All of it.
+    /// The share of a process that plays everything.
     pub const WHOLE: Shard = Shard { index: 0, of: 1 };
 }
 

@@ -29,9 +29,9 @@ pub struct Evaluation {
     pub locomotion: String,
     pub disclosure: Disclosure,
     pub hints: Hints,
-    /// Of the episodes that began at their task's beginning.
+    /// How the episodes went that began at their task's beginning.
     pub tasks: BTreeMap<String, TaskSummary>,
-    /// Of those that began at a phase.
+    /// How those went that began at a phase.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub phase_level: Option<PhaseLevel>,
     /// Episodes that could not be begun, and why.

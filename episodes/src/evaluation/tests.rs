@@ -6,7 +6,7 @@ use tandem_sim::render::RendererKind;
 use tandem_tools_spec::{Disclosure, EndReason, Hints, PhaseTimes, Protocol, ResultReply};
 
 use super::*;
-use crate::results::{PhaseLevel, missed, write_result};
+use crate::results::{PhaseLevel, missed_phase_note, write_result};
 use crate::spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, Start};
 use crate::tasks::{self, Task};
 use crate::{players, scoring::Phase};
@@ -45,7 +45,7 @@ fn played(cache: &EpisodeCache, spec: &EpisodeSpec) -> PlayedEpisode {
 fn the_first_phase_that_was_missed_is_noted() {
     let note = |times: [Option<f64>; 3]| {
         let phases = ["p1", "p2", "p3"].into_iter().map(String::from).zip(times).collect();
-        missed(&result("handover", 7, phases), None)
+        missed_phase_note(&result("handover", 7, phases), None)
     };
     let second = note([Some(4.2), None, None]);
     assert_eq!(second.as_deref(), Some("p2 was not reached in 812 steps"));
@@ -54,8 +54,8 @@ fn the_first_phase_that_was_missed_is_noted() {
     // Where one phase counts, no other is missed.
     let times = [Some(4.2), Some(5.0), None].into_iter().enumerate();
     let result = result("handover", 7, times.map(|(i, time_s)| (Phase::number(i), time_s)).collect());
-    assert_eq!(missed(&result, Some(1)), None);
-    assert_eq!(missed(&result, Some(2)).as_deref(), Some("p3 was not reached in 812 steps"));
+    assert_eq!(missed_phase_note(&result, Some(1)), None);
+    assert_eq!(missed_phase_note(&result, Some(2)).as_deref(), Some("p3 was not reached in 812 steps"));
 }
 
 fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> EvaluationPlan<'static> {

@@ -5,7 +5,7 @@ use tandem_tools_spec::Wait;
 use super::{Episode, Player, PlayerError};
 use crate::tasks::Task;
 
-/// As many as the agentic protocol allows.
+/// The agentic protocol allows no more.
 const STEPS_PER_COMMAND: u32 = 25;
 
 /// Waits for as long as the benchmark protocol lasts.

@@ -10,7 +10,7 @@ use crate::{EpisodeError, Session};
 /// An episode in this process.
 pub struct InProcess {
     pub session: Session,
-    /// Number of phases after which it is over for the player, whatever is left of it.
+    /// The number of phases after which the episode is over for the player, whatever is left of it.
     until: usize,
 }
 

@@ -1,5 +1,5 @@
-//! Who acts in an episode. A player makes tool calls; those that solve a task by looking behind the curtain say so in
-//! their type, and nobody else can be handed what is there.
+//! Who acts in an episode. A player makes tool calls; those that solve a task by knowing what only the simulator knows say so in
+//! their type, and nobody else can be handed it.
 //!
 //! To add a player: one file or folder here and its line in [`ALL`].
 
@@ -18,19 +18,19 @@ use crate::spec::EpisodeSpec;
 pub use in_process::InProcess;
 pub use policy::{EpisodeOutput, PlayError, PlayOutcome, Policy, play_in_process};
 
-/// Makes tool calls on one episode, which is in this process or behind HTTP.
+/// One episode, in this process or behind HTTP, as a player acts on it: by tool calls.
 pub trait Episode {
     fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError>;
 }
 
-/// A caller who also sees what no policy does.
+/// An episode that also shows what no policy is told.
 pub trait PrivilegedEpisode: Episode {
     fn facts(&mut self) -> Result<Facts, PlayerError>;
 }
 
 /// An episode in the caller's own process, which shows views as they were drawn.
 pub trait LocalEpisode: Episode {
-    /// As a call of `observe`.
+    /// What a call of `observe` shows, as it was drawn.
     fn observe(&mut self, observe: &Observe) -> Result<TeamObservation, PlayerError>;
 
     /// The room, seen from where no robot stands: more than a policy has, and results say so.
@@ -42,7 +42,7 @@ pub trait Player {
     fn play(&mut self, episode: &mut dyn Episode) -> Result<(), PlayerError>;
 }
 
-/// Plays one episode to its end with a look at the facts; made anew for each episode.
+/// Plays one episode to its end with knowledge of the facts; made anew for each episode.
 pub trait PrivilegedPlayer {
     fn play(&mut self, episode: &mut dyn PrivilegedEpisode) -> Result<(), PlayerError>;
 }

@@ -36,7 +36,7 @@ impl<'a> EpisodeOutput<'a> {
     }
 }
 
-/// How a policy fared.
+/// What came of an episode that a policy played.
 #[derive(Debug)]
 pub struct PlayOutcome {
     pub result: ResultReply,

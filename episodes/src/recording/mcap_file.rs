@@ -144,10 +144,10 @@ fn string_map(entries: &[(&str, &str)]) -> BTreeMap<String, String> {
 /// When a recording can be read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Visibility {
-    /// Under way, as `episode.mcap.partial`.
+    /// It can be read under way, as `episode.mcap.partial`.
     #[default]
     Live,
-    /// After the end. Nobody can look behind the curtain meanwhile, and a process that is killed leaves nothing.
+    /// It can be read after the end. Nobody sees meanwhile what policies are not told, and a process that is killed leaves nothing.
     After,
 }
 

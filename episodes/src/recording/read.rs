@@ -108,7 +108,7 @@ impl Recording {
         }))
     }
 
-    /// Number and state hash of every step, that before the first one included.
+    /// The number and the state hash of every step, that before the first one included.
     pub fn state_hashes(
         &self,
     ) -> Result<impl Iterator<Item = Result<(u64, String), RecordingError>>, RecordingError> {

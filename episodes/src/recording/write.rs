@@ -30,7 +30,7 @@ pub struct RecordingHeader {
     pub renderer: String,
     /// Which build of Tandem plays it.
     pub build: String,
-    /// In their order in the world.
+    /// The robots, in their order in the world.
     pub robots: Vec<RobotSheet>,
     /// What scoring remembers where the recording begins.
     pub scores: ScoreMemory,

@@ -25,7 +25,7 @@ use crate::tasks::Task;
 pub struct PicturesPlan {
     /// Pictures a second of each camera.
     pub rate_hz: u32,
-    /// Of every camera's pictures, where it is not to be the camera's own.
+    /// Size of every camera's pictures, where it is not to be the camera's own.
     pub size: Option<PictureSize>,
     /// Threads that draw.
     pub jobs: usize,
@@ -36,7 +36,7 @@ pub struct PicturesPlan {
 pub struct DrawnPictures {
     /// Moments at which every camera has a picture.
     pub moments: usize,
-    /// Of these, how many an earlier run had drawn.
+    /// How many of these an earlier run had drawn.
     pub kept: usize,
     pub cameras: usize,
 }
@@ -64,7 +64,7 @@ impl From<ReplayError> for PicturesError {
 #[derive(PartialEq, Serialize, Deserialize)]
 struct Manifest {
     spec: EpisodeSpec,
-    /// Of the state that the episode ended in, or of its last recorded one.
+    /// Hash of the state that the episode ended in, or of its last recorded one.
     state_hash: String,
     rate_hz: u32,
     depth_unit_m: f64,
@@ -82,7 +82,7 @@ struct CameraEntry {
     cy: f32,
 }
 
-/// Where a camera was, in `poses.json`: x right, y down, z along the optical axis, as OpenCV has it.
+/// Where a camera was, an entry of `poses.json`: x right, y down, z along the optical axis, as OpenCV has it.
 #[derive(Serialize)]
 struct CameraPose {
     control_step: u64,

@@ -1,4 +1,4 @@
-//! What there is to see in a recorded episode, drawn from its steps: nothing is simulated.
+//! The cameras of a recorded episode, and pictures drawn from its steps: nothing is simulated.
 
 use tandem_sim::Step;
 use tandem_sim::render::{Camera, Frame};
@@ -13,7 +13,7 @@ use crate::tasks::Task;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EpisodeCamera {
     ThirdPerson,
-    /// In the head of robot number so-and-so.
+    /// The camera in the head of the robot with this index.
     Egocentric(usize),
 }
 
@@ -56,7 +56,7 @@ pub struct EpisodeRenderer {
 }
 
 impl EpisodeRenderer {
-    /// Of the episode `spec`, at rest.
+    /// Draws the episode `spec`, whose world is built for it and stays at rest.
     pub fn of(spec: &EpisodeSpec) -> Result<EpisodeRenderer, EpisodeError> {
         Ok(EpisodeRenderer { observer: Observer::new(spec.renderer, &build(spec)?.world) })
     }

@@ -104,7 +104,7 @@ enum FilmWriter {
     Mp4(Child),
 }
 
-/// From 1, the slowest, to 30.
+/// The speed of the GIF encoder, from 1, the slowest, to 30.
 const GIF_SPEED: i32 = 10;
 
 impl FilmWriter {

@@ -85,7 +85,7 @@ impl From<&str> for PolicyCard {
 }
 
 /// The first phase that was not reached; where one phase counts, that one.
-pub fn missed(result: &ResultReply, counts: Option<usize>) -> Option<String> {
+pub fn missed_phase_note(result: &ResultReply, counts: Option<usize>) -> Option<String> {
     let counted = |index: usize| counts.is_none_or(|only| only == index);
     let phases = result.phases.0.iter().enumerate();
     let (_, (phase, _)) =

@@ -12,11 +12,11 @@ use crate::tasks;
 /// The rates of all phases that were begun at.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhaseLevel {
-    /// In the order of the tasks and their phases.
+    /// The rates in the order of the tasks and their phases.
     pub phases: Vec<PhaseRate>,
     /// Mean of the rates of phases that one robot works on at a time; `None` where there is none.
     pub non_collaborative_share: Option<f64>,
-    /// Of phases on which robots work together.
+    /// Mean of the rates of phases on which robots work together.
     pub collaborative_share: Option<f64>,
     /// How much lower the second is, as a share of the first.
     pub drop_share: Option<f64>,
@@ -26,9 +26,9 @@ pub struct PhaseLevel {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhaseRate {
     pub task: &'static str,
-    /// As `transfer`.
+    /// The phase's id, as `transfer`.
     pub id: &'static str,
-    /// As `p2`.
+    /// The phase's number, as `p2`.
     pub number: String,
     pub collaborative: bool,
     pub episodes: usize,

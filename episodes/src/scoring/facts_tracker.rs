@@ -1,4 +1,4 @@
-//! Watches an episode step by step, and says what scoring and experts may know of it.
+//! Follows an episode step by step, and says what scoring and experts may know of it.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use super::grasps::ObjectGrasps;
 /// What is known of every object by the steps seen so far.
 #[derive(Clone, Debug)]
 pub struct FactsTracker {
-    /// Of each object, as its file has it.
+    /// The model of each object, as its file has it.
     models: Vec<Arc<ObjectModel>>,
     memory: Vec<ObjectMemory>,
 }

@@ -12,7 +12,7 @@ pub const HOLD_BEGINS_N: f32 = 1.5;
 pub const HOLD_ENDS_N: f32 = 0.5;
 /// Presses count as opposed if the angle between them is at least 120 degrees.
 const OPPOSED_COSINE: f32 = -0.5;
-/// For how many control steps in a row the evidence must last before a hold begins or ends: 60 ms.
+/// How many control steps in a row the evidence must last before a hold begins or ends: 60 ms.
 pub const STEPS_TO_CHANGE: u32 = 3;
 
 /// The detector of one hand and one object.
@@ -61,7 +61,7 @@ fn opposed_press_n(contacts: &HandContacts) -> f32 {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ObjectGrasps {
     object: String,
-    /// By robot.
+    /// The detectors of each robot's hands.
     detectors: Vec<Sides<GraspDetector>>,
     /// Control steps since a hand last touched the object.
     untouched_steps: u32,

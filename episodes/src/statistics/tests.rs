@@ -1,4 +1,4 @@
-//! Against what scipy and statsmodels compute; `tests/peers/numerics/statistics.py` writes their figures anew.
+//! Our figures against those of scipy and statsmodels; `tests/peers/numerics/statistics.py` writes their figures anew.
 
 use serde::Deserialize;
 

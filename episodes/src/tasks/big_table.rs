@@ -10,7 +10,7 @@ use super::{Offset, RobotSpot, Task, spot, uniform_xy};
 use crate::scoring::placement::{stands_as_high, stands_released};
 use crate::scoring::{A, B, C, Done, Facts, Phase};
 
-/// From the middle of the table to the robots round it, which look at it.
+/// How far the robots stand from the middle of the table, which they look at.
 const HOLDER_M: f32 = 0.803;
 /// B stands a third of a turn after A, C before.
 const SINE: f32 = 0.866_025_4;

@@ -60,7 +60,7 @@ pub struct RobotSpot {
     pub position_m: [f32; 2],
     /// Which way it faces; 0 is along world x.
     pub yaw_rad: f32,
-    /// For a policy that directs this robot alone.
+    /// What has to be done, for a policy that directs this robot alone.
     pub instruction: &'static str,
 }
 

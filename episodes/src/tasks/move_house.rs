@@ -15,7 +15,7 @@ use crate::scoring::{B, C, Done, Facts, Milestone, Phase};
 
 const START_X_M: f32 = -1.95;
 const GOAL_X_M: f32 = 1.15;
-/// From the middle of the table to a robot that holds its end.
+/// How far a robot that holds an end of the table stands from its middle.
 const HOLDER_M: f32 = 0.753;
 const FEET: [&str; 4] = ["foot_1", "foot_2", "foot_3", "foot_4"];
 const RAILS: [&str; 4] = ["b_left", "b_right", "c_left", "c_right"];

@@ -16,7 +16,7 @@ pub struct Offset {
     pub yaw_rad: RangeInclusive<f32>,
 }
 
-/// Up to `x_m` and `y_m` either way along world x and y, independently.
+/// An offset of up to `x_m` and `y_m` either way along world x and y, independently.
 pub const fn uniform_xy(objects: &'static [&'static str], x_m: f32, y_m: f32) -> Offset {
     Offset { objects, x_m: -x_m..=x_m, y_m: -y_m..=y_m, z_m: 0.0..=0.0, yaw_rad: 0.0..=0.0 }
 }

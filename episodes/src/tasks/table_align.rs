@@ -11,12 +11,12 @@ use super::{ObjectSpot, RobotSpot, Task, spot, uniform_xy};
 use crate::scoring::placement::{stands_as_high, stands_released};
 use crate::scoring::{A, B, Done, Facts, Phase};
 
-/// From the middle of the table to a robot that holds its end.
+/// How far a robot that holds an end of the table stands from its middle.
 const HOLDER_M: f32 = 0.803;
 const PLACE_XY_M: [f32; 2] = [0.0, -1.75];
 const LIFTED_M: f32 = 0.03;
 const CLEAR_M: f32 = 0.01;
-/// From the middle of the chair to the middle of the table, along the way the chair looks, and across it.
+/// How far the middle of the table is from the middle of the chair, along the way the chair looks, and across it.
 const BEFORE_CHAIR_M: [f32; 2] = [0.335, 0.465];
 const ACROSS_M: f32 = 0.13;
 const AS_HIGH_M: f32 = 0.04;

@@ -17,18 +17,18 @@ const WALK_M_S: f32 = 0.35;
 /// B takes a trolley that has been this near to the mark, once it is slower than this.
 const CAME_M: f32 = 0.3;
 const STANDS_M_S: f32 = 0.03;
-/// For so many commands A waits for that, too.
+/// A waits for that, too, for so many commands at most.
 const MOST_STOPPING_BEATS: u32 = 20;
-/// With the bottle in hand.
+/// How fast B walks with the bottle in its hand.
 const CARRY_M_S: f32 = 0.25;
 /// Where a robot has what its right hand takes: ahead of the pelvis, and to the right.
 const AT_HAND_M: Vector = Vector::new(0.40, -0.10, 0.0);
 const LIFT_M: f32 = 0.16;
-/// Away from the trolley before B turns.
+/// How far B steps back from the trolley before it turns.
 const BACK_M: f32 = 0.30;
 const OVER_PATCH_M: f32 = 0.10;
 const AT_HAND: Tolerance = Tolerance { off_m: 0.03, off_rad: 0.05 };
-/// On the way back B already turns.
+/// How near to the way back is near enough; B already turns on it.
 const ON_THE_WAY: Tolerance = Tolerance { off_m: 0.10, off_rad: 0.8 };
 /// A bottle that is let go of falls so far.
 const DROP_M: f32 = 0.003;

@@ -12,7 +12,7 @@ use crate::scoring::{A, B, Facts};
 const MOULDING_IN_WRIST_M: Vector = Vector::new(0.112, 0.045, 0.0);
 const CLOSURE: f32 = 1.1;
 
-/// Before the tip, past the tip, and resting on the peg: the loop's middle relative to the tip.
+/// Where the loop's middle is relative to the peg's tip: before the tip, past it, and resting on the peg.
 const BEFORE_M: Vector = Vector::new(0.0, -0.045, 0.004);
 const PAST_M: Vector = Vector::new(0.0, 0.040, 0.002);
 const RESTING_M: Vector = Vector::new(0.0, 0.045, -0.034);

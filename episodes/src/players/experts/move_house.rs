@@ -14,7 +14,7 @@ use crate::scoring::{A, B, C, Facts};
 
 const LIFT_M: f32 = 0.07;
 const PACE_M_S: f32 = 0.24;
-/// A fist with its palm down: from the wrist to what it presses with, and to its front.
+/// How far it is, in a fist with its palm down, from the wrist to what presses, and to the fist's front.
 const PRESSING_M: f32 = 0.115;
 const FRONT_M: f32 = 0.16;
 /// The fist is made behind the lever and above it; then the wrist is as high above the lever's end, and is pressed farther and farther until
@@ -36,10 +36,10 @@ const PRESS_M: f32 = 0.02;
 const PUSH_M_S: f32 = 0.26;
 /// The robot turns by this part of the leaf's angle.
 const TURN_RATIO: f32 = 0.6;
-/// From the robot to where it pushes: ahead, and to its right.
+/// How far ahead of the robot, and how far to its right, it pushes.
 const AHEAD_M: f32 = 0.45;
 const RIGHT_M: f32 = 0.10;
-/// At the end of the swing A still corrects its place for so long.
+/// A still corrects its place for so long at the end of the swing.
 const OPENED_S: f32 = 0.4;
 /// B stays so far behind A, until A is beside the way.
 const APART_M: f32 = 0.75;

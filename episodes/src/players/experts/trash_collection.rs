@@ -14,7 +14,7 @@ const TALL_M: f32 = 0.72;
 /// The rim of the bin is then a little lower than the bench's top.
 const LIFT_M: f32 = 0.055;
 const PACE_M_S: f32 = 0.28;
-/// From the middle of the bottle to the left wrist: the bottle rolls before the middle of the hand's back.
+/// Where the left wrist is from the middle of the bottle: the bottle rolls before the middle of the hand's back.
 const BEHIND_BOTTLE_M: Vector = Vector::new(-0.12, -0.075, 0.022);
 const ABOVE_M: f32 = 0.14;
 /// The hand stops here, short of the end of the bench; the bottle rolls on.

@@ -92,6 +92,7 @@ impl StepMessage {
 
 /// The 35 numbers one robot was commanded for one control step; the channel's metadata names the columns.
 #[derive(Serialize, JsonSchema)]
+#[schemars(rename = "Action")]
 pub struct ActionMessage {
     row: Vec<f32>,
 }
@@ -108,6 +109,7 @@ impl From<&RobotCommand> for Json<ActionMessage> {
 
 /// The base command alone, with a name for each number.
 #[derive(Serialize, JsonSchema)]
+#[schemars(rename = "Base")]
 pub struct BaseCommandMessage {
     vx_m_s: f32,
     vy_m_s: f32,
@@ -128,6 +130,7 @@ impl From<&RobotCommand> for Json<BaseCommandMessage> {
 
 /// What a robot's hands feel and hold: forces of the world on them (world frame), estimated from the arms' torques.
 #[derive(Serialize, JsonSchema)]
+#[schemars(rename = "Hands")]
 pub struct HandsMessage {
     left_force_n: [f32; 3],
     right_force_n: [f32; 3],
@@ -162,6 +165,7 @@ impl HandsMessage {
 
 /// A phase that was reached.
 #[derive(Serialize, Deserialize, JsonSchema)]
+#[schemars(rename = "Phase")]
 pub struct PhaseMessage {
     pub id: String,
     pub number: String,
@@ -180,6 +184,7 @@ impl From<&PhaseReached> for Json<PhaseMessage> {
 
 /// What is left of the episode.
 #[derive(Serialize, JsonSchema)]
+#[schemars(rename = "BudgetLeft")]
 pub struct BudgetMessage {
     steps_left: u32,
     /// Absent where the protocol sets no limit.

@@ -33,7 +33,7 @@ pub struct EpisodePage<'a> {
     pub calls: &'a CallCounts,
     /// Simulated time at which it began: later than 0 where it began at a phase of another episode.
     pub begin_s: f64,
-    /// As it stood at the last control step; `None` if there was none.
+    /// The budget after the last control step; `None` if there was none.
     pub budget_left: Option<Budget>,
     /// A PNG file.
     pub strip: &'a [u8],

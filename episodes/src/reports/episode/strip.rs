@@ -26,7 +26,7 @@ pub const CELL_WIDTH: usize = 400;
 pub const CELL_HEIGHT: usize = 300;
 const GAP: usize = 6;
 const CAPTION_HEIGHT: usize = 48;
-/// From the top of one line of text to the next.
+/// The distance from the top of one line of text to the next.
 const LINE_HEIGHT: usize = 21;
 const TEXT_TOP: usize = 4;
 const GLYPH: usize = 8;

@@ -15,7 +15,7 @@ use crate::tasks;
 pub struct Comparison {
     pub first: String,
     pub second: String,
-    /// By task, then over all tasks.
+    /// The rows of each task, then those of all tasks together.
     pub rows: Vec<PairedRow>,
 }
 
@@ -37,7 +37,7 @@ pub struct PairedRow {
     pub mcnemar_p_value: f64,
 }
 
-/// By task, seed and where it began; of several the first.
+/// Episodes by task, seed and where they began; of several the first.
 type Episodes<'a> = BTreeMap<(&'static str, u32, Option<usize>), &'a PlayedEpisode>;
 
 impl Comparison {

@@ -5,7 +5,7 @@ use std::path::Path;
 use image::imageops::{self, FilterType};
 
 use super::load::{FoundEpisode, LoadedEpisodes};
-use super::policy::{PolicyGroup, first_missed, groups, succeeded, why};
+use super::policy::{PolicyGroup, failure_cause, first_missed_phase, groups, succeeded};
 use crate::output::webp;
 
 /// One failed episode.
@@ -32,7 +32,7 @@ pub struct Picture {
 /// Columns of a strip are 400 pixels wide; on the page they need no more than this.
 const SCALE: f64 = 0.5;
 
-/// At most so many failures with a picture, by turns from every policy and task; those without one are left out.
+/// The failures that have a picture, `most` of them at most, by turns from every policy and task; those without one are left out.
 pub fn gallery(loaded: &LoadedEpisodes, most: usize) -> Vec<Failure> {
     let groups = groups(&loaded.episodes);
     let all: Vec<(Failure, &FoundEpisode)> = groups.iter().flat_map(failed).collect();
@@ -66,8 +66,8 @@ fn failure(group: &PolicyGroup, found: &FoundEpisode) -> Failure {
         policy: group.name.clone(),
         task: spec.task.id,
         seed: spec.seed,
-        phase: first_missed(&found.played),
-        why: why(&found.played),
+        phase: first_missed_phase(&found.played),
+        why: failure_cause(&found.played),
         picture: None,
     }
 }

@@ -28,7 +28,7 @@ pub use rate::{MeanRate, Rate};
 /// Everything that a report says in words and numbers.
 #[derive(Debug, Serialize)]
 pub struct EvaluationReport {
-    /// In the order in which they were found.
+    /// The policies in the order in which they were found.
     pub policies: Vec<PolicyReport>,
     /// Each policy against the first.
     pub comparisons: Vec<Comparison>,

@@ -1,4 +1,4 @@
-//! How one policy fared: rates of phases, averages, effort, and why episodes failed.
+//! How far one policy got: rates of phases, averages, effort, and why episodes failed.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use super::load::FoundEpisode;
 use super::rate::{MeanRate, Rate};
-use crate::results::{PhaseLevel, PlayedEpisode, PolicyCard, missed};
+use crate::results::{PhaseLevel, PlayedEpisode, PolicyCard, missed_phase_note};
 use crate::scoring::Phase;
 use crate::statistics::Count;
 use crate::tasks::{self, Task};
@@ -20,7 +20,7 @@ pub struct PolicyGroup<'a> {
     pub episodes: Vec<&'a FoundEpisode>,
 }
 
-/// How it fared.
+/// How far its episodes got, and at what cost.
 #[derive(Debug, Serialize)]
 pub struct PolicyReport {
     pub name: String,
@@ -29,9 +29,9 @@ pub struct PolicyReport {
     pub build: String,
     pub episodes: usize,
     pub falls: u32,
-    /// In the order of the list of tasks; those that were played.
+    /// The tasks that were played, in the order of the list of tasks.
     pub tasks: Vec<TaskReport>,
-    /// Over the tasks of so many robots.
+    /// Averages over the tasks of two robots, and over those of three.
     pub averages: Vec<TaskAverage>,
     pub together: ByCollaboration,
     /// Every phase on its own, where episodes began at phases.
@@ -54,16 +54,16 @@ pub struct TaskReport {
 /// One phase of a task.
 #[derive(Debug, Serialize)]
 pub struct PhaseReport {
-    /// As `transfer`.
+    /// The phase's id, as `transfer`.
     pub id: &'static str,
-    /// As `p2`.
+    /// The phase's number, as `p2`.
     pub number: String,
     pub collaborative: bool,
-    /// Of all episodes.
+    /// The rate of all episodes.
     pub cumulative: Option<Rate>,
-    /// Of those that reached the phase before it.
+    /// The rate of those that reached the phase before it.
     pub conditional: Option<Rate>,
-    /// Of those that began where it begins.
+    /// The rate of those that began where it begins.
     pub from_its_beginning: Option<Rate>,
 }
 
@@ -90,7 +90,7 @@ pub struct EpisodeCosts {
     pub thought: ValueRange,
 }
 
-/// Some numbers, seen from afar.
+/// The range of some numbers, and the middle one.
 #[derive(Debug, Serialize)]
 pub struct ValueRange {
     pub min: f64,
@@ -274,7 +274,7 @@ fn conditional(tasks: &[TaskReport], together: bool) -> Option<MeanRate> {
 fn reasons(episodes: &[&PlayedEpisode]) -> Vec<FailureReason> {
     let mut reasons: Vec<FailureReason> = Vec::new();
     for played in episodes.iter().filter(|played| !succeeded(played)) {
-        let (phase, why) = (first_missed(played), why(played));
+        let (phase, why) = (first_missed_phase(played), failure_cause(played));
         let same = |known: &&mut FailureReason| {
             (known.task, &known.phase, &known.why) == (played.spec.task.id, &phase, &why)
         };
@@ -294,14 +294,14 @@ fn reasons(episodes: &[&PlayedEpisode]) -> Vec<FailureReason> {
 }
 
 /// Number of the first phase that counts and was not reached.
-pub fn first_missed(played: &PlayedEpisode) -> String {
+pub fn first_missed_phase(played: &PlayedEpisode) -> String {
     let counts = |phase: &usize| played.start_phase().is_none_or(|only| only == *phase);
     let mut phases = (0..played.spec.task.phases.len()).filter(counts);
     phases.find(|phase| !reached(played, *phase)).map(Phase::number).unwrap_or_default()
 }
 
 /// What the policy said when it gave up, or why the episode ended; and who fell.
-pub fn why(played: &PlayedEpisode) -> String {
+pub fn failure_cause(played: &PlayedEpisode) -> String {
     let ended = match played.result.ended {
         EndReason::TaskComplete => "the task was completed",
         EndReason::StepBudgetExhausted => "the steps ran out",
@@ -313,7 +313,7 @@ pub fn why(played: &PlayedEpisode) -> String {
     let own = played
         .note
         .clone()
-        .filter(|note| Some(note) != missed(&played.result, played.start_phase()).as_ref());
+        .filter(|note| Some(note) != missed_phase_note(&played.result, played.start_phase()).as_ref());
     let why = own.unwrap_or_else(|| ended.into());
     match played.result.falls {
         0 => why,

@@ -24,7 +24,7 @@ pub struct PublishedAverages {
     pub collaborative_share: f64,
 }
 
-/// By method, then by task.
+/// The published rates by method, then by task.
 pub fn rows() -> Vec<PublishedRates> {
     let row = |line: &str| {
         let mut cells = line.split(',');
@@ -35,7 +35,7 @@ pub fn rows() -> Vec<PublishedRates> {
     PHASES.lines().skip(1).filter_map(row).collect()
 }
 
-/// By method.
+/// The published averages by method.
 pub fn averages() -> Vec<PublishedAverages> {
     let row = |line: &str| {
         let (method, rest) = line.split_once(',')?;

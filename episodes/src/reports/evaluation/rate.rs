@@ -25,12 +25,12 @@ impl Rate {
         Count { successes: self.successes, trials: self.trials }
     }
 
-    /// As `97.5 [93.2, 99.5]`, in percent.
+    /// The rate and its interval in percent, as `97.5 [93.2, 99.5]`.
     pub fn text(self) -> String {
         with_interval(self.share, self.interval_share)
     }
 
-    /// As `39/40`.
+    /// The counts, as `39/40`.
     pub fn fraction(self) -> String {
         format!("{}/{}", self.successes, self.trials)
     }
@@ -46,14 +46,14 @@ pub struct MeanRate {
 }
 
 impl MeanRate {
-    /// Of those rates that have trials; `None` where none has.
+    /// The mean of those rates that have trials; `None` where none has.
     pub fn of(counts: impl Iterator<Item = Count>) -> Option<MeanRate> {
         let counts: Vec<Count> = counts.filter(|count| count.trials > 0).collect();
         let (mean_share, interval_share) = mean_share(&counts)?;
         Some(MeanRate { counts, mean_share, interval_share })
     }
 
-    /// As [`Rate::text`].
+    /// The mean and its interval in percent; see [`Rate::text`].
     pub fn text(&self) -> String {
         with_interval(self.mean_share, self.interval_share)
     }
@@ -63,7 +63,7 @@ fn with_interval(share: f64, [low_share, high_share]: [f64; 2]) -> String {
     format!("{} [{}, {}]", percent(share), percent(low_share), percent(high_share))
 }
 
-/// With one decimal, left out where it is zero.
+/// A share in percent with one decimal, which is left out where it is zero.
 pub fn percent(share: f64) -> String {
     let text = format!("{:.1}", 100.0 * share);
     // What rounds to zero has no sign.

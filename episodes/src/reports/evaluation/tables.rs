@@ -135,7 +135,7 @@ fn together(policies: &[PolicyReport]) -> Table {
     table
 }
 
-/// In percent, with its sign.
+/// A share in percent, with its sign.
 pub fn signed(share: f64) -> String {
     let text = percent(share);
     if share > 0.0 && text != "0" { format!("+{text}") } else { text }
@@ -220,7 +220,7 @@ fn p_text(p_value: f64) -> String {
     if p_value < 0.0001 { "< 0.0001".into() } else { format!("{p_value:.4}") }
 }
 
-/// By method, and a column for each task that was played.
+/// A row for each method, and a column for each task that was played.
 pub fn published(rows: &[PublishedRates]) -> Table {
     let mut table = Table::new(
         "Published, in another simulator",
@@ -252,7 +252,7 @@ pub fn published(rows: &[PublishedRates]) -> Table {
     table
 }
 
-/// Only beside our own.
+/// The published averages, which are shown only beside our own.
 fn published_together(report: &EvaluationReport) -> Table {
     let mut table = Table::new(
         "Published from the phases' beginnings, in another simulator",

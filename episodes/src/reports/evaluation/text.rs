@@ -53,7 +53,7 @@ pub fn csv(report: &EvaluationReport) -> String {
     text
 }
 
-/// As RFC 4180 has it.
+/// A cell of CSV, quoted as RFC 4180 has it.
 fn quoted(cell: &str) -> String {
     match cell.contains([',', '"', '\n', '\r']) {
         true => format!("\"{}\"", cell.replace('"', "\"\"")),
@@ -61,7 +61,7 @@ fn quoted(cell: &str) -> String {
     }
 }
 
-/// Needs the package `booktabs`.
+/// The tables for LaTeX, which need the package `booktabs`.
 pub fn tex(report: &EvaluationReport) -> String {
     let mut text = String::from("% Needs \\usepackage{booktabs}.\n");
     text.extend(all(report).iter().map(tex_table));

@@ -40,7 +40,7 @@ impl Facts {
         }
     }
 
-    /// As [`Facts::grip`], of robots that each hold `object` with both hands.
+    /// The same facts, but these robots hold `object`, each with both hands.
     pub fn held_by(self, robots: &[usize], object: &str) -> Facts {
         let hands = robots.iter().flat_map(|robot| Side::BOTH.map(|side| (*robot, side)));
         hands.fold(self, |facts, (robot, side)| facts.grip(robot, side, object, Grip::Holding))

@@ -43,9 +43,9 @@ pub struct ObjectFacts {
     pub angular_velocity_rad_s: Vector,
     /// Height of the object's origin above the floor when the episode began.
     pub rest_height_m: f32,
-    /// By robot.
+    /// How each robot's hands grip it.
     pub hands: Vec<Sides<Grip>>,
-    /// For how long no hand has touched it.
+    /// How long no hand has touched it.
     pub untouched_s: f64,
 }
 
@@ -76,7 +76,7 @@ impl Facts {
         self.object(object).hands[robot] == Sides::both(Grip::Off)
     }
 
-    /// For how long no hand has touched `object`.
+    /// How long no hand has touched `object`.
     pub fn untouched_s(&self, object: &str) -> f64 {
         self.object(object).untouched_s
     }

@@ -18,13 +18,13 @@ pub struct Phase {
 /// When a phase is reached. Conditions see one control step at a time; what has to happen in sequence says so here.
 #[derive(Debug)]
 pub enum Done {
-    /// As soon as the condition holds.
+    /// It is reached as soon as the condition holds.
     When(fn(&Facts) -> bool),
-    /// When `then` holds after `first` held; a step at which `broken` holds in between asks for `first` again.
+    /// It is reached when `then` holds after `first` held; a step at which `broken` holds in between asks for `first` again.
     Sequence { first: fn(&Facts) -> bool, then: fn(&Facts) -> bool, broken: fn(&Facts) -> bool },
-    /// When `condition` has held without a break for `for_s`, and `at_end` holds then too.
+    /// It is reached when `condition` has held without a break for `for_s`, and `at_end` holds then too.
     Lasting { condition: fn(&Facts) -> bool, for_s: f64, at_end: fn(&Facts) -> bool },
-    /// When every one of these has been passed, in any order.
+    /// It is reached when every one of these has been passed, in any order.
     Milestones(&'static [Milestone]),
 }
 
@@ -32,7 +32,7 @@ pub enum Done {
 #[derive(Debug)]
 pub struct Milestone {
     pub condition: fn(&Facts) -> bool,
-    /// For how long it has to hold without a break.
+    /// How long it has to hold without a break.
     pub for_s: f64,
 }
 
@@ -59,7 +59,7 @@ pub struct PhaseMemory {
     underway: bool,
     /// Since when the present phase's lasting condition has held, in simulated seconds.
     since_s: Option<f64>,
-    /// Of the present phase's milestones, those that have been begun.
+    /// The milestones of the present phase that have been begun.
     milestones: Vec<MilestoneMemory>,
 }
 

@@ -51,7 +51,7 @@ impl<'a> BarGrasp<'a> {
         [grasp(Side::Left, bars[0]), grasp(Side::Right, bars[1])]
     }
 
-    /// As [`BarGrasp::from_above`], on upright bars, palms towards each other.
+    /// The same for upright bars: palms towards each other. See [`BarGrasp::from_above`].
     pub fn between(robot: usize, object: &'a str, bars: [&'a str; 2], heading_rad: f32) -> [BarGrasp<'a>; 2] {
         let upright = Rotation::from_rotation_z(heading_rad);
         BarGrasp::from_above(robot, object, bars, heading_rad)
@@ -107,7 +107,7 @@ impl BarGrasp<'_> {
 }
 
 const ATTEMPTS: usize = 4;
-/// From here hands come at bars.
+/// How far from a bar hands begin to come at it.
 const STANDOFF_M: f32 = 0.08;
 
 /// Closes all hands on their bars at once; hands that miss try again.

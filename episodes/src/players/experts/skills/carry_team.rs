@@ -13,14 +13,14 @@ use crate::scoring::{Facts, Grip};
 
 /// How far behind a bar in its hands a robot stands.
 const BEHIND_BAR_M: f32 = 0.29;
-/// Towards their places, before anything is held. Hands that reach out correct the rest.
+/// How fast robots walk to their places before anything is held. Hands that reach out correct the rest.
 const APPROACH_M_S: f32 = 0.3;
 const NEAR: Tolerance = Tolerance { off_m: 0.03, off_rad: 0.05 };
-/// What two robots that walk with a load need.
+/// How far hands give way, which two robots that walk with a load need.
 const COMPLIANCE_N_S_M: f64 = 250.0;
 /// Robots still correct their places for so long once the object has arrived.
 const HOLD_S: f32 = 0.7;
-/// Feet come together, and what pulls between the hands fades.
+/// How long robots rest: feet come together, and what pulls between the hands fades.
 const REST_S: f32 = 0.6;
 /// A hand has lost what it does not touch for so many commands; the robots then rest, and take it again no more often.
 const LOST_BEATS: u32 = 5;
@@ -28,7 +28,7 @@ const CARRIES: u32 = 4;
 /// An object that is set down is pressed on the floor by so much.
 const PRESS_M: f32 = 0.004;
 
-/// The way of a carried object, by the distance it has gone, and how fast.
+/// Where a carried object is by the distance it has gone, and how fast it goes.
 pub struct ObjectPath<'a> {
     pub at: &'a dyn Fn(f32) -> Pose,
     pub length_m: f32,
@@ -117,13 +117,13 @@ impl<'a> CarryTeam<'a> {
         for _ in 0..CARRIES {
             self.give_way(commander, true);
             let at = |gone_m: f32| self.postures(&(path.at)(gone_m));
-            let course = PosturePath { at: &at, length_m, pace_m_s, hold_s: HOLD_S, free_m };
+            let postures = PosturePath { at: &at, length_m, pace_m_s, hold_s: HOLD_S, free_m };
             let mut off_beats = 0;
             let mut well = |facts: &Facts| {
                 off_beats = if self.hands_off(facts).next().is_some() { off_beats + 1 } else { 0 };
                 off_beats < LOST_BEATS
             };
-            match follow_while(commander, &course, from_m, &mut well)? {
+            match follow_while(commander, &postures, from_m, &mut well)? {
                 PathProgress::Completed => return Ok(()),
                 PathProgress::Interrupted { gone_m } => from_m = gone_m,
             }
@@ -160,7 +160,7 @@ impl<'a> CarryTeam<'a> {
         self.carry_where_free(commander, place, pace_m_s, &FREE)
     }
 
-    /// As [`CarryTeam::carry_to`], no farther than is free by now.
+    /// The same as [`CarryTeam::carry_to`], no farther than is free by now.
     pub fn carry_where_free(
         &mut self,
         commander: &mut Commander,

@@ -26,9 +26,9 @@ pub struct BaseVelocity {
 /// Where both wrists go.
 #[derive(Clone, Copy, Debug)]
 pub enum WristTargets {
-    /// In the world frame, where they stay.
+    /// Poses in the world frame, where the wrists stay.
     InWorld(Sides<Pose>),
-    /// In the pelvis frame, along with the pelvis.
+    /// Poses in the pelvis frame; the wrists go along with the pelvis.
     InPelvis(Sides<Pose>),
 }
 
@@ -92,7 +92,7 @@ pub struct CommandedTargets {
 pub struct Commander<'a> {
     task: &'static Task,
     episode: &'a mut dyn PrivilegedEpisode,
-    /// By robot.
+    /// What each robot was last commanded.
     targets: Vec<CommandedTargets>,
     /// Whether other scripts play at the same time, so that all commands are equally long.
     in_step: bool,
@@ -160,7 +160,7 @@ impl<'a> Commander<'a> {
         self.travel(duration_s, moves, smooth)
     }
 
-    /// As [`Commander::perform`], at constant speed: one leg of a longer path.
+    /// The same as [`Commander::perform`], at constant speed: one leg of a longer path.
     pub fn glide(&mut self, duration_s: f32, moves: &[HandMove]) -> Result<(), PlayerError> {
         self.travel(duration_s, moves, |part| part)
     }

@@ -8,7 +8,7 @@ use crate::players::PlayerError;
 use crate::scoring::{Facts, Grip};
 
 const ATTEMPTS: usize = 4;
-/// From here hands come at bars.
+/// How far from a bar hands begin to come at it.
 const STANDOFF_M: f32 = 0.08;
 /// One step of a soft grasp; fingers close over the first of them.
 const GIVE_S: f32 = 0.1;

@@ -7,7 +7,7 @@ use crate::players::PlayerError;
 
 /// Where the axis of a held cylinder lies in a right wrist's frame: in front of the palm, between fingers and thumb.
 const AXIS_IN_WRIST_M: Vector = Vector::new(0.1195, 0.055, 0.0);
-/// From here a hand comes at a cylinder, palm first.
+/// How far from a cylinder a hand begins to come at it, palm first.
 const STANDOFF_M: f32 = 0.08;
 
 /// A hand that is to hold an upright cylinder.

@@ -1,4 +1,4 @@
-//! Robots that walk along a course with their hands where the course has them.
+//! Robots walk along a path of postures: where each stands and where its hands are, by the distance gone.
 
 use tandem_sim::{CONTROL_DT_S, Pose, Sides, heading_rad, wrapped_rad};
 
@@ -9,7 +9,7 @@ use crate::scoring::Facts;
 
 const ACCELERATION_M_S2: f32 = 0.3;
 const AT_END_M: f32 = 1e-4;
-/// The slowest that a course is followed.
+/// The slowest that a path is followed.
 const CREEP_M_S: f32 = 0.02;
 /// What a robot's base is asked for, corrections included.
 const MOST_M_S: f32 = 0.35;
@@ -22,7 +22,7 @@ pub struct Posture {
     pub wrists: Sides<Pose>,
 }
 
-/// Of a course on which nothing is in the way.
+/// How much of a path may have been gone where nothing is in the way: all of it.
 pub const FREE: fn(&Facts) -> f32 = |_| f32::INFINITY;
 
 /// Postures by the distance gone.
@@ -32,55 +32,55 @@ pub struct PosturePath<'a> {
     pub pace_m_s: f32,
     /// How much of it may have been gone by now.
     pub free_m: &'a dyn Fn(&Facts) -> f32,
-    /// For how long robots still correct their places at the end.
+    /// How long robots still correct their places at the end.
     pub hold_s: f32,
 }
 
-/// How far a course was followed.
+/// How far a path was followed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PathProgress {
     Completed,
-    /// Something went wrong here.
+    /// Something went wrong when so much of it had been gone.
     Interrupted {
         gone_m: f32,
     },
 }
 
-/// Goes along a course from its beginning to its end, from rest to rest.
-pub fn follow(commander: &mut Commander, course: &PosturePath) -> Result<(), PlayerError> {
-    follow_while(commander, course, 0.0, &mut |_| true).map(drop)
+/// The robots follow a path from its beginning to its end, from rest to rest.
+pub fn follow(commander: &mut Commander, path: &PosturePath) -> Result<(), PlayerError> {
+    follow_while(commander, path, 0.0, &mut |_| true).map(drop)
 }
 
-/// As [`follow`], from where `gone_m` of it have been gone, and for as long as all is `well`.
+/// The robots follow a path from where `gone_m` of it have been gone, for as long as all is `well`; see [`follow`].
 pub fn follow_while(
     commander: &mut Commander,
-    course: &PosturePath,
+    path: &PosturePath,
     mut gone_m: f32,
     well: &mut dyn FnMut(&Facts) -> bool,
 ) -> Result<PathProgress, PlayerError> {
     let dt_s = WALK_STEPS as f32 * CONTROL_DT_S;
     let (mut pace_m_s, mut held_s) = (0.0f32, 0.0f32);
-    while held_s < course.hold_s {
-        let left_m = course.length_m - gone_m;
+    while held_s < path.hold_s {
+        let left_m = path.length_m - gone_m;
         let facts = commander.facts()?;
         if !well(&facts) {
             return Ok(PathProgress::Interrupted { gone_m });
         }
-        let free_m = (course.free_m)(&facts) - gone_m;
+        let free_m = (path.free_m)(&facts) - gone_m;
         if left_m > AT_END_M && free_m < AT_END_M {
             pace_m_s = 0.0;
         } else if left_m > AT_END_M {
             let left_m = left_m.min(free_m);
             let can_stop_m_s = (2.0 * ACCELERATION_M_S2 * left_m).sqrt();
-            let most_m_s = course.pace_m_s.min(can_stop_m_s).max(CREEP_M_S);
+            let most_m_s = path.pace_m_s.min(can_stop_m_s).max(CREEP_M_S);
             pace_m_s = (pace_m_s + ACCELERATION_M_S2 * dt_s).min(most_m_s);
             gone_m += (pace_m_s * dt_s).min(left_m);
         } else {
             pace_m_s = 0.0;
             held_s += dt_s;
         }
-        let now = (course.at)(gone_m);
-        let next = (course.at)((gone_m + pace_m_s * dt_s).min(course.length_m));
+        let now = (path.at)(gone_m);
+        let next = (path.at)((gone_m + pace_m_s * dt_s).min(path.length_m));
         let step = |(now, next): (&Posture, &Posture)| {
             let drift = TargetVelocity {
                 velocity_m_s: (next.stand.translation - now.stand.translation) / dt_s,

@@ -53,7 +53,7 @@ pub fn html(report: &EvaluationReport, failures: &[Failure]) -> String {
     )
 }
 
-/// As "a, b and c".
+/// The names in a sentence, as "a, b and c".
 fn in_words(names: &[String]) -> String {
     match names.split_last() {
         Some((last, others)) if !others.is_empty() => format!("{} and {last}", others.join(", ")),
