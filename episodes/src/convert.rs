@@ -6,10 +6,12 @@ use tandem_tools_spec as wire;
 
 /// Wire arrays to a rigid transform; the quaternion's norm has been checked to be positive.
 pub fn isometry(position_m: [f64; 3], quaternion_wxyz: [f64; 4]) -> Isometry3<f64> {
-    let [x, y, z] = position_m;
-    let [w, i, j, k] = quaternion_wxyz;
-    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k));
-    Isometry3::from_parts(Translation3::new(x, y, z), rotation)
+    Isometry3::from_parts(Translation3::from(position_m), unit_quaternion(quaternion_wxyz))
+}
+
+/// A wire array to a rotation; its norm has been checked to be positive.
+pub fn unit_quaternion([w, i, j, k]: [f64; 4]) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k))
 }
 
 pub fn isometry_from_sim(pose: &Pose) -> Isometry3<f64> {

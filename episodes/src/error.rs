@@ -16,11 +16,15 @@ pub enum EpisodeError {
     )]
     ForeignRobot { name: String, own: String },
     #[error(
+        "the episode stands at step {now} and not at {expected}; look again, then command with expected_step {now}"
+    )]
+    OtherStep { expected: u32, now: u32 },
+    #[error(
         "the {protocol} protocol gives no depth images; measure at pixels with query_depth, or start the episode under the benchmark protocol"
     )]
     DepthImage { protocol: &'static str },
     #[error("{asked} control steps in one command; the {protocol} protocol allows 1 to {most}")]
-    TooManySteps { asked: usize, most: u32, protocol: &'static str },
+    TooManySteps { asked: u32, most: u32, protocol: &'static str },
     #[error("pixel [{u}, {v}] is outside the image; u goes from 0 to {}, v from 0 to {}", .width - 1, .height - 1)]
     PixelOutside { u: i64, v: i64, width: u32, height: u32 },
     #[error("the episode has ended ({}); observe, get_robot_state, get_status and finish still answer; start_episode begins another", reason_text(*.reason))]
@@ -55,6 +59,7 @@ impl EpisodeError {
             EpisodeError::ForeignRobot { .. } => {
                 Refusal::new("foreign-robot", "Another operator's robot", Conflict)
             }
+            EpisodeError::OtherStep { .. } => Refusal::new("other-step", "Another step", Conflict),
             EpisodeError::DepthImage { .. } => Refusal::new("depth-image", "No depth images", Conflict),
             EpisodeError::TooManySteps { .. } => Refusal::new("too-many-steps", "Too many steps", Invalid),
             EpisodeError::PixelOutside { .. } => {

@@ -38,7 +38,7 @@ mod spec;
 pub mod statistics;
 pub mod tasks;
 
-pub use commands::{Called, OperatorCommand, own as own_call};
+pub use commands::{Called, OperatorCall, OperatorCommand};
 pub use describe::{brief, task_list};
 pub use error::{CheckpointError, EpisodeError, SceneError};
 pub use instructions::{Instructions, InstructionsError};
@@ -51,6 +51,6 @@ pub use recording::{
 };
 pub use results::RESULT_FILE;
 pub use scoring::{A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, RobotFacts, Scores, StepScore};
-pub use session::{Checkpoint, Clock, RunFiles, RunFolder, Session, monotonic};
+pub use session::{CallReply, Checkpoint, Clock, RunFiles, RunFolder, Session, monotonic};
 pub use spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, SceneFile, Start};
 pub use tandem_sim::{BaseLimits, LocomotionChoice, SimError, joint_names, render::RendererKind};

@@ -25,10 +25,10 @@ pub struct Rules {
 
 impl Rules {
     /// The control steps of one command, if it may ask for that many.
-    pub fn steps(&self, asked: usize) -> Result<u32, EpisodeError> {
-        match u32::try_from(asked) {
-            Ok(steps) if (1..=self.steps_per_command).contains(&steps) => Ok(steps),
-            _ => Err(EpisodeError::TooManySteps {
+    pub fn steps(&self, asked: u32) -> Result<u32, EpisodeError> {
+        match (1..=self.steps_per_command).contains(&asked) {
+            true => Ok(asked),
+            false => Err(EpisodeError::TooManySteps {
                 asked,
                 most: self.steps_per_command,
                 protocol: self.protocol.name(),

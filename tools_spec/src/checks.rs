@@ -52,18 +52,15 @@ pub fn steps(steps: u32) -> Result<(), String> {
 }
 
 /// At least one robot, none of them twice.
-pub fn robots<'a>(names: impl Iterator<Item = &'a str>) -> Result<(), String> {
-    let mut seen: Vec<&str> = Vec::new();
-    for name in names {
-        if seen.contains(&name) {
-            return Err(format!("robot {name:?} is named twice; name each robot at most once"));
-        }
-        seen.push(name);
-    }
-    if seen.is_empty() {
+pub fn robots(names: &[&str]) -> Result<(), String> {
+    if names.is_empty() {
         return Err("robots is empty; name at least one robot, as \"A\"".into());
     }
-    Ok(())
+    let twice = names.iter().enumerate().find(|(index, name)| names[..*index].contains(name));
+    match twice {
+        Some((_, name)) => Err(format!("robot {name:?} is named twice; name each robot at most once")),
+        None => Ok(()),
+    }
 }
 
 /// With this stride a region of a whole picture fits.

@@ -21,21 +21,30 @@ use crate::tools::*;
 ///
 /// That line adds `query_depth` to the names and to the specifications; the variants `LookCall::QueryDepth`, with the
 /// arguments, and `LookReply::QueryDepth`, with the tool's own `Tool::Reply`; a `From<QueryDepth>` for `ToolCall`; and
-/// its arms where calls are read, named and checked and replies are read. Whoever answers `LookCall`s does not compile
-/// until it answers this one.
+/// its arms where calls are read, named, checked and asked for their robots and steps, and where replies are read. Whoever
+/// answers `LookCall`s does not compile until it answers this one.
 ///
 /// In a group with `-> each R`, `R` is made here and every tool has a reply of its own; with `-> all R`, every tool of the
-/// group replies with the existing type `R`. What `without_episode` lists has no call on an episode.
+/// group replies with the existing type `R`. A group `for operators` is offered only in episodes whose operators may talk. What
+/// `without_episode` lists has no call on an episode.
 macro_rules! tools {
     (
         without_episode { $($free:ident,)* }
-        $( $(#[$doc:meta])* $group:ident($call:ident) -> $whose:ident $reply:ident { $($tool:ident,)* } )*
+        $(
+            $(#[$doc:meta])*
+            $group:ident($call:ident) -> $whose:ident $reply:ident $(for $audience:ident)? { $($tool:ident,)* }
+        )*
     ) => {
-        /// Every tool, in the order a policy meets them, with or without hints in its texts.
+        /// The tools of every policy, in the order it meets them, with or without hints in their texts.
         pub fn tool_specs(hints: Hints) -> Vec<ToolSpec> {
+            operator_tool_specs(hints).into_iter().filter(|spec| !spec.for_operators).collect()
+        }
+
+        /// The tools of an operator who may talk to others: every tool.
+        pub fn operator_tool_specs(hints: Hints) -> Vec<ToolSpec> {
             vec![
                 $( ToolSpec::without_episode::<$free>(hints), )*
-                $( $( ToolSpec::on_episode::<$tool>(hints), )* )*
+                $( $( ToolSpec::on_episode::<$tool>(hints, $call::FOR_OPERATORS), )* )*
             ]
         }
 
@@ -54,6 +63,22 @@ macro_rules! tools {
             impl $call {
                 /// The tools of this group, by name.
                 pub const TOOLS: &[&str] = &[$( $tool::NAME, )*];
+                /// Whether only operators who may talk are offered them.
+                pub const FOR_OPERATORS: bool = tools!(@for_operators $($audience)?);
+
+                /// The robots that the arguments name.
+                pub fn robots(&self) -> Vec<&str> {
+                    match self {
+                        $( $call::$tool(args) => args.robots(), )*
+                    }
+                }
+
+                /// Control steps of 20 ms that the call asks for; only commands ask for any.
+                pub fn steps(&self) -> u32 {
+                    match self {
+                        $( $call::$tool(args) => args.steps(), )*
+                    }
+                }
             }
 
             tools!(@replies $whose $reply $call { $($tool)* });
@@ -91,7 +116,12 @@ macro_rules! tools {
             pub fn parse(name: &str, args: Value) -> Result<ToolCall, SpecError> {
                 match name {
                     $( $( $tool::NAME => parse_args::<$tool>(args).map(ToolCall::from), )* )*
-                    _ => Err(SpecError::UnknownTool { name: name.into(), have: EPISODE_TOOLS.to_vec() }),
+                    _ => {
+                        let groups = [$( ($call::FOR_OPERATORS, $call::TOOLS), )*];
+                        let offered = groups.into_iter().filter(|(for_operators, _)| !for_operators);
+                        let have = offered.flat_map(|(_, tools)| tools).copied().collect();
+                        Err(SpecError::UnknownTool { name: name.into(), have })
+                    }
                 }
             }
 
@@ -99,6 +129,20 @@ macro_rules! tools {
             pub fn name(&self) -> &'static str {
                 match self {
                     $( $( ToolCall::$group($call::$tool(_)) => $tool::NAME, )* )*
+                }
+            }
+
+            /// The robots that the arguments name.
+            pub fn robots(&self) -> Vec<&str> {
+                match self {
+                    $( ToolCall::$group(call) => call.robots(), )*
+                }
+            }
+
+            /// Control steps of 20 ms that the call asks for; only commands ask for any.
+            pub fn steps(&self) -> u32 {
+                match self {
+                    $( ToolCall::$group(call) => call.steps(), )*
                 }
             }
 
@@ -136,6 +180,9 @@ macro_rules! tools {
     };
     (@replies all $reply:ident $call:ident { $($tool:ident)* }) => {};
 
+    (@for_operators) => { false };
+    (@for_operators operators) => { true };
+
     (@reply each $group_reply:ident $tool:ident $reply:ident) => { $group_reply::$tool($reply) };
     (@reply all $group_reply:ident $tool:ident $reply:ident) => { $reply };
 }
@@ -166,6 +213,11 @@ tools! {
     Manage(ManageCall) -> each ManageReply {
         GetStatus,
         Finish,
+    }
+
+    /// Words from one operator to the others.
+    Talk(TalkCall) -> each TalkReply for operators {
+        Say,
     }
 }
 

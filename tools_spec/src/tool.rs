@@ -38,6 +38,16 @@ pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
     /// Arguments that work, shown to callers whose own did not.
     fn example() -> Self;
 
+    /// The robots that the arguments name, each as often as they name it.
+    fn robots(&self) -> Vec<&str> {
+        Vec::new()
+    }
+
+    /// Control steps of 20 ms that the call asks for; only commands ask for any.
+    fn steps(&self) -> u32 {
+        0
+    }
+
     /// Where REST serves it.
     fn route() -> Route {
         Route::of_episode("{episode_id}", Self::NAME)

@@ -3,43 +3,46 @@
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use tandem_tools_spec::{ActCall, Formats, Look, Observe, Say, SpecError, Tool, ToolCall, parse_args};
+use tandem_tools_spec::{ActCall, Call, Look, SpecError, ToolCall};
 
-use super::own::own;
-use super::{Command, Motion, find};
+use super::{Action, Command, Motion, RobotOrder, find};
 use crate::EpisodeError;
 use crate::protocol::Rules;
 
-/// A call on an episode.
+/// What is called on an episode.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Called {
-    /// One of the tools.
-    Tool(ToolCall),
-    /// A look whose pictures come in another form than that of PNGs.
-    Look(Look),
+    /// One call, by the policy of all robots or an operator of one.
+    One(Call),
     /// Commands of several operators, executed side by side for as long as the shortest of them; robots without one hold still.
-    Together(Vec<OperatorCommand>),
-    /// Words of an operator to the others.
-    Say(Say),
+    Together(Vec<OperatorCall>),
 }
 
-/// The command of an operator to its own robot.
+/// A call that the operator of one robot has a right to: it fits the contract and names no other robot.
 #[derive(Clone, Debug, PartialEq)]
+pub struct OperatorCall {
+    robot: String,
+    call: Call,
+}
+
+/// A command of an operator that the episode has read, and will execute together with those of others.
+#[derive(Clone, Debug)]
 pub struct OperatorCommand {
-    pub robot: String,
-    pub call: ActCall,
+    /// The call, less the step at which it was expected.
+    pub(crate) call: OperatorCall,
+    pub(crate) order: RobotOrder,
 }
 
 /// Arguments of [`Called::Together`] as a recording has them.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Written {
-    commands: Vec<WrittenCommand>,
+struct TogetherArguments {
+    commands: Vec<OperatorArguments>,
 }
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct WrittenCommand {
+struct OperatorArguments {
     robot: String,
     tool: String,
     arguments: Value,
@@ -52,135 +55,143 @@ impl Called {
     /// The tool's name, or what stands for it.
     pub fn name(&self) -> &'static str {
         match self {
-            Called::Tool(call) => call.name(),
-            Called::Look(_) => Observe::NAME,
+            Called::One(call) => call.name(),
             Called::Together(_) => Called::TOGETHER,
-            Called::Say(_) => Say::NAME,
-        }
-    }
-
-    /// A look in whatever form.
-    pub fn look(look: Look) -> Called {
-        match look.formats == Formats::default() {
-            true => Called::Tool(look.call()),
-            false => Called::Look(look),
         }
     }
 
     /// What [`Called::parse`] reads.
     pub fn arguments(&self) -> Result<String, serde_json::Error> {
         match self {
-            Called::Tool(call) => serde_json::to_string(call),
-            Called::Look(look) => serde_json::to_string(look),
-            Called::Together(commands) => {
-                let commands = commands.iter().map(OperatorCommand::written).collect::<Result<_, _>>()?;
-                serde_json::to_string(&Written { commands })
+            Called::One(call) => serde_json::to_string(call),
+            Called::Together(calls) => {
+                let commands = calls.iter().map(OperatorCall::arguments).collect::<Result<_, _>>()?;
+                serde_json::to_string(&TogetherArguments { commands })
             }
-            Called::Say(say) => serde_json::to_string(say),
         }
     }
 
     /// Reads what a recording holds of a call.
-    pub fn parse(name: &str, arguments: Value) -> Result<Called, SpecError> {
-        match name {
-            Called::TOGETHER => {
-                let malformed = |error: serde_json::Error| SpecError::Malformed {
-                    tool: Called::TOGETHER,
-                    place: String::new(),
-                    reason: error.to_string(),
-                    example: r#"{"commands":[{"robot":"A","tool":"wait","arguments":{"steps":25}}]}"#.into(),
-                };
-                let written: Written = serde_json::from_value(arguments).map_err(malformed)?;
-                let commands = written.commands.into_iter().map(OperatorCommand::parse);
-                Ok(Called::Together(commands.collect::<Result<_, _>>()?))
-            }
-            Say::NAME => parse_args(arguments).map(Called::Say),
-            Observe::NAME => Look::parse(arguments).map(Called::look),
-            _ => ToolCall::parse(name, arguments).map(Called::Tool),
+    pub fn parse(name: &str, arguments: Value) -> Result<Called, EpisodeError> {
+        if name != Called::TOGETHER {
+            return Ok(Called::One(Call::parse(name, arguments)?));
         }
-    }
-
-    /// Checks what was built in Rust rather than read from JSON.
-    pub fn validate(&self) -> Result<(), SpecError> {
-        match self {
-            Called::Tool(call) => call.validate(),
-            Called::Look(look) => look.call().validate(),
-            Called::Together(commands) => {
-                commands.iter().try_for_each(|command| ToolCall::Act(command.call.clone()).validate())
-            }
-            Called::Say(say) => {
-                say.validate().map_err(|reason| SpecError::Invalid { tool: Say::NAME, reason })
-            }
-        }
+        let malformed = |error: serde_json::Error| SpecError::Malformed {
+            tool: Called::TOGETHER,
+            place: String::new(),
+            reason: error.to_string(),
+            example: r#"{"commands":[{"robot":"A","tool":"wait","arguments":{"steps":25}}]}"#.into(),
+        };
+        let arguments: TogetherArguments = serde_json::from_value(arguments).map_err(malformed)?;
+        let calls = arguments.commands.into_iter().map(OperatorCall::parse);
+        Ok(Called::Together(calls.collect::<Result<_, _>>()?))
     }
 }
 
 impl From<ToolCall> for Called {
-    fn from(call: ToolCall) -> Called {
-        Called::Tool(call)
+    fn from(tool: ToolCall) -> Called {
+        Called::One(tool.into())
     }
 }
 
-impl OperatorCommand {
-    /// Control steps that it asks for.
-    pub fn asked_steps(&self) -> u32 {
-        match &self.call {
-            ActCall::MoveWrists(args) => args.steps,
-            ActCall::Walk(args) => args.steps,
-            ActCall::SendJointChunk(args) => args.robots.first().map_or(0, |chunk| chunk.rows.len() as u32),
-            ActCall::Wait(args) => args.steps,
+impl OperatorCall {
+    /// The call as the operator of `robot` may make it: an observation that names no robot is of the operator's own.
+    pub fn new(robot: &str, call: Call) -> Result<OperatorCall, EpisodeError> {
+        call.validate()?;
+        let call = call.looking_through(robot);
+        if let Some(name) = call.robots().into_iter().find(|name| *name != robot) {
+            return Err(EpisodeError::ForeignRobot { name: name.into(), own: robot.into() });
         }
+        Ok(OperatorCall { robot: robot.into(), call })
     }
 
-    /// Reads it for the robots that `motions` move: the operator's own, by its index, and what all would do if nobody else
-    /// commanded.
-    pub fn read(&self, rules: &Rules, motions: &[Motion]) -> Result<(usize, Command), EpisodeError> {
-        own(ToolCall::Act(self.call.clone()), &self.robot)?;
-        Ok((find(&self.robot, motions)?, Command::read(&self.call, rules, motions)?))
+    /// The operator's robot.
+    pub fn robot(&self) -> &str {
+        &self.robot
     }
 
-    fn written(&self) -> Result<WrittenCommand, serde_json::Error> {
-        let call = ToolCall::Act(self.call.clone());
-        Ok(WrittenCommand {
-            robot: self.robot.clone(),
-            tool: call.name().into(),
-            arguments: serde_json::to_value(&call)?,
-        })
+    /// What the operator calls.
+    pub fn call(&self) -> &Call {
+        &self.call
     }
 
-    fn parse(written: WrittenCommand) -> Result<OperatorCommand, SpecError> {
-        match ToolCall::parse(&written.tool, written.arguments)? {
-            ToolCall::Act(call) => Ok(OperatorCommand { robot: written.robot, call }),
+    /// As [`OperatorCall::call`], by value.
+    pub fn into_call(self) -> Call {
+        self.call
+    }
+
+    /// What the operator wants to look at once its command is done.
+    pub(crate) fn take_look(&mut self) -> Option<Look> {
+        self.call.then.take()
+    }
+
+    /// Reads a command for the robots that `motions` move: what the operator's own is to do.
+    pub(crate) fn order(&self, rules: &Rules, motions: &[Motion]) -> Result<RobotOrder, EpisodeError> {
+        let robot = find(&self.robot, motions)?;
+        let Command { steps, orders } = Command::read(self.command()?, rules, motions)?;
+        let own = orders.into_iter().find(|order| order.robot == robot);
+        Ok(own.unwrap_or(RobotOrder { robot, steps, action: Action::Wait }))
+    }
+
+    fn command(&self) -> Result<&ActCall, SpecError> {
+        match &self.call.tool {
+            ToolCall::Act(call) => Ok(call),
             other => Err(SpecError::Invalid {
                 tool: Called::TOGETHER,
                 reason: format!("{} is no command; operators command by move_wrists and such", other.name()),
             }),
         }
     }
+
+    fn arguments(&self) -> Result<OperatorArguments, serde_json::Error> {
+        Ok(OperatorArguments {
+            robot: self.robot.clone(),
+            tool: self.call.name().into(),
+            arguments: serde_json::to_value(&self.call.tool)?,
+        })
+    }
+
+    fn parse(arguments: OperatorArguments) -> Result<OperatorCall, EpisodeError> {
+        let OperatorArguments { robot, tool, arguments } = arguments;
+        let call = OperatorCall::new(&robot, ToolCall::parse(&tool, arguments)?.into())?;
+        call.command()?;
+        Ok(call)
+    }
+}
+
+impl OperatorCommand {
+    /// The operator's robot.
+    pub fn robot(&self) -> &str {
+        self.call.robot()
+    }
+
+    /// Control steps that it asks for.
+    pub fn steps(&self) -> u32 {
+        self.order.steps
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use serde_json::json;
-    use tandem_tools_spec::{Wait, Walk};
+    use tandem_tools_spec::{GetStatus, Observe, Say, Tool, Wait, Walk};
 
     use super::*;
 
+    fn operator(robot: &str, call: impl Into<ToolCall>) -> OperatorCall {
+        OperatorCall::new(robot, Call::from(call.into())).unwrap()
+    }
+
     #[test]
     fn what_is_written_is_read_back() {
-        let walk = match Walk::example().into() {
-            ToolCall::Act(call) => OperatorCommand { robot: "A".into(), call },
-            other => panic!("{other:?} is no command"),
-        };
-        let wait = OperatorCommand { robot: "B".into(), call: ActCall::Wait(Wait { steps: 5 }) };
-        assert_eq!((walk.asked_steps(), wait.asked_steps()), (25, 5));
+        let commands = vec![operator("A", Walk::example()), operator("B", Wait { steps: 5 })];
         for called in [
-            Called::Together(vec![walk, wait]),
-            Called::Say(Say { text: "Ready.".into() }),
+            Called::Together(commands),
+            Called::from(ToolCall::from(Say { text: "Ready.".into() })),
             Called::from(ToolCall::from(Wait { steps: 3 })),
         ] {
             let arguments = serde_json::from_str(&called.arguments().unwrap()).unwrap();
-            assert_eq!(Called::parse(called.name(), arguments), Ok(called));
+            assert_eq!(Called::parse(called.name(), arguments).unwrap(), called);
         }
     }
 
@@ -193,5 +204,27 @@ mod tests {
         check(json!({ "robot": "A", "tool": "finish", "arguments": {} }), "finish is no command");
         check(json!({ "robot": "A", "tool": "wait", "arguments": { "steps": 0 } }), "at least 1");
         check(json!({ "robot": "A" }), "arguments that work");
+    }
+
+    /// Every example of the contract that names a robot names A.
+    #[test]
+    fn operators_call_for_their_own_robots() {
+        let own =
+            |call: &Call, robot: &str| OperatorCall::new(robot, call.clone()).map(OperatorCall::into_call);
+        for call in ToolCall::examples().into_iter().map(Call::from) {
+            assert_eq!(own(&call, "A").unwrap(), call);
+            let foreign = own(&call, "B");
+            match call.robots().is_empty() {
+                true => assert_eq!(foreign.unwrap(), call),
+                false => {
+                    let text = foreign.unwrap_err().to_string();
+                    assert!(text.contains("\"A\"") && text.contains("yours is \"B\""), "{text}");
+                }
+            }
+        }
+        let status = operator("B", GetStatus {});
+        assert_eq!((status.robot(), status.call().robots().len()), ("B", 0));
+        let all = operator("B", Observe { robots: None, short: None }).into_call();
+        assert_eq!(all.tool, Observe { robots: Some(vec!["B".into()]), short: None }.into());
     }
 }

@@ -1,14 +1,46 @@
-//! The action row: arms 14, hands 14, waist 3, base 4.
+//! The action row: arms 14, hands 14, waist 3, base 4; and what of it lies beyond what a robot's joints and base can do.
 
 use std::ops::Range;
 
 use tandem_sim::{
-    ARM_COLUMNS, ARM_JOINTS, BaseCommand, HAND_COLUMNS, HAND_JOINTS, RobotModel, Side, UPPER, UPPER_JOINTS,
-    WAIST_COLUMN,
+    ARM_COLUMNS, ARM_JOINTS, BaseCommand, BaseLimits, HAND_COLUMNS, HAND_JOINTS, RobotModel, Side, UPPER,
+    UPPER_JOINTS, WAIST_COLUMN,
 };
 
 /// Names of the last four columns, as every message with a base command has them.
 const BASE: [&str; 4] = ["vx_m_s", "vy_m_s", "yaw_rate_rad_s", "pelvis_height_m"];
+
+/// What of a command lay beyond a limit and was moved there.
+#[derive(Clone, Debug, Default)]
+pub struct Clamped {
+    /// Columns of the action row.
+    pub columns: Vec<usize>,
+    /// Fields of the base command.
+    pub base: Vec<&'static str>,
+}
+
+impl Clamped {
+    /// The joint target `asked_rad` of a column, within the joint's limits.
+    pub fn joint(&mut self, model: &RobotModel, column: usize, asked_rad: f64) -> f64 {
+        let joint = &model.joints[UPPER[column]];
+        let within_rad = asked_rad.clamp(joint.lower_rad.into(), joint.upper_rad.into());
+        if within_rad != asked_rad && !self.columns.contains(&column) {
+            self.columns.push(column);
+        }
+        within_rad
+    }
+
+    /// The base command `asked`, within what locomotion accepts.
+    pub fn base(&mut self, limits: &BaseLimits, asked: BaseCommand) -> BaseCommand {
+        let done = limits.clamp(asked);
+        for field in clamped_fields(&asked, &done) {
+            if !self.base.contains(&field) {
+                self.base.push(field);
+            }
+        }
+        done
+    }
+}
 
 /// The columns of an arm.
 pub fn arm(side: Side) -> Range<usize> {
@@ -47,7 +79,7 @@ pub fn base_command([vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m]: [f32; 4])
 }
 
 /// Fields of the base command that differ between what was asked and what is done.
-pub fn clamped_fields(asked: &BaseCommand, done: &BaseCommand) -> impl Iterator<Item = &'static str> {
+fn clamped_fields(asked: &BaseCommand, done: &BaseCommand) -> impl Iterator<Item = &'static str> {
     let pairs = base_row(asked).into_iter().zip(base_row(done));
     BASE.into_iter().zip(pairs).filter(|(_, (asked, done))| asked != done).map(|(name, _)| name)
 }

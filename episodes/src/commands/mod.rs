@@ -1,155 +1,138 @@
-//! Commands: an acting tool call becomes one order per robot, once; orders become joint targets, step by step.
+//! Commands: an acting tool call becomes orders to robots, once; an order becomes a trajectory of joint targets, step by step.
+//!
+//! Each acting tool has a file of its own, from its arguments to joint targets: `move_wrists`, `walk`, `send_joint_chunk`, `wait`.
 
-mod aim;
 mod called;
+mod check_reach;
 mod columns;
 mod motion;
-mod orders;
-mod own;
-mod reach;
+mod move_wrists;
 mod report;
-mod run;
+mod send_joint_chunk;
 mod upper_body;
+mod wait;
+mod walk;
 
-pub use aim::Aim;
-pub use called::{Called, OperatorCommand};
-pub use columns::{action_row, base_row};
+pub use called::{Called, OperatorCall, OperatorCommand};
+pub use check_reach::check_reach;
+pub use columns::{Clamped, action_row, base_row};
 pub use motion::{Motion, MotionState, RobotSheet};
-pub use own::own;
-pub use reach::check_reach;
 pub use report::report;
-pub use run::Run;
 pub use upper_body::{UpperBody, upper_body};
 
-use tandem_sim::{BaseCommand, HAND_JOINTS, Sides, UPPER_JOINTS};
-use tandem_tools_spec::ActCall;
+use tandem_sim::RobotCommand;
+use tandem_tools_spec::{ActCall, JointChunk, WalkMove, WristMove};
 
 use crate::EpisodeError;
 use crate::protocol::Rules;
+use move_wrists::WristTrajectory;
+use send_joint_chunk::JointTrajectory;
+use walk::WalkTrajectory;
 
-/// What all robots do for some control steps.
+/// What robots do for some control steps. A robot without an order holds still.
+#[derive(Clone, Debug)]
 pub struct Command {
     pub steps: u32,
-    /// One per robot of the episode.
-    pub orders: Vec<Order>,
-    /// Control steps that each robot's order is made for: of a longer one, only the beginning is executed.
-    pub made_for: Vec<u32>,
-    /// Robots that the caller named, in its order, or all that wait: these are reported on.
-    named: Vec<usize>,
+    /// At most one for a robot. These robots are reported on, in this order.
+    pub orders: Vec<RobotOrder>,
 }
 
-/// What one robot is to do, and what of it had to be cut down.
-pub struct Order {
-    pub movement: Movement,
-    pub cut: Cut,
-}
-
-/// What one robot does during a command.
+/// What one robot, by its index, is to do. Whatever could be refused has been refused.
 #[derive(Clone, Debug)]
-pub enum Movement {
-    /// Nothing new is asked for, and the base stands: hands go on to where they were told to be.
+pub struct RobotOrder {
+    pub robot: usize,
+    /// Control steps that the order is made for. Where the command is shorter, only the order's beginning is executed.
+    pub steps: u32,
+    pub action: Action,
+}
+
+/// What is asked of one robot, as the arguments of a tool say it.
+#[derive(Clone, Debug)]
+pub enum Action {
+    MoveWrists(Box<WristMove>),
+    Walk(WalkMove),
+    SendJointChunk(JointChunk),
+    Wait,
+}
+
+/// What one robot does, control step by control step.
+pub enum Trajectory {
+    /// The base stands, and hands go on to where they were told to be.
     Hold,
-    /// Wrists and fingers arrive with the command's last step.
-    Reach(Box<Goals>),
-    /// The base moves; arms and hands keep their joints.
-    Walk(BaseCommand),
-    /// One row per step.
-    Rows(Vec<Row>),
-}
-
-/// Where hands are to be; fingers that are `None` stay.
-#[derive(Clone, Debug)]
-pub struct Goals {
-    pub wrists: Sides<Aim>,
-    /// How the wrists give way; `None` for not at all.
-    pub compliance_n_s_m: Option<f64>,
-    pub fingers_rad: Sides<Option<[f64; HAND_JOINTS]>>,
-    pub base: BaseCommand,
-}
-
-/// Joint targets and base command of one control step.
-#[derive(Clone, Copy, Debug)]
-pub struct Row {
-    pub upper_rad: [f64; UPPER_JOINTS],
-    pub base: BaseCommand,
-}
-
-/// What lay beyond a limit and was moved there.
-#[derive(Clone, Debug, Default)]
-pub struct Cut {
-    /// Columns of the action row.
-    columns: Vec<usize>,
-    /// Fields of the base command.
-    base: Vec<&'static str>,
+    Wrists(Box<WristTrajectory>),
+    Walk(WalkTrajectory),
+    Joints(JointTrajectory),
 }
 
 impl Command {
     /// Reads a call for the robots that `motions` move. Either all of it is in order, or none of it becomes a command.
     pub fn read(call: &ActCall, rules: &Rules, motions: &[Motion]) -> Result<Command, EpisodeError> {
-        match call {
-            ActCall::MoveWrists(args) => {
-                let entries = args.robots.iter().map(|entry| (entry.robot.as_str(), entry));
-                Command::of(rules.steps(args.steps as usize)?, entries, motions, orders::reach)
-            }
-            ActCall::Walk(args) => {
-                let entries = args.robots.iter().map(|entry| (entry.robot.as_str(), entry));
-                Command::of(rules.steps(args.steps as usize)?, entries, motions, orders::walk)
-            }
-            ActCall::SendJointChunk(args) => {
-                let rows = args.robots.first().map_or(0, |chunk| chunk.rows.len());
-                let entries = args.robots.iter().map(|chunk| (chunk.robot.as_str(), chunk.rows.as_slice()));
-                Command::of(rules.steps(rows)?, entries, motions, orders::rows)
-            }
-            ActCall::Wait(args) => {
-                let hold = Command::hold(rules.steps(args.steps as usize)?, motions.len());
-                Ok(Command { named: (0..motions.len()).collect(), ..hold })
-            }
-        }
+        let steps = rules.steps(call.steps())?;
+        let order = |(name, action): (&str, Action)| {
+            find(name, motions).map(|robot| RobotOrder { robot, steps, action })
+        };
+        let orders = actions(call, motions).into_iter().map(order).collect::<Result<_, _>>()?;
+        Ok(Command { steps, orders })
     }
 
-    /// `robots` robots stand still for `steps` control steps.
-    pub fn hold(steps: u32, robots: usize) -> Command {
-        let orders = (0..robots).map(|_| Order::hold()).collect();
-        Command { steps, orders, made_for: vec![steps; robots], named: Vec::new() }
+    /// All robots hold still for `steps` control steps, and none is reported on.
+    pub fn hold(steps: u32) -> Command {
+        Command { steps, orders: Vec::new() }
     }
 
-    /// What several robots, by index, are told each by a command of its own, side by side and for as long as the shortest of them.
-    pub fn together(parts: Vec<(usize, Command)>, robots: usize) -> Command {
-        let steps = parts.iter().map(|(_, part)| part.steps).min().unwrap_or_default();
-        let mut command = Command::hold(steps, robots);
-        for (robot, part) in parts {
-            command.made_for[robot] = part.steps;
-            command.orders.splice(robot..=robot, part.orders.into_iter().nth(robot));
-            command.named.push(robot);
-        }
-        command
-    }
-
-    /// The robots to report on, and what of their orders had to be cut down.
-    pub fn cuts(&self) -> Vec<(usize, Cut)> {
-        self.named.iter().map(|robot| (*robot, self.orders[*robot].cut.clone())).collect()
-    }
-
-    /// Robots with an entry get the order that `order` makes of it, the others hold.
-    fn of<'a, Entry>(
-        steps: u32,
-        entries: impl Iterator<Item = (&'a str, Entry)>,
-        motions: &[Motion],
-        order: impl Fn(Entry, &Motion) -> Order,
-    ) -> Result<Command, EpisodeError> {
-        let mut command = Command::hold(steps, motions.len());
-        for (name, entry) in entries {
-            let robot = find(name, motions)?;
-            command.orders[robot] = order(entry, &motions[robot]);
-            command.named.push(robot);
-        }
-        Ok(command)
+    /// Several robots are told each by an order of its own, side by side and for as long as the shortest of these.
+    pub fn together(orders: Vec<RobotOrder>) -> Command {
+        let steps = orders.iter().map(|order| order.steps).min().unwrap_or_default();
+        Command { steps, orders }
     }
 }
 
-impl Order {
-    fn hold() -> Order {
-        Order { movement: Movement::Hold, cut: Cut::default() }
+impl Trajectory {
+    /// Has `motion` take up `action`, which is to be done within `steps` control steps. Also says what of it was clamped.
+    pub fn begin(action: &Action, steps: u32, motion: &mut Motion) -> (Trajectory, Clamped) {
+        let mut clamped = Clamped::default();
+        let trajectory = match action {
+            Action::MoveWrists(entry) => {
+                Trajectory::Wrists(WristTrajectory::begin(entry, steps, motion, &mut clamped).into())
+            }
+            Action::Walk(entry) => Trajectory::Walk(WalkTrajectory::begin(entry, motion, &mut clamped)),
+            Action::SendJointChunk(chunk) => {
+                Trajectory::Joints(JointTrajectory::begin(chunk, motion, &mut clamped))
+            }
+            Action::Wait => Trajectory::Hold,
+        };
+        (trajectory, clamped)
+    }
+
+    /// The command of control step `step`, counted from 1.
+    pub fn command(&self, step: u32, motion: &mut Motion) -> RobotCommand {
+        match self {
+            Trajectory::Hold => wait::hold(motion),
+            Trajectory::Wrists(wrists) => wrists.advance(step, motion),
+            Trajectory::Walk(walk) => walk.advance(motion),
+            Trajectory::Joints(joints) => joints.advance(step, motion),
+        }
+        motion.command()
+    }
+}
+
+/// What a call asks of each robot that it is about, by the robot's name.
+fn actions<'a>(call: &'a ActCall, motions: &'a [Motion]) -> Vec<(&'a str, Action)> {
+    match call {
+        ActCall::MoveWrists(args) => {
+            let action =
+                |entry: &'a WristMove| (entry.robot.as_str(), Action::MoveWrists(Box::new(entry.clone())));
+            args.robots.iter().map(action).collect()
+        }
+        ActCall::Walk(args) => {
+            args.robots.iter().map(|entry| (entry.robot.as_str(), Action::Walk(entry.clone()))).collect()
+        }
+        ActCall::SendJointChunk(args) => {
+            let action =
+                |chunk: &'a JointChunk| (chunk.robot.as_str(), Action::SendJointChunk(chunk.clone()));
+            args.robots.iter().map(action).collect()
+        }
+        ActCall::Wait(_) => motions.iter().map(|motion| (motion.robot.name.as_str(), Action::Wait)).collect(),
     }
 }
 

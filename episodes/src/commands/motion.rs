@@ -9,7 +9,6 @@ use tandem_sim::{
     BaseCommand, BaseLimits, CONTROL_HZ, HAND_JOINTS, RobotCommand, RobotModel, Side, Sides, UPPER_JOINTS,
 };
 
-use super::aim::Aim;
 use super::columns;
 use super::upper_body::{REACH_TOLERANCE, UpperBody};
 
@@ -53,6 +52,17 @@ pub struct MotionState {
     yielded_m: f64,
     /// What the solver remembers of steps that did not help; see [`Solver::caution`].
     caution: f64,
+}
+
+/// What a wrist is to do.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Aim {
+    /// The arm's joints stay as they are.
+    Joints,
+    /// A pose in the world: the hand stays there while the pelvis sways or walks.
+    World(Isometry3<f64>),
+    /// A pose in the pelvis frame, which goes where the pelvis goes.
+    Carried(Isometry3<f64>),
 }
 
 impl Motion {
@@ -100,7 +110,7 @@ impl Motion {
     }
 
     /// A wrist in the pelvis frame as it would be had it not given way.
-    pub(super) fn without_yield(&self, pelvis_from_wrist: &Isometry3<f64>) -> Isometry3<f64> {
+    fn without_yield(&self, pelvis_from_wrist: &Isometry3<f64>) -> Isometry3<f64> {
         Translation3::from(-self.yielded_in_pelvis_m()) * pelvis_from_wrist
     }
 
@@ -120,8 +130,20 @@ impl Motion {
         self.state = state;
     }
 
-    pub fn base(&self) -> BaseCommand {
-        self.state.base
+    /// What the robot is told now.
+    pub fn command(&self) -> RobotCommand {
+        RobotCommand {
+            upper_rad: self.state.upper_rad.map(|target_rad| target_rad as f32),
+            base: self.state.base,
+        }
+    }
+
+    /// The base command that a velocity (forward and left in m/s, turning in rad/s) and a height ask for. Without a height, the base
+    /// keeps the one that it was last told.
+    pub(super) fn base_asked(&self, velocity_command: [f64; 3], height_m: Option<f64>) -> BaseCommand {
+        let [vx_m_s, vy_m_s, yaw_rate_rad_s] = velocity_command.map(|part| part as f32);
+        let pelvis_height_m = height_m.map_or(self.state.base.pelvis_height_m, |height_m| height_m as f32);
+        BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m }
     }
 
     /// Where the wrists are to be, in the frame of the pelvis as it is now; of an arm without a target, where its joints
@@ -145,6 +167,18 @@ impl Motion {
     /// What the wrists are to do from now on.
     pub(super) fn aim(&mut self, aims: Sides<Aim>) {
         self.state.aims = aims;
+    }
+
+    /// From now on the arms keep their joints.
+    pub(super) fn keep_joints(&mut self) {
+        self.aim(Sides::both(Aim::Joints));
+    }
+
+    /// Aims of the kind of those in force, at which the wrists would have arrived were they where the commanded joints put them and had
+    /// they not given way.
+    pub(super) fn arrived(&self) -> Sides<Aim> {
+        let commanded = self.commanded_wrists().map(|wrist| self.without_yield(&wrist));
+        Sides::from_fn(|side| self.state.aims[side].at(&self.state.world_from_pelvis, &commanded[side]))
     }
 
     pub(super) fn set_joints(&mut self, upper_rad: [f64; UPPER_JOINTS]) {
@@ -217,4 +251,38 @@ impl Motion {
 fn configuration<'a>(body: &'a UpperBody, state: &MotionState) -> Configuration<'a> {
     let q: Vec<f64> = body.columns.iter().map(|column| state.upper_rad[*column]).collect();
     Configuration::new(&body.model, &q).expect("one finite target per joint")
+}
+
+impl Aim {
+    /// The wrist's pose that is asked for, in the frame of a pelvis at `world_from_pelvis`; `None` for joints.
+    pub fn in_pelvis(&self, world_from_pelvis: &Isometry3<f64>) -> Option<Isometry3<f64>> {
+        match self {
+            Aim::Joints => None,
+            Aim::World(world_from_wrist) => Some(world_from_pelvis.inv_mul(world_from_wrist)),
+            Aim::Carried(pelvis_from_wrist) => Some(*pelvis_from_wrist),
+        }
+    }
+
+    /// An aim of the same kind at which a wrist at `pelvis_from_wrist` has arrived.
+    pub fn at(&self, world_from_pelvis: &Isometry3<f64>, pelvis_from_wrist: &Isometry3<f64>) -> Aim {
+        match self {
+            Aim::Joints => Aim::Joints,
+            Aim::World(_) => Aim::World(world_from_pelvis * pelvis_from_wrist),
+            Aim::Carried(_) => Aim::Carried(*pelvis_from_wrist),
+        }
+    }
+
+    /// The aim after `share` of the straight way from here to `goal`, in the goal's frame; the goal itself where the two are
+    /// of different kinds.
+    pub fn towards(&self, goal: &Aim, share: f64) -> Aim {
+        match (self, goal) {
+            (Aim::World(from), Aim::World(to)) => Aim::World(between(from, to, share)),
+            (Aim::Carried(from), Aim::Carried(to)) => Aim::Carried(between(from, to, share)),
+            (Aim::Joints | Aim::World(_) | Aim::Carried(_), goal) => *goal,
+        }
+    }
+}
+
+fn between(from: &Isometry3<f64>, to: &Isometry3<f64>, share: f64) -> Isometry3<f64> {
+    from.try_lerp_slerp(to, share, 1e-9).unwrap_or(*to)
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Translation3, Vector3};
 use tandem_sim::{BaseCommand, BaseLimits, RobotCommand, RobotModel, Side, Sides, UPPER, assets};
-use tandem_tools_spec::{MoveWrists, Protocol, ToolCall, WristMove};
+use tandem_tools_spec::{MoveWrists, Protocol, ToolCall, WalkMove, WristMove};
 
 use super::*;
 use crate::protocol::rules;
@@ -24,24 +24,24 @@ fn standing() -> Motion {
     Motion::new(robot, &body, &rest, Isometry3::translation(0.0, 0.0, 0.78))
 }
 
-/// The movement that moves A as `entry` says, in one command of 50 steps.
-fn movement(entry: WristMove, motion: &Motion) -> Movement {
+/// What `entry` asks of A, in one command of 50 steps.
+fn action(entry: WristMove, motion: &Motion) -> Action {
     let rules = rules(Protocol::Benchmark, tasks::find("handover").unwrap());
     let ToolCall::Act(call) = MoveWrists { steps: 50, robots: vec![entry] }.into() else { panic!("a look") };
     let command = Command::read(&call, &rules, std::slice::from_ref(motion)).unwrap();
-    command.orders.into_iter().next().unwrap().movement
+    command.orders.into_iter().next().unwrap().action
 }
 
 /// Plays 50 steps, in each of which the pelvis moves by `pelvis_step_m`.
-fn play(movement: Movement, pelvis_step_m: Vector3<f64>, motion: &mut Motion) {
-    play_pulled(movement, pelvis_step_m, Vector3::zeros(), motion);
+fn play(action: Action, pelvis_step_m: Vector3<f64>, motion: &mut Motion) {
+    play_pulled(action, pelvis_step_m, Vector3::zeros(), motion);
 }
 
 /// As [`play`], while the hands feel `hands_n`.
-fn play_pulled(movement: Movement, pelvis_step_m: Vector3<f64>, hands_n: Vector3<f64>, motion: &mut Motion) {
-    let mut run = Run::begin(movement, 50, motion);
-    for _ in 0..50 {
-        run.command(motion);
+fn play_pulled(action: Action, pelvis_step_m: Vector3<f64>, hands_n: Vector3<f64>, motion: &mut Motion) {
+    let (trajectory, _) = Trajectory::begin(&action, 50, motion);
+    for step in 1..=50 {
+        trajectory.command(step, motion);
         motion.sense(Translation3::from(pelvis_step_m) * motion.world_from_pelvis(), hands_n);
     }
 }
@@ -63,9 +63,9 @@ fn wrist_in_world_m(motion: &Motion) -> Vector3<f64> {
 /// A robot whose right hand has arrived before its chest.
 fn arrived() -> Motion {
     let mut motion = standing();
-    let goal = movement(right_hand(false), &motion);
+    let goal = action(right_hand(false), &motion);
     play(goal, Vector3::zeros(), &mut motion);
-    play(Movement::Hold, Vector3::zeros(), &mut motion);
+    play(Action::Wait, Vector3::zeros(), &mut motion);
     motion
 }
 
@@ -76,12 +76,12 @@ fn a_hand_stays_in_the_world_under_a_moving_pelvis_until_it_is_out_of_reach() {
     assert!((there_m - Vector3::new(0.28, -0.24, 1.0)).norm() < 1e-3, "{there_m}");
     let back = |distance_m: f64| Vector3::new(-distance_m / 50.0, 0.0, 0.0);
     for distance_m in [0.01, -0.02, 0.06] {
-        play(Movement::Hold, back(distance_m), &mut motion);
+        play(Action::Wait, back(distance_m), &mut motion);
         let off_m = (wrist_in_world_m(&motion) - there_m).norm();
         // Inverse kinematics comes two control steps after the pelvis.
         assert!(off_m < 5e-3, "{off_m} m off after {distance_m} m back");
     }
-    play(Movement::Hold, back(0.6), &mut motion);
+    play(Action::Wait, back(0.6), &mut motion);
     let off_m = (wrist_in_world_m(&motion) - there_m).norm();
     assert!(off_m > 0.1, "{off_m} m off, with the arm's length between pelvis and target");
 }
@@ -92,7 +92,7 @@ fn targets_are_of_the_pelvis_at_the_beginning_and_only_carried_ones_move_with_it
     for (carried, walked) in [(false, 0.0), (true, 50.0)] {
         let mut motion = arrived();
         let began_m = wrist_in_world_m(&motion);
-        let goal = movement(right_hand(carried), &motion);
+        let goal = action(right_hand(carried), &motion);
         play(goal, step_m, &mut motion);
         let off_m = (wrist_in_world_m(&motion) - began_m - walked * step_m).norm();
         assert!(off_m < 3e-3, "{off_m} m off with carried {carried}");
@@ -112,21 +112,21 @@ fn hands_give_way_as_they_were_told_to_and_come_back() {
     let off_m = |motion: &Motion| wrist_in_world_m(motion) - there_m;
     // What pulls a stiff hand, or a soft one sideways, does not move it.
     for (entry, hands_n) in [(right_hand(false), ahead_n), (soft(), Vector3::new(0.0, 30.0, -20.0))] {
-        let goal = movement(entry, &motion);
+        let goal = action(entry, &motion);
         play_pulled(goal, Vector3::zeros(), hands_n, &mut motion);
         assert!(off_m(&motion).norm() < 1e-3, "{} under {hands_n}", off_m(&motion));
-        play(Movement::Hold, Vector3::zeros(), &mut motion);
+        play(Action::Wait, Vector3::zeros(), &mut motion);
     }
     // 10 N for a second, at 1 m/s for 250 N: 4 cm, less what creeps back and what the hand is behind.
-    let goal = movement(soft(), &motion);
+    let goal = action(soft(), &motion);
     play_pulled(goal, Vector3::zeros(), ahead_n, &mut motion);
     assert!((0.036..0.040).contains(&off_m(&motion).x), "{}", off_m(&motion));
     // The next command begins where the hand is, and goes on to the limit.
-    let goal = movement(soft(), &motion);
+    let goal = action(soft(), &motion);
     play_pulled(goal, Vector3::zeros(), 3.0 * ahead_n, &mut motion);
     assert!((0.058..0.0605).contains(&off_m(&motion).x), "{}", off_m(&motion));
-    play(Movement::Hold, Vector3::zeros(), &mut motion);
-    play(Movement::Hold, Vector3::zeros(), &mut motion);
+    play(Action::Wait, Vector3::zeros(), &mut motion);
+    play(Action::Wait, Vector3::zeros(), &mut motion);
     assert!(off_m(&motion).norm() < 1e-3, "{}", off_m(&motion));
 }
 
@@ -136,7 +136,7 @@ fn an_arm_without_a_target_keeps_its_joints() {
     let left = columns::arm(Side::Left);
     let before_rad = motion.state().upper_rad;
     let low = WristMove { right_position_m: Some([0.30, -0.10, -0.05]), ..WristMove::hold("A") };
-    let goal = movement(low, &motion);
+    let goal = action(low, &motion);
     play(goal, Vector3::new(0.001, 0.0, 0.0), &mut motion);
     let after_rad = motion.state().upper_rad;
     assert_eq!(after_rad[left.clone()], before_rad[left], "the left arm was given no target");
@@ -144,8 +144,9 @@ fn an_arm_without_a_target_keeps_its_joints() {
 
     // Walking takes both arms along, whatever they were told before.
     let mut walking = arrived();
-    let walk = Movement::Walk(walking.base());
-    play(walk, Vector3::new(0.002, 0.0, 0.0), &mut walking);
+    let walk =
+        WalkMove { robot: "A".into(), vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m: None };
+    play(Action::Walk(walk), Vector3::new(0.002, 0.0, 0.0), &mut walking);
     assert_eq!(walking.state().upper_rad, before_rad);
 }
 
@@ -159,4 +160,20 @@ fn reach_is_asked_of_the_named_arm_alone() {
         assert_eq!(errors.right.unwrap().position_m < 0.005, within);
         assert!(at_limit.iter().all(|joint| !joint.starts_with("left")), "{at_limit:?}");
     }
+}
+
+#[test]
+fn a_half_that_is_left_out_is_where_the_hand_is_to_be() {
+    let mut motion = arrived();
+    let target = motion.targets().right;
+    let higher = WristMove { right_position_m: Some([0.28, -0.24, 0.3]), ..WristMove::hold("A") };
+    play(action(higher, &motion), Vector3::zeros(), &mut motion);
+    let moved = motion.targets().right;
+    assert!((moved.translation.vector - Vector3::new(0.28, -0.24, 0.3)).norm() < 1e-12);
+    // Through the world and back; six decimals would be coarser by far.
+    assert!(moved.rotation.angle_to(&target.rotation) < 1e-12);
+    let turned = WristMove { right_quaternion_wxyz: Some([0.8, 0.6, 0.0, 0.0]), ..WristMove::hold("A") };
+    play(action(turned, &motion), Vector3::zeros(), &mut motion);
+    let off_m = (motion.targets().right.translation.vector - moved.translation.vector).norm();
+    assert!(off_m < 1e-12, "{off_m} m");
 }

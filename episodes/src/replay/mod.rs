@@ -21,5 +21,5 @@ pub enum ReplayError {
     #[error(transparent)]
     Episode(#[from] EpisodeError),
     #[error("call {number} of the recording is no tool call of this build: {source}")]
-    Call { number: usize, source: tandem_tools_spec::SpecError },
+    Call { number: usize, source: EpisodeError },
 }

@@ -3,7 +3,7 @@
 use tandem_sim::Pose;
 use tandem_tools_spec::{
     CommandReply, EndReason, Formats, Look, LookCall, LookReply, ManageCall, ManageReply, Observe,
-    RobotReport, StopReason, ToolCall, ToolReply,
+    RobotReport, StopReason, TalkCall, TalkReply, ToolCall, ToolReply,
 };
 
 use super::Session;
@@ -22,8 +22,8 @@ impl Answer {
     /// As the one who called is told it.
     pub fn reply(self, called: &Called) -> Result<ToolReply, EpisodeError> {
         let formats = match called {
-            Called::Look(look) => look.formats,
-            Called::Tool(_) | Called::Together(_) | Called::Say(_) => Formats::default(),
+            Called::One(call) => call.formats,
+            Called::Together(_) => Formats::default(),
         };
         match self {
             Answer::Reply(reply) => Ok(reply),
@@ -43,36 +43,43 @@ impl<'a> From<&'a Answer> for CallOutcome<'a> {
 
 impl Session {
     pub(super) fn answer(&mut self, called: &Called) -> Result<Answer, EpisodeError> {
-        match (called, self.ended) {
-            (Called::Tool(ToolCall::Manage(call)), _) => {
-                Ok(Answer::Reply(ToolReply::Manage(self.manage(call))))
+        let call = match called {
+            Called::One(call) => call,
+            Called::Together(calls) => {
+                self.expect_underway()?;
+                let orders = calls.iter().map(|call| call.order(&self.rules, &self.motions));
+                let command = Command::together(orders.collect::<Result<_, _>>()?);
+                return self.act(&command);
             }
-            (Called::Tool(ToolCall::Look(call)), _) => self.look(call),
-            (Called::Look(look), _) => self.seen(&look.observe, &look.formats).map(Answer::Observation),
-            (Called::Tool(ToolCall::Act(_)) | Called::Together(_) | Called::Say(_), Some(reason)) => {
-                Err(EpisodeError::Ended { reason })
+        };
+        call.validate()?;
+        match &call.tool {
+            ToolCall::Look(look) => self.look(look, &call.formats),
+            ToolCall::Act(act) => {
+                self.expect_underway()?;
+                let command = Command::read(act, &self.rules, &self.motions)?;
+                self.act(&command)
             }
-            (Called::Tool(ToolCall::Act(call)), None) => {
-                let command = Command::read(call, &self.rules, &self.motions)?;
-                Ok(Answer::Reply(ToolReply::Act(self.act(command)?)))
-            }
-            (Called::Together(commands), None) => {
-                let parts = commands.iter().map(|command| command.read(&self.rules, &self.motions));
-                let command = Command::together(parts.collect::<Result<_, _>>()?, self.motions.len());
-                Ok(Answer::Reply(ToolReply::Act(self.act(command)?)))
-            }
-            (Called::Say(_), None) => {
-                Ok(Answer::Reply(ToolReply::Manage(ManageReply::GetStatus(self.status()))))
+            ToolCall::Manage(manage) => Ok(Answer::Reply(ToolReply::Manage(self.manage(manage)))),
+            ToolCall::Talk(TalkCall::Say(_)) => {
+                self.expect_underway()?;
+                Ok(Answer::Reply(ToolReply::Talk(TalkReply::Say(self.status()))))
             }
         }
     }
 
-    fn look(&mut self, call: &LookCall) -> Result<Answer, EpisodeError> {
+    /// Refuses what an episode that has ended does no more.
+    pub(super) fn expect_underway(&self) -> Result<(), EpisodeError> {
+        match self.ended {
+            Some(reason) => Err(EpisodeError::Ended { reason }),
+            None => Ok(()),
+        }
+    }
+
+    fn look(&mut self, call: &LookCall, formats: &Formats) -> Result<Answer, EpisodeError> {
         let find = |name: &String| commands::find(name, &self.motions);
         let reply = match call {
-            LookCall::Observe(args) => {
-                return self.seen(args, &Formats::default()).map(Answer::Observation);
-            }
+            LookCall::Observe(args) => return self.seen(args, formats).map(Answer::Observation),
             LookCall::GetRobotState(args) => {
                 let robot = find(&args.robot)?;
                 let sheet = &self.motions[robot].robot;
@@ -104,7 +111,7 @@ impl Session {
     }
 
     /// Whether an observation can be made as asked.
-    pub fn check_look(&self, look: &Look) -> Result<(), EpisodeError> {
+    pub(super) fn check_look(&self, look: &Look) -> Result<(), EpisodeError> {
         self.looked_through(&look.observe, &look.formats).map(drop)
     }
 
@@ -126,21 +133,22 @@ impl Session {
         }
     }
 
-    /// Executes a command that has been checked as a whole.
-    fn act(&mut self, command: Command) -> Result<CommandReply, EpisodeError> {
-        let cuts = command.cuts();
+    /// Executes a command, and reports on every robot that it has an order for.
+    pub(super) fn act(&mut self, command: &Command) -> Result<Answer, EpisodeError> {
         let began: Vec<Pose> =
             self.present.robots.iter().map(|robot| robot.state.start_from_pelvis).collect();
-        let executed_steps = self.run(command)?;
+        let (executed_steps, clamped) = self.run(command)?;
         let stop_reason = self.stop_reason();
-        let robots: Vec<RobotReport> = cuts
+        let robots: Vec<RobotReport> = command
+            .orders
             .iter()
-            .map(|(robot, cut)| {
-                let state = &self.present.robots[*robot].state;
-                report(cut, &began[*robot], state, &self.motions[*robot])
+            .zip(&clamped)
+            .map(|(order, clamped)| {
+                let state = &self.present.robots[order.robot].state;
+                report(clamped, &began[order.robot], state, &self.motions[order.robot])
             })
             .collect();
-        Ok(CommandReply {
+        Ok(Answer::Reply(ToolReply::Act(CommandReply {
             executed_steps,
             stop_reason,
             time_s: self.present.time_s,
@@ -148,7 +156,7 @@ impl Session {
             fallen: self.fallen(),
             phases: self.phases(),
             budget: self.budget(),
-        })
+        })))
     }
 
     /// Why a command that has been executed stopped; what ends the episode ends it here.

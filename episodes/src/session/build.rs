@@ -1,15 +1,31 @@
-//! From what an episode is to its world at rest, and to what moves its robots.
+//! From what an episode is to its world at rest, and to what moves its robots. The world is the task's own scene, or another in which
+//! the task's robots and objects are put where sites say.
 
+use std::path::Path;
 use std::sync::Arc;
 
-use tandem_sim::{Robot, RobotModel, World};
+use tandem_sim::mjcf::{Document, Site};
+use tandem_sim::{
+    CONTROL_HZ, ObjectPlacement, Pose, Robot, RobotModel, RobotPlacement, Rotation, SceneSource, Step,
+    Vector, World, WorldSpec, assets, heading_rad,
+};
 use xxhash_rust::xxh3::xxh3_64;
 
-use super::venue;
 use crate::EpisodeError;
 use crate::commands::{Motion, RobotSheet, UpperBody};
 use crate::convert::isometry_from_sim;
+use crate::error::SceneError;
 use crate::spec::{EpisodeSpec, RobotFile};
+use crate::tasks::Task;
+
+/// Site of a scene at which the origin of a task is.
+const TASK_SITE: &str = "task";
+const THIRD_PERSON: &str = "third_person";
+/// A site is upright within this.
+const LEVEL_RAD: f32 = 0.01;
+/// In a scene that nobody has tried before, everything has to stay where it is put, for so long and as near as this.
+const TRIAL_STEPS: u32 = 50;
+const STAYS_M: f32 = 0.03;
 
 /// What an episode is made of.
 pub struct Built {
@@ -27,8 +43,8 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
     let locomotion = spec.locomotion.load()?;
     let mjcf = spec.robot.read()?;
     let model = Arc::new(RobotModel::parse(&spec.robot.name(), &mjcf)?);
-    let world_spec = venue::world_spec(spec)?;
-    venue::check(spec, &world_spec, &model)?;
+    let world_spec = world_spec(spec)?;
+    try_scene(spec, &world_spec, &model)?;
     let mut world = World::with_robot(&world_spec, model)?;
     for robot in 0..world.robots().len() {
         world.set_locomotion(robot, locomotion.controller());
@@ -50,4 +66,145 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
         RobotFile::File(_) => format!("{}-{:016x}", spec.robot.name(), xxh3_64(mjcf.as_bytes())),
     };
     Ok(Built { world, motions, robot, locomotion: locomotion.name().into() })
+}
+
+/// What the world of an episode is made of.
+fn world_spec(spec: &EpisodeSpec) -> Result<WorldSpec, EpisodeError> {
+    let own = own_spec(spec.task, spec.seed);
+    match &spec.scene {
+        None => Ok(own),
+        Some(file) => Ok(elsewhere(own, spec.task, &file.path, file.load()?)?),
+    }
+}
+
+fn own_spec(task: &Task, seed: u32) -> WorldSpec {
+    let robots = task.robots.iter().map(|robot| RobotPlacement {
+        name: robot.name.into(),
+        position_m: robot.position_m,
+        yaw_rad: robot.yaw_rad,
+    });
+    let objects = task.objects.iter().zip(task.start_poses(seed)).map(|(spot, start)| ObjectPlacement {
+        name: spot.name.into(),
+        file: spot.file.into(),
+        world_from_object: Pose::from_parts(
+            start.position_m.into(),
+            Rotation::from_rotation_z(start.yaw_rad),
+        ),
+    });
+    WorldSpec { scene: task.scene.into(), robots: robots.collect(), objects: objects.collect() }
+}
+
+/// Puts a task into another scene. The scene is moved, so that its site `task` is at the origin; tasks and experts keep their numbers.
+fn elsewhere(
+    mut spec: WorldSpec,
+    task: &'static Task,
+    path: &Path,
+    mut document: Document,
+) -> Result<WorldSpec, SceneError> {
+    let sites = document.room_sites()?;
+    let find = |name: &str| sites.iter().find(|site| site.name == name);
+    let Some(origin) = find(TASK_SITE) else {
+        let robots = task.robot_names().map(robot_site);
+        let may = robots.chain(task.objects.iter().map(|spot| spot.name.into())).collect();
+        let have: Vec<&str> = sites.iter().map(|site| site.name.as_str()).collect();
+        return Err(SceneError::NoPlace { path: path.into(), task: task.id, may, have: have.join(", ") });
+    };
+    let world_from_scene = upright(path, origin)?.inverse();
+    for robot in &mut spec.robots {
+        if let Some(site) = find(&robot_site(&robot.name)) {
+            let at = world_from_scene * upright(path, site)?;
+            robot.position_m = [at.translation.x, at.translation.y];
+            robot.yaw_rad = heading_rad(&at);
+        }
+    }
+    for (object, spot) in spec.objects.iter_mut().zip(task.objects) {
+        if let Some(site) = find(spot.name) {
+            // What the seed adds stays.
+            let spot_m = Vector::from(spot.position_m);
+            let by_m = object.world_from_object.translation - spot_m;
+            let turned = Rotation::from_rotation_z(heading_rad(&object.world_from_object) - spot.yaw_rad);
+            let at = world_from_scene * upright(path, site)?;
+            object.world_from_object = Pose::from_parts(at.translation + by_m, at.rotation * turned);
+        }
+    }
+    if document.cameras.iter().all(|camera| camera.name != THIRD_PERSON) {
+        let own = Document::parse(task.scene, assets::scene(task.scene)?)?;
+        let seen = own.cameras.iter().filter(|camera| camera.name == THIRD_PERSON);
+        document.cameras.extend(seen.map(|camera| camera.moved(&world_from_scene.inverse())));
+    }
+    spec.scene = SceneSource::Read { document: Arc::new(document), world_from_scene };
+    Ok(spec)
+}
+
+/// Makes sure that a scene of a file has what the task needs: a trial of its own, in which nobody acts.
+fn try_scene(
+    spec: &EpisodeSpec,
+    world_spec: &WorldSpec,
+    model: &Arc<RobotModel>,
+) -> Result<(), EpisodeError> {
+    let Some(file) = &spec.scene else { return Ok(()) };
+    let (path, task) = (file.path.clone(), spec.task.id);
+    let mut world = World::with_robot(world_spec, model.clone())?;
+    for spot in spec.task.objects {
+        if world.object_models().filter(|(name, _)| *name == spot.name).count() > 1 {
+            return Err(SceneError::SameName { path, task, name: spot.name.into() }.into());
+        }
+    }
+    let commands: Vec<_> = (0..world.robots().len()).map(|robot| world.rest_command(robot)).collect();
+    let start = places_m(&world.present(), spec.task);
+    let mut end = start.clone();
+    for _ in 0..TRIAL_STEPS {
+        end = places_m(&world.control_step(&commands)?, spec.task);
+    }
+    let moved = start.iter().zip(&end).map(|(start, end)| (start, (end.at_m - start.at_m).length()));
+    match moved.into_iter().find(|(_, moved_m)| *moved_m > STAYS_M) {
+        None => Ok(()),
+        Some((Place { name, site, at_m }, moved_m)) => Err(SceneError::Unsteady {
+            path,
+            task,
+            name: name.clone(),
+            site: site.clone(),
+            at_m: at_m.to_array(),
+            moved_m,
+            trial_s: f64::from(TRIAL_STEPS) / CONTROL_HZ,
+        }
+        .into()),
+    }
+}
+
+/// Where something of the task is.
+#[derive(Clone)]
+struct Place {
+    /// For messages.
+    name: String,
+    /// The site of a scene that places it.
+    site: String,
+    at_m: Vector,
+}
+
+fn places_m(step: &Step, task: &Task) -> Vec<Place> {
+    let robots = step.robots.iter().zip(task.robot_names()).map(|(robot, name)| Place {
+        name: format!("robot {name}"),
+        site: robot_site(name),
+        at_m: robot.state.world_from_pelvis.translation,
+    });
+    let objects = task.objects.iter().filter_map(|spot| {
+        let at_m = step.object(spot.name)?.world_from_object.translation;
+        Some(Place { name: spot.name.into(), site: spot.name.into(), at_m })
+    });
+    robots.chain(objects).collect()
+}
+
+fn robot_site(name: &str) -> String {
+    format!("robot_{name}")
+}
+
+fn upright(path: &Path, site: &Site) -> Result<Pose, SceneError> {
+    let pose = site.body_from_site;
+    let tilt_rad = (pose.rotation * Vector::Z).angle_between(Vector::Z);
+    if tilt_rad > LEVEL_RAD {
+        let (path, site) = (path.into(), site.name.clone());
+        return Err(SceneError::Tilted { path, site, tilt_deg: tilt_rad.to_degrees() });
+    }
+    Ok(Pose::from_parts(pose.translation, Rotation::from_rotation_z(heading_rad(&pose))))
 }

@@ -2,14 +2,15 @@
 
 mod answer;
 mod build;
+mod calls;
 mod checkpoint;
 mod clock;
 mod replay;
 mod run_files;
 mod status;
-mod venue;
 
 pub(crate) use build::build;
+pub use calls::CallReply;
 pub use checkpoint::Checkpoint;
 pub use clock::{Clock, monotonic};
 pub(crate) use replay::Replay;
@@ -22,17 +23,16 @@ use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
 use tandem_sim::{RobotCommand, Side, Step, World};
-use tandem_tools_spec::{EndReason, Formats, ManageReply, Observe, ResultReply, ToolCall, ToolReply};
+use tandem_tools_spec::{EndReason, ResultReply};
 
-use crate::commands::{Called, Command, Motion, OperatorCommand, Run};
+use crate::commands::{Clamped, Command, Motion, Trajectory};
 use crate::convert::isometry_from_sim;
-use crate::observation::{Observer, Picture, TeamObservation};
+use crate::observation::{Observer, Picture};
 use crate::protocol::{Rules, rules};
-use crate::recording::{BEGIN, CallOutcome, state_hash_text};
+use crate::recording::{BEGIN, state_hash_text};
 use crate::scoring::{Facts, Phase, Scores};
 use crate::spec::{EpisodeSpec, Start};
 use crate::{EpisodeError, fingerprint};
-use answer::Answer;
 use build::Built;
 use checkpoint::Origin;
 use clock::ThinkingClock;
@@ -140,80 +140,7 @@ impl Session {
     fn hold(&mut self, steps: u32) -> Result<(), EpisodeError> {
         match steps {
             0 => Ok(()),
-            steps => self.run(Command::hold(steps, self.motions.len())).map(drop),
-        }
-    }
-
-    /// Answers a tool call. An error changes nothing but the count of calls. The call that ends the episode, and no later one,
-    /// is counted and recorded, and closes the files.
-    pub fn call(&mut self, call: ToolCall) -> Result<ToolReply, EpisodeError> {
-        self.make(None, &call.into())
-    }
-
-    /// As [`Session::call`], of whatever can be called, made by the operator of a robot or by the policy of all.
-    pub fn make(&mut self, operator: Option<&str>, called: &Called) -> Result<ToolReply, EpisodeError> {
-        let underway = self.arrived();
-        let mut answer = called.validate().map_err(EpisodeError::from).and_then(|()| self.answer(called));
-        self.came_out(underway, operator, called, CallOutcome::of(&answer));
-        if let Ok(Answer::Reply(ToolReply::Manage(ManageReply::Finish(reply)))) = &mut answer {
-            // Closing the files may have failed, which the reply has to say.
-            *reply = self.result().told(self.spec().disclosure);
-        }
-        let reply = answer.and_then(|answer| answer.reply(called));
-        self.let_think();
-        reply
-    }
-
-    /// As [`Session::call`] of `observe`, for a policy in this process: with views as they were drawn.
-    pub fn observe(&mut self, observe: &Observe) -> Result<TeamObservation, EpisodeError> {
-        let underway = self.arrived();
-        let called = Called::from(ToolCall::from(observe.clone()));
-        let seen = called.validate().map_err(EpisodeError::from);
-        let seen = seen.and_then(|()| self.seen(observe, &Formats::default()));
-        self.came_out(underway, None, &called, CallOutcome::of(&seen));
-        self.let_think();
-        seen
-    }
-
-    /// Whether an operator's command could be executed as things stand. A refusal is counted and recorded as that of any call.
-    pub fn check(&mut self, command: &OperatorCommand) -> Result<(), EpisodeError> {
-        let read = match self.ended {
-            Some(reason) => Err(EpisodeError::Ended { reason }),
-            None => command.read(&self.rules, &self.motions).map(drop),
-        };
-        let Err(refusal) = read else { return Ok(()) };
-        let underway = self.arrived();
-        let called = Called::Together(vec![command.clone()]);
-        self.came_out(underway, Some(&command.robot), &called, CallOutcome::refused(&refusal));
-        self.let_think();
-        Err(refusal)
-    }
-
-    /// A call has arrived. Returns whether it is one of the episode's.
-    fn arrived(&mut self) -> bool {
-        self.clock.pause();
-        if self.ended.is_none() && self.clock.exhausted() {
-            self.ended = Some(EndReason::WallClockExhausted);
-        }
-        let underway = self.result.is_none();
-        self.tool_calls += u32::from(underway);
-        underway
-    }
-
-    /// A call has come out: records it, and closes the files if it has ended the episode.
-    fn came_out(&mut self, underway: bool, operator: Option<&str>, called: &Called, outcome: CallOutcome) {
-        if let (true, Some(files)) = (underway, &mut self.files) {
-            files.tool_call(self.present.time_s, self.clock.spent(), operator, called, outcome);
-        }
-        if self.ended.is_some() {
-            self.settle();
-        }
-    }
-
-    /// The policy's clock goes on, unless the episode has ended.
-    fn let_think(&mut self) {
-        if self.ended.is_none() {
-            self.clock.resume();
+            steps => self.run(&Command::hold(steps)).map(drop),
         }
     }
 
@@ -247,29 +174,34 @@ impl Session {
         self.result = Some(result);
     }
 
-    /// Executes a command; fewer of its steps if the last phase is reached or the budget ends. Returns how many.
-    fn run(&mut self, command: Command) -> Result<u32, EpisodeError> {
+    /// Executes a command; fewer of its steps if the last phase is reached or the budget ends. Returns how many, and what of each order
+    /// was clamped.
+    fn run(&mut self, command: &Command) -> Result<(u32, Vec<Clamped>), EpisodeError> {
         let left = self.steps_left();
+        let mut trajectories: Vec<Trajectory> = self.motions.iter().map(|_| Trajectory::Hold).collect();
+        let mut clamped = Vec::with_capacity(command.orders.len());
+        for order in &command.orders {
+            let motion = &mut self.motions[order.robot];
+            let (trajectory, beyond) = Trajectory::begin(&order.action, order.steps.min(left), motion);
+            trajectories[order.robot] = trajectory;
+            clamped.push(beyond);
+        }
         let steps = command.steps.min(left);
-        let movements = command.orders.into_iter().map(|order| order.movement).zip(command.made_for);
-        let mut runs: Vec<Run> = movements
-            .zip(&mut self.motions)
-            .map(|((movement, made_for), motion)| Run::begin(movement, made_for.min(left), motion))
-            .collect();
         for step in 1..=steps {
-            self.step(&mut runs)?;
+            self.step(step, &trajectories)?;
             if self.has_succeeded() {
-                return Ok(step);
+                return Ok((step, clamped));
             }
         }
-        Ok(steps)
+        Ok((steps, clamped))
     }
 
-    /// One control step, from the robots' movements to what is scored and recorded of it.
-    fn step(&mut self, runs: &mut [Run]) -> Result<(), EpisodeError> {
+    /// One control step, the `step`th of a command, from the robots' trajectories to what is scored and recorded of it.
+    fn step(&mut self, step: u32, trajectories: &[Trajectory]) -> Result<(), EpisodeError> {
         let started = Instant::now();
+        let moves = trajectories.iter().zip(&mut self.motions);
         let commands: Vec<RobotCommand> =
-            runs.iter_mut().zip(&mut self.motions).map(|(run, motion)| run.command(motion)).collect();
+            moves.map(|(trajectory, motion)| trajectory.command(step, motion)).collect();
         let stepped = self.world.control_step(&commands);
         self.physics += started.elapsed();
         if stepped.is_err() {

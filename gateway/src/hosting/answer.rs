@@ -1,8 +1,8 @@
 //! What a call on an episode is answered with.
 
 use serde::Serialize;
-use tandem_episodes::Session;
-use tandem_tools_spec::{Heard, ManageReply, Observation, Partner, ToolReply};
+use tandem_episodes::{CallReply, Session};
+use tandem_tools_spec::{Heard, ManageReply, Observation, Partner, StopReason, TalkReply, ToolReply};
 
 /// A tool's reply, and what has to be said with every reply.
 #[derive(Debug, Serialize)]
@@ -33,17 +33,45 @@ pub struct Answer {
 
 impl Answer {
     /// The answer of `session` with `reply`.
-    pub fn new(reply: ToolReply, session: &Session) -> Answer {
+    pub fn new(reply: CallReply, session: &Session) -> Answer {
+        let CallReply { reply, observation } = reply;
         let is_result = matches!(reply, ToolReply::Manage(ManageReply::Finish(_)));
         let failed = session.recording_failed().filter(|_| !is_result);
         Answer {
             reply,
             step: (!is_result).then(|| session.env_steps()),
-            observation: None,
+            observation,
             partners: Vec::new(),
             heard: Vec::new(),
             recording_failed: failed.map(str::to_owned),
             others_play_on: false,
         }
+    }
+
+    /// The answer without what it says of other robots than `robot`.
+    pub fn of_own_robot(mut self, robot: &str) -> Answer {
+        match &mut self.reply {
+            ToolReply::Act(reply) => {
+                reply.robots.retain(|report| report.robot == robot);
+                reply.fallen.retain(|entry| entry.robot == robot);
+            }
+            ToolReply::Manage(ManageReply::GetStatus(status)) | ToolReply::Talk(TalkReply::Say(status)) => {
+                status.fallen.retain(|entry| entry.robot == robot)
+            }
+            // Looks are asked of the own robot alone, and a result is of all.
+            ToolReply::Look(_) | ToolReply::Manage(ManageReply::Finish(_)) => {}
+        }
+        self
+    }
+
+    /// The answer to a command of `asked_steps`, of which fewer were executed where a partner's was shorter.
+    pub fn cut_off_after(mut self, asked_steps: u32) -> Answer {
+        if let ToolReply::Act(reply) = &mut self.reply
+            && reply.stop_reason == StopReason::StepsDone
+            && reply.executed_steps < asked_steps
+        {
+            reply.stop_reason = StopReason::PartnerDone;
+        }
+        self
     }
 }

@@ -11,18 +11,15 @@ use std::{
 };
 
 use tandem_episodes::{
-    Called, Clock, EpisodeError, EpisodeSpec, Facts, OperatorCommand, RunFolder, Session, monotonic,
+    CallReply, Clock, EpisodeError, EpisodeSpec, Facts, OperatorCall, OperatorCommand, RunFolder, Session,
+    monotonic,
 };
-use tandem_tools_spec::{
-    Asked, Briefing, Look, LookCall, ManageReply, ResultReply, Say, ToolCall, ToolReply,
-};
+use tandem_tools_spec::{Briefing, Call, ManageReply, ResultReply, ToolCall, ToolReply};
 use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 
 use super::{
     Answer, HostingError,
-    guarded::Guarded,
-    tally::Tally,
-    work::{self, Made},
+    panic_guard::{EpisodeMetrics, PanicGuard},
 };
 use crate::metrics::Metrics;
 
@@ -32,54 +29,53 @@ const WAITING_CALLS: usize = 16;
 /// The contact solver keeps large temporaries on the stack.
 const STACK_BYTES: usize = 8 << 20;
 
-enum Command {
-    Make {
-        made: Box<Made>,
-        reply: oneshot::Sender<Result<Answer, HostingError>>,
+/// What the thread does for somebody, all of it between two other jobs.
+enum Job {
+    Call {
+        /// The robot whose operator calls; `None` where one policy directs all.
+        operator: Option<String>,
+        call: Box<Call>,
+        reply: Reply<Answer>,
     },
-    Check(Box<Check>),
+    ReadCommand {
+        call: Box<OperatorCall>,
+        reply: Reply<OperatorCommand>,
+    },
     Together {
         commands: Vec<OperatorCommand>,
-        looks: Vec<Option<Look>>,
-        reply: oneshot::Sender<Result<Vec<Answer>, HostingError>>,
+        reply: Reply<Vec<Answer>>,
     },
     Status {
-        reply: oneshot::Sender<Result<Answer, HostingError>>,
+        reply: Reply<Answer>,
     },
     Briefing {
-        reply: oneshot::Sender<Result<Briefing, HostingError>>,
+        reply: Reply<Briefing>,
     },
     Facts {
-        reply: oneshot::Sender<Result<Facts, HostingError>>,
+        reply: Reply<Facts>,
     },
     EndIfAbandoned {
         idle: Duration,
     },
     Close {
-        reply: oneshot::Sender<Closing>,
+        reply: Reply<ResultReply>,
     },
 }
 
-/// Asks whether an operator's command could be executed.
-struct Check {
-    command: OperatorCommand,
-    expected_step: Option<u32>,
-    then: Option<Look>,
-    reply: oneshot::Sender<Result<(), HostingError>>,
-}
+type Reply<T> = oneshot::Sender<Result<T, HostingError>>;
 
 /// A running episode. Dropping the last handle ends the episode and closes its recording.
 #[derive(Debug)]
 pub struct EpisodeThread {
-    commands: mpsc::Sender<Command>,
-    news: Arc<News>,
+    jobs: mpsc::Sender<Job>,
+    status: Arc<SharedStatus>,
     folder: PathBuf,
     steps_per_command: u32,
 }
 
 /// What the thread lets everybody know without being asked.
 #[derive(Debug, Default)]
-struct News {
+struct SharedStatus {
     ended: AtomicBool,
     /// The first failure of the recording.
     recording_failed: OnceLock<String>,
@@ -87,9 +83,9 @@ struct News {
     thought: AtomicU64,
 }
 
-impl News {
+impl SharedStatus {
     /// As `session` stands.
-    fn spread(&self, session: &Guarded) {
+    fn update(&self, session: &PanicGuard) {
         self.ended.store(session.ended(), Ordering::Relaxed);
         self.thought.store(session.thought().as_nanos() as u64, Ordering::Relaxed);
         if let Some(reason) = session.recording_failed() {
@@ -120,10 +116,10 @@ impl EpisodeThread {
         metrics: Arc<Metrics>,
         clock: Clock,
     ) -> Result<(EpisodeThread, Briefing), HostingError> {
-        let (commands, inbox) = mpsc::channel(WAITING_CALLS);
+        let (jobs, inbox) = mpsc::channel(WAITING_CALLS);
         let (started, start) = oneshot::channel();
-        let news = Arc::new(News::default());
-        let (from_thread, name, path) = (news.clone(), id.to_owned(), folder.path.clone());
+        let status = Arc::new(SharedStatus::default());
+        let (from_thread, name, path) = (status.clone(), id.to_owned(), folder.path.clone());
         let thread = move || {
             // Every line that is logged on this thread names the episode.
             let _named = tracing::info_span!("thread", episode = name).entered();
@@ -131,7 +127,8 @@ impl EpisodeThread {
                 Ok((session, briefing)) => {
                     // A caller that went away during the start has dropped the inbox's other end, and serve returns.
                     let _ = started.send(Ok(briefing));
-                    let closed = serve(Guarded::new(session, Tally::new(metrics)), inbox, &from_thread);
+                    let guarded = PanicGuard::new(session, EpisodeMetrics::new(metrics));
+                    let closed = serve(guarded, inbox, &from_thread);
                     // The place is free before the caller hears of the end, so that it can start the next episode.
                     drop(permit);
                     closed.answer();
@@ -146,111 +143,75 @@ impl EpisodeThread {
             .map_err(HostingError::Thread)?;
         let briefing = start.await.map_err(|_| HostingError::EpisodePanicked)??;
         let steps_per_command = briefing.status.budget.steps_per_command;
-        Ok((EpisodeThread { commands, news, folder: path, steps_per_command }, briefing))
+        Ok((EpisodeThread { jobs, status, folder: path, steps_per_command }, briefing))
     }
 
-    /// Runs a call and returns its reply.
-    pub async fn call(&self, call: ToolCall) -> Result<Answer, HostingError> {
-        self.ask(None, call.into()).await
+    /// Runs a call of the policy that directs all robots and returns its reply.
+    pub async fn call(&self, tool: ToolCall) -> Result<Answer, HostingError> {
+        self.ask(None, tool.into()).await
     }
 
-    /// As [`EpisodeThread::call`], with what programs ask for besides, and for the operator of a robot where each has one.
-    pub async fn ask(&self, operator: Option<&str>, asked: Asked) -> Result<Answer, HostingError> {
-        let Asked { call, formats, expected_step, then } = asked;
-        let called = match call {
-            ToolCall::Look(LookCall::Observe(observe)) => Called::look(Look { observe, formats }),
-            call => Called::Tool(call),
-        };
-        self.make(Made { operator: operator.map(str::to_owned), called, expected_step, then }).await
+    /// As [`EpisodeThread::call`], with all that may go with a call, and for the operator of a robot where each has one.
+    pub async fn ask(&self, operator: Option<&str>, call: Call) -> Result<Answer, HostingError> {
+        let (operator, call) = (operator.map(str::to_owned), Box::new(call));
+        self.do_job(|reply| Job::Call { operator, call, reply }).await
     }
 
-    /// Records what the operator of `robot` says.
-    pub async fn say(&self, robot: &str, say: Say) -> Result<Answer, HostingError> {
-        let called = Called::Say(say);
-        self.make(Made { operator: Some(robot.into()), called, expected_step: None, then: None }).await
-    }
-
-    async fn make(&self, made: Made) -> Result<Answer, HostingError> {
-        let (reply, answer) = oneshot::channel();
-        self.send(Command::Make { made: made.into(), reply })?;
-        answer.await.map_err(|_| HostingError::EpisodeStopped)?
-    }
-
-    /// Whether an operator's command could be executed now, and what it wants to see then could be seen.
-    pub async fn check(
-        &self,
-        command: OperatorCommand,
-        expected_step: Option<u32>,
-        then: Option<Look>,
-    ) -> Result<(), HostingError> {
-        let (reply, answer) = oneshot::channel();
-        self.send(Command::Check(Check { command, expected_step, then, reply }.into()))?;
-        answer.await.map_err(|_| HostingError::EpisodeStopped)?
+    /// Reads an operator's command: what cannot be executed, and what could not be seen afterwards, is refused.
+    pub async fn read_command(&self, call: OperatorCall) -> Result<OperatorCommand, HostingError> {
+        self.do_job(|reply| Job::ReadCommand { call: call.into(), reply }).await
     }
 
     /// Executes commands of several operators side by side. Returns an answer for each, with what each looks at then.
-    pub async fn together(
-        &self,
-        commands: Vec<OperatorCommand>,
-        looks: Vec<Option<Look>>,
-    ) -> Result<Vec<Answer>, HostingError> {
-        let (reply, answer) = oneshot::channel();
+    pub async fn together(&self, commands: Vec<OperatorCommand>) -> Result<Vec<Answer>, HostingError> {
         // Callers wait for it already, so it waits for its turn.
-        let together = Command::Together { commands, looks, reply };
-        self.commands.send(together).await.map_err(|_| HostingError::EpisodeStopped)?;
-        answer.await.map_err(|_| HostingError::EpisodeStopped)?
+        self.do_job_in_turn(|reply| Job::Together { commands, reply }).await
     }
 
     /// Where the episode stands, for those who look on: asking is no call of the policy's.
     pub async fn status(&self) -> Result<Answer, HostingError> {
-        let (reply, answer) = oneshot::channel();
-        self.send(Command::Status { reply })?;
-        answer.await.map_err(|_| HostingError::EpisodeStopped)?
+        self.do_job(|reply| Job::Status { reply }).await
     }
 
     /// What has to be known to begin, as it stands now.
     pub async fn briefing(&self) -> Result<Briefing, HostingError> {
-        let (reply, answer) = oneshot::channel();
-        self.send(Command::Briefing { reply })?;
-        answer.await.map_err(|_| HostingError::EpisodeStopped)?
+        self.do_job(|reply| Job::Briefing { reply }).await
     }
 
     /// Where everything is and who touches what: for experts and scoring in this process, never for policies.
     pub fn facts_blocking(&self) -> Result<Facts, HostingError> {
         let (reply, answer) = oneshot::channel();
-        self.send(Command::Facts { reply })?;
+        self.send(Job::Facts { reply })?;
         answer.blocking_recv().map_err(|_| HostingError::EpisodeStopped)?
     }
 
     /// Ends the episode if its policy's clock has run out, or if it has made no call for as long as `idle`.
     pub fn end_if_abandoned(&self, idle: Duration) {
         // Where something waits already, nobody is gone, and the places to wait are for calls.
-        if self.commands.capacity() == self.commands.max_capacity() {
+        if self.jobs.capacity() == self.jobs.max_capacity() {
             // An episode that has stopped meanwhile has ended.
-            let _ = self.commands.try_send(Command::EndIfAbandoned { idle });
+            let _ = self.jobs.try_send(Job::EndIfAbandoned { idle });
         }
     }
 
     /// Ends the episode after the calls already waiting, closes its recording and returns the result.
     pub async fn close(&self) -> Result<ResultReply, HostingError> {
-        let (reply, answer) = oneshot::channel();
-        self.commands.send(Command::Close { reply }).await.map_err(|_| HostingError::EpisodeStopped)?;
-        answer.await.map_err(|_| HostingError::EpisodeStopped)?
+        self.do_job_in_turn(|reply| Job::Close { reply }).await
     }
 
     /// Whether the episode takes no more commands.
     pub fn ended(&self) -> bool {
-        self.news.ended.load(Ordering::Relaxed) || self.commands.is_closed()
+        self.status.ended.load(Ordering::Relaxed) || self.jobs.is_closed()
     }
 
     /// How long the policy has thought, up to its last call.
     pub fn thought(&self) -> Duration {
-        Duration::from_nanos(self.news.thought.load(Ordering::Relaxed))
+        Duration::from_nanos(self.status.thought.load(Ordering::Relaxed))
     }
 
     /// Why the recording is not complete, if it is not.
     pub fn recording_failed(&self) -> Option<&str> {
-        self.news.recording_failed.get().map(String::as_str)
+        self.status.recording_failed.get().map(String::as_str)
     }
 
     /// The most control steps that one command may ask for.
@@ -263,8 +224,22 @@ impl EpisodeThread {
         &self.folder
     }
 
-    fn send(&self, command: Command) -> Result<(), HostingError> {
-        self.commands.try_send(command).map_err(|error| match error {
+    /// Has the thread do a job, unless too many wait already.
+    async fn do_job<T>(&self, job: impl FnOnce(Reply<T>) -> Job) -> Result<T, HostingError> {
+        let (reply, answer) = oneshot::channel();
+        self.send(job(reply))?;
+        answer.await.map_err(|_| HostingError::EpisodeStopped)?
+    }
+
+    /// Has the thread do a job, however many wait.
+    async fn do_job_in_turn<T>(&self, job: impl FnOnce(Reply<T>) -> Job) -> Result<T, HostingError> {
+        let (reply, answer) = oneshot::channel();
+        self.jobs.send(job(reply)).await.map_err(|_| HostingError::EpisodeStopped)?;
+        answer.await.map_err(|_| HostingError::EpisodeStopped)?
+    }
+
+    fn send(&self, job: Job) -> Result<(), HostingError> {
+        self.jobs.try_send(job).map_err(|error| match error {
             mpsc::error::TrySendError::Full(_) => HostingError::TooManyWaiting { limit: WAITING_CALLS },
             mpsc::error::TrySendError::Closed(_) => HostingError::EpisodeStopped,
         })
@@ -282,9 +257,7 @@ fn open_session(
 }
 
 /// Who asked for the end, and what they are to be told once the place is free.
-struct Closed(Option<(oneshot::Sender<Closing>, Closing)>);
-
-type Closing = Result<ResultReply, HostingError>;
+struct Closed(Option<(Reply<ResultReply>, Result<ResultReply, HostingError>)>);
 
 impl Closed {
     fn answer(self) {
@@ -294,41 +267,39 @@ impl Closed {
     }
 }
 
-/// Answers commands until one asks for the end, or nobody is left who could send one.
-fn serve(mut session: Guarded, mut inbox: mpsc::Receiver<Command>, news: &News) -> Closed {
-    news.spread(&session);
-    while let Some(command) = inbox.blocking_recv() {
+/// Does jobs until one asks for the end, or nobody is left who could send one.
+fn serve(mut session: PanicGuard, mut inbox: mpsc::Receiver<Job>, status: &SharedStatus) -> Closed {
+    status.update(&session);
+    while let Some(job) = inbox.blocking_recv() {
         // A reply that cannot be sent means that the caller has gone. What was done stays done.
-        match command {
-            Command::Make { made, reply } => {
-                let answer = session.run(|session| work::make(session, &made));
-                news.spread(&session);
-                let _ = reply.send(answer.and_then(|answer| answer));
+        match job {
+            Job::Call { operator, call, reply } => {
+                let answer = session.run(|session| answer(session, operator.as_deref(), *call));
+                status.update(&session);
+                let _ = reply.send(answer.flatten());
             }
-            Command::Check(check) => {
-                let Check { command, expected_step, then, reply } = *check;
-                let checked =
-                    session.run(|session| work::check(session, &command, expected_step, then.as_ref()));
-                news.spread(&session);
-                let _ = reply.send(checked.and_then(|checked| checked));
+            Job::ReadCommand { call, reply } => {
+                let command = session.run(|session| Ok(session.read_command(*call)?));
+                status.update(&session);
+                let _ = reply.send(command.flatten());
             }
-            Command::Together { commands, looks, reply } => {
-                let answers = session.run(|session| work::together(session, commands, &looks));
-                news.spread(&session);
-                let _ = reply.send(answers.and_then(|answers| answers));
+            Job::Together { commands, reply } => {
+                let answers = session.run(|session| together(session, commands));
+                status.update(&session);
+                let _ = reply.send(answers.flatten());
             }
-            Command::Status { reply } => drop(reply.send(session.run(|session| status(session)))),
-            Command::Briefing { reply } => drop(reply.send(session.run(|session| session.briefing()))),
-            Command::Facts { reply } => drop(reply.send(session.run(|session| session.facts()))),
-            Command::EndIfAbandoned { idle } => {
+            Job::Status { reply } => drop(reply.send(session.run(|session| standing(session)))),
+            Job::Briefing { reply } => drop(reply.send(session.run(|session| session.briefing()))),
+            Job::Facts { reply } => drop(reply.send(session.run(|session| session.facts()))),
+            Job::EndIfAbandoned { idle } => {
                 // The log has the reason of a refusal.
                 let _ = session.run(|session| session.end_if_abandoned(idle));
-                news.spread(&session);
+                status.update(&session);
                 if session.ended() {
                     tracing::info!("abandoned, and ended");
                 }
             }
-            Command::Close { reply } => return Closed(Some((reply, session.close()))),
+            Job::Close { reply } => return Closed(Some((reply, session.close()))),
         }
     }
     // Nobody is left who could be told.
@@ -336,6 +307,17 @@ fn serve(mut session: Guarded, mut inbox: mpsc::Receiver<Command>, news: &News) 
     Closed(None)
 }
 
-fn status(session: &Session) -> Answer {
-    Answer::new(ToolReply::Manage(ManageReply::GetStatus(session.status())), session)
+fn answer(session: &mut Session, operator: Option<&str>, call: Call) -> Result<Answer, HostingError> {
+    let reply = session.ask(operator, call)?;
+    Ok(Answer::new(reply, session))
+}
+
+fn together(session: &mut Session, commands: Vec<OperatorCommand>) -> Result<Vec<Answer>, HostingError> {
+    let replies = session.together(commands)?;
+    Ok(replies.into_iter().map(|reply| Answer::new(reply, session)).collect())
+}
+
+fn standing(session: &Session) -> Answer {
+    let reply = ToolReply::Manage(ManageReply::GetStatus(session.status()));
+    Answer::new(CallReply { reply, observation: None }, session)
 }

@@ -50,16 +50,6 @@ pub enum HostingError {
         /// What the system said.
         source: io::Error,
     },
-    /// The episode has moved on since the caller looked.
-    #[error(
-        "the episode stands at step {now} and not at {expected}; look again, then command with expected_step {now}"
-    )]
-    OtherStep {
-        /// Where the caller had it.
-        expected: u32,
-        /// Where it is.
-        now: u32,
-    },
     /// The operator has commanded already.
     #[error(
         "robot {robot:?} has its command for this step already; its reply comes when {}",
@@ -159,7 +149,6 @@ impl HostingError {
             HostingError::EpisodePanicked => {
                 Refusal::new("episode-failed", "The simulator failed", Failed).hint(START_ANOTHER)
             }
-            HostingError::OtherStep { .. } => Refusal::new("other-step", "Another step", Conflict),
             HostingError::DoubleCommand { .. } => {
                 Refusal::new("double-command", "Commanded already", Conflict)
             }

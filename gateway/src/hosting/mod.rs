@@ -2,24 +2,20 @@
 //! Nothing here knows how callers reach it.
 
 mod answer;
-mod caller;
 mod episode_thread;
 mod error;
-mod guarded;
-mod hosted;
-mod kept;
+mod hosted_episode;
+mod idempotency_cache;
+mod panic_guard;
 mod run_folder;
 mod table;
-mod tally;
 mod team;
 #[cfg(test)]
 mod tests;
-mod work;
 
 pub use answer::Answer;
-pub use caller::Caller;
 pub use episode_thread::EpisodeThread;
 pub use error::HostingError;
-pub use hosted::{Hosted, Request};
-pub use kept::Once;
+pub use hosted_episode::{Caller, HostedEpisode};
+pub use idempotency_cache::IdempotentReply;
 pub use table::EpisodeTable;

@@ -15,8 +15,8 @@ use tokio::{
 };
 
 use super::{
-    Caller, EpisodeThread, Hosted, HostingError,
-    kept::{Kept, Once},
+    Caller, EpisodeThread, HostedEpisode, HostingError,
+    idempotency_cache::{IdempotencyCache, IdempotentReply},
     run_folder,
     team::Team,
 };
@@ -25,19 +25,19 @@ use crate::{metrics::Metrics, settings::Settings};
 /// The episodes of one server.
 #[derive(Debug)]
 pub struct EpisodeTable {
-    held: Mutex<Held>,
+    held: Mutex<HeldEpisodes>,
     places: Arc<Semaphore>,
     settings: Arc<Settings>,
-    starts: Kept<(StartEpisode, Driving), Started>,
+    starts: IdempotencyCache<(StartEpisode, Driving), SharedStart>,
     metrics: Arc<Metrics>,
 }
 
 /// What came of a start, for as many as want to know.
-type Started = Result<StartReply, Arc<HostingError>>;
+type SharedStart = Result<StartReply, Arc<HostingError>>;
 
 #[derive(Debug, Default)]
-struct Held {
-    episodes: BTreeMap<String, Hosted>,
+struct HeldEpisodes {
+    episodes: BTreeMap<String, HostedEpisode>,
     /// From here on nothing is added.
     closing: bool,
 }
@@ -49,7 +49,7 @@ impl EpisodeTable {
             held: Mutex::default(),
             places: Arc::new(Semaphore::new(settings.max_episodes as usize)),
             settings,
-            starts: Kept::default(),
+            starts: IdempotencyCache::default(),
             metrics: Arc::default(),
         }
     }
@@ -65,12 +65,12 @@ impl EpisodeTable {
         args: StartEpisode,
         driving: Driving,
         key: &str,
-    ) -> Result<Once<StartReply>, HostingError> {
+    ) -> Result<IdempotentReply<StartReply>, HostingError> {
         let (table, request) = (self.clone(), (args.clone(), driving));
         let work = async move { table.start_driven(args, driving).await.map_err(Arc::new) };
-        let lasting = |made: &Started| made.as_ref().map_or_else(|error| error.is_final(), |_| true);
-        let Once { reply, again } = self.starts.once(key, request, work, lasting).await?;
-        Ok(Once { reply: reply.map_err(HostingError::Shared)?, again })
+        let lasting = |made: &SharedStart| made.as_ref().map_or_else(|error| error.is_final(), |_| true);
+        let IdempotentReply { reply, replayed } = self.starts.once(key, request, work, lasting).await?;
+        Ok(IdempotentReply { reply: reply.map_err(HostingError::Shared)?, replayed })
     }
 
     /// Starts an episode in which one policy directs all robots.
@@ -128,7 +128,7 @@ impl EpisodeTable {
         let (episode, mut briefing) =
             EpisodeThread::start(id, spec, folder, place, self.metrics.clone()).await?;
         self.settings.instructions.rephrase_briefing(&mut briefing);
-        if let Err(late) = self.hold(Hosted::new(id, Arc::new(episode), team)) {
+        if let Err(late) = self.hold(HostedEpisode::new(id, Arc::new(episode), team)) {
             late.thread.close().await?;
             return Err(HostingError::ShuttingDown);
         }
@@ -147,7 +147,7 @@ impl EpisodeTable {
     }
 
     /// The episode `id`.
-    pub fn hosted(&self, id: &str) -> Result<Hosted, HostingError> {
+    pub fn hosted(&self, id: &str) -> Result<HostedEpisode, HostingError> {
         self.lock().episodes.get(id).cloned().ok_or_else(|| unknown(id))
     }
 
@@ -238,10 +238,10 @@ impl EpisodeTable {
     /// Holds an episode that one policy directs, unless the table is closing: then it is given back.
     #[cfg(test)]
     pub(crate) fn insert(&self, id: &str, episode: Arc<EpisodeThread>) -> Result<(), Arc<EpisodeThread>> {
-        self.hold(Hosted::new(id, episode, None)).map_err(|hosted| hosted.thread)
+        self.hold(HostedEpisode::new(id, episode, None)).map_err(|hosted| hosted.thread)
     }
 
-    fn hold(&self, episode: Hosted) -> Result<(), Box<Hosted>> {
+    fn hold(&self, episode: HostedEpisode) -> Result<(), Box<HostedEpisode>> {
         let mut held = self.lock();
         if held.closing {
             return Err(episode.into());
@@ -272,7 +272,7 @@ impl EpisodeTable {
         episodes.remove(&id).map(|hosted| hosted.thread)
     }
 
-    fn lock(&self) -> MutexGuard<'_, Held> {
+    fn lock(&self) -> MutexGuard<'_, HeldEpisodes> {
         // Nothing panics while it holds the lock; were it so, the map itself would still be whole.
         self.held.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }

@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Instant};
 
-use tandem_tools_spec::{EPISODE_TOOLS, ListTasks, Say, StartEpisode, Tool as _};
+use tandem_tools_spec::{EPISODE_TOOLS, ListTasks, StartEpisode, Tool as _};
 
 use super::problem::ApiError;
 use crate::{hosting::EpisodeTable, settings::Settings};
@@ -34,11 +34,7 @@ fn known(name: &str) -> Option<&'static str> {
     every_tool().into_iter().find(|tool| *tool == name)
 }
 
-/// The names of all tools: those that need no episode, those of every episode, and the one that only some episodes have.
+/// The names of all tools: those that need no episode, those of every episode, and those that only some episodes have.
 pub fn every_tool() -> Vec<&'static str> {
-    [ListTasks::NAME, StartEpisode::NAME]
-        .into_iter()
-        .chain(EPISODE_TOOLS.iter().copied())
-        .chain([Say::NAME])
-        .collect()
+    [ListTasks::NAME, StartEpisode::NAME].into_iter().chain(EPISODE_TOOLS.iter().copied()).collect()
 }

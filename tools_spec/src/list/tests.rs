@@ -81,6 +81,8 @@ fn a_line_reads_and_checks_calls() {
     assert_eq!(call, Wave { times: 2 }.into());
     assert_eq!((call.name(), json!(call)), ("wave", json!({ "times": 2 })));
     assert_eq!(call.validate(), Ok(()));
+    assert_eq!((call.robots().len(), call.steps()), (0, 0));
+    assert_eq!(ToolCall::from(Wait { steps: 5 }).steps(), 5);
     assert!(ToolCall::examples().contains(&Wave { times: 3 }.into()));
     let refused = ToolCall::parse("wave", json!({ "times": 0 })).unwrap_err();
     assert_eq!(refused.to_string(), "wave: times is 0; give at least 1");
@@ -109,14 +111,14 @@ fn a_line_reads_replies() {
 
 #[test]
 fn every_example_works_and_only_looking_promises_to_change_nothing() {
-    let specs = tool_specs(Hints::On);
+    let specs = operator_tool_specs(Hints::On);
     for example in ToolCall::examples() {
         assert_eq!(ToolCall::parse(example.name(), json!(example)), Ok(example.clone()));
         let read_only = specs.iter().any(|spec| spec.name == example.name() && spec.read_only);
         match example {
             ToolCall::Look(call) => assert!(read_only, "{call:?}"),
             ToolCall::Act(call) => assert!(!read_only, "{call:?}"),
-            ToolCall::Manage(_) => {}
+            ToolCall::Manage(_) | ToolCall::Talk(_) => {}
         }
     }
 }

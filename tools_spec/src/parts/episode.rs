@@ -1,7 +1,116 @@
-//! Where an episode stands.
+//! The rules of an episode, what a policy is told of its success and of grasping, and where the episode stands.
+
+use std::fmt;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+/// The rules an episode is run under.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Protocol {
+    /// For agents that think between commands: at most 25 steps a command, 6000 steps of which 300 are an initial hold,
+    /// and 1800 s of the policy's own time.
+    Agentic,
+    /// For learned policies: at most 50 steps a command, and the task's own number of steps.
+    Benchmark,
+}
+
+impl Protocol {
+    /// Every protocol.
+    pub const ALL: [Protocol; 2] = [Protocol::Agentic, Protocol::Benchmark];
+
+    /// The name that JSON, command lines and reports use.
+    pub fn name(self) -> &'static str {
+        match self {
+            Protocol::Agentic => "agentic",
+            Protocol::Benchmark => "benchmark",
+        }
+    }
+}
+
+impl fmt::Display for Protocol {
+    fn fmt(&self, text: &mut fmt::Formatter) -> fmt::Result {
+        text.pad(self.name())
+    }
+}
+
+/// What replies tell about phases, and whether success ends an episode.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Disclosure {
+    /// Every reply tells the phases reached, and the last phase ends the episode.
+    #[default]
+    Live,
+    /// Phases are told once the episode has ended, which it does not do by itself on success: call finish.
+    End,
+    /// Phases are never told, nor does success end the episode: call finish.
+    Never,
+}
+
+impl Disclosure {
+    /// Every kind.
+    pub const ALL: [Disclosure; 3] = [Disclosure::Live, Disclosure::End, Disclosure::Never];
+
+    /// The name that JSON, command lines and reports use.
+    pub fn name(self) -> &'static str {
+        match self {
+            Disclosure::Live => "live",
+            Disclosure::End => "end",
+            Disclosure::Never => "never",
+        }
+    }
+
+    /// Whether phases are told in an episode that has `ended` or goes on.
+    pub fn tells(self, ended: bool) -> bool {
+        match self {
+            Disclosure::Live => true,
+            Disclosure::End => ended,
+            Disclosure::Never => false,
+        }
+    }
+
+    /// Whether the last phase ends the episode.
+    pub fn ends_on_success(self) -> bool {
+        self == Disclosure::Live
+    }
+}
+
+impl fmt::Display for Disclosure {
+    fn fmt(&self, text: &mut fmt::Formatter) -> fmt::Result {
+        text.pad(self.name())
+    }
+}
+
+/// What texts say besides geometry.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Hints {
+    /// How to grasp: finger angles, ways to come near, orders of closing.
+    #[default]
+    On,
+    /// Nothing.
+    Off,
+}
+
+impl Hints {
+    /// Both.
+    pub const ALL: [Hints; 2] = [Hints::On, Hints::Off];
+
+    /// The name that JSON, command lines and reports use.
+    pub fn name(self) -> &'static str {
+        match self {
+            Hints::On => "on",
+            Hints::Off => "off",
+        }
+    }
+}
+
+impl fmt::Display for Hints {
+    fn fmt(&self, text: &mut fmt::Formatter) -> fmt::Result {
+        text.pad(self.name())
+    }
+}
 
 /// What is left of the episode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -33,4 +142,25 @@ pub struct RobotFallen {
     pub robot: String,
     /// True from the moment it fell.
     pub fallen: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_has_the_same_names() {
+        let check = |written: serde_json::Value, named: String, name: &str| {
+            assert_eq!((written, named.as_str()), (serde_json::json!(name), name));
+        };
+        for kind in Protocol::ALL {
+            check(serde_json::json!(kind), kind.to_string(), kind.name());
+        }
+        for kind in Disclosure::ALL {
+            check(serde_json::json!(kind), kind.to_string(), kind.name());
+        }
+        for kind in Hints::ALL {
+            check(serde_json::json!(kind), kind.to_string(), kind.name());
+        }
+    }
 }

@@ -33,6 +33,9 @@ pub struct ToolSpec {
     pub idempotent: bool,
     /// Whether the tool acts on an episode that `start_episode` made.
     pub on_episode: bool,
+    /// Whether only operators who may talk to each other are offered it.
+    #[serde(skip)]
+    pub for_operators: bool,
     /// Where REST serves it.
     pub route: Route,
 }
@@ -48,11 +51,12 @@ pub struct EpisodeToolSpec {
 }
 
 impl ToolSpec {
-    /// The specification of `T`, which acts on an episode; without a path to name it, the arguments carry `episode_id`.
-    pub fn on_episode<T: Tool>(hints: Hints) -> ToolSpec {
+    /// The specification of `T`, which acts on an episode; without a path to name it, the arguments carry `episode_id`. It may be
+    /// for operators who talk alone.
+    pub fn on_episode<T: Tool>(hints: Hints, for_operators: bool) -> ToolSpec {
         let mut spec = ToolSpec::without_episode::<T>(hints);
         require_episode_id(&mut spec.input_schema);
-        ToolSpec { on_episode: true, ..spec }
+        ToolSpec { on_episode: true, for_operators, ..spec }
     }
 
     /// The specification of `T`, which needs no episode.
@@ -67,6 +71,7 @@ impl ToolSpec {
             read_only: T::READ_ONLY,
             idempotent: T::IDEMPOTENT,
             on_episode: false,
+            for_operators: false,
             route: T::route(),
         }
     }

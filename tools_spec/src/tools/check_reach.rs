@@ -1,4 +1,4 @@
-//! `check_reach`: whether the arms could get to a pose, without moving.
+//! `check_reach`: whether the arms could get to a pose, without moving. `episodes/src/commands/check_reach.rs` answers it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -48,6 +48,10 @@ impl Tool for CheckReach {
             right_position_m: Some([0.30, -0.20, 0.10]),
             right_quaternion_wxyz: Some([1.0, 0.0, 0.0, 0.0]),
         }
+    }
+
+    fn robots(&self) -> Vec<&str> {
+        vec![&self.robot]
     }
 
     fn validate(&self) -> Result<(), String> {

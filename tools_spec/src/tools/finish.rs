@@ -1,4 +1,4 @@
-//! `finish`: ends the episode and gives its result.
+//! `finish`: ends the episode and gives its result. `episodes/src/session/answer.rs` carries it out.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::Error as _};

@@ -1,4 +1,4 @@
-//! `get_robot_state`: proprioception of one robot.
+//! `get_robot_state`: proprioception of one robot. `episodes/src/session/answer.rs` answers it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,6 +25,10 @@ impl Tool for GetRobotState {
 
     fn example() -> Self {
         GetRobotState { robot: "A".into() }
+    }
+
+    fn robots(&self) -> Vec<&str> {
+        vec![&self.robot]
     }
 }
 

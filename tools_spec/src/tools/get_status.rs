@@ -1,4 +1,4 @@
-//! `get_status`: where the episode stands.
+//! `get_status`: where the episode stands. `episodes/src/session/status.rs` answers it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

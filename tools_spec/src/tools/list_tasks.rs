@@ -1,4 +1,4 @@
-//! `list_tasks`: what can be started.
+//! `list_tasks`: what can be started. `gateway/src/hosting/table.rs` answers it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! `move_wrists`: the command of agents that think in poses.
+//! `move_wrists`: the command of agents that think in poses. `episodes/src/commands/move_wrists.rs` makes wrist and finger trajectories of it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -134,9 +134,17 @@ impl Tool for MoveWrists {
         MoveWrists { steps: 25, robots: vec![right] }
     }
 
+    fn robots(&self) -> Vec<&str> {
+        self.robots.iter().map(|entry| entry.robot.as_str()).collect()
+    }
+
+    fn steps(&self) -> u32 {
+        self.steps
+    }
+
     fn validate(&self) -> Result<(), String> {
         checks::steps(self.steps)?;
-        checks::robots(self.robots.iter().map(|entry| entry.robot.as_str()))?;
+        checks::robots(&self.robots())?;
         checks::each(&self.robots, |entry| &entry.robot, WristMove::validate)
     }
 }

@@ -1,4 +1,4 @@
-//! `observe`: what the robots see and feel.
+//! `observe`: what the robots see and feel. `episodes/src/session/answer.rs` answers it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, ser::SerializeStruct};
@@ -35,9 +35,13 @@ impl Tool for Observe {
         Observe { robots: Some(vec!["A".into()]), short: Some(true) }
     }
 
+    fn robots(&self) -> Vec<&str> {
+        self.robots.iter().flatten().map(String::as_str).collect()
+    }
+
     fn validate(&self) -> Result<(), String> {
-        match &self.robots {
-            Some(robots) => checks::robots(robots.iter().map(String::as_str)),
+        match self.robots {
+            Some(_) => checks::robots(&self.robots()),
             None => Ok(()),
         }
     }

@@ -1,4 +1,4 @@
-//! `query_depth`: how far away the thing at a pixel is, and where that is for the robot's hands.
+//! `query_depth`: how far away the thing at a pixel is, and where that is for the robot's hands. `episodes/src/session/answer.rs` answers it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -42,6 +42,10 @@ impl Tool for QueryDepth {
 
     fn example() -> Self {
         QueryDepth { robot: "A".into(), pixels: Some(vec![[160, 120], [170, 120]]), region: None }
+    }
+
+    fn robots(&self) -> Vec<&str> {
+        vec![&self.robot]
     }
 
     fn validate(&self) -> Result<(), String> {

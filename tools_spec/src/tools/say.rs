@@ -1,4 +1,5 @@
-//! `say`: operators of one episode talk. Not one of the listed tools: an episode has it only where it was started so.
+//! `say`: operators of one episode talk. Offered only in an episode that was started so. `gateway/src/hosting/team/` lets the others
+//! hear it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! `send_joint_chunk`: the command of learned policies, one row of joint targets per control step.
+//! `send_joint_chunk`: the command of learned policies, one row of joint targets per control step. `episodes/src/commands/send_joint_chunk.rs` carries it out.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -79,8 +79,18 @@ impl Tool for SendJointChunk {
         SendJointChunk { robots: vec![JointChunk { robot: "A".into(), rows: vec![row] }] }
     }
 
+    fn robots(&self) -> Vec<&str> {
+        self.robots.iter().map(|entry| entry.robot.as_str()).collect()
+    }
+
+    /// One a row; every robot has as many.
+    fn steps(&self) -> u32 {
+        let rows = self.robots.first().map_or(0, |entry| entry.rows.len());
+        u32::try_from(rows).unwrap_or(u32::MAX)
+    }
+
     fn validate(&self) -> Result<(), String> {
-        checks::robots(self.robots.iter().map(|entry| entry.robot.as_str()))?;
+        checks::robots(&self.robots())?;
         checks::each(&self.robots, |entry| &entry.robot, JointChunk::validate)?;
         let first = &self.robots[0];
         if first.rows.is_empty() {

@@ -1,4 +1,4 @@
-//! `wait`: lets time pass.
+//! `wait`: lets time pass. `episodes/src/commands/wait.rs` carries it out.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -24,6 +24,10 @@ impl Tool for Wait {
 
     fn example() -> Self {
         Wait { steps: 25 }
+    }
+
+    fn steps(&self) -> u32 {
+        self.steps
     }
 
     fn validate(&self) -> Result<(), String> {

@@ -1,4 +1,4 @@
-//! `walk`: moves the base while the arms keep their joints.
+//! `walk`: moves the base while the arms keep their joints. `episodes/src/commands/walk.rs` carries it out.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -61,9 +61,17 @@ impl Tool for Walk {
         Walk { steps: 25, robots: vec![forward] }
     }
 
+    fn robots(&self) -> Vec<&str> {
+        self.robots.iter().map(|entry| entry.robot.as_str()).collect()
+    }
+
+    fn steps(&self) -> u32 {
+        self.steps
+    }
+
     fn validate(&self) -> Result<(), String> {
         checks::steps(self.steps)?;
-        checks::robots(self.robots.iter().map(|entry| entry.robot.as_str()))?;
+        checks::robots(&self.robots())?;
         checks::each(&self.robots, |entry| &entry.robot, WalkMove::validate)
     }
 }

@@ -5,7 +5,6 @@
 //! The policy's clock runs until the step is made, so while at least one operator thinks. An operator's call blocks until its
 //! robot's reply is there.
 
-mod reply;
 mod round;
 
 use std::{
@@ -13,10 +12,10 @@ use std::{
     time::Duration,
 };
 
-use tandem_episodes::{OperatorCommand, own_call};
+use tandem_episodes::{OperatorCall, OperatorCommand};
 use tandem_tools_spec::{
-    ActCall, Asked, Driving, Finish, GetStatus, Heard, Look, LookCall, ManageCall, OperatorToken, Partner,
-    PartnerDid, Say, ToolCall,
+    Call, Driving, Finish, GetStatus, Heard, ManageCall, OperatorToken, Partner, PartnerDid, TalkCall,
+    ToolCall,
 };
 use tokio::sync::oneshot;
 
@@ -78,35 +77,39 @@ impl Team {
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
         robot: &str,
-        asked: Asked,
+        call: Call,
     ) -> Result<Answer, HostingError> {
         let seat = self.seat(robot)?;
-        let answer = match own_call(asked.call, robot)? {
-            ToolCall::Act(call) => {
-                let then = asked.then.map(|look| own_look(look, robot)).transpose()?;
-                return self.act(episode, seat, call, asked.expected_step, then).await;
+        let call = OperatorCall::new(robot, call)?;
+        let answer = match &call.call().tool {
+            ToolCall::Act(_) => return self.act(episode, seat, call).await,
+            ToolCall::Talk(TalkCall::Say(say)) => {
+                let words = Heard { from: robot.into(), text: say.text.clone() };
+                return self.say(episode, seat, call, words).await;
             }
             ToolCall::Manage(ManageCall::Finish(_)) => self.finish(episode, seat).await?,
-            call => episode.ask(Some(robot), Asked { formats: asked.formats, ..Asked::from(call) }).await?,
+            ToolCall::Look(_) | ToolCall::Manage(ManageCall::GetStatus(_)) => {
+                episode.ask(Some(robot), call.into_call()).await?
+            }
         };
         self.round().has_looked(seat);
         Ok(self.told(answer, seat))
     }
 
-    /// Lets the others hear what the operator of `robot` says.
-    pub async fn say(
+    /// Lets the others hear what the operator on `seat` says.
+    async fn say(
         &self,
         episode: &Arc<EpisodeThread>,
-        robot: &str,
-        say: Say,
+        seat: usize,
+        call: OperatorCall,
+        words: Heard,
     ) -> Result<Answer, HostingError> {
-        let seat = self.seat(robot)?;
         if !self.talk {
             return Err(HostingError::NoTalk);
         }
         self.round().check_unheard(seat)?;
-        let answer = episode.say(robot, say.clone()).await?;
-        self.round().spread(seat, &Heard { from: robot.into(), text: say.text });
+        let answer = episode.ask(Some(&words.from), call.into_call()).await?;
+        self.round().spread(seat, &words);
         Ok(self.told(answer, seat))
     }
 
@@ -115,19 +118,16 @@ impl Team {
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
         seat: usize,
-        call: ActCall,
-        expected_step: Option<u32>,
-        then: Option<Look>,
+        call: OperatorCall,
     ) -> Result<Answer, HostingError> {
-        let command = OperatorCommand { robot: self.seats[seat].robot.clone(), call };
         self.round().admit(seat)?;
         // What cannot be executed is refused before the others depend on it.
-        episode.check(command.clone(), expected_step, then.clone()).await?;
+        let command = episode.read_command(call).await?;
         let (reply, answer) = oneshot::channel();
         {
             let mut round = self.round();
             round.admit(seat)?;
-            round.command(seat, Pending { command, then, reply });
+            round.command(seat, Pending { command, reply });
         }
         self.go_on(episode);
         answer.await.map_err(|_| HostingError::EpisodeStopped)?
@@ -143,10 +143,10 @@ impl Team {
         let robot = Some(self.seats[seat].robot.as_str());
         let others_play_on = !episode.ended() && self.round().finish(seat)?;
         if !others_play_on {
-            return episode.ask(robot, Asked::from(ToolCall::from(Finish {}))).await;
+            return episode.ask(robot, ToolCall::from(Finish {}).into()).await;
         }
         self.go_on(episode);
-        let status = episode.ask(robot, Asked::from(ToolCall::from(GetStatus {}))).await?;
+        let status = episode.ask(robot, ToolCall::from(GetStatus {}).into()).await?;
         Ok(Answer { others_play_on, ..status })
     }
 
@@ -186,27 +186,26 @@ impl Team {
 
     /// Makes the step, whoever of its operators is still there, and tells each what became of it.
     async fn execute(self: Arc<Self>, episode: &Arc<EpisodeThread>, pending: Vec<(usize, Pending)>) {
-        let commands: Vec<OperatorCommand> =
-            pending.iter().map(|(_, pending)| pending.command.clone()).collect();
-        let looks = pending.iter().map(|(_, pending)| pending.then.clone()).collect();
-        let asked_steps: Vec<u32> = commands.iter().map(OperatorCommand::asked_steps).collect();
-        let outcome = episode.together(commands, looks).await;
+        let (replies, commands): (Vec<_>, Vec<OperatorCommand>) =
+            pending.into_iter().map(|(seat, Pending { command, reply })| ((seat, reply), command)).unzip();
+        let asked_steps: Vec<u32> = commands.iter().map(OperatorCommand::steps).collect();
+        let outcome = episode.together(commands).await;
         let did = self.round().end(outcome.as_ref().ok().and_then(|answers| answers.first()));
         match outcome {
             Ok(answers) => {
-                for (((seat, pending), answer), asked_steps) in
-                    pending.into_iter().zip(answers).zip(asked_steps)
+                for (((seat, reply), answer), asked_steps) in
+                    replies.into_iter().zip(answers).zip(asked_steps)
                 {
                     let partners = self.partners(seat, &did);
-                    let answer = reply::cut_off(Answer { partners, ..self.told(answer, seat) }, asked_steps);
+                    let answer = Answer { partners, ..self.told(answer, seat) }.cut_off_after(asked_steps);
                     // A caller that has gone has its robot's step recorded all the same.
-                    let _ = pending.reply.send(Ok(answer));
+                    let _ = reply.send(Ok(answer));
                 }
             }
             Err(error) => {
                 let error = Arc::new(error);
-                for (_, pending) in pending {
-                    let _ = pending.reply.send(Err(HostingError::Shared(error.clone())));
+                for (_, reply) in replies {
+                    let _ = reply.send(Err(HostingError::Shared(error.clone())));
                 }
             }
         }
@@ -216,7 +215,7 @@ impl Team {
     /// The answer as the operator on `seat` is told it.
     fn told(&self, answer: Answer, seat: usize) -> Answer {
         let heard = self.round().take_heard(seat);
-        Answer { heard, ..reply::of_own_robot(answer, &self.seats[seat].robot) }
+        Answer { heard, ..answer.of_own_robot(&self.seats[seat].robot) }
     }
 
     /// What the partners of `seat` did, where `did` has it of everyone.
@@ -233,12 +232,5 @@ impl Team {
     fn round(&self) -> MutexGuard<'_, Round> {
         // Nothing panics while it holds the lock.
         self.round.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
-    }
-}
-
-fn own_look(look: Look, robot: &str) -> Result<Look, HostingError> {
-    match own_call(look.call(), robot)? {
-        ToolCall::Look(LookCall::Observe(observe)) => Ok(Look { observe, ..look }),
-        _ => Ok(look),
     }
 }

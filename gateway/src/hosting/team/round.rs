@@ -1,7 +1,7 @@
 //! Who has commanded what for the step that is made next.
 
 use tandem_episodes::OperatorCommand;
-use tandem_tools_spec::{Heard, Look, PartnerDid, ToolReply};
+use tandem_tools_spec::{Heard, PartnerDid, ToolReply};
 use tokio::{sync::oneshot, task::AbortHandle};
 
 use crate::hosting::{Answer, HostingError};
@@ -41,12 +41,10 @@ enum State {
     Finished,
 }
 
-/// A command, and what is to become of its reply.
+/// A command that the episode has read, and where its reply goes.
 #[derive(Debug)]
 pub struct Pending {
     pub command: OperatorCommand,
-    /// What its operator looks at when it is done.
-    pub then: Option<Look>,
     pub reply: oneshot::Sender<Result<Answer, HostingError>>,
 }
 
@@ -157,7 +155,7 @@ impl Round {
             ToolReply::Act(reply) => {
                 answer.step.map(|step| [step.saturating_sub(reply.executed_steps), step])
             }
-            ToolReply::Look(_) | ToolReply::Manage(_) => None,
+            ToolReply::Look(_) | ToolReply::Manage(_) | ToolReply::Talk(_) => None,
         });
         self.operators.iter_mut().map(|operator| operator.end(made)).collect()
     }

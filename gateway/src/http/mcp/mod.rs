@@ -27,8 +27,8 @@ use rmcp::{
 use serde::Serialize;
 use serde_json::Value;
 use tandem_tools_spec::{
-    CameraImage, Format, ListTasks, LookReply, StartEpisode, Tool as _, ToolReply, parse_args, parse_start,
-    say_tool, tool_specs,
+    Call, CameraImage, Format, ListTasks, LookReply, StartEpisode, Tool as _, ToolReply, operator_tool_specs,
+    parse_args, parse_start, tool_specs,
 };
 
 use super::{
@@ -36,7 +36,7 @@ use super::{
     body::check_unique_fields,
     problem::ApiError,
 };
-use crate::hosting::{Answer, Caller, HostingError, Request};
+use crate::hosting::{Answer, Caller, HostingError};
 
 /// What a host tells its model about the server as a whole.
 const INSTRUCTIONS: &str = "Simulated humanoids that must work together. Call list_tasks, then start_episode, then look \
@@ -76,10 +76,10 @@ impl ServerHandler for McpServer {
         context: RequestContext<RoleServer>,
     ) -> Result<ListToolsResult, ErrorData> {
         let hints = self.app.settings.hints;
-        let mut specs = tool_specs(hints);
-        if caller(&context).is_some_and(|who| self.app.table.may_talk(who)) {
-            specs.push(say_tool(hints));
-        }
+        let specs = match caller(&context).is_some_and(|who| self.app.table.may_talk(who)) {
+            true => operator_tool_specs(hints),
+            false => tool_specs(hints),
+        };
         let tools: Result<Vec<Tool>, _> =
             specs.iter().map(|spec| serde_json::from_value(spec.formatted(Format::Mcp))).collect();
         let tools = tools.map_err(|error| ErrorData::internal_error(error.to_string(), None))?;
@@ -168,23 +168,23 @@ impl McpServer {
         mut args: Value,
     ) -> Result<Vec<ContentBlock>, ApiError> {
         let handle = args.as_object_mut().and_then(|object| object.shift_remove("episode_id"));
-        let request = Request::parse(name, args).map_err(ApiError::from);
+        let call = Call::parse(name, args).map_err(ApiError::from);
         let id = match (handle, who) {
             (Some(Value::String(id)), _) => id,
             // An operator's token says which episode.
             (None, Caller::Operator { episode, .. }) => episode.clone(),
             _ => {
-                request?;
+                call?;
                 return Err(ApiError::NoEpisodeNamed { tool: name.into() });
             }
         };
         let episode = self.app.table.hosted(&id);
-        let request = match &episode {
-            Ok(episode) => request.map_err(|refusal| refusal.in_episode(&episode.thread))?,
-            Err(_) => request?,
+        let call = match &episode {
+            Ok(episode) => call.map_err(|refusal| refusal.in_episode(&episode.thread))?,
+            Err(_) => call?,
         };
         let episode = episode?;
-        let answered = episode.call(who, request, None).await;
+        let answered = episode.call(who, call, None).await;
         content(&answered.map_err(|error| ApiError::from(error).in_episode(&episode.thread))?.reply)
     }
 }

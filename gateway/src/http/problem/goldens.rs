@@ -66,7 +66,7 @@ fn hosting_refusals() -> Vec<HostingError> {
         HostingError::EpisodeStopped,
         HostingError::EpisodePanicked,
         HostingError::Folder { runs: "runs".into(), source: failure() },
-        HostingError::OtherStep { expected: 1, now: 2 },
+        EpisodeError::OtherStep { expected: 1, now: 2 }.into(),
         HostingError::DoubleCommand { robot: robot(), waits_for: vec!["B".into(), "C".into()] },
         HostingError::DoubleCommand { robot: robot(), waits_for: Vec::new() },
         HostingError::LateCommand { robot: robot(), from_step: 1, to_step: 9 },

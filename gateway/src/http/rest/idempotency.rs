@@ -35,8 +35,8 @@ fn read(value: &HeaderValue) -> Result<String, ApiError> {
 }
 
 /// Marks a reply that an earlier request with the same key has had.
-pub fn mark_replayed(mut response: Response, again: bool) -> Response {
-    if again {
+pub fn mark_replayed(mut response: Response, replayed: bool) -> Response {
+    if replayed {
         response.headers_mut().insert(REPLAYED, HeaderValue::from_static("true"));
     }
     response

@@ -14,8 +14,8 @@ use axum::{
 use serde::Deserialize;
 use serde_json::{Value, json};
 use tandem_tools_spec::{
-    EpisodeToolSpec, Format, ResultReply, StartEpisode, TaskList, Tool as _, episode_tool_specs, parse_start,
-    say_spec, tool_specs,
+    Call, EpisodeToolSpec, Format, ResultReply, StartEpisode, TaskList, Tool as _, episode_tool_specs,
+    parse_start, tool_specs,
 };
 
 use super::{
@@ -24,7 +24,7 @@ use super::{
     problem::ApiError,
 };
 use crate::{
-    hosting::{Caller, HostingError, Once, Request as Asked},
+    hosting::{Caller, HostingError, IdempotentReply},
     metrics::MetricsPage,
 };
 use idempotency::{IdempotencyKey, mark_replayed};
@@ -88,9 +88,7 @@ async fn episode_tools(
     let episode = app.table.hosted(&id)?;
     episode.admit(&who)?;
     let (hints, most_steps) = (app.settings.hints, episode.thread.steps_per_command());
-    let mut specs = episode_tool_specs(hints, &id, most_steps);
-    specs.extend(episode.may_talk().then(|| say_spec(hints, &id)));
-    Ok(Json(specs))
+    Ok(Json(episode_tool_specs(hints, &id, most_steps, episode.may_talk())))
 }
 
 async fn openapi(State(app): State<AppState>) -> Json<Value> {
@@ -123,13 +121,13 @@ async fn start(
     counted(&app, StartEpisode::NAME, async {
         require_host(&who)?;
         let (args, driving) = parse_start(encoding.read(&body)?)?;
-        let Once { reply, again } = match key {
+        let IdempotentReply { reply, replayed } = match key {
             Some(key) => app.table.start_once(args, driving, &key).await?,
-            None => Once { reply: app.table.start_driven(args, driving).await?, again: false },
+            None => IdempotentReply { reply: app.table.start_driven(args, driving).await?, replayed: false },
         };
         let location = format!("/v1/episodes/{}", reply.episode_id);
         let written = encoding.write(StatusCode::CREATED, &reply)?;
-        Ok(mark_replayed(([(header::LOCATION, location)], written).into_response(), again))
+        Ok(mark_replayed(([(header::LOCATION, location)], written).into_response(), replayed))
     })
     .await
 }
@@ -163,15 +161,15 @@ async fn call(
     counted(&app, &name, async {
         let episode = app.table.hosted(&id)?;
         episode.admit(&who)?;
-        let read = || Ok(Asked::parse(&name, without_episode_id(encoding.read(&body)?, &id)?)?);
+        let read = || Ok(Call::parse(&name, without_episode_id(encoding.read(&body)?, &id)?)?);
         let answer = match read() {
-            Ok(request) => episode.call(&who, request, key.as_deref()).await.map_err(ApiError::from),
+            Ok(call) => episode.call(&who, call, key.as_deref()).await.map_err(ApiError::from),
             Err(refusal) => Err(refusal),
         };
-        let Once { reply, again } =
+        let IdempotentReply { reply, replayed } =
             answer.map_err(|refusal: ApiError| refusal.in_episode(&episode.thread))?;
         let status = if reply.others_play_on { StatusCode::ACCEPTED } else { StatusCode::OK };
-        Ok(mark_replayed(encoding.write(status, &*reply)?, again))
+        Ok(mark_replayed(encoding.write(status, &*reply)?, replayed))
     })
     .await
 }

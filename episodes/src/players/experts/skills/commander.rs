@@ -250,10 +250,12 @@ impl<'a> Commander<'a> {
         match self.pass_on(MoveWrists { steps, robots })? {
             ToolReply::Act(reply) if reply.stop_reason == StopReason::StepsDone => Ok(()),
             ToolReply::Act(_) => Err(PlayerError::EpisodeOver),
-            other @ (ToolReply::Look(_) | ToolReply::Manage(_)) => Err(PlayerError::Call {
-                tool: MoveWrists::NAME,
-                reason: format!("unexpected reply {other:?}"),
-            }),
+            other @ (ToolReply::Look(_) | ToolReply::Manage(_) | ToolReply::Talk(_)) => {
+                Err(PlayerError::Call {
+                    tool: MoveWrists::NAME,
+                    reason: format!("unexpected reply {other:?}"),
+                })
+            }
         }
     }
 

@@ -1,7 +1,58 @@
-//! The base command: what it is made of, and what locomotion accepts of it.
+//! Poses, numbers by joint, and base commands with what locomotion accepts of them.
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, de::Error as _};
+use serde_json::{Map, Value};
+
+/// A pose in the frame that the field which holds it names.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Pose {
+    /// [x, y, z] in metres.
+    pub position_m: [f64; 3],
+    /// [w, x, y, z], norm 1.
+    pub quaternion_wxyz: [f64; 4],
+}
+
+/// One number per joint, in the robot's published joint order; JSON object from joint name to number. JSON carries them
+/// to six decimals: the drives measure no finer, and a model reads a third of the text.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointValues(pub Vec<(String, f64)>);
+
+impl JointValues {
+    /// The value of one joint.
+    pub fn get(&self, joint: &str) -> Option<f64> {
+        self.0.iter().find(|(name, _)| name == joint).map(|(_, value)| *value)
+    }
+}
+
+impl Serialize for JointValues {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        // Adding zero makes the zero of tiny negative values a positive one.
+        let rounded = |value: f64| (value * 1e6).round() / 1e6 + 0.0;
+        serializer.collect_map(self.0.iter().map(|(name, value)| (name, rounded(*value))))
+    }
+}
+
+impl<'de> Deserialize<'de> for JointValues {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let object = Map::<String, Value>::deserialize(deserializer)?;
+        let number = |(name, value): (String, Value)| match value.as_f64() {
+            Some(value) => Ok((name, value)),
+            None => Err(D::Error::custom(format!("joint {name} holds {value}; expected a number"))),
+        };
+        object.into_iter().map(number).collect::<Result<_, _>>().map(JointValues)
+    }
+}
+
+impl JsonSchema for JointValues {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "JointValues".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({ "type": "object", "additionalProperties": { "type": "number" } })
+    }
+}
 
 /// What a base command is made of, in the order of action rows. Fields and columns bear these names.
 pub const BASE_COLUMNS: [&str; 4] = ["vx_m_s", "vy_m_s", "yaw_rate_rad_s", "pelvis_height_m"];
@@ -43,7 +94,7 @@ pub struct Range {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::{Value, json};
+    use serde_json::json;
 
     use super::*;
 

@@ -1,28 +1,32 @@
-//! What a program may ask for besides a tool's own arguments. Models are shown none of it: it stands in the schemas of bodies, not in
-//! those of tools.
+//! A call on an episode as a program makes it: the tool, and what may stand beside the tool's own arguments. Models are shown none
+//! of that: it stands in the schemas of bodies, not in those of tools.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value, json};
 
 use crate::error::SpecError;
-use crate::list::{ActCall, LookCall, ToolCall, tool_specs};
+use crate::list::{ActCall, LookCall, ToolCall, operator_tool_specs};
 use crate::parts::{Driving, Formats, Hints};
 use crate::schema::{ToolSpec, body_schema, plain_schema};
 use crate::strict_value::StrictValue;
 use crate::tool::{Tool, parse_args};
 use crate::tools::{Observation, Observe, StartEpisode};
 
-/// A call on an episode, and what a program asks for besides.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Asked {
-    /// The call.
-    pub call: ToolCall,
-    /// How pictures are to come, where the call looks.
+/// A call on an episode. It serialises to what [`Call::parse`] reads.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Call {
+    /// The tool and its arguments.
+    #[serde(flatten)]
+    pub tool: ToolCall,
+    /// How pictures are to come, where the tool is `observe`.
+    #[serde(flatten)]
     pub formats: Formats,
-    /// Of a command: the step that the episode has to stand at.
+    /// The step that the episode has to stand at, where the tool is a command.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub expected_step: Option<u32>,
-    /// Of a command: what to look at once it is done.
+    /// What to look at once a command is done.
+    #[serde(rename = "observe", skip_serializing_if = "Option::is_none")]
     pub then: Option<Look>,
 }
 
@@ -53,26 +57,69 @@ impl WithCommand {
     const FIELDS: [&str; 2] = ["expected_step", Observe::NAME];
 }
 
-impl Asked {
-    /// Reads a call with whatever may stand beside its arguments.
-    pub fn parse(name: &str, mut args: Value) -> Result<Asked, SpecError> {
+impl Call {
+    /// Reads the call of tool `name` with arguments `args` and whatever stands beside them.
+    pub fn parse(name: &str, mut args: Value) -> Result<Call, SpecError> {
         if let Some(tool) = ActCall::TOOLS.iter().find(|tool| **tool == name) {
             let beside: WithCommand = beside(tool, &mut args, &WithCommand::FIELDS)?;
             let call = ToolCall::parse(name, args)?;
             let then = beside.observe.map(|args| Look::parse(args.into())).transpose()?;
-            return Ok(Asked { expected_step: beside.expected_step, then, ..Asked::from(call) });
+            return Ok(Call { expected_step: beside.expected_step, then, ..Call::from(call) });
         }
-        if name == Observe::NAME {
-            let Look { observe, formats } = Look::parse(args)?;
-            return Ok(Asked { formats, ..Asked::from(ToolCall::from(observe)) });
+        match name {
+            Observe::NAME => Look::parse(args).map(Call::from),
+            _ => ToolCall::parse(name, args).map(Call::from),
         }
-        Ok(Asked::from(ToolCall::parse(name, args)?))
+    }
+
+    /// The tool's name.
+    pub fn name(&self) -> &'static str {
+        self.tool.name()
+    }
+
+    /// The robots that the call and the look after it name.
+    pub fn robots(&self) -> Vec<&str> {
+        let then = self.then.iter().flat_map(|look| look.observe.robots());
+        self.tool.robots().into_iter().chain(then).collect()
+    }
+
+    /// Control steps of 20 ms that the call asks for; only commands ask for any.
+    pub fn steps(&self) -> u32 {
+        self.tool.steps()
+    }
+
+    /// Observations that name no robot become those of `robot`.
+    pub fn looking_through(mut self, robot: &str) -> Call {
+        let then = self.then.as_mut().map(|look| &mut look.observe);
+        let own = match &mut self.tool {
+            ToolCall::Look(LookCall::Observe(observe)) => Some(observe),
+            ToolCall::Look(_) | ToolCall::Act(_) | ToolCall::Manage(_) | ToolCall::Talk(_) => None,
+        };
+        for observe in own.into_iter().chain(then) {
+            observe.robots.get_or_insert_with(|| vec![robot.into()]);
+        }
+        self
+    }
+
+    /// Checks a call that was built in Rust rather than read from JSON; [`Call::parse`] has already done it.
+    pub fn validate(&self) -> Result<(), SpecError> {
+        self.tool.validate()?;
+        match &self.then {
+            Some(look) => look.call().validate(),
+            None => Ok(()),
+        }
     }
 }
 
-impl From<ToolCall> for Asked {
-    fn from(call: ToolCall) -> Asked {
-        Asked { call, formats: Formats::default(), expected_step: None, then: None }
+impl From<ToolCall> for Call {
+    fn from(tool: ToolCall) -> Call {
+        Call { tool, formats: Formats::default(), expected_step: None, then: None }
+    }
+}
+
+impl From<Look> for Call {
+    fn from(look: Look) -> Call {
+        Call { formats: look.formats, ..Call::from(look.call()) }
     }
 }
 
@@ -84,8 +131,8 @@ impl Look {
     }
 
     /// The call alone.
-    pub fn call(&self) -> ToolCall {
-        ToolCall::Look(LookCall::Observe(self.observe.clone()))
+    fn call(&self) -> ToolCall {
+        self.observe.clone().into()
     }
 }
 
@@ -115,7 +162,7 @@ fn beside<T: DeserializeOwned + Default>(
 
 /// Every tool, with what programs may send beside its arguments in the schema of its body.
 pub fn specs_for_programs(hints: Hints) -> Vec<ToolSpec> {
-    let mut specs = tool_specs(hints);
+    let mut specs = operator_tool_specs(hints);
     for spec in &mut specs {
         match spec.name {
             StartEpisode::NAME => spec.allow(&properties::<Driving>()),
@@ -147,31 +194,73 @@ fn observe_properties() -> Value {
 mod tests {
     use super::*;
     use crate::parts::{DepthFormat, ImageFormat, Operators};
-    use crate::tools::Wait;
+    use crate::tools::{GetRobotState, GetStatus, MoveWrists, Say, Wait, WristMove};
+
+    fn looking(robots: &[&str]) -> Look {
+        let robots = Some(robots.iter().map(|robot| robot.to_string()).collect());
+        let formats = Formats { images: Some(ImageFormat::Rgb), depth: None };
+        Look { observe: Observe { robots, short: None }, formats }
+    }
 
     #[test]
     fn what_stands_beside_the_arguments_is_read() {
-        let plain = Asked::parse("wait", json!({ "steps": 5 })).unwrap();
-        assert_eq!(plain, Asked::from(ToolCall::from(Wait { steps: 5 })));
-        let asked = Asked::parse(
+        let plain = Call::parse("wait", json!({ "steps": 5 })).unwrap();
+        assert_eq!(plain, Call::from(ToolCall::from(Wait { steps: 5 })));
+        let call = Call::parse(
             "wait",
             json!({ "steps": 5, "expected_step": 300.0, "observe": { "robots": ["A"], "images": "rgb" } }),
         );
-        let formats = Formats { images: Some(ImageFormat::Rgb), depth: None };
-        let look = Look { observe: Observe { robots: Some(vec!["A".into()]), short: None }, formats };
-        assert_eq!(asked.unwrap(), Asked { expected_step: Some(300), then: Some(look), ..plain });
-        let asked = Asked::parse("observe", json!({ "depth": "float16", "short": true })).unwrap();
-        assert_eq!(asked.call, Observe { robots: None, short: Some(true) }.into());
-        assert_eq!(asked.formats, Formats { images: None, depth: Some(DepthFormat::Float16) });
+        assert_eq!(call.unwrap(), Call { expected_step: Some(300), then: Some(looking(&["A"])), ..plain });
+        let call = Call::parse("observe", json!({ "depth": "float16", "short": true })).unwrap();
+        assert_eq!(call.tool, Observe { robots: None, short: Some(true) }.into());
+        assert_eq!(call.formats, Formats { images: None, depth: Some(DepthFormat::Float16) });
         let (start, driving) =
             parse_start(json!({ "task": "handover", "seed": 0, "operators": "per_robot" })).unwrap();
         assert_eq!((start.seed, driving.operators), (0, Some(Operators::PerRobot)));
     }
 
     #[test]
+    fn what_is_written_is_read_back() {
+        let examples = ToolCall::examples().into_iter().map(Call::from);
+        let wait = Call::from(ToolCall::from(Wait { steps: 5 }));
+        let whole = Call { expected_step: Some(300), then: Some(looking(&["A", "B"])), ..wait };
+        for call in examples.chain([whole, Call::from(looking(&["B"]))]) {
+            assert_eq!(Call::parse(call.name(), json!(call)), Ok(call));
+        }
+        assert_eq!(json!(Call::from(ToolCall::from(GetStatus {}))), json!({}));
+    }
+
+    #[test]
+    fn a_call_knows_its_robots_and_its_steps() {
+        let robots = |call: &Call| call.robots().join(" ");
+        for (name, example) in ToolCall::examples().into_iter().map(|call| (call.name(), Call::from(call))) {
+            assert_eq!(example.steps() > 0, ActCall::TOOLS.contains(&name), "{name}");
+            let named = if ["wait", "get_status", "finish", "say"].contains(&name) { "" } else { "A" };
+            assert_eq!(robots(&example), named, "{name}");
+        }
+        let both = vec![WristMove::hold("B"), WristMove::hold("A")];
+        let reach = Call::from(ToolCall::from(MoveWrists { steps: 7, robots: both }));
+        assert_eq!((robots(&reach).as_str(), reach.steps()), ("B A", 7));
+        assert_eq!(robots(&Call { then: Some(looking(&["C"])), ..reach }), "B A C");
+    }
+
+    #[test]
+    fn who_looks_for_itself_need_not_say_so() {
+        let all = || Observe { robots: None, short: None };
+        let look = || Look { observe: all(), formats: Formats::default() };
+        let wait = Call { then: Some(look()), ..Call::from(ToolCall::from(Wait { steps: 1 })) };
+        for call in [Call::from(look()), wait] {
+            assert_eq!(call.looking_through("B").robots(), ["B"]);
+        }
+        for named in [ToolCall::from(GetRobotState { robot: "A".into() }), Say { text: "B.".into() }.into()] {
+            assert_eq!(Call::from(named.clone()).looking_through("B"), Call::from(named));
+        }
+    }
+
+    #[test]
     fn refusals_name_the_field() {
         let check = |name: &str, args: Value, says: &str| {
-            let text = Asked::parse(name, args).unwrap_err().to_string();
+            let text = Call::parse(name, args).unwrap_err().to_string();
             assert!(text.contains(says), "{text}");
         };
         check("wait", json!({ "steps": 5, "expected_step": -1 }), "wait: expected_step: ");

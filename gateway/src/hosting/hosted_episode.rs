@@ -1,55 +1,47 @@
-//! An episode as callers meet it: driven by one policy or by an operator for each robot, with replies that are kept.
+//! An episode as callers meet it: driven by one policy or by an operator for each robot, with replies that may be asked for again.
 
 use std::sync::Arc;
 
-use serde_json::Value;
-use tandem_tools_spec::{
-    Asked, Briefing, ManageReply, ResultReply, Say, SpecError, StatusReply, Tool, ToolReply, parse_args,
-};
+use tandem_tools_spec::{Briefing, Call, ManageReply, ResultReply, StatusReply, ToolCall, ToolReply};
 
 use super::{
-    Answer, Caller, EpisodeThread, HostingError,
-    kept::{Kept, Once},
+    Answer, EpisodeThread, HostingError,
+    idempotency_cache::{IdempotencyCache, IdempotentReply},
     team::Team,
 };
 
-/// An episode that is held.
+/// Who calls, as its token says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Caller {
+    /// Who may use the server: starts episodes, and drives those that one policy directs.
+    Host,
+    /// The operator of one robot.
+    Operator {
+        /// The episode.
+        episode: String,
+        /// The robot, as "A".
+        robot: String,
+    },
+}
+
+/// An episode that a server holds.
 #[derive(Debug, Clone)]
-pub struct Hosted {
+pub struct HostedEpisode {
     id: String,
     /// The thread that owns its world.
     pub thread: Arc<EpisodeThread>,
     /// The operators, where each robot has one.
     pub team: Option<Arc<Team>>,
-    kept: Arc<Kept<Request, Outcome>>,
+    replies: Arc<IdempotencyCache<Call, SharedAnswer>>,
 }
 
-/// What is asked of an episode.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Request {
-    /// A call of a tool.
-    Asked(Box<Asked>),
-    /// Words to the other operators.
-    Say(Say),
-}
+/// What came of a call, for as many as want to know.
+type SharedAnswer = Result<Arc<Answer>, Arc<HostingError>>;
 
-/// What came of a request, for as many as want to know.
-type Outcome = Result<Arc<Answer>, Arc<HostingError>>;
-
-impl Request {
-    /// Reads a call of the tool `name`.
-    pub fn parse(name: &str, args: Value) -> Result<Request, SpecError> {
-        match name {
-            Say::NAME => parse_args(args).map(Request::Say),
-            _ => Asked::parse(name, args).map(|asked| Request::Asked(asked.into())),
-        }
-    }
-}
-
-impl Hosted {
-    /// The episode `id`, whose replies are kept from now on.
-    pub fn new(id: &str, thread: Arc<EpisodeThread>, team: Option<Team>) -> Hosted {
-        Hosted { id: id.into(), thread, team: team.map(Arc::new), kept: Arc::default() }
+impl HostedEpisode {
+    /// The episode `id`, whose replies may be asked for again from now on.
+    pub fn new(id: &str, thread: Arc<EpisodeThread>, team: Option<Team>) -> HostedEpisode {
+        HostedEpisode { id: id.into(), thread, team: team.map(Arc::new), replies: Arc::default() }
     }
 
     /// What the episode is called.
@@ -57,25 +49,25 @@ impl Hosted {
         &self.id
     }
 
-    /// Answers a request; with a key, once for this key and caller.
+    /// Answers a call; with a key, once for this key and caller.
     pub async fn call(
         &self,
         who: &Caller,
-        request: Request,
+        call: Call,
         key: Option<&str>,
-    ) -> Result<Once<Arc<Answer>>, HostingError> {
+    ) -> Result<IdempotentReply<Arc<Answer>>, HostingError> {
         let robot = self.robot_of(who)?;
         let Some(key) = key else {
-            let reply = Arc::new(self.clone().answer(robot, request).await?);
-            return Ok(Once { reply, again: false });
+            let reply = Arc::new(self.clone().answer(robot, call).await?);
+            return Ok(IdempotentReply { reply, replayed: false });
         };
         // Keys of different operators have nothing to do with each other.
         let key = format!("{}:{key}", robot.as_deref().unwrap_or_default());
-        let (hosted, asked) = (self.clone(), request.clone());
-        let work = async move { hosted.answer(robot, asked).await.map(Arc::new).map_err(Arc::new) };
-        let lasting = |made: &Outcome| made.as_ref().map_or_else(|error| error.is_final(), |_| true);
-        let Once { reply, again } = self.kept.once(&key, request, work, lasting).await?;
-        Ok(Once { reply: reply.map_err(HostingError::Shared)?, again })
+        let (episode, asked) = (self.clone(), call.clone());
+        let work = async move { episode.answer(robot, asked).await.map(Arc::new).map_err(Arc::new) };
+        let lasting = |made: &SharedAnswer| made.as_ref().map_or_else(|error| error.is_final(), |_| true);
+        let IdempotentReply { reply, replayed } = self.replies.once(&key, call, work, lasting).await?;
+        Ok(IdempotentReply { reply: reply.map_err(HostingError::Shared)?, replayed })
     }
 
     /// Where the episode stands, for who looks on: asking is no call.
@@ -136,12 +128,13 @@ impl Hosted {
         }
     }
 
-    async fn answer(self, robot: Option<String>, request: Request) -> Result<Answer, HostingError> {
-        match (self.team, robot, request) {
-            (Some(team), Some(robot), Request::Asked(asked)) => team.call(&self.thread, &robot, *asked).await,
-            (Some(team), Some(robot), Request::Say(say)) => team.say(&self.thread, &robot, say).await,
-            (_, _, Request::Asked(asked)) => self.thread.ask(None, *asked).await,
-            (_, _, Request::Say(_)) => Err(HostingError::NoTalk),
+    async fn answer(self, robot: Option<String>, call: Call) -> Result<Answer, HostingError> {
+        match (self.team, robot, &call.tool) {
+            (Some(team), Some(robot), _) => team.call(&self.thread, &robot, call).await,
+            (_, _, ToolCall::Talk(_)) => Err(HostingError::NoTalk),
+            (_, _, ToolCall::Look(_) | ToolCall::Act(_) | ToolCall::Manage(_)) => {
+                self.thread.ask(None, call).await
+            }
         }
     }
 }

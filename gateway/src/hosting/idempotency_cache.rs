@@ -1,4 +1,4 @@
-//! Replies that are kept, so that a caller who never saw one can ask again without anything being done twice.
+//! Replies by idempotency key, so that a caller who never saw one can ask again without anything being done twice.
 
 use std::{
     collections::VecDeque,
@@ -9,12 +9,12 @@ use tokio::sync::watch;
 
 use super::HostingError;
 
-/// How many replies an episode keeps; with pictures, one may have a megabyte.
-const KEPT: usize = 16;
+/// How many replies are kept; with pictures, one may have a megabyte.
+const CAPACITY: usize = 16;
 
-/// Kept replies `R` to requests `Q`, by the key that came with each.
+/// Replies `R` to requests `Q`, by the key that came with each.
 #[derive(Debug)]
-pub struct Kept<Q, R> {
+pub struct IdempotencyCache<Q, R> {
     entries: Mutex<VecDeque<Entry<Q, R>>>,
 }
 
@@ -27,20 +27,20 @@ struct Entry<Q, R> {
 
 /// A reply, and whether it had been made before.
 #[derive(Debug, PartialEq)]
-pub struct Once<R> {
+pub struct IdempotentReply<R> {
     /// The reply.
     pub reply: R,
     /// Whether an earlier request with the same key has had it.
-    pub again: bool,
+    pub replayed: bool,
 }
 
-impl<Q, R> Default for Kept<Q, R> {
-    fn default() -> Kept<Q, R> {
-        Kept { entries: Mutex::default() }
+impl<Q, R> Default for IdempotencyCache<Q, R> {
+    fn default() -> IdempotencyCache<Q, R> {
+        IdempotencyCache { entries: Mutex::default() }
     }
 }
 
-impl<Q: PartialEq + Clone, R: Clone + Send + Sync + 'static> Kept<Q, R> {
+impl<Q: PartialEq + Clone, R: Clone + Send + Sync + 'static> IdempotencyCache<Q, R> {
     /// Lets `work` make the reply to `request`, once for a key: who asks again with the key gets that reply, or waits for it. A
     /// reply that is not `lasting` is forgotten, so that asking again tries again. The work goes on if its caller leaves.
     pub async fn once(
@@ -49,8 +49,8 @@ impl<Q: PartialEq + Clone, R: Clone + Send + Sync + 'static> Kept<Q, R> {
         request: Q,
         work: impl Future<Output = R> + Send + 'static,
         lasting: impl Fn(&R) -> bool,
-    ) -> Result<Once<R>, HostingError> {
-        let (mut reply, again) = self.find_or_begin(key, request, work)?;
+    ) -> Result<IdempotentReply<R>, HostingError> {
+        let (mut reply, replayed) = self.find_or_begin(key, request, work)?;
         let made = reply.wait_for(Option::is_some).await.map(|made| made.clone());
         // A work that panicked made no reply, and says so as an episode that stopped under way.
         let Ok(Some(made)) = made else {
@@ -60,7 +60,7 @@ impl<Q: PartialEq + Clone, R: Clone + Send + Sync + 'static> Kept<Q, R> {
         if !lasting(&made) {
             self.forget(key);
         }
-        Ok(Once { reply: made, again })
+        Ok(IdempotentReply { reply: made, replayed })
     }
 
     /// Where the reply comes, and whether the work on it had begun before.
@@ -79,7 +79,7 @@ impl<Q: PartialEq + Clone, R: Clone + Send + Sync + 'static> Kept<Q, R> {
         }
         let (sender, reply) = watch::channel(None);
         entries.push_back(Entry { key: key.into(), request, reply: reply.clone() });
-        if entries.len() > KEPT {
+        if entries.len() > CAPACITY {
             entries.pop_front();
         }
         tokio::spawn(async move {
@@ -107,32 +107,32 @@ mod tests {
 
     use super::*;
 
-    /// Keeps counts: each work counts on and replies with the count.
+    /// Each work counts on and replies with the count.
     struct Counting {
-        kept: Kept<&'static str, u32>,
+        cache: IdempotencyCache<&'static str, u32>,
         count: Arc<AtomicU32>,
     }
 
     impl Counting {
         fn new() -> Counting {
-            Counting { kept: Kept::default(), count: Arc::default() }
+            Counting { cache: IdempotencyCache::default(), count: Arc::default() }
         }
 
-        async fn ask(&self, key: &str, request: &'static str) -> Result<Once<u32>, HostingError> {
+        async fn ask(&self, key: &str, request: &'static str) -> Result<IdempotentReply<u32>, HostingError> {
             let count = self.count.clone();
             let work = async move {
                 tokio::task::yield_now().await;
                 count.fetch_add(1, Relaxed) + 1
             };
-            self.kept.once(key, request, work, |count| count % 2 == 1).await
+            self.cache.once(key, request, work, |count| count % 2 == 1).await
         }
     }
 
     #[tokio::test]
     async fn a_key_stands_for_one_reply() {
         let counting = Counting::new();
-        assert_eq!(counting.ask("k", "wait").await.unwrap(), Once { reply: 1, again: false });
-        assert_eq!(counting.ask("k", "wait").await.unwrap(), Once { reply: 1, again: true });
+        assert_eq!(counting.ask("k", "wait").await.unwrap(), IdempotentReply { reply: 1, replayed: false });
+        assert_eq!(counting.ask("k", "wait").await.unwrap(), IdempotentReply { reply: 1, replayed: true });
         let refused = counting.ask("k", "walk").await.unwrap_err();
         assert!(matches!(refused, HostingError::KeyUsed), "{refused}");
         assert_eq!(counting.count.load(Relaxed), 1);
@@ -142,8 +142,8 @@ mod tests {
     async fn what_does_not_last_is_made_anew() {
         let counting = Counting::new();
         counting.ask("k", "wait").await.unwrap();
-        assert_eq!(counting.ask("l", "wait").await.unwrap(), Once { reply: 2, again: false });
-        assert_eq!(counting.ask("l", "wait").await.unwrap(), Once { reply: 3, again: false });
+        assert_eq!(counting.ask("l", "wait").await.unwrap(), IdempotentReply { reply: 2, replayed: false });
+        assert_eq!(counting.ask("l", "wait").await.unwrap(), IdempotentReply { reply: 3, replayed: false });
     }
 
     #[tokio::test]
@@ -156,11 +156,11 @@ mod tests {
     #[tokio::test]
     async fn the_oldest_replies_are_forgotten() {
         let counting = Counting::new();
-        for key in 0..=KEPT {
-            counting.kept.once(&key.to_string(), "wait", async { 1 }, |_| true).await.unwrap();
+        for key in 0..=CAPACITY {
+            counting.cache.once(&key.to_string(), "wait", async { 1 }, |_| true).await.unwrap();
         }
         let again =
-            async |key: &str| counting.kept.once(key, "wait", async { 1 }, |_| true).await.unwrap().again;
+            async |key: &str| counting.cache.once(key, "wait", async { 1 }, |_| true).await.unwrap().replayed;
         assert!(again("1").await && !again("0").await);
     }
 }

@@ -5,7 +5,7 @@ use tandem_sim::Sides;
 use tandem_tools_spec::{CheckReach, HandReach, ReachReply};
 
 use super::motion::Motion;
-use super::orders::wrist_target;
+use super::move_wrists::wrist_target;
 use super::upper_body::REACH_TOLERANCE;
 use crate::convert::rounded;
 

@@ -1,0 +1,128 @@
+//! `move_wrists`: wrists and fingers go in a straight line and arrive with the order's last step. The line is straight in the world,
+//! or for carried targets in the pelvis frame.
+
+use nalgebra::{Isometry3, Translation3};
+use tandem_sim::{BaseCommand, HAND_JOINTS, Side, Sides, UPPER_JOINTS};
+use tandem_tools_spec::WristMove;
+
+use super::columns::{self, Clamped};
+use super::motion::{Aim, Motion};
+use crate::convert::unit_quaternion;
+
+/// The way of both wrists and their fingers.
+pub struct WristTrajectory {
+    steps: u32,
+    /// Where the wrists begin, of the kind of the aims that they go to.
+    from: Sides<Aim>,
+    to: Sides<Aim>,
+    /// How the wrists give way; `None` for not at all.
+    compliance_n_s_m: Option<f64>,
+    from_rad: [f64; UPPER_JOINTS],
+    /// Fingers that are `None` stay.
+    fingers_rad: Sides<Option<[f64; HAND_JOINTS]>>,
+    base: BaseCommand,
+}
+
+impl WristTrajectory {
+    /// Has `motion` take up what `entry` asks of it, within `steps` control steps.
+    pub fn begin(
+        entry: &WristMove,
+        steps: u32,
+        motion: &mut Motion,
+        clamped: &mut Clamped,
+    ) -> WristTrajectory {
+        let velocity =
+            [entry.vx_m_s.unwrap_or(0.0), entry.vy_m_s.unwrap_or(0.0), entry.yaw_rate_rad_s.unwrap_or(0.0)];
+        let base =
+            clamped.base(&motion.robot.base_limits, motion.base_asked(velocity, entry.pelvis_height_m));
+        let to = aims(entry, motion);
+        let mut fingers = |side: Side, asked_rad: &Option<[f64; HAND_JOINTS]>| {
+            let first = columns::hand(side).start;
+            asked_rad.map(|asked_rad| {
+                std::array::from_fn(|finger| {
+                    clamped.joint(&motion.robot.model, first + finger, asked_rad[finger])
+                })
+            })
+        };
+        let fingers_rad = Sides {
+            left: fingers(Side::Left, &entry.left_fingers_rad),
+            right: fingers(Side::Right, &entry.right_fingers_rad),
+        };
+        motion.aim(to);
+        WristTrajectory {
+            steps,
+            from: motion.arrived(),
+            to,
+            compliance_n_s_m: entry.compliance_n_s_m,
+            from_rad: motion.state().upper_rad,
+            fingers_rad,
+            base,
+        }
+    }
+
+    /// Control step `step`, counted from 1.
+    pub fn advance(&self, step: u32, motion: &mut Motion) {
+        let part = f64::from(step) / f64::from(self.steps);
+        motion.give_way(self.compliance_n_s_m);
+        motion.walk(self.base);
+        for side in Side::BOTH {
+            if let Some(goal_rad) = &self.fingers_rad[side] {
+                let from_rad = &self.from_rad[columns::hand(side)];
+                let between: [f64; HAND_JOINTS] =
+                    std::array::from_fn(|i| from_rad[i] + (goal_rad[i] - from_rad[i]) * part);
+                motion.set_fingers(side, &between);
+            }
+        }
+        motion.follow(&Sides::from_fn(|side| self.from[side].towards(&self.to[side], part)));
+    }
+}
+
+/// Where the wrists are to go.
+fn aims(entry: &WristMove, motion: &Motion) -> Sides<Aim> {
+    let present = motion.targets();
+    let targets = Sides {
+        left: wrist_target(entry.left_position_m, entry.left_quaternion_wxyz, &present.left),
+        right: wrist_target(entry.right_position_m, entry.right_quaternion_wxyz, &present.right),
+    };
+    targets.map(|target| match (target, entry.carried.unwrap_or(false)) {
+        (None, _) => Aim::Joints,
+        (Some(pelvis_from_wrist), true) => Aim::Carried(pelvis_from_wrist),
+        (Some(pelvis_from_wrist), false) => Aim::World(motion.world_from_pelvis() * pelvis_from_wrist),
+    })
+}
+
+/// A wrist's target in the pelvis frame, of which either half may be left as `present` has it; `None` where both are.
+pub fn wrist_target(
+    position_m: Option<[f64; 3]>,
+    quaternion_wxyz: Option<[f64; 4]>,
+    present: &Isometry3<f64>,
+) -> Option<Isometry3<f64>> {
+    if position_m.is_none() && quaternion_wxyz.is_none() {
+        return None;
+    }
+    let translation = position_m.map_or(present.translation, Translation3::from);
+    let rotation = quaternion_wxyz.map_or(present.rotation, unit_quaternion);
+    Some(Isometry3::from_parts(translation, rotation))
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    use super::*;
+
+    /// A third of a metre has no end of decimals, and the wire has six.
+    #[test]
+    fn what_is_left_out_stays_to_the_last_bit() {
+        let turned = UnitQuaternion::from_scaled_axis(Vector3::new(0.1, -0.7, 1.0 / 3.0));
+        let present = Isometry3::from_parts(Translation3::new(1.0 / 3.0, -0.2, 0.1), turned);
+        let ahead = [1.0, 0.0, 0.0, 0.0];
+        let moved = wrist_target(Some([0.3, -0.2, 0.15]), None, &present).unwrap();
+        assert_eq!(moved, Isometry3::from_parts(Translation3::new(0.3, -0.2, 0.15), turned));
+        let turned = wrist_target(None, Some(ahead), &present).unwrap();
+        assert_eq!(turned, Isometry3::from_parts(present.translation, UnitQuaternion::identity()));
+        assert_eq!(wrist_target(None, None, &present), None);
+        let both = wrist_target(Some([0.3, -0.2, 0.15]), Some(ahead), &present);
+        assert_eq!(both, Some(Isometry3::translation(0.3, -0.2, 0.15)));
+    }
+}

@@ -1,0 +1,167 @@
+//! How a robot did under an order that has just been executed.
+
+use nalgebra::Isometry3;
+use tandem_sim::{HAND_JOINTS, Pose, RobotState, Side, UPPER, Vector};
+use tandem_tools_spec::{BaseMotion, Effort, FingerReport, HandReport, HandState, RobotReport};
+
+use super::columns::{self, Clamped};
+use super::motion::{Motion, RobotSheet};
+use super::upper_body::REACH_TOLERANCE;
+use crate::convert::{isometry_from_sim, rounded, rounded_to, wire_pose, wire_pose_from_sim};
+
+/// A measured joint this near to its limit rests at it.
+const AT_LIMIT_RAD: f32 = 0.01;
+/// An arm of which a joint turns faster is on the way; a finger likewise.
+const ARM_MOVES_RAD_S: f32 = 0.05;
+const FINGER_MOVES_RAD_S: f32 = 0.2;
+/// Fingers that are free come this near to their targets.
+const FINGER_TOLERANCE_RAD: f64 = 0.06;
+
+/// What became of an order of which `clamped` was moved to limits, where the robot measures `state` after it; its own odometry had its
+/// pelvis at `began` before.
+pub fn report(clamped: &Clamped, began: &Pose, state: &RobotState, motion: &Motion) -> RobotReport {
+    let robot = &motion.robot;
+    RobotReport {
+        robot: robot.name.clone(),
+        left: hand_report(Side::Left, clamped, state, motion),
+        right: hand_report(Side::Right, clamped, state, motion),
+        pelvis_in_start: wire_pose_from_sim(&state.start_from_pelvis),
+        base_motion: base_motion(began, &state.start_from_pelvis),
+        waist_joints_clamped: names(
+            robot,
+            among(&clamped.columns, |column| columns::waist().contains(&column)),
+        ),
+        waist_joints_at_limit: names(
+            robot,
+            columns::waist().filter(|column| at_limit(*column, robot, state)),
+        ),
+        base_command_clamped: clamped.base.iter().map(|field| field.to_string()).collect(),
+    }
+}
+
+fn base_motion(began: &Pose, ended: &Pose) -> BaseMotion {
+    let ahead = began.rotation * Vector::X;
+    let ahead = Vector::new(ahead.x, ahead.y, 0.0).normalize_or(Vector::X);
+    let moved_m = ended.translation - began.translation;
+    let now_ahead = ended.rotation * Vector::X;
+    let across = Vector::Z.cross(ahead);
+    BaseMotion {
+        forward_m: rounded(moved_m.dot(ahead).into()),
+        left_m: rounded(moved_m.dot(across).into()),
+        up_m: rounded(moved_m.z.into()),
+        turned_rad: rounded(now_ahead.dot(across).atan2(now_ahead.dot(ahead)).into()),
+    }
+}
+
+/// How one hand did.
+fn hand_report(side: Side, clamped: &Clamped, state: &RobotState, motion: &Motion) -> HandReport {
+    let (arm, hand) = (columns::arm(side), columns::hand(side));
+    let target = motion.targets()[side];
+    let measured = isometry_from_sim(&state.pelvis_from_wrist[side]);
+    let missing = measured.inverse() * target;
+    let robot = &motion.robot;
+    let force_n = state.world_from_pelvis.rotation.inverse() * state.hand_force_n[side];
+    HandReport {
+        state: wrist_state(side, &target, &measured, state, motion),
+        target: wire_pose(&target),
+        measured: wire_pose(&measured),
+        position_error_m: rounded(missing.translation.vector.norm()),
+        orientation_error_rad: rounded(missing.rotation.angle()),
+        fingers: fingers(side, state, motion),
+        largest_effort: largest_effort(side, state, motion),
+        force_n: force_n.to_array().map(|part| rounded_to(2, part.into())),
+        joints_clamped: names(
+            robot,
+            among(&clamped.columns, |column| arm.contains(&column) || hand.contains(&column)),
+        ),
+        // A finger is at a limit whenever the hand is open; that says nothing about reach.
+        joints_at_limit: names(robot, arm.clone().filter(|column| at_limit(*column, robot, state))),
+    }
+}
+
+fn wrist_state(
+    side: Side,
+    target: &Isometry3<f64>,
+    measured: &Isometry3<f64>,
+    state: &RobotState,
+    motion: &Motion,
+) -> HandState {
+    let commanded = motion.commanded_wrists()[side];
+    if is_near(measured, target) {
+        HandState::Arrived
+    } else if columns::arm(side).any(|column| state.qd_rad_s[UPPER[column]].abs() > ARM_MOVES_RAD_S) {
+        HandState::Moving
+    } else if is_near(&commanded, target) {
+        HandState::Blocked
+    } else {
+        HandState::OutOfReach
+    }
+}
+
+fn is_near(wrist: &Isometry3<f64>, target: &Isometry3<f64>) -> bool {
+    let missing = wrist.inv_mul(target);
+    missing.translation.vector.norm() <= REACH_TOLERANCE.position_m
+        && missing.rotation.angle() <= REACH_TOLERANCE.orientation_rad
+}
+
+fn fingers(side: Side, state: &RobotState, motion: &Motion) -> FingerReport {
+    let first = columns::hand(side).start;
+    let joint = |finger: usize| UPPER[first + finger];
+    let target_rad: [f64; HAND_JOINTS] =
+        std::array::from_fn(|finger| motion.state().upper_rad[first + finger]);
+    let measured_rad: [f64; HAND_JOINTS] = std::array::from_fn(|finger| state.q_rad[joint(finger)].into());
+    let near = |finger: usize| (target_rad[finger] - measured_rad[finger]).abs() <= FINGER_TOLERANCE_RAD;
+    let moves = |finger: usize| state.qd_rad_s[joint(finger)].abs() > FINGER_MOVES_RAD_S;
+    let state = if (0..HAND_JOINTS).all(near) {
+        HandState::Arrived
+    } else if (0..HAND_JOINTS).any(moves) {
+        HandState::Moving
+    } else {
+        HandState::Blocked
+    };
+    let wire = |angles_rad: [f64; HAND_JOINTS]| angles_rad.map(|angle_rad| rounded_to(4, angle_rad));
+    FingerReport { state, target_rad: wire(target_rad), measured_rad: wire(measured_rad) }
+}
+
+fn largest_effort(side: Side, state: &RobotState, motion: &Motion) -> Effort {
+    let model = &motion.robot.model;
+    let share = |joint: usize| state.torque_n_m[joint].abs() / model.joints[joint].effort_n_m;
+    let joints = columns::arm(side).chain(columns::hand(side)).map(|column| UPPER[column]);
+    let hardest = joints.max_by(|one, other| share(*one).total_cmp(&share(*other)));
+    let hardest = hardest.unwrap_or(UPPER[columns::arm(side).start]);
+    Effort { joint: model.joints[hardest].name.clone(), share: rounded_to(3, share(hardest).into()) }
+}
+
+fn among(columns: &[usize], of_interest: impl Fn(usize) -> bool) -> impl Iterator<Item = usize> {
+    columns.iter().copied().filter(move |column| of_interest(*column))
+}
+
+fn at_limit(column: usize, robot: &RobotSheet, state: &RobotState) -> bool {
+    let joint = &robot.model.joints[UPPER[column]];
+    let q_rad = state.q_rad[UPPER[column]];
+    q_rad < joint.lower_rad + AT_LIMIT_RAD || q_rad > joint.upper_rad - AT_LIMIT_RAD
+}
+
+fn names(robot: &RobotSheet, columns: impl Iterator<Item = usize>) -> Vec<String> {
+    columns.map(|column| robot.model.joints[UPPER[column]].name.clone()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f32::consts::FRAC_PI_2;
+
+    use super::*;
+    use tandem_sim::Rotation;
+
+    #[test]
+    fn the_base_moves_as_seen_from_where_it_began() {
+        let at = |place_m: [f32; 3], heading_rad: f32| {
+            Pose::from_parts(place_m.into(), Rotation::from_rotation_z(heading_rad))
+        };
+        let motion = base_motion(&at([1.0, 2.0, 0.75], FRAC_PI_2), &at([0.9, 2.3, 0.7], FRAC_PI_2 + 0.4));
+        let found = [motion.forward_m, motion.left_m, motion.up_m, motion.turned_rad];
+        for (found, expected) in found.into_iter().zip([0.3, 0.1, -0.05, 0.4]) {
+            assert!((found - expected).abs() < 1e-5, "{motion:?}");
+        }
+    }
+}

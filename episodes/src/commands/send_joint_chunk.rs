@@ -1,0 +1,41 @@
+//! `send_joint_chunk`: one row of joint targets and base command per control step.
+
+use tandem_sim::{BaseCommand, UPPER_JOINTS};
+use tandem_tools_spec::JointChunk;
+
+use super::columns::{self, Clamped};
+use super::motion::Motion;
+
+/// One row per control step.
+pub struct JointTrajectory {
+    rows: Vec<JointRow>,
+}
+
+/// Joint targets and base command of one control step.
+struct JointRow {
+    upper_rad: [f64; UPPER_JOINTS],
+    base: BaseCommand,
+}
+
+impl JointTrajectory {
+    /// Has `motion` take up the rows of `chunk`.
+    pub fn begin(chunk: &JointChunk, motion: &mut Motion, clamped: &mut Clamped) -> JointTrajectory {
+        let row = |row: &Vec<f64>| {
+            let upper_rad =
+                std::array::from_fn(|column| clamped.joint(&motion.robot.model, column, row[column]));
+            let asked = columns::base_command(std::array::from_fn(|i| row[UPPER_JOINTS + i] as f32));
+            JointRow { upper_rad, base: clamped.base(&motion.robot.base_limits, asked) }
+        };
+        let rows = chunk.rows.iter().map(row).collect();
+        motion.keep_joints();
+        JointTrajectory { rows }
+    }
+
+    /// Control step `step`, counted from 1.
+    pub fn advance(&self, step: u32, motion: &mut Motion) {
+        let row = &self.rows[step as usize - 1];
+        motion.give_way(None);
+        motion.walk(row.base);
+        motion.set_joints(row.upper_rad);
+    }
+}

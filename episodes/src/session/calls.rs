@@ -1,0 +1,158 @@
+//! How calls reach an episode: what is refused before it counts, what is counted and recorded, and what the policy's clock does.
+
+use tandem_tools_spec::{
+    Call, EndReason, Formats, Look, ManageReply, Observation, Observe, ToolCall, ToolReply,
+};
+
+use super::Session;
+use super::answer::Answer;
+use crate::EpisodeError;
+use crate::commands::{Called, Command, OperatorCall, OperatorCommand, RobotOrder};
+use crate::observation::TeamObservation;
+use crate::recording::CallOutcome;
+
+/// What a call comes to.
+#[derive(Clone, Debug)]
+pub struct CallReply {
+    pub reply: ToolReply,
+    /// What was seen after a command that asked for it.
+    pub observation: Option<Observation>,
+}
+
+impl Session {
+    /// Answers a tool call of the policy that directs all robots. An error changes nothing but the count of calls. The call that ends
+    /// the episode, and no later one, is counted and recorded, and closes the files.
+    pub fn call(&mut self, call: ToolCall) -> Result<ToolReply, EpisodeError> {
+        self.make(None, &call.into())
+    }
+
+    /// As [`Session::call`], with all that may go with a call, by the operator of a robot or by the policy of all. A call that was
+    /// made for another step, or whose look afterwards could not be had, is refused before it counts.
+    pub fn ask(&mut self, operator: Option<&str>, mut call: Call) -> Result<CallReply, EpisodeError> {
+        self.check_around(&call)?;
+        call.expected_step = None;
+        let then = call.then.take();
+        let reply = self.make(operator, &Called::One(call))?;
+        Ok(CallReply { reply, observation: self.look_after(operator, then)? })
+    }
+
+    /// As [`Session::call`] of `observe`, for a policy in this process: with views as they were drawn.
+    pub fn observe(&mut self, observe: &Observe) -> Result<TeamObservation, EpisodeError> {
+        let look = Look { observe: observe.clone(), formats: Formats::default() };
+        let seen = self.look_once(None, &look);
+        self.let_think();
+        seen
+    }
+
+    /// Reads an operator's command, which [`Session::together`] executes when those of others are there, too. A refusal is counted and
+    /// recorded as that of any call.
+    pub fn read_command(&mut self, call: OperatorCall) -> Result<OperatorCommand, EpisodeError> {
+        self.check_around(call.call())?;
+        let order = self.expect_underway().and_then(|()| call.order(&self.rules, &self.motions));
+        let refusal = match order {
+            Ok(order) => return Ok(OperatorCommand { call, order }),
+            Err(refusal) => refusal,
+        };
+        let underway = self.arrived();
+        let operator = call.robot().to_owned();
+        let called = Called::Together(vec![call]);
+        self.came_out(underway, Some(&operator), &called, CallOutcome::refused(&refusal));
+        self.let_think();
+        Err(refusal)
+    }
+
+    /// Executes the commands of several operators side by side, and looks for each what it wants to see then.
+    pub fn together(&mut self, commands: Vec<OperatorCommand>) -> Result<Vec<CallReply>, EpisodeError> {
+        let (mut calls, orders): (Vec<OperatorCall>, Vec<RobotOrder>) =
+            commands.into_iter().map(|command| (command.call, command.order)).unzip();
+        let looks: Vec<(String, Option<Look>)> =
+            calls.iter_mut().map(|call| (call.robot().to_owned(), call.take_look())).collect();
+        let called = Called::Together(calls);
+        let underway = self.arrived();
+        let answer = self.expect_underway().and_then(|()| self.act(&Command::together(orders)));
+        self.came_out(underway, None, &called, CallOutcome::of(&answer));
+        self.let_think();
+        let reply = answer?.reply(&called)?;
+        let replies = looks.into_iter().map(|(robot, look)| {
+            Ok(CallReply { reply: reply.clone(), observation: self.look_after(Some(&robot), look)? })
+        });
+        replies.collect()
+    }
+
+    /// Makes a call with nothing around it.
+    pub(super) fn make(
+        &mut self,
+        operator: Option<&str>,
+        called: &Called,
+    ) -> Result<ToolReply, EpisodeError> {
+        let underway = self.arrived();
+        let mut answer = self.answer(called);
+        self.came_out(underway, operator, called, CallOutcome::of(&answer));
+        if let Ok(Answer::Reply(ToolReply::Manage(ManageReply::Finish(reply)))) = &mut answer {
+            // Closing the files may have failed, which the reply has to say.
+            *reply = self.result().told(self.spec().disclosure);
+        }
+        let reply = answer.and_then(|answer| answer.reply(called));
+        self.let_think();
+        reply
+    }
+
+    /// Whether the episode stands where a call expects it, and what it wants to see afterwards can be seen.
+    fn check_around(&self, call: &Call) -> Result<(), EpisodeError> {
+        let now = self.env_steps();
+        if let Some(expected) = call.expected_step.filter(|expected| *expected != now) {
+            return Err(EpisodeError::OtherStep { expected, now });
+        }
+        call.then.as_ref().map_or(Ok(()), |look| self.check_look(look))
+    }
+
+    /// Looks after a command, if that was asked for: a call of its own.
+    fn look_after(
+        &mut self,
+        operator: Option<&str>,
+        look: Option<Look>,
+    ) -> Result<Option<Observation>, EpisodeError> {
+        let Some(look) = look else { return Ok(None) };
+        let seen = self.look_once(operator, &look);
+        let observation = seen.and_then(|seen| Ok(seen.reply(&look.formats)?));
+        self.let_think();
+        observation.map(Some)
+    }
+
+    fn look_once(&mut self, operator: Option<&str>, look: &Look) -> Result<TeamObservation, EpisodeError> {
+        let underway = self.arrived();
+        let call = Call::from(look.clone());
+        let valid = call.validate().map_err(EpisodeError::from);
+        let seen = valid.and_then(|()| self.seen(&look.observe, &look.formats));
+        self.came_out(underway, operator, &Called::One(call), CallOutcome::of(&seen));
+        seen
+    }
+
+    /// A call has arrived. Returns whether it is one of the episode's.
+    fn arrived(&mut self) -> bool {
+        self.clock.pause();
+        if self.ended.is_none() && self.clock.exhausted() {
+            self.ended = Some(EndReason::WallClockExhausted);
+        }
+        let underway = self.result.is_none();
+        self.tool_calls += u32::from(underway);
+        underway
+    }
+
+    /// A call has come out: records it, and closes the files if it has ended the episode.
+    fn came_out(&mut self, underway: bool, operator: Option<&str>, called: &Called, outcome: CallOutcome) {
+        if let (true, Some(files)) = (underway, &mut self.files) {
+            files.tool_call(self.present.time_s, self.clock.spent(), operator, called, outcome);
+        }
+        if self.ended.is_some() {
+            self.settle();
+        }
+    }
+
+    /// The policy's clock goes on, unless the episode has ended.
+    pub(super) fn let_think(&mut self) {
+        if self.ended.is_none() {
+            self.clock.resume();
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! A session that a panic ends, and nothing but it. What it does is counted in the metrics.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::time::Duration;
+
+use tandem_episodes::Session;
+use tandem_tools_spec::{EndReason, ResultReply};
+
+use super::HostingError;
+use crate::metrics::Metrics;
+
+/// A session, until it has panicked.
+pub struct PanicGuard {
+    state: GuardState,
+    metrics: EpisodeMetrics,
+}
+
+enum GuardState {
+    Sound(Box<Session>),
+    /// After a panic the world may be anything, and nobody looks at it again. The result is of what could be closed.
+    Panicked(Option<ResultReply>),
+}
+
+impl PanicGuard {
+    /// A session whose work is counted by `metrics`.
+    pub fn new(session: Session, mut metrics: EpisodeMetrics) -> PanicGuard {
+        metrics.begin(&session);
+        PanicGuard { state: GuardState::Sound(Box::new(session)), metrics }
+    }
+
+    /// Lets the session do `work`. A panic ends the episode: its recording is closed, and this and every later work is refused.
+    pub fn run<T>(&mut self, work: impl FnOnce(&mut Session) -> T) -> Result<T, HostingError> {
+        let GuardState::Sound(session) = &mut self.state else { return Err(HostingError::EpisodePanicked) };
+        match catch_unwind(AssertUnwindSafe(|| work(session))) {
+            Ok(done) => {
+                self.metrics.count(session);
+                Ok(done)
+            }
+            Err(panic) => {
+                self.after(panic);
+                Err(HostingError::EpisodePanicked)
+            }
+        }
+    }
+
+    /// Whether the episode takes no more commands.
+    pub fn ended(&self) -> bool {
+        match &self.state {
+            GuardState::Sound(session) => session.ended().is_some(),
+            GuardState::Panicked(_) => true,
+        }
+    }
+
+    /// How long the policy has thought, up to its last call; nothing that is known after a panic.
+    pub fn thought(&self) -> Duration {
+        match &self.state {
+            GuardState::Sound(session) => session.thought(),
+            GuardState::Panicked(_) => Duration::ZERO,
+        }
+    }
+
+    /// Why the recording is not complete, if it is not.
+    pub fn recording_failed(&self) -> Option<&str> {
+        match &self.state {
+            GuardState::Sound(session) => session.recording_failed(),
+            GuardState::Panicked(result) => result.as_ref()?.recording_failed.as_deref(),
+        }
+    }
+
+    /// Ends the episode and closes its recording.
+    pub fn close(mut self) -> Result<ResultReply, HostingError> {
+        match self.state {
+            GuardState::Sound(session) => {
+                let result = closed(|| session.close()).map_err(|panic| {
+                    tracing::error!(panic = text(&*panic), "not closed");
+                    HostingError::EpisodePanicked
+                });
+                let reason = result.as_ref().map_or(EndReason::SimulatorFailed, |result| result.ended);
+                self.metrics.end(reason);
+                result
+            }
+            GuardState::Panicked(result) => result.ok_or(HostingError::EpisodePanicked),
+        }
+    }
+
+    fn after(&mut self, panic: Box<dyn Any + Send>) {
+        tracing::error!(panic = text(&*panic), "the simulator panicked; this episode ends");
+        self.metrics.end(EndReason::SimulatorFailed);
+        let GuardState::Sound(session) = std::mem::replace(&mut self.state, GuardState::Panicked(None))
+        else {
+            return;
+        };
+        // The broken world may panic once more under way; what is flushed by then can be read nevertheless.
+        match closed(|| session.close_failed()) {
+            Ok(result) => self.state = GuardState::Panicked(Some(result)),
+            Err(panic) => tracing::error!(panic = text(&*panic), "not closed"),
+        }
+    }
+}
+
+/// What the metrics have been told of one episode so far.
+#[derive(Debug)]
+pub struct EpisodeMetrics {
+    metrics: Arc<Metrics>,
+    control_steps: u64,
+    physics: Duration,
+    ended: bool,
+}
+
+impl EpisodeMetrics {
+    /// An episode that has not begun.
+    pub fn new(metrics: Arc<Metrics>) -> EpisodeMetrics {
+        EpisodeMetrics { metrics, control_steps: 0, physics: Duration::ZERO, ended: false }
+    }
+
+    /// The episode has begun, and may have held still for a while.
+    pub fn begin(&mut self, session: &Session) {
+        self.metrics.episode_started();
+        self.count(session);
+    }
+
+    /// Counts what the session has done since it was last counted.
+    pub fn count(&mut self, session: &Session) {
+        let (control_steps, physics) = (session.present().control_step, session.physics());
+        let since = control_steps.saturating_sub(self.control_steps);
+        self.metrics.simulated(since, physics.saturating_sub(self.physics));
+        (self.control_steps, self.physics) = (control_steps, physics);
+        if let Some(reason) = session.ended() {
+            self.end(reason);
+        }
+    }
+
+    /// The episode has ended, which counts once.
+    pub fn end(&mut self, reason: EndReason) {
+        if !self.ended {
+            self.ended = true;
+            self.metrics.episode_ended(reason);
+        }
+    }
+}
+
+fn closed(close: impl FnOnce() -> ResultReply) -> Result<ResultReply, Box<dyn Any + Send>> {
+    catch_unwind(AssertUnwindSafe(close))
+}
+
+fn text(panic: &(dyn Any + Send)) -> &str {
+    let owned = panic.downcast_ref::<String>().map(String::as_str);
+    owned.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no text")
+}

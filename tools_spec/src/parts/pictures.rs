@@ -1,0 +1,175 @@
+//! Pictures as JSON and MessagePack carry them, in which form they come to programs, and how pixels of them are named.
+
+use base64::{Engine, prelude::BASE64_STANDARD};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize, de::Error as _};
+
+use crate::limits;
+
+/// How the pictures of an observation are to come.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Formats {
+    /// "png", or "rgb" for the bytes of each pixel row by row, which come in `arrays` then. Null: "png".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub images: Option<ImageFormat>,
+    /// Depth along the optical axis at every pixel, in `arrays`: "float16" for little-endian numbers in metres, infinite where
+    /// nothing is; "png16" for a PNG of 16 bits in millimetres, 0 where nothing is. Under the benchmark protocol only. Null: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth: Option<DepthFormat>,
+}
+
+impl Formats {
+    /// The fields, as JSON names them.
+    pub const FIELDS: [&str; 2] = ["images", "depth"];
+}
+
+/// How colours come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ImageFormat {
+    /// A PNG file.
+    Png,
+    /// Three bytes a pixel.
+    Rgb,
+}
+
+/// How depth comes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DepthFormat {
+    /// Numbers of half precision, in metres.
+    Float16,
+    /// A PNG file, in millimetres.
+    Png16,
+}
+
+/// A PNG file; base64 in JSON, bytes as they are in MessagePack.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Png(pub Vec<u8>);
+
+impl Png {
+    /// The file as base64, as JSON and MCP carry it.
+    pub fn to_base64(&self) -> String {
+        BASE64_STANDARD.encode(&self.0)
+    }
+}
+
+impl Serialize for Png {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match serializer.is_human_readable() {
+            true => serializer.serialize_str(&self.to_base64()),
+            false => serializer.serialize_bytes(&self.0),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Png {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        BASE64_STANDARD.decode(String::deserialize(deserializer)?).map(Png).map_err(D::Error::custom)
+    }
+}
+
+impl JsonSchema for Png {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Png".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({ "type": "string", "contentEncoding": "base64", "contentMediaType": "image/png" })
+    }
+}
+
+/// Bytes: base64 in JSON, bytes as they are in MessagePack.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bytes(pub Vec<u8>);
+
+impl Serialize for Bytes {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match serializer.is_human_readable() {
+            true => serializer.serialize_str(&BASE64_STANDARD.encode(&self.0)),
+            false => serializer.serialize_bytes(&self.0),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Bytes {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        BASE64_STANDARD.decode(String::deserialize(deserializer)?).map(Bytes).map_err(D::Error::custom)
+    }
+}
+
+impl JsonSchema for Bytes {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Bytes".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({ "type": "string", "contentEncoding": "base64" })
+    }
+}
+
+/// What one camera saw, pixel by pixel, row by row from the top left. Its size is that of its calibration.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CameraArrays {
+    /// The robot whose head camera it is.
+    pub robot: String,
+    /// Three bytes a pixel, red, green, blue, where `images` was "rgb". Base64 in JSON.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rgb: Option<Bytes>,
+    /// Distances along the optical axis in metres, little-endian numbers of half precision, infinite where nothing is; where
+    /// `depth` was "float16". Base64 in JSON.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_float16: Option<Bytes>,
+    /// The same in millimetres as a PNG of 16 bits, 0 where nothing is or it is further than 65.535 m; where `depth` was "png16".
+    /// Base64 in JSON.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_png16: Option<Bytes>,
+}
+
+/// Every so many pixels of a rectangle, beginning at `from`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PixelRegion {
+    /// Its top left pixel [u, v], as [100, 80].
+    #[schemars(extend("prefixItems" = limits::pixel_range()))]
+    pub from: [i64; 2],
+    /// Its bottom right pixel [u, v], as [220, 170].
+    #[schemars(extend("prefixItems" = limits::pixel_range()))]
+    pub to: [i64; 2],
+    /// 1 for every pixel, 10 for every tenth one across and down.
+    #[schemars(range(min = 1, max = u32::MAX))]
+    pub stride: u32,
+}
+
+impl PixelRegion {
+    /// How many pixels it names with another stride, which is not zero.
+    pub(crate) fn count(&self, stride: u32) -> u128 {
+        let along = |axis: usize| u128::from(self.from[axis].abs_diff(self.to[axis]) / u64::from(stride)) + 1;
+        along(0).saturating_mul(along(1))
+    }
+
+    /// The pixels that it names, row by row. Count them first.
+    pub(crate) fn pixels(&self) -> Vec<[i64; 2]> {
+        let along = |axis: usize| {
+            let ends = [self.from[axis].min(self.to[axis]), self.from[axis].max(self.to[axis])];
+            (ends[0]..=ends[1]).step_by(self.stride.max(1) as usize)
+        };
+        along(1).flat_map(|v| along(0).map(move |u| [u, v])).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn the_fields_are_those_of_the_type() {
+        let formats = Formats { images: Some(ImageFormat::Png), depth: Some(DepthFormat::Png16) };
+        let written = json!(formats);
+        let names: Vec<&String> = written.as_object().into_iter().flatten().map(|(name, _)| name).collect();
+        assert_eq!(names, Formats::FIELDS);
+        assert_eq!(written, json!({ "images": "png", "depth": "png16" }));
+    }
+}
