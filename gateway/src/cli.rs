@@ -12,12 +12,12 @@ use crate::commands::{
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
-    command: Command,
+    command: CliCommand,
 }
 
 /// What `tandem` can do. The help text of each is the doc comment of its flags.
 #[derive(Debug, Subcommand)]
-enum Command {
+enum CliCommand {
     Serve(serve::ServeArgs),
     Demo(demo::DemoArgs),
     Evaluate(evaluate::EvaluateArgs),
@@ -35,17 +35,17 @@ impl Cli {
     /// Runs the subcommand that the command line names.
     pub fn run(self) -> CommandResult {
         match self.command {
-            Command::Serve(args) => serve::run(args),
-            Command::Demo(args) => demo::run(args),
-            Command::Evaluate(args) => evaluate::run(args),
-            Command::Collect(args) => collect::run(args),
-            Command::Locomotion(args) => locomotion::run(args),
-            Command::Tasks(args) => tasks::run(args),
-            Command::Recover(args) => recover::run(args),
-            Command::Replay(args) => replay::run(args),
-            Command::Report(args) => report::run(args),
-            Command::Bench(args) => bench::run(args),
-            Command::Doctor(args) => doctor::run(args),
+            CliCommand::Serve(args) => serve::run(args),
+            CliCommand::Demo(args) => demo::run(args),
+            CliCommand::Evaluate(args) => evaluate::run(args),
+            CliCommand::Collect(args) => collect::run(args),
+            CliCommand::Locomotion(args) => locomotion::run(args),
+            CliCommand::Tasks(args) => tasks::run(args),
+            CliCommand::Recover(args) => recover::run(args),
+            CliCommand::Replay(args) => replay::run(args),
+            CliCommand::Report(args) => report::run(args),
+            CliCommand::Bench(args) => bench::run(args),
+            CliCommand::Doctor(args) => doctor::run(args),
         }
     }
 }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tandem_tools_spec::{ActCall, Call, Look, SpecError, ToolCall};
 
-use super::{Action, Command, Motion, RobotOrder, find};
+use super::{Command, Motion, RobotAction, RobotOrder, find};
 use crate::EpisodeError;
 use crate::protocol::Rules;
 
@@ -28,7 +28,7 @@ pub struct OperatorCall {
 /// A command of an operator that the episode has read, and will execute together with those of others.
 #[derive(Clone, Debug)]
 pub struct OperatorCommand {
-    /// The call, less the step at which it was expected.
+    /// The call, as a recording will hold it.
     pub(crate) call: OperatorCall,
     pub(crate) order: RobotOrder,
 }
@@ -130,7 +130,7 @@ impl OperatorCall {
         let robot = find(&self.robot, motions)?;
         let Command { steps, orders } = Command::read(self.command()?, rules, motions)?;
         let own = orders.into_iter().find(|order| order.robot == robot);
-        Ok(own.unwrap_or(RobotOrder { robot, steps, action: Action::Wait }))
+        Ok(own.unwrap_or(RobotOrder { robot, steps, action: RobotAction::Wait }))
     }
 
     fn command(&self) -> Result<&ActCall, SpecError> {

@@ -33,7 +33,7 @@ use walk::WalkTrajectory;
 #[derive(Clone, Debug)]
 pub struct Command {
     pub steps: u32,
-    /// At most one for a robot. These robots are reported on, in this order.
+    /// One order at most for each robot. The robots are reported on in this order.
     pub orders: Vec<RobotOrder>,
 }
 
@@ -43,12 +43,12 @@ pub struct RobotOrder {
     pub robot: usize,
     /// Control steps that the order is made for. Where the command is shorter, only the order's beginning is executed.
     pub steps: u32,
-    pub action: Action,
+    pub action: RobotAction,
 }
 
 /// What is asked of one robot, as the arguments of a tool say it.
 #[derive(Clone, Debug)]
-pub enum Action {
+pub enum RobotAction {
     MoveWrists(Box<WristMove>),
     Walk(WalkMove),
     SendJointChunk(JointChunk),
@@ -68,7 +68,7 @@ impl Command {
     /// Reads a call for the robots that `motions` move. Either all of it is in order, or none of it becomes a command.
     pub fn read(call: &ActCall, rules: &Rules, motions: &[Motion]) -> Result<Command, EpisodeError> {
         let steps = rules.steps(call.steps())?;
-        let order = |(name, action): (&str, Action)| {
+        let order = |(name, action): (&str, RobotAction)| {
             find(name, motions).map(|robot| RobotOrder { robot, steps, action })
         };
         let orders = actions(call, motions).into_iter().map(order).collect::<Result<_, _>>()?;
@@ -89,17 +89,17 @@ impl Command {
 
 impl Trajectory {
     /// Has `motion` take up `action`, which is to be done within `steps` control steps. Also says what of it was clamped.
-    pub fn begin(action: &Action, steps: u32, motion: &mut Motion) -> (Trajectory, Clamped) {
+    pub fn begin(action: &RobotAction, steps: u32, motion: &mut Motion) -> (Trajectory, Clamped) {
         let mut clamped = Clamped::default();
         let trajectory = match action {
-            Action::MoveWrists(entry) => {
+            RobotAction::MoveWrists(entry) => {
                 Trajectory::Wrists(WristTrajectory::begin(entry, steps, motion, &mut clamped).into())
             }
-            Action::Walk(entry) => Trajectory::Walk(WalkTrajectory::begin(entry, motion, &mut clamped)),
-            Action::SendJointChunk(chunk) => {
+            RobotAction::Walk(entry) => Trajectory::Walk(WalkTrajectory::begin(entry, motion, &mut clamped)),
+            RobotAction::SendJointChunk(chunk) => {
                 Trajectory::Joints(JointTrajectory::begin(chunk, motion, &mut clamped))
             }
-            Action::Wait => Trajectory::Hold,
+            RobotAction::Wait => Trajectory::Hold,
         };
         (trajectory, clamped)
     }
@@ -117,22 +117,25 @@ impl Trajectory {
 }
 
 /// What a call asks of each robot that it is about, by the robot's name.
-fn actions<'a>(call: &'a ActCall, motions: &'a [Motion]) -> Vec<(&'a str, Action)> {
+fn actions<'a>(call: &'a ActCall, motions: &'a [Motion]) -> Vec<(&'a str, RobotAction)> {
     match call {
         ActCall::MoveWrists(args) => {
-            let action =
-                |entry: &'a WristMove| (entry.robot.as_str(), Action::MoveWrists(Box::new(entry.clone())));
+            let action = |entry: &'a WristMove| {
+                (entry.robot.as_str(), RobotAction::MoveWrists(Box::new(entry.clone())))
+            };
             args.robots.iter().map(action).collect()
         }
         ActCall::Walk(args) => {
-            args.robots.iter().map(|entry| (entry.robot.as_str(), Action::Walk(entry.clone()))).collect()
+            args.robots.iter().map(|entry| (entry.robot.as_str(), RobotAction::Walk(entry.clone()))).collect()
         }
         ActCall::SendJointChunk(args) => {
             let action =
-                |chunk: &'a JointChunk| (chunk.robot.as_str(), Action::SendJointChunk(chunk.clone()));
+                |chunk: &'a JointChunk| (chunk.robot.as_str(), RobotAction::SendJointChunk(chunk.clone()));
             args.robots.iter().map(action).collect()
         }
-        ActCall::Wait(_) => motions.iter().map(|motion| (motion.robot.name.as_str(), Action::Wait)).collect(),
+        ActCall::Wait(_) => {
+            motions.iter().map(|motion| (motion.robot.name.as_str(), RobotAction::Wait)).collect()
+        }
     }
 }
 

@@ -169,7 +169,7 @@ impl Motion {
         self.state.aims = aims;
     }
 
-    /// From now on the arms keep their joints.
+    /// Both arms keep their joints until they are told otherwise.
     pub(super) fn keep_joints(&mut self) {
         self.aim(Sides::both(Aim::Joints));
     }

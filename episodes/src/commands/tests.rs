@@ -25,7 +25,7 @@ fn standing() -> Motion {
 }
 
 /// What `entry` asks of A, in one command of 50 steps.
-fn action(entry: WristMove, motion: &Motion) -> Action {
+fn action(entry: WristMove, motion: &Motion) -> RobotAction {
     let rules = rules(Protocol::Benchmark, tasks::find("handover").unwrap());
     let ToolCall::Act(call) = MoveWrists { steps: 50, robots: vec![entry] }.into() else { panic!("a look") };
     let command = Command::read(&call, &rules, std::slice::from_ref(motion)).unwrap();
@@ -33,12 +33,12 @@ fn action(entry: WristMove, motion: &Motion) -> Action {
 }
 
 /// Plays 50 steps, in each of which the pelvis moves by `pelvis_step_m`.
-fn play(action: Action, pelvis_step_m: Vector3<f64>, motion: &mut Motion) {
+fn play(action: RobotAction, pelvis_step_m: Vector3<f64>, motion: &mut Motion) {
     play_pulled(action, pelvis_step_m, Vector3::zeros(), motion);
 }
 
 /// As [`play`], while the hands feel `hands_n`.
-fn play_pulled(action: Action, pelvis_step_m: Vector3<f64>, hands_n: Vector3<f64>, motion: &mut Motion) {
+fn play_pulled(action: RobotAction, pelvis_step_m: Vector3<f64>, hands_n: Vector3<f64>, motion: &mut Motion) {
     let (trajectory, _) = Trajectory::begin(&action, 50, motion);
     for step in 1..=50 {
         trajectory.command(step, motion);
@@ -65,7 +65,7 @@ fn arrived() -> Motion {
     let mut motion = standing();
     let goal = action(right_hand(false), &motion);
     play(goal, Vector3::zeros(), &mut motion);
-    play(Action::Wait, Vector3::zeros(), &mut motion);
+    play(RobotAction::Wait, Vector3::zeros(), &mut motion);
     motion
 }
 
@@ -76,12 +76,12 @@ fn a_hand_stays_in_the_world_under_a_moving_pelvis_until_it_is_out_of_reach() {
     assert!((there_m - Vector3::new(0.28, -0.24, 1.0)).norm() < 1e-3, "{there_m}");
     let back = |distance_m: f64| Vector3::new(-distance_m / 50.0, 0.0, 0.0);
     for distance_m in [0.01, -0.02, 0.06] {
-        play(Action::Wait, back(distance_m), &mut motion);
+        play(RobotAction::Wait, back(distance_m), &mut motion);
         let off_m = (wrist_in_world_m(&motion) - there_m).norm();
         // Inverse kinematics comes two control steps after the pelvis.
         assert!(off_m < 5e-3, "{off_m} m off after {distance_m} m back");
     }
-    play(Action::Wait, back(0.6), &mut motion);
+    play(RobotAction::Wait, back(0.6), &mut motion);
     let off_m = (wrist_in_world_m(&motion) - there_m).norm();
     assert!(off_m > 0.1, "{off_m} m off, with the arm's length between pelvis and target");
 }
@@ -115,7 +115,7 @@ fn hands_give_way_as_they_were_told_to_and_come_back() {
         let goal = action(entry, &motion);
         play_pulled(goal, Vector3::zeros(), hands_n, &mut motion);
         assert!(off_m(&motion).norm() < 1e-3, "{} under {hands_n}", off_m(&motion));
-        play(Action::Wait, Vector3::zeros(), &mut motion);
+        play(RobotAction::Wait, Vector3::zeros(), &mut motion);
     }
     // 10 N for a second, at 1 m/s for 250 N: 4 cm, less what creeps back and what the hand is behind.
     let goal = action(soft(), &motion);
@@ -125,8 +125,8 @@ fn hands_give_way_as_they_were_told_to_and_come_back() {
     let goal = action(soft(), &motion);
     play_pulled(goal, Vector3::zeros(), 3.0 * ahead_n, &mut motion);
     assert!((0.058..0.0605).contains(&off_m(&motion).x), "{}", off_m(&motion));
-    play(Action::Wait, Vector3::zeros(), &mut motion);
-    play(Action::Wait, Vector3::zeros(), &mut motion);
+    play(RobotAction::Wait, Vector3::zeros(), &mut motion);
+    play(RobotAction::Wait, Vector3::zeros(), &mut motion);
     assert!(off_m(&motion).norm() < 1e-3, "{}", off_m(&motion));
 }
 
@@ -146,7 +146,7 @@ fn an_arm_without_a_target_keeps_its_joints() {
     let mut walking = arrived();
     let walk =
         WalkMove { robot: "A".into(), vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m: None };
-    play(Action::Walk(walk), Vector3::new(0.002, 0.0, 0.0), &mut walking);
+    play(RobotAction::Walk(walk), Vector3::new(0.002, 0.0, 0.0), &mut walking);
     assert_eq!(walking.state().upper_rad, before_rad);
 }
 

@@ -19,7 +19,7 @@ pub enum Answer {
 }
 
 impl Answer {
-    /// As the one who called is told it.
+    /// The reply that the caller gets, with views encoded as it asked for them.
     pub fn reply(self, called: &Called) -> Result<ToolReply, EpisodeError> {
         let formats = match called {
             Called::One(call) => call.formats,

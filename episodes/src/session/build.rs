@@ -175,7 +175,7 @@ fn try_scene(
 /// Where something of the task is.
 #[derive(Clone)]
 struct Place {
-    /// For messages.
+    /// What messages call it.
     name: String,
     /// The site of a scene that places it.
     site: String,

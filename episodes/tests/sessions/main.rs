@@ -7,6 +7,7 @@ mod common;
 mod endings;
 mod films;
 mod hands;
+mod operators;
 mod recordings;
 mod replays;
 mod scenes;

@@ -35,34 +35,34 @@ enum Job {
         /// The robot whose operator calls; `None` where one policy directs all.
         operator: Option<String>,
         call: Box<Call>,
-        reply: Reply<Answer>,
+        reply: ReplySender<Answer>,
     },
     ReadCommand {
         call: Box<OperatorCall>,
-        reply: Reply<OperatorCommand>,
+        reply: ReplySender<OperatorCommand>,
     },
     Together {
         commands: Vec<OperatorCommand>,
-        reply: Reply<Vec<Answer>>,
+        reply: ReplySender<Vec<Answer>>,
     },
     Status {
-        reply: Reply<Answer>,
+        reply: ReplySender<Answer>,
     },
     Briefing {
-        reply: Reply<Briefing>,
+        reply: ReplySender<Briefing>,
     },
     Facts {
-        reply: Reply<Facts>,
+        reply: ReplySender<Facts>,
     },
     EndIfAbandoned {
         idle: Duration,
     },
     Close {
-        reply: Reply<ResultReply>,
+        reply: ReplySender<ResultReply>,
     },
 }
 
-type Reply<T> = oneshot::Sender<Result<T, HostingError>>;
+type ReplySender<T> = oneshot::Sender<Result<T, HostingError>>;
 
 /// A running episode. Dropping the last handle ends the episode and closes its recording.
 #[derive(Debug)]
@@ -84,7 +84,7 @@ struct SharedStatus {
 }
 
 impl SharedStatus {
-    /// As `session` stands.
+    /// Takes over how `session` stands.
     fn update(&self, session: &PanicGuard) {
         self.ended.store(session.ended(), Ordering::Relaxed);
         self.thought.store(session.thought().as_nanos() as u64, Ordering::Relaxed);
@@ -225,14 +225,14 @@ impl EpisodeThread {
     }
 
     /// Has the thread do a job, unless too many wait already.
-    async fn do_job<T>(&self, job: impl FnOnce(Reply<T>) -> Job) -> Result<T, HostingError> {
+    async fn do_job<T>(&self, job: impl FnOnce(ReplySender<T>) -> Job) -> Result<T, HostingError> {
         let (reply, answer) = oneshot::channel();
         self.send(job(reply))?;
         answer.await.map_err(|_| HostingError::EpisodeStopped)?
     }
 
     /// Has the thread do a job, however many wait.
-    async fn do_job_in_turn<T>(&self, job: impl FnOnce(Reply<T>) -> Job) -> Result<T, HostingError> {
+    async fn do_job_in_turn<T>(&self, job: impl FnOnce(ReplySender<T>) -> Job) -> Result<T, HostingError> {
         let (reply, answer) = oneshot::channel();
         self.jobs.send(job(reply)).await.map_err(|_| HostingError::EpisodeStopped)?;
         answer.await.map_err(|_| HostingError::EpisodeStopped)?
@@ -257,7 +257,7 @@ fn open_session(
 }
 
 /// Who asked for the end, and what they are to be told once the place is free.
-struct Closed(Option<(Reply<ResultReply>, Result<ResultReply, HostingError>)>);
+struct Closed(Option<(ReplySender<ResultReply>, Result<ResultReply, HostingError>)>);
 
 impl Closed {
     fn answer(self) {

@@ -38,7 +38,7 @@ type SharedStart = Result<StartReply, Arc<HostingError>>;
 #[derive(Debug, Default)]
 struct HeldEpisodes {
     episodes: BTreeMap<String, HostedEpisode>,
-    /// From here on nothing is added.
+    /// Whether the server goes down, and no episode is added any more.
     closing: bool,
 }
 

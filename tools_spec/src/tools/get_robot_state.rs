@@ -1,4 +1,4 @@
-//! `get_robot_state`: proprioception of one robot. `episodes/src/session/answer.rs` answers it.
+//! `get_robot_state`: proprioception of one robot. `episodes/src/observation/proprioception.rs` answers it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

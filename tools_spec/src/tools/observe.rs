@@ -1,4 +1,4 @@
-//! `observe`: what the robots see and feel. `episodes/src/session/answer.rs` answers it.
+//! `observe`: what the robots see and feel. `episodes/src/observation/observer.rs` answers it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, ser::SerializeStruct};

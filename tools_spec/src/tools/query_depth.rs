@@ -1,4 +1,5 @@
-//! `query_depth`: how far away the thing at a pixel is, and where that is for the robot's hands. `episodes/src/session/answer.rs` answers it.
+//! `query_depth`: how far away the thing at a pixel is, and where that is for the robot's hands.
+//! `episodes/src/observation/observer.rs` answers it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,5 @@
-//! `say`: operators of one episode talk. Offered only in an episode that was started so. `gateway/src/hosting/team/` lets the others
-//! hear it.
+//! `say`: operators of one episode talk. Offered only in an episode that was started so. `gateway/src/hosting/team/` lets the
+//! others hear it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

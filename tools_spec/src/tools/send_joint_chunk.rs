@@ -1,4 +1,5 @@
-//! `send_joint_chunk`: the command of learned policies, one row of joint targets per control step. `episodes/src/commands/send_joint_chunk.rs` carries it out.
+//! `send_joint_chunk`: the command of learned policies, one row of joint targets per control step.
+//! `episodes/src/commands/send_joint_chunk.rs` carries it out.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -13,7 +13,7 @@ const MOST_UNHEARD: usize = 32;
 #[derive(Debug)]
 pub struct Round {
     operators: Vec<Operator>,
-    /// Of the step that is made next.
+    /// Counts the steps that have been made.
     number: u64,
     /// Ends the patience that is running.
     patience: Option<AbortHandle>,
@@ -22,14 +22,14 @@ pub struct Round {
 #[derive(Debug)]
 struct Operator {
     robot: String,
-    state: State,
+    state: OperatorState,
     /// Steps through which its robot was held without it knowing.
     missed: Option<[u32; 2]>,
     heard: Vec<Heard>,
 }
 
 #[derive(Debug)]
-enum State {
+enum OperatorState {
     Thinking,
     /// Has commanded; the step is not yet made.
     Waiting(Box<Pending>),
@@ -51,7 +51,8 @@ pub struct Pending {
 impl Round {
     /// The first one, of the operators of `robots`.
     pub fn new(robots: Vec<String>) -> Round {
-        let operator = |robot| Operator { robot, state: State::Thinking, missed: None, heard: Vec::new() };
+        let operator =
+            |robot| Operator { robot, state: OperatorState::Thinking, missed: None, heard: Vec::new() };
         Round { operators: robots.into_iter().map(operator).collect(), number: 0, patience: None }
     }
 
@@ -65,12 +66,12 @@ impl Round {
         let operator = &mut self.operators[seat];
         let robot = operator.robot.clone();
         match operator.state {
-            State::Waiting(_) | State::Acting => {
+            OperatorState::Waiting(_) | OperatorState::Acting => {
                 return Err(HostingError::DoubleCommand { robot, waits_for });
             }
-            State::Finished => return Err(HostingError::OperatorFinished { robot }),
-            State::Silent => operator.state = State::Thinking,
-            State::Thinking => {}
+            OperatorState::Finished => return Err(HostingError::OperatorFinished { robot }),
+            OperatorState::Silent => operator.state = OperatorState::Thinking,
+            OperatorState::Thinking => {}
         }
         match operator.missed.take() {
             Some([from_step, to_step]) => Err(HostingError::LateCommand { robot, from_step, to_step }),
@@ -79,15 +80,15 @@ impl Round {
     }
 
     pub fn command(&mut self, seat: usize, pending: Pending) {
-        self.operators[seat].state = State::Waiting(pending.into());
+        self.operators[seat].state = OperatorState::Waiting(pending.into());
     }
 
     /// The operator on `seat` has looked at how things stand.
     pub fn has_looked(&mut self, seat: usize) {
         let operator = &mut self.operators[seat];
         operator.missed = None;
-        if let State::Silent = operator.state {
-            operator.state = State::Thinking;
+        if let OperatorState::Silent = operator.state {
+            operator.state = OperatorState::Thinking;
         }
     }
 
@@ -95,23 +96,28 @@ impl Round {
     pub fn finish(&mut self, seat: usize) -> Result<bool, HostingError> {
         let waits_for = self.awaited();
         let operator = &mut self.operators[seat];
-        if let State::Waiting(_) | State::Acting = operator.state {
+        if let OperatorState::Waiting(_) | OperatorState::Acting = operator.state {
             return Err(HostingError::DoubleCommand { robot: operator.robot.clone(), waits_for });
         }
-        operator.state = State::Finished;
-        Ok(self.operators.iter().any(|other| !matches!(other.state, State::Finished | State::Silent)))
+        operator.state = OperatorState::Finished;
+        Ok(self
+            .operators
+            .iter()
+            .any(|other| !matches!(other.state, OperatorState::Finished | OperatorState::Silent)))
     }
 
     /// The robots whose operators have not commanded yet.
     pub fn awaited(&self) -> Vec<String> {
-        let thinking = self.operators.iter().filter(|operator| matches!(operator.state, State::Thinking));
+        let thinking =
+            self.operators.iter().filter(|operator| matches!(operator.state, OperatorState::Thinking));
         thinking.map(|operator| operator.robot.clone()).collect()
     }
 
     /// Whether a step could be made: somebody has commanded, and none is being made.
     pub fn may_begin(&self) -> bool {
-        let any = |of: fn(&State) -> bool| self.operators.iter().any(|operator| of(&operator.state));
-        any(|state| matches!(state, State::Waiting(_))) && !any(|state| matches!(state, State::Acting))
+        let any = |of: fn(&OperatorState) -> bool| self.operators.iter().any(|operator| of(&operator.state));
+        any(|state| matches!(state, OperatorState::Waiting(_)))
+            && !any(|state| matches!(state, OperatorState::Acting))
     }
 
     /// Whether the others' patience is running.
@@ -119,7 +125,7 @@ impl Round {
         self.patience.is_some()
     }
 
-    /// From now on the others' patience runs, until it is stopped by `patience`.
+    /// The others' patience begins to run; `patience` stops it.
     pub fn time(&mut self, patience: AbortHandle) {
         self.patience = Some(patience);
     }
@@ -127,8 +133,8 @@ impl Round {
     /// Nobody waits any longer for those who have not commanded.
     pub fn lose_patience(&mut self) {
         for operator in &mut self.operators {
-            if let State::Thinking = operator.state {
-                operator.state = State::Silent;
+            if let OperatorState::Thinking = operator.state {
+                operator.state = OperatorState::Silent;
             }
         }
     }
@@ -140,8 +146,8 @@ impl Round {
         }
         let mut taken = Vec::new();
         for (seat, operator) in self.operators.iter_mut().enumerate() {
-            match std::mem::replace(&mut operator.state, State::Acting) {
-                State::Waiting(pending) => taken.push((seat, *pending)),
+            match std::mem::replace(&mut operator.state, OperatorState::Acting) {
+                OperatorState::Waiting(pending) => taken.push((seat, *pending)),
                 other => operator.state = other,
             }
         }
@@ -190,14 +196,14 @@ impl Operator {
     /// The step is over, and was made from the first to the second of `made`.
     fn end(&mut self, made: Option<[u32; 2]>) -> PartnerDid {
         match self.state {
-            State::Acting => {
-                self.state = State::Thinking;
+            OperatorState::Acting => {
+                self.state = OperatorState::Thinking;
                 PartnerDid::Acted
             }
-            State::Finished => PartnerDid::HeldFinished,
+            OperatorState::Finished => PartnerDid::HeldFinished,
             // It has looked and commanded again while the step was made; the command is for the next one.
-            State::Waiting(_) => PartnerDid::HeldSilent,
-            State::Thinking | State::Silent => {
+            OperatorState::Waiting(_) => PartnerDid::HeldSilent,
+            OperatorState::Thinking | OperatorState::Silent => {
                 if let Some([from_step, to_step]) = made {
                     self.missed.get_or_insert([from_step, to_step])[1] = to_step;
                 }
