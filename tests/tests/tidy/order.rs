@@ -33,6 +33,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
             &["tasks"],
             &["protocol", "spec"],
             &["commands", "results"],
+            &["observation"],
             &["describe", "recording"],
             &["reports"],
             &["instructions", "session"],
