@@ -149,10 +149,16 @@ impl RobotFile {
 impl SceneFile {
     /// The scene that a file holds now.
     pub fn of(path: &Path) -> Result<SceneFile, SimError> {
-        let xxh3 = fingerprint(&Document::read(path)?);
+        SceneFile::with_approximations(path).map(|(scene, _)| scene)
+    }
+
+    /// The scene that a file holds now, and what it says that does not happen quite as in MuJoCo, a line each.
+    pub fn with_approximations(path: &Path) -> Result<(SceneFile, Vec<String>), SimError> {
+        let document = Document::read(path)?;
+        let xxh3 = fingerprint(&document);
         // Whoever replays the episode may be in another folder.
         let path = std::path::absolute(path).unwrap_or_else(|_| path.into());
-        Ok(SceneFile { path, xxh3 })
+        Ok((SceneFile { path, xxh3 }, document.approximations().to_vec()))
     }
 
     /// Reads the file, which has to be as it was.

@@ -234,7 +234,7 @@ impl Settings {
                 Some(path) => Instructions::read(path)?,
                 None => Instructions::default(),
             },
-            scene: layer.scene.as_deref().map(SceneFile::of).transpose()?,
+            scene: layer.scene.as_deref().map(read_scene).transpose()?,
             base_limits: locomotion.load()?.limits(),
             locomotion,
             renderer,
@@ -278,6 +278,13 @@ fn read_layer(path: &Path) -> Result<Layer, SettingsError> {
     let text =
         std::fs::read_to_string(path).map_err(|source| SettingsError::Read { path: path.into(), source })?;
     toml::from_str(&text).map_err(|source| SettingsError::Parse { path: path.into(), source })
+}
+
+/// Reads a scene, and logs what of its file does not happen quite as in MuJoCo.
+pub fn read_scene(path: &Path) -> Result<SceneFile, SimError> {
+    let (scene, approximations) = SceneFile::with_approximations(path)?;
+    approximations.iter().for_each(|line| tracing::warn!("not quite as in MuJoCo: {line}"));
+    Ok(scene)
 }
 
 #[cfg(test)]

@@ -67,6 +67,18 @@ fn messages_name_what_there_is() {
     let ball =
         r#"<mujoco><worldbody><body name="a"><joint type="ball" name="b"/></body></worldbody></mujoco>"#;
     check(Model::from_mjcf(ball).expect_err("a ball joint").to_string(), "use hinges and slides");
+    let refused = |body: &str, expected: &str| {
+        let xml = format!("<mujoco><worldbody><body name=\"a\">{body}</body></worldbody></mujoco>");
+        check(Model::from_mjcf(&xml).expect_err(expected).to_string(), expected);
+    };
+    refused(r#"<joint name="h" ref="10"/>"#, "joint `h`: `ref` is not read");
+    refused(r#"<joint name="h" axis="0 0 0"/>"#, "joint `h`: its axis is 0 0 0");
+    refused(r#"<joint name="h" limited="true"/>"#, "joint `h`: it is limited without a range");
+    refused(r#"<joint name="h" pos="nan 0 0"/>"#, "joint `h`: its place");
+    refused(r#"<body name="b"><freejoint/></body>"#, "it is Free; use hinges and slides");
+    refused(r#"<body name="a"/>"#, "body `a`: there is another of this name");
+    refused(r#"<body><inertial pos="0 0 0" mass="-1"/></body>"#, "body without a name: its mass is below 0");
+    refused(&("<body>".repeat(20_000) + &"</body>".repeat(20_000)), "nest fewer");
     check(Model::from_urdf("<robot").expect_err("cut off").to_string(), "not valid URDF");
 }
 

@@ -1,11 +1,11 @@
-//! Equalities of a file between the links that its bodies became.
+//! Equalities of a file between the links that its bodies became, and links that never touch.
 
 use crate::SimError;
 use crate::dynamics::{DPose3, Dynamics, Equality, LinkId, TreeId};
 use crate::mjcf::{BodyTree, Document, EqualityKind};
 
 /// A tree of a file, and what it became: `None` is a part of the world.
-pub(crate) struct Placed<'a> {
+pub(crate) struct PlacedTree<'a> {
     pub tree: &'a BodyTree,
     pub id: Option<TreeId>,
 }
@@ -15,7 +15,7 @@ pub(crate) struct Placed<'a> {
 struct End {
     /// `None` is the world.
     link: Option<LinkId>,
-    /// In the frame of the link, or of the world.
+    /// The body's pose in the frame of the link, or of the world.
     carrier_from_body: DPose3,
     world_from_body: DPose3,
 }
@@ -24,7 +24,7 @@ struct End {
 pub(crate) fn add_equalities(
     dynamics: &mut Dynamics,
     document: &Document,
-    placed: &[Placed],
+    placed: &[PlacedTree],
     world_from_file: &DPose3,
 ) -> Result<(), SimError> {
     for equality in document.equalities()? {
@@ -67,32 +67,51 @@ fn weld(a: End, b: End, a_from_b: DPose3) -> Option<Equality> {
     a.link.map(|link| Equality::Weld { a: link, a_from_b: between_links, b: b.link })
 }
 
-fn end(dynamics: &Dynamics, placed: &[Placed], world_from_file: &DPose3, body: Option<&String>) -> End {
+fn end(dynamics: &Dynamics, placed: &[PlacedTree], world_from_file: &DPose3, body: Option<&String>) -> End {
     let world = End { link: None, carrier_from_body: *world_from_file, world_from_body: *world_from_file };
     let Some(name) = body else { return world };
-    for Placed { tree, id } in placed {
-        for (index, link) in tree.links.iter().enumerate() {
-            let Some(found) = link.bodies.iter().find(|body| body.name == *name) else { continue };
-            let in_link = found.link_from_body;
-            return match id {
-                Some(id) => End {
-                    link: Some(id.link(index)),
-                    carrier_from_body: in_link,
-                    world_from_body: dynamics.tree(*id).world_from_link(index) * in_link,
-                },
-                None => {
-                    let world_from_body = *world_from_file * link.parent_from_link * in_link;
-                    End { link: None, carrier_from_body: world_from_body, world_from_body }
-                }
-            };
-        }
+    for PlacedTree { tree, id } in placed {
+        let Some((link, in_link)) = tree.body(name) else { continue };
+        return match id {
+            Some(id) => End {
+                link: Some(id.link(link)),
+                carrier_from_body: in_link,
+                world_from_body: dynamics.tree(*id).world_from_link(link) * in_link,
+            },
+            None => {
+                let world_from_body = *world_from_file * tree.links[link].parent_from_link * in_link;
+                End { link: None, carrier_from_body: world_from_body, world_from_body }
+            }
+        };
     }
     world
 }
 
+/// Links that the file's `<exclude>` names never touch. Two parts of the room do not anyway.
+pub(crate) fn keep_apart(
+    dynamics: &mut Dynamics,
+    document: &Document,
+    placed: &[PlacedTree],
+) -> Result<(), SimError> {
+    for pair in document.exclusions()? {
+        let links = pair.each_ref().map(|name| {
+            placed.iter().find_map(|PlacedTree { tree, id }| Some((*id)?.link(tree.body(name)?.0)))
+        });
+        match links {
+            [Some(a), Some(b)] => dynamics.keep_apart(a, b),
+            [None, None] => {}
+            [Some(_), None] | [None, Some(_)] => {
+                let what = format!("exclude of `{}` and `{}`, one of which never moves", pair[0], pair[1]);
+                return Err(document.unsupported(what));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// The link that a joint of a file moves, unless that is a part of the world.
-pub(super) fn joint_link(placed: &[Placed], joint: &str) -> Option<LinkId> {
-    placed.iter().find_map(|Placed { tree, id }| {
+pub(super) fn joint_link(placed: &[PlacedTree], joint: &str) -> Option<LinkId> {
+    placed.iter().find_map(|PlacedTree { tree, id }| {
         let index = tree.links.iter().position(|link| link.joint.name() == Some(joint))?;
         Some((*id)?.link(index))
     })

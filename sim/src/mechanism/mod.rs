@@ -3,14 +3,12 @@
 
 mod equality;
 mod machinery;
-mod start;
 
 use rapier3d::math::Pose;
 
 use equality::joint_link;
-pub(crate) use equality::{Placed, add_equalities};
-pub(crate) use machinery::{Machinery, START};
-pub(crate) use start::begin;
+pub(crate) use equality::{PlacedTree, add_equalities, keep_apart};
+pub(crate) use machinery::{Machinery, START, begin};
 
 pub(crate) use crate::dynamics::rounded;
 
@@ -18,7 +16,7 @@ use crate::dynamics::{Axis, Collider, DPose3, DQuat, Dynamics, Joint, Link, Link
 use crate::mjcf::{Actuator, AxisJoint, BodyLink, BodyTree, Geom, LinkJoint};
 use crate::owner::Owner;
 
-/// In full precision; the rotation is a unit quaternion again.
+/// The pose in full precision; its rotation is a unit quaternion again.
 pub(crate) fn precise(pose: &Pose) -> DPose3 {
     let [x, y, z, w] = pose.rotation.to_array().map(f64::from);
     DPose3::from_parts(pose.translation.as_dvec3(), DQuat::from_xyzw(x, y, z, w).normalize())

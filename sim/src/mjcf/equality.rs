@@ -1,4 +1,4 @@
-//! Constraints between joints or bodies that a file asks for: couplings, welds, pins.
+//! What a file asks of pairs of joints or bodies: couplings, welds, pins, and bodies that never touch.
 
 use mjcf_rs::equality::Equality as Element;
 use rapier3d::glamx::{DPose3, DVec3};
@@ -7,10 +7,10 @@ use super::Document;
 use crate::SimError;
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct Equality {
-    /// Empty where the file gives none.
+pub struct EqualityConstraint {
+    /// The name is empty where the file gives none.
     pub name: String,
-    /// In force from the beginning.
+    /// Whether it holds from the beginning.
     pub active: bool,
     pub kind: EqualityKind,
 }
@@ -31,11 +31,11 @@ pub enum EqualityKind {
 }
 
 impl Document {
-    pub fn equalities(&self) -> Result<Vec<Equality>, SimError> {
+    pub fn equalities(&self) -> Result<Vec<EqualityConstraint>, SimError> {
         self.model.equality.iter().map(|element| self.equality(element)).collect()
     }
 
-    fn equality(&self, element: &Element) -> Result<Equality, SimError> {
+    fn equality(&self, element: &Element) -> Result<EqualityConstraint, SimError> {
         let (common, kind) = match element {
             Element::Joint(coupling) => {
                 let joint = self.known_axis(&coupling.joint1)?;
@@ -48,6 +48,8 @@ impl Document {
                 let other = weld.body2.as_deref().map(|name| self.known_body(name)).transpose()?;
                 // MuJoCo's default is a quaternion of 0, which stands for "as placed".
                 let body_from_other = weld.relpose.filter(|pose| pose.rotation.length_squared() > 0.0);
+                let body_from_other = body_from_other
+                    .map(|pose| DPose3::from_parts(pose.translation, pose.rotation.normalize()));
                 (&weld.common, EqualityKind::Weld { body, other, body_from_other })
             }
             Element::Connect(pin) => {
@@ -61,7 +63,17 @@ impl Document {
                 return Err(self.unsupported(what));
             }
         };
-        Ok(Equality { name: common.name.clone().unwrap_or_default(), active: common.active, kind })
+        Ok(EqualityConstraint { name: common.name.clone().unwrap_or_default(), active: common.active, kind })
+    }
+
+    /// Pairs of bodies that never touch.
+    pub fn exclusions(&self) -> Result<Vec<[String; 2]>, SimError> {
+        let named = |name: &str| match self.model.body_id_by_name(name) {
+            Some(_) => Ok(name.to_string()),
+            None => Err(self.unsupported(format!("exclude of `{name}`, which is no body"))),
+        };
+        let pairs = self.model.contact.excludes.iter();
+        pairs.map(|pair| Ok([named(&pair.body1)?, named(&pair.body2)?])).collect()
     }
 
     fn known_body(&self, name: &str) -> Result<String, SimError> {

@@ -65,37 +65,22 @@ const DEFAULT_RGBA: [f64; 4] = [0.5, 0.5, 0.5, 1.0];
 const PLANE_THICKNESS_M: f32 = 0.2;
 
 impl Geom {
-    pub(super) fn read(document: &Document, geom: &mjcf_rs::body::Geom) -> Result<Geom, SimError> {
-        let size = vector(geom.size);
+    /// Geom `index` of a body.
+    pub(super) fn read(document: &Document, body: usize, index: usize) -> Result<Geom, SimError> {
+        let geom = &document.model.bodies[body].body.geoms[index];
+        let refuse = |what: &str| document.source.refuse_at(document.checked.bodies[body].geoms[index], what);
         let (body_from_geom, half_length_m) = match geom.fromto {
             Some(ends) => between(ends),
-            None => (pose(&geom.pose), size.y),
-        };
-        let radius_m = size.x;
-        let primitive = match geom.type_ {
-            GeomType::Sphere => Primitive::Sphere { radius_m },
-            GeomType::Capsule => Primitive::Capsule { radius_m, half_length_m },
-            GeomType::Cylinder => Primitive::Cylinder { radius_m, half_length_m },
-            GeomType::Box => Primitive::Box { half_extents_m: size },
-            GeomType::Ellipsoid => Primitive::Ellipsoid { radii_m: size },
-            GeomType::Plane => Primitive::Plane { half_extents_m: [size.x, size.y] },
-            GeomType::Mesh => mesh(document, geom)?,
-            other => {
-                let what = format!(
-                    "geom `{}` is of type {other:?}; use sphere, capsule, cylinder, box, ellipsoid, plane or mesh",
-                    geom.name.as_deref().unwrap_or_default()
-                );
-                return Err(document.unsupported(what));
-            }
+            None => (pose(&geom.pose), vector(geom.size).y),
         };
         let material = geom.material.as_ref().and_then(|name| document.model.assets.material(name));
         Ok(Geom {
-            primitive,
+            primitive: primitive(document, geom, half_length_m).map_err(|what| refuse(&what))?,
             body_from_geom,
             rgba: rgba(document, geom, material),
             material: geom.material.clone(),
             checker_rgb: material.and_then(|material| checker_rgb(document, material)),
-            friction: friction(document, geom)?,
+            friction: friction(geom).map_err(|what| refuse(&what))?,
             density_kg_m3: geom.density.unwrap_or(DEFAULT_DENSITY_KG_M3) as f32,
             mass_kg: geom.mass.map(|m| m as f32),
             collides: geom.contype != 0 || geom.conaffinity != 0,
@@ -131,6 +116,51 @@ impl Geom {
     }
 }
 
+/// The shape of a geom; `half_length_m` is that of a shape between two ends.
+fn primitive(
+    document: &Document,
+    geom: &mjcf_rs::body::Geom,
+    half_length_m: f32,
+) -> Result<Primitive, String> {
+    let size = vector(geom.size);
+    let radius_m = size.x;
+    let between_ends = geom.fromto.is_some();
+    let (primitive, extents_m) = match geom.type_ {
+        GeomType::Sphere => (Primitive::Sphere { radius_m }, vec![radius_m]),
+        GeomType::Capsule => (Primitive::Capsule { radius_m, half_length_m }, vec![radius_m, half_length_m]),
+        GeomType::Cylinder => {
+            (Primitive::Cylinder { radius_m, half_length_m }, vec![radius_m, half_length_m])
+        }
+        GeomType::Box | GeomType::Ellipsoid => {
+            let half_m = if between_ends { Vector::new(radius_m, radius_m, half_length_m) } else { size };
+            let primitive = match geom.type_ {
+                GeomType::Box => Primitive::Box { half_extents_m: half_m },
+                _ => Primitive::Ellipsoid { radii_m: half_m },
+            };
+            (primitive, half_m.to_array().to_vec())
+        }
+        GeomType::Plane => (Primitive::Plane { half_extents_m: [size.x, size.y] }, Vec::new()),
+        GeomType::Mesh => (mesh(document, geom)?, Vec::new()),
+        GeomType::Hfield | GeomType::Sdf => {
+            let have = "sphere, capsule, cylinder, box, ellipsoid, plane or mesh";
+            return Err(format!("it is of type {:?}; use {have}", geom.type_));
+        }
+    };
+    if extents_m.iter().any(|extent_m| *extent_m <= 0.0) {
+        return Err("it has an extent of 0; state a size for every direction".into());
+    }
+    let on_ends = !matches!(geom.type_, GeomType::Sphere | GeomType::Plane | GeomType::Mesh);
+    if between_ends && !on_ends {
+        return Err(
+            "fromto is for capsules, cylinders, boxes and ellipsoids; state pos and a rotation".into()
+        );
+    }
+    if geom.mesh.is_some() && geom.type_ != GeomType::Mesh {
+        return Err("shapes are not fitted to meshes; use type=\"mesh\", or state the size".into());
+    }
+    Ok(primitive)
+}
+
 /// The geom's own colour, or its material's; a picture on the material tints it.
 fn rgba(
     document: &Document,
@@ -145,9 +175,9 @@ fn rgba(
     [r * x, g * y, b * z, a]
 }
 
-fn friction(document: &Document, geom: &mjcf_rs::body::Geom) -> Result<Friction, SimError> {
+fn friction(geom: &mjcf_rs::body::Geom) -> Result<Friction, String> {
     let directions = Directions::from_condim(geom.condim)
-        .ok_or_else(|| document.unsupported(format!("condim {}; use 1, 3, 4 or 6", geom.condim)))?;
+        .ok_or_else(|| format!("condim=\"{}\"; use 1, 3, 4 or 6", geom.condim))?;
     let [slide, spin_m, roll_m] = geom.friction;
     Ok(Friction { directions, slide, spin_m, roll_m, priority: geom.priority })
 }
@@ -169,14 +199,14 @@ fn between(ends_m: [f64; 6]) -> (Pose, f32) {
     (Pose::from_parts(a + half, rotation), half.length())
 }
 
-fn mesh(document: &Document, geom: &mjcf_rs::body::Geom) -> Result<Primitive, SimError> {
+fn mesh(document: &Document, geom: &mjcf_rs::body::Geom) -> Result<Primitive, String> {
     let name = geom.mesh.as_deref().unwrap_or_default();
     if let Some(mesh) = document.meshes.get(name) {
         return Ok(Primitive::Mesh(mesh.clone()));
     }
     let asset = document.model.assets.mesh(name);
     let Some(vertices) = asset.and_then(|asset| asset.inline_vertices.as_ref()) else {
-        return Err(document.unsupported(format!("mesh `{name}` is no asset with a file or vertices")));
+        return Err(format!("mesh `{name}` is no asset with a file or vertices"));
     };
     Ok(Primitive::Convex {
         vertices_m: vertices.chunks_exact(3).map(|v| vector([v[0], v[1], v[2]])).collect(),

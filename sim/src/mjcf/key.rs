@@ -1,6 +1,6 @@
 //! Keys of a file: states, and what actuators are told at a time.
 
-use super::{Document, LinkJoint, joint};
+use super::{Document, LinkJoint};
 use crate::SimError;
 
 /// MJCF's `<key>`. What a file leaves out is empty.
@@ -8,17 +8,17 @@ use crate::SimError;
 pub struct Key {
     pub name: String,
     pub time_s: f64,
-    /// Of all joints, in the order of [`Document::trees`]; see [`LinkJoint::coordinates`].
+    /// The coordinates of all joints, in the order of [`Document::trees`]; see [`LinkJoint::coordinates`].
     pub positions: Vec<f64>,
-    /// As many as there are degrees of freedom; of a free joint the velocity in world axes, the spin in those of its body.
+    /// A number for each degree of freedom; a free joint has its velocity in world axes and its spin in the axes of its body.
     pub velocities: Vec<f64>,
-    /// In the order of [`Document::actuators`].
+    /// What the actuators are told, in the order of [`Document::actuators`].
     pub controls: Vec<f64>,
 }
 
 impl Document {
     pub fn keys(&self) -> Result<Vec<Key>, SimError> {
-        let joints = (0..self.model.bodies.len()).map(|body| joint::read(self, body));
+        let joints = (0..self.model.bodies.len()).map(|body| self.joint(body));
         let joints = joints.collect::<Result<Vec<_>, _>>()?;
         let coordinates = joints.iter().map(LinkJoint::coordinates).sum();
         let freedoms = joints.iter().map(LinkJoint::freedoms).sum();
@@ -30,9 +30,21 @@ impl Document {
                 have => Err(self
                     .unsupported(format!("key `{name}` has {have} numbers in {what}; it takes {expected}"))),
             };
+            let positions = numbers("qpos", &key.qpos, coordinates)?;
+            let mut rest = positions.as_slice();
+            for joint in joints.iter().filter(|_| !positions.is_empty()) {
+                let (own, others) = rest.split_at(joint.coordinates());
+                rest = others;
+                if own.len() == 7 && own[3..].iter().all(|part| *part == 0.0) {
+                    let body = joint.name().unwrap_or_default();
+                    let what =
+                        format!("key `{name}`: the quaternion of free joint `{body}` is 0 0 0 0 in qpos");
+                    return Err(self.unsupported(what));
+                }
+            }
             Ok(Key {
                 time_s: key.time,
-                positions: numbers("qpos", &key.qpos, coordinates)?,
+                positions,
                 velocities: numbers("qvel", &key.qvel, freedoms)?,
                 controls: numbers("ctrl", &key.ctrl, self.model.actuators.len())?,
                 name,

@@ -1,29 +1,27 @@
-//! Reads MJCF through `mjcf-rs` and adds what that parser leaves out: cameras, and everything else as we use it.
+//! The one reader of MJCF, for robots, scenes and objects: the text with all that it includes ([`source`]), every element
+//! and attribute accepted or refused by one table ([`check`], [`support`]), parsed by `mjcf-rs`, and then as we use it:
+//! bodies in trees, shapes, joints with their actuators, equalities, keys, and what that parser leaves out.
 
-mod actuator;
-mod camera;
+mod bodies;
+mod check;
 mod equality;
+mod files;
+mod frames;
 mod geometry;
-mod joint;
+mod joints;
 mod key;
-mod mass;
-mod mesh;
-mod site;
-mod texture;
-mod tree;
+mod source;
+mod support;
 #[cfg(test)]
-mod tree_tests;
+mod tests;
 
-pub use actuator::{Actuator, ActuatorKind};
-pub use camera::MjcfCamera;
-pub use equality::{Equality, EqualityKind};
+pub use bodies::{BodyLink, BodyTree, PlacedBody};
+pub use equality::{EqualityConstraint, EqualityKind};
+pub use files::Mesh;
+pub use frames::{MjcfCamera, Site};
 pub use geometry::{Geom, Primitive};
-pub use joint::{AxisJoint, LinkJoint};
+pub use joints::{Actuator, ActuatorKind, AxisJoint, LinkJoint};
 pub use key::Key;
-pub(crate) use mass::mass_properties;
-pub use mesh::Mesh;
-pub use site::Site;
-pub use tree::{BodyLink, BodyTree, PlacedBody};
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -33,16 +31,20 @@ use rapier3d::math::{Pose, Rotation, Vector};
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::SimError;
+use check::Checked;
+use source::MjcfText;
 
-/// A parsed file: bodies with defaults baked in, and its cameras.
+/// A parsed file. What it says is all in effect, or it would not have been read.
 #[derive(Debug)]
 pub struct Document {
     pub file: String,
     pub model: mjcf_rs::Model,
     pub cameras: Vec<MjcfCamera>,
-    /// Where files lie that it names.
+    source: MjcfText,
+    checked: Checked,
+    /// The folder in which files lie that it names.
     folder: PathBuf,
-    /// Of the files that its assets name, by asset.
+    /// What the files hold that its assets name, by asset.
     meshes: BTreeMap<String, Arc<Mesh>>,
     texture_rgb: BTreeMap<String, [f32; 3]>,
 }
@@ -53,8 +55,7 @@ impl Document {
         Document::parse_in(file, xml, Path::new("."))
     }
 
-    /// Reads a file. What it includes, its meshes and its pictures are read from where they lie beside it; cameras of included files are
-    /// not.
+    /// Reads a file. What it includes, its meshes and its pictures are read from where they lie beside it.
     pub fn read(path: &Path) -> Result<Document, SimError> {
         let file = path.display().to_string();
         let xml =
@@ -63,19 +64,40 @@ impl Document {
     }
 
     fn parse_in(file: &str, xml: &str, folder: &Path) -> Result<Document, SimError> {
-        let model = mjcf_rs::Model::from_str(xml, folder)
+        let source = MjcfText::read(file, xml, folder)?;
+        let checked = check::check(&source)?;
+        let model = mjcf_rs::Model::from_str(&source.text, folder)
             .map_err(|source| SimError::Mjcf { file: file.into(), source })?;
         let mut document = Document {
             file: file.into(),
             model,
-            cameras: camera::parse(file, xml)?,
+            cameras: frames::cameras(&source)?,
+            source,
+            checked,
             folder: folder.into(),
             meshes: BTreeMap::new(),
             texture_rgb: BTreeMap::new(),
         };
+        document.approximate_collisions();
         document.meshes = document.read_meshes()?;
         document.texture_rgb = document.read_textures()?;
         Ok(document)
+    }
+
+    /// What the file says that does not happen quite as in MuJoCo, a line each with the first place that says it.
+    pub fn approximations(&self) -> &[String] {
+        &self.checked.approximated
+    }
+
+    /// A geom that only collides with others, or that others only collide with, collides with all here.
+    fn approximate_collisions(&mut self) {
+        let bodies = self.model.bodies.iter().zip(&self.checked.bodies);
+        let mut one_sided = bodies.flat_map(|(entry, bytes)| entry.body.geoms.iter().zip(&bytes.geoms));
+        if let Some((_, byte)) = one_sided.find(|(geom, _)| (geom.contype == 0) != (geom.conaffinity == 0)) {
+            let what = "only one of contype and conaffinity is 0: it touches all that is not 0 in both";
+            let line = self.source.line(*byte);
+            self.checked.approximated.push(format!("`{line}`: geom: {what}"));
+        }
     }
 
     /// Tells files of different content apart, with all that they include and name; comments do not count.
@@ -88,9 +110,14 @@ impl Document {
         SimError::Unsupported { file: self.file.clone(), what: what.into() }
     }
 
+    /// The refusal of a body, with its line and the names around it.
+    fn refuse_body(&self, body: usize, what: &str) -> SimError {
+        self.source.refuse_at(self.checked.bodies[body].body, what)
+    }
+
     /// Geoms of a body, in that body's frame.
-    pub(crate) fn geoms(&self, body: usize) -> Result<Vec<Geom>, SimError> {
-        self.model.bodies[body].body.geoms.iter().map(|geom| Geom::read(self, geom)).collect()
+    fn geoms(&self, body: usize) -> Result<Vec<Geom>, SimError> {
+        (0..self.model.bodies[body].body.geoms.len()).map(|index| Geom::read(self, body, index)).collect()
     }
 
     /// Sites of what never moves, in the frame of the file.
@@ -109,7 +136,7 @@ impl Document {
     }
 
     /// Sites of a body, in that body's frame.
-    pub(crate) fn sites(&self, body: usize) -> impl Iterator<Item = Site> {
+    fn sites(&self, body: usize) -> impl Iterator<Item = Site> {
         self.model.bodies[body].body.sites.iter().map(Site::read)
     }
 }
@@ -123,6 +150,6 @@ pub(crate) fn pose(p: &mjcf_rs::Pose) -> Pose {
     )
 }
 
-pub(crate) fn vector([x, y, z]: [f64; 3]) -> Vector {
+fn vector([x, y, z]: [f64; 3]) -> Vector {
     Vector::new(x as f32, y as f32, z as f32)
 }

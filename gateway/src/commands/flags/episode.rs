@@ -11,7 +11,7 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
-use crate::settings::one_of;
+use crate::settings::{one_of, read_scene};
 
 /// Which episodes to play.
 #[derive(Debug, Args)]
@@ -55,7 +55,7 @@ pub struct SceneFlag {
 impl SceneFlag {
     /// Reads the scene from the file that the flag names.
     fn read(&self) -> Result<Option<SceneFile>, SimError> {
-        self.file.as_deref().map(SceneFile::of).transpose()
+        self.file.as_deref().map(read_scene).transpose()
     }
 }
 

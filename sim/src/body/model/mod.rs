@@ -28,7 +28,7 @@ pub struct LinkModel {
 pub struct JointModel {
     pub name: String,
     pub link: usize,
-    /// In the link's frame.
+    /// The axis in the link's frame.
     pub axis: Vector,
     pub lower_rad: f32,
     pub upper_rad: f32,
@@ -55,7 +55,7 @@ pub struct RobotModel {
     pub links: Vec<LinkModel>,
     /// Published order: the file's actuators.
     pub joints: Vec<JointModel>,
-    /// Where tasks put a hand.
+    /// The frames that tasks put somewhere.
     pub wrists: Sides<SiteModel>,
     /// Centre of the sole.
     pub soles: Sides<SiteModel>,
@@ -65,6 +65,8 @@ pub struct RobotModel {
     /// Link pairs that never touch, smaller index first.
     excluded: BTreeSet<(usize, usize)>,
     pub hands: Sides<HandLinks>,
+    /// What its file says that does not happen quite as in MuJoCo.
+    pub approximations: Vec<String>,
 }
 
 /// Links of one hand, for contact queries.

@@ -7,7 +7,7 @@ use super::{Object, ObjectModel, ObjectPlacement};
 use crate::SimError;
 use crate::dynamics::{Dynamics, Link, Tree, TreeId};
 use crate::mechanism::{
-    Machinery, Placed, START, add_collider, add_equalities, begin, links, precise, rounded,
+    Machinery, PlacedTree, START, add_collider, add_equalities, begin, keep_apart, links, precise, rounded,
 };
 use crate::mjcf::{BodyLink, BodyTree, Document, Geom};
 use crate::owner::Owner;
@@ -46,7 +46,7 @@ pub(in crate::world) fn insert_scene(
             let tree_links = links(tree, &world_from_file, &actuators);
             Some(insert_moving(dynamics, tree, tree_links, name, &mut objects)?)
         };
-        placed.push(Placed { tree, id });
+        placed.push(PlacedTree { tree, id });
     }
     // Welds hold bodies as they are placed, whatever they begin with.
     add_equalities(dynamics, scene, &placed, &world_from_file)?;
@@ -56,30 +56,6 @@ pub(in crate::world) fn insert_scene(
     }
     keep_apart(dynamics, scene, &placed)?;
     Ok(Furniture { fixed, objects, machinery })
-}
-
-/// What the file's `<exclude>` names never touches. Two parts of the room do not anyway.
-fn keep_apart(dynamics: &mut Dynamics, scene: &Document, placed: &[Placed]) -> Result<(), SimError> {
-    let link_of = |name: &str| {
-        let has = |link: &BodyLink| link.bodies.iter().any(|body| body.name == name);
-        let found = placed.iter().find_map(|Placed { tree, id }| {
-            let link = tree.links.iter().position(has)?;
-            Some(id.map(|id| id.link(link)))
-        });
-        found.ok_or_else(|| scene.unsupported(format!("exclude of `{name}`, which is no body")))
-    };
-    for pair in &scene.model.contact.excludes {
-        match (link_of(&pair.body1)?, link_of(&pair.body2)?) {
-            (Some(a), Some(b)) => dynamics.keep_apart(a, b),
-            (None, None) => {}
-            (Some(_), None) | (None, Some(_)) => {
-                let what =
-                    format!("exclude of `{}` and `{}`, one of which never moves", pair.body1, pair.body2);
-                return Err(scene.unsupported(what));
-            }
-        }
-    }
-    Ok(())
 }
 
 /// Inserts an object file: one top-level body, a mark if no joint moves it. The body has the placement's name, and the
@@ -109,7 +85,9 @@ pub(in crate::world) fn insert_object(
     let name = |link: &BodyLink| part_name(&placement.name, link);
     let tree_links = links(&tree, &world_from_file, &[]);
     let id = insert_moving(dynamics, &tree, tree_links, name, objects)?;
-    add_equalities(dynamics, &document, &[Placed { tree: &tree, id: Some(id) }], &world_from_file)
+    let placed = [PlacedTree { tree: &tree, id: Some(id) }];
+    add_equalities(dynamics, &document, &placed, &world_from_file)?;
+    keep_apart(dynamics, &document, &placed)
 }
 
 fn insert_moving(

@@ -84,11 +84,19 @@ impl ObjectModel {
     /// An embedded object file, and the one body that lies directly in its world with all that is on it.
     pub(super) fn read(file: &str) -> Result<(Document, BodyTree), SimError> {
         let document = Document::parse(file, assets::object(file)?)?;
-        // The first is the file's own world, with nothing in it.
-        let mut trees = document.trees()?.into_iter().skip(1);
+        let mut trees = document.trees()?.into_iter();
+        // The first is the file's own world.
+        let world = trees.next().into_iter().flat_map(|world| world.links);
         let (Some(tree), None) = (trees.next(), trees.next()) else {
             return Err(document.unsupported("an object file has one top-level body"));
         };
+        let beside = world.into_iter().any(|link| !link.geoms.is_empty() || !link.sites.is_empty());
+        if beside || !document.cameras.is_empty() {
+            return Err(document.unsupported("an object file has geoms and sites on its body, and no camera"));
+        }
+        if !document.actuators()?.is_empty() || !document.keys()?.is_empty() {
+            return Err(document.unsupported("an object file has neither actuators nor keys; scenes have"));
+        }
         let root = &tree.links[0];
         let falls = matches!(root.joint, LinkJoint::Free { .. });
         if falls && !root.geoms.iter().any(|geom| geom.collides && geom.collider().is_some()) {

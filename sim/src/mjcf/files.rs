@@ -1,4 +1,4 @@
-//! Mesh files that an MJCF file names: OBJ and STL.
+//! Files that an MJCF file names: meshes (OBJ and STL), and pictures on materials, of which only the colour is taken.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -6,6 +6,7 @@ use std::io::BufReader;
 use std::path::Path;
 use std::sync::Arc;
 
+use image::ImageReader;
 use rapier3d::math::Vector;
 
 use super::{Document, vector};
@@ -26,6 +27,17 @@ impl Document {
             if let Some(path) = self.model.resolve_mesh_file(asset, &self.folder) {
                 let name = asset.name.clone().unwrap_or_default();
                 found.insert(name, Arc::new(self.read_mesh(asset, &path)?));
+            }
+        }
+        Ok(found)
+    }
+
+    /// The mean colours of the textures that its assets name files of.
+    pub(super) fn read_textures(&self) -> Result<BTreeMap<String, [f32; 3]>, SimError> {
+        let mut found = BTreeMap::new();
+        for asset in &self.model.assets.textures {
+            if let Some(path) = self.model.resolve_texture_file(asset, &self.folder) {
+                found.insert(asset.name.clone().unwrap_or_default(), mean_rgb(&path)?);
             }
         }
         Ok(found)
@@ -89,6 +101,19 @@ fn read_stl(path: &Path, mut file: BufReader<File>) -> Result<Mesh, SimError> {
         vertices_m: mesh.vertices.iter().map(|v| Vector::new(v[0], v[1], v[2])).collect(),
         triangles: mesh.faces.iter().map(|face| face.vertices.map(|corner| corner as u32)).collect(),
     })
+}
+
+fn mean_rgb(path: &Path) -> Result<[f32; 3], SimError> {
+    let name = || path.display().to_string();
+    let reader = ImageReader::open(path).map_err(|source| SimError::Read { path: name(), source })?;
+    let picture = reader.decode().map_err(|source| SimError::Texture { path: name(), source })?.into_rgb8();
+    let mut sum = [0.0f64; 3];
+    for pixel in picture.pixels() {
+        for (sum, value) in sum.iter_mut().zip(pixel.0) {
+            *sum += f64::from(value) / 255.0;
+        }
+    }
+    Ok(sum.map(|sum| (sum / picture.pixels().len().max(1) as f64) as f32))
 }
 
 fn unreadable(path: &Path, source: std::io::Error) -> SimError {

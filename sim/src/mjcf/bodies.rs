@@ -1,11 +1,11 @@
 //! Bodies of a file as trees: links, the joints between them, their masses, geoms and sites. Plain data; nothing moves.
 
+use mjcf_rs::body::{InertiaSpec, Inertial};
 use rapier3d::glamx::DPose3;
-use rapier3d::math::Pose;
+use rapier3d::math::{Matrix, Pose, Vector};
 use rapier3d::prelude::MassProperties;
 
-use super::joint::{self, LinkJoint};
-use super::{Document, Geom, Site, mass, pose};
+use super::{Document, Geom, LinkJoint, Primitive, Site, pose, vector};
 use crate::SimError;
 
 /// A top-level body with everything on it.
@@ -18,14 +18,14 @@ pub struct BodyTree {
 /// A rigid part of a tree: a body with its joint, and the bodies without a joint that sit on it.
 #[derive(Clone, Debug)]
 pub struct BodyLink {
-    /// Of the body that has the joint; the world's is "world".
+    /// The name of the body that has the joint; the world is called "world".
     pub name: String,
     /// Index into [`BodyTree::links`]; `None` is the world.
     pub parent: Option<usize>,
-    /// With the joint at 0.
+    /// The pose with the joint at 0.
     pub parent_from_link: DPose3,
     pub joint: LinkJoint,
-    /// Link frame.
+    /// Mass and inertia in the link's frame.
     pub mass: MassProperties,
     pub geoms: Vec<Geom>,
     pub sites: Vec<Site>,
@@ -44,6 +44,14 @@ impl BodyTree {
     pub fn is_fixed(&self) -> bool {
         self.links.iter().all(|link| link.joint == LinkJoint::Fixed)
     }
+
+    /// The link of which a body is a part, and the body's pose in its frame.
+    pub fn body(&self, name: &str) -> Option<(usize, DPose3)> {
+        self.links.iter().enumerate().find_map(|(index, link)| {
+            let body = link.bodies.iter().find(|body| body.name == name)?;
+            Some((index, body.link_from_body))
+        })
+    }
 }
 
 /// Where a body of the file ended up.
@@ -61,7 +69,7 @@ impl Document {
         let mut trees: Vec<BodyTree> = Vec::new();
         let mut places: Vec<Place> = Vec::new();
         for (id, entry) in self.model.bodies.iter().enumerate() {
-            let joint = joint::read(self, id)?;
+            let joint = self.joint(id)?;
             let parent = entry.parent.filter(|parent| *parent != 0).map(|parent| places[parent]);
             let parent_from_body = entry.body.pose;
             let place = match parent {
@@ -84,7 +92,28 @@ impl Document {
         for link in trees.iter_mut().flat_map(|tree| &mut tree.links) {
             link.name = link.bodies[0].name.clone();
         }
+        self.check_masses(&trees, &places)?;
         Ok(trees)
+    }
+
+    /// Every joint moves something that has mass.
+    fn check_masses(&self, trees: &[BodyTree], places: &[Place]) -> Result<(), SimError> {
+        for (index, tree) in trees.iter().enumerate() {
+            let mut carried_kg: Vec<f32> = tree.links.iter().map(|link| link.mass.mass()).collect();
+            for (id, link) in tree.links.iter().enumerate().rev() {
+                let armature = link.joint.axis().map_or(0.0, |axis| axis.armature);
+                if link.joint != LinkJoint::Fixed && carried_kg[id] <= 0.0 && armature <= 0.0 {
+                    let body = places.iter().position(|place| (place.tree, place.link) == (index, id));
+                    let what =
+                        "its joint moves nothing that has mass; give it a mass or the joint an armature";
+                    return Err(self.refuse_body(body.unwrap_or(0), what));
+                }
+                if let Some(parent) = link.parent {
+                    carried_kg[parent] += carried_kg[id];
+                }
+            }
+        }
+        Ok(())
     }
 
     fn add_body(&self, id: usize, link: &mut BodyLink, link_from_body: DPose3) -> Result<(), SimError> {
@@ -94,8 +123,8 @@ impl Document {
         let on_link: Pose = pose(&link_from_body);
         let geoms = self.geoms(id)?;
         let mass = match &body.inertial {
-            Some(inertial) => mass::mass_properties(inertial),
-            None => geoms.iter().map(mass::of_geom).fold(MassProperties::default(), |sum, part| sum + part),
+            Some(inertial) => stated_mass(inertial),
+            None => geoms.iter().map(mass_of_geom).fold(MassProperties::default(), |sum, part| sum + part),
         };
         link.mass += mass.transform_by(&on_link);
         link.geoms.extend(
@@ -119,4 +148,44 @@ fn new_link(parent: Option<usize>, parent_from_link: DPose3, joint: LinkJoint) -
         sites: Vec::new(),
         bodies: Vec::new(),
     }
+}
+
+/// Mass properties of an `<inertial>`, in the body's frame.
+fn stated_mass(inertial: &Inertial) -> MassProperties {
+    let inertia = match inertial.inertia {
+        InertiaSpec::Diagonal(d) => Matrix::from_diagonal(vector(d)),
+        InertiaSpec::Full([xx, yy, zz, xy, xz, yz]) => {
+            Matrix::from_cols(vector([xx, xy, xz]), vector([xy, yy, yz]), vector([xz, yz, zz]))
+        }
+    };
+    MassProperties::with_inertia_matrix(Vector::ZERO, inertial.mass as f32, inertia)
+        .transform_by(&pose(&inertial.pose))
+}
+
+/// Mass properties of a geom filled evenly, in its body's frame. As in MuJoCo, a geom weighs something whether or not it
+/// collides, unless its mass is 0; a plane weighs nothing.
+fn mass_of_geom(geom: &Geom) -> MassProperties {
+    let Some((body_from_shape, shape)) = geom.collider() else { return MassProperties::default() };
+    let of_unit_density = match geom.primitive {
+        Primitive::Plane { .. } => return MassProperties::default(),
+        // The collision shape is a hull with flat faces.
+        Primitive::Ellipsoid { radii_m } => ellipsoid(radii_m).transform_by(&geom.body_from_geom),
+        Primitive::Sphere { .. }
+        | Primitive::Capsule { .. }
+        | Primitive::Cylinder { .. }
+        | Primitive::Box { .. }
+        | Primitive::Convex { .. }
+        | Primitive::Mesh(_) => shape.mass_properties(1.0).transform_by(&body_from_shape),
+    };
+    let mass_kg = geom.mass_kg.unwrap_or(geom.density_kg_m3 * of_unit_density.mass());
+    let mut mass = of_unit_density;
+    mass.set_mass(mass_kg, true);
+    mass
+}
+
+/// m = 4/3 pi a b c,  I_xx = m (b^2 + c^2) / 5.
+fn ellipsoid(radii_m: Vector) -> MassProperties {
+    let mass = 4.0 / 3.0 * std::f32::consts::PI * radii_m.x * radii_m.y * radii_m.z;
+    let s = radii_m * radii_m * (mass / 5.0);
+    MassProperties::new(Vector::ZERO, mass, Vector::new(s.y + s.z, s.x + s.z, s.x + s.y))
 }

@@ -1,0 +1,106 @@
+//! What a file gives a name to, so that nobody else has to know where it is: sites, which are points and regions, and cameras.
+
+use rapier3d::math::{Matrix, Pose, Rotation, Vector};
+
+use super::source::MjcfText;
+use super::{pose, vector};
+use crate::SimError;
+
+/// A named point of a body, or a region around it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Site {
+    pub name: String,
+    pub body_from_site: Pose,
+    /// MJCF's `size`: of a sphere the radius; of a cylinder (along z) the radius and half the length; of a box half the
+    /// extents.
+    pub size_m: Vector,
+}
+
+impl Site {
+    pub(crate) fn read(site: &mjcf_rs::body::Site) -> Site {
+        Site {
+            name: site.name.clone().unwrap_or_default(),
+            body_from_site: pose(&site.pose),
+            size_m: vector(site.size),
+        }
+    }
+
+    /// The point in the body's frame.
+    pub fn position_m(&self) -> Vector {
+        self.body_from_site.translation
+    }
+
+    /// The radius of a sphere or a cylinder.
+    pub fn radius_m(&self) -> f32 {
+        self.size_m.x
+    }
+
+    /// Smallest and largest corner, in the body's frame, of a box that lies along its axes.
+    pub fn corners_m(&self) -> [Vector; 2] {
+        [self.position_m() - self.size_m, self.position_m() + self.size_m]
+    }
+}
+
+/// A camera fixed to a body. Its axes are MuJoCo's and OpenGL's: x right, y up, looking along -z.
+#[derive(Clone, Debug)]
+pub struct MjcfCamera {
+    pub name: String,
+    /// Body it is fixed to; `None` is the world.
+    pub body: Option<String>,
+    pub body_from_camera: Pose,
+    pub vertical_fov_rad: f32,
+    /// Width and height in pixels.
+    pub resolution_px: (u32, u32),
+}
+
+impl MjcfCamera {
+    /// The same camera, seen from a frame in which the file's world lies at `frame_from_file`.
+    pub fn moved(&self, frame_from_file: &Pose) -> MjcfCamera {
+        let body_from_camera = match self.body {
+            Some(_) => self.body_from_camera,
+            None => *frame_from_file * self.body_from_camera,
+        };
+        MjcfCamera { body_from_camera, ..self.clone() }
+    }
+}
+
+/// MuJoCo's default `fovy`.
+const DEFAULT_FOVY_DEG: f32 = 45.0;
+const DEFAULT_RESOLUTION_PX: (u32, u32) = (320, 240);
+
+pub(super) fn cameras(source: &MjcfText) -> Result<Vec<MjcfCamera>, SimError> {
+    let xml = source.xml()?;
+    xml.descendants().filter(|node| node.has_tag_name("camera")).map(|node| camera(source, node)).collect()
+}
+
+fn camera(source: &MjcfText, node: roxmltree::Node) -> Result<MjcfCamera, SimError> {
+    // Whether they are right in number and finite has been checked.
+    let numbers = |attribute: &str| -> Option<Vec<f32>> {
+        let words = node.attribute(attribute)?.split_whitespace();
+        Some(words.filter_map(|word| word.parse().ok()).collect())
+    };
+    let position = numbers("pos").map_or(Vector::ZERO, |p| Vector::new(p[0], p[1], p[2]));
+    let rotation = match (numbers("quat"), numbers("xyaxes")) {
+        (Some(q), _) => Rotation::from_xyzw(q[1], q[2], q[3], q[0]).normalize(),
+        (None, Some(a)) => {
+            let x = Vector::new(a[0], a[1], a[2]).normalize();
+            let y = Vector::new(a[3], a[4], a[5]);
+            let y = (y - x * x.dot(y)).normalize();
+            Rotation::from_mat3(&Matrix::from_cols(x, y, x.cross(y)))
+        }
+        (None, None) => Rotation::IDENTITY,
+    };
+    let body = node.parent().filter(|parent| parent.has_tag_name("body"));
+    if body.is_some_and(|body| !body.has_attribute("name")) {
+        return Err(source.refuse(&node, "name the body that carries it"));
+    }
+    let fovy_deg = numbers("fovy").map_or(DEFAULT_FOVY_DEG, |v| v[0]);
+    let resolution_px = numbers("resolution").map_or(DEFAULT_RESOLUTION_PX, |v| (v[0] as u32, v[1] as u32));
+    Ok(MjcfCamera {
+        name: node.attribute("name").unwrap_or_default().to_string(),
+        body: body.and_then(|body| body.attribute("name")).map(str::to_string),
+        body_from_camera: Pose::from_parts(position, rotation),
+        vertical_fov_rad: fovy_deg.to_radians(),
+        resolution_px,
+    })
+}

@@ -1,0 +1,199 @@
+//! Joints of bodies, and what drives them, as plain data.
+
+use mjcf_rs::Tristate;
+use mjcf_rs::body::JointType;
+use mjcf_rs::extras::{Actuator as ActuatorElement, ActuatorKind as Kind};
+use rapier3d::glamx::DVec3;
+
+use super::Document;
+use crate::SimError;
+use crate::dynamics::Axis;
+
+/// What a body may do against its parent.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LinkJoint {
+    Fixed,
+    /// Only a top-level body has it.
+    Free {
+        name: String,
+    },
+    Hinge(AxisJoint),
+    Slide(AxisJoint),
+}
+
+/// A joint of one degree of freedom.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AxisJoint {
+    pub name: String,
+    /// The effort has no limit here: the actuator has one.
+    pub axis: Axis,
+}
+
+/// Drives one hinge or slide. Efforts are N m or N, positions rad or m.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Actuator {
+    pub joint: String,
+    pub kind: ActuatorKind,
+    /// Commands are clamped to this range.
+    pub control_range: Option<[f64; 2]>,
+    pub effort_range: Option<[f64; 2]>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ActuatorKind {
+    /// Exerts what it is told.
+    Motor,
+    /// kp (what it is told - q) - kd q'.
+    Position { kp: f64, kd: f64 },
+}
+
+impl LinkJoint {
+    pub fn name(&self) -> Option<&str> {
+        match self {
+            LinkJoint::Fixed => None,
+            LinkJoint::Free { name } => Some(name),
+            LinkJoint::Hinge(joint) | LinkJoint::Slide(joint) => Some(&joint.name),
+        }
+    }
+
+    pub fn axis(&self) -> Option<&Axis> {
+        match self {
+            LinkJoint::Fixed | LinkJoint::Free { .. } => None,
+            LinkJoint::Hinge(joint) | LinkJoint::Slide(joint) => Some(&joint.axis),
+        }
+    }
+
+    /// Numbers of MuJoCo's `qvel`.
+    pub fn freedoms(&self) -> usize {
+        match self {
+            LinkJoint::Fixed => 0,
+            LinkJoint::Free { .. } => 6,
+            LinkJoint::Hinge(_) | LinkJoint::Slide(_) => 1,
+        }
+    }
+
+    /// Numbers of MuJoCo's `qpos`: a free joint has a position and a quaternion.
+    pub fn coordinates(&self) -> usize {
+        match self {
+            LinkJoint::Fixed => 0,
+            LinkJoint::Free { .. } => 7,
+            LinkJoint::Hinge(_) | LinkJoint::Slide(_) => 1,
+        }
+    }
+}
+
+impl Document {
+    pub fn actuators(&self) -> Result<Vec<Actuator>, SimError> {
+        self.model.actuators.iter().map(|element| self.actuator(element)).collect()
+    }
+
+    fn actuator(&self, element: &ActuatorElement) -> Result<Actuator, SimError> {
+        let joint = element.joint.clone().unwrap_or_default();
+        self.axis_joint(&joint)?;
+        if element.gear != [1.0, 0.0, 0.0, 0.0, 0.0, 0.0] {
+            let what = format!("actuator of joint `{joint}` has a gear; state gains and ranges of the joint");
+            return Err(self.unsupported(what));
+        }
+        let kind = match element.kind {
+            Kind::Motor => ActuatorKind::Motor,
+            Kind::Position => {
+                ActuatorKind::Position { kp: element.kp.unwrap_or(1.0), kd: element.kv.unwrap_or(0.0) }
+            }
+            Kind::Velocity | Kind::IntVelocity | Kind::Damper | Kind::General | Kind::Other => {
+                let what = format!("actuator {:?} of joint `{joint}`; use motor or position", element.kind);
+                return Err(self.unsupported(what));
+            }
+        };
+        let limits = |what: &str, limited, range| {
+            let limits = self.limits(what, limited, range);
+            limits.map_err(|what| self.unsupported(format!("actuator of joint `{joint}`: {what}")))
+        };
+        Ok(Actuator {
+            control_range: limits("ctrl", element.ctrl_limited, element.ctrl_range)?,
+            effort_range: limits("force", element.force_limited, element.force_range)?,
+            joint,
+            kind,
+        })
+    }
+
+    /// A hinge or slide by name.
+    pub(super) fn axis_joint(&self, name: &str) -> Result<&mjcf_rs::body::Joint, SimError> {
+        let axes = || {
+            let joints = self.model.bodies.iter().flat_map(|entry| &entry.body.joints);
+            joints.filter(|joint| matches!(joint.type_, JointType::Hinge | JointType::Slide))
+        };
+        axes().find(|joint| joint.name.as_deref() == Some(name)).ok_or_else(|| {
+            let have = axes().filter_map(|joint| joint.name.as_deref()).collect::<Vec<_>>().join(", ");
+            self.unsupported(format!("no hinge or slide `{name}`; have: {have}"))
+        })
+    }
+}
+
+impl Document {
+    /// The joint of a body.
+    pub(super) fn joint(&self, body: usize) -> Result<LinkJoint, SimError> {
+        let entry = &self.model.bodies[body];
+        let joint = match entry.body.joints.as_slice() {
+            [] => return Ok(LinkJoint::Fixed),
+            [joint] => joint,
+            several => {
+                let what = format!("it has {} joints; put a body between two joints", several.len());
+                return Err(self.refuse_body(body, &what));
+            }
+        };
+        let refuse = |what: &str| self.source.refuse_at(self.checked.bodies[body].joints[0], what);
+        let name = joint.name.clone().unwrap_or_default();
+        if joint.ref_ != 0.0 || joint.springdamper.is_some_and(|numbers| numbers != [0.0; 2]) {
+            return Err(refuse("`ref` and `springdamper` are not read; state stiffness and damping"));
+        }
+        match joint.type_ {
+            JointType::Free if entry.parent != Some(0) => {
+                Err(refuse("a free body lies in another; move it to the top level"))
+            }
+            JointType::Free => {
+                let states = [joint.stiffness, joint.damping, joint.frictionloss, joint.armature];
+                match states == [0.0; 4] {
+                    true => Ok(LinkJoint::Free { name }),
+                    false => Err(refuse("nothing holds or slows a free body; use <freejoint>")),
+                }
+            }
+            JointType::Hinge => Ok(LinkJoint::Hinge(self.axis(name, joint).map_err(|what| refuse(&what))?)),
+            JointType::Slide => Ok(LinkJoint::Slide(self.axis(name, joint).map_err(|what| refuse(&what))?)),
+            JointType::Ball => Err(refuse("it is a ball; use free, hinge or slide")),
+        }
+    }
+
+    fn axis(&self, name: String, joint: &mjcf_rs::body::Joint) -> Result<AxisJoint, String> {
+        let axis = Axis {
+            anchor_m: DVec3::from_array(joint.pos),
+            armature: joint.armature,
+            friction_loss: joint.frictionloss,
+            damping: joint.damping,
+            stiffness: joint.stiffness,
+            spring_rest: joint.springref,
+            range: self.limits("", joint.limited, joint.range)?,
+            ..Axis::along(DVec3::from_array(joint.axis))
+        };
+        Ok(AxisJoint { name, axis })
+    }
+
+    /// A range, if it limits anything; `what` is limited.
+    fn limits(
+        &self,
+        what: &str,
+        limited: Tristate,
+        range: Option<[f64; 2]>,
+    ) -> Result<Option<[f64; 2]>, String> {
+        let autolimits = self.model.compiler.autolimits;
+        match (limited, range) {
+            (Tristate::True, None) => Err(format!("{what}limited=\"true\" needs a {what}range")),
+            (Tristate::Auto, Some(_)) if !autolimits => {
+                Err(format!("it has a {what}range; state {what}limited, or autolimits=\"true\""))
+            }
+            (_, Some([low, high])) if low >= high && limited.resolve(autolimits, true) => Err(format!(
+                "{what}range=\"{low} {high}\" has its smaller number second, or one number twice"
+            )),
+            (limited, range) => Ok(range.filter(|_| limited.resolve(autolimits, true))),
+        }
+    }
+}

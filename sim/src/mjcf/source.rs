@@ -1,0 +1,155 @@
+//! The text of a file with everything that it includes in its place, and the line that each part of it comes from.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use roxmltree::Node;
+
+use crate::SimError;
+
+/// XML text without `<include>`.
+#[derive(Debug)]
+pub(super) struct MjcfText {
+    pub text: String,
+    files: Vec<SourceFile>,
+    /// Earliest first; together they are the text.
+    pieces: Vec<Piece>,
+    /// Where included files are looked for if they are not beside the file that includes them.
+    folder: PathBuf,
+}
+
+#[derive(Debug)]
+struct SourceFile {
+    name: String,
+    text: String,
+    /// Tells files apart that are included by different names.
+    path: Option<PathBuf>,
+}
+
+/// A part of the text that stands in a file without a break.
+#[derive(Debug)]
+struct Piece {
+    start: usize,
+    file: usize,
+    start_in_file: usize,
+}
+
+impl MjcfText {
+    /// Puts included files where MuJoCo puts them: what stands in their root element replaces the `<include>`.
+    pub fn read(file: &str, xml: &str, folder: &Path) -> Result<MjcfText, SimError> {
+        let mut source =
+            MjcfText { text: String::new(), files: Vec::new(), pieces: Vec::new(), folder: folder.into() };
+        source.files.push(SourceFile { name: file.into(), text: xml.into(), path: None });
+        source.append(0, folder, false)?;
+        Ok(source)
+    }
+
+    /// The text as a tree of elements.
+    pub fn xml(&self) -> Result<roxmltree::Document<'_>, SimError> {
+        let file = || self.files[0].name.clone();
+        roxmltree::Document::parse(&self.text).map_err(|source| SimError::Xml { file: file(), source })
+    }
+
+    /// The refusal of an element, with its line and the names around it.
+    pub fn refuse(&self, node: &Node, what: impl AsRef<str>) -> SimError {
+        let what = format!("{}: {}", describe(node), what.as_ref());
+        SimError::Unsupported { file: self.line(node.range().start), what }
+    }
+
+    /// The refusal of the element that begins at a byte of the text.
+    pub fn refuse_at(&self, byte: usize, what: &str) -> SimError {
+        let xml = match self.xml() {
+            Ok(xml) => xml,
+            Err(error) => return error,
+        };
+        let node = xml.descendants().find(|node| node.is_element() && node.range().start >= byte);
+        self.refuse(&node.unwrap_or(xml.root_element()), what)
+    }
+
+    /// The file and line in which a byte of the text stands, as `scene.xml:12`.
+    pub fn line(&self, byte: usize) -> String {
+        let after = self.pieces.partition_point(|piece| piece.start <= byte);
+        let piece = &self.pieces[after.saturating_sub(1)];
+        self.files[piece.file].line(piece.start_in_file + byte - piece.start)
+    }
+
+    /// Appends a file: the whole of it, or what its root element holds.
+    fn append(&mut self, file: usize, folder: &Path, inside_only: bool) -> Result<(), SimError> {
+        let SourceFile { name, text, .. } = &self.files[file];
+        let (name, text) = (name.clone(), text.clone());
+        let xml = roxmltree::Document::parse(&text)
+            .map_err(|source| SimError::Xml { file: name.clone(), source })?;
+        let whole = match (inside_only, inside(&xml.root_element())) {
+            (false, _) => 0..text.len(),
+            (true, Some(inside)) => inside,
+            (true, None) => {
+                return Err(SimError::Unsupported { file: name, what: "there is nothing to include".into() });
+            }
+        };
+        let mut from = whole.start;
+        for include in xml.descendants().filter(|node| node.has_tag_name("include")) {
+            self.push(file, from..include.range().start);
+            from = include.range().end;
+            let (included, folder) = self.open(file, &include, folder)?;
+            self.append(included, &folder, true)?;
+        }
+        self.push(file, from..whole.end);
+        Ok(())
+    }
+
+    fn push(&mut self, file: usize, range: Range<usize>) {
+        self.pieces.push(Piece { start: self.text.len(), file, start_in_file: range.start });
+        self.text.push_str(&self.files[file].text[range]);
+    }
+
+    /// Reads the file that an `<include>` of another names, and says in which folder it lies.
+    fn open(&mut self, by: usize, include: &Node, folder: &Path) -> Result<(usize, PathBuf), SimError> {
+        let refuse =
+            |what: String| SimError::Unsupported { file: self.files[by].line(include.range().start), what };
+        let name = include.attribute("file").ok_or_else(|| refuse("<include> needs a `file`".into()))?;
+        let beside = folder.join(name);
+        let path = if beside.exists() { beside } else { self.folder.join(name) };
+        let shown = path.display().to_string();
+        let text = std::fs::read_to_string(&path)
+            .map_err(|source| SimError::Read { path: shown.clone(), source })?;
+        let path = path.canonicalize().unwrap_or(path);
+        if self.files.iter().any(|file| file.path.as_ref() == Some(&path)) {
+            return Err(refuse(format!("`{shown}` is included already; a file can be included once")));
+        }
+        let folder = path.parent().unwrap_or(Path::new(".")).to_path_buf();
+        self.files.push(SourceFile { name: shown, text, path: Some(path) });
+        Ok((self.files.len() - 1, folder))
+    }
+}
+
+impl SourceFile {
+    fn line(&self, byte: usize) -> String {
+        let before = &self.text.as_bytes()[..byte];
+        format!("{}:{}", self.name, 1 + before.iter().filter(|byte| **byte == b'\n').count())
+    }
+}
+
+/// Where the content of an element stands.
+fn inside(node: &Node) -> Option<Range<usize>> {
+    Some(node.first_child()?.range().start..node.last_child()?.range().end)
+}
+
+/// An element by its name, or else by the nearest element around it that has one.
+pub(super) fn describe(node: &Node) -> String {
+    let tag = |node: &Node| node.tag_name().name().to_string();
+    let name = |node: &Node| {
+        let class = node.attribute("class").filter(|_| node.has_tag_name("default"));
+        node.attribute("name").or(class).map(String::from)
+    };
+    if let Some(name) = name(node) {
+        return format!("{} `{name}`", tag(node));
+    }
+    let around: Vec<Node> = node.ancestors().skip(1).filter(Node::is_element).collect();
+    let unnamed = around.first().is_some_and(|one| one.has_tag_name("body") && name(one).is_none());
+    let of_unnamed = if unnamed { " of an unnamed body" } else { "" };
+    match (around.iter().find_map(|one| Some((tag(one), name(one)?))), around.as_slice()) {
+        (Some((around, name)), _) => format!("{}{of_unnamed} in {around} `{name}`", tag(node)),
+        (None, [.., section, _]) => format!("{}{of_unnamed} in <{}>", tag(node), tag(section)),
+        (None, _) => format!("<{}>", tag(node)),
+    }
+}

@@ -1,0 +1,233 @@
+//! What stands in `<worldbody>` and `<body>`, and in defaults for it.
+
+use super::{
+    AMOUNT, Attribute, CLASS, COLOR, Element, MAYBE, NAME, NUMBER, POSE, Sign, Support, Takes, USER,
+    approximated, attribute, ignored, mapped, numbers, only, refused,
+};
+
+const TREE: &[&str] = &["worldbody", "body", "frame"];
+/// Elements in which bodies and what is on them stand, or what classes say of these.
+const TREE_OR_DEFAULT: &[&str] = &["worldbody", "body", "frame", "default"];
+
+pub(super) const ELEMENTS: &[Element] = &[
+    Element {
+        name: "worldbody",
+        within: &["mujoco"],
+        support: Support::Mapped,
+        kind: None,
+        attributes: &[],
+        note: "",
+    },
+    Element {
+        name: "body",
+        within: TREE,
+        support: Support::Mapped,
+        kind: Some("body"),
+        attributes: &[&[NAME, CHILDCLASS], POSE, BODY],
+        note: "a body without a joint is a part of the body that carries it; of a robot's file there is one in the worldbody, and it is free",
+    },
+    Element {
+        name: "frame",
+        within: TREE,
+        support: Support::Mapped,
+        kind: Some("frame"),
+        attributes: &[&[NAME, CHILDCLASS], POSE],
+        note: "",
+    },
+    Element {
+        name: "inertial",
+        within: &["body"],
+        support: Support::Mapped,
+        kind: None,
+        attributes: &[
+            POSE,
+            &[
+                mapped(&["mass"], AMOUNT),
+                mapped(&["diaginertia"], Takes::Numbers { least: 3, most: 3, sign: Sign::NotNegative }),
+                mapped(&["fullinertia"], numbers(6, 6)),
+            ],
+        ],
+        note: "without it, mass and inertia are those of the geoms",
+    },
+    Element {
+        name: "joint",
+        within: &["body", "default"],
+        support: Support::Mapped,
+        kind: Some("joint"),
+        attributes: &[&[NAME, CLASS], JOINT],
+        note: "at most one a body; limits are hard; of a robot's file all are hinges at their body's origin, without springs and damping",
+    },
+    Element {
+        name: "freejoint",
+        within: &["body"],
+        support: Support::Mapped,
+        kind: Some("joint"),
+        attributes: &[&[
+            NAME,
+            only(&["align"], &["false", "auto"], "the frame of a free body is where the file has it"),
+            ignored(&["group"], "joints are not drawn"),
+        ]],
+        note: "of a body that stands in the worldbody",
+    },
+    Element {
+        name: "geom",
+        within: TREE_OR_DEFAULT,
+        support: Support::Mapped,
+        kind: Some("geom"),
+        attributes: &[&[NAME, CLASS], POSE, GEOM],
+        note: "",
+    },
+    Element {
+        name: "site",
+        within: TREE_OR_DEFAULT,
+        support: Support::Mapped,
+        kind: Some("site"),
+        attributes: &[&[NAME, CLASS], POSE, SITE],
+        note: "a named point, or a region; it is not drawn",
+    },
+    Element {
+        name: "camera",
+        within: &["worldbody", "body"],
+        support: Support::Mapped,
+        kind: Some("camera"),
+        attributes: &[CAMERA],
+        note: "on a body that has a name, or in the worldbody",
+    },
+    Element {
+        name: "camera",
+        within: &["frame", "default"],
+        support: Support::Refused,
+        kind: None,
+        attributes: &[],
+        note: "state everything on the camera itself, outside of frames",
+    },
+    Element {
+        name: "light",
+        within: TREE_OR_DEFAULT,
+        support: Support::Ignored,
+        kind: None,
+        attributes: &[],
+        note: "one sun with shadow lights every scene",
+    },
+    Element {
+        name: "plugin",
+        within: &["worldbody", "body", "frame", "geom", "mesh", "actuator", "sensor", "extension"],
+        support: Support::Refused,
+        kind: None,
+        attributes: &[],
+        note: "plugins of MuJoCo are not run",
+    },
+    refused_in_tree("composite", "write its bodies out"),
+    refused_in_tree("flexcomp", "nothing bends or stretches here"),
+    refused_in_tree("replicate", "write its copies out, or let MuJoCo save the file"),
+    refused_in_tree("attach", "include the file, or let MuJoCo save the whole"),
+];
+
+const fn refused_in_tree(name: &'static str, note: &'static str) -> Element {
+    Element { name, within: TREE, support: Support::Refused, kind: None, attributes: &[], note }
+}
+
+const CHILDCLASS: Attribute = mapped(&["childclass"], Takes::Class);
+
+const BODY: &[Attribute] = &[
+    only(&["mocap"], &["false"], "nothing is moved from outside"),
+    only(&["gravcomp"], &["0"], "everything has its whole weight"),
+    refused(&["sleep"], "bodies never sleep; leave it out"),
+    ignored(&["simple", "fuse"], "they change how MuJoCo computes, not what"),
+    USER,
+];
+
+const JOINT: &[Attribute] = &[
+    attribute(
+        Support::Mapped,
+        &["type"],
+        Takes::Word(&["free", "hinge", "slide", "ball"]),
+        "`ball` is refused; use three hinges with bodies between them",
+    ),
+    mapped(&["pos"], numbers(3, 3)),
+    mapped(&["axis"], Takes::Direction(3)),
+    mapped(&["range"], numbers(2, 2)),
+    mapped(&["limited"], MAYBE),
+    mapped(&["stiffness", "damping", "frictionloss", "armature"], AMOUNT),
+    mapped(&["springref"], NUMBER),
+    only(&["ref"], &["0"], "`ref` and `springdamper` are not read; state stiffness and damping"),
+    only(&["springdamper"], &["0 0"], "`ref` and `springdamper` are not read; state stiffness and damping"),
+    attribute(Support::Approximated, &["margin"], Takes::Only(&["0"]), "a limit acts at the limit"),
+    approximated(
+        &["solreflimit", "solimplimit", "solreffriction", "solimpfriction"],
+        "limits and friction of joints are hard",
+    ),
+    refused(&["actuatorfrcrange"], "state a forcerange on the actuator"),
+    only(&["actuatorfrclimited"], &["false", "auto"], "state a forcerange on the actuator"),
+    only(&["actuatorgravcomp"], &["false"], "everything has its whole weight"),
+    ignored(&["group"], "joints are not drawn"),
+    USER,
+];
+
+const GEOM: &[Attribute] = &[
+    attribute(
+        Support::Mapped,
+        &["type"],
+        Takes::Word(&["plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf"]),
+        "`hfield` and `sdf` are refused; meshes and ellipsoids collide as their hulls, planes as slabs 0.2 m thick (an endless one is 100 m wide)",
+    ),
+    mapped(&["size"], Takes::Numbers { least: 1, most: 3, sign: Sign::NotNegative }),
+    mapped(&["fromto"], numbers(6, 6)),
+    mapped(&["mass", "density"], AMOUNT),
+    only(&["shellinertia"], &["false"], "geoms are filled evenly"),
+    mapped(&["friction"], Takes::Numbers { least: 1, most: 3, sign: Sign::NotNegative }),
+    mapped(&["condim"], Takes::Word(&["1", "3", "4", "6"])),
+    mapped(&["priority"], NUMBER),
+    attribute(
+        Support::Approximated,
+        &["contype", "conaffinity"],
+        Takes::Only(&["0", "1"]),
+        "a geom with both 0 touches nothing; all others touch each other",
+    ),
+    attribute(
+        Support::Approximated,
+        &["margin", "gap"],
+        Takes::Only(&["0"]),
+        "contacts begin where surfaces meet",
+    ),
+    approximated(
+        &["solref", "solimp", "solmix"],
+        "every contact is as soft as a hundred times the lighter body's weight makes it sink 9 mm",
+    ),
+    only(&["surfacevel"], &["0 0 0"], "surfaces do not run"),
+    only(&["adhesion"], &["0"], "nothing sticks"),
+    mapped(&["mesh"], Takes::NameOf("mesh")),
+    refused(&["hfield"], "write a height field as boxes or as meshes"),
+    ignored(&["fitscale"], "it is for shapes fitted to meshes, which are refused"),
+    mapped(&["material"], Takes::NameOf("material")),
+    mapped(&["rgba"], COLOR),
+    attribute(Support::Mapped, &["group"], NUMBER, "groups above 2 are not drawn, as in MuJoCo"),
+    ignored(&["fluidshape", "fluidcoef"], "there is no medium"),
+    USER,
+];
+
+const SITE: &[Attribute] = &[
+    mapped(&["type"], Takes::Word(&["sphere", "capsule", "ellipsoid", "cylinder", "box"])),
+    mapped(&["size"], Takes::Numbers { least: 1, most: 3, sign: Sign::NotNegative }),
+    refused(&["fromto"], "state pos, a rotation and size"),
+    refused(&["mesh"], "use another type"),
+    ignored(&["group", "material", "rgba"], "sites are not drawn"),
+    USER,
+];
+
+const CAMERA: &[Attribute] = &[
+    NAME,
+    mapped(&["pos"], numbers(3, 3)),
+    mapped(&["quat"], Takes::Quaternion),
+    mapped(&["xyaxes"], Takes::Axes),
+    refused(&["axisangle", "euler", "zaxis"], "use quat or xyaxes"),
+    mapped(&["fovy"], Takes::Numbers { least: 1, most: 1, sign: Sign::Positive }),
+    mapped(&["resolution"], Takes::Numbers { least: 2, most: 2, sign: Sign::Positive }),
+    refused(&["focal", "focalpixel", "principal", "principalpixel", "sensorsize"], "use fovy"),
+    only(&["orthographic"], &["false"], "every camera has a perspective"),
+    only(&["projection"], &["perspective"], "every camera has a perspective"),
+    attribute(Support::Approximated, &["mode"], Takes::Only(&["fixed"]), "a camera is fixed to its body"),
+    approximated(&["target"], "a camera is fixed to its body"),
+    ignored(&["class", "ipd", "output"], "they say nothing of the picture"),
+    USER,
+];

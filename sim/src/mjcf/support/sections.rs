@@ -1,0 +1,386 @@
+//! What stands beside the bodies: settings, defaults, assets, contacts, equalities, actuators and keys.
+
+use super::{
+    AMOUNT, ANY_NUMBERS, Attribute, BOOLEAN, CLASS, COLOR, Element, MAYBE, NAME, NUMBER, Support, Takes,
+    USER, approximated, attribute, ignored, mapped, numbers, only, refused,
+};
+
+pub(super) const ELEMENTS: &[Element] = &[
+    element(
+        Support::Mapped,
+        "mujoco",
+        &[""],
+        &[&[ignored(&["model"], "files are called by their names")]],
+        "",
+    ),
+    element(
+        Support::Mapped,
+        "include",
+        &["mujoco", "any"],
+        &[&[mapped(&["file"], Takes::Text)]],
+        "beside the file that includes it, or else beside the first; every file once, as in MuJoCo",
+    ),
+    element(Support::Mapped, "compiler", &["mujoco"], &[COMPILER], ""),
+    element(Support::Ignored, "lengthrange", &["compiler"], &[], "it is for muscles"),
+    element(Support::Mapped, "option", &["mujoco"], &[OPTION], ""),
+    element(Support::Mapped, "flag", &["option"], &[FLAG], ""),
+    element(Support::Ignored, "size", &["mujoco"], &[], "memory is taken as it is needed"),
+    element(Support::Ignored, "statistic", &["mujoco"], &[], "it is for MuJoCo's viewer"),
+    element(Support::Ignored, "visual", &["mujoco"], &[], "it is for MuJoCo's viewer"),
+    element(Support::Ignored, "custom", &["mujoco"], &[], "nobody asks for it"),
+    element(
+        Support::Ignored,
+        "sensor",
+        &["mujoco"],
+        &[],
+        "robots sense what a real one does, whatever the file",
+    ),
+    element(Support::Mapped, "extension", &["mujoco"], &[], "its plugins are refused"),
+    element(
+        Support::Mapped,
+        "default",
+        &["mujoco", "default"],
+        &[&[mapped(&["class"], Takes::Text)]],
+        "classes inherit as in MuJoCo; numbers that a class states are not replaced in part, and a pose only as a whole",
+    ),
+    element(Support::Mapped, "asset", &["mujoco"], &[], ""),
+    named(
+        Support::Mapped,
+        "mesh",
+        &["asset", "default"],
+        "mesh",
+        &[&[NAME, CLASS], MESH],
+        "files are OBJ and STL",
+    ),
+    named(
+        Support::Mapped,
+        "texture",
+        &["asset"],
+        "texture",
+        &[&[NAME], TEXTURE],
+        "of a picture its mean colour is taken",
+    ),
+    named(Support::Mapped, "material", &["asset", "default"], "material", &[&[NAME, CLASS], MATERIAL], ""),
+    element(Support::Ignored, "layer", &["material"], &[], "of a material its colour and texture are taken"),
+    element(Support::Refused, "hfield", &["asset"], &[], "write a height field as boxes or as meshes"),
+    element(Support::Refused, "skin", &["asset", "deformable"], &[], "nothing bends or stretches here"),
+    element(Support::Refused, "model", &["asset"], &[], "include the file, or let MuJoCo save the whole"),
+    element(Support::Mapped, "contact", &["mujoco"], &[], ""),
+    named(
+        Support::Mapped,
+        "exclude",
+        &["contact"],
+        "exclude",
+        &[&[NAME, mapped(&["body1", "body2"], Takes::Text)]],
+        "of two bodies that move, or two that do not",
+    ),
+    element(Support::Refused, "pair", &["contact", "default"], &[], "state friction on the geoms"),
+    element(Support::Refused, "deformable", &["mujoco"], &[], "nothing bends or stretches here"),
+    element(Support::Refused, "tendon", &["mujoco", "default"], &[], "couple joints with an equality"),
+    element(Support::Mapped, "equality", &["mujoco"], &[], "they are hard; a robot's file has none"),
+    element(Support::Mapped, "equality", &["default"], &[&[mapped(&["active"], BOOLEAN), SOFTNESS]], ""),
+    named(Support::Mapped, "connect", &["equality"], "equality", &[EQUALITY, CONNECT], ""),
+    named(Support::Mapped, "weld", &["equality"], "equality", &[EQUALITY, WELD], ""),
+    named(Support::Mapped, "joint", &["equality"], "equality", &[EQUALITY, COUPLING], ""),
+    element(Support::Refused, "tendon", &["equality"], &[], "use joint, weld or connect"),
+    element(Support::Refused, "flex", &["equality"], &[], "use joint, weld or connect"),
+    element(Support::Refused, "flexvert", &["equality"], &[], "use joint, weld or connect"),
+    element(Support::Refused, "flexstrain", &["equality"], &[], "use joint, weld or connect"),
+    element(Support::Refused, "distance", &["equality"], &[], "use joint, weld or connect"),
+    element(Support::Mapped, "actuator", &["mujoco"], &[], "one a joint"),
+    named(Support::Mapped, "motor", ACTUATORS, "actuator", &[ACTUATOR], "not in a robot's file"),
+    named(
+        Support::Mapped,
+        "position",
+        ACTUATORS,
+        "actuator",
+        &[ACTUATOR, POSITION],
+        "of a robot's file all are of this kind, in the published order of joints",
+    ),
+    other_actuator("general"),
+    other_actuator("velocity"),
+    other_actuator("intvelocity"),
+    other_actuator("damper"),
+    other_actuator("orientation"),
+    other_actuator("pid"),
+    other_actuator("cylinder"),
+    other_actuator("muscle"),
+    other_actuator("adhesion"),
+    other_actuator("dcmotor"),
+    element(Support::Mapped, "keyframe", &["mujoco"], &[], ""),
+    named(
+        Support::Mapped,
+        "key",
+        &["keyframe"],
+        "key",
+        &[KEY],
+        "a scene begins as its key `start` has it; actuators do what that key tells them, and from the `time` of every later key what that one does; a robot begins in the `qpos` of its file's first key",
+    ),
+];
+
+const ACTUATORS: &[&str] = &["actuator", "default"];
+const SOFTNESS: Attribute = approximated(&["solref", "solimp"], "equalities are hard");
+
+const fn element(
+    support: Support,
+    name: &'static str,
+    within: &'static [&'static str],
+    attributes: &'static [&'static [Attribute]],
+    note: &'static str,
+) -> Element {
+    Element { name, within, support, kind: None, attributes, note }
+}
+
+const fn named(
+    support: Support,
+    name: &'static str,
+    within: &'static [&'static str],
+    kind: &'static str,
+    attributes: &'static [&'static [Attribute]],
+    note: &'static str,
+) -> Element {
+    Element { name, within, support, kind: Some(kind), attributes, note }
+}
+
+const fn other_actuator(name: &'static str) -> Element {
+    element(Support::Refused, name, ACTUATORS, &[], "use motor or position")
+}
+
+const COMPILER: &[Attribute] = &[
+    mapped(&["angle"], Takes::Word(&["degree", "radian"])),
+    mapped(&["autolimits", "strippath"], BOOLEAN),
+    mapped(&["eulerseq"], Takes::AxisSequence),
+    mapped(&["meshdir", "texturedir", "assetdir"], Takes::Text),
+    only(&["coordinate"], &["local"], "let MuJoCo 2.3.3 save the file"),
+    only(&["inertiafromgeom"], &["auto"], "state an <inertial>, or none"),
+    only(&["inertiagrouprange"], &["0 5"], "give geoms that should weigh nothing mass=\"0\""),
+    only(&["settotalmass"], &["-1"], "state masses that add up"),
+    only(&["fitaabb", "alignfree"], &["false"], "shapes and frames are as the file states them"),
+    only(&["convexhull"], &["true"], "meshes collide as their hulls"),
+    attribute(
+        Support::Approximated,
+        &["balanceinertia"],
+        Takes::Only(&["false"]),
+        "masses and inertias stay as the file states them",
+    ),
+    attribute(
+        Support::Approximated,
+        &["boundmass", "boundinertia"],
+        Takes::Only(&["0"]),
+        "masses and inertias stay as the file states them",
+    ),
+    attribute(
+        Support::Approximated,
+        &["exactmeshinertia"],
+        Takes::Only(&["false"]),
+        "a mesh weighs what its hull weighs",
+    ),
+    ignored(
+        &["discardvisual", "usethread", "fusestatic", "saveinertial", "conflict"],
+        "they change how MuJoCo computes, not what",
+    ),
+];
+
+const OPTION: &[Attribute] = &[
+    attribute(
+        Support::Approximated,
+        &["timestep"],
+        Takes::Only(&["0.005"]),
+        "every world is stepped by 5 ms",
+    ),
+    only(&["gravity"], &["0 0 -9.81"], "z is up, and things weigh what they weigh on earth"),
+    only(&["wind"], &["0 0 0"], "there is no medium"),
+    only(&["density", "viscosity"], &["0"], "there is no medium"),
+    refused(&["actuatorgroupdisable"], "leave out actuators that should do nothing"),
+    ignored(&["magnetic"], "nothing senses it"),
+    ignored(&["o_margin", "o_solref", "o_solimp", "o_friction"], "the flag that would use them is refused"),
+    ignored(
+        &[
+            "integrator",
+            "cone",
+            "impratio",
+            "jacobian",
+            "solver",
+            "iterations",
+            "tolerance",
+            "ls_iterations",
+            "ls_tolerance",
+            "noslip_iterations",
+            "noslip_tolerance",
+            "ccd_iterations",
+            "ccd_tolerance",
+            "sdf_iterations",
+            "sdf_initpoints",
+            "sleep_tolerance",
+            "apirate",
+        ],
+        "the solver is our own, with elliptic friction cones",
+    ),
+];
+
+const FLAG: &[Attribute] = &[
+    only(
+        &[
+            "constraint",
+            "equality",
+            "frictionloss",
+            "limit",
+            "contact",
+            "passive",
+            "spring",
+            "damper",
+            "gravity",
+            "clampctrl",
+            "actuation",
+            "filterparent",
+        ],
+        &["enable"],
+        "physics has all its parts",
+    ),
+    only(&["override", "ipc"], &["disable"], "contacts are those of the geoms"),
+    ignored(
+        &[
+            "warmstart",
+            "refsafe",
+            "sensor",
+            "midphase",
+            "eulerdamp",
+            "autoreset",
+            "nativeccd",
+            "island",
+            "multiccd",
+            "energy",
+            "fwdinv",
+            "invdiscrete",
+            "sleep",
+            "diagexact",
+        ],
+        "the solver is our own",
+    ),
+];
+
+const MESH: &[Attribute] = &[
+    mapped(&["file"], Takes::Text),
+    attribute(Support::Mapped, &["vertex"], ANY_NUMBERS, "drawn as its hull"),
+    approximated(&["face"], "a mesh of vertices is drawn as its hull"),
+    mapped(&["scale"], numbers(3, 3)),
+    only(&["refpos"], &["0 0 0"], "place the geom instead"),
+    only(&["refquat"], &["1 0 0 0"], "place the geom instead"),
+    attribute(
+        Support::Approximated,
+        &["inertia"],
+        Takes::Only(&["convex"]),
+        "a mesh weighs what its hull weighs",
+    ),
+    approximated(&["maxhullvert"], "a hull has all the corners it needs"),
+    refused(&["builtin", "params"], "write the mesh to a file"),
+    refused(&["material"], "state it on the geoms"),
+    ignored(&["content_type"], "the file's name says it"),
+    ignored(&["normal", "texcoord", "smoothnormal"], "faces are drawn flat, in one colour"),
+];
+
+const TEXTURE: &[Attribute] = &[
+    mapped(&["file"], Takes::Text),
+    attribute(
+        Support::Mapped,
+        &["builtin"],
+        Takes::Word(&["none", "gradient", "checker", "flat"]),
+        "`checker` is drawn, other patterns are not",
+    ),
+    mapped(&["rgb1", "rgb2"], numbers(3, 3)),
+    ignored(
+        &[
+            "class",
+            "type",
+            "colorspace",
+            "content_type",
+            "gridsize",
+            "gridlayout",
+            "fileright",
+            "fileleft",
+            "fileup",
+            "filedown",
+            "filefront",
+            "fileback",
+            "mark",
+            "markrgb",
+            "random",
+            "width",
+            "height",
+            "hflip",
+            "vflip",
+            "nchannel",
+        ],
+        "of a texture its mean colour or its checker is drawn",
+    ),
+];
+
+const MATERIAL: &[Attribute] = &[
+    mapped(&["texture"], Takes::NameOf("texture")),
+    mapped(&["rgba"], COLOR),
+    ignored(
+        &[
+            "texrepeat",
+            "texuniform",
+            "emission",
+            "specular",
+            "shininess",
+            "reflectance",
+            "metallic",
+            "roughness",
+        ],
+        "of a material its colour and texture are taken",
+    ),
+];
+
+const EQUALITY: &[Attribute] = &[NAME, CLASS, mapped(&["active"], BOOLEAN), SOFTNESS];
+const CONNECT: &[Attribute] = &[
+    mapped(&["body1", "body2"], Takes::Text),
+    mapped(&["anchor"], numbers(3, 3)),
+    refused(&["site1", "site2"], "use bodies and an anchor"),
+];
+const WELD: &[Attribute] = &[
+    mapped(&["body1", "body2"], Takes::Text),
+    mapped(&["relpose"], numbers(7, 7)),
+    approximated(&["anchor"], "welds are hard, wherever they hold"),
+    attribute(
+        Support::Approximated,
+        &["torquescale"],
+        Takes::Only(&["1"]),
+        "welds are hard, wherever they hold",
+    ),
+    refused(&["site1", "site2"], "use bodies"),
+];
+const COUPLING: &[Attribute] =
+    &[mapped(&["joint1", "joint2"], Takes::Text), mapped(&["polycoef"], numbers(1, 5))];
+
+const ACTUATOR: &[Attribute] = &[
+    NAME,
+    CLASS,
+    mapped(&["joint"], Takes::Text),
+    mapped(&["ctrlrange"], numbers(2, 2)),
+    attribute(Support::Mapped, &["forcerange"], numbers(2, 2), "of the form `-x x`; others are refused"),
+    mapped(&["ctrllimited", "forcelimited"], MAYBE),
+    only(&["gear"], &["1"], "it has a gear; state gains and ranges of the joint"),
+    only(&["damping", "armature"], &["0"], "state it on the joint"),
+    only(&["nsample", "interp", "delay"], &["0"], "commands act at once"),
+    refused(
+        &["jointinparent", "tendon", "site", "refsite", "body", "slidersite", "cranksite", "cranklength"],
+        "actuators act on joints",
+    ),
+    ignored(&["lengthrange"], "it is for muscles"),
+    ignored(&["group"], "actuators are not drawn"),
+    USER,
+];
+const POSITION: &[Attribute] = &[
+    mapped(&["kp", "kv"], AMOUNT),
+    refused(&["dampratio"], "state kv"),
+    only(&["timeconst", "inheritrange"], &["0"], "state ctrlrange; commands act at once"),
+];
+
+const KEY: &[Attribute] = &[
+    NAME,
+    mapped(&["time"], NUMBER),
+    mapped(&["qpos", "qvel", "ctrl"], ANY_NUMBERS),
+    refused(&["act", "mpos", "mquat"], "no actuator has a state, and nothing is moved from outside"),
+];

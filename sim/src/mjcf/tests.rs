@@ -1,0 +1,349 @@
+//! Trees, equalities and actuators of small files, and what is refused.
+
+use rapier3d::glamx::{DPose3, DQuat, DVec3};
+
+use super::{
+    Actuator, ActuatorKind, AxisJoint, BodyTree, Document, EqualityConstraint, EqualityKind, LinkJoint,
+};
+use crate::dynamics::{Axis, Directions, Friction};
+
+fn document(inside: &str) -> Document {
+    let xml = format!("<mujoco><compiler angle=\"radian\" autolimits=\"true\"/>{inside}</mujoco>");
+    Document::parse("test.xml", &xml).expect("valid MJCF")
+}
+
+fn trees(inside: &str) -> Vec<BodyTree> {
+    document(inside).trees().expect("trees")
+}
+
+const DOOR: &str = r#"
+  <worldbody>
+    <geom type="plane" size="1 1 0.1"/>
+    <body name="frame" pos="1 0 0">
+      <geom type="box" pos="0 0 1" size="0.05 0.05 1"/>
+      <body name="leaf" pos="0 0 1">
+        <joint name="hinge" pos="0.1 0 0" axis="0 0 2" range="0 1.5" damping="2" stiffness="0.5" springref="0.1"
+          armature="0.01" frictionloss="0.3"/>
+        <geom type="box" pos="0.4 0 0" size="0.4 0.02 0.9" mass="20"/>
+        <body name="plate" pos="0.7 0 0" quat="0 0 0 1">
+          <geom type="sphere" size="0.05" mass="1"/>
+          <site name="keyhole" pos="0.1 0 0"/>
+          <body name="bolt" pos="0.05 0 0">
+            <joint name="bolt" type="slide" axis="1 0 0" limited="false" range="0 1"/>
+            <geom type="sphere" size="0.01" mass="0.1"/>
+          </body>
+        </body>
+      </body>
+    </body>
+    <body name="mat" pos="0 0 0.1"><freejoint name="mat"/><geom type="box" size="0.1 0.2 0.3" density="500"/></body>
+  </worldbody>
+  <equality>
+    <joint name="latch" joint1="bolt" joint2="hinge" polycoef="0 0.5 0 0 0" active="false"/>
+    <weld body1="mat" body2="plate"/>
+    <connect body1="leaf" anchor="0 0 1"/>
+  </equality>
+  <actuator>
+    <motor joint="hinge" ctrlrange="-5 5"/>
+    <position joint="bolt" kp="20" kv="3" forcerange="-4 4"/>
+  </actuator>"#;
+
+#[test]
+fn bodies_without_a_joint_belong_to_the_link_that_carries_them() {
+    let trees = trees(DOOR);
+    let names: Vec<Vec<&str>> =
+        trees.iter().map(|tree| tree.links.iter().map(|link| link.name.as_str()).collect()).collect();
+    assert_eq!(names, [vec!["world"], vec!["frame", "leaf", "bolt"], vec!["mat"]]);
+    let parents: Vec<Option<usize>> = trees[1].links.iter().map(|link| link.parent).collect();
+    assert_eq!(parents, [None, Some(0), Some(1)]);
+    assert_eq!(trees.iter().map(BodyTree::is_fixed).collect::<Vec<_>>(), [true, false, false]);
+
+    let leaf = &trees[1].links[1];
+    assert_eq!(leaf.bodies[1].name, "plate");
+    assert_eq!(leaf.bodies[1].link_from_body.translation, DVec3::new(0.7, 0.0, 0.0));
+    // The plate is turned half round, so its x is the leaf's -x.
+    assert!((leaf.sites[0].position_m().x - 0.6).abs() < 1e-6);
+    let bolt = &trees[1].links[2];
+    assert!((bolt.parent_from_link.translation - DVec3::new(0.65, 0.0, 0.0)).length() < 1e-9);
+}
+
+#[test]
+fn masses_come_from_all_geoms_of_a_link() {
+    let trees = trees(DOOR);
+    let leaf = &trees[1].links[1].mass;
+    assert!((leaf.mass() - 21.0).abs() < 1e-4);
+    assert!((leaf.local_com.x - (20.0 * 0.4 + 0.7) / 21.0).abs() < 1e-6);
+    let mat = &trees[2].links[0].mass;
+    let (mass_kg, x, y, z) = (500.0 * 0.2 * 0.4 * 0.6, 0.1f32, 0.2f32, 0.3f32);
+    assert!((mat.mass() - mass_kg).abs() < 1e-4);
+    let mut expected = [y * y + z * z, x * x + z * z, x * x + y * y].map(|sum| mass_kg / 3.0 * sum);
+    let mut have = mat.principal_inertia().to_array();
+    expected.sort_by(f32::total_cmp);
+    have.sort_by(f32::total_cmp);
+    for (have, expected) in have.into_iter().zip(expected) {
+        assert!((have - expected).abs() < 1e-4 * expected, "{have} instead of {expected}");
+    }
+}
+
+#[test]
+fn joints_keep_everything_the_file_says() {
+    let trees = trees(DOOR);
+    let axis = Axis {
+        anchor_m: DVec3::new(0.1, 0.0, 0.0),
+        armature: 0.01,
+        friction_loss: 0.3,
+        damping: 2.0,
+        stiffness: 0.5,
+        spring_rest: 0.1,
+        range: Some([0.0, 1.5]),
+        ..Axis::along(DVec3::Z)
+    };
+    let hinge = AxisJoint { name: "hinge".into(), axis };
+    assert_eq!(trees[1].links[1].joint, LinkJoint::Hinge(hinge));
+    let bolt = trees[1].links[2].joint.axis().expect("a slide");
+    assert_eq!(bolt.range, None, "`limited` is false");
+    assert_eq!(trees[2].links[0].joint, LinkJoint::Free { name: "mat".into() });
+}
+
+#[test]
+fn equalities_and_actuators_are_read() {
+    let document = document(DOOR);
+    let unnamed = |kind| EqualityConstraint { name: String::new(), active: true, kind };
+    let coupling = EqualityKind::Coupling {
+        joint: "bolt".into(),
+        other: Some("hinge".into()),
+        coefficients: [0.0, 0.5, 0.0, 0.0, 0.0],
+    };
+    let weld = EqualityKind::Weld { body: "mat".into(), other: Some("plate".into()), body_from_other: None };
+    let pin = EqualityKind::Pin { body: "leaf".into(), other: None, anchor_in_body_m: DVec3::Z };
+    assert_eq!(
+        document.equalities().expect("equalities"),
+        [
+            EqualityConstraint { name: "latch".into(), active: false, kind: coupling },
+            unnamed(weld),
+            unnamed(pin)
+        ]
+    );
+    let motor = Actuator {
+        joint: "hinge".into(),
+        kind: ActuatorKind::Motor,
+        control_range: Some([-5.0, 5.0]),
+        effort_range: None,
+    };
+    let position = Actuator {
+        joint: "bolt".into(),
+        kind: ActuatorKind::Position { kp: 20.0, kd: 3.0 },
+        control_range: None,
+        effort_range: Some([-4.0, 4.0]),
+    };
+    assert_eq!(document.actuators().expect("actuators"), [motor, position]);
+}
+
+#[test]
+fn a_weld_keeps_the_pose_it_states() {
+    let bodies = r#"<worldbody><body name="a"><freejoint/><geom size="1"/></body></worldbody>"#;
+    let weld = |relpose: &str| {
+        let inside = format!("{bodies}<equality><weld body1=\"a\" relpose=\"{relpose}\"/></equality>");
+        match document(&inside).equalities().expect("equalities").remove(0).kind {
+            EqualityKind::Weld { body_from_other, .. } => body_from_other,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(weld("0 1 0 0 0 0 0"), None, "MuJoCo's default");
+    let turned = DPose3::from_parts(DVec3::new(1.0, 2.0, 3.0), DQuat::from_xyzw(0.0, 0.0, 1.0, 0.0));
+    assert_eq!(weld("1 2 3 0 0 0 1"), Some(turned));
+}
+
+#[test]
+fn geoms_have_mujocos_friction_unless_they_state_it() {
+    let friction = |attributes: &str| {
+        let inside = format!("<worldbody><geom type=\"plane\" size=\"1 1 1\" {attributes}/></worldbody>");
+        trees(&inside)[0].links[0].geoms[0].friction
+    };
+    let usual =
+        Friction { directions: Directions::Slide, slide: 1.0, spin_m: 0.005, roll_m: 0.0001, priority: 0 };
+    assert_eq!(friction(""), usual);
+    let stated = Friction {
+        directions: Directions::SlideSpinRoll,
+        slide: 0.6,
+        spin_m: 0.01,
+        roll_m: 0.002,
+        priority: 2,
+    };
+    assert_eq!(friction(r#"friction="0.6 0.01 0.002" condim="6" priority="2""#), stated);
+}
+
+/// Why a file is refused.
+fn refusal(inside: &str) -> String {
+    let xml = format!("<mujoco><compiler angle=\"radian\" autolimits=\"true\"/>\n{inside}</mujoco>");
+    let read = || {
+        let document = Document::parse("test.xml", &xml)?;
+        document.trees()?;
+        document.equalities()?;
+        document.actuators()?;
+        document.exclusions()?;
+        document.keys()
+    };
+    read().err().unwrap_or_else(|| panic!("{inside} is accepted")).to_string()
+}
+
+#[test]
+fn what_is_refused_says_what_would_work() {
+    let body =
+        |joints: &str| format!(r#"<worldbody><body name="a">{joints}<geom size="1"/></body></worldbody>"#);
+    let hinge = r#"<joint name="h"/>"#;
+    let check = |inside: String, told: &str| {
+        let error = refusal(&inside);
+        assert!(error.contains(told), "{error}");
+    };
+    check(body(&format!("{hinge}<joint name=\"i\"/>")), "put a body between two joints");
+    check(body(r#"<joint type="ball"/>"#), "use free, hinge or slide");
+    check(body(r#"<joint ref="1"/>"#), "`ref` and `springdamper` are not read");
+    check(body(r#"<body name="b"><freejoint/></body>"#), "move it to the top level");
+    check(body(r#"<geom size="1" condim="2"/>"#), "use 1, 3, 4 or 6");
+    let coupled = r#"<equality><joint joint1="h" joint2="i"/></equality>"#;
+    check(format!("{}{coupled}", body(hinge)), "no hinge or slide `i`; have: h");
+    let welded = r#"<equality><weld body1="b"/></equality>"#;
+    check(format!("{}{welded}", body(hinge)), "unknown body `b`; have: a");
+    let general = r#"<actuator><velocity joint="h"/></actuator>"#;
+    check(format!("{}{general}", body(hinge)), "use motor or position");
+    let geared = r#"<actuator><motor joint="h" gear="2"/></actuator>"#;
+    check(format!("{}{geared}", body(hinge)), "has a gear");
+}
+
+#[test]
+fn a_refusal_names_the_line_and_what_is_around() {
+    let check = |inside: &str, expected: &str| assert_eq!(refusal(inside), expected);
+    check(
+        "<worldbody>\n<body name=\"door\">\n<body>\n<inertial pos=\"0 0 0\" mass=\"-1\" diaginertia=\"1 1 1\"/></body></body></worldbody>",
+        "`test.xml:5`: inertial of an unnamed body in body `door`: mass=\"-1\"; use 1 number of at least 0",
+    );
+    check(
+        "<worldbody><body name=\"a\"><geom size=\"1\"/></body>\n<body name=\"b\" pos=\"nan 0 0\"><geom size=\"1\"/></body></worldbody>",
+        "`test.xml:3`: body `b`: pos=\"nan 0 0\"; use 3 numbers",
+    );
+    check(
+        "<worldbody><body name=\"a\" quat=\"0 0 0 0\"/></worldbody>",
+        "`test.xml:2`: body `a`: quat=\"0 0 0 0\"; use 4 numbers (w x y z), not all 0",
+    );
+    check(
+        "<worldbody><site name=\"task\"/>\n<site name=\"task\"/></worldbody>",
+        "`test.xml:3`: site `task`: there is a site `task` already; name it otherwise",
+    );
+    check(
+        "<worldbody><body name=\"a\">\n<flexcomp name=\"cloth\"/></body></worldbody>",
+        "`test.xml:3`: flexcomp `cloth`: <flexcomp> is not read; nothing bends or stretches here",
+    );
+    check(
+        "<worldbody><body name=\"a\"><plugin plugin=\"mujoco.elasticity.cable\"/></body></worldbody>",
+        "`test.xml:2`: plugin in body `a`: <plugin> is not read; plugins of MuJoCo are not run",
+    );
+    check(
+        "<extension><plugin plugin=\"mujoco.sdf.bolt\"/></extension>",
+        "`test.xml:2`: plugin in <extension>: <plugin> is not read; plugins of MuJoCo are not run",
+    );
+    check(
+        "<worldbody><body><joint name=\"h\"/></body></worldbody>",
+        "`test.xml:2`: body in <worldbody>: its joint moves nothing that has mass; give it a mass or the joint an armature",
+    );
+}
+
+#[test]
+fn bodies_nested_too_deep_are_refused() {
+    let nested = |count: usize| {
+        let bodies = "<body>".repeat(count) + "<geom size=\"1\"/>" + &"</body>".repeat(count);
+        Document::parse("test.xml", &format!("<mujoco><worldbody>{bodies}</worldbody></mujoco>"))
+    };
+    nested(190).expect("a long chain").trees().expect("trees");
+    for count in [20_000, 1_000_000] {
+        let error = nested(count).expect_err("too deep").to_string();
+        assert!(error.contains("`test.xml:1`") && error.contains("nest fewer"), "{error}");
+    }
+}
+
+/// Every file of ours is read, and means here what it means in MuJoCo.
+#[test]
+fn our_own_files_have_nothing_that_is_approximated() {
+    let folder = |path: &str| std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+    let folders = ["assets/objects", "assets/scenes", "assets/robots/g1_dex3", "../tests/peers/scenes"];
+    let mut count = 0;
+    for entry in folders.iter().flat_map(|path| std::fs::read_dir(folder(path)).expect("a folder")) {
+        let path = entry.expect("an entry of a folder").path();
+        if path.extension().is_some_and(|extension| extension == "xml") {
+            let document = Document::read(&path).unwrap_or_else(|error| panic!("{error}"));
+            document.trees().unwrap_or_else(|error| panic!("{error}"));
+            assert_eq!(document.approximations(), [""; 0]);
+            count += 1;
+        }
+    }
+    assert!(count > 50, "{count} files");
+}
+
+#[test]
+fn what_is_approximated_is_named_once() {
+    let geoms = r#"<geom size="1" solref="0.01 1"/><geom size="1" solref="0.02 1" contype="2"/>"#;
+    let document = document(&format!("<worldbody>{geoms}<geom size=\"1\" contype=\"0\"/></worldbody>"));
+    let told = document.approximations().join("\n");
+    assert_eq!(document.approximations().len(), 3, "{told}");
+    assert!(told.contains("`test.xml:1`: geom in <worldbody> has solref: every contact"), "{told}");
+    assert!(told.contains("only one of contype and conaffinity is 0"), "{told}");
+}
+
+#[test]
+fn classes_are_not_mixed_with_what_elements_state_in_part() {
+    let with = |defaults: &str, geom: &str| {
+        let inside = format!("<default>{defaults}</default><worldbody>{geom}</worldbody>");
+        let xml = format!("<mujoco>{inside}</mujoco>");
+        Document::parse("test.xml", &xml).err().map(|error| error.to_string()).unwrap_or_default()
+    };
+    let pads = r#"<default class="pad"><geom friction="0.8 0.003 0" pos="1 0 0" size="1"/></default>"#;
+    assert_eq!(with(pads, r#"<geom class="pad" friction="1 0 0"/>"#), "");
+    for (geom, expected) in [
+        (r#"<geom class="pad" friction="1"/>"#, "states fewer numbers than its class"),
+        (r#"<geom class="pad" euler="0 0 1"/>"#, "its class states the other half of its pose"),
+        (r#"<geom class="pod"/>"#, "class=\"pod\"; use the class of a <default>"),
+        (r#"<geom class="pad" material="wood"/>"#, "material=\"wood\"; use the name of a material"),
+        (r#"<geom class="pad" colour="red"/>"#, "<geom> has no attribute `colour` that is read"),
+    ] {
+        let error = with(pads, geom);
+        assert!(error.contains(expected), "{error}");
+    }
+    for (defaults, expected) in [
+        ("<general/>", "use motor or position"),
+        ("<default><geom/></default>", "a class inside another needs a name"),
+        (r#"<default class="main"><geom/></default>"#, "there is a class of this name already"),
+    ] {
+        let error = with(defaults, "");
+        assert!(error.contains(expected), "{error}");
+    }
+    let body = r#"<worldbody><body><joint name="h"/><geom size="1"/></body></worldbody>"#;
+    let position = r#"<actuator><position joint="h"/></actuator>"#;
+    let error = refusal(&format!("<default><motor ctrlrange=\"-1 1\"/></default>{body}{position}"));
+    assert!(error.contains("it would count for every <position> too"), "{error}");
+}
+
+#[test]
+fn included_files_keep_their_lines_and_are_read_once() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let write = |name: &str, xml: &str| std::fs::write(folder.path().join(name), xml).expect("a file");
+    write(
+        "lid.xml",
+        "<mujoco>\n<worldbody>\n<body name=\"lid\"><geom size=\"1\"/></body></worldbody></mujoco>",
+    );
+    write(
+        "jar.xml",
+        "<mujoco>\n<include file=\"lid.xml\"/>\n<worldbody><body name=\"jar\"/></worldbody></mujoco>",
+    );
+    let read = |name: &str| Document::read(&folder.path().join(name));
+    let bodies = read("jar.xml").expect("a jar").model.bodies.len();
+    assert_eq!(bodies, 3, "the world, the lid and the jar");
+
+    write(
+        "lid.xml",
+        "<mujoco>\n<worldbody>\n<body name=\"lid\"><geom size=\"-1\"/></body></worldbody></mujoco>",
+    );
+    let error = read("jar.xml").expect_err("a negative size").to_string();
+    assert!(error.contains("lid.xml:3`: geom in body `lid`: size=\"-1\""), "{error}");
+    write("lid.xml", "<mujoco><include file=\"jar.xml\"/></mujoco>");
+    let error = read("lid.xml").expect_err("a circle").to_string();
+    assert!(error.contains("is included already"), "{error}");
+}
