@@ -1,6 +1,6 @@
 //! Tables of the book say what the code says: tasks and their phases, flags of the command line, routes of the server.
 
-use clap::{Command, CommandFactory};
+use clap::{Arg, Command, CommandFactory};
 use tandem::cli::Cli;
 use tandem_episodes::tasks::{self, Task};
 use tandem_tests::TestServer;
@@ -39,7 +39,7 @@ fn expected_of(task: &Task) -> Vec<String> {
 }
 
 #[test]
-fn the_reference_has_every_flag_of_every_subcommand() {
+fn the_reference_has_every_flag_with_its_meaning() {
     let text = page(&format!("{BOOK}/command-line.md")).text;
     let sections: Vec<&str> = text.split("\n## ").skip(1).collect();
     let mut subcommands = Vec::new();
@@ -56,18 +56,47 @@ fn the_reference_has_every_flag_of_every_subcommand() {
         if name == "doctor" {
             continue;
         }
-        let rows = section.lines().filter_map(|line| line.strip_prefix("| `--"));
-        let told: Vec<&str> = rows.filter_map(|row| row.split([' ', '`']).next()).collect();
-        assert_eq!(&told, flags, "flags of {name}");
+        let rows: Vec<&str> = section.lines().filter_map(|line| line.strip_prefix("| `--")).collect();
+        let told: Vec<&str> = rows.iter().filter_map(|row| row.split([' ', '`']).next()).collect();
+        let wanted: Vec<&str> = flags.iter().map(|flag| flag.name.as_str()).collect();
+        assert_eq!(told, wanted, "flags of {name}");
+        for (row, flag) in rows.iter().zip(flags) {
+            let meaning = words(&flag.help);
+            assert!(
+                words(row).contains(&meaning),
+                "{name} --{}: the reference does not say {meaning}",
+                flag.name
+            );
+        }
     }
 }
 
+/// A flag with its help text, without what follows in brackets: the default and where else it can be given.
+struct Flag {
+    name: String,
+    help: String,
+}
+
+impl Flag {
+    fn of(argument: &Arg) -> Option<Flag> {
+        let help = argument.get_help().map(ToString::to_string).unwrap_or_default();
+        let help = help.split(" [default").next().unwrap_or_default().to_owned();
+        Some(Flag { name: argument.get_long()?.to_owned(), help })
+    }
+}
+
+/// The words of a text without signs, so that tables may set them as they like.
+fn words(text: &str) -> String {
+    let words = text.split(|letter: char| !letter.is_alphanumeric()).filter(|word| !word.is_empty());
+    words.collect::<Vec<_>>().join(" ")
+}
+
 /// Every subcommand that has none below it, with its flags.
-fn leaves(path: &str, command: &Command, found: &mut Vec<(String, Vec<String>)>) {
+fn leaves(path: &str, command: &Command, found: &mut Vec<(String, Vec<Flag>)>) {
     let mut below = command.get_subcommands().peekable();
     if below.peek().is_none() {
-        let flags = command.get_arguments().filter_map(|flag| flag.get_long()).map(str::to_owned);
-        let own = flags.filter(|flag| !EVERYWHERE.contains(&flag.as_str()));
+        let flags = command.get_arguments().filter_map(Flag::of);
+        let own = flags.filter(|flag| !EVERYWHERE.contains(&flag.name.as_str()));
         found.push((path.trim().to_owned(), own.collect()));
     }
     for subcommand in below {
