@@ -43,9 +43,10 @@ pub fn check_mention(text: &str) -> Result<(), String> {
     let found = commands(text);
     let words: Vec<&str> = found.first().into_iter().flatten().map(String::as_str).collect();
     match words.as_slice() {
-        ["tandem", "SUBCOMMAND", ..] | ["cargo", "run", "--release", "--"] | ["cargo", "+nightly", ..] => {
-            Ok(())
-        }
+        ["tandem", "SUBCOMMAND", ..]
+        | ["cargo", "run"]
+        | ["cargo", "run", "--release", "--"]
+        | ["cargo", "+nightly", ..] => Ok(()),
         ["tandem", args @ ..] => match Cli::try_parse_from([&["tandem"], args].concat()) {
             Err(error)
                 if [ErrorKind::MissingRequiredArgument, ErrorKind::DisplayHelp].contains(&error.kind()) =>
