@@ -32,8 +32,8 @@ pub struct EvaluateArgs {
     policy: PolicyFlags,
     #[command(flatten)]
     episodes: EpisodeFlags,
-    /// Phases to begin at, by number or id, as p2 or p1,transfer, or `all`: each episode starts where that phase began in the demonstration of its
-    /// task and seed, with the whole budget ahead, and that phase alone counts.
+    /// Phases to begin at, by number or id, as p2 or p1,transfer, or `all`: each episode starts where that phase began in the
+    /// demonstration of its task and seed, with the whole budget ahead, and that phase alone counts.
     #[arg(long, value_name = "PHASES", value_parser = parse_phases, requires = "demos")]
     from: Option<PhaseList>,
     /// Folder of demonstrations, as `collect` or `serve` writes them; this build has to have recorded them.
