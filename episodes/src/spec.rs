@@ -70,9 +70,11 @@ pub enum Start {
     /// It begins at the task's own beginning under the seed.
     #[default]
     Task,
-    /// It begins where another episode of the same task, seed, protocol, robot and controller stood: a [`crate::Checkpoint`]'s file.
+    /// It begins where another episode of the same task, seed, protocol, robot and controller stood: a
+    /// [`crate::Checkpoint`]'s file.
     Checkpoint(PathBuf),
-    /// It begins where a phase began in a recorded episode of the same task, seed, robot and controller, with the whole budget ahead.
+    /// It begins where a phase began in a recorded episode of the same task, seed, robot and controller, with the whole
+    /// budget ahead.
     Phase(PhaseStart),
 }
 

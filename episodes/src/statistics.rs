@@ -1,5 +1,5 @@
-//! What counts of episodes leave open: exact and score intervals of rates, of means of rates, and of what two policies differ by
-//! on the same episodes.
+//! What counts of episodes leave open: exact and score intervals of rates, of means of rates, and of what two policies
+//! differ by on the same episodes.
 
 use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF};
 

@@ -1,7 +1,7 @@
 //! Two robots that carry a bar between them: cases of the bench of base controllers that need hands.
 //!
-//! They take the bar from its stand by the skills of the experts, lift it, and walk it along the case's way side by side. Nothing
-//! joins them but what their fingers hold.
+//! They take the bar from its stand by the skills of the experts, lift it, and walk it along the case's way side by side.
+//! Nothing joins them but what their fingers hold.
 
 use std::cell::Cell;
 use std::f32::consts::FRAC_PI_2;

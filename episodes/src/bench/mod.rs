@@ -39,8 +39,8 @@ pub enum BenchError {
     Player(#[from] PlayerError),
 }
 
-/// Plays the cases whose names contain one of the words of `filter`, separated by commas, on seeds 0 to `seeds` - 1, robots of their
-/// own first, then two that carry something between them; calls `done` after each case.
+/// Plays the cases whose names contain one of the words of `filter`, separated by commas, on seeds 0 to `seeds` - 1, robots
+/// of their own first, then two that carry something between them; calls `done` after each case.
 pub fn locomotion(
     controller: &Controller,
     filter: &str,

@@ -1,5 +1,5 @@
-//! Who acts in an episode. A player makes tool calls; those that solve a task by knowing what only the simulator knows say so in
-//! their type, and nobody else can be handed it.
+//! Who acts in an episode. A player makes tool calls; those that solve a task by knowing what only the simulator knows say
+//! so in their type, and nobody else can be handed it.
 //!
 //! To add a player: one file or folder here and its line in [`ALL`].
 

@@ -1,5 +1,5 @@
-//! An MCAP file with typed topics, under another name until it is complete; and where its bytes go: to a file that others can read
-//! under way, or nowhere before the end.
+//! An MCAP file with typed topics, under another name until it is complete; and where its bytes go: to a file that others
+//! can read under way, or nowhere before the end.
 
 use std::{
     collections::BTreeMap,
@@ -147,7 +147,8 @@ pub enum Visibility {
     /// It can be read under way, as `episode.mcap.partial`.
     #[default]
     Live,
-    /// It can be read after the end. Nobody sees meanwhile what policies are not told, and a process that is killed leaves nothing.
+    /// It can be read after the end. Nobody sees meanwhile what policies are not told, and a process that is killed leaves
+    /// nothing.
     After,
 }
 

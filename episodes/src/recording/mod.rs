@@ -5,9 +5,9 @@
 //! `A/egocentric`, objects by name. Numbers that have no well-known schema are JSON with a JSON Schema. `/steps` holds each
 //! [`tandem_sim::Step`] as it was, bit for bit, from the state before the first one on; everything else is for people.
 //!
-//! All that a replay needs is there: what the episode is, the build, each tool call with what the policy's clock was charged, the
-//! hash of the whole state after every step, and as attachments checkpoints of where the policy took over and where every
-//! later phase begins.
+//! All that a replay needs is there: what the episode is, the build, each tool call with what the policy's clock was
+//! charged, the hash of the whole state after every step, and as attachments checkpoints of where the policy took over and
+//! where every later phase begins.
 //!
 //! The file is `episode.mcap.partial` until [`Recorder::finish`] renames it, so an `episode.mcap` is always complete. A
 //! recorder that is dropped earlier still writes the index; one whose process is killed leaves whole chunks without an index,

@@ -36,8 +36,8 @@ pub enum RecoverError {
     Output(#[from] OutputError),
 }
 
-/// Writes every message, attachment and all metadata of `FILE.partial` up to its last whole record to `FILE`, with an index. What is
-/// read stays as it is.
+/// Writes every message, attachment and all metadata of `FILE.partial` up to its last whole record to `FILE`, with an
+/// index. What is read stays as it is.
 pub fn recover(partial: &Path) -> Result<Recovered, RecoverError> {
     let path = match partial.extension() {
         Some(extension) if extension == "partial" => partial.with_extension(""),

@@ -136,7 +136,8 @@ impl Recorder {
         self.file.attach(&checkpoint_name(name), time_s, bytes)
     }
 
-    /// Appends a tool call and its answer. Pictures of the answer go to the topics of their robots' cameras, one for each state.
+    /// Appends a tool call and its answer. Pictures of the answer go to the topics of their robots' cameras, one for each
+    /// state.
     pub fn tool_call(&mut self, record: ToolCallRecord) -> Result<(), OutputError> {
         let ToolCallRecord { time_s, message, pictures } = record;
         self.file.write(&mut self.tool_calls, time_s, &Json(message))?;

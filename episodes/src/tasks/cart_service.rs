@@ -1,9 +1,9 @@
 //! CartService: A pushes a trolley down an aisle; B takes a wine bottle from it and stands it on a table.
 //!
-//! Conditions, tolerances and randomisation are the benchmark's. Where it is silent we chose what G1s do: a trolley of 13 kg on four
-//! castors, pushed over a metre and a half before it counts as parked, a bottle in a steel ring on it, and a table whose patch is
-//! nine tenths of a metre from where the bottle then stands. A bottle that leaves the goal before it is served has to be carried there
-//! anew.
+//! Conditions, tolerances and randomisation are the benchmark's. Where it is silent we chose what G1s do: a trolley of 13
+//! kg on four castors, pushed over a metre and a half before it counts as parked, a bottle in a steel ring on it, and a
+//! table whose patch is nine tenths of a metre from where the bottle then stands. A bottle that leaves the goal before it
+//! is served has to be carried there anew.
 
 use std::f32::consts::FRAC_PI_2;
 

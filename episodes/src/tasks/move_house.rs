@@ -1,9 +1,9 @@
 //! MoveHouse: A opens a door; B and C carry a console table through it and set it down on marks in the room beyond.
 //!
-//! Conditions, tolerances and randomisation are the benchmark's. Where it is silent we chose what G1s do: a table of 3.1 kg with rails at
-//! elbow height, carried 3.1 m along its length through a doorway of 0.96 m; the plane that all have to pass is 0.20 m beyond the
-//! middle of the wall, clear of its frame. Feet are off the floor, and the table is aloft, from a centimetre on. A table that leaves the
-//! goal before it is released has to be carried there anew.
+//! Conditions, tolerances and randomisation are the benchmark's. Where it is silent we chose what G1s do: a table of 3.1 kg
+//! with rails at elbow height, carried 3.1 m along its length through a doorway of 0.96 m; the plane that all have to pass
+//! is 0.20 m beyond the middle of the wall, clear of its frame. Feet are off the floor, and the table is aloft, from a
+//! centimetre on. A table that leaves the goal before it is released has to be carried there anew.
 
 use std::f32::consts::PI;
 

@@ -1,9 +1,9 @@
 //! TrashCollection: A carries a bin to the end of a bench and holds it there; B sweeps a bottle off the bench into it.
 //!
-//! Conditions, tolerances and randomisation are the benchmark's. Where it is silent we chose what a G1 carries between its hands: a
-//! bin of 1.5 kg, 0.72 m tall, with upright handles, which stands so far away that it walks at least 1.2 m before it counts as
-//! delivered; and a bench of 0.80 m, over whose end a bottle rolls that lies across it. A bin is held aloft if it is held as
-//! high off the floor as for the first phase.
+//! Conditions, tolerances and randomisation are the benchmark's. Where it is silent we chose what a G1 carries between its
+//! hands: a bin of 1.5 kg, 0.72 m tall, with upright handles, which stands so far away that it walks at least 1.2 m before
+//! it counts as delivered; and a bench of 0.80 m, over whose end a bottle rolls that lies across it. A bin is held aloft if
+//! it is held as high off the floor as for the first phase.
 
 use std::f32::consts::FRAC_PI_2;
 

@@ -1,5 +1,5 @@
-//! CartService: A takes the trolley's bar and pushes it to the mark. Meanwhile B walks up; it lifts the bottle out of its ring, steps back, turns to the
-//! table and stands the bottle on the patch.
+//! CartService: A takes the trolley's bar and pushes it to the mark. Meanwhile B walks up; it lifts the bottle out of its
+//! ring, steps back, turns to the table and stands the bottle on the patch.
 
 use std::f32::consts::FRAC_PI_2;
 

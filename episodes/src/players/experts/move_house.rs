@@ -1,5 +1,5 @@
-//! MoveHouse: A presses the lever, pushes the door open along its swing and stands aside in the other room. Meanwhile B and C lift the table;
-//! they follow A through the doorway in step and set it down on the marks.
+//! MoveHouse: A presses the lever, pushes the door open along its swing and stands aside in the other room. Meanwhile B and
+//! C lift the table; they follow A through the doorway in step and set it down on the marks.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -17,15 +17,15 @@ const PACE_M_S: f32 = 0.24;
 /// How far it is, in a fist with its palm down, from the wrist to what presses, and to the fist's front.
 const PRESSING_M: f32 = 0.115;
 const FRONT_M: f32 = 0.16;
-/// The fist is made behind the lever and above it; then the wrist is as high above the lever's end, and is pressed farther and farther until
-/// the bolt has been drawn.
+/// The fist is made behind the lever and above it; then the wrist is as high above the lever's end, and is pressed farther
+/// and farther until the bolt has been drawn.
 const BACK_M: f32 = 0.10;
 const ABOVE_LEVER_M: f32 = 0.11;
 const DOWN_M: [f32; 4] = [-0.02, -0.05, -0.08, -0.11];
 /// The bolt reaches 20 mm into its hole.
 const DRAWN_M: f32 = 0.022;
-/// The leaf, seen by the one who pushes: where its face is, and how far from the hinge it is pushed, first beside the lever, then farther in,
-/// so that the robot passes through the middle of the doorway.
+/// The leaf, seen by the one who pushes: where its face is, and how far from the hinge it is pushed, first beside the
+/// lever, then farther in, so that the robot passes through the middle of the doorway.
 const FACE_X_M: f32 = -0.045;
 const FIRST_RADIUS_M: f32 = 0.785;
 const LAST_RADIUS_M: f32 = 0.50;

@@ -1,5 +1,5 @@
-//! TableAlign: both robots take the rails, lift, carry the table down the room while they turn it by a quarter, come at the chair from
-//! its front, set down and let go.
+//! TableAlign: both robots take the rails, lift, carry the table down the room while they turn it by a quarter, come at the
+//! chair from its front, set down and let go.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 

@@ -1,5 +1,5 @@
-//! TrashCollection: A bends its knees, takes the bin by its handles and holds it at the end of the bench, over which B sweeps the bottle with
-//! the back of its left hand.
+//! TrashCollection: A bends its knees, takes the bin by its handles and holds it at the end of the bench, over which B
+//! sweeps the bottle with the back of its left hand.
 
 use std::f32::consts::FRAC_PI_2;
 

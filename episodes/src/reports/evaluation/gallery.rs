@@ -32,7 +32,8 @@ pub struct Picture {
 /// Columns of a strip are 400 pixels wide; on the page they need no more than this.
 const SCALE: f64 = 0.5;
 
-/// The failures that have a picture, `most` of them at most, by turns from every policy and task; those without one are left out.
+/// The failures that have a picture, `most` of them at most, by turns from every policy and task; those without one are
+/// left out.
 pub fn gallery(loaded: &LoadedEpisodes, most: usize) -> Vec<Failure> {
     let groups = groups(&loaded.episodes);
     let all: Vec<(Failure, &FoundEpisode)> = groups.iter().flat_map(failed).collect();

@@ -31,7 +31,8 @@ const BAR_IN_WRIST_M: Vector = Vector::new(0.105, 0.042, 0.0);
 const BAR_CLOSURE: f32 = 1.3;
 
 impl<'a> BarGrasp<'a> {
-    /// Both hands of a robot on bars of 36 mm, left and right, palms down, fingers pointing along a heading in the object's frame.
+    /// Both hands of a robot on bars of 36 mm, left and right, palms down, fingers pointing along a heading in the object's
+    /// frame.
     pub fn from_above(
         robot: usize,
         object: &'a str,

@@ -1,5 +1,5 @@
-//! Robots that carry one object together, in step: all follow one path of the object, and hands give way to the partners. One robot
-//! that carries or pushes something with both hands is the smallest team.
+//! Robots that carry one object together, in step: all follow one path of the object, and hands give way to the partners.
+//! One robot that carries or pushes something with both hands is the smallest team.
 
 use tandem_sim::{Pose, Sides, Vector};
 
@@ -110,7 +110,8 @@ impl<'a> CarryTeam<'a> {
         self.measure(commander)
     }
 
-    /// Takes the held object along a path, at the end of which it stays for a moment. Hands that lose it on the way take it again.
+    /// Takes the held object along a path, at the end of which it stays for a moment. Hands that lose it on the way take it
+    /// again.
     pub fn carry(&mut self, commander: &mut Commander, path: &ObjectPath) -> Result<(), PlayerError> {
         let ObjectPath { length_m, pace_m_s, free_m, .. } = *path;
         let mut from_m = 0.0;
@@ -186,7 +187,8 @@ impl<'a> CarryTeam<'a> {
         self.robots.iter().zip(&self.object_from_stand).enumerate().map(posture).collect()
     }
 
-    /// All stand still with what they hold. Set down without it, a load that robots pull to and fro as they stop is dragged along.
+    /// All stand still with what they hold. Set down without it, a load that robots pull to and fro as they stop is dragged
+    /// along.
     pub fn rest(&self, commander: &mut Commander) -> Result<(), PlayerError> {
         let still: Vec<HandMove> =
             self.grasps.iter().map(|grasp| HandMove::still(grasp.robot, grasp.side)).collect();

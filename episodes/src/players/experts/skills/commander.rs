@@ -9,8 +9,8 @@ use crate::tasks::Task;
 
 /// Control steps of one command: short enough to start and stop smoothly.
 const STEPS_PER_COMMAND: u32 = 10;
-/// Control steps of one command of a robot that walks: hands that are fixed in the world fall behind one that does not say anew where
-/// they are to be.
+/// Control steps of one command of a robot that walks: hands that are fixed in the world fall behind one that does not say
+/// anew where they are to be.
 pub const WALK_STEPS: u32 = 5;
 /// Control steps of every command while several scripts are played at once.
 pub const BEAT_STEPS: u32 = WALK_STEPS;

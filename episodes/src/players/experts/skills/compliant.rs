@@ -39,8 +39,8 @@ pub fn grasp_compliantly(commander: &mut Commander, grasps: &[BarGrasp]) -> Resu
     Err(PlayerError::GaveUp("not every hand could take its bar".into()))
 }
 
-/// Closes hands whose palms are at the bars, as `around` has them. Each wrist's goal makes up for what it is off, as the hands of a
-/// robot are that has given way to partners, and gives way to what the hand feels.
+/// Closes hands whose palms are at the bars, as `around` has them. Each wrist's goal makes up for what it is off, as the
+/// hands of a robot are that has given way to partners, and gives way to what the hand feels.
 fn close_compliantly(
     commander: &mut Commander,
     grasps: &[BarGrasp],
@@ -78,8 +78,8 @@ fn all_hold(facts: &Facts, grasps: &[BarGrasp]) -> bool {
     grasps.iter().all(|grasp| grasp.is_held(facts))
 }
 
-/// Hands open where they are, for opening fingers push; then they rise. Those that still touch try it again, and give way to what they
-/// are caught on.
+/// Hands open where they are, for opening fingers push; then they rise. Those that still touch try it again, and give way
+/// to what they are caught on.
 pub fn let_go(commander: &mut Commander, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
     open_in_place(commander, grasps)?;
     let away = each(commander, grasps, |grasp, commander| {

@@ -57,8 +57,8 @@ struct ScriptChannel {
     outcomes: Sender<CommandOutcome>,
 }
 
-/// Plays all scripts to their ends. Nothing moves before every script that still plays has said what its robots do next, so that equal
-/// beginnings have equal ends, whichever thread is faster.
+/// Plays all scripts to their ends. Nothing moves before every script that still plays has said what its robots do next, so
+/// that equal beginnings have equal ends, whichever thread is faster.
 pub fn in_parallel(commander: &mut Commander, scripts: Vec<ParallelScript>) -> Result<(), PlayerError> {
     let facts = commander.facts()?;
     thread::scope(|scope| {
