@@ -18,12 +18,12 @@ pub struct Failure {
     pub phase: String,
     pub why: String,
     /// `None` where its strip cannot be read.
-    pub picture: Option<Picture>,
+    pub picture: Option<FailurePicture>,
 }
 
-/// A small picture.
+/// The strip of a failed episode, made small.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Picture {
+pub struct FailurePicture {
     pub webp: Vec<u8>,
     pub width: u32,
     pub height: u32,
@@ -74,11 +74,11 @@ fn failure(group: &PolicyGroup, found: &FoundEpisode) -> Failure {
 }
 
 /// `None` where the file is no picture.
-fn shrunk(strip: &Path) -> Option<Picture> {
+fn shrunk(strip: &Path) -> Option<FailurePicture> {
     let strip = image::open(strip).ok()?.into_rgb8();
     let [width, height] =
         [strip.width(), strip.height()].map(|px| (f64::from(px) * SCALE).round().max(1.0) as u32);
     let small = imageops::resize(&strip, width, height, FilterType::Triangle);
     let webp = webp::picture(width, height, small.as_raw()).ok()?;
-    Some(Picture { webp, width, height })
+    Some(FailurePicture { webp, width, height })
 }
