@@ -65,14 +65,14 @@ mod units;
 pub mod world;
 
 pub use body::{
-    ARM_COLUMNS, ARM_JOINTS, HAND_COLUMNS, HAND_JOINTS, JOINTS, RobotModel, UPPER, UPPER_JOINTS,
-    WAIST_COLUMN, WholeBody, joint_names,
+    ARM_COLUMNS, ARM_JOINTS, BodyEstimate, HAND_COLUMNS, HAND_JOINTS, JOINTS, RobotModel, UPPER,
+    UPPER_JOINTS, WAIST_COLUMN, joint_names,
 };
 pub use error::SimError;
 pub use locomotion::{BaseCommand, BaseLimits, LocomotionChoice};
 pub use plane::{heading_rad, wrapped_rad};
 pub use rapier3d::math::{Pose, Rotation, Vector};
-pub use robot::{Robot, RobotCommand, RobotPlacement, RobotState};
+pub use robot::{Robot, RobotCommand, RobotEstimate, RobotPlacement, RobotSensed, RobotTruth};
 pub use sides::{Side, Sides};
 pub use units::{CONTROL_DT_S, CONTROL_HZ, GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL};
 pub use world::{

@@ -187,7 +187,7 @@ impl Episode for LoggedEpisode<'_> {
             self.log.push(LogEntry {
                 bar: facts.object("bar").pose_in_world,
                 pelvises: facts.robots.iter().map(|robot| robot.pelvis_in_world).collect(),
-                power_w: robots.iter().map(|robot| robot.state.power_w()).sum::<f32>() / robots.len() as f32,
+                power_w: robots.iter().map(|robot| robot.sensed.power_w()).sum::<f32>() / robots.len() as f32,
             });
         }
         Ok(reply)

@@ -1,7 +1,7 @@
 //! How a robot did under an order that has just been executed.
 
 use nalgebra::Isometry3;
-use tandem_sim::{HAND_JOINTS, Pose, RobotState, Side, UPPER, Vector};
+use tandem_sim::{HAND_JOINTS, Pose, RobotSensed, Side, UPPER, Vector};
 use tandem_tools_spec::{BaseMotion, Effort, FingerReport, HandReport, HandState, RobotReport};
 
 use super::columns::{self, Clamped};
@@ -17,23 +17,23 @@ const FINGER_MOVES_RAD_S: f32 = 0.2;
 /// Fingers that are free come this near to their targets.
 const FINGER_TOLERANCE_RAD: f64 = 0.06;
 
-/// What became of an order of which `clamped` was moved to limits, where the robot measures `state` after it; its own odometry had its
+/// What became of an order of which `clamped` was moved to limits, where the robot senses `sensed` after it; its own odometry had its
 /// pelvis at `began` before.
-pub fn report(clamped: &Clamped, began: &Pose, state: &RobotState, motion: &Motion) -> RobotReport {
+pub fn report(clamped: &Clamped, began: &Pose, sensed: &RobotSensed, motion: &Motion) -> RobotReport {
     let robot = &motion.robot;
     RobotReport {
         robot: robot.name.clone(),
-        left: hand_report(Side::Left, clamped, state, motion),
-        right: hand_report(Side::Right, clamped, state, motion),
-        pelvis_in_start: wire_pose_from_sim(&state.start_from_pelvis),
-        base_motion: base_motion(began, &state.start_from_pelvis),
+        left: hand_report(Side::Left, clamped, sensed, motion),
+        right: hand_report(Side::Right, clamped, sensed, motion),
+        pelvis_in_start: wire_pose_from_sim(&sensed.start_from_pelvis),
+        base_motion: base_motion(began, &sensed.start_from_pelvis),
         waist_joints_clamped: names(
             robot,
             among(&clamped.columns, |column| columns::waist().contains(&column)),
         ),
         waist_joints_at_limit: names(
             robot,
-            columns::waist().filter(|column| at_limit(*column, robot, state)),
+            columns::waist().filter(|column| at_limit(*column, robot, sensed)),
         ),
         base_command_clamped: clamped.base.iter().map(|field| field.to_string()).collect(),
     }
@@ -54,28 +54,27 @@ fn base_motion(began: &Pose, ended: &Pose) -> BaseMotion {
 }
 
 /// How one hand did.
-fn hand_report(side: Side, clamped: &Clamped, state: &RobotState, motion: &Motion) -> HandReport {
+fn hand_report(side: Side, clamped: &Clamped, sensed: &RobotSensed, motion: &Motion) -> HandReport {
     let (arm, hand) = (columns::arm(side), columns::hand(side));
     let target = motion.targets()[side];
-    let measured = isometry_from_sim(&state.pelvis_from_wrist[side]);
+    let measured = isometry_from_sim(&sensed.pelvis_from_wrist[side]);
     let missing = measured.inverse() * target;
     let robot = &motion.robot;
-    let force_n = state.world_from_pelvis.rotation.inverse() * state.hand_force_n[side];
     HandReport {
-        state: wrist_state(side, &target, &measured, state, motion),
+        state: wrist_state(side, &target, &measured, sensed, motion),
         target: wire_pose(&target),
         measured: wire_pose(&measured),
         position_error_m: rounded(missing.translation.vector.norm()),
         orientation_error_rad: rounded(missing.rotation.angle()),
-        fingers: fingers(side, state, motion),
-        largest_effort: largest_effort(side, state, motion),
-        force_n: force_n.to_array().map(|part| rounded_to(2, part.into())),
+        fingers: fingers(side, sensed, motion),
+        largest_effort: largest_effort(side, sensed, motion),
+        force_n: sensed.hand_force_in_pelvis_n[side].to_array().map(|part| rounded_to(2, part.into())),
         joints_clamped: names(
             robot,
             among(&clamped.columns, |column| arm.contains(&column) || hand.contains(&column)),
         ),
         // A finger is at a limit whenever the hand is open; that says nothing about reach.
-        joints_at_limit: names(robot, arm.clone().filter(|column| at_limit(*column, robot, state))),
+        joints_at_limit: names(robot, arm.clone().filter(|column| at_limit(*column, robot, sensed))),
     }
 }
 
@@ -83,13 +82,13 @@ fn wrist_state(
     side: Side,
     target: &Isometry3<f64>,
     measured: &Isometry3<f64>,
-    state: &RobotState,
+    sensed: &RobotSensed,
     motion: &Motion,
 ) -> HandState {
     let commanded = motion.commanded_wrists()[side];
     if is_near(measured, target) {
         HandState::Arrived
-    } else if columns::arm(side).any(|column| state.qd_rad_s[UPPER[column]].abs() > ARM_MOVES_RAD_S) {
+    } else if columns::arm(side).any(|column| sensed.qd_rad_s[UPPER[column]].abs() > ARM_MOVES_RAD_S) {
         HandState::Moving
     } else if is_near(&commanded, target) {
         HandState::Blocked
@@ -104,14 +103,14 @@ fn is_near(wrist: &Isometry3<f64>, target: &Isometry3<f64>) -> bool {
         && missing.rotation.angle() <= REACH_TOLERANCE.orientation_rad
 }
 
-fn fingers(side: Side, state: &RobotState, motion: &Motion) -> FingerReport {
+fn fingers(side: Side, sensed: &RobotSensed, motion: &Motion) -> FingerReport {
     let first = columns::hand(side).start;
     let joint = |finger: usize| UPPER[first + finger];
     let target_rad: [f64; HAND_JOINTS] =
         std::array::from_fn(|finger| motion.state().upper_rad[first + finger]);
-    let measured_rad: [f64; HAND_JOINTS] = std::array::from_fn(|finger| state.q_rad[joint(finger)].into());
+    let measured_rad: [f64; HAND_JOINTS] = std::array::from_fn(|finger| sensed.q_rad[joint(finger)].into());
     let near = |finger: usize| (target_rad[finger] - measured_rad[finger]).abs() <= FINGER_TOLERANCE_RAD;
-    let moves = |finger: usize| state.qd_rad_s[joint(finger)].abs() > FINGER_MOVES_RAD_S;
+    let moves = |finger: usize| sensed.qd_rad_s[joint(finger)].abs() > FINGER_MOVES_RAD_S;
     let state = if (0..HAND_JOINTS).all(near) {
         HandState::Arrived
     } else if (0..HAND_JOINTS).any(moves) {
@@ -123,9 +122,9 @@ fn fingers(side: Side, state: &RobotState, motion: &Motion) -> FingerReport {
     FingerReport { state, target_rad: wire(target_rad), measured_rad: wire(measured_rad) }
 }
 
-fn largest_effort(side: Side, state: &RobotState, motion: &Motion) -> Effort {
+fn largest_effort(side: Side, sensed: &RobotSensed, motion: &Motion) -> Effort {
     let model = &motion.robot.model;
-    let share = |joint: usize| state.torque_n_m[joint].abs() / model.joints[joint].effort_n_m;
+    let share = |joint: usize| sensed.torque_n_m[joint].abs() / model.joints[joint].effort_n_m;
     let joints = columns::arm(side).chain(columns::hand(side)).map(|column| UPPER[column]);
     let hardest = joints.max_by(|one, other| share(*one).total_cmp(&share(*other)));
     let hardest = hardest.unwrap_or(UPPER[columns::arm(side).start]);
@@ -136,9 +135,9 @@ fn among(columns: &[usize], of_interest: impl Fn(usize) -> bool) -> impl Iterato
     columns.iter().copied().filter(move |column| of_interest(*column))
 }
 
-fn at_limit(column: usize, robot: &RobotSheet, state: &RobotState) -> bool {
+fn at_limit(column: usize, robot: &RobotSheet, sensed: &RobotSensed) -> bool {
     let joint = &robot.model.joints[UPPER[column]];
-    let q_rad = state.q_rad[UPPER[column]];
+    let q_rad = sensed.q_rad[UPPER[column]];
     q_rad < joint.lower_rad + AT_LIMIT_RAD || q_rad > joint.upper_rad - AT_LIMIT_RAD
 }
 

@@ -52,8 +52,7 @@ fn half_bits(value: f32) -> u16 {
 
 #[cfg(test)]
 mod tests {
-    use tandem_sim::Pose;
-    use tandem_sim::render::{Camera, Frame};
+    use tandem_sim::render::{Frame, Intrinsics};
 
     use super::*;
 
@@ -81,7 +80,7 @@ mod tests {
 
     #[test]
     fn only_what_is_asked_for_comes() {
-        let camera = Camera { world_from_camera: Pose::IDENTITY, vertical_fov_rad: 1.0, width: 2, height: 1 };
+        let intrinsics = Intrinsics { width: 2, height: 1, focal_px: 1.0, cx: 0.5, cy: 0.0 };
         let frame = Frame {
             width: 2,
             height: 1,
@@ -89,7 +88,7 @@ mod tests {
             depth_m: vec![1.5, f32::INFINITY],
             ids: vec![0; 2],
         };
-        let view = RobotView::new(camera, frame);
+        let view = RobotView::new(intrinsics, frame);
         let of = |images, depth| arrays("A", &view, &Formats { images, depth }).unwrap();
         assert_eq!(of(None, None), None);
         assert_eq!(of(Some(ImageFormat::Png), None), None);

@@ -7,12 +7,12 @@ mod proprioception;
 
 use std::sync::{Arc, OnceLock};
 
-use tandem_sim::render::{Camera, Frame, PictureError, encode_png};
+use tandem_sim::render::{Frame, Intrinsics, PictureError, encode_png};
 use tandem_tools_spec::{CameraCalibration, CameraImage, Formats, ImageFormat, Observation, Png, RobotState};
 
 pub use formats::check_formats;
 pub use observer::Observer;
-pub use proprioception::{Detail, robot_state};
+pub use proprioception::{Detail, Proprioception, robot_state};
 
 /// What several robots see and sense at the same moment.
 #[derive(Clone, Debug)]
@@ -29,16 +29,14 @@ pub struct RobotObservation {
     pub view: Arc<RobotView>,
 }
 
-/// What the camera in a robot's head sees.
+/// What the camera in a robot's head sees. Neither where it is in the world nor what is seen there is told.
 #[derive(Debug)]
 pub struct RobotView {
-    pub camera: Camera,
+    pub intrinsics: Intrinsics,
     /// The recording may still need it when the rest of the view is gone.
     pub picture: Arc<Picture>,
     /// As [`Frame::depth_m`].
     pub depth_m: Vec<f32>,
-    /// As [`Frame::ids`].
-    pub ids: Vec<u32>,
 }
 
 /// The colours of a frame, and its PNG file once somebody has asked for that.
@@ -67,9 +65,9 @@ impl Picture {
 }
 
 impl RobotView {
-    pub fn new(camera: Camera, frame: Frame) -> RobotView {
-        let Frame { width, height, rgb, depth_m, ids } = frame;
-        RobotView { camera, picture: Picture::new(width, height, rgb).into(), depth_m, ids }
+    pub fn new(intrinsics: Intrinsics, frame: Frame) -> RobotView {
+        let Frame { width, height, rgb, depth_m, .. } = frame;
+        RobotView { intrinsics, picture: Picture::new(width, height, rgb).into(), depth_m }
     }
 }
 

@@ -6,7 +6,7 @@ use tandem_sim::render::{Camera, Cameras, Frame, Renderer, RendererKind, Scenery
 use tandem_sim::{Step, World};
 use tandem_tools_spec::{DepthPoint, DepthReply};
 
-use super::proprioception::{Detail, calibration, robot_state};
+use super::proprioception::{Detail, Proprioception, calibration, robot_state};
 use super::{Picture, RobotObservation, RobotView, TeamObservation};
 use crate::EpisodeError;
 use crate::commands::RobotSheet;
@@ -50,7 +50,7 @@ impl Observer {
         };
         let view = drawn.views[robot].get_or_insert_with(|| {
             let camera = self.cameras.egocentric(step, robot);
-            Arc::new(RobotView::new(camera, self.renderer.render(step, &camera)))
+            Arc::new(RobotView::new(camera.intrinsics(), self.renderer.render(step, &camera)))
         });
         let view = view.clone();
         self.drawn = Some(drawn);
@@ -67,9 +67,10 @@ impl Observer {
     ) -> TeamObservation {
         let mut observe = |robot: usize| {
             let view = self.view(step, robot);
+            let own = Proprioception::of(step, robot);
             RobotObservation {
-                state: robot_state(step, robot, sheets[robot], detail),
-                calibration: calibration(step, robot, &sheets[robot].name, &view.camera),
+                state: robot_state(&own, sheets[robot], detail),
+                calibration: calibration(own.sensed, &sheets[robot].name, &view.intrinsics),
                 view,
             }
         };
@@ -90,13 +91,12 @@ impl Observer {
             return Err(EpisodeError::PixelOutside { u, v, width, height });
         }
         let view = self.view(step, robot);
-        let pelvis_from_camera = step.robots[robot].state.pelvis_from_camera;
+        let pelvis_from_camera = step.robots[robot].sensed.pelvis_from_camera;
         let points = pixels.iter().map(|&pixel| {
             let [u, v] = pixel;
             let depth_m = view.depth_m[v as usize * width as usize + u as usize];
             let seen = depth_m.is_finite();
-            let point_m =
-                pelvis_from_camera * view.camera.unproject([u as f32 + 0.5, v as f32 + 0.5], depth_m);
+            let point_m = pelvis_from_camera * view.intrinsics.unproject([u as f32, v as f32], depth_m);
             DepthPoint {
                 pixel,
                 depth_m: seen.then_some(rounded(depth_m.into())),

@@ -1,7 +1,7 @@
 //! What a robot senses of itself, and its camera's calibration, as replies have them.
 
-use tandem_sim::render::{Camera, Intrinsics};
-use tandem_sim::{Step, Vector};
+use tandem_sim::render::Intrinsics;
+use tandem_sim::{BaseCommand, RobotSensed, RobotStep, Step};
 use tandem_tools_spec::{CameraCalibration, JointValues, Observe, RobotState};
 
 use crate::commands::RobotSheet;
@@ -21,33 +21,48 @@ impl Detail {
     }
 }
 
-/// What robot number `robot`, described by `sheet`, measures after `step`.
-pub fn robot_state(step: &Step, robot: usize, sheet: &RobotSheet, detail: Detail) -> RobotState {
-    let (state, command) = (&step.robots[robot].state, &step.robots[robot].command);
+/// One robot's share of a step, as far as the robot itself knows of it.
+pub struct Proprioception<'a> {
+    pub time_s: f64,
+    pub sensed: &'a RobotSensed,
+    /// The base command in force.
+    pub base: &'a BaseCommand,
+}
+
+impl<'a> Proprioception<'a> {
+    /// Takes from `step` what robot number `robot` knows.
+    pub fn of(step: &'a Step, robot: usize) -> Proprioception<'a> {
+        let RobotStep { sensed, command, .. } = &step.robots[robot];
+        Proprioception { time_s: step.time_s, sensed, base: &command.base }
+    }
+}
+
+/// What a robot senses that is described by `sheet`.
+pub fn robot_state(own: &Proprioception, sheet: &RobotSheet, detail: Detail) -> RobotState {
+    let Proprioception { time_s, sensed, base } = *own;
     let named = |values: &[f32]| {
         let joints = sheet.model.joints.iter().zip(values);
         JointValues(joints.map(|(joint, value)| (joint.name.clone(), f64::from(*value))).collect())
     };
     let in_full = |values: &[f32]| (detail == Detail::Full).then(|| named(values));
-    let down = state.world_from_pelvis.rotation.inverse() * Vector::new(0.0, 0.0, -1.0);
     RobotState {
         robot: sheet.name.clone(),
-        time_s: step.time_s,
-        joint_positions_rad: named(&state.q_rad),
-        joint_velocities_rad_s: in_full(&state.qd_rad_s),
-        joint_torques_n_m: in_full(&state.torque_n_m),
-        left_wrist: wire_pose_from_sim(&state.pelvis_from_wrist.left),
-        right_wrist: wire_pose_from_sim(&state.pelvis_from_wrist.right),
-        gravity_in_pelvis: wire_vector(down),
-        pelvis_in_start: wire_pose_from_sim(&state.start_from_pelvis),
-        base_command: wire_base(&command.base),
-        fallen: state.fallen,
+        time_s,
+        joint_positions_rad: named(&sensed.q_rad),
+        joint_velocities_rad_s: in_full(&sensed.qd_rad_s),
+        joint_torques_n_m: in_full(&sensed.torque_n_m),
+        left_wrist: wire_pose_from_sim(&sensed.pelvis_from_wrist.left),
+        right_wrist: wire_pose_from_sim(&sensed.pelvis_from_wrist.right),
+        gravity_in_pelvis: wire_vector(sensed.gravity_in_pelvis),
+        pelvis_in_start: wire_pose_from_sim(&sensed.start_from_pelvis),
+        base_command: wire_base(base),
+        fallen: sensed.fallen,
     }
 }
 
-/// The calibration of the camera in the head of robot number `robot`, called `name`, after `step`.
-pub fn calibration(step: &Step, robot: usize, name: &str, camera: &Camera) -> CameraCalibration {
-    let Intrinsics { width, height, focal_px, cx, cy } = camera.intrinsics();
+/// The calibration of the camera in the head of the robot called `name`, with its `intrinsics`.
+pub fn calibration(sensed: &RobotSensed, name: &str, intrinsics: &Intrinsics) -> CameraCalibration {
+    let Intrinsics { width, height, focal_px, cx, cy } = *intrinsics;
     let focal_px = rounded(focal_px.into());
     CameraCalibration {
         robot: name.into(),
@@ -57,6 +72,6 @@ pub fn calibration(step: &Step, robot: usize, name: &str, camera: &Camera) -> Ca
         fy: focal_px,
         cx: cx.into(),
         cy: cy.into(),
-        camera_in_pelvis: wire_pose_from_sim(&opencv_axes(&step.robots[robot].state.pelvis_from_camera)),
+        camera_in_pelvis: wire_pose_from_sim(&opencv_axes(&sensed.pelvis_from_camera)),
     }
 }

@@ -232,15 +232,15 @@ fn wrists_follow_from_transforms(world: &World, recorded: &FrameTransforms) {
     };
     let step = world.present();
     for (index, robot) in ["A", "B"].into_iter().enumerate() {
-        let state = &step.robots[index].state;
-        for (side, measured) in ["left", "right"].into_iter().zip(state.pelvis_from_wrist) {
+        let moved = &step.robots[index];
+        for (side, measured) in ["left", "right"].into_iter().zip(moved.sensed.pelvis_from_wrist) {
             let recorded = pose(&format!("{robot}/{side}_wrist_yaw_link"));
-            let measured = state.world_from_pelvis * measured;
+            let measured = moved.truth.world_from_pelvis() * measured;
             let error_m = (recorded.translation - measured.translation).length();
             assert!(error_m < 1e-4, "{robot} {side} wrist is {error_m} m off");
             assert!(recorded.rotation.angle_between(measured.rotation) < 2e-3);
         }
-        let camera = state.world_from_pelvis * state.pelvis_from_camera;
+        let camera = moved.world_from_camera();
         let optical = pose(&format!("{robot}/egocentric"));
         let forward = optical.rotation * Vector::Z;
         assert!((forward + camera.rotation * Vector::Z).length() < 1e-3, "an image's z axis looks forward");

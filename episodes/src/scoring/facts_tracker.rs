@@ -55,10 +55,10 @@ impl FactsTracker {
     /// The facts after `step`, the last one that was looked at.
     pub fn facts(&self, step: &Step) -> Facts {
         let robots = step.robots.iter().map(|robot| RobotFacts {
-            pelvis_in_world: robot.state.world_from_pelvis,
-            wrist_in_pelvis: robot.state.pelvis_from_wrist,
-            hand_force_n: robot.state.hand_force_n,
-            fallen: robot.state.fallen,
+            pelvis_in_world: robot.truth.world_from_pelvis(),
+            wrist_in_pelvis: robot.sensed.pelvis_from_wrist,
+            hand_force_n: robot.estimate.hand_force_n,
+            fallen: robot.sensed.fallen,
         });
         let objects = self.memory.iter().zip(&self.models).filter_map(|(memory, model)| {
             let state = step.object(&memory.name)?;

@@ -9,7 +9,7 @@ use tandem_tools_spec::{
 use super::Session;
 use crate::EpisodeError;
 use crate::commands::{self, Called, Command, RobotSheet, check_reach, report};
-use crate::observation::{Detail, TeamObservation, check_formats, robot_state};
+use crate::observation::{Detail, Proprioception, TeamObservation, check_formats, robot_state};
 use crate::recording::CallOutcome;
 
 /// What a call is answered with; views are not encoded yet.
@@ -83,7 +83,11 @@ impl Session {
             LookCall::GetRobotState(args) => {
                 let robot = find(&args.robot)?;
                 let sheet = &self.motions[robot].robot;
-                LookReply::GetRobotState(robot_state(&self.present, robot, sheet, Detail::Full))
+                LookReply::GetRobotState(robot_state(
+                    &Proprioception::of(&self.present, robot),
+                    sheet,
+                    Detail::Full,
+                ))
             }
             LookCall::QueryDepth(args) => {
                 let robot = find(&args.robot)?;
@@ -136,7 +140,7 @@ impl Session {
     /// Executes a command, and reports on every robot that it has an order for.
     pub(super) fn act(&mut self, command: &Command) -> Result<Answer, EpisodeError> {
         let began: Vec<Pose> =
-            self.present.robots.iter().map(|robot| robot.state.start_from_pelvis).collect();
+            self.present.robots.iter().map(|robot| robot.sensed.start_from_pelvis).collect();
         let (executed_steps, clamped) = self.run(command)?;
         let stop_reason = self.stop_reason();
         let robots: Vec<RobotReport> = command
@@ -144,8 +148,8 @@ impl Session {
             .iter()
             .zip(&clamped)
             .map(|(order, clamped)| {
-                let state = &self.present.robots[order.robot].state;
-                report(clamped, &began[order.robot], state, &self.motions[order.robot])
+                let sensed = &self.present.robots[order.robot].sensed;
+                report(clamped, &began[order.robot], sensed, &self.motions[order.robot])
             })
             .collect();
         Ok(Answer::Reply(ToolReply::Act(CommandReply {

@@ -57,7 +57,7 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
             model: robot.model.clone(),
             base_limits: robot.base_limits(),
         };
-        let world_from_pelvis = isometry_from_sim(&present.robots[index].state.world_from_pelvis);
+        let world_from_pelvis = isometry_from_sim(&present.robots[index].estimate.world_from_pelvis);
         Motion::new(sheet, &body, &world.rest_command(index), world_from_pelvis)
     };
     let motions = world.robots().iter().enumerate().map(motion).collect();
@@ -186,7 +186,7 @@ fn places_m(step: &Step, task: &Task) -> Vec<Place> {
     let robots = step.robots.iter().zip(task.robot_names()).map(|(robot, name)| Place {
         name: format!("robot {name}"),
         site: robot_site(name),
-        at_m: robot.state.world_from_pelvis.translation,
+        at_m: robot.truth.world_from_pelvis().translation,
     });
     let objects = task.objects.iter().filter_map(|spot| {
         let at_m = step.object(spot.name)?.world_from_object.translation;

@@ -209,9 +209,9 @@ impl Session {
         }
         self.present = Arc::new(stepped?);
         for (motion, robot) in self.motions.iter_mut().zip(&self.present.robots) {
-            let [left_n, right_n] = [Side::Left, Side::Right].map(|side| robot.state.hand_force_n[side]);
+            let [left_n, right_n] = [Side::Left, Side::Right].map(|side| robot.estimate.hand_force_n[side]);
             let hands_n = Vector3::from((left_n + right_n).to_array().map(f64::from));
-            motion.sense(isometry_from_sim(&robot.state.world_from_pelvis), hands_n);
+            motion.sense(isometry_from_sim(&robot.estimate.world_from_pelvis), hands_n);
         }
         let (was_underway, reached_before) = (self.scores.underway(), self.scores.reached().count());
         let scored = self.scores.update(&self.present);

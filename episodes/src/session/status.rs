@@ -31,7 +31,10 @@ impl Session {
     pub(super) fn fallen(&self) -> Vec<RobotFallen> {
         let robots = self.motions.iter().zip(&self.present.robots);
         robots
-            .map(|(motion, step)| RobotFallen { robot: motion.robot.name.clone(), fallen: step.state.fallen })
+            .map(|(motion, step)| RobotFallen {
+                robot: motion.robot.name.clone(),
+                fallen: step.sensed.fallen,
+            })
             .collect()
     }
 

@@ -115,8 +115,8 @@ fn begin(situation: Situation, robots: usize) -> Result<(World, Vec<RobotCommand
                 world.control_step(&commands)?;
             }
             for (robot, measured) in world.present().robots.iter().enumerate() {
-                let state = &measured.state;
-                let world_from_wrist = state.world_from_pelvis * state.pelvis_from_wrist.right;
+                let pelvis_from_wrist = measured.sensed.pelvis_from_wrist.right;
+                let world_from_wrist = measured.truth.world_from_pelvis() * pelvis_from_wrist;
                 let wrist_from_bottle = Pose::from_translation(GRASP_IN_WRIST_M - Vector::Z * HELD_AT_M);
                 world.put_object(&bottle_name(robot), world_from_wrist * wrist_from_bottle);
             }
@@ -137,9 +137,9 @@ fn close(commands: &mut [RobotCommand], closed_share: f32) {
 fn check(world: &World, situation: Situation) {
     let present = world.present();
     for (index, robot) in present.robots.iter().enumerate() {
-        assert!(!robot.state.fallen, "robot {index} fell while {}", situation.name());
+        assert!(!robot.sensed.fallen, "robot {index} fell while {}", situation.name());
         if situation == Situation::Holding {
-            let wrist = robot.state.world_from_pelvis * robot.state.pelvis_from_wrist.right;
+            let wrist = robot.truth.world_from_pelvis() * robot.sensed.pelvis_from_wrist.right;
             let bottle = present.object(&bottle_name(index)).map(|bottle| bottle.world_from_object);
             let away_m = bottle.map(|bottle| (bottle * (Vector::Z * HELD_AT_M) - wrist.translation).length());
             assert!(
@@ -192,9 +192,9 @@ mod tests {
     /// In the frame of the wrist that holds it.
     fn held_m(world: &World, robot: usize) -> Vector {
         let present = world.present();
-        let state = &present.robots[robot].state;
         let bottle = present.object(&bottle_name(robot)).expect("a bottle for every robot").world_from_object;
-        let world_from_wrist = state.world_from_pelvis * state.pelvis_from_wrist.right;
+        let robot = &present.robots[robot];
+        let world_from_wrist = robot.truth.world_from_pelvis() * robot.sensed.pelvis_from_wrist.right;
         (world_from_wrist.inverse() * bottle).transform_point(Vector::Z * HELD_AT_M)
     }
 

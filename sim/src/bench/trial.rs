@@ -11,7 +11,7 @@ use super::tour::{self, Leg};
 use crate::body::PALM_IN_WRIST_M;
 use crate::locomotion::{BaseCommand, BaseVelocity, Locomotion};
 use crate::plane::{heading_rad, wrapped_rad};
-use crate::robot::{RobotCommand, RobotState};
+use crate::robot::{RobotCommand, RobotTruth};
 use crate::{CONTROL_DT_S as DT_S, RobotPlacement, Side, SimError, World, WorldSpec};
 
 const PUSH_S: f32 = 1.0;
@@ -30,24 +30,28 @@ pub(super) fn run(case: &Case, seed: u64, locomotion: Box<dyn Locomotion>) -> Re
         world.load_hand(0, side, case.hand_load_kg, PALM_IN_WRIST_M);
     }
     let rest = world.rest_command(0);
-    let mut state = world.present().robots.remove(0).state;
+    let mut robot = world.present().robots.remove(0);
     let mut log: Vec<Sample> = Vec::new();
     let mut trial = Trial::default();
     let mut work_j = 0.0;
     for step in 0..(case.duration_s / DT_S) as usize {
         let time_s = step as f32 * DT_S;
-        trial.fell = state.fallen;
+        trial.fell = robot.sensed.fallen;
         if trial.fell {
             break;
         }
         let heading_rad =
-            unwrap(heading_rad(&state.world_from_pelvis), log.last().map_or(0.0, |s| s.heading_rad));
-        let base = base_command(case, &world, &state, heading_rad, &legs, time_s, rest.base);
+            unwrap(heading_rad(&robot.truth.world_from_pelvis()), log.last().map_or(0.0, |s| s.heading_rad));
+        let base = base_command(case, &world, &robot.truth, heading_rad, &legs, time_s, rest.base);
         disturb(case, &mut world, seed, direction, &legs, time_s);
         let upper_rad = arms.at(&rest.upper_rad, time_s);
-        work_j += state.power_w() * DT_S;
-        log.push(Sample { pelvis_m: state.world_from_pelvis.translation, heading_rad, command: base });
-        state = world.control_step(&[RobotCommand { upper_rad, base }])?.robots.remove(0).state;
+        work_j += robot.sensed.power_w() * DT_S;
+        log.push(Sample {
+            pelvis_m: robot.truth.world_from_pelvis().translation,
+            heading_rad,
+            command: base,
+        });
+        robot = world.control_step(&[RobotCommand { upper_rad, base }])?.robots.remove(0);
     }
     trial.power_w = work_j / (log.len() as f32 * DT_S);
     if !trial.fell {
@@ -59,7 +63,7 @@ pub(super) fn run(case: &Case, seed: u64, locomotion: Box<dyn Locomotion>) -> Re
 fn base_command(
     case: &Case,
     world: &World,
-    state: &RobotState,
+    truth: &RobotTruth,
     heading_rad: f32,
     legs: &[Leg],
     time_s: f32,
@@ -78,7 +82,7 @@ fn base_command(
         }
         Plan::Tour(tour) => {
             let leg = ((time_s / tour.leg_s) as usize).min(legs.len() - 1);
-            let pelvis_m = state.world_from_pelvis.translation;
+            let pelvis_m = truth.world_from_pelvis().translation;
             let away_m = legs[leg].target_m - Vector::new(pelvis_m.x, pelvis_m.y, 0.0);
             tour::command(away_m, heading_rad, &world.robots()[0].base_limits(), rest.pelvis_height_m)
         }

@@ -1,5 +1,5 @@
 //! What a controller may know of a robot: its model, the order of its joints, kinematics and inverse dynamics. It knows no
-//! physics world: whoever senses a robot there fills in a [`WholeBody`].
+//! physics world: whoever senses a robot there fills in a [`BodyEstimate`].
 
 mod inverse_dynamics;
 mod layout;
@@ -16,7 +16,7 @@ pub use layout::{
     joint_names,
 };
 pub use model::{HandLinks, JointModel, LinkModel, RobotModel, SiteModel};
-pub use whole_body::WholeBody;
+pub use whole_body::BodyEstimate;
 
 pub(crate) use layout::{ARMS, LEG_JOINTS, LEGS, MIRRORED_ARM, WAIST, WAIST_JOINTS, check_joint_order};
 pub(crate) use whole_body::PALM_IN_WRIST_M;

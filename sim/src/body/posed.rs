@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use rapier3d::math::{Pose, Rotation, Vector};
 
-use super::{Acceleration, JOINTS, RobotModel, WholeBody};
+use super::{Acceleration, BodyEstimate, JOINTS, RobotModel};
 use crate::{GRAVITY_M_S2, Sides, assets};
 
 /// The embedded robot.
@@ -79,7 +79,7 @@ impl Posed {
     }
 
     /// The robot as a controller sees it, with nothing in the hands.
-    pub(crate) fn body(&self) -> WholeBody<'static> {
+    pub(crate) fn body(&self) -> BodyEstimate<'static> {
         let model = model();
         let world_from_link = model.forward_kinematics(self.world_from_pelvis, &self.q_rad);
         let (mut com_m, mut com_velocity_m_s) = (Vector::ZERO, Vector::ZERO);
@@ -88,7 +88,7 @@ impl Posed {
             com_m += *world * link.mass.local_com * part;
             com_velocity_m_s += moving.velocity_at(world.rotation * link.mass.local_com) * part;
         }
-        WholeBody {
+        BodyEstimate {
             model,
             q_rad: self.q_rad,
             qd_rad_s: self.qd_rad_s,

@@ -8,8 +8,9 @@ use crate::{GRAVITY_M_S2, Side, Sides};
 /// Middle of the palm, where loads of the hands act, in the frame of the link that carries the wrist.
 pub(crate) const PALM_IN_WRIST_M: Vector = Vector::new(0.12, 0.0, 0.0);
 
-/// What a controller may know of its own robot: joint readings, link poses, centre of mass.
-pub struct WholeBody<'a> {
+/// What a robot takes its own body to be, which is what a controller may know: joint readings, link poses, centre of mass. The world
+/// frame is where the robot believes it to be.
+pub struct BodyEstimate<'a> {
     pub model: &'a RobotModel,
     pub q_rad: [f32; JOINTS],
     pub qd_rad_s: [f32; JOINTS],
@@ -26,7 +27,7 @@ pub struct WholeBody<'a> {
     pub waist_target_rad: [f32; WAIST_JOINTS],
 }
 
-impl WholeBody<'_> {
+impl BodyEstimate<'_> {
     /// Middle of each palm, where loads of the hands are taken to act.
     pub fn palms_m(&self) -> Sides<Vector> {
         self.model.hands.each_ref().map(|hand| self.world_from_link[hand.wrist] * PALM_IN_WRIST_M)

@@ -13,7 +13,7 @@ pub use choice::LocomotionChoice;
 use serde::{Deserialize, Serialize};
 
 use crate::Sides;
-use crate::body::{JointDrive, LEG_JOINTS, WAIST_JOINTS, WholeBody};
+use crate::body::{BodyEstimate, JointDrive, LEG_JOINTS, WAIST_JOINTS};
 
 /// What a policy asks of the base, in the robot's own heading frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -77,7 +77,7 @@ pub trait Locomotion: Send {
     fn limits(&self) -> BaseLimits;
 
     /// One physics step.
-    fn tick(&mut self, body: &WholeBody, command: &BaseCommand, dt_s: f32) -> LegCommand;
+    fn tick(&mut self, body: &BodyEstimate, command: &BaseCommand, dt_s: f32) -> LegCommand;
 
     /// What is added to the task's waist targets (yaw, roll, pitch) until the next [`Locomotion::tick`], by a controller
     /// that balances with the waist.

@@ -14,7 +14,7 @@ use rapier3d::na::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
 use crate::Sides;
-use crate::body::{ARM_JOINTS, ARMS, JOINTS, WholeBody};
+use crate::body::{ARM_JOINTS, ARMS, BodyEstimate, JOINTS};
 
 #[derive(Clone, Default, Serialize, Deserialize)]
 pub(super) struct HandLoads {
@@ -48,7 +48,7 @@ const LARGEST_WEIGHT_N: f32 = 35.0;
 impl HandLoads {
     /// One physics step: `torque_n_m` are the drives' torques of the last step. Returns the torques that hold all joints
     /// against gravity and the arms against the weights in the hands.
-    pub(super) fn update(&mut self, body: &WholeBody, torque_n_m: &[f32], dt_s: f32) -> [f32; JOINTS] {
+    pub(super) fn update(&mut self, body: &BodyEstimate, torque_n_m: &[f32], dt_s: f32) -> [f32; JOINTS] {
         let gravity_n_m = body.gravity_torques_n_m();
         let mut load_n_m = gravity_n_m;
         let palms_m = body.palms_m();
@@ -73,7 +73,8 @@ impl HandLoads {
         self.force.each_ref().map(HandForce::force_n)
     }
 
-    pub(super) fn weight_n(&self) -> Sides<f32> {
+    #[cfg(test)]
+    fn weight_n(&self) -> Sides<f32> {
         self.payload.each_ref().map(Payload::weight_n)
     }
 }
@@ -107,6 +108,7 @@ struct Payload {
 }
 
 impl Payload {
+    #[cfg(test)]
     fn weight_n(&self) -> f32 {
         self.weight_n
     }
@@ -136,7 +138,7 @@ mod tests {
     use crate::{PHYSICS_DT_S, Side};
 
     /// Arms bent in front of the body.
-    fn holding() -> WholeBody<'static> {
+    fn holding() -> BodyEstimate<'static> {
         let mut posed = Posed::standing();
         for (side, first) in ARMS.by_side() {
             let bent_rad = [-0.4, 0.2 * side.sign(), 0.1 * side.sign(), 0.6, 0.0, 0.2, 0.0];
@@ -146,7 +148,7 @@ mod tests {
     }
 
     /// Feels long enough for the filters, with torques that hold the arms against gravity and a force on each palm.
-    fn feel(body: &WholeBody, force_n: Sides<Vector>) -> (HandLoads, [f32; JOINTS]) {
+    fn feel(body: &BodyEstimate, force_n: Sides<Vector>) -> (HandLoads, [f32; JOINTS]) {
         let mut torque_n_m = body.gravity_torques_n_m();
         for (side, first) in ARMS.by_side() {
             let (palm_m, force_n) = (body.palms_m()[side], force_n[side]);

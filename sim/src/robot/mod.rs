@@ -1,5 +1,6 @@
 //! One robot in a world: put there, sensed, driven.
 
+mod estimate;
 mod hand_loads;
 mod joints;
 mod odometry;
@@ -12,11 +13,11 @@ use rapier3d::math::Vector;
 use serde::{Deserialize, Serialize};
 
 pub use spawn::RobotPlacement;
-pub use state::RobotState;
+pub use state::{RobotEstimate, RobotSensed, RobotTruth};
 
 use crate::body::{
-    JOINTS, JointDrive, LEG_JOINTS, LEGS, RobotModel, UPPER, UPPER_JOINTS, WAIST, WAIST_COLUMN, WAIST_JOINTS,
-    WholeBody,
+    BodyEstimate, JOINTS, JointDrive, LEG_JOINTS, LEGS, RobotModel, UPPER, UPPER_JOINTS, WAIST, WAIST_COLUMN,
+    WAIST_JOINTS,
 };
 use crate::dynamics::{Dynamics, TreeId};
 use crate::locomotion::{BaseCommand, BaseLimits, LegCommand, Locomotion};
@@ -68,10 +69,11 @@ impl Robot {
 
     /// Sets this robot's joint drives for one physics step, `substep` counting from 0 within the control step.
     pub(crate) fn drive(&mut self, dynamics: &mut Dynamics, command: &RobotCommand, substep: u32) {
-        // What is sensed borrows from this model, so that the robot may change meanwhile.
+        // The estimate borrows from this model, so that the robot may change meanwhile.
         let model = Arc::clone(&self.model);
         let tree = dynamics.tree_mut(self.tree);
-        let body = self.sense(&model, tree);
+        let hand_force_n = self.memory.hand_loads.force_n();
+        let body = estimate::from_truth(&model, tree, hand_force_n, self.waist_target_rad());
         let load_n_m = self.feel(&body, &joints::torques_n_m(tree, &model));
         self.memory.odometry.update(&body, PHYSICS_DT_S);
         let legs = self.locomotion.tick(&body, &command.base, PHYSICS_DT_S);
@@ -84,7 +86,7 @@ impl Robot {
 
     /// Torques of the upper body's joints against gravity and what the hands carry, as far as it is known by now.
     /// `torque_n_m` are the drives' torques of the last step.
-    fn feel(&mut self, body: &WholeBody, torque_n_m: &[f32; JOINTS]) -> [f32; JOINTS] {
+    fn feel(&mut self, body: &BodyEstimate, torque_n_m: &[f32; JOINTS]) -> [f32; JOINTS] {
         let pelvis = body.world_from_pelvis();
         let upright = (pelvis.rotation * Vector::Z).z;
         self.memory.fallen |= pelvis.translation.z < FALLEN_HEIGHT_M || upright < FALLEN_TILT_COSINE;

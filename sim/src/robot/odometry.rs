@@ -10,7 +10,7 @@
 use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
-use crate::body::WholeBody;
+use crate::body::BodyEstimate;
 use crate::plane::flat;
 
 /// What a robot knows of its way since it was put into the world.
@@ -41,12 +41,12 @@ struct Sensed {
 
 impl Odometry {
     /// One physics step.
-    pub(super) fn update(&mut self, body: &WholeBody, dt_s: f32) {
+    pub(super) fn update(&mut self, body: &BodyEstimate, dt_s: f32) {
         self.last = Some(self.estimate(&Sensed::of(body), dt_s));
     }
 
     /// The pelvis in the start frame, measured as `body` one physics step after the last [`Odometry::update`].
-    pub(super) fn start_from_pelvis(&self, body: &WholeBody, dt_s: f32) -> Pose {
+    pub(super) fn start_from_pelvis(&self, body: &BodyEstimate, dt_s: f32) -> Pose {
         self.estimate(&Sensed::of(body), dt_s).start_from_pelvis
     }
 
@@ -69,7 +69,7 @@ impl Odometry {
 }
 
 impl Sensed {
-    fn of(body: &WholeBody) -> Sensed {
+    fn of(body: &BodyEstimate) -> Sensed {
         let pelvis_from_world = body.world_from_pelvis().inverse();
         let soles = &body.model.soles;
         let shapes = soles.iter().flat_map(|sole| {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::objects::Object;
 use super::{ObjectState, World};
-use crate::robot::{RobotCommand, RobotState};
+use crate::robot::{RobotCommand, RobotEstimate, RobotSensed, RobotTruth};
 use crate::{CONTROL_HZ, Side};
 
 /// The world after one control step, or before the first.
@@ -23,12 +23,12 @@ pub struct Step {
     pub touches: Vec<Touch>,
 }
 
-/// One robot: what it measured after the step, and what it was told for the step.
+/// One robot: what it senses after the step, where it takes itself to be, where it is, and what it was told for the step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotStep {
-    pub state: RobotState,
-    /// In the order of [`crate::body::RobotModel::links`].
-    pub world_from_link: Vec<Pose>,
+    pub sensed: RobotSensed,
+    pub estimate: RobotEstimate,
+    pub truth: RobotTruth,
     /// Before the first step, the command under which the robot rests.
     pub command: RobotCommand,
 }
@@ -57,6 +57,13 @@ pub struct HandContacts {
     pub thumb_n: Vector,
     pub fingers_n: Vector,
     pub palm_n: Vector,
+}
+
+impl RobotStep {
+    /// Where the camera in the robot's head is. Axes as [`crate::mjcf::MjcfCamera`]'s.
+    pub fn world_from_camera(&self) -> Pose {
+        self.truth.world_from_pelvis() * self.sensed.pelvis_from_camera
+    }
 }
 
 impl Step {
@@ -90,14 +97,18 @@ impl World {
 
     fn robot_step(&self, index: usize) -> RobotStep {
         let robot = &self.robots[index];
-        let body = robot.measure(&self.dynamics);
+        let body = robot.estimated_body(&self.dynamics);
         let command = match self.control_steps {
             0 => robot.rest_command(&self.dynamics),
             _ => robot.last_command(),
         };
         RobotStep {
-            state: robot.state(&body, &self.dynamics),
-            world_from_link: body.world_from_link,
+            sensed: robot.sensed(&body, &self.dynamics),
+            estimate: RobotEstimate {
+                world_from_pelvis: body.world_from_pelvis(),
+                hand_force_n: body.hand_force_n,
+            },
+            truth: robot.truth(&self.dynamics),
             command,
         }
     }

@@ -48,6 +48,6 @@ fn a_walk_continues_from_a_snapshot_bit_for_bit() {
     for world in [&mut first, &mut second] {
         (0..100).for_each(|_| drop(world.control_step(&[command]).expect("it stays finite")));
     }
-    assert!(first.present().robots[0].state.world_from_pelvis.translation.x > 0.6);
+    assert!(first.present().robots[0].truth.world_from_pelvis().translation.x > 0.6);
     assert_eq!(first.state_hash(), second.state_hash());
 }

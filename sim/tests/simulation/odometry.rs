@@ -1,6 +1,6 @@
 //! What a robot's own odometry says of its way, against where it went.
 
-use tandem_sim::{BaseCommand, Pose, RobotCommand, RobotPlacement, RobotState, World, WorldSpec};
+use tandem_sim::{BaseCommand, Pose, RobotCommand, RobotPlacement, RobotStep, World, WorldSpec};
 
 fn world() -> World {
     let robot = RobotPlacement { name: "A".into(), position_m: [0.4, -0.3], yaw_rad: 1.1 };
@@ -8,8 +8,8 @@ fn world() -> World {
     World::new(&spec).expect("embedded files load")
 }
 
-fn pelvis(world: &World) -> RobotState {
-    world.present().robots.remove(0).state
+fn pelvis(world: &World) -> RobotStep {
+    world.present().robots.remove(0)
 }
 
 /// How far the odometry is off, in place and in heading, after a walk of `seconds` that ends at rest, and how long the
@@ -17,7 +17,7 @@ fn pelvis(world: &World) -> RobotState {
 fn drift(velocity: [f32; 3], seconds: u32) -> ([f32; 2], f32) {
     let mut world = world();
     let rest = world.rest_command(0);
-    let mut start = pelvis(&world).world_from_pelvis;
+    let mut start = pelvis(&world).truth.world_from_pelvis();
     start.translation.z = 0.0;
     let [vx_m_s, vy_m_s, yaw_rate_rad_s] = velocity;
     let walk = BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, ..rest.base };
@@ -25,13 +25,13 @@ fn drift(velocity: [f32; 3], seconds: u32) -> ([f32; 2], f32) {
     let mut last_m = start.translation;
     for base in [vec![walk; 50 * seconds as usize], vec![rest.base; 150]].concat() {
         let step = world.control_step(&[RobotCommand { base, ..rest }]).expect("it stays finite");
-        let pelvis_m = step.robots[0].state.world_from_pelvis.translation;
+        let pelvis_m = step.robots[0].truth.world_from_pelvis().translation;
         way_m += (pelvis_m - last_m).truncate().length();
         last_m = pelvis_m;
     }
-    let state = pelvis(&world);
-    assert!(!state.fallen, "{velocity:?}");
-    let off: Pose = (start.inverse() * state.world_from_pelvis).inverse() * state.start_from_pelvis;
+    let RobotStep { sensed, truth, .. } = pelvis(&world);
+    assert!(!sensed.fallen, "{velocity:?}");
+    let off: Pose = (start.inverse() * truth.world_from_pelvis()).inverse() * sensed.start_from_pelvis;
     let turned_rad = 2.0 * off.rotation.xyz().length().asin();
     ([off.translation.length(), turned_rad], way_m)
 }

@@ -60,7 +60,7 @@ fn run(world: &mut World, rest: &[RobotCommand], steps: u64) -> Step {
 }
 
 fn pelvis_m(step: &Step, robot: usize) -> Vector {
-    step.robots[robot].state.world_from_pelvis.translation
+    step.robots[robot].truth.world_from_pelvis().translation
 }
 
 #[test]
@@ -72,12 +72,12 @@ fn robots_stand_while_their_arms_move() {
         let step = run(&mut world, &rest, 1);
         low = low.min(pelvis_m(&step, 0));
         high = high.max(pelvis_m(&step, 0));
-        let torques_n_m = step.robots[0].state.torque_n_m;
+        let torques_n_m = step.robots[0].sensed.torque_n_m;
         for (torque_n_m, joint) in torques_n_m.iter().zip(&world.robots()[0].model.joints) {
             assert!(torque_n_m.abs() <= joint.effort_n_m, "{} needs {torque_n_m} N m", joint.name);
         }
         assert_eq!(world.self_contacts(0), []);
-        assert!(step.robots.iter().all(|robot| !robot.state.fallen));
+        assert!(step.robots.iter().all(|robot| !robot.sensed.fallen));
     }
     let sway = high - low;
     assert!(sway.x < 0.015 && sway.y < 0.015 && sway.z < 0.005, "pelvis sways {sway} m");
@@ -96,7 +96,7 @@ fn another_robots_file_is_all_it_takes() {
     let mut world = World::with_robot(&kitchen(), model).expect("a world");
     let rest = rest(&world);
     let step = run(&mut world, &rest, 200);
-    assert!(step.robots.iter().all(|robot| !robot.state.fallen));
+    assert!(step.robots.iter().all(|robot| !robot.sensed.fallen));
 }
 
 #[test]
@@ -151,8 +151,8 @@ fn a_step_says_what_was_done_and_comes_back_from_its_bytes() {
 #[test]
 fn a_step_names_the_hand_that_touches() {
     let right_wrist = {
-        let state = &world().present().robots[0].state;
-        state.world_from_pelvis * state.pelvis_from_wrist.right
+        let robot = &world().present().robots[0];
+        robot.truth.world_from_pelvis() * robot.sensed.pelvis_from_wrist.right
     };
     let mut spec = kitchen();
     // The bottle falls onto the hand.

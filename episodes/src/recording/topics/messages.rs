@@ -8,7 +8,7 @@ use base64::{DecodeError, Engine, prelude::BASE64_STANDARD};
 use foxglove::{Encode, Schema, bytes::BufMut};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tandem_sim::{BaseCommand, RobotCommand, RobotState, Side, Step};
+use tandem_sim::{BaseCommand, RobotCommand, RobotStep, Side, Step};
 use tandem_tools_spec::{Budget, PhaseReached, ToolReply};
 
 use crate::commands::{Called, base_row};
@@ -145,9 +145,9 @@ impl JsonMessage for HandsMessage {
 }
 
 impl HandsMessage {
-    /// Of robot number `robot`, which measures `state` where scoring sees `facts`.
-    pub fn of(state: &RobotState, robot: usize, facts: &Facts) -> Json<HandsMessage> {
-        let felt_n = state.hand_force_n.map(|force_n| force_n.to_array());
+    /// The hands of robot number `robot`, which moved as `moved` where scoring sees `facts`.
+    pub fn of(moved: &RobotStep, robot: usize, facts: &Facts) -> Json<HandsMessage> {
+        let felt_n = moved.estimate.hand_force_n.map(|force_n| force_n.to_array());
         let named = |side: Side, wanted: Grip| {
             let objects = facts.objects.iter().filter(|object| object.hands[robot][side] == wanted);
             objects.map(|object| object.name.clone()).collect()

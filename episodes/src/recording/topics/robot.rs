@@ -1,7 +1,7 @@
 //! The topics of one robot: what its joints do, what it was told, what its hands feel and what its camera saw.
 
 use foxglove::messages::{CameraCalibration, CompressedImage, JointState, JointStates};
-use tandem_sim::{RobotModel, RobotState, RobotStep, mjcf::MjcfCamera, render::Intrinsics};
+use tandem_sim::{RobotModel, RobotSensed, RobotStep, mjcf::MjcfCamera, render::Intrinsics};
 
 use super::messages::{ActionMessage, BaseCommandMessage, HandsMessage, Json};
 use super::transforms::{EGOCENTRIC, robot_frame, timestamp};
@@ -50,11 +50,11 @@ impl RobotTopics {
         step: &RobotStep,
         facts: &Facts,
     ) -> Result<(), OutputError> {
-        let joints = joint_states(&robot.model, time_s, &step.state);
+        let joints = joint_states(&robot.model, time_s, &step.sensed);
         file.write(&mut self.joint_states, time_s, &joints)?;
         file.write(&mut self.action, time_s, &Json::from(&step.command))?;
         file.write(&mut self.base_command, time_s, &Json::from(&step.command))?;
-        file.write(&mut self.hands, time_s, &HandsMessage::of(&step.state, index, facts))
+        file.write(&mut self.hands, time_s, &HandsMessage::of(step, index, facts))
     }
 
     /// Appends a picture seen through the robot's head camera, unless there is one of this moment: physics stands still between
@@ -94,13 +94,13 @@ impl RobotTopics {
     }
 }
 
-fn joint_states(model: &RobotModel, time_s: f64, state: &RobotState) -> JointStates {
+fn joint_states(model: &RobotModel, time_s: f64, sensed: &RobotSensed) -> JointStates {
     let joints = model.joints.iter().enumerate().map(|(index, joint)| JointState {
         name: joint.name.clone(),
-        position: Some(state.q_rad[index].into()),
-        velocity: Some(state.qd_rad_s[index].into()),
+        position: Some(sensed.q_rad[index].into()),
+        velocity: Some(sensed.qd_rad_s[index].into()),
         acceleration: None,
-        effort: Some(state.torque_n_m[index].into()),
+        effort: Some(sensed.torque_n_m[index].into()),
     });
     JointStates { timestamp: Some(timestamp(time_s)), joints: joints.collect() }
 }

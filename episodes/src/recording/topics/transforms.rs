@@ -1,7 +1,7 @@
 //! Poses as Foxglove's transforms: the world, each robot's chain of links, its camera, and the objects.
 
 use foxglove::messages::{FrameTransform, FrameTransforms, Quaternion, Timestamp, Vector3};
-use tandem_sim::{Pose, RobotModel, RobotState, Rotation, Step, Vector};
+use tandem_sim::{Pose, RobotModel, RobotSensed, Rotation, Step, Vector};
 
 use crate::commands::RobotSheet;
 use crate::convert::opencv_axes;
@@ -31,13 +31,13 @@ pub fn transforms(robots: &[RobotSheet], step: &Step) -> FrameTransforms {
     for (robot, moved) in robots.iter().zip(&step.robots) {
         let model = &robot.model;
         let name = |link: usize| robot_frame(&robot.name, &model.links[link].name);
-        transforms.push(frame(WORLD.into(), name(0), moved.state.world_from_pelvis));
-        for (link, parent_from_link) in link_poses(model, &moved.state) {
+        transforms.push(frame(WORLD.into(), name(0), moved.truth.world_from_pelvis()));
+        for (link, parent_from_link) in link_poses(model, &moved.sensed) {
             let parent = model.links[link].parent.unwrap_or_default();
             transforms.push(frame(name(parent), name(link), parent_from_link));
         }
         let camera = robot_frame(&robot.name, EGOCENTRIC);
-        transforms.push(frame(name(0), camera, opencv_axes(&moved.state.pelvis_from_camera)));
+        transforms.push(frame(name(0), camera, opencv_axes(&moved.sensed.pelvis_from_camera)));
     }
     for object in &step.objects {
         transforms.push(frame(WORLD.into(), object.name.clone(), object.state.world_from_object));
@@ -46,9 +46,12 @@ pub fn transforms(robots: &[RobotSheet], step: &Step) -> FrameTransforms {
 }
 
 /// Pose of every jointed link in its parent, from the measured joint angles: multibody joints do not drift.
-fn link_poses<'a>(model: &'a RobotModel, state: &'a RobotState) -> impl Iterator<Item = (usize, Pose)> + 'a {
+fn link_poses<'a>(
+    model: &'a RobotModel,
+    sensed: &'a RobotSensed,
+) -> impl Iterator<Item = (usize, Pose)> + 'a {
     model.joints.iter().enumerate().map(|(index, joint)| {
-        let turn = Rotation::from_axis_angle(joint.axis, state.q_rad[index]);
+        let turn = Rotation::from_axis_angle(joint.axis, sensed.q_rad[index]);
         (joint.link, model.links[joint.link].parent_from_link * Pose::from_rotation(turn))
     })
 }

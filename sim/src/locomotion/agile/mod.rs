@@ -19,7 +19,7 @@ pub use network::Network;
 
 use super::{BaseCommand, BaseLimits, LegCommand, Locomotion};
 use crate::PHYSICS_STEPS_PER_CONTROL;
-use crate::body::{JOINTS, JointDrive, LEGS, WAIST, WholeBody};
+use crate::body::{BodyEstimate, JOINTS, JointDrive, LEGS, WAIST};
 use joints::JointMap;
 use network::{Action, Observation, RecurrentState};
 use place::ReferencePlace;
@@ -55,7 +55,7 @@ impl Agile {
         Agile { network, joints: JointMap::new(), state: None }
     }
 
-    fn observe(&self, body: &WholeBody, velocity_command: [f32; 3]) -> Observation {
+    fn observe(&self, body: &BodyEstimate, velocity_command: [f32; 3]) -> Observation {
         let pelvis = body.world_from_pelvis().rotation;
         let turning = pelvis.inverse() * body.pelvis_angular_velocity_rad_s;
         let q_rad = less_waist_targets(body);
@@ -69,7 +69,7 @@ impl Agile {
     }
 
     /// Stands as it is until the policy has spoken.
-    fn begin(&self, body: &WholeBody) -> AgileState {
+    fn begin(&self, body: &BodyEstimate) -> AgileState {
         let q_rad = less_waist_targets(body);
         let joints = &body.model.joints;
         let observation = self.observe(body, [0.0; 3]);
@@ -104,7 +104,7 @@ impl Locomotion for Agile {
         LIMITS
     }
 
-    fn tick(&mut self, body: &WholeBody, command: &BaseCommand, dt_s: f32) -> LegCommand {
+    fn tick(&mut self, body: &BodyEstimate, command: &BaseCommand, dt_s: f32) -> LegCommand {
         let mut state = self.state.take().unwrap_or_else(|| self.begin(body));
         if state.ticks.is_multiple_of(PHYSICS_STEPS_PER_CONTROL) {
             let command = LIMITS.clamp(*command);
@@ -152,7 +152,7 @@ impl Locomotion for Agile {
 }
 
 /// Joint angles as they would be had the task asked for an upright waist.
-fn less_waist_targets(body: &WholeBody) -> [f32; JOINTS] {
+fn less_waist_targets(body: &BodyEstimate) -> [f32; JOINTS] {
     let mut q_rad = body.q_rad;
     for (i, target_rad) in body.waist_target_rad.into_iter().enumerate() {
         q_rad[WAIST + i] -= target_rad;

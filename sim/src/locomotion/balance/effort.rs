@@ -8,7 +8,7 @@ use rapier3d::na::{SMatrix, SVector};
 
 use super::ground::{FootForce, distribute, leg_torques_n_m};
 use super::load::Load;
-use crate::body::{Acceleration, Effort, JOINTS, LEG_JOINTS, LEGS, WholeBody};
+use crate::body::{Acceleration, BodyEstimate, Effort, JOINTS, LEG_JOINTS, LEGS};
 use crate::plane::flat;
 use crate::{GRAVITY_M_S2, Side, Sides};
 
@@ -60,7 +60,7 @@ pub(super) struct LegTorques {
 /// [`leg_torques`], with trunk and feet driven less hard if a joint could not do it: torques that saturate fit no motion,
 /// and tip the foot that carries.
 pub(super) fn leg_torques_within_limits(
-    body: &WholeBody,
+    body: &BodyEstimate,
     load: &Load,
     motion: &WantedMotion,
     contact: &GroundContact,
@@ -101,7 +101,12 @@ pub(super) fn leg_torques_within_limits(
 /// Torques of both legs. The pelvis accelerates sideways as it must for the ground force to have no moment about the
 /// pressure point, and turns no harder than one foot can hold: both are linear in its acceleration, and found by correcting
 /// it [`CORRECTIONS`] times.
-fn leg_torques(body: &WholeBody, load: &Load, motion: &WantedMotion, contact: &GroundContact) -> LegTorques {
+fn leg_torques(
+    body: &BodyEstimate,
+    load: &Load,
+    motion: &WantedMotion,
+    contact: &GroundContact,
+) -> LegTorques {
     let point_m = contact.pressure_m;
     let height_m = (body.com_m.z - point_m.z).max(LEAST_HEIGHT_M);
     let away_m = flat(body.com_m - point_m);
@@ -128,7 +133,7 @@ fn leg_torques(body: &WholeBody, load: &Load, motion: &WantedMotion, contact: &G
 
 impl GroundContact {
     /// A foot holds less against turning the nearer the pressure is to toe or heel.
-    fn most_turn_n_m(&self, body: &WholeBody) -> f32 {
+    fn most_turn_n_m(&self, body: &BodyEstimate) -> f32 {
         match self.foot {
             Some(side) => {
                 let sole_from_world = body.world_from_soles()[side].inverse();
@@ -150,7 +155,7 @@ struct Reaction {
 
 impl Reaction {
     fn of(
-        body: &WholeBody,
+        body: &BodyEstimate,
         load: &Load,
         motion: &WantedMotion,
         pelvis: Acceleration,
@@ -184,7 +189,7 @@ impl Reaction {
     /// Torques with which the legs push on the ground.
     fn pushes_n_m(
         &self,
-        body: &WholeBody,
+        body: &BodyEstimate,
         contact: &GroundContact,
         turn_n_m: Vector,
     ) -> Sides<[f32; LEG_JOINTS]> {
@@ -207,7 +212,7 @@ impl Reaction {
 /// Force (N) with which the ground answers the torques of one leg whose foot stands:
 ///   J^T w = tau_dynamics - tau,  by damped least squares.
 pub(super) fn ground_force_n(
-    body: &WholeBody,
+    body: &BodyEstimate,
     side: Side,
     dynamics_n_m: &[f32; JOINTS],
     torque_n_m: &[f32; LEG_JOINTS],
@@ -222,7 +227,7 @@ pub(super) fn ground_force_n(
 }
 
 /// Linear over angular velocity of an ankle roll link per joint velocity of its leg.
-fn foot_jacobian(body: &WholeBody, side: Side) -> SMatrix<f32, 6, 6> {
+fn foot_jacobian(body: &BodyEstimate, side: Side) -> SMatrix<f32, 6, 6> {
     let first = LEGS[side];
     let foot_m = body.world_from_foot(side).translation;
     let mut jacobian = SMatrix::<f32, 6, 6>::zeros();
@@ -236,7 +241,7 @@ fn foot_jacobian(body: &WholeBody, side: Side) -> SMatrix<f32, 6, 6> {
 
 /// Changes the joint accelerations of both legs so that the feet accelerate as wanted:
 ///   (J^T J + damping I) d = J^T (wanted - now).
-fn move_feet(body: &WholeBody, motion: &WantedMotion, effort: &Effort, qdd_rad_s2: &mut [f32; JOINTS]) {
+fn move_feet(body: &BodyEstimate, motion: &WantedMotion, effort: &Effort, qdd_rad_s2: &mut [f32; JOINTS]) {
     for side in Side::BOTH {
         let first = LEGS[side];
         let foot = body.model.joints[first + 5].link;

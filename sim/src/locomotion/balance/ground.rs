@@ -5,7 +5,7 @@ mod tests;
 
 use rapier3d::math::{Pose, Vector};
 
-use crate::body::{LEG_JOINTS, LEGS, WholeBody};
+use crate::body::{BodyEstimate, LEG_JOINTS, LEGS};
 use crate::plane::flat;
 use crate::{Side, Sides};
 
@@ -113,7 +113,7 @@ pub(super) fn distribute(
 /// Torques with which a leg pushes on the ground so that the ground answers with `foot` and a free moment:
 /// tau = -J^T [f; m].
 pub(super) fn leg_torques_n_m(
-    body: &WholeBody,
+    body: &BodyEstimate,
     side: Side,
     foot: FootForce,
     free_moment_n_m: Vector,

@@ -2,7 +2,7 @@
 
 use rapier3d::math::Vector;
 
-use crate::body::WholeBody;
+use crate::body::BodyEstimate;
 use crate::plane::flat;
 use crate::{GRAVITY_M_S2, Sides};
 
@@ -14,7 +14,7 @@ pub(super) struct Laden {
 }
 
 impl Laden {
-    pub(super) fn of(body: &WholeBody) -> Laden {
+    pub(super) fn of(body: &BodyEstimate) -> Laden {
         let carried_kg = body.hand_force_n.map(|force_n| (-force_n.z - DEAD_ZONE_N).max(0.0) / GRAVITY_M_S2);
         let mut mass_kg = body.model.mass_kg;
         let mut momentum_kg_m_s = body.com_velocity_m_s * mass_kg;
@@ -49,7 +49,7 @@ const LARGEST_TURN_N_M: f32 = 20.0;
 impl Load {
     /// With height h of the centre of mass c over the ground and vertical load N = m g - f_z:
     ///   p = c + ( m_y + h f_x, -m_x + h f_y ) / N.
-    pub(super) fn of(body: &WholeBody, laden: &Laden, ground_m: f32, push_m_s2: Vector) -> Load {
+    pub(super) fn of(body: &BodyEstimate, laden: &Laden, ground_m: f32, push_m_s2: Vector) -> Load {
         let height_m = body.com_m.z - ground_m;
         let balanced_m = |force_n: Vector, moment_n_m: Vector| {
             let away_m =

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{BaseCommand, BaseLimits, BaseVelocity, LegCommand, Locomotion};
 use crate::GRAVITY_M_S2;
-use crate::body::WholeBody;
+use crate::body::BodyEstimate;
 use crate::plane::heading_rad;
 use ground::middle_m;
 use load::{Laden, Load};
@@ -89,7 +89,7 @@ impl Locomotion for Balance {
         LIMITS
     }
 
-    fn tick(&mut self, body: &WholeBody, command: &BaseCommand, dt_s: f32) -> LegCommand {
+    fn tick(&mut self, body: &BodyEstimate, command: &BaseCommand, dt_s: f32) -> LegCommand {
         let state = self.state.get_or_insert_with(|| BalanceState::new(body));
         let command = LIMITS.clamp(*command);
         state.velocity = ramped(state.velocity, command.velocity(), dt_s);
@@ -123,7 +123,7 @@ impl Locomotion for Balance {
 }
 
 impl BalanceState {
-    fn new(body: &WholeBody) -> BalanceState {
+    fn new(body: &BodyEstimate) -> BalanceState {
         let pelvis = body.world_from_pelvis();
         let heading_rad = heading_rad(&pelvis);
         let middle_m = middle_m(&body.world_from_soles());
@@ -140,7 +140,7 @@ impl BalanceState {
         }
     }
 
-    fn change_mode(&mut self, body: &WholeBody, load: &Load) {
+    fn change_mode(&mut self, body: &BodyEstimate, load: &Load) {
         let BaseVelocity { vx_m_s, vy_m_s, yaw_rate_rad_s } = self.velocity;
         let moving =
             vx_m_s.abs() > STILL_M_S || vy_m_s.abs() > STILL_M_S || yaw_rate_rad_s.abs() > STILL_RAD_S;
@@ -183,7 +183,7 @@ impl BalanceState {
         }
     }
 
-    fn stance(&self, body: &WholeBody, load: &Load) -> Stance {
+    fn stance(&self, body: &BodyEstimate, load: &Load) -> Stance {
         let soles = body.world_from_soles();
         let middle_m = middle_m(&soles);
         let height_m = body.com_m.z - middle_m.z;

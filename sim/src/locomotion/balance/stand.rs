@@ -11,7 +11,7 @@ use super::effort::ground_force_n;
 use super::ground::{distribute, leg_torques_n_m, middle_m, supported_force_n};
 use super::legs::{LegAngles, inverse, rotation_vector_rad};
 use super::load::Load;
-use crate::body::{JOINTS, JointDrive, LEG_JOINTS, LEGS, WholeBody};
+use crate::body::{BodyEstimate, JOINTS, JointDrive, LEG_JOINTS, LEGS};
 use crate::locomotion::LegCommand;
 use crate::plane::flat;
 use crate::{GRAVITY_M_S2, Side, Sides};
@@ -74,7 +74,7 @@ pub(super) struct Stand {
 impl Stand {
     /// Plants the feet where they are. `moving` is a robot's that comes to rest: where the pelvis rests relative to the
     /// middle of the soles, in the heading frame, and what it leans against. `None` keeps the pelvis where it is.
-    pub(super) fn plant(body: &WholeBody, heading_rad: f32, moving: Option<(Vector, &Load)>) -> Stand {
+    pub(super) fn plant(body: &BodyEstimate, heading_rad: f32, moving: Option<(Vector, &Load)>) -> Stand {
         let pelvis = body.world_from_pelvis();
         let soles = body.world_from_soles();
         let middle_m = middle_m(&soles);
@@ -103,7 +103,7 @@ impl Stand {
 
     /// Where the centre of mass, with what is carried, would be with the pelvis at home: from the middle of the feet, in the
     /// heading frame.
-    fn weights_m(&self, body: &WholeBody, load: &Load) -> Vector {
+    fn weights_m(&self, body: &BodyEstimate, load: &Load) -> Vector {
         let away_m = load.weights_point_m - body.world_from_pelvis().translation;
         Rotation::from_rotation_z(-self.heading_rad) * flat(self.home_m + away_m - middle_m(&self.soles))
     }
@@ -121,7 +121,7 @@ impl Stand {
     /// One physics step towards a pelvis height over the soles.
     pub(super) fn tick(
         &mut self,
-        body: &WholeBody,
+        body: &BodyEstimate,
         load: &Load,
         height_m: f32,
         dt_s: f32,
@@ -160,7 +160,7 @@ impl Stand {
 
     /// Pelvis pose (world) that keeps the centre of mass within [`COM_ZONE_M`] of the middle of the planted feet,
     /// as near to home as that and a push allow.
-    fn pelvis_goal(&mut self, body: &WholeBody, load: &Load, dt_s: f32) -> Pose {
+    fn pelvis_goal(&mut self, body: &BodyEstimate, load: &Load, dt_s: f32) -> Pose {
         let heading = Rotation::from_rotation_z(self.heading_rad);
         let weights_m = self.weights_m(body, load);
         let shift_m = back_into_m(COM_ZONE_M, weights_m);
@@ -186,7 +186,7 @@ fn within_reach_m(shift_m: Vector) -> Vector {
 
 /// Force with which the ground answers the drives of one leg.
 fn push_n(
-    body: &WholeBody,
+    body: &BodyEstimate,
     side: Side,
     drives: &[JointDrive; LEG_JOINTS],
     gravity_n_m: &[f32; JOINTS],
@@ -201,7 +201,7 @@ fn push_n(
 
 /// Leg torques of the ground forces that accelerate the centre of mass and right the trunk towards `goal`.
 fn balance_torques_n_m(
-    body: &WholeBody,
+    body: &BodyEstimate,
     load: &Load,
     goal: Pose,
     goal_velocity_m_s: Vector,

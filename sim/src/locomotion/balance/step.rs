@@ -22,7 +22,7 @@ use super::ground::nearest_support_m;
 use super::legs::rotation_vector_rad;
 use super::load::Load;
 use super::swing::{SOLE_IN_FOOT_M, SWING_S, Swing, foot_motion};
-use crate::body::{Acceleration, JointDrive, LEGS, WholeBody};
+use crate::body::{Acceleration, BodyEstimate, JointDrive, LEGS};
 use crate::locomotion::{BaseVelocity, LegCommand};
 use crate::plane::{flat, heading_rad, wrapped_rad};
 use crate::{GRAVITY_M_S2, Side, Sides};
@@ -88,7 +88,7 @@ pub(super) struct Stepping {
 
 impl Stepping {
     /// Starts stepping; the first foot to carry is the one nearer to the capture point.
-    pub(super) fn start(body: &WholeBody, heading_rad: f32, left_carries: bool) -> Stepping {
+    pub(super) fn start(body: &BodyEstimate, heading_rad: f32, left_carries: bool) -> Stepping {
         let stance = if left_carries { Side::Left } else { Side::Right };
         let ground_m = body.world_from_soles()[stance].translation.z;
         let mut step = Stepping {
@@ -119,7 +119,7 @@ impl Stepping {
     /// One physics step; also gives the horizontal acceleration of the centre of mass that it should bring.
     pub(super) fn tick(
         &mut self,
-        body: &WholeBody,
+        body: &BodyEstimate,
         load: &Load,
         velocity: BaseVelocity,
         height_m: f32,
@@ -171,7 +171,7 @@ impl Stepping {
     }
 
     /// Turns the heading as commanded, within the leash of where the robot faces.
-    fn turn(&mut self, body: &WholeBody, yaw_rate_rad_s: f32, dt_s: f32) {
+    fn turn(&mut self, body: &BodyEstimate, yaw_rate_rad_s: f32, dt_s: f32) {
         self.goal_rad += yaw_rate_rad_s * dt_s;
         let return_rad =
             wrapped_rad(self.goal_rad - self.heading_rad).clamp(-RETURN_RAD_S * dt_s, RETURN_RAD_S * dt_s);
@@ -181,7 +181,7 @@ impl Stepping {
     }
 
     /// Ahead and left of where the pelvis faces: a velocity is meant along these, and it may stay behind the heading.
-    fn faced_axes(&mut self, body: &WholeBody, dt_s: f32) -> [Vector; 2] {
+    fn faced_axes(&mut self, body: &BodyEstimate, dt_s: f32) -> [Vector; 2] {
         let lag_rad = wrapped_rad(self.heading_rad - heading_rad(&body.world_from_pelvis()));
         self.lag_rad += (lag_rad - self.lag_rad) * (dt_s / FACING_TIME_S);
         let facing = Rotation::from_rotation_z(self.heading_rad - self.lag_rad);
@@ -200,7 +200,7 @@ impl Stepping {
 
     /// Largest height of the pelvis at which both legs reach, now and where the swinging one will land: a leg that is
     /// straight can neither lift its foot nor let the pelvis down.
-    fn within_reach_m(&self, body: &WholeBody) -> f32 {
+    fn within_reach_m(&self, body: &BodyEstimate) -> f32 {
         let pelvis_m = body.world_from_pelvis().translation;
         let remaining_s = (PERIOD_S - self.time_s).max(0.0);
         let height_m = |side: Side| {
@@ -218,7 +218,7 @@ impl Stepping {
     }
 
     /// Exchanges the feet when the swinging one has met the ground.
-    fn land(&mut self, body: &WholeBody, soles: &Sides<Pose>, ground_m: f32) {
+    fn land(&mut self, body: &BodyEstimate, soles: &Sides<Pose>, ground_m: f32) {
         let swinging_s = self.time_s - TRANSFER_S;
         let swing = self.stance.other();
         if self.shifting_s.is_some() || swinging_s < 0.0 {
@@ -238,7 +238,7 @@ impl Stepping {
     /// Torques of both legs for a centre of pressure, an upright trunk and the swinging foot's path.
     fn carry(
         &self,
-        body: &WholeBody,
+        body: &BodyEstimate,
         load: &Load,
         pressure_m: Vector,
         ground_m: f32,
@@ -270,7 +270,7 @@ impl Stepping {
 }
 
 /// Torques as drives, whose springs and dampers add nothing at the measured angle and velocity.
-fn drives(body: &WholeBody, torques: &LegTorques) -> LegCommand {
+fn drives(body: &BodyEstimate, torques: &LegTorques) -> LegCommand {
     Sides::from_fn(|side| {
         std::array::from_fn(|i| {
             let joint = LEGS[side] + i;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::legs::rotation_vector_rad;
 use crate::Side;
-use crate::body::{Acceleration, LEG_JOINTS, LEGS, WholeBody};
+use crate::body::{Acceleration, BodyEstimate, LEG_JOINTS, LEGS};
 
 pub(super) const SWING_S: f32 = 0.25;
 /// The foot is down a little before the step ends.
@@ -42,7 +42,7 @@ pub(super) struct Swing {
 
 impl Swing {
     /// The foot stands; its next swing starts from where it is.
-    pub(super) fn plant(&mut self, body: &WholeBody, side: Side) {
+    pub(super) fn plant(&mut self, body: &BodyEstimate, side: Side) {
         *self = Swing::at(body.world_from_foot(side));
     }
 
@@ -95,7 +95,7 @@ impl Swing {
     }
 
     /// Acceleration of the foot that keeps it on its path.
-    pub(super) fn wanted(&self, body: &WholeBody, side: Side, time_s: f32) -> Acceleration {
+    pub(super) fn wanted(&self, body: &BodyEstimate, side: Side, time_s: f32) -> Acceleration {
         let (foot, speed_m_s, spin_rad_s) = foot_motion(body, side);
         let p = (time_s / AIR_S).clamp(0.0, 1.0);
         let [lift_m, lift_m_s, lift_m_s2] = lift(time_s);
@@ -131,7 +131,7 @@ fn lift(time_s: f32) -> [f32; 3] {
 }
 
 /// Pose, velocity and angular velocity of an ankle roll link, world frame.
-pub(super) fn foot_motion(body: &WholeBody, side: Side) -> (Pose, Vector, Vector) {
+pub(super) fn foot_motion(body: &BodyEstimate, side: Side) -> (Pose, Vector, Vector) {
     let first = LEGS[side];
     let foot = body.world_from_foot(side);
     let mut spin_rad_s = body.pelvis_angular_velocity_rad_s;

@@ -39,6 +39,12 @@ impl Intrinsics {
             cy: 0.5 * height as f32 - 0.5,
         }
     }
+
+    /// Point in the camera's frame, with its axes as [`crate::mjcf::MjcfCamera`]'s, that is seen at `uv_px` at a depth.
+    pub fn unproject(&self, uv_px: [f32; 2], depth_m: f32) -> Vector {
+        let scale = depth_m / self.focal_px;
+        Vector::new((uv_px[0] - self.cx) * scale, (self.cy - uv_px[1]) * scale, -depth_m)
+    }
 }
 
 impl From<&MjcfCamera> for Intrinsics {
@@ -95,9 +101,7 @@ impl Camera {
 
     /// Point in the camera's frame that is seen at picture coordinates `uv_px` at a depth.
     pub fn unproject(&self, uv_px: [f32; 2], depth_m: f32) -> Vector {
-        let [cx, cy] = self.principal_point_px();
-        let scale = depth_m / self.focal_px();
-        Vector::new((uv_px[0] - cx) * scale, (cy - uv_px[1]) * scale, -depth_m)
+        self.intrinsics().unproject(uv_px.map(|px| px - 0.5), depth_m)
     }
 }
 
@@ -118,8 +122,7 @@ impl Cameras {
 
     /// The camera in a robot's head, as `step` left it.
     pub fn egocentric(&self, step: &Step, robot: usize) -> Camera {
-        let state = &step.robots[robot].state;
-        camera(&self.heads[robot], state.world_from_pelvis * state.pelvis_from_camera)
+        camera(&self.heads[robot], step.robots[robot].world_from_camera())
     }
 
     /// The scene's camera that sees all robots.

@@ -94,12 +94,12 @@ impl Scenery {
     pub fn place(&self, step: &Step) -> PlacedScenery {
         let world_from_carrier = |carrier: Carrier| match carrier {
             Carrier::Room => Pose::IDENTITY,
-            Carrier::Link { robot, link } => step.robots[robot].world_from_link[link],
+            Carrier::Link { robot, link } => step.robots[robot].truth.world_from_link[link],
             Carrier::Object(object) => step.objects[object].state.world_from_object,
         };
         let mut middle_m = Vector::ZERO;
         for robot in &step.robots {
-            middle_m += robot.state.world_from_pelvis.translation / step.robots.len() as f32;
+            middle_m += robot.truth.world_from_pelvis().translation / step.robots.len() as f32;
         }
         let world_from_mesh =
             self.parts.iter().map(|part| world_from_carrier(part.carrier) * part.carrier_from_mesh);

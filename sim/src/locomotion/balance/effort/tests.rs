@@ -8,7 +8,7 @@ const STILL: WantedMotion =
     WantedMotion { lift_m_s2: 0.0, turn_rad_s2: Vector::ZERO, feet: Sides::both(AT_REST) };
 const AT_REST: Acceleration = Acceleration { linear_m_s2: Vector::ZERO, angular_rad_s2: Vector::ZERO };
 
-fn solve(body: &WholeBody, motion: &WantedMotion, pressure_m: Vector, foot: Option<Side>) -> LegTorques {
+fn solve(body: &BodyEstimate, motion: &WantedMotion, pressure_m: Vector, foot: Option<Side>) -> LegTorques {
     let load = Load::of(body, &Laden::of(body), 0.0, Vector::ZERO);
     leg_torques_within_limits(body, &load, motion, &GroundContact { pressure_m: flat(pressure_m), foot })
 }
