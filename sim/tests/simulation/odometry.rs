@@ -66,7 +66,7 @@ fn a_snapshot_keeps_the_way() {
     let rest = world.rest_command(0);
     let walk = RobotCommand { base: BaseCommand { vx_m_s: 0.3, yaw_rate_rad_s: 0.2, ..rest.base }, ..rest };
     let go = |world: &mut World| (0..100).for_each(|_| drop(world.control_step(&[walk]).expect("finite")));
-    let told = |world: &World| pelvis(world).start_from_pelvis;
+    let told = |world: &World| pelvis(world).sensed.start_from_pelvis;
     go(&mut world);
     let snapshot = world.snapshot().expect("a snapshot");
     let then = told(&world);
