@@ -3,11 +3,11 @@
 mod circles;
 mod crates;
 mod extending;
-mod functions;
+mod files;
 mod lengths;
 mod modules;
 mod order;
 mod paths;
 mod sources;
-mod text;
+mod types;
 mod units;

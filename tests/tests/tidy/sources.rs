@@ -6,7 +6,7 @@ use std::{
 };
 
 /// Folders that hold what was built or recorded, not what was written.
-const NOT_OURS: [&str; 3] = ["target", "runs", "node_modules"];
+const NOT_OURS: [&str; 5] = ["target", "runs", "book", "node_modules", "__pycache__"];
 
 /// One file.
 pub struct Source {
@@ -36,26 +36,34 @@ pub fn everywhere(extensions: &[&str]) -> Vec<Source> {
 
 /// Every file of a folder of the repository with one of the `extensions`.
 pub fn below(folder: &str, extensions: &[&str]) -> Vec<Source> {
+    let ours =
+        |path: &PathBuf| path.extension().is_some_and(|own| extensions.iter().any(|ours| own == *ours));
+    files(folder).into_iter().filter(ours).map(read).collect()
+}
+
+/// Paths of all files of a folder of the repository, from its root. Hidden ones are left out.
+pub fn files(folder: &str) -> Vec<PathBuf> {
     let mut paths = Vec::new();
-    collect(&root().join(folder), extensions, &mut paths);
+    collect(&root().join(folder), &mut paths);
     paths.sort();
-    paths.into_iter().map(|path| read(&path)).collect()
+    paths.iter().map(|path| path.strip_prefix(root()).expect("below the root").into()).collect()
 }
 
-fn read(path: &Path) -> Source {
-    let text = fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-    Source { path: path.strip_prefix(root()).expect("below the root").into(), text }
+fn read(path: PathBuf) -> Source {
+    let text = fs::read_to_string(root().join(&path));
+    Source { text: text.unwrap_or_else(|error| panic!("{}: {error}", path.display())), path }
 }
 
-fn collect(folder: &Path, extensions: &[&str], found: &mut Vec<PathBuf>) {
+fn collect(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("a folder of the repository") {
         let path = entry.expect("an entry of a folder").path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        if name.starts_with('.') || NOT_OURS.contains(&name.as_str()) {
+            continue;
+        }
         if path.is_dir() {
-            if !name.starts_with('.') && !NOT_OURS.contains(&name.as_str()) {
-                collect(&path, extensions, found);
-            }
-        } else if path.extension().is_some_and(|extension| extensions.iter().any(|ours| extension == *ours)) {
+            collect(&path, found);
+        } else {
             found.push(path);
         }
     }
