@@ -1,4 +1,4 @@
-//! The server and the client.
+//! The server under test, and the HTTP client that tests call it with.
 
 use std::{net::SocketAddr, path::PathBuf, time::Duration};
 
@@ -59,7 +59,7 @@ impl TestServer {
         TestServer::with(Layer::default())
     }
 
-    /// As [`TestServer::start`], with further settings.
+    /// Starts a server as [`TestServer::start`] does, with further settings.
     pub fn with(flags: Layer) -> TestServer {
         let runs = tempfile::tempdir().expect("a temporary folder");
         let flags = Layer {
@@ -99,7 +99,7 @@ impl TestServer {
         self.post(&format!("/v1/episodes/{id}/tools/{tool}"), args)
     }
 
-    /// Headers and text of a page that is not JSON.
+    /// Returns the headers and the text of a page that is not JSON.
     #[track_caller]
     pub fn page(&self, path: &str) -> (http::HeaderMap, String) {
         let mut page = self.agent.get(format!("http://{}{path}", self.address)).call().expect("a page");
@@ -119,19 +119,19 @@ impl TestServer {
         self.send("DELETE", path, None, b"")
     }
 
-    /// As [`TestServer::post`], with further headers.
+    /// Posts as [`TestServer::post`] does, with further headers.
     pub fn post_with(&self, path: &str, headers: &[(&str, &str)], body: &Value) -> Answer {
         let headers = [&[("content-type", "application/json")], headers].concat();
         json_answer(self.ask("POST", path, &headers, body.to_string().as_bytes()))
     }
 
-    /// Calls a tool as who has this token.
+    /// Calls a tool in the name of the caller that has this token.
     pub fn tool_as(&self, token: &str, id: &str, tool: &str, args: &Value) -> Answer {
         let path = format!("/v1/episodes/{id}/tools/{tool}");
         self.post_with(&path, &[("authorization", &format!("Bearer {token}"))], args)
     }
 
-    /// The answer to a request as it comes: status, headers and bytes.
+    /// Returns the answer to a request as it comes: status, headers and bytes.
     pub fn ask(
         &self,
         method: &str,
@@ -153,7 +153,7 @@ impl TestServer {
         (answer.status().as_u16(), answer.headers().clone(), bytes)
     }
 
-    /// Sends any bytes as any type.
+    /// Sends any bytes under any content type.
     pub fn send(&self, method: &str, path: &str, content_type: Option<&str>, body: &[u8]) -> Answer {
         // What MCP asks for, and what REST takes as well.
         let accept = ("accept", "application/json, text/event-stream");

@@ -1,5 +1,5 @@
-//! The whole of Tandem, mostly over HTTP. One program, because each that is linked costs seconds; a test of it by name:
-//! `cargo test --release -p tandem-tests --test end_to_end experts`.
+//! The whole of Tandem, mostly over HTTP. The tests are one program, because linking each takes seconds; some of them are run by
+//! name: `cargo test --release -p tandem-tests --test end_to_end experts`.
 
 mod documents;
 mod episodes;

@@ -1,4 +1,4 @@
-//! No circle between the modules of a crate, on any level of the tree.
+//! The modules of a crate form no circle, on any level of the tree.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -12,7 +12,7 @@ use super::{
     sources::{Source, below},
 };
 
-/// From the crate's root, which is empty.
+/// A module's path from the crate's root, whose own path is empty.
 pub type Name = Vec<String>;
 
 /// One file of a crate. Items that are compiled for tests only are left out.
@@ -27,7 +27,7 @@ pub struct Module {
 pub struct Arrow {
     pub from: Name,
     pub to: Name,
-    /// File and line.
+    /// The file and line that draw the arrow.
     pub place: String,
 }
 
@@ -76,7 +76,7 @@ fn is_test(attributes: &[Attribute]) -> bool {
     })
 }
 
-/// Of the items that are ever compiled for tests only.
+/// The attributes of an item of a kind that is ever compiled for tests only.
 fn attributes(item: &Item) -> &[Attribute] {
     match item {
         Item::Mod(item) => &item.attrs,

@@ -10,7 +10,7 @@ const NOT_OURS: [&str; 5] = ["target", "runs", "book", "node_modules", "__pycach
 
 /// One file.
 pub struct Source {
-    /// From the root of the repository.
+    /// The path from the root of the repository.
     pub path: PathBuf,
     pub text: String,
 }

@@ -90,18 +90,18 @@ const DIMENSIONLESS: &[&str] = &[
     "pace",
     "gain",
     "caution",
-    // Any number: of conversions and checks, and of ranges whose own names carry the unit.
+    // Numbers of conversions and checks, which may be any, and of ranges whose own names carry the unit.
     "value",
     "values",
     "median",
     "quartiles",
     "min",
     "max",
-    // Columns of the contract: joints in rad, then m/s, m/s, rad/s and m of the base.
+    // An action row of the contract: joints in rad, then m/s, m/s, rad/s and m of the base.
     "row",
     "rows",
     "command",
-    // Of a picture: column and row in pixels, then what else stands there.
+    // Corners in a picture: column and row in pixels, then what is interpolated between them.
     "corners",
     // A camera's intrinsics, in pixels, as every library calls them.
     "fx",

@@ -16,7 +16,7 @@ const STANDING: [&str; 4] = ["handover", "pouring", "frame_hang", "co_pouring"];
 /// Seeds on which nobody tuned anything but how a hand that slipped takes its load again (6100).
 const SEEDS: [u32; 3] = [3, 6100, 6101];
 
-/// Plays the experts of `tasks`: phases in order, and nobody falls.
+/// Plays the experts of `tasks`, and checks that phases come in order and that nobody falls.
 fn solve(tasks: Vec<&'static Task>) {
     let plan = EvaluationPlan {
         player: players::find("expert").expect("a player"),

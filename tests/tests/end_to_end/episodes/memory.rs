@@ -1,4 +1,4 @@
-//! That episodes leave no memory behind.
+//! Episodes leave no memory behind.
 
 use std::fs;
 
@@ -12,7 +12,7 @@ fn resident_kb() -> u64 {
     line.trim().trim_end_matches(" kB").parse().expect("a number")
 }
 
-/// Starts so many episodes, plays each a little, and closes them.
+/// Starts this many episodes, plays each a little, and closes them.
 fn play(server: &TestServer, episodes: usize) {
     for _ in 0..episodes {
         let id = server.episode("benchmark");

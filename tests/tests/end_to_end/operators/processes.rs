@@ -14,7 +14,7 @@ use ureq::Agent;
 
 use super::team::Team;
 
-/// Where the process of an operator finds what it has to know, as JSON.
+/// The environment variable that tells an operator's process its task, as JSON.
 const TASK: &str = "TANDEM_TEST_OPERATOR";
 
 /// What the expert of all robots did on seed 0 of Handover, and what came of it.
@@ -28,7 +28,7 @@ fn expert(runs: &Path) -> (Vec<(String, Value)>, ResultReply) {
     (commands.map(|call| (call.tool, call.arguments)).collect(), result)
 }
 
-/// What of a command is for `robot`: where it is not named, it holds still.
+/// The part of a command that is for `robot`; a robot that is not named holds still.
 fn half((tool, args): &(String, Value), robot: &str) -> (String, Value) {
     let steps = args["steps"]
         .as_u64()

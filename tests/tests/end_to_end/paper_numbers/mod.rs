@@ -1,4 +1,4 @@
-//! What the benchmark has published against what the program does: one table of numbers, and tests on both sides of each.
+//! The program against the benchmark's published numbers: one table of them, and tests on both sides of each.
 
 mod rules;
 mod scene;

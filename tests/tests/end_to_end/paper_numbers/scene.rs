@@ -46,7 +46,7 @@ impl Scene {
         first(&facts)
     }
 
-    /// As [`Scene::threshold`], of the beginning of a sequence.
+    /// Checks as [`Scene::threshold`] does, for the beginning of a sequence.
     pub fn beginning(&self, p: usize, threshold: f32, large: bool, change: impl Fn(&mut Facts, f32)) {
         let at = |share: f32| self.begins(p, |facts| change(facts, threshold * share));
         let (good, bad) = if large { (OUTSIDE, INSIDE) } else { (INSIDE, OUTSIDE) };

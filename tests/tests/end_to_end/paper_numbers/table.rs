@@ -8,11 +8,11 @@ pub struct Published {
     pub scene: &'static str,
     pub episode_steps: u32,
     pub moves: &'static [Moves],
-    /// Of p1, p2, p3: whether more than one robot has to work on it; published for tasks of two robots.
+    /// Whether more than one robot has to work on p1, p2 and p3; published for tasks of two robots.
     pub collaborative: Option<[bool; 3]>,
 }
 
-/// What is drawn uniformly for some objects together, from the first to the second number.
+/// A range, from the first to the second number, from which one value is drawn uniformly for some objects together.
 #[derive(Debug, PartialEq)]
 pub struct Moves {
     pub objects: &'static [&'static str],

@@ -12,7 +12,7 @@ use serde_json::Value;
 /// A server that lives until the test ends.
 pub struct ActServer {
     pub address: SocketAddr,
-    /// What was asked for.
+    /// All requests so far.
     pub requests: Arc<Mutex<Vec<Value>>>,
 }
 

@@ -9,10 +9,10 @@ use std::{
 use rmpv::Value;
 use tungstenite::{Message, WebSocket};
 
-/// What a policy does with a request: its number on this connection, counted from 0, and what it says.
+/// Decides the reply to a request, from its number on this connection (counted from 0) and its content.
 pub type Decide = dyn Fn(usize, &Value) -> Reply + Send + Sync;
 
-/// What goes back.
+/// What the server sends back.
 pub enum Reply {
     /// Rows under `actions`.
     Rows(Vec<Vec<f32>>),
@@ -27,7 +27,7 @@ pub enum Reply {
 /// A server that lives until the test ends.
 pub struct OpenpiServer {
     pub address: SocketAddr,
-    /// What was asked for, on all connections.
+    /// The requests so far, of all connections.
     pub requests: Arc<Mutex<Vec<Value>>>,
 }
 
@@ -99,7 +99,7 @@ fn actions(rows: &[Vec<f32>]) -> Value {
     Value::Map(vec![("actions".into(), array)])
 }
 
-/// What stands under `key`.
+/// The value under `key`.
 pub fn entry<'a>(map: &'a Value, key: &str) -> &'a Value {
     let entries = map.as_map().expect("a map");
     let found = entries.iter().find(|(name, _)| name.as_slice() == Some(key.as_bytes()));

@@ -1,4 +1,4 @@
-//! What the tests here play.
+//! The evaluations that the tests of policies play.
 
 use std::path::Path;
 
@@ -30,7 +30,7 @@ pub fn plan(player: &dyn Policy, seeds: Vec<u32>, record: bool) -> EvaluationPla
     }
 }
 
-/// Plays into `folder`.
+/// Plays the plan; the results go into `folder`.
 pub fn play(plan: &EvaluationPlan, folder: &Path) -> Evaluation {
     evaluate(plan, folder, &|_| {}).expect("it is played")
 }

@@ -11,7 +11,7 @@ use super::plans::{plan, play};
 
 const LONG: Duration = Duration::from_secs(100);
 
-/// What a program does that is started with `ROLE=role`, if it is none for the shell alone.
+/// The command line that starts `agent` below in this role.
 fn agent_command(role: &str) -> String {
     let binary = env::current_exe().expect("this binary");
     format!("ROLE={role} '{}' --exact policies::programs::agent --ignored --nocapture", binary.display())

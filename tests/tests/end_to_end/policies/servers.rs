@@ -13,16 +13,16 @@ use super::{
     plans::{last_angles_rad, plan, play},
 };
 
-/// Of 43 joints.
+/// Where the wrists' last joints are among the 43 of a state.
 const LEFT_WRIST: usize = 21;
 const RIGHT_WRIST: usize = 35;
-/// Of what A alone is told.
+/// These words are in the instruction of A alone.
 const WORDS_OF_A: &str = "Take the bottle";
-/// Of an action row.
+/// Where the same joints are in an action row.
 pub const LEFT_WRIST_COLUMN: usize = 6;
 const RIGHT_WRIST_COLUMN: usize = 13;
 
-/// The map in a file that says `text`.
+/// Reads the map from a file that says `text`.
 pub fn map(folder: &Path, text: &str) -> PolicyMap {
     let path = folder.join("map.toml");
     fs::write(&path, text).expect("a file");

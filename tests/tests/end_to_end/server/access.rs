@@ -1,4 +1,4 @@
-//! A server with a token: who has none learns nothing, and what callers send is in no log.
+//! A server with a token: callers without it learn nothing, and nothing that callers send is in a log.
 
 use std::{
     io,
@@ -17,7 +17,7 @@ fn server() -> TestServer {
     TestServer::with(Layer { token, ..Layer::default() })
 }
 
-/// Routes of all kinds, some of which there are.
+/// Routes of all kinds, some of which exist.
 const ROUTES: [(&str, &str); 10] = [
     ("GET", "/healthz"),
     ("GET", "/v1/tasks"),
@@ -61,7 +61,7 @@ fn who_has_no_token_gets_one_answer_everywhere() {
     assert_eq!(moved["step"], 2);
 }
 
-/// What has been logged in this process.
+/// All lines that this process has logged.
 #[derive(Clone, Default)]
 struct Lines(Arc<Mutex<Vec<u8>>>);
 

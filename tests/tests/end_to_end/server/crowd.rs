@@ -11,7 +11,7 @@ use tandem_tests::{Answer, TestServer};
 
 const CLIENTS: usize = 50;
 
-/// What each of many clients is answered that ask at the same time.
+/// The answers to many clients that ask at the same time.
 fn all_at_once(ask: impl Fn(usize) -> Answer + Sync) -> Vec<Answer> {
     thread::scope(|scope| {
         let clients: Vec<_> = (0..CLIENTS)
@@ -26,7 +26,7 @@ fn all_at_once(ask: impl Fn(usize) -> Answer + Sync) -> Vec<Answer> {
     })
 }
 
-/// How many were answered; everybody else was told to come again.
+/// Counts the clients that were answered, and checks that all others were told to come again.
 #[track_caller]
 fn answered(answers: &[Answer], status: u16) -> usize {
     let (good, others): (Vec<&Answer>, Vec<&Answer>) =

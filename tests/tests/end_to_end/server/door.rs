@@ -1,4 +1,4 @@
-//! Who is let in: this machine's programs, and no web page.
+//! Programs of this machine are let in, and web pages are not.
 
 use std::{
     io::{Read, Write},

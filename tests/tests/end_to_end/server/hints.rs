@@ -1,4 +1,4 @@
-//! Whether texts say how to grasp, as a policy meets them: on every face of the server, and in the recording.
+//! Hints: whether the texts that a policy reads say how to grasp, wherever the server shows them, and in the recording.
 
 use serde_json::{Value, json};
 use tandem::settings::Layer;

@@ -1,4 +1,4 @@
-//! What those see who run a server: the page of metrics, the page of the interface, and tools in every host's form.
+//! What the operators of a server see: metrics, the page of the interface, and the tools in every host's form.
 
 use serde_json::{Value, json};
 use tandem_tests::TestServer;
