@@ -54,12 +54,14 @@ const STEPS: &[Step] = &[
         folder: "sim/assets/objects",
         extension: "xml",
         says: "<mujoco",
-        // Tasks place them, and their experts take hold of them; tests stand beside what they test.
+        // Tasks place them, and their experts take hold of them; tests stand beside what they test. The table of MJCF support has
+        // elements and attributes of the same names.
         may: &[
             "episodes/src/tasks/",
             "episodes/src/players/experts/",
             "episodes/src/bench/",
             "sim/src/bench/",
+            "sim/src/mjcf/support/",
         ],
     },
     Step {

@@ -16,11 +16,11 @@ const CRATES: [&str; 4] = ["tools_spec", "sim", "episodes", "gateway"];
 /// In these files numbers belong to joints of any kind, in rad or m as in `ik`, or to rows of the solver, which mix them.
 const GENERALISED: [&str; 6] = [
     "sim/src/dynamics/",
-    "sim/src/mechanism/start.rs",
-    "sim/src/mjcf/actuator.rs",
+    "sim/src/mechanism/machinery.rs",
     "sim/src/mjcf/equality.rs",
-    "sim/src/mjcf/joint.rs",
+    "sim/src/mjcf/joints.rs",
     "sim/src/mjcf/key.rs",
+    "sim/src/mjcf/support/",
 ];
 
 /// Types that hold a quantity.
