@@ -10,7 +10,7 @@ use tandem_ik::{IkError, Model};
 use tandem_sim::assets;
 use tandem_sim::bench;
 pub use tandem_sim::bench::{
-    CaseReport, PhysicsCase, PhysicsReport, PicturesCase, PicturesReport, Report as LocomotionReport,
+    CaseReport, LocomotionReport, PhysicsCase, PhysicsReport, PicturesCase, PicturesReport,
 };
 use tandem_sim::render::RendererKind;
 

@@ -28,7 +28,7 @@ pub type NewLocomotion<'a> = &'a (dyn Fn() -> Box<dyn Locomotion> + Sync);
 
 /// Results of all cases.
 #[derive(Clone, Debug, Serialize)]
-pub struct Report {
+pub struct LocomotionReport {
     pub cases: Vec<CaseReport>,
 }
 
@@ -82,7 +82,7 @@ pub fn run(
     filter: &str,
     seeds: usize,
     mut done: impl FnMut(&CaseReport),
-) -> Result<Report, SimError> {
+) -> Result<LocomotionReport, SimError> {
     let mut cases = Vec::new();
     for case in CASES.iter().filter(|case| is_asked(filter, case.name)) {
         let trials = over_seeds(seeds, |seed| trial::run(case, seed, new_locomotion()));
@@ -91,7 +91,7 @@ pub fn run(
         done(&report);
         cases.push(report);
     }
-    Ok(Report { cases })
+    Ok(LocomotionReport { cases })
 }
 
 /// What `trial` makes of each of the seeds 0 up to `seeds`, as many at once as there are processors.

@@ -8,8 +8,8 @@ use crate::{GRAVITY_M_S2, Side, Sides};
 /// Middle of the palm, where loads of the hands act, in the frame of the link that carries the wrist.
 pub(crate) const PALM_IN_WRIST_M: Vector = Vector::new(0.12, 0.0, 0.0);
 
-/// What a robot takes its own body to be, which is what a controller may know: joint readings, link poses, centre of mass. The world
-/// frame is where the robot believes it to be.
+/// What a robot takes its own body to be, which is what a controller may know: joint readings, link poses, centre of
+/// mass. The world frame is where the robot believes it to be.
 pub struct BodyEstimate<'a> {
     pub model: &'a RobotModel,
     pub q_rad: [f32; JOINTS],

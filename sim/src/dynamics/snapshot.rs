@@ -27,7 +27,7 @@ pub struct OtherWorld;
 
 /// [`DynamicsState`] where it lies; serialised, both are the same bytes.
 #[derive(Serialize)]
-struct Present<'a> {
+struct PresentState<'a> {
     trees: Vec<TreeState>,
     equalities: &'a [EqualityState],
     touches: &'a [ContactPoint],
@@ -37,7 +37,7 @@ struct Present<'a> {
 impl Dynamics {
     /// The present state, to be serialised at once.
     pub fn present(&self) -> impl Serialize {
-        Present {
+        PresentState {
             trees: self.trees.all.iter().map(|tree| tree.state()).collect(),
             equalities: &self.solver.equalities.memory,
             touches: &self.solver.touches,

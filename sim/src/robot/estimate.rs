@@ -8,9 +8,9 @@ use crate::body::{BodyEstimate, PALM_IN_WRIST_M, RobotModel, WAIST_JOINTS};
 use crate::dynamics::Tree;
 use crate::mechanism::rounded;
 
-/// The body as the simulator has it. This stands in for an estimator, which would replace it: whatever senses, balances and steers a
-/// robot takes what is known of the body from here, and asks the simulator nothing. Masses are the model's, whatever was loaded on a
-/// hand.
+/// The body as the simulator has it. This stands in for an estimator, which would replace it: whatever senses, balances
+/// and steers a robot takes what is known of the body from here, and asks the simulator nothing. Masses are the model's,
+/// whatever was loaded on a hand.
 pub(super) fn from_truth<'a>(
     model: &'a RobotModel,
     tree: &Tree,

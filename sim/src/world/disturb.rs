@@ -1,5 +1,5 @@
-//! What no command can make: pushes at a link, weights fused to a hand, objects put elsewhere. For benches and tests of controllers; no
-//! tool reaches them.
+//! What no command can make: pushes at a link, weights fused to a hand, objects put elsewhere. For benches and tests of
+//! controllers; no tool reaches them.
 
 use rapier3d::math::{Pose, Vector};
 use rapier3d::prelude::{AngVector, MassProperties};

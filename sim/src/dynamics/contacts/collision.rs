@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::collider::{Collider, ColliderId, Surface};
 use super::friction::Friction;
-use super::near::Near;
+use super::near::NearPairs;
 use super::{Candidate, ContactPoint, Impulses};
 use crate::dynamics::DVec3;
 use crate::dynamics::settings::Settings;
@@ -20,7 +20,7 @@ use crate::dynamics::trees::{LinkId, Trees};
 #[derive(Default)]
 pub struct Collision {
     surfaces: Vec<Surface>,
-    near: Near,
+    near: NearPairs,
     /// Candidates of this step, in the order of their colliders.
     pub candidates: Vec<Candidate>,
     /// Manifolds of the last step that have points, in the order of their colliders.
@@ -68,7 +68,7 @@ impl Collision {
             if !surfaces[0].bounds.intersects(&surfaces[1].bounds) {
                 continue;
             }
-            let between = Between { colliders, surfaces, trees, settings };
+            let between = NearPair { colliders, surfaces, trees, settings };
             let mut points = self.spare.pop().unwrap_or_default();
             let before = last.next_if(|manifold| manifold.colliders == colliders);
             between.find(before.map(|manifold| &manifold.points), &mut points);
@@ -104,14 +104,14 @@ impl Collision {
 }
 
 /// Two colliders that are near each other.
-struct Between<'a> {
+struct NearPair<'a> {
     colliders: [ColliderId; 2],
     surfaces: [&'a Surface; 2],
     trees: &'a Trees,
     settings: &'a Settings,
 }
 
-impl Between<'_> {
+impl NearPair<'_> {
     /// Points of contact, from those of the last step on if there were any.
     fn find(&self, before: Option<&ContactManifold<(), ()>>, manifold: &mut ContactManifold<(), ()>) {
         let [first, second] = self.surfaces;

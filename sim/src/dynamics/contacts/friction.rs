@@ -260,8 +260,8 @@ struct Symmetric2 {
 }
 
 impl Symmetric2 {
-    /// Inverse of the block of two lanes that begins at `lane`, if there is one. Two lanes that are not independent are each taken
-    /// by itself and does half.
+    /// Inverse of the block of two lanes that begins at `lane`, if there is one. Two lanes that are not independent
+    /// are each taken by itself and does half.
     fn inverse_of<const N: usize>(a: &[[f64; N]; N], lane: usize) -> Symmetric2 {
         if lane + 1 >= N {
             return Symmetric2::default();

@@ -11,9 +11,9 @@ use super::collider::{ColliderId, Surface};
 use crate::dynamics::trees::{LinkId, Trees};
 
 #[derive(Default)]
-pub struct Near {
-    /// Pairs in order, the smaller collider first: all that could touch in this step, and some that could not. Which of those are among them
-    /// depends on the past, so that nothing else may.
+pub struct NearPairs {
+    /// Pairs in order, the smaller collider first: all that could touch in this step, and some that could not. Which
+    /// of those are among them depends on the past, so that nothing else may.
     pub pairs: Vec<[ColliderId; 2]>,
     /// Links that never touch, smaller first.
     apart: BTreeSet<(LinkId, LinkId)>,
@@ -26,7 +26,7 @@ pub struct Near {
     events: Vec<BroadPhasePairEvent>,
 }
 
-impl Near {
+impl NearPairs {
     pub fn add(&mut self, surface: &Surface) -> ColliderId {
         // All are fixed for Rapier; of two that no tree moves it makes no pair.
         let kinds = match surface.body {
@@ -46,7 +46,7 @@ impl Near {
         self.apart.insert((a.min(b), a.max(b)));
     }
 
-    /// Tells where a collider is; [`Near::update`] follows.
+    /// Tells where a collider is; [`NearPairs::update`] follows.
     pub fn place(&mut self, id: ColliderId, surface: &Surface) {
         self.broad_phase.set_aabb(&self.parameters, self.handles[id.index()], surface.bounds);
     }

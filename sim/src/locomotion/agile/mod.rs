@@ -21,7 +21,7 @@ use super::{BaseCommand, BaseLimits, LegCommand, Locomotion};
 use crate::PHYSICS_STEPS_PER_CONTROL;
 use crate::body::{BodyEstimate, JOINTS, JointDrive, LEGS, WAIST};
 use joints::JointMap;
-use network::{Action, Observation, RecurrentState};
+use network::{Action, NetworkInputs, RecurrentState};
 use place::ReferencePlace;
 
 const LIMITS: BaseLimits = BaseLimits {
@@ -55,11 +55,11 @@ impl Agile {
         Agile { network, joints: JointMap::new(), state: None }
     }
 
-    fn observe(&self, body: &BodyEstimate, velocity_command: [f32; 3]) -> Observation {
+    fn observe(&self, body: &BodyEstimate, velocity_command: [f32; 3]) -> NetworkInputs {
         let pelvis = body.world_from_pelvis().rotation;
         let turning = pelvis.inverse() * body.pelvis_angular_velocity_rad_s;
         let q_rad = less_waist_targets(body);
-        Observation {
+        NetworkInputs {
             quaternion_wxyz: [pelvis.w, pelvis.x, pelvis.y, pelvis.z],
             angular_velocity_rad_s: turning.to_array(),
             velocity_command,

@@ -39,7 +39,7 @@ const STEPS_TO_REMEMBER: usize = 25;
 
 /// What the network sees at one control step.
 #[derive(Clone, Debug)]
-pub(super) struct Observation {
+pub(super) struct NetworkInputs {
     /// Pelvis in the world.
     pub quaternion_wxyz: [f32; 4],
     /// Angular velocity of the pelvis, in its own frame.
@@ -98,7 +98,7 @@ impl Network {
         let name = format!("{name}+{:016x}", xxh3_64(&bytes));
         let model = load(&file, bytes)?;
         let network = Network::check(&file, name, model)?;
-        let still = Observation {
+        let still = NetworkInputs {
             quaternion_wxyz: [1.0, 0.0, 0.0, 0.0],
             angular_velocity_rad_s: [0.0; 3],
             velocity_command: [0.0; 3],
@@ -172,7 +172,7 @@ impl Network {
 
     /// The memory of a robot that has stood as in `observation` for half a second, acting as the policy wanted. One that
     /// had not acted before would be thrown into the policy's own stance: it hops a third of a metre.
-    pub(super) fn remember(&self, observation: &Observation) -> RunResult<RecurrentState> {
+    pub(super) fn remember(&self, observation: &NetworkInputs) -> RunResult<RecurrentState> {
         let mut memory = self.blank();
         for _ in 0..STEPS_TO_REMEMBER {
             memory = self.run(observation, &memory)?.1;
@@ -187,14 +187,14 @@ impl Network {
     /// One control step.
     pub(super) fn run(
         &self,
-        observation: &Observation,
+        observation: &NetworkInputs,
         memory: &RecurrentState,
     ) -> RunResult<(Action, RecurrentState)> {
         self.split(self.evaluate(observation, memory)?)
     }
 
     /// Values of [`Network::outputs`].
-    fn evaluate(&self, observation: &Observation, memory: &RecurrentState) -> RunResult<Vec<Value>> {
+    fn evaluate(&self, observation: &NetworkInputs, memory: &RecurrentState) -> RunResult<Vec<Value>> {
         let mut inputs = Vec::with_capacity(self.inputs.len());
         for input in &self.inputs {
             let value = match input.source {
@@ -232,7 +232,7 @@ impl fmt::Debug for Network {
     }
 }
 
-impl Observation {
+impl NetworkInputs {
     fn values(&self, name: &str) -> &[f32] {
         match name {
             ORIENTATION => &self.quaternion_wxyz,

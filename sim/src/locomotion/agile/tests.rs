@@ -179,7 +179,7 @@ fn what_is_no_onnx_is_refused() {
 #[test]
 fn memories_come_back_and_begin_as_after_half_a_second() {
     let network = read(limp(50.0)).unwrap();
-    let observation = Observation {
+    let observation = NetworkInputs {
         quaternion_wxyz: [1.0, 0.0, 0.0, 0.0],
         angular_velocity_rad_s: [0.0; 3],
         velocity_command: [0.0; 3],

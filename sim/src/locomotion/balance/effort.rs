@@ -14,7 +14,8 @@ use crate::{GRAVITY_M_S2, Side, Sides};
 
 /// Horizontal force within what friction surely gives.
 const FRICTION_USED: f32 = 0.43;
-/// Friction holds a foot against turning by its corners, up to 15 N m; less where the pressure is at toe or heel, whose corners are close.
+/// Friction holds a foot against turning by its corners, up to 15 N m; less where the pressure is at toe or heel, whose
+/// corners are close.
 const LARGEST_TURN_N_M: f32 = 14.0;
 const TURN_FADE_M: f32 = 0.12;
 /// Inertia of trunk and arms about the vertical.
@@ -24,8 +25,8 @@ const CORRECTIONS: usize = 2;
 const LEAST_HEIGHT_M: f32 = 0.4;
 /// A knee that is almost straight must not ask for the impossible.
 const DAMPING: f32 = 0.004;
-/// Damping of the ground force that torques give away. With twenty times as much, half of a pull on a robot that leans is not seen: its legs
-/// are almost straight.
+/// Damping of the ground force that torques give away. With twenty times as much, half of a pull on a robot that leans
+/// is not seen: its legs are almost straight.
 const FORCE_DAMPING: f32 = 0.0002;
 const LARGEST_JOINT_ACCELERATION_RAD_S2: f32 = 400.0;
 
@@ -116,10 +117,10 @@ fn leg_torques(
     };
     let most_turn_n_m = contact.most_turn_n_m(body);
     let mut qdd_rad_s2 = [0.0; JOINTS];
-    let mut reaction = Reaction::of(body, load, motion, pelvis, point_m, &mut qdd_rad_s2);
+    let mut reaction = GroundReaction::of(body, load, motion, pelvis, point_m, &mut qdd_rad_s2);
     for _ in 0..CORRECTIONS {
         reaction.correct(&mut pelvis, body.model.mass_kg, height_m, most_turn_n_m);
-        reaction = Reaction::of(body, load, motion, pelvis, point_m, &mut qdd_rad_s2);
+        reaction = GroundReaction::of(body, load, motion, pelvis, point_m, &mut qdd_rad_s2);
     }
     let turn_n_m = Vector::Z * reaction.rest_n_m.z.clamp(-most_turn_n_m, most_turn_n_m);
     let pushes_n_m = reaction.pushes_n_m(body, contact, turn_n_m);
@@ -146,14 +147,14 @@ impl GroundContact {
 }
 
 /// What the ground has to do for a motion of the pelvis.
-struct Reaction {
+struct GroundReaction {
     effort: Effort,
     force_n: Vector,
     /// Moment about the pressure point that the force does not have.
     rest_n_m: Vector,
 }
 
-impl Reaction {
+impl GroundReaction {
     fn of(
         body: &BodyEstimate,
         load: &Load,
@@ -161,7 +162,7 @@ impl Reaction {
         pelvis: Acceleration,
         point_m: Vector,
         qdd_rad_s2: &mut [f32; JOINTS],
-    ) -> Reaction {
+    ) -> GroundReaction {
         let effort = body.inverse_dynamics(pelvis, qdd_rad_s2);
         move_feet(body, motion, &effort, qdd_rad_s2);
         let effort = body.inverse_dynamics(pelvis, qdd_rad_s2);
@@ -169,7 +170,7 @@ impl Reaction {
         let rest_n_m = effort.moment_n_m + (pelvis_m - point_m).cross(effort.force_n)
             - load.moment_n_m
             - (body.com_m - point_m).cross(load.force_n);
-        Reaction { force_n: effort.force_n - load.force_n, rest_n_m, effort }
+        GroundReaction { force_n: effort.force_n - load.force_n, rest_n_m, effort }
     }
 
     /// Accelerates the pelvis away from the moment that is left, no harder than friction gives, and turns it less where

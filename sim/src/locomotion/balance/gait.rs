@@ -10,7 +10,8 @@ pub(super) const PERIOD_S: f32 = TRANSFER_S + SWING_S;
 const WIDTH_M: f32 = 0.24;
 /// Walking sideways brings the feet together at every other step.
 const WIDENING: f32 = 0.3;
-/// Angular momentum of a swinging leg per speed of its foot, over mass times height of the robot; tuned on punches, seeds 2000-3149.
+/// Angular momentum of a swinging leg per speed of its foot, over mass times height of the robot; tuned on punches,
+/// seeds 2000-3149.
 pub(super) const SWING_INERTIA: f32 = 0.09;
 
 /// Where the feet and the capture point of a steady gait are, one step ahead, relative to the stance foot.
@@ -25,9 +26,9 @@ pub(super) struct Gait {
 impl Gait {
     /// With E = e^{w t}, t the transfer, G = e^{w (T - t)} and K = G (E - 1) / (w t):
     ///   b = v T (1 - E G + K) / (E G - 1)  along the motion,   width (E G + 1 - K) / (E G + 1)  to the inside.
-    /// The foot that swings 2 v T ahead adds to the capture point what is left of s u when it lands, 2 v T s e^{w a} with a the time
-    /// from the middle of its flight: b is smaller by that over E G - 1. To the sides b stays as it is, for robots that
-    /// start to walk sideways have no room for the narrower step.
+    /// The foot that swings 2 v T ahead adds to the capture point what is left of s u when it lands, 2 v T s e^{w a}
+    /// with a the time from the middle of its flight: b is smaller by that over E G - 1. To the sides b stays as it
+    /// is, for robots that start to walk sideways have no room for the narrower step.
     pub(super) fn new(rate_1_s: f32, velocity_m_s: Vector, outside_axis: Vector) -> Gait {
         let transfer = (rate_1_s * TRANSFER_S).exp();
         let whole = (rate_1_s * PERIOD_S).exp();

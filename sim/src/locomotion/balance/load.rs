@@ -7,14 +7,14 @@ use crate::plane::flat;
 use crate::{GRAVITY_M_S2, Sides};
 
 /// A robot and what its hands carry, as one body: what is carried is a mass in each palm. Its swing does not push the robot.
-pub(super) struct Laden {
+pub(super) struct LadenRobot {
     carried_kg: Sides<f32>,
     pub mass_kg: f32,
     pub velocity_m_s: Vector,
 }
 
-impl Laden {
-    pub(super) fn of(body: &BodyEstimate) -> Laden {
+impl LadenRobot {
+    pub(super) fn of(body: &BodyEstimate) -> LadenRobot {
         let carried_kg = body.hand_force_n.map(|force_n| (-force_n.z - DEAD_ZONE_N).max(0.0) / GRAVITY_M_S2);
         let mut mass_kg = body.model.mass_kg;
         let mut momentum_kg_m_s = body.com_velocity_m_s * mass_kg;
@@ -22,7 +22,7 @@ impl Laden {
             mass_kg += carried_kg;
             momentum_kg_m_s += palm_m_s * carried_kg;
         }
-        Laden { carried_kg, mass_kg, velocity_m_s: momentum_kg_m_s / mass_kg }
+        LadenRobot { carried_kg, mass_kg, velocity_m_s: momentum_kg_m_s / mass_kg }
     }
 }
 
@@ -35,7 +35,7 @@ pub(super) struct Load {
     pub balance_point_m: Vector,
     /// The same without the push: where the robot and what it carries have their centre of mass.
     pub weights_point_m: Vector,
-    /// Mass of the robot and of what it carries.
+    /// Velocity of the robot and of what it carries, as one body.
     pub velocity_m_s: Vector,
 }
 
@@ -49,7 +49,7 @@ const LARGEST_TURN_N_M: f32 = 20.0;
 impl Load {
     /// With height h of the centre of mass c over the ground and vertical load N = m g - f_z:
     ///   p = c + ( m_y + h f_x, -m_x + h f_y ) / N.
-    pub(super) fn of(body: &BodyEstimate, laden: &Laden, ground_m: f32, push_m_s2: Vector) -> Load {
+    pub(super) fn of(body: &BodyEstimate, laden: &LadenRobot, ground_m: f32, push_m_s2: Vector) -> Load {
         let height_m = body.com_m.z - ground_m;
         let balanced_m = |force_n: Vector, moment_n_m: Vector| {
             let away_m =
@@ -65,7 +65,8 @@ impl Load {
         }
         let weights_point_m = balanced_m(force_n, moment_n_m);
         for (hand_n, palm_m) in body.hand_force_n.into_iter().zip(palms_m) {
-            // What pulls sideways is part of the push. What turns the robot, the hands alone tell: the push acts over the centre of mass.
+            // What pulls sideways is part of the push. What turns the robot, the hands alone tell: the push
+            // acts over the centre of mass.
             moment_n_m.z += (palm_m - body.com_m).cross(flat(hand_n)).z;
         }
         moment_n_m.z = moment_n_m.z.clamp(-LARGEST_TURN_N_M, LARGEST_TURN_N_M);
@@ -86,7 +87,7 @@ mod tests {
     #[test]
     fn a_robot_stands_under_what_it_carries() {
         let mut body = Posed::standing().body();
-        let free = Load::of(&body, &Laden::of(&body), 0.0, Vector::ZERO);
+        let free = Load::of(&body, &LadenRobot::of(&body), 0.0, Vector::ZERO);
         assert_eq!(
             (free.force_n, free.moment_n_m, free.balance_point_m),
             (Vector::ZERO, Vector::ZERO, body.com_m)
@@ -95,7 +96,7 @@ mod tests {
         // Equal weights in both hands act as one in the middle: the common centre of mass.
         let weight_n = 20.0;
         body.hand_force_n = Sides::both(Vector::new(0.0, 0.0, -weight_n - DEAD_ZONE_N));
-        let loaded = Load::of(&body, &Laden::of(&body), 0.0, Vector::ZERO);
+        let loaded = Load::of(&body, &LadenRobot::of(&body), 0.0, Vector::ZERO);
         let palms_m: Vector = body.palms_m().into_iter().sum();
         let robot_n = body.model.mass_kg * GRAVITY_M_S2;
         let common_m = (body.com_m * robot_n + palms_m * weight_n) / (robot_n + 2.0 * weight_n);
@@ -104,7 +105,7 @@ mod tests {
 
         // What lifts, and what is lighter than the dead zone, is no load.
         body.hand_force_n = Sides { left: Vector::Z * 30.0, right: Vector::Z * -0.9 * DEAD_ZONE_N };
-        assert_eq!(Load::of(&body, &Laden::of(&body), 0.0, Vector::ZERO).force_n, Vector::ZERO);
+        assert_eq!(Load::of(&body, &LadenRobot::of(&body), 0.0, Vector::ZERO).force_n, Vector::ZERO);
     }
 
     /// A robot at rest whose hands swing 3 kg each forward: momentum is shared by all that moves.
@@ -113,9 +114,9 @@ mod tests {
         let mut body = Posed::standing().body();
         body.com_velocity_m_s = Vector::ZERO;
         body.palm_velocity_m_s = Sides::both(Vector::X);
-        assert_eq!(Laden::of(&body).velocity_m_s, Vector::ZERO, "empty hands");
+        assert_eq!(LadenRobot::of(&body).velocity_m_s, Vector::ZERO, "empty hands");
         body.hand_force_n = Sides::both(Vector::new(0.0, 0.0, -3.0 * GRAVITY_M_S2 - DEAD_ZONE_N));
-        let laden = Laden::of(&body);
+        let laden = LadenRobot::of(&body);
         let mass_kg = body.model.mass_kg + 6.0;
         assert!((laden.mass_kg - mass_kg).abs() < 1e-4, "{}", laden.mass_kg);
         assert!((laden.velocity_m_s - Vector::X * (6.0 / mass_kg)).length() < 1e-5, "{}", laden.velocity_m_s);
@@ -126,7 +127,7 @@ mod tests {
     fn a_push_is_leant_against() {
         let body = Posed::standing().body();
         let push_m_s2 = Vector::new(0.5, 0.0, 0.0);
-        let load = Load::of(&body, &Laden::of(&body), 0.0, push_m_s2);
+        let load = Load::of(&body, &LadenRobot::of(&body), 0.0, push_m_s2);
         let lean_m = body.com_m.x - load.balance_point_m.x;
         let expected_m = -push_m_s2.x * (body.com_m.z + PUSH_LEVER_M) / GRAVITY_M_S2;
         assert!((lean_m - expected_m).abs() < 1e-5, "{lean_m} {expected_m}");

@@ -20,8 +20,8 @@ use crate::GRAVITY_M_S2;
 use crate::body::BodyEstimate;
 use crate::plane::heading_rad;
 use ground::middle_m;
-use load::{Laden, Load};
-use observer::Observer;
+use load::{LadenRobot, Load};
+use observer::PushObserver;
 use stand::Stand;
 use step::Stepping;
 
@@ -68,7 +68,7 @@ struct BalanceState {
     time_in_mode_s: f32,
     /// Where the pelvis rests over the middle of the soles, heading frame.
     pelvis_from_middle_m: Vector,
-    observer: Observer,
+    observer: PushObserver,
 }
 
 #[derive(Clone, Serialize, Deserialize)]
@@ -96,7 +96,7 @@ impl Locomotion for Balance {
         state.time_in_mode_s += dt_s;
         let ground_m =
             body.world_from_soles().iter().map(|sole| sole.translation.z).fold(f32::INFINITY, f32::min);
-        let laden = Laden::of(body);
+        let laden = LadenRobot::of(body);
         state.observer.update(laden.velocity_m_s, dt_s);
         let load = Load::of(body, &laden, ground_m, state.observer.push_m_s2());
         state.change_mode(body, &load);
@@ -136,7 +136,7 @@ impl BalanceState {
             velocity: BaseVelocity::STILL,
             time_in_mode_s: 0.0,
             pelvis_from_middle_m,
-            observer: Observer::default(),
+            observer: PushObserver::default(),
         }
     }
 

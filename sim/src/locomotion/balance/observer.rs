@@ -10,13 +10,13 @@ const LARGEST_CHANGE_M_S3: f32 = 4.5;
 
 /// Luenberger observer of the horizontal  v' = expected + d,  d' = 0,  both poles at -[`RATE_1_S`].
 #[derive(Clone, Default, Serialize, Deserialize)]
-pub(super) struct Observer {
+pub(super) struct PushObserver {
     velocity_m_s: Option<Vector>,
     expected_m_s2: Vector,
     push_m_s2: Vector,
 }
 
-impl Observer {
+impl PushObserver {
     /// Horizontal acceleration of the centre of mass by everything that was not expected.
     pub(super) fn push_m_s2(&self) -> Vector {
         self.push_m_s2
@@ -45,8 +45,8 @@ mod tests {
     const DT_S: f32 = 1.0 / 200.0;
 
     /// A body that is accelerated by what was asked for and a push that nobody told of.
-    fn observe(seconds: f32, push_m_s2: impl Fn(f32) -> Vector) -> (Observer, f32) {
-        let mut observer = Observer::default();
+    fn observe(seconds: f32, push_m_s2: impl Fn(f32) -> Vector) -> (PushObserver, f32) {
+        let mut observer = PushObserver::default();
         let mut velocity_m_s = Vector::new(0.2, 0.0, 0.1);
         let mut largest_m_s2 = 0.0_f32;
         for step in 0..(seconds / DT_S) as usize {

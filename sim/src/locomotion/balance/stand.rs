@@ -108,8 +108,8 @@ impl Stand {
         Rotation::from_rotation_z(-self.heading_rad) * flat(self.home_m + away_m - middle_m(&self.soles))
     }
 
-    /// Shift of the pelvis against what of a push the feet do not hold, with the centre of mass at `weights_m`; all in the heading
-    /// frame, from the middle of the feet.
+    /// Shift of the pelvis against what of a push the feet do not hold, with the centre of mass at `weights_m`; all
+    /// in the heading frame, from the middle of the feet.
     fn against_push_m(&self, weights_m: Vector, load: &Load) -> Vector {
         let push_m = flat(load.balance_point_m - load.weights_point_m);
         let balance_m = weights_m + Rotation::from_rotation_z(-self.heading_rad) * push_m;
@@ -209,7 +209,7 @@ fn balance_torques_n_m(
     let mass_kg = body.model.mass_kg;
     let pelvis = body.world_from_pelvis();
     let error_m = goal.translation - pelvis.translation;
-    // The damping is that of the pelvis, which holds still while arms swing.
+    // The velocity is that of the pelvis, which holds still while arms swing.
     let rate_m_s = goal_velocity_m_s - body.pelvis_velocity_m_s;
     let acceleration_m_s2 = Vector::new(
         HORIZONTAL_STIFFNESS_1_S2 * error_m.x + HORIZONTAL_DAMPING_1_S * rate_m_s.x,
@@ -238,7 +238,7 @@ fn balance_torques_n_m(
 
 #[cfg(test)]
 mod tests {
-    use super::super::load::Laden;
+    use super::super::load::LadenRobot;
     use super::*;
     use crate::body::posed::Posed;
 
@@ -247,7 +247,7 @@ mod tests {
         let body = Posed::standing().body();
         let stand = Stand::plant(&body, 0.0, None);
         for push_m_s2 in [0.0, 0.2, -0.2, 1.0, -1.0] {
-            let load = Load::of(&body, &Laden::of(&body), 0.0, Vector::Y * push_m_s2);
+            let load = Load::of(&body, &LadenRobot::of(&body), 0.0, Vector::Y * push_m_s2);
             let moved_m = (load.balance_point_m - load.weights_point_m).y;
             let beyond_m = (moved_m.abs() - PUSH_ZONE_M).max(0.0);
             assert_eq!(beyond_m > 0.0, push_m_s2.abs() == 1.0, "{moved_m}");

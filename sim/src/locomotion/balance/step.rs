@@ -3,13 +3,13 @@
 //! With x the balance point, v its velocity, u that of the swinging foot, s = [`SWING_INERTIA`] and w = sqrt(g / h), the
 //! capture point  xi = x + (v - s u) / w  obeys
 //!   xi' = w (xi - p) + s u,   p the centre of pressure,
-//! which moves from the old foot to the new one within the transfer time and stays there. What s u still adds until the foot lands,
-//! the offset b of the steady gait takes into account, the plan of a step does not: that won nothing. A foot put down at
-//! xi(T) - b  leaves the capture point the offset b from the new foot; see [`Gait`].
-//! The centre of mass moves along with a leg that swings, and stops with it: v - s u is the speed that lasts, known
-//! from the angular momentum about the ground. Without it a robot that was hit steps too far, the farther the faster it
-//! steps, and at the next step too far the other way.
-//! Source: Englsberger, Ott, Albu-Schaeffer 2015; Khadiv et al. 2016; angular momentum: Gong, Grizzle 2022.
+//! which moves from the old foot to the new one within the transfer time and stays there. What s u still adds until the
+//! foot lands, the offset b of the steady gait takes into account, the plan of a step does not: that won nothing. A foot
+//! put down at xi(T) - b  leaves the capture point the offset b from the new foot; see [`Gait`]. The centre of mass
+//! moves along with a leg that swings, and stops with it: v - s u is the speed that lasts, known from the angular
+//! momentum about the ground. Without it a robot that was hit steps too far, the farther the faster it steps, and at the
+//! next step too far the other way. Source: Englsberger, Ott, Albu-Schaeffer 2015; Khadiv et al. 2016; angular momentum:
+//! Gong, Grizzle 2022.
 
 use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};

@@ -15,7 +15,7 @@ use crate::render::{Camera, Frame, PlacedScenery, Renderer, Scenery};
 use contact::ContactMap;
 use shade::{Facet, Rays};
 use shadow::ShadowMap;
-use target::Target;
+use target::RenderTarget;
 use view::{Row, SrgbTable, View};
 
 /// Renders on the calling thread. It keeps its buffers, and the shadows of the last state.
@@ -28,9 +28,9 @@ pub(super) struct CpuRenderer {
     contact: ContactMap,
     row: Row,
     facets: Vec<Facet>,
-    samples: Target,
+    samples: RenderTarget,
     /// One sample a pixel, at its centre: what depth and ids are read from.
-    centres: Target,
+    centres: RenderTarget,
 }
 
 impl CpuRenderer {
@@ -43,8 +43,8 @@ impl CpuRenderer {
             contact: ContactMap::default(),
             row: Row::default(),
             facets: Vec::new(),
-            samples: Target::default(),
-            centres: Target::default(),
+            samples: RenderTarget::default(),
+            centres: RenderTarget::default(),
         }
     }
 }

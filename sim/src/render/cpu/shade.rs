@@ -1,4 +1,5 @@
-//! Sheets in one state of the world, and their light: one sun with shadow, a sky that lights from above, a faint lamp at the camera.
+//! Sheets in one state of the world, and their light: one sun with shadow, a sky that lights from above, a faint lamp at
+//! the camera.
 
 use rapier3d::math::{Matrix, Vector};
 

@@ -12,7 +12,7 @@ use crate::render::{Camera, PlacedScenery};
 
 /// Nearest surface per sample. `nearness_1_m` is 1 / depth, which is linear over a triangle's picture.
 #[derive(Default)]
-pub(super) struct Target {
+pub(super) struct RenderTarget {
     grid: Grid,
     nearness_1_m: SampleRows<f32>,
     sheet: SampleRows<u32>,
@@ -22,8 +22,8 @@ pub(super) struct Target {
 #[inline(always)]
 pub(super) fn draw<S: Simd>(
     simd: S,
-    samples: &mut Target,
-    centres: &mut Target,
+    samples: &mut RenderTarget,
+    centres: &mut RenderTarget,
     prepared: &Prepared,
     placed: &PlacedScenery,
     camera: &Camera,
@@ -99,14 +99,20 @@ impl Lens {
 }
 
 #[inline(always)]
-fn fill<S: Simd>(simd: S, samples: &mut Target, centres: &mut Target, corners: [[f32; 3]; 3], sheet: u32) {
+fn fill<S: Simd>(
+    simd: S,
+    samples: &mut RenderTarget,
+    centres: &mut RenderTarget,
+    corners: [[f32; 3]; 3],
+    sheet: u32,
+) {
     if let Some(outline) = ProjectedTriangle::new(corners) {
         samples.fill(simd, &outline, sheet);
         centres.fill(simd, &outline, sheet);
     }
 }
 
-impl Target {
+impl RenderTarget {
     pub(super) fn width(&self) -> usize {
         self.grid.width
     }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::contact::ContactMap;
 use super::shade::{Facet, Rays, Strip, Surfaces};
 use super::shadow::ShadowMap;
-use super::target::Target;
+use super::target::RenderTarget;
 use crate::render::scene::prepared::{NOTHING, Prepared};
 use crate::render::shading::lanes::{LANES, Lanes, lanes};
 use crate::render::shading::{OUTLINE, OUTLINE_DEPTH_STEP, SAMPLES, SKY, SRGB_STEPS};
@@ -17,7 +17,7 @@ pub(super) struct View<'a> {
     pub prepared: &'a Prepared,
     /// The facet of each sheet.
     pub facets: &'a [Facet],
-    pub target: &'a Target,
+    pub target: &'a RenderTarget,
     pub shadow: &'a ShadowMap,
     pub contact: &'a ContactMap,
     pub rays: Rays,

@@ -50,7 +50,8 @@ pub enum Carrier {
 pub struct PlacedScenery {
     /// Pose of each part.
     pub world_from_mesh: Vec<Pose>,
-    /// The point between the robots, around which shadows have to be sharp. It moves in steps, so that the room's shadows need seldom be drawn.
+    /// The point between the robots, around which shadows have to be sharp. It moves in steps, so that the room's
+    /// shadows need seldom be drawn.
     pub focus_m: Vector,
 }
 
