@@ -10,7 +10,7 @@ use tandem::{
 
 use super::{
     command_lines,
-    pages::{Block, Page, pages, root},
+    pages::{Block, Page, all_documents, root},
 };
 
 /// The scene that `xml,scene` shows.
@@ -19,7 +19,7 @@ const SCENE: &str = "episodes/tests/scenes/kitchen/handover.xml";
 #[test]
 fn every_block_of_code_is_what_its_fence_says() {
     let mut wrong = Vec::new();
-    for page in pages() {
+    for page in all_documents() {
         for block in page.blocks() {
             if let Err(reason) = check(&block) {
                 wrong.push(format!("{}: {reason}", page.at(block.line)));
@@ -32,7 +32,7 @@ fn every_block_of_code_is_what_its_fence_says() {
 #[test]
 fn commands_in_the_text_are_accepted() {
     let mut wrong = Vec::new();
-    for page in pages() {
+    for page in all_documents() {
         for (line, words) in page.in_backticks() {
             if let Err(reason) = command_lines::check_mention(&words) {
                 wrong.push(format!("{}: {words}: {reason}", page.at(line)));
