@@ -82,11 +82,11 @@ async fn tools(
 
 async fn episode_tools(
     State(app): State<AppState>,
-    Extension(who): Extension<Caller>,
+    Extension(caller): Extension<Caller>,
     Path(id): Path<String>,
 ) -> Result<Json<Vec<EpisodeToolSpec>>, ApiError> {
     let episode = app.table.hosted(&id)?;
-    episode.admit(&who)?;
+    episode.admit(&caller)?;
     let (hints, most_steps) = (app.settings.hints, episode.thread.steps_per_command());
     Ok(Json(episode_tool_specs(hints, &id, most_steps, episode.may_talk())))
 }
@@ -104,22 +104,22 @@ async fn docs(State(app): State<AppState>) -> Response {
 
 async fn metrics(
     State(app): State<AppState>,
-    Extension(who): Extension<Caller>,
+    Extension(caller): Extension<Caller>,
 ) -> Result<Response, ApiError> {
-    require_host(&who)?;
+    require_host(&caller)?;
     let page = app.table.metrics().page(app.table.len(), app.table.running());
     Ok(([(header::CONTENT_TYPE, MetricsPage::CONTENT_TYPE)], page).into_response())
 }
 
 async fn start(
     State(app): State<AppState>,
-    Extension(who): Extension<Caller>,
+    Extension(caller): Extension<Caller>,
     encoding: Encoding,
     IdempotencyKey(key): IdempotencyKey,
     body: Bytes,
 ) -> Result<Response, ApiError> {
     counted(&app, StartEpisode::NAME, async {
-        require_host(&who)?;
+        require_host(&caller)?;
         let (args, driving) = parse_start(encoding.read(&body)?)?;
         let IdempotentReply { reply, replayed } = match key {
             Some(key) => app.table.start_once(args, driving, &key).await?,
@@ -134,25 +134,25 @@ async fn start(
 
 async fn status(
     State(app): State<AppState>,
-    Extension(who): Extension<Caller>,
+    Extension(caller): Extension<Caller>,
     encoding: Encoding,
     Path(id): Path<String>,
 ) -> Result<Response, ApiError> {
-    encoding.write(StatusCode::OK, &app.table.hosted(&id)?.status(&who).await?)
+    encoding.write(StatusCode::OK, &app.table.hosted(&id)?.status(&caller).await?)
 }
 
 async fn briefing(
     State(app): State<AppState>,
-    Extension(who): Extension<Caller>,
+    Extension(caller): Extension<Caller>,
     encoding: Encoding,
     Path(id): Path<String>,
 ) -> Result<Response, ApiError> {
-    encoding.write(StatusCode::OK, &app.table.briefing(&id, &who).await?)
+    encoding.write(StatusCode::OK, &app.table.briefing(&id, &caller).await?)
 }
 
 async fn call(
     State(app): State<AppState>,
-    Extension(who): Extension<Caller>,
+    Extension(caller): Extension<Caller>,
     encoding: Encoding,
     IdempotencyKey(key): IdempotencyKey,
     Path((id, name)): Path<(String, String)>,
@@ -160,10 +160,10 @@ async fn call(
 ) -> Result<Response, ApiError> {
     counted(&app, &name, async {
         let episode = app.table.hosted(&id)?;
-        episode.admit(&who)?;
+        episode.admit(&caller)?;
         let read = || Ok(Call::parse(&name, without_episode_id(encoding.read(&body)?, &id)?)?);
         let answer = match read() {
-            Ok(call) => episode.call(&who, call, key.as_deref()).await.map_err(ApiError::from),
+            Ok(call) => episode.call(&caller, call, key.as_deref()).await.map_err(ApiError::from),
             Err(refusal) => Err(refusal),
         };
         let IdempotentReply { reply, replayed } =
@@ -176,17 +176,17 @@ async fn call(
 
 async fn remove(
     State(app): State<AppState>,
-    Extension(who): Extension<Caller>,
+    Extension(caller): Extension<Caller>,
     Path(id): Path<String>,
 ) -> Result<Json<ResultReply>, ApiError> {
-    app.table.hosted(&id)?.admit(&who)?;
-    require_host(&who)?;
+    app.table.hosted(&id)?.admit(&caller)?;
+    require_host(&caller)?;
     Ok(Json(app.table.remove(&id).await?))
 }
 
 /// Refuses an operator: what concerns more than its robot is for the caller who started the episode.
-fn require_host(who: &Caller) -> Result<(), HostingError> {
-    match who {
+fn require_host(caller: &Caller) -> Result<(), HostingError> {
+    match caller {
         Caller::Host => Ok(()),
         Caller::Operator { .. } => Err(HostingError::HostsBusiness),
     }
