@@ -1,4 +1,4 @@
-//! Who looks at the world of an episode: draws what its cameras see, and measures depth at pixels.
+//! Looks at the world of an episode: draws what its cameras see, and measures depth at pixels.
 
 use std::sync::Arc;
 
@@ -32,7 +32,7 @@ impl Observer {
         Observer { renderer: kind.renderer(Scenery::of(world)), cameras: Cameras::of(world), drawn: None }
     }
 
-    /// Who draws.
+    /// The renderer, and on what device it draws.
     pub fn renderer(&self) -> &str {
         self.renderer.name()
     }

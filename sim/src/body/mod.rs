@@ -1,6 +1,7 @@
 //! What a controller may know of a robot: its model, the order of its joints, kinematics and inverse dynamics. It knows no
 //! physics world: whoever senses a robot there fills in a [`BodyEstimate`].
 
+mod estimate;
 mod inverse_dynamics;
 mod layout;
 mod model;
@@ -8,18 +9,17 @@ mod model;
 pub(crate) mod posed;
 #[cfg(test)]
 mod tests;
-mod whole_body;
 
+pub use estimate::BodyEstimate;
 pub use inverse_dynamics::{Acceleration, Effort};
 pub use layout::{
     ARM_COLUMNS, ARM_JOINTS, HAND_COLUMNS, HAND_JOINTS, JOINTS, UPPER, UPPER_JOINTS, WAIST_COLUMN,
     joint_names,
 };
 pub use model::{HandLinks, JointModel, LinkModel, RobotModel, SiteModel};
-pub use whole_body::BodyEstimate;
 
+pub(crate) use estimate::PALM_IN_WRIST_M;
 pub(crate) use layout::{ARMS, LEG_JOINTS, LEGS, MIRRORED_ARM, WAIST, WAIST_JOINTS, check_joint_order};
-pub(crate) use whole_body::PALM_IN_WRIST_M;
 
 /// Spring, damper and feedforward of one joint for one physics step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

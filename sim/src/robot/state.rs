@@ -47,7 +47,7 @@ pub struct RobotEstimate {
 /// What only the simulator knows of a robot: for scoring, recordings, pictures and experts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotTruth {
-    /// In the order of [`crate::body::RobotModel::links`].
+    /// Every link, in the order of [`crate::body::RobotModel::links`]; the pelvis is the first.
     pub world_from_link: Vec<Pose>,
 }
 
@@ -59,7 +59,6 @@ impl RobotSensed {
 }
 
 impl RobotTruth {
-    /// The pelvis is the first link.
     pub fn world_from_pelvis(&self) -> Pose {
         self.world_from_link[0]
     }

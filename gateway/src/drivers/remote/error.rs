@@ -5,22 +5,22 @@ use std::time::Duration;
 /// What went wrong with a server.
 #[derive(Debug, thiserror::Error)]
 pub enum RemoteError {
-    /// Nobody listens, yet.
+    /// No server listens at the address yet.
     #[error("no policy answers at {url}: {reason}; start its server first")]
     Unreachable { url: String, reason: String },
-    /// It was there, and is gone.
+    /// The server was there, and is gone.
     #[error("the policy at {url} is gone: {reason}")]
     Gone { url: String, reason: String },
-    /// It takes too long.
+    /// The server takes too long.
     #[error("the policy at {url} gave no answer within {} s", .within.as_secs_f64())]
     Slow { url: String, within: Duration },
-    /// It says itself that it failed.
+    /// The server says itself that it failed.
     #[error("the policy at {url} failed: {text}")]
     Failed { url: String, text: String },
-    /// What it sends is not of its protocol.
+    /// What the server sends is not of its protocol.
     #[error("the policy at {url} sent what cannot be read: {reason}")]
     Unreadable { url: String, reason: String },
-    /// What it sends does not fit the map.
+    /// What the server sends does not fit the map.
     #[error("the policy's answer does not fit its map: {0}")]
     Misfit(String),
 }

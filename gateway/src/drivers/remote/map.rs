@@ -20,7 +20,7 @@ pub const PRESETS: [(&str, &str); 2] =
 /// What stands for a robot's name in a key.
 pub const ROBOT: &str = "{robot}";
 
-/// Of a picture that a policy is shown.
+/// The longest side of a picture that a policy is shown.
 const LONGEST_SIDE_PX: u32 = 4096;
 
 /// How a policy is asked and understood.
@@ -43,7 +43,7 @@ pub struct PolicyMap {
     pub chunk: Chunk,
 }
 
-/// Whose views and joints a policy is shown.
+/// Which robots' views and joints a policy is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Scope {
@@ -53,7 +53,7 @@ pub enum Scope {
     Global,
 }
 
-/// Whom an answer moves.
+/// Which robots an answer moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AnswerScope {
@@ -87,7 +87,7 @@ pub struct ImageKey {
     pub layout: Layout,
 }
 
-/// Who looks.
+/// Which camera a picture comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CameraName {

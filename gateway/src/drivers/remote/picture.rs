@@ -10,16 +10,16 @@ use super::values::{Array, Elements};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fit {
-    /// As large as fits, in the middle of black, as `resize_with_pad` of openpi-client.
+    /// The whole picture as large as fits, in the middle of black, as `resize_with_pad` of openpi-client.
     #[default]
     Pad,
-    /// To the new size, whatever becomes of its shape.
+    /// Stretched to the new size, whatever becomes of its shape.
     Stretch,
     /// The largest part of the right shape, from the middle.
     Crop,
 }
 
-/// In which order the elements come.
+/// The order of a picture's elements.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Layout {

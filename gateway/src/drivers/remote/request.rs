@@ -88,7 +88,7 @@ pub fn request(
                 }
             }
             (CameraName::ThirdPerson, Some(picture)) => request.put(key, pixels(picture, image, map)),
-            // Nobody looked.
+            // No picture was taken.
             (CameraName::ThirdPerson, None) => {}
         }
     }
@@ -114,7 +114,8 @@ pub fn request(
     request
 }
 
-/// What stands under `key` and of whom: under a key with a robot's name in it of that robot, else of the one that is asked for.
+/// Keys with the inputs that stand under them: those of a robot whose name is in its key, else those of the robot that the request is
+/// for.
 fn of_robots<'a>(
     key: &str,
     map: &PolicyMap,

@@ -15,7 +15,7 @@ pub enum Elements {
 }
 
 impl Array {
-    /// As numpy calls the type of the elements.
+    /// The type of the elements, by numpy's name for it.
     pub fn dtype(&self) -> &'static str {
         match self.elements {
             Elements::Bytes(_) => "|u1",
@@ -71,7 +71,7 @@ pub enum ReplyValue {
         values: Vec<f64>,
     },
     Text(String),
-    /// Anything else, in words.
+    /// What is none of these, described in words.
     Other(String),
 }
 
@@ -122,7 +122,7 @@ impl ReplyValue {
         })
     }
 
-    /// In words, for whoever has to mend a map.
+    /// Describes the value in words, for whoever has to mend a map.
     pub fn describe(&self) -> String {
         match self {
             ReplyValue::Map(entries) if entries.is_empty() => "an empty map".into(),
