@@ -198,8 +198,8 @@ mod tests {
     #[test]
     fn what_is_no_policy_is_told_what_is() {
         let check = |flags: &[&str], says: &str| {
-            let told = card(flags).unwrap_err();
-            assert!(told.contains(says), "{told}");
+            let refusal = card(flags).unwrap_err();
+            assert!(refusal.contains(says), "{refusal}");
         };
         check(&["--policy", "expart"], "have: expert, idle, demonstration, exec:COMMAND");
         check(&["--policy", "exec: "], "give one, as exec:");

@@ -127,15 +127,15 @@ impl Target {
 
 /// Checks that a refusal says something, and nothing secret.
 fn check_refusal(target: &Target, answer: &RawReply, sent: &str) {
-    let told = answer.body.to_string();
-    assert_ne!(answer.status, StatusCode::INTERNAL_SERVER_ERROR, "{sent}: {told}");
+    let shown = answer.body.to_string();
+    assert_ne!(answer.status, StatusCode::INTERNAL_SERVER_ERROR, "{sent}: {shown}");
     let runs = target.runs.path().to_string_lossy().into_owned();
     for secret in [&*runs, "panicked", ".rs:", "RUST_BACKTRACE"] {
-        assert!(!told.contains(secret), "{sent}: {told} tells {secret:?}");
+        assert!(!shown.contains(secret), "{sent}: {shown} tells {secret:?}");
     }
-    let says_something = told.contains("detail") || told.contains("message") || told.contains("text");
-    assert!(says_something, "{sent}: refused with {told:?}");
-    assert!(told.len() < 4 * sent.len() + 4096, "{sent}: refused with {} bytes", told.len());
+    let says_something = shown.contains("detail") || shown.contains("message") || shown.contains("text");
+    assert!(says_something, "{sent}: refused with {shown:?}");
+    assert!(shown.len() < 4 * sent.len() + 4096, "{sent}: refused with {} bytes", shown.len());
 }
 
 /// Sends `calls` random requests and returns how many were refused.

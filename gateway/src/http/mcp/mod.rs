@@ -76,7 +76,7 @@ impl ServerHandler for McpServer {
         context: RequestContext<RoleServer>,
     ) -> Result<ListToolsResult, ErrorData> {
         let hints = self.app.settings.hints;
-        let specs = match caller(&context).is_some_and(|who| self.app.table.may_talk(who)) {
+        let specs = match caller_of(&context).is_some_and(|caller| self.app.table.may_talk(caller)) {
             true => operator_tool_specs(hints),
             false => tool_specs(hints),
         };
@@ -117,8 +117,10 @@ impl ServerHandler for McpServer {
         let episode = args["episode_id"].as_str().map(str::to_owned);
         let called = match duplicate_field(&context) {
             Some(DuplicateField(reason)) => Err(ApiError::MalformedJson(reason.clone())),
-            None => match caller(&context) {
-                Some(who) => counted(&self.app, &request.name, self.call(who, &request.name, args)).await,
+            None => match caller_of(&context) {
+                Some(caller) => {
+                    counted(&self.app, &request.name, self.call(caller, &request.name, args)).await
+                }
                 None => Err(ApiError::NoToken),
             },
         };
@@ -133,20 +135,20 @@ impl ServerHandler for McpServer {
 }
 
 impl McpServer {
-    async fn call(&self, who: &Caller, name: &str, args: Value) -> Result<Vec<ContentBlock>, ApiError> {
+    async fn call(&self, caller: &Caller, name: &str, args: Value) -> Result<Vec<ContentBlock>, ApiError> {
         match name {
             ListTasks::NAME => {
                 parse_args::<ListTasks>(args)?;
                 json_block(&self.app.table.task_list())
             }
             StartEpisode::NAME => {
-                if let Caller::Operator { .. } = who {
+                if let Caller::Operator { .. } = caller {
                     return Err(HostingError::HostsBusiness.into());
                 }
                 let (args, driving) = parse_start(args)?;
                 json_block(&self.app.table.start_driven(args, driving).await?)
             }
-            _ => self.call_episode(who, name, args).await,
+            _ => self.call_episode(caller, name, args).await,
         }
     }
 
@@ -163,13 +165,13 @@ impl McpServer {
 
     async fn call_episode(
         &self,
-        who: &Caller,
+        caller: &Caller,
         name: &str,
         mut args: Value,
     ) -> Result<Vec<ContentBlock>, ApiError> {
         let handle = args.as_object_mut().and_then(|object| object.shift_remove("episode_id"));
         let call = Call::parse(name, args).map_err(ApiError::from);
-        let id = match (handle, who) {
+        let id = match (handle, caller) {
             (Some(Value::String(id)), _) => id,
             // An operator's token says which episode.
             (None, Caller::Operator { episode, .. }) => episode.clone(),
@@ -184,7 +186,7 @@ impl McpServer {
             Err(_) => call?,
         };
         let episode = episode?;
-        let answered = episode.call(who, call, None).await;
+        let answered = episode.call(caller, call, None).await;
         content(&answered.map_err(|error| ApiError::from(error).in_episode(&episode.thread))?.reply)
     }
 }
@@ -214,7 +216,7 @@ fn content(answer: &Answer) -> Result<Vec<ContentBlock>, ApiError> {
 }
 
 /// The caller, as the gate has identified it.
-fn caller(context: &RequestContext<RoleServer>) -> Option<&Caller> {
+fn caller_of(context: &RequestContext<RoleServer>) -> Option<&Caller> {
     context.extensions.get::<Parts>()?.extensions.get()
 }
 
