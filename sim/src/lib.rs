@@ -22,7 +22,7 @@
 //! }
 //! assert_eq!(step.time_s, 0.5);
 //! for (robot, x_m) in step.robots.iter().zip([0.0, 1.5]) {
-//!     let pelvis_m = robot.world_from_link[0].translation;
+//!     let pelvis_m = robot.truth.world_from_pelvis().translation;
 //!     assert!((pelvis_m.x - x_m).abs() < 0.05 && pelvis_m.z > 0.7, "it stands where it was put");
 //! }
 //! # Ok(())

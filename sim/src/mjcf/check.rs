@@ -99,7 +99,7 @@ impl Check<'_> {
             let within = node.parent_element().map_or("", |parent| parent.tag_name().name());
             let kind = support::element(within, node.tag_name().name()).and_then(|element| element.kind);
             let (Some(kind), false) = (kind, within == "default") else { continue };
-            let file_stem = || Some(std::path::Path::new(node.attribute("file")?).file_stem()?.to_str()?);
+            let file_stem = || std::path::Path::new(node.attribute("file")?).file_stem()?.to_str();
             let Some(name) = node.attribute("name").or_else(file_stem).filter(|name| !name.is_empty()) else {
                 continue;
             };
