@@ -47,7 +47,7 @@ impl EpisodeCache<'_> {
     pub fn load(&self, spec: &EpisodeSpec) -> Option<PlayedEpisode> {
         let bytes = std::fs::read(self.folder.join(format!("{}.json", name(spec)))).ok()?;
         let cached: PlayedEpisode = serde_json::from_slice(&bytes).ok()?;
-        let by = (&cached.by, cached.locomotion.as_str(), cached.build.as_str());
+        let by = (&cached.policy, cached.locomotion.as_str(), cached.build.as_str());
         let same = by == (&self.plan.player.card(), &self.locomotion, self.build)
             && cached.spec == *spec
             && (cached.result.task.as_str(), cached.result.seed) == (spec.task.id, spec.seed)
@@ -67,7 +67,7 @@ impl EpisodeCache<'_> {
             return Err(unrecorded(spec, reason));
         }
         let played = PlayedEpisode {
-            by: self.plan.player.card(),
+            policy: self.plan.player.card(),
             spec: spec.clone(),
             locomotion: self.locomotion.clone(),
             build: self.build.into(),

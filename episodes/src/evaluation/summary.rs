@@ -24,7 +24,7 @@ pub struct TaskSummary {
 pub struct Evaluation {
     /// Who played.
     #[serde(flatten)]
-    pub by: PolicyCard,
+    pub policy: PolicyCard,
     pub protocol: Protocol,
     pub locomotion: String,
     pub disclosure: Disclosure,
@@ -56,7 +56,7 @@ pub fn summarise(cache: &EpisodeCache, episodes: Vec<PlayedEpisode>, left_out: V
         task.mean_env_steps /= task.episodes as f64;
     }
     Evaluation {
-        by: cache.plan.player.card(),
+        policy: cache.plan.player.card(),
         protocol: cache.plan.protocol,
         locomotion: cache.locomotion.clone(),
         disclosure: cache.plan.disclosure,

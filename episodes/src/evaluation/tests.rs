@@ -31,7 +31,7 @@ fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultRe
 /// An episode that was played under `cache`'s rules.
 fn played(cache: &EpisodeCache, spec: &EpisodeSpec) -> PlayedEpisode {
     PlayedEpisode {
-        by: cache.plan.player.card(),
+        policy: cache.plan.player.card(),
         spec: spec.clone(),
         locomotion: cache.locomotion.clone(),
         build: cache.build.into(),
@@ -175,9 +175,9 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
         ("hints", |played| played.spec.hints = Hints::Off),
         ("start", |played| played.spec.start = Start::Checkpoint("other".into())),
         ("robot", |played| played.spec.robot = RobotFile::File("other.xml".into())),
-        ("policy", |played| played.by = "idle".into()),
-        ("settings", |played| played.by.settings = Some(serde_json::json!({ "execute": 25 }))),
-        ("extra information", |played| played.by.extra_information.push("third_person".into())),
+        ("policy", |played| played.policy = "idle".into()),
+        ("settings", |played| played.policy.settings = Some(serde_json::json!({ "execute": 25 }))),
+        ("extra information", |played| played.policy.extra_information.push("third_person".into())),
         ("controller", |played| played.locomotion.push('0')),
         ("build", |played| played.build.push('0')),
     ] {

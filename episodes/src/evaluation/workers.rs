@@ -41,7 +41,7 @@ pub fn play_all(
             });
         }
         drop(done);
-        played.iter().inspect(|(_, outcome)| tell(outcome, progress)).collect()
+        played.iter().inspect(|(_, outcome)| report_progress(outcome, progress)).collect()
     });
     if let Some(error) = failure.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()) {
         return Err(error);
@@ -60,7 +60,7 @@ pub fn play_all(
     Ok(episodes)
 }
 
-fn tell(outcome: &PlannedOutcome, progress: &(dyn Fn(&PlayedEpisode) + Sync)) {
+fn report_progress(outcome: &PlannedOutcome, progress: &(dyn Fn(&PlayedEpisode) + Sync)) {
     match outcome {
         PlannedOutcome::Played(played) => progress(played),
         PlannedOutcome::LeftOut(_) => {}

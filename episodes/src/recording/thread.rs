@@ -44,7 +44,7 @@ impl RecorderThread {
         let Some(appends) = &self.appends else { return };
         let sent = match appends.try_send(Box::new(append)) {
             Err(TrySendError::Full(append)) => {
-                self.hurry();
+                self.wake();
                 appends.send(append).is_ok()
             }
             sent => sent.is_ok(),
@@ -65,13 +65,13 @@ impl RecorderThread {
             drop(flushed);
             outcome
         });
-        self.hurry();
+        self.wake();
         // Nothing is ever sent; it ends when the other side is gone, be it by a failure before.
         let _ = wait.recv();
     }
 
     /// Gathers no longer.
-    fn hurry(&self) {
+    fn wake(&self) {
         if let Some(thread) = &self.thread {
             thread.thread().unpark();
         }
@@ -85,7 +85,7 @@ impl RecorderThread {
     /// Waits until everything is appended. Returns the recorder, unless it has failed.
     pub fn stop(&mut self) -> Option<Recorder> {
         self.appends = None;
-        self.hurry();
+        self.wake();
         let stopped = self.thread.take()?.join();
         stopped.unwrap_or_else(|_| {
             self.failed.get_or_init(|| PANICKED.into());

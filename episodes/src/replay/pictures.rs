@@ -37,7 +37,7 @@ pub struct DrawnPictures {
     /// Moments at which every camera has a picture.
     pub moments: usize,
     /// How many of these an earlier run had drawn.
-    pub kept: usize,
+    pub already_drawn: usize,
     pub cameras: usize,
 }
 
@@ -113,14 +113,14 @@ pub fn draw_all(
         .map(|(step, view)| camera_pose(step, view.name(task), &scene.camera(view, step, plan.size)))
         .collect();
     write_whole(&folder.join(POSES), &serde_json::to_vec(&poses).map_err(OutputError::from)?)?;
-    let kept = AtomicUsize::new(0);
+    let already_drawn = AtomicUsize::new(0);
     let next = AtomicUsize::new(0);
     let failure: Mutex<Option<PicturesError>> = Mutex::new(None);
     let work = || -> Result<(), PicturesError> {
         let mut scene = EpisodeRenderer::of(&recording.spec).map_err(ReplayError::from)?;
         while let Some(step) = steps.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let before = views.iter().all(|view| PictureFiles::of(folder, view.name(task), step).are_there());
-            kept.fetch_add(usize::from(before), Ordering::Relaxed);
+            let before = views.iter().all(|view| PictureFiles::of(folder, view.name(task), step).exist());
+            already_drawn.fetch_add(usize::from(before), Ordering::Relaxed);
             if !before {
                 views.iter().try_for_each(|view| draw(&mut scene, *view, step, plan, folder, task))?;
             }
@@ -141,7 +141,11 @@ pub fn draw_all(
     });
     match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
         Some(error) => Err(error),
-        None => Ok(DrawnPictures { moments: steps.len(), kept: kept.into_inner(), cameras: views.len() }),
+        None => Ok(DrawnPictures {
+            moments: steps.len(),
+            already_drawn: already_drawn.into_inner(),
+            cameras: views.len(),
+        }),
     }
 }
 
@@ -222,7 +226,7 @@ impl PictureFiles {
         PictureFiles { rgb: file("rgb"), depth: file("depth") }
     }
 
-    fn are_there(&self) -> bool {
+    fn exist(&self) -> bool {
         self.rgb.exists() && self.depth.exists()
     }
 }
@@ -236,7 +240,7 @@ fn draw(
     task: &Task,
 ) -> Result<(), PicturesError> {
     let files = PictureFiles::of(folder, view.name(task), step);
-    if files.are_there() {
+    if files.exist() {
         return Ok(());
     }
     let camera = scene.camera(view, step, plan.size);

@@ -33,7 +33,7 @@ pub const EPISODES: &str = "episodes";
 pub struct PlayedEpisode {
     /// Who played.
     #[serde(flatten)]
-    pub by: PolicyCard,
+    pub policy: PolicyCard,
     pub spec: EpisodeSpec,
     /// Which base controller the robots had; the name tells files of different content apart.
     pub locomotion: String,

@@ -82,7 +82,7 @@ fn pictures_are_drawn_once_whatever_stops_the_run() {
         draw_all(&recording, &PicturesPlan { rate_hz, size: Some(SIZE), jobs }, &out, &|| {})
     };
     let drawn = draw(10, 2).unwrap();
-    assert_eq!((drawn.moments, drawn.kept, drawn.cameras), (3, 0, 3), "steps 0, 5 and 10");
+    assert_eq!((drawn.moments, drawn.already_drawn, drawn.cameras), (3, 0, 3), "steps 0, 5 and 10");
     let before = files(&out);
     assert_eq!(before.len(), 3 * 3 * 2 + 2, "{before:?}");
 
@@ -91,7 +91,7 @@ fn pictures_are_drawn_once_whatever_stops_the_run() {
     let depth_mm = image::open(&lost).unwrap().into_luma16();
     std::fs::remove_file(&lost).unwrap();
     let drawn = draw(10, 1).unwrap();
-    assert_eq!((drawn.moments, drawn.kept), (3, 2));
+    assert_eq!((drawn.moments, drawn.already_drawn), (3, 2));
     let after = files(&out);
     let written = |path: &&PathBuf| before.get(*path) != after.get(*path) && !path.ends_with("poses.json");
     let written: Vec<_> = after.keys().filter(written).collect();

@@ -162,8 +162,9 @@ fn render(
 ) -> Result<(), Box<dyn std::error::Error>> {
     let bar = ProgressBar::no_length();
     bar.set_style(ProgressStyle::with_template("  {pos} moments, {elapsed}")?);
-    let DrawnPictures { moments, kept, cameras } = draw_all(recording, plan, folder, &|| bar.inc(1))?;
+    let DrawnPictures { moments, already_drawn, cameras } =
+        draw_all(recording, plan, folder, &|| bar.inc(1))?;
     bar.finish_and_clear();
-    println!("  {}: {moments} moments of {cameras} cameras, {kept} of them kept", folder.display());
+    println!("  {}: {moments} moments of {cameras} cameras, {already_drawn} of them kept", folder.display());
     Ok(())
 }

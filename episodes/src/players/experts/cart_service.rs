@@ -6,7 +6,7 @@ use std::f32::consts::FRAC_PI_2;
 use tandem_sim::{Pose, Side, Vector};
 
 use super::skills::{
-    BarGrasp, CarryTeam, Commander, CylinderGrasp, ParallelScript, Tolerance, WalkGoal, come_near,
+    BarGrasp, CarryTeam, Commander, CylinderGrasp, ParallelScript, Tolerance, WalkGoal, approach,
     grasp_compliantly, in_parallel, let_go, pick_up_all, place, walk_to,
 };
 use crate::players::PlayerError;
@@ -73,16 +73,16 @@ fn serve(commander: &mut Commander) -> Result<(), PlayerError> {
     };
     let grasp = bottle(FRAC_PI_2);
     let before = at_hand(commander.facts()?.position_m("bottle"), FRAC_PI_2);
-    come_near(commander, &[WalkGoal { robot: B, to: before, pace_m_s: WALK_M_S }], AT_HAND)?;
+    approach(commander, &[WalkGoal { robot: B, to: before, pace_m_s: WALK_M_S }], AT_HAND)?;
     pick_up_all(commander, &[grasp])?;
     let standing_m = commander.facts()?.position_m("bottle");
     let lift = grasp.carry(commander, standing_m + Vector::Z * LIFT_M)?;
     commander.perform(1.0, &[lift])?;
 
     let back = at_hand(standing_m - Vector::Y * BACK_M, FRAC_PI_2);
-    come_near(commander, &[WalkGoal { robot: B, to: back, pace_m_s: CARRY_M_S }], ON_THE_WAY)?;
+    approach(commander, &[WalkGoal { robot: B, to: back, pace_m_s: CARRY_M_S }], ON_THE_WAY)?;
     let patch_m = commander.facts()?.position_m("serving_patch");
-    come_near(commander, &[WalkGoal { robot: B, to: at_hand(patch_m, 0.0), pace_m_s: CARRY_M_S }], AT_HAND)?;
+    approach(commander, &[WalkGoal { robot: B, to: at_hand(patch_m, 0.0), pace_m_s: CARRY_M_S }], AT_HAND)?;
     let grasp = bottle(0.0);
     for (height_m, duration_s) in [(OVER_PATCH_M, 1.2), (DROP_M, 1.0)] {
         let over = grasp.carry(commander, patch_m + Vector::Z * height_m)?;

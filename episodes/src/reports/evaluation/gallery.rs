@@ -51,7 +51,7 @@ pub fn gallery(loaded: &LoadedEpisodes, most: usize) -> Vec<Failure> {
     order.sort_unstable();
     let pictured = order.into_iter().map(|index| {
         let (failure, found) = &all[index];
-        Failure { picture: found.strip.as_deref().and_then(shrunk), ..failure.clone() }
+        Failure { picture: found.strip.as_deref().and_then(scaled_picture), ..failure.clone() }
     });
     pictured.collect()
 }
@@ -74,7 +74,7 @@ fn failure(group: &PolicyGroup, found: &FoundEpisode) -> Failure {
 }
 
 /// `None` where the file is no picture.
-fn shrunk(strip: &Path) -> Option<FailurePicture> {
+fn scaled_picture(strip: &Path) -> Option<FailurePicture> {
     let strip = image::open(strip).ok()?.into_rgb8();
     let [width, height] =
         [strip.width(), strip.height()].map(|px| (f64::from(px) * SCALE).round().max(1.0) as u32);

@@ -39,7 +39,7 @@ pub fn load(folders: &[PathBuf]) -> Result<LoadedEpisodes, LoadError> {
         let before = loaded.episodes.len() + loaded.skipped.len();
         let kept = folder.join(EPISODES);
         if kept.is_dir() {
-            load_kept(&kept, &mut loaded)?;
+            load_results(&kept, &mut loaded)?;
         } else {
             load_recordings(folder, &mut loaded)?;
         }
@@ -60,7 +60,7 @@ impl LoadedEpisodes {
 }
 
 /// Results of single episodes, each in a file.
-fn load_kept(folder: &Path, loaded: &mut LoadedEpisodes) -> Result<(), LoadError> {
+fn load_results(folder: &Path, loaded: &mut LoadedEpisodes) -> Result<(), LoadError> {
     for path in entries(folder)?.into_iter().filter(|path| path.extension().is_some_and(|e| e == "json")) {
         let read = std::fs::read(&path).map_err(|error| error.to_string());
         match read.and_then(|bytes| serde_json::from_slice(&bytes).map_err(|error| error.to_string())) {
@@ -90,7 +90,7 @@ fn recorded(path: &Path, policy: &str) -> Result<PlayedEpisode, String> {
     let calls = recording.tool_calls().map_err(|error| error.to_string())?;
     let result = recording.result.clone().ok_or_else(|| format!("{} was interrupted", path.display()))?;
     Ok(PlayedEpisode {
-        by: policy.into(),
+        policy: policy.into(),
         spec: recording.spec.clone(),
         locomotion: recording.locomotion.clone(),
         build: recording.build.clone(),

@@ -136,13 +136,13 @@ fn rules_of(played: &PlayedEpisode) -> Vec<String> {
     let spec = &played.spec;
     let short = played.build.chars().rev().take(6).collect::<Vec<_>>();
     vec![
-        played.by.full_name(),
+        played.policy.full_name(),
         spec.protocol.name().into(),
         played.locomotion.clone(),
         spec.robot.name(),
         format!("tells {}", spec.disclosure),
         format!("hints {}", spec.hints.name()),
-        settings_of(&played.by),
+        settings_of(&played.policy),
         format!("build ..{}", short.iter().rev().collect::<String>()),
     ]
 }

@@ -15,7 +15,7 @@ fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Played
     let times = (0..task.phases.len()).map(|index| (crate::Phase::number(index), reached(index)));
     let ended = if phases == task.phases.len() { EndReason::TaskComplete } else { EndReason::Finished };
     PlayedEpisode {
-        by: policy.into(),
+        policy: policy.into(),
         spec: EpisodeSpec::new(task, seed, Protocol::Benchmark),
         locomotion: "balance".into(),
         build: "0.1.0+test".into(),

@@ -71,7 +71,7 @@ fn an_openpi_policy_sees_feels_and_turns_wrists() {
     // Twenty looks, and a command for each.
     assert_eq!(played.result.tool_calls, 40);
     assert_eq!(
-        (&*played.by.name, played.by.extra_information.len()),
+        (&*played.policy.name, played.policy.extra_information.len()),
         (&*format!("openpi:{}", server.url()), 0)
     );
     let near = |joint: usize, robot: usize, target_rad: f32| {
@@ -149,8 +149,8 @@ fn one_policy_behind_act_may_direct_all_and_see_the_room() {
     let policy = RemotePolicy::new(PolicyProtocol::Act, vec![server.url()], central.clone());
     let evaluation = play(&plan(&policy, vec![1], true), folder.path());
     let played = &evaluation.episodes[0];
-    assert_eq!(played.by.extra_information, ["third_person"]);
-    assert_eq!(played.by.settings, Some(json!(central)));
+    assert_eq!(played.policy.extra_information, ["third_person"]);
+    assert_eq!(played.policy.settings, Some(json!(central)));
     let text = fs::read_to_string(folder.path().join("results.json")).expect("results");
     let results: serde_json::Value = serde_json::from_str(&text).expect("JSON");
     assert_eq!(results["extra_information"], json!(["third_person"]));

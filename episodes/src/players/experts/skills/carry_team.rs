@@ -7,7 +7,7 @@ use super::bar::{BarGrasp, move_together};
 use super::commander::{Commander, HandMove};
 use super::compliant::grasp_compliantly;
 use super::posture_path::{FREE, PathProgress, Posture, PosturePath, follow_while};
-use super::walk::{Tolerance, WalkGoal, come_near, upright};
+use super::walk::{Tolerance, WalkGoal, approach, upright};
 use crate::players::PlayerError;
 use crate::scoring::{Facts, Grip};
 
@@ -75,7 +75,7 @@ impl<'a> CarryTeam<'a> {
     /// Robots walk to where they stand beside the object as it is now.
     pub fn gather(&self, commander: &mut Commander) -> Result<(), PlayerError> {
         let walk_goals = self.walk_goals(commander)?;
-        come_near(commander, &walk_goals, NEAR)
+        approach(commander, &walk_goals, NEAR)
     }
 
     /// Where the robots have to walk to stand beside the object as it is now.

@@ -16,4 +16,4 @@ pub use compliant::{grasp_compliantly, let_go};
 pub use cylinder::{CylinderGrasp, closed_rad, pick_up_all};
 pub use parallel::{ParallelScript, in_parallel};
 pub use posture_path::{FREE, Posture, PosturePath, follow};
-pub use walk::{Tolerance, WalkGoal, come_near, place, upright, walk_to};
+pub use walk::{Tolerance, WalkGoal, approach, place, upright, walk_to};

@@ -56,17 +56,13 @@ pub fn steer(at: &Pose, to: &Pose, drift: TargetVelocity, pace_m_s: f32) -> Base
 }
 
 /// Brings robots near their places, hands kept as they are relative to the body, without waiting for them to come to rest.
-pub fn come_near(
-    commander: &mut Commander,
-    goals: &[WalkGoal],
-    within: Tolerance,
-) -> Result<(), PlayerError> {
+pub fn approach(commander: &mut Commander, goals: &[WalkGoal], within: Tolerance) -> Result<(), PlayerError> {
     let mut hands = Vec::with_capacity(goals.len());
     for goal in goals {
         hands.push(commander.facts()?.robots[goal.robot].wrist_in_pelvis);
     }
     let mut left_s = LONGEST_S;
-    while left_s > 0.0 && !are_there(commander, goals, within)? {
+    while left_s > 0.0 && !have_arrived(commander, goals, within)? {
         let facts = commander.facts()?;
         let walk = |goal: &WalkGoal| {
             steer(
@@ -90,7 +86,7 @@ pub fn walk_to(commander: &mut Commander, goals: &[WalkGoal]) -> Result<(), Play
     }
     let mut left_s = LONGEST_S;
     for _ in 0..TRIES {
-        while left_s > 0.0 && !are_there(commander, goals, CLOSE)? {
+        while left_s > 0.0 && !have_arrived(commander, goals, CLOSE)? {
             let facts = commander.facts()?;
             let walk = |goal: &WalkGoal| {
                 steer(
@@ -107,7 +103,7 @@ pub fn walk_to(commander: &mut Commander, goals: &[WalkGoal]) -> Result<(), Play
             commander.advance(WALK_STEPS, &moves(goals, &hands, |_| BaseVelocity::default()))?;
         }
         // Where a robot came by with a sway, it does not come to rest.
-        if are_there(commander, goals, AT_REST)? {
+        if have_arrived(commander, goals, AT_REST)? {
             break;
         }
     }
@@ -127,7 +123,11 @@ fn moves(
     goals.iter().zip(hands).map(part).collect()
 }
 
-fn are_there(commander: &mut Commander, goals: &[WalkGoal], within: Tolerance) -> Result<bool, PlayerError> {
+fn have_arrived(
+    commander: &mut Commander,
+    goals: &[WalkGoal],
+    within: Tolerance,
+) -> Result<bool, PlayerError> {
     let facts = commander.facts()?;
     let is_there = |goal: &WalkGoal| {
         let at = facts.robots[goal.robot].pelvis_in_world;
