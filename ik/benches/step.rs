@@ -1,6 +1,10 @@
 //! Time of one step and of one solution for two wrists and 17 joints on one thread.
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use std::{
+    hint::black_box,
+    time::{Duration, Instant},
+};
+
 use nalgebra::Vector3;
 use tandem_ik::{Configuration, DampingTask, FrameTask, Model, PostureTask, SolveOptions, Solver, Task};
 
@@ -22,44 +26,45 @@ fn tasks(model: &Model, start: &Configuration) -> Vec<Task> {
     tasks
 }
 
-fn step(criterion: &mut Criterion) {
+/// Runs `once` in batches for a second, and prints the time of one in the median batch.
+fn measure(name: &str, mut once: impl FnMut()) {
+    const BATCH: u32 = 20;
+    let mut batch_us = || {
+        let start = Instant::now();
+        (0..BATCH).for_each(|_| once());
+        start.elapsed().as_secs_f64() * 1e6 / f64::from(BATCH)
+    };
+    let start = Instant::now();
+    let mut times_us = Vec::new();
+    while start.elapsed() < Duration::from_secs(1) {
+        times_us.push(batch_us());
+    }
+    times_us.sort_by(f64::total_cmp);
+    println!("{name}: {:.1} us", times_us[times_us.len() / 2]);
+}
+
+fn main() {
     let model = common::g1();
     let start = common::ready(&model);
     let tasks = tasks(&model, &start);
-    let mut group = criterion.benchmark_group("two wrists, 17 joints");
     let mut configuration = start.clone();
     let mut solver = Solver::new(&model, 0.02);
-    group.bench_function("step", |bencher| {
-        bencher.iter(|| {
+    let mut step = |name: &str, solver: &mut Solver| {
+        measure(name, || {
             configuration.clone_from(&start);
-            solver.step(&mut configuration, &tasks, &[])
+            black_box(solver.step(&mut configuration, &tasks, &[]));
         });
-    });
+    };
+    step("step", &mut solver);
     solver.limits.velocity = vec![2.0; model.nv()];
-    group.bench_function("step at speed limits", |bencher| {
-        bencher.iter(|| {
-            configuration.clone_from(&start);
-            solver.step(&mut configuration, &tasks, &[])
-        });
-    });
+    step("step at speed limits", &mut solver);
     // Every pair within range: ten rows.
     let barrier = tandem_ik::SelfCollision { range_m: 2.0, ..common::self_collision(&model) };
     solver.self_collision = Some(barrier);
-    group.bench_function("step with ten capsule pairs", |bencher| {
-        bencher.iter(|| {
-            configuration.clone_from(&start);
-            solver.step(&mut configuration, &tasks, &[])
-        });
-    });
+    step("step with ten capsule pairs", &mut solver);
     let mut solver = Solver::new(&model, 0.02);
-    group.bench_function("solve", |bencher| {
-        bencher.iter(|| {
-            configuration.clone_from(&start);
-            solver.solve(&mut configuration, &tasks, &SolveOptions::default())
-        });
+    measure("solve", || {
+        configuration.clone_from(&start);
+        black_box(solver.solve(&mut configuration, &tasks, &SolveOptions::default()));
     });
-    group.finish();
 }
-
-criterion_group!(benches, step);
-criterion_main!(benches);

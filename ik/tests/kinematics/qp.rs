@@ -1,8 +1,5 @@
 //! The active set method against Clarabel, an interior point method, on random problems.
 
-use clarabel::algebra::CscMatrix;
-use clarabel::solver::SupportedConeT::{NonnegativeConeT, ZeroConeT};
-use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus};
 use tandem_ik::qp::{Constraint, Qp, QpFailure};
 
 /// Uniform in -1..1; splitmix64.
@@ -65,58 +62,24 @@ fn load(problem: &Problem) -> Qp {
     qp
 }
 
-/// Clarabel's form: A x + s = b with s in cones; equalities first.
-fn clarabel(problem: &Problem) -> Vec<f64> {
-    let n = problem.n;
-    let (mut a, mut b): (Vec<Vec<f64>>, Vec<f64>) = (Vec::new(), Vec::new());
-    for (row, bound, _) in problem.rows.iter().filter(|row| row.2) {
-        a.push(row.clone());
-        b.push(*bound);
-    }
-    let equalities = a.len();
-    for (row, bound, _) in problem.rows.iter().filter(|row| !row.2) {
-        a.push(row.iter().map(|a| -a).collect());
-        b.push(-bound);
-    }
-    for i in 0..n {
-        let unit = |value: f64| (0..n).map(|j| if j == i { value } else { 0.0 }).collect();
-        a.extend([unit(1.0), unit(-1.0)]);
-        b.extend([problem.upper[i], -problem.lower[i]]);
-    }
-    let hessian: Vec<Vec<f64>> = (0..n)
-        .map(|i| (0..n).map(|j| if j >= i { problem.hessian[i * n + j] } else { 0.0 }).collect())
-        .collect();
-    let cones = [ZeroConeT(equalities), NonnegativeConeT(a.len() - equalities)];
-    let settings = DefaultSettingsBuilder::default()
-        .verbose(false)
-        .tol_gap_abs(1e-13)
-        .tol_gap_rel(1e-13)
-        .tol_feas(1e-13)
-        .build()
-        .expect("valid settings");
-    let mut solver = DefaultSolver::new(
-        &CscMatrix::from(&hessian),
-        &problem.linear,
-        &CscMatrix::from(&a),
-        &b,
-        &cones,
-        settings,
-    )
-    .expect("consistent sizes");
-    solver.solve();
-    assert!(matches!(solver.solution.status, SolverStatus::Solved | SolverStatus::AlmostSolved));
-    solver.solution.x.clone()
+/// What `tests/peers/numerics/qp.py` has had Clarabel find, problem by problem.
+#[derive(serde::Deserialize)]
+struct Recorded {
+    solutions: Vec<Vec<f64>>,
 }
 
 #[test]
 fn solutions_are_clarabels() {
+    let recorded = include_str!("../data/clarabel.json");
+    let recorded: Recorded = serde_json::from_str(recorded).expect("solutions");
+    assert_eq!(recorded.solutions.len(), 1000);
     let mut active = 0;
-    for seed in 0..1000 {
-        let problem = random_problem(seed);
-        let mut qp = load(&problem);
+    for (seed, solution) in (0..).zip(&recorded.solutions) {
+        let mut qp = load(&random_problem(seed));
         qp.solve().unwrap_or_else(|failure| panic!("problem {seed}: {failure:?}"));
         active += qp.active().count();
-        for (ours, theirs) in qp.x.iter().zip(clarabel(&problem)) {
+        assert_eq!(qp.x.len(), solution.len());
+        for (ours, theirs) in qp.x.iter().zip(solution) {
             assert!((ours - theirs).abs() < 1e-8, "problem {seed}: {ours} against {theirs}");
         }
     }
