@@ -4,7 +4,7 @@ use include_dir::{Dir, include_dir};
 
 use crate::SimError;
 
-static ASSETS: Dir = include_dir!("$CARGO_MANIFEST_DIR/assets");
+static ASSETS: Dir = include_dir!("$TANDEM_SIM_ASSETS");
 
 /// The robot used unless another file is given.
 pub const DEFAULT_ROBOT: &str = "g1_dex3";

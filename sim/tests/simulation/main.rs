@@ -1,8 +1,6 @@
 //! Worlds from outside: physics, walking and pictures.
 
 mod allocation;
-#[cfg(feature = "gpu")]
-mod gpu;
 mod locomotion;
 mod odometry;
 mod peer_scenes;

@@ -7,6 +7,8 @@ mod proof;
 mod scene;
 mod shader;
 mod targets;
+#[cfg(test)]
+mod tests;
 
 use std::sync::{Arc, OnceLock};
 

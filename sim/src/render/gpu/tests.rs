@@ -3,8 +3,8 @@
 
 use std::f32::consts::PI;
 
-use tandem_sim::render::{Camera, Cameras, Frame, Renderer, RendererKind, Scenery, cpu};
-use tandem_sim::{ObjectPlacement, Pose, RobotPlacement, Step, Vector, World, WorldSpec};
+use crate::render::{Camera, Cameras, Frame, Renderer, RendererKind, Scenery, cpu};
+use crate::{ObjectPlacement, Pose, RobotPlacement, Step, Vector, World, WorldSpec};
 
 const LEAST_PSNR_DB: f64 = 40.0;
 const DEPTH_TOLERANCE_M: f32 = 1e-4;
