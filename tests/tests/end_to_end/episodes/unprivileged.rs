@@ -46,6 +46,6 @@ fn the_bottle_is_lifted_by_what_the_tools_say() {
             last = tool("move_wrists", json!({ "steps": 50, "robots": [hand] }));
         }
     }
-    assert_eq!(last["phases"][0]["name"], "grasp_and_lift", "{last}");
+    assert_eq!(last["phases"][0]["id"], "grasp_and_lift", "{last}");
     assert!(last["robots"][0]["right"]["position_error_m"].as_f64().is_some_and(|m| m < 0.01), "{last}");
 }
