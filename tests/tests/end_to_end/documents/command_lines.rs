@@ -20,6 +20,14 @@ const VARIABLES: [(&str, &str); 6] = [
     ("$PWD", "."),
 ];
 
+/// What the command line says to a command that leaves out something, or asks for help.
+const UNFINISHED: [ErrorKind; 4] = [
+    ErrorKind::DisplayHelp,
+    ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand,
+    ErrorKind::MissingRequiredArgument,
+    ErrorKind::MissingSubcommand,
+];
+
 /// Checks every command of a script.
 pub fn check(script: &str) -> Result<(), String> {
     let script = VARIABLES.iter().fold(script.to_owned(), |text, (name, value)| text.replace(name, value));
@@ -48,11 +56,7 @@ pub fn check_mention(text: &str) -> Result<(), String> {
         | ["cargo", "run", "--release", "--"]
         | ["cargo", "+nightly", ..] => Ok(()),
         ["tandem", args @ ..] => match Cli::try_parse_from([&["tandem"], args].concat()) {
-            Err(error)
-                if [ErrorKind::MissingRequiredArgument, ErrorKind::DisplayHelp].contains(&error.kind()) =>
-            {
-                Ok(())
-            }
+            Err(error) if UNFINISHED.contains(&error.kind()) => Ok(()),
             _ if args.is_empty() => Ok(()),
             parsed => parsed.map(drop).map_err(|error| error.to_string()),
         },
