@@ -21,5 +21,5 @@ pub enum ReplayError {
     #[error(transparent)]
     Episode(#[from] EpisodeError),
     #[error("call {number} of the recording is no tool call of this build: {source}")]
-    Call { number: usize, source: EpisodeError },
+    Call { number: usize, source: Box<EpisodeError> },
 }

@@ -63,7 +63,7 @@ pub fn verify(recording: &Recording) -> Result<Verification, ReplayError> {
         if difference.is_some() {
             break;
         }
-        let again = |source| ReplayError::Call { number: index + 1, source };
+        let again = |error: EpisodeError| ReplayError::Call { number: index + 1, source: error.into() };
         let parsed = Called::parse(&call.tool, call.arguments.clone()).map_err(again)?;
         // A call that was refused is refused again, and what it says is not compared.
         let _ = replay.call(&parsed, call.thought);

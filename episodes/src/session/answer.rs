@@ -14,7 +14,7 @@ use crate::recording::CallOutcome;
 
 /// What a call is answered with; views are not encoded yet.
 pub enum Answer {
-    Reply(ToolReply),
+    Reply(Box<ToolReply>),
     Observation(TeamObservation),
 }
 
@@ -26,9 +26,15 @@ impl Answer {
             Called::Together(_) => Formats::default(),
         };
         match self {
-            Answer::Reply(reply) => Ok(reply),
+            Answer::Reply(reply) => Ok(*reply),
             Answer::Observation(seen) => Ok(ToolReply::Look(LookReply::Observe(seen.reply(&formats)?))),
         }
+    }
+}
+
+impl From<ToolReply> for Answer {
+    fn from(reply: ToolReply) -> Answer {
+        Answer::Reply(Box::new(reply))
     }
 }
 
@@ -60,10 +66,10 @@ impl Session {
                 let command = Command::read(act, &self.rules, &self.motions)?;
                 self.act(&command)
             }
-            ToolCall::Manage(manage) => Ok(Answer::Reply(ToolReply::Manage(self.manage(manage)))),
+            ToolCall::Manage(manage) => Ok(ToolReply::Manage(self.manage(manage)).into()),
             ToolCall::Talk(TalkCall::Say(_)) => {
                 self.expect_underway()?;
-                Ok(Answer::Reply(ToolReply::Talk(TalkReply::Say(self.status()))))
+                Ok(ToolReply::Talk(TalkReply::Say(self.status())).into())
             }
         }
     }
@@ -99,7 +105,7 @@ impl Session {
                 LookReply::CheckReach(check_reach(args, &self.motions[robot]))
             }
         };
-        Ok(Answer::Reply(ToolReply::Look(reply)))
+        Ok(ToolReply::Look(reply).into())
     }
 
     /// What the robots that are looked through see and sense now.
@@ -152,7 +158,7 @@ impl Session {
                 report(clamped, &began[order.robot], sensed, &self.motions[order.robot])
             })
             .collect();
-        Ok(Answer::Reply(ToolReply::Act(CommandReply {
+        Ok(ToolReply::Act(CommandReply {
             executed_steps,
             stop_reason,
             time_s: self.present.time_s,
@@ -160,7 +166,8 @@ impl Session {
             fallen: self.fallen(),
             phases: self.phases(),
             budget: self.budget(),
-        })))
+        })
+        .into())
     }
 
     /// Why a command that has been executed stopped; what ends the episode ends it here.

@@ -88,7 +88,9 @@ impl Session {
         let underway = self.arrived();
         let mut answer = self.answer(called);
         self.came_out(underway, operator, called, CallOutcome::of(&answer));
-        if let Ok(Answer::Reply(ToolReply::Manage(ManageReply::Finish(reply)))) = &mut answer {
+        if let Ok(Answer::Reply(reply)) = &mut answer
+            && let ToolReply::Manage(ManageReply::Finish(reply)) = &mut **reply
+        {
             // Closing the files may have failed, which the reply has to say.
             *reply = self.result().told(self.spec().disclosure);
         }
