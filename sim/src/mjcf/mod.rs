@@ -1,5 +1,5 @@
-//! The one reader of MJCF, for robots, scenes and objects: the text with all that it includes ([`source`]), every element
-//! and attribute accepted or refused by one table ([`check`], [`support`]), parsed by `mjcf-rs`, and then as we use it:
+//! The one reader of MJCF, for robots, scenes and objects: the text with all that it includes (`source`), every element
+//! and attribute accepted or refused by one table (`check`, `support`), parsed by `mjcf-rs`, and then as we use it:
 //! bodies in trees, shapes, joints with their actuators, equalities, keys, and what that parser leaves out.
 
 mod bodies;

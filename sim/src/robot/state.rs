@@ -36,7 +36,7 @@ pub struct RobotSensed {
 }
 
 /// Where a robot takes itself to be, for what steers its hands and its base. No reply shows it: it is the simulator's own state
-/// as long as [`estimate::from_truth`] is where it comes from.
+/// as long as `estimate::from_truth` is where it comes from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotEstimate {
     pub world_from_pelvis: Pose,
