@@ -121,3 +121,36 @@ fn a_place_where_nothing_stands_is_refused() {
     check("scene.xml", island, r#"pos="-1 1.37 0""#, &["bottle does not stay", "something to stand on"]);
     check("scene.xml", r#"pos="0 0 -0.05""#, r#"pos="0 0 -0.5""#, &["robot A does not stay"]);
 }
+
+#[test]
+fn what_is_not_read_is_refused_where_it_stands() {
+    let mug = r#"<body name="kitchen_mug_2" "#;
+    let before_mug = |element: &str| format!("{element}{mug}");
+    check("scene.xml", mug, &before_mug("<flexcomp name=\"cloth\"/>"), &["scene.xml:", "flexcomp `cloth`"]);
+    check(
+        "scene.xml",
+        mug,
+        &before_mug("<body><plugin plugin=\"mujoco.pid\"/></body>"),
+        &["<plugin> is not read"],
+    );
+    let carcass = r#"<inertial pos="0 0 0.4" mass="30""#;
+    let negative = &["scene.xml:", "body `kitchen_cupboard_1_carcass`", "mass=\"-30\""];
+    check("scene.xml", carcass, &carcass.replace("30", "-30"), negative);
+    check(
+        "handover.xml",
+        "</worldbody>",
+        "<site name=\"task\"/></worldbody>",
+        &["handover.xml:", "site `task`"],
+    );
+    check("handover.xml", "0.7071068 0 0 0.7071068", "0 0 0 0", &["handover.xml:", "quat=\"0 0 0 0\""]);
+}
+
+#[test]
+fn what_is_approximated_in_a_scene_is_named() {
+    let (_, approximations) =
+        SceneFile::with_approximations(&Path::new(KITCHEN).join("handover.xml")).unwrap();
+    let text = approximations.join("\n");
+    for attribute in ["balanceinertia", "boundmass", "boundinertia"] {
+        assert!(text.contains(&format!("has {attribute}: masses and inertias stay")), "{text}");
+    }
+}

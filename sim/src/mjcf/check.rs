@@ -8,7 +8,7 @@ use super::source::{self, MjcfText};
 use super::support::{self, Element, Support, Takes, value};
 use crate::SimError;
 
-/// Elements inside one another, at most: whoever reads MJCF recurses. MuJoCo's own reader stops at 500.
+/// Elements inside one another, at most: the parser recurses.
 const MOST_NESTED: usize = 200;
 /// Ways to say a rotation; an element has one at most.
 const ROTATIONS: [&str; 6] = ["quat", "axisangle", "euler", "xyaxes", "zaxis", "fullinertia"];
@@ -50,6 +50,7 @@ pub(super) fn check(source: &MjcfText) -> Result<Checked, SimError> {
         check.collect_class(&default, None)?;
     }
     check.check_shared_defaults(&root)?;
+    check_angles(source, &root)?;
     if let Some(mujoco) = support::element("", "mujoco") {
         check.attributes(&root, mujoco, None)?;
     }
@@ -72,6 +73,17 @@ fn check_depth(source: &MjcfText, xml: &roxmltree::Document) -> Result<(), SimEr
         }
     }
     Ok(())
+}
+
+/// Angles in a class are read with the settings that stand before it; in MuJoCo all settings come first.
+fn check_angles(source: &MjcfText, root: &Node) -> Result<(), SimError> {
+    let has_angles = |node: Node| node.has_attribute("euler") || node.has_attribute("axisangle");
+    let mut sections =
+        root.children().skip_while(|one| !one.descendants().any(has_angles) || !is_default(one));
+    match sections.find(|one| one.has_tag_name("compiler")) {
+        Some(compiler) => Err(source.refuse(&compiler, "a <default> before it has angles; put it first")),
+        None => Ok(()),
+    }
 }
 
 /// What a default class states of its own.

@@ -315,6 +315,8 @@ fn classes_are_not_mixed_with_what_elements_state_in_part() {
         let error = with(defaults, "");
         assert!(error.contains(expected), "{error}");
     }
+    let late = r#"<default><geom euler="0 0 1"/></default><compiler angle="degree"/>"#;
+    assert!(refusal(late).contains("a <default> before it has angles; put it first"));
     let body = r#"<worldbody><body><joint name="h"/><geom size="1"/></body></worldbody>"#;
     let position = r#"<actuator><position joint="h"/></actuator>"#;
     let error = refusal(&format!("<default><motor ctrlrange=\"-1 1\"/></default>{body}{position}"));

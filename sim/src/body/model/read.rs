@@ -191,3 +191,45 @@ fn hand(links: &[LinkModel], side: Side, wrist: usize) -> HandLinks {
     }
     hand
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assets;
+
+    /// Why the embedded robot is refused once `from` in its file has become `to`.
+    #[track_caller]
+    fn refusal(from: &str, to: &str) -> String {
+        let text = assets::robot(assets::DEFAULT_ROBOT).expect("embedded");
+        assert!(text.contains(from), "{from}");
+        let other = text.replacen(from, to, 1);
+        RobotModel::parse("robot.xml", &other).err().map_or(String::new(), |error| error.to_string())
+    }
+
+    #[test]
+    fn what_a_robot_cannot_have_is_refused() {
+        let knee = r#"<joint name="left_knee_joint" "#;
+        let actuator = r#"joint="left_knee_joint" "#;
+        let end = "</mujoco>";
+        for (from, to, expected) in [
+            (knee, r#"<joint name="left_knee_joint" damping="1" "#, "has a spring or a damper"),
+            (knee, r#"<joint name="left_knee_joint" pos="0 0 1" "#, "turns beside its body's origin"),
+            (knee, r#"<joint name="left_knee_joint" limited="false" "#, "needs a range"),
+            (knee, r#"<joint name="left_knee_joint" type="slide" "#, "is no hinge"),
+            (actuator, r#"joint="left_knee_joint" ctrlrange="-1 1" "#, "leave out the actuator's ctrlrange"),
+            (actuator, r#"joint="left_knee_joint" forcelimited="false" "#, "needs a forcerange"),
+            (r#"forcerange="-"#, r#"forcerange="-1"#, "is stronger one way"),
+            (end, "<worldbody><geom size=\"1\"/></worldbody></mujoco>", "none in the worldbody"),
+            (end, "<worldbody><body><geom size=\"1\"/></body></worldbody></mujoco>", "all others on it"),
+            (end, "<equality><weld body1=\"pelvis\"/></equality></mujoco>", "a robot has no equalities"),
+            (
+                end,
+                "<contact><exclude body1=\"pelvis\" body2=\"hip\"/></contact></mujoco>",
+                "exclude of `hip`",
+            ),
+        ] {
+            let error = refusal(from, to);
+            assert!(error.contains(expected) && error.starts_with("`robot.xml"), "{to}: {error}");
+        }
+    }
+}

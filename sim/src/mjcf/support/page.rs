@@ -21,6 +21,7 @@ Whatever is not in the table is refused too: a misspelt attribute, or one that a
 
 * numbers that are not finite, too many or too few; masses below 0; quaternions of 0; two rotations on one element;
 * a name that two elements of a kind have, and a class, material or texture that is not in the file;
+* a `<compiler>` after a `<default>` that states angles, which it would change in MuJoCo;
 * ranges whose smaller number comes second, `limited=\"true\"` without a range, and a range with neither `limited` nor
   `autolimits`;
 * joints that move nothing that has mass, two joints on one body, and shapes with an extent of 0;
@@ -39,8 +40,9 @@ fn page() -> String {
     page += "| element | attributes | | |\n|---|---|---|---|\n";
     for element in all() {
         page += &element_row(element);
-        for attribute in element.attributes.iter().copied().flatten() {
-            page += &attribute_row(attribute);
+        let attributes: Vec<&Attribute> = element.attributes.iter().copied().flatten().collect();
+        for alike in attributes.chunk_by(|one, next| happens(one) == happens(next)) {
+            page += &attribute_row(alike);
         }
     }
     page
@@ -62,8 +64,14 @@ fn element_row(element: &Element) -> String {
     )
 }
 
-fn attribute_row(attribute: &Attribute) -> String {
-    let names: Vec<String> = attribute.names.iter().map(|name| format!("`{name}`")).collect();
+fn attribute_row(alike: &[&Attribute]) -> String {
+    let names: Vec<String> = alike.iter().flat_map(|one| one.names).map(|name| format!("`{name}`")).collect();
+    let (support, note) = happens(alike[0]);
+    format!("| | {} | {support} | {} |\n", names.join(", "), escaped(note))
+}
+
+/// What becomes of an attribute, and why.
+fn happens(attribute: &Attribute) -> (String, &'static str) {
     let support = match attribute.takes {
         Takes::Only(values) => {
             let values: Vec<String> = values.iter().map(|value| format!("`{value}`")).collect();
@@ -71,7 +79,7 @@ fn attribute_row(attribute: &Attribute) -> String {
         }
         _ => word(attribute.support).to_string(),
     };
-    format!("| | {} | {support} | {} |\n", names.join(", "), escaped(attribute.note))
+    (support, attribute.note)
 }
 
 fn word(support: Support) -> &'static str {

@@ -41,7 +41,7 @@ pub(super) const ELEMENTS: &[Element] = &[
         "default",
         &["mujoco", "default"],
         &[&[mapped(&["class"], Takes::Text)]],
-        "classes inherit as in MuJoCo; numbers that a class states are not replaced in part, and a pose only as a whole",
+        "classes inherit as in MuJoCo; but an element states all numbers of a size, a friction or a pose, or none",
     ),
     element(Support::Mapped, "asset", &["mujoco"], &[], ""),
     named(
@@ -78,7 +78,13 @@ pub(super) const ELEMENTS: &[Element] = &[
     element(Support::Refused, "deformable", &["mujoco"], &[], "nothing bends or stretches here"),
     element(Support::Refused, "tendon", &["mujoco", "default"], &[], "couple joints with an equality"),
     element(Support::Mapped, "equality", &["mujoco"], &[], "they are hard; a robot's file has none"),
-    element(Support::Mapped, "equality", &["default"], &[&[mapped(&["active"], BOOLEAN), SOFTNESS]], ""),
+    element(
+        Support::Mapped,
+        "equality",
+        &["default"],
+        &[&[refused(&["active"], "state it on each"), SOFTNESS]],
+        "",
+    ),
     named(Support::Mapped, "connect", &["equality"], "equality", &[EQUALITY, CONNECT], ""),
     named(Support::Mapped, "weld", &["equality"], "equality", &[EQUALITY, WELD], ""),
     named(Support::Mapped, "joint", &["equality"], "equality", &[EQUALITY, COUPLING], ""),
