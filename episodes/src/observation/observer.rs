@@ -1,5 +1,6 @@
 //! Looks at the world of an episode: draws what its cameras see, and measures depth at pixels.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use tandem_sim::render::{Camera, Cameras, Frame, Renderer, RendererKind, Scenery};
@@ -37,24 +38,31 @@ impl Observer {
         self.renderer.name()
     }
 
+    /// What cameras see after `step`, in their order.
+    pub fn render_all(&mut self, step: &Step, cameras: &[Camera]) -> Vec<Frame> {
+        self.renderer.render_all(step, cameras)
+    }
+
     /// What any camera sees after `step`.
     pub fn render(&mut self, step: &Step, camera: &Camera) -> Frame {
         self.renderer.render(step, camera)
     }
 
-    /// What robot number `robot` sees after `step`; drawn the first time only.
-    pub fn view(&mut self, step: &Arc<Step>, robot: usize) -> Arc<RobotView> {
-        let mut drawn = match self.drawn.take() {
+    /// What the robots numbered `robots` see after `step`; each view is drawn the first time only, and those to draw side by side.
+    pub fn views(&mut self, step: &Arc<Step>, robots: &[usize]) -> Vec<Arc<RobotView>> {
+        let DrawnStep { views, .. } = match &mut self.drawn {
             Some(drawn) if Arc::ptr_eq(&drawn.step, step) => drawn,
-            _ => DrawnStep { step: step.clone(), views: vec![None; step.robots.len()] },
+            drawn => drawn.insert(DrawnStep { step: step.clone(), views: vec![None; step.robots.len()] }),
         };
-        let view = drawn.views[robot].get_or_insert_with(|| {
-            let camera = self.cameras.egocentric(step, robot);
-            Arc::new(RobotView::new(camera.intrinsics(), self.renderer.render(step, &camera)))
-        });
-        let view = view.clone();
-        self.drawn = Some(drawn);
-        view
+        let missing: BTreeSet<usize> =
+            robots.iter().copied().filter(|robot| views[*robot].is_none()).collect();
+        let cameras: Vec<Camera> =
+            missing.iter().map(|robot| self.cameras.egocentric(step, *robot)).collect();
+        let frames = self.renderer.render_all(step, &cameras);
+        for ((robot, camera), frame) in missing.into_iter().zip(&cameras).zip(frames) {
+            views[robot] = Some(Arc::new(RobotView::new(camera.intrinsics(), frame)));
+        }
+        robots.iter().filter_map(|robot| views[*robot].clone()).collect()
     }
 
     /// What the robots numbered `robots` see and sense after `step`; `sheets` describe all robots.
@@ -65,8 +73,8 @@ impl Observer {
         sheets: &[&RobotSheet],
         detail: Detail,
     ) -> TeamObservation {
-        let mut observe = |robot: usize| {
-            let view = self.view(step, robot);
+        let views = self.views(step, robots);
+        let observe = |(&robot, view): (&usize, Arc<RobotView>)| {
             let own = Proprioception::of(step, robot);
             RobotObservation {
                 state: robot_state(&own, sheets[robot], detail),
@@ -74,7 +82,7 @@ impl Observer {
                 view,
             }
         };
-        TeamObservation { time_s: step.time_s, robots: robots.iter().map(|robot| observe(*robot)).collect() }
+        TeamObservation { time_s: step.time_s, robots: robots.iter().zip(views).map(observe).collect() }
     }
 
     /// The reply to `query_depth` for robot number `robot`, called `name`.
@@ -90,7 +98,7 @@ impl Observer {
         if let Some([u, v]) = pixels.iter().copied().find(|pixel| outside(*pixel)) {
             return Err(EpisodeError::PixelOutside { u, v, width, height });
         }
-        let view = self.view(step, robot);
+        let view = self.views(step, &[robot]).swap_remove(0);
         let pelvis_from_camera = step.robots[robot].sensed.pelvis_from_camera;
         let points = pixels.iter().map(|&pixel| {
             let [u, v] = pixel;

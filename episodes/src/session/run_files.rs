@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use tandem_sim::render::Camera;
 use tandem_sim::{CONTROL_HZ, Step};
 use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
 
@@ -172,14 +171,15 @@ pub(super) fn moment<'a>(
     names: impl Iterator<Item = &'a str>,
     observer: &mut Observer,
 ) -> KeyMoment {
-    let mut cameras = vec![("the room".into(), observer.cameras.third_person())];
+    let (mut labels, mut cameras) = (vec!["the room".into()], vec![observer.cameras.third_person()]);
     for (robot, name) in names.enumerate() {
-        cameras.push((format!("what {name} sees"), observer.cameras.egocentric(step, robot)));
+        labels.push(format!("what {name} sees"));
+        cameras.push(observer.cameras.egocentric(step, robot));
     }
-    let view = |(label, camera): (String, Camera)| {
-        let camera = Camera { width: CELL_WIDTH as u32, height: CELL_HEIGHT as u32, ..camera };
-        LabelledFrame { label, frame: observer.render(step, &camera) }
-    };
-    let views = cameras.into_iter().map(view).collect();
+    for camera in &mut cameras {
+        (camera.width, camera.height) = (CELL_WIDTH as u32, CELL_HEIGHT as u32);
+    }
+    let frames = observer.render_all(step, &cameras).into_iter();
+    let views = labels.into_iter().zip(frames).map(|(label, frame)| LabelledFrame { label, frame }).collect();
     KeyMoment { caption: [caption.into(), format!("{:.1} s", step.time_s)], views }
 }

@@ -16,6 +16,8 @@ pub use scene::mesh::{TriangleMesh, Vertex};
 pub use scene::{Carrier, Part, PlacedScenery, Scenery, robot_rgba};
 pub use shading::pattern::Pattern;
 
+use std::slice;
+
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
@@ -26,8 +28,13 @@ pub trait Renderer: Send {
     /// What it is, and on what device.
     fn name(&self) -> &str;
 
+    /// What each of `cameras` sees after `step`, in their order. They may be drawn side by side.
+    fn render_all(&mut self, step: &Step, cameras: &[Camera]) -> Vec<Frame>;
+
     /// What `camera` sees after `step`.
-    fn render(&mut self, step: &Step, camera: &Camera) -> Frame;
+    fn render(&mut self, step: &Step, camera: &Camera) -> Frame {
+        self.render_all(step, slice::from_ref(camera)).swap_remove(0)
+    }
 }
 
 /// A rendered picture, row by row from the top left.
@@ -43,7 +50,7 @@ pub struct Frame {
     pub ids: Vec<u32>,
 }
 
-/// The embedded renderer; it draws on the calling thread.
+/// The embedded renderer; it draws on the calling thread, and on one more for each further picture of a state.
 pub fn cpu(scenery: Scenery) -> Box<dyn Renderer> {
     Box::new(cpu::CpuRenderer::new(scenery))
 }

@@ -329,6 +329,19 @@ fn the_same_step_gives_the_same_bits() {
 }
 
 #[test]
+fn pictures_of_a_state_are_drawn_side_by_side() {
+    let above = overhead(1.0);
+    let cameras =
+        [above, Camera { width: 64, ..overhead(0.5) }, look_at(Vector::new(0.8, -1.2, 1.0), Vector::ZERO)];
+    let (scenery, step) = (floor_and(TriangleMesh::capsule(0.1, 0.2)), step(&[at(0.0, 0.0, 0.3)]));
+    let alone: Vec<_> = cameras.iter().map(|camera| cpu(scenery.clone()).render(&step, camera)).collect();
+    let mut renderer = cpu(scenery);
+    assert_eq!(renderer.render_all(&step, &cameras), alone);
+    assert_eq!(renderer.render_all(&step, &[]), []);
+    assert_eq!(renderer.render(&step, &cameras[1]), alone[1]);
+}
+
+#[test]
 fn meshes_have_the_volume_of_their_shapes_and_normals_that_point_out() {
     // A circle of twelve sides has 4.5 % less area, and a half circle of six turned around its axis 6.7 % less volume.
     let (round, ball) = (0.046, 0.11);

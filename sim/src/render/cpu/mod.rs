@@ -7,6 +7,9 @@ mod shadow;
 mod target;
 mod view;
 
+use std::panic::resume_unwind;
+use std::thread;
+
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::Step;
@@ -18,16 +21,30 @@ use shadow::ShadowMap;
 use target::RenderTarget;
 use view::{Row, SrgbTable, View};
 
-/// Renders on the calling thread. It keeps its buffers, and the shadows of the last state.
+/// Renders on the calling thread, and several pictures of a state side by side. It keeps its buffers, and the shadows of the last
+/// state.
 pub(super) struct CpuRenderer {
     prepared: Prepared,
     srgb: SrgbTable,
+    state: LitState,
+    /// One for each picture that is drawn at the same time.
+    canvases: Vec<Canvas>,
+}
+
+/// A state of the scenery with its light: what pictures from all cameras have in common.
+#[derive(Default)]
+struct LitState {
     /// What shadow, contacts and facets are of.
     placed: PlacedScenery,
     shadow: ShadowMap,
     contact: ContactMap,
-    row: Row,
     facets: Vec<Facet>,
+}
+
+/// The buffers of one picture.
+#[derive(Default)]
+struct Canvas {
+    row: Row,
     samples: RenderTarget,
     /// One sample a pixel, at its centre: what depth and ids are read from.
     centres: RenderTarget,
@@ -38,14 +55,30 @@ impl CpuRenderer {
         CpuRenderer {
             prepared: Prepared::new(scenery),
             srgb: SrgbTable::default(),
-            placed: PlacedScenery::default(),
-            shadow: ShadowMap::default(),
-            contact: ContactMap::default(),
-            row: Row::default(),
-            facets: Vec::new(),
-            samples: RenderTarget::default(),
-            centres: RenderTarget::default(),
+            state: LitState::default(),
+            canvases: Vec::new(),
         }
+    }
+
+    /// What each of `cameras` sees, the first drawn on this thread and the others beside it. A picture is the same bit for bit,
+    /// whatever is drawn beside it.
+    pub(super) fn draw_placed(&mut self, placed: PlacedScenery, cameras: &[Camera]) -> Vec<Frame> {
+        let CpuRenderer { prepared, srgb, state, canvases } = self;
+        let arch = Arch::new();
+        if state.placed != placed {
+            arch.dispatch(StateDrawing { state, prepared, placed });
+        }
+        canvases.resize_with(canvases.len().max(cameras.len()), Canvas::default);
+        let (prepared, srgb, state) = (&*prepared, &*srgb, &*state);
+        let draw = |(canvas, camera)| arch.dispatch(PictureDrawing { state, prepared, srgb, canvas, camera });
+        let mut pictures = canvases.iter_mut().zip(cameras);
+        let first = pictures.next();
+        thread::scope(|scope| {
+            let others: Vec<_> = pictures.map(|picture| scope.spawn(move || draw(picture))).collect();
+            let others =
+                others.into_iter().map(|other| other.join().unwrap_or_else(|panic| resume_unwind(panic)));
+            first.map(draw).into_iter().chain(others).collect()
+        })
     }
 }
 
@@ -54,17 +87,39 @@ impl Renderer for CpuRenderer {
         "cpu"
     }
 
-    fn render(&mut self, step: &Step, camera: &Camera) -> Frame {
+    fn render_all(&mut self, step: &Step, cameras: &[Camera]) -> Vec<Frame> {
         let placed = self.prepared.scenery.place(step);
-        self.draw_placed(placed, camera)
+        self.draw_placed(placed, cameras)
     }
 }
 
-/// A picture to draw. It is compiled once more for processors with wide registers, with everything that is inlined into it;
-/// its bits are the same.
-struct PictureDrawing<'a> {
-    renderer: &'a mut CpuRenderer,
+/// The light of a state to draw. This and [`PictureDrawing`] are compiled once more for processors with wide registers, with
+/// everything that is inlined into them; their bits are the same.
+struct StateDrawing<'a> {
+    state: &'a mut LitState,
+    prepared: &'a Prepared,
     placed: PlacedScenery,
+}
+
+impl WithSimd for StateDrawing<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let StateDrawing { state, prepared, placed } = self;
+        state.shadow.draw(simd, prepared, &placed);
+        state.contact.draw(prepared, &placed);
+        shade::place(&mut state.facets, prepared, &placed);
+        state.placed = placed;
+    }
+}
+
+/// A picture to draw.
+struct PictureDrawing<'a> {
+    state: &'a LitState,
+    prepared: &'a Prepared,
+    srgb: &'a SrgbTable,
+    canvas: &'a mut Canvas,
     camera: &'a Camera,
 }
 
@@ -73,42 +128,27 @@ impl WithSimd for PictureDrawing<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Frame {
-        self.renderer.draw(simd, self.placed, self.camera)
-    }
-}
-
-impl CpuRenderer {
-    pub(super) fn draw_placed(&mut self, placed: PlacedScenery, camera: &Camera) -> Frame {
-        Arch::new().dispatch(PictureDrawing { renderer: self, placed, camera })
-    }
-
-    #[inline(always)]
-    fn draw<S: Simd>(&mut self, simd: S, placed: PlacedScenery, camera: &Camera) -> Frame {
-        if self.placed != placed {
-            self.shadow.draw(simd, &self.prepared, &placed);
-            self.contact.draw(&self.prepared, &placed);
-            shade::place(&mut self.facets, &self.prepared, &placed);
-            self.placed = placed;
-        }
-        target::draw(simd, &mut self.samples, &mut self.centres, &self.prepared, &self.placed, camera);
+        let PictureDrawing { state, prepared, srgb, canvas, camera } = self;
+        let Canvas { row, samples, centres } = canvas;
+        target::draw(simd, samples, centres, prepared, &state.placed, camera);
         let view = View {
-            prepared: &self.prepared,
-            facets: &self.facets,
-            target: &self.samples,
-            shadow: &self.shadow,
-            contact: &self.contact,
+            prepared,
+            facets: &state.facets,
+            target: samples,
+            shadow: &state.shadow,
+            contact: &state.contact,
             rays: Rays::new(camera),
         };
         let mut frame = Frame {
             width: camera.width,
             height: camera.height,
-            rgb: view.rgb(&mut self.row, &self.srgb),
+            rgb: view.rgb(row, srgb),
             depth_m: Vec::with_capacity((camera.width * camera.height) as usize),
             ids: Vec::with_capacity((camera.width * camera.height) as usize),
         };
         for row in 0..camera.height as usize {
-            frame.depth_m.extend(self.centres.nearness_1_m(row).iter().map(|nearness| 1.0 / nearness));
-            frame.ids.extend(self.centres.sheets(row).iter().map(|sheet| self.prepared.id(*sheet)));
+            frame.depth_m.extend(centres.nearness_1_m(row).iter().map(|nearness| 1.0 / nearness));
+            frame.ids.extend(centres.sheets(row).iter().map(|sheet| prepared.id(*sheet)));
         }
         frame
     }

@@ -189,14 +189,15 @@ impl Renderer for GpuRenderer {
         self.embedded.as_ref().map_or(&self.gpu.name, |embedded| embedded.name())
     }
 
-    fn render(&mut self, step: &Step, camera: &Camera) -> Frame {
+    fn render_all(&mut self, step: &Step, cameras: &[Camera]) -> Vec<Frame> {
         if let Some(embedded) = &mut self.embedded {
-            return embedded.render(step, camera);
+            return embedded.render_all(step, cameras);
         }
         let placed = self.prepared.scenery.place(step);
-        self.draw(&placed, camera).unwrap_or_else(|error| {
+        let drawn: Result<_, _> = cameras.iter().map(|camera| self.draw(&placed, camera)).collect();
+        drawn.unwrap_or_else(|error| {
             tracing::warn!("pictures are drawn by the embedded renderer from now on: {error}");
-            self.embedded.insert(cpu(self.prepared.scenery.clone())).render(step, camera)
+            self.embedded.insert(cpu(self.prepared.scenery.clone())).render_all(step, cameras)
         })
     }
 }

@@ -44,7 +44,7 @@ pub fn camera() -> Camera {
 
 /// Whether another renderer's picture of it is right.
 pub fn accepts(drawn: &Frame) -> bool {
-    let expected = CpuRenderer::new(scenery()).draw_placed(placed(), &camera());
+    let expected = CpuRenderer::new(scenery()).draw_placed(placed(), &[camera()]).swap_remove(0);
     let count = expected.ids.len() as f32;
     let stray = drawn.ids.iter().zip(&expected.ids).filter(|(drawn, expected)| drawn != expected).count();
     let differences = drawn.rgb.iter().zip(&expected.rgb).map(|(a, b)| f32::from(a.abs_diff(*b)));
