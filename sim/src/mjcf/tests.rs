@@ -263,8 +263,8 @@ fn bodies_nested_too_deep_are_refused() {
 /// Every file of ours is read, and means here what it means in MuJoCo.
 #[test]
 fn our_own_files_have_nothing_that_is_approximated() {
-    let folder = |path: &str| std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
-    let folders = ["assets/objects", "assets/scenes", "assets/robots/g1_dex3", "../tests/peers/scenes"];
+    let folder = |path: &str| std::path::Path::new(env!("TANDEM_SIM_ASSETS")).join(path);
+    let folders = ["objects", "scenes", "robots/g1_dex3", "../../tests/peers/scenes"];
     let mut count = 0;
     for entry in folders.iter().flat_map(|path| std::fs::read_dir(folder(path)).expect("a folder")) {
         let path = entry.expect("an entry of a folder").path();

@@ -2,7 +2,7 @@
 
 use super::{Attribute, Element, Support, Takes, all};
 
-const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/src/mjcf.md");
+const PAGE: &str = concat!(env!("TANDEM_SIM_ASSETS"), "/../../docs/src/mjcf.md");
 
 const INTRODUCTION: &str = "# MJCF support
 
