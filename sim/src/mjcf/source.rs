@@ -88,6 +88,11 @@ impl MjcfText {
         };
         let mut from = whole.start;
         for include in xml.descendants().filter(|node| node.has_tag_name("include")) {
+            if include.range().start < from {
+                let file = self.files[file].line(include.range().start);
+                let what = "an included file is no <include> itself; put that into a <mujoco>".into();
+                return Err(SimError::Unsupported { file, what });
+            }
             self.push(file, from..include.range().start);
             from = include.range().end;
             let (included, folder) = self.open(file, &include, folder)?;
@@ -107,6 +112,9 @@ impl MjcfText {
         let refuse =
             |what: String| SimError::Unsupported { file: self.files[by].line(include.range().start), what };
         let name = include.attribute("file").ok_or_else(|| refuse("<include> needs a `file`".into()))?;
+        if include.children().any(|child| child.is_element()) {
+            return Err(refuse("<include> holds elements; put them behind it".into()));
+        }
         let beside = folder.join(name);
         let path = if beside.exists() { beside } else { self.folder.join(name) };
         let shown = path.display().to_string();

@@ -348,4 +348,11 @@ fn included_files_keep_their_lines_and_are_read_once() {
     write("lid.xml", "<mujoco><include file=\"jar.xml\"/></mujoco>");
     let error = read("lid.xml").expect_err("a circle").to_string();
     assert!(error.contains("is included already"), "{error}");
+    write("box.xml", "<mujoco><include file=\"lid.xml\"><include file=\"jar.xml\"/></include></mujoco>");
+    let error = read("box.xml").expect_err("an include in an include").to_string();
+    assert!(error.contains("holds elements"), "{error}");
+    write("root.xml", "<include file=\"jar.xml\"> </include>");
+    write("box.xml", "<mujoco><include file=\"root.xml\"/></mujoco>");
+    let error = read("box.xml").expect_err("an include that is an include").to_string();
+    assert!(error.contains("root.xml:1`: an included file is no <include> itself"), "{error}");
 }
