@@ -245,7 +245,14 @@ impl Check<'_> {
         let known = |name: &str| match takes {
             Takes::Class => self.classes.contains_key(name),
             Takes::NameOf(kind) => self.names.get(kind).is_some_and(|names| names.contains(name)),
-            _ => true,
+            Takes::Text
+            | Takes::Numbers { .. }
+            | Takes::Direction(_)
+            | Takes::Quaternion
+            | Takes::Axes
+            | Takes::AxisSequence
+            | Takes::Word(_)
+            | Takes::Only(_) => true,
         };
         let wanted = match takes {
             Takes::Class if !known(attribute.value()) => Some("the class of a <default>".to_string()),
