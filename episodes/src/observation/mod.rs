@@ -29,14 +29,14 @@ pub struct RobotObservation {
     pub view: Arc<RobotView>,
 }
 
-/// What the camera in a robot's head sees. Neither where it is in the world nor what is seen there is told.
+/// What the camera in a robot's head sees. It says neither where the camera is in the world nor which objects are seen.
 #[derive(Debug)]
 pub struct RobotView {
     pub intrinsics: Intrinsics,
     /// The recording may still need it when the rest of the view is gone.
     pub picture: Arc<Picture>,
-    /// As [`Frame::depth_m`].
-    pub depth_m: Vec<f32>,
+    /// As [`Frame::depth_m`]. Not every protocol gives it to policies at every pixel, so they get it by calls alone.
+    pub(crate) depth_m: Vec<f32>,
 }
 
 /// The colours of a frame, and its PNG file once somebody has asked for that.
