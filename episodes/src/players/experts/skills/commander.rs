@@ -1,6 +1,6 @@
 //! What every expert builds on: hands that move along straight lines in the world, several at once.
 
-use tandem_sim::{CONTROL_DT_S, Pose, Side, Sides};
+use tandem_sim::{BaseVelocity, CONTROL_DT_S, Pose, Side, Sides};
 use tandem_tools_spec::{MoveWrists, StopReason, Tool as _, ToolReply, WristMove};
 
 use crate::players::{PlayerError, PrivilegedEpisode};
@@ -14,14 +14,6 @@ const STEPS_PER_COMMAND: u32 = 10;
 pub const WALK_STEPS: u32 = 5;
 /// Control steps of every command while several scripts are played at once.
 pub const BEAT_STEPS: u32 = WALK_STEPS;
-
-/// How fast a base is to go, in its own heading frame.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct BaseVelocity {
-    pub vx_m_s: f32,
-    pub vy_m_s: f32,
-    pub yaw_rate_rad_s: f32,
-}
 
 /// Where both wrists go.
 #[derive(Clone, Copy, Debug)]

@@ -1,8 +1,8 @@
 //! Places on the floor, where robots stand and which way they look; and walking to them, several robots at once.
 
-use tandem_sim::{CONTROL_DT_S, Pose, Rotation, Sides, Vector, heading_rad, wrapped_rad};
+use tandem_sim::{BaseVelocity, CONTROL_DT_S, Pose, Rotation, Sides, Vector, heading_rad, wrapped_rad};
 
-use super::commander::{BaseVelocity, Commander, RobotMove, WALK_STEPS, WristTargets};
+use super::commander::{Commander, RobotMove, WALK_STEPS, WristTargets};
 use crate::players::PlayerError;
 
 /// Velocity for each metre that a robot is off its place, and turning for each radian.
@@ -100,7 +100,7 @@ pub fn walk_to(commander: &mut Commander, goals: &[WalkGoal]) -> Result<(), Play
             left_s -= WALK_STEPS as f32 * CONTROL_DT_S;
         }
         for _ in 0..SETTLE_COMMANDS {
-            commander.advance(WALK_STEPS, &moves(goals, &hands, |_| BaseVelocity::default()))?;
+            commander.advance(WALK_STEPS, &moves(goals, &hands, |_| BaseVelocity::STILL))?;
         }
         // Where a robot came by with a sway, it does not come to rest.
         if have_arrived(commander, goals, AT_REST)? {
