@@ -83,7 +83,8 @@ impl Camera {
 
     /// Where the optical axis meets the picture, in pixels from the top left corner.
     pub fn principal_point_px(&self) -> [f32; 2] {
-        [0.5 * self.width as f32, 0.5 * self.height as f32]
+        let Intrinsics { cx, cy, .. } = self.intrinsics();
+        [cx + 0.5, cy + 0.5]
     }
 
     /// Picture coordinates (pixels from the top left corner, the first pixel's centre at 0.5, 0.5) and depth of a point
