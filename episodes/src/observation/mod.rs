@@ -5,7 +5,7 @@ mod formats;
 mod observer;
 mod proprioception;
 
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use tandem_sim::render::{Frame, Intrinsics, PictureError, encode_png};
 use tandem_tools_spec::{CameraCalibration, CameraImage, Formats, ImageFormat, Observation, Png, RobotState};
@@ -46,21 +46,22 @@ pub struct Picture {
     pub height: u32,
     /// Three bytes a pixel, sRGB.
     pub rgb: Vec<u8>,
-    png: OnceLock<Vec<u8>>,
+    png: Mutex<Option<Arc<[u8]>>>,
 }
 
 impl Picture {
     pub fn new(width: u32, height: u32, rgb: Vec<u8>) -> Picture {
-        Picture { width, height, rgb, png: OnceLock::new() }
+        Picture { width, height, rgb, png: Mutex::default() }
     }
 
-    /// The picture as a PNG file, encoded the first time only.
-    pub fn png(&self) -> Result<&[u8], PictureError> {
-        if let Some(png) = self.png.get() {
-            return Ok(png);
+    /// The picture as a PNG file, encoded the first time only: whoever asks meanwhile waits for it.
+    pub fn png(&self) -> Result<Arc<[u8]>, PictureError> {
+        let mut png = self.png.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(png) = &*png {
+            return Ok(png.clone());
         }
-        let png = encode_png(self.width, self.height, &self.rgb)?;
-        Ok(self.png.get_or_init(|| png))
+        let encoded = encode_png(self.width, self.height, &self.rgb)?.into();
+        Ok(png.insert(encoded).clone())
     }
 }
 

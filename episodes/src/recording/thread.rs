@@ -1,5 +1,6 @@
 //! A recorder on a thread of its own, so that an episode does not wait while what it left behind is encoded and compressed.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, OnceLock};
 use std::thread::{Builder, JoinHandle, park_timeout};
@@ -16,6 +17,11 @@ const GATHERED: Duration = Duration::from_millis(250);
 /// Appends that may wait, five seconds of an episode, before the episode waits for the recorder.
 const WAITING_APPENDS: usize = 250;
 
+/// Pictures wait as they were drawn, a quarter of a megabyte each, and are encoded by the recorder. From so many on it gathers no
+/// longer, and from so many on the episode waits for it.
+const GATHERED_PICTURES: usize = 4;
+const WAITING_PICTURES: usize = 16;
+
 const PANICKED: &str = "the recorder panicked";
 
 type Append = Box<dyn FnOnce(&mut Recorder) -> Result<(), OutputError> + Send>;
@@ -27,6 +33,7 @@ pub struct RecorderThread {
     thread: Option<JoinHandle<Option<Recorder>>>,
     /// The first failure. The recording would have a hole after it, so it ends there.
     failed: Arc<OnceLock<String>>,
+    waiting_pictures: Arc<AtomicUsize>,
 }
 
 impl RecorderThread {
@@ -36,7 +43,12 @@ impl RecorderThread {
         let failure = failed.clone();
         let work = move || append_all(recorder, &inbox, &failure);
         let thread = Builder::new().name("recorder".into()).spawn(work)?;
-        Ok(RecorderThread { appends: Some(appends), thread: Some(thread), failed })
+        Ok(RecorderThread {
+            appends: Some(appends),
+            thread: Some(thread),
+            failed,
+            waiting_pictures: Arc::default(),
+        })
     }
 
     /// Appends after everything that was appended before, some time soon.
@@ -52,6 +64,29 @@ impl RecorderThread {
         if !sent {
             // Where it has failed, it has said why.
             self.failed.get_or_init(|| PANICKED.into());
+        }
+    }
+
+    /// As [`RecorderThread::append`], of something that holds so many pictures.
+    pub fn append_pictures(
+        &self,
+        pictures: usize,
+        append: impl FnOnce(&mut Recorder) -> Result<(), OutputError> + Send + 'static,
+    ) {
+        if pictures == 0 {
+            return self.append(append);
+        }
+        let waiting = self.waiting_pictures.clone();
+        let count = waiting.fetch_add(pictures, Ordering::Relaxed) + pictures;
+        self.append(move |recorder| {
+            let outcome = append(recorder);
+            waiting.fetch_sub(pictures, Ordering::Relaxed);
+            outcome
+        });
+        match count {
+            ..GATHERED_PICTURES => {}
+            GATHERED_PICTURES..WAITING_PICTURES => self.wake(),
+            WAITING_PICTURES.. => self.flush(),
         }
     }
 

@@ -138,7 +138,7 @@ impl Session {
             ManageCall::GetStatus(_) => ManageReply::GetStatus(self.status()),
             ManageCall::Finish(_) => {
                 self.ended.get_or_insert(EndReason::Finished);
-                ManageReply::Finish(self.result().told(self.spec().disclosure))
+                ManageReply::Finish(self.result().disclosed(self.spec().disclosure))
             }
         }
     }

@@ -92,7 +92,7 @@ impl Session {
             && let ToolReply::Manage(ManageReply::Finish(reply)) = &mut **reply
         {
             // Closing the files may have failed, which the reply has to say.
-            *reply = self.result().told(self.spec().disclosure);
+            *reply = self.result().disclosed(self.spec().disclosure);
         }
         let reply = answer.and_then(|answer| answer.reply(called));
         self.let_think();

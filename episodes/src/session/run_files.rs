@@ -109,7 +109,8 @@ impl RunFiles {
     ) {
         self.calls.count(called.name(), outcome.is_ok());
         let record = ToolCallRecord::new(time_s, thought, operator, called, outcome);
-        self.recorder.append(move |recorder| recorder.tool_call(record?));
+        let pictures = record.as_ref().map_or(0, |record| record.pictures.len());
+        self.recorder.append_pictures(pictures, move |recorder| recorder.tool_call(record?));
     }
 
     /// Waits until everything recorded is on its way to the disk, or has failed.

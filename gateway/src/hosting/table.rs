@@ -180,7 +180,7 @@ impl EpisodeTable {
         let episode = self.lock().episodes.remove(id).ok_or_else(|| unknown(id))?;
         let result = episode.close().await?;
         tracing::info!(episode = id, "closed");
-        Ok(result.told(self.settings.disclosure))
+        Ok(result.disclosed(self.settings.disclosure))
     }
 
     /// How many episodes are held.

@@ -37,7 +37,7 @@ fn drift(velocity: [f32; 3], seconds: u32) -> ([f32; 2], f32) {
 }
 
 #[test]
-fn drift_is_what_readme_says() {
+fn drift_is_what_the_book_says() {
     for velocity in [
         [0.4, 0.0, 0.0],
         [0.2, 0.0, 0.0],

@@ -44,7 +44,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "gateway",
         &[
-            &["token", "metrics", "one_of"],
+            &["token", "metrics"],
             &["settings"],
             &["hosting"],
             &["http"],

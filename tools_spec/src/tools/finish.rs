@@ -75,7 +75,7 @@ pub struct ResultReply {
 
 impl ResultReply {
     /// The result as a policy hears it at the end.
-    pub fn told(mut self, disclosure: Disclosure) -> ResultReply {
+    pub fn disclosed(mut self, disclosure: Disclosure) -> ResultReply {
         if !disclosure.tells(true) {
             self.phases.0.iter_mut().for_each(|(_, time_s)| *time_s = None);
         }

@@ -93,7 +93,7 @@ impl Team {
             }
         };
         self.round().has_looked(seat);
-        Ok(self.told(answer, seat))
+        Ok(self.for_seat(answer, seat))
     }
 
     /// Lets the others hear what the operator on `seat` says.
@@ -110,7 +110,7 @@ impl Team {
         self.round().check_unheard(seat)?;
         let answer = episode.ask(Some(&words.from), call.into_call()).await?;
         self.round().spread(seat, &words);
-        Ok(self.told(answer, seat))
+        Ok(self.for_seat(answer, seat))
     }
 
     /// Takes a command, and answers when the step has been made.
@@ -197,7 +197,8 @@ impl Team {
                     replies.into_iter().zip(answers).zip(asked_steps)
                 {
                     let partners = self.partners(seat, &did);
-                    let answer = Answer { partners, ..self.told(answer, seat) }.cut_off_after(asked_steps);
+                    let answer =
+                        Answer { partners, ..self.for_seat(answer, seat) }.cut_off_after(asked_steps);
                     // A caller that has gone has its robot's step recorded all the same.
                     let _ = reply.send(Ok(answer));
                 }
@@ -213,7 +214,7 @@ impl Team {
     }
 
     /// The answer as the operator on `seat` is told it.
-    fn told(&self, answer: Answer, seat: usize) -> Answer {
+    fn for_seat(&self, answer: Answer, seat: usize) -> Answer {
         let heard = self.round().take_heard(seat);
         Answer { heard, ..answer.of_own_robot(&self.seats[seat].robot) }
     }
