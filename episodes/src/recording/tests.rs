@@ -4,6 +4,10 @@ use std::{
     collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
     time::Duration,
 };
 
@@ -158,7 +162,7 @@ fn a_recording_has_a_message_a_step_on_every_topic() {
         *count += 1;
         match message.channel.topic.as_str() {
             "/tf" => last_transforms = Some(FrameTransforms::decode(&*message.data).unwrap()),
-            "/A/egocentric" => assert!(CompressedImage::decode(&*message.data).unwrap().data == picture),
+            "/A/egocentric" => assert!(CompressedImage::decode(&*message.data).unwrap().data == *picture),
             "/tool_calls" => assert!(!String::from_utf8_lossy(&message.data).contains("base64")),
             _ => {}
         }
@@ -367,5 +371,24 @@ fn the_layout_names_topics_and_fields_that_there_are() {
                 "the layout names {path}, and there is no {field}"
             );
         }
+    }
+}
+
+/// Pictures that wait take memory, so the episode waits before there are many.
+#[test]
+fn few_pictures_wait_for_the_recorder() {
+    let folder = tempfile::tempdir().unwrap();
+    let (recorder, _) = recorder(folder.path(), &world());
+    let thread = RecorderThread::start(recorder).unwrap();
+    let waiting = Arc::new(AtomicUsize::new(0));
+    for _ in 0..100 {
+        waiting.fetch_add(2, Ordering::SeqCst);
+        let appended = waiting.clone();
+        thread.append_pictures(2, move |_| {
+            appended.fetch_sub(2, Ordering::SeqCst);
+            Ok(())
+        });
+        let count = waiting.load(Ordering::SeqCst);
+        assert!(count < 16, "{count} pictures wait");
     }
 }
