@@ -102,7 +102,7 @@ pub fn newcombe(pairs: Pairs) -> Option<[f64; 2]> {
     Some([difference - reach(p2 - l2, u1 - p1), difference + reach(u2 - p2, p1 - l1)])
 }
 
-/// Of two binary outcomes, corrected for continuity where it is positive.
+/// The correlation of two binary outcomes, corrected for continuity where it is positive.
 fn correlation(pairs: Pairs) -> f64 {
     let [a, b, c, d] = [pairs.both, pairs.first_only, pairs.second_only, pairs.neither].map(|n| n as f64);
     let margins = (a + b) * (c + d) * (a + c) * (b + d);

@@ -133,7 +133,7 @@ fn phases_on_their_own_are_averaged_by_who_works_on_them() {
         let times = vec![(Phase::number(phase), reached.then_some(4.2))];
         PlayedEpisode { result: result(id, seed, times), ..played(&cache, &spec) }
     };
-    // Of Handover p2 is collaborative; of CoPouring every phase is.
+    // Handover has one collaborative phase, p2; all of CoPouring's are.
     let mut episodes = vec![from("handover", 0, 0, true), from("handover", 1, 0, true)];
     episodes.extend((0..4).map(|seed| from("handover", seed, 1, seed == 0)));
     episodes.extend((0..4).map(|seed| from("co_pouring", seed, 2, seed < 3)));

@@ -24,7 +24,7 @@ pub struct Observer {
 struct DrawnStep {
     /// Held, so that no other step can have its address.
     step: Arc<Step>,
-    /// By robot.
+    /// The view of each robot, once it has been drawn.
     views: Vec<Option<Arc<RobotView>>>,
 }
 

@@ -22,13 +22,13 @@ pub struct Metrics {
 #[derive(Debug, Default)]
 struct Counts {
     started: u64,
-    /// By why they ended.
+    /// Episodes that have ended, by the reason.
     ended: BTreeMap<String, u64>,
-    /// By tool and HTTP status.
+    /// Calls, by tool and HTTP status.
     calls: BTreeMap<(&'static str, u16), u64>,
-    /// By tool.
+    /// Times of answers, by tool.
     answered: BTreeMap<&'static str, Histogram>,
-    /// By the kind of problem.
+    /// Refusals, by the kind of problem.
     refused: BTreeMap<String, u64>,
     physics: Duration,
     control_steps: u64,

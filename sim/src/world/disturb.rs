@@ -19,7 +19,7 @@ pub(super) struct Push {
 }
 
 impl Push {
-    /// For one physics step.
+    /// Pushes for one physics step.
     pub fn apply(&self, dynamics: &mut Dynamics) {
         let tree = dynamics.tree_mut(self.link.tree);
         let point_m = tree.world_from_link(self.link.link) * self.point_in_link_m.as_dvec3();

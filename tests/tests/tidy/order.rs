@@ -7,7 +7,7 @@ use super::{
     sources::expect_none,
 };
 
-/// By crate, rows of top-level modules. A module may name those of earlier rows, never those of its own or a later one.
+/// For each crate, rows of its top-level modules. A module may name those of earlier rows, never those of its own or a later one.
 const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "sim",

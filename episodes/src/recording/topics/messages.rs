@@ -269,7 +269,7 @@ pub struct ToolCallRecord {
     /// When it was answered.
     pub time_s: f64,
     pub message: ToolCallMessage,
-    /// By robot.
+    /// What was seen, with the name of the robot that saw it.
     pub pictures: Vec<(String, Arc<Picture>)>,
 }
 

@@ -64,7 +64,7 @@ pub fn held_row(state_values: &[f64]) -> Vec<f64> {
             row[columns.clone()].copy_from_slice(&state_values[sensed.clone()]);
         }
     }
-    // Of the base command the height alone persists.
+    // The height is all that persists of a base command.
     row[ACTION_BASE..ACTION_ROW_LEN - 1].fill(0.0);
     row
 }

@@ -138,7 +138,7 @@ impl QueryPlan<'_> {
     }
 }
 
-/// By robot, the action row that keeps it as it is.
+/// For each robot, the action row that keeps it as it is.
 fn held_rows(observation: &PolicyObservation) -> Vec<Vec<f64>> {
     observation.robots.iter().map(|robot| columns::held_row(&robot.state_values)).collect()
 }

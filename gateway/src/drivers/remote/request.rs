@@ -28,7 +28,7 @@ pub struct TaskInstructions {
 
 /// What a policy may be shown of one moment.
 pub struct PolicyObservation {
-    /// By robot, in the task's order.
+    /// One for each robot, in the task's order.
     pub robots: Vec<RobotInputs>,
     /// The room, where the policy is shown it.
     pub third_person: Option<Arc<Picture>>,

@@ -7,7 +7,7 @@ use super::bench::{Bench, DOWN, DT_S, Random, bush, hinge, stir};
 
 /// Efforts of an acceleration `a` by degree of freedom, from Newton and Euler link by link:
 ///   c'' = o'' + dw x r + w x (w x r),  f = m (c'' - g),  n = I dw + w x I w.
-/// Of a free first link the force and the moment about its centre of mass.
+/// The force on a free first link, and the moment about its centre of mass.
 pub fn efforts(tree: &Tree, v: &[f64], a: &[f64], gravity_m_s2: DVec3) -> Vec<f64> {
     let mut motion: Vec<(DVec3, DVec3, DVec3)> = Vec::new();
     let mut loads: Vec<(DVec3, DVec3)> = Vec::new();

@@ -8,7 +8,7 @@ use crate::{ObjectPlacement, Pose, RobotPlacement, Step, Vector, World, WorldSpe
 
 const LEAST_PSNR_DB: f64 = 40.0;
 const DEPTH_TOLERANCE_M: f32 = 1e-4;
-/// Of the pixels.
+/// The share of pixels that may show another thing.
 const STRAY_IDS: f64 = 0.002;
 
 /// `None`, and a line, where pictures are drawn by the embedded renderer anyway.

@@ -31,7 +31,7 @@ pub fn map(folder: &Path, text: &str) -> PolicyMap {
 
 /// A policy that keeps every robot as it first felt it, but for a wrist, whose column and angle follow from its words.
 pub fn turning(wrist: impl Fn(&str) -> (usize, f32) + Send + Sync + 'static, rows: usize) -> Box<Decide> {
-    // By words, which are a robot's own.
+    // Words tell them apart: each robot has its own.
     let first: Mutex<BTreeMap<String, Vec<f32>>> = Mutex::default();
     Box::new(move |number, request| {
         let state = floats(request, "observation/state");

@@ -61,7 +61,7 @@ impl Pendulum {
         self.stance = self.stance.other();
     }
 
-    /// Of two steps.
+    /// The velocity over two steps.
     fn velocity_m_s(&mut self, command_m_s: Vector) -> Vector {
         let before_m = self.com_m;
         self.step(command_m_s);
