@@ -94,6 +94,9 @@ fn joint_model(
     let ActuatorKind::Position { kp, kd } = actuator.kind else {
         return Err("needs a <position> actuator");
     };
+    if kp == 0.0 || kd == 0.0 {
+        return Err("needs a kp and a kv above 0 on its actuator");
+    }
     if actuator.control_range.is_some() {
         return Err("is told targets within its range; leave out the actuator's ctrlrange");
     }
@@ -219,6 +222,7 @@ mod tests {
             (actuator, r#"joint="left_knee_joint" ctrlrange="-1 1" "#, "leave out the actuator's ctrlrange"),
             (actuator, r#"joint="left_knee_joint" forcelimited="false" "#, "needs a forcerange"),
             (r#"forcerange="-"#, r#"forcerange="-1"#, "is stronger one way"),
+            (r#"kp="200" kv="6""#, r#"kp="200""#, "needs a kp and a kv"),
             (end, "<worldbody><geom size=\"1\"/></worldbody></mujoco>", "none in the worldbody"),
             (end, "<worldbody><body><geom size=\"1\"/></body></worldbody></mujoco>", "all others on it"),
             (end, "<equality><weld body1=\"pelvis\"/></equality></mujoco>", "a robot has no equalities"),
