@@ -58,7 +58,8 @@ impl Observer {
             robots.iter().copied().filter(|robot| views[*robot].is_none()).collect();
         let cameras: Vec<Camera> =
             missing.iter().map(|robot| self.cameras.egocentric(step, *robot)).collect();
-        let frames = self.renderer.render_all(step, &cameras);
+        // Where all have been drawn, the renderer need not even place the scenery.
+        let frames = if cameras.is_empty() { Vec::new() } else { self.renderer.render_all(step, &cameras) };
         for ((robot, camera), frame) in missing.into_iter().zip(&cameras).zip(frames) {
             views[robot] = Some(Arc::new(RobotView::new(camera.intrinsics(), frame)));
         }
