@@ -5,6 +5,7 @@
 
 use std::cell::Cell;
 use std::f32::consts::FRAC_PI_2;
+use std::ops::RangeInclusive;
 
 use tandem_sim::bench::{CaseReport, over_seeds};
 use tandem_sim::render::RendererKind;
@@ -72,9 +73,13 @@ const fn beside(name: &'static str, left_m: f32) -> RobotSpot {
     RobotSpot { name, position_m: [0.0, left_m], yaw_rad: 0.0, instruction: "" }
 }
 
-/// Plays one case on seeds 0 to `seeds` - 1.
-pub fn run(case: &CarryingCase, controller: &Controller, seeds: usize) -> Result<CaseReport, BenchError> {
-    let trials = over_seeds(seeds, |seed| trial(case, controller, seed as u32));
+/// Plays one case on these seeds.
+pub fn run(
+    case: &CarryingCase,
+    controller: &Controller,
+    seeds: &RangeInclusive<u32>,
+) -> Result<CaseReport, BenchError> {
+    let trials = over_seeds(seeds, |seed| trial(case, controller, seed));
     let trials = trials.into_iter().collect::<Result<Vec<_>, _>>()?;
     let done: Vec<&CarryResult> = trials.iter().flatten().collect();
     let worst = |value: fn(&CarryResult) -> f32| done.iter().map(|carried| value(carried)).reduce(f32::max);
@@ -85,7 +90,7 @@ pub fn run(case: &CarryingCase, controller: &Controller, seeds: usize) -> Result
         sway_m: worst(|carried| carried.off_way_m),
         load_tilt_deg: worst(|carried| carried.tilt_deg),
         power_w: done.iter().map(|carried| carried.power_w).sum::<f32>() / done.len().max(1) as f32,
-        ..CaseReport::of(case.name, seeds)
+        ..CaseReport::of(case.name, trials.len())
     })
 }
 

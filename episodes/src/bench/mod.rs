@@ -2,6 +2,7 @@
 
 mod carrying;
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 pub use tandem_ik::bench::Report as IkReport;
@@ -39,12 +40,12 @@ pub enum BenchError {
     Player(#[from] PlayerError),
 }
 
-/// Plays the cases whose names contain one of the words of `filter`, separated by commas, on seeds 0 to `seeds` - 1, robots
-/// of their own first, then two that carry something between them; calls `done` after each case.
+/// Plays the cases whose names contain one of the words of `filter`, separated by commas, on these seeds, robots of
+/// their own first, then two that carry something between them; calls `done` after each case.
 pub fn locomotion(
     controller: &Controller,
     filter: &str,
-    seeds: usize,
+    seeds: &RangeInclusive<u32>,
     mut done: impl FnMut(&CaseReport),
 ) -> Result<LocomotionReport, BenchError> {
     let choice = controller.load()?;

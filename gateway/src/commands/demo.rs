@@ -40,8 +40,8 @@ const PASS_PERCENT: usize = 80;
 /// Play the Handover task by a scripted expert over real HTTP, and write what happened.
 #[derive(Debug, clap::Args)]
 pub struct DemoArgs {
-    /// One seed, or a range of seeds as 0..9, both ends included.
-    #[arg(long = "seed", default_value = "0", value_name = "SEED")]
+    /// One seed, or a range of seeds as 0-9 or 0..9, both ends included.
+    #[arg(long, alias = "seed", default_value = "0", value_name = "SEEDS")]
     seeds: Seeds,
     /// Folder that the results are written to, one folder per episode.
     #[arg(long, env = "TANDEM_RUNS", default_value = "runs", value_name = "DIR")]

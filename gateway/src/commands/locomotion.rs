@@ -5,7 +5,7 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::Subcommand;
 use tandem_episodes::bench::{self, CaseReport};
 
-use super::{CommandResult, flags::LocomotionFlag};
+use super::{CommandResult, Seeds, flags::LocomotionFlag};
 
 /// The base controller.
 #[derive(Debug, clap::Args)]
@@ -24,9 +24,9 @@ enum LocomotionPart {
         /// Cases whose names contain one of these words, separated by commas.
         #[arg(long, default_value = "", value_name = "WORDS")]
         cases: String,
-        /// Seeds per case.
-        #[arg(long, default_value_t = 10, value_name = "N")]
-        seeds: usize,
+        /// One seed, or a range of seeds as 0-9 or 0..9, both ends included.
+        #[arg(long, default_value = "0-9", value_name = "SEEDS")]
+        seeds: Seeds,
         /// JSON file to write.
         #[arg(long, value_name = "OUT")]
         json: Option<PathBuf>,
@@ -37,7 +37,7 @@ enum LocomotionPart {
 pub fn run(args: LocomotionArgs) -> CommandResult {
     let LocomotionPart::Bench { locomotion, cases, seeds, json } = args.part;
     println!("{}", CaseReport::HEAD);
-    let report = bench::locomotion(&locomotion.controller(), &cases, seeds, |case| println!("{case}"))?;
+    let report = bench::locomotion(&locomotion.controller(), &cases, &seeds.0, |case| println!("{case}"))?;
     if let Some(path) = json {
         std::fs::write(path, serde_json::to_string_pretty(&report)?)?;
     }

@@ -11,6 +11,7 @@ mod trial;
 
 use std::fmt;
 use std::num::NonZero;
+use std::ops::RangeInclusive;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde::Serialize;
@@ -76,16 +77,16 @@ pub fn is_asked(filter: &str, case: &str) -> bool {
     filter.split(',').any(|word| case.contains(word))
 }
 
-/// Runs every case that `filter` asks for, with seeds 0 up to `seeds`; `done` hears of each case as it ends.
+/// Runs every case that `filter` asks for, on these seeds; `done` hears of each case as it ends.
 pub fn run(
     new_locomotion: NewLocomotion,
     filter: &str,
-    seeds: usize,
+    seeds: &RangeInclusive<u32>,
     mut done: impl FnMut(&CaseReport),
 ) -> Result<LocomotionReport, SimError> {
     let mut cases = Vec::new();
     for case in CASES.iter().filter(|case| is_asked(filter, case.name)) {
-        let trials = over_seeds(seeds, |seed| trial::run(case, seed, new_locomotion()));
+        let trials = over_seeds(seeds, |seed| trial::run(case, seed.into(), new_locomotion()));
         let trials = trials.into_iter().collect::<Result<Vec<_>, _>>()?;
         let report = summarise(case, &trials);
         done(&report);
@@ -94,22 +95,20 @@ pub fn run(
     Ok(LocomotionReport { cases })
 }
 
-/// What `trial` makes of each of the seeds 0 up to `seeds`, as many at once as there are processors.
-pub fn over_seeds<T: Send>(seeds: usize, trial: impl Fn(u64) -> T + Sync) -> Vec<T> {
+/// What `trial` makes of each of these seeds, as many at once as there are processors.
+pub fn over_seeds<T: Send>(seeds: &RangeInclusive<u32>, trial: impl Fn(u32) -> T + Sync) -> Vec<T> {
     let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
+    let seeds: Vec<u32> = seeds.clone().collect();
     let next = AtomicUsize::new(0);
     let work = || {
         let mut done = Vec::new();
         loop {
-            let seed = next.fetch_add(1, Ordering::Relaxed);
-            if seed >= seeds {
-                return done;
-            }
-            done.push((seed, trial(seed as u64)));
+            let Some(seed) = seeds.get(next.fetch_add(1, Ordering::Relaxed)) else { return done };
+            done.push((*seed, trial(*seed)));
         }
     };
     let mut trials: Vec<_> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads.min(seeds)).map(|_| scope.spawn(work)).collect();
+        let workers: Vec<_> = (0..threads.min(seeds.len())).map(|_| scope.spawn(work)).collect();
         workers.into_iter().flat_map(|worker| worker.join().expect("a trial never panics")).collect()
     });
     trials.sort_by_key(|(seed, _)| *seed);

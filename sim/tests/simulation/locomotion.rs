@@ -4,7 +4,7 @@ use tandem_sim::locomotion::Balance;
 use tandem_sim::{RobotCommand, RobotPlacement, World, WorldSpec, bench};
 
 fn report(case: &str, seeds: usize) -> bench::CaseReport {
-    let report = bench::run(&|| Box::new(Balance::default()), case, seeds, |_| {}).unwrap();
+    let report = bench::run(&|| Box::new(Balance::default()), case, &(0..=seeds as u32 - 1), |_| {}).unwrap();
     assert_eq!(report.cases.len(), 1, "`{case}` names one case");
     report.cases.into_iter().next().unwrap()
 }

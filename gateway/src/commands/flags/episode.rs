@@ -19,7 +19,7 @@ pub struct EpisodeFlags {
     /// Task ids separated by commas, or `all`.
     #[arg(long, default_value = "all", value_name = "TASKS", value_parser = parse_tasks)]
     tasks: TaskList,
-    /// One seed, or a range of seeds as 0-9, both ends included.
+    /// One seed, or a range of seeds as 0-9 or 0..9, both ends included.
     #[arg(long, default_value = "0-9", value_name = "SEEDS")]
     seeds: Seeds,
     /// The rules.
@@ -119,13 +119,13 @@ impl EpisodeFlags {
     }
 }
 
-/// Seeds on the command line: `3`, or `0..9` with both ends included, as result tables name them.
+/// Seeds on the command line, in every command that takes any: `3`, or `0-9`, or `0..9`, with both ends included.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Seeds(pub RangeInclusive<u32>);
 
 /// A text that names no seeds.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
-#[error("{0:?} names no seeds; give one, as 3, or a range with both ends included, as 0..9")]
+#[error("{0:?} names no seeds; give one, as 3, or a range with both ends included, as 0-9 or 0..9")]
 pub struct SeedsError(String);
 
 impl FromStr for Seeds {
@@ -146,7 +146,10 @@ impl FromStr for Seeds {
 
 #[cfg(test)]
 mod tests {
+    use clap::{CommandFactory, Parser};
+
     use super::*;
+    use crate::cli::Cli;
 
     #[test]
     fn texts_name_seeds() {
@@ -164,5 +167,33 @@ mod tests {
         check("ten", None);
         check("", None);
         check("4294967296", None);
+    }
+
+    /// What a flag for seeds says of itself in each command that has one, under the command's name.
+    fn help_on_seeds(command: &clap::Command, path: &str, found: &mut Vec<(String, String)>) {
+        for of in command.get_subcommands() {
+            let path = format!("{path} {}", of.get_name());
+            let is_seeds = |flag: &&clap::Arg| flag.get_long().is_some_and(|name| name.starts_with("seed"));
+            if let Some(flag) = of.get_arguments().find(is_seeds) {
+                let name = flag.get_long().unwrap_or_default();
+                let help = flag.get_help().map(ToString::to_string).unwrap_or_default();
+                found.push((path.clone(), format!("--{name}: {help}")));
+            }
+            help_on_seeds(of, &path, found);
+        }
+    }
+
+    #[test]
+    fn seeds_mean_the_same_in_every_command() {
+        let mut found = Vec::new();
+        help_on_seeds(&Cli::command(), "tandem", &mut found);
+        assert!(found.len() >= 4, "{found:?}");
+        let same = "--seeds: One seed, or a range of seeds as 0-9 or 0..9, both ends included";
+        for (path, help) in &found {
+            assert_eq!(help, same, "{path}");
+            let read = |seeds: &str| Cli::try_parse_from(path.split(' ').chain(["--seeds", seeds])).is_ok();
+            assert!(read("3") && read("0-9") && read("0..9"), "{path}");
+            assert!(!read("9-0") && !read("ten"), "{path}");
+        }
     }
 }
