@@ -1,17 +1,20 @@
 //! Parts of Tandem measured on their own, on the robot that the episodes use.
 
 mod carrying;
+mod falls;
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
+pub use falls::falls;
 pub use tandem_ik::bench::Report as IkReport;
 use tandem_ik::bench::{TargetSet, run};
 use tandem_ik::{IkError, Model};
 use tandem_sim::assets;
 use tandem_sim::bench;
 pub use tandem_sim::bench::{
-    CaseReport, LocomotionReport, PhysicsCase, PhysicsReport, PicturesCase, PicturesReport,
+    CaseReport, FallTrial, FallsCase, FallsReport, FloorEpisode, LocomotionReport, PhysicsCase,
+    PhysicsReport, PicturesCase, PicturesReport,
 };
 use tandem_sim::render::RendererKind;
 

@@ -1,7 +1,8 @@
 //! What a base controller can do: standing, loads, walking, stopping, squatting, pushes and a tour, several seeds each. And
-//! how long a step of physics and a picture take.
+//! how long a step of physics and a picture take, and what becomes of robots that fall.
 
 mod cases;
+mod falls;
 mod measure;
 mod motion;
 mod physics;
@@ -17,6 +18,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use serde::Serialize;
 
 pub use cases::{CASES, Case};
+pub use falls::{Broken, FALL_CASES, FallCase, FallPlace, FallTrial, FallsCase, FallsReport, FloorEpisode};
 pub use physics::{PhysicsCase, PhysicsReport, physics};
 pub use pictures::{PicturesCase, PicturesReport, pictures};
 

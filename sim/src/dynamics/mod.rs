@@ -10,6 +10,7 @@
 //! bits: trees and colliders count in the order in which they were added, and so do contacts.
 
 mod contacts;
+mod energy_balance;
 mod joints;
 mod settings;
 mod snapshot;
@@ -21,6 +22,7 @@ mod trees;
 pub use contacts::ContactPoint;
 pub use contacts::collider::{Collider, ColliderId};
 pub use contacts::friction::{Directions, Friction};
+pub use energy_balance::{EnergyBalance, EnergyBefore};
 pub use joints::equality::{Equality, EqualityId};
 pub use rapier3d::glamx::{DMat3, DPose3, DQuat, DVec3};
 pub use settings::{Settings, Softness};
@@ -85,6 +87,11 @@ impl Dynamics {
     /// Switches an equality on or off: locks and opens a latch.
     pub fn set_active(&mut self, equality: EqualityId, active: bool) {
         self.solver.equalities.set_active(equality, active);
+    }
+
+    /// All trees, in the order in which they were added.
+    pub fn tree_ids(&self) -> impl Iterator<Item = TreeId> + use<> {
+        self.trees.ids()
     }
 
     pub fn tree(&self, id: TreeId) -> &Tree {

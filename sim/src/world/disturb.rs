@@ -46,6 +46,29 @@ impl World {
         self.dynamics.tree_mut(robot.tree).set_mass(wrist, Mass::from_rapier(&whole));
     }
 
+    /// As [`World::push`], at a point of the link that a hinge or slide of an object carries, in that link's frame.
+    pub(crate) fn push_object(&mut self, joint: &str, point_in_link_m: Vector, force_n: Vector) {
+        let link = self.jointed(joint);
+        self.pushes.push(Push { link, point_in_link_m, force_n });
+    }
+
+    /// Sets a hinge (rad) or slide (m) of an object, by the name that its file gives.
+    pub(crate) fn set_object_joint(&mut self, joint: &str, position: f64, velocity: f64) {
+        let link = self.jointed(joint);
+        self.dynamics.tree_mut(link.tree).set_joint(link.link, position, velocity);
+    }
+
+    fn jointed(&self, joint: &str) -> LinkId {
+        let object = self.objects.iter().find(|object| object.joint.as_deref() == Some(joint));
+        object.and_then(|object| object.link).unwrap_or_else(|| panic!("no joint `{joint}`"))
+    }
+
+    /// Puts a robot somewhere, at rest, as its joints are.
+    pub(crate) fn put_robot(&mut self, robot: usize, world_from_pelvis: Pose) {
+        let tree = self.dynamics.tree_mut(self.robots[robot].tree);
+        tree.set_base(precise(&world_from_pelvis), DVec3::ZERO, DVec3::ZERO);
+    }
+
     /// Puts a free object somewhere, at rest. An unknown one is a bug of the caller.
     pub(crate) fn put_object(&mut self, name: &str, world_from_object: Pose) {
         let object = self.objects.iter().find(|object| object.name == name);

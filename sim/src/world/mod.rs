@@ -5,12 +5,17 @@ mod disturb;
 mod objects;
 mod snapshot;
 mod step;
+mod watch;
 
 use std::sync::Arc;
 
 pub use objects::{ObjectModel, ObjectPart, ObjectPlacement, ObjectState};
 pub use snapshot::Snapshot;
 pub use step::{HandContacts, ObjectStep, RobotStep, Step, Touch};
+pub use watch::{
+    DEEP_M, Extremes, FARTHEST_BEYOND_RAD, FASTEST_M_S, Greatest, LEAST_SCALE_J, LONGEST_DEEP_S,
+    MOST_MADE_SHARE, WINDOW_S, Watch,
+};
 
 use rapier3d::math::Pose;
 
@@ -111,10 +116,19 @@ impl World {
     /// Advances by one control step, and says what it left behind. One command per robot, in the order of
     /// [`World::robots`]. After an error the world stands where its last physics step left it, and cannot go on.
     pub fn control_step(&mut self, commands: &[RobotCommand]) -> Result<Step, Diverged> {
+        self.step_by(commands, World::advance)
+    }
+
+    /// One control step whose physics steps `advance` makes.
+    fn step_by(
+        &mut self,
+        commands: &[RobotCommand],
+        mut advance: impl FnMut(&mut World) -> Result<(), Diverged>,
+    ) -> Result<Step, Diverged> {
         assert_eq!(commands.len(), self.robots.len(), "one command per robot");
         for substep in 0..PHYSICS_STEPS_PER_CONTROL {
             self.drive(commands, substep);
-            self.advance()?;
+            advance(self)?;
         }
         self.pushes.clear();
         self.control_steps += 1;

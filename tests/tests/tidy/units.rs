@@ -45,6 +45,7 @@ const UNITS: &[&str] = &[
     "kg",
     "n",
     "w",
+    "j",
     "px",
     "steps",
     "m_s",

@@ -14,7 +14,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use tandem_episodes::{
     RendererKind,
-    bench::{IkReport, PhysicsReport, PicturesReport},
+    bench::{FallsCase, FallsReport, IkReport, PhysicsReport, PicturesReport},
 };
 
 use super::CommandResult;
@@ -62,6 +62,21 @@ enum BenchPart {
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
     },
+    /// Falls: what physics makes of robots that stagger through all tasks, are dropped and struck.
+    Falls {
+        /// How many episodes, over all cases.
+        #[arg(long, default_value_t = FALLS_EPISODES, value_name = "N")]
+        episodes: usize,
+        /// Cases whose names contain one of these words, separated by commas.
+        #[arg(long, default_value = "", value_name = "WORDS")]
+        cases: String,
+        /// Write what robots alone on a floor were told, and how they fared, to this file as JSON.
+        #[arg(long, value_name = "FILE")]
+        commands: Option<PathBuf>,
+        /// Write the cases to this file as JSON, too.
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+    },
     /// All parts one after the other, each as it is without flags.
     All {
         /// Write everything to this file as JSON, too.
@@ -74,7 +89,7 @@ enum BenchPart {
 type Measure = fn() -> Result<Value, Box<dyn Error>>;
 
 /// The parts that `bench all` measures; a new part adds its line.
-const PARTS: [(&str, Measure); 4] = [
+const PARTS: [(&str, Measure); 5] = [
     ("physics", || Ok(serde_json::to_value(measure_physics()?)?)),
     ("render", || Ok(serde_json::to_value(measure_pictures(RendererKind::Cpu)?)?)),
     ("tools", || Ok(serde_json::to_value(measure_tools()?)?)),
@@ -83,7 +98,11 @@ const PARTS: [(&str, Measure); 4] = [
         print_ik(&report);
         Ok(serde_json::to_value(report)?)
     }),
+    ("falls", || Ok(serde_json::to_value(measure_falls(FALLS_EPISODES, "")?)?)),
 ];
+
+/// Four of each case.
+const FALLS_EPISODES: usize = 60;
 
 /// Measures a part and prints a table.
 pub fn run(args: BenchArgs) -> CommandResult {
@@ -92,6 +111,13 @@ pub fn run(args: BenchArgs) -> CommandResult {
         BenchPart::Tools { json } => write(measure_tools()?, json.as_deref()),
         BenchPart::Physics { json } => write(measure_physics()?, json.as_deref()),
         BenchPart::Render { renderer, json } => write(measure_pictures(renderer)?, json.as_deref()),
+        BenchPart::Falls { episodes, cases, commands, json } => {
+            let report = measure_falls(episodes, &cases)?;
+            if let Some(path) = commands {
+                std::fs::write(path, serde_json::to_string(&report.floor)?)?;
+            }
+            write(report, json.as_deref())
+        }
         BenchPart::All { json } => all(json.as_deref()),
     }
 }
@@ -135,6 +161,14 @@ fn measure_physics() -> Result<PhysicsReport, Box<dyn Error>> {
             "{:14}{:>7}{:>10.1}{:>10.1}x",
             case.name, case.robots, case.median_step_us, case.realtime_factor
         );
+    })?)
+}
+
+fn measure_falls(episodes: usize, cases: &str) -> Result<FallsReport, Box<dyn Error>> {
+    println!("{}", FallsCase::HEAD);
+    Ok(tandem_episodes::bench::falls(episodes, cases, |case| {
+        println!("{case}");
+        case.diverged_at.iter().for_each(|at| println!("    {at}"));
     })?)
 }
 

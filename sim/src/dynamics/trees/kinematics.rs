@@ -94,6 +94,11 @@ impl Tree {
         self.velocity[link].at(self.position_m[link])
     }
 
+    /// Velocity of the link's centre of mass, world frame.
+    pub fn com_velocity_m_s(&self, link: usize) -> DVec3 {
+        self.velocity[link].at(self.centre_m(link))
+    }
+
     /// Velocity of a point that is fixed to a link and now lies at `point_m` in the world.
     pub fn point_velocity_m_s(&self, link: usize, point_m: DVec3) -> DVec3 {
         self.velocity[link].at(point_m - self.reference_m)

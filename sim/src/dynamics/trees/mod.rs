@@ -34,7 +34,7 @@ impl TreeId {
     }
 
     #[inline]
-    pub(in crate::dynamics) fn index(self) -> usize {
+    pub(crate) fn index(self) -> usize {
         usize::from(self.0)
     }
 }
@@ -57,6 +57,10 @@ impl Trees {
         self.offset.push(offset);
         self.all.push(tree);
         id
+    }
+
+    pub fn ids(&self) -> impl Iterator<Item = TreeId> + use<> {
+        (0..self.all.len() as u16).map(TreeId)
     }
 
     pub fn dofs(&self) -> usize {

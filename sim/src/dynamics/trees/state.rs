@@ -28,6 +28,12 @@ impl Tree {
         self.links[link].joint.axis().map_or(0.0, |_| self.v[self.layout.first_dof[link]])
     }
 
+    /// How far a hinge (rad) or slide (m) is beyond its range; 0 within it, and of other joints.
+    pub fn beyond_range(&self, link: usize) -> f64 {
+        let range = self.links[link].joint.axis().and_then(|axis| axis.range);
+        range.map_or(0.0, |[low, high]| (low - self.q[link]).max(self.q[link] - high).max(0.0))
+    }
+
     /// What the drive of a joint exerted on average over the last step (N m or N), within its effort limit.
     pub fn drive_effort(&self, link: usize) -> f64 {
         self.effort[link]

@@ -1,0 +1,56 @@
+//! The bench of falls: robots that stagger through the worlds of the tasks, and what else makes them fall.
+
+use tandem_sim::bench::{
+    FALL_CASES, FallCase, FallPlace, FallTrial, FallsCase, FallsReport, is_asked, over_seeds,
+};
+use tandem_tools_spec::Protocol;
+
+use super::BenchError;
+use crate::session::build;
+use crate::spec::EpisodeSpec;
+use crate::tasks;
+
+/// Seeds from here on, which no table of results reports.
+const FIRST_SEED: u32 = 2000;
+
+/// Plays so many episodes, as evenly as it goes, of the cases whose names contain one of the words of `filter`, separated by
+/// commas; calls `done` after each case.
+pub fn falls(
+    episodes: usize,
+    filter: &str,
+    mut done: impl FnMut(&FallsCase),
+) -> Result<FallsReport, BenchError> {
+    let asked: Vec<(usize, &FallCase)> =
+        FALL_CASES.iter().enumerate().filter(|(_, case)| is_asked(filter, case.name)).collect();
+    let mut report = FallsReport { cases: Vec::new(), floor: Vec::new() };
+    for (place, (number, case)) in asked.iter().enumerate() {
+        let count = episodes / asked.len() + usize::from(place < episodes % asked.len());
+        let trials = over_seeds(count, |episode| trial(case, *number, episode as u32));
+        let mut trials = trials.into_iter().collect::<Result<Vec<FallTrial>, _>>()?;
+        let figures = FallsCase::of(case.name, &trials);
+        done(&figures);
+        report.cases.push(figures);
+        for trial in &mut trials {
+            let told = trial.floor.take();
+            report.floor.extend(told.map(|told| (trial.clone(), told)));
+        }
+    }
+    Ok(report)
+}
+
+/// One episode of a case; those in the worlds of tasks go through all tasks, each case from another one on.
+fn trial(case: &FallCase, number: usize, episode: u32) -> Result<FallTrial, BenchError> {
+    let seed = FIRST_SEED + episode;
+    let (world, budget_steps, place) = match case.place {
+        FallPlace::Task | FallPlace::TaskFromAbove => {
+            let task = &tasks::ALL[(number + episode as usize) % tasks::ALL.len()];
+            let built = build(&EpisodeSpec::new(task, seed, Protocol::Benchmark)).map_err(Box::new)?;
+            (built.world, task.benchmark_steps, task.id)
+        }
+        FallPlace::Floor | FallPlace::OnRobot | FallPlace::TableOnRobot | FallPlace::Door => {
+            (case.world()?, 0, case.name)
+        }
+    };
+    let trial = case.play(world, budget_steps, u64::from(seed));
+    Ok(FallTrial { played: format!("{place} seed {seed}"), ..trial })
+}

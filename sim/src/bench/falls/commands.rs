@@ -1,0 +1,85 @@
+//! What staggering robots are told.
+
+use std::sync::Arc;
+
+use crate::bench::motion::SplitMix64;
+use crate::body::{RobotModel, UPPER, UPPER_JOINTS};
+use crate::locomotion::{BaseCommand, BaseLimits};
+use crate::{CONTROL_DT_S, RobotCommand, World};
+
+/// How a robot staggers.
+#[derive(Clone, Copy, Debug)]
+pub struct Stagger {
+    /// Share of the way from rest to anywhere in its range that a joint is sent.
+    pub amplitude_share: f32,
+    /// Control steps after which everything is drawn anew.
+    pub hold_steps: u32,
+    /// How fast targets move.
+    pub pace_rad_s: f32,
+}
+
+/// Base velocities are drawn up to this, and then what the controller can follow of it.
+const FASTEST_BASE_M_S: f32 = 0.5;
+const FASTEST_TURN_RAD_S: f32 = 0.5;
+
+/// A robot's commands, drawn from a seed.
+pub(super) struct Staggering {
+    how: Stagger,
+    random: SplitMix64,
+    model: Arc<RobotModel>,
+    limits: BaseLimits,
+    rest_rad: [f32; UPPER_JOINTS],
+    goal_rad: [f32; UPPER_JOINTS],
+    command: RobotCommand,
+}
+
+impl Staggering {
+    pub fn of(world: &World, robot: usize, how: Stagger, seed: u64) -> Staggering {
+        let command = world.rest_command(robot);
+        let robot_seed = seed.wrapping_mul(1_000_003).wrapping_add(robot as u64);
+        let robot = &world.robots()[robot];
+        Staggering {
+            how,
+            random: SplitMix64(robot_seed),
+            model: robot.model.clone(),
+            limits: robot.base_limits(),
+            rest_rad: command.upper_rad,
+            goal_rad: command.upper_rad,
+            command,
+        }
+    }
+
+    /// Staggers about other joint positions than those of the rest pose.
+    pub fn about(&mut self, rest_rad: [f32; UPPER_JOINTS]) {
+        self.rest_rad = rest_rad;
+    }
+
+    /// The command of control step `step`, which count from 0.
+    pub fn next(&mut self, step: u32) -> RobotCommand {
+        if step.is_multiple_of(self.how.hold_steps) {
+            self.draw();
+        }
+        let most_rad = self.how.pace_rad_s * CONTROL_DT_S;
+        for (target, goal) in self.command.upper_rad.iter_mut().zip(self.goal_rad) {
+            *target += (goal - *target).clamp(-most_rad, most_rad);
+        }
+        self.command
+    }
+
+    fn draw(&mut self) {
+        for (column, joint) in UPPER.into_iter().enumerate() {
+            let model = &self.model.joints[joint];
+            let anywhere_rad = self.random.uniform([model.lower_rad, model.upper_rad]);
+            let rest_rad = self.rest_rad[column];
+            self.goal_rad[column] = rest_rad + (anywhere_rad - rest_rad) * self.how.amplitude_share;
+        }
+        let mut velocity = |most: f32| self.random.uniform([-most, most]);
+        let base = BaseCommand {
+            vx_m_s: velocity(FASTEST_BASE_M_S),
+            vy_m_s: velocity(FASTEST_BASE_M_S),
+            yaw_rate_rad_s: velocity(FASTEST_TURN_RAD_S),
+            pelvis_height_m: self.random.uniform(self.limits.pelvis_height_m),
+        };
+        self.command.base = self.limits.clamp(base);
+    }
+}

@@ -1,0 +1,149 @@
+//! Falls: robots that stagger, are dropped, are struck, and what physics makes of it. Nothing here is an episode's: a bench puts
+//! robots in the air and pushes doors.
+
+mod cases;
+mod commands;
+mod floor;
+
+use std::fmt;
+
+use serde::Serialize;
+
+pub use cases::{FALL_CASES, FallCase, FallPlace};
+pub use floor::FloorEpisode;
+
+use crate::dynamics::Diverged;
+use crate::world::{Extremes, Watch};
+use crate::{RobotCommand, World};
+
+/// How a world fared.
+#[derive(Clone, Debug, Serialize)]
+pub struct FallTrial {
+    /// What was played, as a task and its seed.
+    pub played: String,
+    pub control_steps: u32,
+    /// Robots that lay at the end.
+    pub fallen: usize,
+    /// Where physics gave numbers that are not finite, if it did.
+    pub diverged: Option<String>,
+    pub extremes: Extremes,
+    /// Where robots are alone on a floor: what they were told.
+    #[serde(skip)]
+    pub floor: Option<FloorEpisode>,
+}
+
+/// One case over its episodes.
+#[derive(Clone, Debug, Serialize)]
+pub struct FallsCase {
+    pub case: String,
+    pub episodes: usize,
+    /// Robots that lay at the end of their episodes.
+    pub fallen: usize,
+    pub diverged: usize,
+    /// Where that was, episode by episode.
+    pub diverged_at: Vec<String>,
+    /// Episodes that broke each limit.
+    pub broken: Broken,
+    pub greatest: Extremes,
+}
+
+/// Episodes in which something was beyond its limit, see [`crate::world::Extremes`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Broken {
+    pub speed: usize,
+    pub energy: usize,
+    pub depth: usize,
+    pub range: usize,
+}
+
+/// All cases.
+#[derive(Clone, Debug, Serialize)]
+pub struct FallsReport {
+    pub cases: Vec<FallsCase>,
+    /// What robots alone on a floor were told, and how they fared.
+    #[serde(skip)]
+    pub floor: Vec<(FallTrial, FloorEpisode)>,
+}
+
+/// Plays `steps` control steps; `next` says what robots are told for each, and may disturb the world.
+fn play(
+    world: &mut World,
+    steps: u32,
+    mut next: impl FnMut(&mut World, u32) -> Vec<RobotCommand>,
+) -> FallTrial {
+    let mut watch = Watch::default();
+    let mut diverged: Option<Diverged> = None;
+    let mut control_steps = 0;
+    let mut fallen = 0;
+    while control_steps < steps && diverged.is_none() {
+        let commands = next(world, control_steps);
+        match world.watched_step(&commands, &mut watch) {
+            Ok(step) => fallen = step.robots.iter().filter(|robot| robot.sensed.fallen).count(),
+            Err(error) => diverged = Some(error),
+        }
+        control_steps += 1;
+    }
+    let diverged = diverged.map(|error| format!("step {control_steps}: {error}"));
+    FallTrial {
+        played: String::new(),
+        control_steps,
+        fallen,
+        diverged,
+        extremes: watch.extremes,
+        floor: None,
+    }
+}
+
+impl FallsCase {
+    /// What the trials of one case come to.
+    pub fn of(case: &str, trials: &[FallTrial]) -> FallsCase {
+        let mut greatest = Extremes::default();
+        let mut broken = Broken::default();
+        for trial in trials {
+            greatest.join(&trial.extremes, |at| format!("{}: {at}", trial.played));
+            let [speed, energy, depth, range] = trial.extremes.broken().map(usize::from);
+            broken.speed += speed;
+            broken.energy += energy;
+            broken.depth += depth;
+            broken.range += range;
+        }
+        let at = |trial: &FallTrial| Some(format!("{}, {}", trial.played, trial.diverged.as_ref()?));
+        let diverged_at: Vec<String> = trials.iter().filter_map(at).collect();
+        FallsCase {
+            case: case.into(),
+            episodes: trials.len(),
+            fallen: trials.iter().map(|trial| trial.fallen).sum(),
+            diverged: diverged_at.len(),
+            diverged_at,
+            broken,
+            greatest,
+        }
+    }
+
+    /// Column heads of its lines: greatest values, and in brackets how many episodes were beyond the limit.
+    pub const HEAD: &str = "case                  episodes fallen diverged  fastest link    energy made        deeper than 2 cm      beyond range";
+}
+
+impl fmt::Display for FallsCase {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Extremes { speed_m_s, made_j, made_share, depth_m, deep_s, beyond_rad } = &self.greatest;
+        write!(
+            f,
+            "{:22}{:>8}{:>7}{:>9}  {:>6.1} m/s ({})  {:>6.1} J, {:>3.0} % ({})  {:>3.0} mm, {:.2} s ({})  {:.2} rad ({})",
+            self.case,
+            self.episodes,
+            self.fallen,
+            self.diverged,
+            speed_m_s.value,
+            self.broken.speed,
+            made_j.value,
+            made_share.value * 100.0,
+            self.broken.energy,
+            depth_m.value * 1e3,
+            deep_s.value,
+            self.broken.depth,
+            beyond_rad.value,
+            self.broken.range,
+        )
+    }
+}

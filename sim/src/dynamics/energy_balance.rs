@@ -1,0 +1,188 @@
+//! Where the kinetic energy of a step came from, for benches and tests. A step itself runs nothing of this.
+//!
+//! The solver finds velocities v' from those before, v, by
+//!   M(q) (v' - v) = P - dt h,
+//! with the impulses P of everything that acts and the Coriolis and gyroscopic forces h, which in truth do no work. With the mean
+//! velocity u = (v + v') / 2, the impulses have done the work
+//!   P . u = K(q, v') - K(q, v) + dt h . u,
+//! exactly. Part of it is known one by one: gravity, springs, drives, pushes. The rest is what contacts, ends of ranges, dry
+//! friction, dampers and equalities did, and they can only take:
+//!   taken = P . u - W_gravity - W_springs - W_drives - W_pushes <= 0.
+//! The step then moves positions to q' and ends with velocities v''. Energy that nothing put in is what it has beyond all that,
+//! U being the potential of gravity and springs:
+//!   made = [K + U](q', v'') - [K + U](q, v) - W_drives - W_pushes - taken
+//!        = K(q', v'') - K(q, v') - dt h . u + U(q') - U(q) + W_gravity + W_springs.
+//! What pushes bodies out of each other moves positions alone: where that lifts something, it has been made, too.
+
+use super::trees::spatial::{ForceVector, Inertia, MotionVector, Symmetric};
+use super::trees::tree::Tree;
+use super::{DVec3, Dynamics};
+
+/// What [`Dynamics::energy_balance`] has to know of the state before the step, its pushes included.
+pub struct EnergyBefore {
+    trees: Vec<TreeBefore>,
+}
+
+struct TreeBefore {
+    q: Vec<f64>,
+    v: Vec<f64>,
+    axis: Vec<MotionVector>,
+    velocity: Vec<MotionVector>,
+    inertia: Vec<Inertia>,
+    external: Vec<ForceVector>,
+    kinetic: f64,
+    potential: f64,
+}
+
+/// The energy of one step, J.
+#[derive(Clone, Debug, Default)]
+pub struct EnergyBalance {
+    /// Kinetic energy before the step.
+    pub kinetic: f64,
+    /// Work of every drive, push and spring, and of gravity on every tree, that was positive.
+    pub put_in: f64,
+    /// Work of contacts, ends of ranges, dry friction, dampers and equalities; not above 0 where they are solved well.
+    pub taken: f64,
+    /// What nothing put in, by tree.
+    pub made: Vec<f64>,
+}
+
+impl Dynamics {
+    /// To be asked for after drives and pushes are set, before [`Dynamics::step`].
+    pub fn energy_before(&self) -> EnergyBefore {
+        let gravity = self.settings.gravity_m_s2;
+        EnergyBefore { trees: self.trees.all.iter().map(|tree| TreeBefore::of(tree, gravity)).collect() }
+    }
+
+    /// The energy of the step that has been made since.
+    pub fn energy_balance(&self, before: &EnergyBefore) -> EnergyBalance {
+        let mut balance = EnergyBalance::default();
+        for ((tree, before), offset) in self.trees.all.iter().zip(&before.trees).zip(&self.trees.offset) {
+            let solved = &self.final_v[*offset..offset + tree.dofs()];
+            before.close(tree, solved, self.settings.dt_s, self.settings.gravity_m_s2, &mut balance);
+        }
+        balance
+    }
+}
+
+impl TreeBefore {
+    fn of(tree: &Tree, gravity: DVec3) -> TreeBefore {
+        let inertia = inertias(tree);
+        TreeBefore {
+            q: tree.q.clone(),
+            v: tree.v.clone(),
+            axis: tree.axis.clone(),
+            velocity: tree.velocity.clone(),
+            external: tree.external.clone(),
+            kinetic: kinetic(tree, &inertia, &tree.velocity, &tree.v),
+            potential: potential(tree, gravity),
+            inertia,
+        }
+    }
+
+    /// Adds the step of one tree, which ended as `tree` is now. `solved` are the velocities that the solver found.
+    fn close(&self, tree: &Tree, solved: &[f64], dt_s: f64, gravity: DVec3, balance: &mut EnergyBalance) {
+        let mut solved = solved.to_vec();
+        if tree.is_lone() {
+            // It gyrates on its own, exactly: impulses act before, and the solver's velocity has the gyration in it.
+            let gyration = tree.half_gyration_rad_s * 2.0;
+            (DVec3::from_slice(&solved[3..6]) - gyration).write_to_slice(&mut solved[3..6]);
+        }
+        let after = self.link_velocities(tree, &solved);
+        let mean: Vec<MotionVector> =
+            self.velocity.iter().zip(&after).map(|(before, after)| (*before + *after) * 0.5).collect();
+        let coriolis = if tree.is_lone() { 0.0 } else { dt_s * self.coriolis_power(tree, &mean) };
+        let links = || self.inertia.iter().zip(&mean);
+        let weights = dt_s * links().map(|(inertia, v)| gravity.dot(inertia.mul(*v).linear)).sum::<f64>();
+        let pushes = dt_s * self.external.iter().zip(&mean).map(|(force, v)| v.dot(*force)).sum::<f64>();
+        let (mut springs, mut drives) = (0.0, 0.0);
+        balance.put_in += weights.max(0.0) + pushes.max(0.0);
+        for (i, link) in tree.links.iter().enumerate() {
+            let Some(axis) = link.joint.axis() else { continue };
+            let k = tree.layout.first_dof[i];
+            let moved = dt_s * 0.5 * (self.v[k] + solved[k]);
+            let spring = axis.stiffness * (axis.spring_rest - self.q[i] - dt_s * solved[k]) * moved;
+            let drive = tree.effort[i] * moved;
+            balance.put_in += spring.max(0.0) + drive.max(0.0);
+            springs += spring;
+            drives += drive;
+        }
+        let kinetic_solved = kinetic(tree, &self.inertia, &after, &solved);
+        let whole = kinetic_solved - self.kinetic + coriolis;
+        let kinetic_now = kinetic(tree, &inertias(tree), &tree.velocity, &tree.v);
+        let lifted = potential(tree, gravity) - self.potential;
+        balance.kinetic += self.kinetic;
+        balance.taken += whole - weights - springs - drives - pushes;
+        balance.made.push(kinetic_now - kinetic_solved - coriolis + lifted + weights + springs);
+    }
+
+    /// v = v_p + S q', where the tree was.
+    fn link_velocities(&self, tree: &Tree, v: &[f64]) -> Vec<MotionVector> {
+        let mut velocities: Vec<MotionVector> = Vec::with_capacity(tree.links.len());
+        for (i, link) in tree.links.iter().enumerate() {
+            let dof = tree.layout.first_dof[i];
+            let mut velocity = link.parent.map_or(MotionVector::default(), |parent| velocities[parent]);
+            for k in dof..dof + link.joint.dofs() {
+                velocity += self.axis[k] * v[k];
+            }
+            velocities.push(velocity);
+        }
+        velocities
+    }
+
+    /// h . u, link by link: the force that its own motion asks of each, without gravity, at its mean velocity.
+    fn coriolis_power(&self, tree: &Tree, mean: &[MotionVector]) -> f64 {
+        let mut accelerations: Vec<MotionVector> = Vec::with_capacity(tree.links.len());
+        let mut power = 0.0;
+        for (i, link) in tree.links.iter().enumerate() {
+            let velocity = self.velocity[i];
+            let acceleration = match link.parent {
+                Some(parent) => {
+                    let before = self.velocity[parent];
+                    accelerations[parent] + before.cross(velocity - before)
+                }
+                // As in `equations`: of a free link it is a point that moves whose velocity is a degree of freedom.
+                None if link.joint.dofs() == 6 => {
+                    MotionVector { angular: DVec3::ZERO, linear: -velocity.angular.cross(velocity.linear) }
+                }
+                None => MotionVector::default(),
+            };
+            accelerations.push(acceleration);
+            let inertia = &self.inertia[i];
+            let force = inertia.mul(acceleration) + velocity.cross_force(inertia.mul(velocity));
+            power += mean[i].dot(force);
+        }
+        power
+    }
+}
+
+/// Of each link about the tree's reference, as the tree is now.
+fn inertias(tree: &Tree) -> Vec<Inertia> {
+    let inertia = |(i, link): (usize, &super::Link)| {
+        let (mass_kg, com_m) = (link.mass.mass_kg, tree.centre_m(i));
+        let mut second_kg_m2 = tree.own_inertia[i].rotated(&tree.rotation[i]);
+        second_kg_m2 += Symmetric::of_point(mass_kg, com_m);
+        Inertia { mass_kg, first_kg_m: com_m * mass_kg, second_kg_m2 }
+    };
+    tree.links.iter().enumerate().map(inertia).collect()
+}
+
+fn kinetic(tree: &Tree, inertia: &[Inertia], velocity: &[MotionVector], v: &[f64]) -> f64 {
+    let links = inertia.iter().zip(velocity).map(|(inertia, v)| v.dot(inertia.mul(*v))).sum::<f64>();
+    let rotor = |(i, link): (usize, &super::Link)| {
+        let axis = link.joint.axis()?;
+        Some(axis.armature * v[tree.layout.first_dof[i]].powi(2))
+    };
+    0.5 * (links + tree.links.iter().enumerate().filter_map(rotor).sum::<f64>())
+}
+
+fn potential(tree: &Tree, gravity: DVec3) -> f64 {
+    let link = |(i, link): (usize, &super::Link)| {
+        let spring = link
+            .joint
+            .axis()
+            .map_or(0.0, |axis| 0.5 * axis.stiffness * (axis.spring_rest - tree.q[i]).powi(2));
+        spring - link.mass.mass_kg * gravity.dot(tree.reference_m + tree.centre_m(i))
+    };
+    tree.links.iter().enumerate().map(link).sum()
+}

@@ -1,0 +1,172 @@
+//! What a bench looks for in every physics step: speeds, energy that nothing put in, overlaps, joints beyond their ranges.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use serde::{Deserialize, Serialize};
+
+use super::{Step, World};
+use crate::PHYSICS_DT_S;
+use crate::dynamics::{ColliderId, Diverged, Dynamics, EnergyBalance, TreeId};
+use crate::robot::RobotCommand;
+
+/// No link moves faster: a fall from the ceiling ends at 7 m/s, and the fastest joints whip a hand to 20 m/s.
+pub const FASTEST_M_S: f64 = 25.0;
+/// Over any [`WINDOW_S`] no more than this share of what was there and was put in may come from nothing.
+pub const MOST_MADE_SHARE: f64 = 0.05;
+pub const WINDOW_S: f64 = 0.2;
+/// Where less than this was there and put in, it counts as this: what a robot of 35 kg has gained when it has fallen by 30 cm.
+/// What pushes bodies out of each other lifts such a robot out of the tolerated depth with less than 5 % of it.
+pub const LEAST_SCALE_J: f64 = 100.0;
+/// Nothing overlaps by more than this for longer than that.
+pub const DEEP_M: f64 = 0.02;
+pub const LONGEST_DEEP_S: f64 = 0.1;
+/// No joint is beyond its range by more.
+pub const FARTHEST_BEYOND_RAD: f64 = 0.1;
+
+/// The greatest value of something, and where it was.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Greatest {
+    pub value: f64,
+    pub at: String,
+}
+
+/// The greatest of everything that was watched, in m/s, J, shares, m, s and rad (m of slides).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Extremes {
+    /// Speed of a link's centre of mass.
+    pub speed_m_s: Greatest,
+    /// Kinetic energy that came from nothing in a window, and its share of what was there and was put in.
+    pub made_j: Greatest,
+    pub made_share: Greatest,
+    /// Overlap of two colliders at any time, and for how long a pair overlapped by more than [`DEEP_M`].
+    pub depth_m: Greatest,
+    pub deep_s: Greatest,
+    pub beyond_rad: Greatest,
+}
+
+/// Watches a world, physics step by physics step.
+#[derive(Default)]
+pub struct Watch {
+    pub extremes: Extremes,
+    window: VecDeque<EnergyBalance>,
+    /// Pairs that overlap by too much, and for how many physics steps by now.
+    deep: BTreeMap<[ColliderId; 2], u32>,
+}
+
+impl World {
+    /// As [`World::control_step`], under the eyes of `watch`.
+    pub fn watched_step(&mut self, commands: &[RobotCommand], watch: &mut Watch) -> Result<Step, Diverged> {
+        self.step_by(commands, |world| {
+            let before = world.dynamics.energy_before();
+            world.advance()?;
+            watch.look(&world.dynamics, world.dynamics.energy_balance(&before));
+            Ok(())
+        })
+    }
+}
+
+impl Greatest {
+    fn see(&mut self, value: f64, at: impl FnOnce() -> String) {
+        // What is no number is greater than any.
+        if value > self.value || value.is_nan() {
+            *self = Greatest { value, at: at() };
+        }
+    }
+
+    /// The greater of both.
+    pub fn join(&mut self, other: &Greatest, at: impl FnOnce(&str) -> String) {
+        self.see(other.value, || at(&other.at));
+    }
+}
+
+impl Extremes {
+    /// Takes over what was greater in `other`; `at` says where that was.
+    pub fn join(&mut self, other: &Extremes, at: impl Fn(&str) -> String) {
+        let pairs = [
+            (&mut self.speed_m_s, &other.speed_m_s),
+            (&mut self.made_j, &other.made_j),
+            (&mut self.made_share, &other.made_share),
+            (&mut self.depth_m, &other.depth_m),
+            (&mut self.deep_s, &other.deep_s),
+            (&mut self.beyond_rad, &other.beyond_rad),
+        ];
+        for (mine, others) in pairs {
+            mine.join(others, &at);
+        }
+    }
+
+    /// Which limits are broken: speed, energy, depth, range.
+    pub fn broken(&self) -> [bool; 4] {
+        [
+            (&self.speed_m_s, FASTEST_M_S),
+            (&self.made_share, MOST_MADE_SHARE),
+            (&self.deep_s, LONGEST_DEEP_S),
+            (&self.beyond_rad, FARTHEST_BEYOND_RAD),
+        ]
+        .map(|(greatest, limit)| greatest.value > limit || greatest.value.is_nan())
+    }
+}
+
+impl Watch {
+    /// Looks at what a physics step left behind.
+    fn look(&mut self, dynamics: &Dynamics, balance: EnergyBalance) {
+        for id in dynamics.tree_ids() {
+            let tree = dynamics.tree(id);
+            for (index, link) in tree.links().iter().enumerate() {
+                let at = || format!("{}/{}", tree.name, link.name);
+                self.extremes.speed_m_s.see(tree.com_velocity_m_s(index).length(), at);
+                self.extremes.beyond_rad.see(tree.beyond_range(index), at);
+            }
+        }
+        self.look_at_energy(dynamics, balance);
+        self.look_at_overlaps(dynamics);
+    }
+
+    fn look_at_energy(&mut self, dynamics: &Dynamics, balance: EnergyBalance) {
+        if self.window.len() >= (WINDOW_S / f64::from(PHYSICS_DT_S)).round() as usize {
+            self.window.pop_front();
+        }
+        self.window.push_back(balance);
+        let sum = |of: fn(&EnergyBalance) -> f64| self.window.iter().map(of).sum::<f64>();
+        let made_j = sum(|step| step.made.iter().sum()) + sum(|step| step.taken).max(0.0);
+        let put_in_j = self.window.front().map_or(0.0, |step| step.kinetic) + sum(|step| step.put_in);
+        let most = || {
+            let of_tree = |tree: &TreeId| {
+                self.window.iter().filter_map(|step| step.made.get(tree.index())).sum::<f64>()
+            };
+            let most = dynamics.tree_ids().max_by(|a, b| of_tree(a).total_cmp(&of_tree(b)));
+            let name = most.map_or("", |tree| dynamics.tree(tree).name.as_str());
+            format!("{name}, of {put_in_j:.0} J")
+        };
+        self.extremes.made_j.see(made_j, most);
+        self.extremes.made_share.see(made_j / put_in_j.max(LEAST_SCALE_J), most);
+    }
+
+    fn look_at_overlaps(&mut self, dynamics: &Dynamics) {
+        let mut deepest: BTreeMap<[ColliderId; 2], f64> = BTreeMap::new();
+        for touch in dynamics.touches() {
+            let depth_m = deepest.entry(touch.colliders).or_default();
+            *depth_m = depth_m.max(-touch.gap_m);
+        }
+        self.deep.retain(|pair, _| deepest.get(pair).is_some_and(|depth_m| *depth_m > DEEP_M));
+        for (pair, depth_m) in deepest {
+            let at = || pair.map(|id| body_name(dynamics, id)).join(" in ");
+            self.extremes.depth_m.see(depth_m, at);
+            if depth_m > DEEP_M {
+                let steps = self.deep.entry(pair).or_default();
+                *steps += 1;
+                self.extremes.deep_s.see(f64::from(*steps) * f64::from(PHYSICS_DT_S), at);
+            }
+        }
+    }
+}
+
+fn body_name(dynamics: &Dynamics, id: ColliderId) -> String {
+    match dynamics.collider(id).on {
+        None => "the room".into(),
+        Some(on) => {
+            let tree = dynamics.tree(on.tree);
+            format!("{}/{}", tree.name, tree.links()[on.link].name)
+        }
+    }
+}
