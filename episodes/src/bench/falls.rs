@@ -25,7 +25,8 @@ pub fn falls(
     let mut report = FallsReport { cases: Vec::new(), floor: Vec::new() };
     for (place, (number, case)) in asked.iter().enumerate() {
         let count = episodes / asked.len() + usize::from(place < episodes % asked.len());
-        let trials = over_seeds(count, |episode| trial(case, *number, episode as u32));
+        let seeds = FIRST_SEED..=FIRST_SEED - 1 + count as u32;
+        let trials = over_seeds(&seeds, |seed| trial(case, *number, seed));
         let mut trials = trials.into_iter().collect::<Result<Vec<FallTrial>, _>>()?;
         let figures = FallsCase::of(case.name, &trials);
         done(&figures);
@@ -39,8 +40,8 @@ pub fn falls(
 }
 
 /// One episode of a case; those in the worlds of tasks go through all tasks, each case from another one on.
-fn trial(case: &FallCase, number: usize, episode: u32) -> Result<FallTrial, BenchError> {
-    let seed = FIRST_SEED + episode;
+fn trial(case: &FallCase, number: usize, seed: u32) -> Result<FallTrial, BenchError> {
+    let episode = seed - FIRST_SEED;
     let (world, budget_steps, place) = match case.place {
         FallPlace::Task | FallPlace::TaskFromAbove => {
             let task = &tasks::ALL[(number + episode as usize) % tasks::ALL.len()];

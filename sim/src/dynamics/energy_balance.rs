@@ -65,6 +65,13 @@ impl Dynamics {
     }
 }
 
+impl EnergyBefore {
+    /// Kinetic energy of all trees.
+    pub fn kinetic(&self) -> f64 {
+        self.trees.iter().map(|tree| tree.kinetic).sum()
+    }
+}
+
 impl TreeBefore {
     fn of(tree: &Tree, gravity: DVec3) -> TreeBefore {
         let inertia = inertias(tree);

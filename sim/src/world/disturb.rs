@@ -6,9 +6,12 @@ use rapier3d::prelude::{AngVector, MassProperties};
 
 use super::World;
 use crate::Side;
-use crate::dynamics::{DVec3, Dynamics, LinkId, Mass};
+use crate::dynamics::{ContactPoint, DVec3, Dynamics, LinkId, Mass};
 use crate::locomotion::Locomotion;
 use crate::mechanism::precise;
+
+/// Resting contacts are a little deeper than nothing.
+const ALLOWED_OVERLAP_M: f64 = 0.002;
 
 /// A force for one control step.
 pub(super) struct Push {
@@ -67,6 +70,21 @@ impl World {
     pub(crate) fn put_robot(&mut self, robot: usize, world_from_pelvis: Pose) {
         let tree = self.dynamics.tree_mut(self.robots[robot].tree);
         tree.set_base(precise(&world_from_pelvis), DVec3::ZERO, DVec3::ZERO);
+    }
+
+    /// Whether a robot overlaps with something where it is.
+    pub(crate) fn overlaps(&mut self, robot: usize) -> bool {
+        let tree = self.robots[robot].tree;
+        let before = self.dynamics.state();
+        // A step finds out what touches, and is taken back.
+        let stepped = self.dynamics.step();
+        let of_robot = |touch: &ContactPoint| {
+            touch.colliders.iter().any(|id| self.dynamics.collider(*id).on.is_some_and(|on| on.tree == tree))
+        };
+        let overlap = |touch: &ContactPoint| of_robot(touch) && touch.gap_m < -ALLOWED_OVERLAP_M;
+        let overlaps = stepped.is_err() || self.dynamics.touches().iter().any(overlap);
+        self.dynamics.restore(&before).expect("a state of this world");
+        overlaps
     }
 
     /// Puts a free object somewhere, at rest. An unknown one is a bug of the caller.

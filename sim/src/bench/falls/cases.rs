@@ -72,6 +72,8 @@ const HEAD_M: f32 = 1.3;
 /// A robot that lies reaches so far below its pelvis.
 const LYING_M: f32 = 0.15;
 const AIM_M: f32 = 0.2;
+/// Some objects hang on walls: a robot that would begin within one is put elsewhere.
+const DRAWS: usize = 50;
 
 /// A robot before the doorway whose right arm goes through it, close to the post of the latch.
 const AT_DOOR_M: [f32; 2] = [-0.28, -0.25];
@@ -113,12 +115,7 @@ impl FallCase {
             FallPlace::Task => self.stagger(world, budget_steps, seed),
             FallPlace::Floor => floor::thrash(world, self.stagger, SHORT_STEPS, seed),
             FallPlace::TaskFromAbove => {
-                let objects = world.present().objects;
-                let marks = objects.iter().map(|object| object.state.world_from_object.translation);
-                let above_m = marks.into_iter().map(|at_m| at_m + Vector::Z * (DROP_M + LYING_M));
-                let above_m: Vec<Vector> = above_m.collect();
-                let at = (random.uniform([0.0, above_m.len() as f32]) as usize).min(above_m.len() - 1);
-                world.put_robot(0, lying(above_m[at], &mut random));
+                drop_on_an_object(world, &mut random);
                 self.stagger(world, SHORT_STEPS, seed)
             }
             FallPlace::OnRobot => {
@@ -159,6 +156,19 @@ impl FallCase {
             // It stands at the door until it is struck; what its arm does is drawn.
             vec![crate::RobotCommand { base: rest.base, ..robot.next(step) }]
         })
+    }
+}
+
+/// Puts the first robot above one of the objects and what that stands on, where nothing is in its way.
+fn drop_on_an_object(world: &mut World, random: &mut SplitMix64) {
+    let objects = world.present().objects;
+    for _ in 0..DRAWS {
+        let drawn = random.uniform([0.0, objects.len() as f32]) as usize;
+        let object_m = objects[drawn.min(objects.len() - 1)].state.world_from_object.translation;
+        world.put_robot(0, lying(object_m + Vector::Z * (DROP_M + LYING_M), random));
+        if !world.overlaps(0) {
+            return;
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 mod bench;
 mod contacts;
 mod drives;
+mod energy_balance;
 mod exactness;
 mod free_motion;
 mod friction;
