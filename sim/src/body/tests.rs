@@ -134,3 +134,26 @@ fn the_action_row_is_arms_hands_waist() {
     assert!(names.iter().all(|name| row.contains(&name.as_str())
         != (name.contains("hip") || name.contains("knee") || name.contains("ankle"))));
 }
+
+/// Unitree's numbers, each with the motor that has it.
+#[test]
+fn motors_are_as_fast_as_unitree_says() {
+    let limit_rad_s = |name: &str| {
+        let joints = &model().joints;
+        joints.iter().find(|joint| joint.name == name).expect("a joint").speed_limit_rad_s
+    };
+    for (name, expected_rad_s) in [
+        ("left_hip_roll_joint", 20.0),
+        ("right_knee_joint", 20.0),
+        ("right_hip_yaw_joint", 32.0),
+        ("left_ankle_roll_joint", 30.0),
+        ("waist_yaw_joint", 32.0),
+        ("waist_pitch_joint", 30.0),
+        ("left_wrist_roll_joint", 37.0),
+        ("right_wrist_yaw_joint", 22.0),
+        ("left_hand_thumb_0_joint", 3.14),
+        ("right_hand_index_1_joint", 12.0),
+    ] {
+        assert_eq!(limit_rad_s(name), expected_rad_s, "{name}");
+    }
+}

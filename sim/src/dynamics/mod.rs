@@ -4,7 +4,8 @@
 //! (`contacts::collision`: Parry's manifolds). Then it is, for every [`Tree`]: bias forces and mass matrix
 //! (`trees::equations`), its factor M = L^T D L and whitened velocities (`trees::factor`); then rows of contacts
 //! (`contacts::friction`), joints (`joints::bounds`) and equalities (`joints::equality`), Gauss-Seidel on them
-//! (`solving`), and new positions (`trees::kinematics`). It knows no robot and no file format.
+//! (`solving`), and new positions (`trees::kinematics`), after which a fast tree has no energy that nothing gave it
+//! (`trees::energy`). It knows no robot and no file format.
 //!
 //! SI units, radians, world axes with z wherever gravity says, f64 throughout. The same sequence of calls gives the same
 //! bits: trees and colliders count in the order in which they were added, and so do contacts.

@@ -13,7 +13,7 @@ pub(crate) use machinery::{Machinery, START, begin};
 pub(crate) use crate::dynamics::rounded;
 
 use crate::dynamics::{Axis, Collider, DPose3, DQuat, Dynamics, Joint, Link, LinkId, Mass};
-use crate::mjcf::{Actuator, AxisJoint, BodyLink, BodyTree, Geom, LinkJoint};
+use crate::mjcf::{Actuator, AxisJoint, BodyLink, BodyTree, Geom, LinkJoint, Primitive};
 use crate::owner::Owner;
 
 /// The pose in full precision; its rotation is a unit quaternion again.
@@ -30,6 +30,7 @@ pub(crate) fn add_collider(dynamics: &mut Dynamics, geom: &Geom, on: Option<Link
         on,
         body_from_shape: precise(&body_from_shape),
         friction: geom.friction,
+        endless: matches!(geom.primitive, Primitive::Plane { .. }),
         tag: owner.map_or(0, Owner::tag),
     });
 }
@@ -61,5 +62,9 @@ fn link(link: &BodyLink, world_from_file: &DPose3, actuators: &[Actuator]) -> Li
 fn axis(joint: &AxisJoint, actuators: &[Actuator]) -> Axis {
     let actuator = actuators.iter().find(|actuator| actuator.joint == joint.name);
     let effort_range = actuator.and_then(|actuator| actuator.effort_range);
-    Axis { effort_limit: effort_range.map_or(f64::INFINITY, |[_, most]| most), ..joint.axis.clone() }
+    Axis {
+        effort_limit: effort_range.map_or(f64::INFINITY, |[_, most]| most),
+        speed_limit: actuator.and_then(|actuator| actuator.speed_limit).unwrap_or(f64::INFINITY),
+        ..joint.axis.clone()
+    }
 }

@@ -61,8 +61,10 @@ pub struct Geom {
 const LAST_DRAWN_GROUP: i32 = 2;
 const DEFAULT_DENSITY_KG_M3: f64 = 1000.0;
 const DEFAULT_RGBA: [f64; 4] = [0.5, 0.5, 0.5, 1.0];
-/// A plane collides as a slab of this thickness: half-spaces have no mass centre and no bounds.
-const PLANE_THICKNESS_M: f32 = 0.2;
+/// A plane collides as a slab of this thickness, which nothing gets through, and this far around whatever is near it: it has no
+/// end, whatever is drawn of it, as in MuJoCo. Half-spaces have no mass centre and no bounds.
+const PLANE_THICKNESS_M: f32 = 2.0;
+const PLANE_REACH_M: f32 = 50.0;
 
 impl Geom {
     /// Geom `index` of a body.
@@ -104,10 +106,9 @@ impl Geom {
             }
             Primitive::Box { half_extents_m: h } => SharedShape::cuboid(h.x, h.y, h.z),
             Primitive::Ellipsoid { radii_m } => SharedShape::convex_hull(&ellipsoid_points(*radii_m))?,
-            Primitive::Plane { half_extents_m: [x, y] } => {
+            Primitive::Plane { .. } => {
                 body_from_shape *= Pose::from_translation(Vector::new(0.0, 0.0, -PLANE_THICKNESS_M / 2.0));
-                let extent = |half: f32| if half > 0.0 { half } else { 50.0 };
-                SharedShape::cuboid(extent(*x), extent(*y), PLANE_THICKNESS_M / 2.0)
+                SharedShape::cuboid(PLANE_REACH_M, PLANE_REACH_M, PLANE_THICKNESS_M / 2.0)
             }
             Primitive::Convex { vertices_m } => SharedShape::convex_hull(vertices_m)?,
             Primitive::Mesh(mesh) => SharedShape::convex_hull(&mesh.vertices_m)?,

@@ -6,6 +6,7 @@ use mjcf_rs::extras::{Actuator as ActuatorElement, ActuatorKind as Kind};
 use rapier3d::glamx::DVec3;
 
 use super::Document;
+use super::source::MjcfText;
 use crate::SimError;
 use crate::dynamics::Axis;
 
@@ -37,6 +38,8 @@ pub struct Actuator {
     /// Commands are clamped to this range.
     pub control_range: Option<[f64; 2]>,
     pub effort_range: Option<[f64; 2]>,
+    /// rad/s or m/s at which it can push no further.
+    pub speed_limit: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,6 +48,22 @@ pub enum ActuatorKind {
     Motor,
     /// kp (what it is told - q) - kd q'.
     Position { kp: f64, kd: f64 },
+}
+
+/// The `<numeric>` in which a file says how fast its motors turn, in the order of its actuators: MJCF has nothing else for it,
+/// and MuJoCo reads past it.
+const SPEED_LIMITS: &str = "actuator_speed_limit";
+
+pub(super) fn speed_limits(source: &MjcfText) -> Result<Option<Vec<f64>>, SimError> {
+    let xml = source.xml()?;
+    let mut numerics = xml.descendants().filter(|node| node.has_tag_name("numeric"));
+    let limits = numerics.find(|node| node.attribute("name") == Some(SPEED_LIMITS));
+    // The table of support has let only numbers pass.
+    let words = |node: roxmltree::Node| {
+        let words = node.attribute("data").unwrap_or_default().split_ascii_whitespace();
+        words.filter_map(|word| word.parse().ok()).collect()
+    };
+    Ok(limits.map(words))
 }
 
 impl LinkJoint {
@@ -84,10 +103,20 @@ impl LinkJoint {
 
 impl Document {
     pub fn actuators(&self) -> Result<Vec<Actuator>, SimError> {
-        self.model.actuators.iter().map(|element| self.actuator(element)).collect()
+        let elements = &self.model.actuators;
+        let limits = &self.speed_limits;
+        if let Some(limits) = limits.as_ref().filter(|limits| limits.len() != elements.len()) {
+            let (have, takes) = (limits.len(), elements.len());
+            let what = format!(
+                "numeric `{SPEED_LIMITS}` has {have} numbers; it takes {takes}, one for each actuator"
+            );
+            return Err(self.unsupported(what));
+        }
+        let limit = |index: usize| limits.as_ref().map(|limits| limits[index]);
+        elements.iter().enumerate().map(|(index, element)| self.actuator(element, limit(index))).collect()
     }
 
-    fn actuator(&self, element: &ActuatorElement) -> Result<Actuator, SimError> {
+    fn actuator(&self, element: &ActuatorElement, speed_limit: Option<f64>) -> Result<Actuator, SimError> {
         let joint = element.joint.clone().unwrap_or_default();
         self.axis_joint(&joint)?;
         if element.gear != [1.0, 0.0, 0.0, 0.0, 0.0, 0.0] {
@@ -108,9 +137,17 @@ impl Document {
             let limits = self.limits(what, limited, range);
             limits.map_err(|what| self.unsupported(format!("actuator of joint `{joint}`: {what}")))
         };
+        let effort_range = limits("force", element.force_limited, element.force_range)?;
+        if let Some(limit) = speed_limit.filter(|limit| *limit <= 0.0 || effort_range.is_none()) {
+            let what = format!(
+                "actuator of joint `{joint}`: a speed limit of {limit}; it has to be above 0, and needs a forcerange"
+            );
+            return Err(self.unsupported(what));
+        }
         Ok(Actuator {
             control_range: limits("ctrl", element.ctrl_limited, element.ctrl_range)?,
-            effort_range: limits("force", element.force_limited, element.force_range)?,
+            effort_range,
+            speed_limit,
             joint,
             kind,
         })

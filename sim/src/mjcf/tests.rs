@@ -128,14 +128,49 @@ fn equalities_and_actuators_are_read() {
         kind: ActuatorKind::Motor,
         control_range: Some([-5.0, 5.0]),
         effort_range: None,
+        speed_limit: None,
     };
     let position = Actuator {
         joint: "bolt".into(),
         kind: ActuatorKind::Position { kp: 20.0, kd: 3.0 },
         control_range: None,
         effort_range: Some([-4.0, 4.0]),
+        speed_limit: None,
     };
     assert_eq!(document.actuators().expect("actuators"), [motor, position]);
+}
+
+#[test]
+fn motors_have_the_speed_limits_that_a_numeric_states() {
+    let with = |forcerange: &str, data: &str| {
+        let joint = |name: &str| format!(r#"<body><joint name="{name}"/><geom size="0.1"/></body>"#);
+        let motors = format!(r#"<motor joint="a" forcerange="-1 1"/><motor joint="b" {forcerange}/>"#);
+        let numeric =
+            format!(r#"<numeric name="other" data="7"/><numeric name="actuator_speed_limit" {data}/>"#);
+        let (a, b) = (joint("a"), joint("b"));
+        document(&format!(
+            "<worldbody>{a}{b}</worldbody><actuator>{motors}</actuator><custom>{numeric}</custom>"
+        ))
+        .actuators()
+        .map(|motors| motors.iter().map(|motor| motor.speed_limit).collect::<Vec<_>>())
+        .map_err(|error| error.to_string())
+    };
+    let limited = r#"forcerange="-2 2""#;
+    assert_eq!(with(limited, r#"size="2" data="3.14 20""#), Ok(vec![Some(3.14), Some(20.0)]));
+    for (forcerange, data, expected) in [
+        (limited, r#"data="20""#, "has 1 numbers; it takes 2, one for each actuator"),
+        (limited, "", "has 0 numbers; it takes 2"),
+        (limited, r#"data="20 0""#, "joint `b`: a speed limit of 0; it has to be above 0"),
+        (limited, r#"data="-1 20""#, "joint `a`: a speed limit of -1; it has to be above 0"),
+        (
+            "",
+            r#"data="20 20""#,
+            "joint `b`: a speed limit of 20; it has to be above 0, and needs a forcerange",
+        ),
+    ] {
+        let error = with(forcerange, data).expect_err(expected);
+        assert!(error.contains(expected), "{error}");
+    }
 }
 
 #[test]

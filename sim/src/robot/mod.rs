@@ -76,7 +76,10 @@ impl Robot {
         let body = estimate::from_truth(&model, tree, hand_force_n, self.waist_target_rad());
         let load_n_m = self.feel(&body, &joints::torques_n_m(tree, &model));
         self.memory.odometry.update(&body, PHYSICS_DT_S);
-        let legs = self.locomotion.tick(&body, &command.base, PHYSICS_DT_S);
+        let legs = match self.memory.fallen {
+            true => limp_legs(&model),
+            false => self.locomotion.tick(&body, &command.base, PHYSICS_DT_S),
+        };
         let mut drives = [JointDrive::default(); JOINTS];
         self.set_upper_body(&mut drives, &load_n_m, command, substep);
         set_legs(&mut drives, &legs);
@@ -114,8 +117,10 @@ impl Robot {
                 feedforward_n_m: load_n_m[joint] + model.kd_n_m_s_rad * (to - from) / CONTROL_DT_S,
             };
         }
-        for (drive, offset_rad) in drives[WAIST..].iter_mut().zip(self.locomotion.waist_offset_rad()) {
-            drive.target_rad += offset_rad;
+        if !self.memory.fallen {
+            for (drive, offset_rad) in drives[WAIST..].iter_mut().zip(self.locomotion.waist_offset_rad()) {
+                drive.target_rad += offset_rad;
+            }
         }
     }
 
@@ -142,6 +147,17 @@ impl Robot {
         self.memory = memory;
         Ok(())
     }
+}
+
+/// Legs of a robot that has fallen: no controller here gets up, and one that goes on balancing on its back thrashes about with
+/// kilowatts. The dampers of the drives let it sink. Waist, arms and hands go on doing what they are told.
+fn limp_legs(model: &RobotModel) -> LegCommand {
+    LEGS.map(|first| {
+        std::array::from_fn(|i| JointDrive {
+            kd_n_m_s_rad: model.joints[first + i].kd_n_m_s_rad,
+            ..JointDrive::default()
+        })
+    })
 }
 
 fn set_legs(drives: &mut [JointDrive; JOINTS], legs: &LegCommand) {

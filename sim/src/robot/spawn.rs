@@ -88,6 +88,7 @@ fn tree_link(model: &RobotModel, link: &body::LinkModel) -> Link {
             friction_loss: f64::from(joint.friction_n_m),
             range: Some([f64::from(joint.lower_rad), f64::from(joint.upper_rad)]),
             effort_limit: f64::from(joint.effort_n_m),
+            speed_limit: f64::from(joint.speed_limit_rad_s),
             ..Axis::along(joint.axis.as_dvec3())
         })
     });

@@ -2,6 +2,7 @@
 
 mod contacts;
 mod disturb;
+mod ground;
 mod objects;
 mod snapshot;
 mod step;
@@ -79,6 +80,7 @@ impl World {
             SceneSource::Embedded(name) => World::of_scene(Document::parse(name, assets::scene(name)?)?)?,
             SceneSource::Read { document, world_from_scene } => World::furnished(document, world_from_scene)?,
         };
+        world.lay_ground();
         let dynamics = &mut world.dynamics;
         for placement in &spec.objects {
             objects::insert_object(dynamics, placement, &mut world.objects)?;

@@ -47,6 +47,7 @@ fn scene() -> Dynamics {
         on: None,
         body_from_shape: DPose3::from_translation(DVec3::new(0.0, 0.0, -0.1)),
         friction: FRICTION,
+        endless: false,
         tag: 0,
     });
     for tower in 0..3 {
@@ -70,6 +71,7 @@ fn scene() -> Dynamics {
                 on: Some(tree.link(part)),
                 body_from_shape: DPose3::IDENTITY,
                 friction: FRICTION,
+                endless: false,
                 tag: 0,
             });
         }

@@ -1,6 +1,7 @@
 //! Worlds from outside: physics, walking and pictures.
 
 mod allocation;
+mod falls;
 mod locomotion;
 mod odometry;
 mod peer_scenes;

@@ -37,6 +37,8 @@ pub struct JointModel {
     pub kp_n_m_rad: f32,
     pub kd_n_m_s_rad: f32,
     pub effort_n_m: f32,
+    /// At which its motor can push no further; infinite if the file does not say.
+    pub speed_limit_rad_s: f32,
     /// Coordinate in the file's first keyframe.
     pub rest_rad: f32,
 }

@@ -117,6 +117,7 @@ fn joint_model(
         kp_n_m_rad: kp as f32,
         kd_n_m_s_rad: kd as f32,
         effort_n_m: effort as f32,
+        speed_limit_rad_s: actuator.speed_limit.map_or(f32::INFINITY, |limit| limit as f32),
         rest_rad,
     })
 }

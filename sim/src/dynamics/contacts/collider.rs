@@ -1,13 +1,11 @@
 //! Colliders: convex shapes on links and in the world, and where they are in a step.
 
-use rapier3d::math::Pose;
 use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::prelude::SharedShape;
 use serde::{Deserialize, Serialize};
 
 use super::friction::Friction;
 use crate::dynamics::settings::Settings;
-use crate::dynamics::trees::spatial::rounded;
 use crate::dynamics::trees::{LinkId, Trees};
 use crate::dynamics::{DMat3, DPose3, DVec3};
 
@@ -23,6 +21,8 @@ pub struct Collider {
     /// Pose of the shape in the link's frame, or in the world's.
     pub body_from_shape: DPose3,
     pub friction: Friction,
+    /// Whether it goes on for ever along its x and y axes. The shape is then the part of it near something else.
+    pub endless: bool,
     /// Tells whoever owns the world whose collider it is.
     pub tag: u128,
 }
@@ -42,6 +42,12 @@ pub struct Surface {
     pub bounds: Aabb,
 }
 
+/// The part of an endless collider that counts is moved by whole multiples of this. A shape has to reach farther than this
+/// beyond what it meets; between two moves it lies still, and points of contact continue those of the step before.
+const TILE_M: f64 = 32.0;
+/// Bounds of an endless collider, from its middle.
+const ENDLESS_M: f64 = 1e6;
+
 impl ColliderId {
     #[inline]
     pub(in crate::dynamics) fn index(self) -> usize {
@@ -54,10 +60,14 @@ impl Surface {
         let local = collider.shape.compute_local_aabb();
         let body = collider.on.filter(|link| trees.moves(*link));
         let world_from_body = collider.on.map_or(DPose3::IDENTITY, |link| trees.world_from(link));
+        let mut half_m = local.half_extents().as_dvec3();
+        if collider.endless {
+            (half_m.x, half_m.y) = (ENDLESS_M, ENDLESS_M);
+        }
         let mut surface = Surface {
             body,
             middle_m: local.center().as_dvec3(),
-            half_m: local.half_extents().as_dvec3(),
+            half_m,
             world_from_shape: DPose3::IDENTITY,
             reach_m: 0.0,
             bounds: local,
@@ -91,8 +101,14 @@ impl Surface {
         self.world_from_shape.inverse() * middle_m - self.middle_m
     }
 
-    /// Pose of another surface in the frame of this one.
-    pub fn pose_of(&self, other: &Surface) -> Pose {
-        rounded(&(self.world_from_shape.inverse() * other.world_from_shape))
+    /// Where the shape is that another surface may meet: of an endless collider the part that lies beside that one.
+    pub fn beside(&self, other: &Surface) -> DPose3 {
+        if !self.collider.endless {
+            return self.world_from_shape;
+        }
+        let away_m = self.towards(other);
+        let tile_m = |away_m: f64| (away_m / TILE_M).round() * TILE_M;
+        let moved_m = DVec3::new(tile_m(away_m.x), tile_m(away_m.y), 0.0);
+        self.world_from_shape * DPose3::from_translation(moved_m)
     }
 }

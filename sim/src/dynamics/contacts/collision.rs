@@ -13,9 +13,10 @@ use super::collider::{Collider, ColliderId, Surface};
 use super::friction::Friction;
 use super::near::NearPairs;
 use super::{Candidate, ContactPoint, Impulses};
-use crate::dynamics::DVec3;
 use crate::dynamics::settings::Settings;
+use crate::dynamics::trees::spatial::rounded;
 use crate::dynamics::trees::{LinkId, Trees};
+use crate::dynamics::{DPose3, DVec3};
 
 #[derive(Default)]
 pub struct Collision {
@@ -68,7 +69,9 @@ impl Collision {
             if !surfaces[0].bounds.intersects(&surfaces[1].bounds) {
                 continue;
             }
-            let between = NearPair { colliders, surfaces, trees, settings };
+            let [first, second] = surfaces;
+            let world_from_shapes = [first.beside(second), second.beside(first)];
+            let between = NearPair { colliders, surfaces, world_from_shapes, trees, settings };
             let mut points = self.spare.pop().unwrap_or_default();
             let before = last.next_if(|manifold| manifold.colliders == colliders);
             between.find(before.map(|manifold| &manifold.points), &mut points);
@@ -107,6 +110,7 @@ impl Collision {
 struct NearPair<'a> {
     colliders: [ColliderId; 2],
     surfaces: [&'a Surface; 2],
+    world_from_shapes: [DPose3; 2],
     trees: &'a Trees,
     settings: &'a Settings,
 }
@@ -126,8 +130,10 @@ impl NearPair<'_> {
         }
         let near_m = (first.reach_m + second.reach_m) as f32;
         let [a, b] = self.surfaces.map(|surface| &*surface.collider.shape);
+        let [world_from_a, world_from_b] = self.world_from_shapes;
+        let a_from_b = rounded(&(world_from_a.inverse() * world_from_b));
         DefaultQueryDispatcher
-            .contact_manifold_convex_convex(&first.pose_of(second), a, b, None, None, near_m, manifold)
+            .contact_manifold_convex_convex(&a_from_b, a, b, None, None, near_m, manifold)
             .expect("Parry knows all convex shapes");
         // Parry may find no direction between two that only just touch; in the next step they are a little deeper, or apart.
         if !manifold.local_n1.is_normalized() {
@@ -147,7 +153,7 @@ impl NearPair<'_> {
         let faces = manifold.points.len() > 3;
         for point in manifold.points.iter().filter(|point| !faces || point.fid1 != PackedFeatureId::UNKNOWN) {
             let local_m = [point.local_p1, point.local_p2].map(Vector::as_dvec3);
-            let [on_a_m, on_b_m] = [0, 1].map(|side| self.surfaces[side].world_from_shape * local_m[side]);
+            let [on_a_m, on_b_m] = [0, 1].map(|side| self.world_from_shapes[side] * local_m[side]);
             let (gap_m, point_m) = ((on_b_m - on_a_m).dot(normal), (on_a_m + on_b_m) * 0.5);
             let [before_m_s, after_m_s] = bodies.map(|body| self.velocity_m_s(body, point_m));
             let parting_m_s = (after_m_s - before_m_s).dot(normal);

@@ -1,4 +1,4 @@
-//! Rows of single joints: drives at their effort limits, dry friction and limits of position, all along one degree of freedom.
+//! Rows of single joints: drives at their limits, dry friction and limits of position, all along one degree of freedom.
 
 use super::DriveLaw;
 use crate::dynamics::settings::{Pass, Settings};
@@ -22,7 +22,7 @@ struct JointRow {
     range: Option<Range>,
 }
 
-/// A drive near its effort limit, which the mass matrix leaves out.
+/// A drive near a limit of its effort or speed, which the mass matrix leaves out.
 struct BoundedDrive {
     law: DriveLaw,
     impulse: f64,
@@ -143,11 +143,8 @@ impl BoundedDrive {
         BoundedDrive { law, impulse }
     }
 
-    /// T' = rest - implicit v' with  v' = v + (T' - T) Y.Y,  within the limit.
     fn update(&mut self, inverse_mass: f64, v: &mut f64) {
-        let DriveLaw { rest, implicit, most } = self.law;
-        let change = (rest - implicit * *v - self.impulse) / (1.0 + implicit * inverse_mass);
-        let impulse = (self.impulse + change).clamp(-most, most);
+        let impulse = self.law.meet(inverse_mass, *v, self.impulse);
         *v += inverse_mass * (impulse - self.impulse);
         self.impulse = impulse;
     }

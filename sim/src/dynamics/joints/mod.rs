@@ -15,18 +15,55 @@ pub mod equality;
 use super::trees::link::Drive;
 use super::trees::tree::Tree;
 
-/// A drive's impulse in a step as a function of the velocity v' at its end:  rest - implicit v', within +-most.
+/// A drive's impulse in a step as a function of the velocity v' at its end:  rest - implicit v', within +-most. A motor that
+/// turns fast pushes less in the direction in which it turns, and brakes with all it has:
+///   |impulse| <= slope (speed_limit - |v'|),   slope = most / (speed_limit - SLACKENS speed_limit),
+/// which is all of it at 80 % of the limit and nothing at the limit. It holds at the end of the step as the rest does, so
+/// that no motor drives itself beyond its limit within a step, however light its link is.
 #[derive(Clone, Copy, Debug)]
 pub struct DriveLaw {
     pub rest: f64,
     pub implicit: f64,
     pub most: f64,
+    pub speed_limit: f64,
+    pub slope: f64,
 }
 
 /// A drive that exerted more than this share of its limit in the last step is a row in the next.
 const NEAR_LIMIT: f64 = 0.8;
+/// From this share of its speed limit on a drive pushes less.
+const SLACKENS: f64 = 0.8;
 /// Efforts keep to their limits to this share.
 const TOLERANCE: f64 = 1e-9;
+
+impl DriveLaw {
+    /// Smallest and largest impulse at the velocity `v` of the end of the step.
+    fn bounds(&self, v: f64) -> [f64; 2] {
+        if self.slope == 0.0 {
+            return [-self.most, self.most];
+        }
+        let low = -self.slope * (self.speed_limit + v);
+        let high = self.slope * (self.speed_limit - v);
+        [low.clamp(-self.most, 0.0), high.clamp(0.0, self.most)]
+    }
+
+    /// The impulse that meets the law at the velocity that it leaves behind:  v' = v + (T' - T) Y.Y,  where v is the
+    /// velocity with the impulse T. Every part of the law falls with v', so that each is met by itself and the least
+    /// counts.
+    pub(in crate::dynamics) fn meet(&self, inverse_mass: f64, v: f64, impulse: f64) -> f64 {
+        let line = |rest: f64, implicit: f64| {
+            impulse + (rest - implicit * v - impulse) / (1.0 + implicit * inverse_mass)
+        };
+        let wanted = line(self.rest, self.implicit);
+        if self.slope == 0.0 {
+            return wanted.clamp(-self.most, self.most);
+        }
+        let slack = self.slope * self.speed_limit;
+        let low = line(-slack, self.slope).clamp(-self.most, 0.0);
+        let high = line(slack, self.slope).clamp(0.0, self.most);
+        wanted.clamp(low, high)
+    }
+}
 
 impl Tree {
     pub fn drive(&mut self, link: usize, drive: Drive) {
@@ -35,17 +72,26 @@ impl Tree {
 
     pub(in crate::dynamics) fn drive_law(&self, link: usize, dt_s: f64) -> DriveLaw {
         let drive = &self.drives[link];
-        let limit = self.links[link].joint.axis().map_or(0.0, |axis| axis.effort_limit);
-        let (most, implicit) = (limit * dt_s, dt_s * (drive.kd + dt_s * drive.kp));
+        let axis = self.links[link].joint.axis();
+        let limits = axis.map_or((0.0, f64::INFINITY), |axis| (axis.effort_limit, axis.speed_limit));
+        let (most, speed_limit) = (limits.0 * dt_s, limits.1);
+        let implicit = dt_s * (drive.kd + dt_s * drive.kp);
         let rest = dt_s * (drive.kp * (drive.target - self.q[link]) + drive.feedforward);
-        DriveLaw { rest: if implicit == 0.0 { rest.clamp(-most, most) } else { rest }, implicit, most }
+        DriveLaw {
+            rest: if implicit == 0.0 { rest.clamp(-most, most) } else { rest },
+            implicit,
+            most,
+            speed_limit,
+            slope: if speed_limit.is_finite() { most / (speed_limit * (1.0 - SLACKENS)) } else { 0.0 },
+        }
     }
 
     /// Guesses which drives will be at their limits.
     pub(in crate::dynamics) fn guess_bounded(&mut self) {
         for (i, link) in self.links.iter().enumerate() {
-            let limit = link.joint.axis().map_or(f64::INFINITY, |axis| axis.effort_limit);
-            self.bounded[i] = self.effort[i].abs() > NEAR_LIMIT * limit;
+            let Some(axis) = link.joint.axis() else { continue };
+            self.bounded[i] = self.effort[i].abs() > NEAR_LIMIT * axis.effort_limit
+                || self.v[self.layout.first_dof[i]].abs() > SLACKENS * axis.speed_limit;
         }
     }
 
@@ -58,8 +104,10 @@ impl Tree {
                 continue;
             }
             let law = self.drive_law(i, dt_s);
-            let impulse = law.rest - law.implicit * v[self.layout.first_dof[i]];
-            if impulse.abs() > law.most * (1.0 + TOLERANCE) {
+            let v = v[self.layout.first_dof[i]];
+            let impulse = law.rest - law.implicit * v;
+            let ([low, high], tolerance) = (law.bounds(v), law.most * TOLERANCE);
+            if impulse > high + tolerance || impulse < low - tolerance {
                 self.bounded[i] = true;
                 more = true;
             }

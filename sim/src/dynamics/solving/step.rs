@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use crate::dynamics::Dynamics;
+use crate::dynamics::settings::Settings;
 use crate::dynamics::trees::spatial::ForceVector;
 use crate::dynamics::trees::tree::Tree;
 
@@ -20,11 +21,16 @@ impl Dynamics {
         self.check()?;
         self.solver.commit(&mut self.trees, self.settings.dt_s);
         self.collision.commit();
-        let dt_s = self.settings.dt_s;
+        let Settings { dt_s, gravity_m_s2, .. } = self.settings;
         for (tree, range) in self.trees.ranges() {
-            tree.keep_efforts(dt_s, &self.final_v[range.clone()]);
-            tree.integrate(dt_s, &self.moving_v[range.clone()], &self.final_v[range]);
+            let after = &self.final_v[range.clone()];
+            tree.keep_efforts(dt_s, after);
+            let due = tree.due(gravity_m_s2, dt_s, after, &self.solver.w[range.clone()]);
+            tree.integrate(dt_s, &self.moving_v[range], after);
             tree.kinematics();
+            if let Some(due) = due {
+                tree.settle(&due);
+            }
         }
         Ok(())
     }

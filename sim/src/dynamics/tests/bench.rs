@@ -36,12 +36,40 @@ impl Bench {
     pub fn add_slab(&mut self, half_width_m: f32, friction: Friction) {
         let shape = SharedShape::cuboid(half_width_m, half_width_m, 0.1);
         let body_from_shape = DPose3::from_translation(DVec3::new(0.0, 0.0, -0.1));
-        self.dynamics.add_collider(Collider { shape, on: None, body_from_shape, friction, tag: 0 });
+        self.dynamics.add_collider(Collider {
+            shape,
+            on: None,
+            body_from_shape,
+            friction,
+            endless: false,
+            tag: 0,
+        });
+    }
+
+    /// A floor without an end at z = 0, of which a part of 80 m is there at a time.
+    pub fn add_endless_floor(&mut self, friction: Friction) {
+        let shape = SharedShape::cuboid(40.0, 40.0, 1.0);
+        let body_from_shape = DPose3::from_translation(DVec3::new(0.0, 0.0, -1.0));
+        self.dynamics.add_collider(Collider {
+            shape,
+            on: None,
+            body_from_shape,
+            friction,
+            endless: true,
+            tag: 0,
+        });
     }
 
     pub fn add_shape(&mut self, on: LinkId, shape: SharedShape, friction: Friction) -> ColliderId {
         let body_from_shape = DPose3::IDENTITY;
-        self.dynamics.add_collider(Collider { shape, on: Some(on), body_from_shape, friction, tag: 0 })
+        self.dynamics.add_collider(Collider {
+            shape,
+            on: Some(on),
+            body_from_shape,
+            friction,
+            endless: false,
+            tag: 0,
+        })
     }
 
     /// A lone box of even density.

@@ -128,3 +128,24 @@ fn dynamics_contacts_report_the_weight() {
     assert!((normal / DT_S - 2.0 * G_M_S2).abs() < 0.05);
     assert_eq!(bench.dynamics.touches().len(), 4);
 }
+
+/// A part of an endless floor is wherever something comes down on it, and is as good there as at its middle.
+#[test]
+fn dynamics_endless_floor_carries_everywhere() {
+    let settled = |x_m: f64| {
+        let mut bench = Bench::new(DOWN);
+        bench.add_endless_floor(sliding(0.5));
+        let at = DPose3::from_translation(DVec3::new(x_m, -2.0 * x_m, 0.3));
+        let body = bench.add_box(3.0, DVec3::new(0.2, 0.1, 0.05), at, sliding(0.5));
+        bench.dynamics.tree_mut(body).set_base(at, DVec3::X, DVec3::ZERO);
+        bench.run_s(2.0);
+        let place_m = bench.position_m(body);
+        assert!((place_m.z - 0.05).abs() < 1e-3, "{place_m}");
+        place_m.x - x_m
+    };
+    let slid_m = settled(0.0);
+    // 15.9 m: it slides from one part of the floor to the next.
+    for x_m in [15.9, 60.0, -700.0] {
+        assert!((settled(x_m) - slid_m).abs() < 1e-3, "{} {slid_m}", settled(x_m));
+    }
+}

@@ -73,3 +73,34 @@ fn dynamics_thrashing_tree_keeps_its_momentum() {
     let (dp, dl) = ((p - linear).length() / size.0, (l - angular).length() / size.1);
     assert!(dp < 0.01 && dl < 0.01, "{dp} {dl}");
 }
+
+/// Left alone, a tree that whirls about keeps its momentum and gains no energy.
+#[test]
+fn dynamics_whirling_tree_gains_no_energy() {
+    for (fast, seed) in [(40.0, 12), (150.0, 13)] {
+        let mut random = Random(seed);
+        let mut bench = Bench::new(DVec3::ZERO);
+        let mut tree = bush(Joint::Free, &mut random);
+        stir(&mut tree, &mut random, fast);
+        tree.set_base(DPose3::IDENTITY, DVec3::ZERO, DVec3::ZERO);
+        let id = bench.add(tree);
+        let kinetic_j = |bench: &Bench| {
+            let tree = bench.dynamics.tree(id);
+            let armature = |link: usize| tree.links()[link].joint.axis().map_or(0.0, |axis| axis.armature);
+            let drives = (0..tree.links().len()).map(|i| armature(i) * tree.joint_velocity(i).powi(2));
+            bench.energy_j(id) + 0.5 * drives.sum::<f64>()
+        };
+        let (linear, angular) = momentum(bench.dynamics.tree(id));
+        let (first_j, mut before_j) = (kinetic_j(&bench), kinetic_j(&bench));
+        for _ in 0..1000 {
+            bench.step();
+            let now_j = kinetic_j(&bench);
+            assert!(now_j < before_j * 1.01, "{now_j} J after {before_j} J");
+            before_j = now_j;
+        }
+        assert!(before_j < first_j, "{before_j} J of {first_j} J");
+        let (p, l) = momentum(bench.dynamics.tree(id));
+        let (dp, dl) = ((p - linear).length() / linear.length(), (l - angular).length() / angular.length());
+        assert!(dp < 1e-9 && dl < 1e-9, "{dp} {dl}");
+    }
+}

@@ -21,11 +21,7 @@ impl Tree {
         let count = self.links.len();
         for i in 0..count {
             let acceleration = self.velocity_product(i, gravity_m_s2);
-            let link = &self.links[i];
-            let (mass_kg, com_m) = (link.mass.mass_kg, self.centre_m(i));
-            let mut second_kg_m2 = self.own_inertia[i].rotated(&self.rotation[i]);
-            second_kg_m2 += Symmetric::of_point(mass_kg, com_m);
-            let inertia = Inertia { mass_kg, first_kg_m: com_m * mass_kg, second_kg_m2 };
+            let inertia = self.inertia_of(i);
             self.inertia[i] = inertia;
             self.acceleration[i] = acceleration;
             let velocity = self.velocity[i];
@@ -42,6 +38,14 @@ impl Tree {
                 self.force[parent] += force;
             }
         }
+    }
+
+    /// Inertia of a link by itself.
+    pub(super) fn inertia_of(&self, i: usize) -> Inertia {
+        let (mass_kg, com_m) = (self.links[i].mass.mass_kg, self.centre_m(i));
+        let mut second_kg_m2 = self.own_inertia[i].rotated(&self.rotation[i]);
+        second_kg_m2 += Symmetric::of_point(mass_kg, com_m);
+        Inertia { mass_kg, first_kg_m: com_m * mass_kg, second_kg_m2 }
     }
 
     /// a_p + v_p x S q', the acceleration with q'' = 0. Gravity is an acceleration of the world upwards.

@@ -44,6 +44,8 @@ pub struct Axis {
     pub range: Option<[f64; 2]>,
     /// What a drive can exert at most; infinite for a joint that is never driven to its limit.
     pub effort_limit: f64,
+    /// At which a drive can push no further; near it, it pushes less. Infinite for one that knows no such speed.
+    pub speed_limit: f64,
 }
 
 /// What a joint's drive is told; it stays until it is told again and is not part of a state.
@@ -76,6 +78,7 @@ impl Axis {
             spring_rest: 0.0,
             range: None,
             effort_limit: f64::INFINITY,
+            speed_limit: f64::INFINITY,
         }
     }
 }

@@ -27,7 +27,17 @@ pub(super) const ELEMENTS: &[Element] = &[
     element(Support::Ignored, "size", &["mujoco"], &[], "memory is taken as it is needed"),
     element(Support::Ignored, "statistic", &["mujoco"], &[], "it is for MuJoCo's viewer"),
     element(Support::Ignored, "visual", &["mujoco"], &[], "it is for MuJoCo's viewer"),
-    element(Support::Ignored, "custom", &["mujoco"], &[], "nobody asks for it"),
+    element(Support::Mapped, "custom", &["mujoco"], &[], ""),
+    named(
+        Support::Mapped,
+        "numeric",
+        &["custom"],
+        "numeric",
+        &[NUMERIC],
+        "one called `actuator_speed_limit` has the speeds (rad/s or m/s) at which motors can push no further, one for each actuator in their order: from 80 % of it on a motor pushes less, and it brakes with all it has; MuJoCo's motors have no such limit; others are ignored",
+    ),
+    element(Support::Ignored, "text", &["custom"], &[], "nobody asks for it"),
+    element(Support::Ignored, "tuple", &["custom"], &[], "nobody asks for it"),
     element(
         Support::Ignored,
         "sensor",
@@ -124,6 +134,8 @@ pub(super) const ELEMENTS: &[Element] = &[
     ),
 ];
 
+const NUMERIC: &[Attribute] =
+    &[NAME, mapped(&["data"], ANY_NUMBERS), ignored(&["size"], "there are as many as there are")];
 const ACTUATORS: &[&str] = &["actuator", "default"];
 const SOFTNESS: Attribute = approximated(&["solref", "solimp"], "equalities are hard");
 

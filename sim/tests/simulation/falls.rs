@@ -1,0 +1,99 @@
+//! What becomes of what falls: robots go limp, and the floor has no edge.
+
+use std::sync::Arc;
+
+use tandem_sim::mjcf::Document;
+use tandem_sim::{ObjectPlacement, Pose, RobotPlacement, SceneSource, Vector, World, WorldSpec};
+
+fn robot(position_m: [f32; 2]) -> RobotPlacement {
+    RobotPlacement { name: "A".into(), position_m, yaw_rad: 0.0 }
+}
+
+#[test]
+fn the_legs_of_a_fallen_robot_are_limp() {
+    let spec = WorldSpec { scene: "floor".into(), robots: vec![robot([0.0, 0.0])], objects: vec![] };
+    let mut world = World::new(&spec).expect("a world");
+    let command = [world.rest_command(0)];
+    let mut fell = false;
+    for control_step in 0..200 {
+        if control_step < 20 {
+            world.push(0, "torso_link", Vector::new(0.0, 0.0, 0.2), Vector::new(400.0, 0.0, 0.0));
+        }
+        let step = world.control_step(&command).expect("it stays finite");
+        let robot = &step.robots[0];
+        // What a faster robot gains by integration is taken back after its drives have acted.
+        if fell && robot.sensed.qd_rad_s.iter().all(|speed| speed.abs() < 15.0) {
+            let model = &world.robots()[0].model;
+            for (index, joint) in model.joints.iter().enumerate().take(12) {
+                let (torque_n_m, velocity) = (robot.sensed.torque_n_m[index], robot.sensed.qd_rad_s[index]);
+                let damper_n_m = -joint.kd_n_m_s_rad * velocity;
+                assert!(
+                    (torque_n_m - damper_n_m).abs() < 0.01,
+                    "{}: {torque_n_m} {damper_n_m} N m",
+                    joint.name
+                );
+            }
+        }
+        fell = robot.sensed.fallen;
+    }
+    let step = world.present();
+    let sensed = &step.robots[0].sensed;
+    assert!(fell && sensed.qd_rad_s.iter().all(|speed| speed.abs() < 0.5), "it lies still");
+    let arm_rad = sensed.q_rad[15] - command[0].upper_rad[0];
+    assert!(arm_rad.abs() < 0.6, "its arm still does what it is told: {arm_rad} rad away");
+}
+
+/// The floor of home_098 is drawn to y = -2 m. A robot that is put beyond stands, and so does a bottle.
+#[test]
+fn floors_go_on_where_they_are_no_longer_drawn() {
+    let bottle = ObjectPlacement {
+        name: "bottle".into(),
+        file: "bottle".into(),
+        world_from_object: Pose::from_translation(Vector::new(60.0, -90.0, 0.1)),
+    };
+    let spec =
+        WorldSpec { scene: "home_098".into(), robots: vec![robot([0.0, -6.0])], objects: vec![bottle] };
+    let mut world = World::new(&spec).expect("a world");
+    let mut command = [world.rest_command(0)];
+    command[0].base.vx_m_s = 0.2;
+    for _ in 0..250 {
+        world.control_step(&command).expect("it stays finite");
+    }
+    let step = world.present();
+    assert!(!step.robots[0].sensed.fallen);
+    let bottle_m = step.object("bottle").expect("a bottle").world_from_object.translation;
+    assert!(bottle_m.z.abs() < 0.05, "{bottle_m}");
+}
+
+/// A floor that is a box ends, but what goes over its edge comes to rest on a ground below.
+#[test]
+fn what_goes_over_the_edge_of_a_box_lands_below_it() {
+    let bottle = |name: &str, x_m: f32| ObjectPlacement {
+        name: name.into(),
+        file: "bottle".into(),
+        world_from_object: Pose::from_translation(Vector::new(x_m, 0.5, 0.02)),
+    };
+    let floor = r#"<geom type="box" size="2 1 0.05" pos="0 0 -0.05"/>"#;
+    let plane = r#"<geom type="plane" size="1 1 0.1" pos="0 0 -0.3"/>"#;
+    for (geoms, ground_m) in [(floor.to_string(), -0.1), (format!("{floor}{plane}"), -0.3)] {
+        let xml = format!("<mujoco><worldbody>{geoms}</worldbody></mujoco>");
+        let document = Arc::new(Document::parse("room.xml", &xml).expect("a room"));
+        let spec = WorldSpec {
+            scene: SceneSource::Read { document, world_from_scene: Pose::IDENTITY },
+            robots: vec![robot([0.0, 0.0])],
+            objects: vec![bottle("on", 1.5), bottle("beside", 3.0)],
+        };
+        let mut world = World::new(&spec).expect("a world");
+        let command = [world.rest_command(0)];
+        for _ in 0..100 {
+            world.control_step(&command).expect("it stays finite");
+        }
+        let step = world.present();
+        assert!(!step.robots[0].sensed.fallen);
+        for (name, expected_m) in [("on", 0.0), ("beside", ground_m)] {
+            let bottle_m = step.object(name).expect("a bottle").world_from_object.translation;
+            // It may have tipped over.
+            assert!((bottle_m.z - expected_m).abs() < 0.05, "{name}: {bottle_m}");
+        }
+    }
+}
