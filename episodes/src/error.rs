@@ -55,7 +55,7 @@ impl EpisodeError {
         use RefusalClass::{Conflict, Invalid, NotFound};
         match self {
             EpisodeError::UnknownTask { .. } => Refusal::new("unknown-task", "Unknown task", NotFound),
-            EpisodeError::UnknownRobot { .. } => Refusal::new("unknown-robot", "Unknown robot", NotFound),
+            EpisodeError::UnknownRobot { .. } => Refusal::new("unknown-robot", "Unknown robot", Invalid),
             EpisodeError::ForeignRobot { .. } => {
                 Refusal::new("foreign-robot", "Another operator's robot", Conflict)
             }

@@ -36,6 +36,10 @@ pub enum InstructionsError {
     Parse { path: PathBuf, source: serde_json::Error },
     #[error("{path}: {reason}")]
     Unknown { path: PathBuf, reason: String },
+    #[error(
+        "{path}: {place} is empty, and nobody would know what to do; write there what is to be done, or leave it out for the task's own words"
+    )]
+    Empty { path: PathBuf, place: String },
 }
 
 impl Instructions {
@@ -46,6 +50,9 @@ impl Instructions {
         let instructions: Instructions = serde_json::from_str(&text)
             .map_err(|source| InstructionsError::Parse { path: path.into(), source })?;
         let unknown = |reason: String| InstructionsError::Unknown { path: path.into(), reason };
+        if let Some(place) = instructions.empty_place() {
+            return Err(InstructionsError::Empty { path: path.into(), place });
+        }
         for (id, own) in &instructions.0 {
             let task = tasks::find(id).map_err(|error| unknown(error.to_string()))?;
             let names: Vec<&str> = task.robots.iter().map(|robot| robot.name).collect();
@@ -54,6 +61,22 @@ impl Instructions {
             }
         }
         Ok(instructions)
+    }
+
+    /// Where words are missing: in a text, in what is said of a task, or in the whole.
+    fn empty_place(&self) -> Option<String> {
+        if self.0.is_empty() {
+            return Some("the file".into());
+        }
+        self.0.iter().find_map(|(id, own)| {
+            let robots = own.robots.iter().map(|(robot, text)| (format!("{id}.robots.{robot}"), text));
+            let mut texts =
+                own.joint.iter().map(|text| (format!("{id}.joint"), text)).chain(robots).peekable();
+            match texts.peek() {
+                None => Some(id.clone()),
+                Some(_) => texts.find(|(_, text)| text.trim().is_empty()).map(|(place, _)| place),
+            }
+        })
     }
 
     /// The reply to `list_tasks` in these words, where robots follow base commands within `limits`.
@@ -111,10 +134,14 @@ mod tests {
     #[test]
     fn mistakes_are_named_with_what_would_work() {
         for (text, expected) in [
-            (r#"{"handove": {}}"#, "no task \"handove\"; have: handover"),
+            (r#"{"handove": {"joint": "x"}}"#, "no task \"handove\"; have: handover"),
             (r#"{"handover": {"robots": {"C": "x"}}}"#, "handover has no robot \"C\"; have: A, B"),
             (r#"{"handover": {"both": "x"}}"#, "a file that works"),
             ("not JSON", "a file that works"),
+            ("{}", "the file is empty"),
+            (r#"{"handover": {}}"#, "handover is empty"),
+            (r#"{"handover": {"joint": ""}}"#, "handover.joint is empty"),
+            (r#"{"handover": {"joint": "x", "robots": {"A": "x", "B": " "}}}"#, "handover.robots.B is empty"),
         ] {
             let message = read(text).unwrap_err();
             assert!(message.contains(expected), "{message}");

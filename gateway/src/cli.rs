@@ -1,9 +1,10 @@
 //! The command line: which subcommands there are.
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::commands::{
-    CommandResult, bench, collect, demo, doctor, evaluate, locomotion, recover, replay, report, serve, tasks,
+    CommandResult, bench, collect, completions, demo, doctor, evaluate, locomotion, man, recover, replay,
+    report, serve, tasks,
 };
 
 /// Physics of humanoids that must work together, behind an HTTP API.
@@ -29,6 +30,8 @@ enum CliCommand {
     Report(report::ReportArgs),
     Bench(bench::BenchArgs),
     Doctor(doctor::DoctorArgs),
+    Completions(completions::CompletionsArgs),
+    Man(man::ManArgs),
 }
 
 impl Cli {
@@ -46,14 +49,14 @@ impl Cli {
             CliCommand::Report(args) => report::run(args),
             CliCommand::Bench(args) => bench::run(args),
             CliCommand::Doctor(args) => doctor::run(args),
+            CliCommand::Completions(args) => completions::run(&args, Cli::command()),
+            CliCommand::Man(args) => man::run(args, Cli::command()),
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
 
     #[test]

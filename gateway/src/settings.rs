@@ -1,7 +1,7 @@
 //! Settings: flags first, then environment (`TANDEM_*`), then a TOML file, then defaults.
 
 use std::{
-    net::SocketAddr,
+    net::{IpAddr, SocketAddr},
     path::{Path, PathBuf},
     sync::Arc,
     time::Duration,
@@ -77,7 +77,7 @@ pub struct Layer {
     #[arg(long, env = "TANDEM_MAX_REQUESTS", value_name = "N")]
     pub max_requests: Option<usize>,
     /// Requests that one address may send per second; further ones get 429 [default: any number].
-    #[arg(long, env = "TANDEM_RATE_LIMIT", value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, env = "TANDEM_RATE_LIMIT", value_name = "N")]
     pub rate_limit: Option<u32>,
     /// An episode without a call for so long is ended and gives its place back [default: 900].
     #[arg(long, env = "TANDEM_IDLE_TIMEOUT", value_name = "SECONDS")]
@@ -98,6 +98,9 @@ pub enum Record {
 }
 
 impl Layer {
+    /// How many episodes may be held at once, where nobody says it.
+    pub const MAX_EPISODES: u32 = 8;
+
     fn or(self, next: Layer) -> Layer {
         Layer {
             listen: self.listen.or(next.listen),
@@ -121,6 +124,80 @@ impl Layer {
             stop_timeout: self.stop_timeout.or(next.stop_timeout),
         }
     }
+
+    /// These settings, and from the file at `config` what they leave out.
+    pub fn over_file(self, config: &Path) -> Result<Layer, SettingsError> {
+        Ok(self.or(read_layer(config)?))
+    }
+
+    /// Refuses numbers and names that no server could be used with.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        let numbers = [
+            ("max_episodes", self.max_episodes.map(u64::from), "8"),
+            ("max_body_bytes", self.max_body_bytes.map(|bytes| bytes as u64), "2000000"),
+            ("request_timeout", self.request_timeout.map(u64::from), "30"),
+            ("max_requests", self.max_requests.map(|requests| requests as u64), "256"),
+            ("rate_limit", self.rate_limit.map(u64::from), "100"),
+            ("idle_timeout", self.idle_timeout.map(u64::from), "900"),
+        ];
+        if let Some((setting, _, example)) = numbers.into_iter().find(|(_, given, _)| *given == Some(0)) {
+            return Err(SettingsError::Zero { setting, example });
+        }
+        match self.allowed_host.iter().flatten().find(|name| !is_host(name)) {
+            Some(name) => Err(SettingsError::NoHost { name: name.clone() }),
+            None => Ok(()),
+        }
+    }
+
+    /// Address to serve on.
+    pub fn address(&self) -> SocketAddr {
+        self.listen.unwrap_or(SocketAddr::from(([127, 0, 0, 1], 8700)))
+    }
+
+    /// The token that is given; none is needed where no other machine reaches the address.
+    pub fn find_token(&self) -> Result<Option<Token>, SettingsError> {
+        let token = match (&self.token_file, &self.token) {
+            (Some(_), Some(_)) => return Err(SettingsError::TwoTokens),
+            (Some(path), None) if path.as_os_str().is_empty() => {
+                return Err(TokenError::Empty { setting: "token_file" }.into());
+            }
+            (Some(path), None) => Some(Token::read(path)?),
+            (None, token) => token.clone(),
+        };
+        let listen = self.address();
+        if token.is_none() && !listen.ip().to_canonical().is_loopback() {
+            return Err(SettingsError::Open { listen });
+        }
+        Ok(token)
+    }
+
+    /// Folder that recordings are written to.
+    pub fn runs_folder(&self) -> PathBuf {
+        self.runs.clone().unwrap_or_else(|| "runs".into())
+    }
+
+    /// The instructions of the file, or the tasks' own.
+    pub fn read_instructions(&self) -> Result<Instructions, InstructionsError> {
+        self.instructions.as_deref().map_or_else(|| Ok(Instructions::default()), Instructions::read)
+    }
+
+    /// The base controller; its file is not read yet.
+    pub fn controller(&self) -> Controller {
+        Controller::from_file(self.locomotion.as_deref())
+    }
+
+    /// Who draws pictures.
+    pub fn renderer(&self) -> RendererKind {
+        self.renderer.unwrap_or_default()
+    }
+}
+
+/// Whether a text is the name of a host alone, as requests name it before the port.
+fn is_host(name: &str) -> bool {
+    let part = |part: &str| {
+        !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_".contains(&byte))
+    };
+    name.split('.').all(part) || name.parse::<IpAddr>().is_ok()
 }
 
 /// Every setting, resolved.
@@ -191,6 +268,22 @@ pub enum SettingsError {
         /// The address to serve on.
         listen: SocketAddr,
     },
+    /// A limit that lets nothing through.
+    #[error("{setting} is 0, and the server could not be used; give at least 1, as {example}")]
+    Zero {
+        /// As files call it.
+        setting: &'static str,
+        /// A number that works.
+        example: &'static str,
+    },
+    /// What the server is to be reached by is no name.
+    #[error(
+        "allowed_host {name:?} is no name of a host; give it alone, as lab.example, without http:// and port"
+    )]
+    NoHost {
+        /// What was given.
+        name: String,
+    },
     /// The file with instructions cannot be used.
     #[error(transparent)]
     Instructions(#[from] InstructionsError),
@@ -214,33 +307,32 @@ impl Settings {
             Some(path) => read_layer(path)?,
             None => Layer::default(),
         };
-        let layer = flags.or(file);
-        let listen = layer.listen.unwrap_or(SocketAddr::from(([127, 0, 0, 1], 8700)));
-        let token = token(&layer, listen)?;
-        let locomotion = Controller::from_file(layer.locomotion.as_deref());
-        let renderer = layer.renderer.unwrap_or_default();
+        Settings::from_layer(flags.or(file))
+    }
+
+    fn from_layer(layer: Layer) -> Result<Arc<Settings>, SettingsError> {
+        layer.check()?;
+        let locomotion = layer.controller();
+        let renderer = layer.renderer();
         tracing::info!("{}", renderer.describe()?);
         let seconds = |given: Option<u32>, default: u32| Duration::from_secs(given.unwrap_or(default).into());
         Ok(Arc::new(Settings {
-            listen,
-            allowed_hosts: layer.allowed_host.unwrap_or_default(),
-            token,
-            runs: layer.runs.unwrap_or_else(|| "runs".into()),
+            listen: layer.address(),
+            token: layer.find_token()?,
+            runs: layer.runs_folder(),
             record: match layer.record {
                 None | Some(Record::Live) => Visibility::Live,
                 Some(Record::After) => Visibility::After,
             },
-            instructions: match &layer.instructions {
-                Some(path) => Instructions::read(path)?,
-                None => Instructions::default(),
-            },
+            instructions: layer.read_instructions()?,
             scene: layer.scene.as_deref().map(read_scene).transpose()?,
             base_limits: locomotion.load()?.limits(),
             locomotion,
             renderer,
             disclosure: layer.disclosure.unwrap_or_default(),
             hints: layer.hints.unwrap_or_default(),
-            max_episodes: layer.max_episodes.unwrap_or(8),
+            allowed_hosts: layer.allowed_host.unwrap_or_default(),
+            max_episodes: layer.max_episodes.unwrap_or(Layer::MAX_EPISODES),
             max_body_bytes: layer.max_body_bytes.unwrap_or(2_000_000),
             request_timeout: seconds(layer.request_timeout, 30),
             max_requests: layer.max_requests.unwrap_or(256),
@@ -249,19 +341,6 @@ impl Settings {
             stop_timeout: seconds(layer.stop_timeout, 30),
         }))
     }
-}
-
-/// The token that `layer` gives; none is needed where no other machine reaches `listen`.
-fn token(layer: &Layer, listen: SocketAddr) -> Result<Option<Token>, SettingsError> {
-    let token = match (&layer.token_file, &layer.token) {
-        (Some(_), Some(_)) => return Err(SettingsError::TwoTokens),
-        (Some(path), None) => Some(Token::read(path)?),
-        (None, token) => token.clone(),
-    };
-    if token.is_none() && !listen.ip().to_canonical().is_loopback() {
-        return Err(SettingsError::Open { listen });
-    }
-    Ok(token)
 }
 
 /// Parses a flag whose value is one of `all` by its name; `--help` and the error for a wrong name list the names.
@@ -309,6 +388,7 @@ mod tests {
         std::fs::remove_file(&path).unwrap();
         assert!(Settings::resolve(Layer::default(), Some(&path)).is_err());
     }
+
     #[test]
     fn an_address_that_others_reach_needs_a_token() {
         let token = || Token::parse("0123456789abcdef", "a test").unwrap();
@@ -329,5 +409,28 @@ mod tests {
         let missing = Layer { token_file: Some("/nowhere/token".into()), ..Layer::default() };
         let refused = Settings::resolve(missing, None).unwrap_err().to_string();
         assert!(refused.contains("/nowhere/token"), "{refused}");
+    }
+
+    #[test]
+    fn settings_that_let_nobody_in_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("settings.toml");
+        let check = |line: &str, says: &[&str]| {
+            std::fs::write(&path, line).unwrap();
+            let text = Settings::resolve(Layer::default(), Some(&path)).unwrap_err().to_string();
+            says.iter().for_each(|part| assert!(text.contains(part), "{line}: {text}"));
+        };
+        check("max_episodes = 0", &["max_episodes is 0", "at least 1, as 8"]);
+        for limit in ["max_body_bytes", "request_timeout", "max_requests", "rate_limit", "idle_timeout"] {
+            check(&format!("{limit} = 0"), &[limit, "at least 1"]);
+        }
+        for host in ["", "http://lab.example", "lab.example:8700", "lab..example", "a b"] {
+            check(&format!("allowed_host = [{host:?}]"), &["no name of a host", "as lab.example"]);
+        }
+        check("token_file = \"\"", &["token_file is set and empty", "openssl"]);
+        check("token = \"\"", &["unknown field `token`", "`token_file`"]);
+        let most = Layer { max_requests: Some(usize::MAX), stop_timeout: Some(0), ..Layer::default() };
+        let hosts = Some(["lab.example", "lab", "10.0.0.5", "fe80::1"].map(String::from).into());
+        assert!(Settings::resolve(Layer { allowed_host: hosts, ..most }, None).is_ok());
     }
 }

@@ -2,6 +2,7 @@
 
 use std::{
     env,
+    ffi::OsStr,
     fmt::{self, Write},
     fs, io,
     path::{Path, PathBuf},
@@ -41,6 +42,14 @@ pub enum TokenError {
         /// Where it came from.
         place: String,
     },
+    /// A setting is there and says nothing: whoever has given it takes the server for closed.
+    #[error(
+        "{setting} is set and empty; give a token by it (`openssl rand -hex 32` makes one), or unset it for a server without"
+    )]
+    Empty {
+        /// What is empty.
+        setting: &'static str,
+    },
     /// The system has no random numbers.
     #[error("no random numbers for a token: {0}")]
     Random(getrandom::Error),
@@ -52,9 +61,15 @@ const TOKEN_VARIABLE: &str = "TANDEM_TOKEN";
 impl Token {
     /// The token in the environment's variable `TANDEM_TOKEN`, if it is set.
     pub fn from_environment() -> Result<Option<Token>, TokenError> {
-        let text = env::var_os(TOKEN_VARIABLE).filter(|text| !text.is_empty());
+        env::var_os(TOKEN_VARIABLE).map(|text| Token::from_variable(&text)).transpose()
+    }
+
+    fn from_variable(text: &OsStr) -> Result<Token, TokenError> {
+        if text.is_empty() {
+            return Err(TokenError::Empty { setting: TOKEN_VARIABLE });
+        }
         // Bytes that are no UTF-8 become characters that no token has, and are refused.
-        text.map(|text| Token::parse(&text.to_string_lossy(), TOKEN_VARIABLE)).transpose()
+        Token::parse(&text.to_string_lossy(), TOKEN_VARIABLE)
     }
 
     /// The token in a file, without the white space around it.
@@ -160,6 +175,16 @@ mod tests {
     }
 
     #[test]
+    fn a_variable_that_is_set_has_a_token() {
+        assert!(Token::from_variable(OsStr::new(GOOD)).unwrap().matches(GOOD));
+        let refused = Token::from_variable(OsStr::new("")).unwrap_err().to_string();
+        assert!(
+            refused.contains("TANDEM_TOKEN is set and empty") && refused.contains("unset it"),
+            "{refused}"
+        );
+    }
+
+    #[test]
     fn made_tokens_differ() {
         let [(one, text), (other, _)] = [(); 2].map(|()| Token::random().unwrap());
         assert!(one.matches(&text) && !other.matches(&text) && one != other);
@@ -177,6 +202,8 @@ mod tests {
         fs::set_permissions(&path, fs::Permissions::from_mode(0o640)).unwrap();
         assert!(readable_by_others(&path));
         fs::write(&path, "short\n").unwrap();
+        assert!(Token::read(&path).unwrap_err().to_string().contains("16 to 256"));
+        fs::write(&path, "").unwrap();
         assert!(Token::read(&path).unwrap_err().to_string().contains("16 to 256"));
         assert!(Token::read(folder.path()).unwrap_err().to_string().contains("cannot read"));
     }

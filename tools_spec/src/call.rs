@@ -165,7 +165,10 @@ pub fn specs_for_programs(hints: Hints) -> Vec<ToolSpec> {
     let mut specs = operator_tool_specs(hints);
     for spec in &mut specs {
         match spec.name {
-            StartEpisode::NAME => spec.allow(&properties::<Driving>()),
+            StartEpisode::NAME => {
+                spec.allow(&properties::<Driving>());
+                spec.demand_one_of(Driving::conditions());
+            }
             Observe::NAME => spec.allow(&properties::<Formats>()),
             name if ActCall::TOOLS.contains(&name) => {
                 spec.allow(&properties::<WithCommand>());

@@ -97,6 +97,20 @@ fn equal_rows(most_steps: u32) -> Value {
     (1..=most_steps).map(each).collect::<Vec<_>>().into()
 }
 
+/// Lets every name of a robot be one of `robots`, which an episode has.
+pub fn bound_robots(schema: &mut Value, robots: &[String]) {
+    match schema {
+        Value::Array(items) => items.iter_mut().for_each(|item| bound_robots(item, robots)),
+        Value::Object(object) => {
+            if let Some(pattern) = object.get_mut("pattern").filter(|pattern| **pattern == ROBOT_PATTERN) {
+                *pattern = format!("^[{}]$", robots.concat()).into();
+            }
+            object.values_mut().for_each(|value| bound_robots(value, robots));
+        }
+        _ => {}
+    }
+}
+
 /// Bounds every number of a schema where it has no bound of its own. Integers are left alone, whose types bound them.
 pub fn bound_numbers(schema: &mut Value) {
     match schema {

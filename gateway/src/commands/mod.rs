@@ -2,21 +2,36 @@
 
 pub mod bench;
 pub mod collect;
+pub mod completions;
 pub mod demo;
 pub mod doctor;
 pub mod evaluate;
 mod flags;
 pub mod locomotion;
 mod logging;
+pub mod man;
 pub mod recover;
 pub mod replay;
 pub mod report;
 pub mod serve;
 pub mod tasks;
 
-use std::{error::Error, process::ExitCode};
+use std::{
+    error::Error,
+    io::{self, Write},
+    process::ExitCode,
+};
 
 pub use flags::Seeds;
 
 /// What a subcommand ends with: an error is printed and is a failure, too.
 pub type CommandResult = Result<ExitCode, Box<dyn Error>>;
+
+/// Prints a text that other programs may read. One that has read enough and has gone is no error.
+fn print(text: &str) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error),
+        _ => Ok(()),
+    }
+}

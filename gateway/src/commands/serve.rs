@@ -19,13 +19,13 @@ use crate::{
 pub struct ServeArgs {
     /// TOML file with any of the settings below; flags and environment come first.
     #[arg(long, env = "TANDEM_CONFIG", value_name = "FILE")]
-    config: Option<PathBuf>,
+    pub(super) config: Option<PathBuf>,
     /// Log for people, or one JSON object per line.
     #[arg(long, env = "TANDEM_LOG_FORMAT", value_name = "FORMAT", default_value = "text")]
     log_format: LogFormat,
     /// Settings given as flags or environment.
     #[command(flatten)]
-    flags: Layer,
+    pub(super) flags: Layer,
 }
 
 /// Serves.

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
     sync::{
         Arc, OnceLock,
-        atomic::{AtomicBool, AtomicU64, Ordering},
+        atomic::{AtomicU32, AtomicU64, Ordering},
     },
     time::Duration,
 };
@@ -14,7 +14,7 @@ use tandem_episodes::{
     CallReply, Clock, EpisodeError, EpisodeSpec, Facts, OperatorCall, OperatorCommand, RunFolder, Session,
     monotonic,
 };
-use tandem_tools_spec::{Briefing, Call, ManageReply, ResultReply, ToolCall, ToolReply};
+use tandem_tools_spec::{Briefing, Call, EndReason, ManageReply, Protocol, ResultReply, ToolCall, ToolReply};
 use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 
 use super::{
@@ -70,13 +70,28 @@ pub struct EpisodeThread {
     jobs: mpsc::Sender<Job>,
     status: Arc<SharedStatus>,
     folder: PathBuf,
+    subject: EpisodeSubject,
+    robots: Vec<String>,
     steps_per_command: u32,
+}
+
+/// What an episode is one of.
+#[derive(Debug, Clone, Copy)]
+pub struct EpisodeSubject {
+    /// The task's id.
+    pub task: &'static str,
+    /// The seed.
+    pub seed: u32,
+    /// The rules.
+    pub protocol: Protocol,
 }
 
 /// What the thread lets everybody know without being asked.
 #[derive(Debug, Default)]
 struct SharedStatus {
-    ended: AtomicBool,
+    /// Why the episode takes no more commands.
+    ended: OnceLock<EndReason>,
+    env_steps: AtomicU32,
     /// The first failure of the recording.
     recording_failed: OnceLock<String>,
     /// How long the policy has thought, in nanoseconds.
@@ -86,7 +101,12 @@ struct SharedStatus {
 impl SharedStatus {
     /// Takes over how `session` stands.
     fn update(&self, session: &PanicGuard) {
-        self.ended.store(session.ended(), Ordering::Relaxed);
+        if let Some(reason) = session.ended() {
+            self.ended.get_or_init(|| reason);
+        }
+        if let Some(env_steps) = session.env_steps() {
+            self.env_steps.store(env_steps, Ordering::Relaxed);
+        }
         self.thought.store(session.thought().as_nanos() as u64, Ordering::Relaxed);
         if let Some(reason) = session.recording_failed() {
             self.recording_failed.get_or_init(|| reason.to_owned());
@@ -119,6 +139,7 @@ impl EpisodeThread {
         let (jobs, inbox) = mpsc::channel(WAITING_CALLS);
         let (started, start) = oneshot::channel();
         let status = Arc::new(SharedStatus::default());
+        let subject = EpisodeSubject { task: spec.task.id, seed: spec.seed, protocol: spec.protocol };
         let (from_thread, name, path) = (status.clone(), id.to_owned(), folder.path.clone());
         let thread = move || {
             // Every line that is logged on this thread names the episode.
@@ -142,8 +163,10 @@ impl EpisodeThread {
             .spawn(thread)
             .map_err(HostingError::Thread)?;
         let briefing = start.await.map_err(|_| HostingError::EpisodePanicked)??;
+        status.env_steps.fetch_max(briefing.status.env_steps, Ordering::Relaxed);
         let steps_per_command = briefing.status.budget.steps_per_command;
-        Ok((EpisodeThread { jobs, status, folder: path, steps_per_command }, briefing))
+        let robots = briefing.robots.iter().map(|robot| robot.robot.clone()).collect();
+        Ok((EpisodeThread { jobs, status, folder: path, subject, robots, steps_per_command }, briefing))
     }
 
     /// Runs a call of the policy that directs all robots and returns its reply.
@@ -201,7 +224,27 @@ impl EpisodeThread {
 
     /// Whether the episode takes no more commands.
     pub fn ended(&self) -> bool {
-        self.status.ended.load(Ordering::Relaxed) || self.jobs.is_closed()
+        self.end_reason().is_some() || self.jobs.is_closed()
+    }
+
+    /// Why the episode takes no more commands, as far as its last call has shown.
+    pub fn end_reason(&self) -> Option<EndReason> {
+        self.status.ended.get().copied()
+    }
+
+    /// Control steps executed up to the last call, the initial hold included.
+    pub fn env_steps(&self) -> u32 {
+        self.status.env_steps.load(Ordering::Relaxed)
+    }
+
+    /// What is played.
+    pub fn subject(&self) -> &EpisodeSubject {
+        &self.subject
+    }
+
+    /// The robots of the episode, in order.
+    pub fn robots(&self) -> &[String] {
+        &self.robots
     }
 
     /// How long the policy has thought, up to its last call.
@@ -295,7 +338,7 @@ fn serve(mut session: PanicGuard, mut inbox: mpsc::Receiver<Job>, status: &Share
                 // The log has the reason of a refusal.
                 let _ = session.run(|session| session.end_if_abandoned(idle));
                 status.update(&session);
-                if session.ended() {
+                if session.ended().is_some() {
                     tracing::info!("abandoned, and ended");
                 }
             }

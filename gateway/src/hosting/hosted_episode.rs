@@ -2,7 +2,11 @@
 
 use std::sync::Arc;
 
-use tandem_tools_spec::{Briefing, Call, ManageReply, ResultReply, StatusReply, ToolCall, ToolReply};
+use tandem_episodes::EpisodeError;
+use tandem_tools_spec::{
+    Briefing, Call, EPISODE_TOOLS, EpisodeEntry, ManageReply, Operators, ResultReply, SpecError, StatusReply,
+    TalkCall, ToolCall, ToolReply,
+};
 
 use super::{
     Answer, EpisodeThread, HostingError,
@@ -94,9 +98,38 @@ impl HostedEpisode {
         Ok(briefing)
     }
 
+    /// Its line in the list of episodes. Its thread is not asked, which may be at work.
+    pub fn entry(&self) -> EpisodeEntry {
+        let subject = self.thread.subject();
+        EpisodeEntry {
+            episode_id: self.id.clone(),
+            task: subject.task.into(),
+            seed: subject.seed,
+            protocol: subject.protocol,
+            operators: if self.team.is_some() { Operators::PerRobot } else { Operators::One },
+            step: self.thread.env_steps(),
+            ended: self.thread.end_reason(),
+        }
+    }
+
     /// Whether operators may talk.
     pub fn may_talk(&self) -> bool {
         self.team.as_ref().is_some_and(|team| team.may_talk())
+    }
+
+    /// Refuses a tool that `who` is not offered, whatever its arguments are.
+    pub fn check_offered(&self, who: &Caller, tool: &str) -> Result<(), HostingError> {
+        let is_operator = matches!(who, Caller::Operator { .. });
+        let for_talk = |tool: &str| TalkCall::TOOLS.contains(&tool);
+        if for_talk(tool) && !self.may_talk() {
+            return Err(HostingError::NoTalk);
+        }
+        if EPISODE_TOOLS.contains(&tool) {
+            return Ok(());
+        }
+        let offered = EPISODE_TOOLS.iter().filter(|tool| (is_operator && self.may_talk()) || !for_talk(tool));
+        let have = offered.copied().collect();
+        Err(EpisodeError::from(SpecError::UnknownTool { name: tool.into(), have }).into())
     }
 
     /// Ends the episode, as [`EpisodeThread::close`] does; operators who wait for each other are told.

@@ -45,11 +45,19 @@ impl PanicGuard {
         }
     }
 
-    /// Whether the episode takes no more commands.
-    pub fn ended(&self) -> bool {
+    /// Why the episode takes no more commands, if it takes none.
+    pub fn ended(&self) -> Option<EndReason> {
         match &self.state {
-            GuardState::Sound(session) => session.ended().is_some(),
-            GuardState::Panicked(_) => true,
+            GuardState::Sound(session) => session.ended(),
+            GuardState::Panicked(_) => Some(EndReason::SimulatorFailed),
+        }
+    }
+
+    /// How many control steps have been executed; none that are known after a panic.
+    pub fn env_steps(&self) -> Option<u32> {
+        match &self.state {
+            GuardState::Sound(session) => Some(session.env_steps()),
+            GuardState::Panicked(_) => None,
         }
     }
 

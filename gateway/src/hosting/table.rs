@@ -7,7 +7,9 @@ use std::{
 };
 
 use tandem_episodes::{EpisodeSpec, RunFolder, tasks};
-use tandem_tools_spec::{Briefing, Driving, Protocol, ResultReply, StartEpisode, StartReply, TaskList};
+use tandem_tools_spec::{
+    Briefing, Driving, EpisodeList, Protocol, ResultReply, StartEpisode, StartReply, TaskList,
+};
 use tokio::{
     sync::{OwnedSemaphorePermit, Semaphore},
     task::JoinSet,
@@ -156,6 +158,13 @@ impl EpisodeTable {
         let mut briefing = self.hosted(id)?.briefing(who).await?;
         self.settings.instructions.rephrase_briefing(&mut briefing);
         Ok(briefing)
+    }
+
+    /// The episodes that `who` may know of, by id.
+    pub fn list(&self, who: &Caller) -> EpisodeList {
+        let held = self.lock();
+        let known = held.episodes.values().filter(|episode| episode.admit(who).is_ok());
+        EpisodeList { episodes: known.map(HostedEpisode::entry).collect() }
     }
 
     /// Whether `who` is an operator who may talk to others.

@@ -2,10 +2,19 @@
 
 use std::{sync::Arc, time::Instant};
 
-use tandem_tools_spec::{EPISODE_TOOLS, ListTasks, StartEpisode, Tool as _};
+use serde_json::Value;
+use tandem_tools_spec::{
+    EPISODE_TOOLS, ListTasks, StartEpisode, Tool as _, ToolSpec, operator_tool_specs, tool_specs,
+};
 
 use super::problem::ApiError;
-use crate::{hosting::EpisodeTable, settings::Settings};
+use crate::{
+    hosting::{Caller, EpisodeTable},
+    settings::Settings,
+};
+
+/// The version of this program.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// The server as its handlers see it.
 #[derive(Debug, Clone)]
@@ -14,6 +23,21 @@ pub struct AppState {
     pub table: Arc<EpisodeTable>,
     /// What the server was told.
     pub settings: Arc<Settings>,
+}
+
+impl AppState {
+    /// The tools that `caller` may be offered: talking is for operators who may.
+    pub fn tool_specs(&self, caller: &Caller) -> Vec<ToolSpec> {
+        match self.table.may_talk(caller) {
+            true => operator_tool_specs(self.settings.hints),
+            false => tool_specs(self.settings.hints),
+        }
+    }
+
+    /// The REST interface as `caller` may use it.
+    pub fn openapi(&self, caller: &Caller) -> Value {
+        tandem_tools_spec::openapi(VERSION, self.settings.hints, self.table.may_talk(caller))
+    }
 }
 
 /// Answers a call of the tool `name` by `work`, and counts it with its status and the time it took.

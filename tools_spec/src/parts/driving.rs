@@ -2,6 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 /// The shortest and the longest patience, in seconds.
 const PATIENCE_S: [f64; 2] = [0.05, 600.0];
@@ -12,11 +13,12 @@ pub struct Driving {
     /// "per_robot": each robot has an operator of its own, who sees and commands that robot alone, by the token that the reply
     /// has for it. "one" or null: one policy directs all robots.
     pub operators: Option<Operators>,
-    /// How long operators wait for one who does not command, in seconds, before its robot holds still. Null: 120. Says nothing
-    /// where one policy directs all.
+    /// How long operators wait for one who does not command, in seconds, before its robot holds still. Null: 120. Refused where
+    /// one policy directs all.
     #[schemars(range(min = PATIENCE_S[0], max = PATIENCE_S[1]))]
     pub patience_s: Option<f64>,
-    /// True: operators may talk to each other by the tool say. False or null: they may not.
+    /// True: operators may talk to each other by the tool say, which is refused where one policy directs all. False or null: they
+    /// may not.
     pub talk: Option<bool>,
 }
 
@@ -36,8 +38,22 @@ impl Driving {
         self.patience_s.unwrap_or(Driving::PATIENCE_S)
     }
 
-    /// Checks the patience. The text says what would work.
+    /// JSON Schema of what [`Driving::validate`] demands of several fields together.
+    pub(crate) fn conditions() -> Value {
+        json!([
+            { "required": ["operators"], "properties": { "operators": { "const": Operators::PerRobot } } },
+            { "properties": { "talk": { "enum": [false, null] }, "patience_s": { "type": "null" } } },
+        ])
+    }
+
+    /// Checks the patience, and that nothing is said of operators where there are none. The text says what would work.
     pub fn validate(&self) -> Result<(), String> {
+        let given = [self.patience_s.map(|_| "patience_s"), self.talk.filter(|talk| *talk).map(|_| "talk")];
+        if let (false, Some(field)) = (self.is_per_robot(), given.into_iter().flatten().next()) {
+            return Err(format!(
+                "{field} is for operators, and one policy directs all robots; add \"operators\": \"per_robot\", or leave {field} out"
+            ));
+        }
         let [shortest, longest] = PATIENCE_S;
         match self.patience_s {
             Some(given) if !(shortest..=longest).contains(&given) => Err(format!(
@@ -99,8 +115,6 @@ pub struct Heard {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
-
     use super::*;
 
     #[test]
@@ -114,7 +128,8 @@ mod tests {
 
     #[test]
     fn patience_has_its_limits() {
-        let with = |patience_s: f64| Driving { patience_s: Some(patience_s), ..Driving::default() };
+        let operators = Some(Operators::PerRobot);
+        let with = |patience_s: f64| Driving { operators, patience_s: Some(patience_s), talk: None };
         for patience_s in PATIENCE_S {
             assert_eq!(with(patience_s).validate(), Ok(()));
         }
@@ -122,5 +137,21 @@ mod tests {
             assert!(with(patience_s).validate().is_err(), "{patience_s}");
         }
         assert_eq!((Driving::default().patience_s(), Driving::default().is_per_robot()), (120.0, false));
+    }
+
+    #[test]
+    fn what_is_said_of_operators_needs_some() {
+        let check =
+            |operators: Option<Operators>, patience_s: Option<f64>, talk: Option<bool>, says: &str| {
+                let text = Driving { operators, patience_s, talk }.validate().err().unwrap_or_default();
+                assert!(text.contains(says) && text.is_empty() == says.is_empty(), "{text}");
+            };
+        for operators in [None, Some(Operators::One)] {
+            check(operators, Some(5.0), None, "patience_s is for operators");
+            check(operators, None, Some(true), "talk is for operators");
+            check(operators, None, Some(true), "add \"operators\": \"per_robot\", or leave talk out");
+            check(operators, None, Some(false), "");
+        }
+        check(Some(Operators::PerRobot), Some(5.0), Some(true), "");
     }
 }

@@ -3,6 +3,7 @@
 mod command;
 mod driving;
 mod episode;
+mod listing;
 mod pictures;
 mod quantities;
 
@@ -11,5 +12,6 @@ pub use command::{
 };
 pub use driving::{Driving, Heard, OperatorToken, Operators, Partner, PartnerDid};
 pub use episode::{Budget, Disclosure, Hints, PhaseReached, Protocol, RobotFallen};
+pub use listing::{EpisodeEntry, EpisodeList};
 pub use pictures::{Bytes, CameraArrays, DepthFormat, Formats, ImageFormat, PixelRegion, Png};
 pub use quantities::{BASE_COLUMNS, BaseCommand, BaseLimits, JointValues, Pose, Range};

@@ -6,7 +6,7 @@ use super::format::Format;
 use super::plain::plain_schema;
 use super::spec::ToolSpec;
 use crate::limits::MOST_STEPS;
-use crate::parts::{Heard, Partner};
+use crate::parts::{EpisodeList, Heard, Partner};
 use crate::refusal::ProblemBody;
 use crate::tool::Tool;
 use crate::tools::{Briefing, Finish, GetStatus, StartEpisode};
@@ -22,6 +22,7 @@ pub fn openapi(version: &str, tools: &[ToolSpec]) -> Value {
         }
         paths.insert(spec.route.path.clone(), path);
     }
+    paths["/v1/episodes"]["get"] = list_episodes();
     let status = with_notice(plain_schema::<<GetStatus as Tool>::Reply>());
     let result = plain_schema::<<Finish as Tool>::Reply>();
     let briefing = "What has to be known to play the episode, as its start said it; for the operator of a robot, its own part.";
@@ -64,10 +65,16 @@ fn paths_without_tools() -> Map<String, Value> {
     let of_episode = "The tools of a running episode: each with its route and with the schema of its body, which says how \
         many control steps the episode's protocol allows for one command.";
     let of_episode = operation("list_episode_tools", of_episode, "200", specs.clone());
+    let home = text(
+        "home",
+        "A page with the episodes that the caller may know of, and where to go on.",
+        "text/html",
+    );
     let docs = text("docs", "This description as a page.", "text/html");
     let metrics =
         text("metrics", "What the server has done and does, in the text format of Prometheus.", "text/plain");
     let paths = [
+        ("/", json!({ "get": home })),
         ("/healthz", json!({ "get": health })),
         ("/metrics", json!({ "get": metrics })),
         ("/docs", json!({ "get": docs })),
@@ -75,6 +82,11 @@ fn paths_without_tools() -> Map<String, Value> {
         ("/v1/episodes/{episode_id}/tools", json!({ "parameters": [episode_id()], "get": of_episode })),
     ];
     paths.into_iter().map(|(path, methods)| (path.into(), methods)).collect()
+}
+
+fn list_episodes() -> Value {
+    let list = "The episodes that the server holds, as far as they are the caller's business: for the operator of a robot, its own.";
+    operation("list_episodes", list, "200", plain_schema::<EpisodeList>())
 }
 
 fn list_tools(specs: Value) -> Value {

@@ -6,7 +6,7 @@ use serde_json::{Map, Value};
 use super::nullable::leave_out;
 use super::plain::{body_schema, plain_schema};
 use super::strict::{require_episode_id, strict_schema};
-use crate::limits::bound_steps;
+use crate::limits::{bound_robots, bound_steps};
 use crate::parts::Hints;
 use crate::tool::{Route, Tool};
 
@@ -83,6 +83,11 @@ impl ToolSpec {
         }
     }
 
+    /// Lets a body be only what fits one of these schemas, too.
+    pub(crate) fn demand_one_of(&mut self, conditions: Value) {
+        self.marked_body["anyOf"] = conditions;
+    }
+
     /// JSON Schema of a REST body, which need not be strict: what may be null may be left out, and lengths are said. A command
     /// may have up to `most_steps` control steps.
     pub fn body_schema(&self, most_steps: u32) -> Value {
@@ -109,9 +114,10 @@ impl ToolSpec {
         schema.as_object_mut().map(std::mem::take).unwrap_or_default()
     }
 
-    /// The tool as the running episode `id` has it.
-    pub fn of_episode(self, id: &str, most_steps: u32) -> EpisodeToolSpec {
-        let body_schema = self.body_schema(most_steps);
+    /// The tool as the running episode `id` with these `robots` has it.
+    pub fn of_episode(self, id: &str, robots: &[String], most_steps: u32) -> EpisodeToolSpec {
+        let mut body_schema = self.body_schema(most_steps);
+        bound_robots(&mut body_schema, robots);
         let route = Route::of_episode(id, self.name);
         EpisodeToolSpec { spec: ToolSpec { route, ..self }, body_schema }
     }

@@ -6,8 +6,11 @@ use tandem_tools_spec::{Format, Hints, ToolSpec, episode_tool_specs, openapi, to
 /// Everything that a policy is told of the tools, face by face.
 fn faces(hints: Hints) -> Vec<String> {
     let specs = tool_specs(hints);
-    let mut faces =
-        vec![json!(specs), json!(episode_tool_specs(hints, "x", 25, false)), openapi("1.2.3", hints)];
+    let mut faces = vec![
+        json!(specs),
+        json!(episode_tool_specs(hints, "x", &["A".into(), "B".into()], 25, false)),
+        openapi("1.2.3", hints, false),
+    ];
     for format in Format::ALL {
         faces.push(specs.iter().map(|spec| spec.formatted(format)).collect());
     }
@@ -126,7 +129,7 @@ fn what_may_be_null_may_be_left_out_but_of_the_strict_schema() {
 
 #[test]
 fn every_tool_names_its_route_and_openapi_has_it() {
-    let document = openapi("1.2.3", Hints::On);
+    let document = openapi("1.2.3", Hints::On, false);
     for spec in tool_specs(Hints::On) {
         let operation = &document["paths"][&spec.route.path][spec.route.method.to_lowercase()];
         assert_eq!(operation["operationId"], spec.name, "{:?}", spec.route);
@@ -140,7 +143,7 @@ fn every_tool_names_its_route_and_openapi_has_it() {
 
 #[test]
 fn a_running_episode_says_how_many_steps_a_command_may_have() {
-    let specs = episode_tool_specs(Hints::On, "handover-seed0", 25, false);
+    let specs = episode_tool_specs(Hints::On, "handover-seed0", &["A".into(), "B".into()], 25, false);
     let body = |name: &str| {
         let found = specs.iter().find(|tool| tool.spec.name == name).expect("a tool");
         assert_eq!(found.spec.route.path, format!("/v1/episodes/handover-seed0/tools/{name}"));

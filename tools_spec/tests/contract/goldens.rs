@@ -44,7 +44,7 @@ fn tools_without_hints() {
 /// That robots have equally many rows is said in fifty alternatives, of which three are kept.
 #[test]
 fn openapi_document() {
-    let mut document = openapi("0.0.0", Hints::On);
+    let mut document = openapi("0.0.0", Hints::On, false);
     let chunk = "/paths/~1v1~1episodes~1{episode_id}~1tools~1send_joint_chunk/post/requestBody/content/application~1json/schema";
     let rows = document.pointer_mut(&format!("{chunk}/properties/robots/anyOf"));
     let rows = rows.and_then(Value::as_array_mut).expect("the alternatives");

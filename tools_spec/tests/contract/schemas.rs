@@ -2,7 +2,8 @@
 
 use serde_json::{Value, json};
 use tandem_tools_spec::{
-    ActCall, EPISODE_TOOLS, Hints, LookCall, TalkCall, ToolCall, operator_tool_specs, tool_specs,
+    ActCall, EPISODE_TOOLS, Hints, LookCall, TalkCall, ToolCall, episode_tool_specs, operator_tool_specs,
+    tool_specs,
 };
 
 const REFUSED_KEYWORDS: &[&str] = &[
@@ -207,7 +208,7 @@ fn numbers_that_json_cannot_hold_are_refused_too() {
 
 #[test]
 fn openapi_has_a_path_for_every_tool() {
-    let document = tandem_tools_spec::openapi("1.2.3", Hints::On);
+    let document = tandem_tools_spec::openapi("1.2.3", Hints::On, false);
     assert_eq!((&document["openapi"], &document["info"]["version"]), (&json!("3.1.0"), &json!("1.2.3")));
     for tool in EPISODE_TOOLS.iter().filter(|tool| !TalkCall::TOOLS.contains(tool)) {
         let call = &document["paths"][format!("/v1/episodes/{{episode_id}}/tools/{tool}")]["post"];
@@ -255,7 +256,7 @@ fn a_region_names_every_so_many_pixels_row_by_row() {
 /// What the checks refuse in a body, its schema does not allow.
 #[test]
 fn openapi_says_what_is_refused() {
-    let document = tandem_tools_spec::openapi("1.2.3", Hints::On);
+    let document = tandem_tools_spec::openapi("1.2.3", Hints::On, false);
     let field = |tool: &str, pointer: &str| {
         let body =
             &document["paths"][format!("/v1/episodes/{{episode_id}}/tools/{tool}")]["post"]["requestBody"];
@@ -293,7 +294,7 @@ fn openapi_says_what_is_refused() {
 
 #[test]
 fn openapi_describes_every_tool() {
-    let document = tandem_tools_spec::openapi("1.2.3", Hints::On).to_string();
+    let document = tandem_tools_spec::openapi("1.2.3", Hints::On, false).to_string();
     for spec in tool_specs(Hints::On) {
         assert!(
             document.contains(&format!("\"operationId\":\"{}\"", spec.name)),
@@ -310,4 +311,37 @@ fn joint_values_keep_their_order_and_six_decimals() {
     assert_eq!(serde_json::to_string(&values).unwrap(), r#"{"waist":0.639963,"elbow":0.0}"#);
     let read: tandem_tools_spec::JointValues = serde_json::from_value(json!(values)).unwrap();
     assert_eq!((read.get("waist"), read.get("knee")), (Some(0.639_963), None));
+}
+
+/// An episode of two robots has no third.
+#[test]
+fn bodies_of_an_episode_name_its_own_robots() {
+    let robots = ["A".to_owned(), "B".to_owned()];
+    let patterns = |tool: &str| {
+        let specs = episode_tool_specs(Hints::On, "x", &robots, 25, true);
+        let spec = specs.iter().find(|spec| spec.spec.name == tool).unwrap();
+        let text = spec.body_schema.to_string();
+        let found: Vec<String> = text
+            .split("\"pattern\":\"")
+            .skip(1)
+            .filter_map(|rest| Some(rest.split('"').next()?.into()))
+            .collect();
+        found
+    };
+    for tool in ["observe", "get_robot_state", "query_depth", "check_reach", "walk", "send_joint_chunk"] {
+        assert!(patterns(tool).iter().all(|pattern| pattern == "^[AB]$"), "{tool}: {:?}", patterns(tool));
+        assert!(!patterns(tool).is_empty(), "{tool}");
+    }
+}
+
+/// What is said of operators needs some, and the body's schema says so.
+#[test]
+fn a_start_says_what_only_operators_can_have() {
+    let document = tandem_tools_spec::openapi("1.2.3", Hints::On, false);
+    let body =
+        &document["paths"]["/v1/episodes"]["post"]["requestBody"]["content"]["application/json"]["schema"];
+    assert_eq!(body["anyOf"][0]["properties"]["operators"]["const"], "per_robot");
+    assert_eq!(body["anyOf"][1]["properties"]["patience_s"]["type"], "null");
+    let document = |talk| tandem_tools_spec::openapi("1.2.3", Hints::On, talk).to_string();
+    assert_eq!([document(false), document(true)].map(|text| text.contains("/tools/say")), [false, true]);
 }

@@ -12,7 +12,7 @@ use std::{
     time::Duration,
 };
 
-use tandem_episodes::{OperatorCall, OperatorCommand};
+use tandem_episodes::{EpisodeError, OperatorCall, OperatorCommand};
 use tandem_tools_spec::{
     Call, Driving, Finish, GetStatus, Heard, ManageCall, OperatorToken, Partner, PartnerDid, TalkCall,
     ToolCall,
@@ -80,6 +80,7 @@ impl Team {
         call: Call,
     ) -> Result<Answer, HostingError> {
         let seat = self.seat(robot)?;
+        self.check_robots(&call)?;
         let call = OperatorCall::new(robot, call)?;
         let answer = match &call.call().tool {
             ToolCall::Act(_) => return self.act(episode, seat, call).await,
@@ -223,6 +224,18 @@ impl Team {
     fn partners(&self, seat: usize, did: &[PartnerDid]) -> Vec<Partner> {
         let all = self.seats.iter().zip(did).enumerate().filter(|(other, _)| *other != seat);
         all.map(|(_, (other, did))| Partner { robot: other.robot.clone(), did: *did }).collect()
+    }
+
+    /// Refuses a call that names a robot which nobody drives.
+    fn check_robots(&self, call: &Call) -> Result<(), EpisodeError> {
+        let names = || self.seats.iter().map(|seat| seat.robot.as_str());
+        match call.robots().into_iter().find(|robot| !names().any(|name| name == *robot)) {
+            Some(robot) => Err(EpisodeError::UnknownRobot {
+                name: robot.into(),
+                have: names().map(str::to_owned).collect(),
+            }),
+            None => Ok(()),
+        }
     }
 
     fn seat(&self, robot: &str) -> Result<usize, HostingError> {

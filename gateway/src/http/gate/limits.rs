@@ -36,7 +36,7 @@ impl Limits {
     /// The limits that `settings` set.
     pub fn new(settings: &Settings) -> Limits {
         Limits {
-            permits: Arc::new(Semaphore::new(settings.max_requests)),
+            permits: Arc::new(Semaphore::new(settings.max_requests.min(Semaphore::MAX_PERMITS))),
             most_requests: settings.max_requests,
             rates: settings.rate_limit.map(|per_second| Arc::new(Mutex::new(Rates::new(per_second)))),
         }

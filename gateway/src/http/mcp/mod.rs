@@ -27,8 +27,8 @@ use rmcp::{
 use serde::Serialize;
 use serde_json::Value;
 use tandem_tools_spec::{
-    Call, CameraImage, Format, ListTasks, LookReply, StartEpisode, Tool as _, ToolReply, operator_tool_specs,
-    parse_args, parse_start, tool_specs,
+    Call, CameraImage, Format, ListTasks, LookReply, StartEpisode, TalkCall, Tool as _, ToolReply,
+    parse_args, parse_start,
 };
 
 use super::{
@@ -75,11 +75,7 @@ impl ServerHandler for McpServer {
         _: Option<PaginatedRequestParams>,
         context: RequestContext<RoleServer>,
     ) -> Result<ListToolsResult, ErrorData> {
-        let hints = self.app.settings.hints;
-        let specs = match caller_of(&context).is_some_and(|caller| self.app.table.may_talk(caller)) {
-            true => operator_tool_specs(hints),
-            false => tool_specs(hints),
-        };
+        let specs = self.app.tool_specs(caller_of(&context).unwrap_or(&Caller::Host));
         let tools: Result<Vec<Tool>, _> =
             specs.iter().map(|spec| serde_json::from_value(spec.formatted(Format::Mcp))).collect();
         let tools = tools.map_err(|error| ErrorData::internal_error(error.to_string(), None))?;
@@ -110,7 +106,9 @@ impl ServerHandler for McpServer {
         context: RequestContext<RoleServer>,
     ) -> Result<CallToolResponse, ErrorData> {
         if !every_tool().contains(&request.name.as_ref()) {
-            let text = format!("no tool {:?}; have: {}", request.name, every_tool().join(", "));
+            let specs = self.app.tool_specs(caller_of(&context).unwrap_or(&Caller::Host));
+            let have: Vec<&str> = specs.iter().map(|spec| spec.name).collect();
+            let text = format!("no tool {:?}; have: {}", request.name, have.join(", "));
             return Err(ErrorData::invalid_params(text, None));
         }
         let args = Value::Object(request.arguments.unwrap_or_default());
@@ -175,12 +173,16 @@ impl McpServer {
             (Some(Value::String(id)), _) => id,
             // An operator's token says which episode.
             (None, Caller::Operator { episode, .. }) => episode.clone(),
+            _ if TalkCall::TOOLS.contains(&name) => return Err(HostingError::NoTalk.into()),
             _ => {
                 call?;
                 return Err(ApiError::NoEpisodeNamed { tool: name.into() });
             }
         };
         let episode = self.app.table.hosted(&id);
+        if let Ok(episode) = &episode {
+            episode.admit(caller).and_then(|()| episode.check_offered(caller, name))?;
+        }
         let call = match &episode {
             Ok(episode) => call.map_err(|refusal| refusal.in_episode(&episode.thread))?,
             Err(_) => call?,

@@ -16,6 +16,17 @@ pub fn page(document: &Value) -> String {
             operations += &section(path, &method.to_uppercase(), operation, &methods["parameters"]);
         }
     }
+    let body = format!(
+        r#"<p>The interface, as <a href="/v1/openapi.json">/v1/openapi.json</a> has it for programs. The same tools are served to MCP hosts
+at <code>/mcp</code>, and as specifications for language models at <a href="/v1/tools">/v1/tools</a>.
+<a href="/">The episodes</a> are on a page of their own.</p>
+{operations}"#
+    );
+    whole(&title, &body)
+}
+
+/// A page with this title and body, both in HTML.
+pub fn whole(title: &str, body: &str) -> String {
     format!(
         r#"<!doctype html>
 <html lang="en">
@@ -28,9 +39,7 @@ pub fn page(document: &Value) -> String {
 </head>
 <body>
 <h1>{title}</h1>
-<p>The interface, as <a href="/v1/openapi.json">/v1/openapi.json</a> has it for programs. The same tools are served to MCP hosts
-at <code>/mcp</code>, and as specifications for language models at <a href="/v1/tools">/v1/tools</a>.</p>
-{operations}</body>
+{body}</body>
 </html>
 "#
     )
@@ -139,7 +148,7 @@ mod tests {
 
     #[test]
     fn every_operation_is_there_with_its_fields() {
-        let page = page(&tandem_tools_spec::openapi("1.2.3", Hints::On));
+        let page = page(&tandem_tools_spec::openapi("1.2.3", Hints::On, false));
         for spec in tool_specs(Hints::On) {
             assert!(page.contains(&format!("<details id=\"{}\">", spec.name)), "{}", spec.name);
             for name in spec.input_schema["properties"].as_object().into_iter().flat_map(Map::keys) {
@@ -153,7 +162,7 @@ mod tests {
 
     #[test]
     fn nothing_is_loaded_and_nothing_breaks_out() {
-        let mut document = tandem_tools_spec::openapi("1.2.3", Hints::On);
+        let mut document = tandem_tools_spec::openapi("1.2.3", Hints::On, false);
         document["info"]["title"] = "<script>".into();
         let page = page(&document);
         for foreign in ["<script", "src=", "url(", "@import", "http://", "https://", "<link"] {

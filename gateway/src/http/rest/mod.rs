@@ -1,6 +1,7 @@
 //! The REST routes: those under `/v1`, and those about the server itself.
 
 mod docs;
+mod home;
 mod idempotency;
 
 use axum::{
@@ -15,11 +16,11 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use tandem_tools_spec::{
     Call, EpisodeToolSpec, Format, ResultReply, StartEpisode, TaskList, Tool as _, episode_tool_specs,
-    parse_start, tool_specs,
+    parse_start,
 };
 
 use super::{
-    app::{AppState, counted},
+    app::{AppState, VERSION, counted},
     encoding::Encoding,
     problem::ApiError,
 };
@@ -30,15 +31,16 @@ use crate::{
 use idempotency::{IdempotencyKey, mark_replayed};
 
 /// Every route: path, methods, handlers.
-fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<AppState>); 11] {
+fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<AppState>); 12] {
     [
+        ("/", &["GET"], get(home)),
         ("/healthz", &["GET"], get(health)),
         ("/metrics", &["GET"], get(metrics)),
         ("/docs", &["GET"], get(docs)),
         ("/v1/tasks", &["GET"], get(tasks)),
         ("/v1/tools", &["GET"], get(tools)),
         ("/v1/openapi.json", &["GET"], get(openapi)),
-        ("/v1/episodes", &["POST"], post(start)),
+        ("/v1/episodes", &["GET", "POST"], get(episodes).post(start)),
         ("/v1/episodes/{id}", &["GET", "DELETE"], get(status).delete(remove)),
         ("/v1/episodes/{id}/briefing", &["GET"], get(briefing)),
         ("/v1/episodes/{id}/tools", &["GET"], get(episode_tools)),
@@ -57,7 +59,7 @@ pub fn served() -> Vec<String> {
 }
 
 async fn health(State(app): State<AppState>) -> Json<Value> {
-    Json(json!({ "status": "ok", "version": env!("CARGO_PKG_VERSION"), "episodes": app.table.len() }))
+    Json(json!({ "status": "ok", "version": VERSION, "episodes": app.table.len() }))
 }
 
 async fn tasks(State(app): State<AppState>) -> Json<TaskList> {
@@ -72,9 +74,10 @@ struct ToolsQuery {
 
 async fn tools(
     State(app): State<AppState>,
+    Extension(caller): Extension<Caller>,
     Query(query): Query<ToolsQuery>,
 ) -> Result<Json<Value>, ApiError> {
-    let specs = tool_specs(app.settings.hints);
+    let specs = app.tool_specs(&caller);
     let Some(name) = query.format else { return Ok(Json(json!(specs))) };
     let format = Format::find(&name).ok_or(ApiError::UnknownFormat { name })?;
     Ok(Json(specs.iter().map(|spec| spec.formatted(format)).collect()))
@@ -87,19 +90,37 @@ async fn episode_tools(
 ) -> Result<Json<Vec<EpisodeToolSpec>>, ApiError> {
     let episode = app.table.hosted(&id)?;
     episode.admit(&caller)?;
-    let (hints, most_steps) = (app.settings.hints, episode.thread.steps_per_command());
-    Ok(Json(episode_tool_specs(hints, &id, most_steps, episode.may_talk())))
+    let (hints, talk) = (app.settings.hints, app.table.may_talk(&caller));
+    let thread = &episode.thread;
+    Ok(Json(episode_tool_specs(hints, &id, thread.robots(), thread.steps_per_command(), talk)))
 }
 
-async fn openapi(State(app): State<AppState>) -> Json<Value> {
-    Json(tandem_tools_spec::openapi(env!("CARGO_PKG_VERSION"), app.settings.hints))
+async fn openapi(State(app): State<AppState>, Extension(caller): Extension<Caller>) -> Json<Value> {
+    Json(app.openapi(&caller))
 }
 
-/// The description of the interface as a page, which needs nothing else and may load nothing.
-async fn docs(State(app): State<AppState>) -> Response {
-    let document = tandem_tools_spec::openapi(env!("CARGO_PKG_VERSION"), app.settings.hints);
+/// The description of the interface as a page.
+async fn docs(State(app): State<AppState>, Extension(caller): Extension<Caller>) -> Response {
+    page(docs::page(&app.openapi(&caller)))
+}
+
+/// The page that a browser finds first.
+async fn home(State(app): State<AppState>, Extension(caller): Extension<Caller>) -> Response {
+    page(home::page(VERSION, &app.table.list(&caller)))
+}
+
+/// A page, which needs nothing else and may load nothing.
+fn page(html: String) -> Response {
     let policy = (header::CONTENT_SECURITY_POLICY, "default-src 'none'; style-src 'unsafe-inline'");
-    ([policy], Html(docs::page(&document))).into_response()
+    ([policy], Html(html)).into_response()
+}
+
+async fn episodes(
+    State(app): State<AppState>,
+    Extension(caller): Extension<Caller>,
+    encoding: Encoding,
+) -> Result<Response, ApiError> {
+    encoding.write(StatusCode::OK, &app.table.list(&caller))
 }
 
 async fn metrics(
@@ -161,7 +182,10 @@ async fn call(
     counted(&app, &name, async {
         let episode = app.table.hosted(&id)?;
         episode.admit(&caller)?;
-        let read = || Ok(Call::parse(&name, without_episode_id(encoding.read(&body)?, &id)?)?);
+        let read = || {
+            episode.check_offered(&caller, &name)?;
+            Ok(Call::parse(&name, without_episode_id(encoding.read(&body)?, &id)?)?)
+        };
         let answer = match read() {
             Ok(call) => episode.call(&caller, call, key.as_deref()).await.map_err(ApiError::from),
             Err(refusal) => Err(refusal),

@@ -42,6 +42,43 @@ fn tools_accept_the_bodies_that_pages_show() {
     }
 }
 
+/// The bodies of all calls of a tool by curl in a script.
+fn sent_to<'a>(tool: &str, script: &'a str) -> Vec<&'a str> {
+    let calls = script.split(&format!("/tools/{tool} ")).skip(1);
+    calls.filter_map(|rest| rest.split_once("-d '")?.1.split('\'').next()).collect()
+}
+
+/// What is reached in half a second, a reader sees done.
+#[test]
+fn hands_that_pages_move_arrive() {
+    let server = TestServer::start();
+    let mut bodies: Vec<(String, Value)> = json_blocks("tool=move_wrists")
+        .iter()
+        .map(|(page, block, _)| (page.at(block.line), parsed(block)))
+        .collect();
+    for page in pages() {
+        for block in page.blocks().iter().filter(|block| block.language == "sh") {
+            let sent = sent_to("move_wrists", &block.text).into_iter();
+            bodies.extend(sent.map(|body| (page.at(block.line), serde_json::from_str(body).expect("JSON"))));
+        }
+    }
+    assert!(bodies.len() > 2, "{bodies:?}");
+    for (place, body) in bodies {
+        let id = server.episode("agentic");
+        let reply = server.tool(&id, "move_wrists", &body).ok();
+        for (asked, report) in
+            body["robots"].as_array().into_iter().flatten().zip(reply["robots"].as_array().expect("robots"))
+        {
+            for side in
+                ["left", "right"].into_iter().filter(|side| asked.get(format!("{side}_position_m")).is_some())
+            {
+                assert_eq!(report[side]["state"], "arrived", "{place}: {report:#}");
+            }
+        }
+        server.delete(&format!("/v1/episodes/{id}"));
+    }
+}
+
 #[test]
 fn a_refusal_that_pages_show_is_the_one_that_comes() {
     let server = TestServer::start();

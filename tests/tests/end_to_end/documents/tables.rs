@@ -52,8 +52,10 @@ fn the_reference_has_every_flag_with_its_meaning() {
     for (name, flags) in &subcommands {
         let section = sections.iter().find(|section| section.lines().next() == Some(name));
         let section = section.unwrap_or_else(|| panic!("the reference has no section {name}"));
-        // It has the settings of `serve`, and says so.
+        // It has the flags of `serve`, and says so.
         if name == "doctor" {
+            let serve = subcommands.iter().find(|(name, _)| name == "serve").map(|(_, flags)| flags);
+            assert_eq!(serve, Some(flags), "`doctor` takes what `serve` takes");
             continue;
         }
         let rows: Vec<&str> = section.lines().filter_map(|line| line.strip_prefix("| `--")).collect();
@@ -72,6 +74,7 @@ fn the_reference_has_every_flag_with_its_meaning() {
 }
 
 /// A flag with its help text, without what follows in brackets: the default and where else it can be given.
+#[derive(Debug, PartialEq)]
 struct Flag {
     name: String,
     help: String,

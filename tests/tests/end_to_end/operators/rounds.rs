@@ -34,6 +34,7 @@ fn an_operator_sees_and_commands_its_own_robot_alone() {
     ] {
         team.ask(1, tool, args).refused(409, &["robot \"A\" is another operator's", "yours is \"B\""]);
     }
+    team.ask(1, "get_robot_state", json!({ "robot": "C" })).refused(422, &["no robot \"C\"", "have: A, B"]);
     let episode = format!("/v1/episodes/{}", team.id);
     let bearer = format!("Bearer {}", team.tokens[1]);
     let own = [("authorization", bearer.as_str())];
@@ -172,6 +173,11 @@ fn operators_talk_where_they_may() {
     let headers = [("authorization", &*bearer), ("accept", "application/json, text/event-stream")];
     let listed = team.server.post_with("/mcp", &headers, &list).ok();
     assert!(names(&listed["result"]["tools"], "name").contains(&"say"), "{listed}");
+    let (_, _, tools) = team.server.ask("GET", "/v1/tools", &headers[..1], b"");
+    assert!(String::from_utf8_lossy(&tools).contains("\"say\""));
+    let (_, _, document) = team.server.ask("GET", "/v1/openapi.json", &headers[..1], b"");
+    assert!(String::from_utf8_lossy(&document).contains("/tools/say"));
+    team.ask(0, "grasp", json!({})).refused(404, &["no tool \"grasp\"", "finish, say"]);
     let (_, recording) = team.verified();
     let calls = recording.tool_calls().expect("its calls");
     let said: Vec<_> = calls.iter().filter(|call| call.tool == "say").collect();
@@ -228,4 +234,49 @@ fn only_who_asks_for_operators_gets_them() {
     assert!(start(json!({ "operators": "one", "talk": null })).ok().get("operators").is_none());
     start(json!({ "operators": "two" })).refused(422, &["per_robot"]);
     start(json!({ "operators": "per_robot", "patience_s": 0 })).refused(422, &["patience_s is 0", "120"]);
+    for fields in [json!({ "talk": true }), json!({ "operators": "one", "talk": true })] {
+        start(fields)
+            .refused(422, &["talk is for operators", "\"operators\": \"per_robot\"", "leave talk out"]);
+    }
+    start(json!({ "patience_s": 5 })).refused(422, &["patience_s is for operators", "leave patience_s out"]);
+    assert_eq!(server.get("/healthz").ok()["episodes"], 1);
+}
+
+/// Every list of tools, and every text that names tools, has `say` where the caller may use it and nowhere else.
+#[test]
+fn who_may_not_talk_is_not_offered_to() {
+    let quiet = Team::start(json!({}));
+    let talking = Team::start(json!({ "talk": true }));
+    let list = json!({ "jsonrpc": "2.0", "id": 1, "method": "tools/list", "params": {} });
+    let grasp = json!({
+        "jsonrpc": "2.0", "id": 1, "method": "tools/call", "params": { "name": "grasp", "arguments": {} },
+    });
+    // An operator who may not talk, and who has started an episode whose operators may.
+    for (team, token) in [(&quiet, quiet.tokens[0].as_str()), (&talking, "none")] {
+        let bearer = format!("Bearer {token}");
+        let headers = [("authorization", &*bearer), ("accept", "application/json, text/event-stream")];
+        let mcp = |body: &Value| team.server.post_with("/mcp", &headers, body).body.to_string();
+        let get = |path: &str| {
+            let (_, _, bytes) = team.server.ask("GET", path, &headers[..1], b"");
+            String::from_utf8(bytes).expect("text")
+        };
+        let of_episode = format!("/v1/episodes/{}/tools", team.id);
+        let refused = team.server.tool_as(token, &team.id, "grasp", &json!({}));
+        assert_eq!(refused.status, 404);
+        for text in [
+            refused.body.to_string(),
+            mcp(&list),
+            mcp(&grasp),
+            get("/v1/tools"),
+            get("/v1/tools?format=mcp"),
+            get(&of_episode),
+            get("/v1/openapi.json"),
+        ] {
+            let offered = ["\"say\"", "/tools/say", ", say"].iter().find(|name| text.contains(**name));
+            assert!(text.contains("move_wrists") && offered.is_none(), "{offered:?} in {text}");
+        }
+    }
+    for args in [json!({}), json!({ "text": "" }), json!({ "text": "Hello." })] {
+        quiet.ask(0, "say", args).refused(409, &["nobody hears you"]);
+    }
 }

@@ -18,7 +18,9 @@ fn server() -> TestServer {
 }
 
 /// Routes of all kinds, some of which exist.
-const ROUTES: [(&str, &str); 10] = [
+const ROUTES: [(&str, &str); 12] = [
+    ("GET", "/"),
+    ("GET", "/v1/episodes"),
     ("GET", "/healthz"),
     ("GET", "/v1/tasks"),
     ("GET", "/v1/openapi.json"),

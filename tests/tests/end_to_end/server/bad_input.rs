@@ -23,11 +23,11 @@ fn refused_calls() -> Vec<(&'static str, Value, u16, &'static [&'static str])> {
     vec![
         ("grasp", json!({}), 404, &["\"grasp\"", "observe", "move_wrists", "send_joint_chunk"]),
         ("start_episode", json!({}), 404, &["start_episode", "get_status"]),
-        ("get_robot_state", json!({ "robot": "Z" }), 404, &["\"Z\"", "A, B"]),
-        ("observe", json!({ "robots": ["A", "C"] }), 404, &["\"C\"", "A, B"]),
-        ("move_wrists", json!({ "steps": 5, "robots": [{ "robot": "a" }] }), 404, &["\"a\"", "A, B"]),
-        ("query_depth", json!({ "robot": "Z", "pixels": [[0, 0]] }), 404, &["\"Z\"", "A, B"]),
-        ("check_reach", json!({ "robot": "Z", "left_position_m": [0.3, 0.2, 0.1] }), 404, &["\"Z\"", "A, B"]),
+        ("get_robot_state", json!({ "robot": "Z" }), 422, &["\"Z\"", "A, B"]),
+        ("observe", json!({ "robots": ["A", "C"] }), 422, &["\"C\"", "A, B"]),
+        ("move_wrists", json!({ "steps": 5, "robots": [{ "robot": "a" }] }), 422, &["\"a\"", "A, B"]),
+        ("query_depth", json!({ "robot": "Z", "pixels": [[0, 0]] }), 422, &["\"Z\"", "A, B"]),
+        ("check_reach", json!({ "robot": "Z", "left_position_m": [0.3, 0.2, 0.1] }), 422, &["\"Z\"", "A, B"]),
         ("wait", json!({ "steps": 26 }), 422, &["26", "agentic", "1 to 25"]),
         ("wait", json!({ "steps": 0 }), 422, &["at least 1"]),
         ("wait", json!({ "steps": 2.0, "seconds": 1 }), 422, &["`seconds`"]),
@@ -104,9 +104,9 @@ fn what_does_not_exist_is_refused_with_what_does() {
     server.get("/v1/episodes/nope").refused(404, &["\"nope\"", "POST /v1/episodes"]);
     server.delete("/v1/episodes/nope").refused(404, &["\"nope\""]);
     server.tool("nope", "wait", &json!({ "steps": 1 })).refused(404, &["\"nope\"", "POST /v1/episodes"]);
-    server.get("/v1/episode").refused(404, &["GET /v1/episode ", "POST /v1/episodes"]);
-    server.get("/").refused(404, &["GET /v1/tools"]);
-    server.get("/v1/episodes").refused(405, &["POST /v1/episodes"]);
+    server.get("/v1/episode").refused(404, &["GET /v1/episode ", "GET|POST /v1/episodes"]);
+    server.get("/v2").refused(404, &["GET /v1/tools", "GET|POST /v1/episodes"]);
+    server.delete("/v1/episodes").refused(405, &["GET|POST /v1/episodes"]);
     server.delete("/v1/tasks").refused(405, &["GET /v1/tasks"]);
     server.get("/v1/episodes/%ff").refused(400, &["UTF-8"]);
     let start = |args: Value| server.post("/v1/episodes", &args);

@@ -40,7 +40,7 @@ fn header<'a>(answer: &'a str, name: &str) -> &'a str {
 const JSON: &str = "content-type: application/json";
 
 /// A request to every route, with a body where one is read; the episode is the first of seed 0.
-const REQUESTS: [(&str, &str); 13] = [
+const REQUESTS: [(&str, &str); 15] = [
     ("GET /healthz", ""),
     ("GET /metrics", ""),
     ("GET /docs", ""),
@@ -54,6 +54,8 @@ const REQUESTS: [(&str, &str); 13] = [
     ("POST /v1/episodes/handover-seed0/tools/wait", r#"{"steps": 1}"#),
     ("POST /v1/episodes/handover-seed0/tools/finish", ""),
     ("DELETE /v1/episodes/handover-seed0", ""),
+    ("GET /", ""),
+    ("GET /v1/episodes", ""),
 ];
 
 #[test]
@@ -129,7 +131,7 @@ fn other_methods_are_told_which_there_are() {
     let server = TestServer::start();
     for (path, allowed) in [
         ("/healthz", "GET,HEAD"),
-        ("/v1/episodes", "POST"),
+        ("/v1/episodes", "GET,HEAD,POST"),
         ("/v1/episodes/x", "GET,HEAD,DELETE"),
         ("/v1/episodes/x/tools/wait", "POST"),
     ] {

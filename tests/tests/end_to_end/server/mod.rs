@@ -5,6 +5,7 @@ mod bad_input;
 mod crowd;
 mod door;
 mod hints;
+mod listing;
 mod mcp;
 mod operations;
 mod repeats;

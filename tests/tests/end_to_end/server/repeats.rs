@@ -76,7 +76,7 @@ fn a_command_may_bring_back_what_is_seen_then() {
     assert_eq!((&seen["time_s"], &seen["states"][0]["robot"]), (&reply["time_s"], &json!("B")));
     assert!(seen["images"][0]["png_base64"].as_str().is_some_and(|png| png.starts_with("iVBORw0KGgo")));
     // What could not be looked at stops the command, too.
-    wait(json!({ "robots": ["C"] })).refused(404, &["\"C\"", "A, B"]);
+    wait(json!({ "robots": ["C"] })).refused(422, &["\"C\"", "A, B"]);
     wait(json!({ "robot": "A" })).refused(422, &["unknown field `robot`"]);
     assert_eq!(server.get(&format!("/v1/episodes/{id}")).ok()["step"], 5);
 }

@@ -1,0 +1,23 @@
+//! `tandem completions`: what a shell has to know to complete command lines.
+
+use std::process::ExitCode;
+
+use clap_complete::Shell;
+
+use super::{CommandResult, print};
+
+/// Print what a shell has to know to complete the command line.
+#[derive(Debug, clap::Args)]
+pub struct CompletionsArgs {
+    /// The shell.
+    #[arg(value_name = "SHELL")]
+    shell: Shell,
+}
+
+/// Prints the completions of `command`.
+pub fn run(args: &CompletionsArgs, mut command: clap::Command) -> CommandResult {
+    let (name, mut script) = (command.get_name().to_owned(), Vec::new());
+    clap_complete::generate(args.shell, &mut command, name, &mut script);
+    print(&String::from_utf8(script)?)?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,73 @@
+//! What the settings name: limits, the token, instructions, the base controller and the scene.
+
+use std::path::Path;
+
+use tandem_episodes::{EpisodeError, SceneError, SceneFile};
+
+use super::{Finding, Findings, specs, trial};
+use crate::{settings::Layer, token::Token};
+
+/// Tries each thing that `layer` names.
+pub fn check(layer: &Layer, token: Result<Option<Token>, String>) -> Findings {
+    let mut findings =
+        vec![("limits", Finding::of(limits(layer))), ("token", Finding::of(check_token(layer, token)))];
+    if let Some(path) = &layer.instructions {
+        let read = layer.read_instructions().map_err(|error| error.to_string());
+        findings.push(("instructions", Finding::of(read.map(|_| format!("{} is read", path.display())))));
+    }
+    if let Some(path) = &layer.locomotion {
+        let loaded = layer.controller().load().map_err(|error| error.to_string());
+        findings.push(("locomotion", Finding::of(loaded.map(|_| format!("{} is read", path.display())))));
+    }
+    if let Some(path) = &layer.scene {
+        findings.extend(scene(layer, path).into_iter().map(|finding| ("scene", finding)));
+    }
+    findings
+}
+
+fn limits(layer: &Layer) -> Result<String, String> {
+    layer.check().map_err(|error| error.to_string())?;
+    Ok(format!("{} episodes at once", layer.max_episodes.unwrap_or(Layer::MAX_EPISODES)))
+}
+
+fn check_token(layer: &Layer, token: Result<Option<Token>, String>) -> Result<String, String> {
+    let layer = Layer { token: token?, ..layer.clone() };
+    match layer.find_token() {
+        Ok(Some(_)) => Ok("every request has to send it".into()),
+        Ok(None) => Ok(format!("none, and none is needed: only this machine reaches {}", layer.address())),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// What in a scene's file is not quite as in MuJoCo, and which tasks can be played in it. A scene is made for few of them, so it is
+/// wrong only where there is none.
+fn scene(layer: &Layer, path: &Path) -> Vec<Finding> {
+    let approximations = match SceneFile::with_approximations(path) {
+        Ok((_, approximations)) => approximations,
+        Err(error) => return vec![Finding::Wrong(error.to_string())],
+    };
+    let mut findings: Vec<Finding> =
+        approximations.iter().map(|line| Finding::Note(format!("not quite as in MuJoCo: {line}"))).collect();
+    let (mut playable, mut others) = (Vec::new(), Vec::new());
+    for spec in specs(layer) {
+        match trial(&spec) {
+            Ok(_) => playable.push(spec.task.id),
+            Err(error) => {
+                let text = error.to_string();
+                // Without the site for the task's origin there is no place for any task.
+                if matches!(&error, EpisodeError::Scene(scene) if matches!(**scene, SceneError::NoPlace { .. }))
+                {
+                    findings.push(Finding::Wrong(format!("no task can be played: {text}")));
+                    return findings;
+                }
+                others.push(Finding::Note(format!("{} cannot be played: {text}", spec.task.id)));
+            }
+        }
+    }
+    findings.push(match playable.is_empty() {
+        true => Finding::Wrong(format!("no task can be played in {}; what each needs:", path.display())),
+        false => Finding::Works(format!("{} holds {}", path.display(), playable.join(", "))),
+    });
+    findings.extend(others);
+    findings
+}

@@ -1,0 +1,111 @@
+//! What the machine can do: physics and pictures, the port, the folder of recordings, clocks and cores.
+
+use std::{
+    fs,
+    net::{SocketAddr, TcpListener},
+    path::Path,
+    thread::available_parallelism,
+    time::{Duration, Instant, SystemTime, UNIX_EPOCH},
+};
+
+use tandem_episodes::{EpisodeError, EpisodeSpec, create_private_folder};
+use tandem_tools_spec::{Observe, ToolCall, Wait};
+
+use super::{Finding, Findings, trial};
+use crate::settings::Layer;
+
+/// How many control steps the check of physics simulates.
+const TRIED_STEPS: u32 = 25;
+/// Below this factor, a call that simulates takes longer than the motion of its robots.
+const MIN_REALTIME_FACTOR: f64 = 1.0;
+/// A clock that is set right shows no earlier time than 2026, when this program was written.
+const PROGRAM_DATE: Duration = Duration::from_secs(1_767_225_600);
+/// The coarsest tick of a clock that can time calls.
+const COARSEST_TICK: Duration = Duration::from_millis(1);
+/// With fewer cores, episodes wait for each other.
+const MIN_CORES: usize = 2;
+
+/// Tries the machine by an episode that can be played, if any can.
+pub fn check(layer: &Layer, spec: Option<EpisodeSpec>) -> Findings {
+    let played = match &spec {
+        Some(spec) => Finding::of(physics(spec)),
+        None => Finding::Note("not tried, because no task can be played with these settings".into()),
+    };
+    let rest = [
+        ("port", port(layer.address())),
+        ("runs", runs(&layer.runs_folder())),
+        ("clock", clock()),
+        ("cores", cores()),
+    ];
+    [("physics", played)].into_iter().chain(rest.map(|(what, tried)| (what, Finding::of(tried)))).collect()
+}
+
+/// Plays half a second of an episode, and draws what all robots see.
+fn physics(spec: &EpisodeSpec) -> Result<String, String> {
+    let play = || {
+        let mut session = trial(spec)?;
+        session.call(Wait { steps: TRIED_STEPS }.into())?;
+        let simulated_s = session.present().time_s;
+        let began = Instant::now();
+        session.call(ToolCall::from(Observe { robots: None, short: None }))?;
+        Ok((simulated_s / session.physics().as_secs_f64(), began.elapsed()))
+    };
+    let (factor, look) = play().map_err(|error: EpisodeError| format!("{error}; please report it"))?;
+    let (task, robots) = (spec.task.id, spec.task.robots.len());
+    let text = format!(
+        "{task} at {factor:.0} times real time, {} ms for a look of its {robots} robots",
+        look.as_millis()
+    );
+    if factor < MIN_REALTIME_FACTOR {
+        return Err(format!("{text}; build with --release, and run fewer episodes at once"));
+    }
+    Ok(text)
+}
+
+pub(super) fn port(address: SocketAddr) -> Result<String, String> {
+    match TcpListener::bind(address) {
+        Ok(_) => Ok(format!("{address} is free")),
+        Err(error) => Err(format!("{address}: {error}; stop what listens there, or give another --listen")),
+    }
+}
+
+pub(super) fn runs(folder: &Path) -> Result<String, String> {
+    let shown = folder.display();
+    let there = folder.exists();
+    let probe = folder.join(format!(".doctor-{}", std::process::id()));
+    let tried = create_private_folder(folder).and_then(|()| fs::write(&probe, "probe"));
+    let cleared = fs::remove_file(&probe);
+    if !there {
+        // A folder that this check has made is removed again, unless somebody has put something in.
+        let _ = fs::remove_dir(folder);
+    }
+    match tried.and(cleared) {
+        Ok(()) => Ok(format!("{shown} can be written")),
+        Err(error) => Err(format!("{shown}: {error}; make it writable, or give another --runs")),
+    }
+}
+
+fn clock() -> Result<String, String> {
+    let began = Instant::now();
+    let mut tick = Duration::ZERO;
+    while tick.is_zero() {
+        tick = began.elapsed();
+    }
+    if tick > COARSEST_TICK {
+        return Err(format!("ticks every {tick:?}, too coarse to time calls; run on another machine"));
+    }
+    match SystemTime::now().duration_since(UNIX_EPOCH) {
+        Ok(now) if now >= PROGRAM_DATE => Ok(format!("ticks within {tick:?}, and its date can be")),
+        _ => Err("shows a time before 2026, and recordings name theirs; set the date".into()),
+    }
+}
+
+fn cores() -> Result<String, String> {
+    match available_parallelism() {
+        Ok(cores) if cores.get() < MIN_CORES => Err(format!(
+            "{cores}; give at least {MIN_CORES}, or run one episode at a time with --max-episodes 1"
+        )),
+        Ok(cores) => Ok(format!("{cores}, as many episodes run at full speed")),
+        Err(error) => Err(format!("not known: {error}; the program runs, as fast as it can")),
+    }
+}

@@ -1,0 +1,107 @@
+//! `tandem doctor`: what of a server's settings works on this machine, and what to do about what does not.
+
+mod given;
+mod machine;
+
+use std::{fmt::Write, process::ExitCode};
+
+use tandem_episodes::{EpisodeError, EpisodeSpec, SceneFile, Session, tasks};
+use tandem_tools_spec::Protocol;
+
+use super::{CommandResult, print, serve::ServeArgs};
+use crate::{settings::Layer, token::Token};
+
+/// Say what works on this machine: all that a server's settings name, pictures, physics, the port, the folder of recordings, clocks
+/// and cores.
+#[derive(Debug, clap::Args)]
+pub struct DoctorArgs {
+    /// The settings of the server that is to run here.
+    #[command(flatten)]
+    serve: ServeArgs,
+}
+
+/// The result of a check.
+#[derive(Debug, PartialEq)]
+enum Finding {
+    /// A line for people.
+    Works(String),
+    /// What need not be as it is meant.
+    Note(String),
+    /// What is wrong, and what to do.
+    Wrong(String),
+}
+
+impl Finding {
+    /// What works, or what is wrong.
+    fn of(tried: Result<String, String>) -> Finding {
+        tried.map_or_else(Finding::Wrong, Finding::Works)
+    }
+}
+
+/// Findings, each with what it is about.
+type Findings = Vec<(&'static str, Finding)>;
+
+/// Prints a line for each finding. The program fails if anything does not work.
+pub fn run(args: DoctorArgs) -> CommandResult {
+    let findings = examine(args.serve, Token::from_environment().map_err(|error| error.to_string()));
+    print(&told(&findings))?;
+    let sound = findings.iter().all(|(_, finding)| !matches!(finding, Finding::Wrong(_)));
+    Ok(if sound { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn told(findings: &Findings) -> String {
+    findings.iter().fold(String::new(), |mut lines, (what, finding)| {
+        let (word, text) = match finding {
+            Finding::Works(text) => ("ok", text),
+            Finding::Note(text) => ("note", text),
+            Finding::Wrong(text) => ("WRONG", text),
+        };
+        // Writing to a text cannot fail.
+        let _ = writeln!(lines, "{what:14}{word:7}{text}");
+        lines
+    })
+}
+
+/// Tries everything, whatever is wrong before it.
+fn examine(args: ServeArgs, token: Result<Option<Token>, String>) -> Findings {
+    let mut findings = Findings::new();
+    let layer = match &args.config {
+        None => args.flags,
+        Some(path) => match args.flags.clone().over_file(path) {
+            Ok(layer) => {
+                findings.push(("config", Finding::Works(format!("{} is read", path.display()))));
+                layer
+            }
+            Err(error) => {
+                let text = format!("{error}; what follows is of flags, environment and defaults alone");
+                findings.push(("config", Finding::Wrong(text)));
+                args.flags
+            }
+        },
+    };
+    findings.extend(given::check(&layer, token));
+    findings.push(("renderer", Finding::of(layer.renderer().describe().map_err(|error| error.to_string()))));
+    findings.extend(machine::check(&layer, specs(&layer).find_map(|spec| trial(&spec).ok().map(|_| spec))));
+    findings
+}
+
+/// Every task as this server would play it, as far as what it is made of can be read.
+fn specs(layer: &Layer) -> impl Iterator<Item = EpisodeSpec> {
+    let scene = layer.scene.as_deref().map(SceneFile::of);
+    let scene = scene.and_then(Result::ok);
+    let (locomotion, renderer) = (layer.controller(), layer.renderer());
+    tasks::ALL.iter().map(move |task| EpisodeSpec {
+        scene: scene.clone(),
+        locomotion: locomotion.clone(),
+        renderer,
+        ..EpisodeSpec::new(task, 0, Protocol::Benchmark)
+    })
+}
+
+/// Builds an episode, in a scene of somebody's own after a second in which nobody acts.
+fn trial(spec: &EpisodeSpec) -> Result<Session, EpisodeError> {
+    Session::start(spec, None)
+}
+
+#[cfg(test)]
+mod tests;

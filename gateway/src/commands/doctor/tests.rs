@@ -1,0 +1,103 @@
+use std::{fs, net::TcpListener, path::Path};
+
+use clap::Parser;
+
+use super::*;
+
+#[derive(Debug, Parser)]
+struct Line {
+    #[command(flatten)]
+    args: DoctorArgs,
+}
+
+/// What is found with these flags, of the things called `what`.
+fn found(flags: &[&str], what: &str) -> Vec<Finding> {
+    let line = Line::try_parse_from([&["doctor"], flags].concat()).unwrap();
+    let findings = examine(line.args.serve, Ok(None)).into_iter();
+    findings.filter(|(about, _)| *about == what).map(|(_, finding)| finding).collect()
+}
+
+#[track_caller]
+fn expect_wrong(findings: &[Finding], says: &[&str]) {
+    let wrong = findings.iter().find_map(|finding| match finding {
+        Finding::Wrong(text) => Some(text),
+        Finding::Works(_) | Finding::Note(_) => None,
+    });
+    let wrong = wrong.unwrap_or_else(|| panic!("nothing is wrong: {findings:?}"));
+    says.iter().for_each(|part| assert!(wrong.contains(part), "{wrong}"));
+}
+
+#[test]
+fn a_port_that_is_taken_and_a_folder_that_cannot_be_written_say_what_to_do() {
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap();
+    assert!(machine::port(address).unwrap_err().contains("give another --listen"));
+    drop(taken);
+    assert!(machine::port(address).is_ok());
+
+    let place = tempfile::tempdir().unwrap();
+    let file = place.path().join("file");
+    fs::write(&file, "no folder").unwrap();
+    assert!(machine::runs(&file.join("runs")).unwrap_err().contains("give another --runs"));
+    assert_eq!(fs::read_to_string(&file).unwrap(), "no folder");
+}
+
+#[test]
+fn looking_leaves_nothing_behind() {
+    let place = tempfile::tempdir().unwrap();
+    let (new, kept) = (place.path().join("new"), place.path().join("kept"));
+    fs::create_dir(&kept).unwrap();
+    assert!(machine::runs(&new).is_ok() && machine::runs(&kept).is_ok());
+    assert!(!new.exists() && kept.exists());
+    assert_eq!(fs::read_dir(&kept).unwrap().count(), 0);
+}
+
+#[test]
+fn the_file_of_settings_and_all_that_it_names_are_tried() {
+    let place = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| {
+        let path = place.path().join(name);
+        fs::write(&path, text).unwrap();
+        path.to_string_lossy().into_owned()
+    };
+    let words = write("words.json", r#"{"handover": {"joint": ""}}"#);
+    let text = format!(
+        "listen = \"0.0.0.0:0\"\nmax_episodes = 0\ninstructions = {words:?}\nscene = \"no.xml\"\nlocomotion = \"no.onnx\"\n"
+    );
+    let config = write("settings.toml", &text);
+    let flags = ["--config", &config, "--runs", "/dev/null/runs"];
+    expect_wrong(&found(&flags, "limits"), &["max_episodes is 0", "as 8"]);
+    expect_wrong(&found(&flags, "token"), &["other machines reach", "--token-file"]);
+    expect_wrong(&found(&flags, "instructions"), &["handover.joint is empty"]);
+    expect_wrong(&found(&flags, "locomotion"), &["no.onnx"]);
+    expect_wrong(&found(&flags, "scene"), &["no.xml"]);
+    expect_wrong(&found(&flags, "runs"), &["give another --runs"]);
+    assert!(matches!(found(&flags, "config")[..], [Finding::Works(_)]));
+
+    let wrong = write("wrong.toml", "max_episode = 3\n");
+    expect_wrong(&found(&["--config", &wrong], "config"), &["`max_episodes`", "alone"]);
+    expect_wrong(&found(&["--config", "/nowhere.toml"], "config"), &["/nowhere.toml"]);
+    assert!(matches!(found(&["--config", &wrong], "cores")[..], [_]), "the rest is tried all the same");
+}
+
+#[test]
+fn a_scene_is_tried_with_what_tasks_need_of_it() {
+    let place = tempfile::tempdir().unwrap();
+    let kitchen = Path::new(env!("CARGO_MANIFEST_DIR")).join("../episodes/tests/scenes/kitchen");
+    let bare = place.path().join("bare.xml");
+    fs::write(&bare, r#"<mujoco><worldbody><geom type="plane" size="5 5 0.1"/></worldbody></mujoco>"#)
+        .unwrap();
+    expect_wrong(&found(&["--scene", bare.to_str().unwrap()], "scene"), &["no site \"task\"", "give it one"]);
+
+    let handover = kitchen.join("handover.xml");
+    let findings = found(&["--scene", handover.to_str().unwrap()], "scene");
+    let works = |finding: &Finding| matches!(finding, Finding::Works(text) if text.contains("handover.xml holds handover"));
+    assert!(findings.iter().any(works), "{findings:?}");
+    let note = |finding: &Finding| matches!(finding, Finding::Note(text) if text.contains("frame_hang cannot be played"));
+    assert!(findings.iter().any(note), "{findings:?}");
+    assert!(
+        found(&["--scene", handover.to_str().unwrap()], "physics")
+            .iter()
+            .all(|finding| matches!(finding, Finding::Works(_)))
+    );
+}

@@ -1,0 +1,81 @@
+//! `/`: where to go on, and the episodes, as a page for people, without scripts.
+
+use std::fmt::Write;
+
+use serde_json::json;
+use tandem_episodes::html::escape;
+use tandem_tools_spec::{EpisodeEntry, EpisodeList, Operators};
+
+use super::docs::whole;
+
+/// The page of a server of `version` with these episodes.
+pub fn page(version: &str, list: &EpisodeList) -> String {
+    let mut body = String::from(
+        "<p>Simulated humanoids that must work together. <a href=\"/docs\">The interface</a>, for programs \
+         <a href=\"/v1/openapi.json\">as OpenAPI</a>; <a href=\"/v1/tasks\">the tasks</a>; <a href=\"/v1/tools\">the tools</a>; \
+         <a href=\"/metrics\">figures for Prometheus</a>. MCP hosts connect to <code>/mcp</code>.</p>\n<h2>Episodes</h2>\n",
+    );
+    let rows: String = list.episodes.iter().map(row).collect();
+    body += &match rows.is_empty() {
+        true => "<p>None is held. <code>POST /v1/episodes</code> starts one.</p>\n".to_owned(),
+        false => format!(
+            "<table>\n<tr><th>episode</th><th>task</th><th>seed</th><th>protocol</th><th>driven by</th><th>step</th><th>stands</th></tr>\n\
+             {rows}</table>\n"
+        ),
+    };
+    whole(&format!("Tandem {}", escape(version)), &body)
+}
+
+fn row(entry: &EpisodeEntry) -> String {
+    let EpisodeEntry { episode_id, task, seed, protocol, operators, step, ended } = entry;
+    let driven = match operators {
+        Operators::One => "one policy",
+        Operators::PerRobot => "an operator for each robot",
+    };
+    let stands = match ended {
+        None => "goes on".to_owned(),
+        Some(reason) => json!(reason).as_str().unwrap_or_default().replace('_', " "),
+    };
+    let (id, mut row) = (escape(episode_id), String::from("<tr>"));
+    // Writing to a text cannot fail.
+    let _ = write!(row, "<td><a href=\"/v1/episodes/{id}\">{id}</a></td>");
+    for cell in
+        [task.clone(), seed.to_string(), protocol.to_string(), driven.into(), step.to_string(), stands]
+    {
+        let _ = write!(row, "<td>{}</td>", escape(&cell));
+    }
+    row + "</tr>\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use tandem_tools_spec::{EndReason, Protocol};
+
+    use super::*;
+
+    #[test]
+    fn every_episode_has_its_line_and_nothing_breaks_out() {
+        let entry = |id: &str, ended: Option<EndReason>| EpisodeEntry {
+            episode_id: id.into(),
+            task: "handover".into(),
+            seed: 7,
+            protocol: Protocol::Agentic,
+            operators: Operators::PerRobot,
+            step: 325,
+            ended,
+        };
+        let failed = Some(EndReason::SimulatorFailed);
+        let page = page("1.2.3", &EpisodeList { episodes: vec![entry("a", None), entry("<b>", failed)] });
+        let rest =
+            "<td>handover</td><td>7</td><td>agentic</td><td>an operator for each robot</td><td>325</td>";
+        assert!(
+            page.contains(&format!("<a href=\"/v1/episodes/a\">a</a></td>{rest}<td>goes on</td>")),
+            "{page}"
+        );
+        assert!(page.contains("<td>simulator failed</td>") && page.contains("&lt;b&gt;"), "{page}");
+        for foreign in ["<script", "<b>", "src=", "url(", "http://", "https://", "<link"] {
+            assert!(!page.contains(foreign), "{foreign}");
+        }
+        assert!(super::page("1.2.3", &EpisodeList { episodes: Vec::new() }).contains("None is held"));
+    }
+}

@@ -1,0 +1,120 @@
+//! Who sees which episodes: in the list, and on the page that a browser finds first.
+
+use serde_json::{Value, json};
+use tandem::{settings::Layer, token::Token};
+use tandem_tests::TestServer;
+use tandem_tools_spec::EpisodeList;
+
+const TOKEN: &str = "correct-horse-battery-staple";
+
+fn ids(list: &Value) -> Vec<&str> {
+    list["episodes"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(|entry| entry["episode_id"].as_str())
+        .collect()
+}
+
+/// What a caller with this token is answered, as text.
+fn asked(server: &TestServer, token: &str, path: &str) -> (u16, String) {
+    let (status, _, bytes) = server.ask("GET", path, &[("authorization", &format!("Bearer {token}"))], b"");
+    (status, String::from_utf8(bytes).expect("text"))
+}
+
+#[test]
+fn the_list_has_every_episode_as_it_stands() {
+    let server = TestServer::start();
+    assert_eq!(server.get("/v1/episodes").ok(), json!({ "episodes": [] }));
+    let first = server.episode("agentic");
+    let body = json!({ "task": "move_house", "seed": 3, "protocol": "benchmark", "operators": "per_robot" });
+    server.post("/v1/episodes", &body).ok();
+    server.tool(&first, "wait", &json!({ "steps": 7 })).ok();
+    let entry = |id: &str,
+                 task: &str,
+                 seed: u32,
+                 protocol: &str,
+                 operators: &str,
+                 step: u32,
+                 ended: Value| {
+        json!({
+            "episode_id": id, "task": task, "seed": seed, "protocol": protocol, "operators": operators, "step": step,
+            "ended": ended,
+        })
+    };
+    let house = entry("move_house-seed3", "move_house", 3, "benchmark", "per_robot", 0, Value::Null);
+    let handover = |ended| entry(&first, "handover", 0, "agentic", "one", 307, ended);
+    let expected = |ended| json!({ "episodes": [handover(ended), house] });
+    assert_eq!(server.get("/v1/episodes").ok(), expected(Value::Null));
+    server.tool(&first, "finish", &json!({})).ok();
+    let list = server.get("/v1/episodes").ok();
+    assert_eq!(list, expected(json!("finished")));
+
+    let read: EpisodeList =
+        serde_json::from_value(list.clone()).expect("what the OpenAPI description is made of");
+    assert_eq!(json!(read), list);
+    let document = server.get("/v1/openapi.json").ok();
+    let schema = &document["paths"]["/v1/episodes"]["get"]["responses"]["200"]["content"]["application/json"]
+        ["schema"];
+    let described = schema["properties"]["episodes"]["items"]["required"].as_array().map(Vec::len);
+    assert_eq!(
+        described,
+        list["episodes"][0].as_object().map(|entry| entry.len() - 1),
+        "all but null: {schema}"
+    );
+
+    server.delete(&format!("/v1/episodes/{first}")).ok();
+    assert_eq!(ids(&server.get("/v1/episodes").ok()), ["move_house-seed3"]);
+}
+
+#[test]
+fn who_has_a_token_sees_its_own_episodes() {
+    let token = Some(Token::parse(TOKEN, "a test").expect("a token"));
+    let server = TestServer::with(Layer { token, ..Layer::default() });
+    let bearer = format!("Bearer {TOKEN}");
+    let start = |fields: Value| {
+        let mut body = json!({ "task": "handover", "seed": 0, "protocol": "benchmark" });
+        body.as_object_mut().expect("an object").extend(fields.as_object().cloned().unwrap_or_default());
+        server.post_with("/v1/episodes", &[("authorization", &bearer)], &body).ok()
+    };
+    let (own, team) = (start(json!({})), start(json!({ "seed": 1, "operators": "per_robot" })));
+    let [own, team_id] = [&own, &team].map(|started| started["episode_id"].as_str().expect("an id"));
+    let operator = team["operators"][1]["token"].as_str().expect("a token");
+
+    let list = |token: &str| -> Value {
+        serde_json::from_str(&asked(&server, token, "/v1/episodes").1).expect("JSON")
+    };
+    assert_eq!(ids(&list(TOKEN)), [own, team_id]);
+    assert_eq!(ids(&list(operator)), [team_id], "the other episode is not an operator's to know of");
+    let stranger = "nobody-has-this-token";
+    for path in ["/v1/episodes", "/"] {
+        let (status, text) = asked(&server, stranger, path);
+        assert!(status == 401 && !text.contains("handover"), "{path}: {text}");
+    }
+    let (_, host) = asked(&server, TOKEN, "/");
+    assert!([own, team_id].iter().all(|id| host.contains(&format!(">{id}</a>"))), "{host}");
+    let (_, page) = asked(&server, operator, "/");
+    assert!(page.contains(&format!(">{team_id}</a>")) && !page.contains(&format!(">{own}</a>")), "{page}");
+    assert!(![&host, &page].iter().any(|page| page.contains(operator) || page.contains(TOKEN)));
+}
+
+#[test]
+fn a_browser_finds_a_page_that_leads_on() {
+    let server = TestServer::start();
+    let (headers, page) = server.page("/");
+    assert_eq!(headers["content-type"], "text/html; charset=utf-8");
+    assert!(
+        headers["content-security-policy"]
+            .to_str()
+            .is_ok_and(|policy| policy.starts_with("default-src 'none'"))
+    );
+    assert!(page.contains("None is held"), "{page}");
+    let links: Vec<&str> = page.split("href=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
+    assert!(links.contains(&"/docs") && links.len() > 3, "{links:?}");
+    links.iter().for_each(|link| drop(server.page(link)));
+    let id = server.episode("benchmark");
+    let (_, page) = server.page("/");
+    assert!(page.contains(&format!("<a href=\"/v1/episodes/{id}\">{id}</a>")), "{page}");
+    server.page(&format!("/v1/episodes/{id}"));
+    assert!(server.page("/docs").1.contains("id=\"list_episodes\""));
+}
