@@ -1,11 +1,13 @@
 """Calls a running server with what its own OpenAPI description allows and with what it does not, by `schemathesis`, all checks.
 
     pip install -r tests/peers/clients/fuzz.txt
-    tandem serve --max-episodes 64 &
+    tandem serve --max-episodes 512 &
     python tests/peers/clients/fuzz.py http://127.0.0.1:8700 [OPERATION ...]
 
-Every operation has an episode of its own, under the benchmark protocol. One thing JSON Schema cannot say, and it is left
-out here: that a region names at most 256 pixels.
+The first run calls every operation but DELETE, each on a live episode of its own, and says how far the episode has come. The second
+run calls all operations together, DELETE among them, on episodes that they share. The task has three robots, so every name
+that the schemas allow is a robot's; the protocol is the benchmark's. One thing JSON Schema cannot say, and it is left out
+here: that a region names at most 256 pixels.
 """
 
 import json
@@ -16,6 +18,11 @@ import tempfile
 import urllib.request
 
 EXAMPLES = 60
+# Of the second run, in which operations meet.
+SHARED_EXAMPLES = 30
+SHARED_EPISODES = 16
+DELETE = "delete_episode"
+COMMANDS = ["move_wrists", "walk", "send_joint_chunk", "wait"]
 
 
 def read(request):
@@ -24,43 +31,86 @@ def read(request):
 
 
 def new_episode(url):
-    body = json.dumps({"task": "handover", "seed": 0, "protocol": "benchmark"}).encode()
+    body = json.dumps({"task": "move_house", "seed": 0, "protocol": "benchmark"}).encode()
     request = urllib.request.Request(f"{url}/v1/episodes", body, {"content-type": "application/json"})
     return read(request)["episode_id"]
 
 
-def fuzz(url, document, operation, folder):
-    """Whether every check passes on one operation."""
-    # An episode of its own, so that one that ends is not missed by the others.
-    config = folder / "schemathesis.toml"
-    config.write_text(f'[parameters]\n"path.episode_id" = "{new_episode(url)}"\n')
-    command = ["schemathesis", "--config-file", config, "run", document, "--url", url, "--checks", "all"]
-    only = ["--include-operation-id", operation, "--max-examples", str(EXAMPLES)]
-    done = subprocess.run(command + only, capture_output=True, text=True)
-    print(f"{operation:20} {'fine' if done.returncode == 0 else 'FAILED'}")
+def held(url):
+    """The episodes of the server, by id."""
+    return {entry["episode_id"]: entry for entry in read(f"{url}/v1/episodes")["episodes"]}
+
+
+def schemathesis(url, document, folder, config, flags):
+    """Whether every check passes."""
+    (folder / "openapi.json").write_text(json.dumps(document))
+    (folder / "schemathesis.toml").write_text(config)
+    command = ["schemathesis", "--config-file", folder / "schemathesis.toml", "run", folder / "openapi.json"]
+    done = subprocess.run(command + ["--url", url, "--checks", "all"] + flags, capture_output=True, text=True)
     if done.returncode != 0:
-        print(done.stdout)
+        print(done.stdout, done.stderr)
     return done.returncode == 0
 
 
-def check(url, only):
-    openapi = read(f"{url}/v1/openapi.json")
-    depth = openapi["paths"]["/v1/episodes/{episode_id}/tools/query_depth"]["post"]["requestBody"]
-    region = depth["content"]["application/json"]["schema"]["properties"]["region"]["properties"]
+def fuzz_one(url, document, operation, folder):
+    """Whether every check passes on one operation, and its commands are carried out."""
+    # An episode of its own, so that one that ends is not missed by the others.
+    episode = new_episode(url)
+    config = f'[parameters]\n"path.episode_id" = "{episode}"\n'
+    flags = ["--include-operation-id", operation, "--max-examples", str(EXAMPLES)]
+    fine = schemathesis(url, document, folder, config, flags)
+    entry = held(url)[episode]
+    if operation in COMMANDS and entry["step"] == 0:
+        print(f"{operation}: no command was carried out")
+        fine = False
+    print(f"{operation:20} {'fine' if fine else 'FAILED':6} {entry['step']} steps, ended: {entry['ended']}", flush=True)
+    return fine
+
+
+def fuzz_together(url, document, folder):
+    """Whether every check passes on all operations together, and every shared episode is deleted by them or stands whole."""
+    document = json.loads(json.dumps(document))
+    shared = [new_episode(url) for _ in range(SHARED_EPISODES)]
+    for path in document["paths"].values():
+        for parameter in path.get("parameters", []):
+            parameter["schema"] = {"type": "string", "enum": shared}
+    fine = schemathesis(url, document, folder, "", ["--max-examples", str(SHARED_EXAMPLES)])
+    deleted = [episode for episode in shared if episode not in held(url)]
+    if not deleted:
+        print("no episode was deleted")
+        fine = False
+    print(f"{'all, with DELETE':20} {'fine' if fine else 'FAILED':6} {len(deleted)} of {len(shared)} episodes deleted")
+    return fine
+
+
+def description(url):
+    """The server's OpenAPI description, with what JSON Schema cannot say left out."""
+    document = read(f"{url}/v1/openapi.json")
+
+    def body(tool):
+        post = document["paths"][f"/v1/episodes/{{episode_id}}/tools/{tool}"]["post"]
+        return post["requestBody"]["content"]["application/json"]["schema"]["properties"]
+
     # That robots have equally many rows is said in fifty alternatives, for which the generator takes minutes; one robot has.
-    chunk = openapi["paths"]["/v1/episodes/{episode_id}/tools/send_joint_chunk"]["post"]["requestBody"]
-    robots = chunk["content"]["application/json"]["schema"]["properties"]["robots"]
+    robots = body("send_joint_chunk")["robots"]
     robots["maxItems"] = 1
     del robots["anyOf"]
+    region = body("query_depth")["region"]["properties"]
     for corner in ("from", "to"):
         region[corner]["prefixItems"] = [{"type": "integer", "minimum": 0, "maximum": 15}] * 2
-    operations = [method["operationId"] for path in openapi["paths"].values() for name, method in path.items() if name != "parameters"]
-    operations = [operation for operation in operations if not only or operation in only]
+    return document
+
+
+def check(url, only):
+    document = description(url)
+    operations = [method["operationId"] for path in document["paths"].values() for name, method in path.items() if name != "parameters"]
+    first = [operation for operation in operations if operation != DELETE and (not only or operation in only)]
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
-        document = folder / "openapi.json"
-        document.write_text(json.dumps(openapi))
-        return all([fuzz(url, document, operation, folder) for operation in operations])
+        fine = [fuzz_one(url, document, operation, folder) for operation in first]
+        if not only or DELETE in only:
+            fine.append(fuzz_together(url, document, folder))
+    return all(fine)
 
 
 if __name__ == "__main__":

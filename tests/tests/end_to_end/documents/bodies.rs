@@ -44,7 +44,8 @@ fn tools_accept_the_bodies_that_pages_show() {
 
 /// The bodies of all calls of a tool by curl in a script.
 fn sent_to<'a>(tool: &str, script: &'a str) -> Vec<&'a str> {
-    let calls = script.split(&format!("/tools/{tool} ")).skip(1);
+    let route = format!("/tools/{tool} ");
+    let calls = script.split(route.as_str()).skip(1);
     calls.filter_map(|rest| rest.split_once("-d '")?.1.split('\'').next()).collect()
 }
 
