@@ -23,6 +23,7 @@ mod describe;
 mod error;
 pub mod evaluation;
 mod fingerprint;
+pub mod html;
 mod instructions;
 mod observation;
 mod output;
@@ -43,7 +44,7 @@ pub use describe::{brief, task_list};
 pub use error::{CheckpointError, EpisodeError, SceneError};
 pub use instructions::{Instructions, InstructionsError};
 pub use observation::{Picture, RobotObservation, RobotView, TeamObservation};
-pub use output::{OutputError, create_new_private_folder, create_private_folder, html, write_whole};
+pub use output::{OutputError, create_new_private_folder, create_private_folder, write_whole};
 pub use protocol::{Rules, rules};
 pub use recording::{
     RecordedCall, RecordedCheckpoint, Recorder, Recording, RecordingError, RecoverError, Recovered,

@@ -19,6 +19,9 @@ use crate::output::{OutputError, partial_path, put_in_place, write_whole};
 /// No more than this much of an episode is lost with the process.
 const FLUSHED_EVERY: Duration = Duration::from_millis(500);
 
+/// A chunk is compressed as one, in buffers that every recording under way has.
+const CHUNK_BYTES: u64 = 256 << 10;
+
 /// A file that is being written.
 pub struct McapFile {
     writer: mcap::Writer<RecordingStore>,
@@ -129,6 +132,7 @@ pub fn writer(store: RecordingStore) -> Result<mcap::Writer<RecordingStore>, mca
         .library(concat!("tandem ", env!("CARGO_PKG_VERSION")))
         .compression(Some(mcap::Compression::Lz4))
         .disable_seeking(true)
+        .chunk_size(Some(CHUNK_BYTES))
         .create(store)
 }
 
@@ -215,6 +219,8 @@ impl Write for RecordingStore {
         let written = file.write_all(&self.pending);
         self.flushed_bytes += self.pending.len() as u64;
         self.pending.clear();
+        // The scene's shapes and the pictures of a reply are megabytes, and come seldom.
+        self.pending.shrink_to(CHUNK_BYTES as usize);
         if written.is_err() {
             self.sink = Sink::Failed;
         }

@@ -8,7 +8,7 @@ mod video;
 pub use pictures::{DrawnPictures, PicturesError, PicturesPlan, draw_all};
 pub use scene::{EpisodeCamera, EpisodeRenderer, PictureSize};
 pub use verify::{Difference, Verdict, Verification, verify};
-pub use video::{VideoError, VideoFormat, film};
+pub use video::{ShortFilm, VideoError, VideoFormat, film, short_film};
 
 use crate::EpisodeError;
 use crate::recording::RecordingError;

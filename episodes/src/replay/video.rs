@@ -92,6 +92,41 @@ pub fn film(
     Ok(pictures)
 }
 
+/// A film for a page: so many pictures at most, whatever the episode's length, so that it plays for seconds and has a quarter of a
+/// megabyte at most.
+pub struct ShortFilm {
+    pub webp: Vec<u8>,
+    /// How much faster it plays than the episode was.
+    pub times_as_fast: f64,
+}
+
+const SHORT_PICTURES: usize = 60;
+const SHORT_RATE_HZ: u32 = 10;
+const SHORT_SIZE: PictureSize = PictureSize { width: 320, height: 240 };
+/// How long its last picture stays.
+const SHORT_END_MS: i32 = 1500;
+
+/// Films a whole recording from the side, as a [`ShortFilm`].
+pub fn short_film(recording: &Recording) -> Result<ShortFilm, VideoError> {
+    let mut scene = EpisodeRenderer::of(&recording.spec).map_err(ReplayError::from)?;
+    let failed = |error| webp_failed(recording.path(), error);
+    let mut encoder = webp::encoder((SHORT_SIZE.width, SHORT_SIZE.height)).map_err(failed)?;
+    let steps = recording.state_hashes().map_err(ReplayError::from)?.count();
+    let stride = steps.div_ceil(SHORT_PICTURES).max(1);
+    let mut pictures = 0;
+    for (index, step) in recording.steps().map_err(ReplayError::from)?.enumerate() {
+        let step = step.map_err(ReplayError::from)?;
+        if index % stride == 0 || index + 1 == steps {
+            let camera = scene.camera(EpisodeCamera::ThirdPerson, &step, Some(SHORT_SIZE));
+            let frame = scene.draw(&step, &camera);
+            encoder.add_frame(&frame.rgb, time_ms(pictures, SHORT_RATE_HZ)).map_err(failed)?;
+            pictures += 1;
+        }
+    }
+    let webp = encoder.finalize(time_ms(pictures, SHORT_RATE_HZ) + SHORT_END_MS).map_err(failed)?.to_vec();
+    Ok(ShortFilm { webp, times_as_fast: stride as f64 * f64::from(SHORT_RATE_HZ) / CONTROL_HZ })
+}
+
 /// Which step, counted from the recording's first, picture number `picture` shows.
 pub fn step_of_picture(picture: usize, rate_hz: u32) -> usize {
     (picture as f64 * CONTROL_HZ / f64::from(rate_hz)).round() as usize

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
+use tandem_sim::render::{Frame, PictureError, encode_png};
 use tandem_sim::{CONTROL_HZ, Step};
 use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
 
@@ -16,7 +17,8 @@ use crate::observation::Observer;
 use crate::output::{OutputError, create_private_folder, write_whole};
 use crate::recording::{CallOutcome, Recorder, RecorderThread, RecordingHeader, ToolCallRecord, Visibility};
 use crate::reports::episode::{
-    CELL_HEIGHT, CELL_WIDTH, CallCounts, EpisodePage, KeyMoment, LabelledFrame, PAGE_FILE, STRIP_FILE, png,
+    CELL_HEIGHT, CELL_WIDTH, CallCounts, EpisodePage, KeyMoment, LabelledPicture, PAGE_FILE, STRIP_FILE,
+    strip,
 };
 use crate::results::write_result;
 use crate::scoring::Facts;
@@ -119,8 +121,11 @@ impl RunFiles {
     }
 
     /// Keeps a moment for the strip.
-    pub(super) fn keep(&mut self, moment: KeyMoment) {
-        self.moments.push(moment);
+    pub(super) fn keep(&mut self, moment: Result<KeyMoment, PictureError>) {
+        match moment {
+            Ok(moment) => self.moments.push(moment),
+            Err(error) => self.note(Err(error)),
+        }
     }
 
     /// Why the recording is not complete, if it is not.
@@ -143,15 +148,14 @@ impl RunFiles {
     }
 
     fn report(&self, result: &ResultReply, task: &Task) -> Result<(), EpisodeError> {
-        let strip = png(&self.moments)?;
-        write_whole(&self.folder.join(STRIP_FILE), &strip)?;
+        write_whole(&self.folder.join(STRIP_FILE), &strip::png(&self.moments)?)?;
         let page = EpisodePage {
             task,
             result,
             calls: &self.calls,
             begin_s: self.begin_s,
             budget_left: self.budget_left,
-            strip: &strip,
+            moments: &self.moments,
         };
         Ok(write_whole(&self.folder.join(PAGE_FILE), page.html().as_bytes())?)
     }
@@ -171,7 +175,7 @@ pub(super) fn moment<'a>(
     step: &Step,
     names: impl Iterator<Item = &'a str>,
     observer: &mut Observer,
-) -> KeyMoment {
+) -> Result<KeyMoment, PictureError> {
     let (mut labels, mut cameras) = (vec!["the room".into()], vec![observer.cameras.third_person()]);
     for (robot, name) in names.enumerate() {
         labels.push(format!("what {name} sees"));
@@ -181,6 +185,9 @@ pub(super) fn moment<'a>(
         (camera.width, camera.height) = (CELL_WIDTH as u32, CELL_HEIGHT as u32);
     }
     let frames = observer.render_all(step, &cameras).into_iter();
-    let views = labels.into_iter().zip(frames).map(|(label, frame)| LabelledFrame { label, frame }).collect();
-    KeyMoment { caption: [caption.into(), format!("{:.1} s", step.time_s)], views }
+    let view = |(label, Frame { width, height, rgb, .. }): (String, Frame)| {
+        Ok(LabelledPicture { label, file: encode_png(width, height, &rgb)? })
+    };
+    let views = labels.into_iter().zip(frames).map(view).collect::<Result<_, PictureError>>()?;
+    Ok(KeyMoment { caption: [caption.into(), format!("{:.1} s", step.time_s)], views })
 }

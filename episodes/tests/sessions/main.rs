@@ -11,3 +11,5 @@ mod operators;
 mod recordings;
 mod replays;
 mod scenes;
+#[path = "../../../tests/src/skipped.rs"]
+mod skipped;

@@ -3,8 +3,12 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use tandem_episodes::reports::{EvaluationReport, ReportFormat, gallery, load};
-use tandem_episodes::write_whole;
+use tandem_episodes::replay::{ShortFilm, short_film};
+use tandem_episodes::reports::{
+    EvaluationReport, Film, FilmContent, FilmPlace, FilmedEpisode, ReportFormat, ReportPictures, film_places,
+    gallery, load,
+};
+use tandem_episodes::{Recording, write_whole};
 
 use super::CommandResult;
 use crate::settings::one_of;
@@ -30,15 +34,33 @@ pub struct ReportArgs {
 pub fn run(args: ReportArgs) -> CommandResult {
     let loaded = load(&args.folders)?;
     let report = EvaluationReport::of(&loaded);
-    let failures = match args.format {
-        ReportFormat::Html => gallery(&loaded, args.failures),
-        ReportFormat::Markdown | ReportFormat::Csv | ReportFormat::Json | ReportFormat::Tex => Vec::new(),
+    let pictures = match args.format {
+        ReportFormat::Html => ReportPictures {
+            films: film_places(&loaded).into_iter().map(film).collect(),
+            failures: gallery(&loaded, args.failures),
+        },
+        ReportFormat::Markdown | ReportFormat::Csv | ReportFormat::Json | ReportFormat::Tex => {
+            ReportPictures::default()
+        }
     };
-    let text = report.write(args.format, &failures)?;
+    let text = report.write(args.format, &pictures)?;
     let default = args.folders.first().map(|folder| folder.join(format!("report.{}", args.format.name())));
     let path = args.out.or(default).unwrap_or_else(|| "report.html".into());
     write_whole(&path, text.as_bytes())?;
-    println!("{}: {} episodes", path.display(), loaded.episodes.len());
+    let films = pictures.films.iter().filter(|film| film.content.is_ok()).count();
+    let films = if films > 0 { format!(", {films} films") } else { String::new() };
+    let size_mb = text.len() as f64 / 1e6;
+    println!("{}: {} episodes{films}, {size_mb:.1} MB", path.display(), loaded.episodes.len());
     loaded.skipped.iter().for_each(|skipped| eprintln!("left out: {skipped}"));
     Ok(ExitCode::SUCCESS)
+}
+
+/// Films an episode; what cannot be filmed says so in its place, and the rest of the report is none the worse.
+fn film(place: FilmPlace) -> Film {
+    let content = place.episode.clone().and_then(|FilmedEpisode { recording, .. }| {
+        let read = Recording::read(&recording).map_err(|error| error.to_string())?;
+        let ShortFilm { webp, times_as_fast } = short_film(&read).map_err(|error| error.to_string())?;
+        Ok(FilmContent { webp, times_as_fast })
+    });
+    Film { place, content }
 }

@@ -8,6 +8,7 @@ mod lengths;
 mod modules;
 mod order;
 mod paths;
+mod skips;
 mod sources;
 mod types;
 mod units;

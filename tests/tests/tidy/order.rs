@@ -28,7 +28,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "episodes",
         &[
-            &["output", "fingerprint", "scoring", "convert", "statistics"],
+            &["output", "html", "fingerprint", "scoring", "convert", "statistics"],
             &["error"],
             &["tasks"],
             &["protocol", "spec"],

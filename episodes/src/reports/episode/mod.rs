@@ -1,7 +1,9 @@
 //! What an episode leaves for people to look at: a page and a strip of pictures.
 
+pub mod moments;
 mod page;
-mod strip;
+pub mod strip;
 
+pub use moments::{KeyMoment, LabelledPicture};
 pub use page::{CallCounts, EpisodePage, PAGE_FILE};
-pub use strip::{CELL_HEIGHT, CELL_WIDTH, KeyMoment, LabelledFrame, STRIP_FILE, png};
+pub use strip::{CELL_HEIGHT, CELL_WIDTH, STRIP_FILE};

@@ -2,19 +2,17 @@
 
 use std::collections::BTreeMap;
 
-use base64::{Engine, prelude::BASE64_STANDARD};
 use tandem_sim::CONTROL_HZ;
 use tandem_tools_spec::{Budget, EndReason, ResultReply};
 
-use crate::output::html::escape;
+use crate::html::{self, escape};
 use crate::protocol::{Rules, rules};
+use crate::reports::episode::moments::{self, KeyMoment};
 use crate::scoring::Phase;
 use crate::tasks::Task;
 
 /// The page's name in a run folder.
 pub const PAGE_FILE: &str = "report.html";
-
-const STYLE: &str = include_str!("style.css");
 
 /// Answered and refused calls by tool.
 #[derive(Debug, Default)]
@@ -35,27 +33,15 @@ pub struct EpisodePage<'a> {
     pub begin_s: f64,
     /// The budget after the last control step; `None` if there was none.
     pub budget_left: Option<Budget>,
-    /// A PNG file.
-    pub strip: &'a [u8],
+    pub moments: &'a [KeyMoment],
 }
 
 impl EpisodePage<'_> {
     /// The page.
     pub fn html(&self) -> String {
-        let title = format!("{}, seed {}", escape(self.task.id), self.result.seed);
-        let strip = BASE64_STANDARD.encode(self.strip);
-        format!(
-            r#"<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}</title>
-<style>
-{STYLE}</style>
-</head>
-<body>
-<h1>{title}</h1>
+        let title = format!("{}, seed {}", self.task.id, self.result.seed);
+        let body = format!(
+            r#"<h1>{}</h1>
 <p class="soft">{instruction}</p>
 <p>{verdict}</p>
 <dl class="facts">{facts}</dl>
@@ -63,25 +49,25 @@ impl EpisodePage<'_> {
 {timeline}
 {phases}
 <h2>Key moments</h2>
-<img alt="One column per key moment: third person above, then what each robot sees" src="data:image/png;base64,{strip}">
+{moments}
 <h2>Budget</h2>
 {budget}
 <h2>Tool calls</h2>
 {calls}
 <h2>Recording</h2>
-{recording}
-</body>
-</html>
-"#,
+{recording}"#,
+            escape(&title),
             instruction = escape(self.task.instruction),
             verdict = self.verdict(),
             facts = self.facts(),
             timeline = self.timeline(),
             phases = self.phases(),
+            moments = moments::html(self.moments, "moments"),
             budget = self.budget(),
             calls = self.tool_calls(),
             recording = self.recording(),
-        )
+        );
+        html::page(&title, &body)
     }
 
     fn duration_s(&self) -> f64 {
@@ -151,11 +137,11 @@ impl EpisodePage<'_> {
             let who = if phase.collaborative { "together" } else { "alone" };
             let condition = escape(phase.description);
             rows += &format!(
-                r#"<tr><td>{number} {name}</td><td class="{class}">{reached}</td><td>{who}</td><td>{condition}</td></tr>"#
+                r#"<tr><td>{number} {name}</td><td class="{class}">{reached}</td><td>{who}</td><td class="long">{condition}</td></tr>"#
             );
         }
         format!(
-            "<table><tr><th>Phase</th><th>Reached at</th><th>Robots work</th><th>Condition</th></tr>{rows}</table>"
+            r#"<table class="words"><tr><th>Phase</th><th>Reached at</th><th>Robots work</th><th>Condition</th></tr>{rows}</table>"#
         )
     }
 
@@ -168,17 +154,17 @@ impl EpisodePage<'_> {
             hold => format!(", {hold} of them the initial hold"),
         };
         let mut rows = format!(
-            r#"<tr><td>Control steps of 20 ms</td><td><meter max="{episode_steps}" value="{steps}"></meter></td><td>{steps} of {episode_steps}{hold}</td></tr>"#
+            r#"<tr><td>Control steps of 20 ms</td><td class="long"><meter max="{episode_steps}" value="{steps}"></meter></td><td>{steps} of {episode_steps}{hold}</td></tr>"#
         );
         if let (Some(allowed), Some(left_s)) = (thinking, self.budget_left.and_then(|b| b.wall_clock_left_s))
         {
             let allowed_s = allowed.as_secs_f64();
             let used_s = allowed_s - left_s;
             rows += &format!(
-                r#"<tr><td>Policy's own time</td><td><meter max="{allowed_s}" value="{used_s:.2}"></meter></td><td>{used_s:.1} of {allowed_s:.0} s by the last step</td></tr>"#
+                r#"<tr><td>Policy's own time</td><td class="long"><meter max="{allowed_s}" value="{used_s:.2}"></meter></td><td>{used_s:.1} of {allowed_s:.0} s by the last step</td></tr>"#
             );
         }
-        format!("<table>{rows}</table>")
+        format!(r#"<table class="words">{rows}</table>"#)
     }
 
     fn tool_calls(&self) -> String {

@@ -13,6 +13,16 @@ pub struct FoundEpisode {
     pub played: PlayedEpisode,
     /// Its picture strip, where it was recorded.
     pub strip: Option<PathBuf>,
+    /// Its recording, where there is one.
+    pub recording: Option<PathBuf>,
+}
+
+impl FoundEpisode {
+    /// An episode with what its run folder holds, if there is one.
+    fn new(played: PlayedEpisode, run: &Path) -> FoundEpisode {
+        let file = |name: &str| Some(run.join(name)).filter(|path| path.exists());
+        FoundEpisode { played, strip: file(STRIP_FILE), recording: file(Recorder::FILE_NAME) }
+    }
 }
 
 /// What folders hold.
@@ -64,7 +74,7 @@ fn load_results(folder: &Path, loaded: &mut LoadedEpisodes) -> Result<(), LoadEr
     for path in entries(folder)?.into_iter().filter(|path| path.extension().is_some_and(|e| e == "json")) {
         let read = std::fs::read(&path).map_err(|error| error.to_string());
         match read.and_then(|bytes| serde_json::from_slice(&bytes).map_err(|error| error.to_string())) {
-            Ok(played) => loaded.add(FoundEpisode { played, strip: strip(&path.with_extension("")) }),
+            Ok(played) => loaded.add(FoundEpisode::new(played, &path.with_extension(""))),
             Err(reason) => loaded.skipped.push(format!("{}: {reason}", path.display())),
         }
     }
@@ -78,7 +88,7 @@ fn load_recordings(folder: &Path, loaded: &mut LoadedEpisodes) -> Result<(), Loa
     let folders = std::iter::once(folder.to_owned()).chain(entries(folder)?);
     for run in folders.filter(|run| run.join(Recorder::FILE_NAME).exists()) {
         match recorded(&run.join(Recorder::FILE_NAME), &policy) {
-            Ok(played) => loaded.add(FoundEpisode { played, strip: strip(&run) }),
+            Ok(played) => loaded.add(FoundEpisode::new(played, &run)),
             Err(reason) => loaded.skipped.push(reason),
         }
     }
@@ -98,11 +108,6 @@ fn recorded(path: &Path, policy: &str) -> Result<PlayedEpisode, String> {
         thought_s: calls.last().map_or(0.0, |call| call.thought.as_secs_f64()),
         result,
     })
-}
-
-fn strip(run: &Path) -> Option<PathBuf> {
-    let strip = run.join(STRIP_FILE);
-    strip.exists().then_some(strip)
 }
 
 /// What a folder holds, by name.

@@ -2,7 +2,6 @@
 //! policies compare on the same seeds; as one page that needs nothing else, or as text.
 
 mod compare;
-mod gallery;
 mod load;
 mod page;
 mod policy;
@@ -16,8 +15,10 @@ mod text;
 use serde::Serialize;
 
 pub use compare::{Comparison, PairedRow};
-pub use gallery::{Failure, gallery};
 pub use load::{FoundEpisode, LoadError, LoadedEpisodes, load};
+pub use page::ReportPictures;
+pub use page::films::{Film, FilmContent, FilmPlace, FilmedEpisode, film_places};
+pub use page::gallery::{Failure, gallery};
 pub use policy::{
     ByCollaboration, EpisodeCosts, FailureReason, PhaseReport, PolicyReport, TaskAverage, TaskReport,
     ValueRange,
@@ -89,10 +90,14 @@ impl EvaluationReport {
         }
     }
 
-    /// The report; a page shows `failures`, too.
-    pub fn write(&self, format: ReportFormat, failures: &[Failure]) -> Result<String, serde_json::Error> {
+    /// The report; a page shows `pictures`, too.
+    pub fn write(
+        &self,
+        format: ReportFormat,
+        pictures: &ReportPictures,
+    ) -> Result<String, serde_json::Error> {
         Ok(match format {
-            ReportFormat::Html => page::html(self, failures),
+            ReportFormat::Html => page::html(self, pictures),
             ReportFormat::Markdown => text::markdown(self),
             ReportFormat::Csv => text::csv(self),
             ReportFormat::Json => serde_json::to_string_pretty(self)? + "\n",

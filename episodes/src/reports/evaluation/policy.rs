@@ -24,6 +24,9 @@ pub struct PolicyGroup<'a> {
 #[derive(Debug, Serialize)]
 pub struct PolicyReport {
     pub name: String,
+    /// Where it was reached, if it is a server.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub address: Option<String>,
     pub protocol: &'static str,
     pub locomotion: String,
     pub build: String,
@@ -135,8 +138,10 @@ pub fn groups(episodes: &[FoundEpisode]) -> Vec<PolicyGroup<'_>> {
 fn rules_of(played: &PlayedEpisode) -> Vec<String> {
     let spec = &played.spec;
     let short = played.build.chars().rev().take(6).collect::<Vec<_>>();
+    let (name, address) = split_address(&played.policy.name);
     vec![
-        played.policy.full_name(),
+        PolicyCard { name: name.into(), ..played.policy.clone() }.full_name(),
+        address.unwrap_or("in this process").into(),
         spec.protocol.name().into(),
         played.locomotion.clone(),
         spec.robot.name(),
@@ -145,6 +150,15 @@ fn rules_of(played: &PlayedEpisode) -> Vec<String> {
         settings_of(&played.policy),
         format!("build ..{}", short.iter().rev().collect::<String>()),
     ]
+}
+
+/// The name of a policy without the addresses that it is reached at, as `openpi` of `openpi:ws://host:8000`, and these.
+fn split_address(name: &str) -> (&str, Option<&str>) {
+    let parts = name.split_once(':').filter(|(_, address)| {
+        let scheme = address.split_once("://").map_or("", |(scheme, _)| scheme);
+        !scheme.is_empty() && scheme.chars().all(|character| character.is_ascii_alphanumeric())
+    });
+    parts.map_or((name, None), |(name, address)| (name, Some(address)))
 }
 
 /// A short name for how a policy was driven.
@@ -176,6 +190,7 @@ impl PolicyReport {
         let tasks: Vec<TaskReport> = of_tasks.flatten().collect();
         PolicyReport {
             name: group.name.clone(),
+            address: first.and_then(|played| split_address(&played.policy.name).1).map(str::to_owned),
             protocol: first.map_or("", |played| played.spec.protocol.name()),
             locomotion: first.map(|played| played.locomotion.clone()).unwrap_or_default(),
             build: first.map(|played| played.build.clone()).unwrap_or_default(),

@@ -55,7 +55,8 @@ fn write(folder: &Path, episodes: &[PlayedEpisode]) {
 }
 
 fn found(episodes: Vec<PlayedEpisode>) -> LoadedEpisodes {
-    let episodes = episodes.into_iter().map(|played| FoundEpisode { played, strip: None }).collect();
+    let episodes =
+        episodes.into_iter().map(|played| FoundEpisode { played, strip: None, recording: None }).collect();
     LoadedEpisodes { episodes, skipped: Vec::new() }
 }
 
@@ -156,7 +157,7 @@ fn reports_quote_what_they_are_told() {
     episodes.push(begun);
     let report = EvaluationReport::of(&found(episodes));
     let check = |format: ReportFormat, expected: &[&str], absent: &[&str]| {
-        let text = report.write(format, &[]).unwrap();
+        let text = report.write(format, &ReportPictures::default()).unwrap();
         for wanted in expected {
             assert!(text.contains(wanted), "{format:?} has no {wanted}: {text}");
         }
@@ -190,7 +191,7 @@ fn reports_quote_what_they_are_told() {
     );
     check(ReportFormat::Tex, &["a$<$b$>$\\&\"|\\_,\\%", "\\toprule", "60 [26.2, 87.8] 6/10"], &["a<b>"]);
     let json: serde_json::Value =
-        serde_json::from_str(&report.write(ReportFormat::Json, &[]).unwrap()).unwrap();
+        serde_json::from_str(&report.write(ReportFormat::Json, &ReportPictures::default()).unwrap()).unwrap();
     assert_eq!(json["policies"][0]["tasks"][0]["phases"][1]["cumulative"]["successes"], 6);
 }
 
@@ -201,16 +202,78 @@ fn failures_are_shown_by_turns() {
     image::RgbImage::new(812, 40).save(&strip).unwrap();
     let mut loaded = found(nine_six_three("agent"));
     let other = tasks::find("pouring").unwrap();
-    loaded.episodes.push(FoundEpisode { played: played("agent", other, 1, 0), strip: None });
+    loaded.episodes.push(FoundEpisode { played: played("agent", other, 1, 0), strip: None, recording: None });
     loaded.episodes.iter_mut().for_each(|found| found.strip = Some(strip.clone()));
     let shown = gallery(&loaded, 2);
     let seeds: Vec<_> = shown.iter().map(|failure| (failure.task, failure.seed, &*failure.phase)).collect();
     assert_eq!(seeds, [("handover", 3, "p3"), ("pouring", 1, "p1")]);
-    let picture = shown[0].picture.as_ref().unwrap();
-    assert_eq!((picture.width, picture.height, &picture.webp[..4]), (406, 20, &b"RIFF"[..]));
-    let page = EvaluationReport::of(&loaded).write(ReportFormat::Html, &shown).unwrap();
+    let file = &shown[0].moments[0].views[0].file;
+    let decoder = webp_animation::Decoder::new(file).unwrap();
+    assert_eq!(decoder.dimensions(), (406, 20));
+    let pictures = ReportPictures { failures: shown, ..ReportPictures::default() };
+    let page = EvaluationReport::of(&loaded).write(ReportFormat::Html, &pictures).unwrap();
     assert!(
         page.contains("2 of 8 episodes that failed") && page.contains("data:image/webp;base64,"),
         "{page}"
     );
+}
+
+/// The name of a server is a word; where it is reached stands beside it.
+#[test]
+fn addresses_are_a_detail() {
+    let check = |names: &[&str], titles: &[&str], addresses: &[Option<&str>]| {
+        let report =
+            EvaluationReport::of(&found(names.iter().flat_map(|name| nine_six_three(name)).collect()));
+        let named: Vec<&str> = report.policies.iter().map(|policy| policy.name.as_str()).collect();
+        let at: Vec<Option<&str>> = report.policies.iter().map(|policy| policy.address.as_deref()).collect();
+        assert_eq!((&*named, &*at), (titles, addresses));
+        report.write(ReportFormat::Html, &ReportPictures::default()).unwrap()
+    };
+    let page = check(&["openpi:ws://[::1]:8000"], &["openpi"], &[Some("ws://[::1]:8000")]);
+    assert!(page.contains("<h1>openpi</h1>") && page.contains("<title>Tandem: openpi</title>"), "{page}");
+    assert!(page.contains("at <code>ws://[::1]:8000</code>"), "{page}");
+    check(
+        &["act:http://a:1", "act:http://b:2"],
+        &["act (http://a:1)", "act (http://b:2)"],
+        &[Some("http://a:1"), Some("http://b:2")],
+    );
+    let program = "exec:python agent.py --url http://a";
+    check(&[program, "expert"], &[program, "expert"], &[None, None]);
+}
+
+/// Each task has two films, or says why it has not.
+#[test]
+fn films_are_of_one_success_and_one_failure() {
+    let mut loaded = found(nine_six_three("agent"));
+    let succeeding = tasks::find("pouring").unwrap();
+    loaded.episodes.extend(found(vec![played("agent", succeeding, 4, succeeding.phases.len())]).episodes);
+    // Seeds 0 to 2 of Handover succeeded; of them, and of those that failed, the first was not recorded.
+    for (index, recorded) in [(1, "one"), (2, "two"), (4, "four")] {
+        loaded.episodes[index].recording = Some(recorded.into());
+    }
+    let places = film_places(&loaded);
+    let episodes: Vec<Result<(u32, Option<&str>), &str>> = places
+        .iter()
+        .map(|place| match &place.episode {
+            Ok(found) => Ok((found.seed, found.why.as_deref())),
+            Err(reason) => Err(reason.as_str()),
+        })
+        .collect();
+    let unrecorded = "No recording of an episode that succeeded was kept; evaluate --record keeps them.";
+    let ended = Some("the policy ended the episode");
+    assert_eq!(episodes, [Ok((1, None)), Ok((4, ended)), Err(unrecorded), Err("No episode failed.")]);
+    let contents = [
+        Ok(FilmContent { webp: b"RIFF".into(), times_as_fast: 3.0 }),
+        Err("a <reason>".into()),
+        Err(String::new()),
+        Err(String::new()),
+    ];
+    let films = places.into_iter().zip(contents).map(|(place, content)| Film { place, content }).collect();
+    let pictures = ReportPictures { films, ..ReportPictures::default() };
+    let page = EvaluationReport::of(&loaded).write(ReportFormat::Html, &pictures).unwrap();
+    let top = page.find("data:image/webp;base64,UklGRg==").unwrap();
+    assert!(top < page.find("How far episodes got").unwrap(), "films are above the figures");
+    for text in ["agent, seed 1, 3 times as fast", "a &lt;reason&gt;", unrecorded, "No episode failed."] {
+        assert!(page.contains(text), "no {text:?} in {page}");
+    }
 }

@@ -6,6 +6,10 @@ use super::tables::{Table, all};
 
 pub fn markdown(report: &EvaluationReport) -> String {
     let mut text = String::from("# Tandem: report\n");
+    for policy in &report.policies {
+        let address = policy.address.as_ref().map(|address| format!("\n{}: {address}\n", policy.name));
+        text.extend(address);
+    }
     for table in all(report) {
         let line = |cells: &[String]| {
             format!("| {} |\n", cells.iter().map(|c| escape_pipe(c)).collect::<Vec<_>>().join(" | "))

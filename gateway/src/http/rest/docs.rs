@@ -3,13 +3,12 @@
 use std::fmt::Write;
 
 use serde_json::{Map, Value};
-use tandem_episodes::html::escape;
-
-const STYLE: &str = include_str!("docs.css");
+use tandem_episodes::html::{self, escape};
 
 /// The page of an OpenAPI document.
 pub fn page(document: &Value) -> String {
-    let title = format!("{} {}", text(&document["info"]["title"]), text(&document["info"]["version"]));
+    let info = |name: &str| document["info"][name].as_str().unwrap_or_default();
+    let title = format!("{} {}", info("title"), info("version"));
     let mut operations = String::new();
     for (path, methods) in entries(&document["paths"]) {
         for (method, operation) in entries(methods).filter(|(name, _)| *name != "parameters") {
@@ -17,32 +16,14 @@ pub fn page(document: &Value) -> String {
         }
     }
     let body = format!(
-        r#"<p>The interface, as <a href="/v1/openapi.json">/v1/openapi.json</a> has it for programs. The same tools are served to MCP hosts
+        r#"<h1>{}</h1>
+<p>The interface, as <a href="/v1/openapi.json">/v1/openapi.json</a> has it for programs. The same tools are served to MCP hosts
 at <code>/mcp</code>, and as specifications for language models at <a href="/v1/tools">/v1/tools</a>.
 <a href="/">The episodes</a> are on a page of their own.</p>
-{operations}"#
+{operations}"#,
+        escape(&title)
     );
-    whole(&title, &body)
-}
-
-/// A page with this title and body, both in HTML.
-pub fn whole(title: &str, body: &str) -> String {
-    format!(
-        r#"<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}</title>
-<style>
-{STYLE}</style>
-</head>
-<body>
-<h1>{title}</h1>
-{body}</body>
-</html>
-"#
-    )
+    html::page(&title, &body)
 }
 
 /// The section of one operation, folded until its reader opens it.
@@ -52,7 +33,7 @@ fn section(path: &str, method: &str, operation: &Value, shared: &Value) -> Strin
     let parameters = [shared, &operation["parameters"]].into_iter().filter_map(Value::as_array).flatten();
     let rows: String = parameters.map(parameter).collect();
     if !rows.is_empty() {
-        body += &format!("<h3>In the address</h3>\n<table>\n{rows}</table>\n");
+        body += &format!("<h3>In the address</h3>\n<table class=\"words\">\n{rows}</table>\n");
     }
     if let Some(schema) = schema(&operation["requestBody"]) {
         body += &format!("<h3>Body</h3>\n{}", fields(schema));
@@ -62,7 +43,7 @@ fn section(path: &str, method: &str, operation: &Value, shared: &Value) -> Strin
         let _ = write!(body, "<h3>{}: {}</h3>\n{answer}", escape(status), text(&response["description"]));
     }
     format!(
-        "<details id=\"{id}\">\n<summary><b>{method}</b> <code>{}</code> <span>{id}</span></summary>\n{body}</details>\n",
+        "<details id=\"{id}\">\n<summary><b>{method}</b> <code>{}</code> <span class=\"soft\">{id}</span></summary>\n{body}</details>\n",
         escape(path)
     )
 }
@@ -78,7 +59,7 @@ fn fields(schema: &Value) -> String {
     list_fields(schema, "", &mut rows);
     match rows.is_empty() {
         true => format!("<p>{} {}</p>\n", kind(schema), text(&schema["description"])),
-        false => format!("<table>\n{rows}</table>\n"),
+        false => format!("<table class=\"words\">\n{rows}</table>\n"),
     }
 }
 
@@ -98,7 +79,7 @@ fn list_fields(schema: &Value, place: &str, rows: &mut String) {
 fn row(name: &str, schema: &Value, described: &Value, required: bool) -> String {
     let name = if required { format!("<b>{name}</b>") } else { name.to_owned() };
     format!(
-        "<tr><td><code>{name}</code></td><td>{}</td><td>{}</td></tr>\n",
+        "<tr><td><code>{name}</code></td><td>{}</td><td class=\"long\">{}</td></tr>\n",
         kind(schema),
         text(&described["description"])
     )

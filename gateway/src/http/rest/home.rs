@@ -3,14 +3,14 @@
 use std::fmt::Write;
 
 use serde_json::json;
-use tandem_episodes::html::escape;
+use tandem_episodes::html::{self, escape};
 use tandem_tools_spec::{EpisodeEntry, EpisodeList, Operators};
-
-use super::docs::whole;
 
 /// The page of a server of `version` with these episodes.
 pub fn page(version: &str, list: &EpisodeList) -> String {
-    let mut body = String::from(
+    let title = format!("Tandem {version}");
+    let mut body = format!("<h1>{}</h1>\n", escape(&title));
+    body.push_str(
         "<p>Simulated humanoids that must work together. <a href=\"/docs\">The interface</a>, for programs \
          <a href=\"/v1/openapi.json\">as OpenAPI</a>; <a href=\"/v1/tasks\">the tasks</a>; <a href=\"/v1/tools\">the tools</a>; \
          <a href=\"/metrics\">figures for Prometheus</a>. MCP hosts connect to <code>/mcp</code>.</p>\n<h2>Episodes</h2>\n",
@@ -19,11 +19,11 @@ pub fn page(version: &str, list: &EpisodeList) -> String {
     body += &match rows.is_empty() {
         true => "<p>None is held. <code>POST /v1/episodes</code> starts one.</p>\n".to_owned(),
         false => format!(
-            "<table>\n<tr><th>episode</th><th>task</th><th>seed</th><th>protocol</th><th>driven by</th><th>step</th><th>stands</th></tr>\n\
-             {rows}</table>\n"
+            "<div class=\"scroll\"><table>\n<tr><th>episode</th><th>task</th><th>seed</th><th>protocol</th><th>driven by</th><th>step</th><th>stands</th></tr>\n\
+             {rows}</table></div>\n"
         ),
     };
-    whole(&format!("Tandem {}", escape(version)), &body)
+    html::page(&title, &body)
 }
 
 fn row(entry: &EpisodeEntry) -> String {

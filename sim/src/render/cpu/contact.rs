@@ -61,6 +61,11 @@ impl WithSimd for ContactDrawing<'_> {
 }
 
 impl ContactMap {
+    /// The next map is drawn as the first one is.
+    pub fn forget(&mut self) {
+        self.focus_m = None;
+    }
+
     pub fn draw(&mut self, prepared: &Prepared, placed: &PlacedScenery) {
         Arch::new().dispatch(ContactDrawing { map: self, prepared, placed });
     }

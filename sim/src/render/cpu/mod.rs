@@ -6,8 +6,10 @@ mod shade;
 mod shadow;
 mod target;
 mod view;
+mod workspace;
 
 use std::panic::resume_unwind;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 
 use pulp::{Arch, Simd, WithSimd};
@@ -21,14 +23,13 @@ use shadow::ShadowMap;
 use target::RenderTarget;
 use view::{Row, SrgbTable, View};
 
-/// Renders on the calling thread, and several pictures of a state side by side. It keeps its buffers, and the shadows of the last
-/// state.
+/// Renders on the calling thread, and several pictures of a state side by side. Its buffers it has only while it draws; the shadows
+/// of its last state are there the next time, unless too many others have drawn meanwhile.
 pub(super) struct CpuRenderer {
     prepared: Prepared,
     srgb: SrgbTable,
-    state: LitState,
-    /// One for each picture that is drawn at the same time.
-    canvases: Vec<Canvas>,
+    /// No other renderer of this process has it.
+    number: u64,
 }
 
 /// A state of the scenery with its light: what pictures from all cameras have in common.
@@ -39,6 +40,15 @@ struct LitState {
     shadow: ShadowMap,
     contact: ContactMap,
     facets: Vec<Facet>,
+}
+
+impl LitState {
+    /// Becomes anybody's: nothing of what it was lit for is taken for what is to be drawn next.
+    fn forget(&mut self) {
+        self.placed = PlacedScenery::default();
+        self.shadow.forget();
+        self.contact.forget();
+    }
 }
 
 /// The buffers of one picture.
@@ -52,33 +62,45 @@ struct Canvas {
 
 impl CpuRenderer {
     pub(super) fn new(scenery: Scenery) -> CpuRenderer {
+        static RENDERERS: AtomicU64 = AtomicU64::new(0);
         CpuRenderer {
             prepared: Prepared::new(scenery),
             srgb: SrgbTable::default(),
-            state: LitState::default(),
-            canvases: Vec::new(),
+            number: RENDERERS.fetch_add(1, Ordering::Relaxed),
         }
     }
 
     /// What each of `cameras` sees, the first drawn on this thread and the others beside it. A picture is the same bit for bit,
     /// whatever is drawn beside it.
     pub(super) fn draw_placed(&mut self, placed: PlacedScenery, cameras: &[Camera]) -> Vec<Frame> {
-        let CpuRenderer { prepared, srgb, state, canvases } = self;
+        let CpuRenderer { prepared, srgb, number } = self;
         let arch = Arch::new();
+        // What panics meanwhile takes state and canvases with it.
+        let mut state = workspace::take_state(*number);
         if state.placed != placed {
-            arch.dispatch(StateDrawing { state, prepared, placed });
+            arch.dispatch(StateDrawing { state: &mut state, prepared, placed });
         }
-        canvases.resize_with(canvases.len().max(cameras.len()), Canvas::default);
-        let (prepared, srgb, state) = (&*prepared, &*srgb, &*state);
-        let draw = |(canvas, camera)| arch.dispatch(PictureDrawing { state, prepared, srgb, canvas, camera });
+        let mut canvases = workspace::take_canvases(cameras.len());
+        let (prepared, srgb, lit) = (&*prepared, &*srgb, &state);
+        let draw =
+            |(canvas, camera)| arch.dispatch(PictureDrawing { state: lit, prepared, srgb, canvas, camera });
         let mut pictures = canvases.iter_mut().zip(cameras);
         let first = pictures.next();
-        thread::scope(|scope| {
+        let frames = thread::scope(|scope| {
             let others: Vec<_> = pictures.map(|picture| scope.spawn(move || draw(picture))).collect();
             let others =
                 others.into_iter().map(|other| other.join().unwrap_or_else(|panic| resume_unwind(panic)));
             first.map(draw).into_iter().chain(others).collect()
-        })
+        });
+        workspace::give_canvases(canvases);
+        workspace::give_state(*number, state);
+        frames
+    }
+}
+
+impl Drop for CpuRenderer {
+    fn drop(&mut self) {
+        workspace::drop_state(self.number);
     }
 }
 

@@ -45,6 +45,11 @@ struct ShadowLayer {
 }
 
 impl ShadowMap {
+    /// The next shadows are drawn as the first ones are.
+    pub(super) fn forget(&mut self) {
+        self.focus_m = None;
+    }
+
     /// Draws the shadows of everything that casts one.
     #[inline(always)]
     pub(super) fn draw<S: Simd>(&mut self, simd: S, prepared: &Prepared, placed: &PlacedScenery) {

@@ -6,6 +6,11 @@ use std::f32::consts::PI;
 use crate::render::{Camera, Cameras, Frame, Renderer, RendererKind, Scenery, cpu};
 use crate::{ObjectPlacement, Pose, RobotPlacement, Step, Vector, World, WorldSpec};
 
+#[path = "../../../../tests/src/skipped.rs"]
+mod skipped;
+
+use skipped::skipped;
+
 const LEAST_PSNR_DB: f64 = 40.0;
 const DEPTH_TOLERANCE_M: f32 = 1e-4;
 /// The share of pixels that may show another thing.
@@ -16,7 +21,7 @@ fn gpu(scenery: Scenery) -> Option<Box<dyn Renderer>> {
     let renderer = RendererKind::Gpu.renderer(scenery);
     let found = renderer.name() != RendererKind::Cpu.name();
     if !found {
-        println!("skipped: {}", RendererKind::Gpu.describe().expect("this build has it"));
+        skipped(&RendererKind::Gpu.describe().expect("this build has it"));
     }
     found.then_some(renderer)
 }

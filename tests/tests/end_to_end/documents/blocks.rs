@@ -7,6 +7,7 @@ use tandem::{
     drivers::PolicyMap,
     settings::{Layer, Settings},
 };
+use tandem_tests::skipped;
 
 use super::{
     command_lines,
@@ -79,7 +80,7 @@ fn in_a_file(block: &Block, read: impl Fn(&str) -> Result<(), String>) -> Result
 /// Whether Python reads it; without Python nobody knows.
 fn compile(block: &Block) -> Result<(), String> {
     if !is_installed("python3") {
-        println!("skipped: no python3 to compile a block with");
+        skipped("no python3 to compile blocks with");
         return Ok(());
     }
     in_a_file(block, |path| {

@@ -14,7 +14,7 @@ use std::{
 
 use clap::Parser;
 use tandem::cli::Cli;
-use tandem_tests::TestServer;
+use tandem_tests::{TestServer, skipped};
 
 use super::{
     blocks::{is_installed, succeeds},
@@ -39,7 +39,7 @@ def policy(image, state):
 #[test]
 fn scripts_of_pages_run() {
     if !is_installed("curl") {
-        println!("skipped: no curl");
+        skipped("no curl to call a server with");
         return;
     }
     thread::scope(|scope| {
@@ -62,7 +62,8 @@ fn loops_in_python_run() {
         let imports: String =
             script.lines().filter(|line| line.starts_with("import ")).collect::<Vec<_>>().join("\n");
         if !is_installed("python3") || !succeeds(Command::new("python3").args(["-c", &imports])) {
-            println!("skipped: no python3, or not what {} asks for: {imports}", page.path.display());
+            let imports = imports.replace('\n', ", ");
+            skipped(&format!("no python3, or not what {} asks for: {imports}", page.path.display()));
             continue;
         }
         let server = TestServer::start();
@@ -96,7 +97,7 @@ fn script(page: &Page, language: &str) -> String {
 
 fn run_script(page: &Page, script: &str) {
     if script.contains("python3 ") && !is_installed("python3") {
-        println!("skipped: no python3 for {}", page.path.display());
+        skipped(&format!("no python3 for {}", page.path.display()));
         return;
     }
     let began = Instant::now();

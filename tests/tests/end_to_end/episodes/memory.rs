@@ -1,8 +1,10 @@
-//! Episodes leave no memory behind.
+//! What episodes take of memory, and that they leave none behind.
 
-use std::fs;
+use std::{env, fs, process::Command};
 
 use serde_json::json;
+use tandem::settings::Layer;
+use tandem_episodes::tasks;
 use tandem_tests::TestServer;
 
 /// Resident memory of this process, which is the server's, too.
@@ -40,4 +42,45 @@ fn check(episodes: usize) {
 #[ignore = "some minutes"]
 fn five_hundred_episodes_leave_no_memory_behind() {
     check(500);
+}
+
+/// Most that an episode may take, of all that the server takes beyond what it took before the first.
+const EPISODE_KB: u64 = 12_000;
+const EPISODES: usize = 21;
+
+#[test]
+#[ignore = "a process of its own, which the test below starts"]
+fn episodes_side_by_side() {
+    let server = TestServer::with(Layer { max_episodes: Some(EPISODES as u32), ..Layer::default() });
+    let before_kb = resident_kb();
+    let start = |(seed, task): (usize, &tasks::Task)| {
+        let args = json!({ "task": task.id, "seed": seed, "protocol": "benchmark" });
+        let started = server.post("/v1/episodes", &args).ok();
+        started["episode_id"].as_str().expect("an id").to_owned()
+    };
+    let ids: Vec<String> = tasks::ALL.iter().cycle().take(EPISODES).enumerate().map(start).collect();
+    for _ in 0..3 {
+        for id in &ids {
+            server.tool(id, "wait", &json!({ "steps": 2 })).ok();
+            server.tool(id, "observe", &json!({})).ok();
+        }
+    }
+    let each_kb = (resident_kb() - before_kb) / EPISODES as u64;
+    println!("{EPISODES} episodes: {before_kb} kB before, {each_kb} kB each");
+    assert!(each_kb <= EPISODE_KB, "{each_kb} kB each");
+}
+
+/// Other tests of this program take memory, too.
+#[test]
+fn an_episode_takes_at_most_twelve_megabytes() {
+    let mut alone = Command::new(env::current_exe().expect("this program"));
+    alone.args(["--exact", "episodes::memory::episodes_side_by_side", "--ignored", "--nocapture"]);
+    let output = alone.output().expect("this program again");
+    let told = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(
+        output.status.success() && told.contains("1 passed"),
+        "{told}{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    println!("{told}");
 }

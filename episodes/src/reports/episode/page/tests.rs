@@ -3,6 +3,7 @@
 use tandem_tools_spec::{PhaseTimes, Protocol};
 
 use super::*;
+use crate::reports::episode::LabelledPicture;
 use crate::tasks;
 
 fn page(phase_times_s: [Option<f64>; 3], protocol: Protocol) -> String {
@@ -30,7 +31,9 @@ fn page_from(begin_s: f64, phase_times_s: [Option<f64>; 3], protocol: Protocol) 
     let wall_clock_left_s = (protocol == Protocol::Agentic).then_some(1740.0);
     let budget_left = Some(Budget { steps_left: 5500, wall_clock_left_s, steps_per_command: 25 });
     let task = tasks::find("handover").unwrap();
-    EpisodePage { task, result: &result, calls: &calls, begin_s, budget_left, strip: b"png" }.html()
+    let views = vec![LabelledPicture { label: "what A sees".into(), file: b"png".into() }];
+    let moments = [KeyMoment { caption: ["p1 <grasp>".into(), "4.0 s".into()], views }];
+    EpisodePage { task, result: &result, calls: &calls, begin_s, budget_left, moments: &moments }.html()
 }
 
 #[test]
@@ -49,6 +52,10 @@ fn pages_tell_what_happened() {
             "60.0 of 1800 s",
             r#"<code>move_wrists</code></td><td class="number">2</td><td class="number">1</td>"#,
             "data:image/png;base64,cG5n",
+            // What a picture shows is text.
+            r#"<p>p1 &lt;grasp&gt; <span class="soft">4.0 s</span></p>"#,
+            "<figcaption>what A sees</figcaption>",
+            r#"alt="what A sees, p1 &lt;grasp&gt; 4.0 s""#,
         ],
         &["p3 1"],
     );
@@ -74,4 +81,21 @@ fn pages_load_nothing_and_escape_what_they_quote() {
     assert!(page.contains("<code>&lt;script&gt;</code>"));
     assert!(!page.contains("<script"));
     assert!(!page.contains("<link") && !page.contains("url(") && !page.contains("src=\"http"));
+}
+
+/// What is long stands in cells that become lines of their own where there is no room for columns.
+#[test]
+fn no_table_of_words_needs_more_room_than_a_telephone_has() {
+    let page = page([Some(4.0), None, None], Protocol::Agentic);
+    let tables: Vec<&str> =
+        page.split("<table").skip(1).map(|table| table.split_once("</table>").unwrap().0).collect();
+    assert_eq!(tables.len(), 3);
+    for table in tables {
+        let words = table.starts_with(" class=\"words\"");
+        for cell in table.split("<td").skip(1).map(|cell| cell.split_once("</td>").unwrap().0) {
+            let (class, text) = cell.split_once('>').unwrap();
+            let lone = words && class.contains("long");
+            assert!(lone || text.len() < 50, "{cell}");
+        }
+    }
 }

@@ -1,60 +1,57 @@
 //! The report as one page that needs nothing else: no script, no font, no picture from elsewhere.
 
+pub mod films;
+pub mod gallery;
 mod plot;
 
-use base64::{Engine, prelude::BASE64_STANDARD};
-
 use super::EvaluationReport;
-use super::gallery::Failure;
 use super::policy::PolicyReport;
 use super::rate::percent;
 use super::tables::{self, Table};
-use crate::output::html::escape;
+use crate::html::{self, escape};
+use films::Film;
+use gallery::Failure;
 use plot::{SERIES, task_plot};
 
-const STYLE: &str = include_str!("style.css");
+/// What a page shows beside words and figures.
+#[derive(Clone, Debug, Default)]
+pub struct ReportPictures {
+    pub films: Vec<Film>,
+    pub failures: Vec<Failure>,
+}
 
 /// The page.
-pub fn html(report: &EvaluationReport, failures: &[Failure]) -> String {
+pub fn html(report: &EvaluationReport, pictures: &ReportPictures) -> String {
     let policies = &report.policies;
-    let names: Vec<String> = policies.iter().map(|policy| escape(&policy.name)).collect();
-    format!(
-        r#"<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>Tandem: {title}</title>
-<style>
-{STYLE}</style>
-</head>
-<body>
-<h1>{title}</h1>
+    let names: Vec<&str> = policies.iter().map(|policy| policy.name.as_str()).collect();
+    let title = in_words(&names);
+    let body = format!(
+        r#"<h1>{}</h1>
 <p class="soft">{episodes} episodes over {tasks} tasks, played in Tandem.</p>
 <div class="cards">{cards}</div>
+{films}
 <h2>How far episodes got</h2>
 {legend}
 <div class="plots">{plots}</div>
 {tables}
 {gallery}
-{skipped}
-</body>
-</html>
-"#,
-        title = in_words(&names),
+{skipped}"#,
+        escape(&title),
         episodes = policies.iter().map(|policy| policy.episodes).sum::<usize>(),
         tasks = tasks(report).len(),
         cards = policies.iter().enumerate().map(|(index, policy)| card(index, policy)).collect::<String>(),
+        films = films::html(&pictures.films),
         legend = legend(policies),
         plots = tasks(report).iter().map(|task| task_plot(task, policies)).collect::<String>(),
         tables = tables::all(report).iter().map(table).collect::<String>(),
-        gallery = gallery(failures, policies),
+        gallery = gallery::html(&pictures.failures, policies),
         skipped = skipped(report),
-    )
+    );
+    html::page(&format!("Tandem: {title}"), &body)
 }
 
 /// The names in a sentence, as "a, b and c".
-fn in_words(names: &[String]) -> String {
+fn in_words(names: &[&str]) -> String {
     match names.split_last() {
         Some((last, others)) if !others.is_empty() => format!("{} and {last}", others.join(", ")),
         _ => names.concat(),
@@ -88,9 +85,11 @@ fn card(index: usize, policy: &PolicyReport) -> String {
     }
     facts.push(("Episodes".into(), policy.episodes.to_string()));
     facts.push(("Robots that fell".into(), policy.falls.to_string()));
+    let address = policy.address.as_ref().map(|address| format!("at <code>{}</code>, ", escape(address)));
+    let address = address.unwrap_or_default();
     let fact = |(name, value): &(String, String)| format!("<div><dt>{name}</dt><dd>{value}</dd></div>");
     format!(
-        r#"<section class="card" style="--c: var(--s{})"><h3><span class="swatch"></span>{}</h3><dl>{}</dl><p class="soft">{} protocol, controller {}, build <code>{}</code></p></section>"#,
+        r#"<section class="card" style="--c: var(--s{})"><h3><span class="swatch"></span>{}</h3><dl>{}</dl><p class="soft">{address}{} protocol, controller {}, build <code>{}</code></p></section>"#,
         index % SERIES,
         escape(&policy.name),
         facts.iter().map(fact).collect::<String>(),
@@ -149,33 +148,6 @@ fn table(table: &Table) -> String {
         escape(&table.title),
         escape(&table.note),
     )
-}
-
-/// Failures with their key moments.
-fn gallery(failures: &[Failure], policies: &[PolicyReport]) -> String {
-    let failed: usize =
-        policies.iter().flat_map(|policy| &policy.reasons).map(|reason| reason.seeds.len()).sum();
-    let shown = failures.len();
-    let note = match (failed, shown) {
-        (0, _) => "No episode failed.".into(),
-        (_, 0) => format!(
-            "{failed} episodes failed, none of them recorded; <code>evaluate --record</code> keeps pictures."
-        ),
-        _ => format!(
-            "{shown} of {failed} episodes that failed: third person above, then what each robot sees."
-        ),
-    };
-    let mut figures = String::new();
-    for failure in failures {
-        let Some(picture) = &failure.picture else { continue };
-        let webp = BASE64_STANDARD.encode(&picture.webp);
-        let (task, policy, why) = (escape(failure.task), escape(&failure.policy), escape(&failure.why));
-        figures += &format!(
-            r#"<figure><figcaption><b>{task}, seed {}</b> {policy}, stuck before {}: {why}</figcaption><div class="scroll"><img loading="lazy" width="{}" height="{}" alt="Key moments of {task}, seed {}" src="data:image/webp;base64,{webp}"></div></figure>"#,
-            failure.seed, failure.phase, picture.width, picture.height, failure.seed,
-        );
-    }
-    format!(r#"<h2>Failures</h2><p class="soft">{note}</p>{figures}"#)
 }
 
 fn skipped(report: &EvaluationReport) -> String {

@@ -1,6 +1,6 @@
 //! Rates of one task's phases as a drawing: a mark for each rate on a line from 0 to 100 %, and its interval.
 
-use crate::output::html::escape;
+use crate::html::escape;
 use crate::reports::evaluation::policy::{PhaseReport, PolicyReport};
 use crate::reports::evaluation::rate::Rate;
 

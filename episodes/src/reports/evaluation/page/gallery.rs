@@ -1,12 +1,11 @@
 //! Failures with their key moments, as small pictures.
 
-use std::path::Path;
-
-use image::imageops::{self, FilterType};
-
-use super::load::{FoundEpisode, LoadedEpisodes};
-use super::policy::{PolicyGroup, failure_cause, first_missed_phase, groups, succeeded};
-use crate::output::webp;
+use crate::html::escape;
+use crate::reports::episode::{KeyMoment, moments, strip};
+use crate::reports::evaluation::load::{FoundEpisode, LoadedEpisodes};
+use crate::reports::evaluation::policy::{
+    PolicyGroup, PolicyReport, failure_cause, first_missed_phase, groups, succeeded,
+};
 
 /// One failed episode.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,19 +16,11 @@ pub struct Failure {
     /// Number of the first phase that counts and was not reached.
     pub phase: String,
     pub why: String,
-    /// `None` where its strip cannot be read.
-    pub picture: Option<FailurePicture>,
+    /// None where its strip cannot be read.
+    pub moments: Vec<KeyMoment>,
 }
 
-/// The strip of a failed episode, made small.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FailurePicture {
-    pub webp: Vec<u8>,
-    pub width: u32,
-    pub height: u32,
-}
-
-/// Columns of a strip are 400 pixels wide; on the page they need no more than this.
+/// Pictures of a strip are 400 pixels wide; on the page they need no more than this.
 const SCALE: f64 = 0.5;
 
 /// The failures that have a picture, `most` of them at most, by turns from every policy and task; those without one are
@@ -51,7 +42,8 @@ pub fn gallery(loaded: &LoadedEpisodes, most: usize) -> Vec<Failure> {
     order.sort_unstable();
     let pictured = order.into_iter().map(|index| {
         let (failure, found) = &all[index];
-        Failure { picture: found.strip.as_deref().and_then(scaled_picture), ..failure.clone() }
+        let moments = found.strip.as_deref().and_then(|path| strip::read(path, SCALE)).unwrap_or_default();
+        Failure { moments, ..failure.clone() }
     });
     pictured.collect()
 }
@@ -69,16 +61,31 @@ fn failure(group: &PolicyGroup, found: &FoundEpisode) -> Failure {
         seed: spec.seed,
         phase: first_missed_phase(&found.played),
         why: failure_cause(&found.played),
-        picture: None,
+        moments: Vec::new(),
     }
 }
 
-/// `None` where the file is no picture.
-fn scaled_picture(strip: &Path) -> Option<FailurePicture> {
-    let strip = image::open(strip).ok()?.into_rgb8();
-    let [width, height] =
-        [strip.width(), strip.height()].map(|px| (f64::from(px) * SCALE).round().max(1.0) as u32);
-    let small = imageops::resize(&strip, width, height, FilterType::Triangle);
-    let webp = webp::picture(width, height, small.as_raw()).ok()?;
-    Some(FailurePicture { webp, width, height })
+/// Failures with their key moments, as a part of the page.
+pub fn html(failures: &[Failure], policies: &[PolicyReport]) -> String {
+    let failed: usize =
+        policies.iter().flat_map(|policy| &policy.reasons).map(|reason| reason.seeds.len()).sum();
+    let shown = failures.len();
+    let note = match (failed, shown) {
+        (0, _) => "No episode failed.".into(),
+        (_, 0) => format!(
+            "{failed} episodes failed, none of them recorded; <code>evaluate --record</code> keeps pictures."
+        ),
+        _ => format!("{shown} of {failed} episodes that failed, with their key moments."),
+    };
+    let mut shown = String::new();
+    for failure in failures.iter().filter(|failure| !failure.moments.is_empty()) {
+        let (task, policy, why) = (escape(failure.task), escape(&failure.policy), escape(&failure.why));
+        shown += &format!(
+            r#"<p><b>{task}, seed {}</b> {policy}, stuck before {}: {why}</p>{}"#,
+            failure.seed,
+            failure.phase,
+            moments::html(&failure.moments, "moments small"),
+        );
+    }
+    format!(r#"<h2>Failures</h2><p class="soft">{note}</p>{shown}"#)
 }

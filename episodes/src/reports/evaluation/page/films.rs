@@ -1,0 +1,121 @@
+//! Of each task a film of an episode that succeeded and one of an episode that failed, or why there is none.
+
+use std::path::PathBuf;
+
+use crate::html::escape;
+use crate::reports::episode::moments;
+use crate::reports::evaluation::load::{FoundEpisode, LoadedEpisodes};
+use crate::reports::evaluation::policy::{failure_cause, groups, succeeded};
+use crate::tasks;
+
+/// The place of a film on the page.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FilmPlace {
+    pub task: &'static str,
+    /// Whether it is the one of an episode that succeeded.
+    pub success: bool,
+    /// The episode to film, or why there is none.
+    pub episode: Result<FilmedEpisode, String>,
+}
+
+/// An episode of which there is a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FilmedEpisode {
+    pub policy: String,
+    pub seed: u32,
+    /// Why it failed, if it did.
+    pub why: Option<String>,
+    pub recording: PathBuf,
+}
+
+/// A film in its place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    pub place: FilmPlace,
+    /// The film, or why there is none.
+    pub content: Result<FilmContent, String>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct FilmContent {
+    pub webp: Vec<u8>,
+    pub times_as_fast: f64,
+}
+
+/// Two places for each task that was played; in each, the first episode of the first policy that has one and its recording.
+pub fn film_places(loaded: &LoadedEpisodes) -> Vec<FilmPlace> {
+    let groups = groups(&loaded.episodes);
+    let episodes: Vec<(&str, &FoundEpisode)> = groups
+        .iter()
+        .flat_map(|group| group.episodes.iter().map(|found| (group.name.as_str(), *found)))
+        .collect();
+    let mut places = Vec::new();
+    for task in tasks::ALL {
+        let played: Vec<_> =
+            episodes.iter().copied().filter(|(_, found)| found.played.spec.task == task).collect();
+        if played.is_empty() {
+            continue;
+        }
+        for success in [true, false] {
+            let such = played.iter().copied().filter(|(_, found)| succeeded(&found.played) == success);
+            places.push(FilmPlace { task: task.id, success, episode: choose(success, such) });
+        }
+    }
+    places
+}
+
+fn choose<'a>(
+    success: bool,
+    mut such: impl Iterator<Item = (&'a str, &'a FoundEpisode)> + Clone,
+) -> Result<FilmedEpisode, String> {
+    let what = if success { "succeeded" } else { "failed" };
+    if such.clone().next().is_none() {
+        return Err(format!("No episode {what}."));
+    }
+    let film = such.find_map(|(policy, found)| {
+        Some(FilmedEpisode {
+            policy: policy.into(),
+            seed: found.played.spec.seed,
+            why: (!success).then(|| failure_cause(&found.played)),
+            recording: found.recording.clone()?,
+        })
+    });
+    film.ok_or_else(|| {
+        format!("No recording of an episode that {what} was kept; evaluate --record keeps them.")
+    })
+}
+
+/// The films as a part of the page; nothing where there are none.
+pub fn html(films: &[Film]) -> String {
+    if films.is_empty() {
+        return String::new();
+    }
+    let mut cards = String::new();
+    for of_task in films.chunk_by(|one, other| one.place.task == other.place.task) {
+        let pair: String = of_task.iter().map(figure).collect();
+        let task = of_task.first().map_or("", |film| film.place.task);
+        cards += &format!(
+            r#"<section class="card"><h3>{}</h3><div class="pair">{pair}</div></section>"#,
+            escape(task)
+        );
+    }
+    format!(
+        r#"<h2>One success and one failure of each task</h2><p class="soft">From the side, faster than it was.</p><div class="films">{cards}</div>"#
+    )
+}
+
+fn figure(Film { place, content }: &Film) -> String {
+    let (class, what) = if place.success { ("good", "success") } else { ("bad", "failure") };
+    let (picture, text) = match (&place.episode, content) {
+        (Ok(FilmedEpisode { policy, seed, why, .. }), Ok(FilmContent { webp, times_as_fast })) => {
+            let of = format!("{}, seed {seed}", escape(policy));
+            let why = why.as_ref().map(|why| format!(": {}", escape(why))).unwrap_or_default();
+            let alt = format!("A {what} at {}, {of}", escape(place.task));
+            (moments::picture(webp, &alt), format!("{of}, {times_as_fast:.0} times as fast{why}"))
+        }
+        (Err(reason), _) | (_, Err(reason)) => (String::new(), escape(reason)),
+    };
+    format!(
+        r#"<figure>{picture}<figcaption><span class="{class}">{what}</span> <span class="soft">{text}</span></figcaption></figure>"#
+    )
+}
