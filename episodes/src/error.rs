@@ -33,8 +33,8 @@ pub enum EpisodeError {
     Spec(#[from] SpecError),
     #[error("the world cannot be built: {0}")]
     Sim(#[from] tandem_sim::SimError),
-    #[error("the episode ends here: {0}")]
-    Diverged(#[from] tandem_sim::dynamics::Diverged),
+    #[error("the episode ends here: in step {step}, {source}")]
+    Diverged { step: u64, source: tandem_sim::dynamics::Diverged },
     #[error("inverse kinematics cannot use the robot's file: {0}")]
     Ik(#[from] tandem_ik::IkError),
     #[error("a picture cannot be encoded: {0}")]
@@ -67,7 +67,7 @@ impl EpisodeError {
             }
             EpisodeError::Ended { .. } => Refusal::new("ended", "Episode ended", Conflict),
             EpisodeError::Spec(error) => error.refusal(),
-            EpisodeError::Diverged(_) => Refusal::new("diverged", "Physics diverged", Conflict),
+            EpisodeError::Diverged { .. } => Refusal::new("diverged", "Physics diverged", Conflict),
             EpisodeError::Scene(_) => Refusal::new("scene", "Scene does not fit the task", Invalid),
             EpisodeError::Checkpoint(_) => Refusal::new("checkpoint", "Checkpoint does not fit", Invalid),
             EpisodeError::Sim(_)

@@ -52,6 +52,8 @@ pub use recording::{
 };
 pub use results::RESULT_FILE;
 pub use scoring::{A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, RobotFacts, Scores, StepScore};
-pub use session::{CallReply, Checkpoint, Clock, RunFiles, RunFolder, Session, monotonic};
+pub use session::{
+    CallReply, Checkpoint, Clock, FAILED_STEP_FILE, FailedStep, RunFiles, RunFolder, Session, monotonic,
+};
 pub use spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, SceneFile, Start};
 pub use tandem_sim::{BaseLimits, LocomotionChoice, SimError, joint_names, render::RendererKind};

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{EvaluationError, EvaluationPlan};
 use crate::output::write_whole;
 use crate::players::{EpisodeOutput, PlayError, PlayOutcome};
-use crate::results::{PlayedEpisode, RESULT_FILE, missed_phase_note};
+use crate::results::{PlayedEpisode, RESULT_FILE, episode_note};
 use crate::spec::{EpisodeSpec, Start};
 use crate::{CheckpointError, EpisodeError};
 
@@ -71,7 +71,10 @@ impl EpisodeCache<'_> {
             spec: spec.clone(),
             locomotion: self.locomotion.clone(),
             build: self.build.into(),
-            note: stopped.or_else(|| missed_phase_note(&result, spec.start_phase())),
+            // What a policy says of a simulator that failed is less than the simulator says.
+            note: stopped
+                .filter(|_| result.simulator_failure.is_none())
+                .or_else(|| episode_note(&result, spec.start_phase())),
             thought_s: thought.as_secs_f64(),
             result,
         };

@@ -23,6 +23,7 @@ fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultRe
         falls: 0,
         realtime_factor: 3.5,
         state_hash: "00c0ffee00c0ffee".into(),
+        simulator_failure: None,
         extra_information: vec![],
         recording_failed: None,
     }

@@ -135,6 +135,7 @@ fn result() -> ResultReply {
         falls: 0,
         realtime_factor: 4.0,
         state_hash: "0123456789abcdef".into(),
+        simulator_failure: None,
         extra_information: vec![],
         recording_failed: None,
     }

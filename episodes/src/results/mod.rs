@@ -66,7 +66,8 @@ pub struct PolicyCard {
     pub settings: Option<Value>,
     /// What it is shown beyond what the robots themselves see and feel.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub extra_information: Vec<String>,
+    pub simulator_failure: None,
+    extra_information: Vec<String>,
 }
 
 impl PolicyCard {
@@ -82,6 +83,12 @@ impl From<&str> for PolicyCard {
     fn from(name: &str) -> PolicyCard {
         PolicyCard { name: name.into(), ..PolicyCard::default() }
     }
+}
+
+/// How the simulator failed, or else the first phase that was not reached.
+pub fn episode_note(result: &ResultReply, counts: Option<usize>) -> Option<String> {
+    let failed = result.simulator_failure.as_ref().map(|failure| format!("the simulator failed {failure}"));
+    failed.or_else(|| missed_phase_note(result, counts))
 }
 
 /// The first phase that was not reached; where one phase counts, that one.
@@ -118,6 +125,7 @@ mod tests {
             falls: 0,
             realtime_factor: 3.5,
             state_hash: "00c0ffee00c0ffee".into(),
+            simulator_failure: None,
             extra_information: vec![],
             recording_failed: None,
         }

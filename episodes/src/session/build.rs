@@ -153,8 +153,10 @@ fn try_scene(
     let commands: Vec<_> = (0..world.robots().len()).map(|robot| world.rest_command(robot)).collect();
     let start = places_m(&world.present(), spec.task);
     let mut end = start.clone();
-    for _ in 0..TRIAL_STEPS {
-        end = places_m(&world.control_step(&commands)?, spec.task);
+    for step in 1..=u64::from(TRIAL_STEPS) {
+        let stepped = world.control_step(&commands);
+        let present = stepped.map_err(|source| EpisodeError::Diverged { step, source })?;
+        end = places_m(&present, spec.task);
     }
     let moved = start.iter().zip(&end).map(|(start, end)| (start, (end.at_m - start.at_m).length()));
     match moved.into_iter().find(|(_, moved_m)| *moved_m > STAYS_M) {

@@ -11,6 +11,7 @@ use tandem_sim::Snapshot;
 use tandem_tools_spec::EndReason;
 use xxhash_rust::xxh3::xxh3_64;
 
+use super::failure::{FailedStep, Rewind};
 use super::{Session, this_build};
 use crate::commands::MotionState;
 use crate::error::{CheckpointError, EpisodeError};
@@ -24,6 +25,8 @@ use crate::spec::{EpisodeSpec, PhaseStart};
 pub struct Checkpoint {
     origin: Origin,
     progress: Progress,
+    /// The step after it, where the simulator failed in that.
+    pub(super) failed: Option<FailedStep>,
 }
 
 /// Whose progress it is.
@@ -54,6 +57,8 @@ struct Header {
     build: String,
     #[serde(flatten)]
     origin: Origin,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    failed: Option<FailedStep>,
     /// Length and hash of what follows.
     bytes: usize,
     xxh3: String,
@@ -71,6 +76,7 @@ impl Checkpoint {
         let header = Header {
             build: this_build()?.into(),
             origin: self.origin.clone(),
+            failed: self.failed.clone(),
             bytes: progress.len(),
             xxh3: hash(&progress),
         };
@@ -114,12 +120,17 @@ impl Checkpoint {
             return Err(CheckpointError::Torn { path: path.into(), have, expected }.into());
         }
         let progress = postcard::from_bytes(progress).map_err(CheckpointError::from)?;
-        Ok(Checkpoint { origin: header.origin, progress })
+        Ok(Checkpoint { origin: header.origin, progress, failed: header.failed })
     }
 
     /// The episode that it was made of.
     pub fn spec(&self) -> &EpisodeSpec {
         &self.origin.spec
+    }
+
+    /// The step after it, if the simulator failed in that.
+    pub fn failed(&self) -> Option<&FailedStep> {
+        self.failed.as_ref()
     }
 }
 
@@ -158,7 +169,7 @@ impl Session {
             thought: self.clock.spent(),
             ended: self.ended,
         };
-        Ok(Checkpoint { origin: self.origin.clone(), progress })
+        Ok(Checkpoint { origin: self.origin.clone(), progress, failed: None })
     }
 
     /// Takes the episode to a checkpoint of an episode of the same task, seed, protocol, robot and controller. On an error
@@ -191,6 +202,8 @@ impl Session {
         self.tool_calls = progress.tool_calls;
         self.clock.set_spent(progress.thought);
         self.ended = progress.ended;
+        self.simulator_failure = None;
+        self.rewind = Rewind::default();
         self.result = None;
         Ok(())
     }

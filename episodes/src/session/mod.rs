@@ -5,6 +5,7 @@ mod build;
 mod calls;
 mod checkpoint;
 mod clock;
+mod failure;
 mod replay;
 mod run_files;
 mod status;
@@ -13,6 +14,8 @@ pub(crate) use build::build;
 pub use calls::CallReply;
 pub use checkpoint::Checkpoint;
 pub use clock::{Clock, monotonic};
+use failure::Rewind;
+pub use failure::{FAILED_STEP_FILE, FailedStep};
 pub(crate) use replay::Replay;
 use run_files::moment;
 pub use run_files::{RunFiles, RunFolder};
@@ -25,7 +28,7 @@ use nalgebra::Vector3;
 use tandem_sim::{RobotCommand, Side, Step, World};
 use tandem_tools_spec::{EndReason, ResultReply};
 
-use crate::commands::{Clamped, Command, Motion, Trajectory};
+use crate::commands::{Clamped, Command, Motion, MotionState, Trajectory};
 use crate::convert::isometry_from_sim;
 use crate::observation::{Observer, Picture};
 use crate::protocol::{Rules, rules};
@@ -56,6 +59,9 @@ pub struct Session {
     /// Time that physics took, for the real-time factor.
     physics: Duration,
     ended: Option<EndReason>,
+    /// How the simulator failed, if it did.
+    simulator_failure: Option<String>,
+    rewind: Rewind,
     /// Whether the policy has been given depth at every pixel.
     saw_depth_images: bool,
     /// State hashes of the steps since they were last taken, where somebody wants them.
@@ -100,6 +106,8 @@ impl Session {
             tool_calls: 0,
             physics: Duration::ZERO,
             ended: None,
+            simulator_failure: None,
+            rewind: Rewind::default(),
             saw_depth_images: false,
             hashes: None,
             result: None,
@@ -199,15 +207,18 @@ impl Session {
     /// One control step, the `step`th of a command, from the robots' trajectories to what is scored and recorded of it.
     fn step(&mut self, step: u32, trajectories: &[Trajectory]) -> Result<(), EpisodeError> {
         let started = Instant::now();
+        let motions: Vec<MotionState> = self.motions.iter().map(|motion| motion.state().clone()).collect();
         let moves = trajectories.iter().zip(&mut self.motions);
         let commands: Vec<RobotCommand> =
             moves.map(|(trajectory, motion)| trajectory.command(step, motion)).collect();
+        self.rewind.before_step(&self.world);
         let stepped = self.world.control_step(&commands);
         self.physics += started.elapsed();
-        if stepped.is_err() {
-            self.ended = Some(EndReason::SimulatorFailed);
+        match stepped {
+            Ok(present) => self.present = Arc::new(present),
+            Err(diverged) => return Err(self.fail(diverged, commands, motions)),
         }
-        self.present = Arc::new(stepped?);
+        self.rewind.stepped(commands);
         for (motion, robot) in self.motions.iter_mut().zip(&self.present.robots) {
             let [left_n, right_n] = [Side::Left, Side::Right].map(|side| robot.estimate.hand_force_n[side]);
             let hands_n = Vector3::from((left_n + right_n).to_array().map(f64::from));
@@ -320,8 +331,9 @@ impl Session {
         self.close_as(EndReason::Finished)
     }
 
-    /// As [`Session::close`], of an episode that could not be played on.
-    pub fn close_failed(self) -> ResultReply {
+    /// As [`Session::close`], of an episode that could not be played on, and why.
+    pub fn close_failed(mut self, why: String) -> ResultReply {
+        self.simulator_failure.get_or_insert(why);
         self.close_as(EndReason::SimulatorFailed)
     }
 

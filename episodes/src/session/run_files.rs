@@ -10,6 +10,7 @@ use tandem_sim::render::{Frame, PictureError, encode_png};
 use tandem_sim::{CONTROL_HZ, Step};
 use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
 
+use super::failure::FAILED_STEP_FILE;
 use super::{Session, this_build};
 use crate::EpisodeError;
 use crate::commands::Called;
@@ -94,6 +95,12 @@ impl RunFiles {
             Ok(bytes) => self.recorder.append(move |recorder| recorder.checkpoint(&name, time_s, &bytes)),
             Err(error) => self.note(Err(error)),
         }
+    }
+
+    /// Keeps the last good step before the one in which the simulator failed.
+    pub(super) fn failed_step(&mut self, checkpoint: Result<Vec<u8>, EpisodeError>) {
+        let path = self.folder.join(FAILED_STEP_FILE);
+        self.note(checkpoint.and_then(|bytes| Ok(write_whole(&path, &bytes)?)));
     }
 
     pub(super) fn phase(&mut self, phase: &PhaseReached) {

@@ -125,6 +125,7 @@ impl Session {
             falls: self.fallen().iter().filter(|robot| robot.fallen).count() as u32,
             realtime_factor: if physics_s > 0.0 { self.present.time_s / physics_s } else { 0.0 },
             state_hash: self.state_hash(),
+            simulator_failure: self.simulator_failure.clone(),
             extra_information: self.extra_information(),
             recording_failed: self.recording_failed().map(str::to_owned),
         }

@@ -5,18 +5,18 @@ use std::process::ExitCode;
 use std::str::FromStr;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use tandem_episodes::Recording;
 use tandem_episodes::replay::{
     Difference, DrawnPictures, EpisodeCamera, PictureSize, PicturesPlan, Verdict, Verification, draw_all,
     film, verify,
 };
+use tandem_episodes::{Checkpoint, FAILED_STEP_FILE, Recording, Session};
 
 use super::CommandResult;
 
 /// Play recordings again: say what they hold, verify them, film them, or draw what every camera saw with depth.
 #[derive(Debug, clap::Args)]
 pub struct ReplayArgs {
-    /// Recordings, as runs/handover-seed0/episode.mcap.
+    /// Recordings, as runs/handover-seed0/episode.mcap, or the failed_step.checkpoint beside one.
     #[arg(value_name = "FILES", required = true)]
     recordings: Vec<PathBuf>,
     /// Simulate again and compare the state after every step, result and phases; names the first step that differs.
@@ -70,6 +70,10 @@ pub fn run(args: ReplayArgs) -> CommandResult {
     }
     let mut all_same = true;
     for path in &args.recordings {
+        if path.extension().is_some_and(|extension| extension == "checkpoint") {
+            all_same &= failed_step(path, &args)?;
+            continue;
+        }
         let recording = Recording::read(path)?;
         describe(&recording);
         if args.verify {
@@ -87,6 +91,35 @@ pub fn run(args: ReplayArgs) -> CommandResult {
         }
     }
     Ok(if all_same { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Says in which step the simulator failed; with `--verify`, makes that step again. Returns whether it fails as it did.
+fn failed_step(path: &Path, args: &ReplayArgs) -> Result<bool, Box<dyn std::error::Error>> {
+    if args.video.is_some() || args.render.is_some() {
+        return Err(format!(
+            "{} holds one step, without pictures; give the recording beside it",
+            path.display()
+        )
+        .into());
+    }
+    let checkpoint = Checkpoint::read(path)?;
+    let Some(failed) = checkpoint.failed() else {
+        return Err(
+            format!("{} is of no step that failed; {FAILED_STEP_FILE} would be", path.display()).into()
+        );
+    };
+    let spec = checkpoint.spec();
+    let (task, seed, protocol) = (spec.task.id, spec.seed, spec.protocol);
+    println!("{}: {task} seed {seed}, {protocol}", path.display());
+    println!("  the simulator failed {}", failed.failure);
+    if !args.verify {
+        return Ok(true);
+    }
+    let again = Session::fail_again(&checkpoint, failed)?;
+    let text = again.map_or("the step succeeds".into(), |diverged| diverged.to_string());
+    let same = failed.failure.ends_with(&text);
+    println!("  {}: {text}", if same { "verified, it fails again" } else { "DIFFERS, again" });
+    Ok(same)
 }
 
 fn describe(recording: &Recording) {

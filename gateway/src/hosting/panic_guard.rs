@@ -101,7 +101,8 @@ impl PanicGuard {
             return;
         };
         // The broken world may panic once more under way; what is flushed by then can be read nevertheless.
-        match closed(|| session.close_failed()) {
+        let why = format!("by a panic: {}", text(&*panic));
+        match closed(|| session.close_failed(why)) {
             Ok(result) => self.state = GuardState::Panicked(Some(result)),
             Err(panic) => tracing::error!(panic = text(&*panic), "not closed"),
         }

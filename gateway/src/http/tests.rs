@@ -3,7 +3,9 @@
 use std::{path::Path, sync::Arc};
 
 use serde_json::{Value, json};
-use tandem_episodes::{EpisodeSpec, Recorder, Recording, RobotFile, RunFolder, tasks};
+use tandem_episodes::{
+    Checkpoint, EpisodeSpec, FAILED_STEP_FILE, Recorder, Recording, RobotFile, RunFolder, Session, tasks,
+};
 use tandem_tools_spec::{EndReason, Protocol};
 use tokio::sync::Semaphore;
 
@@ -74,6 +76,22 @@ fn physics_that_diverges_ends_its_own_episode_and_says_at_which_body() {
     assert_eq!((result.ended, result.tool_calls), (EndReason::SimulatorFailed, 2));
     assert_eq!(u64::from(result.env_steps), last.control_step);
     assert!((2..7).contains(&result.env_steps), "it diverged on the move: {result:?}");
+
+    let failure = result.simulator_failure.unwrap();
+    assert!(
+        failure.starts_with(&format!("in step {}, physics diverged at link", result.env_steps + 1)),
+        "{failure}"
+    );
+    assert!(detail.contains(&failure), "{detail} {failure}");
+    let kept = Checkpoint::read(&folder.join(FAILED_STEP_FILE)).unwrap();
+    let failed = kept.failed().unwrap();
+    assert_eq!(failed.failure, failure);
+    let again = Session::fail_again(&kept, failed).unwrap().unwrap();
+    assert!(failure.ends_with(&again.to_string()), "{failure} {again}");
+    let mut sound = Session::start(kept.spec(), None).unwrap();
+    sound.resume(&kept).unwrap();
+    assert_eq!((sound.present(), sound.ended()), (&last, None), "the last good step, to go on from");
+    assert_eq!(sound.state_hash(), result.state_hash);
 
     let (status, reply) = post("/handover-seed0/tools/move_wrists", &reach);
     assert_eq!((status, &reply["executed_steps"]), (200, &json!(5)), "{reply}");

@@ -65,6 +65,9 @@ pub struct ResultReply {
     pub realtime_factor: f64,
     /// Hash of the whole physical state at the end, 16 hexadecimal digits.
     pub state_hash: String,
+    /// How the simulator failed: in which step, at which body, and what came out; left out where it did not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simulator_failure: Option<String>,
     /// What the policy was shown beyond what the benchmark's own policies see, as "depth_images"; left out where it was nothing.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub extra_information: Vec<String>,

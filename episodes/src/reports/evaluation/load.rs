@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::recording::{Recorder, Recording};
 use crate::reports::episode::STRIP_FILE;
-use crate::results::{EPISODES, PlayedEpisode, missed_phase_note};
+use crate::results::{EPISODES, PlayedEpisode, episode_note};
 
 /// One episode.
 #[derive(Clone, Debug)]
@@ -104,7 +104,7 @@ fn recorded(path: &Path, policy: &str) -> Result<PlayedEpisode, String> {
         spec: recording.spec.clone(),
         locomotion: recording.locomotion.clone(),
         build: recording.build.clone(),
-        note: missed_phase_note(&result, None),
+        note: episode_note(&result, None),
         thought_s: calls.last().map_or(0.0, |call| call.thought.as_secs_f64()),
         result,
     })

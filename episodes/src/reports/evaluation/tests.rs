@@ -30,6 +30,7 @@ fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Played
             falls: u32::from(phases == 0),
             realtime_factor: 3.5,
             state_hash: format!("{seed:016x}"),
+            simulator_failure: None,
             extra_information: vec![],
             recording_failed: None,
         },

@@ -66,21 +66,27 @@ impl Dynamics {
                 if moving.abs() + last.abs() < FASTEST {
                     continue;
                 }
-                return Err(Diverged { tree: tree.name.clone(), link: tree.links[*link].name.clone() });
+                return Err(Diverged {
+                    tree: tree.name.clone(),
+                    link: tree.links[*link].name.clone(),
+                    speed: if moving.abs() < FASTEST { last } else { moving },
+                });
             }
         }
         Ok(())
     }
 }
 
-/// The step gave a number that is not finite; the state is that before the step.
+/// The step gave a number that is not finite or will not be for long; the state is that before the step.
 #[derive(Debug, Error, PartialEq)]
 #[error(
-    "physics diverged at link `{link}` of `{tree}`: a velocity or position is not finite; command less effort or slower motion"
+    "physics diverged at link `{link}` of `{tree}`: a velocity came out as {speed:.3e} m/s or rad/s, which is not finite or soon will not be; command less effort or slower motion"
 )]
 pub struct Diverged {
     pub tree: String,
     pub link: String,
+    /// Of one of the link's degrees of freedom, m/s or rad/s.
+    pub speed: f64,
 }
 
 /// m/s or rad/s. Nothing real comes near; beyond, Rapier's f32 would soon overflow.

@@ -23,6 +23,7 @@ fn page_from(begin_s: f64, phase_times_s: [Option<f64>; 3], protocol: Protocol) 
         falls: 0,
         realtime_factor: 3.5,
         state_hash: "<script>".into(),
+        simulator_failure: None,
         extra_information: vec![],
         recording_failed: None,
     };
