@@ -66,8 +66,7 @@ pub struct PolicyCard {
     pub settings: Option<Value>,
     /// What it is shown beyond what the robots themselves see and feel.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub simulator_failure: None,
-    extra_information: Vec<String>,
+    pub extra_information: Vec<String>,
 }
 
 impl PolicyCard {

@@ -72,8 +72,9 @@ impl Session {
         }
         let rewound = self.rewind.back(&mut self.world).map_err(EpisodeError::from);
         let checkpoint = rewound.and_then(|()| {
-            let failed = Some(FailedStep { failure: failure.clone(), commands });
-            Checkpoint { failed, ..self.checkpoint()? }.to_bytes()
+            let mut checkpoint = self.checkpoint()?;
+            checkpoint.failed = Some(FailedStep { failure: failure.clone(), commands });
+            checkpoint.to_bytes()
         });
         if let Some(files) = &mut self.files {
             files.failed_step(checkpoint);
