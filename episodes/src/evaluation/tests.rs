@@ -6,7 +6,7 @@ use tandem_sim::render::RendererKind;
 use tandem_tools_spec::{Disclosure, EndReason, Hints, PhaseTimes, Protocol, ResultReply};
 
 use super::*;
-use crate::results::{PhaseLevel, missed_phase_note, write_result};
+use crate::results::{PhaseLevel, episode_note, missed_phase_note, write_result};
 use crate::spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, Start};
 use crate::tasks::{self, Task};
 use crate::{players, scoring::Phase};
@@ -57,6 +57,14 @@ fn the_first_phase_that_was_missed_is_noted() {
     let result = result("handover", 7, times.map(|(i, time_s)| (Phase::number(i), time_s)).collect());
     assert_eq!(missed_phase_note(&result, Some(1)), None);
     assert_eq!(missed_phase_note(&result, Some(2)).as_deref(), Some("p3 was not reached in 812 steps"));
+
+    // Where the simulator failed, that is what there is to say.
+    assert_eq!(episode_note(&result, Some(2)), missed_phase_note(&result, Some(2)));
+    let failed = ResultReply { simulator_failure: Some("in step 813, physics diverged".into()), ..result };
+    assert_eq!(
+        episode_note(&failed, Some(2)).as_deref(),
+        Some("the simulator failed in step 813, physics diverged")
+    );
 }
 
 fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> EvaluationPlan<'static> {

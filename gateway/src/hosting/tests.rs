@@ -70,6 +70,7 @@ async fn a_panic_ends_its_own_episode_and_no_other() {
     assert_eq!(recording.steps().unwrap().map(Result::unwrap).count(), 3);
     let result = episode.close().await.unwrap();
     assert_eq!((result.ended, result.env_steps), (EndReason::SimulatorFailed, 2));
+    assert_eq!(result.simulator_failure.as_deref(), Some("by a panic: the clock is broken"));
     assert_eq!(places.available_permits(), 1);
     other.call(wait()).await.unwrap();
     assert_eq!((status(&other).await.ended, other.close().await.unwrap().env_steps), (None, 2));
