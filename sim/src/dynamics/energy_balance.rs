@@ -127,10 +127,10 @@ impl TreeBefore {
     fn link_velocities(&self, tree: &Tree, v: &[f64]) -> Vec<MotionVector> {
         let mut velocities: Vec<MotionVector> = Vec::with_capacity(tree.links.len());
         for (i, link) in tree.links.iter().enumerate() {
-            let dof = tree.layout.first_dof[i];
+            let (dof, dofs) = (tree.layout.first_dof[i], link.joint.dofs());
             let mut velocity = link.parent.map_or(MotionVector::default(), |parent| velocities[parent]);
-            for k in dof..dof + link.joint.dofs() {
-                velocity += self.axis[k] * v[k];
+            for (axis, rate) in self.axis[dof..dof + dofs].iter().zip(&v[dof..]) {
+                velocity += *axis * *rate;
             }
             velocities.push(velocity);
         }
