@@ -11,7 +11,7 @@ use std::{
 pub enum OutputError {
     #[error("cannot write {}: {source}; give a folder on a disk with space that may be written to", path.display())]
     Io { path: PathBuf, source: io::Error },
-    #[error("the recording {} failed: {source}", path.display())]
+    #[error("the recording {} cannot be written: {source}", path.display())]
     Mcap { path: PathBuf, source: mcap::McapError },
     #[error("a record of the episode cannot be written as JSON: {0}")]
     Json(#[from] serde_json::Error),
@@ -19,15 +19,28 @@ pub enum OutputError {
     Encode(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
 
+impl OutputError {
+    /// Why the recording at `path` cannot be written. What the system has said comes out as it said it.
+    pub fn of_recording(path: &Path, source: mcap::McapError) -> OutputError {
+        match source {
+            mcap::McapError::Io(source) => OutputError::Io { path: path.into(), source },
+            source => OutputError::Mcap { path: path.into(), source },
+        }
+    }
+}
+
 /// Writes a file under another name first and renames it when it is complete and on the disk: a reader sees the whole of it
-/// or nothing, even after a power cut.
+/// or nothing, even after a power cut. What cannot be written leaves nothing behind.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     let partial = partial_path(path);
     let written = File::create(&partial).and_then(|mut file| {
         file.write_all(bytes)?;
         put_in_place(&file, &partial, path)
     });
-    written.map_err(|source| OutputError::Io { path: path.into(), source })
+    written.map_err(|source| {
+        let _ = fs::remove_file(&partial);
+        OutputError::Io { path: path.into(), source }
+    })
 }
 
 /// What a file is called until it is complete.

@@ -80,7 +80,12 @@ pub fn play_in_process(
         Some(phase) => InProcess::until(phase + 1, session),
         None => InProcess::new(session),
     };
-    let stopped = match act(&mut episode) {
+    let acted = match episode.session.recording_failed() {
+        // Whoever wants a recording has no use for the episode.
+        Some(reason) => Err(PlayerError::GaveUp(reason.into())),
+        None => act(&mut episode),
+    };
+    let stopped = match acted {
         Ok(()) | Err(PlayerError::EpisodeOver) => None,
         Err(error) => Some(error.to_string()),
     };

@@ -3,21 +3,18 @@
 
 use std::{
     collections::BTreeMap,
-    fs::File,
+    fs::{self, File},
     io::{self, Seek, SeekFrom, Write},
     marker::PhantomData,
     path::{Path, PathBuf},
-    time::{Duration, Instant},
 };
 
 use foxglove::Encode;
 use mcap::Attachment;
-use mcap::records::{MessageHeader, Metadata};
+use mcap::records::MessageHeader;
 
+use super::{data_section::LIBRARY, metadata};
 use crate::output::{OutputError, partial_path, put_in_place, write_whole};
-
-/// No more than this much of an episode is lost with the process.
-const FLUSHED_EVERY: Duration = Duration::from_millis(500);
 
 /// A chunk is compressed as one, in buffers that every recording under way has.
 const CHUNK_BYTES: u64 = 256 << 10;
@@ -28,7 +25,6 @@ pub struct McapFile {
     path: PathBuf,
     /// Reused between messages.
     buffer: Vec<u8>,
-    flushed: Instant,
 }
 
 /// A channel that carries messages of one type.
@@ -43,8 +39,8 @@ impl McapFile {
     pub fn create(path: &Path, visibility: Visibility) -> Result<McapFile, OutputError> {
         let store = RecordingStore::create(path, visibility)
             .map_err(|source| OutputError::Io { path: path.into(), source })?;
-        let writer = writer(store).map_err(|source| OutputError::Mcap { path: path.into(), source })?;
-        Ok(McapFile { writer, path: path.into(), buffer: Vec::new(), flushed: Instant::now() })
+        let writer = writer(store).map_err(|source| OutputError::of_recording(path, source))?;
+        Ok(McapFile { writer, path: path.into(), buffer: Vec::new() })
     }
 
     /// Opens a topic. `metadata` describes the channel, as the names of an array's columns.
@@ -84,19 +80,17 @@ impl McapFile {
         };
         let written = self.writer.write_to_known_channel(&header, &self.buffer);
         topic.messages += 1;
-        written.map_err(|e| self.failed(e))?;
-        if self.flushed.elapsed() >= FLUSHED_EVERY { self.flush() } else { Ok(()) }
+        written.map_err(|e| self.failed(e))
     }
 
     /// Hands the system everything that has been written, as whole chunks: it outlives the process, and can be read.
     pub fn flush(&mut self) -> Result<(), OutputError> {
-        self.flushed = Instant::now();
         self.writer.flush().map_err(|e| self.failed(e))
     }
 
-    /// Appends a named set of texts that belong to the whole file.
+    /// Appends a named set of texts that belong to the whole file, with a checksum among them.
     pub fn metadata(&mut self, name: &str, entries: &[(&str, &str)]) -> Result<(), OutputError> {
-        let record = Metadata { name: name.into(), metadata: string_map(entries) };
+        let record = metadata::with_checksum(name, string_map(entries));
         self.writer.write_metadata(&record).map_err(|e| self.failed(e))
     }
 
@@ -122,14 +116,14 @@ impl McapFile {
     }
 
     fn failed(&self, source: mcap::McapError) -> OutputError {
-        OutputError::Mcap { path: self.path.clone(), source }
+        OutputError::of_recording(&self.path, source)
     }
 }
 
 /// Writes chunks as wholes, so that no flush ends in the middle of one.
 pub fn writer(store: RecordingStore) -> Result<mcap::Writer<RecordingStore>, mcap::McapError> {
     mcap::WriteOptions::new()
-        .library(concat!("tandem ", env!("CARGO_PKG_VERSION")))
+        .library(format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION")))
         .compression(Some(mcap::Compression::Lz4))
         .disable_seeking(true)
         .chunk_size(Some(CHUNK_BYTES))
@@ -170,7 +164,7 @@ enum Sink {
         partial: PathBuf,
     },
     Memory,
-    /// A flush has failed. Nothing more is written: what lies on the disk ends in the middle of a record.
+    /// A flush has failed. Nothing more is written: what lies on the disk ends where the last one ended.
     Failed,
 }
 
@@ -187,6 +181,11 @@ impl RecordingStore {
         Ok(RecordingStore { pending: Vec::new(), flushed_bytes: 0, sink })
     }
 
+    /// What has not been flushed; of a store that others cannot read under way, everything.
+    pub fn pending(&self) -> &[u8] {
+        &self.pending
+    }
+
     /// Puts everything on the disk under the name `path`.
     pub fn keep(mut self, path: &Path) -> Result<(), OutputError> {
         let failed = |source| OutputError::Io { path: path.into(), source };
@@ -197,6 +196,15 @@ impl RecordingStore {
             Sink::Failed => Err(failed(after_a_failure())),
         }
     }
+}
+
+/// Cuts off what was written of a flush that failed; a file without anything before it goes.
+fn leave(file: &File, partial: &Path, flushed_bytes: u64) {
+    // Where that fails, too, what can be read of the file is the same.
+    let _ = match flushed_bytes {
+        0 => fs::remove_file(partial),
+        flushed_bytes => file.set_len(flushed_bytes),
+    };
 }
 
 fn after_a_failure() -> io::Error {
@@ -215,15 +223,16 @@ impl Write for RecordingStore {
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        let Sink::File { file, .. } = &mut self.sink else { return Ok(()) };
+        let Sink::File { file, partial } = &mut self.sink else { return Ok(()) };
         let written = file.write_all(&self.pending);
+        if written.is_err() {
+            leave(file, partial, self.flushed_bytes);
+            self.sink = Sink::Failed;
+        }
         self.flushed_bytes += self.pending.len() as u64;
         self.pending.clear();
         // The scene's shapes and the pictures of a reply are megabytes, and come seldom.
         self.pending.shrink_to(CHUNK_BYTES as usize);
-        if written.is_err() {
-            self.sink = Sink::Failed;
-        }
         written
     }
 }

@@ -11,9 +11,13 @@
 //!
 //! The file is `episode.mcap.partial` until [`Recorder::finish`] renames it, so an `episode.mcap` is always complete. A
 //! recorder that is dropped earlier still writes the index; one whose process is killed leaves whole chunks without an index,
-//! which [`recover`] adds.
+//! which [`recover`] adds. Whoever reads a recording has every byte of it checked first ([`Recording::read`]).
 
+mod checked_file;
+mod damage;
+mod data_section;
 mod mcap_file;
+mod metadata;
 mod read;
 mod recover;
 #[cfg(test)]
@@ -22,9 +26,10 @@ mod thread;
 mod topics;
 mod write;
 
+pub use damage::{Damage, Fault, FilePart};
 pub use mcap_file::Visibility;
 pub use read::{RecordedCall, RecordedCheckpoint, Recording, RecordingError};
-pub use recover::{RecoverError, Recovered, recover};
+pub use recover::{LeftOut, RecoverError, Recovered, recover};
 pub use thread::RecorderThread;
 pub use topics::messages::{CallOutcome, ToolCallRecord, state_hash_text};
 pub use write::{Recorder, RecordingHeader};
@@ -35,14 +40,4 @@ pub const BEGIN: &str = "begin";
 /// Name of the attachment that is the checkpoint of a phase's beginning, or of [`BEGIN`].
 fn checkpoint_name(of: &str) -> String {
     format!("{of}.checkpoint")
-}
-
-/// Records of metadata that are read back, and their entries.
-mod metadata {
-    pub const EPISODE: &str = "episode";
-    pub const SPEC: &str = "spec";
-    pub const LOCOMOTION: &str = "locomotion";
-    pub const BUILD: &str = "build";
-    pub const SCORES: &str = "scores";
-    pub const RESULT: &str = "result";
 }

@@ -1,6 +1,5 @@
 //! Reads a recording back: what the episode was, every step bit for bit, phases and tool calls; and scores it again.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -10,6 +9,8 @@ use serde_json::Value;
 use tandem_sim::{SimError, Step};
 use tandem_tools_spec::{PhaseReached, ResultReply};
 
+use super::checked_file::CheckedFile;
+use super::damage::Damage;
 use super::topics::messages::{PhaseMessage, StepError, StepMessage, ToolCallMessage};
 use super::{checkpoint_name, metadata, topics};
 use crate::results::RESULT_FILE;
@@ -19,7 +20,7 @@ use crate::spec::EpisodeSpec;
 /// A recording in memory.
 pub struct Recording {
     path: PathBuf,
-    bytes: Vec<u8>,
+    file: CheckedFile,
     pub spec: EpisodeSpec,
     /// Which base controller the robots had; the name tells files of different content apart.
     pub locomotion: String,
@@ -59,11 +60,8 @@ pub struct RecordedCheckpoint {
 pub enum RecordingError {
     #[error("cannot read the recording {}: {source}", path.display())]
     Read { path: PathBuf, source: std::io::Error },
-    #[error(
-        "{} is no complete MCAP file: {source}; of a recording that was interrupted, `tandem recover {}` makes one",
-        path.display(), path.display()
-    )]
-    Mcap { path: PathBuf, source: mcap::McapError },
+    #[error("{} is no whole recording: {source}; {}", path.display(), recover_hint(path))]
+    Damaged { path: PathBuf, source: Box<Damage> },
     #[error("{} has no {what}; recordings that this version of Tandem makes have it", path.display())]
     Missing { path: PathBuf, what: String },
     #[error("{}: a message or an entry is not what its name says: {source}", path.display())]
@@ -75,19 +73,24 @@ pub enum RecordingError {
 }
 
 impl Recording {
-    /// Reads a file and checks that it is a recording of an episode. Steps are read as they are asked for.
+    /// Reads a file, checks every byte of it, and that it is a recording of an episode. Steps are read as they are asked for.
     pub fn read(path: &Path) -> Result<Recording, RecordingError> {
         let bytes =
             std::fs::read(path).map_err(|source| RecordingError::Read { path: path.into(), source })?;
-        let records =
-            metadata_records(&bytes).map_err(|source| RecordingError::Mcap { path: path.into(), source })?;
+        Recording::from_bytes(path, bytes)
+    }
+
+    /// As [`Recording::read`], of what `path` holds.
+    pub fn from_bytes(path: &Path, bytes: Vec<u8>) -> Result<Recording, RecordingError> {
+        let file = CheckedFile::new(bytes)
+            .map_err(|source| RecordingError::Damaged { path: path.into(), source: source.into() })?;
         let json = |source| RecordingError::Json { path: path.into(), source };
         let missing = |what: &str| RecordingError::Missing { path: path.into(), what: what.into() };
-        let episode = records.get(metadata::EPISODE).ok_or_else(|| missing(metadata::EPISODE))?;
+        let episode = file.metadata(metadata::EPISODE).ok_or_else(|| missing(metadata::EPISODE))?;
         let entry = |name: &str| episode.get(name).ok_or_else(|| missing(name));
         let step = |source: StepError| RecordingError::Step { path: path.into(), source };
         let scores = BASE64_STANDARD.decode(entry(metadata::SCORES)?).map_err(|e| step(e.into()))?;
-        let result = records.get(metadata::RESULT).and_then(|entries| entries.get(RESULT_FILE));
+        let result = file.metadata(metadata::RESULT).and_then(|entries| entries.get(RESULT_FILE));
         Ok(Recording {
             path: path.into(),
             spec: serde_json::from_str(entry(metadata::SPEC)?).map_err(json)?,
@@ -95,38 +98,45 @@ impl Recording {
             build: entry(metadata::BUILD)?.clone(),
             result: result.map(|text| serde_json::from_str(text)).transpose().map_err(json)?,
             scores: postcard::from_bytes(&scores).map_err(|e| step(e.into()))?,
-            bytes,
+            file,
         })
     }
 
+    /// What of the file no checksum covers; empty of what Tandem wrote.
+    pub fn uncovered(&self) -> &[String] {
+        self.file.uncovered()
+    }
+
+    /// Makes sure that all that a replay needs can be read.
+    pub(super) fn check_replayable(&self) -> Result<(), RecordingError> {
+        let what = topics::STEPS.to_string();
+        let first = self.steps().next();
+        first.ok_or_else(|| RecordingError::Missing { path: self.path.clone(), what })??;
+        for hash in self.state_hashes() {
+            hash?;
+        }
+        self.tool_calls()?;
+        self.phases().map(drop)
+    }
+
     /// The state before the first step, then every step.
-    pub fn steps(&self) -> Result<impl Iterator<Item = Result<Step, RecordingError>>, RecordingError> {
-        let steps = self.messages::<StepMessage>(topics::STEPS)?;
-        Ok(steps.map(|message| {
+    pub fn steps(&self) -> impl Iterator<Item = Result<Step, RecordingError>> {
+        self.messages::<StepMessage>(topics::STEPS).map(|message| {
             let (_, message) = message?;
             message.step().map_err(|source| RecordingError::Step { path: self.path.clone(), source })
-        }))
+        })
     }
 
     /// The number and the state hash of every step, that before the first one included.
-    pub fn state_hashes(
-        &self,
-    ) -> Result<impl Iterator<Item = Result<(u64, String), RecordingError>>, RecordingError> {
-        let steps = self.messages::<StepMessage>(topics::STEPS)?;
-        Ok(steps.map(|message| message.map(|(_, message)| message.state())))
+    pub fn state_hashes(&self) -> impl Iterator<Item = Result<(u64, String), RecordingError>> {
+        let steps = self.messages::<StepMessage>(topics::STEPS);
+        steps.map(|message| message.map(|(_, message)| message.state()))
     }
 
     /// The checkpoint of `what`: a phase's beginning, or `BEGIN`; `None` where there is none.
-    pub fn checkpoint(&self, what: &str) -> Result<Option<RecordedCheckpoint>, RecordingError> {
-        let failed = |source| RecordingError::Mcap { path: self.path.clone(), source };
-        let summary = mcap::Summary::read(&self.bytes).map_err(failed)?.unwrap_or_default();
-        let name = checkpoint_name(what);
-        let Some(index) = summary.attachment_indexes.iter().find(|index| index.name == name) else {
-            return Ok(None);
-        };
-        let attachment = mcap::read::attachment(&self.bytes, index).map_err(failed)?;
-        let (time_s, bytes) = (attachment.log_time as f64 / 1e9, attachment.data.into_owned());
-        Ok(Some(RecordedCheckpoint { time_s, bytes }))
+    pub fn checkpoint(&self, what: &str) -> Option<RecordedCheckpoint> {
+        let (place, bytes) = self.file.attachment(&checkpoint_name(what))?;
+        Some(RecordedCheckpoint { time_s: place.log_time as f64 / 1e9, bytes: bytes.to_vec() })
     }
 
     /// Where it was read from.
@@ -140,7 +150,7 @@ impl Recording {
             let (_, PhaseMessage { id, number, time_s }) = message?;
             Ok(PhaseReached { id, number, time_s })
         };
-        self.messages(topics::PHASES)?.map(phase).collect()
+        self.messages(topics::PHASES).map(phase).collect()
     }
 
     /// The tool calls of the episode, in their order.
@@ -152,12 +162,12 @@ impl Recording {
                 (Duration::from_nanos(thought_ns), if ok { Ok(reply) } else { Err(reply) });
             Ok(RecordedCall { time_s, thought, tool, arguments, operator, outcome })
         };
-        self.messages(topics::TOOL_CALLS)?.map(call).collect()
+        self.messages(topics::TOOL_CALLS).map(call).collect()
     }
 
     /// Scores the recorded steps by the task's conditions as this build has them.
     pub fn score(&self) -> Result<Scores, RecordingError> {
-        let mut steps = self.steps()?;
+        let mut steps = self.steps();
         let missing = || RecordingError::Missing { path: self.path.clone(), what: topics::STEPS.into() };
         let start = steps.next().ok_or_else(missing)??;
         let mut scores = self.spec.task.scores(&start)?;
@@ -172,18 +182,15 @@ impl Recording {
     fn messages<T: DeserializeOwned>(
         &self,
         topic: &str,
-    ) -> Result<impl Iterator<Item = Result<(f64, T), RecordingError>>, RecordingError> {
-        let failed = |source| RecordingError::Mcap { path: self.path.clone(), source };
-        let stream = mcap::MessageStream::new(&self.bytes).map_err(failed)?;
-        let wanted = move |message: &Result<mcap::Message, mcap::McapError>| match message {
-            Ok(message) => message.channel.topic == topic,
-            Err(_) => true,
-        };
-        Ok(stream.filter(wanted).map(move |message| {
-            let message = message.map_err(failed)?;
-            let content = serde_json::from_slice(&message.data).map_err(|source| self.json(source))?;
-            Ok((message.log_time as f64 / 1e9, content))
-        }))
+    ) -> impl Iterator<Item = Result<(f64, T), RecordingError>> {
+        let read = |log_time: u64, content: &[u8]| (log_time as f64 / 1e9, serde_json::from_slice(content));
+        self.file.messages(topic, read).map(move |message| {
+            let (time_s, content) = message.map_err(|source| RecordingError::Damaged {
+                path: self.path.clone(),
+                source: source.into(),
+            })?;
+            Ok((time_s, content.map_err(|source| self.json(source))?))
+        })
     }
 
     fn json(&self, source: serde_json::Error) -> RecordingError {
@@ -191,11 +198,15 @@ impl Recording {
     }
 }
 
-type Entries = BTreeMap<String, String>;
-
-/// The metadata records of a file, by name.
-fn metadata_records(bytes: &[u8]) -> Result<BTreeMap<String, Entries>, mcap::McapError> {
-    let summary = mcap::Summary::read(bytes)?.unwrap_or_default();
-    let read = |index| mcap::read::metadata(bytes, index);
-    summary.metadata_indexes.iter().map(|index| read(index).map(|m| (m.name, m.metadata))).collect()
+/// How what is whole of a recording becomes a recording.
+fn recover_hint(path: &Path) -> String {
+    match path.extension() {
+        Some(extension) if extension == "partial" => {
+            format!("`tandem recover {}` makes one of what comes before", path.display())
+        }
+        _ => format!(
+            "rename it to {0}.partial, and `tandem recover {0}.partial` makes one of what comes before",
+            path.display()
+        ),
+    }
 }

@@ -1,24 +1,35 @@
-//! Makes a whole recording of what an interrupted episode left.
+//! Makes a whole recording of what an interrupted episode left, or of what a bad disk left of a recording.
 
 use std::path::{Path, PathBuf};
 
 use mcap::Attachment;
-use mcap::read::{ChunkFlattener, Options};
 use mcap::records::Record;
 
+use super::damage::Damage;
+use super::data_section::{AttachmentPlace, DataPart, DataSection};
 use super::mcap_file::{RecordingStore, Visibility, writer};
-use super::read::RecordingError;
+use super::read::{Recording, RecordingError};
 use crate::output::OutputError;
 
 /// What could be read, and where it is now.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug)]
 pub struct Recovered {
     pub path: PathBuf,
     pub messages: u64,
     /// Simulated time of the last message.
     pub last_s: f64,
-    /// Why no more could be read; `None` where the file is whole.
-    pub torn: Option<String>,
+    /// `None` where nothing was.
+    pub left_out: Option<LeftOut>,
+    /// How many metadata records no checksum covers, as in what earlier versions left: they are taken as they are.
+    pub unchecked_metadata: usize,
+}
+
+/// What was left out: everything from the first part on that is not as it was written.
+#[derive(Debug)]
+pub struct LeftOut {
+    pub damage: Damage,
+    /// From there to the end of the file.
+    pub bytes: usize,
 }
 
 /// Why nothing was recovered.
@@ -32,12 +43,14 @@ pub enum RecoverError {
     Read(#[from] RecordingError),
     #[error("{} holds no message that can be read: {reason}", path.display())]
     Nothing { path: PathBuf, reason: String },
+    #[error("what is whole of {} is not enough to be replayed: {source}", path.display())]
+    TooLittle { path: PathBuf, source: Box<RecordingError> },
     #[error(transparent)]
     Output(#[from] OutputError),
 }
 
-/// Writes every message, attachment and all metadata of `FILE.partial` up to its last whole record to `FILE`, with an
-/// index. What is read stays as it is.
+/// Writes every message, attachment and all metadata of `FILE.partial` up to the first part that is not as it was written to
+/// `FILE`, with an index. What is read stays as it is, and what is written can be replayed, or nothing is.
 pub fn recover(partial: &Path) -> Result<Recovered, RecoverError> {
     let path = match partial.extension() {
         Some(extension) if extension == "partial" => partial.with_extension(""),
@@ -49,22 +62,27 @@ pub fn recover(partial: &Path) -> Result<Recovered, RecoverError> {
     let bytes =
         std::fs::read(partial).map_err(|source| RecordingError::Read { path: partial.into(), source })?;
     let nothing = |reason: String| RecoverError::Nothing { path: partial.into(), reason };
-    let records =
-        ChunkFlattener::new_with_options(&bytes, Options::IgnoreEndMagic | Options::ValidateChunkCrcs);
+    let mut data = DataSection::begin(&bytes).map_err(|damage| nothing(damage.to_string()))?;
     let mut copy = RecoveredFile::create(&path)?;
-    for record in records.map_err(|error| nothing(error.to_string()))? {
-        match record {
-            Ok(record) => copy.add(record)?,
-            Err(error) => {
-                copy.torn = Some(error.to_string());
-                break;
-            }
+    let damage = loop {
+        match data.next_part() {
+            Ok(Some(part)) => copy.add(part, &bytes)?,
+            // What follows the data is made anew.
+            Ok(None) => break None,
+            Err(damage) => break Some(damage),
         }
-    }
+    };
     if copy.messages == 0 {
-        return Err(nothing(copy.torn.unwrap_or_else(|| "it has none".into())));
+        return Err(nothing(damage.map_or_else(|| "it has none".into(), |damage| damage.to_string())));
     }
-    Ok(copy.finish()?)
+    let left_out = damage.map(|damage| LeftOut { bytes: bytes.len() - damage.offset, damage });
+    let unchecked_metadata = match data.check_end() {
+        Ok(true) => 0,
+        Ok(false) | Err(_) => data.without_checksum.metadata,
+    };
+    let (messages, last_s) = (copy.messages, copy.last_ns as f64 / 1e9);
+    let path = copy.finish(partial)?;
+    Ok(Recovered { path, messages, last_s, left_out, unchecked_metadata })
 }
 
 /// The whole recording, on its way.
@@ -73,7 +91,6 @@ struct RecoveredFile {
     writer: mcap::Writer<RecordingStore>,
     messages: u64,
     last_ns: u64,
-    torn: Option<String>,
 }
 
 impl RecoveredFile {
@@ -81,12 +98,28 @@ impl RecoveredFile {
         // Nothing is left behind where nothing can be recovered.
         let store = RecordingStore::create(path, Visibility::After)
             .map_err(|source| OutputError::Io { path: path.into(), source })?;
-        let writer = writer(store).map_err(|source| OutputError::Mcap { path: path.into(), source })?;
-        Ok(RecoveredFile { path: path.into(), writer, messages: 0, last_ns: 0, torn: None })
+        let writer = writer(store).map_err(|source| OutputError::of_recording(path, source))?;
+        Ok(RecoveredFile { path: path.into(), writer, messages: 0, last_ns: 0 })
     }
 
-    fn add(&mut self, record: Record) -> Result<(), OutputError> {
-        let written = match record {
+    /// Adds a part of the file that has `bytes`.
+    fn add(&mut self, part: DataPart, bytes: &[u8]) -> Result<(), OutputError> {
+        let written = match part {
+            DataPart::Chunk(_, records) => {
+                // The chunk has been checked, so that all its records can be read.
+                records.iter().flatten().try_for_each(|(_, record)| self.add_record(record))
+            }
+            DataPart::Metadata(metadata) => self.writer.write_metadata(&metadata),
+            DataPart::Attachment(AttachmentPlace { log_time, create_time, name, media_type, data }) => {
+                let data = bytes[data].into();
+                self.writer.attach(&Attachment { log_time, create_time, name, media_type, data })
+            }
+        };
+        written.map_err(|source| OutputError::of_recording(&self.path, source))
+    }
+
+    fn add_record(&mut self, record: Record) -> Result<(), mcap::McapError> {
+        match record {
             Record::Schema { header, data } => {
                 self.writer.add_schema_with_id(header.id, &header.name, &header.encoding, &data).map(drop)
             }
@@ -105,24 +138,19 @@ impl RecoveredFile {
                 self.last_ns = header.log_time;
                 self.writer.write_to_known_channel(&header, &data)
             }
-            Record::Metadata(metadata) => self.writer.write_metadata(&metadata),
-            Record::Attachment { header, data, .. } => self.writer.attach(&Attachment {
-                log_time: header.log_time,
-                create_time: header.create_time,
-                name: header.name,
-                media_type: header.media_type,
-                data,
-            }),
-            // The rest is what the writer makes anew.
+            // A chunk has nothing else.
             _ => Ok(()),
-        };
-        written.map_err(|source| OutputError::Mcap { path: self.path.clone(), source })
+        }
     }
 
-    fn finish(mut self) -> Result<Recovered, OutputError> {
-        self.writer.finish().map_err(|source| OutputError::Mcap { path: self.path.clone(), source })?;
-        self.writer.into_inner().keep(&self.path)?;
-        let RecoveredFile { path, messages, last_ns, torn, .. } = self;
-        Ok(Recovered { path, messages, last_s: last_ns as f64 / 1e9, torn })
+    /// Gives the file its name, if it can be replayed.
+    fn finish(mut self, partial: &Path) -> Result<PathBuf, RecoverError> {
+        self.writer.finish().map_err(|source| OutputError::of_recording(&self.path, source))?;
+        let store = self.writer.into_inner();
+        Recording::from_bytes(&self.path, store.pending().to_vec())
+            .and_then(|recording| recording.check_replayable())
+            .map_err(|source| RecoverError::TooLittle { path: partial.into(), source: source.into() })?;
+        store.keep(&self.path)?;
+        Ok(self.path)
     }
 }

@@ -5,17 +5,23 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, OnceLock};
 use std::thread::{Builder, JoinHandle, park_timeout};
 use std::time::Duration;
-use std::{io, iter};
+use std::{io, iter, mem};
 
 use super::write::Recorder;
 use crate::output::OutputError;
 
-/// What comes within this time is appended in one go and handed to the system; a process that is killed loses about so much.
-/// Being woken for every step or call would take a core from who waits for the answer.
+/// What comes within this time is appended in one go and handed to the system; a process that is killed loses about so much of
+/// what was said. Being woken for every step or call would take a core from who waits for the answer.
 const GATHERED: Duration = Duration::from_millis(250);
 
-/// Appends that may wait, five seconds of an episode, before the episode waits for the recorder.
+/// Appends that may wait before the episode waits for the recorder.
 const WAITING_APPENDS: usize = 250;
+
+/// So many steps are handed to the system in one go: fewer would be chunks that compress badly.
+const GATHERED_STEPS: usize = 12;
+
+/// The most steps that a process which is killed loses: with so many the episode waits until the system has them.
+const UNWRITTEN_STEPS: usize = 25;
 
 /// Pictures wait as they were drawn, a quarter of a megabyte each, and are encoded by the recorder. From so many on it gathers no
 /// longer, and from so many on the episode waits for it.
@@ -24,7 +30,15 @@ const WAITING_PICTURES: usize = 16;
 
 const PANICKED: &str = "the recorder panicked";
 
-type Append = Box<dyn FnOnce(&mut Recorder) -> Result<(), OutputError> + Send>;
+type Write = Box<dyn FnOnce(&mut Recorder) -> Result<(), OutputError> + Send>;
+
+/// What the recorder is asked for.
+enum Append {
+    Step(Write),
+    Other(Write),
+    /// Everything so far is to be on its way to the disk when the sender is gone; nothing is ever sent.
+    Flush(SyncSender<()>),
+}
 
 /// Appends to a recording one after the other, behind the caller's back.
 pub struct RecorderThread {
@@ -34,27 +48,54 @@ pub struct RecorderThread {
     /// The first failure. The recording would have a hole after it, so it ends there.
     failed: Arc<OnceLock<String>>,
     waiting_pictures: Arc<AtomicUsize>,
+    /// Steps that the system does not have yet.
+    unwritten_steps: Arc<AtomicUsize>,
 }
 
 impl RecorderThread {
     pub fn start(recorder: Recorder) -> io::Result<RecorderThread> {
         let (appends, inbox) = sync_channel(WAITING_APPENDS);
         let failed = Arc::new(OnceLock::new());
-        let failure = failed.clone();
-        let work = move || append_all(recorder, &inbox, &failure);
+        let unwritten_steps = Arc::<AtomicUsize>::default();
+        let appender = Appender {
+            recorder,
+            failed: failed.clone(),
+            unwritten_steps: unwritten_steps.clone(),
+            gathered_steps: 0,
+        };
+        let work = move || appender.run(&inbox);
         let thread = Builder::new().name("recorder".into()).spawn(work)?;
         Ok(RecorderThread {
             appends: Some(appends),
             thread: Some(thread),
             failed,
             waiting_pictures: Arc::default(),
+            unwritten_steps,
         })
     }
 
     /// Appends after everything that was appended before, some time soon.
     pub fn append(&self, append: impl FnOnce(&mut Recorder) -> Result<(), OutputError> + Send + 'static) {
+        self.send(Append::Other(Box::new(append)));
+    }
+
+    /// As [`RecorderThread::append`], of a control step.
+    pub fn append_step(
+        &self,
+        append: impl FnOnce(&mut Recorder) -> Result<(), OutputError> + Send + 'static,
+    ) {
+        let count = self.unwritten_steps.fetch_add(1, Ordering::Relaxed) + 1;
+        self.send(Append::Step(Box::new(append)));
+        match count {
+            ..GATHERED_STEPS => {}
+            GATHERED_STEPS..UNWRITTEN_STEPS => self.wake(),
+            UNWRITTEN_STEPS.. => self.flush(),
+        }
+    }
+
+    fn send(&self, append: Append) {
         let Some(appends) = &self.appends else { return };
-        let sent = match appends.try_send(Box::new(append)) {
+        let sent = match appends.try_send(append) {
             Err(TrySendError::Full(append)) => {
                 self.wake();
                 appends.send(append).is_ok()
@@ -93,15 +134,9 @@ impl RecorderThread {
     /// Waits until the system has everything that was appended so far, or one of it has failed.
     pub fn flush(&self) {
         let (flushed, wait) = sync_channel::<()>(0);
-        let failed = self.failed.clone();
-        self.append(move |recorder| {
-            let outcome = recorder.flush();
-            note(&failed, &outcome);
-            drop(flushed);
-            outcome
-        });
+        self.send(Append::Flush(flushed));
         self.wake();
-        // Nothing is ever sent; it ends when the other side is gone, be it by a failure before.
+        // It ends when the other side is gone, be it by a failure before.
         let _ = wait.recv();
     }
 
@@ -136,26 +171,61 @@ impl Drop for RecorderThread {
     }
 }
 
-/// Returns the recorder when nobody is left who appends, or nothing at its first failure.
-fn append_all(
-    mut recorder: Recorder,
-    inbox: &Receiver<Append>,
-    failed: &OnceLock<String>,
-) -> Option<Recorder> {
-    while let Ok(first) = inbox.recv() {
-        park_timeout(GATHERED);
-        let mut appends = iter::once(first).chain(inbox.try_iter());
-        let appended = appends.try_for_each(|append| append(&mut recorder)).and_then(|()| recorder.flush());
-        note(failed, &appended);
-        if appended.is_err() {
-            return None;
-        }
-    }
-    Some(recorder)
+/// What runs on the recorder's thread.
+struct Appender {
+    recorder: Recorder,
+    failed: Arc<OnceLock<String>>,
+    unwritten_steps: Arc<AtomicUsize>,
+    /// Steps since the last flush.
+    gathered_steps: usize,
 }
 
-fn note(failed: &OnceLock<String>, outcome: &Result<(), OutputError>) {
-    if let Err(error) = outcome {
-        failed.get_or_init(|| error.to_string());
+impl Appender {
+    /// Returns the recorder when nobody is left who appends, or nothing at its first failure.
+    fn run(mut self, inbox: &Receiver<Append>) -> Option<Recorder> {
+        while let Ok(first) = inbox.recv() {
+            if !matches!(first, Append::Flush(_)) {
+                park_timeout(GATHERED);
+            }
+            let mut appends = iter::once(first).chain(inbox.try_iter());
+            if !(appends.all(|append| self.append(append)) && self.flush()) {
+                return None;
+            }
+        }
+        Some(self.recorder)
+    }
+
+    /// Whether all is well.
+    fn append(&mut self, append: Append) -> bool {
+        match append {
+            Append::Step(write) => {
+                self.gathered_steps += 1;
+                let outcome = write(&mut self.recorder);
+                self.note(outcome) && (self.gathered_steps < GATHERED_STEPS || self.flush())
+            }
+            Append::Other(write) => {
+                let outcome = write(&mut self.recorder);
+                self.note(outcome)
+            }
+            // Whoever waits hears of a failure.
+            Append::Flush(flushed) => {
+                let is_well = self.flush();
+                drop(flushed);
+                is_well
+            }
+        }
+    }
+
+    fn flush(&mut self) -> bool {
+        let outcome = self.recorder.flush();
+        self.unwritten_steps.fetch_sub(mem::take(&mut self.gathered_steps), Ordering::Relaxed);
+        self.note(outcome)
+    }
+
+    fn note(&self, outcome: Result<(), OutputError>) -> bool {
+        if let Err(error) = &outcome {
+            self.failed.get_or_init(|| error.to_string());
+        }
+        outcome.is_ok()
     }
 }

@@ -72,7 +72,7 @@ pub fn film(
     let mut scene = EpisodeRenderer::of(&recording.spec).map_err(ReplayError::from)?;
     let mut writer: Option<FilmWriter> = None;
     let mut pictures = 0;
-    for (index, step) in recording.steps().map_err(ReplayError::from)?.enumerate() {
+    for (index, step) in recording.steps().enumerate() {
         let step = step.map_err(ReplayError::from)?;
         if index < step_of_picture(pictures, rate_hz) {
             continue;
@@ -111,10 +111,10 @@ pub fn short_film(recording: &Recording) -> Result<ShortFilm, VideoError> {
     let mut scene = EpisodeRenderer::of(&recording.spec).map_err(ReplayError::from)?;
     let failed = |error| webp_failed(recording.path(), error);
     let mut encoder = webp::encoder((SHORT_SIZE.width, SHORT_SIZE.height)).map_err(failed)?;
-    let steps = recording.state_hashes().map_err(ReplayError::from)?.count();
+    let steps = recording.state_hashes().count();
     let stride = steps.div_ceil(SHORT_PICTURES).max(1);
     let mut pictures = 0;
-    for (index, step) in recording.steps().map_err(ReplayError::from)?.enumerate() {
+    for (index, step) in recording.steps().enumerate() {
         let step = step.map_err(ReplayError::from)?;
         if index % stride == 0 || index + 1 == steps {
             let camera = scene.camera(EpisodeCamera::ThirdPerson, &step, Some(SHORT_SIZE));

@@ -97,8 +97,8 @@ impl Checkpoint {
     pub fn of_phase(start: &PhaseStart) -> Result<Checkpoint, EpisodeError> {
         let PhaseStart { recording: path, phase } = start;
         let unreadable = |error: crate::RecordingError| CheckpointError::Recording(error.to_string());
-        let found = Recording::read(path).and_then(|recording| recording.checkpoint(phase));
-        match found.map_err(unreadable)? {
+        let recording = Recording::read(path).map_err(unreadable)?;
+        match recording.checkpoint(phase) {
             Some(found) => Checkpoint::from_bytes(&found.bytes, path),
             None => Err(CheckpointError::NoPhase { path: path.clone(), phase: phase.clone() }.into()),
         }

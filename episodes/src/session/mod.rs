@@ -130,7 +130,7 @@ impl Session {
             }
         };
         if let Some(folder) = folder {
-            self.files = Some(RunFiles::create(folder, self)?);
+            self.files = Some(RunFiles::create(folder, self));
         }
         self.keep_picture("start");
         self.hold(hold_steps)?;

@@ -2,6 +2,7 @@
 //! episode: what cannot be written is named in the result, and the episode goes on without it.
 
 use std::fmt::Display;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -41,7 +42,8 @@ impl From<&Path> for RunFolder {
 /// The files of an episode.
 pub struct RunFiles {
     folder: PathBuf,
-    recorder: RecorderThread,
+    /// `None` where the recording could not begin.
+    recorder: Option<RecorderThread>,
     /// The first failure, unless it is the recorder's.
     failed: Option<String>,
     moments: Vec<KeyMoment>,
@@ -51,49 +53,36 @@ pub struct RunFiles {
 }
 
 impl RunFiles {
-    /// Makes the folder and begins the recording where `session` stands.
-    pub(super) fn create(folder: RunFolder, session: &Session) -> Result<RunFiles, EpisodeError> {
-        let RunFolder { path, visibility } = folder;
-        create_private_folder(&path).map_err(|source| OutputError::Io { path: path.clone(), source })?;
-        let header = RecordingHeader {
-            spec: session.spec().clone(),
-            locomotion: session.origin.locomotion.clone(),
-            renderer: session.observer.renderer().into(),
-            build: this_build()?.into(),
-            robots: session.motions.iter().map(|motion| motion.robot.clone()).collect(),
-            scores: session.scores.memory(),
-        };
-        let mut recorder =
-            Recorder::create(&path, visibility, header, &session.present, session.world.state_hash())?;
-        recorder.draw("world", session.world.room())?;
-        for (name, model) in session.world.object_models() {
-            recorder.draw(name, &model.geoms)?;
-        }
-        // What fails here fails the start; what fails later does not.
-        recorder.flush()?;
-        let recorder = RecorderThread::start(recorder)
-            .map_err(|source| OutputError::Io { path: path.clone(), source })?;
-        Ok(RunFiles {
-            folder: path,
-            recorder,
-            failed: None,
+    /// Makes the folder and begins the recording where `session` stands. If that fails, the episode goes on all the same.
+    pub(super) fn create(folder: RunFolder, session: &Session) -> RunFiles {
+        let begun = begin(&folder, session);
+        let failed = begun.as_ref().err().map(EpisodeError::to_string);
+        RunFiles {
+            folder: folder.path,
+            recorder: begun.ok(),
+            failed,
             moments: Vec::new(),
             begin_s: session.steps_before as f64 / CONTROL_HZ,
             calls: CallCounts::default(),
             budget_left: None,
-        })
+        }
     }
 
     pub(super) fn step(&mut self, step: Arc<Step>, state_hash: u64, facts: Facts, budget: Budget) {
         self.budget_left = Some(budget);
-        self.recorder.append(move |recorder| recorder.step(&step, state_hash, &facts, budget));
+        if let Some(recorder) = &self.recorder {
+            recorder.append_step(move |recorder| recorder.step(&step, state_hash, &facts, budget));
+        }
     }
 
     pub(super) fn checkpoint(&mut self, name: &str, time_s: f64, bytes: Result<Vec<u8>, EpisodeError>) {
         let name = name.to_owned();
-        match bytes {
-            Ok(bytes) => self.recorder.append(move |recorder| recorder.checkpoint(&name, time_s, &bytes)),
-            Err(error) => self.note(Err(error)),
+        match (bytes, &self.recorder) {
+            (Ok(bytes), Some(recorder)) => {
+                recorder.append(move |recorder| recorder.checkpoint(&name, time_s, &bytes));
+            }
+            (Ok(_), None) => {}
+            (Err(error), _) => self.note(Err(error)),
         }
     }
 
@@ -105,7 +94,9 @@ impl RunFiles {
 
     pub(super) fn phase(&mut self, phase: &PhaseReached) {
         let phase = phase.clone();
-        self.recorder.append(move |recorder| recorder.phase(&phase));
+        if let Some(recorder) = &self.recorder {
+            recorder.append(move |recorder| recorder.phase(&phase));
+        }
     }
 
     pub(super) fn tool_call(
@@ -117,14 +108,17 @@ impl RunFiles {
         outcome: CallOutcome,
     ) {
         self.calls.count(called.name(), outcome.is_ok());
+        let Some(recorder) = &self.recorder else { return };
         let record = ToolCallRecord::new(time_s, thought, operator, called, outcome);
         let pictures = record.as_ref().map_or(0, |record| record.pictures.len());
-        self.recorder.append_pictures(pictures, move |recorder| recorder.tool_call(record?));
+        recorder.append_pictures(pictures, move |recorder| recorder.tool_call(record?));
     }
 
     /// Waits until everything recorded is on its way to the disk, or has failed.
     pub(super) fn flush(&mut self) {
-        self.recorder.flush();
+        if let Some(recorder) = &self.recorder {
+            recorder.flush();
+        }
     }
 
     /// Keeps a moment for the strip.
@@ -137,12 +131,12 @@ impl RunFiles {
 
     /// Why the recording is not complete, if it is not.
     pub(super) fn failed(&self) -> Option<&str> {
-        self.failed.as_deref().or_else(|| self.recorder.failed())
+        self.failed.as_deref().or_else(|| self.recorder.as_ref()?.failed())
     }
 
     /// Closes the recording and writes the rest; `result` then names what failed.
     pub(super) fn finish(&mut self, result: &mut ResultReply, task: &Task) {
-        let recorder = self.recorder.stop();
+        let recorder = self.recorder.as_mut().and_then(RecorderThread::stop);
         result.recording_failed = self.failed().map(str::to_owned);
         if let Some(recorder) = recorder {
             self.note(recorder.finish(result).map(drop));
@@ -152,6 +146,8 @@ impl RunFiles {
         result.recording_failed = self.failed().map(str::to_owned);
         self.note(write_result(result, &self.folder).map(drop));
         result.recording_failed = self.failed().map(str::to_owned);
+        // A folder goes that nothing could be written into; any other is not empty.
+        let _ = fs::remove_dir(&self.folder);
     }
 
     fn report(&self, result: &ResultReply, task: &Task) -> Result<(), EpisodeError> {
@@ -174,6 +170,29 @@ impl RunFiles {
             self.failed = Some(error.to_string());
         }
     }
+}
+
+/// Begins the recording, so that what cannot be written is known from the start.
+fn begin(folder: &RunFolder, session: &Session) -> Result<RecorderThread, EpisodeError> {
+    let RunFolder { path, visibility } = folder;
+    let failed = |source| OutputError::Io { path: path.clone(), source };
+    create_private_folder(path).map_err(failed)?;
+    let header = RecordingHeader {
+        spec: session.spec().clone(),
+        locomotion: session.origin.locomotion.clone(),
+        renderer: session.observer.renderer().into(),
+        build: this_build()?.into(),
+        robots: session.motions.iter().map(|motion| motion.robot.clone()).collect(),
+        scores: session.scores.memory(),
+    };
+    let mut recorder =
+        Recorder::create(path, *visibility, header, &session.present, session.world.state_hash())?;
+    recorder.draw("world", session.world.room())?;
+    for (name, model) in session.world.object_models() {
+        recorder.draw(name, &model.geoms)?;
+    }
+    recorder.flush()?;
+    Ok(RecorderThread::start(recorder).map_err(failed)?)
 }
 
 /// A moment for the picture strip: what the third-person camera and the robots called `names` see after `step`.

@@ -103,7 +103,7 @@ fn pictures_are_drawn_once_whatever_stops_the_run() {
     assert_eq!(image::open(&lost).unwrap().into_luma16(), depth_mm);
 
     // It is the depth that the camera sees.
-    let step = recording.steps().unwrap().nth(5).unwrap().unwrap();
+    let step = recording.steps().nth(5).unwrap().unwrap();
     let mut scene = EpisodeRenderer::of(&recording.spec).unwrap();
     let camera = scene.camera(EpisodeCamera::Egocentric(0), &step, Some(SIZE));
     let seen = scene.draw(&step, &camera);

@@ -1,5 +1,7 @@
 //! Recordings read back: every step as it was, and phases scored again from the steps alone.
 
+mod damage;
+
 use crate::common::*;
 use std::path::{Path, PathBuf};
 use tandem_episodes::players::{self, InProcess};
@@ -23,7 +25,7 @@ fn recorded_steps_are_the_steps_bit_for_bit() {
 
     let recording = Recording::read(&folder.path().join(Recorder::FILE_NAME)).unwrap();
     assert_eq!((&recording.spec, recording.locomotion.as_str()), (&spec, "balance"));
-    let steps: Vec<_> = recording.steps().unwrap().map(Result::unwrap).collect();
+    let steps: Vec<_> = recording.steps().map(Result::unwrap).collect();
     assert_eq!(steps.iter().map(|step| step.control_step).collect::<Vec<_>>(), (0..=10).collect::<Vec<_>>());
     assert_eq!((&steps[..6], &steps[10]), (&present[..], &last));
     let calls = recording.tool_calls().unwrap();
@@ -63,7 +65,7 @@ fn what_is_no_recording_is_refused_by_name() {
     assert!(Recording::read(&path).map(drop).unwrap_err().to_string().contains("cannot read the recording"));
     std::fs::write(&path, "not MCAP").unwrap();
     let text = Recording::read(&path).map(drop).unwrap_err().to_string();
-    assert!(text.contains("notes.mcap is no complete MCAP file"), "{text}");
+    assert!(text.contains("notes.mcap is no whole recording"), "{text}");
 }
 
 #[test]
@@ -111,7 +113,7 @@ fn an_interrupted_recording_is_recovered_up_to_the_last_reply() {
     let recovered = recover(&partial).unwrap();
     assert_eq!((recovered.path.clone(), recovered.last_s), (folder.path().join(Recorder::FILE_NAME), 0.3));
     let recording = Recording::read(&recovered.path).unwrap();
-    assert_eq!((recording.steps().unwrap().count(), recording.tool_calls().unwrap().len()), (16, 3));
+    assert_eq!((recording.steps().count(), recording.tool_calls().unwrap().len()), (16, 3));
     assert_eq!((recording.spec.seed, recording.result.clone()), (3, None));
     assert_eq!(recording.score().unwrap().reached().count(), 0);
     let text = recover(&partial).unwrap_err().to_string();
@@ -128,8 +130,8 @@ fn a_torn_end_is_left_out() {
         std::fs::remove_file(&whole.path).unwrap();
         std::fs::write(&partial, &bytes[..left_bytes]).unwrap();
         let recovered = recover(&partial).unwrap();
-        assert!(recovered.torn.is_some() && recovered.messages <= whole.messages, "{recovered:?}");
-        Recording::read(&whole.path).unwrap().steps().unwrap().for_each(|step| drop(step.unwrap()));
+        assert!(recovered.left_out.is_some() && recovered.messages <= whole.messages, "{recovered:?}");
+        Recording::read(&whole.path).unwrap().steps().for_each(|step| drop(step.unwrap()));
     }
     for (name, content, says) in [
         ("episode.mcap", &b""[..], "does not end in .partial"),

@@ -24,7 +24,7 @@ use super::{
 };
 use crate::{
     drivers::HttpEpisode,
-    hosting::EpisodeThread,
+    hosting::{EpisodeThread, try_runs_folder},
     http::Server,
     settings::{Layer, Settings},
 };
@@ -64,7 +64,8 @@ pub fn run(args: DemoArgs) -> CommandResult {
         ..Layer::default()
     };
     let results = play_all(&args.runs, args.seeds, flags)?;
-    Ok(if passed(&results) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    let recorded = results.iter().all(|result| result.recording_failed.is_none());
+    Ok(if recorded && passed(&results) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// Plays every seed in turn on a server with these flags, recorded under `runs`, and prints what came of it.
@@ -74,7 +75,9 @@ pub fn play_all(runs: &Path, seeds: Seeds, flags: Layer) -> Result<Vec<ResultRep
         runs: Some(runs.into()),
         ..flags
     };
-    let server = Server::start(Settings::resolve(flags, None)?)?;
+    let settings = Settings::resolve(flags, None)?;
+    try_runs_folder(&settings.runs)?;
+    let server = Server::start(settings)?;
     let results = seeds.0.map(|seed| play(&server, seed)).collect::<Result<Vec<_>, _>>()?;
     server.stop();
     if results.len() > 1 {
@@ -122,7 +125,10 @@ fn print_result(task: &Task, result: &ResultReply, folder: &Path) {
         "  {} control steps of 20 ms, {} tool calls, {} falls, {:.1}x real time on one thread",
         result.env_steps, result.tool_calls, result.falls, result.realtime_factor
     );
-    println!("  {}: result.json, episode.mcap, strip.png, report.html", folder.display());
+    match &result.recording_failed {
+        Some(reason) => println!("  not everything was written: {reason}"),
+        None => println!("  {}: result.json, episode.mcap, strip.png, report.html", folder.display()),
+    }
 }
 
 /// The expert's episode: the expert acts over HTTP like any policy, and reads the true state in this process.

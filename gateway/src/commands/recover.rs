@@ -2,6 +2,8 @@
 
 use std::{path::PathBuf, process::ExitCode};
 
+use tandem_episodes::LeftOut;
+
 use super::CommandResult;
 
 /// Make a whole recording of one that was interrupted: FILE.mcap of FILE.mcap.partial.
@@ -21,8 +23,11 @@ pub fn run(args: RecoverArgs) -> CommandResult {
         recovered.messages,
         recovered.last_s
     );
-    if let Some(torn) = recovered.torn {
-        println!("the end of {} is torn and was left out: {torn}", args.partial.display());
+    if let Some(LeftOut { damage, bytes }) = recovered.left_out {
+        println!("the last {bytes} bytes of {} were left out: {damage}", args.partial.display());
+    }
+    if recovered.unchecked_metadata > 0 {
+        println!("what the episode was has no checksum there, and was taken as it is");
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -139,6 +139,9 @@ fn describe(recording: &Recording) {
         }
         None => println!("  interrupted before its end"),
     }
+    if !recording.uncovered().is_empty() {
+        println!("  warning: no checksum covers {}", recording.uncovered().join(", "));
+    }
 }
 
 /// Prints how the recording compares, and returns whether it is the same.

@@ -9,6 +9,7 @@ use super::{
     logging::{LogFormat, log_server},
 };
 use crate::{
+    hosting::try_runs_folder,
     http::Server,
     settings::{Layer, Settings},
     token::Token,
@@ -33,6 +34,7 @@ pub fn run(args: ServeArgs) -> CommandResult {
     log_server(LevelFilter::INFO, args.log_format);
     let flags = Layer { token: Token::from_environment()?, ..args.flags };
     let settings = Settings::resolve(flags, args.config.as_deref())?;
+    try_runs_folder(&settings.runs)?;
     let left = Server::start(settings)?.run_until_signal();
     Ok(if left.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

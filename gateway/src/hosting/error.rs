@@ -1,6 +1,6 @@
 //! Why the host of episodes refuses.
 
-use std::{io, path::PathBuf, sync::Arc};
+use std::{io, sync::Arc};
 
 use tandem_episodes::EpisodeError;
 use tandem_tools_spec::{Refusal, RefusalClass};
@@ -42,14 +42,6 @@ pub enum HostingError {
         "the simulator failed in this episode and the episode ends here; its recording holds what went before"
     )]
     EpisodePanicked,
-    /// The episode has no folder to be recorded into.
-    #[error("no folder in {}: {source}", .runs.display())]
-    Folder {
-        /// Where it was to be made.
-        runs: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
     /// The operator has commanded already.
     #[error(
         "robot {robot:?} has its command for this step already; its reply comes when {}",
@@ -164,9 +156,7 @@ impl HostingError {
             }
             HostingError::KeyUsed => Refusal::new("key-used", "Key used", Invalid),
             HostingError::Shared(error) => error.refusal(),
-            HostingError::Folder { .. } | HostingError::Token(_) | HostingError::Thread(_) => {
-                Refusal::INTERNAL
-            }
+            HostingError::Token(_) | HostingError::Thread(_) => Refusal::INTERNAL,
         }
     }
 

@@ -1,39 +1,88 @@
 //! One folder per episode under the runs folder. The folder's name is the episode's id.
 
 use std::{
-    io,
+    fs, io,
     path::{Path, PathBuf},
+    sync::atomic::{AtomicU32, Ordering},
 };
 
 use tandem_episodes::{create_new_private_folder, create_private_folder};
 
-/// Makes a new folder for an episode: `handover-seed0`, and where that is taken `handover-seed0-2`, `-3`, ...
-pub fn create(runs: &Path, task: &str, seed: u32) -> io::Result<(String, PathBuf)> {
-    create_private_folder(runs)?;
-    let base = format!("{task}-seed{seed}");
-    let names = std::iter::once(base.clone()).chain((2u32..).map(|n| format!("{base}-{n}")));
+/// Writes something into the folder of all runs; nothing of the trial is left behind. The error says what would have worked.
+pub fn try_runs_folder(runs: &Path) -> Result<(), String> {
+    let there = runs.exists();
+    let probe = runs.join(format!(".probe-{}", std::process::id()));
+    let tried = create_private_folder(runs).and_then(|()| fs::write(&probe, "probe"));
+    let cleared = fs::remove_file(&probe);
+    if !there {
+        // A folder that was made for this is removed again, unless somebody has put something in.
+        let _ = fs::remove_dir(runs);
+    }
+    let shown = runs.display();
+    tried.and(cleared).map_err(|error| format!("{shown}: {error}; make it writable, or give another --runs"))
+}
+
+/// Names and makes the folders of one server.
+#[derive(Debug, Default)]
+pub struct RunFolders {
+    /// Episodes that got no folder.
+    without: AtomicU32,
+}
+
+impl RunFolders {
+    /// Makes a new folder for an episode: `handover-seed0`, and where that is taken `handover-seed0-2`, `-3`, ... Where none can
+    /// be made, as on a full disk, the episode has a name all the same; its recording fails, and says why.
+    pub fn create(&self, runs: &Path, task: &str, seed: u32) -> (String, PathBuf) {
+        let base = format!("{task}-seed{seed}");
+        if let Ok(Some(made)) = create_private_folder(runs).and_then(|()| first_free(runs, &base)) {
+            return made;
+        }
+        loop {
+            let number = self.without.fetch_add(1, Ordering::Relaxed) + 1;
+            let name = format!("{base}-unrecorded-{number}");
+            let folder = runs.join(&name);
+            if !folder.exists() {
+                return (name, folder);
+            }
+        }
+    }
+}
+
+fn first_free(runs: &Path, base: &str) -> io::Result<Option<(String, PathBuf)>> {
+    let names = std::iter::once(base.to_owned()).chain((2u32..).map(|n| format!("{base}-{n}")));
     for name in names {
         let folder = runs.join(&name);
         match create_new_private_folder(&folder) {
-            Ok(()) => return Ok((name, folder)),
+            Ok(()) => return Ok(Some((name, folder))),
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => continue,
             Err(error) => return Err(error),
         }
     }
-    Err(io::Error::other(format!("every name for {base} is taken in {}", runs.display())))
+    Ok(None)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::RunFolders;
+
     #[test]
     fn names_are_never_used_twice() {
         let runs = std::env::temp_dir().join(format!("tandem-runs-{}", std::process::id()));
-        let name = |seed| super::create(&runs, "handover", seed).unwrap().0;
+        let folders = RunFolders::default();
+        let name = |seed| folders.create(&runs, "handover", seed).0;
         assert_eq!(
             [name(0), name(0), name(1), name(0)],
             ["handover-seed0", "handover-seed0-2", "handover-seed1", "handover-seed0-3"]
         );
         std::fs::remove_dir_all(&runs).unwrap();
+    }
+
+    #[test]
+    fn an_episode_has_a_name_of_its_own_where_no_folder_can_be_made() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let folders = RunFolders::default();
+        let names = [(); 2].map(|()| folders.create(&file.path().join("runs"), "handover", 0).0);
+        assert_eq!(names, ["handover-seed0-unrecorded-1", "handover-seed0-unrecorded-2"]);
     }
 
     #[cfg(unix)]
@@ -42,7 +91,7 @@ mod tests {
         use std::os::unix::fs::PermissionsExt;
         let parent = tempfile::tempdir().unwrap();
         let runs = parent.path().join("data/runs");
-        let (_, folder) = super::create(&runs, "handover", 0).unwrap();
+        let (_, folder) = RunFolders::default().create(&runs, "handover", 0);
         for path in [runs, folder] {
             let mode = std::fs::metadata(&path).unwrap().permissions().mode();
             assert_eq!(mode & 0o777, 0o700, "{}", path.display());

@@ -19,7 +19,7 @@ use tokio::{
 use super::{
     Caller, EpisodeThread, HostedEpisode, HostingError,
     idempotency_cache::{IdempotencyCache, IdempotentReply},
-    run_folder,
+    run_folder::RunFolders,
     team::Team,
 };
 use crate::{metrics::Metrics, settings::Settings};
@@ -32,6 +32,7 @@ pub struct EpisodeTable {
     settings: Arc<Settings>,
     starts: IdempotencyCache<(StartEpisode, Driving), SharedStart>,
     metrics: Arc<Metrics>,
+    folders: RunFolders,
 }
 
 /// What came of a start, for as many as want to know.
@@ -53,6 +54,7 @@ impl EpisodeTable {
             settings,
             starts: IdempotencyCache::default(),
             metrics: Arc::default(),
+            folders: RunFolders::default(),
         }
     }
 
@@ -96,9 +98,7 @@ impl EpisodeTable {
             ..EpisodeSpec::new(tasks::find(&args.task)?, args.seed, protocol)
         };
         let place = self.take_place().await?;
-        let runs = &self.settings.runs;
-        let (id, path) = run_folder::create(runs, spec.task.id, spec.seed)
-            .map_err(|source| HostingError::Folder { runs: runs.clone(), source })?;
+        let (id, path) = self.folders.create(&self.settings.runs, spec.task.id, spec.seed);
         let folder = RunFolder { path, visibility: self.settings.record };
         self.begin(&id, spec, &driving, folder, place).await
     }

@@ -70,7 +70,7 @@ fn physics_that_diverges_ends_its_own_episode_and_says_at_which_body() {
     assert!(problem["detail"].as_str().unwrap().contains("the simulator failed"), "{problem}");
     let state = post("/diverging/tools/get_robot_state", &json!({ "robot": "A" }));
     let recording = Recording::read(&folder.join(Recorder::FILE_NAME)).unwrap();
-    let last = recording.steps().unwrap().map(Result::unwrap).last().unwrap();
+    let last = recording.steps().map(Result::unwrap).last().unwrap();
     assert_eq!((state.0, state.1["time_s"].as_f64()), (200, Some(last.time_s)), "as it was last sound");
     let result = recording.result.unwrap();
     assert_eq!((result.ended, result.tool_calls), (EndReason::SimulatorFailed, 2));

@@ -1,18 +1,17 @@
 //! What the machine can do: physics and pictures, the port, the folder of recordings, clocks and cores.
 
 use std::{
-    fs,
     net::{SocketAddr, TcpListener},
     path::Path,
     thread::available_parallelism,
     time::{Duration, Instant, SystemTime, UNIX_EPOCH},
 };
 
-use tandem_episodes::{EpisodeError, EpisodeSpec, create_private_folder};
+use tandem_episodes::{EpisodeError, EpisodeSpec};
 use tandem_tools_spec::{Observe, ToolCall, Wait};
 
 use super::{Finding, Findings, trial};
-use crate::settings::Layer;
+use crate::{hosting::try_runs_folder, settings::Layer};
 
 /// How many control steps the check of physics simulates.
 const TRIED_STEPS: u32 = 25;
@@ -70,19 +69,7 @@ pub(super) fn port(address: SocketAddr) -> Result<String, String> {
 }
 
 pub(super) fn runs(folder: &Path) -> Result<String, String> {
-    let shown = folder.display();
-    let there = folder.exists();
-    let probe = folder.join(format!(".doctor-{}", std::process::id()));
-    let tried = create_private_folder(folder).and_then(|()| fs::write(&probe, "probe"));
-    let cleared = fs::remove_file(&probe);
-    if !there {
-        // A folder that this check has made is removed again, unless somebody has put something in.
-        let _ = fs::remove_dir(folder);
-    }
-    match tried.and(cleared) {
-        Ok(()) => Ok(format!("{shown} can be written")),
-        Err(error) => Err(format!("{shown}: {error}; make it writable, or give another --runs")),
-    }
+    try_runs_folder(folder).map(|()| format!("{} can be written", folder.display()))
 }
 
 fn clock() -> Result<String, String> {

@@ -147,6 +147,9 @@ impl Policy for Program {
         let id = format!("{}-seed{}", spec.task.id, spec.seed);
         let files = RunFolder { path: absolute.clone(), visibility: Visibility::After };
         let (episode, start) = server.host(&id, spec.clone(), &self.driving, files)?;
+        if let Some(reason) = start.briefing.recording_failed {
+            return Err(PlayError::Lost(reason));
+        }
         let participants = Participant::all(&start, &text, &absolute);
         let ran = self.run(&server, &episode, &start, &participants);
         let over = episode.ended();

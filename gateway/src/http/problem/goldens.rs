@@ -65,7 +65,6 @@ fn hosting_refusals() -> Vec<HostingError> {
         HostingError::ShuttingDown,
         HostingError::EpisodeStopped,
         HostingError::EpisodePanicked,
-        HostingError::Folder { runs: "runs".into(), source: failure() },
         EpisodeError::OtherStep { expected: 1, now: 2 }.into(),
         HostingError::DoubleCommand { robot: robot(), waits_for: vec!["B".into(), "C".into()] },
         HostingError::DoubleCommand { robot: robot(), waits_for: Vec::new() },

@@ -324,7 +324,6 @@ mod tests {
             assert!(body.detail.contains(says), "{body:?}");
         };
         let failure = || io::Error::other("disk full");
-        check(HostingError::Folder { runs: "runs".into(), source: failure() }, 500, "its log says why");
         check(HostingError::Thread(failure()), 500, "the server failed; its log says why");
         check(HostingError::UnknownEpisode { id: "x".into() }, 404, "POST /v1/episodes");
         check(HostingError::EpisodePanicked, 500, "its recording holds what went before; start another");

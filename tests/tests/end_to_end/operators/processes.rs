@@ -112,6 +112,6 @@ fn who_is_left_alone_is_told_and_the_recording_is_whole() {
     assert_eq!(result["ended"], "finished", "nobody is left to be waited for: {result}");
     assert_eq!(result["env_steps"].as_u64(), before.as_u64().map(|steps| steps + 1));
     let (_, recording) = team.verified();
-    let left = recording.steps().expect("steps").last().expect("a step").expect("a step");
+    let left = recording.steps().last().expect("a step").expect("a step");
     assert_eq!(Some(left.control_step), result["env_steps"].as_u64());
 }

@@ -39,6 +39,6 @@ pub fn play(plan: &EvaluationPlan, folder: &Path) -> Evaluation {
 pub fn last_angles_rad(folder: &Path, name: &str, joint: usize) -> Vec<f32> {
     let path = folder.join("episodes").join(name).join(Recorder::FILE_NAME);
     let recording = Recording::read(&path).expect("a recording");
-    let last = recording.steps().expect("steps").last().expect("a step").expect("a whole step");
+    let last = recording.steps().last().expect("a step").expect("a whole step");
     last.robots.iter().map(|robot| robot.sensed.q_rad[joint]).collect()
 }

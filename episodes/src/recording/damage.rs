@@ -1,0 +1,80 @@
+//! Where a recording is not as it was written.
+
+use std::fmt;
+
+use mcap::records::op;
+
+/// A part of the file that does not hold what was written.
+#[derive(Debug, thiserror::Error)]
+#[error("{part} at byte {offset}: {fault}")]
+pub struct Damage {
+    pub part: FilePart,
+    /// Where the part begins.
+    pub offset: usize,
+    pub fault: Fault,
+}
+
+/// What of the file it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FilePart {
+    /// The first eight bytes, or the last.
+    Magic,
+    /// Everything up to the summary.
+    DataSection,
+    Summary,
+    /// Numbered from 1.
+    Chunk(usize),
+    /// By its opcode.
+    Record(u8),
+}
+
+/// What is wrong with it.
+#[derive(Debug, thiserror::Error)]
+pub enum Fault {
+    #[error("the file ends within it")]
+    Cut,
+    #[error("the file ends before it")]
+    Missing,
+    #[error("its checksum is {saved:08x}, and that of its bytes is {calculated:08x}")]
+    Checksum { saved: u32, calculated: u32 },
+    #[error("it says that it has {said} bytes, and it has {has}")]
+    Length { said: u64, has: usize },
+    #[error("it says that {compressed} bytes hold {uncompressed}, which is more than they can")]
+    Expansion { compressed: usize, uncompressed: u64 },
+    #[error("it is compressed as {0:?}; recordings are compressed as \"lz4\"")]
+    Compression(String),
+    #[error("it cannot be decompressed: {0}")]
+    Decompress(std::io::Error),
+    #[error("it cannot be read: {0}")]
+    Content(mcap::McapError),
+    #[error("it is not what has to be there")]
+    Unexpected,
+    #[error("message {found} of channel {channel} is where message {expected} has to be")]
+    Sequence { channel: u16, expected: u32, found: u32 },
+}
+
+impl Fault {
+    /// The fault as that of `part`, which begins at `offset`.
+    pub fn of(self, part: FilePart, offset: usize) -> Damage {
+        Damage { part, offset, fault: self }
+    }
+}
+
+impl fmt::Display for FilePart {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let name = match *self {
+            FilePart::Magic => "the mark of MCAP files",
+            FilePart::DataSection => "the data section",
+            FilePart::Summary => "the summary",
+            FilePart::Chunk(number) => return write!(f, "chunk {number}"),
+            FilePart::Record(op::HEADER) => "the header",
+            FilePart::Record(op::FOOTER) => "the footer",
+            FilePart::Record(op::DATA_END) => "the end of the data",
+            FilePart::Record(op::MESSAGE_INDEX) => "a message index",
+            FilePart::Record(op::ATTACHMENT) => "an attachment",
+            FilePart::Record(op::METADATA) => "a metadata record",
+            FilePart::Record(opcode) => return write!(f, "a record of kind {opcode:#04x}"),
+        };
+        f.write_str(name)
+    }
+}

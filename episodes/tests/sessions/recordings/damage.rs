@@ -1,0 +1,207 @@
+//! Recordings of which bytes were changed or cut off: none aborts or panics, none is verified, and what is recovered can be
+//! replayed.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tandem_episodes::replay::{Verdict, verify};
+use tandem_episodes::{
+    FilePart, RecordedCall, Recorder, Recording, RecordingError, RecoverError, Session, recover,
+};
+use tandem_tools_spec::{Finish, Observe, Protocol};
+
+use super::interrupted;
+use crate::common::*;
+
+/// Flipped bytes and cuts of all recordings together.
+const FLIPS: usize = 2000;
+const CUTS: usize = 200;
+/// Every so manieth is recovered, too, and of these every so manieth simulated again.
+const RECOVERED: usize = 5;
+const SIMULATED: usize = 10;
+
+/// Numbers that look random and are the same in every run (xorshift64, Marsaglia 2003).
+struct Chance(u64);
+
+impl Chance {
+    fn below(&mut self, limit: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 % limit as u64) as usize
+    }
+}
+
+/// Three small recordings: pictures and a result, three robots, and one that was recovered and has no end.
+fn recordings(folder: &Path) -> [PathBuf; 3] {
+    let [looks, three, cut] = ["looks", "three", "cut"].map(|name| folder.join(name));
+    let mut session = Session::start(&spec("handover", 3, Protocol::Benchmark), Some(&looks)).unwrap();
+    command(&mut session, raise_hand(4));
+    session.call(Observe { robots: Some(vec!["A".into()]), short: None }.into()).unwrap();
+    wait(&mut session, 3);
+    session.call(Finish {}.into()).unwrap();
+    let mut session =
+        Session::start(&spec("trash_collection", 3, Protocol::Benchmark), Some(&three)).unwrap();
+    wait(&mut session, 6);
+    session.close();
+    recover(&interrupted(&cut, 2)).unwrap();
+    [looks, three, cut].map(|folder| folder.join(Recorder::FILE_NAME))
+}
+
+/// All that is read of a recording.
+fn content(recording: &Recording) -> (Vec<(u64, String)>, Vec<RecordedCall>) {
+    let hashes = recording.state_hashes().map(Result::unwrap).collect();
+    (hashes, recording.tool_calls().unwrap())
+}
+
+/// What is recovered of `bytes` is a beginning of `original`, or nothing is left.
+fn recovers_a_beginning(bytes: &[u8], original: &Recording, folder: &Path, simulate: bool, what: &str) {
+    let partial = folder.join("episode.mcap.partial");
+    fs::write(&partial, bytes).unwrap();
+    match recover(&partial) {
+        Ok(recovered) => {
+            let found = Recording::read(&recovered.path).unwrap();
+            assert_eq!((&found.spec, &found.build), (&original.spec, &original.build), "{what}");
+            let ((hashes, calls), (all_hashes, all_calls)) = (content(&found), content(original));
+            assert!(all_hashes.starts_with(&hashes) && all_calls.starts_with(&calls), "{what}");
+            let lacks = hashes.len() < all_hashes.len() || calls.len() < all_calls.len();
+            assert!(recovered.left_out.is_some() || !lacks, "{what}: what is missing was not said");
+            if simulate {
+                assert_eq!(verify(&found).unwrap().outcome, Verdict::Same, "{what}");
+            }
+            fs::remove_file(recovered.path).unwrap();
+        }
+        Err(error) => {
+            let known = matches!(error, RecoverError::Nothing { .. } | RecoverError::TooLittle { .. });
+            assert!(known, "{what}: {error}");
+            assert!(!folder.join(Recorder::FILE_NAME).exists(), "{what}");
+        }
+    }
+}
+
+/// Every byte is held to something, so that no change goes unseen: there is none without meaning.
+#[test]
+fn no_flipped_byte_is_verified() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut chance = Chance(25);
+    let mut chunks = 0;
+    for path in recordings(folder.path()) {
+        let bytes = fs::read(&path).unwrap();
+        let original = Recording::read(&path).unwrap();
+        assert_eq!(original.uncovered(), [""; 0], "{}", path.display());
+        let place = tempfile::tempdir().unwrap();
+        // The beginning and the end have most kinds of bytes; a chunk is one.
+        let ends = (0..160).chain(bytes.len() - 160..bytes.len());
+        let random = (0..FLIPS / 3 - 320).map(|_| chance.below(bytes.len())).collect::<Vec<_>>();
+        for (number, flipped) in ends.chain(random).enumerate() {
+            let mut changed = bytes.clone();
+            changed[flipped] ^= 1 + chance.below(255) as u8;
+            let what = format!("byte {flipped} of {}", path.display());
+            match Recording::from_bytes(&path, changed.clone()).map(drop) {
+                Err(RecordingError::Damaged { source, .. }) => {
+                    assert!(source.offset <= flipped, "{what}: {source}");
+                    chunks += usize::from(matches!(source.part, FilePart::Chunk(_)));
+                }
+                Err(error) => panic!("{what}: {error}"),
+                Ok(()) => panic!("{what} was not missed"),
+            }
+            if number % RECOVERED == 0 {
+                let simulate = number % (RECOVERED * SIMULATED) == 0;
+                recovers_a_beginning(&changed, &original, place.path(), simulate, &what);
+            }
+        }
+    }
+    assert!(chunks > FLIPS / 3, "most bytes are in chunks, which are named: {chunks}");
+}
+
+#[test]
+fn no_cut_is_verified() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut chance = Chance(26);
+    for path in recordings(folder.path()) {
+        let bytes = fs::read(&path).unwrap();
+        let original = Recording::read(&path).unwrap();
+        let place = tempfile::tempdir().unwrap();
+        for number in 0..CUTS / 3 + 1 {
+            let left = chance.below(bytes.len());
+            let what = format!("the first {left} bytes of {}", path.display());
+            let text =
+                Recording::from_bytes(&path, bytes[..left].to_vec()).map(drop).unwrap_err().to_string();
+            assert!(text.contains("at byte") && text.contains("tandem recover"), "{what}: {text}");
+            recovers_a_beginning(&bytes[..left], &original, place.path(), number % SIMULATED == 0, &what);
+        }
+        let more = [&bytes[..], b"more"].concat();
+        let text = Recording::from_bytes(&path, more).map(drop).unwrap_err().to_string();
+        assert!(text.contains("the mark of MCAP files at byte"), "{text}");
+    }
+}
+
+/// Sizes that a file does not have are not believed, whatever checksum says so.
+#[test]
+fn a_chunk_that_says_it_is_huge_is_refused_before_it_is_decompressed() {
+    let folder = tempfile::tempdir().unwrap();
+    let [path, ..] = recordings(folder.path());
+    let bytes = fs::read(&path).unwrap();
+    let opcode = 6;
+    let size = bytes.windows(3).position(|window| window == b"lz4").unwrap() - 4 - 4 - 8;
+    let chunk = size - 8 - 8 - 9;
+    assert_eq!(bytes[chunk], opcode);
+    for (field, says) in [(size, "more than they can"), (chunk + 1, "the file ends within it")] {
+        let mut changed = bytes.clone();
+        changed[field + 6] = 0x5f;
+        let text = Recording::from_bytes(&path, changed).map(drop).unwrap_err().to_string();
+        assert!(text.contains(&format!("at byte {chunk}: ")) && text.contains(says), "{text}");
+    }
+}
+
+/// Other programs may write recordings without checksums; these are replayed, and what cannot be checked is named.
+#[test]
+fn a_recording_without_checksums_is_replayed_and_says_what_is_not_covered() {
+    let folder = tempfile::tempdir().unwrap();
+    let [path, ..] = recordings(folder.path());
+    let bytes = fs::read(&path).unwrap();
+    let copy = folder.path().join("copy.mcap");
+    let options = mcap::WriteOptions::new()
+        .calculate_chunk_crcs(false)
+        .calculate_data_section_crc(false)
+        .calculate_summary_section_crc(false)
+        .calculate_attachment_crcs(false);
+    let mut writer = options.create(fs::File::create(&copy).unwrap()).unwrap();
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        writer.write(&message.unwrap()).unwrap();
+    }
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    for index in &summary.metadata_indexes {
+        let mut record = mcap::read::metadata(&bytes, index).unwrap();
+        assert!(record.metadata.remove("crc32").is_some());
+        writer.write_metadata(&record).unwrap();
+    }
+    for index in &summary.attachment_indexes {
+        writer.attach(&mcap::read::attachment(&bytes, index).unwrap()).unwrap();
+    }
+    writer.finish().unwrap();
+    let recording = Recording::read(&copy).unwrap();
+    let uncovered = recording.uncovered().join(", ");
+    assert_eq!(
+        uncovered,
+        "header and message indexes, 1 chunks, 1 attachments, 2 metadata records, the summary"
+    );
+    assert_eq!(verify(&recording).unwrap().outcome, Verdict::Same);
+}
+
+/// What a killed process has left is a copy of the file at any moment.
+#[test]
+fn a_process_that_is_killed_loses_at_most_25_steps() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut session = Session::start(&spec("handover", 3, Protocol::Benchmark), Some(folder.path())).unwrap();
+    let copies = tempfile::tempdir().unwrap();
+    let mut made = 0;
+    for (number, steps) in [25, 25, 7, 1, 25, 24, 25, 25, 3, 25].into_iter().enumerate() {
+        made += wait(&mut session, steps).executed_steps;
+        let partial = copies.path().join(format!("{number}.mcap.partial"));
+        fs::copy(folder.path().join("episode.mcap.partial"), &partial).unwrap();
+        let recovered = recover(&partial).unwrap();
+        let kept = Recording::read(&recovered.path).unwrap().state_hashes().count() as u32 - 1;
+        assert!(kept + 25 >= made, "{kept} of {made} steps are kept");
+    }
+}
