@@ -3,8 +3,9 @@
 use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::commands::{
-    CommandResult, bench, collect, completions, demo, doctor, evaluate, locomotion, man, recover, replay,
-    report, serve, tasks,
+    CommandResult,
+    about::{completions, man, tasks},
+    bench, collect, demo, doctor, evaluate, locomotion, recover, replay, report, serve,
 };
 
 /// Physics of humanoids that must work together, behind an HTTP API.

@@ -12,6 +12,7 @@ mod checks;
 mod error;
 mod limits;
 mod list;
+mod listing;
 mod parts;
 mod refusal;
 mod schema;
@@ -25,11 +26,12 @@ pub use list::{
     ActCall, EPISODE_TOOLS, LookCall, LookReply, ManageCall, ManageReply, TalkCall, TalkReply, ToolCall,
     ToolReply, operator_tool_specs, tool_specs,
 };
+pub use listing::{EpisodeEntry, EpisodeList};
 pub use parts::{
     BASE_COLUMNS, BaseCommand, BaseLimits, BaseMotion, Budget, Bytes, CameraArrays, CommandReply,
-    DepthFormat, Disclosure, Driving, Effort, EpisodeEntry, EpisodeList, FingerReport, Formats, HandReport,
-    HandState, Heard, Hints, ImageFormat, JointValues, OperatorToken, Operators, Partner, PartnerDid,
-    PhaseReached, PixelRegion, Png, Pose, Protocol, Range, RobotFallen, RobotReport, StopReason,
+    DepthFormat, Disclosure, Driving, Effort, FingerReport, Formats, HandReport, HandState, Heard, Hints,
+    ImageFormat, JointValues, OperatorToken, Operators, Partner, PartnerDid, PhaseReached, PixelRegion, Png,
+    Pose, Protocol, Range, RobotFallen, RobotReport, StopReason,
 };
 pub use refusal::{ProblemBody, Refusal, RefusalClass};
 pub use schema::{EpisodeToolSpec, Format, ToolSpec};

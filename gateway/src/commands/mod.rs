@@ -1,20 +1,18 @@
 //! What `tandem` can do: one file or folder per subcommand, each with its flags and its `run`; what several share is in `flags`.
 
+pub mod about;
 pub mod bench;
 pub mod collect;
-pub mod completions;
 pub mod demo;
 pub mod doctor;
 pub mod evaluate;
 mod flags;
 pub mod locomotion;
 mod logging;
-pub mod man;
 pub mod recover;
 pub mod replay;
 pub mod report;
 pub mod serve;
-pub mod tasks;
 
 use std::{
     error::Error,

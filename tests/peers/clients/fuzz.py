@@ -12,6 +12,7 @@ here: that a region names at most 256 pixels.
 
 import json
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -42,45 +43,48 @@ def held(url):
 
 
 def schemathesis(url, document, folder, config, flags):
-    """Whether every check passes."""
+    """Whether every check passes, and on how many requests."""
     (folder / "openapi.json").write_text(json.dumps(document))
     (folder / "schemathesis.toml").write_text(config)
     command = ["schemathesis", "--config-file", folder / "schemathesis.toml", "run", folder / "openapi.json"]
     done = subprocess.run(command + ["--url", url, "--checks", "all"] + flags, capture_output=True, text=True)
     if done.returncode != 0:
         print(done.stdout, done.stderr)
-    return done.returncode == 0
+    cases = re.search(r"(\d+) generated", done.stdout)
+    return done.returncode == 0, int(cases[1]) if cases else 0
 
 
 def fuzz_one(url, document, operation, folder):
-    """Whether every check passes on one operation, and its commands are carried out."""
+    """Whether every check passes on one operation, and its commands are carried out; on how many requests."""
     # An episode of its own, so that one that ends is not missed by the others.
     episode = new_episode(url)
     config = f'[parameters]\n"path.episode_id" = "{episode}"\n'
     flags = ["--include-operation-id", operation, "--max-examples", str(EXAMPLES)]
-    fine = schemathesis(url, document, folder, config, flags)
+    fine, cases = schemathesis(url, document, folder, config, flags)
     entry = held(url)[episode]
     if operation in COMMANDS and entry["step"] == 0:
         print(f"{operation}: no command was carried out")
         fine = False
-    print(f"{operation:20} {'fine' if fine else 'FAILED':6} {entry['step']} steps, ended: {entry['ended']}", flush=True)
-    return fine
+    word = "fine" if fine else "FAILED"
+    print(f"{operation:20} {word:6} {cases:5} requests, {entry['step']} steps, ended: {entry['ended']}", flush=True)
+    return fine, cases
 
 
 def fuzz_together(url, document, folder):
-    """Whether every check passes on all operations together, and every shared episode is deleted by them or stands whole."""
+    """Whether every check passes on all operations together, by which episodes are deleted; on how many requests."""
     document = json.loads(json.dumps(document))
     shared = [new_episode(url) for _ in range(SHARED_EPISODES)]
     for path in document["paths"].values():
         for parameter in path.get("parameters", []):
             parameter["schema"] = {"type": "string", "enum": shared}
-    fine = schemathesis(url, document, folder, "", ["--max-examples", str(SHARED_EXAMPLES)])
+    fine, cases = schemathesis(url, document, folder, "", ["--max-examples", str(SHARED_EXAMPLES)])
     deleted = [episode for episode in shared if episode not in held(url)]
     if not deleted:
         print("no episode was deleted")
         fine = False
-    print(f"{'all, with DELETE':20} {'fine' if fine else 'FAILED':6} {len(deleted)} of {len(shared)} episodes deleted")
-    return fine
+    word = "fine" if fine else "FAILED"
+    print(f"{'all, with DELETE':20} {word:6} {cases:5} requests, {len(deleted)} of {len(shared)} episodes deleted")
+    return fine, cases
 
 
 def description(url):
@@ -107,10 +111,11 @@ def check(url, only):
     first = [operation for operation in operations if operation != DELETE and (not only or operation in only)]
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
-        fine = [fuzz_one(url, document, operation, folder) for operation in first]
+        runs = [fuzz_one(url, document, operation, folder) for operation in first]
         if not only or DELETE in only:
-            fine.append(fuzz_together(url, document, folder))
-    return all(fine)
+            runs.append(fuzz_together(url, document, folder))
+    print(f"{sum(cases for _, cases in runs)} requests")
+    return all(fine for fine, _ in runs)
 
 
 if __name__ == "__main__":

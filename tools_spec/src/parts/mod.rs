@@ -3,7 +3,6 @@
 mod command;
 mod driving;
 mod episode;
-mod listing;
 mod pictures;
 mod quantities;
 
@@ -12,6 +11,5 @@ pub use command::{
 };
 pub use driving::{Driving, Heard, OperatorToken, Operators, Partner, PartnerDid};
 pub use episode::{Budget, Disclosure, Hints, PhaseReached, Protocol, RobotFallen};
-pub use listing::{EpisodeEntry, EpisodeList};
 pub use pictures::{Bytes, CameraArrays, DepthFormat, Formats, ImageFormat, PixelRegion, Png};
 pub use quantities::{BASE_COLUMNS, BaseCommand, BaseLimits, JointValues, Pose, Range};

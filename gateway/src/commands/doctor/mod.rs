@@ -56,6 +56,7 @@ fn told(findings: &Findings) -> String {
             Finding::Note(text) => ("note", text),
             Finding::Wrong(text) => ("WRONG", text),
         };
+        let text = text.trim_end().replace('\n', &format!("\n{:21}", ""));
         // Writing to a text cannot fail.
         let _ = writeln!(lines, "{what:14}{word:7}{text}");
         lines
@@ -73,8 +74,9 @@ fn examine(args: ServeArgs, token: Result<Option<Token>, String>) -> Findings {
                 layer
             }
             Err(error) => {
-                let text = format!("{error}; what follows is of flags, environment and defaults alone");
-                findings.push(("config", Finding::Wrong(text)));
+                findings.push(("config", Finding::Wrong(error.to_string())));
+                let text = "what follows is of flags, environment and defaults alone";
+                findings.push(("config", Finding::Note(text.into())));
                 args.flags
             }
         },

@@ -1,3 +1,5 @@
+//! Settings that would not work are found, and what would work is said.
+
 use std::{fs, net::TcpListener, path::Path};
 
 use clap::Parser;
@@ -5,14 +7,14 @@ use clap::Parser;
 use super::*;
 
 #[derive(Debug, Parser)]
-struct Line {
+struct DoctorLine {
     #[command(flatten)]
     args: DoctorArgs,
 }
 
 /// What is found with these flags, of the things called `what`.
 fn found(flags: &[&str], what: &str) -> Vec<Finding> {
-    let line = Line::try_parse_from([&["doctor"], flags].concat()).unwrap();
+    let line = DoctorLine::try_parse_from([&["doctor"], flags].concat()).unwrap();
     let findings = examine(line.args.serve, Ok(None)).into_iter();
     findings.filter(|(about, _)| *about == what).map(|(_, finding)| finding).collect()
 }
@@ -75,9 +77,21 @@ fn the_file_of_settings_and_all_that_it_names_are_tried() {
     assert!(matches!(found(&flags, "config")[..], [Finding::Works(_)]));
 
     let wrong = write("wrong.toml", "max_episode = 3\n");
-    expect_wrong(&found(&["--config", &wrong], "config"), &["`max_episodes`", "alone"]);
+    expect_wrong(&found(&["--config", &wrong], "config"), &["`max_episodes`"]);
     expect_wrong(&found(&["--config", "/nowhere.toml"], "config"), &["/nowhere.toml"]);
     assert!(matches!(found(&["--config", &wrong], "cores")[..], [_]), "the rest is tried all the same");
+}
+
+#[test]
+fn what_is_told_of_several_lines_stands_under_its_first() {
+    let findings = vec![
+        ("config", Finding::Wrong("no TOML\n  |\n1 | x\n".into())),
+        ("cores", Finding::Works("2".into())),
+    ];
+    let space = " ".repeat(21);
+    let expected =
+        format!("config        WRONG  no TOML\n{space}  |\n{space}1 | x\ncores         ok     2\n");
+    assert_eq!(told(&findings), expected);
 }
 
 #[test]

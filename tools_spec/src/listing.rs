@@ -3,8 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::driving::Operators;
-use super::episode::Protocol;
+use crate::parts::{Operators, Protocol};
 use crate::tools::EndReason;
 
 /// The episodes that the caller may know of, by id: for who started them all that the server holds, for the operator of a robot

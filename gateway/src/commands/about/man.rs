@@ -5,7 +5,7 @@ use std::{fs, path::PathBuf, process::ExitCode};
 use clap::Command;
 use clap_mangen::Man;
 
-use super::{CommandResult, print};
+use crate::commands::{CommandResult, print};
 
 /// Print the manual page, or write one for each subcommand into a folder.
 #[derive(Debug, clap::Args)]

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap_complete::Shell;
 
-use super::{CommandResult, print};
+use crate::commands::{CommandResult, print};
 
 /// Print what a shell has to know to complete the command line.
 #[derive(Debug, clap::Args)]

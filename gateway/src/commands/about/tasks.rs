@@ -5,7 +5,7 @@ use std::{fmt::Write, process::ExitCode};
 use tandem_episodes::LocomotionChoice;
 use tandem_tools_spec::TaskList;
 
-use super::{CommandResult, print};
+use crate::commands::{CommandResult, print};
 
 /// List the tasks and their phases.
 #[derive(Debug, clap::Args)]
