@@ -156,6 +156,7 @@ fn reason_text(reason: EndReason) -> &'static str {
         EndReason::WallClockExhausted => "the policy's wall clock ran out",
         EndReason::Finished => "it was finished",
         EndReason::Abandoned => "no call came for too long",
+        EndReason::PolicyFailed => "its policy failed",
         EndReason::SimulatorFailed => "the simulator failed",
     }
 }

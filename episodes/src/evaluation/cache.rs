@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use tandem_tools_spec::{EndReason, ResultReply};
+
 use super::{EvaluationError, EvaluationPlan};
 use crate::output::write_whole;
 use crate::players::{EpisodeOutput, PlayError, PlayOutcome};
@@ -11,7 +13,8 @@ use crate::{CheckpointError, EpisodeError};
 
 /// What became of an episode of the plan.
 pub enum PlannedOutcome {
-    /// Boxed, because the other is small.
+    /// An earlier run has played it. Boxed, because the last is small.
+    Kept(Box<PlayedEpisode>),
     Played(Box<PlayedEpisode>),
     /// It could not be begun, and why.
     LeftOut(String),
@@ -28,7 +31,7 @@ pub struct EpisodeCache<'a> {
 impl EpisodeCache<'_> {
     pub fn load_or_play(&self, spec: &EpisodeSpec) -> Result<PlannedOutcome, EvaluationError> {
         if let Some(cached) = self.load(spec) {
-            return Ok(PlannedOutcome::Played(Box::new(cached)));
+            return self.keep(spec, cached).map(|kept| PlannedOutcome::Kept(Box::new(kept)));
         }
         let folder = self.folder.join(name(spec));
         match self.plan.player.play_episode(spec, EpisodeOutput { folder: &folder, record: self.plan.record })
@@ -39,11 +42,14 @@ impl EpisodeCache<'_> {
             }
             Err(PlayError::NotReady(reason)) => Ok(PlannedOutcome::LeftOut(reason)),
             Err(PlayError::Episode(error)) => Err(error.into()),
+            Err(PlayError::Absent(reason)) => {
+                Err(EvaluationError::PolicyAbsent { reason, kept: 0, planned: 0 })
+            }
             Err(PlayError::Lost(reason)) => Err(unrecorded(spec, reason)),
         }
     }
 
-    /// An earlier run's episode, if it is this one: a file that is torn, renamed or from other rules counts as missing.
+    /// An earlier run's episode, if it is this one and counts: a file that is torn, renamed or from other rules counts as missing.
     pub fn load(&self, spec: &EpisodeSpec) -> Option<PlayedEpisode> {
         let bytes = std::fs::read(self.folder.join(format!("{}.json", name(spec)))).ok()?;
         let cached: PlayedEpisode = serde_json::from_slice(&bytes).ok()?;
@@ -52,7 +58,21 @@ impl EpisodeCache<'_> {
             && cached.spec == *spec
             && (cached.result.task.as_str(), cached.result.seed) == (spec.task.id, spec.seed)
             && self.recording(spec).is_none_or(|folder| folder.join(RESULT_FILE).exists());
-        same.then_some(cached)
+        let cached = PlayedEpisode { keep_failed: self.keeps_failure(&cached.result), ..cached };
+        (same && cached.counts()).then_some(cached)
+    }
+
+    /// Whether a result is of a policy that failed itself, which counts here.
+    fn keeps_failure(&self, result: &ResultReply) -> bool {
+        self.plan.keep_failed && result.ended == EndReason::PolicyFailed
+    }
+
+    /// Has the file of a kept episode say how it counts now.
+    fn keep(&self, spec: &EpisodeSpec, kept: PlayedEpisode) -> Result<PlayedEpisode, EvaluationError> {
+        match kept.keep_failed {
+            true => self.write(spec, kept),
+            false => Ok(kept),
+        }
     }
 
     /// Where the episode is recorded, if it is. Its `result.json` is written last.
@@ -76,8 +96,13 @@ impl EpisodeCache<'_> {
                 .filter(|_| result.simulator_failure.is_none())
                 .or_else(|| episode_note(&result, spec.start_phase())),
             thought_s: thought.as_secs_f64(),
+            keep_failed: self.keeps_failure(&result),
             result,
         };
+        self.write(spec, played)
+    }
+
+    fn write(&self, spec: &EpisodeSpec, played: PlayedEpisode) -> Result<PlayedEpisode, EvaluationError> {
         let text = serde_json::to_string_pretty(&played)?;
         write_whole(&self.folder.join(format!("{}.json", name(spec))), text.as_bytes())?;
         Ok(played)

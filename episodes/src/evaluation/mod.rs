@@ -30,14 +30,44 @@ pub enum EvaluationError {
     Recording { task: &'static str, seed: u32, reason: String },
     #[error("an episode cannot be written as JSON: {0}")]
     Json(#[from] serde_json::Error),
+    #[error(
+        "{reason}, and run the same command again: of {planned} episodes {kept} are played and kept, and it goes on with the others"
+    )]
+    PolicyAbsent { reason: String, kept: usize, planned: usize },
+}
+
+impl EvaluationError {
+    /// The error as it is told when of so many `planned` episodes the next run finds `kept`.
+    fn after(self, kept: usize, planned: usize) -> EvaluationError {
+        match self {
+            EvaluationError::PolicyAbsent { reason, .. } => {
+                EvaluationError::PolicyAbsent { reason, kept, planned }
+            }
+            EvaluationError::Episode(_)
+            | EvaluationError::Output(_)
+            | EvaluationError::Io { .. }
+            | EvaluationError::Recording { .. }
+            | EvaluationError::Json(_) => self,
+        }
+    }
+}
+
+/// What became of one episode of the plan.
+#[derive(Clone, Copy, Debug)]
+pub enum EpisodeEvent<'a> {
+    /// An earlier run has played it.
+    Kept(&'a PlayedEpisode),
+    Played(&'a PlayedEpisode),
+    /// It could not be begun.
+    LeftOut,
 }
 
 /// Plays what `folder` does not hold yet of the plan's share, writes `results.json` there, and calls `progress` after each
-/// episode.
+/// episode of it.
 pub fn evaluate(
     plan: &EvaluationPlan,
     folder: &Path,
-    progress: &(dyn Fn(&PlayedEpisode) + Sync),
+    progress: &(dyn Fn(EpisodeEvent) + Sync),
 ) -> Result<Evaluation, EvaluationError> {
     let cached = folder.join(EPISODES);
     create_private_folder(&cached).map_err(|source| EvaluationError::Io { path: cached.clone(), source })?;

@@ -34,6 +34,8 @@ pub struct EvaluationPlan<'a> {
     pub jobs: usize,
     /// Record every episode in a folder of its own (`episode.mcap`, `strip.png`, `report.html`).
     pub record: bool,
+    /// Count episodes in which the policy itself failed as failures, and keep them. They are played again otherwise.
+    pub keep_failed: bool,
 }
 
 /// Where the episodes begin.

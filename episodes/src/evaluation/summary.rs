@@ -6,17 +6,22 @@ use serde::Serialize;
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
 use super::cache::EpisodeCache;
-use crate::results::{PhaseLevel, PlayedEpisode, PolicyCard};
+use crate::results::{Exclusion, PhaseLevel, PlayedEpisode, PolicyCard};
 
 /// How a task went over its seeds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TaskSummary {
+    /// Those that count: what follows is of them.
     pub episodes: usize,
     pub p1: usize,
     pub p2: usize,
     pub p3: usize,
     pub falls: u32,
     pub mean_env_steps: f64,
+    /// Those that do not count, because the policy itself failed.
+    pub policy_failed: usize,
+    /// Those that do not count, because the simulator failed.
+    pub simulator_failed: usize,
 }
 
 /// The content of `results.json`.
@@ -44,16 +49,23 @@ pub fn summarise(cache: &EpisodeCache, episodes: Vec<PlayedEpisode>, left_out: V
     let mut tasks: BTreeMap<String, TaskSummary> = BTreeMap::new();
     for episode in episodes.iter().filter(|played| played.start_phase().is_none()) {
         let task = tasks.entry(episode.result.task.clone()).or_default();
-        let reached = |phase: &str| usize::from(episode.result.phases.reached_s(phase).is_some());
-        task.episodes += 1;
-        task.p1 += reached("p1");
-        task.p2 += reached("p2");
-        task.p3 += reached("p3");
+        match episode.exclusion() {
+            Some(Exclusion::PolicyFailed) => task.policy_failed += 1,
+            Some(Exclusion::SimulatorFailed) => task.simulator_failed += 1,
+            None => task.episodes += 1,
+        }
+        if !episode.counts() {
+            continue;
+        }
+        let reached = |phase: usize| usize::from(episode.reached(phase));
+        task.p1 += reached(0);
+        task.p2 += reached(1);
+        task.p3 += reached(2);
         task.falls += episode.result.falls;
         task.mean_env_steps += f64::from(episode.result.env_steps);
     }
     for task in tasks.values_mut() {
-        task.mean_env_steps /= task.episodes as f64;
+        task.mean_env_steps /= task.episodes.max(1) as f64;
     }
     Evaluation {
         policy: cache.plan.player.card(),

@@ -39,6 +39,7 @@ fn played(cache: &EpisodeCache, spec: &EpisodeSpec) -> PlayedEpisode {
         result: result(spec.task.id, spec.seed, vec![("p1".into(), Some(4.2))]),
         thought_s: 1.5,
         note: None,
+        keep_failed: false,
     }
 }
 
@@ -83,6 +84,7 @@ fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> EvaluationPlan<'static> {
         shard: Shard::WHOLE,
         jobs: 1,
         record: false,
+        keep_failed: false,
     }
 }
 
@@ -203,4 +205,54 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
     std::fs::create_dir(folder.path().join("pouring-7")).unwrap();
     write_result(&same.result, &folder.path().join("pouring-7")).unwrap();
     assert_eq!(collector.load(&spec), Some(same));
+}
+
+/// What an episode came to whose policy, or whose simulator, failed after it had reached `reached` phases of three.
+fn failed(cache: &EpisodeCache, spec: &EpisodeSpec, ended: EndReason, reached: usize) -> PlayedEpisode {
+    let times = (0..3).map(|index| (Phase::number(index), (index < reached).then_some(4.2)));
+    let result = ResultReply { ended, ..result(spec.task.id, spec.seed, times.collect()) };
+    PlayedEpisode { result, ..played(cache, spec) }
+}
+
+#[test]
+fn what_failed_itself_is_counted_apart_and_played_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let handover = tasks::find("handover").unwrap();
+    let plan = plan(vec![handover], vec![1, 2, 3, 4, 5]);
+    let build = fingerprint::build().unwrap();
+    let cache = EpisodeCache { plan: &plan, folder: folder.path(), locomotion: "balance".into(), build };
+    let keeping_plan = EvaluationPlan { keep_failed: true, ..plan.clone() };
+    let keeping = EpisodeCache { plan: &keeping_plan, locomotion: "balance".into(), ..cache };
+    let spec = |seed: u32| plan.spec(handover, seed, Start::Task);
+    let outcomes = [
+        (EndReason::Finished, 2),
+        (EndReason::PolicyFailed, 2),
+        (EndReason::SimulatorFailed, 1),
+        // What was reached before it failed was reached.
+        (EndReason::PolicyFailed, 3),
+        (EndReason::Abandoned, 0),
+    ];
+    let episodes: Vec<PlayedEpisode> = (1..)
+        .zip(outcomes)
+        .map(|(seed, (ended, reached))| failed(&cache, &spec(seed), ended, reached))
+        .collect();
+    for episode in &episodes {
+        let path = folder.path().join(format!("handover-{}.json", episode.spec.seed));
+        std::fs::write(path, serde_json::to_string(episode).unwrap()).unwrap();
+    }
+    let kept = |cache: &EpisodeCache| -> Vec<u32> {
+        (1..=5).filter(|seed| cache.load(&spec(*seed)).is_some()).collect()
+    };
+    assert_eq!((kept(&cache), kept(&keeping)), (vec![1, 4, 5], vec![1, 2, 4, 5]));
+
+    let summary = summary::summarise(&cache, episodes.clone(), Vec::new()).tasks["handover"].clone();
+    assert_eq!((summary.episodes, summary.policy_failed, summary.simulator_failed), (3, 1, 1));
+    assert_eq!((summary.p1, summary.p2, summary.p3, summary.mean_env_steps), (2, 2, 1, 812.0));
+    let counted: Vec<PlayedEpisode> = (1..=5)
+        .map(|seed| keeping.load(&spec(seed)).unwrap_or_else(|| episodes[seed as usize - 1].clone()))
+        .collect();
+    let summary = summary::summarise(&keeping, counted, Vec::new()).tasks["handover"].clone();
+    assert_eq!((summary.episodes, summary.policy_failed, summary.simulator_failed), (4, 0, 1));
+    let nothing = summary::summarise(&cache, vec![episodes[1].clone()], Vec::new()).tasks["handover"].clone();
+    assert_eq!((nothing.episodes, nothing.policy_failed, nothing.mean_env_steps), (0, 1, 0.0));
 }

@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, mpsc};
 
-use super::EvaluationError;
 use super::cache::{EpisodeCache, PlannedOutcome};
+use super::{EpisodeEvent, EvaluationError};
 use crate::results::PlayedEpisode;
 use crate::spec::EpisodeSpec;
 
@@ -13,7 +13,7 @@ pub fn play_all(
     cache: &EpisodeCache,
     work: &[EpisodeSpec],
     left_out: &mut Vec<String>,
-    progress: &(dyn Fn(&PlayedEpisode) + Sync),
+    progress: &(dyn Fn(EpisodeEvent) + Sync),
 ) -> Result<Vec<PlayedEpisode>, EvaluationError> {
     let next = AtomicUsize::new(0);
     let failure = Mutex::new(None);
@@ -41,16 +41,17 @@ pub fn play_all(
             });
         }
         drop(done);
-        played.iter().inspect(|(_, outcome)| report_progress(outcome, progress)).collect()
+        played.iter().inspect(|(_, outcome)| progress(outcome.into())).collect()
     });
     if let Some(error) = failure.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()) {
-        return Err(error);
+        let kept = outcomes.iter().filter(|(_, outcome)| outcome.counts()).count();
+        return Err(error.after(kept, work.len()));
     }
     outcomes.sort_by_key(|(number, _)| *number);
     let mut episodes = Vec::with_capacity(outcomes.len());
     for (number, outcome) in outcomes {
         match outcome {
-            PlannedOutcome::Played(played) => episodes.push(*played),
+            PlannedOutcome::Kept(played) | PlannedOutcome::Played(played) => episodes.push(*played),
             PlannedOutcome::LeftOut(reason) => {
                 let EpisodeSpec { task, seed, .. } = &work[number];
                 left_out.push(format!("{} seed {seed}: {reason}", task.id));
@@ -60,9 +61,22 @@ pub fn play_all(
     Ok(episodes)
 }
 
-fn report_progress(outcome: &PlannedOutcome, progress: &(dyn Fn(&PlayedEpisode) + Sync)) {
-    match outcome {
-        PlannedOutcome::Played(played) => progress(played),
-        PlannedOutcome::LeftOut(_) => {}
+impl PlannedOutcome {
+    /// Whether the next run need not play the episode.
+    fn counts(&self) -> bool {
+        match self {
+            PlannedOutcome::Kept(played) | PlannedOutcome::Played(played) => played.counts(),
+            PlannedOutcome::LeftOut(_) => false,
+        }
+    }
+}
+
+impl<'a> From<&'a PlannedOutcome> for EpisodeEvent<'a> {
+    fn from(outcome: &'a PlannedOutcome) -> EpisodeEvent<'a> {
+        match outcome {
+            PlannedOutcome::Kept(kept) => EpisodeEvent::Kept(kept),
+            PlannedOutcome::Played(played) => EpisodeEvent::Played(played),
+            PlannedOutcome::LeftOut(_) => EpisodeEvent::LeftOut,
+        }
     }
 }

@@ -16,7 +16,7 @@ use crate::scoring::Facts;
 use crate::spec::EpisodeSpec;
 
 pub use in_process::InProcess;
-pub use policy::{EpisodeOutput, PlayError, PlayOutcome, Policy, play_in_process};
+pub use policy::{EpisodeOutput, PlayError, PlayOutcome, Policy, PolicyWait, play_in_process};
 
 /// One episode, in this process or behind HTTP, as a player acts on it: by tool calls.
 pub trait Episode {
@@ -60,6 +60,9 @@ pub enum PlayerError {
     Call { tool: &'static str, reason: String },
     #[error("{0}")]
     GaveUp(String),
+    /// The policy itself failed, as one whose server is gone: what it would have done nobody knows.
+    #[error("{0}")]
+    Failed(String),
 }
 
 /// A player by name.

@@ -1,10 +1,10 @@
 //! Whoever plays the episodes of an evaluation: a player of [`super::ALL`], or a policy that lives elsewhere.
 
-use std::fmt::Debug;
+use std::fmt::{self, Debug};
 use std::path::Path;
 use std::time::Duration;
 
-use tandem_tools_spec::ResultReply;
+use tandem_tools_spec::{EndReason, ResultReply};
 
 use super::{InProcess, PlayerEntry, PlayerError};
 use crate::results::PolicyCard;
@@ -18,6 +18,25 @@ pub trait Policy: Debug + Send + Sync {
 
     /// Plays `spec` from its start to its result.
     fn play_episode(&self, spec: &EpisodeSpec, output: EpisodeOutput) -> Result<PlayOutcome, PlayError>;
+
+    /// What it waits for at present, before an episode can begin.
+    fn waiting(&self) -> Option<PolicyWait> {
+        None
+    }
+}
+
+/// What a policy waits for, and how long it has.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PolicyWait {
+    /// As the addresses of its servers.
+    pub target: String,
+    pub lasted: Duration,
+}
+
+impl fmt::Display for PolicyWait {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "waiting for {}, {} s", self.target, self.lasted.as_secs())
+    }
 }
 
 /// Where an episode leaves its files.
@@ -51,9 +70,12 @@ pub struct PlayOutcome {
 pub enum PlayError {
     #[error(transparent)]
     Episode(#[from] EpisodeError),
-    /// The policy was not ready, and the episode has not begun; another time it may be.
+    /// The policy was not ready, and nothing was played; another time it may be.
     #[error("{0}")]
     NotReady(String),
+    /// Nobody is there who could play this episode, or any other.
+    #[error("{0}")]
+    Absent(String),
     /// The episode was played, and what came of it is lost.
     #[error("{0}")]
     Lost(String),
@@ -87,7 +109,12 @@ pub fn play_in_process(
     };
     let stopped = match acted {
         Ok(()) | Err(PlayerError::EpisodeOver) => None,
-        Err(error) => Some(error.to_string()),
+        Err(error) => {
+            if let PlayerError::Failed(_) = error {
+                episode.session.end(EndReason::PolicyFailed);
+            }
+            Some(error.to_string())
+        }
     };
     let thought = episode.session.thought();
     Ok(PlayOutcome { result: episode.session.close(), thought, stopped })

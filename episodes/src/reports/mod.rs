@@ -4,8 +4,8 @@ pub(crate) mod episode;
 mod evaluation;
 
 pub use evaluation::{
-    ByCollaboration, Comparison, EpisodeCosts, EvaluationReport, Failure, FailureReason, Film, FilmContent,
-    FilmPlace, FilmedEpisode, FoundEpisode, LoadError, LoadedEpisodes, MeanRate, PairedRow, PhaseReport,
-    PolicyReport, PublishedAverages, PublishedRates, Rate, ReportFormat, ReportPictures, TaskAverage,
-    TaskReport, ValueRange, film_places, gallery, load,
+    ByCollaboration, Comparison, EpisodeCosts, EvaluationReport, ExcludedEpisodes, Failure, FailureReason,
+    Film, FilmContent, FilmPlace, FilmedEpisode, FoundEpisode, LoadError, LoadedEpisodes, MeanRate,
+    PairedRow, PhaseReport, PolicyReport, PublishedAverages, PublishedRates, Rate, ReportFormat,
+    ReportPictures, TaskAverage, TaskReport, ValueRange, film_places, gallery, load,
 };

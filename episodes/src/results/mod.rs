@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use tandem_tools_spec::ResultReply;
+use tandem_tools_spec::{EndReason, ResultReply};
 
 pub use phase_level::{PhaseLevel, PhaseRate};
 
 use crate::output::{OutputError, write_whole};
+use crate::scoring::Phase;
 use crate::spec::EpisodeSpec;
 
 /// The result's name in a run folder.
@@ -46,12 +47,63 @@ pub struct PlayedEpisode {
     pub thought_s: f64,
     /// Why the episode fell short: what stopped the policy, or the first phase that was missed.
     pub note: Option<String>,
+    /// Whether it counts as a failure of the policy that the policy itself failed, as whoever evaluated it wished.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub keep_failed: bool,
+}
+
+/// Why an episode says nothing of how far its policy gets. It is listed apart from failures, and played again by the next run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Exclusion {
+    PolicyFailed,
+    SimulatorFailed,
+}
+
+impl Exclusion {
+    /// As tables have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Exclusion::PolicyFailed => "policy failed",
+            Exclusion::SimulatorFailed => "simulator failed",
+        }
+    }
 }
 
 impl PlayedEpisode {
     /// Index of the phase that it began at and that alone counts; `None` where it began at the task's beginning.
     pub fn start_phase(&self) -> Option<usize> {
         self.spec.start_phase()
+    }
+
+    /// Whether phase number `phase`, from 0, was reached.
+    pub fn reached(&self, phase: usize) -> bool {
+        self.result.phases.reached_s(&Phase::number(phase)).is_some()
+    }
+
+    /// Whether the phase that counts was reached: the one that the episode began at, or the last.
+    pub fn succeeded(&self) -> bool {
+        self.reached(self.start_phase().unwrap_or(self.spec.task.phases.len() - 1))
+    }
+
+    /// Why the episode does not count, if it does not. What was reached before something failed stays reached.
+    pub fn exclusion(&self) -> Option<Exclusion> {
+        let failed = match self.result.ended {
+            EndReason::PolicyFailed if self.keep_failed => None,
+            EndReason::PolicyFailed => Some(Exclusion::PolicyFailed),
+            EndReason::SimulatorFailed => Some(Exclusion::SimulatorFailed),
+            EndReason::TaskComplete
+            | EndReason::StepBudgetExhausted
+            | EndReason::WallClockExhausted
+            | EndReason::Finished
+            | EndReason::Abandoned => None,
+        };
+        failed.filter(|_| !self.succeeded())
+    }
+
+    /// Whether the episode counts in rates and averages.
+    pub fn counts(&self) -> bool {
+        self.exclusion().is_none()
     }
 }
 

@@ -161,6 +161,11 @@ impl Session {
         } else {
             return;
         };
+        self.end(reason);
+    }
+
+    /// Ends the episode for a reason that lies outside it, unless it has ended before, and closes its files.
+    pub fn end(&mut self, reason: EndReason) {
         self.ended.get_or_insert(reason);
         self.settle();
     }
@@ -338,8 +343,7 @@ impl Session {
     }
 
     fn close_as(mut self, reason: EndReason) -> ResultReply {
-        self.ended.get_or_insert(reason);
-        self.settle();
+        self.end(reason);
         self.result()
     }
 }

@@ -57,6 +57,9 @@ enum Job {
     EndIfAbandoned {
         idle: Duration,
     },
+    End {
+        reason: EndReason,
+    },
     Close {
         reply: ReplySender<ResultReply>,
     },
@@ -217,6 +220,13 @@ impl EpisodeThread {
         }
     }
 
+    /// Ends the episode for a reason that lies outside it, after the calls already waiting, unless it has ended by then. Not for
+    /// threads that run futures: it waits for a place among the jobs.
+    pub fn end_blocking(&self, reason: EndReason) {
+        // An episode that has stopped meanwhile has ended.
+        let _ = self.jobs.blocking_send(Job::End { reason });
+    }
+
     /// Ends the episode after the calls already waiting, closes its recording and returns the result.
     pub async fn close(&self) -> Result<ResultReply, HostingError> {
         self.do_job_in_turn(|reply| Job::Close { reply }).await
@@ -341,6 +351,11 @@ fn serve(mut session: PanicGuard, mut inbox: mpsc::Receiver<Job>, status: &Share
                 if session.ended().is_some() {
                     tracing::info!("abandoned, and ended");
                 }
+            }
+            Job::End { reason } => {
+                // The log has the reason of a refusal.
+                let _ = session.run(|session| session.end(reason));
+                status.update(&session);
             }
             Job::Close { reply } => return Closed(Some((reply, session.close()))),
         }

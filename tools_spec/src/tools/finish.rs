@@ -38,6 +38,8 @@ pub enum EndReason {
     Finished,
     /// No call came for so long that the server took the policy for gone.
     Abandoned,
+    /// The policy itself failed: its program or its server crashed, or was gone. Only `tandem evaluate` ends episodes so.
+    PolicyFailed,
     /// The simulator itself failed; the recording holds what went before.
     SimulatorFailed,
 }

@@ -84,6 +84,7 @@ impl EpisodePage<'_> {
             EndReason::WallClockExhausted => "The policy's time ran out.",
             EndReason::Finished => "The policy ended the episode.",
             EndReason::Abandoned => "The policy went away.",
+            EndReason::PolicyFailed => "The policy itself failed.",
             EndReason::SimulatorFailed => "The simulator failed.",
         };
         format!(r#"<span class="{class}">{reached} of {phases} phases reached.</span> {why}"#)

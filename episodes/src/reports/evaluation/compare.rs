@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::policy::{PolicyGroup, reached};
+use super::policy::PolicyGroup;
 use crate::results::PlayedEpisode;
 use crate::scoring::Phase;
 use crate::statistics::{Pairs, mcnemar, newcombe};
@@ -78,7 +78,7 @@ fn row(
     let mut pairs = Pairs::default();
     let counts = |played: &PlayedEpisode| played.start_phase().is_none_or(|only| only == phase);
     for (one, other) in shared.iter().filter(|(one, _)| counts(one)) {
-        match (reached(one, phase), reached(other, phase)) {
+        match (one.reached(phase), other.reached(phase)) {
             (true, true) => pairs.both += 1,
             (true, false) => pairs.first_only += 1,
             (false, true) => pairs.second_only += 1,

@@ -106,6 +106,7 @@ fn recorded(path: &Path, policy: &str) -> Result<PlayedEpisode, String> {
         build: recording.build.clone(),
         note: episode_note(&result, None),
         thought_s: calls.last().map_or(0.0, |call| call.thought.as_secs_f64()),
+        keep_failed: false,
         result,
     })
 }

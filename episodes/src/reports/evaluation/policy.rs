@@ -1,6 +1,6 @@
 //! How far one policy got: rates of phases, averages, effort, and why episodes failed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 use serde_json::Value;
@@ -9,7 +9,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use super::load::FoundEpisode;
 use super::rate::{MeanRate, Rate};
-use crate::results::{PhaseLevel, PlayedEpisode, PolicyCard, missed_phase_note};
+use crate::results::{Exclusion, PhaseLevel, PlayedEpisode, PolicyCard, missed_phase_note};
 use crate::scoring::Phase;
 use crate::statistics::Count;
 use crate::tasks::{self, Task};
@@ -17,7 +17,10 @@ use crate::tasks::{self, Task};
 /// One policy, under one set of rules and on one build.
 pub struct PolicyGroup<'a> {
     pub name: String,
+    /// Those that count.
     pub episodes: Vec<&'a FoundEpisode>,
+    /// Those that do not, and that have not been played again.
+    pub excluded: Vec<&'a PlayedEpisode>,
 }
 
 /// How far its episodes got, and at what cost.
@@ -30,6 +33,7 @@ pub struct PolicyReport {
     pub protocol: &'static str,
     pub locomotion: String,
     pub build: String,
+    /// Those that count: what is not said of the excluded ones is of these.
     pub episodes: usize,
     pub falls: u32,
     /// The tasks that were played, in the order of the list of tasks.
@@ -40,6 +44,8 @@ pub struct PolicyReport {
     /// Every phase on its own, where episodes began at phases.
     pub phase_level: Option<PhaseLevel>,
     pub reasons: Vec<FailureReason>,
+    /// Episodes that say nothing of how far the policy gets.
+    pub excluded: Vec<ExcludedEpisodes>,
 }
 
 /// One task.
@@ -111,6 +117,15 @@ pub struct FailureReason {
     pub seeds: Vec<u32>,
 }
 
+/// Episodes that do not count, for one reason.
+#[derive(Debug, Serialize)]
+pub struct ExcludedEpisodes {
+    pub task: &'static str,
+    pub what: Exclusion,
+    pub why: String,
+    pub seeds: Vec<u32>,
+}
+
 /// Policies in the order in which they were found, with names that tell them apart.
 pub fn groups(episodes: &[FoundEpisode]) -> Vec<PolicyGroup<'_>> {
     let mut groups: Vec<(Vec<String>, Vec<&FoundEpisode>)> = Vec::new();
@@ -131,7 +146,17 @@ pub fn groups(episodes: &[FoundEpisode]) -> Vec<PolicyGroup<'_>> {
             false => format!("{} ({})", key[0], parts.join(", ")),
         }
     };
-    groups.into_iter().map(|(key, episodes)| PolicyGroup { name: name(&key), episodes }).collect()
+    groups.into_iter().map(|(key, episodes)| PolicyGroup::new(name(&key), episodes)).collect()
+}
+
+impl<'a> PolicyGroup<'a> {
+    fn new(name: String, found: Vec<&'a FoundEpisode>) -> PolicyGroup<'a> {
+        let (episodes, excluded): (Vec<_>, Vec<_>) = found.into_iter().partition(|one| one.played.counts());
+        let key = |played: &PlayedEpisode| (played.spec.task.id, played.spec.seed, played.start_phase());
+        let again: BTreeSet<_> = episodes.iter().map(|one| key(&one.played)).collect();
+        let excluded = excluded.into_iter().map(|one| &one.played);
+        PolicyGroup { name, excluded: excluded.filter(|one| !again.contains(&key(one))).collect(), episodes }
+    }
 }
 
 /// What has to agree for episodes to be of one policy: its name first, then all that may tell namesakes apart.
@@ -167,25 +192,15 @@ fn settings_of(card: &PolicyCard) -> String {
     format!("settings {:06x}", xxh3_64(text.as_bytes()) & 0xff_ffff)
 }
 
-/// Whether phase number `phase` was reached.
-pub fn reached(played: &PlayedEpisode, phase: usize) -> bool {
-    played.result.phases.reached_s(&Phase::number(phase)).is_some()
-}
-
-/// Whether the phase that counts was reached: the one that the episode began at, or the last.
-pub fn succeeded(played: &PlayedEpisode) -> bool {
-    reached(played, played.start_phase().unwrap_or(played.spec.task.phases.len() - 1))
-}
-
 fn count<'a>(episodes: impl Iterator<Item = &'a PlayedEpisode>, phase: usize) -> Count {
-    let reached: Vec<bool> = episodes.map(|played| reached(played, phase)).collect();
+    let reached: Vec<bool> = episodes.map(|played| played.reached(phase)).collect();
     Count { successes: reached.iter().filter(|reached| **reached).count(), trials: reached.len() }
 }
 
 impl PolicyReport {
     pub fn of(group: &PolicyGroup) -> PolicyReport {
         let played: Vec<&PlayedEpisode> = group.episodes.iter().map(|found| &found.played).collect();
-        let first = played.first();
+        let first = played.first().or(group.excluded.first());
         let of_tasks = tasks::ALL.iter().map(|task| TaskReport::of(task, &played));
         let tasks: Vec<TaskReport> = of_tasks.flatten().collect();
         PolicyReport {
@@ -203,6 +218,7 @@ impl PolicyReport {
             },
             phase_level: PhaseLevel::of(played.iter().copied()),
             reasons: reasons(&played),
+            excluded: excluded(&group.excluded),
             tasks,
         }
     }
@@ -216,7 +232,7 @@ impl TaskReport {
         let whole: Vec<&PlayedEpisode> =
             of_task.iter().copied().filter(|one| one.start_phase().is_none()).collect();
         let phase = |(index, phase): (usize, &'static Phase)| {
-            let before = whole.iter().filter(|one| index == 0 || reached(one, index - 1)).copied();
+            let before = whole.iter().filter(|one| index == 0 || one.reached(index - 1)).copied();
             let from_it = of_task.iter().filter(|one| one.start_phase() == Some(index)).copied();
             PhaseReport {
                 id: phase.id,
@@ -288,7 +304,7 @@ fn conditional(tasks: &[TaskReport], together: bool) -> Option<MeanRate> {
 
 fn reasons(episodes: &[&PlayedEpisode]) -> Vec<FailureReason> {
     let mut reasons: Vec<FailureReason> = Vec::new();
-    for played in episodes.iter().filter(|played| !succeeded(played)) {
+    for played in episodes.iter().filter(|played| !played.succeeded()) {
         let (phase, why) = (first_missed_phase(played), failure_cause(played));
         let same = |known: &&mut FailureReason| {
             (known.task, &known.phase, &known.why) == (played.spec.task.id, &phase, &why)
@@ -308,11 +324,25 @@ fn reasons(episodes: &[&PlayedEpisode]) -> Vec<FailureReason> {
     reasons
 }
 
+fn excluded(episodes: &[&PlayedEpisode]) -> Vec<ExcludedEpisodes> {
+    let mut listed: Vec<ExcludedEpisodes> = Vec::new();
+    for (played, what) in episodes.iter().filter_map(|played| Some((played, played.exclusion()?))) {
+        let (task, seed, why) = (played.spec.task.id, played.spec.seed, failure_cause(played));
+        let same = |known: &&mut ExcludedEpisodes| (known.task, known.what, &known.why) == (task, what, &why);
+        match listed.iter_mut().find(same) {
+            Some(known) => known.seeds.push(seed),
+            None => listed.push(ExcludedEpisodes { task, what, why, seeds: vec![seed] }),
+        }
+    }
+    listed.sort_by_key(|entry| (tasks::ALL.iter().position(|task| task.id == entry.task), entry.what));
+    listed
+}
+
 /// Number of the first phase that counts and was not reached.
 pub fn first_missed_phase(played: &PlayedEpisode) -> String {
     let counts = |phase: &usize| played.start_phase().is_none_or(|only| only == *phase);
     let mut phases = (0..played.spec.task.phases.len()).filter(counts);
-    phases.find(|phase| !reached(played, *phase)).map(Phase::number).unwrap_or_default()
+    phases.find(|phase| !played.reached(*phase)).map(Phase::number).unwrap_or_default()
 }
 
 /// What the policy said when it gave up, or why the episode ended; and who fell.
@@ -323,6 +353,7 @@ pub fn failure_cause(played: &PlayedEpisode) -> String {
         EndReason::WallClockExhausted => "the policy's time ran out",
         EndReason::Finished => "the policy ended the episode",
         EndReason::Abandoned => "the policy went away",
+        EndReason::PolicyFailed => "the policy itself failed",
         EndReason::SimulatorFailed => "the simulator failed",
     };
     let own = played

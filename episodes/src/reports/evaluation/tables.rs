@@ -34,6 +34,7 @@ pub fn all(report: &EvaluationReport) -> Vec<Table> {
     tables.push(together(policies));
     tables.push(effort(policies));
     tables.push(reasons(policies));
+    tables.push(excluded(policies));
     tables.extend(report.comparisons.iter().map(comparison));
     tables.push(published(&report.published));
     tables.push(published_together(report));
@@ -44,7 +45,7 @@ pub fn all(report: &EvaluationReport) -> Vec<Table> {
 pub fn rates(policy: &PolicyReport) -> Table {
     let mut table = Table::new(
         format!("Phases: {}", policy.name),
-        "Percent with the exact 95 % interval (Clopper-Pearson). Cumulative: of all episodes. Conditional: of those that reached \
+        "Percent with the exact 95 % interval (Clopper-Pearson). Cumulative: of all episodes that count. Conditional: of those that reached \
          the phase before. From its beginning: of episodes that began where the phase begins.",
         &["Task", "Phase", "Robots work", "Cumulative", "Conditional", "From its beginning"],
         3,
@@ -185,6 +186,30 @@ fn reasons(policies: &[PolicyReport]) -> Table {
                 reason.task.into(),
                 reason.phase.clone(),
                 reason.why.clone(),
+                seeds.len().to_string(),
+                seeds.join(", "),
+            ]);
+        }
+    }
+    table
+}
+
+fn excluded(policies: &[PolicyReport]) -> Table {
+    let mut table = Table::new(
+        "Not counted",
+        "Episodes in which the policy itself failed (its program or its server crashed or was gone), or the simulator. They are in \
+         no rate, and `evaluate` plays them again.",
+        &["Policy", "Task", "What", "Why", "Episodes", "Seeds"],
+        4,
+    );
+    for policy in policies {
+        for entry in &policy.excluded {
+            let seeds: Vec<String> = entry.seeds.iter().map(u32::to_string).collect();
+            table.rows.push(vec![
+                policy.name.clone(),
+                entry.task.into(),
+                entry.what.name().into(),
+                entry.why.clone(),
                 seeds.len().to_string(),
                 seeds.join(", "),
             ]);

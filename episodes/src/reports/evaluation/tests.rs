@@ -36,6 +36,7 @@ fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Played
         },
         thought_s: f64::from(seed),
         note: None,
+        keep_failed: false,
     }
 }
 
@@ -194,6 +195,82 @@ fn reports_quote_what_they_are_told() {
     let json: serde_json::Value =
         serde_json::from_str(&report.write(ReportFormat::Json, &ReportPictures::default()).unwrap()).unwrap();
     assert_eq!(json["policies"][0]["tasks"][0]["phases"][1]["cumulative"]["successes"], 6);
+}
+
+#[test]
+fn what_failed_itself_is_told_apart_and_in_no_rate() {
+    let handover = tasks::find("handover").unwrap();
+    let failed = |policy: &str, seed: u32, ended: EndReason, why: &str| {
+        let mut played = played(policy, handover, seed, 1);
+        played.result.ended = ended;
+        played.note = Some(why.into());
+        played
+    };
+    let crash = "B: the program ended at control step 25, before its episode did (exit status: 1)";
+    let mut episodes = nine_six_three("one");
+    episodes.extend(nine_six_three("other"));
+    episodes.extend([
+        failed("one", 20, EndReason::PolicyFailed, crash),
+        failed("one", 21, EndReason::PolicyFailed, crash),
+        failed("one", 22, EndReason::SimulatorFailed, "a velocity is not finite"),
+        // It was played again elsewhere.
+        failed("one", 3, EndReason::PolicyFailed, crash),
+        failed("other", 20, EndReason::Finished, "it is too hard"),
+        PlayedEpisode { keep_failed: true, ..failed("other", 21, EndReason::PolicyFailed, crash) },
+    ]);
+    let folder = tempfile::tempdir().unwrap();
+    let strip = folder.path().join("strip.png");
+    image::RgbImage::new(812, 40).save(&strip).unwrap();
+    let mut found = found(episodes);
+    found.episodes.iter_mut().for_each(|found| found.strip = Some(strip.clone()));
+    let report = EvaluationReport::of(&found);
+    let [one, other] = &report.policies[..] else { panic!("{:?}", report.policies) };
+    assert_eq!((one.episodes, other.episodes), (10, 12));
+    assert_eq!(one.tasks[0].phases[0].cumulative.map(Rate::fraction).as_deref(), Some("9/10"));
+    let listed: Vec<_> = one.excluded.iter().map(|e| (e.what.name(), &*e.why, &*e.seeds)).collect();
+    let simulator = ("simulator failed", "a velocity is not finite", &[22][..]);
+    assert_eq!(listed, [("policy failed", crash, &[20, 21][..]), simulator]);
+    assert!(other.excluded.is_empty() && other.reasons.iter().any(|reason| reason.why == crash));
+    assert_eq!(report.comparisons[0].rows[0].pairs.total(), 10);
+    let shown: Vec<_> =
+        gallery(&found, 99).into_iter().map(|failure| (failure.policy, failure.seed)).collect();
+    assert_eq!(shown.len(), 7 + 9, "{shown:?}");
+    assert!(shown.iter().all(|(policy, seed)| *seed < 20 || policy == "other"), "{shown:?}");
+
+    for format in ReportFormat::ALL {
+        let text = report.write(format, &ReportPictures::default()).unwrap();
+        match format {
+            ReportFormat::Csv => assert!(text.contains("cumulative,9,10,0.9,"), "{text}"),
+            ReportFormat::Html | ReportFormat::Markdown | ReportFormat::Json | ReportFormat::Tex => {
+                let kept = text.replace("\\_", "_");
+                assert!(
+                    kept.contains(crash) && kept.to_lowercase().contains("simulator"),
+                    "{format:?}: {text}"
+                );
+                assert!(kept.contains("Not counted") || kept.contains("\"simulator_failed\""), "{format:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn results_of_earlier_versions_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut old = serde_json::json!(played("agent", tasks::find("handover").unwrap(), 4, 1));
+    assert_eq!(
+        old.as_object_mut().unwrap().remove("keep_failed"),
+        None,
+        "it is written only where it is set"
+    );
+    old["note"] = "the program ended without a call, before its episode did (exit status: 127)".into();
+    std::fs::create_dir_all(folder.path().join("episodes")).unwrap();
+    std::fs::write(folder.path().join("episodes/handover-4.json"), old.to_string()).unwrap();
+    let loaded = load(&[folder.path().into()]).unwrap();
+    let report = EvaluationReport::of(&loaded);
+    assert_eq!(
+        (loaded.skipped.len(), report.policies[0].episodes, report.policies[0].excluded.len()),
+        (0, 1, 0)
+    );
 }
 
 #[test]

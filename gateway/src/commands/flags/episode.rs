@@ -115,6 +115,7 @@ impl EpisodeFlags {
             shard: Shard::WHOLE,
             jobs: self.jobs,
             record,
+            keep_failed: false,
         })
     }
 }

@@ -4,7 +4,7 @@ use std::{error::Error, time::Duration};
 
 use tandem_episodes::{
     EpisodeSpec,
-    players::{self, EpisodeOutput, PlayError, PlayOutcome, Policy},
+    players::{self, EpisodeOutput, PlayError, PlayOutcome, Policy, PolicyWait},
     results::PolicyCard,
 };
 use tandem_tools_spec::{Driving, Operators};
@@ -162,6 +162,10 @@ impl Policy for Renamed {
 
     fn play_episode(&self, spec: &EpisodeSpec, output: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
         self.policy.play_episode(spec, output)
+    }
+
+    fn waiting(&self) -> Option<PolicyWait> {
+        self.policy.waiting()
     }
 }
 

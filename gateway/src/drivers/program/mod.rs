@@ -35,8 +35,9 @@ const GRACE_PERIOD: Duration = Duration::from_secs(10);
 /// How often programs are looked at.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// How much of a program's last line a result quotes.
-const LAST_LINE_CHARS: usize = 300;
+/// How much of a program's last words a result quotes.
+const QUOTED_CHARS: usize = 300;
+const QUOTED_LINES: usize = 3;
 
 /// A command that plays.
 #[derive(Debug)]
@@ -103,24 +104,92 @@ impl Program {
         Ok(exits.into_iter().zip(statuses).collect())
     }
 
+    /// Waits until all programs have ended, one of them has failed, or their time is over.
     fn watch(&self, groups: &mut [ProcessGroup], episode: &EpisodeThread) -> io::Result<Vec<ProgramExit>> {
         let began = Instant::now();
         let mut over: Option<Instant> = None;
+        let mut exits: Vec<Option<ProgramExit>> = groups.iter().map(|_| None).collect();
         loop {
-            let ended: Vec<bool> =
-                groups.iter_mut().map(ProcessGroup::has_ended).collect::<io::Result<_>>()?;
+            for (exit, group) in exits.iter_mut().zip(groups.iter_mut()) {
+                if exit.is_none()
+                    && let Some(well) = group.ended_well()?
+                {
+                    // Whoever is found to have ended while the episode goes on has ended before it.
+                    *exit = Some(match (episode.ended(), well) {
+                        (true, _) => ProgramExit::After,
+                        (false, true) => ProgramExit::Left,
+                        (false, false) => ProgramExit::Failed,
+                    });
+                }
+            }
             let late = began.elapsed() >= self.limit;
             let stay = episode.ended() && over.get_or_insert_with(Instant::now).elapsed() >= GRACE_PERIOD;
-            if late || stay || ended.iter().all(|ended| *ended) {
-                let exit = |ended: bool| match (ended, late) {
-                    (true, _) => ProgramExit::Ended,
-                    (false, true) => ProgramExit::TimedOut(self.limit),
-                    (false, false) => ProgramExit::StillRunning,
+            let done = exits.iter().all(Option::is_some) || exits.contains(&Some(ProgramExit::Failed));
+            if late || stay || done {
+                let running = match late && !episode.ended() {
+                    true => ProgramExit::TimedOut,
+                    false => ProgramExit::StillRunning,
                 };
-                return Ok(ended.into_iter().map(exit).collect());
+                return Ok(exits.into_iter().map(|exit| exit.unwrap_or(running)).collect());
             }
             thread::sleep(POLL_INTERVAL);
         }
+    }
+
+    /// What is told of a program whose process left its episode early, and of what it said at last.
+    fn last_words(&self, exit: ProgramExit, status: &str, so_far: &str, folder: &Path) -> Option<String> {
+        match exit {
+            ProgramExit::Left | ProgramExit::Failed => {
+                let words = last_lines(folder).map(|lines| format!("; its last words: {lines}"));
+                let words = words.unwrap_or_default();
+                Some(format!("the program ended {so_far}, before its episode did ({status}){words}"))
+            }
+            ProgramExit::TimedOut => Some(format!(
+                "the program was stopped {so_far}, when its {} s were over",
+                self.limit.as_secs_f64()
+            )),
+            ProgramExit::After | ProgramExit::StillRunning => None,
+        }
+    }
+
+    /// What came of the episode that left `result`, whose programs were found as `ran` says.
+    fn outcome(
+        &self,
+        result: ResultReply,
+        thought: Duration,
+        ran: &[(ProgramExit, String)],
+        participants: &[Participant],
+    ) -> Result<PlayOutcome, PlayError> {
+        let so_far = match (result.tool_calls, participants) {
+            (0, _) => "without a call".into(),
+            (1, [_]) => "after 1 call".into(),
+            (calls, [_]) => format!("after {calls} calls"),
+            (_, _) => format!("at control step {}", result.env_steps),
+        };
+        let told = ran.iter().zip(participants).filter_map(|((exit, status), participant)| {
+            let words = self.last_words(*exit, status, &so_far, &participant.folder)?;
+            Some(participant.robot.map_or(words.clone(), |robot| format!("{robot}: {words}")))
+        });
+        let mut reasons: Vec<String> = told.collect();
+        match result.ended {
+            EndReason::WallClockExhausted => reasons.push("the policy's wall clock ran out".into()),
+            EndReason::Abandoned => reasons.push("the program made no call for too long".into()),
+            EndReason::TaskComplete
+            | EndReason::StepBudgetExhausted
+            | EndReason::Finished
+            | EndReason::PolicyFailed
+            | EndReason::SimulatorFailed => {}
+        }
+        let stopped = (!reasons.is_empty()).then(|| reasons.join("; "));
+        if result.tool_calls == 0 {
+            return Err(PlayError::NotReady(stopped.unwrap_or_else(|| "the program made no call".into())));
+        }
+        // A program that hangs is no better than one that is gone.
+        let ended = match result.ended {
+            EndReason::Abandoned => EndReason::PolicyFailed,
+            ended => ended,
+        };
+        Ok(PlayOutcome { result: ResultReply { ended, ..result }, thought, stopped })
     }
 }
 
@@ -152,64 +221,58 @@ impl Policy for Program {
         }
         let participants = Participant::all(&start, &text, &absolute);
         let ran = self.run(&server, &episode, &start, &participants);
-        let over = episode.ended();
+        if ran.as_ref().is_ok_and(|ran| ran.iter().any(|(exit, _)| exit.is_failure())) {
+            episode.end_blocking(EndReason::PolicyFailed);
+        }
         let thought = episode.thought();
         drop(episode);
         server.stop();
-        let ran = ran?;
-        let result = read_result(&absolute)?;
-        let reasons = ran.iter().zip(&participants).filter_map(|((exit, status), participant)| {
-            let reason = exit.failure(status, over, &result, &participant.folder)?;
-            Some(participant.robot.map_or(reason.clone(), |robot| format!("{robot}: {reason}")))
-        });
-        let reasons: Vec<String> = reasons.collect();
-        let stopped = (!reasons.is_empty()).then(|| reasons.join("; "));
-        Ok(PlayOutcome { result, thought, stopped })
+        self.outcome(read_result(&absolute)?, thought, &ran?, &participants)
     }
 }
 
 /// How a program was found when the wait for it was over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ProgramExit {
-    /// It ended by itself.
-    Ended,
-    /// Its episode is over, and it still runs.
+    /// It ended when its episode had.
+    After,
+    /// It ended by itself before its episode, and says that all went well.
+    Left,
+    /// It could not be started, or it crashed, or something ended it, before its episode ended.
+    Failed,
+    /// Its episode is over, or another program has failed, and it still runs.
     StillRunning,
-    /// It ran for longer than this limit.
-    TimedOut(Duration),
+    /// It ran for longer than it may.
+    TimedOut,
 }
 
 impl ProgramExit {
-    /// What kept a program from playing its episode to the end, if anything did. `status` is the exit status of the program, `over`
-    /// says whether the episode had ended by then, and `folder` has the program's output.
-    fn failure(&self, status: &str, over: bool, result: &ResultReply, folder: &Path) -> Option<String> {
-        match (self, over, result.ended) {
-            (ProgramExit::TimedOut(limit), ..) => {
-                Some(format!("the program was stopped after {} s", limit.as_secs_f64()))
-            }
-            (_, true, EndReason::WallClockExhausted) => Some("the policy's wall clock ran out".into()),
-            (_, true, EndReason::Abandoned) => Some("the program made no call for too long".into()),
-            (ProgramExit::Ended, false, _) => {
-                let calls = match result.tool_calls {
-                    0 => "without a call".into(),
-                    1 => "after 1 call".into(),
-                    calls => format!("after {calls} calls"),
-                };
-                let line = last_line(folder).map(|line| format!("; its last words: {line}"));
-                let line = line.unwrap_or_default();
-                Some(format!("the program ended {calls}, before its episode did ({status}){line}"))
-            }
-            (ProgramExit::Ended | ProgramExit::StillRunning, ..) => None,
+    fn is_failure(self) -> bool {
+        match self {
+            ProgramExit::Failed | ProgramExit::TimedOut => true,
+            ProgramExit::After | ProgramExit::Left | ProgramExit::StillRunning => false,
         }
     }
 }
 
-/// The last line that a program has written to stderr, or else to stdout.
-fn last_line(folder: &Path) -> Option<String> {
+/// The last lines that a program has written to stderr, or else to stdout: the last of all, and of those before it what there is
+/// room for.
+fn last_lines(folder: &Path) -> Option<String> {
     [STDERR_FILE, STDOUT_FILE].into_iter().find_map(|name| {
         let bytes = fs::read(folder.join(name)).ok()?;
         let text = String::from_utf8_lossy(&bytes);
-        let line = text.lines().map(str::trim).rfind(|line| !line.is_empty())?;
-        Some(line.chars().take(LAST_LINE_CHARS).collect())
+        // Python underlines with lines that have no word.
+        let worded = text.lines().map(str::trim).filter(|line| line.contains(char::is_alphanumeric));
+        let mut lines = worded.rev();
+        let mut quoted: String = lines.next()?.chars().take(QUOTED_CHARS).collect();
+        for line in lines.take(QUOTED_LINES - 1) {
+            let longer = format!("{line} / {quoted}");
+            if longer.chars().count() > QUOTED_CHARS {
+                break;
+            }
+            quoted = longer;
+        }
+        Some(quoted)
     })
 }
 

@@ -65,9 +65,9 @@ impl ProcessGroup {
         Ok(ProcessGroup { child, groups: groups.clone(), status: None })
     }
 
-    /// Whether the program has ended, whatever it has left running.
-    pub fn has_ended(&mut self) -> io::Result<bool> {
-        has_ended(&mut self.child)
+    /// Whether the program has ended well, whatever it has left running; `None` while it runs.
+    pub fn ended_well(&mut self) -> io::Result<Option<bool>> {
+        ended_well(&mut self.child)
     }
 
     /// Asks the group to end, ends it if it does not, and says how the program ended.
@@ -79,10 +79,10 @@ impl ProcessGroup {
         if let Some(status) = self.status {
             return Ok(status);
         }
-        if !self.has_ended()? {
+        if self.ended_well()?.is_none() {
             terminate(self.child.id());
             let asked = Instant::now();
-            while !self.has_ended()? && asked.elapsed() < TERMINATION_GRACE {
+            while self.ended_well()?.is_none() && asked.elapsed() < TERMINATION_GRACE {
                 thread::sleep(POLL_INTERVAL);
             }
         }
@@ -136,11 +136,11 @@ mod system {
         command.process_group(0);
     }
 
-    /// Whether the child has ended. It is not waited for, so that no other process gets its number.
-    pub fn has_ended(child: &mut Child) -> io::Result<bool> {
-        let Some(pid) = number(child.id()) else { return Ok(true) };
+    /// Whether the child has ended with status 0; `None` while it runs. It is not waited for, so that no other process gets its number.
+    pub fn ended_well(child: &mut Child) -> io::Result<Option<bool>> {
+        let Some(pid) = number(child.id()) else { return Ok(Some(false)) };
         let look = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
-        Ok(waitid(WaitId::Pid(pid), look)?.is_some())
+        Ok(waitid(WaitId::Pid(pid), look)?.map(|status| status.exit_status() == Some(0)))
     }
 
     pub fn terminate(id: u32) {
@@ -175,8 +175,8 @@ mod system {
 
     pub fn in_own_group(_: &mut Command) {}
 
-    pub fn has_ended(child: &mut Child) -> io::Result<bool> {
-        Ok(child.try_wait()?.is_some())
+    pub fn ended_well(child: &mut Child) -> io::Result<Option<bool>> {
+        Ok(child.try_wait()?.map(|status| status.success()))
     }
 
     pub fn terminate(_: u32) {}
@@ -188,4 +188,4 @@ mod system {
     pub fn kill_group(_: u32) {}
 }
 
-use system::{SHELL, has_ended, in_own_group, kill, kill_group, terminate};
+use system::{SHELL, ended_well, in_own_group, kill, kill_group, terminate};

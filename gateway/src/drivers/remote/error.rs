@@ -6,7 +6,7 @@ use std::time::Duration;
 #[derive(Debug, thiserror::Error)]
 pub enum RemoteError {
     /// No server listens at the address yet.
-    #[error("no policy answers at {url}: {reason}; start its server first")]
+    #[error("no policy answers at {url}: {reason}")]
     Unreachable { url: String, reason: String },
     /// The server was there, and is gone.
     #[error("the policy at {url} is gone: {reason}")]
@@ -23,6 +23,19 @@ pub enum RemoteError {
     /// What the server sends does not fit the map.
     #[error("the policy's answer does not fit its map: {0}")]
     Misfit(String),
+}
+
+impl RemoteError {
+    /// Whether nobody is there who answers, now and in the next episode.
+    pub fn is_absence(&self) -> bool {
+        match self {
+            RemoteError::Unreachable { .. } | RemoteError::Slow { .. } => true,
+            RemoteError::Gone { .. }
+            | RemoteError::Failed { .. }
+            | RemoteError::Unreadable { .. }
+            | RemoteError::Misfit(_) => false,
+        }
+    }
 }
 
 /// The line of a text that says most: of a Python traceback the last, of everything else the first; not too much of it.

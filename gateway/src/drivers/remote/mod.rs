@@ -11,10 +11,15 @@ mod policy_session;
 mod request;
 mod values;
 
+use std::{
+    sync::{Mutex, MutexGuard},
+    time::Instant,
+};
+
 use serde_json::json;
 use tandem_episodes::{
     EpisodeSpec,
-    players::{EpisodeOutput, PlayError, PlayOutcome, Policy, play_in_process},
+    players::{EpisodeOutput, PlayError, PlayOutcome, Policy, PolicyWait, play_in_process},
     results::PolicyCard,
     rules,
     tasks::Task,
@@ -23,6 +28,7 @@ use tandem_episodes::{
 pub use client::PolicyProtocol;
 pub use map::{MapError, PRESETS, PolicyMap};
 
+use error::RemoteError;
 use map::AnswerScope;
 use policy_session::PolicySession;
 use request::TaskInstructions;
@@ -34,12 +40,46 @@ pub struct RemotePolicy {
     /// One for all robots, or one for each in the task's order.
     urls: Vec<String>,
     map: PolicyMap,
+    /// Since when each of the episodes that cannot begin yet has waited for the servers.
+    waits: Mutex<Vec<Instant>>,
 }
 
 impl RemotePolicy {
     /// The policy at `urls`, asked as `map` says.
     pub fn new(protocol: PolicyProtocol, urls: Vec<String>, map: PolicyMap) -> RemotePolicy {
-        RemotePolicy { protocol, urls, map }
+        RemotePolicy { protocol, urls, map, waits: Mutex::default() }
+    }
+
+    fn waits(&self) -> MutexGuard<'_, Vec<Instant>> {
+        // Nothing panics while it holds the lock.
+        self.waits.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+
+    /// Connects to the servers for an episode of this task.
+    fn open(&self, task: &Task, most_steps: u32) -> Result<PolicySession<'_>, PlayError> {
+        let began = Instant::now();
+        self.waits().push(began);
+        let session =
+            PolicySession::open(self.protocol, &self.urls, &self.map, instructions(task), most_steps);
+        let mut waits = self.waits();
+        let own = waits.iter().position(|wait| *wait == began);
+        own.map(|index| waits.remove(index));
+        drop(waits);
+        session.map_err(|failures| self.not_opened(&failures))
+    }
+
+    /// Nothing was played. Where no server is there, there is none for any other episode.
+    fn not_opened(&self, failures: &[RemoteError]) -> PlayError {
+        let reasons: Vec<String> = failures.iter().map(RemoteError::to_string).collect();
+        let reasons = reasons.join("; ");
+        match failures.iter().any(RemoteError::is_absence) {
+            true => PlayError::Absent(format!(
+                "{reasons}. Start its server, or name in --policy where it listens (a server that starts slowly is waited for longer \
+                 with a greater connect_s in its policy map, now {} s)",
+                self.map.connect_s
+            )),
+            false => PlayError::NotReady(reasons),
+        }
     }
 
     /// Whether there are as many servers as the task and the map want.
@@ -70,10 +110,13 @@ impl Policy for RemotePolicy {
     fn play_episode(&self, spec: &EpisodeSpec, place: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
         self.check(spec.task).map_err(PlayError::NotReady)?;
         let most_steps = rules(spec.protocol, spec.task).steps_per_command;
-        let session =
-            PolicySession::open(self.protocol, &self.urls, &self.map, instructions(spec.task), most_steps);
-        let mut session = session.map_err(|error| PlayError::NotReady(error.to_string()))?;
+        let mut session = self.open(spec.task, most_steps)?;
         Ok(play_in_process(spec, place, |episode| session.play(episode))?)
+    }
+
+    fn waiting(&self) -> Option<PolicyWait> {
+        let lasted = self.waits().iter().min()?.elapsed();
+        Some(PolicyWait { target: self.urls.join(", "), lasted })
     }
 }
 

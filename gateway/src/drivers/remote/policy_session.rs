@@ -34,35 +34,60 @@ pub struct PolicySession<'a> {
 }
 
 impl<'a> PolicySession<'a> {
-    /// Connects to the servers at `urls`, waiting for those that are not there yet, and tries each with black pictures and zeros.
+    /// Connects to the servers at `urls` side by side, waiting for those that are not there yet, and tries each with black pictures
+    /// and zeros. Says of each that fails why.
     pub fn open(
         protocol: PolicyProtocol,
         urls: &[String],
         map: &'a PolicyMap,
         instructions: TaskInstructions,
         most_steps: u32,
-    ) -> Result<PolicySession<'a>, RemoteError> {
+    ) -> Result<PolicySession<'a>, Vec<RemoteError>> {
         let plan = QueryPlan { map, instructions };
         let deadline = Instant::now() + Duration::from_secs_f64(map.connect_s);
-        let mut clients = Vec::with_capacity(urls.len());
-        for (url, robots) in urls.iter().zip(plan.queries()) {
-            clients.push(retry_until(deadline, || {
+        let connect = |url: &str, robots: &[usize]| {
+            retry_until(deadline, || {
                 let mut client = protocol.open(url, plan.within())?;
-                plan.probe(&mut *client, &robots)?;
+                plan.probe(&mut *client, robots)?;
                 Ok(client)
-            })?);
+            })
+        };
+        let opened: Vec<Result<Box<dyn PolicyClient>, RemoteError>> = thread::scope(|scope| {
+            let connect = &connect;
+            let connecting = urls.iter().zip(plan.queries());
+            let connecting: Vec<_> =
+                connecting.map(|(url, robots)| scope.spawn(move || connect(url, &robots))).collect();
+            connecting.into_iter().map(joined).collect()
+        });
+        let (mut clients, mut failures) = (Vec::with_capacity(urls.len()), Vec::new());
+        for client in opened {
+            match client {
+                Ok(client) => clients.push(client),
+                Err(failure) => failures.push(failure),
+            }
         }
-        Ok(PolicySession { plan, clients, most_steps: most_steps as usize })
+        match failures.is_empty() {
+            true => Ok(PolicySession { plan, clients, most_steps: most_steps as usize }),
+            false => Err(failures),
+        }
     }
 
     /// Plays until the episode is over, or a policy fails.
     pub fn play(&mut self, episode: &mut dyn LocalEpisode) -> Result<(), PlayerError> {
+        self.act(episode).map_err(|error| match error {
+            // An answer that cannot be executed is a failure of the server's, too.
+            PlayerError::Call { .. } => PlayerError::Failed(error.to_string()),
+            error => error,
+        })
+    }
+
+    fn act(&mut self, episode: &mut dyn LocalEpisode) -> Result<(), PlayerError> {
         let mut held: Option<Vec<Vec<f64>>> = None;
         loop {
             let observation = PolicyObservation::take(episode, self.plan.map.shows_third_person())?;
             let held_rows = held.get_or_insert_with(|| held_rows(&observation));
             let chunks = self.decide(&observation, held_rows);
-            let chunks = chunks.map_err(|error| PlayerError::GaveUp(error.to_string()))?;
+            let chunks = chunks.map_err(|error| PlayerError::Failed(error.to_string()))?;
             execute(episode, &chunks, self.most_steps)?;
         }
     }
@@ -85,13 +110,16 @@ impl<'a> PolicySession<'a> {
                 let asking = own.iter_mut().zip(&queries);
                 let asked: Vec<_> =
                     asking.map(|(client, robots)| scope.spawn(move || ask(&mut **client, robots))).collect();
-                let answer =
-                    |asked: ScopedJoinHandle<_>| asked.join().unwrap_or_else(|panic| resume_unwind(panic));
-                asked.into_iter().map(answer).collect()
+                asked.into_iter().map(joined).collect()
             }),
         };
         Ok(answers?.into_iter().flatten().collect())
     }
+}
+
+/// What a thread came to; a panic on it goes on here.
+fn joined<T>(thread: ScopedJoinHandle<T>) -> T {
+    thread.join().unwrap_or_else(|panic| resume_unwind(panic))
 }
 
 /// Which requests are made for which robots, as a map says.

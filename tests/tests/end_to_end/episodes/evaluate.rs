@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use serde_json::json;
-use tandem_episodes::evaluation::{EvaluationPlan, Shard, Starts, evaluate};
+use tandem_episodes::evaluation::{EpisodeEvent, EvaluationPlan, Shard, Starts, evaluate};
 use tandem_episodes::reports::{EvaluationReport, load};
 use tandem_episodes::results::PlayedEpisode;
 use tandem_episodes::{Controller, RendererKind, RobotFile, players, tasks};
@@ -26,6 +26,7 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> EvaluationPlan<'static> {
         shard: Shard::WHOLE,
         jobs,
         record: false,
+        keep_failed: false,
     }
 }
 
@@ -64,7 +65,7 @@ fn jobs_change_nothing_and_kept_episodes_are_not_played_again() {
     // A kept episode comes back with the figures of the machine that played it; a lost one is played again.
     std::fs::remove_file(one.path().join("episodes/handover-2.json")).expect("the file was written");
     let finished = AtomicU32::new(0);
-    let count = |_: &PlayedEpisode| {
+    let count = |_: EpisodeEvent| {
         finished.fetch_add(1, Ordering::Relaxed);
     };
     let resumed = evaluate(&plan(1, vec![1, 2]), one.path(), &count).expect("it is played");

@@ -33,6 +33,7 @@ fn solve(tasks: Vec<&'static Task>) {
         shard: Shard::WHOLE,
         jobs: available_parallelism().map_or(1, usize::from),
         record: false,
+        keep_failed: false,
     };
     let folder = tempfile::tempdir().expect("a temporary folder");
     let played = evaluate(&plan, folder.path(), &|_| {}).expect("worlds can be built").episodes;

@@ -34,12 +34,21 @@ pub struct OpenpiServer {
 impl OpenpiServer {
     /// Connection number `n`, counted from 0, is answered by `decide(n)`.
     pub fn start(decide: impl Fn(usize) -> Box<Decide> + Send + 'static) -> OpenpiServer {
-        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+        OpenpiServer::start_at(([127, 0, 0, 1], 0).into(), usize::MAX, decide)
+    }
+
+    /// As [`OpenpiServer::start`], at this address; nobody listens any more after so many connections.
+    pub fn start_at(
+        address: SocketAddr,
+        connections: usize,
+        decide: impl Fn(usize) -> Box<Decide> + Send + 'static,
+    ) -> OpenpiServer {
+        let listener = TcpListener::bind(address).expect("a free port");
         let address = listener.local_addr().expect("an address");
         let requests = Arc::new(Mutex::new(Vec::new()));
         let heard = requests.clone();
         thread::spawn(move || {
-            for (number, stream) in listener.incoming().enumerate() {
+            for (number, stream) in listener.incoming().enumerate().take(connections) {
                 let (decide, heard) = (decide(number), heard.clone());
                 let stream = stream.expect("a connection");
                 thread::spawn(move || serve(stream, &*decide, &heard));

@@ -27,6 +27,7 @@ pub fn plan(player: &dyn Policy, seeds: Vec<u32>, record: bool) -> EvaluationPla
         shard: Shard::WHOLE,
         jobs: 2,
         record,
+        keep_failed: false,
     }
 }
 

@@ -4,7 +4,11 @@ use std::{env, fs, io::Read, path::Path, time::Duration};
 
 use serde_json::{Value, json};
 use tandem::drivers::Program;
-use tandem_episodes::results::PlayedEpisode;
+use tandem_episodes::{
+    evaluation::{Evaluation, EvaluationPlan},
+    reports::{EvaluationReport, ReportFormat, ReportPictures, load},
+    results::{Exclusion, PlayedEpisode},
+};
 use tandem_tools_spec::{Driving, EndReason, Operators};
 
 use super::plans::{plan, play};
@@ -48,6 +52,18 @@ fn agent() {
             drop(ureq::delete(&episode).header("authorization", &token).call().expect("it is deleted"));
         }
         Ok("leave") => eprintln!("it is too hard"),
+        Ok("crash") if env::var("TANDEM_ROBOT").as_deref() != Ok("A") => {
+            eprintln!("Traceback (most recent call last):\n  ~~~^^\nplan()");
+            panic!("the planner has no plan");
+        }
+        // A partner of one that crashes.
+        Ok("crash") => while tool("wait", json!({ "steps": 5 })).is_ok() {},
+        Ok("hang") => std::thread::sleep(LONG),
+        Ok("kill") => {
+            let own = std::process::id().to_string();
+            std::process::Command::new("kill").args(["-KILL", &own]).status().expect("kill");
+            std::thread::sleep(LONG);
+        }
         role => panic!("{role:?} is no role"),
     }
 }
@@ -148,18 +164,100 @@ fn a_program_may_end_its_episode_in_any_way() {
 }
 
 #[test]
-fn a_program_that_fails_has_its_last_words_in_the_result() {
+fn a_program_that_never_calls_is_left_out() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let played = play_one("echo out of ideas >&2; echo; exit 3", LONG, folder.path());
-    assert_eq!((played.result.ended, played.result.env_steps), (EndReason::Finished, 0));
+    let left_out = |command: &str, limit: Duration| {
+        let evaluation = play(&plan(&program(command, limit), vec![1], false), folder.path());
+        assert_eq!((evaluation.episodes.len(), evaluation.tasks.len()), (0, 0), "{command}");
+        evaluation.left_out.join(", ")
+    };
     assert_eq!(
-        played.note.as_deref(),
-        Some(
-            "the program ended without a call, before its episode did (exit status: 3); its last words: out of ideas"
-        )
+        left_out("echo out of ideas >&2; echo; exit 3", LONG),
+        "handover seed 1: the program ended without a call, before its episode did (exit status: 3); its last words: out of ideas"
     );
-    let missing = play_one("/no/such/program", LONG, folder.path());
-    assert!(missing.note.is_some_and(|note| note.contains("exit status: 127")));
+    let text = left_out("/no/such/program", LONG);
+    assert!(text.contains("exit status: 127") && text.contains("/no/such/program"), "{text}");
+    assert!(left_out("true", LONG).contains("without a call"));
+    let short = Duration::from_millis(300);
+    assert_eq!(
+        left_out("sleep 1000", short),
+        "handover seed 1: the program was stopped without a call, when its 0.3 s were over"
+    );
+}
+
+#[test]
+fn a_program_that_crashes_is_listed_apart_and_played_again() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let flag = folder.path().join("repaired");
+    let sound = agent_command("finish");
+    for (role, says) in [
+        ("crash", "(exit status: 101); its last words: "),
+        ("kill", "after 1 call, before its episode did (signal: 9"),
+        ("hang", "the program was stopped after 1 call, when its 4 s were over"),
+    ] {
+        let command = format!(
+            "if [ -e '{}' ]; then exec {sound}; fi; exec env {}",
+            flag.display(),
+            agent_command(role)
+        );
+        let sound_from_now_on =
+            program(&command.replace("exec ROLE", "exec env ROLE"), Duration::from_secs(4));
+        let plan = plan(&sound_from_now_on, vec![1, 2], false);
+        let evaluation = play(&plan, folder.path());
+        let handover = &evaluation.tasks["handover"];
+        assert_eq!((handover.episodes, handover.policy_failed, handover.p1), (0, 2, 0));
+        for played in &evaluation.episodes {
+            assert_eq!(played.result.ended, EndReason::PolicyFailed);
+            assert_eq!(played.exclusion(), Some(Exclusion::PolicyFailed));
+            let note = played.note.as_deref().unwrap_or_default();
+            assert!(note.contains(says), "{note}");
+        }
+        let recorded = folder.path().join("episodes/handover-1/result.json");
+        assert!(fs::read_to_string(recorded).expect("a result").contains("\"policy_failed\""));
+
+        // Whoever wants them counted gets what was played, and nothing is played again.
+        let kept = play(&EvaluationPlan { keep_failed: true, ..plan.clone() }, folder.path());
+        assert_eq!((kept.tasks["handover"].episodes, kept.tasks["handover"].policy_failed), (2, 0));
+        let hashes = |evaluation: &Evaluation| {
+            let all = evaluation.episodes.iter();
+            all.map(|played| (played.result.state_hash.clone(), played.thought_s)).collect::<Vec<_>>()
+        };
+        assert_eq!(hashes(&kept), hashes(&evaluation));
+        let report = EvaluationReport::of(&load(&[folder.path().into()]).expect("episodes"));
+        assert!((report.policies[0].episodes, report.policies[0].excluded.len()) == (2, 0), "{report:?}");
+
+        fs::write(&flag, "").expect("a file");
+        let again = play(&plan, folder.path());
+        assert_eq!((again.tasks["handover"].episodes, again.tasks["handover"].policy_failed), (2, 0));
+        assert!(again.episodes.iter().all(|played| played.result.ended == EndReason::Finished));
+        fs::remove_file(&flag).expect("the file");
+        fs::remove_dir_all(folder.path().join("episodes")).expect("a folder");
+    }
+}
+
+#[test]
+fn a_crash_of_one_of_two_programs_is_named() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let driving = Driving { operators: Some(Operators::PerRobot), patience_s: Some(1.0), talk: None };
+    let programs = Program::new(agent_command("crash"), driving, LONG).expect("settings");
+    let evaluation = play(&plan(&programs, vec![1], false), folder.path());
+    let played = &evaluation.episodes[0];
+    assert_eq!(
+        (played.result.ended, played.exclusion()),
+        (EndReason::PolicyFailed, Some(Exclusion::PolicyFailed))
+    );
+    let note = played.note.as_deref().unwrap_or_default();
+    assert!(note.starts_with("B: the program ended at control step "), "{note}");
+    assert!(note.contains("(exit status: 101); its last words: ") && note.contains("plan"), "{note}");
+    assert!(!note.contains("A: ") && !note.contains("~~~"), "{note}");
+    let report = EvaluationReport::of(&load(&[folder.path().into()]).expect("episodes"));
+    assert_eq!(report.policies[0].excluded[0].why, note);
+    assert!(
+        report
+            .write(ReportFormat::Html, &ReportPictures::default())
+            .expect("a page")
+            .contains("B: the program ended at control step")
+    );
 }
 
 #[cfg(unix)]
@@ -170,11 +268,14 @@ fn a_program_is_stopped_with_all_that_it_started() {
     // It does not care about being asked, and has a child that outlives it.
     let command =
         format!("trap '' TERM; sleep 1000 & echo $! > '{}'; while :; do sleep 1; done", pids.display());
-    let played = play_one(&command, Duration::from_millis(300), folder.path());
-    assert_eq!(played.note.as_deref(), Some("the program was stopped after 0.3 s"));
+    let left_out = |command: &str, limit: Duration| {
+        play(&plan(&program(command, limit), vec![1], false), folder.path()).left_out.join(", ")
+    };
+    let text = left_out(&command, Duration::from_millis(300));
+    assert!(text.ends_with("was stopped without a call, when its 0.3 s were over"), "{text}");
     // And one that is left behind by a program that ends.
-    let left = play_one(&format!("sleep 1000 & echo $! >> '{}'", pids.display()), LONG, folder.path());
-    assert!(left.note.is_some_and(|note| note.starts_with("the program ended without a call")));
+    let text = left_out(&format!("sleep 1000 & echo $! >> '{}'", pids.display()), LONG);
+    assert!(text.contains("the program ended without a call"), "{text}");
     let text = fs::read_to_string(&pids).expect("it was written");
     let pids: Vec<&str> = text.lines().collect();
     assert_eq!(pids.len(), 2);

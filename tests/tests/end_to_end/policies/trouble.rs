@@ -2,6 +2,10 @@
 
 use serde_json::json;
 use tandem::drivers::{PolicyMap, PolicyProtocol, RemotePolicy};
+use tandem_episodes::{
+    evaluation::{EvaluationPlan, evaluate},
+    players::Policy,
+};
 use tandem_tools_spec::EndReason;
 
 use super::{
@@ -61,7 +65,7 @@ fn a_server_that_fails_ends_its_episode_and_no_other() {
         (7, "left_shoulder_pitch_joint is beyond 1000"),
     ] {
         let (ended, steps, note) = one_by_one(seed);
-        assert_eq!((ended, steps), (EndReason::Finished, 20), "{note}");
+        assert_eq!((ended, steps), (EndReason::PolicyFailed, 20), "{note}");
         assert!(note.contains(says), "{note}");
     }
     let (ended, steps, note) = one_by_one(8);
@@ -77,16 +81,6 @@ fn a_policy_that_is_not_ready_is_left_out_and_played_the_next_time() {
         assert_eq!(evaluation.episodes, [], "nothing was begun");
         evaluation.left_out.join(", ")
     };
-    let unheard =
-        std::net::TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("an address");
-    let absent = [
-        (PolicyProtocol::Openpi, format!("ws://{unheard}")),
-        (PolicyProtocol::Act, format!("http://{unheard}/act")),
-    ];
-    for (protocol, url) in absent {
-        let text = left_out(&RemotePolicy::new(protocol, vec![url.clone()], fast()));
-        assert!(text.starts_with(&format!("handover seed 1: no policy answers at {url}")), "{text}");
-    }
     let narrow = OpenpiServer::start(|_| Box::new(|_, _| Reply::Rows(vec![vec![0.0; 32]; 50])));
     let text = left_out(&RemotePolicy::new(PolicyProtocol::Openpi, vec![narrow.url()], fast()));
     assert!(text.contains("expected an array of shape [rows, 35]") && text.contains("[50, 32]"), "{text}");
@@ -105,6 +99,43 @@ fn a_policy_that_is_not_ready_is_left_out_and_played_the_next_time() {
         folder.path(),
     );
     assert!(asked() > before, "another map is another policy");
+}
+
+/// An address at which nobody listens.
+fn nowhere() -> std::net::SocketAddr {
+    std::net::TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("an address")
+}
+
+#[test]
+fn an_evaluation_without_its_server_stops_and_goes_on_later() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let fast = map(folder.path(), FAST);
+    let refusal = |policy: &RemotePolicy| {
+        let one_by_one = EvaluationPlan { jobs: 1, ..plan(policy, vec![1, 2, 3, 4], false) };
+        evaluate(&one_by_one, folder.path(), &|_| {}).expect_err("nobody plays").to_string()
+    };
+    for (protocol, scheme) in [(PolicyProtocol::Openpi, "ws://"), (PolicyProtocol::Act, "http://")] {
+        let absent = [nowhere(), nowhere()].map(|address| format!("{scheme}{address}"));
+        let text = refusal(&RemotePolicy::new(protocol, absent.to_vec(), fast.clone()));
+        for url in &absent {
+            assert!(text.contains(&format!("no policy answers at {url}")), "{text}");
+        }
+        assert!(text.contains("Start its server") && text.contains("connect_s"), "{text}");
+        assert!(text.contains("run the same command again: of 4 episodes 0 are played and kept"), "{text}");
+    }
+
+    // One that is gone after two episodes, and comes back.
+    let address = nowhere();
+    let short = OpenpiServer::start_at(address, 2, |_| still(50));
+    let policy = RemotePolicy::new(PolicyProtocol::Openpi, vec![short.url()], fast.clone());
+    let text = refusal(&policy);
+    assert!(text.contains("of 4 episodes 2 are played and kept"), "{text}");
+    assert_eq!(policy.waiting(), None);
+    let back = OpenpiServer::start_at(address, 2, |_| still(50));
+    let evaluation = play(&plan(&policy, vec![1, 2, 3, 4], false), folder.path());
+    assert_eq!((evaluation.episodes.len(), evaluation.left_out.len()), (4, 0));
+    let [before, after] = [&short, &back].map(|server| server.requests.lock().expect("no panic").len());
+    assert_eq!(before, after, "two episodes each");
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use crate::html::escape;
 use crate::reports::episode::moments;
 use crate::reports::evaluation::load::{FoundEpisode, LoadedEpisodes};
-use crate::reports::evaluation::policy::{failure_cause, groups, succeeded};
+use crate::reports::evaluation::policy::{failure_cause, groups};
 use crate::tasks;
 
 /// The place of a film on the page.
@@ -57,7 +57,7 @@ pub fn film_places(loaded: &LoadedEpisodes) -> Vec<FilmPlace> {
             continue;
         }
         for success in [true, false] {
-            let such = played.iter().copied().filter(|(_, found)| succeeded(&found.played) == success);
+            let such = played.iter().copied().filter(|(_, found)| found.played.succeeded() == success);
             places.push(FilmPlace { task: task.id, success, episode: choose(success, such) });
         }
     }

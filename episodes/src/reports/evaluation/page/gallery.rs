@@ -4,7 +4,7 @@ use crate::html::escape;
 use crate::reports::episode::{KeyMoment, moments, strip};
 use crate::reports::evaluation::load::{FoundEpisode, LoadedEpisodes};
 use crate::reports::evaluation::policy::{
-    PolicyGroup, PolicyReport, failure_cause, first_missed_phase, groups, succeeded,
+    PolicyGroup, PolicyReport, failure_cause, first_missed_phase, groups,
 };
 
 /// One failed episode.
@@ -49,7 +49,7 @@ pub fn gallery(loaded: &LoadedEpisodes, most: usize) -> Vec<Failure> {
 }
 
 fn failed<'a>(group: &PolicyGroup<'a>) -> Vec<(Failure, &'a FoundEpisode)> {
-    let found = group.episodes.iter().filter(|found| !succeeded(&found.played));
+    let found = group.episodes.iter().filter(|found| !found.played.succeeded());
     found.map(|found| (failure(group, found), *found)).collect()
 }
 

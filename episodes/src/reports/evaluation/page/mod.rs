@@ -84,6 +84,10 @@ fn card(index: usize, policy: &PolicyReport) -> String {
         }
     }
     facts.push(("Episodes".into(), policy.episodes.to_string()));
+    let excluded: usize = policy.excluded.iter().map(|entry| entry.seeds.len()).sum();
+    if excluded > 0 {
+        facts.push(("Not counted".into(), excluded.to_string()));
+    }
     facts.push(("Robots that fell".into(), policy.falls.to_string()));
     let address = policy.address.as_ref().map(|address| format!("at <code>{}</code>, ", escape(address)));
     let address = address.unwrap_or_default();

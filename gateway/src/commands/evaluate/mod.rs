@@ -1,5 +1,8 @@
 //! `tandem evaluate`: how far a policy gets, over tasks and seeds.
 
+mod progress;
+mod table;
+
 use std::{
     error::Error,
     path::{Path, PathBuf},
@@ -7,12 +10,9 @@ use std::{
     str::FromStr,
 };
 
-use indicatif::{ProgressBar, ProgressStyle};
 use tandem_episodes::{
     Phase,
-    evaluation::{self, Evaluation, EvaluationPlan, Shard, Starts},
-    results::PhaseLevel,
-    statistics::{Count, clopper_pearson},
+    evaluation::{self, EvaluationPlan, Shard, Starts},
     tasks,
 };
 
@@ -21,9 +21,7 @@ use super::{
     flags::{EpisodeFlags, PolicyFlags},
     logging::log_evaluation,
 };
-
-/// How many notes on failures are printed below the table.
-const NOTES_SHOWN: usize = 20;
+use progress::with_progress;
 
 /// Play tasks over seeds in parallel worlds and count the phases reached. Goes on where an interrupted run stopped.
 #[derive(Debug, clap::Args)]
@@ -45,6 +43,10 @@ pub struct EvaluateArgs {
     /// Record every episode in a folder of its own, for `replay` and for the pictures of a report.
     #[arg(long)]
     record: bool,
+    /// Count episodes in which the policy itself failed (its program or its server crashed or was gone) as failures, and keep them;
+    /// without it they are listed apart, and the next run plays them again.
+    #[arg(long)]
+    keep_failed: bool,
     /// Folder for `results.json` and one file per episode.
     #[arg(long, value_name = "DIR", default_value = "runs/evaluation")]
     out: PathBuf,
@@ -89,7 +91,7 @@ impl FromStr for ShardFlag {
     }
 }
 
-/// Plays and counts. The program fails if there are episodes to play and none could begin.
+/// Plays and counts. The program fails if there are episodes to play and none of them counts.
 pub fn run(args: EvaluateArgs) -> CommandResult {
     log_evaluation();
     let starts = match (args.demos, args.from) {
@@ -98,76 +100,22 @@ pub fn run(args: EvaluateArgs) -> CommandResult {
     };
     let ShardFlag(shard) = args.shard;
     let policy = args.policy.policy()?;
-    let plan = EvaluationPlan { starts, shard, ..args.episodes.plan(&*policy, args.record)? };
+    let plan = EvaluationPlan {
+        starts,
+        shard,
+        keep_failed: args.keep_failed,
+        ..args.episodes.plan(&*policy, args.record)?
+    };
     Ok(match play_and_print(&plan, &args.out)? {
         0 if !plan.episodes().0.is_empty() => ExitCode::FAILURE,
         _ => ExitCode::SUCCESS,
     })
 }
 
-/// Plays `plan` into `folder` with a progress bar, prints a table, and returns how many episodes were played.
+/// Plays `plan` into `folder`, says how it goes on, prints a table, and returns how many of the episodes count.
 pub fn play_and_print(plan: &EvaluationPlan, folder: &Path) -> Result<usize, Box<dyn Error>> {
-    let bar = ProgressBar::new(plan.episodes().0.len() as u64);
-    bar.set_style(ProgressStyle::with_template("  [{bar:30}] {pos} of {len} episodes, {elapsed}, {msg}")?);
-    let evaluation = evaluation::evaluate(plan, folder, &|played| {
-        bar.set_message(format!("{} seed {}", played.result.task, played.result.seed));
-        bar.inc(1);
-    })?;
-    bar.finish_and_clear();
-    print_table(&evaluation);
-    evaluation.phase_level.iter().for_each(print_phase_level);
-    let notes: Vec<String> = evaluation
-        .episodes
-        .iter()
-        .filter_map(|episode| Some((&episode.result, episode.note.as_deref()?)))
-        .map(|(result, note)| format!("  {} seed {}: {note}", result.task, result.seed))
-        .collect();
-    notes.iter().take(NOTES_SHOWN).for_each(|note| println!("{note}"));
-    if notes.len() > NOTES_SHOWN {
-        println!("  and {} more notes in results.json", notes.len() - NOTES_SHOWN);
-    }
-    evaluation.left_out.iter().for_each(|left_out| println!("  left out: {left_out}"));
+    let evaluation = with_progress(plan, |progress| evaluation::evaluate(plan, folder, progress))?;
+    table::print(&evaluation);
     println!("  results in {}", folder.display());
-    Ok(evaluation.episodes.len())
-}
-
-fn print_table(evaluation: &Evaluation) {
-    if evaluation.tasks.is_empty() {
-        return;
-    }
-    println!(
-        "{:14} {:>8}  {:^22} {:^22} {:^22} {:>5} {:>6}",
-        "task", "episodes", "p1", "p2", "p3", "falls", "steps"
-    );
-    for (id, task) in &evaluation.tasks {
-        let [p1, p2, p3] =
-            [task.p1, task.p2, task.p3].map(|successes| rate(Count { successes, trials: task.episodes }));
-        println!(
-            "{id:14} {:>8}  {p1:^22} {p2:^22} {p3:^22} {:>5} {:>6.0}",
-            task.episodes, task.falls, task.mean_env_steps
-        );
-    }
-    println!("rates in %, with exact 95 % intervals (Clopper-Pearson)");
-}
-
-/// Prints how often each phase was reached from its own start, and how much lower the rate of collaborative phases is.
-fn print_phase_level(level: &PhaseLevel) {
-    println!("{:14} {:>8}  {:>8}  {:^22}", "task", "from", "episodes", "reached");
-    for phase in &level.phases {
-        let reached = rate(Count { successes: phase.reached, trials: phase.episodes });
-        let who = if phase.collaborative { "together" } else { "" };
-        println!("{:14} {:>8}  {:>8}  {reached:^22} {who}", phase.task, phase.number, phase.episodes);
-    }
-    let percent = |share: Option<f64>| share.map_or("-".into(), |share| format!("{:.1}", 100.0 * share));
-    println!(
-        "mean of phases in %: alone {}, together {}, which is {} % lower",
-        percent(level.non_collaborative_share),
-        percent(level.collaborative_share),
-        percent(level.drop_share)
-    );
-}
-
-fn rate(count: Count) -> String {
-    let [low, high] = clopper_pearson(count).map(|share| 100.0 * share);
-    format!("{:.0} [{low:.0}, {high:.0}]", 100.0 * count.share().unwrap_or_default())
+    Ok(evaluation.episodes.iter().filter(|episode| episode.counts()).count())
 }

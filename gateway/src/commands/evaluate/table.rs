@@ -1,0 +1,100 @@
+//! What an evaluation came to, as text: rates, why episodes failed, and what does not count.
+
+use tandem_episodes::{
+    evaluation::Evaluation,
+    results::{Exclusion, PhaseLevel, PlayedEpisode},
+    statistics::{Count, clopper_pearson},
+};
+
+/// How many notes of a kind are printed below the table.
+const NOTES_SHOWN: usize = 20;
+
+/// Prints the tables, then notes.
+pub fn print(evaluation: &Evaluation) {
+    print_tasks(evaluation);
+    evaluation.phase_level.iter().for_each(print_phase_level);
+    let (counted, excluded): (Vec<&PlayedEpisode>, Vec<&PlayedEpisode>) =
+        evaluation.episodes.iter().partition(|episode| episode.counts());
+    print_notes(counted.into_iter().filter_map(|episode| Some((episode, episode.note.clone()?))));
+    if !excluded.is_empty() {
+        println!(
+            "not counted, because the policy itself or the simulator failed; the next run plays them again:"
+        );
+        print_notes(excluded.into_iter().map(|episode| (episode, exclusion_note(episode))));
+    }
+    evaluation.left_out.iter().for_each(|left_out| println!("  left out: {left_out}"));
+}
+
+/// What failed, and how.
+fn exclusion_note(episode: &PlayedEpisode) -> String {
+    let what = episode.exclusion().map_or("", Exclusion::name);
+    match (episode.exclusion(), &episode.note) {
+        (Some(Exclusion::PolicyFailed), Some(note)) => format!("{what}: {note}"),
+        (Some(Exclusion::SimulatorFailed) | None, Some(note)) => note.clone(),
+        (_, None) => what.into(),
+    }
+}
+
+fn print_notes<'a>(notes: impl Iterator<Item = (&'a PlayedEpisode, String)>) {
+    let lines: Vec<String> = notes
+        .map(|(episode, note)| format!("  {} seed {}: {note}", episode.result.task, episode.result.seed))
+        .collect();
+    lines.iter().take(NOTES_SHOWN).for_each(|line| println!("{line}"));
+    if lines.len() > NOTES_SHOWN {
+        println!("  and {} more notes in results.json", lines.len() - NOTES_SHOWN);
+    }
+}
+
+fn print_tasks(evaluation: &Evaluation) {
+    if evaluation.tasks.is_empty() {
+        return;
+    }
+    let excluded = evaluation.tasks.values().any(|task| task.policy_failed + task.simulator_failed > 0);
+    let column = if excluded { "  not counted" } else { "" };
+    println!(
+        "{:14} {:>8}  {:^22} {:^22} {:^22} {:>5} {:>6}{column}",
+        "task", "episodes", "p1", "p2", "p3", "falls", "steps"
+    );
+    for (id, task) in &evaluation.tasks {
+        let [p1, p2, p3] =
+            [task.p1, task.p2, task.p3].map(|successes| rate(Count { successes, trials: task.episodes }));
+        let kinds = [
+            (task.policy_failed, Exclusion::PolicyFailed),
+            (task.simulator_failed, Exclusion::SimulatorFailed),
+        ];
+        let kinds = kinds.into_iter().filter(|(count, _)| *count > 0);
+        let excluded: Vec<String> = kinds.map(|(count, what)| format!("{} {count}", what.name())).collect();
+        let line = format!(
+            "{id:14} {:>8}  {p1:^22} {p2:^22} {p3:^22} {:>5} {:>6.0}  {}",
+            task.episodes,
+            task.falls,
+            task.mean_env_steps,
+            excluded.join(", ")
+        );
+        println!("{}", line.trim_end());
+    }
+    println!("rates in %, with exact 95 % intervals (Clopper-Pearson)");
+}
+
+/// Prints how often each phase was reached from its own start, and how much lower the rate of collaborative phases is.
+fn print_phase_level(level: &PhaseLevel) {
+    println!("{:14} {:>8}  {:>8}  {:^22}", "task", "from", "episodes", "reached");
+    for phase in &level.phases {
+        let reached = rate(Count { successes: phase.reached, trials: phase.episodes });
+        let who = if phase.collaborative { "together" } else { "" };
+        println!("{:14} {:>8}  {:>8}  {reached:^22} {who}", phase.task, phase.number, phase.episodes);
+    }
+    let percent = |share: Option<f64>| share.map_or("-".into(), |share| format!("{:.1}", 100.0 * share));
+    println!(
+        "mean of phases in %: alone {}, together {}, which is {} % lower",
+        percent(level.non_collaborative_share),
+        percent(level.collaborative_share),
+        percent(level.drop_share)
+    );
+}
+
+fn rate(count: Count) -> String {
+    let Some(share) = count.share() else { return "-".into() };
+    let [low, high] = clopper_pearson(count).map(|share| 100.0 * share);
+    format!("{:.0} [{low:.0}, {high:.0}]", 100.0 * share)
+}
