@@ -5,7 +5,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use crate::commands::{
     CommandResult,
     about::{completions, man, tasks},
-    bench, collect, demo, doctor, evaluate, locomotion, recover, replay, report, serve,
+    bench, collect, demo, doctor, evaluate, locomotion, policy_map, recover, replay, report, serve,
 };
 
 /// Physics of humanoids that must work together, behind an HTTP API.
@@ -24,6 +24,7 @@ enum CliCommand {
     Demo(demo::DemoArgs),
     Evaluate(evaluate::EvaluateArgs),
     Collect(collect::CollectArgs),
+    PolicyMap(policy_map::PolicyMapArgs),
     Locomotion(locomotion::LocomotionArgs),
     Tasks(tasks::TasksArgs),
     Recover(recover::RecoverArgs),
@@ -43,6 +44,7 @@ impl Cli {
             CliCommand::Demo(args) => demo::run(args),
             CliCommand::Evaluate(args) => evaluate::run(args),
             CliCommand::Collect(args) => collect::run(args),
+            CliCommand::PolicyMap(args) => policy_map::run(args),
             CliCommand::Locomotion(args) => locomotion::run(args),
             CliCommand::Tasks(args) => tasks::run(args),
             CliCommand::Recover(args) => recover::run(args),

@@ -9,6 +9,7 @@ pub mod evaluate;
 mod flags;
 pub mod locomotion;
 mod logging;
+pub mod policy_map;
 pub mod recover;
 pub mod replay;
 pub mod report;

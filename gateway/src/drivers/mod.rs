@@ -6,4 +6,4 @@ mod remote;
 
 pub use http_episode::HttpEpisode;
 pub use program::Program;
-pub use remote::{MapError, PRESETS, PolicyMap, PolicyProtocol, RemotePolicy};
+pub use remote::{MapError, PRESETS, PolicyMap, PolicyProtocol, RemoteError, RemotePolicy, preset, try_map};

@@ -48,4 +48,5 @@ def main():
     print(f"act        {len(policy.seen)} requests, arm raised")
 
 
-main()
+if __name__ == "__main__":
+    main()

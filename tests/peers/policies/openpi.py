@@ -74,4 +74,5 @@ def main():
     print(f"failing    {episode['note']}")
 
 
-main()
+if __name__ == "__main__":
+    main()

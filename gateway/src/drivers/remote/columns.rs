@@ -3,13 +3,15 @@
 use std::ops::Range;
 
 use tandem_episodes::joint_names;
-use tandem_tools_spec::{ACTION_ROW_LEN, BASE_COLUMNS, RobotState};
+use tandem_tools_spec::{ACTION_ROW_LEN, BASE_COLUMNS, Pose, RobotState};
+
+use super::poses::{POSE_LEN, RotationForm, pose_values};
 
 /// Some columns by one name.
-type Block = (&'static str, Range<usize>);
+type Block = (String, Range<usize>);
 
-/// Blocks of a robot's numbers, in the order of [`state_values`].
-const STATE: [Block; 12] = [
+/// Blocks of a robot's numbers, in the order of [`state_values`], but for those of its wrists.
+const STATE: [(&str, Range<usize>); 11] = [
     ("left_leg", 0..6),
     ("right_leg", 6..12),
     ("waist", 12..15),
@@ -18,18 +20,20 @@ const STATE: [Block; 12] = [
     ("right_arm", 29..36),
     ("right_hand", 36..43),
     ("joints", 0..JOINTS),
-    ("left_wrist", 43..50),
-    ("right_wrist", 50..57),
-    ("gravity", 57..60),
+    ("gravity", STATE_GRAVITY..STATE_PELVIS),
+    ("pelvis_in_start", STATE_PELVIS..STATE_BASE),
     ("base_command", STATE_BASE..STATE_LEN),
 ];
 const JOINTS: usize = 43;
+const STATE_WRISTS: [usize; 2] = [JOINTS, JOINTS + POSE_LEN];
+const STATE_GRAVITY: usize = JOINTS + 2 * POSE_LEN;
+const STATE_PELVIS: usize = STATE_GRAVITY + 3;
 /// The base command comes last.
-const STATE_BASE: usize = 60;
-const STATE_LEN: usize = 64;
+const STATE_BASE: usize = STATE_PELVIS + 7;
+const STATE_LEN: usize = STATE_BASE + 4;
 
 /// Blocks of an action row, in the order of `send_joint_chunk`.
-const ACTION: [Block; 7] = [
+const ACTION: [(&str, Range<usize>); 7] = [
     ("left_arm", 0..7),
     ("right_arm", 7..14),
     ("left_hand", 14..21),
@@ -39,21 +43,49 @@ const ACTION: [Block; 7] = [
     ("row", 0..ACTION_ROW_LEN),
 ];
 const ACTION_BASE: usize = 31;
+/// Behind a row, a policy may tell poses of the wrists.
+const ACTION_WRISTS: [usize; 2] = [ACTION_ROW_LEN, ACTION_ROW_LEN + POSE_LEN];
+/// Columns that a policy may tell.
+pub const ACTION_LEN: usize = ACTION_ROW_LEN + 2 * POSE_LEN;
 
-/// All that a robot senses: joints in rad; of each wrist x, y, z in m and w, x, y, z in the pelvis frame; which way is down; the
-/// base command in force, as [`BASE_COLUMNS`] has it.
+/// The wrists, left before right wherever there are both.
+pub const WRISTS: [&str; 2] = ["left_wrist", "right_wrist"];
+/// What of a wrist can be named, after its name; a pose has its numbers in this order.
+const WRIST_PARTS: [(&str, Range<usize>); 6] = [
+    ("", 0..7),
+    ("_position", 0..3),
+    ("_quaternion", 3..7),
+    ("_quaternion_xyzw", 7..11),
+    ("_columns_6d", 11..17),
+    ("_rows_6d", 17..POSE_LEN),
+];
+
+/// All that a robot senses: joints in rad; of each wrist the pose in the pelvis frame; which way is down; the pelvis where its own
+/// odometry has it, x, y, z in m and w, x, y, z; the base command in force, as [`BASE_COLUMNS`] has it.
 pub fn state_values(state: &RobotState) -> Vec<f64> {
     let joints = state.joint_positions_rad.0.iter().map(|(_, angle_rad)| *angle_rad);
-    let wrists = [&state.left_wrist, &state.right_wrist];
-    let wrists = wrists.into_iter().flat_map(|pose| pose.position_m.into_iter().chain(pose.quaternion_wxyz));
+    let wrists = [&state.left_wrist, &state.right_wrist].into_iter();
+    let wrists = wrists.flat_map(|pose| pose_values(pose.position_m, pose.quaternion_wxyz));
+    let Pose { position_m, quaternion_wxyz } = state.pelvis_in_start;
+    let pelvis = position_m.into_iter().chain(quaternion_wxyz);
     let base = &state.base_command;
     let base = [base.vx_m_s, base.vy_m_s, base.yaw_rate_rad_s, base.pelvis_height_m];
-    joints.chain(wrists).chain(state.gravity_in_pelvis).chain(base).collect()
+    joints.chain(wrists).chain(state.gravity_in_pelvis).chain(pelvis).chain(base).collect()
 }
 
 /// Numbers of the right length for [`state_values`], of a robot of which nothing is known.
 pub fn blank_state_values() -> Vec<f64> {
     vec![0.0; STATE_LEN]
+}
+
+/// Where a wrist is sensed to be, and the pelvis by the robot's odometry: x, y, z, w, x, y, z.
+pub fn sensed_wrist(state_values: &[f64], side: usize) -> &[f64] {
+    &state_values[STATE_WRISTS[side]..][..7]
+}
+
+/// As [`sensed_wrist`], of the pelvis.
+pub fn sensed_pelvis(state_values: &[f64]) -> &[f64] {
+    &state_values[STATE_PELVIS..STATE_BASE]
 }
 
 /// The row that keeps a robot as it senses that it is: arms, hands, waist and height where they are, no walking.
@@ -65,28 +97,79 @@ pub fn held_row(state_values: &[f64]) -> Vec<f64> {
         }
     }
     // The height is all that persists of a base command.
-    row[ACTION_BASE..ACTION_ROW_LEN - 1].fill(0.0);
+    row[velocities()].fill(0.0);
     row
+}
+
+/// Columns of an action row that are velocities: nothing that a robot could be at.
+pub fn velocities() -> Range<usize> {
+    ACTION_BASE..ACTION_ROW_LEN - 1
+}
+
+/// Columns of an action row that arms and waist have, which wrists move by inverse kinematics.
+pub fn is_of_arm_or_waist(column: usize) -> bool {
+    let blocks = ["left_arm", "right_arm", "waist"];
+    ACTION.iter().any(|(name, columns)| blocks.contains(name) && columns.contains(&column))
+}
+
+/// Columns of an action row that a hand has.
+pub fn hand(side: usize) -> Range<usize> {
+    ACTION[2 + side].1.clone()
+}
+
+/// Where the position of a wrist is among the columns that a policy may tell.
+pub fn wrist_position(side: usize) -> Range<usize> {
+    ACTION_WRISTS[side]..ACTION_WRISTS[side] + 3
+}
+
+/// As [`wrist_position`], of its rotation in one form.
+pub fn wrist_rotation(side: usize, form: RotationForm) -> Range<usize> {
+    let before = RotationForm::ALL.into_iter().take_while(|known| *known != form);
+    let from = ACTION_WRISTS[side] + 3 + before.map(RotationForm::len).sum::<usize>();
+    from..from + form.len()
 }
 
 /// Which of [`state_values`] the `names` mean, in their order.
 pub fn state_columns(names: &[String]) -> Result<Vec<usize>, String> {
-    columns(names, &STATE, &state_singles())
+    columns(names, &state_blocks(), &state_singles())
 }
 
-/// Which columns of an action row the `names` mean, in their order.
+/// Which columns of those that a policy may tell the `names` mean, in their order.
 pub fn action_columns(names: &[String]) -> Result<Vec<usize>, String> {
-    let columns = columns(names, &ACTION, &action_singles())?;
+    let columns = columns(names, &action_blocks(), &action_singles())?;
     match (0..columns.len()).find(|index| columns[..*index].contains(&columns[*index])) {
         None => Ok(columns),
         Some(index) => Err(format!("{:?} is told twice", action_name(columns[index]))),
     }
 }
 
-/// What column number `column` of an action row is called.
+/// What column number `column` of those that a policy may tell is called; of a wrist, the part that it belongs to.
 pub fn action_name(column: usize) -> String {
-    let singles = action_singles();
-    singles.into_iter().find(|(_, at)| *at == column).map(|(name, _)| name).unwrap_or_default()
+    let single = action_singles().into_iter().find(|(_, at)| *at == column).map(|(name, _)| name);
+    let parts = || wrist_blocks(ACTION_WRISTS).into_iter().filter(|(name, _)| !WRISTS.contains(&&**name));
+    let part = || parts().find(|(_, columns)| columns.contains(&column)).map(|(name, _)| name);
+    single.or_else(part).unwrap_or_default()
+}
+
+fn state_blocks() -> Vec<Block> {
+    let own = STATE.iter().map(|(name, columns)| ((*name).to_owned(), columns.clone()));
+    own.chain(wrist_blocks(STATE_WRISTS)).collect()
+}
+
+fn action_blocks() -> Vec<Block> {
+    let own = ACTION.iter().map(|(name, columns)| ((*name).to_owned(), columns.clone()));
+    own.chain(wrist_blocks(ACTION_WRISTS)).collect()
+}
+
+/// Blocks of wrists whose numbers begin at `starts`.
+fn wrist_blocks(starts: [usize; 2]) -> Vec<Block> {
+    let of_wrist = |(wrist, start): (&str, usize)| {
+        let block = |(part, columns): &(&str, Range<usize>)| {
+            (format!("{wrist}{part}"), start + columns.start..start + columns.end)
+        };
+        WRIST_PARTS.iter().map(block).collect::<Vec<_>>()
+    };
+    WRISTS.into_iter().zip(starts).flat_map(of_wrist).collect()
 }
 
 fn columns(names: &[String], blocks: &[Block], singles: &[(String, usize)]) -> Result<Vec<usize>, String> {
@@ -95,7 +178,7 @@ fn columns(names: &[String], blocks: &[Block], singles: &[(String, usize)]) -> R
         let block = blocks.iter().find(|(known, _)| known == name).map(|(_, columns)| columns.clone());
         let single = singles.iter().find(|(known, _)| known == name).map(|(_, column)| *column..*column + 1);
         found.extend(block.or(single).ok_or_else(|| {
-            let have: Vec<&str> = blocks.iter().map(|(name, _)| *name).collect();
+            let have: Vec<&str> = blocks.iter().map(|(name, _)| &**name).collect();
             format!("no column {name:?}; have: {}, and joints and base columns by name", have.join(", "))
         })?);
     }
@@ -128,27 +211,47 @@ mod tests {
 
     #[test]
     fn names_are_blocks_or_single_columns() {
-        assert_eq!(state_columns(&names("waist left_knee_joint vx_m_s")), Ok(vec![12, 13, 14, 3, 60]));
+        assert_eq!(
+            state_columns(&names("waist left_knee_joint vx_m_s")),
+            Ok(vec![12, 13, 14, 3, STATE_BASE])
+        );
         assert_eq!(action_columns(&names("pelvis_height_m waist_roll_joint")), Ok(vec![34, 29]));
         assert_eq!(action_columns(&names("row")).map(|columns| columns.len()), Ok(35));
         let text = action_columns(&names("left_leg")).unwrap_err();
         assert!(text.starts_with("no column \"left_leg\"; have: left_arm, "), "{text}");
         let text = action_columns(&names("left_arm left_elbow_joint")).unwrap_err();
         assert_eq!(text, "\"left_elbow_joint\" is told twice");
+        let text = action_columns(&names("right_wrist right_wrist_position")).unwrap_err();
+        assert_eq!(text, "\"right_wrist_position\" is told twice");
+    }
+
+    #[test]
+    fn wrists_are_named_by_part() {
+        let pose = action_columns(&names("left_wrist")).unwrap();
+        let parts = action_columns(&names("left_wrist_position left_wrist_quaternion")).unwrap();
+        assert_eq!((pose.len(), &pose), (7, &parts));
+        for (form, part) in RotationForm::ALL.into_iter().zip(&WRIST_PARTS[2..]) {
+            let named = action_columns(&[format!("right_wrist{}", part.0)]).unwrap();
+            assert_eq!(named, wrist_rotation(1, form).collect::<Vec<_>>());
+        }
+        assert_eq!(action_columns(&names("right_wrist_rows_6d")).unwrap().last(), Some(&(ACTION_LEN - 1)));
+        assert_eq!(state_columns(&names("pelvis_in_start gravity")).map(|columns| columns.len()), Ok(10));
     }
 
     #[test]
     fn columns_are_those_of_the_contract() {
         // Blocks of arms, hands and waist follow the one order in a state and the other in a row, with equal joints.
-        let action: Vec<String> = (0..ACTION_ROW_LEN).map(action_name).collect();
+        let action: Vec<String> = (0..ACTION_LEN).map(action_name).collect();
         assert!(action.iter().all(|name| !name.is_empty()), "{action:?}");
         assert_eq!(
             (&*action[3], &*action[21], &*action[28]),
             ("left_elbow_joint", "right_hand_thumb_0_joint", "waist_yaw_joint")
         );
-        assert_eq!(action[31..], BASE_COLUMNS);
+        assert_eq!(action[31..35], BASE_COLUMNS);
+        assert_eq!((&*action[hand(0).start], hand(1)), ("left_hand_thumb_0_joint", 21..28));
         let state_values: Vec<f64> = (0..STATE_LEN as u32).map(f64::from).collect();
         let row = held_row(&state_values);
-        assert_eq!((row[0], row[7], row[14], row[28], row[31], row[34]), (15.0, 29.0, 22.0, 12.0, 0.0, 63.0));
+        assert_eq!((row[0], row[7], row[14], row[28], row[31]), (15.0, 29.0, 22.0, 12.0, 0.0));
+        assert_eq!(row[34], (STATE_LEN - 1) as f64);
     }
 }

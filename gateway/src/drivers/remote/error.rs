@@ -38,14 +38,16 @@ impl RemoteError {
     }
 }
 
-/// The line of a text that says most: of a Python traceback the last, of everything else the first; not too much of it.
+/// The line of a text that says most: of a Python traceback the last, of everything else the first; not too much of it. The first
+/// line of a page in HTML is a tag, so of a page it is the beginning.
 pub fn gist(text: &str) -> String {
     let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
-    let line = match text.starts_with("Traceback") {
-        true => lines.next_back(),
-        false => lines.next(),
+    let line = match (text.starts_with("Traceback"), text.trim_start().starts_with('<')) {
+        (true, _) => lines.next_back().map(str::to_owned),
+        (false, true) => Some(lines.collect::<Vec<_>>().join(" ")),
+        (false, false) => lines.next().map(str::to_owned),
     };
-    line.unwrap_or("no text").chars().take(LONGEST_GIST_CHARS).collect()
+    line.as_deref().unwrap_or("no text").chars().take(LONGEST_GIST_CHARS).collect()
 }
 
 const LONGEST_GIST_CHARS: usize = 300;
@@ -62,6 +64,8 @@ mod tests {
         );
         assert_eq!(gist("out of memory\nmore"), "out of memory");
         assert_eq!(gist(" \n"), "no text");
+        let page = "<html>\r\n<head><title>502 Bad Gateway</title></head>\r\n<body>";
+        assert_eq!(gist(page), "<html> <head><title>502 Bad Gateway</title></head> <body>");
         assert_eq!(gist(&"x".repeat(1000)).len(), LONGEST_GIST_CHARS);
     }
 }

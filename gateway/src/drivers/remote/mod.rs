@@ -1,14 +1,15 @@
 //! Learned policies as servers: we are their client. A map says which pictures and numbers they get under which key, and which they
 //! give back.
 
-mod action_rows;
+mod action;
 mod client;
 mod columns;
 mod error;
 mod map;
-mod picture;
 mod policy_session;
+mod poses;
 mod request;
+mod trial;
 mod values;
 
 use std::{
@@ -26,9 +27,10 @@ use tandem_episodes::{
 };
 
 pub use client::PolicyProtocol;
-pub use map::{MapError, PRESETS, PolicyMap};
+pub use error::RemoteError;
+pub use map::{MapError, PRESETS, PolicyMap, preset};
+pub use trial::try_map;
 
-use error::RemoteError;
 use map::AnswerScope;
 use policy_session::PolicySession;
 use request::TaskInstructions;

@@ -7,15 +7,14 @@ use std::{
 };
 
 use tandem_episodes::players::{LocalEpisode, PlayerError};
-use tandem_tools_spec::{JointChunk, SendJointChunk, StopReason, ToolReply};
 
 use super::{
-    action_rows,
+    action::{Executor, RobotRows, chunks, executed_rows},
     client::{PolicyClient, PolicyProtocol},
     columns,
     error::RemoteError,
     map::{AnswerScope, PolicyMap},
-    request::{PolicyObservation, TaskInstructions, request},
+    request::{ObservationHistory, PolicyObservation, TaskInstructions, request},
 };
 
 /// How long the first answer may take: models are compiled then. No clock of an episode runs yet.
@@ -82,28 +81,38 @@ impl<'a> PolicySession<'a> {
     }
 
     fn act(&mut self, episode: &mut dyn LocalEpisode) -> Result<(), PlayerError> {
-        let mut held: Option<Vec<Vec<f64>>> = None;
+        let mut history = ObservationHistory::begin(self.plan.map, episode)?;
+        let held_rows = held_rows(history.present());
+        let mut executor = Executor::new(self.plan.map, self.most_steps, history.present());
+        let mut executed = 0;
         loop {
-            let observation = PolicyObservation::take(episode, self.plan.map.shows_third_person())?;
-            let held_rows = held.get_or_insert_with(|| held_rows(&observation));
-            let chunks = self.decide(&observation, held_rows);
+            executor.sense(history.present());
+            let chunks = self.decide(&history.shown(), &held_rows);
             let chunks = chunks.map_err(|error| PlayerError::Failed(error.to_string()))?;
-            execute(episode, &chunks, self.most_steps)?;
+            let (begin, end) = (executed, executed + executed_rows(&chunks));
+            for look_at in history.looks_between(begin, end) {
+                executor.execute(episode, &chunks, executed - begin..look_at - begin)?;
+                history.look(episode, look_at)?;
+                executed = look_at;
+            }
+            executor.execute(episode, &chunks, executed - begin..end - begin)?;
+            history.look(episode, end)?;
+            executed = end;
         }
     }
 
     /// Asks for every robot: a shared policy once after the other, policies of their own at the same time.
     fn decide(
         &mut self,
-        observation: &PolicyObservation,
+        shown: &[&PolicyObservation],
         held_rows: &[Vec<f64>],
-    ) -> Result<Vec<JointChunk>, RemoteError> {
+    ) -> Result<Vec<RobotRows>, RemoteError> {
         let PolicySession { plan, clients, .. } = self;
         let queries = plan.queries();
         let ask = |client: &mut dyn PolicyClient, robots: &[usize]| {
-            plan.ask(client, observation, robots, held_rows, plan.within())
+            plan.ask(client, shown, robots, held_rows, plan.within())
         };
-        let answers: Result<Vec<Vec<JointChunk>>, RemoteError> = match &mut clients[..] {
+        let answers: Result<Vec<Vec<RobotRows>>, RemoteError> = match &mut clients[..] {
             [shared] => queries.iter().map(|robots| ask(&mut **shared, robots)).collect(),
             own => thread::scope(|scope| {
                 let ask = &ask;
@@ -146,23 +155,25 @@ impl QueryPlan<'_> {
     /// Whether a server answers what its map says.
     fn probe(&self, client: &mut dyn PolicyClient, robots: &[usize]) -> Result<(), RemoteError> {
         let observation = PolicyObservation::blank(self.instructions.robots.len());
-        self.ask(client, &observation, robots, &held_rows(&observation), FIRST_ANSWER).map(drop)
+        let shown = vec![&observation; self.map.history.map_or(1, |history| history.length)];
+        self.ask(client, &shown, robots, &held_rows(&observation), FIRST_ANSWER).map(drop)
     }
 
     fn ask(
         &self,
         client: &mut dyn PolicyClient,
-        observation: &PolicyObservation,
+        shown: &[&PolicyObservation],
         robots: &[usize],
         held_rows: &[Vec<f64>],
         within: Duration,
-    ) -> Result<Vec<JointChunk>, RemoteError> {
+    ) -> Result<Vec<RobotRows>, RemoteError> {
         let robot = match (self.map.answer, robots) {
             (AnswerScope::One, [robot]) => Some(*robot),
             _ => None,
         };
-        let reply = client.ask(&request(self.map, &self.instructions, observation, robot), within)?;
-        action_rows::chunks(self.map, &self.instructions, &reply, robots, held_rows)
+        let reply = client.ask(&request(self.map, &self.instructions, shown, robot), within)?;
+        let Some(present) = shown.last() else { return Ok(Vec::new()) };
+        chunks(self.map, &self.instructions, &reply, robots, held_rows, present)
     }
 }
 
@@ -184,27 +195,4 @@ fn retry_until<T>(
             outcome => return outcome,
         }
     }
-}
-
-/// Sends the rows of all robots, in as many commands as the protocol asks for; no more rows than every robot has.
-fn execute(
-    episode: &mut dyn LocalEpisode,
-    chunks: &[JointChunk],
-    most_steps: usize,
-) -> Result<(), PlayerError> {
-    let rows = chunks.iter().map(|chunk| chunk.rows.len()).min().unwrap_or_default();
-    for from in (0..rows).step_by(most_steps.max(1)) {
-        let to = rows.min(from + most_steps);
-        let part = |chunk: &JointChunk| JointChunk {
-            robot: chunk.robot.clone(),
-            rows: chunk.rows[from..to].to_vec(),
-        };
-        let command = SendJointChunk { robots: chunks.iter().map(part).collect() };
-        if let ToolReply::Act(reply) = episode.call(command.into())?
-            && reply.stop_reason != StopReason::StepsDone
-        {
-            return Err(PlayerError::EpisodeOver);
-        }
-    }
-    Ok(())
 }

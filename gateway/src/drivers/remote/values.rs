@@ -15,6 +15,21 @@ pub enum Elements {
 }
 
 impl Array {
+    /// Arrays of one shape along a new first axis.
+    pub fn stack(arrays: Vec<Array>) -> Array {
+        let shape = arrays.first().map(|array| array.shape.clone()).unwrap_or_default();
+        let shape = std::iter::once(arrays.len()).chain(shape).collect();
+        let mut joined: Option<Elements> = None;
+        for Array { elements, .. } in arrays {
+            match (&mut joined, elements) {
+                (Some(Elements::Bytes(all)), Elements::Bytes(more)) => all.extend(more),
+                (Some(Elements::Floats(all)), Elements::Floats(more)) => all.extend(more),
+                (_, elements) => joined = Some(elements),
+            }
+        }
+        Array { shape, elements: joined.unwrap_or(Elements::Floats(Vec::new())) }
+    }
+
     /// The type of the elements, by numpy's name for it.
     pub fn dtype(&self) -> &'static str {
         match self.elements {
@@ -38,7 +53,7 @@ pub enum RequestValue {
     Map(Vec<(String, RequestValue)>),
     Array(Array),
     Text(String),
-    Texts(Vec<String>),
+    List(Vec<RequestValue>),
 }
 
 /// Parts of a key: `video > ego_view` is `ego_view` in the map `video`.
@@ -112,6 +127,23 @@ impl ReplyValue {
             true => Ok(ReplyValue::Array { shape, values }),
             false => Err(format!("an array of shape {shape:?} with {} elements", values.len())),
         }
+    }
+
+    /// Puts `value` where `key` says, and makes the maps on the way; in place of the whole where it names nothing.
+    pub fn put(&mut self, key: &str, value: ReplyValue) {
+        let mut at = self;
+        for part in path(key) {
+            if !matches!(at, ReplyValue::Map(_)) {
+                *at = ReplyValue::Map(Vec::new());
+            }
+            let ReplyValue::Map(entries) = at else { return };
+            let index = entries.iter().position(|(name, _)| name == part).unwrap_or_else(|| {
+                entries.push((part.into(), ReplyValue::Map(Vec::new())));
+                entries.len() - 1
+            });
+            at = &mut entries[index].1;
+        }
+        *at = value;
     }
 
     /// What `key` names; the whole where it names nothing.

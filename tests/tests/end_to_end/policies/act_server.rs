@@ -19,6 +19,14 @@ pub struct ActServer {
 impl ActServer {
     /// Every request is answered by `decide`, with a status and JSON.
     pub fn start(decide: impl Fn(&Value) -> (u16, Value) + Send + Sync + 'static) -> ActServer {
+        ActServer::start_with_text(move |request| {
+            let (status, reply) = decide(request);
+            (status, reply.to_string())
+        })
+    }
+
+    /// As [`ActServer::start`], with any text.
+    pub fn start_with_text(decide: impl Fn(&Value) -> (u16, String) + Send + Sync + 'static) -> ActServer {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
         let address = listener.local_addr().expect("an address");
         let requests = Arc::new(Mutex::new(Vec::new()));
@@ -41,7 +49,7 @@ impl ActServer {
 /// Answers one request; `None` when the client has gone.
 fn serve(
     mut stream: &TcpStream,
-    decide: &(dyn Fn(&Value) -> (u16, Value) + Send + Sync),
+    decide: &(dyn Fn(&Value) -> (u16, String) + Send + Sync),
     heard: &Mutex<Vec<Value>>,
 ) -> Option<()> {
     let mut reader = BufReader::new(stream);
@@ -60,10 +68,10 @@ fn serve(
     }
     let mut body = vec![0; length];
     reader.read_exact(&mut body).ok()?;
-    let request: Value = serde_json::from_slice(&body).expect("JSON");
-    let (status, reply) = decide(&request);
+    // Who asks for another protocol sends none.
+    let request: Value = serde_json::from_slice(&body).unwrap_or_default();
+    let (status, text) = decide(&request);
     heard.lock().expect("no panic").push(request);
-    let text = reply.to_string();
     let head = format!(
         "HTTP/1.1 {status} OK\r\ncontent-type: application/json\r\ncontent-length: {}\r\n\r\n",
         text.len()

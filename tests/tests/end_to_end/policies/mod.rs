@@ -1,6 +1,7 @@
 //! Policies that live elsewhere: programs that are started for an episode, and learned policies at servers.
 
 mod act_server;
+mod kinds;
 mod openpi_server;
 mod plans;
 mod programs;

@@ -160,3 +160,35 @@ fn what_a_server_behind_act_refuses_is_told() {
         assert!(text.contains(says), "{text}");
     }
 }
+
+/// What nginx answers for a server that is not there.
+const PAGE: &str =
+    "<html>\r\n<head><title>502 Bad Gateway</title></head>\r\n<body>\r\n</body>\r\n</html>\r\n";
+
+#[test]
+fn a_page_in_html_is_shown() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let told = |status: u16, protocol: PolicyProtocol| {
+        let server = ActServer::start_with_text(move |_| (status, PAGE.into()));
+        let url = match protocol {
+            PolicyProtocol::Act => server.url(),
+            PolicyProtocol::Openpi => format!("ws://{}", server.address),
+        };
+        let policy = RemotePolicy::new(protocol, vec![url], map(folder.path(), FAST));
+        match evaluate(&plan(&policy, vec![1], false), folder.path(), &|_| {}) {
+            Ok(evaluation) => evaluation.left_out.join(", "),
+            // Behind such a page there may be no server at all.
+            Err(error) => error.to_string(),
+        }
+    };
+    let page = "<html> <head><title>502 Bad Gateway</title></head> <body>";
+    for (status, protocol, says) in [
+        (502, PolicyProtocol::Act, "failed: 502 Bad Gateway: "),
+        (200, PolicyProtocol::Act, "expected JSON; came, with status 200 OK, \""),
+        (502, PolicyProtocol::Openpi, "it answers HTTP 502 Bad Gateway: "),
+        (200, PolicyProtocol::Openpi, "it answers HTTP 200 OK: "),
+    ] {
+        let text = told(status, protocol);
+        assert!(text.contains(&format!("{says}{page}")), "{text}");
+    }
+}

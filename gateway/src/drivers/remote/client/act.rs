@@ -58,7 +58,10 @@ impl PolicyClient for Act {
             let text = format!("{status}: {}", gist(&text));
             return Err(RemoteError::Failed { url: self.url.clone(), text });
         }
-        let reply = serde_json::from_str(&text).map_err(|error| error.to_string()).and_then(from_json);
+        let no_json = |error: serde_json::Error| {
+            format!("expected JSON; came, with status {status}, {:?}: {error}", gist(&text))
+        };
+        let reply = serde_json::from_str(&text).map_err(no_json).and_then(from_json);
         reply.map_err(|reason| RemoteError::Unreadable { url: self.url.clone(), reason })
     }
 }
@@ -75,7 +78,7 @@ fn to_json(request: &RequestValue) -> Value {
             "shape": array.shape,
         }),
         RequestValue::Text(text) => json!(text),
-        RequestValue::Texts(texts) => json!(texts),
+        RequestValue::List(items) => items.iter().map(to_json).collect(),
     }
 }
 
@@ -114,7 +117,7 @@ mod tests {
         let array = Array { shape: vec![1, 2], elements: Elements::Floats(vec![1.5, -2.0]) };
         let request = RequestValue::Map(vec![
             ("x".into(), RequestValue::Array(array)),
-            ("y".into(), RequestValue::Texts(vec!["z".into()])),
+            ("y".into(), RequestValue::List(vec![RequestValue::Text("z".into())])),
         ]);
         let value = to_json(&request);
         // json_numpy.dumps(np.float32([[1.5, -2]]))

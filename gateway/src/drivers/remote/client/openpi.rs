@@ -27,6 +27,12 @@ impl Openpi {
         let unreachable = |reason: String| RemoteError::Unreachable { url: url.into(), reason };
         let stream = DeadlineStream::connect(url, within).map_err(|error| unreachable(error.to_string()))?;
         let (socket, _) = tungstenite::client(url, stream).map_err(|error| match error {
+            // A proxy's page of an error, or another server than a policy's.
+            HandshakeError::Failure(Error::Http(response)) => {
+                let text =
+                    String::from_utf8_lossy(response.body().as_deref().unwrap_or_default()).into_owned();
+                unreachable(format!("it answers HTTP {}: {}", response.status(), gist(&text)))
+            }
             HandshakeError::Failure(error) => unreachable(error.to_string()),
             HandshakeError::Interrupted(_) => RemoteError::Slow { url: url.into(), within },
         })?;
@@ -156,7 +162,7 @@ fn msgpack_value(request: &RequestValue) -> Value {
         ),
         RequestValue::Array(array) => ndarray(array),
         RequestValue::Text(text) => text.as_str().into(),
-        RequestValue::Texts(texts) => Value::Array(texts.iter().map(|text| text.as_str().into()).collect()),
+        RequestValue::List(items) => Value::Array(items.iter().map(msgpack_value).collect()),
     }
 }
 

@@ -1,5 +1,7 @@
 //! Which numbers and pictures go under which key to a policy, and which come back: a small TOML file, or a preset.
 
+mod check;
+
 use std::{
     collections::BTreeMap,
     fs, io,
@@ -7,21 +9,19 @@ use std::{
 };
 
 use serde::{Deserialize, Serialize};
+use tandem_episodes::CONTROL_HZ;
+use tandem_tools_spec::ACTION_ROW_LEN;
 
-use super::{
-    columns::{action_columns, state_columns},
-    picture::{Fit, Layout},
-};
+use super::columns::{WRISTS, action_columns};
 
 /// Maps that the program carries, by name; each is written out and explained in its file.
-pub const PRESETS: [(&str, &str); 2] =
-    [("openpi", include_str!("maps/openpi.toml")), ("gr00t_n17_g1", include_str!("maps/gr00t_n17_g1.toml"))];
+pub const PRESETS: [(&str, &str); 2] = [
+    ("openpi", include_str!("presets/openpi.toml")),
+    ("gr00t_n17_g1", include_str!("presets/gr00t_n17_g1.toml")),
+];
 
 /// What stands for a robot's name in a key.
 pub const ROBOT: &str = "{robot}";
-
-/// The longest side of a picture that a policy is shown.
-const LONGEST_SIDE_PX: u32 = 4096;
 
 /// How a policy is asked and understood.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -41,6 +41,9 @@ pub struct PolicyMap {
     pub prompt: BTreeMap<String, PromptForm>,
     pub action: BTreeMap<String, Vec<String>>,
     pub chunk: Chunk,
+    /// Left out where a policy is shown the present alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub history: Option<HistorySpan>,
 }
 
 /// Which robots' views and joints a policy is shown.
@@ -104,8 +107,32 @@ pub enum PromptForm {
     List,
 }
 
-/// Rows of an answer.
+/// How a picture gets to another size.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fit {
+    /// The whole picture as large as fits, in the middle of black, as `resize_with_pad` of openpi-client.
+    #[default]
+    Pad,
+    /// Stretched to the new size, whatever becomes of its shape.
+    Stretch,
+    /// The largest part of the right shape, from the middle.
+    Crop,
+}
+
+/// The order of a picture's elements.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Layout {
+    /// Rows, columns, colours.
+    #[default]
+    Hwc,
+    /// Colours, rows, columns.
+    Chw,
+}
+
+/// How the rows of an answer are understood and executed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Chunk {
     /// How many there have to be.
@@ -114,6 +141,81 @@ pub struct Chunk {
     /// How many of them are executed, from the first.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub execute: Option<usize>,
+    /// How many make a second; left out: one a control step.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate_hz: Option<f64>,
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub between: Between,
+    /// Columns that are differences to what was observed when the policy was asked.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub delta: Vec<String>,
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub wrist_frame: WristFrame,
+}
+
+/// What robots are told in the control steps that one row lasts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Between {
+    /// To go evenly from the row before to this one. Velocities change at once.
+    #[default]
+    Interpolate,
+    /// This row in every one of them.
+    Hold,
+}
+
+/// In whose axes poses of wrists are told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WristFrame {
+    /// The pelvis: hands go where it goes.
+    #[default]
+    Pelvis,
+    /// Where the robot stood at the episode's start, by its own odometry: hands stay in the world.
+    Start,
+    /// The wrist itself as it was observed; such poses are always differences. Hands stay in the world.
+    Wrist,
+}
+
+/// How much of the past a policy is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HistorySpan {
+    /// How many observations, the present one included.
+    pub length: usize,
+    /// How many rows are executed between two of them.
+    #[serde(default = "one")]
+    pub stride: usize,
+    #[serde(default)]
+    pub form: HistoryForm,
+}
+
+/// How observations of several moments are put together, the oldest first.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HistoryForm {
+    /// Arrays with an axis of moments, behind the leading axes.
+    #[default]
+    Stack,
+    /// Lists of arrays.
+    List,
+}
+
+fn one() -> usize {
+    1
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+/// What of an answer is a difference to what was observed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DeltaColumns {
+    /// Columns of an action row.
+    pub row_columns: Vec<usize>,
+    /// The left and the right wrist.
+    pub wrists: [bool; 2],
 }
 
 /// Why a map cannot be used.
@@ -165,52 +267,31 @@ impl PolicyMap {
         whole.try_into().map_err(unreadable)
     }
 
-    /// Whether it can be followed.
-    fn check(&self) -> Result<(), String> {
-        for names in self.state.values() {
-            state_columns(names)?;
-        }
-        self.check_action()?;
-        let wrong = |size: &[u32; 2]| !size.iter().all(|side| (1..=LONGEST_SIDE_PX).contains(side));
-        if let Some((key, _)) = self.images.iter().find(|(_, image)| image.size.as_ref().is_some_and(wrong)) {
-            return Err(format!("the size of {key:?}: give two numbers from 1 to {LONGEST_SIDE_PX}"));
-        }
-        for (name, count) in [("rows", self.chunk.rows), ("execute", self.chunk.execute)] {
-            if count == Some(0) {
-                return Err(format!("[chunk] {name} is 0; a chunk has at least one row"));
-            }
-        }
-        for (name, value_s) in [("connect_s", self.connect_s), ("reply_s", self.reply_s)] {
-            if !(0.0..=86400.0).contains(&value_s) {
-                return Err(format!("{name} is {value_s}; give seconds, at most a day's"));
-            }
-        }
-        self.check_keys()
+    /// How many rows of an answer make a second.
+    pub fn rate_hz(&self) -> f64 {
+        self.chunk.rate_hz.unwrap_or(CONTROL_HZ)
     }
 
-    /// No column may be told by two keys.
-    fn check_action(&self) -> Result<(), String> {
+    /// What of an answer is a difference. The map was checked when it was read.
+    pub fn delta(&self) -> DeltaColumns {
+        let is_wrist = |name: &&String| WRISTS.contains(&name.as_str());
+        let (wrists, others): (Vec<&String>, Vec<&String>) = self.chunk.delta.iter().partition(is_wrist);
+        let others: Vec<String> = others.into_iter().cloned().collect();
+        DeltaColumns {
+            row_columns: action_columns(&others).unwrap_or_default(),
+            wrists: WRISTS.map(|wrist| wrists.iter().any(|name| *name == wrist)),
+        }
+    }
+
+    /// Whether robots are told where their wrists are to be.
+    pub fn moves_wrists(&self) -> bool {
+        self.told_columns().iter().any(|column| *column >= ACTION_ROW_LEN)
+    }
+
+    /// The columns that an answer tells, in no order.
+    pub fn told_columns(&self) -> Vec<usize> {
         let all: Vec<String> = self.action.values().flatten().cloned().collect();
-        match action_columns(&all)?.is_empty() {
-            true => Err("[action] tells no column".into()),
-            false => Ok(()),
-        }
-    }
-
-    /// One answer for all robots is asked with keys for all robots.
-    fn check_keys(&self) -> Result<(), String> {
-        if self.answer == AnswerScope::One {
-            return Ok(());
-        }
-        let egocentric = self.images.iter().filter(|(_, image)| image.camera == CameraName::Egocentric);
-        let mut own = egocentric.map(|(key, _)| key).chain(self.state.keys());
-        match (self.scope, own.find(|key| !key.contains(ROBOT))) {
-            (Scope::Local, _) => Err("answer = \"all\" needs scope = \"global\"".into()),
-            (Scope::Global, Some(key)) => Err(format!(
-                "answer = \"all\" asks for no robot in particular; put {ROBOT} into the key {key:?}"
-            )),
-            (Scope::Global, None) => Ok(()),
-        }
+        action_columns(&all).unwrap_or_default()
     }
 
     /// What a policy is shown beyond what robots see and feel.
@@ -227,7 +308,8 @@ impl PolicyMap {
     }
 }
 
-fn preset(name: &str) -> Option<&'static str> {
+/// The file of the preset called `name`.
+pub fn preset(name: &str) -> Option<&'static str> {
     PRESETS.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
 }
 
@@ -253,33 +335,7 @@ mod tests {
         let changed = read(own).unwrap();
         let preset = PolicyMap::find("openpi").unwrap();
         let state = BTreeMap::from([("state".to_owned(), vec!["left_arm".to_owned()])]);
-        let chunk = Chunk { rows: None, execute: Some(25) };
+        let chunk = Chunk { execute: Some(25), ..Chunk::default() };
         assert_eq!(changed, PolicyMap { reply_s: 5.0, chunk, state, ..preset });
-    }
-
-    #[test]
-    fn what_is_wrong_with_a_map_is_said() {
-        let check = |text: &str, says: &str| {
-            let told = read(&format!("preset = \"openpi\"\n{text}")).unwrap_err().to_string();
-            assert!(told.contains(says), "{told}");
-        };
-        check("[state]\n\"s\" = [\"left_foot\"]", "no column \"left_foot\"; have: left_leg");
-        check(
-            "[action]\n\"a\" = [\"waist\"]\n\"b\" = [\"waist_yaw_joint\"]",
-            "\"waist_yaw_joint\" is told twice",
-        );
-        check("[action]", "tells no column");
-        check("[chunk]\nrows = 0", "rows is 0");
-        check("reply_s = nan", "reply_s is NaN");
-        check("answer = \"all\"", "needs scope = \"global\"");
-        check("answer = \"all\"\nscope = \"global\"", "put {robot} into the key \"observation/image\"");
-        check("scop = \"global\"", "unknown field `scop`");
-        check("[images]\n\"i\" = { camera = \"egocentric\", size = [0, 9] }", "from 1 to 4096");
-        assert!(read("preset = \"opempi\"").unwrap_err().to_string().contains("have: openpi, gr00t_n17_g1"));
-        let text = PolicyMap::find("opempi").unwrap_err().to_string();
-        assert!(
-            text.starts_with("no policy map \"opempi\"") && text.contains("openpi, gr00t_n17_g1"),
-            "{text}"
-        );
     }
 }

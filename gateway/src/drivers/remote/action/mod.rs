@@ -1,14 +1,39 @@
-//! From a policy's reply to rows of `send_joint_chunk`: checked against its map before a robot moves.
+//! From a policy's reply to what robots are told: checked against its map before a robot moves.
 
-use tandem_tools_spec::JointChunk;
+mod executor;
+mod spans;
+mod table;
+mod wrists;
+
+pub use executor::{Executor, executed_rows};
+pub use wrists::WristTarget;
+
+use tandem_tools_spec::ACTION_ROW_LEN;
 
 use super::{
-    columns::{action_columns, action_name},
+    columns::{ACTION_LEN, action_columns, action_name, held_row, sensed_pelvis, sensed_wrist},
     error::RemoteError,
     map::{AnswerScope, PolicyMap, ROBOT},
-    request::TaskInstructions,
+    poses::pose_of,
+    request::{PolicyObservation, TaskInstructions},
     values::ReplyValue,
 };
+
+/// What one robot is told: rows at the map's rate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RobotRows {
+    pub robot: String,
+    pub rows: Vec<ActionRow>,
+}
+
+/// What one robot is told at one moment, with nothing left that depends on where it was.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ActionRow {
+    /// As `send_joint_chunk` has it; of a robot that is told wrist poses, arms and waist do not count.
+    pub row: Vec<f64>,
+    /// Left and right.
+    pub wrists: [WristTarget; 2],
+}
 
 /// Some columns of every row of one robot, as they stand in a reply.
 struct ColumnBlock<'a> {
@@ -20,20 +45,24 @@ struct ColumnBlock<'a> {
     width: usize,
 }
 
-/// The chunks of the robots with the indices `robots`, for which `answer` came; columns that their policy leaves out are taken
-/// from `held_rows`.
+/// The rows of the robots with the indices `robots`, for which `answer` came; columns that their policy leaves out are taken
+/// from `held_rows`, and differences are added to what was `observed`.
 pub fn chunks(
     map: &PolicyMap,
     instructions: &TaskInstructions,
     answer: &ReplyValue,
     robots: &[usize],
     held_rows: &[Vec<f64>],
-) -> Result<Vec<JointChunk>, RemoteError> {
+    observed: &PolicyObservation,
+) -> Result<Vec<RobotRows>, RemoteError> {
     let mut found = Vec::with_capacity(robots.len());
     for (place, robot) in robots.iter().enumerate() {
         let name = &instructions.robots[*robot];
         let parts = parts(map, answer, name, place, robots.len())?;
-        found.push(JointChunk { robot: name.clone(), rows: joined(map, &parts, &held_rows[*robot])? });
+        let state_values = &observed.robots[*robot].state_values;
+        let told = joined(map, &parts, &held_rows[*robot])?;
+        let rows = told.iter().enumerate().map(|(row, told)| action_row(map, told, row, state_values));
+        found.push(RobotRows { robot: name.clone(), rows: rows.collect::<Result<_, _>>()? });
     }
     Ok(found)
 }
@@ -57,49 +86,13 @@ fn parts<'a>(
             false => (columns.len() * robots, columns.len() * place),
         };
         let key = key.replace(ROBOT, name);
-        let values = table(answer, &key, width, map.chunk.rows)?;
+        let values = table::find(answer, &key, width, map.chunk.rows)?;
         parts.push(ColumnBlock { key, columns, values, from, width });
     }
     Ok(parts)
 }
 
-/// The numbers under `key`, which have to be rows of `width` numbers.
-fn table<'a>(
-    answer: &'a ReplyValue,
-    key: &str,
-    width: usize,
-    rows: Option<usize>,
-) -> Result<&'a [f64], RemoteError> {
-    let expected = match rows {
-        Some(rows) => format!("expected an array of shape [{rows}, {width}] under the key {key:?}"),
-        None => format!("expected an array of shape [rows, {width}] under the key {key:?}"),
-    };
-    let misfit = |came: String| RemoteError::Misfit(format!("{expected}; came {came}"));
-    let value = answer.at(key).ok_or_else(|| misfit(answer.describe()))?;
-    let ReplyValue::Array { shape, values } = value else { return Err(misfit(value.describe())) };
-    let (have_rows, have_width) = match shape[..] {
-        // One column, or one row.
-        [length] if width == 1 => (length, 1),
-        [length] => (1, length),
-        [.., rows, width] => (rows, width),
-        [] => (0, 0),
-    };
-    let batches: usize = shape.iter().rev().skip(2).product();
-    if (batches, have_width) != (1, width) || have_rows == 0 || rows.is_some_and(|rows| rows != have_rows) {
-        return Err(misfit(value.describe()));
-    }
-    match values.iter().position(|value| !value.is_finite()) {
-        None => Ok(values),
-        Some(at) => Err(RemoteError::Misfit(format!(
-            "the number in row {}, column {} under the key {key:?} is {}; expected finite numbers",
-            at / width,
-            at % width,
-            values[at]
-        ))),
-    }
-}
-
-/// Whole rows, as many as are executed.
+/// Every column that a policy may tell, in as many rows as are executed.
 fn joined(map: &PolicyMap, parts: &[ColumnBlock], held_row: &[f64]) -> Result<Vec<Vec<f64>>, RemoteError> {
     let Some(first) = parts.first() else { return Ok(Vec::new()) };
     let rows = first.values.len() / first.width;
@@ -118,6 +111,7 @@ fn joined(map: &PolicyMap, parts: &[ColumnBlock], held_row: &[f64]) -> Result<Ve
     }
     let row = |row: usize| {
         let mut whole = held_row.to_vec();
+        whole.resize(ACTION_LEN, 0.0);
         for part in parts {
             let numbers = &part.values[row * part.width + part.from..];
             for (column, value) in part.columns.iter().zip(numbers) {
@@ -126,11 +120,42 @@ fn joined(map: &PolicyMap, parts: &[ColumnBlock], held_row: &[f64]) -> Result<Ve
         }
         whole
     };
-    let rows: Vec<Vec<f64>> = (0..executed).map(row).collect();
-    match rows.iter().flatten().position(|value| value.abs() > LARGEST_VALUE) {
-        None => Ok(rows),
-        Some(at) => {
-            let name = action_name(at % held_row.len());
+    Ok((0..executed).map(row).collect())
+}
+
+/// What the columns `told` in row number `row` ask of a robot that was observed to be at `state_values`.
+fn action_row(
+    map: &PolicyMap,
+    told: &[f64],
+    row: usize,
+    state_values: &[f64],
+) -> Result<ActionRow, RemoteError> {
+    let delta = map.delta();
+    let (mut whole, sensed_row) = (told[..ACTION_ROW_LEN].to_vec(), held_row(state_values));
+    for column in &delta.row_columns {
+        whole[*column] += sensed_row[*column];
+    }
+    let told_columns = map.told_columns();
+    let pelvis_in_start = pose_of(sensed_pelvis(state_values));
+    let mut wrists = [WristTarget::default(); 2];
+    for (side, wrist) in wrists.iter_mut().enumerate() {
+        let given = WristTarget::read(told, &told_columns, side)
+            .map_err(|reason| RemoteError::Misfit(format!("in row {row}, {reason}")))?;
+        let pelvis_from_wrist = pose_of(sensed_wrist(state_values, side));
+        *wrist =
+            given.resolved(map.chunk.wrist_frame, delta.wrists[side], &pelvis_from_wrist, &pelvis_in_start);
+    }
+    let positions_m = wrists.iter().filter_map(|wrist| wrist.position_m);
+    if positions_m
+        .flat_map(|position_m| <[f64; 3]>::from(position_m))
+        .any(|value| value.abs() > LARGEST_VALUE)
+    {
+        return Err(RemoteError::Misfit(format!("a wrist is sent beyond {LARGEST_VALUE} m; expected m")));
+    }
+    match whole.iter().position(|value| value.abs() > LARGEST_VALUE) {
+        None => Ok(ActionRow { row: whole, wrists }),
+        Some(column) => {
+            let name = action_name(column);
             Err(RemoteError::Misfit(format!(
                 "{name} is beyond {LARGEST_VALUE} in size; expected rad, m and m/s"
             )))
@@ -165,9 +190,18 @@ mod tests {
         ReplyValue::Map(entries.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect())
     }
 
-    fn read(map: &PolicyMap, answer: &ReplyValue, robots: &[usize]) -> Result<Vec<JointChunk>, String> {
+    fn read_at(
+        map: &PolicyMap,
+        answer: &ReplyValue,
+        robots: &[usize],
+        observed: &PolicyObservation,
+    ) -> Result<Vec<RobotRows>, String> {
         let held_rows = [vec![9.0; 35], vec![8.0; 35]];
-        chunks(map, &instructions(), answer, robots, &held_rows).map_err(|error| error.to_string())
+        chunks(map, &instructions(), answer, robots, &held_rows, observed).map_err(|error| error.to_string())
+    }
+
+    fn read(map: &PolicyMap, answer: &ReplyValue, robots: &[usize]) -> Result<Vec<RobotRows>, String> {
+        read_at(map, answer, robots, &PolicyObservation::blank(2))
     }
 
     #[test]
@@ -175,7 +209,7 @@ mod tests {
         let answer = keyed(&[("actions", array(&[50, 35]))]);
         let whole = read(&map(""), &answer, &[1]).unwrap();
         assert_eq!((whole.len(), &*whole[0].robot, whole[0].rows.len()), (1, "B", 50));
-        assert_eq!((whole[0].rows[0][1], whole[0].rows[1][0]), (0.01, 0.35));
+        assert_eq!((whole[0].rows[0].row[1], whole[0].rows[1].row[0]), (0.01, 0.35));
         let first = read(&map("[chunk]\nrows = 50\nexecute = 20"), &answer, &[1]).unwrap();
         assert_eq!(first[0].rows, whole[0].rows[..20]);
         // A batch of one, and one row alone.
@@ -188,7 +222,10 @@ mod tests {
         let own = map("[action]\n\"h\" = [\"pelvis_height_m\"]\n\"a\" = [\"waist\", \"left_arm\"]");
         let answer = keyed(&[("a", array(&[2, 10])), ("h", array(&[2]))]);
         let rows = &read(&own, &answer, &[0]).unwrap()[0].rows;
-        assert_eq!((rows[1][28], rows[1][0], rows[1][34], rows[1][7]), (0.1, 0.13, 0.01, 9.0));
+        assert_eq!(
+            (rows[1].row[28], rows[1].row[0], rows[1].row[34], rows[1].row[7]),
+            (0.1, 0.13, 0.01, 9.0)
+        );
         let uneven = keyed(&[("a", array(&[2, 10])), ("h", array(&[3, 1]))]);
         let text = read(&own, &uneven, &[0]).unwrap_err();
         assert!(text.contains("2 rows under the key \"a\" and 3 under \"h\""), "{text}");
@@ -202,12 +239,12 @@ mod tests {
         let answer = keyed(&[("actions", array(&[4, 6]))]);
         let chunks = read(&beside, &answer, &[0, 1]).unwrap();
         let waists: Vec<_> =
-            chunks.iter().map(|chunk| (&*chunk.robot, chunk.rows[1][28], chunk.rows[1][0])).collect();
+            chunks.iter().map(|chunk| (&*chunk.robot, chunk.rows[1].row[28], chunk.rows[1].row[0])).collect();
         assert_eq!(waists, [("A", 0.06, 9.0), ("B", 0.09, 8.0)]);
         let apart = map(&format!("{all}\"{{robot}} > actions\" = [\"waist\"]"));
         let of = |shape| keyed(&[("actions", array(shape))]);
         let chunks = read(&apart, &keyed(&[("A", of(&[4, 3])), ("B", of(&[4, 3]))]), &[0, 1]).unwrap();
-        assert_eq!(chunks.iter().map(|chunk| chunk.rows[1][28]).collect::<Vec<_>>(), [0.03, 0.03]);
+        assert_eq!(chunks.iter().map(|chunk| chunk.rows[1].row[28]).collect::<Vec<_>>(), [0.03, 0.03]);
     }
 
     #[test]
@@ -217,7 +254,7 @@ mod tests {
             assert!(text.contains(says), "{text}");
         };
         let any = map("");
-        let fixed = map("[chunk]\nrows = 50\nexecute = 60");
+        let fixed = map("[chunk]\nrows = 50");
         let expected = "expected an array of shape [rows, 35] under the key \"actions\"; came ";
         check(
             &any,
@@ -238,12 +275,46 @@ mod tests {
             &keyed(&[("actions", array(&[20, 35]))]),
             "[50, 35] under the key \"actions\"; came an array of shape [20, 35]",
         );
-        check(&fixed, &keyed(&[("actions", array(&[50, 35]))]), "50 rows, of which 60 are to be executed");
+        check(
+            &map("[chunk]\nexecute = 60"),
+            &keyed(&[("actions", array(&[50, 35]))]),
+            "50 rows, of which 60 are to be executed",
+        );
+        let bare = "came an array of shape [50, 35] without a key: answer with a map that has the key \"actions\", or make \"\" the key in [action]";
+        check(&any, &array(&[50, 35]), bare);
         let mut values = vec![0.0; 70];
         values[37] = f64::NAN;
         let broken = keyed(&[("actions", ReplyValue::Array { shape: vec![2, 35], values })]);
         check(&any, &broken, "row 1, column 2 under the key \"actions\" is NaN");
         let far = keyed(&[("actions", ReplyValue::Array { shape: vec![35], values: vec![4e6; 35] })]);
         check(&any, &far, "left_shoulder_pitch_joint is beyond 1000");
+    }
+
+    #[test]
+    fn differences_are_added_to_what_was_observed() {
+        let own = map(
+            "[action]\n\"a\" = [\"left_arm\", \"waist\", \"pelvis_height_m\"]\n[chunk]\ndelta = [\"left_arm\", \"pelvis_height_m\"]",
+        );
+        let mut observed = PolicyObservation::blank(2);
+        observed.robots[1].state_values[15] = 0.5;
+        *observed.robots[1].state_values.last_mut().unwrap() = 0.7;
+        let rows = &read_at(&own, &keyed(&[("a", array(&[2, 11]))]), &[1], &observed).unwrap()[0].rows;
+        // The first joint of the arm, the waist as it is told, the height, and what is held.
+        let row = &rows[1].row;
+        assert_eq!((row[0], row[28], row[7]), (0.5 + 0.11, 0.18, 8.0));
+        assert!((row[34] - (0.7 + 0.21)).abs() < 1e-12, "{row:?}");
+    }
+
+    #[test]
+    fn poses_without_a_direction_are_refused() {
+        let own = map("[action]\n\"a\" = [\"left_wrist\"]");
+        let answer = |values: Vec<f64>| keyed(&[("a", ReplyValue::Array { shape: vec![1, 7], values })]);
+        let text = read(&own, &answer(vec![0.0; 7]), &[0]).unwrap_err();
+        assert!(text.contains("in row 0, the rotation of left_wrist has no direction"), "{text}");
+        let text = read(&own, &answer(vec![4e6, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), &[0]).unwrap_err();
+        assert!(text.contains("a wrist is sent beyond 1000 m"), "{text}");
+        let rows = &read(&own, &answer(vec![0.3, 0.2, 0.1, 2.0, 0.0, 0.0, 0.0]), &[0]).unwrap()[0].rows;
+        assert_eq!(rows[0].wrists[0].position_m.unwrap().x, 0.3);
+        assert_eq!((rows[0].wrists[1], rows[0].row[0]), (WristTarget::default(), 9.0));
     }
 }

@@ -1,34 +1,12 @@
 //! Pictures in the size and order that a policy wants.
 
 use image::{ImageBuffer, Rgb, RgbImage, imageops};
-use serde::{Deserialize, Serialize};
 use tandem_episodes::Picture;
 
-use super::values::{Array, Elements};
-
-/// How a picture gets to another size.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Fit {
-    /// The whole picture as large as fits, in the middle of black, as `resize_with_pad` of openpi-client.
-    #[default]
-    Pad,
-    /// Stretched to the new size, whatever becomes of its shape.
-    Stretch,
-    /// The largest part of the right shape, from the middle.
-    Crop,
-}
-
-/// The order of a picture's elements.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Layout {
-    /// Rows, columns, colours.
-    #[default]
-    Hwc,
-    /// Colours, rows, columns.
-    Chw,
-}
+use crate::drivers::remote::{
+    map::{Fit, Layout},
+    values::{Array, Elements},
+};
 
 /// Smooth in both directions, as Pillow's bilinear filter.
 const FILTER: imageops::FilterType = imageops::FilterType::Triangle;

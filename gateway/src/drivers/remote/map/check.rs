@@ -1,0 +1,256 @@
+//! Whether a map can be followed, and if not, what would be right.
+
+use super::{AnswerScope, CameraName, HistorySpan, PolicyMap, ROBOT, Scope, WristFrame};
+use crate::drivers::remote::{
+    columns::{
+        WRISTS, action_columns, action_name, is_of_arm_or_waist, state_columns, velocities, wrist_position,
+        wrist_rotation,
+    },
+    poses::RotationForm,
+};
+
+/// The longest side of a picture that a policy is shown.
+const LONGEST_SIDE_PX: u32 = 4096;
+/// A row of wrist poses is one command, which has 25 control steps at most: half a second.
+const RATES_HZ: [f64; 2] = [2.0, 1000.0];
+const LONGEST_HISTORY: usize = 32;
+
+impl PolicyMap {
+    /// Whether it can be followed.
+    pub(super) fn check(&self) -> Result<(), String> {
+        for names in self.state.values() {
+            state_columns(names)?;
+        }
+        let told = self.check_action()?;
+        self.check_wrists(&told)?;
+        self.check_delta(&told)?;
+        let wrong = |size: &[u32; 2]| !size.iter().all(|side| (1..=LONGEST_SIDE_PX).contains(side));
+        if let Some((key, _)) = self.images.iter().find(|(_, image)| image.size.as_ref().is_some_and(wrong)) {
+            return Err(format!("the size of {key:?}: give two numbers from 1 to {LONGEST_SIDE_PX}"));
+        }
+        for (name, value_s) in [("connect_s", self.connect_s), ("reply_s", self.reply_s)] {
+            if !(0.0..=86400.0).contains(&value_s) {
+                return Err(format!("{name} is {value_s}; give seconds, at most a day's"));
+            }
+        }
+        self.check_chunk()?;
+        self.history.as_ref().map_or(Ok(()), check_history)?;
+        self.check_keys()
+    }
+
+    /// The columns that are told; none of them by two keys.
+    fn check_action(&self) -> Result<Vec<usize>, String> {
+        let all: Vec<String> = self.action.values().flatten().cloned().collect();
+        let told = action_columns(&all)?;
+        match told.is_empty() {
+            true => Err("[action] tells no column".into()),
+            false => Ok(told),
+        }
+    }
+
+    /// Inverse kinematics moves arms and waist to where wrists are to be: nobody else may.
+    fn check_wrists(&self, told: &[usize]) -> Result<(), String> {
+        for (side, wrist) in WRISTS.iter().enumerate() {
+            let forms = RotationForm::ALL.into_iter().map(|form| wrist_rotation(side, form).start);
+            if forms.filter(|start| told.contains(start)).count() > 1 {
+                return Err(format!("the rotation of {wrist} is told twice; give one form of it"));
+            }
+        }
+        let wrists = self.told_wrists(told);
+        let frame = self.chunk.wrist_frame;
+        match wrists.first() {
+            None if frame != WristFrame::Pelvis => {
+                Err("[chunk] wrist_frame is for poses of wrists, and [action] has none".into())
+            }
+            None => Ok(()),
+            Some(wrist) => match told.iter().find(|column| is_of_arm_or_waist(**column)) {
+                Some(column) => Err(format!(
+                    "[action] tells {wrist:?} and {:?}; arms and waist follow the wrists by inverse kinematics, so give \
+                     one or the other",
+                    action_name(*column)
+                )),
+                None => Ok(()),
+            },
+        }
+    }
+
+    fn told_wrists(&self, told: &[usize]) -> Vec<&'static str> {
+        let is_told = |side: usize| {
+            let rotations = RotationForm::ALL.into_iter().map(|form| wrist_rotation(side, form).start);
+            rotations.chain([wrist_position(side).start]).any(|start| told.contains(&start))
+        };
+        WRISTS.into_iter().enumerate().filter(|(side, _)| is_told(*side)).map(|(_, wrist)| wrist).collect()
+    }
+
+    /// Only what is told, and what a robot can be at, can be a difference.
+    fn check_delta(&self, told: &[usize]) -> Result<(), String> {
+        let wrists = self.told_wrists(told);
+        for name in &self.chunk.delta {
+            if let Some(wrist) = WRISTS.iter().find(|wrist| name.starts_with(*wrist)) {
+                match (name == wrist, wrists.contains(wrist)) {
+                    (false, _) => {
+                        return Err(format!("[chunk] delta: {name:?}; give the whole pose, {wrist:?}"));
+                    }
+                    (true, false) => return Err(format!("[chunk] delta: [action] does not tell {name:?}")),
+                    (true, true) => continue,
+                }
+            }
+            for column in action_columns(std::slice::from_ref(name))
+                .map_err(|reason| format!("[chunk] delta: {reason}"))?
+            {
+                let column_name = action_name(column);
+                if velocities().contains(&column) {
+                    return Err(format!(
+                        "[chunk] delta: {column_name:?} is a velocity, which is always told as it is to be; give joints, \
+                         pelvis_height_m or wrists"
+                    ));
+                }
+                if !told.contains(&column) {
+                    return Err(format!("[chunk] delta: [action] does not tell {column_name:?}"));
+                }
+            }
+        }
+        let delta = self.delta();
+        let whole = |(side, wrist): (usize, &&str)| !wrists.contains(wrist) || delta.wrists[side];
+        match self.chunk.wrist_frame == WristFrame::Wrist && !WRISTS.iter().enumerate().all(whole) {
+            true => Err(format!(
+                "[chunk] wrist_frame = \"wrist\" tells where a wrist goes from where it was observed; give delta = {wrists:?} \
+                 as well, or another frame"
+            )),
+            false => Ok(()),
+        }
+    }
+
+    fn check_chunk(&self) -> Result<(), String> {
+        let chunk = &self.chunk;
+        for (name, count) in [("rows", chunk.rows), ("execute", chunk.execute)] {
+            if count == Some(0) {
+                return Err(format!("[chunk] {name} is 0; a chunk has at least one row"));
+            }
+        }
+        if let (Some(rows), Some(execute)) = (chunk.rows, chunk.execute)
+            && execute > rows
+        {
+            return Err(format!(
+                "[chunk] execute is {execute} and rows is {rows}; no more rows can be executed than there are: give execute at \
+                 most {rows}, or leave it out for all"
+            ));
+        }
+        let [least_hz, most_hz] = RATES_HZ;
+        match chunk.rate_hz {
+            Some(rate_hz) if !(least_hz..=most_hz).contains(&rate_hz) => {
+                Err(format!("[chunk] rate_hz is {rate_hz}; give rows a second, from {least_hz} to {most_hz}"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// One answer for all robots is asked with keys for all robots.
+    fn check_keys(&self) -> Result<(), String> {
+        if self.answer == AnswerScope::One {
+            return Ok(());
+        }
+        let egocentric = self.images.iter().filter(|(_, image)| image.camera == CameraName::Egocentric);
+        let mut own = egocentric.map(|(key, _)| key).chain(self.state.keys());
+        match (self.scope, own.find(|key| !key.contains(ROBOT))) {
+            (Scope::Local, _) => Err("answer = \"all\" needs scope = \"global\"".into()),
+            (Scope::Global, Some(key)) => Err(format!(
+                "answer = \"all\" asks for no robot in particular; put {ROBOT} into the key {key:?}"
+            )),
+            (Scope::Global, None) => Ok(()),
+        }
+    }
+}
+
+fn check_history(history: &HistorySpan) -> Result<(), String> {
+    match (history.length, history.stride) {
+        (2..=LONGEST_HISTORY, 1..) => Ok(()),
+        (_, 0) => {
+            Err("[history] stride is 0; give how many rows are executed between two observations".into())
+        }
+        (length, _) => Err(format!(
+            "[history] length is {length}; give 2 to {LONGEST_HISTORY}, or leave [history] out for the present alone"
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::drivers::remote::map::MapError;
+
+    fn read(text: &str) -> Result<PolicyMap, MapError> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        fs::write(file.path(), text).unwrap();
+        PolicyMap::find(&file.path().display().to_string())
+    }
+
+    fn check(text: &str, says: &str) {
+        let told = read(&format!("preset = \"openpi\"\n{text}")).unwrap_err().to_string();
+        assert!(told.contains(says), "{told}");
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_map_is_said() {
+        check("[state]\n\"s\" = [\"left_foot\"]", "no column \"left_foot\"; have: left_leg");
+        check(
+            "[action]\n\"a\" = [\"waist\"]\n\"b\" = [\"waist_yaw_joint\"]",
+            "\"waist_yaw_joint\" is told twice",
+        );
+        check("[action]", "tells no column");
+        check("[chunk]\nrows = 0", "rows is 0");
+        check(
+            "[chunk]\nrows = 50\nexecute = 60",
+            "execute is 60 and rows is 50; no more rows can be executed",
+        );
+        check("reply_s = nan", "reply_s is NaN");
+        check("answer = \"all\"", "needs scope = \"global\"");
+        check("answer = \"all\"\nscope = \"global\"", "put {robot} into the key \"observation/image\"");
+        check("scop = \"global\"", "unknown field `scop`");
+        check("[images]\n\"i\" = { camera = \"egocentric\", size = [0, 9] }", "from 1 to 4096");
+        assert!(read("preset = \"opempi\"").unwrap_err().to_string().contains("have: openpi, gr00t_n17_g1"));
+        let text = PolicyMap::find("opempi").unwrap_err().to_string();
+        assert!(
+            text.starts_with("no policy map \"opempi\"") && text.contains("openpi, gr00t_n17_g1"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn what_is_wrong_with_rates_and_histories_is_said() {
+        check("[chunk]\nrate_hz = 0.5", "rate_hz is 0.5; give rows a second, from 2 to 1000");
+        check("[chunk]\nrate_hz = nan", "rate_hz is NaN");
+        check("[chunk]\nbetween = \"jump\"", "unknown variant `jump`, expected `interpolate` or `hold`");
+        check("[history]\nlength = 1", "length is 1; give 2 to 32");
+        check("[history]\nlength = 2\nstride = 0", "stride is 0");
+        let map = read("preset = \"openpi\"\n[history]\nlength = 2\n[chunk]\nrate_hz = 15").unwrap();
+        assert_eq!((map.rate_hz(), map.history.unwrap().stride), (15.0, 1));
+    }
+
+    #[test]
+    fn what_is_wrong_with_wrists_and_deltas_is_said() {
+        let wrists = "[action]\n\"a\" = [\"left_wrist_position\", \"left_wrist_rows_6d\", \"right_wrist\", \"vx_m_s\"]\n[chunk]\n";
+        let says = |chunk: &str, says: &str| check(&format!("{wrists}{chunk}"), says);
+        says("delta = [\"right_wrist_position\"]", "give the whole pose, \"right_wrist\"");
+        says("delta = [\"vx_m_s\"]", "\"vx_m_s\" is a velocity");
+        says("delta = [\"left_hand\"]", "does not tell \"left_hand_thumb_0_joint\"");
+        says("delta = [\"left_foot\"]", "no column \"left_foot\"");
+        says("wrist_frame = \"wrist\"", "give delta = [\"left_wrist\", \"right_wrist\"] as well");
+        says("wrist_frame = \"wrist\"\ndelta = [\"left_wrist\"]", "as well");
+        says("wrist_frame = \"world\"", "expected one of `pelvis`, `start`, `wrist`");
+        check("[chunk]\nwrist_frame = \"start\"", "wrist_frame is for poses of wrists");
+        check("[chunk]\ndelta = [\"left_wrist\"]", "[action] does not tell \"left_wrist\"");
+        check(
+            "[action]\n\"a\" = [\"left_wrist\", \"waist\"]",
+            "tells \"left_wrist\" and \"waist_yaw_joint\"; arms and waist follow the wrists",
+        );
+        check(
+            "[action]\n\"a\" = [\"left_wrist\", \"left_wrist_rows_6d\"]",
+            "the rotation of left_wrist is told twice",
+        );
+        let map = read(&format!("preset = \"openpi\"\n{wrists}delta = [\"left_wrist\"]\n")).unwrap();
+        assert_eq!((map.delta().wrists, map.delta().row_columns), ([true, false], vec![]));
+    }
+}

@@ -1,0 +1,59 @@
+//! What a policy may be shown of one moment.
+
+use std::sync::Arc;
+
+use tandem_episodes::{
+    Picture,
+    players::{LocalEpisode, PlayerError},
+};
+use tandem_tools_spec::Observe;
+
+use crate::drivers::remote::columns::{blank_state_values, state_values};
+
+/// What a policy may be shown of one moment.
+#[derive(Clone)]
+pub struct PolicyObservation {
+    /// One for each robot, in the task's order.
+    pub robots: Vec<RobotInputs>,
+    /// The room, where the policy is shown it.
+    pub third_person: Option<Arc<Picture>>,
+}
+
+/// What one robot sees and senses.
+#[derive(Clone)]
+pub struct RobotInputs {
+    pub picture: Arc<Picture>,
+    /// Numbers in the order of [`state_values`].
+    pub state_values: Vec<f64>,
+}
+
+/// Size of pictures that nobody has taken.
+const WIDTH_PX: u32 = 320;
+const HEIGHT_PX: u32 = 240;
+
+impl PolicyObservation {
+    /// Looks through all robots, and at the room where that is wanted.
+    pub fn take(
+        episode: &mut dyn LocalEpisode,
+        third_person: bool,
+    ) -> Result<PolicyObservation, PlayerError> {
+        let seen = episode.observe(&Observe { robots: None, short: Some(true) })?;
+        let inputs = seen.robots.iter().map(|robot| RobotInputs {
+            picture: robot.view.picture.clone(),
+            state_values: state_values(&robot.state),
+        });
+        let third_person = third_person.then(|| episode.third_person().into());
+        Ok(PolicyObservation { robots: inputs.collect(), third_person })
+    }
+
+    /// Black pictures and zeros, of the right sizes, to try a policy with before an episode begins.
+    pub fn blank(robots: usize) -> PolicyObservation {
+        let black = vec![0; (3 * WIDTH_PX * HEIGHT_PX) as usize];
+        let picture = Arc::new(Picture::new(WIDTH_PX, HEIGHT_PX, black));
+        let inputs = || RobotInputs { picture: picture.clone(), state_values: blank_state_values() };
+        PolicyObservation {
+            robots: (0..robots).map(|_| inputs()).collect(),
+            third_person: Some(picture.clone()),
+        }
+    }
+}

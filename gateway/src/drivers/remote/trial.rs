@@ -1,0 +1,398 @@
+//! A map tried on a made-up observation and a made-up answer: what a policy would be sent, and what its answer would do.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+use tandem_episodes::{
+    CONTROL_HZ, rules,
+    tasks::{self, Task},
+};
+use tandem_tools_spec::Protocol;
+
+use super::{
+    action::{Executor, RobotRows, chunks, executed_rows},
+    columns::{action_columns, action_name, held_row, is_of_arm_or_waist, state_columns},
+    error::RemoteError,
+    instructions,
+    map::{AnswerScope, Between, CameraName, PolicyMap, ROBOT, WristFrame},
+    request::{PolicyObservation, TaskInstructions, request},
+    values::{ReplyValue, RequestValue},
+};
+
+/// Rows of a made-up answer where the map leaves open how many there are.
+const ROWS: usize = 10;
+
+/// Tries `map` with as many robots as there are tasks for, and says what came of it.
+pub fn try_map(map: &PolicyMap) -> Result<String, RemoteError> {
+    let by_robots: BTreeMap<usize, &Task> =
+        tasks::ALL.iter().rev().map(|task| (task.robots.len(), task)).collect();
+    let trials = by_robots.values().map(|task| Ok(MapTrial::new(map, task)?.text()));
+    Ok(trials.collect::<Result<Vec<_>, RemoteError>>()?.join("\n"))
+}
+
+/// A map with as many robots as one task has.
+struct MapTrial<'a> {
+    map: &'a PolicyMap,
+    task: &'a Task,
+    instructions: TaskInstructions,
+    observation: PolicyObservation,
+    /// The robots of the first request.
+    asked: Vec<usize>,
+    chunks: Vec<RobotRows>,
+}
+
+/// A key, what kind of value stands under it, and what that is.
+struct KeyLine {
+    key: String,
+    kind: String,
+    content: String,
+}
+
+impl<'a> MapTrial<'a> {
+    /// Makes up an answer to every request, and reads it as a policy's.
+    fn new(map: &'a PolicyMap, task: &'a Task) -> Result<MapTrial<'a>, RemoteError> {
+        let (instructions, robots) = (instructions(task), task.robots.len());
+        let observation = PolicyObservation::blank(robots);
+        let held_rows: Vec<Vec<f64>> =
+            observation.robots.iter().map(|robot| held_row(&robot.state_values)).collect();
+        let queries: Vec<Vec<usize>> = match map.answer {
+            AnswerScope::One => (0..robots).map(|robot| vec![robot]).collect(),
+            AnswerScope::All => vec![(0..robots).collect()],
+        };
+        let mut told = Vec::with_capacity(robots);
+        for asked in &queries {
+            let answer = made_up_answer(map, &instructions, asked);
+            told.extend(chunks(map, &instructions, &answer, asked, &held_rows, &observation)?);
+        }
+        let asked = queries.into_iter().next().unwrap_or_default();
+        Ok(MapTrial { map, task, instructions, observation, asked, chunks: told })
+    }
+
+    fn text(&self) -> String {
+        let (robots, names) = (self.chunks.len(), self.instructions.robots.join(", "));
+        let asked = match self.map.answer {
+            AnswerScope::One => format!("a request for each of {names}; the one for A:"),
+            AnswerScope::All => format!("one request for {names} together:"),
+        };
+        let sent = self.request_lines();
+        let answered: Vec<KeyLine> =
+            self.map.action.iter().flat_map(|(key, names)| self.answer_lines(key, names)).collect();
+        let widest =
+            |width: fn(&KeyLine) -> usize| sent.iter().chain(&answered).map(width).max().unwrap_or(0);
+        let (key_width, kind_width) = (widest(|line| line.key.len()), widest(|line| line.kind.len()));
+        let lines = |lines: &[KeyLine]| -> String {
+            let line = |KeyLine { key, kind, content }: &KeyLine| {
+                format!("  {key:key_width$}  {kind:kind_width$}  {content}").trim_end().to_owned() + "\n"
+            };
+            lines.iter().map(line).collect()
+        };
+        format!(
+            "{robots} robots: {asked}\n{}its answer, columns counted from 0:\n{}{}",
+            lines(&sent),
+            lines(&answered),
+            self.execution()
+        )
+    }
+
+    /// What stands under each key of the first request.
+    fn request_lines(&self) -> Vec<KeyLine> {
+        let robot = match self.map.answer {
+            AnswerScope::One => self.asked.first().copied(),
+            AnswerScope::All => None,
+        };
+        let moments = self.map.history.map_or(1, |history| history.length);
+        let sent = request(self.map, &self.instructions, &vec![&self.observation; moments], robot);
+        let RequestValue::Map(entries) = sent else { return Vec::new() };
+        let mut lines = Vec::new();
+        flatten("", &entries, &mut lines);
+        let line = |(key, value): (String, &RequestValue)| KeyLine {
+            content: self.sent_under(&key, value),
+            kind: kind(value),
+            key,
+        };
+        lines.into_iter().map(line).collect()
+    }
+
+    /// What of robots or room is sent under `key`.
+    fn sent_under(&self, key: &str, value: &RequestValue) -> String {
+        let is_it = |known: &str| {
+            let named = |name: &String| parts(&known.replace(ROBOT, name)) == key;
+            parts(known) == key || self.instructions.robots.iter().any(named)
+        };
+        let image = self.map.images.iter().find(|(known, _)| is_it(known));
+        let state = self.map.state.iter().find(|(known, _)| is_it(known));
+        match (image, state, value) {
+            (Some((_, image)), _, _) => match image.camera {
+                CameraName::Egocentric => "the camera in the robot's head".into(),
+                CameraName::ThirdPerson => "the room, which results note as extra information".into(),
+            },
+            (_, Some((_, names)), _) => {
+                let width = |name: &String| {
+                    state_columns(std::slice::from_ref(name)).map_or(0, |columns| columns.len())
+                };
+                let widths = names.iter().map(|name| format!("{name} {}", width(name)));
+                widths.collect::<Vec<_>>().join(", ")
+            }
+            (None, None, RequestValue::Text(text)) => format!("{text:?}"),
+            (None, None, RequestValue::List(texts)) => {
+                texts.iter().map(|text| self.sent_under(key, text)).collect()
+            }
+            (None, None, RequestValue::Map(_) | RequestValue::Array(_)) => String::new(),
+        }
+    }
+
+    /// What an answer has under `key`, and where that goes.
+    fn answer_lines(&self, key: &str, names: &[String]) -> Vec<KeyLine> {
+        let robots: Vec<&String> = self.asked.iter().map(|robot| &self.instructions.robots[*robot]).collect();
+        let rows = self.map.chunk.rows.map_or("rows".to_owned(), |rows| rows.to_string());
+        let line = |key: String, robots: &[&String]| {
+            let mut from = 0;
+            let mut content = Vec::new();
+            for robot in robots {
+                for name in names {
+                    let width = action_columns(std::slice::from_ref(name)).map_or(0, |columns| columns.len());
+                    let range =
+                        if width == 1 { from.to_string() } else { format!("{from}-{}", from + width - 1) };
+                    content.push(format!(
+                        "{range} {name}{}{}",
+                        self.understood(name),
+                        of_robot(robot, robots)
+                    ));
+                    from += width;
+                }
+            }
+            let key = if parts(&key).is_empty() { "(the answer itself)".into() } else { key };
+            KeyLine { key, kind: format!("[{rows}, {from}]"), content: content.join(", ") }
+        };
+        match key.contains(ROBOT) {
+            true => robots.iter().map(|robot| line(key.replace(ROBOT, robot), &[robot])).collect(),
+            false => vec![line(key.to_owned(), &robots)],
+        }
+    }
+
+    /// What else than a target a column is.
+    fn understood(&self, name: &str) -> &'static str {
+        let columns = action_columns(&[name.to_owned()]).unwrap_or_default();
+        let delta = self.map.delta();
+        let side = |wrist: &str| name.starts_with(wrist);
+        let is_delta = columns.iter().any(|column| delta.row_columns.contains(column))
+            || side("left_wrist") && delta.wrists[0]
+            || side("right_wrist") && delta.wrists[1];
+        let is_wrist = side("left_wrist") || side("right_wrist");
+        match (is_wrist, is_delta, self.map.chunk.wrist_frame) {
+            (false, false, _) => "",
+            (false, true, _) => " (added to what was observed)",
+            (true, false, WristFrame::Pelvis) => " (pelvis frame)",
+            (true, false, WristFrame::Start) => " (start frame)",
+            (true, true, WristFrame::Pelvis) => " (from where it was observed, along the pelvis' axes)",
+            (true, true, WristFrame::Start) => " (from where it was observed, along the start frame's axes)",
+            (true, _, WristFrame::Wrist) => " (from where it was observed, along its own axes)",
+        }
+    }
+
+    /// The calls that a made-up answer becomes.
+    fn execution(&self) -> String {
+        let rows = executed_rows(&self.chunks);
+        let calls = |protocol: Protocol| {
+            let most_steps = rules(protocol, self.task).steps_per_command as usize;
+            let executor = Executor::new(self.map, most_steps, &self.observation);
+            let commands = executor.commands(&self.chunks, 0..rows);
+            commands.into_iter().map(|command| executor.call(command, &self.chunks)).collect::<Vec<_>>()
+        };
+        let (agentic, benchmark) = (calls(Protocol::Agentic), calls(Protocol::Benchmark));
+        let steps: u32 = benchmark.iter().map(|call| call.steps()).sum();
+        let Some(first) = benchmark.first() else { return String::new() };
+        let between = match self.map.chunk.between {
+            _ if self.map.rate_hz() == CONTROL_HZ => "",
+            Between::Interpolate => ", with even steps from row to row",
+            Between::Hold => ", each row held until the next",
+        };
+        let count = |calls: usize| if calls == 1 { "1 call".to_owned() } else { format!("{calls} calls") };
+        format!(
+            "{}{rows} rows at {} a second make {steps} control steps of 20 ms{between}: {} of {} in the agentic protocol, {} in the \
+             benchmark's.\nfor columns of 0.01, 0.02, ..., the first of them tells A: {}\n",
+            self.held(),
+            self.map.rate_hz(),
+            count(agentic.len()),
+            first.name(),
+            count(benchmark.len()),
+            told_first(&json!(first))
+        )
+    }
+
+    /// What no key tells.
+    fn held(&self) -> String {
+        let told = self.map.told_columns();
+        let blocks = ["left_arm", "right_arm", "left_hand", "right_hand", "waist", "base_command"];
+        let mut held = Vec::new();
+        for block in blocks {
+            let columns = action_columns(&[block.to_owned()]).unwrap_or_default();
+            let follows = self.map.moves_wrists() && columns.iter().all(|column| is_of_arm_or_waist(*column));
+            let open: Vec<usize> = columns.iter().copied().filter(|column| !told.contains(column)).collect();
+            match (follows, open.len()) {
+                (true, _) | (_, 0) => {}
+                (false, all) if all == columns.len() => held.push(block.to_owned()),
+                (false, _) => held.extend(open.into_iter().map(action_name)),
+            }
+        }
+        let follows = match self.map.moves_wrists() {
+            true => "arms and waist follow the wrists by inverse kinematics, as for move_wrists\n",
+            false => "",
+        };
+        match held.is_empty() {
+            true => follows.into(),
+            false => format!("{follows}no key tells {}: held as at the start\n", held.join(", ")),
+        }
+    }
+}
+
+/// An answer of the shape that the map expects, whose columns can be told apart: 0.01, 0.02 and so on.
+fn made_up_answer(map: &PolicyMap, instructions: &TaskInstructions, asked: &[usize]) -> ReplyValue {
+    let rows = map.chunk.rows.or(map.chunk.execute).unwrap_or(ROWS);
+    let mut answer = ReplyValue::Map(Vec::new());
+    for (key, names) in &map.action {
+        let width = action_columns(names).map_or(0, |columns| columns.len());
+        let table = |width: usize| ReplyValue::Array {
+            shape: vec![rows, width],
+            values: (0..rows * width).map(|index| (index % width + 1) as f64 / 100.0).collect(),
+        };
+        match (key.contains(ROBOT), map.answer) {
+            (true, _) => asked.iter().for_each(|robot| {
+                answer.put(&key.replace(ROBOT, &instructions.robots[*robot]), table(width));
+            }),
+            (false, AnswerScope::One) => answer.put(key, table(width)),
+            (false, AnswerScope::All) => answer.put(key, table(width * asked.len())),
+        }
+    }
+    answer
+}
+
+/// Keys with their values, those in maps with what leads there.
+fn flatten<'a>(
+    before: &str,
+    entries: &'a [(String, RequestValue)],
+    found: &mut Vec<(String, &'a RequestValue)>,
+) {
+    for (key, value) in entries {
+        let key = if before.is_empty() { key.clone() } else { format!("{before} > {key}") };
+        match value {
+            RequestValue::Map(inner) => flatten(&key, inner, found),
+            RequestValue::Array(_) | RequestValue::Text(_) | RequestValue::List(_) => {
+                found.push((key, value))
+            }
+        }
+    }
+}
+
+/// A key as [`flatten`] writes it.
+fn parts(key: &str) -> String {
+    super::values::path(key).collect::<Vec<_>>().join(" > ")
+}
+
+fn kind(value: &RequestValue) -> String {
+    match value {
+        RequestValue::Array(array) => {
+            let of = match array.dtype() {
+                "|u1" => "uint8",
+                _ => "float32",
+            };
+            format!("{of} {:?}", array.shape)
+        }
+        RequestValue::Text(_) => "text".into(),
+        RequestValue::List(items) => {
+            format!("list of {}, each {}", items.len(), items.first().map_or(String::new(), kind))
+        }
+        RequestValue::Map(_) => "map".into(),
+    }
+}
+
+fn of_robot(robot: &str, robots: &[&String]) -> String {
+    match robots.len() {
+        1 => String::new(),
+        _ => format!(" of {robot}"),
+    }
+}
+
+/// What the first robot of a command is told, without what is left open, and of rows the first.
+fn told_first(call: &Value) -> Value {
+    let mut entry = call["robots"][0].clone();
+    if let Some(fields) = entry.as_object_mut() {
+        fields.retain(|name, value| !value.is_null() && name != "robot");
+        if let Some(rows) = fields.get_mut("rows").and_then(Value::as_array_mut) {
+            rows.truncate(1);
+        }
+        if let Some(steps) = call.get("steps") {
+            fields.insert("steps".into(), steps.clone());
+        }
+    }
+    entry
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tried(text: &str) -> String {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), format!("preset = \"openpi\"\n{text}")).unwrap();
+        try_map(&PolicyMap::find(&file.path().display().to_string()).unwrap()).unwrap()
+    }
+
+    fn check(text: &str, says: &[&str]) {
+        let told = tried(text);
+        let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+        for line in says {
+            assert!(words(&told).contains(&words(line)), "{line:?} in\n{told}");
+        }
+    }
+
+    #[test]
+    fn presets_are_told_for_two_and_three_robots() {
+        check(
+            "",
+            &[
+                "2 robots: a request for each of A, B; the one for A:",
+                "3 robots: a request for each of A, B, C; the one for A:",
+                "observation/image uint8 [224, 224, 3] the camera in the robot's head",
+                "observation/state float32 [43] left_leg 6, right_leg 6, waist 3",
+                "prompt text \"",
+                "actions [rows, 35] 0-6 left_arm, 7-13 right_arm",
+                "31-34 base_command",
+                "10 rows at 50 a second make 10 control steps of 20 ms: 1 call of send_joint_chunk in the agentic protocol, 1 call in",
+                "tells A: {\"rows\":[[0.01,0.02,0.03,",
+            ],
+        );
+        for (name, _) in crate::drivers::PRESETS {
+            assert!(!tried(&format!("# {name}")).contains("held as at the start"));
+        }
+    }
+
+    #[test]
+    fn what_goes_where_is_told() {
+        check(
+            "scope = \"global\"\nanswer = \"all\"\n[images]\n\"eyes > {robot}\" = { camera = \"egocentric\" }\n\
+             \"room\" = { camera = \"third_person\", size = [8, 6] }\n[state]\n\"{robot}\" = [\"waist\"]\n[action]\n\
+             \"\" = [\"left_arm\", \"vx_m_s\"]\n[history]\nlength = 2\nform = \"list\"\n",
+            &[
+                "3 robots: one request for A, B, C together:",
+                "eyes > C list of 2, each uint8 [240, 320, 3] the camera in the robot's head",
+                "room list of 2, each uint8 [6, 8, 3] the room, which results note",
+                "(the answer itself) [rows, 24] 0-6 left_arm of A, 7 vx_m_s of A, 8-14 left_arm of B",
+                "no key tells right_arm, left_hand, right_hand, waist, vy_m_s, yaw_rate_rad_s, pelvis_height_m: held",
+            ],
+        );
+        check(
+            "[action]\n\"a\" = [\"left_wrist_position\", \"left_wrist_rows_6d\"]\n\"h\" = [\"left_hand\", \"pelvis_height_m\"]\n\
+             [chunk]\nrows = 30\nexecute = 15\nrate_hz = 15\nwrist_frame = \"wrist\"\ndelta = [\"left_wrist\", \"left_hand\"]",
+            &[
+                "a [30, 9] 0-2 left_wrist_position (from where it was observed, along its own axes), 3-8 left_wrist_rows_6d",
+                "h [30, 8] 0-6 left_hand (added to what was observed), 7 pelvis_height_m",
+                "arms and waist follow the wrists by inverse kinematics",
+                "no key tells right_hand, vx_m_s, vy_m_s, yaw_rate_rad_s: held",
+                "15 rows at 15 a second make 50 control steps of 20 ms, with even steps from row to row: 15 calls of move_wrists",
+                "\"left_position_m\":[0.01,0.02,0.03]",
+                "\"steps\":3",
+            ],
+        );
+    }
+}
