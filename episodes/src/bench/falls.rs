@@ -42,7 +42,7 @@ pub fn falls(
 /// One episode of a case; those in the worlds of tasks go through all tasks, each case from another one on.
 fn trial(case: &FallCase, number: usize, seed: u32) -> Result<FallTrial, BenchError> {
     let episode = seed - FIRST_SEED;
-    let (world, budget_steps, place) = match case.place {
+    let (mut world, budget_steps, place) = match case.place {
         FallPlace::Task | FallPlace::TaskFromAbove => {
             let task = &tasks::ALL[(number + episode as usize) % tasks::ALL.len()];
             let built = build(&EpisodeSpec::new(task, seed, Protocol::Benchmark)).map_err(Box::new)?;
@@ -52,6 +52,6 @@ fn trial(case: &FallCase, number: usize, seed: u32) -> Result<FallTrial, BenchEr
             (case.world()?, 0, case.name)
         }
     };
-    let trial = case.play(world, budget_steps, u64::from(seed));
+    let trial = case.play(&mut world, budget_steps, u64::from(seed));
     Ok(FallTrial { played: format!("{place} seed {seed}"), ..trial })
 }

@@ -108,8 +108,7 @@ impl FallCase {
     }
 
     /// Plays one seed in `world`, that of a task or [`FallCase::world`]; `budget_steps` are the control steps of a task's episode.
-    pub fn play(&self, mut world: World, budget_steps: u32, seed: u64) -> FallTrial {
-        let world = &mut world;
+    pub fn play(&self, world: &mut World, budget_steps: u32, seed: u64) -> FallTrial {
         let mut random = SplitMix64(seed ^ 0x5eed);
         match self.place {
             FallPlace::Task => self.stagger(world, budget_steps, seed),
@@ -179,4 +178,32 @@ fn lying(at_m: Vector, random: &mut SplitMix64) -> Pose {
     let heading = Rotation::from_rotation_z(random.uniform([0.0, TAU]));
     let rolled = Rotation::from_rotation_x(random.uniform([0.0, TAU]));
     Pose::from_parts(at_m, heading * rolled * Rotation::from_rotation_y(PI / 2.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn played(name: &str, seed: u64) -> (World, FallTrial) {
+        let case = FALL_CASES.iter().find(|case| case.name == name).expect("a case");
+        let mut world = case.world().expect("a world");
+        let trial = case.play(&mut world, 0, seed);
+        (world, trial)
+    }
+
+    /// What is slammed meets a hand, and what is dropped a robot: otherwise these cases would show nothing.
+    #[test]
+    fn doors_and_tables_meet_robots() {
+        let mut stopped = 0;
+        for seed in 2000..2006 {
+            let (door, trial) = played("door_on_hand", seed);
+            let angle_rad = door.joint_position(HINGE).expect("a hinge");
+            println!("door {seed}: {angle_rad:.3} rad, {} fell, {:?}", trial.fallen, trial.extremes);
+            stopped += usize::from(angle_rad > 0.02);
+        }
+        let fell: usize = (2000..2006).map(|seed| played("table_on_robot", seed).1.fallen).sum();
+        println!("{stopped} doors stopped, {fell} fell under tables");
+        assert!(stopped >= 3, "{stopped} of 6 doors were stopped by a hand");
+        assert!(fell >= 1, "no robot fell under a table");
+    }
 }
