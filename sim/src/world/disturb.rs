@@ -72,14 +72,15 @@ impl World {
         tree.set_base(precise(&world_from_pelvis), DVec3::ZERO, DVec3::ZERO);
     }
 
-    /// Whether a robot overlaps with something where it is.
+    /// Whether a robot overlaps with anything else where it is.
     pub(crate) fn overlaps(&mut self, robot: usize) -> bool {
         let tree = self.robots[robot].tree;
         let before = self.dynamics.state();
         // A step finds out what touches, and is taken back.
         let stepped = self.dynamics.step();
         let of_robot = |touch: &ContactPoint| {
-            touch.colliders.iter().any(|id| self.dynamics.collider(*id).on.is_some_and(|on| on.tree == tree))
+            let [a, b] = touch.colliders.map(|id| self.dynamics.collider(id).on.map(|on| on.tree));
+            a != b && [a, b].contains(&Some(tree))
         };
         let overlap = |touch: &ContactPoint| of_robot(touch) && touch.gap_m < -ALLOWED_OVERLAP_M;
         let overlaps = stepped.is_err() || self.dynamics.touches().iter().any(overlap);

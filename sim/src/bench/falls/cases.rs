@@ -72,8 +72,9 @@ const HEAD_M: f32 = 1.3;
 /// A robot that lies reaches so far below its pelvis.
 const LYING_M: f32 = 0.15;
 const AIM_M: f32 = 0.2;
-/// Some objects hang on walls: a robot that would begin within one is put elsewhere.
+/// Some objects hang on walls, and robots stand beside them: one that would begin within them is put elsewhere, a little higher.
 const DRAWS: usize = 50;
+const HIGHER_M: f32 = 0.05;
 
 /// A robot before the doorway whose right arm goes through it, close to the post of the latch.
 const AT_DOOR_M: [f32; 2] = [-0.28, -0.25];
@@ -161,10 +162,11 @@ impl FallCase {
 /// Puts the first robot above one of the objects and what that stands on, where nothing is in its way.
 fn drop_on_an_object(world: &mut World, random: &mut SplitMix64) {
     let objects = world.present().objects;
-    for _ in 0..DRAWS {
+    for draw in 0..DRAWS {
         let drawn = random.uniform([0.0, objects.len() as f32]) as usize;
         let object_m = objects[drawn.min(objects.len() - 1)].state.world_from_object.translation;
-        world.put_robot(0, lying(object_m + Vector::Z * (DROP_M + LYING_M), random));
+        let above_m = DROP_M + LYING_M + HIGHER_M * draw as f32;
+        world.put_robot(0, lying(object_m + Vector::Z * above_m, random));
         if !world.overlaps(0) {
             return;
         }
