@@ -50,7 +50,13 @@ pub fn run(args: ReportArgs) -> CommandResult {
     let films = pictures.films.iter().filter(|film| film.content.is_ok()).count();
     let films = if films > 0 { format!(", {films} films") } else { String::new() };
     let size_mb = text.len() as f64 / 1e6;
-    println!("{}: {} episodes{films}, {size_mb:.1} MB", path.display(), loaded.episodes.len());
+    let excluded = report.policies.iter().flat_map(|policy| &policy.excluded).map(|entry| entry.seeds.len());
+    let excluded = match excluded.sum() {
+        0 => String::new(),
+        count => format!(" ({count} not counted)"),
+    };
+    let episodes = loaded.episodes.len();
+    println!("{}: {episodes} episodes{excluded}{films}, {size_mb:.1} MB", path.display());
     loaded.skipped.iter().for_each(|skipped| eprintln!("left out: {skipped}"));
     Ok(ExitCode::SUCCESS)
 }

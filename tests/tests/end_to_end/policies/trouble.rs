@@ -1,5 +1,7 @@
 //! Learned policies at servers that fail: each ends its own episode, with a result that says why, and no other.
 
+use std::{thread, time::Duration};
+
 use serde_json::json;
 use tandem::drivers::{PolicyMap, PolicyProtocol, RemotePolicy};
 use tandem_episodes::{
@@ -123,6 +125,22 @@ fn an_evaluation_without_its_server_stops_and_goes_on_later() {
         assert!(text.contains("Start its server") && text.contains("connect_s"), "{text}");
         assert!(text.contains("run the same command again: of 4 episodes 0 are played and kept"), "{text}");
     }
+
+    // Whoever looks on is told what is waited for.
+    let slow = PolicyMap { connect_s: 1.5, ..fast.clone() };
+    let url = format!("ws://{}", nowhere());
+    let policy = RemotePolicy::new(PolicyProtocol::Openpi, vec![url.clone()], slow);
+    let told = thread::scope(|scope| {
+        let stopped = scope.spawn(|| refusal(&policy));
+        let mut told = None;
+        while !stopped.is_finished() {
+            told = policy.waiting().or(told);
+            thread::sleep(Duration::from_millis(20));
+        }
+        told
+    });
+    let told = told.map(|wait| wait.to_string()).unwrap_or_default();
+    assert!(told.starts_with(&format!("waiting for {url}, ")), "{told}");
 
     // One that is gone after two episodes, and comes back.
     let address = nowhere();
