@@ -64,7 +64,7 @@ pub struct Layer {
     /// Whether tools' texts and the start's brief say how to grasp, or geometry only [default: on].
     #[arg(long, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = one_of(Hints::ALL, Hints::name))]
     pub hints: Option<Hints>,
-    /// Episodes that may be held at once; each costs a thread and about 30 MB [default: 8].
+    /// Episodes that may be held at once; each costs a thread and about 8 MB [default: 8].
     #[arg(long, env = "TANDEM_MAX_EPISODES", value_name = "N")]
     pub max_episodes: Option<u32>,
     /// Largest request body that is read [default: 2000000].

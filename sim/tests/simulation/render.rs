@@ -341,6 +341,41 @@ fn pictures_of_a_state_are_drawn_side_by_side() {
     assert_eq!(renderer.render(&step, &cameras[1]), alone[1]);
 }
 
+/// Renderers share what they need while they draw; what one has lit is nobody else's light.
+#[test]
+fn pictures_do_not_depend_on_who_else_draws() {
+    let roof = |height_m: f32| {
+        let slab = TriangleMesh::cuboid(Vector::new(0.4, 0.4, 0.02));
+        let mut scenery = scenery(vec![
+            floor(),
+            (slab, at(0.0, 0.0, height_m)),
+            (TriangleMesh::sphere(0.1), at(0.0, 0.0, 0.0)),
+        ]);
+        scenery.parts[2].carrier = Carrier::Object(0);
+        scenery
+    };
+    let heights_m = [0.3, 0.5, 0.7, 0.9, 1.1];
+    let mut renderers = heights_m.map(|height_m| cpu(roof(height_m)));
+    let camera = look_at(Vector::new(1.2, -1.0, 1.4), Vector::ZERO);
+    let steps = [0.2, 0.4].map(|x_m| step(&[at(x_m, 0.5, 0.1)]));
+    let mut first: Vec<Frame> = Vec::new();
+    for round in 0..6 {
+        // Another one draws before each, as often as there are others.
+        for turn in 0..heights_m.len() {
+            let number = turn * (1 + round % 4) % heights_m.len();
+            let frames = steps.each_ref().map(|step| renderers[number].render(step, &camera));
+            let alone = steps.each_ref().map(|step| cpu(roof(heights_m[number])).render(step, &camera));
+            assert_eq!(frames, alone, "renderer {number} in round {round}");
+            match round {
+                0 => first.extend(frames),
+                _ => assert_eq!(first[2 * number..][..2], frames, "renderer {number} in round {round}"),
+            }
+        }
+    }
+    let [one, other] = [&first[0], &first[2]];
+    assert_ne!(one.rgb, other.rgb, "they cast different shadows");
+}
+
 #[test]
 fn meshes_have_the_volume_of_their_shapes_and_normals_that_point_out() {
     // A circle of twelve sides has 4.5 % less area, and a half circle of six turned around its axis 6.7 % less volume.

@@ -351,7 +351,12 @@ fn films_are_of_one_success_and_one_failure() {
     let page = EvaluationReport::of(&loaded).write(ReportFormat::Html, &pictures).unwrap();
     let top = page.find("data:image/webp;base64,UklGRg==").unwrap();
     assert!(top < page.find("How far episodes got").unwrap(), "films are above the figures");
-    for text in ["agent, seed 1, 3 times as fast", "a &lt;reason&gt;", unrecorded, "No episode failed."] {
+    for text in [
+        "agent, seed 1 (3 times as fast)",
+        "No film of a failure. a &lt;reason&gt;",
+        unrecorded,
+        "No episode failed.",
+    ] {
         assert!(page.contains(text), "no {text:?} in {page}");
     }
 }

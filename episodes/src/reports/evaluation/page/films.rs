@@ -106,16 +106,17 @@ pub fn html(films: &[Film]) -> String {
 
 fn figure(Film { place, content }: &Film) -> String {
     let (class, what) = if place.success { ("good", "success") } else { ("bad", "failure") };
-    let (picture, text) = match (&place.episode, content) {
-        (Ok(FilmedEpisode { policy, seed, why, .. }), Ok(FilmContent { webp, times_as_fast })) => {
-            let of = format!("{}, seed {seed}", escape(policy));
-            let why = why.as_ref().map(|why| format!(": {}", escape(why))).unwrap_or_default();
-            let alt = format!("A {what} at {}, {of}", escape(place.task));
-            (moments::picture(webp, &alt), format!("{of}, {times_as_fast:.0} times as fast{why}"))
+    let (episode, film) = match (&place.episode, content) {
+        (Ok(episode), Ok(film)) => (episode, film),
+        (Err(reason), _) | (_, Err(reason)) => {
+            return format!(r#"<p class="soft">No film of a {what}. {}</p>"#, escape(reason));
         }
-        (Err(reason), _) | (_, Err(reason)) => (String::new(), escape(reason)),
     };
+    let of = format!("{}, seed {}", escape(&episode.policy), episode.seed);
+    let why = episode.why.as_ref().map(|why| format!(": {}", escape(why))).unwrap_or_default();
+    let picture = moments::picture(&film.webp, &format!("A {what} at {}, {of}", escape(place.task)));
     format!(
-        r#"<figure>{picture}<figcaption><span class="{class}">{what}</span> <span class="soft">{text}</span></figcaption></figure>"#
+        r#"<figure>{picture}<figcaption><span class="{class}">{what}</span> <span class="soft">{of}{why} ({:.0} times as fast)</span></figcaption></figure>"#,
+        film.times_as_fast
     )
 }
