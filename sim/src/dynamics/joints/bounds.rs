@@ -41,8 +41,43 @@ struct Range {
     impulse_down: f64,
 }
 
-/// A joint without other rows gets one for its range only if it could reach an end when this much faster, rad/s or m/s.
+/// A joint without other rows gets one for its range at first only if it could reach an end when this much faster, rad/s or m/s.
 const NEAR_RANGE: f64 = 10.0;
+/// A joint that would be beyond its range by more (rad or m) without a row gets one, and the step is repeated.
+const MOST_BEYOND: f64 = 0.01;
+
+impl Tree {
+    /// Whether a joint has a row in any case.
+    fn is_held(&self, link: usize) -> bool {
+        self.bounded[link] || self.links[link].joint.axis().is_some_and(|axis| axis.friction_loss > 0.0)
+    }
+
+    /// Whether a joint's range is a part of its row.
+    fn range_is_row(&self, link: usize, dt_s: f64) -> bool {
+        let Some([low, high]) = self.links[link].joint.axis().and_then(|axis| axis.range) else {
+            return false;
+        };
+        let (q, v) = (self.q[link], self.v[self.layout.first_dof[link]]);
+        let reach = (v.abs() + NEAR_RANGE) * dt_s;
+        self.is_held(link) || self.overrun[link] || q - reach < low || q + reach > high
+    }
+
+    /// Adds the joints that leave their ranges when they move by the velocities `v` and were not near an end; whether there
+    /// were any.
+    pub(in crate::dynamics) fn hold_more(&mut self, dt_s: f64, v: &[f64]) -> bool {
+        let mut more = false;
+        for i in 0..self.links.len() {
+            let Some([low, high]) = self.links[i].joint.axis().and_then(|axis| axis.range) else { continue };
+            let next = self.q[i] + dt_s * v[self.layout.first_dof[i]];
+            let beyond = next < low - MOST_BEYOND || next > high + MOST_BEYOND;
+            if beyond && !self.range_is_row(i, dt_s) {
+                self.overrun[i] = true;
+                more = true;
+            }
+        }
+        more
+    }
+}
 
 impl JointRows {
     pub fn clear(&mut self) {
@@ -55,15 +90,9 @@ impl JointRows {
         let dt_s = settings.dt_s;
         for (i, link) in tree.links.iter().enumerate() {
             let Some(axis) = link.joint.axis() else { continue };
-            let dof = tree.layout.first_dof[i];
-            let (q, v) = (tree.q[i], tree.v[dof]);
-            let held = tree.bounded[i] || axis.friction_loss > 0.0;
-            let near = |[low, high]: [f64; 2]| {
-                let reach = (v.abs() + NEAR_RANGE) * dt_s;
-                held || q - reach < low || q + reach > high
-            };
-            let range = axis.range.filter(|range| near(*range));
-            if !held && range.is_none() {
+            let (dof, q) = (tree.layout.first_dof[i], tree.q[i]);
+            let range = axis.range.filter(|_| tree.range_is_row(i, dt_s));
+            if !tree.is_held(i) && range.is_none() {
                 continue;
             }
             let start = self.rows.column.len();
@@ -97,7 +126,9 @@ impl JointRows {
         }
     }
 
-    pub fn sweep(&mut self, pass: Pass, w: &mut [f64]) {
+    /// The greatest velocity (rad/s or m/s) that an end of a range took back.
+    pub fn sweep(&mut self, pass: Pass, w: &mut [f64]) -> f64 {
+        let mut greatest = 0.0f64;
         for (group, row) in self.all.iter_mut().enumerate() {
             let [before] = self.rows.velocity(group, w);
             let mut v = before;
@@ -107,12 +138,15 @@ impl JointRows {
             }
             row.dry.update(inverse_mass, mass, &mut v);
             if let Some(range) = &mut row.range {
+                let pushed = v;
                 range.update(pass, inverse_mass, mass, &mut v);
+                greatest = greatest.max((v - pushed).abs());
             }
             if v != before {
                 self.rows.push_impulse(group, &[(v - before) * mass], w);
             }
         }
+        greatest
     }
 
     /// Gives the trees the impulses of dry friction and the efforts of bounded drives.

@@ -88,6 +88,7 @@ impl Tree {
 
     /// Guesses which drives will be at their limits.
     pub(in crate::dynamics) fn guess_bounded(&mut self) {
+        self.overrun.fill(false);
         for (i, link) in self.links.iter().enumerate() {
             let Some(axis) = link.joint.axis() else { continue };
             self.bounded[i] = self.effort[i].abs() > NEAR_LIMIT * axis.effort_limit

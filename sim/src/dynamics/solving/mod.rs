@@ -12,6 +12,11 @@ use crate::dynamics::settings::{Pass, Settings};
 use crate::dynamics::trees::Trees;
 use crate::dynamics::trees::spatial::ForceVector;
 
+/// Velocity (rad/s or m/s) which, taken back by the end of a range in the last sweep, says that more are needed, and how many at
+/// most: what is heavy presses a light link against its stop.
+const UNSETTLED: f64 = 2.0;
+const MORE_SWEEPS: usize = 32;
+
 #[derive(Default)]
 pub struct Solver {
     /// Whitened velocities of all trees.
@@ -56,14 +61,22 @@ impl Solver {
         }
     }
 
-    /// Impulses that correct positions; `w` is what positions move by. They are what the next step begins with.
+    /// Impulses that correct positions; `w` is what positions move by. They are what the next step begins with. There are
+    /// more sweeps where ends of ranges are not settled by then.
     pub fn correct(&mut self, candidates: &[Candidate], sweeps: usize) {
         self.joints.warm_start(&mut self.w);
         self.equalities.warm_start(&mut self.w);
         self.plain.warm_start(&mut self.w);
         self.rolling.warm_start(&mut self.w);
+        let mut pushed = 0.0;
         for _ in 0..sweeps {
-            self.sweep(Pass::Correcting);
+            pushed = self.sweep(Pass::Correcting);
+        }
+        for _ in 0..MORE_SWEEPS {
+            if pushed < UNSETTLED {
+                break;
+            }
+            pushed = self.sweep(Pass::Correcting);
         }
         self.equalities.remember();
         self.found.clear();
@@ -96,11 +109,13 @@ impl Solver {
         std::mem::swap(&mut self.touches, &mut self.found);
     }
 
-    fn sweep(&mut self, pass: Pass) {
-        self.joints.sweep(pass, &mut self.w);
+    /// The greatest velocity (rad/s or m/s) that an end of a range took back.
+    fn sweep(&mut self, pass: Pass) -> f64 {
+        let pushed = self.joints.sweep(pass, &mut self.w);
         self.equalities.sweep(pass, &mut self.w);
         self.plain.sweep(pass, &mut self.w);
         self.rolling.sweep(pass, &mut self.w);
+        pushed
     }
 }
 

@@ -49,11 +49,13 @@ impl Dynamics {
         unwhiten(&self.trees.all, &self.solver.w, &mut self.final_v);
     }
 
-    /// Makes rows of the drives that exceeded their limits; every round adds one at least, so that it ends.
+    /// Makes rows of the drives that exceeded their limits and of the joints that left their ranges; every round adds one at
+    /// least, so that it ends.
     fn bound_more(&mut self) -> bool {
         let mut more = false;
         for (tree, range) in self.trees.ranges() {
-            more |= tree.bound_more(self.settings.dt_s, &self.final_v[range]);
+            more |= tree.bound_more(self.settings.dt_s, &self.final_v[range.clone()]);
+            more |= tree.hold_more(self.settings.dt_s, &self.moving_v[range]);
         }
         more
     }

@@ -1,9 +1,11 @@
 //! Joints of one degree of freedom, limits and equalities.
 
 use rapier3d::glamx::{DMat3, DPose3, DQuat, DVec3};
+use rapier3d::math::Vector;
+use rapier3d::prelude::SharedShape;
 
 use super::super::{Axis, Drive, Equality, Joint, Link, Mass, Tree};
-use super::bench::{Bench, DOWN, DT_S, G_M_S2, hinge, jointed, link, lone};
+use super::bench::{Bench, DOWN, DT_S, G_M_S2, hinge, jointed, link, lone, sliding};
 
 /// Period of a pendulum at 0.2 rad, and its energy over 20 s.
 #[test]
@@ -220,4 +222,34 @@ fn dynamics_trees_that_cannot_be_are_named() {
     let two: Vec<Link> =
         vec![link(None, DVec3::ZERO, Joint::Fixed, mass), link(Some(0), DVec3::ZERO, Joint::Free, mass)];
     assert!(Tree::new("pair", two).err().unwrap().to_string().contains("only the first link"));
+}
+
+/// A heavy ball strikes a finger that is far from the end of its range: it stops there, and the ball on it.
+#[test]
+fn dynamics_blow_does_not_drive_a_light_link_beyond_its_range() {
+    for speed_m_s in [1.0, 3.0, 6.0] {
+        let mut axis = Axis::along(DVec3::Y);
+        (axis.range, axis.armature) = (Some([-1.5, 0.3]), 0.0005);
+        let mut mass = Mass::of_box(0.02, DVec3::new(0.02, 0.01, 0.01));
+        mass.com_m = DVec3::new(0.025, 0.0, 0.0);
+        let mut bench = Bench::new(DVec3::ZERO);
+        let finger = bench.add(jointed(Joint::Hinge(axis), mass));
+        let (knuckle, tip) = (Vector::ZERO, Vector::new(0.045, 0.0, 0.0));
+        bench.add_shape(finger.link(0), SharedShape::capsule(knuckle, tip, 0.01), sliding(0.5));
+        let at_m = DVec3::new(0.035, 0.0, 0.0615);
+        let ball = bench.add_ball(5.0, 0.05, at_m, sliding(0.5));
+        let at = DPose3::from_translation(at_m);
+        bench.dynamics.tree_mut(ball).set_base(at, DVec3::new(0.0, 0.0, -speed_m_s), DVec3::ZERO);
+        let (mut farthest_rad, mut deepest_m) = (0.0f64, 0.0f64);
+        for _ in 0..60 {
+            bench.step();
+            farthest_rad = farthest_rad.max(bench.dynamics.tree(finger).joint_position(0));
+            deepest_m = bench.dynamics.touches().iter().fold(deepest_m, |most, touch| most.max(-touch.gap_m));
+        }
+        assert!(farthest_rad > 0.25, "it was struck: {farthest_rad} rad");
+        assert!(
+            farthest_rad < 0.35 && deepest_m < 0.02,
+            "{farthest_rad} rad, {deepest_m} m at {speed_m_s} m/s"
+        );
+    }
 }

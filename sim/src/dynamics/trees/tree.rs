@@ -27,6 +27,8 @@ pub struct Tree {
     pub(in crate::dynamics) drives: Vec<Drive>,
     /// Whether a link's drive is a row of the solver in this step, by link.
     pub(in crate::dynamics) bounded: Vec<bool>,
+    /// Whether a joint would leave its range in this step although it was not near an end, by link.
+    pub(in crate::dynamics) overrun: Vec<bool>,
     /// Forces from outside, by link, about the reference; they act in the next step only.
     pub(in crate::dynamics) external: Vec<ForceVector>,
     /// What the drives exerted in the last step, by link.
@@ -69,6 +71,7 @@ impl Tree {
             v: vec![0.0; dofs],
             drives: vec![Drive::NONE; count],
             bounded: vec![false; count],
+            overrun: vec![false; count],
             external: vec![ForceVector::default(); count],
             effort: vec![0.0; count],
             dry_friction: vec![0.0; count],
