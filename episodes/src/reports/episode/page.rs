@@ -87,6 +87,10 @@ impl EpisodePage<'_> {
             EndReason::PolicyFailed => "The policy itself failed.",
             EndReason::SimulatorFailed => "The simulator failed.",
         };
+        let why = match &self.result.simulator_failure {
+            Some(failure) => format!("The simulator failed {}.", escape(failure)),
+            None => why.into(),
+        };
         format!(r#"<span class="{class}">{reached} of {phases} phases reached.</span> {why}"#)
     }
 

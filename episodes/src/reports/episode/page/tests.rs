@@ -11,8 +11,12 @@ fn page(phase_times_s: [Option<f64>; 3], protocol: Protocol) -> String {
 }
 
 fn page_from(begin_s: f64, phase_times_s: [Option<f64>; 3], protocol: Protocol) -> String {
+    page_of(begin_s, &result(phase_times_s, protocol))
+}
+
+fn result(phase_times_s: [Option<f64>; 3], protocol: Protocol) -> ResultReply {
     let phases = phase_times_s.into_iter().enumerate().map(|(index, time_s)| (Phase::number(index), time_s));
-    let result = ResultReply {
+    ResultReply {
         task: "handover".into(),
         seed: 4,
         protocol,
@@ -26,7 +30,11 @@ fn page_from(begin_s: f64, phase_times_s: [Option<f64>; 3], protocol: Protocol) 
         simulator_failure: None,
         extra_information: vec![],
         recording_failed: None,
-    };
+    }
+}
+
+fn page_of(begin_s: f64, result: &ResultReply) -> String {
+    let protocol = result.protocol;
     let mut calls = CallCounts::default();
     [true, true, false].into_iter().for_each(|answered| calls.count("move_wrists", answered));
     let wall_clock_left_s = (protocol == Protocol::Agentic).then_some(1740.0);
@@ -34,7 +42,20 @@ fn page_from(begin_s: f64, phase_times_s: [Option<f64>; 3], protocol: Protocol) 
     let task = tasks::find("handover").unwrap();
     let views = vec![LabelledPicture { label: "what A sees".into(), file: b"png".into() }];
     let moments = [KeyMoment { caption: ["p1 <grasp>".into(), "4.0 s".into()], views }];
-    EpisodePage { task, result: &result, calls: &calls, begin_s, budget_left, moments: &moments }.html()
+    EpisodePage { task, result, calls: &calls, begin_s, budget_left, moments: &moments }.html()
+}
+
+#[test]
+fn a_page_says_how_the_simulator_failed() {
+    let failure = Some("in step 501, physics diverged at link `left_<knee>`".into());
+    let result = ResultReply {
+        ended: EndReason::SimulatorFailed,
+        simulator_failure: failure,
+        ..result([None; 3], Protocol::Benchmark)
+    };
+    let page = page_of(0.0, &result);
+    let expected = "The simulator failed in step 501, physics diverged at link `left_&lt;knee&gt;`.";
+    assert!(page.contains(expected), "no `{expected}` in {page}");
 }
 
 #[test]
