@@ -204,3 +204,60 @@ fn render(
     println!("  {}: {moments} moments of {cameras} cameras, {already_drawn} of them kept", folder.display());
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use tandem_episodes::{EpisodeSpec, RobotFile, tasks};
+    use tandem_tools_spec::{MoveWrists, Protocol, WristMove};
+
+    use super::*;
+
+    fn args(path: &Path) -> ReplayArgs {
+        ReplayArgs {
+            recordings: vec![path.into()],
+            verify: true,
+            video: None,
+            camera: "third_person".into(),
+            render: None,
+            rate: 25,
+            size: None,
+            jobs: 1,
+        }
+    }
+
+    /// Standing still the robot does nothing, and to move its elbow takes more torque than numbers of single precision can say.
+    fn play_until_the_simulator_fails(folder: &Path) -> Session {
+        let sound = RobotFile::default().read().unwrap();
+        let elbow =
+            sound.lines().find(|line| line.contains(r#"<position name="right_elbow_joint""#)).unwrap();
+        let absurd = r#"<position name="right_elbow_joint" joint="right_elbow_joint" kp="1e38" kv="1e38" forcerange="-1e38 1e38"/>"#;
+        let robot = folder.join("absurd.xml");
+        std::fs::write(&robot, sound.replace(elbow, absurd)).unwrap();
+        let handover = tasks::find("handover").unwrap();
+        let spec = EpisodeSpec {
+            robot: RobotFile::File(robot),
+            ..EpisodeSpec::new(handover, 0, Protocol::Benchmark)
+        };
+        let mut session = Session::start(&spec, Some(folder)).unwrap();
+        let reach = WristMove { right_position_m: Some([0.28, -0.24, 0.22]), ..WristMove::hold("A") };
+        session.call(MoveWrists { steps: 5, robots: vec![reach] }.into()).unwrap_err();
+        session
+    }
+
+    #[test]
+    fn a_step_that_failed_is_made_again_from_its_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let session = play_until_the_simulator_fails(folder.path());
+        let path = folder.path().join(FAILED_STEP_FILE);
+        assert!(failed_step(&path, &args(&path)).unwrap(), "it fails as it did");
+        let filmed = ReplayArgs { video: Some("film.webp".into()), ..args(&path) };
+        let refused = failed_step(&path, &filmed).unwrap_err().to_string();
+        assert!(refused.contains("give the recording beside it"), "{refused}");
+
+        let sound = folder.path().join("sound.checkpoint");
+        session.checkpoint().unwrap().write(&sound).unwrap();
+        let refused = failed_step(&sound, &args(&sound)).unwrap_err().to_string();
+        assert!(refused.contains("no step that failed"), "{refused}");
+        session.close();
+    }
+}
