@@ -103,3 +103,18 @@ pub mod webp {
         Encoder::new_with_options(size_px, options)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_put_in_place_leaves_nothing_behind() {
+        let place = tempfile::tempdir().unwrap();
+        let taken = place.path().join("taken");
+        fs::create_dir(&taken).unwrap();
+        let text = write_whole(&taken, b"bytes").unwrap_err().to_string();
+        assert!(text.contains("taken") && text.contains("give a folder"), "{text}");
+        assert_eq!(fs::read_dir(place.path()).unwrap().count(), 1);
+    }
+}

@@ -69,6 +69,18 @@ fn what_is_no_recording_is_refused_by_name() {
 }
 
 #[test]
+fn an_episode_that_cannot_be_recorded_is_played_all_the_same() {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let folder = file.path().join("run");
+    let mut session = Session::start(&spec("handover", 3, Protocol::Benchmark), Some(&folder)).unwrap();
+    let reason = session.recording_failed().unwrap().to_owned();
+    assert!(reason.contains("Not a directory") && reason.contains("give a folder on a disk"), "{reason}");
+    assert_eq!(wait(&mut session, 5).executed_steps, 5);
+    let result = session.close();
+    assert_eq!((result.env_steps, result.recording_failed), (5, Some(reason)));
+}
+
+#[test]
 fn a_moment_is_pictured_once() {
     let folder = tempfile::tempdir().unwrap();
     let spec = spec("handover", 3, Protocol::Benchmark);

@@ -27,7 +27,7 @@ pub fn run(args: RecoverArgs) -> CommandResult {
         println!("the last {bytes} bytes of {} were left out: {damage}", args.partial.display());
     }
     if recovered.unchecked_metadata > 0 {
-        println!("what the episode was has no checksum there, and was taken as it is");
+        println!("the metadata have no checksum there, and were taken as they are");
     }
     Ok(ExitCode::SUCCESS)
 }

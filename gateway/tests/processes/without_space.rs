@@ -65,6 +65,15 @@ fn an_episode_goes_on_when_its_recording_cannot() {
     assert_eq!(counted, (&json!(calls + 1), &first), "{result}");
     let written = std::fs::read_to_string(runs.path().join(&id).join("result.json")).expect("result.json");
     assert_eq!(serde_json::from_str::<Value>(&written).expect("JSON"), result);
+
+    // What was recorded before is whole.
+    let partial = runs.path().join(&id).join("episode.mcap.partial");
+    let tandem = || Command::new(env!("CARGO_BIN_EXE_tandem"));
+    let recovered = ran(tandem(), &["recover"], &partial);
+    assert!(recovered.status.success(), "{}", text(&recovered.stderr));
+    assert!(!text(&recovered.stdout).contains("left out"), "{}", text(&recovered.stdout));
+    let verified = ran(tandem(), &["replay", "--verify"], &partial.with_extension(""));
+    assert!(text(&verified.stdout).contains("verified: "), "{}", text(&verified.stdout));
 }
 
 #[test]
