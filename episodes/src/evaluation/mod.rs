@@ -24,9 +24,11 @@ pub enum EvaluationError {
     Episode(#[from] EpisodeError),
     #[error(transparent)]
     Output(#[from] OutputError),
-    #[error("cannot write {path}: {source}")]
+    #[error("cannot write {path}: {source}; give a folder on a disk with space that may be written to")]
     Io { path: PathBuf, source: std::io::Error },
-    #[error("{task} seed {seed} was played and not recorded: {reason}")]
+    #[error(
+        "{task} seed {seed} could not be recorded: {reason}; what was played before is kept, and the same command goes on from there"
+    )]
     Recording { task: &'static str, seed: u32, reason: String },
     #[error("an episode cannot be written as JSON: {0}")]
     Json(#[from] serde_json::Error),

@@ -19,7 +19,9 @@ pub fn try_runs_folder(runs: &Path) -> Result<(), String> {
         let _ = fs::remove_dir(runs);
     }
     let shown = runs.display();
-    tried.and(cleared).map_err(|error| format!("{shown}: {error}; make room there, make it writable, or give another --runs"))
+    tried.and(cleared).map_err(|error| {
+        format!("{shown}: {error}; make room there, make it writable, or give another --runs")
+    })
 }
 
 /// Names and makes the folders of one server.
