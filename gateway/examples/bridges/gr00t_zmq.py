@@ -3,7 +3,7 @@
     python3 gateway/examples/bridges/gr00t_zmq.py --server tcp://127.0.0.1:5555 --port 8001
     tandem evaluate --policy act:http://127.0.0.1:8001/act --policy-map gr00t_n17_g1 --protocol benchmark
 
-It needs numpy, msgpack and pyzmq. The server is that of Isaac-GR00T (N1.5 to N1.7), with the flat keys of `Gr00tSimPolicyWrapper`
+It needs numpy, msgpack and pyzmq. The server is that of Isaac-GR00T (N1.6 and N1.7), with the flat keys of `Gr00tSimPolicyWrapper`
 (`--use-sim-policy-wrapper`), as the preset gr00t_n17_g1 has them.
 """
 

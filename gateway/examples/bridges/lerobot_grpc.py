@@ -4,9 +4,10 @@
     python3 gateway/examples/bridges/lerobot_grpc.py --server 127.0.0.1:8080 --type act --policy USER/POLICY --chunk 50 --port 8001
     tandem evaluate --policy act:http://127.0.0.1:8001/act --policy-map lerobot.toml --protocol benchmark
 
-Its messages are pickled objects of LeRobot's own, so it runs where `lerobot[async]` is installed, in the server's version. The server
-has one client and one queue: give each robot, and each world of --jobs, a server and a bridge of its own. The map, whose states and
-actions are those that the policy was trained on:
+Its messages are pickled objects of LeRobot's own, so it runs where `lerobot[async]` is installed, in the server's version. A server has
+one client, so it takes one bridge, which robots and worlds share; a policy that remembers what it saw, as LeRobot's diffusion policy
+does, needs a server and a bridge for each robot, and --jobs 1. The map, whose states and actions are those that the policy was trained
+on:
 
     preset = "openpi"
     [images]

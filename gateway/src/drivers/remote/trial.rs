@@ -210,12 +210,13 @@ impl<'a> MapTrial<'a> {
         let count = |calls: usize| if calls == 1 { "1 call".to_owned() } else { format!("{calls} calls") };
         format!(
             "{}{rows} rows at {} a second make {steps} control steps of 20 ms{between}: {} of {} in the agentic protocol, {} in the \
-             benchmark's.\nfor columns of 0.01, 0.02, ..., the first of them tells A: {}\n",
+             benchmark's\nan answer whose columns are 0.01, 0.02, ... begins with {} for A: {}\n",
             self.held(),
             self.map.rate_hz(),
             count(agentic.len()),
             first.name(),
             count(benchmark.len()),
+            first.name(),
             told_first(&json!(first))
         )
     }
@@ -359,7 +360,7 @@ mod tests {
                 "actions [rows, 35] 0-6 left_arm, 7-13 right_arm",
                 "31-34 base_command",
                 "10 rows at 50 a second make 10 control steps of 20 ms: 1 call of send_joint_chunk in the agentic protocol, 1 call in",
-                "tells A: {\"rows\":[[0.01,0.02,0.03,",
+                "begins with send_joint_chunk for A: {\"rows\":[[0.01,0.02,0.03,",
             ],
         );
         for (name, _) in crate::drivers::PRESETS {

@@ -98,6 +98,26 @@ pub fn is_installed(program: &str) -> bool {
     succeeds(Command::new(program).arg("--version"))
 }
 
+/// Files of Python that users are given have nobody else who compiles them.
+#[test]
+fn examples_are_python() {
+    if !is_installed("python3") {
+        println!("skipped: no python3 to compile examples with");
+        return;
+    }
+    let folders = ["agents", "bridges"].map(|folder| root().join("gateway/examples").join(folder));
+    let files = folders.iter().flat_map(|folder| fs::read_dir(folder).expect("a folder of examples"));
+    let files: Vec<_> = files.map(|file| file.expect("a file").path()).collect();
+    let python: Vec<_> =
+        files.iter().filter(|file| file.extension().is_some_and(|end| end == "py")).collect();
+    assert!(python.len() >= 3, "{files:?}");
+    for file in python {
+        let text = fs::read_to_string(file).expect("text");
+        let compiled = compile(&Block { language: "python".into(), purpose: String::new(), text, line: 1 });
+        assert_eq!(compiled, Ok(()), "{}", file.display());
+    }
+}
+
 /// Whether a command ends well.
 pub fn succeeds(command: &mut Command) -> bool {
     command.output().is_ok_and(|output| output.status.success())

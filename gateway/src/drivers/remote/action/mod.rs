@@ -146,10 +146,7 @@ fn action_row(
             given.resolved(map.chunk.wrist_frame, delta.wrists[side], &pelvis_from_wrist, &pelvis_in_start);
     }
     let positions_m = wrists.iter().filter_map(|wrist| wrist.position_m);
-    if positions_m
-        .flat_map(|position_m| <[f64; 3]>::from(position_m))
-        .any(|value| value.abs() > LARGEST_VALUE)
-    {
+    if positions_m.flat_map(<[f64; 3]>::from).any(|value| value.abs() > LARGEST_VALUE) {
         return Err(RemoteError::Misfit(format!("a wrist is sent beyond {LARGEST_VALUE} m; expected m")));
     }
     match whole.iter().position(|value| value.abs() > LARGEST_VALUE) {
