@@ -129,6 +129,12 @@ pub fn wrist_rotation(side: usize, form: RotationForm) -> Range<usize> {
     from..from + form.len()
 }
 
+/// Which wrist's pose, or part of it, is called `name`. Joints of wrists are joints.
+pub fn wrist_named(name: &str) -> Option<usize> {
+    let is_of = |wrist: &str| WRIST_PARTS.iter().any(|(part, _)| name.strip_prefix(wrist) == Some(*part));
+    WRISTS.iter().position(|wrist| is_of(wrist))
+}
+
 /// Which of [`state_values`] the `names` mean, in their order.
 pub fn state_columns(names: &[String]) -> Result<Vec<usize>, String> {
     columns(names, &state_blocks(), &state_singles())
@@ -235,6 +241,9 @@ mod tests {
             assert_eq!(named, wrist_rotation(1, form).collect::<Vec<_>>());
         }
         assert_eq!(action_columns(&names("right_wrist_rows_6d")).unwrap().last(), Some(&(ACTION_LEN - 1)));
+        let named =
+            ["left_wrist", "right_wrist_rows_6d", "left_wrist_yaw_joint", "left_arm"].map(wrist_named);
+        assert_eq!(named, [Some(0), Some(1), None, None]);
         assert_eq!(state_columns(&names("pelvis_in_start gravity")).map(|columns| columns.len()), Ok(10));
     }
 

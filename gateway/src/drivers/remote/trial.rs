@@ -11,7 +11,7 @@ use tandem_tools_spec::Protocol;
 
 use super::{
     action::{Executor, RobotRows, chunks, executed_rows},
-    columns::{action_columns, action_name, held_row, is_of_arm_or_waist, state_columns},
+    columns::{action_columns, action_name, held_row, is_of_arm_or_waist, state_columns, wrist_named},
     error::RemoteError,
     instructions,
     map::{AnswerScope, Between, CameraName, PolicyMap, ROBOT, WristFrame},
@@ -174,12 +174,10 @@ impl<'a> MapTrial<'a> {
     fn understood(&self, name: &str) -> &'static str {
         let columns = action_columns(&[name.to_owned()]).unwrap_or_default();
         let delta = self.map.delta();
-        let side = |wrist: &str| name.starts_with(wrist);
+        let wrist = wrist_named(name);
         let is_delta = columns.iter().any(|column| delta.row_columns.contains(column))
-            || side("left_wrist") && delta.wrists[0]
-            || side("right_wrist") && delta.wrists[1];
-        let is_wrist = side("left_wrist") || side("right_wrist");
-        match (is_wrist, is_delta, self.map.chunk.wrist_frame) {
+            || wrist.is_some_and(|side| delta.wrists[side]);
+        match (wrist.is_some(), is_delta, self.map.chunk.wrist_frame) {
             (false, false, _) => "",
             (false, true, _) => " (added to what was observed)",
             (true, false, WristFrame::Pelvis) => " (pelvis frame)",
@@ -381,6 +379,10 @@ mod tests {
                 "(the answer itself) [rows, 24] 0-6 left_arm of A, 7 vx_m_s of A, 8-14 left_arm of B",
                 "no key tells right_arm, left_hand, right_hand, waist, vy_m_s, yaw_rate_rad_s, pelvis_height_m: held",
             ],
+        );
+        check(
+            "[action]\n\"a\" = [\"left_wrist_yaw_joint\", \"waist\"]\n[chunk]\ndelta = [\"left_wrist_yaw_joint\"]",
+            &["a [rows, 4] 0 left_wrist_yaw_joint (added to what was observed), 1-3 waist"],
         );
         check(
             "[action]\n\"a\" = [\"left_wrist_position\", \"left_wrist_rows_6d\"]\n\"h\" = [\"left_hand\", \"pelvis_height_m\"]\n\

@@ -26,12 +26,13 @@ impl Openpi {
     pub fn connect(url: &str, within: Duration) -> Result<Openpi, RemoteError> {
         let unreachable = |reason: String| RemoteError::Unreachable { url: url.into(), reason };
         let stream = DeadlineStream::connect(url, within).map_err(|error| unreachable(error.to_string()))?;
+        let page = stream.stream.try_clone();
         let (socket, _) = tungstenite::client(url, stream).map_err(|error| match error {
             // A proxy's page of an error, or another server than a policy's.
             HandshakeError::Failure(Error::Http(response)) => {
-                let text =
-                    String::from_utf8_lossy(response.body().as_deref().unwrap_or_default()).into_owned();
-                unreachable(format!("it answers HTTP {}: {}", response.status(), gist(&text)))
+                let status = response.status();
+                let begun = response.into_body().unwrap_or_default();
+                unreachable(format!("it answers HTTP {status}: {}", gist(&page_text(begun, page))))
             }
             HandshakeError::Failure(error) => unreachable(error.to_string()),
             HandshakeError::Interrupted(_) => RemoteError::Slow { url: url.into(), within },
@@ -91,6 +92,22 @@ impl PolicyClient for Openpi {
         self.hear(within)
     }
 }
+
+/// The beginning of a page of which `begun` came with its header, as far as it comes soon.
+fn page_text(mut begun: Vec<u8>, stream: io::Result<TcpStream>) -> String {
+    if begun.is_empty()
+        && let Ok(mut stream) = stream
+        && stream.set_read_timeout(Some(PAGE_WAIT)).is_ok()
+    {
+        let mut buffer = [0; 4096];
+        let length = stream.read(&mut buffer).unwrap_or_default();
+        begun.extend_from_slice(&buffer[..length]);
+    }
+    String::from_utf8_lossy(&begun).into_owned()
+}
+
+/// How long the text of a page may follow its header.
+const PAGE_WAIT: Duration = Duration::from_secs(1);
 
 fn is_late(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut)

@@ -3,8 +3,8 @@
 use super::{AnswerScope, CameraName, HistorySpan, PolicyMap, ROBOT, Scope, WristFrame};
 use crate::drivers::remote::{
     columns::{
-        WRISTS, action_columns, action_name, is_of_arm_or_waist, state_columns, velocities, wrist_position,
-        wrist_rotation,
+        WRISTS, action_columns, action_name, is_of_arm_or_waist, state_columns, velocities, wrist_named,
+        wrist_position, wrist_rotation,
     },
     poses::RotationForm,
 };
@@ -86,8 +86,8 @@ impl PolicyMap {
     fn check_delta(&self, told: &[usize]) -> Result<(), String> {
         let wrists = self.told_wrists(told);
         for name in &self.chunk.delta {
-            if let Some(wrist) = WRISTS.iter().find(|wrist| name.starts_with(*wrist)) {
-                match (name == wrist, wrists.contains(wrist)) {
+            if let Some(wrist) = wrist_named(name).map(|side| WRISTS[side]) {
+                match (name == wrist, wrists.contains(&wrist)) {
                     (false, _) => {
                         return Err(format!("[chunk] delta: {name:?}; give the whole pose, {wrist:?}"));
                     }
@@ -250,6 +250,10 @@ mod tests {
             "[action]\n\"a\" = [\"left_wrist\", \"left_wrist_rows_6d\"]",
             "the rotation of left_wrist is told twice",
         );
+        let joint =
+            "[action]\n\"a\" = [\"left_wrist_yaw_joint\"]\n[chunk]\ndelta = [\"left_wrist_yaw_joint\"]";
+        let map = read(&format!("preset = \"openpi\"\n{joint}")).unwrap();
+        assert_eq!((map.delta().wrists, map.delta().row_columns), ([false, false], vec![6]));
         let map = read(&format!("preset = \"openpi\"\n{wrists}delta = [\"left_wrist\"]\n")).unwrap();
         assert_eq!((map.delta().wrists, map.delta().row_columns), ([true, false], vec![]));
     }
