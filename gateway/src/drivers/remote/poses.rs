@@ -64,8 +64,8 @@ impl RotationForm {
 }
 
 /// Gram and Schmidt: the first vector keeps its direction, the second what is square to it, the third follows.
-fn matrix_of(six: &[f64]) -> Option<UnitQuaternion<f64>> {
-    let &[x0, x1, x2, y0, y1, y2] = six else { return None };
+fn matrix_of(values: &[f64]) -> Option<UnitQuaternion<f64>> {
+    let &[x0, x1, x2, y0, y1, y2] = values else { return None };
     let x = Vector3::new(x0, x1, x2).try_normalize(SHORTEST)?;
     let y = Vector3::new(y0, y1, y2);
     let y = (y - x * x.dot(&y)).try_normalize(SHORTEST)?;

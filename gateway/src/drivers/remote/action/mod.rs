@@ -123,15 +123,15 @@ fn joined(map: &PolicyMap, parts: &[ColumnBlock], held_row: &[f64]) -> Result<Ve
     Ok((0..executed).map(row).collect())
 }
 
-/// What the columns `told` in row number `row` ask of a robot that was observed to be at `state_values`.
+/// What the columns `told_values` in row number `row` ask of a robot that was observed to be at `state_values`.
 fn action_row(
     map: &PolicyMap,
-    told: &[f64],
+    told_values: &[f64],
     row: usize,
     state_values: &[f64],
 ) -> Result<ActionRow, RemoteError> {
     let delta = map.delta();
-    let (mut whole, sensed_row) = (told[..ACTION_ROW_LEN].to_vec(), held_row(state_values));
+    let (mut whole, sensed_row) = (told_values[..ACTION_ROW_LEN].to_vec(), held_row(state_values));
     for column in &delta.row_columns {
         whole[*column] += sensed_row[*column];
     }
@@ -139,7 +139,7 @@ fn action_row(
     let pelvis_in_start = pose_of(sensed_pelvis(state_values));
     let mut wrists = [WristTarget::default(); 2];
     for (side, wrist) in wrists.iter_mut().enumerate() {
-        let given = WristTarget::read(told, &told_columns, side)
+        let given = WristTarget::read(told_values, &told_columns, side)
             .map_err(|reason| RemoteError::Misfit(format!("in row {row}, {reason}")))?;
         let pelvis_from_wrist = pose_of(sensed_wrist(state_values, side));
         *wrist =

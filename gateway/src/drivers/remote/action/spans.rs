@@ -31,9 +31,14 @@ pub fn spans(rows: usize, rate_hz: f64) -> Vec<RowSpan> {
     spans
 }
 
-/// Rows of `send_joint_chunk`, one a control step, for a robot that was last told `from`.
-pub fn control_rows(rows: &[ActionRow], spans: &[RowSpan], from: &[f64], between: Between) -> Vec<Vec<f64>> {
-    let mut before = from;
+/// Rows of `send_joint_chunk`, one a control step, for a robot that was last told `from_row`.
+pub fn control_rows(
+    rows: &[ActionRow],
+    spans: &[RowSpan],
+    from_row: &[f64],
+    between: Between,
+) -> Vec<Vec<f64>> {
+    let mut before = from_row;
     let mut control_rows = Vec::new();
     for span in spans {
         let goal = &rows[span.row].row;
@@ -49,14 +54,14 @@ pub fn control_rows(rows: &[ActionRow], spans: &[RowSpan], from: &[f64], between
 }
 
 /// The row after `share` of the way; velocities are the goal's from the beginning, for they are no places.
-fn between_rows(before: &[f64], goal: &[f64], share: f64) -> Vec<f64> {
+fn between_rows(before_row: &[f64], goal_row: &[f64], share: f64) -> Vec<f64> {
     let value = |(column, (before, goal)): (usize, (&f64, &f64))| match velocities().contains(&column) {
         true => *goal,
         // The goal itself to the last bit.
         false if share == 1.0 => *goal,
         false => before + (goal - before) * share,
     };
-    before.iter().zip(goal).enumerate().map(value).collect()
+    before_row.iter().zip(goal_row).enumerate().map(value).collect()
 }
 
 #[cfg(test)]

@@ -18,16 +18,17 @@ pub struct WristTarget {
 }
 
 impl WristTarget {
-    /// What the columns `told` say of a wrist, of which a policy tells `told_columns`.
-    pub fn read(told: &[f64], told_columns: &[usize], side: usize) -> Result<WristTarget, String> {
+    /// What the columns `told_values` say of a wrist, of which a policy tells `told_columns`.
+    pub fn read(told_values: &[f64], told_columns: &[usize], side: usize) -> Result<WristTarget, String> {
         let position = wrist_position(side);
-        let position_m =
-            told_columns.contains(&position.start).then(|| Vector3::from_column_slice(&told[position]));
+        let position_m = told_columns
+            .contains(&position.start)
+            .then(|| Vector3::from_column_slice(&told_values[position]));
         let form = RotationForm::ALL
             .into_iter()
             .find(|form| told_columns.contains(&wrist_rotation(side, *form).start));
         let rotation = form.map(|form| {
-            let values = &told[wrist_rotation(side, form)];
+            let values = &told_values[wrist_rotation(side, form)];
             form.read(values).ok_or_else(|| {
                 format!("the rotation of {} has no direction: {values:?}; expected a rotation", WRISTS[side])
             })
