@@ -104,7 +104,7 @@ impl LinkJoint {
 impl Document {
     pub fn actuators(&self) -> Result<Vec<Actuator>, SimError> {
         let elements = &self.model.actuators;
-        let limits = &self.speed_limits;
+        let limits = &self.speed_limit_values;
         if let Some(limits) = limits.as_ref().filter(|limits| limits.len() != elements.len()) {
             let (have, takes) = (limits.len(), elements.len());
             let what = format!(

@@ -41,7 +41,7 @@ pub struct Document {
     pub model: mjcf_rs::Model,
     pub cameras: Vec<MjcfCamera>,
     /// How fast the motors turn, in the order of the actuators, where the file says so.
-    speed_limits: Option<Vec<f64>>,
+    speed_limit_values: Option<Vec<f64>>,
     source: MjcfText,
     checked: Checked,
     /// The folder in which files lie that it names.
@@ -74,7 +74,7 @@ impl Document {
             file: file.into(),
             model,
             cameras: frames::cameras(&source)?,
-            speed_limits: joints::speed_limits(&source)?,
+            speed_limit_values: joints::speed_limits(&source)?,
             source,
             checked,
             folder: folder.into(),
@@ -105,7 +105,7 @@ impl Document {
 
     /// Tells files of different content apart, with all that they include and name; comments do not count.
     pub fn fingerprint(&self) -> u64 {
-        let read = (&self.model, &self.cameras, &self.meshes, &self.texture_rgb, &self.speed_limits);
+        let read = (&self.model, &self.cameras, &self.meshes, &self.texture_rgb, &self.speed_limit_values);
         let content = format!("{read:?}");
         xxh3_64(content.as_bytes())
     }

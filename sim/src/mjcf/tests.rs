@@ -156,7 +156,7 @@ fn motors_have_the_speed_limits_that_a_numeric_states() {
         .map_err(|error| error.to_string())
     };
     let limited = r#"forcerange="-2 2""#;
-    assert_eq!(with(limited, r#"size="2" data="3.14 20""#), Ok(vec![Some(3.14), Some(20.0)]));
+    assert_eq!(with(limited, r#"size="2" data="3.5 20""#), Ok(vec![Some(3.5), Some(20.0)]));
     for (forcerange, data, expected) in [
         (limited, r#"data="20""#, "has 1 numbers; it takes 2, one for each actuator"),
         (limited, "", "has 0 numbers; it takes 2"),

@@ -103,10 +103,12 @@ impl Surface {
 
     /// Where the shape is that another surface may meet: of an endless collider the part that lies beside that one.
     pub fn beside(&self, other: &Surface) -> DPose3 {
-        if !self.collider.endless {
+        let other_m = other.world_from_shape.translation;
+        let near = other_m.distance_squared(self.world_from_shape.translation) < (0.5 * TILE_M).powi(2);
+        if near || !self.collider.endless {
             return self.world_from_shape;
         }
-        let away_m = self.towards(other);
+        let away_m = self.world_from_shape.inverse() * other_m;
         let tile_m = |away_m: f64| (away_m / TILE_M).round() * TILE_M;
         let moved_m = DVec3::new(tile_m(away_m.x), tile_m(away_m.y), 0.0);
         self.world_from_shape * DPose3::from_translation(moved_m)

@@ -26,7 +26,6 @@ pub struct DriveLaw {
     pub implicit: f64,
     pub most: f64,
     pub speed_limit: f64,
-    pub slope: f64,
 }
 
 /// A drive that exerted more than this share of its limit in the last step is a row in the next.
@@ -37,13 +36,24 @@ const SLACKENS: f64 = 0.8;
 const TOLERANCE: f64 = 1e-9;
 
 impl DriveLaw {
+    /// What the limit of effort falls by per speed where the drive is fast.
+    fn slope(&self) -> f64 {
+        self.most / (self.speed_limit * (1.0 - SLACKENS))
+    }
+
+    /// Whether a drive still has its whole effort at the velocity `v`.
+    fn is_strong(&self, v: f64) -> bool {
+        v.abs() <= SLACKENS * self.speed_limit
+    }
+
     /// Smallest and largest impulse at the velocity `v` of the end of the step.
     fn bounds(&self, v: f64) -> [f64; 2] {
-        if self.slope == 0.0 {
+        if self.is_strong(v) {
             return [-self.most, self.most];
         }
-        let low = -self.slope * (self.speed_limit + v);
-        let high = self.slope * (self.speed_limit - v);
+        let slope = self.slope();
+        let low = -slope * (self.speed_limit + v);
+        let high = slope * (self.speed_limit - v);
         [low.clamp(-self.most, 0.0), high.clamp(0.0, self.most)]
     }
 
@@ -54,14 +64,16 @@ impl DriveLaw {
         let line = |rest: f64, implicit: f64| {
             impulse + (rest - implicit * v - impulse) / (1.0 + implicit * inverse_mass)
         };
-        let wanted = line(self.rest, self.implicit);
-        if self.slope == 0.0 {
-            return wanted.clamp(-self.most, self.most);
+        let wanted = line(self.rest, self.implicit).clamp(-self.most, self.most);
+        if self.is_strong(v + (wanted - impulse) * inverse_mass) {
+            return wanted;
         }
-        let slack = self.slope * self.speed_limit;
-        let low = line(-slack, self.slope).clamp(-self.most, 0.0);
-        let high = line(slack, self.slope).clamp(0.0, self.most);
-        wanted.clamp(low, high)
+        let slope = self.slope();
+        let slack = slope * self.speed_limit;
+        let low = line(-slack, slope).clamp(-self.most, 0.0);
+        let high = line(slack, slope).clamp(0.0, self.most);
+        // Not `clamp`, which panics at what is not a number; the step will say that physics diverged.
+        wanted.max(low).min(high)
     }
 }
 
@@ -82,7 +94,6 @@ impl Tree {
             implicit,
             most,
             speed_limit,
-            slope: if speed_limit.is_finite() { most / (speed_limit * (1.0 - SLACKENS)) } else { 0.0 },
         }
     }
 
