@@ -48,7 +48,7 @@ pub fn with_progress<T>(plan: &EvaluationPlan, work: impl FnOnce(&(dyn Fn(Episod
                         }
                     });
                 } else {
-                    let waiting = wait.filter(|wait| wait.lasted >= WAIT_FIRST).map(|wait| wait.to_string());
+                    let waiting = wait.filter(|wait| wait.lasted >= TICK).map(|wait| wait.to_string());
                     bar.set_message(waiting.unwrap_or_else(|| lock().bar_text(elapsed)));
                 }
             }

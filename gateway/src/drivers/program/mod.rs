@@ -303,3 +303,27 @@ impl From<HostingError> for PlayError {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn last_words_end_with_the_last_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let said = |stdout: &str, stderr: &str| {
+            fs::write(folder.path().join(STDOUT_FILE), stdout).unwrap();
+            fs::write(folder.path().join(STDERR_FILE), stderr).unwrap();
+            last_lines(folder.path())
+        };
+        let traceback =
+            "Traceback:\n  File \"agent.py\", line 7\n    plan()\n    ~~~~^^\nRuntimeError: no plan\n\n";
+        let told = "File \"agent.py\", line 7 / plan() / RuntimeError: no plan";
+        assert_eq!(said("unheard", traceback).as_deref(), Some(told));
+        assert_eq!(said("only this\n", " \n").as_deref(), Some("only this"));
+        let long = "x".repeat(1000);
+        assert_eq!(said("", &format!("before\n{long}")).map(|words| words.len()), Some(QUOTED_CHARS));
+        assert_eq!(said("", &format!("{long}\nthe end")).as_deref(), Some("the end"));
+        assert_eq!(said("", ""), None);
+    }
+}
