@@ -18,7 +18,10 @@ const LONG: Duration = Duration::from_secs(100);
 /// The command line that starts `agent` below in this role.
 fn agent_command(role: &str) -> String {
     let binary = env::current_exe().expect("this binary");
-    format!("ROLE={role} '{}' --exact policies::programs::agent --ignored --nocapture", binary.display())
+    format!(
+        "ROLE={role} RUST_BACKTRACE=0 '{}' --exact policies::programs::agent --ignored --nocapture",
+        binary.display()
+    )
 }
 
 #[test]
