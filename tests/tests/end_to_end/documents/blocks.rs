@@ -101,10 +101,6 @@ pub fn is_installed(program: &str) -> bool {
 /// Files of Python that users are given have nobody else who compiles them.
 #[test]
 fn examples_are_python() {
-    if !is_installed("python3") {
-        println!("skipped: no python3 to compile examples with");
-        return;
-    }
     let folders = ["agents", "bridges"].map(|folder| root().join("gateway/examples").join(folder));
     let files = folders.iter().flat_map(|folder| fs::read_dir(folder).expect("a folder of examples"));
     let files: Vec<_> = files.map(|file| file.expect("a file").path()).collect();
