@@ -5,6 +5,7 @@ mod checkpoints;
 mod commands;
 mod common;
 mod endings;
+mod falls;
 mod films;
 mod hands;
 mod operators;
