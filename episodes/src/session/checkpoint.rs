@@ -7,11 +7,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use tandem_sim::Snapshot;
+use tandem_sim::{RobotCommand, Snapshot};
 use tandem_tools_spec::EndReason;
 use xxhash_rust::xxh3::xxh3_64;
 
-use super::failure::{FailedStep, Rewind};
 use super::{Session, this_build};
 use crate::commands::MotionState;
 use crate::error::{CheckpointError, EpisodeError};
@@ -27,6 +26,15 @@ pub struct Checkpoint {
     progress: Progress,
     /// The step after it, where the simulator failed in that.
     pub(super) failed: Option<FailedStep>,
+}
+
+/// The step in which the simulator failed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FailedStep {
+    /// Its number in the episode, and what came out.
+    pub failure: String,
+    /// What each robot was told.
+    pub commands: Vec<RobotCommand>,
 }
 
 /// Whose progress it is.
@@ -203,7 +211,7 @@ impl Session {
         self.clock.set_spent(progress.thought);
         self.ended = progress.ended;
         self.simulator_failure = None;
-        self.rewind = Rewind::default();
+        self.rewind.forget();
         self.result = None;
         Ok(())
     }

@@ -1,12 +1,11 @@
 //! When the simulator fails: the world goes back to the last good step, and that is kept for a report, with what the robots were told
 //! next.
 
-use serde::{Deserialize, Serialize};
 use tandem_sim::dynamics::Diverged;
 use tandem_sim::{RobotCommand, SimError, Snapshot, World};
 use tandem_tools_spec::EndReason;
 
-use super::{Checkpoint, Session, monotonic};
+use super::{Checkpoint, FailedStep, Session, monotonic};
 use crate::EpisodeError;
 use crate::commands::MotionState;
 
@@ -14,15 +13,6 @@ use crate::commands::MotionState;
 pub const FAILED_STEP_FILE: &str = "failed_step.checkpoint";
 /// Control steps after which the world is kept anew: at most so many are simulated again.
 const KEPT_STEPS: usize = 50;
-
-/// The step in which the simulator failed.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct FailedStep {
-    /// Its number in the episode, and what came out.
-    pub failure: String,
-    /// What each robot was told.
-    pub commands: Vec<RobotCommand>,
-}
 
 /// The world as it was a while ago, and what it has been told since. It costs less than to keep it at every step.
 #[derive(Default)]
@@ -37,6 +27,11 @@ impl Rewind {
             self.kept = world.snapshot().ok();
             self.since.clear();
         }
+    }
+
+    /// The world is another one's from here on.
+    pub fn forget(&mut self) {
+        *self = Rewind::default();
     }
 
     /// The world has made a good step.

@@ -12,10 +12,10 @@ mod status;
 
 pub(crate) use build::build;
 pub use calls::CallReply;
-pub use checkpoint::Checkpoint;
+pub use checkpoint::{Checkpoint, FailedStep};
 pub use clock::{Clock, monotonic};
+pub use failure::FAILED_STEP_FILE;
 use failure::Rewind;
-pub use failure::{FAILED_STEP_FILE, FailedStep};
 pub(crate) use replay::Replay;
 use run_files::moment;
 pub use run_files::{RunFiles, RunFolder};

@@ -55,10 +55,10 @@ impl World {
         self.pushes.push(Push { link, point_in_link_m, force_n });
     }
 
-    /// Sets a hinge (rad) or slide (m) of an object, by the name that its file gives.
-    pub(crate) fn set_object_joint(&mut self, joint: &str, position: f64, velocity: f64) {
+    /// Sets a hinge of an object, by the name that its file gives.
+    pub(crate) fn set_object_hinge(&mut self, joint: &str, position_rad: f64, velocity_rad_s: f64) {
         let link = self.jointed(joint);
-        self.dynamics.tree_mut(link.tree).set_joint(link.link, position, velocity);
+        self.dynamics.tree_mut(link.tree).set_joint(link.link, position_rad, velocity_rad_s);
     }
 
     fn jointed(&self, joint: &str) -> LinkId {

@@ -142,12 +142,12 @@ impl FallCase {
         let mut reaching_rad = rest.upper_rad;
         reaching_rad[ARM_COLUMNS.right..ARM_COLUMNS.right + ARM_JOINTS].copy_from_slice(&REACHING_RAD);
         robot.about(reaching_rad);
-        world.set_object_joint(HINGE, OPEN_RAD, 0.0);
+        world.set_object_hinge(HINGE, OPEN_RAD, 0.0);
         play(world, SHORT_STEPS, |world, step| {
             let time_s = step as f32 * CONTROL_DT_S;
             let angle_rad = world.joint_position(HINGE).unwrap_or_default();
             if step == (SHUTS_AFTER_S / CONTROL_DT_S) as u32 {
-                world.set_object_joint(HINGE, angle_rad, -SLAM_RAD_S);
+                world.set_object_hinge(HINGE, angle_rad, -SLAM_RAD_S);
             }
             if time_s >= SHUTS_AFTER_S {
                 let (sine, cosine) = (angle_rad as f32).sin_cos();
