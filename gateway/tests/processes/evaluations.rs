@@ -2,6 +2,8 @@
 
 use std::process::{Command, Output};
 
+use crate::skipped::skipped;
+
 fn evaluate(arguments: &[&str]) -> (Output, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tandem"));
     command.args(["evaluate", "--tasks", "handover", "--seeds", "2000..2001", "--protocol", "benchmark"]);
@@ -40,8 +42,7 @@ fn programs_that_do_not_play_are_no_failures() {
     let look = "curl -sf -X POST -H \"Authorization: Bearer $TANDEM_TOKEN\" -H 'content-type: application/json' -d '{\"steps\": 5}' \
                 \"$TANDEM_URL/v1/episodes/$TANDEM_EPISODE/tools/wait\" > /dev/null || exit 0";
     if Command::new("curl").arg("--version").output().is_err() {
-        eprintln!("skipped: there is no curl");
-        return;
+        return skipped("there is no curl");
     }
     let crash = format!("exec:{look}; echo the planner has no plan >&2; kill -KILL $$");
     let (output, printed) = evaluate(&["--policy", &crash, "--policy-name", "agent", "--out", out]);

@@ -6,6 +6,8 @@ mod logs;
 mod resumed;
 mod server;
 mod signals;
+#[path = "../../../tests/src/skipped.rs"]
+mod skipped;
 mod without_space;
 
 pub use server::{Delays, Server, partials};

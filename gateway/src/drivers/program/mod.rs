@@ -130,7 +130,12 @@ impl Program {
                     true => ProgramExit::TimedOut,
                     false => ProgramExit::StillRunning,
                 };
-                return Ok(exits.into_iter().map(|exit| exit.unwrap_or(running)).collect());
+                let found = |exit: Option<ProgramExit>| match exit.unwrap_or(running) {
+                    // It has done its part, and the others have played the episode to its end.
+                    ProgramExit::Left if episode.ended() => ProgramExit::After,
+                    exit => exit,
+                };
+                return Ok(exits.into_iter().map(found).collect());
             }
             thread::sleep(POLL_INTERVAL);
         }
@@ -234,7 +239,7 @@ impl Policy for Program {
 /// How a program was found when the wait for it was over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ProgramExit {
-    /// It ended when its episode had.
+    /// It ended when its episode had, or had no further part in it.
     After,
     /// It ended by itself before its episode, and says that all went well.
     Left,
