@@ -55,3 +55,20 @@ fn trial(case: &FallCase, number: usize, seed: u32) -> Result<FallTrial, BenchEr
     let trial = case.play(&mut world, budget_steps, u64::from(seed));
     Ok(FallTrial { played: format!("{place} seed {seed}"), ..trial })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Four episodes of every case, those in tasks over whole budgets. `tandem bench falls --episodes 1000` plays more.
+    #[test]
+    fn falls_stay_finite_slow_shallow_and_make_no_energy() {
+        let report = falls(60, "", |case| println!("{case}")).expect("worlds");
+        assert!(report.cases.iter().map(|case| case.fallen).sum::<usize>() > 30, "robots fell");
+        for case in report.cases {
+            let greatest = format!("{}: {:#?}", case.case, case.greatest);
+            assert_eq!(case.diverged_at, Vec::<String>::new(), "{greatest}");
+            assert_eq!(case.broken, Default::default(), "speed, energy, depth, range of {greatest}");
+        }
+    }
+}

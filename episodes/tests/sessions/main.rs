@@ -5,7 +5,6 @@ mod checkpoints;
 mod commands;
 mod common;
 mod endings;
-mod falls;
 mod films;
 mod hands;
 mod operators;
