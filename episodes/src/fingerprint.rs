@@ -1,16 +1,56 @@
 //! Which program this is. Two builds of one version may differ in physics, so what one has begun another must not go on with.
 
-use std::io;
-use std::sync::OnceLock;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+use std::sync::{Mutex, OnceLock, PoisonError};
 
-use xxhash_rust::xxh3::xxh3_64;
+use xxhash_rust::xxh3::Xxh3;
+
+/// A program is tens of megabytes, so it is read in parts.
+const PART_BYTES: usize = 64 << 10;
 
 /// Version and hash of the program's own file, as it was when first asked for.
 pub fn build() -> io::Result<&'static str> {
     static BUILD: OnceLock<String> = OnceLock::new();
+    /// Who comes while the file is being read waits for what comes of it.
+    static READING: Mutex<()> = Mutex::new(());
+    let _reading = READING.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(build) = BUILD.get() {
         return Ok(build);
     }
-    let hash = xxh3_64(&std::fs::read(std::env::current_exe()?)?);
+    let hash = hash(&std::env::current_exe()?)?;
     Ok(BUILD.get_or_init(|| format!("{}+{hash:016x}", env!("CARGO_PKG_VERSION"))))
+}
+
+fn hash(path: &Path) -> io::Result<u64> {
+    let (mut file, mut hasher) = (File::open(path)?, Xxh3::new());
+    let mut part = vec![0; PART_BYTES];
+    loop {
+        match file.read(&mut part) {
+            Ok(0) => return Ok(hasher.digest()),
+            Ok(length) => hasher.update(&part[..length]),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use xxhash_rust::xxh3::xxh3_64;
+
+    use super::*;
+
+    #[test]
+    fn a_file_has_the_hash_of_its_bytes() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("program");
+        for length in [0, 1, PART_BYTES, 3 * PART_BYTES + 7] {
+            let bytes: Vec<u8> = (0..length).map(|i| (i * i) as u8).collect();
+            std::fs::write(&path, &bytes).unwrap();
+            assert_eq!(hash(&path).unwrap(), xxh3_64(&bytes), "{length} bytes");
+        }
+        assert!(hash(&folder.path().join("none")).is_err());
+    }
 }

@@ -22,6 +22,7 @@ use shade::{Facet, Rays};
 use shadow::ShadowMap;
 use target::RenderTarget;
 use view::{Row, SrgbTable, View};
+use workspace::Workspace;
 
 /// Renders on the calling thread, and several pictures of a state side by side. Its buffers it has only while it draws; the shadows
 /// of its last state are there the next time, unless too many others have drawn meanwhile.
@@ -75,32 +76,27 @@ impl CpuRenderer {
     pub(super) fn draw_placed(&mut self, placed: PlacedScenery, cameras: &[Camera]) -> Vec<Frame> {
         let CpuRenderer { prepared, srgb, number } = self;
         let arch = Arch::new();
-        // What panics meanwhile takes state and canvases with it.
-        let mut state = workspace::take_state(*number);
+        let mut workspace = Workspace::take(*number, cameras.len());
+        let Workspace { state, canvases, .. } = &mut workspace;
         if state.placed != placed {
-            arch.dispatch(StateDrawing { state: &mut state, prepared, placed });
+            arch.dispatch(StateDrawing { state, prepared, placed });
         }
-        let mut canvases = workspace::take_canvases(cameras.len());
-        let (prepared, srgb, lit) = (&*prepared, &*srgb, &state);
-        let draw =
-            |(canvas, camera)| arch.dispatch(PictureDrawing { state: lit, prepared, srgb, canvas, camera });
+        let (prepared, srgb, state) = (&*prepared, &*srgb, &*state);
+        let draw = |(canvas, camera)| arch.dispatch(PictureDrawing { state, prepared, srgb, canvas, camera });
         let mut pictures = canvases.iter_mut().zip(cameras);
         let first = pictures.next();
-        let frames = thread::scope(|scope| {
+        thread::scope(|scope| {
             let others: Vec<_> = pictures.map(|picture| scope.spawn(move || draw(picture))).collect();
             let others =
                 others.into_iter().map(|other| other.join().unwrap_or_else(|panic| resume_unwind(panic)));
             first.map(draw).into_iter().chain(others).collect()
-        });
-        workspace::give_canvases(canvases);
-        workspace::give_state(*number, state);
-        frames
+        })
     }
 }
 
 impl Drop for CpuRenderer {
     fn drop(&mut self) {
-        workspace::drop_state(self.number);
+        Workspace::forget(self.number);
     }
 }
 

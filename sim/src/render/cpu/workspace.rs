@@ -1,70 +1,132 @@
 //! What drawing needs and no picture keeps: megabytes, of which a renderer that waits for its next picture needs none. So the renderers
-//! of a process share them.
+//! of a process share them, and no more of them draw at the same time than there are processor cores.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
 use super::{Canvas, LitState};
 
-/// Lit states that wait for their renderers' next pictures. With fewer, renderers that draw by turns would light their rooms anew
-/// each time; so many are there at least, and more only where more renderers draw at the same time.
+/// Lit states that wait for their renderers' next pictures. With fewer, two renderers that draw by turns would light their rooms anew
+/// each time; where more draw at the same time, there are as many as draw.
 const WAITING_STATES: usize = 2;
 
-/// The lit states that nobody draws with, each with the number of the renderer that it was lit for, the latest last.
-static STATES: Mutex<Vec<(u64, LitState)>> = Mutex::new(Vec::new());
+/// Canvases that wait for pictures: as many as a task has robots, and the third person.
+const WAITING_CANVASES: usize = 4;
 
-/// The canvases that nobody draws on.
-static CANVASES: Mutex<Vec<Canvas>> = Mutex::new(Vec::new());
+/// What nobody draws with at the moment.
+struct Shared {
+    /// Renderers that draw.
+    drawing: usize,
+    /// Each with the number of the renderer that it was lit for, the latest last.
+    states: Vec<(u64, LitState)>,
+    canvases: Vec<Canvas>,
+}
 
-/// Takes a state for the renderer of this number: the one that it drew with last, if that has not gone to another renderer.
-pub fn take_state(renderer: u64) -> LitState {
-    let mut states = STATES.lock().unwrap_or_else(PoisonError::into_inner);
-    let own = states.iter().position(|(lit_for, _)| *lit_for == renderer);
-    let free = (states.len() >= WAITING_STATES).then_some(0);
-    match (own, free) {
-        (Some(own), _) => states.remove(own).1,
-        (None, Some(oldest)) => {
-            let (_, mut state) = states.remove(oldest);
-            state.forget();
-            state
+static SHARED: Mutex<Shared> = Mutex::new(Shared { drawing: 0, states: Vec::new(), canvases: Vec::new() });
+/// One that drew has ended.
+static ENDED: Condvar = Condvar::new();
+
+/// What one renderer draws with. It is given back when it is dropped, unless the drawing has panicked.
+pub struct Workspace {
+    renderer: u64,
+    /// What the renderer drew with last, if that has not gone to another one.
+    pub state: LitState,
+    /// One for each picture.
+    pub canvases: Vec<Canvas>,
+}
+
+impl Workspace {
+    /// Waits for a place among those that draw. `renderer` is a number that no other renderer of this process has.
+    pub fn take(renderer: u64, pictures: usize) -> Workspace {
+        let most = processors();
+        let mut shared = ENDED.wait_while(lock(), |shared| shared.drawing >= most);
+        let shared = shared.as_mut().unwrap_or_else(|poisoned| poisoned.get_mut());
+        shared.drawing += 1;
+        let kept = shared.canvases.len().saturating_sub(pictures);
+        let mut canvases = shared.canvases.split_off(kept);
+        canvases.resize_with(pictures, Canvas::default);
+        Workspace { renderer, state: shared.take_state(renderer), canvases }
+    }
+
+    /// Lets go of what was lit for a renderer that is no more.
+    pub fn forget(renderer: u64) {
+        lock().states.retain(|(lit_for, _)| *lit_for != renderer);
+    }
+}
+
+impl Drop for Workspace {
+    fn drop(&mut self) {
+        let mut shared = lock();
+        shared.drawing -= 1;
+        if !thread::panicking() {
+            shared.states.push((self.renderer, std::mem::take(&mut self.state)));
+            if shared.states.len() > WAITING_STATES.max(processors()) {
+                shared.states.remove(0);
+            }
+            shared.canvases.append(&mut self.canvases);
+            shared.canvases.truncate(WAITING_CANVASES.max(processors()));
         }
-        (None, None) => LitState::default(),
+        ENDED.notify_one();
     }
 }
 
-/// Gives back the state that this renderer has drawn with.
-pub fn give_state(renderer: u64, state: LitState) {
-    let mut states = STATES.lock().unwrap_or_else(PoisonError::into_inner);
-    states.push((renderer, state));
-    if states.len() > WAITING_STATES.max(processors()) {
-        states.remove(0);
+impl Shared {
+    fn take_state(&mut self, renderer: u64) -> LitState {
+        if let Some(own) = self.states.iter().position(|(lit_for, _)| *lit_for == renderer) {
+            return self.states.remove(own).1;
+        }
+        if self.states.len() < WAITING_STATES {
+            return LitState::default();
+        }
+        let (_, mut oldest) = self.states.remove(0);
+        oldest.forget();
+        oldest
     }
 }
 
-/// Lets go of what was lit for a renderer that is no more.
-pub fn drop_state(renderer: u64) {
-    STATES.lock().unwrap_or_else(PoisonError::into_inner).retain(|(lit_for, _)| *lit_for != renderer);
+fn lock() -> MutexGuard<'static, Shared> {
+    SHARED.lock().unwrap_or_else(PoisonError::into_inner)
 }
-
-/// Takes a canvas for each of so many pictures.
-pub fn take_canvases(count: usize) -> Vec<Canvas> {
-    let mut canvases = CANVASES.lock().unwrap_or_else(PoisonError::into_inner);
-    let kept = canvases.len().saturating_sub(count);
-    let mut taken = canvases.split_off(kept);
-    taken.resize_with(count, Canvas::default);
-    taken
-}
-
-/// Gives back canvases.
-pub fn give_canvases(given: Vec<Canvas>) {
-    let mut canvases = CANVASES.lock().unwrap_or_else(PoisonError::into_inner);
-    canvases.extend(given);
-    canvases.truncate(processors().max(CANVASES_OF_A_STATE));
-}
-
-/// The robots of a task at most, or one fewer and the third person.
-const CANVASES_OF_A_STATE: usize = 4;
 
 fn processors() -> usize {
     thread::available_parallelism().map_or(1, usize::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::panic::catch_unwind;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+
+    #[test]
+    fn no_more_draw_at_once_than_there_are_cores_and_a_panic_gives_its_place_back() {
+        let (now, most) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let draw = |renderer: u64| {
+            let workspace = Workspace::take(renderer, 2);
+            assert_eq!(workspace.canvases.len(), 2);
+            most.fetch_max(now.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
+            thread::yield_now();
+            now.fetch_sub(1, Ordering::SeqCst);
+            assert!(!renderer.is_multiple_of(7), "this one panics");
+        };
+        let threads = 8 * processors();
+        let panicked = thread::scope(|scope| {
+            let one = |thread: usize| {
+                let numbers = (0..50).map(move |round| (round * threads + thread) as u64 + (1 << 40));
+                scope.spawn(move || {
+                    numbers
+                        .filter(|number| {
+                            catch_unwind(std::panic::AssertUnwindSafe(|| draw(*number))).is_err()
+                        })
+                        .count()
+                })
+            };
+            let threads: Vec<_> = (0..threads).map(one).collect();
+            threads.into_iter().map(|thread| thread.join().unwrap()).sum::<usize>()
+        });
+        assert!(panicked > threads, "{panicked} panicked");
+        assert!((1..=processors()).contains(&most.into_inner()));
+        assert!(lock().states.len() <= WAITING_STATES.max(processors()));
+    }
 }
