@@ -97,7 +97,7 @@ pub fn film(
 pub struct ShortFilm {
     pub webp: Vec<u8>,
     /// How much faster it plays than the episode was.
-    pub times_as_fast: f64,
+    pub speed_ratio: f64,
 }
 
 const SHORT_PICTURES: usize = 60;
@@ -124,7 +124,7 @@ pub fn short_film(recording: &Recording) -> Result<ShortFilm, VideoError> {
         }
     }
     let webp = encoder.finalize(time_ms(pictures, SHORT_RATE_HZ) + SHORT_END_MS).map_err(failed)?.to_vec();
-    Ok(ShortFilm { webp, times_as_fast: stride as f64 * f64::from(SHORT_RATE_HZ) / CONTROL_HZ })
+    Ok(ShortFilm { webp, speed_ratio: stride as f64 * f64::from(SHORT_RATE_HZ) / CONTROL_HZ })
 }
 
 /// Which step, counted from the recording's first, picture number `picture` shows.

@@ -65,8 +65,8 @@ pub fn run(args: ReportArgs) -> CommandResult {
 fn film(place: FilmPlace) -> Film {
     let content = place.episode.clone().and_then(|FilmedEpisode { recording, .. }| {
         let read = Recording::read(&recording).map_err(|error| error.to_string())?;
-        let ShortFilm { webp, times_as_fast } = short_film(&read).map_err(|error| error.to_string())?;
-        Ok(FilmContent { webp, times_as_fast })
+        let ShortFilm { webp, speed_ratio } = short_film(&read).map_err(|error| error.to_string())?;
+        Ok(FilmContent { webp, speed_ratio })
     });
     Film { place, content }
 }

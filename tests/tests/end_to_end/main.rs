@@ -7,3 +7,4 @@ mod operators;
 mod paper_numbers;
 mod policies;
 mod server;
+mod skips;

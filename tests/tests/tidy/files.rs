@@ -83,3 +83,14 @@ fn no_file_points_out_of_the_repository() {
         .collect();
     expect_none(&pointing, "everything a file names is in the repository");
 }
+
+#[test]
+fn what_tests_leave_out_is_not_printed_where_nobody_sees_it() {
+    let print = ["println!(\"skipped", "eprintln!(\"skipped"];
+    let hidden: Vec<String> = everywhere(&["rs"])
+        .into_iter()
+        .filter(|source| print.iter().any(|print| source.text.contains(print)))
+        .map(|source| source.path.display().to_string())
+        .collect();
+    expect_none(&hidden, "a test says what it leaves out through tests/src/skipped.rs");
+}

@@ -8,7 +8,6 @@ mod lengths;
 mod modules;
 mod order;
 mod paths;
-mod skips;
 mod sources;
 mod types;
 mod units;

@@ -64,19 +64,19 @@ fn encode(canvas: &Canvas, texts: &str) -> Result<Vec<u8>, png::EncodingError> {
     Ok(bytes)
 }
 
-/// The moments of a strip that was written earlier, as small pictures `scale` as large. A picture without texts, such as a strip of
+/// The moments of a strip that was written earlier, as small pictures `scale_ratio` as large. A picture without texts, such as a strip of
 /// an earlier build, is one moment of which nothing is said; `None` where there is no picture.
-pub fn read(path: &Path, scale: f64) -> Option<Vec<KeyMoment>> {
+pub fn read(path: &Path, scale_ratio: f64) -> Option<Vec<KeyMoment>> {
     let strip = image::open(path).ok()?.into_rgb8();
     let Some(columns) = texts(path).filter(|columns| fits(&strip, columns)) else {
-        let views = vec![LabelledPicture { label: String::new(), file: small(&strip, scale)? }];
+        let views = vec![LabelledPicture { label: String::new(), file: small(&strip, scale_ratio)? }];
         return Some(vec![KeyMoment { caption: Default::default(), views }]);
     };
     let moment = |(column, ColumnTexts { caption, labels }): (usize, ColumnTexts)| {
         let view = |(row, label): (usize, String)| {
             let [x, y] = [column_x(column), picture_y(row)].map(|px| px as u32);
             let cell = imageops::crop_imm(&strip, x, y, CELL_WIDTH as u32, CELL_HEIGHT as u32);
-            Some(LabelledPicture { label, file: small(&cell.to_image(), scale)? })
+            Some(LabelledPicture { label, file: small(&cell.to_image(), scale_ratio)? })
         };
         let views = labels.into_iter().enumerate().map(view).collect::<Option<_>>()?;
         Some(KeyMoment { caption, views })
@@ -98,9 +98,9 @@ fn fits(strip: &RgbImage, columns: &[ColumnTexts]) -> bool {
 }
 
 /// A picture of its own, as WebP.
-fn small(picture: &RgbImage, scale: f64) -> Option<Vec<u8>> {
+fn small(picture: &RgbImage, scale_ratio: f64) -> Option<Vec<u8>> {
     let [width, height] =
-        [picture.width(), picture.height()].map(|px| (f64::from(px) * scale).round().max(1.0) as u32);
+        [picture.width(), picture.height()].map(|px| (f64::from(px) * scale_ratio).round().max(1.0) as u32);
     let small = imageops::resize(picture, width, height, FilterType::Triangle);
     webp::picture(width, height, small.as_raw()).ok()
 }

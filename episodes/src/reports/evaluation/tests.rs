@@ -341,7 +341,7 @@ fn films_are_of_one_success_and_one_failure() {
     let ended = Some("the policy ended the episode");
     assert_eq!(episodes, [Ok((1, None)), Ok((4, ended)), Err(unrecorded), Err("No episode failed.")]);
     let contents = [
-        Ok(FilmContent { webp: b"RIFF".into(), times_as_fast: 3.0 }),
+        Ok(FilmContent { webp: b"RIFF".into(), speed_ratio: 3.0 }),
         Err("a <reason>".into()),
         Err(String::new()),
         Err(String::new()),

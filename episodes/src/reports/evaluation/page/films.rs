@@ -39,7 +39,7 @@ pub struct Film {
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmContent {
     pub webp: Vec<u8>,
-    pub times_as_fast: f64,
+    pub speed_ratio: f64,
 }
 
 /// Two places for each task that was played; in each, the first episode of the first policy that has one and its recording.
@@ -117,6 +117,6 @@ fn figure(Film { place, content }: &Film) -> String {
     let picture = moments::picture(&film.webp, &format!("A {what} at {}, {of}", escape(place.task)));
     format!(
         r#"<figure>{picture}<figcaption><span class="{class}">{what}</span> <span class="soft">{of}{why} ({:.0} times as fast)</span></figcaption></figure>"#,
-        film.times_as_fast
+        film.speed_ratio
     )
 }
