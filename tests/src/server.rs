@@ -65,7 +65,7 @@ impl TestServer {
         let flags = Layer {
             listen: Some("127.0.0.1:0".parse().expect("an address")),
             runs: Some(runs.path().into()),
-            max_episodes: Some(2),
+            max_episodes: flags.max_episodes.or(Some(2)),
             ..flags
         };
         let settings = Settings::resolve(flags, None).expect("settings without a file");

@@ -49,10 +49,15 @@ const EPISODE_KB: u64 = 12_000;
 /// Most that it may take for a moment, while others draw and start beside it.
 const EPISODE_PEAK_KB: u64 = 16_000;
 const EPISODES: usize = 21;
+/// Set where the process is there for this alone.
+const ALONE: &str = "TANDEM_TESTS_MEMORY_ALONE";
 
 #[test]
 #[ignore = "a process of its own, which the test below starts"]
 fn episodes_side_by_side() {
+    if env::var_os(ALONE).is_none() {
+        return;
+    }
     let server = TestServer::with(Layer { max_episodes: Some(EPISODES as u32), ..Layer::default() });
     let before_kb = memory_kb("VmRSS");
     let play = |seed: usize, task: &tasks::Task| {
@@ -80,7 +85,9 @@ fn episodes_side_by_side() {
 #[test]
 fn an_episode_takes_at_most_twelve_megabytes() {
     let mut alone = Command::new(env::current_exe().expect("this program"));
-    alone.args(["--exact", "episodes::memory::episodes_side_by_side", "--ignored", "--nocapture"]);
+    alone
+        .args(["--exact", "episodes::memory::episodes_side_by_side", "--ignored", "--nocapture"])
+        .env(ALONE, "1");
     let output = alone.output().expect("this program again");
     let told = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(
