@@ -186,26 +186,11 @@ fn lying(at_m: Vector, random: &mut SplitMix64) -> Pose {
 mod tests {
     use super::*;
 
-    fn played(name: &str, seed: u64) -> (World, FallTrial) {
-        let case = FALL_CASES.iter().find(|case| case.name == name).expect("a case");
-        let mut world = case.world().expect("a world");
-        let trial = case.play(&mut world, 0, seed);
-        (world, trial)
-    }
-
-    /// What is slammed meets a hand, and what is dropped a robot: otherwise these cases would show nothing.
+    /// What is dropped meets a robot: otherwise the case would show nothing.
     #[test]
-    fn doors_and_tables_meet_robots() {
-        let mut stopped = 0;
-        for seed in 2000..2006 {
-            let (door, trial) = played("door_on_hand", seed);
-            let angle_rad = door.joint_position(HINGE).expect("a hinge");
-            println!("door {seed}: {angle_rad:.3} rad, {} fell, {:?}", trial.fallen, trial.extremes);
-            stopped += usize::from(angle_rad > 0.02);
-        }
-        let fell: usize = (2000..2006).map(|seed| played("table_on_robot", seed).1.fallen).sum();
-        println!("{stopped} doors stopped, {fell} fell under tables");
-        assert!(stopped >= 3, "{stopped} of 6 doors were stopped by a hand");
-        assert!(fell >= 1, "no robot fell under a table");
+    fn tables_meet_robots() {
+        let case = FALL_CASES.iter().find(|case| case.name == "table_on_robot").expect("a case");
+        let fell = |seed| case.play(&mut case.world().expect("a world"), 0, seed).fallen;
+        assert!((2000..2006).map(fell).sum::<usize>() >= 1, "no robot fell under a table");
     }
 }
