@@ -2,6 +2,7 @@
 
 use rapier3d::glamx::{DPose3, DVec3};
 
+use super::super::trees::energy::FAST_RAD;
 use super::super::{Axis, Drive, Joint, Mass, Tree};
 use super::bench::{Bench, DOWN, DT_S, Random, jointed, link, sliding};
 use super::inverse::efforts;
@@ -74,7 +75,7 @@ fn dynamics_saturated_chain_on_the_floor() {
 /// While nothing touches, the reported efforts are those of inverse dynamics.
 fn check_efforts(bench: &Bench, id: super::super::TreeId, at: &super::super::TreeState, before: &[f64]) {
     // Of a fast tree, energy that the integration made is taken back (see `energy`), which no drive did.
-    let fast = |v: &[f64]| v.iter().any(|v| v.abs() > 0.1 / DT_S);
+    let fast = |v: &[f64]| v.iter().any(|v| v.abs() > FAST_RAD / DT_S);
     if !bench.dynamics.touches().is_empty() || fast(before) || fast(&bench.dynamics.tree(id).v) {
         return;
     }

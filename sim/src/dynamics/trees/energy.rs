@@ -1,7 +1,7 @@
 //! What a fast tree may not gain: kinetic energy that no force gave it.
 //!
-//! Coriolis forces are explicit in a step, and positions move along straight lines in joint coordinates. Below a tenth of a
-//! radian per step neither matters. A fallen robot that thrashes about is faster, and there the two together feed kinetic
+//! Coriolis forces are explicit in a step, and positions move along straight lines in joint coordinates. Below a twentieth
+//! of a radian per step neither matters. A fallen robot that thrashes about is faster, and there the two together feed kinetic
 //! energy, the more the faster it is: left alone, it has no bound. In truth Coriolis forces do no work. With the impulses P
 //! of everything else,
 //!   M (v' - v) = P - dt h,   so that the work is   P . (v + v') / 2 = K(q, v') - K(q, v) + dt h . (v + v') / 2,
@@ -20,7 +20,7 @@ use super::spatial::{ForceVector, Inertia, MotionVector, Symmetric};
 use super::tree::Tree;
 
 /// rad per step of a joint or of the base; slower trees are left as they are.
-const FAST_RAD: f64 = 0.1;
+pub(in crate::dynamics) const FAST_RAD: f64 = 0.05;
 
 /// What a step ought to end with.
 pub(in crate::dynamics) struct Due {

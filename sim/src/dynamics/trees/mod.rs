@@ -1,6 +1,6 @@
 //! All trees of a world, and where each one's degrees of freedom lie among all.
 
-mod energy;
+pub mod energy;
 mod equations;
 mod factor;
 mod free_spin;
