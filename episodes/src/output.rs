@@ -32,13 +32,17 @@ impl OutputError {
 /// Writes a file under another name first and renames it when it is complete and on the disk: a reader sees the whole of it
 /// or nothing, even after a power cut. What cannot be written leaves nothing behind.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
-    let partial = partial_path(path);
-    let written = File::create(&partial).and_then(|mut file| {
+    write_whole_as(&partial_path(path), path, bytes)
+}
+
+/// As [`write_whole`], where the file's usual name on its way is another file's: it is called `under_way` instead.
+pub fn write_whole_as(under_way: &Path, path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    let written = File::create(under_way).and_then(|mut file| {
         file.write_all(bytes)?;
-        put_in_place(&file, &partial, path)
+        put_in_place(&file, under_way, path)
     });
     written.map_err(|source| {
-        let _ = fs::remove_file(&partial);
+        let _ = fs::remove_file(under_way);
         OutputError::Io { path: path.into(), source }
     })
 }

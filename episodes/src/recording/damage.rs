@@ -14,6 +14,13 @@ pub struct Damage {
     pub fault: Fault,
 }
 
+impl Damage {
+    /// Whether not even the first bytes are those of such a file.
+    pub fn is_of_another_format(&self) -> bool {
+        self.part == FilePart::Magic && self.offset == 0
+    }
+}
+
 /// What of the file it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FilePart {

@@ -104,10 +104,7 @@ impl<'a> DataSection<'a> {
         while self.saved_checksum.is_none() {
             let offset = self.position;
             let Some((opcode, content)) = self.take_record()? else { return Ok(None) };
-            let part = match opcode {
-                op::CHUNK => FilePart::Chunk(self.chunks + 1),
-                opcode => FilePart::Record(opcode),
-            };
+            let part = self.part(opcode);
             if let Some(read) = self.read(opcode, offset, content).map_err(|fault| fault.of(part, offset))? {
                 return Ok(Some(read));
             }
@@ -138,10 +135,17 @@ impl<'a> DataSection<'a> {
     fn take_record(&mut self) -> Result<Option<(u8, Range<usize>)>, Damage> {
         let offset = self.position;
         let Some(opcode) = self.bytes.get(offset) else { return Ok(None) };
-        let content =
-            frame(self.bytes, offset).ok_or_else(|| Fault::Cut.of(FilePart::Record(*opcode), offset))?;
+        let content = frame(self.bytes, offset).ok_or_else(|| Fault::Cut.of(self.part(*opcode), offset))?;
         self.position = content.end;
         Ok(Some((*opcode, content)))
+    }
+
+    /// What the next record is.
+    fn part(&self, opcode: u8) -> FilePart {
+        match opcode {
+            op::CHUNK => FilePart::Chunk(self.chunks + 1),
+            opcode => FilePart::Record(opcode),
+        }
     }
 
     fn read(&mut self, opcode: u8, offset: usize, content: Range<usize>) -> Result<Option<DataPart>, Fault> {

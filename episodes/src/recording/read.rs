@@ -60,7 +60,7 @@ pub struct RecordedCheckpoint {
 pub enum RecordingError {
     #[error("cannot read the recording {}: {source}", path.display())]
     Read { path: PathBuf, source: std::io::Error },
-    #[error("{} is no whole recording: {source}; {}", path.display(), recover_hint(path))]
+    #[error("{} is no whole recording: {source}; {}", path.display(), hint(path, source))]
     Damaged { path: PathBuf, source: Box<Damage> },
     #[error("{} has no {what}; recordings that this version of Tandem makes have it", path.display())]
     Missing { path: PathBuf, what: String },
@@ -198,14 +198,15 @@ impl Recording {
     }
 }
 
-/// How what is whole of a recording becomes a recording.
-fn recover_hint(path: &Path) -> String {
+/// How what is whole of a recording may become a recording.
+fn hint(path: &Path, damage: &Damage) -> String {
     match path.extension() {
+        _ if damage.is_of_another_format() => "it is no MCAP file; give an episode.mcap".into(),
         Some(extension) if extension == "partial" => {
-            format!("`tandem recover {}` makes one of what comes before", path.display())
+            format!("`tandem recover {}` may make one of what comes before", path.display())
         }
         _ => format!(
-            "rename it to {0}.partial, and `tandem recover {0}.partial` makes one of what comes before",
+            "rename it to {0}.partial, and `tandem recover {0}.partial` may make one of what comes before",
             path.display()
         ),
     }

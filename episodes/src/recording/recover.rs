@@ -9,7 +9,7 @@ use super::damage::Damage;
 use super::data_section::{AttachmentPlace, DataPart, DataSection};
 use super::mcap_file::{RecordingStore, Visibility, writer};
 use super::read::{Recording, RecordingError};
-use crate::output::OutputError;
+use crate::output::{OutputError, write_whole_as};
 
 /// What could be read, and where it is now.
 #[derive(Debug)]
@@ -43,10 +43,21 @@ pub enum RecoverError {
     Read(#[from] RecordingError),
     #[error("{} holds no message that can be read: {reason}", path.display())]
     Nothing { path: PathBuf, reason: String },
-    #[error("what is whole of {} is not enough to be replayed: {source}", path.display())]
-    TooLittle { path: PathBuf, source: Box<RecordingError> },
+    #[error("what is whole of {} is not enough to be replayed: {reason}", path.display())]
+    TooLittle { path: PathBuf, reason: String },
     #[error(transparent)]
     Output(#[from] OutputError),
+}
+
+impl RecoverError {
+    /// Who is here has been told to recover already.
+    fn too_little(partial: &Path, source: RecordingError) -> RecoverError {
+        let reason = match source {
+            RecordingError::Damaged { source, .. } => source.to_string(),
+            source => source.to_string(),
+        };
+        RecoverError::TooLittle { path: partial.into(), reason }
+    }
 }
 
 /// Writes every message, attachment and all metadata of `FILE.partial` up to the first part that is not as it was written to
@@ -147,10 +158,11 @@ impl RecoveredFile {
     fn finish(mut self, partial: &Path) -> Result<PathBuf, RecoverError> {
         self.writer.finish().map_err(|source| OutputError::of_recording(&self.path, source))?;
         let store = self.writer.into_inner();
-        Recording::from_bytes(&self.path, store.pending().to_vec())
+        Recording::from_bytes(partial, store.pending().to_vec())
             .and_then(|recording| recording.check_replayable())
-            .map_err(|source| RecoverError::TooLittle { path: partial.into(), source: source.into() })?;
-        store.keep(&self.path)?;
+            .map_err(|source| RecoverError::too_little(partial, source))?;
+        // What is read has the name that files have while they are written.
+        write_whole_as(&partial.with_extension("recovering"), &self.path, store.pending())?;
         Ok(self.path)
     }
 }

@@ -1,6 +1,6 @@
 //! A recorder on a thread of its own, so that an episode does not wait while what it left behind is encoded and compressed.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, OnceLock};
 use std::thread::{Builder, JoinHandle, park_timeout};
@@ -50,6 +50,7 @@ pub struct RecorderThread {
     waiting_pictures: Arc<AtomicUsize>,
     /// Steps that the system does not have yet.
     unwritten_steps: Arc<AtomicUsize>,
+    hurry: Arc<AtomicBool>,
 }
 
 impl RecorderThread {
@@ -57,11 +58,13 @@ impl RecorderThread {
         let (appends, inbox) = sync_channel(WAITING_APPENDS);
         let failed = Arc::new(OnceLock::new());
         let unwritten_steps = Arc::<AtomicUsize>::default();
+        let hurry = Arc::<AtomicBool>::default();
         let appender = Appender {
             recorder,
             failed: failed.clone(),
             unwritten_steps: unwritten_steps.clone(),
             gathered_steps: 0,
+            hurry: hurry.clone(),
         };
         let work = move || appender.run(&inbox);
         let thread = Builder::new().name("recorder".into()).spawn(work)?;
@@ -71,6 +74,7 @@ impl RecorderThread {
             failed,
             waiting_pictures: Arc::default(),
             unwritten_steps,
+            hurry,
         })
     }
 
@@ -143,6 +147,7 @@ impl RecorderThread {
     /// Gathers no longer.
     fn wake(&self) {
         if let Some(thread) = &self.thread {
+            self.hurry.store(true, Ordering::Release);
             thread.thread().unpark();
         }
     }
@@ -178,14 +183,18 @@ struct Appender {
     unwritten_steps: Arc<AtomicUsize>,
     /// Steps since the last flush.
     gathered_steps: usize,
+    /// Whether it has been woken. It also parks while it waits for an append, and being woken from that leaves no trace.
+    hurry: Arc<AtomicBool>,
 }
 
 impl Appender {
     /// Returns the recorder when nobody is left who appends, or nothing at its first failure.
     fn run(mut self, inbox: &Receiver<Append>) -> Option<Recorder> {
         while let Ok(first) = inbox.recv() {
-            if !matches!(first, Append::Flush(_)) {
+            if !matches!(first, Append::Flush(_)) && !self.hurry.swap(false, Ordering::AcqRel) {
                 park_timeout(GATHERED);
+                // What it was woken for has been sent before, and is taken up now.
+                self.hurry.swap(false, Ordering::AcqRel);
             }
             let mut appends = iter::once(first).chain(inbox.try_iter());
             if !(appends.all(|append| self.append(append)) && self.flush()) {

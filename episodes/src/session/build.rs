@@ -153,9 +153,14 @@ fn try_scene(
     let commands: Vec<_> = (0..world.robots().len()).map(|robot| world.rest_command(robot)).collect();
     let start = places_m(&world.present(), spec.task);
     let mut end = start.clone();
-    for step in 1..=u64::from(TRIAL_STEPS) {
-        let stepped = world.control_step(&commands);
-        let present = stepped.map_err(|source| EpisodeError::Diverged { step, source })?;
+    let trial_s = f64::from(TRIAL_STEPS) / CONTROL_HZ;
+    for _ in 0..TRIAL_STEPS {
+        let present = world.control_step(&commands).map_err(|source| SceneError::Diverged {
+            path: path.clone(),
+            task,
+            trial_s,
+            source,
+        })?;
         end = places_m(&present, spec.task);
     }
     let moved = start.iter().zip(&end).map(|(start, end)| (start, (end.at_m - start.at_m).length()));
@@ -168,7 +173,7 @@ fn try_scene(
             site: site.clone(),
             at_m: at_m.to_array(),
             moved_m,
-            trial_s: f64::from(TRIAL_STEPS) / CONTROL_HZ,
+            trial_s,
         }
         .into()),
     }

@@ -2,10 +2,10 @@
 //! episode: what cannot be written is named in the result, and the episode goes on without it.
 
 use std::fmt::Display;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
+use std::{fs, io};
 
 use tandem_sim::render::{Frame, PictureError, encode_png};
 use tandem_sim::{CONTROL_HZ, Step};
@@ -177,6 +177,11 @@ fn begin(folder: &RunFolder, session: &Session) -> Result<RecorderThread, Episod
     let RunFolder { path, visibility } = folder;
     let failed = |source| OutputError::Io { path: path.clone(), source };
     create_private_folder(path).map_err(failed)?;
+    match fs::remove_file(path.join(FAILED_STEP_FILE)) {
+        // That of an earlier episode in this folder is not of this one.
+        Err(source) if source.kind() != io::ErrorKind::NotFound => return Err(failed(source).into()),
+        _ => {}
+    }
     let header = RecordingHeader {
         spec: session.spec().clone(),
         locomotion: session.origin.locomotion.clone(),

@@ -6,14 +6,17 @@ use crate::common::*;
 use std::path::{Path, PathBuf};
 use tandem_episodes::players::{self, InProcess};
 
-use tandem_episodes::{Recorder, Recording, Session, recover};
+use tandem_episodes::{FAILED_STEP_FILE, Recorder, Recording, Session, recover};
 use tandem_tools_spec::{EndReason, Finish, Observe, Protocol};
 
 #[test]
 fn recorded_steps_are_the_steps_bit_for_bit() {
     let folder = tempfile::tempdir().unwrap();
     let spec = spec("co_pouring", 3, Protocol::Benchmark);
+    let of_another = folder.path().join(FAILED_STEP_FILE);
+    std::fs::write(&of_another, "an earlier episode's").unwrap();
     let mut session = Session::start(&spec, Some(folder.path())).unwrap();
+    assert!(!of_another.exists());
     let mut present = vec![session.present().clone()];
     for _ in 0..5 {
         wait(&mut session, 1);
@@ -66,6 +69,7 @@ fn what_is_no_recording_is_refused_by_name() {
     std::fs::write(&path, "not MCAP").unwrap();
     let text = Recording::read(&path).map(drop).unwrap_err().to_string();
     assert!(text.contains("notes.mcap is no whole recording"), "{text}");
+    assert!(text.ends_with("it is no MCAP file; give an episode.mcap"), "{text}");
 }
 
 #[test]
@@ -122,7 +126,17 @@ fn an_interrupted_recording_is_recovered_up_to_the_last_reply() {
     let text = Recording::read(&partial).map(drop).unwrap_err().to_string();
     assert!(text.contains("tandem recover") && text.contains("episode.mcap.partial"), "{text}");
 
+    // Whatever comes of it, it is not written to.
+    let bytes = std::fs::read(&partial).unwrap();
+    let on_the_way = folder.path().join("episode.mcap.recovering");
+    for taken in [&on_the_way, &folder.path().join(Recorder::FILE_NAME)] {
+        std::fs::create_dir(taken).unwrap();
+        recover(&partial).unwrap_err();
+        assert!(std::fs::read(&partial).unwrap() == bytes, "with {}", taken.display());
+        std::fs::remove_dir(taken).unwrap();
+    }
     let recovered = recover(&partial).unwrap();
+    assert!(std::fs::read(&partial).unwrap() == bytes && !on_the_way.exists());
     assert_eq!((recovered.path.clone(), recovered.last_s), (folder.path().join(Recorder::FILE_NAME), 0.3));
     let recording = Recording::read(&recovered.path).unwrap();
     assert_eq!((recording.steps().count(), recording.tool_calls().unwrap().len()), (16, 3));

@@ -150,7 +150,7 @@ fn a_chunk_that_says_it_is_huge_is_refused_before_it_is_decompressed() {
         let mut changed = bytes.clone();
         changed[field + 6] = 0x5f;
         let text = Recording::from_bytes(&path, changed).map(drop).unwrap_err().to_string();
-        assert!(text.contains(&format!("at byte {chunk}: ")) && text.contains(says), "{text}");
+        assert!(text.contains(&format!("chunk 1 at byte {chunk}: ")) && text.contains(says), "{text}");
     }
 }
 
