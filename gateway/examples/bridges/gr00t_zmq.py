@@ -111,7 +111,7 @@ def main():
     parser.add_argument("--server", default="tcp://127.0.0.1:5555")
     parser.add_argument("--port", type=int, default=8001)
     parser.add_argument("--token")
-    parser.add_argument("--timeout-s", type=float, default=60)
+    parser.add_argument("--timeout-s", type=float, default=600)
     args = parser.parse_args()
     policy = Gr00t(args.server, args.token, args.timeout_s)
     server = http.server.ThreadingHTTPServer(("127.0.0.1", args.port), handler(policy))

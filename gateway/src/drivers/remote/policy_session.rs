@@ -11,7 +11,6 @@ use tandem_episodes::players::{LocalEpisode, PlayerError};
 use super::{
     action::{Executor, RobotRows, chunks, executed_rows},
     client::{PolicyClient, PolicyProtocol},
-    columns,
     error::RemoteError,
     map::{AnswerScope, PolicyMap},
     request::{ObservationHistory, PolicyObservation, TaskInstructions, request},
@@ -82,7 +81,7 @@ impl<'a> PolicySession<'a> {
 
     fn act(&mut self, episode: &mut dyn LocalEpisode) -> Result<(), PlayerError> {
         let mut history = ObservationHistory::begin(self.plan.map, episode)?;
-        let held_rows = held_rows(history.present());
+        let held_rows = history.present().held_rows();
         let mut executor = Executor::new(self.plan.map, self.most_steps, history.present());
         let mut executed = 0;
         loop {
@@ -145,18 +144,14 @@ impl QueryPlan<'_> {
 
     /// The robots of each request.
     fn queries(&self) -> Vec<Vec<usize>> {
-        let robots = 0..self.instructions.robots.len();
-        match self.map.answer {
-            AnswerScope::One => robots.map(|robot| vec![robot]).collect(),
-            AnswerScope::All => vec![robots.collect()],
-        }
+        self.map.queries(self.instructions.robots.len())
     }
 
     /// Whether a server answers what its map says.
     fn probe(&self, client: &mut dyn PolicyClient, robots: &[usize]) -> Result<(), RemoteError> {
         let observation = PolicyObservation::blank(self.instructions.robots.len());
         let shown = vec![&observation; self.map.history.map_or(1, |history| history.length)];
-        self.ask(client, &shown, robots, &held_rows(&observation), FIRST_ANSWER).map(drop)
+        self.ask(client, &shown, robots, &observation.held_rows(), FIRST_ANSWER).map(drop)
     }
 
     fn ask(
@@ -175,11 +170,6 @@ impl QueryPlan<'_> {
         let Some(present) = shown.last() else { return Ok(Vec::new()) };
         chunks(self.map, &self.instructions, &reply, robots, held_rows, present)
     }
-}
-
-/// For each robot, the action row that keeps it as it is.
-fn held_rows(observation: &PolicyObservation) -> Vec<Vec<f64>> {
-    observation.robots.iter().map(|robot| columns::held_row(&robot.state_values)).collect()
 }
 
 /// Tries again until the deadline while nobody listens.

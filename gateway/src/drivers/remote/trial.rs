@@ -11,7 +11,7 @@ use tandem_tools_spec::Protocol;
 
 use super::{
     action::{Executor, RobotRows, chunks, executed_rows},
-    columns::{action_columns, action_name, held_row, is_of_arm_or_waist, state_columns, wrist_named},
+    columns::{action_columns, action_name, is_of_arm_or_waist, state_columns, wrist_named},
     error::RemoteError,
     instructions,
     map::{AnswerScope, Between, CameraName, PolicyMap, ROBOT, WristFrame},
@@ -53,12 +53,8 @@ impl<'a> MapTrial<'a> {
     fn new(map: &'a PolicyMap, task: &'a Task) -> Result<MapTrial<'a>, RemoteError> {
         let (instructions, robots) = (instructions(task), task.robots.len());
         let observation = PolicyObservation::blank(robots);
-        let held_rows: Vec<Vec<f64>> =
-            observation.robots.iter().map(|robot| held_row(&robot.state_values)).collect();
-        let queries: Vec<Vec<usize>> = match map.answer {
-            AnswerScope::One => (0..robots).map(|robot| vec![robot]).collect(),
-            AnswerScope::All => vec![(0..robots).collect()],
-        };
+        let held_rows = observation.held_rows();
+        let queries = map.queries(robots);
         let mut told = Vec::with_capacity(robots);
         for asked in &queries {
             let answer = made_up_answer(map, &instructions, asked);
@@ -171,21 +167,29 @@ impl<'a> MapTrial<'a> {
     }
 
     /// What else than a target a column is.
-    fn understood(&self, name: &str) -> &'static str {
+    fn understood(&self, name: &str) -> String {
         let columns = action_columns(&[name.to_owned()]).unwrap_or_default();
         let delta = self.map.delta();
-        let wrist = wrist_named(name);
-        let is_delta = columns.iter().any(|column| delta.row_columns.contains(column))
-            || wrist.is_some_and(|side| delta.wrists[side]);
-        match (wrist.is_some(), is_delta, self.map.chunk.wrist_frame) {
-            (false, false, _) => "",
-            (false, true, _) => " (added to what was observed)",
-            (true, false, WristFrame::Pelvis) => " (pelvis frame)",
-            (true, false, WristFrame::Start) => " (start frame)",
-            (true, true, WristFrame::Pelvis) => " (from where it was observed, along the pelvis' axes)",
-            (true, true, WristFrame::Start) => " (from where it was observed, along the start frame's axes)",
-            (true, _, WristFrame::Wrist) => " (from where it was observed, along its own axes)",
-        }
+        let Some(side) = wrist_named(name) else {
+            let added: Vec<usize> =
+                columns.iter().copied().filter(|column| delta.row_columns.contains(column)).collect();
+            return match added.len() {
+                0 => String::new(),
+                all if all == columns.len() => " (added to what was observed)".into(),
+                _ => {
+                    let names: Vec<String> = added.into_iter().map(action_name).collect();
+                    format!(" ({} added to what was observed)", names.join(", "))
+                }
+            };
+        };
+        let told = match (delta.wrists[side], self.map.chunk.wrist_frame) {
+            (false, WristFrame::Pelvis) => " (pelvis frame)",
+            (false, WristFrame::Start) => " (start frame)",
+            (true, WristFrame::Pelvis) => " (from where it was observed, along the pelvis' axes)",
+            (true, WristFrame::Start) => " (from where it was observed, along the start frame's axes)",
+            (_, WristFrame::Wrist) => " (from where it was observed, along its own axes)",
+        };
+        told.into()
     }
 
     /// The calls that a made-up answer becomes.
@@ -362,7 +366,8 @@ mod tests {
             ],
         );
         for (name, _) in crate::drivers::PRESETS {
-            assert!(!tried(&format!("# {name}")).contains("held as at the start"));
+            let told = try_map(&PolicyMap::find(name).unwrap()).unwrap();
+            assert!(told.contains("3 robots: ") && !told.contains("held as at the start"), "{name}: {told}");
         }
     }
 
@@ -383,6 +388,10 @@ mod tests {
         check(
             "[action]\n\"a\" = [\"left_wrist_yaw_joint\", \"waist\"]\n[chunk]\ndelta = [\"left_wrist_yaw_joint\"]",
             &["a [rows, 4] 0 left_wrist_yaw_joint (added to what was observed), 1-3 waist"],
+        );
+        check(
+            "[action]\n\"a\" = [\"left_arm\", \"waist\"]\n[chunk]\ndelta = [\"left_elbow_joint\"]",
+            &["a [rows, 10] 0-6 left_arm (left_elbow_joint added to what was observed), 7-9 waist"],
         );
         check(
             "[action]\n\"a\" = [\"left_wrist_position\", \"left_wrist_rows_6d\"]\n\"h\" = [\"left_hand\", \"pelvis_height_m\"]\n\

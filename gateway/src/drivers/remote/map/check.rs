@@ -1,5 +1,9 @@
 //! Whether a map can be followed, and if not, what would be right.
 
+use std::collections::BTreeSet;
+
+use tandem_episodes::tasks;
+
 use super::{AnswerScope, CameraName, HistorySpan, PolicyMap, ROBOT, Scope, WristFrame};
 use crate::drivers::remote::{
     columns::{
@@ -7,6 +11,7 @@ use crate::drivers::remote::{
         wrist_position, wrist_rotation,
     },
     poses::RotationForm,
+    values::path,
 };
 
 /// The longest side of a picture that a policy is shown.
@@ -14,6 +19,12 @@ const LONGEST_SIDE_PX: u32 = 4096;
 /// A row of wrist poses is one command, which has 25 control steps at most: half a second.
 const RATES_HZ: [f64; 2] = [2.0, 1000.0];
 const LONGEST_HISTORY: usize = 32;
+/// More than three minutes of rows at 50 a second.
+const MOST_ROWS: usize = 10_000;
+const MOST_LEADING_AXES: usize = 8;
+/// How long a policy may be waited for: up to a day. An answer takes some time.
+const LONGEST_S: f64 = 86400.0;
+const SHORTEST_REPLY_S: f64 = 0.001;
 
 impl PolicyMap {
     /// Whether it can be followed.
@@ -28,14 +39,23 @@ impl PolicyMap {
         if let Some((key, _)) = self.images.iter().find(|(_, image)| image.size.as_ref().is_some_and(wrong)) {
             return Err(format!("the size of {key:?}: give two numbers from 1 to {LONGEST_SIDE_PX}"));
         }
-        for (name, value_s) in [("connect_s", self.connect_s), ("reply_s", self.reply_s)] {
-            if !(0.0..=86400.0).contains(&value_s) {
-                return Err(format!("{name} is {value_s}; give seconds, at most a day's"));
+        for (name, value_s, least_s) in
+            [("connect_s", self.connect_s, 0.0), ("reply_s", self.reply_s, SHORTEST_REPLY_S)]
+        {
+            if !(least_s..=LONGEST_S).contains(&value_s) {
+                return Err(format!("{name} is {value_s}; give seconds, from {least_s} to {LONGEST_S}"));
             }
+        }
+        if self.leading_axes > MOST_LEADING_AXES {
+            let given = self.leading_axes;
+            return Err(format!("leading_axes is {given}; give {MOST_LEADING_AXES} at most"));
         }
         self.check_chunk()?;
         self.history.as_ref().map_or(Ok(()), check_history)?;
-        self.check_keys()
+        self.check_keys()?;
+        let sent = self.images.keys().chain(self.state.keys()).chain(self.prompt.keys());
+        check_paths(&sent.collect::<Vec<_>>())?;
+        check_paths(&self.action.keys().collect::<Vec<_>>())
     }
 
     /// The columns that are told; none of them by two keys.
@@ -124,8 +144,12 @@ impl PolicyMap {
     fn check_chunk(&self) -> Result<(), String> {
         let chunk = &self.chunk;
         for (name, count) in [("rows", chunk.rows), ("execute", chunk.execute)] {
-            if count == Some(0) {
-                return Err(format!("[chunk] {name} is 0; a chunk has at least one row"));
+            match count {
+                Some(0) => return Err(format!("[chunk] {name} is 0; a chunk has at least one row")),
+                Some(count) if count > MOST_ROWS => {
+                    return Err(format!("[chunk] {name} is {count}; give {MOST_ROWS} at most"));
+                }
+                _ => {}
             }
         }
         if let (Some(rows), Some(execute)) = (chunk.rows, chunk.execute)
@@ -162,9 +186,36 @@ impl PolicyMap {
     }
 }
 
+/// Under one key stands one thing: none leads through another, nor to the same place, for any robot.
+fn check_paths(keys: &[&String]) -> Result<(), String> {
+    let robots: BTreeSet<&str> =
+        tasks::ALL.iter().flat_map(|task| task.robots).map(|robot| robot.name).collect();
+    let paths = |key: &str| -> Vec<Vec<String>> {
+        let path = |key: &str| path(key).map(String::from).collect();
+        robots.iter().map(|robot| path(&key.replace(ROBOT, robot))).collect()
+    };
+    for (place, key) in keys.iter().enumerate() {
+        let own = paths(key);
+        for other in &keys[place + 1..] {
+            let meet = |others: &Vec<String>| {
+                own.iter().any(|own| own.starts_with(others) || others.starts_with(own))
+            };
+            if paths(other).iter().any(meet) {
+                return Err(format!(
+                    "the keys {key:?} and {other:?}: one leads to the other, or both to the same place; give each a place of its own"
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
 fn check_history(history: &HistorySpan) -> Result<(), String> {
     match (history.length, history.stride) {
-        (2..=LONGEST_HISTORY, 1..) => Ok(()),
+        (2..=LONGEST_HISTORY, 1..=MOST_ROWS) => Ok(()),
+        (_, stride) if stride > MOST_ROWS => {
+            Err(format!("[history] stride is {stride}; give {MOST_ROWS} at most"))
+        }
         (_, 0) => {
             Err("[history] stride is 0; give how many rows are executed between two observations".into())
         }
@@ -206,6 +257,11 @@ mod tests {
             "execute is 60 and rows is 50; no more rows can be executed",
         );
         check("reply_s = nan", "reply_s is NaN");
+        check("reply_s = 0", "reply_s is 0; give seconds, from 0.001 to 86400");
+        check("connect_s = -1", "connect_s is -1; give seconds, from 0 to 86400");
+        check("[chunk]\nrows = 9223372036854775807", "rows is 9223372036854775807; give 10000 at most");
+        check("[chunk]\nexecute = 10001", "execute is 10001; give 10000 at most");
+        check("leading_axes = 9223372036854775807", "leading_axes is 9223372036854775807; give 8 at most");
         check("answer = \"all\"", "needs scope = \"global\"");
         check("answer = \"all\"\nscope = \"global\"", "put {robot} into the key \"observation/image\"");
         check("scop = \"global\"", "unknown field `scop`");
@@ -219,12 +275,28 @@ mod tests {
     }
 
     #[test]
+    fn keys_that_meet_are_refused() {
+        let state =
+            |keys: [&str; 2]| format!("[state]\n{:?} = [\"waist\"]\n{:?} = [\"left_arm\"]", keys[0], keys[1]);
+        check(&state(["obs", "obs > left"]), "the keys \"obs\" and \"obs > left\": one leads to the other");
+        check(&state(["obs > left", "obs>left"]), "or both to the same place");
+        check(&state(["prompt > left", "obs"]), "the keys \"prompt > left\" and \"prompt\"");
+        check(&format!("scope = \"global\"\n{}", state(["B > s", "{robot}"])), "\"B > s\" and \"{robot}\"");
+        check("[action]\n\"\" = [\"waist\"]\n\"a\" = [\"left_arm\"]", "the keys \"\" and \"a\"");
+        read(&format!("preset = \"openpi\"\n{}", state(["obs > left", "obs > leftmost"]))).unwrap();
+    }
+
+    #[test]
     fn what_is_wrong_with_rates_and_histories_is_said() {
         check("[chunk]\nrate_hz = 0.5", "rate_hz is 0.5; give rows a second, from 2 to 1000");
         check("[chunk]\nrate_hz = nan", "rate_hz is NaN");
         check("[chunk]\nbetween = \"jump\"", "unknown variant `jump`, expected `interpolate` or `hold`");
         check("[history]\nlength = 1", "length is 1; give 2 to 32");
         check("[history]\nlength = 2\nstride = 0", "stride is 0");
+        check(
+            "[history]\nlength = 32\nstride = 9223372036854775807",
+            "stride is 9223372036854775807; give 10000",
+        );
         let map = read("preset = \"openpi\"\n[history]\nlength = 2\n[chunk]\nrate_hz = 15").unwrap();
         assert_eq!((map.rate_hz(), map.history.unwrap().stride), (15.0, 1));
     }

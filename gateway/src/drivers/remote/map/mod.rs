@@ -283,6 +283,14 @@ impl PolicyMap {
         }
     }
 
+    /// The robots of each request, where there are `robots`.
+    pub fn queries(&self, robots: usize) -> Vec<Vec<usize>> {
+        match self.answer {
+            AnswerScope::One => (0..robots).map(|robot| vec![robot]).collect(),
+            AnswerScope::All => vec![(0..robots).collect()],
+        }
+    }
+
     /// Whether robots are told where their wrists are to be.
     pub fn moves_wrists(&self) -> bool {
         self.told_columns().iter().any(|column| *column >= ACTION_ROW_LEN)

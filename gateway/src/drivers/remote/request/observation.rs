@@ -8,7 +8,7 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::Observe;
 
-use crate::drivers::remote::columns::{blank_state_values, state_values};
+use crate::drivers::remote::columns::{blank_state_values, held_row, state_values};
 
 /// What a policy may be shown of one moment.
 #[derive(Clone)]
@@ -44,6 +44,11 @@ impl PolicyObservation {
         });
         let third_person = third_person.then(|| episode.third_person().into());
         Ok(PolicyObservation { robots: inputs.collect(), third_person })
+    }
+
+    /// For each robot, the action row that keeps it as it is.
+    pub fn held_rows(&self) -> Vec<Vec<f64>> {
+        self.robots.iter().map(|robot| held_row(&robot.state_values)).collect()
     }
 
     /// Black pictures and zeros, of the right sizes, to try a policy with before an episode begins.
