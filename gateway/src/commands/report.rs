@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use tandem_episodes::replay::{ShortFilm, short_film};
 use tandem_episodes::reports::{
     EvaluationReport, Film, FilmContent, FilmPlace, FilmedEpisode, ReportFormat, ReportPictures, film_places,
-    gallery, load,
+    gallery, load, pictured_failures,
 };
 use tandem_episodes::{Recording, write_whole};
 
@@ -38,6 +38,7 @@ pub fn run(args: ReportArgs) -> CommandResult {
         ReportFormat::Html => ReportPictures {
             films: film_places(&loaded).into_iter().map(film).collect(),
             failures: gallery(&loaded, args.failures),
+            pictured_failures: pictured_failures(&loaded),
         },
         ReportFormat::Markdown | ReportFormat::Csv | ReportFormat::Json | ReportFormat::Tex => {
             ReportPictures::default()

@@ -18,7 +18,7 @@ pub use compare::{Comparison, PairedRow};
 pub use load::{FoundEpisode, LoadError, LoadedEpisodes, load};
 pub use page::ReportPictures;
 pub use page::films::{Film, FilmContent, FilmPlace, FilmedEpisode, film_places};
-pub use page::gallery::{Failure, gallery};
+pub use page::gallery::{Failure, gallery, pictured_failures};
 pub use policy::{
     ByCollaboration, EpisodeCosts, ExcludedEpisodes, FailureReason, PhaseReport, PolicyReport, TaskAverage,
     TaskReport, ValueRange,

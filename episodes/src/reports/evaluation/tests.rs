@@ -288,7 +288,10 @@ fn failures_are_shown_by_turns() {
     let file = &shown[0].moments[0].views[0].file;
     let decoder = webp_animation::Decoder::new(file).unwrap();
     assert_eq!(decoder.dimensions(), (406, 20));
-    let pictures = ReportPictures { failures: shown, ..ReportPictures::default() };
+    let none = ReportPictures { pictured_failures: pictured_failures(&loaded), ..ReportPictures::default() };
+    let page = EvaluationReport::of(&loaded).write(ReportFormat::Html, &none).unwrap();
+    assert!(page.contains("8 episodes failed, none of them shown"), "{page}");
+    let pictures = ReportPictures { failures: shown, ..none };
     let page = EvaluationReport::of(&loaded).write(ReportFormat::Html, &pictures).unwrap();
     assert!(
         page.contains("2 of 8 episodes that failed") && page.contains("data:image/webp;base64,"),
@@ -347,16 +350,22 @@ fn films_are_of_one_success_and_one_failure() {
         Err(String::new()),
     ];
     let films = places.into_iter().zip(contents).map(|(place, content)| Film { place, content }).collect();
-    let pictures = ReportPictures { films, ..ReportPictures::default() };
+    let mut pictures = ReportPictures { films, ..ReportPictures::default() };
     let page = EvaluationReport::of(&loaded).write(ReportFormat::Html, &pictures).unwrap();
     let top = page.find("data:image/webp;base64,UklGRg==").unwrap();
     assert!(top < page.find("How far episodes got").unwrap(), "films are above the figures");
     for text in [
         "agent, seed 1 (3 times as fast)",
+        "From the side, faster than it was.",
         "No film of a failure. a &lt;reason&gt;",
         unrecorded,
         "No episode failed.",
     ] {
         assert!(page.contains(text), "no {text:?} in {page}");
     }
+    if let Some(Ok(content)) = pictures.films.first_mut().map(|film| film.content.as_mut()) {
+        content.speed_ratio = 0.2;
+    }
+    let page = EvaluationReport::of(&loaded).write(ReportFormat::Html, &pictures).unwrap();
+    assert!(page.contains("agent, seed 1 (0.2 times as fast)") && page.contains("From the side.<"), "{page}");
 }

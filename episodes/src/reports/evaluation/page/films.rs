@@ -99,8 +99,13 @@ pub fn html(films: &[Film]) -> String {
             escape(task)
         );
     }
+    let faster = |film: &Film| film.content.as_ref().is_ok_and(|content| content.speed_ratio > 1.0);
+    let speed = match films.iter().filter(|film| film.content.is_ok()).all(faster) {
+        true => ", faster than it was",
+        false => "",
+    };
     format!(
-        r#"<h2>One success and one failure of each task</h2><p class="soft">From the side, faster than it was.</p><div class="films">{cards}</div>"#
+        r#"<h2>One success and one failure of each task</h2><p class="soft">From the side{speed}.</p><div class="films">{cards}</div>"#
     )
 }
 
@@ -116,7 +121,7 @@ fn figure(Film { place, content }: &Film) -> String {
     let why = episode.why.as_ref().map(|why| format!(": {}", escape(why))).unwrap_or_default();
     let picture = moments::picture(&film.webp, &format!("A {what} at {}, {of}", escape(place.task)));
     format!(
-        r#"<figure>{picture}<figcaption><span class="{class}">{what}</span> <span class="soft">{of}{why} ({:.0} times as fast)</span></figcaption></figure>"#,
-        film.speed_ratio
+        r#"<figure>{picture}<figcaption><span class="{class}">{what}</span> <span class="soft">{of}{why} ({} times as fast)</span></figcaption></figure>"#,
+        (10.0 * film.speed_ratio).round() / 10.0
     )
 }

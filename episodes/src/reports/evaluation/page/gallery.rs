@@ -3,6 +3,7 @@
 use crate::html::escape;
 use crate::reports::episode::{KeyMoment, moments, strip};
 use crate::reports::evaluation::load::{FoundEpisode, LoadedEpisodes};
+use crate::reports::evaluation::page::ReportPictures;
 use crate::reports::evaluation::policy::{
     PolicyGroup, PolicyReport, failure_cause, first_missed_phase, groups,
 };
@@ -48,6 +49,12 @@ pub fn gallery(loaded: &LoadedEpisodes, most: usize) -> Vec<Failure> {
     pictured.collect()
 }
 
+/// How many failures have a picture.
+pub fn pictured_failures(loaded: &LoadedEpisodes) -> usize {
+    let failures = groups(&loaded.episodes);
+    failures.iter().flat_map(failed).filter(|(_, found)| found.strip.is_some()).count()
+}
+
 fn failed<'a>(group: &PolicyGroup<'a>) -> Vec<(Failure, &'a FoundEpisode)> {
     let found = group.episodes.iter().filter(|found| !found.played.succeeded());
     found.map(|found| (failure(group, found), *found)).collect()
@@ -66,13 +73,19 @@ fn failure(group: &PolicyGroup, found: &FoundEpisode) -> Failure {
 }
 
 /// Failures with their key moments, as a part of the page.
-pub fn html(failures: &[Failure], policies: &[PolicyReport]) -> String {
+pub fn html(pictures: &ReportPictures, policies: &[PolicyReport]) -> String {
+    let failures = &pictures.failures;
     let failed: usize =
         policies.iter().flat_map(|policy| &policy.reasons).map(|reason| reason.seeds.len()).sum();
     let shown = failures.len();
-    let note = match (failed, shown) {
-        (0, _) => "No episode failed.".into(),
-        (_, 0) => format!(
+    let note = match (failed, shown, pictures.pictured_failures) {
+        (0, ..) => "No episode failed.".into(),
+        (_, 0, 1..) => {
+            format!(
+                "{failed} episodes failed, none of them shown; <code>report --failures 12</code> shows twelve."
+            )
+        }
+        (_, 0, 0) => format!(
             "{failed} episodes failed, none of them recorded; <code>evaluate --record</code> keeps pictures."
         ),
         _ => format!("{shown} of {failed} episodes that failed, with their key moments."),

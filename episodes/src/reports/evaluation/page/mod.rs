@@ -18,6 +18,8 @@ use plot::{SERIES, task_plot};
 pub struct ReportPictures {
     pub films: Vec<Film>,
     pub failures: Vec<Failure>,
+    /// How many failures have a picture, shown or not.
+    pub pictured_failures: usize,
 }
 
 /// The page.
@@ -44,7 +46,7 @@ pub fn html(report: &EvaluationReport, pictures: &ReportPictures) -> String {
         legend = legend(policies),
         plots = tasks(report).iter().map(|task| task_plot(task, policies)).collect::<String>(),
         tables = tables::all(report).iter().map(table).collect::<String>(),
-        gallery = gallery::html(&pictures.failures, policies),
+        gallery = gallery::html(pictures, policies),
         skipped = skipped(report),
     );
     html::page(&format!("Tandem: {title}"), &body)
