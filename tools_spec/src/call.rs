@@ -273,7 +273,8 @@ mod tests {
         check("get_status", json!({ "expected_step": 3 }), "unknown field `expected_step`");
         check("grasp", json!({}), "no tool \"grasp\"");
         let start = |field: &str, value: Value| {
-            parse_start(json!({ "task": "handover", "seed": 0, field: value })).unwrap_err().to_string()
+            let start = json!({ "task": "handover", "seed": 0, "operators": "per_robot", field: value });
+            parse_start(start).unwrap_err().to_string()
         };
         assert!(start("patience_s", json!(0)).contains("patience_s is 0"));
         assert!(start("operators", json!("two")).contains("`per_robot`"));
