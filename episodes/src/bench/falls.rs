@@ -22,6 +22,13 @@ pub fn falls(
 ) -> Result<FallsReport, BenchError> {
     let asked: Vec<(usize, &FallCase)> =
         FALL_CASES.iter().enumerate().filter(|(_, case)| is_asked(filter, case.name)).collect();
+    if asked.is_empty() {
+        let have = FALL_CASES.map(|case| case.name).join(", ");
+        return Err(BenchError::NoCase { asked: filter.into(), have });
+    }
+    if episodes == 0 {
+        return Err(BenchError::NoEpisodes);
+    }
     let mut report = FallsReport { cases: Vec::new(), floor: Vec::new() };
     for (place, (number, case)) in asked.iter().enumerate() {
         let count = episodes / asked.len() + usize::from(place < episodes % asked.len());
@@ -59,6 +66,14 @@ fn trial(case: &FallCase, number: usize, seed: u32) -> Result<FallTrial, BenchEr
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_measures_no_falls_is_refused() {
+        let refusal = |episodes, filter| falls(episodes, filter, |_| ()).err().expect("refused").to_string();
+        let unknown = refusal(60, "nonsense");
+        assert!(unknown.contains("`nonsense`") && unknown.contains("table_on_robot"), "{unknown}");
+        assert!(refusal(0, "door").contains("at least 1"));
+    }
 
     /// Four episodes of every case, those in tasks over whole budgets. `tandem bench falls --episodes 1000` plays more.
     #[test]

@@ -41,6 +41,10 @@ pub enum BenchError {
     Episode(#[from] Box<EpisodeError>),
     #[error(transparent)]
     Player(#[from] PlayerError),
+    #[error("no case's name contains `{asked}`; the cases are {have}")]
+    NoCase { asked: String, have: String },
+    #[error("0 episodes measure nothing; use at least 1")]
+    NoEpisodes,
 }
 
 /// Plays the cases whose names contain one of the words of `filter`, separated by commas, on these seeds, robots of

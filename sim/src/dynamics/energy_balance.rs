@@ -14,7 +14,7 @@
 //!        = K(q', v'') - K(q, v') - dt h . u + U(q') - U(q) + W_gravity + W_springs.
 //! What pushes bodies out of each other moves positions alone: where that lifts something, it has been made, too.
 
-use super::trees::spatial::{ForceVector, Inertia, MotionVector, Symmetric};
+use super::trees::spatial::{ForceVector, Inertia, MotionVector};
 use super::trees::tree::Tree;
 use super::{DVec3, Dynamics};
 
@@ -62,13 +62,6 @@ impl Dynamics {
             before.close(tree, solved, self.settings.dt_s, self.settings.gravity_m_s2, &mut balance);
         }
         balance
-    }
-}
-
-impl EnergyBefore {
-    /// Kinetic energy of all trees.
-    pub fn kinetic(&self) -> f64 {
-        self.trees.iter().map(|tree| tree.kinetic).sum()
     }
 }
 
@@ -165,13 +158,7 @@ impl TreeBefore {
 
 /// Of each link about the tree's reference, as the tree is now.
 fn inertias(tree: &Tree) -> Vec<Inertia> {
-    let inertia = |(i, link): (usize, &super::Link)| {
-        let (mass_kg, com_m) = (link.mass.mass_kg, tree.centre_m(i));
-        let mut second_kg_m2 = tree.own_inertia[i].rotated(&tree.rotation[i]);
-        second_kg_m2 += Symmetric::of_point(mass_kg, com_m);
-        Inertia { mass_kg, first_kg_m: com_m * mass_kg, second_kg_m2 }
-    };
-    tree.links.iter().enumerate().map(inertia).collect()
+    (0..tree.links.len()).map(|link| tree.inertia_of(link)).collect()
 }
 
 fn kinetic(tree: &Tree, inertia: &[Inertia], velocity: &[MotionVector], v: &[f64]) -> f64 {

@@ -107,6 +107,15 @@ impl Dynamics {
         self.collision.collider(id)
     }
 
+    /// All colliders, in the order in which they were added, and where they are.
+    pub fn colliders(&self) -> impl Iterator<Item = (&Collider, DPose3)> {
+        let world_from = |link: &LinkId| self.trees.world_from(*link);
+        self.collision.colliders().map(move |collider| {
+            let world_from_body = collider.on.as_ref().map_or(DPose3::IDENTITY, world_from);
+            (collider, world_from_body * collider.body_from_shape)
+        })
+    }
+
     /// All points of contact of the last step.
     pub fn touches(&self) -> &[ContactPoint] {
         &self.solver.touches

@@ -1,6 +1,6 @@
 //! Bodies of a file as trees: links, the joints between them, their masses, geoms and sites. Plain data; nothing moves.
 
-use mjcf_rs::body::{InertiaSpec, Inertial};
+use mjcf_rs::body::{GeomType, InertiaSpec, Inertial};
 use rapier3d::glamx::DPose3;
 use rapier3d::math::{Matrix, Pose, Vector};
 use rapier3d::prelude::MassProperties;
@@ -87,6 +87,7 @@ impl Document {
                 }
             };
             places.push(place);
+            self.refuse_planes_that_move(id, &trees[place.tree].links, place.link)?;
             self.add_body(id, &mut trees[place.tree].links[place.link], place.link_from_body)?;
         }
         for link in trees.iter_mut().flat_map(|tree| &mut tree.links) {
@@ -94,6 +95,18 @@ impl Document {
         }
         self.check_masses(&trees, &places)?;
         Ok(trees)
+    }
+
+    /// As in MuJoCo, planes are on bodies that no joint moves.
+    fn refuse_planes_that_move(&self, id: usize, links: &[BodyLink], link: usize) -> Result<(), SimError> {
+        let geoms = &self.model.bodies[id].body.geoms;
+        let Some(plane) = geoms.iter().position(|geom| geom.type_ == GeomType::Plane) else { return Ok(()) };
+        let mut above = std::iter::successors(Some(link), |link| links[*link].parent);
+        if above.all(|link| links[link].joint == LinkJoint::Fixed) {
+            return Ok(());
+        }
+        let what = "a plane has no end; use a box on what moves";
+        Err(self.source.refuse_at(self.checked.bodies[id].geoms[plane], what))
     }
 
     /// Every joint moves something that has mass.

@@ -280,6 +280,10 @@ fn a_refusal_names_the_line_and_what_is_around() {
         "<worldbody><body><joint name=\"h\"/></body></worldbody>",
         "`test.xml:2`: body in <worldbody>: its joint moves nothing that has mass; give it a mass or the joint an armature",
     );
+    check(
+        "<worldbody><body name=\"cart\"><freejoint/><geom size=\"1\"/><body name=\"top\">\n<geom type=\"plane\" size=\"1 1 1\"/></body></body></worldbody>",
+        "`test.xml:3`: geom in body `top`: a plane has no end; use a box on what moves",
+    );
 }
 
 #[test]

@@ -77,8 +77,18 @@ fn what_goes_over_the_edge_of_a_box_lands_below_it() {
     };
     let floor = r#"<geom type="box" size="2 1 0.05" pos="0 0 -0.05"/>"#;
     let plane = r#"<geom type="plane" size="1 1 0.1" pos="0 0 -0.3"/>"#;
-    for (geoms, ground_m) in [(floor.to_string(), -0.1), (format!("{floor}{plane}"), -0.3)] {
-        let xml = format!("<mujoco><worldbody>{geoms}</worldbody></mujoco>");
+    let lamp = r#"<geom type="box" size="0.1 0.1 0.1" pos="0 0 2.5"/>"#;
+    let door = r#"<body name="door" pos="0 0.9 1"><joint axis="0 0 1"/><geom type="box" size="0.3 0.02 0.8"/></body>"#;
+    let raft = r#"<body name="raft" pos="0 0 -0.05"><freejoint/><geom type="box" size="2 1 0.05"/></body>"#;
+    let rooms = [
+        (floor.to_string(), -0.1),
+        (format!("{floor}{plane}"), -0.3),
+        (format!("{lamp}<body name=\"house\">{floor}{door}</body>"), -0.1),
+        (format!("{lamp}<body name=\"house\">{floor}{plane}{door}</body>"), -0.3),
+        (raft.to_string(), -0.1),
+    ];
+    for (room, ground_m) in rooms {
+        let xml = format!("<mujoco><worldbody>{room}</worldbody></mujoco>");
         let document = Arc::new(Document::parse("room.xml", &xml).expect("a room"));
         let spec = WorldSpec {
             scene: SceneSource::Read { document, world_from_scene: Pose::IDENTITY },
@@ -95,7 +105,26 @@ fn what_goes_over_the_edge_of_a_box_lands_below_it() {
         for (name, expected_m) in [("on", 0.0), ("beside", ground_m)] {
             let bottle_m = step.object(name).expect("a bottle").world_from_object.translation;
             // It may have tipped over.
-            assert!((bottle_m.z - expected_m).abs() < 0.05, "{name}: {bottle_m}");
+            assert!((bottle_m.z - expected_m).abs() < 0.05, "{name}: {bottle_m} in {room}");
         }
     }
+}
+
+/// A floor is below a mesh wherever the frame is that its vertices are in.
+#[test]
+fn a_mesh_far_from_its_frame_lies_on_the_floor() {
+    let corners = [59.9, 60.1].map(|x| format!("{x} -0.1 -0.1  {x} 0.1 -0.1  {x} -0.1 0.1  {x} 0.1 0.1"));
+    let xml = format!(
+        r#"<mujoco><asset><mesh name="cube" vertex="{}"/></asset><worldbody><geom type="plane" size="1 1 0.1"/>
+        <body name="cube" pos="-60 0 0.2"><freejoint/><geom type="mesh" mesh="cube"/></body></worldbody></mujoco>"#,
+        corners.join(" ")
+    );
+    let document = Arc::new(Document::parse("cube.xml", &xml).expect("a scene"));
+    let scene = SceneSource::Read { document, world_from_scene: Pose::IDENTITY };
+    let mut world = World::new(&WorldSpec { scene, robots: vec![], objects: vec![] }).expect("a world");
+    for _ in 0..50 {
+        world.control_step(&[]).expect("it stays finite");
+    }
+    let frame_m = world.present().object("cube").expect("a cube").world_from_object.translation;
+    assert!((frame_m.z - 0.1).abs() < 0.02, "{frame_m}");
 }

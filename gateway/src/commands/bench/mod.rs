@@ -165,8 +165,9 @@ fn measure_physics() -> Result<PhysicsReport, Box<dyn Error>> {
 }
 
 fn measure_falls(episodes: usize, cases: &str) -> Result<FallsReport, Box<dyn Error>> {
-    println!("{}", FallsCase::HEAD);
+    let mut head = Some(FallsCase::HEAD);
     Ok(tandem_episodes::bench::falls(episodes, cases, |case| {
+        head.take().into_iter().for_each(|head| println!("{head}"));
         println!("{case}");
         case.diverged_at.iter().for_each(|at| println!("    {at}"));
     })?)

@@ -73,7 +73,7 @@ const HEAD_M: f32 = 1.3;
 const LYING_M: f32 = 0.15;
 const AIM_M: f32 = 0.2;
 /// Some objects hang on walls, and robots stand beside them: one that would begin within them is put elsewhere, a little higher.
-const DRAWS: usize = 50;
+const DRAWS: usize = 1000;
 const HIGHER_M: f32 = 0.05;
 
 /// A robot before the doorway whose right arm goes through it, close to the post of the latch.
@@ -171,6 +171,7 @@ fn drop_on_an_object(world: &mut World, random: &mut SplitMix64) {
             return;
         }
     }
+    panic!("the robot overlaps with something wherever it is put, up to {} m", HIGHER_M * DRAWS as f32);
 }
 
 /// On its front, its back or a side, about here.

@@ -103,7 +103,7 @@ impl Surface {
 
     /// Where the shape is that another surface may meet: of an endless collider the part that lies beside that one.
     pub fn beside(&self, other: &Surface) -> DPose3 {
-        let other_m = other.world_from_shape.translation;
+        let other_m = other.world_from_shape * other.middle_m;
         let near = other_m.distance_squared(self.world_from_shape.translation) < (0.5 * TILE_M).powi(2);
         if near || !self.collider.endless {
             return self.world_from_shape;

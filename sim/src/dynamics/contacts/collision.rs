@@ -56,6 +56,10 @@ impl Collision {
         &self.surfaces[id.index()].collider
     }
 
+    pub fn colliders(&self) -> impl Iterator<Item = &Collider> {
+        self.surfaces.iter().map(|surface| &surface.collider)
+    }
+
     /// Collects what touches, or will within the step.
     pub fn detect(&mut self, trees: &Trees, settings: &Settings) {
         self.place(trees, settings);

@@ -42,7 +42,7 @@ impl Tree {
 
     /// Inertia of a link by itself.
     #[inline]
-    pub(super) fn inertia_of(&self, i: usize) -> Inertia {
+    pub(in crate::dynamics) fn inertia_of(&self, i: usize) -> Inertia {
         let (mass_kg, com_m) = (self.links[i].mass.mass_kg, self.centre_m(i));
         let mut second_kg_m2 = self.own_inertia[i].rotated(&self.rotation[i]);
         second_kg_m2 += Symmetric::of_point(mass_kg, com_m);

@@ -169,7 +169,7 @@ const GEOM: &[Attribute] = &[
         Support::Mapped,
         &["type"],
         Takes::Word(&["plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf"]),
-        "`hfield` and `sdf` are refused; meshes and ellipsoids collide as their hulls, planes as slabs 2 m thick without an end, whatever is drawn of them",
+        "`hfield` and `sdf` are refused; meshes and ellipsoids collide as their hulls, planes as slabs 2 m thick without an end, whatever is drawn of them; planes are refused on what a joint moves",
     ),
     mapped(&["size"], Takes::Numbers { least: 1, most: 3, sign: Sign::NotNegative }),
     mapped(&["fromto"], numbers(6, 6)),
