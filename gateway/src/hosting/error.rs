@@ -34,6 +34,12 @@ pub enum HostingError {
     /// The server is going down.
     #[error("the server is shutting down and takes no new episodes; try again when it is back")]
     ShuttingDown,
+    /// Another episode has this id.
+    #[error("an episode {id:?} is held already")]
+    HeldAlready {
+        /// The id of both.
+        id: String,
+    },
     /// The episode was closed meanwhile.
     #[error("the episode has stopped")]
     EpisodeStopped,
@@ -156,7 +162,9 @@ impl HostingError {
             }
             HostingError::KeyUsed => Refusal::new("key-used", "Key used", Invalid),
             HostingError::Shared(error) => error.refusal(),
-            HostingError::Token(_) | HostingError::Thread(_) => Refusal::INTERNAL,
+            HostingError::HeldAlready { .. } | HostingError::Token(_) | HostingError::Thread(_) => {
+                Refusal::INTERNAL
+            }
         }
     }
 

@@ -1,9 +1,13 @@
 //! One folder per episode under the runs folder. The folder's name is the episode's id.
 
 use std::{
+    collections::BTreeSet,
     fs, io,
     path::{Path, PathBuf},
-    sync::atomic::{AtomicU32, Ordering},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicU32, Ordering},
+    },
 };
 
 use tandem_episodes::{create_new_private_folder, create_private_folder};
@@ -27,6 +31,8 @@ pub fn try_runs_folder(runs: &Path) -> Result<(), String> {
 /// Names and makes the folders of one server.
 #[derive(Debug, Default)]
 pub struct RunFolders {
+    /// Names of episodes that got a folder. It may be gone again, as where nothing could be written into it.
+    given: Mutex<BTreeSet<String>>,
     /// Episodes that got no folder.
     without: AtomicU32,
 }
@@ -36,7 +42,7 @@ impl RunFolders {
     /// be made, as on a full disk, the episode has a name all the same; its recording fails, and says why.
     pub fn create(&self, runs: &Path, task: &str, seed: u32) -> (String, PathBuf) {
         let base = format!("{task}-seed{seed}");
-        if let Ok(Some(made)) = create_private_folder(runs).and_then(|()| first_free(runs, &base)) {
+        if let Ok(Some(made)) = create_private_folder(runs).and_then(|()| self.first_free(runs, &base)) {
             return made;
         }
         loop {
@@ -48,19 +54,26 @@ impl RunFolders {
             }
         }
     }
-}
 
-fn first_free(runs: &Path, base: &str) -> io::Result<Option<(String, PathBuf)>> {
-    let names = std::iter::once(base.to_owned()).chain((2u32..).map(|n| format!("{base}-{n}")));
-    for name in names {
-        let folder = runs.join(&name);
-        match create_new_private_folder(&folder) {
-            Ok(()) => return Ok(Some((name, folder))),
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => continue,
-            Err(error) => return Err(error),
+    fn first_free(&self, runs: &Path, base: &str) -> io::Result<Option<(String, PathBuf)>> {
+        let mut given = self.given.lock().unwrap_or_else(PoisonError::into_inner);
+        let names = std::iter::once(base.to_owned()).chain((2u32..).map(|n| format!("{base}-{n}")));
+        for name in names {
+            if given.contains(&name) {
+                continue;
+            }
+            let folder = runs.join(&name);
+            match create_new_private_folder(&folder) {
+                Ok(()) => {
+                    given.insert(name.clone());
+                    return Ok(Some((name, folder)));
+                }
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => continue,
+                Err(error) => return Err(error),
+            }
         }
+        Ok(None)
     }
-    Ok(None)
 }
 
 #[cfg(test)]
@@ -75,6 +88,12 @@ mod tests {
         assert_eq!(
             [name(0), name(0), name(1), name(0)],
             ["handover-seed0", "handover-seed0-2", "handover-seed1", "handover-seed0-3"]
+        );
+        std::fs::remove_dir(runs.join("handover-seed0")).unwrap();
+        assert_eq!(
+            name(0),
+            "handover-seed0-4",
+            "the episode may still be held when its empty folder is gone"
         );
         std::fs::remove_dir_all(&runs).unwrap();
     }

@@ -1,7 +1,7 @@
 //! The episodes that are held, by id, and the limit on their number.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, btree_map::Entry},
     sync::{Arc, Mutex, MutexGuard},
     time::Duration,
 };
@@ -130,9 +130,10 @@ impl EpisodeTable {
         let (episode, mut briefing) =
             EpisodeThread::start(id, spec, folder, place, self.metrics.clone()).await?;
         self.settings.instructions.rephrase_briefing(&mut briefing);
-        if let Err(late) = self.hold(HostedEpisode::new(id, Arc::new(episode), team)) {
-            late.thread.close().await?;
-            return Err(HostingError::ShuttingDown);
+        let episode = Arc::new(episode);
+        if let Err(refused) = self.hold(HostedEpisode::new(id, episode.clone(), team)) {
+            episode.close().await?;
+            return Err(refused);
         }
         tracing::info!(episode = id, "started");
         Ok(StartReply { episode_id: id.into(), operators, briefing })
@@ -244,18 +245,22 @@ impl EpisodeTable {
         left
     }
 
-    /// Holds an episode that one policy directs, unless the table is closing: then it is given back.
+    /// Holds an episode that one policy directs.
     #[cfg(test)]
-    pub(crate) fn insert(&self, id: &str, episode: Arc<EpisodeThread>) -> Result<(), Arc<EpisodeThread>> {
-        self.hold(HostedEpisode::new(id, episode, None)).map_err(|hosted| hosted.thread)
+    pub(crate) fn insert(&self, id: &str, episode: Arc<EpisodeThread>) -> Result<(), HostingError> {
+        self.hold(HostedEpisode::new(id, episode, None))
     }
 
-    fn hold(&self, episode: HostedEpisode) -> Result<(), Box<HostedEpisode>> {
+    /// Holds an episode, unless the table is closing or holds one of that id, which stays.
+    fn hold(&self, episode: HostedEpisode) -> Result<(), HostingError> {
         let mut held = self.lock();
         if held.closing {
-            return Err(episode.into());
+            return Err(HostingError::ShuttingDown);
         }
-        held.episodes.insert(episode.id().into(), episode);
+        match held.episodes.entry(episode.id().into()) {
+            Entry::Vacant(free) => drop(free.insert(episode)),
+            Entry::Occupied(taken) => return Err(HostingError::HeldAlready { id: taken.key().clone() }),
+        }
         Ok(())
     }
 

@@ -99,7 +99,7 @@ async fn an_episode_without_calls_is_ended_and_closed() {
 
 #[tokio::test]
 async fn closing_ends_in_time_and_says_what_it_left() {
-    let runs = tempfile::tempdir().unwrap();
+    let [runs, other_runs] = [(); 2].map(|()| tempfile::tempdir().unwrap());
     let flags = Layer { runs: Some(runs.path().into()), max_episodes: Some(1), ..Layer::default() };
     let table = EpisodeTable::new(Settings::resolve(flags, None).unwrap());
     let (go_on, stuck) = mpsc::channel::<()>();
@@ -114,6 +114,11 @@ async fn closing_ends_in_time_and_says_what_it_left() {
     });
     let (episode, _, _) = start("stuck", runs.path(), clock).await;
     table.insert("stuck", episode.clone()).unwrap();
+    let (other, _, _) = start("stuck", other_runs.path(), hands().1).await;
+    let refused = table.insert("stuck", other.clone());
+    assert!(matches!(refused, Err(HostingError::HeldAlready { .. })), "{refused:?}");
+    assert!(Arc::ptr_eq(&table.get("stuck").unwrap(), &episode), "it stays whose the id was");
+    other.close().await.unwrap();
     hangs.store(true, Relaxed);
     let call = tokio::spawn(async move { episode.call(wait()).await });
     tokio::task::yield_now().await;
@@ -122,6 +127,7 @@ async fn closing_ends_in_time_and_says_what_it_left() {
     drop(go_on);
     assert!(call.await.unwrap().is_ok(), "the call still finishes");
     let (late, _, _) = start("late", runs.path(), hands().1).await;
-    let late = table.insert("late", late).expect_err("nothing is added after closing");
+    let refused = table.insert("late", late.clone());
+    assert!(matches!(refused, Err(HostingError::ShuttingDown)), "nothing is added after closing");
     late.close().await.unwrap();
 }
