@@ -40,6 +40,10 @@ impl EpisodeCache<'_> {
             Err(PlayError::Episode(EpisodeError::Checkpoint(CheckpointError::NoPhase { .. }))) => {
                 Ok(PlannedOutcome::LeftOut("its demonstration did not come so far".into()))
             }
+            // The world came apart before the policy could do anything; others may hold.
+            Err(PlayError::Episode(error @ EpisodeError::Diverged { .. })) => {
+                Ok(PlannedOutcome::LeftOut(format!("the simulator failed before the policy's turn: {error}")))
+            }
             Err(PlayError::NotReady(reason)) => Ok(PlannedOutcome::LeftOut(reason)),
             Err(PlayError::Episode(error)) => Err(error.into()),
             Err(PlayError::Absent(reason)) => {

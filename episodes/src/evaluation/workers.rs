@@ -44,7 +44,8 @@ pub fn play_all(
         played.iter().inspect(|(_, outcome)| progress(outcome.into())).collect()
     });
     if let Some(error) = failure.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()) {
-        let kept = outcomes.iter().filter(|(_, outcome)| outcome.counts()).count();
+        // As the next run will find it: also what lies there from before, and was not come to.
+        let kept = work.iter().filter(|spec| cache.load(spec).is_some()).count();
         return Err(error.after(kept, work.len()));
     }
     outcomes.sort_by_key(|(number, _)| *number);
@@ -59,16 +60,6 @@ pub fn play_all(
         }
     }
     Ok(episodes)
-}
-
-impl PlannedOutcome {
-    /// Whether the next run need not play the episode.
-    fn counts(&self) -> bool {
-        match self {
-            PlannedOutcome::Kept(played) | PlannedOutcome::Played(played) => played.counts(),
-            PlannedOutcome::LeftOut(_) => false,
-        }
-    }
 }
 
 impl<'a> From<&'a PlannedOutcome> for EpisodeEvent<'a> {

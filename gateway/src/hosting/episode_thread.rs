@@ -110,7 +110,9 @@ impl SharedStatus {
         if let Some(env_steps) = session.env_steps() {
             self.env_steps.store(env_steps, Ordering::Relaxed);
         }
-        self.thought.store(session.thought().as_nanos() as u64, Ordering::Relaxed);
+        if let Some(thought) = session.thought() {
+            self.thought.store(thought.as_nanos() as u64, Ordering::Relaxed);
+        }
         if let Some(reason) = session.recording_failed() {
             self.recording_failed.get_or_init(|| reason.to_owned());
         }

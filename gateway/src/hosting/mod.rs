@@ -18,5 +18,5 @@ pub use episode_thread::EpisodeThread;
 pub use error::HostingError;
 pub use hosted_episode::{Caller, HostedEpisode};
 pub use idempotency_cache::IdempotentReply;
-pub use run_folder::try_runs_folder;
+pub use run_folder::{look_at_runs_folder, try_runs_folder};
 pub use table::EpisodeTable;

@@ -62,10 +62,10 @@ impl PanicGuard {
     }
 
     /// How long the policy has thought, up to its last call; nothing that is known after a panic.
-    pub fn thought(&self) -> Duration {
+    pub fn thought(&self) -> Option<Duration> {
         match &self.state {
-            GuardState::Sound(session) => session.thought(),
-            GuardState::Panicked(_) => Duration::ZERO,
+            GuardState::Sound(session) => Some(session.thought()),
+            GuardState::Panicked(_) => None,
         }
     }
 

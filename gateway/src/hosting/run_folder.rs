@@ -12,20 +12,26 @@ use std::{
 
 use tandem_episodes::{create_new_private_folder, create_private_folder};
 
-/// Writes something into the folder of all runs; nothing of the trial is left behind. The error says what would have worked.
+/// Makes the folder of all runs, where it is not there, and writes something into it, which is removed again; the folder stays. The
+/// error says what would have worked.
 pub fn try_runs_folder(runs: &Path) -> Result<(), String> {
-    let there = runs.exists();
     let probe = runs.join(format!(".probe-{}", std::process::id()));
     let tried = create_private_folder(runs).and_then(|()| fs::write(&probe, "probe"));
     let cleared = fs::remove_file(&probe);
-    if !there {
-        // A folder that was made for this is removed again, unless somebody has put something in.
-        let _ = fs::remove_dir(runs);
-    }
     let shown = runs.display();
     tried.and(cleared).map_err(|error| {
         format!("{shown}: {error}; make room there, make it writable, or give another --runs")
     })
+}
+
+/// As [`try_runs_folder`]; nothing of the trial is left behind.
+pub fn look_at_runs_folder(runs: &Path) -> Result<(), String> {
+    let named = runs.ancestors().filter(|path| !path.as_os_str().is_empty());
+    let missing: Vec<&Path> = named.take_while(|path| !path.exists()).collect();
+    let tried = try_runs_folder(runs);
+    // A folder that was made for this is removed again, unless somebody has put something in.
+    let _ = missing.into_iter().try_for_each(fs::remove_dir);
+    tried
 }
 
 /// Names and makes the folders of one server.

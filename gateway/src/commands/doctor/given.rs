@@ -31,7 +31,7 @@ fn limits(layer: &Layer) -> Result<String, String> {
 }
 
 fn check_token(layer: &Layer, token: Result<Option<Token>, String>) -> Result<String, String> {
-    let layer = Layer { token: token?, ..layer.clone() };
+    token?;
     match layer.find_token() {
         Ok(Some(_)) => Ok("every request has to send it".into()),
         Ok(None) => Ok(format!("none, and none is needed: only this machine reaches {}", layer.address())),

@@ -11,7 +11,7 @@ use tandem_episodes::{EpisodeError, EpisodeSpec};
 use tandem_tools_spec::{Observe, ToolCall, Wait};
 
 use super::{Finding, Findings, trial};
-use crate::{hosting::try_runs_folder, settings::Layer};
+use crate::{hosting::look_at_runs_folder, settings::Layer};
 
 /// How many control steps the check of physics simulates.
 const TRIED_STEPS: u32 = 25;
@@ -69,7 +69,7 @@ pub(super) fn port(address: SocketAddr) -> Result<String, String> {
 }
 
 pub(super) fn runs(folder: &Path) -> Result<String, String> {
-    try_runs_folder(folder).map(|()| format!("{} can be written", folder.display()))
+    look_at_runs_folder(folder).map(|()| format!("{} can be written", folder.display()))
 }
 
 fn clock() -> Result<String, String> {

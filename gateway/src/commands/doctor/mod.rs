@@ -66,9 +66,11 @@ fn told(findings: &Findings) -> String {
 /// Tries everything, whatever is wrong before it.
 fn examine(args: ServeArgs, token: Result<Option<Token>, String>) -> Findings {
     let mut findings = Findings::new();
+    // As for the server: a token of the environment goes before the file's.
+    let flags = Layer { token: token.clone().ok().flatten(), ..args.flags };
     let layer = match &args.config {
-        None => args.flags,
-        Some(path) => match args.flags.clone().over_file(path) {
+        None => flags,
+        Some(path) => match flags.clone().over_file(path) {
             Ok(layer) => {
                 findings.push(("config", Finding::Works(format!("{} is read", path.display()))));
                 layer
@@ -77,7 +79,7 @@ fn examine(args: ServeArgs, token: Result<Option<Token>, String>) -> Findings {
                 findings.push(("config", Finding::Wrong(error.to_string())));
                 let text = "what follows is of flags, environment and defaults alone";
                 findings.push(("config", Finding::Note(text.into())));
-                args.flags
+                flags
             }
         },
     };

@@ -14,8 +14,13 @@ struct DoctorLine {
 
 /// What is found with these flags, of the things called `what`.
 fn found(flags: &[&str], what: &str) -> Vec<Finding> {
+    found_with(Ok(None), flags, what)
+}
+
+/// As [`found`], where the environment holds `token`.
+fn found_with(token: Result<Option<Token>, String>, flags: &[&str], what: &str) -> Vec<Finding> {
     let line = DoctorLine::try_parse_from([&["doctor"], flags].concat()).unwrap();
-    let findings = examine(line.args.serve, Ok(None)).into_iter();
+    let findings = examine(line.args.serve, token).into_iter();
     findings.filter(|(about, _)| *about == what).map(|(_, finding)| finding).collect()
 }
 
@@ -50,6 +55,7 @@ fn looking_leaves_nothing_behind() {
     let (new, kept) = (place.path().join("new"), place.path().join("kept"));
     fs::create_dir(&kept).unwrap();
     assert!(machine::runs(&new).is_ok() && machine::runs(&kept).is_ok());
+    assert!(machine::runs(&new.join("a/b")).is_ok() && machine::runs(&kept.join("a/b")).is_ok());
     assert!(!new.exists() && kept.exists());
     assert_eq!(fs::read_dir(&kept).unwrap().count(), 0);
 }
@@ -75,6 +81,12 @@ fn the_file_of_settings_and_all_that_it_names_are_tried() {
     expect_wrong(&found(&flags, "scene"), &["no.xml"]);
     expect_wrong(&found(&flags, "runs"), &["give another --runs"]);
     assert!(matches!(found(&flags, "config")[..], [Finding::Works(_)]));
+
+    let config = write("token.toml", "token_file = \"no token\"\n");
+    expect_wrong(&found(&["--config", &config], "token"), &["no token"]);
+    // A server takes the environment's, too.
+    let (token, _) = Token::random().unwrap();
+    assert!(matches!(found_with(Ok(Some(token)), &["--config", &config], "token")[..], [Finding::Works(_)]));
 
     let wrong = write("wrong.toml", "max_episode = 3\n");
     expect_wrong(&found(&["--config", &wrong], "config"), &["`max_episodes`"]);

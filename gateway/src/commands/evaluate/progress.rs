@@ -131,7 +131,7 @@ impl Tally {
         let left = self.planned.saturating_sub(self.done());
         let time = match self.left(elapsed) {
             Some(time) => format!("about {} at this pace", in_words(time)),
-            None => "none finished yet".into(),
+            None => "no pace known yet".into(),
         };
         format!("{} of {} episodes done{of_them}, {left} left, {time}", self.done(), self.planned)
     }
@@ -220,7 +220,7 @@ mod tests {
              about 1 h 45 min at this pace"
         );
         let begun = Tally { planned: 3, ..Tally::default() };
-        assert_eq!(begun.line(SECOND * 60), "0 of 3 episodes done, 3 left, none finished yet");
+        assert_eq!(begun.line(SECOND * 60), "0 of 3 episodes done, 3 left, no pace known yet");
         assert_eq!(Tally { played: 2, ..begun }.bar_text(SECOND * 60), "about 30 s left");
     }
 

@@ -5,7 +5,8 @@ mod participant;
 mod process;
 
 use std::{
-    fs, io,
+    fs::{self, File},
+    io::{self, Read, Seek, SeekFrom},
     path::Path,
     sync::Arc,
     thread,
@@ -38,6 +39,9 @@ const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// How much of a program's last words a result quotes.
 const QUOTED_CHARS: usize = 300;
 const QUOTED_LINES: usize = 3;
+
+/// Where they are looked for: the end of a file, which may be of any size.
+const LAST_WORDS_BYTES: u64 = 64 << 10;
 
 /// A command that plays.
 #[derive(Debug)]
@@ -79,14 +83,14 @@ impl Program {
         })
     }
 
-    /// Starts a process for each participant and waits until all are gone. Returns how each was found, and its exit status.
+    /// Starts a process for each participant and waits until all are gone. Returns how each was found.
     fn run(
         &self,
         server: &Server,
         episode: &EpisodeThread,
         start: &StartReply,
         participants: &[Participant],
-    ) -> Result<Vec<(ProgramExit, String)>, PlayError> {
+    ) -> Result<Vec<FoundProgram>, PlayError> {
         let url = format!("http://{}", server.address());
         let mut groups = Vec::new();
         for participant in participants {
@@ -101,48 +105,62 @@ impl Program {
         let exits = self.watch(&mut groups, episode).map_err(|error| lost("the program is lost", error))?;
         let statuses: io::Result<Vec<String>> = groups.into_iter().map(ProcessGroup::stop).collect();
         let statuses = statuses.map_err(|error| lost("the program is lost", error))?;
-        Ok(exits.into_iter().zip(statuses).collect())
+        let found = exits.into_iter().zip(statuses);
+        Ok(found.map(|((exit, env_steps), status)| FoundProgram { exit, env_steps, status }).collect())
     }
 
-    /// Waits until all programs have ended, one of them has failed, or their time is over.
-    fn watch(&self, groups: &mut [ProcessGroup], episode: &EpisodeThread) -> io::Result<Vec<ProgramExit>> {
+    /// Waits until all programs have ended, one of them has failed, or their time is over. Returns how each was found, and at which
+    /// control step.
+    fn watch(
+        &self,
+        groups: &mut [ProcessGroup],
+        episode: &EpisodeThread,
+    ) -> io::Result<Vec<(ProgramExit, u32)>> {
         let began = Instant::now();
         let mut over: Option<Instant> = None;
-        let mut exits: Vec<Option<ProgramExit>> = groups.iter().map(|_| None).collect();
+        let mut exits: Vec<Option<(ProgramExit, u32)>> = groups.iter().map(|_| None).collect();
         loop {
             for (exit, group) in exits.iter_mut().zip(groups.iter_mut()) {
                 if exit.is_none()
                     && let Some(well) = group.ended_well()?
                 {
                     // Whoever is found to have ended while the episode goes on has ended before it.
-                    *exit = Some(match (episode.ended(), well) {
+                    let found = match (episode.ended(), well) {
                         (true, _) => ProgramExit::After,
                         (false, true) => ProgramExit::Left,
                         (false, false) => ProgramExit::Failed,
-                    });
+                    };
+                    *exit = Some((found, episode.env_steps()));
                 }
             }
             let late = began.elapsed() >= self.limit;
             let stay = episode.ended() && over.get_or_insert_with(Instant::now).elapsed() >= GRACE_PERIOD;
-            let done = exits.iter().all(Option::is_some) || exits.contains(&Some(ProgramExit::Failed));
+            let failed = exits.iter().flatten().any(|(exit, _)| exit.is_failure());
+            let done = failed || exits.iter().all(Option::is_some);
             if late || stay || done {
                 let running = match late && !episode.ended() {
                     true => ProgramExit::TimedOut,
                     false => ProgramExit::StillRunning,
                 };
-                let found = |exit: Option<ProgramExit>| match exit.unwrap_or(running) {
-                    // It has done its part, and the others have played the episode to its end.
-                    ProgramExit::Left if episode.ended() => ProgramExit::After,
-                    exit => exit,
-                };
-                return Ok(exits.into_iter().map(found).collect());
+                let env_steps = episode.env_steps();
+                let found: Vec<(ProgramExit, u32)> =
+                    exits.into_iter().map(|exit| exit.unwrap_or((running, env_steps))).collect();
+                // Whoever left in order had done its part, where the others have played the episode to its end, or one of them is
+                // to blame for it.
+                let excused = episode.ended() || found.iter().any(|(exit, _)| exit.is_failure());
+                let judged = found.into_iter().map(|(exit, env_steps)| match exit {
+                    ProgramExit::Left if excused => (ProgramExit::After, env_steps),
+                    exit => (exit, env_steps),
+                });
+                return Ok(judged.collect());
             }
             thread::sleep(POLL_INTERVAL);
         }
     }
 
     /// What is told of a program whose process left its episode early, and of what it said at last.
-    fn last_words(&self, exit: ProgramExit, status: &str, so_far: &str, folder: &Path) -> Option<String> {
+    fn last_words(&self, found: &FoundProgram, so_far: &str, folder: &Path) -> Option<String> {
+        let FoundProgram { exit, status, .. } = found;
         match exit {
             ProgramExit::Left | ProgramExit::Failed => {
                 let words = last_lines(folder).map(|lines| format!("; its last words: {lines}"));
@@ -162,17 +180,17 @@ impl Program {
         &self,
         result: ResultReply,
         thought: Duration,
-        ran: &[(ProgramExit, String)],
+        ran: &[FoundProgram],
         participants: &[Participant],
     ) -> Result<PlayOutcome, PlayError> {
-        let so_far = match (result.tool_calls, participants) {
-            (0, _) => "without a call".into(),
-            (1, [_]) => "after 1 call".into(),
-            (calls, [_]) => format!("after {calls} calls"),
-            (_, _) => format!("at control step {}", result.env_steps),
-        };
-        let told = ran.iter().zip(participants).filter_map(|((exit, status), participant)| {
-            let words = self.last_words(*exit, status, &so_far, &participant.folder)?;
+        let told = ran.iter().zip(participants).filter_map(|(found, participant)| {
+            let so_far = match (result.tool_calls, participants) {
+                (0, _) => "without a call".into(),
+                (1, [_]) => "after 1 call".into(),
+                (calls, [_]) => format!("after {calls} calls"),
+                (_, _) => format!("at control step {}", found.env_steps),
+            };
+            let words = self.last_words(found, &so_far, &participant.folder)?;
             Some(participant.robot.map_or(words.clone(), |robot| format!("{robot}: {words}")))
         });
         let mut reasons: Vec<String> = told.collect();
@@ -226,7 +244,7 @@ impl Policy for Program {
         }
         let participants = Participant::all(&start, &text, &absolute);
         let ran = self.run(&server, &episode, &start, &participants);
-        if ran.as_ref().is_ok_and(|ran| ran.iter().any(|(exit, _)| exit.is_failure())) {
+        if ran.as_ref().is_ok_and(|ran| ran.iter().any(|found| found.exit.is_failure())) {
             episode.end_blocking(EndReason::PolicyFailed);
         }
         let thought = episode.thought();
@@ -236,10 +254,19 @@ impl Policy for Program {
     }
 }
 
+/// What was found of a program when the wait for it was over.
+struct FoundProgram {
+    exit: ProgramExit,
+    /// How far the episode was.
+    env_steps: u32,
+    /// Its exit status, in words.
+    status: String,
+}
+
 /// How a program was found when the wait for it was over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ProgramExit {
-    /// It ended when its episode had, or had no further part in it.
+    /// It ended when its episode had, or had no further part in it and nothing to do with its end.
     After,
     /// It ended by itself before its episode, and says that all went well.
     Left,
@@ -264,7 +291,12 @@ impl ProgramExit {
 /// room for.
 fn last_lines(folder: &Path) -> Option<String> {
     [STDERR_FILE, STDOUT_FILE].into_iter().find_map(|name| {
-        let bytes = fs::read(folder.join(name)).ok()?;
+        let mut file = File::open(folder.join(name)).ok()?;
+        let read_from = file.metadata().ok()?.len().saturating_sub(LAST_WORDS_BYTES);
+        file.seek(SeekFrom::Start(read_from)).ok()?;
+        let mut bytes = Vec::new();
+        // The program may still write.
+        file.take(LAST_WORDS_BYTES).read_to_end(&mut bytes).ok()?;
         let text = String::from_utf8_lossy(&bytes);
         // Python underlines with lines that have no word.
         let worded = text.lines().map(str::trim).filter(|line| line.contains(char::is_alphanumeric));
@@ -330,5 +362,9 @@ mod tests {
         assert_eq!(said("", &format!("before\n{long}")).map(|words| words.len()), Some(QUOTED_CHARS));
         assert_eq!(said("", &format!("{long}\nthe end")).as_deref(), Some("the end"));
         assert_eq!(said("", ""), None);
+        let much = "x y\n".repeat(LAST_WORDS_BYTES as usize);
+        assert_eq!(said("", &format!("{much}{traceback}")).as_deref(), Some(told));
+        let earlier = format!("long ago\n{}", "\n".repeat(LAST_WORDS_BYTES as usize));
+        assert_eq!(said("heard", &earlier).as_deref(), Some("heard"), "all of a file is not read");
     }
 }
