@@ -93,11 +93,12 @@ impl ServerHandler for McpServer {
     async fn get_prompt(
         &self,
         request: GetPromptRequestParams,
-        _: RequestContext<RoleServer>,
+        context: RequestContext<RoleServer>,
     ) -> Result<GetPromptResponse, ErrorData> {
         let arguments = request.arguments.unwrap_or_default();
         let list = self.app.table.task_list();
-        Ok(prompt::prompt(&request.name, arguments, list, self.app.settings.hints)?.into())
+        let caller = caller_of(&context).unwrap_or(&Caller::Host);
+        Ok(prompt::prompt(&request.name, arguments, list, self.app.settings.hints, caller)?.into())
     }
 
     async fn call_tool(
@@ -173,7 +174,9 @@ impl McpServer {
             (Some(Value::String(id)), _) => id,
             // An operator's token says which episode.
             (None, Caller::Operator { episode, .. }) => episode.clone(),
-            _ if TalkCall::TOOLS.contains(&name) => return Err(HostingError::NoTalk.into()),
+            (None, Caller::Host) if TalkCall::TOOLS.contains(&name) => {
+                return Err(HostingError::NoTalk.into());
+            }
             _ => {
                 call?;
                 return Err(ApiError::NoEpisodeNamed { tool: name.into() });

@@ -7,6 +7,8 @@ use rmcp::{
 use tandem_episodes::{brief, tasks};
 use tandem_tools_spec::{Brief, Hints, Protocol, ProtocolInfo, StartEpisode, TaskInfo, TaskList, parse_args};
 
+use crate::hosting::Caller;
+
 /// The name of the only prompt.
 const NAME: &str = "play_task";
 
@@ -26,12 +28,13 @@ pub fn prompts() -> Vec<Prompt> {
     vec![prompt.with_title("Play a task")]
 }
 
-/// The prompt called `name` for the task, seed and protocol in `arguments`; `list` has the tasks.
+/// The prompt called `name` for the task, seed and protocol in `arguments`, as `caller` may follow it; `list` has the tasks.
 pub fn prompt(
     name: &str,
     arguments: JsonObject,
     list: TaskList,
     hints: Hints,
+    caller: &Caller,
 ) -> Result<GetPromptResult, ErrorData> {
     let refused = |text: String| ErrorData::invalid_params(text, None);
     if name != NAME {
@@ -41,7 +44,7 @@ pub fn prompt(
     let task = tasks::find(&start.task).map_err(|error| refused(error.to_string()))?;
     let info = list.tasks.iter().find(|info| info.id == task.id);
     let info = info.ok_or_else(|| refused(format!("{} is not listed", task.id)))?;
-    let text = text(info, &start, &brief(hints));
+    let text = text(info, &start, &brief(hints), caller);
     let mut result = GetPromptResult::new(vec![PromptMessage::new_text(Role::User, text)]);
     result.description = Some(info.instruction.clone());
     Ok(result)
@@ -60,7 +63,7 @@ fn start(mut arguments: JsonObject) -> Result<StartEpisode, String> {
     parse_args(arguments.into()).map_err(|error| error.to_string())
 }
 
-fn text(task: &TaskInfo, start: &StartEpisode, brief: &Brief) -> String {
+fn text(task: &TaskInfo, start: &StartEpisode, brief: &Brief, caller: &Caller) -> String {
     let protocol = start.protocol.unwrap_or(Protocol::Agentic);
     let robots = task.robots.iter().map(|robot| format!("* {}: {}", robot.robot, robot.instruction));
     let phases =
@@ -68,6 +71,13 @@ fn text(task: &TaskInfo, start: &StartEpisode, brief: &Brief) -> String {
     let budget = task.protocols.iter().find(|info| info.protocol == protocol).map(budget);
     let brief = [&brief.frames, &brief.partners, &brief.odometry, &brief.camera, &brief.hands];
     let lines = |lines: &mut dyn Iterator<Item = String>| lines.collect::<Vec<_>>().join("\n");
+    let begin = match caller {
+        Caller::Host => {
+            format!("Begin with start_episode, task {}, seed {}, protocol {protocol}. ", task.id, start.seed)
+        }
+        // Its episode goes on already.
+        Caller::Operator { robot, .. } => format!("You are the operator of robot {robot}. "),
+    };
     [
         task.instruction.clone(),
         format!("The robots:\n{}", lines(&mut robots.into_iter())),
@@ -75,9 +85,8 @@ fn text(task: &TaskInfo, start: &StartEpisode, brief: &Brief) -> String {
         budget.unwrap_or_default(),
         lines(&mut brief.into_iter().cloned()),
         format!(
-            "Begin with start_episode, task {}, seed {}, protocol {protocol}. Look with observe, measure with query_depth, act \
-             with move_wrists, walk and wait, and check with every reply what came of it. Call finish when the task is done.",
-            task.id, start.seed
+            "{begin}Look with observe, measure with query_depth, act \
+             with move_wrists, walk and wait, and check with every reply what came of it. Call finish when the task is done."
         ),
     ]
     .join("\n\n")

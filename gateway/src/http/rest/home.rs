@@ -6,14 +6,20 @@ use serde_json::json;
 use tandem_episodes::html::{self, escape};
 use tandem_tools_spec::{EpisodeEntry, EpisodeList, Operators};
 
-/// The page of a server of `version` with these episodes.
-pub fn page(version: &str, list: &EpisodeList) -> String {
+use crate::hosting::Caller;
+
+/// The page of a server of `version` with these episodes, and what else `caller` may see.
+pub fn page(version: &str, list: &EpisodeList, caller: &Caller) -> String {
     let title = format!("Tandem {version}");
+    let figures = match caller {
+        Caller::Host => "; <a href=\"/metrics\">figures for Prometheus</a>",
+        Caller::Operator { .. } => "",
+    };
     let mut body = format!("<h1>{}</h1>\n", escape(&title));
-    body.push_str(
+    body += &format!(
         "<p>Simulated humanoids that must work together. <a href=\"/docs\">The interface</a>, for programs \
-         <a href=\"/v1/openapi.json\">as OpenAPI</a>; <a href=\"/v1/tasks\">the tasks</a>; <a href=\"/v1/tools\">the tools</a>; \
-         <a href=\"/metrics\">figures for Prometheus</a>. MCP hosts connect to <code>/mcp</code>.</p>\n<h2>Episodes</h2>\n",
+         <a href=\"/v1/openapi.json\">as OpenAPI</a>; <a href=\"/v1/tasks\">the tasks</a>; <a href=\"/v1/tools\">the tools</a>{figures}. \
+         MCP hosts connect to <code>/mcp</code>.</p>\n<h2>Episodes</h2>\n"
     );
     let rows: String = list.episodes.iter().map(row).collect();
     body += &match rows.is_empty() {
@@ -65,7 +71,12 @@ mod tests {
             ended,
         };
         let failed = Some(EndReason::SimulatorFailed);
-        let page = page("1.2.3", &EpisodeList { episodes: vec![entry("a", None), entry("<b>", failed)] });
+        let page = page(
+            "1.2.3",
+            &EpisodeList { episodes: vec![entry("a", None), entry("<b>", failed)] },
+            &Caller::Host,
+        );
+        assert!(page.contains("href=\"/metrics\""), "{page}");
         let rest =
             "<td>handover</td><td>7</td><td>agentic</td><td>an operator for each robot</td><td>325</td>";
         assert!(
@@ -76,6 +87,11 @@ mod tests {
         for foreign in ["<script", "<b>", "src=", "url(", "http://", "https://", "<link"] {
             assert!(!page.contains(foreign), "{foreign}");
         }
-        assert!(super::page("1.2.3", &EpisodeList { episodes: Vec::new() }).contains("None is held"));
+        let operator = Caller::Operator { episode: "a".into(), robot: "A".into() };
+        let page = super::page("1.2.3", &EpisodeList { episodes: Vec::new() }, &operator);
+        assert!(
+            page.contains("None is held") && page.contains("/v1/tools") && !page.contains("/metrics"),
+            "{page}"
+        );
     }
 }

@@ -106,7 +106,7 @@ async fn docs(State(app): State<AppState>, Extension(caller): Extension<Caller>)
 
 /// The page that a browser finds first.
 async fn home(State(app): State<AppState>, Extension(caller): Extension<Caller>) -> Response {
-    page(home::page(VERSION, &app.table.list(&caller)))
+    page(home::page(VERSION, &app.table.list(&caller), &caller))
 }
 
 /// A page, which needs nothing else and may load nothing.

@@ -221,6 +221,21 @@ fn operators_may_speak_mcp() {
     assert!(failed && text.contains("driven by its own operator"), "{text}");
     let start = json!({ "task": "handover", "seed": 0 });
     assert!(call(&team.tokens[0], "start_episode", start).0);
+    let prompt = |token: &str| {
+        let request = json!({
+            "jsonrpc": "2.0", "id": 1, "method": "prompts/get",
+            "params": { "name": "play_task", "arguments": { "task": "handover" } },
+        });
+        let bearer = format!("Bearer {token}");
+        let headers = [("authorization", bearer.as_str()), ("accept", "application/json, text/event-stream")];
+        team.server.post_with("/mcp", &headers, &request).ok().to_string()
+    };
+    let text = prompt(&team.tokens[1]);
+    assert!(
+        text.contains("operator of robot B. Look with observe") && !text.contains("start_episode"),
+        "{text}"
+    );
+    assert!(prompt("none").contains("Begin with start_episode, task handover, seed 0"));
 }
 
 #[test]
@@ -276,6 +291,14 @@ fn who_may_not_talk_is_not_offered_to() {
             assert!(text.contains("move_wrists") && offered.is_none(), "{offered:?} in {text}");
         }
     }
+    let said = json!({
+        "jsonrpc": "2.0", "id": 1, "method": "tools/call",
+        "params": { "name": "say", "arguments": { "episode_id": 5, "text": "Hello." } },
+    });
+    let bearer = format!("Bearer {}", talking.tokens[0]);
+    let headers = [("authorization", &*bearer), ("accept", "application/json, text/event-stream")];
+    let answer = talking.server.post_with("/mcp", &headers, &said).body.to_string();
+    assert!(answer.contains("episode_id") && !answer.contains("nobody hears you"), "{answer}");
     for args in [json!({}), json!({ "text": "" }), json!({ "text": "Hello." })] {
         quiet.ask(0, "say", args).refused(409, &["nobody hears you"]);
     }
