@@ -17,7 +17,7 @@ pub struct PolicyMapArgs {
 
 #[derive(Debug, Subcommand)]
 enum MapAction {
-    /// Print a preset as TOML, with what each line means.
+    /// Print a preset as TOML; that of openpi says what each line means.
     Show {
         /// The preset.
         #[arg(value_name = "NAME", value_parser = PossibleValuesParser::new(PRESETS.map(|(name, _)| name)))]
