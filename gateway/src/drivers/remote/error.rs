@@ -26,14 +26,21 @@ pub enum RemoteError {
 }
 
 impl RemoteError {
-    /// Whether nobody is there who answers, now and in the next episode.
-    pub fn is_absence(&self) -> bool {
+    /// What to do where nobody is there who answers, now and in the next episode; `connect_s` is how long that was waited for.
+    pub fn remedy(&self, connect_s: f64) -> Option<String> {
         match self {
-            RemoteError::Unreachable { .. } | RemoteError::Slow { .. } => true,
+            RemoteError::Unreachable { .. } => Some(format!(
+                "Start its server, or name in --policy where it listens (a server that starts slowly is waited for longer with a \
+                 greater connect_s in its policy map, now {connect_s} s)"
+            )),
+            // No setting of a map makes a first answer come.
+            RemoteError::Slow { .. } => {
+                Some("That is as long as a first answer may take; see what its server does".into())
+            }
             RemoteError::Gone { .. }
             | RemoteError::Failed { .. }
             | RemoteError::Unreadable { .. }
-            | RemoteError::Misfit(_) => false,
+            | RemoteError::Misfit(_) => None,
         }
     }
 }

@@ -74,13 +74,9 @@ impl RemotePolicy {
     fn not_opened(&self, failures: &[RemoteError]) -> PlayError {
         let reasons: Vec<String> = failures.iter().map(RemoteError::to_string).collect();
         let reasons = reasons.join("; ");
-        match failures.iter().any(RemoteError::is_absence) {
-            true => PlayError::Absent(format!(
-                "{reasons}. Start its server, or name in --policy where it listens (a server that starts slowly is waited for longer \
-                 with a greater connect_s in its policy map, now {} s)",
-                self.map.connect_s
-            )),
-            false => PlayError::NotReady(reasons),
+        match failures.iter().find_map(|failure| failure.remedy(self.map.connect_s)) {
+            Some(remedy) => PlayError::Absent(format!("{reasons}. {remedy}")),
+            None => PlayError::NotReady(reasons),
         }
     }
 

@@ -44,8 +44,8 @@ impl<'a> PolicySession<'a> {
         let plan = QueryPlan { map, instructions };
         let deadline = Instant::now() + Duration::from_secs_f64(map.connect_s);
         let connect = |url: &str, robots: &[usize]| {
-            retry_until(deadline, || {
-                let mut client = protocol.open(url, plan.within())?;
+            retry_until(deadline, |left| {
+                let mut client = protocol.open(url, left, plan.within())?;
                 plan.probe(&mut *client, robots)?;
                 Ok(client)
             })
@@ -172,13 +172,14 @@ impl QueryPlan<'_> {
     }
 }
 
-/// Tries again until the deadline while nobody listens.
+/// Tries again until the deadline while nobody listens, each time with the time that is left.
 fn retry_until<T>(
     deadline: Instant,
-    mut attempt: impl FnMut() -> Result<T, RemoteError>,
+    mut attempt: impl FnMut(Duration) -> Result<T, RemoteError>,
 ) -> Result<T, RemoteError> {
     loop {
-        match attempt() {
+        let left = deadline.saturating_duration_since(Instant::now());
+        match attempt(left.max(RETRY_INTERVAL)) {
             Err(RemoteError::Unreachable { .. }) if Instant::now() + RETRY_INTERVAL < deadline => {
                 thread::sleep(RETRY_INTERVAL)
             }

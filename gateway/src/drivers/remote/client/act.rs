@@ -4,7 +4,7 @@ use std::{io, time::Duration};
 
 use base64::{Engine, prelude::BASE64_STANDARD};
 use serde_json::{Value, json};
-use ureq::{Agent, http::Response};
+use ureq::{Agent, Timeout, http::Response};
 
 use super::PolicyClient;
 use crate::drivers::remote::{
@@ -19,38 +19,51 @@ const LARGEST_ANSWER_BYTES: u64 = 64 << 20;
 pub struct Act {
     url: String,
     agent: Agent,
+    /// How long it may take to find the server, until it has been found.
+    connect_within: Option<Duration>,
 }
 
 impl Act {
-    pub fn new(url: &str) -> Act {
+    pub fn new(url: &str, connect_within: Duration) -> Act {
         let agent = Agent::config_builder().http_status_as_error(false).build().new_agent();
-        Act { url: url.into(), agent }
+        Act { url: url.into(), agent, connect_within: Some(connect_within) }
     }
 
     fn post(&self, body: String, within: Duration) -> Result<Response<ureq::Body>, ureq::Error> {
-        let request = self.agent.post(&self.url).config().timeout_global(Some(within)).build();
-        request.header("content-type", "application/json").send(body)
+        let config = self.agent.post(&self.url).config().timeout_global(Some(within));
+        let config = config.timeout_resolve(self.connect_within).timeout_connect(self.connect_within);
+        config.build().header("content-type", "application/json").send(body)
     }
 
     fn failed(&self, error: ureq::Error, within: Duration) -> RemoteError {
         let (url, reason) = (self.url.clone(), error.to_string());
         match error {
+            ureq::Error::Timeout(Timeout::Connect | Timeout::Resolve)
+            | ureq::Error::ConnectionFailed
+            | ureq::Error::HostNotFound => RemoteError::Unreachable { url, reason },
             ureq::Error::Timeout(_) => RemoteError::Slow { url, within },
-            ureq::Error::ConnectionFailed | ureq::Error::HostNotFound => {
-                RemoteError::Unreachable { url, reason }
-            }
-            ureq::Error::Io(error) if error.kind() == io::ErrorKind::ConnectionRefused => {
-                RemoteError::Unreachable { url, reason }
-            }
+            ureq::Error::Io(error) if is_unreachable(&error) => RemoteError::Unreachable { url, reason },
             _ => RemoteError::Gone { url, reason },
         }
     }
+}
+
+/// Whether nobody was reached, of all that may go wrong on the way.
+fn is_unreachable(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        io::ErrorKind::ConnectionRefused
+            | io::ErrorKind::HostUnreachable
+            | io::ErrorKind::NetworkUnreachable
+            | io::ErrorKind::AddrNotAvailable
+    )
 }
 
 impl PolicyClient for Act {
     fn ask(&mut self, request: &RequestValue, within: Duration) -> Result<ReplyValue, RemoteError> {
         let body = to_json(request).to_string();
         let mut response = self.post(body, within).map_err(|error| self.failed(error, within))?;
+        self.connect_within = None;
         let status = response.status();
         let read = response.body_mut().with_config().limit(LARGEST_ANSWER_BYTES).read_to_string();
         let text = read.map_err(|error| self.failed(error, within))?;
@@ -126,6 +139,29 @@ mod tests {
         let reply = ReplyValue::Array { shape: vec![1, 2], values: vec![1.5, -2.0] };
         assert_eq!(from_json(known), Ok(reply.clone()));
         assert_eq!(from_json(json!([[1.5, -2]])), Ok(reply));
+    }
+
+    #[test]
+    fn nobody_and_somebody_slow_are_told_apart() {
+        let within = Duration::from_secs(1);
+        let failed = |error: ureq::Error| Act::new("http://there", within).failed(error, within);
+        for kind in [
+            io::ErrorKind::ConnectionRefused,
+            io::ErrorKind::HostUnreachable,
+            io::ErrorKind::NetworkUnreachable,
+            io::ErrorKind::AddrNotAvailable,
+        ] {
+            let error = failed(ureq::Error::Io(kind.into()));
+            assert!(matches!(error, RemoteError::Unreachable { .. }), "{kind}: {error}");
+        }
+        for timeout in [Timeout::Connect, Timeout::Resolve] {
+            let error = failed(ureq::Error::Timeout(timeout));
+            assert!(matches!(error, RemoteError::Unreachable { .. }), "{timeout:?}: {error}");
+        }
+        let error = failed(ureq::Error::Timeout(Timeout::Global));
+        assert!(matches!(error, RemoteError::Slow { .. }), "{error}");
+        let error = failed(ureq::Error::Io(io::ErrorKind::ConnectionReset.into()));
+        assert!(matches!(error, RemoteError::Gone { .. }), "{error}");
     }
 
     #[test]

@@ -44,11 +44,17 @@ impl PolicyProtocol {
         }
     }
 
-    /// A client of the server at `url`.
-    pub fn open(self, url: &str, within: Duration) -> Result<Box<dyn PolicyClient>, RemoteError> {
+    /// A client of the server at `url`, which has to be found within `connect_within`; it may be busy then, and has `reply_within` to
+    /// say who it is, or as long as to be found if that is longer.
+    pub fn open(
+        self,
+        url: &str,
+        connect_within: Duration,
+        reply_within: Duration,
+    ) -> Result<Box<dyn PolicyClient>, RemoteError> {
         Ok(match self {
-            PolicyProtocol::Openpi => Box::new(openpi::Openpi::connect(url, within)?),
-            PolicyProtocol::Act => Box::new(act::Act::new(url)),
+            PolicyProtocol::Openpi => Box::new(openpi::Openpi::connect(url, connect_within, reply_within)?),
+            PolicyProtocol::Act => Box::new(act::Act::new(url, connect_within)),
         })
     }
 }

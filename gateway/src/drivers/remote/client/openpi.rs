@@ -23,9 +23,19 @@ pub struct Openpi {
 
 impl Openpi {
     /// Connects, and hears who the server is.
-    pub fn connect(url: &str, within: Duration) -> Result<Openpi, RemoteError> {
+    pub fn connect(
+        url: &str,
+        connect_within: Duration,
+        reply_within: Duration,
+    ) -> Result<Openpi, RemoteError> {
         let unreachable = |reason: String| RemoteError::Unreachable { url: url.into(), reason };
-        let stream = DeadlineStream::connect(url, within).map_err(|error| unreachable(error.to_string()))?;
+        let mut stream =
+            DeadlineStream::connect(url, connect_within).map_err(|error| unreachable(error.to_string()))?;
+        // A server that answers somebody else may shake no hands meanwhile.
+        let within = connect_within.max(reply_within);
+        let silent =
+            || unreachable(format!("it says nothing within {} s of the connection", within.as_secs_f64()));
+        stream.deadline = Instant::now() + within;
         let page = stream.stream.try_clone();
         let (socket, _) = tungstenite::client(url, stream).map_err(|error| match error {
             // A proxy's page of an error, or another server than a policy's.
@@ -34,11 +44,16 @@ impl Openpi {
                 let begun = response.into_body().unwrap_or_default();
                 unreachable(format!("it answers HTTP {status}: {}", gist(&page_text(begun, page))))
             }
+            HandshakeError::Failure(Error::Io(error)) if is_late(&error) => silent(),
             HandshakeError::Failure(error) => unreachable(error.to_string()),
-            HandshakeError::Interrupted(_) => RemoteError::Slow { url: url.into(), within },
+            HandshakeError::Interrupted(_) => silent(),
         })?;
         let mut link = Openpi { url: url.into(), socket };
-        match link.hear(within)? {
+        let metadata = link.hear(within).map_err(|error| match error {
+            RemoteError::Slow { .. } => silent(),
+            error => error,
+        })?;
+        match metadata {
             ReplyValue::Map(_) => Ok(link),
             other => {
                 Err(link.unreadable(format!("expected metadata first, a map; came {}", other.describe())))
@@ -106,6 +121,9 @@ fn page_text(mut begun: Vec<u8>, stream: io::Result<TcpStream>) -> String {
     String::from_utf8_lossy(&begun).into_owned()
 }
 
+/// How long an address is tried at least.
+const SHORTEST_TRIAL: Duration = Duration::from_millis(10);
+
 /// How long the text of a page may follow its header.
 const PAGE_WAIT: Duration = Duration::from_secs(1);
 
@@ -124,11 +142,16 @@ impl DeadlineStream {
         let address = url.strip_prefix(PolicyProtocol::Openpi.scheme()).unwrap_or(url);
         let address = address.split('/').next().unwrap_or_default();
         let mut failure = io::Error::other("no such host");
-        for address in address.to_socket_addrs()? {
-            match TcpStream::connect_timeout(&address, within) {
+        let deadline = Instant::now() + within;
+        let mut addresses = address.to_socket_addrs()?;
+        while let Some(address) = addresses.next() {
+            // Each has its share of what is left, which must not be nothing.
+            let left = deadline.saturating_duration_since(Instant::now());
+            let share = left / (addresses.len() as u32 + 1);
+            match TcpStream::connect_timeout(&address, share.max(SHORTEST_TRIAL)) {
                 Ok(stream) => {
                     stream.set_nodelay(true)?;
-                    return Ok(DeadlineStream { stream, deadline: Instant::now() + within });
+                    return Ok(DeadlineStream { stream, deadline });
                 }
                 Err(error) => failure = error,
             }
@@ -262,6 +285,17 @@ mod tests {
 
     /// `msgpack_numpy.packb({"actions": np.float32([[1.5, -2]]), "n": np.float64(3)})` of openpi-client 0.1.2.
     const KNOWN: &[u8] = include_bytes!("known.msgpack");
+
+    #[test]
+    fn a_server_that_says_nothing_is_not_there() {
+        // The system takes connections; nobody hears them.
+        let silent = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        let url = format!("ws://{}", silent.local_addr().unwrap());
+        let opened = Openpi::connect(&url, Duration::from_secs(1), Duration::from_millis(20));
+        let error = opened.err().unwrap();
+        assert!(matches!(error, RemoteError::Unreachable { .. }), "{error}");
+        assert!(error.to_string().ends_with("it says nothing within 1 s of the connection"), "{error}");
+    }
 
     #[test]
     fn answers_of_openpi_are_read() {
