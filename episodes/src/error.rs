@@ -118,10 +118,10 @@ pub enum SceneError {
         trial_s: f64,
     },
     #[error(
-        "{task} cannot be played in the scene {}: in a trial of {trial_s:.0} s, in which nobody acts, {source}",
+        "in the scene {}, in a trial of {trial_s:.0} s, in which nobody acts, {source}",
         path.display()
     )]
-    Diverged { path: PathBuf, task: &'static str, trial_s: f64, source: tandem_sim::dynamics::Diverged },
+    Diverged { path: PathBuf, trial_s: f64, source: tandem_sim::dynamics::Diverged },
 }
 
 /// Why a checkpoint cannot be gone on from.

@@ -157,7 +157,6 @@ fn try_scene(
     for _ in 0..TRIAL_STEPS {
         let present = world.control_step(&commands).map_err(|source| SceneError::Diverged {
             path: path.clone(),
-            task,
             trial_s,
             source,
         })?;

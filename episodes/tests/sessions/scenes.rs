@@ -123,6 +123,14 @@ fn a_place_where_nothing_stands_is_refused() {
 }
 
 #[test]
+fn a_scene_that_the_simulator_cannot_play_is_refused_after_its_trial() {
+    let absurd = r#"damping="0.1" stiffness="1e12" springref="1e12""#;
+    let says =
+        ["handover.xml, in a trial of 1 s, in which nobody acts, physics diverged", "kitchen_cupboard_1"];
+    check("scene.xml", r#"range="0 1.57" damping="0.1""#, absurd, &says);
+}
+
+#[test]
 fn what_is_not_read_is_refused_where_it_stands() {
     let mug = r#"<body name="kitchen_mug_2" "#;
     let before_mug = |element: &str| format!("{element}{mug}");

@@ -74,9 +74,13 @@ fn recovers_a_beginning(bytes: &[u8], original: &Recording, folder: &Path, simul
         Err(error) => {
             let known = matches!(error, RecoverError::Nothing { .. } | RecoverError::TooLittle { .. });
             assert!(known, "{what}: {error}");
+            let text = error.to_string();
+            assert!(!text.replace("episode.mcap.partial", "").contains("episode.mcap"), "{what}: {text}");
+            assert!(!text.contains("tandem recover"), "{what}: {text}");
             assert!(!folder.join(Recorder::FILE_NAME).exists(), "{what}");
         }
     }
+    assert!(fs::read(&partial).unwrap() == bytes, "{what}: what is recovered stays as it is");
 }
 
 /// Every byte is held to something, so that no change goes unseen: there is none without meaning.
