@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 
-use tandem_sim::render::RendererKind;
+use tandem_sim::{dynamics::Diverged, render::RendererKind};
 use tandem_tools_spec::{Disclosure, EndReason, Hints, PhaseTimes, Protocol, ResultReply};
 
 use super::*;
-use crate::results::{PhaseLevel, episode_note, missed_phase_note, write_result};
+use crate::players::{EpisodeOutput, PlayError, PlayOutcome, Policy};
+use crate::results::{PhaseLevel, PolicyCard, episode_note, missed_phase_note, write_result};
 use crate::spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, Start};
 use crate::tasks::{self, Task};
 use crate::{players, scoring::Phase};
@@ -208,6 +209,51 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
 }
 
 /// What an episode came to whose policy, or whose simulator, failed after it had reached `reached` phases of three.
+/// A policy that plays nothing.
+#[derive(Debug)]
+struct Unplayable(fn() -> PlayError);
+
+impl Policy for Unplayable {
+    fn card(&self) -> PolicyCard {
+        "unplayable".into()
+    }
+
+    fn play_episode(&self, _: &EpisodeSpec, _: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
+        Err((self.0)())
+    }
+}
+
+#[test]
+fn what_was_played_before_is_kept_where_no_other_episode_can_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let play = |why: fn() -> PlayError| {
+        let player = Unplayable(why);
+        let plan = EvaluationPlan {
+            player: &player,
+            ..plan(vec![tasks::find("handover").unwrap()], vec![1, 2, 3, 4])
+        };
+        let build = fingerprint::build().unwrap();
+        let cache = EpisodeCache { plan: &plan, folder: folder.path(), locomotion: "balance".into(), build };
+        let (work, mut left_out) = plan.episodes();
+        for spec in &work[1..3] {
+            let path = folder.path().join(format!("handover-{}.json", spec.seed));
+            std::fs::write(path, serde_json::to_string(&played(&cache, spec)).unwrap()).unwrap();
+        }
+        workers::play_all(&cache, &work, &mut left_out, &|_| {}).map(|episodes| (episodes.len(), left_out))
+    };
+    // The first episode finds nobody; what comes after it was played by an earlier run.
+    let absent = play(|| PlayError::Absent("nobody".into())).unwrap_err();
+    assert!(matches!(absent, EvaluationError::PolicyAbsent { kept: 2, planned: 4, .. }), "{absent}");
+
+    let (episodes, left_out) = play(|| {
+        let source = Diverged { tree: "A".into(), link: "pelvis".into(), speed: 1e9 };
+        PlayError::Episode(EpisodeError::Diverged { step: 3, source })
+    })
+    .unwrap();
+    assert_eq!((episodes, left_out.len()), (2, 2));
+    assert!(left_out[1].starts_with("handover seed 4: the simulator failed before"), "{left_out:?}");
+}
+
 fn failed(cache: &EpisodeCache, spec: &EpisodeSpec, ended: EndReason, reached: usize) -> PlayedEpisode {
     let times = (0..3).map(|index| (Phase::number(index), (index < reached).then_some(4.2)));
     let result = ResultReply { ended, ..result(spec.task.id, spec.seed, times.collect()) };

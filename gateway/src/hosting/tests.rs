@@ -51,20 +51,23 @@ fn hands() -> (Arc<AtomicU64>, Clock) {
 async fn a_panic_ends_its_own_episode_and_no_other() {
     let [broken_folder, sound_folder] = [(); 2].map(|()| tempfile::tempdir().unwrap());
     let broken = Arc::new(AtomicBool::new(false));
-    let breaks = broken.clone();
+    let (breaks, readings) = (broken.clone(), AtomicU64::new(0));
     let clock: Clock = Box::new(move || {
         // Once: closing the episode asks for the time, too.
         assert!(!breaks.swap(false, Relaxed), "the clock is broken");
-        Duration::ZERO
+        Duration::from_millis(readings.fetch_add(1, Relaxed))
     });
     let (episode, places, _) = start("broken", broken_folder.path(), clock).await;
     let (other, _, _) = start("sound", sound_folder.path(), hands().1).await;
     episode.call(wait()).await.unwrap();
+    let thought = episode.thought();
+    assert!(!thought.is_zero());
     broken.store(true, Relaxed);
     let refused = episode.call(wait()).await.unwrap_err();
     assert!(refused.to_string().contains("the simulator failed in this episode"), "{refused}");
     assert!(episode.ended());
     assert!(matches!(episode.status().await, Err(HostingError::EpisodePanicked)));
+    assert_eq!(episode.thought(), thought, "what is known is kept");
 
     let recording = Recording::read(&broken_folder.path().join(Recorder::FILE_NAME)).unwrap();
     assert_eq!(recording.steps().map(Result::unwrap).count(), 3);

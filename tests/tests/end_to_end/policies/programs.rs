@@ -58,6 +58,12 @@ fn agent() {
         Ok("crash") if env::var("TANDEM_ROBOT").as_deref() != Ok("A") => {
             panic!("the planner has no plan");
         }
+        // A partner of one that crashes later, when this has long left.
+        Ok("leave_partner") if env::var("TANDEM_ROBOT").as_deref() == Ok("A") => {}
+        Ok("leave_partner") => {
+            tool("wait", json!({ "steps": 5 })).expect("it waits alone");
+            panic!("the planner has no plan");
+        }
         // A partner of one that crashes.
         Ok("crash") => while tool("wait", json!({ "steps": 5 })).is_ok() {},
         Ok("hang") => std::thread::sleep(LONG),
@@ -238,9 +244,16 @@ fn a_program_that_crashes_is_listed_apart_and_played_again() {
 
 #[test]
 fn a_crash_of_one_of_two_programs_is_named() {
+    for role in ["crash", "leave_partner"] {
+        check_named_crash(role);
+    }
+}
+
+/// B's program crashes, whatever A's does.
+fn check_named_crash(role: &str) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let driving = Driving { operators: Some(Operators::PerRobot), patience_s: Some(1.0), talk: None };
-    let programs = Program::new(agent_command("crash"), driving, LONG).expect("settings");
+    let programs = Program::new(agent_command(role), driving, LONG).expect("settings");
     let evaluation = play(&plan(&programs, vec![1], false), folder.path());
     let played = &evaluation.episodes[0];
     assert_eq!(
