@@ -69,7 +69,7 @@ mod tests {
 
     #[test]
     fn what_measures_no_falls_is_refused() {
-        let refusal = |episodes, filter| falls(episodes, filter, |_| ()).err().expect("refused").to_string();
+        let refusal = |episodes, filter| falls(episodes, filter, |_| ()).expect_err("refused").to_string();
         let unknown = refusal(60, "nonsense");
         assert!(unknown.contains("`nonsense`") && unknown.contains("table_on_robot"), "{unknown}");
         assert!(refusal(0, "door").contains("at least 1"));
