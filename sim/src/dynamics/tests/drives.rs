@@ -32,15 +32,28 @@ fn dynamics_drive_saturates() {
     assert!((bench.dynamics.tree(id).joint_position(0) - 2.0).abs() < 1e-3);
 }
 
-/// A floating chain on the floor whose drives all ask for too much: within limits, and by inverse dynamics true.
+/// A floating chain on the floor whose drives all ask for too much: within limits.
 #[test]
 fn dynamics_saturated_chain_on_the_floor() {
+    let (limited, _) = saturated_chain(0.4, 0.003, 600);
+    assert!(limited > 500, "{limited}");
+}
+
+/// One that falls from high up, and is too heavy to become fast: by inverse dynamics true as well.
+#[test]
+fn dynamics_saturated_chain_in_the_air() {
+    let (limited, checked) = saturated_chain(100.0, 0.5, 80);
+    assert!(limited > 100 && checked > 70, "{limited} {checked}");
+}
+
+/// How many efforts were at their limits, and in how many steps all were those of inverse dynamics.
+fn saturated_chain(height_m: f64, armature: f64, steps: usize) -> (usize, usize) {
     let limit = 4.0;
     let mut links =
-        vec![link(None, DVec3::new(0.0, 0.0, 0.4), Joint::Free, Mass::of_box(2.0, DVec3::splat(0.05)))];
+        vec![link(None, DVec3::new(0.0, 0.0, height_m), Joint::Free, Mass::of_box(2.0, DVec3::splat(0.05)))];
     for index in 1..7 {
         let mut axis = Axis::along([DVec3::X, DVec3::Y, DVec3::new(0.0, 1.0, 1.0)][index % 3]);
-        (axis.armature, axis.effort_limit) = (0.003, limit);
+        (axis.armature, axis.effort_limit) = (armature, limit);
         let mass = Mass::of_box(0.7, DVec3::new(0.05, 0.03, 0.03));
         links.push(link(Some(index - 1), DVec3::new(0.12, 0.0, 0.0), Joint::Hinge(axis), mass));
     }
@@ -51,8 +64,8 @@ fn dynamics_saturated_chain_on_the_floor() {
         bench.add_shape(id.link(index), ball, sliding(0.7));
     }
     let mut random = Random(3);
-    let mut limited = 0;
-    for step in 0..600 {
+    let (mut limited, mut checked) = (0, 0);
+    for step in 0..steps {
         if step % 20 == 0 {
             for link in 1..7 {
                 let drive = Drive { target: 2.0 * random.number(), kp: 150.0, kd: 5.0, feedforward: 0.0 };
@@ -67,17 +80,22 @@ fn dynamics_saturated_chain_on_the_floor() {
             assert!(told.abs() <= limit * (1.0 + 1e-8), "{told} at link {link}");
             limited += usize::from(told.abs() > 0.999 * limit);
         }
-        check_efforts(&bench, id, &at, &before);
+        checked += usize::from(check_efforts(&bench, id, &at, &before));
     }
-    assert!(limited > 500, "{limited}");
+    (limited, checked)
 }
 
-/// While nothing touches, the reported efforts are those of inverse dynamics.
-fn check_efforts(bench: &Bench, id: super::super::TreeId, at: &super::super::TreeState, before: &[f64]) {
+/// While nothing touches and the tree is slow, the reported efforts are those of inverse dynamics. Says whether it was so.
+fn check_efforts(
+    bench: &Bench,
+    id: super::super::TreeId,
+    at: &super::super::TreeState,
+    before: &[f64],
+) -> bool {
     // Of a fast tree, energy that the integration made is taken back (see `energy`), which no drive did.
     let fast = |v: &[f64]| v.iter().any(|v| v.abs() > FAST_RAD / DT_S);
     if !bench.dynamics.touches().is_empty() || fast(before) || fast(&bench.dynamics.tree(id).v) {
-        return;
+        return false;
     }
     let tree = bench.dynamics.tree(id);
     let acceleration: Vec<f64> =
@@ -89,6 +107,7 @@ fn check_efforts(bench: &Bench, id: super::super::TreeId, at: &super::super::Tre
         let (found, told) = (found[5 + link], tree.drive_effort(link));
         assert!((found - told).abs() < 1e-7, "{found} {told} at link {link}");
     }
+    true
 }
 
 /// A drive holds a load against gravity with the limit just above it, and gives way just below.
