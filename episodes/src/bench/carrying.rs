@@ -14,7 +14,9 @@ use tandem_tools_spec::{Protocol, ToolCall, ToolReply};
 
 use super::BenchError;
 use crate::Session;
-use crate::players::experts::skills::{BarGrasp, CarryTeam, Commander, FREE, ObjectPath, grasp_compliantly};
+use crate::players::experts::skills::{
+    CarryTeam, Commander, FREE, HandGrasp, Hold, ObjectPath, grasp_compliantly,
+};
 use crate::players::{Episode, InProcess, PlayerError, PrivilegedEpisode};
 use crate::scoring::{A, B, Done, Facts, Grip, Phase};
 use crate::spec::{Controller, EpisodeSpec};
@@ -134,8 +136,8 @@ fn carry(
     aloft: &Cell<Option<Pose>>,
 ) -> Result<(), PlayerError> {
     let commander = &mut Commander::new(&TASK, episode)?;
-    let [a_left, a_right] = BarGrasp::from_above(A, "bar", ["a_left", "a_right"], 0.0);
-    let [b_left, b_right] = BarGrasp::from_above(B, "bar", ["b_left", "b_right"], 0.0);
+    let [a_left, a_right] = HandGrasp::with_both_hands(A, "bar", ["a_left", "a_right"], 0.0, &Hold::BAR);
+    let [b_left, b_right] = HandGrasp::with_both_hands(B, "bar", ["b_left", "b_right"], 0.0, &Hold::BAR);
     let grasps = [a_left, a_right, b_left, b_right];
     let mut team = CarryTeam::new(commander, &grasps)?;
     team.gather(commander)?;

@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use tandem_sim::Pose;
 
-use super::skills::{BarGrasp, CarryTeam, Commander, grasp_compliantly, let_go, upright};
+use super::skills::{CarryTeam, Commander, HandGrasp, Hold, grasp_compliantly, let_go, upright};
 use crate::players::PlayerError;
 use crate::scoring::{A, B, C};
 
@@ -13,9 +13,12 @@ const PACE_M_S: f32 = 0.21;
 
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     let third_rad = 2.0 * PI / 3.0;
-    let [a_left, a_right] = BarGrasp::from_above(A, "round_table", ["a_left", "a_right"], 0.0);
-    let [b_left, b_right] = BarGrasp::from_above(B, "round_table", ["b_left", "b_right"], third_rad);
-    let [c_left, c_right] = BarGrasp::from_above(C, "round_table", ["c_left", "c_right"], -third_rad);
+    let [a_left, a_right] =
+        HandGrasp::with_both_hands(A, "round_table", ["a_left", "a_right"], 0.0, &Hold::BAR);
+    let [b_left, b_right] =
+        HandGrasp::with_both_hands(B, "round_table", ["b_left", "b_right"], third_rad, &Hold::BAR);
+    let [c_left, c_right] =
+        HandGrasp::with_both_hands(C, "round_table", ["c_left", "c_right"], -third_rad, &Hold::BAR);
     let grasps = [a_left, a_right, b_left, b_right, c_left, c_right];
     let mut team = CarryTeam::new(commander, &grasps)?;
     team.gather(commander)?;

@@ -6,7 +6,7 @@ use std::f32::consts::FRAC_PI_2;
 use tandem_sim::{Pose, Side, Vector};
 
 use super::skills::{
-    BarGrasp, CarryTeam, Commander, CylinderGrasp, ParallelScript, Tolerance, WalkGoal, approach,
+    CarryTeam, Commander, CylinderGrasp, HandGrasp, Hold, ParallelScript, Tolerance, WalkGoal, approach,
     grasp_compliantly, in_parallel, let_go, pick_up_all, place, walk_to,
 };
 use crate::players::PlayerError;
@@ -41,7 +41,7 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
 
 /// A pushes the trolley to the mark and leaves it there.
 fn park(commander: &mut Commander) -> Result<(), PlayerError> {
-    let grasps = BarGrasp::from_above(A, "service_trolley", ["left", "right"], -FRAC_PI_2);
+    let grasps = HandGrasp::with_both_hands(A, "service_trolley", ["left", "right"], -FRAC_PI_2, &Hold::BAR);
     let mut team = CarryTeam::new(commander, &grasps)?;
     team.gather(commander)?;
     grasp_compliantly(commander, &grasps)?;

@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 
-use super::skills::{BarGrasp, CarryTeam, Commander, grasp_compliantly, let_go};
+use super::skills::{CarryTeam, Commander, HandGrasp, Hold, grasp_compliantly, let_go};
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
@@ -10,8 +10,8 @@ const LIFT_M: f32 = 0.09;
 const PACE_M_S: f32 = 0.2;
 
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
-    let [a_left, a_right] = BarGrasp::from_above(A, "basket", ["a_left", "a_right"], 0.0);
-    let [b_left, b_right] = BarGrasp::from_above(B, "basket", ["b_left", "b_right"], PI);
+    let [a_left, a_right] = HandGrasp::with_both_hands(A, "basket", ["a_left", "a_right"], 0.0, &Hold::BAR);
+    let [b_left, b_right] = HandGrasp::with_both_hands(B, "basket", ["b_left", "b_right"], PI, &Hold::BAR);
     let grasps = [a_left, a_right, b_left, b_right];
     let mut team = CarryTeam::new(commander, &grasps)?;
     team.gather(commander)?;

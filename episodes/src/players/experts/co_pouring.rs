@@ -1,15 +1,13 @@
 //! CoPouring: both robots lay a hand on the bar at their end, lift, and turn the tub about the bars over the crate.
 
-use std::f32::consts::{FRAC_PI_2, PI};
+use std::f32::consts::PI;
 
 use tandem_sim::{Pose, Rotation, Side, Vector};
 
-use super::skills::{BarGrasp, Commander, move_together, take_together};
+use super::skills::{Commander, HandGrasp, Hold, move_together, take_together, wrapped_rad};
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
-/// Where a 36 mm bar lies in a hand whose palm is on it.
-const BAR_IN_WRIST_M: Vector = Vector::new(0.105, 0.042, 0.0);
 /// Closed a little further than round a bottle.
 const CLOSURE: f32 = 1.15;
 
@@ -19,22 +17,10 @@ const OVER_CRATE_M: f32 = 0.18;
 const TIP_RAD: f32 = 1.25;
 
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
-    let palm_down = |heading_rad: f32, roll_rad: f32| {
-        Rotation::from_rotation_z(heading_rad) * Rotation::from_rotation_x(roll_rad)
-    };
-    let grasp = |robot, side, bar, object_from_wrist| BarGrasp {
-        robot,
-        side,
-        object: "tub",
-        bar,
-        bar_in_wrist_m: BAR_IN_WRIST_M,
-        object_from_wrist,
-        closure: CLOSURE,
-    };
-    let grasps = [
-        grasp(A, Side::Left, "bar_a", palm_down(0.0, FRAC_PI_2)),
-        grasp(B, Side::Right, "bar_b", palm_down(PI, -FRAC_PI_2)),
-    ];
+    let hold = Hold { closed_rad: wrapped_rad(CLOSURE), ..Hold::BAR };
+    let grasp =
+        |robot, side, place, heading_rad| HandGrasp { robot, side, object: "tub", place, hold, heading_rad };
+    let grasps = [grasp(A, Side::Left, "bar_a", 0.0), grasp(B, Side::Right, "bar_b", PI)];
     take_together(commander, &grasps)?;
     let facts = commander.facts()?;
     let start = facts.object("tub").pose_in_world;

@@ -2,15 +2,19 @@
 
 use std::f32::consts::FRAC_PI_2;
 
-use tandem_sim::{Pose, Rotation, Side, Vector};
+use tandem_sim::{Pose, Side, Vector};
 
-use super::skills::{BarGrasp, Commander, HandMove, move_together, take_together};
+use super::skills::{Commander, HandGrasp, HandMove, Hold, move_together, take_together, wrapped_rad};
 use crate::players::PlayerError;
 use crate::scoring::{A, B, Facts};
 
-/// Where the moulding, 50 x 40 mm, lies in a hand whose palm is on its outside.
-const MOULDING_IN_WRIST_M: Vector = Vector::new(0.112, 0.045, 0.0);
-const CLOSURE: f32 = 1.1;
+/// The upright moulding, 50 x 40 mm, with the palm on its outside.
+const MOULDING: Hold = Hold {
+    turned_rad: [0.0; 3],
+    place_in_wrist_m: Vector::new(0.112, 0.045, 0.0),
+    closed_rad: wrapped_rad(1.1),
+    ..Hold::BAR
+};
 
 /// Where the loop's middle is relative to the peg's tip: before the tip, past it, and resting on the peg.
 const BEFORE_M: Vector = Vector::new(0.0, -0.045, 0.004);
@@ -27,14 +31,13 @@ const BACK_M: f32 = 0.14;
 
 /// A frame that both hold already is not taken again; one whose loop is over the peg is only let down.
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
-    let grasp = |robot, side, bar| BarGrasp {
+    let grasp = |robot, side, place| HandGrasp {
         robot,
         side,
         object: "frame",
-        bar,
-        bar_in_wrist_m: MOULDING_IN_WRIST_M,
-        object_from_wrist: Rotation::from_rotation_z(FRAC_PI_2),
-        closure: CLOSURE,
+        place,
+        hold: MOULDING,
+        heading_rad: FRAC_PI_2,
     };
     let grasps = [grasp(A, Side::Left, "left_side"), grasp(B, Side::Right, "right_side")];
     let held = |facts: &Facts| [A, B].iter().all(|robot| facts.holds_any(*robot, "frame"));
@@ -81,8 +84,9 @@ fn is_straight_on_peg(facts: &Facts) -> bool {
     facts.threads("wall_peg", ["root", "tip"], "frame", "loop") && facts.tilt_rad("frame") < ASKEW_RAD
 }
 
-fn let_go(commander: &mut Commander, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
-    let loose = |grasp: &BarGrasp| BarGrasp { closure: LOOSE, ..*grasp }.close();
+fn let_go(commander: &mut Commander, grasps: &[HandGrasp]) -> Result<(), PlayerError> {
+    let hold = Hold { closed_rad: wrapped_rad(LOOSE), ..MOULDING };
+    let loose = |grasp: &HandGrasp| HandGrasp { hold, ..*grasp }.close();
     let loosen: Vec<HandMove> = grasps.iter().map(loose).collect();
     commander.perform(0.5, &loosen)?;
     for step_m in [Vector::new(OUTWARDS_M, 0.0, 0.0), Vector::new(0.0, -BACK_M, 0.0)] {
@@ -100,5 +104,5 @@ fn let_go(commander: &mut Commander, grasps: &[BarGrasp]) -> Result<(), PlayerEr
         commander.perform(0.9, &moves)?;
     }
     // It still swings a little.
-    commander.perform(3.0, &grasps.iter().map(BarGrasp::open).collect::<Vec<_>>())
+    commander.perform(3.0, &grasps.iter().map(HandGrasp::open).collect::<Vec<_>>())
 }

@@ -6,7 +6,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 use tandem_sim::{Pose, Rotation, Side, Sides, Vector};
 
 use super::skills::{
-    BarGrasp, CarryTeam, Commander, FREE, HandMove, ParallelScript, Posture, PosturePath, WalkGoal,
+    CarryTeam, Commander, FREE, HandGrasp, HandMove, Hold, ParallelScript, Posture, PosturePath, WalkGoal,
     closed_rad, follow, grasp_compliantly, in_parallel, let_go, place, walk_to,
 };
 use crate::players::PlayerError;
@@ -63,8 +63,10 @@ fn clear_the_way(commander: &mut Commander) -> Result<(), PlayerError> {
 
 /// B and C take the table, follow A through the doorway, and set it down on its marks.
 fn carry_table(commander: &mut Commander) -> Result<(), PlayerError> {
-    let [b_left, b_right] = BarGrasp::from_above(B, "console_table", ["b_left", "b_right"], PI);
-    let [c_left, c_right] = BarGrasp::from_above(C, "console_table", ["c_left", "c_right"], 0.0);
+    let [b_left, b_right] =
+        HandGrasp::with_both_hands(B, "console_table", ["b_left", "b_right"], PI, &Hold::BAR);
+    let [c_left, c_right] =
+        HandGrasp::with_both_hands(C, "console_table", ["c_left", "c_right"], 0.0, &Hold::BAR);
     let grasps = [b_left, b_right, c_left, c_right];
     let mut team = CarryTeam::new(commander, &grasps)?;
     team.gather(commander)?;

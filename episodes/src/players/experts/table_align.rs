@@ -6,7 +6,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 use tandem_sim::Vector;
 
 use super::skills::{
-    BarGrasp, CarryTeam, Commander, FREE, ObjectPath, grasp_compliantly, let_go, place, upright,
+    CarryTeam, Commander, FREE, HandGrasp, Hold, ObjectPath, grasp_compliantly, let_go, place, upright,
 };
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
@@ -18,8 +18,10 @@ const BEFORE_CHAIR_M: Vector = Vector::new(0.65, 0.0, 0.0);
 const AT_CHAIR_M: Vector = Vector::new(0.40, 0.0, 0.0);
 
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
-    let [a_left, a_right] = BarGrasp::from_above(A, "office_table", ["a_left", "a_right"], 0.0);
-    let [b_left, b_right] = BarGrasp::from_above(B, "office_table", ["b_left", "b_right"], PI);
+    let [a_left, a_right] =
+        HandGrasp::with_both_hands(A, "office_table", ["a_left", "a_right"], 0.0, &Hold::BAR);
+    let [b_left, b_right] =
+        HandGrasp::with_both_hands(B, "office_table", ["b_left", "b_right"], PI, &Hold::BAR);
     let grasps = [a_left, a_right, b_left, b_right];
     let mut team = CarryTeam::new(commander, &grasps)?;
     team.gather(commander)?;

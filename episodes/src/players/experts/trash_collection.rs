@@ -5,7 +5,7 @@ use std::f32::consts::FRAC_PI_2;
 
 use tandem_sim::{Pose, Rotation, Side, Vector};
 
-use super::skills::{BarGrasp, CarryTeam, Commander, HandMove, grasp_compliantly};
+use super::skills::{CarryTeam, Commander, HandGrasp, HandMove, Hold, grasp_compliantly};
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
@@ -23,7 +23,13 @@ const SWEEP_M_S: f32 = 0.35;
 const TRIES: u32 = 3;
 
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
-    let grasps = BarGrasp::between(A, "bin", ["left", "right"], -FRAC_PI_2);
+    let grasps = HandGrasp::with_both_hands(
+        A,
+        "bin",
+        ["left", "right"],
+        -FRAC_PI_2,
+        &Hold { turned_rad: [0.0; 3], ..Hold::BAR },
+    );
     let mut team = CarryTeam::new(commander, &grasps)?;
     commander.set_height(A, BENT_M);
     team.gather(commander)?;

@@ -1,18 +1,16 @@
 //! Robots that carry one object together, in step: all follow one path of the object, and hands give way to the partners.
 //! One robot that carries or pushes something with both hands is the smallest team.
 
-use tandem_sim::{Pose, Sides, Vector};
+use tandem_sim::{Pose, Rotation, Sides, Vector};
 
-use super::bar::{BarGrasp, move_together};
 use super::commander::{Commander, HandMove};
 use super::compliant::grasp_compliantly;
+use super::grasp::{HandGrasp, move_together};
 use super::posture_path::{FREE, PathProgress, Posture, PosturePath, follow_while};
 use super::walk::{Tolerance, WalkGoal, approach, upright};
 use crate::players::PlayerError;
 use crate::scoring::{Facts, Grip};
 
-/// How far behind a bar in its hands a robot stands.
-const BEHIND_BAR_M: f32 = 0.29;
 /// How fast robots walk to their places before anything is held. Hands that reach out correct the rest.
 const APPROACH_M_S: f32 = 0.3;
 const NEAR: Tolerance = Tolerance { off_m: 0.03, off_rad: 0.05 };
@@ -39,7 +37,7 @@ pub struct ObjectPath<'a> {
 
 /// Robots and their grasps of one object.
 pub struct CarryTeam<'a> {
-    grasps: &'a [BarGrasp<'a>],
+    grasps: &'a [HandGrasp<'a>],
     robots: Vec<usize>,
     /// Where each robot stands, in the object's frame.
     object_from_stand: Vec<Pose>,
@@ -49,14 +47,14 @@ pub struct CarryTeam<'a> {
 
 impl<'a> CarryTeam<'a> {
     /// Robots that have both hands in `grasps`, left first.
-    pub fn new(commander: &mut Commander, grasps: &'a [BarGrasp<'a>]) -> Result<CarryTeam<'a>, PlayerError> {
+    pub fn new(commander: &mut Commander, grasps: &'a [HandGrasp<'a>]) -> Result<CarryTeam<'a>, PlayerError> {
         let facts = commander.facts()?;
         let pairs = grasps.chunks_exact(2);
-        let stand = |pair: &[BarGrasp]| {
-            let bar_m = |grasp: &BarGrasp| facts.site(grasp.object, grasp.bar).position_m();
-            let middle_m = (bar_m(&pair[0]) + bar_m(&pair[1])) * 0.5;
-            let ahead = upright(&Pose::from_rotation(pair[0].object_from_wrist));
-            let back_m = ahead.rotation * Vector::new(-BEHIND_BAR_M, 0.0, 0.0);
+        let stand = |pair: &[HandGrasp]| {
+            let place_m = |grasp: &HandGrasp| facts.site(grasp.object, grasp.place).position_m();
+            let middle_m = (place_m(&pair[0]) + place_m(&pair[1])) * 0.5;
+            let ahead = Pose::from_rotation(Rotation::from_rotation_z(pair[0].heading_rad));
+            let back_m = ahead.rotation * Vector::new(-pair[0].hold.behind_m, 0.0, 0.0);
             Pose::from_parts((middle_m + back_m).with_z(0.0), ahead.rotation)
         };
         Ok(CarryTeam {
@@ -134,15 +132,15 @@ impl<'a> CarryTeam<'a> {
     }
 
     /// Grasps whose hands do not even touch the object.
-    fn hands_off(&self, facts: &Facts) -> impl Iterator<Item = BarGrasp<'a>> {
-        let off = |grasp: &BarGrasp| facts.object(grasp.object).hands[grasp.robot][grasp.side] == Grip::Off;
+    fn hands_off(&self, facts: &Facts) -> impl Iterator<Item = HandGrasp<'a>> {
+        let off = |grasp: &HandGrasp| facts.object(grasp.object).hands[grasp.robot][grasp.side] == Grip::Off;
         self.grasps.iter().copied().filter(off).collect::<Vec<_>>().into_iter()
     }
 
     /// The robots stand, the hands that have lost the object take it where it is now, and all bring it back to its way.
     fn take_again(&mut self, commander: &mut Commander, on_its_way: &Pose) -> Result<(), PlayerError> {
         self.rest(commander)?;
-        let lost: Vec<BarGrasp> = self.hands_off(&commander.facts()?).collect();
+        let lost: Vec<HandGrasp> = self.hands_off(&commander.facts()?).collect();
         if !lost.is_empty() {
             grasp_compliantly(commander, &lost)?;
         }

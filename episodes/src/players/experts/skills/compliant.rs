@@ -1,15 +1,19 @@
-//! Taking and letting go of bars that partners hold, too: hands give way to what they feel, so that nobody is pulled.
+//! Taking and letting go of what partners hold, too: hands give way to what they feel, so that nobody is pulled.
 
-use tandem_sim::{Pose, Vector};
+use tandem_sim::Vector;
 
-use super::bar::BarGrasp;
 use super::commander::{Commander, HandMove};
+use super::grasp::HandGrasp;
 use crate::players::PlayerError;
 use crate::scoring::{Facts, Grip};
 
 const ATTEMPTS: usize = 4;
-/// How far from a bar hands begin to come at it.
-const STANDOFF_M: f32 = 0.08;
+/// How long hands take to their first stop, to the next, and from the last to where they close.
+const TO_FIRST_STOP_S: f32 = 0.9;
+const BETWEEN_STOPS_S: f32 = 0.6;
+const FROM_LAST_STOP_S: f32 = 0.5;
+/// How long they take to leave, all stops together.
+const LEAVE_S: f32 = 1.2;
 /// One step of a soft grasp; fingers close over the first of them.
 const GIVE_S: f32 = 0.1;
 const GIVES: usize = 16;
@@ -20,14 +24,16 @@ const MOST_GIVE_M: f32 = 0.01;
 /// A wrist's goal is never farther than this from the wrist.
 const LEASH_M: f32 = 0.03;
 
-/// Closes all hands on their bars at once; hands that miss try again, while the others hold on.
-pub fn grasp_compliantly(commander: &mut Commander, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
+/// Closes all hands on their places at once, which are held alike; hands that miss try again, while the others hold on.
+pub fn grasp_compliantly(commander: &mut Commander, grasps: &[HandGrasp]) -> Result<(), PlayerError> {
     let mut missing = grasps.to_vec();
     for _ in 0..ATTEMPTS {
-        let before = each(commander, &missing, |grasp, commander| grasp.before(commander, STANDOFF_M))?;
-        commander.perform(0.9, &before)?;
+        for stop in 0..stops(&missing) {
+            let before = each(commander, &missing, |grasp, commander| grasp.at_stop(commander, stop))?;
+            commander.perform(if stop == 0 { TO_FIRST_STOP_S } else { BETWEEN_STOPS_S }, &before)?;
+        }
         let around = each(commander, &missing, |grasp, commander| grasp.around(commander))?;
-        commander.perform(0.5, &around)?;
+        commander.perform(FROM_LAST_STOP_S, &around)?;
         close_compliantly(commander, &missing, &around)?;
         let facts = commander.facts()?;
         missing = grasps.iter().copied().filter(|grasp| !grasp.is_held(&facts)).collect();
@@ -36,14 +42,14 @@ pub fn grasp_compliantly(commander: &mut Commander, grasps: &[BarGrasp]) -> Resu
         }
         open_in_place(commander, &missing)?;
     }
-    Err(PlayerError::GaveUp("not every hand could take its bar".into()))
+    Err(PlayerError::GaveUp("not every hand could take hold".into()))
 }
 
-/// Closes hands whose palms are at the bars, as `around` has them. Each wrist's goal makes up for what it is off, as the
+/// Closes hands that are where they close, as `around` has them. Each wrist's goal makes up for what it is off, as the
 /// hands of a robot are that has given way to partners, and gives way to what the hand feels.
 fn close_compliantly(
     commander: &mut Commander,
-    grasps: &[BarGrasp],
+    grasps: &[HandGrasp],
     around: &[HandMove],
 ) -> Result<(), PlayerError> {
     let mut goals = Vec::with_capacity(grasps.len());
@@ -74,23 +80,29 @@ fn close_compliantly(
     Ok(())
 }
 
-fn all_hold(facts: &Facts, grasps: &[BarGrasp]) -> bool {
+fn all_hold(facts: &Facts, grasps: &[HandGrasp]) -> bool {
     grasps.iter().all(|grasp| grasp.is_held(facts))
 }
 
-/// Hands open where they are, for opening fingers push; then they rise. Those that still touch try it again, and give way
-/// to what they are caught on.
-pub fn let_go(commander: &mut Commander, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
+/// How many stops hands have on their way to what they hold alike.
+fn stops(grasps: &[HandGrasp]) -> usize {
+    grasps.first().map_or(0, |grasp| grasp.hold.stops_m.len())
+}
+
+/// Hands open where they are, for opening fingers push; then they leave by the stops that they came by. Those that still touch
+/// go in and out once more, and give way to what they are caught on.
+pub fn let_go(commander: &mut Commander, grasps: &[HandGrasp]) -> Result<(), PlayerError> {
     open_in_place(commander, grasps)?;
-    let away = each(commander, grasps, |grasp, commander| {
-        let wrist = commander.world_from_wrist(grasp.robot, grasp.side)?;
-        let raised = Pose::from_parts(wrist.translation + Vector::Z * 0.10, wrist.rotation);
-        Ok(HandMove::reach(grasp.robot, grasp.side, raised))
-    })?;
-    commander.perform(1.0, &away)?;
-    for attempt in 0..ATTEMPTS {
+    for stop in (0..stops(grasps)).rev() {
+        let away = each(commander, grasps, |grasp, commander| {
+            let nearer_m = grasp.hold.stops_m.get(stop + 1).copied().unwrap_or(Vector::ZERO);
+            grasp.off(commander, grasp.hold.stops_m[stop] - nearer_m)
+        })?;
+        commander.perform(LEAVE_S / stops(grasps) as f32, &away)?;
+    }
+    for _ in 0..ATTEMPTS {
         let facts = commander.facts()?;
-        let hooked: Vec<BarGrasp> = grasps
+        let hooked: Vec<HandGrasp> = grasps
             .iter()
             .copied()
             .filter(|grasp| facts.object(grasp.object).hands[grasp.robot][grasp.side] != Grip::Off)
@@ -98,24 +110,24 @@ pub fn let_go(commander: &mut Commander, grasps: &[BarGrasp]) -> Result<(), Play
         if hooked.is_empty() {
             break;
         }
-        // Back into the gap behind the bar, and out again, farther.
         let around = each(commander, &hooked, |grasp, commander| {
             Ok(HandMove { fingers_rad: grasp.open().fingers_rad, ..grasp.around(commander)? })
         })?;
         commander.perform(0.6, &around)?;
-        let standoff_m = 0.10 + 0.02 * attempt as f32;
-        let before = each(commander, &hooked, |grasp, commander| grasp.before(commander, standoff_m))?;
-        commander.perform(0.8, &before)?;
+        for stop in (0..stops(&hooked)).rev() {
+            let away = each(commander, &hooked, |grasp, commander| grasp.at_stop(commander, stop))?;
+            commander.perform(BETWEEN_STOPS_S, &away)?;
+        }
     }
     for grasp in grasps {
         commander.set_compliance(grasp.robot, None);
     }
-    let open: Vec<HandMove> = grasps.iter().map(BarGrasp::open).collect();
+    let open: Vec<HandMove> = grasps.iter().map(HandGrasp::open).collect();
     commander.perform(0.5, &open)
 }
 
 /// Opens hands; the wrists stay wherever the fingers push them.
-fn open_in_place(commander: &mut Commander, grasps: &[BarGrasp]) -> Result<(), PlayerError> {
+fn open_in_place(commander: &mut Commander, grasps: &[HandGrasp]) -> Result<(), PlayerError> {
     for _ in 0..6 {
         let moves = each(commander, grasps, |grasp, commander| {
             let wrist = commander.world_from_wrist(grasp.robot, grasp.side)?;
@@ -128,8 +140,8 @@ fn open_in_place(commander: &mut Commander, grasps: &[BarGrasp]) -> Result<(), P
 
 fn each(
     commander: &mut Commander,
-    grasps: &[BarGrasp],
-    part: impl Fn(&BarGrasp, &mut Commander) -> Result<HandMove, PlayerError>,
+    grasps: &[HandGrasp],
+    part: impl Fn(&HandGrasp, &mut Commander) -> Result<HandMove, PlayerError>,
 ) -> Result<Vec<HandMove>, PlayerError> {
     grasps.iter().map(|grasp| part(grasp, commander)).collect()
 }

@@ -136,18 +136,29 @@ fn grasp_once(commander: &mut Commander, grasps: &[CylinderGrasp]) -> Result<(),
 /// Fingers of a right hand around a 7 cm cylinder; a left hand mirrors them.
 const CLOSED_RAD: [f32; 7] = [0.0, -0.75, -0.8, 1.1, 1.3, 1.1, 1.3];
 /// The thumb stands off, so that the cylinder passes it.
-const OPEN_RAD: [f32; 7] = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0];
+pub const OPEN_RAD: [f32; 7] = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0];
+
+/// Fingers of a right hand that are closed so far round something, 1 for a 7 cm cylinder.
+pub const fn wrapped_rad(closure: f32) -> [f32; 7] {
+    let mut fingers_rad = CLOSED_RAD;
+    let mut i = 0;
+    while i < fingers_rad.len() {
+        fingers_rad[i] *= closure;
+        i += 1;
+    }
+    fingers_rad
+}
 
 pub fn closed_rad(side: Side) -> [f32; 7] {
     mirrored(CLOSED_RAD, side)
 }
 
-pub fn open_rad(side: Side) -> [f32; 7] {
+fn open_rad(side: Side) -> [f32; 7] {
     mirrored(OPEN_RAD, side)
 }
 
 /// Every joint of a left hand turns the other way, but for the base of the thumb, which turns about the palm.
-fn mirrored(right_rad: [f32; 7], side: Side) -> [f32; 7] {
+pub fn mirrored(right_rad: [f32; 7], side: Side) -> [f32; 7] {
     match side {
         Side::Right => right_rad,
         Side::Left => std::array::from_fn(|i| if i == 0 { right_rad[i] } else { -right_rad[i] }),

@@ -1,19 +1,21 @@
 //! What several experts use: hands that move together, grasps, the shapes of a hand, walking, and carrying in step.
 
-mod bar;
 mod carry_team;
 mod commander;
 mod compliant;
 mod cylinder;
+mod grasp;
+mod hold;
 mod parallel;
 mod posture_path;
 mod walk;
 
-pub use bar::{BarGrasp, move_together, take_together};
 pub use carry_team::{CarryTeam, ObjectPath};
 pub use commander::{Commander, HandMove};
 pub use compliant::{grasp_compliantly, let_go};
-pub use cylinder::{CylinderGrasp, closed_rad, pick_up_all};
+pub use cylinder::{CylinderGrasp, closed_rad, pick_up_all, wrapped_rad};
+pub use grasp::{HandGrasp, move_together, take_together};
+pub use hold::Hold;
 pub use parallel::{ParallelScript, in_parallel};
 pub use posture_path::{FREE, Posture, PosturePath, follow};
 pub use walk::{Tolerance, WalkGoal, approach, place, upright, walk_to};
