@@ -1,7 +1,7 @@
 //! Physics of the robots and their rooms: MJCF loading, dynamics, balance control, cameras and renderers.
 //!
-//! Rooms, each knowing only those before it: [`dynamics`], [`mjcf`], [`body`], [`locomotion`], [`robot`], [`world`], then
-//! [`render`] and [`mod@bench`].
+//! Rooms, each knowing only those before it: [`dynamics`], [`mjcf`], [`body`], [`estimate`] and [`locomotion`], [`robot`],
+//! [`world`], then [`render`] and [`mod@bench`].
 //!
 //! Units are SI, z is up, frames are right-handed, quaternions are written `wxyz`. One [`World`] is stepped by one
 //! thread; the same binary, specification and commands give the same [`World::state_hash`], bit for bit.
@@ -53,11 +53,13 @@ pub mod bench;
 pub mod body;
 pub mod dynamics;
 mod error;
+pub mod estimate;
 pub mod locomotion;
 mod mechanism;
 pub mod mjcf;
 mod owner;
 mod plane;
+mod random;
 pub mod render;
 pub mod robot;
 mod sides;
@@ -72,7 +74,10 @@ pub use error::SimError;
 pub use locomotion::{BaseCommand, BaseLimits, BaseVelocity, LocomotionChoice};
 pub use plane::{heading_rad, wrapped_rad};
 pub use rapier3d::math::{Pose, Rotation, Vector};
-pub use robot::{Robot, RobotCommand, RobotEstimate, RobotPlacement, RobotSensed, RobotTruth};
+pub use robot::{
+    Robot, RobotCommand, RobotEstimate, RobotPlacement, RobotSensed, RobotTruth, Sensing, SensorModel,
+    StateSource,
+};
 pub use sides::{Side, Sides};
 pub use units::{CONTROL_DT_S, CONTROL_HZ, GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL};
 pub use world::{

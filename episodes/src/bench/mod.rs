@@ -56,7 +56,8 @@ pub fn locomotion(
     mut done: impl FnMut(&CaseReport),
 ) -> Result<LocomotionReport, BenchError> {
     let choice = controller.load()?;
-    let mut report = bench::run(&|| choice.controller(), filter, seeds, &mut done)?;
+    let mut report =
+        bench::run(&|| choice.controller(), tandem_sim::Sensing::default(), filter, seeds, &mut done)?;
     for case in carrying::CASES.iter().filter(|case| bench::is_asked(filter, case.name)) {
         let carried = carrying::run(case, controller, seeds)?;
         done(&carried);

@@ -24,6 +24,7 @@ pub use pictures::{PicturesCase, PicturesReport, pictures};
 
 use crate::SimError;
 use crate::locomotion::Locomotion;
+use crate::robot::Sensing;
 use measure::Trial;
 
 /// Makes a fresh controller for each trial.
@@ -82,13 +83,18 @@ pub fn is_asked(filter: &str, case: &str) -> bool {
 /// Runs every case that `filter` asks for, on these seeds; `done` hears of each case as it ends.
 pub fn run(
     new_locomotion: NewLocomotion,
+    sensing: Sensing,
     filter: &str,
     seeds: &RangeInclusive<u32>,
     mut done: impl FnMut(&CaseReport),
 ) -> Result<LocomotionReport, SimError> {
     let mut cases = Vec::new();
     for case in CASES.iter().filter(|case| is_asked(filter, case.name)) {
-        let trials = over_seeds(seeds, |seed| trial::run(case, seed.into(), new_locomotion()));
+        let trial = |seed: u32| {
+            let seed = u64::from(seed);
+            trial::run(case, seed, new_locomotion(), Sensing { seed, ..sensing })
+        };
+        let trials = over_seeds(seeds, trial);
         let trials = trials.into_iter().collect::<Result<Vec<_>, _>>()?;
         let report = summarise(case, &trials);
         done(&report);

@@ -1,22 +1,8 @@
-//! Random numbers of a seed, and arm motion drawn from them.
+//! Arm motion, drawn from the random numbers of a seed.
 
 use crate::Sides;
 use crate::body::{ARM_COLUMNS, ARM_JOINTS, MIRRORED_ARM, UPPER_JOINTS};
-
-/// SplitMix64: the same numbers everywhere.
-pub(super) struct SplitMix64(pub u64);
-
-impl SplitMix64 {
-    /// Uniform between the two.
-    pub(super) fn uniform(&mut self, [low, high]: [f32; 2]) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^= z >> 31;
-        low + (high - low) * ((z >> 40) as f32 / (1u64 << 24) as f32)
-    }
-}
+use crate::random::SplitMix64;
 
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Arms {

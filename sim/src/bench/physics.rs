@@ -82,6 +82,7 @@ fn measure(situation: Situation, robots: usize) -> Result<PhysicsCase, SimError>
                 let stepped = Instant::now();
                 world.advance()?;
                 within.push(stepped.elapsed());
+                world.sense();
             }
             if control_step >= SETTLING_CONTROL_STEPS {
                 whole.push(started.elapsed() / PHYSICS_STEPS_PER_CONTROL);

@@ -2,8 +2,8 @@
 
 use rapier3d::math::Vector;
 
-use super::motion::SplitMix64;
 use crate::locomotion::{BaseCommand, BaseLimits};
+use crate::random::SplitMix64;
 
 /// Parameters of a tour.
 pub(super) struct Tour {

@@ -6,22 +6,29 @@ use rapier3d::math::Vector;
 
 use super::cases::{Case, Disturbance, Plan, STOP_S};
 use super::measure::{SETTLE_S, Sample, Trial, measure};
-use super::motion::{ArmMotion, SplitMix64};
+use super::motion::ArmMotion;
 use super::tour::{self, Leg};
 use crate::body::PALM_IN_WRIST_M;
 use crate::locomotion::{BaseCommand, BaseVelocity, Locomotion};
 use crate::plane::{heading_rad, wrapped_rad};
-use crate::robot::{RobotCommand, RobotTruth};
+use crate::random::SplitMix64;
+use crate::robot::{RobotCommand, RobotTruth, Sensing};
 use crate::{CONTROL_DT_S as DT_S, RobotPlacement, Side, SimError, World, WorldSpec};
 
 const PUSH_S: f32 = 1.0;
 
 /// Runs until the time is up or the robot lies.
-pub(super) fn run(case: &Case, seed: u64, locomotion: Box<dyn Locomotion>) -> Result<Trial, SimError> {
+pub(super) fn run(
+    case: &Case,
+    seed: u64,
+    locomotion: Box<dyn Locomotion>,
+    sensing: Sensing,
+) -> Result<Trial, SimError> {
     let placement = RobotPlacement { name: "A".into(), position_m: [0.0, 0.0], yaw_rad: 0.0 };
     let spec = WorldSpec { scene: "floor".into(), robots: vec![placement], objects: vec![] };
     let mut world = World::new(&spec)?;
     world.set_locomotion(0, locomotion);
+    world.set_sensing(&sensing);
     let mut random = SplitMix64(seed);
     let arms = ArmMotion::new(case.arms, &mut random);
     let legs = if let Plan::Tour(tour) = &case.plan { tour::legs(tour, &mut random) } else { Vec::new() };

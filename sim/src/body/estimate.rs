@@ -1,5 +1,7 @@
 //! Kinematic and static quantities of one robot at one instant, in the world frame.
 
+use std::sync::Arc;
+
 use rapier3d::math::{Pose, Vector};
 
 use super::{JOINTS, LEG_JOINTS, LEGS, RobotModel, SiteModel, WAIST_JOINTS};
@@ -10,8 +12,8 @@ pub(crate) const PALM_IN_WRIST_M: Vector = Vector::new(0.12, 0.0, 0.0);
 
 /// What a robot takes its own body to be, which is what a controller may know: joint readings, link poses, centre of
 /// mass. The world frame is where the robot believes it to be.
-pub struct BodyEstimate<'a> {
-    pub model: &'a RobotModel,
+pub struct BodyEstimate {
+    pub model: Arc<RobotModel>,
     pub q_rad: [f32; JOINTS],
     pub qd_rad_s: [f32; JOINTS],
     pub world_from_link: Vec<Pose>,
@@ -27,7 +29,60 @@ pub struct BodyEstimate<'a> {
     pub waist_target_rad: [f32; WAIST_JOINTS],
 }
 
-impl BodyEstimate<'_> {
+/// Where a pelvis is and how it moves.
+pub(crate) struct PelvisMotion {
+    pub world_from_pelvis: Pose,
+    pub velocity_m_s: Vector,
+    pub spin_rad_s: Vector,
+}
+
+impl BodyEstimate {
+    /// The body by its joints, its pelvis and the poses that both give its links, with nothing in its hands. Velocities run outwards from the pelvis: with o the
+    /// origin of a link, a the axis of its joint and p its parent,
+    ///   w = w_p + a qd,   v = v_p + w_p x (o - o_p).
+    pub(crate) fn of_motion(
+        model: &Arc<RobotModel>,
+        pelvis: &PelvisMotion,
+        q_rad: &[f32; JOINTS],
+        qd_rad_s: &[f32; JOINTS],
+        world_from_link: Vec<Pose>,
+    ) -> BodyEstimate {
+        let mut motions: Vec<(Vector, Vector)> = Vec::with_capacity(model.links.len());
+        let (mut com_m, mut com_velocity_m_s) = (Vector::ZERO, Vector::ZERO);
+        for (link, world) in model.links.iter().zip(&world_from_link) {
+            let (velocity_m_s, spin_rad_s) = match (link.parent, link.joint) {
+                (Some(parent), Some(joint)) => {
+                    let (velocity_m_s, spin_rad_s) = motions[parent];
+                    let offset_m = world.translation - world_from_link[parent].translation;
+                    let turning_rad_s = world.rotation * model.joints[joint].axis * qd_rad_s[joint];
+                    (velocity_m_s + spin_rad_s.cross(offset_m), spin_rad_s + turning_rad_s)
+                }
+                _ => (pelvis.velocity_m_s, pelvis.spin_rad_s),
+            };
+            let centre_m = world.rotation * link.mass.local_com;
+            com_m += (world.translation + centre_m) * link.mass.mass();
+            com_velocity_m_s += (velocity_m_s + spin_rad_s.cross(centre_m)) * link.mass.mass();
+            motions.push((velocity_m_s, spin_rad_s));
+        }
+        let palm_velocity_m_s = model.hands.each_ref().map(|hand| {
+            let (velocity_m_s, spin_rad_s) = motions[hand.wrist];
+            velocity_m_s + spin_rad_s.cross(world_from_link[hand.wrist].rotation * PALM_IN_WRIST_M)
+        });
+        BodyEstimate {
+            model: Arc::clone(model),
+            q_rad: *q_rad,
+            qd_rad_s: *qd_rad_s,
+            world_from_link,
+            pelvis_velocity_m_s: pelvis.velocity_m_s,
+            pelvis_angular_velocity_rad_s: pelvis.spin_rad_s,
+            com_m: com_m / model.mass_kg,
+            com_velocity_m_s: com_velocity_m_s / model.mass_kg,
+            palm_velocity_m_s,
+            hand_force_n: Sides::both(Vector::ZERO),
+            waist_target_rad: [0.0; WAIST_JOINTS],
+        }
+    }
+
     /// Middle of each palm, where loads of the hands are taken to act.
     pub fn palms_m(&self) -> Sides<Vector> {
         self.model.hands.each_ref().map(|hand| self.world_from_link[hand.wrist] * PALM_IN_WRIST_M)

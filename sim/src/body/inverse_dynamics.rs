@@ -37,7 +37,7 @@ struct Moving {
     moment_n_m: Vector,
 }
 
-impl BodyEstimate<'_> {
+impl BodyEstimate {
     /// Effort of the acceleration of the pelvis and of all joints (rad/s^2), at the measured positions and velocities.
     pub fn inverse_dynamics(&self, pelvis: Acceleration, qdd_rad_s2: &[f32; JOINTS]) -> Effort {
         let mut links: Vec<Moving> = Vec::with_capacity(self.model.links.len());

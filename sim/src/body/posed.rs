@@ -1,6 +1,6 @@
 //! Robots for tests: the embedded model in any pose and motion, without a physics world.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use rapier3d::math::{Pose, Rotation, Vector};
 
@@ -8,11 +8,11 @@ use super::{Acceleration, BodyEstimate, JOINTS, RobotModel};
 use crate::{GRAVITY_M_S2, Sides, assets};
 
 /// The embedded robot.
-pub(crate) fn model() -> &'static RobotModel {
-    static MODEL: OnceLock<RobotModel> = OnceLock::new();
+pub(crate) fn model() -> &'static Arc<RobotModel> {
+    static MODEL: OnceLock<Arc<RobotModel>> = OnceLock::new();
     MODEL.get_or_init(|| {
         let text = assets::robot(assets::DEFAULT_ROBOT).unwrap();
-        RobotModel::parse("robot.xml", text).unwrap()
+        Arc::new(RobotModel::parse("robot.xml", text).unwrap())
     })
 }
 
@@ -79,7 +79,7 @@ impl Posed {
     }
 
     /// The robot as a controller sees it, with nothing in the hands.
-    pub(crate) fn body(&self) -> BodyEstimate<'static> {
+    pub(crate) fn body(&self) -> BodyEstimate {
         let model = model();
         let world_from_link = model.forward_kinematics(self.world_from_pelvis, &self.q_rad);
         let (mut com_m, mut com_velocity_m_s) = (Vector::ZERO, Vector::ZERO);
@@ -89,7 +89,7 @@ impl Posed {
             com_velocity_m_s += moving.velocity_at(world.rotation * link.mass.local_com) * part;
         }
         BodyEstimate {
-            model,
+            model: Arc::clone(model),
             q_rad: self.q_rad,
             qd_rad_s: self.qd_rad_s,
             world_from_link,

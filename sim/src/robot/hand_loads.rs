@@ -138,7 +138,7 @@ mod tests {
     use crate::{PHYSICS_DT_S, Side};
 
     /// Arms bent in front of the body.
-    fn holding() -> BodyEstimate<'static> {
+    fn holding() -> BodyEstimate {
         let mut posed = Posed::standing();
         for (side, first) in ARMS.by_side() {
             let bent_rad = [-0.4, 0.2 * side.sign(), 0.1 * side.sign(), 0.6, 0.0, 0.2, 0.0];

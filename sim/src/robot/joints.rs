@@ -1,7 +1,4 @@
-//! The joints of a robot, in published order: what they read, how they are driven, and how a number of each is written.
-
-use serde::de::Error;
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+//! The joints of a robot, in published order: what they read and how they are driven.
 
 use crate::body::{JOINTS, JointDrive, RobotModel};
 use crate::dynamics::{Drive, Tree};
@@ -29,15 +26,4 @@ pub(super) fn drive(tree: &mut Tree, model: &RobotModel, drives: &[JointDrive; J
         };
         tree.drive(joint.link, drive);
     }
-}
-
-/// Serialises one number per joint: serde itself stops at arrays of 32.
-pub fn serialize<S: Serializer>(values: &[f32; JOINTS], serializer: S) -> Result<S::Ok, S::Error> {
-    values.as_slice().serialize(serializer)
-}
-
-pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f32; JOINTS], D::Error> {
-    let values = Vec::<f32>::deserialize(deserializer)?;
-    let count = values.len();
-    values.try_into().map_err(|_| Error::invalid_length(count, &"43 numbers, one per joint"))
 }

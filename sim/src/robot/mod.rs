@@ -1,17 +1,18 @@
 //! One robot in a world: put there, sensed, driven.
 
-mod estimate;
 mod hand_loads;
 mod joints;
-mod odometry;
+mod knowledge;
+mod sensors;
 mod spawn;
 mod state;
 
 use std::sync::Arc;
 
-use rapier3d::math::Vector;
 use serde::{Deserialize, Serialize};
 
+pub use knowledge::{Sensing, StateSource};
+pub use sensors::SensorModel;
 pub use spawn::RobotPlacement;
 pub use state::{RobotEstimate, RobotSensed, RobotTruth};
 
@@ -19,11 +20,11 @@ use crate::body::{
     BodyEstimate, JOINTS, JointDrive, LEG_JOINTS, LEGS, RobotModel, UPPER, UPPER_JOINTS, WAIST, WAIST_COLUMN,
     WAIST_JOINTS,
 };
-use crate::dynamics::{Dynamics, TreeId};
+use crate::dynamics::{DVec3, Dynamics, TreeId};
 use crate::locomotion::{BaseCommand, BaseLimits, LegCommand, Locomotion};
 use crate::{CONTROL_DT_S, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError};
 use hand_loads::HandLoads;
-use odometry::Odometry;
+use knowledge::SelfKnowledge;
 
 /// What one robot is told for one control step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -41,6 +42,8 @@ pub struct Robot {
     pub(crate) tree: TreeId,
     locomotion: Box<dyn Locomotion>,
     memory: RobotMemory,
+    /// What the robot takes its body to be since the last [`Robot::sense`].
+    body: BodyEstimate,
 }
 
 /// Everything of a robot that lives outside dynamics and outlasts a step.
@@ -49,13 +52,13 @@ struct RobotMemory {
     /// Upper-body targets at the last control step; within a step they move linearly to the new command.
     last_upper_rad: Vec<f32>,
     hand_loads: HandLoads,
-    odometry: Odometry,
+    knowledge: SelfKnowledge,
     base: BaseCommand,
     fallen: bool,
 }
 
-const FALLEN_HEIGHT_M: f32 = 0.4;
-const FALLEN_TILT_COSINE: f32 = 0.5;
+const FALLEN_HEIGHT_M: f64 = 0.4;
+const FALLEN_TILT_COSINE: f64 = 0.5;
 
 impl Robot {
     /// Base commands that this robot can follow.
@@ -67,33 +70,46 @@ impl Robot {
         self.locomotion = locomotion;
     }
 
+    /// Replaces sensors and what the robot knows by them, as of a robot that has stood still until now.
+    pub(crate) fn set_sensing(&mut self, dynamics: &Dynamics, sensing: &Sensing, index: usize) {
+        self.memory.knowledge = SelfKnowledge::new(&self.model, dynamics.tree(self.tree), sensing, index);
+        self.recollect(dynamics);
+    }
+
+    /// Reads the sensors, once after every physics step.
+    pub(crate) fn sense(&mut self, dynamics: &Dynamics) {
+        let tree = dynamics.tree(self.tree);
+        let body = self.memory.knowledge.update(&self.model, tree);
+        self.take(body);
+        let pelvis = tree.world_from_link(0);
+        let upright = (pelvis.rotation * DVec3::Z).z;
+        self.memory.fallen |= pelvis.translation.z < FALLEN_HEIGHT_M || upright < FALLEN_TILT_COSINE;
+    }
+
+    /// The body as it was known when this robot's memory was made.
+    fn recollect(&mut self, dynamics: &Dynamics) {
+        let body = self.memory.knowledge.body(&self.model, dynamics.tree(self.tree));
+        self.take(body);
+    }
+
+    fn take(&mut self, body: BodyEstimate) {
+        let hand_force_n = self.memory.hand_loads.force_n();
+        self.body = BodyEstimate { hand_force_n, waist_target_rad: self.waist_target_rad(), ..body };
+    }
+
     /// Sets this robot's joint drives for one physics step, `substep` counting from 0 within the control step.
     pub(crate) fn drive(&mut self, dynamics: &mut Dynamics, command: &RobotCommand, substep: u32) {
-        // The estimate borrows from this model, so that the robot may change meanwhile.
-        let model = Arc::clone(&self.model);
-        let tree = dynamics.tree_mut(self.tree);
-        let hand_force_n = self.memory.hand_loads.force_n();
-        let body = estimate::from_truth(&model, tree, hand_force_n, self.waist_target_rad());
-        let load_n_m = self.feel(&body, &joints::torques_n_m(tree, &model));
-        self.memory.odometry.update(&body, PHYSICS_DT_S);
+        let torque_n_m = &self.memory.knowledge.readings().torque_n_m;
+        let load_n_m = self.memory.hand_loads.update(&self.body, torque_n_m, PHYSICS_DT_S);
         let legs = match self.memory.fallen {
-            true => limp_legs(&model),
-            false => self.locomotion.tick(&body, &command.base, PHYSICS_DT_S),
+            true => limp_legs(&self.model),
+            false => self.locomotion.tick(&self.body, &command.base, PHYSICS_DT_S),
         };
         let mut drives = [JointDrive::default(); JOINTS];
         self.set_upper_body(&mut drives, &load_n_m, command, substep);
         set_legs(&mut drives, &legs);
-        joints::drive(tree, &model, &drives);
+        joints::drive(dynamics.tree_mut(self.tree), &self.model, &drives);
         self.remember(command, substep);
-    }
-
-    /// Torques of the upper body's joints against gravity and what the hands carry, as far as it is known by now.
-    /// `torque_n_m` are the drives' torques of the last step.
-    fn feel(&mut self, body: &BodyEstimate, torque_n_m: &[f32; JOINTS]) -> [f32; JOINTS] {
-        let pelvis = body.world_from_pelvis();
-        let upright = (pelvis.rotation * Vector::Z).z;
-        self.memory.fallen |= pelvis.translation.z < FALLEN_HEIGHT_M || upright < FALLEN_TILT_COSINE;
-        self.memory.hand_loads.update(body, torque_n_m, PHYSICS_DT_S)
     }
 
     /// The upper body goes linearly from the last command to this one. A controller that balances with the waist adds to
@@ -141,10 +157,12 @@ impl Robot {
         Ok(postcard::to_stdvec(&(&self.memory, self.locomotion.save()?))?)
     }
 
-    pub(crate) fn load(&mut self, bytes: &[u8]) -> Result<(), SimError> {
+    /// `dynamics` are those of the moment at which it was saved.
+    pub(crate) fn load(&mut self, dynamics: &Dynamics, bytes: &[u8]) -> Result<(), SimError> {
         let (memory, locomotion): (RobotMemory, Vec<u8>) = postcard::from_bytes(bytes)?;
         self.locomotion.load(&locomotion)?;
         self.memory = memory;
+        self.recollect(dynamics);
         Ok(())
     }
 }

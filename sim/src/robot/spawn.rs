@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rapier3d::math::{Pose, Rotation, Vector};
 
 use super::hand_loads::HandLoads;
-use super::odometry::Odometry;
+use super::knowledge::{SelfKnowledge, Sensing};
 use super::{Robot, RobotMemory};
 use crate::SimError;
 use crate::body::{self, RobotModel, UPPER, check_joint_order};
@@ -49,16 +49,18 @@ impl Robot {
         for (a, b) in model.apart() {
             dynamics.keep_apart(tree.link(a), tree.link(b));
         }
+        let knowledge = SelfKnowledge::new(model, dynamics.tree(tree), &Sensing::default(), index);
+        let body = knowledge.body(model, dynamics.tree(tree));
         let memory = RobotMemory {
             last_upper_rad: UPPER.iter().map(|joint| q_rad[*joint]).collect(),
             hand_loads: HandLoads::default(),
-            odometry: Odometry::default(),
+            knowledge,
             base: BaseCommand::standing(pelvis.translation.z),
             fallen: false,
         };
         let name = placement.name.clone();
         let locomotion = Box::new(Balance::default());
-        Ok(Robot { name, model: model.clone(), tree, locomotion, memory })
+        Ok(Robot { name, model: model.clone(), tree, locomotion, memory, body })
     }
 }
 

@@ -4,22 +4,22 @@
 use rapier3d::math::{Pose, Vector};
 use serde::{Deserialize, Serialize};
 
-use super::{Robot, RobotCommand, estimate, joints};
-use crate::body::{BodyEstimate, JOINTS, UPPER};
+use super::{Robot, RobotCommand, joints};
+use crate::Sides;
+use crate::body::{JOINTS, UPPER, joint_array};
 use crate::dynamics::Dynamics;
 use crate::locomotion::BaseCommand;
 use crate::mechanism::rounded;
-use crate::{PHYSICS_DT_S, Sides};
 
 /// What a robot senses, in frames of its own: all that a reply or a policy may be made of.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotSensed {
     /// Published order, as the velocities and torques.
-    #[serde(with = "joints")]
+    #[serde(with = "joint_array")]
     pub q_rad: [f32; JOINTS],
-    #[serde(with = "joints")]
+    #[serde(with = "joint_array")]
     pub qd_rad_s: [f32; JOINTS],
-    #[serde(with = "joints")]
+    #[serde(with = "joint_array")]
     pub torque_n_m: [f32; JOINTS],
     /// The way down, which the IMU measures, in the pelvis frame.
     pub gravity_in_pelvis: Vector,
@@ -35,8 +35,8 @@ pub struct RobotSensed {
     pub fallen: bool,
 }
 
-/// Where a robot takes itself to be, for what steers its hands and its base. No reply shows it: it is the simulator's own state
-/// as long as `estimate::from_truth` is where it comes from.
+/// Where a robot takes itself to be, for what steers its hands and its base: by its estimator, in a frame that was the world's
+/// when it started. No reply shows it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotEstimate {
     pub world_from_pelvis: Pose,
@@ -65,34 +65,35 @@ impl RobotTruth {
 }
 
 impl Robot {
-    /// The robot as it knows itself.
-    pub(crate) fn estimated_body(&self, dynamics: &Dynamics) -> BodyEstimate<'_> {
-        let hand_force_n = self.memory.hand_loads.force_n();
-        estimate::from_truth(&self.model, dynamics.tree(self.tree), hand_force_n, self.waist_target_rad())
-    }
-
-    /// What the robot senses that knows itself as `body`.
-    pub(crate) fn sensed(&self, body: &BodyEstimate, dynamics: &Dynamics) -> RobotSensed {
-        let model = body.model;
+    /// What the robot senses, and what it makes of that.
+    pub(crate) fn sensed(&self) -> RobotSensed {
+        let body = &self.body;
         let world_from_pelvis = body.world_from_pelvis();
         let pelvis_from_world = world_from_pelvis.inverse();
         RobotSensed {
             q_rad: body.q_rad,
             qd_rad_s: body.qd_rad_s,
-            torque_n_m: joints::torques_n_m(dynamics.tree(self.tree), model),
-            gravity_in_pelvis: world_from_pelvis.rotation.inverse() * Vector::new(0.0, 0.0, -1.0),
-            start_from_pelvis: self.memory.odometry.start_from_pelvis(body, PHYSICS_DT_S),
-            pelvis_from_wrist: model
+            torque_n_m: self.memory.knowledge.readings().torque_n_m,
+            gravity_in_pelvis: pelvis_from_world.rotation * -Vector::Z,
+            start_from_pelvis: self.memory.knowledge.world_from_start().inverse() * world_from_pelvis,
+            pelvis_from_wrist: self
+                .model
                 .wrists
                 .each_ref()
                 .map(|wrist| pelvis_from_world * body.world_from_site(wrist)),
             pelvis_from_camera: pelvis_from_world
-                * body.world_from_link[model.egocentric_link]
-                * model.egocentric.body_from_camera,
-            hand_force_in_pelvis_n: body
-                .hand_force_n
-                .map(|force_n| world_from_pelvis.rotation.inverse() * force_n),
+                * body.world_from_link[self.model.egocentric_link]
+                * self.model.egocentric.body_from_camera,
+            hand_force_in_pelvis_n: body.hand_force_n.map(|force_n| pelvis_from_world.rotation * force_n),
             fallen: self.memory.fallen,
+        }
+    }
+
+    /// Where the robot takes itself to be.
+    pub(crate) fn estimate(&self) -> RobotEstimate {
+        RobotEstimate {
+            world_from_pelvis: self.body.world_from_pelvis(),
+            hand_force_n: self.body.hand_force_n,
         }
     }
 

@@ -24,7 +24,7 @@ use crate::body::RobotModel;
 use crate::dynamics::{DVec3, Diverged, Dynamics, Settings};
 use crate::mechanism::Machinery;
 use crate::mjcf::{Document, MjcfCamera};
-use crate::robot::{Robot, RobotCommand, RobotPlacement};
+use crate::robot::{Robot, RobotCommand, RobotPlacement, Sensing};
 use crate::{CONTROL_HZ, GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError, assets};
 use disturb::Push;
 use objects::{Furniture, Object};
@@ -131,6 +131,7 @@ impl World {
         for substep in 0..PHYSICS_STEPS_PER_CONTROL {
             self.drive(commands, substep);
             advance(self)?;
+            self.sense();
         }
         self.pushes.clear();
         self.control_steps += 1;
@@ -149,6 +150,18 @@ impl World {
     /// One physics step.
     pub(crate) fn advance(&mut self) -> Result<(), Diverged> {
         self.dynamics.step()
+    }
+
+    /// What robots sense of it.
+    pub(crate) fn sense(&mut self) {
+        self.robots.iter_mut().for_each(|robot| robot.sense(&self.dynamics));
+    }
+
+    /// Gives all robots other sensors, and another way to know themselves. They take it that they have stood still until now.
+    pub fn set_sensing(&mut self, sensing: &Sensing) {
+        for (index, robot) in self.robots.iter_mut().enumerate() {
+            robot.set_sensing(&self.dynamics, sensing, index);
+        }
     }
 
     pub fn robots(&self) -> &[Robot] {

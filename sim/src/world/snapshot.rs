@@ -30,10 +30,11 @@ impl World {
 
     /// Takes the world back to a snapshot. On an error the world is as it was.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), SimError> {
-        let before = self.save_robots()?;
-        let loaded = self.load_robots(&snapshot.robots);
-        if let Err(error) = loaded.and_then(|()| Ok(self.dynamics.restore(&snapshot.dynamics)?)) {
-            self.load_robots(&before)?;
+        let before = (self.dynamics.state(), self.save_robots()?);
+        self.dynamics.restore(&snapshot.dynamics)?;
+        if let Err(error) = self.load_robots(&snapshot.robots) {
+            self.dynamics.restore(&before.0)?;
+            self.load_robots(&before.1)?;
             return Err(error);
         }
         self.control_steps = snapshot.control_steps;
@@ -46,7 +47,7 @@ impl World {
 
     fn load_robots(&mut self, saved: &[Vec<u8>]) -> Result<(), SimError> {
         for (index, robot) in self.robots.iter_mut().enumerate() {
-            robot.load(saved.get(index).map(Vec::as_slice).unwrap_or_default())?;
+            robot.load(&self.dynamics, saved.get(index).map(Vec::as_slice).unwrap_or_default())?;
         }
         Ok(())
     }

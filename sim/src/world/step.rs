@@ -97,17 +97,13 @@ impl World {
 
     fn robot_step(&self, index: usize) -> RobotStep {
         let robot = &self.robots[index];
-        let body = robot.estimated_body(&self.dynamics);
         let command = match self.control_steps {
             0 => robot.rest_command(&self.dynamics),
             _ => robot.last_command(),
         };
         RobotStep {
-            sensed: robot.sensed(&body, &self.dynamics),
-            estimate: RobotEstimate {
-                world_from_pelvis: body.world_from_pelvis(),
-                hand_force_n: body.hand_force_n,
-            },
+            sensed: robot.sensed(),
+            estimate: robot.estimate(),
             truth: robot.truth(&self.dynamics),
             command,
         }

@@ -1,10 +1,17 @@
 //! The default base controller walks, carries, gives way and comes back, bit for bit again.
 
 use tandem_sim::locomotion::Balance;
-use tandem_sim::{RobotCommand, RobotPlacement, World, WorldSpec, bench};
+use tandem_sim::{RobotCommand, RobotPlacement, Sensing, World, WorldSpec, bench};
 
 fn report(case: &str, seeds: usize) -> bench::CaseReport {
-    let report = bench::run(&|| Box::new(Balance::default()), case, &(0..=seeds as u32 - 1), |_| {}).unwrap();
+    let report = bench::run(
+        &|| Box::new(Balance::default()),
+        Sensing::default(),
+        case,
+        &(0..=seeds as u32 - 1),
+        |_| {},
+    )
+    .unwrap();
     assert_eq!(report.cases.len(), 1, "`{case}` names one case");
     report.cases.into_iter().next().unwrap()
 }

@@ -12,13 +12,13 @@ const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "sim",
         &[
-            &["units", "sides", "plane", "dynamics", "owner"],
+            &["units", "sides", "plane", "random", "dynamics", "owner"],
             &["error"],
             &["assets"],
             &["mjcf"],
             &["mechanism"],
             &["body"],
-            &["locomotion"],
+            &["estimate", "locomotion"],
             &["robot"],
             &["world"],
             &["render"],

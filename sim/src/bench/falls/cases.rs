@@ -6,8 +6,8 @@ use rapier3d::math::{Pose, Rotation, Vector};
 
 use super::commands::{Stagger, Staggering};
 use super::{FallTrial, floor, play};
-use crate::bench::motion::SplitMix64;
 use crate::body::{ARM_COLUMNS, ARM_JOINTS};
+use crate::random::SplitMix64;
 use crate::{CONTROL_DT_S, ObjectPlacement, RobotPlacement, SimError, World, WorldSpec};
 
 /// One situation; a seed draws its commands and how things fall.

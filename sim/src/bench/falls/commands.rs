@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::bench::motion::SplitMix64;
 use crate::body::{RobotModel, UPPER, UPPER_JOINTS};
 use crate::locomotion::{BaseCommand, BaseLimits};
+use crate::random::SplitMix64;
 use crate::{CONTROL_DT_S, RobotCommand, World};
 
 /// How a robot staggers.

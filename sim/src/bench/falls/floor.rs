@@ -7,9 +7,9 @@ use serde::Serialize;
 
 use super::commands::Stagger;
 use super::{FallTrial, play};
-use crate::bench::motion::SplitMix64;
 use crate::body::{BodyEstimate, JOINTS, JointDrive, JointModel, LEGS, RobotModel, UPPER};
 use crate::locomotion::{BaseCommand, BaseLimits, LegCommand, Locomotion};
+use crate::random::SplitMix64;
 use crate::{CONTROL_DT_S, PHYSICS_STEPS_PER_CONTROL, RobotCommand, Side, Sides, World};
 
 /// What a robot alone on a floor was told.

@@ -61,6 +61,10 @@ pub struct RobotModel {
     pub wrists: Sides<SiteModel>,
     /// Centre of the sole.
     pub soles: Sides<SiteModel>,
+    /// Points of the link that carries a sole on which it can stand, in that link's frame.
+    pub sole_corners_m: Sides<Vec<Vector>>,
+    /// Where the inertial measurement unit is: site `imu` of the pelvis, or the pelvis' own origin.
+    pub imu_in_pelvis_m: Vector,
     pub egocentric: MjcfCamera,
     pub egocentric_link: usize,
     pub mass_kg: f32,

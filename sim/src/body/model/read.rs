@@ -3,10 +3,10 @@
 
 use std::collections::BTreeSet;
 
-use rapier3d::math::Pose;
+use rapier3d::math::{Pose, Vector};
 
 use super::{HandLinks, JointModel, LinkModel, RobotModel, SiteModel};
-use crate::mjcf::{Actuator, ActuatorKind, AxisJoint, BodyTree, Document, LinkJoint, MjcfCamera, pose};
+use crate::mjcf::{Actuator, ActuatorKind, AxisJoint, BodyTree, Document, Geom, LinkJoint, MjcfCamera, pose};
 use crate::{Side, Sides, SimError};
 
 impl RobotModel {
@@ -19,12 +19,15 @@ impl RobotModel {
         let links = links(document, &tree, &joints)?;
         let (egocentric, egocentric_link) = camera(document, &tree)?;
         let wrists = sites(document, &tree, "wrist", "where tasks put the hand")?;
+        let soles = sites(document, &tree, "foot", "at the sole's centre")?;
         Ok(RobotModel {
             mass_kg: links.iter().map(|link| link.mass.mass()).sum(),
             egocentric,
             egocentric_link,
             wrists,
-            soles: sites(document, &tree, "foot", "at the sole's centre")?,
+            sole_corners_m: soles.each_ref().map(|sole| corners_m(&links[sole.link].geoms)),
+            soles,
+            imu_in_pelvis_m: imu_in_pelvis_m(&tree),
             excluded: excluded(document, &tree)?,
             hands: Sides::from_fn(|side| hand(&links, side, wrists[side].link)),
             links,
@@ -169,6 +172,27 @@ fn sites(
         found.ok_or_else(|| document.unsupported(format!("needs a site `{name}` {meaning}")))
     };
     Ok(Sides { left: site(Side::Left)?, right: site(Side::Right)? })
+}
+
+/// The lowest points of all that collides: of a sphere its lowest, of anything else the lower corners of its box.
+fn corners_m(geoms: &[Geom]) -> Vec<Vector> {
+    let colliding = geoms.iter().filter(|geom| geom.collides).filter_map(Geom::collider);
+    let corners = colliding.flat_map(|(link_from_shape, shape)| match shape.as_ball() {
+        Some(ball) => vec![link_from_shape.translation - Vector::Z * ball.radius],
+        None => {
+            let (low, high) = {
+                let bounds = shape.compute_aabb(&link_from_shape);
+                (bounds.mins, bounds.maxs)
+            };
+            [low.x, high.x].iter().flat_map(|x| [low.y, high.y].map(|y| Vector::new(*x, y, low.z))).collect()
+        }
+    });
+    corners.collect()
+}
+
+fn imu_in_pelvis_m(tree: &BodyTree) -> Vector {
+    let imu = tree.links[0].sites.iter().find(|site| site.name == "imu");
+    imu.map_or(Vector::ZERO, |site| site.body_from_site.translation)
 }
 
 /// Link pairs that never touch: those that the file names, and neighbours.

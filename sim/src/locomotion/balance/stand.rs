@@ -136,7 +136,7 @@ impl Stand {
         let goal = self.pelvis_goal(body, load, dt_s);
         for side in Side::BOTH {
             let leg = &mut self.q_rad[side];
-            *leg = inverse(body.model, side, goal, self.feet[side], leg, IK_ITERATIONS);
+            *leg = inverse(&body.model, side, goal, self.feet[side], leg, IK_ITERATIONS);
         }
         let goal_velocity_m_s = Vector::new(self.offset_rate_m_s.x, self.offset_rate_m_s.y, rise_m / dt_s);
         let torques_n_m = balance_torques_n_m(body, load, goal, goal_velocity_m_s);

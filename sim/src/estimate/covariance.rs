@@ -1,0 +1,190 @@
+//! The covariance of the errors of a state, and what a measurement makes of both.
+
+use rapier3d::glamx::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
+
+/// Where each part of the error begins.
+pub(super) const TURN: usize = 0;
+pub(super) const VELOCITY: usize = 3;
+pub(super) const PLACE: usize = 6;
+pub(super) const GYRO_BIAS: usize = 9;
+pub(super) const ACC_BIAS: usize = 12;
+pub(super) const FEET: usize = 15;
+pub(super) const HEADINGS: usize = 21;
+pub(super) const ERRORS: usize = 23;
+
+/// One number for each error.
+pub(super) type Errors = [f64; ERRORS];
+
+/// Symmetric, rows and columns in the order of the errors.
+#[derive(Clone, Serialize, Deserialize)]
+pub(super) struct Covariance([Errors; ERRORS]);
+
+/// A measurement's derivatives by the errors, those that are not zero.
+pub(super) struct Row {
+    parts: [(usize, f64); MOST_PARTS],
+    len: usize,
+}
+
+/// Two of the place, three of the turn.
+const MOST_PARTS: usize = 5;
+
+impl Row {
+    pub fn of<const N: usize>(parts: [(usize, f64); N]) -> Row {
+        let mut row = Row { parts: [(0, 0.0); MOST_PARTS], len: 0 };
+        parts.into_iter().for_each(|(error, derivative)| row.push(error, derivative));
+        row
+    }
+
+    pub fn push(&mut self, error: usize, derivative: f64) {
+        self.parts[self.len] = (error, derivative);
+        self.len += 1;
+    }
+
+    fn dot(&self, errors: &Errors) -> f64 {
+        self.parts[..self.len].iter().map(|(error, derivative)| errors[*error] * derivative).sum()
+    }
+}
+
+impl Covariance {
+    pub fn diagonal(sigma: impl Fn(usize) -> f64) -> Covariance {
+        let mut rows = [[0.0; ERRORS]; ERRORS];
+        (0..ERRORS).for_each(|error| rows[error][error] = sigma(error) * sigma(error));
+        Covariance(rows)
+    }
+
+    /// P+ = F P F^T with F the step of the errors over `dt_s`:
+    ///   theta+ = theta - R b_g dt,   v+ = v - [f]x theta dt - R b_a dt,   p+ = p + v dt.
+    pub fn predict(&mut self, rotation: DMat3, force_m_s2: DVec3, dt_s: f64) {
+        let by_bias = rotation * -dt_s;
+        let by_turn = cross(force_m_s2) * -dt_s;
+        // F (F P)^T is F P F^T, for P is symmetric.
+        for _ in 0..2 {
+            for i in 0..3 {
+                self.add_row(PLACE + i, VELOCITY + i, dt_s);
+            }
+            for i in 0..3 {
+                for j in 0..3 {
+                    self.add_row(VELOCITY + i, TURN + j, by_turn.col(j)[i]);
+                    self.add_row(VELOCITY + i, ACC_BIAS + j, by_bias.col(j)[i]);
+                }
+            }
+            for i in 0..3 {
+                (0..3).for_each(|j| self.add_row(TURN + i, GYRO_BIAS + j, by_bias.col(j)[i]));
+            }
+            self.transpose();
+        }
+    }
+
+    /// The error has taken a step of its own, of this standard deviation.
+    pub fn widen(&mut self, error: usize, sigma: f64) {
+        self.0[error][error] += sigma * sigma;
+    }
+
+    /// The error at `to` is, from now on, the one that `from` has at this moment.
+    pub fn copy(&mut self, from: usize, to: usize) {
+        self.0[to] = self.0[from];
+        self.0[to][to] = self.0[from][from];
+        let column = self.0[to];
+        self.0.iter_mut().zip(column).for_each(|(row, value)| row[to] = value);
+    }
+
+    #[cfg(test)]
+    pub fn of_rows(rows: [Errors; ERRORS]) -> Covariance {
+        Covariance(rows)
+    }
+
+    #[cfg(test)]
+    pub fn at(&self, row: usize, column: usize) -> f64 {
+        self.0[row][column]
+    }
+
+    fn add_row(&mut self, to: usize, from: usize, factor: f64) {
+        let from = self.0[from];
+        self.0[to].iter_mut().zip(from).for_each(|(to, from)| *to += factor * from);
+    }
+
+    fn transpose(&mut self) {
+        for i in 0..ERRORS {
+            for j in 0..i {
+                (self.0[i][j], self.0[j][i]) = (self.0[j][i], self.0[i][j]);
+            }
+        }
+    }
+
+    /// h^T P h.
+    fn variance(&self, row: &Row) -> f64 {
+        let parts = &row.parts[..row.len];
+        let by_row = parts.iter().map(|(i, d_i)| {
+            let line = &self.0[*i];
+            d_i * parts.iter().map(|(j, d_j)| d_j * line[*j]).sum::<f64>()
+        });
+        by_row.sum()
+    }
+
+    /// P h.
+    fn times(&self, row: &Row) -> Errors {
+        let mut product = [0.0; ERRORS];
+        for (error, derivative) in &row.parts[..row.len] {
+            product.iter_mut().zip(&self.0[*error]).for_each(|(sum, value)| *sum += value * derivative);
+        }
+        product
+    }
+}
+
+/// Measurements of one instant, one number after the other: each says  y = h . errors + noise.
+pub(super) struct Update<'a> {
+    pub covariance: &'a mut Covariance,
+    pub errors: Errors,
+    /// Errors that stay what they are; how uncertain they are is reckoned with (Schmidt's filter).
+    pub considered: &'a [usize],
+}
+
+impl Update<'_> {
+    /// Where a measurement is more than `SLIP_GATE` off, its error at `slipped` has moved by what is missing.
+    pub fn gate(&mut self, row: &Row, y: f64, sigma: f64, slipped: usize) {
+        let rest = y - row.dot(&self.errors);
+        if rest * rest > super::SLIP_GATE * (self.covariance.variance(row) + sigma * sigma) {
+            self.covariance.widen(slipped, rest);
+        }
+    }
+
+    ///   k = P h / s,   s = h^T P h + sigma^2,   P+ = P - k (P h)^T - P h k^T + s k k^T,   k = 0 where considered.
+    pub fn measure(&mut self, row: &Row, y: f64, sigma: f64) {
+        let product = self.covariance.times(row);
+        let spread = row.dot(&product) + sigma * sigma;
+        let step = (y - row.dot(&self.errors)) / spread;
+        let kept = self.considered_block();
+        for (i, line) in self.covariance.0.iter_mut().enumerate() {
+            let gain = product[i] / spread;
+            line.iter_mut().zip(&product).for_each(|(value, other)| *value -= gain * other);
+            self.errors[i] += product[i] * step;
+        }
+        self.restore(kept, &product, step);
+    }
+
+    /// The covariances of the considered errors with one another, which a measurement leaves as they are.
+    fn considered_block(&self) -> [[f64; 2]; 2] {
+        let mut kept = [[0.0; 2]; 2];
+        for (i, error) in self.considered.iter().enumerate() {
+            for (j, other) in self.considered.iter().enumerate() {
+                kept[i][j] = self.covariance.0[*error][*other];
+            }
+        }
+        kept
+    }
+
+    fn restore(&mut self, kept: [[f64; 2]; 2], product: &Errors, step: f64) {
+        for (i, error) in self.considered.iter().enumerate() {
+            self.errors[*error] -= product[*error] * step;
+            for (j, other) in self.considered.iter().enumerate() {
+                self.covariance.0[*error][*other] = kept[i][j];
+            }
+        }
+    }
+}
+
+/// The matrix of a cross product: [v]x w = v x w.
+pub(super) fn cross(v: DVec3) -> DMat3 {
+    DMat3::from_cols(DVec3::new(0.0, v.z, -v.y), DVec3::new(-v.z, 0.0, v.x), DVec3::new(v.y, -v.x, 0.0))
+}

@@ -1,0 +1,29 @@
+//! Pseudo-random numbers that are the same everywhere.
+
+use serde::{Deserialize, Serialize};
+
+/// Steele, Lea and Flood's SplitMix64.
+#[derive(Clone, Serialize, Deserialize)]
+pub(crate) struct SplitMix64(pub u64);
+
+impl SplitMix64 {
+    /// Uniform between the two.
+    pub(crate) fn uniform(&mut self, [low, high]: [f32; 2]) -> f32 {
+        low + (high - low) * ((self.next() >> 40) as f32 / (1u64 << 24) as f32)
+    }
+
+    /// Normally distributed about 0, after Box and Muller.
+    pub(crate) fn normal(&mut self, sigma: f32) -> f32 {
+        let [radius, angle] =
+            [self.next(), self.next()].map(|bits| ((bits >> 40) as f32 + 0.5) / (1u64 << 24) as f32);
+        sigma * (-2.0 * radius.ln()).sqrt() * (std::f32::consts::TAU * angle).cos()
+    }
+
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+}

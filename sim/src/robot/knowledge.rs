@@ -1,0 +1,171 @@
+//! How a robot comes to know its own body: by its sensors and an estimator, or, for comparison, by the simulator's own state.
+
+use std::sync::Arc;
+
+use rapier3d::math::{Pose, Rotation, Vector};
+use serde::{Deserialize, Serialize};
+
+use super::sensors::{SensorModel, Sensors};
+use crate::body::{BodyEstimate, PALM_IN_WRIST_M, RobotModel, WAIST_JOINTS};
+use crate::dynamics::Tree;
+use crate::estimate::{SensorReadings, StateEstimator};
+use crate::mechanism::rounded;
+use crate::plane::{flat, heading_rad};
+use crate::{PHYSICS_DT_S, Sides};
+
+/// Where what a robot knows of its pelvis comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StateSource {
+    /// A filter over inertial measurement unit, joint encoders and joint torques, as a real robot needs it.
+    Estimator,
+    /// The simulator's own state, which no real robot has.
+    #[default]
+    Truth,
+}
+
+/// What the robots of a world know of themselves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Sensing {
+    pub source: StateSource,
+    pub sensors: SensorModel,
+    /// Of the sensors' noise.
+    pub seed: u64,
+}
+
+/// Sensors, what they read last, and what has been made of it.
+#[derive(Clone, Serialize, Deserialize)]
+pub(super) struct SelfKnowledge {
+    sensors: Sensors,
+    readings: SensorReadings,
+    /// `None` where truth is the source.
+    estimator: Option<StateEstimator>,
+    /// On the floor under the pelvis at the start, z up, x where the pelvis faced.
+    world_from_start: Pose,
+}
+
+impl SelfKnowledge {
+    /// A robot that has stood still for a second. `index` tells the sensors of one world's robots apart.
+    pub(super) fn new(model: &RobotModel, tree: &Tree, sensing: &Sensing, index: usize) -> SelfKnowledge {
+        let seed = sensing.seed.wrapping_mul(0x2545_f491_4f6c_dd1d).wrapping_add(index as u64);
+        let mut sensors = Sensors::new(sensing.sensors, seed);
+        let readings = sensors.read(tree, model, PHYSICS_DT_S);
+        let world_from_pelvis = rounded(&tree.world_from_link(0));
+        let estimator = (sensing.source == StateSource::Estimator).then(|| {
+            let upwards = world_from_pelvis.rotation.inverse() * Vector::Z;
+            let still_force_m_s2 = sensors.still_force_m_s2(upwards * crate::GRAVITY_M_S2);
+            StateEstimator::new(
+                model,
+                &world_from_pelvis,
+                &readings.q_rad,
+                still_force_m_s2,
+                sensors.latency_s(),
+            )
+        });
+        let heading = Rotation::from_rotation_z(heading_rad(&world_from_pelvis));
+        let world_from_start = Pose::from_parts(flat(world_from_pelvis.translation), heading);
+        SelfKnowledge { sensors, readings, estimator, world_from_start }
+    }
+
+    /// One physics step. Returns the body by what is known then, with nothing in its hands.
+    pub(super) fn update(&mut self, model: &Arc<RobotModel>, tree: &Tree) -> BodyEstimate {
+        self.readings = self.sensors.read(tree, model, PHYSICS_DT_S);
+        let Some(estimator) = &mut self.estimator else { return from_truth(model, tree, &self.readings) };
+        let pelvis_from_link = estimator.update(model, &self.readings, PHYSICS_DT_S);
+        estimator.body(model, &self.readings, &pelvis_from_link)
+    }
+
+    pub(super) fn readings(&self) -> &SensorReadings {
+        &self.readings
+    }
+
+    pub(super) fn world_from_start(&self) -> &Pose {
+        &self.world_from_start
+    }
+
+    /// The body by what was known at the last update.
+    pub(super) fn body(&self, model: &Arc<RobotModel>, tree: &Tree) -> BodyEstimate {
+        match &self.estimator {
+            Some(estimator) => {
+                let pelvis_from_link = model.forward_kinematics(Pose::IDENTITY, &self.readings.q_rad);
+                estimator.body(model, &self.readings, &pelvis_from_link)
+            }
+            None => from_truth(model, tree, &self.readings),
+        }
+    }
+}
+
+/// The body as the simulator has it, with ideal sensors to the last bit. Masses are the model's, whatever was loaded on a hand.
+fn from_truth(model: &Arc<RobotModel>, tree: &Tree, readings: &SensorReadings) -> BodyEstimate {
+    let mut com_m = Vector::ZERO;
+    let mut com_velocity_m_s = Vector::ZERO;
+    let mut world_from_link = Vec::with_capacity(model.links.len());
+    for (index, link) in model.links.iter().enumerate() {
+        let world = tree.world_from_link(index);
+        let centre_m = world * link.mass.local_com.as_dvec3();
+        com_m += centre_m.as_vec3() * link.mass.mass();
+        com_velocity_m_s += tree.point_velocity_m_s(index, centre_m).as_vec3() * link.mass.mass();
+        world_from_link.push(rounded(&world));
+    }
+    let palm_velocity_m_s = model.hands.each_ref().map(|hand| {
+        let palm_m = tree.world_from_link(hand.wrist) * PALM_IN_WRIST_M.as_dvec3();
+        tree.point_velocity_m_s(hand.wrist, palm_m).as_vec3()
+    });
+    BodyEstimate {
+        model: Arc::clone(model),
+        q_rad: readings.q_rad,
+        qd_rad_s: readings.qd_rad_s,
+        pelvis_velocity_m_s: tree.link_velocity_m_s(0).as_vec3(),
+        pelvis_angular_velocity_rad_s: tree.link_spin_rad_s(0).as_vec3(),
+        world_from_link,
+        com_m: com_m / model.mass_kg,
+        com_velocity_m_s: com_velocity_m_s / model.mass_kg,
+        palm_velocity_m_s,
+        hand_force_n: Sides::both(Vector::ZERO),
+        waist_target_rad: [0.0; WAIST_JOINTS],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::super::{Robot, RobotPlacement};
+    use crate::PHYSICS_DT_S;
+    use crate::body::posed::{Posed, model};
+    use crate::dynamics::{DVec3, Dynamics, Settings};
+
+    /// What is read from the physics world is what the model's kinematics make of joints and pelvis: here of a robot in the
+    /// air, touching nothing, with an arm on the move.
+    #[test]
+    fn poses_and_velocities_are_those_of_the_model() {
+        let mut dynamics = Dynamics::new(Settings::new(f64::from(PHYSICS_DT_S), DVec3::Z * -9.81));
+        let placement = RobotPlacement { name: "A".into(), position_m: [0.3, -0.2], yaw_rad: 0.8 };
+        let model = Arc::new(model().clone());
+        let mut robot = Robot::spawn(&mut dynamics, &model, &placement, 0).unwrap();
+        let mut command = robot.rest_command(&dynamics);
+        command.upper_rad[0] -= 0.1;
+        for substep in 0..4 {
+            robot.drive(&mut dynamics, &command, substep);
+            dynamics.step().unwrap();
+            robot.sense(&dynamics);
+        }
+        let sensed = &robot.body;
+        let body = Posed {
+            world_from_pelvis: sensed.world_from_pelvis(),
+            pelvis_velocity_m_s: sensed.pelvis_velocity_m_s,
+            pelvis_angular_velocity_rad_s: sensed.pelvis_angular_velocity_rad_s,
+            q_rad: sensed.q_rad,
+            qd_rad_s: sensed.qd_rad_s,
+        }
+        .body();
+        assert!(sensed.qd_rad_s.iter().any(|rate| rate.abs() > 0.1), "the arm moves");
+        for (seen, expected) in sensed.world_from_link.iter().zip(&body.world_from_link) {
+            assert!((seen.translation - expected.translation).length() < 1e-4, "{seen:?} {expected:?}");
+        }
+        assert!((sensed.com_m - body.com_m).length() < 1e-4);
+        let error_m_s = (sensed.com_velocity_m_s - body.com_velocity_m_s).length();
+        // To the order of one physics step.
+        assert!(error_m_s < 0.01, "{} {}", sensed.com_velocity_m_s, body.com_velocity_m_s);
+    }
+}

@@ -1,0 +1,166 @@
+//! What the sensors of a robot read: ideal ones the simulator's own state, those of a G1 with noise, bias and latency.
+
+use rapier3d::math::{Rotation, Vector};
+use serde::{Deserialize, Serialize};
+
+use super::joints;
+use crate::GRAVITY_M_S2;
+use crate::body::{JOINTS, RobotModel};
+use crate::dynamics::Tree;
+use crate::estimate::SensorReadings;
+use crate::random::SplitMix64;
+
+/// How good a robot's sensors are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SensorModel {
+    /// Every reading is exact and of this instant.
+    #[default]
+    Ideal,
+    /// Noise, bias and latency of a Unitree G1.
+    G1,
+}
+
+/// Standard deviations of what is added to each reading at 200 Hz, and how late readings are.
+struct Noise {
+    gyro_rad_s: f32,
+    gyro_bias_rad_s: f32,
+    acc_m_s2: f32,
+    acc_bias_m_s2: f32,
+    encoder_rad: f32,
+    torque_n_m: f32,
+    latency_s: f32,
+    /// Joint velocities are differences of positions, low-passed at this frequency; `None`: as the joints have them.
+    rate_cutoff_hz: Option<f32>,
+}
+
+const G1: Noise = Noise {
+    gyro_rad_s: 3.5e-3,
+    gyro_bias_rad_s: 8.7e-4,
+    acc_m_s2: 0.05,
+    acc_bias_m_s2: 0.02,
+    encoder_rad: 1e-4,
+    torque_n_m: 0.5,
+    latency_s: 4e-3,
+    rate_cutoff_hz: Some(40.0),
+};
+
+/// Readings over which a robot at rest takes the mean of its accelerometer: one second.
+const STILL_READINGS: f32 = 200.0;
+
+/// The sensors of one robot.
+#[derive(Clone, Serialize, Deserialize)]
+pub(super) struct Sensors {
+    model: SensorModel,
+    random: SplitMix64,
+    gyro_bias_rad_s: Vector,
+    acc_bias_m_s2: Vector,
+    /// Velocity of the IMU and rotation of the pelvis at the last reading.
+    last_motion: Option<(Vector, Rotation)>,
+    /// What the last reading would have been without noise and latency.
+    last_ideal: Option<SensorReadings>,
+    last: Option<SensorReadings>,
+}
+
+impl Sensors {
+    pub(super) fn new(model: SensorModel, seed: u64) -> Sensors {
+        let mut sensors = Sensors {
+            model,
+            random: SplitMix64(seed),
+            gyro_bias_rad_s: Vector::ZERO,
+            acc_bias_m_s2: Vector::ZERO,
+            last_motion: None,
+            last_ideal: None,
+            last: None,
+        };
+        if let Some(noise) = sensors.noise() {
+            sensors.gyro_bias_rad_s = sensors.normal(noise.gyro_bias_rad_s);
+            sensors.acc_bias_m_s2 = sensors.normal(noise.acc_bias_m_s2);
+        }
+        sensors
+    }
+
+    fn noise(&self) -> Option<&'static Noise> {
+        match self.model {
+            SensorModel::Ideal => None,
+            SensorModel::G1 => Some(&G1),
+        }
+    }
+
+    /// Each part with this standard deviation.
+    fn normal(&mut self, sigma: f32) -> Vector {
+        let mut draw = || self.random.normal(sigma);
+        Vector::new(draw(), draw(), draw())
+    }
+
+    /// One physics step after the last reading.
+    pub(super) fn read(&mut self, tree: &Tree, model: &RobotModel, dt_s: f32) -> SensorReadings {
+        let ideal = self.ideal(tree, model, dt_s);
+        let Some(noise) = self.noise() else { return ideal };
+        let mut read = match &self.last_ideal {
+            Some(last) => between(&ideal, last, noise.latency_s / dt_s),
+            None => ideal.clone(),
+        };
+        self.last_ideal = Some(ideal);
+        for joint in 0..JOINTS {
+            read.q_rad[joint] += self.random.normal(noise.encoder_rad);
+            read.torque_n_m[joint] += self.random.normal(noise.torque_n_m);
+        }
+        read.gyro_rad_s += self.gyro_bias_rad_s + self.normal(noise.gyro_rad_s);
+        read.specific_force_m_s2 += self.acc_bias_m_s2 + self.normal(noise.acc_m_s2);
+        if let Some(cutoff_hz) = noise.rate_cutoff_hz {
+            let part = 1.0 - (-std::f32::consts::TAU * cutoff_hz * dt_s).exp();
+            read.qd_rad_s = std::array::from_fn(|joint| {
+                self.last.as_ref().map_or(0.0, |last| {
+                    let difference_rad_s = (read.q_rad[joint] - last.q_rad[joint]) / dt_s;
+                    last.qd_rad_s[joint] + (difference_rad_s - last.qd_rad_s[joint]) * part
+                })
+            });
+        }
+        self.last = Some(read.clone());
+        read
+    }
+
+    /// How old readings are when they come.
+    pub(super) fn latency_s(&self) -> f32 {
+        self.noise().map_or(0.0, |noise| noise.latency_s)
+    }
+
+    /// What the accelerometer reads in the mean over a second at rest, where an exact one reads `ideal_m_s2`.
+    pub(super) fn still_force_m_s2(&mut self, ideal_m_s2: Vector) -> Vector {
+        let noise_m_s2 = self.noise().map_or(0.0, |noise| noise.acc_m_s2 / STILL_READINGS.sqrt());
+        ideal_m_s2 + self.acc_bias_m_s2 + self.normal(noise_m_s2)
+    }
+
+    fn ideal(&mut self, tree: &Tree, model: &RobotModel, dt_s: f32) -> SensorReadings {
+        let (q_rad, qd_rad_s) = joints::read(tree, model);
+        let world_from_pelvis = tree.world_from_link(0);
+        let rotation = world_from_pelvis.rotation.as_quat();
+        let imu_m = world_from_pelvis * model.imu_in_pelvis_m.as_dvec3();
+        let velocity_m_s = tree.point_velocity_m_s(0, imu_m).as_vec3();
+        let (before_m_s, before) = self.last_motion.unwrap_or((velocity_m_s, rotation));
+        self.last_motion = Some((velocity_m_s, rotation));
+        let force_m_s2 = (velocity_m_s - before_m_s) / dt_s + Vector::Z * GRAVITY_M_S2;
+        SensorReadings {
+            q_rad,
+            qd_rad_s,
+            torque_n_m: joints::torques_n_m(tree, model),
+            gyro_rad_s: rotation.inverse() * tree.link_spin_rad_s(0).as_vec3(),
+            specific_force_m_s2: before.slerp(rotation, 0.5).inverse() * force_m_s2,
+        }
+    }
+}
+
+/// The readings of `part` of a step before `now`, where `before` was a step ago.
+fn between(now: &SensorReadings, before: &SensorReadings, part: f32) -> SensorReadings {
+    let mix = |now: &[f32; JOINTS], before: &[f32; JOINTS]| {
+        std::array::from_fn(|joint| now[joint] + (before[joint] - now[joint]) * part)
+    };
+    SensorReadings {
+        q_rad: mix(&now.q_rad, &before.q_rad),
+        qd_rad_s: mix(&now.qd_rad_s, &before.qd_rad_s),
+        torque_n_m: mix(&now.torque_n_m, &before.torque_n_m),
+        gyro_rad_s: now.gyro_rad_s.lerp(before.gyro_rad_s, part),
+        specific_force_m_s2: now.specific_force_m_s2.lerp(before.specific_force_m_s2, part),
+    }
+}
