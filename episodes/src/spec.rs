@@ -104,6 +104,37 @@ impl EpisodeSpec {
         }
     }
 
+    /// What is not as the benchmark has it, each as results name it behind the policy's name. Whoever adds a setting decides here
+    /// whether it belongs to them.
+    pub fn departures(&self) -> Vec<String> {
+        // Without `..`, so that the compiler asks about a new field. What is named apart, or changes nothing that a policy could
+        // tell, is left out.
+        let EpisodeSpec {
+            task: _,
+            seed: _,
+            protocol: _,
+            scene,
+            robot,
+            locomotion,
+            renderer: _,
+            start: _,
+            disclosure,
+            hints,
+        } = self;
+        let file = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let departures = [
+            (*disclosure != Disclosure::default()).then(|| format!("phases told: {disclosure}")),
+            (*hints != Hints::default()).then(|| format!("hints: {hints}")),
+            scene.as_ref().map(|scene| format!("scene: {}", file(&scene.path))),
+            (*robot != RobotFile::default()).then(|| format!("robot: {}", robot.kind())),
+            match locomotion {
+                Controller::Balance => None,
+                Controller::File(path) => Some(format!("controller: {}", file(path))),
+            },
+        ];
+        departures.into_iter().flatten().collect()
+    }
+
     /// Index of the phase that it begins at and that alone counts; `None` where it begins elsewhere, and all count.
     pub fn start_phase(&self) -> Option<usize> {
         match &self.start {

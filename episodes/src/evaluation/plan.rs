@@ -79,6 +79,11 @@ impl EvaluationPlan<'_> {
         }
     }
 
+    /// What in its episodes is not as the benchmark has it, which is the same in all of them.
+    pub fn departures(&self) -> Vec<String> {
+        self.tasks.first().map_or_else(Vec::new, |task| self.spec(task, 0, Start::Task).departures())
+    }
+
     /// This share of the episodes, and which of it are left out because nobody has demonstrated them.
     pub fn episodes(&self) -> (Vec<EpisodeSpec>, Vec<String>) {
         let (mut found, mut left_out) = (Vec::new(), Vec::new());

@@ -6,7 +6,7 @@ use serde::Serialize;
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
 use super::cache::EpisodeCache;
-use crate::results::{Exclusion, PhaseLevel, PlayedEpisode, PolicyCard};
+use crate::results::{Exclusion, PhaseLevel, PlayedEpisode, PolicyCard, named};
 
 /// How a task went over its seeds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -34,6 +34,9 @@ pub struct Evaluation {
     pub locomotion: String,
     pub disclosure: Disclosure,
     pub hints: Hints,
+    /// What was not as the benchmark has it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub departures: Vec<String>,
     /// How the episodes went that began at their task's beginning.
     pub tasks: BTreeMap<String, TaskSummary>,
     /// How those went that began at a phase.
@@ -43,6 +46,13 @@ pub struct Evaluation {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<String>,
     pub episodes: Vec<PlayedEpisode>,
+}
+
+impl Evaluation {
+    /// The policy's name with what has to be known beside it, as reports have it.
+    pub fn full_name(&self) -> String {
+        named(&self.policy.full_name(), &self.departures)
+    }
 }
 
 pub fn summarise(cache: &EpisodeCache, episodes: Vec<PlayedEpisode>, left_out: Vec<String>) -> Evaluation {
@@ -73,6 +83,7 @@ pub fn summarise(cache: &EpisodeCache, episodes: Vec<PlayedEpisode>, left_out: V
         locomotion: cache.locomotion.clone(),
         disclosure: cache.plan.disclosure,
         hints: cache.plan.hints,
+        departures: cache.plan.departures(),
         tasks,
         phase_level: PhaseLevel::of(episodes.iter()),
         left_out,

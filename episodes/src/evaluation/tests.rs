@@ -26,6 +26,7 @@ fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultRe
         state_hash: "00c0ffee00c0ffee".into(),
         simulator_failure: None,
         extra_information: vec![],
+        departures: vec![],
         recording_failed: None,
     }
 }

@@ -137,6 +137,7 @@ fn result() -> ResultReply {
         state_hash: "0123456789abcdef".into(),
         simulator_failure: None,
         extra_information: vec![],
+        departures: vec![],
         recording_failed: None,
     }
 }

@@ -81,6 +81,11 @@ impl PlayedEpisode {
         self.result.phases.reached_s(&Phase::number(phase)).is_some()
     }
 
+    /// The policy's name, what it was shown beyond what others see, and what else was not as the benchmark has it.
+    pub fn full_name(&self) -> String {
+        named(&self.policy.full_name(), &self.spec.departures())
+    }
+
     /// Whether the phase that counts was reached: the one that the episode began at, or the last.
     pub fn succeeded(&self) -> bool {
         self.reached(self.start_phase().unwrap_or(self.spec.task.phases.len() - 1))
@@ -124,9 +129,13 @@ pub struct PolicyCard {
 impl PolicyCard {
     /// The name, and what the policy is shown beyond what others see.
     pub fn full_name(&self) -> String {
-        let extra = self.extra_information.iter().map(|what| format!(" + {what}"));
-        std::iter::once(self.name.clone()).chain(extra).collect()
+        named(&self.name, &self.extra_information)
     }
+}
+
+/// A policy's name with what has to be known beside it.
+pub fn named(policy: &str, beside: &[String]) -> String {
+    std::iter::once(policy.to_owned()).chain(beside.iter().map(|what| format!(" + {what}"))).collect()
 }
 
 impl From<&str> for PolicyCard {
@@ -178,6 +187,7 @@ mod tests {
             state_hash: "00c0ffee00c0ffee".into(),
             simulator_failure: None,
             extra_information: vec![],
+            departures: vec![],
             recording_failed: None,
         }
     }

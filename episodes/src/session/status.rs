@@ -127,6 +127,7 @@ impl Session {
             state_hash: self.state_hash(),
             simulator_failure: self.simulator_failure.clone(),
             extra_information: self.extra_information(),
+            departures: self.spec().departures(),
             recording_failed: self.recording_failed().map(str::to_owned),
         }
     }

@@ -73,6 +73,9 @@ pub struct ResultReply {
     /// What the policy was shown beyond what the benchmark's own policies see, as "depth_images"; left out where it was nothing.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub extra_information: Vec<String>,
+    /// What else was not as the benchmark has it, as "scene: kitchen.xml"; left out where it was nothing.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub departures: Vec<String>,
     /// Why the recording is not complete; left out where it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording_failed: Option<String>,

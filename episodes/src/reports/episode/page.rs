@@ -95,8 +95,15 @@ impl EpisodePage<'_> {
     }
 
     fn facts(&self) -> String {
+        let beside: Vec<&str> = [&self.result.extra_information, &self.result.departures]
+            .into_iter()
+            .flatten()
+            .map(String::as_str)
+            .collect();
+        let beside = if beside.is_empty() { "nothing".into() } else { escape(&beside.join(", ")) };
         let facts = [
             ("Protocol", self.result.protocol.name().into()),
+            ("Not as in the benchmark", beside),
             ("Simulated time", format!("{:.2} s", self.duration_s())),
             ("Tool calls", self.result.tool_calls.to_string()),
             ("Robots that fell", self.result.falls.to_string()),

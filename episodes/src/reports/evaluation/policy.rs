@@ -9,7 +9,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use super::load::FoundEpisode;
 use super::rate::{MeanRate, Rate};
-use crate::results::{Exclusion, PhaseLevel, PlayedEpisode, PolicyCard, missed_phase_note};
+use crate::results::{Exclusion, PhaseLevel, PlayedEpisode, PolicyCard, missed_phase_note, named};
 use crate::scoring::Phase;
 use crate::statistics::Count;
 use crate::tasks::{self, Task};
@@ -164,14 +164,15 @@ fn rules_of(played: &PlayedEpisode) -> Vec<String> {
     let spec = &played.spec;
     let short = played.build.chars().rev().take(6).collect::<Vec<_>>();
     let (name, address) = split_address(&played.policy.name);
+    let card = PolicyCard { name: name.into(), ..played.policy.clone() };
     vec![
-        PolicyCard { name: name.into(), ..played.policy.clone() }.full_name(),
+        named(&card.full_name(), &spec.departures()),
         address.unwrap_or("in this process").into(),
         spec.protocol.name().into(),
+        // Departures name files alone, whose content or folder may differ.
         played.locomotion.clone(),
         spec.robot.name(),
-        format!("tells {}", spec.disclosure),
-        format!("hints {}", spec.hints.name()),
+        spec.scene.as_ref().map(|scene| format!("scene {}", scene.xxh3)).unwrap_or_default(),
         settings_of(&played.policy),
         format!("build ..{}", short.iter().rev().collect::<String>()),
     ]

@@ -32,6 +32,7 @@ fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Played
             state_hash: format!("{seed:016x}"),
             simulator_failure: None,
             extra_information: vec![],
+            departures: vec![],
             recording_failed: None,
         },
         thought_s: f64::from(seed),
@@ -147,6 +148,23 @@ fn namesakes_are_told_apart_by_what_differs() {
     let report = EvaluationReport::of(&found([one, other].concat()));
     let names: Vec<&str> = report.policies.iter().map(|policy| policy.name.as_str()).collect();
     assert_eq!(names, ["agent (benchmark)", "agent (agentic)"]);
+}
+
+/// What is not as the benchmark has it stands behind the policy's name, however a report is written.
+#[test]
+fn departures_stand_behind_the_name() {
+    let [one, mut other] = [nine_six_three("agent"), nine_six_three("agent")];
+    other.iter_mut().for_each(|played| {
+        played.spec.hints = tandem_tools_spec::Hints::Off;
+        played.spec.locomotion = crate::spec::Controller::File("policies/fast.onnx".into());
+    });
+    let report = EvaluationReport::of(&found([one, other].concat()));
+    let names: Vec<&str> = report.policies.iter().map(|policy| policy.name.as_str()).collect();
+    assert_eq!(names, ["agent", "agent + hints: off + controller: fast.onnx"]);
+    for format in ReportFormat::ALL {
+        let text = report.write(format, &ReportPictures::default()).unwrap();
+        assert!(text.contains(names[1]), "{format:?}: {text}");
+    }
 }
 
 /// Every format, of a policy whose name has to be escaped everywhere.

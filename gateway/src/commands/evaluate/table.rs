@@ -11,6 +11,7 @@ const NOTES_SHOWN: usize = 20;
 
 /// Prints the tables, then notes.
 pub fn print(evaluation: &Evaluation) {
+    println!("{}, {} protocol", evaluation.full_name(), evaluation.protocol);
     print_tasks(evaluation);
     evaluation.phase_level.iter().for_each(print_phase_level);
     let (counted, excluded): (Vec<&PlayedEpisode>, Vec<&PlayedEpisode>) =

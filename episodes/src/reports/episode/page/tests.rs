@@ -29,6 +29,7 @@ fn result(phase_times_s: [Option<f64>; 3], protocol: Protocol) -> ResultReply {
         state_hash: "<script>".into(),
         simulator_failure: None,
         extra_information: vec![],
+        departures: vec![],
         recording_failed: None,
     }
 }
