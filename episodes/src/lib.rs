@@ -56,4 +56,7 @@ pub use session::{
     CallReply, Checkpoint, Clock, FAILED_STEP_FILE, FailedStep, RunFiles, RunFolder, Session, monotonic,
 };
 pub use spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, SceneFile, Start};
-pub use tandem_sim::{BaseLimits, CONTROL_HZ, LocomotionChoice, SimError, joint_names, render::RendererKind};
+pub use tandem_sim::{
+    BaseLimits, CONTROL_HZ, LocomotionChoice, Sensing, SensorModel, SimError, StateSource, joint_names,
+    render::RendererKind,
+};

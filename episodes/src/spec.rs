@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use tandem_sim::{LocomotionChoice, SimError, mjcf::Document, render::RendererKind};
+use tandem_sim::{
+    LocomotionChoice, Sensing, SensorModel, SimError, StateSource, mjcf::Document, render::RendererKind,
+};
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
 use crate::error::SceneError;
@@ -23,6 +25,9 @@ pub struct EpisodeSpec {
     pub scene: Option<SceneFile>,
     pub robot: RobotFile,
     pub locomotion: Controller,
+    /// What robots know of themselves; in recordings of builds that did not ask, the simulator's own state.
+    #[serde(default = "before_there_was_a_choice")]
+    pub sensing: Sensing,
     /// Who draws what robots see; nothing else depends on it.
     pub renderer: RendererKind,
     pub start: Start,
@@ -97,6 +102,7 @@ impl EpisodeSpec {
             scene: None,
             robot: RobotFile::default(),
             locomotion: Controller::default(),
+            sensing: Sensing::default(),
             renderer: RendererKind::default(),
             start: Start::default(),
             disclosure: Disclosure::default(),
@@ -116,6 +122,7 @@ impl EpisodeSpec {
             scene,
             robot,
             locomotion,
+            sensing: Sensing { state_estimate, sensors },
             renderer: _,
             start: _,
             disclosure,
@@ -131,6 +138,9 @@ impl EpisodeSpec {
                 Controller::Balance => None,
                 Controller::File(path) => Some(format!("controller: {}", file(path))),
             },
+            (*state_estimate != StateSource::default())
+                .then(|| format!("state estimate: {}", state_estimate.name())),
+            (*sensors != SensorModel::default()).then(|| format!("sensors: {}", sensors.name())),
         ];
         departures.into_iter().flatten().collect()
     }
@@ -144,6 +154,10 @@ impl EpisodeSpec {
             Start::Task | Start::Checkpoint(_) => None,
         }
     }
+}
+
+fn before_there_was_a_choice() -> Sensing {
+    Sensing::TRUTH
 }
 
 impl Default for RobotFile {

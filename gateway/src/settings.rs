@@ -13,7 +13,8 @@ use clap::{
 };
 use serde::Deserialize;
 use tandem_episodes::{
-    BaseLimits, Controller, Instructions, InstructionsError, RendererKind, SceneFile, SimError, Visibility,
+    BaseLimits, Controller, Instructions, InstructionsError, RendererKind, SceneFile, Sensing, SensorModel,
+    SimError, StateSource, Visibility,
 };
 use tandem_tools_spec::{Disclosure, Hints};
 
@@ -54,6 +55,13 @@ pub struct Layer {
     /// ONNX file with a velocity policy for the G1 in place of our own base controller.
     #[arg(long, env = "TANDEM_LOCOMOTION", value_name = "FILE")]
     pub locomotion: Option<PathBuf>,
+    /// Where robots have their own state from: an estimator over what they sense, or the simulator, which no real robot has
+    /// [default: estimator].
+    #[arg(long, env = "TANDEM_STATE_ESTIMATE", value_name = "SOURCE", value_parser = one_of(StateSource::ALL, StateSource::name))]
+    pub state_estimate: Option<StateSource>,
+    /// What robots sense: everything exactly, or with noise, bias and latency as a G1 does [default: ideal].
+    #[arg(long, env = "TANDEM_SENSORS", value_name = "NAME", value_parser = one_of(SensorModel::ALL, SensorModel::name))]
+    pub sensors: Option<SensorModel>,
     /// Who draws pictures: a graphics processor, the embedded renderer, or whichever is there [default: auto].
     #[arg(long, env = "TANDEM_RENDERER", value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name))]
     pub renderer: Option<RendererKind>,
@@ -112,6 +120,8 @@ impl Layer {
             instructions: self.instructions.or(next.instructions),
             scene: self.scene.or(next.scene),
             locomotion: self.locomotion.or(next.locomotion),
+            state_estimate: self.state_estimate.or(next.state_estimate),
+            sensors: self.sensors.or(next.sensors),
             renderer: self.renderer.or(next.renderer),
             disclosure: self.disclosure.or(next.disclosure),
             hints: self.hints.or(next.hints),
@@ -186,6 +196,14 @@ impl Layer {
         Controller::from_file(self.locomotion.as_deref())
     }
 
+    /// What robots know of themselves.
+    pub fn sensing(&self) -> Sensing {
+        Sensing {
+            state_estimate: self.state_estimate.unwrap_or_default(),
+            sensors: self.sensors.unwrap_or_default(),
+        }
+    }
+
     /// Who draws pictures.
     pub fn renderer(&self) -> RendererKind {
         self.renderer.unwrap_or_default()
@@ -219,6 +237,8 @@ pub struct Settings {
     pub scene: Option<SceneFile>,
     /// The base controller of every robot.
     pub locomotion: Controller,
+    /// What robots know of themselves.
+    pub sensing: Sensing,
     /// What that controller follows.
     pub base_limits: BaseLimits,
     /// Who draws pictures.
@@ -328,6 +348,7 @@ impl Settings {
             scene: layer.scene.as_deref().map(read_scene).transpose()?,
             base_limits: locomotion.load()?.limits(),
             locomotion,
+            sensing: layer.sensing(),
             renderer,
             disclosure: layer.disclosure.unwrap_or_default(),
             hints: layer.hints.unwrap_or_default(),

@@ -12,11 +12,11 @@ impl SplitMix64 {
         low + (high - low) * ((self.next() >> 40) as f32 / (1u64 << 24) as f32)
     }
 
-    /// Normally distributed about 0, after Box and Muller.
-    pub(crate) fn normal(&mut self, sigma: f32) -> f32 {
+    /// Normally distributed about 0 with a standard deviation of 1, after Box and Muller.
+    pub(crate) fn normal(&mut self) -> f32 {
         let [radius, angle] =
             [self.next(), self.next()].map(|bits| ((bits >> 40) as f32 + 0.5) / (1u64 << 24) as f32);
-        sigma * (-2.0 * radius.ln()).sqrt() * (std::f32::consts::TAU * angle).cos()
+        (-2.0 * radius.ln()).sqrt() * (std::f32::consts::TAU * angle).cos()
     }
 
     fn next(&mut self) -> u64 {

@@ -9,7 +9,7 @@ use std::ops::RangeInclusive;
 
 use tandem_sim::bench::{CaseReport, over_seeds};
 use tandem_sim::render::RendererKind;
-use tandem_sim::{CONTROL_HZ, Pose, Rotation, Sides, Vector, heading_rad, wrapped_rad};
+use tandem_sim::{CONTROL_HZ, Pose, Rotation, Sensing, Sides, Vector, heading_rad, wrapped_rad};
 use tandem_tools_spec::{Protocol, ToolCall, ToolReply};
 
 use super::BenchError;
@@ -79,9 +79,10 @@ const fn beside(name: &'static str, left_m: f32) -> RobotSpot {
 pub fn run(
     case: &CarryingCase,
     controller: &Controller,
+    sensing: Sensing,
     seeds: &RangeInclusive<u32>,
 ) -> Result<CaseReport, BenchError> {
-    let trials = over_seeds(seeds, |seed| trial(case, controller, seed));
+    let trials = over_seeds(seeds, |seed| trial(case, controller, sensing, seed));
     let trials = trials.into_iter().collect::<Result<Vec<_>, _>>()?;
     let done: Vec<&CarryResult> = trials.iter().flatten().collect();
     let worst = |value: fn(&CarryResult) -> f32| done.iter().map(|carried| value(carried)).reduce(f32::max);
@@ -110,9 +111,15 @@ struct CarryResult {
 }
 
 /// One seed; `None` if a robot fell, or hands lost the bar for good.
-fn trial(case: &CarryingCase, controller: &Controller, seed: u32) -> Result<Option<CarryResult>, BenchError> {
+fn trial(
+    case: &CarryingCase,
+    controller: &Controller,
+    sensing: Sensing,
+    seed: u32,
+) -> Result<Option<CarryResult>, BenchError> {
     let spec = EpisodeSpec {
         locomotion: controller.clone(),
+        sensing,
         renderer: RendererKind::Cpu,
         ..EpisodeSpec::new(&TASK, seed, Protocol::Benchmark)
     };

@@ -10,13 +10,13 @@ pub use falls::falls;
 pub use tandem_ik::bench::Report as IkReport;
 use tandem_ik::bench::{TargetSet, run};
 use tandem_ik::{IkError, Model};
-use tandem_sim::assets;
 use tandem_sim::bench;
 pub use tandem_sim::bench::{
     CaseReport, FallTrial, FallsCase, FallsReport, FloorEpisode, LocomotionReport, PhysicsCase,
     PhysicsReport, PicturesCase, PicturesReport,
 };
 use tandem_sim::render::RendererKind;
+use tandem_sim::{Sensing, assets};
 
 use crate::EpisodeError;
 use crate::commands;
@@ -51,15 +51,15 @@ pub enum BenchError {
 /// their own first, then two that carry something between them; calls `done` after each case.
 pub fn locomotion(
     controller: &Controller,
+    sensing: Sensing,
     filter: &str,
     seeds: &RangeInclusive<u32>,
     mut done: impl FnMut(&CaseReport),
 ) -> Result<LocomotionReport, BenchError> {
     let choice = controller.load()?;
-    let mut report =
-        bench::run(&|| choice.controller(), tandem_sim::Sensing::default(), filter, seeds, &mut done)?;
+    let mut report = bench::run(&|| choice.controller(), sensing, filter, seeds, &mut done)?;
     for case in carrying::CASES.iter().filter(|case| bench::is_asked(filter, case.name)) {
-        let carried = carrying::run(case, controller, seeds)?;
+        let carried = carrying::run(case, controller, sensing, seeds)?;
         done(&carried);
         report.cases.push(carried);
     }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use tandem_sim::render::RendererKind;
+use tandem_sim::{Sensing, render::RendererKind};
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
 use crate::players::Policy;
@@ -21,6 +21,8 @@ pub struct EvaluationPlan<'a> {
     pub scene: Option<SceneFile>,
     pub robot: RobotFile,
     pub locomotion: Controller,
+    /// What robots know of themselves.
+    pub sensing: Sensing,
     pub renderer: RendererKind,
     /// What policies are told about their success, and whether success ends an episode.
     pub disclosure: Disclosure,
@@ -71,6 +73,7 @@ impl EvaluationPlan<'_> {
             robot: self.robot.clone(),
             scene: self.scene.clone(),
             locomotion: self.locomotion.clone(),
+            sensing: self.sensing,
             renderer: self.renderer,
             disclosure: self.disclosure,
             hints: self.hints,

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
+use tandem_sim::Sensing;
 use tandem_tools_spec::{Disclosure, Hints, Protocol};
 
 use super::cache::EpisodeCache;
@@ -32,6 +33,8 @@ pub struct Evaluation {
     pub policy: PolicyCard,
     pub protocol: Protocol,
     pub locomotion: String,
+    #[serde(flatten)]
+    pub sensing: Sensing,
     pub disclosure: Disclosure,
     pub hints: Hints,
     /// What was not as the benchmark has it.
@@ -81,6 +84,7 @@ pub fn summarise(cache: &EpisodeCache, episodes: Vec<PlayedEpisode>, left_out: V
         policy: cache.plan.player.card(),
         protocol: cache.plan.protocol,
         locomotion: cache.locomotion.clone(),
+        sensing: cache.plan.sensing,
         disclosure: cache.plan.disclosure,
         hints: cache.plan.hints,
         departures: cache.plan.departures(),

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use tandem_sim::{dynamics::Diverged, render::RendererKind};
+use tandem_sim::{Sensing, dynamics::Diverged, render::RendererKind};
 use tandem_tools_spec::{Disclosure, EndReason, Hints, PhaseTimes, Protocol, ResultReply};
 
 use super::*;
@@ -77,6 +77,7 @@ fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> EvaluationPlan<'static> {
         scene: None,
         robot: RobotFile::default(),
         locomotion: Controller::Balance,
+        sensing: Sensing::default(),
         renderer: RendererKind::Cpu,
         disclosure: Disclosure::Live,
         hints: Hints::On,
@@ -186,6 +187,7 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
         ("protocol", |played| played.spec.protocol = Protocol::Benchmark),
         ("disclosure", |played| played.spec.disclosure = Disclosure::End),
         ("hints", |played| played.spec.hints = Hints::Off),
+        ("sensing", |played| played.spec.sensing = Sensing::TRUTH),
         ("start", |played| played.spec.start = Start::Checkpoint("other".into())),
         ("robot", |played| played.spec.robot = RobotFile::File("other.xml".into())),
         ("policy", |played| played.policy = "idle".into()),

@@ -246,7 +246,7 @@ fn wrists_follow_from_transforms(world: &World, recorded: &FrameTransforms) {
             assert!(error_m < 1e-4, "{robot} {side} wrist is {error_m} m off");
             assert!(recorded.rotation.angle_between(measured.rotation) < 2e-3);
         }
-        let camera = moved.world_from_camera();
+        let camera = moved.truth.world_from_camera;
         let optical = pose(&format!("{robot}/egocentric"));
         let forward = optical.rotation * Vector::Z;
         assert!((forward + camera.rotation * Vector::Z).length() < 1e-3, "an image's z axis looks forward");

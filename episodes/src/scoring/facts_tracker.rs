@@ -56,8 +56,11 @@ impl FactsTracker {
     pub fn facts(&self, step: &Step) -> Facts {
         let robots = step.robots.iter().map(|robot| RobotFacts {
             pelvis_in_world: robot.truth.world_from_pelvis(),
-            wrist_in_pelvis: robot.sensed.pelvis_from_wrist,
-            hand_force_n: robot.estimate.hand_force_n,
+            wrist_in_pelvis: robot
+                .truth
+                .world_from_wrist
+                .map(|wrist| robot.truth.world_from_pelvis().inverse() * wrist),
+            hand_force_n: robot.hand_force_in_world_n(),
             fallen: robot.sensed.fallen,
         });
         let objects = self.memory.iter().zip(&self.models).filter_map(|(memory, model)| {

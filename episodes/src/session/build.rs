@@ -49,6 +49,7 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
     for robot in 0..world.robots().len() {
         world.set_locomotion(robot, locomotion.controller());
     }
+    world.set_sensing(spec.sensing, spec.seed);
     let body = Arc::new(UpperBody::new(&mjcf, &world.rest_command(0))?);
     let present = world.present();
     let motion = |(index, robot): (usize, &Robot)| {

@@ -19,7 +19,7 @@ use crate::recording::Recording;
 use crate::scoring::ScoreMemory;
 use crate::spec::{EpisodeSpec, PhaseStart};
 
-/// An episode at one instant. It fits episodes of the same task, seed, protocol, robot and controller.
+/// An episode at one instant. It fits episodes of the same task, seed, protocol, robot, controller and sensing.
 #[derive(Clone)]
 pub struct Checkpoint {
     origin: Origin,
@@ -157,7 +157,12 @@ impl Origin {
     fn machine(&self) -> String {
         let scene = self.spec.scene.as_ref().map(|scene| format!(" in scene {}", scene.xxh3));
         let scene = scene.unwrap_or_default();
-        format!("robot {} and controller {}{scene}", self.robot, self.locomotion)
+        let sensing = self.spec.sensing;
+        let (source, sensors) = (sensing.state_estimate.name(), sensing.sensors.name());
+        format!(
+            "robot {}, controller {}, state estimate {source} and sensors {sensors}{scene}",
+            self.robot, self.locomotion
+        )
     }
 }
 
@@ -180,8 +185,8 @@ impl Session {
         Ok(Checkpoint { origin: self.origin.clone(), progress, failed: None })
     }
 
-    /// Takes the episode to a checkpoint of an episode of the same task, seed, protocol, robot and controller. On an error
-    /// the episode is as it was.
+    /// Takes the episode to a checkpoint of an episode of the same task, seed, protocol, robot, controller and sensing. On
+    /// an error the episode is as it was.
     pub fn resume(&mut self, checkpoint: &Checkpoint) -> Result<(), EpisodeError> {
         expect_same(checkpoint.origin.episode(), self.origin.episode())?;
         self.restore(&checkpoint.progress)

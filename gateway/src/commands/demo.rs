@@ -19,7 +19,7 @@ use tracing_subscriber::filter::LevelFilter;
 
 use super::{
     CommandResult, Seeds,
-    flags::{LocomotionFlag, RendererFlag, SceneFlag},
+    flags::{LocomotionFlag, RendererFlag, SceneFlag, SensingFlags},
     logging::log_to_stderr,
 };
 use crate::{
@@ -51,6 +51,8 @@ pub struct DemoArgs {
     #[command(flatten)]
     locomotion: LocomotionFlag,
     #[command(flatten)]
+    sensing: SensingFlags,
+    #[command(flatten)]
     renderer: RendererFlag,
 }
 
@@ -60,6 +62,8 @@ pub fn run(args: DemoArgs) -> CommandResult {
     let flags = Layer {
         scene: args.scene.file,
         locomotion: args.locomotion.file,
+        state_estimate: Some(args.sensing.state_estimate),
+        sensors: Some(args.sensing.sensors),
         renderer: Some(args.renderer.kind),
         ..Layer::default()
     };

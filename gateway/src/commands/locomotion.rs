@@ -5,7 +5,10 @@ use std::{path::PathBuf, process::ExitCode};
 use clap::Subcommand;
 use tandem_episodes::bench::{self, CaseReport};
 
-use super::{CommandResult, Seeds, flags::LocomotionFlag};
+use super::{
+    CommandResult, Seeds,
+    flags::{LocomotionFlag, SensingFlags},
+};
 
 /// The base controller.
 #[derive(Debug, clap::Args)]
@@ -21,6 +24,8 @@ enum LocomotionPart {
     Bench {
         #[command(flatten)]
         locomotion: LocomotionFlag,
+        #[command(flatten)]
+        sensing: SensingFlags,
         /// Cases whose names contain one of these words, separated by commas.
         #[arg(long, default_value = "", value_name = "WORDS")]
         cases: String,
@@ -35,9 +40,10 @@ enum LocomotionPart {
 
 /// Plays the cases, prints a line per case as it ends, and writes JSON where it is asked for.
 pub fn run(args: LocomotionArgs) -> CommandResult {
-    let LocomotionPart::Bench { locomotion, cases, seeds, json } = args.part;
+    let LocomotionPart::Bench { locomotion, sensing, cases, seeds, json } = args.part;
     println!("{}", CaseReport::HEAD);
-    let report = bench::locomotion(&locomotion.controller(), &cases, &seeds.0, |case| println!("{case}"))?;
+    let (controller, sensing) = (locomotion.controller(), sensing.sensing());
+    let report = bench::locomotion(&controller, sensing, &cases, &seeds.0, |case| println!("{case}"))?;
     if let Some(path) = json {
         std::fs::write(path, serde_json::to_string_pretty(&report)?)?;
     }

@@ -92,6 +92,7 @@ impl EpisodeTable {
         let spec = EpisodeSpec {
             scene: self.settings.scene.clone(),
             locomotion: self.settings.locomotion.clone(),
+            sensing: self.settings.sensing,
             renderer: self.settings.renderer,
             disclosure: self.settings.disclosure,
             hints: self.settings.hints,

@@ -90,11 +90,7 @@ pub fn run(
 ) -> Result<LocomotionReport, SimError> {
     let mut cases = Vec::new();
     for case in CASES.iter().filter(|case| is_asked(filter, case.name)) {
-        let trial = |seed: u32| {
-            let seed = u64::from(seed);
-            trial::run(case, seed, new_locomotion(), Sensing { seed, ..sensing })
-        };
-        let trials = over_seeds(seeds, trial);
+        let trials = over_seeds(seeds, |seed| trial::run(case, seed, new_locomotion(), sensing));
         let trials = trials.into_iter().collect::<Result<Vec<_>, _>>()?;
         let report = summarise(case, &trials);
         done(&report);

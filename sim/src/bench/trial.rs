@@ -20,7 +20,7 @@ const PUSH_S: f32 = 1.0;
 /// Runs until the time is up or the robot lies.
 pub(super) fn run(
     case: &Case,
-    seed: u64,
+    seed: u32,
     locomotion: Box<dyn Locomotion>,
     sensing: Sensing,
 ) -> Result<Trial, SimError> {
@@ -28,8 +28,8 @@ pub(super) fn run(
     let spec = WorldSpec { scene: "floor".into(), robots: vec![placement], objects: vec![] };
     let mut world = World::new(&spec)?;
     world.set_locomotion(0, locomotion);
-    world.set_sensing(&sensing);
-    let mut random = SplitMix64(seed);
+    world.set_sensing(sensing, seed);
+    let mut random = SplitMix64(seed.into());
     let arms = ArmMotion::new(case.arms, &mut random);
     let legs = if let Plan::Tour(tour) = &case.plan { tour::legs(tour, &mut random) } else { Vec::new() };
     let direction = pull_direction(&mut random);
@@ -96,7 +96,7 @@ fn base_command(
     }
 }
 
-fn disturb(case: &Case, world: &mut World, seed: u64, direction: Vector, legs: &[Leg], time_s: f32) {
+fn disturb(case: &Case, world: &mut World, seed: u32, direction: Vector, legs: &[Leg], time_s: f32) {
     match &case.disturbance {
         Disturbance::Pull { force_n } if time_s > 0.5 * SETTLE_S => {
             for side in Side::BOTH {

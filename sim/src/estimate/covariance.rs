@@ -12,6 +12,8 @@ pub(super) const ACC_BIAS: usize = 12;
 pub(super) const FEET: usize = 15;
 pub(super) const HEADINGS: usize = 21;
 pub(super) const ERRORS: usize = 23;
+/// Turn, velocity and place, which a step of time changes.
+const MOVING: usize = GYRO_BIAS;
 
 /// One number for each error.
 pub(super) type Errors = [f64; ERRORS];
@@ -21,7 +23,7 @@ pub(super) type Errors = [f64; ERRORS];
 pub(super) struct Covariance([Errors; ERRORS]);
 
 /// A measurement's derivatives by the errors, those that are not zero.
-pub(super) struct Row {
+pub(super) struct MeasurementRow {
     parts: [(usize, f64); MOST_PARTS],
     len: usize,
 }
@@ -29,9 +31,9 @@ pub(super) struct Row {
 /// Two of the place, three of the turn.
 const MOST_PARTS: usize = 5;
 
-impl Row {
-    pub fn of<const N: usize>(parts: [(usize, f64); N]) -> Row {
-        let mut row = Row { parts: [(0, 0.0); MOST_PARTS], len: 0 };
+impl MeasurementRow {
+    pub fn of<const N: usize>(parts: [(usize, f64); N]) -> MeasurementRow {
+        let mut row = MeasurementRow { parts: [(0, 0.0); MOST_PARTS], len: 0 };
         parts.into_iter().for_each(|(error, derivative)| row.push(error, derivative));
         row
     }
@@ -55,30 +57,49 @@ impl Covariance {
 
     /// P+ = F P F^T with F the step of the errors over `dt_s`:
     ///   theta+ = theta - R b_g dt,   v+ = v - [f]x theta dt - R b_a dt,   p+ = p + v dt.
+    /// F changes the first three parts alone, so of P F^T what the others have with them is what F P has, mirrored.
     pub fn predict(&mut self, rotation: DMat3, force_m_s2: DVec3, dt_s: f64) {
         let by_bias = rotation * -dt_s;
         let by_turn = cross(force_m_s2) * -dt_s;
-        // F (F P)^T is F P F^T, for P is symmetric.
-        for _ in 0..2 {
-            for i in 0..3 {
-                self.add_row(PLACE + i, VELOCITY + i, dt_s);
-            }
-            for i in 0..3 {
-                for j in 0..3 {
+        for i in 0..3 {
+            self.add_row(PLACE + i, VELOCITY + i, dt_s);
+        }
+        for i in 0..3 {
+            for j in 0..3 {
+                if i != j {
                     self.add_row(VELOCITY + i, TURN + j, by_turn.col(j)[i]);
-                    self.add_row(VELOCITY + i, ACC_BIAS + j, by_bias.col(j)[i]);
                 }
+                self.add_row(VELOCITY + i, ACC_BIAS + j, by_bias.col(j)[i]);
             }
+        }
+        for i in 0..3 {
+            (0..3).for_each(|j| self.add_row(TURN + i, GYRO_BIAS + j, by_bias.col(j)[i]));
+        }
+        for row in &mut self.0[..MOVING] {
+            let part = |at: usize| DVec3::new(row[at], row[at + 1], row[at + 2]);
+            let turned = by_bias * part(GYRO_BIAS);
+            let hastened = by_turn * part(TURN) + by_bias * part(ACC_BIAS);
+            let moved = part(VELOCITY) * dt_s;
             for i in 0..3 {
-                (0..3).for_each(|j| self.add_row(TURN + i, GYRO_BIAS + j, by_bias.col(j)[i]));
+                row[TURN + i] += turned[i];
+                row[VELOCITY + i] += hastened[i];
+                row[PLACE + i] += moved[i];
             }
-            self.transpose();
+        }
+        for i in MOVING..ERRORS {
+            (0..MOVING).for_each(|j| self.0[i][j] = self.0[j][i]);
         }
     }
 
     /// The error has taken a step of its own, of this standard deviation.
     pub fn widen(&mut self, error: usize, sigma: f64) {
         self.0[error][error] += sigma * sigma;
+    }
+
+    /// The error has nothing to do with the others any more.
+    pub fn forget(&mut self, error: usize) {
+        self.0[error] = [0.0; ERRORS];
+        self.0.iter_mut().for_each(|row| row[error] = 0.0);
     }
 
     /// The error at `to` is, from now on, the one that `from` has at this moment.
@@ -104,16 +125,8 @@ impl Covariance {
         self.0[to].iter_mut().zip(from).for_each(|(to, from)| *to += factor * from);
     }
 
-    fn transpose(&mut self) {
-        for i in 0..ERRORS {
-            for j in 0..i {
-                (self.0[i][j], self.0[j][i]) = (self.0[j][i], self.0[i][j]);
-            }
-        }
-    }
-
     /// h^T P h.
-    fn variance(&self, row: &Row) -> f64 {
+    fn variance(&self, row: &MeasurementRow) -> f64 {
         let parts = &row.parts[..row.len];
         let by_row = parts.iter().map(|(i, d_i)| {
             let line = &self.0[*i];
@@ -123,7 +136,7 @@ impl Covariance {
     }
 
     /// P h.
-    fn times(&self, row: &Row) -> Errors {
+    fn times(&self, row: &MeasurementRow) -> Errors {
         let mut product = [0.0; ERRORS];
         for (error, derivative) in &row.parts[..row.len] {
             product.iter_mut().zip(&self.0[*error]).for_each(|(sum, value)| *sum += value * derivative);
@@ -142,7 +155,7 @@ pub(super) struct Update<'a> {
 
 impl Update<'_> {
     /// Where a measurement is more than `SLIP_GATE` off, its error at `slipped` has moved by what is missing.
-    pub fn gate(&mut self, row: &Row, y: f64, sigma: f64, slipped: usize) {
+    pub fn gate(&mut self, row: &MeasurementRow, y: f64, sigma: f64, slipped: usize) {
         let rest = y - row.dot(&self.errors);
         if rest * rest > super::SLIP_GATE * (self.covariance.variance(row) + sigma * sigma) {
             self.covariance.widen(slipped, rest);
@@ -150,12 +163,16 @@ impl Update<'_> {
     }
 
     ///   k = P h / s,   s = h^T P h + sigma^2,   P+ = P - k (P h)^T - P h k^T + s k k^T,   k = 0 where considered.
-    pub fn measure(&mut self, row: &Row, y: f64, sigma: f64) {
+    pub fn measure(&mut self, row: &MeasurementRow, y: f64, sigma: f64) {
         let product = self.covariance.times(row);
         let spread = row.dot(&product) + sigma * sigma;
         let step = (y - row.dot(&self.errors)) / spread;
         let kept = self.considered_block();
         for (i, line) in self.covariance.0.iter_mut().enumerate() {
+            // What a measurement says nothing of stays: headings, of a robot that walks.
+            if product[i] == 0.0 {
+                continue;
+            }
             let gain = product[i] / spread;
             line.iter_mut().zip(&product).for_each(|(value, other)| *value -= gain * other);
             self.errors[i] += product[i] * step;

@@ -18,7 +18,7 @@ pub(super) struct Foot {
     /// Which way the foot faces, since the robot stands still.
     pub heading_rad: f64,
     /// That the foot stands: 0 it surely does not, 1 it surely does.
-    pub sureness: f64,
+    pub contact_share: f64,
     /// Centre of pressure in the link's frame, filtered.
     pressure_m: Vector,
     /// Vertical force, filtered.
@@ -49,7 +49,7 @@ impl Foot {
             link: sole.link,
             point_m: DVec3::ZERO,
             heading_rad: 0.0,
-            sureness: 1.0,
+            contact_share: 1.0,
             pressure_m: sole.link_from_site.translation,
             force_n: 0.5 * model.mass_kg * GRAVITY_M_S2,
         }
@@ -87,7 +87,7 @@ impl Foot {
             let loaded = (foot.force_n - LIFTED_N) / (STANDING_N - LIFTED_N);
             let above_m = lowest_m[side] - lowest_m[side.other()];
             let low = 1.0 - (above_m - 0.5 * HIGHER_M) / (0.5 * HIGHER_M);
-            foot.sureness = f64::from(loaded.min(low).clamp(0.0, 1.0));
+            foot.contact_share = f64::from(loaded.min(low).clamp(0.0, 1.0));
         }
     }
 
@@ -120,13 +120,13 @@ impl Foot {
     }
 }
 
-/// J^T w = tau_gravity - tau, by damped least squares, in the pelvis' axes; `down` are those of gravity. J: 6 x 6, rows force and
+/// J^T w = tau_gravity - tau, by damped least squares, in the pelvis' axes; `down_direction` is that of gravity. J: 6 x 6, rows force and
 /// moment, columns the leg's joints [m; 1].
 fn ground_wrench(
     model: &RobotModel,
     pelvis_from_link: &[Pose],
     side: Side,
-    down: Vector,
+    down_direction: Vector,
     torque_n_m: &[f32; JOINTS],
 ) -> GroundWrench {
     let joints = &model.joints[LEGS[side]..LEGS[side] + LEG_JOINTS];
@@ -141,7 +141,7 @@ fn ground_wrench(
         let mass = &model.links[joints[i].link].mass;
         mass_kg += mass.mass();
         moment_kg_m += pose * mass.local_com * mass.mass();
-        let holding_n_m = -axis.dot((moment_kg_m - origin_m * mass_kg).cross(down * GRAVITY_M_S2));
+        let holding_n_m = -axis.dot((moment_kg_m - origin_m * mass_kg).cross(down_direction * GRAVITY_M_S2));
         rest_n_m[i] = holding_n_m - torque_n_m[LEGS[side] + i];
         let linear = axis.cross(foot_m - origin_m);
         jacobian.set_column(i, &SVector::from([linear.x, linear.y, linear.z, axis.x, axis.y, axis.z]));

@@ -30,8 +30,8 @@ use crate::body::{BodyEstimate, JOINTS, PelvisMotion, RobotModel, joint_array};
 use crate::plane::heading_rad;
 use crate::{GRAVITY_M_S2, Side, Sides};
 use covariance::{
-    ACC_BIAS, Covariance, ERRORS, Errors, FEET, GYRO_BIAS, HEADINGS, PLACE, Row, TURN, Update, VELOCITY,
-    cross,
+    ACC_BIAS, Covariance, ERRORS, Errors, FEET, GYRO_BIAS, HEADINGS, MeasurementRow, PLACE, TURN, Update,
+    VELOCITY, cross,
 };
 use feet::{Foot, facing_rad};
 
@@ -204,9 +204,13 @@ impl StateEstimator {
     /// From the moment on at which the robot stands still, the feet's headings are those that they have then.
     fn see_stillness(&mut self, readings: &SensorReadings, pelvis_from_link: &[Pose], dt_s: f32) {
         let spin_rad_s = readings.gyro_rad_s - self.gyro_bias_rad_s.as_vec3();
-        let stands = self.feet.iter().all(|foot| foot.sureness > 0.5) && spin_rad_s.length() < STILL_RAD_S;
+        let stands =
+            self.feet.iter().all(|foot| foot.contact_share > 0.5) && spin_rad_s.length() < STILL_RAD_S;
         let was_still = self.is_still();
         self.still_s = if stands { self.still_s + dt_s } else { 0.0 };
+        if was_still && !self.is_still() {
+            (0..2).for_each(|side| self.covariance.forget(HEADINGS + side));
+        }
         if self.is_still() && !was_still {
             for (side, foot) in self.feet.iter_mut().enumerate() {
                 let rotation = pelvis_from_link[foot.link].rotation.as_dquat();
@@ -223,8 +227,9 @@ impl StateEstimator {
         let mut update = Update { covariance: &mut self.covariance, errors: [0.0; ERRORS], considered };
         for (side, foot) in Side::BOTH.into_iter().zip(self.feet.iter()) {
             let standing_walk_m = if still { STILL_WALK_M } else { STEPPING_WALK_M };
-            let walk_m =
-                (FLYING_WALK_M.ln() * (1.0 - foot.sureness) + standing_walk_m.ln() * foot.sureness).exp();
+            let walk_m = (FLYING_WALK_M.ln() * (1.0 - foot.contact_share)
+                + standing_walk_m.ln() * foot.contact_share)
+                .exp();
             let at = FEET + 3 * side.index();
             (at..at + 3).for_each(|error| update.covariance.widen(error, walk_m * dt_s.sqrt()));
             let pelvis_from_foot = &pelvis_from_link[foot.link];
@@ -232,7 +237,7 @@ impl StateEstimator {
             let missing_m = arm_m - (foot.point_m - self.imu_m);
             let turning = cross(arm_m);
             for axis in 0..3 {
-                let mut row = Row::of([(PLACE + axis, -1.0), (at + axis, 1.0)]);
+                let mut row = MeasurementRow::of([(PLACE + axis, -1.0), (at + axis, 1.0)]);
                 (0..if still { 3 } else { 2 })
                     .for_each(|about| row.push(TURN + about, turning.col(about)[axis]));
                 update.gate(&row, missing_m[axis], POINT_NOISE_M, at + axis);
@@ -242,13 +247,13 @@ impl StateEstimator {
                 let heading = HEADINGS + side.index();
                 let facing_rad = facing_rad(self.world_from_imu * pelvis_from_foot.rotation.as_dquat());
                 let turned_rad = wrapped_rad(facing_rad - foot.heading_rad);
-                let row = Row::of([(TURN + 2, -1.0), (heading, 1.0)]);
+                let row = MeasurementRow::of([(TURN + 2, -1.0), (heading, 1.0)]);
                 update.covariance.widen(heading, STILL_HEADING_WALK_RAD * dt_s.sqrt());
                 update.gate(&row, turned_rad, HEADING_NOISE_RAD, heading);
                 update.measure(&row, turned_rad, HEADING_NOISE_RAD);
             }
-            if foot.sureness > SURE {
-                update.measure(&Row::of([(at + 2, 1.0)]), -foot.point_m.z, FLOOR_NOISE_M);
+            if foot.contact_share > SURE {
+                update.measure(&MeasurementRow::of([(at + 2, 1.0)]), -foot.point_m.z, FLOOR_NOISE_M);
             }
         }
         let errors = update.errors;

@@ -2,7 +2,7 @@
 
 use rapier3d::glamx::{DMat3, DQuat, DVec3};
 
-use super::covariance::{Covariance, ERRORS, PLACE, Row, TURN, Update, cross};
+use super::covariance::{Covariance, ERRORS, MeasurementRow, PLACE, TURN, Update, cross};
 use super::*;
 use crate::PHYSICS_DT_S;
 use crate::body::posed::{Posed, model};
@@ -77,8 +77,8 @@ fn a_foot_that_carries_nothing_does_not_stand() {
     readings.torque_n_m[left..left + LEG_JOINTS].copy_from_slice(&gravity_n_m[left..left + LEG_JOINTS]);
     let mut estimator = estimator(&readings);
     body_after(&mut estimator, &readings, 0.1);
-    assert_eq!(estimator.feet.left.sureness, 0.0);
-    assert_eq!(estimator.feet.right.sureness, 1.0);
+    assert_eq!(estimator.feet.left.contact_share, 0.0);
+    assert_eq!(estimator.feet.right.contact_share, 1.0);
 }
 
 /// A covariance with something of everything.
@@ -129,7 +129,7 @@ fn a_prediction_is_the_product_of_three_matrices() {
 fn a_measurement_is_josephs_form() {
     for considered in [&[][..], &[TURN + 2, GYRO_BIAS + 2][..]] {
         let (mut covariance, before) = mixed();
-        let row = Row::of([(PLACE, -1.0), (FEET, 1.0), (TURN + 1, 0.4)]);
+        let row = MeasurementRow::of([(PLACE, -1.0), (FEET, 1.0), (TURN + 1, 0.4)]);
         let (y, sigma) = (0.7, 0.3);
         let mut update = Update { covariance: &mut covariance, errors: [0.0; ERRORS], considered };
         update.measure(&row, y, sigma);

@@ -18,19 +18,33 @@ use crate::{PHYSICS_DT_S, Sides};
 #[serde(rename_all = "snake_case")]
 pub enum StateSource {
     /// A filter over inertial measurement unit, joint encoders and joint torques, as a real robot needs it.
+    #[default]
     Estimator,
     /// The simulator's own state, which no real robot has.
-    #[default]
     Truth,
 }
 
 /// What the robots of a world know of themselves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sensing {
-    pub source: StateSource,
+    pub state_estimate: StateSource,
     pub sensors: SensorModel,
-    /// Of the sensors' noise.
-    pub seed: u64,
+}
+
+impl StateSource {
+    pub const ALL: [StateSource; 2] = [StateSource::Estimator, StateSource::Truth];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            StateSource::Estimator => "estimator",
+            StateSource::Truth => "truth",
+        }
+    }
+}
+
+impl Sensing {
+    /// What robots knew before they had an estimator: the simulator's own state.
+    pub const TRUTH: Sensing = Sensing { state_estimate: StateSource::Truth, sensors: SensorModel::Ideal };
 }
 
 /// Sensors, what they read last, and what has been made of it.
@@ -45,25 +59,25 @@ pub(super) struct SelfKnowledge {
 }
 
 impl SelfKnowledge {
-    /// A robot that has stood still for a second. `index` tells the sensors of one world's robots apart.
-    pub(super) fn new(model: &RobotModel, tree: &Tree, sensing: &Sensing, index: usize) -> SelfKnowledge {
-        let seed = sensing.seed.wrapping_mul(0x2545_f491_4f6c_dd1d).wrapping_add(index as u64);
+    /// A robot that has stood still for a second, and is told that its pelvis is at `told`, of which it believes place and
+    /// heading. Equal seeds give equal noise.
+    pub(super) fn new(
+        model: &RobotModel,
+        tree: &Tree,
+        told: &Pose,
+        sensing: Sensing,
+        seed: u64,
+    ) -> SelfKnowledge {
         let mut sensors = Sensors::new(sensing.sensors, seed);
         let readings = sensors.read(tree, model, PHYSICS_DT_S);
-        let world_from_pelvis = rounded(&tree.world_from_link(0));
-        let estimator = (sensing.source == StateSource::Estimator).then(|| {
-            let upwards = world_from_pelvis.rotation.inverse() * Vector::Z;
+        let rotation = rounded(&tree.world_from_link(0)).rotation;
+        let estimator = (sensing.state_estimate == StateSource::Estimator).then(|| {
+            let upwards = rotation.inverse() * Vector::Z;
             let still_force_m_s2 = sensors.still_force_m_s2(upwards * crate::GRAVITY_M_S2);
-            StateEstimator::new(
-                model,
-                &world_from_pelvis,
-                &readings.q_rad,
-                still_force_m_s2,
-                sensors.latency_s(),
-            )
+            StateEstimator::new(model, told, &readings.q_rad, still_force_m_s2, sensors.latency_s())
         });
-        let heading = Rotation::from_rotation_z(heading_rad(&world_from_pelvis));
-        let world_from_start = Pose::from_parts(flat(world_from_pelvis.translation), heading);
+        let heading = Rotation::from_rotation_z(heading_rad(told));
+        let world_from_start = Pose::from_parts(flat(told.translation), heading);
         SelfKnowledge { sensors, readings, estimator, world_from_start }
     }
 

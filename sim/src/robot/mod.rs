@@ -9,6 +9,7 @@ mod state;
 
 use std::sync::Arc;
 
+use rapier3d::math::Pose;
 use serde::{Deserialize, Serialize};
 
 pub use knowledge::{Sensing, StateSource};
@@ -70,9 +71,10 @@ impl Robot {
         self.locomotion = locomotion;
     }
 
-    /// Replaces sensors and what the robot knows by them, as of a robot that has stood still until now.
-    pub(crate) fn set_sensing(&mut self, dynamics: &Dynamics, sensing: &Sensing, index: usize) {
-        self.memory.knowledge = SelfKnowledge::new(&self.model, dynamics.tree(self.tree), sensing, index);
+    /// Replaces sensors and what the robot knows by them, as of a robot that has stood still until now and is told where it is.
+    pub(crate) fn set_sensing(&mut self, dynamics: &Dynamics, told: &Pose, sensing: Sensing, seed: u64) {
+        let tree = dynamics.tree(self.tree);
+        self.memory.knowledge = SelfKnowledge::new(&self.model, tree, told, sensing, seed);
         self.recollect(dynamics);
     }
 

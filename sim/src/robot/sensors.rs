@@ -21,6 +21,17 @@ pub enum SensorModel {
     G1,
 }
 
+impl SensorModel {
+    pub const ALL: [SensorModel; 2] = [SensorModel::Ideal, SensorModel::G1];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            SensorModel::Ideal => "ideal",
+            SensorModel::G1 => "g1",
+        }
+    }
+}
+
 /// Standard deviations of what is added to each reading at 200 Hz, and how late readings are.
 struct Noise {
     gyro_rad_s: f32,
@@ -74,8 +85,8 @@ impl Sensors {
             last: None,
         };
         if let Some(noise) = sensors.noise() {
-            sensors.gyro_bias_rad_s = sensors.normal(noise.gyro_bias_rad_s);
-            sensors.acc_bias_m_s2 = sensors.normal(noise.acc_bias_m_s2);
+            sensors.gyro_bias_rad_s = sensors.normal() * noise.gyro_bias_rad_s;
+            sensors.acc_bias_m_s2 = sensors.normal() * noise.acc_bias_m_s2;
         }
         sensors
     }
@@ -87,9 +98,9 @@ impl Sensors {
         }
     }
 
-    /// Each part with this standard deviation.
-    fn normal(&mut self, sigma: f32) -> Vector {
-        let mut draw = || self.random.normal(sigma);
+    /// Each part with a standard deviation of 1.
+    fn normal(&mut self) -> Vector {
+        let mut draw = || self.random.normal();
         Vector::new(draw(), draw(), draw())
     }
 
@@ -103,11 +114,11 @@ impl Sensors {
         };
         self.last_ideal = Some(ideal);
         for joint in 0..JOINTS {
-            read.q_rad[joint] += self.random.normal(noise.encoder_rad);
-            read.torque_n_m[joint] += self.random.normal(noise.torque_n_m);
+            read.q_rad[joint] += self.random.normal() * noise.encoder_rad;
+            read.torque_n_m[joint] += self.random.normal() * noise.torque_n_m;
         }
-        read.gyro_rad_s += self.gyro_bias_rad_s + self.normal(noise.gyro_rad_s);
-        read.specific_force_m_s2 += self.acc_bias_m_s2 + self.normal(noise.acc_m_s2);
+        read.gyro_rad_s += self.gyro_bias_rad_s + self.normal() * noise.gyro_rad_s;
+        read.specific_force_m_s2 += self.acc_bias_m_s2 + self.normal() * noise.acc_m_s2;
         if let Some(cutoff_hz) = noise.rate_cutoff_hz {
             let part = 1.0 - (-std::f32::consts::TAU * cutoff_hz * dt_s).exp();
             read.qd_rad_s = std::array::from_fn(|joint| {
@@ -129,7 +140,7 @@ impl Sensors {
     /// What the accelerometer reads in the mean over a second at rest, where an exact one reads `ideal_m_s2`.
     pub(super) fn still_force_m_s2(&mut self, ideal_m_s2: Vector) -> Vector {
         let noise_m_s2 = self.noise().map_or(0.0, |noise| noise.acc_m_s2 / STILL_READINGS.sqrt());
-        ideal_m_s2 + self.acc_bias_m_s2 + self.normal(noise_m_s2)
+        ideal_m_s2 + self.acc_bias_m_s2 + self.normal() * noise_m_s2
     }
 
     fn ideal(&mut self, tree: &Tree, model: &RobotModel, dt_s: f32) -> SensorReadings {

@@ -49,7 +49,8 @@ impl Robot {
         for (a, b) in model.apart() {
             dynamics.keep_apart(tree.link(a), tree.link(b));
         }
-        let knowledge = SelfKnowledge::new(model, dynamics.tree(tree), &Sensing::default(), index);
+        let knowledge =
+            SelfKnowledge::new(model, dynamics.tree(tree), &pelvis, Sensing::default(), index as u64);
         let body = knowledge.body(model, dynamics.tree(tree));
         let memory = RobotMemory {
             last_upper_rad: UPPER.iter().map(|joint| q_rad[*joint]).collect(),

@@ -40,7 +40,7 @@ pub struct RobotSensed {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotEstimate {
     pub world_from_pelvis: Pose,
-    /// External force on each hand, world frame, estimated from joint torques.
+    /// External force on each hand, in the same frame, estimated from joint torques.
     pub hand_force_n: Sides<Vector>,
 }
 
@@ -49,6 +49,9 @@ pub struct RobotEstimate {
 pub struct RobotTruth {
     /// Every link, in the order of [`crate::body::RobotModel::links`]; the pelvis is the first.
     pub world_from_link: Vec<Pose>,
+    pub world_from_wrist: Sides<Pose>,
+    /// Axes as [`crate::mjcf::MjcfCamera`]'s.
+    pub world_from_camera: Pose,
 }
 
 impl RobotSensed {
@@ -101,7 +104,16 @@ impl Robot {
     pub(crate) fn truth(&self, dynamics: &Dynamics) -> RobotTruth {
         let tree = dynamics.tree(self.tree);
         let links = 0..self.model.links.len();
-        RobotTruth { world_from_link: links.map(|link| rounded(&tree.world_from_link(link))).collect() }
+        let world_from_link: Vec<Pose> = links.map(|link| rounded(&tree.world_from_link(link))).collect();
+        let model = &self.model;
+        RobotTruth {
+            world_from_wrist: model
+                .wrists
+                .each_ref()
+                .map(|wrist| world_from_link[wrist.link] * wrist.link_from_site),
+            world_from_camera: world_from_link[model.egocentric_link] * model.egocentric.body_from_camera,
+            world_from_link,
+        }
     }
 
     /// The command of the last control step.

@@ -8,6 +8,9 @@ mod snapshot;
 mod step;
 mod watch;
 
+#[cfg(test)]
+mod knowledge_tests;
+
 use std::sync::Arc;
 
 pub use objects::{ObjectModel, ObjectPart, ObjectPlacement, ObjectState};
@@ -157,10 +160,12 @@ impl World {
         self.robots.iter_mut().for_each(|robot| robot.sense(&self.dynamics));
     }
 
-    /// Gives all robots other sensors, and another way to know themselves. They take it that they have stood still until now.
-    pub fn set_sensing(&mut self, sensing: &Sensing) {
+    /// Gives all robots other sensors, whose noise `seed` decides, and another way to know themselves. They take it that
+    /// they have stood still until now.
+    pub fn set_sensing(&mut self, sensing: Sensing, seed: u32) {
         for (index, robot) in self.robots.iter_mut().enumerate() {
-            robot.set_sensing(&self.dynamics, sensing, index);
+            let told = robot.truth(&self.dynamics).world_from_pelvis();
+            robot.set_sensing(&self.dynamics, &told, sensing, u64::from(seed) << 32 | index as u64);
         }
     }
 

@@ -1,12 +1,12 @@
 //! What one control step left behind: plain, serialisable, complete. Whoever looks at a world reads this.
 
-use rapier3d::math::{Pose, Vector};
+use rapier3d::math::Vector;
 use serde::{Deserialize, Serialize};
 
 use super::objects::Object;
 use super::{ObjectState, World};
 use crate::robot::{RobotCommand, RobotEstimate, RobotSensed, RobotTruth};
-use crate::{CONTROL_HZ, Side};
+use crate::{CONTROL_HZ, Side, Sides};
 
 /// The world after one control step, or before the first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,9 +60,10 @@ pub struct HandContacts {
 }
 
 impl RobotStep {
-    /// Where the camera in the robot's head is. Axes as [`crate::mjcf::MjcfCamera`]'s.
-    pub fn world_from_camera(&self) -> Pose {
-        self.truth.world_from_pelvis() * self.sensed.pelvis_from_camera
+    /// The external force on each hand that the robot feels, turned into the world as it is.
+    pub fn hand_force_in_world_n(&self) -> Sides<Vector> {
+        let world_from_pelvis = self.truth.world_from_pelvis();
+        self.sensed.hand_force_in_pelvis_n.map(|force_n| world_from_pelvis.rotation * force_n)
     }
 }
 

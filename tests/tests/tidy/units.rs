@@ -13,9 +13,10 @@ use super::{modules::modules, sources::expect_none};
 /// and its costs and errors are weighted.
 const CRATES: [&str; 4] = ["tools_spec", "sim", "episodes", "gateway"];
 
-/// In these files numbers belong to joints of any kind, in rad or m as in `ik`, or to rows of the solver, which mix them.
-const GENERALISED: [&str; 6] = [
+/// In these files numbers belong to joints of any kind, in rad or m as in `ik`, or to rows of a solver or a filter, which mix them.
+const GENERALISED: [&str; 7] = [
     "sim/src/dynamics/",
+    "sim/src/estimate/covariance.rs",
     "sim/src/mechanism/machinery.rs",
     "sim/src/mjcf/equality.rs",
     "sim/src/mjcf/joints.rs",

@@ -147,7 +147,7 @@ impl JsonMessage for HandsMessage {
 impl HandsMessage {
     /// The hands of robot number `robot`, which moved as `moved` where scoring sees `facts`.
     pub fn of(moved: &RobotStep, robot: usize, facts: &Facts) -> Json<HandsMessage> {
-        let felt_n = moved.estimate.hand_force_n.map(|force_n| force_n.to_array());
+        let felt_n = moved.hand_force_in_world_n().map(|force_n| force_n.to_array());
         let named = |side: Side, wanted: Grip| {
             let objects = facts.objects.iter().filter(|object| object.hands[robot][side] == wanted);
             objects.map(|object| object.name.clone()).collect()

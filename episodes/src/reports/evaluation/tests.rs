@@ -157,10 +157,11 @@ fn departures_stand_behind_the_name() {
     other.iter_mut().for_each(|played| {
         played.spec.hints = tandem_tools_spec::Hints::Off;
         played.spec.locomotion = crate::spec::Controller::File("policies/fast.onnx".into());
+        played.spec.sensing = tandem_sim::Sensing::TRUTH;
     });
     let report = EvaluationReport::of(&found([one, other].concat()));
     let names: Vec<&str> = report.policies.iter().map(|policy| policy.name.as_str()).collect();
-    assert_eq!(names, ["agent", "agent + hints: off + controller: fast.onnx"]);
+    assert_eq!(names, ["agent", "agent + hints: off + controller: fast.onnx + state estimate: truth"]);
     for format in ReportFormat::ALL {
         let text = report.write(format, &ReportPictures::default()).unwrap();
         assert!(text.contains(names[1]), "{format:?}: {text}");

@@ -93,10 +93,11 @@ fn examine(args: ServeArgs, token: Result<Option<Token>, String>) -> Findings {
 fn specs(layer: &Layer) -> impl Iterator<Item = EpisodeSpec> {
     let scene = layer.scene.as_deref().map(SceneFile::of);
     let scene = scene.and_then(Result::ok);
-    let (locomotion, renderer) = (layer.controller(), layer.renderer());
+    let (locomotion, sensing, renderer) = (layer.controller(), layer.sensing(), layer.renderer());
     tasks::ALL.iter().map(move |task| EpisodeSpec {
         scene: scene.clone(),
         locomotion: locomotion.clone(),
+        sensing,
         renderer,
         ..EpisodeSpec::new(task, 0, Protocol::Benchmark)
     })

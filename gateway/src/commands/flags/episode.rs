@@ -4,7 +4,7 @@ use std::{ops::RangeInclusive, path::PathBuf, str::FromStr};
 
 use clap::Args;
 use tandem_episodes::{
-    Controller, RendererKind, RobotFile, SceneFile, SimError,
+    Controller, RendererKind, RobotFile, SceneFile, Sensing, SensorModel, SimError, StateSource,
     evaluation::{EvaluationPlan, Shard, Starts},
     players::Policy,
     tasks::{self, Task},
@@ -41,6 +41,8 @@ pub struct EpisodeFlags {
     #[command(flatten)]
     locomotion: LocomotionFlag,
     #[command(flatten)]
+    sensing: SensingFlags,
+    #[command(flatten)]
     renderer: RendererFlag,
 }
 
@@ -71,6 +73,26 @@ impl LocomotionFlag {
     /// Which controller the flag names; its file is not read yet.
     pub fn controller(&self) -> Controller {
         Controller::from_file(self.file.as_deref())
+    }
+}
+
+/// What robots know of themselves, on the command line.
+#[derive(Debug, Args)]
+pub struct SensingFlags {
+    /// Where robots have their own state from: an estimator over what they sense, or the simulator, which no real robot has.
+    #[arg(long, env = "TANDEM_STATE_ESTIMATE", value_name = "SOURCE", value_parser = one_of(StateSource::ALL, StateSource::name))]
+    #[arg(default_value = StateSource::default().name())]
+    pub state_estimate: StateSource,
+    /// What robots sense: everything exactly, or with noise, bias and latency as a G1 does.
+    #[arg(long, env = "TANDEM_SENSORS", value_name = "NAME", value_parser = one_of(SensorModel::ALL, SensorModel::name))]
+    #[arg(default_value = SensorModel::default().name())]
+    pub sensors: SensorModel,
+}
+
+impl SensingFlags {
+    /// Both as one value.
+    pub fn sensing(&self) -> Sensing {
+        Sensing { state_estimate: self.state_estimate, sensors: self.sensors }
     }
 }
 
@@ -106,6 +128,7 @@ impl EpisodeFlags {
             scene: self.scene.read()?,
             robot: RobotFile::default(),
             locomotion: self.locomotion.controller(),
+            sensing: self.sensing.sensing(),
             disclosure: self.disclosure,
             hints: self.hints,
             renderer: self.renderer.kind,

@@ -3,5 +3,5 @@
 mod episode;
 mod policy;
 
-pub use episode::{EpisodeFlags, LocomotionFlag, RendererFlag, SceneFlag, Seeds};
+pub use episode::{EpisodeFlags, LocomotionFlag, RendererFlag, SceneFlag, Seeds, SensingFlags};
 pub use policy::PolicyFlags;

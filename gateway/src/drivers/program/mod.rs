@@ -78,6 +78,7 @@ impl Program {
             disclosure: spec.disclosure,
             hints: spec.hints,
             locomotion: spec.locomotion.clone(),
+            sensing: spec.sensing,
             renderer: spec.renderer,
             ..(*self.settings).clone()
         })

@@ -123,7 +123,7 @@ impl Cameras {
 
     /// The camera in a robot's head, as `step` left it.
     pub fn egocentric(&self, step: &Step, robot: usize) -> Camera {
-        camera(&self.heads[robot], step.robots[robot].world_from_camera())
+        camera(&self.heads[robot], step.robots[robot].truth.world_from_camera)
     }
 
     /// The scene's camera that sees all robots.

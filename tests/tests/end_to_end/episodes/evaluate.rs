@@ -6,7 +6,7 @@ use serde_json::json;
 use tandem_episodes::evaluation::{EpisodeEvent, EvaluationPlan, Shard, Starts, evaluate};
 use tandem_episodes::reports::{EvaluationReport, load};
 use tandem_episodes::results::PlayedEpisode;
-use tandem_episodes::{Controller, RendererKind, RobotFile, players, tasks};
+use tandem_episodes::{Controller, RendererKind, RobotFile, Sensing, players, tasks};
 use tandem_tools_spec::{Disclosure, EndReason, Hints, Protocol};
 
 fn plan(jobs: usize, seeds: Vec<u32>) -> EvaluationPlan<'static> {
@@ -17,6 +17,7 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> EvaluationPlan<'static> {
         scene: None,
         robot: RobotFile::default(),
         locomotion: Controller::Balance,
+        sensing: Sensing::default(),
         disclosure: Disclosure::Live,
         hints: Hints::On,
         renderer: RendererKind::Cpu,

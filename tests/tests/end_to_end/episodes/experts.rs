@@ -6,7 +6,7 @@ use std::thread::available_parallelism;
 use tandem_episodes::evaluation::{EvaluationPlan, Shard, Starts, evaluate};
 use tandem_episodes::players::{self, Episode, InProcess, PlayerError, PrivilegedEpisode, experts};
 use tandem_episodes::tasks::{self, Task};
-use tandem_episodes::{A, Controller, EpisodeSpec, Facts, RendererKind, RobotFile, Session};
+use tandem_episodes::{A, Controller, EpisodeSpec, Facts, RendererKind, RobotFile, Sensing, Session};
 use tandem_sim::Side;
 use tandem_tools_spec::{ActCall, Disclosure, Hints, Protocol, ToolCall, ToolReply};
 
@@ -24,6 +24,7 @@ fn solve(tasks: Vec<&'static Task>) {
         scene: None,
         robot: RobotFile::default(),
         locomotion: Controller::Balance,
+        sensing: Sensing::default(),
         disclosure: Disclosure::Live,
         hints: Hints::On,
         renderer: RendererKind::Cpu,

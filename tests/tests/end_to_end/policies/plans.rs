@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use tandem_episodes::{
-    Controller, Recorder, Recording, RendererKind, RobotFile,
+    Controller, Recorder, Recording, RendererKind, RobotFile, Sensing,
     evaluation::{Evaluation, EvaluationPlan, Shard, Starts, evaluate},
     players::Policy,
     tasks,
@@ -18,6 +18,7 @@ pub fn plan(player: &dyn Policy, seeds: Vec<u32>, record: bool) -> EvaluationPla
         robot: RobotFile::default(),
         scene: None,
         locomotion: Controller::Balance,
+        sensing: Sensing::default(),
         disclosure: Disclosure::Live,
         hints: Hints::On,
         renderer: RendererKind::Cpu,
