@@ -2,6 +2,8 @@
 
 mod contacts;
 mod disturb;
+#[cfg(test)]
+mod foot_tests;
 mod ground;
 mod objects;
 mod snapshot;
