@@ -9,6 +9,9 @@ use super::{HandLinks, JointModel, LinkModel, RobotModel, SiteModel};
 use crate::mjcf::{Actuator, ActuatorKind, AxisJoint, BodyTree, Document, Geom, LinkJoint, MjcfCamera, pose};
 use crate::{Side, Sides, SimError};
 
+/// A foot stands on what is lowest of it, to within this.
+const SOLE_M: f32 = 0.002;
+
 impl RobotModel {
     /// Reads a robot file: one free root body, hinges with position actuators, sites `left_wrist`, `right_wrist`,
     /// `left_foot`, `right_foot`, a camera `egocentric` and a first keyframe to stand in.
@@ -174,7 +177,8 @@ fn sites(
     Ok(Sides { left: site(Side::Left)?, right: site(Side::Right)? })
 }
 
-/// The lowest points of all that collides: of a sphere its lowest, of anything else the lower corners of its box.
+/// What of a foot stands on the floor: of a sphere its lowest point, of anything else the lower corners of its box; without those of
+/// shapes that end higher.
 fn corners_m(geoms: &[Geom]) -> Vec<Vector> {
     let colliding = geoms.iter().filter(|geom| geom.collides).filter_map(Geom::collider);
     let corners = colliding.flat_map(|(link_from_shape, shape)| match shape.as_ball() {
@@ -187,7 +191,10 @@ fn corners_m(geoms: &[Geom]) -> Vec<Vector> {
             [low.x, high.x].iter().flat_map(|x| [low.y, high.y].map(|y| Vector::new(*x, y, low.z))).collect()
         }
     });
-    corners.collect()
+    let mut corners_m: Vec<Vector> = corners.collect();
+    let lowest_m = corners_m.iter().map(|corner_m| corner_m.z).fold(f32::INFINITY, f32::min);
+    corners_m.retain(|corner_m| corner_m.z <= lowest_m + SOLE_M);
+    corners_m
 }
 
 fn imu_in_pelvis_m(tree: &BodyTree) -> Vector {
@@ -232,6 +239,16 @@ mod tests {
         assert!(text.contains(from), "{from}");
         let other = text.replacen(from, to, 1);
         RobotModel::parse("robot.xml", &other).err().map_or(String::new(), |error| error.to_string())
+    }
+
+    #[test]
+    fn a_foot_stands_on_the_corners_that_are_lowest() {
+        let text = assets::robot(assets::DEFAULT_ROBOT).expect("embedded");
+        let robot = RobotModel::parse("robot.xml", text).expect("a robot");
+        for corners_m in robot.sole_corners_m.iter() {
+            assert_eq!(corners_m.len(), 4, "what meets furniture ends higher: {corners_m:?}");
+            assert!(corners_m.iter().all(|corner_m| (corner_m.z + 0.035).abs() < 1e-6), "{corners_m:?}");
+        }
     }
 
     #[test]
