@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use tandem_sim::{
     LocomotionChoice, Sensing, SensorModel, SimError, StateSource, mjcf::Document, render::RendererKind,
 };
-use tandem_tools_spec::{Disclosure, Hints, Protocol};
+use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, Wording};
 
 use crate::error::SceneError;
 use crate::scoring::Phase;
@@ -31,10 +31,13 @@ pub struct EpisodeSpec {
     /// Who draws what robots see; nothing else depends on it.
     pub renderer: RendererKind,
     pub start: Start,
-    /// What the policy is told about its success.
+    /// How much the policy is told. Recordings that do not say it are of policies that were told everything.
+    #[serde(default)]
+    pub assistance: Assistance,
+    /// What it is told about its success: for experiments something else than the assistance has it.
     #[serde(default)]
     pub disclosure: Disclosure,
-    /// Whether it is told how to grasp.
+    /// Whether it is told how to grasp; likewise.
     #[serde(default)]
     pub hints: Hints,
 }
@@ -105,9 +108,20 @@ impl EpisodeSpec {
             sensing: Sensing::default(),
             renderer: RendererKind::default(),
             start: Start::default(),
-            disclosure: Disclosure::default(),
-            hints: Hints::default(),
+            assistance: Assistance::default(),
+            disclosure: Assistance::default().disclosure(),
+            hints: Assistance::default().hints(),
         }
+    }
+
+    /// The same with another assistance, and what that has of phases and hints.
+    pub fn assisted(self, assistance: Assistance) -> EpisodeSpec {
+        EpisodeSpec { assistance, disclosure: assistance.disclosure(), hints: assistance.hints(), ..self }
+    }
+
+    /// Which texts its policy reads.
+    pub fn wording(&self) -> Wording {
+        Wording { assistance: self.assistance, hints: self.hints }
     }
 
     /// What is not as the benchmark has it, each as results name it behind the policy's name. Whoever adds a setting decides here
@@ -125,13 +139,15 @@ impl EpisodeSpec {
             sensing: Sensing { state_estimate, sensors },
             renderer: _,
             start: _,
+            assistance,
             disclosure,
             hints,
         } = self;
         let file = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let departures = [
-            (*disclosure != Disclosure::default()).then(|| format!("phases told: {disclosure}")),
-            (*hints != Hints::default()).then(|| format!("hints: {hints}")),
+            (*assistance != Assistance::Paper).then(|| format!("assistance: {assistance}")),
+            (*disclosure != assistance.disclosure()).then(|| format!("phases told: {disclosure}")),
+            (*hints != assistance.hints()).then(|| format!("hints: {hints}")),
             scene.as_ref().map(|scene| format!("scene: {}", file(&scene.path))),
             (*robot != RobotFile::default()).then(|| format!("robot: {}", robot.kind())),
             match locomotion {

@@ -16,7 +16,7 @@ use tandem_episodes::{
     BaseLimits, Controller, Instructions, InstructionsError, RendererKind, SceneFile, Sensing, SensorModel,
     SimError, StateSource, Visibility,
 };
-use tandem_tools_spec::{Disclosure, Hints};
+use tandem_tools_spec::{Assistance, Disclosure, Hints, Wording};
 
 use crate::token::{Token, TokenError};
 
@@ -65,12 +65,16 @@ pub struct Layer {
     /// Who draws pictures: a graphics processor, the embedded renderer, or whichever is there [default: auto].
     #[arg(long, env = "TANDEM_RENDERER", value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name))]
     pub renderer: Option<RendererKind>,
-    /// What policies are told: `live` tells phases in every reply and ends an episode on success, `end` tells them at the end,
-    /// `never` only in the files; neither of these two ends an episode on success [default: live].
-    #[arg(long, env = "TANDEM_DISCLOSURE", value_name = "WHEN", value_parser = one_of(Disclosure::ALL, Disclosure::name))]
+    /// What policies are told: `paper` what the benchmark tells its agents, and success at the end; `full` all that robots sense,
+    /// phases as they are reached, and how to grasp [default: full].
+    #[arg(long, env = "TANDEM_ASSISTANCE", value_name = "WHAT", value_parser = one_of(Assistance::ALL, Assistance::name))]
+    pub assistance: Option<Assistance>,
+    /// For experiments: what is told of phases, whatever the assistance has: `live` tells them in every reply and ends an episode on
+    /// success, `end` tells them at the end, `never` only in the files; neither of these two ends an episode on success.
+    #[arg(long, hide = true, env = "TANDEM_DISCLOSURE", value_name = "WHEN", value_parser = one_of(Disclosure::ALL, Disclosure::name))]
     pub disclosure: Option<Disclosure>,
-    /// Whether tools' texts and the start's brief say how to grasp, or geometry only [default: on].
-    #[arg(long, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = one_of(Hints::ALL, Hints::name))]
+    /// For experiments: whether texts say how to grasp, whatever the assistance has.
+    #[arg(long, hide = true, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = one_of(Hints::ALL, Hints::name))]
     pub hints: Option<Hints>,
     /// Episodes that may be held at once; each costs a thread and about 8 MB [default: 8].
     #[arg(long, env = "TANDEM_MAX_EPISODES", value_name = "N")]
@@ -123,6 +127,7 @@ impl Layer {
             state_estimate: self.state_estimate.or(next.state_estimate),
             sensors: self.sensors.or(next.sensors),
             renderer: self.renderer.or(next.renderer),
+            assistance: self.assistance.or(next.assistance),
             disclosure: self.disclosure.or(next.disclosure),
             hints: self.hints.or(next.hints),
             max_episodes: self.max_episodes.or(next.max_episodes),
@@ -243,7 +248,9 @@ pub struct Settings {
     pub base_limits: BaseLimits,
     /// Who draws pictures.
     pub renderer: RendererKind,
-    /// What policies are told about their success.
+    /// How much policies are told.
+    pub assistance: Assistance,
+    /// What they are told about their success.
     pub disclosure: Disclosure,
     /// Whether they are told how to grasp.
     pub hints: Hints,
@@ -321,6 +328,11 @@ pub enum SettingsError {
 }
 
 impl Settings {
+    /// Which texts policies read.
+    pub fn wording(&self) -> Wording {
+        Wording { assistance: self.assistance, hints: self.hints }
+    }
+
     /// Fills what `flags` (and the environment, which clap reads) leave out from the file at `config`, then from defaults.
     pub fn resolve(flags: Layer, config: Option<&Path>) -> Result<Arc<Settings>, SettingsError> {
         let file = match config {
@@ -334,6 +346,7 @@ impl Settings {
         layer.check()?;
         let locomotion = layer.controller();
         let renderer = layer.renderer();
+        let assistance = layer.assistance.unwrap_or_default();
         tracing::info!("{}", renderer.describe()?);
         let seconds = |given: Option<u32>, default: u32| Duration::from_secs(given.unwrap_or(default).into());
         Ok(Arc::new(Settings {
@@ -350,8 +363,9 @@ impl Settings {
             locomotion,
             sensing: layer.sensing(),
             renderer,
-            disclosure: layer.disclosure.unwrap_or_default(),
-            hints: layer.hints.unwrap_or_default(),
+            assistance,
+            disclosure: layer.disclosure.unwrap_or(assistance.disclosure()),
+            hints: layer.hints.unwrap_or(assistance.hints()),
             allowed_hosts: layer.allowed_host.unwrap_or_default(),
             max_episodes: layer.max_episodes.unwrap_or(Layer::MAX_EPISODES),
             max_body_bytes: layer.max_body_bytes.unwrap_or(2_000_000),

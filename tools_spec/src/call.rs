@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 
 use crate::error::SpecError;
 use crate::list::{ActCall, LookCall, ToolCall, operator_tool_specs};
-use crate::parts::{Driving, Formats, Hints};
+use crate::parts::{Assistance, Driving, Formats, Wording};
 use crate::schema::{ToolSpec, body_schema, plain_schema};
 use crate::strict_value::StrictValue;
 use crate::tool::{Tool, parse_args};
@@ -161,8 +161,8 @@ fn beside<T: DeserializeOwned + Default>(
 }
 
 /// Every tool, with what programs may send beside its arguments in the schema of its body.
-pub fn specs_for_programs(hints: Hints) -> Vec<ToolSpec> {
-    let mut specs = operator_tool_specs(hints);
+pub fn specs_for_programs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
+    let mut specs = operator_tool_specs(wording);
     for spec in &mut specs {
         match spec.name {
             StartEpisode::NAME => {
@@ -184,7 +184,7 @@ pub fn specs_for_programs(hints: Hints) -> Vec<ToolSpec> {
 }
 
 fn properties<T: JsonSchema>() -> Map<String, Value> {
-    let mut schema = body_schema::<T>(Hints::default());
+    let mut schema = body_schema::<T>(Wording::from(Assistance::Full));
     schema["properties"].as_object_mut().map(std::mem::take).unwrap_or_default()
 }
 
@@ -282,7 +282,7 @@ mod tests {
 
     #[test]
     fn bodies_allow_it_and_models_do_not_see_it() {
-        for spec in specs_for_programs(Hints::On) {
+        for spec in specs_for_programs(Assistance::Full) {
             let beside: &[&str] = match spec.name {
                 StartEpisode::NAME => &Driving::FIELDS,
                 Observe::NAME => &Formats::FIELDS,

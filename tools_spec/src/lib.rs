@@ -28,10 +28,10 @@ pub use list::{
 };
 pub use listing::{EpisodeEntry, EpisodeList};
 pub use parts::{
-    BASE_COLUMNS, BaseCommand, BaseLimits, BaseMotion, Budget, Bytes, CameraArrays, CommandReply,
-    DepthFormat, Disclosure, Driving, Effort, FingerReport, Formats, HandReport, HandState, Heard, Hints,
-    ImageFormat, JointValues, OperatorToken, Operators, Partner, PartnerDid, PhaseReached, PixelRegion, Png,
-    Pose, Protocol, Range, RobotFallen, RobotReport, StopReason,
+    Assistance, BASE_COLUMNS, BaseCommand, BaseLimits, BaseMotion, Budget, Bytes, CameraArrays, CommandReply,
+    DepthFormat, Disclosure, Driving, Effort, ExtraInformation, FingerReport, Formats, HandReport, HandState,
+    Heard, Hints, ImageFormat, JointValues, OperatorToken, Operators, Partner, PartnerDid, PhaseReached,
+    PixelRegion, Png, Pose, Protocol, Range, RobotFallen, RobotReport, StopReason, Wording,
 };
 pub use refusal::{ProblemBody, Refusal, RefusalClass};
 pub use schema::{EpisodeToolSpec, Format, ToolSpec};
@@ -39,22 +39,24 @@ pub use tool::{Route, Tool, parse_args};
 pub use tools::*;
 
 /// The REST interface of `version` as OpenAPI 3.1, from the same types that read and write it, for a caller who may or may not `talk`.
-pub fn openapi(version: &str, hints: Hints, talk: bool) -> serde_json::Value {
-    let specs: Vec<ToolSpec> =
-        call::specs_for_programs(hints).into_iter().filter(|spec| talk || !spec.for_operators).collect();
+pub fn openapi(version: &str, wording: impl Into<Wording>, talk: bool) -> serde_json::Value {
+    let specs: Vec<ToolSpec> = call::specs_for_programs(wording.into())
+        .into_iter()
+        .filter(|spec| talk || !spec.for_operators)
+        .collect();
     schema::openapi(version, &specs)
 }
 
 /// The tools of the running episode `id` with these `robots`, whose commands may have up to `most_steps` control steps, for a caller
 /// who may or may not `talk`.
 pub fn episode_tool_specs(
-    hints: Hints,
+    wording: impl Into<Wording>,
     id: &str,
     robots: &[String],
     most_steps: u32,
     talk: bool,
 ) -> Vec<EpisodeToolSpec> {
-    let specs = call::specs_for_programs(hints).into_iter();
+    let specs = call::specs_for_programs(wording.into()).into_iter();
     let offered = specs.filter(|spec| spec.on_episode && (talk || !spec.for_operators));
     offered.map(|spec| spec.of_episode(id, robots, most_steps)).collect()
 }

@@ -4,7 +4,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::error::SpecError;
-use crate::parts::{CommandReply, Hints};
+use crate::parts::{CommandReply, Wording};
 use crate::schema::ToolSpec;
 use crate::tool::{Tool, parse_args};
 use crate::tools::*;
@@ -35,16 +35,17 @@ macro_rules! tools {
             $group:ident($call:ident) -> $whose:ident $reply:ident $(for $audience:ident)? { $($tool:ident,)* }
         )*
     ) => {
-        /// The tools of every policy, in the order it meets them, with or without hints in their texts.
-        pub fn tool_specs(hints: Hints) -> Vec<ToolSpec> {
-            operator_tool_specs(hints).into_iter().filter(|spec| !spec.for_operators).collect()
+        /// The tools of every policy, in the order it meets them, in the texts that it reads.
+        pub fn tool_specs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
+            operator_tool_specs(wording).into_iter().filter(|spec| !spec.for_operators).collect()
         }
 
         /// The tools of an operator who may talk to others: every tool.
-        pub fn operator_tool_specs(hints: Hints) -> Vec<ToolSpec> {
+        pub fn operator_tool_specs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
+            let wording = wording.into();
             vec![
-                $( ToolSpec::without_episode::<$free>(hints), )*
-                $( $( ToolSpec::on_episode::<$tool>(hints, $call::FOR_OPERATORS), )* )*
+                $( ToolSpec::without_episode::<$free>(wording), )*
+                $( $( ToolSpec::on_episode::<$tool>(wording, $call::FOR_OPERATORS), )* )*
             ]
         }
 

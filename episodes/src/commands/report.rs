@@ -25,8 +25,8 @@ pub fn report(clamped: &Clamped, began: &Pose, sensed: &RobotSensed, motion: &Mo
         robot: robot.name.clone(),
         left: hand_report(Side::Left, clamped, sensed, motion),
         right: hand_report(Side::Right, clamped, sensed, motion),
-        pelvis_in_start: wire_pose_from_sim(&sensed.start_from_pelvis),
-        base_motion: base_motion(began, &sensed.start_from_pelvis),
+        pelvis_in_start: Some(wire_pose_from_sim(&sensed.start_from_pelvis)),
+        base_motion: Some(base_motion(began, &sensed.start_from_pelvis)),
         waist_joints_clamped: names(
             robot,
             among(&clamped.columns, |column| columns::waist().contains(&column)),
@@ -60,15 +60,16 @@ fn hand_report(side: Side, clamped: &Clamped, sensed: &RobotSensed, motion: &Mot
     let measured = isometry_from_sim(&sensed.pelvis_from_wrist[side]);
     let missing = measured.inverse() * target;
     let robot = &motion.robot;
+    let force_n = sensed.hand_force_in_pelvis_n[side];
     HandReport {
-        state: wrist_state(side, &target, &measured, sensed, motion),
+        state: Some(wrist_state(side, &target, &measured, sensed, motion)),
         target: wire_pose(&target),
         measured: wire_pose(&measured),
         position_error_m: rounded(missing.translation.vector.norm()),
         orientation_error_rad: rounded(missing.rotation.angle()),
         fingers: fingers(side, sensed, motion),
-        largest_effort: largest_effort(side, sensed, motion),
-        force_n: sensed.hand_force_in_pelvis_n[side].to_array().map(|part| rounded_to(2, part.into())),
+        largest_effort: Some(largest_effort(side, sensed, motion)),
+        force_n: Some(force_n.to_array().map(|part| rounded_to(2, part.into()))),
         joints_clamped: names(
             robot,
             among(&clamped.columns, |column| arm.contains(&column) || hand.contains(&column)),
@@ -119,7 +120,7 @@ fn fingers(side: Side, sensed: &RobotSensed, motion: &Motion) -> FingerReport {
         HandState::Blocked
     };
     let wire = |angles_rad: [f64; HAND_JOINTS]| angles_rad.map(|angle_rad| rounded_to(4, angle_rad));
-    FingerReport { state, target_rad: wire(target_rad), measured_rad: wire(measured_rad) }
+    FingerReport { state: Some(state), target_rad: wire(target_rad), measured_rad: wire(measured_rad) }
 }
 
 fn largest_effort(side: Side, sensed: &RobotSensed, motion: &Motion) -> Effort {

@@ -1,13 +1,15 @@
 //! What a policy has to know of frames, cameras and hands, in words. The numbers are those of the embedded robot.
 
-use tandem_tools_spec::{Brief, Hints};
+use tandem_tools_spec::{Assistance, Brief, Hints, Wording};
 
 const FRAMES: &str = "Poses of wrists and camera, and points of query_depth, are in the robot's own pelvis frame as it is at that \
     moment: x forward, y left, z up, metres. Quaternions are [w, x, y, z].";
 
 const PARTNERS: &str = "The pelvis frames of different robots are unrelated. To relate two of them, find the same two points, well \
     apart, with query_depth of both robots: robots stand upright, so a turn about z and a shift take the points of the one to \
-    those of the other. pelvis_in_start keeps that valid while robots move.";
+    those of the other.";
+
+const PARTNERS_MOVE: &str = " pelvis_in_start keeps that valid while robots move.";
 
 const ODOMETRY: &str = "pelvis_in_start is where a robot's own legs and gyro have it: the pose of its pelvis in a frame that lies on \
     the floor under where the pelvis was when the episode began, z up, x where the robot faced. It drifts by up to 1 % of the way \
@@ -26,12 +28,14 @@ const GRASPING: &str = "Around something upright: open the thumb, come palm firs
     palm on it, then close the outer finger joints (middle_1, index_1) first, the inner ones (middle_0, index_0) next and the thumb \
     last; open in the reverse order, since open fingers may stay hooked under it. Fingers that are blocked hold something.";
 
-/// The brief of an episode, with hints or without.
-pub fn brief(hints: Hints) -> Brief {
+/// The brief of an episode in the words that its policy reads.
+pub fn brief(wording: Wording) -> Brief {
+    let Wording { assistance, hints } = wording;
+    let is_full = assistance == Assistance::Full;
     Brief {
         frames: FRAMES.into(),
-        partners: PARTNERS.into(),
-        odometry: ODOMETRY.into(),
+        partners: [PARTNERS, if is_full { PARTNERS_MOVE } else { "" }].concat(),
+        odometry: is_full.then(|| ODOMETRY.into()),
         camera: CAMERA.into(),
         hands: HANDS.into(),
         grasping: (hints == Hints::On).then(|| GRASPING.into()),
@@ -102,8 +106,16 @@ mod tests {
 
     #[test]
     fn without_hints_there_is_geometry_only() {
-        let (with, without) = (brief(Hints::On), brief(Hints::Off));
+        let (with, without) = (brief(Hints::On.into()), brief(Hints::Off.into()));
         assert!(with.grasping.is_some());
         assert_eq!(without, Brief { grasping: None, ..with });
+    }
+
+    #[test]
+    fn nothing_is_said_of_what_is_not_told() {
+        let brief = serde_json::json!(brief(Assistance::Paper.into())).to_string();
+        for word in ["pelvis_in_start", "base_motion", "grasping", "odometry"] {
+            assert!(!brief.contains(word), "{word}: {brief}");
+        }
     }
 }

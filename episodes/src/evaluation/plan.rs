@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use tandem_sim::{Sensing, render::RendererKind};
-use tandem_tools_spec::{Disclosure, Hints, Protocol};
+use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol};
 
 use crate::players::Policy;
 use crate::recording::Recorder;
@@ -24,9 +24,11 @@ pub struct EvaluationPlan<'a> {
     /// What robots know of themselves.
     pub sensing: Sensing,
     pub renderer: RendererKind,
-    /// What policies are told about their success, and whether success ends an episode.
+    /// How much policies are told.
+    pub assistance: Assistance,
+    /// What they are told about their success, and whether success ends an episode.
     pub disclosure: Disclosure,
-    /// Whether policies are told how to grasp.
+    /// Whether they are told how to grasp.
     pub hints: Hints,
     pub tasks: Vec<&'static Task>,
     pub seeds: Vec<u32>,
@@ -75,6 +77,7 @@ impl EvaluationPlan<'_> {
             locomotion: self.locomotion.clone(),
             sensing: self.sensing,
             renderer: self.renderer,
+            assistance: self.assistance,
             disclosure: self.disclosure,
             hints: self.hints,
             start,

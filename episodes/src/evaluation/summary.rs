@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use tandem_sim::Sensing;
-use tandem_tools_spec::{Disclosure, Hints, Protocol};
+use tandem_tools_spec::{Assistance, Protocol};
 
 use super::cache::EpisodeCache;
-use crate::results::{Exclusion, PhaseLevel, PlayedEpisode, PolicyCard, named};
+use crate::results::{Exclusion, PhaseLevel, PlayedEpisode, PolicyCard, named, shown_in};
 
 /// How a task went over its seeds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -35,8 +35,7 @@ pub struct Evaluation {
     pub locomotion: String,
     #[serde(flatten)]
     pub sensing: Sensing,
-    pub disclosure: Disclosure,
-    pub hints: Hints,
+    pub assistance: Assistance,
     /// What was not as the benchmark has it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub departures: Vec<String>,
@@ -54,7 +53,8 @@ pub struct Evaluation {
 impl Evaluation {
     /// The policy's name with what has to be known beside it, as reports have it.
     pub fn full_name(&self) -> String {
-        named(&self.policy.full_name(), &self.departures)
+        let shown = shown_in(self.episodes.iter());
+        named(&named(&self.policy.name, &shown), &self.departures)
     }
 }
 
@@ -85,8 +85,7 @@ pub fn summarise(cache: &EpisodeCache, episodes: Vec<PlayedEpisode>, left_out: V
         protocol: cache.plan.protocol,
         locomotion: cache.locomotion.clone(),
         sensing: cache.plan.sensing,
-        disclosure: cache.plan.disclosure,
-        hints: cache.plan.hints,
+        assistance: cache.plan.assistance,
         departures: cache.plan.departures(),
         tasks,
         phase_level: PhaseLevel::of(episodes.iter()),

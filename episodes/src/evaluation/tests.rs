@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use tandem_sim::{Sensing, dynamics::Diverged, render::RendererKind};
-use tandem_tools_spec::{Disclosure, EndReason, Hints, PhaseTimes, Protocol, ResultReply};
+use tandem_tools_spec::{Assistance, Disclosure, EndReason, Hints, PhaseTimes, Protocol, ResultReply};
 
 use super::*;
 use crate::players::{EpisodeOutput, PlayError, PlayOutcome, Policy};
@@ -25,7 +25,9 @@ fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultRe
         realtime_factor: 3.5,
         state_hash: "00c0ffee00c0ffee".into(),
         simulator_failure: None,
+        assistance: Assistance::Full,
         extra_information: vec![],
+        extra_information_replies: Default::default(),
         departures: vec![],
         recording_failed: None,
     }
@@ -79,6 +81,7 @@ fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> EvaluationPlan<'static> {
         locomotion: Controller::Balance,
         sensing: Sensing::default(),
         renderer: RendererKind::Cpu,
+        assistance: Assistance::Full,
         disclosure: Disclosure::Live,
         hints: Hints::On,
         tasks,
@@ -157,8 +160,19 @@ fn phases_on_their_own_are_averaged_by_who_works_on_them() {
         level.phases.iter().map(|rate| (rate.task, &*rate.number, rate.reached, rate.episodes)).collect();
     let handover = [("handover", "p1", 2, 2), ("handover", "p2", 1, 4), ("handover", "p3", 0, 1)];
     assert_eq!(rates, [&handover[..], &[("co_pouring", "p3", 3, 4)]].concat());
-    assert_eq!((level.non_collaborative_share, level.collaborative_share), (Some(0.5), Some(0.5)));
-    assert_eq!(level.drop_share, Some(0.0));
+    assert_eq!(
+        (level.two_robots.non_collaborative_share, level.two_robots.collaborative_share),
+        (Some(0.5), Some(0.5))
+    );
+    assert_eq!(level.two_robots.drop_share, Some(0.0));
+    assert_eq!(level.three_robots, None);
+    // Tasks of three robots have means of their own.
+    episodes.push(from("big_table", 0, 0, true));
+    episodes.push(from("big_table", 0, 1, false));
+    let with_three = PhaseLevel::of(episodes.iter()).unwrap();
+    assert_eq!(with_three.two_robots, level.two_robots);
+    let three = with_three.three_robots.unwrap();
+    assert_eq!((three.non_collaborative_share, three.collaborative_share), (None, Some(0.5)));
     let whole = played(&cache, &plan.spec(tasks::find("handover").unwrap(), 0, Start::Task));
     assert_eq!(PhaseLevel::of([whole].iter()), None);
 }
@@ -185,6 +199,7 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
         ("task", (|played| played.result.task = "handover".into()) as Change),
         ("seed", |played| played.result.seed = 8),
         ("protocol", |played| played.spec.protocol = Protocol::Benchmark),
+        ("assistance", |played| played.spec.assistance = Assistance::Paper),
         ("disclosure", |played| played.spec.disclosure = Disclosure::End),
         ("hints", |played| played.spec.hints = Hints::Off),
         ("sensing", |played| played.spec.sensing = Sensing::TRUTH),

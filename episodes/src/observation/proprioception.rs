@@ -53,10 +53,10 @@ pub fn robot_state(own: &Proprioception, sheet: &RobotSheet, detail: Detail) -> 
         joint_torques_n_m: in_full(&sensed.torque_n_m),
         left_wrist: wire_pose_from_sim(&sensed.pelvis_from_wrist.left),
         right_wrist: wire_pose_from_sim(&sensed.pelvis_from_wrist.right),
-        gravity_in_pelvis: wire_vector(sensed.gravity_in_pelvis),
-        pelvis_in_start: wire_pose_from_sim(&sensed.start_from_pelvis),
+        gravity_in_pelvis: Some(wire_vector(sensed.gravity_in_pelvis)),
+        pelvis_in_start: Some(wire_pose_from_sim(&sensed.start_from_pelvis)),
         base_command: wire_base(base),
-        fallen: sensed.fallen,
+        fallen: Some(sensed.fallen),
     }
 }
 

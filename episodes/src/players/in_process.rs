@@ -1,6 +1,6 @@
 //! An episode in this process, as a player meets it.
 
-use tandem_tools_spec::{Observe, Tool as _, ToolCall, ToolReply};
+use tandem_tools_spec::{ExtraInformation, Observe, Tool as _, ToolCall, ToolReply};
 
 use super::{Episode, LocalEpisode, PlayerError, PrivilegedEpisode};
 use crate::observation::{Picture, TeamObservation};
@@ -49,9 +49,19 @@ fn refused(tool: &'static str, error: EpisodeError) -> PlayerError {
 }
 
 impl LocalEpisode for InProcess {
-    fn observe(&mut self, observe: &Observe) -> Result<TeamObservation, PlayerError> {
+    fn observe(
+        &mut self,
+        observe: &Observe,
+        shown: &[ExtraInformation],
+    ) -> Result<TeamObservation, PlayerError> {
         self.check_underway()?;
-        self.session.observe(observe).map_err(|error| refused(Observe::NAME, error))
+        self.session.observe(observe, shown).map_err(|error| refused(Observe::NAME, error))
+    }
+
+    fn carry_out(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {
+        self.check_underway()?;
+        let tool = call.name();
+        self.session.carry_out(call).map_err(|error| refused(tool, error))
     }
 
     fn third_person(&mut self) -> Picture {

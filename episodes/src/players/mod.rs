@@ -9,7 +9,7 @@ mod idle;
 mod in_process;
 mod policy;
 
-use tandem_tools_spec::{Observe, ToolCall, ToolReply};
+use tandem_tools_spec::{ExtraInformation, Observe, ToolCall, ToolReply};
 
 use crate::observation::{Picture, TeamObservation};
 use crate::scoring::Facts;
@@ -30,8 +30,16 @@ pub trait PrivilegedEpisode: Episode {
 
 /// An episode in the caller's own process, which shows views as they were drawn.
 pub trait LocalEpisode: Episode {
-    /// What a call of `observe` shows, as it was drawn.
-    fn observe(&mut self, observe: &Observe) -> Result<TeamObservation, PlayerError>;
+    /// What a call of `observe` shows, as it was drawn, with nothing withheld; of what the benchmark's own policies are not shown, the
+    /// policy itself is `shown` this.
+    fn observe(
+        &mut self,
+        observe: &Observe,
+        shown: &[ExtraInformation],
+    ) -> Result<TeamObservation, PlayerError>;
+
+    /// Carries out what a policy decided. Nothing is withheld from the reply, which the policy itself is not shown.
+    fn carry_out(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError>;
 
     /// The room, seen from where no robot stands: more than a policy has, and results say so.
     fn third_person(&mut self) -> Picture;

@@ -17,7 +17,9 @@ use tandem_sim::render::RendererKind;
 use tandem_sim::{
     ObjectPlacement, Pose, Robot, RobotCommand, RobotPlacement, Rotation, Vector, World, WorldSpec,
 };
-use tandem_tools_spec::{Budget, EndReason, PhaseReached, PhaseTimes, Protocol, ResultReply, ToolCall};
+use tandem_tools_spec::{
+    Assistance, Budget, EndReason, PhaseReached, PhaseTimes, Protocol, ResultReply, ToolCall,
+};
 
 use super::*;
 use crate::commands::RobotSheet;
@@ -136,7 +138,9 @@ fn result() -> ResultReply {
         realtime_factor: 4.0,
         state_hash: "0123456789abcdef".into(),
         simulator_failure: None,
+        assistance: Assistance::Full,
         extra_information: vec![],
+        extra_information_replies: Default::default(),
         departures: vec![],
         recording_failed: None,
     }

@@ -7,5 +7,6 @@ pub use evaluation::{
     ByCollaboration, Comparison, EpisodeCosts, EvaluationReport, ExcludedEpisodes, Failure, FailureReason,
     Film, FilmContent, FilmPlace, FilmedEpisode, FoundEpisode, LoadError, LoadedEpisodes, MeanRate,
     PairedRow, PhaseReport, PolicyReport, PublishedAverages, PublishedRates, Rate, ReportFormat,
-    ReportPictures, TaskAverage, TaskReport, ValueRange, film_places, gallery, load, pictured_failures,
+    ReportPictures, ShownReport, TaskAverage, TaskReport, ValueRange, film_places, gallery, load,
+    pictured_failures,
 };

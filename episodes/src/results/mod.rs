@@ -2,13 +2,14 @@
 
 mod phase_level;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use tandem_tools_spec::{EndReason, ResultReply};
+use tandem_tools_spec::{Assistance, EndReason, ExtraInformation, ResultReply};
 
-pub use phase_level::{PhaseLevel, PhaseRate};
+pub use phase_level::{PhaseLevel, PhaseMeans, PhaseRate};
 
 use crate::output::{OutputError, write_whole};
 use crate::scoring::Phase;
@@ -81,9 +82,14 @@ impl PlayedEpisode {
         self.result.phases.reached_s(&Phase::number(phase)).is_some()
     }
 
-    /// The policy's name, what it was shown beyond what others see, and what else was not as the benchmark has it.
-    pub fn full_name(&self) -> String {
-        named(&self.policy.full_name(), &self.spec.departures())
+    /// What the policy was shown that the benchmark's own policies are not, without what its assistance says already.
+    fn shown(&self) -> impl Iterator<Item = &String> {
+        let is_said = |what: &&String| {
+            let of_full = ExtraInformation::ALL.into_iter().filter(|kind| kind.is_of_full_assistance());
+            self.spec.assistance == Assistance::Full && of_full.into_iter().any(|kind| kind.name() == **what)
+        };
+        let asked = &self.policy.extra_information;
+        asked.iter().chain(self.result.extra_information.iter().filter(move |what| !is_said(what)))
     }
 
     /// Whether the phase that counts was reached: the one that the episode began at, or the last.
@@ -138,6 +144,12 @@ pub fn named(policy: &str, beside: &[String]) -> String {
     std::iter::once(policy.to_owned()).chain(beside.iter().map(|what| format!(" + {what}"))).collect()
 }
 
+/// What the policy of these episodes was shown in any of them that the benchmark's own policies are not, as stands behind its name.
+pub fn shown_in<'a>(episodes: impl Iterator<Item = &'a PlayedEpisode>) -> Vec<String> {
+    let shown: BTreeSet<&String> = episodes.flat_map(PlayedEpisode::shown).collect();
+    shown.into_iter().cloned().collect()
+}
+
 impl From<&str> for PolicyCard {
     /// A policy of which nothing but the name is known.
     fn from(name: &str) -> PolicyCard {
@@ -186,7 +198,9 @@ mod tests {
             realtime_factor: 3.5,
             state_hash: "00c0ffee00c0ffee".into(),
             simulator_failure: None,
+            assistance: Assistance::Full,
             extra_information: vec![],
+            extra_information_replies: Default::default(),
             departures: vec![],
             recording_failed: None,
         }
@@ -200,7 +214,7 @@ mod tests {
             let written: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
             let expected = json!({
                 "task": "handover", "seed": 3, "protocol": "agentic", "phases": {"p1": 4.2, "p2": 9.86, "p3": p3},
-                "ended": "finished", "env_steps": 812, "tool_calls": 61, "falls": 0, "realtime_factor": 3.5,
+                "assistance": "full", "ended": "finished", "env_steps": 812, "tool_calls": 61, "falls": 0, "realtime_factor": 3.5,
                 "state_hash": "00c0ffee00c0ffee",
             });
             assert_eq!(written, expected);

@@ -14,6 +14,17 @@ use crate::tasks;
 pub struct PhaseLevel {
     /// The rates in the order of the tasks and their phases.
     pub phases: Vec<PhaseRate>,
+    /// Means over the tasks of two robots, as the benchmark has them.
+    #[serde(flatten)]
+    pub two_robots: PhaseMeans,
+    /// Means over the tasks of three robots, where any was played.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub three_robots: Option<PhaseMeans>,
+}
+
+/// Means of phases' rates; every phase counts the same, however many episodes it has.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PhaseMeans {
     /// Mean of the rates of phases that one robot works on at a time; `None` where there is none.
     pub non_collaborative_share: Option<f64>,
     /// Mean of the rates of phases on which robots work together.
@@ -26,6 +37,8 @@ pub struct PhaseLevel {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhaseRate {
     pub task: &'static str,
+    /// How many robots the task is for.
+    pub robots: usize,
     /// The phase's id, as `transfer`.
     pub id: &'static str,
     /// The phase's number, as `p2`.
@@ -55,23 +68,41 @@ impl PhaseLevel {
         let rate = |((task, phase), [episodes, reached]): ((usize, usize), [usize; 2])| {
             let task = &tasks::ALL[task];
             let Phase { id, collaborative, .. } = task.phases[phase];
-            PhaseRate { task: task.id, id, number: Phase::number(phase), collaborative, episodes, reached }
+            let robots = task.robots.len();
+            PhaseRate {
+                task: task.id,
+                robots,
+                id,
+                number: Phase::number(phase),
+                collaborative,
+                episodes,
+                reached,
+            }
         };
         let phases: Vec<PhaseRate> = counts.into_iter().map(rate).collect();
-        let mean = |together: bool| mean(phases.iter().filter(|rate| rate.collaborative == together));
-        let (non_collaborative_share, collaborative_share) = (mean(false), mean(true));
-        let drop = |(alone, together): (f64, f64)| (alone > 0.0).then(|| (alone - together) / alone);
-        let drop_share = non_collaborative_share.zip(collaborative_share).and_then(drop);
-        (!phases.is_empty()).then_some(PhaseLevel {
-            phases,
-            non_collaborative_share,
-            collaborative_share,
-            drop_share,
-        })
+        let of_robots = |robots: usize| phases.iter().filter(move |rate| rate.robots == robots);
+        let three_robots = of_robots(3).next().map(|_| PhaseMeans::of(of_robots(3)));
+        let two_robots = PhaseMeans::of(of_robots(2));
+        (!phases.is_empty()).then_some(PhaseLevel { phases, two_robots, three_robots })
+    }
+
+    /// The means by number of robots, where there are any.
+    pub fn means(&self) -> Vec<(usize, &PhaseMeans)> {
+        let two = self.phases.iter().any(|rate| rate.robots == 2).then_some((2, &self.two_robots));
+        two.into_iter().chain(self.three_robots.iter().map(|means| (3, means))).collect()
     }
 }
 
-/// Every phase counts the same, however many episodes it has.
+impl PhaseMeans {
+    fn of<'a>(rates: impl Iterator<Item = &'a PhaseRate> + Clone) -> PhaseMeans {
+        let mean = |together: bool| mean(rates.clone().filter(|rate| rate.collaborative == together));
+        let (non_collaborative_share, collaborative_share) = (mean(false), mean(true));
+        let drop = |(alone, together): (f64, f64)| (alone > 0.0).then(|| (alone - together) / alone);
+        let drop_share = non_collaborative_share.zip(collaborative_share).and_then(drop);
+        PhaseMeans { non_collaborative_share, collaborative_share, drop_share }
+    }
+}
+
 fn mean<'a>(rates: impl Iterator<Item = &'a PhaseRate>) -> Option<f64> {
     let shares: Vec<f64> = rates.map(PhaseRate::share).collect();
     (!shares.is_empty()).then(|| shares.iter().sum::<f64>() / shares.len() as f64)

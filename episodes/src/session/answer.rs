@@ -13,6 +13,7 @@ use crate::observation::{Detail, Proprioception, TeamObservation, check_formats,
 use crate::recording::CallOutcome;
 
 /// What a call is answered with; views are not encoded yet.
+#[derive(Clone)]
 pub enum Answer {
     Reply(Box<ToolReply>),
     Observation(TeamObservation),
@@ -115,7 +116,6 @@ impl Session {
         formats: &Formats,
     ) -> Result<TeamObservation, EpisodeError> {
         let robots = self.looked_through(args, formats)?;
-        self.saw_depth_images |= formats.depth.is_some() && self.ended.is_none();
         let sheets: Vec<&RobotSheet> = self.motions.iter().map(|motion| &motion.robot).collect();
         Ok(self.observer.observe(&self.present, &robots, &sheets, Detail::of(args)))
     }
@@ -163,7 +163,7 @@ impl Session {
             stop_reason,
             time_s: self.present.time_s,
             robots,
-            fallen: self.fallen(),
+            fallen: self.told_fallen(),
             phases: self.phases(),
             budget: self.budget(),
         })

@@ -1,7 +1,7 @@
 //! How calls reach an episode: what is refused before it counts, what is counted and recorded, and what the policy's clock does.
 
 use tandem_tools_spec::{
-    Call, EndReason, Formats, Look, ManageReply, Observation, Observe, ToolCall, ToolReply,
+    Call, EndReason, ExtraInformation, Formats, Look, ManageReply, Observation, Observe, ToolCall, ToolReply,
 };
 
 use super::Session;
@@ -36,12 +36,39 @@ impl Session {
         Ok(CallReply { reply, observation: self.look_after(operator, then)? })
     }
 
-    /// As [`Session::call`] of `observe`, for a policy in this process: with views as they were drawn.
-    pub fn observe(&mut self, observe: &Observe) -> Result<TeamObservation, EpisodeError> {
+    /// As [`Session::call`] of `observe`, for who asks a policy in this process: with views as they were drawn, and nothing
+    /// withheld. Of what the benchmark's own policies are not shown, the policy itself is `shown` this.
+    pub fn observe(
+        &mut self,
+        observe: &Observe,
+        shown: &[ExtraInformation],
+    ) -> Result<TeamObservation, EpisodeError> {
         let look = Look { observe: observe.clone(), formats: Formats::default() };
+        let underway = self.ended.is_none();
         let seen = self.look_once(None, &look);
+        for robot in seen.iter().flat_map(|seen| &seen.robots).filter(|_| underway) {
+            shown.iter().for_each(|what| self.shown.count(*what, &robot.state.robot));
+        }
         self.let_think();
         seen
+    }
+
+    /// As [`Session::call`], for who carries out what a policy in this process decided: nothing is withheld from the reply, which the
+    /// policy itself is not shown.
+    pub fn carry_out(&mut self, call: ToolCall) -> Result<ToolReply, EpisodeError> {
+        let called = Called::One(call.into());
+        let underway = self.arrived();
+        let answer = self.answer(&called);
+        let assistance = self.spec().assistance;
+        let told = answer.as_ref().map(|answer| {
+            let mut told = answer.clone();
+            told.withhold(assistance);
+            told
+        });
+        self.came_out(underway, None, &called, CallOutcome::of(&told));
+        let reply = answer.and_then(|answer| answer.reply(&called));
+        self.let_think();
+        reply
     }
 
     /// Reads an operator's command, which [`Session::together`] executes when those of others are there, too. A refusal is counted and
@@ -69,7 +96,8 @@ impl Session {
             calls.iter_mut().map(|call| (call.robot().to_owned(), call.take_look())).collect();
         let called = Called::Together(calls);
         let underway = self.arrived();
-        let answer = self.expect_underway().and_then(|()| self.act(&Command::together(orders)));
+        let mut answer = self.expect_underway().and_then(|()| self.act(&Command::together(orders)));
+        answer.iter_mut().for_each(|answer| self.tell(answer, &called, true));
         self.came_out(underway, None, &called, CallOutcome::of(&answer));
         self.let_think();
         let reply = answer?.reply(&called)?;
@@ -86,7 +114,9 @@ impl Session {
         called: &Called,
     ) -> Result<ToolReply, EpisodeError> {
         let underway = self.arrived();
+        let counts = self.ended.is_none();
         let mut answer = self.answer(called);
+        answer.iter_mut().for_each(|answer| self.tell(answer, called, counts));
         self.came_out(underway, operator, called, CallOutcome::of(&answer));
         if let Ok(Answer::Reply(reply)) = &mut answer
             && let ToolReply::Manage(ManageReply::Finish(reply)) = &mut **reply
@@ -97,6 +127,18 @@ impl Session {
         let reply = answer.and_then(|answer| answer.reply(called));
         self.let_think();
         reply
+    }
+
+    /// Takes out of an answer what the policy is not told, and counts what it is shown, if that `counts`.
+    fn tell(&mut self, answer: &mut Answer, called: &Called, counts: bool) {
+        answer.withhold(self.spec().assistance);
+        let formats = match called {
+            Called::One(call) => call.formats,
+            Called::Together(_) => Formats::default(),
+        };
+        if counts {
+            self.shown.count_answer(answer, &formats, self.origin.spec.protocol);
+        }
     }
 
     /// Whether the episode stands where a call expects it, and what it wants to see afterwards can be seen.
@@ -115,18 +157,22 @@ impl Session {
         look: Option<Look>,
     ) -> Result<Option<Observation>, EpisodeError> {
         let Some(look) = look else { return Ok(None) };
-        let seen = self.look_once(operator, &look);
+        let underway = self.ended.is_none();
+        let seen = self.look_once(operator, &look).map(|seen| seen.told(self.spec().assistance));
+        seen.iter().filter(|_| underway).for_each(|seen| self.shown.count_seen(seen, &look.formats));
         let observation = seen.and_then(|seen| Ok(seen.reply(&look.formats)?));
         self.let_think();
         observation.map(Some)
     }
 
+    /// What a look shows, with nothing withheld; it is recorded as a policy is told it.
     fn look_once(&mut self, operator: Option<&str>, look: &Look) -> Result<TeamObservation, EpisodeError> {
         let underway = self.arrived();
         let call = Call::from(look.clone());
         let valid = call.validate().map_err(EpisodeError::from);
         let seen = valid.and_then(|()| self.seen(&look.observe, &look.formats));
-        self.came_out(underway, operator, &Called::One(call), CallOutcome::of(&seen));
+        let told = seen.as_ref().map(|seen| seen.told(self.spec().assistance));
+        self.came_out(underway, operator, &Called::One(call), CallOutcome::of(&told));
         seen
     }
 

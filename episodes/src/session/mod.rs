@@ -9,6 +9,7 @@ mod failure;
 mod replay;
 mod run_files;
 mod status;
+mod told;
 
 pub(crate) use build::build;
 pub use calls::CallReply;
@@ -39,6 +40,7 @@ use crate::{EpisodeError, fingerprint};
 use build::Built;
 use checkpoint::Origin;
 use clock::ThinkingClock;
+use told::ShownInformation;
 
 /// One episode from start to result.
 pub struct Session {
@@ -62,8 +64,8 @@ pub struct Session {
     /// How the simulator failed, if it did.
     simulator_failure: Option<String>,
     rewind: Rewind,
-    /// Whether the policy has been given depth at every pixel.
-    saw_depth_images: bool,
+    /// What the policy has been shown that the benchmark's own policies are not.
+    shown: ShownInformation,
     /// State hashes of the steps since they were last taken, where somebody wants them.
     hashes: Option<Vec<u64>>,
     /// What it came to, from when the files were closed: the one truth that everybody is told.
@@ -108,7 +110,7 @@ impl Session {
             ended: None,
             simulator_failure: None,
             rewind: Rewind::default(),
-            saw_depth_images: false,
+            shown: ShownInformation::default(),
             hashes: None,
             result: None,
             present,

@@ -1,7 +1,8 @@
 //! How the episode stands: budget, phases, falls, result.
 
 use tandem_tools_spec::{
-    Briefing, Budget, EndReason, PhaseReached, PhaseTimes, ResultReply, RobotFallen, RobotInfo, StatusReply,
+    Assistance, Briefing, Budget, EndReason, PhaseReached, PhaseTimes, ResultReply, RobotFallen, RobotInfo,
+    StatusReply,
 };
 
 use super::Session;
@@ -9,6 +10,7 @@ use crate::commands::action_row;
 use crate::convert::rounded;
 use crate::describe;
 use crate::scoring::Phase;
+use crate::spec::EpisodeSpec;
 
 impl Session {
     pub(super) fn steps_left(&self) -> u32 {
@@ -38,6 +40,14 @@ impl Session {
             .collect()
     }
 
+    /// Who has fallen, as far as the policy is told.
+    pub(super) fn told_fallen(&self) -> Vec<RobotFallen> {
+        match self.spec().assistance {
+            Assistance::Paper => Vec::new(),
+            Assistance::Full => self.fallen(),
+        }
+    }
+
     /// Whether success ends the episode now.
     pub(super) fn has_succeeded(&self) -> bool {
         self.spec().disclosure.ends_on_success() && self.scores.complete()
@@ -64,6 +74,7 @@ impl Session {
 
     /// Where the episode stands, for those who look on: asking is no call.
     pub fn status(&self) -> StatusReply {
+        let EpisodeSpec { assistance, disclosure, .. } = *self.spec();
         StatusReply {
             task: self.spec().task.id.into(),
             seed: self.spec().seed,
@@ -71,8 +82,9 @@ impl Session {
             time_s: self.present.time_s,
             env_steps: self.env_steps(),
             ended: self.ended,
-            fallen: self.fallen(),
-            disclosure: self.spec().disclosure,
+            fallen: self.told_fallen(),
+            assistance,
+            disclosure: Some(disclosure).filter(|told| *told != assistance.disclosure()),
             phases: self.phases(),
             budget: self.budget(),
             state_hash: self.state_hash(),
@@ -90,7 +102,7 @@ impl Session {
             instructions: describe::instructions(task),
             robots: self.motions.iter().map(|motion| info(&motion.robot.name)).collect(),
             kinds: vec![describe::robot_kind(kind.clone(), &self.motions[0].robot)],
-            brief: describe::brief(self.spec().hints),
+            brief: describe::brief(self.spec().wording()),
             action_row: action_row(&self.motions[0].robot.model),
             status: self.status(),
             recording_failed: self.recording_failed().map(str::to_owned),
@@ -103,11 +115,6 @@ impl Session {
             Some(result) => result.clone(),
             None => self.result_so_far(),
         }
-    }
-
-    /// What the policy was shown beyond what the benchmark's own policies see.
-    fn extra_information(&self) -> Vec<String> {
-        self.saw_depth_images.then(|| "depth_images".into()).into_iter().collect()
     }
 
     fn result_so_far(&self) -> ResultReply {
@@ -126,7 +133,9 @@ impl Session {
             realtime_factor: if physics_s > 0.0 { self.present.time_s / physics_s } else { 0.0 },
             state_hash: self.state_hash(),
             simulator_failure: self.simulator_failure.clone(),
-            extra_information: self.extra_information(),
+            assistance: self.spec().assistance,
+            extra_information: self.shown.names(),
+            extra_information_replies: self.shown.replies(),
             departures: self.spec().departures(),
             recording_failed: self.recording_failed().map(str::to_owned),
         }

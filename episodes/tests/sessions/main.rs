@@ -1,5 +1,6 @@
 //! Sessions on real physics.
 
+mod assistance;
 mod at_rest;
 mod checkpoints;
 mod commands;

@@ -12,6 +12,7 @@ import urllib.request
 
 EPISODE = f"{os.environ['TANDEM_URL']}/v1/episodes/{os.environ['TANDEM_EPISODE']}"
 RISE_M = 0.1
+NEAR_M = 0.01
 MOST_COMMANDS = 8
 
 
@@ -38,10 +39,10 @@ def main():
     targets = [raised(robot["robot"]) for robot in start["robots"] if mine in (None, robot["robot"])]
     for _ in range(MOST_COMMANDS):
         reports = call("move_wrists", steps=steps, robots=targets)["robots"]
-        if all(report["right"]["state"] == "arrived" for report in reports):
+        if all(report["right"]["position_error_m"] < NEAR_M for report in reports):
             break
     for report in reports:
-        print(report["robot"], report["right"]["state"], report["right"]["measured"])
+        print(report["robot"], report["right"]["position_error_m"], report["right"]["measured"])
     print(call("finish"))
 
 

@@ -3,6 +3,7 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use tandem_episodes::players;
+use tandem_tools_spec::Assistance;
 use tracing_subscriber::filter::LevelFilter;
 
 use super::{CommandResult, evaluate::play_and_print, flags::EpisodeFlags, logging::log_to_stderr};
@@ -20,7 +21,7 @@ pub struct CollectArgs {
 /// Plays and records.
 pub fn run(args: CollectArgs) -> CommandResult {
     log_to_stderr(LevelFilter::INFO);
-    let plan = args.episodes.plan(players::find("expert")?, true)?;
+    let plan = args.episodes.plan(players::find("expert")?, true, Assistance::Full)?;
     play_and_print(&plan, &args.out)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -103,8 +103,9 @@ fn play(server: &Server, seed: u32) -> Result<ResultReply, Box<dyn Error>> {
     let task = tasks::find(TASK)?;
     let spec = EpisodeSpec::new(task, seed, Protocol::Agentic);
     let args = StartEpisode { task: task.id.into(), seed, protocol: Some(spec.protocol) };
-    println!("{TASK}, seed {seed}, over http://{}", server.address());
     let (http, started) = HttpEpisode::start(server.address(), &args)?;
+    let assistance = started.briefing.status.assistance;
+    println!("{TASK}, seed {seed}, over http://{}, assistance {assistance}", server.address());
     let thread = server.table().get(&started.episode_id)?;
     let mut episode = OverHttp { http, thread, progress: Progress::new(task.phases.len()) };
     let outcome = players::find("expert")?.play(&spec, &mut episode);

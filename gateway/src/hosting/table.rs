@@ -8,7 +8,7 @@ use std::{
 
 use tandem_episodes::{EpisodeSpec, RunFolder, tasks};
 use tandem_tools_spec::{
-    Briefing, Driving, EpisodeList, Protocol, ResultReply, StartEpisode, StartReply, TaskList,
+    Assistance, Briefing, Driving, EpisodeList, Protocol, ResultReply, StartEpisode, StartReply, TaskList,
 };
 use tokio::{
     sync::{OwnedSemaphorePermit, Semaphore},
@@ -94,6 +94,7 @@ impl EpisodeTable {
             locomotion: self.settings.locomotion.clone(),
             sensing: self.settings.sensing,
             renderer: self.settings.renderer,
+            assistance: self.settings.assistance,
             disclosure: self.settings.disclosure,
             hints: self.settings.hints,
             ..EpisodeSpec::new(tasks::find(&args.task)?, args.seed, protocol)
@@ -140,9 +141,15 @@ impl EpisodeTable {
         Ok(StartReply { episode_id: id.into(), operators, briefing })
     }
 
-    /// The reply to `list_tasks`.
+    /// The reply to `list_tasks`, without what policies of this server are not told.
     pub fn task_list(&self) -> TaskList {
-        self.settings.instructions.task_list(&self.settings.base_limits)
+        let mut list = self.settings.instructions.task_list(&self.settings.base_limits);
+        match self.settings.assistance {
+            // How the score is counted is no part of the task.
+            Assistance::Paper => list.tasks.iter_mut().for_each(|task| task.phases.clear()),
+            Assistance::Full => {}
+        }
+        list
     }
 
     /// The thread of the episode `id`.

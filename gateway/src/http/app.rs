@@ -29,14 +29,14 @@ impl AppState {
     /// The tools that `caller` may be offered: talking is for operators who may.
     pub fn tool_specs(&self, caller: &Caller) -> Vec<ToolSpec> {
         match self.table.may_talk(caller) {
-            true => operator_tool_specs(self.settings.hints),
-            false => tool_specs(self.settings.hints),
+            true => operator_tool_specs(self.settings.wording()),
+            false => tool_specs(self.settings.wording()),
         }
     }
 
     /// The REST interface as `caller` may use it.
     pub fn openapi(&self, caller: &Caller) -> Value {
-        tandem_tools_spec::openapi(VERSION, self.settings.hints, self.table.may_talk(caller))
+        tandem_tools_spec::openapi(VERSION, self.settings.wording(), self.table.may_talk(caller))
     }
 }
 

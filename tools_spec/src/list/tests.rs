@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::*;
+use crate::parts::Assistance;
 
 /// Wave with a robot's hand so many times; a tool to show what one line of the list gives, and nothing else.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -64,7 +65,7 @@ fn a_line_names_and_describes_the_tool() {
     assert_eq!(with_wave::EPISODE_TOOLS, ["get_status", "wave", "wait"]);
     assert_eq!(with_wave::LookCall::TOOLS, ["get_status", "wave"]);
     assert_eq!(with_wave::ActCall::TOOLS, ["wait"]);
-    let specs = with_wave::tool_specs(Hints::On);
+    let specs = with_wave::tool_specs(Assistance::Full);
     let names: Vec<_> = specs.iter().map(|spec| (spec.name, spec.on_episode)).collect();
     assert_eq!(names, [("list_tasks", false), ("get_status", true), ("wave", true), ("wait", true)]);
     let wave = &specs[2];
@@ -111,7 +112,7 @@ fn a_line_reads_replies() {
 
 #[test]
 fn every_example_works_and_only_looking_promises_to_change_nothing() {
-    let specs = operator_tool_specs(Hints::On);
+    let specs = operator_tool_specs(Assistance::Full);
     for example in ToolCall::examples() {
         assert_eq!(ToolCall::parse(example.name(), json!(example)), Ok(example.clone()));
         let read_only = specs.iter().any(|spec| spec.name == example.name() && spec.read_only);

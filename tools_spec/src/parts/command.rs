@@ -17,9 +17,10 @@ pub struct CommandReply {
     pub time_s: f64,
     /// One report per robot that the command named; after `wait`, one per robot of the episode.
     pub robots: Vec<RobotReport>,
-    /// Every robot of the episode.
+    /// Every robot of the episode; left out where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fallen: Vec<RobotFallen>,
-    /// Every phase reached so far, where the episode's disclosure tells it.
+    /// Every phase reached so far, where the episode's assistance tells it.
     pub phases: Vec<PhaseReached>,
     /// What is left of the episode.
     pub budget: Budget,
@@ -49,10 +50,13 @@ pub struct RobotReport {
     /// Its right arm and hand.
     pub right: HandReport,
     /// Where its own legs and gyro have it: the pose of its pelvis in the start frame, which lies on the floor under the pelvis as
-    /// it was when the episode began, z up, x where the robot faced. Drifts by up to 1 % of the way walked.
-    pub pelvis_in_start: Pose,
-    /// How far the command took the base, by the same odometry.
-    pub base_motion: BaseMotion,
+    /// it was when the episode began, z up, x where the robot faced. Drifts by up to 1 % of the way walked. Left out where the
+    /// assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pelvis_in_start: Option<Pose>,
+    /// How far the command took the base, by the same odometry; left out where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base_motion: Option<BaseMotion>,
     /// Waist joints whose target lay beyond a limit and was moved to it.
     pub waist_joints_clamped: Vec<String>,
     /// Waist joints that rest at a limit.
@@ -77,8 +81,9 @@ pub struct BaseMotion {
 /// How one hand did under a command, at its last step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HandReport {
-    /// How the wrist stands to its target.
-    pub state: HandState,
+    /// How the wrist stands to its target; left out where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub state: Option<HandState>,
     /// The wrist pose that was asked for, in the pelvis frame as it is now; of an arm without a wrist target, the pose that
     /// its joint targets stand for.
     pub target: Pose,
@@ -90,11 +95,14 @@ pub struct HandReport {
     pub orientation_error_rad: f64,
     /// Its fingers.
     pub fingers: FingerReport,
-    /// The joint of this arm and hand that works hardest.
-    pub largest_effort: Effort,
+    /// The joint of this arm and hand that works hardest; left out where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub largest_effort: Option<Effort>,
     /// Force of the world on the hand in newtons, in the pelvis frame, as the arm's own joints feel it: a hand that holds 0.5 kg
-    /// feels about -4.9 along z; one in quick motion feels its own inertia, too.
-    pub force_n: [f64; 3],
+    /// feels about -4.9 along z; one in quick motion feels its own inertia, too. Left out where the
+    /// assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force_n: Option<[f64; 3]>,
     /// Joints of this arm and hand whose target lay beyond a limit and was moved to it.
     pub joints_clamped: Vec<String>,
     /// Joints of this arm and hand that rest at a limit.
@@ -118,8 +126,9 @@ pub enum HandState {
 /// How the fingers of one hand did. Angles are [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FingerReport {
-    /// How they stand to their targets.
-    pub state: HandState,
+    /// How they stand to their targets; left out where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub state: Option<HandState>,
     /// Joint angles that were asked for, in radians.
     pub target_rad: [f64; 7],
     /// Joint angles that were measured, in radians.

@@ -35,6 +35,150 @@ impl fmt::Display for Protocol {
     }
 }
 
+/// How much a policy is told.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Assistance {
+    /// What the benchmark tells its agents: pictures, joint angles, wrist poses, calibration, depth at pixels, how far wrists are from
+    /// their targets and which joints are at a limit, and the budget; success at the end of the episode.
+    Paper,
+    /// All that a robot could sense, how hands stand to their targets, who has fallen, phases as they are reached, by what they are
+    /// scored, and how to grasp.
+    #[default]
+    Full,
+}
+
+impl Assistance {
+    /// Both.
+    pub const ALL: [Assistance; 2] = [Assistance::Paper, Assistance::Full];
+
+    /// The name that JSON, command lines and reports use.
+    pub fn name(self) -> &'static str {
+        match self {
+            Assistance::Paper => "paper",
+            Assistance::Full => "full",
+        }
+    }
+
+    /// What it is, for the log of a program that starts.
+    pub fn about(self) -> &'static str {
+        match self {
+            Assistance::Paper => {
+                "assistance paper: policies are told what the benchmark tells its agents, success at the end of the episode"
+            }
+            Assistance::Full => {
+                "assistance full: policies are told all that robots sense, phases as they are reached, and how to grasp"
+            }
+        }
+    }
+
+    /// What it tells of phases.
+    pub fn disclosure(self) -> Disclosure {
+        match self {
+            Assistance::Paper => Disclosure::End,
+            Assistance::Full => Disclosure::Live,
+        }
+    }
+
+    /// What its texts say besides geometry.
+    pub fn hints(self) -> Hints {
+        match self {
+            Assistance::Paper => Hints::Off,
+            Assistance::Full => Hints::On,
+        }
+    }
+}
+
+impl fmt::Display for Assistance {
+    fn fmt(&self, text: &mut fmt::Formatter) -> fmt::Result {
+        text.pad(self.name())
+    }
+}
+
+/// Which texts about tools a policy reads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Wording {
+    /// Whether they speak of what only `full` tells.
+    pub assistance: Assistance,
+    /// Whether they say how to grasp.
+    pub hints: Hints,
+}
+
+impl From<Assistance> for Wording {
+    fn from(assistance: Assistance) -> Wording {
+        Wording { assistance, hints: assistance.hints() }
+    }
+}
+
+impl From<Hints> for Wording {
+    fn from(hints: Hints) -> Wording {
+        Wording { assistance: Assistance::Full, hints }
+    }
+}
+
+/// What a policy may be shown that the benchmark's own policies are not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ExtraInformation {
+    /// Depth at every pixel of a picture.
+    DepthImages,
+    /// Depth at single pixels, where the benchmark's policies are learned ones.
+    PixelDepth,
+    /// The camera that sees all robots.
+    ThirdPerson,
+    /// How fast joints turn.
+    JointVelocities,
+    /// How hard drives work.
+    JointTorques,
+    /// What the world does to hands.
+    HandForces,
+    /// How far a robot has gone.
+    Odometry,
+    /// Which way is down.
+    Gravity,
+}
+
+impl ExtraInformation {
+    /// Every kind.
+    pub const ALL: [ExtraInformation; 8] = [
+        ExtraInformation::DepthImages,
+        ExtraInformation::PixelDepth,
+        ExtraInformation::ThirdPerson,
+        ExtraInformation::JointVelocities,
+        ExtraInformation::JointTorques,
+        ExtraInformation::HandForces,
+        ExtraInformation::Odometry,
+        ExtraInformation::Gravity,
+    ];
+
+    /// As results and reports call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            ExtraInformation::DepthImages => "depth_images",
+            ExtraInformation::PixelDepth => "pixel_depth",
+            ExtraInformation::ThirdPerson => "third_person",
+            ExtraInformation::JointVelocities => "joint_velocities",
+            ExtraInformation::JointTorques => "joint_torques",
+            ExtraInformation::HandForces => "hand_forces",
+            ExtraInformation::Odometry => "odometry",
+            ExtraInformation::Gravity => "gravity",
+        }
+    }
+
+    /// Whether `full` assistance tells it unasked, so that who names the assistance has named it.
+    pub fn is_of_full_assistance(self) -> bool {
+        match self {
+            ExtraInformation::DepthImages | ExtraInformation::PixelDepth | ExtraInformation::ThirdPerson => {
+                false
+            }
+            ExtraInformation::JointVelocities
+            | ExtraInformation::JointTorques
+            | ExtraInformation::HandForces
+            | ExtraInformation::Odometry
+            | ExtraInformation::Gravity => true,
+        }
+    }
+}
+
 /// What replies tell about phases, and whether success ends an episode.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -154,6 +298,9 @@ mod tests {
             assert_eq!((written, named.as_str()), (serde_json::json!(name), name));
         };
         for kind in Protocol::ALL {
+            check(serde_json::json!(kind), kind.to_string(), kind.name());
+        }
+        for kind in Assistance::ALL {
             check(serde_json::json!(kind), kind.to_string(), kind.name());
         }
         for kind in Disclosure::ALL {

@@ -4,7 +4,7 @@ use schemars::{JsonSchema, generate::SchemaSettings};
 use serde_json::Value;
 
 use crate::limits::bound_numbers;
-use crate::parts::Hints;
+use crate::parts::{Assistance, Hints, Wording};
 
 /// The schema of `T` as it is, for replies: nothing has to be strict about what the server itself sends.
 pub fn plain_schema<T: JsonSchema>() -> Value {
@@ -12,33 +12,40 @@ pub fn plain_schema<T: JsonSchema>() -> Value {
     settings.into_generator().into_root_schema_for::<T>().to_value()
 }
 
-/// The schema of `T` as arguments, with its hints at the end of what they belong to, or without them.
-pub fn argument_schema<T: JsonSchema>(hints: Hints) -> Value {
+/// The schema of `T` as arguments, with its hints at the end of what they belong to, or without them; where a policy is told less,
+/// a text that it has for that takes the place of the description.
+pub fn argument_schema<T: JsonSchema>(wording: Wording) -> Value {
     let mut schema = plain_schema::<T>();
-    tell(&mut schema, hints);
+    word(&mut schema, wording);
     schema
 }
 
 /// The schema of `T` as a body that is read: what the checks refuse, it does not allow. How many control steps a command may
 /// have is still to be said.
-pub fn body_schema<T: JsonSchema>(hints: Hints) -> Value {
-    let mut schema = argument_schema::<T>(hints);
+pub fn body_schema<T: JsonSchema>(wording: Wording) -> Value {
+    let mut schema = argument_schema::<T>(wording);
     bound_numbers(&mut schema);
     schema
 }
 
-fn tell(schema: &mut Value, hints: Hints) {
+fn word(schema: &mut Value, wording: Wording) {
     match schema {
-        Value::Array(items) => items.iter_mut().for_each(|item| tell(item, hints)),
+        Value::Array(items) => items.iter_mut().for_each(|item| word(item, wording)),
         Value::Object(object) => {
-            if object.get("hint").is_some_and(Value::is_string)
-                && let Some(Value::String(hint)) = object.remove("hint")
-                && hints == Hints::On
-                && let Some(Value::String(text)) = object.get_mut("description")
-            {
-                *text = format!("{text} {hint}");
+            let mut text_of = |name: &str| match object.get(name)?.is_string() {
+                true => object.remove(name)?.as_str().map(str::to_owned),
+                false => None,
+            };
+            let (hint, of_paper) = (text_of("hint"), text_of("paper"));
+            if let Some(Value::String(text)) = object.get_mut("description") {
+                if let (Some(of_paper), Assistance::Paper) = (of_paper, wording.assistance) {
+                    *text = of_paper;
+                }
+                if let (Some(hint), Hints::On) = (hint, wording.hints) {
+                    *text = format!("{text} {hint}");
+                }
             }
-            object.values_mut().for_each(|value| tell(value, hints));
+            object.values_mut().for_each(|value| word(value, wording));
         }
         _ => {}
     }

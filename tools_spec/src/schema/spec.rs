@@ -7,7 +7,7 @@ use super::nullable::leave_out;
 use super::plain::{body_schema, plain_schema};
 use super::strict::{require_episode_id, strict_schema};
 use crate::limits::{bound_robots, bound_steps};
-use crate::parts::Hints;
+use crate::parts::Wording;
 use crate::tool::{Route, Tool};
 
 /// A tool as a policy's host needs it: for OpenAI, Anthropic and MCP alike.
@@ -53,20 +53,20 @@ pub struct EpisodeToolSpec {
 impl ToolSpec {
     /// The specification of `T`, which acts on an episode; without a path to name it, the arguments carry `episode_id`. It may be
     /// for operators who talk alone.
-    pub fn on_episode<T: Tool>(hints: Hints, for_operators: bool) -> ToolSpec {
-        let mut spec = ToolSpec::without_episode::<T>(hints);
+    pub fn on_episode<T: Tool>(wording: Wording, for_operators: bool) -> ToolSpec {
+        let mut spec = ToolSpec::without_episode::<T>(wording);
         require_episode_id(&mut spec.input_schema);
         ToolSpec { on_episode: true, for_operators, ..spec }
     }
 
     /// The specification of `T`, which needs no episode.
-    pub fn without_episode<T: Tool>(hints: Hints) -> ToolSpec {
-        let (description, input_schema) = strict_schema::<T>(hints);
+    pub fn without_episode<T: Tool>(wording: Wording) -> ToolSpec {
+        let (description, input_schema) = strict_schema::<T>(wording);
         ToolSpec {
             name: T::NAME,
             description,
             input_schema,
-            marked_body: body_schema::<T>(hints),
+            marked_body: body_schema::<T>(wording),
             reply_schema: plain_schema::<T::Reply>(),
             read_only: T::READ_ONLY,
             idempotent: T::IDEMPOTENT,

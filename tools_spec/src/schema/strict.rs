@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 
 use super::nullable::as_choices;
 use super::plain::argument_schema;
-use crate::parts::Hints;
+use crate::parts::Wording;
 
 /// Keywords that OpenAI's strict mode or common MCP clients refuse or warn about.
 const DROPPED: &[&str] = &[
@@ -33,8 +33,8 @@ const DROPPED: &[&str] = &[
 ];
 
 /// The description of `T` and its schema without it.
-pub fn strict_schema<T: JsonSchema>(hints: Hints) -> (String, Map<String, Value>) {
-    let mut schema = argument_schema::<T>(hints);
+pub fn strict_schema<T: JsonSchema>(wording: Wording) -> (String, Map<String, Value>) {
+    let mut schema = argument_schema::<T>(wording);
     make_strict(&mut schema);
     let mut object = schema.as_object_mut().map(std::mem::take).unwrap_or_default();
     let description = match object.remove("description") {

@@ -1,10 +1,12 @@
 //! `finish`: ends the episode and gives its result. `episodes/src/session/answer.rs` carries it out.
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::Error as _};
 use serde_json::{Map, Value};
 
-use crate::parts::{Disclosure, Protocol};
+use crate::parts::{Assistance, Disclosure, Protocol};
 use crate::tool::Tool;
 
 /// End the episode and get its result. Call it when the task is done or cannot be done any more. After that no
@@ -70,10 +72,16 @@ pub struct ResultReply {
     /// How the simulator failed: in which step, at which body, and what came out; left out where it did not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simulator_failure: Option<String>,
+    /// How much the policy was told.
+    #[serde(default)]
+    pub assistance: Assistance,
     /// What the policy was shown beyond what the benchmark's own policies see, as "depth_images"; left out where it was nothing.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub extra_information: Vec<String>,
-    /// What else was not as the benchmark has it, as "scene: kitchen.xml"; left out where it was nothing.
+    /// How many replies showed it, by what it was, then by the robot that it was of; left out where it was nothing.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub extra_information_replies: BTreeMap<String, BTreeMap<String, u32>>,
+    /// What was not as the benchmark has it, as "assistance: full"; left out where it was nothing.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub departures: Vec<String>,
     /// Why the recording is not complete; left out where it is.

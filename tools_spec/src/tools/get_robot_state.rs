@@ -11,6 +11,8 @@ use crate::tool::Tool;
 /// frame, which way is down, how far the robot has gone, and the base command in force. Costs no steps; physics stands still.
 /// Also answers after the episode has ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(extend("paper" = "Read one robot's proprioception: 43 joint angles by name, both wrist poses in the pelvis frame, and the \
+    base command in force. Costs no steps; physics stands still. Also answers after the episode has ended."))]
 #[serde(deny_unknown_fields)]
 pub struct GetRobotState {
     /// The robot, as "A".
@@ -41,23 +43,28 @@ pub struct RobotState {
     pub time_s: f64,
     /// Joint angles in radians.
     pub joint_positions_rad: JointValues,
-    /// Joint velocities in radians per second; left out of observe's short form.
+    /// Joint velocities in radians per second; left out of observe's short form, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint_velocities_rad_s: Option<JointValues>,
-    /// Joint torques in newton metres, as the drives apply them; left out of observe's short form.
+    /// Joint torques in newton metres, as the drives apply them; left out of observe's short form, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint_torques_n_m: Option<JointValues>,
     /// Measured pose of the left wrist (`left_wrist_yaw_link`) in the pelvis frame (x forward, y left, z up).
     pub left_wrist: Pose,
     /// Measured pose of the right wrist (`right_wrist_yaw_link`) in the pelvis frame.
     pub right_wrist: Pose,
-    /// The direction of gravity in the pelvis frame, length 1: [0, 0, -1] when upright.
-    pub gravity_in_pelvis: [f64; 3],
+    /// The direction of gravity in the pelvis frame, length 1: [0, 0, -1] when upright. Left out where the assistance is
+    /// "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity_in_pelvis: Option<[f64; 3]>,
     /// Where its own legs and gyro have it: the pose of its pelvis in the start frame, which lies on the floor under the pelvis as
-    /// it was when the episode began, z up, x where the robot faced. Drifts by up to 1 % of the way walked.
-    pub pelvis_in_start: Pose,
+    /// it was when the episode began, z up, x where the robot faced. Drifts by up to 1 % of the way walked. Left out where the
+    /// assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pelvis_in_start: Option<Pose>,
     /// What locomotion is doing.
     pub base_command: BaseCommand,
-    /// Whether the robot has fallen.
-    pub fallen: bool,
+    /// Whether the robot has fallen; left out where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fallen: Option<bool>,
 }

@@ -4,12 +4,14 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::finish::EndReason;
-use crate::parts::{Budget, Disclosure, PhaseReached, Protocol, RobotFallen};
+use crate::parts::{Assistance, Budget, Disclosure, PhaseReached, Protocol, RobotFallen};
 use crate::tool::Tool;
 
 /// Ask where the episode stands: time, phases reached, who has fallen, and the budget left. Costs no steps; physics stands
 /// still. Also answers after the episode has ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(extend("paper" = "Ask where the episode stands: time, the budget left, and once it has ended the phases that were reached. \
+    Costs no steps; physics stands still. Also answers after the episode has ended."))]
 #[serde(deny_unknown_fields)]
 pub struct GetStatus {}
 
@@ -38,11 +40,16 @@ pub struct StatusReply {
     pub env_steps: u32,
     /// Why the episode has ended; null while it goes on.
     pub ended: Option<EndReason>,
-    /// Every robot of the episode.
+    /// Every robot of the episode; left out where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fallen: Vec<RobotFallen>,
-    /// What is told of the phases, and whether the last one ends the episode.
-    pub disclosure: Disclosure,
-    /// Every phase reached so far, where the disclosure tells it.
+    /// How much is told. Where it is "paper", phases are told once the episode has ended, which it does not do by itself on success:
+    /// call finish. Where it is "full", the last phase ends the episode.
+    pub assistance: Assistance,
+    /// What is told of the phases, where that is not as the assistance has it; left out otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub disclosure: Option<Disclosure>,
+    /// Every phase reached so far, where the assistance tells it.
     pub phases: Vec<PhaseReached>,
     /// What is left of the episode.
     pub budget: Budget,

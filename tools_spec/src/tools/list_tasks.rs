@@ -10,6 +10,8 @@ use crate::tool::{Route, Tool};
 /// List the tasks that start_episode can start: their instructions, the phases they are scored by, and the budgets of
 /// each protocol; and how fast and how low the robots can move.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(extend("paper" = "List the tasks that start_episode can start: their instructions and the budgets of each protocol; and how \
+    fast and how low the robots can move."))]
 #[serde(deny_unknown_fields)]
 pub struct ListTasks {}
 
@@ -45,7 +47,8 @@ pub struct TaskInfo {
     pub instruction: String,
     /// What each robot has to do, for policies that direct one.
     pub robots: Vec<Instruction>,
-    /// The phases, in the order they have to be reached.
+    /// The phases, in the order they have to be reached; left out where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub phases: Vec<PhaseInfo>,
     /// The protocols and their budgets for this task.
     pub protocols: Vec<ProtocolInfo>,

@@ -17,6 +17,11 @@ const LEAST_COMPLIANCE_N_S_M: f64 = 50.0;
 /// arm's joints, and fingers that are not given keep theirs. The reply says of each wrist and its fingers whether they have
 /// arrived, are moving (repeat the command or call wait), are blocked by load or contact, or are out of reach.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(extend("paper" = "Move wrists, fingers and base of one or more robots for a number of control steps of 20 ms. Inverse \
+    kinematics turns wrist poses into arm and waist joints. Robots that are not named hold still; a hand without a wrist target keeps \
+    its arm's joints, and fingers that are not given keep theirs. The reply says how far each wrist is from its target, where the \
+    fingers are, and which joints were moved to a limit or rest at one; a hand that is not there yet goes on when the command is \
+    repeated, or by wait."))]
 #[serde(deny_unknown_fields)]
 pub struct MoveWrists {
     /// Control steps of 20 ms: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark protocol.

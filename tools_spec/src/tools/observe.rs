@@ -23,6 +23,7 @@ pub struct Observe {
     )]
     pub robots: Option<Vec<String>>,
     /// True: without joint velocities and torques, which halves the text. False or null: with them.
+    #[schemars(extend("paper" = "Null: what it would leave out is not told here."))]
     pub short: Option<bool>,
 }
 

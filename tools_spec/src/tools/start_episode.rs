@@ -121,8 +121,9 @@ pub struct Brief {
     pub frames: String,
     /// How the frames of different robots are related.
     pub partners: String,
-    /// What is known of a robot's own way.
-    pub odometry: String,
+    /// What is known of a robot's own way; left out where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub odometry: Option<String>,
     /// The camera's convention, and what moves it.
     pub camera: String,
     /// The shape of a hand.

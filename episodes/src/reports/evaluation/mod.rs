@@ -20,8 +20,8 @@ pub use page::ReportPictures;
 pub use page::films::{Film, FilmContent, FilmPlace, FilmedEpisode, film_places};
 pub use page::gallery::{Failure, gallery, pictured_failures};
 pub use policy::{
-    ByCollaboration, EpisodeCosts, ExcludedEpisodes, FailureReason, PhaseReport, PolicyReport, TaskAverage,
-    TaskReport, ValueRange,
+    ByCollaboration, EpisodeCosts, ExcludedEpisodes, FailureReason, PhaseReport, PolicyReport, ShownReport,
+    TaskAverage, TaskReport, ValueRange,
 };
 pub use published::{PublishedAverages, PublishedRates};
 pub use rate::{MeanRate, Rate};

@@ -9,7 +9,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use super::load::FoundEpisode;
 use super::rate::{MeanRate, Rate};
-use crate::results::{Exclusion, PhaseLevel, PlayedEpisode, PolicyCard, missed_phase_note, named};
+use crate::results::{Exclusion, PhaseLevel, PlayedEpisode, PolicyCard, missed_phase_note, named, shown_in};
 use crate::scoring::Phase;
 use crate::statistics::Count;
 use crate::tasks::{self, Task};
@@ -40,9 +40,12 @@ pub struct PolicyReport {
     pub tasks: Vec<TaskReport>,
     /// Averages over the tasks of two robots, and over those of three.
     pub averages: Vec<TaskAverage>,
-    pub together: ByCollaboration,
+    /// Of the tasks of two robots, as the benchmark has it, then of those of three; each where it was played.
+    pub together: Vec<ByCollaboration>,
     /// Every phase on its own, where episodes began at phases.
     pub phase_level: Option<PhaseLevel>,
+    /// What it was shown that the benchmark's own policies are not.
+    pub shown: Vec<ShownReport>,
     pub reasons: Vec<FailureReason>,
     /// Episodes that say nothing of how far the policy gets.
     pub excluded: Vec<ExcludedEpisodes>,
@@ -84,9 +87,11 @@ pub struct TaskAverage {
     pub phases: Vec<Option<MeanRate>>,
 }
 
-/// Phases on which robots work together against those on which they do not: means of conditional rates.
+/// Phases on which robots work together against those on which they do not, of the tasks of one number of robots: means of conditional
+/// rates.
 #[derive(Debug, Serialize)]
 pub struct ByCollaboration {
+    pub robots: usize,
     pub alone: Option<MeanRate>,
     pub together: Option<MeanRate>,
 }
@@ -105,6 +110,17 @@ pub struct ValueRange {
     pub min: f64,
     pub median_value: f64,
     pub max: f64,
+}
+
+/// One kind of information that the benchmark's own policies are not shown.
+#[derive(Debug, Serialize)]
+pub struct ShownReport {
+    /// As results have it, as `odometry`.
+    pub what: String,
+    /// In how many of the episodes that count.
+    pub episodes: usize,
+    /// How many replies showed it, by the robot that it is of.
+    pub replies: BTreeMap<String, u32>,
 }
 
 /// Why some episodes failed.
@@ -127,7 +143,7 @@ pub struct ExcludedEpisodes {
 }
 
 /// Policies in the order in which they were found, with names that tell them apart.
-pub fn groups(episodes: &[FoundEpisode]) -> Vec<PolicyGroup<'_>> {
+pub fn groups<'a>(episodes: &'a [FoundEpisode]) -> Vec<PolicyGroup<'a>> {
     let mut groups: Vec<(Vec<String>, Vec<&FoundEpisode>)> = Vec::new();
     for found in episodes {
         let key = rules_of(&found.played);
@@ -137,16 +153,23 @@ pub fn groups(episodes: &[FoundEpisode]) -> Vec<PolicyGroup<'_>> {
         }
     }
     let keys: Vec<Vec<String>> = groups.iter().map(|(key, _)| key.clone()).collect();
-    let name = |key: &Vec<String>| {
+    let apart = |key: &Vec<String>| {
         let namesakes: Vec<&Vec<String>> = keys.iter().filter(|other| other[0] == key[0]).collect();
         let differs = |part: &usize| namesakes.iter().any(|other| other[*part] != key[*part]);
         let parts: Vec<&str> = (1..key.len()).filter(differs).map(|part| key[part].as_str()).collect();
         match parts.is_empty() {
-            true => key[0].clone(),
-            false => format!("{} ({})", key[0], parts.join(", ")),
+            true => String::new(),
+            false => format!(" ({})", parts.join(", ")),
         }
     };
-    groups.into_iter().map(|(key, episodes)| PolicyGroup::new(name(&key), episodes)).collect()
+    let group = |(key, episodes): (Vec<String>, Vec<&'a FoundEpisode>)| {
+        let (policy, settings) = (&episodes[0].played.policy.name, &episodes[0].played.spec);
+        let policy = split_address(policy).0;
+        let shown = shown_in(episodes.iter().map(|found| &found.played));
+        let full_name = named(&named(policy, &shown), &settings.departures());
+        PolicyGroup::new(full_name + &apart(&key), episodes)
+    };
+    groups.into_iter().map(group).collect()
 }
 
 impl<'a> PolicyGroup<'a> {
@@ -213,11 +236,9 @@ impl PolicyReport {
             episodes: played.len(),
             falls: played.iter().map(|played| played.result.falls).sum(),
             averages: averages(&tasks),
-            together: ByCollaboration {
-                alone: conditional(&tasks, false),
-                together: conditional(&tasks, true),
-            },
+            together: [2, 3].into_iter().filter_map(|robots| ByCollaboration::of(&tasks, robots)).collect(),
             phase_level: PhaseLevel::of(played.iter().copied()),
+            shown: shown(&played),
             reasons: reasons(&played),
             excluded: excluded(&group.excluded),
             tasks,
@@ -297,10 +318,37 @@ fn averages(tasks: &[TaskReport]) -> Vec<TaskAverage> {
     by_robots.into_iter().map(average).collect()
 }
 
-/// Mean of the conditional rates of phases on which robots work together, or of those on which they do not.
-fn conditional(tasks: &[TaskReport], together: bool) -> Option<MeanRate> {
-    let phases = tasks.iter().flat_map(|task| &task.phases).filter(|phase| phase.collaborative == together);
-    MeanRate::of(phases.filter_map(|phase| phase.conditional).map(Rate::count))
+impl ByCollaboration {
+    /// `None` where no phase of such a task has a conditional rate.
+    fn of(tasks: &[TaskReport], robots: usize) -> Option<ByCollaboration> {
+        let mean = |together: bool| {
+            let phases = tasks.iter().filter(|task| task.robots == robots).flat_map(|task| &task.phases);
+            let phases = phases.filter(|phase| phase.collaborative == together);
+            MeanRate::of(phases.filter_map(|phase| phase.conditional).map(Rate::count))
+        };
+        let (alone, together) = (mean(false), mean(true));
+        (alone.is_some() || together.is_some()).then_some(ByCollaboration { robots, alone, together })
+    }
+}
+
+fn shown(episodes: &[&PlayedEpisode]) -> Vec<ShownReport> {
+    let mut shown: BTreeMap<&String, ShownReport> = BTreeMap::new();
+    for played in episodes {
+        let (result, asked) = (&played.result, &played.policy.extra_information);
+        let kinds: BTreeSet<&String> = result.extra_information.iter().chain(asked).collect();
+        for what in kinds {
+            let report = shown.entry(what).or_insert_with(|| ShownReport {
+                what: what.clone(),
+                episodes: 0,
+                replies: BTreeMap::new(),
+            });
+            report.episodes += 1;
+            for (robot, count) in result.extra_information_replies.get(what).into_iter().flatten() {
+                *report.replies.entry(robot.clone()).or_default() += count;
+            }
+        }
+    }
+    shown.into_values().collect()
 }
 
 fn reasons(episodes: &[&PlayedEpisode]) -> Vec<FailureReason> {

@@ -4,6 +4,7 @@ use super::compare::{Comparison, PairedRow};
 use super::policy::{EpisodeCosts, PolicyReport, TaskReport, ValueRange};
 use super::rate::{MeanRate, Rate, percent};
 use super::{EvaluationReport, PublishedRates};
+use crate::statistics::Count;
 
 /// Words in rows and columns.
 pub struct Table {
@@ -32,6 +33,7 @@ pub fn all(report: &EvaluationReport) -> Vec<Table> {
     let mut tables: Vec<Table> = policies.iter().map(rates).collect();
     tables.push(averages(policies));
     tables.push(together(policies));
+    tables.push(shown(policies));
     tables.push(effort(policies));
     tables.push(reasons(policies));
     tables.push(excluded(policies));
@@ -95,42 +97,44 @@ fn mean_text(mean: Option<&MeanRate>) -> String {
 fn together(policies: &[PolicyReport]) -> Table {
     let mut table = Table::new(
         "Working alone and working together",
-        "Means of phases in percent. Conditional: given the phase before. From their beginnings: each episode begins where the \
-         phase begins in a demonstration. The drop is relative to working alone.",
-        &["Policy", "Rates", "Alone", "Together", "Gap (points)", "Drop"],
-        2,
+        "Means of phases in percent, over the tasks of two robots as the benchmark has them; those of three robots apart. Conditional: \
+         given the phase before. From their beginnings: each episode begins where the phase begins in a demonstration. The drop is \
+         relative to working alone.",
+        &["Policy", "Tasks", "Rates", "Alone", "Together", "Gap (points)", "Drop"],
+        3,
     );
-    let mut add = |policy: &PolicyReport, rates: &str, texts: [String; 2], shares: [Option<f64>; 2]| {
-        let gap = shares[0].zip(shares[1]).map(|(alone, together)| together - alone);
-        let drop = gap.zip(shares[0]).filter(|(_, alone)| *alone > 0.0).map(|(gap, alone)| -gap / alone);
-        let [alone, together] = texts;
-        table.rows.push(vec![
-            policy.name.clone(),
-            rates.into(),
-            alone,
-            together,
-            gap.map_or(NONE.into(), signed),
-            drop.map_or(NONE.into(), |drop| format!("{} %", percent(drop))),
-        ]);
-    };
+    let mut add =
+        |policy: &PolicyReport, robots: usize, rates: &str, texts: [String; 2], shares: [Option<f64>; 2]| {
+            let gap = shares[0].zip(shares[1]).map(|(alone, together)| together - alone);
+            let drop = gap.zip(shares[0]).filter(|(_, alone)| *alone > 0.0).map(|(gap, alone)| -gap / alone);
+            let [alone, together] = texts;
+            table.rows.push(vec![
+                policy.name.clone(),
+                format!("of {robots} robots"),
+                rates.into(),
+                alone,
+                together,
+                gap.map_or(NONE.into(), signed),
+                drop.map_or(NONE.into(), |drop| format!("{} %", percent(drop))),
+            ]);
+        };
     for policy in policies {
-        let means = [&policy.together.alone, &policy.together.together];
-        if means.iter().any(|mean| mean.is_some()) {
-            let shares = means.map(|mean| mean.as_ref().map(|mean| mean.mean_share));
-            add(policy, "conditional", means.map(|mean| mean_text(mean.as_ref())), shares);
+        for means in &policy.together {
+            let of_both = [&means.alone, &means.together];
+            let shares = of_both.map(|mean| mean.as_ref().map(|mean| mean.mean_share));
+            let texts = of_both.map(|mean| mean_text(mean.as_ref()));
+            add(policy, means.robots, "conditional", texts, shares);
         }
-        if let Some(level) = &policy.phase_level {
-            let mean =
-                |together: bool| {
-                    let phases = level.phases.iter().filter(|rate| rate.collaborative == together);
-                    MeanRate::of(phases.map(|rate| crate::statistics::Count {
-                        successes: rate.reached,
-                        trials: rate.episodes,
-                    }))
-                };
+        let Some(level) = &policy.phase_level else { continue };
+        for (robots, means) in level.means() {
+            let mean = |together: bool| {
+                let of_robots = level.phases.iter().filter(|rate| rate.robots == robots);
+                let phases = of_robots.filter(|rate| rate.collaborative == together);
+                MeanRate::of(phases.map(|rate| Count { successes: rate.reached, trials: rate.episodes }))
+            };
             let texts = [mean(false), mean(true)].map(|mean| mean_text(mean.as_ref()));
-            let shares = [level.non_collaborative_share, level.collaborative_share];
-            add(policy, "from their beginnings", texts, shares);
+            let shares = [means.non_collaborative_share, means.collaborative_share];
+            add(policy, robots, "from their beginnings", texts, shares);
         }
     }
     table
@@ -140,6 +144,29 @@ fn together(policies: &[PolicyReport]) -> Table {
 pub fn signed(share: f64) -> String {
     let text = percent(share);
     if share > 0.0 && text != "0" { format!("+{text}") } else { text }
+}
+
+fn shown(policies: &[PolicyReport]) -> Table {
+    let mut table = Table::new(
+        "Shown beyond the benchmark",
+        "What policies were shown that the benchmark's own are not: in how many of the episodes, and how many replies showed it of \
+         each robot.",
+        &["Policy", "Information", "Replies by robot", "Episodes"],
+        3,
+    );
+    for policy in policies {
+        for shown in &policy.shown {
+            let replies = shown.replies.iter().map(|(robot, count)| format!("{robot} {count}"));
+            let replies = replies.collect::<Vec<_>>().join(", ");
+            table.rows.push(vec![
+                policy.name.clone(),
+                shown.what.replace('_', " "),
+                if replies.is_empty() { NONE.into() } else { replies },
+                format!("{}/{}", shown.episodes, policy.episodes),
+            ]);
+        }
+    }
+    table
 }
 
 fn effort(policies: &[PolicyReport]) -> Table {

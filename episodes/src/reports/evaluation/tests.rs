@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use tandem_tools_spec::{EndReason, PhaseTimes, Protocol, ResultReply};
+use tandem_tools_spec::{Assistance, EndReason, PhaseTimes, Protocol, ResultReply};
 
 use super::*;
 use crate::results::PlayedEpisode;
@@ -31,7 +31,9 @@ fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Played
             realtime_factor: 3.5,
             state_hash: format!("{seed:016x}"),
             simulator_failure: None,
+            assistance: Assistance::Full,
             extra_information: vec![],
+            extra_information_replies: Default::default(),
             departures: vec![],
             recording_failed: None,
         },
@@ -90,7 +92,8 @@ fn rates_are_counted_by_phase() {
     assert_eq!(fractions(|phase| phase.cumulative), ["9/10", "6/10", "3/10"]);
     assert_eq!(fractions(|phase| phase.conditional), ["9/10", "6/9", "3/6"]);
     assert_eq!(fractions(|phase| phase.from_its_beginning), ["-", "-", "-"]);
-    let together = &report.policies[0].together;
+    let [together] = &report.policies[0].together[..] else { panic!("means of one number of robots") };
+    assert_eq!(together.robots, 2);
     let mean = |mean: &Option<MeanRate>| mean.as_ref().map(|mean| mean.mean_share);
     assert_eq!((mean(&together.alone), mean(&together.together)), (Some(0.7), Some(6.0 / 9.0)));
     let effort = handover.effort.as_ref().unwrap();

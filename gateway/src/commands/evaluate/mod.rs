@@ -16,6 +16,8 @@ use tandem_episodes::{
     tasks,
 };
 
+use tandem_tools_spec::Assistance;
+
 use super::{
     CommandResult,
     flags::{EpisodeFlags, PolicyFlags},
@@ -104,7 +106,7 @@ pub fn run(args: EvaluateArgs) -> CommandResult {
         starts,
         shard,
         keep_failed: args.keep_failed,
-        ..args.episodes.plan(&*policy, args.record)?
+        ..args.episodes.plan(&*policy, args.record, Assistance::Paper)?
     };
     Ok(match play_and_print(&plan, &args.out)? {
         0 if !plan.episodes().0.is_empty() => ExitCode::FAILURE,

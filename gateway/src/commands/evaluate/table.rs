@@ -86,12 +86,14 @@ fn print_phase_level(level: &PhaseLevel) {
         println!("{:14} {:>8}  {:>8}  {reached:^22} {who}", phase.task, phase.number, phase.episodes);
     }
     let percent = |share: Option<f64>| share.map_or("-".into(), |share| format!("{:.1}", 100.0 * share));
-    println!(
-        "mean of phases in %: alone {}, together {}, which is {} % lower",
-        percent(level.non_collaborative_share),
-        percent(level.collaborative_share),
-        percent(level.drop_share)
-    );
+    for (robots, means) in level.means() {
+        println!(
+            "mean of phases in %, tasks of {robots} robots: alone {}, together {}, which is {} % lower",
+            percent(means.non_collaborative_share),
+            percent(means.collaborative_share),
+            percent(means.drop_share)
+        );
+    }
 }
 
 fn rate(count: Count) -> String {

@@ -9,7 +9,7 @@ use tandem_episodes::{
     players::Policy,
     tasks::{self, Task},
 };
-use tandem_tools_spec::{Disclosure, Hints, Protocol};
+use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol};
 
 use crate::settings::{one_of, read_scene};
 
@@ -25,14 +25,15 @@ pub struct EpisodeFlags {
     /// The rules.
     #[arg(long, value_parser = one_of(Protocol::ALL, Protocol::name), default_value = Protocol::Agentic.name())]
     protocol: Protocol,
-    /// What policies are told, as for `serve`: only `live` ends an episode on success. Results have every phase all the same.
-    #[arg(long, env = "TANDEM_DISCLOSURE", value_name = "WHEN", value_parser = one_of(Disclosure::ALL, Disclosure::name))]
-    #[arg(default_value = Disclosure::Live.name())]
-    disclosure: Disclosure,
-    /// Whether policies are told how to grasp, as for `serve`.
-    #[arg(long, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = one_of(Hints::ALL, Hints::name))]
-    #[arg(default_value = Hints::On.name())]
-    hints: Hints,
+    /// What policies are told, as for `serve` [default: paper for evaluate, full for collect].
+    #[arg(long, env = "TANDEM_ASSISTANCE", value_name = "WHAT", value_parser = one_of(Assistance::ALL, Assistance::name))]
+    assistance: Option<Assistance>,
+    /// For experiments: what is told of phases, whatever the assistance has; only `live` ends an episode on success.
+    #[arg(long, hide = true, env = "TANDEM_DISCLOSURE", value_name = "WHEN", value_parser = one_of(Disclosure::ALL, Disclosure::name))]
+    disclosure: Option<Disclosure>,
+    /// For experiments: whether texts say how to grasp, whatever the assistance has.
+    #[arg(long, hide = true, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = one_of(Hints::ALL, Hints::name))]
+    hints: Option<Hints>,
     /// Worlds that run side by side.
     #[arg(long, default_value_t = 1, value_name = "N")]
     jobs: usize,
@@ -119,8 +120,15 @@ fn parse_tasks(text: &str) -> Result<TaskList, String> {
 }
 
 impl EpisodeFlags {
-    /// The plan to have `player` play these episodes.
-    pub fn plan(self, player: &dyn Policy, record: bool) -> Result<EvaluationPlan<'_>, SimError> {
+    /// The plan to have `player` play these episodes, told as `assistance` says where no flag does.
+    pub fn plan(
+        self,
+        player: &dyn Policy,
+        record: bool,
+        assistance: Assistance,
+    ) -> Result<EvaluationPlan<'_>, SimError> {
+        let assistance = self.assistance.unwrap_or(assistance);
+        tracing::info!("{}", assistance.about());
         tracing::info!("{}", self.renderer.kind.describe()?);
         Ok(EvaluationPlan {
             player,
@@ -129,8 +137,9 @@ impl EpisodeFlags {
             robot: RobotFile::default(),
             locomotion: self.locomotion.controller(),
             sensing: self.sensing.sensing(),
-            disclosure: self.disclosure,
-            hints: self.hints,
+            assistance,
+            disclosure: self.disclosure.unwrap_or(assistance.disclosure()),
+            hints: self.hints.unwrap_or(assistance.hints()),
             renderer: self.renderer.kind,
             tasks: self.tasks.0,
             seeds: self.seeds.0.collect(),

@@ -75,6 +75,7 @@ impl Program {
         Arc::new(Settings {
             token: Some(token),
             runs: folder.join("others"),
+            assistance: spec.assistance,
             disclosure: spec.disclosure,
             hints: spec.hints,
             locomotion: spec.locomotion.clone(),

@@ -88,7 +88,8 @@ fn brief(start: &StartReply, url: &str, robot: Option<&str>, driving: &Driving) 
         budget.steps_left, budget.steps_per_command
     ));
     let Brief { frames, partners, odometry, camera, hands, grasping } = &briefing.brief;
-    paragraphs.extend([frames, partners, odometry, camera, hands].into_iter().chain(grasping).cloned());
+    let told = [frames, partners].into_iter().chain(odometry).chain([camera, hands]).chain(grasping);
+    paragraphs.extend(told.cloned());
     paragraphs.join("\n\n") + "\n"
 }
 

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use tandem_episodes::joint_names;
-use tandem_tools_spec::{ACTION_ROW_LEN, BASE_COLUMNS, Pose, RobotState};
+use tandem_tools_spec::{ACTION_ROW_LEN, BASE_COLUMNS, ExtraInformation, Pose, RobotState};
 
 use super::poses::{POSE_LEN, RotationForm, pose_values};
 
@@ -60,17 +60,22 @@ const WRIST_PARTS: [(&str, Range<usize>); 6] = [
     ("_rows_6d", 17..POSE_LEN),
 ];
 
+/// Upright, where the episode began.
+const DOWN: [f64; 3] = [0.0, 0.0, -1.0];
+const START: Pose = Pose { position_m: [0.0; 3], quaternion_wxyz: [1.0, 0.0, 0.0, 0.0] };
+
 /// All that a robot senses: joints in rad; of each wrist the pose in the pelvis frame; which way is down; the pelvis where its own
 /// odometry has it, x, y, z in m and w, x, y, z; the base command in force, as [`BASE_COLUMNS`] has it.
 pub fn state_values(state: &RobotState) -> Vec<f64> {
     let joints = state.joint_positions_rad.0.iter().map(|(_, angle_rad)| *angle_rad);
     let wrists = [&state.left_wrist, &state.right_wrist].into_iter();
     let wrists = wrists.flat_map(|pose| pose_values(pose.position_m, pose.quaternion_wxyz));
-    let Pose { position_m, quaternion_wxyz } = state.pelvis_in_start;
+    // Nothing is withheld from who asks a policy; see `LocalEpisode::observe`.
+    let Pose { position_m, quaternion_wxyz } = state.pelvis_in_start.unwrap_or(START);
     let pelvis = position_m.into_iter().chain(quaternion_wxyz);
     let base = &state.base_command;
     let base = [base.vx_m_s, base.vy_m_s, base.yaw_rate_rad_s, base.pelvis_height_m];
-    joints.chain(wrists).chain(state.gravity_in_pelvis).chain(pelvis).chain(base).collect()
+    joints.chain(wrists).chain(state.gravity_in_pelvis.unwrap_or(DOWN)).chain(pelvis).chain(base).collect()
 }
 
 /// Numbers of the right length for [`state_values`], of a robot of which nothing is known.
@@ -138,6 +143,16 @@ pub fn wrist_named(name: &str) -> Option<usize> {
 /// Which of [`state_values`] the `names` mean, in their order.
 pub fn state_columns(names: &[String]) -> Result<Vec<usize>, String> {
     columns(names, &state_blocks(), &state_singles())
+}
+
+/// What of the state columns numbered `columns` the benchmark's own policies are not shown.
+pub fn extra_columns(columns: &[usize]) -> Vec<ExtraInformation> {
+    let extra = [
+        (ExtraInformation::Gravity, STATE_GRAVITY..STATE_PELVIS),
+        (ExtraInformation::Odometry, STATE_PELVIS..STATE_BASE),
+    ];
+    let named = |of: &Range<usize>| columns.iter().any(|column| of.contains(column));
+    extra.into_iter().filter(|(_, of)| named(of)).map(|(what, _)| what).collect()
 }
 
 /// Which columns of those that a policy may tell the `names` mean, in their order.

@@ -98,7 +98,7 @@ impl ServerHandler for McpServer {
         let arguments = request.arguments.unwrap_or_default();
         let list = self.app.table.task_list();
         let caller = caller_of(&context).unwrap_or(&Caller::Host);
-        Ok(prompt::prompt(&request.name, arguments, list, self.app.settings.hints, caller)?.into())
+        Ok(prompt::prompt(&request.name, arguments, list, self.app.settings.wording(), caller)?.into())
     }
 
     async fn call_tool(

@@ -5,7 +5,9 @@ use rmcp::{
     model::{GetPromptResult, JsonObject, Prompt, PromptArgument, PromptMessage, Role},
 };
 use tandem_episodes::{brief, tasks};
-use tandem_tools_spec::{Brief, Hints, Protocol, ProtocolInfo, StartEpisode, TaskInfo, TaskList, parse_args};
+use tandem_tools_spec::{
+    Brief, Protocol, ProtocolInfo, StartEpisode, TaskInfo, TaskList, Wording, parse_args,
+};
 
 use crate::hosting::Caller;
 
@@ -33,7 +35,7 @@ pub fn prompt(
     name: &str,
     arguments: JsonObject,
     list: TaskList,
-    hints: Hints,
+    wording: Wording,
     caller: &Caller,
 ) -> Result<GetPromptResult, ErrorData> {
     let refused = |text: String| ErrorData::invalid_params(text, None);
@@ -44,7 +46,7 @@ pub fn prompt(
     let task = tasks::find(&start.task).map_err(|error| refused(error.to_string()))?;
     let info = list.tasks.iter().find(|info| info.id == task.id);
     let info = info.ok_or_else(|| refused(format!("{} is not listed", task.id)))?;
-    let text = text(info, &start, &brief(hints), caller);
+    let text = text(info, &start, &brief(wording), caller);
     let mut result = GetPromptResult::new(vec![PromptMessage::new_text(Role::User, text)]);
     result.description = Some(info.instruction.clone());
     Ok(result)
@@ -68,8 +70,11 @@ fn text(task: &TaskInfo, start: &StartEpisode, brief: &Brief, caller: &Caller) -
     let robots = task.robots.iter().map(|robot| format!("* {}: {}", robot.robot, robot.instruction));
     let phases =
         task.phases.iter().map(|phase| format!("* {} {}: {}", phase.number, phase.id, phase.description));
+    let phases = phases.collect::<Vec<_>>().join("\n");
+    let phases = (!phases.is_empty()).then(|| format!("The phases that are scored:\n{phases}"));
     let budget = task.protocols.iter().find(|info| info.protocol == protocol).map(budget);
-    let brief = [&brief.frames, &brief.partners, &brief.odometry, &brief.camera, &brief.hands];
+    let Brief { frames, partners, odometry, camera, hands, grasping: _ } = brief;
+    let brief = [frames, partners].into_iter().chain(odometry).chain([camera, hands]);
     let lines = |lines: &mut dyn Iterator<Item = String>| lines.collect::<Vec<_>>().join("\n");
     let begin = match caller {
         Caller::Host => {
@@ -78,18 +83,18 @@ fn text(task: &TaskInfo, start: &StartEpisode, brief: &Brief, caller: &Caller) -
         // Its episode goes on already.
         Caller::Operator { robot, .. } => format!("You are the operator of robot {robot}. "),
     };
-    [
-        task.instruction.clone(),
-        format!("The robots:\n{}", lines(&mut robots.into_iter())),
-        format!("The phases that are scored:\n{}", lines(&mut phases.into_iter())),
-        budget.unwrap_or_default(),
-        lines(&mut brief.into_iter().cloned()),
-        format!(
+    let paragraphs = [
+        Some(task.instruction.clone()),
+        Some(format!("The robots:\n{}", lines(&mut robots.into_iter()))),
+        phases,
+        budget,
+        Some(lines(&mut brief.cloned())),
+        Some(format!(
             "{begin}Look with observe, measure with query_depth, act \
              with move_wrists, walk and wait, and check with every reply what came of it. Call finish when the task is done."
-        ),
-    ]
-    .join("\n\n")
+        )),
+    ];
+    paragraphs.into_iter().flatten().collect::<Vec<_>>().join("\n\n")
 }
 
 fn budget(info: &ProtocolInfo) -> String {

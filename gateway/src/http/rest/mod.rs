@@ -90,9 +90,9 @@ async fn episode_tools(
 ) -> Result<Json<Vec<EpisodeToolSpec>>, ApiError> {
     let episode = app.table.hosted(&id)?;
     episode.admit(&caller)?;
-    let (hints, talk) = (app.settings.hints, app.table.may_talk(&caller));
+    let (wording, talk) = (app.settings.wording(), app.table.may_talk(&caller));
     let thread = &episode.thread;
-    Ok(Json(episode_tool_specs(hints, &id, thread.robots(), thread.steps_per_command(), talk)))
+    Ok(Json(episode_tool_specs(wording, &id, thread.robots(), thread.steps_per_command(), talk)))
 }
 
 async fn openapi(State(app): State<AppState>, Extension(caller): Extension<Caller>) -> Json<Value> {

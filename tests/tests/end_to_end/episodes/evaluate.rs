@@ -6,8 +6,8 @@ use serde_json::json;
 use tandem_episodes::evaluation::{EpisodeEvent, EvaluationPlan, Shard, Starts, evaluate};
 use tandem_episodes::reports::{EvaluationReport, load};
 use tandem_episodes::results::PlayedEpisode;
-use tandem_episodes::{Controller, RendererKind, RobotFile, Sensing, players, tasks};
-use tandem_tools_spec::{Disclosure, EndReason, Hints, Protocol};
+use tandem_episodes::{Controller, EpisodeSpec, RendererKind, RobotFile, Sensing, players, tasks};
+use tandem_tools_spec::{Assistance, Disclosure, EndReason, Hints, Protocol};
 
 fn plan(jobs: usize, seeds: Vec<u32>) -> EvaluationPlan<'static> {
     let handover = tasks::find("handover").expect("a task");
@@ -18,6 +18,7 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> EvaluationPlan<'static> {
         robot: RobotFile::default(),
         locomotion: Controller::Balance,
         sensing: Sensing::default(),
+        assistance: Assistance::Full,
         disclosure: Disclosure::Live,
         hints: Hints::On,
         renderer: RendererKind::Cpu,
@@ -34,18 +35,28 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> EvaluationPlan<'static> {
 #[test]
 fn what_policies_are_told_is_recorded_and_not_mixed() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let play = |disclosure: Disclosure, hints: Hints| {
-        let plan = EvaluationPlan { disclosure, hints, ..plan(1, vec![1]) };
-        let told = evaluate(&plan, folder.path(), &|_| {}).expect("it is played").episodes.remove(0);
+    let play = |assistance: Assistance, disclosure: Disclosure, hints: Hints, name: &str| {
+        let plan = EvaluationPlan { assistance, disclosure, hints, ..plan(1, vec![1]) };
+        let mut evaluation = evaluate(&plan, folder.path(), &|_| {}).expect("it is played");
+        assert_eq!(evaluation.full_name(), name);
+        let told = evaluation.episodes.remove(0);
         let text = std::fs::read_to_string(folder.path().join("results.json")).expect("it was written");
         let results: serde_json::Value = serde_json::from_str(&text).expect("valid JSON");
-        assert_eq!((&results["disclosure"], &results["hints"]), (&json!(disclosure), &json!(hints)));
+        assert_eq!(results["assistance"], json!(assistance));
+        let EpisodeSpec { assistance: of_spec, disclosure: of_phases, hints: of_texts, .. } = told.spec;
+        assert_eq!((of_spec, of_phases, of_texts), (assistance, disclosure, hints));
+        assert_eq!((told.result.assistance, &told.result.departures), (assistance, &told.spec.departures()));
         told
     };
-    let live = play(Disclosure::Live, Hints::On);
+    let (full, paper) = (Assistance::Full, Assistance::Paper);
+    let live = play(full, Disclosure::Live, Hints::On, "expert + assistance: full");
     assert_eq!((live.result.ended, live.note), (EndReason::TaskComplete, None));
-    let never = play(Disclosure::Never, Hints::Off);
-    assert_eq!((never.result.ended, never.note), (EndReason::Finished, None), "it is played anew");
+    let told = play(paper, Disclosure::End, Hints::Off, "expert");
+    assert_eq!((told.result.ended, told.note), (EndReason::Finished, None), "it is played anew");
+    assert_eq!(told.result.phases, live.result.phases, "an expert needs nothing of what only `full` tells");
+    assert_eq!(told.result.extra_information, [""; 0]);
+    let name = "expert + phases told: never + hints: on";
+    let never = play(paper, Disclosure::Never, Hints::On, name);
     assert_eq!(never.result.phases, live.result.phases, "results have every phase");
 }
 
@@ -106,5 +117,5 @@ fn phases_are_played_on_their_own_by_shares_and_joined_by_a_report() {
     let reached: Vec<_> =
         level.phases.iter().map(|rate| (&*rate.number, rate.reached, rate.episodes)).collect();
     assert_eq!(reached, [("p1", 1, 1), ("p2", 1, 1), ("p3", 1, 1)]);
-    assert_eq!((level.collaborative_share, level.drop_share), (Some(1.0), Some(0.0)));
+    assert_eq!((level.two_robots.collaborative_share, level.two_robots.drop_share), (Some(1.0), Some(0.0)));
 }

@@ -8,7 +8,7 @@ use tandem_episodes::players::{self, Episode, InProcess, PlayerError, Privileged
 use tandem_episodes::tasks::{self, Task};
 use tandem_episodes::{A, Controller, EpisodeSpec, Facts, RendererKind, RobotFile, Sensing, Session};
 use tandem_sim::Side;
-use tandem_tools_spec::{ActCall, Disclosure, Hints, Protocol, ToolCall, ToolReply};
+use tandem_tools_spec::{ActCall, Assistance, Protocol, ToolCall, ToolReply};
 
 /// Tasks in which nobody walks.
 const STANDING: [&str; 4] = ["handover", "pouring", "frame_hang", "co_pouring"];
@@ -25,8 +25,10 @@ fn solve(tasks: Vec<&'static Task>) {
         robot: RobotFile::default(),
         locomotion: Controller::Balance,
         sensing: Sensing::default(),
-        disclosure: Disclosure::Live,
-        hints: Hints::On,
+        // Experts act on facts, and need nothing of what only `full` tells.
+        assistance: Assistance::Paper,
+        disclosure: Assistance::Paper.disclosure(),
+        hints: Assistance::Paper.hints(),
         renderer: RendererKind::Cpu,
         tasks: tasks.clone(),
         seeds: SEEDS.into(),

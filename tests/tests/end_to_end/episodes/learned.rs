@@ -107,10 +107,13 @@ fn every_form_says_the_same() {
         assert!((depth_m - expected_m).abs() < 1e-3 * expected_m, "{depth_m} {expected_m}");
     }
     let result = server.delete(&format!("/v1/episodes/{id}")).ok();
+    // More than the benchmark's policies see, and how often.
+    let shown = ["depth_images", "pixel_depth", "joint_velocities", "joint_torques", "odometry", "gravity"];
+    assert_eq!(result["extra_information"], json!(shown));
+    let replies = &result["extra_information_replies"];
     assert_eq!(
-        result["extra_information"],
-        json!(["depth_images"]),
-        "more than the benchmark's policies see"
+        (&replies["pixel_depth"], &replies["depth_images"]["A"]),
+        (&json!({ "A": 1 }), &replies["odometry"]["A"])
     );
 }
 

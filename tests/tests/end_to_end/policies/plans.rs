@@ -8,7 +8,7 @@ use tandem_episodes::{
     players::Policy,
     tasks,
 };
-use tandem_tools_spec::{Disclosure, Hints, Protocol};
+use tandem_tools_spec::{Assistance, Protocol};
 
 /// Handover on `seeds`, under the benchmark protocol.
 pub fn plan(player: &dyn Policy, seeds: Vec<u32>, record: bool) -> EvaluationPlan<'_> {
@@ -19,8 +19,9 @@ pub fn plan(player: &dyn Policy, seeds: Vec<u32>, record: bool) -> EvaluationPla
         scene: None,
         locomotion: Controller::Balance,
         sensing: Sensing::default(),
-        disclosure: Disclosure::Live,
-        hints: Hints::On,
+        assistance: Assistance::Paper,
+        disclosure: Assistance::Paper.disclosure(),
+        hints: Assistance::Paper.hints(),
         renderer: RendererKind::Cpu,
         tasks: vec![tasks::find("handover").expect("a task")],
         seeds,

@@ -1,6 +1,7 @@
 //! The server as callers meet it: its routes, who is let in, and what is refused.
 
 mod access;
+mod assistance;
 mod bad_input;
 mod crowd;
 mod door;

@@ -1,6 +1,6 @@
 //! What the page says of an episode, and what it keeps out.
 
-use tandem_tools_spec::{PhaseTimes, Protocol};
+use tandem_tools_spec::{Assistance, PhaseTimes, Protocol};
 
 use super::*;
 use crate::reports::episode::LabelledPicture;
@@ -28,7 +28,9 @@ fn result(phase_times_s: [Option<f64>; 3], protocol: Protocol) -> ResultReply {
         realtime_factor: 3.5,
         state_hash: "<script>".into(),
         simulator_failure: None,
+        assistance: Assistance::Full,
         extra_information: vec![],
+        extra_information_replies: Default::default(),
         departures: vec![],
         recording_failed: None,
     }

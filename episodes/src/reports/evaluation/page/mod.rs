@@ -9,6 +9,7 @@ use super::policy::PolicyReport;
 use super::rate::percent;
 use super::tables::{self, Table};
 use crate::html::{self, escape};
+use crate::results::PhaseLevel;
 use films::Film;
 use gallery::Failure;
 use plot::{SERIES, task_plot};
@@ -75,14 +76,18 @@ fn card(index: usize, policy: &PolicyReport) -> String {
             facts.push((format!("Tasks of {} robots, %", average.robots), mean.text()));
         }
     }
-    let phases = [("alone", &policy.together.alone), ("together", &policy.together.together)];
-    for (who, mean) in phases.into_iter().filter_map(|(who, mean)| Some((who, mean.as_ref()?))) {
-        facts.push((format!("Phases {who}, conditional, %"), mean.text()));
+    // The benchmark's means are of tasks of two robots, which need not be said of them.
+    let apart = |robots: usize| if robots == 2 { String::new() } else { format!(", {robots} robots") };
+    for means in &policy.together {
+        let phases = [("alone", &means.alone), ("together", &means.together)];
+        for (who, mean) in phases.into_iter().filter_map(|(who, mean)| Some((who, mean.as_ref()?))) {
+            facts.push((format!("Phases {who}{}, conditional, %", apart(means.robots)), mean.text()));
+        }
     }
-    if let Some(level) = &policy.phase_level {
-        let shares = [("alone", level.non_collaborative_share), ("together", level.collaborative_share)];
+    for (robots, means) in policy.phase_level.iter().flat_map(PhaseLevel::means) {
+        let shares = [("alone", means.non_collaborative_share), ("together", means.collaborative_share)];
         for (who, share) in shares.into_iter().filter_map(|(who, share)| Some((who, share?))) {
-            facts.push((format!("Phases {who}, begun at, %"), percent(share)));
+            facts.push((format!("Phases {who}{}, begun at, %", apart(robots)), percent(share)));
         }
     }
     facts.push(("Episodes".into(), policy.episodes.to_string()));

@@ -71,7 +71,7 @@ impl<'a> Executor<'a> {
         rows: Range<usize>,
     ) -> Result<(), PlayerError> {
         for planned in self.commands(chunks, rows.clone()) {
-            if let ToolReply::Act(reply) = episode.call(self.call(planned, chunks))? {
+            if let ToolReply::Act(reply) = episode.carry_out(self.call(planned, chunks))? {
                 if reply.stop_reason != StopReason::StepsDone {
                     return Err(PlayerError::EpisodeOver);
                 }
@@ -146,7 +146,8 @@ impl<'a> Executor<'a> {
     fn take_report(&mut self, reply: &CommandReply, chunks: &[RobotRows]) {
         for (chunk, start_from_pelvis) in chunks.iter().zip(&mut self.start_from_pelvis) {
             if let Some(report) = reply.robots.iter().find(|report| report.robot == chunk.robot) {
-                let Pose { position_m, quaternion_wxyz: [w, x, y, z] } = report.pelvis_in_start;
+                let Some(pelvis_in_start) = report.pelvis_in_start else { continue };
+                let Pose { position_m, quaternion_wxyz: [w, x, y, z] } = pelvis_in_start;
                 let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
                 *start_from_pelvis = Isometry3::from_parts(Translation3::from(position_m), rotation);
             }

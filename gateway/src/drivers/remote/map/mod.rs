@@ -10,9 +10,9 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 use tandem_episodes::CONTROL_HZ;
-use tandem_tools_spec::ACTION_ROW_LEN;
+use tandem_tools_spec::{ACTION_ROW_LEN, ExtraInformation};
 
-use super::columns::{WRISTS, action_columns};
+use super::columns::{WRISTS, action_columns, extra_columns, state_columns};
 
 /// Maps that the program carries, by name; each is written out and explained in its file.
 pub const PRESETS: [(&str, &str); 2] = [
@@ -302,12 +302,22 @@ impl PolicyMap {
         action_columns(&all).unwrap_or_default()
     }
 
-    /// What a policy is shown beyond what robots see and feel.
-    pub fn extra_information(&self) -> Vec<String> {
-        match self.shows_third_person() {
-            true => vec!["third_person".into()],
-            false => Vec::new(),
+    /// What a policy is shown that the benchmark's own policies are not. The map was checked when it was read.
+    pub fn shown(&self) -> Vec<ExtraInformation> {
+        let names: Vec<String> = self.state.values().flatten().cloned().collect();
+        let mut shown = extra_columns(&state_columns(&names).unwrap_or_default());
+        // Whoever tells poses in the start frame has to know where the robot is in it.
+        if self.chunk.wrist_frame == WristFrame::Start && !shown.contains(&ExtraInformation::Odometry) {
+            shown.push(ExtraInformation::Odometry);
         }
+        shown.extend(self.shows_third_person().then_some(ExtraInformation::ThirdPerson));
+        shown.sort();
+        shown
+    }
+
+    /// As [`PolicyMap::shown`], by name.
+    pub fn extra_information(&self) -> Vec<String> {
+        self.shown().into_iter().map(|what| what.name().into()).collect()
     }
 
     /// Whether the camera that sees all robots is shown.

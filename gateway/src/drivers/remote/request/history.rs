@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use tandem_episodes::players::{LocalEpisode, PlayerError};
+use tandem_tools_spec::ExtraInformation;
 
 use super::PolicyObservation;
 use crate::drivers::remote::map::PolicyMap;
@@ -12,7 +13,8 @@ pub struct ObservationHistory {
     /// How many a policy is shown, and how many rows lie between two of them.
     length: usize,
     stride: usize,
-    third_person: bool,
+    /// What of an observation the benchmark's own policies are not shown.
+    shown: Vec<ExtraInformation>,
     /// The latest, and the number of rows that were executed before it.
     present: PolicyObservation,
     present_rows: usize,
@@ -23,17 +25,10 @@ pub struct ObservationHistory {
 impl ObservationHistory {
     /// The first look at an episode.
     pub fn begin(map: &PolicyMap, episode: &mut dyn LocalEpisode) -> Result<ObservationHistory, PlayerError> {
-        let third_person = map.shows_third_person();
+        let shown = map.shown();
         let (length, stride) = map.history.map_or((1, 1), |history| (history.length, history.stride));
-        let present = PolicyObservation::take(episode, third_person)?;
-        Ok(ObservationHistory {
-            length,
-            stride,
-            third_person,
-            present,
-            present_rows: 0,
-            past: VecDeque::new(),
-        })
+        let present = PolicyObservation::take(episode, &shown)?;
+        Ok(ObservationHistory { length, stride, shown, present, present_rows: 0, past: VecDeque::new() })
     }
 
     /// What robots see and feel now.
@@ -43,7 +38,7 @@ impl ObservationHistory {
 
     /// Looks at the episode, of which `rows` rows have been executed now.
     pub fn look(&mut self, episode: &mut dyn LocalEpisode, rows: usize) -> Result<(), PlayerError> {
-        let observation = PolicyObservation::take(episode, self.third_person)?;
+        let observation = PolicyObservation::take(episode, &self.shown)?;
         self.remember(rows, observation);
         Ok(())
     }
@@ -94,7 +89,7 @@ mod tests {
         ObservationHistory {
             length,
             stride,
-            third_person: false,
+            shown: Vec::new(),
             present: observation(0),
             present_rows: 0,
             past: VecDeque::new(),

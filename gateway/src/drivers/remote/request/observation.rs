@@ -6,7 +6,7 @@ use tandem_episodes::{
     Picture,
     players::{LocalEpisode, PlayerError},
 };
-use tandem_tools_spec::Observe;
+use tandem_tools_spec::{ExtraInformation, Observe};
 
 use crate::drivers::remote::columns::{blank_state_values, held_row, state_values};
 
@@ -32,12 +32,14 @@ const WIDTH_PX: u32 = 320;
 const HEIGHT_PX: u32 = 240;
 
 impl PolicyObservation {
-    /// Looks through all robots, and at the room where that is wanted.
+    /// Looks through all robots, and at the room where that is wanted; of what the benchmark's own policies are not shown, the
+    /// policy is `shown` this.
     pub fn take(
         episode: &mut dyn LocalEpisode,
-        third_person: bool,
+        shown: &[ExtraInformation],
     ) -> Result<PolicyObservation, PlayerError> {
-        let seen = episode.observe(&Observe { robots: None, short: Some(true) })?;
+        let seen = episode.observe(&Observe { robots: None, short: Some(true) }, shown)?;
+        let third_person = shown.contains(&ExtraInformation::ThirdPerson);
         let inputs = seen.robots.iter().map(|robot| RobotInputs {
             picture: robot.view.picture.clone(),
             state_values: state_values(&robot.state),

@@ -1,0 +1,189 @@
+//! What a policy is told of what was measured. What its assistance withholds is taken out of every reply here and nowhere else, and
+//! what the benchmark's own policies are not shown is counted by what it is and by the robot that it is of.
+
+use std::collections::BTreeMap;
+
+use tandem_tools_spec::{
+    Assistance, CommandReply, ExtraInformation, FingerReport, Formats, HandReport, LookReply, Protocol,
+    RobotReport, RobotState, ToolReply,
+};
+
+use super::answer::Answer;
+use crate::observation::TeamObservation;
+
+/// How many replies showed what the benchmark's own policies are not shown.
+#[derive(Debug, Default)]
+pub struct ShownInformation(BTreeMap<ExtraInformation, BTreeMap<String, u32>>);
+
+impl ShownInformation {
+    /// What was shown, by name.
+    pub fn names(&self) -> Vec<String> {
+        self.0.keys().map(|what| what.name().into()).collect()
+    }
+
+    /// How many replies showed it, by name and robot.
+    pub fn replies(&self) -> BTreeMap<String, BTreeMap<String, u32>> {
+        self.0.iter().map(|(what, robots)| (what.name().into(), robots.clone())).collect()
+    }
+
+    /// Counts that a reply has shown `what` of `robot`.
+    pub fn count(&mut self, what: ExtraInformation, robot: &str) {
+        *self.0.entry(what).or_default().entry(robot.into()).or_default() += 1;
+    }
+
+    /// Counts what an answer shows from which nothing is to be withheld any more; an observation is in the formats of its call.
+    pub fn count_answer(&mut self, answer: &Answer, formats: &Formats, protocol: Protocol) {
+        match answer {
+            Answer::Observation(seen) => self.count_seen(seen, formats),
+            Answer::Reply(reply) => match &**reply {
+                ToolReply::Act(reply) => reply.robots.iter().for_each(|report| self.count_report(report)),
+                ToolReply::Look(LookReply::GetRobotState(state)) => self.count_state(state),
+                // Agents of the benchmark have it, its learned policies have not.
+                ToolReply::Look(LookReply::QueryDepth(depth)) if protocol == Protocol::Benchmark => {
+                    self.count(ExtraInformation::PixelDepth, &depth.robot);
+                }
+                ToolReply::Look(
+                    LookReply::QueryDepth(_) | LookReply::CheckReach(_) | LookReply::Observe(_),
+                )
+                | ToolReply::Manage(_)
+                | ToolReply::Talk(_) => {}
+            },
+        }
+    }
+
+    /// As [`ShownInformation::count_answer`], of an observation.
+    pub fn count_seen(&mut self, seen: &TeamObservation, formats: &Formats) {
+        for robot in &seen.robots {
+            self.count_state(&robot.state);
+            if formats.depth.is_some() {
+                self.count(ExtraInformation::DepthImages, &robot.state.robot);
+            }
+        }
+    }
+
+    fn count_state(&mut self, state: &RobotState) {
+        let shown = [
+            (ExtraInformation::JointVelocities, state.joint_velocities_rad_s.is_some()),
+            (ExtraInformation::JointTorques, state.joint_torques_n_m.is_some()),
+            (ExtraInformation::Gravity, state.gravity_in_pelvis.is_some()),
+            (ExtraInformation::Odometry, state.pelvis_in_start.is_some()),
+        ];
+        self.count_each(&shown, &state.robot);
+    }
+
+    fn count_report(&mut self, report: &RobotReport) {
+        let hands = [&report.left, &report.right];
+        let shown = [
+            (ExtraInformation::JointTorques, hands.iter().any(|hand| hand.largest_effort.is_some())),
+            (ExtraInformation::HandForces, hands.iter().any(|hand| hand.force_n.is_some())),
+            (ExtraInformation::Odometry, report.pelvis_in_start.is_some() || report.base_motion.is_some()),
+        ];
+        self.count_each(&shown, &report.robot);
+    }
+
+    fn count_each(&mut self, shown: &[(ExtraInformation, bool)], robot: &str) {
+        for (what, _) in shown.iter().filter(|(_, is_shown)| *is_shown) {
+            self.count(*what, robot);
+        }
+    }
+}
+
+impl Answer {
+    /// Takes out what a policy of this assistance is not told.
+    pub fn withhold(&mut self, assistance: Assistance) {
+        match (assistance, self) {
+            (Assistance::Full, _) => {}
+            (Assistance::Paper, Answer::Observation(seen)) => withhold_seen(seen),
+            (Assistance::Paper, Answer::Reply(reply)) => match &mut **reply {
+                ToolReply::Act(reply) => withhold_report(reply),
+                ToolReply::Look(LookReply::GetRobotState(state)) => withhold_state(state),
+                ToolReply::Look(LookReply::Observe(seen)) => seen.states.iter_mut().for_each(withhold_state),
+                // What is asked about a pixel or a pose, and how the episode stands, which is told as it is to be.
+                ToolReply::Look(LookReply::QueryDepth(_) | LookReply::CheckReach(_))
+                | ToolReply::Manage(_)
+                | ToolReply::Talk(_) => {}
+            },
+        }
+    }
+}
+
+impl TeamObservation {
+    /// The observation as a policy of this assistance is told it.
+    pub fn told(&self, assistance: Assistance) -> TeamObservation {
+        let mut told = self.clone();
+        match assistance {
+            Assistance::Paper => withhold_seen(&mut told),
+            Assistance::Full => {}
+        }
+        told
+    }
+}
+
+fn withhold_seen(seen: &mut TeamObservation) {
+    seen.robots.iter_mut().for_each(|robot| withhold_state(&mut robot.state));
+}
+
+// Written without `..`, so that the compiler asks of a new field whether it is told.
+
+fn withhold_state(state: &mut RobotState) {
+    let RobotState {
+        robot: _,
+        time_s: _,
+        joint_positions_rad: _,
+        joint_velocities_rad_s,
+        joint_torques_n_m,
+        left_wrist: _,
+        right_wrist: _,
+        gravity_in_pelvis,
+        pelvis_in_start,
+        base_command: _,
+        fallen,
+    } = state;
+    (*joint_velocities_rad_s, *joint_torques_n_m) = (None, None);
+    (*gravity_in_pelvis, *pelvis_in_start, *fallen) = (None, None, None);
+}
+
+fn withhold_report(reply: &mut CommandReply) {
+    let CommandReply {
+        executed_steps: _,
+        stop_reason: _,
+        time_s: _,
+        robots,
+        fallen,
+        // These are told as the disclosure has it.
+        phases: _,
+        budget: _,
+    } = reply;
+    fallen.clear();
+    for report in robots {
+        let RobotReport {
+            robot: _,
+            left,
+            right,
+            pelvis_in_start,
+            base_motion,
+            waist_joints_clamped: _,
+            waist_joints_at_limit: _,
+            base_command_clamped: _,
+        } = report;
+        (*pelvis_in_start, *base_motion) = (None, None);
+        withhold_hand(left);
+        withhold_hand(right);
+    }
+}
+
+fn withhold_hand(hand: &mut HandReport) {
+    let HandReport {
+        state,
+        target: _,
+        measured: _,
+        position_error_m: _,
+        orientation_error_rad: _,
+        fingers: FingerReport { state: fingers_state, target_rad: _, measured_rad: _ },
+        largest_effort,
+        force_n,
+        joints_clamped: _,
+        joints_at_limit: _,
+    } = hand;
+    (*state, *fingers_state, *largest_effort, *force_n) = (None, None, None, None);
+}
