@@ -1,7 +1,7 @@
-//! BigTable: three robots lift a round table by the rails on its rim, carry it to a disc on the floor and set it down.
+//! BigTable: three robots lift a round table by its edge, carry it to a disc on the floor and set it down.
 //!
 //! Conditions, tolerances and randomisation are the benchmark's. Where it is silent we chose what three G1s carry: a pedestal table
-//! of 0.80 m and 4.5 kg with rails at elbow height, 1.25 m, so that it is carried over a metre whatever the seed, and a disc of
+//! of 0.80 m and 3.55 kg, 1.25 m, so that it is carried over a metre whatever the seed, and a disc of
 //! 0.70 m under a foot of 0.40 m.
 
 use std::f32::consts::PI;
@@ -27,14 +27,14 @@ pub const TASK: Task = Task {
             name: "A",
             position_m: [0.0, 0.0],
             yaw_rad: 0.0,
-            instruction: "Take the yellow rail before you with both hands. Lift the table together with your partners, walk \
+            instruction: "Take the edge of the table before you with both hands. Lift the table together with your partners, walk \
                           straight ahead with it, level, until its foot is over the green disc, set it down and let go.",
         },
         RobotSpot {
             name: "B",
             position_m: [HOLDER_M * 1.5, -HOLDER_M * SINE],
             yaw_rad: PI * 2.0 / 3.0,
-            instruction: "Take the yellow rail before you with both hands. Lift the table together with your partners, walk \
+            instruction: "Take the edge of the table before you with both hands. Lift the table together with your partners, walk \
                           backwards and to your right with it, level, until its foot is over the green disc, set it down and \
                           let go.",
         },
@@ -42,7 +42,7 @@ pub const TASK: Task = Task {
             name: "C",
             position_m: [HOLDER_M * 1.5, HOLDER_M * SINE],
             yaw_rad: -PI * 2.0 / 3.0,
-            instruction: "Take the yellow rail before you with both hands. Lift the table together with your partners, walk \
+            instruction: "Take the edge of the table before you with both hands. Lift the table together with your partners, walk \
                           backwards and to your left with it, level, until its foot is over the green disc, set it down and \
                           let go.",
         },
@@ -52,7 +52,7 @@ pub const TASK: Task = Task {
         yaw_rad: -4.0 * PI / 180.0..=4.0 * PI / 180.0,
         ..uniform_xy(&["round_table"], 0.04, 0.04)
     }],
-    instruction: "All three robots take the round table by its rails, lift it together, carry it level until its foot is over the \
+    instruction: "All three robots take the round table by its edge, lift it together, carry it level until its foot is over the \
                   green disc, set it down there and let go.",
     benchmark_steps: 1000,
     phases: &[

@@ -1,7 +1,7 @@
 //! TableAlign: two robots carry a table across an office, turn it by a quarter on the way and set it down square to a chair.
 //!
 //! Conditions, tolerances and randomisation are the benchmark's. Where it is silent we chose what two G1s carry: a light table
-//! of 4.1 kg with rails at elbow height, and 1.75 m down the room, so that it is carried over a metre and a half whatever the
+//! of 3.4 kg, and 1.75 m down the room, so that it is carried over a metre and a half whatever the
 //! seed. The goal region, whose size the benchmark does not give, is a patch that the middle of the table has to be over, 20 cm
 //! to each side of its place: from there on it can be aligned.
 
@@ -30,7 +30,7 @@ pub const TASK: Task = Task {
             name: "A",
             position_m: [-HOLDER_M, 0.0],
             yaw_rad: 0.0,
-            instruction: "Take the yellow rail at your end of the table with both hands and lift it level with your partner. \
+            instruction: "Take your end of the table by its edge with both hands and lift it level with your partner. \
                           Carry it down the room, to your right, and turn it with your partner by a quarter to the left on \
                           the way, until it stands on the green patch with the chair before its long side. Then let go.",
         },
@@ -38,7 +38,7 @@ pub const TASK: Task = Task {
             name: "B",
             position_m: [HOLDER_M, 0.0],
             yaw_rad: PI,
-            instruction: "Take the yellow rail at your end of the table with both hands and lift it level with your partner. \
+            instruction: "Take your end of the table by its edge with both hands and lift it level with your partner. \
                           Carry it down the room, to your left, and turn it with your partner by a quarter to the left on \
                           the way, until it stands on the green patch with the chair before its long side. Then let go.",
         },
@@ -49,7 +49,7 @@ pub const TASK: Task = Task {
         spot("table_patch", [PLACE_XY_M[0], PLACE_XY_M[1], 0.0]),
     ],
     randomize: &[uniform_xy(&["office_table"], 0.05, 0.05)],
-    instruction: "Both robots lift the table by its rails, carry it down the office, turn it by a quarter on the way, set it down \
+    instruction: "Both robots lift the table by the edges of its ends, carry it down the office, turn it by a quarter on the way, set it down \
                   on the green patch with its long side square to the chair, and let go.",
     benchmark_steps: 1100,
     phases: &[

@@ -1,7 +1,7 @@
 //! TrashCollection: A carries a bin to the end of a bench and holds it there; B sweeps a bottle off the bench into it.
 //!
 //! Conditions, tolerances and randomisation are the benchmark's. Where it is silent we chose what a G1 carries between its
-//! hands: a bin of 1.5 kg, 0.72 m tall, with upright handles, which stands so far away that it walks at least 1.2 m before
+//! hands: a bin of 1.5 kg, 0.72 m tall, which stands so far away that it walks at least 1.2 m before
 //! it counts as delivered; and a bench of 0.80 m, over whose end a bottle rolls that lies across it. A bin is held aloft if
 //! it is held as high off the floor as for the first phase.
 
@@ -29,7 +29,7 @@ pub const TASK: Task = Task {
             name: "A",
             position_m: [0.0, BIN_Y_M + 0.55],
             yaw_rad: -FRAC_PI_2,
-            instruction: "Walk to the bin, bend your knees a little and take it by the yellow handles, one in each hand. Carry it upright \
+            instruction: "Walk to the bin, bend your knees a little and take it by the rim of its sides, one in each hand. Carry it upright \
                           straight ahead to the end of the bench, and hold it there with its rim a little lower than the \
                           bench's top until the bottle is in it.",
         },

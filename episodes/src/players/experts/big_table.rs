@@ -1,4 +1,4 @@
-//! BigTable: three robots take their rails, lift, carry the table straight to the disc in step, set down and let go.
+//! BigTable: three robots take the edge with both hands, lift, carry the table straight to the disc in step, set down and let go.
 
 use std::f32::consts::PI;
 
@@ -9,18 +9,23 @@ use crate::players::PlayerError;
 use crate::scoring::{A, B, C};
 
 const LIFT_M: f32 = 0.07;
+/// Pelvises over the floor: palms that lie on the top are then at elbow height.
+const PELVIS_M: f32 = 0.75;
 const PACE_M_S: f32 = 0.21;
 
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     let third_rad = 2.0 * PI / 3.0;
     let [a_left, a_right] =
-        HandGrasp::with_both_hands(A, "round_table", ["a_left", "a_right"], 0.0, &Hold::BAR);
+        HandGrasp::with_both_hands(A, "round_table", ["a_left", "a_right"], 0.0, &Hold::ROUND_EDGE);
     let [b_left, b_right] =
-        HandGrasp::with_both_hands(B, "round_table", ["b_left", "b_right"], third_rad, &Hold::BAR);
+        HandGrasp::with_both_hands(B, "round_table", ["b_left", "b_right"], third_rad, &Hold::ROUND_EDGE);
     let [c_left, c_right] =
-        HandGrasp::with_both_hands(C, "round_table", ["c_left", "c_right"], -third_rad, &Hold::BAR);
+        HandGrasp::with_both_hands(C, "round_table", ["c_left", "c_right"], -third_rad, &Hold::ROUND_EDGE);
     let grasps = [a_left, a_right, b_left, b_right, c_left, c_right];
     let mut team = CarryTeam::new(commander, &grasps)?;
+    for robot in [A, B, C] {
+        commander.set_height(robot, PELVIS_M);
+    }
     team.gather(commander)?;
     grasp_compliantly(commander, &grasps)?;
     team.lift(commander, LIFT_M)?;

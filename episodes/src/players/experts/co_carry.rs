@@ -1,4 +1,4 @@
-//! CoCarry: both robots take the bars, lift, side-step to the other shelf in step, set down and let go.
+//! CoCarry: both robots take the rim, lift, side-step to the other shelf in step, set down and let go.
 
 use std::f32::consts::PI;
 
@@ -10,8 +10,8 @@ const LIFT_M: f32 = 0.09;
 const PACE_M_S: f32 = 0.2;
 
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
-    let [a_left, a_right] = HandGrasp::with_both_hands(A, "basket", ["a_left", "a_right"], 0.0, &Hold::BAR);
-    let [b_left, b_right] = HandGrasp::with_both_hands(B, "basket", ["b_left", "b_right"], PI, &Hold::BAR);
+    let [a_left, a_right] = HandGrasp::with_both_hands(A, "basket", ["a_left", "a_right"], 0.0, &Hold::RIM);
+    let [b_left, b_right] = HandGrasp::with_both_hands(B, "basket", ["b_left", "b_right"], PI, &Hold::RIM);
     let grasps = [a_left, a_right, b_left, b_right];
     let mut team = CarryTeam::new(commander, &grasps)?;
     team.gather(commander)?;

@@ -1,4 +1,4 @@
-//! TableAlign: both robots take the rails, lift, carry the table down the room while they turn it by a quarter, come at the
+//! TableAlign: both robots take the edges, lift, carry the table down the room while they turn it by a quarter, come at the
 //! chair from its front, set down and let go.
 
 use std::f32::consts::{FRAC_PI_2, PI};
@@ -12,18 +12,23 @@ use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
 const LIFT_M: f32 = 0.07;
-const PACE_M_S: f32 = 0.17;
+/// Pelvises over the floor: palms that lie on the top are then at elbow height.
+const PELVIS_M: f32 = 0.75;
+const PACE_M_S: f32 = 0.20;
 /// The table's middle in the chair's frame: where the turn ends, clear of the chair, and where it is set down.
 const BEFORE_CHAIR_M: Vector = Vector::new(0.65, 0.0, 0.0);
 const AT_CHAIR_M: Vector = Vector::new(0.40, 0.0, 0.0);
 
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     let [a_left, a_right] =
-        HandGrasp::with_both_hands(A, "office_table", ["a_left", "a_right"], 0.0, &Hold::BAR);
+        HandGrasp::with_both_hands(A, "office_table", ["a_left", "a_right"], 0.0, &Hold::EDGE);
     let [b_left, b_right] =
-        HandGrasp::with_both_hands(B, "office_table", ["b_left", "b_right"], PI, &Hold::BAR);
+        HandGrasp::with_both_hands(B, "office_table", ["b_left", "b_right"], PI, &Hold::EDGE);
     let grasps = [a_left, a_right, b_left, b_right];
     let mut team = CarryTeam::new(commander, &grasps)?;
+    for robot in [A, B] {
+        commander.set_height(robot, PELVIS_M);
+    }
     team.gather(commander)?;
     grasp_compliantly(commander, &grasps)?;
     team.lift(commander, LIFT_M)?;
@@ -39,6 +44,7 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
         false => before.lerp(&over, (gone_m - turn_m) / (length_m - turn_m)),
     };
     team.carry(commander, &ObjectPath { at: &at, length_m, pace_m_s: PACE_M_S, free_m: &FREE })?;
+    team.rest(commander)?;
     team.set_down(commander, &place(chair * AT_CHAIR_M, FRAC_PI_2))?;
     let_go(commander, &grasps)
 }

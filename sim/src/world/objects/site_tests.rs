@@ -1,8 +1,11 @@
-//! Sites against the shapes around them: a handle is on something solid, a hole is in the open.
+//! Objects against what is said of them: sites lie on shapes or in the open, and what robots carry is as large and as heavy as its page
+//! says.
 
 use rapier3d::math::Vector;
+use rapier3d::parry::bounding_volume::BoundingVolume as _;
 
 use super::ObjectModel;
+use crate::assets;
 use crate::mjcf::Site;
 
 /// Distance from a point of an object to its nearest shape; 0 inside one.
@@ -111,5 +114,36 @@ fn the_lowest_point_is_that_of_the_shape_as_it_lies() {
     {
         let lowest_m = glass.lowest_m(&Pose::from_rotation(Rotation::from_rotation_x(turn_rad)));
         assert!((lowest_m - height_m).abs() < 2e-3, "{lowest_m} m, turned by {turn_rad} rad");
+    }
+}
+
+/// What several robots carry, or one with both hands: how far it reaches along each axis, and its mass.
+const CARRIED: [(&str, [f32; 3], f32); 4] = [
+    ("round_table", [0.80, 0.80, 0.74], 3.55),
+    ("office_table", [0.90, 0.60, 0.74], 3.4),
+    ("basket", [0.56, 0.41, 0.25], 2.0),
+    ("bin", [0.30, 0.17, 0.72], 1.5),
+];
+
+#[test]
+fn carried_objects_are_held_by_what_they_have() {
+    for (name, size_m, mass_kg) in CARRIED {
+        let (_, tree) = ObjectModel::read(name).unwrap_or_else(|error| panic!("{error}"));
+        let found_kg = tree.links[0].mass.mass();
+        assert!((found_kg - mass_kg).abs() < 0.005, "{name}: {found_kg} kg, its page says {mass_kg} kg");
+        let file = assets::object(name).unwrap_or_else(|error| panic!("{error}"));
+        let names: Vec<&str> =
+            file.split("name=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
+        for added in ["rail", "handle", "bar"] {
+            assert!(!names.iter().any(|name| name.contains(added)), "{name} has a {added}: {names:?}");
+        }
+        // Nothing sticks out, whatever it is called, and whether it collides or not.
+        let model = object(name);
+        let shapes = model.geoms.iter().filter_map(|geom| geom.collider());
+        let bounds =
+            shapes.map(|(pose, shape)| shape.compute_aabb(&pose)).reduce(|all, one| all.merged(&one));
+        let found_m = bounds.unwrap_or_else(|| panic!("{name} has shapes")).extents();
+        let off_m = (found_m - Vector::from(size_m)).abs().max_element();
+        assert!(off_m < 0.02, "{name} is {found_m} m large, its page says {size_m:?}");
     }
 }

@@ -12,6 +12,8 @@ const ATTEMPTS: usize = 4;
 const TO_FIRST_STOP_S: f32 = 0.9;
 const BETWEEN_STOPS_S: f32 = 0.6;
 const FROM_LAST_STOP_S: f32 = 0.5;
+/// They come to rest before they close: what a wrist is off then, its goal makes up for.
+const SETTLE_S: f32 = 0.2;
 /// How long they take to leave, all stops together.
 const LEAVE_S: f32 = 1.2;
 /// One step of a soft grasp; fingers close over the first of them.
@@ -34,6 +36,7 @@ pub fn grasp_compliantly(commander: &mut Commander, grasps: &[HandGrasp]) -> Res
         }
         let around = each(commander, &missing, |grasp, commander| grasp.around(commander))?;
         commander.perform(FROM_LAST_STOP_S, &around)?;
+        commander.perform(SETTLE_S, &around)?;
         close_compliantly(commander, &missing, &around)?;
         let facts = commander.facts()?;
         missing = grasps.iter().copied().filter(|grasp| !grasp.is_held(&facts)).collect();

@@ -80,6 +80,6 @@ impl Hold {
         open_rad: OPEN_RAD,
         closed_rad: [0.0, -1.04, -1.74, 0.3, 0.3, 0.3, 0.3],
         stops_m: &[Vector::new(0.16, 0.05, 0.0), Vector::new(0.0, 0.05, 0.0)],
-        behind_m: 0.29,
+        behind_m: 0.38,
     };
 }
