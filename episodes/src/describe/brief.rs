@@ -24,9 +24,18 @@ const HANDS: &str = "A wrist's x axis points along its fingers, and its z axis a
     is at [0.12, 0.055, 0]. The palm reaches from x = 0.04 to 0.13, and from z = -0.045 to 0.045, and is 0.04 thick. Straight \
     fingers reach to x = 0.22. The thumb, with its angles at 0, stands off the palm at x = 0.065, to y = 0.115.";
 
-const GRASPING: &str = "Around something upright: open the thumb, come palm first, then close fingers and thumb. Around a bar: lay the \
-    palm on it, then close the outer finger joints (middle_1, index_1) first, the inner ones (middle_0, index_0) next and the thumb \
-    last; open in the reverse order, since open fingers may stay hooked under it. Fingers that are blocked hold something.";
+const GRASPING: &str = "Fingers are given for a right hand, thumb [0, 1, 2] and each finger [0, 1]; a left one has the other sign but for \
+    thumb_0. A thumb that is stopped short of its target presses, and fingers that are blocked hold something. Around something \
+    upright: open the thumb, come palm first, then close fingers and thumb. Around a bar: lay the palm on it, then close the outer \
+    finger joints (middle_1, index_1) first, the inner ones (middle_0, index_0) next and the thumb last; open in the reverse order, \
+    since open fingers may stay hooked under it. The edge of a table: palms down (right wrist [0.707, -0.707, 0, 0], left [0.707, \
+    0.707, 0, 0]), fingers ahead over the top, thumb under it. The wrist ends 0.085 m before the edge and 0.017 m above the top; come \
+    from 0.14 m farther off and 0.03 m higher with the thumb at [0, 0.5, 0], in and then down, and close thumb [0, -0.9, -1.74] and \
+    fingers [0.3, 0.2]. A rim from above: palms down, wrist 0.095 m before its middle and 0.031 m above it, fingers inside [1.57, 0.6], \
+    thumb outside [0, -0.95, -0.6]. An upright wall, as of a tall bin: both hands point down outside it ([0.707, 0, 0.707, 0]), palms \
+    flat on it, wrist 0.09 m above the rim and 0.017 m beside, thumb over the rim [0, -1.04, -1.74], fingers [0.3, 0.3]; come from \
+    above, 0.05 m beside. Stand with the pelvis 0.3 m behind the places of both hands, 0.38 m behind those on a bin, which knees push \
+    over otherwise. To let go, open, and leave the way you came.";
 
 /// The brief of an episode in the words that its policy reads.
 pub fn brief(wording: Wording) -> Brief {
