@@ -96,7 +96,8 @@ mod tests {
     #[test]
     fn policies_are_told_what_experts_do() {
         let grasping = brief(Hints::On.into()).grasping.expect("hints");
-        let told = |what: &str| assert!(grasping.contains(what), "the brief does not say `{what}`: {grasping}");
+        let told =
+            |what: &str| assert!(grasping.contains(what), "the brief does not say `{what}`: {grasping}");
         let thumb = |angles: [f32; 7]| told(&format!("[{}, {}, {}]", angles[0], angles[1], angles[2]));
         let fingers = |angles: [f32; 7]| told(&format!("[{}, {}]", angles[3], angles[4]));
         for hold in [Hold::EDGE, Hold::RIM, Hold::WALL] {
