@@ -142,12 +142,18 @@ impl<const N: usize> Contacts<N> {
         });
     }
 
-    pub fn warm_start(&self, w: &mut [f64]) {
+    /// Adds what the impulses, as they are now, do.
+    pub fn push_impulses(&self, w: &mut [f64]) {
         for (group, contact) in self.all.iter().enumerate() {
             if contact.impulse != [0.0; N] {
                 self.rows.push_impulse(group, &contact.impulse, w);
             }
         }
+    }
+
+    /// Leaves a share of all impulses.
+    pub fn scale(&mut self, share: f64) {
+        self.all.iter_mut().flat_map(|contact| &mut contact.impulse).for_each(|impulse| *impulse *= share);
     }
 
     /// One sweep of Gauss-Seidel, contact by contact.

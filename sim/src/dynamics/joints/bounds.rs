@@ -172,7 +172,7 @@ fn approach(distance: f64, settings: &Settings) -> [f64; 2] {
 impl BoundedDrive {
     /// Begins with the effort of the last step.
     fn new(tree: &Tree, link: usize, dt_s: f64) -> BoundedDrive {
-        let law = tree.drive_law(link, dt_s);
+        let law = tree.laws[link];
         let impulse = (tree.effort[link] * dt_s).clamp(-law.most, law.most);
         BoundedDrive { law, impulse }
     }

@@ -12,7 +12,7 @@
 pub mod bounds;
 pub mod equality;
 
-use super::trees::link::Drive;
+use super::trees::link::{Axis, Drive};
 use super::trees::tree::Tree;
 
 /// A drive's impulse in a step as a function of the velocity v' at its end:  rest - implicit v', within +-most. A motor that
@@ -20,7 +20,7 @@ use super::trees::tree::Tree;
 ///   |impulse| <= slope (speed_limit - |v'|),   slope = most / (speed_limit - SLACKENS speed_limit),
 /// which is all of it at 80 % of the limit and nothing at the limit. It holds at the end of the step as the rest does, so
 /// that no motor drives itself beyond its limit within a step, however light its link is.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct DriveLaw {
     pub rest: f64,
     pub implicit: f64,
@@ -82,11 +82,9 @@ impl Tree {
         self.drives[link] = drive;
     }
 
-    pub(in crate::dynamics) fn drive_law(&self, link: usize, dt_s: f64) -> DriveLaw {
+    fn drive_law(&self, link: usize, axis: &Axis, dt_s: f64) -> DriveLaw {
         let drive = &self.drives[link];
-        let axis = self.links[link].joint.axis();
-        let limits = axis.map_or((0.0, f64::INFINITY), |axis| (axis.effort_limit, axis.speed_limit));
-        let (most, speed_limit) = (limits.0 * dt_s, limits.1);
+        let (most, speed_limit) = (axis.effort_limit * dt_s, axis.speed_limit);
         let implicit = dt_s * (drive.kd + dt_s * drive.kp);
         let rest = dt_s * (drive.kp * (drive.target - self.q[link]) + drive.feedforward);
         DriveLaw {
@@ -97,11 +95,12 @@ impl Tree {
         }
     }
 
-    /// Guesses which drives will be at their limits.
-    pub(in crate::dynamics) fn guess_bounded(&mut self) {
+    /// Takes down what the drives are told, and guesses which of them will be at their limits.
+    pub(in crate::dynamics) fn begin_drives(&mut self, dt_s: f64) {
         self.overrun.fill(false);
         for (i, link) in self.links.iter().enumerate() {
             let Some(axis) = link.joint.axis() else { continue };
+            self.laws[i] = self.drive_law(i, axis, dt_s);
             self.bounded[i] = self.effort[i].abs() > NEAR_LIMIT * axis.effort_limit
                 || self.v[self.layout.first_dof[i]].abs() > SLACKENS * axis.speed_limit;
         }
@@ -109,13 +108,13 @@ impl Tree {
 
     /// Adds the drives that turned out to be beyond their limits at the velocities `v` of the end of the step; whether
     /// there were any.
-    pub(in crate::dynamics) fn bound_more(&mut self, dt_s: f64, v: &[f64]) -> bool {
+    pub(in crate::dynamics) fn bound_more(&mut self, v: &[f64]) -> bool {
         let mut more = false;
         for i in 0..self.links.len() {
             if self.links[i].joint.axis().is_none() || self.bounded[i] {
                 continue;
             }
-            let law = self.drive_law(i, dt_s);
+            let law = &self.laws[i];
             let v = v[self.layout.first_dof[i]];
             let impulse = law.rest - law.implicit * v;
             let ([low, high], tolerance) = (law.bounds(v), law.most * TOLERANCE);
@@ -137,7 +136,7 @@ impl Tree {
             let mut impulse = dt_s * axis.stiffness * (axis.spring_rest - self.q[i]);
             self.implicit[k] = dt_s * (axis.damping + dt_s * axis.stiffness);
             if !self.bounded[i] {
-                let law = self.drive_law(i, dt_s);
+                let law = &self.laws[i];
                 impulse += law.rest;
                 self.implicit[k] += law.implicit;
             }
@@ -149,7 +148,7 @@ impl Tree {
     pub(in crate::dynamics) fn keep_efforts(&mut self, dt_s: f64, v: &[f64]) {
         for i in 0..self.links.len() {
             if self.links[i].joint.axis().is_some() && !self.bounded[i] {
-                let law = self.drive_law(i, dt_s);
+                let law = &self.laws[i];
                 self.effort[i] = (law.rest - law.implicit * v[self.layout.first_dof[i]]) / dt_s;
             }
         }

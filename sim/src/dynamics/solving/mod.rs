@@ -16,11 +16,16 @@ use crate::dynamics::trees::spatial::ForceVector;
 /// most: what is heavy presses a light link against its stop.
 const UNSETTLED: f64 = 2.0;
 const MORE_SWEEPS: usize = 32;
+/// J that the relaxing sweeps took: where it was so much, there may be more that they should have taken.
+const HARD_J: f64 = 0.3;
 
 #[derive(Default)]
 pub struct Solver {
     /// Whitened velocities of all trees.
     pub w: Vec<f64>,
+    /// Likewise before the step, and what contacts change; only where [`Solver::take_only`] needs them.
+    before: Vec<f64>,
+    change: Vec<f64>,
     joints: JointRows,
     pub equalities: Equalities,
     /// Contacts that slide and spin, and contacts that also resist rolling; both in the order of the candidates.
@@ -61,23 +66,13 @@ impl Solver {
         }
     }
 
-    /// Impulses that correct positions; `w` is what positions move by. They are what the next step begins with. There are
-    /// more sweeps where ends of ranges are not settled by then.
+    /// Impulses that correct positions; `w` is what positions move by. They are what the next step begins with.
     pub fn correct(&mut self, candidates: &[Candidate], sweeps: usize) {
         self.joints.warm_start(&mut self.w);
         self.equalities.warm_start(&mut self.w);
-        self.plain.warm_start(&mut self.w);
-        self.rolling.warm_start(&mut self.w);
-        let mut pushed = 0.0;
-        for _ in 0..sweeps {
-            pushed = self.sweep(Pass::Correcting);
-        }
-        for _ in 0..MORE_SWEEPS {
-            if pushed < UNSETTLED {
-                break;
-            }
-            pushed = self.sweep(Pass::Correcting);
-        }
+        self.plain.push_impulses(&mut self.w);
+        self.rolling.push_impulses(&mut self.w);
+        self.settle(Pass::Correcting, sweeps);
         self.equalities.remember();
         self.found.clear();
         let (mut plain, mut rolling) = (self.plain.all.iter(), self.rolling.all.iter());
@@ -89,9 +84,11 @@ impl Solver {
     }
 
     /// Impulses without correction; `w` is then the velocity at the end of the step, and the touches tell what acted.
-    pub fn relax(&mut self, candidates: &[Candidate], sweeps: usize) {
-        for _ in 0..sweeps {
-            self.sweep(Pass::Relaxing);
+    pub fn relax(&mut self, trees: &Trees, candidates: &[Candidate], sweeps: usize) {
+        let corrected_j = kinetic_j(&self.w);
+        self.settle(Pass::Relaxing, sweeps);
+        if corrected_j - kinetic_j(&self.w) > HARD_J {
+            self.take_only(trees);
         }
         let (mut plain, mut rolling) = (self.plain.all.iter(), self.rolling.all.iter());
         for (touch, candidate) in self.found.iter_mut().zip(candidates) {
@@ -109,6 +106,49 @@ impl Solver {
         std::mem::swap(&mut self.touches, &mut self.found);
     }
 
+    /// So many sweeps, and more where ends of ranges are not settled by then.
+    fn settle(&mut self, pass: Pass, sweeps: usize) {
+        let mut pushed = 0.0;
+        for sweep in 0..sweeps + MORE_SWEEPS {
+            if sweep >= sweeps && pushed < UNSETTLED {
+                break;
+            }
+            pushed = self.sweep(pass);
+        }
+    }
+
+    /// Contacts only take energy. Sweeps that have not settled can leave a part of the speed with which things were pushed out
+    /// of each other; the impulses P of all contacts together have then done work, and of a share s of them
+    ///   W(s) = s P . (v + v' - (1 - s) M^-1 P) / 2,   v and v' the velocities before and after the step.
+    /// The share that stays is the one that does none. It keeps all momentum and all cones of friction, and what goes on
+    /// approaching the next step stops.
+    fn take_only(&mut self, trees: &Trees) {
+        self.before.resize(self.w.len(), 0.0);
+        for (tree, offset) in trees.all.iter().zip(&trees.offset) {
+            tree.factor.whiten_velocity(
+                &tree.layout,
+                &tree.v,
+                &mut self.before[*offset..offset + tree.dofs()],
+            );
+        }
+        self.change.clear();
+        self.change.resize(self.w.len(), 0.0);
+        self.plain.push_impulses(&mut self.change);
+        self.rolling.push_impulses(&mut self.change);
+        let (mut twice_work_j, mut own_j) = (0.0, 0.0);
+        for ((change, before), after) in self.change.iter().zip(&self.before).zip(&self.w) {
+            twice_work_j += change * (before + after);
+            own_j += change * change;
+        }
+        if twice_work_j <= 0.0 {
+            return;
+        }
+        let share = (1.0 - twice_work_j / own_j).max(0.0);
+        self.plain.scale(share);
+        self.rolling.scale(share);
+        self.w.iter_mut().zip(&self.change).for_each(|(w, change)| *w -= (1.0 - share) * change);
+    }
+
     /// The greatest velocity (rad/s or m/s) that an end of a range took back.
     fn sweep(&mut self, pass: Pass) -> f64 {
         let pushed = self.joints.sweep(pass, &mut self.w);
@@ -117,6 +157,11 @@ impl Solver {
         self.rolling.sweep(pass, &mut self.w);
         pushed
     }
+}
+
+/// With what springs, dampers and drives add to the mass matrix.
+fn kinetic_j(w: &[f64]) -> f64 {
+    0.5 * w.iter().map(|w| w * w).sum::<f64>()
 }
 
 fn push<const N: usize>(

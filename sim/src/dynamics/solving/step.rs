@@ -12,7 +12,7 @@ impl Dynamics {
     /// nothing. An error leaves all state as it was.
     pub fn step(&mut self) -> Result<(), Diverged> {
         self.collision.detect(&self.trees, &self.settings);
-        self.trees.all.iter_mut().for_each(Tree::guess_bounded);
+        self.trees.all.iter_mut().for_each(|tree| tree.begin_drives(self.settings.dt_s));
         self.solve();
         while self.bound_more() {
             self.solve();
@@ -45,7 +45,7 @@ impl Dynamics {
         self.solver.prepare(&self.trees, candidates, settings);
         self.solver.correct(candidates, settings.sweeps);
         unwhiten(&self.trees.all, &self.solver.w, &mut self.moving_v);
-        self.solver.relax(candidates, settings.relaxing_sweeps);
+        self.solver.relax(&self.trees, candidates, settings.relaxing_sweeps);
         unwhiten(&self.trees.all, &self.solver.w, &mut self.final_v);
     }
 
@@ -54,7 +54,7 @@ impl Dynamics {
     fn bound_more(&mut self) -> bool {
         let mut more = false;
         for (tree, range) in self.trees.ranges() {
-            more |= tree.bound_more(self.settings.dt_s, &self.final_v[range.clone()]);
+            more |= tree.bound_more(&self.final_v[range.clone()]);
             more |= tree.hold_more(self.settings.dt_s, &self.moving_v[range]);
         }
         more

@@ -41,7 +41,7 @@ impl Tree {
     }
 
     /// Inertia of a link by itself.
-    #[inline]
+    #[inline(always)]
     pub(in crate::dynamics) fn inertia_of(&self, i: usize) -> Inertia {
         let (mass_kg, com_m) = (self.links[i].mass.mass_kg, self.centre_m(i));
         let mut second_kg_m2 = self.own_inertia[i].rotated(&self.rotation[i]);

@@ -66,6 +66,16 @@ impl Factor {
         }
     }
 
+    /// w = D^1/2 L v.
+    pub fn whiten_velocity(&self, layout: &Layout, v: &[f64], w: &mut [f64]) {
+        for k in 0..layout.dofs() {
+            let path = layout.path(k);
+            let beyond = self.h[layout.row(k)].iter().zip(&path[..path.len() - 1]);
+            let lv = v[k] + beyond.map(|(l, j)| l * v[usize::from(*j)]).sum::<f64>();
+            w[k] = lv / self.inverse_root_d[k];
+        }
+    }
+
     /// v = L^-1 D^-1/2 w.
     pub fn unwhiten(&self, layout: &Layout, w: &[f64], v: &mut [f64]) {
         for k in 0..layout.dofs() {

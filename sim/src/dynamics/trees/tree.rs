@@ -7,6 +7,7 @@ use super::factor::Factor;
 use super::layout::Layout;
 use super::link::{Drive, Joint, Link, Mass};
 use super::spatial::{ForceVector, Inertia, MotionVector, Symmetric};
+use crate::dynamics::joints::DriveLaw;
 
 /// Links joined into a tree. A robot is a tree with a free first link, a door one on a fixed first link, a lone
 /// object a tree of one free link.
@@ -25,6 +26,8 @@ pub struct Tree {
     pub(in crate::dynamics) v: Vec<f64>,
     /// What each link's drive is told, by link.
     pub(in crate::dynamics) drives: Vec<Drive>,
+    /// What that comes to in this step, by link.
+    pub(in crate::dynamics) laws: Vec<DriveLaw>,
     /// Whether a link's drive is a row of the solver in this step, by link.
     pub(in crate::dynamics) bounded: Vec<bool>,
     /// Whether a joint would leave its range in this step although it was not near an end, by link.
@@ -70,6 +73,7 @@ impl Tree {
             q: vec![0.0; count],
             v: vec![0.0; dofs],
             drives: vec![Drive::NONE; count],
+            laws: vec![DriveLaw::default(); count],
             bounded: vec![false; count],
             overrun: vec![false; count],
             external: vec![ForceVector::default(); count],
