@@ -15,9 +15,9 @@ use axum::{
 use rmcp::{
     ErrorData, RoleServer, ServerHandler,
     model::{
-        CallToolRequestParams, CallToolResponse, CallToolResult, ContentBlock, GetPromptRequestParams,
-        GetPromptResponse, Implementation, ListPromptsResult, ListToolsResult, PaginatedRequestParams,
-        ServerCapabilities, ServerConfig, Tool,
+        CallToolRequestParams, CallToolResponse, CallToolResult, ContentBlock, DiscoverResult,
+        GetPromptRequestParams, GetPromptResponse, Implementation, InitializeRequestParams, InitializeResult,
+        ListPromptsResult, ListToolsResult, PaginatedRequestParams, ServerCapabilities, ServerConfig, Tool,
     },
     service::RequestContext,
     transport::streamable_http_server::{
@@ -38,10 +38,20 @@ use super::{
 };
 use crate::hosting::{Answer, Caller, HostingError};
 
-/// What a host tells its model about the server as a whole.
-const INSTRUCTIONS: &str = "Simulated humanoids that must work together. Call list_tasks, then start_episode, then look \
-    with observe and act with move_wrists, walk, send_joint_chunk or wait until the task is done, then call finish. \
-    Physics stands still between calls.";
+/// What a host tells its model about the server as a whole: only what `caller` can do.
+fn instructions(caller: &Caller) -> String {
+    let begin = match caller {
+        Caller::Host => "Call list_tasks, then start_episode, then look".into(),
+        // Its episode goes on already, and no other can be begun.
+        Caller::Operator { episode, robot } => {
+            format!("You are the operator of robot {robot} in the episode {episode}, which has begun. Look")
+        }
+    };
+    format!(
+        "Simulated humanoids that must work together. {begin} with observe and act with move_wrists, walk, send_joint_chunk or wait \
+         until the task is done, then call finish. Physics stands still between calls."
+    )
+}
 
 /// The routes to nest at `/mcp`, behind the gate, which has checked `Host` and `Origin`.
 pub fn router(app: AppState) -> Router {
@@ -67,7 +77,23 @@ impl ServerHandler for McpServer {
     fn get_info(&self) -> ServerConfig {
         ServerConfig::new(ServerCapabilities::builder().enable_tools().enable_prompts().build())
             .with_server_info(Implementation::new("tandem", env!("CARGO_PKG_VERSION")))
-            .with_instructions(INSTRUCTIONS)
+            .with_instructions(instructions(&Caller::Host))
+    }
+
+    async fn initialize(
+        &self,
+        request: InitializeRequestParams,
+        context: RequestContext<RoleServer>,
+    ) -> Result<InitializeResult, ErrorData> {
+        context.peer.set_peer_info(request.clone());
+        let server = self.negotiate_initialize(&request)?;
+        Ok(server.with_instructions(instructions(caller_of(&context).unwrap_or(&Caller::Host))))
+    }
+
+    async fn discover(&self, context: RequestContext<RoleServer>) -> Result<DiscoverResult, ErrorData> {
+        let caller = caller_of(&context).unwrap_or(&Caller::Host);
+        let server = self.get_info().with_instructions(instructions(caller));
+        Ok(DiscoverResult::from_server_info(self.supported_protocol_versions().into_owned(), server))
     }
 
     async fn list_tools(

@@ -63,6 +63,7 @@ fn hosting_refusals() -> Vec<HostingError> {
         HostingError::TooManyEpisodes { limit: 8 },
         HostingError::TooManyWaiting { limit: 16 },
         HostingError::ShuttingDown,
+        HostingError::HeldAlready { id: "handover-seed0".into() },
         HostingError::EpisodeStopped,
         HostingError::EpisodePanicked,
         EpisodeError::OtherStep { expected: 1, now: 2 }.into(),

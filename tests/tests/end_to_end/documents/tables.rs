@@ -73,6 +73,28 @@ fn the_reference_has_every_flag_with_its_meaning() {
     }
 }
 
+/// Flags that `--help` does not list are for experiments, and stand in one place.
+#[test]
+fn flags_for_experiments_are_told_of_in_one_place() {
+    fn hidden(command: &Command) -> Vec<String> {
+        let own = command.get_arguments().filter(|flag| flag.is_hide_set());
+        let own = own.filter_map(|flag| flag.get_long().map(str::to_owned));
+        own.chain(command.get_subcommands().flat_map(hidden)).collect()
+    }
+    let text = page(&format!("{BOOK}/concepts.md")).text;
+    let section = text.split("\n### ").find(|section| section.starts_with("Finer settings for experiments"));
+    let mut told: Vec<&str> = section
+        .expect("a section on finer settings")
+        .lines()
+        .filter_map(|line| line.strip_prefix("| `--")?.split('`').next())
+        .collect();
+    let mut hidden = hidden(&Cli::command());
+    hidden.sort();
+    hidden.dedup();
+    told.sort_unstable();
+    assert_eq!(told, hidden);
+}
+
 /// A flag with its help text, without what follows in brackets: the default and where else it can be given.
 #[derive(Debug, PartialEq)]
 struct Flag {
@@ -98,7 +120,7 @@ fn words(text: &str) -> String {
 fn leaves(path: &str, command: &Command, found: &mut Vec<(String, Vec<Flag>)>) {
     let mut below = command.get_subcommands().peekable();
     if below.peek().is_none() {
-        let flags = command.get_arguments().filter_map(Flag::of);
+        let flags = command.get_arguments().filter(|flag| !flag.is_hide_set()).filter_map(Flag::of);
         let own = flags.filter(|flag| !EVERYWHERE.contains(&flag.name.as_str()));
         found.push((path.trim().to_owned(), own.collect()));
     }

@@ -141,3 +141,29 @@ fn what_is_no_call_is_refused_with_the_codes_of_json_rpc() {
     check(&of_task(json!({ "task": "handove" })), -32602, "have: handover");
     check(&of_task(json!({ "task": "handover", "seed": "x" })), -32602, "give one as 0");
 }
+
+/// What a host is told of the server is what it can do there: an operator's episode has begun, and it can begin no other.
+#[test]
+fn instructions_say_what_the_caller_can_do() {
+    let server = TestServer::start();
+    let start = json!({ "task": "handover", "seed": 0, "operators": "per_robot" });
+    let started = server.post("/v1/episodes", &start).ok();
+    let (id, token) = (&started["episode_id"], started["operators"][1]["token"].as_str().expect("a token"));
+    let bearer = format!("Bearer {token}");
+    let instructions = |headers: &[(&str, &str)]| {
+        let client = json!({ "name": "test", "version": "1" });
+        let params = json!({ "protocolVersion": "2025-06-18", "capabilities": {}, "clientInfo": client });
+        let message = json!({ "jsonrpc": "2.0", "id": 1, "method": "initialize", "params": params });
+        let accept = [("accept", "application/json, text/event-stream")];
+        let answer = server.post_with("/mcp", &[&accept, headers].concat(), &message).ok();
+        answer["result"]["instructions"].as_str().expect("instructions").to_owned()
+    };
+    let (host, operator) = (instructions(&[]), instructions(&[("authorization", &bearer)]));
+    assert!(host.contains("Call list_tasks, then start_episode, then look with observe"), "{host}");
+    assert!(!operator.contains("start_episode") && !operator.contains("list_tasks"), "{operator}");
+    let id = id.as_str().expect("an id");
+    assert!(
+        operator.contains(&format!("operator of robot B in the episode {id}, which has begun")),
+        "{operator}"
+    );
+}
