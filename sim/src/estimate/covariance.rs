@@ -61,19 +61,18 @@ impl Covariance {
     pub fn predict(&mut self, rotation: DMat3, force_m_s2: DVec3, dt_s: f64) {
         let by_bias = rotation * -dt_s;
         let by_turn = cross(force_m_s2) * -dt_s;
+        let biased = |i: usize, at: usize| [0, 1, 2].map(|j| (at + j, by_bias.col(j)[i]));
         for i in 0..3 {
-            self.add_row(PLACE + i, VELOCITY + i, dt_s);
+            self.add_rows(PLACE + i, [(VELOCITY + i, dt_s)]);
         }
         for i in 0..3 {
-            for j in 0..3 {
-                if i != j {
-                    self.add_row(VELOCITY + i, TURN + j, by_turn.col(j)[i]);
-                }
-                self.add_row(VELOCITY + i, ACC_BIAS + j, by_bias.col(j)[i]);
-            }
+            let [x, y, z] = biased(i, ACC_BIAS);
+            let [j, k] = [(i + 1) % 3, (i + 2) % 3];
+            let turns = [j, k].map(|axis| (TURN + axis, by_turn.col(axis)[i]));
+            self.add_rows(VELOCITY + i, [turns[0], turns[1], x, y, z]);
         }
         for i in 0..3 {
-            (0..3).for_each(|j| self.add_row(TURN + i, GYRO_BIAS + j, by_bias.col(j)[i]));
+            self.add_rows(TURN + i, biased(i, GYRO_BIAS));
         }
         for row in &mut self.0[..MOVING] {
             let part = |at: usize| DVec3::new(row[at], row[at + 1], row[at + 2]);
@@ -120,9 +119,13 @@ impl Covariance {
         self.0[row][column]
     }
 
-    fn add_row(&mut self, to: usize, from: usize, factor: f64) {
-        let from = self.0[from];
-        self.0[to].iter_mut().zip(from).for_each(|(to, from)| *to += factor * from);
+    /// Adds multiples of other rows to a row.
+    fn add_rows<const N: usize>(&mut self, to: usize, from: [(usize, f64); N]) {
+        let mut row = self.0[to];
+        for (from, factor) in from {
+            row.iter_mut().zip(&self.0[from]).for_each(|(value, other)| *value += factor * other);
+        }
+        self.0[to] = row;
     }
 
     /// h^T P h.

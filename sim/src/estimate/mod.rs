@@ -232,6 +232,10 @@ impl StateEstimator {
                 .exp();
             let at = FEET + 3 * side.index();
             (at..at + 3).for_each(|error| update.covariance.widen(error, walk_m * dt_s.sqrt()));
+            // A foot in the air tells nothing; where it comes down, its point is as uncertain as the flight was long.
+            if foot.contact_share == 0.0 {
+                continue;
+            }
             let pelvis_from_foot = &pelvis_from_link[foot.link];
             let arm_m = self.world_from_imu * foot.arm_m(pelvis_from_foot, model);
             let missing_m = arm_m - (foot.point_m - self.imu_m);
