@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::common::*;
-use tandem_episodes::{Checkpoint, EpisodeSpec, Session, Start};
+use tandem_episodes::{Checkpoint, EpisodeSpec, Sensing, Session, Start};
 use tandem_tools_spec::{Protocol, StatusReply};
 
 #[test]
@@ -79,6 +79,17 @@ fn checkpoints_of_other_episodes_are_refused_by_name() {
         assert!(text.contains("made of task handover seed 5 under the benchmark protocol"), "{text}");
         assert!(text.contains(&format!("this one is {wanted}")), "{text}");
     }
+}
+
+/// A robot's idea of itself is part of its state.
+#[test]
+fn a_checkpoint_is_no_start_for_robots_that_know_themselves_otherwise() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("handover.checkpoint");
+    written(&path);
+    let text =
+        refusal(EpisodeSpec { sensing: Sensing::TRUTH, ..spec("handover", 5, Protocol::Benchmark) }, &path);
+    assert!(text.contains("state estimate estimator") && text.contains("state estimate truth"), "{text}");
 }
 
 #[test]

@@ -10,7 +10,8 @@ use crate::recordings::interrupted;
 use tandem_episodes::players::{self, InProcess, PlayerError};
 use tandem_episodes::replay::{Verdict, Verification, verify};
 use tandem_episodes::{
-    Clock, EpisodeSpec, Phase, PhaseStart, Recorder, Recording, Session, Start, recover, tasks,
+    Clock, EpisodeSpec, Phase, PhaseStart, Recorder, Recording, Sensing, SensorModel, Session, Start,
+    recover, tasks,
 };
 use tandem_tools_spec::{EndReason, Finish, GetStatus, Observe, Protocol, Wait};
 
@@ -61,6 +62,27 @@ fn every_task_is_verified_and_goes_on_where_each_phase_begins() {
             );
         }
     }
+}
+
+/// Noise of sensors is drawn from the episode's seed: played again it is the same, and under another seed another.
+#[test]
+fn noise_is_the_same_again() {
+    let sensing = Sensing { sensors: SensorModel::G1, ..Sensing::default() };
+    let noisy = |seed: u32| EpisodeSpec { sensing, ..spec("handover", seed, Protocol::Benchmark) };
+    let folder = tempfile::tempdir().unwrap();
+    let mut session = Session::start(&noisy(5), Some(folder.path())).unwrap();
+    let read = |session: &mut Session| state(session, "A").joint_positions_rad;
+    let first = read(&mut session);
+    play(&mut session);
+    assert_eq!(session.close().departures, ["sensors: g1"]);
+    assert_eq!(verified(&folder.path().join(Recorder::FILE_NAME)).outcome, Verdict::Same);
+
+    let begun = |spec: EpisodeSpec| read(&mut Session::start(&spec, None).unwrap());
+    assert_eq!(begun(noisy(5)), first);
+    assert_ne!(begun(noisy(6)), first);
+    // Objects apart, nothing else depends on the seed.
+    let exact = |seed: u32| begun(spec("handover", seed, Protocol::Benchmark));
+    assert_eq!(exact(5), exact(6));
 }
 
 /// Three commands of A, in which a second is thought; the policy's clock runs out after `thinking_s` more.

@@ -175,3 +175,67 @@ fn between(now: &SensorReadings, before: &SensorReadings, part: f32) -> SensorRe
         specific_force_m_s2: now.specific_force_m_s2.lerp(before.specific_force_m_s2, part),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::super::{Robot, RobotPlacement};
+    use super::*;
+    use crate::PHYSICS_DT_S;
+    use crate::body::posed::model;
+    use crate::dynamics::{DVec3, Dynamics, Settings};
+
+    /// A robot in the air, before its first step.
+    fn hanging() -> (Dynamics, Robot) {
+        let mut dynamics = Dynamics::new(Settings::new(f64::from(PHYSICS_DT_S), DVec3::Z * -9.81));
+        let placement = RobotPlacement { name: "A".into(), position_m: [0.0; 2], yaw_rad: 0.0 };
+        let robot =
+            Robot::spawn(&mut dynamics, &Arc::new(RobotModel::clone(model())), &placement, 0).unwrap();
+        (dynamics, robot)
+    }
+
+    fn spread(values: &[f32]) -> f32 {
+        let mean = values.iter().sum::<f32>() / values.len() as f32;
+        (values.iter().map(|value| (value - mean).powi(2)).sum::<f32>() / values.len() as f32).sqrt()
+    }
+
+    #[test]
+    fn readings_spread_as_they_should() {
+        let (dynamics, robot) = hanging();
+        let tree = dynamics.tree(robot.tree);
+        let read = |seed: u64| {
+            let mut sensors = Sensors::new(SensorModel::G1, seed);
+            (0..1000).map(|_| sensors.read(tree, model(), PHYSICS_DT_S)).collect::<Vec<_>>()
+        };
+        let readings = read(1);
+        let check = |value: fn(&SensorReadings) -> f32, expected: f32| {
+            let found = spread(&readings.iter().map(value).collect::<Vec<_>>());
+            assert!((found / expected - 1.0).abs() < 0.1, "{found} {expected}");
+        };
+        check(|read| read.q_rad[3], G1.encoder_rad);
+        check(|read| read.torque_n_m[7], G1.torque_n_m);
+        check(|read| read.gyro_rad_s.z, G1.gyro_rad_s);
+        check(|read| read.specific_force_m_s2.x, G1.acc_m_s2);
+        assert!(read(1) == readings && read(2) != readings, "the seed decides");
+
+        let ideal = Sensors::new(SensorModel::Ideal, 1).read(tree, model(), PHYSICS_DT_S);
+        assert_eq!(ideal.q_rad, joints::read(tree, model()).0);
+        assert!((ideal.specific_force_m_s2 - Vector::Z * GRAVITY_M_S2).length() < 1e-4);
+    }
+
+    /// A robot that begins to fall feels nothing at once; by noisy sensors it feels most of its weight still.
+    #[test]
+    fn readings_are_late() {
+        let upwards = |sensors: SensorModel| {
+            let (mut dynamics, robot) = hanging();
+            let mut sensors = Sensors::new(sensors, 1);
+            sensors.read(dynamics.tree(robot.tree), model(), PHYSICS_DT_S);
+            dynamics.step().unwrap();
+            sensors.read(dynamics.tree(robot.tree), model(), PHYSICS_DT_S).specific_force_m_s2.z
+        };
+        assert!(upwards(SensorModel::Ideal).abs() < 0.1);
+        let late = G1.latency_s / PHYSICS_DT_S;
+        assert!((upwards(SensorModel::G1) - late * GRAVITY_M_S2).abs() < 0.3);
+    }
+}
