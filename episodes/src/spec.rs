@@ -1,10 +1,12 @@
 //! What makes an episode what it is, in one value: from a request or flags to the session, the recording and the results.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use tandem_sim::{
-    LocomotionChoice, Sensing, SensorModel, SimError, StateSource, mjcf::Document, render::RendererKind,
+    LocomotionChoice, RobotModel, Sensing, SensorModel, SimError, StateSource, mjcf::Document,
+    render::RendererKind,
 };
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, Wording};
 
@@ -197,6 +199,11 @@ impl RobotFile {
             RobotFile::Embedded(name) => name.clone(),
             RobotFile::File(path) => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         }
+    }
+
+    /// The robot that the file describes.
+    pub fn model(&self) -> Result<Arc<RobotModel>, SimError> {
+        Ok(Arc::new(RobotModel::parse(&self.name(), &self.read()?)?))
     }
 
     /// The file's text.

@@ -170,7 +170,7 @@ impl Recording {
         let mut steps = self.steps();
         let missing = || RecordingError::Missing { path: self.path.clone(), what: topics::STEPS.into() };
         let start = steps.next().ok_or_else(missing)??;
-        let mut scores = self.spec.task.scores(&start)?;
+        let mut scores = self.spec.task.scores(&self.spec.robot.model()?, &start)?;
         scores.set_memory(self.scores.clone());
         for step in steps {
             scores.update(&step?);

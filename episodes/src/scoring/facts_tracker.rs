@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use tandem_sim::{ObjectModel, SimError, Step};
+use tandem_sim::{ObjectModel, RobotModel, SimError, Step};
 
 use super::facts::{Facts, ObjectFacts, RobotFacts};
 use super::grasps::ObjectGrasps;
@@ -13,6 +13,7 @@ use super::grasps::ObjectGrasps;
 pub struct FactsTracker {
     /// The model of each object, as its file has it.
     models: Vec<Arc<ObjectModel>>,
+    robot: Arc<RobotModel>,
     memory: Vec<ObjectMemory>,
 }
 
@@ -25,12 +26,14 @@ pub struct ObjectMemory {
 }
 
 impl FactsTracker {
-    /// Begins to watch `objects`, given by name and file, and what moves on them, with the state before the first control step.
+    /// Begins to watch `objects`, given by name and file, and what moves on them, and robots of a model, with the state before the
+    /// first control step.
     pub fn new<'a>(
         objects: impl Iterator<Item = (&'a str, &'a str)>,
+        robot: &Arc<RobotModel>,
         start: &Step,
     ) -> Result<FactsTracker, SimError> {
-        let mut tracker = FactsTracker { models: Vec::new(), memory: Vec::new() };
+        let mut tracker = FactsTracker { models: Vec::new(), robot: robot.clone(), memory: Vec::new() };
         for (name, file) in objects {
             for part in ObjectModel::parts(file, name)? {
                 let at_start = start.object(&part.name);
@@ -55,6 +58,8 @@ impl FactsTracker {
     /// The facts after `step`, the last one that was looked at.
     pub fn facts(&self, step: &Step) -> Facts {
         let robots = step.robots.iter().map(|robot| RobotFacts {
+            model: self.robot.clone(),
+            world_from_link: robot.truth.world_from_link.clone(),
             pelvis_in_world: robot.truth.world_from_pelvis(),
             wrist_in_pelvis: robot
                 .truth

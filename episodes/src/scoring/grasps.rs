@@ -63,7 +63,7 @@ pub struct ObjectGrasps {
     object: String,
     /// The detectors of each robot's hands.
     detectors: Vec<Sides<GraspDetector>>,
-    /// Control steps since a hand last touched the object.
+    /// Control steps since any part of a robot last touched the object, or a hand held it.
     untouched_steps: u32,
 }
 
@@ -83,7 +83,9 @@ impl ObjectGrasps {
                 hands[side].update(&step.contacts(robot, side, &self.object));
             }
         }
-        let off = self.grips().iter().all(|hands| *hands == Sides::both(Grip::Off));
+        // A hand that lost touch for a moment holds on.
+        let hands_off = self.grips().iter().all(|hands| *hands == Sides::both(Grip::Off));
+        let off = hands_off && !step.is_touched(&self.object);
         self.untouched_steps = if off { self.untouched_steps + 1 } else { 0 };
     }
 
@@ -99,6 +101,8 @@ impl ObjectGrasps {
 /// Presses on both sides of every threshold, and how long they last.
 #[cfg(test)]
 mod tests {
+    use tandem_sim::{BodyTouch, ObjectState, ObjectStep, Pose};
+
     use super::*;
 
     fn contacts(thumb_n: Vector, fingers_n: Vector, palm_n: Vector) -> HandContacts {
@@ -134,6 +138,32 @@ mod tests {
             (0..STEPS_TO_CHANGE).for_each(|_| detector.update(&contacts));
             assert_eq!(detector.grip(), expected, "{what}");
         }
+    }
+
+    #[test]
+    fn an_object_is_untouched_while_no_part_of_a_robot_touches_it() {
+        let state = ObjectState {
+            world_from_object: Pose::IDENTITY,
+            velocity_m_s: Vector::ZERO,
+            angular_velocity_rad_s: Vector::ZERO,
+        };
+        let bottle = ObjectStep { name: "bottle".into(), state };
+        let step = |body_touches: Vec<BodyTouch>| Step {
+            control_step: 0,
+            time_s: 0.0,
+            robots: Vec::new(),
+            objects: vec![bottle.clone()],
+            touches: Vec::new(),
+            body_touches,
+        };
+        let mut grasps = ObjectGrasps::new("bottle", 2);
+        (0..10).for_each(|_| grasps.update(&step(Vec::new())));
+        assert!((grasps.untouched_s() - 0.2).abs() < 1e-9);
+        // A forearm or a foot, as no hand touches it.
+        grasps.update(&step(vec![BodyTouch { object: 0, robot: 1 }]));
+        assert_eq!((grasps.untouched_s(), grasps.grips()), (0.0, vec![Sides::both(Grip::Off); 2]));
+        grasps.update(&step(Vec::new()));
+        assert!((grasps.untouched_s() - 0.02).abs() < 1e-9);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::scoring::Facts;
 
-/// How long no hand may have touched an object before it counts as released.
+/// How long no part of a robot may have touched an object before it counts as released.
 pub const RELEASE_S: f64 = 0.2;
 /// A placed object stands this nearly upright.
 pub const UPRIGHT_RAD: f32 = 15.0 * std::f32::consts::PI / 180.0;
@@ -11,7 +11,7 @@ pub const STILL_M_S: f32 = 0.05;
 /// A placed object turns no faster than this.
 pub const STILL_RAD_S: f32 = 0.15;
 
-/// Every hand has been off `object` for 0.2 s, and it stands upright and still.
+/// Every part of every robot has been off `object` for 0.2 s, and it stands upright and still.
 pub fn stands_released(f: &Facts, object: &str) -> bool {
     f.untouched_s(object) >= RELEASE_S
         && f.tilt_rad(object) <= UPRIGHT_RAD
@@ -43,7 +43,7 @@ pub mod sides {
 
     use crate::scoring::{Facts, ObjectFacts};
 
-    /// `placed` a little inside and a little outside of how slow `object` has to be, and of how long hands have to be off it.
+    /// `placed` a little inside and a little outside of how slow `object` has to be, and of how long robots have to be off it.
     pub fn still_and_released(placed: &Facts, object: &str) -> [(&'static str, Facts, Facts); 3] {
         let changed = |change: &dyn Fn(&mut ObjectFacts)| {
             let mut facts = placed.clone();
@@ -56,7 +56,7 @@ pub mod sides {
         [
             ("speed", fast(0.0499), fast(0.0501)),
             ("turning", turning(0.1499), turning(0.1501)),
-            ("hands", untouched(0.2), untouched(0.18)),
+            ("release", untouched(0.2), untouched(0.18)),
         ]
     }
 }

@@ -1,7 +1,9 @@
 //! The score of one episode: grasps, facts and phases, step by step. An episode under way and its recording are scored alike.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
-use tandem_sim::{SimError, Step};
+use tandem_sim::{RobotModel, SimError, Step};
 
 use super::facts_tracker::{FactsTracker, ObjectMemory};
 use super::phases::{PhaseMemory, PhaseTracker};
@@ -29,14 +31,15 @@ pub struct StepScore {
 }
 
 impl Scores {
-    /// Begins to score `phases`, which may ask for `objects`, given by name and file, with the state before the first
-    /// control step.
+    /// Begins to score `phases`, which may ask for `objects`, given by name and file, and for robots of this model, with the
+    /// state before the first control step.
     pub fn new<'a>(
         phases: &'static [Phase],
         objects: impl Iterator<Item = (&'a str, &'a str)>,
+        robot: &Arc<RobotModel>,
         start: &Step,
     ) -> Result<Scores, SimError> {
-        Ok(Scores { tracker: FactsTracker::new(objects, start)?, phases: PhaseTracker::new(phases) })
+        Ok(Scores { tracker: FactsTracker::new(objects, robot, start)?, phases: PhaseTracker::new(phases) })
     }
 
     /// Looks at the control step that follows the last one.

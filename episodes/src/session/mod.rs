@@ -99,8 +99,8 @@ impl Session {
         Ok(Session {
             origin: Origin { spec: spec.clone(), robot, locomotion },
             rules,
+            scores: spec.task.scores(&motions[0].robot.model, &present)?,
             motions,
-            scores: spec.task.scores(&present)?,
             clock: ThinkingClock::new(rules.thinking, clock),
             observer: Observer::new(spec.renderer, &world),
             files: None,

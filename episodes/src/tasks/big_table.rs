@@ -72,7 +72,7 @@ pub const TASK: Task = Task {
         Phase {
             id: "release",
             description: "The whole foot of the table is on the disc, the table as high as at first to 5 cm, upright within 15 \
-                          degrees and still, and no hand has touched it for 0.2 s.",
+                          degrees and still, and no robot has touched it for 0.2 s.",
             collaborative: true,
             done: Done::When(released),
         },

@@ -71,7 +71,7 @@ pub const TASK: Task = Task {
         Phase {
             id: "serve",
             description: "B has held the bottle within 15 cm of the patch, seen from above; since then it has stayed there and stands \
-                          within 6 cm of the patch on each axis, upright within 15 degrees and still, and no hand has touched it \
+                          within 6 cm of the patch on each axis, upright within 15 degrees and still, and no robot has touched it \
                           for 0.2 s.",
             collaborative: false,
             done: Done::Sequence { first: carried_to_goal, then: served, broken: away_from_goal },

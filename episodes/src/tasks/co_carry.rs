@@ -63,7 +63,7 @@ pub const TASK: Task = Task {
         Phase {
             id: "release",
             description: "The basket stands within 15 cm of the patch on each horizontal axis, as high as on the first shelf to \
-                          6 cm, upright within 15 degrees and still, and no hand has touched it for 0.2 s.",
+                          6 cm, upright within 15 degrees and still, and no robot has touched it for 0.2 s.",
             collaborative: true,
             done: Done::When(released),
         },

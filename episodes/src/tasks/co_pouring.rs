@@ -72,7 +72,7 @@ pub const TASK: Task = Task {
     phases: &[
         Phase {
             id: "joint_grasp_and_lift",
-            description: "Both robots hold the tub at least 3 cm above its stack.",
+            description: "Both robots hold the tub, its lowest point at least 3 cm above its stack.",
             collaborative: true,
             done: Done::When(lifted),
         },
@@ -97,7 +97,7 @@ fn held_by_both(f: &Facts) -> bool {
 
 /// Both robots hold the tub off its stack.
 fn lifted(f: &Facts) -> bool {
-    held_by_both(f) && f.lift_m("tub") >= LIFTED_M
+    held_by_both(f) && f.clearance_m("tub") >= LIFTED_M
 }
 
 /// Both robots hold the tub aslant.

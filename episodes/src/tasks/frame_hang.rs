@@ -66,7 +66,7 @@ pub const TASK: Task = Task {
         Phase {
             id: "hang",
             description: "The peg has passed through the loop while both robots held the frame; the frame has stayed on it, \
-                          hangs within 35 degrees of upright and nearly still, and no hand has touched it for 0.2 s.",
+                          hangs within 35 degrees of upright and nearly still, and no robot has touched it for 0.2 s.",
             collaborative: true,
             done: Done::Sequence { first: threaded_while_held, then: hangs, broken: off_the_peg },
         },

@@ -58,7 +58,7 @@ pub const TASK: Task = Task {
         Phase {
             id: "place",
             description: "The bottle stands within 6 cm of the target on each axis, upright within 15 degrees and \
-                          still, and no hand has touched it for 0.2 s.",
+                          still, and no robot has touched it for 0.2 s.",
             collaborative: false,
             done: Done::When(placed),
         },

@@ -16,7 +16,9 @@ mod trash_collection;
 
 pub use randomize::{Offset, StartPose, uniform_xy};
 
-use tandem_sim::{SimError, Step};
+use std::sync::Arc;
+
+use tandem_sim::{RobotModel, SimError, Step};
 
 use crate::EpisodeError;
 use crate::scoring::{Phase, Scores};
@@ -80,9 +82,9 @@ pub const fn spot(name: &'static str, position_m: [f32; 3]) -> ObjectSpot {
 }
 
 impl Task {
-    /// Begins to score an episode of this task, with the state before the first control step.
-    pub fn scores(&self, start: &Step) -> Result<Scores, SimError> {
-        Scores::new(self.phases, self.objects.iter().map(|spot| (spot.name, spot.file)), start)
+    /// Begins to score an episode of this task with robots of this model, with the state before the first control step.
+    pub fn scores(&self, robot: &Arc<RobotModel>, start: &Step) -> Result<Scores, SimError> {
+        Scores::new(self.phases, self.objects.iter().map(|spot| (spot.name, spot.file)), robot, start)
     }
 
     /// Names of the robots, in their order.

@@ -18,7 +18,6 @@ const GOAL_X_M: f32 = 1.15;
 /// How far a robot that holds an end of the table stands from its middle.
 const HOLDER_M: f32 = 0.753;
 const FEET: [&str; 4] = ["foot_1", "foot_2", "foot_3", "foot_4"];
-const RAILS: [&str; 4] = ["b_left", "b_right", "c_left", "c_right"];
 const LIFTED_M: f32 = 0.03;
 const CLEAR_M: f32 = 0.01;
 const OPEN_RAD: f32 = 1.45;
@@ -76,26 +75,25 @@ pub const TASK: Task = Task {
         },
         Phase {
             id: "pass_doorway",
-            description: "The whole table and both carriers are at least 20 cm beyond the middle of the wall; B and C hold the \
-                          table, and its feet are at least 1 cm off the floor.",
+            description: "All of the table and of both carriers is at least 20 cm beyond the middle of the wall; B and C hold \
+                          the table, and its feet are at least 1 cm off the floor.",
             collaborative: true,
             done: Done::When(passed),
         },
         Phase {
             id: "place",
             description: "B and C have held the table aloft within 15 cm of its place, seen from above; since then it has stayed there \
-                          and stands with each foot on its square of 10 cm, as high as at first to 4 cm, upright within 15 degrees \
-                          and still, and no hand has touched it for 0.2 s.",
+                          and stands with all of each foot on its square of 10 cm, as high as at first to 4 cm, upright within \
+                          15 degrees and still, and no robot has touched it for 0.2 s.",
             collaborative: true,
             done: Done::Sequence { first: carried_to_goal, then: placed, broken: away_from_goal },
         },
     ],
 };
 
-/// B and C hold the table, and every foot is as high off the floor as this.
+/// B and C hold the table, and all of it is as high off the floor as this.
 fn held_above(f: &Facts, clear_m: f32) -> bool {
-    f.held_by_all(&[B, C], "console_table")
-        && FEET.iter().all(|foot| f.site_m("console_table", foot).z >= clear_m)
+    f.held_by_all(&[B, C], "console_table") && f.clearance_m("console_table") >= clear_m
 }
 
 fn lifted(f: &Facts) -> bool {
@@ -107,14 +105,14 @@ fn open(f: &Facts) -> bool {
     f.turned_rad("lever_door", "lever_door leaf") >= OPEN_RAD
 }
 
-/// B and C are through the door with the table between them.
+/// All of B, of C and of the table between them is through the door.
 fn passed(f: &Facts) -> bool {
-    let door = f.object("lever_door").pose_in_world.inverse();
-    let plane_m = f.site("lever_door", "clear").position_m().x;
-    let beyond = |point_m: Vector| (door * point_m).x >= plane_m;
-    let table = FEET.iter().chain(&RAILS).map(|site| f.site_m("console_table", site));
-    let carriers = [B, C].map(|robot| f.robots[robot].pelvis_in_world.translation);
-    held_above(f, CLEAR_M) && table.chain(carriers).all(beyond)
+    let back = f.object("lever_door").pose_in_world.rotation * Vector::NEG_X;
+    let plane_m = f.site_m("lever_door", "clear").dot(back);
+    let beyond = |reach_back_m: f32| reach_back_m <= plane_m;
+    held_above(f, CLEAR_M)
+        && beyond(f.reach_m("console_table", back))
+        && [B, C].iter().all(|robot| beyond(f.robot_reach_m(*robot, back)))
 }
 
 fn away_from_goal(f: &Facts) -> bool {
@@ -126,14 +124,9 @@ fn carried_to_goal(f: &Facts) -> bool {
     held_above(f, CLEAR_M) && !away_from_goal(f)
 }
 
-/// The table stands with each foot on its square, released.
+/// The table stands with all of each foot on its square, released.
 fn placed(f: &Facts) -> bool {
-    let on_mark = |foot: &&str| {
-        let mark = f.site("foot_marks", foot);
-        let beside_m = f.object("foot_marks").pose_in_world.inverse() * f.site_m("console_table", foot)
-            - mark.position_m();
-        beside_m.x.abs() <= mark.size_m.x && beside_m.y.abs() <= mark.size_m.y
-    };
+    let on_mark = |foot: &&str| f.within_mark("console_table", foot, "foot_marks", foot);
     stands_released(f, "console_table")
         && FEET.iter().all(on_mark)
         && stands_as_high(f, "console_table", AS_HIGH_M)

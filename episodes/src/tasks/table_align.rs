@@ -70,7 +70,7 @@ pub const TASK: Task = Task {
             id: "align",
             description: "The middle of the table is 33.5 to 46.5 cm before the middle of the chair and within 13 cm across, its \
                           long side square to the chair within 4 degrees, as high as at first to 4 cm; it stands upright within \
-                          15 degrees and still, and no hand has touched it for 0.2 s.",
+                          15 degrees and still, and no robot has touched it for 0.2 s.",
             collaborative: true,
             done: Done::When(aligned),
         },

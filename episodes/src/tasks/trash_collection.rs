@@ -18,7 +18,7 @@ const BIN_Y_M: f32 = 1.77;
 const CARRY_POINT_Y_M: f32 = 0.105;
 const LIFTED_M: f32 = 0.02;
 const DELIVERED_M: f32 = 0.25;
-/// How far the rim of the bin may be above the bench's top.
+/// How far the rim of the bin, its highest part, may be above the bench's top.
 const RIM_ABOVE_M: f32 = 0.01;
 
 pub const TASK: Task = Task {
@@ -56,14 +56,14 @@ pub const TASK: Task = Task {
     phases: &[
         Phase {
             id: "lift_bin",
-            description: "A holds the bin at least 2 cm off the floor.",
+            description: "A holds the bin, all of it at least 2 cm off the floor.",
             collaborative: false,
             done: Done::When(lifted),
         },
         Phase {
             id: "deliver_bin",
-            description: "A holds the bin at least 2 cm off the floor, its middle within 25 cm of the taped mark at the end of the \
-                          bench, its rim at most 1 cm higher than the bench's top.",
+            description: "A holds the bin, all of it at least 2 cm off the floor, its middle within 25 cm of the taped mark at the end \
+                          of the bench, no point of its rim more than 1 cm higher than the bench's top.",
             collaborative: false,
             done: Done::When(delivered),
         },
@@ -78,14 +78,12 @@ pub const TASK: Task = Task {
 
 /// A holds the bin off the floor.
 fn lifted(f: &Facts) -> bool {
-    f.holds_any(A, "bin") && f.lift_m("bin") >= LIFTED_M
+    f.holds_any(A, "bin") && f.clearance_m("bin") >= LIFTED_M
 }
 
 /// A holds the bin at the end of the bench, so low that a bottle falls into it.
 fn delivered(f: &Facts) -> bool {
-    lifted(f)
-        && f.apart_m("bin", "carry_point") <= DELIVERED_M
-        && f.site_m("bin", "rim").z <= BENCH_M + RIM_ABOVE_M
+    lifted(f) && f.apart_m("bin", "carry_point") <= DELIVERED_M && f.highest_m("bin") <= BENCH_M + RIM_ABOVE_M
 }
 
 /// The bottle lies in the bin, which A has not let go of.

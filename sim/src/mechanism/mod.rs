@@ -3,12 +3,14 @@
 
 mod equality;
 mod machinery;
+mod solid;
 
 use rapier3d::math::Pose;
 
 use equality::joint_link;
 pub(crate) use equality::{PlacedTree, add_equalities, keep_apart};
 pub(crate) use machinery::{Machinery, START, begin};
+pub(crate) use solid::Solid;
 
 pub(crate) use crate::dynamics::rounded;
 

@@ -1,15 +1,23 @@
 //! What a hand feels of an object, and a robot of itself.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rapier3d::math::Vector;
 
 use super::World;
-use super::step::{HandContacts, Touch};
+use super::step::{BodyTouch, HandContacts, Touch};
 use crate::body::HandLinks;
 use crate::dynamics::ColliderId;
 use crate::owner::Owner;
 use crate::{PHYSICS_DT_S, Side, Sides};
+
+/// A point at which a link presses on an object, with the normal force on the object (N, world).
+struct Press {
+    object: usize,
+    robot: usize,
+    link: usize,
+    force_n: Vector,
+}
 
 impl HandContacts {
     /// Adds the force of one of the robot's links, if it belongs to `hand`.
@@ -28,16 +36,7 @@ impl World {
     /// All hands that touch an object, in the order of the objects.
     pub(super) fn touches(&self) -> Vec<Touch> {
         let mut found: BTreeMap<(usize, usize), Sides<HandContacts>> = BTreeMap::new();
-        for (owners, force_n) in self.presses() {
-            let (object, robot, link, force_n) = match owners {
-                [Some(Owner::Link { robot, link }), Some(Owner::Object(object))] => {
-                    (object, robot, link, force_n)
-                }
-                [Some(Owner::Object(object)), Some(Owner::Link { robot, link })] => {
-                    (object, robot, link, -force_n)
-                }
-                _ => continue,
-            };
+        for Press { object, robot, link, force_n } in self.presses_on_objects() {
             let hands = found.entry((object, robot)).or_default();
             for side in Side::BOTH {
                 hands[side].add(&self.robots[robot].model.hands[side], link, force_n);
@@ -48,6 +47,26 @@ impl World {
             Side::BOTH.into_iter().zip(hands).map(touch)
         });
         by_hand.filter(|touch| touch.contacts != HandContacts::default()).collect()
+    }
+
+    /// All robots that touch an object, in the order of the objects.
+    pub(super) fn body_touches(&self) -> Vec<BodyTouch> {
+        let touch = |press: Press| BodyTouch { object: press.object, robot: press.robot };
+        let found: BTreeSet<BodyTouch> = self.presses_on_objects().map(touch).collect();
+        found.into_iter().collect()
+    }
+
+    /// Points at which robots pressed on objects in the last step.
+    fn presses_on_objects(&self) -> impl Iterator<Item = Press> {
+        self.presses().filter_map(|(owners, force_n)| match owners {
+            [Some(Owner::Link { robot, link }), Some(Owner::Object(object))] => {
+                Some(Press { object, robot, link, force_n })
+            }
+            [Some(Owner::Object(object)), Some(Owner::Link { robot, link })] => {
+                Some(Press { object, robot, link, force_n: -force_n })
+            }
+            _ => None,
+        })
     }
 
     /// Points that pressed in the last step: whose colliders they are between, and the normal force on the second (N, world).

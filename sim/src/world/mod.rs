@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 pub use objects::{ObjectModel, ObjectPart, ObjectPlacement, ObjectState};
 pub use snapshot::Snapshot;
-pub use step::{HandContacts, ObjectStep, RobotStep, Step, Touch};
+pub use step::{BodyTouch, HandContacts, ObjectStep, RobotStep, Step, Touch};
 pub use watch::{
     DEEP_M, Extremes, FARTHEST_BEYOND_RAD, FASTEST_M_S, Greatest, LEAST_SCALE_J, LONGEST_DEEP_S,
     MOST_MADE_SHARE, WINDOW_S, Watch,

@@ -21,6 +21,8 @@ pub struct Step {
     pub objects: Vec<ObjectStep>,
     /// Hands that touch an object; those that touch none have no entry.
     pub touches: Vec<Touch>,
+    /// Robots that touch an object with any part of them, hands included.
+    pub body_touches: Vec<BodyTouch>,
 }
 
 /// One robot: what it senses after the step, where it takes itself to be, where it is, and what it was told for the step.
@@ -51,6 +53,15 @@ pub struct Touch {
     pub contacts: HandContacts,
 }
 
+/// One robot on one object, with whatever part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct BodyTouch {
+    /// Index into [`Step::objects`].
+    pub object: usize,
+    /// Index into [`Step::robots`].
+    pub robot: usize,
+}
+
 /// Normal contact forces (N, world) that a hand's parts exert on an object, averaged over the last physics step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct HandContacts {
@@ -73,6 +84,11 @@ impl Step {
         self.objects.iter().find(|object| object.name == name).map(|object| &object.state)
     }
 
+    /// Whether any part of any robot touches an object; false of one that is unknown.
+    pub fn is_touched(&self, object: &str) -> bool {
+        self.body_touches.iter().any(|touch| self.objects[touch.object].name == object)
+    }
+
     /// Forces of one hand on one object; zero if the object is unknown or out of touch.
     pub fn contacts(&self, robot: usize, side: Side, object: &str) -> HandContacts {
         let of_hand = |touch: &&Touch| {
@@ -93,6 +109,7 @@ impl World {
             robots: (0..self.robots.len()).map(|robot| self.robot_step(robot)).collect(),
             objects: self.objects.iter().map(object).collect(),
             touches: self.touches(),
+            body_touches: self.body_touches(),
         }
     }
 

@@ -36,7 +36,7 @@ fn step(objects: &[Pose]) -> Step {
         ObjectStep { name: "thing".into(), state }
     };
     let objects = objects.iter().map(object).collect();
-    Step { control_step: 0, time_s: 0.0, robots: vec![], objects, touches: vec![] }
+    Step { control_step: 0, time_s: 0.0, robots: vec![], objects, touches: vec![], body_touches: vec![] }
 }
 
 fn at(x: f32, y: f32, z: f32) -> Pose {

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use tandem_sim::body::RobotModel;
 use tandem_sim::{
-    CONTROL_DT_S, HandContacts, ObjectPlacement, Pose, RobotCommand, RobotPlacement, Side, SimError, Step,
-    Vector, World, WorldSpec, assets,
+    BodyTouch, CONTROL_DT_S, HandContacts, ObjectPlacement, Pose, RobotCommand, RobotPlacement, Side,
+    SimError, Step, Vector, World, WorldSpec, assets,
 };
 
 fn kitchen() -> WorldSpec {
@@ -167,6 +167,21 @@ fn a_step_names_the_hand_that_touches() {
     assert_eq!(step.contacts(0, Side::Right, "bottle"), step.touches[0].contacts);
     assert_eq!(step.contacts(0, Side::Left, "bottle"), HandContacts::default());
     assert_eq!(step.contacts(0, Side::Right, "vase"), HandContacts::default());
+    assert_eq!(step.body_touches, [BodyTouch { object: 0, robot: 0 }]);
+    assert!(step.is_touched("bottle") && !step.is_touched("vase"));
+}
+
+#[test]
+fn a_step_names_the_robot_that_touches_with_what_is_no_hand() {
+    let mut spec = kitchen();
+    // The bottle falls onto A's left shoulder, far from all hands.
+    spec.objects[0].world_from_object = Pose::from_translation(Vector::new(0.0, 0.12, 1.15));
+    let mut world = World::new(&spec).expect("embedded files load");
+    let rest = rest(&world);
+    let mut steps = (0..50).map(|_| world.control_step(&rest).expect("it stays finite"));
+    let step = steps.find(|step| !step.body_touches.is_empty()).expect("the bottle lands on the shoulder");
+    assert_eq!(step.body_touches, [BodyTouch { object: 0, robot: 0 }]);
+    assert!(step.touches.is_empty() && step.is_touched("bottle"));
 }
 
 #[test]

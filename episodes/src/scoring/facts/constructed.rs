@@ -1,15 +1,23 @@
 //! Worlds for tests, put together by hand, and the quantities of such worlds.
 
-use tandem_sim::{ObjectModel, ObjectPart};
+use std::sync::LazyLock;
+
+use tandem_sim::{ObjectModel, ObjectPart, Rotation};
 
 use super::*;
-use crate::tasks::{self, Task};
+use crate::spec::RobotFile;
+use crate::tasks::{self, RobotSpot, Task};
+
+/// The robot that stands in all of them.
+static ROBOT: LazyLock<Arc<RobotModel>> = LazyLock::new(|| RobotFile::default().model().unwrap());
 
 impl Facts {
-    /// Every object at its spot, at rest and touched by no hand since the episode began 10 s ago.
+    /// Every robot and object at its spot, at rest, and no object touched since the episode began 10 s ago.
     pub fn at_rest(task: &Task) -> Facts {
-        let robot = |_| RobotFacts {
-            pelvis_in_world: Pose::IDENTITY,
+        let robot = |spot: &RobotSpot| RobotFacts {
+            model: ROBOT.clone(),
+            world_from_link: standing(spot.position_m, spot.yaw_rad),
+            pelvis_in_world: standing(spot.position_m, spot.yaw_rad)[0],
             wrist_in_pelvis: Sides::both(Pose::IDENTITY),
             hand_force_n: Sides::both(Vector::ZERO),
             fallen: false,
@@ -28,7 +36,7 @@ impl Facts {
             }
         };
         let object = |spot: &crate::tasks::ObjectSpot| {
-            let heading = tandem_sim::Rotation::from_rotation_z(spot.yaw_rad);
+            let heading = Rotation::from_rotation_z(spot.yaw_rad);
             let world_from_object = Pose::from_parts(spot.position_m.into(), heading);
             let parts = ObjectModel::parts(spot.file, spot.name).unwrap();
             parts.into_iter().map(move |found| part(world_from_object, found))
@@ -44,6 +52,14 @@ impl Facts {
     pub fn held_by(self, robots: &[usize], object: &str) -> Facts {
         let hands = robots.iter().flat_map(|robot| Side::BOTH.map(|side| (*robot, side)));
         hands.fold(self, |facts, (robot, side)| facts.grip(robot, side, object, Grip::Holding))
+    }
+
+    /// The same facts, but a robot has stepped elsewhere, as it is.
+    pub fn with_robot_moved(mut self, robot: usize, by_m: Vector) -> Facts {
+        let robot = &mut self.robots[robot];
+        robot.pelvis_in_world.translation += by_m;
+        robot.world_from_link.iter_mut().for_each(|link| link.translation += by_m);
+        self
     }
 
     pub fn object_mut(&mut self, name: &str) -> &mut ObjectFacts {
@@ -63,10 +79,22 @@ impl Facts {
     }
 
     pub fn turned(mut self, object: &str, axis: Vector, angle_rad: f32) -> Facts {
-        let turn = tandem_sim::Rotation::from_axis_angle(axis, angle_rad);
+        let turn = Rotation::from_axis_angle(axis, angle_rad);
         self.object_mut(object).pose_in_world.rotation = turn;
         self
     }
+}
+
+/// The links of a robot that stands as its file has it, with its soles on the floor.
+fn standing([x_m, y_m]: [f32; 2], yaw_rad: f32) -> Vec<Pose> {
+    let q_rad: Vec<f32> = ROBOT.joints.iter().map(|joint| joint.rest_rad).collect();
+    let heading = Rotation::from_rotation_z(yaw_rad);
+    let above_floor = |height_m: f32| {
+        let pelvis = Pose::from_parts(Vector::new(x_m, y_m, height_m), heading);
+        ROBOT.forward_kinematics(pelvis, &q_rad)
+    };
+    let lowest_m = -ROBOT.reach_m(&above_floor(0.0), Vector::NEG_Z);
+    above_floor(-lowest_m)
 }
 
 #[test]
@@ -82,6 +110,27 @@ fn quantities_are_those_of_the_constructed_world() {
         let turned = rest.clone().turned("bottle", axis, angle_rad);
         assert!((turned.tilt_rad("bottle") - tilt_rad).abs() < 1e-3, "{axis} {angle_rad}");
     }
+}
+
+#[test]
+fn bodies_reach_as_far_as_their_shapes() {
+    let close = |a: f32, b: f32| (a - b).abs() < 1e-4;
+    let rest = Facts::at_rest(tasks::find("handover").unwrap());
+    // The bottle is 70 mm thick and 0.30 m tall, and stands on the counter of 0.80 m at x = 0.30 m.
+    assert!(
+        close(rest.reach_m("bottle", Vector::X), 0.335)
+            && close(rest.reach_m("bottle", Vector::NEG_X), -0.265)
+    );
+    assert!(close(rest.lowest_m("bottle"), 0.8) && close(rest.highest_m("bottle"), 1.1));
+    let tilted = rest.clone().turned("bottle", Vector::Y, std::f32::consts::FRAC_PI_2);
+    assert!(close(tilted.lowest_m("bottle"), 0.765) && close(tilted.clearance_m("bottle"), -0.035));
+    // A stands at 0 and looks along x; its soles are on the floor, and what is foremost of it are the fingers.
+    assert!(close(rest.robot_reach_m(A, Vector::NEG_Z), 0.0));
+    let back_m = rest.robot_reach_m(A, Vector::NEG_X);
+    let front_m = rest.robot_reach_m(A, Vector::X);
+    assert!((0.08..0.16).contains(&back_m) && (0.25..0.6).contains(&front_m), "{back_m} {front_m}");
+    let ahead = rest.with_robot_moved(A, Vector::X);
+    assert!(close(ahead.robot_reach_m(A, Vector::NEG_X), back_m - 1.0));
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tandem_sim::{ObjectModel, Pose, Side, Sides, Vector, mjcf::Site};
+use tandem_sim::{ObjectModel, Pose, RobotModel, Side, Sides, Vector, mjcf::Site};
 
 /// Index of robot A in [`Facts::robots`].
 pub const A: usize = 0;
@@ -24,6 +24,10 @@ pub struct Facts {
 /// One robot.
 #[derive(Clone, Debug)]
 pub struct RobotFacts {
+    /// Its shapes.
+    pub model: Arc<RobotModel>,
+    /// Every link, in the order of [`RobotModel::links`].
+    pub world_from_link: Vec<Pose>,
     pub pelvis_in_world: Pose,
     pub wrist_in_pelvis: Sides<Pose>,
     /// Force of the world on each palm, in the world's frame; estimated from the arm's own torques. A hand that
@@ -45,7 +49,7 @@ pub struct ObjectFacts {
     pub rest_height_m: f32,
     /// How each robot's hands grip it.
     pub hands: Vec<Sides<Grip>>,
-    /// How long no hand has touched it.
+    /// How long no part of any robot has touched it.
     pub untouched_s: f64,
 }
 
@@ -76,7 +80,7 @@ impl Facts {
         self.object(object).hands[robot] == Sides::both(Grip::Off)
     }
 
-    /// How long no hand has touched `object`.
+    /// How long no part of any robot has touched `object`.
     pub fn untouched_s(&self, object: &str) -> f64 {
         self.object(object).untouched_s
     }
@@ -90,8 +94,29 @@ impl Facts {
     /// How far the lowest point of `object` is above where its origin rested when the episode began: for what stood upright,
     /// how far all of it is off what it stood on.
     pub fn clearance_m(&self, object: &str) -> f32 {
+        self.lowest_m(object) - self.object(object).rest_height_m
+    }
+
+    /// Height above the floor of the lowest point of `object`.
+    pub fn lowest_m(&self, object: &str) -> f32 {
+        -self.reach_m(object, Vector::NEG_Z)
+    }
+
+    /// Height above the floor of the highest point of `object`.
+    pub fn highest_m(&self, object: &str) -> f32 {
+        self.reach_m(object, Vector::Z)
+    }
+
+    /// How far `object` reaches along a direction of the world, a unit vector, from the world's origin.
+    pub fn reach_m(&self, object: &str, direction: Vector) -> f32 {
         let object = self.object(object);
-        object.model.lowest_m(&object.pose_in_world) - object.rest_height_m
+        object.model.reach_m(&object.pose_in_world, direction)
+    }
+
+    /// How far a robot reaches along a direction of the world, a unit vector, from the world's origin.
+    pub fn robot_reach_m(&self, robot: usize, direction: Vector) -> f32 {
+        let robot = &self.robots[robot];
+        robot.model.reach_m(&robot.world_from_link, direction)
     }
 
     /// Angle between the z axis of `object` and the world's.
@@ -156,6 +181,19 @@ impl Facts {
         let [low_m, high_m] = self.site(container, site).corners_m();
         let local = self.object(container).pose_in_world.inverse() * self.position_m(object);
         local.cmpge(low_m).all() && local.cmple(high_m).all()
+    }
+
+    /// Whether a site of `object` that is a box is, seen along z of `target`, wholly within a site of that which is one, too.
+    pub fn within_mark(&self, object: &str, site: &str, target: &str, mark: &str) -> bool {
+        let (site, mark) = (self.site(object, site), self.site(target, mark));
+        let target_from_object =
+            self.object(target).pose_in_world.inverse() * self.object(object).pose_in_world;
+        let beside_m = target_from_object * site.position_m() - mark.position_m();
+        let turn = target_from_object.rotation;
+        let half_m = (turn * Vector::X).abs() * site.size_m.x
+            + (turn * Vector::Y).abs() * site.size_m.y
+            + (turn * Vector::Z).abs() * site.size_m.z;
+        (beside_m.abs() + half_m).truncate().cmple(mark.size_m.truncate()).all()
     }
 
     /// Whether a rod of `object`, from one site to another, passes through a ring of `carrier`: a site with its axis along y.

@@ -58,7 +58,10 @@ fn serve_on_both_sides_of_every_threshold() {
     let tilted = |degrees: f32| bottle_at(Vector::ZERO).turned("bottle", Vector::Y, degrees.to_radians());
     for (what, inside, outside) in [
         ("x", bottle_at(Vector::X * 0.0599), bottle_at(Vector::X * 0.0601)),
+        ("-x", bottle_at(Vector::X * -0.0599), bottle_at(Vector::X * -0.0601)),
+        ("y", bottle_at(Vector::Y * 0.0599), bottle_at(Vector::Y * 0.0601)),
         ("-y", bottle_at(Vector::Y * -0.0599), bottle_at(Vector::Y * -0.0601)),
+        ("-z", bottle_at(Vector::Z * -0.0599), bottle_at(Vector::Z * -0.0601)),
         ("z", bottle_at(Vector::Z * 0.0599), bottle_at(Vector::Z * 0.0601)),
         ("tilt", tilted(14.9), tilted(15.1)),
     ]

@@ -52,6 +52,8 @@ fn release_on_both_sides_of_every_threshold() {
     let tilted = |degrees: f32| placed(Vector::ZERO).turned("basket", Vector::Y, degrees.to_radians());
     for (what, inside, outside) in [
         ("x", placed(Vector::X * 0.1499), placed(Vector::X * 0.1501)),
+        ("-x", placed(Vector::X * -0.1499), placed(Vector::X * -0.1501)),
+        ("y", placed(Vector::Y * 0.1499), placed(Vector::Y * 0.1501)),
         ("-y", placed(Vector::Y * -0.1499), placed(Vector::Y * -0.1501)),
         ("height", placed(Vector::Z * 0.0599), placed(Vector::Z * 0.0601)),
         ("depth", placed(Vector::Z * -0.0599), placed(Vector::Z * -0.0601)),

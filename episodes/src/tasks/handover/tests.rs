@@ -68,7 +68,10 @@ fn place_on_both_sides_of_every_threshold() {
     let untouched = |for_s| changed(|bottle| bottle.untouched_s = for_s);
     for (what, inside, outside) in [
         ("x", shifted(Vector::X * 0.0599), shifted(Vector::X * 0.0601)),
+        ("-x", shifted(Vector::X * -0.0599), shifted(Vector::X * -0.0601)),
+        ("y", shifted(Vector::Y * 0.0599), shifted(Vector::Y * 0.0601)),
         ("-y", shifted(Vector::Y * -0.0599), shifted(Vector::Y * -0.0601)),
+        ("-z", shifted(Vector::Z * -0.0599), shifted(Vector::Z * -0.0601)),
         ("z", shifted(Vector::Z * 0.0599), shifted(Vector::Z * 0.0601)),
         ("tilt", tilted(14.9), tilted(15.1)),
         ("speed", moving(0.0499), moving(0.0501)),

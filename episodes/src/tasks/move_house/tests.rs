@@ -51,32 +51,44 @@ fn the_door_is_open_on_both_sides_of_its_angle() {
     assert!(milestones.iter().any(|milestone| milestone.for_s == 0.5 && (milestone.condition)(&turned(1.5))));
 }
 
-/// B and C hold the table with its middle at `table_x_m`; their pelvises at these.
-fn walking(table_x_m: f32, b_x_m: f32, c_x_m: f32, lift_m: f32) -> Facts {
+/// B and C hold the table this high; the rearmost point of it and of each of them is this far beyond the middle of the wall.
+fn beyond(table_m: f32, b_m: f32, c_m: f32, lift_m: f32) -> Facts {
     let mut facts = held();
-    facts.object_mut("console_table").pose_in_world.translation = Vector::new(table_x_m, 0.0, lift_m);
-    facts.robots[B].pelvis_in_world.translation = Vector::new(b_x_m, 0.0, 0.75);
-    facts.robots[C].pelvis_in_world.translation = Vector::new(c_x_m, 0.0, 0.75);
-    facts
+    facts.object_mut("console_table").pose_in_world.translation.z = lift_m;
+    let by_m = table_m + facts.reach_m("console_table", Vector::NEG_X);
+    facts.object_mut("console_table").pose_in_world.translation.x += by_m;
+    [(B, b_m), (C, c_m)].into_iter().fold(facts, |facts, (robot, rear_m)| {
+        let by_m = rear_m + facts.robot_reach_m(robot, Vector::NEG_X);
+        facts.with_robot_moved(robot, Vector::X * by_m)
+    })
 }
 
 #[test]
-fn table_and_carriers_pass_the_plane_together() {
-    for (facts, expected) in [
-        (walking(1.0, 1.75, 0.25, 0.05), true),
-        (walking(1.0, 1.75, 0.2001, 0.05), true),
-        (walking(1.0, 1.75, 0.1999, 0.05), false),
-        (walking(1.0, 0.1999, 0.25, 0.05), false),
-        // The rail that follows is 0.463 m behind the middle.
-        (walking(0.664, 1.4, 0.25, 0.05), true),
-        (walking(0.662, 1.4, 0.25, 0.05), false),
-        (walking(1.0, 1.75, 0.25, 0.0101), true),
-        (walking(1.0, 1.75, 0.25, 0.0099), false),
+fn all_of_table_and_carriers_passes_the_plane_together() {
+    for (table_m, b_m, c_m, lift_m, expected) in [
+        (0.6, 1.0, 0.3, 0.05, true),
+        (0.2001, 1.0, 0.3, 0.05, true),
+        (0.1999, 1.0, 0.3, 0.05, false),
+        (0.6, 0.2001, 0.3, 0.05, true),
+        (0.6, 0.1999, 0.3, 0.05, false),
+        (0.6, 1.0, 0.2001, 0.05, true),
+        (0.6, 1.0, 0.1999, 0.05, false),
+        (0.6, 1.0, 0.3, 0.0101, true),
+        (0.6, 1.0, 0.3, 0.0099, false),
     ] {
-        assert_eq!(passed(&facts), expected, "{:?}", facts.object("console_table").pose_in_world);
+        let facts = beyond(table_m, b_m, c_m, lift_m);
+        assert_eq!(passed(&facts), expected, "{table_m} {b_m} {c_m} {lift_m}");
     }
-    let let_go = walking(1.0, 1.75, 0.25, 0.05).grip(C, Left, "console_table", Touching);
+    let let_go = beyond(0.6, 1.0, 0.3, 0.05).grip(C, Left, "console_table", Touching);
     assert!(!passed(&let_go.grip(C, Right, "console_table", Touching)));
+}
+
+#[test]
+fn a_heel_behind_the_plane_is_not_through_the_door() {
+    // C's pelvis is farther beyond than its rear, which follows it.
+    let facts = beyond(0.6, 1.0, 0.15, 0.05);
+    let pelvis_m = facts.robots[C].pelvis_in_world.translation.x;
+    assert!(pelvis_m > 0.2 && !passed(&facts), "{pelvis_m}");
 }
 
 #[test]
@@ -97,11 +109,16 @@ fn table_is_carried_to_15_cm_and_is_away_beyond() {
 fn place_on_both_sides_of_every_threshold() {
     let stands = |beside_m: Vector, degrees: f32| at_marks(Facts::at_rest(&TASK), beside_m, degrees);
     for (what, inside, outside) in [
-        ("x", stands(Vector::X * 0.0499, 0.0), stands(Vector::X * 0.0501, 0.0)),
-        ("-y", stands(Vector::Y * -0.0499, 0.0), stands(Vector::Y * -0.0501, 0.0)),
-        // Feet 0.37 m ahead and 0.13 m aside go sideways by 5 cm.
-        ("turned", stands(Vector::ZERO, 7.5), stands(Vector::ZERO, 7.7)),
+        // Feet 28 mm wide on marks of 100 mm.
+        ("x", stands(Vector::X * 0.0359, 0.0), stands(Vector::X * 0.0361, 0.0)),
+        ("-x", stands(Vector::X * -0.0359, 0.0), stands(Vector::X * -0.0361, 0.0)),
+        ("y", stands(Vector::Y * 0.0359, 0.0), stands(Vector::Y * 0.0361, 0.0)),
+        ("-y", stands(Vector::Y * -0.0359, 0.0), stands(Vector::Y * -0.0361, 0.0)),
+        // Feet 0.37 m ahead go sideways by 3.5 cm, with corners that turn out by a millimetre.
+        ("turned", stands(Vector::ZERO, 5.1), stands(Vector::ZERO, 5.5)),
+        ("turned back", stands(Vector::ZERO, -5.1), stands(Vector::ZERO, -5.5)),
         ("height", stands(Vector::Z * 0.0399, 0.0), stands(Vector::Z * 0.0401, 0.0)),
+        ("depth", stands(Vector::Z * -0.0399, 0.0), stands(Vector::Z * -0.0401, 0.0)),
     ]
     .into_iter()
     .chain(still_and_released(&stands(Vector::ZERO, 0.0), "console_table"))

@@ -64,3 +64,11 @@ fn marble_on_both_sides_of_the_glass() {
         assert_eq!(marble_in_glass(&marble(offset_m)), expected, "{offset_m}");
     }
 }
+
+#[test]
+fn marble_stays_for_half_a_second_and_the_glass_is_up_on_both_sides_of_3_cm() {
+    let Done::Lasting { for_s, at_end, .. } = TASK.phases[2].done else { panic!("it has to last") };
+    assert_eq!(for_s, 0.5);
+    assert!(at_end(&lifted(0.0, 0.0301)));
+    assert!(!at_end(&lifted(0.1, 0.0299)));
+}

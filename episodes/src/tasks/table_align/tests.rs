@@ -79,6 +79,11 @@ fn align_on_both_sides_of_every_threshold() {
             placed(0.40, 0.0, 0.0).raised("office_table", 0.0399),
             placed(0.40, 0.0, 0.0).raised("office_table", 0.0401),
         ),
+        (
+            "depth",
+            placed(0.40, 0.0, 0.0).raised("office_table", -0.0399),
+            placed(0.40, 0.0, 0.0).raised("office_table", -0.0401),
+        ),
         ("tilt", tilted(14.9), tilted(15.1)),
     ]
     .into_iter()

@@ -26,6 +26,10 @@ fn lift_on_both_sides_of_2_cm_and_by_a() {
     assert!(!lifted(&Facts::at_rest(&TASK).held_by(&[B], "bin").raised("bin", 0.0201)));
     let touched = held().grip(A, Left, "bin", Touching).grip(A, Right, "bin", Touching);
     assert!(!lifted(&touched.raised("bin", 0.0201)));
+    // What counts is the lowest point: leaning by 5 degrees, that of a long side, 85 mm beside the middle.
+    let leaning = |lift_m: f32| held().raised("bin", lift_m).turned("bin", Vector::X, 5_f32.to_radians());
+    assert!(lifted(&leaning(0.0276)));
+    assert!(!lifted(&leaning(0.0272)));
 }
 
 #[test]
@@ -33,15 +37,23 @@ fn deliver_on_both_sides_of_every_threshold() {
     for (beside_m, base_m, expected) in [
         (Vector::ZERO, 0.0201, true),
         (Vector::ZERO, 0.0199, false),
-        // The bin is 0.72 m tall, the bench 0.80 m.
-        (Vector::ZERO, 0.0899, true),
-        (Vector::ZERO, 0.0903, false),
+        // The bin is 0.721 m tall, the bench 0.80 m.
+        (Vector::ZERO, 0.0888, true),
+        (Vector::ZERO, 0.0892, false),
         (Vector::X * 0.2499, 0.06, true),
         (Vector::X * 0.2501, 0.06, false),
         (Vector::new(0.17, 0.18, 0.0), 0.06, true),
         (Vector::new(-0.18, 0.18, 0.0), 0.06, false),
     ] {
         assert_eq!(delivered(&held_at(beside_m, base_m)), expected, "{beside_m} {base_m}");
+    }
+    // What counts is the highest point of the rim: leaning by 5 degrees either way, that of a long side, which is 0.715 m up, 82 mm
+    // beside the middle, and 6 mm thick around that.
+    for degrees in [5_f32, -5.0] {
+        let leaning =
+            |base_m: f32| held_at(Vector::ZERO, base_m).turned("bin", Vector::X, degrees.to_radians());
+        assert!(delivered(&leaning(0.0844)), "{degrees}");
+        assert!(!delivered(&leaning(0.0848)), "{degrees}");
     }
 }
 

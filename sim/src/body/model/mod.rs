@@ -8,6 +8,7 @@ use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::prelude::MassProperties;
 
 use crate::Sides;
+use crate::mechanism::Solid;
 use crate::mjcf::{Geom, MjcfCamera};
 
 /// One rigid link. Bodies without a joint are merged into their parent's link.
@@ -21,6 +22,7 @@ pub struct LinkModel {
     pub joint: Option<usize>,
     pub mass: MassProperties,
     pub geoms: Vec<Geom>,
+    solid: Solid,
 }
 
 /// One actuated hinge, with the PD gains and limits of its position actuator.
@@ -104,6 +106,13 @@ impl RobotModel {
             world_from_link.push(pose);
         }
         world_from_link
+    }
+
+    /// How far what collides of the robot reaches along a direction of the world, a unit vector, from the world's origin, with
+    /// its links at these poses.
+    pub fn reach_m(&self, world_from_link: &[Pose], direction: Vector) -> f32 {
+        let links = self.links.iter().zip(world_from_link);
+        links.map(|(link, pose)| link.solid.reach_m(pose, direction)).fold(f32::NEG_INFINITY, f32::max)
     }
 
     pub(crate) fn rest_rad(&self) -> Vec<f32> {

@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use rapier3d::math::{Pose, Vector};
 
 use super::{HandLinks, JointModel, LinkModel, RobotModel, SiteModel};
+use crate::mechanism::Solid;
 use crate::mjcf::{Actuator, ActuatorKind, AxisJoint, BodyTree, Document, Geom, LinkJoint, MjcfCamera, pose};
 use crate::{Side, Sides, SimError};
 
@@ -142,6 +143,7 @@ fn links(document: &Document, tree: &BodyTree, joints: &[JointModel]) -> Result<
             parent_from_link: pose(&link.parent_from_link),
             joint,
             mass: link.mass,
+            solid: Solid::of(&link.geoms),
             geoms: link.geoms.clone(),
         })
     };

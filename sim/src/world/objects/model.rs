@@ -1,17 +1,10 @@
 //! What an object's file says of it, whichever world it is put into.
 
 use rapier3d::math::{Pose, Vector};
-use rapier3d::parry::query::Ray;
-use rapier3d::prelude::SharedShape;
 
-use crate::mechanism::rounded;
+use crate::mechanism::{Solid, rounded};
 use crate::mjcf::{BodyLink, BodyTree, Document, Geom, LinkJoint, Site};
 use crate::{SimError, assets};
-
-/// Ways to look from a point that may be enclosed; the staves of a vessel leave no gaps between them.
-const HEADINGS: u32 = 16;
-/// No object is as wide as this.
-const SIGHT_M: f32 = 10.0;
 
 /// A rigid body of a file as tasks and pictures see it, in its own frame.
 #[derive(Clone, Debug)]
@@ -20,6 +13,9 @@ pub struct ObjectModel {
     pub name: String,
     pub geoms: Vec<Geom>,
     pub sites: Vec<Site>,
+    /// Of this body alone, without the parts that move on it.
+    pub mass_kg: f32,
+    solid: Solid,
 }
 
 /// A rigid part of an object, as the file has it with every joint at 0.
@@ -53,32 +49,21 @@ impl ObjectModel {
         self.sites.iter().find(|site| site.name == name)
     }
 
+    /// How far what collides of the object reaches along a direction of the world, a unit vector, from the world's origin, with
+    /// the object at `world_from_object`.
+    pub fn reach_m(&self, world_from_object: &Pose, direction: Vector) -> f32 {
+        self.solid.reach_m(world_from_object, direction)
+    }
+
     /// Height above the floor of the lowest point of what collides, with the object at `world_from_object`.
     pub fn lowest_m(&self, world_from_object: &Pose) -> f32 {
-        let bottoms_m = self.colliders().map(|(object_from_shape, shape)| {
-            shape.compute_aabb(&(*world_from_object * object_from_shape)).mins.z
-        });
-        bottoms_m.fold(f32::INFINITY, f32::min)
+        -self.reach_m(world_from_object, Vector::NEG_Z)
     }
 
     /// Whether a point of the object's frame lies in the open between walls and over a floor: whichever way one looks from
     /// there, level in the object's own frame or down, one sees the object.
     pub fn encloses(&self, point_m: Vector) -> bool {
-        let colliders: Vec<(Pose, SharedShape)> = self.colliders().collect();
-        let solid = colliders.iter().any(|(pose, shape)| shape.contains_point(pose, point_m));
-        let sees = |direction: Vector| {
-            let ray = Ray::new(point_m, direction);
-            colliders.iter().any(|(pose, shape)| shape.intersects_ray(pose, &ray, SIGHT_M))
-        };
-        let headings_rad = (0..HEADINGS).map(|i| i as f32 * std::f32::consts::TAU / HEADINGS as f32);
-        let mut level =
-            headings_rad.map(|heading_rad| Vector::new(heading_rad.cos(), heading_rad.sin(), 0.0));
-        !solid && sees(Vector::NEG_Z) && level.all(sees)
-    }
-
-    /// What collides, with its pose in the object's frame.
-    fn colliders(&self) -> impl Iterator<Item = (Pose, SharedShape)> {
-        self.geoms.iter().filter(|geom| geom.collides).filter_map(Geom::collider)
+        self.solid.encloses(point_m)
     }
 
     /// An embedded object file, and the one body that lies directly in its world with all that is on it.
@@ -107,7 +92,13 @@ impl ObjectModel {
     }
 
     pub(super) fn of(link: &BodyLink) -> ObjectModel {
-        ObjectModel { name: link.name.clone(), geoms: link.geoms.clone(), sites: link.sites.clone() }
+        ObjectModel {
+            name: link.name.clone(),
+            geoms: link.geoms.clone(),
+            sites: link.sites.clone(),
+            mass_kg: link.mass.mass(),
+            solid: Solid::of(&link.geoms),
+        }
     }
 }
 

@@ -25,8 +25,8 @@ fn site<'a>(model: &'a ObjectModel, name: &str) -> &'a Site {
 
 #[test]
 fn sites_lie_on_the_shapes_or_in_the_open() {
-    // How far the nearest shape is, at least and at most.
-    const SOLID_M: [f32; 2] = [0.0, 0.0];
+    // How far the nearest shape is, at least and at most; on a surface to rounding.
+    const SOLID_M: [f32; 2] = [0.0, 1e-6];
     for (name, sites, [low_m, high_m]) in [
         ("bottle", &["grip_low", "grip_high"][..], SOLID_M),
         ("tub", &["bar_a", "bar_b"], SOLID_M),
@@ -36,7 +36,7 @@ fn sites_lie_on_the_shapes_or_in_the_open() {
         ("console_table", &["b_left", "b_right", "c_left", "c_right"], SOLID_M),
         ("console_table", &["foot_1", "foot_2", "foot_3", "foot_4"], SOLID_M),
         ("round_table", &["a_left", "a_right", "b_left", "b_right", "c_left", "c_right", "foot"], SOLID_M),
-        ("bin", &["left", "right", "rim"], SOLID_M),
+        ("bin", &["left", "right"], SOLID_M),
         ("service_trolley", &["left", "right", "ring"], SOLID_M),
         ("wall_peg", &["root", "tip"], SOLID_M),
         ("cup", &["lip"], [0.0, 0.003]),
@@ -69,6 +69,22 @@ fn regions_have_the_extent_of_what_they_stand_for() {
         assert!(clearance_m(&model, at_wall_m - outwards * 0.01) > 0.005, "{outwards}");
     }
     assert!(low_m.z.abs() < 1e-6, "an apple that lies on the base is inside");
+}
+
+#[test]
+fn feet_are_as_wide_as_the_legs_that_stand_on_them() {
+    let table = object("console_table");
+    for name in ["foot_1", "foot_2", "foot_3", "foot_4"] {
+        let foot = site(&table, name);
+        for (x, y) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+            let corner_m = |wider_m: f32| {
+                let half_m = foot.size_m + Vector::splat(wider_m);
+                foot.position_m() + Vector::new(half_m.x * x, half_m.y * y, 0.0)
+            };
+            let [inside_m, outside_m] = [-1e-4, 1e-3].map(|wider_m| clearance_m(&table, corner_m(wider_m)));
+            assert!(inside_m < 1e-6 && outside_m > 5e-4, "{name}: {inside_m} m, {outside_m} m");
+        }
+    }
 }
 
 #[test]

@@ -18,6 +18,7 @@ mod blocks;
 mod bodies;
 mod command_lines;
 mod links;
+mod masses;
 mod pages;
 #[cfg(unix)]
 mod scripts;

@@ -1,4 +1,4 @@
-//! Every task that has an expert is solved by it on real physics within the benchmark protocol's steps, even if a hand slips.
+//! Experts solve their tasks on real physics within the benchmark protocol's steps, on seeds that nobody tuned on, even if a hand slips.
 
 use std::ops::RangeInclusive;
 use std::thread::available_parallelism;
@@ -13,11 +13,15 @@ use tandem_tools_spec::{ActCall, Assistance, Protocol, ToolCall, ToolReply};
 /// Tasks in which nobody walks.
 const STANDING: [&str; 4] = ["handover", "pouring", "frame_hang", "co_pouring"];
 
-/// Seeds on which nobody tuned anything but how a hand that slipped takes its load again (6100).
-const SEEDS: [u32; 3] = [3, 6100, 6101];
+/// Drawn from 7000-7099 by lot on 2026-11-23, before any of these was ever played: no table reports them, and nobody tunes on them.
+/// They are never changed to make this test pass. Experts miss one episode in fifty, so that what counts is how many of them fail;
+/// one that fails is looked into on other seeds. Until then the test had seeds 3, which tables report, 6100, on which it was tuned
+/// how a hand that slipped takes its load again, and 6101.
+const SEEDS: [u32; 3] = [7030, 7054, 7081];
 
-/// Plays the experts of `tasks`, and checks that phases come in order and that nobody falls.
-fn solve(tasks: Vec<&'static Task>) {
+/// Plays the experts of `tasks`, and checks that phases come in order, that at most so many episodes of all fail, and of no task more
+/// than one, and that nobody falls where the task is solved.
+fn solve(tasks: Vec<&'static Task>, may_fail: usize) {
     let plan = EvaluationPlan {
         player: players::find("expert").expect("a player"),
         protocol: Protocol::Benchmark,
@@ -41,24 +45,31 @@ fn solve(tasks: Vec<&'static Task>) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let played = evaluate(&plan, folder.path(), &|_| {}).expect("worlds can be built").episodes;
     assert_eq!(played.len(), tasks.len() * SEEDS.len());
+    let mut failed = Vec::new();
     for episode in &played {
         let task = tasks.iter().find(|task| task.id == episode.result.task).expect("a task of the plan");
         let result = &episode.result;
         let times_s: Vec<f64> = result.phases.0.iter().filter_map(|(_, time_s)| *time_s).collect();
-        assert_eq!((result.task.as_str(), times_s.len()), (task.id, task.phases.len()), "{episode:?}");
-        assert!(times_s.is_sorted() && times_s[0] > 0.0, "{episode:?}");
-        assert_eq!(result.falls, 0, "{episode:?}");
+        assert!(times_s.is_sorted() && times_s.iter().all(|time_s| *time_s > 0.0), "{episode:?}");
+        if times_s.len() < task.phases.len() {
+            failed.push((task.id, result.seed, times_s.len(), result.falls));
+        } else {
+            assert_eq!(result.falls, 0, "{episode:?}");
+        }
     }
+    let twice = |task: &&Task| failed.iter().filter(|(id, ..)| *id == task.id).count() > 1;
+    let fails_too_often = failed.len() > may_fail || tasks.iter().any(twice);
+    assert!(!fails_too_often, "task, seed, phases reached, falls: {failed:?}");
 }
 
 #[test]
 fn experts_that_stand_solve_their_tasks() {
-    solve(experts::solved().filter(|task| STANDING.contains(&task.id)).collect());
+    solve(experts::solved().filter(|task| STANDING.contains(&task.id)).collect(), 1);
 }
 
 #[test]
 fn experts_that_walk_solve_their_tasks() {
-    solve(experts::solved().filter(|task| !STANDING.contains(&task.id)).collect());
+    solve(experts::solved().filter(|task| !STANDING.contains(&task.id)).collect(), 2);
 }
 
 /// An episode in which A's left hand opens and rises for a moment while the table is on its way.

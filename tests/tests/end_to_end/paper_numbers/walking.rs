@@ -31,7 +31,7 @@ fn trash_collection() {
     };
     scene.threshold(2, table::BIN_RIM_ABOVE_BENCH_M, false, |facts, above_m| {
         deliver(facts, Vector::ZERO);
-        let up_m = bench_m(facts) + above_m - facts.site_m("bin", "rim").z;
+        let up_m = bench_m(facts) + above_m - facts.highest_m("bin");
         changed(facts, "bin").pose_in_world.translation.z += up_m;
     });
     let swept = |facts: &mut Facts, holds: bool| {
@@ -173,7 +173,9 @@ fn move_house() {
             place(facts, axis * off_m + Vector::Z * 0.05);
             held_by(facts, &[B, C], "console_table");
         });
-        scene.threshold(3, table::CONSOLE_MARK_M / 2.0, false, |facts, off_m| place(facts, axis * off_m));
+        // All of a foot, 28 mm square, stands on its mark.
+        let beside_m = table::CONSOLE_MARK_M / 2.0 - 0.014;
+        scene.threshold(3, beside_m, false, |facts, off_m| place(facts, axis * off_m));
     }
     for axis in [Vector::Z, Vector::NEG_Z] {
         scene.threshold(3, table::CONSOLE_HEIGHT_M, false, |facts, off_m| place(facts, axis * off_m));
