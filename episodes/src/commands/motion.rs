@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Translation3, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use tandem_ik::{Configuration, FrameError, Outcome, SolveOptions, Solver, frame_errors};
 use tandem_sim::{
@@ -15,8 +15,9 @@ use super::upper_body::{REACH_TOLERANCE, UpperBody};
 /// Part of the remaining error that one control step removes: smooth, and a lag of two steps.
 const GAIN: f64 = 0.5;
 const REACH_RESTARTS: usize = 8;
-/// Hands give way by no more than this, and creep back at this rate while they may give way, faster when they may no more.
-const MOST_YIELD_M: f64 = 0.06;
+/// Hands give way by no more than this ahead and to the side (m) and about the vertical (rad). They creep back at this rate while they may
+/// give way, faster when they may no more.
+const MOST_YIELD: [f64; 3] = [0.06, 0.06, 0.15];
 const LEAK_1_S: f64 = 0.1;
 const RETURN_1_S: f64 = 3.0;
 
@@ -46,12 +47,26 @@ pub struct MotionState {
     pub(super) aims: Sides<Aim>,
     /// The pelvis as it was last sensed.
     world_from_pelvis: Isometry3<f64>,
-    /// What pulled both hands the way the robot faces, as it was last sensed.
-    pull_n: f64,
-    /// How far the hands have given way to it.
-    yielded_m: f64,
+    /// What pulled the pair of hands, as it was last sensed: the way the robot faces and to its left (N), and about the vertical through
+    /// the middle between the wrists (N m).
+    pull: [f64; 3],
+    /// How far the hands have given way to each (m, m, rad).
+    yielded: [f64; 3],
     /// What the solver remembers of steps that did not help; see [`Solver::caution`].
     caution: f64,
+}
+
+/// How the pair of hands gives way to what pulls it: the force under which it goes at 1 m/s, or the moment under which it turns at
+/// 1 rad/s; `None` for not at all.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Compliance {
+    pub ahead_n_s_m: Option<f64>,
+    pub side_n_s_m: Option<f64>,
+    pub turn_n_m_s_rad: Option<f64>,
+}
+
+impl Compliance {
+    pub const NONE: Compliance = Compliance { ahead_n_s_m: None, side_n_s_m: None, turn_n_m_s_rad: None };
 }
 
 /// What a wrist is to do.
@@ -78,44 +93,64 @@ impl Motion {
             base: rest.base,
             aims: Sides::both(Aim::Joints),
             world_from_pelvis,
-            pull_n: 0.0,
-            yielded_m: 0.0,
+            pull: [0.0; 3],
+            yielded: [0.0; 3],
             caution: 1.0,
         };
         Motion { robot, solver: body.solver(), body: body.clone(), state }
     }
 
-    /// What the robot's hands are steered by until it is sensed anew: the pelvis, and the force of the world on both hands together
-    /// (world frame).
-    pub fn sense(&mut self, world_from_pelvis: Isometry3<f64>, hands_n: Vector3<f64>) {
+    /// What the robot's hands are steered by until it is sensed anew: the pelvis, and the force of the world on each hand (world frame).
+    pub fn sense(&mut self, world_from_pelvis: Isometry3<f64>, hands_n: Sides<Vector3<f64>>) {
         self.state.world_from_pelvis = world_from_pelvis;
-        self.state.pull_n = hands_n.dot(&self.ahead());
+        let wrists = self.commanded_wrists();
+        let apart_m = world_from_pelvis * wrists.left.translation.vector
+            - world_from_pelvis * wrists.right.translation.vector;
+        let turning_n_m = 0.5 * apart_m.cross(&(hands_n.left - hands_n.right)).z;
+        let pull_n = self.heading().inverse() * (hands_n.left + hands_n.right);
+        self.state.pull = [pull_n.x, pull_n.y, turning_n_m];
     }
 
-    /// The way the robot faces, level, in the world.
-    fn ahead(&self) -> Vector3<f64> {
-        let x = self.state.world_from_pelvis.rotation * Vector3::x();
-        Vector3::new(x.x, x.y, 0.0).normalize()
+    /// Level, x the way the robot faces.
+    fn heading(&self) -> UnitQuaternion<f64> {
+        let ahead = self.state.world_from_pelvis.rotation * Vector3::x();
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), ahead.y.atan2(ahead.x))
     }
 
-    /// Hands give way for one control step; without compliance they come back to where they were told to be.
+    /// Hands give way for one control step; where they must not, they come back to where they were told to be.
     ///   dy/dt = F / c - l y,   |y| <= y_max
-    pub(super) fn give_way(&mut self, compliance_n_s_m: Option<f64>) {
-        let MotionState { pull_n, yielded_m, .. } = self.state;
-        let rate_m_s = match compliance_n_s_m {
-            Some(compliance_n_s_m) => pull_n / compliance_n_s_m - LEAK_1_S * yielded_m,
-            None => -RETURN_1_S * yielded_m,
-        };
-        self.state.yielded_m = (yielded_m + rate_m_s / CONTROL_HZ).clamp(-MOST_YIELD_M, MOST_YIELD_M);
+    pub(super) fn give_way(&mut self, compliance: Compliance) {
+        let Compliance { ahead_n_s_m, side_n_s_m, turn_n_m_s_rad } = compliance;
+        for (i, damping) in [ahead_n_s_m, side_n_s_m, turn_n_m_s_rad].into_iter().enumerate() {
+            let yielded = self.state.yielded[i];
+            let rate = match damping {
+                Some(damping) => self.state.pull[i] / damping - LEAK_1_S * yielded,
+                None => -RETURN_1_S * yielded,
+            };
+            self.state.yielded[i] = (yielded + rate / CONTROL_HZ).clamp(-MOST_YIELD[i], MOST_YIELD[i]);
+        }
     }
 
-    /// A wrist in the pelvis frame as it would be had it not given way.
-    fn without_yield(&self, pelvis_from_wrist: &Isometry3<f64>) -> Isometry3<f64> {
-        Translation3::from(-self.yielded_in_pelvis_m()) * pelvis_from_wrist
+    /// From wrists as they were told to be to where they have given way to, if the middle between them was told to be at `middle_m`
+    /// (pelvis frame). It turns them about this middle.
+    fn yielding(&self, middle_m: Vector3<f64>) -> Isometry3<f64> {
+        let pelvis_from_world = self.state.world_from_pelvis.rotation.inverse();
+        let up = pelvis_from_world * Vector3::z_axis();
+        let turned = UnitQuaternion::from_axis_angle(&up, self.state.yielded[2]);
+        Translation3::from(self.yielded_m()) * Isometry3::rotation_wrt_point(turned, Point3::from(middle_m))
     }
 
-    fn yielded_in_pelvis_m(&self) -> Vector3<f64> {
-        self.state.world_from_pelvis.rotation.inverse() * (self.ahead() * self.state.yielded_m)
+    /// How far the middle between the wrists has given way, pelvis frame.
+    fn yielded_m(&self) -> Vector3<f64> {
+        let [ahead_m, left_m, _] = self.state.yielded;
+        let level_m = self.heading() * Vector3::new(ahead_m, left_m, 0.0);
+        self.state.world_from_pelvis.rotation.inverse() * level_m
+    }
+
+    /// Where the commanded joints would put the middle between the wrists had it not given way, pelvis frame.
+    fn commanded_middle_m(&self) -> Vector3<f64> {
+        let wrists = self.commanded_wrists();
+        0.5 * (wrists.left.translation.vector + wrists.right.translation.vector) - self.yielded_m()
     }
 
     pub fn world_from_pelvis(&self) -> &Isometry3<f64> {
@@ -177,7 +212,8 @@ impl Motion {
     /// Aims of the kind of those in force, at which the wrists would have arrived were they where the commanded joints put them and had
     /// they not given way.
     pub(super) fn arrived(&self) -> Sides<Aim> {
-        let commanded = self.commanded_wrists().map(|wrist| self.without_yield(&wrist));
+        let as_told = self.yielding(self.commanded_middle_m()).inverse();
+        let commanded = self.commanded_wrists().map(|wrist| as_told * wrist);
         Sides::from_fn(|side| self.state.aims[side].at(&self.state.world_from_pelvis, &commanded[side]))
     }
 
@@ -239,8 +275,13 @@ impl Motion {
     }
 
     fn in_pelvis(&self, aims: &Sides<Aim>) -> Sides<Option<Isometry3<f64>>> {
-        let yielded = Translation3::from(self.yielded_in_pelvis_m());
-        aims.map(|aim| aim.in_pelvis(&self.state.world_from_pelvis).map(|asked| yielded * asked))
+        let asked = aims.map(|aim| aim.in_pelvis(&self.state.world_from_pelvis));
+        let middle_m = match (asked.left, asked.right) {
+            (Some(left), Some(right)) => 0.5 * (left.translation.vector + right.translation.vector),
+            (None, _) | (_, None) => self.commanded_middle_m(),
+        };
+        let yielding = self.yielding(middle_m);
+        asked.map(|asked| asked.map(|wrist| yielding * wrist))
     }
 
     fn configuration(&self) -> Configuration<'_> {

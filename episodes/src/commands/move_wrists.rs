@@ -6,7 +6,7 @@ use tandem_sim::{BaseCommand, HAND_JOINTS, Side, Sides, UPPER_JOINTS};
 use tandem_tools_spec::WristMove;
 
 use super::columns::{self, Clamped};
-use super::motion::{Aim, Motion};
+use super::motion::{Aim, Compliance, Motion};
 use crate::convert::unit_quaternion;
 
 /// The way of both wrists and their fingers.
@@ -15,8 +15,7 @@ pub struct WristTrajectory {
     /// Where the wrists begin, of the kind of the aims that they go to.
     from: Sides<Aim>,
     to: Sides<Aim>,
-    /// How the wrists give way; `None` for not at all.
-    compliance_n_s_m: Option<f64>,
+    compliance: Compliance,
     from_rad: [f64; UPPER_JOINTS],
     /// Fingers that are `None` stay.
     fingers_rad: Sides<Option<[f64; HAND_JOINTS]>>,
@@ -53,7 +52,11 @@ impl WristTrajectory {
             steps,
             from: motion.arrived(),
             to,
-            compliance_n_s_m: entry.compliance_n_s_m,
+            compliance: Compliance {
+                ahead_n_s_m: entry.compliance_n_s_m,
+                side_n_s_m: entry.side_compliance_n_s_m,
+                turn_n_m_s_rad: entry.turn_compliance_n_m_s_rad,
+            },
             from_rad: motion.state().upper_rad,
             fingers_rad,
             base,
@@ -63,7 +66,7 @@ impl WristTrajectory {
     /// Control step `step`, counted from 1.
     pub fn advance(&self, step: u32, motion: &mut Motion) {
         let part = f64::from(step) / f64::from(self.steps);
-        motion.give_way(self.compliance_n_s_m);
+        motion.give_way(self.compliance);
         motion.walk(self.base);
         for side in Side::BOTH {
             if let Some(goal_rad) = &self.fingers_rad[side] {

@@ -4,7 +4,7 @@ use tandem_sim::{BaseCommand, UPPER_JOINTS};
 use tandem_tools_spec::JointChunk;
 
 use super::columns::{self, Clamped};
-use super::motion::Motion;
+use super::motion::{Compliance, Motion};
 
 /// One row per control step.
 pub struct JointTrajectory {
@@ -34,7 +34,7 @@ impl JointTrajectory {
     /// Control step `step`, counted from 1.
     pub fn advance(&self, step: u32, motion: &mut Motion) {
         let row = &self.rows[step as usize - 1];
-        motion.give_way(None);
+        motion.give_way(Compliance::NONE);
         motion.walk(row.base);
         motion.set_joints(row.upper_rad);
     }

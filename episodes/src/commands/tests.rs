@@ -1,8 +1,9 @@
 //! Where hands go while the pelvis moves under them, by kinematics alone: joints are where they are told to be.
 
+use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Translation3, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use tandem_sim::{BaseCommand, BaseLimits, RobotCommand, RobotModel, Side, Sides, UPPER, assets};
 use tandem_tools_spec::{MoveWrists, Protocol, ToolCall, WalkMove, WristMove};
 
@@ -37,8 +38,18 @@ fn play(action: RobotAction, pelvis_step_m: Vector3<f64>, motion: &mut Motion) {
     play_pulled(action, pelvis_step_m, Vector3::zeros(), motion);
 }
 
-/// As [`play`], while the hands feel `hands_n`.
-fn play_pulled(action: RobotAction, pelvis_step_m: Vector3<f64>, hands_n: Vector3<f64>, motion: &mut Motion) {
+/// As [`play`], while the hands together feel `both_n`.
+fn play_pulled(action: RobotAction, pelvis_step_m: Vector3<f64>, both_n: Vector3<f64>, motion: &mut Motion) {
+    play_felt(action, pelvis_step_m, Sides::both(0.5 * both_n), motion);
+}
+
+/// As [`play`], while each hand feels its force.
+fn play_felt(
+    action: RobotAction,
+    pelvis_step_m: Vector3<f64>,
+    hands_n: Sides<Vector3<f64>>,
+    motion: &mut Motion,
+) {
     let (trajectory, _) = Trajectory::begin(&action, 50, motion);
     for step in 1..=50 {
         trajectory.command(step, motion);
@@ -128,6 +139,79 @@ fn hands_give_way_as_they_were_told_to_and_come_back() {
     play(RobotAction::Wait, Vector3::zeros(), &mut motion);
     play(RobotAction::Wait, Vector3::zeros(), &mut motion);
     assert!(off_m(&motion).norm() < 1e-3, "{}", off_m(&motion));
+}
+
+/// Both hands before the chest of a robot that faces left, and what they ask for; they may give way as `soft` has it.
+fn both_hands(soft: WristMove) -> (Motion, RobotAction) {
+    let mut motion = standing();
+    let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), FRAC_PI_2);
+    motion.sense(motion.world_from_pelvis() * turned, Sides::both(Vector3::zeros()));
+    let ahead = Some([1.0, 0.0, 0.0, 0.0]);
+    let entry = WristMove {
+        left_position_m: Some([0.28, 0.24, 0.22]),
+        left_quaternion_wxyz: ahead,
+        right_position_m: Some([0.28, -0.24, 0.22]),
+        right_quaternion_wxyz: ahead,
+        ..soft
+    };
+    let stiff = WristMove { side_compliance_n_s_m: None, turn_compliance_n_m_s_rad: None, ..entry.clone() };
+    let goal = action(stiff, &motion);
+    play(goal, Vector3::zeros(), &mut motion);
+    play(RobotAction::Wait, Vector3::zeros(), &mut motion);
+    let soft = action(entry, &motion);
+    (motion, soft)
+}
+
+fn wrists_in_world(motion: &Motion) -> Sides<Isometry3<f64>> {
+    motion.commanded_wrists().map(|wrist| motion.world_from_pelvis() * wrist)
+}
+
+/// 10 N or 2 N m for a second, at 1 m/s for 250 N and 1 rad/s for 20 N m: 4 cm and 0.1 rad, less what creeps back and what the hands are
+/// behind.
+#[test]
+fn the_pair_of_hands_gives_way_to_the_side_and_about_the_vertical() {
+    // The robot faces along y of the world, so -x is its left; its left hand is the one at -x.
+    let to_left = Sides::both(Vector3::new(-5.0, 0.0, 0.0));
+    let turning_n = 2.0 / 0.48;
+    let turning =
+        Sides { left: Vector3::new(0.0, -turning_n, 0.0), right: Vector3::new(0.0, turning_n, 0.0) };
+    let side = || WristMove { side_compliance_n_s_m: Some(250.0), ..WristMove::hold("A") };
+    let turn = || WristMove { turn_compliance_n_m_s_rad: Some(20.0), ..WristMove::hold("A") };
+    for (soft, felt_n, left_m, turned_rad) in [
+        (side(), to_left, 0.036..0.040, -0.002..0.002),
+        (side(), turning, -0.001..0.001, -0.002..0.002),
+        (turn(), turning, -0.001..0.001, 0.090..0.100),
+        (turn(), to_left, -0.001..0.001, -0.002..0.002),
+        (WristMove::hold("A"), turning, -0.001..0.001, -0.002..0.002),
+    ] {
+        let (mut motion, goal) = both_hands(soft);
+        let before = wrists_in_world(&motion);
+        play_felt(goal, Vector3::zeros(), felt_n, &mut motion);
+        let after = wrists_in_world(&motion);
+        let middle = |wrists: &Sides<Isometry3<f64>>| {
+            0.5 * (wrists.left.translation.vector + wrists.right.translation.vector)
+        };
+        let moved_m = middle(&after) - middle(&before);
+        assert!(left_m.contains(&-moved_m.x) && moved_m.y.abs() < 1e-3, "{moved_m}, not {left_m:?}");
+        for side in Side::BOTH {
+            let by = after[side].rotation * before[side].rotation.inverse();
+            assert!(turned_rad.contains(&by.scaled_axis().z), "{side:?} turned by {}", by.scaled_axis());
+        }
+        let apart_m = after.left.translation.vector - after.right.translation.vector;
+        assert!((apart_m.norm() - 0.48).abs() < 2e-3, "hands {} m apart", apart_m.norm());
+        // The next command begins where the hands are, and without compliance they come back.
+        let (trajectory, _) = Trajectory::begin(&RobotAction::Wait, 50, &mut motion);
+        trajectory.command(1, &mut motion);
+        let next = wrists_in_world(&motion);
+        assert!((middle(&next) - middle(&after)).norm() < 5e-3);
+        play(RobotAction::Wait, Vector3::zeros(), &mut motion);
+        play(RobotAction::Wait, Vector3::zeros(), &mut motion);
+        let back = wrists_in_world(&motion);
+        for side in Side::BOTH {
+            let off_m = (back[side].translation.vector - before[side].translation.vector).norm();
+            assert!(off_m < 1e-3, "{side:?} is {off_m} m from where it was told to be");
+        }
+    }
 }
 
 #[test]

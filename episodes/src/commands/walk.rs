@@ -4,7 +4,7 @@ use tandem_sim::BaseCommand;
 use tandem_tools_spec::WalkMove;
 
 use super::columns::Clamped;
-use super::motion::Motion;
+use super::motion::{Compliance, Motion};
 
 /// The same base command at every step.
 pub struct WalkTrajectory {
@@ -23,7 +23,7 @@ impl WalkTrajectory {
 
     /// One control step.
     pub fn advance(&self, motion: &mut Motion) {
-        motion.give_way(None);
+        motion.give_way(Compliance::NONE);
         motion.walk(self.base);
     }
 }

@@ -34,8 +34,11 @@ const GRASPING: &str = "Fingers are given for a right hand, thumb [0, 1, 2] and 
     fingers [0.3, 0.2]. A rim from above: palms down, wrist 0.095 m before its middle and 0.031 m above it, fingers inside [1.57, 0.6], \
     thumb outside [0, -0.95, -0.6]. An upright wall, as of a tall bin: both hands point down outside it ([0.707, 0, 0.707, 0]), palms \
     flat on it, wrist 0.09 m above the rim and 0.017 m beside, thumb over the rim [0, -1.04, -1.74], fingers [0.3, 0.3]; come from \
-    above, 0.05 m beside. Stand with the pelvis 0.3 m behind the places of both hands, 0.38 m behind those on a bin, which knees push \
-    over otherwise. To let go, open, and leave the way you came.";
+    above, 0.05 m beside. The legs of a table: both hands point ahead ([1, 0, 0, 0]), palms on the outer sides of the legs, 0.05 m under \
+    the top; the wrist ends 0.1 m before the middle of the leg and 0.032 m beside it; come from 0.09 m farther out and 0.025 m lower, in \
+    and then up, and close thumb [0, -0.9, -1.74] and fingers [1, 1]. Stand with the pelvis 0.3 m behind the places of both hands, 0.38 \
+    m behind those on legs or on a bin, which thighs and knees push otherwise, and in the middle between them. Who lifts or carries \
+    with partners lets the hands give way (compliance_n_s_m 250) until the thing stands. To let go, open, and leave the way you came.";
 
 /// The brief of an episode in the words that its policy reads.
 pub fn brief(wording: Wording) -> Brief {

@@ -26,7 +26,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
-use tandem_sim::{RobotCommand, Side, Step, World};
+use tandem_sim::{RobotCommand, Step, World};
 use tandem_tools_spec::{EndReason, ResultReply};
 
 use crate::commands::{Clamped, Command, Motion, MotionState, Trajectory};
@@ -227,8 +227,8 @@ impl Session {
         }
         self.rewind.stepped(commands);
         for (motion, robot) in self.motions.iter_mut().zip(&self.present.robots) {
-            let [left_n, right_n] = [Side::Left, Side::Right].map(|side| robot.estimate.hand_force_n[side]);
-            let hands_n = Vector3::from((left_n + right_n).to_array().map(f64::from));
+            let hands_n =
+                robot.estimate.hand_force_n.map(|force_n| Vector3::from(force_n.to_array().map(f64::from)));
             motion.sense(isometry_from_sim(&robot.estimate.world_from_pelvis), hands_n);
         }
         let (was_underway, reached_before) = (self.scores.underway(), self.scores.reached().count());

@@ -11,6 +11,7 @@ use crate::tool::Tool;
 
 /// Softer hands would be thrown about by what they feel of their own motion.
 const LEAST_COMPLIANCE_N_S_M: f64 = 50.0;
+const LEAST_COMPLIANCE_N_M_S_RAD: f64 = 5.0;
 
 /// Move wrists, fingers and base of one or more robots for a number of control steps of 20 ms. Inverse kinematics turns
 /// wrist poses into arm and waist joints. Robots that are not named hold still; a hand without a wrist target keeps its
@@ -67,6 +68,14 @@ pub struct WristMove {
     /// Null: hands keep to their targets.
     #[schemars(range(min = LEAST_COMPLIANCE_N_S_M))]
     pub compliance_n_s_m: Option<f64>,
+    /// How both hands together give way to what pulls or pushes them to the robot's left or right, as a partner who sways does: at
+    /// 1 m/s under as many newtons, up to 6 cm; at least 50. Null: not to the sides.
+    #[schemars(range(min = LEAST_COMPLIANCE_N_S_M))]
+    pub side_compliance_n_s_m: Option<f64>,
+    /// How both hands together give way to what turns them about the vertical through the middle between the wrists: at 1 rad/s under
+    /// as many newton metres, up to 0.15 rad; at least 5. Null: they do not turn.
+    #[schemars(range(min = LEAST_COMPLIANCE_N_M_S_RAD))]
+    pub turn_compliance_n_m_s_rad: Option<f64>,
     /// Left finger joint angles in radians: [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1]. Positive angles
     /// close thumb_1 and thumb_2, negative ones middle and index. Null: the target stays.
     #[schemars(extend("hint" = "Closed around a bottle: [0, 0.75, 0.8, -1.1, -1.3, -1.1, -1.3]; open: [0, -0.3, 0, 0, 0, 0, 0]."))]
@@ -96,6 +105,8 @@ impl WristMove {
             right_quaternion_wxyz: None,
             carried: None,
             compliance_n_s_m: None,
+            side_compliance_n_s_m: None,
+            turn_compliance_n_m_s_rad: None,
             left_fingers_rad: None,
             right_fingers_rad: None,
             vx_m_s: None,
@@ -116,11 +127,17 @@ impl WristMove {
             "right_fingers_rad",
             self.right_fingers_rad.as_ref().map_or(&[], |fingers| &fingers[..]),
         )?;
-        checks::finite("compliance_n_s_m", self.compliance_n_s_m.as_slice())?;
-        if let Some(soft) = self.compliance_n_s_m.filter(|given| *given < LEAST_COMPLIANCE_N_S_M) {
-            return Err(format!(
-                "compliance_n_s_m is {soft}; give at least {LEAST_COMPLIANCE_N_S_M}, as 250, or null for hands that do not give way"
-            ));
+        for (name, given, least, common) in [
+            ("compliance_n_s_m", self.compliance_n_s_m, LEAST_COMPLIANCE_N_S_M, 250),
+            ("side_compliance_n_s_m", self.side_compliance_n_s_m, LEAST_COMPLIANCE_N_S_M, 500),
+            ("turn_compliance_n_m_s_rad", self.turn_compliance_n_m_s_rad, LEAST_COMPLIANCE_N_M_S_RAD, 40),
+        ] {
+            checks::finite(name, given.as_slice())?;
+            if let Some(soft) = given.filter(|given| *given < least) {
+                return Err(format!(
+                    "{name} is {soft}; give at least {least}, as {common}, or null for hands that do not give way"
+                ));
+            }
         }
         checks::base([self.vx_m_s, self.vy_m_s, self.yaw_rate_rad_s, self.pelvis_height_m])
     }

@@ -277,7 +277,11 @@ fn openapi_says_what_is_refused() {
     assert_eq!(quaternion["contains"], json!({ "anyOf": [{ "minimum": 1e-6 }, { "maximum": -1e-6 }] }));
     assert_eq!((&quaternion["minItems"], &quaternion["maxItems"]), (&json!(4), &json!(4)));
     assert_eq!(field("walk", "/robots/items/properties/vx_m_s/maximum"), 1e6);
-    assert_eq!(field("move_wrists", "/robots/items/properties/compliance_n_s_m/minimum"), 50.0);
+    for (soft, least) in
+        [("compliance_n_s_m", 50.0), ("side_compliance_n_s_m", 50.0), ("turn_compliance_n_m_s_rad", 5.0)]
+    {
+        assert_eq!(field("move_wrists", &format!("/robots/items/properties/{soft}/minimum")), least);
+    }
     assert_eq!(field("query_depth", "/region/properties/stride/maximum"), u32::MAX);
     assert_eq!(field("send_joint_chunk", "/robots/items/properties/rows/items/items/minimum"), -1e6);
     assert_eq!(field("query_depth", "/pixels/items/prefixItems/1/maximum"), 239);

@@ -13,7 +13,10 @@ use crate::players::PlayerError;
 use crate::scoring::{A, B, C, Facts};
 
 const LIFT_M: f32 = 0.07;
-const PACE_M_S: f32 = 0.24;
+/// Pelvis over the floor while robots take the legs and set them down, and while they walk.
+const BENT_M: f32 = 0.64;
+const TALL_M: f32 = 0.70;
+const PACE_M_S: f32 = 0.27;
 /// How far it is, in a fist with its palm down, from the wrist to what presses, and to the fist's front.
 const PRESSING_M: f32 = 0.115;
 const FRONT_M: f32 = 0.16;
@@ -64,14 +67,20 @@ fn clear_the_way(commander: &mut Commander) -> Result<(), PlayerError> {
 /// B and C take the table, follow A through the doorway, and set it down on its marks.
 fn carry_table(commander: &mut Commander) -> Result<(), PlayerError> {
     let [b_left, b_right] =
-        HandGrasp::with_both_hands(B, "console_table", ["b_left", "b_right"], PI, &Hold::BAR);
+        HandGrasp::with_both_hands(B, "console_table", ["b_left", "b_right"], PI, &Hold::LEG);
     let [c_left, c_right] =
-        HandGrasp::with_both_hands(C, "console_table", ["c_left", "c_right"], 0.0, &Hold::BAR);
+        HandGrasp::with_both_hands(C, "console_table", ["c_left", "c_right"], 0.0, &Hold::LEG);
     let grasps = [b_left, b_right, c_left, c_right];
     let mut team = CarryTeam::new(commander, &grasps)?;
-    team.gather(commander)?;
+    set_heights(commander, BENT_M);
+    // Thighs meet legs behind which robots do not stand in the middle.
+    let stands = team.walk_goals(commander)?;
+    walk_to(commander, &stands)?;
     grasp_compliantly(commander, &grasps)?;
+    // Two robots that lift with stiff hands lean back against each other's pull, and stagger.
+    team.give_way(commander, true);
     team.lift(commander, LIFT_M)?;
+    set_heights(commander, TALL_M);
     let facts = commander.facts()?;
     let marks = facts.object("foot_marks").pose_in_world;
     let b_x_m = facts.robots[B].pelvis_in_world.translation.x;
@@ -80,11 +89,19 @@ fn carry_table(commander: &mut Commander) -> Result<(), PlayerError> {
         a_m => a_m.x - APART_M - b_x_m,
     };
     team.carry_where_free(commander, &marks, PACE_M_S, &free_m)?;
+    set_heights(commander, BENT_M);
     team.rest(commander)?;
     team.set_down(commander, &marks)?;
     // The squares are small, and hands that gave way now would shift the table as they open.
     team.give_way(commander, false);
     let_go(commander, &grasps)
+}
+
+/// How high the pelvises of B and C are from now on.
+fn set_heights(commander: &mut Commander, height_m: f32) {
+    for robot in [B, C] {
+        commander.set_height(robot, height_m);
+    }
 }
 
 /// A lays its right fist on the lever, presses it down and follows the leaf on its swing.

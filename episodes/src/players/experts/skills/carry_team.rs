@@ -1,7 +1,7 @@
 //! Robots that carry one object together, in step: all follow one path of the object, and hands give way to the partners.
 //! One robot that carries or pushes something with both hands is the smallest team.
 
-use tandem_sim::{Pose, Rotation, Sides, Vector};
+use tandem_sim::{Pose, Rotation, Sides, Vector, heading_rad, wrapped_rad};
 
 use super::commander::{Commander, HandMove};
 use super::compliant::grasp_compliantly;
@@ -25,6 +25,10 @@ const LOST_BEATS: u32 = 5;
 const CARRIES: u32 = 4;
 /// An object that is set down is pressed on the floor by so much.
 const PRESS_M: f32 = 0.004;
+/// It is set down once it is over its place within this, or has been moved there so many times.
+const OVER_M: f32 = 0.015;
+const OVER_RAD: f32 = 0.02;
+const MOST_MOVES_OVER: u32 = 3;
 
 /// Where a carried object is by the distance it has gone, and how fast it goes.
 pub struct ObjectPath<'a> {
@@ -193,13 +197,21 @@ impl<'a> CarryTeam<'a> {
         commander.perform(REST_S, &still)
     }
 
-    /// Sets the object down: over its place first, for which hands must not give way, then straight below.
+    /// Sets the object down: over its place first, for which hands must not give way, until it is seen to be there; then straight
+    /// below.
     pub fn set_down(&self, commander: &mut Commander, place: &Pose) -> Result<(), PlayerError> {
-        let from = self.object(commander)?;
-        let over = Pose::from_parts(place.translation.with_z(from.translation.z), place.rotation);
-        let down = Pose::from_parts(place.translation - Vector::Z * PRESS_M, place.rotation);
         self.give_way(commander, false);
-        move_together(commander, self.grasps, &|share| from.lerp(&over, share), 4, 0.15)?;
+        let mut object = self.object(commander)?;
+        for _ in 0..MOST_MOVES_OVER {
+            let over = Pose::from_parts(place.translation.with_z(object.translation.z), place.rotation);
+            move_together(commander, self.grasps, &|share| object.lerp(&over, share), 4, 0.15)?;
+            object = self.object(commander)?;
+            if is_over(&object, place) {
+                break;
+            }
+        }
+        let over = Pose::from_parts(place.translation.with_z(object.translation.z), place.rotation);
+        let down = Pose::from_parts(place.translation - Vector::Z * PRESS_M, place.rotation);
         move_together(commander, self.grasps, &|share| over.lerp(&down, share), 5, 0.22)?;
         self.give_way(commander, true);
         Ok(())
@@ -212,4 +224,10 @@ impl<'a> CarryTeam<'a> {
             commander.set_compliance(*robot, compliance_n_s_m);
         }
     }
+}
+
+/// Whether an object is over a place, seen from above.
+fn is_over(object: &Pose, place: &Pose) -> bool {
+    let off_m = (object.translation - place.translation).truncate().length();
+    off_m < OVER_M && wrapped_rad(heading_rad(object) - heading_rad(place)).abs() < OVER_RAD
 }

@@ -59,7 +59,8 @@ impl Hold {
         open_rad: OPEN_RAD,
         closed_rad: [0.0, -0.9, -1.74, 1.0, 1.0, 1.0, 1.0],
         stops_m: &[Vector::new(0.0, 0.09, 0.025), Vector::new(0.0, 0.0, 0.025)],
-        behind_m: 0.28,
+        // Nearer by, thighs of robots that sway as they walk press on the legs.
+        behind_m: 0.38,
     };
 
     /// A rim of 24 mm from above, of which the place is the axis: the palm on it, fingers inside, the thumb outside.
