@@ -33,7 +33,9 @@ pub enum EpisodeError {
     Spec(#[from] SpecError),
     #[error("the world cannot be built: {0}")]
     Sim(#[from] tandem_sim::SimError),
-    #[error("the episode ends here: in step {step}, {source}")]
+    #[error(
+        "the episode ends here: in step {step}, {source}; in another episode, command less effort or slower motion"
+    )]
     Diverged { step: u64, source: tandem_sim::dynamics::Diverged },
     #[error("inverse kinematics cannot use the robot's file: {0}")]
     Ik(#[from] tandem_ik::IkError),
@@ -118,7 +120,7 @@ pub enum SceneError {
         trial_s: f64,
     },
     #[error(
-        "in the scene {}, in a trial of {trial_s:.0} s, in which nobody acts, {source}",
+        "in the scene {}, in a trial of {trial_s:.0} s, in which nobody acts, {source}; look there for shapes that begin within each other, masses of less than a gram, and springs or actuators that are too strong for what they move",
         path.display()
     )]
     Diverged { path: PathBuf, trial_s: f64, source: tandem_sim::dynamics::Diverged },

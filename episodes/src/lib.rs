@@ -57,6 +57,8 @@ pub use session::{
 };
 pub use spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, SceneFile, Start};
 pub use tandem_sim::{
-    BaseLimits, CONTROL_HZ, LocomotionChoice, Sensing, SensorModel, SimError, StateSource, joint_names,
+    BaseLimits, CONTROL_HZ, LocomotionChoice, Sensing, SensorModel, SimError, StateSource,
+    assets::{DEFAULT_ROBOT, ROBOTS},
+    joint_names,
     render::RendererKind,
 };

@@ -71,6 +71,8 @@ pub enum Controller {
     Balance,
     /// A velocity policy in an ONNX file.
     File(PathBuf),
+    /// The same with a loop over the robot's place around it.
+    Looped(PathBuf),
 }
 
 /// Where an episode begins.
@@ -155,6 +157,9 @@ impl EpisodeSpec {
             match locomotion {
                 Controller::Balance => None,
                 Controller::File(path) => Some(format!("controller: {}", file(path))),
+                Controller::Looped(path) => {
+                    Some(format!("controller: {} in a loop over its place", file(path)))
+                }
             },
             (*state_estimate != StateSource::default())
                 .then(|| format!("state estimate: {}", state_estimate.name())),
@@ -247,16 +252,21 @@ fn fingerprint(document: &Document) -> String {
 }
 
 impl Controller {
-    /// The controller of a file, or our own without one.
+    /// The controller of a file, or our own without one; `looped:` before the path asks for the loop.
     pub fn from_file(path: Option<&Path>) -> Controller {
-        path.map_or(Controller::Balance, |path| Controller::File(path.into()))
+        let Some(path) = path else { return Controller::Balance };
+        match path.to_str().and_then(|text| text.strip_prefix("looped:")) {
+            Some(file) => Controller::Looped(file.into()),
+            None => Controller::File(path.into()),
+        }
     }
 
     /// Reads and checks the file.
     pub fn load(&self) -> Result<LocomotionChoice, SimError> {
         match self {
             Controller::Balance => Ok(LocomotionChoice::Balance),
-            Controller::File(path) => LocomotionChoice::from_file(Some(path)),
+            Controller::File(path) => LocomotionChoice::from_file(path, false),
+            Controller::Looped(path) => LocomotionChoice::from_file(path, true),
         }
     }
 }

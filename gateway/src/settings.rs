@@ -52,7 +52,7 @@ pub struct Layer {
     /// MJCF file of a scene in place of the tasks' own; its site `task` says where.
     #[arg(long, env = "TANDEM_SCENE", value_name = "FILE")]
     pub scene: Option<PathBuf>,
-    /// ONNX file with a velocity policy for the G1 in place of our own base controller.
+    /// ONNX file with a velocity policy for the G1 in place of our own base controller; looped:FILE puts a loop over the robot's place around it.
     #[arg(long, env = "TANDEM_LOCOMOTION", value_name = "FILE")]
     pub locomotion: Option<PathBuf>,
     /// Where robots have their own state from: an estimator over what they sense, or the simulator, which no real robot has

@@ -1,5 +1,7 @@
 //! MJCF files that the binary carries: `robots/<name>/robot.xml`, `scenes/<name>.xml`, `objects/<name>.xml`.
 
+use std::sync::LazyLock;
+
 use include_dir::{Dir, include_dir};
 
 use crate::SimError;
@@ -9,8 +11,22 @@ static ASSETS: Dir = include_dir!("$TANDEM_SIM_ASSETS");
 /// The robot used unless another file is given.
 pub const DEFAULT_ROBOT: &str = "g1_dex3";
 
+/// The same with the effort limits of Unitree's URDF in place of those of its MJCF, which disagree: 35 N m in place of 50 at
+/// ankles, waist roll and waist pitch.
+pub const URDF_EFFORTS_ROBOT: &str = "g1_dex3_urdf_efforts";
+
+pub const ROBOTS: [&str; 2] = [DEFAULT_ROBOT, URDF_EFFORTS_ROBOT];
+
+static URDF_EFFORTS: LazyLock<Option<String>> = LazyLock::new(|| {
+    let own = robot(DEFAULT_ROBOT).ok()?;
+    Some(own.replace(r#"forcerange="-50 50""#, r#"forcerange="-35 35""#))
+});
+
 /// Text of an embedded robot file.
 pub fn robot(name: &str) -> Result<&'static str, SimError> {
+    if let (URDF_EFFORTS_ROBOT, Some(text)) = (name, URDF_EFFORTS.as_deref()) {
+        return Ok(text);
+    }
     text("robot", "robots", name, &format!("robots/{name}/robot.xml"))
 }
 
@@ -40,6 +56,9 @@ fn names(folder: &str) -> Vec<String> {
         .filter_map(|entry| entry.path().file_stem())
         .map(|stem| stem.to_string_lossy().into_owned())
         .collect();
+    if folder == "robots" {
+        names.push(URDF_EFFORTS_ROBOT.into());
+    }
     names.sort();
     names
 }

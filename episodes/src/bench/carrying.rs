@@ -19,7 +19,7 @@ use crate::players::experts::skills::{
 };
 use crate::players::{Episode, InProcess, PlayerError, PrivilegedEpisode};
 use crate::scoring::{A, B, Done, Facts, Grip, Phase};
-use crate::spec::{Controller, EpisodeSpec};
+use crate::spec::{Controller, EpisodeSpec, RobotFile};
 use crate::tasks::{RobotSpot, Task, spot, uniform_xy};
 
 /// A way of the bar.
@@ -78,11 +78,12 @@ const fn beside(name: &'static str, left_m: f32) -> RobotSpot {
 /// Plays one case on these seeds.
 pub fn run(
     case: &CarryingCase,
+    robot: &str,
     controller: &Controller,
     sensing: Sensing,
     seeds: &RangeInclusive<u32>,
 ) -> Result<CaseReport, BenchError> {
-    let trials = over_seeds(seeds, |seed| trial(case, controller, sensing, seed));
+    let trials = over_seeds(seeds, |seed| trial(case, robot, controller, sensing, seed));
     let trials = trials.into_iter().collect::<Result<Vec<_>, _>>()?;
     let done: Vec<&CarryResult> = trials.iter().flatten().collect();
     let worst = |value: fn(&CarryResult) -> f32| done.iter().map(|carried| value(carried)).reduce(f32::max);
@@ -113,11 +114,13 @@ struct CarryResult {
 /// One seed; `None` if a robot fell, or hands lost the bar for good.
 fn trial(
     case: &CarryingCase,
+    robot: &str,
     controller: &Controller,
     sensing: Sensing,
     seed: u32,
 ) -> Result<Option<CarryResult>, BenchError> {
     let spec = EpisodeSpec {
+        robot: RobotFile::Embedded(robot.into()),
         locomotion: controller.clone(),
         sensing,
         renderer: RendererKind::Cpu,

@@ -47,9 +47,10 @@ pub enum BenchError {
     NoEpisodes,
 }
 
-/// Plays the cases whose names contain one of the words of `filter`, separated by commas, on these seeds, robots of
-/// their own first, then two that carry something between them; calls `done` after each case.
+/// Plays the cases whose names contain one of the words of `filter`, separated by commas, on these seeds with the embedded robot of
+/// this name, robots of their own first, then two that carry something between them; calls `done` after each case.
 pub fn locomotion(
+    robot: &str,
     controller: &Controller,
     sensing: Sensing,
     filter: &str,
@@ -57,9 +58,9 @@ pub fn locomotion(
     mut done: impl FnMut(&CaseReport),
 ) -> Result<LocomotionReport, BenchError> {
     let choice = controller.load()?;
-    let mut report = bench::run(&|| choice.controller(), sensing, filter, seeds, &mut done)?;
+    let mut report = bench::run(robot, &|| choice.controller(), sensing, filter, seeds, &mut done)?;
     for case in carrying::CASES.iter().filter(|case| bench::is_asked(filter, case.name)) {
-        let carried = carrying::run(case, controller, sensing, seeds)?;
+        let carried = carrying::run(case, robot, controller, sensing, seeds)?;
         done(&carried);
         report.cases.push(carried);
     }

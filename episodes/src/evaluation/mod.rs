@@ -74,7 +74,7 @@ pub fn evaluate(
     let cached = folder.join(EPISODES);
     create_private_folder(&cached).map_err(|source| EvaluationError::Io { path: cached.clone(), source })?;
     let build = fingerprint::build().map_err(EpisodeError::Build)?;
-    let locomotion = plan.locomotion.load().map_err(EpisodeError::from)?.name().to_string();
+    let locomotion = plan.locomotion.load().map_err(EpisodeError::from)?.name();
     let cache = EpisodeCache { plan, folder: &cached, locomotion, build };
     let (work, mut left_out) = plan.episodes();
     let episodes = workers::play_all(&cache, &work, &mut left_out, progress)?;

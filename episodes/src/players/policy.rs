@@ -1,6 +1,8 @@
 //! Whoever plays the episodes of an evaluation: a player of [`super::ALL`], or a policy that lives elsewhere.
 
+use std::any::Any;
 use std::fmt::{self, Debug};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::Duration;
 
@@ -91,7 +93,8 @@ impl Policy for PlayerEntry {
     }
 }
 
-/// Plays `spec` in this process: `act` makes the calls. That the episode ends under way is no error.
+/// Plays `spec` in this process: `act` makes the calls. That the episode ends under way is no error, and a panic is a failure of
+/// the policy, which ends this episode and no other.
 pub fn play_in_process(
     spec: &EpisodeSpec,
     output: EpisodeOutput,
@@ -105,7 +108,9 @@ pub fn play_in_process(
     let acted = match episode.session.recording_failed() {
         // Whoever wants a recording has no use for the episode.
         Some(reason) => Err(PlayerError::GaveUp(reason.into())),
-        None => act(&mut episode),
+        None => catch_unwind(AssertUnwindSafe(|| act(&mut episode))).unwrap_or_else(|panic| {
+            Err(PlayerError::Failed(format!("it panicked: {}", panic_text(&*panic))))
+        }),
     };
     let stopped = match acted {
         Ok(()) | Err(PlayerError::EpisodeOver) => None,
@@ -118,4 +123,27 @@ pub fn play_in_process(
     };
     let thought = episode.session.thought();
     Ok(PlayOutcome { result: episode.session.close(), thought, stopped })
+}
+
+/// What a panic says of itself.
+fn panic_text(panic: &(dyn Any + Send)) -> &str {
+    let literal = || panic.downcast_ref::<&str>().copied();
+    panic.downcast_ref::<String>().map(String::as_str).or_else(literal).unwrap_or("without a word")
+}
+
+#[cfg(test)]
+mod tests {
+    use tandem_tools_spec::Protocol;
+
+    use super::*;
+    use crate::tasks;
+
+    #[test]
+    fn a_panic_of_a_player_ends_its_episode_as_a_failed_policy() {
+        let spec = EpisodeSpec::new(tasks::find("handover").unwrap(), 2000, Protocol::Benchmark);
+        let output = EpisodeOutput { folder: Path::new(""), record: false };
+        let played = play_in_process(&spec, output, |_| panic!("no plan for seed {}", 2000)).unwrap();
+        assert_eq!(played.result.ended, EndReason::PolicyFailed);
+        assert_eq!(played.stopped.as_deref(), Some("it panicked: no plan for seed 2000"));
+    }
 }

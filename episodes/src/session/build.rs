@@ -66,7 +66,7 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
         RobotFile::Embedded(name) => name.clone(),
         RobotFile::File(_) => format!("{}-{:016x}", spec.robot.name(), xxh3_64(mjcf.as_bytes())),
     };
-    Ok(Built { world, motions, robot, locomotion: locomotion.name().into() })
+    Ok(Built { world, motions, robot, locomotion: locomotion.name() })
 }
 
 /// What the world of an episode is made of.

@@ -3,7 +3,10 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::Subcommand;
-use tandem_episodes::bench::{self, CaseReport};
+use tandem_episodes::{
+    DEFAULT_ROBOT, ROBOTS,
+    bench::{self, CaseReport},
+};
 
 use super::{
     CommandResult, Seeds,
@@ -26,6 +29,9 @@ enum LocomotionPart {
         locomotion: LocomotionFlag,
         #[command(flatten)]
         sensing: SensingFlags,
+        /// The robot: with the effort limits of Unitree's MJCF, or of its URDF, which has 35 N m in place of 50 at ankles, waist roll and waist pitch.
+        #[arg(long, value_name = "NAME", value_parser = ROBOTS, default_value = DEFAULT_ROBOT)]
+        robot: String,
         /// Cases whose names contain one of these words, separated by commas.
         #[arg(long, default_value = "", value_name = "WORDS")]
         cases: String,
@@ -40,10 +46,11 @@ enum LocomotionPart {
 
 /// Plays the cases, prints a line per case as it ends, and writes JSON where it is asked for.
 pub fn run(args: LocomotionArgs) -> CommandResult {
-    let LocomotionPart::Bench { locomotion, sensing, cases, seeds, json } = args.part;
+    let LocomotionPart::Bench { locomotion, sensing, robot, cases, seeds, json } = args.part;
     println!("{}", CaseReport::HEAD);
     let (controller, sensing) = (locomotion.controller(), sensing.sensing());
-    let report = bench::locomotion(&controller, sensing, &cases, &seeds.0, |case| println!("{case}"))?;
+    let report =
+        bench::locomotion(&robot, &controller, sensing, &cases, &seeds.0, |case| println!("{case}"))?;
     if let Some(path) = json {
         std::fs::write(path, serde_json::to_string_pretty(&report)?)?;
     }

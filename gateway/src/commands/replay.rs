@@ -211,6 +211,7 @@ mod tests {
     use tandem_tools_spec::{MoveWrists, Protocol, WristMove};
 
     use super::*;
+    use crate::hosting::write_absurd_robot;
 
     fn args(path: &Path) -> ReplayArgs {
         ReplayArgs {
@@ -225,14 +226,9 @@ mod tests {
         }
     }
 
-    /// Standing still the robot does nothing, and to move its elbow takes more torque than numbers of single precision can say.
     fn play_until_the_simulator_fails(folder: &Path) -> Session {
-        let sound = RobotFile::default().read().unwrap();
-        let elbow =
-            sound.lines().find(|line| line.contains(r#"<position name="right_elbow_joint""#)).unwrap();
-        let absurd = r#"<position name="right_elbow_joint" joint="right_elbow_joint" kp="1e38" kv="1e38" forcerange="-1e38 1e38"/>"#;
         let robot = folder.join("absurd.xml");
-        std::fs::write(&robot, sound.replace(elbow, absurd)).unwrap();
+        write_absurd_robot(&robot);
         let handover = tasks::find("handover").unwrap();
         let spec = EpisodeSpec {
             robot: RobotFile::File(robot),

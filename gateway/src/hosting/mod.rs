@@ -1,6 +1,8 @@
 //! The episodes that a server holds: their table, the thread of each, and the folder that each is recorded into.
 //! Nothing here knows how callers reach it.
 
+#[cfg(test)]
+mod absurd_robot;
 mod answer;
 mod episode_thread;
 mod error;
@@ -13,6 +15,8 @@ mod team;
 #[cfg(test)]
 mod tests;
 
+#[cfg(test)]
+pub use absurd_robot::write_absurd_robot;
 pub use answer::Answer;
 pub use episode_thread::EpisodeThread;
 pub use error::HostingError;

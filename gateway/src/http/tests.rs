@@ -11,18 +11,9 @@ use tokio::sync::Semaphore;
 
 use super::Server;
 use crate::{
-    hosting::EpisodeThread,
+    hosting::{EpisodeThread, write_absurd_robot},
     settings::{Layer, Settings},
 };
-
-/// The embedded robot with one absurd joint: standing still it does nothing, and to move it takes more torque than numbers
-/// of single precision can say.
-fn write_absurd_robot(path: &Path) {
-    let sound = RobotFile::default().read().unwrap();
-    let elbow = sound.lines().find(|line| line.contains(r#"<position name="right_elbow_joint""#)).unwrap();
-    let absurd = r#"<position name="right_elbow_joint" joint="right_elbow_joint" kp="1e38" kv="1e38" forcerange="-1e38 1e38"/>"#;
-    std::fs::write(path, sound.replace(elbow, absurd)).unwrap();
-}
 
 /// Has `server` hold an episode of Handover with the robots of a file, which no caller can ask for.
 fn hold(server: &Server, id: &str, robot: &Path, folder: &Path) {

@@ -13,6 +13,7 @@ mod trial;
 use std::fmt;
 use std::num::NonZero;
 use std::ops::RangeInclusive;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde::Serialize;
@@ -22,9 +23,10 @@ pub use falls::{Broken, FALL_CASES, FallCase, FallPlace, FallTrial, FallsCase, F
 pub use physics::{PhysicsCase, PhysicsReport, physics};
 pub use pictures::{PicturesCase, PicturesReport, pictures};
 
-use crate::SimError;
+use crate::body::RobotModel;
 use crate::locomotion::Locomotion;
 use crate::robot::Sensing;
+use crate::{SimError, assets};
 use measure::Trial;
 
 /// Makes a fresh controller for each trial.
@@ -33,6 +35,8 @@ pub type NewLocomotion<'a> = &'a (dyn Fn() -> Box<dyn Locomotion> + Sync);
 /// Results of all cases.
 #[derive(Clone, Debug, Serialize)]
 pub struct LocomotionReport {
+    /// Of [`crate::assets::ROBOTS`].
+    pub robot: String,
     pub cases: Vec<CaseReport>,
 }
 
@@ -80,8 +84,10 @@ pub fn is_asked(filter: &str, case: &str) -> bool {
     filter.split(',').any(|word| case.contains(word))
 }
 
-/// Runs every case that `filter` asks for, on these seeds; `done` hears of each case as it ends.
+/// Runs every case that `filter` asks for, on these seeds, with the embedded robot of this name; `done` hears of each case as it
+/// ends.
 pub fn run(
+    robot: &str,
     new_locomotion: NewLocomotion,
     sensing: Sensing,
     filter: &str,
@@ -89,14 +95,15 @@ pub fn run(
     mut done: impl FnMut(&CaseReport),
 ) -> Result<LocomotionReport, SimError> {
     let mut cases = Vec::new();
+    let model = Arc::new(RobotModel::parse(robot, assets::robot(robot)?)?);
     for case in CASES.iter().filter(|case| is_asked(filter, case.name)) {
-        let trials = over_seeds(seeds, |seed| trial::run(case, seed, new_locomotion(), sensing));
+        let trials = over_seeds(seeds, |seed| trial::run(case, seed, &model, new_locomotion(), sensing));
         let trials = trials.into_iter().collect::<Result<Vec<_>, _>>()?;
         let report = summarise(case, &trials);
         done(&report);
         cases.push(report);
     }
-    Ok(LocomotionReport { cases })
+    Ok(LocomotionReport { robot: robot.into(), cases })
 }
 
 /// What `trial` makes of each of these seeds, as many at once as there are processors.

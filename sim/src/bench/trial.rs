@@ -1,6 +1,7 @@
 //! One case with one seed.
 
 use std::f32::consts::{PI, TAU};
+use std::sync::Arc;
 
 use rapier3d::math::Vector;
 
@@ -8,7 +9,7 @@ use super::cases::{Case, Disturbance, Plan, STOP_S};
 use super::measure::{SETTLE_S, Sample, Trial, measure};
 use super::motion::ArmMotion;
 use super::tour::{self, Leg};
-use crate::body::PALM_IN_WRIST_M;
+use crate::body::{PALM_IN_WRIST_M, RobotModel};
 use crate::locomotion::{BaseCommand, BaseVelocity, Locomotion};
 use crate::plane::{heading_rad, wrapped_rad};
 use crate::random::SplitMix64;
@@ -21,12 +22,13 @@ const PUSH_S: f32 = 1.0;
 pub(super) fn run(
     case: &Case,
     seed: u32,
+    model: &Arc<RobotModel>,
     locomotion: Box<dyn Locomotion>,
     sensing: Sensing,
 ) -> Result<Trial, SimError> {
     let placement = RobotPlacement { name: "A".into(), position_m: [0.0, 0.0], yaw_rad: 0.0 };
     let spec = WorldSpec { scene: "floor".into(), robots: vec![placement], objects: vec![] };
-    let mut world = World::new(&spec)?;
+    let mut world = World::with_robot(&spec, model.clone())?;
     world.set_locomotion(0, locomotion);
     world.set_sensing(sensing, seed);
     let mut random = SplitMix64(seed.into());

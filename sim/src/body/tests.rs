@@ -135,6 +135,32 @@ fn the_action_row_is_arms_hands_waist() {
         != (name.contains("hip") || name.contains("knee") || name.contains("ankle"))));
 }
 
+/// Unitree's MJCF and URDF agree but for ankles, waist roll and waist pitch.
+#[test]
+fn effort_limits_are_those_of_the_mjcf_or_of_the_urdf() {
+    let parse = |name| {
+        let text = crate::assets::robot(name).expect("embedded");
+        crate::RobotModel::parse("robot.xml", text).expect("a robot")
+    };
+    let [own, urdf] = crate::assets::ROBOTS.map(parse);
+    let mut differ = Vec::new();
+    for (own, urdf) in own.joints.iter().zip(&urdf.joints) {
+        if own.effort_n_m != urdf.effort_n_m {
+            assert_eq!([own.effort_n_m, urdf.effort_n_m], [50.0, 35.0], "{}", own.name);
+            differ.push(own.name.as_str());
+        }
+    }
+    let expected = [
+        "left_ankle_pitch_joint",
+        "left_ankle_roll_joint",
+        "right_ankle_pitch_joint",
+        "right_ankle_roll_joint",
+        "waist_roll_joint",
+        "waist_pitch_joint",
+    ];
+    assert_eq!(differ, expected);
+}
+
 /// Unitree's numbers, each with the motor that has it.
 #[test]
 fn motors_are_as_fast_as_unitree_says() {

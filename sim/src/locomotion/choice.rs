@@ -15,18 +15,15 @@ pub enum LocomotionChoice {
     /// Our own.
     #[default]
     Balance,
-    /// A velocity policy that was read from an ONNX file.
+    /// A velocity policy that was read from an ONNX file, and whether a loop over its place is around it.
     #[cfg(feature = "onnx")]
-    Onnx(Arc<Network>),
+    Onnx { network: Arc<Network>, looped: bool },
 }
 
 impl LocomotionChoice {
-    /// The policy of a file, or our own controller without one.
-    pub fn from_file(path: Option<&Path>) -> Result<LocomotionChoice, SimError> {
-        Ok(match path {
-            Some(path) => from_onnx(path)?,
-            None => LocomotionChoice::Balance,
-        })
+    /// The policy of a file. `looped`: it is told not the commands, but what keeps the robot where they would have taken it.
+    pub fn from_file(path: &Path, looped: bool) -> Result<LocomotionChoice, SimError> {
+        from_onnx(path, looped)
     }
 
     /// A fresh controller for one robot.
@@ -34,7 +31,7 @@ impl LocomotionChoice {
         match self {
             LocomotionChoice::Balance => Box::new(Balance::default()),
             #[cfg(feature = "onnx")]
-            LocomotionChoice::Onnx(network) => Box::new(Agile::new(network.clone())),
+            LocomotionChoice::Onnx { network, looped } => Box::new(Agile::new(network.clone(), *looped)),
         }
     }
 
@@ -43,22 +40,24 @@ impl LocomotionChoice {
         self.controller().limits()
     }
 
-    /// What recordings and results call it: `balance`, or the file's name with a hash of its content.
-    pub fn name(&self) -> &str {
+    /// What recordings and results call it: `balance`, or the file's name with a hash of its content, and the loop if there is one.
+    pub fn name(&self) -> String {
         match self {
-            LocomotionChoice::Balance => "balance",
+            LocomotionChoice::Balance => "balance".into(),
             #[cfg(feature = "onnx")]
-            LocomotionChoice::Onnx(network) => network.name(),
+            LocomotionChoice::Onnx { network, looped: false } => network.name().into(),
+            #[cfg(feature = "onnx")]
+            LocomotionChoice::Onnx { network, looped: true } => format!("looped:{}", network.name()),
         }
     }
 }
 
 #[cfg(feature = "onnx")]
-fn from_onnx(path: &Path) -> Result<LocomotionChoice, SimError> {
-    Ok(LocomotionChoice::Onnx(Arc::new(Network::from_file(path)?)))
+fn from_onnx(path: &Path, looped: bool) -> Result<LocomotionChoice, SimError> {
+    Ok(LocomotionChoice::Onnx { network: Arc::new(Network::from_file(path)?), looped })
 }
 
 #[cfg(not(feature = "onnx"))]
-fn from_onnx(path: &Path) -> Result<LocomotionChoice, SimError> {
+fn from_onnx(path: &Path, _looped: bool) -> Result<LocomotionChoice, SimError> {
     Err(SimError::WithoutOnnx { path: path.display().to_string() })
 }

@@ -51,19 +51,19 @@ impl World {
 
     /// As [`World::push`], at a point of the link that a hinge or slide of an object carries, in that link's frame.
     pub(crate) fn push_object(&mut self, joint: &str, point_in_link_m: Vector, force_n: Vector) {
-        let link = self.jointed(joint);
+        let link = self.jointed_link(joint);
         self.pushes.push(Push { link, point_in_link_m, force_n });
     }
 
     /// Sets a hinge of an object, by the name that its file gives.
     pub(crate) fn set_object_hinge(&mut self, joint: &str, position_rad: f64, velocity_rad_s: f64) {
-        let link = self.jointed(joint);
+        let link = self.jointed_link(joint);
         self.dynamics.tree_mut(link.tree).set_joint(link.link, position_rad, velocity_rad_s);
     }
 
-    fn jointed(&self, joint: &str) -> LinkId {
-        let object = self.objects.iter().find(|object| object.joint.as_deref() == Some(joint));
-        object.and_then(|object| object.link).unwrap_or_else(|| panic!("no joint `{joint}`"))
+    fn jointed_link(&self, joint: &str) -> LinkId {
+        self.link_of(|object| object.joint.as_deref() == Some(joint))
+            .unwrap_or_else(|| panic!("no joint `{joint}`"))
     }
 
     /// Puts a robot somewhere, at rest, as its joints are.
@@ -90,8 +90,8 @@ impl World {
 
     /// Puts a free object somewhere, at rest. An unknown one is a bug of the caller.
     pub(crate) fn put_object(&mut self, name: &str, world_from_object: Pose) {
-        let object = self.objects.iter().find(|object| object.name == name);
-        let link = object.and_then(|object| object.link).unwrap_or_else(|| panic!("no free object `{name}`"));
+        let link = self.link_of(|object| object.name == name);
+        let link = link.unwrap_or_else(|| panic!("no free object `{name}`"));
         let tree = self.dynamics.tree_mut(link.tree);
         tree.set_base(precise(&world_from_object), DVec3::ZERO, DVec3::ZERO);
     }

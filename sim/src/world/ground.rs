@@ -3,16 +3,20 @@
 use rapier3d::math::{Pose, Vector};
 
 use super::World;
-use crate::dynamics::{Collider, DPose3, DVec3};
+use crate::dynamics::{Collider, DPose3, DVec3, Directions, Friction};
 use crate::mechanism::{add_collider, rounded};
 use crate::mjcf::{Geom, Primitive};
 
 /// A plane that leans by less carries what falls on it.
 const CARRIES_COSINE: f64 = 0.5;
+/// MJCF's defaults.
+const PLAIN: Friction =
+    Friction { directions: Directions::Slide, slide: 1.0, spin_m: 0.005, roll_m: 0.0001, priority: 0 };
 
 impl World {
     /// Puts a plane without an end under the lowest shape of the scene, unless the scene has such a plane itself: exported rooms
-    /// have boxes for floors, and what goes over the edge of one would fall for ever. Nobody sees it.
+    /// have boxes for floors, and what goes over the edge of one would fall for ever. In a scene of which nothing collides it is at
+    /// z = 0, where robots are put. Nobody sees it.
     pub(super) fn lay_ground(&mut self) {
         // No joint moves a plane.
         let carries = |(collider, at): (&Collider, DPose3)| {
@@ -27,7 +31,7 @@ impl World {
             (collider.shape.compute_aabb(&rounded(&at)).mins.z, collider.friction)
         };
         let lowest = shapes.map(bottom_m).min_by(|a, b| a.0.total_cmp(&b.0));
-        let Some((bottom_m, friction)) = lowest else { return };
+        let (bottom_m, friction) = lowest.unwrap_or((0.0, PLAIN));
         let ground = Geom {
             primitive: Primitive::Plane { half_extents_m: [0.0; 2] },
             body_from_geom: Pose::from_translation(Vector::Z * bottom_m),

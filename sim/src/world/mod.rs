@@ -26,7 +26,7 @@ pub use watch::{
 use rapier3d::math::Pose;
 
 use crate::body::RobotModel;
-use crate::dynamics::{DVec3, Diverged, Dynamics, Settings};
+use crate::dynamics::{DVec3, Diverged, Dynamics, LinkId, Settings};
 use crate::mechanism::Machinery;
 use crate::mjcf::{Document, MjcfCamera};
 use crate::robot::{Robot, RobotCommand, RobotPlacement, Sensing};
@@ -192,9 +192,13 @@ impl World {
 
     /// Position of a hinge (rad) or a slide (m) of an object, by the name that its file gives; the first that has it.
     pub fn joint_position(&self, joint: &str) -> Option<f64> {
-        let named = |object: &&Object| object.joint.as_deref() == Some(joint);
-        let link = self.objects.iter().find(named)?.link?;
+        let link = self.link_of(|object| object.joint.as_deref() == Some(joint))?;
         Some(self.dynamics.tree(link.tree).joint_position(link.link))
+    }
+
+    /// The link of the first object of which this is true; none if that does not move.
+    fn link_of(&self, is: impl Fn(&Object) -> bool) -> Option<LinkId> {
+        self.objects.iter().find(|object| is(object))?.link
     }
 
     /// Every object's name and what its file says of it.

@@ -42,6 +42,8 @@ pub struct Extremes {
     pub depth_m: Greatest,
     pub deep_s: Greatest,
     pub beyond_rad: Greatest,
+    /// Speed of a joint, as a share of the speed at which its motor can push no further.
+    pub joint_speed_share: Greatest,
 }
 
 /// Watches a world, physics step by physics step.
@@ -89,6 +91,7 @@ impl Extremes {
             (&mut self.depth_m, &other.depth_m),
             (&mut self.deep_s, &other.deep_s),
             (&mut self.beyond_rad, &other.beyond_rad),
+            (&mut self.joint_speed_share, &other.joint_speed_share),
         ];
         for (mine, others) in pairs {
             mine.join(others, &at);
@@ -116,6 +119,9 @@ impl Watch {
                 let at = || format!("{}/{}", tree.name, link.name);
                 self.extremes.speed_m_s.see(tree.com_velocity_m_s(index).length(), at);
                 self.extremes.beyond_rad.see(tree.beyond_range(index), at);
+                if let Some(share) = tree.motor_speed_share(index) {
+                    self.extremes.joint_speed_share.see(share, at);
+                }
             }
         }
         self.look_at_energy(dynamics, balance);

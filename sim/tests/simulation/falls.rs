@@ -67,6 +67,28 @@ fn floors_go_on_where_they_are_no_longer_drawn() {
     assert!(bottle_m.z.abs() < 0.05, "{bottle_m}");
 }
 
+/// A scene in which nothing collides has a ground all the same, where robots stand.
+#[test]
+fn robots_stand_in_a_scene_of_nothing() {
+    let ghost = r#"<geom type="box" size="1 1 1" pos="4 0 -5" contype="0" conaffinity="0"/>"#;
+    for room in ["", ghost] {
+        let xml = format!("<mujoco><worldbody>{room}</worldbody></mujoco>");
+        let document = Arc::new(Document::parse("room.xml", &xml).expect("a room"));
+        let spec = WorldSpec {
+            scene: SceneSource::Read { document, world_from_scene: Pose::IDENTITY },
+            robots: vec![robot([0.0, 0.0])],
+            objects: vec![],
+        };
+        let mut world = World::new(&spec).expect("a world");
+        let command = [world.rest_command(0)];
+        for _ in 0..100 {
+            world.control_step(&command).expect("it stays finite");
+        }
+        let robot = &world.present().robots[0];
+        assert!(!robot.sensed.fallen && robot.truth.world_from_pelvis().translation.z > 0.7, "{room}");
+    }
+}
+
 /// A floor that is a box ends, but what goes over its edge comes to rest on a ground below.
 #[test]
 fn what_goes_over_the_edge_of_a_box_lands_below_it() {

@@ -1,10 +1,12 @@
 //! The default base controller walks, carries, gives way and comes back, bit for bit again.
 
+use tandem_sim::assets::DEFAULT_ROBOT;
 use tandem_sim::locomotion::Balance;
 use tandem_sim::{RobotCommand, RobotPlacement, Sensing, World, WorldSpec, bench};
 
 fn report(case: &str, seeds: usize) -> bench::CaseReport {
     let report = bench::run(
+        DEFAULT_ROBOT,
         &|| Box::new(Balance::default()),
         Sensing::default(),
         case,

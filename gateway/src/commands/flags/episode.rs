@@ -65,7 +65,7 @@ impl SceneFlag {
 /// The base controller on the command line.
 #[derive(Debug, Args)]
 pub struct LocomotionFlag {
-    /// ONNX file with a velocity policy for the G1 in place of our own base controller.
+    /// ONNX file with a velocity policy for the G1 in place of our own base controller; looped:FILE puts a loop over the robot's place around it.
     #[arg(long = "locomotion", env = "TANDEM_LOCOMOTION", value_name = "FILE")]
     pub file: Option<PathBuf>,
 }

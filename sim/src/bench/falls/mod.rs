@@ -121,15 +121,16 @@ impl FallsCase {
     }
 
     /// Column heads of its lines: greatest values, and in brackets how many episodes were beyond the limit.
-    pub const HEAD: &str = "case                  episodes fallen diverged  fastest link    energy made        deeper than 2 cm      beyond range";
+    pub const HEAD: &str = "case                  episodes fallen diverged  fastest link    energy made        deeper than 2 cm      beyond range  fastest joint";
 }
 
 impl fmt::Display for FallsCase {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Extremes { speed_m_s, made_j, made_share, depth_m, deep_s, beyond_rad } = &self.greatest;
+        let Extremes { speed_m_s, made_j, made_share, depth_m, deep_s, beyond_rad, joint_speed_share } =
+            &self.greatest;
         write!(
             f,
-            "{:22}{:>8}{:>7}{:>9}  {:>6.1} m/s ({})  {:>6.1} J, {:>3.0} % ({})  {:>3.0} mm, {:.2} s ({})  {:.2} rad ({})",
+            "{:22}{:>8}{:>7}{:>9}  {:>6.1} m/s ({})  {:>6.1} J, {:>3.0} % ({})  {:>3.0} mm, {:.2} s ({})  {:.2} rad ({})  {:>3.0} % of its motor",
             self.case,
             self.episodes,
             self.fallen,
@@ -144,6 +145,7 @@ impl fmt::Display for FallsCase {
             self.broken.depth,
             beyond_rad.value,
             self.broken.range,
+            joint_speed_share.value * 100.0,
         )
     }
 }

@@ -17,9 +17,11 @@ use super::trees::tree::Tree;
 
 /// A drive's impulse in a step as a function of the velocity v' at its end:  rest - implicit v', within +-most. A motor that
 /// turns fast pushes less in the direction in which it turns, and brakes with all it has:
-///   |impulse| <= slope (speed_limit - |v'|),   slope = most / (speed_limit - SLACKENS speed_limit),
-/// which is all of it at 80 % of the limit and nothing at the limit. It holds at the end of the step as the rest does, so
-/// that no motor drives itself beyond its limit within a step, however light its link is.
+///   impulse <= slope (speed_limit - v'),   slope = most / (speed_limit - SLACKENS speed_limit),   for v' > 0,
+/// which is all of it at 80 % of the limit and nothing at the limit. Beyond the limit, where something else turns it, its
+/// voltage is above the supply's and drives a current back: it brakes whatever it is told, with all it has from 120 % on.
+/// It holds at the end of the step as the rest does, so that no motor drives itself beyond its limit within a step, however
+/// light its link is.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DriveLaw {
     pub rest: f64,
@@ -54,7 +56,7 @@ impl DriveLaw {
         let slope = self.slope();
         let low = -slope * (self.speed_limit + v);
         let high = slope * (self.speed_limit - v);
-        [low.clamp(-self.most, 0.0), high.clamp(0.0, self.most)]
+        [low.clamp(-self.most, self.most), high.clamp(-self.most, self.most)]
     }
 
     /// The impulse that meets the law at the velocity that it leaves behind:  v' = v + (T' - T) Y.Y,  where v is the
@@ -70,8 +72,7 @@ impl DriveLaw {
         }
         let slope = self.slope();
         let slack = slope * self.speed_limit;
-        let low = line(-slack, slope).clamp(-self.most, 0.0);
-        let high = line(slack, slope).clamp(0.0, self.most);
+        let [low, high] = [-slack, slack].map(|rest| line(rest, slope).clamp(-self.most, self.most));
         // Not `clamp`, which panics at what is not a number; the step will say that physics diverged.
         wanted.max(low).min(high)
     }

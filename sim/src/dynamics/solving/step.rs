@@ -82,7 +82,7 @@ impl Dynamics {
 /// The step gave a number that is not finite or will not be for long; the state is that before the step.
 #[derive(Debug, Error, PartialEq)]
 #[error(
-    "physics diverged at link `{link}` of `{tree}`: a velocity came out as {speed:.3e} m/s or rad/s, which is not finite or soon will not be; command less effort or slower motion"
+    "physics diverged at link `{link}` of `{tree}`: a velocity came out as {speed:.3e} m/s or rad/s, which is not finite or soon will not be"
 )]
 pub struct Diverged {
     pub tree: String,

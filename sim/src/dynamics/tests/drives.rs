@@ -150,10 +150,15 @@ fn effort_at(speed: f64, push_n_m: f64) -> f64 {
 }
 
 #[test]
-fn dynamics_motor_at_its_speed_limit_pushes_nothing_and_brakes_fully() {
-    for (speed, push, brake) in
-        [(0.0, 2.0, -2.0), (7.9, 2.0, -2.0), (9.0, 1.0, -2.0), (10.0, 0.0, -2.0), (30.0, 0.0, -2.0)]
-    {
+fn dynamics_motor_at_its_speed_limit_pushes_nothing_and_beyond_it_brakes() {
+    for (speed, push, brake) in [
+        (0.0, 2.0, -2.0),
+        (7.9, 2.0, -2.0),
+        (9.0, 1.0, -2.0),
+        (10.0, 0.0, -2.0),
+        (11.0, -1.0, -2.0),
+        (30.0, -2.0, -2.0),
+    ] {
         for sign in [1.0, -1.0] {
             let (pushed, braked) =
                 (effort_at(sign * speed, sign * 5.0), effort_at(sign * speed, sign * -5.0));
@@ -180,6 +185,25 @@ fn dynamics_motor_does_not_drive_itself_beyond_its_speed_limit() {
             let speed = bench.dynamics.tree(id).joint_velocity(0);
             assert!(speed > 9.0, "{speed} of a wheel of {inertia_kg_m2} kg m^2");
         }
+    }
+}
+
+/// A wheel that something turns at three times the speed of its motor, which is told to go on: it comes down to that speed and stays
+/// there, however light it is.
+#[test]
+fn dynamics_motor_brakes_what_turns_too_fast() {
+    for inertia_kg_m2 in [1e-5, 1e-3, 0.02] {
+        let (mut bench, id) = motor(inertia_kg_m2);
+        bench.dynamics.tree_mut(id).set_joint(0, 0.0, 30.0);
+        bench.dynamics.tree_mut(id).drive(0, Drive { feedforward: 50.0, ..Drive::NONE });
+        let mut last = 30.0;
+        for _ in 0..200 {
+            bench.step();
+            let speed = bench.dynamics.tree(id).joint_velocity(0);
+            assert!(speed < last + 1e-9 && speed > 9.0, "{speed} after {last} of {inertia_kg_m2} kg m^2");
+            last = speed;
+        }
+        assert!(last < 10.0 + 1e-3, "{last} of a wheel of {inertia_kg_m2} kg m^2");
     }
 }
 

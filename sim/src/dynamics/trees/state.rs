@@ -28,6 +28,12 @@ impl Tree {
         self.links[link].joint.axis().map_or(0.0, |_| self.v[self.layout.first_dof[link]])
     }
 
+    /// Speed of a joint as a share of its motor's limit, if that has one.
+    pub fn motor_speed_share(&self, link: usize) -> Option<f64> {
+        let limit = self.links[link].joint.axis()?.speed_limit;
+        limit.is_finite().then(|| self.joint_velocity(link).abs() / limit)
+    }
+
     /// How far a hinge (rad) or slide (m) is beyond its range; 0 within it, and of other joints.
     pub fn beyond_range(&self, link: usize) -> f64 {
         let range = self.links[link].joint.axis().and_then(|axis| axis.range);

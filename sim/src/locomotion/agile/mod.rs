@@ -1,6 +1,9 @@
 //! A base controller that somebody else trained: a velocity policy as an ONNX file, of the kind that AGILE exports for the
 //! G1.
 //!
+//! It is told the commands as they are. With a loop over its place (`place`) it is told instead what keeps the robot where the commands
+//! would have taken it, by what the robot itself knows of its place.
+//!
 //! The policy runs once per control step and drives the legs by PD targets with its own gains. Roll and pitch of the waist,
 //! which it balances with, belong to the task here: the policy sees them less the task's targets, as if the task had asked
 //! for an upright waist, and what it wants of them is added to the task's targets.
@@ -38,6 +41,7 @@ const HEAVY_N: f32 = 50.0;
 pub struct Agile {
     network: Arc<Network>,
     joints: JointMap,
+    looped: bool,
     state: Option<AgileState>,
 }
 
@@ -51,8 +55,9 @@ struct AgileState {
 }
 
 impl Agile {
-    pub fn new(network: Arc<Network>) -> Agile {
-        Agile { network, joints: JointMap::new(), state: None }
+    /// `looped`: with a loop over its place.
+    pub fn new(network: Arc<Network>, looped: bool) -> Agile {
+        Agile { network, joints: JointMap::new(), looped, state: None }
     }
 
     fn observe(&self, body: &BodyEstimate, velocity_command: [f32; 3]) -> NetworkInputs {
@@ -109,12 +114,9 @@ impl Locomotion for Agile {
         if state.ticks.is_multiple_of(PHYSICS_STEPS_PER_CONTROL) {
             let command = LIMITS.clamp(*command);
             let mut velocity = [command.vx_m_s, command.vy_m_s, command.yaw_rate_rad_s];
-            let pelvis = body.world_from_pelvis();
-            let pulled_down_n: f32 = body.hand_force_n.into_iter().map(|force| -force.z).sum();
-            if pulled_down_n > HEAVY_N {
-                state.place = ReferencePlace::of(pelvis);
-            } else {
-                velocity = state.place.follow(pelvis, velocity, dt_s * PHYSICS_STEPS_PER_CONTROL as f32);
+            if self.looped {
+                velocity =
+                    keep_place(&mut state.place, body, velocity, dt_s * PHYSICS_STEPS_PER_CONTROL as f32);
             }
             // A network that ran at load runs again; should it ever not, the last targets hold the robot.
             if let Ok((action, memory)) = self.network.run(&self.observe(body, velocity), &state.memory)
@@ -149,6 +151,17 @@ impl Locomotion for Agile {
         self.state = postcard::from_bytes(state)?;
         Ok(())
     }
+}
+
+/// What a policy is told so that it keeps up with the commands.
+fn keep_place(place: &mut ReferencePlace, body: &BodyEstimate, velocity: [f32; 3], dt_s: f32) -> [f32; 3] {
+    let pelvis = body.world_from_pelvis();
+    let pulled_down_n: f32 = body.hand_force_n.into_iter().map(|force| -force.z).sum();
+    if pulled_down_n > HEAVY_N {
+        *place = ReferencePlace::of(pelvis);
+        return velocity;
+    }
+    place.follow(pelvis, velocity, dt_s)
 }
 
 /// Joint angles as they would be had the task asked for an upright waist.

@@ -198,6 +198,37 @@ fn memories_come_back_and_begin_as_after_half_a_second() {
     assert_eq!(memory.0[1], [28.0; 28]);
 }
 
+/// Wants every joint to be ahead of where it is by the forward velocity that the policy is told.
+fn telling() -> GraphProto {
+    let mut graph = limp(50.0);
+    graph.initializer.extend([integers("forward", &[0; 14]), integers("command_column", &[3, 1])]);
+    graph.node.retain(|node| node.name.as_deref() != Some("action_joint_pos"));
+    graph.node.extend([
+        node("Reshape", ["velocity_commands", "command_column"], "commands"),
+        node("Gather", ["commands", "forward"], "forward_column"),
+        node("Reshape", ["forward_column", "row"], "told"),
+        node("Add", ["controlled", "told"], "action_joint_pos"),
+    ]);
+    graph
+}
+
+/// A robot that does not come along: the policy hears the command, and in a loop over its place what would catch up.
+#[test]
+fn a_policy_is_told_the_command_unless_a_loop_is_asked_for() {
+    let network = Arc::new(read(telling()).unwrap());
+    let body = crate::body::posed::Posed::standing().body();
+    let command = BaseCommand { vx_m_s: 0.2, ..BaseCommand::standing(LIMITS.pelvis_height_m[0]) };
+    let told = |looped: bool| {
+        let mut agile = Agile::new(network.clone(), looped);
+        for _ in 0..100 * PHYSICS_STEPS_PER_CONTROL {
+            agile.tick(&body, &command, crate::PHYSICS_DT_S);
+        }
+        agile.state.unwrap().action.target_rad[0] - body.q_rad[agile.joints.controlled[0]]
+    };
+    assert!((told(false) - 0.2).abs() < 1e-5, "{}", told(false));
+    assert!(told(true) > 0.5, "{}", told(true));
+}
+
 #[test]
 fn a_policy_drives_the_robot_and_snapshots_continue_bit_for_bit() {
     let network = Arc::new(read(limp(50.0)).unwrap());
@@ -205,7 +236,7 @@ fn a_policy_drives_the_robot_and_snapshots_continue_bit_for_bit() {
     let spec = WorldSpec { scene: "floor".into(), robots: vec![placement], objects: vec![] };
     let world = || {
         let mut world = World::new(&spec).unwrap();
-        world.set_locomotion(0, Box::new(Agile::new(network.clone())));
+        world.set_locomotion(0, Box::new(Agile::new(network.clone(), true)));
         world
     };
     let mut first = world();

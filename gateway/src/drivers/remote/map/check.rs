@@ -227,16 +227,8 @@ fn check_history(history: &HistorySpan) -> Result<(), String> {
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
-
     use super::*;
-    use crate::drivers::remote::map::MapError;
-
-    fn read(text: &str) -> Result<PolicyMap, MapError> {
-        let file = tempfile::NamedTempFile::new().unwrap();
-        fs::write(file.path(), text).unwrap();
-        PolicyMap::find(&file.path().display().to_string())
-    }
+    use crate::drivers::remote::map::tests::read;
 
     fn check(text: &str, says: &str) {
         let told = read(&format!("preset = \"openpi\"\n{text}")).unwrap_err().to_string();

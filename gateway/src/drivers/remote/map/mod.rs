@@ -335,7 +335,8 @@ pub fn preset(name: &str) -> Option<&'static str> {
 mod tests {
     use super::*;
 
-    fn read(text: &str) -> Result<PolicyMap, MapError> {
+    /// The map of a file that holds this.
+    pub(super) fn read(text: &str) -> Result<PolicyMap, MapError> {
         let file = tempfile::NamedTempFile::new().unwrap();
         fs::write(file.path(), text).unwrap();
         PolicyMap::find(&file.path().display().to_string())

@@ -1,0 +1,14 @@
+//! A robot for tests of a simulator that fails.
+
+use std::path::Path;
+
+use tandem_episodes::RobotFile;
+
+/// The embedded robot with one absurd joint: standing still it does nothing, and to move it takes more torque than numbers
+/// of single precision can say.
+pub fn write_absurd_robot(path: &Path) {
+    let sound = RobotFile::default().read().unwrap();
+    let elbow = sound.lines().find(|line| line.contains(r#"<position name="right_elbow_joint""#)).unwrap();
+    let absurd = r#"<position name="right_elbow_joint" joint="right_elbow_joint" kp="1e38" kv="1e38" forcerange="-1e38 1e38"/>"#;
+    std::fs::write(path, sound.replace(elbow, absurd)).unwrap();
+}
