@@ -3,7 +3,9 @@
 use tandem_tools_spec::{Assistance, Brief, Hints, Wording};
 
 const FRAMES: &str = "Poses of wrists and camera, and points of query_depth, are in the robot's own pelvis frame as it is at that \
-    moment: x forward, y left, z up, metres. Quaternions are [w, x, y, z].";
+    moment: x forward, y left, z up, metres. Quaternions are [w, x, y, z]. A robot walks with bent knees: while it steps its pelvis \
+    is 0.62 to 0.68 m high, whatever height is commanded, and rises to that height when it stands. What its hands hold sinks and \
+    rises along.";
 
 const PARTNERS: &str = "The pelvis frames of different robots are unrelated. To relate two of them, find the same two points, well \
     apart, with query_depth of both robots: robots stand upright, so a turn about z and a shift take the points of the one to \

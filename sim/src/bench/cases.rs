@@ -30,14 +30,27 @@ pub(super) enum Plan {
 /// What else happens.
 pub(super) enum Disturbance {
     None,
-    /// A steady force on each hand.
+    /// A steady force on each hand, in a direction that the seed draws.
     Pull {
         force_n: f32,
+    },
+    /// A level force on each of these hands, in the direction of the seed (ten of them), until `end_s`.
+    LevelPull {
+        force_n: f32,
+        hands: PulledHands,
+        end_s: f32,
     },
     /// One second at the torso, in the direction of the seed (eight of them).
     Push {
         force_n: f32,
     },
+}
+
+#[derive(Clone, Copy)]
+pub(super) enum PulledHands {
+    Both,
+    /// The left one for even seeds, the right one for odd ones.
+    One,
 }
 
 pub(super) const STOP_S: f32 = 5.0;
@@ -56,13 +69,24 @@ const fn moving(name: &'static str, [vx_m_s, vy_m_s, yaw_rate_rad_s]: [f32; 3]) 
     Case { name, duration_s: 21.0 + STOP_S, plan: Plan::Move(velocity), ..HOLD }
 }
 
-pub const CASES: [Case; 25] = [
+/// A robot that stands is pulled by its hands for so long, and is looked at when it has been left alone again.
+const LONG_PULL_END_S: f32 = 20.0;
+const SHORT_PULL_END_S: f32 = 4.0;
+
+const fn pulled(name: &'static str, force_n: f32, hands: PulledHands, end_s: f32) -> Case {
+    Case { name, disturbance: Disturbance::LevelPull { force_n, hands, end_s }, ..HOLD }
+}
+
+pub const CASES: [Case; 28] = [
     Case { name: "stand", ..HOLD },
     Case { name: "stand_waving", duration_s: 60.0, arms: Arms::Waving, ..HOLD },
     Case { name: "stand_1kg", hand_load_kg: 1.0, ..HOLD },
     Case { name: "stand_2kg", hand_load_kg: 2.0, ..HOLD },
     Case { name: "stand_3kg", hand_load_kg: 3.0, ..HOLD },
     Case { name: "stand_pull_15n", disturbance: Disturbance::Pull { force_n: 15.0 }, ..HOLD },
+    pulled("stand_pull_25n", 25.0, PulledHands::Both, LONG_PULL_END_S),
+    pulled("stand_pull_25n_one_hand", 25.0, PulledHands::One, LONG_PULL_END_S),
+    pulled("stand_pull_40n", 40.0, PulledHands::Both, SHORT_PULL_END_S),
     moving("forward_0.4", [0.4, 0.0, 0.0]),
     moving("forward_0.2", [0.2, 0.0, 0.0]),
     moving("backward_0.3", [-0.3, 0.0, 0.0]),

@@ -7,11 +7,14 @@ use super::tour::Leg;
 use crate::CONTROL_DT_S as DT_S;
 use crate::locomotion::{BaseCommand, BaseVelocity};
 use crate::plane::flat;
+use crate::{Side, Sides};
 
 /// Arms rise and loads swing out before anything is asked or measured.
 pub(super) const SETTLE_S: f32 = 2.0;
 /// A velocity is measured after the start of motion has faded.
 const RAMP_S: f32 = 2.0;
+/// A foot that is so much higher than at the start is in the air.
+const LIFTED_M: f32 = 0.015;
 
 /// What came out; see [`super::CaseReport`].
 #[derive(Clone, Debug, Default)]
@@ -24,12 +27,15 @@ pub(super) struct Trial {
     pub height_error_m: Option<f32>,
     pub standing_after_s: Option<f32>,
     pub still_after_s: Option<f32>,
+    pub steps: Option<u32>,
     pub power_w: f32,
 }
 
 /// One control step of the log.
 pub(super) struct Sample {
     pub pelvis_m: Vector,
+    /// Ankle roll links.
+    pub feet_m: Sides<Vector>,
     /// Unwrapped.
     pub heading_rad: f32,
     pub command: BaseCommand,
@@ -48,6 +54,8 @@ pub(super) fn measure(case: &Case, log: &[Sample], legs: &[Leg], trial: &mut Tri
             }
             trial.sway_m = Some((high.x - low.x).max(high.y - low.y));
             trial.final_drift_m = Some(flat(log[end].pelvis_m - log[0].pelvis_m).length());
+            trial.heading_error_deg = Some((log[end].heading_rad - log[0].heading_rad).abs().to_degrees());
+            trial.steps = Some(steps(log));
         }
         Plan::Move(velocity) => {
             let stop = at(case.duration_s - STOP_S);
@@ -55,6 +63,7 @@ pub(super) fn measure(case: &Case, log: &[Sample], legs: &[Leg], trial: &mut Tri
             let turned_rad = velocity.yaw_rate_rad_s * (stop - start) as f32 * DT_S;
             trial.heading_error_deg =
                 Some((log[end].heading_rad - log[start].heading_rad - turned_rad).abs().to_degrees());
+            trial.height_error_m = Some(walking_height_error_m(&log[at(SETTLE_S + RAMP_S)..stop]));
             trial.standing_after_s = Some(slower_after_s(&log[stop..], 0.1));
             trial.still_after_s = Some(slower_after_s(&log[stop..], 0.02));
         }
@@ -74,6 +83,20 @@ pub(super) fn measure(case: &Case, log: &[Sample], legs: &[Leg], trial: &mut Tri
         };
         trial.height_error_m = ends.iter().map(error_m).reduce(f32::max);
     }
+}
+
+/// How often a foot left the ground.
+fn steps(log: &[Sample]) -> u32 {
+    let lifted = |sample: &Sample, side: Side| sample.feet_m[side].z - log[0].feet_m[side].z > LIFTED_M;
+    let lifts =
+        |side: Side| log.windows(2).filter(|pair| !lifted(&pair[0], side) && lifted(&pair[1], side)).count();
+    Side::BOTH.into_iter().map(|side| lifts(side) as u32).sum()
+}
+
+/// How far the mean height of the pelvis over a walk is from the commanded one.
+fn walking_height_error_m(log: &[Sample]) -> f32 {
+    let error_m = |sample: &Sample| sample.pelvis_m.z - sample.command.pelvis_height_m;
+    (log.iter().map(error_m).sum::<f32>() / log.len() as f32).abs()
 }
 
 /// Largest deviation of the mean velocity in the heading frame, as a part of the commanded speed (m/s or rad/s).

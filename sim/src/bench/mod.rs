@@ -57,6 +57,8 @@ pub struct CaseReport {
     /// From the zero command until the pelvis stays slower than 0.1 m/s, and than 0.02 m/s.
     pub standing_after_s: Option<f32>,
     pub still_after_s: Option<f32>,
+    /// How often a foot left the ground while the robot was to stand.
+    pub steps: Option<u32>,
     /// The most that what robots carried between them was ever tilted.
     pub load_tilt_deg: Option<f32>,
     /// Mean absolute mechanical power of all joints.
@@ -143,6 +145,7 @@ fn summarise(case: &Case, trials: &[Trial]) -> CaseReport {
         height_error_m: worst(|trial| trial.height_error_m),
         standing_after_s: worst(|trial| trial.standing_after_s),
         still_after_s: worst(|trial| trial.still_after_s),
+        steps: standing.iter().filter_map(|trial| trial.steps).max(),
         power_w: mean(|trial| Some(trial.power_w)).unwrap_or(0.0),
         ..CaseReport::of(case.name, trials.len())
     }
@@ -150,7 +153,7 @@ fn summarise(case: &Case, trials: &[Trial]) -> CaseReport {
 
 impl CaseReport {
     /// Column heads of [`CaseReport`]'s lines.
-    pub const HEAD: &str = "case                        alive  v err  heading    drift     sway   height  stands  still   tilt  power";
+    pub const HEAD: &str = "case                        alive  v err  heading    drift     sway   height  stands  still  steps   tilt  power";
 
     /// The report of a case in which nothing has been measured yet.
     pub fn of(case: &str, seeds: usize) -> CaseReport {
@@ -165,6 +168,7 @@ impl CaseReport {
             height_error_m: None,
             standing_after_s: None,
             still_after_s: None,
+            steps: None,
             load_tilt_deg: None,
             power_w: 0.0,
         }
@@ -178,7 +182,7 @@ impl fmt::Display for CaseReport {
         };
         write!(
             f,
-            "{:26} {:>2}/{:<2}  {:>5}  {:>7}  {:>7}  {:>7}  {:>7}  {:>6}  {:>5}  {:>5}  {:>5}",
+            "{:26} {:>2}/{:<2}  {:>5}  {:>7}  {:>7}  {:>7}  {:>7}  {:>6}  {:>5}  {:>5}  {:>5}  {:>5}",
             self.case,
             self.survived,
             self.seeds,
@@ -189,6 +193,7 @@ impl fmt::Display for CaseReport {
             show(self.height_error_m, 100.0, "cm"),
             show(self.standing_after_s, 1.0, "s"),
             show(self.still_after_s, 1.0, "s"),
+            self.steps.map_or("-".into(), |steps| steps.to_string()),
             show(self.load_tilt_deg, 1.0, "°"),
             show(Some(self.power_w), 1.0, "W"),
         )

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use rapier3d::math::Vector;
 
-use super::cases::{Case, Disturbance, Plan, STOP_S};
+use super::cases::{Case, Disturbance, Plan, PulledHands, STOP_S};
 use super::measure::{SETTLE_S, Sample, Trial, measure};
 use super::motion::ArmMotion;
 use super::tour::{self, Leg};
@@ -39,6 +39,7 @@ pub(super) fn run(
         world.load_hand(0, side, case.hand_load_kg, PALM_IN_WRIST_M);
     }
     let rest = world.rest_command(0);
+    let feet = world.robots()[0].model.soles.each_ref().map(|sole| sole.link);
     let mut robot = world.present().robots.remove(0);
     let mut log: Vec<Sample> = Vec::new();
     let mut trial = Trial::default();
@@ -56,6 +57,7 @@ pub(super) fn run(
         let upper_rad = arms.at(&rest.upper_rad, time_s);
         work_j += robot.sensed.power_w() * DT_S;
         log.push(Sample {
+            feet_m: feet.map(|link| robot.truth.world_from_link[link].translation),
             pelvis_m: robot.truth.world_from_pelvis().translation,
             heading_rad,
             command: base,
@@ -99,14 +101,20 @@ fn base_command(
 }
 
 fn disturb(case: &Case, world: &mut World, seed: u32, direction: Vector, legs: &[Leg], time_s: f32) {
+    let pulled_s = time_s - 0.5 * SETTLE_S;
     match &case.disturbance {
-        Disturbance::Pull { force_n } if time_s > 0.5 * SETTLE_S => {
-            for side in Side::BOTH {
-                let model = &world.robots()[0].model;
-                let link = model.links[model.hands[side].wrist].name.clone();
-                let force_n = direction * (force_n * (time_s - 0.5 * SETTLE_S).min(1.0));
-                world.push(0, &link, PALM_IN_WRIST_M, force_n);
-            }
+        Disturbance::Pull { force_n } if pulled_s > 0.0 => {
+            pull(world, &Side::BOTH, direction * (force_n * pulled_s.min(1.0)));
+        }
+        Disturbance::LevelPull { force_n, hands, end_s } if pulled_s > 0.0 && time_s < *end_s => {
+            let angle = TAU * seed as f32 / 10.0;
+            let sides: &[Side] = match hands {
+                PulledHands::Both => &Side::BOTH,
+                PulledHands::One if seed % 2 == 0 => &[Side::Left],
+                PulledHands::One => &[Side::Right],
+            };
+            let towards = Vector::new(angle.cos(), angle.sin(), 0.0);
+            pull(world, sides, towards * (force_n * pulled_s.min(1.0)));
         }
         Disturbance::Push { force_n } if (5.0..5.0 + PUSH_S).contains(&time_s) => {
             let angle = TAU * seed as f32 / 8.0;
@@ -121,6 +129,15 @@ fn disturb(case: &Case, world: &mut World, seed: u32, direction: Vector, legs: &
         if (0.0..tour.punch_s - 0.5 * DT_S).contains(&within_s) {
             world.push(0, legs[leg].punched_link, Vector::ZERO, legs[leg].punch_n);
         }
+    }
+}
+
+/// Pulls at the palms of these hands during the next control step.
+fn pull(world: &mut World, sides: &[Side], force_n: Vector) {
+    for side in sides {
+        let model = &world.robots()[0].model;
+        let link = model.links[model.hands[*side].wrist].name.clone();
+        world.push(0, &link, PALM_IN_WRIST_M, force_n);
     }
 }
 

@@ -30,6 +30,21 @@ fn walks_as_commanded_and_stops() {
     }
 }
 
+/// What the brief and the tools tell of the pelvis of a robot that steps: 0.62 to 0.68 m, whatever is commanded.
+#[test]
+fn walks_as_high_as_policies_are_told() {
+    let (mut world, mut command) = walking();
+    for (vx_m_s, vy_m_s) in [(0.4, 0.0), (0.0, 0.3), (-0.3, 0.0)] {
+        (command.base.vx_m_s, command.base.vy_m_s) = (vx_m_s, vy_m_s);
+        for step in 0..150 {
+            let present = world.control_step(&[command]).expect("it stays finite");
+            let height_m = present.robots[0].truth.world_from_pelvis().translation.z;
+            assert!(step < 50 || (0.62..0.68).contains(&height_m), "{height_m} m at {vx_m_s}, {vy_m_s} m/s");
+        }
+    }
+    assert!(command.base.pelvis_height_m > 0.75, "it was told to stand high");
+}
+
 /// Seed 0 is pushed forward, seed 1 obliquely.
 #[test]
 fn stays_on_its_feet_under_pushes_and_pulls() {
