@@ -122,7 +122,7 @@ fn walked_m(robot: RobotModel) -> f32 {
     let rest = world.rest_command(0);
     let mut deepest_m = 0.0_f32;
     for _ in 0..200 {
-        let mut command = rest.clone();
+        let mut command = rest;
         command.base.vx_m_s = 0.3;
         let step = world.control_step(&[command]).expect("it stays finite");
         for sole in robot.soles.iter() {
