@@ -25,8 +25,8 @@ fn documents_weigh_objects_as_their_files_do() {
             for stated in stated_kg(text) {
                 // Or of what a part is made of, as a comment in an object's file has it.
                 let explained = |spot: &ObjectSpot| file(spot).contains(&format!("{} kg of ", stated.text));
-                let known = masses_kg.iter().any(|mass_kg| stated.is(*mass_kg))
-                    || task.objects.iter().any(explained);
+                let known =
+                    masses_kg.iter().any(|mass_kg| stated.is(*mass_kg)) || task.objects.iter().any(explained);
                 assert!(
                     known,
                     "the {place} of {} says {} kg; objects have {masses_kg:?}",
