@@ -76,7 +76,7 @@ pub struct Layer {
     /// For experiments: whether texts say how to grasp, whatever the assistance has.
     #[arg(long, hide = true, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = one_of(Hints::ALL, Hints::name))]
     pub hints: Option<Hints>,
-    /// Episodes that may be held at once; each costs a thread and about 8 MB [default: 8].
+    /// Episodes that may be held at once; each costs a thread and about 7 MB, beside 40 MB that they share [default: 8].
     #[arg(long, env = "TANDEM_MAX_EPISODES", value_name = "N")]
     pub max_episodes: Option<u32>,
     /// Largest request body that is read [default: 2000000].

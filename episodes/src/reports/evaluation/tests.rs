@@ -171,6 +171,74 @@ fn departures_stand_behind_the_name() {
     }
 }
 
+/// What a policy was shown in some of its episodes is named and counted, and makes no other policy of it.
+#[test]
+fn what_was_shown_beyond_the_benchmark_is_told() {
+    let mut episodes = nine_six_three("agent");
+    for played in &mut episodes {
+        played.spec = played.spec.clone().assisted(Assistance::Paper);
+        played.result.assistance = Assistance::Paper;
+    }
+    let replies = |count: u32| [("A".to_owned(), count), ("B".to_owned(), 1)].into_iter().collect();
+    for played in &mut episodes[..2] {
+        played.result.extra_information = vec!["pixel_depth".into()];
+        played.result.extra_information_replies = [("pixel_depth".to_owned(), replies(3))].into();
+    }
+    let mut told_all = played("other", tasks::find("handover").unwrap(), 0, 2);
+    told_all.result.extra_information = vec!["depth_images".into(), "odometry".into()];
+    episodes.push(told_all);
+    let report = EvaluationReport::of(&found(episodes));
+    let names: Vec<&str> = report.policies.iter().map(|policy| policy.name.as_str()).collect();
+    // That `full` tells odometry need not be said beside it.
+    assert_eq!(names, ["agent + pixel_depth", "other + depth_images + assistance: full"]);
+    let shown = |policy: &PolicyReport| -> Vec<(String, usize, Vec<u32>)> {
+        let shown = policy.shown.iter();
+        shown.map(|s| (s.what.clone(), s.episodes, s.replies.values().copied().collect())).collect()
+    };
+    assert_eq!(shown(&report.policies[0]), [("pixel_depth".into(), 2, vec![6, 2])]);
+    let other = [("depth_images".to_owned(), 1, vec![]), ("odometry".to_owned(), 1, vec![])];
+    assert_eq!(shown(&report.policies[1]), other);
+    let text = report.write(ReportFormat::Markdown, &ReportPictures::default()).unwrap();
+    assert!(text.contains("| agent + pixel_depth | pixel depth | A 6, B 2 | 2/10 |"), "{text}");
+    let page = report.write(ReportFormat::Html, &ReportPictures::default()).unwrap();
+    assert!(page.contains("Shown beyond the benchmark") && page.contains("A 6, B 2"), "{page}");
+}
+
+/// Tasks of three robots have means of their own, in every form.
+#[test]
+fn means_of_phases_are_by_number_of_robots() {
+    let begun = |task: &str, seed: u32, phase: usize, phases: usize| {
+        let mut played = played("agent", tasks::find(task).unwrap(), seed, phases);
+        let recording = "demonstration".into();
+        played.spec.start = Start::Phase(PhaseStart { recording, phase: crate::Phase::number(phase) });
+        played
+    };
+    let mut episodes = nine_six_three("agent");
+    episodes.extend([begun("handover", 0, 1, 2), begun("big_table", 0, 0, 1), begun("big_table", 1, 0, 0)]);
+    episodes.push(played("agent", tasks::find("big_table").unwrap(), 2, 1));
+    let report = EvaluationReport::of(&found(episodes));
+    let policy = &report.policies[0];
+    let conditional: Vec<(usize, Option<f64>)> =
+        policy.together.iter().map(|m| (m.robots, m.together.as_ref().map(|m| m.mean_share))).collect();
+    assert_eq!(conditional, [(2, Some(6.0 / 9.0)), (3, Some(0.5))]);
+    let level = policy.phase_level.as_ref().unwrap();
+    assert_eq!(level.two_robots.collaborative_share, Some(1.0));
+    assert_eq!(level.three_robots.as_ref().unwrap().collaborative_share, Some(0.5));
+    let text = report.write(ReportFormat::Markdown, &ReportPictures::default()).unwrap();
+    let lines: Vec<&str> = text.lines().filter(|line| line.contains("| of ")).collect();
+    let begins: Vec<String> = lines
+        .iter()
+        .map(|line| line.split('|').skip(2).take(2).map(str::trim).collect::<Vec<_>>().join(", "))
+        .collect();
+    let rates = ["conditional", "from their beginnings"];
+    let expected = rates.map(|rates| [2, 3].map(|robots| format!("of {robots} robots, {rates}"))).concat();
+    assert_eq!(begins, expected, "{text}");
+    let page = report.write(ReportFormat::Html, &ReportPictures::default()).unwrap();
+    for label in ["Phases together, conditional, %", "Phases together, 3 robots, conditional, %"] {
+        assert!(page.contains(label), "no {label}: {page}");
+    }
+}
+
 /// Every format, of a policy whose name has to be escaped everywhere.
 #[test]
 fn reports_quote_what_they_are_told() {
@@ -284,6 +352,11 @@ fn results_of_earlier_versions_are_read() {
         None,
         "it is written only where it is set"
     );
+    // They say of disclosure and hints alone what policies were told, or nothing.
+    let spec = old["spec"].as_object_mut().unwrap();
+    assert!(spec.remove("assistance").is_some() && spec.remove("hints").is_some());
+    spec.insert("disclosure".into(), "end".into());
+    assert!(old.as_object_mut().unwrap().remove("assistance").is_some());
     old["note"] = "the program ended without a call, before its episode did (exit status: 127)".into();
     std::fs::create_dir_all(folder.path().join("episodes")).unwrap();
     std::fs::write(folder.path().join("episodes/handover-4.json"), old.to_string()).unwrap();
@@ -293,6 +366,7 @@ fn results_of_earlier_versions_are_read() {
         (loaded.skipped.len(), report.policies[0].episodes, report.policies[0].excluded.len()),
         (0, 1, 0)
     );
+    assert_eq!(report.policies[0].name, "agent + assistance: full + phases told: end");
 }
 
 #[test]
