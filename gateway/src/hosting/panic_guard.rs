@@ -20,7 +20,7 @@ pub struct PanicGuard {
 enum GuardState {
     Sound(Box<Session>),
     /// After a panic the world may be anything, and nobody looks at it again. The result is of what could be closed.
-    Panicked(Option<ResultReply>),
+    Panicked(Option<Box<ResultReply>>),
 }
 
 impl PanicGuard {
@@ -89,7 +89,7 @@ impl PanicGuard {
                 self.metrics.end(reason);
                 result
             }
-            GuardState::Panicked(result) => result.ok_or(HostingError::EpisodePanicked),
+            GuardState::Panicked(result) => result.map(|result| *result).ok_or(HostingError::EpisodePanicked),
         }
     }
 
@@ -103,7 +103,7 @@ impl PanicGuard {
         // The broken world may panic once more under way; what is flushed by then can be read nevertheless.
         let why = format!("by a panic: {}", text(&*panic));
         match closed(|| session.close_failed(why)) {
-            Ok(result) => self.state = GuardState::Panicked(Some(result)),
+            Ok(result) => self.state = GuardState::Panicked(Some(Box::new(result))),
             Err(panic) => tracing::error!(panic = text(&*panic), "not closed"),
         }
     }
