@@ -5,7 +5,7 @@
 use std::{env, fs, path::Path};
 
 use serde_json::{Value, json};
-use tandem_tools_spec::{Format, Hints, ToolSpec, openapi, tool_specs};
+use tandem_tools_spec::{Assistance, Format, Hints, ToolSpec, openapi, tool_specs};
 
 /// Compares `face` with the file `name`, or writes the file.
 fn check(name: &str, face: &Value) {
@@ -32,13 +32,22 @@ fn tools_in_every_format() {
     }
 }
 
+/// The tools of `other` that differ from those of `one`.
+fn differing(one: Vec<ToolSpec>, other: Vec<ToolSpec>) -> Value {
+    let differ = one.into_iter().zip(other).filter(|(one, other)| one != other);
+    differ.map(|(_, other)| json!(other)).collect()
+}
+
 /// What hints say is kept apart: with them only the texts differ.
 #[test]
 fn tools_without_hints() {
-    let without: Vec<ToolSpec> = tool_specs(Hints::Off);
-    let differ = tool_specs(Hints::On).into_iter().zip(without).filter(|(with, without)| with != without);
-    let texts: Vec<Value> = differ.map(|(_, without)| json!(without)).collect();
-    check("without_hints", &json!(texts));
+    check("without_hints", &differing(tool_specs(Hints::On), tool_specs(Hints::Off)));
+}
+
+/// What is told under `paper` is said in other texts.
+#[test]
+fn tools_of_paper() {
+    check("paper", &differing(tool_specs(Hints::Off), tool_specs(Assistance::Paper)));
 }
 
 /// That robots have equally many rows is said in fifty alternatives, of which three are kept.
