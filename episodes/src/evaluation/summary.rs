@@ -1,6 +1,6 @@
 //! How the episodes went: counts per task, and the intervals that counts of this size leave open.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 use tandem_sim::Sensing;
@@ -39,6 +39,9 @@ pub struct Evaluation {
     /// What was not as the benchmark has it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub departures: Vec<String>,
+    /// What the policy was shown in any episode that the benchmark's own policies are not.
+    #[serde(skip_serializing_if = "BTreeSet::is_empty")]
+    pub extra_information: BTreeSet<String>,
     /// How the episodes went that began at their task's beginning.
     pub tasks: BTreeMap<String, TaskSummary>,
     /// How those went that began at a phase.
@@ -87,6 +90,7 @@ pub fn summarise(cache: &EpisodeCache, episodes: Vec<PlayedEpisode>, left_out: V
         sensing: cache.plan.sensing,
         assistance: cache.plan.assistance,
         departures: cache.plan.departures(),
+        extra_information: episodes.iter().flat_map(|played| played.result.extra_information.clone()).collect(),
         tasks,
         phase_level: PhaseLevel::of(episodes.iter()),
         left_out,

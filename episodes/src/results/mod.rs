@@ -127,8 +127,9 @@ pub struct PolicyCard {
     /// How it is reached and driven, as far as its name does not say it.
     #[serde(rename = "policy_settings", default, skip_serializing_if = "Option::is_none")]
     pub settings: Option<Value>,
-    /// What it is shown beyond what the robots themselves see and feel.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    /// What it asks to be shown that the benchmark's own policies are not. A result, which stands beside it in files, says by the
+    /// plain name what was shown.
+    #[serde(rename = "policy_extra_information", default, skip_serializing_if = "Vec::is_empty")]
     pub extra_information: Vec<String>,
 }
 
@@ -223,6 +224,28 @@ mod tests {
         let names: Vec<_> =
             fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
         assert_eq!(names, ["result.json"], "no partial file stays behind");
+    }
+
+    /// A policy's card and its result stand in one object.
+    #[test]
+    fn what_a_policy_asks_for_and_what_it_was_shown_are_kept_apart() {
+        let mut result = result(None);
+        result.extra_information = vec!["odometry".into(), "third_person".into()];
+        let card = PolicyCard { extra_information: vec!["third_person".into()], ..PolicyCard::from("agent") };
+        for policy in [card, "agent".into()] {
+            let played = PlayedEpisode {
+                policy,
+                spec: EpisodeSpec::new(crate::tasks::find("handover").unwrap(), 3, Protocol::Agentic),
+                locomotion: "balance".into(),
+                build: "test".into(),
+                result: result.clone(),
+                thought_s: 0.0,
+                note: None,
+                keep_failed: false,
+            };
+            let text = serde_json::to_string(&played).unwrap();
+            assert_eq!(serde_json::from_str::<PlayedEpisode>(&text).unwrap(), played);
+        }
     }
 
     #[test]
