@@ -90,7 +90,10 @@ pub fn summarise(cache: &EpisodeCache, episodes: Vec<PlayedEpisode>, left_out: V
         sensing: cache.plan.sensing,
         assistance: cache.plan.assistance,
         departures: cache.plan.departures(),
-        extra_information: episodes.iter().flat_map(|played| played.result.extra_information.clone()).collect(),
+        extra_information: episodes
+            .iter()
+            .flat_map(|played| played.result.extra_information.clone())
+            .collect(),
         tasks,
         phase_level: PhaseLevel::of(episodes.iter()),
         left_out,
