@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 
 use crate::error::SpecError;
 use crate::list::{ActCall, LookCall, ToolCall, operator_tool_specs};
-use crate::parts::{Assistance, Driving, Formats, Wording};
+use crate::parts::{Driving, Formats, Wording};
 use crate::schema::{ToolSpec, body_schema, plain_schema};
 use crate::strict_value::StrictValue;
 use crate::tool::{Tool, parse_args};
@@ -162,16 +162,17 @@ fn beside<T: DeserializeOwned + Default>(
 
 /// Every tool, with what programs may send beside its arguments in the schema of its body.
 pub fn specs_for_programs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
+    let wording = wording.into();
     let mut specs = operator_tool_specs(wording);
     for spec in &mut specs {
         match spec.name {
             StartEpisode::NAME => {
-                spec.allow(&properties::<Driving>());
+                spec.allow(&properties::<Driving>(wording));
                 spec.demand_one_of(Driving::conditions());
             }
-            Observe::NAME => spec.allow(&properties::<Formats>()),
+            Observe::NAME => spec.allow(&properties::<Formats>(wording)),
             name if ActCall::TOOLS.contains(&name) => {
-                spec.allow(&properties::<WithCommand>());
+                spec.allow(&properties::<WithCommand>(wording));
                 let mut observation = plain_schema::<Observation>();
                 observation["description"] =
                     json!("What is seen after the command; left out where it did not ask.");
@@ -183,20 +184,24 @@ pub fn specs_for_programs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
     specs
 }
 
-fn properties<T: JsonSchema>() -> Map<String, Value> {
-    let mut schema = body_schema::<T>(Wording::from(Assistance::Full));
+fn properties<T: JsonSchema>(wording: Wording) -> Map<String, Value> {
+    properties_of(body_schema::<T>(wording))
+}
+
+fn properties_of(mut schema: Value) -> Map<String, Value> {
     schema["properties"].as_object_mut().map(std::mem::take).unwrap_or_default()
 }
 
-/// What `observe` may hold beside a command.
+/// What `observe` may hold beside a command. The command's own schema is still to be worded, and this with it.
 fn observe_properties() -> Value {
-    json!(properties::<Observe>().into_iter().chain(properties::<Formats>()).collect::<Map<_, _>>())
+    let own = properties_of(plain_schema::<Observe>()).into_iter();
+    json!(own.chain(properties_of(plain_schema::<Formats>())).collect::<Map<_, _>>())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parts::{DepthFormat, ImageFormat, Operators};
+    use crate::parts::{Assistance, DepthFormat, ImageFormat, Operators};
     use crate::tools::{GetRobotState, GetStatus, MoveWrists, Say, Wait, WristMove};
 
     fn looking(robots: &[&str]) -> Look {

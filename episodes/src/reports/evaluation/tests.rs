@@ -16,7 +16,7 @@ fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Played
     let ended = if phases == task.phases.len() { EndReason::TaskComplete } else { EndReason::Finished };
     PlayedEpisode {
         policy: policy.into(),
-        spec: EpisodeSpec::new(task, seed, Protocol::Benchmark),
+        spec: EpisodeSpec::new(task, seed, Protocol::Benchmark).assisted(Assistance::Paper),
         locomotion: "balance".into(),
         build: "0.1.0+test".into(),
         result: ResultReply {
@@ -31,7 +31,7 @@ fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Played
             realtime_factor: 3.5,
             state_hash: format!("{seed:016x}"),
             simulator_failure: None,
-            assistance: Assistance::Full,
+            assistance: Assistance::Paper,
             extra_information: vec![],
             extra_information_replies: Default::default(),
             departures: vec![],
@@ -158,13 +158,13 @@ fn namesakes_are_told_apart_by_what_differs() {
 fn departures_stand_behind_the_name() {
     let [one, mut other] = [nine_six_three("agent"), nine_six_three("agent")];
     other.iter_mut().for_each(|played| {
-        played.spec.hints = tandem_tools_spec::Hints::Off;
+        played.spec.hints = tandem_tools_spec::Hints::On;
         played.spec.locomotion = crate::spec::Controller::File("policies/fast.onnx".into());
         played.spec.sensing = tandem_sim::Sensing::TRUTH;
     });
     let report = EvaluationReport::of(&found([one, other].concat()));
     let names: Vec<&str> = report.policies.iter().map(|policy| policy.name.as_str()).collect();
-    assert_eq!(names, ["agent", "agent + hints: off + controller: fast.onnx + state estimate: truth"]);
+    assert_eq!(names, ["agent", "agent + hints: on + controller: fast.onnx + state estimate: truth"]);
     for format in ReportFormat::ALL {
         let text = report.write(format, &ReportPictures::default()).unwrap();
         assert!(text.contains(names[1]), "{format:?}: {text}");
@@ -175,16 +175,13 @@ fn departures_stand_behind_the_name() {
 #[test]
 fn what_was_shown_beyond_the_benchmark_is_told() {
     let mut episodes = nine_six_three("agent");
-    for played in &mut episodes {
-        played.spec = played.spec.clone().assisted(Assistance::Paper);
-        played.result.assistance = Assistance::Paper;
-    }
     let replies = |count: u32| [("A".to_owned(), count), ("B".to_owned(), 1)].into_iter().collect();
     for played in &mut episodes[..2] {
         played.result.extra_information = vec!["pixel_depth".into()];
         played.result.extra_information_replies = [("pixel_depth".to_owned(), replies(3))].into();
     }
     let mut told_all = played("other", tasks::find("handover").unwrap(), 0, 2);
+    told_all.spec = told_all.spec.assisted(Assistance::Full);
     told_all.result.extra_information = vec!["depth_images".into(), "odometry".into()];
     episodes.push(told_all);
     let report = EvaluationReport::of(&found(episodes));

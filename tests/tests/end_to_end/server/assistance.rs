@@ -45,7 +45,9 @@ fn full_fields(reply: &Value) -> Vec<&'static str> {
     let mut found: Vec<&'static str> = match reply {
         Value::Object(object) => {
             let own = FULL_FIELDS.into_iter().filter(|field| object.contains_key(*field));
-            own.chain(object.values().flat_map(full_fields)).collect()
+            // A result counts what was told by its name.
+            let inner = object.iter().filter(|(name, _)| *name != "extra_information_replies");
+            own.chain(inner.flat_map(|(_, value)| full_fields(value))).collect()
         }
         Value::Array(items) => items.iter().flat_map(full_fields).collect(),
         Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => Vec::new(),
