@@ -101,19 +101,23 @@ mod tests {
             |what: &str| assert!(grasping.contains(what), "the brief does not say `{what}`: {grasping}");
         let thumb = |angles: [f32; 7]| told(&format!("[{}, {}, {}]", angles[0], angles[1], angles[2]));
         let fingers = |angles: [f32; 7]| told(&format!("[{}, {}]", angles[3], angles[4]));
-        for hold in [Hold::EDGE, Hold::RIM, Hold::WALL] {
+        for hold in [Hold::EDGE, Hold::RIM, Hold::WALL, Hold::LEG] {
             thumb(hold.closed_rad);
             fingers(hold.closed_rad);
             assert_eq!(hold.closed_rad[3..5], hold.closed_rad[5..7], "both fingers alike");
         }
         thumb(Hold::EDGE.open_rad);
         let rounded = |length_m: f32| (length_m * 1000.0).round() / 1000.0;
-        let [edge_m, rim_m, wall_m] = [Hold::EDGE, Hold::RIM, Hold::WALL].map(|hold| hold.place_in_wrist_m);
+        let [edge_m, rim_m, wall_m, leg_m] =
+            [Hold::EDGE, Hold::RIM, Hold::WALL, Hold::LEG].map(|hold| hold.place_in_wrist_m);
         told(&format!("{} m before the edge and {} m above the top", edge_m.x, rounded(edge_m.y - PLATE_M)));
         told(&format!("{} m farther off and {} m higher", Hold::EDGE.stops_m[0].x, Hold::EDGE.stops_m[0].y));
         told(&format!("{} m before its middle and {} m above it", rim_m.x, rim_m.y));
         told(&format!("{} m above the rim and {} m beside", wall_m.x, wall_m.y));
-        told(&format!("{} m behind those on a bin", Hold::WALL.behind_m));
+        told(&format!("{} m before the middle of the leg and {} m beside it", leg_m.x, leg_m.y));
+        told(&format!("{} m farther out and {} m lower", Hold::LEG.stops_m[0].y, Hold::LEG.stops_m[0].z));
+        told(&format!("{} m behind those on legs or on a bin", Hold::WALL.behind_m));
+        assert_eq!(Hold::LEG.behind_m, Hold::WALL.behind_m, "legs and bins are told as one");
         for hold in [Hold::EDGE, Hold::ROUND_EDGE, Hold::RIM] {
             assert!((hold.behind_m - 0.3).abs() < 0.025, "0.3 m behind the places of both hands");
         }
