@@ -1,11 +1,9 @@
 //! Sessions on real physics.
 
-mod assistance;
 mod at_rest;
 mod checkpoints;
 mod commands;
 mod common;
-mod endings;
 mod films;
 mod hands;
 mod operators;
@@ -14,3 +12,4 @@ mod replays;
 mod scenes;
 #[path = "../../../tests/src/skipped.rs"]
 mod skipped;
+mod told;

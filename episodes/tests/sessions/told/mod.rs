@@ -1,0 +1,4 @@
+//! What a policy is told, under way and at the end.
+
+mod assistance;
+mod endings;
