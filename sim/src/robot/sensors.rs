@@ -162,17 +162,17 @@ impl Sensors {
     }
 }
 
-/// The readings of `part` of a step before `now`, where `before` was a step ago.
-fn between(now: &SensorReadings, before: &SensorReadings, part: f32) -> SensorReadings {
+/// The readings of `share` of a step before `now`, where `before` was a step ago.
+fn between(now: &SensorReadings, before: &SensorReadings, share: f32) -> SensorReadings {
     let mix = |now: &[f32; JOINTS], before: &[f32; JOINTS]| {
-        std::array::from_fn(|joint| now[joint] + (before[joint] - now[joint]) * part)
+        std::array::from_fn(|joint| now[joint] + (before[joint] - now[joint]) * share)
     };
     SensorReadings {
         q_rad: mix(&now.q_rad, &before.q_rad),
         qd_rad_s: mix(&now.qd_rad_s, &before.qd_rad_s),
         torque_n_m: mix(&now.torque_n_m, &before.torque_n_m),
-        gyro_rad_s: now.gyro_rad_s.lerp(before.gyro_rad_s, part),
-        specific_force_m_s2: now.specific_force_m_s2.lerp(before.specific_force_m_s2, part),
+        gyro_rad_s: now.gyro_rad_s.lerp(before.gyro_rad_s, share),
+        specific_force_m_s2: now.specific_force_m_s2.lerp(before.specific_force_m_s2, share),
     }
 }
 
