@@ -24,7 +24,10 @@ static URDF_EFFORTS: LazyLock<Option<String>> = LazyLock::new(|| {
 
 /// Text of an embedded robot file.
 pub fn robot(name: &str) -> Result<&'static str, SimError> {
-    if let (URDF_EFFORTS_ROBOT, Some(text)) = (name, URDF_EFFORTS.as_deref()) {
+    // The text is made of the default's, so it is looked at for this name alone.
+    if name == URDF_EFFORTS_ROBOT
+        && let Some(text) = URDF_EFFORTS.as_deref()
+    {
         return Ok(text);
     }
     text("robot", "robots", name, &format!("robots/{name}/robot.xml"))
