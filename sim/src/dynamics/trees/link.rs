@@ -61,6 +61,21 @@ pub struct Drive {
     pub feedforward: f64,
 }
 
+/// A drive's impulse in a step as a function of the velocity v' at its end:  rest - implicit v', within +-most. A motor that
+/// turns fast pushes less in the direction in which it turns, and brakes with all it has:
+///   impulse <= slope (speed_limit - v'),   slope = most / (0.2 speed_limit),   for v' > 0,
+/// which is all of it at 80 % of the limit and nothing at the limit. Beyond the limit, where something else turns it, its
+/// voltage is above the supply's and drives a current back: it brakes whatever it is told, with all it has from 120 % on.
+/// It holds at the end of the step as the rest does, so that no motor drives itself beyond its limit within a step, however
+/// light its link is.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DriveLaw {
+    pub rest: f64,
+    pub implicit: f64,
+    pub most: f64,
+    pub speed_limit: f64,
+}
+
 impl Drive {
     pub const NONE: Drive = Drive { target: 0.0, kp: 0.0, kd: 0.0, feedforward: 0.0 };
 }
