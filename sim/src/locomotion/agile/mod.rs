@@ -154,14 +154,14 @@ impl Locomotion for Agile {
 }
 
 /// What a policy is told so that it keeps up with the commands.
-fn keep_place(place: &mut ReferencePlace, body: &BodyEstimate, velocity: [f32; 3], dt_s: f32) -> [f32; 3] {
+fn keep_place(place: &mut ReferencePlace, body: &BodyEstimate, command: [f32; 3], dt_s: f32) -> [f32; 3] {
     let pelvis = body.world_from_pelvis();
     let pulled_down_n: f32 = body.hand_force_n.into_iter().map(|force| -force.z).sum();
     if pulled_down_n > HEAVY_N {
         *place = ReferencePlace::of(pelvis);
-        return velocity;
+        return command;
     }
-    place.follow(pelvis, velocity, dt_s)
+    place.follow(pelvis, command, dt_s)
 }
 
 /// Joint angles as they would be had the task asked for an upright waist.
