@@ -110,7 +110,7 @@ fn disturb(case: &Case, world: &mut World, seed: u32, direction: Vector, legs: &
             let angle = TAU * seed as f32 / 10.0;
             let sides: &[Side] = match hands {
                 PulledHands::Both => &Side::BOTH,
-                PulledHands::One if seed % 2 == 0 => &[Side::Left],
+                PulledHands::One if seed.is_multiple_of(2) => &[Side::Left],
                 PulledHands::One => &[Side::Right],
             };
             let towards = Vector::new(angle.cos(), angle.sin(), 0.0);

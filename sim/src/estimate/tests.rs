@@ -16,8 +16,8 @@ fn standing() -> SensorReadings {
     for side in Side::BOTH {
         let sole_m = body.world_from_soles()[side].translation;
         let carried = Vector::Z * (0.5 * model().mass_kg * GRAVITY_M_S2);
-        for joint in LEGS[side]..LEGS[side] + LEG_JOINTS {
-            torque_n_m[joint] -= body.moment_n_m(joint, sole_m, carried);
+        for (joint, torque_n_m) in torque_n_m.iter_mut().enumerate().skip(LEGS[side]).take(LEG_JOINTS) {
+            *torque_n_m -= body.moment_n_m(joint, sole_m, carried);
         }
     }
     SensorReadings {
@@ -139,8 +139,8 @@ fn a_measurement_is_josephs_form() {
         let spread = (0..ERRORS).map(|i| h[i] * ph[i]).sum::<f64>() + sigma * sigma;
         let gain: Errors =
             std::array::from_fn(|i| if considered.contains(&i) { 0.0 } else { ph[i] / spread });
-        for i in 0..ERRORS {
-            assert!((update.errors[i] - gain[i] * y).abs() < 1e-12);
+        for (error, gain) in update.errors.iter().zip(gain) {
+            assert!((error - gain * y).abs() < 1e-12);
         }
         let expected = std::array::from_fn(|i| {
             std::array::from_fn(|j| {
