@@ -17,7 +17,8 @@ const GAIN: f64 = 0.5;
 const REACH_RESTARTS: usize = 8;
 /// Hands give way by no more than this ahead and to the side (m) and about the vertical (rad). They creep back at this rate while they may
 /// give way, faster when they may no more.
-const MOST_YIELD: [f64; 3] = [0.06, 0.06, 0.15];
+const MOST_YIELD_M: f64 = 0.06;
+const MOST_YIELD_RAD: f64 = 0.15;
 const LEAK_1_S: f64 = 0.1;
 const RETURN_1_S: f64 = 3.0;
 
@@ -47,11 +48,13 @@ pub struct MotionState {
     pub(super) aims: Sides<Aim>,
     /// The pelvis as it was last sensed.
     world_from_pelvis: Isometry3<f64>,
-    /// What pulled the pair of hands, as it was last sensed: the way the robot faces and to its left (N), and about the vertical through
-    /// the middle between the wrists (N m).
-    pull: [f64; 3],
-    /// How far the hands have given way to each (m, m, rad).
-    yielded: [f64; 3],
+    /// What pulled the pair of hands, as it was last sensed: the way the robot faces and to its left, and about the vertical through the
+    /// middle between the wrists.
+    pull_n: [f64; 2],
+    turning_n_m: f64,
+    /// How far the hands have given way to each.
+    yielded_m: [f64; 2],
+    yielded_rad: f64,
     /// What the solver remembers of steps that did not help; see [`Solver::caution`].
     caution: f64,
 }
@@ -93,8 +96,10 @@ impl Motion {
             base: rest.base,
             aims: Sides::both(Aim::Joints),
             world_from_pelvis,
-            pull: [0.0; 3],
-            yielded: [0.0; 3],
+            pull_n: [0.0; 2],
+            turning_n_m: 0.0,
+            yielded_m: [0.0; 2],
+            yielded_rad: 0.0,
             caution: 1.0,
         };
         Motion { robot, solver: body.solver(), body: body.clone(), state }
@@ -106,9 +111,9 @@ impl Motion {
         let wrists = self.commanded_wrists();
         let apart_m = world_from_pelvis * wrists.left.translation.vector
             - world_from_pelvis * wrists.right.translation.vector;
-        let turning_n_m = 0.5 * apart_m.cross(&(hands_n.left - hands_n.right)).z;
         let pull_n = self.heading().inverse() * (hands_n.left + hands_n.right);
-        self.state.pull = [pull_n.x, pull_n.y, turning_n_m];
+        self.state.pull_n = [pull_n.x, pull_n.y];
+        self.state.turning_n_m = 0.5 * apart_m.cross(&(hands_n.left - hands_n.right)).z;
     }
 
     /// Level, x the way the robot faces.
@@ -121,14 +126,15 @@ impl Motion {
     ///   dy/dt = F / c - l y,   |y| <= y_max
     pub(super) fn give_way(&mut self, compliance: Compliance) {
         let Compliance { ahead_n_s_m, side_n_s_m, turn_n_m_s_rad } = compliance;
-        for (i, damping) in [ahead_n_s_m, side_n_s_m, turn_n_m_s_rad].into_iter().enumerate() {
-            let yielded = self.state.yielded[i];
-            let rate = match damping {
-                Some(damping) => self.state.pull[i] / damping - LEAK_1_S * yielded,
-                None => -RETURN_1_S * yielded,
-            };
-            self.state.yielded[i] = (yielded + rate / CONTROL_HZ).clamp(-MOST_YIELD[i], MOST_YIELD[i]);
-        }
+        let MotionState { pull_n, turning_n_m, yielded_m, yielded_rad, .. } = &mut self.state;
+        let one = |yielded: &mut f64, pull: f64, damping: Option<f64>, most: f64| {
+            let rate = damping.map_or(-RETURN_1_S * *yielded, |damping| pull / damping - LEAK_1_S * *yielded);
+            *yielded = (*yielded + rate / CONTROL_HZ).clamp(-most, most);
+        };
+        let [ahead_m, left_m] = yielded_m;
+        one(ahead_m, pull_n[0], ahead_n_s_m, MOST_YIELD_M);
+        one(left_m, pull_n[1], side_n_s_m, MOST_YIELD_M);
+        one(yielded_rad, *turning_n_m, turn_n_m_s_rad, MOST_YIELD_RAD);
     }
 
     /// From wrists as they were told to be to where they have given way to, if the middle between them was told to be at `middle_m`
@@ -136,13 +142,13 @@ impl Motion {
     fn yielding(&self, middle_m: Vector3<f64>) -> Isometry3<f64> {
         let pelvis_from_world = self.state.world_from_pelvis.rotation.inverse();
         let up = pelvis_from_world * Vector3::z_axis();
-        let turned = UnitQuaternion::from_axis_angle(&up, self.state.yielded[2]);
+        let turned = UnitQuaternion::from_axis_angle(&up, self.state.yielded_rad);
         Translation3::from(self.yielded_m()) * Isometry3::rotation_wrt_point(turned, Point3::from(middle_m))
     }
 
     /// How far the middle between the wrists has given way, pelvis frame.
     fn yielded_m(&self) -> Vector3<f64> {
-        let [ahead_m, left_m, _] = self.state.yielded;
+        let [ahead_m, left_m] = self.state.yielded_m;
         let level_m = self.heading() * Vector3::new(ahead_m, left_m, 0.0);
         self.state.world_from_pelvis.rotation.inverse() * level_m
     }
