@@ -44,20 +44,6 @@ fn dynamics_friction_takes_all_of_a_sliding_box() {
     assert!(made < 0.04, "{made} J of 4 J came from nothing or went there");
 }
 
-/// A heavy box that presses light ones into the floor is pushed out slowly, sweep by sweep; what speed is left is no contact's work.
-#[test]
-fn dynamics_contacts_that_push_apart_do_no_work() {
-    let mut bench = Bench::with_floor(DOWN, sliding(0.6));
-    for level in 0..6 {
-        let (mass_kg, z_m) = (if level == 5 { 50.0 } else { 0.3 }, 0.02 + 0.06 * f64::from(level));
-        bench.add_box(mass_kg, DVec3::splat(0.05), DPose3::from_translation(DVec3::Z * z_m), sliding(0.6));
-    }
-    let balances = measured(&mut bench, 100, |_| {});
-    let most = balances.iter().map(|balance| balance.taken).fold(f64::MIN, f64::max);
-    let fastest = balances.iter().map(|balance| balance.kinetic).fold(f64::MIN, f64::max);
-    assert!(most < 0.5, "contacts did work of {most} J in a step; there were at most {fastest} J");
-}
-
 #[test]
 fn dynamics_a_tree_that_swings_makes_little_and_what_is_added_is_seen() {
     let mut random = Random(11);
