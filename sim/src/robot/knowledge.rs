@@ -157,7 +157,7 @@ mod tests {
         let placement = RobotPlacement { name: "A".into(), position_m: [0.3, -0.2], yaw_rad: 0.8 };
         let model = Arc::new(model().clone());
         let mut robot = Robot::spawn(&mut dynamics, &model, &placement, 0).unwrap();
-        let mut command = robot.rest_command(&dynamics);
+        let mut command = robot.rest_command();
         command.upper_rad[0] -= 0.1;
         for substep in 0..4 {
             robot.drive(&mut dynamics, &command, substep);

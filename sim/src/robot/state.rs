@@ -4,7 +4,7 @@
 use rapier3d::math::{Pose, Vector};
 use serde::{Deserialize, Serialize};
 
-use super::{Robot, RobotCommand, joints};
+use super::{Robot, RobotCommand};
 use crate::Sides;
 use crate::body::{JOINTS, UPPER, joint_array};
 use crate::dynamics::Dynamics;
@@ -122,11 +122,14 @@ impl Robot {
         RobotCommand { upper_rad, base: self.memory.base }
     }
 
-    /// The command under which the robot stays as it is.
-    pub(crate) fn rest_command(&self, dynamics: &Dynamics) -> RobotCommand {
-        let tree = dynamics.tree(self.tree);
-        let (q_rad, _) = joints::read(tree, &self.model);
-        let base = BaseCommand::standing(tree.world_from_link(0).translation.z as f32);
-        RobotCommand { upper_rad: UPPER.map(|joint| q_rad[joint]), base: self.base_limits().clamp(base) }
+    /// The command under which the robot stays as it is, by its encoders and by where it takes its pelvis to be.
+    pub(crate) fn rest_command(&self) -> RobotCommand {
+        let base = BaseCommand::standing(self.body.world_from_pelvis().translation.z);
+        let upper_rad = UPPER.map(|joint| {
+            let model = &self.model.joints[joint];
+            // Noise may read a joint at its stop as beyond it.
+            self.body.q_rad[joint].clamp(model.lower_rad, model.upper_rad)
+        });
+        RobotCommand { upper_rad, base: self.base_limits().clamp(base) }
     }
 }

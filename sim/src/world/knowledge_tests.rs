@@ -4,6 +4,7 @@ use rapier3d::math::{Pose, Rotation, Vector};
 
 use super::{RobotStep, World, WorldSpec};
 use crate::BaseCommand;
+use crate::body::UPPER;
 use crate::plane::heading_rad;
 use crate::robot::{RobotCommand, RobotPlacement, Sensing, SensorModel, StateSource};
 
@@ -77,4 +78,28 @@ fn the_simulators_state_is_not_misled() {
     let believed = step.estimate.world_from_pelvis;
     assert!(apart(&believed, &step.truth.world_from_pelvis()) < 1e-4);
     assert!(believed.translation.truncate().length() > 40.0 && heading_rad(&believed) > 1.0);
+}
+
+/// The command under which a robot stays as it is comes of its readings, and of where it takes its pelvis to be.
+#[test]
+fn a_robot_stays_as_it_senses_itself() {
+    let mut world = misled([0.0; 2], 0.0, Sensing::default());
+    let rest_rad = world.robots[0].model.rest_rad();
+    let ideal = world.rest_command(0);
+    let standing_m = world.present().robots[0].truth.world_from_pelvis().translation.z;
+    assert!((ideal.base.pelvis_height_m - standing_m).abs() < 1e-5);
+    for (told_rad, joint) in ideal.upper_rad.iter().zip(UPPER) {
+        assert!((told_rad - rest_rad[joint]).abs() < 1e-6, "exact sensors let nothing jump");
+    }
+
+    let told = Pose::from_translation(Vector::Z * 0.7);
+    let sensing = Sensing { sensors: SensorModel::G1, ..Sensing::default() };
+    world.robots[0].set_sensing(&world.dynamics, &told, sensing, 7);
+    let noisy = world.rest_command(0);
+    assert!((noisy.base.pelvis_height_m - 0.7).abs() < 0.01, "{}", noisy.base.pelvis_height_m);
+    let read_rad = world.present().robots[0].sensed.q_rad;
+    for (told_rad, joint) in noisy.upper_rad.iter().zip(UPPER) {
+        assert!((told_rad - read_rad[joint]).abs() < 1e-3);
+    }
+    assert_ne!(noisy.upper_rad, ideal.upper_rad);
 }

@@ -175,9 +175,9 @@ impl World {
         &self.robots
     }
 
-    /// The command under which a robot stays as it was put into the world.
+    /// The command under which a robot stays as it is, by what it senses.
     pub fn rest_command(&self, robot: usize) -> RobotCommand {
-        self.robots[robot].rest_command(&self.dynamics)
+        self.robots[robot].rest_command()
     }
 
     /// Geoms of the scene that do not move, world frame.

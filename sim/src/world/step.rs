@@ -116,7 +116,7 @@ impl World {
     fn robot_step(&self, index: usize) -> RobotStep {
         let robot = &self.robots[index];
         let command = match self.control_steps {
-            0 => robot.rest_command(&self.dynamics),
+            0 => robot.rest_command(),
             _ => robot.last_command(),
         };
         RobotStep {
