@@ -187,6 +187,19 @@ fn lying(at_m: Vector, random: &mut SplitMix64) -> Pose {
 mod tests {
     use super::*;
 
+    /// The door strikes the arm in the doorway, and drives the robot, which stands otherwise, back from where it stood.
+    #[test]
+    fn the_door_strikes_the_robot_before_it() {
+        let case = FALL_CASES.iter().find(|case| case.name == "door_on_hand").expect("a case");
+        for seed in 2000..2004 {
+            let mut world = case.world().expect("a world");
+            case.play(&mut world, 0, seed);
+            let pelvis_m = world.present().robots[0].truth.world_from_pelvis().translation;
+            let driven_m = (pelvis_m.x - AT_DOOR_M[0]).hypot(pelvis_m.y - AT_DOOR_M[1]);
+            assert!(driven_m > 0.15, "seed {seed}: the robot stands {driven_m} m from its place");
+        }
+    }
+
     /// What is dropped meets a robot: otherwise the case would show nothing.
     #[test]
     fn tables_meet_robots() {
