@@ -74,7 +74,7 @@ fn noise_is_the_same_again() {
     let read = |session: &mut Session| state(session, "A").joint_positions_rad;
     let first = read(&mut session);
     play(&mut session);
-    assert_eq!(session.close().departures, ["sensors: g1"]);
+    assert_eq!(session.close().departures, ["assistance: full", "sensors: g1"]);
     assert_eq!(verified(&folder.path().join(Recorder::FILE_NAME)).outcome, Verdict::Same);
 
     let begun = |spec: EpisodeSpec| read(&mut Session::start(&spec, None).unwrap());

@@ -14,7 +14,7 @@ use crate::scoring::{A, B};
 const LIFT_M: f32 = 0.07;
 /// Pelvises over the floor: palms that lie on the top are then at elbow height.
 const PELVIS_M: f32 = 0.75;
-const PACE_M_S: f32 = 0.20;
+const PACE_M_S: f32 = 0.18;
 /// The table's middle in the chair's frame: where the turn ends, clear of the chair, and where it is set down.
 const BEFORE_CHAIR_M: Vector = Vector::new(0.65, 0.0, 0.0);
 const AT_CHAIR_M: Vector = Vector::new(0.40, 0.0, 0.0);
@@ -44,7 +44,6 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
         false => before.lerp(&over, (gone_m - turn_m) / (length_m - turn_m)),
     };
     team.carry(commander, &ObjectPath { at: &at, length_m, pace_m_s: PACE_M_S, free_m: &FREE })?;
-    team.rest(commander)?;
     team.set_down(commander, &place(chair * AT_CHAIR_M, FRAC_PI_2))?;
     let_go(commander, &grasps)
 }

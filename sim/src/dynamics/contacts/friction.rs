@@ -151,11 +151,6 @@ impl<const N: usize> Contacts<N> {
         }
     }
 
-    /// Leaves a share of all impulses.
-    pub fn scale(&mut self, share: f64) {
-        self.all.iter_mut().flat_map(|contact| &mut contact.impulse).for_each(|impulse| *impulse *= share);
-    }
-
     /// One sweep of Gauss-Seidel, contact by contact.
     pub fn sweep(&mut self, pass: Pass, w: &mut [f64]) {
         for (group, contact) in self.all.iter_mut().enumerate() {

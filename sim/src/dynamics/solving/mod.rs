@@ -1,8 +1,11 @@
 //! Contacts, joints and equalities of a step, and the impulses that meet them: projected Gauss-Seidel on whitened velocities.
 
+mod heaps;
 mod step;
 
 pub use step::Diverged;
+
+use heaps::Heaps;
 
 use crate::dynamics::contacts::friction::{Contact, Contacts, Directions, Terms};
 use crate::dynamics::contacts::{Candidate, ContactPoint, Impulses, continued};
@@ -88,7 +91,7 @@ impl Solver {
         let corrected_j = kinetic_j(&self.w);
         self.settle(Pass::Relaxing, sweeps);
         if corrected_j - kinetic_j(&self.w) > HARD_J {
-            self.take_only(trees);
+            self.take_only(trees, candidates);
         }
         let (mut plain, mut rolling) = (self.plain.all.iter(), self.rolling.all.iter());
         for (touch, candidate) in self.found.iter_mut().zip(candidates) {
@@ -117,12 +120,12 @@ impl Solver {
         }
     }
 
-    /// Contacts only take energy. Sweeps that have not settled can leave a part of the speed with which things were pushed out
-    /// of each other; the impulses P of all contacts together have then done work, and of a share s of them
+    /// Contacts ought to take energy only. Sweeps that have not settled can leave a part of the speed with which things were pushed
+    /// out of each other; the impulses P of all contacts of a heap have then done work, and of a share s of them
     ///   W(s) = s P . (v + v' - (1 - s) M^-1 P) / 2,   v and v' the velocities before and after the step.
-    /// The share that stays is the one that does none. It keeps all momentum and all cones of friction, and what goes on
-    /// approaching the next step stops.
-    fn take_only(&mut self, trees: &Trees) {
+    /// The share that stays is the one that does none. It keeps all momentum and all cones of friction; what goes on approaching,
+    /// and joints that run on into their ends, the next step stops.
+    fn take_only(&mut self, trees: &Trees, candidates: &[Candidate]) {
         self.before.resize(self.w.len(), 0.0);
         for (tree, offset) in trees.all.iter().zip(&trees.offset) {
             tree.factor.whiten_velocity(
@@ -135,18 +138,35 @@ impl Solver {
         self.change.resize(self.w.len(), 0.0);
         self.plain.push_impulses(&mut self.change);
         self.rolling.push_impulses(&mut self.change);
-        let (mut twice_work_j, mut own_j) = (0.0, 0.0);
-        for ((change, before), after) in self.change.iter().zip(&self.before).zip(&self.w) {
-            twice_work_j += change * (before + after);
-            own_j += change * change;
+        let heaps = Heaps::of(trees.all.len(), candidates);
+        let mut work = vec![HeapWork::default(); trees.all.len()];
+        for (index, (tree, offset)) in trees.all.iter().zip(&trees.offset).enumerate() {
+            let of_heap = &mut work[heaps.of_tree(index)];
+            for at in *offset..offset + tree.dofs() {
+                of_heap.twice_j += self.change[at] * (self.before[at] + self.w[at]);
+                of_heap.own_j += self.change[at] * self.change[at];
+            }
         }
-        if twice_work_j <= 0.0 {
+        if work.iter().all(|work| work.twice_j <= 0.0) {
             return;
         }
-        let share = (1.0 - twice_work_j / own_j).max(0.0);
-        self.plain.scale(share);
-        self.rolling.scale(share);
-        self.w.iter_mut().zip(&self.change).for_each(|(w, change)| *w -= (1.0 - share) * change);
+        for (index, (tree, offset)) in trees.all.iter().zip(&trees.offset).enumerate() {
+            let left_out = 1.0 - work[heaps.of_tree(index)].share();
+            for at in *offset..offset + tree.dofs() {
+                self.w[at] -= left_out * self.change[at];
+            }
+        }
+        let (mut plain, mut rolling) = (self.plain.all.iter_mut(), self.rolling.all.iter_mut());
+        for candidate in candidates {
+            let share = work[heaps.of_contact(candidate)].share();
+            let impulse = match candidate.friction.directions {
+                Directions::None | Directions::Slide | Directions::SlideSpin => {
+                    plain.next().map(|contact| &mut contact.impulse[..])
+                }
+                Directions::SlideSpinRoll => rolling.next().map(|contact| &mut contact.impulse[..]),
+            };
+            impulse.into_iter().flatten().for_each(|impulse| *impulse *= share);
+        }
     }
 
     /// The greatest velocity (rad/s or m/s) that an end of a range took back.
@@ -156,6 +176,24 @@ impl Solver {
         self.plain.sweep(pass, &mut self.w);
         self.rolling.sweep(pass, &mut self.w);
         pushed
+    }
+}
+
+/// What the contacts of a heap did in a step.
+#[derive(Clone, Copy, Default)]
+struct HeapWork {
+    /// Twice the work of their impulses, and twice what these would do to things at rest.
+    twice_j: f64,
+    own_j: f64,
+}
+
+impl HeapWork {
+    /// The share of the impulses that does no work.
+    fn share(self) -> f64 {
+        match self.twice_j > 0.0 {
+            true => (1.0 - self.twice_j / self.own_j).max(0.0),
+            false => 1.0,
+        }
     }
 }
 
