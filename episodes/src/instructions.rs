@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use tandem_sim::BaseLimits;
 use tandem_tools_spec::{Briefing, Instruction, TaskList};
+use xxhash_rust::xxh3::xxh3_64;
 
 use crate::describe::task_list;
 use crate::tasks;
@@ -79,6 +80,12 @@ impl Instructions {
         })
     }
 
+    /// Hash of what is said of `task` in place of its own words, if anything is.
+    pub fn fingerprint(&self, task: &str) -> Option<String> {
+        let TaskInstructions { joint, robots } = self.0.get(task)?;
+        Some(format!("{:016x}", xxh3_64(format!("{:?}", (joint, robots)).as_bytes())))
+    }
+
     /// The reply to `list_tasks` in these words, where robots follow base commands within `limits`.
     pub fn task_list(&self, limits: &BaseLimits) -> TaskList {
         let mut list = task_list(limits);
@@ -129,6 +136,15 @@ mod tests {
         assert_eq!(handover.robots[0], own.tasks[0].robots[0]);
         assert_eq!(handover.robots[1].instruction, "Nimm sie.");
         assert_eq!(list.tasks[1..], own.tasks[1..]);
+    }
+
+    #[test]
+    fn hashes_tell_words_apart() {
+        let hash = |text: &str, task: &str| read(text).unwrap().fingerprint(task);
+        let (one, other) = (r#"{"handover": {"joint": "x"}}"#, r#"{"handover": {"joint": "y"}}"#);
+        assert_eq!(hash(one, "handover"), hash(one, "handover"));
+        assert_ne!(hash(one, "handover"), hash(other, "handover"));
+        assert_eq!((hash(one, "handover").map(|hash| hash.len()), hash(one, "pouring")), (Some(16), None));
     }
 
     #[test]

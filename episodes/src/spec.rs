@@ -42,6 +42,9 @@ pub struct EpisodeSpec {
     /// Whether it is told how to grasp; likewise.
     #[serde(default)]
     pub hints: Hints,
+    /// Hash of the instructions that the policy is given in place of the task's own; see [`crate::Instructions::fingerprint`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub instructions: Option<String>,
 }
 
 /// Which file describes the robots.
@@ -115,6 +118,7 @@ impl EpisodeSpec {
             assistance: Assistance::default(),
             disclosure: Assistance::default().disclosure(),
             hints: Assistance::default().hints(),
+            instructions: None,
         }
     }
 
@@ -128,7 +132,7 @@ impl EpisodeSpec {
         Wording { assistance: self.assistance, hints: self.hints }
     }
 
-    /// What is not as the benchmark has it, each as results name it behind the policy's name. Whoever adds a setting decides here
+    /// What is neither as the benchmark nor as Tandem usually has it, each as results name it behind the policy's name. Whoever adds a setting decides here
     /// whether it belongs to them.
     pub fn departures(&self) -> Vec<String> {
         // Without `..`, so that the compiler asks about a new field. What is named apart, or changes nothing that a policy could
@@ -146,6 +150,7 @@ impl EpisodeSpec {
             assistance,
             disclosure,
             hints,
+            instructions,
         } = self;
         let file = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let departures = [
@@ -164,6 +169,7 @@ impl EpisodeSpec {
             (*state_estimate != StateSource::default())
                 .then(|| format!("state estimate: {}", state_estimate.name())),
             (*sensors != SensorModel::default()).then(|| format!("sensors: {}", sensors.name())),
+            instructions.as_ref().map(|xxh3| format!("instructions: {xxh3}")),
         ];
         departures.into_iter().flatten().collect()
     }
@@ -268,5 +274,35 @@ impl Controller {
             Controller::File(path) => LocomotionChoice::from_file(path, false),
             Controller::Looped(path) => LocomotionChoice::from_file(path, true),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn controllers_are_named_as_they_were_asked_for() {
+        let asked = |file: Option<&str>| Controller::from_file(file.map(Path::new));
+        assert_eq!(asked(None), Controller::Balance);
+        assert_eq!(asked(Some("a/walk.onnx")), Controller::File("a/walk.onnx".into()));
+        assert_eq!(asked(Some("looped:a/walk.onnx")), Controller::Looped("a/walk.onnx".into()));
+
+        let own = EpisodeSpec::new(&tasks::ALL[0], 0, Protocol::Benchmark).assisted(Assistance::Paper);
+        let departures =
+            |file: Option<&str>| EpisodeSpec { locomotion: asked(file), ..own.clone() }.departures();
+        assert_eq!(departures(None), Vec::<String>::new());
+        assert_eq!(departures(Some("a/walk.onnx")), ["controller: walk.onnx"]);
+        assert_eq!(
+            departures(Some("looped:a/walk.onnx")),
+            ["controller: walk.onnx in a loop over its place"]
+        );
+    }
+
+    #[test]
+    fn other_words_are_named() {
+        let own = EpisodeSpec::new(&tasks::ALL[0], 0, Protocol::Benchmark).assisted(Assistance::Paper);
+        let told = EpisodeSpec { instructions: Some("00ff".into()), ..own };
+        assert_eq!(told.departures(), ["instructions: 00ff"]);
     }
 }

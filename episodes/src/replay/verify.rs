@@ -73,7 +73,7 @@ pub fn verify(recording: &Recording) -> Result<Verification, ReplayError> {
         (Some((call, found)), _) => Verdict::State(found.by(call)),
         (None, Some(result)) => match comparison.missing() {
             Some(found) => Verdict::State(found.by(calls.iter().enumerate().next_back())),
-            None => compare_results(recording, result, replay.result().0)?,
+            None => compare_results(recording, result, replay.result().0, recording.build == this)?,
         },
         (None, None) => Verdict::Same,
     };
@@ -141,23 +141,33 @@ impl StateMismatch {
     }
 }
 
-/// The recorded result against the one of the simulation, and against the phases scored from the recorded steps.
+/// The recorded result against the one of the simulation, and against the phases scored from the recorded steps. Another build may
+/// not have named what this one does; calls do not say all that a policy was shown of them.
 fn compare_results(
     recording: &Recording,
     recorded: &ResultReply,
     again: ResultReply,
+    same_build: bool,
 ) -> Result<Verdict, ReplayError> {
     let times_s =
         |result: &ResultReply| result.phases.0.iter().filter_map(|(_, time_s)| *time_s).collect::<Vec<f64>>();
     let scored_s: Vec<f64> = recording.score()?.reached().map(|(_, time_s)| time_s).collect();
     let text = |times_s: &[f64]| format!("{times_s:?}");
     let facts = |result: &ResultReply| (result.env_steps, result.tool_calls, result.falls);
-    let pairs = [
+    let mut pairs = vec![
         ("state hash at the end", recorded.state_hash.clone(), again.state_hash.clone()),
         ("times of phases", text(&times_s(recorded)), text(&times_s(&again))),
         ("times of phases scored from the steps", text(&times_s(recorded)), text(&scored_s)),
         ("steps, calls and falls", format!("{:?}", facts(recorded)), format!("{:?}", facts(&again))),
     ];
+    if same_build {
+        let named: Vec<&String> = recorded.extra_information_replies.keys().collect();
+        let settings = |result: &ResultReply| format!("{}, {:?}", result.assistance, result.departures);
+        pairs.extend([
+            ("assistance and departures", settings(recorded), settings(&again)),
+            ("extra information", format!("{:?}", recorded.extra_information), format!("{named:?}")),
+        ]);
+    }
     let differs = pairs.into_iter().find(|(_, recorded, again)| recorded != again);
     Ok(match differs {
         Some((what, recorded, again)) => Verdict::Result { what, recorded, again },

@@ -11,7 +11,7 @@ use tandem_sim::{RobotCommand, Snapshot};
 use tandem_tools_spec::EndReason;
 use xxhash_rust::xxh3::xxh3_64;
 
-use super::{Session, this_build};
+use super::{Session, this_build, told::ShownInformation};
 use crate::commands::MotionState;
 use crate::error::{CheckpointError, EpisodeError};
 use crate::output::write_whole;
@@ -19,7 +19,8 @@ use crate::recording::Recording;
 use crate::scoring::ScoreMemory;
 use crate::spec::{EpisodeSpec, PhaseStart};
 
-/// An episode at one instant. It fits episodes of the same task, seed, protocol, robot, controller and sensing.
+/// An episode at one instant. It fits episodes of the same task, seed, protocol, robot, controller and sensing, whose policies are
+/// told the same.
 #[derive(Clone)]
 pub struct Checkpoint {
     origin: Origin,
@@ -57,6 +58,8 @@ struct Progress {
     tool_calls: u32,
     thought: Duration,
     ended: Option<EndReason>,
+    /// What the policy has been shown by then.
+    shown: ShownInformation,
 }
 
 /// The first line of a file.
@@ -146,10 +149,18 @@ impl Origin {
     /// What has to be the same for progress to fit, in words.
     fn episode(&self) -> String {
         let (task, seed, protocol) = (self.spec.task.id, self.spec.seed, self.spec.protocol.name());
-        format!("task {task} seed {seed} under the {protocol} protocol with {}", self.machine())
+        let (machine, told) = (self.machine(), self.told());
+        format!("task {task} seed {seed} under the {protocol} protocol with {machine}, and {told}")
     }
 
-    /// As [`Origin::episode`], under whatever protocol.
+    /// What its policy is told: who was told something once knows it.
+    fn told(&self) -> String {
+        let EpisodeSpec { assistance, disclosure, hints, instructions, .. } = &self.spec;
+        let words = instructions.as_deref().unwrap_or("of the task");
+        format!("assistance {assistance}, phases told {disclosure}, hints {hints}, instructions {words}")
+    }
+
+    /// As [`Origin::episode`], under whatever protocol and whatever its policy is told.
     fn world(&self) -> String {
         format!("task {} seed {} with {}", self.spec.task.id, self.spec.seed, self.machine())
     }
@@ -181,24 +192,26 @@ impl Session {
             tool_calls: self.tool_calls,
             thought: self.clock.spent(),
             ended: self.ended,
+            shown: self.shown.clone(),
         };
         Ok(Checkpoint { origin: self.origin.clone(), progress, failed: None })
     }
 
-    /// Takes the episode to a checkpoint of an episode of the same task, seed, protocol, robot, controller and sensing. On
-    /// an error the episode is as it was.
+    /// Takes the episode to a checkpoint of an episode of the same task, seed, protocol, robot, controller and sensing, whose
+    /// policy is told the same. On an error the episode is as it was.
     pub fn resume(&mut self, checkpoint: &Checkpoint) -> Result<(), EpisodeError> {
         expect_same(checkpoint.origin.episode(), self.origin.episode())?;
         self.restore(&checkpoint.progress)
     }
 
-    /// As [`Session::resume`], under whatever protocol, with the whole budget ahead: what was done so far is not this
-    /// episode's.
+    /// As [`Session::resume`], under whatever protocol and whatever its policy is told, with the whole budget ahead: what was
+    /// done so far is not this episode's.
     pub fn take_up(&mut self, checkpoint: &Checkpoint) -> Result<(), EpisodeError> {
         expect_same(checkpoint.origin.world(), self.origin.world())?;
         self.restore(&checkpoint.progress)?;
         self.steps_before = self.present.control_step;
         self.tool_calls = 0;
+        self.shown = ShownInformation::default();
         self.clock.set_spent(Duration::ZERO);
         self.ended = None;
         Ok(())
@@ -215,6 +228,7 @@ impl Session {
         self.tool_calls = progress.tool_calls;
         self.clock.set_spent(progress.thought);
         self.ended = progress.ended;
+        self.shown = progress.shown.clone();
         self.simulator_failure = None;
         self.rewind.forget();
         self.result = None;

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
 use tandem_tools_spec::{
     Assistance, CommandReply, ExtraInformation, FingerReport, Formats, HandReport, LookReply, Protocol,
     RobotReport, RobotState, ToolReply,
@@ -12,7 +13,7 @@ use super::answer::Answer;
 use crate::observation::TeamObservation;
 
 /// How many replies showed what the benchmark's own policies are not shown.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct ShownInformation(BTreeMap<ExtraInformation, BTreeMap<String, u32>>);
 
 impl ShownInformation {

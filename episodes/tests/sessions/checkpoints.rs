@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::common::*;
 use tandem_episodes::{Checkpoint, EpisodeSpec, Sensing, Session, Start};
-use tandem_tools_spec::{Protocol, StatusReply};
+use tandem_tools_spec::{Assistance, Hints, Protocol, StatusReply};
 
 #[test]
 fn an_episode_taken_up_from_a_checkpoint_goes_on_as_it_did() {
@@ -90,6 +90,23 @@ fn a_checkpoint_is_no_start_for_robots_that_know_themselves_otherwise() {
     let text =
         refusal(EpisodeSpec { sensing: Sensing::TRUTH, ..spec("handover", 5, Protocol::Benchmark) }, &path);
     assert!(text.contains("state estimate estimator") && text.contains("state estimate truth"), "{text}");
+}
+
+/// Who was told something once knows it, and results say so.
+#[test]
+fn a_checkpoint_is_no_start_for_policies_that_are_told_otherwise() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("handover.checkpoint");
+    written(&path);
+    let own = || spec("handover", 5, Protocol::Benchmark);
+    let text = refusal(own().assisted(Assistance::Paper), &path);
+    assert!(text.contains("assistance full") && text.contains("assistance paper"), "{text}");
+    let text = refusal(EpisodeSpec { hints: Hints::Off, ..own() }, &path);
+    assert!(text.contains("hints on") && text.contains("hints off"), "{text}");
+
+    let begun = EpisodeSpec { start: Start::Checkpoint(path), ..own() };
+    let shown = Session::start(&begun, None).unwrap().result().extra_information;
+    assert!(shown.iter().any(|what| what == "odometry"), "what the command before showed: {shown:?}");
 }
 
 #[test]

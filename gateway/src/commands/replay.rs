@@ -9,7 +9,8 @@ use tandem_episodes::replay::{
     Difference, DrawnPictures, EpisodeCamera, PictureSize, PicturesPlan, Verdict, Verification, draw_all,
     film, verify,
 };
-use tandem_episodes::{Checkpoint, FAILED_STEP_FILE, Recording, Session};
+use tandem_episodes::{Checkpoint, EpisodeSpec, FAILED_STEP_FILE, Recording, Session};
+use tandem_tools_spec::ResultReply;
 
 use super::CommandResult;
 
@@ -126,6 +127,7 @@ fn describe(recording: &Recording) {
     let spec = &recording.spec;
     let (task, seed, protocol) = (spec.task.id, spec.seed, spec.protocol);
     println!("{}: {task} seed {seed}, {protocol}, build {}", recording.path().display(), recording.build);
+    println!("  {}", told(spec, recording.result.as_ref()));
     match &recording.result {
         Some(result) => {
             let reached = result.phases.0.iter().filter(|(_, time_s)| time_s.is_some()).count();
@@ -142,6 +144,15 @@ fn describe(recording: &Recording) {
     if !recording.uncovered().is_empty() {
         println!("  warning: no checksum covers {}", recording.uncovered().join(", "));
     }
+}
+
+/// What its policy was told, and what is neither as the benchmark nor as Tandem usually has it.
+fn told(spec: &EpisodeSpec, result: Option<&ResultReply>) -> String {
+    let shown = result.map_or(&[][..], |result| &result.extra_information[..]);
+    let assistance = format!("assistance: {}", spec.assistance);
+    let departures = spec.departures().into_iter().filter(|departure| *departure != assistance);
+    let besides = departures.chain(shown.iter().map(|what| format!("shown {what}")));
+    [assistance.clone()].into_iter().chain(besides).collect::<Vec<_>>().join(", ")
 }
 
 /// Prints how the recording compares, and returns whether it is the same.
@@ -207,8 +218,8 @@ fn render(
 
 #[cfg(test)]
 mod tests {
-    use tandem_episodes::{EpisodeSpec, RobotFile, tasks};
-    use tandem_tools_spec::{MoveWrists, Protocol, WristMove};
+    use tandem_episodes::{RobotFile, tasks};
+    use tandem_tools_spec::{Assistance, Hints, MoveWrists, Protocol, WristMove};
 
     use super::*;
     use crate::hosting::write_absurd_robot;
@@ -238,6 +249,14 @@ mod tests {
         let reach = WristMove { right_position_m: Some([0.28, -0.24, 0.22]), ..WristMove::hold("A") };
         session.call(MoveWrists { steps: 5, robots: vec![reach] }.into()).unwrap_err();
         session
+    }
+
+    #[test]
+    fn what_policies_were_told_is_said() {
+        let own = EpisodeSpec::new(tasks::find("handover").unwrap(), 0, Protocol::Benchmark);
+        assert_eq!(told(&own, None), "assistance: full");
+        let paper = EpisodeSpec { hints: Hints::On, ..own.assisted(Assistance::Paper) };
+        assert_eq!(told(&paper, None), "assistance: paper, hints: on");
     }
 
     #[test]

@@ -97,6 +97,7 @@ impl EpisodeTable {
             assistance: self.settings.assistance,
             disclosure: self.settings.disclosure,
             hints: self.settings.hints,
+            instructions: self.settings.instructions.fingerprint(&args.task),
             ..EpisodeSpec::new(tasks::find(&args.task)?, args.seed, protocol)
         };
         let place = self.take_place().await?;

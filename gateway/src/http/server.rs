@@ -59,7 +59,7 @@ impl Server {
             let _ = stopped.await;
         }));
         runtime.spawn(end_abandoned_episodes(table.clone()));
-        tracing::info!("{}", settings.assistance.about());
+        tracing::info!("{}", settings.assistance.about(settings.disclosure, settings.hints));
         tracing::info!("serving on http://{address}");
         Ok(Server { runtime, address, table, stop, served, settings })
     }

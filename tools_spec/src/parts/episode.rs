@@ -60,16 +60,22 @@ impl Assistance {
         }
     }
 
-    /// What it is, for the log of a program that starts.
-    pub fn about(self) -> &'static str {
-        match self {
-            Assistance::Paper => {
-                "assistance paper: policies are told what the benchmark tells its agents, success at the end of the episode"
-            }
-            Assistance::Full => {
-                "assistance full: policies are told all that robots sense, phases as they are reached, and how to grasp"
-            }
-        }
+    /// What policies are told with it, `disclosure` and `hints`, for the log of a program that starts.
+    pub fn about(self, disclosure: Disclosure, hints: Hints) -> String {
+        let sensed = match self {
+            Assistance::Paper => "what the benchmark tells its agents",
+            Assistance::Full => "all that robots sense",
+        };
+        let success = match disclosure {
+            Disclosure::Live => "phases as they are reached",
+            Disclosure::End => "success at the end of the episode",
+            Disclosure::Never => "nothing of their success",
+        };
+        let grasps = match hints {
+            Hints::On => ", and how to grasp",
+            Hints::Off => "",
+        };
+        format!("assistance {self}: policies are told {sensed}, {success}{grasps}")
     }
 
     /// What it tells of phases.
@@ -117,7 +123,8 @@ impl From<Hints> for Wording {
 }
 
 /// What a policy may be shown that the benchmark's own policies are not.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ExtraInformation {
     /// Depth at every pixel of a picture.
     DepthImages,
@@ -291,6 +298,17 @@ pub struct RobotFallen {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn starts_say_what_policies_are_told() {
+        let own = |assistance: Assistance| assistance.about(assistance.disclosure(), assistance.hints());
+        let paper = "assistance paper: policies are told what the benchmark tells its agents";
+        assert_eq!(own(Assistance::Paper), format!("{paper}, success at the end of the episode"));
+        let live = Assistance::Paper.about(Disclosure::Live, Hints::On);
+        assert_eq!(live, format!("{paper}, phases as they are reached, and how to grasp"));
+        let full = "assistance full: policies are told all that robots sense";
+        assert_eq!(own(Assistance::Full), format!("{full}, phases as they are reached, and how to grasp"));
+    }
 
     #[test]
     fn json_has_the_same_names() {

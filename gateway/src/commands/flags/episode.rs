@@ -128,7 +128,9 @@ impl EpisodeFlags {
         assistance: Assistance,
     ) -> Result<EvaluationPlan<'_>, SimError> {
         let assistance = self.assistance.unwrap_or(assistance);
-        tracing::info!("{}", assistance.about());
+        let disclosure = self.disclosure.unwrap_or(assistance.disclosure());
+        let hints = self.hints.unwrap_or(assistance.hints());
+        tracing::info!("{}", assistance.about(disclosure, hints));
         tracing::info!("{}", self.renderer.kind.describe()?);
         Ok(EvaluationPlan {
             player,
@@ -138,8 +140,8 @@ impl EpisodeFlags {
             locomotion: self.locomotion.controller(),
             sensing: self.sensing.sensing(),
             assistance,
-            disclosure: self.disclosure.unwrap_or(assistance.disclosure()),
-            hints: self.hints.unwrap_or(assistance.hints()),
+            disclosure,
+            hints,
             renderer: self.renderer.kind,
             tasks: self.tasks.0,
             seeds: self.seeds.0.collect(),

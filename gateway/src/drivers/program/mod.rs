@@ -15,7 +15,7 @@ use std::{
 
 use serde_json::json;
 use tandem_episodes::{
-    EpisodeSpec, RunFolder, Visibility, create_private_folder,
+    EpisodeError, EpisodeSpec, RunFolder, Visibility, create_private_folder,
     players::{EpisodeOutput, PlayError, PlayOutcome, Policy},
     results::PolicyCard,
 };
@@ -71,18 +71,24 @@ impl Program {
     }
 
     /// The settings of a server for this episode alone.
-    fn settings_for(&self, spec: &EpisodeSpec, token: Token, folder: &Path) -> Arc<Settings> {
-        Arc::new(Settings {
+    fn settings_for(
+        &self,
+        spec: &EpisodeSpec,
+        token: Token,
+        folder: &Path,
+    ) -> Result<Arc<Settings>, PlayError> {
+        Ok(Arc::new(Settings {
             token: Some(token),
             runs: folder.join("others"),
             assistance: spec.assistance,
             disclosure: spec.disclosure,
             hints: spec.hints,
+            base_limits: spec.locomotion.load().map_err(EpisodeError::from)?.limits(),
             locomotion: spec.locomotion.clone(),
             sensing: spec.sensing,
             renderer: spec.renderer,
             ..(*self.settings).clone()
-        })
+        }))
     }
 
     /// Starts a process for each participant and waits until all are gone. Returns how each was found.
@@ -236,7 +242,7 @@ impl Policy for Program {
         let absolute = folder.canonicalize().map_err(|error| lost("no folder for the episode", error))?;
         remove_old_result(&absolute.join(tandem_episodes::RESULT_FILE))?;
         let (token, text) = Token::random().map_err(HostingError::from)?;
-        let server = Server::start(self.settings_for(spec, token, &absolute));
+        let server = Server::start(self.settings_for(spec, token, &absolute)?);
         let server = server.map_err(|error| lost("no server", error))?;
         let id = format!("{}-seed{}", spec.task.id, spec.seed);
         let files = RunFolder { path: absolute.clone(), visibility: Visibility::After };

@@ -60,22 +60,18 @@ const WRIST_PARTS: [(&str, Range<usize>); 6] = [
     ("_rows_6d", 17..POSE_LEN),
 ];
 
-/// Upright, where the episode began.
-const DOWN: [f64; 3] = [0.0, 0.0, -1.0];
-const START: Pose = Pose { position_m: [0.0; 3], quaternion_wxyz: [1.0, 0.0, 0.0, 0.0] };
-
 /// All that a robot senses: joints in rad; of each wrist the pose in the pelvis frame; which way is down; the pelvis where its own
-/// odometry has it, x, y, z in m and w, x, y, z; the base command in force, as [`BASE_COLUMNS`] has it.
-pub fn state_values(state: &RobotState) -> Vec<f64> {
+/// odometry has it, x, y, z in m and w, x, y, z; the base command in force, as [`BASE_COLUMNS`] has it. `None` of a state that
+/// something is withheld from.
+pub fn state_values(state: &RobotState) -> Option<Vec<f64>> {
     let joints = state.joint_positions_rad.0.iter().map(|(_, angle_rad)| *angle_rad);
     let wrists = [&state.left_wrist, &state.right_wrist].into_iter();
     let wrists = wrists.flat_map(|pose| pose_values(pose.position_m, pose.quaternion_wxyz));
-    // Nothing is withheld from who asks a policy; see `LocalEpisode::observe`.
-    let Pose { position_m, quaternion_wxyz } = state.pelvis_in_start.unwrap_or(START);
+    let Pose { position_m, quaternion_wxyz } = state.pelvis_in_start?;
     let pelvis = position_m.into_iter().chain(quaternion_wxyz);
     let base = &state.base_command;
     let base = [base.vx_m_s, base.vy_m_s, base.yaw_rate_rad_s, base.pelvis_height_m];
-    joints.chain(wrists).chain(state.gravity_in_pelvis.unwrap_or(DOWN)).chain(pelvis).chain(base).collect()
+    Some(joints.chain(wrists).chain(state.gravity_in_pelvis?).chain(pelvis).chain(base).collect())
 }
 
 /// Numbers of the right length for [`state_values`], of a robot of which nothing is known.

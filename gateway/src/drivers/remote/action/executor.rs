@@ -17,7 +17,7 @@ use crate::drivers::remote::{
     columns::{held_row, sensed_pelvis},
     map::{Between, PolicyMap},
     poses::pose_of,
-    request::PolicyObservation,
+    request::{PolicyObservation, withheld},
 };
 
 /// Tells robots what policies decided, and remembers where that left them.
@@ -75,7 +75,7 @@ impl<'a> Executor<'a> {
                 if reply.stop_reason != StopReason::StepsDone {
                     return Err(PlayerError::EpisodeOver);
                 }
-                self.take_report(&reply, chunks);
+                self.take_report(&reply, chunks)?;
             }
         }
         for (last_row, chunk) in self.last_rows.iter_mut().zip(chunks) {
@@ -143,14 +143,15 @@ impl<'a> Executor<'a> {
         }
     }
 
-    fn take_report(&mut self, reply: &CommandReply, chunks: &[RobotRows]) {
+    fn take_report(&mut self, reply: &CommandReply, chunks: &[RobotRows]) -> Result<(), PlayerError> {
         for (chunk, start_from_pelvis) in chunks.iter().zip(&mut self.start_from_pelvis) {
             if let Some(report) = reply.robots.iter().find(|report| report.robot == chunk.robot) {
-                let Some(pelvis_in_start) = report.pelvis_in_start else { continue };
+                let pelvis_in_start = report.pelvis_in_start.ok_or_else(|| withheld("a command"))?;
                 let Pose { position_m, quaternion_wxyz: [w, x, y, z] } = pelvis_in_start;
                 let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
                 *start_from_pelvis = Isometry3::from_parts(Translation3::from(position_m), rotation);
             }
         }
+        Ok(())
     }
 }

@@ -5,7 +5,7 @@ mod observation;
 mod picture;
 
 pub use history::ObservationHistory;
-pub use observation::PolicyObservation;
+pub use observation::{PolicyObservation, withheld};
 
 use tandem_episodes::Picture;
 

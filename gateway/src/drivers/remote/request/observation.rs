@@ -6,7 +6,7 @@ use tandem_episodes::{
     Picture,
     players::{LocalEpisode, PlayerError},
 };
-use tandem_tools_spec::{ExtraInformation, Observe};
+use tandem_tools_spec::{ExtraInformation, Observe, Tool as _};
 
 use crate::drivers::remote::columns::{blank_state_values, held_row, state_values};
 
@@ -27,6 +27,12 @@ pub struct RobotInputs {
     pub state_values: Vec<f64>,
 }
 
+/// The error of a reply without what robots know of themselves, which nothing made up takes the place of.
+pub fn withheld(tool: &'static str) -> PlayerError {
+    let reason = "the reply withholds gravity or odometry, which who asks a policy has to have".into();
+    PlayerError::Call { tool, reason }
+}
+
 /// Size of pictures that nobody has taken.
 const WIDTH_PX: u32 = 320;
 const HEIGHT_PX: u32 = 240;
@@ -40,12 +46,13 @@ impl PolicyObservation {
     ) -> Result<PolicyObservation, PlayerError> {
         let seen = episode.observe(&Observe { robots: None, short: Some(true) }, shown)?;
         let third_person = shown.contains(&ExtraInformation::ThirdPerson);
-        let inputs = seen.robots.iter().map(|robot| RobotInputs {
-            picture: robot.view.picture.clone(),
-            state_values: state_values(&robot.state),
+        let inputs = seen.robots.iter().map(|robot| {
+            let state_values = state_values(&robot.state).ok_or_else(|| withheld(Observe::NAME))?;
+            Ok(RobotInputs { picture: robot.view.picture.clone(), state_values })
         });
         let third_person = third_person.then(|| episode.third_person().into());
-        Ok(PolicyObservation { robots: inputs.collect(), third_person })
+        let robots = inputs.collect::<Result<_, PlayerError>>()?;
+        Ok(PolicyObservation { robots, third_person })
     }
 
     /// For each robot, the action row that keeps it as it is.
