@@ -58,7 +58,7 @@ pub fn locomotion(
     mut done: impl FnMut(&CaseReport),
 ) -> Result<LocomotionReport, BenchError> {
     let choice = controller.load()?;
-    let mut report = bench::run(robot, &|| choice.controller(), sensing, filter, seeds, &mut done)?;
+    let mut report = bench::run(robot, &choice, sensing, filter, seeds, &mut done)?;
     for case in carrying::CASES.iter().filter(|case| bench::is_asked(filter, case.name)) {
         let carried = carrying::run(case, robot, controller, sensing, seeds)?;
         done(&carried);

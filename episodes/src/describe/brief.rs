@@ -1,11 +1,13 @@
 //! What a policy has to know of frames, cameras and hands, in words. The numbers are those of the embedded robot.
 
-use tandem_tools_spec::{Assistance, Brief, Hints, Wording};
+use tandem_tools_spec::{Assistance, BaseLimits, Brief, Hints, Wording};
 
 const FRAMES: &str = "Poses of wrists and camera, and points of query_depth, are in the robot's own pelvis frame as it is at that \
-    moment: x forward, y left, z up, metres. Quaternions are [w, x, y, z]. A robot walks with bent knees: while it steps its pelvis \
-    is 0.62 to 0.68 m high, whatever height is commanded, and rises to that height when it stands. What its hands hold sinks and \
-    rises along.";
+    moment: x forward, y left, z up, metres. Quaternions are [w, x, y, z].";
+
+/// Of our own controller. Those of files have no height to command, and walk as high as they stand.
+const BENT_KNEES: &str = " A robot walks with bent knees: while it steps its pelvis is 0.62 to 0.68 m high, whatever height is \
+    commanded, and rises to that height when it stands. What its hands hold sinks and rises along.";
 
 const PARTNERS: &str = "The pelvis frames of different robots are unrelated. To relate two of them, find the same two points, well \
     apart, with query_depth of both robots: robots stand upright, so a turn about z and a shift take the points of the one to \
@@ -13,7 +15,7 @@ const PARTNERS: &str = "The pelvis frames of different robots are unrelated. To 
 
 const PARTNERS_MOVE: &str = " pelvis_in_start keeps that valid while robots move.";
 
-const ODOMETRY: &str = "pelvis_in_start is where a robot's own legs and gyro have it: the pose of its pelvis in a frame that lies on \
+const ODOMETRY: &str = "pelvis_in_start is where a robot's own IMU and joints have it: the pose of its pelvis in a frame that lies on \
     the floor under where the pelvis was when the episode began, z up, x where the robot faced. It drifts by up to 1 % of the way \
     walked. base_motion is the same over one command.";
 
@@ -42,12 +44,13 @@ const GRASPING: &str = "Fingers are given for a right hand, thumb [0, 1, 2] and 
     m behind those on legs or on a bin, which thighs and knees push otherwise, and in the middle between them. Who lifts or carries \
     with partners lets the hands give way (compliance_n_s_m 250) until the thing stands. To let go, open, and leave the way you came.";
 
-/// The brief of an episode in the words that its policy reads.
-pub fn brief(wording: Wording) -> Brief {
+/// The brief of an episode in the words that its policy reads, where robots follow base commands within `limits`.
+pub fn brief(wording: Wording, limits: &BaseLimits) -> Brief {
     let Wording { assistance, hints } = wording;
     let is_full = assistance == Assistance::Full;
+    let squats = limits.pelvis_height_m.min < limits.pelvis_height_m.max;
     Brief {
-        frames: FRAMES.into(),
+        frames: [FRAMES, if squats { BENT_KNEES } else { "" }].concat(),
         partners: [PARTNERS, if is_full { PARTNERS_MOVE } else { "" }].concat(),
         odometry: is_full.then(|| ODOMETRY.into()),
         camera: CAMERA.into(),
@@ -60,7 +63,13 @@ pub fn brief(wording: Wording) -> Brief {
 mod tests {
     use super::*;
     use tandem_sim::mjcf::{Geom, Primitive};
-    use tandem_sim::{JOINTS, Pose, RobotModel, Side, Sides, Vector, assets};
+    use tandem_sim::{JOINTS, LocomotionChoice, Pose, RobotModel, Side, Sides, Vector, assets};
+
+    use crate::convert::wire_limits;
+
+    fn limits() -> BaseLimits {
+        wire_limits(&LocomotionChoice::Balance.limits())
+    }
 
     /// Points of a shape, in the frame of its link, and how far it reaches beyond each of them.
     fn points_m(geom: &Geom) -> (Vec<Vector>, f32) {
@@ -120,14 +129,24 @@ mod tests {
 
     #[test]
     fn without_hints_there_is_geometry_only() {
-        let (with, without) = (brief(Hints::On.into()), brief(Hints::Off.into()));
+        let (with, without) = (brief(Hints::On.into(), &limits()), brief(Hints::Off.into(), &limits()));
         assert!(with.grasping.is_some());
         assert_eq!(without, Brief { grasping: None, ..with });
     }
 
     #[test]
+    fn bent_knees_are_those_of_our_own_controller() {
+        let mut limits = limits();
+        let frames = |limits: &BaseLimits| brief(Assistance::Paper.into(), limits).frames;
+        assert!(frames(&limits).contains("0.62 to 0.68 m"));
+        // As of a policy in a file.
+        limits.pelvis_height_m.min = limits.pelvis_height_m.max;
+        assert!(!frames(&limits).contains("0.62"));
+    }
+
+    #[test]
     fn nothing_is_said_of_what_is_not_told() {
-        let brief = serde_json::json!(brief(Assistance::Paper.into())).to_string();
+        let brief = serde_json::json!(brief(Assistance::Paper.into(), &limits())).to_string();
         for word in ["pelvis_in_start", "base_motion", "grasping", "odometry"] {
             assert!(!brief.contains(word), "{word}: {brief}");
         }

@@ -27,19 +27,21 @@ pub struct Proprioception<'a> {
     pub sensed: &'a RobotSensed,
     /// The base command in force.
     pub base: &'a BaseCommand,
+    /// The simulator's word, and no reading.
+    pub fallen: bool,
 }
 
 impl<'a> Proprioception<'a> {
     /// Takes from `step` what robot number `robot` knows.
     pub fn of(step: &'a Step, robot: usize) -> Proprioception<'a> {
-        let RobotStep { sensed, command, .. } = &step.robots[robot];
-        Proprioception { time_s: step.time_s, sensed, base: &command.base }
+        let RobotStep { sensed, truth, command, .. } = &step.robots[robot];
+        Proprioception { time_s: step.time_s, sensed, base: &command.base, fallen: truth.fallen }
     }
 }
 
 /// What a robot senses that is described by `sheet`.
 pub fn robot_state(own: &Proprioception, sheet: &RobotSheet, detail: Detail) -> RobotState {
-    let Proprioception { time_s, sensed, base } = *own;
+    let Proprioception { time_s, sensed, base, fallen } = *own;
     let named = |values: &[f32]| {
         let joints = sheet.model.joints.iter().zip(values);
         JointValues(joints.map(|(joint, value)| (joint.name.clone(), f64::from(*value))).collect())
@@ -56,7 +58,7 @@ pub fn robot_state(own: &Proprioception, sheet: &RobotSheet, detail: Detail) -> 
         gravity_in_pelvis: Some(wire_vector(sensed.gravity_in_pelvis)),
         pelvis_in_start: Some(wire_pose_from_sim(&sensed.start_from_pelvis)),
         base_command: wire_base(base),
-        fallen: Some(sensed.fallen),
+        fallen: Some(fallen),
     }
 }
 

@@ -66,7 +66,7 @@ impl FactsTracker {
                 .world_from_wrist
                 .map(|wrist| robot.truth.world_from_pelvis().inverse() * wrist),
             hand_force_n: robot.hand_force_in_world_n(),
-            fallen: robot.sensed.fallen,
+            fallen: robot.truth.fallen,
         });
         let objects = self.memory.iter().zip(&self.models).filter_map(|(memory, model)| {
             let state = step.object(&memory.name)?;

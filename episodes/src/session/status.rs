@@ -7,7 +7,7 @@ use tandem_tools_spec::{
 
 use super::Session;
 use crate::commands::action_row;
-use crate::convert::rounded;
+use crate::convert::{rounded, wire_limits};
 use crate::describe;
 use crate::scoring::Phase;
 use crate::spec::EpisodeSpec;
@@ -33,10 +33,7 @@ impl Session {
     pub(super) fn fallen(&self) -> Vec<RobotFallen> {
         let robots = self.motions.iter().zip(&self.present.robots);
         robots
-            .map(|(motion, step)| RobotFallen {
-                robot: motion.robot.name.clone(),
-                fallen: step.sensed.fallen,
-            })
+            .map(|(motion, step)| RobotFallen { robot: motion.robot.name.clone(), fallen: step.truth.fallen })
             .collect()
     }
 
@@ -102,7 +99,7 @@ impl Session {
             instructions: describe::instructions(task),
             robots: self.motions.iter().map(|motion| info(&motion.robot.name)).collect(),
             kinds: vec![describe::robot_kind(kind.clone(), &self.motions[0].robot)],
-            brief: describe::brief(self.spec().wording()),
+            brief: describe::brief(self.spec().wording(), &wire_limits(&self.motions[0].robot.base_limits)),
             action_row: action_row(&self.motions[0].robot.model),
             status: self.status(),
             recording_failed: self.recording_failed().map(str::to_owned),

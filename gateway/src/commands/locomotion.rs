@@ -44,13 +44,14 @@ enum LocomotionPart {
     },
 }
 
-/// Plays the cases, prints a line per case as it ends, and writes JSON where it is asked for.
+/// Plays the cases, prints a line per case as it ends and one of what was measured, and writes JSON where it is asked for.
 pub fn run(args: LocomotionArgs) -> CommandResult {
     let LocomotionPart::Bench { locomotion, sensing, robot, cases, seeds, json } = args.part;
     println!("{}", CaseReport::HEAD);
     let (controller, sensing) = (locomotion.controller(), sensing.sensing());
     let report =
         bench::locomotion(&robot, &controller, sensing, &cases, &seeds.0, |case| println!("{case}"))?;
+    println!("{}", report.settings());
     if let Some(path) = json {
         std::fs::write(path, serde_json::to_string_pretty(&report)?)?;
     }

@@ -24,19 +24,20 @@ pub use physics::{PhysicsCase, PhysicsReport, physics};
 pub use pictures::{PicturesCase, PicturesReport, pictures};
 
 use crate::body::RobotModel;
-use crate::locomotion::Locomotion;
+use crate::locomotion::LocomotionChoice;
 use crate::robot::Sensing;
 use crate::{SimError, assets};
 use measure::Trial;
-
-/// Makes a fresh controller for each trial.
-pub type NewLocomotion<'a> = &'a (dyn Fn() -> Box<dyn Locomotion> + Sync);
 
 /// Results of all cases.
 #[derive(Clone, Debug, Serialize)]
 pub struct LocomotionReport {
     /// Of [`crate::assets::ROBOTS`].
     pub robot: String,
+    /// As recordings call it, with the loop if there is one.
+    pub controller: String,
+    #[serde(flatten)]
+    pub sensing: Sensing,
     pub cases: Vec<CaseReport>,
 }
 
@@ -90,7 +91,7 @@ pub fn is_asked(filter: &str, case: &str) -> bool {
 /// ends.
 pub fn run(
     robot: &str,
-    new_locomotion: NewLocomotion,
+    choice: &LocomotionChoice,
     sensing: Sensing,
     filter: &str,
     seeds: &RangeInclusive<u32>,
@@ -99,13 +100,13 @@ pub fn run(
     let mut cases = Vec::new();
     let model = Arc::new(RobotModel::parse(robot, assets::robot(robot)?)?);
     for case in CASES.iter().filter(|case| is_asked(filter, case.name)) {
-        let trials = over_seeds(seeds, |seed| trial::run(case, seed, &model, new_locomotion(), sensing));
+        let trials = over_seeds(seeds, |seed| trial::run(case, seed, &model, choice.controller(), sensing));
         let trials = trials.into_iter().collect::<Result<Vec<_>, _>>()?;
         let report = summarise(case, &trials);
         done(&report);
         cases.push(report);
     }
-    Ok(LocomotionReport { robot: robot.into(), cases })
+    Ok(LocomotionReport { robot: robot.into(), controller: choice.name(), sensing, cases })
 }
 
 /// What `trial` makes of each of these seeds, as many at once as there are processors.
@@ -126,6 +127,18 @@ pub fn over_seeds<T: Send>(seeds: &RangeInclusive<u32>, trial: impl Fn(u32) -> T
     });
     trials.sort_by_key(|(seed, _)| *seed);
     trials.into_iter().map(|(_, trial)| trial).collect()
+}
+
+impl LocomotionReport {
+    /// What was measured, in a line below the table.
+    pub fn settings(&self) -> String {
+        let Sensing { state_estimate, sensors } = self.sensing;
+        let (state_estimate, sensors) = (state_estimate.name(), sensors.name());
+        format!(
+            "robot {}, controller {}, state estimate {state_estimate}, sensors {sensors}",
+            self.robot, self.controller
+        )
+    }
 }
 
 fn summarise(case: &Case, trials: &[Trial]) -> CaseReport {
@@ -203,6 +216,26 @@ impl fmt::Display for CaseReport {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::assets::DEFAULT_ROBOT;
+    use crate::robot::SensorModel;
+
+    #[test]
+    fn a_report_says_what_was_measured() {
+        let sensing = Sensing { sensors: SensorModel::G1, ..Sensing::TRUTH };
+        let report =
+            run(DEFAULT_ROBOT, &LocomotionChoice::Balance, sensing, "no such case", &(0..=0), |_| {});
+        let report = report.unwrap();
+        let json = serde_json::to_value(&report).unwrap();
+        for (key, value) in [
+            ("robot", DEFAULT_ROBOT),
+            ("controller", "balance"),
+            ("state_estimate", "truth"),
+            ("sensors", "g1"),
+        ] {
+            assert_eq!(json[key], value, "{key}");
+            assert!(report.settings().contains(value), "{}", report.settings());
+        }
+    }
 
     #[test]
     fn quartiles_leave_a_quarter_on_each_side() {

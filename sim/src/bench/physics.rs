@@ -138,7 +138,7 @@ fn close(commands: &mut [RobotCommand], closed_share: f32) {
 fn check(world: &World, situation: Situation) {
     let present = world.present();
     for (index, robot) in present.robots.iter().enumerate() {
-        assert!(!robot.sensed.fallen, "robot {index} fell while {}", situation.name());
+        assert!(!robot.truth.fallen, "robot {index} fell while {}", situation.name());
         if situation == Situation::Holding {
             let wrist = robot.truth.world_from_pelvis() * robot.sensed.pelvis_from_wrist.right;
             let bottle = present.object(&bottle_name(index)).map(|bottle| bottle.world_from_object);

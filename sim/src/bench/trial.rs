@@ -46,7 +46,7 @@ pub(super) fn run(
     let mut work_j = 0.0;
     for step in 0..(case.duration_s / DT_S) as usize {
         let time_s = step as f32 * DT_S;
-        trial.fell = robot.sensed.fallen;
+        trial.fell = robot.truth.fallen;
         if trial.fell {
             break;
         }

@@ -8,7 +8,7 @@
 //!   R+ = R exp((w - b_g) dt),   v+ = v + (R (a - b_a) + g) dt,   p+ = p + v+ dt
 //!   theta' = -R b_g,   v' = -[R a]x theta - R b_a,   p' = v
 //!   0 = R r_i(q) - (f_i - p)           r_i: from the IMU to the point of the sole where the ground pushes, by the encoders
-//!   0 = f_i,z                          the floor is level
+//!   0 = f_i,z                          the floor is level, and at the height at which it was told
 //!   0 = heading(R R_i(q)) - psi_i      only of a robot that stands still: feet twist under one that walks
 //!
 //! The point moves over the sole with the centre of pressure (a foot that tips rests on its edge), and f_i moves along.

@@ -83,6 +83,7 @@ impl Robot {
         let tree = dynamics.tree(self.tree);
         let body = self.memory.knowledge.update(&self.model, tree);
         self.take(body);
+        // The simulator's word, whatever the robot takes itself to be: it is scored, and ends what its legs can do.
         let pelvis = tree.world_from_link(0);
         let upright = (pelvis.rotation * DVec3::Z).z;
         self.memory.fallen |= pelvis.translation.z < FALLEN_HEIGHT_M || upright < FALLEN_TILT_COSINE;

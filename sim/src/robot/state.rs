@@ -11,7 +11,8 @@ use crate::dynamics::Dynamics;
 use crate::locomotion::BaseCommand;
 use crate::mechanism::rounded;
 
-/// What a robot senses, in frames of its own: all that a reply or a policy may be made of.
+/// What a robot senses, in frames of its own: all that a reply or a policy may be made of, but for
+/// [`RobotTruth::fallen`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotSensed {
     /// Published order, as the velocities and torques.
@@ -31,8 +32,6 @@ pub struct RobotSensed {
     pub pelvis_from_camera: Pose,
     /// External force on each hand, pelvis frame, estimated from joint torques.
     pub hand_force_in_pelvis_n: Sides<Vector>,
-    /// Pelvis below 0.4 m or tilted beyond 60 degrees. Stays true: nothing puts a robot back.
-    pub fallen: bool,
 }
 
 /// Where a robot takes itself to be, for what steers its hands and its base: by its estimator, in a frame that was the world's
@@ -52,6 +51,9 @@ pub struct RobotTruth {
     pub world_from_wrist: Sides<Pose>,
     /// Axes as [`crate::mjcf::MjcfCamera`]'s.
     pub world_from_camera: Pose,
+    /// Pelvis below 0.4 m or tilted beyond 60 degrees. Stays true: nothing puts a robot back. The one thing here that reaches
+    /// a robot and its policy: it takes the power from the legs, and replies tell it.
+    pub fallen: bool,
 }
 
 impl RobotSensed {
@@ -88,7 +90,6 @@ impl Robot {
                 * body.world_from_link[self.model.egocentric_link]
                 * self.model.egocentric.body_from_camera,
             hand_force_in_pelvis_n: body.hand_force_n.map(|force_n| pelvis_from_world.rotation * force_n),
-            fallen: self.memory.fallen,
         }
     }
 
@@ -113,6 +114,7 @@ impl Robot {
                 .map(|wrist| world_from_link[wrist.link] * wrist.link_from_site),
             world_from_camera: world_from_link[model.egocentric_link] * model.egocentric.body_from_camera,
             world_from_link,
+            fallen: self.memory.fallen,
         }
     }
 

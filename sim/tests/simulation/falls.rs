@@ -35,7 +35,7 @@ fn the_legs_of_a_fallen_robot_are_limp() {
                 );
             }
         }
-        fell = robot.sensed.fallen;
+        fell = robot.truth.fallen;
     }
     assert!(checked > 50, "{checked} steps were looked at");
     let step = world.present();
@@ -62,7 +62,7 @@ fn floors_go_on_where_they_are_no_longer_drawn() {
         world.control_step(&command).expect("it stays finite");
     }
     let step = world.present();
-    assert!(!step.robots[0].sensed.fallen);
+    assert!(!step.robots[0].truth.fallen);
     let bottle_m = step.object("bottle").expect("a bottle").world_from_object.translation;
     assert!(bottle_m.z.abs() < 0.05, "{bottle_m}");
 }
@@ -85,7 +85,7 @@ fn robots_stand_in_a_scene_of_nothing() {
             world.control_step(&command).expect("it stays finite");
         }
         let robot = &world.present().robots[0];
-        assert!(!robot.sensed.fallen && robot.truth.world_from_pelvis().translation.z > 0.7, "{room}");
+        assert!(!robot.truth.fallen && robot.truth.world_from_pelvis().translation.z > 0.7, "{room}");
     }
 }
 
@@ -123,7 +123,7 @@ fn what_goes_over_the_edge_of_a_box_lands_below_it() {
             world.control_step(&command).expect("it stays finite");
         }
         let step = world.present();
-        assert!(!step.robots[0].sensed.fallen);
+        assert!(!step.robots[0].truth.fallen);
         for (name, expected_m) in [("on", 0.0), ("beside", ground_m)] {
             let bottle_m = step.object(name).expect("a bottle").world_from_object.translation;
             // It may have tipped over.

@@ -1,13 +1,12 @@
 //! The default base controller walks, carries, gives way and comes back, bit for bit again.
 
 use tandem_sim::assets::DEFAULT_ROBOT;
-use tandem_sim::locomotion::Balance;
-use tandem_sim::{RobotCommand, RobotPlacement, Sensing, World, WorldSpec, bench};
+use tandem_sim::{LocomotionChoice, RobotCommand, RobotPlacement, Sensing, World, WorldSpec, bench};
 
 fn report(case: &str, seeds: usize) -> bench::CaseReport {
     let report = bench::run(
         DEFAULT_ROBOT,
-        &|| Box::new(Balance::default()),
+        &LocomotionChoice::Balance,
         Sensing::default(),
         case,
         &(0..=seeds as u32 - 1),
@@ -30,7 +29,7 @@ fn walks_as_commanded_and_stops() {
     }
 }
 
-/// What the brief and the tools tell of the pelvis of a robot that steps: 0.62 to 0.68 m, whatever is commanded.
+/// What the brief tells of the pelvis of a robot that steps: 0.62 to 0.68 m, whatever is commanded.
 #[test]
 fn walks_as_high_as_policies_are_told() {
     let (mut world, mut command) = walking();

@@ -30,7 +30,7 @@ fn drift(velocity: [f32; 3], seconds: u32) -> ([f32; 2], f32) {
         last_m = pelvis_m;
     }
     let RobotStep { sensed, truth, .. } = pelvis(&world);
-    assert!(!sensed.fallen, "{velocity:?}");
+    assert!(!truth.fallen, "{velocity:?}");
     let off: Pose = (start.inverse() * truth.world_from_pelvis()).inverse() * sensed.start_from_pelvis;
     let turned_rad = 2.0 * off.rotation.xyz().length().asin();
     ([off.translation.length(), turned_rad], way_m)

@@ -77,7 +77,7 @@ fn robots_stand_while_their_arms_move() {
             assert!(torque_n_m.abs() <= joint.effort_n_m, "{} needs {torque_n_m} N m", joint.name);
         }
         assert_eq!(world.self_contacts(0), []);
-        assert!(step.robots.iter().all(|robot| !robot.sensed.fallen));
+        assert!(step.robots.iter().all(|robot| !robot.truth.fallen));
     }
     let sway = high - low;
     assert!(sway.x < 0.015 && sway.y < 0.015 && sway.z < 0.005, "pelvis sways {sway} m");
@@ -96,7 +96,7 @@ fn another_robots_file_is_all_it_takes() {
     let mut world = World::with_robot(&kitchen(), model).expect("a world");
     let rest = rest(&world);
     let step = run(&mut world, &rest, 200);
-    assert!(step.robots.iter().all(|robot| !robot.sensed.fallen));
+    assert!(step.robots.iter().all(|robot| !robot.truth.fallen));
 }
 
 #[test]

@@ -57,7 +57,7 @@ pub struct RobotState {
     /// "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gravity_in_pelvis: Option<[f64; 3]>,
-    /// Where its own legs and gyro have it: the pose of its pelvis in the start frame, which lies on the floor under the pelvis as
+    /// Where its own IMU and joints have it: the pose of its pelvis in the start frame, which lies on the floor under the pelvis as
     /// it was when the episode began, z up, x where the robot faced. Drifts by up to 1 % of the way walked. Left out where the
     /// assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]

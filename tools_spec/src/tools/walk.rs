@@ -35,7 +35,7 @@ pub struct WalkMove {
     pub vy_m_s: f64,
     /// Turning rate in radians per second, counter-clockwise seen from above.
     pub yaw_rate_rad_s: f64,
-    /// Height of the pelvis above the floor in metres, for a robot that stands: one that steps has its pelvis at 0.62 to 0.68.
+    /// Height of the pelvis above the floor in metres, for a robot that stands; while it steps it may be lower.
     /// Null: the target stays.
     pub pelvis_height_m: Option<f64>,
 }

@@ -78,7 +78,7 @@ fn play(
     while control_steps < steps && diverged.is_none() {
         let commands = next(world, control_steps);
         match world.watched_step(&commands, &mut watch) {
-            Ok(step) => fallen = step.robots.iter().filter(|robot| robot.sensed.fallen).count(),
+            Ok(step) => fallen = step.robots.iter().filter(|robot| robot.truth.fallen).count(),
             Err(error) => diverged = Some(error),
         }
         control_steps += 1;

@@ -88,7 +88,9 @@ impl Hold {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::convert::wire_limits;
     use crate::describe::brief;
+    use tandem_sim::LocomotionChoice;
     use tandem_tools_spec::Hints;
 
     /// Thickness of the plates that [`Hold::EDGE`] is for.
@@ -96,7 +98,8 @@ mod tests {
 
     #[test]
     fn policies_are_told_what_experts_do() {
-        let grasping = brief(Hints::On.into()).grasping.expect("hints");
+        let limits = wire_limits(&LocomotionChoice::Balance.limits());
+        let grasping = brief(Hints::On.into(), &limits).grasping.expect("hints");
         let told =
             |what: &str| assert!(grasping.contains(what), "the brief does not say `{what}`: {grasping}");
         let thumb = |angles: [f32; 7]| told(&format!("[{}, {}, {}]", angles[0], angles[1], angles[2]));
