@@ -41,8 +41,9 @@ const GRASPING: &str = "Fingers are given for a right hand, thumb [0, 1, 2] and 
     above, 0.05 m beside. The legs of a table: both hands point ahead ([1, 0, 0, 0]), palms on the outer sides of the legs, 0.05 m under \
     the top; the wrist ends 0.1 m before the middle of the leg and 0.032 m beside it; come from 0.09 m farther out and 0.025 m lower, in \
     and then up, and close thumb [0, -0.9, -1.74] and fingers [1, 1]. Stand with the pelvis 0.3 m behind the places of both hands, 0.38 \
-    m behind those on legs or on a bin, which thighs and knees push otherwise, and in the middle between them. Who lifts or carries \
-    with partners lets the hands give way (compliance_n_s_m 250) until the thing stands. To let go, open, and leave the way you came.";
+    m behind those on legs or on a bin, which thighs and knees push otherwise, and in the middle between them. Who carries \
+    with partners lets the hands give way (compliance_n_s_m 250) from when the thing is lifted, by its legs while it is lifted, too, \
+    until it is over its goal; stiff hands lower it. To let go, open, and leave the way you came.";
 
 /// The brief of an episode in the words that its policy reads, where robots follow base commands within `limits`.
 pub fn brief(wording: Wording, limits: &BaseLimits) -> Brief {

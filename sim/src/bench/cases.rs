@@ -69,7 +69,8 @@ const fn moving(name: &'static str, [vx_m_s, vy_m_s, yaw_rate_rad_s]: [f32; 3]) 
     Case { name, duration_s: 21.0 + STOP_S, plan: Plan::Move(velocity), ..HOLD }
 }
 
-/// A robot that stands is pulled by its hands for so long, and is looked at when it has been left alone again.
+/// A robot that stands is pulled by its hands until then: to the end of its case, so that it is looked at as it is pulled, or for a
+/// while, so that it is looked at when it has been left alone again.
 const LONG_PULL_END_S: f32 = 20.0;
 const SHORT_PULL_END_S: f32 = 4.0;
 

@@ -13,7 +13,8 @@ use crate::players::PlayerError;
 use crate::scoring::{A, B, C, Facts};
 
 const LIFT_M: f32 = 0.07;
-/// Pelvis over the floor while robots take the legs and set them down, and while they walk.
+/// Pelvis over the floor while robots take the legs and set them down, and while they stand with the table aloft. As they walk, it is
+/// under 0.68 m whatever is commanded.
 const BENT_M: f32 = 0.64;
 const TALL_M: f32 = 0.70;
 const PACE_M_S: f32 = 0.27;

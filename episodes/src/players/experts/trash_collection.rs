@@ -11,6 +11,7 @@ use super::skills::{
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
+/// Pelvis over the floor while A takes the bin, and while it stands with it. As it walks, that is under 0.68 m whatever is commanded.
 const BENT_M: f32 = 0.68;
 const TALL_M: f32 = 0.72;
 /// The rim of the bin is then a little lower than the bench's top.

@@ -1,4 +1,5 @@
-//! Experts solve their tasks on real physics within the benchmark protocol's steps, on seeds that nobody tuned on, even if a hand slips.
+//! Experts solve their tasks on real physics within the benchmark protocol's steps, on seeds that nobody tuned on. A hand that slips,
+//! on a seed that was tuned on, takes its load again.
 
 use std::ops::RangeInclusive;
 use std::thread::available_parallelism;
@@ -14,13 +15,14 @@ use tandem_tools_spec::{ActCall, Assistance, Protocol, ToolCall, ToolReply};
 const STANDING: [&str; 4] = ["handover", "pouring", "frame_hang", "co_pouring"];
 
 /// Drawn from 7000-7099 by lot on 2026-11-23, before any of these was ever played: no table reports them, and nobody tunes on them.
-/// They are never changed to make this test pass. Experts miss one episode in fifty, so that what counts is how many of them fail;
-/// one that fails is looked into on other seeds. Until then the test had seeds 3, which tables report, 6100, on which it was tuned
-/// how a hand that slipped takes its load again, and 6101.
+/// They are never changed to make this test pass. Experts miss two episodes in a thousand; so few seeds cannot tell that from one in
+/// a hundred, and the next change of physics or controller moves which ones are missed. So a single miss is let pass, to be looked
+/// into on other seeds, and two of one task are not. Until then the test had seeds 3, which tables report, 6100, on which it was
+/// tuned how a hand that slipped takes its load again, and 6101.
 const SEEDS: [u32; 3] = [7030, 7054, 7081];
 
 /// Plays the experts of `tasks`, and checks that phases come in order, that at most so many episodes of all fail, and of no task more
-/// than one, and that nobody falls where the task is solved.
+/// than one, and that nobody falls, whether the task is solved or not.
 fn solve(tasks: Vec<&'static Task>, may_fail: usize) {
     let plan = EvaluationPlan {
         player: players::find("expert").expect("a player"),
@@ -52,14 +54,13 @@ fn solve(tasks: Vec<&'static Task>, may_fail: usize) {
         let times_s: Vec<f64> = result.phases.0.iter().filter_map(|(_, time_s)| *time_s).collect();
         assert!(times_s.is_sorted() && times_s.iter().all(|time_s| *time_s > 0.0), "{episode:?}");
         if times_s.len() < task.phases.len() {
-            failed.push((task.id, result.seed, times_s.len(), result.falls));
-        } else {
-            assert_eq!(result.falls, 0, "{episode:?}");
+            failed.push((task.id, result.seed, times_s.len()));
         }
+        assert_eq!(result.falls, 0, "{episode:?}");
     }
     let twice = |task: &&Task| failed.iter().filter(|(id, ..)| *id == task.id).count() > 1;
     let fails_too_often = failed.len() > may_fail || tasks.iter().any(twice);
-    assert!(!fails_too_often, "task, seed, phases reached, falls: {failed:?}");
+    assert!(!fails_too_often, "task, seed, phases reached: {failed:?}");
 }
 
 #[test]
