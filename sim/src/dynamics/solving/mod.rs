@@ -19,6 +19,8 @@ use crate::dynamics::trees::spatial::ForceVector;
 /// most: what is heavy presses a light link against its stop.
 const UNSETTLED: f64 = 2.0;
 const MORE_SWEEPS: usize = 32;
+/// Where something lies deeper in another, as many more: what is heavy presses something light into the floor.
+const DEEP_M: f64 = 0.01;
 /// J that the relaxing sweeps took: where it was so much, there may be more that they should have taken.
 const HARD_J: f64 = 0.3;
 
@@ -75,7 +77,8 @@ impl Solver {
         self.equalities.warm_start(&mut self.w);
         self.plain.push_impulses(&mut self.w);
         self.rolling.push_impulses(&mut self.w);
-        self.settle(Pass::Correcting, sweeps);
+        let deep = candidates.iter().any(|candidate| candidate.touch.gap_m < -DEEP_M);
+        self.settle(Pass::Correcting, if deep { sweeps + MORE_SWEEPS } else { sweeps });
         self.equalities.remember();
         self.found.clear();
         let (mut plain, mut rolling) = (self.plain.all.iter(), self.rolling.all.iter());
