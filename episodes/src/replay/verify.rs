@@ -1,5 +1,7 @@
 //! Simulates a recorded episode again, and compares the state after every step.
 
+use std::collections::BTreeSet;
+
 use tandem_tools_spec::ResultReply;
 
 use super::ReplayError;
@@ -161,11 +163,12 @@ fn compare_results(
         ("steps, calls and falls", format!("{:?}", facts(recorded)), format!("{:?}", facts(&again))),
     ];
     if same_build {
-        let named: Vec<&String> = recorded.extra_information_replies.keys().collect();
+        let named: BTreeSet<&String> = recorded.extra_information.iter().collect();
+        let counted: BTreeSet<&String> = recorded.extra_information_replies.keys().collect();
         let settings = |result: &ResultReply| format!("{}, {:?}", result.assistance, result.departures);
         pairs.extend([
             ("assistance and departures", settings(recorded), settings(&again)),
-            ("extra information", format!("{:?}", recorded.extra_information), format!("{named:?}")),
+            ("extra information", format!("{named:?}"), format!("{counted:?}")),
         ]);
     }
     let differs = pairs.into_iter().find(|(_, recorded, again)| recorded != again);
