@@ -71,8 +71,10 @@ pub use body::{
     UPPER_JOINTS, WAIST_COLUMN, joint_names,
 };
 pub use error::SimError;
+pub use estimate::JointReadings;
 pub use locomotion::{BaseCommand, BaseLimits, BaseVelocity, LocomotionChoice};
 pub use plane::{heading_rad, wrapped_rad};
+pub use random::SplitMix64;
 pub use rapier3d::math::{Pose, Rotation, Vector};
 pub use robot::{
     Robot, RobotCommand, RobotEstimate, RobotPlacement, RobotSensed, RobotTruth, Sensing, SensorModel,

@@ -89,7 +89,7 @@ fn wrist_state(
     let commanded = motion.commanded_wrists()[side];
     if is_near(measured, target) {
         HandState::Arrived
-    } else if columns::arm(side).any(|column| sensed.qd_rad_s[UPPER[column]].abs() > ARM_MOVES_RAD_S) {
+    } else if columns::arm(side).any(|column| sensed.joints.qd_rad_s[UPPER[column]].abs() > ARM_MOVES_RAD_S) {
         HandState::Moving
     } else if is_near(&commanded, target) {
         HandState::Blocked
@@ -109,9 +109,10 @@ fn fingers(side: Side, sensed: &RobotSensed, motion: &Motion) -> FingerReport {
     let joint = |finger: usize| UPPER[first + finger];
     let target_rad: [f64; HAND_JOINTS] =
         std::array::from_fn(|finger| motion.state().upper_rad[first + finger]);
-    let measured_rad: [f64; HAND_JOINTS] = std::array::from_fn(|finger| sensed.q_rad[joint(finger)].into());
+    let measured_rad: [f64; HAND_JOINTS] =
+        std::array::from_fn(|finger| sensed.joints.q_rad[joint(finger)].into());
     let near = |finger: usize| (target_rad[finger] - measured_rad[finger]).abs() <= FINGER_TOLERANCE_RAD;
-    let moves = |finger: usize| sensed.qd_rad_s[joint(finger)].abs() > FINGER_MOVES_RAD_S;
+    let moves = |finger: usize| sensed.joints.qd_rad_s[joint(finger)].abs() > FINGER_MOVES_RAD_S;
     let state = if (0..HAND_JOINTS).all(near) {
         HandState::Arrived
     } else if (0..HAND_JOINTS).any(moves) {
@@ -125,7 +126,7 @@ fn fingers(side: Side, sensed: &RobotSensed, motion: &Motion) -> FingerReport {
 
 fn largest_effort(side: Side, sensed: &RobotSensed, motion: &Motion) -> Effort {
     let model = &motion.robot.model;
-    let share = |joint: usize| sensed.torque_n_m[joint].abs() / model.joints[joint].effort_n_m;
+    let share = |joint: usize| sensed.joints.torque_n_m[joint].abs() / model.joints[joint].effort_n_m;
     let joints = columns::arm(side).chain(columns::hand(side)).map(|column| UPPER[column]);
     let hardest = joints.max_by(|one, other| share(*one).total_cmp(&share(*other)));
     let hardest = hardest.unwrap_or(UPPER[columns::arm(side).start]);
@@ -138,7 +139,7 @@ fn among(columns: &[usize], of_interest: impl Fn(usize) -> bool) -> impl Iterato
 
 fn at_limit(column: usize, robot: &RobotSheet, sensed: &RobotSensed) -> bool {
     let joint = &robot.model.joints[UPPER[column]];
-    let q_rad = sensed.q_rad[UPPER[column]];
+    let q_rad = sensed.joints.q_rad[UPPER[column]];
     q_rad < joint.lower_rad + AT_LIMIT_RAD || q_rad > joint.upper_rad - AT_LIMIT_RAD
 }
 

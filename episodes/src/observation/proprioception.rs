@@ -50,9 +50,9 @@ pub fn robot_state(own: &Proprioception, sheet: &RobotSheet, detail: Detail) -> 
     RobotState {
         robot: sheet.name.clone(),
         time_s,
-        joint_positions_rad: named(&sensed.q_rad),
-        joint_velocities_rad_s: in_full(&sensed.qd_rad_s),
-        joint_torques_n_m: in_full(&sensed.torque_n_m),
+        joint_positions_rad: named(&sensed.joints.q_rad),
+        joint_velocities_rad_s: in_full(&sensed.joints.qd_rad_s),
+        joint_torques_n_m: in_full(&sensed.joints.torque_n_m),
         left_wrist: wire_pose_from_sim(&sensed.pelvis_from_wrist.left),
         right_wrist: wire_pose_from_sim(&sensed.pelvis_from_wrist.right),
         gravity_in_pelvis: Some(wire_vector(sensed.gravity_in_pelvis)),

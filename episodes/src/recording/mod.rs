@@ -31,7 +31,7 @@ pub use mcap_file::Visibility;
 pub use read::{RecordedCall, RecordedCheckpoint, Recording, RecordingError};
 pub use recover::{LeftOut, RecoverError, Recovered, recover};
 pub use thread::RecorderThread;
-pub use topics::messages::{CallOutcome, ToolCallRecord, state_hash_text};
+pub use topics::messages::{CallOutcome, CallerRecord, ToolCallRecord, state_hash_text};
 pub use write::{Recorder, RecordingHeader};
 
 /// What the checkpoint is called that an episode began with, where that is not its task's own beginning.

@@ -7,7 +7,7 @@ use base64::{Engine, prelude::BASE64_STANDARD};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use tandem_sim::{SimError, Step};
-use tandem_tools_spec::{PhaseReached, ResultReply};
+use tandem_tools_spec::{ExtraInformation, PhaseReached, ResultReply};
 
 use super::checked_file::CheckedFile;
 use super::damage::Damage;
@@ -42,6 +42,9 @@ pub struct RecordedCall {
     pub arguments: Value,
     /// The robot whose operator made it; `None` where one policy directed all.
     pub operator: Option<String>,
+    /// Of what the benchmark's own policies are not shown, what a policy that was asked in the simulator's process was shown;
+    /// `None` where the policy was shown the whole reply.
+    pub shown: Option<Vec<ExtraInformation>>,
     /// The reply as JSON, without pictures; or the text of the problem.
     pub outcome: Result<String, String>,
 }
@@ -156,11 +159,14 @@ impl Recording {
     /// The tool calls of the episode, in their order.
     pub fn tool_calls(&self) -> Result<Vec<RecordedCall>, RecordingError> {
         let call = |message: Result<(f64, ToolCallMessage), RecordingError>| {
-            let (time_s, ToolCallMessage { tool, thought_ns, arguments, operator, ok, reply }) = message?;
+            let (time_s, message) = message?;
+            let ToolCallMessage { tool, thought_ns, arguments, operator, shown, ok, reply } = message;
             let arguments = serde_json::from_str(&arguments).map_err(|source| self.json(source))?;
             let (thought, outcome) =
                 (Duration::from_nanos(thought_ns), if ok { Ok(reply) } else { Err(reply) });
-            Ok(RecordedCall { time_s, thought, tool, arguments, operator, outcome })
+            let shown = shown.map(serde_json::to_value).map(|shown| shown.and_then(serde_json::from_value));
+            let shown = shown.transpose().map_err(|source| self.json(source))?;
+            Ok(RecordedCall { time_s, thought, tool, arguments, operator, shown, outcome })
         };
         self.messages(topics::TOOL_CALLS).map(call).collect()
     }

@@ -112,7 +112,7 @@ fn record(folder: &Path) -> (World, PathBuf) {
             ToolCallRecord::new(
                 time_s,
                 THOUGHT,
-                None,
+                CallerRecord::Policy,
                 &wait.into(),
                 CallOutcome::refused(&"no steps are left"),
             )
@@ -121,7 +121,8 @@ fn record(folder: &Path) -> (World, PathBuf) {
         .unwrap();
     let observe = ToolCall::parse("observe", serde_json::json!({ "robots": ["A"] })).unwrap();
     let seen = seen(&world);
-    let record = ToolCallRecord::new(time_s, THOUGHT, Some("A"), &observe.into(), (&seen).into());
+    let record =
+        ToolCallRecord::new(time_s, THOUGHT, CallerRecord::Operator("A"), &observe.into(), (&seen).into());
     recorder.tool_call(record.unwrap()).unwrap();
     let path = recorder.finish(&result()).unwrap();
     (world, path)

@@ -68,7 +68,7 @@ pub fn verify(recording: &Recording) -> Result<Verification, ReplayError> {
         let again = |error: EpisodeError| ReplayError::Call { number: index + 1, source: error.into() };
         let parsed = Called::parse(&call.tool, call.arguments.clone()).map_err(again)?;
         // A call that was refused is refused again, and what it says is not compared.
-        let _ = replay.call(&parsed, call.thought);
+        let _ = replay.call(&parsed, call.thought, call.shown.as_deref());
         difference = comparison.compare(replay.take_hashes()).map(|found| (Some((index, call)), found));
     }
     let outcome = match (difference, &recording.result) {
@@ -144,7 +144,7 @@ impl StateMismatch {
 }
 
 /// The recorded result against the one of the simulation, and against the phases scored from the recorded steps. Another build may
-/// not have named what this one does; calls do not say all that a policy was shown of them.
+/// not have named what this one does.
 fn compare_results(
     recording: &Recording,
     recorded: &ResultReply,
@@ -163,12 +163,14 @@ fn compare_results(
         ("steps, calls and falls", format!("{:?}", facts(recorded)), format!("{:?}", facts(&again))),
     ];
     if same_build {
-        let named: BTreeSet<&String> = recorded.extra_information.iter().collect();
-        let counted: BTreeSet<&String> = recorded.extra_information_replies.keys().collect();
+        let shown = |result: &ResultReply| {
+            let named: BTreeSet<&String> = result.extra_information.iter().collect();
+            format!("{named:?}, replies {:?}", result.extra_information_replies)
+        };
         let settings = |result: &ResultReply| format!("{}, {:?}", result.assistance, result.departures);
         pairs.extend([
             ("assistance and departures", settings(recorded), settings(&again)),
-            ("extra information", format!("{named:?}"), format!("{counted:?}")),
+            ("extra information", shown(recorded), shown(&again)),
         ]);
     }
     let differs = pairs.into_iter().find(|(_, recorded, again)| recorded != again);

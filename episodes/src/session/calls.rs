@@ -9,7 +9,7 @@ use super::answer::Answer;
 use crate::EpisodeError;
 use crate::commands::{Called, Command, OperatorCall, OperatorCommand, RobotOrder};
 use crate::observation::TeamObservation;
-use crate::recording::CallOutcome;
+use crate::recording::{CallOutcome, CallerRecord};
 
 /// What a call comes to.
 #[derive(Clone, Debug)]
@@ -23,7 +23,7 @@ impl Session {
     /// Answers a tool call of the policy that directs all robots. An error changes nothing but the count of calls. The call that ends
     /// the episode, and no later one, is counted and recorded, and closes the files.
     pub fn call(&mut self, call: ToolCall) -> Result<ToolReply, EpisodeError> {
-        self.make(None, &call.into())
+        self.make(CallerRecord::Policy, &call.into())
     }
 
     /// As [`Session::call`], with all that may go with a call, by the operator of a robot or by the policy of all. A call that was
@@ -32,8 +32,9 @@ impl Session {
         self.check_around(&call)?;
         call.expected_step = None;
         let then = call.then.take();
-        let reply = self.make(operator, &Called::One(call))?;
-        Ok(CallReply { reply, observation: self.look_after(operator, then)? })
+        let caller = operator.map_or(CallerRecord::Policy, CallerRecord::Operator);
+        let reply = self.make(caller, &Called::One(call))?;
+        Ok(CallReply { reply, observation: self.look_after(caller, then)? })
     }
 
     /// As [`Session::call`] of `observe`, for who asks a policy in this process: with views as they were drawn, and nothing
@@ -45,10 +46,8 @@ impl Session {
     ) -> Result<TeamObservation, EpisodeError> {
         let look = Look { observe: observe.clone(), formats: Formats::default() };
         let underway = self.ended.is_none();
-        let seen = self.look_once(None, &look);
-        for robot in seen.iter().flat_map(|seen| &seen.robots).filter(|_| underway) {
-            shown.iter().for_each(|what| self.shown.count(*what, &robot.state.robot));
-        }
+        let seen = self.look_once(CallerRecord::InProcess(shown), &look);
+        seen.iter().filter(|_| underway).for_each(|seen| self.shown.count_each(shown, seen));
         self.let_think();
         seen
     }
@@ -60,12 +59,8 @@ impl Session {
         let underway = self.arrived();
         let answer = self.answer(&called);
         let assistance = self.spec().assistance;
-        let told = answer.as_ref().map(|answer| {
-            let mut told = answer.clone();
-            told.withhold(assistance);
-            told
-        });
-        self.came_out(underway, None, &called, CallOutcome::of(&told));
+        let told = answer.as_ref().map(|answer| answer.told(assistance));
+        self.came_out(underway, CallerRecord::InProcess(&[]), &called, CallOutcome::of(&told));
         let reply = answer.and_then(|answer| answer.reply(&called));
         self.let_think();
         reply
@@ -83,7 +78,7 @@ impl Session {
         let underway = self.arrived();
         let operator = call.robot().to_owned();
         let called = Called::Together(vec![call]);
-        self.came_out(underway, Some(&operator), &called, CallOutcome::refused(&refusal));
+        self.came_out(underway, CallerRecord::Operator(&operator), &called, CallOutcome::refused(&refusal));
         self.let_think();
         Err(refusal)
     }
@@ -97,27 +92,34 @@ impl Session {
         let called = Called::Together(calls);
         let underway = self.arrived();
         let mut answer = self.expect_underway().and_then(|()| self.act(&Command::together(orders)));
-        answer.iter_mut().for_each(|answer| self.tell(answer, &called, true));
-        self.came_out(underway, None, &called, CallOutcome::of(&answer));
+        for answer in answer.iter_mut() {
+            answer.withhold(self.spec().assistance);
+            self.count(answer, &called, CallerRecord::Policy);
+        }
+        self.came_out(underway, CallerRecord::Policy, &called, CallOutcome::of(&answer));
         self.let_think();
         let reply = answer?.reply(&called)?;
         let replies = looks.into_iter().map(|(robot, look)| {
-            Ok(CallReply { reply: reply.clone(), observation: self.look_after(Some(&robot), look)? })
+            Ok(CallReply {
+                reply: reply.clone(),
+                observation: self.look_after(CallerRecord::Operator(&robot), look)?,
+            })
         });
         replies.collect()
     }
 
-    /// Makes a call with nothing around it.
-    pub(super) fn make(
-        &mut self,
-        operator: Option<&str>,
-        called: &Called,
-    ) -> Result<ToolReply, EpisodeError> {
-        let underway = self.arrived();
+    /// Makes a call with nothing around it. The reply tells what the policy may be told, whoever calls.
+    pub(super) fn make(&mut self, caller: CallerRecord, called: &Called) -> Result<ToolReply, EpisodeError> {
         let counts = self.ended.is_none();
+        let underway = self.arrived();
         let mut answer = self.answer(called);
-        answer.iter_mut().for_each(|answer| self.tell(answer, called, counts));
-        self.came_out(underway, operator, called, CallOutcome::of(&answer));
+        for answer in answer.iter_mut() {
+            answer.withhold(self.spec().assistance);
+            if counts {
+                self.count(answer, called, caller);
+            }
+        }
+        self.came_out(underway, caller, called, CallOutcome::of(&answer));
         if let Ok(Answer::Reply(reply)) = &mut answer
             && let ToolReply::Manage(ManageReply::Finish(reply)) = &mut **reply
         {
@@ -129,15 +131,18 @@ impl Session {
         reply
     }
 
-    /// Takes out of an answer what the policy is not told, and counts what it is shown, if that `counts`.
-    fn tell(&mut self, answer: &mut Answer, called: &Called, counts: bool) {
-        answer.withhold(self.spec().assistance);
+    /// Counts what an answer shows from which nothing is to be withheld any more.
+    fn count(&mut self, answer: &Answer, called: &Called, caller: CallerRecord) {
         let formats = match called {
             Called::One(call) => call.formats,
             Called::Together(_) => Formats::default(),
         };
-        if counts {
-            self.shown.count_answer(answer, &formats, self.origin.spec.protocol);
+        match (caller, answer) {
+            (CallerRecord::Policy | CallerRecord::Operator(_), answer) => {
+                self.shown.count_answer(answer, &formats, self.origin.spec.protocol);
+            }
+            (CallerRecord::InProcess(shown), Answer::Observation(seen)) => self.shown.count_each(shown, seen),
+            (CallerRecord::InProcess(_), Answer::Reply(_)) => {}
         }
     }
 
@@ -153,12 +158,12 @@ impl Session {
     /// Looks after a command, if that was asked for: a call of its own.
     fn look_after(
         &mut self,
-        operator: Option<&str>,
+        caller: CallerRecord,
         look: Option<Look>,
     ) -> Result<Option<Observation>, EpisodeError> {
         let Some(look) = look else { return Ok(None) };
         let underway = self.ended.is_none();
-        let seen = self.look_once(operator, &look).map(|seen| seen.told(self.spec().assistance));
+        let seen = self.look_once(caller, &look).map(|seen| seen.told(self.spec().assistance));
         seen.iter().filter(|_| underway).for_each(|seen| self.shown.count_seen(seen, &look.formats));
         let observation = seen.and_then(|seen| Ok(seen.reply(&look.formats)?));
         self.let_think();
@@ -166,13 +171,13 @@ impl Session {
     }
 
     /// What a look shows, with nothing withheld; it is recorded as a policy is told it.
-    fn look_once(&mut self, operator: Option<&str>, look: &Look) -> Result<TeamObservation, EpisodeError> {
+    fn look_once(&mut self, caller: CallerRecord, look: &Look) -> Result<TeamObservation, EpisodeError> {
         let underway = self.arrived();
         let call = Call::from(look.clone());
         let valid = call.validate().map_err(EpisodeError::from);
         let seen = valid.and_then(|()| self.seen(&look.observe, &look.formats));
         let told = seen.as_ref().map(|seen| seen.told(self.spec().assistance));
-        self.came_out(underway, operator, &Called::One(call), CallOutcome::of(&told));
+        self.came_out(underway, caller, &Called::One(call), CallOutcome::of(&told));
         seen
     }
 
@@ -188,9 +193,9 @@ impl Session {
     }
 
     /// A call has come out: records it, and closes the files if it has ended the episode.
-    fn came_out(&mut self, underway: bool, operator: Option<&str>, called: &Called, outcome: CallOutcome) {
+    fn came_out(&mut self, underway: bool, caller: CallerRecord, called: &Called, outcome: CallOutcome) {
         if let (true, Some(files)) = (underway, &mut self.files) {
-            files.tool_call(self.present.time_s, self.clock.spent(), operator, called, outcome);
+            files.tool_call(self.present.time_s, self.clock.spent(), caller, called, outcome);
         }
         if self.ended.is_some() {
             self.settle();

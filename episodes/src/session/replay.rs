@@ -5,13 +5,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
-use tandem_tools_spec::ResultReply;
+use tandem_tools_spec::{ExtraInformation, ResultReply};
 
 use super::{Checkpoint, Session};
 use crate::EpisodeError;
 use crate::commands::Called;
 use crate::protocol::rules;
-use crate::recording::RecordedCheckpoint;
+use crate::recording::{CallerRecord, RecordedCheckpoint};
 use crate::spec::{EpisodeSpec, Start};
 
 /// An episode under way for the second time.
@@ -45,11 +45,17 @@ impl Replay {
         Ok(Replay { session, policy_clock_ns })
     }
 
-    /// Makes a call that was made when the policy had thought for as long as `thought`.
-    pub fn call(&mut self, called: &Called, thought: Duration) -> Result<(), EpisodeError> {
+    /// Makes a call that was made when the policy had thought for as long as `thought`; `shown` as [`crate::RecordedCall`] has it.
+    pub fn call(
+        &mut self,
+        called: &Called,
+        thought: Duration,
+        shown: Option<&[ExtraInformation]>,
+    ) -> Result<(), EpisodeError> {
         let passed = thought.saturating_sub(self.session.clock.spent());
         self.policy_clock_ns.fetch_add(u64::try_from(passed.as_nanos()).unwrap_or(u64::MAX), Relaxed);
-        self.session.make(None, called).map(drop)
+        let caller = shown.map_or(CallerRecord::Policy, CallerRecord::InProcess);
+        self.session.make(caller, called).map(drop)
     }
 
     /// The hashes of the states since they were last taken, the first of all included.

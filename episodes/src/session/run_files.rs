@@ -17,7 +17,9 @@ use crate::EpisodeError;
 use crate::commands::Called;
 use crate::observation::Observer;
 use crate::output::{OutputError, create_private_folder, write_whole};
-use crate::recording::{CallOutcome, Recorder, RecorderThread, RecordingHeader, ToolCallRecord, Visibility};
+use crate::recording::{
+    CallOutcome, CallerRecord, Recorder, RecorderThread, RecordingHeader, ToolCallRecord, Visibility,
+};
 use crate::reports::episode::{
     CELL_HEIGHT, CELL_WIDTH, CallCounts, EpisodePage, KeyMoment, LabelledPicture, PAGE_FILE, STRIP_FILE,
     strip,
@@ -103,13 +105,13 @@ impl RunFiles {
         &mut self,
         time_s: f64,
         thought: Duration,
-        operator: Option<&str>,
+        caller: CallerRecord,
         called: &Called,
         outcome: CallOutcome,
     ) {
         self.calls.count(called.name(), outcome.is_ok());
         let Some(recorder) = &self.recorder else { return };
-        let record = ToolCallRecord::new(time_s, thought, operator, called, outcome);
+        let record = ToolCallRecord::new(time_s, thought, caller, called, outcome);
         let pictures = record.as_ref().map_or(0, |record| record.pictures.len());
         recorder.append_pictures(pictures, move |recorder| recorder.tool_call(record?));
     }

@@ -27,8 +27,15 @@ impl ShownInformation {
         self.0.iter().map(|(what, robots)| (what.name().into(), robots.clone())).collect()
     }
 
+    /// Counts that an observation has shown all this of every robot in it.
+    pub fn count_each(&mut self, shown: &[ExtraInformation], seen: &TeamObservation) {
+        for robot in &seen.robots {
+            shown.iter().for_each(|what| self.count(*what, &robot.state.robot));
+        }
+    }
+
     /// Counts that a reply has shown `what` of `robot`.
-    pub fn count(&mut self, what: ExtraInformation, robot: &str) {
+    fn count(&mut self, what: ExtraInformation, robot: &str) {
         *self.0.entry(what).or_default().entry(robot.into()).or_default() += 1;
     }
 
@@ -69,7 +76,7 @@ impl ShownInformation {
             (ExtraInformation::Gravity, state.gravity_in_pelvis.is_some()),
             (ExtraInformation::Odometry, state.pelvis_in_start.is_some()),
         ];
-        self.count_each(&shown, &state.robot);
+        self.count_those(&shown, &state.robot);
     }
 
     fn count_report(&mut self, report: &RobotReport) {
@@ -79,10 +86,10 @@ impl ShownInformation {
             (ExtraInformation::HandForces, hands.iter().any(|hand| hand.force_n.is_some())),
             (ExtraInformation::Odometry, report.pelvis_in_start.is_some() || report.base_motion.is_some()),
         ];
-        self.count_each(&shown, &report.robot);
+        self.count_those(&shown, &report.robot);
     }
 
-    fn count_each(&mut self, shown: &[(ExtraInformation, bool)], robot: &str) {
+    fn count_those(&mut self, shown: &[(ExtraInformation, bool)], robot: &str) {
         for (what, _) in shown.iter().filter(|(_, is_shown)| *is_shown) {
             self.count(*what, robot);
         }
@@ -90,6 +97,13 @@ impl ShownInformation {
 }
 
 impl Answer {
+    /// The answer as a policy of this assistance is told it.
+    pub fn told(&self, assistance: Assistance) -> Answer {
+        let mut told = self.clone();
+        told.withhold(assistance);
+        told
+    }
+
     /// Takes out what a policy of this assistance is not told.
     pub fn withhold(&mut self, assistance: Assistance) {
         match (assistance, self) {

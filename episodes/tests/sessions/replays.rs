@@ -1,5 +1,6 @@
 //! Recordings simulated again: the same where they are whole, and found out where a number was changed.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -7,7 +8,7 @@ use std::time::Duration;
 
 use crate::common::*;
 use crate::recordings::interrupted;
-use tandem_episodes::players::{self, InProcess, PlayerError};
+use tandem_episodes::players::{self, InProcess, LocalEpisode as _, PlayerError};
 use tandem_episodes::replay::{Verdict, Verification, verify};
 use tandem_episodes::{
     Clock, EpisodeSpec, Phase, PhaseStart, Recorder, Recording, Sensing, SensorModel, Session, Start,
@@ -121,7 +122,7 @@ fn the_clock_is_charged_again_as_it_was() {
     }
 }
 
-/// A copy of a recording in which `change` was made to the JSON of the tool calls.
+/// A copy of a recording in which `change` was made to the JSON of the tool calls and to that of the result.
 fn changed(path: &Path, change: impl Fn(&str) -> String) -> PathBuf {
     let bytes = std::fs::read(path).unwrap();
     let copy = path.with_file_name("changed.mcap");
@@ -136,7 +137,13 @@ fn changed(path: &Path, change: impl Fn(&str) -> String) -> PathBuf {
     }
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
     for index in &summary.metadata_indexes {
-        writer.write_metadata(&mcap::read::metadata(&bytes, index).unwrap()).unwrap();
+        let mut record = mcap::read::metadata(&bytes, index).unwrap();
+        if record.name == "result" {
+            // Whoever changes a result leaves out its checksum, which early recordings had none of.
+            record.metadata.remove("crc32").expect("a checksum");
+            record.metadata.values_mut().for_each(|text| *text = change(text));
+        }
+        writer.write_metadata(&record).unwrap();
     }
     writer.finish().unwrap();
     copy
@@ -165,6 +172,42 @@ fn a_changed_number_is_found_at_its_step() {
     check("{\\\"steps\\\":7}", "{\\\"steps\\\":6}", 7, 2, "move_wrists");
     // One that is longer at the end has states that were never recorded.
     check("{\\\"steps\\\":10}", "{\\\"steps\\\":11}", 43, 3, "wait");
+}
+
+/// What a policy was shown is counted again: how often, and by a policy in this process, too, to whom the reply is not shown.
+#[test]
+fn a_result_that_hides_what_its_policy_was_told_differs() {
+    use tandem_tools_spec::ExtraInformation::{JointVelocities, ThirdPerson};
+    let folder = tempfile::tempdir().unwrap();
+    let own = spec("handover", 5, Protocol::Benchmark);
+    let mut episode = InProcess::new(Session::start(&own, Some(folder.path())).unwrap());
+    state(&mut episode.session, "A");
+    let look = Observe { robots: None, short: Some(true) };
+    episode.observe(&look, &[JointVelocities, ThirdPerson]).unwrap();
+    episode.carry_out(Wait { steps: 3 }.into()).unwrap();
+    wait(&mut episode.session, 2);
+    let result = episode.session.close();
+    let by_robot = |a: u32, b: u32| BTreeMap::from([("A".to_owned(), a), ("B".to_owned(), b)]);
+    assert_eq!(result.extra_information_replies["joint_velocities"], by_robot(2, 1));
+    assert_eq!(result.extra_information_replies["odometry"], by_robot(2, 1));
+    let path = folder.path().join(Recorder::FILE_NAME);
+    assert_eq!(verified(&path).outcome, Verdict::Same);
+    let calls = Recording::read(&path).unwrap().tool_calls().unwrap();
+    let shown: Vec<_> = calls.into_iter().map(|call| call.shown).collect();
+    assert_eq!(shown, [None, Some(vec![JointVelocities, ThirdPerson]), Some(vec![]), None]);
+    for (from, to) in [
+        (r#""joint_velocities":{"A":2,"B":1}"#, r#""joint_velocities":{"A":1,"B":1}"#),
+        (r#","third_person":{"A":1,"B":1}"#, ""),
+        (r#""third_person","#, ""),
+        (r#""shown":["joint_velocities","third_person"]"#, r#""shown":["third_person"]"#),
+    ] {
+        let copy = changed(&path, |text| text.replace(from, to));
+        let outcome = verified(&copy).outcome;
+        assert!(
+            matches!(outcome, Verdict::Result { what: "extra information", .. }),
+            "{from} -> {to}: {outcome:?}"
+        );
+    }
 }
 
 #[test]

@@ -28,10 +28,15 @@ pub struct AppState {
 impl AppState {
     /// The tools that `caller` may be offered: talking is for operators who may.
     pub fn tool_specs(&self, caller: &Caller) -> Vec<ToolSpec> {
-        match self.table.may_talk(caller) {
+        let mut specs = match self.table.may_talk(caller) {
             true => operator_tool_specs(self.settings.wording()),
             false => tool_specs(self.settings.wording()),
+        };
+        if let Caller::Operator { .. } = caller {
+            // An operator's episode goes on already, and no other can be begun.
+            specs.retain(|spec| spec.name != StartEpisode::NAME);
         }
+        specs
     }
 
     /// The REST interface as `caller` may use it.

@@ -35,16 +35,21 @@ use covariance::{
 };
 use feet::{Foot, facing_rad};
 
-/// What the sensors of a robot read at one instant.
+/// What the joints of a robot read at one instant, in the published order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SensorReadings {
-    /// Published order, as the velocities and torques.
+pub struct JointReadings {
     #[serde(with = "joint_array")]
     pub q_rad: [f32; JOINTS],
     #[serde(with = "joint_array")]
     pub qd_rad_s: [f32; JOINTS],
     #[serde(with = "joint_array")]
     pub torque_n_m: [f32; JOINTS],
+}
+
+/// What the sensors of a robot read at one instant.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SensorReadings {
+    pub joints: JointReadings,
     /// Angular velocity of the pelvis, in its axes.
     pub gyro_rad_s: Vector,
     /// Specific force at the IMU, its mean since the last reading, in the pelvis' axes: upwards 9.81 at rest.
@@ -144,9 +149,9 @@ impl StateEstimator {
     /// One reading, `dt_s` after the last one. Returns the poses of all links in the pelvis frame, by the joints.
     pub(crate) fn update(&mut self, model: &RobotModel, readings: &SensorReadings, dt_s: f32) -> Vec<Pose> {
         self.predict(readings, f64::from(dt_s));
-        let pelvis_from_link = model.forward_kinematics(Pose::IDENTITY, &readings.q_rad);
+        let pelvis_from_link = model.forward_kinematics(Pose::IDENTITY, &readings.joints.q_rad);
         let rotation = self.world_from_imu.as_quat();
-        Foot::feel(&mut self.feet, model, &pelvis_from_link, rotation, &readings.torque_n_m, dt_s);
+        Foot::feel(&mut self.feet, model, &pelvis_from_link, rotation, &readings.joints.torque_n_m, dt_s);
         self.see_stillness(readings, &pelvis_from_link, dt_s);
         self.correct(model, &pelvis_from_link, f64::from(dt_s));
         pelvis_from_link
@@ -176,7 +181,13 @@ impl StateEstimator {
             spin_rad_s,
         };
         let world_from_link = pelvis_from_link.iter().map(|link| pelvis.world_from_pelvis * *link).collect();
-        BodyEstimate::of_motion(model, &pelvis, &readings.q_rad, &readings.qd_rad_s, world_from_link)
+        BodyEstimate::of_motion(
+            model,
+            &pelvis,
+            &readings.joints.q_rad,
+            &readings.joints.qd_rad_s,
+            world_from_link,
+        )
     }
 
     fn is_still(&self) -> bool {

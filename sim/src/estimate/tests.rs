@@ -21,9 +21,7 @@ fn standing() -> SensorReadings {
         }
     }
     SensorReadings {
-        q_rad: body.q_rad,
-        qd_rad_s: [0.0; JOINTS],
-        torque_n_m,
+        joints: JointReadings { q_rad: body.q_rad, qd_rad_s: [0.0; JOINTS], torque_n_m },
         gyro_rad_s: Vector::ZERO,
         specific_force_m_s2: Vector::Z * GRAVITY_M_S2,
     }
@@ -31,7 +29,7 @@ fn standing() -> SensorReadings {
 
 fn estimator(readings: &SensorReadings) -> StateEstimator {
     let pelvis = Posed::standing().world_from_pelvis;
-    StateEstimator::new(model(), &pelvis, &readings.q_rad, readings.specific_force_m_s2, 0.0)
+    StateEstimator::new(model(), &pelvis, &readings.joints.q_rad, readings.specific_force_m_s2, 0.0)
 }
 
 fn body_after(estimator: &mut StateEstimator, readings: &SensorReadings, seconds: f32) -> BodyEstimate {
@@ -74,7 +72,8 @@ fn a_foot_that_carries_nothing_does_not_stand() {
     let body = Posed::standing().body();
     let gravity_n_m = body.gravity_torques_n_m();
     let left = LEGS[Side::Left];
-    readings.torque_n_m[left..left + LEG_JOINTS].copy_from_slice(&gravity_n_m[left..left + LEG_JOINTS]);
+    readings.joints.torque_n_m[left..left + LEG_JOINTS]
+        .copy_from_slice(&gravity_n_m[left..left + LEG_JOINTS]);
     let mut estimator = estimator(&readings);
     body_after(&mut estimator, &readings, 0.1);
     assert_eq!(estimator.feet.left.contact_share, 0.0);

@@ -74,7 +74,7 @@ impl SelfKnowledge {
         let estimator = (sensing.state_estimate == StateSource::Estimator).then(|| {
             let upwards = rotation.inverse() * Vector::Z;
             let still_force_m_s2 = sensors.still_force_m_s2(upwards * crate::GRAVITY_M_S2);
-            StateEstimator::new(model, told, &readings.q_rad, still_force_m_s2, sensors.latency_s())
+            StateEstimator::new(model, told, &readings.joints.q_rad, still_force_m_s2, sensors.latency_s())
         });
         let heading = Rotation::from_rotation_z(heading_rad(told));
         let world_from_start = Pose::from_parts(flat(told.translation), heading);
@@ -101,7 +101,7 @@ impl SelfKnowledge {
     pub(super) fn body(&self, model: &Arc<RobotModel>, tree: &Tree) -> BodyEstimate {
         match &self.estimator {
             Some(estimator) => {
-                let pelvis_from_link = model.forward_kinematics(Pose::IDENTITY, &self.readings.q_rad);
+                let pelvis_from_link = model.forward_kinematics(Pose::IDENTITY, &self.readings.joints.q_rad);
                 estimator.body(model, &self.readings, &pelvis_from_link)
             }
             None => from_truth(model, tree, &self.readings),
@@ -127,8 +127,8 @@ fn from_truth(model: &Arc<RobotModel>, tree: &Tree, readings: &SensorReadings) -
     });
     BodyEstimate {
         model: Arc::clone(model),
-        q_rad: readings.q_rad,
-        qd_rad_s: readings.qd_rad_s,
+        q_rad: readings.joints.q_rad,
+        qd_rad_s: readings.joints.qd_rad_s,
         pelvis_velocity_m_s: tree.link_velocity_m_s(0).as_vec3(),
         pelvis_angular_velocity_rad_s: tree.link_spin_rad_s(0).as_vec3(),
         world_from_link,

@@ -102,7 +102,7 @@ impl Robot {
 
     /// Sets this robot's joint drives for one physics step, `substep` counting from 0 within the control step.
     pub(crate) fn drive(&mut self, dynamics: &mut Dynamics, command: &RobotCommand, substep: u32) {
-        let torque_n_m = &self.memory.knowledge.readings().torque_n_m;
+        let torque_n_m = &self.memory.knowledge.readings().joints.torque_n_m;
         let load_n_m = self.memory.hand_loads.update(&self.body, torque_n_m, PHYSICS_DT_S);
         let legs = match self.memory.fallen {
             true => limp_legs(&self.model),

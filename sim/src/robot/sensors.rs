@@ -7,7 +7,7 @@ use super::joints;
 use crate::GRAVITY_M_S2;
 use crate::body::{JOINTS, RobotModel};
 use crate::dynamics::Tree;
-use crate::estimate::SensorReadings;
+use crate::estimate::{JointReadings, SensorReadings};
 use crate::random::SplitMix64;
 
 /// How good a robot's sensors are.
@@ -114,15 +114,15 @@ impl Sensors {
         };
         self.last_ideal = Some(ideal);
         for joint in 0..JOINTS {
-            read.q_rad[joint] += self.random.normal() * noise.encoder_rad;
-            read.torque_n_m[joint] += self.random.normal() * noise.torque_n_m;
+            read.joints.q_rad[joint] += self.random.normal() * noise.encoder_rad;
+            read.joints.torque_n_m[joint] += self.random.normal() * noise.torque_n_m;
         }
         read.gyro_rad_s += self.gyro_bias_rad_s + self.normal() * noise.gyro_rad_s;
         read.specific_force_m_s2 += self.acc_bias_m_s2 + self.normal() * noise.acc_m_s2;
         let part = 1.0 - (-std::f32::consts::TAU * noise.rate_cutoff_hz * dt_s).exp();
-        read.qd_rad_s = std::array::from_fn(|joint| {
-            self.last.as_ref().map_or(0.0, |last| {
-                let difference_rad_s = (read.q_rad[joint] - last.q_rad[joint]) / dt_s;
+        read.joints.qd_rad_s = std::array::from_fn(|joint| {
+            self.last.as_ref().map_or(0.0, |SensorReadings { joints: last, .. }| {
+                let difference_rad_s = (read.joints.q_rad[joint] - last.q_rad[joint]) / dt_s;
                 last.qd_rad_s[joint] + (difference_rad_s - last.qd_rad_s[joint]) * part
             })
         });
@@ -151,9 +151,7 @@ impl Sensors {
         self.last_motion = Some((velocity_m_s, rotation));
         let force_m_s2 = (velocity_m_s - before_m_s) / dt_s + Vector::Z * GRAVITY_M_S2;
         SensorReadings {
-            q_rad,
-            qd_rad_s,
-            torque_n_m: joints::torques_n_m(tree, model),
+            joints: JointReadings { q_rad, qd_rad_s, torque_n_m: joints::torques_n_m(tree, model) },
             gyro_rad_s: rotation.inverse() * tree.link_spin_rad_s(0).as_vec3(),
             specific_force_m_s2: before.slerp(rotation, 0.5).inverse() * force_m_s2,
         }
@@ -166,9 +164,11 @@ fn between(now: &SensorReadings, before: &SensorReadings, share: f32) -> SensorR
         std::array::from_fn(|joint| now[joint] + (before[joint] - now[joint]) * share)
     };
     SensorReadings {
-        q_rad: mix(&now.q_rad, &before.q_rad),
-        qd_rad_s: mix(&now.qd_rad_s, &before.qd_rad_s),
-        torque_n_m: mix(&now.torque_n_m, &before.torque_n_m),
+        joints: JointReadings {
+            q_rad: mix(&now.joints.q_rad, &before.joints.q_rad),
+            qd_rad_s: mix(&now.joints.qd_rad_s, &before.joints.qd_rad_s),
+            torque_n_m: mix(&now.joints.torque_n_m, &before.joints.torque_n_m),
+        },
         gyro_rad_s: now.gyro_rad_s.lerp(before.gyro_rad_s, share),
         specific_force_m_s2: now.specific_force_m_s2.lerp(before.specific_force_m_s2, share),
     }
@@ -211,17 +211,17 @@ mod tests {
             let found = spread(&readings.iter().map(value).collect::<Vec<_>>());
             assert!((found / expected - 1.0).abs() < 0.1, "{found} {expected}");
         };
-        check(|read| read.q_rad[3], G1.encoder_rad);
-        check(|read| read.torque_n_m[7], G1.torque_n_m);
+        check(|read| read.joints.q_rad[3], G1.encoder_rad);
+        check(|read| read.joints.torque_n_m[7], G1.torque_n_m);
         check(|read| read.gyro_rad_s.z, G1.gyro_rad_s);
         check(|read| read.specific_force_m_s2.x, G1.acc_m_s2);
         // Differences of white noise s have 2 s^2 / dt^2; y += a (d - y) leaves 2 a^2 s^2 / dt^2 / (2 - a), and a is 0.7154 at 40 Hz
         // and 200 readings a second.
-        check(|read| read.qd_rad_s[3], 0.8926 * G1.encoder_rad / PHYSICS_DT_S);
+        check(|read| read.joints.qd_rad_s[3], 0.8926 * G1.encoder_rad / PHYSICS_DT_S);
         assert!(read(1) == readings && read(2) != readings, "the seed decides");
 
         let ideal = Sensors::new(SensorModel::Ideal, 1).read(tree, model(), PHYSICS_DT_S);
-        assert_eq!(ideal.q_rad, joints::read(tree, model()).0);
+        assert_eq!(ideal.joints.q_rad, joints::read(tree, model()).0);
         assert!((ideal.specific_force_m_s2 - Vector::Z * GRAVITY_M_S2).length() < 1e-4);
     }
 

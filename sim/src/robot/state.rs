@@ -6,8 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{Robot, RobotCommand};
 use crate::Sides;
-use crate::body::{JOINTS, UPPER, joint_array};
+use crate::body::UPPER;
 use crate::dynamics::Dynamics;
+use crate::estimate::JointReadings;
 use crate::locomotion::BaseCommand;
 use crate::mechanism::rounded;
 
@@ -15,13 +16,7 @@ use crate::mechanism::rounded;
 /// [`RobotTruth::fallen`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotSensed {
-    /// Published order, as the velocities and torques.
-    #[serde(with = "joint_array")]
-    pub q_rad: [f32; JOINTS],
-    #[serde(with = "joint_array")]
-    pub qd_rad_s: [f32; JOINTS],
-    #[serde(with = "joint_array")]
-    pub torque_n_m: [f32; JOINTS],
+    pub joints: JointReadings,
     /// The way down, which the IMU measures, in the pelvis frame.
     pub gravity_in_pelvis: Vector,
     /// The pelvis by the robot's own odometry: the start frame lies on the floor under the pelvis as it was put into the world,
@@ -59,7 +54,8 @@ pub struct RobotTruth {
 impl RobotSensed {
     /// Mechanical power of all joints, each counted whichever way it works.
     pub fn power_w(&self) -> f32 {
-        self.torque_n_m.iter().zip(&self.qd_rad_s).map(|(torque, rate)| (torque * rate).abs()).sum()
+        let JointReadings { qd_rad_s, torque_n_m, .. } = &self.joints;
+        torque_n_m.iter().zip(qd_rad_s).map(|(torque, rate)| (torque * rate).abs()).sum()
     }
 }
 
@@ -76,9 +72,7 @@ impl Robot {
         let world_from_pelvis = body.world_from_pelvis();
         let pelvis_from_world = world_from_pelvis.inverse();
         RobotSensed {
-            q_rad: body.q_rad,
-            qd_rad_s: body.qd_rad_s,
-            torque_n_m: self.memory.knowledge.readings().torque_n_m,
+            joints: self.memory.knowledge.readings().joints.clone(),
             gravity_in_pelvis: pelvis_from_world.rotation * -Vector::Z,
             start_from_pelvis: self.memory.knowledge.world_from_start().inverse() * world_from_pelvis,
             pelvis_from_wrist: self

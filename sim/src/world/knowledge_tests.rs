@@ -53,7 +53,7 @@ fn where_the_world_is_reaches_no_robot() {
         for (a, b) in here.iter().zip(&there) {
             assert!(apart(&a.estimate.world_from_pelvis, &b.estimate.world_from_pelvis) < 0.01);
             assert!(apart(&a.sensed.start_from_pelvis, &b.sensed.start_from_pelvis) < 0.01);
-            for (a, b) in a.sensed.q_rad.iter().zip(&b.sensed.q_rad) {
+            for (a, b) in a.sensed.joints.q_rad.iter().zip(&b.sensed.joints.q_rad) {
                 assert!((a - b).abs() < 0.02, "{sensors:?}: {a} {b}");
             }
         }
@@ -97,7 +97,7 @@ fn a_robot_stays_as_it_senses_itself() {
     world.robots[0].set_sensing(&world.dynamics, &told, sensing, 7);
     let noisy = world.rest_command(0);
     assert!((noisy.base.pelvis_height_m - 0.7).abs() < 0.01, "{}", noisy.base.pelvis_height_m);
-    let read_rad = world.present().robots[0].sensed.q_rad;
+    let read_rad = world.present().robots[0].sensed.joints.q_rad;
     for (told_rad, joint) in noisy.upper_rad.iter().zip(UPPER) {
         assert!((told_rad - read_rad[joint]).abs() < 1e-3);
     }

@@ -22,11 +22,12 @@ fn the_legs_of_a_fallen_robot_are_limp() {
         let step = world.control_step(&command).expect("it stays finite");
         let robot = &step.robots[0];
         // What a faster robot gains by integration is taken back after its drives have acted.
-        if fell && robot.sensed.qd_rad_s.iter().all(|speed| speed.abs() < 8.0) {
+        if fell && robot.sensed.joints.qd_rad_s.iter().all(|speed| speed.abs() < 8.0) {
             checked += 1;
             let model = &world.robots()[0].model;
             for (index, joint) in model.joints.iter().enumerate().take(12) {
-                let (torque_n_m, velocity) = (robot.sensed.torque_n_m[index], robot.sensed.qd_rad_s[index]);
+                let (torque_n_m, velocity) =
+                    (robot.sensed.joints.torque_n_m[index], robot.sensed.joints.qd_rad_s[index]);
                 let damper_n_m = -joint.kd_n_m_s_rad * velocity;
                 assert!(
                     (torque_n_m - damper_n_m).abs() < 0.01,
@@ -40,8 +41,8 @@ fn the_legs_of_a_fallen_robot_are_limp() {
     assert!(checked > 50, "{checked} steps were looked at");
     let step = world.present();
     let sensed = &step.robots[0].sensed;
-    assert!(fell && sensed.qd_rad_s.iter().all(|speed| speed.abs() < 0.5), "it lies still");
-    let arm_rad = sensed.q_rad[15] - command[0].upper_rad[0];
+    assert!(fell && sensed.joints.qd_rad_s.iter().all(|speed| speed.abs() < 0.5), "it lies still");
+    let arm_rad = sensed.joints.q_rad[15] - command[0].upper_rad[0];
     assert!(arm_rad.abs() < 0.6, "its arm still does what it is told: {arm_rad} rad away");
 }
 

@@ -72,7 +72,7 @@ fn robots_stand_while_their_arms_move() {
         let step = run(&mut world, &rest, 1);
         low = low.min(pelvis_m(&step, 0));
         high = high.max(pelvis_m(&step, 0));
-        let torques_n_m = step.robots[0].sensed.torque_n_m;
+        let torques_n_m = step.robots[0].sensed.joints.torque_n_m;
         for (torque_n_m, joint) in torques_n_m.iter().zip(&world.robots()[0].model.joints) {
             assert!(torque_n_m.abs() <= joint.effort_n_m, "{} needs {torque_n_m} N m", joint.name);
         }

@@ -9,7 +9,7 @@ use foxglove::{Encode, Schema, bytes::BufMut};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tandem_sim::{BaseCommand, RobotCommand, RobotStep, Side, Step};
-use tandem_tools_spec::{Budget, PhaseReached, ToolReply};
+use tandem_tools_spec::{Budget, ExtraInformation, PhaseReached, ToolReply};
 
 use crate::commands::{Called, base_row};
 use crate::observation::{Picture, TeamObservation};
@@ -264,6 +264,36 @@ impl<'a> From<&'a TeamObservation> for CallOutcome<'a> {
     }
 }
 
+/// Who made a call, and what it showed.
+#[derive(Clone, Copy)]
+pub enum CallerRecord<'a> {
+    /// The policy that directs all robots. It is shown the reply.
+    Policy,
+    /// The operator of this robot, who is shown the reply.
+    Operator(&'a str),
+    /// Who carries out what a policy in this process decides. Of what the benchmark's own policies are not shown, the policy
+    /// itself is shown this of every robot that was looked at.
+    InProcess(&'a [ExtraInformation]),
+}
+
+impl<'a> CallerRecord<'a> {
+    /// The robot whose operator called.
+    pub fn operator(self) -> Option<&'a str> {
+        match self {
+            CallerRecord::Operator(robot) => Some(robot),
+            CallerRecord::Policy | CallerRecord::InProcess(_) => None,
+        }
+    }
+
+    /// See [`RecordedCall::shown`](crate::RecordedCall).
+    fn shown(self) -> Option<&'a [ExtraInformation]> {
+        match self {
+            CallerRecord::Policy | CallerRecord::Operator(_) => None,
+            CallerRecord::InProcess(shown) => Some(shown),
+        }
+    }
+}
+
 /// A tool call as it is recorded: the call with its answer, and the pictures of that, which have topics of their own.
 pub struct ToolCallRecord {
     /// When it was answered.
@@ -274,12 +304,11 @@ pub struct ToolCallRecord {
 }
 
 impl ToolCallRecord {
-    /// What `operator` called (`None` where one policy directs all) and how it came out; the policy has `thought` since the
-    /// episode began, up to this call.
+    /// What was called by whom, and how it came out; the policy has `thought` since the episode began, up to this call.
     pub fn new(
         time_s: f64,
         thought: Duration,
-        operator: Option<&str>,
+        caller: CallerRecord,
         called: &Called,
         outcome: CallOutcome,
     ) -> Result<ToolCallRecord, OutputError> {
@@ -287,7 +316,8 @@ impl ToolCallRecord {
             tool: called.name().into(),
             thought_ns: u64::try_from(thought.as_nanos()).unwrap_or(u64::MAX),
             arguments: called.arguments()?,
-            operator: operator.map(str::to_owned),
+            operator: caller.operator().map(str::to_owned),
+            shown: caller.shown().map(|shown| shown.iter().map(|what| what.name().into()).collect()),
             ok: outcome.is_ok(),
             reply: outcome.text()?,
         };
@@ -306,6 +336,11 @@ pub struct ToolCallMessage {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "String")]
     pub operator: Option<String>,
+    /// Of what the benchmark's own policies are not shown, what a policy was shown that is asked in the simulator's process;
+    /// absent where the policy was shown the whole reply.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Vec<String>")]
+    pub shown: Option<Vec<String>>,
     pub ok: bool,
     /// The reply without pictures, or the text of the problem.
     pub reply: String,

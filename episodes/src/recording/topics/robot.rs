@@ -97,10 +97,10 @@ impl RobotTopics {
 fn joint_states(model: &RobotModel, time_s: f64, sensed: &RobotSensed) -> JointStates {
     let joints = model.joints.iter().enumerate().map(|(index, joint)| JointState {
         name: joint.name.clone(),
-        position: Some(sensed.q_rad[index].into()),
-        velocity: Some(sensed.qd_rad_s[index].into()),
+        position: Some(sensed.joints.q_rad[index].into()),
+        velocity: Some(sensed.joints.qd_rad_s[index].into()),
         acceleration: None,
-        effort: Some(sensed.torque_n_m[index].into()),
+        effort: Some(sensed.joints.torque_n_m[index].into()),
     });
     JointStates { timestamp: Some(timestamp(time_s)), joints: joints.collect() }
 }

@@ -51,7 +51,7 @@ fn link_poses<'a>(
     sensed: &'a RobotSensed,
 ) -> impl Iterator<Item = (usize, Pose)> + 'a {
     model.joints.iter().enumerate().map(|(index, joint)| {
-        let turn = Rotation::from_axis_angle(joint.axis, sensed.q_rad[index]);
+        let turn = Rotation::from_axis_angle(joint.axis, sensed.joints.q_rad[index]);
         (joint.link, model.links[joint.link].parent_from_link * Pose::from_rotation(turn))
     })
 }

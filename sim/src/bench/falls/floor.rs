@@ -58,7 +58,7 @@ impl FloorEpisode {
 /// Sends the robot of a world of one robot anywhere.
 pub(super) fn thrash(world: &mut World, how: Stagger, steps: u32, seed: u64) -> FallTrial {
     let model = world.robots()[0].model.clone();
-    let rest_rad = world.present().robots[0].sensed.q_rad;
+    let rest_rad = world.present().robots[0].sensed.joints.q_rad;
     let episode = FloorEpisode::draw(&model, &rest_rad, how, steps, seed);
     let rest = world.rest_command(0);
     let rows = Arc::new(episode.targets_rad.clone());

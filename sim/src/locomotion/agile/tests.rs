@@ -253,6 +253,6 @@ fn a_policy_drives_the_robot_and_snapshots_continue_bit_for_bit() {
     run(&mut second, 6);
     assert_eq!(first.state_hash(), second.state_hash());
     // The policy wants the waist ever further ahead of where it is, and it follows.
-    let waist_rad = first.present().robots[0].sensed.q_rad[WAIST + 1];
+    let waist_rad = first.present().robots[0].sensed.joints.q_rad[WAIST + 1];
     assert!(waist_rad > 2e-3, "{waist_rad}");
 }

@@ -221,6 +221,17 @@ fn operators_may_speak_mcp() {
     assert!(failed && text.contains("driven by its own operator"), "{text}");
     let start = json!({ "task": "handover", "seed": 0 });
     assert!(call(&team.tokens[0], "start_episode", start).0);
+    // What is refused is not offered.
+    let offered = |token: &str| {
+        let list = json!({ "jsonrpc": "2.0", "id": 1, "method": "tools/list", "params": {} });
+        let bearer = format!("Bearer {token}");
+        let headers = [("authorization", bearer.as_str()), ("accept", "application/json, text/event-stream")];
+        let listed = team.server.post_with("/mcp", &headers, &list).ok();
+        let (_, _, tools) = team.server.ask("GET", "/v1/tools", &headers[..1], b"");
+        let tools: Value = serde_json::from_slice(&tools).expect("JSON");
+        [&listed["result"]["tools"], &tools].map(|tools| names(tools, "name").contains(&"start_episode"))
+    };
+    assert_eq!((offered(&team.tokens[0]), offered("none")), ([false; 2], [true; 2]));
     let prompt = |token: &str| {
         let request = json!({
             "jsonrpc": "2.0", "id": 1, "method": "prompts/get",

@@ -67,7 +67,7 @@ impl Played {
     fn angle_rad(&self, joint: usize, control_step: u64) -> f32 {
         let mut steps = self.recording.steps().map(|step| step.expect("a whole step"));
         let step = steps.find(|step| step.control_step == control_step).expect("a step");
-        step.robots[0].sensed.q_rad[joint]
+        step.robots[0].sensed.joints.q_rad[joint]
     }
 }
 

@@ -43,5 +43,5 @@ pub fn last_angles_rad(folder: &Path, name: &str, joint: usize) -> Vec<f32> {
     let path = folder.join("episodes").join(name).join(Recorder::FILE_NAME);
     let recording = Recording::read(&path).expect("a recording");
     let last = recording.steps().last().expect("a step").expect("a whole step");
-    last.robots.iter().map(|robot| robot.sensed.q_rad[joint]).collect()
+    last.robots.iter().map(|robot| robot.sensed.joints.q_rad[joint]).collect()
 }
