@@ -20,6 +20,14 @@ pub fn isometry_from_sim(pose: &Pose) -> Isometry3<f64> {
 }
 
 /// Six decimals: a micrometre. More would only cost a language model tokens.
+pub fn isometry_to_sim(pose: &Isometry3<f64>) -> Pose {
+    let q = pose.rotation.as_ref();
+    Pose::from_parts(
+        Vector::from(<[f64; 3]>::from(pose.translation.vector).map(|part| part as f32)),
+        Rotation::from_xyzw(q.i as f32, q.j as f32, q.k as f32, q.w as f32),
+    )
+}
+
 pub fn wire_pose(pose: &Isometry3<f64>) -> wire::Pose {
     let (t, r) = (pose.translation, pose.rotation);
     wire::Pose {

@@ -25,6 +25,7 @@ pub mod evaluation;
 mod fingerprint;
 pub mod html;
 mod instructions;
+pub mod live;
 mod observation;
 mod output;
 pub mod players;

@@ -76,6 +76,12 @@ impl TestServer {
         TestServer { address: server.address(), server: Some(server), runs, agent }
     }
 
+    /// What the link for watching has after its `#`.
+    pub fn watch_key(&self) -> String {
+        let link = self.server.as_ref().expect("a running server").watch_link();
+        link.split_once('#').expect("a link with a key").1.into()
+    }
+
     /// Stops the server as SIGTERM does.
     pub fn stop(&mut self) {
         let left = self.server.take().expect("a running server").stop();

@@ -171,6 +171,27 @@ impl Motion {
         self.state = state;
     }
 
+    /// What moves a robot like this one that is told the same.
+    pub fn another(&self) -> Motion {
+        Motion {
+            robot: self.robot.clone(),
+            solver: self.body.solver(),
+            body: self.body.clone(),
+            state: self.state.clone(),
+        }
+    }
+
+    /// The state of a robot like this one that was last told `command`, with its pelvis at `world_from_pelvis`: of its hands it is
+    /// known where the joints were to have them.
+    pub fn told(&self, command: &RobotCommand, world_from_pelvis: Isometry3<f64>) -> MotionState {
+        Motion::new(self.robot.clone(), &self.body, command, world_from_pelvis).state
+    }
+
+    /// Whether a wrist is to be at a pose, and its arm not only at joint angles.
+    pub fn aims_at_pose(&self, side: Side) -> bool {
+        self.state.aims[side] != Aim::Joints
+    }
+
     /// What the robot is told now.
     pub fn command(&self) -> RobotCommand {
         RobotCommand {

@@ -79,7 +79,8 @@ fn hand_report(side: Side, clamped: &Clamped, sensed: &RobotSensed, motion: &Mot
     }
 }
 
-fn wrist_state(
+/// How a wrist does that is to be at `target` and is at `measured`, both in the pelvis frame.
+pub fn wrist_state(
     side: Side,
     target: &Isometry3<f64>,
     measured: &Isometry3<f64>,

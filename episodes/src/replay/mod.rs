@@ -1,10 +1,12 @@
 //! Recordings brought back: simulated again and compared step by step, or drawn again by any camera.
 
+mod look_back;
 mod pictures;
 mod scene;
 mod verify;
 mod video;
 
+pub use look_back::RecordedEpisode;
 pub use pictures::{DrawnPictures, PicturesError, PicturesPlan, draw_all};
 pub use scene::{EpisodeCamera, EpisodeRenderer, PictureSize};
 pub use verify::{Difference, Verdict, Verification, verify};

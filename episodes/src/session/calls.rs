@@ -9,7 +9,7 @@ use super::answer::Answer;
 use crate::EpisodeError;
 use crate::commands::{Called, Command, OperatorCall, OperatorCommand, RobotOrder};
 use crate::observation::TeamObservation;
-use crate::recording::{CallOutcome, CallerRecord};
+use crate::recording::{CallOutcome, CallerRecord, ToolCallRecord};
 
 /// What a call comes to.
 #[derive(Clone, Debug)]
@@ -194,8 +194,15 @@ impl Session {
 
     /// A call has come out: records it, and closes the files if it has ended the episode.
     fn came_out(&mut self, underway: bool, caller: CallerRecord, called: &Called, outcome: CallOutcome) {
-        if let (true, Some(files)) = (underway, &mut self.files) {
-            files.tool_call(self.present.time_s, self.clock.spent(), caller, called, outcome);
+        if underway && (self.files.is_some() || self.shows_calls()) {
+            let (time_s, thought, ok) = (self.present.time_s, self.clock.spent(), outcome.is_ok());
+            let record = ToolCallRecord::new(time_s, thought, caller, called, outcome);
+            if self.shows_calls() {
+                self.show_call(&record);
+            }
+            if let Some(files) = &mut self.files {
+                files.tool_call(called.name(), ok, record);
+            }
         }
         if self.ended.is_some() {
             self.settle();

@@ -6,6 +6,7 @@ mod calls;
 mod checkpoint;
 mod clock;
 mod failure;
+mod onlookers;
 mod replay;
 mod run_files;
 mod status;
@@ -17,6 +18,7 @@ pub use checkpoint::{Checkpoint, FailedStep};
 pub use clock::{Clock, monotonic};
 pub use failure::FAILED_STEP_FILE;
 use failure::Rewind;
+use onlookers::Audience;
 pub(crate) use replay::Replay;
 use run_files::moment;
 pub use run_files::{RunFiles, RunFolder};
@@ -56,6 +58,7 @@ pub struct Session {
     clock: ThinkingClock,
     observer: Observer,
     files: Option<RunFiles>,
+    audience: Audience,
     /// Up to the end.
     tool_calls: u32,
     /// Time that physics took, for the real-time factor.
@@ -104,6 +107,7 @@ impl Session {
             clock: ThinkingClock::new(rules.thinking, clock),
             observer: Observer::new(spec.renderer, &world),
             files: None,
+            audience: Audience::default(),
             steps_before: 0,
             tool_calls: 0,
             physics: Duration::ZERO,
@@ -187,6 +191,7 @@ impl Session {
             files.finish(&mut result, self.origin.spec.task);
         }
         self.result = Some(result);
+        self.show_end();
     }
 
     /// Executes a command; fewer of its steps if the last phase is reached or the budget ends. Returns how many, and what of each order
@@ -240,6 +245,7 @@ impl Session {
         if let Some(files) = &mut self.files {
             files.step(self.present.clone(), self.world.state_hash(), scored.facts, budget);
         }
+        self.show_step(budget);
         if scored.reached {
             self.phases_reached(reached_before);
         } else if self.scores.underway() && !was_underway {
@@ -256,6 +262,7 @@ impl Session {
             if let Some(files) = &mut self.files {
                 files.phase(phase);
             }
+            self.show_phase(phase);
         }
         if !self.scores.complete() {
             self.keep_checkpoint(&Phase::number(reached.len()));

@@ -4,7 +4,6 @@
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Duration;
 use std::{fs, io};
 
 use tandem_sim::render::{Frame, PictureError, encode_png};
@@ -14,12 +13,9 @@ use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
 use super::failure::FAILED_STEP_FILE;
 use super::{Session, this_build};
 use crate::EpisodeError;
-use crate::commands::Called;
 use crate::observation::Observer;
 use crate::output::{OutputError, create_private_folder, write_whole};
-use crate::recording::{
-    CallOutcome, CallerRecord, Recorder, RecorderThread, RecordingHeader, ToolCallRecord, Visibility,
-};
+use crate::recording::{Recorder, RecorderThread, RecordingHeader, ToolCallRecord, Visibility};
 use crate::reports::episode::{
     CELL_HEIGHT, CELL_WIDTH, CallCounts, EpisodePage, KeyMoment, LabelledPicture, PAGE_FILE, STRIP_FILE,
     strip,
@@ -103,15 +99,12 @@ impl RunFiles {
 
     pub(super) fn tool_call(
         &mut self,
-        time_s: f64,
-        thought: Duration,
-        caller: CallerRecord,
-        called: &Called,
-        outcome: CallOutcome,
+        name: &'static str,
+        ok: bool,
+        record: Result<ToolCallRecord, OutputError>,
     ) {
-        self.calls.count(called.name(), outcome.is_ok());
+        self.calls.count(name, ok);
         let Some(recorder) = &self.recorder else { return };
-        let record = ToolCallRecord::new(time_s, thought, caller, called, outcome);
         let pictures = record.as_ref().map_or(0, |record| record.pictures.len());
         recorder.append_pictures(pictures, move |recorder| recorder.tool_call(record?));
     }

@@ -82,6 +82,7 @@ pub fn play_all(runs: &Path, seeds: Seeds, flags: Layer) -> Result<Vec<ResultRep
     let settings = Settings::resolve(flags, None)?;
     try_runs_folder(&settings.runs)?;
     let server = Server::start(settings)?;
+    println!("watch at {}", server.watch_link());
     let results = seeds.0.map(|seed| play(&server, seed)).collect::<Result<Vec<_>, _>>()?;
     server.stop();
     if results.len() > 1 {

@@ -7,6 +7,7 @@ use tracing_subscriber::filter::LevelFilter;
 use super::{
     CommandResult,
     logging::{LogFormat, log_server},
+    print,
 };
 use crate::{
     hosting::try_runs_folder,
@@ -35,6 +36,9 @@ pub fn run(args: ServeArgs) -> CommandResult {
     let flags = Layer { token: Token::from_environment()?, ..args.flags };
     let settings = Settings::resolve(flags, args.config.as_deref())?;
     try_runs_folder(&settings.runs)?;
-    let left = Server::start(settings)?.run_until_signal();
+    let server = Server::start(settings)?;
+    // Not in the log, which others may read.
+    print(&format!("watch at {}\n", server.watch_link()))?;
+    let left = server.run_until_signal();
     Ok(if left.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

@@ -12,13 +12,14 @@ use std::{
 
 use tandem_episodes::{
     CallReply, Clock, EpisodeError, EpisodeSpec, Facts, OperatorCall, OperatorCommand, RunFolder, Session,
-    monotonic,
+    live::LiveView, monotonic,
 };
 use tandem_tools_spec::{Briefing, Call, EndReason, ManageReply, Protocol, ResultReply, ToolCall, ToolReply};
 use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 
 use super::{
     Answer, HostingError,
+    onlookers::{FeedEnd, LiveFeed, LiveWatch},
     panic_guard::{EpisodeMetrics, PanicGuard},
 };
 use crate::metrics::Metrics;
@@ -60,6 +61,9 @@ enum Job {
     End {
         reason: EndReason,
     },
+    Watch {
+        reply: ReplySender<LiveView>,
+    },
     Close {
         reply: ReplySender<ResultReply>,
     },
@@ -76,6 +80,7 @@ pub struct EpisodeThread {
     subject: EpisodeSubject,
     robots: Vec<String>,
     steps_per_command: u32,
+    feed: Arc<LiveFeed>,
 }
 
 /// What an episode is one of.
@@ -145,16 +150,20 @@ impl EpisodeThread {
         let (started, start) = oneshot::channel();
         let status = Arc::new(SharedStatus::default());
         let subject = EpisodeSubject { task: spec.task.id, seed: spec.seed, protocol: spec.protocol };
+        let (feed, feed_end) = LiveFeed::new();
+        let feed = Arc::new(feed);
+        let fed = feed.clone();
         let (from_thread, name, path) = (status.clone(), id.to_owned(), folder.path.clone());
         let thread = move || {
             // Every line that is logged on this thread names the episode.
             let _named = tracing::info_span!("thread", episode = name).entered();
-            match open_session(&spec, folder, clock) {
+            match open_session(&spec, folder, clock, feed_end) {
                 Ok((session, briefing)) => {
                     // A caller that went away during the start has dropped the inbox's other end, and serve returns.
                     let _ = started.send(Ok(briefing));
                     let guarded = PanicGuard::new(session, EpisodeMetrics::new(metrics));
                     let closed = serve(guarded, inbox, &from_thread);
+                    fed.close();
                     // The place is free before the caller hears of the end, so that it can start the next episode.
                     drop(permit);
                     closed.answer();
@@ -171,7 +180,7 @@ impl EpisodeThread {
         status.env_steps.fetch_max(briefing.status.env_steps, Ordering::Relaxed);
         let steps_per_command = briefing.status.budget.steps_per_command;
         let robots = briefing.robots.iter().map(|robot| robot.robot.clone()).collect();
-        Ok((EpisodeThread { jobs, status, folder: path, subject, robots, steps_per_command }, briefing))
+        Ok((EpisodeThread { jobs, status, folder: path, subject, robots, steps_per_command, feed }, briefing))
     }
 
     /// Runs a call of the policy that directs all robots and returns its reply.
@@ -204,6 +213,14 @@ impl EpisodeThread {
     /// What has to be known to begin, as it stands now.
     pub async fn briefing(&self) -> Result<Briefing, HostingError> {
         self.do_job(|reply| Job::Briefing { reply }).await
+    }
+
+    /// How the episode stands, and what happens from now on, for who looks on: no call of the policy's.
+    pub async fn watch(&self) -> Result<LiveWatch, HostingError> {
+        // Listening comes first, so that nothing is missed between the two.
+        let events = self.feed.subscribe().ok_or(HostingError::EpisodeStopped)?;
+        let view = self.do_job_in_turn(|reply| Job::Watch { reply }).await?;
+        Ok(LiveWatch { view, events })
     }
 
     /// Where everything is and who touches what: for experts and scoring in this process, never for policies.
@@ -305,8 +322,10 @@ fn open_session(
     spec: &EpisodeSpec,
     folder: RunFolder,
     clock: Clock,
+    feed: FeedEnd,
 ) -> Result<(Session, Briefing), EpisodeError> {
-    let session = Session::start_with_clock(spec, Some(folder), clock)?;
+    let mut session = Session::start_with_clock(spec, Some(folder), clock)?;
+    session.set_onlookers(Box::new(feed));
     let briefing = session.briefing();
     Ok((session, briefing))
 }
@@ -345,6 +364,7 @@ fn serve(mut session: PanicGuard, mut inbox: mpsc::Receiver<Job>, status: &Share
             }
             Job::Status { reply } => drop(reply.send(session.run(|session| standing(session)))),
             Job::Briefing { reply } => drop(reply.send(session.run(|session| session.briefing()))),
+            Job::Watch { reply } => drop(reply.send(session.run(|session| session.live_view()))),
             Job::Facts { reply } => drop(reply.send(session.run(|session| session.facts()))),
             Job::EndIfAbandoned { idle } => {
                 // The log has the reason of a refusal.

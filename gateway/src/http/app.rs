@@ -7,7 +7,12 @@ use tandem_tools_spec::{
     EPISODE_TOOLS, ListTasks, StartEpisode, Tool as _, ToolSpec, operator_tool_specs, tool_specs,
 };
 
-use super::problem::ApiError;
+use tokio::sync::Semaphore;
+
+use super::{
+    pages::{LastOpened, MOST_WATCHERS, WatchKey},
+    problem::ApiError,
+};
 use crate::{
     hosting::{Caller, EpisodeTable},
     settings::Settings,
@@ -23,9 +28,21 @@ pub struct AppState {
     pub table: Arc<EpisodeTable>,
     /// What the server was told.
     pub settings: Arc<Settings>,
+    /// Who may watch.
+    pub watch_key: WatchKey,
+    /// Places for those who watch.
+    pub watchers: Arc<Semaphore>,
+    /// The recording that was watched last.
+    pub opened: LastOpened,
 }
 
 impl AppState {
+    /// A server that holds no episode yet.
+    pub fn new(table: Arc<EpisodeTable>, settings: Arc<Settings>, watch_key: WatchKey) -> AppState {
+        let watchers = Arc::new(Semaphore::new(MOST_WATCHERS));
+        AppState { table, settings, watch_key, watchers, opened: LastOpened::default() }
+    }
+
     /// The tools that `caller` may be offered: talking is for operators who may.
     pub fn tool_specs(&self, caller: &Caller) -> Vec<ToolSpec> {
         let mut specs = match self.table.may_talk(caller) {

@@ -7,6 +7,7 @@ mod gate;
 #[cfg(test)]
 mod hostile;
 mod mcp;
+mod pages;
 mod problem;
 mod rest;
 mod router;

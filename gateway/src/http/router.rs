@@ -15,7 +15,7 @@ use super::{
         limits::{self, Limits},
         tokens,
     },
-    mcp,
+    mcp, pages,
     problem::{ApiError, RefusalKind},
     rest,
 };
@@ -23,6 +23,7 @@ use super::{
 /// The whole service.
 pub fn router(app: AppState, gate: Gate, limits: Limits) -> Router {
     let routed = rest::router()
+        .merge(pages::router())
         .nest_service("/mcp", mcp::router(app.clone()))
         .fallback(no_route)
         .method_not_allowed_fallback(no_method)
@@ -49,7 +50,8 @@ async fn no_method(method: Method, uri: Uri) -> ApiError {
 }
 
 fn refused_route(method: Method, uri: Uri, other_method: bool) -> ApiError {
-    let have = rest::served().into_iter().chain(["POST /mcp".into()]).collect();
+    let have =
+        rest::served().into_iter().chain(["POST /mcp".into(), format!("GET {}", pages::WATCH)]).collect();
     ApiError::NoRoute { method: method.to_string(), path: uri.path().into(), have, other_method }
 }
 

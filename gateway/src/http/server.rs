@@ -9,6 +9,7 @@ use tokio::{net::TcpListener, runtime::Runtime, sync::oneshot, task::JoinHandle,
 use super::{
     app::AppState,
     gate::{Gate, connections, limits::Limits},
+    pages::{WATCH, WatchKey},
     router::router,
 };
 use crate::{
@@ -30,6 +31,7 @@ const ABANDONED_CHECK_INTERVAL: Duration = Duration::from_secs(1);
 pub struct Server {
     runtime: Runtime,
     address: SocketAddr,
+    watch_link: String,
     table: Arc<EpisodeTable>,
     stop: oneshot::Sender<()>,
     served: JoinHandle<()>,
@@ -52,7 +54,9 @@ impl Server {
         })?;
         let address = listener.local_addr()?;
         let table = Arc::new(EpisodeTable::new(settings.clone()));
-        let app = AppState { table: table.clone(), settings: settings.clone() };
+        let watch_key = WatchKey::random().map_err(io::Error::other)?;
+        let watch_link = format!("http://{address}{WATCH}#{}", watch_key.text());
+        let app = AppState::new(table.clone(), settings.clone(), watch_key);
         let router = router(app, Gate::new(settings.clone(), address.ip()), Limits::new(&settings));
         let (stop, stopped) = oneshot::channel::<()>();
         let served = runtime.spawn(connections::serve(listener, router, settings.request_timeout, async {
@@ -61,12 +65,17 @@ impl Server {
         runtime.spawn(end_abandoned_episodes(table.clone()));
         tracing::info!("{}", settings.assistance.about(settings.disclosure, settings.hints));
         tracing::info!("serving on http://{address}");
-        Ok(Server { runtime, address, table, stop, served, settings })
+        Ok(Server { runtime, address, watch_link, table, stop, served, settings })
     }
 
     /// The address that it serves on.
     pub fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// The link by which people watch. Who has it sees all, so it is for no log and no policy.
+    pub fn watch_link(&self) -> &str {
+        &self.watch_link
     }
 
     /// Starts `spec` under the name `id` with its files in `folder`, for an evaluation in this process.

@@ -8,3 +8,4 @@ mod paper_numbers;
 mod policies;
 mod server;
 mod skips;
+mod watching;

@@ -35,7 +35,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
             &["commands", "results"],
             &["observation"],
             &["describe", "recording"],
-            &["reports"],
+            &["live", "reports"],
             &["instructions", "session"],
             &["players", "replay"],
             &["evaluation", "bench"],

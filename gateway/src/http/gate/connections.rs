@@ -79,7 +79,8 @@ async fn connection(
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(header_limit)
-        .serve_connection(TokioIo::new(stream), with_peer);
+        .serve_connection(TokioIo::new(stream), with_peer)
+        .with_upgrades();
     let mut connection = std::pin::pin!(connection);
     let stopped = async move {
         let _ = stopping.wait_for(|stopping| *stopping).await;

@@ -3,25 +3,48 @@
 
 use axum::{
     extract::{Request, State},
-    http::{HeaderMap, header},
+    http::{HeaderMap, StatusCode, header},
     middleware::Next,
     response::{IntoResponse, Response},
 };
 
 use crate::{
     hosting::Caller,
-    http::{app::AppState, problem::ApiError},
+    http::{
+        app::AppState,
+        pages::{WATCH, Watcher, door},
+        problem::ApiError,
+    },
 };
 
 /// Lets a request pass with its [`Caller`], and without the token that identified the caller.
 pub async fn identify(State(app): State<AppState>, mut request: Request, next: Next) -> Response {
-    let Some(caller) = caller(&app, request.headers()) else {
+    let watches = is_watching(request.uri().path()) && app.watch_key.opens(request.headers());
+    let Some(caller) = caller(&app, request.headers()).or(watches.then_some(Caller::Host)) else {
         tracing::info!("a request without a token was refused");
-        return ApiError::NoToken.into_response();
+        return refused(request.headers());
     };
+    if watches {
+        request.extensions_mut().insert(Watcher);
+    }
+    request.headers_mut().remove(header::COOKIE);
     request.headers_mut().remove(header::AUTHORIZATION);
     request.extensions_mut().insert(caller);
     next.run(request).await
+}
+
+/// Whether a path is one for which the link opens, and no token does.
+fn is_watching(path: &str) -> bool {
+    path.strip_prefix(WATCH).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+}
+
+/// The refusal of who has no token: the same everywhere, for browsers as a page that reads the link for watching.
+fn refused(headers: &HeaderMap) -> Response {
+    let accepts = headers.get(header::ACCEPT).and_then(|value| value.to_str().ok()).unwrap_or_default();
+    match accepts.contains("text/html") {
+        true => door(StatusCode::UNAUTHORIZED),
+        false => ApiError::NoToken.into_response(),
+    }
 }
 
 fn caller(app: &AppState, headers: &HeaderMap) -> Option<Caller> {

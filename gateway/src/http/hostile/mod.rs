@@ -19,6 +19,7 @@ use tokio::runtime::Runtime;
 use super::{
     app::AppState,
     gate::{Gate, limits::Limits},
+    pages::WatchKey,
     router::router,
 };
 use crate::{
@@ -56,7 +57,8 @@ impl Target {
         let flags = Layer { runs: Some(runs.path().into()), max_episodes: Some(1), ..Layer::default() };
         let settings = Settings::resolve(flags, None).unwrap();
         let table = Arc::new(EpisodeTable::new(settings.clone()));
-        let app = AppState { table: table.clone(), settings: settings.clone() };
+        let key = WatchKey::random().unwrap();
+        let app = AppState::new(table.clone(), settings.clone(), key);
         let gate = Gate::new(settings.clone(), [127, 0, 0, 1].into());
         let router = TowerToHyperService::new(router(app, gate, Limits::new(&settings)));
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();

@@ -37,6 +37,8 @@ fn own_refusals() -> Vec<ApiError> {
         ApiError::MalformedJson("expected value at line 1".into()),
         ApiError::MalformedMsgpack("it ends too early".into()),
         ApiError::NoToken,
+        ApiError::NoWatcher,
+        ApiError::NoRun { run: "expert/handover-seed0".into() },
         ApiError::Key,
         ApiError::NoObject("a number"),
         ApiError::SlowBody { limit: Duration::from_secs(30) },

@@ -78,6 +78,15 @@ pub enum ApiError {
     /// Nothing says who calls.
     #[error("send the token as Authorization: Bearer TOKEN")]
     NoToken,
+    /// Who asks has not come by the link for watching.
+    #[error("watching wants the link that the server printed when it started; a policy's token does not do")]
+    NoWatcher,
+    /// No finished episode of that name.
+    #[error("no finished episode {run:?} with that file in the runs folder; GET /watch/episodes lists them")]
+    NoRun {
+        /// What was asked for.
+        run: String,
+    },
     /// An idempotency key that is no text of the right length.
     #[error(
         "Idempotency-Key has to be 1 to 255 letters, digits and signs, as a UUID; a new one for each request"
@@ -218,6 +227,8 @@ impl ApiError {
                 Problem::new("malformed-msgpack", "Malformed MessagePack", StatusCode::BAD_REQUEST)
             }
             ApiError::NoToken => Problem::new("no-token", "No token", StatusCode::UNAUTHORIZED),
+            ApiError::NoWatcher => Refusal::new("no-watcher", "Not by the link", Forbidden).into(),
+            ApiError::NoRun { .. } => Refusal::new("no-run", "No such finished episode", NotFound).into(),
             ApiError::Key => Problem::new("invalid-key", "Invalid key", StatusCode::BAD_REQUEST),
             ApiError::BrokenBody(_) => {
                 Problem::new("broken-body", "Body not received", StatusCode::BAD_REQUEST)

@@ -1,0 +1,131 @@
+//! What does not change in an episode, for those who look on: shapes, names and limits, and who draws the robots' pictures for them.
+
+use std::sync::{Mutex, PoisonError};
+
+use serde_json::{Value, json};
+use tandem_sim::render::{
+    Camera, Cameras, Intrinsics, PictureError, Renderer, RendererKind, Scenery, encode_png,
+};
+use tandem_sim::{CONTROL_HZ, Step, World};
+
+use super::geometry::{Geometry, pose_row};
+use super::{LiveStep, frame};
+use crate::EpisodeError;
+use crate::commands::Motion;
+use crate::protocol::rules;
+use crate::scoring::Phase;
+use crate::spec::EpisodeSpec;
+
+/// The scene of an episode.
+pub struct LiveScene {
+    head: Value,
+    numbers: Vec<u8>,
+    robots: Vec<RobotFrame>,
+    cameras: Cameras,
+    /// Robots of their own, which take up what those of the episode were told.
+    motions: Mutex<Vec<Motion>>,
+    drawing: Mutex<Drawing>,
+}
+
+/// What of a robot the message of a step needs.
+pub struct RobotFrame {
+    name: String,
+    pub effort_limits_n_m: Vec<f32>,
+}
+
+/// Who draws pictures, from when somebody looks at one.
+struct Drawing {
+    kind: RendererKind,
+    scenery: Option<Scenery>,
+    renderer: Option<Box<dyn Renderer>>,
+}
+
+impl LiveScene {
+    /// The scene of the episode `spec`, which is played in `world` by robots that `motions` move.
+    pub(crate) fn of(spec: &EpisodeSpec, world: &World, motions: &[Motion]) -> LiveScene {
+        let scenery = Scenery::of(world);
+        let Geometry { meshes, parts, numbers } = Geometry::of(&scenery);
+        let cameras = Cameras::of(world);
+        let third_person = cameras.third_person();
+        let robots = motions.iter().map(|motion| robot_head(motion)).collect::<Vec<_>>();
+        let objects: Vec<&str> = world.object_models().map(|(name, _)| name).collect();
+        let phases = spec.task.phases.iter().enumerate();
+        let phases = phases.map(|(index, phase)| {
+            json!({ "number": Phase::number(index), "id": phase.id, "collaborative": phase.collaborative })
+        });
+        let head = json!({
+            "task": spec.task.id, "seed": spec.seed, "protocol": spec.protocol, "instruction": spec.task.instruction,
+            "assistance": spec.assistance, "control_hz": CONTROL_HZ,
+            "episode_steps": rules(spec.protocol, spec.task).episode_steps,
+            "phases": phases.collect::<Vec<_>>(), "robots": robots, "objects": objects,
+            "third_person": { "pose": pose_row(&third_person.world_from_camera), "vertical_fov_rad": third_person.vertical_fov_rad },
+            "meshes": meshes, "parts": parts,
+        });
+        let frames = motions.iter().map(|motion| RobotFrame {
+            name: motion.robot.name.clone(),
+            effort_limits_n_m: motion.robot.model.joints.iter().map(|joint| joint.effort_n_m).collect(),
+        });
+        LiveScene {
+            head,
+            numbers,
+            robots: frames.collect(),
+            cameras,
+            motions: Mutex::new(motions.iter().map(Motion::another).collect()),
+            drawing: Mutex::new(Drawing { kind: spec.renderer, scenery: Some(scenery), renderer: None }),
+        }
+    }
+
+    /// The message that a page draws the scene from: the length of its head in bytes (u32), the head, JSON with `more` in it and
+    /// blanks up to a multiple of four, then the numbers of its meshes, then `rest`. All little-endian.
+    pub fn message(&self, more: Value, rest: &[u8]) -> Result<Vec<u8>, EpisodeError> {
+        let mut head = self.head.clone();
+        if let (Value::Object(head), Value::Object(more)) = (&mut head, more) {
+            head.extend(more);
+        }
+        let mut text = head.to_string().into_bytes();
+        text.resize(text.len().next_multiple_of(4), b' ');
+        let mut message = Vec::with_capacity(4 + text.len() + self.numbers.len() + rest.len());
+        message.extend((text.len() as u32).to_le_bytes());
+        message.extend(text);
+        message.extend(&self.numbers);
+        message.extend(rest);
+        Ok(message)
+    }
+
+    /// The message of a step; `frame.rs` says what is in it.
+    pub fn frame(&self, live: &LiveStep) -> Vec<u8> {
+        // Every frame begins with the states of its own step, so that a panic leaves nothing wrong behind.
+        let mut motions = self.motions.lock().unwrap_or_else(PoisonError::into_inner);
+        frame::row(live, &mut motions, &self.robots)
+    }
+
+    /// What robot `name` sees after `step`, as a PNG file; `None` if there is no such robot. Drawn for who looks on, and by nobody
+    /// whom the episode waits for.
+    pub fn picture(&self, step: &Step, name: &str) -> Option<Result<Vec<u8>, PictureError>> {
+        let robot = self.robots.iter().position(|robot| robot.name == name)?;
+        let camera: Camera = self.cameras.egocentric(step, robot);
+        let mut drawing = self.drawing.lock().unwrap_or_else(PoisonError::into_inner);
+        let Drawing { kind, scenery, renderer } = &mut *drawing;
+        let renderer = match renderer {
+            Some(renderer) => renderer,
+            none => none.insert(kind.renderer(scenery.take().unwrap_or_default())),
+        };
+        let drawn = renderer.render(step, &camera);
+        Some(encode_png(drawn.width, drawn.height, &drawn.rgb))
+    }
+
+    /// The names of the robots.
+    pub fn robots(&self) -> impl Iterator<Item = &str> {
+        self.robots.iter().map(|robot| robot.name.as_str())
+    }
+}
+
+fn robot_head(motion: &Motion) -> Value {
+    let model = &motion.robot.model;
+    let Intrinsics { width, height, .. } = Intrinsics::from(&model.egocentric);
+    let joints: Vec<&str> = model.joints.iter().map(|joint| joint.name.as_str()).collect();
+    json!({
+        "name": motion.robot.name, "links": model.links.len(), "joints": joints,
+        "camera": { "vertical_fov_rad": model.egocentric.vertical_fov_rad, "width": width, "height": height },
+    })
+}

@@ -1,0 +1,83 @@
+//! A finished episode for who looks at it in a page: its scene, what happened when, and its steps as a scrubber shows them. Nothing is
+//! simulated.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+use tandem_sim::Step;
+use tandem_sim::render::PictureError;
+
+use super::ReplayError;
+use crate::EpisodeError;
+use crate::commands::Motion;
+use crate::convert::isometry_from_sim;
+use crate::live::{LiveCall, LiveScene, LiveStep};
+use crate::recording::Recording;
+use crate::session::build;
+
+/// Every how many control steps one is shown: ten a second, between which a page draws what lies between.
+const STEPS_PER_FRAME: usize = 5;
+
+/// A recording that is looked at.
+pub struct RecordedEpisode {
+    scene: LiveScene,
+    motions: Vec<Motion>,
+    steps: Vec<Step>,
+    told: Value,
+}
+
+impl RecordedEpisode {
+    /// Reads the recording at `path`.
+    pub fn read(path: &Path) -> Result<RecordedEpisode, ReplayError> {
+        let recording = Recording::read(path)?;
+        let built = build(&recording.spec)?;
+        let mut steps: Vec<Step> = Vec::new();
+        let mut last = None;
+        for (index, step) in recording.steps().enumerate() {
+            let step = step?;
+            match index % STEPS_PER_FRAME {
+                0 => {
+                    steps.push(step);
+                    last = None;
+                }
+                _ => last = Some(step),
+            }
+        }
+        steps.extend(last);
+        let calls = recording.tool_calls()?;
+        let calls = calls.iter().zip(1..).map(|(call, number)| LiveCall::of_recorded(number, call));
+        let told = json!({
+            "recorded": true, "calls": calls.collect::<Vec<_>>(), "reached": recording.phases()?,
+            "result": recording.result, "frames": steps.len(),
+        });
+        let scene = LiveScene::of(&recording.spec, &built.world, &built.motions);
+        Ok(RecordedEpisode { scene, motions: built.motions, steps, told })
+    }
+
+    /// The message that a page draws all of it from: that of the scene with the calls, the phases and the result in its head, and every
+    /// step's at its end.
+    pub fn message(&self) -> Result<Vec<u8>, EpisodeError> {
+        let frames = self.steps.iter().flat_map(|step| self.scene.frame(&self.shown(step)));
+        let frames: Vec<u8> = frames.collect();
+        self.scene.message(self.told.clone(), &frames)
+    }
+
+    /// What robot `name` saw in the shown step that is nearest to `time_s`, as a PNG file; `None` if there is no such robot or step.
+    pub fn picture(&self, time_s: f64, name: &str) -> Option<Result<Vec<u8>, PictureError>> {
+        let away = |step: &&Step| (step.time_s - time_s).abs();
+        let step = self.steps.iter().min_by(|one, other| away(one).total_cmp(&away(other)))?;
+        self.scene.picture(step, name)
+    }
+
+    /// The names of the robots.
+    pub fn robots(&self) -> impl Iterator<Item = &str> {
+        self.scene.robots()
+    }
+
+    fn shown(&self, step: &Step) -> LiveStep {
+        let told = self.motions.iter().zip(&step.robots).map(|(motion, robot)| {
+            motion.told(&robot.command, isometry_from_sim(&robot.estimate.world_from_pelvis))
+        });
+        LiveStep::new(step.clone().into(), told.collect(), None)
+    }
+}

@@ -1,0 +1,101 @@
+//! What a session tells those who look on. It changes nothing: steps and calls are handed over as they have been made.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use tandem_tools_spec::{Budget, PhaseReached};
+
+use super::Session;
+use crate::live::{LiveCall, LiveEvent, LiveScene, LiveStep, LiveView, Onlookers, STEPS_PER_FRAME};
+use crate::output::OutputError;
+use crate::recording::ToolCallRecord;
+
+/// Calls that are kept for who comes later.
+const KEPT_CALLS: usize = 50;
+
+/// Who looks on, if anybody may, and what those are shown first who come later.
+#[derive(Default)]
+pub struct Audience {
+    onlookers: Option<Box<dyn Onlookers>>,
+    /// The latest, the oldest first.
+    calls: VecDeque<Arc<LiveCall>>,
+    calls_made: u32,
+    scene: Option<Arc<LiveScene>>,
+}
+
+impl Audience {
+    fn tell(&self, event: impl FnOnce() -> LiveEvent) {
+        if let Some(onlookers) = self.onlookers.as_deref().filter(|onlookers| onlookers.any()) {
+            onlookers.tell(event());
+        }
+    }
+}
+
+impl Session {
+    /// From now on, tells `onlookers` what happens.
+    pub fn set_onlookers(&mut self, onlookers: Box<dyn Onlookers>) {
+        self.audience.onlookers = Some(onlookers);
+    }
+
+    /// The episode as it stands, for who begins to look on. No call, and no time of the policy's.
+    pub fn live_view(&mut self) -> LiveView {
+        self.clock.pause();
+        let scene = match &self.audience.scene {
+            Some(scene) => scene.clone(),
+            None => {
+                let made = Arc::new(LiveScene::of(self.spec(), &self.world, &self.motions));
+                self.audience.scene.insert(made).clone()
+            }
+        };
+        let view = LiveView {
+            scene,
+            now: Arc::new(self.live_step(self.budget())),
+            calls: self.audience.calls.iter().cloned().collect(),
+            phases: self.reached(),
+            result: self.result.clone(),
+        };
+        self.let_think();
+        view
+    }
+
+    /// Shows the present step, where it is one that is shown.
+    pub(super) fn show_step(&self, budget: Budget) {
+        if self.present.control_step.is_multiple_of(STEPS_PER_FRAME) {
+            self.audience.tell(|| LiveEvent::Step(Arc::new(self.live_step(budget))));
+        }
+    }
+
+    pub(super) fn show_phase(&self, phase: &PhaseReached) {
+        self.audience.tell(|| LiveEvent::Phase(phase.clone()));
+    }
+
+    /// Shows the step in which the episode has ended, and what it came to.
+    pub(super) fn show_end(&self) {
+        self.audience.tell(|| LiveEvent::Step(Arc::new(self.live_step(self.budget()))));
+        if let Some(result) = &self.result {
+            self.audience.tell(|| LiveEvent::Ended(Arc::new(result.clone())));
+        }
+    }
+
+    /// Whether calls are shown or kept to be shown.
+    pub(super) fn shows_calls(&self) -> bool {
+        self.audience.onlookers.is_some()
+    }
+
+    /// A call that has been answered.
+    pub(super) fn show_call(&mut self, record: &Result<ToolCallRecord, OutputError>) {
+        let Ok(record) = record else { return };
+        self.audience.calls_made += 1;
+        let call = Arc::new(LiveCall::new(self.audience.calls_made, record));
+        if self.audience.calls.len() == KEPT_CALLS {
+            self.audience.calls.pop_front();
+        }
+        self.audience.calls.push_back(Arc::new(call.without_pictures()));
+        self.audience.tell(|| LiveEvent::Call(call));
+    }
+
+    fn live_step(&self, budget: Budget) -> LiveStep {
+        let motions = self.motions.iter().map(|motion| motion.state().clone()).collect();
+        LiveStep::new(self.present.clone(), motions, Some(budget))
+    }
+}

@@ -1,0 +1,178 @@
+//! Finished episodes, as the folder of runs has them: their list, a recording to scrub in, its pictures, its film and its files.
+
+use std::{
+    fs,
+    path::{Component, Path, PathBuf},
+    sync::{Arc, Mutex, PoisonError},
+    time::SystemTime,
+};
+
+use axum::{
+    extract::{Query, State},
+    http::header,
+    response::{IntoResponse, Response},
+};
+use serde_json::{Value, json};
+use tandem_episodes::{
+    EpisodeError, RESULT_FILE, Recording,
+    replay::{RecordedEpisode, short_film},
+};
+
+use super::{Wanted, blocking};
+use crate::{
+    hosting::HostingError,
+    http::{app::AppState, problem::ApiError},
+};
+
+/// How many are listed, the newest first.
+const MOST_LISTED: usize = 200;
+
+/// How deep below the runs folder episodes lie: those of an evaluation are in a folder of its folder.
+const DEPTH: usize = 4;
+
+const RECORDING: &str = "episode.mcap";
+
+/// What of an episode's folder may be fetched, and what it is.
+const FILES: [(&str, &str); 4] = [
+    (RECORDING, "application/octet-stream"),
+    (RESULT_FILE, "application/json"),
+    ("strip.png", "image/png"),
+    ("report.html", "text/html; charset=utf-8"),
+];
+
+/// The recording that was looked at last: a page asks for many pictures of one.
+#[derive(Clone, Default)]
+pub struct LastOpened(Arc<Mutex<Option<(PathBuf, SystemTime, Arc<RecordedEpisode>)>>>);
+
+impl std::fmt::Debug for LastOpened {
+    fn fmt(&self, text: &mut std::fmt::Formatter) -> std::fmt::Result {
+        text.write_str("LastOpened(..)")
+    }
+}
+
+impl LastOpened {
+    fn open(&self, folder: &Path) -> Result<Arc<RecordedEpisode>, ApiError> {
+        let path = folder.join(RECORDING);
+        let changed = fs::metadata(&path).and_then(|file| file.modified());
+        let changed = changed.map_err(|_| no_recording(folder))?;
+        let mut last = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((known, at, episode)) = &*last
+            && *known == path
+            && *at == changed
+        {
+            return Ok(episode.clone());
+        }
+        // One at a time: two pages that ask for the same wait for one reading.
+        let episode = RecordedEpisode::read(&path).map(Arc::new).map_err(|error| unreadable(&error))?;
+        *last = Some((path, changed, episode.clone()));
+        Ok(episode)
+    }
+}
+
+fn no_recording(folder: &Path) -> ApiError {
+    ApiError::NoRun { run: folder.file_name().unwrap_or_default().to_string_lossy().into_owned() }
+}
+
+fn unreadable(error: &dyn std::error::Error) -> ApiError {
+    let status = axum::http::StatusCode::UNPROCESSABLE_ENTITY;
+    ApiError::Protocol { status, detail: error.to_string() }
+}
+
+/// The finished episodes below `runs`, the newest first, without those that are `held`.
+pub fn list(runs: &Path, held: &[String]) -> Vec<Value> {
+    let mut found = Vec::new();
+    collect(runs, DEPTH, &mut found);
+    found.sort_by_key(|(at, _)| std::cmp::Reverse(*at));
+    let entry = |(at, folder): (SystemTime, PathBuf)| {
+        let run = folder.strip_prefix(runs).ok()?.to_str()?.replace('\\', "/");
+        if held.contains(&run) {
+            return None;
+        }
+        let result: Value = serde_json::from_slice(&fs::read(folder.join(RESULT_FILE)).ok()?).ok()?;
+        let ended_s = at.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
+        let recorded = folder.join(RECORDING).is_file();
+        let strip = folder.join("strip.png").is_file();
+        Some(
+            json!({ "run": run, "result": result, "ended_unix_s": ended_s, "recorded": recorded, "strip": strip }),
+        )
+    };
+    found.into_iter().filter_map(entry).take(MOST_LISTED).collect()
+}
+
+fn collect(folder: &Path, depth: usize, found: &mut Vec<(SystemTime, PathBuf)>) {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    for entry in entries.filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_dir())) {
+        let path = entry.path();
+        match fs::metadata(path.join(RESULT_FILE)).and_then(|file| file.modified()) {
+            Ok(at) => found.push((at, path)),
+            Err(_) if depth > 1 => collect(&path, depth - 1, found),
+            Err(_) => {}
+        }
+    }
+}
+
+/// The folder that a page names, which lies below the runs folder and is an episode's.
+fn folder(app: &AppState, wanted: &Wanted) -> Result<PathBuf, ApiError> {
+    let run = wanted.run.clone().unwrap_or_default();
+    let named = Path::new(&run);
+    let below = !run.is_empty() && named.components().all(|part| matches!(part, Component::Normal(_)));
+    let folder = app.settings.runs.join(named);
+    match below && folder.join(RESULT_FILE).is_file() {
+        true => Ok(folder),
+        false => Err(ApiError::NoRun { run }),
+    }
+}
+
+/// All that a page draws of a finished episode.
+pub async fn run(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> Result<Response, ApiError> {
+    let folder = folder(&app, &wanted)?;
+    let message = blocking(move || {
+        let episode = app.opened.open(&folder)?;
+        episode.message().map_err(|error| HostingError::from(error).into())
+    });
+    Ok(([(header::CONTENT_TYPE, "application/octet-stream")], message.await?).into_response())
+}
+
+/// What a robot saw at a moment, as a PNG file.
+pub async fn picture(app: AppState, wanted: Wanted) -> Result<Vec<u8>, ApiError> {
+    let folder = folder(&app, &wanted)?;
+    blocking(move || {
+        let episode = app.opened.open(&folder)?;
+        let name = wanted.robot.unwrap_or_default();
+        let drawn = episode.picture(wanted.time_s.unwrap_or_default(), &name);
+        let have = episode.robots().map(str::to_owned).collect();
+        let drawn = drawn.ok_or(EpisodeError::UnknownRobot { name, have }).map_err(HostingError::from)?;
+        drawn.map_err(|failed| ApiError::Reply(failed.into()))
+    })
+    .await
+}
+
+/// A short film of the episode.
+pub async fn film(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> Result<Response, ApiError> {
+    let folder = folder(&app, &wanted)?;
+    let made = blocking(move || {
+        let recording = Recording::read(&folder.join(RECORDING)).map_err(|error| unreadable(&error))?;
+        short_film(&recording).map_err(|error| unreadable(&error))
+    });
+    Ok(([(header::CONTENT_TYPE, "image/webp")], made.await?.webp).into_response())
+}
+
+/// A file of the episode's folder.
+pub async fn file(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> Result<Response, ApiError> {
+    let folder = folder(&app, &wanted)?;
+    let asked = wanted.file.unwrap_or_default();
+    let found = FILES.iter().find(|(name, _)| *name == asked);
+    let (name, kind) =
+        *found.ok_or(ApiError::NoRun { run: format!("{}/{asked}", wanted.run.unwrap_or_default()) })?;
+    let bytes = blocking(move || fs::read(folder.join(name)).map_err(|_| no_recording(&folder))).await?;
+    let headers = [
+        (header::CONTENT_TYPE, kind.to_owned()),
+        // A report is a page of its own, which runs nothing.
+        (
+            header::CONTENT_SECURITY_POLICY,
+            "sandbox; default-src 'none'; img-src data:; style-src 'unsafe-inline'".into(),
+        ),
+        (header::CONTENT_DISPOSITION, format!("inline; filename=\"{name}\"")),
+    ];
+    Ok((headers, bytes).into_response())
+}

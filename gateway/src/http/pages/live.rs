@@ -1,0 +1,134 @@
+//! Running episodes: their scenes, and what happens in them over a WebSocket.
+
+use std::{io, sync::Arc};
+
+use axum::{
+    extract::{Query, Request, State},
+    http::header,
+    response::{IntoResponse, Response},
+};
+use serde_json::{Value, json};
+use tandem_episodes::live::{LiveCall, LiveEvent, LiveScene};
+use tokio::sync::{OwnedSemaphorePermit, broadcast::error::RecvError};
+
+use super::{
+    Wanted, blocking,
+    socket::{PageSender, PageSocket, upgrade},
+};
+use crate::{
+    hosting::{EpisodeThread, HostingError, LiveWatch},
+    http::{app::AppState, problem::ApiError},
+};
+
+/// How many pages may watch at once.
+pub const MOST_WATCHERS: usize = 64;
+
+/// What comes first in the message of a picture; that of a step begins with 1.
+const PICTURE_KIND: f32 = 2.0;
+
+fn thread(app: &AppState, wanted: &Wanted) -> Result<Arc<EpisodeThread>, ApiError> {
+    let id = wanted.episode.clone().unwrap_or_default();
+    Ok(app.table.hosted(&id).map_err(|_| HostingError::UnknownEpisode { id })?.thread)
+}
+
+/// The scene, with the calls and phases so far in its head.
+pub async fn scene(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> Result<Response, ApiError> {
+    let LiveWatch { view, .. } = thread(&app, &wanted)?.watch().await?;
+    let message = blocking(move || {
+        let calls: Vec<&Value> = view.calls.iter().map(|call| &call.told).collect();
+        let more = json!({
+            "recorded": false, "calls": calls, "reached": view.phases, "result": view.result, "frames": 1,
+        });
+        let frame = view.now.frame(&view.scene);
+        view.scene.message(more, &frame).map_err(|error| HostingError::from(error).into())
+    });
+    Ok(([(header::CONTENT_TYPE, "application/octet-stream")], message.await?).into_response())
+}
+
+/// What happens from now on.
+pub async fn live(
+    State(app): State<AppState>,
+    Query(wanted): Query<Wanted>,
+    request: Request,
+) -> Result<Response, ApiError> {
+    let thread = thread(&app, &wanted)?;
+    let place = app.watchers.clone().try_acquire_owned();
+    let place = place.map_err(|_| ApiError::Busy { limit: MOST_WATCHERS })?;
+    let watch = thread.watch().await?;
+    // The episode must not live on because somebody watches it.
+    drop(thread);
+    upgrade(request, move |socket| serve(socket, watch, place))
+}
+
+async fn serve(socket: PageSocket, watch: LiveWatch, _place: OwnedSemaphorePermit) -> io::Result<()> {
+    let PageSocket { mut sender, mut closing } = socket;
+    tokio::select! {
+        told = tell(&mut sender, watch) => {
+            told?;
+            sender.close().await
+        }
+        () = closing.gone() => Ok(()),
+    }
+}
+
+/// Tells a page what happens until nothing does any more. A page that is too slow gets what is newest.
+async fn tell(sender: &mut PageSender, watch: LiveWatch) -> io::Result<()> {
+    let LiveWatch { view, mut events } = watch;
+    let scene = view.scene;
+    let told_calls = view.calls.last().map_or(0, |call| call.number);
+    for call in &view.calls {
+        sender.text(call.told.to_string()).await?;
+    }
+    for phase in &view.phases {
+        sender.text(json!({ "kind": "phase", "phase": phase }).to_string()).await?;
+    }
+    sender.bytes(view.now.frame(&scene).to_vec()).await?;
+    if let Some(result) = &view.result {
+        sender.text(json!({ "kind": "ended", "result": result }).to_string()).await?;
+    }
+    loop {
+        match events.recv().await {
+            Ok(LiveEvent::Step(step)) => sender.bytes(step.frame(&scene).to_vec()).await?,
+            Ok(LiveEvent::Call(call)) if call.number > told_calls => tell_call(sender, &scene, call).await?,
+            Ok(LiveEvent::Call(_)) => {}
+            Ok(LiveEvent::Phase(phase)) => {
+                sender.text(json!({ "kind": "phase", "phase": phase }).to_string()).await?
+            }
+            Ok(LiveEvent::Ended(result)) => {
+                sender.text(json!({ "kind": "ended", "result": *result }).to_string()).await?
+            }
+            Err(RecvError::Lagged(_)) => {}
+            Err(RecvError::Closed) => return Ok(()),
+        }
+    }
+}
+
+async fn tell_call(sender: &mut PageSender, scene: &LiveScene, call: Arc<LiveCall>) -> io::Result<()> {
+    sender.text(call.told.to_string()).await?;
+    for (robot, picture) in &call.pictures {
+        let picture = picture.clone();
+        let png = tokio::task::spawn_blocking(move || picture.png()).await.map_err(io::Error::other)?;
+        let number = scene.robots().position(|name| name == robot).unwrap_or_default();
+        let head = [PICTURE_KIND, call.number as f32, number as f32];
+        let mut message: Vec<u8> = head.into_iter().flat_map(f32::to_le_bytes).collect();
+        message.extend(png.map_err(io::Error::other)?.iter());
+        sender.bytes(message).await?;
+    }
+    Ok(())
+}
+
+/// What a robot sees now.
+pub async fn picture(app: AppState, wanted: Wanted) -> Result<Vec<u8>, ApiError> {
+    let thread = thread(&app, &wanted)?;
+    let LiveWatch { view, .. } = thread.watch().await?;
+    let name = wanted.robot.unwrap_or_default();
+    blocking(move || {
+        let have = view.scene.robots().map(str::to_owned).collect();
+        let drawn = view.scene.picture(&view.now.step, &name);
+        let drawn = drawn
+            .ok_or(tandem_episodes::EpisodeError::UnknownRobot { name, have })
+            .map_err(HostingError::from)?;
+        drawn.map_err(|failed| ApiError::Reply(failed.into()))
+    })
+    .await
+}

@@ -1,0 +1,147 @@
+//! Pages for people: `/watch` shows running and finished episodes. What a page draws comes as numbers over a WebSocket; script and style
+//! are in this binary, made of `gateway/web`.
+
+mod finished;
+mod key;
+mod live;
+mod socket;
+
+use axum::{
+    Extension, Router,
+    extract::{Query, Request, State},
+    http::{HeaderName, HeaderValue, StatusCode, header},
+    middleware::{self, Next},
+    response::{Html, IntoResponse, Response},
+    routing::{get, post},
+};
+use serde::Deserialize;
+use serde_json::json;
+
+use super::{app::AppState, problem::ApiError};
+use crate::hosting::Caller;
+
+pub use finished::LastOpened;
+pub use key::{WatchKey, Watcher};
+pub use live::MOST_WATCHERS;
+
+const SHELL: &str = include_str!("../../../web/page.html");
+const STYLE: &str = include_str!("../../../web/style.css");
+const SCRIPT: &str = include_str!("../../../web/dist/watch.js");
+const DOOR: &str = include_str!("door.html");
+
+/// Everything comes from this server, and nothing may be sent elsewhere or put into another site's page.
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; \
+     base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+/// Where all pages are; what is below is for who watches.
+pub const WATCH: &str = "/watch";
+
+/// Which episode, robot and moment is asked for.
+#[derive(Debug, Deserialize)]
+struct Wanted {
+    /// An episode that is held, by its id; or one that is finished, by its folder.
+    episode: Option<String>,
+    run: Option<String>,
+    robot: Option<String>,
+    time_s: Option<f64>,
+    file: Option<String>,
+}
+
+/// The routes of the pages.
+pub fn router() -> Router<AppState> {
+    let inside = Router::new()
+        .route("/watch/page.js", get(script))
+        .route("/watch/page.css", get(style))
+        .route("/watch/episodes", get(episodes))
+        .route("/watch/scene", get(live::scene))
+        .route("/watch/live", get(live::live))
+        .route("/watch/camera", get(camera))
+        .route("/watch/run", get(finished::run))
+        .route("/watch/film", get(finished::film))
+        .route("/watch/file", get(finished::file))
+        .layer(middleware::from_fn(only_watchers));
+    inside.route(WATCH, get(page).merge(post(enter)))
+}
+
+/// Lets nobody in who has not come by the link.
+async fn only_watchers(request: Request, next: Next) -> Response {
+    match request.extensions().get::<Watcher>() {
+        Some(Watcher) => next.run(request).await,
+        None => ApiError::NoWatcher.into_response(),
+    }
+}
+
+/// The page, or the door to it for who has not come by the link.
+async fn page(watcher: Option<Extension<Watcher>>) -> Response {
+    match watcher {
+        Some(_) => ([(header::CONTENT_SECURITY_POLICY, POLICY)], Html(SHELL)).into_response(),
+        None => door(StatusCode::OK),
+    }
+}
+
+/// The page that asks for the link, and reads it from its own address.
+pub fn door(status: StatusCode) -> Response {
+    let mut bytes = [0u8; 16];
+    if getrandom::fill(&mut bytes).is_err() {
+        return ApiError::NoWatcher.into_response();
+    }
+    let nonce: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+    let policy = format!(
+        "default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; connect-src 'self'; img-src data:; base-uri 'none'; frame-ancestors 'none'"
+    );
+    let headers = [(header::CONTENT_SECURITY_POLICY, policy)];
+    (status, headers, Html(DOOR.replace("NONCE", &nonce))).into_response()
+}
+
+/// Who has the key gets the cookie.
+async fn enter(
+    State(app): State<AppState>,
+    watcher: Option<Extension<Watcher>>,
+) -> Result<Response, ApiError> {
+    let cookie = watcher.and_then(|_| app.watch_key.cookie()).ok_or(ApiError::NoWatcher)?;
+    Ok((StatusCode::NO_CONTENT, [(header::SET_COOKIE, cookie)]).into_response())
+}
+
+async fn script() -> Response {
+    asset("text/javascript; charset=utf-8", SCRIPT)
+}
+
+async fn style() -> Response {
+    asset("text/css; charset=utf-8", STYLE)
+}
+
+fn asset(kind: &'static str, text: &'static str) -> Response {
+    let headers: [(HeaderName, HeaderValue); 2] = [
+        (header::CONTENT_TYPE, HeaderValue::from_static(kind)),
+        // Another build of the program has other files by the same names.
+        (header::CACHE_CONTROL, HeaderValue::from_static("no-cache")),
+    ];
+    (headers, text).into_response()
+}
+
+/// Running and finished episodes.
+async fn episodes(State(app): State<AppState>) -> Result<Response, ApiError> {
+    let held = app.table.list(&Caller::Host);
+    let runs = app.settings.runs.clone();
+    let known: Vec<String> = held.episodes.iter().map(|entry| entry.episode_id.clone()).collect();
+    let finished = blocking(move || Ok(finished::list(&runs, &known))).await?;
+    Ok(axum::Json(json!({ "version": super::app::VERSION, "held": held.episodes, "finished": finished }))
+        .into_response())
+}
+
+/// What a robot sees, now or at a moment of a finished episode.
+async fn camera(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> Result<Response, ApiError> {
+    let png = match wanted.run.is_some() {
+        true => finished::picture(app, wanted).await?,
+        false => live::picture(app, wanted).await?,
+    };
+    let headers = [(header::CONTENT_TYPE, "image/png"), (header::CACHE_CONTROL, "no-store")];
+    Ok((headers, png).into_response())
+}
+
+/// Does what takes long on a thread that is for that.
+async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T, ApiError> + Send + 'static,
+) -> Result<T, ApiError> {
+    tokio::task::spawn_blocking(work).await.map_err(|failed| ApiError::Reply(failed.into()))?
+}

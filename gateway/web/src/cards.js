@@ -1,0 +1,68 @@
+// The first page: a card for every episode that runs or has ended.
+
+import { ask, element, words } from "./dom.js";
+
+const EVERY_MS = 1500;
+
+export function cards(main) {
+  document.title = "Tandem: episodes";
+  const running = element("div", { class: "cards" });
+  const finished = element("div", { class: "cards" });
+  const none = element("p", { class: "soft" });
+  const problem = element("p", { class: "bad", role: "alert" });
+  const version = element("span", { class: "soft" });
+  main.replaceChildren(
+    element("header", { class: "top" }, element("h1", {}, "Tandem"), version),
+    problem,
+    element("h2", {}, "On this server"), none, running,
+    element("h2", {}, "Finished"), finished,
+  );
+  let shown = "";
+  const look = async () => {
+    try {
+      const list = await (await ask("/watch/episodes")).json();
+      problem.textContent = "";
+      version.textContent = list.version;
+      const text = JSON.stringify(list);
+      if (text === shown) return;
+      shown = text;
+      none.textContent = list.held.length ? "" : "No episode is held. An episode that a policy starts appears here by itself.";
+      running.replaceChildren(...list.held.map(heldCard));
+      finished.replaceChildren(...list.finished.map(finishedCard));
+      if (!list.finished.length) finished.append(element("p", { class: "soft" }, "None yet."));
+    } catch (error) {
+      problem.textContent = `Not up to date: ${error.message}`;
+    }
+  };
+  look();
+  setInterval(() => document.hidden || look(), EVERY_MS);
+}
+
+function heldCard(entry) {
+  const stands = entry.ended ? words(entry.ended) : "runs";
+  return element("a", { class: "card", href: `/watch?episode=${encodeURIComponent(entry.episode_id)}` },
+    element("div", { class: "line" }, element("strong", {}, words(entry.task)), badge(stands, entry.ended ? "" : "live")),
+    element("div", { class: "soft" }, `seed ${entry.seed}, ${entry.protocol}, ${entry.operators === "per_robot" ? "an operator a robot" : "one policy"}`),
+    element("div", {}, `${(entry.step / 50).toFixed(1)} s, step ${entry.step}`),
+    element("div", { class: "soft id" }, entry.episode_id));
+}
+
+function finishedCard({ run, result, ended_unix_s: endedS, recorded, strip }) {
+  const phases = Object.entries(result.phases ?? {});
+  const reached = phases.filter(([, time]) => time !== null).length;
+  const done = phases.length > 0 && reached === phases.length;
+  const inside = [
+    strip ? element("img", { src: `/watch/file?run=${encodeURIComponent(run)}&file=strip.png`, alt: "", loading: "lazy" }) : null,
+    element("div", { class: "line" }, element("strong", {}, words(result.task)), badge(`${reached} of ${phases.length} phases`, done ? "good" : "bad")),
+    element("div", { class: "soft" }, `seed ${result.seed}, ${result.protocol}, ${words(result.ended)}`),
+    element("div", {}, `${(result.env_steps / 50).toFixed(1)} s, ${result.tool_calls} calls, ${result.falls} falls`),
+    element("div", { class: "soft id" }, `${run}, ${new Date(1000 * endedS).toLocaleString()}`),
+  ];
+  // A failed episode opens where it failed, which is its end.
+  const at = done ? "" : `&at=${(result.env_steps / 50).toFixed(1)}`;
+  return recorded
+    ? element("a", { class: "card", href: `/watch?run=${encodeURIComponent(run)}${at}` }, ...inside)
+    : element("div", { class: "card" }, ...inside, element("div", { class: "soft" }, "Not recorded."));
+}
+
+export const badge = (text, kind) => element("span", { class: `badge ${kind}` }, text);

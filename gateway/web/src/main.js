@@ -1,0 +1,21 @@
+// `/watch`: the episodes as cards, and each on a page of its own.
+
+import { cards } from "./cards.js";
+import { element } from "./dom.js";
+import { episode } from "./episode.js";
+
+const main = document.getElementById("main");
+const wanted = new URLSearchParams(location.search);
+
+const page = async () => {
+  if (wanted.has("episode")) return episode(main, { episode: wanted.get("episode") });
+  if (wanted.has("run")) return episode(main, { run: wanted.get("run"), at: Number(wanted.get("at")) || 0 });
+  return cards(main);
+};
+
+page().catch((error) => {
+  main.replaceChildren(
+    element("p", {}, element("a", { href: "/watch" }, "All episodes")),
+    element("h1", {}, "Nothing to show"),
+    element("p", { class: "bad", role: "alert" }, error.message));
+});

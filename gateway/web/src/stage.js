@@ -1,0 +1,285 @@
+// An episode in three dimensions: the shapes that the server draws robots' pictures of, put where a step has them.
+
+import {
+  AmbientLight, ArrowHelper, BufferAttribute, BufferGeometry, Color, DirectionalLight, Group, HemisphereLight, Line, LineBasicMaterial,
+  LineSegments, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, Quaternion, SRGBColorSpace, Scene, SphereGeometry,
+  Vector3, WebGLRenderer,
+} from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { colour, robotColour } from "./dom.js";
+import { POSE, SIDES } from "./message.js";
+
+const UP = new Vector3(0, 0, 1);
+/** Lengths of arrows. */
+const METRES_PER_NEWTON = 0.006;
+const LEAST_SHOWN_N = 1;
+const FRUSTUM_M = 0.55;
+/** Wrists nearer to their targets need no ghost. */
+const GHOST_FROM_M = 0.01;
+const STATE_COLOURS = { moving: "--accent", arrived: "--good", blocked: "--bad", out_of_reach: "--odd", joints: "--soft" };
+const SKY_FROM_BELOW = 0x8d8678;
+
+export class Stage {
+  /** @param {HTMLElement} place @param {ReturnType<import("./message.js").readScene>} scene */
+  constructor(place, { head, meshes, layout }) {
+    this.head = head;
+    this.layout = layout;
+    this.place = place;
+    this.renderer = new WebGLRenderer({ antialias: true, powerPreference: "high-performance" });
+    this.renderer.shadowMap.enabled = true;
+    place.append(this.renderer.domElement);
+    this.scene = new Scene();
+    this.light();
+    this.carriers = this.build(meshes);
+    this.free = new PerspectiveCamera((head.third_person.vertical_fov_rad * 180) / Math.PI, 1, 0.02, 60);
+    this.free.up.copy(UP);
+    this.free.position.fromArray(head.third_person.pose);
+    this.head_camera = new PerspectiveCamera(60, 1, 0.02, 60);
+    this.controls = new OrbitControls(this.free, this.renderer.domElement);
+    this.controls.maxDistance = 12;
+    this.controls.addEventListener("change", () => { this.stale = true; });
+    this.view = "free";
+    this.extras = { frustums: true, forces: true, targets: true };
+    this.robots = head.robots.map((robot, index) => this.extrasOf(robot, index));
+    this.stale = true;
+    new ResizeObserver(() => this.resize()).observe(place);
+    this.resize();
+    this.paint();
+  }
+
+  /** Takes over the colours of the page. */
+  paint() {
+    this.scene.background = new Color(colour("--sky"));
+    this.stale = true;
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.place;
+    if (!width || !height) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(width, height, false);
+    this.stale = true;
+  }
+
+  light() {
+    this.scene.add(new HemisphereLight(0xffffff, SKY_FROM_BELOW, 1.6), new AmbientLight(0xffffff, 0.35));
+    this.sun = new DirectionalLight(0xffffff, 2.1);
+    this.sun.castShadow = true;
+    this.sun.shadow.mapSize.set(1024, 1024);
+    Object.assign(this.sun.shadow.camera, { left: -2.2, right: 2.2, top: 2.2, bottom: -2.2, near: 0.5, far: 9 });
+    this.sun.shadow.bias = -0.0015;
+    this.sun.shadow.normalBias = 0.02;
+    this.scene.add(this.sun, this.sun.target);
+  }
+
+  /** One mesh for all parts of a carrier that cast shadows, and one for all that do not. Returns the carriers that move. */
+  build(meshes) {
+    const groups = new Map();
+    for (const part of this.head.parts) {
+      const { kind, robot, link, object } = part.carrier;
+      const key = `${kind} ${robot} ${link} ${object} ${part.casts_shadow}`;
+      groups.set(key, [...(groups.get(key) ?? []), part]);
+    }
+    const carriers = [];
+    for (const parts of groups.values()) {
+      const plain = parts.filter((part) => part.pattern !== "checker");
+      const checked = parts.filter((part) => part.pattern === "checker");
+      for (const [some, material] of [[plain, new MeshLambertMaterial({ vertexColors: true })], ...checked.map((part) => [[part], checker(part)])]) {
+        if (!some.length) continue;
+        const mesh = new Mesh(merged(some, meshes), material);
+        mesh.castShadow = some[0].casts_shadow;
+        mesh.receiveShadow = true;
+        this.scene.add(mesh);
+        const at = this.placeOf(some[0].carrier);
+        if (at !== null) carriers.push({ mesh, at });
+      }
+    }
+    return carriers;
+  }
+
+  /** Where in a row the pose of a carrier is. */
+  placeOf({ kind, robot, link, object }) {
+    if (kind === "link") return this.layout.links[robot] + link * POSE;
+    return kind === "object" ? this.layout.objects + object * POSE : null;
+  }
+
+  extrasOf(robot, index) {
+    const paint = new Color(robotColour(index));
+    const frustum = new LineSegments(frustumGeometry(robot.camera), new LineBasicMaterial({ color: paint, transparent: true, opacity: 0.75 }));
+    this.scene.add(frustum);
+    const hands = SIDES.map(() => {
+      const ghost = ghostGroup();
+      const line = new Line(new BufferGeometry().setAttribute("position", new BufferAttribute(new Float32Array(6), 3)), new LineBasicMaterial());
+      line.frustumCulled = false;
+      const felt = new ArrowHelper(UP, new Vector3(), 0.1, paint);
+      const contact = new ArrowHelper(UP, new Vector3(), 0.1, colour("--force"));
+      this.scene.add(ghost, line, felt, contact);
+      return { ghost, line, felt, contact };
+    });
+    return { frustum, hands };
+  }
+
+  /** Puts everything where it is a `share` of the way from one step to the next. */
+  show(from, to, share, states) {
+    const one = new Vector3();
+    const turn = new Quaternion();
+    const turnTo = new Quaternion();
+    const pose = (thing, at) => {
+      thing.position.fromArray(from.row, at).lerp(one.fromArray(to.row, at), share);
+      thing.quaternion.copy(turn.fromArray(from.row, at + 3)).slerp(turnTo.fromArray(to.row, at + 3), share);
+    };
+    for (const { mesh, at } of this.carriers) pose(mesh, at);
+    const middle = new Vector3();
+    this.robots.forEach((robot, index) => {
+      const { camera } = this.layout.robots[index];
+      pose(robot.frustum, camera);
+      robot.frustum.visible = this.extras.frustums && this.view !== this.head.robots[index].name;
+      middle.addScaledVector(one.fromArray(to.row, this.layout.links[index]), 1 / this.robots.length);
+      robot.hands.forEach((hand, side) => this.showHand(hand, to.hand(index, side), from, pose, states?.[index]?.[side]));
+      if (this.view === this.head.robots[index].name) pose(this.head_camera, camera);
+    });
+    if (!this.centred) {
+      this.controls.target.set(middle.x, middle.y, 0.75);
+      this.controls.update();
+      this.centred = true;
+    }
+    this.sun.target.position.set(middle.x, middle.y, 0.6);
+    this.sun.position.set(middle.x - 0.9, middle.y - 1.3, 4.6);
+    this.stale = true;
+  }
+
+  showHand({ ghost, line, felt, contact }, hand, from, pose, recordedState) {
+    const state = recordedState ?? hand.state;
+    const paint = new Color(colour(STATE_COLOURS[state] ?? "--soft"));
+    pose(ghost, hand.target);
+    ghost.visible = line.visible = this.extras.targets && hand.positionError > GHOST_FROM_M;
+    ghost.traverse((part) => part.material?.color.copy(paint));
+    line.material.color.copy(paint);
+    const wrist = new Vector3().fromArray(from.row, hand.wrist);
+    const ends = line.geometry.getAttribute("position");
+    ends.setXYZ(0, wrist.x, wrist.y, wrist.z);
+    ends.setXYZ(1, ghost.position.x, ghost.position.y, ghost.position.z);
+    ends.needsUpdate = true;
+    arrow(felt, wrist, hand.felt, this.extras.forces);
+    arrow(contact, wrist, hand.contact, this.extras.forces);
+  }
+
+  /** Looks with the free camera, or as a robot called `view` does. */
+  look(view) {
+    this.view = view;
+    this.controls.enabled = view === "free";
+    this.stale = true;
+  }
+
+  /** Draws, if anything has changed. Returns whether it has. */
+  draw() {
+    this.controls.update();
+    if (!this.stale) return false;
+    this.stale = false;
+    const { clientWidth: width, clientHeight: height } = this.place;
+    const robot = this.head.robots.find(({ name }) => name === this.view);
+    const camera = robot ? this.head_camera : this.free;
+    if (robot) {
+      // The whole of its picture is seen, and beside it what the place has room for.
+      const tall = robot.camera.width / robot.camera.height / (width / height);
+      const half = Math.tan(robot.camera.vertical_fov_rad / 2) * Math.max(1, tall);
+      camera.fov = (2 * Math.atan(half) * 180) / Math.PI;
+    }
+    camera.aspect = width / height;
+    camera.updateProjectionMatrix();
+    this.renderer.render(this.scene, camera);
+    return true;
+  }
+
+  /** Draws less, where drawing takes long. */
+  simplify() {
+    this.renderer.shadowMap.enabled = false;
+    this.sun.castShadow = false;
+    this.scene.traverse((part) => { if (part.material) part.material.needsUpdate = true; });
+    this.stale = true;
+  }
+}
+
+/** Squares of half a metre in the world's ground plane, as the server draws them. */
+function checker(part) {
+  const material = new MeshLambertMaterial({ vertexColors: true });
+  const second = new Color().setRGB(...part.second_rgb, SRGBColorSpace);
+  material.onBeforeCompile = (shader) => {
+    shader.uniforms.second = { value: second };
+    shader.vertexShader = shader.vertexShader
+      .replace("#include <common>", "#include <common>\nvarying vec3 vPlace;")
+      .replace("#include <project_vertex>", "#include <project_vertex>\nvPlace = (modelMatrix * vec4(transformed, 1.0)).xyz;");
+    shader.fragmentShader = shader.fragmentShader
+      .replace("#include <common>", "#include <common>\nvarying vec3 vPlace;\nuniform vec3 second;")
+      .replace("#include <color_fragment>", "#include <color_fragment>\nif (mod(floor(vPlace.x * 2.0) + floor(vPlace.y * 2.0), 2.0) == 0.0) diffuseColor.rgb = second;");
+  };
+  return material;
+}
+
+/** Parts of one carrier as one geometry in its frame, with their colours at the corners. */
+function merged(parts, meshes) {
+  const total = parts.reduce((sum, part) => sum + meshes[part.mesh].positions.length, 0);
+  const positions = new Float32Array(total);
+  const normals = new Float32Array(total);
+  const colours = new Float32Array(total);
+  const indices = [];
+  const point = new Vector3();
+  const turn = new Quaternion();
+  let first = 0;
+  for (const part of parts) {
+    const mesh = meshes[part.mesh];
+    const paint = new Color().setRGB(...part.rgb, SRGBColorSpace);
+    const corners = mesh.positions.length / 3;
+    turn.fromArray(part.pose, 3);
+    for (let corner = 0; corner < corners; corner += 1) {
+      const at = 3 * (first + corner);
+      point.fromArray(mesh.positions, 3 * corner).applyQuaternion(turn);
+      point.x += part.pose[0];
+      point.y += part.pose[1];
+      point.z += part.pose[2];
+      point.toArray(positions, at);
+      point.set(mesh.normals[4 * corner], mesh.normals[4 * corner + 1], mesh.normals[4 * corner + 2]).normalize();
+      point.applyQuaternion(turn).toArray(normals, at);
+      paint.toArray(colours, at);
+    }
+    for (const corner of mesh.indices) indices.push(first + corner);
+    first += corners;
+  }
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new BufferAttribute(positions, 3));
+  geometry.setAttribute("normal", new BufferAttribute(normals, 3));
+  geometry.setAttribute("color", new BufferAttribute(colours, 3));
+  geometry.setIndex(indices);
+  return geometry;
+}
+
+/** The edges of what a camera sees, which looks along -z with y up. */
+function frustumGeometry({ vertical_fov_rad: fov, width, height }) {
+  const y = FRUSTUM_M * Math.tan(fov / 2);
+  const x = (y * width) / height;
+  const corners = [[-x, -y], [x, -y], [x, y], [-x, y]].map(([a, b]) => [a, b, -FRUSTUM_M]);
+  const ends = corners.flatMap((corner, index) => [[0, 0, 0], corner, corner, corners[(index + 1) % 4]]);
+  return new BufferGeometry().setAttribute("position", new BufferAttribute(new Float32Array(ends.flat()), 3));
+}
+
+/** A wrist's target: a ball, and axes that say how the hand is turned. */
+function ghostGroup() {
+  const group = new Group();
+  const material = new MeshBasicMaterial({ transparent: true, opacity: 0.55, depthTest: false });
+  const ball = new Mesh(new SphereGeometry(0.022, 16, 12), material);
+  const ends = new Float32Array([0, 0, 0, 0.1, 0, 0, 0, 0, 0, 0, 0.05, 0, 0, 0, 0, 0, 0, 0.05]);
+  const axes = new LineSegments(new BufferGeometry().setAttribute("position", new BufferAttribute(ends, 3)), new LineBasicMaterial({ depthTest: false }));
+  group.add(ball, axes);
+  group.renderOrder = ball.renderOrder = axes.renderOrder = 5;
+  return group;
+}
+
+function arrow(helper, at, force, wanted) {
+  const along = new Vector3().fromArray(force);
+  const newtons = along.length();
+  helper.visible = wanted && newtons > LEAST_SHOWN_N;
+  if (!helper.visible) return;
+  helper.position.copy(at);
+  helper.setDirection(along.divideScalar(newtons));
+  helper.setLength(Math.min(0.06 + newtons * METRES_PER_NEWTON, 0.8), 0.04, 0.025);
+}

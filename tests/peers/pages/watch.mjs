@@ -1,0 +1,139 @@
+// The pages at /watch in a headless Chromium: an episode watched live to its end, a finished one scrubbed, and pictures of both for
+// somebody to look at.
+//
+//     cargo build --release
+//     mkdir -p /tmp/watch && cd /tmp/watch && npm install playwright-core@1.65.1
+//     node REPOSITORY/tests/peers/pages/watch.mjs REPOSITORY/target/release/tandem
+//
+// Takes a chromium from the path, or from CHROMIUM. Pictures are written to the working folder.
+import assert from "node:assert/strict";
+import { spawn } from "node:child_process";
+import { mkdtempSync } from "node:fs";
+import { createRequire } from "node:module";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+
+const { chromium } = createRequire(join(process.cwd(), "x"))("playwright-core");
+const [program] = process.argv.slice(2);
+/** For whoever changes the page: the files of this folder in place of those in the program. */
+const sources = process.env.TANDEM_WEB;
+const WIDTHS = [400, 1400, 2500];
+
+const runs = mkdtempSync(join(tmpdir(), "watch-"));
+const server = spawn(program, ["serve", "--listen", "127.0.0.1:0", "--runs", runs], { stdio: ["ignore", "pipe", "ignore"] });
+process.on("exit", () => server.kill());
+const link = await new Promise((resolve) => {
+  let said = "";
+  server.stdout.on("data", (data) => {
+    said += data;
+    const found = said.match(/watch at (\S+)\n/);
+    if (found) resolve(found[1]);
+  });
+});
+const base = new URL(link).origin;
+
+const call = async (path, body) => {
+  const answer = await fetch(base + path, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) });
+  assert(answer.ok, `${path}: ${await answer.clone().text()}`);
+  return answer.json();
+};
+
+const browser = await chromium.launch({
+  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+  args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync"],
+});
+
+async function open(width, scheme) {
+  const context = await browser.newContext({ viewport: { width, height: Math.round(Math.min(width * 1.6, 1400)) }, colorScheme: scheme });
+  const page = await context.newPage();
+  page.wrong = [];
+  page.on("pageerror", (error) => page.wrong.push(error.message));
+  page.on("console", (message) => message.type() === "error" && page.wrong.push(message.text()));
+  page.on("request", (request) => request.url().startsWith(base) || request.url().startsWith("blob:") || page.wrong.push(`asks ${request.url()}`));
+  if (sources) {
+    await page.route("**/watch/page.js", (route) => route.fulfill({ path: join(sources, "dist/watch.js"), contentType: "text/javascript" }));
+    await page.route("**/watch/page.css", (route) => route.fulfill({ path: join(sources, "style.css"), contentType: "text/css" }));
+  }
+  await page.goto(link);
+  await page.waitForSelector("h2");
+  return page;
+}
+
+const wide = await open(1400, "light");
+
+// Who has not come by the link sees the door.
+const stranger = await (await browser.newContext()).newPage();
+await stranger.goto(`${base}/watch`);
+assert.match(await stranger.textContent("body"), /open the link/);
+
+// A live one.
+const { episode_id: id } = await call("/v1/episodes", { task: "handover", seed: 2000, protocol: "benchmark" });
+await wide.waitForSelector(".card .live");
+await wide.screenshot({ path: "cards-running.png" });
+await wide.click(".card");
+await wide.waitForSelector(".view canvas");
+await wide.check("#look");
+const tool = (name, body) => call(`/v1/episodes/${id}/tools/${name}`, body);
+await tool("observe", {});
+for (let reach = 0; reach < 6; reach += 1) {
+  await tool("move_wrists", { steps: 25, robots: [
+    { robot: "A", right_position_m: [0.3, -0.15, 0.1 + 0.04 * reach], right_quaternion_wxyz: [1, 0, 0, 0] },
+    { robot: "B", left_position_m: [0.9, 0.2, 0.2], left_quaternion_wxyz: [1, 0, 0, 0] }] });
+  await new Promise((resolve) => { setTimeout(resolve, 300); });
+}
+await wide.waitForFunction(() => document.querySelectorAll(".calls li").length === 7);
+await wide.waitForSelector(".pictures img");
+await wide.waitForFunction(() => /3\.0 s/.test(document.querySelector(".facts").textContent));
+assert.equal(await wide.locator(".calls .seen img").count(), 2, "the pictures that the policy was shown");
+for (const width of WIDTHS) {
+  for (const scheme of ["light", "dark"]) {
+    await wide.setViewportSize({ width, height: Math.round(Math.min(width * 1.6, 1400)) });
+    await wide.emulateMedia({ colorScheme: scheme });
+    await wide.waitForTimeout(1200);
+    await wide.screenshot({ path: `live-${width}-${scheme}.png`, fullPage: width === 400 });
+    const beyond = await wide.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+    assert(beyond <= 0, `${beyond} pixels beyond a width of ${width}`);
+  }
+}
+await wide.setViewportSize({ width: 1400, height: 1000 });
+await wide.selectOption(".tools select", "A");
+await wide.waitForTimeout(500);
+await wide.screenshot({ path: "live-as-A.png" });
+const rate = await wide.evaluate(() => new Promise((resolve) => {
+  const began = performance.now();
+  let frames = 0;
+  const count = () => (++frames, performance.now() - began < 2000 ? requestAnimationFrame(count) : resolve(frames / 2));
+  requestAnimationFrame(count);
+}));
+console.log(`${rate} frames a second at rest, in software`);
+await fetch(`${base}/v1/episodes/${id}`, { method: "DELETE" });
+await wide.waitForSelector("text=Look at it again");
+assert.deepEqual(wide.wrong, []);
+
+// The same, finished.
+await wide.click("text=Look at it again");
+await wide.waitForSelector(".scrubber");
+await wide.locator(".track input").fill("1.5");
+await wide.waitForFunction(() => /1\.50 of/.test(document.querySelector(".scrubber output").textContent));
+await wide.check("#look");
+await wide.waitForSelector(".pictures img");
+await wide.locator(".calls details").first().click();
+await wide.waitForTimeout(600);
+await wide.screenshot({ path: "finished.png", fullPage: true });
+await wide.click("text=Play");
+await wide.waitForFunction(() => document.querySelector(".scrubber button").textContent === "Pause");
+await wide.waitForFunction(() => !/1\.50 of/.test(document.querySelector(".scrubber output").textContent));
+await wide.click("text=Show its film");
+await wide.waitForFunction(() => [...document.images].some((image) => image.src.includes("/film") && image.naturalWidth > 0), null, { timeout: 60000 });
+await wide.click("text=All episodes");
+await wide.waitForSelector(".card img");
+for (const width of WIDTHS) {
+  await wide.setViewportSize({ width, height: 1000 });
+  await wide.waitForTimeout(300);
+  await wide.screenshot({ path: `cards-${width}.png` });
+}
+assert.deepEqual(wide.wrong, []);
+await browser.close();
+console.log("watched, scrubbed, and nothing went wrong; look at the pictures");
+process.exit(0);

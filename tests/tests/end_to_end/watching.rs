@@ -1,0 +1,214 @@
+//! Those who watch: they come by the link alone, see what happens, and change nothing.
+
+use std::net::TcpStream;
+
+use serde_json::{Value, json};
+use tandem::{settings::Layer, token::Token};
+use tandem_tests::TestServer;
+use tungstenite::{Message, WebSocket, client::IntoClientRequest};
+
+const TOKEN: &str = "correct-horse-battery-staple";
+
+/// Steps of 0.1 s each that move both robots.
+fn calls() -> Vec<(&'static str, Value)> {
+    let move_wrists =
+        json!({ "steps": 5, "robots": [{ "robot": "A", "right_position_m": [0.25, -0.2, 0.2] }] });
+    vec![
+        ("wait", json!({ "steps": 5 })),
+        ("move_wrists", move_wrists),
+        ("observe", json!({ "robots": ["B"] })),
+    ]
+}
+
+fn watch(server: &TestServer, id: &str) -> WebSocket<TcpStream> {
+    let address = format!("ws://{}/watch/live?episode={id}", server.address);
+    let mut request = address.into_client_request().expect("a request");
+    let cookie = format!("tandem_watch={}", server.watch_key());
+    request.headers_mut().insert("cookie", cookie.parse().expect("a cookie"));
+    let stream = TcpStream::connect(server.address).expect("a connection");
+    tungstenite::client(request, stream).expect("a socket").0
+}
+
+/// A GET of a page by who has the link.
+fn get(server: &TestServer, path: &str) -> (u16, Vec<u8>) {
+    let key = format!("Bearer {}", server.watch_key());
+    let (status, _, bytes) = server.ask("GET", path, &[("authorization", &key)], b"");
+    (status, bytes)
+}
+
+/// The head of a scene's message, and the numbers of its frames.
+fn scene(message: &[u8]) -> (Value, Vec<f32>) {
+    let size = u32::from_le_bytes(message[..4].try_into().expect("four bytes")) as usize;
+    let head: Value = serde_json::from_slice(&message[4..4 + size]).expect("JSON");
+    let meshes = head["meshes"].as_array().expect("meshes");
+    let bytes = meshes.iter().map(|mesh| 16 * mesh[0].as_u64().unwrap() + 12 * mesh[1].as_u64().unwrap());
+    let begin = 4 + size + bytes.sum::<u64>() as usize;
+    (head, numbers(&message[begin..]))
+}
+
+fn numbers(bytes: &[u8]) -> Vec<f32> {
+    bytes.chunks_exact(4).map(|four| f32::from_le_bytes(four.try_into().expect("four bytes"))).collect()
+}
+
+#[test]
+fn who_has_not_come_by_the_link_sees_nothing() {
+    let inside = [
+        "/watch/episodes",
+        "/watch/scene?episode=handover-seed0",
+        "/watch/live?episode=handover-seed0",
+        "/watch/page.js",
+    ];
+    let open = TestServer::start();
+    open.episode("benchmark");
+    let closed = TestServer::with(Layer {
+        token: Some(Token::parse(TOKEN, "a test").expect("a token")),
+        ..Layer::default()
+    });
+    let policy = format!("Bearer {TOKEN}");
+    for path in inside {
+        open.get(path).refused(403, &["link", "printed"]);
+        let (status, _, _) = closed.ask("GET", path, &[("authorization", &policy)], b"");
+        assert_eq!(status, 403, "a policy's token opens {path}");
+        assert_eq!(closed.get(path).status, 401, "{path}");
+        let forged = [("cookie", "tandem_watch=0123456789abcdef0123456789abcdef01234567")];
+        assert_eq!(closed.ask("GET", path, &forged, b"").0, 401, "{path}");
+    }
+    let (status, _, door) = closed.ask("GET", "/v1/episodes", &[("accept", "text/html")], b"");
+    assert!(status == 401 && String::from_utf8_lossy(&door).contains("open the link"), "{status}");
+    let (_, _, door) = open.ask("GET", "/watch", &[], b"");
+    assert!(!String::from_utf8_lossy(&door).contains("handover"));
+}
+
+#[test]
+fn the_link_becomes_a_cookie_that_opens_pages_and_nothing_else() {
+    let server = TestServer::with(Layer {
+        token: Some(Token::parse(TOKEN, "a test").expect("a token")),
+        ..Layer::default()
+    });
+    let key = format!("Bearer {}", server.watch_key());
+    let (status, headers, _) = server.ask("POST", "/watch", &[("authorization", &key)], b"");
+    let cookie = headers["set-cookie"].to_str().expect("a text");
+    assert!(status == 204 && cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"), "{cookie}");
+    let cookie = cookie.split(';').next().expect("a cookie");
+    let (status, headers, page) = server.ask("GET", "/watch", &[("cookie", cookie)], b"");
+    assert_eq!(status, 200);
+    assert!(String::from_utf8_lossy(&page).contains("/watch/page.js"));
+    let policy = headers["content-security-policy"].to_str().expect("a text");
+    assert!(
+        policy.starts_with("default-src 'none'; script-src 'self'") && !policy.contains("unsafe"),
+        "{policy}"
+    );
+    for path in ["/v1/episodes", "/metrics", "/", "/watcher"] {
+        assert_eq!(server.ask("GET", path, &[("cookie", cookie)], b"").0, 401, "{path}");
+        assert_eq!(server.ask("GET", path, &[("authorization", &key)], b"").0, 401, "{path}");
+    }
+    let evil = [("cookie", cookie), ("origin", "http://evil.example")];
+    assert_eq!(server.ask("GET", "/watch/episodes", &evil, b"").0, 403, "another site's page");
+}
+
+#[test]
+fn who_watches_sees_steps_calls_and_pictures_until_the_end() {
+    let server = TestServer::start();
+    let id = server.episode("benchmark");
+    let (status, message) = get(&server, &format!("/watch/scene?episode={id}"));
+    assert_eq!(status, 200);
+    let (head, first) = scene(&message);
+    assert_eq!((&head["task"], &head["robots"][1]["name"]), (&json!("handover"), &json!("B")));
+    assert_eq!((first[0], first[1]), (1.0, 0.0), "a step, the one before the first");
+    let mut socket = watch(&server, &id);
+    for (tool, args) in calls() {
+        server.tool(&id, tool, &args).ok();
+    }
+    server.delete(&format!("/v1/episodes/{id}")).ok();
+    let (mut steps, mut tools, mut pictures, mut ended) = (Vec::new(), Vec::new(), 0, None);
+    while let Ok(message) = socket.read() {
+        match message {
+            Message::Binary(bytes) => {
+                let row = numbers(&bytes[..bytes.len().min(12)]);
+                match row[0] {
+                    1.0 => {
+                        assert_eq!(bytes.len(), 4 * first.len(), "every step has the same numbers");
+                        steps.push(row[1]);
+                    }
+                    _ => {
+                        assert_eq!(row, [2.0, 3.0, 1.0], "a picture of the third call, by the second robot");
+                        assert!(bytes[12..].starts_with(b"\x89PNG"));
+                        pictures += 1;
+                    }
+                }
+            }
+            Message::Text(text) => {
+                let told: Value = serde_json::from_str(&text).expect("JSON");
+                match told["kind"].as_str() {
+                    Some("call") => tools.push(told["tool"].clone()),
+                    Some("ended") => ended = Some(told["result"]["ended"].clone()),
+                    other => panic!("{other:?}"),
+                }
+            }
+            Message::Close(_) => break,
+            other => panic!("{other:?}"),
+        }
+    }
+    assert_eq!(steps, [0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 10.0], "every other step, and the last");
+    assert_eq!((tools, pictures), (vec![json!("wait"), json!("move_wrists"), json!("observe")], 1));
+    assert_eq!(ended, Some(json!("finished")));
+}
+
+#[test]
+fn watching_changes_nothing() {
+    let play = |watchers: usize| {
+        let server = TestServer::start();
+        let id = server.episode("benchmark");
+        // They are told more than they read, which is nothing: nobody waits for them.
+        let sockets: Vec<_> = (0..watchers).map(|_| watch(&server, &id)).collect();
+        for (tool, args) in (0..8).flat_map(|_| calls()) {
+            server.tool(&id, tool, &args).ok();
+            if watchers > 0 {
+                assert_eq!(get(&server, &format!("/watch/camera?episode={id}&robot=A")).0, 200);
+            }
+        }
+        let result = server.delete(&format!("/v1/episodes/{id}")).ok();
+        drop(sockets);
+        (result["state_hash"].clone(), result["tool_calls"].clone(), result["phases"].clone())
+    };
+    let alone = play(0);
+    assert_eq!(play(3), alone);
+    assert_eq!(alone.1, 24);
+}
+
+#[test]
+fn a_finished_episode_can_be_looked_at_again() {
+    let server = TestServer::start();
+    let id = server.episode("benchmark");
+    for (tool, args) in calls() {
+        server.tool(&id, tool, &args).ok();
+    }
+    let seen = get(&server, &format!("/watch/camera?episode={id}&robot=B"));
+    server.delete(&format!("/v1/episodes/{id}")).ok();
+    let list: Value = serde_json::from_slice(&get(&server, "/watch/episodes").1).expect("JSON");
+    assert_eq!((&list["held"], &list["finished"][0]["run"]), (&json!([]), &json!(id)));
+    let (status, message) = get(&server, &format!("/watch/run?run={id}"));
+    assert_eq!(status, 200);
+    let (head, frames) = scene(&message);
+    assert_eq!((&head["frames"], &head["result"]["env_steps"]), (&json!(3), &json!(10)));
+    let length = frames.len() / 3;
+    assert_eq!([0, 1, 2].map(|frame| frames[frame * length + 1]), [0.0, 5.0, 10.0]);
+    assert_eq!(head["calls"].as_array().map(Vec::len), Some(3));
+    let again = get(&server, &format!("/watch/camera?run={id}&robot=B&time_s=0.2"));
+    assert!(again == seen && again.0 == 200, "the robot's picture is the same, live and drawn again");
+    let (status, film) = get(&server, &format!("/watch/film?run={id}"));
+    assert!(status == 200 && film.starts_with(b"RIFF"));
+    assert_eq!(get(&server, &format!("/watch/file?run={id}&file=result.json")).0, 200);
+    let (status, problem) = get(&server, &format!("/watch/camera?run={id}&robot=Z"));
+    assert!(status == 404 && String::from_utf8_lossy(&problem).contains("A, B"), "{status}");
+    for wrong in [
+        "run=..",
+        "run=",
+        "run=/etc",
+        "run=nope",
+        &format!("run={id}/../{id}"),
+        &format!("run={id}&file=../x"),
+    ] {
+        assert_eq!(get(&server, &format!("/watch/file?{wrong}")).0, 404, "{wrong}");
+    }
+}
