@@ -64,9 +64,7 @@ impl CylinderGrasp<'_> {
 
     /// Away from the object, the way it came.
     pub fn away(&self, commander: &mut Commander) -> Result<HandMove, PlayerError> {
-        let wrist = commander.world_from_wrist(self.robot, self.side)?;
-        let back = wrist.rotation * Vector::new(0.0, -STANDOFF_M * away(self.side), 0.0);
-        Ok(self.reach(Pose::from_parts(wrist.translation + back, wrist.rotation)))
+        back_off(commander, self.robot, self.side, Vector::new(0.0, STANDOFF_M, 0.0))
     }
 
     /// Wrist motion that brings the held object's origin to `object_m` (world), upright.
@@ -163,6 +161,18 @@ pub fn mirrored(right_rad: [f32; 7], side: Side) -> [f32; 7] {
         Side::Right => right_rad,
         Side::Left => std::array::from_fn(|i| if i == 0 { right_rad[i] } else { -right_rad[i] }),
     }
+}
+
+/// From where a hand is to where what it let go of is `off_m` farther off, in a right wrist's frame.
+pub fn back_off(
+    commander: &mut Commander,
+    robot: usize,
+    side: Side,
+    off_m: Vector,
+) -> Result<HandMove, PlayerError> {
+    let wrist = commander.world_from_wrist(robot, side)?;
+    let back_m = wrist.rotation * mirrored_m(off_m, side);
+    Ok(HandMove::reach(robot, side, Pose::from_parts(wrist.translation - back_m, wrist.rotation)))
 }
 
 /// A point given in a right wrist's frame, in the wrist's frame of `side`.

@@ -3,7 +3,7 @@
 use tandem_sim::{Pose, Rotation, Side, Vector};
 
 use super::commander::{Commander, HandMove};
-use super::cylinder::{mirrored, mirrored_m};
+use super::cylinder::{back_off, mirrored, mirrored_m};
 use super::hold::Hold;
 use crate::players::PlayerError;
 use crate::scoring::Facts;
@@ -68,10 +68,7 @@ impl HandGrasp<'_> {
 
     /// From where the hand is to where what it let go of is `off_m` farther off, in a right wrist's frame.
     pub fn off(&self, commander: &mut Commander, off_m: Vector) -> Result<HandMove, PlayerError> {
-        let wrist = commander.world_from_wrist(self.robot, self.side)?;
-        let back_m = wrist.rotation * mirrored_m(off_m, self.side);
-        let world_from_wrist = Pose::from_parts(wrist.translation - back_m, wrist.rotation);
-        Ok(HandMove::reach(self.robot, self.side, world_from_wrist))
+        back_off(commander, self.robot, self.side, off_m)
     }
 
     fn open_rad(&self) -> [f32; 7] {
