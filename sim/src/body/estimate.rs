@@ -23,8 +23,8 @@ pub struct BodyEstimate {
     pub com_velocity_m_s: Vector,
     /// Velocity of the middle of each palm.
     pub palm_velocity_m_s: Sides<Vector>,
-    /// Measured external force on each hand, at its palm.
-    pub hand_force_n: Sides<Vector>,
+    /// What each arm does to the trunk, as a force at its palm: that of the world on the hand, and the inertia of the moving arm.
+    pub hand_reaction_n: Sides<Vector>,
     /// Where the task wants the waist: yaw, roll, pitch.
     pub waist_target_rad: [f32; WAIST_JOINTS],
 }
@@ -36,10 +36,44 @@ pub(crate) struct PelvisMotion {
     pub spin_rad_s: Vector,
 }
 
-impl BodyEstimate {
-    /// The body by its joints, its pelvis and the poses that both give its links, with nothing in its hands. Velocities run outwards from the pelvis: with o the
-    /// origin of a link, a the axis of its joint and p its parent,
+/// How a link moves: the velocity of its origin, and its spin, in world axes.
+#[derive(Clone, Copy)]
+pub(crate) struct LinkMotion {
+    pub velocity_m_s: Vector,
+    pub spin_rad_s: Vector,
+}
+
+impl LinkMotion {
+    /// Of all links. Velocities run outwards from the pelvis: with o the origin of a link, a the axis of its joint and p its parent,
     ///   w = w_p + a qd,   v = v_p + w_p x (o - o_p).
+    fn of_links(
+        model: &RobotModel,
+        pelvis: LinkMotion,
+        qd_rad_s: &[f32; JOINTS],
+        world_from_link: &[Pose],
+    ) -> Vec<LinkMotion> {
+        let mut motions: Vec<LinkMotion> = Vec::with_capacity(model.links.len());
+        for (link, world) in model.links.iter().zip(world_from_link) {
+            let motion = match (link.parent, link.joint) {
+                (Some(parent), Some(joint)) => {
+                    let LinkMotion { velocity_m_s, spin_rad_s } = motions[parent];
+                    let offset_m = world.translation - world_from_link[parent].translation;
+                    let turning_rad_s = world.rotation * model.joints[joint].axis * qd_rad_s[joint];
+                    LinkMotion {
+                        velocity_m_s: velocity_m_s + spin_rad_s.cross(offset_m),
+                        spin_rad_s: spin_rad_s + turning_rad_s,
+                    }
+                }
+                _ => pelvis,
+            };
+            motions.push(motion);
+        }
+        motions
+    }
+}
+
+impl BodyEstimate {
+    /// The body by its joints, its pelvis and the poses that both give its links, with nothing in its hands.
     pub(crate) fn of_motion(
         model: &Arc<RobotModel>,
         pelvis: &PelvisMotion,
@@ -47,25 +81,17 @@ impl BodyEstimate {
         qd_rad_s: &[f32; JOINTS],
         world_from_link: Vec<Pose>,
     ) -> BodyEstimate {
-        let mut motions: Vec<(Vector, Vector)> = Vec::with_capacity(model.links.len());
+        let moving = LinkMotion { velocity_m_s: pelvis.velocity_m_s, spin_rad_s: pelvis.spin_rad_s };
+        let motions = LinkMotion::of_links(model, moving, qd_rad_s, &world_from_link);
         let (mut com_m, mut com_velocity_m_s) = (Vector::ZERO, Vector::ZERO);
-        for (link, world) in model.links.iter().zip(&world_from_link) {
-            let (velocity_m_s, spin_rad_s) = match (link.parent, link.joint) {
-                (Some(parent), Some(joint)) => {
-                    let (velocity_m_s, spin_rad_s) = motions[parent];
-                    let offset_m = world.translation - world_from_link[parent].translation;
-                    let turning_rad_s = world.rotation * model.joints[joint].axis * qd_rad_s[joint];
-                    (velocity_m_s + spin_rad_s.cross(offset_m), spin_rad_s + turning_rad_s)
-                }
-                _ => (pelvis.velocity_m_s, pelvis.spin_rad_s),
-            };
+        for ((link, world), motion) in model.links.iter().zip(&world_from_link).zip(&motions) {
+            let LinkMotion { velocity_m_s, spin_rad_s } = *motion;
             let centre_m = world.rotation * link.mass.local_com;
             com_m += (world.translation + centre_m) * link.mass.mass();
             com_velocity_m_s += (velocity_m_s + spin_rad_s.cross(centre_m)) * link.mass.mass();
-            motions.push((velocity_m_s, spin_rad_s));
         }
         let palm_velocity_m_s = model.hands.each_ref().map(|hand| {
-            let (velocity_m_s, spin_rad_s) = motions[hand.wrist];
+            let LinkMotion { velocity_m_s, spin_rad_s } = motions[hand.wrist];
             velocity_m_s + spin_rad_s.cross(world_from_link[hand.wrist].rotation * PALM_IN_WRIST_M)
         });
         BodyEstimate {
@@ -78,9 +104,18 @@ impl BodyEstimate {
             com_m: com_m / model.mass_kg,
             com_velocity_m_s: com_velocity_m_s / model.mass_kg,
             palm_velocity_m_s,
-            hand_force_n: Sides::both(Vector::ZERO),
+            hand_reaction_n: Sides::both(Vector::ZERO),
             waist_target_rad: [0.0; WAIST_JOINTS],
         }
+    }
+
+    /// How all links move.
+    pub(crate) fn link_motions(&self) -> Vec<LinkMotion> {
+        let pelvis = LinkMotion {
+            velocity_m_s: self.pelvis_velocity_m_s,
+            spin_rad_s: self.pelvis_angular_velocity_rad_s,
+        };
+        LinkMotion::of_links(&self.model, pelvis, &self.qd_rad_s, &self.world_from_link)
     }
 
     /// Middle of each palm, where loads of the hands are taken to act.

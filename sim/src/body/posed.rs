@@ -98,7 +98,7 @@ impl Posed {
             com_m,
             com_velocity_m_s,
             palm_velocity_m_s: Sides::both(Vector::ZERO),
-            hand_force_n: Sides::both(Vector::ZERO),
+            hand_reaction_n: Sides::both(Vector::ZERO),
             waist_target_rad: [0.0; 3],
         }
     }

@@ -1,9 +1,10 @@
 //! What a robot's hands feel: the force on each, and the weight that each carries. Both are read from the arms' own joint
 //! torques, as far as gravity does not explain them.
 //!
-//! Force: at rest  tau - tau_gravity = -J^T f  with f the force on the palm, so
-//!   f = -(J J^T + damping I)^-1 J (tau - tau_gravity),   J: 3 x 7 [m],
-//! low-passed. Damping keeps a stretched arm, which cannot feel along itself, from reporting nonsense.
+//! Force: torques tau_ext from outside are J^T f with f the force on the palm, so
+//!   f = (J J^T + damping I)^-1 J tau_ext,   J: 3 x 7 [m],
+//! low-passed. What the world does is told with tau_ext of [`ArmMomentum`], which knows the arm's own motion. What an arm does to
+//! the trunk, its inertia included, is felt with tau_ext = tau_gravity - tau: the balance has to know both. Damping keeps a stretched arm, which cannot feel along itself, from reporting nonsense.
 //!
 //! Weight: at rest the torque beyond gravity is J^T f with f the load at the palm. Only the vertical part is estimated, as the
 //! least squares fit  w = -(J_z . tau) / (J_z . J_z),  low-passed, and never negative: pushing on a table is not a load.
@@ -13,13 +14,18 @@ use rapier3d::math::Vector;
 use rapier3d::na::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
+use super::arm_momentum::{ArmMomentum, OBSERVER_TIME_S};
 use crate::Sides;
 use crate::body::{ARM_JOINTS, ARMS, BodyEstimate, JOINTS};
 
 #[derive(Clone, Default, Serialize, Deserialize)]
 pub(super) struct HandLoads {
+    momentum: Sides<ArmMomentum>,
     payload: Sides<Payload>,
+    /// Of the world on each hand.
     force: Sides<HandForce>,
+    /// The same with the inertia of the moving arm.
+    reaction: Sides<HandForce>,
 }
 
 /// What one arm tells of its hand at one instant.
@@ -30,8 +36,9 @@ struct Arm {
     excess_n_m: [f32; ARM_JOINTS],
 }
 
-/// Slow against the arm's own motion, fast against a partner who starts to pull.
-const FORCE_FILTER_TIME_S: f32 = 0.2;
+/// Slow against the arm's own motion, fast against a partner who starts to pull; where the observer filters before, together as slow.
+const REACTION_FILTER_TIME_S: f32 = 0.2;
+const FORCE_FILTER_TIME_S: f32 = REACTION_FILTER_TIME_S - OBSERVER_TIME_S;
 const FORCE_DAMPING_M2: f32 = 0.002;
 /// More than an arm can hold is an impact.
 const LARGEST_FORCE_N: f32 = 80.0;
@@ -52,14 +59,19 @@ impl HandLoads {
         let gravity_n_m = body.gravity_torques_n_m();
         let mut load_n_m = gravity_n_m;
         let palms_m = body.palms_m();
+        let motions = body.link_motions();
         for (side, first) in ARMS.by_side() {
+            let excess_n_m = std::array::from_fn(|i| torque_n_m[first + i] - gravity_n_m[first + i]);
+            let outside_n_m = self.momentum[side].update(body, &motions, first, &excess_n_m, dt_s);
             let arm = Arm {
                 levers_m: [Vector::X, Vector::Y, Vector::Z].map(|direction| {
                     std::array::from_fn(|i| body.moment_n_m(first + i, palms_m[side], direction))
                 }),
-                excess_n_m: std::array::from_fn(|i| torque_n_m[first + i] - gravity_n_m[first + i]),
+                excess_n_m,
             };
-            self.force[side].update(&arm, dt_s);
+            self.force[side].update(&arm.levers_m, outside_n_m, FORCE_FILTER_TIME_S, dt_s);
+            let felt_n_m = arm.excess_n_m.map(|excess_n_m| -excess_n_m);
+            self.reaction[side].update(&arm.levers_m, felt_n_m, REACTION_FILTER_TIME_S, dt_s);
             self.payload[side].update(&arm, dt_s);
             for (i, held_n_m) in self.payload[side].torques_n_m(&arm).into_iter().enumerate() {
                 load_n_m[first + i] += held_n_m;
@@ -68,9 +80,14 @@ impl HandLoads {
         load_n_m
     }
 
-    /// World frame.
+    /// Force of the world on each hand (world frame).
     pub(super) fn force_n(&self) -> Sides<Vector> {
         self.force.each_ref().map(HandForce::force_n)
+    }
+
+    /// The same with the inertia of the moving arm: what each arm does to the trunk.
+    pub(super) fn reaction_n(&self) -> Sides<Vector> {
+        self.reaction.each_ref().map(HandForce::force_n)
     }
 
     #[cfg(test)]
@@ -90,15 +107,21 @@ impl HandForce {
         self.force_n
     }
 
-    /// One physics step.
-    fn update(&mut self, arm: &Arm, dt_s: f32) {
-        let jacobian_m = SMatrix::<f32, 3, ARM_JOINTS>::from_fn(|row, column| arm.levers_m[row][column]);
-        let excess_n_m = SVector::from(arm.excess_n_m);
+    /// One physics step, in which the palm did `outside_n_m` to the joints.
+    fn update(
+        &mut self,
+        levers_m: &[[f32; ARM_JOINTS]; 3],
+        outside_n_m: [f32; ARM_JOINTS],
+        filter_time_s: f32,
+        dt_s: f32,
+    ) {
+        let jacobian_m = SMatrix::<f32, 3, ARM_JOINTS>::from_fn(|row, column| levers_m[row][column]);
+        let outside_n_m = SVector::from(outside_n_m);
         let normal_m2 = jacobian_m * jacobian_m.transpose() + SMatrix::identity() * FORCE_DAMPING_M2;
         let Some(factor) = normal_m2.cholesky() else { return };
-        let fitted = factor.solve(&(jacobian_m * -excess_n_m));
+        let fitted = factor.solve(&(jacobian_m * outside_n_m));
         let measured_n = Vector::new(fitted.x, fitted.y, fitted.z).clamp_length_max(LARGEST_FORCE_N);
-        self.force_n += (measured_n - self.force_n) * (dt_s / FORCE_FILTER_TIME_S);
+        self.force_n += (measured_n - self.force_n) * (dt_s / filter_time_s);
     }
 }
 
@@ -195,9 +218,10 @@ mod tests {
         {
             let (feeling, _) = feel(&body, Sides { left: force_n, right: -force_n });
             for (side, expected_n) in (Sides { left: force_n, right: -force_n }).by_side() {
-                let found_n = feeling.force_n()[side];
-                let error_n = (found_n - expected_n).length();
-                assert!(error_n < 0.25 * expected_n.length(), "{side:?}: {found_n}, not {expected_n}");
+                for found_n in [feeling.force_n()[side], feeling.reaction_n()[side]] {
+                    let error_n = (found_n - expected_n).length();
+                    assert!(error_n < 0.25 * expected_n.length(), "{side:?}: {found_n}, not {expected_n}");
+                }
             }
         }
     }

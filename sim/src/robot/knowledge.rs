@@ -135,7 +135,7 @@ fn from_truth(model: &Arc<RobotModel>, tree: &Tree, readings: &SensorReadings) -
         com_m: com_m / model.mass_kg,
         com_velocity_m_s: com_velocity_m_s / model.mass_kg,
         palm_velocity_m_s,
-        hand_force_n: Sides::both(Vector::ZERO),
+        hand_reaction_n: Sides::both(Vector::ZERO),
         waist_target_rad: [0.0; WAIST_JOINTS],
     }
 }

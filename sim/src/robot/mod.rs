@@ -1,5 +1,6 @@
 //! One robot in a world: put there, sensed, driven.
 
+mod arm_momentum;
 mod hand_loads;
 mod joints;
 mod knowledge;
@@ -96,8 +97,8 @@ impl Robot {
     }
 
     fn take(&mut self, body: BodyEstimate) {
-        let hand_force_n = self.memory.hand_loads.force_n();
-        self.body = BodyEstimate { hand_force_n, waist_target_rad: self.waist_target_rad(), ..body };
+        let hand_reaction_n = self.memory.hand_loads.reaction_n();
+        self.body = BodyEstimate { hand_reaction_n, waist_target_rad: self.waist_target_rad(), ..body };
     }
 
     /// Sets this robot's joint drives for one physics step, `substep` counting from 0 within the control step.

@@ -83,7 +83,11 @@ impl Robot {
             pelvis_from_camera: pelvis_from_world
                 * body.world_from_link[self.model.egocentric_link]
                 * self.model.egocentric.body_from_camera,
-            hand_force_in_pelvis_n: body.hand_force_n.map(|force_n| pelvis_from_world.rotation * force_n),
+            hand_force_in_pelvis_n: self
+                .memory
+                .hand_loads
+                .force_n()
+                .map(|force_n| pelvis_from_world.rotation * force_n),
         }
     }
 
@@ -91,7 +95,7 @@ impl Robot {
     pub(crate) fn estimate(&self) -> RobotEstimate {
         RobotEstimate {
             world_from_pelvis: self.body.world_from_pelvis(),
-            hand_force_n: self.body.hand_force_n,
+            hand_force_n: self.memory.hand_loads.force_n(),
         }
     }
 

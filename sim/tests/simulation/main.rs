@@ -2,6 +2,7 @@
 
 mod allocation;
 mod falls;
+mod hand_forces;
 mod locomotion;
 mod odometry;
 mod peer_scenes;

@@ -156,7 +156,7 @@ impl Locomotion for Agile {
 /// What a policy is told so that it keeps up with the commands.
 fn keep_place(place: &mut ReferencePlace, body: &BodyEstimate, command: [f32; 3], dt_s: f32) -> [f32; 3] {
     let pelvis = body.world_from_pelvis();
-    let pulled_down_n: f32 = body.hand_force_n.into_iter().map(|force| -force.z).sum();
+    let pulled_down_n: f32 = body.hand_reaction_n.into_iter().map(|force| -force.z).sum();
     if pulled_down_n > HEAVY_N {
         *place = ReferencePlace::of(pelvis);
         return command;

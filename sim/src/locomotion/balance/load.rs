@@ -15,7 +15,8 @@ pub(super) struct LadenRobot {
 
 impl LadenRobot {
     pub(super) fn of(body: &BodyEstimate) -> LadenRobot {
-        let carried_kg = body.hand_force_n.map(|force_n| (-force_n.z - DEAD_ZONE_N).max(0.0) / GRAVITY_M_S2);
+        let carried_kg =
+            body.hand_reaction_n.map(|force_n| (-force_n.z - DEAD_ZONE_N).max(0.0) / GRAVITY_M_S2);
         let mut mass_kg = body.model.mass_kg;
         let mut momentum_kg_m_s = body.com_velocity_m_s * mass_kg;
         for (carried_kg, palm_m_s) in carried_kg.into_iter().zip(body.palm_velocity_m_s) {
@@ -64,7 +65,7 @@ impl Load {
             moment_n_m += (palm_m - body.com_m).cross(weight_n);
         }
         let weights_point_m = balanced_m(force_n, moment_n_m);
-        for (hand_n, palm_m) in body.hand_force_n.into_iter().zip(palms_m) {
+        for (hand_n, palm_m) in body.hand_reaction_n.into_iter().zip(palms_m) {
             // What pulls sideways is part of the push. What turns the robot, the hands alone tell: the push
             // acts over the centre of mass.
             moment_n_m.z += (palm_m - body.com_m).cross(flat(hand_n)).z;
@@ -95,7 +96,7 @@ mod tests {
 
         // Equal weights in both hands act as one in the middle: the common centre of mass.
         let weight_n = 20.0;
-        body.hand_force_n = Sides::both(Vector::new(0.0, 0.0, -weight_n - DEAD_ZONE_N));
+        body.hand_reaction_n = Sides::both(Vector::new(0.0, 0.0, -weight_n - DEAD_ZONE_N));
         let loaded = Load::of(&body, &LadenRobot::of(&body), 0.0, Vector::ZERO);
         let palms_m: Vector = body.palms_m().into_iter().sum();
         let robot_n = body.model.mass_kg * GRAVITY_M_S2;
@@ -104,7 +105,7 @@ mod tests {
         assert!(away_m.x.abs() < 1e-5 && away_m.y.abs() < 1e-5, "{away_m}");
 
         // What lifts, and what is lighter than the dead zone, is no load.
-        body.hand_force_n = Sides { left: Vector::Z * 30.0, right: Vector::Z * -0.9 * DEAD_ZONE_N };
+        body.hand_reaction_n = Sides { left: Vector::Z * 30.0, right: Vector::Z * -0.9 * DEAD_ZONE_N };
         assert_eq!(Load::of(&body, &LadenRobot::of(&body), 0.0, Vector::ZERO).force_n, Vector::ZERO);
     }
 
@@ -115,7 +116,7 @@ mod tests {
         body.com_velocity_m_s = Vector::ZERO;
         body.palm_velocity_m_s = Sides::both(Vector::X);
         assert_eq!(LadenRobot::of(&body).velocity_m_s, Vector::ZERO, "empty hands");
-        body.hand_force_n = Sides::both(Vector::new(0.0, 0.0, -3.0 * GRAVITY_M_S2 - DEAD_ZONE_N));
+        body.hand_reaction_n = Sides::both(Vector::new(0.0, 0.0, -3.0 * GRAVITY_M_S2 - DEAD_ZONE_N));
         let laden = LadenRobot::of(&body);
         let mass_kg = body.model.mass_kg + 6.0;
         assert!((laden.mass_kg - mass_kg).abs() < 1e-4, "{}", laden.mass_kg);
