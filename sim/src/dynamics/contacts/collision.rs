@@ -5,18 +5,24 @@
 
 use rapier3d::math::Vector;
 use rapier3d::parry::bounding_volume::BoundingVolume;
-use rapier3d::parry::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
+use rapier3d::parry::query::{
+    ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher, TrackedContact,
+};
 use rapier3d::parry::shape::PackedFeatureId;
 use serde::{Deserialize, Serialize};
 
 use super::collider::{Collider, ColliderId, Surface};
 use super::friction::Friction;
 use super::near::NearPairs;
+use super::overlap::Overlap;
 use super::{Candidate, ContactPoint, Impulses};
 use crate::dynamics::settings::Settings;
 use crate::dynamics::trees::spatial::rounded;
 use crate::dynamics::trees::{LinkId, Trees};
 use crate::dynamics::{DPose3, DVec3};
+
+/// Two faces lie on each other where no point is deeper than their corners by this.
+const FACE_M: f32 = 0.001;
 
 #[derive(Default)]
 pub struct Collision {
@@ -139,6 +145,9 @@ impl NearPair<'_> {
         DefaultQueryDispatcher
             .contact_manifold_convex_convex(&a_from_b, a, b, None, None, near_m, manifold)
             .expect("Parry knows all convex shapes");
+        if let Some(overlap) = Overlap::of([a, b], &a_from_b) {
+            overlap.mend(before, manifold);
+        }
         // Parry may find no direction between two that only just touch; in the next step they are a little deeper, or apart.
         if !manifold.local_n1.is_normalized() {
             manifold.clear();
@@ -153,8 +162,13 @@ impl NearPair<'_> {
         let friction = Friction::between(&first.collider.friction, &second.collider.friction);
         let bodies = self.surfaces.map(|surface| surface.body);
         let mut number = 0;
-        // The nearest point is added to the corners of two faces that lie on each other; it lies between them and wanders.
-        let faces = manifold.points.len() > 3;
+        // The nearest point is added to the corners of two faces that lie on each other; it lies between them and wanders. Of a hull
+        // that is tilted the face that looks there the most may be another than the one that is deepest: then it is what counts.
+        let of_faces = |point: &&TrackedContact<()>| point.fid1 != PackedFeatureId::UNKNOWN;
+        let deepest_m =
+            manifold.points.iter().filter(of_faces).map(|point| point.dist).fold(f32::MAX, f32::min);
+        let faces =
+            manifold.points.len() > 3 && manifold.points.iter().all(|point| point.dist > deepest_m - FACE_M);
         for point in manifold.points.iter().filter(|point| !faces || point.fid1 != PackedFeatureId::UNKNOWN) {
             let local_m = [point.local_p1, point.local_p2].map(Vector::as_dvec3);
             let [on_a_m, on_b_m] = [0, 1].map(|side| self.world_from_shapes[side] * local_m[side]);

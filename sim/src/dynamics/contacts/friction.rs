@@ -151,11 +151,16 @@ impl<const N: usize> Contacts<N> {
         }
     }
 
-    /// One sweep of Gauss-Seidel, contact by contact.
-    pub fn sweep(&mut self, pass: Pass, w: &mut [f64]) {
+    /// One sweep of Gauss-Seidel, contact by contact, each of which changes by this share of what it would.
+    pub fn sweep(&mut self, pass: Pass, share: f64, w: &mut [f64]) {
         for (group, contact) in self.all.iter_mut().enumerate() {
             let velocity = self.rows.velocity(group, w);
-            let impulse = contact.update(pass, velocity);
+            let mut impulse = contact.update(pass, velocity);
+            if share < 1.0 {
+                for (new, old) in impulse.iter_mut().zip(contact.impulse) {
+                    *new = old + share * (*new - old);
+                }
+            }
             let mut change = impulse;
             for (change, old) in change.iter_mut().zip(contact.impulse) {
                 *change -= old;

@@ -4,6 +4,7 @@ pub mod collider;
 pub mod collision;
 pub mod friction;
 mod near;
+pub mod overlap;
 
 use rapier3d::glamx::DVec3;
 use serde::{Deserialize, Serialize};

@@ -126,7 +126,7 @@ impl JointRows {
         }
     }
 
-    /// The greatest velocity (rad/s or m/s) that an end of a range took back.
+    /// The greatest velocity (rad/s or m/s) that an end of a range, or a motor that is turned too fast, took back.
     pub fn sweep(&mut self, pass: Pass, w: &mut [f64]) -> f64 {
         let mut greatest = 0.0f64;
         for (group, row) in self.all.iter_mut().enumerate() {
@@ -135,6 +135,9 @@ impl JointRows {
             let (inverse_mass, mass) = (row.inverse_mass, row.mass);
             if let Some(drive) = &mut row.drive {
                 drive.update(inverse_mass, &mut v);
+                if v.abs() > drive.law.speed_limit {
+                    greatest = greatest.max((v - before).abs());
+                }
             }
             row.dry.update(inverse_mass, mass, &mut v);
             if let Some(range) = &mut row.range {

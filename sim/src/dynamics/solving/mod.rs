@@ -15,10 +15,14 @@ use crate::dynamics::settings::{Pass, Settings};
 use crate::dynamics::trees::Trees;
 use crate::dynamics::trees::spatial::ForceVector;
 
-/// Velocity (rad/s or m/s) which, taken back by the end of a range in the last sweep, says that more are needed, and how many at
-/// most: what is heavy presses a light link against its stop.
+/// Velocity (rad/s or m/s) which, taken back in the last sweep by the end of a range or by a motor that is turned too fast, says that
+/// more are needed, and how many at most: what is heavy presses a light link against its stop.
 const UNSETTLED: f64 = 2.0;
 const MORE_SWEEPS: usize = 32;
+/// After so many of these contacts change by a share of what they would: friction at a finger that is wedged between the floor and its
+/// stop goes to and fro for ever otherwise, each sweep taking back what the one before did.
+const WHOLE_SWEEPS: usize = 8;
+const DAMPED_SHARE: f64 = 0.5;
 /// Where something lies deeper in another, as many more: what is heavy presses something light into the floor.
 const DEEP_M: f64 = 0.01;
 /// J that the relaxing sweeps took: where it was so much, there may be more that they should have taken.
@@ -112,14 +116,15 @@ impl Solver {
         std::mem::swap(&mut self.touches, &mut self.found);
     }
 
-    /// So many sweeps, and more where ends of ranges are not settled by then.
+    /// So many sweeps, and more where ends of ranges and motors that are turned too fast are not settled by then.
     fn settle(&mut self, pass: Pass, sweeps: usize) {
         let mut pushed = 0.0;
         for sweep in 0..sweeps + MORE_SWEEPS {
             if sweep >= sweeps && pushed < UNSETTLED {
                 break;
             }
-            pushed = self.sweep(pass);
+            let share = if sweep < sweeps + WHOLE_SWEEPS { 1.0 } else { DAMPED_SHARE };
+            pushed = self.sweep(pass, share);
         }
     }
 
@@ -172,12 +177,13 @@ impl Solver {
         }
     }
 
-    /// The greatest velocity (rad/s or m/s) that an end of a range took back.
-    fn sweep(&mut self, pass: Pass) -> f64 {
+    /// Contacts change by this share of what they would. The greatest velocity (rad/s or m/s) that joints took back, see
+    /// [`JointRows::sweep`].
+    fn sweep(&mut self, pass: Pass, share: f64) -> f64 {
         let pushed = self.joints.sweep(pass, &mut self.w);
         self.equalities.sweep(pass, &mut self.w);
-        self.plain.sweep(pass, &mut self.w);
-        self.rolling.sweep(pass, &mut self.w);
+        self.plain.sweep(pass, share, &mut self.w);
+        self.rolling.sweep(pass, share, &mut self.w);
         pushed
     }
 }
