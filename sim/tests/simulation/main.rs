@@ -4,6 +4,7 @@ mod allocation;
 mod falls;
 mod hand_forces;
 mod locomotion;
+mod motors;
 mod odometry;
 mod peer_scenes;
 mod render;
