@@ -7,7 +7,7 @@ use tandem_sim::{Pose, Rotation, Side, Sides, Vector};
 
 use super::skills::{
     CarryTeam, Commander, FREE, HandGrasp, HandMove, Hold, ParallelScript, Posture, PosturePath, WalkGoal,
-    closed_rad, follow, grasp_compliantly, in_parallel, let_go, place, walk_to,
+    closed_rad, follow, grasp_reached, in_parallel, let_go, place, walk_to,
 };
 use crate::players::PlayerError;
 use crate::scoring::{A, B, C, Facts};
@@ -74,10 +74,9 @@ fn carry_table(commander: &mut Commander) -> Result<(), PlayerError> {
     let grasps = [b_left, b_right, c_left, c_right];
     let mut team = CarryTeam::new(commander, &grasps)?;
     set_heights(commander, BENT_M);
-    // Thighs meet legs behind which robots do not stand in the middle.
-    let stands = team.walk_goals(commander)?;
-    walk_to(commander, &stands)?;
-    grasp_compliantly(commander, &grasps)?;
+    // Thighs meet legs behind which robots do not stand in the middle, and where they have come too near.
+    team.gather_reaching(commander)?;
+    grasp_reached(commander, &grasps)?;
     // Two robots that lift with stiff hands lean back against each other's pull, and stagger.
     team.give_way(commander, true);
     team.lift(commander, LIFT_M)?;
@@ -91,7 +90,6 @@ fn carry_table(commander: &mut Commander) -> Result<(), PlayerError> {
     };
     team.carry_where_free(commander, &marks, PACE_M_S, &free_m)?;
     set_heights(commander, BENT_M);
-    team.rest(commander)?;
     team.set_down(commander, &marks)?;
     // The squares are small, and hands that gave way now would shift the table as they open.
     team.give_way(commander, false);
@@ -105,10 +103,9 @@ fn set_heights(commander: &mut Commander, height_m: f32) {
     }
 }
 
-/// A lays its right fist on the lever, presses it down and follows the leaf on its swing.
+/// A, which begins within reach of the lever, lays its right fist on it, presses it down and follows the leaf on its swing.
 fn open_door(commander: &mut Commander) -> Result<(), PlayerError> {
     let leaf = commander.facts()?.object("lever_door leaf").pose_in_world;
-    walk_to(commander, &[WalkGoal { robot: A, to: push(&leaf, 0.0, 0.0).0, pace_m_s: WALK_M_S }])?;
     let pressed_m = press_lever(commander)?;
     let robot = &commander.facts()?.robots[A];
     let (left_in_pelvis, pelvis_m) = (robot.wrist_in_pelvis.left, robot.pelvis_in_world.translation.z);

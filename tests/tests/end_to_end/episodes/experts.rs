@@ -7,7 +7,7 @@ use std::thread::available_parallelism;
 use tandem_episodes::evaluation::{EvaluationPlan, Shard, Starts, evaluate};
 use tandem_episodes::players::{self, Episode, InProcess, PlayerError, PrivilegedEpisode, experts};
 use tandem_episodes::tasks::{self, Task};
-use tandem_episodes::{A, Controller, EpisodeSpec, Facts, RendererKind, RobotFile, Sensing, Session};
+use tandem_episodes::{A, B, C, Controller, EpisodeSpec, Facts, RendererKind, RobotFile, Sensing, Session};
 use tandem_sim::Side;
 use tandem_tools_spec::{ActCall, Assistance, Protocol, ToolCall, ToolReply};
 
@@ -116,4 +116,57 @@ fn a_hand_that_slips_off_a_load_takes_it_again() {
     players::find("expert").expect("a player").play(&spec, &mut slip).expect("an expert that goes on");
     assert!(slip.slipped && slip.took_again);
     assert_eq!(slip.episode.session.reached_phases(), 3);
+}
+
+/// An episode in which B and C lift a table by its legs.
+struct Lift {
+    episode: InProcess,
+    /// How far they stood from where they hold it best when it had been lifted.
+    most_off_m: Option<f32>,
+}
+
+const CONSOLE: &str = "console_table";
+/// From its middle to where the pelvises of those who hold it are to be: 0.37 m to the legs, and 0.38 m behind them.
+const MIDDLE_FROM_PELVIS_M: f32 = 0.75;
+
+impl Episode for Lift {
+    fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {
+        let facts = self.episode.session.facts();
+        if self.most_off_m.is_none() && facts.lift_m(CONSOLE) > 0.06 {
+            let table = facts.object(CONSOLE).pose_in_world.inverse();
+            let off_m = |(robot, ahead_m): (usize, f32)| {
+                let mut pelvis_m = (table * facts.robots[robot].pelvis_in_world).translation;
+                pelvis_m.x -= ahead_m;
+                pelvis_m.truncate().length()
+            };
+            let pair = [(B, MIDDLE_FROM_PELVIS_M), (C, -MIDDLE_FROM_PELVIS_M)];
+            self.most_off_m = pair.into_iter().map(off_m).reduce(f32::max);
+        }
+        self.episode.call(call)
+    }
+}
+
+impl PrivilegedEpisode for Lift {
+    fn facts(&mut self) -> Result<Facts, PlayerError> {
+        self.episode.facts()
+    }
+}
+
+/// On these seeds carriers took a step after their arms as they reached out: they were 9 cm too near when they lifted, their thighs
+/// pressed on the legs with their first steps, and they fell.
+#[test]
+fn carriers_stand_where_they_are_to_when_they_lift() {
+    for seed in [2009, 2103] {
+        let spec = EpisodeSpec::new(tasks::find("move_house").expect("a task"), seed, Protocol::Benchmark);
+        let session = Session::start(&spec, None).expect("a session");
+        let mut lift = Lift { episode: InProcess::new(session), most_off_m: None };
+        players::find("expert").expect("a player").play(&spec, &mut lift).expect("an expert that carries on");
+        let reached = lift.episode.session.reached_phases();
+        let result = lift.episode.session.close();
+        assert!(lift.most_off_m.is_some_and(|off_m| off_m < 0.05), "{seed}: {:?} m", lift.most_off_m);
+        assert_eq!((reached, result.falls), (3, 0), "{seed}");
+        // Of the 30 s that it has, it leaves some.
+        let placed_s = result.phases.0.last().and_then(|(_, time_s)| *time_s);
+        assert!(placed_s.is_some_and(|time_s| time_s < 27.0), "{seed}: {placed_s:?} s");
+    }
 }

@@ -7,7 +7,7 @@ use super::commander::{Commander, HandMove};
 use super::compliant::grasp_compliantly;
 use super::grasp::{HandGrasp, move_together};
 use super::posture_path::{FREE, PathProgress, Posture, PosturePath, follow_while};
-use super::walk::{Tolerance, WalkGoal, approach, upright};
+use super::walk::{Tolerance, WalkGoal, approach, upright, walk_reaching};
 use crate::players::PlayerError;
 use crate::scoring::{Facts, Grip};
 
@@ -80,8 +80,19 @@ impl<'a> CarryTeam<'a> {
         approach(commander, &walk_goals, NEAR)
     }
 
+    /// Robots walk to where they stand beside the object as it is now, and reach out to the first stops of their hands meanwhile.
+    pub fn gather_reaching(&self, commander: &mut Commander) -> Result<(), PlayerError> {
+        let walk_goals = self.walk_goals(commander)?;
+        let mut reaches = Vec::with_capacity(walk_goals.len());
+        for pair in self.grasps.chunks_exact(2) {
+            let [left, right] = [pair[0].at_stop(commander, 0)?, pair[1].at_stop(commander, 0)?];
+            reaches.push(Sides { left, right });
+        }
+        walk_reaching(commander, &walk_goals, &reaches)
+    }
+
     /// Where the robots have to walk to stand beside the object as it is now.
-    pub fn walk_goals(&self, commander: &mut Commander) -> Result<Vec<WalkGoal>, PlayerError> {
+    fn walk_goals(&self, commander: &mut Commander) -> Result<Vec<WalkGoal>, PlayerError> {
         let object = upright(&self.object(commander)?);
         let way = |(robot, stand): (&usize, &Pose)| WalkGoal {
             robot: *robot,

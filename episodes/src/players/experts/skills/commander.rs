@@ -147,6 +147,12 @@ impl<'a> Commander<'a> {
         self.targets[robot].compliance_n_s_m = compliance_n_s_m;
     }
 
+    /// What the fingers of a hand are to be at from its next command on, where the move says it.
+    pub fn set_fingers(&mut self, hand: &HandMove) {
+        let target = &mut self.targets[hand.robot].hands[hand.side];
+        target.fingers_rad = hand.fingers_rad.or(target.fingers_rad);
+    }
+
     /// Moves hands along straight lines for `duration_s`, starting and arriving at rest; robots not named hold still.
     pub fn perform(&mut self, duration_s: f32, moves: &[HandMove]) -> Result<(), PlayerError> {
         self.travel(duration_s, moves, smooth)
@@ -292,6 +298,6 @@ fn world_from_wrist(facts: &Facts, robot: usize, side: Side) -> Pose {
 }
 
 /// Zero speed at both ends.
-fn smooth(share: f32) -> f32 {
+pub fn smooth(share: f32) -> f32 {
     share * share * (3.0 - 2.0 * share)
 }

@@ -28,9 +28,20 @@ const LEASH_M: f32 = 0.03;
 
 /// Closes all hands on their places at once, which are held alike; hands that miss try again, while the others hold on.
 pub fn grasp_compliantly(commander: &mut Commander, grasps: &[HandGrasp]) -> Result<(), PlayerError> {
+    grasp_from(commander, grasps, 0)
+}
+
+/// The same for hands that have reached out to their first stops.
+pub fn grasp_reached(commander: &mut Commander, grasps: &[HandGrasp]) -> Result<(), PlayerError> {
+    grasp_from(commander, grasps, 1)
+}
+
+/// The same from a stop on; those that miss go all the way once more.
+fn grasp_from(commander: &mut Commander, grasps: &[HandGrasp], first_stop: usize) -> Result<(), PlayerError> {
     let mut missing = grasps.to_vec();
-    for _ in 0..ATTEMPTS {
-        for stop in 0..stops(&missing) {
+    for attempt in 0..ATTEMPTS {
+        let next_stop = if attempt == 0 { first_stop } else { 0 };
+        for stop in next_stop..stops(&missing) {
             let before = each(commander, &missing, |grasp, commander| grasp.at_stop(commander, stop))?;
             commander.perform(if stop == 0 { TO_FIRST_STOP_S } else { BETWEEN_STOPS_S }, &before)?;
         }

@@ -12,7 +12,7 @@ mod walk;
 
 pub use carry_team::{CarryTeam, ObjectPath};
 pub use commander::{Commander, HandMove};
-pub use compliant::{grasp_compliantly, let_go};
+pub use compliant::{grasp_compliantly, grasp_reached, let_go};
 pub use cylinder::{CylinderGrasp, closed_rad, pick_up_all, wrapped_rad};
 pub use grasp::{HandGrasp, move_together, take_together};
 pub use hold::Hold;

@@ -1,8 +1,11 @@
 //! Places on the floor, where robots stand and which way they look; and walking to them, several robots at once.
 
-use tandem_sim::{BaseVelocity, CONTROL_DT_S, Pose, Rotation, Sides, Vector, heading_rad, wrapped_rad};
+use std::collections::VecDeque;
+use std::ops::RangeInclusive;
 
-use super::commander::{Commander, RobotMove, WALK_STEPS, WristTargets};
+use tandem_sim::{BaseVelocity, CONTROL_DT_S, Pose, Rotation, Side, Sides, Vector, heading_rad, wrapped_rad};
+
+use super::commander::{Commander, HandMove, RobotMove, WALK_STEPS, WristTargets, smooth};
 use crate::players::PlayerError;
 
 /// Velocity for each metre that a robot is off its place, and turning for each radian.
@@ -16,6 +19,12 @@ const TRIES: u32 = 3;
 const LONGEST_S: f32 = 20.0;
 /// Feet come together, and what sways comes to rest.
 const SETTLE_COMMANDS: u32 = 6;
+/// Commands in which a robot takes a step with either foot.
+const TWO_STEPS_COMMANDS: usize = 6;
+/// How long hands take to reach out.
+const REACH_S: f32 = 1.5;
+/// Hands that have reached out correct the rest.
+const LONGEST_REACHING_S: f32 = 4.0;
 
 /// Where a robot is to walk.
 #[derive(Clone, Copy)]
@@ -59,20 +68,15 @@ pub fn steer(at: &Pose, to: &Pose, drift: TargetVelocity, pace_m_s: f32) -> Base
 pub fn approach(commander: &mut Commander, goals: &[WalkGoal], within: Tolerance) -> Result<(), PlayerError> {
     let mut hands = Vec::with_capacity(goals.len());
     for goal in goals {
-        hands.push(commander.facts()?.robots[goal.robot].wrist_in_pelvis);
+        hands.push(WristTargets::InPelvis(commander.facts()?.robots[goal.robot].wrist_in_pelvis));
     }
     let mut left_s = LONGEST_S;
-    while left_s > 0.0 && !have_arrived(commander, goals, within)? {
-        let facts = commander.facts()?;
-        let walk = |goal: &WalkGoal| {
-            steer(
-                &facts.robots[goal.robot].pelvis_in_world,
-                &goal.to,
-                TargetVelocity::default(),
-                goal.pace_m_s,
-            )
-        };
-        commander.advance(WALK_STEPS, &moves(goals, &hands, walk))?;
+    while left_s > 0.0 {
+        let now = pelvises(commander, goals)?;
+        if now.iter().zip(goals).all(|(at, goal)| is_there(at, goal, within)) {
+            break;
+        }
+        commander.advance(WALK_STEPS, &moves(goals, &hands, &steered(&now, goals)))?;
         left_s -= WALK_STEPS as f32 * CONTROL_DT_S;
     }
     Ok(())
@@ -82,59 +86,140 @@ pub fn approach(commander: &mut Commander, goals: &[WalkGoal], within: Tolerance
 pub fn walk_to(commander: &mut Commander, goals: &[WalkGoal]) -> Result<(), PlayerError> {
     let mut hands = Vec::with_capacity(goals.len());
     for goal in goals {
-        hands.push(commander.facts()?.robots[goal.robot].wrist_in_pelvis);
+        hands.push(WristTargets::InPelvis(commander.facts()?.robots[goal.robot].wrist_in_pelvis));
     }
-    let mut left_s = LONGEST_S;
-    for _ in 0..TRIES {
-        while left_s > 0.0 && !have_arrived(commander, goals, CLOSE)? {
-            let facts = commander.facts()?;
-            let walk = |goal: &WalkGoal| {
-                steer(
-                    &facts.robots[goal.robot].pelvis_in_world,
-                    &goal.to,
-                    TargetVelocity::default(),
-                    goal.pace_m_s,
-                )
+    arrive(commander, goals, 0.0..=LONGEST_S, &|_| hands.clone())
+}
+
+/// Brings robots to their places while their hands reach out: each pair of `reaches` are the hands of the robot of the goal beside it. One
+/// who stands already when both arms go out takes a step after them, for they weigh ahead; one who walks meanwhile stands in its place
+/// with its arms out.
+pub fn walk_reaching(
+    commander: &mut Commander,
+    goals: &[WalkGoal],
+    reaches: &[Sides<HandMove>],
+) -> Result<(), PlayerError> {
+    let mut from = Vec::with_capacity(goals.len());
+    for (goal, hands) in goals.iter().zip(reaches) {
+        let robot = &commander.facts()?.robots[goal.robot];
+        from.push(robot.wrist_in_pelvis.map(|wrist| robot.pelvis_in_world * wrist));
+        for side in Side::BOTH {
+            commander.set_fingers(&hands[side]);
+        }
+    }
+    arrive(commander, goals, REACH_S..=LONGEST_REACHING_S, &|gone_s| {
+        let part = smooth((gone_s / REACH_S).min(1.0));
+        let reach = |(from, hands): (&Sides<Pose>, &Sides<HandMove>)| {
+            let wrist = |side: Side| {
+                let to = hands[side].world_from_wrist.unwrap_or(from[side]);
+                from[side].lerp(&to, part)
             };
-            commander.advance(WALK_STEPS, &moves(goals, &hands, walk))?;
-            left_s -= WALK_STEPS as f32 * CONTROL_DT_S;
+            WristTargets::InWorld(Sides::from_fn(wrist))
+        };
+        from.iter().zip(reaches).map(reach).collect()
+    })
+}
+
+/// Walks robots to their places with their hands where `hands` has them so many seconds after they set out. Each stops where it is there,
+/// and no sooner than after so long.
+fn arrive(
+    commander: &mut Commander,
+    goals: &[WalkGoal],
+    time_s: RangeInclusive<f32>,
+    hands: &dyn Fn(f32) -> Vec<WristTargets>,
+) -> Result<(), PlayerError> {
+    let mut gone_s = 0.0;
+    let mut resting = vec![false; goals.len()];
+    for _ in 0..TRIES {
+        let mut sway = Sway::default();
+        while gone_s < *time_s.end() {
+            let now = pelvises(commander, goals)?;
+            let mean = sway.mean(now.clone());
+            for (robot, goal) in goals.iter().enumerate() {
+                resting[robot] |=
+                    gone_s >= *time_s.start() && sway.is_told() && is_there(&mean[robot], goal, CLOSE);
+            }
+            if !resting.contains(&false) {
+                break;
+            }
+            let mut velocities = steered(&now, goals);
+            for (velocity, _) in velocities.iter_mut().zip(&resting).filter(|(_, rests)| **rests) {
+                *velocity = BaseVelocity::STILL;
+            }
+            gone_s += WALK_STEPS as f32 * CONTROL_DT_S;
+            commander.advance(WALK_STEPS, &moves(goals, &hands(gone_s), &velocities))?;
         }
         for _ in 0..SETTLE_COMMANDS {
-            commander.advance(WALK_STEPS, &moves(goals, &hands, |_| BaseVelocity::STILL))?;
+            gone_s += WALK_STEPS as f32 * CONTROL_DT_S;
+            let still = vec![BaseVelocity::STILL; goals.len()];
+            commander.advance(WALK_STEPS, &moves(goals, &hands(gone_s), &still))?;
         }
         // Where a robot came by with a sway, it does not come to rest.
-        if have_arrived(commander, goals, AT_REST)? {
+        let now = pelvises(commander, goals)?;
+        resting = goals.iter().zip(&now).map(|(goal, at)| is_there(at, goal, AT_REST)).collect();
+        if !resting.contains(&false) || gone_s >= *time_s.end() {
             break;
         }
     }
     Ok(())
 }
 
-fn moves(
-    goals: &[WalkGoal],
-    hands: &[Sides<Pose>],
-    walk: impl Fn(&WalkGoal) -> BaseVelocity,
-) -> Vec<RobotMove> {
-    let part = |(goal, hands): (&WalkGoal, &Sides<Pose>)| RobotMove {
-        robot: goal.robot,
-        base: walk(goal),
-        wrists: WristTargets::InPelvis(*hands),
-    };
-    goals.iter().zip(hands).map(part).collect()
+/// Where robots were at their last commands. A pelvis sways by 3 cm to each side from step to step, so that it passes its place over and
+/// over; in the mean over two steps a robot is there or is not.
+#[derive(Default)]
+struct Sway {
+    recent: VecDeque<Vec<Pose>>,
 }
 
-fn have_arrived(
-    commander: &mut Commander,
-    goals: &[WalkGoal],
-    within: Tolerance,
-) -> Result<bool, PlayerError> {
+impl Sway {
+    /// Where the robots are in the mean, which are `now` there.
+    fn mean(&mut self, now: Vec<Pose>) -> Vec<Pose> {
+        let robots = now.len();
+        self.recent.push_back(now);
+        if self.recent.len() > TWO_STEPS_COMMANDS {
+            self.recent.pop_front();
+        }
+        let share = 1.0 / self.recent.len() as f32;
+        let mean = |robot: usize| {
+            let (mut position_m, mut ahead) = (Vector::ZERO, Vector::ZERO);
+            for poses in &self.recent {
+                position_m += poses[robot].translation * share;
+                ahead += poses[robot].rotation * Vector::X * share;
+            }
+            place(position_m, ahead.y.atan2(ahead.x))
+        };
+        (0..robots).map(mean).collect()
+    }
+
+    /// Whether a mean says where robots are: those who stand do not sway.
+    fn is_told(&self) -> bool {
+        [1, TWO_STEPS_COMMANDS].contains(&self.recent.len())
+    }
+}
+
+fn pelvises(commander: &mut Commander, goals: &[WalkGoal]) -> Result<Vec<Pose>, PlayerError> {
     let facts = commander.facts()?;
-    let is_there = |goal: &WalkGoal| {
-        let at = facts.robots[goal.robot].pelvis_in_world;
-        let off_m = (goal.to.translation - at.translation).truncate().length();
-        off_m < within.off_m && wrapped_rad(heading_rad(&goal.to) - heading_rad(&at)).abs() < within.off_rad
+    Ok(goals.iter().map(|goal| facts.robots[goal.robot].pelvis_in_world).collect())
+}
+
+/// How robots walk to their places from where they are.
+fn steered(now: &[Pose], goals: &[WalkGoal]) -> Vec<BaseVelocity> {
+    let walk = |(at, goal): (&Pose, &WalkGoal)| steer(at, &goal.to, TargetVelocity::default(), goal.pace_m_s);
+    now.iter().zip(goals).map(walk).collect()
+}
+
+fn moves(goals: &[WalkGoal], hands: &[WristTargets], velocities: &[BaseVelocity]) -> Vec<RobotMove> {
+    let part = |((goal, wrists), base): ((&WalkGoal, &WristTargets), &BaseVelocity)| RobotMove {
+        robot: goal.robot,
+        base: *base,
+        wrists: *wrists,
     };
-    Ok(goals.iter().all(is_there))
+    goals.iter().zip(hands).zip(velocities).map(part).collect()
+}
+
+fn is_there(at: &Pose, goal: &WalkGoal, within: Tolerance) -> bool {
+    let off_m = (goal.to.translation - at.translation).truncate().length();
+    off_m < within.off_m && wrapped_rad(heading_rad(&goal.to) - heading_rad(at)).abs() < within.off_rad
 }
 
 /// The same place and heading, without any tilt.
