@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use rapier3d::math::Vector;
 
-use super::cases::{Case, Disturbance, Plan, PulledHands, STOP_S};
+use super::cases::{Case, Disturbance, PULL_RISE_S, Plan, PulledHands, STOP_S};
 use super::measure::{SETTLE_S, Sample, Trial, measure};
 use super::motion::ArmMotion;
 use super::tour::{self, Leg};
@@ -102,9 +102,10 @@ fn base_command(
 
 fn disturb(case: &Case, world: &mut World, seed: u32, direction: Vector, legs: &[Leg], time_s: f32) {
     let pulled_s = time_s - 0.5 * SETTLE_S;
+    let risen = (pulled_s / PULL_RISE_S).min(1.0);
     match &case.disturbance {
         Disturbance::Pull { force_n } if pulled_s > 0.0 => {
-            pull(world, &Side::BOTH, direction * (force_n * pulled_s.min(1.0)));
+            pull(world, &Side::BOTH, direction * (force_n * risen));
         }
         Disturbance::LevelPull { force_n, hands, end_s } if pulled_s > 0.0 && time_s < *end_s => {
             let angle = TAU * seed as f32 / 10.0;
@@ -114,7 +115,7 @@ fn disturb(case: &Case, world: &mut World, seed: u32, direction: Vector, legs: &
                 PulledHands::One => &[Side::Right],
             };
             let towards = Vector::new(angle.cos(), angle.sin(), 0.0);
-            pull(world, sides, towards * (force_n * pulled_s.min(1.0)));
+            pull(world, sides, towards * (force_n * risen));
         }
         Disturbance::Push { force_n } if (5.0..5.0 + PUSH_S).contains(&time_s) => {
             let angle = TAU * seed as f32 / 8.0;
