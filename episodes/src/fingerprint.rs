@@ -2,13 +2,22 @@
 
 use std::fs::File;
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use xxhash_rust::xxh3::Xxh3;
 
 /// A program is tens of megabytes, so it is read in parts.
 const PART_BYTES: usize = 64 << 10;
+
+/// Where the program's own file is, where that is not the file that the system runs.
+static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+
+/// For a host that has loaded the program as a library: the library's file is what tells builds apart, and not the host's. The first
+/// path stays.
+pub fn name_program(path: PathBuf) {
+    PROGRAM.get_or_init(|| path);
+}
 
 /// Version and hash of the program's own file, as it was when first asked for.
 pub fn build() -> io::Result<&'static str> {
@@ -19,7 +28,10 @@ pub fn build() -> io::Result<&'static str> {
     if let Some(build) = BUILD.get() {
         return Ok(build);
     }
-    let hash = hash(&std::env::current_exe()?)?;
+    let hash = match PROGRAM.get() {
+        Some(path) => hash(path)?,
+        None => hash(&std::env::current_exe()?)?,
+    };
     Ok(BUILD.get_or_init(|| format!("{}+{hash:016x}", env!("CARGO_PKG_VERSION"))))
 }
 

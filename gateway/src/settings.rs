@@ -13,10 +13,10 @@ use clap::{
 };
 use serde::Deserialize;
 use tandem_episodes::{
-    BaseLimits, Controller, Instructions, InstructionsError, RendererKind, SceneFile, Sensing, SensorModel,
-    SimError, StateSource, Visibility,
+    BaseLimits, Controller, EpisodeError, EpisodeSpec, Instructions, InstructionsError, RendererKind,
+    SceneFile, Sensing, SensorModel, SimError, StateSource, Visibility, tasks,
 };
-use tandem_tools_spec::{Assistance, Disclosure, Hints, Wording};
+use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, StartEpisode, Wording};
 
 use crate::token::{Token, TokenError};
 
@@ -331,6 +331,22 @@ impl Settings {
     /// Which texts policies read.
     pub fn wording(&self) -> Wording {
         Wording { assistance: self.assistance, hints: self.hints }
+    }
+
+    /// The episode that these settings make of a start.
+    pub fn spec(&self, start: &StartEpisode) -> Result<EpisodeSpec, EpisodeError> {
+        let protocol = start.protocol.unwrap_or(Protocol::Agentic);
+        Ok(EpisodeSpec {
+            scene: self.scene.clone(),
+            locomotion: self.locomotion.clone(),
+            sensing: self.sensing,
+            renderer: self.renderer,
+            assistance: self.assistance,
+            disclosure: self.disclosure,
+            hints: self.hints,
+            instructions: self.instructions.fingerprint(&start.task),
+            ..EpisodeSpec::new(tasks::find(&start.task)?, start.seed, protocol)
+        })
     }
 
     /// Fills what `flags` (and the environment, which clap reads) leave out from the file at `config`, then from defaults.

@@ -24,7 +24,7 @@ pub use call::{Call, Look, parse_start};
 pub use error::SpecError;
 pub use list::{
     ActCall, EPISODE_TOOLS, LookCall, LookReply, ManageCall, ManageReply, TalkCall, TalkReply, ToolCall,
-    ToolReply, operator_tool_specs, tool_specs,
+    ToolReply, operator_tool_specs, tool_specs, typed_tools,
 };
 pub use listing::{EpisodeEntry, EpisodeList};
 pub use parts::{
@@ -34,7 +34,7 @@ pub use parts::{
     PixelRegion, Png, Pose, Protocol, Range, RobotFallen, RobotReport, StopReason, Wording,
 };
 pub use refusal::{ProblemBody, Refusal, RefusalClass};
-pub use schema::{EpisodeToolSpec, Format, ToolSpec};
+pub use schema::{EpisodeToolSpec, Format, ToolSpec, TypedTool, TypedTools};
 pub use tool::{Route, Tool, parse_args};
 pub use tools::*;
 

@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use crate::error::SpecError;
 use crate::parts::{CommandReply, Wording};
-use crate::schema::ToolSpec;
+use crate::schema::{ToolSpec, TypedTools, TypedToolsCollector};
 use crate::tool::{Tool, parse_args};
 use crate::tools::*;
 
@@ -47,6 +47,15 @@ macro_rules! tools {
                 $( ToolSpec::without_episode::<$free>(wording), )*
                 $( $( ToolSpec::on_episode::<$tool>(wording, $call::FOR_OPERATORS), )* )*
             ]
+        }
+
+        /// Every tool with its arguments and its reply as named types.
+        pub fn typed_tools() -> TypedTools {
+            let mut tools = TypedToolsCollector::new();
+            $( tools.add::<$free>(false, false); )*
+            $( $( tools.add::<$tool>(true, $call::FOR_OPERATORS); )* )*
+            tools.add_type::<Briefing>();
+            tools.finish()
         }
 
         /// The tools that act on an episode, by name.

@@ -72,6 +72,13 @@ impl RobotView {
     }
 }
 
+impl RobotView {
+    /// As [`Frame::depth_m`], for callers in this process whose look the episode has checked: not every protocol allows it.
+    pub fn depth_m(&self) -> &[f32] {
+        &self.depth_m
+    }
+}
+
 impl TeamObservation {
     /// The reply to `observe`, with pictures in the formats that were asked for.
     pub fn reply(&self, formats: &Formats) -> Result<Observation, PictureError> {

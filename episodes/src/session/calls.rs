@@ -1,7 +1,9 @@
 //! How calls reach an episode: what is refused before it counts, what is counted and recorded, and what the policy's clock does.
 
+use tandem_sim::Step;
 use tandem_tools_spec::{
-    Call, EndReason, ExtraInformation, Formats, Look, ManageReply, Observation, Observe, ToolCall, ToolReply,
+    Assistance, Call, EndReason, ExtraInformation, Formats, GetRobotState, Look, ManageReply, Observation,
+    Observe, ToolCall, ToolReply,
 };
 
 use super::Session;
@@ -50,6 +52,42 @@ impl Session {
         seen.iter().filter(|_| underway).for_each(|seen| self.shown.count_each(shown, seen));
         self.let_think();
         seen
+    }
+
+    /// As [`Session::call`] of `observe`, for a policy in this process: what it is told, with views as they were drawn.
+    pub fn observe_as_told(&mut self, look: &Look) -> Result<TeamObservation, EpisodeError> {
+        let seen = self.look_as_told(CallerRecord::Policy, look);
+        self.let_think();
+        seen
+    }
+
+    /// As [`Session::call`] of `get_robot_state` for each robot, for a policy in this process that needs no text: what it is told of the
+    /// step that is returned is the assistance's.
+    pub fn read_states(&mut self) -> Result<(Assistance, &Step), EpisodeError> {
+        let robots: Vec<String> = self.motions.iter().map(|motion| motion.robot.name.clone()).collect();
+        for robot in robots {
+            match self.files {
+                Some(_) => {
+                    let called = Called::One(ToolCall::from(GetRobotState { robot }).into());
+                    self.make(CallerRecord::Policy, &called)?;
+                }
+                None => self.count_state_read(&robot),
+            }
+        }
+        Ok((self.spec().assistance, &self.present))
+    }
+
+    /// A call of `get_robot_state` whose answer nobody needs as such.
+    fn count_state_read(&mut self, robot: &str) {
+        let counts = self.ended.is_none();
+        self.arrived();
+        if counts && self.spec().assistance == Assistance::Full {
+            self.shown.count_whole_state(robot);
+        }
+        if self.ended.is_some() {
+            self.settle();
+        }
+        self.let_think();
     }
 
     /// As [`Session::call`], for who carries out what a policy in this process decided: nothing is withheld from the reply, which the
@@ -162,12 +200,17 @@ impl Session {
         look: Option<Look>,
     ) -> Result<Option<Observation>, EpisodeError> {
         let Some(look) = look else { return Ok(None) };
-        let underway = self.ended.is_none();
-        let seen = self.look_once(caller, &look).map(|seen| seen.told(self.spec().assistance));
-        seen.iter().filter(|_| underway).for_each(|seen| self.shown.count_seen(seen, &look.formats));
-        let observation = seen.and_then(|seen| Ok(seen.reply(&look.formats)?));
+        let observation = self.look_as_told(caller, &look).and_then(|seen| Ok(seen.reply(&look.formats)?));
         self.let_think();
         observation.map(Some)
+    }
+
+    /// What a look shows, as the policy is told it, which is counted.
+    fn look_as_told(&mut self, caller: CallerRecord, look: &Look) -> Result<TeamObservation, EpisodeError> {
+        let underway = self.ended.is_none();
+        let seen = self.look_once(caller, look).map(|seen| seen.told(self.spec().assistance));
+        seen.iter().filter(|_| underway).for_each(|seen| self.shown.count_seen(seen, &look.formats));
+        seen
     }
 
     /// What a look shows, with nothing withheld; it is recorded as a policy is told it.

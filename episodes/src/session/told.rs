@@ -79,6 +79,17 @@ impl ShownInformation {
         self.count_those(&shown, &state.robot);
     }
 
+    /// As of an answer that shows all of a robot's state.
+    pub fn count_whole_state(&mut self, robot: &str) {
+        let shown = [
+            ExtraInformation::JointVelocities,
+            ExtraInformation::JointTorques,
+            ExtraInformation::Gravity,
+            ExtraInformation::Odometry,
+        ];
+        shown.into_iter().for_each(|what| self.count(what, robot));
+    }
+
     fn count_report(&mut self, report: &RobotReport) {
         let hands = [&report.left, &report.right];
         let shown = [

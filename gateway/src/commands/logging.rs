@@ -42,5 +42,6 @@ fn install(default: Targets, format: LogFormat) {
     };
     // The MCP library logs three lines for each line of this program.
     let usual = default.with_target("rmcp", LevelFilter::WARN);
-    tracing_subscriber::registry().with(wanted.unwrap_or(usual)).with(lines).init();
+    // Who runs several commands in one process, as a Python program may, has the log of the first one.
+    let _ = tracing_subscriber::registry().with(wanted.unwrap_or(usual)).with(lines).try_init();
 }

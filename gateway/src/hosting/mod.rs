@@ -24,5 +24,6 @@ pub use error::HostingError;
 pub use hosted_episode::{Caller, HostedEpisode};
 pub use idempotency_cache::IdempotentReply;
 pub use onlookers::LiveWatch;
+pub use panic_guard::{EpisodeMetrics, PanicGuard};
 pub use run_folder::{look_at_runs_folder, try_runs_folder};
 pub use table::EpisodeTable;

@@ -6,9 +6,9 @@ use std::{
     time::Duration,
 };
 
-use tandem_episodes::{EpisodeSpec, RunFolder, tasks};
+use tandem_episodes::{EpisodeSpec, RunFolder};
 use tandem_tools_spec::{
-    Assistance, Briefing, Driving, EpisodeList, Protocol, ResultReply, StartEpisode, StartReply, TaskList,
+    Assistance, Briefing, Driving, EpisodeList, ResultReply, StartEpisode, StartReply, TaskList,
 };
 use tokio::{
     sync::{OwnedSemaphorePermit, Semaphore},
@@ -88,18 +88,7 @@ impl EpisodeTable {
         args: StartEpisode,
         driving: Driving,
     ) -> Result<StartReply, HostingError> {
-        let protocol = args.protocol.unwrap_or(Protocol::Agentic);
-        let spec = EpisodeSpec {
-            scene: self.settings.scene.clone(),
-            locomotion: self.settings.locomotion.clone(),
-            sensing: self.settings.sensing,
-            renderer: self.settings.renderer,
-            assistance: self.settings.assistance,
-            disclosure: self.settings.disclosure,
-            hints: self.settings.hints,
-            instructions: self.settings.instructions.fingerprint(&args.task),
-            ..EpisodeSpec::new(tasks::find(&args.task)?, args.seed, protocol)
-        };
+        let spec = self.settings.spec(&args)?;
         let place = self.take_place().await?;
         let (id, path) = self.folders.create(&self.settings.runs, spec.task.id, spec.seed);
         let folder = RunFolder { path, visibility: self.settings.record };

@@ -1,8 +1,9 @@
 //! Which crate may depend on which.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
-use super::sources::root;
+use super::sources::{expect_none, root};
 
 /// Which crates of the workspace each crate may depend on. `sim`, `ik` and `tools_spec` know nothing of each other.
 const ARROWS: &[(&str, &[&str])] = &[
@@ -54,4 +55,29 @@ fn the_arrows_name_every_member() {
     listed.sort_unstable();
     named.sort_unstable();
     assert_eq!(named, listed);
+}
+
+/// The versions of every package that a lock file names.
+fn locked(path: &str) -> BTreeMap<String, BTreeSet<String>> {
+    let text = fs::read_to_string(root().join(path)).unwrap_or_else(|error| panic!("{path}: {error}"));
+    let lock: toml::Table = text.parse().unwrap_or_else(|error| panic!("{path}: {error}"));
+    let mut versions = BTreeMap::<String, BTreeSet<String>>::new();
+    for package in lock["package"].as_array().into_iter().flatten() {
+        let entry = |name: &str| package[name].as_str().unwrap_or_default().to_owned();
+        versions.entry(entry("name")).or_default().insert(entry("version"));
+    }
+    versions
+}
+
+/// The same crates in the program and in the wheel: the same seed with the same commands has to end in the same state in both.
+#[test]
+fn the_wheel_is_made_of_the_same_versions() {
+    let program = locked("Cargo.lock");
+    let wheel = locked("gateway/python/Cargo.lock");
+    let differs = wheel.iter().filter_map(|(name, versions)| {
+        let known = program.get(name)?;
+        (!versions.is_subset(known)).then(|| format!("{name}: {versions:?}, and {known:?} in Cargo.lock"))
+    });
+    let rule = "gateway/python/Cargo.lock has the versions of Cargo.lock; copy that and run `cargo metadata` in gateway/python";
+    expect_none(&differs.collect::<Vec<_>>(), rule);
 }

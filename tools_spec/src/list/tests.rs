@@ -72,6 +72,13 @@ fn a_line_names_and_describes_the_tool() {
     assert!(wave.description.starts_with("Wave with a robot's hand"), "{}", wave.description);
     assert_eq!(wave.input_schema["required"], json!(["episode_id", "times"]));
     assert_eq!(wave.reply_schema["properties"]["answered"]["type"], "boolean");
+    let typed = with_wave::typed_tools();
+    let [_, _, wave, wait] = &typed.tools[..] else { panic!("{:?}", typed.tools) };
+    assert_eq!((wave.name, &*wave.reply, wave.on_episode), ("wave", "WaveReply", true));
+    assert_eq!(wave.arguments["properties"]["times"]["type"], "integer");
+    assert_eq!(typed.types["WaveReply"]["properties"]["answered"]["type"], "boolean");
+    assert_eq!(wait.reply, "CommandReply");
+    assert!(typed.types.contains_key("RobotReport"), "what a reply is made of");
 }
 
 #[test]

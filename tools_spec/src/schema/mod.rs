@@ -6,8 +6,10 @@ mod openapi;
 mod plain;
 mod spec;
 mod strict;
+mod typed;
 
 pub use format::Format;
 pub use openapi::openapi;
 pub use plain::{body_schema, plain_schema};
 pub use spec::{EpisodeToolSpec, ToolSpec};
+pub use typed::{TypedTool, TypedTools, TypedToolsCollector};

@@ -28,7 +28,7 @@ pub fn body_schema<T: JsonSchema>(wording: Wording) -> Value {
     schema
 }
 
-fn word(schema: &mut Value, wording: Wording) {
+pub fn word(schema: &mut Value, wording: Wording) {
     match schema {
         Value::Array(items) => items.iter_mut().for_each(|item| word(item, wording)),
         Value::Object(object) => {

@@ -2,4 +2,5 @@
 
 mod faces;
 mod goldens;
+mod python;
 mod schemas;

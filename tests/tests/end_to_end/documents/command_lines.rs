@@ -77,6 +77,10 @@ fn check_command(words: &[&str]) -> Result<(), String> {
             None => Err("it runs another image".into()),
         },
         ["pip", "install", "-r", file] => expect_file(file),
+        ["pip", "install", package] => {
+            let folder = package.split('[').next().unwrap_or_default();
+            expect_file(&format!("{folder}/pyproject.toml"))
+        }
         ["python" | "python3", file, ..] => expect_file(file),
         [program, ..] if OTHERS.contains(program) => Ok(()),
         [program, ..] => Err(format!("nobody knows the program {program}; see OTHERS in command_lines.rs")),

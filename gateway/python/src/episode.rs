@@ -1,0 +1,309 @@
+//! One episode in the caller's process.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use numpy::{PyArray2, PyArray3, PyReadonlyArray3};
+use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use serde_json::{Value, json};
+use tandem::hosting::{Answer, EpisodeMetrics, HostingError, PanicGuard};
+use tandem::settings::{Layer, Settings};
+use tandem_episodes::{Checkpoint, EpisodeError, RobotObservation, Session};
+use tandem_tools_spec::{
+    ActCall, Call, CommandReply, DepthFormat, EndReason, Formats, ImageFormat, JointChunk, Look, Observe,
+    ResultReply, SendJointChunk, Tool as _, ToolReply, parse_args,
+};
+
+use crate::arrays::{shaped, state_names, state_row};
+use crate::refusal::{failed, refused};
+
+/// An episode from its start to its result. It may be used from any thread; calls of several come one after another.
+#[pyclass(frozen, name = "Episode", module = "tandem._native")]
+pub struct NativeEpisode {
+    held: Mutex<Held>,
+    robots: Vec<String>,
+    recorded: bool,
+    /// Whether somebody wants the policy to stop, who cannot reach its thread.
+    interrupted: Arc<AtomicBool>,
+}
+
+/// What there is of an episode.
+enum Held {
+    Open(Box<PanicGuard>),
+    /// Its result, as far as there is one.
+    Closed(Option<Box<ResultReply>>),
+}
+
+/// Where an episode stands, to go back to.
+#[pyclass(frozen, module = "tandem._native")]
+pub struct Snapshot {
+    checkpoint: Checkpoint,
+}
+
+/// What a step came to: steps executed, why it stopped, simulated time, numbers of phases, who has fallen, and whether that was the end.
+type Stepped = (u32, String, f64, Vec<String>, Vec<bool>, bool);
+
+/// Height by width by red, green, blue.
+type Colours<'py> = Bound<'py, PyArray3<u8>>;
+/// Height by width, in metres.
+type Depths<'py> = Bound<'py, PyArray2<f32>>;
+
+impl NativeEpisode {
+    /// An episode that has begun.
+    pub fn of(session: Session, recorded: bool) -> NativeEpisode {
+        let robots = session.spec().task.robots.iter().map(|robot| robot.name.to_owned()).collect();
+        let guard = PanicGuard::new(session, EpisodeMetrics::new(Arc::default()));
+        NativeEpisode {
+            held: Mutex::new(Held::Open(guard.into())),
+            robots,
+            recorded,
+            interrupted: Arc::default(),
+        }
+    }
+
+    /// The same episode, whose calls raise KeyboardInterrupt from when `interrupted` is set.
+    pub fn until(self, interrupted: Arc<AtomicBool>) -> NativeEpisode {
+        NativeEpisode { interrupted, ..self }
+    }
+
+    /// How long the policy has thought, up to its last call.
+    pub fn thought(&self) -> Duration {
+        match &*self.held() {
+            Held::Open(guard) => guard.thought().unwrap_or_default(),
+            Held::Closed(_) => Duration::ZERO,
+        }
+    }
+
+    fn held(&self) -> MutexGuard<'_, Held> {
+        self.held.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Has the session do something; Python's other threads run meanwhile.
+    fn work<T: Send>(
+        &self,
+        py: Python,
+        work: impl FnOnce(&mut Session) -> Result<T, EpisodeError> + Send,
+    ) -> PyResult<T> {
+        if self.interrupted.load(Ordering::Relaxed) {
+            return Err(PyKeyboardInterrupt::new_err("the evaluation was interrupted"));
+        }
+        let worked = py.detach(|| match &mut *self.held() {
+            Held::Open(guard) => guard.run(|session| Ok(work(session)?)).flatten(),
+            Held::Closed(_) => Err(HostingError::EpisodeStopped),
+        });
+        worked.map_err(|error| refused(py, &error))
+    }
+
+    /// Ends the episode, for a reason if there is one, and closes its recording. The result stays.
+    pub fn end(&self, reason: Option<EndReason>) -> Result<ResultReply, HostingError> {
+        let mut held = self.held();
+        let result = match std::mem::replace(&mut *held, Held::Closed(None)) {
+            Held::Open(mut guard) => {
+                if let Some(reason) = reason {
+                    // One that has panicked has ended already.
+                    let _ = guard.run(|session| session.end(reason));
+                }
+                guard.close().map(Box::new)
+            }
+            Held::Closed(result) => result.ok_or(HostingError::EpisodeStopped),
+        }?;
+        *held = Held::Closed(Some(result.clone()));
+        Ok(*result)
+    }
+}
+
+#[pymethods]
+impl NativeEpisode {
+    /// Starts an episode: `start` has the arguments of start_episode, `settings` those of a server, both as JSON. Returns it with its
+    /// briefing.
+    #[staticmethod]
+    fn start(
+        py: Python,
+        start: &str,
+        settings: &str,
+        record: Option<PathBuf>,
+    ) -> PyResult<(NativeEpisode, String)> {
+        let started = py.detach(|| begin(start, settings, record.as_deref()));
+        let (session, briefing) = started.map_err(|problem| problem.raise(py))?;
+        if let Some(reason) = session.recording_failed() {
+            return Err(failed(py, &reason));
+        }
+        Ok((NativeEpisode::of(session, record.is_some()), briefing))
+    }
+
+    /// Names of the robots, in order.
+    #[getter]
+    fn robots(&self) -> Vec<String> {
+        self.robots.clone()
+    }
+
+    /// Makes a call and returns its reply, both as JSON.
+    fn call(&self, py: Python, tool: &str, arguments: &str) -> PyResult<String> {
+        self.work(py, |session| {
+            let call = Call::parse(tool, read(arguments))?;
+            let reply = session.ask(None, call)?;
+            Ok(json!(Answer::new(reply, session)).to_string())
+        })
+    }
+
+    /// Looks. Returns states and calibrations as JSON, and for each robot colours and, where it is asked for, depth.
+    #[pyo3(signature = (arguments, depth))]
+    fn observe<'py>(
+        &self,
+        py: Python<'py>,
+        arguments: &str,
+        depth: bool,
+    ) -> PyResult<(String, Vec<(Colours<'py>, Option<Depths<'py>>)>)> {
+        let formats =
+            Formats { images: Some(ImageFormat::Rgb), depth: depth.then_some(DepthFormat::Float16) };
+        let seen = self.work(py, |session| {
+            session.observe_as_told(&Look { observe: parse_args::<Observe>(read(arguments))?, formats })
+        })?;
+        let views = seen.robots.iter().map(|RobotObservation { view, .. }| {
+            let (height, width) = (view.picture.height as usize, view.picture.width as usize);
+            let colours = shaped(py, &view.picture.rgb, [height, width, 3])?;
+            let depth = depth.then(|| shaped(py, view.depth_m(), [height, width])).transpose()?;
+            Ok((colours, depth))
+        });
+        let views = views.collect::<PyResult<_>>()?;
+        let (states, cameras): (Vec<&_>, Vec<&_>) =
+            seen.robots.iter().map(|robot| (&robot.state, &robot.calibration)).unzip();
+        Ok((json!({ "time_s": seen.time_s, "states": states, "cameras": cameras }).to_string(), views))
+    }
+
+    /// What each robot senses, a row each.
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let numbers = self.work(py, |session| {
+            let (assistance, step) = session.read_states()?;
+            let mut numbers = Vec::new();
+            step.robots.iter().for_each(|robot| state_row(robot, assistance, &mut numbers));
+            Ok(numbers)
+        })?;
+        shaped(py, &numbers, [self.robots.len(), numbers.len() / self.robots.len()])
+    }
+
+    /// Names of the columns of the state.
+    fn state_columns(&self, py: Python) -> PyResult<Vec<String>> {
+        self.work(py, |session| Ok(state_names(session.spec().assistance)))
+    }
+
+    /// Sends rows of every robot: robots by steps by columns.
+    fn step(&self, py: Python, rows: PyReadonlyArray3<'_, f32>) -> PyResult<Stepped> {
+        let rows = rows.as_array();
+        let chunk = |(robot, rows): (&String, numpy::ndarray::ArrayView2<f32>)| JointChunk {
+            robot: robot.clone(),
+            rows: rows.outer_iter().map(|row| row.iter().copied().map(f64::from).collect()).collect(),
+        };
+        if rows.shape()[0] != self.robots.len() {
+            let have =
+                format!("rows are of {} robots and this episode has {}", rows.shape()[0], self.robots.len());
+            return Err(failed(py, &format!("{have}; give an array of robots by steps by 35")));
+        }
+        let robots = self.robots.iter().zip(rows.outer_iter()).map(chunk).collect();
+        let (CommandReply { executed_steps, stop_reason, time_s, fallen, phases, .. }, ended) =
+            self.work(py, |session| {
+                let reply = match session.call(SendJointChunk { robots }.into())? {
+                    ToolReply::Act(reply) => reply,
+                    ToolReply::Look(_) | ToolReply::Manage(_) | ToolReply::Talk(_) => {
+                        unreachable!("{} is of {:?}", SendJointChunk::NAME, ActCall::TOOLS)
+                    }
+                };
+                Ok((reply, session.ended().is_some()))
+            })?;
+        let phases = phases.into_iter().map(|phase| phase.number).collect();
+        let fallen = fallen.iter().map(|robot| robot.fallen).collect();
+        let reason = json!(stop_reason).as_str().unwrap_or_default().to_owned();
+        Ok((executed_steps, reason, time_s, phases, fallen, ended))
+    }
+
+    /// Where the episode stands.
+    fn snapshot(&self, py: Python) -> PyResult<Snapshot> {
+        self.work(py, |session| session.checkpoint()).map(|checkpoint| Snapshot { checkpoint })
+    }
+
+    /// Goes back, or on, to where a snapshot was taken.
+    fn restore(&self, py: Python, snapshot: &Snapshot) -> PyResult<()> {
+        if self.recorded {
+            let way = "a recorded episode goes forward only; start one without `record` to go back in it";
+            return Err(failed(py, &way));
+        }
+        self.work(py, |session| session.resume(&snapshot.checkpoint))
+    }
+
+    /// Equal for equal physical states, 16 hexadecimal digits.
+    fn state_hash(&self, py: Python) -> PyResult<String> {
+        self.work(py, |session| Ok(session.state_hash()))
+    }
+
+    /// Why the episode has ended, as the contract calls it, if it has.
+    fn ended(&self, py: Python) -> PyResult<Option<String>> {
+        Ok(py.detach(|| match &*self.held() {
+            Held::Open(guard) => guard.ended().map(name_of),
+            Held::Closed(result) => result.as_ref().map(|result| name_of(result.ended)),
+        }))
+    }
+
+    /// Ends the episode, closes its recording, and returns the result as JSON; again and again the same.
+    fn close(&self, py: Python) -> PyResult<String> {
+        let result = py.detach(|| self.end(None)).map_err(|error| refused(py, &error))?;
+        Ok(json!(result).to_string())
+    }
+}
+
+#[pymethods]
+impl Snapshot {
+    /// The snapshot as a file of it would be; the same build reads it again.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = py.detach(|| self.checkpoint.to_bytes()).map_err(|error| refused(py, &error.into()))?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// Reads what `to_bytes` gave.
+    #[staticmethod]
+    fn from_bytes(py: Python, bytes: &[u8]) -> PyResult<Snapshot> {
+        let read = py.detach(|| Checkpoint::from_bytes(bytes, Path::new("snapshot")));
+        read.map(|checkpoint| Snapshot { checkpoint }).map_err(|error| refused(py, &error.into()))
+    }
+}
+
+/// Why an episode does not begin.
+enum StartProblem {
+    Refused(HostingError),
+    Settings(String),
+}
+
+impl StartProblem {
+    fn raise(&self, py: Python) -> PyErr {
+        match self {
+            StartProblem::Refused(error) => refused(py, error),
+            StartProblem::Settings(text) => failed(py, text),
+        }
+    }
+}
+
+fn begin(start: &str, settings: &str, folder: Option<&Path>) -> Result<(Session, String), StartProblem> {
+    let refuse = |error: EpisodeError| StartProblem::Refused(error.into());
+    let layer: Layer =
+        serde_json::from_str(settings).map_err(|error| StartProblem::Settings(error.to_string()))?;
+    let settings =
+        Settings::resolve(layer, None).map_err(|error| StartProblem::Settings(error.to_string()))?;
+    let start = parse_args(read(start)).map_err(|error| refuse(error.into()))?;
+    let spec = settings.spec(&start).map_err(refuse)?;
+    let session = Session::start(&spec, folder).map_err(refuse)?;
+    let mut briefing = session.briefing();
+    settings.instructions.rephrase_briefing(&mut briefing);
+    Ok((session, json!(briefing).to_string()))
+}
+
+/// What the package has written as JSON.
+fn read(json: &str) -> Value {
+    serde_json::from_str(json).unwrap_or_default()
+}
+
+fn name_of(reason: EndReason) -> String {
+    json!(reason).as_str().unwrap_or_default().into()
+}

@@ -1,0 +1,37 @@
+//! The native module of the Python package `tandem`: episodes in the caller's own process, recordings, evaluations, and the whole
+//! command line. What Python code sees is the typed package around it, in `gateway/python/tandem`.
+//!
+//! Replies cross over as the JSON that HTTP carries, numbers of every step as arrays. Python's lock is free while physics and
+//! drawing run.
+
+mod arrays;
+mod episode;
+mod evaluation;
+mod program;
+mod recording;
+mod refusal;
+
+/// What the package is built on.
+#[pyo3::pymodule]
+mod _native {
+    use std::path::PathBuf;
+
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use crate::arrays::{action_columns, state_columns};
+    #[pymodule_export]
+    use crate::episode::{NativeEpisode, Snapshot};
+    #[pymodule_export]
+    use crate::evaluation::evaluate;
+    #[pymodule_export]
+    use crate::program::{NativeServer, list_tasks, run_command_line, write_report};
+    #[pymodule_export]
+    use crate::recording::NativeRecording;
+
+    /// Episodes, recordings and checkpoints name the build that made them: this library, and not Python's own program.
+    #[pyfunction]
+    fn loaded_from(path: PathBuf) {
+        tandem_episodes::name_program(path);
+    }
+}

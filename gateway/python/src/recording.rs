@@ -1,0 +1,197 @@
+//! Recordings as arrays, and pictures of their steps drawn again.
+
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+
+use numpy::{PyArray2, PyArray3};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use serde_json::json;
+use tandem_episodes::Recording;
+use tandem_episodes::replay::{EpisodeCamera, EpisodeRenderer, PictureSize};
+use tandem_sim::{JOINTS, Side, Step};
+use tandem_tools_spec::ACTION_ROW_LEN;
+
+use crate::arrays::{action_row, pose_row, shaped, vector_row};
+use crate::refusal::{failed, refused};
+
+/// A recording in memory.
+#[pyclass(frozen, name = "Recording", module = "tandem._native")]
+pub struct NativeRecording {
+    recording: Recording,
+    steps: Vec<Step>,
+    /// Made when the first picture is asked for.
+    renderer: Mutex<Option<EpisodeRenderer>>,
+}
+
+#[pymethods]
+impl NativeRecording {
+    /// Reads a file, every byte of which is checked.
+    #[staticmethod]
+    fn read(py: Python, path: PathBuf) -> PyResult<NativeRecording> {
+        let read = || {
+            let recording = Recording::read(&path)?;
+            let steps = recording.steps().collect::<Result<_, _>>()?;
+            Ok(NativeRecording { recording, steps, renderer: Mutex::default() })
+        };
+        py.detach(read).map_err(|error: tandem_episodes::RecordingError| failed(py, &error))
+    }
+
+    /// What the episode was, its build and controller, its result, its phases, the names of its objects and cameras, and its calls,
+    /// as JSON.
+    fn about(&self, py: Python) -> PyResult<String> {
+        let Recording { spec, locomotion, build, result, .. } = &self.recording;
+        let calls = self.recording.tool_calls().map_err(|error| failed(py, &error))?;
+        let calls = calls.iter().map(|call| {
+            let (reply, problem) = (call.outcome.as_ref().ok(), call.outcome.as_ref().err());
+            let reply = reply.and_then(|text| serde_json::from_str::<serde_json::Value>(text).ok());
+            json!({
+                "time_s": call.time_s,
+                "thought_s": call.thought.as_secs_f64(),
+                "tool": call.tool,
+                "arguments": call.arguments,
+                "operator": call.operator,
+                "reply": reply,
+                "problem": problem,
+            })
+        });
+        let objects = self.steps.first().map_or(&[][..], |step| &step.objects[..]);
+        let about = json!({
+            "spec": spec,
+            "locomotion": locomotion,
+            "build": build,
+            "result": result,
+            "phases": self.recording.phases().map_err(|error| failed(py, &error))?,
+            "robots": spec.task.robots.iter().map(|robot| robot.name).collect::<Vec<_>>(),
+            "objects": objects.iter().map(|object| &object.name).collect::<Vec<_>>(),
+            "cameras": EpisodeCamera::all(spec.task).iter().map(|camera| camera.name(spec.task)).collect::<Vec<_>>(),
+            "calls": calls.collect::<Vec<_>>(),
+        });
+        Ok(about.to_string())
+    }
+
+    /// Hash of every state, that before the first step included.
+    fn state_hashes(&self, py: Python) -> PyResult<Vec<String>> {
+        let hashes = self.recording.state_hashes().map(|hash| hash.map(|(_, hash)| hash));
+        hashes.collect::<Result<_, _>>().map_err(|error| failed(py, &error))
+    }
+
+    /// All numbers of all steps by name; the first entry is the state before the first step.
+    fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let columns = py.detach(|| Columns::of(&self.steps));
+        columns.arrays(py)
+    }
+
+    /// Colours and depth that a camera sees after a step, in its own size or in another, width by height.
+    fn picture<'py>(
+        &self,
+        py: Python<'py>,
+        camera: &str,
+        step: usize,
+        size: Option<(u32, u32)>,
+    ) -> PyResult<(Bound<'py, PyArray3<u8>>, Bound<'py, PyArray2<f32>>)> {
+        let spec = &self.recording.spec;
+        let camera = EpisodeCamera::find(camera, spec.task).map_err(|text| failed(py, &text))?;
+        let Some(step) = self.steps.get(step) else {
+            let last = self.steps.len().saturating_sub(1);
+            return Err(failed(py, &format!("no step {step} in this recording; have 0 to {last}")));
+        };
+        let size = size.map(|(width, height)| PictureSize { width, height });
+        let drawn = py.detach(|| {
+            let mut renderer = self.renderer.lock().unwrap_or_else(PoisonError::into_inner);
+            let renderer = match &mut *renderer {
+                Some(made) => made,
+                none => none.insert(EpisodeRenderer::of(spec)?),
+            };
+            let camera = renderer.camera(camera, step, size);
+            Ok(renderer.draw(step, &camera))
+        });
+        let frame = drawn.map_err(|error: tandem_episodes::EpisodeError| refused(py, &error.into()))?;
+        let (height, width) = (frame.height as usize, frame.width as usize);
+        Ok((shaped(py, &frame.rgb, [height, width, 3])?, shaped(py, &frame.depth_m, [height, width])?))
+    }
+}
+
+/// Numbers of all steps, one after another.
+#[derive(Default)]
+struct Columns {
+    shape: (usize, usize, usize),
+    time_s: Vec<f64>,
+    q_rad: Vec<f32>,
+    qd_rad_s: Vec<f32>,
+    torque_n_m: Vec<f32>,
+    action: Vec<f32>,
+    pelvis_in_world: Vec<f32>,
+    pelvis_in_start: Vec<f32>,
+    wrists_in_pelvis: Vec<f32>,
+    wrists_in_world: Vec<f32>,
+    hand_force_n: Vec<f32>,
+    fallen: Vec<bool>,
+    objects_in_world: Vec<f32>,
+    contact_force_n: Vec<f32>,
+}
+
+impl Columns {
+    fn of(steps: &[Step]) -> Columns {
+        let (robots, objects) = steps.first().map_or((0, 0), |step| (step.robots.len(), step.objects.len()));
+        let mut columns = Columns { shape: (steps.len(), robots, objects), ..Columns::default() };
+        columns.contact_force_n = vec![0.0; steps.len() * robots * objects * HAND_NUMBERS * 2];
+        steps.iter().enumerate().for_each(|(index, step)| columns.add(index, step));
+        columns
+    }
+
+    fn add(&mut self, index: usize, step: &Step) {
+        let (_, robots, objects) = self.shape;
+        self.time_s.push(step.time_s);
+        for robot in &step.robots {
+            let (sensed, truth) = (&robot.sensed, &robot.truth);
+            self.q_rad.extend(sensed.joints.q_rad);
+            self.qd_rad_s.extend(sensed.joints.qd_rad_s);
+            self.torque_n_m.extend(sensed.joints.torque_n_m);
+            self.action.extend(action_row(&robot.command));
+            self.pelvis_in_world.extend(pose_row(&truth.world_from_pelvis()));
+            self.pelvis_in_start.extend(pose_row(&sensed.start_from_pelvis));
+            let forces_n = robot.hand_force_in_world_n();
+            for side in Side::BOTH {
+                self.wrists_in_pelvis.extend(pose_row(&sensed.pelvis_from_wrist[side]));
+                self.wrists_in_world.extend(pose_row(&truth.world_from_wrist[side]));
+                self.hand_force_n.extend(vector_row(forces_n[side]));
+            }
+            self.fallen.push(truth.fallen);
+        }
+        for object in &step.objects {
+            self.objects_in_world.extend(pose_row(&object.state.world_from_object));
+        }
+        for touch in &step.touches {
+            let hand = (index * robots + touch.robot) * 2
+                + Side::BOTH.iter().position(|side| *side == touch.side).unwrap_or(0);
+            let first = (hand * objects + touch.object) * HAND_NUMBERS;
+            let parts =
+                [touch.contacts.thumb_n, touch.contacts.fingers_n, touch.contacts.palm_n].map(vector_row);
+            self.contact_force_n[first..first + HAND_NUMBERS].copy_from_slice(parts.as_flattened());
+        }
+    }
+
+    fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (steps, robots, objects) = self.shape;
+        let arrays = PyDict::new(py);
+        arrays.set_item("time_s", shaped(py, &self.time_s, [steps])?)?;
+        arrays.set_item("q_rad", shaped(py, &self.q_rad, [steps, robots, JOINTS])?)?;
+        arrays.set_item("qd_rad_s", shaped(py, &self.qd_rad_s, [steps, robots, JOINTS])?)?;
+        arrays.set_item("torque_n_m", shaped(py, &self.torque_n_m, [steps, robots, JOINTS])?)?;
+        arrays.set_item("actions", shaped(py, &self.action, [steps, robots, ACTION_ROW_LEN])?)?;
+        arrays.set_item("pelvis_in_world", shaped(py, &self.pelvis_in_world, [steps, robots, 7])?)?;
+        arrays.set_item("pelvis_in_start", shaped(py, &self.pelvis_in_start, [steps, robots, 7])?)?;
+        arrays.set_item("wrists_in_pelvis", shaped(py, &self.wrists_in_pelvis, [steps, robots, 2, 7])?)?;
+        arrays.set_item("wrists_in_world", shaped(py, &self.wrists_in_world, [steps, robots, 2, 7])?)?;
+        arrays.set_item("hand_force_n", shaped(py, &self.hand_force_n, [steps, robots, 2, 3])?)?;
+        arrays.set_item("fallen", shaped(py, &self.fallen, [steps, robots])?)?;
+        arrays.set_item("objects_in_world", shaped(py, &self.objects_in_world, [steps, objects, 7])?)?;
+        let contacts = shaped(py, &self.contact_force_n, [steps, robots, 2, objects, 3, 3])?;
+        arrays.set_item("contact_force_n", contacts)?;
+        Ok(arrays)
+    }
+}
+
+/// Thumb, fingers and palm of a hand, three numbers each.
+const HAND_NUMBERS: usize = 9;

@@ -1,0 +1,70 @@
+"""Two or three simulated humanoids that have to work together.
+
+    import tandem
+
+    with tandem.Episode("handover", seed=0) as episode:
+        seen = episode.observe()
+        reply = episode.wait(25)
+        result = episode.finish()
+
+Units are SI; quaternions are w, x, y, z; poses are in a robot's own pelvis frame (x forward, y left, z up) where nothing else
+is said. One control step is 20 ms.
+"""
+
+from __future__ import annotations
+
+from . import _native
+from ._native import Snapshot
+from .base import BaseEpisode, Observation, Stepped
+from .client import Client, RemoteEpisode
+from .contract.arguments import JointChunk, PixelRegion, WalkMove, WristMove
+from .contract.commands import CommandReply
+from .contract.replies import DepthReply, ReachReply, ResultReply, RobotState, StatusReply
+from .contract.start import Briefing, TaskList
+from .episode import Episode
+from .errors import EpisodeEnded, Refused, SimulatorFailed, TandemError, Unreachable
+from .evaluation import Evaluation, evaluate, report, tasks
+from .program import main
+from .recording import Picture, RecordedCall, Recording
+from .server import Server, serve
+
+_native.loaded_from(_native.__file__ or "")
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "BaseEpisode",
+    "Briefing",
+    "Client",
+    "CommandReply",
+    "DepthReply",
+    "Episode",
+    "EpisodeEnded",
+    "Evaluation",
+    "JointChunk",
+    "Observation",
+    "Picture",
+    "PixelRegion",
+    "ReachReply",
+    "RecordedCall",
+    "Recording",
+    "Refused",
+    "RemoteEpisode",
+    "ResultReply",
+    "RobotState",
+    "Server",
+    "SimulatorFailed",
+    "Snapshot",
+    "StatusReply",
+    "Stepped",
+    "TandemError",
+    "TaskList",
+    "Unreachable",
+    "WalkMove",
+    "WristMove",
+    "evaluate",
+    "main",
+    "report",
+    "serve",
+    "tasks",
+]

@@ -1,0 +1,192 @@
+"""Episodes on a server, by the same calls as those in this process."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+from collections.abc import Mapping, Sequence
+from http.client import HTTPConnection, HTTPException, HTTPSConnection
+from typing import Any
+from urllib.parse import urlsplit
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .base import BaseEpisode, Observation, Stepped, chunk_of
+from .contract.arguments import Json
+from .contract.replies import CameraCalibration, Protocol, ResultReply, RobotState
+from .contract.start import Briefing, TaskList
+from .errors import TandemError, Unreachable, of_kind
+
+_KIND = "urn:tandem:problem:"
+
+
+class Client:
+    """A server that `tandem serve` or `tandem.serve()` has started. A client is for one thread.
+
+    url: Where it is, as "http://127.0.0.1:8700".
+    token: What the server wants every request to send. None: that of the environment's TANDEM_TOKEN, if there is one.
+    timeout_s: The longest that an answer may take.
+    """
+
+    def __init__(self, url: str, *, token: str | None = None, timeout_s: float = 120.0) -> None:
+        parts = urlsplit(url)
+        if parts.scheme not in ("http", "https") or parts.hostname is None:
+            raise TandemError(f"{url!r} is no address of a server; give one as http://127.0.0.1:8700")
+        kind = HTTPSConnection if parts.scheme == "https" else HTTPConnection
+        self.url = url.rstrip("/")
+        self._path = parts.path.rstrip("/")
+        self._connection = kind(parts.hostname, parts.port, timeout=timeout_s)
+        self._token = token or os.environ.get("TANDEM_TOKEN")
+
+    def tasks(self) -> TaskList:
+        """The tasks, their phases and budgets, and what robots can do."""
+        return TaskList.of(self.request("GET", "/v1/tasks"))
+
+    def episode(self, task: str, seed: int = 0, *, protocol: Protocol = "agentic") -> RemoteEpisode:
+        """An episode on this server; its assistance, renderer and sensors are the server's, which records it.
+
+        task: A task's id, as "handover".
+        seed: Decides where the objects stand: 0 to 4294967295.
+        protocol: The rules: "agentic" for agents that think between commands, "benchmark" for learned policies.
+        """
+        return RemoteEpisode(self, task, seed, protocol)
+
+    def request(self, method: str, path: str, body: Mapping[str, Json] | None = None) -> Any:
+        """Sends a request and returns its answer as JSON has it."""
+        headers = {"content-type": "application/json"}
+        if self._token:
+            headers["authorization"] = f"Bearer {self._token}"
+        text = None if body is None else json.dumps(body)
+        try:
+            self._connection.request(method, self._path + path, text, headers)
+            response = self._connection.getresponse()
+            status, content, retry = response.status, response.read(), response.getheader("retry-after")
+        except (OSError, HTTPException) as error:
+            self._connection.close()
+            raise Unreachable(f"{self.url} gives no answer: {error or type(error).__name__}") from error
+        try:
+            answer = json.loads(content)
+        except ValueError as error:
+            raise Unreachable(f"{self.url} is no server of Tandem: it answers {status} without JSON") from error
+        if status < 400:
+            return answer
+        kind = str(answer.get("type", "")).removeprefix(_KIND)
+        detail = str(answer.get("detail", content.decode(errors="replace")))
+        raise of_kind(kind, str(answer.get("title", status)), detail, float(retry) if retry else None)
+
+    def close(self) -> None:
+        """Closes the connection; the next request opens another one."""
+        self._connection.close()
+
+
+class RemoteEpisode(BaseEpisode):
+    """One episode on a server."""
+
+    def __init__(self, client: Client, task: str, seed: int, protocol: Protocol) -> None:
+        self.task = task
+        self.seed = seed
+        self.protocol = protocol
+        self._client = client
+        self._id: str | None = None
+        self._briefing: Briefing | None = None
+        self._result: ResultReply | None = None
+
+    def start(self) -> Briefing:
+        if self._id is not None:
+            self.close()
+        body = {"task": self.task, "seed": self.seed, "protocol": self.protocol}
+        answer = self._client.request("POST", "/v1/episodes", body)
+        self._id = str(answer["episode_id"])
+        self._briefing = Briefing.of(answer)
+        self._result = None
+        return self._briefing
+
+    @property
+    def episode_id(self) -> str:
+        """What the server calls it, and the folder of its recording."""
+        if self._id is None:
+            raise TandemError("the episode has not begun; call start() first, or use it in a `with` block")
+        return self._id
+
+    @property
+    def briefing(self) -> Briefing:
+        if self._briefing is None:
+            raise TandemError("the episode has not begun; call start() first, or use it in a `with` block")
+        return self._briefing
+
+    def call(self, tool: str, arguments: Mapping[str, Json]) -> Any:
+        return self._client.request("POST", f"/v1/episodes/{self.episode_id}/tools/{tool}", arguments)
+
+    def observe(self, robots: Sequence[str] | None = None, *, short: bool | None = None, depth: bool = False) -> Observation:
+        arguments: dict[str, Json] = {
+            "robots": None if robots is None else list(robots),
+            "short": short,
+            "images": "rgb",
+            "depth": "float16" if depth else None,
+        }
+        seen = self.call("observe", {name: given for name, given in arguments.items() if given is not None})
+        cameras = {camera["robot"]: CameraCalibration.of(camera) for camera in seen["cameras"]}
+        rgb: dict[str, NDArray[np.uint8]] = {}
+        depth_m: dict[str, NDArray[np.float32]] = {}
+        for array in seen["arrays"]:
+            camera = cameras[array["robot"]]
+            shape = (camera.height, camera.width)
+            rgb[camera.robot] = np.reshape(np.frombuffer(base64.b64decode(array["rgb"]), np.uint8), (*shape, 3))
+            if depth:
+                halves = np.frombuffer(base64.b64decode(array["depth_float16"]), "<f2")
+                depth_m[camera.robot] = np.reshape(halves.astype(np.float32), shape)
+        states = tuple(RobotState.of(state) for state in seen["states"])
+        return Observation(seen["time_s"], states, tuple(cameras.values()), rgb, depth_m)
+
+    @property
+    def state_columns(self) -> tuple[str, ...]:
+        return tuple(_row_of(self.get_robot_state(self.robots[0])))
+
+    def state(self) -> NDArray[np.float32]:
+        rows = [list(_row_of(self.get_robot_state(robot)).values()) for robot in self.robots]
+        return np.array(rows, dtype=np.float32)
+
+    def step(self, rows: ArrayLike) -> Stepped:
+        chunk = chunk_of(rows, len(self.robots)).tolist()
+        named = [{"robot": robot, "rows": own} for robot, own in zip(self.robots, chunk, strict=True)]
+        reply = self.call("send_joint_chunk", {"robots": named})
+        return Stepped(
+            executed_steps=reply["executed_steps"],
+            stop_reason=reply["stop_reason"],
+            time_s=reply["time_s"],
+            phases=tuple(phase["number"] for phase in reply["phases"]),
+            fallen=tuple(robot["fallen"] for robot in reply.get("fallen", ())),
+            ended=reply["stop_reason"] in ("task_complete", "step_budget_exhausted"),
+        )
+
+    def close(self) -> ResultReply:
+        if self._result is None:
+            self._result = ResultReply.of(self._client.request("DELETE", f"/v1/episodes/{self.episode_id}"))
+        return self._result
+
+
+def _row_of(state: RobotState) -> dict[str, float]:
+    """The numbers of a state by the names that an episode in this process gives them."""
+    row = {f"{joint}_rad": angle for joint, angle in state.joint_positions_rad.items()}
+    row |= {f"{joint}_rad_s": rate for joint, rate in (state.joint_velocities_rad_s or {}).items()}
+    row |= {f"{joint}_n_m": torque for joint, torque in (state.joint_torques_n_m or {}).items()}
+    poses = {"left_wrist": state.left_wrist, "right_wrist": state.right_wrist}
+    for name, pose in poses.items():
+        row |= _pose(name, pose.position_m, pose.quaternion_wxyz)
+    if state.gravity_in_pelvis is not None:
+        row |= {f"gravity_{axis}": part for axis, part in zip("xyz", state.gravity_in_pelvis, strict=True)}
+    if state.pelvis_in_start is not None:
+        row |= _pose("pelvis_in_start", state.pelvis_in_start.position_m, state.pelvis_in_start.quaternion_wxyz)
+    base = state.base_command
+    row |= {"vx_m_s": base.vx_m_s, "vy_m_s": base.vy_m_s}
+    row |= {"yaw_rate_rad_s": base.yaw_rate_rad_s, "pelvis_height_m": base.pelvis_height_m}
+    if state.fallen is not None:
+        row["fallen"] = float(state.fallen)
+    return row
+
+
+def _pose(name: str, position_m: Sequence[float], quaternion_wxyz: Sequence[float]) -> dict[str, float]:
+    parts = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
+    return {f"{name}_{part}": value for part, value in zip(parts, (*position_m, *quaternion_wxyz), strict=True)}

@@ -1,0 +1,324 @@
+"""What commands reply.
+
+Written by the tests of `tools_spec` from the one list of tools; not to be edited.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+HandState: TypeAlias = Literal[
+    "arrived",
+    "moving",
+    "blocked",
+    "out_of_reach",
+]
+"""How a wrist or fingers stand to their target."""
+
+StopReason: TypeAlias = Literal[
+    "steps_done",
+    "task_complete",
+    "step_budget_exhausted",
+    "partner_done",
+]
+"""Why a command ended."""
+
+
+@dataclass(frozen=True)
+class BaseMotion:
+    """How a pelvis moved during a command, forward and left as the robot faced when the command began."""
+
+    forward_m: float
+    """Forward, in metres."""
+
+    left_m: float
+    """To the left, in metres."""
+
+    up_m: float
+    """Upwards, in metres."""
+
+    turned_rad: float
+    """How far it turned, in radians, counter-clockwise seen from above."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> BaseMotion:
+        """Reads what JSON has."""
+        return BaseMotion(
+            forward_m=value["forward_m"],
+            left_m=value["left_m"],
+            up_m=value["up_m"],
+            turned_rad=value["turned_rad"],
+        )
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What is left of the episode."""
+
+    steps_left: int
+    """Control steps of 20 ms."""
+
+    wall_clock_left_s: float | None
+    """Seconds that the policy may still spend between calls; the simulator's own time is not counted. Null where
+    the protocol sets no limit.
+    """
+
+    steps_per_command: int
+    """The most steps that one command may ask for."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> Budget:
+        """Reads what JSON has."""
+        return Budget(
+            steps_left=value["steps_left"],
+            wall_clock_left_s=value.get("wall_clock_left_s"),
+            steps_per_command=value["steps_per_command"],
+        )
+
+
+@dataclass(frozen=True)
+class CommandReply:
+    """The reply to every command: `move_wrists`, `walk`, `send_joint_chunk` and `wait`."""
+
+    executed_steps: int
+    """Control steps of 20 ms that were executed."""
+
+    stop_reason: StopReason
+    """Why the command ended."""
+
+    time_s: float
+    """Simulated seconds since the episode began."""
+
+    robots: tuple[RobotReport, ...]
+    """One report per robot that the command named; after `wait`, one per robot of the episode."""
+
+    fallen: tuple[RobotFallen, ...]
+    """Every robot of the episode; left out where the assistance is "paper"."""
+
+    phases: tuple[PhaseReached, ...]
+    """Every phase reached so far, where the episode's assistance tells it."""
+
+    budget: Budget
+    """What is left of the episode."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> CommandReply:
+        """Reads what JSON has."""
+        return CommandReply(
+            executed_steps=value["executed_steps"],
+            stop_reason=value["stop_reason"],
+            time_s=value["time_s"],
+            robots=tuple(RobotReport.of(item) for item in value["robots"]),
+            fallen=tuple(RobotFallen.of(item) for item in value.get("fallen", ())),
+            phases=tuple(PhaseReached.of(item) for item in value["phases"]),
+            budget=Budget.of(value["budget"]),
+        )
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How hard a joint works."""
+
+    joint: str
+    """The joint, as `right_elbow_joint`."""
+
+    share: float
+    """Its torque as a share of its limit, from 0 to 1."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> Effort:
+        """Reads what JSON has."""
+        return Effort(
+            joint=value["joint"],
+            share=value["share"],
+        )
+
+
+@dataclass(frozen=True)
+class FingerReport:
+    """How the fingers of one hand did. Angles are [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0,
+    index_1].
+    """
+
+    state: HandState | None
+    """How they stand to their targets; left out where the assistance is "paper"."""
+
+    target_rad: tuple[float, float, float, float, float, float, float]
+    """Joint angles that were asked for, in radians."""
+
+    measured_rad: tuple[float, float, float, float, float, float, float]
+    """Joint angles that were measured, in radians."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> FingerReport:
+        """Reads what JSON has."""
+        return FingerReport(
+            state=value.get("state"),
+            target_rad=tuple(value["target_rad"]),
+            measured_rad=tuple(value["measured_rad"]),
+        )
+
+
+@dataclass(frozen=True)
+class HandReport:
+    """How one hand did under a command, at its last step."""
+
+    state: HandState | None
+    """How the wrist stands to its target; left out where the assistance is "paper"."""
+
+    target: Pose
+    """The wrist pose that was asked for, in the pelvis frame as it is now; of an arm without a wrist target, the
+    pose that its joint targets stand for.
+    """
+
+    measured: Pose
+    """The wrist pose that was measured, in the pelvis frame as it is now."""
+
+    position_error_m: float
+    """Distance from target to measured, in metres."""
+
+    orientation_error_rad: float
+    """Angle from target to measured, in radians."""
+
+    fingers: FingerReport
+    """Its fingers."""
+
+    largest_effort: Effort | None
+    """The joint of this arm and hand that works hardest; left out where the assistance is "paper"."""
+
+    force_n: tuple[float, float, float] | None
+    """Force of the world on the hand in newtons, in the pelvis frame, as the arm's own joints feel it: a hand that
+    holds 0.5 kg feels about -4.9 along z; one in quick motion feels its own inertia, too. Left out where the
+    assistance is "paper".
+    """
+
+    joints_clamped: tuple[str, ...]
+    """Joints of this arm and hand whose target lay beyond a limit and was moved to it."""
+
+    joints_at_limit: tuple[str, ...]
+    """Joints of this arm and hand that rest at a limit."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> HandReport:
+        """Reads what JSON has."""
+        return HandReport(
+            state=value.get("state"),
+            target=Pose.of(value["target"]),
+            measured=Pose.of(value["measured"]),
+            position_error_m=value["position_error_m"],
+            orientation_error_rad=value["orientation_error_rad"],
+            fingers=FingerReport.of(value["fingers"]),
+            largest_effort=None if (got := value.get("largest_effort")) is None else Effort.of(got),
+            force_n=None if (got := value.get("force_n")) is None else tuple(got),
+            joints_clamped=tuple(value["joints_clamped"]),
+            joints_at_limit=tuple(value["joints_at_limit"]),
+        )
+
+
+@dataclass(frozen=True)
+class PhaseReached:
+    """A phase of the task, and when it was reached."""
+
+    id: str
+    """What the phase is called, as `grasp_and_lift`."""
+
+    number: str
+    """`p1`, `p2`, ... in the order they have to be reached."""
+
+    time_s: float
+    """Simulated seconds since the episode began."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> PhaseReached:
+        """Reads what JSON has."""
+        return PhaseReached(
+            id=value["id"],
+            number=value["number"],
+            time_s=value["time_s"],
+        )
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A pose in the frame that the field which holds it names."""
+
+    position_m: tuple[float, float, float]
+    """[x, y, z] in metres."""
+
+    quaternion_wxyz: tuple[float, float, float, float]
+    """[w, x, y, z], norm 1."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> Pose:
+        """Reads what JSON has."""
+        return Pose(
+            position_m=tuple(value["position_m"]),
+            quaternion_wxyz=tuple(value["quaternion_wxyz"]),
+        )
+
+
+@dataclass(frozen=True)
+class RobotFallen:
+    """Whether a robot has fallen."""
+
+    robot: str
+    """The robot, as "A"."""
+
+    fallen: bool
+    """True from the moment it fell."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> RobotFallen:
+        """Reads what JSON has."""
+        return RobotFallen(
+            robot=value["robot"],
+            fallen=value["fallen"],
+        )
+
+
+@dataclass(frozen=True)
+class RobotReport:
+    """How one robot did under a command."""
+
+    robot: str
+    """The robot, as "A"."""
+
+    left: HandReport
+    """Its left arm and hand."""
+
+    right: HandReport
+    """Its right arm and hand."""
+
+    pelvis_in_start: Pose | None
+    """Where its own IMU and joints have it: the pose of its pelvis in the start frame, which lies on the floor
+    under the pelvis as it was when the episode began, z up, x where the robot faced. Drifts by up to 1 % of the
+    way walked. Left out where the assistance is "paper".
+    """
+
+    base_motion: BaseMotion | None
+    """How far the command took the base, by the same odometry; left out where the assistance is "paper"."""
+
+    waist_joints_clamped: tuple[str, ...]
+    """Waist joints whose target lay beyond a limit and was moved to it."""
+
+    waist_joints_at_limit: tuple[str, ...]
+    """Waist joints that rest at a limit."""
+
+    base_command_clamped: tuple[str, ...]
+    """Fields of the base command that lay beyond what locomotion accepts and were moved to it, as `vx_m_s`."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> RobotReport:
+        """Reads what JSON has."""
+        return RobotReport(
+            robot=value["robot"],
+            left=HandReport.of(value["left"]),
+            right=HandReport.of(value["right"]),
+            pelvis_in_start=None if (got := value.get("pelvis_in_start")) is None else Pose.of(got),
+            base_motion=None if (got := value.get("base_motion")) is None else BaseMotion.of(got),
+            waist_joints_clamped=tuple(value["waist_joints_clamped"]),
+            waist_joints_at_limit=tuple(value["waist_joints_at_limit"]),
+            base_command_clamped=tuple(value["base_command_clamped"]),
+        )

@@ -1,0 +1,415 @@
+"""What tools reply that are no commands.
+
+Written by the tests of `tools_spec` from the one list of tools; not to be edited.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+from .commands import Budget, PhaseReached, Pose, RobotFallen
+
+Assistance: TypeAlias = Literal[
+    "paper",
+    "full",
+]
+"""How much a policy is told."""
+
+Disclosure: TypeAlias = Literal[
+    "live",
+    "end",
+    "never",
+]
+"""What replies tell about phases, and whether success ends an episode."""
+
+EndReason: TypeAlias = Literal[
+    "task_complete",
+    "step_budget_exhausted",
+    "wall_clock_exhausted",
+    "finished",
+    "abandoned",
+    "policy_failed",
+    "simulator_failed",
+]
+"""Why an episode has ended."""
+
+Protocol: TypeAlias = Literal[
+    "agentic",
+    "benchmark",
+]
+"""The rules an episode is run under."""
+
+
+@dataclass(frozen=True)
+class BaseCommand:
+    """The base command in force. Velocities are zero between commands; the height persists."""
+
+    vx_m_s: float
+    """Forward velocity in metres per second."""
+
+    vy_m_s: float
+    """Velocity to the left in metres per second."""
+
+    yaw_rate_rad_s: float
+    """Turning rate in radians per second, counter-clockwise seen from above."""
+
+    pelvis_height_m: float
+    """Height of the pelvis above the floor in metres."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> BaseCommand:
+        """Reads what JSON has."""
+        return BaseCommand(
+            vx_m_s=value["vx_m_s"],
+            vy_m_s=value["vy_m_s"],
+            yaw_rate_rad_s=value["yaw_rate_rad_s"],
+            pelvis_height_m=value["pelvis_height_m"],
+        )
+
+
+@dataclass(frozen=True)
+class CameraCalibration:
+    """A pinhole camera without distortion: a point (x, y, z) in the camera's frame is seen at u = fx x / z + cx, v
+    = fy y / z + cy. Axes: x right, y down, z forward (OpenCV's). Pixel (0, 0) is the top left one and its
+    centre lies at u = v = 0.
+    """
+
+    robot: str
+    """The robot whose head carries it."""
+
+    width: int
+    """Pixels across."""
+
+    height: int
+    """Pixels down."""
+
+    fx: float
+    """Focal length across, in pixels."""
+
+    fy: float
+    """Focal length down, in pixels."""
+
+    cx: float
+    """Column of the optical axis, in pixels."""
+
+    cy: float
+    """Row of the optical axis, in pixels."""
+
+    camera_in_pelvis: Pose
+    """Pose of the camera's frame in the robot's pelvis frame (x forward, y left, z up)."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> CameraCalibration:
+        """Reads what JSON has."""
+        return CameraCalibration(
+            robot=value["robot"],
+            width=value["width"],
+            height=value["height"],
+            fx=value["fx"],
+            fy=value["fy"],
+            cx=value["cx"],
+            cy=value["cy"],
+            camera_in_pelvis=Pose.of(value["camera_in_pelvis"]),
+        )
+
+
+@dataclass(frozen=True)
+class DepthPoint:
+    """What one pixel sees."""
+
+    pixel: tuple[int, int]
+    """The pixel as [u, v]."""
+
+    depth_m: float | None
+    """Distance along the optical axis in metres; null where nothing is seen."""
+
+    point_in_pelvis_m: tuple[float, float, float] | None
+    """The point in the robot's pelvis frame (x forward, y left, z up) in metres; null where nothing is seen."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> DepthPoint:
+        """Reads what JSON has."""
+        return DepthPoint(
+            pixel=tuple(value["pixel"]),
+            depth_m=value.get("depth_m"),
+            point_in_pelvis_m=None if (got := value.get("point_in_pelvis_m")) is None else tuple(got),
+        )
+
+
+@dataclass(frozen=True)
+class DepthReply:
+    """The reply to `query_depth`."""
+
+    robot: str
+    """The robot whose camera measured."""
+
+    points: tuple[DepthPoint, ...]
+    """One entry per pixel asked for, in the same order; of a region row by row."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> DepthReply:
+        """Reads what JSON has."""
+        return DepthReply(
+            robot=value["robot"],
+            points=tuple(DepthPoint.of(item) for item in value["points"]),
+        )
+
+
+@dataclass(frozen=True)
+class HandReach:
+    """How near one wrist comes to a pose."""
+
+    reachable: bool
+    """Whether it comes within the tolerance of 5 mm and 0.05 rad."""
+
+    position_error_m: float
+    """Distance left, in metres."""
+
+    orientation_error_rad: float
+    """Angle left, in radians."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> HandReach:
+        """Reads what JSON has."""
+        return HandReach(
+            reachable=value["reachable"],
+            position_error_m=value["position_error_m"],
+            orientation_error_rad=value["orientation_error_rad"],
+        )
+
+
+@dataclass(frozen=True)
+class ReachReply:
+    """The reply to `check_reach`."""
+
+    robot: str
+    """The robot that was asked about."""
+
+    reachable: bool
+    """Whether every wrist that was given a pose reaches it, both at once if both were."""
+
+    left: HandReach | None
+    """How near the left wrist comes; null if it was given no pose."""
+
+    right: HandReach | None
+    """How near the right wrist comes; null if it was given no pose."""
+
+    joints_at_limit: tuple[str, ...]
+    """Joints of the waist and of the arms asked about that would rest at a limit, by name: what keeps the wrists
+    from coming nearer.
+    """
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> ReachReply:
+        """Reads what JSON has."""
+        return ReachReply(
+            robot=value["robot"],
+            reachable=value["reachable"],
+            left=None if (got := value.get("left")) is None else HandReach.of(got),
+            right=None if (got := value.get("right")) is None else HandReach.of(got),
+            joints_at_limit=tuple(value["joints_at_limit"]),
+        )
+
+
+@dataclass(frozen=True)
+class ResultReply:
+    """The reply to `finish`, and the content of `result.json`."""
+
+    task: str
+    """The task's id."""
+
+    seed: int
+    """The seed."""
+
+    protocol: Protocol
+    """The rules that were in force."""
+
+    phases: dict[str, float | None]
+    """When each phase was reached, in simulated seconds; null where it was not, or is not told."""
+
+    ended: EndReason
+    """Why the episode ended."""
+
+    env_steps: int
+    """Control steps of 20 ms, the initial hold included."""
+
+    tool_calls: int
+    """Calls of tools up to the end, reads, refused calls and the one that ended the episode included."""
+
+    falls: int
+    """Robots that fell."""
+
+    realtime_factor: float
+    """Simulated seconds per second that the physics took."""
+
+    state_hash: str
+    """Hash of the whole physical state at the end, 16 hexadecimal digits."""
+
+    simulator_failure: str | None
+    """How the simulator failed: in which step, at which body, and what came out; left out where it did not."""
+
+    assistance: Assistance | None
+    """How much the policy was told."""
+
+    extra_information: tuple[str, ...]
+    """What the policy was shown beyond what the benchmark's own policies see, as "depth_images"; left out where it
+    was nothing.
+    """
+
+    extra_information_replies: dict[str, dict[str, int]]
+    """How many replies showed it, by what it was, then by the robot that it was of; left out where it was nothing."""
+
+    departures: tuple[str, ...]
+    """What was not as the benchmark has it, as "assistance: full"; left out where it was nothing."""
+
+    recording_failed: str | None
+    """Why the recording is not complete; left out where it is."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> ResultReply:
+        """Reads what JSON has."""
+        return ResultReply(
+            task=value["task"],
+            seed=value["seed"],
+            protocol=value["protocol"],
+            phases=value["phases"],
+            ended=value["ended"],
+            env_steps=value["env_steps"],
+            tool_calls=value["tool_calls"],
+            falls=value["falls"],
+            realtime_factor=value["realtime_factor"],
+            state_hash=value["state_hash"],
+            simulator_failure=value.get("simulator_failure"),
+            assistance=value.get("assistance"),
+            extra_information=tuple(value.get("extra_information", ())),
+            extra_information_replies=value.get("extra_information_replies", {}),
+            departures=tuple(value.get("departures", ())),
+            recording_failed=value.get("recording_failed"),
+        )
+
+
+@dataclass(frozen=True)
+class RobotState:
+    """The reply to `get_robot_state`."""
+
+    robot: str
+    """The robot, as "A"."""
+
+    time_s: float
+    """Simulated seconds since the episode began."""
+
+    joint_positions_rad: dict[str, float]
+    """Joint angles in radians."""
+
+    joint_velocities_rad_s: dict[str, float] | None
+    """Joint velocities in radians per second; left out of observe's short form, and where the assistance is
+    "paper".
+    """
+
+    joint_torques_n_m: dict[str, float] | None
+    """Joint torques in newton metres, as the drives apply them; left out of observe's short form, and where the
+    assistance is "paper".
+    """
+
+    left_wrist: Pose
+    """Measured pose of the left wrist (`left_wrist_yaw_link`) in the pelvis frame (x forward, y left, z up)."""
+
+    right_wrist: Pose
+    """Measured pose of the right wrist (`right_wrist_yaw_link`) in the pelvis frame."""
+
+    gravity_in_pelvis: tuple[float, float, float] | None
+    """The direction of gravity in the pelvis frame, length 1: [0, 0, -1] when upright. Left out where the
+    assistance is "paper".
+    """
+
+    pelvis_in_start: Pose | None
+    """Where its own IMU and joints have it: the pose of its pelvis in the start frame, which lies on the floor
+    under the pelvis as it was when the episode began, z up, x where the robot faced. Drifts by up to 1 % of the
+    way walked. Left out where the assistance is "paper".
+    """
+
+    base_command: BaseCommand
+    """What locomotion is doing."""
+
+    fallen: bool | None
+    """Whether the robot has fallen; left out where the assistance is "paper"."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> RobotState:
+        """Reads what JSON has."""
+        return RobotState(
+            robot=value["robot"],
+            time_s=value["time_s"],
+            joint_positions_rad=value["joint_positions_rad"],
+            joint_velocities_rad_s=value.get("joint_velocities_rad_s"),
+            joint_torques_n_m=value.get("joint_torques_n_m"),
+            left_wrist=Pose.of(value["left_wrist"]),
+            right_wrist=Pose.of(value["right_wrist"]),
+            gravity_in_pelvis=None if (got := value.get("gravity_in_pelvis")) is None else tuple(got),
+            pelvis_in_start=None if (got := value.get("pelvis_in_start")) is None else Pose.of(got),
+            base_command=BaseCommand.of(value["base_command"]),
+            fallen=value.get("fallen"),
+        )
+
+
+@dataclass(frozen=True)
+class StatusReply:
+    """The reply to `get_status`."""
+
+    task: str
+    """The task's id."""
+
+    seed: int
+    """The seed."""
+
+    protocol: Protocol
+    """The rules in force."""
+
+    time_s: float
+    """Simulated seconds since the episode began."""
+
+    env_steps: int
+    """Control steps of 20 ms executed so far, the initial hold included."""
+
+    ended: EndReason | None
+    """Why the episode has ended; null while it goes on."""
+
+    fallen: tuple[RobotFallen, ...]
+    """Every robot of the episode; left out where the assistance is "paper"."""
+
+    assistance: Assistance
+    """How much is told. Where it is "paper", phases are told once the episode has ended, which it does not do by
+    itself on success: call finish. Where it is "full", the last phase ends the episode.
+    """
+
+    disclosure: Disclosure | None
+    """What is told of the phases, where that is not as the assistance has it; left out otherwise."""
+
+    phases: tuple[PhaseReached, ...]
+    """Every phase reached so far, where the assistance tells it."""
+
+    budget: Budget
+    """What is left of the episode."""
+
+    state_hash: str
+    """Hash of the whole physical state, 16 hexadecimal digits. Equal hashes mean equal states."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> StatusReply:
+        """Reads what JSON has."""
+        return StatusReply(
+            task=value["task"],
+            seed=value["seed"],
+            protocol=value["protocol"],
+            time_s=value["time_s"],
+            env_steps=value["env_steps"],
+            ended=value.get("ended"),
+            fallen=tuple(RobotFallen.of(item) for item in value.get("fallen", ())),
+            assistance=value["assistance"],
+            disclosure=value.get("disclosure"),
+            phases=tuple(PhaseReached.of(item) for item in value["phases"]),
+            budget=Budget.of(value["budget"]),
+            state_hash=value["state_hash"],
+        )

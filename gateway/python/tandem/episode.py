@@ -1,0 +1,152 @@
+"""Episodes in this process, at the simulator's own speed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _native
+from ._native import Snapshot
+from .base import BaseEpisode, Observation, Renderer, Sensors, StateEstimate, Stepped, chunk_of, settings_json
+from .contract.arguments import Json
+from .contract.commands import StopReason
+from .contract.replies import Assistance, CameraCalibration, EndReason, Protocol, ResultReply, RobotState
+from .contract.start import Briefing
+from .errors import TandemError
+
+
+class Episode(BaseEpisode):
+    """One episode in this process. Python's other threads run while physics and drawing do.
+
+    task: A task's id, as "handover"; `tandem.tasks()` lists them.
+    seed: Decides where the objects stand: 0 to 4294967295.
+    protocol: The rules: "agentic" for agents that think between commands, "benchmark" for learned policies.
+    assistance: How much is told: "full" all that robots sense, phases as they are reached and how to grasp; "paper" what
+        the benchmark tells its agents.
+    record: Folder for `episode.mcap`, `result.json`, `strip.png` and `report.html`. None: nothing is written.
+    renderer: Who draws.
+    state_estimate: Where robots have their own state from.
+    sensors: What robots sense.
+    scene: MJCF file of a scene in place of the task's own.
+    """
+
+    def __init__(
+        self,
+        task: str,
+        seed: int = 0,
+        *,
+        protocol: Protocol = "agentic",
+        assistance: Assistance = "full",
+        record: str | PathLike[str] | None = None,
+        renderer: Renderer = "auto",
+        state_estimate: StateEstimate = "estimator",
+        sensors: Sensors = "ideal",
+        scene: str | PathLike[str] | None = None,
+    ) -> None:
+        self.task = task
+        self.seed = seed
+        self.protocol = protocol
+        self._record = None if record is None else Path(record)
+        self._settings = settings_json(
+            assistance=assistance,
+            renderer=renderer,
+            state_estimate=state_estimate,
+            sensors=sensors,
+            scene=None if scene is None else Path(scene),
+        )
+        self._native: _native.Episode | None = None
+        self._briefing: Briefing | None = None
+        self._columns: tuple[str, ...] | None = None
+        self._is_given = False
+
+    @classmethod
+    def _begun(cls, native: _native.Episode, briefing: str) -> Episode:
+        """The episode that somebody else has started."""
+        told = Briefing.of(json.loads(briefing))
+        status = told.status
+        episode = cls(status.task, status.seed, protocol=status.protocol, assistance=status.assistance)
+        episode._native, episode._briefing, episode._is_given = native, told, True
+        return episode
+
+    def start(self) -> Briefing:
+        if self._is_given:
+            raise TandemError("an evaluation has started this episode; play it as it is, and leave its end to the evaluation")
+        if self._native is not None:
+            self._native.close()
+        start = json.dumps({"task": self.task, "seed": self.seed, "protocol": self.protocol})
+        self._native, briefing = _native.Episode.start(start, self._settings, self._record)
+        self._briefing = Briefing.of(json.loads(briefing))
+        self._columns = None
+        return self._briefing
+
+    @property
+    def _begun_native(self) -> _native.Episode:
+        if self._native is None:
+            raise TandemError("the episode has not begun; call start() first, or use it in a `with` block")
+        return self._native
+
+    @property
+    def briefing(self) -> Briefing:
+        if self._briefing is None:
+            raise TandemError("the episode has not begun; call start() first, or use it in a `with` block")
+        return self._briefing
+
+    def call(self, tool: str, arguments: Mapping[str, Json]) -> Any:
+        return json.loads(self._begun_native.call(tool, json.dumps(arguments)))
+
+    def observe(self, robots: Sequence[str] | None = None, *, short: bool | None = None, depth: bool = False) -> Observation:
+        arguments = {"robots": None if robots is None else list(robots), "short": short}
+        text, views = self._begun_native.observe(json.dumps(arguments), depth)
+        seen = json.loads(text)
+        states = tuple(RobotState.of(state) for state in seen["states"])
+        depths = {state.robot: view[1] for state, view in zip(states, views, strict=True)}
+        return Observation(
+            time_s=seen["time_s"],
+            states=states,
+            cameras=tuple(CameraCalibration.of(camera) for camera in seen["cameras"]),
+            rgb={state.robot: view[0] for state, view in zip(states, views, strict=True)},
+            depth_m={robot: depth_m for robot, depth_m in depths.items() if depth_m is not None},
+        )
+
+    @property
+    def state_columns(self) -> tuple[str, ...]:
+        if self._columns is None:
+            self._columns = tuple(self._begun_native.state_columns())
+        return self._columns
+
+    def state(self) -> NDArray[np.float32]:
+        return self._begun_native.state()
+
+    def step(self, rows: ArrayLike) -> Stepped:
+        native = self._begun_native
+        steps, reason, time_s, phases, fallen, ended = native.step(chunk_of(rows, len(self.briefing.robots)))
+        return Stepped(steps, cast(StopReason, reason), time_s, tuple(phases), tuple(fallen), ended)
+
+    def snapshot(self) -> Snapshot:
+        """Where the episode stands, with all that its policy has used of its budget."""
+        return self._begun_native.snapshot()
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Takes the episode to where a snapshot was taken of it, or of another one of the same task, seed and settings. A
+        recorded episode goes forward only.
+        """
+        self._begun_native.restore(snapshot)
+
+    @property
+    def state_hash(self) -> str:
+        """16 hexadecimal digits, equal for equal physical states of the same build."""
+        return self._begun_native.state_hash()
+
+    @property
+    def ended(self) -> EndReason | None:
+        """Why the episode has ended; None while it goes on."""
+        return cast(EndReason | None, self._begun_native.ended())
+
+    def close(self) -> ResultReply:
+        return ResultReply.of(json.loads(self._begun_native.close()))

@@ -1,0 +1,54 @@
+"""What goes wrong, as exceptions; the text of each says what would work."""
+
+from __future__ import annotations
+
+
+class TandemError(Exception):
+    """Something cannot be done, and the text says what would work."""
+
+
+class Unreachable(TandemError):
+    """A server gives no answer."""
+
+
+class Refused(TandemError):
+    """An episode or a server refuses what it is asked.
+
+    kind: A stable name for the kind of refusal, as "unknown-robot".
+    title: The kind in words.
+    detail: What was wrong with this call, and what would work; it is the exception's text.
+    retry_after_s: Seconds after which the same request may work; None: it will be refused again.
+    """
+
+    def __init__(self, kind: str, title: str, detail: str, retry_after_s: float | None = None) -> None:
+        super().__init__(detail)
+        self.kind = kind
+        self.title = title
+        self.detail = detail
+        self.retry_after_s = retry_after_s
+
+    def __reduce__(self) -> tuple[type[Refused], tuple[str, str, str, float | None]]:
+        return type(self), (self.kind, self.title, self.detail, self.retry_after_s)
+
+
+class EpisodeEnded(Refused):
+    """The episode has ended, and no command is executed any more."""
+
+
+class SimulatorFailed(Refused):
+    """The simulator failed in this episode, which has ended; its recording holds what went before."""
+
+
+_CLASSES: dict[str, type[Refused]] = {
+    "ended": EpisodeEnded,
+    "episode-stopped": EpisodeEnded,
+    "diverged": SimulatorFailed,
+    "episode-failed": SimulatorFailed,
+}
+
+
+def of_kind(kind: str, title: str, detail: str, retry_after_s: float | None = None) -> TandemError:
+    """The exception for a refusal of this kind."""
+    if kind == "failed":
+        return TandemError(detail)
+    return _CLASSES.get(kind, Refused)(kind, title, detail, retry_after_s)

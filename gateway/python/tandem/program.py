@@ -1,0 +1,27 @@
+"""The whole program `tandem`, within Python."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+
+from . import _native
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs a command as the program `tandem` does, and returns its exit code.
+
+    arguments: What stands behind the program's name, as ["demo", "--seeds", "3"]. None: those of this process.
+    """
+    given = sys.argv[1:] if arguments is None else arguments
+    if threading.current_thread() is threading.main_thread():
+        # Python would only note the signal, and hear of it when the command is done.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    sys.stdout.flush()
+    return _native.run_command_line(["tandem", *given])
+
+
+def command_line() -> None:
+    """The script `tandem`."""
+    sys.exit(main())

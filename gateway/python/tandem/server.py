@@ -1,0 +1,71 @@
+"""A server in the background of this process."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from types import TracebackType
+
+from . import _native
+from .base import Renderer, Sensors, StateEstimate, settings_json
+from .contract.replies import Assistance
+
+
+class Server:
+    """A server in the background: REST and MCP, as `tandem serve` has them. It ends with a `with` block, or by `stop`."""
+
+    def __init__(self, native: _native.Server) -> None:
+        self._native = native
+
+    @property
+    def url(self) -> str:
+        """Where it is reached, as "http://127.0.0.1:8700"."""
+        return self._native.url
+
+    def stop(self) -> list[str]:
+        """Finishes calls under way and closes every recording. Returns the episodes that could not be ended in time."""
+        return self._native.stop()
+
+    def __enter__(self) -> Server:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.stop()
+
+
+def serve(
+    listen: str = "127.0.0.1:0",
+    *,
+    runs: str | PathLike[str] = "runs",
+    assistance: Assistance = "full",
+    renderer: Renderer = "auto",
+    state_estimate: StateEstimate = "estimator",
+    sensors: Sensors = "ideal",
+    scene: str | PathLike[str] | None = None,
+    max_episodes: int = 8,
+    token_file: str | PathLike[str] | None = None,
+) -> Server:
+    """Begins to serve episodes over HTTP, and returns at once.
+
+    listen: Address and port; port 0 takes a free one.
+    runs: Folder that recordings are written to, one folder an episode.
+    assistance: How much policies are told.
+    renderer: Who draws.
+    state_estimate: Where robots have their own state from.
+    sensors: What robots sense.
+    scene: MJCF file of a scene in place of the tasks' own.
+    max_episodes: Episodes that may be held at once.
+    token_file: File with the token that every request has to send; an address that other machines reach needs one.
+    """
+    settings = settings_json(
+        listen=listen,
+        runs=Path(runs),
+        assistance=assistance,
+        renderer=renderer,
+        state_estimate=state_estimate,
+        sensors=sensors,
+        scene=None if scene is None else Path(scene),
+        max_episodes=max_episodes,
+        token_file=None if token_file is None else Path(token_file),
+    )
+    return Server(_native.Server.start(settings))

@@ -1,0 +1,189 @@
+"""What episodes leave: recordings, evaluations, reports; and the command line."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tandem
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, tandem.ResultReply]:
+    folder = tmp_path_factory.mktemp("episode")
+    with tandem.Episode("handover", 2006, record=folder) as episode:
+        episode.walk(20, [tandem.WalkMove("A", 0.3, 0.0, 0.0)])
+        with pytest.raises(tandem.Refused):
+            episode.wait(10_000)
+        with pytest.raises(tandem.TandemError, match="forward only"):
+            episode.restore(episode.snapshot())
+        return folder, episode.finish()
+
+
+def test_a_recording_is_arrays(recorded: tuple[Path, tandem.ResultReply]) -> None:
+    folder, result = recorded
+    recording = tandem.Recording(folder)
+    steps, robots, objects = len(recording), len(recording.robots), len(recording.objects)
+    assert (recording.task, recording.seed, recording.result) == ("handover", 2006, result)
+    assert steps == result.env_steps + 1
+    assert recording.state_hashes[-1] == result.state_hash
+    assert recording.robots == ("A", "B")
+    assert "bottle" in recording.objects
+    for array, shape in [
+        (recording.q_rad, (robots, 43)),
+        (recording.torque_n_m, (robots, 43)),
+        (recording.actions, (robots, 35)),
+        (recording.pelvis_in_world, (robots, 7)),
+        (recording.wrists_in_pelvis, (robots, 2, 7)),
+        (recording.hand_force_n, (robots, 2, 3)),
+        (recording.objects_in_world, (objects, 7)),
+        (recording.contact_force_n, (robots, 2, objects, 3, 3)),
+    ]:
+        assert array.shape == (steps, *shape)
+        assert array.dtype == np.float32
+        assert np.isfinite(array).all()
+    assert np.allclose(np.diff(recording.time_s), 0.02)
+    assert not recording.fallen.any()
+    went = np.linalg.norm(recording.pelvis_in_world[-1, :, :2] - recording.pelvis_in_world[0, :, :2], axis=-1)
+    assert went[0] > 0.03 > went[1]
+    assert recording.actions[-1, 0, recording.action_columns.index("vx_m_s")] == pytest.approx(0.3)
+    tools = [(call.tool, call.problem is None) for call in recording.calls]
+    assert tools == [("walk", True), ("wait", False), ("finish", True)]
+
+
+def test_pictures_are_drawn_on_demand(recorded: tuple[Path, tandem.ResultReply]) -> None:
+    recording = tandem.Recording(recorded[0] / "episode.mcap")
+    assert recording.cameras == ("third_person", "A", "B")
+    first, last = recording.picture("A", 0), recording.picture("A", -1)
+    assert first.rgb.shape == (240, 320, 3)
+    assert first.depth_m.shape == (240, 320)
+    assert not np.array_equal(first.rgb, last.rgb)
+    with tandem.Episode("handover", 2006) as episode:
+        seen = episode.observe().rgb["A"]
+        assert np.array_equal(seen, recording.picture("A", episode.briefing.status.env_steps).rgb)
+    assert recording.picture("third_person", 5, size=(64, 48)).rgb.shape == (48, 64, 3)
+    with pytest.raises(tandem.TandemError, match="have: third_person, A, B"):
+        recording.picture("C", 0)
+    with pytest.raises(IndexError, match="have 0 to"):
+        recording.picture("A", 10_000)
+
+
+def test_damage_is_said(recorded: tuple[Path, tandem.ResultReply], tmp_path: Path) -> None:
+    content = bytearray((recorded[0] / "episode.mcap").read_bytes())
+    content[len(content) // 2] ^= 1
+    damaged = tmp_path / "episode.mcap"
+    damaged.write_bytes(content)
+    with pytest.raises(tandem.TandemError, match="no whole recording"):
+        tandem.Recording(damaged)
+    with pytest.raises(tandem.TandemError, match="cannot read"):
+        tandem.Recording(tmp_path / "none.mcap")
+
+
+def walk_a_little(episode: tandem.Episode) -> None:
+    if episode.seed == 2009:
+        raise ValueError("no plan for this seed")
+    for _ in range(1 + episode.seed % 2):
+        episode.walk(10, [tandem.WalkMove("A", 0.2, 0.0, 0.0)])
+
+
+def test_a_callable_is_evaluated(tmp_path: Path) -> None:
+    told: list[tandem.ResultReply] = []
+
+    def run(jobs: int, out: Path | None) -> tandem.Evaluation:
+        return tandem.evaluate(
+            walk_a_little, "handover", range(2007, 2010), jobs, protocol="benchmark", out=out, progress=told.append
+        )
+
+    kept = run(2, tmp_path)
+    assert len(told) == 3
+    summary = kept.tasks["handover"]
+    assert (summary.episodes, summary.p1, summary.policy_failed) == (2, 0, 1)
+    assert [result.ended for result in kept.results] == ["finished", "finished", "policy_failed"]
+    assert [result.env_steps for result in kept.results] == [20, 10, 0]
+    assert "p1" in (kept.notes[0] or "")
+    assert "ValueError: no plan for this seed" in (kept.notes[2] or "")
+    again = run(1, None)
+    assert [result.state_hash for result in again.results] == [result.state_hash for result in kept.results]
+    assert again.folder is None
+    page = tandem.report(tmp_path)
+    assert "walk_a_little" in page.read_text()
+    text = tandem.report(tmp_path, format="md", out=tmp_path / "table.md").read_text()
+    assert "handover" in text
+    with pytest.raises(tandem.TandemError):
+        tandem.report(tmp_path / "nothing")
+    with pytest.raises(tandem.TandemError, match="have: handover"):
+        tandem.evaluate(walk_a_little, "handove", 2007)
+
+
+def test_other_threads_run_while_physics_does() -> None:
+    counted = 0
+    done = threading.Event()
+
+    def count() -> None:
+        nonlocal counted
+        while not done.wait(0.001):
+            counted += 1
+
+    with tandem.Episode("handover", 2000) as episode:
+        thread = threading.Thread(target=count)
+        thread.start()
+        before = counted
+        for _ in range(20):
+            episode.wait(25)
+        during = counted - before
+        done.set()
+        thread.join()
+    # Each of these calls takes many milliseconds; had they held Python's lock, the other thread would count between them only.
+    assert during > 20
+
+
+def test_the_command_line_is_whole(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    demo = subprocess.run(
+        [sys.executable, "-m", "tandem", "demo", "--seeds", "2010", "--runs", str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert demo.returncode == 0, demo.stderr
+    assert "p3 place reached" in demo.stdout
+    assert tandem.main(["replay", "--verify", str(tmp_path / "handover-seed2010" / "episode.mcap")]) == 0
+    assert "verified" in capfd.readouterr().out
+    assert tandem.main(["no-such-command"]) == 2
+    assert "no-such-command" in capfd.readouterr().err
+    assert tandem.main(["--version"]) == 0
+    assert capfd.readouterr().out.startswith("tandem ")
+
+
+ENDLESS = """
+import sys, tandem
+
+def policy(episode):
+    print("begun", flush=True)
+    while True:
+        episode.wait(1)
+
+tandem.evaluate(policy, ["handover", "pouring"], range(2000, 2200), jobs=2, protocol="agentic", out=sys.argv[1], record=True)
+"""
+
+
+def test_an_interrupt_ends_an_evaluation_and_leaves_files_whole(tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", ENDLESS, str(tmp_path)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "begun\n"
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode != 0
+    assert "KeyboardInterrupt" in said
+    recordings = list(tmp_path.rglob("episode.mcap"))
+    assert recordings
+    assert not list(tmp_path.rglob("*.partial"))
+    for path in recordings:
+        assert len(tandem.Recording(path)) > 1

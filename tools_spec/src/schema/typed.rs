@@ -1,0 +1,64 @@
+//! Tools with their arguments and replies as named types, for clients in languages that have a class for each.
+
+use schemars::{JsonSchema, SchemaGenerator, generate::SchemaSettings};
+use serde_json::{Map, Value};
+
+use super::plain::word;
+use crate::parts::{Assistance, Wording};
+use crate::tool::Tool;
+
+/// Every tool, and the types that their arguments and replies are made of.
+#[derive(Debug, Clone)]
+pub struct TypedTools {
+    /// In the order in which policies meet them.
+    pub tools: Vec<TypedTool>,
+    /// JSON Schema of each type by its name, which `#/$defs/NAME` refers to.
+    pub types: Map<String, Value>,
+}
+
+/// One tool.
+#[derive(Debug, Clone)]
+pub struct TypedTool {
+    /// The name a caller uses.
+    pub name: &'static str,
+    /// JSON Schema of the arguments; the description is the tool's.
+    pub arguments: Value,
+    /// The name of the reply's type.
+    pub reply: String,
+    /// Whether the tool acts on an episode.
+    pub on_episode: bool,
+    /// Whether only operators who may talk to each other are offered it.
+    pub for_operators: bool,
+}
+
+/// Collects tools, and the types that they name.
+pub struct TypedToolsCollector {
+    generator: SchemaGenerator,
+    tools: Vec<TypedTool>,
+}
+
+impl TypedToolsCollector {
+    pub fn new() -> TypedToolsCollector {
+        TypedToolsCollector { generator: SchemaSettings::draft2020_12().into_generator(), tools: Vec::new() }
+    }
+
+    pub fn add<T: Tool>(&mut self, on_episode: bool, for_operators: bool) {
+        let arguments = T::json_schema(&mut self.generator).to_value();
+        self.generator.subschema_for::<T::Reply>();
+        let reply = T::Reply::schema_name().into_owned();
+        self.tools.push(TypedTool { name: T::NAME, arguments, reply, on_episode, for_operators });
+    }
+
+    /// Adds a type that stands within a reply and has a name of its own all the same.
+    pub fn add_type<T: JsonSchema>(&mut self) {
+        self.generator.subschema_for::<T>();
+    }
+
+    /// What was collected, in the words of a policy that is told everything.
+    pub fn finish(mut self) -> TypedTools {
+        let mut types = self.generator.take_definitions(true);
+        let described = types.values_mut().chain(self.tools.iter_mut().map(|tool| &mut tool.arguments));
+        described.for_each(|schema| word(schema, Wording::from(Assistance::Full)));
+        TypedTools { tools: self.tools, types }
+    }
+}

@@ -1,0 +1,240 @@
+//! Types of the contract as Python's dataclasses.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::{Map, Value};
+use tandem_tools_spec::TypedTool;
+
+use super::text::{Lines, docstring};
+use super::types::{Parameter, parameters, python_name, reading, reference, reply_type, without_null};
+use super::{OF_OBSERVE, OF_START, described, is_method};
+
+/// The types of the contract, by what they are part of.
+pub struct Contract<'a> {
+    types: &'a Map<String, Value>,
+    arguments: BTreeSet<String>,
+    /// What commands are answered with.
+    commands: BTreeSet<String>,
+    /// What else tools of an episode are answered with.
+    replies: BTreeSet<String>,
+    /// What only starts and lists of tasks are answered with.
+    start: BTreeSet<String>,
+}
+
+impl<'a> Contract<'a> {
+    pub fn of(types: &'a Map<String, Value>, tools: &[TypedTool]) -> Contract<'a> {
+        let contract = Contract {
+            types,
+            arguments: BTreeSet::new(),
+            commands: BTreeSet::new(),
+            replies: BTreeSet::new(),
+            start: BTreeSet::new(),
+        };
+        let on_episode = || tools.iter().filter(|tool| is_method(tool));
+        // All commands have the same reply, and no other tool has one that another has, too.
+        let is_common = |reply: &str| on_episode().filter(|tool| tool.reply == reply).count() > 1;
+        let all_of = |names: Vec<&str>, but: &[&BTreeSet<String>]| -> BTreeSet<String> {
+            let all = names.into_iter().flat_map(|name| contract.reached_from(name));
+            all.filter(|name| !but.iter().any(|known| known.contains(name))).collect()
+        };
+        let arguments = on_episode().flat_map(|tool| contract.reached(&tool.arguments)).collect();
+        let (common, own): (Vec<&str>, Vec<&str>) =
+            on_episode().map(|tool| tool.reply.as_str()).partition(|reply| is_common(reply));
+        let commands = all_of(common, &[]);
+        let replies = all_of(own.into_iter().chain(OF_OBSERVE).collect(), &[&commands]);
+        let start = all_of(OF_START.to_vec(), &[&commands, &replies]);
+        Contract { arguments, commands, replies, start, ..contract }
+    }
+
+    /// Classes and names for choices that a schema refers to itself.
+    pub fn named_in(&self, schema: &Value) -> Vec<String> {
+        let mut found = Vec::new();
+        references(schema, &mut found);
+        found
+    }
+
+    /// All that a schema is made of.
+    fn reached(&self, schema: &Value) -> BTreeSet<String> {
+        let mut reached = BTreeSet::new();
+        let mut next = self.named_in(schema);
+        while let Some(name) = next.pop() {
+            next.extend(self.named_in(&self.types[&name]).into_iter().filter(|name| !reached.contains(name)));
+            reached.insert(name);
+        }
+        reached
+    }
+
+    fn reached_from(&self, name: &str) -> BTreeSet<String> {
+        let mut reached = self.reached(&self.types[name]);
+        reached.insert(name.into());
+        reached
+    }
+
+    fn is_class(&self, name: &str) -> bool {
+        self.types[name]["properties"].is_object()
+    }
+
+    /// The type of a name that has no class and is no choice, as that of numbers by joint.
+    fn plain(&self, name: &str) -> Option<String> {
+        let schema = &self.types[name];
+        let named = self.is_class(name) || choices(schema).is_some();
+        (!named).then(|| reply_type(schema, &|name| self.plain(name)))
+    }
+
+    /// The module of what tools are given.
+    pub fn arguments(&self) -> String {
+        let mut lines = head("What tools are given.");
+        lines.add(0, "from collections.abc import Mapping, Sequence");
+        lines.add(0, "from dataclasses import dataclass, fields, is_dataclass");
+        lines.add(0, "from typing import Any, TypeAlias, cast\n");
+        lines.add(0, "import numpy as np");
+        lines.add(0, "from numpy.typing import NDArray\n");
+        lines.add(0, include_str!("plain.py").trim_end());
+        for name in self.arguments.iter().filter(|name| self.is_class(name)) {
+            self.argument_class(&mut lines, name);
+        }
+        lines.text()
+    }
+
+    fn argument_class(&self, lines: &mut Lines, name: &str) {
+        let schema = &self.types[name];
+        lines.add(0, "\n\n@dataclass(frozen=True)");
+        lines.add(0, &format!("class {name}:"));
+        docstring(lines, 1, &described(schema), &[]);
+        let fields: Vec<Parameter> = parameters(schema);
+        for Parameter { name, kind, about, required, .. } in &fields {
+            lines.add(0, "");
+            let default = if *required { "" } else { " = None" };
+            lines.add(1, &format!("{name}: {kind}{default}"));
+            docstring(lines, 1, about, &[]);
+        }
+    }
+
+    /// The module of what commands reply.
+    pub fn commands(&self) -> String {
+        self.reply_module("What commands reply.", &self.commands)
+    }
+
+    /// The module of what other tools of an episode reply.
+    pub fn replies(&self) -> String {
+        self.reply_module("What tools reply that are no commands.", &self.replies)
+    }
+
+    /// The module of what a start and a list of tasks reply.
+    pub fn start(&self) -> String {
+        self.reply_module("What a start replies, and what tasks there are.", &self.start)
+    }
+
+    fn reply_module(&self, about: &str, names: &BTreeSet<String>) -> String {
+        let mut lines = head(about);
+        lines.add(0, "from collections.abc import Mapping");
+        lines.add(0, "from dataclasses import dataclass");
+        let has_choices = names.iter().any(|name| choices(&self.types[name]).is_some());
+        lines.add(
+            0,
+            if has_choices { "from typing import Any, Literal, TypeAlias" } else { "from typing import Any" },
+        );
+        let named = names.iter().flat_map(|name| self.named_in(&self.types[name]));
+        let elsewhere: Vec<String> =
+            named.filter(|name| !names.contains(name) && self.plain(name).is_none()).collect();
+        if !elsewhere.is_empty() {
+            lines.add(0, "");
+        }
+        self.import(&mut lines, elsewhere);
+        self.reply_types(&mut lines, names);
+        lines.text()
+    }
+
+    /// Imports types of replies from where they are.
+    pub fn import(&self, lines: &mut Lines, names: Vec<String>) {
+        for (module, own) in [("commands", &self.commands), ("replies", &self.replies)] {
+            lines.import(module, names.iter().filter(|name| own.contains(*name)).cloned());
+        }
+    }
+
+    fn reply_types(&self, lines: &mut Lines, names: &BTreeSet<String>) {
+        let choices: BTreeMap<&String, Vec<String>> =
+            names.iter().filter_map(|name| Some((name, choices(&self.types[name])?))).collect();
+        for (name, values) in &choices {
+            lines.add(0, "");
+            lines.add(0, &format!("{name}: TypeAlias = Literal["));
+            values.iter().for_each(|value| lines.add(1, &format!("\"{value}\",")));
+            lines.add(0, "]");
+            docstring(lines, 0, &described(&self.types[*name]), &[]);
+        }
+        for name in names.iter().filter(|name| self.is_class(name)) {
+            self.reply_class(lines, name);
+        }
+    }
+
+    fn reply_class(&self, lines: &mut Lines, name: &str) {
+        let schema = &self.types[name];
+        let required: Vec<&str> =
+            schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
+        lines.add(0, "\n\n@dataclass(frozen=True)");
+        lines.add(0, &format!("class {name}:"));
+        docstring(lines, 1, &described(schema), &[]);
+        let mut readings = Vec::new();
+        for (wire, field) in schema["properties"].as_object().into_iter().flatten() {
+            let mut kind = reply_type(field, &|name| self.plain(name));
+            let is_class = |name: &str| self.is_class(name);
+            let read = match (required.contains(&wire.as_str()), field["type"].as_str()) {
+                (true, _) => reading(field, &format!("value[\"{wire}\"]"), &is_class),
+                (false, Some("array")) => reading(field, &format!("value.get(\"{wire}\", ())"), &is_class),
+                (false, Some("object")) => format!("value.get(\"{wire}\", {{}})"),
+                (false, _) => {
+                    if !kind.ends_with("| None") {
+                        kind.push_str(" | None");
+                    }
+                    optional_reading(field, wire, &is_class)
+                }
+            };
+            readings.push(format!("{}={read},", python_name(wire)));
+            lines.add(0, "");
+            lines.add(1, &format!("{}: {kind}", python_name(wire)));
+            docstring(lines, 1, &described(field), &[]);
+        }
+        lines.add(0, "");
+        lines.add(1, "@staticmethod");
+        lines.add(1, &format!("def of(value: Mapping[str, Any]) -> {name}:"));
+        lines.add(2, "\"\"\"Reads what JSON has.\"\"\"");
+        lines.add(2, &format!("return {name}("));
+        readings.iter().for_each(|reading| lines.add(3, reading));
+        lines.add(2, ")");
+    }
+}
+
+fn head(about: &str) -> Lines {
+    let mut lines = Lines::default();
+    lines.head(about);
+    lines
+}
+
+/// What reads a field that may be left out.
+fn optional_reading(field: &Value, wire: &str, is_class: &dyn Fn(&str) -> bool) -> String {
+    let got = format!("value.get(\"{wire}\")");
+    match reading(&without_null(field).0, "got", is_class) {
+        same if same == "got" => got,
+        read => format!("None if (got := {got}) is None else {read}"),
+    }
+}
+
+/// The texts of a type that is one of several.
+fn choices(schema: &Value) -> Option<Vec<String>> {
+    let text = |value: &Value| value.as_str().map(str::to_owned);
+    if let Some(values) = schema["enum"].as_array() {
+        return values.iter().map(text).collect();
+    }
+    schema["oneOf"].as_array()?.iter().map(|choice| text(&choice["const"])).collect()
+}
+
+fn references(schema: &Value, found: &mut Vec<String>) {
+    if let Some(name) = reference(schema) {
+        found.push(name.into());
+    }
+    match schema {
+        Value::Array(items) => items.iter().for_each(|item| references(item, found)),
+        Value::Object(object) => object.values().for_each(|value| references(value, found)),
+        _ => {}
+    }
+}
