@@ -122,22 +122,22 @@ impl Posed {
     }
 
     /// Motions of all links, at their origins.
-    fn motions(&self) -> Vec<LinkMotion> {
+    fn motions(&self) -> Vec<PosedMotion> {
         let model = model();
         let world_from_link = model.forward_kinematics(self.world_from_pelvis, &self.q_rad);
-        let mut motions: Vec<LinkMotion> = Vec::with_capacity(model.links.len());
+        let mut motions: Vec<PosedMotion> = Vec::with_capacity(model.links.len());
         for (index, link) in model.links.iter().enumerate() {
             motions.push(match (link.parent, link.joint) {
                 (Some(parent), Some(joint)) => {
                     let world = world_from_link[index];
                     let offset_m = world.translation - world_from_link[parent].translation;
                     let axis = world.rotation * model.joints[joint].axis;
-                    LinkMotion {
+                    PosedMotion {
                         velocity_m_s: motions[parent].velocity_at(offset_m),
                         spin_rad_s: motions[parent].spin_rad_s + axis * self.qd_rad_s[joint],
                     }
                 }
-                _ => LinkMotion {
+                _ => PosedMotion {
                     velocity_m_s: self.pelvis_velocity_m_s,
                     spin_rad_s: self.pelvis_angular_velocity_rad_s,
                 },
@@ -147,12 +147,12 @@ impl Posed {
     }
 }
 
-struct LinkMotion {
+struct PosedMotion {
     velocity_m_s: Vector,
     spin_rad_s: Vector,
 }
 
-impl LinkMotion {
+impl PosedMotion {
     fn velocity_at(&self, from_origin_m: Vector) -> Vector {
         self.velocity_m_s + self.spin_rad_s.cross(from_origin_m)
     }
