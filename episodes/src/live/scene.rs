@@ -10,7 +10,6 @@ use tandem_sim::{CONTROL_HZ, Step, World};
 
 use super::geometry::{Geometry, pose_row};
 use super::{LiveStep, frame};
-use crate::EpisodeError;
 use crate::commands::Motion;
 use crate::protocol::rules;
 use crate::scoring::Phase;
@@ -47,7 +46,7 @@ impl LiveScene {
         let Geometry { meshes, parts, numbers } = Geometry::of(&scenery);
         let cameras = Cameras::of(world);
         let third_person = cameras.third_person();
-        let robots = motions.iter().map(|motion| robot_head(motion)).collect::<Vec<_>>();
+        let robots = motions.iter().map(robot_head).collect::<Vec<_>>();
         let objects: Vec<&str> = world.object_models().map(|(name, _)| name).collect();
         let phases = spec.task.phases.iter().enumerate();
         let phases = phases.map(|(index, phase)| {
@@ -77,7 +76,7 @@ impl LiveScene {
 
     /// The message that a page draws the scene from: the length of its head in bytes (u32), the head, JSON with `more` in it and
     /// blanks up to a multiple of four, then the numbers of its meshes, then `rest`. All little-endian.
-    pub fn message(&self, more: Value, rest: &[u8]) -> Result<Vec<u8>, EpisodeError> {
+    pub fn message(&self, more: Value, rest: &[u8]) -> Vec<u8> {
         let mut head = self.head.clone();
         if let (Value::Object(head), Value::Object(more)) = (&mut head, more) {
             head.extend(more);
@@ -89,7 +88,7 @@ impl LiveScene {
         message.extend(text);
         message.extend(&self.numbers);
         message.extend(rest);
-        Ok(message)
+        message
     }
 
     /// The message of a step; `frame.rs` says what is in it.

@@ -8,7 +8,6 @@ use tandem_sim::Step;
 use tandem_sim::render::PictureError;
 
 use super::ReplayError;
-use crate::EpisodeError;
 use crate::commands::Motion;
 use crate::convert::isometry_from_sim;
 use crate::live::{LiveCall, LiveScene, LiveStep};
@@ -56,7 +55,7 @@ impl RecordedEpisode {
 
     /// The message that a page draws all of it from: that of the scene with the calls, the phases and the result in its head, and every
     /// step's at its end.
-    pub fn message(&self) -> Result<Vec<u8>, EpisodeError> {
+    pub fn message(&self) -> Vec<u8> {
         let frames = self.steps.iter().flat_map(|step| self.scene.frame(&self.shown(step)));
         let frames: Vec<u8> = frames.collect();
         self.scene.message(self.told.clone(), &frames)

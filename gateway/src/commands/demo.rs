@@ -82,7 +82,6 @@ pub fn play_all(runs: &Path, seeds: Seeds, flags: Layer) -> Result<Vec<ResultRep
     let settings = Settings::resolve(flags, None)?;
     try_runs_folder(&settings.runs)?;
     let server = Server::start(settings)?;
-    println!("watch at {}", server.watch_link());
     let results = seeds.0.map(|seed| play(&server, seed)).collect::<Result<Vec<_>, _>>()?;
     server.stop();
     if results.len() > 1 {
@@ -133,7 +132,13 @@ fn print_result(task: &Task, result: &ResultReply, folder: &Path) {
     );
     match &result.recording_failed {
         Some(reason) => println!("  not everything was written: {reason}"),
-        None => println!("  {}: result.json, episode.mcap, strip.png, report.html", folder.display()),
+        None => {
+            println!("  {}: result.json, episode.mcap, strip.png, report.html", folder.display());
+            let runs = folder.parent().unwrap_or(folder).display();
+            println!(
+                "  to look at it step by step in a browser: tandem serve --runs {runs}, and the link that it prints"
+            );
+        }
     }
 }
 

@@ -38,32 +38,19 @@ export class Calls {
     };
     details.addEventListener("toggle", fill);
     const item = element("li", {}, details, pictures);
-    this.known.set(call.number, { call, pictures, reply });
+    this.known.set(call.number, pictures);
     this.list.prepend(item);
     if (this.list.childElementCount > MOST_SHOWN) this.list.lastElementChild.remove();
   }
 
   /** A picture that the policy was shown with a call. */
   picture(number, robot, png) {
-    const shown = this.known.get(number);
-    if (!shown) return;
+    const pictures = this.known.get(number);
+    if (!pictures) return;
     const image = element("img", { alt: `What robot ${this.head.robots[robot].name} saw`, width: 160 });
     image.src = URL.createObjectURL(new Blob([png], { type: "image/png" }));
     image.addEventListener("load", () => URL.revokeObjectURL(image.src), { once: true });
-    shown.pictures.append(image);
-  }
-
-  /** How hands did under the command that was under way at a time, as its reply says it: by robot and side. */
-  statesAt(time) {
-    let under = null;
-    for (const { call, reply } of this.known.values()) {
-      if (call.time_s >= time - 1e-6 && (!under || call.number < under.call.number)) under = { call, reply };
-    }
-    if (under?.call.tool !== "move_wrists" || !under.call.ok) return null;
-    return this.head.robots.map(({ name }) => {
-      const told = under.reply.robots?.find?.(({ robot }) => robot === name);
-      return told ? [told.left?.state, told.right?.state] : null;
-    });
+    pictures.append(image);
   }
 }
 
@@ -75,7 +62,9 @@ const parsed = (json) => {
   }
 };
 
-const text = (value) => (typeof value === "string" ? value : JSON.stringify(value, null, 1));
+/** As JSON, with rows of numbers on one line and without what is null. */
+const text = (value) => (typeof value === "string" ? value
+  : JSON.stringify(value, (_, inner) => (inner === null ? undefined : inner), 2).replace(/\[[-\d.,\se]+\]/g, (row) => row.replace(/\s+/g, " ")));
 
 /** A call in a few words. */
 function summary(call, asked, reply) {

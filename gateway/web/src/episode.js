@@ -6,6 +6,7 @@ import { ask, element, say, words } from "./dom.js";
 import { Frame, readScene } from "./message.js";
 import { Plots } from "./plots.js";
 import { Stage } from "./stage.js";
+import { Targets } from "./targets.js";
 import { LiveTime, RecordedTime } from "./time.js";
 
 const PLOTS_EVERY_MS = 250;
@@ -29,7 +30,8 @@ class EpisodePage {
     this.reached = new Map(head.reached.map((phase) => [phase.number, phase.time_s]));
     this.result = head.result;
     this.time = this.recorded ? new RecordedTime(frames, wanted.at) : new LiveTime(frames[0]);
-    this.plots = new Plots(head);
+    this.targets = this.recorded ? new Targets(scene) : null;
+    this.plots = new Plots(head, this.targets);
     this.calls = new Calls(head, this.recorded ? (time) => this.time.seek(time) : null);
     this.layOut(main);
     this.stage = new Stage(this.view, scene);
@@ -89,7 +91,10 @@ class EpisodePage {
   /** Who looks, and what is shown beside the scene. */
   tools() {
     const views = [["free", "Free camera"], ...this.head.robots.map(({ name }) => [name, `As robot ${name}`])];
-    const choose = element("select", { "aria-label": "Camera", onchange: (event) => this.stage.look(event.target.value) },
+    const choose = element("select", { "aria-label": "Camera", onchange: (event) => {
+      this.stage.look(event.target.value);
+      this.again = true;
+    } },
       ...views.map(([value, text]) => element("option", { value }, text)));
     const extras = [["targets", "targets"], ["forces", "forces"], ["frustums", "fields of view"]].map(([name, text]) =>
       element("label", {}, element("input", { type: "checkbox", checked: true, onchange: (event) => {
@@ -207,7 +212,7 @@ class EpisodePage {
   draw(seconds) {
     const { from, to, share, moved } = this.time.pass(seconds);
     if (moved || this.again || !this.drawn) {
-      this.stage.show(from, to, share, this.recorded ? this.calls.statesAt(this.time.time) : null);
+      this.stage.show(from, to, share, this.targets);
       this.showFacts(to);
       this.drawn = true;
       this.again = false;

@@ -8,15 +8,20 @@ const HEIGHT = 84;
 
 /** What is plotted of a step: a name, a unit, and a number of each robot's left and right. */
 const PLOTS = [
-  { name: "Wrist error", unit: "mm", least: 20, of: (frame, robot, side) => 1000 * frame.hand(robot, side).positionError },
+  { name: "Wrist error", unit: "mm", least: 20, of: (frame, robot, side, joints, targets) => {
+    const error = frame.hand(robot, side).positionError;
+    return 1000 * (targets?.error(frame, robot, side, error) ?? error);
+  } },
   { name: "Force on hand", unit: "N", least: 10, of: (frame, robot, side) => Math.hypot(...frame.hand(robot, side).felt) },
   { name: "Arm effort", unit: "% of limit", least: 50, of: (frame, robot, side, joints) => 100 * frame.effort(robot, joints.arms[side]) },
   { name: "Leg effort", unit: "% of limit", least: 50, of: (frame, robot, side, joints) => 100 * frame.effort(robot, joints.legs[side]) },
 ];
 
 export class Plots {
-  constructor(head) {
+  /** @param {import("./targets.js").Targets | null} targets those of a finished episode */
+  constructor(head, targets) {
     this.head = head;
+    this.targets = targets;
     this.times = [];
     this.joints = head.robots.map(({ joints }) => ({
       arms: SIDES.map((side) => indices(joints, side, /shoulder|elbow|wrist|hand/)),
@@ -38,7 +43,7 @@ export class Plots {
     if (this.times.length && frame.time <= this.times.at(-1)) return;
     this.times.push(frame.time);
     for (const plot of this.plots) {
-      plot.series.forEach((sides, robot) => sides.forEach((line, side) => line.push(plot.of(frame, robot, side, this.joints[robot]))));
+      plot.series.forEach((sides, robot) => sides.forEach((line, side) => line.push(plot.of(frame, robot, side, this.joints[robot], this.targets))));
     }
   }
 

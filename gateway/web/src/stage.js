@@ -120,7 +120,7 @@ export class Stage {
   }
 
   /** Puts everything where it is a `share` of the way from one step to the next. */
-  show(from, to, share, states) {
+  show(from, to, share, targets) {
     const one = new Vector3();
     const turn = new Quaternion();
     const turnTo = new Quaternion();
@@ -135,7 +135,7 @@ export class Stage {
       pose(robot.frustum, camera);
       robot.frustum.visible = this.extras.frustums && this.view !== this.head.robots[index].name;
       middle.addScaledVector(one.fromArray(to.row, this.layout.links[index]), 1 / this.robots.length);
-      robot.hands.forEach((hand, side) => this.showHand(hand, to.hand(index, side), from, pose, states?.[index]?.[side]));
+      robot.hands.forEach((hand, side) => this.showHand(hand, to.hand(index, side), from, pose, targets?.at(from.time + share * (to.time - from.time), index, side)));
       if (this.view === this.head.robots[index].name) pose(this.head_camera, camera);
     });
     if (!this.centred) {
@@ -148,14 +148,18 @@ export class Stage {
     this.stale = true;
   }
 
-  showHand({ ghost, line, felt, contact }, hand, from, pose, recordedState) {
-    const state = recordedState ?? hand.state;
-    const paint = new Color(colour(STATE_COLOURS[state] ?? "--soft"));
-    pose(ghost, hand.target);
-    ghost.visible = line.visible = this.extras.targets && hand.positionError > GHOST_FROM_M;
+  showHand({ ghost, line, felt, contact }, hand, from, pose, recorded) {
+    const paint = new Color(colour(STATE_COLOURS[recorded?.state ?? hand.state] ?? "--soft"));
+    const wrist = new Vector3().fromArray(from.row, hand.wrist);
+    if (recorded) {
+      ghost.position.fromArray(recorded.pose);
+      ghost.quaternion.fromArray(recorded.pose, 3);
+    } else {
+      pose(ghost, hand.target);
+    }
+    ghost.visible = line.visible = this.extras.targets && ghost.position.distanceTo(wrist) > GHOST_FROM_M;
     ghost.traverse((part) => part.material?.color.copy(paint));
     line.material.color.copy(paint);
-    const wrist = new Vector3().fromArray(from.row, hand.wrist);
     const ends = line.geometry.getAttribute("position");
     ends.setXYZ(0, wrist.x, wrist.y, wrist.z);
     ends.setXYZ(1, ghost.position.x, ghost.position.y, ghost.position.z);

@@ -1,5 +1,5 @@
-// The pages at /watch in a headless Chromium: an episode watched live to its end, a finished one scrubbed, and pictures of both for
-// somebody to look at.
+// The pages at /watch in a headless Chromium: calls watched as they are made, the demo watched live to its end, a finished episode
+// scrubbed, and pictures of all for somebody to look at.
 //
 //     cargo build --release
 //     mkdir -p /tmp/watch && cd /tmp/watch && npm install playwright-core@1.65.1
@@ -20,16 +20,22 @@ const sources = process.env.TANDEM_WEB;
 const WIDTHS = [400, 1400, 2500];
 
 const runs = mkdtempSync(join(tmpdir(), "watch-"));
-const server = spawn(program, ["serve", "--listen", "127.0.0.1:0", "--runs", runs], { stdio: ["ignore", "pipe", "ignore"] });
-process.on("exit", () => server.kill());
-const link = await new Promise((resolve) => {
-  let said = "";
-  server.stdout.on("data", (data) => {
-    said += data;
-    const found = said.match(/watch at (\S+)\n/);
-    if (found) resolve(found[1]);
+
+/** Starts the program, which serves until this one ends, and returns the link that it prints. */
+function start(...words) {
+  const server = spawn(program, [...words, "--runs", runs], { stdio: ["ignore", "pipe", "ignore"] });
+  process.on("exit", () => server.kill());
+  return new Promise((resolve) => {
+    let said = "";
+    server.stdout.on("data", (data) => {
+      said += data;
+      const found = said.match(/watch at (\S+)\n/);
+      if (found) resolve(found[1]);
+    });
   });
-});
+}
+
+const link = await start("serve", "--listen", "127.0.0.1:0");
 const base = new URL(link).origin;
 
 const call = async (path, body) => {
@@ -44,13 +50,13 @@ const browser = await chromium.launch({
     "--disable-background-networking", "--disable-component-update", "--disable-sync"],
 });
 
-async function open(width, scheme) {
+async function open(width, scheme, link) {
   const context = await browser.newContext({ viewport: { width, height: Math.round(Math.min(width * 1.6, 1400)) }, colorScheme: scheme });
   const page = await context.newPage();
   page.wrong = [];
   page.on("pageerror", (error) => page.wrong.push(error.message));
   page.on("console", (message) => message.type() === "error" && page.wrong.push(message.text()));
-  page.on("request", (request) => request.url().startsWith(base) || request.url().startsWith("blob:") || page.wrong.push(`asks ${request.url()}`));
+  page.on("request", (request) => request.url().startsWith(new URL(link).origin) || request.url().startsWith("blob:") || page.wrong.push(`asks ${request.url()}`));
   if (sources) {
     await page.route("**/watch/page.js", (route) => route.fulfill({ path: join(sources, "dist/watch.js"), contentType: "text/javascript" }));
     await page.route("**/watch/page.css", (route) => route.fulfill({ path: join(sources, "style.css"), contentType: "text/css" }));
@@ -60,7 +66,7 @@ async function open(width, scheme) {
   return page;
 }
 
-const wide = await open(1400, "light");
+const wide = await open(1400, "light", link);
 
 // Who has not come by the link sees the door.
 const stranger = await (await browser.newContext()).newPage();
@@ -99,7 +105,7 @@ for (const width of WIDTHS) {
 await wide.setViewportSize({ width: 1400, height: 1000 });
 await wide.selectOption(".tools select", "A");
 await wide.waitForTimeout(500);
-await wide.screenshot({ path: "live-as-A.png" });
+assert((await wide.locator(".view").screenshot({ path: "live-as-A.png" })).length > 30_000, "robot A sees something");
 const rate = await wide.evaluate(() => new Promise((resolve) => {
   const began = performance.now();
   let frames = 0;
@@ -114,8 +120,8 @@ assert.deepEqual(wide.wrong, []);
 // The same, finished.
 await wide.click("text=Look at it again");
 await wide.waitForSelector(".scrubber");
-await wide.locator(".track input").fill("1.5");
-await wide.waitForFunction(() => /1\.50 of/.test(document.querySelector(".scrubber output").textContent));
+await wide.locator(".track input").fill("1.4");
+await wide.waitForFunction(() => /1\.40 of/.test(document.querySelector(".scrubber output").textContent));
 await wide.check("#look");
 await wide.waitForSelector(".pictures img");
 await wide.locator(".calls details").first().click();
@@ -123,7 +129,7 @@ await wide.waitForTimeout(600);
 await wide.screenshot({ path: "finished.png", fullPage: true });
 await wide.click("text=Play");
 await wide.waitForFunction(() => document.querySelector(".scrubber button").textContent === "Pause");
-await wide.waitForFunction(() => !/1\.50 of/.test(document.querySelector(".scrubber output").textContent));
+await wide.waitForFunction(() => !/1\.40 of/.test(document.querySelector(".scrubber output").textContent));
 await wide.click("text=Show its film");
 await wide.waitForFunction(() => [...document.images].some((image) => image.src.includes("/film") && image.naturalWidth > 0), null, { timeout: 60000 });
 await wide.click("text=All episodes");
@@ -133,6 +139,28 @@ for (const width of WIDTHS) {
   await wide.waitForTimeout(300);
   await wide.screenshot({ path: `cards-${width}.png` });
 }
+assert.deepEqual(wide.wrong, []);
+
+// The demo's calls once more, over HTTP and slowly enough to be watched, to the last phase.
+await new Promise((resolve) => { spawn(program, ["demo", "--seeds", "2001", "--runs", runs]).on("exit", resolve); });
+const key = { authorization: `Bearer ${new URL(link).hash.slice(1)}` };
+const recorded = await (await fetch(`${base}/watch/run?run=handover-seed2001`, { headers: key })).arrayBuffer();
+const { calls, result } = JSON.parse(new TextDecoder().decode(recorded.slice(4, 4 + new DataView(recorded).getUint32(0, true))));
+const { episode_id: again } = await call("/v1/episodes", { task: "handover", seed: 2001, protocol: "agentic" });
+await wide.goto(`${base}/watch?episode=${again}`);
+await wide.waitForSelector(".view canvas");
+let frames = 0;
+for (const made of calls) {
+  await call(`/v1/episodes/${again}/tools/${made.tool}`, JSON.parse(made.arguments));
+  await wide.waitForTimeout(150);
+  if (++frames === 30) await wide.screenshot({ path: "demo-half.png" });
+}
+await wide.waitForFunction(() => document.querySelectorAll(".phases .done").length === 3);
+await wide.waitForSelector(".top .good");
+await wide.waitForTimeout(1500);
+await wide.screenshot({ path: "demo-end.png" });
+const ended = await (await fetch(`${base}/v1/episodes/${again}`, { method: "DELETE" })).json();
+assert.equal(ended.state_hash, result.state_hash, "watched or not, the same calls lead to the same state");
 assert.deepEqual(wide.wrong, []);
 await browser.close();
 console.log("watched, scrubbed, and nothing went wrong; look at the pictures");

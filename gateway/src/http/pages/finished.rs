@@ -42,7 +42,14 @@ const FILES: [(&str, &str); 4] = [
 
 /// The recording that was looked at last: a page asks for many pictures of one.
 #[derive(Clone, Default)]
-pub struct LastOpened(Arc<Mutex<Option<(PathBuf, SystemTime, Arc<RecordedEpisode>)>>>);
+pub struct LastOpened(Arc<Mutex<Option<OpenedRecording>>>);
+
+/// A recording in memory, and which file it was read from when.
+struct OpenedRecording {
+    path: PathBuf,
+    changed: SystemTime,
+    episode: Arc<RecordedEpisode>,
+}
 
 impl std::fmt::Debug for LastOpened {
     fn fmt(&self, text: &mut std::fmt::Formatter) -> std::fmt::Result {
@@ -56,15 +63,13 @@ impl LastOpened {
         let changed = fs::metadata(&path).and_then(|file| file.modified());
         let changed = changed.map_err(|_| no_recording(folder))?;
         let mut last = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((known, at, episode)) = &*last
-            && *known == path
-            && *at == changed
+        if let Some(opened) = last.as_ref().filter(|opened| opened.path == path && opened.changed == changed)
         {
-            return Ok(episode.clone());
+            return Ok(opened.episode.clone());
         }
         // One at a time: two pages that ask for the same wait for one reading.
         let episode = RecordedEpisode::read(&path).map(Arc::new).map_err(|error| unreadable(&error))?;
-        *last = Some((path, changed, episode.clone()));
+        *last = Some(OpenedRecording { path, changed, episode: episode.clone() });
         Ok(episode)
     }
 }
@@ -126,10 +131,7 @@ fn folder(app: &AppState, wanted: &Wanted) -> Result<PathBuf, ApiError> {
 /// All that a page draws of a finished episode.
 pub async fn run(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> Result<Response, ApiError> {
     let folder = folder(&app, &wanted)?;
-    let message = blocking(move || {
-        let episode = app.opened.open(&folder)?;
-        episode.message().map_err(|error| HostingError::from(error).into())
-    });
+    let message = blocking(move || Ok(app.opened.open(&folder)?.message()));
     Ok(([(header::CONTENT_TYPE, "application/octet-stream")], message.await?).into_response())
 }
 

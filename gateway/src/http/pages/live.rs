@@ -40,7 +40,7 @@ pub async fn scene(State(app): State<AppState>, Query(wanted): Query<Wanted>) ->
             "recorded": false, "calls": calls, "reached": view.phases, "result": view.result, "frames": 1,
         });
         let frame = view.now.frame(&view.scene);
-        view.scene.message(more, &frame).map_err(|error| HostingError::from(error).into())
+        Ok(view.scene.message(more, &frame))
     });
     Ok(([(header::CONTENT_TYPE, "application/octet-stream")], message.await?).into_response())
 }

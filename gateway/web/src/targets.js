@@ -1,0 +1,50 @@
+// Wrist targets of a finished episode, which its steps do not have: the replies to its commands say them, in the robot's pelvis frame at
+// the command's end. While it is carried out, a target is fixed in the world.
+
+import { Quaternion, Vector3 } from "three";
+import { POSE, SIDES } from "./message.js";
+
+export class Targets {
+  /** @param {ReturnType<import("./message.js").readScene>} scene */
+  constructor({ head, layout, frames }) {
+    /** By robot and side: targets in order, with the times between which they hold. */
+    this.known = head.robots.map(() => SIDES.map(() => []));
+    let begin = 0;
+    for (const call of head.calls) {
+      const reply = call.ok && call.tool === "move_wrists" ? JSON.parse(call.reply) : null;
+      for (const told of reply?.robots ?? []) {
+        const robot = head.robots.findIndex(({ name }) => name === told.robot);
+        const frame = frames.findLast(({ time }) => time <= call.time_s + 1e-6);
+        if (robot < 0 || !frame) continue;
+        SIDES.forEach((side, index) => {
+          const pose = inWorld(frame.row, layout.links[robot], told[side].target);
+          this.known[robot][index].push({ begin, end: call.time_s, pose, state: told[side].state ?? "moving" });
+        });
+      }
+      begin = call.time_s;
+    }
+  }
+
+  /** The target of a hand at a time, if a command was under way that had one. */
+  at(time, robot, side) {
+    return this.known[robot][side].find(({ begin, end }) => begin <= time && time <= end) ?? null;
+  }
+
+  /** How far a wrist is from its target; `otherwise` where it has none. */
+  error(frame, robot, side, otherwise) {
+    const target = this.at(frame.time, robot, side);
+    if (!target) return otherwise;
+    const { wrist } = frame.hand(robot, side);
+    return Math.hypot(...[0, 1, 2].map((axis) => frame.row[wrist + axis] - target.pose[axis]));
+  }
+}
+
+function inWorld(row, pelvis, { position_m: position, quaternion_wxyz: [w, x, y, z] }) {
+  const turn = new Quaternion().fromArray(row, pelvis + 3);
+  const at = new Vector3().fromArray(position).applyQuaternion(turn).add(new Vector3().fromArray(row, pelvis));
+  const turned = turn.multiply(new Quaternion(x, y, z, w));
+  const pose = new Float32Array(POSE);
+  at.toArray(pose);
+  turned.toArray(pose, 3);
+  return pose;
+}
