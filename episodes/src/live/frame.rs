@@ -9,8 +9,8 @@
 
 use tandem_sim::{RobotStep, Side, Step};
 
+use super::LiveStep;
 use super::geometry::pose_row;
-use super::{LiveStep, scene::RobotFrame};
 use crate::commands::{Motion, base_row, wrist_state};
 use crate::convert::{isometry_from_sim, isometry_to_sim};
 use tandem_tools_spec::HandState;
@@ -18,6 +18,12 @@ use tandem_tools_spec::HandState;
 /// What comes first in the message of a step.
 const STEP_KIND: f32 = 1.0;
 const NO_LIMIT: f32 = -1.0;
+
+/// What of a robot the message of a step needs.
+pub struct RobotFrame {
+    pub name: String,
+    pub effort_limits_n_m: Vec<f32>,
+}
 
 /// The row of `live`; `motions` are of the same robots, and left as the step has them.
 pub fn row(live: &LiveStep, motions: &mut [Motion], robots: &[RobotFrame]) -> Vec<u8> {

@@ -8,8 +8,9 @@ use tandem_sim::render::{
 };
 use tandem_sim::{CONTROL_HZ, Step, World};
 
+use super::LiveStep;
+use super::frame::{self, RobotFrame};
 use super::geometry::{Geometry, pose_row};
-use super::{LiveStep, frame};
 use crate::commands::Motion;
 use crate::protocol::rules;
 use crate::scoring::Phase;
@@ -24,12 +25,6 @@ pub struct LiveScene {
     /// Robots of their own, which take up what those of the episode were told.
     motions: Mutex<Vec<Motion>>,
     drawing: Mutex<Drawing>,
-}
-
-/// What of a robot the message of a step needs.
-pub struct RobotFrame {
-    name: String,
-    pub effort_limits_n_m: Vec<f32>,
 }
 
 /// Who draws pictures, from when somebody looks at one.

@@ -10,8 +10,8 @@ use tandem_tools_spec::{
 use tokio::sync::Semaphore;
 
 use super::{
-    pages::{LastOpened, MOST_WATCHERS, WatchKey},
     problem::ApiError,
+    watching::{LastOpened, MOST_WATCHERS, WatchKey},
 };
 use crate::{
     hosting::{Caller, EpisodeTable},

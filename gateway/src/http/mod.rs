@@ -14,5 +14,6 @@ mod router;
 mod server;
 #[cfg(test)]
 mod tests;
+mod watching;
 
 pub use server::{Server, shutdown_signal};

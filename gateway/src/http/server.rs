@@ -9,8 +9,9 @@ use tokio::{net::TcpListener, runtime::Runtime, sync::oneshot, task::JoinHandle,
 use super::{
     app::AppState,
     gate::{Gate, connections, limits::Limits},
-    pages::{WATCH, WatchKey},
+    pages::WATCH,
     router::router,
+    watching::WatchKey,
 };
 use crate::{
     hosting::{EpisodeTable, EpisodeThread, HostingError},

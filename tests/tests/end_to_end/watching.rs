@@ -200,7 +200,7 @@ fn a_finished_episode_can_be_looked_at_again() {
     assert!(status == 200 && film.starts_with(b"RIFF"));
     assert_eq!(get(&server, &format!("/watch/file?run={id}&file=result.json")).0, 200);
     let (status, problem) = get(&server, &format!("/watch/camera?run={id}&robot=Z"));
-    assert!(status == 404 && String::from_utf8_lossy(&problem).contains("A, B"), "{status}");
+    assert!(status == 422 && String::from_utf8_lossy(&problem).contains("A, B"), "{status}");
     for wrong in [
         "run=..",
         "run=",

@@ -12,8 +12,9 @@ use crate::{
     hosting::Caller,
     http::{
         app::AppState,
-        pages::{WATCH, Watcher, door},
+        pages::{WATCH, door},
         problem::ApiError,
+        watching::Watcher,
     },
 };
 

@@ -19,8 +19,8 @@ use tokio::runtime::Runtime;
 use super::{
     app::AppState,
     gate::{Gate, limits::Limits},
-    pages::WatchKey,
     router::router,
+    watching::WatchKey,
 };
 use crate::{
     hosting::EpisodeTable,

@@ -3,7 +3,6 @@
 use std::{
     fs,
     path::{Component, Path, PathBuf},
-    sync::{Arc, Mutex, PoisonError},
     time::SystemTime,
 };
 
@@ -13,15 +12,16 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use serde_json::{Value, json};
-use tandem_episodes::{
-    EpisodeError, RESULT_FILE, Recording,
-    replay::{RecordedEpisode, short_film},
-};
+use tandem_episodes::{EpisodeError, RESULT_FILE, Recording, replay::short_film};
 
 use super::{Wanted, blocking};
 use crate::{
     hosting::HostingError,
-    http::{app::AppState, problem::ApiError},
+    http::{
+        app::AppState,
+        problem::ApiError,
+        watching::{RECORDING, no_recording, unreadable},
+    },
 };
 
 /// How many are listed, the newest first.
@@ -30,8 +30,6 @@ const MOST_LISTED: usize = 200;
 /// How deep below the runs folder episodes lie: those of an evaluation are in a folder of its folder.
 const DEPTH: usize = 4;
 
-const RECORDING: &str = "episode.mcap";
-
 /// What of an episode's folder may be fetched, and what it is.
 const FILES: [(&str, &str); 4] = [
     (RECORDING, "application/octet-stream"),
@@ -39,49 +37,6 @@ const FILES: [(&str, &str); 4] = [
     ("strip.png", "image/png"),
     ("report.html", "text/html; charset=utf-8"),
 ];
-
-/// The recording that was looked at last: a page asks for many pictures of one.
-#[derive(Clone, Default)]
-pub struct LastOpened(Arc<Mutex<Option<OpenedRecording>>>);
-
-/// A recording in memory, and which file it was read from when.
-struct OpenedRecording {
-    path: PathBuf,
-    changed: SystemTime,
-    episode: Arc<RecordedEpisode>,
-}
-
-impl std::fmt::Debug for LastOpened {
-    fn fmt(&self, text: &mut std::fmt::Formatter) -> std::fmt::Result {
-        text.write_str("LastOpened(..)")
-    }
-}
-
-impl LastOpened {
-    fn open(&self, folder: &Path) -> Result<Arc<RecordedEpisode>, ApiError> {
-        let path = folder.join(RECORDING);
-        let changed = fs::metadata(&path).and_then(|file| file.modified());
-        let changed = changed.map_err(|_| no_recording(folder))?;
-        let mut last = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(opened) = last.as_ref().filter(|opened| opened.path == path && opened.changed == changed)
-        {
-            return Ok(opened.episode.clone());
-        }
-        // One at a time: two pages that ask for the same wait for one reading.
-        let episode = RecordedEpisode::read(&path).map(Arc::new).map_err(|error| unreadable(&error))?;
-        *last = Some(OpenedRecording { path, changed, episode: episode.clone() });
-        Ok(episode)
-    }
-}
-
-fn no_recording(folder: &Path) -> ApiError {
-    ApiError::NoRun { run: folder.file_name().unwrap_or_default().to_string_lossy().into_owned() }
-}
-
-fn unreadable(error: &dyn std::error::Error) -> ApiError {
-    let status = axum::http::StatusCode::UNPROCESSABLE_ENTITY;
-    ApiError::Protocol { status, detail: error.to_string() }
-}
 
 /// The finished episodes below `runs`, the newest first, without those that are `held`.
 pub fn list(runs: &Path, held: &[String]) -> Vec<Value> {

@@ -17,11 +17,8 @@ use super::{
 };
 use crate::{
     hosting::{EpisodeThread, HostingError, LiveWatch},
-    http::{app::AppState, problem::ApiError},
+    http::{app::AppState, problem::ApiError, watching::MOST_WATCHERS},
 };
-
-/// How many pages may watch at once.
-pub const MOST_WATCHERS: usize = 64;
 
 /// What comes first in the message of a picture; that of a step begins with 1.
 const PICTURE_KIND: f32 = 2.0;

@@ -2,7 +2,6 @@
 //! are in this binary, made of `gateway/web`.
 
 mod finished;
-mod key;
 mod live;
 mod socket;
 
@@ -17,12 +16,8 @@ use axum::{
 use serde::Deserialize;
 use serde_json::json;
 
-use super::{app::AppState, problem::ApiError};
+use super::{app::AppState, problem::ApiError, watching::Watcher};
 use crate::hosting::Caller;
-
-pub use finished::LastOpened;
-pub use key::{WatchKey, Watcher};
-pub use live::MOST_WATCHERS;
 
 const SHELL: &str = include_str!("../../../web/page.html");
 const STYLE: &str = include_str!("../../../web/style.css");

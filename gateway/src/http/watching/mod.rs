@@ -1,0 +1,10 @@
+//! What a server remembers for those who watch: who may, how many do, and the recording that was looked at last.
+
+mod key;
+mod last_opened;
+
+pub use key::{WatchKey, Watcher};
+pub use last_opened::{LastOpened, RECORDING, no_recording, unreadable};
+
+/// How many pages may watch at once.
+pub const MOST_WATCHERS: usize = 64;
