@@ -81,6 +81,11 @@ fn check_command(words: &[&str]) -> Result<(), String> {
             let folder = package.split('[').next().unwrap_or_default();
             expect_file(&format!("{folder}/pyproject.toml"))
         }
+        // The package's own command line.
+        ["python" | "python3", "-m", "tandem", args @ ..] => match args.is_empty() {
+            true => Ok(()),
+            false => check_tandem(args),
+        },
         ["python" | "python3", file, ..] => expect_file(file),
         [program, ..] if OTHERS.contains(program) => Ok(()),
         [program, ..] => Err(format!("nobody knows the program {program}; see OTHERS in command_lines.rs")),
