@@ -1,11 +1,16 @@
 //! Numbers of a robot as rows of an array, and the names of their columns.
 
 use numpy::ndarray::{Dim, Dimension, IntoDimension};
-use numpy::{Element, PyArray, PyArray1, PyArrayMethods};
+use numpy::{Element, PyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use tandem_episodes::joint_names;
 use tandem_sim::{Pose, RobotCommand, RobotStep, UPPER, Vector};
 use tandem_tools_spec::{Assistance, BASE_COLUMNS};
+
+/// A picture's colours: height by width by red, green, blue.
+pub type Colours<'py> = Bound<'py, PyArray3<u8>>;
+/// Distances along the optical axis: height by width, in metres.
+pub type Depths<'py> = Bound<'py, PyArray2<f32>>;
 
 /// Components of a pose.
 const POSE: [&str; 7] = ["x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"];

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use numpy::{PyArray2, PyArray3, PyReadonlyArray3};
+use numpy::{PyArray2, PyReadonlyArray3};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -18,7 +18,7 @@ use tandem_tools_spec::{
     ResultReply, SendJointChunk, Tool as _, ToolReply, parse_args,
 };
 
-use crate::arrays::{shaped, state_names, state_row};
+use crate::arrays::{Colours, Depths, shaped, state_names, state_row};
 use crate::refusal::{failed, refused};
 
 /// An episode from its start to its result. It may be used from any thread; calls of several come one after another.
@@ -47,10 +47,8 @@ pub struct Snapshot {
 /// What a step came to: steps executed, why it stopped, simulated time, numbers of phases, who has fallen, and whether that was the end.
 type Stepped = (u32, String, f64, Vec<String>, Vec<bool>, bool);
 
-/// Height by width by red, green, blue.
-type Colours<'py> = Bound<'py, PyArray3<u8>>;
-/// Height by width, in metres.
-type Depths<'py> = Bound<'py, PyArray2<f32>>;
+/// States and calibrations as JSON, and each robot's view.
+type Seen<'py> = (String, Vec<(Colours<'py>, Option<Depths<'py>>)>);
 
 impl NativeEpisode {
     /// An episode that has begun.
@@ -152,12 +150,7 @@ impl NativeEpisode {
 
     /// Looks. Returns states and calibrations as JSON, and for each robot colours and, where it is asked for, depth.
     #[pyo3(signature = (arguments, depth))]
-    fn observe<'py>(
-        &self,
-        py: Python<'py>,
-        arguments: &str,
-        depth: bool,
-    ) -> PyResult<(String, Vec<(Colours<'py>, Option<Depths<'py>>)>)> {
+    fn observe<'py>(&self, py: Python<'py>, arguments: &str, depth: bool) -> PyResult<Seen<'py>> {
         let formats =
             Formats { images: Some(ImageFormat::Rgb), depth: depth.then_some(DepthFormat::Float16) };
         let seen = self.work(py, |session| {

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
-use numpy::{PyArray2, PyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::json;
@@ -12,7 +11,7 @@ use tandem_episodes::replay::{EpisodeCamera, EpisodeRenderer, PictureSize};
 use tandem_sim::{JOINTS, Side, Step};
 use tandem_tools_spec::ACTION_ROW_LEN;
 
-use crate::arrays::{action_row, pose_row, shaped, vector_row};
+use crate::arrays::{Colours, Depths, action_row, pose_row, shaped, vector_row};
 use crate::refusal::{failed, refused};
 
 /// A recording in memory.
@@ -89,7 +88,7 @@ impl NativeRecording {
         camera: &str,
         step: usize,
         size: Option<(u32, u32)>,
-    ) -> PyResult<(Bound<'py, PyArray3<u8>>, Bound<'py, PyArray2<f32>>)> {
+    ) -> PyResult<(Colours<'py>, Depths<'py>)> {
         let spec = &self.recording.spec;
         let camera = EpisodeCamera::find(camera, spec.task).map_err(|text| failed(py, &text))?;
         let Some(step) = self.steps.get(step) else {
