@@ -19,7 +19,6 @@ pub fn isometry_from_sim(pose: &Pose) -> Isometry3<f64> {
     isometry([t.x, t.y, t.z].map(f64::from), [r.w, r.x, r.y, r.z].map(f64::from))
 }
 
-/// Six decimals: a micrometre. More would only cost a language model tokens.
 pub fn isometry_to_sim(pose: &Isometry3<f64>) -> Pose {
     let q = pose.rotation.as_ref();
     Pose::from_parts(
@@ -28,17 +27,32 @@ pub fn isometry_to_sim(pose: &Isometry3<f64>) -> Pose {
     )
 }
 
+/// Six decimals, for programs.
 pub fn wire_pose(pose: &Isometry3<f64>) -> wire::Pose {
+    pose_to(6, pose)
+}
+
+/// Millimetres and thousandths, for language models: no hand is steered more finely, and each further digit costs them tokens.
+pub fn coarse_pose(pose: &Isometry3<f64>) -> wire::Pose {
+    pose_to(3, pose)
+}
+
+fn pose_to(decimals: i32, pose: &Isometry3<f64>) -> wire::Pose {
     let (t, r) = (pose.translation, pose.rotation);
     wire::Pose {
-        position_m: [t.x, t.y, t.z].map(rounded),
-        quaternion_wxyz: [r.w, r.i, r.j, r.k].map(rounded),
+        position_m: [t.x, t.y, t.z].map(|part_m| rounded_to(decimals, part_m)),
+        quaternion_wxyz: [r.w, r.i, r.j, r.k].map(|part| rounded_to(decimals, part)),
     }
+}
+
+/// Millimetres and milliradians.
+pub fn coarse(value: f64) -> f64 {
+    rounded_to(3, value)
 }
 
 /// Zero has no sign here: `-0.0` would look like a finding.
 pub fn rounded(value: f64) -> f64 {
-    (value * 1e6).round() / 1e6 + 0.0
+    rounded_to(6, value)
 }
 
 /// Fewer decimals, for what is estimated or measured coarsely.

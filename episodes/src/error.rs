@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use tandem_tools_spec::{EndReason, Refusal, RefusalClass, SpecError};
+use tandem_tools_spec::{EndReason, Refusal, RefusalClass, ResultReply, SpecError, SurfaceQuery};
 
 /// The text says what would work, because its reader is often a language model.
 #[derive(Debug, thiserror::Error)]
@@ -27,8 +27,14 @@ pub enum EpisodeError {
     TooManySteps { asked: u32, most: u32, protocol: &'static str },
     #[error("pixel [{u}, {v}] is outside the image; u goes from 0 to {}, v from 0 to {}", .width - 1, .height - 1)]
     PixelOutside { u: i64, v: i64, width: u32, height: u32 },
+    #[error("{}; look with observe, and give a pixel that is on it", no_surface(query))]
+    NoSurface { query: SurfaceQuery },
     #[error("the episode has ended ({}); observe, get_robot_state, get_status and finish still answer; start_episode begins another", reason_text(*.reason))]
-    Ended { reason: EndReason },
+    Ended {
+        reason: EndReason,
+        /// As the policy is told it.
+        result: Box<ResultReply>,
+    },
     #[error(transparent)]
     Spec(#[from] SpecError),
     #[error("the world cannot be built: {0}")]
@@ -67,6 +73,7 @@ impl EpisodeError {
             EpisodeError::PixelOutside { .. } => {
                 Refusal::new("pixel-outside", "Pixel outside the image", Invalid)
             }
+            EpisodeError::NoSurface { .. } => Refusal::new("no-surface", "No such surface", Invalid),
             EpisodeError::Ended { .. } => Refusal::new("ended", "Episode ended", Conflict),
             EpisodeError::Spec(error) => error.refusal(),
             EpisodeError::Diverged { .. } => Refusal::new("diverged", "Physics diverged", Conflict),
@@ -154,6 +161,15 @@ pub enum CheckpointError {
     OtherEpisode { made_of: String, wanted: String },
     #[error("the progress in a checkpoint cannot be read or written: {0}")]
     Progress(#[from] postcard::Error),
+}
+
+fn no_surface(query: &SurfaceQuery) -> String {
+    match (query.color, query.pixel) {
+        (Some(color), _) => {
+            format!("nothing of any size in the picture is {}", format!("{color:?}").to_lowercase())
+        }
+        (None, pixel) => format!("nothing is seen at pixel {:?}", pixel.unwrap_or_default()),
+    }
 }
 
 fn reason_text(reason: EndReason) -> &'static str {

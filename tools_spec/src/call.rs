@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value, json};
 
 use crate::error::SpecError;
-use crate::list::{ActCall, LookCall, ToolCall, operator_tool_specs};
+use crate::list::{ActCall, EPISODE_TOOLS, LookCall, ToolCall, every_tool_spec};
 use crate::parts::{Driving, Formats, Wording};
 use crate::schema::{ToolSpec, body_schema, plain_schema};
 use crate::strict_value::StrictValue;
 use crate::tool::{Tool, parse_args};
-use crate::tools::{Observation, Observe, StartEpisode};
+use crate::tools::{Expectation, Observation, Observe, PlannedCommand, SendPlan, StartEpisode};
 
 /// A call on an episode. It serialises to what [`Call::parse`] reads.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -28,6 +28,25 @@ pub struct Call {
     /// What to look at once a command is done.
     #[serde(rename = "observe", skip_serializing_if = "Option::is_none")]
     pub then: Option<Look>,
+    /// Whether the reply is to leave out what is as it should be. Observations have a word of their own for that.
+    #[serde(skip_serializing_if = "is_false")]
+    pub short: bool,
+}
+
+fn is_false(flag: &bool) -> bool {
+    !flag
+}
+
+/// What goes with every tool that has no such field of its own.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct WithAll {
+    /// As its schemas describe it.
+    short: Option<bool>,
+}
+
+impl WithAll {
+    const FIELDS: [&str; 1] = ["short"];
 }
 
 /// An observation, and how its pictures are to come.
@@ -60,6 +79,14 @@ impl WithCommand {
 impl Call {
     /// Reads the call of tool `name` with arguments `args` and whatever stands beside them.
     pub fn parse(name: &str, mut args: Value) -> Result<Call, SpecError> {
+        let short = match EPISODE_TOOLS.iter().find(|tool| **tool == name && name != Observe::NAME) {
+            Some(tool) => beside::<WithAll>(tool, &mut args, &WithAll::FIELDS)?.short.unwrap_or(false),
+            None => false,
+        };
+        Ok(Call { short, ..Call::parse_in_full(name, args)? })
+    }
+
+    fn parse_in_full(name: &str, mut args: Value) -> Result<Call, SpecError> {
         if let Some(tool) = ActCall::TOOLS.iter().find(|tool| **tool == name) {
             let beside: WithCommand = beside(tool, &mut args, &WithCommand::FIELDS)?;
             let call = ToolCall::parse(name, args)?;
@@ -93,7 +120,11 @@ impl Call {
         let then = self.then.as_mut().map(|look| &mut look.observe);
         let own = match &mut self.tool {
             ToolCall::Look(LookCall::Observe(observe)) => Some(observe),
-            ToolCall::Look(_) | ToolCall::Act(_) | ToolCall::Manage(_) | ToolCall::Talk(_) => None,
+            ToolCall::Look(_)
+            | ToolCall::Act(_)
+            | ToolCall::Plan(_)
+            | ToolCall::Manage(_)
+            | ToolCall::Talk(_) => None,
         };
         for observe in own.into_iter().chain(then) {
             observe.robots.get_or_insert_with(|| vec![robot.into()]);
@@ -113,7 +144,7 @@ impl Call {
 
 impl From<ToolCall> for Call {
     fn from(tool: ToolCall) -> Call {
-        Call { tool, formats: Formats::default(), expected_step: None, then: None }
+        Call { tool, formats: Formats::default(), expected_step: None, then: None, short: false }
     }
 }
 
@@ -133,6 +164,24 @@ impl Look {
     /// The call alone.
     fn call(&self) -> ToolCall {
         self.observe.clone().into()
+    }
+}
+
+impl SendPlan {
+    /// The commands as calls.
+    pub fn calls(&self) -> Result<Vec<(ActCall, Expectation)>, SpecError> {
+        let call = |(index, command): (usize, &PlannedCommand)| {
+            let refused = |reason: String| SpecError::Invalid {
+                tool: SendPlan::NAME,
+                reason: format!("commands[{index}]: {reason}"),
+            };
+            match ToolCall::parse(&command.tool, command.arguments.clone().into()) {
+                Ok(ToolCall::Act(call)) => Ok((call, command.expects.clone().unwrap_or_default())),
+                Ok(other) => Err(refused(format!("{} is no command", other.name()))),
+                Err(error) => Err(refused(error.to_string())),
+            }
+        };
+        self.commands.iter().enumerate().map(call).collect()
     }
 }
 
@@ -163,7 +212,7 @@ fn beside<T: DeserializeOwned + Default>(
 /// Every tool, with what programs may send beside its arguments in the schema of its body.
 pub fn specs_for_programs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
     let wording = wording.into();
-    let mut specs = operator_tool_specs(wording);
+    let mut specs = every_tool_spec(wording);
     for spec in &mut specs {
         match spec.name {
             StartEpisode::NAME => {
@@ -238,12 +287,28 @@ mod tests {
         assert_eq!(json!(Call::from(ToolCall::from(GetStatus {}))), json!({}));
     }
 
+    /// A short reply is asked of every tool alike, and what is written of that is read back.
+    #[test]
+    fn every_tool_takes_short() {
+        for call in ToolCall::examples() {
+            let mut args = json!(call);
+            args["short"] = true.into();
+            let read = Call::parse(call.name(), args).unwrap();
+            assert!(read.short != (call.name() == Observe::NAME), "{read:?}");
+            assert_eq!(Call::parse(read.name(), json!(read)), Ok(read));
+            let mut args = json!(call);
+            args["short"] = "yes".into();
+            assert!(Call::parse(call.name(), args).unwrap_err().to_string().contains("short"));
+        }
+    }
+
     #[test]
     fn a_call_knows_its_robots_and_its_steps() {
         let robots = |call: &Call| call.robots().join(" ");
         for (name, example) in ToolCall::examples().into_iter().map(|call| (call.name(), Call::from(call))) {
             assert_eq!(example.steps() > 0, ActCall::TOOLS.contains(&name), "{name}");
-            let named = if ["wait", "get_status", "finish", "say"].contains(&name) { "" } else { "A" };
+            let named =
+                if ["wait", "send_plan", "get_status", "finish", "say"].contains(&name) { "" } else { "A" };
             assert_eq!(robots(&example), named, "{name}");
         }
         let both = vec![WristMove::hold("B"), WristMove::hold("A")];

@@ -23,15 +23,16 @@ mod tools;
 pub use call::{Call, Look, parse_start};
 pub use error::SpecError;
 pub use list::{
-    ActCall, EPISODE_TOOLS, LookCall, LookReply, ManageCall, ManageReply, TalkCall, TalkReply, ToolCall,
-    ToolReply, operator_tool_specs, tool_specs, typed_tools,
+    ActCall, EPISODE_TOOLS, LookCall, LookReply, ManageCall, ManageReply, PlanCall, TalkCall, TalkReply,
+    ToolCall, ToolReply, operator_tool_specs, tool_specs, typed_tools,
 };
 pub use listing::{EpisodeEntry, EpisodeList};
 pub use parts::{
-    Assistance, BASE_COLUMNS, BaseCommand, BaseLimits, BaseMotion, Budget, Bytes, CameraArrays, CommandReply,
-    DepthFormat, Disclosure, Driving, Effort, ExtraInformation, FingerReport, Formats, HandReport, HandState,
-    Heard, Hints, ImageFormat, JointValues, OperatorToken, Operators, Partner, PartnerDid, PhaseReached,
-    PixelRegion, Png, Pose, Protocol, Range, RobotFallen, RobotReport, StopReason, Wording,
+    Assistance, BASE_COLUMNS, BaseCommand, BaseLimits, BaseMotion, BaseReport, BaseState, Budget, Bytes,
+    CameraArrays, CommandReply, DepthFormat, Disclosure, Driving, Effort, ExtraInformation, FingerReport,
+    Formats, Grip, HandReport, HandState, Heard, Hints, ImageFormat, JointValues, OperatorToken, Operators,
+    Partner, PartnerDid, PhaseReached, PixelRegion, Png, Pose, PoseFrame, Protocol, Range, RobotFallen,
+    RobotReport, StopReason, Touch, Wording,
 };
 pub use refusal::{ProblemBody, Refusal, RefusalClass};
 pub use schema::{EpisodeToolSpec, Format, ToolSpec, TypedTool, TypedTools};
@@ -40,9 +41,11 @@ pub use tools::*;
 
 /// The REST interface of `version` as OpenAPI 3.1, from the same types that read and write it, for a caller who may or may not `talk`.
 pub fn openapi(version: &str, wording: impl Into<Wording>, talk: bool) -> serde_json::Value {
-    let specs: Vec<ToolSpec> = call::specs_for_programs(wording.into())
+    let wording = wording.into();
+    let specs: Vec<ToolSpec> = call::specs_for_programs(wording)
         .into_iter()
         .filter(|spec| talk || !spec.for_operators)
+        .filter(|spec| !spec.full_only || wording.assistance == Assistance::Full)
         .collect();
     schema::openapi(version, &specs)
 }
@@ -56,7 +59,12 @@ pub fn episode_tool_specs(
     most_steps: u32,
     talk: bool,
 ) -> Vec<EpisodeToolSpec> {
-    let specs = call::specs_for_programs(wording.into()).into_iter();
-    let offered = specs.filter(|spec| spec.on_episode && (talk || !spec.for_operators));
+    let wording = wording.into();
+    let specs = call::specs_for_programs(wording).into_iter();
+    let told = |spec: &ToolSpec| !spec.full_only || wording.assistance == Assistance::Full;
+    // Where robots have operators, plans of one would hold up the others.
+    let whose =
+        |spec: &ToolSpec| if talk { !PlanCall::TOOLS.contains(&spec.name) } else { !spec.for_operators };
+    let offered = specs.filter(|spec| spec.on_episode && told(spec) && whose(spec));
     offered.map(|spec| spec.of_episode(id, robots, most_steps)).collect()
 }

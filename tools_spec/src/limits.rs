@@ -56,9 +56,9 @@ pub fn pixel_range() -> Value {
     json!(PICTURE_PX.map(|px| json!({ "type": "integer", "minimum": 0, "maximum": px - 1 })))
 }
 
-/// `oneOf` of an object that has one of two fields, each given with the type that it has where it is not null.
-pub fn either(one: &str, kind: &str, other: &str, other_kind: &str) -> Value {
-    json!([has(one, kind), has(other, other_kind)])
+/// `oneOf` of an object that has one of these fields, each given with the type that it has where it is not null.
+pub fn one_of(fields: &[(&str, &str)]) -> Value {
+    fields.iter().map(|(field, kind)| has(field, kind)).collect()
 }
 
 /// `allOf` of an object in which at least one of these fields is given, each a list.

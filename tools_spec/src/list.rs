@@ -4,7 +4,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::error::SpecError;
-use crate::parts::{CommandReply, Wording};
+use crate::parts::{Assistance, CommandReply, Wording};
 use crate::schema::{ToolSpec, TypedTools, TypedToolsCollector};
 use crate::tool::{Tool, parse_args};
 use crate::tools::*;
@@ -37,12 +37,19 @@ macro_rules! tools {
     ) => {
         /// The tools of every policy, in the order it meets them, in the texts that it reads.
         pub fn tool_specs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
-            operator_tool_specs(wording).into_iter().filter(|spec| !spec.for_operators).collect()
+            let wording = wording.into();
+            let specs = every_tool_spec(wording).into_iter().filter(|spec| !spec.for_operators);
+            specs.filter(|spec| !spec.full_only || wording.assistance == Assistance::Full).collect()
         }
 
-        /// The tools of an operator who may talk to others: every tool.
+        /// The tools of an operator who may talk to others: every tool but plans, which would hold up the others.
         pub fn operator_tool_specs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
-            let wording = wording.into();
+            let specs = every_tool_spec(wording.into()).into_iter();
+            specs.filter(|spec| !is_plan(spec.name)).collect()
+        }
+
+        /// Every tool, whoever is offered it.
+        pub(crate) fn every_tool_spec(wording: Wording) -> Vec<ToolSpec> {
             vec![
                 $( ToolSpec::without_episode::<$free>(wording), )*
                 $( $( ToolSpec::on_episode::<$tool>(wording, $call::FOR_OPERATORS), )* )*
@@ -219,6 +226,12 @@ tools! {
         Wait,
     }
 
+    /// Several commands by one call.
+    Plan(PlanCall) -> all PlanReply {
+        SendPlan,
+        WalkTo,
+    }
+
     /// Concerns the episode as a whole, and is answered after its end too.
     Manage(ManageCall) -> each ManageReply {
         GetStatus,
@@ -229,6 +242,11 @@ tools! {
     Talk(TalkCall) -> each TalkReply for operators {
         Say,
     }
+}
+
+/// Whether a tool carries out several commands.
+fn is_plan(name: &str) -> bool {
+    PlanCall::TOOLS.contains(&name)
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 /// What an error is to its caller. Each error enum gives one for every variant; its text is the error's own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,4 +77,7 @@ pub struct ProblemBody {
     /// Why the recording of the episode is not complete; left out where it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording_failed: Option<String>,
+    /// What the episode came to, as finish tells it, where it is refused because it has ended; left out otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub result: Option<Value>,
 }

@@ -35,6 +35,11 @@ pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
     /// Whether calling it again with the same arguments changes nothing more.
     const IDEMPOTENT: bool = Self::READ_ONLY;
 
+    /// Whether its schema can be strict: every field of it said, and no others.
+    const STRICT: bool = true;
+    /// Whether only policies that are told all are offered it.
+    const FULL_ONLY: bool = false;
+
     /// Arguments that work, shown to callers whose own did not.
     fn example() -> Self;
 

@@ -11,6 +11,7 @@ use crate::protocol::Rules;
 
 /// What is called on an episode.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "one call at a time is on its way")]
 pub enum Called {
     /// One call, by the policy of all robots or an operator of one.
     One(Call),

@@ -5,17 +5,17 @@ use tandem_sim::Sides;
 use tandem_tools_spec::{CheckReach, HandReach, ReachReply};
 
 use super::motion::Motion;
-use super::move_wrists::wrist_target;
+use super::move_wrists::wrist_targets;
 use super::upper_body::REACH_TOLERANCE;
-use crate::convert::rounded;
+use crate::convert::coarse;
 
 /// The reply to `check_reach`.
 pub fn check_reach(args: &CheckReach, motion: &Motion) -> ReachReply {
-    let present = motion.targets();
-    let targets = Sides {
-        left: wrist_target(args.left_position_m, args.left_quaternion_wxyz, &present.left),
-        right: wrist_target(args.right_position_m, args.right_quaternion_wxyz, &present.right),
+    let halves = Sides {
+        left: (args.left_position_m, args.left_quaternion_wxyz),
+        right: (args.right_position_m, args.right_quaternion_wxyz),
     };
+    let targets = wrist_targets(halves, args.frame.unwrap_or_default(), motion);
     let (errors, joints_at_limit) = motion.reach(&targets);
     let hands = errors.map(|error| error.map(hand_reach));
     ReachReply {
@@ -31,7 +31,7 @@ fn hand_reach(error: FrameError) -> HandReach {
     HandReach {
         reachable: error.position_m <= REACH_TOLERANCE.position_m
             && error.orientation_rad <= REACH_TOLERANCE.orientation_rad,
-        position_error_m: rounded(error.position_m),
-        orientation_error_rad: rounded(error.orientation_rad),
+        position_error_m: coarse(error.position_m),
+        orientation_error_rad: coarse(error.orientation_rad),
     }
 }

@@ -5,6 +5,7 @@
 mod called;
 mod check_reach;
 mod columns;
+mod footing;
 mod motion;
 mod move_wrists;
 mod report;
@@ -21,7 +22,7 @@ pub use report::{report, wrist_state};
 pub use upper_body::{UpperBody, upper_body};
 
 use tandem_sim::RobotCommand;
-use tandem_tools_spec::{ActCall, JointChunk, WalkMove, WristMove};
+use tandem_tools_spec::{ActCall, JointChunk, PoseFrame, WalkMove, WristMove};
 
 use crate::EpisodeError;
 use crate::protocol::Rules;
@@ -53,6 +54,16 @@ pub enum RobotAction {
     Walk(WalkMove),
     SendJointChunk(JointChunk),
     Wait,
+}
+
+impl RobotAction {
+    /// The frame that it gives wrist poses in.
+    pub fn frame(&self) -> PoseFrame {
+        match self {
+            RobotAction::MoveWrists(entry) => entry.frame.unwrap_or_default(),
+            RobotAction::Walk(_) | RobotAction::SendJointChunk(_) | RobotAction::Wait => PoseFrame::Pelvis,
+        }
+    }
 }
 
 /// What one robot does, control step by control step.
@@ -109,7 +120,7 @@ impl Trajectory {
         match self {
             Trajectory::Hold => wait::hold(motion),
             Trajectory::Wrists(wrists) => wrists.advance(step, motion),
-            Trajectory::Walk(walk) => walk.advance(motion),
+            Trajectory::Walk(walk) => walk.advance(step, motion),
             Trajectory::Joints(joints) => joints.advance(step, motion),
         }
         motion.command()

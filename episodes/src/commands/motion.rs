@@ -6,11 +6,15 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use tandem_ik::{Configuration, FrameError, Outcome, SolveOptions, Solver, frame_errors};
 use tandem_sim::{
-    BaseCommand, BaseLimits, CONTROL_HZ, HAND_JOINTS, RobotCommand, RobotModel, Side, Sides, UPPER_JOINTS,
+    BaseCommand, BaseLimits, CONTROL_HZ, HAND_JOINTS, RobotCommand, RobotModel, RobotSensed, Side, Sides,
+    UPPER_JOINTS,
 };
+use tandem_tools_spec::PoseFrame;
 
 use super::columns;
+use super::footing::Footing;
 use super::upper_body::{REACH_TOLERANCE, UpperBody};
+use crate::convert::isometry_from_sim;
 
 /// Part of the remaining error that one control step removes: smooth, and a lag of two steps.
 const GAIN: f64 = 0.5;
@@ -21,6 +25,15 @@ const MOST_YIELD_M: f64 = 0.06;
 const MOST_YIELD_RAD: f64 = 0.15;
 const LEAK_1_S: f64 = 0.1;
 const RETURN_1_S: f64 = 3.0;
+/// Of what is missing to a wrist's target, in metres, a radian counts for this.
+const M_PER_RAD: f64 = 0.1;
+/// Part of the mean that one control step makes up.
+const LATELY_PART: f64 = 0.1;
+/// A wrist comes nearer that is nearer than it was lately by this much, or by this part of what is missing; less is swaying.
+const NEARER_M: f64 = 0.003;
+const NEARER_PART: f64 = 0.15;
+/// A hand that has given way by less is where it was told to be: metres or radians.
+const LEAST_TOLD: f64 = 0.003;
 
 /// What of a robot stays the same throughout an episode.
 #[derive(Clone)]
@@ -57,6 +70,17 @@ pub struct MotionState {
     yielded_rad: f64,
     /// What the solver remembers of steps that did not help; see [`Solver::caution`].
     caution: f64,
+    /// How far each wrist is from its target, and how far it was a moment ago; `None` before it has been seen under its present aim.
+    pub(super) approaches: Sides<Option<Approach>>,
+    pub(super) footing: Footing,
+}
+
+/// How a wrist nears its target: metres, of which a radian of its turning counts as a tenth.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Approach {
+    missing_m: f64,
+    /// The mean of what it was, over the last fifth of a second or so.
+    lately_m: f64,
 }
 
 /// How the pair of hands gives way to what pulls it: the force under which it goes at 1 m/s, or the moment under which it turns at
@@ -101,6 +125,8 @@ impl Motion {
             yielded_m: [0.0; 2],
             yielded_rad: 0.0,
             caution: 1.0,
+            approaches: Sides::both(None),
+            footing: Footing::new(world_from_pelvis),
         };
         Motion { robot, solver: body.solver(), body: body.clone(), state }
     }
@@ -116,8 +142,34 @@ impl Motion {
         self.state.turning_n_m = 0.5 * apart_m.cross(&(hands_n.left - hands_n.right)).z;
     }
 
+    /// Takes in what the robot senses after a control step, for what is told of it.
+    pub fn feel(&mut self, sensed: &RobotSensed) {
+        let asked = self.asked_wrists();
+        let before = &self.state.approaches;
+        self.state.approaches = Sides::from_fn(|side| {
+            let off = isometry_from_sim(&sensed.pelvis_from_wrist[side]).inv_mul(&asked[side]?);
+            let missing_m = off.translation.vector.norm() + M_PER_RAD * off.rotation.angle();
+            let lately_m = before[side].map_or(missing_m, |before| before.lately_m);
+            Some(Approach { missing_m, lately_m: lately_m + LATELY_PART * (missing_m - lately_m) })
+        });
+        let MotionState { footing, base, world_from_pelvis, .. } = &mut self.state;
+        footing.feel(sensed, base, world_from_pelvis);
+    }
+
+    /// From a frame in which poses may be given to the pelvis.
+    pub fn pelvis_from(&self, frame: PoseFrame) -> Isometry3<f64> {
+        let pelvis = &self.state.world_from_pelvis;
+        match frame {
+            PoseFrame::Pelvis => Isometry3::identity(),
+            PoseFrame::Level => {
+                Isometry3::from_parts(Translation3::identity(), pelvis.rotation.inverse() * self.heading())
+            }
+            PoseFrame::Start => self.state.footing.pelvis_from_start,
+        }
+    }
+
     /// Level, x the way the robot faces.
-    fn heading(&self) -> UnitQuaternion<f64> {
+    pub(super) fn heading(&self) -> UnitQuaternion<f64> {
         let ahead = self.state.world_from_pelvis.rotation * Vector3::x();
         UnitQuaternion::from_axis_angle(&Vector3::z_axis(), ahead.y.atan2(ahead.x))
     }
@@ -216,6 +268,27 @@ impl Motion {
         Sides::from_fn(|side| asked[side].unwrap_or(commanded[side]))
     }
 
+    /// Where the wrists that have targets are to be, pelvis frame.
+    fn asked_wrists(&self) -> Sides<Option<Isometry3<f64>>> {
+        self.in_pelvis(&self.state.aims)
+    }
+
+    /// How far hands have given way, pelvis frame; `None` where they have not.
+    pub(super) fn given_way_m(&self, side: Side) -> Option<Vector3<f64>> {
+        let MotionState { yielded_m, yielded_rad, aims, .. } = &self.state;
+        let [ahead_m, left_m] = *yielded_m;
+        let most = ahead_m.abs().max(left_m.abs()).max(yielded_rad.abs());
+        let asked = aims[side].in_pelvis(&self.state.world_from_pelvis).filter(|_| most > LEAST_TOLD)?;
+        let given_way = self.asked_wrists()[side]?;
+        Some(given_way.translation.vector - asked.translation.vector)
+    }
+
+    /// Whether a wrist comes nearer to its target; `None` where that cannot be told yet.
+    pub(super) fn comes_nearer(&self, side: Side) -> Option<bool> {
+        let Approach { missing_m, lately_m } = self.state.approaches[side]?;
+        (missing_m != lately_m).then_some(lately_m - missing_m > NEARER_M.max(NEARER_PART * missing_m))
+    }
+
     /// The base stands at the height that it was last told.
     pub(super) fn stand(&mut self) {
         let pelvis_height_m = self.state.base.pelvis_height_m;
@@ -229,6 +302,7 @@ impl Motion {
     /// What the wrists are to do from now on.
     pub(super) fn aim(&mut self, aims: Sides<Aim>) {
         self.state.aims = aims;
+        self.state.approaches = Sides::both(None);
     }
 
     /// Both arms keep their joints until they are told otherwise.
@@ -247,6 +321,10 @@ impl Motion {
     pub(super) fn set_joints(&mut self, upper_rad: [f64; UPPER_JOINTS]) {
         self.state.upper_rad = upper_rad;
         self.state.aims = Sides::both(Aim::Joints);
+    }
+
+    pub(super) fn turn_waist(&mut self, yaw_rad: f64) {
+        self.state.upper_rad[columns::waist().start] = yaw_rad;
     }
 
     pub(super) fn set_fingers(&mut self, side: Side, fingers_rad: &[f64; HAND_JOINTS]) {

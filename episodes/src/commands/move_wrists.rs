@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Translation3};
 use tandem_sim::{BaseCommand, HAND_JOINTS, Side, Sides, UPPER_JOINTS};
-use tandem_tools_spec::WristMove;
+use tandem_tools_spec::{PoseFrame, WristMove};
 
 use super::columns::{self, Clamped};
 use super::motion::{Aim, Compliance, Motion};
@@ -82,20 +82,43 @@ impl WristTrajectory {
 
 /// Where the wrists are to go.
 fn aims(entry: &WristMove, motion: &Motion) -> Sides<Aim> {
-    let present = motion.targets();
-    let targets = Sides {
-        left: wrist_target(entry.left_position_m, entry.left_quaternion_wxyz, &present.left),
-        right: wrist_target(entry.right_position_m, entry.right_quaternion_wxyz, &present.right),
+    let halves = Sides {
+        left: (entry.left_position_m, entry.left_quaternion_wxyz),
+        right: (entry.right_position_m, entry.right_quaternion_wxyz),
     };
-    targets.map(|target| match (target, entry.carried.unwrap_or(false)) {
-        (None, _) => Aim::Joints,
-        (Some(pelvis_from_wrist), true) => Aim::Carried(pelvis_from_wrist),
-        (Some(pelvis_from_wrist), false) => Aim::World(motion.world_from_pelvis() * pelvis_from_wrist),
+    wrist_targets(halves, entry.frame.unwrap_or_default(), motion).map(|target| {
+        match (target, entry.carried.unwrap_or(false)) {
+            (None, _) => Aim::Joints,
+            (Some(pelvis_from_wrist), true) => Aim::Carried(pelvis_from_wrist),
+            (Some(pelvis_from_wrist), false) => Aim::World(motion.world_from_pelvis() * pelvis_from_wrist),
+        }
+    })
+}
+
+/// Position and orientation of a wrist, each of which may be left out.
+type Halves = (Option<[f64; 3]>, Option<[f64; 4]>);
+
+/// Targets of the wrists in the pelvis frame that are given in `frame`.
+pub fn wrist_targets(
+    halves: Sides<Halves>,
+    frame: PoseFrame,
+    motion: &Motion,
+) -> Sides<Option<Isometry3<f64>>> {
+    let present = motion.targets();
+    if frame == PoseFrame::Pelvis {
+        // Through another frame and back, what is left out would not stay to the last bit.
+        return Sides::from_fn(|side| wrist_target(halves[side].0, halves[side].1, &present[side]));
+    }
+    let pelvis_from_frame = motion.pelvis_from(frame);
+    Sides::from_fn(|side| {
+        let present = pelvis_from_frame.inv_mul(&present[side]);
+        let (position_m, quaternion_wxyz) = halves[side];
+        wrist_target(position_m, quaternion_wxyz, &present).map(|target| pelvis_from_frame * target)
     })
 }
 
 /// A wrist's target in the pelvis frame, of which either half may be left as `present` has it; `None` where both are.
-pub fn wrist_target(
+fn wrist_target(
     position_m: Option<[f64; 3]>,
     quaternion_wxyz: Option<[f64; 4]>,
     present: &Isometry3<f64>,

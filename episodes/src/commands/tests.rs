@@ -228,8 +228,15 @@ fn an_arm_without_a_target_keeps_its_joints() {
 
     // Walking takes both arms along, whatever they were told before.
     let mut walking = arrived();
-    let walk =
-        WalkMove { robot: "A".into(), vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m: None };
+    let walk = WalkMove {
+        robot: "A".into(),
+        vx_m_s: 0.0,
+        vy_m_s: 0.0,
+        yaw_rate_rad_s: 0.0,
+        pelvis_height_m: None,
+        waist_yaw_rad: None,
+        look_at_m: None,
+    };
     play(RobotAction::Walk(walk), Vector3::new(0.002, 0.0, 0.0), &mut walking);
     assert_eq!(walking.state().upper_rad, before_rad);
 }

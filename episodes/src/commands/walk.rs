@@ -1,14 +1,20 @@
-//! `walk`: the base moves; arms and hands keep their joints.
+//! `walk`: the base moves, and the waist if it is told to; arms and hands keep their joints.
 
-use tandem_sim::BaseCommand;
+use tandem_sim::{BaseCommand, CONTROL_HZ};
 use tandem_tools_spec::WalkMove;
 
-use super::columns::Clamped;
+use super::columns::{self, Clamped};
 use super::motion::{Compliance, Motion};
 
-/// The same base command at every step.
+/// The trunk turns no faster.
+const WAIST_RAD_S: f64 = 1.0;
+
+/// The same base command at every step, while the waist turns where it is to.
 pub struct WalkTrajectory {
     base: BaseCommand,
+    /// Where the waist begins, and where it is to turn, if it is.
+    from_rad: f64,
+    to_rad: Option<f64>,
 }
 
 impl WalkTrajectory {
@@ -17,12 +23,20 @@ impl WalkTrajectory {
         let velocity = [entry.vx_m_s, entry.vy_m_s, entry.yaw_rate_rad_s];
         let base =
             clamped.base(&motion.robot.base_limits, motion.base_asked(velocity, entry.pelvis_height_m));
+        let yaw = columns::waist().start;
+        let point_rad = entry.look_at_m.map(|[x_m, y_m, _]| y_m.atan2(x_m));
+        let asked_rad = entry.waist_yaw_rad.or(point_rad);
+        let to_rad = asked_rad.map(|asked_rad| clamped.joint(&motion.robot.model, yaw, asked_rad));
         motion.keep_joints();
-        WalkTrajectory { base }
+        WalkTrajectory { base, from_rad: motion.state().upper_rad[yaw], to_rad }
     }
 
     /// One control step.
-    pub fn advance(&self, motion: &mut Motion) {
+    pub fn advance(&self, step: u32, motion: &mut Motion) {
+        if let Some(to_rad) = self.to_rad {
+            let most_rad = WAIST_RAD_S * f64::from(step) / CONTROL_HZ;
+            motion.turn_waist(self.from_rad + (to_rad - self.from_rad).clamp(-most_rad, most_rad));
+        }
         motion.give_way(Compliance::NONE);
         motion.walk(self.base);
     }

@@ -2,6 +2,8 @@
 
 use tandem_tools_spec::{Assistance, BaseLimits, Brief, Hints, Wording};
 
+use super::grips::grips;
+
 const FRAMES: &str = "Poses of wrists and camera, and points of query_depth, are in the robot's own pelvis frame as it is at that \
     moment: x forward, y left, z up, metres. Quaternions are [w, x, y, z].";
 
@@ -28,35 +30,52 @@ const HANDS: &str = "A wrist's x axis points along its fingers, and its z axis a
     is at [0.12, 0.055, 0]. The palm reaches from x = 0.04 to 0.13, and from z = -0.045 to 0.045, and is 0.04 thick. Straight \
     fingers reach to x = 0.22. The thumb, with its angles at 0, stands off the palm at x = 0.065, to y = 0.115.";
 
-const GRASPING: &str = "Fingers are given for a right hand, thumb [0, 1, 2] and each finger [0, 1]; a left one has the other sign but for \
-    thumb_0. A thumb that is stopped short of its target presses, and fingers that are blocked hold something. Around something \
-    upright: open the thumb, come palm first, then close fingers and thumb. Around a bar: lay the palm on it, then close the outer \
-    finger joints (middle_1, index_1) first, the inner ones (middle_0, index_0) next and the thumb last; open in the reverse order, \
-    since open fingers may stay hooked under it. The edge of a table: palms down (right wrist [0.707, -0.707, 0, 0], left [0.707, \
-    0.707, 0, 0]), fingers ahead over the top, thumb under it. The wrist ends 0.085 m before the edge and 0.017 m above the top; come \
-    from 0.14 m farther off and 0.03 m higher with the thumb at [0, 0.5, 0], in and then down, and close thumb [0, -0.9, -1.74] and \
-    fingers [0.3, 0.2]. A rim from above: palms down, wrist 0.095 m before its middle and 0.031 m above it, fingers inside [1.57, 0.6], \
-    thumb outside [0, -0.95, -0.6]. An upright wall, as of a tall bin: both hands point down outside it ([0.707, 0, 0.707, 0]), palms \
-    flat on it, wrist 0.09 m above the rim and 0.017 m beside, thumb over the rim [0, -1.04, -1.74], fingers [0.3, 0.3]; come from \
-    above, 0.05 m beside. The legs of a table: both hands point ahead ([1, 0, 0, 0]), palms on the outer sides of the legs, 0.05 m under \
-    the top; the wrist ends 0.1 m before the middle of the leg and 0.032 m beside it; come from 0.09 m farther out and 0.025 m lower, in \
-    and then up, and close thumb [0, -0.9, -1.74] and fingers [1, 1]. Stand with the pelvis 0.3 m behind the places of both hands, 0.38 \
-    m behind those on legs or on a bin, which thighs and knees push otherwise, and in the middle between them. Who carries \
-    with partners lets the hands give way (compliance_n_s_m 250) from when the thing is lifted, by its legs while it is lifted, too, \
-    until it is over its goal; stiff hands lower it. To let go, open, and leave the way you came.";
+/// What only they are told who are told what hands feel.
+const GRIP: &str = "A hand holds something, as phases ask for, while its thumb presses on one side of it and fingers or palm press \
+    against that, each with 1.5 N or more, for 60 ms: grip then says \"holding\". Where it says \"one_sided\", close by 0.2 rad more what \
+    does not press yet, mostly the thumb; where it says \"touching\" or \"none\" though the hand is closed, bring the palm nearer first. ";
+
+const GRASPING: &str = "Fingers that are stopped short of their targets press: ask them for 0.3 rad more than a thing leaves them. `grips` has \
+    grips that work, for a robot that faces the thing squarely. Put the wrist where the place lies at place_m in its frame: \
+    position = place - R place_m, R being the quaternion's rotation. Come with open_rad over the stops, at each of which place_m is so \
+    much more, then to place_m itself; close to close_rad in 25 to 40 steps, fingers first around a bar, and hold still for 20. A hand \
+    that closes on a thing without lying on it drags it, and is dragged: robots that are pulled so step and sink; then let the hand go \
+    along (no wrist target, or compliance_n_s_m 250) and lay the palm on. To let go, ask for open_rad and leave over the stops, the way \
+    you came; fingers that stay bent hook under a bar. Stand with the pelvis stand_behind_m behind the places of both hands, and in the \
+    middle between them: nearer by, thighs and knees push what stands on legs. Who carries with partners lets the hands give way \
+    (compliance_n_s_m 250) from when the thing is lifted, by its legs while it is lifted, too, until it is over its goal; stiff hands \
+    lower it.";
+
+const NAMED_FRAMES: &str = " Tools that take `frame` know \"pelvis\"; \"level\", the same but upright: z against gravity, x the way the robot \
+    faces (a robot that crouches or carries leans by up to 0.1 rad, which is 7 cm at arm's length); and \"start\", which lies on the \
+    floor under where the pelvis was when the episode began, z up, x where the robot faced, and stays in the room while the robot moves. \
+    Targets that are to be held while a robot is pushed or walks are best given in \"start\". Of a quaternion, q and -q are the same \
+    rotation.";
+
+/// As our own controller walks; held by `walking_is_as_the_brief_says`.
+const WALKING: &str = "A robot that is told to walk gains way after 0.3 to 0.5 s. Told to stop, it coasts: by 3 cm from 0.1 m/s, 8 cm from 0.2, \
+    12 from 0.3 and 20 from 0.4, and by 0.09 rad from turning at 0.5 rad/s; it stands after about a second. While it steps the pelvis \
+    sways by up to 4 cm to each side, twice a second: mean over half a second what you steer by, or have walk_to do it. base.state says \
+    \"standing\", \"stepping\", \"settling\" (told to stop; comes_to_rest_m says where it will stand) or \"pushed\": it steps because its \
+    hands or a partner pull it, drifts and sinks by 10 cm. Then free what pulls: loosen wrist targets, give way with compliance_n_s_m, or \
+    walk the way it is pulled. Arms that reach more than 0.35 m ahead make a robot step, too: walk nearer instead.";
 
 /// The brief of an episode in the words that its policy reads, where robots follow base commands within `limits`.
 pub fn brief(wording: Wording, limits: &BaseLimits) -> Brief {
     let Wording { assistance, hints } = wording;
     let is_full = assistance == Assistance::Full;
+    let is_hinted = hints == Hints::On;
     let squats = limits.pelvis_height_m.min < limits.pelvis_height_m.max;
     Brief {
-        frames: [FRAMES, if squats { BENT_KNEES } else { "" }].concat(),
+        frames: [FRAMES, if squats { BENT_KNEES } else { "" }, if is_full { NAMED_FRAMES } else { "" }]
+            .concat(),
         partners: [PARTNERS, if is_full { PARTNERS_MOVE } else { "" }].concat(),
         odometry: is_full.then(|| ODOMETRY.into()),
         camera: CAMERA.into(),
         hands: HANDS.into(),
-        grasping: (hints == Hints::On).then(|| GRASPING.into()),
+        walking: (is_full && squats).then(|| WALKING.into()),
+        grasping: is_hinted.then(|| [if is_full { GRIP } else { "" }, GRASPING].concat()),
+        grips: if is_hinted { grips() } else { Vec::new() },
     }
 }
 
@@ -132,7 +151,8 @@ mod tests {
     fn without_hints_there_is_geometry_only() {
         let (with, without) = (brief(Hints::On.into(), &limits()), brief(Hints::Off.into(), &limits()));
         assert!(with.grasping.is_some());
-        assert_eq!(without, Brief { grasping: None, ..with });
+        assert!(!with.grips.is_empty());
+        assert_eq!(without, Brief { grasping: None, grips: Vec::new(), ..with });
     }
 
     #[test]
@@ -148,7 +168,7 @@ mod tests {
     #[test]
     fn nothing_is_said_of_what_is_not_told() {
         let brief = serde_json::json!(brief(Assistance::Paper.into(), &limits())).to_string();
-        for word in ["pelvis_in_start", "base_motion", "grasping", "odometry"] {
+        for word in ["pelvis_in_start", "base_motion", "grasping", "odometry", "walking", "level", "grip"] {
             assert!(!brief.contains(word), "{word}: {brief}");
         }
     }

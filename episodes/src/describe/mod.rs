@@ -1,8 +1,13 @@
 //! What policies are told about tasks, protocols and robots.
 
 mod brief;
+mod grips;
+mod room;
 
 pub use brief::brief;
+#[cfg(test)]
+pub use grips::grips;
+pub use room::room;
 
 use tandem_sim::BaseLimits;
 use tandem_tools_spec::{
@@ -25,19 +30,20 @@ fn task_info(task: &Task) -> TaskInfo {
         id: task.id.into(),
         instruction: task.instruction.into(),
         robots: instructions(task),
-        phases: task
-            .phases
-            .iter()
-            .enumerate()
-            .map(|(index, phase)| PhaseInfo {
-                id: phase.id.into(),
-                number: Phase::number(index),
-                description: phase.description.into(),
-                collaborative: phase.collaborative,
-            })
-            .collect(),
+        phases: phases(task),
         protocols: Protocol::ALL.map(|protocol| protocol_info(protocol, task)).to_vec(),
     }
+}
+
+/// The phases of a task, in the order they have to be reached.
+pub fn phases(task: &Task) -> Vec<PhaseInfo> {
+    let info = |(index, phase): (usize, &Phase)| PhaseInfo {
+        id: phase.id.into(),
+        number: Phase::number(index),
+        description: phase.description.into(),
+        collaborative: phase.collaborative,
+    };
+    task.phases.iter().enumerate().map(info).collect()
 }
 
 fn protocol_info(protocol: Protocol, task: &Task) -> ProtocolInfo {

@@ -85,6 +85,7 @@ fn hand(step: &Step, index: usize, side: Side, motion: &Motion, row: &mut Vec<f3
 /// 0 stands for a hand that has no target of its own: its joints are told where to be.
 fn state_number(state: HandState) -> f32 {
     match state {
+        HandState::Idle => 0.0,
         HandState::Moving => 1.0,
         HandState::Arrived => 2.0,
         HandState::Blocked => 3.0,

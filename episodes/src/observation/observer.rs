@@ -3,15 +3,16 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use nalgebra::{Isometry3, Point3};
 use tandem_sim::render::{Camera, Cameras, Frame, Renderer, RendererKind, Scenery};
 use tandem_sim::{Step, World};
-use tandem_tools_spec::{DepthPoint, DepthReply};
+use tandem_tools_spec::{DepthReply, DepthRow, PoseFrame, SurfaceQuery};
 
 use super::proprioception::{Detail, Proprioception, calibration, robot_state};
-use super::{Picture, RobotObservation, RobotView, TeamObservation};
+use super::{Picture, RobotObservation, RobotView, TeamObservation, surface};
 use crate::EpisodeError;
 use crate::commands::RobotSheet;
-use crate::convert::{rounded, wire_vector};
+use crate::convert::{coarse, isometry_from_sim};
 
 /// Draws what the cameras of one world see.
 pub struct Observer {
@@ -86,33 +87,65 @@ impl Observer {
         TeamObservation { time_s: step.time_s, robots: robots.iter().zip(views).map(observe).collect() }
     }
 
-    /// The reply to `query_depth` for robot number `robot`, called `name`.
+    /// The reply to `query_depth` for robot number `robot`, called `name`: the points in `frame`, which is at `pelvis_from_frame`.
     pub fn depth(
         &mut self,
         step: &Arc<Step>,
         robot: usize,
         name: &str,
         pixels: &[[i64; 2]],
+        (frame, pelvis_from_frame): (PoseFrame, Isometry3<f64>),
     ) -> Result<DepthReply, EpisodeError> {
-        let Camera { width, height, .. } = self.cameras.egocentric(step, robot);
-        let outside = |[u, v]: [i64; 2]| u < 0 || v < 0 || u >= width.into() || v >= height.into();
-        if let Some([u, v]) = pixels.iter().copied().find(|pixel| outside(*pixel)) {
-            return Err(EpisodeError::PixelOutside { u, v, width, height });
-        }
+        self.check_pixels(step, robot, pixels)?;
+        let width = self.cameras.egocentric(step, robot).width;
         let view = self.views(step, &[robot]).swap_remove(0);
         let pelvis_from_camera = step.robots[robot].sensed.pelvis_from_camera;
         let points = pixels.iter().map(|&pixel| {
             let [u, v] = pixel;
             let depth_m = view.depth_m[v as usize * width as usize + u as usize];
-            let seen = depth_m.is_finite();
             let point_m = pelvis_from_camera * view.intrinsics.unproject([u as f32, v as f32], depth_m);
-            DepthPoint {
-                pixel,
-                depth_m: seen.then_some(rounded(depth_m.into())),
-                point_in_pelvis_m: seen.then_some(wire_vector(point_m)),
-            }
+            let point_m = pelvis_from_frame.inverse() * Point3::from(point_m.to_array().map(f64::from));
+            DepthRow::new(pixel, depth_m.is_finite().then_some([point_m.x, point_m.y, point_m.z].map(coarse)))
         });
-        Ok(DepthReply { robot: name.into(), points: points.collect() })
+        Ok(DepthReply {
+            robot: name.into(),
+            frame: Some(frame).filter(|frame| *frame != PoseFrame::Pelvis),
+            surface: None,
+            columns: DepthReply::COLUMNS.map(String::from),
+            points: points.collect(),
+        })
+    }
+
+    /// The reply to `query_depth` of a surface.
+    pub fn surface(
+        &mut self,
+        step: &Arc<Step>,
+        robot: usize,
+        name: &str,
+        query: &SurfaceQuery,
+        (frame, pelvis_from_frame): (PoseFrame, Isometry3<f64>),
+    ) -> Result<DepthReply, EpisodeError> {
+        self.check_pixels(step, robot, query.pixel.as_slice())?;
+        let view = self.views(step, &[robot]).swap_remove(0);
+        let pelvis_from_camera = isometry_from_sim(&step.robots[robot].sensed.pelvis_from_camera);
+        let found = surface::find(&view, query, &(pelvis_from_frame.inverse() * pelvis_from_camera));
+        let surface = found.ok_or(EpisodeError::NoSurface { query: *query })?;
+        Ok(DepthReply {
+            robot: name.into(),
+            frame: Some(frame).filter(|frame| *frame != PoseFrame::Pelvis),
+            surface: Some(surface),
+            columns: DepthReply::COLUMNS.map(String::from),
+            points: Vec::new(),
+        })
+    }
+
+    fn check_pixels(&self, step: &Step, robot: usize, pixels: &[[i64; 2]]) -> Result<(), EpisodeError> {
+        let Camera { width, height, .. } = self.cameras.egocentric(step, robot);
+        let outside = |[u, v]: [i64; 2]| u < 0 || v < 0 || u >= width.into() || v >= height.into();
+        match pixels.iter().copied().find(|pixel| outside(*pixel)) {
+            Some([u, v]) => Err(EpisodeError::PixelOutside { u, v, width, height }),
+            None => Ok(()),
+        }
     }
 
     /// What the scene's camera sees that sees all robots.

@@ -3,7 +3,7 @@
 use tandem_sim::Pose;
 use tandem_tools_spec::{
     CommandReply, EndReason, Formats, Look, LookCall, LookReply, ManageCall, ManageReply, Observe,
-    RobotReport, StopReason, TalkCall, TalkReply, ToolCall, ToolReply,
+    RobotReport, SpecError, StopReason, TalkCall, TalkReply, ToolCall, ToolReply,
 };
 
 use super::Session;
@@ -60,12 +60,20 @@ impl Session {
             }
         };
         call.validate()?;
+        self.check_told(&call.tool)?;
         match &call.tool {
             ToolCall::Look(look) => self.look(look, &call.formats),
             ToolCall::Act(act) => {
                 self.expect_underway()?;
                 let command = Command::read(act, &self.rules, &self.motions)?;
                 self.act(&command)
+            }
+            ToolCall::Plan(_) => {
+                self.expect_underway()?;
+                Err(EpisodeError::Spec(SpecError::Invalid {
+                    tool: call.name(),
+                    reason: "its commands are made and recorded one by one".into(),
+                }))
             }
             ToolCall::Manage(manage) => Ok(ToolReply::Manage(self.manage(manage)).into()),
             ToolCall::Talk(TalkCall::Say(_)) => {
@@ -78,7 +86,10 @@ impl Session {
     /// Refuses what an episode that has ended does no more.
     pub(super) fn expect_underway(&self) -> Result<(), EpisodeError> {
         match self.ended {
-            Some(reason) => Err(EpisodeError::Ended { reason }),
+            Some(reason) => {
+                let result = self.result().disclosed(self.spec().disclosure).into();
+                Err(EpisodeError::Ended { reason, result })
+            }
             None => Ok(()),
         }
     }
@@ -98,8 +109,14 @@ impl Session {
             }
             LookCall::QueryDepth(args) => {
                 let robot = find(&args.robot)?;
-                let name = &self.motions[robot].robot.name;
-                LookReply::QueryDepth(self.observer.depth(&self.present, robot, name, &args.named())?)
+                let motion = &self.motions[robot];
+                let frame = args.frame.unwrap_or_default();
+                let frame = (frame, motion.pelvis_from(frame));
+                let name = &motion.robot.name;
+                LookReply::QueryDepth(match &args.surface {
+                    Some(query) => self.observer.surface(&self.present, robot, name, query, frame)?,
+                    None => self.observer.depth(&self.present, robot, name, &args.named(), frame)?,
+                })
             }
             LookCall::CheckReach(args) => {
                 let robot = find(&args.robot)?;
@@ -155,7 +172,7 @@ impl Session {
             .zip(&clamped)
             .map(|(order, clamped)| {
                 let sensed = &self.present.robots[order.robot].sensed;
-                report(clamped, &began[order.robot], sensed, &self.motions[order.robot])
+                report(clamped, &began[order.robot], sensed, &self.motions[order.robot], order.action.frame())
             })
             .collect();
         Ok(ToolReply::Act(CommandReply {

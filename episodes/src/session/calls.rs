@@ -8,6 +8,7 @@ use tandem_tools_spec::{
 
 use super::Session;
 use super::answer::Answer;
+use super::told::shorten;
 use crate::EpisodeError;
 use crate::commands::{Called, Command, OperatorCall, OperatorCommand, RobotOrder};
 use crate::observation::TeamObservation;
@@ -25,7 +26,10 @@ impl Session {
     /// Answers a tool call of the policy that directs all robots. An error changes nothing but the count of calls. The call that ends
     /// the episode, and no later one, is counted and recorded, and closes the files.
     pub fn call(&mut self, call: ToolCall) -> Result<ToolReply, EpisodeError> {
-        self.make(CallerRecord::Policy, &call.into())
+        match &call {
+            ToolCall::Plan(plan) => self.plan(CallerRecord::Policy, plan).map(ToolReply::Plan),
+            _ => self.make(CallerRecord::Policy, &call.into()),
+        }
     }
 
     /// As [`Session::call`], with all that may go with a call, by the operator of a robot or by the policy of all. A call that was
@@ -35,7 +39,16 @@ impl Session {
         call.expected_step = None;
         let then = call.then.take();
         let caller = operator.map_or(CallerRecord::Policy, CallerRecord::Operator);
-        let reply = self.make(caller, &Called::One(call))?;
+        let reply = match &call.tool {
+            ToolCall::Plan(plan) => {
+                let mut reply = ToolReply::Plan(self.plan(caller, plan)?);
+                if call.short {
+                    shorten(&mut reply);
+                }
+                reply
+            }
+            _ => self.make(caller, &Called::One(call))?,
+        };
         Ok(CallReply { reply, observation: self.look_after(caller, then)? })
     }
 
@@ -113,20 +126,24 @@ impl Session {
             Ok(order) => return Ok(OperatorCommand { call, order }),
             Err(refusal) => refusal,
         };
-        let underway = self.arrived();
         let operator = call.robot().to_owned();
-        let called = Called::Together(vec![call]);
-        self.came_out(underway, CallerRecord::Operator(&operator), &called, CallOutcome::refused(&refusal));
-        self.let_think();
+        self.refuse(CallerRecord::Operator(&operator), &Called::Together(vec![call]), &refusal);
         Err(refusal)
+    }
+
+    /// Counts and records a call that has been refused.
+    pub(super) fn refuse(&mut self, caller: CallerRecord, called: &Called, refusal: &EpisodeError) {
+        let underway = self.arrived();
+        self.came_out(underway, caller, called, CallOutcome::refused(refusal));
+        self.let_think();
     }
 
     /// Executes the commands of several operators side by side, and looks for each what it wants to see then.
     pub fn together(&mut self, commands: Vec<OperatorCommand>) -> Result<Vec<CallReply>, EpisodeError> {
         let (mut calls, orders): (Vec<OperatorCall>, Vec<RobotOrder>) =
             commands.into_iter().map(|command| (command.call, command.order)).unzip();
-        let looks: Vec<(String, Option<Look>)> =
-            calls.iter_mut().map(|call| (call.robot().to_owned(), call.take_look())).collect();
+        let after = |call: &mut OperatorCall| (call.robot().to_owned(), call.take_look(), call.call().short);
+        let looks: Vec<(String, Option<Look>, bool)> = calls.iter_mut().map(after).collect();
         let called = Called::Together(calls);
         let underway = self.arrived();
         let mut answer = self.expect_underway().and_then(|()| self.act(&Command::together(orders)));
@@ -137,11 +154,12 @@ impl Session {
         self.came_out(underway, CallerRecord::Policy, &called, CallOutcome::of(&answer));
         self.let_think();
         let reply = answer?.reply(&called)?;
-        let replies = looks.into_iter().map(|(robot, look)| {
-            Ok(CallReply {
-                reply: reply.clone(),
-                observation: self.look_after(CallerRecord::Operator(&robot), look)?,
-            })
+        let replies = looks.into_iter().map(|(robot, look, short)| {
+            let mut reply = reply.clone();
+            if short {
+                shorten(&mut reply);
+            }
+            Ok(CallReply { reply, observation: self.look_after(CallerRecord::Operator(&robot), look)? })
         });
         replies.collect()
     }
@@ -149,12 +167,17 @@ impl Session {
     /// Makes a call with nothing around it. The reply tells what the policy may be told, whoever calls.
     pub(super) fn make(&mut self, caller: CallerRecord, called: &Called) -> Result<ToolReply, EpisodeError> {
         let counts = self.ended.is_none();
+        let is_short = matches!(called, Called::One(Call { short: true, .. }));
         let underway = self.arrived();
         let mut answer = self.answer(called);
         for answer in answer.iter_mut() {
             answer.withhold(self.spec().assistance);
             if counts {
-                self.count(answer, called, caller);
+                let mut shown = answer.clone();
+                if let (true, Answer::Reply(reply)) = (is_short, &mut shown) {
+                    shorten(reply);
+                }
+                self.count(&shown, called, caller);
             }
         }
         self.came_out(underway, caller, called, CallOutcome::of(&answer));
@@ -164,7 +187,11 @@ impl Session {
             // Closing the files may have failed, which the reply has to say.
             *reply = self.result().disclosed(self.spec().disclosure);
         }
-        let reply = answer.and_then(|answer| answer.reply(called));
+        let mut reply = answer.and_then(|answer| answer.reply(called));
+        if is_short {
+            // The recording has all of it.
+            reply.iter_mut().for_each(shorten);
+        }
         self.let_think();
         reply
     }

@@ -7,6 +7,7 @@ mod checkpoint;
 mod clock;
 mod failure;
 mod onlookers;
+mod plan;
 mod replay;
 mod run_files;
 mod status;
@@ -235,6 +236,7 @@ impl Session {
             let hands_n =
                 robot.estimate.hand_force_n.map(|force_n| Vector3::from(force_n.to_array().map(f64::from)));
             motion.sense(isometry_from_sim(&robot.estimate.world_from_pelvis), hands_n);
+            motion.feel(&robot.sensed);
         }
         let (was_underway, reached_before) = (self.scores.underway(), self.scores.reached().count());
         let scored = self.scores.update(&self.present);

@@ -99,6 +99,15 @@ impl Session {
             instructions: describe::instructions(task),
             robots: self.motions.iter().map(|motion| info(&motion.robot.name)).collect(),
             kinds: vec![describe::robot_kind(kind.clone(), &self.motions[0].robot)],
+            phases: match self.spec().assistance {
+                Assistance::Paper => Vec::new(),
+                Assistance::Full => describe::phases(task),
+            },
+            room: match self.spec().assistance {
+                Assistance::Paper => Vec::new(),
+                // What cannot be read would have kept the world from being built.
+                Assistance::Full => describe::room(task).unwrap_or_default(),
+            },
             brief: describe::brief(self.spec().wording(), &wire_limits(&self.motions[0].robot.base_limits)),
             action_row: action_row(&self.motions[0].robot.model),
             status: self.status(),

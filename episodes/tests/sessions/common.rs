@@ -64,6 +64,8 @@ pub fn squat(height_m: f64) -> ToolCall {
         vy_m_s: 0.0,
         yaw_rate_rad_s: 0.0,
         pelvis_height_m: Some(height_m),
+        waist_yaw_rad: None,
+        look_at_m: None,
     };
     Walk { steps: 50, robots: vec![entry] }.into()
 }

@@ -201,7 +201,7 @@ impl NativeEpisode {
             self.work(py, |session| {
                 let reply = match session.call(SendJointChunk { robots }.into())? {
                     ToolReply::Act(reply) => reply,
-                    ToolReply::Look(_) | ToolReply::Manage(_) | ToolReply::Talk(_) => {
+                    ToolReply::Look(_) | ToolReply::Plan(_) | ToolReply::Manage(_) | ToolReply::Talk(_) => {
                         unreachable!("{} is of {:?}", SendJointChunk::NAME, ActCall::TOOLS)
                     }
                 };

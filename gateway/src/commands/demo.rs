@@ -102,7 +102,7 @@ fn count_last_phase(results: &[ResultReply]) -> usize {
 fn play(server: &Server, seed: u32) -> Result<ResultReply, Box<dyn Error>> {
     let task = tasks::find(TASK)?;
     let spec = EpisodeSpec::new(task, seed, Protocol::Agentic);
-    let args = StartEpisode { task: task.id.into(), seed, protocol: Some(spec.protocol) };
+    let args = StartEpisode { task: task.id.into(), seed, protocol: Some(spec.protocol), short: false };
     let (http, started) = HttpEpisode::start(server.address(), &args)?;
     let assistance = started.briefing.status.assistance;
     println!("{TASK}, seed {seed}, over http://{}, assistance {assistance}", server.address());

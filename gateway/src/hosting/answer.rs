@@ -58,8 +58,8 @@ impl Answer {
             ToolReply::Manage(ManageReply::GetStatus(status)) | ToolReply::Talk(TalkReply::Say(status)) => {
                 status.fallen.retain(|entry| entry.robot == robot)
             }
-            // Looks are asked of the own robot alone, and a result is of all.
-            ToolReply::Look(_) | ToolReply::Manage(ManageReply::Finish(_)) => {}
+            // Looks are asked of the own robot alone, operators have no plans, and a result is of all.
+            ToolReply::Look(_) | ToolReply::Plan(_) | ToolReply::Manage(ManageReply::Finish(_)) => {}
         }
         self
     }

@@ -165,7 +165,7 @@ impl HostedEpisode {
         match (self.team, robot, &call.tool) {
             (Some(team), Some(robot), _) => team.call(&self.thread, &robot, call).await,
             (_, _, ToolCall::Talk(_)) => Err(HostingError::NoTalk),
-            (_, _, ToolCall::Look(_) | ToolCall::Act(_) | ToolCall::Manage(_)) => {
+            (_, _, ToolCall::Look(_) | ToolCall::Act(_) | ToolCall::Plan(_) | ToolCall::Manage(_)) => {
                 self.thread.ask(None, call).await
             }
         }

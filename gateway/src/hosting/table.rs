@@ -92,7 +92,9 @@ impl EpisodeTable {
         let place = self.take_place().await?;
         let (id, path) = self.folders.create(&self.settings.runs, spec.task.id, spec.seed);
         let folder = RunFolder { path, visibility: self.settings.record };
-        self.begin(&id, spec, &driving, folder, place).await
+        let reply = self.begin(&id, spec, &driving, folder, place).await?;
+        let briefing = if args.short { reply.briefing.shortened() } else { reply.briefing };
+        Ok(StartReply { briefing, ..reply })
     }
 
     /// Starts `spec` under the name `id` with its files in `folder`, for an evaluation in this process.
@@ -128,7 +130,8 @@ impl EpisodeTable {
             return Err(refused);
         }
         tracing::info!(episode = id, "started");
-        Ok(StartReply { episode_id: id.into(), operators, briefing })
+        let idle_limit_s = self.settings.idle_timeout.as_secs();
+        Ok(StartReply { episode_id: id.into(), idle_limit_s, operators, briefing })
     }
 
     /// The reply to `list_tasks`, without what policies of this server are not told.

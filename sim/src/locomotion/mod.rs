@@ -85,6 +85,11 @@ pub trait Locomotion: Send {
         [0.0; WAIST_JOINTS]
     }
 
+    /// Whether it is stepping rather than standing; `None` where it does not tell the two apart.
+    fn is_stepping(&self) -> Option<bool> {
+        None
+    }
+
     /// Internal state, for snapshots and the state hash.
     fn save(&self) -> Result<Vec<u8>, postcard::Error>;
 

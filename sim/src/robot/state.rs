@@ -27,6 +27,8 @@ pub struct RobotSensed {
     pub pelvis_from_camera: Pose,
     /// External force on each hand, pelvis frame, estimated from joint torques.
     pub hand_force_in_pelvis_n: Sides<Vector>,
+    /// Whether its base controller steps, as far as that tells.
+    pub is_stepping: Option<bool>,
 }
 
 /// Where a robot takes itself to be, for what steers its hands and its base: by its estimator, in a frame that was the world's
@@ -88,6 +90,7 @@ impl Robot {
                 .hand_loads
                 .force_n()
                 .map(|force_n| pelvis_from_world.rotation * force_n),
+            is_stepping: self.locomotion.is_stepping(),
         }
     }
 

@@ -65,12 +65,13 @@ fn a_line_names_and_describes_the_tool() {
     assert_eq!(with_wave::EPISODE_TOOLS, ["get_status", "wave", "wait"]);
     assert_eq!(with_wave::LookCall::TOOLS, ["get_status", "wave"]);
     assert_eq!(with_wave::ActCall::TOOLS, ["wait"]);
-    let specs = with_wave::tool_specs(Assistance::Full);
+    let specs = with_wave::operator_tool_specs(Assistance::Full);
+    assert_eq!(specs, with_wave::tool_specs(Assistance::Full), "nobody here may talk");
     let names: Vec<_> = specs.iter().map(|spec| (spec.name, spec.on_episode)).collect();
     assert_eq!(names, [("list_tasks", false), ("get_status", true), ("wave", true), ("wait", true)]);
     let wave = &specs[2];
     assert!(wave.description.starts_with("Wave with a robot's hand"), "{}", wave.description);
-    assert_eq!(wave.input_schema["required"], json!(["episode_id", "times"]));
+    assert_eq!(wave.input_schema["required"], json!(["episode_id", "times", "short"]));
     assert_eq!(wave.reply_schema["properties"]["answered"]["type"], "boolean");
     let typed = with_wave::typed_tools();
     let [_, _, wave, wait] = &typed.tools[..] else { panic!("{:?}", typed.tools) };
@@ -119,13 +120,14 @@ fn a_line_reads_replies() {
 
 #[test]
 fn every_example_works_and_only_looking_promises_to_change_nothing() {
-    let specs = operator_tool_specs(Assistance::Full);
+    let specs = every_tool_spec(Assistance::Full.into());
     for example in ToolCall::examples() {
         assert_eq!(ToolCall::parse(example.name(), json!(example)), Ok(example.clone()));
         let read_only = specs.iter().any(|spec| spec.name == example.name() && spec.read_only);
         match example {
             ToolCall::Look(call) => assert!(read_only, "{call:?}"),
             ToolCall::Act(call) => assert!(!read_only, "{call:?}"),
+            ToolCall::Plan(call) => assert!(!read_only, "{call:?}"),
             ToolCall::Manage(_) | ToolCall::Talk(_) => {}
         }
     }

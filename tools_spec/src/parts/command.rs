@@ -4,9 +4,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::episode::{Budget, PhaseReached, RobotFallen};
+use super::frames::PoseFrame;
 use super::quantities::Pose;
 
-/// The reply to every command: `move_wrists`, `walk`, `send_joint_chunk` and `wait`.
+/// The reply to every command: `move_wrists`, `walk`, `send_joint_chunk` and `wait`. Lengths are told to the millimetre, angles and
+/// quaternions to a thousandth. What is marked so is left out where the call asked for a short reply.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CommandReply {
     /// Control steps of 20 ms that were executed.
@@ -17,7 +19,7 @@ pub struct CommandReply {
     pub time_s: f64,
     /// One report per robot that the command named; after `wait`, one per robot of the episode.
     pub robots: Vec<RobotReport>,
-    /// Every robot of the episode; left out where the assistance is "paper".
+    /// Every robot of the episode; in a short reply those that have fallen. Left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fallen: Vec<RobotFallen>,
     /// Every phase reached so far, where the episode's assistance tells it.
@@ -45,24 +47,70 @@ pub enum StopReason {
 pub struct RobotReport {
     /// The robot, as "A".
     pub robot: String,
+    /// The frame of wrist poses where the command named another than that of the pelvis; left out otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame: Option<PoseFrame>,
     /// Its left arm and hand.
     pub left: HandReport,
     /// Its right arm and hand.
     pub right: HandReport,
+    /// What its base does; left out where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base: Option<BaseReport>,
     /// Where its own IMU and joints have it: the pose of its pelvis in the start frame, which lies on the floor under the pelvis as
     /// it was when the episode began, z up, x where the robot faced. Drifts by up to 1 % of the way walked. Left out where the
     /// assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pelvis_in_start: Option<Pose>,
-    /// How far the command took the base, by the same odometry; left out where the assistance is "paper".
+    /// How far the command took the base, by the same odometry; left out where the assistance is "paper", and of a short reply where
+    /// it is less than a centimetre and a hundredth of a radian.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base_motion: Option<BaseMotion>,
-    /// Waist joints whose target lay beyond a limit and was moved to it.
+    /// Waist joints whose target lay beyond a limit and was moved to it; left out where there are none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub waist_joints_clamped: Vec<String>,
-    /// Waist joints that rest at a limit.
+    /// Waist joints that rest at a limit; left out where there are none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub waist_joints_at_limit: Vec<String>,
-    /// Fields of the base command that lay beyond what locomotion accepts and were moved to it, as `vx_m_s`.
+    /// Fields of the base command that lay beyond what locomotion accepts and were moved to it, as `vx_m_s`; left out where there
+    /// are none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub base_command_clamped: Vec<String>,
+}
+
+/// What a base does, by its own controller and odometry.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct BaseReport {
+    /// Whether it stands or steps, and why; left out where its controller does not tell standing from stepping.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub state: Option<BaseState>,
+    /// How high the pelvis is over the floor, in metres: measured, not commanded.
+    pub pelvis_height_m: f64,
+    /// The height that it was last told, where it is more than 2 cm off that; left out otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub commanded_height_m: Option<f64>,
+    /// Where the pelvis will come to rest if no further step is commanded: [x, y] in the start frame, to within 5 cm. Only of a base that
+    /// steps or settles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub comes_to_rest_m: Option<[f64; 2]>,
+    /// How far a base that was told to stand is from where it came to rest, [forward, left] in metres as it faced there; left out where
+    /// that is less than 2 cm. Something pulled or pushed it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub displaced_m: Option<[f64; 2]>,
+}
+
+/// Whether a base stands or steps, and why.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum BaseState {
+    /// Both feet stay where they are.
+    Standing,
+    /// It walks as it was told to.
+    Stepping,
+    /// It was told to stop walking and still steps.
+    Settling,
+    /// It steps though nobody told it to: what its hands hold or touch, or a partner, pulls or pushes it.
+    Pushed,
 }
 
 /// How a pelvis moved during a command, forward and left as the robot faced when the command began.
@@ -84,29 +132,72 @@ pub struct HandReport {
     /// How the wrist stands to its target; left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state: Option<HandState>,
+    /// What the fingers feel between them, by their own torques; left out where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grip: Option<Grip>,
+    /// What stops the hand, as far as it can feel that; left out where it feels nothing, and where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub touches: Option<Touch>,
     /// The wrist pose that was asked for, in the pelvis frame as it is now; of an arm without a wrist target, the pose that
-    /// its joint targets stand for.
-    pub target: Pose,
-    /// The wrist pose that was measured, in the pelvis frame as it is now.
-    pub measured: Pose,
-    /// Distance from target to measured, in metres.
-    pub position_error_m: f64,
-    /// Angle from target to measured, in radians.
-    pub orientation_error_rad: f64,
-    /// Its fingers.
-    pub fingers: FingerReport,
-    /// The joint of this arm and hand that works hardest; left out where the assistance is "paper".
+    /// its joint targets stand for. Left out of a short reply.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub target: Option<Pose>,
+    /// The wrist pose that was measured, in the pelvis frame as it is now, its quaternion with the sign that is nearer to the target's.
+    /// Left out of a short reply where the state is "arrived" or "idle".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measured: Option<Pose>,
+    /// Distance from target to measured, in metres. Left out of a short reply where the state is "arrived" or "idle".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position_error_m: Option<f64>,
+    /// Angle from target to measured, in radians; left out as the distance is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orientation_error_rad: Option<f64>,
+    /// How far the hand has given way to what pulls it, by the command's compliance: its target is moved so far, [x, y, z] in metres in
+    /// the pelvis frame. Left out where it has not, and where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub compliance_offset_m: Option<[f64; 3]>,
+    /// Its fingers; left out of a short reply where they have arrived.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fingers: Option<FingerReport>,
+    /// The joint of this arm and hand that works hardest; left out of a short reply where it works at less than four fifths of its limit,
+    /// and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub largest_effort: Option<Effort>,
-    /// Force of the world on the hand in newtons, in the pelvis frame, as the arm's own joints feel it: a hand that holds 0.5 kg
-    /// feels about -4.9 along z; one in quick motion feels its own inertia, too. Left out where the
-    /// assistance is "paper".
+    /// Force of the world on the hand in newtons, [x, y, z] in the pelvis frame, as the arm's own joints feel it: a hand that holds
+    /// 0.5 kg feels about -4.9 along z, one that presses ahead on something a negative x. What moving the arm takes is not counted. Left
+    /// out of a short reply where it is less than 1 N, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_n: Option<[f64; 3]>,
-    /// Joints of this arm and hand whose target lay beyond a limit and was moved to it.
+    /// Joints of this arm and hand whose target lay beyond a limit and was moved to it; left out where there are none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joints_clamped: Vec<String>,
-    /// Joints of this arm and hand that rest at a limit.
+    /// Joints of this arm that rest at a limit; left out where there are none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joints_at_limit: Vec<String>,
+}
+
+/// What the fingers of a hand feel between them: the torques of their drives while they are stopped short of their targets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Grip {
+    /// Nothing.
+    None,
+    /// Something, but it is not pressed.
+    Touching,
+    /// Thumb or fingers press on something and the others do not press against it: close those further.
+    OneSided,
+    /// The thumb presses on one side and the fingers on the other.
+    Holding,
+}
+
+/// What a hand touches, as far as it can feel that.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Touch {
+    /// Its own palm or fingers.
+    Itself,
+    /// Something else.
+    Something,
 }
 
 /// How a wrist or fingers stand to their target.
@@ -115,9 +206,11 @@ pub struct HandReport {
 pub enum HandState {
     /// There: a wrist within 5 mm and 0.05 rad, every finger joint within 0.06 rad.
     Arrived,
-    /// On the way.
+    /// A wrist without a target, whose arm keeps its joints as it was told to.
+    Idle,
+    /// Coming nearer.
     Moving,
-    /// Stopped short by load or contact: fingers around an object are.
+    /// Stopped short by load or contact: fingers around an object are, and an arm that was pushed away.
     Blocked,
     /// Stopped short because limits of joints, the arm's length or the robot's own body allow no more.
     OutOfReach,
@@ -129,8 +222,9 @@ pub struct FingerReport {
     /// How they stand to their targets; left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state: Option<HandState>,
-    /// Joint angles that were asked for, in radians.
-    pub target_rad: [f64; 7],
+    /// Joint angles that were asked for, in radians. Left out of a short reply.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub target_rad: Option<[f64; 7]>,
     /// Joint angles that were measured, in radians.
     pub measured_rad: [f64; 7],
 }

@@ -3,15 +3,18 @@
 mod command;
 mod driving;
 mod episode;
+mod frames;
 mod pictures;
 mod quantities;
 
 pub use command::{
-    BaseMotion, CommandReply, Effort, FingerReport, HandReport, HandState, RobotReport, StopReason,
+    BaseMotion, BaseReport, BaseState, CommandReply, Effort, FingerReport, Grip, HandReport, HandState,
+    RobotReport, StopReason, Touch,
 };
 pub use driving::{Driving, Heard, OperatorToken, Operators, Partner, PartnerDid};
 pub use episode::{
     Assistance, Budget, Disclosure, ExtraInformation, Hints, PhaseReached, Protocol, RobotFallen, Wording,
 };
+pub use frames::PoseFrame;
 pub use pictures::{Bytes, CameraArrays, DepthFormat, Formats, ImageFormat, PixelRegion, Png};
 pub use quantities::{BASE_COLUMNS, BaseCommand, BaseLimits, JointValues, Pose, Range};

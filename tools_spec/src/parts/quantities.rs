@@ -14,7 +14,7 @@ pub struct Pose {
 }
 
 /// One number per joint, in the robot's published joint order; JSON object from joint name to number. JSON carries them
-/// to six decimals: the drives measure no finer, and a model reads a third of the text.
+/// to four decimals, which a model reads in a third of the text; MessagePack, which programs ask for, to six.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointValues(pub Vec<(String, f64)>);
 
@@ -27,8 +27,9 @@ impl JointValues {
 
 impl Serialize for JointValues {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let parts = if serializer.is_human_readable() { 1e4 } else { 1e6 };
         // Adding zero makes the zero of tiny negative values a positive one.
-        let rounded = |value: f64| (value * 1e6).round() / 1e6 + 0.0;
+        let rounded = |value: f64| (value * parts).round() / parts + 0.0;
         serializer.collect_map(self.0.iter().map(|(name, value)| (name, rounded(*value))))
     }
 }

@@ -50,8 +50,8 @@ impl ToolSpec {
             Format::Anthropic => json!({
                 "name": self.name,
                 "description": self.description,
-                "input_schema": self.few_unions_schema(),
-                "strict": true,
+                "input_schema": if self.strict { self.few_unions_schema() } else { self.lenient_schema() },
+                "strict": self.strict,
             }),
             Format::Mcp => self.of_mcp(),
         }
@@ -61,8 +61,8 @@ impl ToolSpec {
         json!({
             "name": self.name,
             "description": self.description,
-            "parameters": self.input_schema,
-            "strict": true,
+            "parameters": if self.strict { self.input_schema.clone() } else { self.lenient_schema() },
+            "strict": self.strict,
         })
     }
 

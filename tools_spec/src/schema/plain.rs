@@ -1,7 +1,7 @@
 //! JSON Schema of types as they are: for replies and REST bodies, where nothing has to be strict.
 
 use schemars::{JsonSchema, generate::SchemaSettings};
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use crate::limits::bound_numbers;
 use crate::parts::{Assistance, Hints, Wording};
@@ -32,6 +32,7 @@ pub fn word(schema: &mut Value, wording: Wording) {
     match schema {
         Value::Array(items) => items.iter_mut().for_each(|item| word(item, wording)),
         Value::Object(object) => {
+            leave_to_full(object, wording);
             let mut text_of = |name: &str| match object.get(name)?.is_string() {
                 true => object.remove(name)?.as_str().map(str::to_owned),
                 false => None,
@@ -48,5 +49,21 @@ pub fn word(schema: &mut Value, wording: Wording) {
             object.values_mut().for_each(|value| word(value, wording));
         }
         _ => {}
+    }
+}
+
+/// Takes out the fields that are for who is told all.
+fn leave_to_full(object: &mut Map<String, Value>, wording: Wording) {
+    let Some(Value::Object(properties)) = object.get_mut("properties") else { return };
+    let mut left = Vec::new();
+    for (name, property) in properties.iter_mut() {
+        let marked = property.as_object_mut().and_then(|property| property.shift_remove("full_only"));
+        if marked.is_some() && wording.assistance == Assistance::Paper {
+            left.push(name.clone());
+        }
+    }
+    properties.retain(|name, _| !left.contains(name));
+    if let Some(Value::Array(required)) = object.get_mut("required") {
+        required.retain(|name| name.as_str().is_none_or(|name| !left.iter().any(|left| left == name)));
     }
 }

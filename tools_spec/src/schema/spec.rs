@@ -1,11 +1,11 @@
 //! Tools as the hosts of language models need them.
 
 use serde::Serialize;
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 use super::nullable::leave_out;
 use super::plain::{body_schema, plain_schema};
-use super::strict::{require_episode_id, strict_schema};
+use super::strict::{SHORT, SHORTLY, require_episode_id, require_short, strict_schema};
 use crate::limits::{bound_robots, bound_steps};
 use crate::parts::Wording;
 use crate::tool::{Route, Tool};
@@ -36,6 +36,12 @@ pub struct ToolSpec {
     /// Whether only operators who may talk to each other are offered it.
     #[serde(skip)]
     pub for_operators: bool,
+    /// Whether only policies that are told all are offered it.
+    #[serde(skip)]
+    pub full_only: bool,
+    /// Whether its schema is strict.
+    #[serde(skip)]
+    pub strict: bool,
     /// Where REST serves it.
     pub route: Route,
 }
@@ -55,6 +61,11 @@ impl ToolSpec {
     /// for operators who talk alone.
     pub fn on_episode<T: Tool>(wording: Wording, for_operators: bool) -> ToolSpec {
         let mut spec = ToolSpec::without_episode::<T>(wording);
+        if spec.input_schema["properties"].get(SHORT).is_none() {
+            require_short(&mut spec.input_schema);
+            spec.marked_body["properties"][SHORT] =
+                json!({ "type": ["boolean", "null"], "description": SHORTLY });
+        }
         require_episode_id(&mut spec.input_schema);
         ToolSpec { on_episode: true, for_operators, ..spec }
     }
@@ -72,6 +83,8 @@ impl ToolSpec {
             idempotent: T::IDEMPOTENT,
             on_episode: false,
             for_operators: false,
+            full_only: T::FULL_ONLY,
+            strict: T::STRICT,
             route: T::route(),
         }
     }
@@ -111,6 +124,9 @@ impl ToolSpec {
     fn leaving_out(&self, own_fields: bool) -> Map<String, Value> {
         let mut schema = Value::Object(self.input_schema.clone());
         leave_out(&mut schema, own_fields);
+        if let (true, Value::Array(required)) = (own_fields, &mut schema["required"]) {
+            required.retain(|name| name != SHORT);
+        }
         schema.as_object_mut().map(std::mem::take).unwrap_or_default()
     }
 

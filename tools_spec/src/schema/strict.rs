@@ -44,6 +44,20 @@ pub fn strict_schema<T: JsonSchema>(wording: Wording) -> (String, Map<String, Va
     (description, object)
 }
 
+/// The field by which every tool is asked for a short reply, and what it says.
+pub const SHORT: &str = "short";
+pub const SHORTLY: &str = "True: a shorter reply, without what is as it should be.";
+
+/// Adds the field by which a tool is asked for a short reply. Strict hosts limit how many fields may be null, so it may not.
+pub fn require_short(schema: &mut Map<String, Value>) {
+    if let Some(Value::Object(properties)) = schema.get_mut("properties") {
+        properties.insert(SHORT.into(), json!({ "type": "boolean", "description": SHORTLY }));
+    }
+    if let Some(Value::Array(required)) = schema.get_mut("required") {
+        required.push(json!(SHORT));
+    }
+}
+
 /// Adds the handle that stands in the path over REST and among the arguments everywhere else.
 pub fn require_episode_id(schema: &mut Map<String, Value>) {
     let handle = json!({ "type": "string", "description": "The episode, as start_episode returned it." });
@@ -109,6 +123,10 @@ fn list_choices(object: &mut Map<String, Value>) {
 }
 
 fn close_object(object: &mut Map<String, Value>) {
+    // What may be any object stays so.
+    if object.get("additionalProperties") == Some(&Value::Bool(true)) {
+        return;
+    }
     let properties = object.entry("properties").or_insert_with(|| json!({}));
     let names: Vec<Value> =
         properties.as_object().into_iter().flatten().map(|(name, _)| json!(name)).collect();

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::checks;
 use crate::limits;
+use crate::parts::PoseFrame;
 use crate::tool::Tool;
 
 /// Ask whether a robot's wrists could reach poses from where it stands, using the arms that are given a pose and the waist.
@@ -29,6 +30,9 @@ pub struct CheckReach {
     /// Right wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null: as it is to be now.
     #[schemars(extend("contains" = limits::direction()))]
     pub right_quaternion_wxyz: Option<[f64; 4]>,
+    /// The frame of the poses: "pelvis", "level" or "start". Null: "pelvis".
+    #[schemars(extend("full_only" = true))]
+    pub frame: Option<PoseFrame>,
 }
 
 /// The fields of which at least one has to be given.
@@ -47,6 +51,7 @@ impl Tool for CheckReach {
             left_quaternion_wxyz: None,
             right_position_m: Some([0.30, -0.20, 0.10]),
             right_quaternion_wxyz: Some([1.0, 0.0, 0.0, 0.0]),
+            frame: None,
         }
     }
 

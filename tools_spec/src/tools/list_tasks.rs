@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::start_episode::Instruction;
+use super::start_episode::{Instruction, PhaseInfo};
 use crate::parts::{BaseLimits, Protocol};
 use crate::tool::{Route, Tool};
 
@@ -13,7 +13,11 @@ use crate::tool::{Route, Tool};
 #[schemars(extend("paper" = "List the tasks that start_episode can start: their instructions and the budgets of each protocol; and how \
     fast and how low the robots can move."))]
 #[serde(deny_unknown_fields)]
-pub struct ListTasks {}
+pub struct ListTasks {
+    /// True: of each task its id and what has to be done alone; start_episode tells the rest.
+    #[serde(default)]
+    pub short: bool,
+}
 
 impl Tool for ListTasks {
     type Reply = TaskList;
@@ -21,7 +25,7 @@ impl Tool for ListTasks {
     const READ_ONLY: bool = true;
 
     fn example() -> Self {
-        ListTasks {}
+        ListTasks { short: false }
     }
 
     fn route() -> Route {
@@ -38,6 +42,18 @@ pub struct TaskList {
     pub base_limits: BaseLimits,
 }
 
+impl TaskList {
+    /// The list as it is told shortly.
+    pub fn shortened(mut self) -> TaskList {
+        for TaskInfo { id: _, instruction: _, robots, phases, protocols } in &mut self.tasks {
+            robots.clear();
+            phases.clear();
+            protocols.clear();
+        }
+        self
+    }
+}
+
 /// One task.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TaskInfo {
@@ -45,26 +61,15 @@ pub struct TaskInfo {
     pub id: String,
     /// What has to be done, for whoever directs all robots.
     pub instruction: String,
-    /// What each robot has to do, for policies that direct one.
+    /// What each robot has to do, for policies that direct one; left out of a short reply.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub robots: Vec<Instruction>,
-    /// The phases, in the order they have to be reached; left out where the assistance is "paper".
+    /// The phases, in the order they have to be reached; left out of a short reply, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub phases: Vec<PhaseInfo>,
-    /// The protocols and their budgets for this task.
+    /// The protocols and their budgets for this task; left out of a short reply.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub protocols: Vec<ProtocolInfo>,
-}
-
-/// One phase of a task.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct PhaseInfo {
-    /// What the phase is called, as `transfer`.
-    pub id: String,
-    /// `p1`, `p2`, ...
-    pub number: String,
-    /// When the phase counts as reached.
-    pub description: String,
-    /// Whether more than one robot has to work on it.
-    pub collaborative: bool,
 }
 
 /// The budgets of one protocol.

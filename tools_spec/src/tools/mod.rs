@@ -10,22 +10,27 @@ mod observe;
 mod query_depth;
 mod say;
 mod send_joint_chunk;
+mod send_plan;
 mod start_episode;
 mod wait;
 mod walk;
+mod walk_to;
 
 pub use check_reach::{CheckReach, HandReach, ReachReply};
 pub use finish::{EndReason, Finish, PhaseTimes, ResultReply};
 pub use get_robot_state::{GetRobotState, RobotState};
 pub use get_status::{GetStatus, StatusReply};
-pub use list_tasks::{ListTasks, PhaseInfo, ProtocolInfo, TaskInfo, TaskList};
+pub use list_tasks::{ListTasks, ProtocolInfo, TaskInfo, TaskList};
 pub use move_wrists::{MoveWrists, WristMove};
 pub use observe::{CameraCalibration, CameraImage, Observation, Observe};
-pub use query_depth::{DepthPoint, DepthReply, QueryDepth};
+pub use query_depth::{Color, DepthReply, DepthRow, QueryDepth, Surface, SurfaceQuery};
 pub use say::Say;
 pub use send_joint_chunk::{ACTION_ROW_LEN, JointChunk, SendJointChunk, action_row_layout};
+pub use send_plan::{Expectation, PlanReply, PlannedCommand, SendPlan};
 pub use start_episode::{
-    Brief, Briefing, Instruction, JointInfo, RobotInfo, RobotKind, StartEpisode, StartReply,
+    Brief, Briefing, Instruction, JointInfo, PhaseInfo, RobotInfo, RobotKind, StartEpisode, StartReply,
+    WorkedGrip,
 };
 pub use wait::Wait;
 pub use walk::{Walk, WalkMove};
+pub use walk_to::{Destination, WalkTo};

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::checks;
 use crate::limits;
-use crate::parts::CommandReply;
+use crate::parts::{CommandReply, PoseFrame};
 use crate::tool::Tool;
 
 /// Softer hands would be thrown about by what they feel of their own motion.
@@ -25,7 +25,7 @@ const LEAST_COMPLIANCE_N_M_S_RAD: f64 = 5.0;
     repeated, or by wait."))]
 #[serde(deny_unknown_fields)]
 pub struct MoveWrists {
-    /// Control steps of 20 ms: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark protocol.
+    /// Control steps of 20 ms: 1 up to the budget's steps_per_command.
     #[schemars(range(min = 1), extend("most_steps" = "maximum"))]
     pub steps: u32,
     /// One entry per robot that is to move; each robot at most once.
@@ -60,6 +60,10 @@ pub struct WristMove {
     /// the arm keeps its joints.
     #[schemars(extend("contains" = limits::direction()))]
     pub right_quaternion_wxyz: Option<[f64; 4]>,
+    /// The frame of the wrist poses of this entry: "pelvis"; "level", upright in the pelvis; or "start", which stays in the room while
+    /// the robot moves: in it a target may be sent again and again without moving with a pelvis that was pushed. Null: "pelvis".
+    #[schemars(extend("full_only" = true))]
+    pub frame: Option<PoseFrame>,
     /// True: the wrist targets move with the pelvis from the command's beginning on, as a robot that carries something wants
     /// it. False or null: they are fixed in the world.
     pub carried: Option<bool>,
@@ -104,6 +108,7 @@ impl WristMove {
             left_quaternion_wxyz: None,
             right_position_m: None,
             right_quaternion_wxyz: None,
+            frame: None,
             carried: None,
             compliance_n_s_m: None,
             side_compliance_n_s_m: None,

@@ -6,15 +6,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::checks;
 use crate::limits;
-use crate::parts::PixelRegion;
+use crate::parts::{PixelRegion, PoseFrame};
 use crate::tool::Tool;
 
-/// Measure depth at pixels of a robot's head camera, named one by one or as a region: at most 256 of them either way. Returns
-/// for each pixel the distance along the optical axis and the 3-D point in the robot's pelvis frame, the frame that wrist
-/// targets are given in. A pixel sees a surface, so the middle of an object lies a little behind the point. Costs no steps;
-/// physics stands still.
+/// Measure where what a robot's head camera sees is, at pixels named one by one or as a region: at most 256 of them either way. Returns
+/// a row [u, v, x, y, z] for each pixel: the 3-D point in the robot's pelvis frame, the frame that wrist targets are given in. A pixel
+/// sees a surface, so the middle of an object lies a little behind the point. Costs no steps; physics stands still.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[schemars(extend("oneOf" = limits::either("pixels", "array", "region", "object")))]
+#[schemars(extend("oneOf" = limits::one_of(&[("pixels", "array"), ("region", "object"), ("surface", "object")])))]
 #[serde(deny_unknown_fields)]
 pub struct QueryDepth {
     /// The robot whose camera measures, as "A".
@@ -26,6 +25,13 @@ pub struct QueryDepth {
     pub pixels: Option<Vec<[i64; 2]>>,
     /// Pixels of a rectangle, row by row, at most 256 of them. Null: those of `pixels`.
     pub region: Option<PixelRegion>,
+    /// A surface to find, whose middle, size and corners are told in place of points: give pixel, [u, v] of a place on it, or color, as
+    /// "red": then it is the largest of that colour.
+    #[schemars(extend("full_only" = true))]
+    pub surface: Option<SurfaceQuery>,
+    /// The frame of the points: "pelvis", "level" or "start". Null: "pelvis".
+    #[schemars(extend("full_only" = true))]
+    pub frame: Option<PoseFrame>,
 }
 
 impl QueryDepth {
@@ -42,7 +48,13 @@ impl Tool for QueryDepth {
     const READ_ONLY: bool = true;
 
     fn example() -> Self {
-        QueryDepth { robot: "A".into(), pixels: Some(vec![[160, 120], [170, 120]]), region: None }
+        QueryDepth {
+            robot: "A".into(),
+            pixels: Some(vec![[160, 120], [170, 120]]),
+            region: None,
+            surface: None,
+            frame: None,
+        }
     }
 
     fn robots(&self) -> Vec<&str> {
@@ -50,15 +62,95 @@ impl Tool for QueryDepth {
     }
 
     fn validate(&self) -> Result<(), String> {
-        match (&self.pixels, &self.region) {
-            (Some(pixels), None) => checks::pixels(pixels),
-            (None, Some(region)) => checks::region(region),
-            (None, None) | (Some(_), Some(_)) => Err(
-                "give either pixels, as [[160, 120]], or region, as {\"from\": [100, 80], \"to\": [220, 170], \"stride\": 10}"
+        match (&self.pixels, &self.region, &self.surface) {
+            (Some(pixels), None, None) => checks::pixels(pixels),
+            (None, Some(region), None) => checks::region(region),
+            (None, None, Some(surface)) => match (surface.pixel, surface.color) {
+                (Some(_), None) | (None, Some(_)) => Ok(()),
+                (None, None) | (Some(_), Some(_)) => {
+                    Err("give either surface.pixel, as [160, 120], or surface.color, as \"red\"".into())
+                }
+            },
+            _ => Err(
+                "give either pixels, as [[160, 120]], or region, as {\"from\": [100, 80], \"to\": [220, 170], \"stride\": 10}, or \
+                 surface, as {\"pixel\": [160, 120]}"
                     .into(),
             ),
         }
     }
+}
+
+/// A surface in a picture: what is joined to a pixel, or the largest of a colour.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SurfaceQuery {
+    /// A pixel on it, as [160, 120]. Null: the largest of `color`.
+    #[schemars(extend("prefixItems" = limits::pixel_range()))]
+    pub pixel: Option<[i64; 2]>,
+    /// Its colour. Null: that of `pixel`.
+    pub color: Option<Color>,
+}
+
+/// A colour by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[allow(missing_docs, reason = "colours are called what they are")]
+pub enum Color {
+    Red,
+    Orange,
+    Yellow,
+    Green,
+    Blue,
+    Purple,
+    White,
+    Grey,
+    Black,
+}
+
+impl Color {
+    /// Every colour.
+    pub const ALL: [Color; 9] = [
+        Color::Red,
+        Color::Orange,
+        Color::Yellow,
+        Color::Green,
+        Color::Blue,
+        Color::Purple,
+        Color::White,
+        Color::Grey,
+        Color::Black,
+    ];
+}
+
+impl JsonSchema for Color {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Color".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({ "type": "string", "enum": Color::ALL })
+    }
+}
+
+/// A surface as the camera sees it: only what is in view, and of a thing only its near side.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Surface {
+    /// How many pixels it has.
+    pub pixels: u32,
+    /// Its top left and bottom right in the picture, as [u, v].
+    pub from: [i64; 2],
+    /// See `from`.
+    pub to: [i64; 2],
+    /// Its mean colour, [red, green, blue] from 0 to 255.
+    pub rgb: [u8; 3],
+    /// The mean of its points, in metres in the frame of the reply.
+    pub centroid_m: [f64; 3],
+    /// How far it reaches along each axis of that frame, in metres.
+    pub extent_m: [f64; 3],
+    /// The four points of its outline that span the most of it in the picture, in the order of its outline: of a rectangle its corners.
+    pub corners_m: Vec<[f64; 3]>,
+    /// Whether it goes on beyond the picture.
+    pub cut_off: bool,
 }
 
 /// The reply to `query_depth`.
@@ -66,17 +158,52 @@ impl Tool for QueryDepth {
 pub struct DepthReply {
     /// The robot whose camera measured.
     pub robot: String,
-    /// One entry per pixel asked for, in the same order; of a region row by row.
-    pub points: Vec<DepthPoint>,
+    /// The frame of the points, where the call named another than that of the pelvis; left out otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame: Option<PoseFrame>,
+    /// The surface that was asked for, and that was found; left out otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surface: Option<Surface>,
+    /// What each column of `points` is: "u", "v", "x_m", "y_m", "z_m".
+    pub columns: [String; 5],
+    /// One row per pixel asked for, in the same order; of a region row by row. Millimetres; null where nothing is seen. Of a surface
+    /// none.
+    pub points: Vec<DepthRow>,
 }
 
-/// What one pixel sees.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct DepthPoint {
-    /// The pixel as [u, v].
-    pub pixel: [i64; 2],
-    /// Distance along the optical axis in metres; null where nothing is seen.
-    pub depth_m: Option<f64>,
-    /// The point in the robot's pelvis frame (x forward, y left, z up) in metres; null where nothing is seen.
-    pub point_in_pelvis_m: Option<[f64; 3]>,
+impl DepthReply {
+    /// What the columns are.
+    pub const COLUMNS: [&str; 5] = ["u", "v", "x_m", "y_m", "z_m"];
+}
+
+/// A pixel and the point that it sees: [u, v, x, y, z].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct DepthRow(pub i64, pub i64, pub Option<f64>, pub Option<f64>, pub Option<f64>);
+
+impl JsonSchema for DepthRow {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "DepthRow".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let cell = serde_json::json!({ "type": ["number", "null"] });
+        schemars::json_schema!({ "type": "array", "items": cell, "minItems": 5, "maxItems": 5 })
+    }
+}
+
+impl DepthRow {
+    /// The row of a pixel that sees `point_m`.
+    pub fn new([u, v]: [i64; 2], point_m: Option<[f64; 3]>) -> DepthRow {
+        let [x_m, y_m, z_m] = point_m.map_or([None; 3], |point_m| point_m.map(Some));
+        DepthRow(u, v, x_m, y_m, z_m)
+    }
+
+    /// The point, if the pixel sees one.
+    pub fn point_m(&self) -> Option<[f64; 3]> {
+        Some([self.2?, self.3?, self.4?])
+    }
 }

@@ -24,8 +24,7 @@ pub fn action_row_layout() -> String {
 }
 
 /// Send joint targets for one or more robots, one row per control step of 20 ms. Rows of all named robots run side by
-/// side, so each robot needs the same number of rows: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark
-/// protocol. Robots that are not named hold still. Targets beyond a joint's limits are clamped and reported.
+/// side, so each robot needs the same number of rows: 1 up to the budget's steps_per_command. Robots that are not named hold still. Targets beyond a joint's limits are clamped and reported.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SendJointChunk {
@@ -44,8 +43,7 @@ pub struct JointChunk {
     /// The robot, as "A".
     #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
-    /// Rows of 35 numbers each, as many as every other robot has; 1 to 25 rows in the agentic protocol, 1 to 50 in the benchmark
-    /// protocol. A row: joint targets in radians for left_arm 7, right_arm 7, left_hand 7, right_hand 7, waist 3 (yaw,
+    /// Rows of 35 numbers each, as many as every other robot has. A row: joint targets in radians for left_arm 7, right_arm 7, left_hand 7, right_hand 7, waist 3 (yaw,
     /// roll, pitch), then the base command: vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m. An arm is shoulder_pitch,
     /// shoulder_roll, shoulder_yaw, elbow, wrist_roll, wrist_pitch, wrist_yaw; a hand is thumb_0, thumb_1, thumb_2,
     /// middle_0, middle_1, index_0, index_1.

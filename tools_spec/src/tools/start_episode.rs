@@ -2,6 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use super::get_status::StatusReply;
 use crate::parts::{BaseLimits, OperatorToken, Protocol};
@@ -20,6 +21,9 @@ pub struct StartEpisode {
     pub seed: u32,
     /// The rules: "agentic" for agents that think between commands, "benchmark" for learned policies. Null: "agentic".
     pub protocol: Option<Protocol>,
+    /// True: without the lists of joints and columns that only send_joint_chunk needs.
+    #[serde(default)]
+    pub short: bool,
 }
 
 impl Tool for StartEpisode {
@@ -28,7 +32,7 @@ impl Tool for StartEpisode {
     const READ_ONLY: bool = false;
 
     fn example() -> Self {
-        StartEpisode { task: "handover".into(), seed: 0, protocol: Some(Protocol::Agentic) }
+        StartEpisode { task: "handover".into(), seed: 0, protocol: Some(Protocol::Agentic), short: false }
     }
 
     fn route() -> Route {
@@ -41,6 +45,8 @@ impl Tool for StartEpisode {
 pub struct StartReply {
     /// The handle that every other tool needs.
     pub episode_id: String,
+    /// An episode to which no call comes for as many seconds ends.
+    pub idle_limit_s: u64,
     /// What each robot's operator needs, where each robot has one of its own; left out otherwise.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub operators: Vec<OperatorToken>,
@@ -58,17 +64,47 @@ pub struct Briefing {
     pub instructions: Vec<Instruction>,
     /// The robots.
     pub robots: Vec<RobotInfo>,
+    /// The phases of the task, in the order they have to be reached; left out where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub phases: Vec<PhaseInfo>,
+    /// The things of the task: how large they are (along their own axes), and about how far from each robot they stand before the seed
+    /// moves them by a decimetre or so. Left out where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub room: Vec<String>,
     /// What can be asked of robots of each kind.
     pub kinds: Vec<RobotKind>,
     /// What has to be known to see and to act.
     pub brief: Brief,
-    /// The columns of a row of send_joint_chunk.
+    /// The columns of a row of send_joint_chunk; left out of a short reply.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub action_row: Vec<String>,
     /// Where the episode stands after the initial hold.
     pub status: StatusReply,
     /// Why the recording is not complete; left out where it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording_failed: Option<String>,
+}
+
+impl Briefing {
+    /// The briefing as it is told shortly.
+    pub fn shortened(mut self) -> Briefing {
+        self.action_row.clear();
+        self.kinds.iter_mut().for_each(|kind| kind.joints.clear());
+        self
+    }
+}
+
+/// One phase of a task.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PhaseInfo {
+    /// What the phase is called, as `transfer`.
+    pub id: String,
+    /// `p1`, `p2`, ...
+    pub number: String,
+    /// When the phase counts as reached.
+    pub description: String,
+    /// Whether more than one robot has to work on it.
+    pub collaborative: bool,
 }
 
 /// What one robot has to do.
@@ -94,7 +130,8 @@ pub struct RobotInfo {
 pub struct RobotKind {
     /// What `robots` call it.
     pub kind: String,
-    /// Its joints.
+    /// Its joints; left out of a short reply.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joints: Vec<JointInfo>,
     /// The base commands that its locomotion accepts.
     #[serde(flatten)]
@@ -128,7 +165,54 @@ pub struct Brief {
     pub camera: String,
     /// The shape of a hand.
     pub hands: String,
+    /// How walking goes, as measured, and what replies say of the base; left out where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub walking: Option<String>,
     /// How to grasp; left out where the server gives no hints.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grasping: Option<String>,
+    /// Grips that work, as `grasping` says how to use them; left out where the server gives no hints.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub grips: Vec<WorkedGrip>,
+}
+
+impl Brief {
+    /// All of it, a line each.
+    pub fn lines(&self) -> Vec<String> {
+        let Brief { frames, partners, odometry, camera, hands, walking, grasping, grips } = self;
+        let told = [frames, partners]
+            .into_iter()
+            .chain(odometry)
+            .chain([camera, hands])
+            .chain(walking)
+            .chain(grasping);
+        told.cloned().chain(grips.iter().map(|grip| json!(grip).to_string())).collect()
+    }
+}
+
+/// A grip that works, of a right hand whose robot faces the thing squarely.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct WorkedGrip {
+    /// What it is for.
+    pub thing: String,
+    /// Which point of the thing `place_m` is.
+    pub place: String,
+    /// How the right wrist is turned, in the level frame.
+    pub right_quaternion_wxyz: [f64; 4],
+    /// How the left wrist is.
+    pub left_quaternion_wxyz: [f64; 4],
+    /// Where the place lies in the right wrist's frame while the hand holds it; negate y for a left hand.
+    pub place_m: [f64; 3],
+    /// Where the hand stops on its way in, the farthest first: so much is added to `place_m` there.
+    pub stops_m: Vec<[f64; 3]>,
+    /// Finger angles of a right hand on its way in and out, as right_fingers_rad; a left one negates all but the first.
+    pub open_rad: [f64; 7],
+    /// Finger angles of a right hand that holds.
+    pub close_rad: [f64; 7],
+    /// How far behind the places of its hands the pelvis stands; left out where that does not matter.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stand_behind_m: Option<f64>,
+    /// How low the pelvis is commanded, so that hands come there; left out where the robot stands upright.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pelvis_height_m: Option<f64>,
 }

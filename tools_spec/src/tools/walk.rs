@@ -8,13 +8,13 @@ use crate::limits;
 use crate::parts::CommandReply;
 use crate::tool::Tool;
 
-/// Walk, turn or change the pelvis height of one or more robots for a number of control steps of 20 ms, while their arms
+/// Walk, turn, change the pelvis height or look around with one or more robots for a number of control steps of 20 ms, while their arms
 /// and hands keep their joints and so go along. Velocities are in the robot's own frame and apply during this command only;
 /// the height persists.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Walk {
-    /// Control steps of 20 ms: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark protocol.
+    /// Control steps of 20 ms: 1 up to the budget's steps_per_command.
     #[schemars(range(min = 1), extend("most_steps" = "maximum"))]
     pub steps: u32,
     /// One entry per robot that is to move; each robot at most once. Robots that are not named hold still.
@@ -38,10 +38,20 @@ pub struct WalkMove {
     /// Height of the pelvis above the floor in metres, for a robot that stands; while it steps it may be lower.
     /// Null: the target stays.
     pub pelvis_height_m: Option<f64>,
+    /// Where the waist is to turn, in radians to the left, at 1 rad/s at most: head and arms turn with it. 0 is straight ahead. Null: it
+    /// stays.
+    pub waist_yaw_rad: Option<f64>,
+    /// A point to turn the head to by the waist, [x, y, z] in the pelvis frame, in place of waist_yaw_rad. Null: none.
+    pub look_at_m: Option<[f64; 3]>,
 }
 
 impl WalkMove {
     fn validate(&self) -> Result<(), String> {
+        checks::finite("waist_yaw_rad", self.waist_yaw_rad.as_slice())?;
+        checks::finite("look_at_m", self.look_at_m.as_ref().map_or(&[], |point_m| &point_m[..]))?;
+        if self.waist_yaw_rad.is_some() && self.look_at_m.is_some() {
+            return Err("waist_yaw_rad and look_at_m both turn the waist; give one of them".into());
+        }
         checks::base([Some(self.vx_m_s), Some(self.vy_m_s), Some(self.yaw_rate_rad_s), self.pelvis_height_m])
     }
 }
@@ -58,6 +68,8 @@ impl Tool for Walk {
             vy_m_s: 0.0,
             yaw_rate_rad_s: 0.0,
             pelvis_height_m: None,
+            waist_yaw_rad: None,
+            look_at_m: None,
         };
         Walk { steps: 25, robots: vec![forward] }
     }

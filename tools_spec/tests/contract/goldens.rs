@@ -34,8 +34,7 @@ fn tools_in_every_format() {
 
 /// The tools of `other` that differ from those of `one`.
 fn differing(one: Vec<ToolSpec>, other: Vec<ToolSpec>) -> Value {
-    let differ = one.into_iter().zip(other).filter(|(one, other)| one != other);
-    differ.map(|(_, other)| json!(other)).collect()
+    other.into_iter().filter(|other| !one.contains(other)).map(|other| json!(other)).collect()
 }
 
 /// What hints say is kept apart: with them only the texts differ.

@@ -19,8 +19,7 @@ const PAPER: &[(&str, &str)] = &[
         "executed_steps stop_reason time_s phases budget.steps_left budget.wall_clock_left_s budget.steps_per_command \
          robots.robot robots.SIDE.target.position_m robots.SIDE.target.quaternion_wxyz robots.SIDE.measured.position_m \
          robots.SIDE.measured.quaternion_wxyz robots.SIDE.position_error_m robots.SIDE.orientation_error_rad \
-         robots.SIDE.fingers.target_rad robots.SIDE.fingers.measured_rad robots.SIDE.joints_clamped robots.SIDE.joints_at_limit \
-         robots.waist_joints_clamped robots.waist_joints_at_limit robots.base_command_clamped",
+         robots.SIDE.fingers.target_rad robots.SIDE.fingers.measured_rad",
     ),
     (
         "get_robot_state",
@@ -35,7 +34,7 @@ const PAPER: &[(&str, &str)] = &[
          cameras.fx cameras.fy cameras.cx cameras.cy cameras.camera_in_pelvis.position_m \
          cameras.camera_in_pelvis.quaternion_wxyz images.robot images.png_base64",
     ),
-    ("query_depth", "robot points.pixel points.depth_m points.point_in_pelvis_m"),
+    ("query_depth", "robot columns points"),
     (
         "check_reach",
         "robot reachable left right.reachable right.position_error_m right.orientation_error_rad joints_at_limit",
@@ -52,11 +51,19 @@ const PAPER: &[(&str, &str)] = &[
     ),
 ];
 
+/// What replies tell beside that where there is something to say.
+const PAPER_AT_TIMES: &[(&str, &str)] = &[(
+    "command",
+    "robots.SIDE.joints_clamped robots.SIDE.joints_at_limit robots.waist_joints_clamped robots.waist_joints_at_limit \
+     robots.base_command_clamped",
+)];
+
 /// What `full` tells beside that.
 const FULL: &[(&str, &str)] = &[
     (
         "command",
         "fallen.robot fallen.fallen phases.id phases.number phases.time_s robots.SIDE.state robots.SIDE.fingers.state \
+         robots.SIDE.grip robots.base.state robots.base.pelvis_height_m \
          robots.SIDE.largest_effort.joint robots.SIDE.largest_effort.share robots.SIDE.force_n \
          robots.pelvis_in_start.position_m robots.pelvis_in_start.quaternion_wxyz robots.base_motion.forward_m \
          robots.base_motion.left_m robots.base_motion.up_m robots.base_motion.turned_rad",
@@ -81,6 +88,13 @@ const FULL: &[(&str, &str)] = &[
     ),
 ];
 
+/// As [`PAPER_AT_TIMES`], under `full`.
+const FULL_AT_TIMES: &[(&str, &str)] = &[(
+    "command",
+    "robots.frame robots.SIDE.touches robots.SIDE.compliance_offset_m robots.base.commanded_height_m robots.base.comes_to_rest_m \
+     robots.base.displaced_m",
+)];
+
 /// Fields by tool.
 type Told = BTreeMap<String, BTreeSet<String>>;
 
@@ -93,6 +107,16 @@ fn listed(lists: &[&[(&str, &str)]]) -> Told {
                 false => vec![field.to_owned()],
             };
             told.entry((*tool).to_owned()).or_default().extend(names);
+        }
+    }
+    told
+}
+
+/// What was told but for what is told at times.
+fn without(mut told: Told, at_times: &[(&str, &str)]) -> Told {
+    for (tool, fields) in listed(&[at_times]) {
+        if let Some(told) = told.get_mut(&tool) {
+            told.retain(|field| !fields.contains(field));
         }
     }
     told
@@ -180,8 +204,9 @@ fn listen(assistance: Assistance) -> (Vec<Option<f64>>, EndReason, Told) {
 #[test]
 fn replies_of_a_whole_episode_tell_what_is_listed_and_nothing_else() {
     let (paper_times_s, ended, told) = listen(Assistance::Paper);
-    assert_eq!((ended, told), (EndReason::Finished, listed(&[PAPER])));
+    assert_eq!((ended, without(told, PAPER_AT_TIMES)), (EndReason::Finished, listed(&[PAPER])));
     let (full_times_s, ended, told) = listen(Assistance::Full);
+    let told = without(without(told, PAPER_AT_TIMES), FULL_AT_TIMES);
     assert_eq!((ended, told), (EndReason::TaskComplete, listed(&[PAPER, FULL])));
     assert!(paper_times_s.iter().all(Option::is_some), "{paper_times_s:?}");
     assert_eq!(paper_times_s, full_times_s, "an expert needs nothing of what only `full` tells");

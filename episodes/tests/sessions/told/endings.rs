@@ -61,7 +61,7 @@ fn looking_goes_on_after_the_end_and_the_clock_does_not() {
     session.call(QueryDepth::example().into()).unwrap();
     session.call(CheckReach::example().into()).unwrap();
     let refused = session.call(Wait { steps: 1 }.into()).unwrap_err();
-    assert!(matches!(refused, EpisodeError::Ended { reason: EndReason::Finished }), "{refused}");
+    assert!(matches!(refused, EpisodeError::Ended { reason: EndReason::Finished, .. }), "{refused}");
     assert_eq!((state(&mut session, "A"), session.state_hash()), before);
     assert_eq!(status(&mut session), ended, "neither the clock nor anything else has gone on");
 }

@@ -34,6 +34,45 @@ def plain(value: Any) -> Any:
 
 
 @dataclass(frozen=True)
+class Destination:
+    """Where one robot's pelvis is to come to rest."""
+
+    robot: str
+    """The robot, as "A"."""
+
+    to_m: Numbers
+    """[x, y] in metres in the robot's own start frame, as pelvis_in_start has it."""
+
+    heading_rad: float | None = None
+    """Which way it is to face, in radians counter-clockwise from how it faced at the start. None: as it faces now."""
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """What is expected of the robots that a command named, or of all after `wait`, once it is done. What is null
+    is not looked at.
+    """
+
+    arrived: bool | None = None
+    """Whether every wrist that has a target has arrived there."""
+
+    blocked: bool | None = None
+    """Whether a wrist is blocked or out of reach."""
+
+    force_above_n: float | None = None
+    """That a hand feels more than as many newtons."""
+
+    force_below_n: float | None = None
+    """That no hand feels more than as many newtons."""
+
+    phase_reached: str | None = None
+    """That this phase has been reached, as "p1"."""
+
+    base_stepping: bool | None = None
+    """Whether a robot steps."""
+
+
+@dataclass(frozen=True)
 class JointChunk:
     """The rows of one robot."""
 
@@ -41,11 +80,10 @@ class JointChunk:
     """The robot, as "A"."""
 
     rows: Numbers
-    """Rows of 35 numbers each, as many as every other robot has; 1 to 25 rows in the agentic protocol, 1 to 50 in
-    the benchmark protocol. A row: joint targets in radians for left_arm 7, right_arm 7, left_hand 7, right_hand
-    7, waist 3 (yaw, roll, pitch), then the base command: vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m. An
-    arm is shoulder_pitch, shoulder_roll, shoulder_yaw, elbow, wrist_roll, wrist_pitch, wrist_yaw; a hand is
-    thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1.
+    """Rows of 35 numbers each, as many as every other robot has. A row: joint targets in radians for left_arm 7,
+    right_arm 7, left_hand 7, right_hand 7, waist 3 (yaw, roll, pitch), then the base command: vx_m_s, vy_m_s,
+    yaw_rate_rad_s, pelvis_height_m. An arm is shoulder_pitch, shoulder_roll, shoulder_yaw, elbow, wrist_roll,
+    wrist_pitch, wrist_yaw; a hand is thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1.
     """
 
 
@@ -61,6 +99,31 @@ class PixelRegion:
 
     stride: int
     """1 for every pixel, 10 for every tenth one across and down."""
+
+
+@dataclass(frozen=True)
+class PlannedCommand:
+    """One command of a plan."""
+
+    tool: str
+    """"move_wrists", "walk", "wait" or "send_joint_chunk"."""
+
+    arguments: Any
+    """The arguments of that tool."""
+
+    expects: Expectation | None = None
+    """What has to be so afterwards for the plan to go on. None: nothing."""
+
+
+@dataclass(frozen=True)
+class SurfaceQuery:
+    """A surface in a picture: what is joined to a pixel, or the largest of a colour."""
+
+    pixel: Numbers | None = None
+    """A pixel on it, as [160, 120]. None: the largest of `color`."""
+
+    color: Color | None = None
+    """Its colour. None: that of `pixel`."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +147,16 @@ class WalkMove:
     pelvis_height_m: float | None = None
     """Height of the pelvis above the floor in metres, for a robot that stands; while it steps it may be lower.
     None: the target stays.
+    """
+
+    waist_yaw_rad: float | None = None
+    """Where the waist is to turn, in radians to the left, at 1 rad/s at most: head and arms turn with it. 0 is
+    straight ahead. None: it stays.
+    """
+
+    look_at_m: Numbers | None = None
+    """A point to turn the head to by the waist, [x, y, z] in the pelvis frame, in place of waist_yaw_rad. None:
+    none.
     """
 
 
@@ -120,6 +193,12 @@ class WristMove:
     right_quaternion_wxyz: Numbers | None = None
     """Right wrist orientation [w, x, y, z], as [1, 0, 0, 0]. None: it stays as it is to be turned; without a
     position either, the arm keeps its joints.
+    """
+
+    frame: PoseFrame | None = None
+    """The frame of the wrist poses of this entry: "pelvis"; "level", upright in the pelvis; or "start", which
+    stays in the room while the robot moves: in it a target may be sent again and again without moving with a
+    pelvis that was pushed. None: "pelvis".
     """
 
     carried: bool | None = None

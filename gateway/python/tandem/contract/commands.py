@@ -9,13 +9,39 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
+BaseState: TypeAlias = Literal[
+    "standing",
+    "stepping",
+    "settling",
+    "pushed",
+]
+"""Whether a base stands or steps, and why."""
+
+Grip: TypeAlias = Literal[
+    "none",
+    "touching",
+    "one_sided",
+    "holding",
+]
+"""What the fingers of a hand feel between them: the torques of their drives while they are stopped short of their
+targets.
+"""
+
 HandState: TypeAlias = Literal[
     "arrived",
+    "idle",
     "moving",
     "blocked",
     "out_of_reach",
 ]
 """How a wrist or fingers stand to their target."""
+
+PoseFrame: TypeAlias = Literal[
+    "pelvis",
+    "level",
+    "start",
+]
+""""""
 
 StopReason: TypeAlias = Literal[
     "steps_done",
@@ -24,6 +50,12 @@ StopReason: TypeAlias = Literal[
     "partner_done",
 ]
 """Why a command ended."""
+
+Touch: TypeAlias = Literal[
+    "itself",
+    "something",
+]
+"""What a hand touches, as far as it can feel that."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +86,41 @@ class BaseMotion:
 
 
 @dataclass(frozen=True)
+class BaseReport:
+    """What a base does, by its own controller and odometry."""
+
+    state: BaseState | None
+    """Whether it stands or steps, and why; left out where its controller does not tell standing from stepping."""
+
+    pelvis_height_m: float
+    """How high the pelvis is over the floor, in metres: measured, not commanded."""
+
+    commanded_height_m: float | None
+    """The height that it was last told, where it is more than 2 cm off that; left out otherwise."""
+
+    comes_to_rest_m: tuple[float, float] | None
+    """Where the pelvis will come to rest if no further step is commanded: [x, y] in the start frame, to within 5
+    cm. Only of a base that steps or settles.
+    """
+
+    displaced_m: tuple[float, float] | None
+    """How far a base that was told to stand is from where it came to rest, [forward, left] in metres as it faced
+    there; left out where that is less than 2 cm. Something pulled or pushed it.
+    """
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> BaseReport:
+        """Reads what JSON has."""
+        return BaseReport(
+            state=value.get("state"),
+            pelvis_height_m=value["pelvis_height_m"],
+            commanded_height_m=value.get("commanded_height_m"),
+            comes_to_rest_m=None if (got := value.get("comes_to_rest_m")) is None else tuple(got),
+            displaced_m=None if (got := value.get("displaced_m")) is None else tuple(got),
+        )
+
+
+@dataclass(frozen=True)
 class Budget:
     """What is left of the episode."""
 
@@ -80,7 +147,10 @@ class Budget:
 
 @dataclass(frozen=True)
 class CommandReply:
-    """The reply to every command: `move_wrists`, `walk`, `send_joint_chunk` and `wait`."""
+    """The reply to every command: `move_wrists`, `walk`, `send_joint_chunk` and `wait`. Lengths are told to the
+    millimetre, angles and quaternions to a thousandth. What is marked so is left out where the call asked for a
+    short reply.
+    """
 
     executed_steps: int
     """Control steps of 20 ms that were executed."""
@@ -95,7 +165,9 @@ class CommandReply:
     """One report per robot that the command named; after `wait`, one per robot of the episode."""
 
     fallen: tuple[RobotFallen, ...]
-    """Every robot of the episode; left out where the assistance is "paper"."""
+    """Every robot of the episode; in a short reply those that have fallen. Left out where the assistance is
+    "paper".
+    """
 
     phases: tuple[PhaseReached, ...]
     """Every phase reached so far, where the episode's assistance tells it."""
@@ -145,8 +217,8 @@ class FingerReport:
     state: HandState | None
     """How they stand to their targets; left out where the assistance is "paper"."""
 
-    target_rad: tuple[float, float, float, float, float, float, float]
-    """Joint angles that were asked for, in radians."""
+    target_rad: tuple[float, float, float, float, float, float, float] | None
+    """Joint angles that were asked for, in radians. Left out of a short reply."""
 
     measured_rad: tuple[float, float, float, float, float, float, float]
     """Joint angles that were measured, in radians."""
@@ -156,7 +228,7 @@ class FingerReport:
         """Reads what JSON has."""
         return FingerReport(
             state=value.get("state"),
-            target_rad=tuple(value["target_rad"]),
+            target_rad=None if (got := value.get("target_rad")) is None else tuple(got),
             measured_rad=tuple(value["measured_rad"]),
         )
 
@@ -168,52 +240,77 @@ class HandReport:
     state: HandState | None
     """How the wrist stands to its target; left out where the assistance is "paper"."""
 
-    target: Pose
-    """The wrist pose that was asked for, in the pelvis frame as it is now; of an arm without a wrist target, the
-    pose that its joint targets stand for.
+    grip: Grip | None
+    """What the fingers feel between them, by their own torques; left out where the assistance is "paper"."""
+
+    touches: Touch | None
+    """What stops the hand, as far as it can feel that; left out where it feels nothing, and where the assistance
+    is "paper".
     """
 
-    measured: Pose
-    """The wrist pose that was measured, in the pelvis frame as it is now."""
+    target: Pose | None
+    """The wrist pose that was asked for, in the pelvis frame as it is now; of an arm without a wrist target, the
+    pose that its joint targets stand for. Left out of a short reply.
+    """
 
-    position_error_m: float
-    """Distance from target to measured, in metres."""
+    measured: Pose | None
+    """The wrist pose that was measured, in the pelvis frame as it is now, its quaternion with the sign that is
+    nearer to the target's. Left out of a short reply where the state is "arrived" or "idle".
+    """
 
-    orientation_error_rad: float
-    """Angle from target to measured, in radians."""
+    position_error_m: float | None
+    """Distance from target to measured, in metres. Left out of a short reply where the state is "arrived" or
+    "idle".
+    """
 
-    fingers: FingerReport
-    """Its fingers."""
+    orientation_error_rad: float | None
+    """Angle from target to measured, in radians; left out as the distance is."""
+
+    compliance_offset_m: tuple[float, float, float] | None
+    """How far the hand has given way to what pulls it, by the command's compliance: its target is moved so far,
+    [x, y, z] in metres in the pelvis frame. Left out where it has not, and where the assistance is "paper".
+    """
+
+    fingers: FingerReport | None
+    """Its fingers; left out of a short reply where they have arrived."""
 
     largest_effort: Effort | None
-    """The joint of this arm and hand that works hardest; left out where the assistance is "paper"."""
+    """The joint of this arm and hand that works hardest; left out of a short reply where it works at less than
+    four fifths of its limit, and where the assistance is "paper".
+    """
 
     force_n: tuple[float, float, float] | None
-    """Force of the world on the hand in newtons, in the pelvis frame, as the arm's own joints feel it: a hand that
-    holds 0.5 kg feels about -4.9 along z; one in quick motion feels its own inertia, too. Left out where the
+    """Force of the world on the hand in newtons, [x, y, z] in the pelvis frame, as the arm's own joints feel it: a
+    hand that holds 0.5 kg feels about -4.9 along z, one that presses ahead on something a negative x. What
+    moving the arm takes is not counted. Left out of a short reply where it is less than 1 N, and where the
     assistance is "paper".
     """
 
     joints_clamped: tuple[str, ...]
-    """Joints of this arm and hand whose target lay beyond a limit and was moved to it."""
+    """Joints of this arm and hand whose target lay beyond a limit and was moved to it; left out where there are
+    none.
+    """
 
     joints_at_limit: tuple[str, ...]
-    """Joints of this arm and hand that rest at a limit."""
+    """Joints of this arm that rest at a limit; left out where there are none."""
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> HandReport:
         """Reads what JSON has."""
         return HandReport(
             state=value.get("state"),
-            target=Pose.of(value["target"]),
-            measured=Pose.of(value["measured"]),
-            position_error_m=value["position_error_m"],
-            orientation_error_rad=value["orientation_error_rad"],
-            fingers=FingerReport.of(value["fingers"]),
+            grip=value.get("grip"),
+            touches=value.get("touches"),
+            target=None if (got := value.get("target")) is None else Pose.of(got),
+            measured=None if (got := value.get("measured")) is None else Pose.of(got),
+            position_error_m=value.get("position_error_m"),
+            orientation_error_rad=value.get("orientation_error_rad"),
+            compliance_offset_m=None if (got := value.get("compliance_offset_m")) is None else tuple(got),
+            fingers=None if (got := value.get("fingers")) is None else FingerReport.of(got),
             largest_effort=None if (got := value.get("largest_effort")) is None else Effort.of(got),
             force_n=None if (got := value.get("force_n")) is None else tuple(got),
-            joints_clamped=tuple(value["joints_clamped"]),
-            joints_at_limit=tuple(value["joints_at_limit"]),
+            joints_clamped=tuple(value.get("joints_clamped", ())),
+            joints_at_limit=tuple(value.get("joints_at_limit", ())),
         )
 
 
@@ -237,6 +334,33 @@ class PhaseReached:
             id=value["id"],
             number=value["number"],
             time_s=value["time_s"],
+        )
+
+
+@dataclass(frozen=True)
+class PlanReply:
+    """The reply to `send_plan` and `walk_to`."""
+
+    commands: int
+    """Commands that were carried out."""
+
+    executed_steps: int
+    """Control steps of 20 ms that they took together."""
+
+    stopped: str | None
+    """Why no more were; null where all was done."""
+
+    last: CommandReply
+    """The reply to the last command that was carried out."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> PlanReply:
+        """Reads what JSON has."""
+        return PlanReply(
+            commands=value["commands"],
+            executed_steps=value["executed_steps"],
+            stopped=value.get("stopped"),
+            last=CommandReply.of(value["last"]),
         )
 
 
@@ -285,11 +409,17 @@ class RobotReport:
     robot: str
     """The robot, as "A"."""
 
+    frame: PoseFrame | None
+    """The frame of wrist poses where the command named another than that of the pelvis; left out otherwise."""
+
     left: HandReport
     """Its left arm and hand."""
 
     right: HandReport
     """Its right arm and hand."""
+
+    base: BaseReport | None
+    """What its base does; left out where the assistance is "paper"."""
 
     pelvis_in_start: Pose | None
     """Where its own IMU and joints have it: the pose of its pelvis in the start frame, which lies on the floor
@@ -298,27 +428,33 @@ class RobotReport:
     """
 
     base_motion: BaseMotion | None
-    """How far the command took the base, by the same odometry; left out where the assistance is "paper"."""
+    """How far the command took the base, by the same odometry; left out where the assistance is "paper", and of a
+    short reply where it is less than a centimetre and a hundredth of a radian.
+    """
 
     waist_joints_clamped: tuple[str, ...]
-    """Waist joints whose target lay beyond a limit and was moved to it."""
+    """Waist joints whose target lay beyond a limit and was moved to it; left out where there are none."""
 
     waist_joints_at_limit: tuple[str, ...]
-    """Waist joints that rest at a limit."""
+    """Waist joints that rest at a limit; left out where there are none."""
 
     base_command_clamped: tuple[str, ...]
-    """Fields of the base command that lay beyond what locomotion accepts and were moved to it, as `vx_m_s`."""
+    """Fields of the base command that lay beyond what locomotion accepts and were moved to it, as `vx_m_s`; left
+    out where there are none.
+    """
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> RobotReport:
         """Reads what JSON has."""
         return RobotReport(
             robot=value["robot"],
+            frame=value.get("frame"),
             left=HandReport.of(value["left"]),
             right=HandReport.of(value["right"]),
+            base=None if (got := value.get("base")) is None else BaseReport.of(got),
             pelvis_in_start=None if (got := value.get("pelvis_in_start")) is None else Pose.of(got),
             base_motion=None if (got := value.get("base_motion")) is None else BaseMotion.of(got),
-            waist_joints_clamped=tuple(value["waist_joints_clamped"]),
-            waist_joints_at_limit=tuple(value["waist_joints_at_limit"]),
-            base_command_clamped=tuple(value["base_command_clamped"]),
+            waist_joints_clamped=tuple(value.get("waist_joints_clamped", ())),
+            waist_joints_at_limit=tuple(value.get("waist_joints_at_limit", ())),
+            base_command_clamped=tuple(value.get("base_command_clamped", ())),
         )

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
-from .commands import Budget, PhaseReached, Pose, RobotFallen
+from .commands import Budget, PhaseReached, Pose, PoseFrame, RobotFallen
 
 Assistance: TypeAlias = Literal[
     "paper",
@@ -116,44 +116,35 @@ class CameraCalibration:
 
 
 @dataclass(frozen=True)
-class DepthPoint:
-    """What one pixel sees."""
-
-    pixel: tuple[int, int]
-    """The pixel as [u, v]."""
-
-    depth_m: float | None
-    """Distance along the optical axis in metres; null where nothing is seen."""
-
-    point_in_pelvis_m: tuple[float, float, float] | None
-    """The point in the robot's pelvis frame (x forward, y left, z up) in metres; null where nothing is seen."""
-
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> DepthPoint:
-        """Reads what JSON has."""
-        return DepthPoint(
-            pixel=tuple(value["pixel"]),
-            depth_m=value.get("depth_m"),
-            point_in_pelvis_m=None if (got := value.get("point_in_pelvis_m")) is None else tuple(got),
-        )
-
-
-@dataclass(frozen=True)
 class DepthReply:
     """The reply to `query_depth`."""
 
     robot: str
     """The robot whose camera measured."""
 
-    points: tuple[DepthPoint, ...]
-    """One entry per pixel asked for, in the same order; of a region row by row."""
+    frame: PoseFrame | None
+    """The frame of the points, where the call named another than that of the pelvis; left out otherwise."""
+
+    surface: Surface | None
+    """The surface that was asked for, and that was found; left out otherwise."""
+
+    columns: tuple[str, str, str, str, str]
+    """What each column of `points` is: "u", "v", "x_m", "y_m", "z_m"."""
+
+    points: tuple[tuple[Any, Any, Any, Any, Any], ...]
+    """One row per pixel asked for, in the same order; of a region row by row. Millimetres; null where nothing is
+    seen. Of a surface none.
+    """
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> DepthReply:
         """Reads what JSON has."""
         return DepthReply(
             robot=value["robot"],
-            points=tuple(DepthPoint.of(item) for item in value["points"]),
+            frame=value.get("frame"),
+            surface=None if (got := value.get("surface")) is None else Surface.of(got),
+            columns=tuple(value["columns"]),
+            points=tuple(value["points"]),
         )
 
 
@@ -412,4 +403,49 @@ class StatusReply:
             phases=tuple(PhaseReached.of(item) for item in value["phases"]),
             budget=Budget.of(value["budget"]),
             state_hash=value["state_hash"],
+        )
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A surface as the camera sees it: only what is in view, and of a thing only its near side."""
+
+    pixels: int
+    """How many pixels it has."""
+
+    from_: tuple[int, int]
+    """Its top left and bottom right in the picture, as [u, v]."""
+
+    to: tuple[int, int]
+    """See `from`."""
+
+    rgb: tuple[int, int, int]
+    """Its mean colour, [red, green, blue] from 0 to 255."""
+
+    centroid_m: tuple[float, float, float]
+    """The mean of its points, in metres in the frame of the reply."""
+
+    extent_m: tuple[float, float, float]
+    """How far it reaches along each axis of that frame, in metres."""
+
+    corners_m: tuple[tuple[float, float, float], ...]
+    """The four points of its outline that span the most of it in the picture, in the order of its outline: of a
+    rectangle its corners.
+    """
+
+    cut_off: bool
+    """Whether it goes on beyond the picture."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> Surface:
+        """Reads what JSON has."""
+        return Surface(
+            pixels=value["pixels"],
+            from_=tuple(value["from"]),
+            to=tuple(value["to"]),
+            rgb=tuple(value["rgb"]),
+            centroid_m=tuple(value["centroid_m"]),
+            extent_m=tuple(value["extent_m"]),
+            corners_m=tuple(tuple(item) for item in value["corners_m"]),
+            cut_off=value["cut_off"],
         )

@@ -58,8 +58,14 @@ class Brief:
     hands: str
     """The shape of a hand."""
 
+    walking: str | None
+    """How walking goes, as measured, and what replies say of the base; left out where the assistance is "paper"."""
+
     grasping: str | None
     """How to grasp; left out where the server gives no hints."""
+
+    grips: tuple[WorkedGrip, ...]
+    """Grips that work, as `grasping` says how to use them; left out where the server gives no hints."""
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> Brief:
@@ -70,7 +76,9 @@ class Brief:
             odometry=value.get("odometry"),
             camera=value["camera"],
             hands=value["hands"],
+            walking=value.get("walking"),
             grasping=value.get("grasping"),
+            grips=tuple(WorkedGrip.of(item) for item in value.get("grips", ())),
         )
 
 
@@ -87,6 +95,14 @@ class Briefing:
     robots: tuple[RobotInfo, ...]
     """The robots."""
 
+    phases: tuple[PhaseInfo, ...]
+    """The phases of the task, in the order they have to be reached; left out where the assistance is "paper"."""
+
+    room: tuple[str, ...]
+    """The things of the task: how large they are (along their own axes), and about how far from each robot they
+    stand before the seed moves them by a decimetre or so. Left out where the assistance is "paper".
+    """
+
     kinds: tuple[RobotKind, ...]
     """What can be asked of robots of each kind."""
 
@@ -94,7 +110,7 @@ class Briefing:
     """What has to be known to see and to act."""
 
     action_row: tuple[str, ...]
-    """The columns of a row of send_joint_chunk."""
+    """The columns of a row of send_joint_chunk; left out of a short reply."""
 
     status: StatusReply
     """Where the episode stands after the initial hold."""
@@ -109,9 +125,11 @@ class Briefing:
             instruction=value["instruction"],
             instructions=tuple(Instruction.of(item) for item in value["instructions"]),
             robots=tuple(RobotInfo.of(item) for item in value["robots"]),
+            phases=tuple(PhaseInfo.of(item) for item in value.get("phases", ())),
+            room=tuple(value.get("room", ())),
             kinds=tuple(RobotKind.of(item) for item in value["kinds"]),
             brief=Brief.of(value["brief"]),
-            action_row=tuple(value["action_row"]),
+            action_row=tuple(value.get("action_row", ())),
             status=StatusReply.of(value["status"]),
             recording_failed=value.get("recording_failed"),
         )
@@ -275,7 +293,7 @@ class RobotKind:
     """What `robots` call it."""
 
     joints: tuple[JointInfo, ...]
-    """Its joints."""
+    """Its joints; left out of a short reply."""
 
     vx_m_s: Range
     """Forward velocity."""
@@ -294,7 +312,7 @@ class RobotKind:
         """Reads what JSON has."""
         return RobotKind(
             kind=value["kind"],
-            joints=tuple(JointInfo.of(item) for item in value["joints"]),
+            joints=tuple(JointInfo.of(item) for item in value.get("joints", ())),
             vx_m_s=Range.of(value["vx_m_s"]),
             vy_m_s=Range.of(value["vy_m_s"]),
             yaw_rate_rad_s=Range.of(value["yaw_rate_rad_s"]),
@@ -313,13 +331,15 @@ class TaskInfo:
     """What has to be done, for whoever directs all robots."""
 
     robots: tuple[Instruction, ...]
-    """What each robot has to do, for policies that direct one."""
+    """What each robot has to do, for policies that direct one; left out of a short reply."""
 
     phases: tuple[PhaseInfo, ...]
-    """The phases, in the order they have to be reached; left out where the assistance is "paper"."""
+    """The phases, in the order they have to be reached; left out of a short reply, and where the assistance is
+    "paper".
+    """
 
     protocols: tuple[ProtocolInfo, ...]
-    """The protocols and their budgets for this task."""
+    """The protocols and their budgets for this task; left out of a short reply."""
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> TaskInfo:
@@ -327,9 +347,9 @@ class TaskInfo:
         return TaskInfo(
             id=value["id"],
             instruction=value["instruction"],
-            robots=tuple(Instruction.of(item) for item in value["robots"]),
+            robots=tuple(Instruction.of(item) for item in value.get("robots", ())),
             phases=tuple(PhaseInfo.of(item) for item in value.get("phases", ())),
-            protocols=tuple(ProtocolInfo.of(item) for item in value["protocols"]),
+            protocols=tuple(ProtocolInfo.of(item) for item in value.get("protocols", ())),
         )
 
 
@@ -349,4 +369,57 @@ class TaskList:
         return TaskList(
             tasks=tuple(TaskInfo.of(item) for item in value["tasks"]),
             base_limits=BaseLimits.of(value["base_limits"]),
+        )
+
+
+@dataclass(frozen=True)
+class WorkedGrip:
+    """A grip that works, of a right hand whose robot faces the thing squarely."""
+
+    thing: str
+    """What it is for."""
+
+    place: str
+    """Which point of the thing `place_m` is."""
+
+    right_quaternion_wxyz: tuple[float, float, float, float]
+    """How the right wrist is turned, in the level frame."""
+
+    left_quaternion_wxyz: tuple[float, float, float, float]
+    """How the left wrist is."""
+
+    place_m: tuple[float, float, float]
+    """Where the place lies in the right wrist's frame while the hand holds it; negate y for a left hand."""
+
+    stops_m: tuple[tuple[float, float, float], ...]
+    """Where the hand stops on its way in, the farthest first: so much is added to `place_m` there."""
+
+    open_rad: tuple[float, float, float, float, float, float, float]
+    """Finger angles of a right hand on its way in and out, as right_fingers_rad; a left one negates all but the
+    first.
+    """
+
+    close_rad: tuple[float, float, float, float, float, float, float]
+    """Finger angles of a right hand that holds."""
+
+    stand_behind_m: float | None
+    """How far behind the places of its hands the pelvis stands; left out where that does not matter."""
+
+    pelvis_height_m: float | None
+    """How low the pelvis is commanded, so that hands come there; left out where the robot stands upright."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> WorkedGrip:
+        """Reads what JSON has."""
+        return WorkedGrip(
+            thing=value["thing"],
+            place=value["place"],
+            right_quaternion_wxyz=tuple(value["right_quaternion_wxyz"]),
+            left_quaternion_wxyz=tuple(value["left_quaternion_wxyz"]),
+            place_m=tuple(value["place_m"]),
+            stops_m=tuple(tuple(item) for item in value["stops_m"]),
+            open_rad=tuple(value["open_rad"]),
+            close_rad=tuple(value["close_rad"]),
+            stand_behind_m=value.get("stand_behind_m"),
+            pelvis_height_m=value.get("pelvis_height_m"),
         )

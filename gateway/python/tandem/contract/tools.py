@@ -9,8 +9,20 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .arguments import JointChunk, Json, Numbers, PixelRegion, WalkMove, WristMove, plain
-from .commands import CommandReply
+from .arguments import (
+    Destination,
+    JointChunk,
+    Json,
+    Numbers,
+    PixelRegion,
+    PlannedCommand,
+    PoseFrame,
+    SurfaceQuery,
+    WalkMove,
+    WristMove,
+    plain,
+)
+from .commands import CommandReply, PlanReply
 from .replies import DepthReply, ReachReply, ResultReply, RobotState, StatusReply
 
 
@@ -42,21 +54,28 @@ class Tools(ABC):
         *,
         pixels: Numbers | None = None,
         region: PixelRegion | None = None,
+        surface: SurfaceQuery | None = None,
+        frame: PoseFrame | None = None,
     ) -> DepthReply:
-        """Measure depth at pixels of a robot's head camera, named one by one or as a region: at most 256 of them
-        either way. Returns for each pixel the distance along the optical axis and the 3-D point in the robot's
-        pelvis frame, the frame that wrist targets are given in. A pixel sees a surface, so the middle of an
-        object lies a little behind the point. Costs no steps; physics stands still.
+        """Measure where what a robot's head camera sees is, at pixels named one by one or as a region: at most 256
+        of them either way. Returns a row [u, v, x, y, z] for each pixel: the 3-D point in the robot's pelvis
+        frame, the frame that wrist targets are given in. A pixel sees a surface, so the middle of an object
+        lies a little behind the point. Costs no steps; physics stands still.
 
         robot: The robot whose camera measures, as "A".
         pixels: Pixels as [u, v]: column 0 to 319 from the left, row 0 to 239 from the top, at most 256 of them.
             Example: [[160, 120], [170, 120]]. None: those of `region`.
         region: Pixels of a rectangle, row by row, at most 256 of them. None: those of `pixels`.
+        surface: A surface to find, whose middle, size and corners are told in place of points: give pixel, [u, v] of
+            a place on it, or color, as "red": then it is the largest of that colour.
+        frame: The frame of the points: "pelvis", "level" or "start". None: "pelvis".
         """
         arguments: dict[str, Any] = {
             "robot": robot,
             "pixels": pixels,
             "region": region,
+            "surface": surface,
+            "frame": frame,
         }
         return DepthReply.of(self.call("query_depth", plain(arguments)))
 
@@ -68,6 +87,7 @@ class Tools(ABC):
         left_quaternion_wxyz: Numbers | None = None,
         right_position_m: Numbers | None = None,
         right_quaternion_wxyz: Numbers | None = None,
+        frame: PoseFrame | None = None,
     ) -> ReachReply:
         """Ask whether a robot's wrists could reach poses from where it stands, using the arms that are given a
         pose and the waist. Nothing moves and no steps are spent. Poses are of the wrist links
@@ -81,6 +101,7 @@ class Tools(ABC):
         right_position_m: Right wrist position [x, y, z] in metres, as [0.30, -0.20, 0.10]. None: where it is to be
             now, or, without an orientation either, this arm keeps its joints.
         right_quaternion_wxyz: Right wrist orientation [w, x, y, z], as [1, 0, 0, 0]. None: as it is to be now.
+        frame: The frame of the poses: "pelvis", "level" or "start". None: "pelvis".
         """
         arguments: dict[str, Any] = {
             "robot": robot,
@@ -88,6 +109,7 @@ class Tools(ABC):
             "left_quaternion_wxyz": left_quaternion_wxyz,
             "right_position_m": right_position_m,
             "right_quaternion_wxyz": right_quaternion_wxyz,
+            "frame": frame,
         }
         return ReachReply.of(self.call("check_reach", plain(arguments)))
 
@@ -102,7 +124,7 @@ class Tools(ABC):
         says of each wrist and its fingers whether they have arrived, are moving (repeat the command or call
         wait), are blocked by load or contact, or are out of reach.
 
-        steps: Control steps of 20 ms: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark protocol.
+        steps: Control steps of 20 ms: 1 up to the budget's steps_per_command.
         robots: One entry per robot that is to move; each robot at most once.
         """
         arguments: dict[str, Any] = {
@@ -116,11 +138,11 @@ class Tools(ABC):
         steps: int,
         robots: Sequence[WalkMove],
     ) -> CommandReply:
-        """Walk, turn or change the pelvis height of one or more robots for a number of control steps of 20 ms,
-        while their arms and hands keep their joints and so go along. Velocities are in the robot's own frame
-        and apply during this command only; the height persists.
+        """Walk, turn, change the pelvis height or look around with one or more robots for a number of control
+        steps of 20 ms, while their arms and hands keep their joints and so go along. Velocities are in the
+        robot's own frame and apply during this command only; the height persists.
 
-        steps: Control steps of 20 ms: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark protocol.
+        steps: Control steps of 20 ms: 1 up to the budget's steps_per_command.
         robots: One entry per robot that is to move; each robot at most once. Robots that are not named hold still.
         """
         arguments: dict[str, Any] = {
@@ -134,9 +156,8 @@ class Tools(ABC):
         robots: Sequence[JointChunk],
     ) -> CommandReply:
         """Send joint targets for one or more robots, one row per control step of 20 ms. Rows of all named robots
-        run side by side, so each robot needs the same number of rows: 1 to 25 in the agentic protocol, 1 to 50
-        in the benchmark protocol. Robots that are not named hold still. Targets beyond a joint's limits are
-        clamped and reported.
+        run side by side, so each robot needs the same number of rows: 1 up to the budget's steps_per_command.
+        Robots that are not named hold still. Targets beyond a joint's limits are clamped and reported.
 
         robots: One entry per robot that is to move; each robot at most once.
         """
@@ -153,12 +174,47 @@ class Tools(ABC):
         object to come to rest. The reply reports on every robot. Wrist targets of the last command stay fixed
         in the world, or carried, as they were given.
 
-        steps: Control steps of 20 ms: 1 to 25 in the agentic protocol, 1 to 50 in the benchmark protocol.
+        steps: Control steps of 20 ms: 1 up to the budget's steps_per_command.
         """
         arguments: dict[str, Any] = {
             "steps": steps,
         }
         return CommandReply.of(self.call("wait", plain(arguments)))
+
+    def send_plan(
+        self,
+        commands: Sequence[PlannedCommand],
+    ) -> PlanReply:
+        """Carry out up to 20 commands one after another, each as if it had been called by itself: with its own
+        steps, counted and recorded by itself. The plan stops after the first command after which something that
+        it `expects` is not so. The reply is that of the last command carried out, with how many were and why no
+        more. If any command could not be carried out, none is.
+
+        commands: The commands, at most 20.
+        """
+        arguments: dict[str, Any] = {
+            "commands": commands,
+        }
+        return PlanReply.of(self.call("send_plan", plain(arguments)))
+
+    def walk_to(
+        self,
+        steps: int,
+        robots: Sequence[Destination],
+    ) -> PlanReply:
+        """Walk to places in the start frame, looking at odometry on the way: arms keep their joints and go along.
+        It is carried out as commands of walk and wait, each counted and recorded by itself, until every robot
+        stands within 4 cm and 0.05 rad of its place, one gets no nearer, or the steps are used up. It walks
+        straight and looks at nothing: go round what stands in the way by places in between.
+
+        steps: The most control steps of 20 ms to take, up to 1500. A metre takes about 250.
+        robots: One entry per robot that is to walk; each robot at most once. Robots that are not named hold still.
+        """
+        arguments: dict[str, Any] = {
+            "steps": steps,
+            "robots": robots,
+        }
+        return PlanReply.of(self.call("walk_to", plain(arguments)))
 
     def get_status(
         self,

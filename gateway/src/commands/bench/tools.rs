@@ -72,7 +72,7 @@ pub fn tools() -> Result<ToolsReport, Box<dyn Error>> {
     };
     let server = Server::start(Settings::resolve(flags, None)?)?;
     let task = tasks::ALL[0].id.into();
-    let args = StartEpisode { task, seed: 0, protocol: Some(Protocol::Benchmark) };
+    let args = StartEpisode { task, seed: 0, protocol: Some(Protocol::Benchmark), short: false };
     let (mut episode, _) = HttpEpisode::start(server.address(), &args)?;
     let looks = [GetStatus {}.into(), GetRobotState { robot: "A".into() }.into()];
     let calls = looks.into_iter().map(|call| times(&mut episode, &call)).collect::<Result<_, _>>()?;

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use tandem_episodes::{EpisodeError, OutputError, create_private_folder, write_whole};
-use tandem_tools_spec::{Brief, Driving, StartReply};
+use tandem_tools_spec::{Driving, StartReply};
 
 /// The file with the brief, which the program reads on its standard input, too.
 pub const BRIEF_FILE: &str = "brief.txt";
@@ -87,9 +87,7 @@ fn brief(start: &StartReply, url: &str, robot: Option<&str>, driving: &Driving) 
         "Budget: {} control steps of 20 ms, at most {} in one command; {clock}. Call finish when the task is done, or cannot be done.",
         budget.steps_left, budget.steps_per_command
     ));
-    let Brief { frames, partners, odometry, camera, hands, grasping } = &briefing.brief;
-    let told = [frames, partners].into_iter().chain(odometry).chain([camera, hands]).chain(grasping);
-    paragraphs.extend(told.cloned());
+    paragraphs.extend(briefing.brief.lines());
     paragraphs.join("\n\n") + "\n"
 }
 

@@ -14,8 +14,8 @@ use std::{
 
 use tandem_episodes::{EpisodeError, OperatorCall, OperatorCommand};
 use tandem_tools_spec::{
-    Call, Driving, Finish, GetStatus, Heard, ManageCall, OperatorToken, Partner, PartnerDid, TalkCall,
-    ToolCall,
+    Call, Driving, Finish, GetStatus, Heard, ManageCall, OperatorToken, Partner, PartnerDid, SpecError,
+    TalkCall, ToolCall,
 };
 use tokio::sync::oneshot;
 
@@ -87,6 +87,14 @@ impl Team {
             ToolCall::Talk(TalkCall::Say(say)) => {
                 let words = Heard { from: robot.into(), text: say.text.clone() };
                 return self.say(episode, seat, call, words).await;
+            }
+            ToolCall::Plan(_) => {
+                return Err(EpisodeError::from(SpecError::Invalid {
+                    tool: call.call().name(),
+                    reason: "every robot of this episode has its operator, and a plan of one would hold up the others; command one by one"
+                        .into(),
+                })
+                .into());
             }
             ToolCall::Manage(ManageCall::Finish(_)) => self.finish(episode, seat).await?,
             ToolCall::Look(_) | ToolCall::Manage(ManageCall::GetStatus(_)) => {

@@ -161,7 +161,7 @@ impl Round {
             ToolReply::Act(reply) => {
                 answer.step.map(|step| [step.saturating_sub(reply.executed_steps), step])
             }
-            ToolReply::Look(_) | ToolReply::Manage(_) | ToolReply::Talk(_) => None,
+            ToolReply::Look(_) | ToolReply::Plan(_) | ToolReply::Manage(_) | ToolReply::Talk(_) => None,
         });
         self.operators.iter_mut().map(|operator| operator.end(made)).collect()
     }

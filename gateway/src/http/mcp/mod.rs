@@ -163,8 +163,9 @@ impl McpServer {
     async fn call(&self, caller: &Caller, name: &str, args: Value) -> Result<Vec<ContentBlock>, ApiError> {
         match name {
             ListTasks::NAME => {
-                parse_args::<ListTasks>(args)?;
-                json_block(&self.app.table.task_list())
+                let ListTasks { short } = parse_args(args)?;
+                let list = self.app.table.task_list();
+                json_block(&if short { list.shortened() } else { list })
             }
             StartEpisode::NAME => {
                 if let Caller::Operator { .. } = caller {
@@ -260,7 +261,9 @@ fn image_captions(images: &[CameraImage]) -> String {
 /// A refusal as a model reads it.
 fn refusal_blocks(error: &ApiError) -> Vec<ContentBlock> {
     let failed = error.recording_failed().map(|reason| format!("recording_failed: {reason}"));
-    [error.body().detail].into_iter().chain(failed).map(ContentBlock::text).collect()
+    let result = error.result().and_then(|result| serde_json::to_string(result).ok());
+    let result = result.map(|result| format!("result: {result}"));
+    [error.body().detail].into_iter().chain(failed).chain(result).map(ContentBlock::text).collect()
 }
 
 /// Says that a body names a field twice. The JSON-RPC library behind this would keep the last of the two.

@@ -73,8 +73,7 @@ fn text(task: &TaskInfo, start: &StartEpisode, brief: &Brief, caller: &Caller) -
     let phases = phases.collect::<Vec<_>>().join("\n");
     let phases = (!phases.is_empty()).then(|| format!("The phases that are scored:\n{phases}"));
     let budget = task.protocols.iter().find(|info| info.protocol == protocol).map(budget);
-    let Brief { frames, partners, odometry, camera, hands, grasping: _ } = brief;
-    let brief = [frames, partners].into_iter().chain(odometry).chain([camera, hands]);
+    let brief = brief.lines();
     let lines = |lines: &mut dyn Iterator<Item = String>| lines.collect::<Vec<_>>().join("\n");
     let begin = match caller {
         Caller::Host => {
@@ -88,7 +87,7 @@ fn text(task: &TaskInfo, start: &StartEpisode, brief: &Brief, caller: &Caller) -
         Some(format!("The robots:\n{}", lines(&mut robots.into_iter()))),
         phases,
         budget,
-        Some(lines(&mut brief.cloned())),
+        Some(brief.join("\n")),
         Some(format!(
             "{begin}Look with observe, measure with query_depth, act \
              with move_wrists, walk and wait, and check with every reply what came of it. Call finish when the task is done."

@@ -11,7 +11,7 @@ use axum::{
 };
 use serde_json::{Value, json};
 use tandem_episodes::{CheckpointError, EpisodeError, OutputError, SceneError, SimError};
-use tandem_tools_spec::{EndReason, SpecError};
+use tandem_tools_spec::{Color, EndReason, ResultReply, SpecError, SurfaceQuery};
 
 use super::ApiError;
 use crate::{hosting::HostingError, token::TokenError};
@@ -85,6 +85,15 @@ fn hosting_refusals() -> Vec<HostingError> {
     ]
 }
 
+fn result() -> ResultReply {
+    let result = serde_json::json!({
+        "task": "handover", "seed": 0, "protocol": "agentic", "phases": { "p1": 9.62, "p2": null, "p3": null },
+        "ended": "finished", "env_steps": 890, "tool_calls": 60, "falls": 0, "realtime_factor": 60.0,
+        "state_hash": "7ae670852d40c288",
+    });
+    serde_json::from_value(result).expect("a result")
+}
+
 fn episode_refusals() -> Vec<EpisodeError> {
     vec![
         EpisodeError::UnknownTask { id: "x".into(), have: vec!["handover"] },
@@ -92,8 +101,9 @@ fn episode_refusals() -> Vec<EpisodeError> {
         EpisodeError::ForeignRobot { name: "B".into(), own: "A".into() },
         EpisodeError::DepthImage { protocol: "agentic" },
         EpisodeError::TooManySteps { asked: 60, most: 25, protocol: "agentic" },
+        EpisodeError::NoSurface { query: SurfaceQuery { pixel: None, color: Some(Color::Red) } },
         EpisodeError::PixelOutside { u: 320, v: 0, width: 320, height: 240 },
-        EpisodeError::Ended { reason: EndReason::Finished },
+        EpisodeError::Ended { reason: EndReason::Finished, result: result().into() },
         EpisodeError::Sim(SimError::WithoutGpu),
         EpisodeError::from(SceneError::Tilted { path: "s.xml".into(), site: "task".into(), tilt_deg: 3.0 }),
         CheckpointError::NoPhase { path: "c".into(), phase: "p2".into() }.into(),

@@ -9,7 +9,8 @@ use axum::{
     http::{HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
 };
-use tandem_tools_spec::{Format, ProblemBody, Refusal, RefusalClass, SpecError};
+use tandem_episodes::EpisodeError;
+use tandem_tools_spec::{Format, ProblemBody, Refusal, RefusalClass, ResultReply, SpecError};
 
 use crate::hosting::{EpisodeThread, HostingError};
 
@@ -148,6 +149,14 @@ pub enum ApiError {
     Reply(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
 
+fn result_in(error: &HostingError) -> Option<&ResultReply> {
+    match error {
+        HostingError::Episode(EpisodeError::Ended { result, .. }) => Some(result),
+        HostingError::Shared(error) => result_in(error),
+        _ => None,
+    }
+}
+
 /// What the caller can do, where the error's own text does not say it.
 fn hint(error: &HostingError) -> String {
     error.refusal().hint.map_or_else(String::new, |hint| format!("; {hint}"))
@@ -276,6 +285,16 @@ impl ApiError {
             status: status.as_u16(),
             detail,
             recording_failed: self.recording_failed().map(str::to_owned),
+            result: self.result().map(|result| serde_json::json!(result)),
+        }
+    }
+
+    /// What the episode came to that has ended, which is why it refuses.
+    pub fn result(&self) -> Option<&ResultReply> {
+        match self {
+            ApiError::Hosting(error) => result_in(error),
+            ApiError::RecordingFailed { error, .. } => error.result(),
+            _ => None,
         }
     }
 

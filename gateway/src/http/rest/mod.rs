@@ -15,8 +15,8 @@ use axum::{
 use serde::Deserialize;
 use serde_json::{Value, json};
 use tandem_tools_spec::{
-    Call, EpisodeToolSpec, Format, ResultReply, StartEpisode, TaskList, Tool as _, episode_tool_specs,
-    parse_start,
+    Call, EpisodeToolSpec, Format, PlanCall, ResultReply, StartEpisode, TaskList, Tool as _,
+    episode_tool_specs, parse_start,
 };
 
 use super::{
@@ -62,8 +62,16 @@ async fn health(State(app): State<AppState>) -> Json<Value> {
     Json(json!({ "status": "ok", "version": VERSION, "episodes": app.table.len() }))
 }
 
-async fn tasks(State(app): State<AppState>) -> Json<TaskList> {
-    Json(app.table.task_list())
+/// The query of `GET /v1/tasks`.
+#[derive(Debug, Deserialize)]
+struct TasksQuery {
+    #[serde(default)]
+    short: bool,
+}
+
+async fn tasks(State(app): State<AppState>, Query(query): Query<TasksQuery>) -> Json<TaskList> {
+    let list = app.table.task_list();
+    Json(if query.short { list.shortened() } else { list })
 }
 
 /// The query of `GET /v1/tools`.
@@ -92,7 +100,12 @@ async fn episode_tools(
     episode.admit(&caller)?;
     let (wording, talk) = (app.settings.wording(), app.table.may_talk(&caller));
     let thread = &episode.thread;
-    Ok(Json(episode_tool_specs(wording, &id, thread.robots(), thread.steps_per_command(), talk)))
+    let mut specs = episode_tool_specs(wording, &id, thread.robots(), thread.steps_per_command(), talk);
+    if let Caller::Operator { .. } = caller {
+        // A plan would hold up the others.
+        specs.retain(|tool| !PlanCall::TOOLS.contains(&tool.spec.name));
+    }
+    Ok(Json(specs))
 }
 
 async fn openapi(State(app): State<AppState>, Extension(caller): Extension<Caller>) -> Json<Value> {

@@ -112,6 +112,10 @@ impl Locomotion for Balance {
         legs
     }
 
+    fn is_stepping(&self) -> Option<bool> {
+        Some(self.state.as_ref().is_some_and(|state| matches!(state.mode, Mode::Step(_))))
+    }
+
     fn save(&self) -> Result<Vec<u8>, postcard::Error> {
         postcard::to_stdvec(&self.state)
     }

@@ -3,6 +3,7 @@
 use serde::Deserialize;
 use serde_json::{Value, json};
 use tandem_tests::TestServer;
+use tandem_tools_spec::{CameraCalibration, DepthRow};
 
 const MSGPACK: &str = "application/msgpack";
 const PIXELS: usize = 320 * 240;
@@ -81,6 +82,13 @@ fn one_call_steps_and_returns_what_is_seen_then() {
 }
 
 /// Raw pictures are what the PNGs hold, and depth is what is measured at pixels.
+/// How far along the camera's axis a point of the pelvis frame is.
+fn along_axis_m(camera: &CameraCalibration, point_m: [f64; 3]) -> f64 {
+    let tandem_tools_spec::Pose { position_m, quaternion_wxyz: [w, x, y, z] } = camera.camera_in_pelvis;
+    let axis = [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)];
+    (0..3).map(|i| axis[i] * (point_m[i] - position_m[i])).sum()
+}
+
 #[test]
 fn every_form_says_the_same() {
     let server = TestServer::start();
@@ -100,11 +108,14 @@ fn every_form_says_the_same() {
     let depth = seen.arrays[0].depth_float16.as_ref().expect("depth");
     let pixels: [[usize; 2]; 3] = [[160, 120], [10, 230], [300, 200]];
     let measured = server.tool(&id, "query_depth", &json!({ "robot": "A", "pixels": pixels })).ok();
-    for ([u, v], point) in pixels.into_iter().zip(measured["points"].as_array().expect("points")) {
+    let camera: CameraCalibration = serde_json::from_value(raw["cameras"][0].clone()).expect("a calibration");
+    for ([u, v], row) in pixels.into_iter().zip(measured["points"].as_array().expect("points")) {
         let at = 2 * (v * 320 + u);
         let depth_m = half(u16::from_le_bytes([depth[at], depth[at + 1]]));
-        let expected_m = point["depth_m"].as_f64().expect("a depth");
-        assert!((depth_m - expected_m).abs() < 1e-3 * expected_m, "{depth_m} {expected_m}");
+        let row: DepthRow = serde_json::from_value(row.clone()).expect("a row");
+        let expected_m = along_axis_m(&camera, row.point_m().expect("a point"));
+        // Rows are to the millimetre.
+        assert!((depth_m - expected_m).abs() < 1e-3 * expected_m + 0.001, "{depth_m} {expected_m}");
     }
     let result = server.delete(&format!("/v1/episodes/{id}")).ok();
     // More than the benchmark's policies see, and how often.

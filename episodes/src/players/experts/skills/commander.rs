@@ -248,7 +248,7 @@ impl<'a> Commander<'a> {
         match self.pass_on(MoveWrists { steps, robots })? {
             ToolReply::Act(reply) if reply.stop_reason == StopReason::StepsDone => Ok(()),
             ToolReply::Act(_) => Err(PlayerError::EpisodeOver),
-            other @ (ToolReply::Look(_) | ToolReply::Manage(_) | ToolReply::Talk(_)) => {
+            other @ (ToolReply::Look(_) | ToolReply::Plan(_) | ToolReply::Manage(_) | ToolReply::Talk(_)) => {
                 Err(PlayerError::Call {
                     tool: MoveWrists::NAME,
                     reason: format!("unexpected reply {other:?}"),

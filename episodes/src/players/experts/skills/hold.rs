@@ -87,42 +87,53 @@ impl Hold {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::convert::wire_limits;
-    use crate::describe::brief;
-    use tandem_sim::LocomotionChoice;
-    use tandem_tools_spec::Hints;
+    use tandem_sim::{Rotation, Side};
+    use tandem_tools_spec::WorkedGrip;
 
-    /// Thickness of the plates that [`Hold::EDGE`] is for.
-    const PLATE_M: f32 = 0.03;
+    use super::*;
+    use crate::describe::grips;
+
+    /// The hand's turn in the level frame of a robot that faces the thing.
+    fn turned(hold: &Hold, side: Side) -> Rotation {
+        let [yaw_rad, pitch_rad, roll_rad] = hold.turned_rad;
+        Rotation::from_rotation_z(-side.sign() * yaw_rad)
+            * Rotation::from_rotation_y(pitch_rad)
+            * Rotation::from_rotation_x(-side.sign() * roll_rad)
+    }
 
     #[test]
     fn policies_are_told_what_experts_do() {
-        let limits = wire_limits(&LocomotionChoice::Balance.limits());
-        let grasping = brief(Hints::On.into(), &limits).grasping.expect("hints");
-        let told =
-            |what: &str| assert!(grasping.contains(what), "the brief does not say `{what}`: {grasping}");
-        let thumb = |angles: [f32; 7]| told(&format!("[{}, {}, {}]", angles[0], angles[1], angles[2]));
-        let fingers = |angles: [f32; 7]| told(&format!("[{}, {}]", angles[3], angles[4]));
-        for hold in [Hold::EDGE, Hold::RIM, Hold::WALL, Hold::LEG] {
-            thumb(hold.closed_rad);
-            fingers(hold.closed_rad);
-            assert_eq!(hold.closed_rad[3..5], hold.closed_rad[5..7], "both fingers alike");
-        }
-        thumb(Hold::EDGE.open_rad);
-        let rounded = |length_m: f32| (length_m * 1000.0).round() / 1000.0;
-        let [edge_m, rim_m, wall_m, leg_m] =
-            [Hold::EDGE, Hold::RIM, Hold::WALL, Hold::LEG].map(|hold| hold.place_in_wrist_m);
-        told(&format!("{} m before the edge and {} m above the top", edge_m.x, rounded(edge_m.y - PLATE_M)));
-        told(&format!("{} m farther off and {} m higher", Hold::EDGE.stops_m[0].x, Hold::EDGE.stops_m[0].y));
-        told(&format!("{} m before its middle and {} m above it", rim_m.x, rim_m.y));
-        told(&format!("{} m above the rim and {} m beside", wall_m.x, wall_m.y));
-        told(&format!("{} m before the middle of the leg and {} m beside it", leg_m.x, leg_m.y));
-        told(&format!("{} m farther out and {} m lower", Hold::LEG.stops_m[0].y, Hold::LEG.stops_m[0].z));
-        told(&format!("{} m behind those on legs or on a bin", Hold::WALL.behind_m));
-        assert_eq!(Hold::LEG.behind_m, Hold::WALL.behind_m, "legs and bins are told as one");
-        for hold in [Hold::EDGE, Hold::ROUND_EDGE, Hold::RIM] {
-            assert!((hold.behind_m - 0.3).abs() < 0.025, "0.3 m behind the places of both hands");
+        let moulding = Hold {
+            turned_rad: [0.0; 3],
+            place_in_wrist_m: Vector::new(0.112, 0.045, 0.0),
+            closed_rad: wrapped_rad(1.1),
+            ..Hold::BAR
+        };
+        let holds = [Hold::BAR, moulding, Hold::EDGE, Hold::LEG, Hold::RIM, Hold::WALL];
+        let told = grips();
+        assert_eq!(told.len(), holds.len() + 1, "and one of upright round things");
+        for (hold, told) in holds.iter().zip(&told[1..]) {
+            let near = |what: &str, told: &[f64], is: &[f32]| {
+                let off =
+                    told.iter().zip(is).map(|(told, is)| (told - f64::from(*is)).abs()).fold(0.0, f64::max);
+                assert!(told.len() == is.len() && off < 0.002, "{what}: told {told:?}, and it is {is:?}");
+            };
+            let WorkedGrip { thing, place_m, stops_m, open_rad, close_rad, stand_behind_m, .. } = told;
+            near(thing, place_m, &hold.place_in_wrist_m.to_array());
+            for (told_m, stop_m) in stops_m.iter().zip(hold.stops_m) {
+                near(thing, told_m, &stop_m.to_array());
+            }
+            assert_eq!(stops_m.len(), hold.stops_m.len(), "{thing}");
+            near(thing, open_rad, &hold.open_rad);
+            near(thing, close_rad, &hold.closed_rad);
+            near(thing, &[stand_behind_m.unwrap()], &[hold.behind_m]);
+            for (told, side) in
+                [(told.right_quaternion_wxyz, Side::Right), (told.left_quaternion_wxyz, Side::Left)]
+            {
+                let [w, x, y, z] = told.map(|part| part as f32);
+                let angle_rad = Rotation::from_xyzw(x, y, z, w).normalize().angle_between(turned(hold, side));
+                assert!(angle_rad < 0.005, "{thing}: {side:?} is {angle_rad} rad off");
+            }
         }
     }
 }

@@ -1,15 +1,21 @@
 //! What a policy is told of what was measured. What its assistance withholds is taken out of every reply here and nowhere else, and
 //! what the benchmark's own policies are not shown is counted by what it is and by the robot that it is of.
 
+mod short;
+
+pub use short::shorten;
+
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 use tandem_tools_spec::{
-    Assistance, CommandReply, ExtraInformation, FingerReport, Formats, HandReport, LookReply, Protocol,
-    RobotReport, RobotState, ToolReply,
+    ActCall, Assistance, CommandReply, ExtraInformation, FingerReport, Formats, HandReport, LookCall,
+    LookReply, PoseFrame, Protocol, RobotReport, RobotState, SpecError, ToolCall, ToolReply,
 };
 
+use super::Session;
 use super::answer::Answer;
+use crate::EpisodeError;
 use crate::observation::TeamObservation;
 
 /// How many replies showed what the benchmark's own policies are not shown.
@@ -45,6 +51,8 @@ impl ShownInformation {
             Answer::Observation(seen) => self.count_seen(seen, formats),
             Answer::Reply(reply) => match &**reply {
                 ToolReply::Act(reply) => reply.robots.iter().for_each(|report| self.count_report(report)),
+                // Its commands have been counted one by one.
+                ToolReply::Plan(_) => {}
                 ToolReply::Look(LookReply::GetRobotState(state)) => self.count_state(state),
                 // Agents of the benchmark have it, its learned policies have not.
                 ToolReply::Look(LookReply::QueryDepth(depth)) if protocol == Protocol::Benchmark => {
@@ -122,6 +130,7 @@ impl Answer {
             (Assistance::Paper, Answer::Observation(seen)) => withhold_seen(seen),
             (Assistance::Paper, Answer::Reply(reply)) => match &mut **reply {
                 ToolReply::Act(reply) => withhold_report(reply),
+                ToolReply::Plan(reply) => withhold_report(&mut reply.last),
                 ToolReply::Look(LookReply::GetRobotState(state)) => withhold_state(state),
                 ToolReply::Look(LookReply::Observe(seen)) => seen.states.iter_mut().for_each(withhold_state),
                 // What is asked about a pixel or a pose, and how the episode stands, which is told as it is to be.
@@ -184,15 +193,18 @@ fn withhold_report(reply: &mut CommandReply) {
     for report in robots {
         let RobotReport {
             robot: _,
+            // Other frames are refused.
+            frame: _,
             left,
             right,
+            base,
             pelvis_in_start,
             base_motion,
             waist_joints_clamped: _,
             waist_joints_at_limit: _,
             base_command_clamped: _,
         } = report;
-        (*pelvis_in_start, *base_motion) = (None, None);
+        (*base, *pelvis_in_start, *base_motion) = (None, None, None);
         withhold_hand(left);
         withhold_hand(right);
     }
@@ -201,15 +213,58 @@ fn withhold_report(reply: &mut CommandReply) {
 fn withhold_hand(hand: &mut HandReport) {
     let HandReport {
         state,
+        grip,
+        touches,
         target: _,
         measured: _,
         position_error_m: _,
         orientation_error_rad: _,
-        fingers: FingerReport { state: fingers_state, target_rad: _, measured_rad: _ },
+        compliance_offset_m,
+        fingers,
         largest_effort,
         force_n,
         joints_clamped: _,
         joints_at_limit: _,
     } = hand;
-    (*state, *fingers_state, *largest_effort, *force_n) = (None, None, None, None);
+    (*state, *grip, *touches, *compliance_offset_m) = (None, None, None, None);
+    (*largest_effort, *force_n) = (None, None);
+    if let Some(FingerReport { state, target_rad: _, measured_rad: _ }) = fingers {
+        *state = None;
+    }
+}
+
+impl Session {
+    /// Refuses a call that would show what the policy is not told.
+    pub(super) fn check_told(&self, call: &ToolCall) -> Result<(), EpisodeError> {
+        let refused = |reason: &str| {
+            EpisodeError::Spec(SpecError::Invalid { tool: call.name(), reason: reason.into() })
+        };
+        let frames: Vec<Option<PoseFrame>> = match call {
+            ToolCall::Plan(_) if self.spec().assistance == Assistance::Paper => {
+                return Err(refused(
+                    "this episode has no plans; command by move_wrists, walk, wait and send_joint_chunk",
+                ));
+            }
+            ToolCall::Plan(_) => Vec::new(),
+            ToolCall::Look(LookCall::QueryDepth(args))
+                if args.surface.is_some() && self.spec().assistance == Assistance::Paper =>
+            {
+                return Err(refused("this episode measures at pixels alone; give pixels or region"));
+            }
+            ToolCall::Look(LookCall::QueryDepth(args)) => vec![args.frame],
+            ToolCall::Look(LookCall::CheckReach(args)) => vec![args.frame],
+            ToolCall::Act(ActCall::MoveWrists(args)) => args.robots.iter().map(|entry| entry.frame).collect(),
+            ToolCall::Look(LookCall::Observe(_) | LookCall::GetRobotState(_))
+            | ToolCall::Act(ActCall::Walk(_) | ActCall::SendJointChunk(_) | ActCall::Wait(_))
+            | ToolCall::Manage(_)
+            | ToolCall::Talk(_) => Vec::new(),
+        };
+        let other = frames.into_iter().flatten().find(|frame| *frame != PoseFrame::Pelvis);
+        match (self.spec().assistance, other) {
+            (Assistance::Paper, Some(_)) => {
+                Err(refused("this episode tells of poses in the pelvis frame alone; leave frame out"))
+            }
+            (Assistance::Paper | Assistance::Full, _) => Ok(()),
+        }
+    }
 }

@@ -1,31 +1,48 @@
 //! How a robot did under an order that has just been executed.
 
+mod feel;
+
 use nalgebra::Isometry3;
 use tandem_sim::{HAND_JOINTS, Pose, RobotSensed, Side, UPPER, Vector};
-use tandem_tools_spec::{BaseMotion, Effort, FingerReport, HandReport, HandState, RobotReport};
+use tandem_tools_spec::{
+    BaseMotion, Effort, FingerReport, HandReport, HandState, PoseFrame, RobotReport, Touch,
+};
 
 use super::columns::{self, Clamped};
-use super::motion::{Motion, RobotSheet};
+use super::motion::{Aim, Motion, RobotSheet};
 use super::upper_body::REACH_TOLERANCE;
-use crate::convert::{isometry_from_sim, rounded, rounded_to, wire_pose, wire_pose_from_sim};
+use crate::convert::{coarse, coarse_pose, isometry_from_sim, rounded_to};
 
 /// A measured joint this near to its limit rests at it.
 const AT_LIMIT_RAD: f32 = 0.01;
 /// An arm of which a joint turns faster is on the way; a finger likewise.
 const ARM_MOVES_RAD_S: f32 = 0.05;
 const FINGER_MOVES_RAD_S: f32 = 0.2;
+/// An arm without a wrist target that is farther from what its joints stand for has been pushed.
+const PUSHED_AWAY_M: f64 = 0.03;
+const PUSHED_AWAY_RAD: f64 = 0.15;
+/// A hand that is blocked and feels this much touches something.
+const TOUCHED_N: f32 = 3.0;
 /// Fingers that are free come this near to their targets.
 const FINGER_TOLERANCE_RAD: f64 = 0.06;
 
 /// What became of an order of which `clamped` was moved to limits, where the robot senses `sensed` after it; its own odometry had its
-/// pelvis at `began` before.
-pub fn report(clamped: &Clamped, began: &Pose, sensed: &RobotSensed, motion: &Motion) -> RobotReport {
+/// pelvis at `began` before. Wrist poses are told in `frame`.
+pub fn report(
+    clamped: &Clamped,
+    began: &Pose,
+    sensed: &RobotSensed,
+    motion: &Motion,
+    frame: PoseFrame,
+) -> RobotReport {
     let robot = &motion.robot;
     RobotReport {
         robot: robot.name.clone(),
-        left: hand_report(Side::Left, clamped, sensed, motion),
-        right: hand_report(Side::Right, clamped, sensed, motion),
-        pelvis_in_start: Some(wire_pose_from_sim(&sensed.start_from_pelvis)),
+        frame: Some(frame).filter(|frame| *frame != PoseFrame::Pelvis),
+        left: hand_report(Side::Left, clamped, sensed, motion, frame),
+        right: hand_report(Side::Right, clamped, sensed, motion, frame),
+        base: Some(motion.state().footing.report(&motion.state().base, motion.world_from_pelvis())),
+        pelvis_in_start: Some(coarse_pose(&isometry_from_sim(&sensed.start_from_pelvis))),
         base_motion: Some(base_motion(began, &sensed.start_from_pelvis)),
         waist_joints_clamped: names(
             robot,
@@ -46,30 +63,51 @@ fn base_motion(began: &Pose, ended: &Pose) -> BaseMotion {
     let now_ahead = ended.rotation * Vector::X;
     let across = Vector::Z.cross(ahead);
     BaseMotion {
-        forward_m: rounded(moved_m.dot(ahead).into()),
-        left_m: rounded(moved_m.dot(across).into()),
-        up_m: rounded(moved_m.z.into()),
-        turned_rad: rounded(now_ahead.dot(across).atan2(now_ahead.dot(ahead)).into()),
+        forward_m: coarse(moved_m.dot(ahead).into()),
+        left_m: coarse(moved_m.dot(across).into()),
+        up_m: coarse(moved_m.z.into()),
+        turned_rad: coarse(now_ahead.dot(across).atan2(now_ahead.dot(ahead)).into()),
     }
 }
 
 /// How one hand did.
-fn hand_report(side: Side, clamped: &Clamped, sensed: &RobotSensed, motion: &Motion) -> HandReport {
+fn hand_report(
+    side: Side,
+    clamped: &Clamped,
+    sensed: &RobotSensed,
+    motion: &Motion,
+    frame: PoseFrame,
+) -> HandReport {
     let (arm, hand) = (columns::arm(side), columns::hand(side));
     let target = motion.targets()[side];
     let measured = isometry_from_sim(&sensed.pelvis_from_wrist[side]);
     let missing = measured.inverse() * target;
     let robot = &motion.robot;
     let force_n = sensed.hand_force_in_pelvis_n[side];
+    let state = wrist_state(side, &target, &measured, sensed, motion);
+    let (grip, touch) = feel::grip(side, sensed, &robot.model);
+    let presses = state == HandState::Blocked && force_n.length() > TOUCHED_N;
+    let frame_from_pelvis = motion.pelvis_from(frame).inverse();
+    let [target_told, mut measured_told] =
+        [target, measured].map(|wrist| coarse_pose(&(frame_from_pelvis * wrist)));
+    let signs = target_told.quaternion_wxyz.iter().zip(&measured_told.quaternion_wxyz);
+    if signs.map(|(one, other)| one * other).sum::<f64>() < 0.0 {
+        measured_told.quaternion_wxyz = measured_told.quaternion_wxyz.map(|part| 0.0 - part);
+    }
     HandReport {
-        state: Some(wrist_state(side, &target, &measured, sensed, motion)),
-        target: wire_pose(&target),
-        measured: wire_pose(&measured),
-        position_error_m: rounded(missing.translation.vector.norm()),
-        orientation_error_rad: rounded(missing.rotation.angle()),
-        fingers: fingers(side, sensed, motion),
+        state: Some(state),
+        grip: Some(grip),
+        touches: touch.or(presses.then_some(Touch::Something)),
+        target: Some(target_told),
+        measured: Some(measured_told),
+        position_error_m: Some(coarse(missing.translation.vector.norm())),
+        orientation_error_rad: Some(coarse(missing.rotation.angle())),
+        compliance_offset_m: motion
+            .given_way_m(side)
+            .map(|offset_m| [offset_m.x, offset_m.y, offset_m.z].map(coarse)),
+        fingers: Some(fingers(side, sensed, motion)),
         largest_effort: Some(largest_effort(side, sensed, motion)),
-        force_n: Some(force_n.to_array().map(|part| rounded_to(2, part.into()))),
+        force_n: Some(force_n.to_array().map(|part| rounded_to(1, part.into()))),
         joints_clamped: names(
             robot,
             among(&clamped.columns, |column| arm.contains(&column) || hand.contains(&column)),
@@ -87,12 +125,23 @@ pub fn wrist_state(
     sensed: &RobotSensed,
     motion: &Motion,
 ) -> HandState {
-    let commanded = motion.commanded_wrists()[side];
+    let turns =
+        || columns::arm(side).any(|column| sensed.joints.qd_rad_s[UPPER[column]].abs() > ARM_MOVES_RAD_S);
+    if motion.state().aims[side] == Aim::Joints {
+        let missing = measured.inv_mul(target);
+        let is_off =
+            missing.translation.vector.norm() > PUSHED_AWAY_M || missing.rotation.angle() > PUSHED_AWAY_RAD;
+        return match (is_off, turns()) {
+            (false, _) => HandState::Idle,
+            (true, true) => HandState::Moving,
+            (true, false) => HandState::Blocked,
+        };
+    }
     if is_near(measured, target) {
         HandState::Arrived
-    } else if columns::arm(side).any(|column| sensed.joints.qd_rad_s[UPPER[column]].abs() > ARM_MOVES_RAD_S) {
+    } else if motion.comes_nearer(side).unwrap_or_else(turns) {
         HandState::Moving
-    } else if is_near(&commanded, target) {
+    } else if is_near(&motion.commanded_wrists()[side], target) {
         HandState::Blocked
     } else {
         HandState::OutOfReach
@@ -121,8 +170,8 @@ fn fingers(side: Side, sensed: &RobotSensed, motion: &Motion) -> FingerReport {
     } else {
         HandState::Blocked
     };
-    let wire = |angles_rad: [f64; HAND_JOINTS]| angles_rad.map(|angle_rad| rounded_to(4, angle_rad));
-    FingerReport { state: Some(state), target_rad: wire(target_rad), measured_rad: wire(measured_rad) }
+    let wire = |angles_rad: [f64; HAND_JOINTS]| angles_rad.map(coarse);
+    FingerReport { state: Some(state), target_rad: Some(wire(target_rad)), measured_rad: wire(measured_rad) }
 }
 
 fn largest_effort(side: Side, sensed: &RobotSensed, motion: &Motion) -> Effort {
@@ -131,7 +180,7 @@ fn largest_effort(side: Side, sensed: &RobotSensed, motion: &Motion) -> Effort {
     let joints = columns::arm(side).chain(columns::hand(side)).map(|column| UPPER[column]);
     let hardest = joints.max_by(|one, other| share(*one).total_cmp(&share(*other)));
     let hardest = hardest.unwrap_or(UPPER[columns::arm(side).start]);
-    Effort { joint: model.joints[hardest].name.clone(), share: rounded_to(3, share(hardest).into()) }
+    Effort { joint: model.joints[hardest].name.clone(), share: rounded_to(2, share(hardest).into()) }
 }
 
 fn among(columns: &[usize], of_interest: impl Fn(usize) -> bool) -> impl Iterator<Item = usize> {

@@ -1,0 +1,92 @@
+//! What a hand feels of what it touches: by the torques of its own drives, and by where its joints have thumb, fingers and palm. Nothing
+//! here is of the simulator's contacts.
+
+use tandem_sim::mjcf::{Geom, Primitive};
+use tandem_sim::{HAND_JOINTS, Pose, RobotModel, RobotSensed, Side, UPPER, Vector};
+use tandem_tools_spec::{Grip, Touch};
+
+use crate::commands::columns;
+
+/// Against what presses on it with 1.5 N a finger's drive works with 0.1 N m or so; one that is free, with less than 0.03.
+const PRESSES_N_M: f32 = 0.1;
+const TOUCHES_N_M: f32 = 0.05;
+/// A finger that turns faster works against its own inertia and damping.
+const MOVES_RAD_S: f32 = 0.5;
+/// Shapes as near as this touch each other.
+const NEAR_M: f32 = 0.004;
+/// Joints of the thumb come first, as in `move_wrists`.
+const THUMB_JOINTS: usize = 3;
+/// thumb_0 swings the thumb to the side, and neither opens nor closes it.
+const SWINGING: usize = 0;
+/// Points along a capsule at which its distance from another shape is taken.
+const POINTS: usize = 9;
+
+/// What the fingers of a hand feel between them, and what that is.
+pub fn grip(side: Side, sensed: &RobotSensed, model: &RobotModel) -> (Grip, Option<Touch>) {
+    let closing: [f32; HAND_JOINTS] = std::array::from_fn(|finger| closing_n_m(side, finger, sensed));
+    let (thumb, fingers) = closing.split_at(THUMB_JOINTS);
+    let most = |torques_n_m: &[f32]| torques_n_m.iter().copied().fold(0.0, f32::max);
+    let presses = |torques_n_m: &[f32]| most(torques_n_m) >= PRESSES_N_M;
+    let of_itself = most(thumb) >= TOUCHES_N_M && thumb_touches_own_hand(side, sensed, model);
+    let grip = match (presses(thumb), presses(fingers)) {
+        (true, false) if of_itself => Grip::None,
+        (true, true) => Grip::Holding,
+        (true, false) | (false, true) => Grip::OneSided,
+        (false, false) if of_itself => Grip::None,
+        (false, false) if closing.iter().any(|torque_n_m| torque_n_m.abs() >= TOUCHES_N_M) => Grip::Touching,
+        (false, false) => Grip::None,
+    };
+    let touch = match grip {
+        Grip::None => of_itself.then_some(Touch::Itself),
+        Grip::Touching | Grip::OneSided | Grip::Holding => Some(Touch::Something),
+    };
+    (grip, touch)
+}
+
+/// The torque with which a finger joint's drive closes it; 0 of joints that turn, and of the one that neither opens nor closes.
+fn closing_n_m(side: Side, finger: usize, sensed: &RobotSensed) -> f32 {
+    let joint = UPPER[columns::hand(side).start + finger];
+    if finger == SWINGING || sensed.joints.qd_rad_s[joint].abs() > MOVES_RAD_S {
+        return 0.0;
+    }
+    // Left thumbs and right fingers close in the positive sense.
+    let sign = if finger < THUMB_JOINTS { side.sign() } else { -side.sign() };
+    sign * sensed.joints.torque_n_m[joint]
+}
+
+/// Whether the last link of the thumb lies on the palm or on a finger of its own hand.
+fn thumb_touches_own_hand(side: Side, sensed: &RobotSensed, model: &RobotModel) -> bool {
+    let hand = &model.hands[side];
+    let Some(thumb) = hand.thumb.last() else { return false };
+    let poses = model.forward_kinematics(Pose::IDENTITY, &sensed.joints.q_rad);
+    let geoms = |link: usize| {
+        let pose = poses[link];
+        model.links[link]
+            .geoms
+            .iter()
+            .filter(|geom| geom.collides)
+            .map(move |geom| (pose * geom.body_from_geom, geom))
+    };
+    let others = || std::iter::once(hand.wrist).chain(hand.fingers.iter().copied()).flat_map(geoms);
+    geoms(*thumb).any(|(pose, geom)| {
+        let Primitive::Capsule { radius_m, half_length_m } = geom.primitive else { return false };
+        let along =
+            |i: usize| pose * (Vector::Z * (half_length_m * (2.0 * i as f32 / (POINTS - 1) as f32 - 1.0)));
+        others().any(|(other, shape)| {
+            (0..POINTS).any(|i| distance_m(along(i), &other, shape) < radius_m + NEAR_M)
+        })
+    })
+}
+
+/// Distance of a point from a shape; of shapes that hands do not have, infinite.
+fn distance_m(point_m: Vector, pose: &Pose, geom: &Geom) -> f32 {
+    let point_m = pose.inverse() * point_m;
+    match &geom.primitive {
+        Primitive::Box { half_extents_m } => (point_m.abs() - *half_extents_m).max(Vector::ZERO).length(),
+        Primitive::Capsule { radius_m, half_length_m } => {
+            let nearest_m = Vector::Z * point_m.z.clamp(-*half_length_m, *half_length_m);
+            (point_m - nearest_m).length() - *radius_m
+        }
+        _ => f32::INFINITY,
+    }
+}

@@ -1,0 +1,97 @@
+//! What somebody in the room would be told of the things in it: how large they are, and about how far from each robot they stand before
+//! the seed moves them.
+
+use tandem_sim::mjcf::{Geom, Primitive};
+use tandem_sim::{ObjectModel, Pose, SimError, Vector};
+
+use crate::tasks::{ObjectSpot, RobotSpot, Task};
+
+/// One line for each thing of a task, as "service trolley, 0.45 x 0.85 x 0.95 m: 0.9 m ahead of A, 3.7 m ahead of B".
+pub fn room(task: &Task) -> Result<Vec<String>, SimError> {
+    let line = |spot: &ObjectSpot| {
+        let [x_m, y_m, z_m] = size_m(spot)?.to_array();
+        let places: Vec<String> = task.robots.iter().map(|robot| place(robot, spot)).collect();
+        let name = spot.name.replace('_', " ");
+        Ok(format!("{name}, {x_m:.2} x {y_m:.2} x {z_m:.2} m: {}", places.join(", ")))
+    };
+    task.objects.iter().map(line).collect()
+}
+
+/// About where a thing is for a robot at the start.
+fn place(robot: &RobotSpot, spot: &ObjectSpot) -> String {
+    let [x_m, y_m, _] = spot.position_m;
+    let (east_m, north_m) = (x_m - robot.position_m[0], y_m - robot.position_m[1]);
+    let (sine, cosine) = robot.yaw_rad.sin_cos();
+    let (ahead_m, left_m) = (cosine * east_m + sine * north_m, cosine * north_m - sine * east_m);
+    let part = |part_m: f32, towards: &str, away: &str| {
+        let words = if part_m < 0.0 { away } else { towards };
+        (part_m.abs() >= 0.05).then(|| format!("{:.1} m {words} {}", part_m.abs(), robot.name))
+    };
+    let parts = [part(ahead_m, "ahead of", "behind"), part(left_m, "to the left of", "to the right of")];
+    let told: Vec<String> = parts.into_iter().flatten().collect();
+    if told.is_empty() { format!("where {} stands", robot.name) } else { told.join(" and ") }
+}
+
+/// Along the axes of a thing as its file has it, z up.
+fn size_m(spot: &ObjectSpot) -> Result<Vector, SimError> {
+    let (mut low_m, mut high_m) = (Vector::INFINITY, Vector::NEG_INFINITY);
+    for part in ObjectModel::parts(spot.file, spot.name)? {
+        for geom in part.model.geoms.iter().filter(|geom| geom.drawn || geom.collides) {
+            for corner_m in corners_m(geom, &part.object_from_part) {
+                (low_m, high_m) = (low_m.min(corner_m), high_m.max(corner_m));
+            }
+        }
+    }
+    Ok(high_m - low_m)
+}
+
+fn corners_m(geom: &Geom, object_from_part: &Pose) -> Vec<Vector> {
+    let pose = *object_from_part * geom.body_from_geom;
+    let of_box = |half_m: Vector| -> Vec<Vector> {
+        let sign = |corner: usize, axis: usize| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 };
+        let signs = |corner: usize| Vector::new(sign(corner, 0), sign(corner, 1), sign(corner, 2));
+        (0..8).map(|corner| signs(corner) * half_m).collect()
+    };
+    let points_m: Vec<Vector> = match &geom.primitive {
+        Primitive::Sphere { radius_m } => of_box(Vector::splat(*radius_m)),
+        Primitive::Capsule { radius_m, half_length_m } => {
+            of_box(Vector::new(*radius_m, *radius_m, half_length_m + radius_m))
+        }
+        Primitive::Cylinder { radius_m, half_length_m } => {
+            of_box(Vector::new(*radius_m, *radius_m, *half_length_m))
+        }
+        Primitive::Box { half_extents_m } => of_box(*half_extents_m),
+        Primitive::Ellipsoid { radii_m } => of_box(*radii_m),
+        Primitive::Convex { vertices_m } => vertices_m.clone(),
+        // Things have neither floors nor meshes of their own.
+        _ => Vec::new(),
+    };
+    points_m.into_iter().map(|point_m| pose * point_m).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tasks;
+
+    #[test]
+    fn things_are_as_large_and_as_far_as_people_would_say() {
+        let lines = |id: &str| room(tasks::find(id).unwrap()).unwrap();
+        let cart = lines("cart_service");
+        assert!(cart[0].starts_with("service trolley, ") && cart[0].contains("0.9 m ahead of A"), "{cart:?}");
+        assert!(
+            cart.iter().any(|line| line.starts_with("parking mark, ") && line.contains("ahead of B")),
+            "{cart:?}"
+        );
+        let handover = lines("handover");
+        assert!(handover[0].starts_with("bottle, 0.07 x 0.07 x 0."), "{handover:?}");
+        for task in tasks::ALL {
+            let lines = lines(task.id);
+            assert_eq!(lines.len(), task.objects.len());
+            for line in lines {
+                println!("{}: {line}", task.id);
+                assert!(!line.contains("inf") && !line.contains("NaN") && !line.contains("-"), "{line}");
+            }
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! Replies as a language model wants to read them: without what is as it should be.
+
+use tandem_tools_spec::{
+    BaseMotion, CommandReply, FingerReport, Grip, HandReport, HandState, LookReply, ManageReply, RobotReport,
+    RobotState, StatusReply, ToolReply,
+};
+
+/// What is less is not worth a word: metres and radians, newtons, the share of a joint's effort.
+const MOVED: f64 = 0.01;
+const FELT_N: f64 = 1.0;
+const HARD_SHARE: f64 = 0.8;
+
+/// Takes out of a reply what its caller can do without.
+pub fn shorten(reply: &mut ToolReply) {
+    match reply {
+        ToolReply::Act(reply) => shorten_report(reply),
+        ToolReply::Plan(reply) => shorten_report(&mut reply.last),
+        ToolReply::Look(LookReply::GetRobotState(state)) => shorten_state(state),
+        ToolReply::Manage(ManageReply::GetStatus(StatusReply { fallen, .. })) => {
+            fallen.retain(|robot| robot.fallen);
+        }
+        ToolReply::Look(LookReply::Observe(_) | LookReply::QueryDepth(_) | LookReply::CheckReach(_))
+        | ToolReply::Manage(ManageReply::Finish(_))
+        | ToolReply::Talk(_) => {}
+    }
+}
+
+fn shorten_state(state: &mut RobotState) {
+    (state.joint_velocities_rad_s, state.joint_torques_n_m) = (None, None);
+}
+
+fn shorten_report(reply: &mut CommandReply) {
+    reply.fallen.retain(|robot| robot.fallen);
+    for RobotReport { left, right, base_motion, .. } in &mut reply.robots {
+        let is_small = |motion: &BaseMotion| {
+            [motion.forward_m, motion.left_m, motion.up_m, motion.turned_rad]
+                .iter()
+                .all(|part| part.abs() < MOVED)
+        };
+        *base_motion = base_motion.filter(|motion| !is_small(motion));
+        shorten_hand(left);
+        shorten_hand(right);
+    }
+}
+
+fn shorten_hand(hand: &mut HandReport) {
+    hand.target = None;
+    if let Some(HandState::Arrived | HandState::Idle) = hand.state {
+        hand.measured = None;
+        (hand.position_error_m, hand.orientation_error_rad) = (None, None);
+    }
+    if let Some(FingerReport { state, target_rad, .. }) = &mut hand.fingers {
+        *target_rad = None;
+        if *state == Some(HandState::Arrived) {
+            hand.fingers = None;
+        }
+    }
+    hand.grip = hand.grip.filter(|grip| *grip != Grip::None);
+    hand.largest_effort.take_if(|effort| effort.share < HARD_SHARE);
+    hand.force_n.take_if(|force_n| force_n.iter().map(|part| part * part).sum::<f64>().sqrt() < FELT_N);
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn hand(state: &str, force_n: f64) -> HandReport {
+        let pose = json!({ "position_m": [0.3, 0.2, 0.1], "quaternion_wxyz": [1, 0, 0, 0] });
+        let rad = [0.0; 7];
+        let hand = json!({
+            "state": state, "grip": "none", "target": pose, "measured": pose, "position_error_m": 0.02,
+            "orientation_error_rad": 0.1, "force_n": [0.0, 0.0, force_n],
+            "fingers": { "state": "arrived", "target_rad": rad, "measured_rad": rad },
+            "largest_effort": { "joint": "right_elbow_joint", "share": 0.3 },
+        });
+        serde_json::from_value(hand).unwrap()
+    }
+
+    #[test]
+    fn what_is_as_it_should_be_is_left_out() {
+        let left = |mut hand: HandReport| {
+            shorten_hand(&mut hand);
+            json!(hand)
+        };
+        assert_eq!(left(hand("idle", 0.4)), json!({ "state": "idle" }));
+        assert_eq!(left(hand("arrived", -4.9)), json!({ "state": "arrived", "force_n": [0.0, 0.0, -4.9] }));
+        let blocked = left(hand("blocked", 9.0));
+        assert_eq!((&blocked["position_error_m"], &blocked["target"]), (&json!(0.02), &json!(null)));
+        // Where nothing says that a hand is where it should be, it is told where it is.
+        let untold = left(HandReport { state: None, ..hand("idle", 0.0) });
+        assert!(untold["measured"].is_object() && untold["position_error_m"].is_number(), "{untold}");
+    }
+}

@@ -1,0 +1,231 @@
+//! What robots tell of what their hands and their base feel, held against what the simulator knows.
+
+use crate::common::*;
+use tandem_episodes::players::{self, Episode, PlayerError, PrivilegedEpisode};
+use tandem_episodes::{A, B, Facts, Grip as Truth, Session};
+use tandem_sim::{Side, Vector};
+use tandem_tools_spec::{
+    Assistance, BaseState, Call, Grip, HandState, MoveWrists, PoseFrame, Protocol, ToolCall, ToolReply,
+    Touch, Walk, WalkMove, WristMove,
+};
+
+/// Plays on, and holds what is told of each hand's grip against its contacts.
+struct Gripping {
+    session: Session,
+    /// How often a hand holds and says so, holds and does not, does not and says so, does not and says nothing.
+    counts: [u32; 4],
+    wrong: Vec<String>,
+}
+
+impl Episode for Gripping {
+    fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {
+        let reply = self.session.call(call).map_err(|_| PlayerError::EpisodeOver)?;
+        let facts = self.session.facts();
+        let ToolReply::Act(command) = &reply else { return Ok(reply) };
+        for report in &command.robots {
+            let robot = ["A", "B", "C"].iter().position(|name| *name == report.robot).expect("a robot");
+            for (side, hand) in [(Side::Left, &report.left), (Side::Right, &report.right)] {
+                let holds = facts.objects.iter().any(|object| object.hands[robot][side] == Truth::Holding);
+                let told = hand.grip == Some(Grip::Holding);
+                let case = match (holds, told) {
+                    (true, true) => 0,
+                    (true, false) => 1,
+                    (false, true) => 2,
+                    (false, false) => 3,
+                };
+                self.counts[case] += 1;
+                if holds != told {
+                    let object = facts.objects.iter().map(|object| (&object.name, object.hands[robot][side]));
+                    self.wrong.push(format!(
+                        "{} {side:?} {:?}: {hand:?}",
+                        report.robot,
+                        object.collect::<Vec<_>>()
+                    ));
+                }
+            }
+        }
+        Ok(reply)
+    }
+}
+
+impl PrivilegedEpisode for Gripping {
+    fn facts(&mut self) -> Result<Facts, PlayerError> {
+        Ok(self.session.facts())
+    }
+}
+
+/// In the tasks of which each has another grip: a hand that holds says so, and one that does not says nothing of it, but for moments in
+/// which it closes or opens.
+#[test]
+fn hands_feel_that_they_hold() {
+    for task in ["handover", "co_carry", "big_table", "trash_collection", "cart_service"] {
+        let spec = spec(task, 2011, Protocol::Benchmark);
+        let session = Session::start(&spec, None).unwrap();
+        let mut episode = Gripping { session, counts: [0; 4], wrong: Vec::new() };
+        players::find("expert").unwrap().play(&spec, &mut episode).unwrap();
+        let [both, silent, only_told, neither] = episode.counts;
+        let wrong = || episode.wrong.join("\n");
+        println!("{task}: {:?}\n{}", episode.counts, wrong());
+        assert!(both >= 8 && neither >= 8, "{task}: {:?}", episode.counts);
+        assert!(f64::from(silent + only_told) < 0.06 * f64::from(both + neither), "{task}: {}", wrong());
+    }
+}
+
+fn right_hand(session: &mut Session, entry: WristMove) -> tandem_tools_spec::RobotReport {
+    let call = MoveWrists { steps: 50, robots: vec![entry] };
+    command(session, call.clone().into());
+    command(session, call.into()).robots.remove(0)
+}
+
+#[test]
+fn a_thumb_on_its_own_palm_holds_nothing() {
+    let mut session = handover(2011);
+    let shaped = |fingers_rad: [f64; 7]| WristMove {
+        right_position_m: Some([0.15, -0.3, 0.25]),
+        right_fingers_rad: Some(fingers_rad),
+        ..WristMove::hold("A")
+    };
+    let open = right_hand(&mut session, shaped([0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0]));
+    assert_eq!((open.right.grip, open.right.touches), (Some(Grip::None), None), "{open:?}");
+    let closed = right_hand(&mut session, shaped([0.0, -1.04, -1.74, 0.3, 0.2, 0.3, 0.2]));
+    assert_eq!(
+        (closed.right.grip, closed.right.touches),
+        (Some(Grip::None), Some(Touch::Itself)),
+        "{closed:?}"
+    );
+    assert_eq!(
+        (closed.left.state, closed.left.grip),
+        (Some(HandState::Idle), Some(Grip::None)),
+        "{closed:?}"
+    );
+}
+
+#[test]
+fn a_base_says_what_it_does_and_where_it_will_rest() {
+    let mut session = handover(2011);
+    let back = |v: f64| Walk {
+        steps: 50,
+        robots: vec![WalkMove {
+            robot: "B".into(),
+            vx_m_s: v,
+            vy_m_s: 0.0,
+            yaw_rate_rad_s: 0.0,
+            pelvis_height_m: None,
+            waist_yaw_rad: None,
+            look_at_m: None,
+        }],
+    };
+    let standing = wait(&mut session, 5).robots[B].base.unwrap();
+    assert_eq!((standing.state, standing.comes_to_rest_m), (Some(BaseState::Standing), None));
+    assert!((standing.pelvis_height_m - 0.76).abs() < 0.005 && standing.commanded_height_m.is_none());
+    command(&mut session, back(-0.2).into());
+    let walking = command(&mut session, back(-0.2).into()).robots[0].base.unwrap();
+    assert_eq!(walking.state, Some(BaseState::Stepping));
+    assert!(walking.pelvis_height_m < 0.69 && walking.commanded_height_m.is_some(), "{walking:?}");
+    let settling = wait(&mut session, 5).robots[B].base.unwrap();
+    assert_eq!(settling.state, Some(BaseState::Settling));
+    for _ in 0..4 {
+        wait(&mut session, 50);
+    }
+    let rested = wait(&mut session, 1).robots.remove(B);
+    assert_eq!(rested.base.unwrap().state, Some(BaseState::Standing));
+    let rests_m = rested.pelvis_in_start.unwrap().position_m;
+    for told in [walking, settling] {
+        let [x_m, y_m] = told.comes_to_rest_m.unwrap();
+        let off_m = (x_m - rests_m[0]).hypot(y_m - rests_m[1]);
+        assert!(off_m < 0.05, "{off_m} m off: {told:?}, and it rests at {rests_m:?}");
+    }
+    assert_eq!(session.facts().robots.len(), 2);
+}
+
+/// A target in the start frame stays where it is while its robot walks and turns; one in the level frame is where gravity and the robot's
+/// heading have it.
+#[test]
+fn targets_are_read_in_the_frame_that_they_name() {
+    let mut session = handover(2011);
+    let back = WalkMove {
+        robot: "A".into(),
+        vx_m_s: -0.2,
+        vy_m_s: 0.0,
+        yaw_rate_rad_s: 0.3,
+        pelvis_height_m: None,
+        waist_yaw_rad: None,
+        look_at_m: None,
+    };
+    command(&mut session, Walk { steps: 50, robots: vec![back] }.into());
+    for _ in 0..4 {
+        wait(&mut session, 50);
+    }
+    let now = wait(&mut session, 1).robots.remove(A);
+    let start_from_pelvis = now.pelvis_in_start.unwrap();
+    let held = now.right.measured.unwrap();
+    // Where the hand is, in the start frame: asked for there, it stays.
+    let [w, x, y, z] = start_from_pelvis.quaternion_wxyz.map(|part| part as f32);
+    let turned = tandem_sim::Rotation::from_xyzw(x, y, z, w).normalize();
+    let at = Vector::from_array(held.position_m.map(|part| part as f32));
+    let origin = Vector::from_array(start_from_pelvis.position_m.map(|part| part as f32));
+    let in_start_m = (origin + turned * at).to_array().map(f64::from);
+    let entry = WristMove {
+        right_position_m: Some(in_start_m),
+        frame: Some(PoseFrame::Start),
+        ..WristMove::hold("A")
+    };
+    let report = right_hand(&mut session, entry);
+    assert_eq!(report.frame, Some(PoseFrame::Start));
+    let measured_m = report.right.measured.unwrap().position_m;
+    for (asked_m, measured_m) in in_start_m.into_iter().zip(measured_m) {
+        assert!((asked_m - measured_m).abs() < 0.008, "{measured_m} for {asked_m}: {report:?}");
+    }
+    let upright = WristMove {
+        frame: Some(PoseFrame::Level),
+        right_quaternion_wxyz: Some([1.0, 0.0, 0.0, 0.0]),
+        right_position_m: Some([0.15, -0.25, 0.2]),
+        ..WristMove::hold("A")
+    };
+    let report = right_hand(&mut session, upright);
+    let facts = session.facts();
+    let robot = &facts.robots[A];
+    let ahead = (robot.pelvis_in_world * robot.wrist_in_pelvis.right).rotation * Vector::X;
+    assert!(ahead.z.abs() < 0.03, "level fingers: {ahead}, {report:?}");
+}
+
+#[test]
+fn other_frames_are_not_for_paper() {
+    let spec = spec("handover", 2011, Protocol::Benchmark).assisted(Assistance::Paper);
+    let mut session = Session::start(&spec, None).unwrap();
+    let args = serde_json::json!({ "robot": "A", "pixels": [[160, 120]], "frame": "start" });
+    let call = Call::parse("query_depth", args).unwrap();
+    let refused = session.call(call.tool).unwrap_err().to_string();
+    assert!(refused.contains("leave frame out"), "{refused}");
+}
+
+/// The camera is turned by the waist: what lies to the side comes to the middle of the picture.
+#[test]
+fn a_robot_looks_where_it_is_told_to() {
+    let mut session = handover(2011);
+    let look = |look_at_m: Option<[f64; 3]>, waist_yaw_rad: Option<f64>| Walk {
+        steps: 50,
+        robots: vec![WalkMove {
+            robot: "A".into(),
+            vx_m_s: 0.0,
+            vy_m_s: 0.0,
+            yaw_rate_rad_s: 0.0,
+            pelvis_height_m: None,
+            waist_yaw_rad,
+            look_at_m,
+        }],
+    };
+    let yaw_rad = |session: &mut Session| {
+        wait(session, 25);
+        state(session, "A").joint_positions_rad.get("waist_yaw_joint").unwrap()
+    };
+    command(&mut session, look(Some([1.0, 0.7, 0.0]), None).into());
+    assert!((yaw_rad(&mut session) - 0.7f64.atan2(1.0)).abs() < 0.03);
+    // No faster than 1 rad/s, and within the joint's range.
+    command(&mut session, look(None, Some(-0.9)).into());
+    let turned_rad = yaw_rad(&mut session);
+    assert!((turned_rad - (0.7f64.atan2(1.0) - 1.0)).abs() < 0.03, "{turned_rad}");
+    let report = command(&mut session, look(None, Some(-9.0)).into()).robots.remove(0);
+    assert_eq!(report.waist_joints_clamped, ["waist_yaw_joint"]);
+    assert_eq!(report.base.unwrap().state, Some(BaseState::Standing), "it turns on the spot");
+}

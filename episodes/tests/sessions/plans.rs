@@ -1,0 +1,120 @@
+//! Several commands by one call: as if they had been called in turn, and replayed so.
+
+use serde_json::json;
+use tandem_episodes::{A, Session};
+use tandem_tools_spec::{Assistance, Call, PlanReply, Protocol, ToolCall, ToolReply};
+
+use crate::common::*;
+
+fn plan(session: &mut Session, tool: &str, args: serde_json::Value) -> Result<PlanReply, String> {
+    let call = Call::parse(tool, args).map_err(|error| error.to_string())?;
+    match session.ask(None, call).map_err(|error| error.to_string())?.reply {
+        ToolReply::Plan(reply) => Ok(reply),
+        other => panic!("{other:?}"),
+    }
+}
+
+fn agentic() -> Session {
+    start("handover", 2011, Protocol::Agentic)
+}
+
+#[test]
+fn a_plan_does_what_its_commands_do() {
+    let up = json!({ "steps": 25, "robots": [{ "robot": "A", "right_position_m": [0.28, -0.24, 0.22] }] });
+    let commands = [("move_wrists", up.clone()), ("wait", json!({ "steps": 20 })), ("move_wrists", up)];
+    let mut one_by_one = agentic();
+    for (tool, args) in commands.clone() {
+        one_by_one.call(ToolCall::parse(tool, args).unwrap()).unwrap();
+    }
+    let mut planned = agentic();
+    let listed = commands.map(|(tool, arguments)| json!({ "tool": tool, "arguments": arguments }));
+    let reply = plan(&mut planned, "send_plan", json!({ "commands": listed })).unwrap();
+    assert_eq!((reply.commands, reply.executed_steps, reply.stopped), (3, 70, None));
+    assert_eq!(planned.state_hash(), one_by_one.state_hash());
+    let (one, other) = (planned.result(), one_by_one.result());
+    assert_eq!((one.tool_calls, one.env_steps), (other.tool_calls, other.env_steps), "every command counts");
+}
+
+#[test]
+fn a_plan_stops_where_something_is_not_as_it_expects() {
+    let mut session = agentic();
+    let far = json!({ "steps": 5, "robots": [{ "robot": "A", "right_position_m": [0.28, -0.24, 0.22] }] });
+    let wait = |expects: serde_json::Value| json!({ "tool": "wait", "arguments": { "steps": 2 }, "expects": expects });
+    let commands = json!([
+        { "tool": "move_wrists", "arguments": far, "expects": { "base_stepping": false, "force_below_n": 20 } },
+        wait(json!({ "blocked": false })),
+        wait(json!({ "arrived": true })),
+        wait(json!({})),
+    ]);
+    let reply = plan(&mut session, "send_plan", json!({ "commands": commands })).unwrap();
+    assert_eq!((reply.commands, reply.executed_steps), (3, 9));
+    let why = reply.stopped.unwrap();
+    assert!(
+        why.contains("commands[2]") && why.contains("arrived is false, not true (A's right wrist"),
+        "{why}"
+    );
+    let hash = session.state_hash();
+    for (expects, says) in [
+        (json!({ "phase_reached": "p1" }), "p1 has not been reached"),
+        (json!({ "force_above_n": 30 }), "not above 30"),
+        (json!({ "base_stepping": true }), "base_stepping is false, not true"),
+    ] {
+        let reply =
+            plan(&mut session, "send_plan", json!({ "commands": [wait(expects), wait(json!({}))] })).unwrap();
+        assert!(reply.commands == 1 && reply.stopped.as_ref().unwrap().contains(says), "{reply:?}");
+    }
+    assert_ne!(session.state_hash(), hash);
+}
+
+#[test]
+fn a_plan_that_cannot_be_carried_out_moves_nothing() {
+    let mut session = agentic();
+    let hash = session.state_hash();
+    let wait = json!({ "tool": "wait", "arguments": { "steps": 5 } });
+    for (command, says) in [
+        (
+            json!({ "tool": "finish", "arguments": {} }),
+            "commands[1]: \"finish\" is no command; have: move_wrists",
+        ),
+        (json!({ "tool": "wait", "arguments": { "steps": 0 } }), "commands[1]: wait: steps is 0"),
+        (json!({ "tool": "wait", "arguments": { "steps": 26 } }), "allows 1 to 25"),
+        (
+            json!({ "tool": "walk", "arguments": { "steps": 5, "robots": [{ "robot": "C", "vx_m_s": 0, "vy_m_s": 0, "yaw_rate_rad_s": 0 }] } }),
+            "no robot \"C\"",
+        ),
+    ] {
+        let refused = plan(&mut session, "send_plan", json!({ "commands": [wait, command] })).unwrap_err();
+        assert!(refused.contains(says), "{refused}");
+    }
+    let many = vec![wait.clone(); 21];
+    assert!(plan(&mut session, "send_plan", json!({ "commands": many })).unwrap_err().contains("at most 20"));
+    assert_eq!(session.state_hash(), hash);
+    let spec = spec("handover", 2011, Protocol::Agentic).assisted(Assistance::Paper);
+    let mut paper = Session::start(&spec, None).unwrap();
+    let refused = plan(&mut paper, "send_plan", json!({ "commands": [wait] })).unwrap_err();
+    assert!(refused.contains("this episode has no plans"), "{refused}");
+}
+
+/// Back from the counter, to the side and turned: by odometry alone, and as the simulator has it.
+#[test]
+fn a_robot_walks_to_a_place() {
+    let mut session = agentic();
+    let began = session.facts().robots[A].pelvis_in_world;
+    let to = json!({ "steps": 1200, "robots": [{ "robot": "A", "to_m": [-0.5, 0.3], "heading_rad": 0.8 }] });
+    let reply = plan(&mut session, "walk_to", to).unwrap();
+    assert_eq!(reply.stopped, None, "{reply:?}");
+    assert!(reply.executed_steps < 700 && reply.commands > 10, "{reply:?}");
+    let moved = began.inverse() * session.facts().robots[A].pelvis_in_world;
+    let off_m = (moved.translation.x + 0.5).hypot(moved.translation.y - 0.3);
+    let ahead = moved.rotation * tandem_sim::Vector::X;
+    let off_rad = (ahead.y.atan2(ahead.x) - 0.8).abs();
+    assert!(off_m < 0.05 && off_rad < 0.06, "{off_m} m and {off_rad} rad off: {:?}", reply.last.robots);
+    // Into the counter there is no way.
+    let to = json!({ "steps": 1200, "robots": [{ "robot": "A", "to_m": [0.6, 0.0], "heading_rad": 0.0 }] });
+    let reply = plan(&mut session, "walk_to", to).unwrap();
+    assert!(reply.stopped.as_ref().is_some_and(|why| why.contains("A")), "{reply:?}");
+    let few = json!({ "steps": 20, "robots": [{ "robot": "A", "to_m": [-0.5, 0.0] }] });
+    let reply = plan(&mut session, "walk_to", few).unwrap();
+    assert_eq!(reply.executed_steps, 20);
+    assert!(reply.stopped.unwrap().contains("the steps are used up; A is"), "its place is half a metre off");
+}
