@@ -10,6 +10,9 @@ use crate::commands::columns;
 /// Against what presses on it with 1.5 N a finger's drive works with 0.1 N m or so; one that is free, with less than 0.03.
 const PRESSES_N_M: f32 = 0.1;
 const TOUCHES_N_M: f32 = 0.05;
+/// A thumb presses this far from its joint, and against the palm if the arm feels less than this part of it.
+const THUMB_LEVER_M: f32 = 0.06;
+const WITHIN_PART: f32 = 0.5;
 /// A finger that turns faster works against its own inertia and damping.
 const MOVES_RAD_S: f32 = 0.5;
 /// Shapes as near as this touch each other.
@@ -28,9 +31,13 @@ pub fn grip(side: Side, sensed: &RobotSensed, model: &RobotModel) -> (Grip, Opti
     let most = |torques_n_m: &[f32]| torques_n_m.iter().copied().fold(0.0, f32::max);
     let presses = |torques_n_m: &[f32]| most(torques_n_m) >= PRESSES_N_M;
     let of_itself = most(thumb) >= TOUCHES_N_M && thumb_touches_own_hand(side, sensed, model);
+    // What the palm presses back is within the hand, and does not reach the arm.
+    let within_n = WITHIN_PART * most(thumb) / THUMB_LEVER_M;
+    let palm_presses = sensed.hand_force_in_pelvis_n[side].length() < within_n;
     let grip = match (presses(thumb), presses(fingers)) {
         (true, false) if of_itself => Grip::None,
         (true, true) => Grip::Holding,
+        (true, false) if palm_presses => Grip::Holding,
         (true, false) | (false, true) => Grip::OneSided,
         (false, false) if of_itself => Grip::None,
         (false, false) if closing.iter().any(|torque_n_m| torque_n_m.abs() >= TOUCHES_N_M) => Grip::Touching,

@@ -131,7 +131,7 @@ class DepthReply:
     columns: tuple[str, str, str, str, str]
     """What each column of `points` is: "u", "v", "x_m", "y_m", "z_m"."""
 
-    points: tuple[tuple[Any, Any, Any, Any, Any], ...]
+    points: tuple[tuple[float | None, float | None, float | None, float | None, float | None], ...]
     """One row per pixel asked for, in the same order; of a region row by row. Millimetres; null where nothing is
     seen. Of a surface none.
     """
@@ -144,7 +144,7 @@ class DepthReply:
             frame=value.get("frame"),
             surface=None if (got := value.get("surface")) is None else Surface.of(got),
             columns=tuple(value["columns"]),
-            points=tuple(value["points"]),
+            points=tuple(tuple(item) for item in value["points"]),
         )
 
 

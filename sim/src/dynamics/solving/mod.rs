@@ -25,6 +25,8 @@ const WHOLE_SWEEPS: usize = 8;
 const DAMPED_SHARE: f64 = 0.5;
 /// Where something lies deeper in another, as many more: what is heavy presses something light into the floor.
 const DEEP_M: f64 = 0.01;
+/// So deep nothing gives way any more.
+const RIGID_M: f64 = 0.02;
 /// J that the relaxing sweeps took: where it was so much, there may be more that they should have taken.
 const HARD_J: f64 = 0.3;
 
@@ -211,6 +213,12 @@ fn kinetic_j(w: &[f64]) -> f64 {
     0.5 * w.iter().map(|w| w * w).sum::<f64>()
 }
 
+/// How much of its softness a contact still has: all of it to a depth of 1 cm, nothing at 2 cm. An arm presses a finger that is
+/// stretched against its stop with 300 times its weight into something, and would hold it 2 cm deep otherwise.
+fn giving_share(gap_m: f64) -> f64 {
+    ((RIGID_M + gap_m) / (RIGID_M - DEEP_M)).clamp(0.0, 1.0)
+}
+
 fn push<const N: usize>(
     contacts: &mut Contacts<N>,
     candidate: &Candidate,
@@ -246,7 +254,7 @@ fn push<const N: usize>(
     }
     contacts.push(Terms {
         bias_m_s: [open_m_s + correction_m_s.max(-settings.fastest_correction_m_s), open_m_s],
-        softness: softness.compliance(settings.dt_s),
+        softness: softness.compliance(settings.dt_s) * giving_share(gap_m),
         friction: std::array::from_fn(|lane| friction[lane]),
         impulse: std::array::from_fn(|lane| if friction[lane] > 0.0 { impulse[lane] } else { 0.0 }),
     });

@@ -9,3 +9,4 @@ mod free_motion;
 mod friction;
 mod inverse;
 mod joints;
+mod overlap;

@@ -133,7 +133,7 @@ fn targets_beyond_limits_are_clamped_and_reported() {
         clamped.contains("left_shoulder_pitch_joint") && clamped.contains("left_hand_thumb_0_joint"),
         "{reply}"
     );
-    assert_eq!(report["right"]["joints_clamped"], json!([]), "{reply}");
+    assert_eq!(report["right"].get("joints_clamped"), None, "{reply}");
     assert!(report["base_command_clamped"].to_string().contains("vx_m_s"), "{reply}");
 }
 

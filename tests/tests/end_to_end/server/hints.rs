@@ -30,7 +30,7 @@ fn texts(hints: Hints) -> Vec<(&'static str, Value)> {
 fn every_face_says_how_to_grasp_or_none_does() {
     let recipes = |text: &Value| {
         let text = text.to_string();
-        ["Closed around a bottle", "To grasp an", "close the outer finger joints"]
+        ["Closed around a bottle", "To grasp an", "close to close_rad in"]
             .into_iter()
             .any(|recipe| text.contains(recipe))
     };
