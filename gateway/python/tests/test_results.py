@@ -146,6 +146,8 @@ def test_other_threads_run_while_physics_does() -> None:
 def test_the_command_line_is_whole(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     demo = subprocess.run(
         [sys.executable, "-m", "tandem", "demo", "--seeds", "2010", "--runs", str(tmp_path)],
+        # Not where the sources lie, which Python would take for the package.
+        cwd=tmp_path,
         capture_output=True,
         text=True,
         check=False,
@@ -174,7 +176,11 @@ tandem.evaluate(policy, ["handover", "pouring"], range(2000, 2200), jobs=2, prot
 
 def test_an_interrupt_ends_an_evaluation_and_leaves_files_whole(tmp_path: Path) -> None:
     process = subprocess.Popen(
-        [sys.executable, "-c", ENDLESS, str(tmp_path)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", ENDLESS, str(tmp_path)],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
     assert process.stdout is not None
     assert process.stdout.readline() == "begun\n"
