@@ -41,7 +41,6 @@ PoseFrame: TypeAlias = Literal[
     "level",
     "start",
 ]
-""""""
 
 StopReason: TypeAlias = Literal[
     "steps_done",

@@ -16,13 +16,12 @@ from .arguments import (
     Numbers,
     PixelRegion,
     PlannedCommand,
-    PoseFrame,
     SurfaceQuery,
     WalkMove,
     WristMove,
     plain,
 )
-from .commands import CommandReply, PlanReply
+from .commands import CommandReply, PlanReply, PoseFrame
 from .replies import DepthReply, ReachReply, ResultReply, RobotState, StatusReply
 
 

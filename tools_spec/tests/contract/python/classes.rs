@@ -1,6 +1,6 @@
 //! Types of the contract as Python's dataclasses.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use serde_json::{Map, Value};
 use tandem_tools_spec::TypedTool;
@@ -74,6 +74,11 @@ impl<'a> Contract<'a> {
         self.types[name]["properties"].is_object()
     }
 
+    /// Whether it is one of several texts that stands in replies, too, whose modules have it.
+    pub fn is_replied(&self, name: &str) -> bool {
+        !self.is_class(name) && [&self.commands, &self.replies].iter().any(|names| names.contains(name))
+    }
+
     /// The type of a name that has no class and is no choice, as that of numbers by joint.
     fn plain(&self, name: &str) -> Option<String> {
         let schema = &self.types[name];
@@ -86,10 +91,19 @@ impl<'a> Contract<'a> {
         let mut lines = head("What tools are given.");
         lines.add(0, "from collections.abc import Mapping, Sequence");
         lines.add(0, "from dataclasses import dataclass, fields, is_dataclass");
-        lines.add(0, "from typing import Any, TypeAlias, cast\n");
+        let defines = |name: &String| choices(&self.types[name]).is_some() && !self.is_replied(name);
+        let literal = if self.arguments.iter().any(defines) { "Literal, " } else { "" };
+        lines.add(0, &format!("from typing import Any, {literal}TypeAlias, cast\n"));
         lines.add(0, "import numpy as np");
         lines.add(0, "from numpy.typing import NDArray\n");
+        let (replied, own): (Vec<&String>, Vec<&String>) =
+            self.arguments.iter().filter(|name| !self.is_class(name)).partition(|name| self.is_replied(name));
+        if !replied.is_empty() {
+            self.import(&mut lines, replied.into_iter().cloned().collect());
+            lines.add(0, "");
+        }
         lines.add(0, include_str!("plain.py").trim_end());
+        own.into_iter().for_each(|name| self.choices(&mut lines, name));
         for name in self.arguments.iter().filter(|name| self.is_class(name)) {
             self.argument_class(&mut lines, name);
         }
@@ -153,18 +167,20 @@ impl<'a> Contract<'a> {
     }
 
     fn reply_types(&self, lines: &mut Lines, names: &BTreeSet<String>) {
-        let choices: BTreeMap<&String, Vec<String>> =
-            names.iter().filter_map(|name| Some((name, choices(&self.types[name])?))).collect();
-        for (name, values) in &choices {
-            lines.add(0, "");
-            lines.add(0, &format!("{name}: TypeAlias = Literal["));
-            values.iter().for_each(|value| lines.add(1, &format!("\"{value}\",")));
-            lines.add(0, "]");
-            docstring(lines, 0, &described(&self.types[*name]), &[]);
-        }
+        names.iter().for_each(|name| self.choices(lines, name));
         for name in names.iter().filter(|name| self.is_class(name)) {
             self.reply_class(lines, name);
         }
+    }
+
+    /// The name for the texts of a type that is one of several; nothing of another type.
+    fn choices(&self, lines: &mut Lines, name: &str) {
+        let Some(values) = choices(&self.types[name]) else { return };
+        lines.add(0, "");
+        lines.add(0, &format!("{name}: TypeAlias = Literal["));
+        values.iter().for_each(|value| lines.add(1, &format!("\"{value}\",")));
+        lines.add(0, "]");
+        docstring(lines, 0, &described(&self.types[name]), &[]);
     }
 
     fn reply_class(&self, lines: &mut Lines, name: &str) {

@@ -56,8 +56,9 @@ fn methods(contract: &Contract, tools: &[TypedTool]) -> String {
     lines.add(0, "from collections.abc import Mapping, Sequence");
     lines.add(0, "from typing import Any\n");
     let of_arguments = offered.iter().flat_map(|tool| contract.named_in(&tool.arguments));
-    lines.import("arguments", of_arguments.chain(["Json".into(), "Numbers".into(), "plain".into()]));
-    contract.import(&mut lines, offered.iter().map(|tool| tool.reply.clone()).collect());
+    let (replied, own): (Vec<String>, Vec<String>) = of_arguments.partition(|name| contract.is_replied(name));
+    lines.import("arguments", own.into_iter().chain(["Json".into(), "Numbers".into(), "plain".into()]));
+    contract.import(&mut lines, offered.iter().map(|tool| tool.reply.clone()).chain(replied).collect());
     lines.add(0, "\n");
     lines.add(0, "class Tools(ABC):");
     lines.add(1, "\"\"\"What can be asked of an episode, wherever it runs.\"\"\"\n");

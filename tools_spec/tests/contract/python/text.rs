@@ -53,6 +53,9 @@ impl Lines {
 
 /// A docstring, with a paragraph for each of `further`.
 pub fn docstring(lines: &mut Lines, level: usize, text: &str, further: &[String]) {
+    if text.is_empty() && further.is_empty() {
+        return;
+    }
     let width = LONGEST_LINE - 4 * level;
     let first = wrapped(text, width - 6, 0);
     if let ([line], []) = (first.as_slice(), further) {
