@@ -32,7 +32,7 @@ struct StartBody<'a> {
 pub enum HttpError {
     /// The server refused, and said why.
     #[error("{}", .0.detail)]
-    Refused(ProblemBody),
+    Refused(Box<ProblemBody>),
     /// The server was not reached, or what it sent is no JSON.
     #[error("no reply over HTTP: {0}")]
     Transport(#[from] ureq::Error),
@@ -93,6 +93,6 @@ fn reply(mut response: Response<ureq::Body>) -> Result<Value, HttpError> {
     if response.status().is_success() {
         Ok(response.body_mut().read_json()?)
     } else {
-        Err(HttpError::Refused(response.body_mut().read_json()?))
+        Err(HttpError::Refused(Box::new(response.body_mut().read_json()?)))
     }
 }
