@@ -38,7 +38,8 @@ pub fn run(args: ServeArgs) -> CommandResult {
     try_runs_folder(&settings.runs)?;
     let server = Server::start(settings)?;
     // Not in the log, which others may read.
-    print(&format!("watch at {}\n", server.watch_link()))?;
+    // Output that cannot be written, as on a full disk, is no reason not to serve.
+    let _ = print(&format!("watch at {}\n", server.watch_link()));
     let left = server.run_until_signal();
     Ok(if left.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
