@@ -54,7 +54,7 @@ class Client:
         return RemoteEpisode(self, task, seed, protocol)
 
     def request(self, method: str, path: str, body: Mapping[str, Json] | None = None) -> Any:
-        """Sends a request and returns its answer as JSON has it."""
+        """Sends a request and returns its answer as JSON has it; None where there is none."""
         headers = {"content-type": "application/json"}
         if self._token:
             headers["authorization"] = f"Bearer {self._token}"
@@ -66,6 +66,8 @@ class Client:
         except (OSError, HTTPException) as error:
             self._connection.close()
             raise Unreachable(f"{self.url} gives no answer: {error or type(error).__name__}") from error
+        if status == 204:
+            return None
         try:
             answer = json.loads(content)
         except ValueError as error:

@@ -1,0 +1,12 @@
+"""Language models that play: a tool loop for any endpoint that speaks OpenAI's or Anthropic's formats.
+
+python -m tandem.agent --model NAME --api openai --task handover --seed 0
+"""
+
+from __future__ import annotations
+
+from .apis import EndpointError, MissingPackage
+from .command_line import main
+from .settings import AgentSettings, Api, Limits, Prices
+
+__all__ = ["AgentSettings", "Api", "EndpointError", "Limits", "MissingPackage", "Prices", "main"]

@@ -1,0 +1,8 @@
+"""One adapter for each wire format, over the official SDKs, which retry, wait and keep the formats current."""
+
+from __future__ import annotations
+
+from .endpoint import EndpointError, MissingPackage, Model, TooLong, without_keys
+from .models import check_package, open_model
+
+__all__ = ["EndpointError", "MissingPackage", "Model", "TooLong", "check_package", "open_model", "without_keys"]

@@ -1,0 +1,97 @@
+"""OpenAI's Chat Completions, which Ollama, vLLM and most other servers of models speak, too."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+from ..conversation import Answers, Call, Picture, Reply, Told, Turn, Usage, listed
+from ..settings import AgentSettings
+from ..tools import Tool, for_chat
+from .endpoint import EndpointError, OptionalFields, import_sdk, open_client, request
+
+NOTHING = "(no words)"
+"""What stands for a reply without words: endpoints want some."""
+
+
+class ChatModel:
+    """A model behind Chat Completions."""
+
+    def __init__(self, settings: AgentSettings, cache_key: str) -> None:
+        self._sdk = import_sdk("openai")
+        self._settings = settings
+        self._client = open_client(self._sdk, self._sdk.OpenAI, settings, ["OPENAI_API_KEY"])
+        self._optional = OptionalFields(prompt_cache_key=cache_key, reasoning_effort=settings.effort)
+
+    def ask(self, instructions: str, tools: Sequence[Tool], turns: Sequence[Turn]) -> Reply:
+        """See Model."""
+        messages = [{"role": "system", "content": instructions}]
+        messages += [message for turn in turns for message in _messages(turn)]
+
+        def send(**optional: Any) -> Any:
+            return self._client.chat.completions.create(
+                model=self._settings.model, messages=messages, tools=for_chat(tools), **optional
+            )
+
+        completion = request(self._sdk, self._settings, self._optional, send)
+        if not completion.choices:
+            raise EndpointError(f"{self._settings.model} answers without a choice: {completion.to_json()[:300]}")
+        return _reply(completion, len(turns))
+
+
+def _messages(turn: Turn) -> list[dict[str, Any]]:
+    match turn:
+        case Told(text):
+            return [{"role": "user", "content": text}]
+        case Reply():
+            return [turn.as_sent]
+        case Answers(answers):
+            told = [{"role": "tool", "tool_call_id": answer.call.call_id, "content": answer.text} for answer in answers]
+            # Answers are text alone here, so that pictures follow as ours.
+            shown = [part for answer in answers for picture in answer.pictures for part in _picture(picture)]
+            return [*told, {"role": "user", "content": shown}] if shown else told
+
+
+def _picture(picture: Picture) -> list[dict[str, Any]]:
+    url = f"data:image/png;base64,{picture.png_base64}"
+    return [{"type": "text", "text": picture.caption}, {"type": "image_url", "image_url": {"url": url}}]
+
+
+def _reply(completion: Any, turn: int) -> Reply:
+    choice = completion.choices[0]
+    message = choice.message
+    words = message.content or ""
+    asked = [call for call in listed(message.tool_calls) if call.type == "function"]
+    # Some servers leave the id empty.
+    calls = tuple(
+        Call(call.id or f"call_{turn}_{index}", call.function.name, call.function.arguments or "{}")
+        for index, call in enumerate(asked)
+    )
+    as_sent: dict[str, Any] = {"role": "assistant", "content": words or (None if calls else NOTHING)}
+    if calls:
+        as_sent["tool_calls"] = [_sent(call) for call in calls]
+    thoughts = getattr(message, "reasoning_content", None) or getattr(message, "reasoning", None) or ""
+    return Reply(words, str(thoughts), calls, _usage(completion.usage), as_sent, choice.finish_reason == "length")
+
+
+def _sent(call: Call) -> dict[str, Any]:
+    """A call as it is shown to the model again. Templates of local models read the arguments, which have to be JSON."""
+    arguments = call.arguments if _is_object(call.arguments) else "{}"
+    return {"id": call.call_id, "type": "function", "function": {"name": call.tool, "arguments": arguments}}
+
+
+def _is_object(text: str) -> bool:
+    try:
+        return isinstance(json.loads(text), dict)
+    except ValueError:
+        return False
+
+
+def _usage(usage: Any) -> Usage | None:
+    if usage is None:
+        return None
+    details = usage.prompt_tokens_details
+    cached = (getattr(details, "cached_tokens", None) or 0) if details else 0
+    written = (getattr(details, "cache_write_tokens", None) or 0) if details else 0
+    return Usage(usage.prompt_tokens or 0, usage.completion_tokens or 0, cached, written)

@@ -1,0 +1,131 @@
+"""What the adapters have in common: clients with their keys, fields that an endpoint may not know, and what goes wrong."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import re
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+from ...errors import TandemError
+from ..conversation import Reply, Turn
+from ..settings import AgentSettings
+from ..tools import Tool
+
+INSTALL = "pip install 'tandem-sim[agents]'"
+
+RETRIES = 6
+"""How often an SDK asks again, with its own growing waits: about half a minute of 429 and 500 is waited out."""
+
+NO_KEY = "none"
+"""Endpoints of one's own, as Ollama and vLLM, want no key; the SDKs want one all the same."""
+
+_MOST_CHARACTERS = 500
+_REFUSED = (400, 422)
+_TOO_LONG = re.compile(
+    r"context.{0,20}(length|window|size)|too long|too many tokens|maximum.{0,40}tokens|exceed.{0,40}(token|context)", re.I
+)
+_KEY = re.compile(r"\b(sk|pk|rk|key)-[\w*.…-]{6,}", re.I)
+
+
+class EndpointError(TandemError):
+    """The model's endpoint gives no reply."""
+
+
+class TooLong(EndpointError):
+    """The conversation is longer than the model can read."""
+
+
+class MissingPackage(TandemError):
+    """An SDK is not installed."""
+
+
+class Model(Protocol):
+    """A model that calls tools."""
+
+    def ask(self, instructions: str, tools: Sequence[Tool], turns: Sequence[Turn]) -> Reply:
+        """Shows the model the conversation and returns what it says. Raises EndpointError."""
+        ...
+
+
+def import_sdk(name: str) -> Any:
+    """The SDK of this name."""
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise MissingPackage(f"the package {name} is missing ({error}); {INSTALL}") from error
+
+
+def open_client(sdk: Any, make: Callable[..., Any], settings: AgentSettings, key_variables: Sequence[str]) -> Any:
+    """A client of an SDK, with the key of its environment variable."""
+    options: dict[str, Any] = {"max_retries": RETRIES}
+    if settings.base_url is not None:
+        options["base_url"] = settings.base_url
+    if not any(os.environ.get(variable) for variable in key_variables):
+        if settings.base_url is None and not os.environ.get(key_variables[0].replace("API_KEY", "BASE_URL")):
+            raise EndpointError(
+                f"no key for {settings.model}; set {key_variables[0]}, or give --base-url for an endpoint of your own"
+            )
+        options["api_key"] = NO_KEY
+    try:
+        return make(**options)
+    except sdk.APIError as error:
+        raise EndpointError(without_keys(str(error))) from None
+
+
+class OptionalFields:
+    """Fields of a request that do it good, and that not every endpoint knows: one that refuses a field by its name is asked
+    without it from then on.
+    """
+
+    def __init__(self, **fields: Any) -> None:
+        self.fields = {name: value for name, value in fields.items() if value is not None}
+
+    def drop_named(self, text: str) -> bool:
+        """Leaves out what a refusal names. Returns whether it named any."""
+        named = [name for name in self.fields if name in text]
+        for name in named:
+            del self.fields[name]
+        return bool(named)
+
+
+def request(sdk: Any, settings: AgentSettings, optional: OptionalFields, send: Callable[..., Any]) -> Any:
+    """Sends a request, and again without what the endpoint does not know."""
+    while True:
+        try:
+            reply = send(**optional.fields)
+            if isinstance(reply, str):
+                raise EndpointError(
+                    f"{_where(settings)} answers no JSON of the API {settings.api}; is --base-url right? Most end in /v1"
+                )
+            return reply
+        except sdk.APIStatusError as error:
+            told = f"{error.message} {error.body}"
+            if error.status_code in _REFUSED and optional.drop_named(told):
+                continue
+            raise _status_error(settings, error.status_code, error.message, told) from None
+        except sdk.APIError as error:
+            cause = f": {error.__cause__}" if error.__cause__ is not None else ""
+            raise EndpointError(without_keys(f"{_where(settings)}: {error}{cause}")) from None
+
+
+def _status_error(settings: AgentSettings, status: int, message: str, told: str) -> EndpointError:
+    short = " ".join(message.removeprefix(f"Error code: {status} - ").split())[:_MOST_CHARACTERS]
+    text = without_keys(f"{_where(settings)} answers {status}: {short}")
+    if status in (*_REFUSED, 413) and _TOO_LONG.search(told):
+        return TooLong(text)
+    return EndpointError(text)
+
+
+def _where(settings: AgentSettings) -> str:
+    return f"{settings.model} at {settings.base_url or 'its endpoint'}"
+
+
+def without_keys(text: str) -> str:
+    """The text without any key that it quotes, as refusals of a wrong key do."""
+    for variable in ("OPENAI_API_KEY", "OPENAI_ADMIN_KEY", "ANTHROPIC_API_KEY", "ANTHROPIC_AUTH_TOKEN", "TANDEM_TOKEN"):
+        key = os.environ.get(variable)
+        if key and key != NO_KEY:
+            text = text.replace(key, f"({variable})")
+    return _KEY.sub("(key)", text)

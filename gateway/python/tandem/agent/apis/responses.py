@@ -1,0 +1,91 @@
+"""OpenAI's Responses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from ..conversation import Answer, Answers, Call, Reply, Told, Turn, Usage, listed
+from ..settings import AgentSettings
+from ..tools import Tool, for_responses
+from .chat import NOTHING
+from .endpoint import EndpointError, OptionalFields, import_sdk, open_client, request
+
+
+class ResponsesModel:
+    """A model behind Responses. Nothing is kept there: all of the conversation is sent, with thoughts as they were given."""
+
+    def __init__(self, settings: AgentSettings, cache_key: str) -> None:
+        self._sdk = import_sdk("openai")
+        self._settings = settings
+        self._client = open_client(self._sdk, self._sdk.OpenAI, settings, ["OPENAI_API_KEY"])
+        self._optional = OptionalFields(
+            prompt_cache_key=cache_key,
+            store=False,
+            include=["reasoning.encrypted_content"],
+            reasoning={"effort": settings.effort, "summary": "auto"} if settings.effort else None,
+        )
+
+    def ask(self, instructions: str, tools: Sequence[Tool], turns: Sequence[Turn]) -> Reply:
+        """See Model."""
+        items = [item for turn in turns for item in _items(turn)]
+
+        def send(**optional: Any) -> Any:
+            return self._client.responses.create(
+                model=self._settings.model, instructions=instructions, input=items, tools=for_responses(tools), **optional
+            )
+
+        response = request(self._sdk, self._settings, self._optional, send)
+        if response.status == "failed":
+            raise EndpointError(f"{self._settings.model} failed: {response.error}")
+        return _reply(response)
+
+
+def _items(turn: Turn) -> list[dict[str, Any]]:
+    match turn:
+        case Told(text):
+            return [{"role": "user", "content": text}]
+        case Reply():
+            return turn.as_sent
+        case Answers(answers):
+            return [
+                {"type": "function_call_output", "call_id": answer.call.call_id, "output": _output(answer)}
+                for answer in answers
+            ]
+
+
+def _output(answer: Answer) -> str | list[dict[str, Any]]:
+    if not answer.pictures:
+        return answer.text
+    parts: list[dict[str, Any]] = [{"type": "input_text", "text": answer.text}]
+    for picture in answer.pictures:
+        url = f"data:image/png;base64,{picture.png_base64}"
+        parts += [{"type": "input_text", "text": picture.caption}, {"type": "input_image", "image_url": url, "detail": "auto"}]
+    return parts
+
+
+def _reply(response: Any) -> Reply:
+    calls: list[Call] = []
+    thoughts: list[str] = []
+    as_sent: list[dict[str, Any]] = []
+    for item in response.output:
+        if item.type == "function_call":
+            calls.append(Call(item.call_id, item.name, item.arguments or "{}"))
+        if item.type == "reasoning":
+            thoughts += [str(part.text) for part in listed(item.summary) + listed(getattr(item, "content", None))]
+            # Thoughts that are not kept there can only be sent back whole.
+            if not item.encrypted_content:
+                continue
+        as_sent.append(item.model_dump(exclude_none=True, mode="json"))
+    cut = response.incomplete_details is not None and response.incomplete_details.reason == "max_output_tokens"
+    sent = as_sent or [{"role": "assistant", "content": NOTHING}]
+    return Reply(response.output_text, "\n".join(thoughts), tuple(calls), _usage(response.usage), sent, cut)
+
+
+def _usage(usage: Any) -> Usage | None:
+    if usage is None:
+        return None
+    details = usage.input_tokens_details
+    cached = (getattr(details, "cached_tokens", None) or 0) if details else 0
+    written = (getattr(details, "cache_write_tokens", None) or 0) if details else 0
+    return Usage(usage.input_tokens, usage.output_tokens, cached, written)

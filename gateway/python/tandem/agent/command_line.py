@@ -1,0 +1,124 @@
+"""`python -m tandem.agent`: a model plays an episode. `tandem agent` and `--policy agent:` start it so, too."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
+
+from ..client import Client
+from ..errors import TandemError
+from ..server import serve
+from .apis import check_package, without_keys
+from .episodes import Hosting, play_joined, play_own
+from .settings import APIS, AgentSettings, Limits, Prices
+
+DEFAULT_SECONDS = 3300.0
+"""`tandem evaluate` stops a program after an hour; a model that is at it for so long finishes before."""
+
+DEFAULT_CALLS = 500
+
+
+def parser() -> argparse.ArgumentParser:
+    """The flags. Those of `tandem agent` that say which model plays are the same."""
+    flags = argparse.ArgumentParser(
+        prog="python -m tandem.agent",
+        description="Have a language model play an episode: the one that TANDEM_URL and TANDEM_EPISODE name, or, with --task, "
+        "a new one. Keys are read from the environment: OPENAI_API_KEY, ANTHROPIC_API_KEY.",
+    )
+    model = flags.add_argument_group("the model")
+    model.add_argument("--model", required=True, metavar="NAME", help="the model's name at its endpoint")
+    model.add_argument(
+        "--api",
+        choices=APIS,
+        default="openai",
+        help="what the endpoint speaks: OpenAI's Responses, its Chat Completions (Ollama, vLLM and most others), or "
+        "Anthropic's Messages [default: openai]",
+    )
+    model.add_argument("--base-url", metavar="URL", help="where it is, as http://127.0.0.1:11434/v1 [default: the API's maker]")
+    model.add_argument(
+        "--effort", metavar="WORD", help="how much it thinks, in its API's words, as low or high [default: its own]"
+    )
+    model.add_argument(
+        "--context-tokens",
+        type=_count,
+        default=100_000,
+        metavar="N",
+        help="longest conversation; the older half of a longer one becomes a list of calls [default: 100000]",
+    )
+    limits = flags.add_argument_group("limits, after which the episode is finished")
+    limits.add_argument("--max-tokens-total", type=_count, metavar="N", help="tokens read and written [default: any number]")
+    limits.add_argument("--max-usd", type=_amount, metavar="USD", help="US dollars, by the prices below [default: any amount]")
+    limits.add_argument("--max-calls", type=_count, default=DEFAULT_CALLS, metavar="N", help="calls of tools [default: 500]")
+    limits.add_argument("--max-seconds", type=_amount, default=DEFAULT_SECONDS, metavar="SECONDS", help="time [default: 3300]")
+    for name, what in (("input", "read"), ("output", "written"), ("cached", "read from a cache")):
+        limits.add_argument(
+            f"--usd-per-million-{name}", type=_amount, metavar="USD", help=f"price of a million tokens that are {what}"
+        )
+    episode = flags.add_argument_group("a new episode")
+    episode.add_argument("--task", metavar="TASK", help="what to play, as handover")
+    episode.add_argument("--seed", type=int, default=0, metavar="N", help="decides where the objects stand [default: 0]")
+    episode.add_argument("--url", metavar="URL", help="server that holds it [default: one in this process]")
+    episode.add_argument("--runs", default="runs", metavar="DIR", help="folder of recordings, without --url [default: runs]")
+    episode.add_argument(
+        "--assistance", choices=("full", "paper"), default="full", help="what the model is told, without --url [default: full]"
+    )
+    episode.add_argument(
+        "--per-robot", action="store_true", help="a model for each robot, which sees and commands that robot alone"
+    )
+    episode.add_argument("--talk", action="store_true", help="with --per-robot: let them talk to each other by the tool say")
+    return flags
+
+
+def settings_of(given: argparse.Namespace) -> AgentSettings:
+    """The agent that these flags name."""
+    prices = (given.usd_per_million_input, given.usd_per_million_output)
+    if prices[0] is None or prices[1] is None:
+        if prices != (None, None) or given.usd_per_million_cached is not None:
+            raise TandemError("prices are for --usd-per-million-input and --usd-per-million-output together")
+        price = None
+    else:
+        price = Prices(prices[0], prices[1], given.usd_per_million_cached)
+    limits = Limits(given.max_tokens_total, given.max_usd, given.max_calls, given.max_seconds)
+    return AgentSettings(given.model, given.api, given.base_url, given.effort, given.context_tokens, limits, price)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command and returns its exit code: 1 where the model or the server gave no answer."""
+    given = parser().parse_args(arguments)
+    try:
+        settings = settings_of(given)
+        check_package(settings.api)
+        return _run(given, settings)
+    except TandemError as error:
+        print(f"tandem agent: {without_keys(str(error))}", file=sys.stderr)
+        return 1
+
+
+def _run(given: argparse.Namespace, settings: AgentSettings) -> int:
+    if given.task is None:
+        url, episode = os.environ.get("TANDEM_URL"), os.environ.get("TANDEM_EPISODE")
+        if not url or not episode:
+            raise TandemError("no episode; give --task, as handover, for a new one")
+        play_joined(Client(url), episode, os.environ.get("TANDEM_ROBOT"), settings)
+        return 0
+    with ExitStack() as stack:
+        url = given.url or stack.enter_context(serve(runs=given.runs, assistance=given.assistance)).url
+        play_own(url, Hosting(given.task, given.seed, given.per_robot, given.talk), settings)
+    return 0
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError("give a whole number from 1 up")
+    return value
+
+
+def _amount(text: str) -> float:
+    value = float(text)
+    if not 0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError("give a number from 0 up")
+    return value

@@ -1,0 +1,60 @@
+"""What a model has used up, and when it has to stop."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from .conversation import Usage
+from .settings import Limits, Prices
+
+
+class Ledger:
+    """Counts what a model uses in one episode."""
+
+    def __init__(self, limits: Limits, prices: Prices | None, clock: Callable[[], float] = time.monotonic) -> None:
+        self.limits = limits
+        self.prices = prices
+        self.input = self.output = self.cached = self.calls = self.requests = 0
+        self.usd = 0.0
+        self._last_tokens = 0
+        self._last_usd = 0.0
+        self._clock = clock
+        self._began_s = clock()
+
+    def add(self, usage: Usage) -> float | None:
+        """Counts a request and returns its price in US dollars, where prices are given."""
+        usd = None if self.prices is None else self.prices.usd(usage)
+        self.requests += 1
+        self.input += usage.input
+        self.output += usage.output
+        self.cached += usage.cached
+        self.usd += usd or 0.0
+        self._last_tokens = usage.input + usage.output
+        self._last_usd = usd or 0.0
+        return usd
+
+    @property
+    def seconds(self) -> float:
+        """How long the agent has been at it."""
+        return self._clock() - self._began_s
+
+    def reason_to_stop(self) -> str | None:
+        """Why no further request may be made. One more is taken to cost as much as the last: conversations grow."""
+        limits, tokens = self.limits, self.input + self.output
+        if limits.tokens is not None and tokens + self._last_tokens > limits.tokens:
+            return f"{tokens} tokens were used, and the next reply would pass --max-tokens-total {limits.tokens}"
+        if limits.usd is not None and self.usd + self._last_usd > limits.usd:
+            return f"{self.usd:.4f} US dollars were spent, and the next reply would pass --max-usd {limits.usd:g}"
+        if limits.calls is not None and self.calls >= limits.calls:
+            return f"all of --max-calls {limits.calls} were made"
+        if limits.seconds is not None and self.seconds >= limits.seconds:
+            return f"--max-seconds {limits.seconds:g} are over"
+        return None
+
+    def summary(self) -> str:
+        """What was used, in a line."""
+        told = f"{self.calls} calls, {self.requests} replies"
+        told = f"{told}, {self.input} tokens read ({self.cached} cached), {self.output} written"
+        price = "" if self.prices is None else f", {self.usd:.4f} US dollars"
+        return f"{told}{price}, {self.seconds:.0f} s"

@@ -1,0 +1,129 @@
+"""The loop: the model is asked, its calls are made, and it is told what came of them, until the episode is over."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from .apis import Model, TooLong
+from .conversation import Answer, Answers, Reply, Told, Usage
+from .instructions import CUT_NUDGE, NUDGE, OPENING, instructions
+from .limits import Ledger
+from .memory import Memory
+from .seat import Note, Seat
+from .settings import AgentSettings
+
+MOST_SILENT = 2
+"""Replies without a call, one after another, after which the episode is finished."""
+
+MOST_CUTS = 4
+"""How often a conversation is halved that an endpoint finds too long, before that is the end."""
+
+SHOWN_CHARACTERS = 200
+
+Printer = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Played:
+    """How a model played."""
+
+    ledger: Ledger
+    stopped: str | None
+    """Why we finished the episode in its place; None: it did so itself, or the episode ended."""
+
+
+class Player:
+    """A model at an episode."""
+
+    def __init__(self, seat: Seat, model: Model, settings: AgentSettings, show: Printer) -> None:
+        self._seat = seat
+        self._model = model
+        self._settings = settings
+        self._show = show
+        self._memory = Memory(OPENING, settings.context_tokens)
+        self._instructions = instructions(seat)
+        self._ledger = Ledger(settings.limits, settings.prices)
+
+    def play(self) -> Played:
+        """Plays until the episode is over for this caller."""
+        silent = 0
+        stopped: str | None = None
+        while not self._seat.over:
+            stopped = self._ledger.reason_to_stop()
+            if stopped is not None:
+                break
+            reply = self._ask()
+            self._memory.add(reply)
+            if reply.calls:
+                silent = 0
+                self._memory.add(Answers(tuple(self._answer(reply))))
+                continue
+            silent += 1
+            if silent >= MOST_SILENT:
+                stopped = "the model called no tool, twice in turn"
+                break
+            self._memory.add(Told(CUT_NUDGE if reply.cut else NUDGE))
+        if stopped is not None:
+            self._show(f"stopped: {stopped}")
+            self._seat.note(Note(f"stopped: {stopped}", "note", self._seat.robot, model=self._settings.model))
+        self._seat.finish()
+        return Played(self._ledger, stopped)
+
+    def _ask(self) -> Reply:
+        """Asks the model, with less of the conversation where it is too long for it, and counts what that took."""
+        began_s = time.monotonic()
+        for _ in range(MOST_CUTS):
+            try:
+                reply = self._model.ask(self._instructions, self._seat.tools, self._memory.turns)
+                break
+            except TooLong:
+                if not self._memory.halve():
+                    raise
+        else:
+            reply = self._model.ask(self._instructions, self._seat.tools, self._memory.turns)
+        seconds = time.monotonic() - began_s
+        usage = reply.usage or Usage(self._memory.estimate(), 0)
+        usd = self._ledger.add(usage)
+        self._tell(reply, usage, usd, seconds)
+        self._memory.trim(usage.input)
+        return reply
+
+    def _tell(self, reply: Reply, usage: Usage, usd: float | None, seconds: float) -> None:
+        """Shows the model's words, and hands them to the server with what they cost."""
+        price = "" if usd is None else f", {usd:.4f} US dollars"
+        self._show(f"{seconds:.1f} s, {usage.input} tokens read ({usage.cached} cached), {usage.output} written{price}")
+        robot, model = self._seat.robot, self._settings.model
+        if reply.thoughts:
+            self._show(f"thinks: {reply.thoughts}")
+            self._seat.note(Note(reply.thoughts, "thought", robot, model=model))
+        if reply.words:
+            self._show(f"says: {reply.words}")
+        tokens = {"input": usage.input, "output": usage.output, "cached": usage.cached}
+        counted = tokens if reply.usage is not None else None
+        calls = ", ".join(call.tool for call in reply.calls) or "nothing"
+        text, kind = (reply.words, "message") if reply.words else (f"(calls {calls})", "note")
+        self._seat.note(Note(text, kind, robot, counted, usd, model, round(seconds, 3)))
+
+    def _answer(self, reply: Reply) -> list[Answer]:
+        """Makes the calls of a reply in their order, as many as may be made."""
+        answers: list[Answer] = []
+        for call in reply.calls:
+            most = self._ledger.limits.calls
+            if self._seat.over:
+                answers.append(Answer(call, "not called: the episode is over", refused=True))
+            elif most is not None and self._ledger.calls >= most:
+                answers.append(Answer(call, f"not called: all of {most} calls were made", refused=True))
+            else:
+                answer = self._seat.call(call)
+                self._ledger.calls += 1
+                pictures = f" and {len(answer.pictures)} pictures" if answer.pictures else ""
+                self._show(f"{call.tool} {_short(call.arguments)}")
+                self._show(f"  {'refused: ' if answer.refused else ''}{_short(answer.text)}{pictures}")
+                answers.append(answer)
+        return answers
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= SHOWN_CHARACTERS else text[: SHOWN_CHARACTERS - 3] + "..."

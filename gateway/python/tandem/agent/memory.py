@@ -1,0 +1,86 @@
+"""The conversation as the model is shown it, cut where it grows too long."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+
+from .conversation import Answers, Reply, Told, Turn
+from .pictures import count_pictures, forget_pictures
+
+MOST_PICTURES = 20
+"""Pictures that are shown; of more, the latest half stays. Each cut has the endpoint read anew what it had cached."""
+
+CHARACTERS_A_TOKEN = 4
+PICTURE_TOKENS = 300
+"""Rough measures, for endpoints that do not count, and for what part of a conversation a turn is."""
+
+LISTED_CALLS = 40
+LISTED_CHARACTERS = 160
+
+
+class Memory:
+    """What the model remembers: our first words, and the latest turns."""
+
+    def __init__(self, opening: str, context_tokens: int, most_pictures: int = MOST_PICTURES) -> None:
+        self._opening = opening
+        self._context_tokens = context_tokens
+        self._most_pictures = most_pictures
+        self._listed: list[str] = []
+        self._turns: list[Turn] = []
+
+    @property
+    def turns(self) -> Sequence[Turn]:
+        """The conversation, which we begin."""
+        opening = self._opening
+        if self._listed:
+            told = "\n".join(self._listed[-LISTED_CALLS:])
+            opening = f"{opening}\n\nWhat you did before, in short, the latest last:\n{told}"
+        return [Told(opening), *self._turns]
+
+    def add(self, turn: Turn) -> None:
+        """Remembers a turn. Pictures go in halves, so that a cache is of use between two cuts."""
+        self._turns.append(turn)
+        if count_pictures(self._turns) > self._most_pictures:
+            self._turns = forget_pictures(self._turns, self._most_pictures // 2)
+
+    def trim(self, input_tokens: int) -> bool:
+        """Where the last request has read more tokens than a conversation may have, cuts it to half of that. Returns whether it
+        was cut.
+        """
+        return input_tokens > self._context_tokens and self.halve()
+
+    def halve(self) -> bool:
+        """Forgets the older half of the turns but for a list of their calls. False: there is nothing to forget."""
+        # A reply and what it was answered belong together; the latest such pair stays.
+        starts = [index for index, turn in enumerate(self._turns) if isinstance(turn, Reply)]
+        sizes = [estimate(turn) for turn in self._turns]
+        later = [index for index in starts[1:] if sum(sizes[index:]) * 2 <= sum(sizes)]
+        cut = later[0] if later else (starts[-1] if len(starts) > 1 else 0)
+        for turn in self._turns[:cut]:
+            if isinstance(turn, Answers):
+                self._listed += [f"- {_short(a.call.tool + ' ' + a.call.arguments)} -> {_short(a.text)}" for a in turn.answers]
+        self._turns = self._turns[cut:]
+        return cut > 0
+
+    def estimate(self) -> int:
+        """Roughly how many tokens the turns are."""
+        return sum(estimate(turn) for turn in self.turns)
+
+
+def estimate(turn: Turn) -> int:
+    """Roughly how many tokens a turn is."""
+    match turn:
+        case Told(text):
+            return len(text) // CHARACTERS_A_TOKEN
+        case Reply():
+            written = len(turn.words) + len(turn.thoughts) + sum(len(call.arguments) for call in turn.calls)
+            return written // CHARACTERS_A_TOKEN
+        case Answers(answers):
+            pictures = PICTURE_TOKENS * sum(len(answer.pictures) for answer in answers)
+            return pictures + sum(len(answer.text) for answer in answers) // CHARACTERS_A_TOKEN
+
+
+def _short(text: str) -> str:
+    line = json.dumps(text, ensure_ascii=False)[1:-1].replace('\\"', '"')
+    return line if len(line) <= LISTED_CHARACTERS else line[: LISTED_CHARACTERS - 3] + "..."

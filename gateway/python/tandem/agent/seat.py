@@ -1,0 +1,120 @@
+"""A place at an episode: what the model is told of it, what it may call, and where its words are kept."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import asdict, dataclass
+from typing import Any, cast
+
+from ..client import Client
+from ..errors import EpisodeEnded, Refused, SimulatorFailed
+from .conversation import Answer, Call
+from .pictures import take_pictures
+from .tools import Tool, offered
+
+MOST_ANSWER_CHARACTERS = 60_000
+"""Of a longer reply the model is shown the beginning."""
+
+LONGEST_WAIT_S = 30.0
+BUSY_TRIES = 5
+"""How long and how often a server that is asked too much is waited for."""
+
+_OVER = ("task_complete", "step_budget_exhausted")
+
+
+@dataclass(frozen=True)
+class Note:
+    """The model's words and what they cost, as the server keeps them."""
+
+    text: str
+    kind: str
+    """"thought", "message" or "note"."""
+
+    robot: str | None
+    tokens: dict[str, int] | None = None
+    usd: float | None = None
+    model: str | None = None
+    seconds: float | None = None
+
+
+class Seat:
+    """One episode on a server, for whoever directs all robots, or one of them.
+
+    robot: The robot that is directed, where it is one alone; the client's token is then its operator's.
+    """
+
+    def __init__(self, client: Client, episode_id: str, robot: str | None = None) -> None:
+        self.client = client
+        self.episode_id = episode_id
+        self.robot = robot
+        self.briefing: dict[str, Any] = client.request("GET", f"/v1/episodes/{episode_id}/briefing")
+        self.tools: tuple[Tool, ...] = offered(client, episode_id)
+        self.over = False
+        self._keeps_notes = True
+
+    def call(self, call: Call) -> Answer:
+        """Calls a tool as the model wants it. What cannot be done is an answer, too, which says what would have worked."""
+        tool = next((tool for tool in self.tools if tool.name == call.tool), None)
+        if tool is None:
+            names = ", ".join(tool.name for tool in self.tools)
+            return Answer(call, f"no tool {call.tool!r}; have: {names}", refused=True)
+        try:
+            given = json.loads(call.arguments or "{}")
+        except ValueError as error:
+            return Answer(
+                call, f"the arguments are no JSON ({error}); give an object that fits the tool's schema", refused=True
+            )
+        if not isinstance(given, dict):
+            return Answer(call, "the arguments are no JSON object; give one that fits the tool's schema", refused=True)
+        arguments = cast("dict[str, Any]", given)
+        if tool.takes("short") and arguments.get("short") is None:
+            arguments["short"] = True
+        try:
+            reply = self._post(tool.name, arguments)
+        except EpisodeEnded as ended:
+            self.over = True
+            return Answer(call, ended.detail, refused=True)
+        except SimulatorFailed as failed:
+            self.over = True
+            return Answer(call, failed.detail, refused=True)
+        except Refused as refused:
+            return Answer(call, refused.detail, refused=True)
+        self.over = self.over or tool.name == "finish" or _is_over(reply)
+        pictures = take_pictures(reply)
+        text = json.dumps(reply, separators=(",", ":"), ensure_ascii=False)
+        if len(text) > MOST_ANSWER_CHARACTERS:
+            text = f"{text[:MOST_ANSWER_CHARACTERS]} ... ({len(text)} characters; the rest is not shown: ask for less)"
+        return Answer(call, text, pictures)
+
+    def _post(self, tool: str, arguments: dict[str, Any]) -> dict[str, Any]:
+        for _ in range(BUSY_TRIES):
+            try:
+                return self.client.request("POST", f"/v1/episodes/{self.episode_id}/tools/{tool}", arguments)
+            except Refused as refused:
+                if refused.retry_after_s is None:
+                    raise
+                time.sleep(min(refused.retry_after_s, LONGEST_WAIT_S))
+        return self.client.request("POST", f"/v1/episodes/{self.episode_id}/tools/{tool}", arguments)
+
+    def finish(self) -> None:
+        """Finishes the episode for this caller, unless it is over."""
+        if not self.over:
+            self.call(Call("", "finish", "{}"))
+
+    def note(self, note: Note) -> None:
+        """Hands the model's words to the server, where it keeps them."""
+        if not self._keeps_notes:
+            return
+        try:
+            self.client.request("POST", f"/v1/episodes/{self.episode_id}/notes", asdict(note))
+        except Refused:
+            # A server that keeps none, or no more: words are not worth an episode.
+            self._keeps_notes = False
+
+
+def _is_over(reply: dict[str, Any]) -> bool:
+    """Whether a reply is the last of its episode. That of several commands has the last one's within."""
+    last = reply.get("last")
+    parts = [reply, cast("dict[str, Any]", last)] if isinstance(last, dict) else [reply]
+    return any(part.get("stop_reason") in _OVER or part.get("ended") is not None for part in parts)

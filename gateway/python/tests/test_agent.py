@@ -1,0 +1,330 @@
+"""Language models that play: the loop, through the official SDKs, against a server of episodes and a scripted endpoint."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from scripted_endpoint import CACHED_TOKENS, INPUT_TOKENS, OUTPUT_TOKENS, Heard, Refusal, Says, Script, ScriptedEndpoint
+
+import tandem
+from tandem.agent import main
+
+APIS = ("openai", "openai-chat", "anthropic")
+KEY = "sk-test-0123456789abcdef"
+SEED = 2000
+
+
+@pytest.fixture(autouse=True)
+def keys(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("OPENAI_API_KEY", "ANTHROPIC_API_KEY"):
+        monkeypatch.setenv(name, KEY)
+    for name in ("OPENAI_BASE_URL", "ANTHROPIC_BASE_URL", "ANTHROPIC_AUTH_TOKEN", "TANDEM_EPISODE", "TANDEM_TOKEN"):
+        monkeypatch.delenv(name, raising=False)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("runs")
+
+
+@pytest.fixture(scope="module")
+def server(runs: Path) -> Iterator[tandem.Server]:
+    with tandem.serve(runs=runs) as server:
+        yield server
+
+
+def run(endpoint: ScriptedEndpoint, server: tandem.Server, api: str = "openai-chat", *flags: str) -> int:
+    """Plays an episode of Handover on the server, as the command line does."""
+    where = ["--api", api, "--base-url", endpoint.base_url(api), "--url", server.url]
+    return main(["--model", "scripted", *where, "--task", "handover", "--seed", str(SEED), *flags])
+
+
+def result(runs: Path) -> dict[str, Any]:
+    """That of the latest episode."""
+    latest = max(runs.glob("handover-*/result.json"), key=lambda path: path.stat().st_mtime_ns)
+    return json.loads(latest.read_text())
+
+
+def observe(robot: str = "A") -> tuple[str, dict[str, Any]]:
+    return "observe", {"robots": [robot]}
+
+
+def saying(*said: Says) -> Callable[[str], Script]:
+    """A script that heeds nothing that it hears."""
+
+    def script(_: str) -> Script:
+        for says in said:
+            _heard = yield says
+
+    return script
+
+
+class Grasp:
+    """Takes the bottle and lifts it, as the brief says how, where it sees it; keeps what it heard."""
+
+    def __init__(self) -> None:
+        self.heard: list[list[Heard]] = []
+
+    def script(self, system: str) -> Script:
+        assert "the bottle" in system and '"close_rad"' in system
+        heard = yield Says(thoughts="Where is the bottle?", words="I look.", calls=(observe(), ("get_status", {})))
+        self.heard.append(heard)
+        heard = yield Says(calls=(("query_depth", {"robot": "A", "surface": {"color": "green"}}),))
+        self.heard.append(heard)
+        x, y, z = json.loads(heard[0].text)["surface"]["centroid_m"]
+        # What is seen is the side that faces the camera, at 0.1 m; the axis is 20 mm behind it.
+        away = math.hypot(x - 0.1, y)
+        x, y, z = x + 0.02 * (x - 0.1) / away, y + 0.02 * y / away, z - 0.06
+        opened, closed = [0, 0.3, 0, 0, 0, 0, 0], [0, -0.75, -0.8, 1.1, 1.3, 1.1, 1.3]
+
+        def wrist(aside_m: float, up_m: float, fingers: list[float]) -> tuple[str, dict[str, Any]]:
+            move: dict[str, Any] = {"robot": "A", "right_position_m": [x - 0.12, y - 0.055 - aside_m, z + up_m]}
+            return "move_wrists", {
+                "steps": 25,
+                "robots": [{**move, "right_quaternion_wxyz": [1, 0, 0, 0], "right_fingers_rad": fingers}],
+            }
+
+        approach = (wrist(0.12, 0.1, opened), wrist(0.08, 0.0, opened), wrist(0.0, 0.0, opened), wrist(0.0, 0.0, opened))
+        self.heard.append((yield Says(words="I reach for it.", calls=approach)))
+        self.heard.append((yield Says(calls=(wrist(0.0, 0.0, closed), wrist(0.0, 0.0, closed)))))
+        self.heard.append((yield Says(calls=(wrist(0.0, 0.06, closed), wrist(0.0, 0.1, closed), wrist(0.0, 0.1, closed)))))
+        yield Says(words="It is lifted.", calls=(("finish", {}),))
+
+
+@pytest.mark.parametrize("api", APIS)
+def test_a_model_lifts_the_bottle(api: str, server: tandem.Server, runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    grasp = Grasp()
+    busy = [Refusal(429, "slow down"), Refusal(500, "no idea"), Refusal(529, "overloaded")]
+    prices = ["--usd-per-million-input", "10", "--usd-per-million-output", "100", "--usd-per-million-cached", "1"]
+    with ScriptedEndpoint(grasp.script, refusals=busy) as endpoint:
+        assert run(endpoint, server, api, *prices) == 0
+    assert endpoint.refused == [429, 500, 529]
+    came = result(runs)
+    assert came["phases"]["p1"] is not None
+    assert (came["ended"], came["falls"], came["tool_calls"]) == ("finished", 0, 13)
+    assert [[heard.pictures for heard in turn] for turn in grasp.heard[:2]] in ([[1, 0], [0]], [[0, 1], [0]])
+    assert json.loads(grasp.heard[0][1].text)["task"] == "handover"
+    assert [request.pictures for request in endpoint.requests] == [0, 1, 1, 1, 1, 1]
+    replies = len(endpoint.requests)
+    usd = replies * ((INPUT_TOKENS - CACHED_TOKENS) * 10 + CACHED_TOKENS * 1 + OUTPUT_TOKENS * 100) / 1e6
+    printed = capsys.readouterr().out
+    assert f"13 calls, {replies} replies, {replies * INPUT_TOKENS} tokens read ({replies * CACHED_TOKENS} cached)" in printed
+    assert f"{usd:.4f} US dollars" in printed
+    assert "thinks: Where is the bottle?" in printed and "says: It is lifted." in printed
+
+
+@pytest.mark.parametrize("api", APIS)
+def test_a_request_says_what_may_be_kept(api: str, server: tandem.Server) -> None:
+    look = Says(words="I look.", calls=(observe(),))
+    done = Says(calls=(("finish", {}),))
+    with ScriptedEndpoint(saying(look, look, look, done)) as endpoint:
+        assert run(endpoint, server, api) == 0
+    for request in endpoint.requests:
+        begun = [request.body[part] for part in ("tools", "instructions", "system") if part in request.body]
+        first = endpoint.requests[0].body
+        assert begun == [first[part] for part in ("tools", "instructions", "system") if part in first]
+        assert "episode_id" not in json.dumps(request.body["tools"])
+        marks = json.dumps(request.body).count('"cache_control"')
+        if api == "anthropic":
+            told = [message for message in request.body["messages"] if message["role"] == "user"]
+            assert marks == 2 + min(2, len(told))
+            assert all("cache_control" in message["content"][-1] for message in told[-2:])
+        else:
+            assert (request.body["prompt_cache_key"], marks) == ("tandem-handover", 0)
+    if api == "openai":
+        assert endpoint.requests[0].body["store"] is False
+        assert all(tool["strict"] is False for tool in endpoint.requests[0].body["tools"])
+
+
+def test_thoughts_go_back_as_their_api_wants_them(server: tandem.Server) -> None:
+    said = saying(Says(thoughts="Hm.", calls=(("get_status", {}),)), Says(calls=(("finish", {}),)))
+    with ScriptedEndpoint(said) as endpoint:
+        assert run(endpoint, server, "openai", "--effort", "low") == 0
+    assert endpoint.requests[0].body["reasoning"] == {"effort": "low", "summary": "auto"}
+    assert [
+        item.get("encrypted_content") for item in endpoint.requests[1].body["input"] if item.get("type") == "reasoning"
+    ] == ["sealed"]
+    with ScriptedEndpoint(said) as endpoint:
+        assert run(endpoint, server, "anthropic", "--effort", "low") == 0
+    assert endpoint.requests[0].body["output_config"] == {"effort": "low"}
+    sent = endpoint.requests[1].body["messages"][1]["content"]
+    assert sent[0] == {"type": "thinking", "thinking": "Hm.", "signature": "signed"}
+
+
+def test_what_an_endpoint_does_not_know_is_left_out(server: tandem.Server) -> None:
+    said = saying(Says(calls=(("get_status", {}),)), Says(calls=(("finish", {}),)))
+    with ScriptedEndpoint(said, unknown=("prompt_cache_key", "include", "store")) as endpoint:
+        assert run(endpoint, server, "openai") == 0
+    assert endpoint.refused == [400, 400, 400]
+    assert len(endpoint.requests) == 2
+
+
+@pytest.mark.parametrize("api", APIS)
+def test_wrong_calls_are_answered_with_advice(api: str, server: tandem.Server, runs: Path) -> None:
+    heard: list[Heard] = []
+
+    def script(_: str) -> Script:
+        calls: list[tuple[str, dict[str, Any] | str]] = [("wait", {"steps": 26})]
+        calls += [("wait", {"steps": "ten"}), ("fly", {})]
+        if api != "anthropic":
+            calls += [("wait", "{steps: 10"), ("wait", "[10]")]
+        heard.extend((yield Says(calls=tuple(calls))))
+        yield Says(calls=(("wait", {"steps": 10}), ("finish", {}), ("wait", {"steps": 10})))
+
+    with ScriptedEndpoint(script) as endpoint:
+        assert run(endpoint, server, api) == 0
+    assert all(each.refused in (True, None) for each in heard)
+    for each, says in zip(heard, ("1 to 25", "steps", "have: observe, ", "no JSON", "no JSON object"), strict=False):
+        assert says in each.text
+    came = result(runs)
+    assert (came["ended"], came["env_steps"]) == ("finished", 310)
+
+
+def test_a_model_that_calls_nothing_is_asked_once_more(
+    server: tandem.Server, runs: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wait = Says(calls=(("wait", {"steps": 5}),))
+    with ScriptedEndpoint(saying(Says("Well."), wait, Says(cut=True), Says("I would rather not."))) as endpoint:
+        assert run(endpoint, server) == 0
+    told = [request.body["messages"][-1]["content"] for request in endpoint.requests]
+    assert "You have called no tool" in told[1]
+    assert "cut off" in told[3]
+    assert len(told) == 4
+    assert result(runs)["ended"] == "finished"
+    assert "stopped: the model called no tool" in capsys.readouterr().out
+
+
+LIMITS = {
+    "--max-tokens-total 3500": (3, "the next reply would pass --max-tokens-total 3500"),
+    "--max-usd 0.035 --usd-per-million-input 10 --usd-per-million-output 0": (3, "the next reply would pass --max-usd 0.035"),
+    "--max-calls 2": (2, "all of --max-calls 2 were made"),
+    "--max-seconds 0": (0, "--max-seconds 0 are over"),
+}
+
+
+@pytest.mark.parametrize("flags", LIMITS)
+def test_limits_finish_the_episode(flags: str, server: tandem.Server, runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    replies, says = LIMITS[flags]
+    with ScriptedEndpoint(saying(*[Says(calls=(("wait", {"steps": 1}),))] * 9)) as endpoint:
+        assert run(endpoint, server, "openai-chat", *flags.split()) == 0
+    assert len(endpoint.requests) == replies
+    assert says in capsys.readouterr().out
+    came = result(runs)
+    assert (came["ended"], came["env_steps"]) == ("finished", 300 + replies)
+
+
+def test_no_call_is_made_beyond_the_limit(server: tandem.Server, runs: Path) -> None:
+    with ScriptedEndpoint(saying(Says(calls=(("wait", {"steps": 1}),) * 5))) as endpoint:
+        assert run(endpoint, server, "openai-chat", "--max-calls", "3") == 0
+    assert result(runs)["env_steps"] == 303
+
+
+def test_a_long_conversation_keeps_instructions_and_the_latest_pictures(server: tandem.Server) -> None:
+    look, wait = Says(calls=(observe("A"), observe("B"))), Says(words="I wait.", calls=(("wait", {"steps": 1}),))
+    with ScriptedEndpoint(saying(*[look] * 13, wait, Says(calls=(("finish", {}),)))) as endpoint:
+        assert run(endpoint, server) == 0
+    assert [request.pictures for request in endpoint.requests] == [0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 10, 12, 14, 14]
+    told = [message for message in endpoint.requests[-1].body["messages"] if message["role"] == "tool"]
+    assert ["no longer shown" in message["content"] for message in told] == [True] * 12 + [False] * 15
+
+    with ScriptedEndpoint(saying(*[wait] * 6, Says(calls=(("finish", {}),)))) as endpoint:
+        assert run(endpoint, server, "openai-chat", "--context-tokens", str(INPUT_TOKENS - 1)) == 0
+    systems = {request.system for request in endpoint.requests}
+    assert len(systems) == 1
+    last = endpoint.requests[-1].body["messages"]
+    assert len(last) == 6
+    assert "What you did before" in last[1]["content"]
+    assert last[1]["content"].count('- wait {"steps": 1} -> {"executed_steps":1') == 4
+
+
+def test_a_conversation_that_an_endpoint_finds_too_long_is_cut(server: tandem.Server, runs: Path) -> None:
+    wait = Says(words="I wait.", calls=(("wait", {"steps": 1}),))
+    with ScriptedEndpoint(saying(*[wait] * 4, Says(calls=(("finish", {}),)))) as endpoint:
+        begin = endpoint.answer
+
+        def answer(path: str, body: dict[str, Any], headers: dict[str, str]) -> tuple[int, dict[str, Any]]:
+            if len(body["messages"]) > 6:
+                return 400, {"error": {"message": "This model's maximum context length is 8192 tokens.", "code": None}}
+            return begin(path, body, headers)
+
+        endpoint.answer = answer
+        assert run(endpoint, server) == 0
+    assert result(runs)["env_steps"] == 304
+
+
+def test_an_endpoint_that_refuses_is_told_without_its_key(
+    server: tandem.Server, runs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wrong = Refusal(401, f"Incorrect API key provided: {KEY}. (sk-te****cdef)")
+    with ScriptedEndpoint(saying(), refusals=[wrong]) as endpoint:
+        assert run(endpoint, server) == 1
+    printed = capsys.readouterr()
+    assert "answers 401: Incorrect API key provided" in printed.err
+    assert "sk-te" not in printed.err + printed.out
+    assert result(runs)["ended"] == "finished"
+    assert not [path for path in runs.rglob("*") if path.is_file() and KEY.encode() in path.read_bytes()]
+    monkeypatch.delenv("OPENAI_API_KEY")
+    assert main(["--model", "m", "--task", "handover", "--url", server.url]) == 1
+    assert "set OPENAI_API_KEY" in capsys.readouterr().err
+    with ScriptedEndpoint(saying(Says(calls=(("finish", {}),)))) as endpoint:
+        assert run(endpoint, server) == 0, "an endpoint of one's own needs no key"
+    assert main(["--model", "m", "--task", "handover", "--base-url", "http://me:secret@host/v1"]) == 1
+    assert "secret" not in capsys.readouterr().err
+
+
+def test_wrong_flags_and_missing_packages_say_what_would_work(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    checks = {
+        "--max-usd 1": "--max-usd needs prices",
+        "--usd-per-million-input 1": "together",
+        "--task handover --base-url localhost:11434": "give one as http://127.0.0.1:11434/v1",
+        "": "give --task, as handover",
+    }
+    for flags, says in checks.items():
+        assert main(["--model", "m", *flags.split()]) == 1
+        assert says in capsys.readouterr().err
+    monkeypatch.setitem(sys.modules, "anthropic", None)
+    assert main(["--model", "m", "--api", "anthropic"]) == 1
+    assert "pip install 'tandem-sim[agents]'" in capsys.readouterr().err
+
+
+def test_a_model_for_each_robot(server: tandem.Server, runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    heard: dict[str, list[Heard]] = {}
+
+    def script(system: str) -> Script:
+        robot = "A" if "the humanoid robot A" in system else "B"
+        yield Says(calls=(("say", {"text": f"I am {robot}."}), ("wait", {"steps": 5})))
+        heard[robot] = yield Says(calls=(("wait", {"steps": 5}),))
+        yield Says(calls=(("finish", {}),))
+
+    with ScriptedEndpoint(script) as endpoint:
+        assert run(endpoint, server, "anthropic", "--per-robot", "--talk") == 0
+    assert {request.system.split(",")[0] for request in endpoint.requests} == {
+        "You direct the humanoid robot A in a simulation",
+        "You direct the humanoid robot B in a simulation",
+    }
+    came = result(runs)
+    assert (came["ended"], came["env_steps"]) == ("finished", 310)
+    printed = capsys.readouterr().out
+    assert "I am A." in printed.split("B: ", 1)[1] and "B: wait" in printed
+
+
+def test_an_episode_that_somebody_else_began_is_joined(
+    server: tandem.Server, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = saying(Says(words="I wait.", calls=(("wait", {"steps": 3}),)), Says(calls=(("finish", {}),)))
+    with tandem.Client(server.url).episode("handover", SEED) as episode, ScriptedEndpoint(said) as endpoint:
+        monkeypatch.setenv("TANDEM_URL", server.url)
+        monkeypatch.setenv("TANDEM_EPISODE", episode.episode_id)
+        where = ["--api", "anthropic", "--base-url", endpoint.base_url("anthropic")]
+        assert main(["--model", "scripted", *where]) == 0
+        assert episode.get_status().ended == "finished"
+        assert episode.get_status().env_steps == 303
+    assert "says: I wait." in capsys.readouterr().out
