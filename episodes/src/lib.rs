@@ -49,8 +49,9 @@ pub use observation::{Picture, RobotObservation, RobotView, TeamObservation};
 pub use output::{OutputError, create_new_private_folder, create_private_folder, write_whole};
 pub use protocol::{Rules, rules};
 pub use recording::{
-    Damage, Fault, FilePart, LeftOut, RecordedCall, RecordedCheckpoint, Recorder, Recording, RecordingError,
-    RecoverError, Recovered, Visibility, recover,
+    Damage, Fault, FilePart, LeftOut, NoteMessage, RecordedCall, RecordedCheckpoint, Recorder, Recording,
+    RecordingError, RecoverError, Recovered, ShownPicture, ToolCallMessage, TranscriptEntry, Visibility,
+    recover,
 };
 pub use results::RESULT_FILE;
 pub use scoring::{A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, RobotFacts, Scores, StepScore};

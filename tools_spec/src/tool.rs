@@ -67,17 +67,26 @@ pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
 
 /// Reads and checks the arguments of `T`, which have to be an object.
 pub fn parse_args<T: Tool>(args: Value) -> Result<T, SpecError> {
-    let parsed: T = serde_path_to_error::deserialize(StrictValue(args)).map_err(|error| {
-        let path = error.path().to_string();
-        SpecError::Malformed {
-            tool: T::NAME,
-            place: if path == "." { String::new() } else { format!("{path}: ") },
-            reason: in_plain_words(&error.into_inner().to_string()),
-            example: json!(T::example()).to_string(),
-        }
-    })?;
+    let parsed: T = read_as(T::NAME, args, || json!(T::example()))?;
     parsed.validate().map_err(|reason| SpecError::Invalid { tool: T::NAME, reason })?;
     Ok(parsed)
+}
+
+/// Reads what refusals call `name`, and of which `example` is one.
+pub fn read_as<T: DeserializeOwned>(
+    name: &'static str,
+    value: Value,
+    example: impl FnOnce() -> Value,
+) -> Result<T, SpecError> {
+    serde_path_to_error::deserialize(StrictValue(value)).map_err(|error| {
+        let path = error.path().to_string();
+        SpecError::Malformed {
+            tool: name,
+            place: if path == "." { String::new() } else { format!("{path}: ") },
+            reason: in_plain_words(&error.into_inner().to_string()),
+            example: example().to_string(),
+        }
+    })
 }
 
 /// Serde names Rust's types, which a caller need not know.

@@ -30,6 +30,7 @@ fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultRe
         extra_information_replies: Default::default(),
         departures: vec![],
         recording_failed: None,
+        usage: None,
     }
 }
 

@@ -13,7 +13,7 @@ use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
 
 use crate::commands::MotionState;
 use crate::observation::Picture;
-use crate::recording::{RecordedCall, ToolCallRecord};
+use crate::recording::{NoteMessage, ToolCallMessage, ToolCallRecord, TranscriptEntry};
 
 pub use scene::LiveScene;
 
@@ -33,7 +33,8 @@ pub const STEPS_PER_FRAME: u64 = 2;
 #[derive(Clone)]
 pub enum LiveEvent {
     Step(Arc<LiveStep>),
-    Call(Arc<LiveCall>),
+    /// A call that has been answered, or a note.
+    Entry(Arc<LiveEntry>),
     Phase(PhaseReached),
     /// It takes no more commands.
     Ended(Arc<ResultReply>),
@@ -60,52 +61,64 @@ impl LiveStep {
     }
 }
 
-/// A tool call with its answer.
-pub struct LiveCall {
-    /// The calls of an episode are counted from 1.
-    pub number: u32,
+/// A tool call with its answer, or a note.
+pub struct LiveEntry {
+    /// The entries of an episode are counted from 1.
+    pub entry: u32,
     /// As a page reads it.
     pub told: Value,
     /// What was seen, with the name of the robot that saw it.
     pub pictures: Vec<(String, Arc<Picture>)>,
 }
 
-impl LiveCall {
-    pub(crate) fn new(number: u32, record: &ToolCallRecord) -> LiveCall {
-        let message = &record.message;
-        let told = json!({
-            "kind": "call", "number": number, "time_s": record.time_s, "thought_s": message.thought_ns as f64 / 1e9,
-            "tool": message.tool, "arguments": message.arguments, "operator": message.operator, "ok": message.ok,
-            "reply": message.reply,
-        });
-        LiveCall { number, told, pictures: record.pictures.clone() }
+impl LiveEntry {
+    /// A call; those that count have a number.
+    pub(crate) fn of_call(entry: u32, number: Option<u32>, record: &ToolCallRecord) -> LiveEntry {
+        let told = told_call(entry, number, record.time_s, &record.message);
+        LiveEntry { entry, told, pictures: record.pictures.clone() }
     }
 
-    /// The call for who comes later: a picture is seen when it is made.
-    pub(crate) fn without_pictures(&self) -> LiveCall {
-        LiveCall { number: self.number, told: self.told.clone(), pictures: Vec::new() }
+    pub(crate) fn of_note(entry: u32, time_s: f64, note: &NoteMessage) -> LiveEntry {
+        LiveEntry { entry, told: told_note(entry, time_s, note), pictures: Vec::new() }
     }
 
-    /// A call of a recording, as a page reads it.
-    pub fn of_recorded(number: u32, call: &RecordedCall) -> Value {
-        let (ok, reply) = match &call.outcome {
-            Ok(reply) => (true, reply),
-            Err(problem) => (false, problem),
-        };
-        json!({
-            "kind": "call", "number": number, "time_s": call.time_s, "thought_s": call.thought.as_secs_f64(),
-            "tool": call.tool, "arguments": call.arguments.to_string(), "operator": call.operator, "ok": ok,
-            "reply": reply,
-        })
+    /// The entry for who comes later: a picture is seen when it is made.
+    pub(crate) fn without_pictures(&self) -> LiveEntry {
+        LiveEntry { entry: self.entry, told: self.told.clone(), pictures: Vec::new() }
     }
+}
+
+/// A transcript as a page reads it.
+pub(crate) fn told_transcript(transcript: &[TranscriptEntry]) -> Vec<Value> {
+    let told = |(entry, told): (u32, &TranscriptEntry)| match told {
+        TranscriptEntry::Call { number, time_s, call } => told_call(entry, *number, *time_s, call),
+        TranscriptEntry::Note { time_s, note } => told_note(entry, *time_s, note),
+    };
+    (1..).zip(transcript).map(told).collect()
+}
+
+fn told_call(entry: u32, number: Option<u32>, time_s: f64, call: &ToolCallMessage) -> Value {
+    let seen: Vec<&str> = call.pictures.iter().map(|picture| picture.robot.as_str()).collect();
+    json!({
+        "kind": "call", "entry": entry, "number": number, "time_s": time_s, "step": call.control_step,
+        "thought_s": call.thought_ns as f64 / 1e9, "tool": call.tool, "arguments": call.arguments,
+        "operator": call.operator, "ok": call.ok, "reply": call.reply, "seen": seen,
+    })
+}
+
+fn told_note(entry: u32, time_s: f64, note: &NoteMessage) -> Value {
+    json!({
+        "kind": "note", "entry": entry, "time_s": time_s, "step": note.control_step,
+        "thought_s": note.thought().as_secs_f64(), "note": note,
+    })
 }
 
 /// An episode as it stands when somebody begins to look on.
 pub struct LiveView {
     pub scene: Arc<LiveScene>,
     pub now: Arc<LiveStep>,
-    /// Its latest calls, the oldest first.
-    pub calls: Vec<Arc<LiveCall>>,
+    /// Its latest calls and notes, the oldest first.
+    pub entries: Vec<Arc<LiveEntry>>,
     pub phases: Vec<PhaseReached>,
     /// What it came to, if it has ended.
     pub result: Option<ResultReply>,

@@ -47,10 +47,11 @@ impl LiveScene {
         let phases = phases.map(|(index, phase)| {
             json!({ "number": Phase::number(index), "id": phase.id, "collaborative": phase.collaborative })
         });
+        let rules = rules(spec.protocol, spec.task);
         let head = json!({
             "task": spec.task.id, "seed": spec.seed, "protocol": spec.protocol, "instruction": spec.task.instruction,
             "assistance": spec.assistance, "control_hz": CONTROL_HZ,
-            "episode_steps": rules(spec.protocol, spec.task).episode_steps,
+            "episode_steps": rules.episode_steps, "thinking_s": rules.thinking.map(|time| time.as_secs_f64()),
             "phases": phases.collect::<Vec<_>>(), "robots": robots, "objects": objects,
             "third_person": { "pose": pose_row(&third_person.world_from_camera), "vertical_fov_rad": third_person.vertical_fov_rad },
             "meshes": meshes, "parts": parts,

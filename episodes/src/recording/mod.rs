@@ -24,6 +24,7 @@ mod recover;
 mod tests;
 mod thread;
 mod topics;
+mod transcript;
 mod write;
 
 pub use damage::{Damage, Fault, FilePart};
@@ -31,7 +32,11 @@ pub use mcap_file::Visibility;
 pub use read::{RecordedCall, RecordedCheckpoint, Recording, RecordingError};
 pub use recover::{LeftOut, RecoverError, Recovered, recover};
 pub use thread::RecorderThread;
-pub use topics::messages::{CallOutcome, CallerRecord, ToolCallRecord, state_hash_text};
+pub use topics::messages::{
+    CallMoment, CallOutcome, CallerRecord, ShownPicture, ToolCallMessage, ToolCallRecord, state_hash_text,
+};
+pub use topics::notes::NoteMessage;
+pub use transcript::TranscriptEntry;
 pub use write::{Recorder, RecordingHeader};
 
 /// What the checkpoint is called that an episode began with, where that is not its task's own beginning.

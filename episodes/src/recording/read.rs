@@ -12,6 +12,7 @@ use tandem_tools_spec::{ExtraInformation, PhaseReached, ResultReply};
 use super::checked_file::CheckedFile;
 use super::damage::Damage;
 use super::topics::messages::{PhaseMessage, StepError, StepMessage, ToolCallMessage};
+use super::topics::notes::NoteMessage;
 use super::{checkpoint_name, metadata, topics};
 use crate::results::RESULT_FILE;
 use crate::scoring::{ScoreMemory, Scores};
@@ -156,11 +157,11 @@ impl Recording {
         self.messages(topics::PHASES).map(phase).collect()
     }
 
-    /// The tool calls of the episode, in their order.
+    /// The tool calls of the episode, in their order: those that count, which a replay makes again.
     pub fn tool_calls(&self) -> Result<Vec<RecordedCall>, RecordingError> {
         let call = |message: Result<(f64, ToolCallMessage), RecordingError>| {
             let (time_s, message) = message?;
-            let ToolCallMessage { tool, thought_ns, arguments, operator, shown, ok, reply } = message;
+            let ToolCallMessage { tool, thought_ns, arguments, operator, shown, ok, reply, .. } = message;
             let arguments = serde_json::from_str(&arguments).map_err(|source| self.json(source))?;
             let (thought, outcome) =
                 (Duration::from_nanos(thought_ns), if ok { Ok(reply) } else { Err(reply) });
@@ -168,7 +169,22 @@ impl Recording {
             let shown = shown.transpose().map_err(|source| self.json(source))?;
             Ok(RecordedCall { time_s, thought, tool, arguments, operator, shown, outcome })
         };
-        self.messages(topics::TOOL_CALLS).map(call).collect()
+        let counted = |message: &Result<(f64, ToolCallMessage), RecordingError>| {
+            message.as_ref().map_or(true, |(_, message)| message.counted)
+        };
+        self.call_messages().filter(counted).map(call).collect()
+    }
+
+    /// All that was asked, what does not count included, with the time of each.
+    pub(super) fn call_messages(
+        &self,
+    ) -> impl Iterator<Item = Result<(f64, ToolCallMessage), RecordingError>> {
+        self.messages(topics::TOOL_CALLS)
+    }
+
+    /// Every note, with its time.
+    pub(super) fn notes(&self) -> Result<Vec<(f64, NoteMessage)>, RecordingError> {
+        self.messages(topics::NOTES).collect()
     }
 
     /// Scores the recorded steps by the task's conditions as this build has them.

@@ -82,6 +82,11 @@ fn recorder(folder: &Path, world: &World) -> (Recorder, Scores) {
     (Recorder::create(folder, Visibility::Live, header, &start, world.state_hash()).unwrap(), scores)
 }
 
+fn moment(world: &World) -> CallMoment {
+    let step = world.present();
+    CallMoment { time_s: step.time_s, control_step: step.control_step, thought: THOUGHT }
+}
+
 fn hash(world: &World) -> String {
     state_hash_text(world.state_hash())
 }
@@ -110,8 +115,7 @@ fn record(folder: &Path) -> (World, PathBuf) {
     recorder
         .tool_call(
             ToolCallRecord::new(
-                time_s,
-                THOUGHT,
+                moment(&world),
                 CallerRecord::Policy,
                 &wait.into(),
                 CallOutcome::refused(&"no steps are left"),
@@ -122,7 +126,7 @@ fn record(folder: &Path) -> (World, PathBuf) {
     let observe = ToolCall::parse("observe", serde_json::json!({ "robots": ["A"] })).unwrap();
     let seen = seen(&world);
     let record =
-        ToolCallRecord::new(time_s, THOUGHT, CallerRecord::Operator("A"), &observe.into(), (&seen).into());
+        ToolCallRecord::new(moment(&world), CallerRecord::Operator("A"), &observe.into(), (&seen).into());
     recorder.tool_call(record.unwrap()).unwrap();
     let path = recorder.finish(&result()).unwrap();
     (world, path)
@@ -146,6 +150,7 @@ fn result() -> ResultReply {
         extra_information_replies: Default::default(),
         departures: vec![],
         recording_failed: None,
+        usage: None,
     }
 }
 
@@ -223,7 +228,15 @@ fn a_recording_reads_back() {
     assert_eq!((calls[0].tool.as_str(), &calls[0].outcome), ("wait", &Err("no steps are left".into())));
     assert_eq!((calls[1].arguments["robots"][0].as_str(), calls[1].outcome.is_ok()), (Some("A"), true));
     assert_eq!((&calls[0].operator, &calls[1].operator), (&None, &Some("A".into())));
-    assert_eq!(recording.result.unwrap(), result());
+    assert_eq!(recording.result.clone().unwrap(), result());
+    let transcript = recording.transcript().unwrap();
+    let [TranscriptEntry::Call { call: wait, .. }, TranscriptEntry::Call { call: look, .. }] =
+        &transcript[..]
+    else {
+        panic!("{transcript:?}");
+    };
+    assert_eq!((wait.control_step, wait.pictures.as_slice()), (STEPS.into(), &[][..]));
+    assert_eq!(look.pictures, [ShownPicture { robot: "A".into(), width: 320, height: 240 }]);
 }
 
 /// The chain of recorded frames puts wrists and camera where the world measured them.

@@ -11,6 +11,7 @@ use super::mcap_file::{McapFile, Topic, Visibility};
 use super::topics::messages::{
     BudgetMessage, Json, PhaseMessage, StepMessage, ToolCallMessage, ToolCallRecord,
 };
+use super::topics::notes::NoteMessage;
 use super::topics::robot::RobotTopics;
 use super::topics::transforms::{self, robot_frame};
 use super::topics::{self, scene};
@@ -49,6 +50,7 @@ pub struct Recorder {
     phases: Topic<Json<PhaseMessage>>,
     budget: Topic<Json<BudgetMessage>>,
     tool_calls: Topic<Json<ToolCallMessage>>,
+    notes: Topic<Json<NoteMessage>>,
 }
 
 impl Recorder {
@@ -77,6 +79,7 @@ impl Recorder {
             phases: file.topic(topics::PHASES, &[])?,
             budget: file.topic("/budget", &[])?,
             tool_calls: file.topic(topics::TOOL_CALLS, &[])?,
+            notes: file.topic(topics::NOTES, &[])?,
             start_s: start.time_s,
             robot_topics,
             robots: header.robots,
@@ -148,6 +151,11 @@ impl Recorder {
             }
         }
         Ok(())
+    }
+
+    /// Appends a note of this time.
+    pub fn note(&mut self, time_s: f64, note: NoteMessage) -> Result<(), OutputError> {
+        self.file.write(&mut self.notes, time_s, &Json(note))
     }
 
     /// Hands everything that has been appended to the system.

@@ -1,6 +1,7 @@
 //! A finished episode for who looks at it in a page: its scene, what happened when, and its steps as a scrubber shows them. Nothing is
 //! simulated.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde_json::{Value, json};
@@ -10,8 +11,8 @@ use tandem_sim::render::PictureError;
 use super::ReplayError;
 use crate::commands::Motion;
 use crate::convert::isometry_from_sim;
-use crate::live::{LiveCall, LiveScene, LiveStep};
-use crate::recording::Recording;
+use crate::live::{LiveScene, LiveStep, told_transcript};
+use crate::recording::{Recording, TranscriptEntry};
 use crate::session::build;
 
 /// Every how many control steps one is shown: ten a second, between which a page draws what lies between.
@@ -22,6 +23,8 @@ pub struct RecordedEpisode {
     scene: LiveScene,
     motions: Vec<Motion>,
     steps: Vec<Step>,
+    /// Those that a policy was shown pictures of.
+    looked: Vec<Step>,
     told: Value,
 }
 
@@ -30,10 +33,14 @@ impl RecordedEpisode {
     pub fn read(path: &Path) -> Result<RecordedEpisode, ReplayError> {
         let recording = Recording::read(path)?;
         let built = build(&recording.spec)?;
-        let mut steps: Vec<Step> = Vec::new();
-        let mut last = None;
+        let transcript = recording.transcript()?;
+        let looks: BTreeSet<u64> = transcript.iter().filter_map(looked_at).collect();
+        let (mut steps, mut looked, mut last) = (Vec::new(), Vec::new(), None);
         for (index, step) in recording.steps().enumerate() {
             let step = step?;
+            if looks.contains(&step.control_step) {
+                looked.push(step.clone());
+            }
             match index % STEPS_PER_FRAME {
                 0 => {
                     steps.push(step);
@@ -43,14 +50,12 @@ impl RecordedEpisode {
             }
         }
         steps.extend(last);
-        let calls = recording.tool_calls()?;
-        let calls = calls.iter().zip(1..).map(|(call, number)| LiveCall::of_recorded(number, call));
         let told = json!({
-            "recorded": true, "calls": calls.collect::<Vec<_>>(), "reached": recording.phases()?,
+            "recorded": true, "story": told_transcript(&transcript), "reached": recording.phases()?,
             "result": recording.result, "frames": steps.len(),
         });
         let scene = LiveScene::of(&recording.spec, &built.world, &built.motions);
-        Ok(RecordedEpisode { scene, motions: built.motions, steps, told })
+        Ok(RecordedEpisode { scene, motions: built.motions, steps, looked, told })
     }
 
     /// The message that a page draws all of it from: that of the scene with the calls, the phases and the result in its head, and every
@@ -61,10 +66,12 @@ impl RecordedEpisode {
         self.scene.message(self.told.clone(), &frames)
     }
 
-    /// What robot `name` saw in the shown step that is nearest to `time_s`, as a PNG file; `None` if there is no such robot or step.
+    /// What robot `name` saw in the step that is nearest to `time_s`, of those that are shown and those that a policy was shown pictures
+    /// of, as a PNG file; `None` if there is no such robot or step.
     pub fn picture(&self, time_s: f64, name: &str) -> Option<Result<Vec<u8>, PictureError>> {
         let away = |step: &&Step| (step.time_s - time_s).abs();
-        let step = self.steps.iter().min_by(|one, other| away(one).total_cmp(&away(other)))?;
+        let step =
+            self.looked.iter().chain(&self.steps).min_by(|one, other| away(one).total_cmp(&away(other)))?;
         self.scene.picture(step, name)
     }
 
@@ -78,5 +85,13 @@ impl RecordedEpisode {
             motion.told(&robot.command, isometry_from_sim(&robot.estimate.world_from_pelvis))
         });
         LiveStep::new(step.clone().into(), told.collect(), None)
+    }
+}
+
+/// The step of which a policy was shown pictures.
+fn looked_at(entry: &TranscriptEntry) -> Option<u64> {
+    match entry {
+        TranscriptEntry::Call { call, .. } => (!call.pictures.is_empty()).then_some(call.control_step),
+        TranscriptEntry::Note { .. } => None,
     }
 }

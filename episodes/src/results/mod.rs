@@ -204,6 +204,7 @@ mod tests {
             extra_information_replies: Default::default(),
             departures: vec![],
             recording_failed: None,
+            usage: None,
         }
     }
 

@@ -12,6 +12,7 @@ use super::told::shorten;
 use crate::EpisodeError;
 use crate::commands::{Called, Command, OperatorCall, OperatorCommand, RobotOrder};
 use crate::observation::TeamObservation;
+use crate::output::OutputError;
 use crate::recording::{CallOutcome, CallerRecord, ToolCallRecord};
 
 /// What a call comes to.
@@ -35,7 +36,7 @@ impl Session {
     /// As [`Session::call`], with all that may go with a call, by the operator of a robot or by the policy of all. A call that was
     /// made for another step, or whose look afterwards could not be had, is refused before it counts.
     pub fn ask(&mut self, operator: Option<&str>, mut call: Call) -> Result<CallReply, EpisodeError> {
-        self.check_around(&call)?;
+        self.admit(operator, &call)?;
         call.expected_step = None;
         let then = call.then.take();
         let caller = operator.map_or(CallerRecord::Policy, CallerRecord::Operator);
@@ -120,7 +121,7 @@ impl Session {
     /// Reads an operator's command, which [`Session::together`] executes when those of others are there, too. A refusal is counted and
     /// recorded as that of any call.
     pub fn read_command(&mut self, call: OperatorCall) -> Result<OperatorCommand, EpisodeError> {
-        self.check_around(call.call())?;
+        self.admit(Some(call.robot()), call.call())?;
         let order = self.expect_underway().and_then(|()| call.order(&self.rules, &self.motions));
         let refusal = match order {
             Ok(order) => return Ok(OperatorCommand { call, order }),
@@ -220,6 +221,16 @@ impl Session {
         call.then.as_ref().map_or(Ok(()), |look| self.check_look(look))
     }
 
+    /// As [`Session::check_around`]; a refusal is told.
+    fn admit(&mut self, operator: Option<&str>, call: &Call) -> Result<(), EpisodeError> {
+        let refused = self.check_around(call).err();
+        refused.map_or(Ok(()), |refusal| {
+            let arguments = serde_json::to_string(call).map_err(OutputError::from)?;
+            self.refused_before(operator, call.name(), &arguments, &refusal.to_string());
+            Err(refusal)
+        })
+    }
+
     /// Looks after a command, if that was asked for: a call of its own.
     fn look_after(
         &mut self,
@@ -265,16 +276,13 @@ impl Session {
     /// A call has come out: records it, and closes the files if it has ended the episode.
     fn came_out(&mut self, underway: bool, caller: CallerRecord, called: &Called, outcome: CallOutcome) {
         if underway && (self.files.is_some() || self.shows_calls()) {
-            let (time_s, thought, ok) = (self.present.time_s, self.clock.spent(), outcome.is_ok());
-            let record = ToolCallRecord::new(time_s, thought, caller, called, outcome);
-            if self.shows_calls() {
-                self.show_call(&record);
-            }
             if let Some(files) = &mut self.files {
-                files.tool_call(called.name(), ok, record);
+                files.count_call(called.name(), outcome.is_ok());
             }
+            self.tell(ToolCallRecord::new(self.now(), caller, called, outcome));
         }
-        if self.ended.is_some() {
+        // A plan that has ended the episode is told behind its last command.
+        if self.ended.is_some() && !self.planning {
             self.settle();
         }
     }

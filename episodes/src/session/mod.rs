@@ -6,6 +6,7 @@ mod calls;
 mod checkpoint;
 mod clock;
 mod failure;
+mod notes;
 mod onlookers;
 mod plan;
 mod replay;
@@ -30,7 +31,7 @@ use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
 use tandem_sim::{RobotCommand, Step, World};
-use tandem_tools_spec::{EndReason, ResultReply};
+use tandem_tools_spec::{EndReason, ResultReply, Usage};
 
 use crate::commands::{Clamped, Command, Motion, MotionState, Trajectory};
 use crate::convert::isometry_from_sim;
@@ -62,6 +63,12 @@ pub struct Session {
     audience: Audience,
     /// Up to the end.
     tool_calls: u32,
+    /// Whether the commands of a plan are made.
+    planning: bool,
+    /// Calls that have been recorded or shown, those that do not count included.
+    told_calls: u32,
+    /// What notes say that was used.
+    usage: Usage,
     /// Time that physics took, for the real-time factor.
     physics: Duration,
     ended: Option<EndReason>,
@@ -111,6 +118,9 @@ impl Session {
             audience: Audience::default(),
             steps_before: 0,
             tool_calls: 0,
+            planning: false,
+            told_calls: 0,
+            usage: Usage::default(),
             physics: Duration::ZERO,
             ended: None,
             simulator_failure: None,

@@ -6,20 +6,22 @@ use std::sync::Arc;
 use tandem_tools_spec::{Budget, PhaseReached};
 
 use super::Session;
-use crate::live::{LiveCall, LiveEvent, LiveScene, LiveStep, LiveView, Onlookers, STEPS_PER_FRAME};
+use crate::live::{LiveEntry, LiveEvent, LiveScene, LiveStep, LiveView, Onlookers, STEPS_PER_FRAME};
 use crate::output::OutputError;
-use crate::recording::ToolCallRecord;
+use crate::recording::{NoteMessage, ToolCallRecord};
 
-/// Calls that are kept for who comes later.
-const KEPT_CALLS: usize = 50;
+/// Calls and notes that are kept for who comes later.
+const KEPT_ENTRIES: usize = 50;
 
 /// Who looks on, if anybody may, and what those are shown first who come later.
 #[derive(Default)]
 pub struct Audience {
     onlookers: Option<Box<dyn Onlookers>>,
     /// The latest, the oldest first.
-    calls: VecDeque<Arc<LiveCall>>,
-    calls_made: u32,
+    entries: VecDeque<Arc<LiveEntry>>,
+    /// How many there have been, and how many of them count as calls.
+    told_entries: u32,
+    counted_calls: u32,
     scene: Option<Arc<LiveScene>>,
 }
 
@@ -50,7 +52,7 @@ impl Session {
         let view = LiveView {
             scene,
             now: Arc::new(self.live_step(self.budget())),
-            calls: self.audience.calls.iter().cloned().collect(),
+            entries: self.audience.entries.iter().cloned().collect(),
             phases: self.reached(),
             result: self.result.clone(),
         };
@@ -85,13 +87,27 @@ impl Session {
     /// A call that has been answered.
     pub(super) fn show_call(&mut self, record: &Result<ToolCallRecord, OutputError>) {
         let Ok(record) = record else { return };
-        self.audience.calls_made += 1;
-        let call = Arc::new(LiveCall::new(self.audience.calls_made, record));
-        if self.audience.calls.len() == KEPT_CALLS {
-            self.audience.calls.pop_front();
+        self.audience.counted_calls += u32::from(record.message.counted);
+        let number = record.message.counted.then_some(self.audience.counted_calls);
+        self.show_entry(|entry| LiveEntry::of_call(entry, number, record));
+    }
+
+    pub(super) fn show_note(&mut self, note: &NoteMessage) {
+        let time_s = self.present.time_s;
+        self.show_entry(|entry| LiveEntry::of_note(entry, time_s, note));
+    }
+
+    fn show_entry(&mut self, made: impl FnOnce(u32) -> LiveEntry) {
+        if !self.shows_calls() {
+            return;
         }
-        self.audience.calls.push_back(Arc::new(call.without_pictures()));
-        self.audience.tell(|| LiveEvent::Call(call));
+        self.audience.told_entries += 1;
+        let entry = Arc::new(made(self.audience.told_entries));
+        if self.audience.entries.len() == KEPT_ENTRIES {
+            self.audience.entries.pop_front();
+        }
+        self.audience.entries.push_back(Arc::new(entry.without_pictures()));
+        self.audience.tell(|| LiveEvent::Entry(entry));
     }
 
     fn live_step(&self, budget: Budget) -> LiveStep {

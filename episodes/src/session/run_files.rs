@@ -15,7 +15,7 @@ use super::{Session, this_build};
 use crate::EpisodeError;
 use crate::observation::Observer;
 use crate::output::{OutputError, create_private_folder, write_whole};
-use crate::recording::{Recorder, RecorderThread, RecordingHeader, ToolCallRecord, Visibility};
+use crate::recording::{NoteMessage, Recorder, RecorderThread, RecordingHeader, ToolCallRecord, Visibility};
 use crate::reports::episode::{
     CELL_HEIGHT, CELL_WIDTH, CallCounts, EpisodePage, KeyMoment, LabelledPicture, PAGE_FILE, STRIP_FILE,
     strip,
@@ -97,13 +97,18 @@ impl RunFiles {
         }
     }
 
-    pub(super) fn tool_call(
-        &mut self,
-        name: &'static str,
-        ok: bool,
-        record: Result<ToolCallRecord, OutputError>,
-    ) {
+    /// Counts a call of this tool, and whether it was answered.
+    pub(super) fn count_call(&mut self, name: &'static str, ok: bool) {
         self.calls.count(name, ok);
+    }
+
+    pub(super) fn keep_note(&mut self, time_s: f64, note: NoteMessage) {
+        if let Some(recorder) = &self.recorder {
+            recorder.append(move |recorder| recorder.note(time_s, note));
+        }
+    }
+
+    pub(super) fn tool_call(&mut self, record: Result<ToolCallRecord, OutputError>) {
         let Some(recorder) = &self.recorder else { return };
         let pictures = record.as_ref().map_or(0, |record| record.pictures.len());
         recorder.append_pictures(pictures, move |recorder| recorder.tool_call(record?));

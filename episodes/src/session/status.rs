@@ -144,6 +144,7 @@ impl Session {
             extra_information_replies: self.shown.replies(),
             departures: self.spec().departures(),
             recording_failed: self.recording_failed().map(str::to_owned),
+            usage: (self.usage.notes > 0).then(|| self.usage.clone()),
         }
     }
 }

@@ -14,3 +14,4 @@ mod scenes;
 #[path = "../../../tests/src/skipped.rs"]
 mod skipped;
 mod told;
+mod transcripts;

@@ -14,7 +14,9 @@ use tandem_episodes::{
     CallReply, Clock, EpisodeError, EpisodeSpec, Facts, OperatorCall, OperatorCommand, RunFolder, Session,
     live::LiveView, monotonic,
 };
-use tandem_tools_spec::{Briefing, Call, EndReason, ManageReply, Protocol, ResultReply, ToolCall, ToolReply};
+use tandem_tools_spec::{
+    Briefing, Call, EndReason, ManageReply, Note, Protocol, ResultReply, ToolCall, ToolReply,
+};
 use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 
 use super::{
@@ -46,6 +48,16 @@ enum Job {
         commands: Vec<OperatorCommand>,
         reply: ReplySender<Vec<Answer>>,
     },
+    Note {
+        operator: Option<String>,
+        note: Box<Note>,
+        reply: ReplySender<()>,
+    },
+    /// Keeps a call that was refused on its way here; nobody waits for that.
+    Refused {
+        operator: Option<String>,
+        call: Box<RefusedCall>,
+    },
     Status {
         reply: ReplySender<Answer>,
     },
@@ -67,6 +79,30 @@ enum Job {
     Close {
         reply: ReplySender<ResultReply>,
     },
+}
+
+/// A call that was refused before it reached its episode, as it came.
+#[derive(Debug, Clone)]
+pub struct RefusedCall {
+    /// What may be a tool's name.
+    pub tool: String,
+    /// What may be JSON.
+    pub arguments: String,
+    /// Why it was refused.
+    pub problem: String,
+}
+
+impl RefusedCall {
+    /// A call that may yet be refused.
+    pub fn of(call: &Call) -> RefusedCall {
+        let arguments = serde_json::to_string(call).unwrap_or_default();
+        RefusedCall { tool: call.name().into(), arguments, problem: String::new() }
+    }
+
+    /// The call with why it was refused.
+    pub fn because(self, refusal: &impl ToString) -> RefusedCall {
+        RefusedCall { problem: refusal.to_string(), ..self }
+    }
 }
 
 type ReplySender<T> = oneshot::Sender<Result<T, HostingError>>;
@@ -203,6 +239,17 @@ impl EpisodeThread {
     pub async fn together(&self, commands: Vec<OperatorCommand>) -> Result<Vec<Answer>, HostingError> {
         // Callers wait for it already, so it waits for its turn.
         self.do_job_in_turn(|reply| Job::Together { commands, reply }).await
+    }
+
+    /// Keeps a note of the policy that directs all robots, or of the operator of one.
+    pub async fn note(&self, operator: Option<&str>, note: Note) -> Result<(), HostingError> {
+        let (operator, note) = (operator.map(str::to_owned), Box::new(note));
+        self.do_job(|reply| Job::Note { operator, note, reply }).await
+    }
+
+    /// Keeps a call that was refused before it came here. Nobody waits for that, and nobody is told where it cannot be kept.
+    pub fn refused(&self, operator: Option<&str>, call: RefusedCall) {
+        let _ = self.jobs.try_send(Job::Refused { operator: operator.map(str::to_owned), call: call.into() });
     }
 
     /// Where the episode stands, for those who look on: asking is no call of the policy's.
@@ -361,6 +408,17 @@ fn serve(mut session: PanicGuard, mut inbox: mpsc::Receiver<Job>, status: &Share
                 let answers = session.run(|session| together(session, commands));
                 status.update(&session);
                 let _ = reply.send(answers.flatten());
+            }
+            Job::Note { operator, note, reply } => {
+                let kept = session.run(|session| Ok(session.note(operator.as_deref(), *note)?));
+                status.update(&session);
+                let _ = reply.send(kept.flatten());
+            }
+            Job::Refused { operator, call } => {
+                let RefusedCall { tool, arguments, problem } = *call;
+                // The log has the reason of a failure.
+                let _ = session
+                    .run(|session| session.refused_before(operator.as_deref(), &tool, &arguments, &problem));
             }
             Job::Status { reply } => drop(reply.send(session.run(|session| standing(session)))),
             Job::Briefing { reply } => drop(reply.send(session.run(|session| session.briefing()))),

@@ -168,6 +168,32 @@ impl HostingError {
         }
     }
 
+    /// Whether operators' turns were in the way, so that the call has not reached the episode.
+    pub fn is_of_the_team(&self) -> bool {
+        match self {
+            HostingError::DoubleCommand { .. }
+            | HostingError::LateCommand { .. }
+            | HostingError::OperatorFinished { .. }
+            | HostingError::NoTalk
+            | HostingError::TooMuchSaid { .. }
+            | HostingError::Episode(EpisodeError::ForeignRobot { .. }) => true,
+            HostingError::Episode(_)
+            | HostingError::UnknownEpisode { .. }
+            | HostingError::TooManyEpisodes { .. }
+            | HostingError::TooManyWaiting { .. }
+            | HostingError::ShuttingDown
+            | HostingError::HeldAlready { .. }
+            | HostingError::EpisodeStopped
+            | HostingError::EpisodePanicked
+            | HostingError::NeedsOperator
+            | HostingError::HostsBusiness
+            | HostingError::KeyUsed
+            | HostingError::Token(_)
+            | HostingError::Shared(_)
+            | HostingError::Thread(_) => false,
+        }
+    }
+
     /// Whether the same request will be refused again.
     pub fn is_final(&self) -> bool {
         self.refusal().retry_after_s.is_none()

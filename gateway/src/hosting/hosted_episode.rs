@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use tandem_episodes::EpisodeError;
 use tandem_tools_spec::{
-    Briefing, Call, EPISODE_TOOLS, EpisodeEntry, ManageReply, Operators, ResultReply, SpecError, StatusReply,
-    TalkCall, ToolCall, ToolReply,
+    Briefing, Call, EPISODE_TOOLS, EpisodeEntry, ManageReply, Note, Operators, ResultReply, SpecError,
+    StatusReply, TalkCall, ToolCall, ToolReply,
 };
 
 use super::{
-    Answer, EpisodeThread, HostingError,
+    Answer, EpisodeThread, HostingError, RefusedCall,
     idempotency_cache::{IdempotencyCache, IdempotentReply},
     team::Team,
 };
@@ -26,6 +26,16 @@ pub enum Caller {
         /// The robot, as "A".
         robot: String,
     },
+}
+
+impl Caller {
+    /// The robot that it drives alone.
+    pub fn robot(&self) -> Option<&str> {
+        match self {
+            Caller::Host => None,
+            Caller::Operator { robot, .. } => Some(robot),
+        }
+    }
 }
 
 /// An episode that a server holds.
@@ -72,6 +82,17 @@ impl HostedEpisode {
         let lasting = |made: &SharedAnswer| made.as_ref().map_or_else(|error| error.is_final(), |_| true);
         let IdempotentReply { reply, replayed } = self.replies.once(&key, call, work, lasting).await?;
         Ok(IdempotentReply { reply: reply.map_err(HostingError::Shared)?, replayed })
+    }
+
+    /// Keeps a note of who started the episode, or of an operator.
+    pub async fn note(&self, who: &Caller, note: Note) -> Result<(), HostingError> {
+        self.admit(who)?;
+        self.thread.note(who.robot(), note).await
+    }
+
+    /// Keeps a call of `who` that was refused before it reached the episode.
+    pub fn refused(&self, who: &Caller, call: RefusedCall) {
+        self.thread.refused(who.robot(), call);
     }
 
     /// Where the episode stands, for who looks on: asking is no call.
@@ -163,7 +184,16 @@ impl HostedEpisode {
 
     async fn answer(self, robot: Option<String>, call: Call) -> Result<Answer, HostingError> {
         match (self.team, robot, &call.tool) {
-            (Some(team), Some(robot), _) => team.call(&self.thread, &robot, call).await,
+            (Some(team), Some(robot), _) => {
+                let asked = RefusedCall::of(&call);
+                let answer = team.call(&self.thread, &robot, call).await;
+                if let Err(refusal) = &answer
+                    && refusal.is_of_the_team()
+                {
+                    self.thread.refused(Some(&robot), asked.because(refusal));
+                }
+                answer
+            }
             (_, _, ToolCall::Talk(_)) => Err(HostingError::NoTalk),
             (_, _, ToolCall::Look(_) | ToolCall::Act(_) | ToolCall::Plan(_) | ToolCall::Manage(_)) => {
                 self.thread.ask(None, call).await

@@ -10,7 +10,7 @@ use std::{
 
 use mcap::read::{MessageStream, Options};
 use serde_json::json;
-use tandem_episodes::Recording;
+use tandem_episodes::{Recording, TranscriptEntry};
 
 use crate::{Delays, Server, partials};
 
@@ -38,6 +38,35 @@ fn a_killed_server_leaves_every_step_that_a_policy_was_told_of_a_second_ago() {
         assert!(steps.last() >= Some(&told_steps), "told of {told_steps}, recorded {:?}", steps.last());
         assert_eq!(recording.result, None);
     }
+}
+
+#[test]
+fn what_was_noted_outlives_the_server() {
+    let runs = tempfile::tempdir().expect("a temporary folder");
+    let server = Server::start(runs.path());
+    let start = json!({ "task": "handover", "seed": 0, "protocol": "agentic" });
+    let started = server.post("/v1/episodes", &start).expect("an episode");
+    let id = started["episode_id"].as_str().expect("an id");
+    // A note is answered without a body.
+    assert_eq!(server.post(&format!("/v1/episodes/{id}/notes"), &json!({ "text": "I wait first." })), None);
+    server.tool(id, "wait", &json!({ "steps": 5 }));
+    server.tool(id, "wait", &json!({ "steps": "many" }));
+    thread::sleep(Duration::from_secs(1));
+    Command::new("kill").args(["-KILL", &server.id().to_string()]).status().expect("kill");
+    let [partial] = &partials(runs.path())[..] else { panic!("no recording") };
+    let recovered = Command::new(env!("CARGO_BIN_EXE_tandem")).arg("recover").arg(partial).output();
+    assert!(recovered.expect("tandem recover").status.success());
+    let recording = Recording::read(&partial.with_extension("")).expect("a whole recording");
+    let told = recording.transcript().expect("its transcript");
+    let [
+        TranscriptEntry::Note { note, .. },
+        TranscriptEntry::Call { .. },
+        TranscriptEntry::Call { call, .. },
+    ] = &told[..]
+    else {
+        panic!("{told:?}");
+    };
+    assert_eq!((note.text.as_str(), call.counted, call.ok), ("I wait first.", false, false));
 }
 
 /// Plays until the server is killed, `delay` after the episode began. Returns the control steps that answers had told of a

@@ -1,13 +1,14 @@
 // The page of one episode, running or finished.
 
-import { Calls } from "./calls.js";
 import { badge } from "./cards.js";
 import { ask, element, say, words } from "./dom.js";
 import { Frame, readScene } from "./message.js";
-import { Plots } from "./plots.js";
+import { BudgetPlots, Plots } from "./plots.js";
 import { Stage } from "./stage.js";
+import { Story } from "./story.js";
 import { Targets } from "./targets.js";
 import { LiveTime, RecordedTime } from "./time.js";
+import { Timeline } from "./timeline.js";
 
 const PLOTS_EVERY_MS = 250;
 const CAMERAS_EVERY_MS = 1000;
@@ -32,11 +33,16 @@ class EpisodePage {
     this.time = this.recorded ? new RecordedTime(frames, wanted.at) : new LiveTime(frames[0]);
     this.targets = this.recorded ? new Targets(scene) : null;
     this.plots = new Plots(head, this.targets);
-    this.calls = new Calls(head, this.recorded ? (time) => this.time.seek(time) : null);
+    this.story = new Story(head, this.recorded ? {
+      seek: (time) => { this.time.play(false); this.time.seek(time); },
+      picture: (robot, time) => this.cameraPath(robot, time),
+    } : null);
+    this.timeline = this.recorded ? new Timeline(head, this.time) : null;
+    this.budget = this.recorded ? new BudgetPlots(head, frames) : null;
     this.layOut(main);
     this.stage = new Stage(this.view, scene);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { this.stage.paint(); this.plotsDue = true; });
-    for (const call of head.calls) this.calls.add(call);
+    for (const entry of head.story) this.story.add(entry);
     for (const frame of frames) this.plots.add(frame);
     this.plotsDue = true;
     this.showPhases();
@@ -81,11 +87,14 @@ class EpisodePage {
         element("section", { class: "stage", "aria-label": "The episode in three dimensions" },
           this.tools(), this.view, this.recorded ? this.scrubber() : null, this.key()),
         element("section", { class: "side", "aria-label": "How it stands" },
-          this.facts, element("h2", {}, "Phases"), this.phases,
-          element("h2", {}, element("label", { for: "look" }, this.look, " What the robots see")), this.cameras,
-          this.recorded ? this.files() : null)),
+          this.facts, this.recorded ? null : element("h2", {}, "Phases"), this.recorded ? null : this.phases,
+          this.recorded ? element("h2", {}, "What happened") : null, this.recorded ? this.story.node : null,
+          element("h2", {}, this.recorded ? "What the robots saw" : element("label", { for: "look" }, this.look, " What the robots see")),
+          this.recorded ? element("p", { class: "soft" }, element("label", { for: "look" }, this.look, " drawn at this moment, whether the policy looked or not")) : null,
+          this.cameras)),
+      this.recorded ? element("section", {}, element("h2", {}, "Budget"), this.budget.node) : null,
       element("section", {}, element("h2", {}, "Hands and joints"), this.plots.node),
-      element("section", {}, element("h2", {}, "Calls, the latest first"), this.calls.node));
+      this.recorded ? this.files() : element("section", {}, element("h2", {}, "Calls and notes, the latest first"), this.story.node));
   }
 
   /** Who looks, and what is shown beside the scene. */
@@ -115,16 +124,8 @@ class EpisodePage {
   scrubber() {
     const { time } = this;
     this.play = element("button", { onclick: () => this.toggle() }, "Play");
-    this.slider = element("input", {
-      type: "range", min: time.begin, max: time.end, step: 0.02, "aria-label": "Moment",
-      oninput: (event) => { time.play(false); time.seek(Number(event.target.value)); },
-    });
+    const step = (way, text, title) => element("button", { title, "aria-label": title, onclick: () => this.timeline.step(way) }, text);
     this.moment = element("output");
-    const marks = element("div", { class: "marks" }, ...[...this.reached].map(([number, at]) => {
-      const mark = element("button", { title: `${number} reached at ${at.toFixed(2)} s`, onclick: () => time.seek(at) }, number);
-      mark.style.left = `${(100 * (at - time.begin)) / (time.end - time.begin)}%`;
-      return mark;
-    }));
     const speed = element("select", { "aria-label": "Speed", onchange: (event) => { time.speed = Number(event.target.value); } },
       ...[0.25, 1, 4, 10].map((factor) => element("option", { value: factor, selected: factor === 1 }, `${factor}x`)));
     addEventListener("keydown", (event) => {
@@ -132,10 +133,14 @@ class EpisodePage {
       if (event.key === " ") this.toggle();
       else if (event.key === "ArrowLeft") time.seek(time.time - 0.1);
       else if (event.key === "ArrowRight") time.seek(time.time + 0.1);
+      else if (event.key === "p") this.timeline.step(-1);
+      else if (event.key === "n") this.timeline.step(1);
       else return;
       event.preventDefault();
     });
-    return element("div", { class: "scrubber" }, this.play, element("div", { class: "track" }, this.slider, marks), speed, this.moment);
+    return element("div", { class: "scrubber" },
+      element("div", { class: "tools" }, step(-1, "◀", "The call before"), this.play, step(1, "▶", "The next call"), speed, this.moment),
+      this.timeline.node);
   }
 
   toggle() {
@@ -154,7 +159,7 @@ class EpisodePage {
       film.replaceChildren(image);
     } }, "Show its film");
     const links = [["episode.mcap", "recording"], ["result.json", "result"], ["strip.png", "strip"], ["report.html", "report"]];
-    return element("div", {}, element("h2", {}, "Film and files"), show, film,
+    return element("section", {}, element("h2", {}, "Film and files"), show, film,
       element("p", {}, ...links.flatMap(([file, text], index) =>
         [index ? ", " : "", element("a", { href: at + file, download: file === "episode.mcap" ? file : null }, text)])),
       element("img", { src: `${at}strip.png`, alt: "Key moments", loading: "lazy" }));
@@ -185,7 +190,7 @@ class EpisodePage {
   }
 
   told(event) {
-    if (event.kind === "call") this.calls.add(event);
+    if (event.kind === "call" || event.kind === "note") this.story.add(event);
     if (event.kind === "phase") {
       this.reached.set(event.phase.number, event.phase.time_s);
       this.showPhases();
@@ -199,7 +204,7 @@ class EpisodePage {
   shown(data) {
     const row = new Float32Array(data.slice(0, data.byteLength - (data.byteLength % 4)));
     if (row[0] === 2) {
-      this.calls.picture(row[1], row[2], data.slice(12));
+      this.story.picture(row[1], row[2], data.slice(12));
       return;
     }
     const frame = new Frame(row, this.scene.layout);
@@ -219,7 +224,8 @@ class EpisodePage {
       if (this.recorded) this.plotsDue = true;
     }
     if (this.recorded) {
-      if (document.activeElement !== this.slider || this.time.playing) this.slider.value = this.time.time;
+      this.timeline.show();
+      this.story.follow(this.time.time);
       say(this.moment, `${this.time.time.toFixed(2)} of ${this.time.end.toFixed(1)} s`);
       say(this.play, this.time.playing ? "Pause" : "Play");
     }
@@ -230,29 +236,43 @@ class EpisodePage {
     if (!this.plotsDue || document.hidden) return;
     this.plotsDue = false;
     this.plots.draw(this.recorded ? this.time.time : null, [...this.reached.values()]);
+    this.budget?.draw(this.time.time, [...this.reached.values()]);
+  }
+
+  cameraPath(robot, time) {
+    return `/watch/camera?${this.query}&robot=${encodeURIComponent(robot)}&time_s=${time}`;
+  }
+
+  /** Which pictures are wanted: of a finished episode those that the policy was shown last, unless its reader wants all of this moment. */
+  wantedPictures() {
+    const { time } = this.time;
+    const at = (name, moment, told) => ({ name, told, moment: moment.toFixed(2) });
+    if (this.look.checked) return this.head.robots.map(({ name }) => at(name, time, ""));
+    if (!this.recorded) return [];
+    return this.head.robots.flatMap(({ name }) => {
+      const look = this.head.story.findLast((entry) => entry.time_s <= time + 1e-6 && entry.seen?.includes(name));
+      return look ? [at(name, look.time_s, `, call ${look.number} at ${look.time_s.toFixed(1)} s`)] : [];
+    });
   }
 
   /** True pictures, drawn by the server as the robots see them. */
   async drawCameras() {
-    if (!this.look.checked) {
-      this.cameras.replaceChildren();
-      this.pictured = null;
-      return;
-    }
-    const time = this.time.time.toFixed(2);
-    if (document.hidden || this.closed || this.drawing || this.pictured === time) return;
+    const wanted = this.wantedPictures();
+    const key = JSON.stringify(wanted);
+    if (document.hidden || this.closed || this.drawing || this.pictured === key) return;
     this.drawing = true;
-    this.pictured = time;
-    const pictures = this.head.robots.map(async ({ name }) => {
-      const answer = await ask(`/watch/camera?${this.query}&robot=${encodeURIComponent(name)}&time_s=${time}`);
+    this.pictured = key;
+    const pictures = wanted.map(async ({ name, told, moment }) => {
+      const answer = await ask(this.cameraPath(name, moment));
       const image = element("img", { alt: `What robot ${name} sees` });
       image.src = URL.createObjectURL(await answer.blob());
       await image.decode();
       URL.revokeObjectURL(image.src);
-      return element("figure", {}, image, element("figcaption", {}, name));
+      return element("figure", {}, image, element("figcaption", {}, `${name}${told}`));
     });
     try {
       this.cameras.replaceChildren(...await Promise.all(pictures));
+      if (!wanted.length && this.recorded) this.cameras.append(element("p", { class: "soft" }, "The policy has not looked yet."));
     } catch (error) {
       this.cameras.replaceChildren(element("p", { class: "bad" }, error.message));
     }
@@ -273,11 +293,24 @@ class EpisodePage {
     const left = this.recorded ? this.head.episode_steps - frame.step : frame.stepsLeft;
     if (left >= 0) facts.push(["steps left", `${Math.round(left)}`]);
     if (frame.clockLeft >= 0) facts.push(["to think", `${frame.clockLeft.toFixed(0)} s`]);
+    if (this.recorded) facts.push(...this.soFar());
     this.head.robots.forEach(({ name }, index) => frame.fallen(index) && facts.push([`robot ${name}`, "has fallen"]));
     const text = facts.join();
     if (text === this.factsText) return;
     this.factsText = text;
     this.facts.replaceChildren(...facts.map(([name, value]) => element("div", {}, element("dt", {}, name), element("dd", {}, value))));
+  }
+
+  /** What has been used up to the moment that is shown. */
+  soFar() {
+    const told = this.head.story.filter((entry) => entry.time_s <= this.time.time + 1e-6);
+    const calls = told.filter(({ kind, number }) => kind === "call" && number !== null).length;
+    const facts = [["calls", `${calls}`], ["thought", `${(told.at(-1)?.thought_s ?? 0).toFixed(0)} s`]];
+    const sum = (of) => told.reduce((total, { note }) => total + ((note && of(note)) ?? 0), 0);
+    const [tokens, usd] = [sum((note) => (note.input_tokens ?? 0) + (note.output_tokens ?? 0)), sum((note) => note.usd)];
+    if (tokens) facts.push(["tokens", tokens < 1e5 ? `${tokens}` : `${(tokens / 1000).toFixed(0)}k`]);
+    if (usd) facts.push(["price", `$${usd.toFixed(2)}`]);
+    return facts;
   }
 
   showEnd() {

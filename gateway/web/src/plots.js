@@ -1,4 +1,4 @@
-// Small plots over simulated time: one line for each robot and side.
+// Small plots over simulated time: of hands and joints, one line for each robot and side; of the budget, one line each.
 
 import { colour, element, robotColour, words } from "./dom.js";
 import { SIDES } from "./message.js";
@@ -64,46 +64,100 @@ export class Plots {
   }
 
   drawOne({ canvas, series, least, now, unit }, begin, end, cursor, marks) {
-    const width = canvas.clientWidth;
-    if (!width) return;
-    const scale = Math.min(devicePixelRatio, 2);
-    canvas.width = width * scale;
-    canvas.height = HEIGHT * scale;
-    const context = canvas.getContext("2d");
-    context.scale(scale, scale);
-    const first = this.times.findIndex((time) => time >= begin);
-    const lines = series.flat();
-    let most = least;
-    for (const line of lines) for (let i = first; i < line.length; i += 1) most = Math.max(most, line[i]);
-    const x = (time) => ((time - begin) / (end - begin)) * (width - 34);
-    const y = (value) => HEIGHT - 4 - (value / most) * (HEIGHT - 12);
-    context.fillStyle = context.strokeStyle = colour("--line");
-    for (const time of marks) context.fillRect(x(time), 0, 1, HEIGHT);
-    context.fillRect(0, y(0), width - 34, 1);
-    context.fillRect(0, y(most), width - 34, 1);
-    context.fillStyle = colour("--soft");
-    context.font = "11px system-ui, sans-serif";
-    context.fillText(most.toFixed(0), width - 30, y(most) + 9);
-    context.fillText("0", width - 30, y(0) + 1);
-    lines.forEach((line, index) => {
-      context.beginPath();
-      context.setLineDash(index % 2 ? [4, 3] : []);
-      context.strokeStyle = robotColour(Math.floor(index / 2));
-      context.lineWidth = 1.5;
-      // No more points than there are places for them.
-      const stride = Math.max(1, Math.floor((line.length - first) / width));
-      for (let i = first; i < line.length; i += stride) context.lineTo(x(this.times[i]), y(line[i]));
-      context.stroke();
-    });
-    context.setLineDash([]);
-    if (cursor !== null) {
-      context.fillStyle = colour("--ink");
-      context.fillRect(x(cursor), 0, 1.5, HEIGHT);
-    }
+    const first = Math.max(0, this.times.findIndex((time) => time >= begin));
+    const lines = series.flat().map((values, index) => ({ times: this.times, values, first, stroke: robotColour(Math.floor(index / 2)), dash: index % 2 ? [4, 3] : [] }));
+    drawLines(canvas, lines, { begin, end, least, cursor, marks });
     const at = cursor === null ? this.times.length - 1 : Math.max(0, this.times.findIndex((time) => time >= cursor));
     const values = series.map((sides, robot) => `${this.head.robots[robot].name} ${sides.map((line) => line[at]?.toFixed(0)).join(" / ")}`);
     now.textContent = values.join(", ");
     canvas.setAttribute("aria-label", `${words(unit)}: ${now.textContent}`);
+  }
+}
+
+/**
+ * What an episode has taken up to each moment, of a finished one: each plot a number that grows or shrinks with calls and notes.
+ */
+export class BudgetPlots {
+  /** @param {import("./message.js").Frame[]} frames */
+  constructor(head, frames) {
+    const end = frames.at(-1).time;
+    this.span = [frames[0].time, end];
+    const steps = head.episode_steps;
+    const budget = frames.map((frame) => [frame.time, 100 * Math.max(0, 1 - frame.step / steps)]);
+    const known = [
+      { name: "Steps left", unit: "%", least: 100, points: budget },
+      { name: "Calls", unit: "so far", least: 5, points: sums(head.story, (entry) => (entry.kind === "call" && entry.number !== null ? 1 : 0)) },
+      { name: "Thinking", unit: "s so far", least: 1, points: head.story.map((entry) => [entry.time_s, entry.thought_s]) },
+      { name: "Tokens", unit: "thousands so far", least: 1, digits: 1, points: sums(head.story, ({ note }) => ((note?.input_tokens ?? 0) + (note?.output_tokens ?? 0)) / 1000) },
+      { name: "Price", unit: "$ so far", least: 0.01, digits: 3, points: sums(head.story, ({ note }) => note?.usd ?? 0) },
+    ];
+    if (head.thinking_s) {
+      const left = head.story.map((entry) => [entry.time_s, 100 * Math.max(0, 1 - entry.thought_s / head.thinking_s)]);
+      known.splice(1, 0, { name: "Time to think left", unit: "%", least: 100, points: [[this.span[0], 100], ...left] });
+    }
+    this.plots = known.filter(({ points }) => points.some(([, value]) => value > 0)).map((plot) => {
+      const canvas = element("canvas", { height: HEIGHT, role: "img", "aria-label": plot.name });
+      return { ...plot, canvas, now: element("span", { class: "soft" }) };
+    });
+    this.node = element("div", { class: "plots" }, ...this.plots.map(({ name, unit, canvas, now }) =>
+      element("figure", {}, element("figcaption", {}, element("b", {}, name), ` [${unit}] `, now), canvas)));
+  }
+
+  draw(cursor, marks) {
+    const [begin, end] = this.span;
+    for (const { canvas, now, name, points, least, digits } of this.plots) {
+      // Between two moments nothing is taken, so each value holds until the next.
+      const held = points.flatMap(([time, value], index) => (index ? [[time, points[index - 1][1]], [time, value]] : [[time, value]]));
+      if (held.length) held.push([end, held.at(-1)[1]]);
+      const line = { times: held.map(([time]) => time), values: held.map(([, value]) => value), first: 0, stroke: colour("--accent"), dash: [] };
+      drawLines(canvas, [line], { begin, end: Math.max(end, begin + 1), least, cursor, marks });
+      const last = points.findLast(([time]) => time <= cursor + 1e-6);
+      now.textContent = last ? last[1].toFixed(digits ?? 0) : "";
+      canvas.setAttribute("aria-label", `${name}: ${now.textContent}`);
+    }
+  }
+}
+
+/** Sums over the entries so far. */
+function sums(story, of) {
+  let sum = 0;
+  return story.map((entry) => [entry.time_s, sum += of(entry)]);
+}
+
+function drawLines(canvas, lines, { begin, end, least, cursor, marks }) {
+  const width = canvas.clientWidth;
+  if (!width) return;
+  const scale = Math.min(devicePixelRatio, 2);
+  canvas.width = width * scale;
+  canvas.height = HEIGHT * scale;
+  const context = canvas.getContext("2d");
+  context.scale(scale, scale);
+  let most = least;
+  for (const { values, first } of lines) for (let i = first; i < values.length; i += 1) most = Math.max(most, values[i]);
+  const x = (time) => ((time - begin) / (end - begin)) * (width - 34);
+  const y = (value) => HEIGHT - 4 - (value / most) * (HEIGHT - 12);
+  context.fillStyle = context.strokeStyle = colour("--line");
+  for (const time of marks) context.fillRect(x(time), 0, 1, HEIGHT);
+  context.fillRect(0, y(0), width - 34, 1);
+  context.fillRect(0, y(most), width - 34, 1);
+  context.fillStyle = colour("--soft");
+  context.font = "11px system-ui, sans-serif";
+  context.fillText(most < 1 ? most.toFixed(2) : most.toFixed(0), width - 30, y(most) + 9);
+  context.fillText("0", width - 30, y(0) + 1);
+  for (const { times, values, first, stroke, dash } of lines) {
+    context.beginPath();
+    context.setLineDash(dash);
+    context.strokeStyle = stroke;
+    context.lineWidth = 1.5;
+    // No more points than there are places for them.
+    const stride = Math.max(1, Math.floor((values.length - first) / width));
+    for (let i = first; i < values.length; i += stride) context.lineTo(x(times[i]), y(values[i]));
+    context.stroke();
+  }
+  context.setLineDash([]);
+  if (cursor !== null) {
+    context.fillStyle = colour("--ink");
+    context.fillRect(x(cursor), 0, 1.5, HEIGHT);
   }
 }
 

@@ -10,7 +10,7 @@ export class Targets {
     /** By robot and side: targets in order, with the times between which they hold. */
     this.known = head.robots.map(() => SIDES.map(() => []));
     let begin = 0;
-    for (const call of head.calls) {
+    for (const call of head.story) {
       const reply = call.ok && call.tool === "move_wrists" ? JSON.parse(call.reply) : null;
       for (const told of reply?.robots ?? []) {
         const robot = head.robots.findIndex(({ name }) => name === told.robot);

@@ -193,7 +193,9 @@ fn a_finished_episode_can_be_looked_at_again() {
     assert_eq!((&head["frames"], &head["result"]["env_steps"]), (&json!(3), &json!(10)));
     let length = frames.len() / 3;
     assert_eq!([0, 1, 2].map(|frame| frames[frame * length + 1]), [0.0, 5.0, 10.0]);
-    assert_eq!(head["calls"].as_array().map(Vec::len), Some(3));
+    let story = head["story"].as_array().expect("what happened");
+    assert_eq!(story.len(), 3);
+    assert_eq!((&story[2]["number"], &story[2]["seen"]), (&json!(3), &json!(["B"])));
     let again = get(&server, &format!("/watch/camera?run={id}&robot=B&time_s=0.2"));
     assert!(again == seen && again.0 == 200, "the robot's picture is the same, live and drawn again");
     let (status, film) = get(&server, &format!("/watch/film?run={id}"));

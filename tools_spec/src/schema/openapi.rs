@@ -3,11 +3,11 @@
 use serde_json::{Map, Value, json};
 
 use super::format::Format;
-use super::plain::plain_schema;
+use super::plain::{body_schema, plain_schema};
 use super::spec::ToolSpec;
 use crate::limits::MOST_STEPS;
 use crate::listing::EpisodeList;
-use crate::parts::{Heard, Partner};
+use crate::parts::{Heard, Hints, Note, Partner, Wording};
 use crate::refusal::ProblemBody;
 use crate::tool::Tool;
 use crate::tools::{Briefing, Finish, GetStatus, StartEpisode};
@@ -40,6 +40,10 @@ pub fn openapi(version: &str, tools: &[ToolSpec]) -> Value {
             "delete": operation("delete_episode", "End the episode, close its recording and forget it.", "200", result),
         }),
     );
+    paths.insert(
+        "/v1/episodes/{episode_id}/notes".into(),
+        json!({ "parameters": [episode_id()], "post": note() }),
+    );
     json!({
         "openapi": "3.1.0",
         "info": { "title": "Tandem", "version": version },
@@ -57,6 +61,16 @@ fn tool(spec: &ToolSpec) -> Value {
         call["requestBody"] = json_body(spec.body_schema(MOST_STEPS));
     }
     call
+}
+
+/// Answered without a body.
+fn note() -> Value {
+    let schema = body_schema::<Note>(Wording::from(Hints::On));
+    let description = schema["description"].as_str().unwrap_or_default().to_owned();
+    let mut note = operation("note", &description, "204", Value::Null);
+    note["responses"]["204"] = json!({ "description": "Kept." });
+    note["requestBody"] = json_body(schema);
+    note
 }
 
 fn paths_without_tools() -> Map<String, Value> {

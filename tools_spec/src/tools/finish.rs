@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::Error as _};
 use serde_json::{Map, Value};
 
-use crate::parts::{Assistance, Disclosure, Protocol};
+use crate::parts::{Assistance, Disclosure, Protocol, Usage};
 use crate::tool::Tool;
 
 /// End the episode and get its result. Call it when the task is done or cannot be done any more. After that no
@@ -87,6 +87,9 @@ pub struct ResultReply {
     /// Why the recording is not complete; left out where it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording_failed: Option<String>,
+    /// What notes on the episode say that was used; left out where there are none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub usage: Option<Usage>,
 }
 
 impl ResultReply {

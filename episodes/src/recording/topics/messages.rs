@@ -294,6 +294,33 @@ impl<'a> CallerRecord<'a> {
     }
 }
 
+/// When something was asked or said in an episode.
+#[derive(Clone, Copy, Debug)]
+pub struct CallMoment {
+    pub time_s: f64,
+    /// How many control steps had been made.
+    pub control_step: u64,
+    /// How long the policy had thought by then since the episode began.
+    pub thought: Duration,
+}
+
+impl CallMoment {
+    pub fn thought_ns(&self) -> u64 {
+        u64::try_from(self.thought.as_nanos()).unwrap_or(u64::MAX)
+    }
+}
+
+/// The longest arguments that are kept of a call which was refused before it reached the episode: a caller may send anything.
+const MOST_UNREAD_BYTES: usize = 10_000;
+/// The same of a tool's name that may be none.
+const MOST_NAME_BYTES: usize = 100;
+
+/// The beginning of a text that is too long.
+fn beginning(text: &str, most_bytes: usize) -> Option<&str> {
+    let cut = (text.len() > most_bytes).then(|| text.floor_char_boundary(most_bytes))?;
+    Some(&text[..cut])
+}
+
 /// A tool call as it is recorded: the call with its answer, and the pictures of that, which have topics of their own.
 pub struct ToolCallRecord {
     /// When it was answered.
@@ -304,31 +331,83 @@ pub struct ToolCallRecord {
 }
 
 impl ToolCallRecord {
-    /// What was called by whom, and how it came out; the policy has `thought` since the episode began, up to this call.
+    /// What was called by whom, and how it came out.
     pub fn new(
-        time_s: f64,
-        thought: Duration,
+        at: CallMoment,
         caller: CallerRecord,
         called: &Called,
         outcome: CallOutcome,
     ) -> Result<ToolCallRecord, OutputError> {
+        let pictures = outcome.pictures();
+        let shown = |(robot, picture): &(String, Arc<Picture>)| ShownPicture {
+            robot: robot.clone(),
+            width: picture.width,
+            height: picture.height,
+        };
         let message = ToolCallMessage {
             tool: called.name().into(),
-            thought_ns: u64::try_from(thought.as_nanos()).unwrap_or(u64::MAX),
+            control_step: at.control_step,
+            thought_ns: at.thought_ns(),
             arguments: called.arguments()?,
             operator: caller.operator().map(str::to_owned),
             shown: caller.shown().map(|shown| shown.iter().map(|what| what.name().into()).collect()),
+            counted: true,
             ok: outcome.is_ok(),
             reply: outcome.text()?,
+            pictures: pictures.iter().map(shown).collect(),
         };
-        Ok(ToolCallRecord { time_s, message, pictures: outcome.pictures() })
+        Ok(ToolCallRecord { time_s: at.time_s, message, pictures })
+    }
+
+    /// What is no call of the episode: refused before it got there, with arguments as they came, or a plan.
+    pub fn beside(
+        at: CallMoment,
+        caller: CallerRecord,
+        tool: &str,
+        arguments: &str,
+        outcome: Result<&str, &str>,
+    ) -> Result<ToolCallRecord, OutputError> {
+        let is_json = serde_json::from_str::<serde::de::IgnoredAny>(arguments).is_ok();
+        let arguments = match beginning(arguments, MOST_UNREAD_BYTES) {
+            Some(beginning) => serde_json::to_string(&format!("{beginning}... ({} bytes)", arguments.len()))?,
+            None if is_json => arguments.to_owned(),
+            None => serde_json::to_string(arguments)?,
+        };
+        let message = ToolCallMessage {
+            tool: beginning(tool, MOST_NAME_BYTES).unwrap_or(tool).into(),
+            control_step: at.control_step,
+            thought_ns: at.thought_ns(),
+            arguments,
+            operator: caller.operator().map(str::to_owned),
+            shown: None,
+            counted: false,
+            ok: outcome.is_ok(),
+            reply: outcome.unwrap_or_else(|problem| problem).into(),
+            pictures: Vec::new(),
+        };
+        Ok(ToolCallRecord { time_s: at.time_s, message, pictures: Vec::new() })
     }
 }
 
+/// A picture that a call showed: what the robot's camera saw after this many control steps, which its topic has.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ShownPicture {
+    pub robot: String,
+    pub width: u32,
+    pub height: u32,
+}
+
+fn counted() -> bool {
+    true
+}
+
 /// A tool call and its answer. Arguments and reply are JSON texts, since every tool has others.
-#[derive(Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ToolCallMessage {
     pub tool: String,
+    /// How many control steps had been made when it was answered.
+    #[serde(default)]
+    pub control_step: u64,
     /// How long the policy has thought since the episode began, this call's own thinking included.
     pub thought_ns: u64,
     pub arguments: String,
@@ -341,9 +420,16 @@ pub struct ToolCallMessage {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Vec<String>")]
     pub shown: Option<Vec<String>>,
+    /// Whether it is a call of the episode, which counts and which a replay makes again. What was refused before it reached the
+    /// episode is none, and neither is a plan, which stands behind its commands.
+    #[serde(default = "counted")]
+    pub counted: bool,
     pub ok: bool,
     /// The reply without pictures, or the text of the problem.
     pub reply: String,
+    /// What it showed, one for each robot.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pictures: Vec<ShownPicture>,
 }
 
 impl JsonMessage for ToolCallMessage {

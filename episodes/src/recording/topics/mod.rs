@@ -1,6 +1,7 @@
 //! What each topic of a recording holds.
 
 pub mod messages;
+pub mod notes;
 pub mod robot;
 pub mod scene;
 pub mod transforms;
@@ -9,3 +10,4 @@ pub mod transforms;
 pub const STEPS: &str = "/steps";
 pub const PHASES: &str = "/phases";
 pub const TOOL_CALLS: &str = "/tool_calls";
+pub const NOTES: &str = "/notes";

@@ -36,6 +36,7 @@ fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Played
             extra_information_replies: Default::default(),
             departures: vec![],
             recording_failed: None,
+            usage: None,
         },
         thought_s: f64::from(seed),
         note: None,

@@ -10,6 +10,7 @@ use tandem_tools_spec::{
 use super::Session;
 use crate::EpisodeError;
 use crate::commands::{Called, Command};
+use crate::output::OutputError;
 use crate::recording::CallerRecord;
 
 /// What has been carried out of a plan.
@@ -33,10 +34,34 @@ impl Session {
             self.refuse(caller, &Called::One(Call::from(call)), &refusal);
             return Err(refusal);
         }
-        match plan {
+        self.planning = true;
+        let reply = match plan {
             PlanCall::SendPlan(plan) => self.carry_out_commands(caller, plan),
             PlanCall::WalkTo(walk) => self.walk_to(caller, walk),
+        };
+        self.planning = false;
+        self.tell_plan(caller, &call, &reply)?;
+        if self.ended.is_some() {
+            self.settle();
         }
+        reply
+    }
+
+    /// Tells the plan behind its commands, for who reads what was asked.
+    fn tell_plan(
+        &mut self,
+        caller: CallerRecord,
+        call: &ToolCall,
+        reply: &Result<PlanReply, EpisodeError>,
+    ) -> Result<(), EpisodeError> {
+        let arguments = serde_json::to_string(call).map_err(OutputError::from)?;
+        let told = match reply {
+            Ok(reply) => Ok(serde_json::to_string(reply).map_err(OutputError::from)?),
+            Err(refusal) => Err(refusal.to_string()),
+        };
+        let told = told.as_deref().map_err(String::as_str);
+        self.tell_beside(caller.operator(), call.name(), &arguments, told);
+        Ok(())
     }
 
     fn check_commands(&self, plan: &SendPlan) -> Result<(), EpisodeError> {

@@ -258,6 +258,9 @@ class ResultReply:
     recording_failed: str | None
     """Why the recording is not complete; left out where it is."""
 
+    usage: Usage | None
+    """What notes on the episode say that was used; left out where there are none."""
+
     @staticmethod
     def of(value: Mapping[str, Any]) -> ResultReply:
         """Reads what JSON has."""
@@ -278,6 +281,7 @@ class ResultReply:
             extra_information_replies=value.get("extra_information_replies", {}),
             departures=tuple(value.get("departures", ())),
             recording_failed=value.get("recording_failed"),
+            usage=None if (got := value.get("usage")) is None else Usage.of(got),
         )
 
 
@@ -448,4 +452,43 @@ class Surface:
             extent_m=tuple(value["extent_m"]),
             corners_m=tuple(tuple(item) for item in value["corners_m"]),
             cut_off=value["cut_off"],
+        )
+
+
+@dataclass(frozen=True)
+class Usage:
+    """What all notes of an episode say that was used, added up."""
+
+    notes: int
+    """How many notes there are."""
+
+    input_tokens: int
+    """Tokens that models read, those from a cache included."""
+
+    output_tokens: int
+    """Tokens that models wrote."""
+
+    cached_tokens: int
+    """Of those that they read, how many came from a cache."""
+
+    usd: float | None
+    """What it cost in US dollars; left out where no note says it."""
+
+    model_s: float | None
+    """How long models took, in seconds; left out where no note says it."""
+
+    models: tuple[str, ...]
+    """The models that notes name."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> Usage:
+        """Reads what JSON has."""
+        return Usage(
+            notes=value["notes"],
+            input_tokens=value["input_tokens"],
+            output_tokens=value["output_tokens"],
+            cached_tokens=value["cached_tokens"],
+            usd=value.get("usd"),
+            model_s=value.get("model_s"),
+            models=tuple(value.get("models", ())),
         )

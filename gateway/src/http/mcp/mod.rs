@@ -36,7 +36,7 @@ use super::{
     body::check_unique_fields,
     problem::ApiError,
 };
-use crate::hosting::{Answer, Caller, HostingError};
+use crate::hosting::{Answer, Caller, HostingError, RefusedCall};
 
 /// What a host tells its model about the server as a whole: only what `caller` can do.
 fn instructions(caller: &Caller) -> String {
@@ -196,6 +196,7 @@ impl McpServer {
         mut args: Value,
     ) -> Result<Vec<ContentBlock>, ApiError> {
         let handle = args.as_object_mut().and_then(|object| object.shift_remove("episode_id"));
+        let asked = args.to_string();
         let call = Call::parse(name, args).map_err(ApiError::from);
         let id = match (handle, caller) {
             (Some(Value::String(id)), _) => id,
@@ -210,11 +211,16 @@ impl McpServer {
             }
         };
         let episode = self.app.table.hosted(&id);
-        if let Ok(episode) = &episode {
-            episode.admit(caller).and_then(|()| episode.check_offered(caller, name))?;
-        }
         let call = match &episode {
-            Ok(episode) => call.map_err(|refusal| refusal.in_episode(&episode.thread))?,
+            Ok(episode) => {
+                episode.admit(caller)?;
+                let offered = episode.check_offered(caller, name).map_err(ApiError::from);
+                offered.and(call).map_err(|refusal| {
+                    let problem = refusal.to_string();
+                    episode.refused(caller, RefusedCall { tool: name.into(), arguments: asked, problem });
+                    refusal.in_episode(&episode.thread)
+                })?
+            }
             Err(_) => call?,
         };
         let episode = episode?;

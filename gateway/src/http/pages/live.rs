@@ -8,7 +8,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use serde_json::{Value, json};
-use tandem_episodes::live::{LiveCall, LiveEvent, LiveScene};
+use tandem_episodes::live::{LiveEntry, LiveEvent, LiveScene};
 use tokio::sync::{OwnedSemaphorePermit, broadcast::error::RecvError};
 
 use super::{
@@ -32,9 +32,9 @@ fn thread(app: &AppState, wanted: &Wanted) -> Result<Arc<EpisodeThread>, ApiErro
 pub async fn scene(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> Result<Response, ApiError> {
     let LiveWatch { view, .. } = thread(&app, &wanted)?.watch().await?;
     let message = blocking(move || {
-        let calls: Vec<&Value> = view.calls.iter().map(|call| &call.told).collect();
+        let story: Vec<&Value> = view.entries.iter().map(|entry| &entry.told).collect();
         let more = json!({
-            "recorded": false, "calls": calls, "reached": view.phases, "result": view.result, "frames": 1,
+            "recorded": false, "story": story, "reached": view.phases, "result": view.result, "frames": 1,
         });
         let frame = view.now.frame(&view.scene);
         Ok(view.scene.message(more, &frame))
@@ -72,9 +72,9 @@ async fn serve(socket: PageSocket, watch: LiveWatch, _place: OwnedSemaphorePermi
 async fn tell(sender: &mut PageSender, watch: LiveWatch) -> io::Result<()> {
     let LiveWatch { view, mut events } = watch;
     let scene = view.scene;
-    let told_calls = view.calls.last().map_or(0, |call| call.number);
-    for call in &view.calls {
-        sender.text(call.told.to_string()).await?;
+    let told_entries = view.entries.last().map_or(0, |entry| entry.entry);
+    for entry in &view.entries {
+        sender.text(entry.told.to_string()).await?;
     }
     for phase in &view.phases {
         sender.text(json!({ "kind": "phase", "phase": phase }).to_string()).await?;
@@ -86,8 +86,10 @@ async fn tell(sender: &mut PageSender, watch: LiveWatch) -> io::Result<()> {
     loop {
         match events.recv().await {
             Ok(LiveEvent::Step(step)) => sender.bytes(step.frame(&scene).to_vec()).await?,
-            Ok(LiveEvent::Call(call)) if call.number > told_calls => tell_call(sender, &scene, call).await?,
-            Ok(LiveEvent::Call(_)) => {}
+            Ok(LiveEvent::Entry(entry)) if entry.entry > told_entries => {
+                tell_entry(sender, &scene, entry).await?
+            }
+            Ok(LiveEvent::Entry(_)) => {}
             Ok(LiveEvent::Phase(phase)) => {
                 sender.text(json!({ "kind": "phase", "phase": phase }).to_string()).await?
             }
@@ -100,13 +102,13 @@ async fn tell(sender: &mut PageSender, watch: LiveWatch) -> io::Result<()> {
     }
 }
 
-async fn tell_call(sender: &mut PageSender, scene: &LiveScene, call: Arc<LiveCall>) -> io::Result<()> {
-    sender.text(call.told.to_string()).await?;
-    for (robot, picture) in &call.pictures {
+async fn tell_entry(sender: &mut PageSender, scene: &LiveScene, entry: Arc<LiveEntry>) -> io::Result<()> {
+    sender.text(entry.told.to_string()).await?;
+    for (robot, picture) in &entry.pictures {
         let picture = picture.clone();
         let png = tokio::task::spawn_blocking(move || picture.png()).await.map_err(io::Error::other)?;
         let number = scene.robots().position(|name| name == robot).unwrap_or_default();
-        let head = [PICTURE_KIND, call.number as f32, number as f32];
+        let head = [PICTURE_KIND, entry.entry as f32, number as f32];
         let mut message: Vec<u8> = head.into_iter().flat_map(f32::to_le_bytes).collect();
         message.extend(png.map_err(io::Error::other)?.iter());
         sender.bytes(message).await?;

@@ -15,7 +15,7 @@ use axum::{
 use serde::Deserialize;
 use serde_json::{Value, json};
 use tandem_tools_spec::{
-    Call, EpisodeToolSpec, Format, PlanCall, ResultReply, StartEpisode, TaskList, Tool as _,
+    Call, EpisodeToolSpec, Format, Note, PlanCall, ResultReply, StartEpisode, TaskList, Tool as _,
     episode_tool_specs, parse_start,
 };
 
@@ -25,13 +25,13 @@ use super::{
     problem::ApiError,
 };
 use crate::{
-    hosting::{Caller, HostingError, IdempotentReply},
+    hosting::{Caller, HostingError, IdempotentReply, RefusedCall},
     metrics::MetricsPage,
 };
 use idempotency::{IdempotencyKey, mark_replayed};
 
 /// Every route: path, methods, handlers.
-fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<AppState>); 12] {
+fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<AppState>); 13] {
     [
         ("/", &["GET"], get(home)),
         ("/healthz", &["GET"], get(health)),
@@ -45,6 +45,7 @@ fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<AppState>);
         ("/v1/episodes/{id}/briefing", &["GET"], get(briefing)),
         ("/v1/episodes/{id}/tools", &["GET"], get(episode_tools)),
         ("/v1/episodes/{id}/tools/{name}", &["POST"], post(call)),
+        ("/v1/episodes/{id}/notes", &["POST"], post(note)),
     ]
 }
 
@@ -201,7 +202,10 @@ async fn call(
         };
         let answer = match read() {
             Ok(call) => episode.call(&caller, call, key.as_deref()).await.map_err(ApiError::from),
-            Err(refusal) => Err(refusal),
+            Err(refusal) => {
+                episode.refused(&caller, refused_call(&name, encoding, &body, &refusal));
+                Err(refusal)
+            }
         };
         let IdempotentReply { reply, replayed } =
             answer.map_err(|refusal: ApiError| refusal.in_episode(&episode.thread))?;
@@ -209,6 +213,31 @@ async fn call(
         Ok(mark_replayed(encoding.write(status, &*reply)?, replayed))
     })
     .await
+}
+
+/// A call that could not be read, as it came.
+fn refused_call(tool: &str, encoding: Encoding, body: &[u8], refusal: &ApiError) -> RefusedCall {
+    let arguments = match encoding.read(body) {
+        Ok(arguments) => arguments.to_string(),
+        Err(_) => String::from_utf8_lossy(body).into_owned(),
+    };
+    RefusedCall { tool: tool.into(), arguments, problem: refusal.to_string() }
+}
+
+/// Keeps what whoever plays says of its play.
+async fn note(
+    State(app): State<AppState>,
+    Extension(caller): Extension<Caller>,
+    encoding: Encoding,
+    Path(id): Path<String>,
+    body: Bytes,
+) -> Result<StatusCode, ApiError> {
+    let episode = app.table.hosted(&id)?;
+    episode.admit(&caller)?;
+    let note = Note::parse(encoding.read(&body)?)?;
+    let kept = episode.note(&caller, note).await;
+    kept.map_err(|refusal| ApiError::from(refusal).in_episode(&episode.thread))?;
+    Ok(StatusCode::NO_CONTENT)
 }
 
 async fn remove(

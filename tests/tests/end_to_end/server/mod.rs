@@ -8,6 +8,7 @@ mod door;
 mod hints;
 mod listing;
 mod mcp;
+mod notes;
 mod operations;
 mod repeats;
 mod rest;

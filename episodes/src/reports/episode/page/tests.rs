@@ -33,6 +33,7 @@ fn result(phase_times_s: [Option<f64>; 3], protocol: Protocol) -> ResultReply {
         extra_information_replies: Default::default(),
         departures: vec![],
         recording_failed: None,
+        usage: None,
     }
 }
 

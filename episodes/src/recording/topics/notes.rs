@@ -1,0 +1,80 @@
+//! What whoever plays says of its play, as recordings hold it.
+
+use std::time::Duration;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tandem_tools_spec::{Note, NoteKind, TokenCount};
+
+use super::messages::{CallMoment, JsonMessage};
+
+/// A note on the episode. What it does not say is left out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct NoteMessage {
+    pub text: String,
+    /// `thought`, `message` or `note`.
+    #[schemars(with = "String")]
+    pub kind: NoteKind,
+    /// How many messages `/tool_calls` had by then: the note belongs to what comes next.
+    pub calls_before: u32,
+    /// How many control steps had been made.
+    pub control_step: u64,
+    /// How long the policy had thought by then since the episode began.
+    pub thought_ns: u64,
+    /// The robot that it is about; absent where it is about all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "String")]
+    pub robot: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "String")]
+    pub model: Option<String>,
+    /// Tokens that the model read, those from a cache included; absent, as the next two, where none were counted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "u32")]
+    pub input_tokens: Option<u32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "u32")]
+    pub output_tokens: Option<u32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "u32")]
+    pub cached_tokens: Option<u32>,
+    /// What it cost in US dollars.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "f64")]
+    pub usd: Option<f64>,
+    /// How long the model took.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "f64")]
+    pub seconds: Option<f64>,
+}
+
+impl JsonMessage for NoteMessage {
+    const SCHEMA_NAME: &str = "tandem.Note";
+}
+
+impl NoteMessage {
+    /// The note `note` of this moment, when `/tool_calls` had so many messages.
+    pub fn new(at: CallMoment, calls_before: u32, note: Note) -> NoteMessage {
+        let Note { text, kind, robot, tokens, usd, model, seconds } = note;
+        let counted = |of: fn(&TokenCount) -> u32| tokens.as_ref().map(of);
+        NoteMessage {
+            text,
+            kind: kind.unwrap_or(NoteKind::Note),
+            calls_before,
+            control_step: at.control_step,
+            thought_ns: at.thought_ns(),
+            robot,
+            model,
+            input_tokens: counted(|tokens| tokens.input),
+            output_tokens: counted(|tokens| tokens.output),
+            cached_tokens: counted(|tokens| tokens.cached),
+            usd,
+            seconds,
+        }
+    }
+
+    /// How long the policy had thought by then.
+    pub fn thought(&self) -> Duration {
+        Duration::from_nanos(self.thought_ns)
+    }
+}

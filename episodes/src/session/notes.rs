@@ -1,0 +1,72 @@
+//! What is kept of an episode for those who read it later, and is no call of it: notes of whoever plays, calls that were refused before
+//! they reached the episode, and plans, whose commands are calls of their own. None of it changes a state, a count, a budget or a clock.
+
+use tandem_tools_spec::{Note, SpecError};
+
+use super::Session;
+use crate::EpisodeError;
+use crate::commands;
+use crate::output::OutputError;
+use crate::recording::{CallMoment, CallerRecord, NoteMessage, ToolCallRecord};
+
+impl Session {
+    /// Keeps a note of the policy that directs all robots, or of the operator of one.
+    pub fn note(&mut self, operator: Option<&str>, mut note: Note) -> Result<(), EpisodeError> {
+        note.validate().map_err(|reason| SpecError::Invalid { tool: Note::NAME, reason })?;
+        self.expect_underway()?;
+        if let Some(own) = operator {
+            let name = note.robot.get_or_insert_with(|| own.into());
+            if name != own {
+                return Err(EpisodeError::ForeignRobot { name: name.clone(), own: own.into() });
+            }
+        }
+        if let Some(robot) = &note.robot {
+            commands::find(robot, &self.motions)?;
+        }
+        self.usage.add(&note);
+        let note = NoteMessage::new(self.now(), self.told_calls, note);
+        self.show_note(&note);
+        let time_s = self.present.time_s;
+        if let Some(files) = &mut self.files {
+            files.keep_note(time_s, note);
+        }
+        Ok(())
+    }
+
+    /// Keeps a call that was refused before it reached the episode: `arguments` as they came.
+    pub fn refused_before(&mut self, operator: Option<&str>, tool: &str, arguments: &str, problem: &str) {
+        self.tell_beside(operator, tool, arguments, Err(problem));
+    }
+
+    /// Keeps what was asked and answered and is no call of the episode.
+    pub(super) fn tell_beside(
+        &mut self,
+        operator: Option<&str>,
+        tool: &str,
+        arguments: &str,
+        outcome: Result<&str, &str>,
+    ) {
+        if self.result.is_none() {
+            let caller = operator.map_or(CallerRecord::Policy, CallerRecord::Operator);
+            self.tell(ToolCallRecord::beside(self.now(), caller, tool, arguments, outcome));
+        }
+    }
+
+    /// Records a call, and shows it to those who look on.
+    pub(super) fn tell(&mut self, record: Result<ToolCallRecord, OutputError>) {
+        self.told_calls += 1;
+        self.show_call(&record);
+        if let Some(files) = &mut self.files {
+            files.tool_call(record);
+        }
+    }
+
+    /// This moment, as recordings have it.
+    pub(super) fn now(&self) -> CallMoment {
+        CallMoment {
+            time_s: self.present.time_s,
+            control_step: self.present.control_step,
+            thought: self.clock.spent() + self.clock.thinking(),
+        }
+    }
+}

@@ -1,0 +1,160 @@
+// What was asked, answered, seen and said in an episode, as a list. Of a running one the latest comes first; a finished one is read from
+// its beginning, and the list goes along with the moment that is shown.
+
+import { element, words } from "./dom.js";
+
+const MOST_SHOWN = 400;
+/** Less is no thinking that a reader wants to know of. */
+const LEAST_THOUGHT_S = 0.1;
+/** Words of a note that are shown before its reader opens it. */
+const SHORT_NOTE = 280;
+
+export class Story {
+  /**
+   * @param {{ seek: (time: number) => void, picture: (robot: string, time: number) => string } | null} recorded of a finished episode:
+   *   takes the page to a moment, and says where a picture is
+   */
+  constructor(head, recorded) {
+    this.head = head;
+    this.recorded = recorded;
+    this.known = new Map();
+    this.entries = [];
+    this.thought = 0;
+    this.list = element("ol", { class: "story" });
+    this.none = element("p", { class: "soft" }, "No call yet.");
+    this.node = element("div", { class: recorded ? "reader" : "" }, this.none, this.list);
+  }
+
+  /** A call or a note. */
+  add(entry) {
+    if (this.known.has(entry.entry)) return;
+    this.none.hidden = true;
+    const seen = element("div", { class: "seen" });
+    const thought = entry.thought_s - this.thought;
+    this.thought = entry.thought_s;
+    const item = element("li", { class: entry.kind },
+      thought >= LEAST_THOUGHT_S ? element("div", { class: "soft pause" }, `thought for ${thought.toFixed(1)} s`) : null,
+      entry.kind === "note" ? this.note(entry) : this.call(entry), seen);
+    if (this.recorded) {
+      for (const robot of entry.seen ?? []) seen.append(this.image(robot, this.recorded.picture(robot, entry.time_s), true));
+    }
+    this.known.set(entry.entry, seen);
+    this.entries.push({ time: entry.time_s, item });
+    if (this.recorded) {
+      this.list.append(item);
+      return;
+    }
+    this.list.prepend(item);
+    if (this.list.childElementCount > MOST_SHOWN) this.list.lastElementChild.remove();
+  }
+
+  call(entry) {
+    const asked = parsed(entry.arguments);
+    const reply = entry.ok ? parsed(entry.reply) : entry.reply;
+    const body = element("div", { class: "body" });
+    const head = element("summary", {},
+      element("span", { class: "number" }, entry.number === null ? "–" : `${entry.number}`),
+      element("code", {}, entry.tool),
+      element("span", {}, summary(entry, asked, reply)),
+      this.when(entry));
+    const details = element("details", { class: entry.ok ? "" : "refused" }, head, body);
+    details.addEventListener("toggle", () => {
+      if (body.childNodes.length) return;
+      body.append(
+        entry.number === null ? element("p", { class: "soft" }, entry.ok ? "The commands before it are those of this plan."
+          : "It was refused before it reached the episode, and does not count.") : "",
+        element("h4", {}, entry.operator ? `Asked by ${entry.operator}'s operator` : "Asked"), element("pre", {}, text(asked)),
+        element("h4", {}, entry.ok ? "Answered" : "Refused"), element("pre", {}, text(reply)),
+        element("p", { class: "soft" }, `The policy had thought for ${entry.thought_s.toFixed(1)} s by then.`));
+    });
+    return details;
+  }
+
+  note(entry) {
+    const { note } = entry;
+    const who = [note.robot ?? "", note.kind, note.model ?? ""].filter(Boolean).join(", ");
+    const long = note.text.length > SHORT_NOTE;
+    const said = element("p", { class: long ? "said long" : "said" }, note.text);
+    return element("div", {},
+      element("div", { class: "line" }, element("span", { class: "soft" }, who), this.when(entry)), note.text ? said : null,
+      long ? element("button", { class: "more", onclick: (event) => { said.classList.remove("long"); event.target.remove(); } }, "All of it") : null,
+      used(note) ? element("p", { class: "soft" }, used(note)) : null);
+  }
+
+  when(entry) {
+    const told = `${entry.time_s.toFixed(1)} s`;
+    if (!this.recorded) return element("span", { class: "soft time" }, told);
+    const go = (event) => {
+      event.preventDefault();
+      this.recorded.seek(entry.time_s);
+    };
+    return element("button", { class: "time", title: "Go there", onclick: go }, told);
+  }
+
+  image(robot, src, later) {
+    return element("img", { alt: `What robot ${robot} saw`, title: `What robot ${robot} saw`, width: 160, height: 120, src, loading: later ? "lazy" : null });
+  }
+
+  /** A picture that the policy was shown with a call. */
+  picture(entry, robot, png) {
+    const seen = this.known.get(entry);
+    if (!seen) return;
+    const image = this.image(this.head.robots[robot].name, URL.createObjectURL(new Blob([png], { type: "image/png" })), false);
+    image.addEventListener("load", () => URL.revokeObjectURL(image.src), { once: true });
+    seen.append(image);
+  }
+
+  /** Marks what was told last at a moment, and brings it into sight. */
+  follow(time) {
+    let last = null;
+    for (const entry of this.entries) {
+      if (entry.time > time + 1e-6) break;
+      last = entry;
+    }
+    if (last?.item === this.marked) return;
+    this.marked?.removeAttribute("aria-current");
+    this.marked = last?.item;
+    if (!this.marked) return;
+    this.marked.setAttribute("aria-current", "step");
+    // The list alone: the page stays where its reader has it.
+    const { node, marked } = this;
+    node.scrollTop = Math.max(0, marked.offsetTop - node.offsetTop - node.clientHeight / 3);
+  }
+}
+
+const parsed = (json) => {
+  try {
+    return JSON.parse(json);
+  } catch {
+    return json;
+  }
+};
+
+/** As JSON, with rows of numbers on one line and without what is null. */
+const text = (value) => (typeof value === "string" ? value
+  : JSON.stringify(value, (_, inner) => (inner === null ? undefined : inner), 2).replace(/\[[-\d.,\se]+\]/g, (row) => row.replace(/\s+/g, " ")));
+
+/** What a note says that was used. */
+export function used({ input_tokens: input, output_tokens: output, cached_tokens: cached, usd, seconds }) {
+  const parts = [];
+  if (input !== undefined) parts.push(`${input} tokens read${cached ? ` (${cached} from a cache)` : ""}, ${output} written`);
+  if (usd !== undefined) parts.push(`$${usd.toFixed(usd < 0.1 ? 4 : 2)}`);
+  if (seconds !== undefined) parts.push(`${seconds.toFixed(1)} s`);
+  return parts.join("; ");
+}
+
+/** A call in a few words. */
+function summary(call, asked, reply) {
+  if (!call.ok) return `refused: ${reply}`;
+  const parts = [];
+  const robots = asked?.robots?.map?.((entry) => entry.robot ?? entry) ?? (asked?.robot ? [asked.robot] : []);
+  if (robots.length) parts.push(robots.join(" and "));
+  if (asked?.text) parts.push(`“${asked.text}”`);
+  if (reply?.commands !== undefined) parts.push(`${reply.commands} commands`);
+  if (reply?.executed_steps !== undefined) parts.push(`${reply.executed_steps} steps`);
+  if (reply?.stopped) parts.push(reply.stopped);
+  if (reply?.stop_reason && reply.stop_reason !== "steps_done") parts.push(words(reply.stop_reason));
+  const states = reply?.robots?.flatMap?.(({ robot, left, right }) =>
+    [["left", left], ["right", right]].filter(([, hand]) => ["blocked", "out_of_reach"].includes(hand?.state)).map(([side, hand]) => `${robot} ${side} ${words(hand.state)}`)) ?? [];
+  return [...parts, ...states].join(", ");
+}

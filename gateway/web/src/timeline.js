@@ -1,0 +1,143 @@
+// The time line of a finished episode: its phases as bands, calls, looks and notes as marks below them, and a slider over all of it.
+
+import { colour, element, words } from "./dom.js";
+
+const ROW = 13;
+/** Rows of marks: what it is, its colour, and which entries are in it. */
+const ROWS = [
+  { name: "commands", colour: "--accent", of: (entry) => entry.kind === "call" && entry.ok && entry.number !== null && entry.steps > 0 },
+  { name: "looks and questions", colour: "--soft", of: (entry) => entry.kind === "call" && entry.ok && entry.number !== null && !(entry.steps > 0) },
+  { name: "refused", colour: "--bad", of: (entry) => entry.kind === "call" && !entry.ok },
+  { name: "notes", colour: "--odd", of: (entry) => entry.kind === "note" },
+];
+
+export class Timeline {
+  /** @param {import("./time.js").RecordedTime} time */
+  constructor(head, time) {
+    this.head = head;
+    this.time = time;
+    this.slider = element("input", {
+      type: "range", min: time.begin, max: time.end, step: 0.02, "aria-label": "Moment",
+      oninput: (event) => { time.play(false); time.seek(Number(event.target.value)); },
+    });
+    this.entries = stretches(head.story, time.begin);
+    this.rows = ROWS.map((row) => ({ ...row, entries: this.entries.filter(row.of) })).filter(({ entries }) => entries.length);
+    this.canvas = element("canvas", { height: this.rows.length * ROW, role: "img", "aria-label": this.told(), onclick: (event) => this.clicked(event) });
+    this.hint = element("span", { class: "hint", hidden: true });
+    this.canvas.addEventListener("pointermove", (event) => this.pointed(event));
+    this.canvas.addEventListener("pointerleave", () => { this.hint.hidden = true; });
+    const legend = element("p", { class: "legend" }, ...this.rows.map((row) =>
+      element("span", {}, element("i", { class: `swatch ${row.colour.slice(2)}` }), `${row.name} (${row.entries.length})`)));
+    this.node = element("div", { class: "track" }, this.slider, this.bands(), this.canvas, this.hint, legend);
+    new ResizeObserver(() => this.draw()).observe(this.canvas);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+  }
+
+  /** Each phase from where the one before it was reached to where it was, and where it never was, to the end. */
+  bands() {
+    const { begin, end } = this.time;
+    const reached = new Map(this.head.reached.map((phase) => [phase.number, phase.time_s]));
+    let from = begin;
+    const bands = [];
+    for (const { number, id } of this.head.phases) {
+      const at = reached.get(number);
+      const until = at ?? end;
+      if (until - from > 1e-6 || at !== undefined) {
+        const told = at === undefined ? `${number} ${words(id)}: not reached` : `${number} ${words(id)}: reached at ${at.toFixed(2)} s`;
+        const band = element("button", { class: at === undefined ? "missed" : "done", title: told, onclick: () => this.time.seek(until) },
+          `${number} ${words(id)}`);
+        band.style.width = `${(100 * (until - from)) / (end - begin)}%`;
+        bands.push(band);
+      }
+      from = until;
+      if (at === undefined) break;
+    }
+    return element("div", { class: "bands" }, ...bands);
+  }
+
+  told() {
+    return this.rows.map(({ name, entries }) => `${entries.length} ${name}`).join(", ");
+  }
+
+  x(time) {
+    const { begin, end } = this.time;
+    return ((time - begin) / (end - begin)) * this.canvas.clientWidth;
+  }
+
+  draw() {
+    const { canvas } = this;
+    const width = canvas.clientWidth;
+    if (!width) return;
+    const scale = Math.min(devicePixelRatio, 2);
+    canvas.width = width * scale;
+    canvas.height = this.rows.length * ROW * scale;
+    canvas.style.height = `${this.rows.length * ROW}px`;
+    const context = canvas.getContext("2d");
+    context.scale(scale, scale);
+    this.rows.forEach(({ entries, colour: name }, row) => {
+      context.fillStyle = colour("--line");
+      context.fillRect(0, row * ROW + ROW - 2, width, 1);
+      context.fillStyle = colour(name);
+      for (const { from, time_s: until } of entries) {
+        const left = this.x(from);
+        context.fillRect(left, row * ROW + 1, Math.max(1.5, this.x(until) - left - 0.7), ROW - 5);
+      }
+    });
+  }
+
+  /** The entry below the pointer, or the nearest within a few pixels. */
+  under(event) {
+    const { left, top, width } = this.canvas.getBoundingClientRect();
+    const row = this.rows[Math.floor((event.clientY - top) / ROW)];
+    if (!row || !width) return null;
+    const x = event.clientX - left;
+    const away = ({ from, time_s: until }) => Math.max(this.x(from) - x, x - this.x(until), 0);
+    const nearest = row.entries.reduce((best, entry) => (best && away(best) <= away(entry) ? best : entry), null);
+    return nearest && away(nearest) < 8 ? nearest : null;
+  }
+
+  pointed(event) {
+    const entry = this.under(event);
+    this.canvas.style.cursor = entry ? "pointer" : "";
+    this.hint.hidden = !entry;
+    if (!entry) return;
+    this.hint.textContent = entry.kind === "note" ? `${entry.note.kind}: ${entry.note.text.slice(0, 120)}`
+      : `${entry.number ?? "–"} ${entry.tool}${entry.ok ? "" : `: ${entry.reply.slice(0, 120)}`}`;
+    const { width } = this.canvas.getBoundingClientRect();
+    this.hint.style.left = `${Math.min(this.x(entry.from), Math.max(0, width - 260))}px`;
+  }
+
+  clicked(event) {
+    const entry = this.under(event);
+    this.time.play(false);
+    if (entry) return this.time.seek(entry.time_s);
+    const { left, width } = this.canvas.getBoundingClientRect();
+    const { begin, end } = this.time;
+    return this.time.seek(begin + ((event.clientX - left) / width) * (end - begin));
+  }
+
+  /** Goes to the entry before or after the moment that is shown. */
+  step(way) {
+    const now = this.time.time;
+    const times = [...new Set(this.entries.map(({ time_s }) => time_s))];
+    const next = way > 0 ? times.find((time) => time > now + 1e-6) : times.findLast((time) => time < now - 1e-6);
+    this.time.play(false);
+    this.time.seek(next ?? (way > 0 ? this.time.end : this.time.begin));
+  }
+
+  show() {
+    if (document.activeElement !== this.slider || this.time.playing) this.slider.value = this.time.time;
+  }
+}
+
+/** The entries with the time from which each lasted: a command since the call before it, all else no time at all. */
+function stretches(story, begin) {
+  let from = begin;
+  return story.map((entry) => {
+    const counts = entry.kind === "call" && entry.number !== null;
+    const made = counts && entry.time_s > from + 1e-6;
+    const stretch = { ...entry, from: made ? from : entry.time_s, steps: made ? 1 : 0 };
+    if (counts) from = entry.time_s;
+    return stretch;
+  });
+}

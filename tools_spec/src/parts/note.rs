@@ -1,0 +1,219 @@
+//! Notes: what whoever plays says of its own play, for those who read the episode later. A note is no tool: it changes nothing of the
+//! episode, and no policy is told of it.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use crate::error::SpecError;
+use crate::limits::ROBOT_PATTERN;
+use crate::tool::read_as;
+
+/// The most characters of a note: more than a model says in one go.
+const MOST_CHARACTERS: usize = 50_000;
+/// The most characters of a model's name.
+const MOST_NAME_CHARACTERS: usize = 200;
+/// The most tokens, dollars and seconds of one note: what is more has been counted wrongly.
+const MOST_TOKENS: u32 = 1_000_000_000;
+const MOST_USD: f64 = 1e6;
+const MOST_SECONDS: f64 = 1e6;
+
+/// Something that whoever plays says of its play, kept in the recording for those who read the episode later: what a model thought, what
+/// it said, what that took. It changes nothing of the episode, costs no call, no steps and no time, and no policy is told of it.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Note {
+    /// The words, at most 50,000 characters. They may be empty where the note says what was used.
+    #[schemars(length(max = MOST_CHARACTERS))]
+    pub text: String,
+    /// What the words are. Null: a note.
+    pub kind: Option<NoteKind>,
+    /// The robot that it is about, as "A". Null: all, and for the operator of a robot its own.
+    #[schemars(regex(pattern = ROBOT_PATTERN))]
+    pub robot: Option<String>,
+    /// What the model read and wrote for it. Null: not said.
+    pub tokens: Option<TokenCount>,
+    /// What that cost in US dollars. Null: not said.
+    #[schemars(range(min = 0, max = MOST_USD))]
+    pub usd: Option<f64>,
+    /// The model, by the name that its server has for it, at most 200 characters. Null: not said.
+    #[schemars(length(max = MOST_NAME_CHARACTERS))]
+    pub model: Option<String>,
+    /// How long the model took, in seconds. Null: not said.
+    #[schemars(range(min = 0, max = MOST_SECONDS))]
+    pub seconds: Option<f64>,
+}
+
+/// What the words of a note are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum NoteKind {
+    /// What a model thought before it acted.
+    Thought,
+    /// What a model said.
+    Message,
+    /// Anything else, as what a program did on its own.
+    Note,
+}
+
+/// Tokens of a language model.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TokenCount {
+    /// Tokens that the model read, those from a cache included.
+    #[schemars(range(max = MOST_TOKENS))]
+    pub input: u32,
+    /// Tokens that the model wrote, its thoughts included.
+    #[schemars(range(max = MOST_TOKENS))]
+    pub output: u32,
+    /// Of those that it read, how many came from a cache. Left out: none.
+    #[serde(default)]
+    #[schemars(range(max = MOST_TOKENS))]
+    pub cached: u32,
+}
+
+impl Note {
+    /// What refusals call it.
+    pub const NAME: &str = "notes";
+
+    /// A note that works.
+    pub fn example() -> Note {
+        Note {
+            text: "The bottle is 0.31 m ahead of A, a bit to the right. I reach above it first.".into(),
+            kind: Some(NoteKind::Thought),
+            robot: Some("A".into()),
+            tokens: Some(TokenCount { input: 5210, output: 84, cached: 4800 }),
+            usd: Some(0.004),
+            model: Some("a-model".into()),
+            seconds: Some(2.5),
+        }
+    }
+
+    /// Reads and checks a note.
+    pub fn parse(body: Value) -> Result<Note, SpecError> {
+        let note: Note = read_as(Note::NAME, body, || json!(Note::example()))?;
+        note.validate().map_err(|reason| SpecError::Invalid { tool: Note::NAME, reason })?;
+        Ok(note)
+    }
+
+    /// Checks lengths and numbers. The text says what would work.
+    pub fn validate(&self) -> Result<(), String> {
+        let long = |name: &str, text: &str, most: usize| match text.chars().count() {
+            count if count > most => {
+                Err(format!("{name} has {count} characters; give at most {most}, or several notes"))
+            }
+            _ => Ok(()),
+        };
+        long("text", &self.text, MOST_CHARACTERS)?;
+        long("model", self.model.as_deref().unwrap_or_default(), MOST_NAME_CHARACTERS)?;
+        if self.text.is_empty() && self.tokens.is_none() && self.usd.is_none() && self.seconds.is_none() {
+            return Err("it says nothing; give a text, or the tokens, usd or seconds that were used".into());
+        }
+        let TokenCount { input, output, cached } = self.tokens.unwrap_or_default();
+        for (name, count) in [("input", input), ("output", output), ("cached", cached)] {
+            if count > MOST_TOKENS {
+                return Err(format!(
+                    "tokens.{name} is {count}; give 0 to {MOST_TOKENS}, those of this note alone"
+                ));
+            }
+        }
+        for (name, number, most) in [("usd", self.usd, MOST_USD), ("seconds", self.seconds, MOST_SECONDS)] {
+            if let Some(number) = number.filter(|number| !(0.0..=most).contains(number)) {
+                return Err(format!("{name} is {number}; give 0 to {most}, that of this note alone"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What all notes of an episode say that was used, added up.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Usage {
+    /// How many notes there are.
+    pub notes: u32,
+    /// Tokens that models read, those from a cache included.
+    pub input_tokens: u64,
+    /// Tokens that models wrote.
+    pub output_tokens: u64,
+    /// Of those that they read, how many came from a cache.
+    pub cached_tokens: u64,
+    /// What it cost in US dollars; left out where no note says it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub usd: Option<f64>,
+    /// How long models took, in seconds; left out where no note says it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model_s: Option<f64>,
+    /// The models that notes name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub models: Vec<String>,
+}
+
+impl Usage {
+    /// Adds what a note says.
+    pub fn add(&mut self, note: &Note) {
+        let TokenCount { input, output, cached } = note.tokens.unwrap_or_default();
+        self.notes += 1;
+        self.input_tokens += u64::from(input);
+        self.output_tokens += u64::from(output);
+        self.cached_tokens += u64::from(cached);
+        let added = |sum: Option<f64>, more: Option<f64>| match (sum, more) {
+            (None, None) => None,
+            (sum, more) => Some(sum.unwrap_or_default() + more.unwrap_or_default()),
+        };
+        self.usd = added(self.usd, note.usd);
+        self.model_s = added(self.model_s, note.seconds);
+        if let Some(model) = note.model.as_ref().filter(|model| !self.models.contains(model)) {
+            self.models.push(model.clone());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read_back_and_most_may_be_left_out() {
+        for note in [Note::example(), Note { text: "ü".repeat(MOST_CHARACTERS), ..Note::default() }] {
+            assert_eq!(Note::parse(json!(note)), Ok(note));
+        }
+        let few = Note::parse(json!({ "text": "", "tokens": { "input": 10, "output": 2 } })).unwrap();
+        assert_eq!(few.tokens, Some(TokenCount { input: 10, output: 2, cached: 0 }));
+    }
+
+    #[test]
+    fn refusals_say_what_would_work() {
+        let check = |body: Value, says: &str| {
+            let text = Note::parse(body).unwrap_err().to_string();
+            assert!(text.contains(says), "{text}");
+        };
+        check(json!({}), "missing field `text`; arguments that work: {\"text\":");
+        check(json!({ "text": "" }), "it says nothing; give a text");
+        check(json!({ "text": "a".repeat(50_001) }), "text has 50001 characters; give at most 50000");
+        check(json!({ "text": "a", "model": "m".repeat(201) }), "model has 201 characters");
+        check(
+            json!({ "text": "a", "kind": "shout" }),
+            "kind: unknown variant `shout`, expected one of `thought`",
+        );
+        check(json!({ "text": "a", "usd": -1 }), "usd is -1; give 0 to 1000000");
+        check(json!({ "text": "a", "seconds": 1e300 }), "seconds is ");
+        check(
+            json!({ "text": "a", "tokens": { "input": 2_000_000_000_u32, "output": 1 } }),
+            "tokens.input is",
+        );
+        check(json!({ "text": "a", "tokens": { "input": 5 } }), "tokens: missing field `output`");
+        check(json!({ "text": "a", "mood": "glad" }), "unknown field `mood`");
+    }
+
+    #[test]
+    fn what_was_used_adds_up() {
+        let mut usage = Usage::default();
+        usage.add(&Note { text: "Hm.".into(), ..Note::default() });
+        assert_eq!((usage.usd, usage.model_s), (None, None));
+        usage.add(&Note::example());
+        usage.add(&Note::example());
+        let Usage { notes, input_tokens, output_tokens, cached_tokens, usd, model_s, models } = usage;
+        assert_eq!((notes, input_tokens, output_tokens, cached_tokens), (3, 10420, 168, 9600));
+        assert_eq!((usd, model_s, models), (Some(0.008), Some(5.0), vec!["a-model".to_owned()]));
+    }
+}
