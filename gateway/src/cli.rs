@@ -5,7 +5,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use crate::commands::{
     CommandResult,
     about::{completions, man, tasks},
-    bench, collect, demo, doctor, evaluate, locomotion, policy_map, recover, replay, report, serve,
+    agent, bench, collect, demo, doctor, evaluate, locomotion, policy_map, recover, replay, report, serve,
 };
 
 /// Physics of humanoids that must work together, behind an HTTP API.
@@ -21,6 +21,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum CliCommand {
     Serve(serve::ServeArgs),
+    Agent(agent::AgentArgs),
     Demo(demo::DemoArgs),
     Evaluate(evaluate::EvaluateArgs),
     Collect(collect::CollectArgs),
@@ -41,6 +42,7 @@ impl Cli {
     pub fn run(self) -> CommandResult {
         match self.command {
             CliCommand::Serve(args) => serve::run(args),
+            CliCommand::Agent(args) => agent::run(args),
             CliCommand::Demo(args) => demo::run(args),
             CliCommand::Evaluate(args) => evaluate::run(args),
             CliCommand::Collect(args) => collect::run(args),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import threading
@@ -18,6 +19,8 @@ def main(arguments: list[str] | None = None) -> int:
     if threading.current_thread() is threading.main_thread():
         # Python would only note the signal, and hear of it when the command is done.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
+    # Language models are played by this interpreter, which has the package.
+    os.environ.setdefault("TANDEM_PYTHON", sys.executable)
     sys.stdout.flush()
     return _native.run_command_line(["tandem", *given])
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import re
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -295,13 +297,25 @@ def test_wrong_flags_and_missing_packages_say_what_would_work(
     assert "pip install 'tandem-sim[agents]'" in capsys.readouterr().err
 
 
+def test_the_program_knows_the_flags_that_say_which_model_plays(capsys: pytest.CaptureFixture[str]) -> None:
+    def flags(text: str) -> set[str]:
+        return set(re.findall(r"--[a-z-]+", text))
+
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    ours = flags(capsys.readouterr().out) - {"--help", "--task", "--seed", "--url"}
+    program = subprocess.run([sys.executable, "-m", "tandem", "agent", "--help"], capture_output=True, text=True, check=True)
+    assert ours <= flags(program.stdout)
+
+
 def test_a_model_for_each_robot(server: tandem.Server, runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    heard: dict[str, list[Heard]] = {}
+    heard: dict[str, str] = {}
 
     def script(system: str) -> Script:
         robot = "A" if "the humanoid robot A" in system else "B"
-        yield Says(calls=(("say", {"text": f"I am {robot}."}), ("wait", {"steps": 5})))
-        heard[robot] = yield Says(calls=(("wait", {"steps": 5}),))
+        first = yield Says(calls=(("say", {"text": f"I am {robot}."}), ("wait", {"steps": 5})))
+        heard[robot] = " ".join(each.text for each in first)
+        yield Says(calls=(("wait", {"steps": 5}),))
         yield Says(calls=(("finish", {}),))
 
     with ScriptedEndpoint(script) as endpoint:
@@ -312,8 +326,11 @@ def test_a_model_for_each_robot(server: tandem.Server, runs: Path, capsys: pytes
     }
     came = result(runs)
     assert (came["ended"], came["env_steps"]) == ("finished", 310)
+    assert "I am A." in heard["B"]
+    assert "I am B." in heard["A"]
     printed = capsys.readouterr().out
-    assert "I am A." in printed.split("B: ", 1)[1] and "B: wait" in printed
+    assert "A: wait" in printed
+    assert "B: wait" in printed
 
 
 def test_an_episode_that_somebody_else_began_is_joined(

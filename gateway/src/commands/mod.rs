@@ -1,6 +1,7 @@
 //! What `tandem` can do: one file or folder per subcommand, each with its flags and its `run`; what several share is in `flags`.
 
 pub mod about;
+pub mod agent;
 pub mod bench;
 pub mod collect;
 pub mod demo;

@@ -1,5 +1,6 @@
 //! The program in a process of its own: stopped, killed, resumed, on a full disk, what it logs, and what it says of itself.
 
+mod agents;
 mod command_line;
 mod evaluations;
 mod logs;

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
-from collections.abc import Sequence
-from contextlib import ExitStack
+import threading
+from collections.abc import Generator, Sequence
+from contextlib import ExitStack, contextmanager
+from types import FrameType
 
 from ..client import Client
 from ..errors import TandemError
 from ..server import serve
-from .apis import check_package, without_keys
+from .apis import open_model, without_keys
 from .episodes import Hosting, play_joined, play_own
 from .settings import APIS, AgentSettings, Limits, Prices
 
@@ -19,6 +22,9 @@ DEFAULT_SECONDS = 3300.0
 """`tandem evaluate` stops a program after an hour; a model that is at it for so long finishes before."""
 
 DEFAULT_CALLS = 500
+
+INTERRUPTED = 130
+"""What shells report of a process that SIGINT has ended."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -69,6 +75,7 @@ def parser() -> argparse.ArgumentParser:
         "--per-robot", action="store_true", help="a model for each robot, which sees and commands that robot alone"
     )
     episode.add_argument("--talk", action="store_true", help="with --per-robot: let them talk to each other by the tool say")
+    flags.add_argument("--check", action="store_true", help=argparse.SUPPRESS)
     return flags
 
 
@@ -90,11 +97,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser().parse_args(arguments)
     try:
         settings = settings_of(given)
-        check_package(settings.api)
-        return _run(given, settings)
+        # What is missing is said before an episode begins.
+        open_model(settings, "")
+        if given.check:
+            return 0
+        with _interruptible():
+            return _run(given, settings)
     except TandemError as error:
         print(f"tandem agent: {without_keys(str(error))}", file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        print("tandem agent: interrupted", file=sys.stderr)
+        return INTERRUPTED
 
 
 def _run(given: argparse.Namespace, settings: AgentSettings) -> int:
@@ -108,6 +122,27 @@ def _run(given: argparse.Namespace, settings: AgentSettings) -> int:
         url = given.url or stack.enter_context(serve(runs=given.runs, assistance=given.assistance)).url
         play_own(url, Hosting(given.task, given.seed, given.per_robot, given.talk), settings)
     return 0
+
+
+@contextmanager
+def _interruptible() -> Generator[None, None, None]:
+    """Has the first SIGINT or SIGTERM end what is done, so that episodes are ended, and no other disturb that."""
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        for each in signals:
+            signal.signal(each, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    signals = (signal.SIGINT, signal.SIGTERM)
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = [signal.signal(each, interrupt) for each in signals]
+    try:
+        yield
+    finally:
+        for each, handler in zip(signals, before, strict=True):
+            signal.signal(each, handler)
 
 
 def _count(text: str) -> int:

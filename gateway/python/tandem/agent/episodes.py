@@ -72,7 +72,7 @@ def _play_each(url: str, episode_id: str, operators: list[dict[str, str]], setti
         except BaseException as failure:
             failures.append(failure)
 
-    threads = [threading.Thread(target=operate, args=(each["robot"], each["token"])) for each in operators]
+    threads = [threading.Thread(target=operate, args=(each["robot"], each["token"]), daemon=True) for each in operators]
     for thread in threads:
         thread.start()
     for thread in threads:

@@ -74,9 +74,10 @@ def _budget(budget: dict[str, Any]) -> str:
 
 def _brief(brief: dict[str, Any]) -> list[str]:
     told: list[str] = []
-    for value in brief.values():
+    for name, value in brief.items():
         if isinstance(value, str):
             told.append(value)
         elif isinstance(value, list):
-            told += [json.dumps(entry, separators=(",", ":"), ensure_ascii=False) for entry in listed(value)]
+            entries = [json.dumps(entry, separators=(",", ":"), ensure_ascii=False) for entry in listed(value)]
+            told += ["\n".join([f"{name}:", *entries])] if entries else []
     return told

@@ -9,10 +9,14 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{Driving, Operators};
 
-use crate::drivers::{PRESETS, PolicyMap, PolicyProtocol, Program, RemotePolicy};
+use super::agent::AgentFlags;
+use crate::drivers::{AgentLoop, PRESETS, PolicyMap, PolicyProtocol, Program, RemotePolicy};
 
 /// The prefix of --policy that names a program.
 const EXEC: &str = "exec:";
+
+/// The prefix of --policy that names a language model.
+const AGENT: &str = "agent:";
 
 /// How long a program may run in an episode, unless a flag says otherwise.
 const LIMIT_S: u32 = 3600;
@@ -48,6 +52,7 @@ pub struct PolicyFlags {
 enum PolicyChoice {
     Player(&'static players::PlayerEntry),
     Program(String),
+    Agent(Box<AgentFlags>),
     Remote(PolicyProtocol, Vec<String>),
 }
 
@@ -55,7 +60,8 @@ fn help() -> String {
     let players = players::ALL.iter().map(|player| format!("{} ({})", player.name, player.about));
     let players: Vec<String> = players.collect();
     format!(
-        "Who plays: {}; exec:COMMAND, a program that is started anew for every episode; openpi:ws://HOST:PORT or act:http://HOST:PORT/act, \
+        "Who plays: {}; exec:COMMAND, a program that is started anew for every episode; \
+         agent:MODEL, a language model, with flags of `tandem agent` as in agent:MODEL?api=anthropic&max-usd=2; openpi:ws://HOST:PORT or act:http://HOST:PORT/act, \
          a learned policy at a server, or one for each robot, separated by commas",
         players.join(", ")
     )
@@ -68,14 +74,17 @@ fn parse_policy(text: &str) -> Result<PolicyChoice, String> {
             false => Ok(PolicyChoice::Program(command.into())),
         };
     }
+    if let Some(agent) = text.strip_prefix(AGENT) {
+        return AgentFlags::parse_policy(agent).map(|flags| PolicyChoice::Agent(Box::new(flags)));
+    }
     for protocol in PolicyProtocol::ALL {
         if let Some(urls) = text.strip_prefix(&format!("{protocol}:")) {
             return parse_urls(protocol, urls).map(|urls| PolicyChoice::Remote(protocol, urls));
         }
     }
-    players::find(text)
-        .map(PolicyChoice::Player)
-        .map_err(|error| format!("{error}, exec:COMMAND, openpi:ws://HOST:PORT, act:http://HOST:PORT/act"))
+    players::find(text).map(PolicyChoice::Player).map_err(|error| {
+        format!("{error}, exec:COMMAND, agent:MODEL, openpi:ws://HOST:PORT, act:http://HOST:PORT/act")
+    })
 }
 
 fn parse_urls(protocol: PolicyProtocol, urls: &str) -> Result<Vec<String>, String> {
@@ -94,7 +103,7 @@ impl PolicyFlags {
         let misplaced = |flag: &str, who: &str| Err(format!("{flag} is for {who}").into());
         let driving = self.driving()?;
         let policy: Box<dyn Policy> = match (self.policy, self.policy_map, self.policy_limit) {
-            (PolicyChoice::Player(_) | PolicyChoice::Program(_), Some(_), _) => {
+            (PolicyChoice::Player(_) | PolicyChoice::Program(_) | PolicyChoice::Agent(_), Some(_), _) => {
                 return misplaced("--policy-map", "policies at a server");
             }
             (PolicyChoice::Player(_) | PolicyChoice::Remote(..), _, Some(_)) => {
@@ -110,6 +119,18 @@ impl PolicyFlags {
             (PolicyChoice::Program(command), None, limit_s) => {
                 let limit = Duration::from_secs(limit_s.unwrap_or(LIMIT_S).into());
                 Box::new(Program::new(command, driving, limit)?)
+            }
+            (PolicyChoice::Agent(flags), None, limit_s) => {
+                let limit_s = limit_s.unwrap_or_else(|| flags.limit_s(LIMIT_S));
+                let agent = AgentLoop::new(flags.arguments(limit_s))?;
+                let limit = Duration::from_secs(limit_s.into());
+                Box::new(Program::agent(
+                    &agent,
+                    format!("{AGENT}{}", flags.model()),
+                    flags.card(),
+                    driving,
+                    limit,
+                )?)
             }
             (PolicyChoice::Remote(protocol, urls), map, None) => {
                 let default =
@@ -207,6 +228,14 @@ mod tests {
         };
         check(&["--policy", "expart"], "have: expert, idle, demonstration, exec:COMMAND");
         check(&["--policy", "exec: "], "give one, as exec:");
+        check(&["--policy", "agent:?api=openai"], "give one, as agent:MODEL");
+        check(
+            &["--policy", "agent:m?key=1"],
+            "unexpected argument '--key' found; an option of agent: is one of api, base-url",
+        );
+        check(&["--policy", "agent:m?api=grpc"], "openai, openai-chat, anthropic");
+        check(&["--policy", "agent:m?max-calls=0"], "max-calls");
+        check(&["--policy", "agent:m", "--policy-map", "openpi"], "--policy-map is for policies at a server");
         check(&["--policy", "openpi:http://a"], "give openpi:ws://HOST:PORT");
         check(
             &["--policy", "act:http://a/act"],

@@ -13,7 +13,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use serde_json::json;
+use serde_json::{Value, json};
 use tandem_episodes::{
     EpisodeError, EpisodeSpec, RunFolder, Visibility, create_private_folder,
     players::{EpisodeOutput, PlayError, PlayOutcome, Policy},
@@ -21,6 +21,7 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{Driving, EndReason, ResultReply, StartReply};
 
+use super::agent::AgentLoop;
 use crate::{
     hosting::{EpisodeThread, HostingError},
     http::Server,
@@ -47,6 +48,9 @@ const LAST_WORDS_BYTES: u64 = 64 << 10;
 #[derive(Debug)]
 pub struct Program {
     command: String,
+    /// What results call it, and what they keep of it.
+    name: String,
+    card: Value,
     /// Whether one process directs all robots, or one each.
     driving: Driving,
     /// Longest that one of its processes may run.
@@ -67,7 +71,20 @@ impl Program {
         };
         let processes = Arc::new(ProcessGroups::default());
         process::stop_on_shutdown(&processes);
-        Ok(Program { command, driving, limit, settings: Settings::resolve(flags, None)?, processes })
+        let (name, card) = (format!("exec:{command}"), json!({ "command": command }));
+        let settings = Settings::resolve(flags, None)?;
+        Ok(Program { command, name, card, driving, limit, settings, processes })
+    }
+
+    /// Episodes played by a language model that results call `name`; `card` is what they keep of it.
+    pub fn agent(
+        agent: &AgentLoop,
+        name: String,
+        card: Value,
+        driving: Driving,
+        limit: Duration,
+    ) -> Result<Program, SettingsError> {
+        Ok(Program { name, card, ..Program::new(agent.shell_line(), driving, limit)? })
     }
 
     /// The settings of a server for this episode alone.
@@ -226,8 +243,8 @@ impl Program {
 
 impl Policy for Program {
     fn card(&self) -> PolicyCard {
-        let mut settings = json!({ "command": self.command, "limit_s": self.limit.as_secs_f64() });
-        let mut name = format!("exec:{}", self.command);
+        let (mut name, mut settings) = (self.name.clone(), self.card.clone());
+        settings["limit_s"] = self.limit.as_secs_f64().into();
         if self.driving.is_per_robot() {
             name.push_str(" per robot");
             settings["patience_s"] = self.driving.patience_s().into();

@@ -8,7 +8,7 @@ use tandem::cli::Cli;
 use super::pages::root;
 
 /// Programs that are taken at their word: they are not ours.
-const OTHERS: [&str; 4] = ["claude", "export", "mdbook", "openssl"];
+const OTHERS: [&str; 5] = ["claude", "export", "mdbook", "ollama", "openssl"];
 
 /// What variables of a cluster stand for, so that a line with them can be read.
 const VARIABLES: [(&str, &str); 6] = [
@@ -86,6 +86,9 @@ fn check_command(words: &[&str]) -> Result<(), String> {
             true => Ok(()),
             false => check_tandem(args),
         },
+        ["python" | "python3", "-m", "tandem.agent", ..] => {
+            expect_file("gateway/python/tandem/agent/__main__.py")
+        }
         ["python" | "python3", file, ..] => expect_file(file),
         [program, ..] if OTHERS.contains(program) => Ok(()),
         [program, ..] => Err(format!("nobody knows the program {program}; see OTHERS in command_lines.rs")),

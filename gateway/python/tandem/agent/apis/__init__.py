@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from .endpoint import EndpointError, MissingPackage, Model, TooLong, without_keys
-from .models import check_package, open_model
+from .models import open_model
 
-__all__ = ["EndpointError", "MissingPackage", "Model", "TooLong", "check_package", "open_model", "without_keys"]
+__all__ = ["EndpointError", "MissingPackage", "Model", "TooLong", "open_model", "without_keys"]

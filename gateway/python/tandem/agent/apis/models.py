@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-from ..settings import AgentSettings, Api
+from ..settings import AgentSettings
 from .chat import ChatModel
-from .endpoint import Model, import_sdk
+from .endpoint import Model
 from .messages import MessagesModel
 from .responses import ResponsesModel
-
-_SDKS: dict[Api, str] = {"openai": "openai", "openai-chat": "openai", "anthropic": "anthropic"}
-
-
-def check_package(api: Api) -> None:
-    """Refuses where the API's SDK is not installed, and says what to install."""
-    import_sdk(_SDKS[api])
 
 
 def open_model(settings: AgentSettings, cache_key: str) -> Model:

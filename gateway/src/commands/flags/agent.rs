@@ -1,0 +1,167 @@
+//! The flags that say which language model plays and what it may use up: those of `python -m tandem.agent`, which reads them.
+
+use std::iter;
+
+use clap::{CommandFactory, Parser};
+use serde_json::{Value, json};
+
+/// Of a program's time, the part after which a model finishes by itself, in twelfths.
+const OWN_TWELFTHS: u32 = 11;
+
+/// How long after the model's own time it is stopped.
+const GRACE_S: u32 = 300;
+
+/// A language model.
+#[derive(Debug, Clone, clap::Args)]
+pub struct AgentFlags {
+    /// The model's name at its endpoint.
+    #[arg(long, value_name = "NAME")]
+    model: String,
+    /// What the endpoint speaks: OpenAI's Responses, its Chat Completions (Ollama, vLLM and most others), or Anthropic's Messages.
+    #[arg(long, value_name = "API", default_value = "openai", value_parser = ["openai", "openai-chat", "anthropic"])]
+    api: String,
+    /// Where the endpoint is, as http://127.0.0.1:11434/v1 [default: the API's maker].
+    #[arg(long, value_name = "URL")]
+    base_url: Option<String>,
+    /// How much the model thinks, in its API's words, as low or high [default: its own].
+    #[arg(long, value_name = "WORD")]
+    effort: Option<String>,
+    /// Longest conversation in tokens; the older half of a longer one becomes a list of calls [default: 100000].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    context_tokens: Option<u32>,
+    /// Tokens read and written in an episode, after which it is finished [default: any number].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    max_tokens_total: Option<u64>,
+    /// US dollars spent in an episode, by the prices below, after which it is finished [default: any amount].
+    #[arg(long, value_name = "USD")]
+    max_usd: Option<f64>,
+    /// Calls of tools in an episode, after which it is finished [default: 500].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    max_calls: Option<u32>,
+    /// Time for an episode, after which it is finished [default: 3300].
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..))]
+    max_seconds: Option<u32>,
+    /// Price of a million tokens that are read.
+    #[arg(long, value_name = "USD")]
+    usd_per_million_input: Option<f64>,
+    /// Price of a million tokens that are written.
+    #[arg(long, value_name = "USD")]
+    usd_per_million_output: Option<f64>,
+    /// Price of a million tokens that are read from a cache [default: as other tokens that are read].
+    #[arg(long, value_name = "USD")]
+    usd_per_million_cached: Option<f64>,
+}
+
+/// The flags as they stand behind `agent:`.
+#[derive(Debug, Parser)]
+#[command(no_binary_name = true, disable_help_flag = true)]
+struct AgentOptions {
+    #[command(flatten)]
+    flags: AgentFlags,
+}
+
+impl AgentFlags {
+    /// What stands behind `agent:` on the command line, as MODEL or MODEL?api=anthropic&max-usd=2.
+    pub fn parse_policy(text: &str) -> Result<AgentFlags, String> {
+        let (model, options) = text.split_once('?').unwrap_or((text, ""));
+        if model.trim().is_empty() {
+            return Err("no model; give one, as agent:MODEL or agent:MODEL?api=anthropic&max-usd=2".into());
+        }
+        let options = options.split('&').filter(|option| !option.is_empty());
+        let arguments =
+            iter::once(format!("--model={model}")).chain(options.map(|option| format!("--{option}")));
+        let refused = |error: clap::Error| {
+            let text = error.to_string();
+            let lines = text.lines().take_while(|line| !line.trim().is_empty()).map(str::trim);
+            let said = lines.collect::<Vec<_>>().join(" ");
+            let said = said.trim_start_matches("error: ");
+            format!("{said}; an option of agent: is one of {}", options_of_agents())
+        };
+        AgentOptions::try_parse_from(arguments).map(|options| options.flags).map_err(refused)
+    }
+
+    /// The model's name.
+    pub fn model(&self) -> &str {
+        &self.model
+    }
+
+    /// How long a program may take that is given `usual_s` where nobody says otherwise.
+    pub fn limit_s(&self, usual_s: u32) -> u32 {
+        usual_s.max(self.max_seconds.map_or(0, |own_s| own_s.saturating_add(GRACE_S)))
+    }
+
+    /// The arguments for Python, where the program is stopped after `limit_s`.
+    pub fn arguments(&self, limit_s: u32) -> Vec<String> {
+        let own_s = self.max_seconds.unwrap_or((limit_s / 12 * OWN_TWELFTHS).max(1));
+        let own_s = ("max-seconds", Some(own_s.to_string()));
+        let given = self.given().into_iter().filter(|(flag, _)| *flag != "max-seconds");
+        let written = |(flag, value): (&str, Option<String>)| value.map(|value| format!("--{flag}={value}"));
+        given.chain([own_s]).filter_map(written).collect()
+    }
+
+    /// What results keep of it.
+    pub fn card(&self) -> Value {
+        let given =
+            self.given().into_iter().filter_map(|(flag, value)| Some((flag.to_owned(), json!(value?))));
+        Value::Object(given.collect())
+    }
+
+    /// Each flag with its value.
+    fn given(&self) -> [(&'static str, Option<String>); 12] {
+        let text = |number: Option<f64>| number.map(|number| number.to_string());
+        [
+            ("model", Some(self.model.clone())),
+            ("api", Some(self.api.clone())),
+            ("base-url", self.base_url.clone()),
+            ("effort", self.effort.clone()),
+            ("context-tokens", self.context_tokens.map(|number| number.to_string())),
+            ("max-tokens-total", self.max_tokens_total.map(|number| number.to_string())),
+            ("max-usd", text(self.max_usd)),
+            ("max-calls", self.max_calls.map(|number| number.to_string())),
+            ("max-seconds", self.max_seconds.map(|number| number.to_string())),
+            ("usd-per-million-input", text(self.usd_per_million_input)),
+            ("usd-per-million-output", text(self.usd_per_million_output)),
+            ("usd-per-million-cached", text(self.usd_per_million_cached)),
+        ]
+    }
+}
+
+/// The names of the flags, but for the model's.
+fn options_of_agents() -> String {
+    let command = AgentOptions::command();
+    let names = command.get_arguments().filter_map(clap::Arg::get_long).filter(|name| *name != "model");
+    names.collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_agent_is_named_with_its_flags() {
+        let plain = AgentFlags::parse_policy("org/model:8b").unwrap();
+        assert_eq!(plain.arguments(3600), ["--model=org/model:8b", "--api=openai", "--max-seconds=3300"]);
+        assert_eq!(plain.limit_s(3600), 3600);
+        let text = "m?api=openai-chat&base-url=http://127.0.0.1:11434/v1&max-usd=0.5&max-seconds=9000&usd-per-million-input=1.25";
+        let flags = AgentFlags::parse_policy(text).unwrap();
+        let expected = [
+            "--model=m",
+            "--api=openai-chat",
+            "--base-url=http://127.0.0.1:11434/v1",
+            "--max-usd=0.5",
+            "--usd-per-million-input=1.25",
+            "--max-seconds=9000",
+        ];
+        assert_eq!(flags.arguments(flags.limit_s(3600)), expected);
+        assert_eq!(flags.limit_s(3600), 9300);
+        assert_eq!(flags.card()["base-url"], "http://127.0.0.1:11434/v1");
+    }
+
+    #[test]
+    fn every_flag_is_handed_on() {
+        let flags = AgentFlags::parse_policy("m").unwrap();
+        let handed: Vec<&str> =
+            flags.given().iter().map(|(flag, _)| *flag).filter(|flag| *flag != "model").collect();
+        assert_eq!(handed.join(", "), options_of_agents());
+    }
+}

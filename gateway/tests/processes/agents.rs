@@ -1,0 +1,117 @@
+//! Language models, which Python plays: what is said where it cannot, and how it is started. A script stands for it here; the package's
+//! own tests have the loop.
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Output},
+};
+
+use serde_json::Value;
+
+use crate::skipped::skipped;
+
+fn tandem(python: &Path, arguments: &[&str]) -> (Output, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tandem"));
+    let output = command.env("TANDEM_PYTHON", python).args(arguments).output().expect("the program starts");
+    let printed = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+    (output, printed.concat())
+}
+
+/// An interpreter that does `what` in place of the loop, unless it is only asked whether it could.
+#[cfg(unix)]
+fn interpreter(folder: &Path, when_checked: &str, what: &str) -> std::path::PathBuf {
+    use std::os::unix::fs::PermissionsExt;
+    let path = folder.join("python");
+    let text = format!("#!/bin/sh\ncase \"$*\" in *--check) {when_checked};; esac\n{what}\n");
+    fs::write(&path, text).expect("a script");
+    fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).expect("a script that runs");
+    path
+}
+
+#[test]
+fn what_is_missing_is_said_before_an_episode_begins() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out");
+    let out = out.to_str().expect("UTF-8");
+    let evaluate =
+        ["evaluate", "--policy", "agent:m", "--tasks", "handover", "--seeds", "2000", "--out", out];
+    let agent = ["agent", "--model", "m", "--seed", "2000", "--runs", out];
+    let check = |python: &Path, says: &str| {
+        for arguments in [&evaluate[..], &agent] {
+            let (output, printed) = tandem(python, arguments);
+            assert!(!output.status.success() && printed.contains(says), "{arguments:?}: {printed}");
+            assert!(!Path::new(out).exists(), "{arguments:?}: {printed}");
+        }
+    };
+    check(Path::new("/no/python"), "/no/python cannot be started");
+    check(Path::new("/no/python"), "pip install 'tandem-sim[agents]'");
+    #[cfg(unix)]
+    {
+        let missing = "echo 'python: No module named tandem' >&2; exit 1";
+        check(&interpreter(folder.path(), missing, "exit 9"), "pip install 'tandem-sim[agents]'");
+        let refused = "echo 'tandem agent: no key for m; set OPENAI_API_KEY' >&2; exit 1";
+        check(&interpreter(folder.path(), refused, "exit 9"), "tandem: no key for m; set OPENAI_API_KEY");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_model_plays_as_a_program_does() {
+    if Command::new("curl").arg("--version").output().is_err() {
+        return skipped("there is no curl");
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let post =
+        "curl -sf -X POST -H \"Authorization: Bearer $TANDEM_TOKEN\" -H 'content-type: application/json'";
+    let finish = format!(
+        "echo \"$@\"; {post} -d '{{\"steps\": 5}}' \"$TANDEM_URL/v1/episodes/$TANDEM_EPISODE/tools/wait\" > /dev/null; \
+         {post} -d '{{}}' \"$TANDEM_URL/v1/episodes/$TANDEM_EPISODE/tools/finish\" > /dev/null"
+    );
+    let python = interpreter(folder.path(), "exit 0", &finish);
+    let out = folder.path().join("out");
+    let policy = "agent:org/m:8b?api=openai-chat&base-url=http://127.0.0.1:1/v1&max-usd=2";
+    let evaluate = ["evaluate", "--policy", policy, "--tasks", "handover", "--seeds", "2000", "--out"];
+    let (output, printed) = tandem(&python, &[&evaluate[..], &[out.to_str().expect("UTF-8")]].concat());
+    assert!(output.status.success(), "{printed}");
+    let read = |name: &str| fs::read_to_string(out.join(name)).expect(name);
+    let results: Value = serde_json::from_str(&read("results.json")).expect("JSON");
+    let card = &results["policy"];
+    assert_eq!(card["name"], "agent:org/m:8b", "{card}");
+    assert_eq!(
+        (&card["settings"]["api"], &card["settings"]["max-usd"]),
+        (&"openai-chat".into(), &"2".into()),
+        "{card}"
+    );
+    let said = "-m tandem.agent --model=org/m:8b --api=openai-chat --base-url=http://127.0.0.1:1/v1 --max-usd=2 --max-seconds=3300\n";
+    assert_eq!(read("episodes/handover-2000/stdout.txt"), said);
+    let (output, printed) =
+        tandem(&python, &["evaluate", "--policy", "agent:m?colour=red", "--tasks", "handover"]);
+    assert!(!output.status.success() && printed.contains("one of api, base-url"), "{printed}");
+}
+
+#[cfg(unix)]
+#[test]
+fn the_command_gives_a_model_its_server() {
+    if Command::new("curl").arg("--version").output().is_err() {
+        return skipped("there is no curl");
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let list = "echo \"$@\"; while [ \"$1\" != --url ]; do shift; done; \
+                curl -sf -H \"Authorization: Bearer $TANDEM_TOKEN\" \"$2/v1/episodes\"";
+    let python = interpreter(folder.path(), "exit 0", list);
+    let runs = folder.path().join("runs");
+    let agent = ["agent", "--model", "m", "--per-robot", "--task", "pouring", "--seeds", "7-8", "--runs"];
+    let (output, printed) = tandem(&python, &[&agent[..], &[runs.to_str().expect("UTF-8")]].concat());
+    assert!(output.status.success(), "{printed}");
+    for says in [
+        "--task pouring --seed 7 --per-robot\n",
+        "--task pouring --seed 8 --per-robot\n",
+        "{\"episodes\":[]}",
+    ] {
+        assert!(printed.contains(says), "no {says:?} in {printed}");
+    }
+    let failing = interpreter(folder.path(), "exit 0", "exit 3");
+    let (output, printed) = tandem(&failing, &[&agent[..], &[runs.to_str().expect("UTF-8")]].concat());
+    assert!(!output.status.success(), "{printed}");
+}
