@@ -1,6 +1,7 @@
 //! Colliders: convex shapes on links and in the world, and where they are in a step.
 
 use rapier3d::parry::bounding_volume::Aabb;
+use rapier3d::parry::shape::TypedShape;
 use rapier3d::prelude::SharedShape;
 use serde::{Deserialize, Serialize};
 
@@ -32,6 +33,8 @@ pub struct Surface {
     pub collider: Collider,
     /// The link that carries it, if something moves that.
     pub body: Option<LinkId>,
+    /// Whether it rolls on what Parry takes for edges and corners; of balls it knows where they touch.
+    pub is_round: bool,
     /// Middle and half extents of its bounds, in its own frame.
     middle_m: DVec3,
     half_m: DVec3,
@@ -66,6 +69,7 @@ impl Surface {
         }
         let mut surface = Surface {
             body,
+            is_round: is_round(&collider.shape),
             middle_m: local.center().as_dvec3(),
             half_m,
             world_from_shape: DPose3::IDENTITY,
@@ -113,4 +117,14 @@ impl Surface {
         let moved_m = DVec3::new(tile_m(away_m.x), tile_m(away_m.y), 0.0);
         self.world_from_shape * DPose3::from_translation(moved_m)
     }
+}
+
+fn is_round(shape: &SharedShape) -> bool {
+    matches!(
+        shape.as_typed_shape(),
+        TypedShape::Cylinder(_)
+            | TypedShape::Cone(_)
+            | TypedShape::RoundCylinder(_)
+            | TypedShape::RoundCone(_)
+    )
 }

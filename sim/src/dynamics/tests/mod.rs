@@ -10,3 +10,4 @@ mod friction;
 mod inverse;
 mod joints;
 mod overlap;
+mod rim;
