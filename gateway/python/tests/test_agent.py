@@ -7,6 +7,7 @@ import math
 import re
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -331,6 +332,43 @@ def test_a_model_for_each_robot(server: tandem.Server, runs: Path, capsys: pytes
     printed = capsys.readouterr().out
     assert "A: wait" in printed
     assert "B: wait" in printed
+
+
+def test_a_signal_ends_the_episode(server: tandem.Server, runs: Path) -> None:
+    asked, over = threading.Event(), threading.Event()
+
+    def script(_: str) -> Script:
+        yield Says(calls=(("wait", {"steps": 4}),))
+        asked.set()
+        over.wait(60)
+        yield Says()
+
+    with ScriptedEndpoint(script) as endpoint:
+        where = ["--api", "openai-chat", "--base-url", endpoint.base_url("openai-chat"), "--url", server.url]
+        command = [sys.executable, "-m", "tandem.agent", "--model", "m", *where, "--task", "handover", "--seed", str(SEED)]
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as program:
+            assert asked.wait(60)
+            program.terminate()
+            told = program.communicate(timeout=60)[1]
+        over.set()
+    assert (program.returncode, told) == (130, "tandem agent: interrupted\n")
+    came = result(runs)
+    assert (came["ended"], came["env_steps"]) == ("finished", 304)
+
+
+def test_words_and_what_they_took_are_kept_with_the_episode(server: tandem.Server, runs: Path) -> None:
+    said = saying(
+        Says(thoughts="Nothing is urgent.", words="I wait.", calls=(("wait", {"steps": 5}),)), Says(calls=(("finish", {}),))
+    )
+    prices = ["--usd-per-million-input", "1", "--usd-per-million-output", "2", "--usd-per-million-cached", "0.5"]
+    with ScriptedEndpoint(said) as endpoint:
+        assert run(endpoint, server, "anthropic", *prices) == 0
+    usage = result(runs)["usage"]
+    assert (usage["notes"], usage["models"]) == (3, ["scripted"])
+    assert usage["input_tokens"] == 2 * INPUT_TOKENS
+    assert (usage["output_tokens"], usage["cached_tokens"]) == (2 * OUTPUT_TOKENS, 2 * CACHED_TOKENS)
+    assert math.isclose(usage["usd"], 2 * ((INPUT_TOKENS - CACHED_TOKENS) + CACHED_TOKENS * 0.5 + OUTPUT_TOKENS * 2) / 1e6)
+    assert usage["model_s"] > 0
 
 
 def test_an_episode_that_somebody_else_began_is_joined(

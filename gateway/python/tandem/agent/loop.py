@@ -102,9 +102,8 @@ class Player:
             self._show(f"says: {reply.words}")
         tokens = {"input": usage.input, "output": usage.output, "cached": usage.cached}
         counted = tokens if reply.usage is not None else None
-        calls = ", ".join(call.tool for call in reply.calls) or "nothing"
-        text, kind = (reply.words, "message") if reply.words else (f"(calls {calls})", "note")
-        self._seat.note(Note(text, kind, robot, counted, usd, model, round(seconds, 3)))
+        # Without words it says what was used alone.
+        self._seat.note(Note(reply.words, "message", robot, counted, usd, model, round(seconds, 3)))
 
     def _answer(self, reply: Reply) -> list[Answer]:
         """Makes the calls of a reply in their order, as many as may be made."""

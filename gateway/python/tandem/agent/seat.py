@@ -16,6 +16,10 @@ from .tools import Tool, offered
 MOST_ANSWER_CHARACTERS = 60_000
 """Of a longer reply the model is shown the beginning."""
 
+MOST_NOTE_CHARACTERS = 50_000
+MOST_NAME_CHARACTERS = 200
+"""What the server takes of a note's words, and of the model's name."""
+
 LONGEST_WAIT_S = 30.0
 BUSY_TRIES = 5
 """How long and how often a server that is asked too much is waited for."""
@@ -107,10 +111,15 @@ class Seat:
         if not self._keeps_notes:
             return
         try:
-            self.client.request("POST", f"/v1/episodes/{self.episode_id}/notes", asdict(note))
-        except Refused:
-            # A server that keeps none, or no more: words are not worth an episode.
-            self._keeps_notes = False
+            body = {
+                **asdict(note),
+                "text": note.text[:MOST_NOTE_CHARACTERS],
+                "model": (note.model or "")[:MOST_NAME_CHARACTERS],
+            }
+            self.client.request("POST", f"/v1/episodes/{self.episode_id}/notes", body)
+        except Refused as refused:
+            # Words are not worth an episode: an older server keeps none, and one that has ended keeps no more.
+            self._keeps_notes = refused.kind not in ("no-route", "ended")
 
 
 def _is_over(reply: dict[str, Any]) -> bool:
