@@ -119,6 +119,7 @@ def test_a_model_lifts_the_bottle(api: str, server: tandem.Server, runs: Path, c
     printed = capsys.readouterr().out
     assert f"13 calls, {replies} replies, {replies * INPUT_TOKENS} tokens read ({replies * CACHED_TOKENS} cached)" in printed
     assert f"{usd:.4f} US dollars" in printed
+    assert "reached: p1 grasp_and_lift" in printed
     assert "thinks: Where is the bottle?" in printed and "says: It is lifted." in printed
 
 

@@ -115,11 +115,14 @@ class Player:
             elif most is not None and self._ledger.calls >= most:
                 answers.append(Answer(call, f"not called: all of {most} calls were made", refused=True))
             else:
+                reached = self._seat.phases
                 answer = self._seat.call(call)
                 self._ledger.calls += 1
                 pictures = f" and {len(answer.pictures)} pictures" if answer.pictures else ""
                 self._show(f"{call.tool} {_short(call.arguments)}")
                 self._show(f"  {'refused: ' if answer.refused else ''}{_short(answer.text)}{pictures}")
+                for phase in self._seat.phases[len(reached) :]:
+                    self._show(f"reached: {phase}")
                 answers.append(answer)
         return answers
 

@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from ..client import Client
 from ..errors import EpisodeEnded, Refused, SimulatorFailed
-from .conversation import Answer, Call
+from .conversation import Answer, Call, listed
 from .pictures import take_pictures
 from .tools import Tool, offered
 
@@ -55,6 +55,8 @@ class Seat:
         self.briefing: dict[str, Any] = client.request("GET", f"/v1/episodes/{episode_id}/briefing")
         self.tools: tuple[Tool, ...] = offered(client, episode_id)
         self.over = False
+        self.phases: tuple[str, ...] = ()
+        """Those reached so far, as the latest reply that tells them has them."""
         self._keeps_notes = True
 
     def call(self, call: Call) -> Answer:
@@ -84,7 +86,11 @@ class Seat:
             return Answer(call, failed.detail, refused=True)
         except Refused as refused:
             return Answer(call, refused.detail, refused=True)
-        self.over = self.over or tool.name == "finish" or _is_over(reply)
+        self.over = self.over or tool.name == "finish" or any(_is_last(part) for part in _parts(reply))
+        for part in _parts(reply):
+            phases = part.get("phases")
+            if isinstance(phases, list):
+                self.phases = tuple(f"{phase['number']} {phase['id']}" for phase in listed(phases))
         pictures = take_pictures(reply)
         text = json.dumps(reply, separators=(",", ":"), ensure_ascii=False)
         if len(text) > MOST_ANSWER_CHARACTERS:
@@ -122,8 +128,12 @@ class Seat:
             self._keeps_notes = refused.kind not in ("no-route", "ended")
 
 
-def _is_over(reply: dict[str, Any]) -> bool:
-    """Whether a reply is the last of its episode. That of several commands has the last one's within."""
+def _parts(reply: dict[str, Any]) -> list[dict[str, Any]]:
+    """A reply, and within one to several commands that to the last of them."""
     last = reply.get("last")
-    parts = [reply, cast("dict[str, Any]", last)] if isinstance(last, dict) else [reply]
-    return any(part.get("stop_reason") in _OVER or part.get("ended") is not None for part in parts)
+    return [reply, cast("dict[str, Any]", last)] if isinstance(last, dict) else [reply]
+
+
+def _is_last(reply: dict[str, Any]) -> bool:
+    """Whether a reply is the last of its episode."""
+    return reply.get("stop_reason") in _OVER or reply.get("ended") is not None
