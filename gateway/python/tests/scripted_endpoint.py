@@ -17,6 +17,10 @@ INPUT_TOKENS, CACHED_TOKENS, OUTPUT_TOKENS = 1000, 400, 50
 """What every reply says that it took."""
 
 
+BESIDE: dict[str, Any] = {"extra_content": {"google": {"thought_signature": "signed"}}}
+"""What the server of Chat Completions puts beside each call and wants back, as that of Gemini does."""
+
+
 @dataclass(frozen=True)
 class Says:
     """A reply of the scripted model: words, and tools with their arguments; a text stands for arguments as it is."""
@@ -94,6 +98,10 @@ class ScriptedEndpoint:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self._server.shutdown()
         self._server.server_close()
+
+    def restart(self) -> None:
+        """Forgets what was said."""
+        self._conversations.clear()
 
     def base_url(self, api: str) -> str:
         """The address that an SDK is given."""
@@ -202,7 +210,7 @@ class Chat:
 
     def reply(self, said: Says, ids: list[str]) -> dict[str, Any]:
         calls = [
-            {"id": call_id, "type": "function", "function": {"name": name, "arguments": _json(arguments)}}
+            {**BESIDE, "id": call_id, "type": "function", "function": {"name": name, "arguments": _json(arguments)}}
             for call_id, (name, arguments) in zip(ids, said.calls, strict=True)
         ]
         message: dict[str, Any] = {"role": "assistant", "content": said.words or None}

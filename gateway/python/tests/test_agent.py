@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from scripted_endpoint import CACHED_TOKENS, INPUT_TOKENS, OUTPUT_TOKENS, Heard, Refusal, Says, Script, ScriptedEndpoint
+from scripted_endpoint import BESIDE, CACHED_TOKENS, INPUT_TOKENS, OUTPUT_TOKENS, Heard, Refusal, Says, Script, ScriptedEndpoint
 
 import tandem
 from tandem.agent import main
@@ -159,6 +159,24 @@ def test_thoughts_go_back_as_their_api_wants_them(server: tandem.Server) -> None
     assert endpoint.requests[0].body["output_config"] == {"effort": "low"}
     sent = endpoint.requests[1].body["messages"][1]["content"]
     assert sent[0] == {"type": "thinking", "thinking": "Hm.", "signature": "signed"}
+
+
+def test_servers_of_chat_completions_get_back_what_they_gave(server: tandem.Server) -> None:
+    said = saying(Says(thoughts="Hm.", calls=(("get_status", {}),)), Says(calls=(("finish", {}),)))
+    with ScriptedEndpoint(said) as endpoint:
+        assert run(endpoint, server) == 0
+        sent = endpoint.requests[1].body["messages"][2]
+        assert (sent["reasoning_content"], sent["tool_calls"][0]["extra_content"]) == ("Hm.", BESIDE["extra_content"])
+        begin = endpoint.answer
+
+        def answer(path: str, body: dict[str, Any], headers: dict[str, str]) -> tuple[int, dict[str, Any]]:
+            if any("reasoning_content" in message for message in body["messages"]):
+                return 400, {"error": {"message": "messages.2: property 'reasoning_content' is unsupported", "code": None}}
+            return begin(path, body, headers)
+
+        endpoint.answer = answer
+        endpoint.restart()
+        assert run(endpoint, server) == 0
 
 
 def test_what_an_endpoint_does_not_know_is_left_out(server: tandem.Server) -> None:

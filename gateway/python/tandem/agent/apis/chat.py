@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from ..conversation import Answers, Call, Picture, Reply, Told, Turn, Usage, listed
 from ..settings import AgentSettings
 from ..tools import Tool, for_chat
 from .endpoint import EndpointError, OptionalFields, import_sdk, open_client, request
+
+RETURNED = ("reasoning_content", "reasoning_details")
+"""Thoughts that some servers want back with the calls that they led to, by the names that they give them."""
 
 NOTHING = "(no words)"
 """What stands for a reply without words: endpoints want some."""
@@ -22,14 +25,14 @@ class ChatModel:
         self._sdk = import_sdk("openai")
         self._settings = settings
         self._client = open_client(self._sdk, self._sdk.OpenAI, settings, ["OPENAI_API_KEY"])
-        self._optional = OptionalFields(prompt_cache_key=cache_key, reasoning_effort=settings.effort)
+        self._optional = OptionalFields(RETURNED, prompt_cache_key=cache_key, reasoning_effort=settings.effort)
 
     def ask(self, instructions: str, tools: Sequence[Tool], turns: Sequence[Turn]) -> Reply:
         """See Model."""
-        messages = [{"role": "system", "content": instructions}]
-        messages += [message for turn in turns for message in _messages(turn)]
 
         def send(**optional: Any) -> Any:
+            messages = [{"role": "system", "content": instructions}]
+            messages += [message for turn in turns for message in _messages(turn, self._optional.returned)]
             return self._client.chat.completions.create(
                 model=self._settings.model, messages=messages, tools=for_chat(tools), **optional
             )
@@ -40,12 +43,12 @@ class ChatModel:
         return _reply(completion, len(turns))
 
 
-def _messages(turn: Turn) -> list[dict[str, Any]]:
+def _messages(turn: Turn, returned: Collection[str]) -> list[dict[str, Any]]:
     match turn:
         case Told(text):
             return [{"role": "user", "content": text}]
         case Reply():
-            return [turn.as_sent]
+            return [{name: value for name, value in turn.as_sent.items() if name not in RETURNED or name in returned}]
         case Answers(answers):
             told = [{"role": "tool", "tool_call_id": answer.call.call_id, "content": answer.text} for answer in answers]
             # Answers are text alone here, so that pictures follow as ours.
@@ -69,16 +72,20 @@ def _reply(completion: Any, turn: int) -> Reply:
         for index, call in enumerate(asked)
     )
     as_sent: dict[str, Any] = {"role": "assistant", "content": words or (None if calls else NOTHING)}
+    as_sent |= {name: value for name in RETURNED if (value := getattr(message, name, None))}
     if calls:
-        as_sent["tool_calls"] = [_sent(call) for call in calls]
+        as_sent["tool_calls"] = [_sent(call, raw) for call, raw in zip(calls, asked, strict=True)]
     thoughts = getattr(message, "reasoning_content", None) or getattr(message, "reasoning", None) or ""
     return Reply(words, str(thoughts), calls, _usage(completion.usage), as_sent, choice.finish_reason == "length")
 
 
-def _sent(call: Call) -> dict[str, Any]:
-    """A call as it is shown to the model again. Templates of local models read the arguments, which have to be JSON."""
+def _sent(call: Call, raw: Any) -> dict[str, Any]:
+    """A call as it is shown to the model again, with whatever its server has put beside it. Templates of local models read the
+    arguments, which have to be JSON.
+    """
     arguments = call.arguments if _is_object(call.arguments) else "{}"
-    return {"id": call.call_id, "type": "function", "function": {"name": call.tool, "arguments": arguments}}
+    function = {"name": call.tool, "arguments": arguments}
+    return {**raw.model_dump(exclude_none=True, mode="json"), "id": call.call_id, "function": function}
 
 
 def _is_object(text: str) -> bool:

@@ -77,17 +77,22 @@ def open_client(sdk: Any, make: Callable[..., Any], settings: AgentSettings, key
 class OptionalFields:
     """Fields of a request that do it good, and that not every endpoint knows: one that refuses a field by its name is asked
     without it from then on.
+
+    returned: Fields of the model's replies that are sent back, as some models want them.
     """
 
-    def __init__(self, **fields: Any) -> None:
+    def __init__(self, returned: Sequence[str] = (), **fields: Any) -> None:
         self.fields = {name: value for name, value in fields.items() if value is not None}
+        self.returned = set(returned)
 
     def drop_named(self, text: str) -> bool:
         """Leaves out what a refusal names. Returns whether it named any."""
         named = [name for name in self.fields if name in text]
         for name in named:
             del self.fields[name]
-        return bool(named)
+        sent_back = {name for name in self.returned if name in text}
+        self.returned -= sent_back
+        return bool(named or sent_back)
 
 
 def request(sdk: Any, settings: AgentSettings, optional: OptionalFields, send: Callable[..., Any]) -> Any:
