@@ -11,6 +11,18 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from types import TracebackType
 from typing import Any, TypeAlias, cast
 
+from anthropic.types.message_create_params import MessageCreateParamsNonStreaming
+from openai.types.chat.completion_create_params import CompletionCreateParamsNonStreaming
+from openai.types.responses.response_create_params import ResponseCreateParamsNonStreaming
+from pydantic import TypeAdapter
+
+# What the SDKs take themselves, as their makers describe it.
+BODIES: dict[str, TypeAdapter[Any]] = {
+    "/v1/chat/completions": TypeAdapter(CompletionCreateParamsNonStreaming),
+    "/v1/responses": TypeAdapter(ResponseCreateParamsNonStreaming),
+    "/v1/messages": TypeAdapter(MessageCreateParamsNonStreaming),
+}
+
 PNG = b"\x89PNG\r\n\x1a\n"
 
 INPUT_TOKENS, CACHED_TOKENS, OUTPUT_TOKENS = 1000, 400, 50
@@ -118,6 +130,7 @@ class ScriptedEndpoint:
             if refusal is not None:
                 self.refused.append(refusal.status)
                 return refusal.status, _error(path, refusal)
+            check_all(BODIES[path].validate_python(body))
             wire = WIRES[path]
             system = wire.system(body)
             self.requests.append(Request(path, body, system, _count_pictures(body), headers))
@@ -159,6 +172,16 @@ class ScriptedEndpoint:
                 pass
 
         return Handler
+
+
+def check_all(value: Any) -> None:
+    """Has what is checked lazily checked, as pydantic does it with what can be gone through."""
+    if isinstance(value, dict):
+        for each in cast("dict[str, Any]", value).values():
+            check_all(each)
+    elif not isinstance(value, str | int | float | None):
+        for each in value:
+            check_all(each)
 
 
 def _error(path: str, refusal: Refusal) -> dict[str, Any]:

@@ -241,6 +241,20 @@ def test_limits_finish_the_episode(flags: str, server: tandem.Server, runs: Path
     assert (came["ended"], came["env_steps"]) == ("finished", 300 + replies)
 
 
+def test_an_endpoint_that_does_not_count_is_estimated(server: tandem.Server, capsys: pytest.CaptureFixture[str]) -> None:
+    with ScriptedEndpoint(saying(*[Says(calls=(observe(),))] * 9)) as endpoint:
+        begin = endpoint.answer
+
+        def answer(path: str, body: dict[str, Any], headers: dict[str, str]) -> tuple[int, dict[str, Any]]:
+            status, reply = begin(path, body, headers)
+            return status, {**reply, "usage": None}
+
+        endpoint.answer = answer
+        assert run(endpoint, server, "openai-chat", "--max-tokens-total", "30000") == 0
+    assert 2 <= len(endpoint.requests) <= 5
+    assert "--max-tokens-total 30000" in capsys.readouterr().out
+
+
 def test_no_call_is_made_beyond_the_limit(server: tandem.Server, runs: Path) -> None:
     with ScriptedEndpoint(saying(Says(calls=(("wait", {"steps": 1}),) * 5))) as endpoint:
         assert run(endpoint, server, "openai-chat", "--max-calls", "3") == 0

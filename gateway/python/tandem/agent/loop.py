@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from .apis import Model, TooLong
 from .conversation import Answer, Answers, Reply, Told, Usage
 from .instructions import CUT_NUDGE, NUDGE, OPENING, instructions
 from .limits import Ledger
-from .memory import Memory
+from .memory import CHARACTERS_A_TOKEN, Memory, estimate
 from .seat import Note, Seat
 from .settings import AgentSettings
 
@@ -44,6 +45,9 @@ class Player:
         self._show = show
         self._memory = Memory(OPENING, settings.context_tokens)
         self._instructions = instructions(seat)
+        # For endpoints that do not count.
+        begun = [self._instructions, *(f"{tool.description}{json.dumps(tool.schema)}" for tool in seat.tools)]
+        self._begun_tokens = sum(len(text) for text in begun) // CHARACTERS_A_TOKEN
         self._ledger = Ledger(settings.limits, settings.prices)
 
     def play(self) -> Played:
@@ -84,7 +88,7 @@ class Player:
         else:
             reply = self._model.ask(self._instructions, self._seat.tools, self._memory.turns)
         seconds = time.monotonic() - began_s
-        usage = reply.usage or Usage(self._memory.estimate(), 0)
+        usage = reply.usage or Usage(self._begun_tokens + self._memory.estimate(), estimate(reply))
         usd = self._ledger.add(usage)
         self._tell(reply, usage, usd, seconds)
         self._memory.trim(usage.input)
