@@ -15,7 +15,7 @@ use super::topics::messages::{PhaseMessage, StepError, StepMessage, ToolCallMess
 use super::topics::notes::NoteMessage;
 use super::{checkpoint_name, metadata, topics};
 use crate::results::RESULT_FILE;
-use crate::scoring::{ScoreMemory, Scores};
+use crate::scoring::{ScoreMemory, Scores, StepScore};
 use crate::spec::EpisodeSpec;
 
 /// A recording in memory.
@@ -189,13 +189,18 @@ impl Recording {
 
     /// Scores the recorded steps by the task's conditions as this build has them.
     pub fn score(&self) -> Result<Scores, RecordingError> {
+        self.score_with(|_| {})
+    }
+
+    /// As [`Recording::score`], and lets `look` see every step's score.
+    pub fn score_with(&self, mut look: impl FnMut(&StepScore)) -> Result<Scores, RecordingError> {
         let mut steps = self.steps();
         let missing = || RecordingError::Missing { path: self.path.clone(), what: topics::STEPS.into() };
         let start = steps.next().ok_or_else(missing)??;
         let mut scores = self.spec.task.scores(&self.spec.robot.model()?, &start)?;
         scores.set_memory(self.scores.clone());
         for step in steps {
-            scores.update(&step?);
+            look(&scores.update(&step?));
         }
         Ok(scores)
     }

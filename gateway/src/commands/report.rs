@@ -5,8 +5,8 @@ use std::process::ExitCode;
 
 use tandem_episodes::replay::{ShortFilm, short_film};
 use tandem_episodes::reports::{
-    EvaluationReport, Film, FilmContent, FilmPlace, FilmedEpisode, ReportFormat, ReportPictures, film_places,
-    gallery, load, pictured_failures,
+    EvaluationReport, Film, FilmContent, FilmPlace, FilmedEpisode, ReportFormat, ReportPictures,
+    failure_moments, film_places, gallery, load, pictured_failures,
 };
 use tandem_episodes::{Recording, write_whole};
 
@@ -25,7 +25,7 @@ pub struct ReportArgs {
     /// File to write [default: report.FORMAT in the first folder].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Failures to show pictures of, where episodes were recorded.
+    /// Failures to show pictures and moments of, where episodes were recorded.
     #[arg(long, value_name = "N", default_value_t = 12)]
     failures: usize,
 }
@@ -33,7 +33,8 @@ pub struct ReportArgs {
 /// Reads the results and writes the report.
 pub fn run(args: ReportArgs) -> CommandResult {
     let loaded = load(&args.folders)?;
-    let report = EvaluationReport::of(&loaded);
+    let mut report = EvaluationReport::of(&loaded);
+    report.failure_moments = failure_moments(&loaded, args.failures);
     let pictures = match args.format {
         ReportFormat::Html => ReportPictures {
             films: film_places(&loaded).into_iter().map(film).collect(),

@@ -41,7 +41,7 @@ const base = new URL(link).origin;
 const call = async (path, body) => {
   const answer = await fetch(base + path, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) });
   assert(answer.ok, `${path}: ${await answer.clone().text()}`);
-  return answer.json();
+  return answer.status === 204 ? null : answer.json();
 };
 
 const browser = await chromium.launch({
@@ -81,17 +81,21 @@ await wide.click(".card");
 await wide.waitForSelector(".view canvas");
 await wide.check("#look");
 const tool = (name, body) => call(`/v1/episodes/${id}/tools/${name}`, body);
+const note = (text, more) => call(`/v1/episodes/${id}/notes`, { text, kind: "thought", model: "a-model", ...more });
+await note("I look first: where is the bottle, and what do A and B see of it?", { tokens: { input: 5210, output: 84, cached: 4800 }, usd: 0.004, seconds: 2.5 });
 await tool("observe", {});
+await fetch(`${base}/v1/episodes/${id}/tools/move_wrists`, { method: "POST", headers: { "content-type": "application/json" }, body: '{"steps": "many"}' });
+await note(`B reaches too far on purpose. ${"It is to be seen that this is told, however long it takes. ".repeat(12)}`, { robot: "B" });
 for (let reach = 0; reach < 6; reach += 1) {
   await tool("move_wrists", { steps: 25, robots: [
     { robot: "A", right_position_m: [0.3, -0.15, 0.1 + 0.04 * reach], right_quaternion_wxyz: [1, 0, 0, 0] },
     { robot: "B", left_position_m: [0.9, 0.2, 0.2], left_quaternion_wxyz: [1, 0, 0, 0] }] });
   await new Promise((resolve) => { setTimeout(resolve, 300); });
 }
-await wide.waitForFunction(() => document.querySelectorAll(".calls li").length === 7);
+await wide.waitForFunction(() => document.querySelectorAll(".story li").length === 10);
 await wide.waitForSelector(".pictures img");
 await wide.waitForFunction(() => /3\.0 s/.test(document.querySelector(".facts").textContent));
-assert.equal(await wide.locator(".calls .seen img").count(), 2, "the pictures that the policy was shown");
+assert.equal(await wide.locator(".story .seen img").count(), 2, "the pictures that the policy was shown");
 for (const width of WIDTHS) {
   for (const scheme of ["light", "dark"]) {
     await wide.setViewportSize({ width, height: Math.round(Math.min(width * 1.6, 1400)) });
@@ -124,9 +128,44 @@ await wide.locator(".track input").fill("1.4");
 await wide.waitForFunction(() => /1\.40 of/.test(document.querySelector(".scrubber output").textContent));
 await wide.check("#look");
 await wide.waitForSelector(".pictures img");
-await wide.locator(".calls details").first().click();
-await wide.waitForTimeout(600);
-await wide.screenshot({ path: "finished.png", fullPage: true });
+// What happened is told in its order, with what was said, refused and shown, and goes along with the moment.
+const told = await wide.locator(".story li").allInnerTexts();
+assert.equal(told.length, 10);
+assert(/thought, a-model/.test(told[0]) && /5210 tokens read \(4800 from a cache\), 84 written; \$0\.0040; 2\.5 s/.test(told[0]), told[0]);
+assert(/–\s+move_wrists\s+refused: move_wrists: steps/.test(told[2]), told[2]);
+assert(/^B, thought/.test(told[3]), told[3]);
+await wide.click("text=All of it");
+assert.equal(await wide.locator(".story .seen img").count(), 2);
+await wide.waitForFunction(() => [...document.querySelectorAll(".story .seen img")].every((image) => image.naturalWidth === 320));
+assert.match(await wide.locator(".bands").innerText(), /p1 grasp and lift/);
+assert.match(await wide.locator(".track canvas").getAttribute("aria-label"), /6 commands, 1 looks and questions, 1 refused, 2 notes/);
+const current = () => wide.locator('.story [aria-current="step"] code').innerText();
+assert.equal(await current(), "move_wrists");
+const moment = () => wide.locator(".scrubber output").innerText();
+await wide.click('[aria-label="The next call"]');
+await wide.waitForFunction(() => /^1\.50 of/.test(document.querySelector(".scrubber output").textContent));
+await wide.click('[aria-label="The call before"]');
+await wide.waitForFunction(() => /^1\.00 of/.test(document.querySelector(".scrubber output").textContent));
+await wide.locator(".track canvas").click({ position: { x: 1, y: 5 } });
+await wide.waitForFunction(() => !/^1\.00 of/.test(document.querySelector(".scrubber output").textContent));
+await wide.uncheck("#look");
+await wide.waitForFunction(() => /call 1 at 0\.0 s/.test(document.querySelector(".pictures").textContent));
+assert.match(await wide.locator(".plots").first().innerText(), /Tokens \[thousands so far\] 5\.3/);
+await wide.locator(".story details").first().click();
+await wide.locator(".track input").fill("1.4");
+for (const width of WIDTHS) {
+  for (const scheme of ["light", "dark"]) {
+    await wide.setViewportSize({ width, height: Math.round(Math.min(width * 1.6, 1400)) });
+    await wide.emulateMedia({ colorScheme: scheme });
+    await wide.waitForTimeout(1200);
+    await wide.screenshot({ path: `finished-${width}-${scheme}.png`, fullPage: true });
+    const beyond = await wide.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+    assert(beyond <= 0, `${beyond} pixels beyond a width of ${width}`);
+  }
+}
+await wide.setViewportSize({ width: 1400, height: 1000 });
+await wide.emulateMedia({ colorScheme: "light" });
+console.log(`shown: ${await moment()}`);
 await wide.click("text=Play");
 await wide.waitForFunction(() => document.querySelector(".scrubber button").textContent === "Pause");
 await wide.waitForFunction(() => !/1\.40 of/.test(document.querySelector(".scrubber output").textContent));
@@ -145,12 +184,12 @@ assert.deepEqual(wide.wrong, []);
 await new Promise((resolve) => { spawn(program, ["demo", "--seeds", "2001", "--runs", runs]).on("exit", resolve); });
 const key = { authorization: `Bearer ${new URL(link).hash.slice(1)}` };
 const recorded = await (await fetch(`${base}/watch/run?run=handover-seed2001`, { headers: key })).arrayBuffer();
-const { calls, result } = JSON.parse(new TextDecoder().decode(recorded.slice(4, 4 + new DataView(recorded).getUint32(0, true))));
+const { story, result } = JSON.parse(new TextDecoder().decode(recorded.slice(4, 4 + new DataView(recorded).getUint32(0, true))));
 const { episode_id: again } = await call("/v1/episodes", { task: "handover", seed: 2001, protocol: "agentic" });
 await wide.goto(`${base}/watch?episode=${again}`);
 await wide.waitForSelector(".view canvas");
 let frames = 0;
-for (const made of calls) {
+for (const made of story.filter(({ kind, number }) => kind === "call" && number !== null)) {
   await call(`/v1/episodes/${again}/tools/${made.tool}`, JSON.parse(made.arguments));
   await wide.waitForTimeout(150);
   if (++frames === 30) await wide.screenshot({ path: "demo-half.png" });

@@ -62,6 +62,9 @@ const UNITS: &[&str] = &[
     "kg_m",
     "kg_m2",
     "kg_m3",
+    "usd",
+    // As the wire has it.
+    "seconds",
 ];
 
 /// What the name of a number without a unit may end in, or a name that says of several units which is where.

@@ -15,13 +15,17 @@ pub struct FoundEpisode {
     pub strip: Option<PathBuf>,
     /// Its recording, where there is one.
     pub recording: Option<PathBuf>,
+    /// Its folder below the runs folder, which is taken to be that which holds the reported one, or is itself reported.
+    pub run: String,
 }
 
 impl FoundEpisode {
     /// An episode with what its run folder holds, if there is one.
-    fn new(played: PlayedEpisode, run: &Path) -> FoundEpisode {
-        let file = |name: &str| Some(run.join(name)).filter(|path| path.exists());
-        FoundEpisode { played, strip: file(STRIP_FILE), recording: file(Recorder::FILE_NAME) }
+    fn new(played: PlayedEpisode, folder: &Path, runs: &Path) -> FoundEpisode {
+        let file = |name: &str| Some(folder.join(name)).filter(|path| path.exists());
+        let absolute = folder.canonicalize().unwrap_or_else(|_| folder.into());
+        let run = absolute.strip_prefix(runs).unwrap_or(&absolute).to_string_lossy().replace('\\', "/");
+        FoundEpisode { played, strip: file(STRIP_FILE), recording: file(Recorder::FILE_NAME), run }
     }
 }
 
@@ -71,10 +75,13 @@ impl LoadedEpisodes {
 
 /// Results of single episodes, each in a file.
 fn load_results(folder: &Path, loaded: &mut LoadedEpisodes) -> Result<(), LoadError> {
+    let absolute = folder.canonicalize().unwrap_or_else(|_| folder.into());
+    // RUNS/EVALUATION/episodes
+    let runs = absolute.ancestors().nth(2).unwrap_or(&absolute);
     for path in entries(folder)?.into_iter().filter(|path| path.extension().is_some_and(|e| e == "json")) {
         let read = std::fs::read(&path).map_err(|error| error.to_string());
         match read.and_then(|bytes| serde_json::from_slice(&bytes).map_err(|error| error.to_string())) {
-            Ok(played) => loaded.add(FoundEpisode::new(played, &path.with_extension(""))),
+            Ok(played) => loaded.add(FoundEpisode::new(played, &path.with_extension(""), runs)),
             Err(reason) => loaded.skipped.push(format!("{}: {reason}", path.display())),
         }
     }
@@ -85,10 +92,12 @@ fn load_results(folder: &Path, loaded: &mut LoadedEpisodes) -> Result<(), LoadEr
 fn load_recordings(folder: &Path, loaded: &mut LoadedEpisodes) -> Result<(), LoadError> {
     let absolute = folder.canonicalize().unwrap_or_else(|_| folder.into());
     let policy = absolute.file_name().map_or("policy".into(), |name| name.to_string_lossy().into_owned());
+    let is_run = folder.join(Recorder::FILE_NAME).exists();
+    let runs = absolute.parent().filter(|_| is_run).unwrap_or(&absolute);
     let folders = std::iter::once(folder.to_owned()).chain(entries(folder)?);
     for run in folders.filter(|run| run.join(Recorder::FILE_NAME).exists()) {
         match recorded(&run.join(Recorder::FILE_NAME), &policy) {
-            Ok(played) => loaded.add(FoundEpisode::new(played, &run)),
+            Ok(played) => loaded.add(FoundEpisode::new(played, &run, runs)),
             Err(reason) => loaded.skipped.push(reason),
         }
     }

@@ -1,6 +1,7 @@
 //! What episodes that were played come to: rates with what they leave open, averages, effort, why episodes failed, and how two
 //! policies compare on the same seeds; as one page that needs nothing else, or as text.
 
+mod agents;
 mod compare;
 mod load;
 mod page;
@@ -11,9 +12,11 @@ mod tables;
 #[cfg(test)]
 mod tests;
 mod text;
+mod went_wrong;
 
 use serde::Serialize;
 
+pub use agents::ModelCosts;
 pub use compare::{Comparison, PairedRow};
 pub use load::{FoundEpisode, LoadError, LoadedEpisodes, load};
 pub use page::ReportPictures;
@@ -25,6 +28,7 @@ pub use policy::{
 };
 pub use published::{PublishedAverages, PublishedRates};
 pub use rate::{MeanRate, Rate};
+pub use went_wrong::{FailureMoment, failure_moments};
 
 /// Everything that a report says in words and numbers.
 #[derive(Debug, Serialize)]
@@ -36,6 +40,8 @@ pub struct EvaluationReport {
     /// What was published of the same tasks in another simulator.
     pub published: Vec<PublishedRates>,
     pub published_averages: Vec<PublishedAverages>,
+    /// Where recorded failures went wrong, as far as somebody has looked.
+    pub failure_moments: Vec<FailureMoment>,
     /// Files that are no episodes, and why.
     pub skipped: Vec<String>,
 }
@@ -84,6 +90,7 @@ impl EvaluationReport {
         EvaluationReport {
             published: published::rows().into_iter().filter(|row| played(&row.task)).collect(),
             published_averages: published::averages(),
+            failure_moments: Vec::new(),
             skipped: loaded.skipped.clone(),
             policies,
             comparisons,

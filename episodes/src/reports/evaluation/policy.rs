@@ -7,6 +7,7 @@ use serde_json::Value;
 use tandem_tools_spec::EndReason;
 use xxhash_rust::xxh3::xxh3_64;
 
+use super::agents::ModelCosts;
 use super::load::FoundEpisode;
 use super::rate::{MeanRate, Rate};
 use crate::results::{Exclusion, PhaseLevel, PlayedEpisode, PolicyCard, missed_phase_note, named, shown_in};
@@ -60,6 +61,8 @@ pub struct TaskReport {
     pub episodes: usize,
     pub phases: Vec<PhaseReport>,
     pub effort: Option<EpisodeCosts>,
+    /// What models took, where notes say it.
+    pub models: Option<ModelCosts>,
     pub falls: u32,
 }
 
@@ -271,6 +274,7 @@ impl TaskReport {
             episodes: whole.len(),
             phases: task.phases.iter().enumerate().map(phase).collect(),
             effort: EpisodeCosts::of(&whole),
+            models: ModelCosts::of(&whole),
             falls: of_task.iter().map(|one| one.result.falls).sum(),
         })
     }
@@ -290,7 +294,8 @@ impl EpisodeCosts {
 }
 
 impl ValueRange {
-    fn of(mut values: Vec<f64>) -> Option<ValueRange> {
+    /// `None` of no values.
+    pub fn of(mut values: Vec<f64>) -> Option<ValueRange> {
         values.sort_by(f64::total_cmp);
         let (min, max) = (*values.first()?, *values.last()?);
         let middle = values.len() / 2;

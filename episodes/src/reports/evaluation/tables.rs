@@ -3,7 +3,7 @@
 use super::compare::{Comparison, PairedRow};
 use super::policy::{EpisodeCosts, PolicyReport, TaskReport, ValueRange};
 use super::rate::{MeanRate, Rate, percent};
-use super::{EvaluationReport, PublishedRates};
+use super::{EvaluationReport, PublishedRates, agents, went_wrong};
 use crate::statistics::Count;
 
 /// Words in rows and columns.
@@ -15,15 +15,24 @@ pub struct Table {
     pub rows: Vec<Vec<String>>,
     /// Columns from this one on hold figures.
     pub figures_from: usize,
+    /// Where the last cell of each row leads, in a table whose rows lead somewhere.
+    pub links: Vec<String>,
 }
 
 /// What there is nothing to say of.
-const NONE: &str = "-";
+pub const NONE: &str = "-";
 
 impl Table {
-    fn new(title: impl Into<String>, note: &str, head: &[&str], figures_from: usize) -> Table {
+    pub fn new(title: impl Into<String>, note: &str, head: &[&str], figures_from: usize) -> Table {
         let head = head.iter().map(|text| text.to_string()).collect();
-        Table { title: title.into(), note: note.into(), head, rows: Vec::new(), figures_from }
+        Table {
+            title: title.into(),
+            note: note.into(),
+            head,
+            rows: Vec::new(),
+            figures_from,
+            links: Vec::new(),
+        }
     }
 }
 
@@ -34,8 +43,10 @@ pub fn all(report: &EvaluationReport) -> Vec<Table> {
     tables.push(averages(policies));
     tables.push(together(policies));
     tables.push(shown(policies));
+    tables.push(agents::table(policies));
     tables.push(effort(policies));
     tables.push(reasons(policies));
+    tables.push(went_wrong::table(&report.failure_moments, policies));
     tables.push(excluded(policies));
     tables.extend(report.comparisons.iter().map(comparison));
     tables.push(published(&report.published));

@@ -45,7 +45,7 @@ fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Played
 }
 
 /// Ten episodes of Handover, of which nine, six and three reach its phases.
-fn nine_six_three(policy: &str) -> Vec<PlayedEpisode> {
+pub fn nine_six_three(policy: &str) -> Vec<PlayedEpisode> {
     let task = tasks::find("handover").unwrap();
     let reached = [3, 3, 3, 2, 2, 2, 1, 1, 1, 0];
     (0..).zip(reached).map(|(seed, phases)| played(policy, task, seed, phases)).collect()
@@ -60,9 +60,11 @@ fn write(folder: &Path, episodes: &[PlayedEpisode]) {
     }
 }
 
-fn found(episodes: Vec<PlayedEpisode>) -> LoadedEpisodes {
-    let episodes =
-        episodes.into_iter().map(|played| FoundEpisode { played, strip: None, recording: None }).collect();
+pub fn found(episodes: Vec<PlayedEpisode>) -> LoadedEpisodes {
+    let episodes = episodes
+        .into_iter()
+        .map(|played| FoundEpisode { played, strip: None, recording: None, run: String::new() })
+        .collect();
     LoadedEpisodes { episodes, skipped: Vec::new() }
 }
 
@@ -374,7 +376,12 @@ fn failures_are_shown_by_turns() {
     image::RgbImage::new(812, 40).save(&strip).unwrap();
     let mut loaded = found(nine_six_three("agent"));
     let other = tasks::find("pouring").unwrap();
-    loaded.episodes.push(FoundEpisode { played: played("agent", other, 1, 0), strip: None, recording: None });
+    loaded.episodes.push(FoundEpisode {
+        played: played("agent", other, 1, 0),
+        strip: None,
+        recording: None,
+        run: String::new(),
+    });
     loaded.episodes.iter_mut().for_each(|found| found.strip = Some(strip.clone()));
     let shown = gallery(&loaded, 2);
     let seeds: Vec<_> = shown.iter().map(|failure| (failure.task, failure.seed, &*failure.phase)).collect();

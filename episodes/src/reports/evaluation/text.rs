@@ -1,6 +1,7 @@
 //! Reports without pictures: Markdown, CSV with a line for each rate, and tables for LaTeX.
 
 use super::EvaluationReport;
+use super::policy::{TaskReport, ValueRange};
 use super::rate::Rate;
 use super::tables::{Table, all};
 
@@ -19,10 +20,21 @@ pub fn markdown(report: &EvaluationReport) -> String {
         text += &format!("\n## {}\n\n{}\n\n", table.title, table.note);
         text += &line(&table.head);
         text += &format!("|{}|\n", rules.collect::<Vec<_>>().join("|"));
-        text.extend(table.rows.iter().map(|row| line(row)));
+        text.extend(linked_rows(&table).iter().map(|row| line(row)));
     }
     text.extend(report.skipped.iter().map(|skipped| format!("\nLeft out: {skipped}\n")));
     text
+}
+
+/// The rows, with what they lead to as Markdown has it.
+fn linked_rows(table: &Table) -> Vec<Vec<String>> {
+    let mut rows = table.rows.clone();
+    for (row, to) in rows.iter_mut().zip(&table.links) {
+        if let Some(last) = row.last_mut() {
+            *last = format!("[{last}]({to})");
+        }
+    }
+    rows
 }
 
 fn escape_pipe(cell: &str) -> String {
@@ -32,10 +44,12 @@ fn escape_pipe(cell: &str) -> String {
 /// A line for each rate of each phase, for whoever counts on.
 pub fn csv(report: &EvaluationReport) -> String {
     let mut text = String::from(
-        "policy,protocol,task,robots,phase_number,phase_id,collaborative,rate,successes,trials,share,low_share,high_share\n",
+        "policy,protocol,task,robots,phase_number,phase_id,collaborative,rate,successes,trials,share,low_share,high_share,\
+         median_steps,median_calls,median_thinking_s,median_input_tokens,median_output_tokens,median_usd\n",
     );
     for policy in &report.policies {
         for task in &policy.tasks {
+            let costs = csv_costs(task);
             for phase in &task.phases {
                 let rates = [
                     ("cumulative", phase.cumulative),
@@ -48,13 +62,27 @@ pub fn csv(report: &EvaluationReport) -> String {
                     let of = format!("{policy_name},{protocol},{},{}", task.task, task.robots);
                     let which = format!("{},{},{}", phase.number, phase.id, phase.collaborative);
                     text += &format!(
-                        "{of},{which},{name},{successes},{trials},{share},{low_share},{high_share}\n"
+                        "{of},{which},{name},{successes},{trials},{share},{low_share},{high_share},{costs}\n"
                     );
                 }
             }
         }
     }
     text
+}
+
+/// What the task's whole episodes took; empty where nothing says it.
+fn csv_costs(task: &TaskReport) -> String {
+    let (effort, models) = (task.effort.as_ref(), task.models.as_ref());
+    let ranges: [Option<&ValueRange>; 6] = [
+        effort.map(|effort| &effort.steps),
+        effort.map(|effort| &effort.calls),
+        effort.map(|effort| &effort.thought),
+        models.map(|models| &models.input_tokens),
+        models.map(|models| &models.output_tokens),
+        models.and_then(|models| models.usd.as_ref()),
+    ];
+    ranges.map(|range| range.map_or(String::new(), |range| range.median_value.to_string())).join(",")
 }
 
 /// A cell of CSV, quoted as RFC 4180 has it.

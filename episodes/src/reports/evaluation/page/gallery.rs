@@ -27,43 +27,54 @@ const SCALE: f64 = 0.5;
 /// The failures that have a picture, `most` of them at most, by turns from every policy and task; those without one are
 /// left out.
 pub fn gallery(loaded: &LoadedEpisodes, most: usize) -> Vec<Failure> {
+    let pictured = failed_by_turns(loaded, most, |found| found.strip.is_some()).into_iter();
+    let pictured = pictured.map(|(policy, found)| {
+        let moments = found.strip.as_deref().and_then(|path| strip::read(path, SCALE)).unwrap_or_default();
+        Failure { moments, ..failure(&policy, found) }
+    });
+    pictured.collect()
+}
+
+/// So many failures at most of those that are `wanted`, with their policies, by turns from every policy and task.
+pub fn failed_by_turns(
+    loaded: &LoadedEpisodes,
+    most: usize,
+    wanted: fn(&FoundEpisode) -> bool,
+) -> Vec<(String, &FoundEpisode)> {
     let groups = groups(&loaded.episodes);
-    let all: Vec<(Failure, &FoundEpisode)> = groups.iter().flat_map(failed).collect();
-    let total = all.len();
+    let mut all: Vec<(String, &FoundEpisode)> = Vec::new();
+    for group in &groups {
+        let of_group = failed(group).into_iter().filter(|found| wanted(found));
+        all.extend(of_group.map(|found| (group.name.clone(), found)));
+    }
     let turn = |index: usize| {
-        let (failure, _) = &all[index];
-        let earlier = all[..index].iter().filter(|(other, found)| {
-            (&other.policy, other.task) == (&failure.policy, failure.task) && found.strip.is_some()
-        });
-        earlier.count()
+        let (policy, found) = &all[index];
+        let same = |(other, one): &&(String, &FoundEpisode)| {
+            other == policy && one.played.spec.task == found.played.spec.task
+        };
+        all[..index].iter().filter(same).count()
     };
-    let mut order: Vec<usize> = (0..total).filter(|index| all[*index].1.strip.is_some()).collect();
+    let mut order: Vec<usize> = (0..all.len()).collect();
     order.sort_by_key(|index| turn(*index));
     order.truncate(most);
     order.sort_unstable();
-    let pictured = order.into_iter().map(|index| {
-        let (failure, found) = &all[index];
-        let moments = found.strip.as_deref().and_then(|path| strip::read(path, SCALE)).unwrap_or_default();
-        Failure { moments, ..failure.clone() }
-    });
-    pictured.collect()
+    order.into_iter().map(|index| all[index].clone()).collect()
 }
 
 /// How many failures have a picture.
 pub fn pictured_failures(loaded: &LoadedEpisodes) -> usize {
     let failures = groups(&loaded.episodes);
-    failures.iter().flat_map(failed).filter(|(_, found)| found.strip.is_some()).count()
+    failures.iter().flat_map(failed).filter(|found| found.strip.is_some()).count()
 }
 
-fn failed<'a>(group: &PolicyGroup<'a>) -> Vec<(Failure, &'a FoundEpisode)> {
-    let found = group.episodes.iter().filter(|found| !found.played.succeeded());
-    found.map(|found| (failure(group, found), *found)).collect()
+fn failed<'a>(group: &PolicyGroup<'a>) -> Vec<&'a FoundEpisode> {
+    group.episodes.iter().copied().filter(|found| !found.played.succeeded()).collect()
 }
 
-fn failure(group: &PolicyGroup, found: &FoundEpisode) -> Failure {
+fn failure(policy: &str, found: &FoundEpisode) -> Failure {
     let spec = &found.played.spec;
     Failure {
-        policy: group.name.clone(),
+        policy: policy.into(),
         task: spec.task.id,
         seed: spec.seed,
         phase: first_missed_phase(&found.played),

@@ -150,7 +150,12 @@ fn table(table: &Table) -> String {
     for (index, row) in table.rows.iter().enumerate() {
         let same = same(index);
         let said = |column: usize, text: &String| if column < same { String::new() } else { text.clone() };
-        let cells = row.iter().enumerate().map(|(column, text)| cell("td", (column, &said(column, text))));
+        let last = row.len() - 1;
+        let leads = |column: usize| table.links.get(index).filter(|_| column == last);
+        let cells = row.iter().enumerate().map(|(column, text)| match leads(column) {
+            Some(to) => format!(r#"<td class="number"><a href="{}">{}</a></td>"#, escape(to), escape(text)),
+            None => cell("td", (column, &said(column, text))),
+        });
         let class = if same == 0 && index > 0 && grouped { r#" class="first""# } else { "" };
         rows += &format!("<tr{class}>{}</tr>", cells.collect::<String>());
     }

@@ -3,8 +3,8 @@
 
 use serde::Serialize;
 
-const PHASES: &str = include_str!("published.csv");
-const PHASE_LEVEL: &str = include_str!("published_phase_level.csv");
+const PHASES: &str = include_str!("phases.csv");
+const PHASE_LEVEL: &str = include_str!("phase_level.csv");
 
 /// Rates of one method on one task.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -1,0 +1,172 @@
+//! What agents took: tokens, price and time of their models, of episodes whose notes say it.
+
+use std::collections::BTreeSet;
+
+use serde::Serialize;
+use tandem_tools_spec::Usage;
+
+use super::policy::{PolicyReport, TaskReport, ValueRange};
+use super::rate::percent;
+use super::tables::{NONE, Table};
+use crate::results::PlayedEpisode;
+
+/// What the notes of a policy's whole episodes say that models took, each an episode's sum.
+#[derive(Debug, Serialize)]
+pub struct ModelCosts {
+    /// Episodes that have notes.
+    pub episodes: usize,
+    /// Tokens that were read, those from a cache included.
+    pub input_tokens: ValueRange,
+    pub output_tokens: ValueRange,
+    /// Of all tokens that were read, which share came from a cache; `None` where none were read.
+    pub cached_share: Option<f64>,
+    /// `None`, as the next two, where no note says it.
+    pub usd: Option<ValueRange>,
+    /// What all of them cost.
+    pub total_usd: Option<f64>,
+    /// How long models took.
+    pub model_time: Option<ValueRange>,
+    pub models: BTreeSet<String>,
+}
+
+impl ModelCosts {
+    /// `None` where no episode has notes.
+    pub fn of(episodes: &[&PlayedEpisode]) -> Option<ModelCosts> {
+        let used: Vec<&Usage> = episodes.iter().filter_map(|played| played.result.usage.as_ref()).collect();
+        let range = |of: fn(&Usage) -> Option<f64>| {
+            ValueRange::of(used.iter().filter_map(|usage| of(usage)).collect())
+        };
+        let total = |of: fn(&Usage) -> u64| used.iter().map(|usage| of(usage)).sum::<u64>() as f64;
+        let (input, cached) = (total(|usage| usage.input_tokens), total(|usage| usage.cached_tokens));
+        let usd = range(|usage| usage.usd);
+        Some(ModelCosts {
+            episodes: used.len(),
+            input_tokens: range(|usage| Some(usage.input_tokens as f64))?,
+            output_tokens: range(|usage| Some(usage.output_tokens as f64))?,
+            cached_share: (input > 0.0).then(|| cached / input),
+            total_usd: usd.is_some().then(|| used.iter().filter_map(|usage| usage.usd).sum()),
+            usd,
+            model_time: range(|usage| usage.model_s),
+            models: used.iter().flat_map(|usage| usage.models.iter().cloned()).collect(),
+        })
+    }
+}
+
+/// Policies side by side, task by task, where any of them has notes.
+pub fn table(policies: &[PolicyReport]) -> Table {
+    let mut table = Table::new(
+        "Agents",
+        "Of episodes from the task's beginning. Phases are a mean; all else but success is a median an episode. Tokens, price and the \
+         time of models are what notes say; of tokens that were read, which share came from a cache. The price of a success is that of \
+         all episodes over those that succeeded.",
+        &[
+            "Policy",
+            "Task",
+            "Success",
+            "Phases",
+            "Steps",
+            "Calls",
+            "Thinking (s)",
+            "Models (s)",
+            "Tokens read (k)",
+            "From a cache",
+            "Tokens written (k)",
+            "Price ($)",
+            "A success ($)",
+        ],
+        2,
+    );
+    let any = |policy: &PolicyReport| policy.tasks.iter().any(|task| task.models.is_some());
+    if policies.iter().any(any) {
+        let rows =
+            policies.iter().flat_map(|policy| policy.tasks.iter().filter_map(move |task| row(policy, task)));
+        table.rows.extend(rows);
+    }
+    table
+}
+
+/// `None` where no episode began at the task's beginning.
+fn row(policy: &PolicyReport, task: &TaskReport) -> Option<Vec<String>> {
+    let effort = task.effort.as_ref()?;
+    let success = task.phases.last()?.cumulative?;
+    let reached: f64 = task.phases.iter().filter_map(|phase| Some(phase.cumulative?.share)).sum();
+    let models = task.models.as_ref();
+    let median = |range: Option<&ValueRange>, scale: f64, decimals: usize| {
+        range.map_or(NONE.into(), |range| format!("{:.decimals$}", range.median_value / scale))
+    };
+    let of_success = models.and_then(|models| models.total_usd).filter(|_| success.successes > 0);
+    Some(vec![
+        policy.name.clone(),
+        task.task.into(),
+        success.fraction(),
+        format!("{reached:.1} of {}", task.phases.len()),
+        median(Some(&effort.steps), 1.0, 0),
+        median(Some(&effort.calls), 1.0, 0),
+        median(Some(&effort.thought), 1.0, 1),
+        median(models.and_then(|models| models.model_time.as_ref()), 1.0, 1),
+        median(models.map(|models| &models.input_tokens), 1e3, 1),
+        models
+            .and_then(|models| models.cached_share)
+            .map_or(NONE.into(), |share| format!("{} %", percent(share))),
+        median(models.map(|models| &models.output_tokens), 1e3, 1),
+        median(models.and_then(|models| models.usd.as_ref()), 1.0, 3),
+        of_success.map_or(NONE.into(), |usd| format!("{:.3}", usd / success.successes as f64)),
+    ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reports::evaluation::tests::{found, nine_six_three};
+    use crate::reports::evaluation::{EvaluationReport, FailureMoment, ReportFormat, ReportPictures};
+
+    /// An expert that says nothing of models, beside an agent of which half of the episodes have notes.
+    #[test]
+    fn agents_are_compared_by_what_their_notes_say() {
+        let mut episodes = nine_six_three("agent");
+        for played in episodes.iter_mut().step_by(2) {
+            played.result.usage = Some(Usage {
+                notes: 3,
+                input_tokens: 10_000,
+                output_tokens: 500,
+                cached_tokens: 4_000,
+                usd: Some(0.06),
+                model_s: Some(12.5),
+                models: vec!["a-model".into()],
+            });
+        }
+        let silent = EvaluationReport::of(&found(nine_six_three("agent")));
+        episodes.extend(nine_six_three("expert"));
+        let mut report = EvaluationReport::of(&found(episodes));
+        let watch = "http://127.0.0.1:8700/watch?run=a&at=11.5";
+        report.failure_moments = vec![FailureMoment {
+            policy: "agent".into(),
+            task: "handover",
+            seed: 9,
+            phase: "p1".into(),
+            what: "A fell".into(),
+            time_s: 12.5,
+            watch: watch.into(),
+        }];
+        let write =
+            |report: &EvaluationReport, format| report.write(format, &ReportPictures::default()).unwrap();
+        let text = write(&report, ReportFormat::Markdown);
+        let agent = "| agent | handover | 3/10 | 1.8 of 3 | 504 | 60 | 4.5 | 12.5 | 10.0 | 40 % | 0.5 | 0.060 | 0.100 |";
+        let expert = "| expert | handover | 3/10 | 1.8 of 3 | 504 | 60 | 4.5 | - | - | - | - | - | - |";
+        let moment = format!("| agent | handover | 9 | p1 | A fell | [12.5]({watch}) |");
+        for line in [agent, expert, &moment] {
+            assert!(text.contains(line), "no {line}: {text}");
+        }
+        assert!(!write(&silent, ReportFormat::Markdown).contains("## Agents"));
+        let page = write(&report, ReportFormat::Html);
+        assert!(page.contains(&format!("<a href=\"{}\">12.5</a>", watch.replace('&', "&amp;"))), "{page}");
+        let csv = write(&report, ReportFormat::Csv);
+        assert!(csv.lines().nth(1).unwrap().ends_with(",504.5,60,4.5,10000,500,0.06"), "{csv}");
+        assert!(csv.lines().last().unwrap().ends_with(",504.5,60,4.5,,,"), "{csv}");
+        let json: serde_json::Value = serde_json::from_str(&write(&report, ReportFormat::Json)).unwrap();
+        let models = &json["policies"][0]["tasks"][0]["models"];
+        assert_eq!((&models["episodes"], &models["models"][0]), (&5.into(), &"a-model".into()));
+        assert_eq!(json["failure_moments"][0]["watch"], watch);
+        assert!(write(&report, ReportFormat::Tex).contains("A fell & 12.5"));
+    }
+}

@@ -1,0 +1,193 @@
+//! Where recorded episodes went wrong: the moment to look at first, and the address of the page that shows it.
+
+use serde::Serialize;
+
+use super::load::{FoundEpisode, LoadedEpisodes};
+use super::page::gallery::failed_by_turns;
+use super::policy::{PolicyReport, first_missed_phase};
+use super::tables::Table;
+use crate::recording::{Recording, RecordingError};
+use crate::scoring::{Facts, Grip};
+
+/// Where `tandem serve` is, unless it is told to be elsewhere.
+const SERVED_AT: &str = "http://127.0.0.1:8700";
+/// What falls so fast, and in no hand, has been dropped; what is set down is slower.
+const DROPPED_M_S: f32 = 0.8;
+
+/// The moment at which an episode went wrong.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FailureMoment {
+    pub policy: String,
+    pub task: &'static str,
+    pub seed: u32,
+    /// Number of the first phase that counts and was not reached.
+    pub phase: String,
+    /// As "A fell".
+    pub what: String,
+    /// Simulated time.
+    pub time_s: f64,
+    /// The page that shows it, on a server whose runs folder has the recording.
+    pub watch: String,
+}
+
+/// The moments of so many failures at most that were recorded, by turns from every policy and task.
+pub fn failure_moments(loaded: &LoadedEpisodes, most: usize) -> Vec<FailureMoment> {
+    let failures = failed_by_turns(loaded, most, |found| found.recording.is_some());
+    failures.into_iter().filter_map(|(policy, found)| moment(&policy, found)).collect()
+}
+
+/// `None` where the recording cannot be read.
+fn moment(policy: &str, found: &FoundEpisode) -> Option<FailureMoment> {
+    let recording = Recording::read(found.recording.as_deref()?).ok()?;
+    let (time_s, what) = went_wrong(&recording).ok()?;
+    let spec = &found.played.spec;
+    Some(FailureMoment {
+        policy: policy.into(),
+        task: spec.task.id,
+        seed: spec.seed,
+        phase: first_missed_phase(&found.played),
+        what,
+        time_s,
+        watch: watch_address(&found.run, time_s),
+    })
+}
+
+/// The first fall of a robot or the first drop of an object after the last phase that was reached; where there was none, the end.
+fn went_wrong(recording: &Recording) -> Result<(f64, String), RecordingError> {
+    let mut watcher = Watcher::default();
+    let names: Vec<&str> = recording.spec.task.robots.iter().map(|robot| robot.name).collect();
+    recording.score_with(|scored| watcher.look(&scored.facts, scored.reached, &names))?;
+    Ok(watcher.found.unwrap_or((watcher.last_s, "the end".into())))
+}
+
+#[derive(Default)]
+struct Watcher {
+    last_s: f64,
+    /// When each object was held last.
+    held_s: Vec<Option<f64>>,
+    fallen: Vec<bool>,
+    /// What went wrong first since the last phase.
+    found: Option<(f64, String)>,
+}
+
+impl Watcher {
+    fn look(&mut self, facts: &Facts, reached: bool, names: &[&str]) {
+        self.last_s = facts.time_s;
+        if reached {
+            // Whoever has fallen lies there still, but what was dropped has been made good.
+            self.found = self.found.take().filter(|(_, what)| what.ends_with("fell"));
+        }
+        self.held_s.resize(facts.objects.len(), None);
+        self.fallen.resize(facts.robots.len(), false);
+        for (index, robot) in facts.robots.iter().enumerate() {
+            if robot.fallen && !self.fallen[index] {
+                self.fallen[index] = true;
+                self.found.get_or_insert_with(|| (facts.time_s, format!("{} fell", names[index])));
+            }
+        }
+        for (object, held_s) in facts.objects.iter().zip(&mut self.held_s) {
+            let mut grips = object.hands.iter().flat_map(|hands| hands.iter());
+            if grips.any(|grip| *grip == Grip::Holding) {
+                *held_s = Some(facts.time_s);
+            } else if object.velocity_m_s.z < -DROPPED_M_S
+                && let Some(held_s) = held_s.take()
+            {
+                let what = format!("{} was dropped", object.name.replace('_', " "));
+                self.found.get_or_insert((held_s, what));
+            }
+        }
+    }
+}
+
+/// The page of a run at a moment, a little before which its reader wants to begin.
+fn watch_address(run: &str, time_s: f64) -> String {
+    let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.~/".contains(&byte);
+    let run: String = run
+        .bytes()
+        .map(|byte| if plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") })
+        .collect();
+    format!("{SERVED_AT}/watch?run={run}&at={:.1}", (time_s - 1.0).max(0.0))
+}
+
+/// The moments as a table.
+pub fn table(moments: &[FailureMoment], policies: &[PolicyReport]) -> Table {
+    let mut table = Table::new(
+        "Where episodes went wrong",
+        "The first fall of a robot, or the first drop of an object, after the last phase that was reached; else the end. Times open the \
+         episode's page a second before, on a `tandem serve` whose runs folder has the recording, once its link has been opened.",
+        &["Policy", "Task", "Seed", "Stuck before", "What", "At (s)"],
+        5,
+    );
+    let order = |name: &String| policies.iter().position(|policy| policy.name == *name);
+    let mut moments: Vec<&FailureMoment> = moments.iter().collect();
+    moments.sort_by_key(|moment| order(&moment.policy));
+    for moment in moments {
+        let FailureMoment { policy, task, seed, phase, what, time_s, watch } = moment;
+        let row = [policy, *task, &seed.to_string(), phase, what, &format!("{time_s:.1}")];
+        table.rows.push(row.map(str::to_owned).to_vec());
+        table.links.push(watch.clone());
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scoring::{A, B};
+    use crate::tasks;
+
+    /// What is found of these moments: seconds, whether a phase was reached, and what was so.
+    fn found(moments: &[(f64, bool, fn(Facts) -> Facts)]) -> Option<(f64, String)> {
+        let rest = Facts::at_rest(tasks::find("handover").unwrap());
+        let mut watcher = Watcher::default();
+        for (time_s, reached, so) in moments {
+            watcher.look(&Facts { time_s: *time_s, ..so(rest.clone()) }, *reached, &["A", "B"]);
+        }
+        watcher.found
+    }
+
+    fn falls(mut facts: Facts) -> Facts {
+        facts.object_mut("bottle").velocity_m_s.z = -1.0;
+        facts
+    }
+
+    fn fallen(mut facts: Facts) -> Facts {
+        facts.robots[B].fallen = true;
+        facts
+    }
+
+    #[test]
+    fn the_first_fall_or_drop_after_the_last_phase_is_what_went_wrong() {
+        let held = |facts: Facts| facts.held_by(&[A], "bottle");
+        let rest = |facts: Facts| facts;
+        let some = |time_s: f64, what: &str| Some((time_s, what.to_owned()));
+        assert_eq!(
+            found(&[(0.0, false, rest), (1.0, false, held), (2.0, true, held), (3.0, false, rest)]),
+            None
+        );
+        let dropped = [
+            (1.0, false, held as fn(Facts) -> Facts),
+            (1.2, false, rest),
+            (1.3, false, falls),
+            (4.0, false, fallen),
+        ];
+        assert_eq!(found(&dropped), some(1.0, "bottle was dropped"));
+        let made_good = [&dropped[..3], &[(5.0, false, held), (6.0, true, held)]].concat();
+        assert_eq!(found(&made_good), None);
+        assert_eq!(
+            found(&[&made_good[..], &[(7.0, false, fallen), (8.0, true, fallen)]].concat()),
+            some(7.0, "B fell")
+        );
+        // What no hand held falls for other reasons.
+        assert_eq!(found(&[(1.0, false, falls)]), None);
+    }
+
+    #[test]
+    fn addresses_hold_any_folder() {
+        assert_eq!(
+            watch_address("expert/episodes/handover-seed3", 12.34),
+            "http://127.0.0.1:8700/watch?run=expert/episodes/handover-seed3&at=11.3"
+        );
+        assert_eq!(watch_address("a b&c/ü", 0.4), "http://127.0.0.1:8700/watch?run=a%20b%26c/%C3%BC&at=0.0");
+    }
+}
