@@ -53,10 +53,11 @@ enum Job {
         note: Box<Note>,
         reply: ReplySender<()>,
     },
-    /// Keeps a call that was refused on its way here; nobody waits for that.
+    /// Keeps a call that was refused on its way here.
     Refused {
         operator: Option<String>,
         call: Box<RefusedCall>,
+        reply: ReplySender<()>,
     },
     Status {
         reply: ReplySender<Answer>,
@@ -247,9 +248,11 @@ impl EpisodeThread {
         self.do_job(|reply| Job::Note { operator, note, reply }).await
     }
 
-    /// Keeps a call that was refused before it came here. Nobody waits for that, and nobody is told where it cannot be kept.
-    pub fn refused(&self, operator: Option<&str>, call: RefusedCall) {
-        let _ = self.jobs.try_send(Job::Refused { operator: operator.map(str::to_owned), call: call.into() });
+    /// Keeps a call that was refused before it came here, after those that its caller made before. Nobody is told where it cannot be
+    /// kept.
+    pub async fn refused(&self, operator: Option<&str>, call: RefusedCall) {
+        let (operator, call) = (operator.map(str::to_owned), Box::new(call));
+        let _ = self.do_job_in_turn(|reply| Job::Refused { operator, call, reply }).await;
     }
 
     /// Where the episode stands, for those who look on: asking is no call of the policy's.
@@ -414,11 +417,11 @@ fn serve(mut session: PanicGuard, mut inbox: mpsc::Receiver<Job>, status: &Share
                 status.update(&session);
                 let _ = reply.send(kept.flatten());
             }
-            Job::Refused { operator, call } => {
+            Job::Refused { operator, call, reply } => {
                 let RefusedCall { tool, arguments, problem } = *call;
-                // The log has the reason of a failure.
-                let _ = session
+                let kept = session
                     .run(|session| session.refused_before(operator.as_deref(), &tool, &arguments, &problem));
+                let _ = reply.send(kept);
             }
             Job::Status { reply } => drop(reply.send(session.run(|session| standing(session)))),
             Job::Briefing { reply } => drop(reply.send(session.run(|session| session.briefing()))),

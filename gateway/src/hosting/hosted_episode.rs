@@ -91,8 +91,8 @@ impl HostedEpisode {
     }
 
     /// Keeps a call of `who` that was refused before it reached the episode.
-    pub fn refused(&self, who: &Caller, call: RefusedCall) {
-        self.thread.refused(who.robot(), call);
+    pub async fn refused(&self, who: &Caller, call: RefusedCall) {
+        self.thread.refused(who.robot(), call).await;
     }
 
     /// Where the episode stands, for who looks on: asking is no call.
@@ -190,7 +190,7 @@ impl HostedEpisode {
                 if let Err(refusal) = &answer
                     && refusal.is_of_the_team()
                 {
-                    self.thread.refused(Some(&robot), asked.because(refusal));
+                    self.thread.refused(Some(&robot), asked.because(refusal)).await;
                 }
                 answer
             }

@@ -37,7 +37,7 @@ class EpisodePage {
       seek: (time) => { this.time.play(false); this.time.seek(time); },
       picture: (robot, time) => this.cameraPath(robot, time),
     } : null);
-    this.timeline = this.recorded ? new Timeline(head, this.time) : null;
+    this.timeline = this.recorded ? new Timeline(head, this.time, frames) : null;
     this.budget = this.recorded ? new BudgetPlots(head, frames) : null;
     this.layOut(main);
     this.stage = new Stage(this.view, scene);

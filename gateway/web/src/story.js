@@ -5,7 +5,7 @@ import { element, words } from "./dom.js";
 
 const MOST_SHOWN = 400;
 /** Less is no thinking that a reader wants to know of. */
-const LEAST_THOUGHT_S = 0.1;
+const LEAST_THOUGHT_S = 0.5;
 /** Words of a note that are shown before its reader opens it. */
 const SHORT_NOTE = 280;
 

@@ -3,6 +3,7 @@
 import { colour, element, words } from "./dom.js";
 
 const ROW = 13;
+const CONTROL_HZ = 50;
 /** Rows of marks: what it is, its colour, and which entries are in it. */
 const ROWS = [
   { name: "commands", colour: "--accent", of: (entry) => entry.kind === "call" && entry.ok && entry.number !== null && entry.steps > 0 },
@@ -12,9 +13,10 @@ const ROWS = [
 ];
 
 export class Timeline {
-  /** @param {import("./time.js").RecordedTime} time */
-  constructor(head, time) {
+  /** @param {import("./time.js").RecordedTime} time @param {import("./message.js").Frame[]} frames */
+  constructor(head, time, frames) {
     this.head = head;
+    this.frames = frames;
     this.time = time;
     this.slider = element("input", {
       type: "range", min: time.begin, max: time.end, step: 0.02, "aria-label": "Moment",
@@ -28,7 +30,7 @@ export class Timeline {
     this.canvas.addEventListener("pointerleave", () => { this.hint.hidden = true; });
     const legend = element("p", { class: "legend" }, ...this.rows.map((row) =>
       element("span", {}, element("i", { class: `swatch ${row.colour.slice(2)}` }), `${row.name} (${row.entries.length})`)));
-    this.node = element("div", { class: "track" }, this.slider, this.bands(), this.canvas, this.hint, legend);
+    this.node = element("div", { class: "track" }, this.slider, this.bands(), this.falls(), this.canvas, this.hint, legend);
     new ResizeObserver(() => this.draw()).observe(this.canvas);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
   }
@@ -53,6 +55,19 @@ export class Timeline {
       if (at === undefined) break;
     }
     return element("div", { class: "bands" }, ...bands);
+  }
+
+  /** Where robots fell. */
+  falls() {
+    const { begin, end } = this.time;
+    const marks = this.head.robots.flatMap(({ name }, robot) => {
+      const fall = this.frames.find((frame) => frame.fallen(robot));
+      if (!fall) return [];
+      const mark = element("button", { title: `Robot ${name} fell at ${fall.time.toFixed(1)} s`, onclick: () => this.time.seek(fall.time) }, `${name} fell`);
+      mark.style.left = `${(100 * (fall.time - begin)) / (end - begin)}%`;
+      return [mark];
+    });
+    return marks.length ? element("div", { class: "falls" }, ...marks) : null;
   }
 
   told() {
@@ -130,14 +145,18 @@ export class Timeline {
   }
 }
 
-/** The entries with the time from which each lasted: a command since the call before it, all else no time at all. */
+/** The entries with the time from which each lasted: a command for as long as its reply says, all else no time at all. */
 function stretches(story, begin) {
-  let from = begin;
   return story.map((entry) => {
-    const counts = entry.kind === "call" && entry.number !== null;
-    const made = counts && entry.time_s > from + 1e-6;
-    const stretch = { ...entry, from: made ? from : entry.time_s, steps: made ? 1 : 0 };
-    if (counts) from = entry.time_s;
-    return stretch;
+    const steps = entry.kind === "call" && entry.number !== null && entry.ok ? executedSteps(entry.reply) : 0;
+    return { ...entry, steps, from: Math.max(begin, entry.time_s - steps / CONTROL_HZ) };
   });
+}
+
+function executedSteps(reply) {
+  try {
+    return JSON.parse(reply)?.executed_steps ?? 0;
+  } catch {
+    return 0;
+  }
 }

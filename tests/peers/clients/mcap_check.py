@@ -22,7 +22,7 @@ WELL_KNOWN = {
     "/A/joint_states": "foxglove.JointStates",
     "/B/joint_states": "foxglove.JointStates",
 }
-OURS = {"/A/action", "/B/action", "/A/base_command", "/B/base_command", "/A/hands", "/B/hands", "/budget", "/phases", "/tool_calls"}
+OURS = {"/A/action", "/B/action", "/A/base_command", "/B/base_command", "/A/hands", "/B/hands", "/budget", "/phases", "/tool_calls", "/notes"}
 CONTROL_STEP_NS = 20_000_000
 
 
@@ -110,7 +110,7 @@ def check(path):
     per_step = [topic for topic in schemas if topic.split("/")[-1] in ("joint_states", "action", "base_command", "hands", "budget")]
     for topic in per_step:
         expect(counts[topic] == steps, f"{topic} has {counts[topic]} messages for {steps} steps")
-    missing = {topic for topic in OURS - {"/phases", "/tool_calls"} if topic not in schemas}
+    missing = {topic for topic in OURS - {"/phases", "/tool_calls", "/notes"} if topic not in schemas}
     expect(not missing, f"no messages on {sorted(missing)}")
     gaps_ns = {b - a for a, b in zip(step_times_ns, step_times_ns[1:])}
     expect(gaps_ns <= {CONTROL_STEP_NS}, f"control steps are {sorted(gaps_ns)} ns apart; expected {CONTROL_STEP_NS}")

@@ -5,6 +5,7 @@ use std::net::TcpStream;
 use serde_json::{Value, json};
 use tandem::{settings::Layer, token::Token};
 use tandem_tests::TestServer;
+use tandem_tools_spec::Png;
 use tungstenite::{Message, WebSocket, client::IntoClientRequest};
 
 const TOKEN: &str = "correct-horse-battery-staple";
@@ -213,4 +214,57 @@ fn a_finished_episode_can_be_looked_at_again() {
     ] {
         assert_eq!(get(&server, &format!("/watch/file?{wrong}")).0, 404, "{wrong}");
     }
+}
+
+/// A page shows one step in five, and of a look what the policy was shown.
+#[test]
+fn what_a_policy_was_shown_is_drawn_again_bit_for_bit() {
+    let server = TestServer::start();
+    let id = server.episode("benchmark");
+    let mut shown = Vec::new();
+    for steps in [3, 4, 6] {
+        let reach = json!({ "robot": "A", "right_position_m": [0.25, -0.2, 0.02 * f64::from(steps)] });
+        server.tool(&id, "move_wrists", &json!({ "steps": steps, "robots": [reach] })).ok();
+        let seen = server.tool(&id, "observe", &json!({ "robots": ["A"] })).ok();
+        let png = seen["images"][0]["png_base64"].as_str().expect("a picture").to_owned();
+        shown.push((seen["time_s"].as_f64().expect("a time"), png));
+    }
+    server.delete(&format!("/v1/episodes/{id}")).ok();
+    for (time_s, png) in shown {
+        let (status, again) = get(&server, &format!("/watch/camera?run={id}&robot=A&time_s={time_s:.2}"));
+        assert_eq!((status, Png(again).to_base64()), (200, png), "at {time_s} s");
+    }
+}
+
+/// What an agent says is seen as it is said, and refusals that do not reach the episode, too.
+#[test]
+fn notes_and_refusals_are_seen_as_they_come() {
+    let server = TestServer::start();
+    let id = server.episode("benchmark");
+    let mut socket = watch(&server, &id);
+    let body = json!({ "text": "I wait.", "kind": "thought" }).to_string();
+    let headers = [("content-type", "application/json")];
+    let path = format!("/v1/episodes/{id}/notes");
+    assert_eq!(server.ask("POST", &path, &headers, body.as_bytes()).0, 204);
+    server.tool(&id, "wait", &json!({ "steps": "two" })).refused(422, &[]);
+    server.tool(&id, "wait", &json!({ "steps": 2 })).ok();
+    server.delete(&format!("/v1/episodes/{id}")).ok();
+    let mut told: Vec<Value> = Vec::new();
+    while let Ok(message) = socket.read() {
+        if let Message::Text(text) = message {
+            told.push(serde_json::from_str(&text).expect("JSON"));
+        }
+    }
+    let kinds: Vec<_> = told
+        .iter()
+        .map(|one| (one["kind"].as_str(), one["entry"].as_u64(), one["number"].as_u64()))
+        .collect();
+    let expected = [
+        (Some("note"), Some(1), None),
+        (Some("call"), Some(2), None),
+        (Some("call"), Some(3), Some(1)),
+        (Some("ended"), None, None),
+    ];
+    assert_eq!(kinds, expected);
+    assert_eq!((&told[0]["note"]["text"], &told[1]["ok"]), (&json!("I wait."), &json!(false)));
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use base64::{DecodeError, Engine, prelude::BASE64_STANDARD};
 use foxglove::{Encode, Schema, bytes::BufMut};
-use schemars::JsonSchema;
+use schemars::{JsonSchema, generate::SchemaSettings};
 use serde::{Deserialize, Serialize};
 use tandem_sim::{BaseCommand, RobotCommand, RobotStep, Side, Step};
 use tandem_tools_spec::{Budget, ExtraInformation, PhaseReached, ToolReply};
@@ -28,7 +28,8 @@ impl<T: JsonMessage> Encode for Json<T> {
     type Error = serde_json::Error;
 
     fn get_schema() -> Option<Schema> {
-        let schema = schemars::schema_for!(T).to_value().to_string();
+        let settings = SchemaSettings::draft2020_12().with(|settings| settings.inline_subschemas = true);
+        let schema = settings.into_generator().into_root_schema_for::<T>().to_value().to_string();
         Some(Schema::new(T::SCHEMA_NAME, "jsonschema", schema.into_bytes()))
     }
 

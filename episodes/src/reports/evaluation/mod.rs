@@ -1,8 +1,8 @@
 //! What episodes that were played come to: rates with what they leave open, averages, effort, why episodes failed, and how two
 //! policies compare on the same seeds; as one page that needs nothing else, or as text.
 
-mod agents;
 mod compare;
+mod costs;
 mod load;
 mod page;
 mod policy;
@@ -16,15 +16,15 @@ mod went_wrong;
 
 use serde::Serialize;
 
-pub use agents::ModelCosts;
 pub use compare::{Comparison, PairedRow};
+pub use costs::{EpisodeCosts, ModelCosts, ValueRange};
 pub use load::{FoundEpisode, LoadError, LoadedEpisodes, load};
 pub use page::ReportPictures;
 pub use page::films::{Film, FilmContent, FilmPlace, FilmedEpisode, film_places};
 pub use page::gallery::{Failure, gallery, pictured_failures};
 pub use policy::{
-    ByCollaboration, EpisodeCosts, ExcludedEpisodes, FailureReason, PhaseReport, PolicyReport, ShownReport,
-    TaskAverage, TaskReport, ValueRange,
+    ByCollaboration, ExcludedEpisodes, FailureReason, PhaseReport, PolicyReport, ShownReport, TaskAverage,
+    TaskReport,
 };
 pub use published::{PublishedAverages, PublishedRates};
 pub use rate::{MeanRate, Rate};

@@ -7,8 +7,8 @@ use serde_json::Value;
 use tandem_tools_spec::EndReason;
 use xxhash_rust::xxh3::xxh3_64;
 
-use super::agents::ModelCosts;
-use super::load::FoundEpisode;
+use super::costs::{EpisodeCosts, ModelCosts};
+use super::load::{FoundEpisode, LoadedEpisodes};
 use super::rate::{MeanRate, Rate};
 use crate::results::{Exclusion, PhaseLevel, PlayedEpisode, PolicyCard, missed_phase_note, named, shown_in};
 use crate::scoring::Phase;
@@ -97,22 +97,6 @@ pub struct ByCollaboration {
     pub robots: usize,
     pub alone: Option<MeanRate>,
     pub together: Option<MeanRate>,
-}
-
-/// What whole episodes cost.
-#[derive(Debug, Serialize)]
-pub struct EpisodeCosts {
-    pub steps: ValueRange,
-    pub calls: ValueRange,
-    pub thought: ValueRange,
-}
-
-/// The range of some numbers, and the middle one.
-#[derive(Debug, Serialize)]
-pub struct ValueRange {
-    pub min: f64,
-    pub median_value: f64,
-    pub max: f64,
 }
 
 /// One kind of information that the benchmark's own policies are not shown.
@@ -280,33 +264,6 @@ impl TaskReport {
     }
 }
 
-impl EpisodeCosts {
-    fn of(episodes: &[&PlayedEpisode]) -> Option<EpisodeCosts> {
-        let spread = |of: fn(&PlayedEpisode) -> f64| {
-            ValueRange::of(episodes.iter().map(|played| of(played)).collect())
-        };
-        Some(EpisodeCosts {
-            steps: spread(|played| played.result.env_steps.into())?,
-            calls: spread(|played| played.result.tool_calls.into())?,
-            thought: spread(|played| played.thought_s)?,
-        })
-    }
-}
-
-impl ValueRange {
-    /// `None` of no values.
-    pub fn of(mut values: Vec<f64>) -> Option<ValueRange> {
-        values.sort_by(f64::total_cmp);
-        let (min, max) = (*values.first()?, *values.last()?);
-        let middle = values.len() / 2;
-        let median_value = match values.len() % 2 {
-            0 => (values[middle - 1] + values[middle]) / 2.0,
-            _ => values[middle],
-        };
-        Some(ValueRange { min, median_value, max })
-    }
-}
-
 fn averages(tasks: &[TaskReport]) -> Vec<TaskAverage> {
     let mut by_robots: BTreeMap<usize, Vec<&TaskReport>> = BTreeMap::new();
     for task in tasks.iter().filter(|task| task.episodes > 0) {
@@ -376,6 +333,37 @@ fn reasons(episodes: &[&PlayedEpisode]) -> Vec<FailureReason> {
     let rank = |reason: &FailureReason| tasks::ALL.iter().position(|task| task.id == reason.task);
     reasons.sort_by_key(|reason| (rank(reason), reason.phase.clone()));
     reasons
+}
+
+/// So many failures at most of those that are `wanted`, with their policies, by turns from every policy and task.
+pub fn failed_by_turns(
+    loaded: &LoadedEpisodes,
+    most: usize,
+    wanted: fn(&FoundEpisode) -> bool,
+) -> Vec<(String, &FoundEpisode)> {
+    let groups = groups(&loaded.episodes);
+    let mut all: Vec<(String, &FoundEpisode)> = Vec::new();
+    for group in &groups {
+        let of_group = failed(group).into_iter().filter(|found| wanted(found));
+        all.extend(of_group.map(|found| (group.name.clone(), found)));
+    }
+    let turn = |index: usize| {
+        let (policy, found) = &all[index];
+        let same = |(other, one): &&(String, &FoundEpisode)| {
+            other == policy && one.played.spec.task == found.played.spec.task
+        };
+        all[..index].iter().filter(same).count()
+    };
+    let mut order: Vec<usize> = (0..all.len()).collect();
+    order.sort_by_key(|index| turn(*index));
+    order.truncate(most);
+    order.sort_unstable();
+    order.into_iter().map(|index| all[index].clone()).collect()
+}
+
+/// The episodes of a policy that count and failed.
+pub fn failed<'a>(group: &PolicyGroup<'a>) -> Vec<&'a FoundEpisode> {
+    group.episodes.iter().copied().filter(|found| !found.played.succeeded()).collect()
 }
 
 fn excluded(episodes: &[&PlayedEpisode]) -> Vec<ExcludedEpisodes> {

@@ -1,9 +1,11 @@
 //! The report's tables, made once for every way of writing them.
 
 use super::compare::{Comparison, PairedRow};
-use super::policy::{EpisodeCosts, PolicyReport, TaskReport, ValueRange};
+use super::costs::{EpisodeCosts, ValueRange};
+use super::policy::{PolicyReport, TaskReport};
 use super::rate::{MeanRate, Rate, percent};
-use super::{EvaluationReport, PublishedRates, agents, went_wrong};
+use super::went_wrong::FailureMoment;
+use super::{EvaluationReport, PublishedRates};
 use crate::statistics::Count;
 
 /// Words in rows and columns.
@@ -43,10 +45,10 @@ pub fn all(report: &EvaluationReport) -> Vec<Table> {
     tables.push(averages(policies));
     tables.push(together(policies));
     tables.push(shown(policies));
-    tables.push(agents::table(policies));
+    tables.push(agents(policies));
     tables.push(effort(policies));
     tables.push(reasons(policies));
-    tables.push(went_wrong::table(&report.failure_moments, policies));
+    tables.push(went_wrong(&report.failure_moments, policies));
     tables.push(excluded(policies));
     tables.extend(report.comparisons.iter().map(comparison));
     tables.push(published(&report.published));
@@ -180,6 +182,69 @@ fn shown(policies: &[PolicyReport]) -> Table {
     table
 }
 
+/// Policies side by side, task by task, where any of them has notes.
+fn agents(policies: &[PolicyReport]) -> Table {
+    let mut table = Table::new(
+        "Agents",
+        "Of episodes from the task's beginning. Phases are a mean; all else but success is a median an episode. Tokens, price and the \
+         time of models are what notes say; of tokens that were read, which share came from a cache. The price of a success is that of \
+         all episodes over those that succeeded.",
+        &[
+            "Policy",
+            "Task",
+            "Success",
+            "Phases",
+            "Steps",
+            "Calls",
+            "Thinking (s)",
+            "Models (s)",
+            "Tokens read (k)",
+            "From a cache",
+            "Tokens written (k)",
+            "Price ($)",
+            "A success ($)",
+        ],
+        2,
+    );
+    let any = |policy: &PolicyReport| policy.tasks.iter().any(|task| task.models.is_some());
+    if policies.iter().any(any) {
+        let rows = policies
+            .iter()
+            .flat_map(|policy| policy.tasks.iter().filter_map(move |task| agents_row(policy, task)));
+        table.rows.extend(rows);
+    }
+    table
+}
+
+/// `None` where no episode began at the task's beginning.
+fn agents_row(policy: &PolicyReport, task: &TaskReport) -> Option<Vec<String>> {
+    let effort = task.effort.as_ref()?;
+    let success = task.phases.last()?.cumulative?;
+    let reached: f64 = task.phases.iter().filter_map(|phase| Some(phase.cumulative?.share)).sum();
+    let models = task.models.as_ref();
+    let median = |range: Option<&ValueRange>, scale: f64, decimals: usize| {
+        range.map_or(NONE.into(), |range| format!("{:.decimals$}", range.median_value / scale))
+    };
+    let of_success = models.and_then(|models| models.total_usd).filter(|_| success.successes > 0);
+    Some(vec![
+        policy.name.clone(),
+        task.task.into(),
+        success.fraction(),
+        format!("{reached:.1} of {}", task.phases.len()),
+        median(Some(&effort.steps), 1.0, 0),
+        median(Some(&effort.calls), 1.0, 0),
+        median(Some(&effort.thought), 1.0, 1),
+        median(models.and_then(|models| models.model_time.as_ref()), 1.0, 1),
+        median(models.map(|models| &models.input_tokens), 1e3, 1),
+        models
+            .and_then(|models| models.cached_share)
+            .map_or(NONE.into(), |share| format!("{} %", percent(share))),
+        median(models.map(|models| &models.output_tokens), 1e3, 1),
+        median(models.and_then(|models| models.usd.as_ref()), 1.0, 3),
+        of_success.map_or(NONE.into(), |usd| format!("{:.3}", usd / success.successes as f64)),
+    ])
+}
+
 fn effort(policies: &[PolicyReport]) -> Table {
     let mut table = Table::new(
         "Effort and falls",
@@ -228,6 +293,26 @@ fn reasons(policies: &[PolicyReport]) -> Table {
                 seeds.join(", "),
             ]);
         }
+    }
+    table
+}
+
+fn went_wrong(moments: &[FailureMoment], policies: &[PolicyReport]) -> Table {
+    let mut table = Table::new(
+        "Where episodes went wrong",
+        "The first fall of a robot, or the first drop of an object, after the last phase that was reached; else the end. Times open the \
+         episode's page a second before, on a `tandem serve` whose runs folder has the recording, once its link has been opened.",
+        &["Policy", "Task", "Seed", "Stuck before", "What", "At (s)"],
+        5,
+    );
+    let order = |name: &String| policies.iter().position(|policy| policy.name == *name);
+    let mut moments: Vec<&FailureMoment> = moments.iter().collect();
+    moments.sort_by_key(|moment| order(&moment.policy));
+    for moment in moments {
+        let FailureMoment { policy, task, seed, phase, what, time_s, watch } = moment;
+        let row = [policy, *task, &seed.to_string(), phase, what, &format!("{time_s:.1}")];
+        table.rows.push(row.map(str::to_owned).to_vec());
+        table.links.push(watch.clone());
     }
     table
 }

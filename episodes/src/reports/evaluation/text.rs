@@ -1,7 +1,8 @@
 //! Reports without pictures: Markdown, CSV with a line for each rate, and tables for LaTeX.
 
 use super::EvaluationReport;
-use super::policy::{TaskReport, ValueRange};
+use super::costs::ValueRange;
+use super::policy::TaskReport;
 use super::rate::Rate;
 use super::tables::{Table, all};
 

@@ -3,9 +3,7 @@
 use serde::Serialize;
 
 use super::load::{FoundEpisode, LoadedEpisodes};
-use super::page::gallery::failed_by_turns;
-use super::policy::{PolicyReport, first_missed_phase};
-use super::tables::Table;
+use super::policy::{failed_by_turns, first_missed_phase};
 use crate::recording::{Recording, RecordingError};
 use crate::scoring::{Facts, Grip};
 
@@ -107,27 +105,6 @@ fn watch_address(run: &str, time_s: f64) -> String {
         .map(|byte| if plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") })
         .collect();
     format!("{SERVED_AT}/watch?run={run}&at={:.1}", (time_s - 1.0).max(0.0))
-}
-
-/// The moments as a table.
-pub fn table(moments: &[FailureMoment], policies: &[PolicyReport]) -> Table {
-    let mut table = Table::new(
-        "Where episodes went wrong",
-        "The first fall of a robot, or the first drop of an object, after the last phase that was reached; else the end. Times open the \
-         episode's page a second before, on a `tandem serve` whose runs folder has the recording, once its link has been opened.",
-        &["Policy", "Task", "Seed", "Stuck before", "What", "At (s)"],
-        5,
-    );
-    let order = |name: &String| policies.iter().position(|policy| policy.name == *name);
-    let mut moments: Vec<&FailureMoment> = moments.iter().collect();
-    moments.sort_by_key(|moment| order(&moment.policy));
-    for moment in moments {
-        let FailureMoment { policy, task, seed, phase, what, time_s, watch } = moment;
-        let row = [policy, *task, &seed.to_string(), phase, what, &format!("{time_s:.1}")];
-        table.rows.push(row.map(str::to_owned).to_vec());
-        table.links.push(watch.clone());
-    }
-    table
 }
 
 #[cfg(test)]

@@ -215,11 +215,15 @@ impl McpServer {
             Ok(episode) => {
                 episode.admit(caller)?;
                 let offered = episode.check_offered(caller, name).map_err(ApiError::from);
-                offered.and(call).map_err(|refusal| {
-                    let problem = refusal.to_string();
-                    episode.refused(caller, RefusedCall { tool: name.into(), arguments: asked, problem });
-                    refusal.in_episode(&episode.thread)
-                })?
+                match offered.and(call) {
+                    Ok(call) => call,
+                    Err(refusal) => {
+                        let problem = refusal.to_string();
+                        let refused = RefusedCall { tool: name.into(), arguments: asked, problem };
+                        episode.refused(caller, refused).await;
+                        return Err(refusal.in_episode(&episode.thread));
+                    }
+                }
             }
             Err(_) => call?,
         };

@@ -25,7 +25,7 @@ pub fn page(version: &str, list: &EpisodeList, caller: &Caller) -> String {
     body += &match rows.is_empty() {
         true => "<p>None is held. <code>POST /v1/episodes</code> starts one.</p>\n".to_owned(),
         false => format!(
-            "<div class=\"scroll\"><table>\n<tr><th>episode</th><th>task</th><th>seed</th><th>protocol</th><th>driven by</th><th>step</th><th>stands</th></tr>\n\
+            "<div class=\"scroll\"><table>\n<tr><th>episode</th><th>task</th><th>seed</th><th>protocol</th><th>driven by</th><th>step</th><th>stands</th><th></th></tr>\n\
              {rows}</table></div>\n"
         ),
     };
@@ -50,6 +50,8 @@ fn row(entry: &EpisodeEntry) -> String {
     {
         let _ = write!(row, "<td>{}</td>", escape(&cell));
     }
+    // Who has not come by the link is asked for it there.
+    let _ = write!(row, "<td><a href=\"/watch?episode={id}\">watch</a></td>");
     row + "</tr>\n"
 }
 
@@ -83,6 +85,7 @@ mod tests {
             page.contains(&format!("<a href=\"/v1/episodes/a\">a</a></td>{rest}<td>goes on</td>")),
             "{page}"
         );
+        assert!(page.contains("<a href=\"/watch?episode=a\">watch</a>"), "{page}");
         assert!(page.contains("<td>simulator failed</td>") && page.contains("&lt;b&gt;"), "{page}");
         for foreign in ["<script", "<b>", "src=", "url(", "http://", "https://", "<link"] {
             assert!(!page.contains(foreign), "{foreign}");

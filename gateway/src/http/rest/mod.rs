@@ -203,7 +203,7 @@ async fn call(
         let answer = match read() {
             Ok(call) => episode.call(&caller, call, key.as_deref()).await.map_err(ApiError::from),
             Err(refusal) => {
-                episode.refused(&caller, refused_call(&name, encoding, &body, &refusal));
+                episode.refused(&caller, refused_call(&name, encoding, &body, &refusal)).await;
                 Err(refusal)
             }
         };

@@ -5,7 +5,7 @@ use crate::reports::episode::{KeyMoment, moments, strip};
 use crate::reports::evaluation::load::{FoundEpisode, LoadedEpisodes};
 use crate::reports::evaluation::page::ReportPictures;
 use crate::reports::evaluation::policy::{
-    PolicyGroup, PolicyReport, failure_cause, first_missed_phase, groups,
+    PolicyReport, failed, failed_by_turns, failure_cause, first_missed_phase, groups,
 };
 
 /// One failed episode.
@@ -35,40 +35,10 @@ pub fn gallery(loaded: &LoadedEpisodes, most: usize) -> Vec<Failure> {
     pictured.collect()
 }
 
-/// So many failures at most of those that are `wanted`, with their policies, by turns from every policy and task.
-pub fn failed_by_turns(
-    loaded: &LoadedEpisodes,
-    most: usize,
-    wanted: fn(&FoundEpisode) -> bool,
-) -> Vec<(String, &FoundEpisode)> {
-    let groups = groups(&loaded.episodes);
-    let mut all: Vec<(String, &FoundEpisode)> = Vec::new();
-    for group in &groups {
-        let of_group = failed(group).into_iter().filter(|found| wanted(found));
-        all.extend(of_group.map(|found| (group.name.clone(), found)));
-    }
-    let turn = |index: usize| {
-        let (policy, found) = &all[index];
-        let same = |(other, one): &&(String, &FoundEpisode)| {
-            other == policy && one.played.spec.task == found.played.spec.task
-        };
-        all[..index].iter().filter(same).count()
-    };
-    let mut order: Vec<usize> = (0..all.len()).collect();
-    order.sort_by_key(|index| turn(*index));
-    order.truncate(most);
-    order.sort_unstable();
-    order.into_iter().map(|index| all[index].clone()).collect()
-}
-
 /// How many failures have a picture.
 pub fn pictured_failures(loaded: &LoadedEpisodes) -> usize {
     let failures = groups(&loaded.episodes);
     failures.iter().flat_map(failed).filter(|found| found.strip.is_some()).count()
-}
-
-fn failed<'a>(group: &PolicyGroup<'a>) -> Vec<&'a FoundEpisode> {
-    group.episodes.iter().copied().filter(|found| !found.played.succeeded()).collect()
 }
 
 fn failure(policy: &str, found: &FoundEpisode) -> Failure {

@@ -1,14 +1,27 @@
-//! What agents took: tokens, price and time of their models, of episodes whose notes say it.
+//! What episodes cost: steps, calls and thinking, and where notes say it, tokens, price and time of models.
 
 use std::collections::BTreeSet;
 
 use serde::Serialize;
 use tandem_tools_spec::Usage;
 
-use super::policy::{PolicyReport, TaskReport, ValueRange};
-use super::rate::percent;
-use super::tables::{NONE, Table};
 use crate::results::PlayedEpisode;
+
+/// What whole episodes cost.
+#[derive(Debug, Serialize)]
+pub struct EpisodeCosts {
+    pub steps: ValueRange,
+    pub calls: ValueRange,
+    pub thought: ValueRange,
+}
+
+/// The range of some numbers, and the middle one.
+#[derive(Debug, Serialize)]
+pub struct ValueRange {
+    pub min: f64,
+    pub median_value: f64,
+    pub max: f64,
+}
 
 /// What the notes of a policy's whole episodes say that models took, each an episode's sum.
 #[derive(Debug, Serialize)]
@@ -52,66 +65,32 @@ impl ModelCosts {
     }
 }
 
-/// Policies side by side, task by task, where any of them has notes.
-pub fn table(policies: &[PolicyReport]) -> Table {
-    let mut table = Table::new(
-        "Agents",
-        "Of episodes from the task's beginning. Phases are a mean; all else but success is a median an episode. Tokens, price and the \
-         time of models are what notes say; of tokens that were read, which share came from a cache. The price of a success is that of \
-         all episodes over those that succeeded.",
-        &[
-            "Policy",
-            "Task",
-            "Success",
-            "Phases",
-            "Steps",
-            "Calls",
-            "Thinking (s)",
-            "Models (s)",
-            "Tokens read (k)",
-            "From a cache",
-            "Tokens written (k)",
-            "Price ($)",
-            "A success ($)",
-        ],
-        2,
-    );
-    let any = |policy: &PolicyReport| policy.tasks.iter().any(|task| task.models.is_some());
-    if policies.iter().any(any) {
-        let rows =
-            policies.iter().flat_map(|policy| policy.tasks.iter().filter_map(move |task| row(policy, task)));
-        table.rows.extend(rows);
+impl EpisodeCosts {
+    /// `None` of no episodes.
+    pub fn of(episodes: &[&PlayedEpisode]) -> Option<EpisodeCosts> {
+        let spread = |of: fn(&PlayedEpisode) -> f64| {
+            ValueRange::of(episodes.iter().map(|played| of(played)).collect())
+        };
+        Some(EpisodeCosts {
+            steps: spread(|played| played.result.env_steps.into())?,
+            calls: spread(|played| played.result.tool_calls.into())?,
+            thought: spread(|played| played.thought_s)?,
+        })
     }
-    table
 }
 
-/// `None` where no episode began at the task's beginning.
-fn row(policy: &PolicyReport, task: &TaskReport) -> Option<Vec<String>> {
-    let effort = task.effort.as_ref()?;
-    let success = task.phases.last()?.cumulative?;
-    let reached: f64 = task.phases.iter().filter_map(|phase| Some(phase.cumulative?.share)).sum();
-    let models = task.models.as_ref();
-    let median = |range: Option<&ValueRange>, scale: f64, decimals: usize| {
-        range.map_or(NONE.into(), |range| format!("{:.decimals$}", range.median_value / scale))
-    };
-    let of_success = models.and_then(|models| models.total_usd).filter(|_| success.successes > 0);
-    Some(vec![
-        policy.name.clone(),
-        task.task.into(),
-        success.fraction(),
-        format!("{reached:.1} of {}", task.phases.len()),
-        median(Some(&effort.steps), 1.0, 0),
-        median(Some(&effort.calls), 1.0, 0),
-        median(Some(&effort.thought), 1.0, 1),
-        median(models.and_then(|models| models.model_time.as_ref()), 1.0, 1),
-        median(models.map(|models| &models.input_tokens), 1e3, 1),
-        models
-            .and_then(|models| models.cached_share)
-            .map_or(NONE.into(), |share| format!("{} %", percent(share))),
-        median(models.map(|models| &models.output_tokens), 1e3, 1),
-        median(models.and_then(|models| models.usd.as_ref()), 1.0, 3),
-        of_success.map_or(NONE.into(), |usd| format!("{:.3}", usd / success.successes as f64)),
-    ])
+impl ValueRange {
+    /// `None` of no values.
+    pub fn of(mut values: Vec<f64>) -> Option<ValueRange> {
+        values.sort_by(f64::total_cmp);
+        let (min, max) = (*values.first()?, *values.last()?);
+        let middle = values.len() / 2;
+        let median_value = match values.len() % 2 {
+            0 => (values[middle - 1] + values[middle]) / 2.0,
+            _ => values[middle],
+        };
+        Some(ValueRange { min, median_value, max })
+    }
 }
 
 #[cfg(test)]
