@@ -16,6 +16,7 @@
 //! # Ok::<(), EpisodeError>(())
 //! ```
 
+pub mod batch;
 pub mod bench;
 mod commands;
 mod convert;

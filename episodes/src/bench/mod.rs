@@ -1,11 +1,13 @@
 //! Parts of Tandem measured on their own, on the robot that the episodes use.
 
 mod carrying;
+mod env;
 mod falls;
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
+pub use env::{EnvCase, EnvReport, env};
 pub use falls::falls;
 pub use tandem_ik::bench::Report as IkReport;
 use tandem_ik::bench::{TargetSet, run};
@@ -19,6 +21,7 @@ use tandem_sim::render::RendererKind;
 use tandem_sim::{Sensing, assets};
 
 use crate::EpisodeError;
+use crate::batch::BatchError;
 use crate::commands;
 use crate::players::PlayerError;
 use crate::spec::Controller;
@@ -39,6 +42,8 @@ pub enum BenchError {
     Sim(#[from] tandem_sim::SimError),
     #[error(transparent)]
     Episode(#[from] Box<EpisodeError>),
+    #[error(transparent)]
+    Batch(#[from] Box<BatchError>),
     #[error(transparent)]
     Player(#[from] PlayerError),
     #[error("no case's name contains `{asked}`; the cases are {have}")]

@@ -49,6 +49,12 @@ impl Observer {
         self.renderer.render(step, camera)
     }
 
+    /// The colours of what the robot numbered `robot` sees after `step`, in a picture of this width and height.
+    pub fn eye(&mut self, step: &Step, robot: usize, [width, height]: [u32; 2]) -> Vec<u8> {
+        let camera = Camera { width, height, ..self.cameras.egocentric(step, robot) };
+        self.renderer.render_colours(step, &camera)
+    }
+
     /// What the robots numbered `robots` see after `step`; each view is drawn the first time only, and those to draw side by side.
     pub fn views(&mut self, step: &Arc<Step>, robots: &[usize]) -> Vec<Arc<RobotView>> {
         let DrawnStep { views, .. } = match &mut self.drawn {

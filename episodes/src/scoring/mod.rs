@@ -3,6 +3,7 @@
 mod facts;
 mod facts_tracker;
 mod grasps;
+pub mod nearness;
 mod phases;
 pub mod placement;
 mod scores;

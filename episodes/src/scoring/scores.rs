@@ -60,6 +60,11 @@ impl Scores {
         self.phases.reached()
     }
 
+    /// The phases reached, and how near the next one is, after `step`, the last one that was looked at.
+    pub fn progress(&self, step: &Step) -> f64 {
+        self.phases.progress(&self.facts(step))
+    }
+
     /// Whether the present phase is a sequence that has begun.
     pub fn underway(&self) -> bool {
         self.phases.underway()

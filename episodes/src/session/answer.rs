@@ -2,7 +2,7 @@
 
 use tandem_sim::Pose;
 use tandem_tools_spec::{
-    CommandReply, EndReason, Formats, Look, LookCall, LookReply, ManageCall, ManageReply, Observe,
+    ActCall, CommandReply, EndReason, Formats, Look, LookCall, LookReply, ManageCall, ManageReply, Observe,
     RobotReport, SpecError, StopReason, TalkCall, TalkReply, ToolCall, ToolReply,
 };
 
@@ -185,6 +185,14 @@ impl Session {
             budget: self.budget(),
         })
         .into())
+    }
+
+    /// Executes what has been checked, and reports on nobody.
+    pub(super) fn carry_out_unreported(&mut self, act: &ActCall) -> Result<(), EpisodeError> {
+        let command = Command::read(act, &self.rules, &self.motions)?;
+        self.run(&command)?;
+        self.stop_reason();
+        Ok(())
     }
 
     /// Why a command that has been executed stopped; what ends the episode ends it here.

@@ -104,6 +104,22 @@ impl Session {
         self.let_think();
     }
 
+    /// As [`Session::call`] of an acting tool, for who reads numbers of what comes of it: there is no reply, so that none is made unless
+    /// it is recorded or shown.
+    pub fn act_unreported(&mut self, call: &ToolCall) -> Result<(), EpisodeError> {
+        let act = match call {
+            ToolCall::Act(act) if self.files.is_none() && !self.shows_calls() => act,
+            _ => return self.call(call.clone()).map(drop),
+        };
+        self.arrived();
+        let acted = self.expect_underway().and_then(|()| self.carry_out_unreported(act));
+        if self.ended.is_some() {
+            self.settle();
+        }
+        self.let_think();
+        acted
+    }
+
     /// As [`Session::call`], for who carries out what a policy in this process decided: nothing is withheld from the reply, which the
     /// policy itself is not shown.
     pub fn carry_out(&mut self, call: ToolCall) -> Result<ToolReply, EpisodeError> {

@@ -322,6 +322,17 @@ impl Session {
         picture
     }
 
+    /// What the camera in a robot's head sees now in a picture of this width and height; as high an angle as ever, and as wide as the
+    /// picture: red, green and blue, row by row. No call: what is shown to a policy is for the caller to count.
+    pub fn eye(&mut self, robot: usize, size_px: [u32; 2]) -> Vec<u8> {
+        self.observer.eye(&self.present, robot, size_px)
+    }
+
+    /// How far the task has come: the phases reached, and how near the next one is, from 0 to 1.
+    pub fn progress(&self) -> f64 {
+        self.scores.progress(&self.present)
+    }
+
     /// How many phases have been reached.
     pub fn reached_phases(&self) -> usize {
         self.scores.reached().count()

@@ -7,6 +7,7 @@
 use std::f32::consts::PI;
 
 use super::{Offset, RobotSpot, Task, spot, uniform_xy};
+use crate::scoring::nearness::{all, beside, come, grips, is, standing};
 use crate::scoring::placement::{stands_as_high, stands_released};
 use crate::scoring::{A, B, C, Done, Facts, Phase};
 
@@ -61,6 +62,9 @@ pub const TASK: Task = Task {
             description: "All three robots hold the table, its foot at least 3 cm off the floor.",
             collaborative: true,
             done: Done::When(lifted),
+            nearness: |f| {
+                all(&[grips(f, &[A, B, C], "round_table"), come(f.clearance_m("round_table"), 0.0, LIFTED_M)])
+            },
         },
         Phase {
             id: "carry",
@@ -68,6 +72,13 @@ pub const TASK: Task = Task {
                           floor.",
             collaborative: true,
             done: Done::When(carried),
+            nearness: |f| {
+                all(&[
+                    is(held_above(f, CLEAR_M)),
+                    beside(f, "round_table", "goal_disc", [CARRY_M, 0.05]),
+                    is(carried(f)),
+                ])
+            },
         },
         Phase {
             id: "release",
@@ -75,6 +86,7 @@ pub const TASK: Task = Task {
                           degrees and still, and no robot has touched it for 0.2 s.",
             collaborative: true,
             done: Done::When(released),
+            nearness: |f| all(&[is(over_disc(f)), standing(f, "round_table"), is(released(f))]),
         },
     ],
 };

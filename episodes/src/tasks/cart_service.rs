@@ -8,8 +8,9 @@
 use std::f32::consts::FRAC_PI_2;
 
 use super::{Offset, RobotSpot, Task, spot, uniform_xy};
+use crate::scoring::nearness::{all, beside, come, grips, is};
 use crate::scoring::placement::{stands_released, within_box};
-use crate::scoring::{B, Done, Facts, Phase};
+use crate::scoring::{A, B, Done, Facts, Phase};
 
 const TROLLEY_Y_M: f32 = 2.2;
 /// Where the bottle stands on the trolley.
@@ -61,12 +62,19 @@ pub const TASK: Task = Task {
             description: "The middle of the trolley is within 35 cm of the middle of the green rectangle.",
             collaborative: false,
             done: Done::When(parked),
+            nearness: |f| {
+                all(&[
+                    grips(f, &[A], "service_trolley"),
+                    beside(f, "service_trolley", "parking_mark", [2.5, PARKED_M]),
+                ])
+            },
         },
         Phase {
             id: "lift_bottle",
             description: "B holds the bottle at least 10 cm above where it stood on the trolley.",
             collaborative: false,
             done: Done::When(bottle_lifted),
+            nearness: |f| all(&[grips(f, &[B], "bottle"), come(f.lift_m("bottle"), 0.0, LIFTED_M)]),
         },
         Phase {
             id: "serve",
@@ -75,6 +83,7 @@ pub const TASK: Task = Task {
                           for 0.2 s.",
             collaborative: false,
             done: Done::Sequence { first: carried_to_goal, then: served, broken: away_from_goal },
+            nearness: |f| all(&[beside(f, "bottle", "serving_patch", [1.5, ON_GOAL_M]), is(served(f))]),
         },
     ],
 };

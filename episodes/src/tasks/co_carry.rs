@@ -7,6 +7,7 @@
 use std::f32::consts::PI;
 
 use super::{RobotSpot, Task, spot, uniform_xy};
+use crate::scoring::nearness::{all, beside, come, grips, is, standing};
 use crate::scoring::placement::{above_box, stands_as_high, stands_released};
 use crate::scoring::{A, B, Done, Facts, Phase};
 
@@ -52,6 +53,7 @@ pub const TASK: Task = Task {
             description: "Both robots hold the basket, its base at least 3 cm above the shelf.",
             collaborative: true,
             done: Done::When(lifted),
+            nearness: |f| all(&[grips(f, &[A, B], "basket"), come(f.clearance_m("basket"), 0.0, LIFTED_M)]),
         },
         Phase {
             id: "carry",
@@ -59,6 +61,9 @@ pub const TASK: Task = Task {
                           1 cm above the shelf.",
             collaborative: true,
             done: Done::When(carried),
+            nearness: |f| {
+                all(&[is(held_above(f, CLEAR_M)), beside(f, "basket", "basket_patch", [CARRY_M, ON_PATCH_M])])
+            },
         },
         Phase {
             id: "release",
@@ -66,6 +71,7 @@ pub const TASK: Task = Task {
                           6 cm, upright within 15 degrees and still, and no robot has touched it for 0.2 s.",
             collaborative: true,
             done: Done::When(released),
+            nearness: |f| all(&[is(on_patch(f)), standing(f, "basket"), is(released(f))]),
         },
     ],
 };

@@ -6,6 +6,7 @@
 use std::f32::consts::PI;
 
 use super::{ObjectSpot, RobotSpot, Task, spot, uniform_xy};
+use crate::scoring::nearness::{all, come, grips, is};
 use crate::scoring::{A, B, Done, Facts, Phase};
 
 const TUB_STACK_M: f32 = 0.75;
@@ -75,18 +76,21 @@ pub const TASK: Task = Task {
             description: "Both robots hold the tub, its lowest point at least 3 cm above its stack.",
             collaborative: true,
             done: Done::When(lifted),
+            nearness: |f| all(&[grips(f, &[A, B], "tub"), come(f.clearance_m("tub"), 0.0, LIFTED_M)]),
         },
         Phase {
             id: "tip",
             description: "Both robots hold the tub, tilted by at least 25 degrees.",
             collaborative: true,
             done: Done::When(tipped),
+            nearness: |f| all(&[grips(f, &[A, B], "tub"), come(f.tilt_rad("tub"), 0.0, TIPPED_RAD)]),
         },
         Phase {
             id: "pour",
             description: "All apples are inside the crate, and both robots still hold the tub.",
             collaborative: true,
             done: Done::When(poured),
+            nearness: |f| all(&[grips(f, &[A, B], "tub"), all(&APPLES.map(|apple| is(in_crate(f, apple))))]),
         },
     ],
 };
@@ -105,9 +109,13 @@ fn tipped(f: &Facts) -> bool {
     held_by_both(f) && f.tilt_rad("tub") >= TIPPED_RAD
 }
 
+fn in_crate(f: &Facts, apple: &str) -> bool {
+    f.inside_box(apple, "crate", "inside")
+}
+
 /// Every apple lies in the crate, and nobody has dropped the tub.
 fn poured(f: &Facts) -> bool {
-    held_by_both(f) && APPLES.iter().all(|apple| f.inside_box(apple, "crate", "inside"))
+    held_by_both(f) && APPLES.iter().all(|apple| in_crate(f, apple))
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 use std::f32::consts::FRAC_PI_2;
 
 use super::{Offset, RobotSpot, Task, spot, uniform_xy};
+use crate::scoring::nearness::{all, come, grips, is};
 use crate::scoring::placement::RELEASE_S;
 use crate::scoring::{A, B, Done, Facts, Phase};
 
@@ -56,12 +57,14 @@ pub const TASK: Task = Task {
             description: "Both robots hold the frame.",
             collaborative: false,
             done: Done::When(held_by_both),
+            nearness: |f| grips(f, &[A, B], "frame"),
         },
         Phase {
             id: "lift",
             description: "Both robots hold the frame at least 10 cm above where it stood.",
             collaborative: true,
             done: Done::When(lifted),
+            nearness: |f| all(&[grips(f, &[A, B], "frame"), come(f.lift_m("frame"), 0.0, LIFTED_M)]),
         },
         Phase {
             id: "hang",
@@ -69,6 +72,7 @@ pub const TASK: Task = Task {
                           hangs within 35 degrees of upright and nearly still, and no robot has touched it for 0.2 s.",
             collaborative: true,
             done: Done::Sequence { first: threaded_while_held, then: hangs, broken: off_the_peg },
+            nearness: |f| all(&[come(from_peg_m(f), 0.5, 0.0), is(threaded(f)), is(hangs(f))]),
         },
     ],
 };
@@ -84,6 +88,11 @@ fn lifted(f: &Facts) -> bool {
 
 fn threaded(f: &Facts) -> bool {
     f.threads("wall_peg", ["root", "tip"], "frame", "loop")
+}
+
+/// From the loop to the tip of the peg.
+fn from_peg_m(f: &Facts) -> f32 {
+    (f.site_m("frame", "loop") - f.site_m("wall_peg", "tip")).length()
 }
 
 fn threaded_while_held(f: &Facts) -> bool {

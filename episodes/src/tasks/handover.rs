@@ -8,6 +8,7 @@ use std::f32::consts::PI;
 use tandem_sim::Side::Right;
 
 use super::{RobotSpot, Task, spot, uniform_xy};
+use crate::scoring::nearness::{all, beside, come, grip, is, standing};
 use crate::scoring::placement::{stands_released, within_box};
 use crate::scoring::{A, B, Done, Facts, Phase};
 
@@ -47,6 +48,7 @@ pub const TASK: Task = Task {
             description: "A's right hand holds the bottle at least 3 cm above where it rested.",
             collaborative: false,
             done: Done::When(grasped_and_lifted),
+            nearness: |f| all(&[grip(f, A, Right, "bottle"), come(f.lift_m("bottle"), 0.0, LIFTED_M)]),
         },
         Phase {
             id: "transfer",
@@ -54,6 +56,7 @@ pub const TASK: Task = Task {
                           of A's hands off; at no time in between has every hand let go.",
             collaborative: true,
             done: Done::Sequence { first: held_together, then: held_by_b_alone, broken: held_by_nobody },
+            nearness: |f| all(&[grip(f, B, Right, "bottle"), is(held_by_b_alone(f))]),
         },
         Phase {
             id: "place",
@@ -61,6 +64,13 @@ pub const TASK: Task = Task {
                           still, and no robot has touched it for 0.2 s.",
             collaborative: false,
             done: Done::When(placed),
+            nearness: |f| {
+                all(&[
+                    beside(f, "bottle", "target_pad", [0.6, ON_TARGET_M]),
+                    standing(f, "bottle"),
+                    is(placed(f)),
+                ])
+            },
         },
     ],
 };

@@ -11,6 +11,7 @@ use std::f32::consts::PI;
 use tandem_sim::Vector;
 
 use super::{RobotSpot, Task, spot, uniform_xy};
+use crate::scoring::nearness::{all, beside, come, grips, is, standing};
 use crate::scoring::placement::{stands_as_high, stands_released};
 use crate::scoring::{B, C, Done, Facts, Milestone, Phase};
 
@@ -73,6 +74,9 @@ pub const TASK: Task = Task {
                 Milestone { condition: lifted, for_s: 0.0 },
                 Milestone { condition: open, for_s: OPEN_S },
             ]),
+            nearness: |f| {
+                all(&[grips(f, &[B, C], "console_table"), is(lifted(f)), come(opened_rad(f), 0.0, OPEN_RAD)])
+            },
         },
         Phase {
             id: "pass_doorway",
@@ -80,6 +84,13 @@ pub const TASK: Task = Task {
                           the table, and its feet are at least 1 cm off the floor.",
             collaborative: true,
             done: Done::When(passed),
+            nearness: |f| {
+                all(&[
+                    is(held_above(f, CLEAR_M)),
+                    beside(f, "console_table", "foot_marks", [GOAL_X_M - START_X_M, 0.4]),
+                    is(passed(f)),
+                ])
+            },
         },
         Phase {
             id: "place",
@@ -88,6 +99,13 @@ pub const TASK: Task = Task {
                           15 degrees and still, and no robot has touched it for 0.2 s.",
             collaborative: true,
             done: Done::Sequence { first: carried_to_goal, then: placed, broken: away_from_goal },
+            nearness: |f| {
+                all(&[
+                    beside(f, "console_table", "foot_marks", [1.0, 0.02]),
+                    standing(f, "console_table"),
+                    is(placed(f)),
+                ])
+            },
         },
     ],
 };
@@ -103,7 +121,11 @@ fn lifted(f: &Facts) -> bool {
 
 /// The door is wide open.
 fn open(f: &Facts) -> bool {
-    f.turned_rad("lever_door", "lever_door leaf") >= OPEN_RAD
+    opened_rad(f) >= OPEN_RAD
+}
+
+fn opened_rad(f: &Facts) -> f32 {
+    f.turned_rad("lever_door", "lever_door leaf")
 }
 
 /// All of B, of C and of the table between them is through the door.

@@ -6,7 +6,8 @@
 use std::f32::consts::{FRAC_PI_3, FRAC_PI_6, PI};
 
 use super::{Offset, RobotSpot, Task, spot, uniform_xy};
-use crate::scoring::{A, Done, Facts, Phase};
+use crate::scoring::nearness::{all, beside, come, grips, is};
+use crate::scoring::{A, B, Done, Facts, Phase};
 
 /// Height of the worktop above the floor.
 const WORKTOP_M: f32 = 0.80;
@@ -54,12 +55,18 @@ pub const TASK: Task = Task {
             description: "Cup and glass are at least 3 cm above the worktop at the same time.",
             collaborative: false,
             done: Done::When(both_aloft),
+            nearness: |f| {
+                all(&[grips(f, &[A], "cup"), grips(f, &[B], "glass"), risen(f, "cup"), risen(f, "glass")])
+            },
         },
         Phase {
             id: "tip",
             description: "A holds the cup aloft and tilts it by at least 60 degrees.",
             collaborative: false,
             done: Done::When(tipped),
+            nearness: |f| {
+                all(&[grips(f, &[A], "cup"), risen(f, "cup"), come(f.tilt_rad("cup"), 0.0, TIPPED_RAD)])
+            },
         },
         Phase {
             id: "pour",
@@ -67,6 +74,9 @@ pub const TASK: Task = Task {
                           above the worktop.",
             collaborative: true,
             done: Done::Lasting { condition: marble_in_glass, for_s: 0.5, at_end: glass_aloft },
+            nearness: |f| {
+                all(&[beside(f, "marble", "glass", [0.5, 0.02]), is(marble_in_glass(f)), risen(f, "glass")])
+            },
         },
     ],
 };
@@ -89,6 +99,11 @@ fn marble_in_glass(f: &Facts) -> bool {
 /// The glass is off the worktop.
 fn glass_aloft(f: &Facts) -> bool {
     aloft(f, "glass")
+}
+
+/// How far a vessel has come off the worktop.
+fn risen(f: &Facts, vessel: &str) -> f32 {
+    come(f.clearance_m(vessel), 0.0, ALOFT_M)
 }
 
 /// All of a vessel is off the worktop, however it is tilted.

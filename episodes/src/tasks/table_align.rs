@@ -8,6 +8,7 @@
 use std::f32::consts::{FRAC_PI_2, PI};
 
 use super::{ObjectSpot, RobotSpot, Task, spot, uniform_xy};
+use crate::scoring::nearness::{all, beside, come, grips, is, standing};
 use crate::scoring::placement::{stands_as_high, stands_released};
 use crate::scoring::{A, B, Done, Facts, Phase};
 
@@ -58,6 +59,9 @@ pub const TASK: Task = Task {
             description: "Both robots hold the table at least 3 cm above where it stood.",
             collaborative: true,
             done: Done::When(lifted),
+            nearness: |f| {
+                all(&[grips(f, &[A, B], "office_table"), come(f.lift_m("office_table"), 0.0, LIFTED_M)])
+            },
         },
         Phase {
             id: "carry",
@@ -65,6 +69,13 @@ pub const TASK: Task = Task {
                           the floor.",
             collaborative: true,
             done: Done::When(carried),
+            nearness: |f| {
+                all(&[
+                    is(f.held_by_all(&[A, B], "office_table")),
+                    beside(f, "office_table", "table_patch", [1.75, 0.1]),
+                    is(carried(f)),
+                ])
+            },
         },
         Phase {
             id: "align",
@@ -73,6 +84,13 @@ pub const TASK: Task = Task {
                           15 degrees and still, and no robot has touched it for 0.2 s.",
             collaborative: true,
             done: Done::When(aligned),
+            nearness: |f| {
+                all(&[
+                    come(off_square_rad(f), FRAC_PI_2, SQUARE_RAD),
+                    standing(f, "office_table"),
+                    is(aligned(f)),
+                ])
+            },
         },
     ],
 };
@@ -89,14 +107,18 @@ fn carried(f: &Facts) -> bool {
         && f.clearance_m("office_table") >= CLEAR_M
 }
 
+/// How far the long side of the table is from square to the chair.
+fn off_square_rad(f: &Facts) -> f32 {
+    (f.turned_rad("office_chair", "office_table").abs() - FRAC_PI_2).abs()
+}
+
 /// The table stands before the chair, square to it, released.
 fn aligned(f: &Facts) -> bool {
     let table_m = f.seen_from_m("office_chair", "office_table");
-    let square_rad = f.turned_rad("office_chair", "office_table").abs() - FRAC_PI_2;
     stands_released(f, "office_table")
         && (BEFORE_CHAIR_M[0]..=BEFORE_CHAIR_M[1]).contains(&table_m.x)
         && table_m.y.abs() <= ACROSS_M
-        && square_rad.abs() <= SQUARE_RAD
+        && off_square_rad(f) <= SQUARE_RAD
         && stands_as_high(f, "office_table", AS_HIGH_M)
 }
 

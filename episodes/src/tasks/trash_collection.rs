@@ -8,6 +8,7 @@
 use std::f32::consts::FRAC_PI_2;
 
 use super::{Offset, RobotSpot, Task, spot, uniform_xy};
+use crate::scoring::nearness::{all, beside, come, grips, is};
 use crate::scoring::{A, Done, Facts, Phase};
 
 /// Height of the bench's top, whose end is at y = 0.
@@ -59,6 +60,7 @@ pub const TASK: Task = Task {
             description: "A holds the bin, all of it at least 2 cm off the floor.",
             collaborative: false,
             done: Done::When(lifted),
+            nearness: |f| all(&[grips(f, &[A], "bin"), come(f.clearance_m("bin"), 0.0, LIFTED_M)]),
         },
         Phase {
             id: "deliver_bin",
@@ -66,12 +68,18 @@ pub const TASK: Task = Task {
                           of the bench, no point of its rim more than 1 cm higher than the bench's top.",
             collaborative: false,
             done: Done::When(delivered),
+            nearness: |f| {
+                all(&[is(lifted(f)), beside(f, "bin", "carry_point", [2.0, DELIVERED_M]), is(delivered(f))])
+            },
         },
         Phase {
             id: "sweep",
             description: "The bottle is inside the bin, and A still holds the bin.",
             collaborative: true,
             done: Done::When(swept),
+            nearness: |f| {
+                all(&[grips(f, &[A], "bin"), beside(f, "pet_bottle", "bin", [1.2, 0.1]), is(swept(f))])
+            },
         },
     ],
 };

@@ -1,6 +1,7 @@
 //! One episode in the caller's process.
 
 use std::path::{Path, PathBuf};
+use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -19,7 +20,7 @@ use tandem_tools_spec::{
 };
 
 use crate::arrays::{Colours, Depths, shaped, state_names, state_row};
-use crate::refusal::{failed, refused};
+use crate::refusal::{failed, forked, refused};
 
 /// An episode from its start to its result. It may be used from any thread; calls of several come one after another.
 #[pyclass(frozen, name = "Episode", module = "tandem._native")]
@@ -27,6 +28,8 @@ pub struct NativeEpisode {
     held: Mutex<Held>,
     robots: Vec<String>,
     recorded: bool,
+    /// The process that made it: one that is forked has neither the threads nor the files of its parent.
+    process: u32,
     /// Whether somebody wants the policy to stop, who cannot reach its thread.
     interrupted: Arc<AtomicBool>,
 }
@@ -59,13 +62,15 @@ impl NativeEpisode {
             held: Mutex::new(Held::Open(guard.into())),
             robots,
             recorded,
+            process: process::id(),
             interrupted: Arc::default(),
         }
     }
 
     /// The same episode, whose calls raise KeyboardInterrupt from when `interrupted` is set.
-    pub fn until(self, interrupted: Arc<AtomicBool>) -> NativeEpisode {
-        NativeEpisode { interrupted, ..self }
+    pub fn until(mut self, interrupted: Arc<AtomicBool>) -> NativeEpisode {
+        self.interrupted = interrupted;
+        self
     }
 
     /// How long the policy has thought, up to its last call.
@@ -80,12 +85,21 @@ impl NativeEpisode {
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Refuses what is asked in a process that was forked.
+    fn check_process(&self, py: Python) -> PyResult<()> {
+        match process::id() == self.process {
+            true => Ok(()),
+            false => Err(failed(py, &forked(self.process))),
+        }
+    }
+
     /// Has the session do something; Python's other threads run meanwhile.
     fn work<T: Send>(
         &self,
         py: Python,
         work: impl FnOnce(&mut Session) -> Result<T, EpisodeError> + Send,
     ) -> PyResult<T> {
+        self.check_process(py)?;
         if self.interrupted.load(Ordering::Relaxed) {
             return Err(PyKeyboardInterrupt::new_err("the evaluation was interrupted"));
         }
@@ -242,8 +256,21 @@ impl NativeEpisode {
 
     /// Ends the episode, closes its recording, and returns the result as JSON; again and again the same.
     fn close(&self, py: Python) -> PyResult<String> {
+        self.check_process(py)?;
         let result = py.detach(|| self.end(None)).map_err(|error| refused(py, &error))?;
         Ok(json!(result).to_string())
+    }
+}
+
+/// An episode that nobody closes leaves its files whole. In a process that was forked it is left as it is: its files are the parent's.
+impl Drop for NativeEpisode {
+    fn drop(&mut self) {
+        if process::id() == self.process {
+            // There is a result, or there is nobody left to tell.
+            let _ = self.end(None);
+        } else if let Ok(held) = self.held.get_mut() {
+            std::mem::forget(std::mem::replace(held, Held::Closed(None)));
+        }
     }
 }
 

@@ -10,6 +10,7 @@ mod evaluation;
 mod program;
 mod recording;
 mod refusal;
+mod worlds;
 
 /// What the package is built on.
 #[pyo3::pymodule]
@@ -28,6 +29,8 @@ mod _native {
     use crate::program::{NativeServer, list_tasks, run_command_line, write_report};
     #[pymodule_export]
     use crate::recording::NativeRecording;
+    #[pymodule_export]
+    use crate::worlds::{NativeWorlds, row_columns};
 
     /// Episodes, recordings and checkpoints name the build that made them: this library, and not Python's own program.
     #[pyfunction]

@@ -21,6 +21,11 @@ pub fn failed(py: Python, error: &dyn Display) -> PyErr {
     raised(py, ("failed", "Failed", error.to_string()))
 }
 
+/// Why nothing is done in another process than the one that made it.
+pub fn forked(maker: u32) -> String {
+    format!("this was made in process {maker}, of which this one is a fork; make another one here")
+}
+
 /// The package has the classes, because callers over HTTP get the same.
 fn raised(py: Python, (kind, title, detail): (&str, &str, String)) -> PyErr {
     let made = py

@@ -1,10 +1,25 @@
 from collections.abc import Callable
+from os import PathLike
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+Outcomes: TypeAlias = tuple[
+    NDArray[np.float64],
+    NDArray[np.bool_],
+    NDArray[np.bool_],
+    NDArray[np.int64],
+    NDArray[np.bool_],
+    NDArray[np.int64],
+    NDArray[np.int64],
+    NDArray[np.int64],
+    list[tuple[int, str]],
+]
+
 def action_columns() -> list[str]: ...
+def row_columns(actions: str) -> list[str]: ...
 def state_columns() -> list[str]: ...
 def list_tasks() -> str: ...
 def loaded_from(path: Path | str) -> None: ...
@@ -64,3 +79,31 @@ class Recording:
     def picture(
         self, camera: str, step: int, size: tuple[int, int] | None
     ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]: ...
+
+class Worlds:
+    def __init__(
+        self,
+        task: str,
+        settings: str,
+        worlds: int,
+        threads: int,
+        actions: str,
+        reward: str,
+        pictures: tuple[int, int] | None,
+        record: str | PathLike[str] | None,
+    ) -> None: ...
+    def action_limits(self) -> NDArray[np.float32]: ...
+    def reset(
+        self, chosen: list[bool], seeds: list[int], seen: tuple[NDArray[np.float32], NDArray[np.uint8] | None]
+    ) -> Outcomes: ...
+    def step(
+        self,
+        actions: NDArray[np.float32],
+        autoreset: str,
+        looks: bool,
+        seen: tuple[NDArray[np.float32], NDArray[np.uint8] | None],
+        last: tuple[NDArray[np.float32], NDArray[np.uint8] | None] | None,
+    ) -> Outcomes: ...
+    def draw(self, world: int, size: tuple[int, int]) -> NDArray[np.uint8]: ...
+    def state_hash(self, world: int) -> str: ...
+    def close(self) -> None: ...

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from typing import Any
 
@@ -23,7 +24,9 @@ def test_the_checker_of_gymnasium_passes(name: str) -> None:
 
     env = make(name, obs_type="state")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+        # That joint limits are not -1 to 1 is said once more each time; everything else is an error.
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", message=".*(symmetric|normalized|infinity).*")
         check_env(env.unwrapped, skip_render_check=True)
     assert env.unwrapped.task_description
     assert env.unwrapped._max_episode_steps > 100
@@ -39,13 +42,35 @@ def held(observation: dict[str, Any]) -> np.ndarray[Any, np.dtype[np.float32]]:
 
 def test_seeds_belong_to_episodes() -> None:
     env = make("Handover", obs_type="state")
-    first, info = env.reset(seed=2000)
+    _, info = env.reset()
     assert info["seed"] == 2000
+    first, info = env.reset(seed=2004)
+    assert info["seed"] == 2004
     env.step(held(first))
     second, info = env.reset()
-    assert info["seed"] == 2001
-    again, _ = env.reset(seed=2001)
+    assert info["seed"] == 2005
+    there = env.unwrapped.state_hash()
+    again, _ = env.reset(seed=2005)
     assert np.array_equal(second["agent_pos"], again["agent_pos"])
+    assert env.unwrapped.state_hash() == there
+    with pytest.raises(ValueError, match="0 to 4294967295"):
+        env.unwrapped._worlds.reset([2**32])
+    env.close()
+
+
+def test_a_step_is_a_step_of_the_episode() -> None:
+    import tandem
+
+    env = make("Handover", obs_type="state")
+    seen, _ = env.reset(seed=2000)
+    action: Any = held(seen)
+    action[3] = 0.3
+    for _ in range(30):
+        seen, _, _, _, _ = env.step(action)
+    with tandem.Episode("handover", 2000, protocol="benchmark") as episode:
+        episode.step(np.repeat(action.reshape(2, 1, 35), 30, axis=1))
+        assert env.unwrapped.state_hash() == episode.state_hash
+        assert np.array_equal(seen["agent_pos"].reshape(2, 47)[:, :43], episode.state()[:, :43])
     env.close()
 
 
@@ -54,7 +79,7 @@ def test_an_episode_goes_to_its_end() -> None:
     seen, _ = env.reset(seed=2000)
     assert env.observation_space.contains(seen)
     assert {camera: image.shape for camera, image in seen["pixels"].items()} == {"A": (240, 320, 3), "B": (240, 320, 3)}
-    assert env.render().shape == (240, 640, 3)
+    assert np.array_equal(env.render(), np.concatenate([seen["pixels"]["A"], seen["pixels"]["B"]], axis=1))
     env.close()
 
     env = make("Handover", obs_type="state")
@@ -65,6 +90,47 @@ def test_an_episode_goes_to_its_end() -> None:
         steps, total = steps + 1, total + reward
         if terminated or truncated:
             break
-    assert (terminated, truncated, info["is_success"], total) == (False, True, False, 0.0)
+    assert (terminated, truncated, info["is_success"], info["phases"], total) == (False, True, False, 0, 0.0)
     assert steps == env.unwrapped._max_episode_steps
+    with pytest.raises(Exception, match="reset it first"):
+        env.step(held(seen))
+    env.close()
+
+
+def test_pictures_have_any_size_and_are_drawn_where_the_policy_looks() -> None:
+    env = make("Handover", observation_width=64, observation_height=48, look_every=3, renderer="cpu")
+    seen, _ = env.reset(seed=2000)
+    pictures = [seen["pixels"]["B"]]
+    assert pictures[0].shape == (48, 64, 3)
+    for _ in range(4):
+        pictures.append(env.step(held(seen))[0]["pixels"]["B"])
+    drawn = [not np.array_equal(before, after) for before, after in itertools.pairwise(pictures)]
+    assert drawn == [False, False, True, False]
+    env.close()
+
+
+def test_wrists_are_sent_to_poses_and_dense_rewards_follow_them() -> None:
+    env = make("Handover", obs_type="state", action_type="wrists", reward_type="dense")
+    env.reset(seed=2000)
+    row = np.zeros(32, np.float32)
+    row[:7], row[7:14], row[-1] = (0.25, 0.25, 0.1, 1, 0, 0, 0), (0.25, -0.25, 0.1, 1, 0, 0, 0), 0.74
+    assert env.action_space.shape == (64,)
+    total = sum(env.step(np.tile(row, 2))[1] for _ in range(50))
+    assert 0.005 < total < 1.0
+    with pytest.raises(Exception, match="quaternion"):
+        env.step(np.zeros(64, np.float32))
+    env.close()
+
+
+def test_what_is_not_there_is_refused_with_what_is() -> None:
+    with pytest.raises(ValueError, match="have: handover, pouring"):
+        make("Handover", task="handove")
+    with pytest.raises(TypeError, match="no option camera; have: obs_type"):
+        make("Handover", camera="A")
+    with pytest.raises(Exception, match="have: sparse, dense"):
+        make("Handover", reward_type="shaped")
+    env = make("Handover", obs_type="state")
+    env.reset()
+    with pytest.raises(Exception, match="give"):
+        env.unwrapped.step(np.zeros(71, np.float32))
     env.close()

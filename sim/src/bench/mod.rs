@@ -75,7 +75,7 @@ pub struct Spread {
 
 impl Spread {
     /// The spread of at least one number; it puts them in order.
-    fn of(values: &mut [f64]) -> Spread {
+    pub fn of(values: &mut [f64]) -> Spread {
         values.sort_unstable_by(f64::total_cmp);
         let at = |share: f64| values[((values.len() - 1) as f64 * share).round() as usize];
         Spread { median: at(0.5), quartiles: [at(0.25), at(0.75)] }

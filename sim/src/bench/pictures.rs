@@ -1,4 +1,4 @@
-//! How long pictures take: those of both robots' eyes in one state of Handover's kitchen, and that of the camera in the room.
+//! How long pictures take: those of both robots' eyes in one state of Handover's kitchen, in two sizes, and that of the camera in the room.
 
 use std::f32::consts::PI;
 use std::time::{Duration, Instant};
@@ -7,7 +7,7 @@ use rapier3d::math::{Pose, Vector};
 use serde::Serialize;
 
 use super::Spread;
-use crate::render::{Camera, Cameras, RendererKind, Scenery};
+use crate::render::{Camera, Cameras, Renderer, RendererKind, Scenery};
 use crate::{ObjectPlacement, RobotPlacement, SimError, Step, World, WorldSpec};
 
 /// Times of all sets of pictures.
@@ -18,7 +18,7 @@ pub struct PicturesReport {
     pub cases: Vec<PicturesCase>,
 }
 
-/// Pictures of one state, colour, depth and ids.
+/// Pictures of one state: colour, depth and ids, or colour alone.
 #[derive(Clone, Debug, Serialize)]
 pub struct PicturesCase {
     pub name: &'static str,
@@ -30,32 +30,56 @@ pub struct PicturesCase {
     pub wall_ms: Spread,
 }
 
+/// What many learned policies look at.
+const SMALL_PX: [u32; 2] = [128, 128];
 /// Each gives a time; processor time is counted in ticks of some milliseconds, so that many states go into one.
 const BATCHES: usize = 9;
 const STATES: usize = 10;
 /// Time that this thread has been running, in nanoseconds, is the first word of this file of Linux.
 const BUSY: &str = "/proc/thread-self/schedstat";
 
-/// Times both sets; `done` hears of each as it ends.
+/// Times all sets; `done` hears of each as it ends.
 pub fn pictures(kind: RendererKind, mut done: impl FnMut(&PicturesCase)) -> Result<PicturesReport, SimError> {
     let world = World::new(&kitchen())?;
     let cameras = Cameras::of(&world);
     let renderer = kind.renderer(Scenery::of(&world)).name().to_owned();
     let eyes = |step: &Step| (0..2).map(|robot| cameras.egocentric(step, robot)).collect();
+    let small = |step: &Step| {
+        let [width, height] = SMALL_PX;
+        (0..2).map(|robot| Camera { width, height, ..cameras.egocentric(step, robot) }).collect()
+    };
     let room = |_: &Step| vec![cameras.third_person()];
     let mut cases = Vec::new();
-    for (name, views) in [("eyes of both", &eyes as &dyn Fn(&Step) -> Vec<Camera>), ("third person", &room)] {
-        let case = measure(kind, name, views)?;
+    let sets: [(_, &dyn Fn(&Step) -> Vec<Camera>, Draw); 4] = [
+        ("eyes of both", &eyes, whole),
+        ("their colours", &eyes, colours),
+        ("small colours", &small, colours),
+        ("third person", &room, whole),
+    ];
+    for (name, views, draw) in sets {
+        let case = measure(kind, name, views, draw)?;
         done(&case);
         cases.push(case);
     }
     Ok(PicturesReport { renderer, cases })
 }
 
+/// Draws a picture: all of it, or its colours alone, as learned policies have them.
+type Draw = fn(&mut dyn Renderer, &Step, &Camera);
+
+fn whole(renderer: &mut dyn Renderer, step: &Step, camera: &Camera) {
+    renderer.render(step, camera);
+}
+
+fn colours(renderer: &mut dyn Renderer, step: &Step, camera: &Camera) {
+    renderer.render_colours(step, camera);
+}
+
 fn measure(
     kind: RendererKind,
     name: &'static str,
     views: &dyn Fn(&Step) -> Vec<Camera>,
+    draw: Draw,
 ) -> Result<PicturesCase, SimError> {
     let mut world = World::new(&kitchen())?;
     let commands = [world.rest_command(0), world.rest_command(1)];
@@ -68,7 +92,7 @@ fn measure(
             let step = world.control_step(&commands)?;
             let (cameras, started) = (views(&step), Instant::now());
             let before = busy_since(started);
-            cameras.iter().for_each(|camera| drop(renderer.render(&step, camera)));
+            cameras.iter().for_each(|camera| draw(&mut *renderer, &step, camera));
             busy += busy_since(started) - before;
             wall += started.elapsed();
         }

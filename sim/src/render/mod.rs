@@ -35,6 +35,11 @@ pub trait Renderer: Send {
     fn render(&mut self, step: &Step, camera: &Camera) -> Frame {
         self.render_all(step, slice::from_ref(camera)).swap_remove(0)
     }
+
+    /// The colours alone of what `camera` sees after `step`, as [`Frame::rgb`], drawn on this thread: for who has threads of its own.
+    fn render_colours(&mut self, step: &Step, camera: &Camera) -> Vec<u8> {
+        self.render(step, camera).rgb
+    }
 }
 
 /// A rendered picture, row by row from the top left.

@@ -341,6 +341,22 @@ fn pictures_of_a_state_are_drawn_side_by_side() {
     assert_eq!(renderer.render(&step, &cameras[1]), alone[1]);
 }
 
+#[test]
+fn colours_alone_are_those_of_the_whole_picture() {
+    let camera = look_at(Vector::new(0.8, -1.2, 1.0), Vector::ZERO);
+    let scenery = floor_and(TriangleMesh::capsule(0.1, 0.2));
+    let steps = [0.3, 0.4].map(|height_m| step(&[at(0.0, 0.0, height_m)]));
+    let mut renderer = cpu(scenery.clone());
+    for step in &steps {
+        let small = Camera { width: 32, height: 32, ..camera };
+        for camera in [&camera, &small] {
+            let whole = cpu(scenery.clone()).render(step, camera);
+            assert_eq!(renderer.render_colours(step, camera), whole.rgb);
+            assert_eq!(renderer.render(step, camera), whole, "depth is there again");
+        }
+    }
+}
+
 /// Renderers share what they need while they draw; what one has lit is nobody else's light.
 #[test]
 fn pictures_do_not_depend_on_who_else_draws() {

@@ -38,7 +38,8 @@ const ORDER: &[(&str, &[&[&str]])] = &[
             &["live", "reports"],
             &["instructions", "session"],
             &["players", "replay"],
-            &["evaluation", "bench"],
+            &["batch", "evaluation"],
+            &["bench"],
         ],
     ),
     (

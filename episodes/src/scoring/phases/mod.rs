@@ -13,6 +13,9 @@ pub struct Phase {
     /// Whether more than one robot has to work on it.
     pub collaborative: bool,
     pub done: Done,
+    /// How near the phase is, from 0 to 1, once its predecessors have been reached: dense rewards for learners, and nothing else, are made
+    /// of it.
+    pub nearness: fn(&Facts) -> f32,
 }
 
 /// When a phase is reached. Conditions see one control step at a time; what has to happen in sequence says so here.
@@ -104,6 +107,13 @@ impl PhaseTracker {
     /// The phases reached so far, in order, with the time of each.
     pub fn reached(&self) -> impl Iterator<Item = (&'static Phase, f64)> {
         self.phases.iter().zip(self.memory.reached_s.iter().copied())
+    }
+
+    /// The phases reached, and how near the next one is.
+    pub fn progress(&self, facts: &Facts) -> f64 {
+        let reached = self.memory.reached_s.len();
+        let next = self.phases.get(reached).map_or(0.0, |phase| (phase.nearness)(facts));
+        reached as f64 + f64::from(next)
     }
 
     /// Whether the present phase is a sequence whose `first` has held, unbroken.

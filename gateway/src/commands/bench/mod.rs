@@ -14,7 +14,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use tandem_episodes::{
     RendererKind,
-    bench::{FallsCase, FallsReport, IkReport, PhysicsReport, PicturesReport},
+    bench::{EnvReport, FallsCase, FallsReport, IkReport, PhysicsReport, PicturesReport},
 };
 
 use super::CommandResult;
@@ -62,6 +62,12 @@ enum BenchPart {
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
     },
+    /// Environments of learners: steps per second of two and three robots without pictures, and their share of the core's own.
+    Env {
+        /// Write the cases to this file as JSON, too.
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+    },
     /// Falls: what physics makes of robots that stagger through all tasks, are dropped and struck.
     Falls {
         /// How many episodes, over all cases.
@@ -89,9 +95,10 @@ enum BenchPart {
 type Measure = fn() -> Result<Value, Box<dyn Error>>;
 
 /// The parts that `bench all` measures; a new part adds its line.
-const PARTS: [(&str, Measure); 5] = [
+const PARTS: [(&str, Measure); 6] = [
     ("physics", || Ok(serde_json::to_value(measure_physics()?)?)),
     ("render", || Ok(serde_json::to_value(measure_pictures(RendererKind::Cpu)?)?)),
+    ("env", || Ok(serde_json::to_value(measure_env()?)?)),
     ("tools", || Ok(serde_json::to_value(measure_tools()?)?)),
     ("ik", || {
         let report = tandem_episodes::bench::ik(None)?;
@@ -111,6 +118,7 @@ pub fn run(args: BenchArgs) -> CommandResult {
         BenchPart::Tools { json } => write(measure_tools()?, json.as_deref()),
         BenchPart::Physics { json } => write(measure_physics()?, json.as_deref()),
         BenchPart::Render { renderer, json } => write(measure_pictures(renderer)?, json.as_deref()),
+        BenchPart::Env { json } => write(measure_env()?, json.as_deref()),
         BenchPart::Falls { episodes, cases, commands, json } => {
             let report = measure_falls(episodes, &cases)?;
             if let Some(path) = commands {
@@ -160,6 +168,25 @@ fn measure_physics() -> Result<PhysicsReport, Box<dyn Error>> {
         println!(
             "{:14}{:>7}{:>10.1}{:>10.1}x",
             case.name, case.robots, case.median_step_us, case.realtime_factor
+        );
+    })?)
+}
+
+fn measure_env() -> Result<EnvReport, Box<dyn Error>> {
+    println!(
+        "{:14}{:>7}{:>8}{:>9}{:>10}{:>10}{:>10}",
+        "task", "robots", "worlds", "threads", "steps/s", "of core", "reset ms"
+    );
+    Ok(tandem_episodes::bench::env(|case| {
+        println!(
+            "{:14}{:>7}{:>8}{:>9}{:>10.0}{:>10.2}{:>10.1}",
+            case.task,
+            case.robots,
+            case.worlds,
+            case.threads,
+            case.steps_per_s.median,
+            case.of_core.median,
+            case.reset_ms.median
         );
     })?)
 }

@@ -9,6 +9,7 @@ mod view;
 mod workspace;
 
 use std::panic::resume_unwind;
+use std::slice;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 
@@ -74,6 +75,10 @@ impl CpuRenderer {
     /// What each of `cameras` sees, the first drawn on this thread and the others beside it. A picture is the same bit for bit,
     /// whatever is drawn beside it.
     pub(super) fn draw_placed(&mut self, placed: PlacedScenery, cameras: &[Camera]) -> Vec<Frame> {
+        self.draw(placed, cameras, Wanted::All)
+    }
+
+    fn draw(&mut self, placed: PlacedScenery, cameras: &[Camera], wanted: Wanted) -> Vec<Frame> {
         let CpuRenderer { prepared, srgb, number } = self;
         let arch = Arch::new();
         let mut workspace = Workspace::take(*number, cameras.len());
@@ -82,7 +87,9 @@ impl CpuRenderer {
             arch.dispatch(StateDrawing { state, prepared, placed });
         }
         let (prepared, srgb, state) = (&*prepared, &*srgb, &*state);
-        let draw = |(canvas, camera)| arch.dispatch(PictureDrawing { state, prepared, srgb, canvas, camera });
+        let draw = |(canvas, camera)| {
+            arch.dispatch(PictureDrawing { state, prepared, srgb, canvas, camera, wanted })
+        };
         let mut pictures = canvases.iter_mut().zip(cameras);
         let first = pictures.next();
         thread::scope(|scope| {
@@ -109,6 +116,11 @@ impl Renderer for CpuRenderer {
         let placed = self.prepared.scenery.place(step);
         self.draw_placed(placed, cameras)
     }
+
+    fn render_colours(&mut self, step: &Step, camera: &Camera) -> Vec<u8> {
+        let placed = self.prepared.scenery.place(step);
+        self.draw(placed, slice::from_ref(camera), Wanted::Colours).swap_remove(0).rgb
+    }
 }
 
 /// The light of a state to draw. This and [`PictureDrawing`] are compiled once more for processors with wide registers, with
@@ -132,6 +144,14 @@ impl WithSimd for StateDrawing<'_> {
     }
 }
 
+/// What of a picture is drawn.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Wanted {
+    All,
+    /// Without depth and ids.
+    Colours,
+}
+
 /// A picture to draw.
 struct PictureDrawing<'a> {
     state: &'a LitState,
@@ -139,6 +159,7 @@ struct PictureDrawing<'a> {
     srgb: &'a SrgbTable,
     canvas: &'a mut Canvas,
     camera: &'a Camera,
+    wanted: Wanted,
 }
 
 impl WithSimd for PictureDrawing<'_> {
@@ -146,9 +167,10 @@ impl WithSimd for PictureDrawing<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Frame {
-        let PictureDrawing { state, prepared, srgb, canvas, camera } = self;
+        let PictureDrawing { state, prepared, srgb, canvas, camera, wanted } = self;
         let Canvas { row, samples, centres } = canvas;
-        target::draw(simd, samples, centres, prepared, &state.placed, camera);
+        let measured = (wanted == Wanted::All).then_some(&mut *centres);
+        target::draw(simd, samples, measured, prepared, &state.placed, camera);
         let view = View {
             prepared,
             facets: &state.facets,
@@ -161,9 +183,14 @@ impl WithSimd for PictureDrawing<'_> {
             width: camera.width,
             height: camera.height,
             rgb: view.rgb(row, srgb),
-            depth_m: Vec::with_capacity((camera.width * camera.height) as usize),
-            ids: Vec::with_capacity((camera.width * camera.height) as usize),
+            depth_m: Vec::new(),
+            ids: Vec::new(),
         };
+        if wanted == Wanted::Colours {
+            return frame;
+        }
+        frame.depth_m.reserve_exact((camera.width * camera.height) as usize);
+        frame.ids.reserve_exact((camera.width * camera.height) as usize);
         for row in 0..camera.height as usize {
             frame.depth_m.extend(centres.nearness_1_m(row).iter().map(|nearness| 1.0 / nearness));
             frame.ids.extend(centres.sheets(row).iter().map(|sheet| prepared.id(*sheet)));

@@ -18,19 +18,21 @@ pub(super) struct RenderTarget {
     sheet: SampleRows<u32>,
 }
 
-/// Fills `samples`, [`SAMPLES`] a pixel along each axis, and `centres`, one a pixel, with all that `camera` sees.
+/// Fills `samples`, [`SAMPLES`] a pixel along each axis, and where they are wanted `centres`, one a pixel, with all that `camera` sees.
 #[inline(always)]
 pub(super) fn draw<S: Simd>(
     simd: S,
     samples: &mut RenderTarget,
-    centres: &mut RenderTarget,
+    mut centres: Option<&mut RenderTarget>,
     prepared: &Prepared,
     placed: &PlacedScenery,
     camera: &Camera,
 ) {
     let (width, height) = (camera.width as usize, camera.height as usize);
     samples.reset(Grid { width: width * SAMPLES, height: height * SAMPLES, pitch_px: 1.0 });
-    centres.reset(Grid { width, height, pitch_px: SAMPLES as f64 });
+    if let Some(centres) = &mut centres {
+        centres.reset(Grid { width, height, pitch_px: SAMPLES as f64 });
+    }
     let camera_from_world = camera.world_from_camera.inverse();
     let lens = Lens::new(camera);
     let mut corners: Vec<[f32; 4]> = Vec::new();
@@ -53,14 +55,26 @@ pub(super) fn draw<S: Simd>(
             let ([au, av, an, az], [bu, bv, bn, bz], [cu, cv, cn, cz]) = (corner(0), corner(1), corner(2));
             let visible = u32::from(az < -NEAR_M) + u32::from(bz < -NEAR_M) + u32::from(cz < -NEAR_M);
             if visible == 3 {
-                fill(simd, samples, centres, [[au, av, an], [bu, bv, bn], [cu, cv, cn]], *sheet);
+                fill(
+                    simd,
+                    samples,
+                    centres.as_deref_mut(),
+                    [[au, av, an], [bu, bv, bn], [cu, cv, cn]],
+                    *sheet,
+                );
             } else if visible > 0 {
                 let position = |corner: u32| part.mesh.vertices[corner as usize].position_m;
                 let (clipped, count) =
                     clip_near(triangle.map(|corner| Vector::from(camera_from_mesh.map(position(corner)))));
                 for i in 1..count - 1 {
                     let corners = [clipped[0], clipped[i], clipped[i + 1]];
-                    fill(simd, samples, centres, corners.map(|p| lens.screen(p.to_array())), *sheet);
+                    fill(
+                        simd,
+                        samples,
+                        centres.as_deref_mut(),
+                        corners.map(|p| lens.screen(p.to_array())),
+                        *sheet,
+                    );
                 }
             }
         }
@@ -102,13 +116,15 @@ impl Lens {
 fn fill<S: Simd>(
     simd: S,
     samples: &mut RenderTarget,
-    centres: &mut RenderTarget,
+    centres: Option<&mut RenderTarget>,
     corners: [[f32; 3]; 3],
     sheet: u32,
 ) {
     if let Some(outline) = ProjectedTriangle::new(corners) {
         samples.fill(simd, &outline, sheet);
-        centres.fill(simd, &outline, sheet);
+        if let Some(centres) = centres {
+            centres.fill(simd, &outline, sheet);
+        }
     }
 }
 

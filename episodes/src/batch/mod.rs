@@ -1,0 +1,217 @@
+//! Worlds of one task that take their steps together, as learners want them: a call a batch, numbers in and numbers out.
+
+mod actions;
+mod parallel;
+mod world;
+
+pub use actions::{ActionKind, wrist_columns};
+pub use world::{RewardKind, WorldStep};
+
+use std::path::PathBuf;
+
+use tandem_sim::JOINTS;
+use tandem_tools_spec::ToolCall;
+
+use crate::spec::EpisodeSpec;
+use crate::{EpisodeError, Session};
+use parallel::for_each;
+use world::{BatchWorld, SeenWorld};
+
+/// Numbers of a robot's state: its joints' angles (rad), then the base command in force.
+pub const STATE_COLUMNS: usize = JOINTS + 4;
+/// A picture of a robot's own camera, where nothing else is asked for.
+pub const PICTURE_PX: [u32; 2] = [320, 240];
+
+/// Why a batch takes no step.
+#[derive(Debug, thiserror::Error)]
+pub enum BatchError {
+    #[error("world {world} has no episode under way; reset it first")]
+    NotBegun { world: usize },
+    #[error("the batch has {have} worlds, 0 to {}; there is no world {world}", have - 1)]
+    NoWorld { world: usize, have: usize },
+    #[error(transparent)]
+    Episode(#[from] EpisodeError),
+}
+
+/// What a batch is.
+#[derive(Clone, Debug)]
+pub struct BatchSpec {
+    /// Every episode, but for its seed.
+    pub episode: EpisodeSpec,
+    pub worlds: usize,
+    /// Worlds step on so many threads.
+    pub threads: usize,
+    pub actions: ActionKind,
+    pub reward: RewardKind,
+    /// Width and height of what each robot's camera sees; `None` where nobody looks.
+    pub pictures_px: Option<[u32; 2]>,
+    /// Where every episode leaves a folder of its own, if they are recorded.
+    pub record: Option<PathBuf>,
+}
+
+/// When the next episode of a world begins whose last one is over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Autoreset {
+    /// In place of the step after the last.
+    NextStep,
+    /// In the last step itself.
+    SameStep,
+    /// When it is reset, and not before.
+    Disabled,
+}
+
+impl Autoreset {
+    pub const ALL: [Autoreset; 3] = [Autoreset::NextStep, Autoreset::SameStep, Autoreset::Disabled];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Autoreset::NextStep => "next_step",
+            Autoreset::SameStep => "same_step",
+            Autoreset::Disabled => "disabled",
+        }
+    }
+}
+
+/// Where what is seen is written: world after world, and robot after robot in each.
+#[derive(Default)]
+pub struct SeenArrays<'a> {
+    /// [`STATE_COLUMNS`] a robot.
+    pub states: &'a mut [f32],
+    /// Height by width by red, green, blue a robot; empty where nobody looks.
+    pub pictures: &'a mut [u8],
+}
+
+/// How a batch takes a step.
+#[derive(Clone, Copy, Debug)]
+pub struct BatchStep<'a> {
+    /// World after world, robot after robot, columns of the action.
+    pub actions: &'a [f32],
+    pub autoreset: Autoreset,
+    /// Whether the policy looks: pictures of other steps are drawn only where an episode begins or is over.
+    pub looks: bool,
+}
+
+/// Worlds that take their steps together.
+pub struct Batch {
+    spec: BatchSpec,
+    worlds: Vec<BatchWorld>,
+}
+
+impl Batch {
+    /// Worlds in which nothing has begun.
+    pub fn new(spec: BatchSpec) -> Batch {
+        let worlds = (0..spec.worlds).map(|index| BatchWorld::new(index, spec.worlds)).collect();
+        Batch { spec, worlds }
+    }
+
+    pub fn spec(&self) -> &BatchSpec {
+        &self.spec
+    }
+
+    /// Begins an episode in each world that has an entry: with the seed that it says, or with that of the world's next round. What the
+    /// episodes of a round are does not depend on how many began by themselves in the last one.
+    pub fn reset(
+        &mut self,
+        seeds: &[Option<Option<u32>>],
+        seen: SeenArrays,
+    ) -> Result<Vec<Option<WorldStep>>, BatchError> {
+        let spec = &self.spec;
+        let mut outcomes: Vec<Result<Option<WorldStep>, EpisodeError>> =
+            self.worlds.iter().map(|_| Ok(None)).collect();
+        let jobs = self.worlds.iter_mut().zip(seen.split(self.spec.worlds)).zip(seeds).zip(&mut outcomes);
+        for_each(self.spec.threads, jobs.collect(), |(((world, seen), seed), outcome)| {
+            if let Some(seed) = seed {
+                *outcome = world.reset(spec, *seed, seen).map(Some);
+            }
+        });
+        Ok(outcomes.into_iter().collect::<Result<_, _>>()?)
+    }
+
+    /// One control step of each world, or the beginning of its next episode. `last` is where the last of an episode is written
+    /// whose world begins anew in the same step. Either all actions are in order, or no world steps.
+    pub fn step(
+        &mut self,
+        step: BatchStep,
+        seen: SeenArrays,
+        last: SeenArrays,
+    ) -> Result<Vec<WorldStep>, BatchError> {
+        let calls = self.calls(&step)?;
+        let spec = &self.spec;
+        let mut outcomes: Vec<Result<WorldStep, EpisodeError>> =
+            self.worlds.iter().map(|_| Ok(WorldStep::default())).collect();
+        let seen = seen.split(spec.worlds).zip(last.split(spec.worlds));
+        let jobs = self.worlds.iter_mut().zip(calls).zip(seen).zip(&mut outcomes);
+        for_each(spec.threads, jobs.collect(), |(((world, call), (seen, last)), outcome)| {
+            *outcome = world.step(spec, &step, &call, seen, last);
+        });
+        Ok(outcomes.into_iter().collect::<Result<_, _>>()?)
+    }
+
+    /// What each world is asked to do, all of it checked.
+    fn calls(&self, step: &BatchStep) -> Result<Vec<ToolCall>, BatchError> {
+        if let Some(world) = self.worlds.iter().position(|world| !world.takes(step.autoreset)) {
+            return Err(BatchError::NotBegun { world });
+        }
+        let columns = self.spec.actions.columns();
+        let task = self.spec.episode.task;
+        let rows = step.actions.chunks_exact(columns * task.robots.len());
+        let asked = rows.take(self.worlds.len()).map(|row| {
+            let call = ToolCall::Act(self.spec.actions.call(task.robot_names(), row));
+            call.validate().map_err(EpisodeError::from)?;
+            Ok(call)
+        });
+        asked.collect()
+    }
+
+    /// What the robots of a world see in pictures of this size.
+    pub fn draw(&mut self, world: usize, size_px: [u32; 2]) -> Result<Vec<u8>, BatchError> {
+        let session = self.session(world)?;
+        let robots = session.spec().task.robots.len();
+        Ok((0..robots).flat_map(|robot| session.eye(robot, size_px)).collect())
+    }
+
+    /// The state of a world, as [`Session::state_hash`].
+    pub fn state_hash(&mut self, world: usize) -> Result<String, BatchError> {
+        Ok(self.session(world)?.state_hash())
+    }
+
+    fn session(&mut self, world: usize) -> Result<&mut Session, BatchError> {
+        let have = self.worlds.len();
+        let found = self.worlds.get_mut(world).ok_or(BatchError::NoWorld { world, have })?;
+        found.session.as_mut().ok_or(BatchError::NotBegun { world })
+    }
+}
+
+/// Recordings are whole, whatever keeps their episodes from being played to the end.
+impl Drop for Batch {
+    fn drop(&mut self) {
+        self.worlds.iter_mut().for_each(BatchWorld::close);
+    }
+}
+
+impl<'a> SeenArrays<'a> {
+    /// Where nobody looks.
+    pub fn of_states(states: &'a mut [f32]) -> SeenArrays<'a> {
+        SeenArrays { states, pictures: &mut [] }
+    }
+
+    /// What each of so many worlds writes; one that writes nothing has nothing.
+    fn split(self, worlds: usize) -> impl Iterator<Item = SeenWorld<'a>> {
+        let states = parts(self.states, worlds);
+        let pictures = parts(self.pictures, worlds);
+        states.zip(pictures).map(|(states, pictures)| SeenWorld { states, pictures })
+    }
+}
+
+fn parts<T>(whole: &mut [T], parts: usize) -> impl Iterator<Item = &mut [T]> {
+    let each = whole.len() / parts.max(1);
+    let mut rest = whole;
+    (0..parts).map(move |_| {
+        let (part, others) = std::mem::take(&mut rest).split_at_mut(each);
+        rest = others;
+        part
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,195 @@
+//! Batches of Handover, the cheapest world.
+
+use tandem_tools_spec::{JointChunk, Protocol, SendJointChunk};
+
+use super::*;
+use crate::tasks;
+
+const WORLDS: usize = 3;
+const ROBOTS: usize = 2;
+
+fn spec(reward: RewardKind) -> BatchSpec {
+    BatchSpec {
+        episode: EpisodeSpec::new(tasks::find("handover").unwrap(), 0, Protocol::Benchmark),
+        worlds: WORLDS,
+        threads: 2,
+        actions: ActionKind::Joints,
+        reward,
+        pictures_px: None,
+        record: None,
+    }
+}
+
+/// Robots that keep their upper bodies at zero and stand.
+fn standing(worlds: usize) -> Vec<f32> {
+    let mut row = vec![0.0; 35];
+    row[34] = 0.74;
+    row.repeat(worlds * ROBOTS)
+}
+
+fn states(worlds: usize) -> Vec<f32> {
+    vec![0.0; worlds * ROBOTS * STATE_COLUMNS]
+}
+
+fn stepped(batch: &mut Batch, autoreset: Autoreset, states: &mut [f32]) -> Vec<WorldStep> {
+    let actions = standing(batch.spec().worlds);
+    let step = BatchStep { actions: &actions, autoreset, looks: true };
+    batch.step(step, SeenArrays::of_states(states), SeenArrays::default()).unwrap()
+}
+
+#[test]
+fn a_batch_ends_in_the_states_of_its_episodes_one_by_one() {
+    let mut batch = Batch::new(spec(RewardKind::Sparse));
+    let mut seen = states(WORLDS);
+    batch
+        .reset(&[Some(Some(2001)), Some(Some(2002)), Some(Some(2003))], SeenArrays::of_states(&mut seen))
+        .unwrap();
+    for _ in 0..20 {
+        stepped(&mut batch, Autoreset::NextStep, &mut seen);
+    }
+    for world in 0..WORLDS {
+        let episode = EpisodeSpec { seed: 2001 + world as u32, ..batch.spec().episode.clone() };
+        let mut alone = Session::start(&episode, None).unwrap();
+        let chunk = |robot: &str| JointChunk {
+            robot: robot.into(),
+            rows: vec![standing(1)[..35].iter().copied().map(f64::from).collect(); 20],
+        };
+        alone.call(SendJointChunk { robots: vec![chunk("A"), chunk("B")] }.into()).unwrap();
+        assert_eq!(batch.state_hash(world).unwrap(), alone.state_hash(), "world {world}");
+        let own = &seen[world * ROBOTS * STATE_COLUMNS..][..STATE_COLUMNS];
+        assert_eq!(own[..JOINTS], alone.present().robots[0].sensed.joints.q_rad);
+        assert_eq!(own[STATE_COLUMNS - 1], 0.74);
+    }
+}
+
+#[test]
+fn seeds_are_those_of_the_episodes_index() {
+    let mut batch = Batch::new(BatchSpec { worlds: 2, ..spec(RewardKind::Sparse) });
+    let mut seen = states(2);
+    let seeds =
+        |begun: Vec<Option<WorldStep>>| begun.into_iter().flatten().map(|step| step.seed).collect::<Vec<_>>();
+    assert_eq!(
+        seeds(batch.reset(&[Some(None), Some(None)], SeenArrays::of_states(&mut seen)).unwrap()),
+        [2000, 2001]
+    );
+    // World 0 is over sooner, twice.
+    for round in 1..=2 {
+        batch.worlds[0].over = true;
+        let begun = stepped(&mut batch, Autoreset::NextStep, &mut seen);
+        assert_eq!((begun[0].seed, begun[0].env_steps, begun[0].reward), (2000 + 2 * round, 0, 0.0));
+        assert_eq!((begun[1].seed, begun[1].env_steps), (2001, round));
+    }
+    assert_eq!(
+        seeds(batch.reset(&[Some(None), Some(None)], SeenArrays::of_states(&mut seen)).unwrap()),
+        [2002, 2003]
+    );
+    assert_eq!(seeds(batch.reset(&[None, Some(Some(7))], SeenArrays::of_states(&mut seen)).unwrap()), [7]);
+}
+
+#[test]
+fn an_episode_that_begins_in_the_same_step_leaves_its_last_state() {
+    let mut batch = Batch::new(BatchSpec { worlds: 1, threads: 1, ..spec(RewardKind::Sparse) });
+    let (mut seen, mut last) = (states(1), states(1));
+    batch.reset(&[Some(Some(2000))], SeenArrays::of_states(&mut seen)).unwrap();
+    let begin = seen.clone();
+    // What nothing keeps on its feet.
+    let mut actions = standing(1);
+    actions[34] = 0.4;
+    actions[31] = 2.0;
+    let mut steps = 0;
+    let fell = loop {
+        let step = BatchStep { actions: &actions, autoreset: Autoreset::SameStep, looks: true };
+        let outcome = batch
+            .step(step, SeenArrays::of_states(&mut seen), SeenArrays::of_states(&mut last))
+            .unwrap()
+            .swap_remove(0);
+        steps += 1;
+        if outcome.terminated || outcome.truncated {
+            break outcome;
+        }
+        assert_eq!(outcome.next_seed, None);
+    };
+    assert_eq!((fell.env_steps, fell.seed, fell.next_seed), (steps, 2000, Some(2001)));
+    assert_ne!(last[..JOINTS], seen[..JOINTS]);
+    assert_eq!(seen.len(), begin.len());
+    let next = stepped(&mut batch, Autoreset::SameStep, &mut seen);
+    assert_eq!((next[0].env_steps, next[0].seed), (1, 2001));
+}
+
+#[test]
+fn pictures_are_drawn_where_the_policy_looks() {
+    let size_px = [32, 24];
+    let mut batch = Batch::new(BatchSpec {
+        worlds: 2,
+        pictures_px: Some(size_px),
+        episode: EpisodeSpec { renderer: crate::RendererKind::Cpu, ..spec(RewardKind::Sparse).episode },
+        ..spec(RewardKind::Sparse)
+    });
+    let (mut seen, mut pixels) = (states(2), vec![0; 2 * ROBOTS * 32 * 24 * 3]);
+    batch
+        .reset(&[Some(Some(2000)), Some(Some(2001))], SeenArrays { states: &mut seen, pictures: &mut pixels })
+        .unwrap();
+    assert_eq!(pixels[..pixels.len() / 2], batch.draw(0, size_px).unwrap());
+    let begin = pixels.clone();
+    let actions = standing(2);
+    for looks in [false, true] {
+        let step = BatchStep { actions: &actions, autoreset: Autoreset::NextStep, looks };
+        let arrays = SeenArrays { states: &mut seen, pictures: &mut pixels };
+        batch.step(step, arrays, SeenArrays::default()).unwrap();
+        assert_eq!(pixels != begin, looks);
+    }
+    assert_eq!(pixels[pixels.len() / 2..], batch.draw(1, size_px).unwrap());
+}
+
+#[test]
+fn a_step_is_refused_as_a_whole() {
+    let mut batch = Batch::new(BatchSpec { worlds: 2, ..spec(RewardKind::Sparse) });
+    let mut seen = states(2);
+    let refused = |batch: &mut Batch, actions: &[f32], autoreset| {
+        let step = BatchStep { actions, autoreset, looks: false };
+        batch
+            .step(step, SeenArrays::of_states(&mut states(2)), SeenArrays::default())
+            .unwrap_err()
+            .to_string()
+    };
+    let mut actions = standing(2);
+    let text = refused(&mut batch, &actions, Autoreset::NextStep);
+    assert_eq!(text, "world 0 has no episode under way; reset it first");
+    batch.reset(&[Some(None), Some(None)], SeenArrays::of_states(&mut seen)).unwrap();
+    let before = batch.state_hash(0).unwrap();
+    actions[35 * ROBOTS] = f32::NAN;
+    let text = refused(&mut batch, &actions, Autoreset::NextStep);
+    assert!(text.contains("row 0"), "{text}");
+    assert_eq!(batch.state_hash(0).unwrap(), before);
+    batch.worlds[1].over = true;
+    let text = refused(&mut batch, &standing(2), Autoreset::Disabled);
+    assert_eq!(text, "world 1 has no episode under way; reset it first");
+    assert!(batch.draw(2, [8, 8]).unwrap_err().to_string().contains("0 to 1"));
+}
+
+#[test]
+fn wrists_go_where_a_row_says() {
+    let mut batch =
+        Batch::new(BatchSpec { worlds: 1, actions: ActionKind::Wrists, ..spec(RewardKind::Dense) });
+    let mut seen = states(1);
+    batch.reset(&[Some(Some(2000))], SeenArrays::of_states(&mut seen)).unwrap();
+    let mut row = vec![0.0; 32];
+    row[..7].copy_from_slice(&[0.25, 0.25, 0.10, 1.0, 0.0, 0.0, 0.0]);
+    row[7..14].copy_from_slice(&[0.25, -0.25, 0.10, 1.0, 0.0, 0.0, 0.0]);
+    row[31] = 0.74;
+    let actions = row.repeat(ROBOTS);
+    let mut progress = 0.0;
+    for _ in 0..75 {
+        let step = BatchStep { actions: &actions, autoreset: Autoreset::NextStep, looks: false };
+        let outcome = batch.step(step, SeenArrays::of_states(&mut seen), SeenArrays::default()).unwrap();
+        progress += outcome[0].reward;
+    }
+    let session = batch.session(0).unwrap();
+    let wrist = session.present().robots[0].sensed.pelvis_from_wrist.right.translation;
+    assert!((wrist - tandem_sim::Vector::new(0.25, -0.25, 0.10)).length() < 0.03, "{wrist}");
+    // Rewards add up to what has been come by since the beginning: the hands have come nearer to the bottle.
+    let begin = Session::start(&EpisodeSpec { seed: 2000, ..batch.spec().episode.clone() }, None).unwrap();
+    let now = batch.session(0).unwrap().progress();
+    assert!((now - begin.progress() - progress).abs() < 1e-6 && progress > 0.01, "{now} {progress}");
+    assert_eq!(wrist_columns().len(), ActionKind::Wrists.columns());
+}

@@ -1,0 +1,220 @@
+//! One world of a batch: episode after episode.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+
+use tandem_sim::JOINTS;
+use tandem_tools_spec::ToolCall;
+
+use super::{Autoreset, BatchSpec, BatchStep, STATE_COLUMNS};
+use crate::commands::base_row;
+use crate::spec::EpisodeSpec;
+use crate::{EpisodeError, Session};
+
+/// Where a world begins that nobody gave a seed: with the first of those that are neither reported nor held out.
+const FIRST_SEED: u32 = 2000;
+
+/// What a step is rewarded with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RewardKind {
+    /// 1 for each phase that it reaches.
+    Sparse,
+    /// What it adds to the task's progress: phases reached, and how near the next one is, from 0 to 1.
+    Dense,
+}
+
+impl RewardKind {
+    pub const ALL: [RewardKind; 2] = [RewardKind::Sparse, RewardKind::Dense];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            RewardKind::Sparse => "sparse",
+            RewardKind::Dense => "dense",
+        }
+    }
+}
+
+/// What a step came to in one world, or the beginning of an episode there.
+#[derive(Clone, Debug, Default)]
+pub struct WorldStep {
+    pub reward: f64,
+    /// Whether the last phase has been reached, or a robot has fallen.
+    pub terminated: bool,
+    /// Whether the budget has run out, or the simulator has failed.
+    pub truncated: bool,
+    /// How many phases have been reached.
+    pub phases: usize,
+    pub fallen: Vec<bool>,
+    /// Control steps of the episode.
+    pub env_steps: u32,
+    /// The episode's seed.
+    pub seed: u32,
+    /// The seed of the episode that has begun behind it, in the same step.
+    pub next_seed: Option<u32>,
+    /// How the simulator failed, if it did.
+    pub failure: Option<String>,
+}
+
+/// Where a world writes what is seen of it.
+pub struct SeenWorld<'a> {
+    pub states: &'a mut [f32],
+    pub pictures: &'a mut [u8],
+}
+
+/// Episode after episode.
+pub struct BatchWorld {
+    index: usize,
+    /// By so much the seeds of a world's episodes lie apart: as many as there are worlds.
+    stride: u32,
+    /// The seed that this round began with; `None` before the first.
+    round_seed: Option<u32>,
+    /// Episodes of this round that have begun.
+    episodes: u32,
+    /// `None` before the first, and after a panic.
+    pub session: Option<Session>,
+    /// Whether the episode is over.
+    pub over: bool,
+    progress: f64,
+}
+
+impl BatchWorld {
+    pub fn new(index: usize, worlds: usize) -> BatchWorld {
+        let stride = u32::try_from(worlds).unwrap_or(u32::MAX);
+        BatchWorld { index, stride, round_seed: None, episodes: 0, session: None, over: false, progress: 0.0 }
+    }
+
+    /// Whether a step is in order, where worlds are reset like this.
+    pub fn takes(&self, autoreset: Autoreset) -> bool {
+        self.round_seed.is_some() && (autoreset != Autoreset::Disabled || !self.over)
+    }
+
+    /// Begins a round: with this seed, or with the one after that of the last round.
+    pub fn reset(
+        &mut self,
+        spec: &BatchSpec,
+        seed: Option<u32>,
+        seen: SeenWorld,
+    ) -> Result<WorldStep, EpisodeError> {
+        let next = match self.round_seed {
+            Some(last) => last.wrapping_add(self.stride),
+            None => FIRST_SEED.wrapping_add(self.index as u32),
+        };
+        self.round_seed = Some(seed.unwrap_or(next));
+        self.episodes = 0;
+        self.begin(spec, seen)
+    }
+
+    /// Begins the next episode of the round. Its seed is the index's: no episode begins elsewhere because another one ended sooner.
+    fn begin(&mut self, spec: &BatchSpec, seen: SeenWorld) -> Result<WorldStep, EpisodeError> {
+        let round_seed = self.round_seed.unwrap_or(FIRST_SEED);
+        let seed = round_seed.wrapping_add(self.stride.wrapping_mul(self.episodes));
+        self.close();
+        let episode = EpisodeSpec { seed, ..spec.episode.clone() };
+        let folder = spec.record.as_ref().map(|record| self.folder(record, &episode));
+        let session = self.session.insert(Session::start(&episode, folder.as_deref())?);
+        self.episodes += 1;
+        self.over = false;
+        self.progress = match spec.reward {
+            RewardKind::Sparse => 0.0,
+            RewardKind::Dense => session.progress(),
+        };
+        look(spec, session, seen, true);
+        Ok(WorldStep { seed, fallen: vec![false; episode.task.robots.len()], ..WorldStep::default() })
+    }
+
+    /// One control step, or the beginning of the next episode.
+    pub fn step(
+        &mut self,
+        spec: &BatchSpec,
+        step: &BatchStep,
+        call: &ToolCall,
+        seen: SeenWorld,
+        last: SeenWorld,
+    ) -> Result<WorldStep, EpisodeError> {
+        if self.over {
+            return self.begin(spec, seen);
+        }
+        let mut outcome = self.advance(spec, call);
+        self.over = outcome.terminated || outcome.truncated;
+        let (shown, anew) = match step.autoreset {
+            Autoreset::SameStep if self.over => (last, Some(seen)),
+            Autoreset::SameStep | Autoreset::NextStep | Autoreset::Disabled => (seen, None),
+        };
+        if let Some(session) = &mut self.session {
+            look(spec, session, shown, step.looks || self.over);
+        }
+        if let Some(seen) = anew {
+            outcome.next_seed = Some(self.begin(spec, seen)?.seed);
+        }
+        Ok(outcome)
+    }
+
+    /// One control step, and what it came to. What goes wrong in a world is told of this world alone.
+    fn advance(&mut self, spec: &BatchSpec, call: &ToolCall) -> WorldStep {
+        let Some(session) = &mut self.session else { return WorldStep::default() };
+        let (seed, before) = (session.spec().seed, session.reached_phases());
+        let failure = match catch_unwind(AssertUnwindSafe(|| session.act_unreported(call))) {
+            Ok(Ok(())) => None,
+            Ok(Err(error)) => Some(error.to_string()),
+            Err(_) => {
+                self.session = None;
+                let failure = Some("the simulator panicked".into());
+                return WorldStep { seed, truncated: true, failure, ..WorldStep::default() };
+            }
+        };
+        let reached = session.reached_phases();
+        let reward = match spec.reward {
+            RewardKind::Sparse => (reached - before) as f64,
+            RewardKind::Dense => {
+                let progress = session.progress();
+                progress - std::mem::replace(&mut self.progress, progress)
+            }
+        };
+        let fallen: Vec<bool> = session.present().robots.iter().map(|robot| robot.truth.fallen).collect();
+        let terminated = reached == session.spec().task.phases.len() || fallen.contains(&true);
+        let truncated = !terminated && (failure.is_some() || session.ended().is_some());
+        let env_steps = session.env_steps();
+        let next_seed = None;
+        WorldStep {
+            reward,
+            terminated,
+            truncated,
+            phases: reached,
+            fallen,
+            env_steps,
+            seed,
+            next_seed,
+            failure,
+        }
+    }
+
+    /// A folder that no other episode has.
+    fn folder(&self, record: &Path, episode: &EpisodeSpec) -> PathBuf {
+        let name = format!("{}-world{}-seed{}", episode.task.id, self.index, episode.seed);
+        let again = (2..).map(|time| record.join(format!("{name}-{time}")));
+        let free = std::iter::once(record.join(&name)).chain(again).find(|folder| !folder.exists());
+        free.unwrap_or_else(|| record.join(&name))
+    }
+
+    /// Ends the episode, if one is under way, and closes its recording, which has the result.
+    pub fn close(&mut self) {
+        if let Some(session) = self.session.take() {
+            session.close();
+        }
+    }
+}
+
+/// Writes what is seen now; pictures only where they are to be drawn.
+fn look(spec: &BatchSpec, session: &mut Session, seen: SeenWorld, draws: bool) {
+    let robots = session.present().robots.iter();
+    for (robot, row) in robots.zip(seen.states.chunks_exact_mut(STATE_COLUMNS)) {
+        let (joints, base) = row.split_at_mut(JOINTS);
+        joints.copy_from_slice(&robot.sensed.joints.q_rad);
+        base.copy_from_slice(&base_row(&robot.command.base));
+    }
+    let Some([width, height]) = spec.pictures_px.filter(|_| draws) else { return };
+    let picture_len = width as usize * height as usize * 3;
+    for (robot, picture) in seen.pictures.chunks_exact_mut(picture_len).enumerate() {
+        picture.copy_from_slice(&session.eye(robot, [width, height]));
+    }
+}

@@ -1,0 +1,127 @@
+//! How near a phase is, from 0 to 1: what dense rewards for learners are made of. A part of it is 1 where the phase's own condition on it
+//! holds, and grows on the way there. Results and phases know nothing of it.
+
+use tandem_sim::{Pose, Side, Vector};
+
+use super::placement::{RELEASE_S, STILL_M_S, STILL_RAD_S, UPRIGHT_RAD};
+use super::{Facts, Grip};
+
+/// A hand that is farther than this from an object has not begun to come to it.
+const FAR_M: f32 = 1.5;
+/// An object that leans more than this has fallen over.
+const FALLEN_OVER_RAD: f32 = 1.0;
+/// The middle of what a hand closes on, in the frame of the wrist: before the palm, which faces left on the right hand.
+const GRASP_IN_WRIST_M: [f32; 2] = [0.12, 0.055];
+/// What a hand has come by when it touches an object, of what it has when it holds it.
+const TOUCHING: f32 = 0.75;
+
+/// The mean of the parts of a condition.
+pub fn all(parts: &[f32]) -> f32 {
+    parts.iter().sum::<f32>() / parts.len() as f32
+}
+
+/// 1 for what holds.
+pub fn is(condition: bool) -> f32 {
+    f32::from(u8::from(condition))
+}
+
+/// How far `value` has come on its way from `from` to `to`.
+pub fn come(value: f32, from: f32, to: f32) -> f32 {
+    ((value - from) / (to - from)).clamp(0.0, 1.0)
+}
+
+/// How far a hand has come to holding `object`: half the way is coming to the box around it.
+pub fn grip(f: &Facts, robot: usize, side: Side, object: &str) -> f32 {
+    match f.object(object).hands[robot][side] {
+        Grip::Holding => 1.0,
+        Grip::Touching => TOUCHING,
+        Grip::Off => 0.5 * come(from_hand_m(f, robot, side, object), FAR_M, 0.0),
+    }
+}
+
+/// How far these robots have come to holding `object`, each with the hand that is nearer to it.
+pub fn grips(f: &Facts, robots: &[usize], object: &str) -> f32 {
+    let nearer =
+        |robot: &usize| Side::BOTH.map(|side| grip(f, *robot, side, object)).into_iter().fold(0.0, f32::max);
+    all(&robots.iter().map(nearer).collect::<Vec<_>>())
+}
+
+/// How far `object` has come, from `from_m` away, to being within `within_m` of `target` on the floor's plane.
+pub fn beside(f: &Facts, object: &str, target: &str, [from_m, within_m]: [f32; 2]) -> f32 {
+    come(f.apart_m(object, target), from_m, within_m)
+}
+
+/// How far `object` has come to standing upright and still with every robot off it.
+pub fn standing(f: &Facts, object: &str) -> f32 {
+    let is_still = f.speed_m_s(object) <= STILL_M_S && f.turn_rate_rad_s(object) <= STILL_RAD_S;
+    let released = f.untouched_s(object) >= RELEASE_S;
+    all(&[come(f.tilt_rad(object), FALLEN_OVER_RAD, UPRIGHT_RAD), is(is_still), is(released)])
+}
+
+/// From what a hand closes on to the box around `object`.
+fn from_hand_m(f: &Facts, robot: usize, side: Side, object: &str) -> f32 {
+    let [ahead_m, inward_m] = GRASP_IN_WRIST_M;
+    let inward_m = match side {
+        Side::Left => -inward_m,
+        Side::Right => inward_m,
+    };
+    let robot = &f.robots[robot];
+    let world_from_wrist = robot.pelvis_in_world * robot.wrist_in_pelvis[side];
+    let object = f.object(object);
+    let hand_m = object.pose_in_world.inverse() * (world_from_wrist * Vector::new(ahead_m, inward_m, 0.0));
+    let reach_m = |direction: Vector| object.model.reach_m(&Pose::IDENTITY, direction);
+    let beyond_m = |axis: Vector| {
+        let along_m = hand_m.dot(axis);
+        (along_m - reach_m(axis)).max(-along_m - reach_m(-axis)).max(0.0)
+    };
+    Vector::new(beyond_m(Vector::X), beyond_m(Vector::Y), beyond_m(Vector::Z)).length()
+}
+
+#[cfg(test)]
+mod tests {
+    use tandem_sim::Side::{Left, Right};
+
+    use super::*;
+    use crate::scoring::{A, B};
+    use crate::tasks;
+
+    #[test]
+    fn a_hand_comes_nearer_touches_and_holds() {
+        let rest = Facts::at_rest(tasks::find("handover").unwrap());
+        // The bottle is 7 cm thick and stands at x = 0.30 m, y = -0.07 m; wrists are in the pelvis.
+        let pelvis = rest.robots[A].pelvis_in_world.translation;
+        let apart = Vector::new(0.30 - 0.035 - 0.12, -0.07 + 0.035 - 0.055, 0.0);
+        let apart = Vector::new(apart.x, apart.y.min(0.0), (0.8 - pelvis.z).max(0.0));
+        assert!((from_hand_m(&rest, A, Right, "bottle") - apart.length()).abs() < 1e-3);
+        let far = grip(&rest, A, Right, "bottle");
+        assert!(far > 0.25 && far < 0.5, "{far}");
+        let touched = rest.clone().grip(A, Right, "bottle", Grip::Touching);
+        let held = rest.clone().grip(A, Right, "bottle", Grip::Holding);
+        assert_eq!(grip(&touched, A, Right, "bottle"), TOUCHING);
+        assert_eq!((grip(&held, A, Right, "bottle"), grip(&held, A, Left, "bottle") < 0.5), (1.0, true));
+        assert_eq!(grips(&held, &[A], "bottle"), 1.0);
+        assert!(grips(&held, &[A, B], "bottle") < 0.75);
+    }
+
+    #[test]
+    fn parts_grow_up_to_the_condition_and_no_further() {
+        for (value, expected) in [(-1.0, 0.0), (0.0, 0.0), (0.015, 0.5), (0.03, 1.0), (1.0, 1.0)] {
+            assert!((come(value, 0.0, 0.03) - expected).abs() < 1e-6, "{value}");
+        }
+        let rest = Facts::at_rest(tasks::find("handover").unwrap());
+        assert_eq!(standing(&rest, "bottle"), 1.0);
+        let leaning = rest.turned("bottle", Vector::X, 0.6);
+        assert!((0.6..0.95).contains(&standing(&leaning, "bottle")));
+    }
+
+    #[test]
+    fn every_phase_says_how_near_it_is() {
+        for task in tasks::ALL {
+            let rest = Facts::at_rest(task);
+            for phase in task.phases {
+                let nearness = (phase.nearness)(&rest);
+                assert!((0.0..1.0).contains(&nearness), "{} {}: {nearness}", task.id, phase.id);
+            }
+        }
+    }
+}

@@ -1,0 +1,26 @@
+"""Tandem as an environment of LeRobot's EnvHub: put this file into a repository of the hub, and its name into `make_env`.
+
+LeRobot asks for `make_env(n_envs, use_async_envs, cfg)` and gets a vector environment of each task, by suite and number. All
+worlds of one step in Rust on threads of their own, whether or not processes are asked for.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+from gym_tandem import TandemVectorEnv
+
+TASKS = ("handover", "co_carry")
+
+
+class FilmedVectorEnv(TandemVectorEnv, SyncVectorEnv):  # pyright: ignore[reportIncompatibleVariableOverride]
+    """What `lerobot-eval` films: it asks the `envs` of a `SyncVectorEnv` for pictures, and those of no other."""
+
+
+def make_env(n_envs: int = 1, use_async_envs: bool = False, cfg: Any = None) -> dict[str, dict[int, TandemVectorEnv]]:
+    """Vector environments of `TASKS`."""
+    options: dict[str, Any] = {"render_mode": "rgb_array"} if cfg is None else cfg.gym_kwargs
+    made = [FilmedVectorEnv(task, n_envs, autoreset_mode=AutoresetMode.SAME_STEP, **options) for task in TASKS]
+    return {"tandem": dict(enumerate(made))}

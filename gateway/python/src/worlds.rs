@@ -1,0 +1,256 @@
+//! Many worlds of one task that step together: what environments of learners are made of.
+
+use std::path::PathBuf;
+use std::process;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use numpy::ndarray::Array2;
+use numpy::{PyArray1, PyArray2, PyArray4, PyReadonlyArray3, PyReadwriteArray3, PyReadwriteArray5};
+use pyo3::prelude::*;
+use tandem::settings::{Layer, Settings};
+use tandem_episodes::EpisodeSpec;
+use tandem_episodes::batch::{
+    ActionKind, Autoreset, Batch, BatchError, BatchSpec, BatchStep, RewardKind, STATE_COLUMNS, SeenArrays,
+    WorldStep, wrist_columns,
+};
+use tandem_tools_spec::{Protocol, StartEpisode};
+
+use crate::arrays::{action_columns, shaped};
+use crate::refusal::{failed, forked, refused};
+
+/// Worlds of one task. It may be used from any thread; calls of several come one after another.
+#[pyclass(frozen, name = "Worlds", module = "tandem._native")]
+pub struct NativeWorlds {
+    batch: Mutex<Option<Batch>>,
+    /// The process that made it: what has been forked has neither the threads nor the files of its parent.
+    process: u32,
+    worlds: usize,
+    robots: usize,
+    limits: Vec<[f32; 2]>,
+}
+
+/// By world: reward, terminated, truncated, phases, fallen (by robot), steps, the episode's seed, that of the one that has begun behind it
+/// or -1. Then worlds in which the simulator failed, and how.
+type Outcomes<'py> = (
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<bool>>,
+    Bound<'py, PyArray1<bool>>,
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray2<bool>>,
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<i64>>,
+    Vec<(usize, String)>,
+);
+
+/// Where what is seen is written: worlds by robots by columns, and worlds by robots by height by width by red, green, blue.
+type Seen<'py> = (PyReadwriteArray3<'py, f32>, Option<PyReadwriteArray5<'py, u8>>);
+
+#[pymethods]
+impl NativeWorlds {
+    /// Makes worlds in which nothing has begun. Threads: 0 for as many as there are cores.
+    #[new]
+    #[pyo3(signature = (task, settings, worlds, threads, actions, reward, pictures, record))]
+    #[allow(clippy::too_many_arguments)]
+    fn new(
+        py: Python,
+        task: String,
+        settings: &str,
+        worlds: usize,
+        threads: usize,
+        actions: &str,
+        reward: &str,
+        pictures: Option<[u32; 2]>,
+        record: Option<PathBuf>,
+    ) -> PyResult<NativeWorlds> {
+        let text = |error: &dyn std::fmt::Display| failed(py, error);
+        let layer: Layer = serde_json::from_str(settings).map_err(|error| text(&error))?;
+        let settings = Settings::resolve(layer, None).map_err(|error| text(&error))?;
+        let start = StartEpisode { task, seed: 0, protocol: Some(Protocol::Benchmark), short: false };
+        let episode = settings.spec(&start).map_err(|error| refused(py, &error.into()))?;
+        let robots = episode.task.robots.len();
+        let actions =
+            one_of("actions", actions, &ActionKind::ALL, ActionKind::name).map_err(|error| text(&error))?;
+        let reward =
+            one_of("reward", reward, &RewardKind::ALL, RewardKind::name).map_err(|error| text(&error))?;
+        let limits = limits(&episode, actions).map_err(|error| text(&error))?;
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        let threads = if threads == 0 { cores() } else { threads };
+        let spec = BatchSpec { episode, worlds, threads, actions, reward, pictures_px: pictures, record };
+        let batch = Mutex::new(Some(Batch::new(spec)));
+        Ok(NativeWorlds { batch, process: process::id(), worlds, robots, limits })
+    }
+
+    /// The least and the most of each number of a robot's row.
+    fn action_limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let numbers: Vec<f32> = self.limits.concat();
+        shaped(py, &numbers, [self.limits.len(), 2])
+    }
+
+    /// Begins an episode in each chosen world, with the seed that is not negative, or that of the next round.
+    fn reset<'py>(
+        &self,
+        py: Python<'py>,
+        chosen: Vec<bool>,
+        seeds: Vec<i64>,
+        seen: Seen<'py>,
+    ) -> PyResult<Outcomes<'py>> {
+        let seeds: Vec<Option<Option<u32>>> = chosen
+            .into_iter()
+            .zip(seeds)
+            .map(|(chosen, seed)| chosen.then_some(u32::try_from(seed).ok()))
+            .collect();
+        let (mut states, mut pictures) = seen;
+        let seen = self.seen(py, &mut states, &mut pictures)?;
+        let begun = self.work(py, |batch| batch.reset(&seeds, seen))?;
+        let begun = begun.into_iter().map(Option::unwrap_or_default).collect();
+        self.outcomes(py, begun)
+    }
+
+    /// One control step of each world: worlds by robots by columns.
+    fn step<'py>(
+        &self,
+        py: Python<'py>,
+        actions: PyReadonlyArray3<'py, f32>,
+        autoreset: &str,
+        looks: bool,
+        seen: Seen<'py>,
+        last: Option<Seen<'py>>,
+    ) -> PyResult<Outcomes<'py>> {
+        let expected = [self.worlds, self.robots, self.limits.len()];
+        let shape = numpy::PyUntypedArrayMethods::shape(&*actions);
+        if shape != expected {
+            return Err(failed(py, &format!("actions have the shape {shape:?}; give {expected:?}: {SHAPE}")));
+        }
+        let actions = actions.as_slice()?;
+        let autoreset = one_of("autoreset", autoreset, &Autoreset::ALL, Autoreset::name)
+            .map_err(|error| failed(py, &error))?;
+        let (mut states, mut pictures) = seen;
+        let seen = self.seen(py, &mut states, &mut pictures)?;
+        let step = BatchStep { actions, autoreset, looks };
+        let stepped = match last {
+            Some((mut states, mut pictures)) => {
+                let last = self.seen(py, &mut states, &mut pictures)?;
+                self.work(py, |batch| batch.step(step, seen, last))
+            }
+            None => self.work(py, |batch| batch.step(step, seen, SeenArrays::default())),
+        }?;
+        self.outcomes(py, stepped)
+    }
+
+    /// What the robots of a world see: robots by height by width by red, green, blue.
+    fn draw<'py>(&self, py: Python<'py>, world: usize, size: [u32; 2]) -> PyResult<Bound<'py, PyArray4<u8>>> {
+        let pixels = self.work(py, |batch| batch.draw(world, size))?;
+        let [width, height] = size.map(|length| length as usize);
+        shaped(py, &pixels, [self.robots, height, width, 3])
+    }
+
+    /// Equal for equal physical states of a world, 16 hexadecimal digits.
+    fn state_hash(&self, py: Python, world: usize) -> PyResult<String> {
+        self.work(py, |batch| batch.state_hash(world))
+    }
+
+    /// Ends all episodes and closes their recordings.
+    fn close(&self, py: Python) {
+        if process::id() == self.process {
+            py.detach(|| drop(self.held().take()));
+        }
+    }
+}
+
+const SHAPE: &str = "worlds by robots by the numbers of a row";
+
+impl NativeWorlds {
+    fn held(&self) -> MutexGuard<'_, Option<Batch>> {
+        self.batch.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Has the worlds do something; Python's other threads run meanwhile.
+    fn work<T: Send>(
+        &self,
+        py: Python,
+        work: impl FnOnce(&mut Batch) -> Result<T, BatchError> + Send,
+    ) -> PyResult<T> {
+        if process::id() != self.process {
+            return Err(failed(py, &forked(self.process)));
+        }
+        match py.detach(|| self.held().as_mut().map(work)) {
+            Some(Ok(done)) => Ok(done),
+            Some(Err(BatchError::Episode(error))) => Err(refused(py, &error.into())),
+            Some(Err(error)) => Err(failed(py, &error)),
+            None => Err(failed(py, &"these worlds have been closed; make new ones")),
+        }
+    }
+
+    /// The arrays that are written, if they are large enough.
+    fn seen<'a>(
+        &self,
+        py: Python,
+        states: &'a mut PyReadwriteArray3<f32>,
+        pictures: &'a mut Option<PyReadwriteArray5<u8>>,
+    ) -> PyResult<SeenArrays<'a>> {
+        let states = states.as_slice_mut()?;
+        if states.len() != self.worlds * self.robots * STATE_COLUMNS {
+            return Err(failed(py, &"the array for states has another size"));
+        }
+        let pictures: &mut [u8] = match pictures {
+            Some(pictures) => pictures.as_slice_mut()?,
+            None => &mut [],
+        };
+        Ok(SeenArrays { states, pictures })
+    }
+
+    fn outcomes<'py>(&self, py: Python<'py>, steps: Vec<WorldStep>) -> PyResult<Outcomes<'py>> {
+        fn array<'py, T: numpy::Element>(
+            py: Python<'py>,
+            steps: &[WorldStep],
+            of: impl Fn(&WorldStep) -> T,
+        ) -> Bound<'py, PyArray1<T>> {
+            PyArray1::from_iter(py, steps.iter().map(of))
+        }
+        let fallen = |[world, robot]: [usize; 2]| steps[world].fallen.get(robot) == Some(&true);
+        let fallen =
+            Array2::from_shape_fn([self.worlds, self.robots], |(world, robot)| fallen([world, robot]));
+        let failures =
+            steps.iter().enumerate().filter_map(|(world, step)| Some((world, step.failure.clone()?)));
+        Ok((
+            array(py, &steps, |step| step.reward),
+            array(py, &steps, |step| step.terminated),
+            array(py, &steps, |step| step.truncated),
+            array(py, &steps, |step| step.phases as i64),
+            PyArray2::from_owned_array(py, fallen),
+            array(py, &steps, |step| i64::from(step.env_steps)),
+            array(py, &steps, |step| i64::from(step.seed)),
+            array(py, &steps, |step| step.next_seed.map_or(-1, i64::from)),
+            failures.collect(),
+        ))
+    }
+}
+
+/// In a process that was forked the worlds are left as they are: their files are the parent's.
+impl Drop for NativeWorlds {
+    fn drop(&mut self) {
+        if process::id() != self.process {
+            std::mem::forget(self.batch.get_mut().unwrap_or_else(PoisonError::into_inner).take());
+        }
+    }
+}
+
+/// Names of the columns of an action.
+#[pyfunction]
+pub fn row_columns(actions: &str) -> Vec<String> {
+    if actions == ActionKind::Wrists.name() { wrist_columns() } else { action_columns() }
+}
+
+fn limits(episode: &EpisodeSpec, actions: ActionKind) -> Result<Vec<[f32; 2]>, tandem_episodes::SimError> {
+    let model = episode.robot.model()?;
+    let base = episode.locomotion.load()?.limits();
+    Ok(actions.limits(&model, &base))
+}
+
+fn one_of<T: Copy>(what: &str, asked: &str, all: &[T], name: fn(T) -> &'static str) -> Result<T, String> {
+    all.iter().copied().find(|one| name(*one) == asked).ok_or_else(|| {
+        let have: Vec<&str> = all.iter().map(|one| name(*one)).collect();
+        format!("no {what} {asked:?}; have: {}", have.join(", "))
+    })
+}
