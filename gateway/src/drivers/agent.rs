@@ -62,9 +62,13 @@ impl AgentLoop {
         if said.contains("No module named tandem") || said.contains("No module named 'tandem") {
             return Err(AgentError::NoPackage { python: agent.python });
         }
-        let last =
-            said.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("the agent cannot be started");
-        Err(AgentError::Refused(last.trim_start_matches("tandem agent: ").into()))
+        let last = said.lines().rfind(|line| !line.trim().is_empty());
+        Err(AgentError::Refused(match last {
+            Some(line) => line.trim_start_matches("tandem agent: ").into(),
+            None => {
+                format!("{} does not start the agent ({}), and says nothing", agent.python, checked.status)
+            }
+        }))
     }
 
     /// The command that plays, with further arguments.

@@ -76,13 +76,9 @@ fn a_model_plays_as_a_program_does() {
     assert!(output.status.success(), "{printed}");
     let read = |name: &str| fs::read_to_string(out.join(name)).expect(name);
     let results: Value = serde_json::from_str(&read("results.json")).expect("JSON");
-    let card = &results["policy"];
-    assert_eq!(card["name"], "agent:org/m:8b", "{card}");
-    assert_eq!(
-        (&card["settings"]["api"], &card["settings"]["max-usd"]),
-        (&"openai-chat".into(), &"2".into()),
-        "{card}"
-    );
+    assert_eq!(results["policy"], "agent:org/m:8b", "{results}");
+    let settings = &results["policy_settings"];
+    assert_eq!((&settings["api"], &settings["max_usd"]), (&"openai-chat".into(), &2.into()), "{settings}");
     let said = "-m tandem.agent --model=org/m:8b --api=openai-chat --base-url=http://127.0.0.1:1/v1 --max-usd=2 --max-seconds=3300\n";
     assert_eq!(read("episodes/handover-2000/stdout.txt"), said);
     let (output, printed) =

@@ -3,10 +3,13 @@
 use std::iter;
 
 use clap::{CommandFactory, Parser};
-use serde_json::{Value, json};
+use serde_json::Value;
 
 /// Of a program's time, the part after which a model finishes by itself, in twelfths.
 const OWN_TWELFTHS: u32 = 11;
+
+/// Flags that are no numbers, even if they look like some.
+const TEXTS: [&str; 4] = ["model", "api", "base-url", "effort"];
 
 /// How long after the model's own time it is stopped.
 const GRACE_S: u32 = 300;
@@ -101,8 +104,12 @@ impl AgentFlags {
 
     /// What results keep of it.
     pub fn card(&self) -> Value {
-        let given =
-            self.given().into_iter().filter_map(|(flag, value)| Some((flag.to_owned(), json!(value?))));
+        let read = |flag: &str, value: String| match TEXTS.contains(&flag) {
+            true => Value::String(value),
+            false => serde_json::from_str(&value).unwrap_or(Value::String(value)),
+        };
+        let given = self.given().into_iter();
+        let given = given.filter_map(|(flag, value)| Some((flag.replace('-', "_"), read(flag, value?))));
         Value::Object(given.collect())
     }
 
@@ -154,7 +161,8 @@ mod tests {
         ];
         assert_eq!(flags.arguments(flags.limit_s(3600)), expected);
         assert_eq!(flags.limit_s(3600), 9300);
-        assert_eq!(flags.card()["base-url"], "http://127.0.0.1:11434/v1");
+        let card = flags.card();
+        assert_eq!((&card["base_url"], &card["max_usd"]), (&"http://127.0.0.1:11434/v1".into(), &0.5.into()));
     }
 
     #[test]
