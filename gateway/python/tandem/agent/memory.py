@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 
-from .conversation import Answers, Reply, Told, Turn
-from .pictures import count_pictures, forget_pictures
+from .conversation import Answer, Answers, Reply, Told, Turn
 
 MOST_PICTURES = 20
 """Pictures that are shown; of more, the latest half stays. Each cut has the endpoint read anew what it had cached."""
@@ -41,8 +41,8 @@ class Memory:
     def add(self, turn: Turn) -> None:
         """Remembers a turn. Pictures go in halves, so that a cache is of use between two cuts."""
         self._turns.append(turn)
-        if count_pictures(self._turns) > self._most_pictures:
-            self._turns = forget_pictures(self._turns, self._most_pictures // 2)
+        if _count_pictures(self._turns) > self._most_pictures:
+            self._turns = _forget_pictures(self._turns, self._most_pictures // 2)
 
     def trim(self, input_tokens: int) -> bool:
         """Where the last request has read more tokens than a conversation may have, cuts it to half of that. Returns whether it
@@ -79,6 +79,30 @@ def estimate(turn: Turn) -> int:
         case Answers(answers):
             pictures = PICTURE_TOKENS * sum(len(answer.pictures) for answer in answers)
             return pictures + sum(len(answer.text) for answer in answers) // CHARACTERS_A_TOKEN
+
+
+def _forget_pictures(turns: Sequence[Turn], keep: int) -> list[Turn]:
+    """The turns with the latest `keep` pictures, and a line of text in place of each older one."""
+    left = keep
+    newest_first: list[Turn] = []
+    for turn in reversed(turns):
+        if isinstance(turn, Answers):
+            answers: list[Answer] = []
+            for answer in reversed(turn.answers):
+                shown = answer.pictures[max(0, len(answer.pictures) - left) :]
+                left -= len(shown)
+                gone = answer.pictures[: len(answer.pictures) - len(shown)]
+                lines = [f"({picture.caption.rstrip(':')}: the picture is no longer shown.)" for picture in gone]
+                answers.append(replace(answer, text="\n".join([answer.text, *lines]), pictures=shown) if gone else answer)
+            newest_first.append(Answers(tuple(reversed(answers))))
+        else:
+            newest_first.append(turn)
+    return newest_first[::-1]
+
+
+def _count_pictures(turns: Sequence[Turn]) -> int:
+    """How many pictures the turns show."""
+    return sum(len(answer.pictures) for turn in turns if isinstance(turn, Answers) for answer in turn.answers)
 
 
 def _short(text: str) -> str:

@@ -9,8 +9,7 @@ from typing import Any, cast
 
 from ..client import Client
 from ..errors import EpisodeEnded, Refused, SimulatorFailed
-from .conversation import Answer, Call, listed
-from .pictures import take_pictures
+from .conversation import Answer, Call, Picture, listed
 from .tools import Tool, offered
 
 MOST_ANSWER_CHARACTERS = 60_000
@@ -91,7 +90,7 @@ class Seat:
             phases = part.get("phases")
             if isinstance(phases, list):
                 self.phases = tuple(f"{phase['number']} {phase['id']}" for phase in listed(phases))
-        pictures = take_pictures(reply)
+        pictures = _take_pictures(reply)
         text = json.dumps(reply, separators=(",", ":"), ensure_ascii=False)
         if len(text) > MOST_ANSWER_CHARACTERS:
             text = f"{text[:MOST_ANSWER_CHARACTERS]} ... ({len(text)} characters; the rest is not shown: ask for less)"
@@ -137,3 +136,14 @@ def _parts(reply: dict[str, Any]) -> list[dict[str, Any]]:
 def _is_last(reply: dict[str, Any]) -> bool:
     """Whether a reply is the last of its episode."""
     return reply.get("stop_reason") in _OVER or reply.get("ended") is not None
+
+
+def _take_pictures(reply: dict[str, Any]) -> tuple[Picture, ...]:
+    """Takes the pictures out of a reply of the server, where it shows something itself or at the end of a command."""
+    seen = [reply, reply.get("observation")]
+    return tuple(picture for part in seen if isinstance(part, dict) for picture in _take_own(cast("dict[str, Any]", part)))
+
+
+def _take_own(part: dict[str, Any]) -> list[Picture]:
+    images = listed(part.pop("images", None))
+    return [Picture(str(image["robot"]), float(part["time_s"]), str(image["png_base64"])) for image in images]
