@@ -4,7 +4,9 @@ use std::f32::consts::FRAC_PI_2;
 
 use tandem_sim::{Pose, Side, Vector};
 
-use super::skills::{Commander, HandGrasp, HandMove, Hold, move_together, take_together, wrapped_rad};
+use super::skills::{
+    COMPLIANCE_N_S_M, Commander, HandGrasp, HandMove, Hold, move_together, take_together, wrapped_rad,
+};
 use crate::players::PlayerError;
 use crate::scoring::{A, B, Facts};
 
@@ -56,6 +58,7 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     };
     let (past, resting) = (upright(tip_m + PAST_M), upright(tip_m + RESTING_M));
     if is_straight_on_peg(&facts) {
+        give_way(commander, true);
         go(commander, start, resting, 4)?;
         return let_go(commander, &grasps);
     }
@@ -64,10 +67,12 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     for _ in 0..TRIES {
         go(commander, before, past, 6)?;
         if is_straight_on_peg(&commander.facts()?) {
+            give_way(commander, true);
             go(commander, past, resting, 4)?;
             if is_straight_on_peg(&commander.facts()?) {
                 return let_go(commander, &grasps);
             }
+            give_way(commander, false);
         }
         // Off again the way it came, and once more with the grips as they are now.
         let missed = commander.facts()?.object("frame").pose_in_world;
@@ -77,6 +82,14 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
         go(commander, above, before, 6)?;
     }
     Err(PlayerError::GaveUp("the frame does not hang straight on the peg".into()))
+}
+
+/// Peg and wall stop a frame that is let down before its hands are where they are told to be: those who hold it there would push
+/// themselves off their feet.
+fn give_way(commander: &mut Commander, give_way: bool) {
+    for robot in [A, B] {
+        commander.set_compliance(robot, give_way.then_some(COMPLIANCE_N_S_M));
+    }
 }
 
 /// Once let go of, a frame that hangs askew stays so: no hand has room behind it to take it again.

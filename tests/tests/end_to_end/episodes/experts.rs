@@ -8,7 +8,7 @@ use tandem_episodes::evaluation::{EvaluationPlan, Shard, Starts, evaluate};
 use tandem_episodes::players::{self, Episode, InProcess, PlayerError, PrivilegedEpisode, experts};
 use tandem_episodes::tasks::{self, Task};
 use tandem_episodes::{A, B, C, Controller, EpisodeSpec, Facts, RendererKind, RobotFile, Sensing, Session};
-use tandem_sim::Side;
+use tandem_sim::{SensorModel, Side};
 use tandem_tools_spec::{ActCall, Assistance, Protocol, ToolCall, ToolReply};
 
 /// Tasks in which nobody walks.
@@ -168,5 +168,58 @@ fn carriers_stand_where_they_are_to_when_they_lift() {
         // Of the 30 s that it has, it leaves some.
         let placed_s = result.phases.0.last().and_then(|(_, time_s)| *time_s);
         assert!(placed_s.is_some_and(|time_s| time_s < 27.0), "{seed}: {placed_s:?} s");
+    }
+}
+
+/// An episode in which B carries a bottle to a table.
+struct Carry {
+    episode: InProcess,
+    /// The farthest that the bottle leaned in the hand, from when it was lifted on.
+    most_tilt_rad: f32,
+}
+
+const BOTTLE: &str = "bottle";
+
+impl Episode for Carry {
+    fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {
+        let facts = self.episode.session.facts();
+        if facts.holds_any(B, BOTTLE) && facts.lift_m(BOTTLE) > 0.02 {
+            self.most_tilt_rad = self.most_tilt_rad.max(facts.tilt_rad(BOTTLE));
+        }
+        self.episode.call(call)
+    }
+}
+
+impl PrivilegedEpisode for Carry {
+    fn facts(&mut self) -> Result<Facts, PlayerError> {
+        self.episode.facts()
+    }
+}
+
+/// A robot that walks is lower than one that stands: here B walked the bottle into the edge of the table, which turned it by 45 degrees
+/// in the hand; the fingers then knocked it about when they opened.
+#[test]
+fn a_bottle_is_carried_over_the_edge_of_the_table() {
+    let spec = EpisodeSpec::new(tasks::find("cart_service").expect("a task"), 2029, Protocol::Benchmark);
+    let session = Session::start(&spec, None).expect("a session");
+    let mut carry = Carry { episode: InProcess::new(session), most_tilt_rad: 0.0 };
+    players::find("expert").expect("a player").play(&spec, &mut carry).expect("an expert that carries on");
+    assert!((0.01..0.26).contains(&carry.most_tilt_rad), "{} rad", carry.most_tilt_rad);
+    assert_eq!(carry.episode.session.reached_phases(), 3);
+}
+
+/// Hands that held the picture where it was told to be while its loop came to rest on the peg pushed both robots off their feet: they
+/// stepped towards each other, and one fell.
+#[test]
+fn hands_give_way_while_the_picture_is_let_down() {
+    for seed in [2004, 2021] {
+        let spec = EpisodeSpec {
+            sensing: Sensing { sensors: SensorModel::G1, ..Sensing::default() },
+            ..EpisodeSpec::new(tasks::find("frame_hang").expect("a task"), seed, Protocol::Benchmark)
+        };
+        let mut episode = InProcess::new(Session::start(&spec, None).expect("a session"));
+        players::find("expert").expect("a player").play(&spec, &mut episode).expect("an expert that goes on");
+        let reached = episode.session.reached_phases();
+        assert_eq!((reached, episode.session.close().falls), (3, 0), "{seed}");
     }
 }

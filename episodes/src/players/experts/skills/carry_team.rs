@@ -15,7 +15,7 @@ use crate::scoring::{Facts, Grip};
 const APPROACH_M_S: f32 = 0.3;
 const NEAR: Tolerance = Tolerance { off_m: 0.03, off_rad: 0.05 };
 /// How far hands give way, which two robots that walk with a load need.
-const COMPLIANCE_N_S_M: f64 = 250.0;
+pub const COMPLIANCE_N_S_M: f64 = 250.0;
 /// Robots still correct their places for so long once the object has arrived.
 const HOLD_S: f32 = 0.7;
 /// How long robots rest: feet come together, and what pulls between the hands fades.

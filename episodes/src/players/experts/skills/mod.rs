@@ -10,7 +10,7 @@ mod parallel;
 mod posture_path;
 mod walk;
 
-pub use carry_team::{CarryTeam, ObjectPath};
+pub use carry_team::{COMPLIANCE_N_S_M, CarryTeam, ObjectPath};
 pub use commander::{Commander, HandMove};
 pub use compliant::{grasp_compliantly, grasp_reached, let_go};
 pub use cylinder::{CylinderGrasp, closed_rad, pick_up_all, wrapped_rad};
