@@ -92,7 +92,7 @@ class EpisodePage {
           element("h2", {}, this.recorded ? "What the robots saw" : element("label", { for: "look" }, this.look, " What the robots see")),
           this.recorded ? element("p", { class: "soft" }, element("label", { for: "look" }, this.look, " drawn at this moment, whether the policy looked or not")) : null,
           this.cameras)),
-      this.recorded ? element("section", {}, element("h2", {}, "Budget"), this.budget.node) : null,
+      ...(this.recorded ? [element("section", {}, element("h2", {}, "Budget"), this.budget.node)] : []),
       element("section", {}, element("h2", {}, "Hands and joints"), this.plots.node),
       this.recorded ? this.files() : element("section", {}, element("h2", {}, "Calls and notes, the latest first"), this.story.node));
   }
@@ -123,7 +123,7 @@ class EpisodePage {
 
   scrubber() {
     const { time } = this;
-    this.play = element("button", { onclick: () => this.toggle() }, "Play");
+    this.play = element("button", { class: "play", onclick: () => this.toggle() }, "Play");
     const step = (way, text, title) => element("button", { title, "aria-label": title, onclick: () => this.timeline.step(way) }, text);
     this.moment = element("output");
     const speed = element("select", { "aria-label": "Speed", onchange: (event) => { time.speed = Number(event.target.value); } },
@@ -309,7 +309,7 @@ class EpisodePage {
     const sum = (of) => told.reduce((total, { note }) => total + ((note && of(note)) ?? 0), 0);
     const [tokens, usd] = [sum((note) => (note.input_tokens ?? 0) + (note.output_tokens ?? 0)), sum((note) => note.usd)];
     if (tokens) facts.push(["tokens", tokens < 1e5 ? `${tokens}` : `${(tokens / 1000).toFixed(0)}k`]);
-    if (usd) facts.push(["price", `$${usd.toFixed(2)}`]);
+    if (usd) facts.push(["price", `$${usd.toFixed(usd < 0.1 ? 3 : 2)}`]);
     return facts;
   }
 

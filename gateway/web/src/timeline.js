@@ -95,7 +95,7 @@ export class Timeline {
       context.fillStyle = colour(name);
       for (const { from, time_s: until } of entries) {
         const left = this.x(from);
-        context.fillRect(left, row * ROW + 1, Math.max(1.5, this.x(until) - left - 0.7), ROW - 5);
+        context.fillRect(left, row * ROW + 1, Math.max(2, this.x(until) - left - 0.7), ROW - 5);
       }
     });
   }

@@ -95,6 +95,7 @@ for (let reach = 0; reach < 6; reach += 1) {
 await wide.waitForFunction(() => document.querySelectorAll(".story li").length === 10);
 await wide.waitForSelector(".pictures img");
 await wide.waitForFunction(() => /3\.0 s/.test(document.querySelector(".facts").textContent));
+assert.doesNotMatch(await wide.locator("main").innerText(), /\b(null|undefined|NaN)\b/);
 assert.equal(await wide.locator(".story .seen img").count(), 2, "the pictures that the policy was shown");
 for (const width of WIDTHS) {
   for (const scheme of ["light", "dark"]) {
@@ -139,6 +140,7 @@ assert.equal(await wide.locator(".story .seen img").count(), 2);
 await wide.waitForFunction(() => [...document.querySelectorAll(".story .seen img")].every((image) => image.naturalWidth === 320));
 assert.match(await wide.locator(".bands").innerText(), /p1 grasp and lift/);
 assert.match(await wide.locator(".track canvas").getAttribute("aria-label"), /6 commands, 1 looks and questions, 1 refused, 2 notes/);
+assert.doesNotMatch(await wide.locator("main").innerText(), /\b(null|undefined|NaN)\b/);
 const current = () => wide.locator('.story [aria-current="step"] code').innerText();
 assert.equal(await current(), "move_wrists");
 const moment = () => wide.locator(".scrubber output").innerText();
@@ -166,8 +168,8 @@ for (const width of WIDTHS) {
 await wide.setViewportSize({ width: 1400, height: 1000 });
 await wide.emulateMedia({ colorScheme: "light" });
 console.log(`shown: ${await moment()}`);
-await wide.click("text=Play");
-await wide.waitForFunction(() => document.querySelector(".scrubber button").textContent === "Pause");
+await wide.click(".scrubber .play");
+await wide.waitForFunction(() => document.querySelector(".scrubber .play").textContent === "Pause");
 await wide.waitForFunction(() => !/1\.40 of/.test(document.querySelector(".scrubber output").textContent));
 await wide.click("text=Show its film");
 await wide.waitForFunction(() => [...document.images].some((image) => image.src.includes("/film") && image.naturalWidth > 0), null, { timeout: 60000 });
