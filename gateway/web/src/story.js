@@ -6,7 +6,7 @@ import { element, words } from "./dom.js";
 const MOST_SHOWN = 400;
 /** Less is no thinking that a reader wants to know of. */
 const LEAST_THOUGHT_S = 0.5;
-/** Words of a note that are shown before its reader opens it. */
+/** Letters of a note or a refusal that are shown before its reader opens it. */
 const SHORT_NOTE = 280;
 
 export class Story {
@@ -145,7 +145,11 @@ export function used({ input_tokens: input, output_tokens: output, cached_tokens
 
 /** A call in a few words. */
 function summary(call, asked, reply) {
-  if (!call.ok) return `refused: ${reply}`;
+  if (!call.ok) {
+    // The example that follows is for the policy; it is told where the call is opened.
+    const [why] = reply.split("; arguments that work");
+    return `refused: ${why.length > SHORT_NOTE ? `${why.slice(0, SHORT_NOTE)}...` : why}`;
+  }
   const parts = [];
   const robots = asked?.robots?.map?.((entry) => entry.robot ?? entry) ?? (asked?.robot ? [asked.robot] : []);
   if (robots.length) parts.push(robots.join(" and "));
