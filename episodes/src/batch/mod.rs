@@ -76,7 +76,7 @@ impl Autoreset {
 #[derive(Default)]
 pub struct SeenArrays<'a> {
     /// [`STATE_COLUMNS`] a robot.
-    pub states: &'a mut [f32],
+    pub state_rows: &'a mut [f32],
     /// Height by width by red, green, blue a robot; empty where nobody looks.
     pub pictures: &'a mut [u8],
 }
@@ -85,7 +85,7 @@ pub struct SeenArrays<'a> {
 #[derive(Clone, Copy, Debug)]
 pub struct BatchStep<'a> {
     /// World after world, robot after robot, columns of the action.
-    pub actions: &'a [f32],
+    pub action_rows: &'a [f32],
     pub autoreset: Autoreset,
     /// Whether the policy looks: pictures of other steps are drawn only where an episode begins or is over.
     pub looks: bool,
@@ -154,7 +154,7 @@ impl Batch {
         }
         let columns = self.spec.actions.columns();
         let task = self.spec.episode.task;
-        let rows = step.actions.chunks_exact(columns * task.robots.len());
+        let rows = step.action_rows.chunks_exact(columns * task.robots.len());
         let asked = rows.take(self.worlds.len()).map(|row| {
             let call = ToolCall::Act(self.spec.actions.call(task.robot_names(), row));
             call.validate().map_err(EpisodeError::from)?;
@@ -191,15 +191,15 @@ impl Drop for Batch {
 
 impl<'a> SeenArrays<'a> {
     /// Where nobody looks.
-    pub fn of_states(states: &'a mut [f32]) -> SeenArrays<'a> {
-        SeenArrays { states, pictures: &mut [] }
+    pub fn of_states(state_rows: &'a mut [f32]) -> SeenArrays<'a> {
+        SeenArrays { state_rows, pictures: &mut [] }
     }
 
     /// What each of so many worlds writes; one that writes nothing has nothing.
     fn split(self, worlds: usize) -> impl Iterator<Item = SeenWorld<'a>> {
-        let states = parts(self.states, worlds);
+        let state_rows = parts(self.state_rows, worlds);
         let pictures = parts(self.pictures, worlds);
-        states.zip(pictures).map(|(states, pictures)| SeenWorld { states, pictures })
+        state_rows.zip(pictures).map(|(state_rows, pictures)| SeenWorld { state_rows, pictures })
     }
 }
 

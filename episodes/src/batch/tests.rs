@@ -31,10 +31,10 @@ fn states(worlds: usize) -> Vec<f32> {
     vec![0.0; worlds * ROBOTS * STATE_COLUMNS]
 }
 
-fn stepped(batch: &mut Batch, autoreset: Autoreset, states: &mut [f32]) -> Vec<WorldStep> {
+fn stepped(batch: &mut Batch, autoreset: Autoreset, rows: &mut [f32]) -> Vec<WorldStep> {
     let actions = standing(batch.spec().worlds);
-    let step = BatchStep { actions: &actions, autoreset, looks: true };
-    batch.step(step, SeenArrays::of_states(states), SeenArrays::default()).unwrap()
+    let step = BatchStep { action_rows: &actions, autoreset, looks: true };
+    batch.step(step, SeenArrays::of_states(rows), SeenArrays::default()).unwrap()
 }
 
 #[test]
@@ -98,7 +98,7 @@ fn an_episode_that_begins_in_the_same_step_leaves_its_last_state() {
     actions[31] = 2.0;
     let mut steps = 0;
     let fell = loop {
-        let step = BatchStep { actions: &actions, autoreset: Autoreset::SameStep, looks: true };
+        let step = BatchStep { action_rows: &actions, autoreset: Autoreset::SameStep, looks: true };
         let outcome = batch
             .step(step, SeenArrays::of_states(&mut seen), SeenArrays::of_states(&mut last))
             .unwrap()
@@ -127,14 +127,17 @@ fn pictures_are_drawn_where_the_policy_looks() {
     });
     let (mut seen, mut pixels) = (states(2), vec![0; 2 * ROBOTS * 32 * 24 * 3]);
     batch
-        .reset(&[Some(Some(2000)), Some(Some(2001))], SeenArrays { states: &mut seen, pictures: &mut pixels })
+        .reset(
+            &[Some(Some(2000)), Some(Some(2001))],
+            SeenArrays { state_rows: &mut seen, pictures: &mut pixels },
+        )
         .unwrap();
     assert_eq!(pixels[..pixels.len() / 2], batch.draw(0, size_px).unwrap());
     let begin = pixels.clone();
     let actions = standing(2);
     for looks in [false, true] {
-        let step = BatchStep { actions: &actions, autoreset: Autoreset::NextStep, looks };
-        let arrays = SeenArrays { states: &mut seen, pictures: &mut pixels };
+        let step = BatchStep { action_rows: &actions, autoreset: Autoreset::NextStep, looks };
+        let arrays = SeenArrays { state_rows: &mut seen, pictures: &mut pixels };
         batch.step(step, arrays, SeenArrays::default()).unwrap();
         assert_eq!(pixels != begin, looks);
     }
@@ -146,7 +149,7 @@ fn a_step_is_refused_as_a_whole() {
     let mut batch = Batch::new(BatchSpec { worlds: 2, ..spec(RewardKind::Sparse) });
     let mut seen = states(2);
     let refused = |batch: &mut Batch, actions: &[f32], autoreset| {
-        let step = BatchStep { actions, autoreset, looks: false };
+        let step = BatchStep { action_rows: actions, autoreset, looks: false };
         batch
             .step(step, SeenArrays::of_states(&mut states(2)), SeenArrays::default())
             .unwrap_err()
@@ -180,7 +183,7 @@ fn wrists_go_where_a_row_says() {
     let actions = row.repeat(ROBOTS);
     let mut progress = 0.0;
     for _ in 0..75 {
-        let step = BatchStep { actions: &actions, autoreset: Autoreset::NextStep, looks: false };
+        let step = BatchStep { action_rows: &actions, autoreset: Autoreset::NextStep, looks: false };
         let outcome = batch.step(step, SeenArrays::of_states(&mut seen), SeenArrays::default()).unwrap();
         progress += outcome[0].reward;
     }

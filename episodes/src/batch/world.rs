@@ -57,7 +57,7 @@ pub struct WorldStep {
 
 /// Where a world writes what is seen of it.
 pub struct SeenWorld<'a> {
-    pub states: &'a mut [f32],
+    pub state_rows: &'a mut [f32],
     pub pictures: &'a mut [u8],
 }
 
@@ -207,7 +207,7 @@ impl BatchWorld {
 /// Writes what is seen now; pictures only where they are to be drawn.
 fn look(spec: &BatchSpec, session: &mut Session, seen: SeenWorld, draws: bool) {
     let robots = session.present().robots.iter();
-    for (robot, row) in robots.zip(seen.states.chunks_exact_mut(STATE_COLUMNS)) {
+    for (robot, row) in robots.zip(seen.state_rows.chunks_exact_mut(STATE_COLUMNS)) {
         let (joints, base) = row.split_at_mut(JOINTS);
         joints.copy_from_slice(&robot.sensed.joints.q_rad);
         base.copy_from_slice(&base_row(&robot.command.base));

@@ -1,10 +1,10 @@
 //! How fast environments of learners step: batches of two and three robots that stand, without pictures, against the core alone.
 
 use std::thread::available_parallelism;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
-use tandem_sim::bench::Spread;
+use tandem_sim::bench::{Spread, busy_since};
 use tandem_sim::{RobotCommand, World};
 use tandem_tools_spec::Protocol;
 
@@ -43,6 +43,9 @@ pub struct EnvCase {
     pub core_steps_per_s: Spread,
     /// The first over the second, each measured right after the other.
     pub of_core: Spread,
+    /// Processor time of the core's step over that of the environment's, which says on a busy machine, too, what is around the core;
+    /// on one thread alone.
+    pub busy_of_core: Option<Spread>,
     /// What the beginning of an episode takes, on one thread.
     pub reset_ms: Spread,
 }
@@ -67,22 +70,61 @@ pub fn env(mut done: impl FnMut(&EnvCase)) -> Result<EnvReport, BenchError> {
 fn measure(task: &'static str, threads: usize) -> Result<EnvCase, BenchError> {
     let episode = EpisodeSpec::new(tasks::find(task).map_err(Box::new)?, FIRST_SEED, Protocol::Benchmark);
     let robots = episode.task.robots.len();
-    let [mut steps, mut core, mut of_core, mut reset_ms] = [const { Vec::new() }; 4];
+    let [mut steps, mut core, mut of_core, mut busy, mut reset_ms] = [const { Vec::new() }; 5];
     for _ in 0..ROUNDS {
-        let alone = core_steps_per_s(&episode)?;
-        let (begin_ms, batch) = batch_steps_per_s(&episode, threads)?;
-        core.push(alone);
-        steps.push(batch);
-        of_core.push(batch / alone);
+        let alone = core_pace(&episode)?;
+        let (begin_ms, batch) = batch_pace(&episode, threads)?;
+        core.push(alone.steps_per_s);
+        steps.push(batch.steps_per_s);
+        of_core.push(batch.steps_per_s / alone.steps_per_s);
+        busy.push(alone.busy_s / batch.busy_s);
         reset_ms.push(begin_ms);
     }
-    let [steps_per_s, core_steps_per_s, of_core, reset_ms] =
-        [steps, core, of_core, reset_ms].map(|mut values| Spread::of(&mut values));
-    Ok(EnvCase { task, robots, worlds: WORLDS, threads, steps_per_s, core_steps_per_s, of_core, reset_ms })
+    let [steps_per_s, core_steps_per_s, of_core, busy, reset_ms] =
+        [steps, core, of_core, busy, reset_ms].map(|mut values| Spread::of(&mut values));
+    let busy_of_core = (threads == 1).then_some(busy);
+    let worlds = WORLDS;
+    Ok(EnvCase {
+        task,
+        robots,
+        worlds,
+        threads,
+        steps_per_s,
+        core_steps_per_s,
+        of_core,
+        busy_of_core,
+        reset_ms,
+    })
+}
+
+/// How fast steps were made, and how long this thread was busy with all of them.
+struct Pace {
+    steps_per_s: f64,
+    busy_s: f64,
+}
+
+/// Takes both times.
+struct Stopwatch {
+    started: Instant,
+    busy: Duration,
+}
+
+impl Stopwatch {
+    fn start() -> Stopwatch {
+        let started = Instant::now();
+        Stopwatch { started, busy: busy_since(started) }
+    }
+
+    /// The pace of so many steps of every world.
+    fn pace(&self, steps: u32) -> Pace {
+        let elapsed_s = self.started.elapsed().as_secs_f64();
+        let busy_s = (busy_since(self.started) - self.busy).as_secs_f64();
+        Pace { steps_per_s: f64::from(steps) * WORLDS as f64 / elapsed_s, busy_s }
+    }
 }
 
 /// The worlds of these episodes under their rest commands, taking turns as those of a batch do.
-fn core_steps_per_s(episode: &EpisodeSpec) -> Result<f64, BenchError> {
+fn core_pace(episode: &EpisodeSpec) -> Result<Pace, BenchError> {
     let begin = |seed: usize| -> Result<(World, Vec<RobotCommand>), BenchError> {
         let seed = FIRST_SEED + seed as u32;
         let world = build(&EpisodeSpec { seed, ..episode.clone() }).map_err(Box::new)?.world;
@@ -90,22 +132,22 @@ fn core_steps_per_s(episode: &EpisodeSpec) -> Result<f64, BenchError> {
         Ok((world, commands))
     };
     let mut worlds = (0..WORLDS).map(begin).collect::<Result<Vec<_>, _>>()?;
-    let mut run = |steps: u32| -> Result<f64, BenchError> {
-        let started = Instant::now();
+    let mut run = |steps: u32| -> Result<Pace, BenchError> {
+        let watch = Stopwatch::start();
         for step in 1..=steps {
             for (world, commands) in &mut worlds {
                 let stepped = world.control_step(commands);
                 stepped.map_err(|source| Box::new(EpisodeError::Diverged { step: step.into(), source }))?;
             }
         }
-        Ok(f64::from(steps) * WORLDS as f64 / started.elapsed().as_secs_f64())
+        Ok(watch.pace(steps))
     };
     run(SETTLING_STEPS)?;
     run(STEPS)
 }
 
 /// The same as environments: how long an episode takes to begin, and steps per second.
-fn batch_steps_per_s(episode: &EpisodeSpec, threads: usize) -> Result<(f64, f64), BenchError> {
+fn batch_pace(episode: &EpisodeSpec, threads: usize) -> Result<(f64, Pace), BenchError> {
     let world = build(episode).map_err(Box::new)?.world;
     let row = |robot: usize| {
         let RobotCommand { upper_rad, base } = world.rest_command(robot);
@@ -128,13 +170,13 @@ fn batch_steps_per_s(episode: &EpisodeSpec, threads: usize) -> Result<(f64, f64)
     let seeds: Vec<_> = (0..WORLDS as u32).map(|world| Some(Some(FIRST_SEED + world))).collect();
     batch.reset(&seeds, SeenArrays::of_states(&mut states)).map_err(failed)?;
     let begin_ms = started.elapsed().as_secs_f64() * 1e3 * threads as f64 / WORLDS as f64;
-    let mut run = |steps: u32| -> Result<f64, BenchError> {
-        let started = Instant::now();
+    let mut run = |steps: u32| -> Result<Pace, BenchError> {
+        let watch = Stopwatch::start();
         for _ in 0..steps {
-            let step = BatchStep { actions: &actions, autoreset: Autoreset::NextStep, looks: false };
+            let step = BatchStep { action_rows: &actions, autoreset: Autoreset::NextStep, looks: false };
             batch.step(step, SeenArrays::of_states(&mut states), SeenArrays::default()).map_err(failed)?;
         }
-        Ok(f64::from(steps) * WORLDS as f64 / started.elapsed().as_secs_f64())
+        Ok(watch.pace(steps))
     };
     run(SETTLING_STEPS)?;
     Ok((begin_ms, run(STEPS)?))

@@ -16,8 +16,8 @@ const GRASP_IN_WRIST_M: [f32; 2] = [0.12, 0.055];
 const TOUCHING: f32 = 0.75;
 
 /// The mean of the parts of a condition.
-pub fn all(parts: &[f32]) -> f32 {
-    parts.iter().sum::<f32>() / parts.len() as f32
+pub fn all(values: &[f32]) -> f32 {
+    values.iter().sum::<f32>() / values.len() as f32
 }
 
 /// 1 for what holds.
@@ -25,9 +25,9 @@ pub fn is(condition: bool) -> f32 {
     f32::from(u8::from(condition))
 }
 
-/// How far `value` has come on its way from `from` to `to`.
-pub fn come(value: f32, from: f32, to: f32) -> f32 {
-    ((value - from) / (to - from)).clamp(0.0, 1.0)
+/// How far `value` has come on its way from one to another.
+pub fn come(value: f32, from_value: f32, to_value: f32) -> f32 {
+    ((value - from_value) / (to_value - from_value)).clamp(0.0, 1.0)
 }
 
 /// How far a hand has come to holding `object`: half the way is coming to the box around it.

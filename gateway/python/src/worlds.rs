@@ -127,7 +127,7 @@ impl NativeWorlds {
             .map_err(|error| failed(py, &error))?;
         let (mut states, mut pictures) = seen;
         let seen = self.seen(py, &mut states, &mut pictures)?;
-        let step = BatchStep { actions, autoreset, looks };
+        let step = BatchStep { action_rows: actions, autoreset, looks };
         let stepped = match last {
             Some((mut states, mut pictures)) => {
                 let last = self.seen(py, &mut states, &mut pictures)?;
@@ -189,15 +189,15 @@ impl NativeWorlds {
         states: &'a mut PyReadwriteArray3<f32>,
         pictures: &'a mut Option<PyReadwriteArray5<u8>>,
     ) -> PyResult<SeenArrays<'a>> {
-        let states = states.as_slice_mut()?;
-        if states.len() != self.worlds * self.robots * STATE_COLUMNS {
+        let state_rows = states.as_slice_mut()?;
+        if state_rows.len() != self.worlds * self.robots * STATE_COLUMNS {
             return Err(failed(py, &"the array for states has another size"));
         }
         let pictures: &mut [u8] = match pictures {
             Some(pictures) => pictures.as_slice_mut()?,
             None => &mut [],
         };
-        Ok(SeenArrays { states, pictures })
+        Ok(SeenArrays { state_rows, pictures })
     }
 
     fn outcomes<'py>(&self, py: Python<'py>, steps: Vec<WorldStep>) -> PyResult<Outcomes<'py>> {

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import subprocess
+import sys
 import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -120,6 +123,40 @@ def test_wrists_are_sent_to_poses_and_dense_rewards_follow_them() -> None:
     with pytest.raises(Exception, match="quaternion"):
         env.step(np.zeros(64, np.float32))
     env.close()
+
+
+def test_what_an_expert_did_succeeds_step_for_step_and_is_rewarded(tmp_path: Path) -> None:
+    import gym_tandem
+    import tandem
+
+    played = ("evaluate", "--policy", "expert", "--tasks", "handover,big_table", "--seeds", "2003")
+    kept = ("--protocol", "benchmark", "--record", "--out", "expert")
+    subprocess.run([sys.executable, "-m", "tandem", *played, *kept], cwd=tmp_path, check=True)
+    for task in ("handover", "big_table"):
+        recording = tandem.Recording(tmp_path / f"expert/episodes/{task}-2003")
+        result: Any = recording.result
+        env = gym_tandem.TandemEnv(task, obs_type="state", reward_type="dense")
+        env.reset(seed=2003)
+        rewards: list[float] = []
+        phases, info = [0], dict[str, Any]()
+        # Rows begin with that before the first step.
+        for action in recording.actions[1:]:
+            _, reward, terminated, truncated, info = env.step(action.ravel())
+            rewards.append(reward)
+            phases.append(info["phases"])
+            assert not truncated
+            if terminated:
+                break
+        assert info["is_success"]
+        assert env.state_hash() == recording.state_hashes[len(rewards)]
+        reached_s = [0.02 * phases.index(phase) for phase in (1, 2, 3)]
+        assert np.allclose(reached_s, list(result.phases.values()))
+        # All three phases, less what is near to the first before anything is done.
+        assert 2.5 < sum(rewards) < 3.0
+        # Rewards lead there: most of the way was come by before a phase was reached.
+        before = sum(rewards[: phases.index(1) - 1])
+        assert before > 0.2
+        env.close()
 
 
 def test_what_is_not_there_is_refused_with_what_is() -> None:

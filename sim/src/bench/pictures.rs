@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use rapier3d::math::{Pose, Vector};
 use serde::Serialize;
 
-use super::Spread;
+use super::{Spread, busy_since};
 use crate::render::{Camera, Cameras, Renderer, RendererKind, Scenery};
 use crate::{ObjectPlacement, RobotPlacement, SimError, Step, World, WorldSpec};
 
@@ -35,8 +35,6 @@ const SMALL_PX: [u32; 2] = [128, 128];
 /// Each gives a time; processor time is counted in ticks of some milliseconds, so that many states go into one.
 const BATCHES: usize = 9;
 const STATES: usize = 10;
-/// Time that this thread has been running, in nanoseconds, is the first word of this file of Linux.
-const BUSY: &str = "/proc/thread-self/schedstat";
 
 /// Times all sets; `done` hears of each as it ends.
 pub fn pictures(kind: RendererKind, mut done: impl FnMut(&PicturesCase)) -> Result<PicturesReport, SimError> {
@@ -50,7 +48,7 @@ pub fn pictures(kind: RendererKind, mut done: impl FnMut(&PicturesCase)) -> Resu
     };
     let room = |_: &Step| vec![cameras.third_person()];
     let mut cases = Vec::new();
-    let sets: [(_, &dyn Fn(&Step) -> Vec<Camera>, Draw); 4] = [
+    let sets: [(_, &Views, Draw); 4] = [
         ("eyes of both", &eyes, whole),
         ("their colours", &eyes, colours),
         ("small colours", &small, colours),
@@ -63,6 +61,9 @@ pub fn pictures(kind: RendererKind, mut done: impl FnMut(&PicturesCase)) -> Resu
     }
     Ok(PicturesReport { renderer, cases })
 }
+
+/// The cameras of a set of pictures.
+type Views<'a> = dyn Fn(&Step) -> Vec<Camera> + 'a;
 
 /// Draws a picture: all of it, or its colours alone, as learned policies have them.
 type Draw = fn(&mut dyn Renderer, &Step, &Camera);
@@ -78,7 +79,7 @@ fn colours(renderer: &mut dyn Renderer, step: &Step, camera: &Camera) {
 fn measure(
     kind: RendererKind,
     name: &'static str,
-    views: &dyn Fn(&Step) -> Vec<Camera>,
+    views: &Views,
     draw: Draw,
 ) -> Result<PicturesCase, SimError> {
     let mut world = World::new(&kitchen())?;
@@ -104,13 +105,6 @@ fn measure(
     let Camera { width, height, .. } = cameras[0];
     let [busy_ms, wall_ms] = [busy_ms, wall_ms].map(|mut all| Spread::of(&mut all[1..]));
     Ok(PicturesCase { name, pictures: cameras.len(), width, height, busy_ms, wall_ms })
-}
-
-/// Processor time of this thread, or the time since `started`.
-fn busy_since(started: Instant) -> Duration {
-    let text = std::fs::read_to_string(BUSY).unwrap_or_default();
-    let ns = text.split_whitespace().next().and_then(|word| word.parse().ok());
-    ns.map_or_else(|| started.elapsed(), Duration::from_nanos)
 }
 
 fn kitchen() -> WorldSpec {

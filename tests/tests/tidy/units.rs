@@ -95,6 +95,9 @@ const DIMENSIONLESS: &[&str] = &[
     "pace",
     "gain",
     "caution",
+    // Both are counted in phases.
+    "reward",
+    "progress",
     // Numbers of conversions and checks, which may be any, and of ranges whose own names carry the unit.
     "value",
     "values",

@@ -174,12 +174,13 @@ fn measure_physics() -> Result<PhysicsReport, Box<dyn Error>> {
 
 fn measure_env() -> Result<EnvReport, Box<dyn Error>> {
     println!(
-        "{:14}{:>7}{:>8}{:>9}{:>10}{:>10}{:>10}",
-        "task", "robots", "worlds", "threads", "steps/s", "of core", "reset ms"
+        "{:14}{:>7}{:>8}{:>9}{:>10}{:>10}{:>10}{:>10}",
+        "task", "robots", "worlds", "threads", "steps/s", "of core", "busy", "reset ms"
     );
     Ok(tandem_episodes::bench::env(|case| {
+        let busy = case.busy_of_core.map_or("-".into(), |share| format!("{:.2}", share.median));
         println!(
-            "{:14}{:>7}{:>8}{:>9}{:>10.0}{:>10.2}{:>10.1}",
+            "{:14}{:>7}{:>8}{:>9}{:>10.0}{:>10.2}{busy:>10}{:>10.1}",
             case.task,
             case.robots,
             case.worlds,
