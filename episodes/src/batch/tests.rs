@@ -22,7 +22,7 @@ fn spec(reward: RewardKind) -> BatchSpec {
 
 /// Robots that keep their upper bodies at zero and stand.
 fn standing(worlds: usize) -> Vec<f32> {
-    let mut row = vec![0.0; 35];
+    let mut row = [0.0; 35];
     row[34] = 0.74;
     row.repeat(worlds * ROBOTS)
 }
@@ -176,7 +176,7 @@ fn wrists_go_where_a_row_says() {
         Batch::new(BatchSpec { worlds: 1, actions: ActionKind::Wrists, ..spec(RewardKind::Dense) });
     let mut seen = states(1);
     batch.reset(&[Some(Some(2000))], SeenArrays::of_states(&mut seen)).unwrap();
-    let mut row = vec![0.0; 32];
+    let mut row = [0.0; 32];
     row[..7].copy_from_slice(&[0.25, 0.25, 0.10, 1.0, 0.0, 0.0, 0.0]);
     row[7..14].copy_from_slice(&[0.25, -0.25, 0.10, 1.0, 0.0, 0.0, 0.0]);
     row[31] = 0.74;
