@@ -43,6 +43,10 @@ const BACKWARD_M: f32 = 0.07;
 const SIDEWAYS_M: f32 = 0.005;
 /// A capture point so near to the middle of the feet is as near to one as to the other.
 const EITHER_FOOT_M: f32 = 0.01;
+/// A leg that swings ahead turns the pelvis to its own side, and one that swings back to the other: a robot that a blow has set
+/// spinning steps with the leg that stops the spin, which is the one that the spin carries along. This, times spin and the
+/// capture point's way ahead, counts like its way to the side. Tuned on punches at shoulders and elbows, seeds 2000-2099.
+const SPIN_S_RAD: f32 = 1.0;
 /// No change of mind within this time after planting.
 const LEAST_STANDING_S: f32 = 0.1;
 /// Feet and capture point from which standing succeeds.
@@ -156,7 +160,8 @@ impl BalanceState {
                     || stance.capture_m.x < -BACKWARD_M
                     || stance.capture_m.y.abs() > half_width_m + SIDEWAYS_M;
                 if (moving || lost) && self.time_in_mode_s > LEAST_STANDING_S {
-                    let left_carries = self.left_carries_first(&stance);
+                    let spin_rad_s = body.pelvis_angular_velocity_rad_s.z;
+                    let left_carries = self.left_carries_first(&stance, lost.then_some(spin_rad_s));
                     self.mode = Mode::Step(Stepping::start(body, self.heading_rad, left_carries));
                     self.time_in_mode_s = 0.0;
                 }
@@ -177,13 +182,18 @@ impl BalanceState {
         }
     }
 
-    /// The foot nearer to the capture point; of feet that are as near, the one from which the robot turns away.
-    fn left_carries_first(&self, stance: &Stance) -> bool {
+    /// The foot nearer to the capture point; of feet that are as near, the one from which the robot turns away. A robot that
+    /// has lost its stance heeds how fast it spins: see [`SPIN_S_RAD`].
+    fn left_carries_first(&self, stance: &Stance, lost_rad_s: Option<f32>) -> bool {
+        let capture_m = stance.capture_m;
+        if let Some(spin_rad_s) = lost_rad_s {
+            return capture_m.y + SPIN_S_RAD * spin_rad_s * capture_m.x > 0.0;
+        }
         let yaw_rate_rad_s = self.velocity.yaw_rate_rad_s;
-        if yaw_rate_rad_s.abs() > STILL_RAD_S && stance.capture_m.y.abs() < EITHER_FOOT_M {
+        if yaw_rate_rad_s.abs() > STILL_RAD_S && capture_m.y.abs() < EITHER_FOOT_M {
             yaw_rate_rad_s < 0.0
         } else {
-            stance.capture_m.y > 0.0
+            capture_m.y > 0.0
         }
     }
 
@@ -209,5 +219,47 @@ fn ramped(from: BaseVelocity, to: BaseVelocity, dt_s: f32) -> BaseVelocity {
         vx_m_s: towards(from.vx_m_s, to.vx_m_s, most_m_s),
         vy_m_s: towards(from.vy_m_s, to.vy_m_s, most_m_s),
         yaw_rate_rad_s: towards(from.yaw_rate_rad_s, to.yaw_rate_rad_s, most_rad_s),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body::posed::Posed;
+
+    /// Whether the left foot carries a robot with its capture point here, that spins so if it has lost its stance.
+    fn left_carries(capture_m: [f32; 2], lost_rad_s: Option<f32>) -> bool {
+        let body = Posed::standing().body();
+        let state = BalanceState::new(&body);
+        let load = Load::of(&body, &LadenRobot::of(&body), 0.0, Vector::ZERO);
+        let mut stance = state.stance(&body, &load);
+        stance.capture_m = Vector::new(capture_m[0], capture_m[1], 0.0);
+        state.left_carries_first(&stance, lost_rad_s)
+    }
+
+    /// Blown ahead or back at an elbow it swings the leg that stops the spin, though the other foot is a little nearer.
+    #[test]
+    fn a_robot_that_spins_steps_with_the_leg_that_stops_it() {
+        for (ahead_m, spin_rad_s, left) in
+            [(0.08, 2.0, true), (0.08, -2.0, false), (-0.08, 2.0, false), (-0.08, -2.0, true)]
+        {
+            for side_m in [0.05, -0.05] {
+                let capture_m = [ahead_m, side_m];
+                assert_eq!(left_carries(capture_m, Some(spin_rad_s)), left, "{capture_m:?}, {spin_rad_s}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_robot_that_does_not_spin_stands_on_the_nearer_foot() {
+        for side_m in [0.12, -0.12] {
+            for lost_rad_s in [None, Some(0.3), Some(-0.3)] {
+                assert_eq!(
+                    left_carries([0.08, side_m], lost_rad_s),
+                    side_m > 0.0,
+                    "{side_m}, {lost_rad_s:?}"
+                );
+            }
+        }
     }
 }
