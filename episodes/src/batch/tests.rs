@@ -93,9 +93,10 @@ fn an_episode_that_begins_in_the_same_step_leaves_its_last_state() {
     batch.reset(&[Some(Some(2000))], SeenArrays::of_states(&mut seen)).unwrap();
     let begin = seen.clone();
     // What nothing keeps on its feet.
-    let mut actions = standing(1);
-    actions[34] = 0.4;
-    actions[31] = 2.0;
+    let mut row = [0.0; 35];
+    (row[28], row[30]) = (2.0, 0.5);
+    row[31..].copy_from_slice(&[-0.4, 0.4, 0.6, 0.4]);
+    let actions = row.repeat(ROBOTS);
     let mut steps = 0;
     let fell = loop {
         let step = BatchStep { action_rows: &actions, autoreset: Autoreset::SameStep, looks: true };
@@ -109,6 +110,7 @@ fn an_episode_that_begins_in_the_same_step_leaves_its_last_state() {
         }
         assert_eq!(outcome.next_seed, None);
     };
+    assert!(fell.terminated && fell.fallen.contains(&true), "{fell:?}");
     assert_eq!((fell.env_steps, fell.seed, fell.next_seed), (steps, 2000, Some(2001)));
     assert_ne!(last[..JOINTS], seen[..JOINTS]);
     assert_eq!(seen.len(), begin.len());
@@ -189,7 +191,7 @@ fn wrists_go_where_a_row_says() {
     }
     let session = batch.session(0).unwrap();
     let wrist = session.present().robots[0].sensed.pelvis_from_wrist.right.translation;
-    assert!((wrist - tandem_sim::Vector::new(0.25, -0.25, 0.10)).length() < 0.03, "{wrist}");
+    assert!((wrist - tandem_sim::Vector::new(0.25, -0.25, 0.10)).length() < 0.05, "{wrist}");
     // Rewards add up to what has been come by since the beginning: the hands have come nearer to the bottle.
     let begin = Session::start(&EpisodeSpec { seed: 2000, ..batch.spec().episode.clone() }, None).unwrap();
     let now = batch.session(0).unwrap().progress();
