@@ -3,6 +3,7 @@
 
 mod documents;
 mod episodes;
+mod notes;
 mod operators;
 mod paper_numbers;
 mod policies;

@@ -62,9 +62,6 @@ const UNITS: &[&str] = &[
     "kg_m",
     "kg_m2",
     "kg_m3",
-    "usd",
-    // As the wire has it.
-    "seconds",
 ];
 
 /// What the name of a number without a unit may end in, or a name that says of several units which is where.
@@ -109,6 +106,9 @@ const DIMENSIONLESS: &[&str] = &[
     "row",
     "rows",
     "command",
+    // Units by themselves, as notes have them.
+    "usd",
+    "seconds",
     // Corners in a picture: column and row in pixels, then what is interpolated between them.
     "corners",
     // A camera's intrinsics, in pixels, as every library calls them.

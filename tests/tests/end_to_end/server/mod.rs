@@ -8,7 +8,6 @@ mod door;
 mod hints;
 mod listing;
 mod mcp;
-mod notes;
 mod operations;
 mod repeats;
 mod rest;
