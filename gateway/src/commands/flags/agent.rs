@@ -45,14 +45,14 @@ pub struct AgentFlags {
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..))]
     max_seconds: Option<u32>,
     /// Price of a million tokens that are read.
-    #[arg(long, value_name = "USD")]
-    usd_per_million_input: Option<f64>,
+    #[arg(long = "usd-per-million-input", value_name = "USD")]
+    million_input_usd: Option<f64>,
     /// Price of a million tokens that are written.
-    #[arg(long, value_name = "USD")]
-    usd_per_million_output: Option<f64>,
+    #[arg(long = "usd-per-million-output", value_name = "USD")]
+    million_output_usd: Option<f64>,
     /// Price of a million tokens that are read from a cache [default: as other tokens that are read].
-    #[arg(long, value_name = "USD")]
-    usd_per_million_cached: Option<f64>,
+    #[arg(long = "usd-per-million-cached", value_name = "USD")]
+    million_cached_usd: Option<f64>,
 }
 
 /// The flags as they stand behind `agent:`.
@@ -126,9 +126,9 @@ impl AgentFlags {
             ("max-usd", text(self.max_usd)),
             ("max-calls", self.max_calls.map(|number| number.to_string())),
             ("max-seconds", self.max_seconds.map(|number| number.to_string())),
-            ("usd-per-million-input", text(self.usd_per_million_input)),
-            ("usd-per-million-output", text(self.usd_per_million_output)),
-            ("usd-per-million-cached", text(self.usd_per_million_cached)),
+            ("usd-per-million-input", text(self.million_input_usd)),
+            ("usd-per-million-output", text(self.million_output_usd)),
+            ("usd-per-million-cached", text(self.million_cached_usd)),
         ]
     }
 }
