@@ -29,6 +29,8 @@ pub enum BatchError {
     NotBegun { world: usize },
     #[error("the batch has {have} worlds, 0 to {}; there is no world {world}", have - 1)]
     NoWorld { world: usize, have: usize },
+    #[error("the episode of seed {seed} cannot be recorded: {reason}")]
+    NotRecorded { seed: u32, reason: String },
     #[error(transparent)]
     Episode(#[from] EpisodeError),
 }
@@ -116,7 +118,7 @@ impl Batch {
         seen: SeenArrays,
     ) -> Result<Vec<Option<WorldStep>>, BatchError> {
         let spec = &self.spec;
-        let mut outcomes: Vec<Result<Option<WorldStep>, EpisodeError>> =
+        let mut outcomes: Vec<Result<Option<WorldStep>, BatchError>> =
             self.worlds.iter().map(|_| Ok(None)).collect();
         let jobs = self.worlds.iter_mut().zip(seen.split(self.spec.worlds)).zip(seeds).zip(&mut outcomes);
         for_each(self.spec.threads, jobs.collect(), |(((world, seen), seed), outcome)| {
@@ -124,7 +126,7 @@ impl Batch {
                 *outcome = world.reset(spec, *seed, seen).map(Some);
             }
         });
-        Ok(outcomes.into_iter().collect::<Result<_, _>>()?)
+        outcomes.into_iter().collect()
     }
 
     /// One control step of each world, or the beginning of its next episode. `last` is where the last of an episode is written
@@ -137,14 +139,14 @@ impl Batch {
     ) -> Result<Vec<WorldStep>, BatchError> {
         let calls = self.calls(&step)?;
         let spec = &self.spec;
-        let mut outcomes: Vec<Result<WorldStep, EpisodeError>> =
+        let mut outcomes: Vec<Result<WorldStep, BatchError>> =
             self.worlds.iter().map(|_| Ok(WorldStep::default())).collect();
         let seen = seen.split(spec.worlds).zip(last.split(spec.worlds));
         let jobs = self.worlds.iter_mut().zip(calls).zip(seen).zip(&mut outcomes);
         for_each(spec.threads, jobs.collect(), |(((world, call), (seen, last)), outcome)| {
             *outcome = world.step(spec, &step, &call, seen, last);
         });
-        Ok(outcomes.into_iter().collect::<Result<_, _>>()?)
+        outcomes.into_iter().collect()
     }
 
     /// What each world is asked to do, all of it checked.

@@ -173,6 +173,19 @@ fn a_step_is_refused_as_a_whole() {
 }
 
 #[test]
+fn what_cannot_be_recorded_does_not_begin() {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let record = Some(file.path().join("runs"));
+    let mut batch = Batch::new(BatchSpec { worlds: 1, record, ..spec(RewardKind::Sparse) });
+    let mut seen = states(1);
+    let refused = batch.reset(&[Some(Some(2000))], SeenArrays::of_states(&mut seen)).unwrap_err().to_string();
+    assert!(refused.starts_with("the episode of seed 2000 cannot be recorded: "), "{refused}");
+    let step = BatchStep { action_rows: &standing(1), autoreset: Autoreset::NextStep, looks: false };
+    let refused = batch.step(step, SeenArrays::of_states(&mut seen), SeenArrays::default()).unwrap_err();
+    assert_eq!(refused.to_string(), "world 0 has no episode under way; reset it first");
+}
+
+#[test]
 fn wrists_go_where_a_row_says() {
     let mut batch =
         Batch::new(BatchSpec { worlds: 1, actions: ActionKind::Wrists, ..spec(RewardKind::Dense) });

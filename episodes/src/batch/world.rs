@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use tandem_sim::JOINTS;
 use tandem_tools_spec::ToolCall;
 
-use super::{Autoreset, BatchSpec, BatchStep, STATE_COLUMNS};
+use super::{Autoreset, BatchError, BatchSpec, BatchStep, STATE_COLUMNS};
+use crate::Session;
 use crate::commands::base_row;
 use crate::spec::EpisodeSpec;
-use crate::{EpisodeError, Session};
 
 /// Where a world begins that nobody gave a seed: with the first of those that are neither reported nor held out.
 const FIRST_SEED: u32 = 2000;
@@ -85,7 +85,7 @@ impl BatchWorld {
 
     /// Whether a step is in order, where worlds are reset like this.
     pub fn takes(&self, autoreset: Autoreset) -> bool {
-        self.round_seed.is_some() && (autoreset != Autoreset::Disabled || !self.over)
+        if self.over { autoreset != Autoreset::Disabled } else { self.session.is_some() }
     }
 
     /// Begins a round: with this seed, or with the one after that of the last round.
@@ -94,7 +94,7 @@ impl BatchWorld {
         spec: &BatchSpec,
         seed: Option<u32>,
         seen: SeenWorld,
-    ) -> Result<WorldStep, EpisodeError> {
+    ) -> Result<WorldStep, BatchError> {
         let next = match self.round_seed {
             Some(last) => last.wrapping_add(self.stride),
             None => FIRST_SEED.wrapping_add(self.index as u32),
@@ -105,13 +105,18 @@ impl BatchWorld {
     }
 
     /// Begins the next episode of the round. Its seed is the index's: no episode begins elsewhere because another one ended sooner.
-    fn begin(&mut self, spec: &BatchSpec, seen: SeenWorld) -> Result<WorldStep, EpisodeError> {
+    fn begin(&mut self, spec: &BatchSpec, seen: SeenWorld) -> Result<WorldStep, BatchError> {
         let round_seed = self.round_seed.unwrap_or(FIRST_SEED);
         let seed = round_seed.wrapping_add(self.stride.wrapping_mul(self.episodes));
         self.close();
         let episode = EpisodeSpec { seed, ..spec.episode.clone() };
         let folder = spec.record.as_ref().map(|record| self.folder(record, &episode));
-        let session = self.session.insert(Session::start(&episode, folder.as_deref())?);
+        let session = Session::start(&episode, folder.as_deref())?;
+        if let Some(reason) = session.recording_failed() {
+            // Whoever wants a recording has no use for the episode.
+            return Err(BatchError::NotRecorded { seed, reason: reason.into() });
+        }
+        let session = self.session.insert(session);
         self.episodes += 1;
         self.over = false;
         self.progress = match spec.reward {
@@ -130,7 +135,7 @@ impl BatchWorld {
         call: &ToolCall,
         seen: SeenWorld,
         last: SeenWorld,
-    ) -> Result<WorldStep, EpisodeError> {
+    ) -> Result<WorldStep, BatchError> {
         if self.over {
             return self.begin(spec, seen);
         }
