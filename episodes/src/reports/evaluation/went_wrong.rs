@@ -113,8 +113,11 @@ mod tests {
     use crate::scoring::{A, B};
     use crate::tasks;
 
-    /// What is found of these moments: seconds, whether a phase was reached, and what was so.
-    fn found(moments: &[(f64, bool, fn(Facts) -> Facts)]) -> Option<(f64, String)> {
+    /// Seconds, whether a phase was reached, and what was so.
+    type WatchedMoment = (f64, bool, fn(Facts) -> Facts);
+
+    /// What is found of these moments.
+    fn found(moments: &[WatchedMoment]) -> Option<(f64, String)> {
         let rest = Facts::at_rest(tasks::find("handover").unwrap());
         let mut watcher = Watcher::default();
         for (time_s, reached, so) in moments {
