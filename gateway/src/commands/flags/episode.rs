@@ -204,7 +204,7 @@ mod tests {
         check("4294967296", None);
     }
 
-    /// What a flag for seeds says of itself in each command that has one, under the command's name.
+    /// What a flag for seeds says of itself in each command that has one, under the command.
     fn help_on_seeds(command: &clap::Command, path: &str, found: &mut Vec<(String, String)>) {
         for of in command.get_subcommands() {
             let path = format!("{path} {}", of.get_name());
@@ -212,7 +212,12 @@ mod tests {
             if let Some(flag) = of.get_arguments().find(is_seeds) {
                 let name = flag.get_long().unwrap_or_default();
                 let help = flag.get_help().map(ToString::to_string).unwrap_or_default();
-                found.push((path.clone(), format!("--{name}: {help}")));
+                // With what else has to be given.
+                let required = of.get_arguments().filter(|flag| flag.is_required_set());
+                let line: String = required
+                    .filter_map(|flag| Some(format!(" --{} x", flag.get_long()?)))
+                    .fold(path.clone(), |line, flag| line + &flag);
+                found.push((line, format!("--{name}: {help}")));
             }
             help_on_seeds(of, &path, found);
         }
