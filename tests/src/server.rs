@@ -108,7 +108,9 @@ impl TestServer {
     /// Returns the headers and the text of a page that is not JSON.
     #[track_caller]
     pub fn page(&self, path: &str) -> (http::HeaderMap, String) {
-        let mut page = self.agent.get(format!("http://{}{path}", self.address)).call().expect("a page");
+        let page =
+            self.agent.get(format!("http://{}{path}", self.address)).header("accept", "text/html, */*;q=0.8");
+        let mut page = page.call().expect("a page");
         assert_eq!(page.status(), 200, "{path}");
         (page.headers().clone(), page.body_mut().read_to_string().expect("a text"))
     }

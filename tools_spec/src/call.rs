@@ -169,20 +169,38 @@ impl Look {
 
 impl SendPlan {
     /// The commands as calls.
-    pub fn calls(&self) -> Result<Vec<(ActCall, Expectation)>, SpecError> {
+    pub fn calls(&self) -> Result<Vec<PlanStep>, SpecError> {
         let call = |(index, command): (usize, &PlannedCommand)| {
             let refused = |reason: String| SpecError::Invalid {
                 tool: SendPlan::NAME,
                 reason: format!("commands[{index}]: {reason}"),
             };
-            match ToolCall::parse(&command.tool, command.arguments.clone().into()) {
-                Ok(ToolCall::Act(call)) => Ok((call, command.expects.clone().unwrap_or_default())),
+            let mut args = Value::Object(command.arguments.clone());
+            let with_all = beside::<WithAll>(SendPlan::NAME, &mut args, &WithAll::FIELDS)
+                .map_err(|error| refused(error.to_string()))?;
+            match ToolCall::parse(&command.tool, args) {
+                Ok(ToolCall::Act(call)) => Ok(PlanStep {
+                    call,
+                    expects: command.expects.clone().unwrap_or_default(),
+                    short: with_all.short.unwrap_or(false),
+                }),
                 Ok(other) => Err(refused(format!("{} is no command", other.name()))),
                 Err(error) => Err(refused(error.to_string())),
             }
         };
         self.commands.iter().enumerate().map(call).collect()
     }
+}
+
+/// One command of a plan, read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlanStep {
+    /// What is commanded.
+    pub call: ActCall,
+    /// What is expected of the robots afterwards.
+    pub expects: Expectation,
+    /// Whether its reply is to be short, where it is the last one that is carried out.
+    pub short: bool,
 }
 
 /// Reads the arguments of `start_episode`, and by whom the episode is to be driven.
@@ -256,7 +274,7 @@ mod tests {
     fn looking(robots: &[&str]) -> Look {
         let robots = Some(robots.iter().map(|robot| robot.to_string()).collect());
         let formats = Formats { images: Some(ImageFormat::Rgb), depth: None };
-        Look { observe: Observe { robots, short: None }, formats }
+        Look { observe: Observe { robots, short: None, frame: None }, formats }
     }
 
     #[test]
@@ -269,7 +287,7 @@ mod tests {
         );
         assert_eq!(call.unwrap(), Call { expected_step: Some(300), then: Some(looking(&["A"])), ..plain });
         let call = Call::parse("observe", json!({ "depth": "float16", "short": true })).unwrap();
-        assert_eq!(call.tool, Observe { robots: None, short: Some(true) }.into());
+        assert_eq!(call.tool, Observe { robots: None, short: Some(true), frame: None }.into());
         assert_eq!(call.formats, Formats { images: None, depth: Some(DepthFormat::Float16) });
         let (start, driving) =
             parse_start(json!({ "task": "handover", "seed": 0, "operators": "per_robot" })).unwrap();
@@ -319,7 +337,7 @@ mod tests {
 
     #[test]
     fn who_looks_for_itself_need_not_say_so() {
-        let all = || Observe { robots: None, short: None };
+        let all = || Observe { robots: None, short: None, frame: None };
         let look = || Look { observe: all(), formats: Formats::default() };
         let wait = Call { then: Some(look()), ..Call::from(ToolCall::from(Wait { steps: 1 })) };
         for call in [Call::from(look()), wait] {

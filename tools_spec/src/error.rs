@@ -1,5 +1,7 @@
 //! What can be wrong with a call before any world is asked.
 
+use serde_json::Value;
+
 use crate::refusal::{Refusal, RefusalClass};
 
 /// A call that does not fit the contract. The text says what would work, because its reader is often a language model.
@@ -36,6 +38,17 @@ pub enum SpecError {
 }
 
 impl SpecError {
+    /// As it is told where the episode is named among the arguments: an example names it, too.
+    pub fn naming_episode(mut self, id: &str) -> SpecError {
+        if let SpecError::Malformed { example, .. } = &mut self
+            && let Ok(Value::Object(arguments)) = serde_json::from_str(example)
+        {
+            let named = std::iter::once(("episode_id".into(), id.into())).chain(arguments);
+            *example = Value::Object(named.collect()).to_string();
+        }
+        self
+    }
+
     /// What this error is to its caller.
     pub const fn refusal(&self) -> Refusal {
         match self {

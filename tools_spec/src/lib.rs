@@ -20,7 +20,7 @@ mod strict_value;
 mod tool;
 mod tools;
 
-pub use call::{Call, Look, parse_start};
+pub use call::{Call, Look, PlanStep, parse_start};
 pub use error::SpecError;
 pub use list::{
     ActCall, EPISODE_TOOLS, LookCall, LookReply, ManageCall, ManageReply, PlanCall, TalkCall, TalkReply,

@@ -84,9 +84,21 @@ pub fn read_as<T: DeserializeOwned>(
             tool: name,
             place: if path == "." { String::new() } else { format!("{path}: ") },
             reason: in_plain_words(&error.into_inner().to_string()),
-            example: example().to_string(),
+            example: without_nulls(example()).to_string(),
         }
     })
+}
+
+/// What may be null may be left out, and not every face of the contract knows of null.
+fn without_nulls(value: Value) -> Value {
+    match value {
+        Value::Array(items) => items.into_iter().map(without_nulls).collect(),
+        Value::Object(fields) => {
+            let given = fields.into_iter().filter(|(_, value)| !value.is_null());
+            Value::Object(given.map(|(name, value)| (name, without_nulls(value))).collect())
+        }
+        scalar => scalar,
+    }
 }
 
 /// Serde names Rust's types, which a caller need not know.

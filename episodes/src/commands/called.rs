@@ -225,7 +225,7 @@ mod tests {
         }
         let status = operator("B", GetStatus {});
         assert_eq!((status.robot(), status.call().robots().len()), ("B", 0));
-        let all = operator("B", Observe { robots: None, short: None }).into_call();
-        assert_eq!(all.tool, Observe { robots: Some(vec!["B".into()]), short: None }.into());
+        let all = operator("B", Observe { robots: None, short: None, frame: None }).into_call();
+        assert_eq!(all.tool, Observe { robots: Some(vec!["B".into()]), short: None, frame: None }.into());
     }
 }

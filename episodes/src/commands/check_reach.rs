@@ -4,10 +4,13 @@ use tandem_ik::FrameError;
 use tandem_sim::Sides;
 use tandem_tools_spec::{CheckReach, HandReach, ReachReply};
 
-use super::motion::Motion;
+use super::motion::{Motion, Reach};
 use super::move_wrists::wrist_targets;
 use super::upper_body::REACH_TOLERANCE;
 use crate::convert::coarse;
+
+/// A robot steps whose centre of mass its arms take farther ahead, as measured of one arm and of both at several heights.
+const STEPS_AHEAD_M: f64 = 0.05;
 
 /// The reply to `check_reach`.
 pub fn check_reach(args: &CheckReach, motion: &Motion) -> ReachReply {
@@ -16,13 +19,14 @@ pub fn check_reach(args: &CheckReach, motion: &Motion) -> ReachReply {
         right: (args.right_position_m, args.right_quaternion_wxyz),
     };
     let targets = wrist_targets(halves, args.frame.unwrap_or_default(), motion);
-    let (errors, joints_at_limit) = motion.reach(&targets);
+    let Reach { errors, joints_at_limit, ahead_m } = motion.reach(&targets);
     let hands = errors.map(|error| error.map(hand_reach));
     ReachReply {
         robot: args.robot.clone(),
         reachable: hands.iter().flatten().all(|hand| hand.reachable),
         left: hands.left,
         right: hands.right,
+        needs_a_step: ahead_m > STEPS_AHEAD_M,
         joints_at_limit,
     }
 }

@@ -17,6 +17,12 @@ const SETTLES_STEPS: u32 = 75;
 const COASTS_S: f64 = 0.25;
 const COASTS_S2_M: f64 = 0.6;
 const CONTROL_S: f64 = 0.02;
+/// A base whose feet have been still for so many control steps, and whose pelvis is off its height, is on its way there while that changes
+/// by more; for a moment after the feet have come together it does not yet rise.
+const PLANTED_STEPS: u32 = 10;
+const RISES_M_S: f64 = 0.02;
+/// Part of the mean of how fast it rises that one control step makes up.
+const RISING_PART: f64 = 0.2;
 /// What differs by less is not told.
 const HEIGHT_M: f64 = 0.02;
 const DISPLACED_M: f64 = 0.02;
@@ -31,6 +37,12 @@ pub struct Footing {
     told_m_s: [f64; 2],
     /// Where it came to rest after that, in the frame of its estimate.
     rests_at: Option<Isometry3<f64>>,
+    /// Control steps since its feet last moved, and how high its pelvis is and how fast it has risen lately.
+    planted_steps: u32,
+    height_m: f64,
+    rises_m_s: f64,
+    /// Whether it has stepped since its last command began, though it was told to stand.
+    stepped: bool,
 }
 
 impl Footing {
@@ -43,13 +55,26 @@ impl Footing {
             still_steps: SETTLES_STEPS,
             told_m_s: [0.0; 2],
             rests_at: None,
+            planted_steps: PLANTED_STEPS,
+            height_m,
+            rises_m_s: 0.0,
+            stepped: false,
         }
+    }
+
+    /// A command begins.
+    pub fn begin(&mut self) {
+        self.stepped = false;
     }
 
     /// Takes in what the robot senses after a control step under the command `base`.
     pub fn feel(&mut self, sensed: &RobotSensed, base: &BaseCommand, world_from_pelvis: &Isometry3<f64>) {
         self.pelvis_from_start = isometry_from_sim(&sensed.start_from_pelvis).inverse();
         self.is_stepping = sensed.is_stepping;
+        self.planted_steps = if sensed.is_stepping == Some(true) { 0 } else { self.planted_steps + 1 };
+        let height_m = f64::from(sensed.start_from_pelvis.translation.z);
+        self.rises_m_s += RISING_PART * ((height_m - self.height_m) / CONTROL_S - self.rises_m_s);
+        self.height_m = height_m;
         if base.velocity() == BaseVelocity::STILL {
             self.still_steps = self.still_steps.saturating_add(1);
         } else {
@@ -60,10 +85,14 @@ impl Footing {
         if self.still_steps >= SETTLES_STEPS || (self.still_steps > 0 && sensed.is_stepping == Some(false)) {
             self.rests_at.get_or_insert(*world_from_pelvis);
         }
+        self.stepped |= self.still_steps >= SETTLES_STEPS && sensed.is_stepping == Some(true);
     }
 
-    fn state(&self) -> Option<BaseState> {
+    fn state(&self, base: &BaseCommand) -> Option<BaseState> {
+        let is_off = (self.height_m - f64::from(base.pelvis_height_m)).abs() > HEIGHT_M;
+        let rises = is_off && (self.planted_steps < PLANTED_STEPS || self.rises_m_s.abs() > RISES_M_S);
         self.is_stepping.map(|steps| match (steps, self.still_steps) {
+            (false, _) if rises => BaseState::Settling,
             (false, _) => BaseState::Standing,
             (true, 0) => BaseState::Stepping,
             (true, still) if still < SETTLES_STEPS => BaseState::Settling,
@@ -76,7 +105,7 @@ impl Footing {
         let start_from_pelvis = self.pelvis_from_start.inverse();
         let pelvis_height_m = start_from_pelvis.translation.z;
         let commanded_m = f64::from(base.pelvis_height_m);
-        let state = self.state();
+        let state = self.state(base);
         let moves = matches!(state, Some(BaseState::Stepping | BaseState::Settling));
         let told_m_s = Vector3::new(self.told_m_s[0], self.told_m_s[1], 0.0);
         let coasts_s = COASTS_S + COASTS_S2_M * told_m_s.norm() - f64::from(self.still_steps) * CONTROL_S;
@@ -94,6 +123,7 @@ impl Footing {
             displaced_m: displaced_m
                 .filter(|off_m| off_m.xy().norm() > DISPLACED_M)
                 .map(|off_m| [coarse(off_m.x), coarse(off_m.y)]),
+            stepped: self.stepped,
         }
     }
 }

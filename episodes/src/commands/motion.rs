@@ -13,7 +13,7 @@ use tandem_tools_spec::PoseFrame;
 
 use super::columns;
 use super::footing::Footing;
-use super::upper_body::{REACH_TOLERANCE, UpperBody};
+use super::upper_body::{REACH_TOLERANCE, UpperBody, ahead_m};
 use crate::convert::isometry_from_sim;
 
 /// Part of the remaining error that one control step removes: smooth, and a lag of two steps.
@@ -81,6 +81,16 @@ pub struct Approach {
     missing_m: f64,
     /// The mean of what it was, over the last fifth of a second or so.
     lately_m: f64,
+}
+
+/// How arms would come to rest.
+pub struct Reach {
+    /// What each wrist that has a target would be off.
+    pub errors: Sides<Option<FrameError>>,
+    /// Joints that would be at their limits.
+    pub joints_at_limit: Vec<String>,
+    /// How much farther ahead the whole robot's centre of mass would be than with its arms at rest.
+    pub ahead_m: f64,
 }
 
 /// How the pair of hands gives way to what pulls it: the force under which it goes at 1 m/s, or the moment under which it turns at
@@ -268,6 +278,19 @@ impl Motion {
         Sides::from_fn(|side| asked[side].unwrap_or(commanded[side]))
     }
 
+    /// As [`Motion::targets`], as they were told and not as they have given way since.
+    pub fn told_wrists(&self) -> Sides<Isometry3<f64>> {
+        let as_told = self.yielding(self.commanded_middle_m()).inverse();
+        let commanded = self.commanded_wrists().map(|wrist| as_told * wrist);
+        let pelvis = &self.state.world_from_pelvis;
+        Sides::from_fn(|side| self.state.aims[side].in_pelvis(pelvis).unwrap_or(commanded[side]))
+    }
+
+    /// A command begins that is told of by itself.
+    pub fn begin_command(&mut self) {
+        self.state.footing.begin();
+    }
+
     /// Where the wrists that have targets are to be, pelvis frame.
     fn asked_wrists(&self) -> Sides<Option<Isometry3<f64>>> {
         self.in_pelvis(&self.state.aims)
@@ -362,9 +385,8 @@ impl Motion {
         }
     }
 
-    /// How far from `targets` (pelvis frame) the wrists would come to rest, and the joints that would be at their limits. An
-    /// arm without a target keeps its joints.
-    pub fn reach(&self, targets: &Sides<Option<Isometry3<f64>>>) -> (Sides<Option<FrameError>>, Vec<String>) {
+    /// How near to `targets` (pelvis frame) the wrists would come to rest. An arm without a target keeps its joints.
+    pub fn reach(&self, targets: &Sides<Option<Isometry3<f64>>>) -> Reach {
         let mut solver = self.body.solver();
         solver.tolerance = REACH_TOLERANCE;
         solver.limits.velocity = self.body.speeds_rad_s(targets);
@@ -376,7 +398,13 @@ impl Motion {
         let errors = targets.each_ref().map(|target| target.as_ref().and_then(|_| errors.next()));
         let moves = solver.limits.velocity.iter().map(|speed| *speed > 0.0).collect::<Vec<_>>();
         let at_limit = tandem_ik::saturated(&configuration).into_iter().filter(|joint| moves[*joint]);
-        (errors, at_limit.map(|joint| self.body.model.joints()[joint].name.clone()).collect())
+        let joints_at_limit = at_limit.map(|joint| self.body.model.joints()[joint].name.clone()).collect();
+        let mut upper_rad = self.state.upper_rad;
+        for (column, q) in self.body.columns.iter().zip(configuration.q()) {
+            upper_rad[*column] = *q;
+        }
+        let ahead_m = ahead_m(&self.robot.model, &upper_rad) - self.body.rest_ahead_m(&self.robot.model);
+        Reach { errors, joints_at_limit, ahead_m }
     }
 
     fn in_pelvis(&self, aims: &Sides<Aim>) -> Sides<Option<Isometry3<f64>>> {

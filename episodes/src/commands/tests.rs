@@ -8,6 +8,7 @@ use tandem_sim::{BaseCommand, BaseLimits, RobotCommand, RobotModel, Side, Sides,
 use tandem_tools_spec::{MoveWrists, Protocol, ToolCall, WalkMove, WristMove};
 
 use super::*;
+use crate::commands::motion::Reach;
 use crate::protocol::rules;
 use crate::tasks;
 
@@ -246,7 +247,8 @@ fn reach_is_asked_of_the_named_arm_alone() {
     let motion = standing();
     for (x_m, within) in [(0.3, true), (0.9, false)] {
         let pose = Isometry3::translation(x_m, -0.2, 0.1);
-        let (errors, at_limit) = motion.reach(&Sides { left: None, right: Some(pose) });
+        let Reach { errors, joints_at_limit: at_limit, .. } =
+            motion.reach(&Sides { left: None, right: Some(pose) });
         assert!(errors.left.is_none());
         assert_eq!(errors.right.unwrap().position_m < 0.005, within);
         assert!(at_limit.iter().all(|joint| !joint.starts_with("left")), "{at_limit:?}");

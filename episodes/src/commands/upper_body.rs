@@ -5,7 +5,9 @@ use tandem_ik::{
     Capsule, DampingTask, FrameId, FrameTask, IkError, JointCouplingTask, Model, PostureTask, SelfCollision,
     Solver, Task, Tolerance,
 };
-use tandem_sim::{CONTROL_HZ, RobotCommand, Side, Sides, UPPER, UPPER_JOINTS, joint_names};
+use tandem_sim::{
+    CONTROL_HZ, JOINTS, Pose, RobotCommand, RobotModel, Side, Sides, UPPER, UPPER_JOINTS, joint_names,
+};
 
 use super::columns;
 
@@ -28,6 +30,8 @@ pub struct UpperBody {
     pub columns: Vec<usize>,
     self_collision: SelfCollision,
     rest_rad: Vec<f64>,
+    /// Of all joints above the hips, in action order.
+    rest_upper_rad: [f64; UPPER_JOINTS],
 }
 
 impl UpperBody {
@@ -44,7 +48,13 @@ impl UpperBody {
             model,
             columns,
             rest_rad,
+            rest_upper_rad: rest.upper_rad.map(f64::from),
         })
+    }
+
+    /// How far ahead of the pelvis the centre of mass of a robot at rest is.
+    pub fn rest_ahead_m(&self, robot: &RobotModel) -> f64 {
+        ahead_m(robot, &self.rest_upper_rad)
     }
 
     /// Wrists at those `targets` that there are, of whose error one step is to remove the part `gain`, and as little else as
@@ -91,6 +101,21 @@ impl UpperBody {
         };
         self.columns.iter().map(speed_rad_s).collect()
     }
+}
+
+/// How far ahead of the pelvis the centre of mass is with the joints above the hips at these angles, and the legs straight.
+pub fn ahead_m(model: &RobotModel, upper_rad: &[f64; UPPER_JOINTS]) -> f64 {
+    let mut q_rad = [0.0; JOINTS];
+    for (column, angle_rad) in upper_rad.iter().enumerate() {
+        q_rad[UPPER[column]] = *angle_rad as f32;
+    }
+    let poses = model.forward_kinematics(Pose::IDENTITY, &q_rad);
+    let (mut mass_kg, mut moment_kg_m) = (0.0, 0.0);
+    for (link, pose) in model.links.iter().zip(&poses) {
+        mass_kg += f64::from(link.mass.mass());
+        moment_kg_m += f64::from(link.mass.mass() * (*pose * link.mass.local_com).x);
+    }
+    moment_kg_m / mass_kg
 }
 
 fn is_waist(joint: &str) -> bool {

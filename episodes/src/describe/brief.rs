@@ -46,6 +46,14 @@ const GRASPING: &str = "Fingers that are stopped short of their targets press: a
     (compliance_n_s_m 250) from when the thing is lifted, by its legs while it is lifted, too, until it is over its goal; stiff hands \
     lower it.";
 
+/// What only they are told who have `walk_to`; held by `a_robot_pushes_a_trolley_by_one_call` and `two_robots_carry_a_basket_by_one_call`.
+const CARRYING: &str = " To push, and to carry together: grip, and lift what is to be lifted by 0.09 m with compliance_n_s_m 250; then call \
+    walk_to with carry, once, with every robot that holds the load, each with its own place: where it stands now, moved by what the load \
+    is to move, in its own start frame (room says how these lie to each other: a partner who faces you goes to its left where you go to \
+    your right). Hands keep their places to the robots and their height; 450 steps a metre. To set down, bring the wrists down again by \
+    steps of 0.03 m with compliance_n_s_m 250 once both stand: a thing has touched when force_n along z falls towards 0, as from -4.4 to \
+    -2.0. Then open.";
+
 const NAMED_FRAMES: &str = " Tools that take `frame` know \"pelvis\"; \"level\", the same but upright: z against gravity, x the way the robot \
     faces (a robot that crouches or carries leans by up to 0.1 rad, which is 7 cm at arm's length); and \"start\", which lies on the \
     floor under where the pelvis was when the episode began, z up, x where the robot faced, and stays in the room while the robot moves. \
@@ -56,7 +64,7 @@ const NAMED_FRAMES: &str = " Tools that take `frame` know \"pelvis\"; \"level\",
 const WALKING: &str = "A robot that is told to walk gains way after 0.3 to 0.5 s. Told to stop, it coasts: by 3 cm from 0.1 m/s, 8 cm from 0.2, \
     12 from 0.3 and 20 from 0.4, and by 0.09 rad from turning at 0.5 rad/s; it stands after about a second. While it steps the pelvis \
     sways by up to 4 cm to each side, twice a second: mean over half a second what you steer by, or have walk_to do it. base.state says \
-    \"standing\", \"stepping\", \"settling\" (told to stop; comes_to_rest_m says where it will stand) or \"pushed\": it steps because its \
+    \"standing\", \"stepping\", \"settling\" (told to stop, or the pelvis still rises; comes_to_rest_m says where it will stand) or \"pushed\": it steps because its \
     hands or a partner pull it, drifts and sinks by 10 cm. Then free what pulls: loosen wrist targets, give way with compliance_n_s_m, or \
     walk the way it is pulled. Arms that reach more than 0.35 m ahead make a robot step, too: walk nearer instead.";
 
@@ -74,7 +82,9 @@ pub fn brief(wording: Wording, limits: &BaseLimits) -> Brief {
         camera: CAMERA.into(),
         hands: HANDS.into(),
         walking: (is_full && squats).then(|| WALKING.into()),
-        grasping: is_hinted.then(|| [if is_full { GRIP } else { "" }, GRASPING].concat()),
+        grasping: is_hinted.then(|| {
+            [if is_full { GRIP } else { "" }, GRASPING, if is_full { CARRYING } else { "" }].concat()
+        }),
         grips: if is_hinted { grips() } else { Vec::new() },
     }
 }

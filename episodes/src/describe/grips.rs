@@ -59,7 +59,7 @@ fn pinched() -> Vec<WorkedGrip> {
             stand_behind_m: Some(0.32),
             ..grip(
                 "the edge of a plate of 30 mm, as of a table: thumb under it (thinner or thicker: y of place_m is 0.017 and the thickness)",
-                "the lower edge",
+                "the lower edge; of a round plate 0.24 m apart, both straight ahead",
                 PALMS_DOWN,
                 [0.085, 0.047, 0.0],
                 vec![[0.14, 0.03, 0.0], [0.0, 0.03, 0.0]],

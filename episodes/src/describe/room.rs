@@ -1,28 +1,70 @@
-//! What somebody in the room would be told of the things in it: how large they are, and about how far from each robot they stand before
-//! the seed moves them.
+//! What somebody in the room would be told of what is in it: how large things are, about how far from each robot they stand before
+//! the seed moves them, and where partners stand.
+
+use std::ops::RangeInclusive;
 
 use tandem_sim::mjcf::{Geom, Primitive};
-use tandem_sim::{ObjectModel, Pose, SimError, Vector};
+use tandem_sim::{ObjectModel, Pose, SimError, Vector, wrapped_rad};
 
 use crate::tasks::{ObjectSpot, RobotSpot, Task};
 
-/// One line for each thing of a task, as "service trolley, 0.45 x 0.85 x 0.95 m: 0.9 m ahead of A, 3.7 m ahead of B".
+/// One line for each thing of a task, as "service trolley, 0.45 x 0.85 x 0.95 m: middle 0.9 m ahead of A, 3.7 m ahead of B (from the
+/// pelvis, give or take 0.32 m)".
 pub fn room(task: &Task) -> Result<Vec<String>, SimError> {
     let line = |spot: &ObjectSpot| {
         let [x_m, y_m, z_m] = size_m(spot)?.to_array();
         let places: Vec<String> = task.robots.iter().map(|robot| place(robot, spot)).collect();
         let name = spot.name.replace('_', " ");
-        Ok(format!("{name}, {x_m:.2} x {y_m:.2} x {z_m:.2} m: {}", places.join(", ")))
+        let places = places.join(", ");
+        Ok(format!(
+            "{name}, {x_m:.2} x {y_m:.2} x {z_m:.2} m: middle {places} (from the pelvis{})",
+            give_or_take(task, spot)
+        ))
     };
-    task.objects.iter().map(line).collect()
+    let things = task.objects.iter().map(line);
+    things.chain(partners(task).into_iter().map(Ok)).collect()
+}
+
+/// Where the others stand, as the first robot has it, as "B begins at [1.26, 0.00] m in A's start frame, turned by 3.14 rad".
+fn partners(task: &Task) -> Vec<String> {
+    let [first, others @ ..] = task.robots else { return Vec::new() };
+    let line = |robot: &RobotSpot| {
+        let (ahead_m, left_m) = seen_from(first, robot.position_m);
+        let turned_rad = wrapped_rad(robot.yaw_rad - first.yaw_rad);
+        let rounded = |part: f32| (part * 100.0).round() / 100.0 + 0.0;
+        format!(
+            "{} begins at [{:.2}, {:.2}] m in {}'s start frame, turned by {:.2} rad",
+            robot.name,
+            rounded(ahead_m),
+            rounded(left_m),
+            first.name,
+            rounded(turned_rad)
+        )
+    };
+    others.iter().map(line).collect()
+}
+
+/// How far a place is ahead of a robot at the start, and to its left.
+fn seen_from(robot: &RobotSpot, [x_m, y_m]: [f32; 2]) -> (f32, f32) {
+    let (east_m, north_m) = (x_m - robot.position_m[0], y_m - robot.position_m[1]);
+    let (sine, cosine) = robot.yaw_rad.sin_cos();
+    (cosine * east_m + sine * north_m, cosine * north_m - sine * east_m)
+}
+
+/// How far the seed may move a thing from there.
+fn give_or_take(task: &Task, spot: &ObjectSpot) -> String {
+    let offsets = task.randomize.iter().filter(|offset| offset.objects.contains(&spot.name));
+    let farthest = |range: &RangeInclusive<f32>| range.start().abs().max(range.end().abs());
+    let [x_m, y_m] = offsets
+        .fold([0.0; 2], |[x_m, y_m], offset| [x_m + farthest(&offset.x_m), y_m + farthest(&offset.y_m)]);
+    let most_m = f32::hypot(x_m, y_m);
+    if most_m < 0.005 { String::new() } else { format!(", give or take {most_m:.2} m") }
 }
 
 /// About where a thing is for a robot at the start.
 fn place(robot: &RobotSpot, spot: &ObjectSpot) -> String {
     let [x_m, y_m, _] = spot.position_m;
-    let (east_m, north_m) = (x_m - robot.position_m[0], y_m - robot.position_m[1]);
-    let (sine, cosine) = robot.yaw_rad.sin_cos();
-    let (ahead_m, left_m) = (cosine * east_m + sine * north_m, cosine * north_m - sine * east_m);
+    let (ahead_m, left_m) = seen_from(robot, [x_m, y_m]);
     let part = |part_m: f32, towards: &str, away: &str| {
         let words = if part_m < 0.0 { away } else { towards };
         (part_m.abs() >= 0.05).then(|| format!("{:.1} m {words} {}", part_m.abs(), robot.name))
@@ -79,18 +121,27 @@ mod tests {
         let lines = |id: &str| room(tasks::find(id).unwrap()).unwrap();
         let cart = lines("cart_service");
         assert!(cart[0].starts_with("service trolley, ") && cart[0].contains("0.9 m ahead of A"), "{cart:?}");
+        assert!(cart[0].ends_with("(from the pelvis, give or take 0.32 m)"), "{cart:?}");
+        let mark = cart.iter().find(|line| line.starts_with("parking mark, ")).unwrap();
+        assert!(mark.ends_with("(from the pelvis)"), "the seed leaves it where it is: {mark}");
         assert!(
             cart.iter().any(|line| line.starts_with("parking mark, ") && line.contains("ahead of B")),
             "{cart:?}"
         );
+        let basket = lines("co_carry");
+        assert_eq!(basket[2], "B begins at [1.26, 0.00] m in A's start frame, turned by -3.14 rad");
         let handover = lines("handover");
         assert!(handover[0].starts_with("bottle, 0.07 x 0.07 x 0."), "{handover:?}");
         for task in tasks::ALL {
             let lines = lines(task.id);
-            assert_eq!(lines.len(), task.objects.len());
-            for line in lines {
+            assert_eq!(lines.len(), task.objects.len() + task.robots.len() - 1);
+            for (index, line) in lines.iter().enumerate() {
                 println!("{}: {line}", task.id);
-                assert!(!line.contains("inf") && !line.contains("NaN") && !line.contains("-"), "{line}");
+                assert!(!line.contains("inf") && !line.contains("NaN"), "{line}");
+                assert!(
+                    index >= task.objects.len() || !line.contains('-'),
+                    "things are ahead or behind: {line}"
+                );
             }
         }
     }

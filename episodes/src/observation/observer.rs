@@ -9,7 +9,8 @@ use tandem_sim::{Step, World};
 use tandem_tools_spec::{DepthReply, DepthRow, PoseFrame, SurfaceQuery};
 
 use super::proprioception::{Detail, Proprioception, calibration, robot_state};
-use super::{Picture, RobotObservation, RobotView, TeamObservation, surface};
+use super::surface::{self, CameraPoses};
+use super::{Picture, RobotObservation, RobotView, TeamObservation};
 use crate::EpisodeError;
 use crate::commands::RobotSheet;
 use crate::convert::{coarse, isometry_from_sim};
@@ -116,7 +117,7 @@ impl Observer {
         Ok(DepthReply {
             robot: name.into(),
             frame: Some(frame).filter(|frame| *frame != PoseFrame::Pelvis),
-            surface: None,
+            surfaces: Vec::new(),
             columns: DepthReply::COLUMNS.map(String::from),
             points: points.collect(),
         })
@@ -130,16 +131,23 @@ impl Observer {
         name: &str,
         query: &SurfaceQuery,
         (frame, pelvis_from_frame): (PoseFrame, Isometry3<f64>),
+        pelvis_from_level: &Isometry3<f64>,
     ) -> Result<DepthReply, EpisodeError> {
         self.check_pixels(step, robot, query.pixel.as_slice())?;
         let view = self.views(step, &[robot]).swap_remove(0);
         let pelvis_from_camera = isometry_from_sim(&step.robots[robot].sensed.pelvis_from_camera);
-        let found = surface::find(&view, query, &(pelvis_from_frame.inverse() * pelvis_from_camera));
-        let surface = found.ok_or(EpisodeError::NoSurface { query: *query })?;
+        let poses = CameraPoses {
+            frame_from_camera: pelvis_from_frame.inverse() * pelvis_from_camera,
+            level_from_camera: pelvis_from_level.inverse() * pelvis_from_camera,
+        };
+        let surfaces = surface::find(&view, query, &poses);
+        if surfaces.is_empty() {
+            return Err(EpisodeError::NoSurface { query: *query });
+        }
         Ok(DepthReply {
             robot: name.into(),
             frame: Some(frame).filter(|frame| *frame != PoseFrame::Pelvis),
-            surface: Some(surface),
+            surfaces,
             columns: DepthReply::COLUMNS.map(String::from),
             points: Vec::new(),
         })

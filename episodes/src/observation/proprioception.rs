@@ -1,17 +1,21 @@
 //! What a robot senses of itself, and its camera's calibration, as replies have them.
 
+use nalgebra::Isometry3;
 use tandem_sim::render::Intrinsics;
-use tandem_sim::{BaseCommand, RobotSensed, RobotStep, Step};
-use tandem_tools_spec::{CameraCalibration, JointValues, Observe, RobotState};
+use tandem_sim::{BaseCommand, Pose, RobotSensed, RobotStep, Step};
+use tandem_tools_spec::{CameraCalibration, JointValues, Observe, PoseFrame, RobotState};
 
+use super::RobotObservation;
 use crate::commands::RobotSheet;
-use crate::convert::{opencv_axes, rounded, wire_base, wire_pose_from_sim, wire_vector};
+use crate::convert::{
+    isometry_from_sim, opencv_axes, rounded, wire_base, wire_pose, wire_pose_from_sim, wire_vector,
+};
 
 /// How much of a state is told.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Detail {
     Full,
-    /// Neither velocities nor torques.
+    /// No joints.
     Short,
 }
 
@@ -50,7 +54,8 @@ pub fn robot_state(own: &Proprioception, sheet: &RobotSheet, detail: Detail) -> 
     RobotState {
         robot: sheet.name.clone(),
         time_s,
-        joint_positions_rad: named(&sensed.joints.q_rad),
+        frame: None,
+        joint_positions_rad: in_full(&sensed.joints.q_rad).unwrap_or_default(),
         joint_velocities_rad_s: in_full(&sensed.joints.qd_rad_s),
         joint_torques_n_m: in_full(&sensed.joints.torque_n_m),
         left_wrist: wire_pose_from_sim(&sensed.pelvis_from_wrist.left),
@@ -75,5 +80,20 @@ pub fn calibration(sensed: &RobotSensed, name: &str, intrinsics: &Intrinsics) ->
         cx: cx.into(),
         cy: cy.into(),
         camera_in_pelvis: wire_pose_from_sim(&opencv_axes(&sensed.pelvis_from_camera)),
+        camera_in_frame: None,
+    }
+}
+
+impl RobotObservation {
+    /// Tells of wrists and camera in `frame`, which is at `pelvis_from_frame`, what the robot has `sensed`.
+    pub fn tell_in(&mut self, frame: PoseFrame, pelvis_from_frame: &Isometry3<f64>, sensed: &RobotSensed) {
+        let in_frame =
+            |pelvis_from: &Pose| wire_pose(&pelvis_from_frame.inv_mul(&isometry_from_sim(pelvis_from)));
+        self.calibration.camera_in_frame = Some(in_frame(&opencv_axes(&sensed.pelvis_from_camera)));
+        if frame != PoseFrame::Pelvis {
+            self.state.frame = Some(frame);
+            self.state.left_wrist = in_frame(&sensed.pelvis_from_wrist.left);
+            self.state.right_wrist = in_frame(&sensed.pelvis_from_wrist.right);
+        }
     }
 }

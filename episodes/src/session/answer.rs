@@ -3,7 +3,7 @@
 use tandem_sim::Pose;
 use tandem_tools_spec::{
     ActCall, CommandReply, EndReason, Formats, Look, LookCall, LookReply, ManageCall, ManageReply, Observe,
-    RobotReport, SpecError, StopReason, TalkCall, TalkReply, ToolCall, ToolReply,
+    PoseFrame, RobotReport, SpecError, StopReason, TalkCall, TalkReply, ToolCall, ToolReply,
 };
 
 use super::Session;
@@ -114,7 +114,10 @@ impl Session {
                 let frame = (frame, motion.pelvis_from(frame));
                 let name = &motion.robot.name;
                 LookReply::QueryDepth(match &args.surface {
-                    Some(query) => self.observer.surface(&self.present, robot, name, query, frame)?,
+                    Some(query) => {
+                        let level = motion.pelvis_from(PoseFrame::Level);
+                        self.observer.surface(&self.present, robot, name, query, frame, &level)?
+                    }
                     None => self.observer.depth(&self.present, robot, name, &args.named(), frame)?,
                 })
             }
@@ -134,7 +137,14 @@ impl Session {
     ) -> Result<TeamObservation, EpisodeError> {
         let robots = self.looked_through(args, formats)?;
         let sheets: Vec<&RobotSheet> = self.motions.iter().map(|motion| &motion.robot).collect();
-        Ok(self.observer.observe(&self.present, &robots, &sheets, Detail::of(args)))
+        let mut seen = self.observer.observe(&self.present, &robots, &sheets, Detail::of(args));
+        if let Some(frame) = args.frame {
+            for (observed, robot) in seen.robots.iter_mut().zip(robots) {
+                let sensed = &self.present.robots[robot].sensed;
+                observed.tell_in(frame, &self.motions[robot].pelvis_from(frame), sensed);
+            }
+        }
+        Ok(seen)
     }
 
     /// Whether an observation can be made as asked.

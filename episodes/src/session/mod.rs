@@ -209,6 +209,7 @@ impl Session {
     /// was clamped.
     fn run(&mut self, command: &Command) -> Result<(u32, Vec<Clamped>), EpisodeError> {
         let left = self.steps_left();
+        self.motions.iter_mut().for_each(Motion::begin_command);
         let mut trajectories: Vec<Trajectory> = self.motions.iter().map(|_| Trajectory::Hold).collect();
         let mut clamped = Vec::with_capacity(command.orders.len());
         for order in &command.orders {

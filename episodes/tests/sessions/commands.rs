@@ -155,7 +155,7 @@ fn depth_finds_the_bottle_where_it_is() {
     let label = pelvis_from_bottle * Vector::new(0.0, 0.0, 0.09);
 
     let ToolReply::Look(LookReply::Observe(seen)) =
-        session.call(Observe { robots: Some(vec!["A".into()]), short: None }.into()).unwrap()
+        session.call(Observe { robots: Some(vec!["A".into()]), short: None, frame: None }.into()).unwrap()
     else {
         panic!("no observation")
     };
@@ -269,7 +269,7 @@ fn episodes_go_the_same_way_whoever_draws() {
         let spec = EpisodeSpec { renderer, ..spec("handover", 5, Protocol::Benchmark) };
         let mut session = Session::start(&spec, None).unwrap();
         for _ in 0..2 {
-            session.call(Observe { robots: None, short: None }.into()).unwrap();
+            session.call(Observe { robots: None, short: None, frame: None }.into()).unwrap();
             command(&mut session, raise_hand(10));
         }
         session.close().state_hash

@@ -95,6 +95,42 @@ fn a_plan_that_cannot_be_carried_out_moves_nothing() {
     assert!(refused.contains("this episode has no plans"), "{refused}");
 }
 
+/// A plan's commands are what the tools take, `short` among it: the reply is short where the last command asked for that.
+#[test]
+fn commands_of_a_plan_may_ask_for_short_replies() {
+    let mut session = agentic();
+    let wait =
+        |short: serde_json::Value| json!({ "tool": "wait", "arguments": { "steps": 2, "short": short } });
+    let target = |reply: &PlanReply| reply.last.robots[A].left.target;
+    let full =
+        plan(&mut session, "send_plan", json!({ "commands": [wait(json!(true)), wait(json!(false))] }))
+            .unwrap();
+    assert!(target(&full).is_some(), "{full:?}");
+    let short =
+        plan(&mut session, "send_plan", json!({ "commands": [wait(json!(null)), wait(json!(true))] }))
+            .unwrap();
+    assert!(target(&short).is_none(), "{short:?}");
+    // Each command counts as a call, and the reply says so.
+    assert_eq!((full.commands, full.tool_calls, short.tool_calls), (2, 2, 4));
+    assert_eq!(session.result().tool_calls, 4);
+    let refused = plan(&mut session, "send_plan", json!({ "commands": [wait(json!("yes"))] })).unwrap_err();
+    assert!(refused.contains("commands[0]") && refused.contains("short"), "{refused}");
+}
+
+/// Two robots stand; one of them has nothing to say.
+#[test]
+fn a_robot_that_did_nothing_is_told_of_in_a_line() {
+    let mut session = agentic();
+    let back = json!({ "steps": 400, "short": true, "robots": [{ "robot": "A", "to_m": [-0.3, 0.0] }] });
+    let reply = plan(&mut session, "walk_to", back).unwrap();
+    let [a, b] = &reply.last.robots[..] else { panic!("{reply:?}") };
+    assert!(a.pelvis_in_start.is_some(), "{a:?}");
+    let idle = json!({ "state": "idle" });
+    let told = json!(b);
+    assert_eq!((&told["left"], &told["right"]), (&idle, &idle), "{told}");
+    assert!(told.get("pelvis_in_start").is_none() && told.to_string().len() < 160, "{told}");
+}
+
 /// Back from the counter, to the side and turned: by odometry alone, and as the simulator has it.
 #[test]
 fn a_robot_walks_to_a_place() {
@@ -103,6 +139,8 @@ fn a_robot_walks_to_a_place() {
     let to = json!({ "steps": 1200, "robots": [{ "robot": "A", "to_m": [-0.5, 0.3], "heading_rad": 0.8 }] });
     let reply = plan(&mut session, "walk_to", to).unwrap();
     assert_eq!(reply.stopped, None, "{reply:?}");
+    let base = reply.last.robots[A].base.unwrap();
+    assert!(base.commanded_height_m.is_none(), "it stands as high as it was told: {base:?}");
     assert!(reply.executed_steps < 700 && reply.commands > 10, "{reply:?}");
     let moved = began.inverse() * session.facts().robots[A].pelvis_in_world;
     let off_m = (moved.translation.x + 0.5).hypot(moved.translation.y - 0.3);

@@ -19,7 +19,8 @@ from .base import BaseEpisode, Observation, Stepped
 from .client import Client, RemoteEpisode
 from .contract.arguments import JointChunk, PixelRegion, WalkMove, WristMove
 from .contract.commands import CommandReply
-from .contract.replies import DepthReply, ReachReply, ResultReply, RobotState, StatusReply
+from .contract.depth import DepthReply
+from .contract.replies import ReachReply, ResultReply, RobotState, StatusReply
 from .contract.start import Briefing, TaskList
 from .episode import Episode
 from .errors import EpisodeEnded, Refused, SimulatorFailed, TandemError, Unreachable

@@ -136,7 +136,7 @@ class BaseEpisode(Tools):
         """Looks through the robots' head cameras, 320 by 240 pixels, and reads what they sense. Costs no steps.
 
         robots: Those to look through. None: all of them.
-        short: True: without joint velocities and torques.
+        short: True: without joint angles, velocities and torques.
         depth: True: with depth at every pixel, which only the benchmark protocol allows.
         """
 

@@ -79,10 +79,10 @@ def check_pictures(tools):
 
 def check_chunks(tools):
     """One call steps and returns what is seen then; a repeated one steps once."""
-    state = call(f"{tools}/observe", {"short": True})
+    state = call(f"{tools}/observe", {})
     for number in range(5):
         chunks = [{"robot": robot["robot"], "rows": standing_rows(robot, 20).tolist()} for robot in state["states"]]
-        body = {"robots": chunks, "expected_step": state["step"], "observe": {"images": "rgb", "short": True}}
+        body = {"robots": chunks, "expected_step": state["step"], "observe": {"images": "rgb"}}
         key = {"idempotency-key": str(uuid.uuid4())}
         reply = call(f"{tools}/send_joint_chunk", body, **key)
         assert call(f"{tools}/send_joint_chunk", body, **key) == reply
@@ -103,7 +103,7 @@ def check_operators(server):
 
     def drive(robot, token):
         for _ in range(10):
-            seen = call(f"{tools}/observe", {"short": True}, token)
+            seen = call(f"{tools}/observe", {}, token)
             assert [state["robot"] for state in seen["states"]] == [robot]
             rows = standing_rows(seen["states"][0], 10).tolist()
             call(f"{tools}/say", {"text": f"{robot} is ready."}, token)

@@ -97,17 +97,25 @@ pub struct BaseReport {
     /// that is less than 2 cm. Something pulled or pushed it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub displaced_m: Option<[f64; 2]>,
+    /// True where it took a step during the command though it was told to stand, after arms that reach far or what pulls at them; left out
+    /// otherwise.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub stepped: bool,
+}
+
+fn is_false(flag: &bool) -> bool {
+    !flag
 }
 
 /// Whether a base stands or steps, and why.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BaseState {
-    /// Both feet stay where they are.
+    /// Both feet stay where they are, and the pelvis is as high as it gets.
     Standing,
     /// It walks as it was told to.
     Stepping,
-    /// It was told to stop walking and still steps.
+    /// It was told to stop walking and still steps, or its pelvis still rises or sinks to the height that it was told.
     Settling,
     /// It steps though nobody told it to: what its hands hold or touch, or a partner, pulls or pushes it.
     Pushed,
@@ -159,19 +167,20 @@ pub struct HandReport {
     /// Its fingers; left out of a short reply where they have arrived.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fingers: Option<FingerReport>,
-    /// The joint of this arm and hand that works hardest; left out of a short reply where it works at less than four fifths of its limit,
-    /// and where the assistance is "paper".
+    /// The joint of this arm and hand that works hardest; left out of a short reply where it works at less than four fifths of its limit
+    /// or is of a finger, as of each that presses, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub largest_effort: Option<Effort>,
     /// Force of the world on the hand in newtons, [x, y, z] in the pelvis frame, as the arm's own joints feel it: a hand that holds
-    /// 0.5 kg feels about -4.9 along z, one that presses ahead on something a negative x. What moving the arm takes is not counted. Left
-    /// out of a short reply where it is less than 1 N, and where the assistance is "paper".
+    /// 0.5 kg feels about -4.9 along z, one that presses ahead on something a negative x. What moving the arm takes is not counted; an arm
+    /// that hangs free may feel up to 5 N of its own friction. Left out of a short reply where it is less than 1 N, of an arm that keeps
+    /// its joints and holds nothing less than 6 N, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_n: Option<[f64; 3]>,
     /// Joints of this arm and hand whose target lay beyond a limit and was moved to it; left out where there are none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joints_clamped: Vec<String>,
-    /// Joints of this arm that rest at a limit; left out where there are none.
+    /// Joints of this arm that rest at a limit; left out where there are none, and of a short reply where the state is "arrived" or "idle".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub joints_at_limit: Vec<String>,
 }
@@ -204,7 +213,8 @@ pub enum Touch {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum HandState {
-    /// There: a wrist within 5 mm and 0.05 rad, every finger joint within 0.06 rad.
+    /// There: a wrist within 5 mm and 0.05 rad, or of a hand that holds something, under which its arm sags, within 15 mm and 0.15 rad;
+    /// every finger joint within 0.06 rad.
     Arrived,
     /// A wrist without a target, whose arm keeps its joints as it was told to.
     Idle,

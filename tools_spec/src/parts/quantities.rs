@@ -15,10 +15,15 @@ pub struct Pose {
 
 /// One number per joint, in the robot's published joint order; JSON object from joint name to number. JSON carries them
 /// to four decimals, which a model reads in a third of the text; MessagePack, which programs ask for, to six.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct JointValues(pub Vec<(String, f64)>);
 
 impl JointValues {
+    /// Whether it has no joint.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
     /// The value of one joint.
     pub fn get(&self, joint: &str) -> Option<f64> {
         self.0.iter().find(|(name, _)| name == joint).map(|(_, value)| *value)

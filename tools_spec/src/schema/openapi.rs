@@ -80,12 +80,8 @@ fn paths_without_tools() -> Map<String, Value> {
     let of_episode = "The tools of a running episode: each with its route and with the schema of its body, which says how \
         many control steps the episode's protocol allows for one command.";
     let of_episode = operation("list_episode_tools", of_episode, "200", specs.clone());
-    let home = text(
-        "home",
-        "A page with the episodes that the caller may know of, and where to go on.",
-        "text/html",
-    );
-    let docs = text("docs", "This description as a page.", "text/html");
+    let home = page("home", "A page with the episodes that the caller may know of, and where to go on.");
+    let docs = page("docs", "This description as a page.");
     let metrics =
         text("metrics", "What the server has done and does, in the text format of Prometheus.", "text/plain");
     let paths = [
@@ -117,6 +113,15 @@ fn list_tools(specs: Value) -> Value {
         "schema": { "type": "string", "enum": Format::ALL.map(Format::name) },
     }]);
     list
+}
+
+/// A page, which is a few lines of text for who does not accept `text/html`.
+fn page(id: &str, description: &str) -> Value {
+    let description =
+        format!("{description} For a call that does not accept text/html, a few lines of text.");
+    let mut operation = text(id, &description, "text/html");
+    operation["responses"]["200"]["content"]["text/plain"] = json!({ "schema": { "type": "string" } });
+    operation
 }
 
 /// What is answered with a text that has no schema.

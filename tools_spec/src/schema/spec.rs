@@ -19,6 +19,9 @@ pub struct ToolSpec {
     pub description: String,
     /// Strict JSON Schema of the arguments, with `episode_id` where the tool acts on an episode.
     pub input_schema: Map<String, Value>,
+    /// The same with the defaults of what may be left out.
+    #[serde(skip)]
+    with_defaults: Map<String, Value>,
     /// As [`ToolSpec::body_schema`], where what counts control steps is only marked.
     #[serde(skip)]
     marked_body: Value,
@@ -62,21 +65,24 @@ impl ToolSpec {
     pub fn on_episode<T: Tool>(wording: Wording, for_operators: bool) -> ToolSpec {
         let mut spec = ToolSpec::without_episode::<T>(wording);
         if spec.input_schema["properties"].get(SHORT).is_none() {
-            require_short(&mut spec.input_schema);
+            require_short(&mut spec.input_schema, false);
+            require_short(&mut spec.with_defaults, true);
             spec.marked_body["properties"][SHORT] =
-                json!({ "type": ["boolean", "null"], "description": SHORTLY });
+                json!({ "type": ["boolean", "null"], "description": SHORTLY, "default": false });
         }
         require_episode_id(&mut spec.input_schema);
+        require_episode_id(&mut spec.with_defaults);
         ToolSpec { on_episode: true, for_operators, ..spec }
     }
 
     /// The specification of `T`, which needs no episode.
     pub fn without_episode<T: Tool>(wording: Wording) -> ToolSpec {
-        let (description, input_schema) = strict_schema::<T>(wording);
+        let (description, input_schema) = strict_schema::<T>(wording, false);
         ToolSpec {
             name: T::NAME,
             description,
             input_schema,
+            with_defaults: strict_schema::<T>(wording, true).1,
             marked_body: body_schema::<T>(wording),
             reply_schema: plain_schema::<T::Reply>(),
             read_only: T::READ_ONLY,
@@ -109,25 +115,16 @@ impl ToolSpec {
         schema
     }
 
-    /// The strict schema with one thing let go: what may be null is left out instead. For hosts that check arguments against the
+    /// The strict schema with one thing let go: what may be null is left out instead, and has its default. For hosts that check arguments against the
     /// schema and do not insist on strictness, as those of MCP.
     pub fn lenient_schema(&self) -> Map<String, Value> {
-        self.leaving_out(true)
+        leaving_out(&self.with_defaults, true)
     }
 
     /// A strict schema for hosts that limit both how many fields of all tools may be left out and how many may be of two types:
     /// the call's own fields may be null, those of the entries of its lists may be left out.
     pub fn few_unions_schema(&self) -> Map<String, Value> {
-        self.leaving_out(false)
-    }
-
-    fn leaving_out(&self, own_fields: bool) -> Map<String, Value> {
-        let mut schema = Value::Object(self.input_schema.clone());
-        leave_out(&mut schema, own_fields);
-        if let (true, Value::Array(required)) = (own_fields, &mut schema["required"]) {
-            required.retain(|name| name != SHORT);
-        }
-        schema.as_object_mut().map(std::mem::take).unwrap_or_default()
+        leaving_out(&self.input_schema, false)
     }
 
     /// The tool as the running episode `id` with these `robots` has it.
@@ -137,4 +134,13 @@ impl ToolSpec {
         let route = Route::of_episode(id, self.name);
         EpisodeToolSpec { spec: ToolSpec { route, ..self }, body_schema }
     }
+}
+
+fn leaving_out(schema: &Map<String, Value>, own_fields: bool) -> Map<String, Value> {
+    let mut schema = Value::Object(schema.clone());
+    leave_out(&mut schema, own_fields);
+    if let (true, Value::Array(required)) = (own_fields, &mut schema["required"]) {
+        required.retain(|name| name != SHORT);
+    }
+    schema.as_object_mut().map(std::mem::take).unwrap_or_default()
 }

@@ -12,7 +12,6 @@ use crate::parts::Wording;
 const DROPPED: &[&str] = &[
     "$schema",
     "title",
-    "default",
     "format",
     "minimum",
     "maximum",
@@ -32,9 +31,12 @@ const DROPPED: &[&str] = &[
     "most_steps",
 ];
 
-/// The description of `T` and its schema without it.
-pub fn strict_schema<T: JsonSchema>(wording: Wording) -> (String, Map<String, Value>) {
+/// The description of `T` and its schema without it, with or without defaults, which strict hosts refuse.
+pub fn strict_schema<T: JsonSchema>(wording: Wording, defaults: bool) -> (String, Map<String, Value>) {
     let mut schema = argument_schema::<T>(wording);
+    if !defaults {
+        drop_defaults(&mut schema);
+    }
     make_strict(&mut schema);
     let mut object = schema.as_object_mut().map(std::mem::take).unwrap_or_default();
     let description = match object.remove("description") {
@@ -49,9 +51,13 @@ pub const SHORT: &str = "short";
 pub const SHORTLY: &str = "True: a shorter reply, without what is as it should be.";
 
 /// Adds the field by which a tool is asked for a short reply. Strict hosts limit how many fields may be null, so it may not.
-pub fn require_short(schema: &mut Map<String, Value>) {
+pub fn require_short(schema: &mut Map<String, Value>, default: bool) {
+    let mut short = json!({ "type": "boolean", "description": SHORTLY });
+    if default {
+        short["default"] = false.into();
+    }
     if let Some(Value::Object(properties)) = schema.get_mut("properties") {
-        properties.insert(SHORT.into(), json!({ "type": "boolean", "description": SHORTLY }));
+        properties.insert(SHORT.into(), short);
     }
     if let Some(Value::Array(required)) = schema.get_mut("required") {
         required.push(json!(SHORT));
@@ -66,6 +72,17 @@ pub fn require_episode_id(schema: &mut Map<String, Value>) {
     }
     if let Some(Value::Array(required)) = schema.get_mut("required") {
         required.insert(0, json!("episode_id"));
+    }
+}
+
+fn drop_defaults(schema: &mut Value) {
+    match schema {
+        Value::Array(items) => items.iter_mut().for_each(drop_defaults),
+        Value::Object(object) => {
+            object.remove("default");
+            object.values_mut().for_each(drop_defaults);
+        }
+        _ => {}
     }
 }
 

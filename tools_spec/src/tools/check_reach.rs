@@ -31,7 +31,7 @@ pub struct CheckReach {
     #[schemars(extend("contains" = limits::direction()))]
     pub right_quaternion_wxyz: Option<[f64; 4]>,
     /// The frame of the poses: "pelvis", "level" or "start". Null: "pelvis".
-    #[schemars(extend("full_only" = true))]
+    #[schemars(extend("full_only" = true, "default" = PoseFrame::Pelvis))]
     pub frame: Option<PoseFrame>,
 }
 
@@ -86,9 +86,17 @@ pub struct ReachReply {
     pub left: Option<HandReach>,
     /// How near the right wrist comes; null if it was given no pose.
     pub right: Option<HandReach>,
+    /// Whether the robot would most likely take a step to keep its balance, as arms ahead of it weigh: walk nearer instead. Left out where
+    /// it would not, and where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub needs_a_step: bool,
     /// Joints of the waist and of the arms asked about that would rest at a limit, by name: what keeps the wrists from
     /// coming nearer.
     pub joints_at_limit: Vec<String>,
+}
+
+fn is_false(flag: &bool) -> bool {
+    !flag
 }
 
 /// How near one wrist comes to a pose.

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::limits;
-use crate::parts::{BaseCommand, JointValues, Pose};
+use crate::parts::{BaseCommand, JointValues, Pose, PoseFrame};
 use crate::tool::Tool;
 
 /// Read one robot's proprioception: 43 joint angles, velocities and torques by name, both wrist poses in the pelvis
@@ -41,17 +41,21 @@ pub struct RobotState {
     pub robot: String,
     /// Simulated seconds since the episode began.
     pub time_s: f64,
-    /// Joint angles in radians.
+    /// The frame of the wrists where the call named another than that of the pelvis; left out otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame: Option<PoseFrame>,
+    /// Joint angles in radians; left out of a short reply.
+    #[serde(default, skip_serializing_if = "JointValues::is_empty")]
     pub joint_positions_rad: JointValues,
-    /// Joint velocities in radians per second; left out of observe's short form, and where the assistance is "paper".
+    /// Joint velocities in radians per second; left out of a short reply, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint_velocities_rad_s: Option<JointValues>,
-    /// Joint torques in newton metres, as the drives apply them; left out of observe's short form, and where the assistance is "paper".
+    /// Joint torques in newton metres, as the drives apply them; left out of a short reply, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint_torques_n_m: Option<JointValues>,
-    /// Measured pose of the left wrist (`left_wrist_yaw_link`) in the pelvis frame (x forward, y left, z up).
+    /// Measured pose of the left wrist (`left_wrist_yaw_link`) in the pelvis frame (x forward, y left, z up), or in `frame`.
     pub left_wrist: Pose,
-    /// Measured pose of the right wrist (`right_wrist_yaw_link`) in the pelvis frame.
+    /// Measured pose of the right wrist (`right_wrist_yaw_link`) in the same frame.
     pub right_wrist: Pose,
     /// The direction of gravity in the pelvis frame, length 1: [0, 0, -1] when upright. Left out where the assistance is
     /// "paper".

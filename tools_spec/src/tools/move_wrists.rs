@@ -62,10 +62,11 @@ pub struct WristMove {
     pub right_quaternion_wxyz: Option<[f64; 4]>,
     /// The frame of the wrist poses of this entry: "pelvis"; "level", upright in the pelvis; or "start", which stays in the room while
     /// the robot moves: in it a target may be sent again and again without moving with a pelvis that was pushed. Null: "pelvis".
-    #[schemars(extend("full_only" = true))]
+    #[schemars(extend("full_only" = true, "default" = PoseFrame::Pelvis))]
     pub frame: Option<PoseFrame>,
     /// True: the wrist targets move with the pelvis from the command's beginning on, as a robot that carries something wants
     /// it. False or null: they are fixed in the world.
+    #[schemars(extend("default" = false))]
     pub carried: Option<bool>,
     /// How both hands give way to what pulls or pushes them along the way that the robot faces, as a partner at the other end of
     /// a load does: at 1 m/s under as many newtons, up to 6 cm. 250 suits two robots that walk with a load; at least 50.
@@ -89,10 +90,13 @@ pub struct WristMove {
     #[schemars(extend("hint" = "Closed around a bottle: [0, -0.75, -0.8, 1.1, 1.3, 1.1, 1.3]; open: [0, 0.3, 0, 0, 0, 0, 0]."))]
     pub right_fingers_rad: Option<[f64; 7]>,
     /// Forward velocity in metres per second during this command. Null: 0.
+    #[schemars(extend("default" = 0))]
     pub vx_m_s: Option<f64>,
     /// Velocity to the left in metres per second during this command. Null: 0.
+    #[schemars(extend("default" = 0))]
     pub vy_m_s: Option<f64>,
     /// Turning rate in radians per second during this command, counter-clockwise seen from above. Null: 0.
+    #[schemars(extend("default" = 0))]
     pub yaw_rate_rad_s: Option<f64>,
     /// Height of the pelvis above the floor in metres, for a robot that stands; while it steps it may be lower.
     /// Null: the target stays.

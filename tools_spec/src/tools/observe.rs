@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize, ser::SerializeStruct};
 use super::get_robot_state::RobotState;
 use crate::checks;
 use crate::limits;
-use crate::parts::{CameraArrays, Png, Pose};
+use crate::parts::{CameraArrays, Png, Pose, PoseFrame};
 use crate::tool::Tool;
 
 /// Look through the robots' own head cameras and read their proprioception. Returns for each robot the same numbers as
@@ -22,9 +22,12 @@ pub struct Observe {
         extend("uniqueItems" = true)
     )]
     pub robots: Option<Vec<String>>,
-    /// True: without joint velocities and torques, which halves the text. False or null: with them.
-    #[schemars(extend("paper" = "Null: what it would leave out is not told here."))]
+    /// True: without joint angles, velocities and torques, most of the text. False or null: with them.
+    #[schemars(extend("paper" = "True: without joint angles, most of the text. False or null: with them.", "default" = false))]
     pub short: Option<bool>,
+    /// The frame of the wrists, and of the camera's pose beside that in the pelvis frame: "pelvis", "level" or "start". Null: "pelvis".
+    #[schemars(extend("full_only" = true, "default" = PoseFrame::Pelvis))]
+    pub frame: Option<PoseFrame>,
 }
 
 impl Tool for Observe {
@@ -33,7 +36,7 @@ impl Tool for Observe {
     const READ_ONLY: bool = true;
 
     fn example() -> Self {
-        Observe { robots: Some(vec!["A".into()]), short: Some(true) }
+        Observe { robots: Some(vec!["A".into()]), short: Some(true), frame: None }
     }
 
     fn robots(&self) -> Vec<&str> {
@@ -86,6 +89,9 @@ pub struct CameraCalibration {
     pub cy: f64,
     /// Pose of the camera's frame in the robot's pelvis frame (x forward, y left, z up).
     pub camera_in_pelvis: Pose,
+    /// The same in the frame that the call named; left out where it named none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_in_frame: Option<Pose>,
 }
 
 /// One picture. In MessagePack, the file is called `png` and no base64.

@@ -25,12 +25,12 @@ pub struct QueryDepth {
     pub pixels: Option<Vec<[i64; 2]>>,
     /// Pixels of a rectangle, row by row, at most 256 of them. Null: those of `pixels`.
     pub region: Option<PixelRegion>,
-    /// A surface to find, whose middle, size and corners are told in place of points: give pixel, [u, v] of a place on it, or color, as
-    /// "red": then it is the largest of that colour.
+    /// A surface to find, whose middle, size, corners and, where it is upright and round, axis are told in place of points: give pixel,
+    /// [u, v] of a place on it, for the patch of its colour and the whole thing, or color, as "red", for the nearest three of that colour.
     #[schemars(extend("full_only" = true))]
     pub surface: Option<SurfaceQuery>,
     /// The frame of the points: "pelvis", "level" or "start". Null: "pelvis".
-    #[schemars(extend("full_only" = true))]
+    #[schemars(extend("full_only" = true, "default" = PoseFrame::Pelvis))]
     pub frame: Option<PoseFrame>,
 }
 
@@ -80,11 +80,11 @@ impl Tool for QueryDepth {
     }
 }
 
-/// A surface in a picture: what is joined to a pixel, or the largest of a colour.
+/// A surface in a picture: what is joined to a pixel, or the nearest of a colour.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceQuery {
-    /// A pixel on it, as [160, 120]. Null: the largest of `color`.
+    /// A pixel on it, as [160, 120]. Null: the nearest of `color`.
     #[schemars(extend("prefixItems" = limits::pixel_range()))]
     pub pixel: Option<[i64; 2]>,
     /// Its colour. Null: that of `pixel`.
@@ -132,9 +132,32 @@ impl JsonSchema for Color {
     }
 }
 
+/// By what pixels are joined to a surface. Neighbours of it are of about the same depth always.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum JoinedBy {
+    /// By like colour.
+    Color,
+    /// By shape, whatever the colours: over edges that stand out, not over corners that go in, as where a thing stands on a table.
+    Shape,
+}
+
+/// The axis of a thing that is upright and round, as a bottle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct UprightAxis {
+    /// Its lower end as far as that is seen, [x, y, z] in metres in the frame of the reply.
+    pub bottom_m: [f64; 3],
+    /// Its upper end.
+    pub top_m: [f64; 3],
+    /// The radius of most of it, in metres.
+    pub radius_m: f64,
+}
+
 /// A surface as the camera sees it: only what is in view, and of a thing only its near side.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Surface {
+    /// By what its pixels are joined.
+    pub joined_by: JoinedBy,
     /// How many pixels it has.
     pub pixels: u32,
     /// Its top left and bottom right in the picture, as [u, v].
@@ -143,12 +166,15 @@ pub struct Surface {
     pub to: [i64; 2],
     /// Its mean colour, [red, green, blue] from 0 to 255.
     pub rgb: [u8; 3],
-    /// The mean of its points, in metres in the frame of the reply.
+    /// The middle of its area, in metres in the frame of the reply.
     pub centroid_m: [f64; 3],
     /// How far it reaches along each axis of that frame, in metres.
     pub extent_m: [f64; 3],
     /// The four points of its outline that span the most of it in the picture, in the order of its outline: of a rectangle its corners.
     pub corners_m: Vec<[f64; 3]>,
+    /// Its axis, where it is upright and round; left out otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axis: Option<UprightAxis>,
     /// Whether it goes on beyond the picture.
     pub cut_off: bool,
 }
@@ -161,9 +187,10 @@ pub struct DepthReply {
     /// The frame of the points, where the call named another than that of the pelvis; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame: Option<PoseFrame>,
-    /// The surface that was asked for, and that was found; left out otherwise.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub surface: Option<Surface>,
+    /// The surfaces that were found: at a pixel the patch of its colour and, where that is more, the whole thing; of a colour up to three,
+    /// the nearest first and what is of the room last. Left out where none was asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub surfaces: Vec<Surface>,
     /// What each column of `points` is: "u", "v", "x_m", "y_m", "z_m".
     pub columns: [String; 5],
     /// One row per pixel asked for, in the same order; of a region row by row. Millimetres; null where nothing is seen. Of a surface

@@ -1,4 +1,4 @@
-//! `send_plan`: several commands in one call. `episodes/src/session/plan.rs` carries it out.
+//! `send_plan`: several commands in one call. `episodes/src/session/plan/` carries it out.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -11,8 +11,8 @@ use crate::tools::{MoveWrists, SendJointChunk, Wait, Walk};
 /// The most commands of a plan.
 const MOST_COMMANDS: usize = 20;
 
-/// Carry out up to 20 commands one after another, each as if it had been called by itself: with its own steps, counted and recorded by
-/// itself. The plan stops after the first command after which something that it `expects` is not so. The reply is that of the last command
+/// Carry out up to 20 commands one after another, each as if it had been called by itself: with its own steps, recorded and counted as a
+/// tool call. The plan stops after the first command after which something that it `expects` is not so. The reply is that of the last command
 /// carried out, with how many were and why no more. If any command could not be carried out, none is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -29,7 +29,7 @@ pub struct PlannedCommand {
     /// "move_wrists", "walk", "wait" or "send_joint_chunk".
     #[schemars(extend("enum" = SendPlan::COMMANDS))]
     pub tool: String,
-    /// The arguments of that tool.
+    /// The arguments of that tool, without episode_id.
     pub arguments: Map<String, Value>,
     /// What has to be so afterwards for the plan to go on. Null: nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -55,7 +55,7 @@ pub struct Expectation {
     /// That this phase has been reached, as "p1".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub phase_reached: Option<String>,
-    /// Whether a robot steps.
+    /// Whether a robot steps, or settles after it was told to walk.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base_stepping: Option<bool>,
 }
@@ -112,8 +112,10 @@ impl Tool for SendPlan {
 /// The reply to `send_plan` and `walk_to`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PlanReply {
-    /// Commands that were carried out.
+    /// Commands that were carried out. Each counts as a tool call of the episode.
     pub commands: u32,
+    /// Tool calls of the episode so far.
+    pub tool_calls: u32,
     /// Control steps of 20 ms that they took together.
     pub executed_steps: u32,
     /// Why no more were; null where all was done.

@@ -1,4 +1,4 @@
-//! `walk_to`: walks to a place by the robot's own odometry. `episodes/src/session/walk_to.rs` carries it out as a row of `walk`.
+//! `walk_to`: walks to a place by the robot's own odometry. `episodes/src/session/plan/` carries it out as a row of commands.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -11,13 +11,14 @@ use crate::tools::PlanReply;
 /// The most control steps of one call: thirty seconds.
 const MOST_STEPS: u32 = 1500;
 
-/// Walk to places in the start frame, looking at odometry on the way: arms keep their joints and go along. It is carried out as commands
-/// of walk and wait, each counted and recorded by itself, until every robot stands within 4 cm and 0.05 rad of its place, one gets no
-/// nearer, or the steps are used up. It walks straight and looks at nothing: go round what stands in the way by places in between.
+/// Walk to places in the start frame, looking at odometry on the way: arms keep their joints and go along, or push and carry with `carry`.
+/// It is carried out as short commands, each recorded and counted as a tool call, until every robot stands within 4 cm and 0.05 rad of
+/// its place (15 cm and 0.1 rad where it carries, its hands nearer), one gets no nearer, or the steps are used up. It walks straight and looks at nothing:
+/// go round what stands in the way by places in between.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WalkTo {
-    /// The most control steps of 20 ms to take, up to 1500. A metre takes about 250.
+    /// The most control steps of 20 ms to take, up to 1500. A metre takes about 250, where robots carry 450.
     #[schemars(range(min = 1, max = MOST_STEPS))]
     pub steps: u32,
     /// One entry per robot that is to walk; each robot at most once. Robots that are not named hold still.
@@ -36,6 +37,11 @@ pub struct Destination {
     pub to_m: [f64; 2],
     /// Which way it is to face, in radians counter-clockwise from how it faced at the start. Null: as it faces now.
     pub heading_rad: Option<f64>,
+    /// True: it pushes or carries what its hands hold. Wrists stay where they are to it and as high over the floor though its pelvis sinks
+    /// as it walks, and lead it by what it lags, up to 20 cm. Robots of one call that carry go at one pace of 0.2 m/s and give way to each other
+    /// (compliance_n_s_m 250), so that several carry one load: give each its place in its own start frame. Null: false.
+    #[schemars(extend("default" = false))]
+    pub carry: Option<bool>,
 }
 
 impl Tool for WalkTo {
@@ -47,7 +53,12 @@ impl Tool for WalkTo {
     fn example() -> Self {
         WalkTo {
             steps: 500,
-            robots: vec![Destination { robot: "A".into(), to_m: [-0.2, 0.1], heading_rad: Some(0.0) }],
+            robots: vec![Destination {
+                robot: "A".into(),
+                to_m: [-0.2, 0.1],
+                heading_rad: Some(0.0),
+                carry: None,
+            }],
         }
     }
 

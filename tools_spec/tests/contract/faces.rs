@@ -123,9 +123,53 @@ fn what_may_be_null_may_be_left_out_but_of_the_strict_schema() {
     check("start_episode", "/required", json!(["task", "seed"]));
     check("move_wrists", "/required", json!(["episode_id", "steps", "robots"]));
     check("move_wrists", "/properties/robots/items/required", json!(["robot"]));
-    assert_eq!(json!(spec("observe").input_schema)["required"], json!(["episode_id", "robots", "short"]));
+    assert_eq!(
+        json!(spec("observe").input_schema)["required"],
+        json!(["episode_id", "robots", "short", "frame"])
+    );
     let body = |name: &str| spec(name).body_schema(50)["required"].clone();
     assert_eq!((body("query_depth"), body("observe")), (json!(["robot"]), Value::Null));
+}
+
+/// Schemas that need not be strict say what stands for what is left out; strict hosts refuse that.
+#[test]
+fn what_may_be_left_out_has_its_default() {
+    let entry = "/properties/robots/items/properties";
+    for (name, place, default) in [
+        ("wait", "/properties/short", json!(false)),
+        ("observe", "/properties/short", json!(false)),
+        ("observe", "/properties/frame", json!("pelvis")),
+        ("move_wrists", &format!("{entry}/carried"), json!(false)),
+        ("move_wrists", &format!("{entry}/vx_m_s"), json!(0)),
+        ("walk_to", &format!("{entry}/carry"), json!(false)),
+    ] {
+        let spec = spec(name);
+        for schema in [json!(spec.lenient_schema()), spec.body_schema(50)] {
+            assert_eq!(
+                schema.pointer(place).map(|field| &field["default"]),
+                Some(&default),
+                "{name} {place}"
+            );
+        }
+        assert!(!json!(spec.few_unions_schema()).to_string().contains("\"default\""), "{name}");
+    }
+}
+
+/// Arguments that are shown to a caller are such as its schema has them: with the episode where it is named there, and without null.
+#[test]
+fn examples_fit_the_schemas() {
+    for name in ["check_reach", "move_wrists", "query_depth", "walk_to", "observe"] {
+        let refused = tandem_tools_spec::Call::parse(name, json!({ "nothing": 1 })).unwrap_err();
+        let named = refused.naming_episode("handover-seed0").to_string();
+        let example: Value =
+            serde_json::from_str(named.split("arguments that work: ").nth(1).unwrap()).unwrap();
+        assert_eq!(example["episode_id"], "handover-seed0", "{named}");
+        assert!(!example.to_string().contains("null"), "{named}");
+        let schema = json!(spec(name).lenient_schema());
+        for field in example.as_object().into_iter().flat_map(Map::keys) {
+            assert!(schema["properties"].get(field).is_some(), "{field}: {schema}");
+        }
+    }
 }
 
 #[test]

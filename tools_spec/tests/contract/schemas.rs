@@ -87,7 +87,7 @@ fn the_two_lists_name_the_same_tools() {
 #[test]
 fn calls_survive_the_wire() {
     let calls = [
-        ("observe", json!({ "robots": null, "short": true })),
+        ("observe", json!({ "robots": null, "short": true, "frame": null })),
         ("get_robot_state", json!({ "robot": "B" })),
         (
             "query_depth",

@@ -5,7 +5,7 @@ mod feel;
 use nalgebra::Isometry3;
 use tandem_sim::{HAND_JOINTS, Pose, RobotSensed, Side, UPPER, Vector};
 use tandem_tools_spec::{
-    BaseMotion, Effort, FingerReport, HandReport, HandState, PoseFrame, RobotReport, Touch,
+    BaseMotion, Effort, FingerReport, Grip, HandReport, HandState, PoseFrame, RobotReport, Touch,
 };
 
 use super::columns::{self, Clamped};
@@ -21,6 +21,8 @@ const FINGER_MOVES_RAD_S: f32 = 0.2;
 /// An arm without a wrist target that is farther from what its joints stand for has been pushed.
 const PUSHED_AWAY_M: f64 = 0.03;
 const PUSHED_AWAY_RAD: f64 = 0.15;
+/// A hand that holds something has arrived within so many times the tolerance of others.
+const HOLDING_FACTOR: f64 = 3.0;
 /// A hand that is blocked and feels this much touches something.
 const TOUCHED_N: f32 = 3.0;
 /// Fingers that are free come this near to their targets.
@@ -137,21 +139,25 @@ pub fn wrist_state(
             (true, false) => HandState::Blocked,
         };
     }
-    if is_near(measured, target) {
+    let near = |factor: f64| is_near(measured, target, factor);
+    // Under its load an arm sags.
+    if near(1.0) || (near(HOLDING_FACTOR) && feel::grip(side, sensed, &motion.robot.model).0 == Grip::Holding)
+    {
         HandState::Arrived
     } else if motion.comes_nearer(side).unwrap_or_else(turns) {
         HandState::Moving
-    } else if is_near(&motion.commanded_wrists()[side], target) {
+    } else if is_near(&motion.commanded_wrists()[side], target, 1.0) {
         HandState::Blocked
     } else {
         HandState::OutOfReach
     }
 }
 
-fn is_near(wrist: &Isometry3<f64>, target: &Isometry3<f64>) -> bool {
+/// Whether a wrist is within the tolerance by this factor.
+fn is_near(wrist: &Isometry3<f64>, target: &Isometry3<f64>, factor: f64) -> bool {
     let missing = wrist.inv_mul(target);
-    missing.translation.vector.norm() <= REACH_TOLERANCE.position_m
-        && missing.rotation.angle() <= REACH_TOLERANCE.orientation_rad
+    missing.translation.vector.norm() <= factor * REACH_TOLERANCE.position_m
+        && missing.rotation.angle() <= factor * REACH_TOLERANCE.orientation_rad
 }
 
 fn fingers(side: Side, sensed: &RobotSensed, motion: &Motion) -> FingerReport {

@@ -1,13 +1,15 @@
 //! Several commands by one call. Each is made, counted and recorded by itself, so that a recording holds nothing of plans.
 
+mod carry;
 mod walk_to;
 
 use tandem_tools_spec::{
     ActCall, BaseState, Call, CommandReply, Expectation, HandReport, HandState, PlanCall, PlanReply,
-    RobotReport, SendPlan, SpecError, StopReason, Tool as _, ToolCall, ToolReply,
+    PlanStep, RobotReport, SendPlan, SpecError, StopReason, Tool as _, ToolCall, ToolReply,
 };
 
 use super::Session;
+use super::told::shorten_report;
 use crate::EpisodeError;
 use crate::commands::{Called, Command};
 use crate::output::OutputError;
@@ -19,6 +21,8 @@ struct PlanProgress {
     commands: u32,
     executed_steps: u32,
     last: Option<CommandReply>,
+    /// Whether the last reply was asked for as a short one.
+    is_short: bool,
 }
 
 impl Session {
@@ -67,7 +71,7 @@ impl Session {
     fn check_commands(&self, plan: &SendPlan) -> Result<(), EpisodeError> {
         plan.calls()?
             .iter()
-            .try_for_each(|(call, _)| Command::read(call, &self.rules, &self.motions).map(drop))
+            .try_for_each(|step| Command::read(&step.call, &self.rules, &self.motions).map(drop))
     }
 
     fn carry_out_commands(
@@ -76,16 +80,30 @@ impl Session {
         plan: &SendPlan,
     ) -> Result<PlanReply, EpisodeError> {
         let mut progress = PlanProgress::default();
-        for (index, (call, expected)) in plan.calls()?.into_iter().enumerate() {
+        for (index, PlanStep { call, expects, short }) in plan.calls()?.into_iter().enumerate() {
+            progress.is_short = short;
             let why = match self.make_planned(caller, call, &mut progress)? {
-                Ok(reply) => unexpected(&expected, reply),
+                Ok(reply) => unexpected(&expects, reply),
                 Err(why) => Some(why),
             };
             if let Some(why) = why {
-                return progress.reply(Some(format!("after commands[{index}]: {why}")));
+                return self.plan_reply(progress, Some(format!("after commands[{index}]: {why}")));
             }
         }
-        progress.reply(None)
+        self.plan_reply(progress, None)
+    }
+
+    /// The reply to a plan of which at least one command has been made, and why no more were.
+    fn plan_reply(&self, progress: PlanProgress, stopped: Option<String>) -> Result<PlanReply, EpisodeError> {
+        let PlanProgress { commands, executed_steps, last, is_short } = progress;
+        let mut last = last.ok_or_else(|| SpecError::Invalid {
+            tool: SendPlan::NAME,
+            reason: "no command was made; give at least one".into(),
+        })?;
+        if is_short {
+            shorten_report(&mut last);
+        }
+        Ok(PlanReply { commands, tool_calls: self.tool_calls, executed_steps, stopped, last })
     }
 
     /// Makes one command of a plan. What keeps the first from being made refuses the plan; later, and where the episode ends, it is why
@@ -119,16 +137,6 @@ impl PlanProgress {
     /// Control steps so far.
     fn executed_steps(&self) -> u32 {
         self.executed_steps
-    }
-
-    /// The reply to the plan, of which at least one command has been made.
-    fn reply(self, stopped: Option<String>) -> Result<PlanReply, EpisodeError> {
-        let PlanProgress { commands, executed_steps, last } = self;
-        let last = last.ok_or_else(|| SpecError::Invalid {
-            tool: SendPlan::NAME,
-            reason: "no command was made; give at least one".into(),
-        })?;
-        Ok(PlanReply { commands, executed_steps, stopped, last })
     }
 }
 

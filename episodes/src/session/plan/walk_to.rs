@@ -15,7 +15,7 @@ use crate::session::Session;
 
 /// Control steps of one walk: about half a cycle of the gait. The pelvis sways from side to side once a cycle, so that the mean of two
 /// moments that are half a cycle apart knows nothing of it.
-const WALK_STEPS: u32 = 13;
+pub const WALK_STEPS: u32 = 13;
 /// Speed by what is missing, and the most of it: ahead, back, to the sides; turning.
 const GAIN_1_S: f64 = 0.7;
 const AHEAD_M_S: f64 = 0.3;
@@ -60,6 +60,9 @@ impl Session {
 
     /// Walks until every robot stands at its place.
     pub(super) fn walk_to(&mut self, caller: CallerRecord, walk: &WalkTo) -> Result<PlanReply, EpisodeError> {
+        if walk.robots.iter().any(|entry| entry.carry == Some(true)) {
+            return self.carry_to(caller, walk);
+        }
         let walkers = walk.robots.iter().map(|entry| self.walker(entry));
         let mut walkers: Vec<Walker> = walkers.collect::<Result<_, _>>()?;
         let mut progress = PlanProgress::default();
@@ -67,7 +70,8 @@ impl Session {
         loop {
             let left = walk.steps.saturating_sub(progress.executed_steps());
             if left == 0 {
-                return progress.reply(Some(format!("the steps are used up; {}", self.how_far(&walkers))));
+                let why = format!("the steps are used up; {}", self.how_far(&walkers));
+                return self.plan_reply(progress, Some(why));
             }
             let steps = left.min(WALK_STEPS);
             let moves: Vec<WalkMove> =
@@ -79,9 +83,9 @@ impl Session {
                 ActCall::Wait(Wait { steps })
             };
             let stands = match self.make_planned(caller, call, &mut progress)? {
-                Err(why) => return progress.reply(Some(why)),
+                Err(why) => return self.plan_reply(progress, Some(why)),
                 Ok(reply) if reply.fallen.iter().any(|robot| robot.fallen) => {
-                    return progress.reply(Some("a robot has fallen".into()));
+                    return self.plan_reply(progress, Some("a robot has fallen".into()));
                 }
                 Ok(reply) => reply.robots.iter().all(|robot| {
                     robot.base.and_then(|base| base.state).is_none_or(|state| state == BaseState::Standing)
@@ -89,22 +93,23 @@ impl Session {
             };
             if let Some(walker) = walkers.iter().find(|walker| walker.walks > PATIENCE_WALKS) {
                 let name = walker.name.clone();
-                return progress.reply(Some(format!(
+                let why = format!(
                     "{name} gets no nearer: something is in its way or holds it; {}",
                     self.how_far(&walkers)
-                )));
+                );
+                return self.plan_reply(progress, Some(why));
             }
             if walks || !stands {
                 continue;
             }
             let off: Vec<bool> = walkers.iter().map(|walker| !self.is_there(walker)).collect();
             if !off.contains(&true) {
-                return progress.reply(None);
+                return self.plan_reply(progress, None);
             }
             attempts += 1;
             if attempts == ATTEMPTS {
-                return progress
-                    .reply(Some(format!("it came no nearer than this; {}", self.how_far(&walkers))));
+                let why = format!("it came no nearer than this; {}", self.how_far(&walkers));
+                return self.plan_reply(progress, Some(why));
             }
             for (walker, off) in walkers.iter_mut().zip(off) {
                 (walker.rests, walker.before_m, walker.walks) = (!off, None, 0);
@@ -190,12 +195,12 @@ impl Session {
     }
 }
 
-fn heading_rad(start_from_pelvis: &Pose) -> f64 {
+pub fn heading_rad(start_from_pelvis: &Pose) -> f64 {
     let ahead = isometry_from_sim(start_from_pelvis).rotation * Vector3::x();
     ahead.y.atan2(ahead.x)
 }
 
 /// The same angle from -pi to pi.
-fn wrapped(angle_rad: f64) -> f64 {
+pub fn wrapped(angle_rad: f64) -> f64 {
     (angle_rad + PI).rem_euclid(2.0 * PI) - PI
 }

@@ -3,7 +3,7 @@
 
 mod short;
 
-pub use short::shorten;
+pub use short::{shorten, shorten_report};
 
 use std::collections::BTreeMap;
 
@@ -133,10 +133,9 @@ impl Answer {
                 ToolReply::Plan(reply) => withhold_report(&mut reply.last),
                 ToolReply::Look(LookReply::GetRobotState(state)) => withhold_state(state),
                 ToolReply::Look(LookReply::Observe(seen)) => seen.states.iter_mut().for_each(withhold_state),
-                // What is asked about a pixel or a pose, and how the episode stands, which is told as it is to be.
-                ToolReply::Look(LookReply::QueryDepth(_) | LookReply::CheckReach(_))
-                | ToolReply::Manage(_)
-                | ToolReply::Talk(_) => {}
+                ToolReply::Look(LookReply::CheckReach(reach)) => reach.needs_a_step = false,
+                // What is asked about a pixel, and how the episode stands, which is told as it is to be.
+                ToolReply::Look(LookReply::QueryDepth(_)) | ToolReply::Manage(_) | ToolReply::Talk(_) => {}
             },
         }
     }
@@ -164,6 +163,8 @@ fn withhold_state(state: &mut RobotState) {
     let RobotState {
         robot: _,
         time_s: _,
+        // Other frames are refused.
+        frame: _,
         joint_positions_rad: _,
         joint_velocities_rad_s,
         joint_torques_n_m,
@@ -254,7 +255,8 @@ impl Session {
             ToolCall::Look(LookCall::QueryDepth(args)) => vec![args.frame],
             ToolCall::Look(LookCall::CheckReach(args)) => vec![args.frame],
             ToolCall::Act(ActCall::MoveWrists(args)) => args.robots.iter().map(|entry| entry.frame).collect(),
-            ToolCall::Look(LookCall::Observe(_) | LookCall::GetRobotState(_))
+            ToolCall::Look(LookCall::Observe(args)) => vec![args.frame],
+            ToolCall::Look(LookCall::GetRobotState(_))
             | ToolCall::Act(ActCall::Walk(_) | ActCall::SendJointChunk(_) | ActCall::Wait(_))
             | ToolCall::Manage(_)
             | ToolCall::Talk(_) => Vec::new(),

@@ -1,13 +1,15 @@
 //! Replies as a language model wants to read them: without what is as it should be.
 
 use tandem_tools_spec::{
-    BaseMotion, CommandReply, FingerReport, Grip, HandReport, HandState, LookReply, ManageReply, RobotReport,
-    RobotState, StatusReply, ToolReply,
+    BaseMotion, CommandReply, FingerReport, Grip, HandReport, HandState, LookReply, ManageReply, Pose,
+    RobotReport, RobotState, StatusReply, ToolReply,
 };
 
 /// What is less is not worth a word: metres and radians, newtons, the share of a joint's effort.
 const MOVED: f64 = 0.01;
 const FELT_N: f64 = 1.0;
+/// What an arm that hangs free may feel of its own friction.
+const HANGING_N: f64 = 6.0;
 const HARD_SHARE: f64 = 0.8;
 
 /// Takes out of a reply what its caller can do without.
@@ -26,28 +28,40 @@ pub fn shorten(reply: &mut ToolReply) {
 }
 
 fn shorten_state(state: &mut RobotState) {
+    state.joint_positions_rad.0.clear();
     (state.joint_velocities_rad_s, state.joint_torques_n_m) = (None, None);
 }
 
-fn shorten_report(reply: &mut CommandReply) {
+/// As [`shorten`], of the reply to a command.
+pub fn shorten_report(reply: &mut CommandReply) {
     reply.fallen.retain(|robot| robot.fallen);
-    for RobotReport { left, right, base_motion, .. } in &mut reply.robots {
+    for RobotReport { left, right, base_motion, pelvis_in_start, .. } in &mut reply.robots {
         let is_small = |motion: &BaseMotion| {
             [motion.forward_m, motion.left_m, motion.up_m, motion.turned_rad]
                 .iter()
                 .all(|part| part.abs() < MOVED)
         };
         *base_motion = base_motion.filter(|motion| !is_small(motion));
+        // One that has not left its place is where it was when the episode began.
+        pelvis_in_start.take_if(|pelvis| is_at_start(pelvis));
         shorten_hand(left);
         shorten_hand(right);
     }
 }
 
+fn is_at_start(start_from_pelvis: &Pose) -> bool {
+    let ([x_m, y_m, _], [w, .., z]) = (start_from_pelvis.position_m, start_from_pelvis.quaternion_wxyz);
+    x_m.hypot(y_m) < MOVED && 2.0 * z.atan2(w).abs() < MOVED
+}
+
 fn shorten_hand(hand: &mut HandReport) {
     hand.target = None;
+    let is_free = hand.state == Some(HandState::Idle) && hand.grip.is_none_or(|grip| grip == Grip::None);
+    let felt_n = if is_free { HANGING_N } else { FELT_N };
     if let Some(HandState::Arrived | HandState::Idle) = hand.state {
         hand.measured = None;
         (hand.position_error_m, hand.orientation_error_rad) = (None, None);
+        hand.joints_at_limit.clear();
     }
     if let Some(FingerReport { state, target_rad, .. }) = &mut hand.fingers {
         *target_rad = None;
@@ -56,13 +70,14 @@ fn shorten_hand(hand: &mut HandReport) {
         }
     }
     hand.grip = hand.grip.filter(|grip| *grip != Grip::None);
-    hand.largest_effort.take_if(|effort| effort.share < HARD_SHARE);
-    hand.force_n.take_if(|force_n| force_n.iter().map(|part| part * part).sum::<f64>().sqrt() < FELT_N);
+    hand.largest_effort.take_if(|effort| effort.share < HARD_SHARE || effort.joint.contains("_hand_"));
+    hand.force_n.take_if(|force_n| force_n.iter().map(|part| part * part).sum::<f64>().sqrt() < felt_n);
 }
 
 #[cfg(test)]
 mod tests {
     use serde_json::json;
+    use tandem_tools_spec::Effort;
 
     use super::*;
 
@@ -84,8 +99,16 @@ mod tests {
             shorten_hand(&mut hand);
             json!(hand)
         };
-        assert_eq!(left(hand("idle", 0.4)), json!({ "state": "idle" }));
+        for hangs_n in [0.4, 5.0] {
+            assert_eq!(left(hand("idle", hangs_n)), json!({ "state": "idle" }));
+        }
+        assert_eq!(left(hand("idle", 7.0))["force_n"], json!([0.0, 0.0, 7.0]));
+        let at_limit = HandReport { joints_at_limit: vec!["right_elbow_joint".into()], ..hand("idle", 0.0) };
+        assert_eq!(left(at_limit), json!({ "state": "idle" }));
         assert_eq!(left(hand("arrived", -4.9)), json!({ "state": "arrived", "force_n": [0.0, 0.0, -4.9] }));
+        let presses = Effort { joint: "right_hand_thumb_1_joint".into(), share: 1.0 };
+        let presses = left(HandReport { largest_effort: Some(presses), ..hand("arrived", -4.9) });
+        assert!(presses.get("largest_effort").is_none(), "{presses}");
         let blocked = left(hand("blocked", 9.0));
         assert_eq!((&blocked["position_error_m"], &blocked["target"]), (&json!(0.02), &json!(null)));
         // Where nothing says that a hand is where it should be, it is told where it is.

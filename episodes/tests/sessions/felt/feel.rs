@@ -124,6 +124,18 @@ fn a_base_says_what_it_does_and_where_it_will_rest() {
     assert!(walking.pelvis_height_m < 0.69 && walking.commanded_height_m.is_some(), "{walking:?}");
     let settling = wait(&mut session, 5).robots[B].base.unwrap();
     assert_eq!(settling.state, Some(BaseState::Settling));
+    let mut stands_after = 0;
+    loop {
+        let base = wait(&mut session, 2).robots[B].base.unwrap();
+        stands_after += 1;
+        assert!(stands_after < 75, "it never stands: {base:?}");
+        if base.state == Some(BaseState::Standing) {
+            // What it sees then is not seen from a pelvis that still rises.
+            assert!((base.pelvis_height_m - 0.76).abs() < 0.021, "{base:?}");
+            break;
+        }
+        assert_eq!(base.state, Some(BaseState::Settling));
+    }
     for _ in 0..4 {
         wait(&mut session, 50);
     }
@@ -136,6 +148,62 @@ fn a_base_says_what_it_does_and_where_it_will_rest() {
         assert!(off_m < 0.05, "{off_m} m off: {told:?}, and it rests at {rests_m:?}");
     }
     assert_eq!(session.facts().robots.len(), 2);
+}
+
+/// Both arms far ahead weigh so much that a robot steps; one does not. Before, the robot is asked; afterwards it says so.
+#[test]
+fn a_reach_says_whether_it_takes_a_step() {
+    for (reach_m, height_m, hands, steps) in [
+        (0.30, 0.15, 2, false),
+        (0.40, 0.15, 1, false),
+        (0.45, 0.35, 1, false),
+        (0.40, 0.15, 2, true),
+        (0.36, 0.35, 2, true),
+    ] {
+        let mut session = start("co_carry", 2012, Protocol::Agentic);
+        let pose = serde_json::json!({
+            "robot": "B", "right_position_m": [reach_m, -0.15, height_m], "right_quaternion_wxyz": [1, 0, 0, 0],
+            "left_position_m": if hands == 2 { Some([reach_m, 0.15, height_m]) } else { None },
+            "left_quaternion_wxyz": if hands == 2 { Some([1, 0, 0, 0]) } else { None },
+        });
+        let ask = |session: &mut Session, tool: &str, args: serde_json::Value| {
+            serde_json::json!(session.ask(None, Call::parse(tool, args).unwrap()).unwrap().reply)
+        };
+        let reach = ask(&mut session, "check_reach", pose.clone());
+        let mut stepped = false;
+        for _ in 0..3 {
+            let args = serde_json::json!({ "steps": 25, "robots": [pose.clone()] });
+            stepped |= ask(&mut session, "move_wrists", args)["robots"][0]["base"]["stepped"] == true;
+        }
+        let case = format!("{hands} hands at {reach_m} m: {reach}");
+        assert_eq!(reach["needs_a_step"] == true, steps, "{case}");
+        assert_eq!(stepped, steps, "{case}");
+    }
+}
+
+/// An observation tells of wrists and camera in the frame that it is asked for.
+#[test]
+fn an_observation_is_told_in_the_frame_that_it_names() {
+    let mut session = handover(2011);
+    let mut look = |frame: Option<&str>| {
+        let call =
+            Call::parse("observe", serde_json::json!({ "robots": ["A"], "short": true, "frame": frame }))
+                .unwrap();
+        serde_json::json!(session.ask(None, call).unwrap().reply)
+    };
+    let (pelvis, start) = (look(None), look(Some("start")));
+    let part = |reply: &serde_json::Value, of: &str, pose: &str| {
+        let position_m = &reply[of][0][pose]["position_m"];
+        std::array::from_fn::<f64, 3, _>(|i| position_m[i].as_f64().unwrap())
+    };
+    assert_eq!((pelvis["states"][0].get("frame"), &start["states"][0]["frame"]), (None, &"start".into()));
+    assert!(pelvis["states"][0].get("joint_positions_rad").is_none(), "a short one has no joints");
+    let (own, room) = (part(&pelvis, "states", "right_wrist"), part(&start, "states", "right_wrist"));
+    assert!((room[2] - own[2] - 0.76).abs() < 0.02 && (room[0] - own[0]).abs() < 0.05, "{own:?} {room:?}");
+    let (own, room) =
+        (part(&start, "cameras", "camera_in_pelvis"), part(&start, "cameras", "camera_in_frame"));
+    assert!((room[2] - own[2] - 0.76).abs() < 0.02, "{own:?} {room:?}");
+    assert!(pelvis["cameras"][0].get("camera_in_frame").is_none());
 }
 
 /// A target in the start frame stays where it is while its robot walks and turns; one in the level frame is where gravity and the robot's

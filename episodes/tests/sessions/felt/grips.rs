@@ -12,18 +12,18 @@ use tandem_tools_spec::{Call, CommandReply, Grip, Protocol, ToolReply, WorkedGri
 use crate::common::*;
 
 /// A thing to grip: in a task, by hands of a robot at places of an object, facing along a heading in the object's frame.
-struct Trial {
-    thing: &'static str,
-    task: &'static str,
-    robot: usize,
-    object: &'static str,
-    places: &'static [(Side, &'static str)],
-    heading_rad: f64,
+pub struct Trial {
+    pub thing: &'static str,
+    pub task: &'static str,
+    pub robot: usize,
+    pub object: &'static str,
+    pub places: &'static [(Side, &'static str)],
+    pub heading_rad: f64,
     /// Whether the robot has to walk there.
-    walks: bool,
+    pub walks: bool,
 }
 
-fn isometry(pose: &Pose) -> Isometry3<f64> {
+pub fn isometry(pose: &Pose) -> Isometry3<f64> {
     let (t, r) = (pose.translation, pose.rotation);
     let [w, x, y, z] = [r.w, r.x, r.y, r.z].map(f64::from);
     Isometry3::from_parts(
@@ -32,13 +32,13 @@ fn isometry(pose: &Pose) -> Isometry3<f64> {
     )
 }
 
-fn heading_rad(pose: &Isometry3<f64>) -> f64 {
+pub fn heading_rad(pose: &Isometry3<f64>) -> f64 {
     let ahead = pose.rotation * Vector3::x();
     ahead.y.atan2(ahead.x)
 }
 
 /// At the same place, but upright.
-fn upright(pose: &Isometry3<f64>) -> Isometry3<f64> {
+pub fn upright(pose: &Isometry3<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(
         pose.translation,
         UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading_rad(pose)),
@@ -132,8 +132,13 @@ impl Trial {
         self.places.iter().map(|(side, _)| facts.object(self.object).hands[self.robot][*side]).collect()
     }
 
-    fn run(&self) {
-        let mut session = start(self.task, 2012, Protocol::Agentic);
+    /// Whether all hands hold the thing.
+    pub fn holds(&self, session: &Session) -> bool {
+        self.hands(session).iter().all(|hand| *hand == Truth::Holding)
+    }
+
+    /// Takes the thing by the grip that the brief has for it, in a session that has just begun. Returns the grip, and what was told last.
+    pub fn take(&self, session: &mut Session) -> (WorkedGrip, CommandReply) {
         let grips = session.briefing().brief.grips;
         let grip = grips
             .iter()
@@ -141,23 +146,30 @@ impl Trial {
             .unwrap_or_else(|| panic!("{}", self.thing));
         let began = isometry(&session.facts().robots[self.robot].pelvis_in_world);
         if self.walks {
-            self.walk(&mut session, &began, grip);
+            self.walk(session, &began, grip);
         }
         if let Some(height_m) = grip.pelvis_height_m {
             let low = json!({ "steps": 25, "robots": [{
                 "robot": self.name(), "vx_m_s": 0, "vy_m_s": 0, "yaw_rate_rad_s": 0, "pelvis_height_m": height_m,
             }] });
             for _ in 0..4 {
-                self.ask(&mut session, "walk", low.clone());
+                self.ask(session, "walk", low.clone());
             }
         }
         for stop_m in &grip.stops_m {
-            self.move_hands(&mut session, grip, Some(*stop_m), &grip.open_rad, 3);
+            self.move_hands(session, grip, Some(*stop_m), &grip.open_rad, 3);
         }
-        self.move_hands(&mut session, grip, Some([0.0; 3]), &grip.open_rad, 3);
-        self.move_hands(&mut session, grip, None, &grip.close_rad, 2);
-        wait(&mut session, 20);
-        let told = self.move_hands(&mut session, grip, None, &grip.close_rad, 1);
+        self.move_hands(session, grip, Some([0.0; 3]), &grip.open_rad, 3);
+        self.move_hands(session, grip, None, &grip.close_rad, 2);
+        wait(session, 20);
+        let told = self.move_hands(session, grip, None, &grip.close_rad, 1);
+        (grip.clone(), told)
+    }
+
+    fn run(&self) {
+        let mut session = start(self.task, 2012, Protocol::Agentic);
+        let (grip, told) = self.take(&mut session);
+        let grip = &grip;
         let report = &told.robots[0];
         let says: Vec<_> = self
             .places
@@ -167,11 +179,7 @@ impl Trial {
                 Side::Right => report.right.grip,
             })
             .collect();
-        assert!(
-            self.hands(&session).iter().all(|hand| *hand == Truth::Holding),
-            "{}: {report:#?}",
-            self.thing
-        );
+        assert!(self.holds(&session), "{}: {report:#?}", self.thing);
         assert!(says.iter().all(|grip| *grip == Some(Grip::Holding)), "{}: {report:#?}", self.thing);
         self.move_hands(&mut session, grip, None, &grip.open_rad, 2);
         for stop_m in grip.stops_m.iter().rev() {

@@ -1,5 +1,7 @@
-//! What robots feel, what they tell of it, and grips that are carried out by what policies are told.
+//! What robots feel and see, what they tell of it, and what is done by what policies are told alone: grips, and loads that are carried.
 
+mod carries;
 mod feel;
 mod grips;
 mod hands;
+mod surfaces;

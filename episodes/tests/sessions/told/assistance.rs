@@ -89,11 +89,14 @@ const FULL: &[(&str, &str)] = &[
 ];
 
 /// As [`PAPER_AT_TIMES`], under `full`.
-const FULL_AT_TIMES: &[(&str, &str)] = &[(
-    "command",
-    "robots.frame robots.SIDE.touches robots.SIDE.compliance_offset_m robots.base.commanded_height_m robots.base.comes_to_rest_m \
-     robots.base.displaced_m",
-)];
+const FULL_AT_TIMES: &[(&str, &str)] = &[
+    (
+        "command",
+        "robots.frame robots.SIDE.touches robots.SIDE.compliance_offset_m robots.base.commanded_height_m \
+         robots.base.comes_to_rest_m robots.base.displaced_m robots.base.stepped",
+    ),
+    ("check_reach", "needs_a_step"),
+];
 
 /// Fields by tool.
 type Told = BTreeMap<String, BTreeSet<String>>;
@@ -164,7 +167,7 @@ impl Episode for Listening {
         if self.commands % 8 == 1 {
             let looks: [ToolCall; 5] = [
                 GetRobotState { robot: "A".into() }.into(),
-                Observe { robots: None, short: None }.into(),
+                Observe { robots: None, short: None, frame: None }.into(),
                 QueryDepth::example().into(),
                 CheckReach::example().into(),
                 GetStatus {}.into(),
@@ -219,7 +222,7 @@ fn what_is_shown_beyond_the_benchmark_is_counted() {
     use tandem_tools_spec::ExtraInformation::{Odometry, ThirdPerson};
     let spec = spec("handover", 0, Protocol::Benchmark).assisted(Assistance::Paper);
     let mut episode = InProcess::new(Session::start(&spec, None).unwrap());
-    let look = Observe { robots: None, short: Some(true) };
+    let look = Observe { robots: None, short: Some(true), frame: None };
     let seen = episode.observe(&look, &[]).unwrap();
     assert!(seen.robots[0].state.pelvis_in_start.is_some(), "who asks a policy knows it");
     let ToolReply::Act(reply) = episode.carry_out(Wait { steps: 1 }.into()).unwrap() else { panic!() };

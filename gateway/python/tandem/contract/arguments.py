@@ -60,6 +60,13 @@ class Destination:
     heading_rad: float | None = None
     """Which way it is to face, in radians counter-clockwise from how it faced at the start. None: as it faces now."""
 
+    carry: bool | None = None
+    """True: it pushes or carries what its hands hold. Wrists stay where they are to it and as high over the floor
+    though its pelvis sinks as it walks, and lead it by what it lags, up to 20 cm. Robots of one call that carry
+    go at one pace of 0.2 m/s and give way to each other (compliance_n_s_m 250), so that several carry one load:
+    give each its place in its own start frame. None: false.
+    """
+
 
 @dataclass(frozen=True)
 class Expectation:
@@ -83,7 +90,7 @@ class Expectation:
     """That this phase has been reached, as "p1"."""
 
     base_stepping: bool | None = None
-    """Whether a robot steps."""
+    """Whether a robot steps, or settles after it was told to walk."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +130,7 @@ class PlannedCommand:
     """"move_wrists", "walk", "wait" or "send_joint_chunk"."""
 
     arguments: Any
-    """The arguments of that tool."""
+    """The arguments of that tool, without episode_id."""
 
     expects: Expectation | None = None
     """What has to be so afterwards for the plan to go on. None: nothing."""
@@ -131,10 +138,10 @@ class PlannedCommand:
 
 @dataclass(frozen=True)
 class SurfaceQuery:
-    """A surface in a picture: what is joined to a pixel, or the largest of a colour."""
+    """A surface in a picture: what is joined to a pixel, or the nearest of a colour."""
 
     pixel: Numbers | None = None
-    """A pixel on it, as [160, 120]. None: the largest of `color`."""
+    """A pixel on it, as [160, 120]. None: the nearest of `color`."""
 
     color: Color | None = None
     """Its colour. None: that of `pixel`."""

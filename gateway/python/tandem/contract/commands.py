@@ -107,6 +107,11 @@ class BaseReport:
     there; left out where that is less than 2 cm. Something pulled or pushed it.
     """
 
+    stepped: bool | None
+    """True where it took a step during the command though it was told to stand, after arms that reach far or what
+    pulls at them; left out otherwise.
+    """
+
     @staticmethod
     def of(value: Mapping[str, Any]) -> BaseReport:
         """Reads what JSON has."""
@@ -116,6 +121,7 @@ class BaseReport:
             commanded_height_m=value.get("commanded_height_m"),
             comes_to_rest_m=None if (got := value.get("comes_to_rest_m")) is None else tuple(got),
             displaced_m=None if (got := value.get("displaced_m")) is None else tuple(got),
+            stepped=value.get("stepped"),
         )
 
 
@@ -275,14 +281,15 @@ class HandReport:
 
     largest_effort: Effort | None
     """The joint of this arm and hand that works hardest; left out of a short reply where it works at less than
-    four fifths of its limit, and where the assistance is "paper".
+    four fifths of its limit or is of a finger, as of each that presses, and where the assistance is "paper".
     """
 
     force_n: tuple[float, float, float] | None
     """Force of the world on the hand in newtons, [x, y, z] in the pelvis frame, as the arm's own joints feel it: a
     hand that holds 0.5 kg feels about -4.9 along z, one that presses ahead on something a negative x. What
-    moving the arm takes is not counted. Left out of a short reply where it is less than 1 N, and where the
-    assistance is "paper".
+    moving the arm takes is not counted; an arm that hangs free may feel up to 5 N of its own friction. Left out
+    of a short reply where it is less than 1 N, of an arm that keeps its joints and holds nothing less than 6 N,
+    and where the assistance is "paper".
     """
 
     joints_clamped: tuple[str, ...]
@@ -291,7 +298,9 @@ class HandReport:
     """
 
     joints_at_limit: tuple[str, ...]
-    """Joints of this arm that rest at a limit; left out where there are none."""
+    """Joints of this arm that rest at a limit; left out where there are none, and of a short reply where the state
+    is "arrived" or "idle".
+    """
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> HandReport:
@@ -341,7 +350,10 @@ class PlanReply:
     """The reply to `send_plan` and `walk_to`."""
 
     commands: int
-    """Commands that were carried out."""
+    """Commands that were carried out. Each counts as a tool call of the episode."""
+
+    tool_calls: int
+    """Tool calls of the episode so far."""
 
     executed_steps: int
     """Control steps of 20 ms that they took together."""
@@ -357,6 +369,7 @@ class PlanReply:
         """Reads what JSON has."""
         return PlanReply(
             commands=value["commands"],
+            tool_calls=value["tool_calls"],
             executed_steps=value["executed_steps"],
             stopped=value.get("stopped"),
             last=CommandReply.of(value["last"]),

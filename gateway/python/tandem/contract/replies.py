@@ -100,6 +100,9 @@ class CameraCalibration:
     camera_in_pelvis: Pose
     """Pose of the camera's frame in the robot's pelvis frame (x forward, y left, z up)."""
 
+    camera_in_frame: Pose | None
+    """The same in the frame that the call named; left out where it named none."""
+
     @staticmethod
     def of(value: Mapping[str, Any]) -> CameraCalibration:
         """Reads what JSON has."""
@@ -112,39 +115,7 @@ class CameraCalibration:
             cx=value["cx"],
             cy=value["cy"],
             camera_in_pelvis=Pose.of(value["camera_in_pelvis"]),
-        )
-
-
-@dataclass(frozen=True)
-class DepthReply:
-    """The reply to `query_depth`."""
-
-    robot: str
-    """The robot whose camera measured."""
-
-    frame: PoseFrame | None
-    """The frame of the points, where the call named another than that of the pelvis; left out otherwise."""
-
-    surface: Surface | None
-    """The surface that was asked for, and that was found; left out otherwise."""
-
-    columns: tuple[str, str, str, str, str]
-    """What each column of `points` is: "u", "v", "x_m", "y_m", "z_m"."""
-
-    points: tuple[tuple[float | None, float | None, float | None, float | None, float | None], ...]
-    """One row per pixel asked for, in the same order; of a region row by row. Millimetres; null where nothing is
-    seen. Of a surface none.
-    """
-
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> DepthReply:
-        """Reads what JSON has."""
-        return DepthReply(
-            robot=value["robot"],
-            frame=value.get("frame"),
-            surface=None if (got := value.get("surface")) is None else Surface.of(got),
-            columns=tuple(value["columns"]),
-            points=tuple(tuple(item) for item in value["points"]),
+            camera_in_frame=None if (got := value.get("camera_in_frame")) is None else Pose.of(got),
         )
 
 
@@ -187,6 +158,11 @@ class ReachReply:
     right: HandReach | None
     """How near the right wrist comes; null if it was given no pose."""
 
+    needs_a_step: bool | None
+    """Whether the robot would most likely take a step to keep its balance, as arms ahead of it weigh: walk nearer
+    instead. Left out where it would not, and where the assistance is "paper".
+    """
+
     joints_at_limit: tuple[str, ...]
     """Joints of the waist and of the arms asked about that would rest at a limit, by name: what keeps the wrists
     from coming nearer.
@@ -200,6 +176,7 @@ class ReachReply:
             reachable=value["reachable"],
             left=None if (got := value.get("left")) is None else HandReach.of(got),
             right=None if (got := value.get("right")) is None else HandReach.of(got),
+            needs_a_step=value.get("needs_a_step"),
             joints_at_limit=tuple(value["joints_at_limit"]),
         )
 
@@ -295,24 +272,27 @@ class RobotState:
     time_s: float
     """Simulated seconds since the episode began."""
 
-    joint_positions_rad: dict[str, float]
-    """Joint angles in radians."""
+    frame: PoseFrame | None
+    """The frame of the wrists where the call named another than that of the pelvis; left out otherwise."""
+
+    joint_positions_rad: dict[str, float] | None
+    """Joint angles in radians; left out of a short reply."""
 
     joint_velocities_rad_s: dict[str, float] | None
-    """Joint velocities in radians per second; left out of observe's short form, and where the assistance is
-    "paper".
-    """
+    """Joint velocities in radians per second; left out of a short reply, and where the assistance is "paper"."""
 
     joint_torques_n_m: dict[str, float] | None
-    """Joint torques in newton metres, as the drives apply them; left out of observe's short form, and where the
+    """Joint torques in newton metres, as the drives apply them; left out of a short reply, and where the
     assistance is "paper".
     """
 
     left_wrist: Pose
-    """Measured pose of the left wrist (`left_wrist_yaw_link`) in the pelvis frame (x forward, y left, z up)."""
+    """Measured pose of the left wrist (`left_wrist_yaw_link`) in the pelvis frame (x forward, y left, z up), or in
+    `frame`.
+    """
 
     right_wrist: Pose
-    """Measured pose of the right wrist (`right_wrist_yaw_link`) in the pelvis frame."""
+    """Measured pose of the right wrist (`right_wrist_yaw_link`) in the same frame."""
 
     gravity_in_pelvis: tuple[float, float, float] | None
     """The direction of gravity in the pelvis frame, length 1: [0, 0, -1] when upright. Left out where the
@@ -337,7 +317,8 @@ class RobotState:
         return RobotState(
             robot=value["robot"],
             time_s=value["time_s"],
-            joint_positions_rad=value["joint_positions_rad"],
+            frame=value.get("frame"),
+            joint_positions_rad=value.get("joint_positions_rad"),
             joint_velocities_rad_s=value.get("joint_velocities_rad_s"),
             joint_torques_n_m=value.get("joint_torques_n_m"),
             left_wrist=Pose.of(value["left_wrist"]),
@@ -407,51 +388,6 @@ class StatusReply:
             phases=tuple(PhaseReached.of(item) for item in value["phases"]),
             budget=Budget.of(value["budget"]),
             state_hash=value["state_hash"],
-        )
-
-
-@dataclass(frozen=True)
-class Surface:
-    """A surface as the camera sees it: only what is in view, and of a thing only its near side."""
-
-    pixels: int
-    """How many pixels it has."""
-
-    from_: tuple[int, int]
-    """Its top left and bottom right in the picture, as [u, v]."""
-
-    to: tuple[int, int]
-    """See `from`."""
-
-    rgb: tuple[int, int, int]
-    """Its mean colour, [red, green, blue] from 0 to 255."""
-
-    centroid_m: tuple[float, float, float]
-    """The mean of its points, in metres in the frame of the reply."""
-
-    extent_m: tuple[float, float, float]
-    """How far it reaches along each axis of that frame, in metres."""
-
-    corners_m: tuple[tuple[float, float, float], ...]
-    """The four points of its outline that span the most of it in the picture, in the order of its outline: of a
-    rectangle its corners.
-    """
-
-    cut_off: bool
-    """Whether it goes on beyond the picture."""
-
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> Surface:
-        """Reads what JSON has."""
-        return Surface(
-            pixels=value["pixels"],
-            from_=tuple(value["from"]),
-            to=tuple(value["to"]),
-            rgb=tuple(value["rgb"]),
-            centroid_m=tuple(value["centroid_m"]),
-            extent_m=tuple(value["extent_m"]),
-            corners_m=tuple(tuple(item) for item in value["corners_m"]),
-            cut_off=value["cut_off"],
         )
 
 

@@ -22,7 +22,8 @@ from .arguments import (
     plain,
 )
 from .commands import CommandReply, PlanReply, PoseFrame
-from .replies import DepthReply, ReachReply, ResultReply, RobotState, StatusReply
+from .depth import DepthReply
+from .replies import ReachReply, ResultReply, RobotState, StatusReply
 
 
 class Tools(ABC):
@@ -65,8 +66,9 @@ class Tools(ABC):
         pixels: Pixels as [u, v]: column 0 to 319 from the left, row 0 to 239 from the top, at most 256 of them.
             Example: [[160, 120], [170, 120]]. None: those of `region`.
         region: Pixels of a rectangle, row by row, at most 256 of them. None: those of `pixels`.
-        surface: A surface to find, whose middle, size and corners are told in place of points: give pixel, [u, v] of
-            a place on it, or color, as "red": then it is the largest of that colour.
+        surface: A surface to find, whose middle, size, corners and, where it is upright and round, axis are told in
+            place of points: give pixel, [u, v] of a place on it, for the patch of its colour and the whole thing, or
+            color, as "red", for the nearest three of that colour.
         frame: The frame of the points: "pelvis", "level" or "start". None: "pelvis".
         """
         arguments: dict[str, Any] = {
@@ -185,9 +187,9 @@ class Tools(ABC):
         commands: Sequence[PlannedCommand],
     ) -> PlanReply:
         """Carry out up to 20 commands one after another, each as if it had been called by itself: with its own
-        steps, counted and recorded by itself. The plan stops after the first command after which something that
-        it `expects` is not so. The reply is that of the last command carried out, with how many were and why no
-        more. If any command could not be carried out, none is.
+        steps, recorded and counted as a tool call. The plan stops after the first command after which something
+        that it `expects` is not so. The reply is that of the last command carried out, with how many were and
+        why no more. If any command could not be carried out, none is.
 
         commands: The commands, at most 20.
         """
@@ -201,12 +203,13 @@ class Tools(ABC):
         steps: int,
         robots: Sequence[Destination],
     ) -> PlanReply:
-        """Walk to places in the start frame, looking at odometry on the way: arms keep their joints and go along.
-        It is carried out as commands of walk and wait, each counted and recorded by itself, until every robot
-        stands within 4 cm and 0.05 rad of its place, one gets no nearer, or the steps are used up. It walks
-        straight and looks at nothing: go round what stands in the way by places in between.
+        """Walk to places in the start frame, looking at odometry on the way: arms keep their joints and go along,
+        or push and carry with `carry`. It is carried out as short commands, each recorded and counted as a tool
+        call, until every robot stands within 4 cm and 0.05 rad of its place (15 cm and 0.1 rad where it
+        carries, its hands nearer), one gets no nearer, or the steps are used up. It walks straight and looks at
+        nothing: go round what stands in the way by places in between.
 
-        steps: The most control steps of 20 ms to take, up to 1500. A metre takes about 250.
+        steps: The most control steps of 20 ms to take, up to 1500. A metre takes about 250, where robots carry 450.
         robots: One entry per robot that is to walk; each robot at most once. Robots that are not named hold still.
         """
         arguments: dict[str, Any] = {

@@ -197,7 +197,8 @@ impl McpServer {
     ) -> Result<Vec<ContentBlock>, ApiError> {
         let handle = args.as_object_mut().and_then(|object| object.shift_remove("episode_id"));
         let asked = args.to_string();
-        let call = Call::parse(name, args).map_err(ApiError::from);
+        let named = handle.as_ref().and_then(Value::as_str).unwrap_or("as start_episode returned it");
+        let call = Call::parse(name, args).map_err(|error| ApiError::from(error.naming_episode(named)));
         let id = match (handle, caller) {
             (Some(Value::String(id)), _) => id,
             // An operator's token says which episode.

@@ -26,6 +26,21 @@ at <code>/mcp</code>, and as specifications for language models at <a href="/v1/
     html::page(&title, &body)
 }
 
+/// Every operation of an OpenAPI document in a line, with the first sentence of what it does.
+pub fn brief(document: &Value) -> String {
+    let mut lines = String::from(
+        "What bodies and replies hold: GET /v1/openapi.json. Arguments of tools: GET /v1/tools.\n",
+    );
+    for (path, methods) in entries(&document["paths"]) {
+        for (method, operation) in entries(methods).filter(|(name, _)| *name != "parameters") {
+            let description = operation["description"].as_str().unwrap_or_default().replace('\n', " ");
+            let sentence = description.split(". ").next().unwrap_or_default().trim_end_matches('.');
+            let _ = writeln!(lines, "{} {path}: {sentence}.", method.to_uppercase());
+        }
+    }
+    lines
+}
+
 /// The section of one operation, folded until its reader opens it.
 fn section(path: &str, method: &str, operation: &Value, shared: &Value) -> String {
     let id = text(&operation["operationId"]);
@@ -136,6 +151,12 @@ mod tests {
                 assert!(page.contains(name.as_str()), "{} {name}", spec.name);
             }
         }
+        let brief = brief(&tandem_tools_spec::openapi("1.2.3", Hints::On, false));
+        let wait = brief
+            .lines()
+            .find(|line| line.starts_with("POST /v1/episodes/{episode_id}/tools/wait: "))
+            .unwrap();
+        assert!(wait.contains("Let all robots hold") && wait.len() < 300 && !brief.contains('<'), "{wait}");
         assert!(page.contains("<code><b>robots[].robot</b></code></td><td>string</td>"));
         assert!(page.contains("<td>array of number or null</td>"));
         assert!(page.contains("<td>agentic, benchmark</td>"));

@@ -32,6 +32,20 @@ pub fn page(version: &str, list: &EpisodeList, caller: &Caller) -> String {
     html::page(&title, &body)
 }
 
+/// What a program finds first.
+pub fn brief(version: &str) -> String {
+    format!(
+        "Tandem {version}: simulated humanoids that must work together.\n\
+         GET  /v1/tasks?short=true             the tasks\n\
+         POST /v1/episodes                     begins one: {{\"task\": \"handover\", \"seed\": 2000}}; the reply says what there is to know\n\
+         GET  /v1/tools                        the tools, as JSON Schema; ?format=openai, anthropic or mcp for their SDKs\n\
+         POST /v1/episodes/{{id}}/tools/{{tool}}   calls one; \"short\": true leaves out of the reply what is as it should be\n\
+         GET  /docs                            every route in a line; GET /v1/openapi.json all of it as OpenAPI\n\
+         GET  /v1/episodes                     the episodes that are held\n\
+         POST /mcp                             the same for MCP hosts\n"
+    )
+}
+
 fn row(entry: &EpisodeEntry) -> String {
     let EpisodeEntry { episode_id, task, seed, protocol, operators, step, ended } = entry;
     let driven = match operators {
@@ -90,6 +104,7 @@ mod tests {
         for foreign in ["<script", "<b>", "src=", "url(", "http://", "https://", "<link"] {
             assert!(!page.contains(foreign), "{foreign}");
         }
+        assert!(brief("1.2.3").contains("POST /v1/episodes/{id}/tools/{tool} "), "{}", brief("1.2.3"));
         let operator = Caller::Operator { episode: "a".into(), robot: "A".into() };
         let page = super::page("1.2.3", &EpisodeList { episodes: Vec::new() }, &operator);
         assert!(

@@ -8,8 +8,8 @@ use axum::{
     Json, Router,
     body::Bytes,
     extract::{Extension, Path, Query, State},
-    http::{StatusCode, header},
-    response::{Html, IntoResponse, Response},
+    http::{HeaderMap, StatusCode, header},
+    response::{Html, IntoResponse, Redirect, Response},
     routing::{MethodRouter, get, post},
 };
 use serde::Deserialize;
@@ -31,7 +31,7 @@ use crate::{
 use idempotency::{IdempotencyKey, mark_replayed};
 
 /// Every route: path, methods, handlers.
-fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<AppState>); 13] {
+fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<AppState>); 14] {
     [
         ("/", &["GET"], get(home)),
         ("/healthz", &["GET"], get(health)),
@@ -40,6 +40,8 @@ fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<AppState>);
         ("/v1/tasks", &["GET"], get(tasks)),
         ("/v1/tools", &["GET"], get(tools)),
         ("/v1/openapi.json", &["GET"], get(openapi)),
+        // Where others have it.
+        ("/openapi.json", &["GET"], get(|| async { Redirect::permanent("/v1/openapi.json") })),
         ("/v1/episodes", &["GET", "POST"], get(episodes).post(start)),
         ("/v1/episodes/{id}", &["GET", "DELETE"], get(status).delete(remove)),
         ("/v1/episodes/{id}/briefing", &["GET"], get(briefing)),
@@ -114,19 +116,33 @@ async fn openapi(State(app): State<AppState>, Extension(caller): Extension<Calle
 }
 
 /// The description of the interface as a page.
-async fn docs(State(app): State<AppState>, Extension(caller): Extension<Caller>) -> Response {
-    page(docs::page(&app.openapi(&caller)))
+async fn docs(
+    State(app): State<AppState>,
+    Extension(caller): Extension<Caller>,
+    headers: HeaderMap,
+) -> Response {
+    let document = app.openapi(&caller);
+    page(&headers, || docs::page(&document), || docs::brief(&document))
 }
 
 /// The page that a browser finds first.
-async fn home(State(app): State<AppState>, Extension(caller): Extension<Caller>) -> Response {
-    page(home::page(VERSION, &app.table.list(&caller), &caller))
+async fn home(
+    State(app): State<AppState>,
+    Extension(caller): Extension<Caller>,
+    headers: HeaderMap,
+) -> Response {
+    page(&headers, || home::page(VERSION, &app.table.list(&caller), &caller), || home::brief(VERSION))
 }
 
-/// A page, which needs nothing else and may load nothing.
-fn page(html: String) -> Response {
+/// A page, which needs nothing else and may load nothing; for who does not ask for one, as language models do, the same in short as text.
+fn page(headers: &HeaderMap, html: impl Fn() -> String, text: impl Fn() -> String) -> Response {
+    let vary = (header::VARY, "accept");
+    let accepts = headers.get_all(header::ACCEPT).iter().filter_map(|value| value.to_str().ok());
+    if !accepts.into_iter().any(|accept| accept.contains("text/html")) {
+        return ([vary], text()).into_response();
+    }
     let policy = (header::CONTENT_SECURITY_POLICY, "default-src 'none'; style-src 'unsafe-inline'");
-    ([policy], Html(html)).into_response()
+    ([policy, vary], Html(html())).into_response()
 }
 
 async fn episodes(

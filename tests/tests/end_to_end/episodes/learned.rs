@@ -64,7 +64,7 @@ fn one_call_steps_and_returns_what_is_seen_then() {
     let server = TestServer::start();
     let id = server.episode("benchmark");
     for (robots, step) in [(&["A", "B"][..], 20), (&["B"], 40)] {
-        let look = json!({ "images": "rgb", "depth": "float16", "short": true });
+        let look = json!({ "images": "rgb", "depth": "float16" });
         let args = json!({ "robots": rows(robots, 20), "observe": look });
         let (status, bytes) = call(&server, &id, "send_joint_chunk", &args);
         assert_eq!(status, 200);

@@ -69,7 +69,7 @@ fn the_camera_and_the_joints_are_as_published() {
     let task = tasks::find("handover").unwrap();
     let mut session = Session::start(&EpisodeSpec::new(task, 0, Protocol::Benchmark), None).unwrap();
     let ToolReply::Look(LookReply::Observe(seen)) =
-        session.call(Observe { robots: None, short: None }.into()).unwrap()
+        session.call(Observe { robots: None, short: None, frame: None }.into()).unwrap()
     else {
         panic!("no observation")
     };

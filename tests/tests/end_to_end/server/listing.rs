@@ -18,7 +18,13 @@ fn ids(list: &Value) -> Vec<&str> {
 
 /// What a caller with this token is answered, as text.
 fn asked(server: &TestServer, token: &str, path: &str) -> (u16, String) {
-    let (status, _, bytes) = server.ask("GET", path, &[("authorization", &format!("Bearer {token}"))], b"");
+    let bearer = format!("Bearer {token}");
+    let (status, _, bytes) = server.ask(
+        "GET",
+        path,
+        &[("authorization", &bearer), ("accept", "text/html, application/json")],
+        b"",
+    );
     (status, String::from_utf8(bytes).expect("text"))
 }
 
@@ -96,6 +102,25 @@ fn who_has_a_token_sees_its_own_episodes() {
     let (_, page) = asked(&server, operator, "/");
     assert!(page.contains(&format!(">{team_id}</a>")) && !page.contains(&format!(">{own}</a>")), "{page}");
     assert!(![&host, &page].iter().any(|page| page.contains(operator) || page.contains(TOKEN)));
+}
+
+/// A language model reads what it gets with a program that asks for no page.
+#[test]
+fn who_asks_for_no_page_gets_a_few_lines() {
+    let server = TestServer::start();
+    for (path, says, most) in
+        [("/", "GET  /v1/tools", 1500), ("/docs", "POST /v1/episodes/{episode_id}/tools/wait: Let all", 9000)]
+    {
+        for accept in [&[][..], &[("accept", "*/*")], &[("accept", "application/json")]] {
+            let (status, headers, bytes) = server.ask("GET", path, accept, b"");
+            let text = String::from_utf8(bytes).expect("text");
+            assert!(status == 200 && text.contains(says), "{path}: {text}");
+            assert!(text.len() < most && !text.contains("<"), "{path}: {} bytes", text.len());
+            assert_eq!(headers["content-type"], "text/plain; charset=utf-8");
+        }
+    }
+    // It leads on to where the description is, and the client follows.
+    assert_eq!(server.get("/openapi.json").ok(), server.get("/v1/openapi.json").ok());
 }
 
 #[test]

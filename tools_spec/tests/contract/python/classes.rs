@@ -7,7 +7,7 @@ use tandem_tools_spec::TypedTool;
 
 use super::text::{Lines, docstring};
 use super::types::{Parameter, parameters, python_name, reading, reference, reply_type, without_null};
-use super::{OF_OBSERVE, OF_START, described, is_method};
+use super::{OF_DEPTH, OF_OBSERVE, OF_START, described, is_method};
 
 /// The types of the contract, by what they are part of.
 pub struct Contract<'a> {
@@ -15,6 +15,8 @@ pub struct Contract<'a> {
     arguments: BTreeSet<String>,
     /// What commands are answered with.
     commands: BTreeSet<String>,
+    /// What is told of points and surfaces.
+    depth: BTreeSet<String>,
     /// What else tools of an episode are answered with.
     replies: BTreeSet<String>,
     /// What only starts and lists of tasks are answered with.
@@ -27,6 +29,7 @@ impl<'a> Contract<'a> {
             types,
             arguments: BTreeSet::new(),
             commands: BTreeSet::new(),
+            depth: BTreeSet::new(),
             replies: BTreeSet::new(),
             start: BTreeSet::new(),
         };
@@ -41,9 +44,10 @@ impl<'a> Contract<'a> {
         let (common, own): (Vec<&str>, Vec<&str>) =
             on_episode().map(|tool| tool.reply.as_str()).partition(|reply| is_common(reply));
         let commands = all_of(common, &[]);
-        let replies = all_of(own.into_iter().chain(OF_OBSERVE).collect(), &[&commands]);
-        let start = all_of(OF_START.to_vec(), &[&commands, &replies]);
-        Contract { arguments, commands, replies, start, ..contract }
+        let depth = all_of(OF_DEPTH.to_vec(), &[&commands]);
+        let replies = all_of(own.into_iter().chain(OF_OBSERVE).collect(), &[&commands, &depth]);
+        let start = all_of(OF_START.to_vec(), &[&commands, &depth, &replies]);
+        Contract { arguments, commands, depth, replies, start, ..contract }
     }
 
     /// Classes and names for choices that a schema refers to itself.
@@ -76,7 +80,8 @@ impl<'a> Contract<'a> {
 
     /// Whether it is one of several texts that stands in replies, too, whose modules have it.
     pub fn is_replied(&self, name: &str) -> bool {
-        !self.is_class(name) && [&self.commands, &self.replies].iter().any(|names| names.contains(name))
+        !self.is_class(name)
+            && [&self.commands, &self.depth, &self.replies].iter().any(|names| names.contains(name))
     }
 
     /// The type of a name that has no class and is no choice, as that of numbers by joint.
@@ -129,6 +134,11 @@ impl<'a> Contract<'a> {
         self.reply_module("What commands reply.", &self.commands)
     }
 
+    /// The module of what is told of points and surfaces.
+    pub fn depth(&self) -> String {
+        self.reply_module("What query_depth replies.", &self.depth)
+    }
+
     /// The module of what other tools of an episode reply.
     pub fn replies(&self) -> String {
         self.reply_module("What tools reply that are no commands.", &self.replies)
@@ -161,7 +171,9 @@ impl<'a> Contract<'a> {
 
     /// Imports types of replies from where they are.
     pub fn import(&self, lines: &mut Lines, names: Vec<String>) {
-        for (module, own) in [("commands", &self.commands), ("replies", &self.replies)] {
+        for (module, own) in
+            [("commands", &self.commands), ("depth", &self.depth), ("replies", &self.replies)]
+        {
             lines.import(module, names.iter().filter(|name| own.contains(*name)).cloned());
         }
     }

@@ -19,6 +19,8 @@ use types::Parameter;
 const OBSERVE: &str = "observe";
 /// What it is answered with besides pictures.
 const OF_OBSERVE: [&str; 2] = ["RobotState", "CameraCalibration"];
+/// What is told of points and surfaces.
+const OF_DEPTH: [&str; 1] = ["DepthReply"];
 /// What a list of tasks is, and what a start says wherever the episode runs.
 const OF_START: [&str; 2] = ["Briefing", "TaskList"];
 
@@ -29,6 +31,7 @@ fn the_python_package_has_every_tool() {
     let modules = [
         ("arguments", contract.arguments()),
         ("commands", contract.commands()),
+        ("depth", contract.depth()),
         ("replies", contract.replies()),
         ("start", contract.start()),
         ("tools", methods(&contract, &tools)),

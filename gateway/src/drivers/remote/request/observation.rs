@@ -44,7 +44,7 @@ impl PolicyObservation {
         episode: &mut dyn LocalEpisode,
         shown: &[ExtraInformation],
     ) -> Result<PolicyObservation, PlayerError> {
-        let seen = episode.observe(&Observe { robots: None, short: Some(true) }, shown)?;
+        let seen = episode.observe(&Observe { robots: None, short: None, frame: None }, shown)?;
         let third_person = shown.contains(&ExtraInformation::ThirdPerson);
         let inputs = seen.robots.iter().map(|robot| {
             let state_values = state_values(&robot.state).ok_or_else(|| withheld(Observe::NAME))?;

@@ -1,11 +1,17 @@
-//! Surfaces in a picture: what is joined to a pixel and looks alike, or the largest of a colour. From the colours and the depth that
-//! the policy may see itself; nothing is known of which object a pixel belongs to.
+//! Surfaces in a picture: what is joined to a pixel and looks alike, the thing that it is of, or the nearest ones of a colour. From the
+//! colours and the depth that the policy may see itself; nothing is known of which object a pixel belongs to.
 
-use nalgebra::{Isometry3, Point3};
-use tandem_tools_spec::{Color, Surface, SurfaceQuery};
+mod round;
+mod thing;
+
+use std::collections::BTreeSet;
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use tandem_tools_spec::{Color, JoinedBy, Surface, SurfaceQuery, UprightAxis};
 
 use super::RobotView;
 use crate::convert::coarse;
+use thing::Relief;
 
 /// Neighbours are of one surface whose depth differs by less: this, and this part of it, for what is seen at a slant.
 const STEP_M: f32 = 0.012;
@@ -20,39 +26,102 @@ const GREY_SATURATION: f32 = 0.25;
 const BLACK_VALUE: f32 = 0.2;
 const WHITE_VALUE: f32 = 0.75;
 
-/// Finds what `query` asks for, with its points by the pose of the camera (MuJoCo's axes) in some frame.
-pub fn find(view: &RobotView, query: &SurfaceQuery, frame_from_camera: &Isometry3<f64>) -> Option<Surface> {
-    let pixels = match (query.pixel, query.color) {
+/// The most surfaces of a colour that are told.
+const MOST_SURFACES: usize = 3;
+/// What reaches farther, or fills more of the picture and goes on beyond it, is no thing but what things stand on or before.
+const BACKGROUND_M: f64 = 2.0;
+const BACKGROUND_PART: f64 = 0.25;
+
+/// Frames in which surfaces are told, or measured, by the pose of the camera (MuJoCo's axes) in each.
+pub struct CameraPoses {
+    pub frame_from_camera: Isometry3<f64>,
+    pub level_from_camera: Isometry3<f64>,
+}
+
+/// Finds what `query` asks for.
+pub fn find(view: &RobotView, query: &SurfaceQuery, poses: &CameraPoses) -> Vec<Surface> {
+    let relief = Relief::of(view);
+    let describe = |joined_by: JoinedBy, pixels: &[usize]| describe(view, &relief, joined_by, pixels, poses);
+    match (query.pixel, query.color) {
         (Some([u, v]), _) => {
             let seed = v as usize * view.picture.width as usize + u as usize;
             let like = rgb(view, seed);
-            joined(view, seed, &mut vec![false; view.depth_m.len()], &|pixel| {
+            let alike = joined(view, seed, &mut vec![false; view.depth_m.len()], &|pixel| {
                 are_alike(like, rgb(view, pixel))
-            })
+            });
+            let thing = relief.thing(view, seed);
+            // Where both are nearly the same, one says it.
+            let is_more = 10 * thing.len() > 11 * alike.len();
+            let found =
+                [(JoinedBy::Color, alike), (JoinedBy::Shape, if is_more { thing } else { Vec::new() })];
+            found
+                .iter()
+                .filter(|(_, pixels)| !pixels.is_empty())
+                .map(|(by, pixels)| describe(*by, pixels))
+                .collect()
         }
-        (None, color) => largest(view, color?),
-    };
-    (!pixels.is_empty()).then(|| describe(view, &pixels, frame_from_camera))
+        (None, Some(color)) => {
+            let mut found: Vec<Surface> =
+                of_color(view, color).iter().map(|pixels| describe(JoinedBy::Color, pixels)).collect();
+            let eye_m = poses.frame_from_camera.translation.vector;
+            let away_m = |surface: &Surface| (Vector3::from(surface.centroid_m) - eye_m).norm();
+            let order = |surface: &Surface| (is_background(view, surface), away_m(surface));
+            found.sort_by(|one, other| {
+                let ((one_behind, one_m), (other_behind, other_m)) = (order(one), order(other));
+                one_behind.cmp(&other_behind).then(one_m.total_cmp(&other_m))
+            });
+            found.truncate(MOST_SURFACES);
+            found
+        }
+        (None, None) => Vec::new(),
+    }
 }
 
-/// The largest surface of a colour.
-fn largest(view: &RobotView, color: Color) -> Vec<usize> {
+fn is_background(view: &RobotView, surface: &Surface) -> bool {
+    let fills = f64::from(surface.pixels) > BACKGROUND_PART * view.depth_m.len() as f64;
+    surface.extent_m.iter().any(|part_m| *part_m > BACKGROUND_M) || (surface.cut_off && fills)
+}
+
+/// Every surface of a colour that is not only an edge.
+fn of_color(view: &RobotView, color: Color) -> Vec<Vec<usize>> {
     let mut seen = vec![false; view.depth_m.len()];
     let is_of_it = |pixel: usize| name(rgb(view, pixel)) == color;
     let mut found = Vec::new();
     for seed in 0..view.depth_m.len() {
         if !seen[seed] && is_of_it(seed) {
             let pixels = joined(view, seed, &mut seen, &is_of_it);
-            if pixels.len() > found.len().max(LEAST_PIXELS) {
-                found = pixels;
+            if pixels.len() >= LEAST_PIXELS && is_broad(view, &pixels) {
+                found.push(pixels);
             }
         }
     }
     found
 }
 
+/// Whether some pixel has only pixels of the same surface around it: edges of things mix colours, in lines.
+fn is_broad(view: &RobotView, pixels: &[usize]) -> bool {
+    let width = view.picture.width as usize;
+    let own: BTreeSet<usize> = pixels.iter().copied().collect();
+    pixels.iter().any(|pixel| {
+        let rows = [pixel.checked_sub(width), Some(*pixel), Some(pixel + width)];
+        rows.into_iter().all(|middle| {
+            middle.is_some_and(|middle| (0..3).all(|i| own.contains(&(middle + i).wrapping_sub(1))))
+        })
+    })
+}
+
 /// Every pixel that is joined to `seed` by neighbours of about the same depth that `belong`.
 fn joined(view: &RobotView, seed: usize, seen: &mut [bool], belong: &dyn Fn(usize) -> bool) -> Vec<usize> {
+    grow(view, seed, seen, &|_, other| belong(other))
+}
+
+/// Every pixel that is joined to `seed` by neighbours of about the same depth that `are_joined`.
+fn grow(
+    view: &RobotView,
+    seed: usize,
+    seen: &mut [bool],
+    are_joined: &dyn Fn(usize, usize) -> bool,
+) -> Vec<usize> {
     if !view.depth_m[seed].is_finite() {
         return Vec::new();
     }
@@ -71,7 +140,7 @@ fn joined(view: &RobotView, seed: usize, seen: &mut [bool], belong: &dyn Fn(usiz
         for other in beside.into_iter().flatten() {
             let [here_m, there_m] = [pixel, other].map(|pixel| view.depth_m[pixel]);
             let step_m = STEP_M + STEP_PART * here_m;
-            if !seen[other] && (here_m - there_m).abs() < step_m && belong(other) {
+            if !seen[other] && (here_m - there_m).abs() < step_m && are_joined(pixel, other) {
                 seen[other] = true;
                 found.push(other);
             }
@@ -119,40 +188,62 @@ fn name([red, green, blue]: [f32; 3]) -> Color {
     }
 }
 
-fn describe(view: &RobotView, pixels: &[usize], frame_from_camera: &Isometry3<f64>) -> Surface {
+fn describe(
+    view: &RobotView,
+    relief: &Relief,
+    joined_by: JoinedBy,
+    pixels: &[usize],
+    poses: &CameraPoses,
+) -> Surface {
+    let CameraPoses { frame_from_camera, level_from_camera } = poses;
     let (width, height) = (view.picture.width as usize, view.picture.height as usize);
     let place = |pixel: usize| [(pixel % width) as i64, (pixel / width) as i64];
-    let point_m = |pixel: usize| -> [f64; 3] {
-        let [u, v] = place(pixel).map(|at| at as f32);
-        let in_camera_m = view.intrinsics.unproject([u, v], view.depth_m[pixel]).to_array().map(f64::from);
-        (frame_from_camera * Point3::from(in_camera_m)).coords.into()
-    };
+    let in_camera_m = |pixel: usize| relief.point_m(pixel).unwrap_or_default();
+    let point_m = |pixel: usize| -> [f64; 3] { (frame_from_camera * in_camera_m(pixel)).coords.into() };
     let (mut from, mut to) = ([i64::MAX; 2], [i64::MIN; 2]);
     let (mut low_m, mut high_m, mut sum_m) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3], [0.0; 3]);
-    let mut color = [0.0; 3];
+    let (mut color, mut whole) = ([0.0; 3], 0.0);
     for &pixel in pixels {
-        let at = place(pixel);
+        let (at, at_m) = (place(pixel), point_m(pixel));
+        // What is near has more pixels, and what is seen at a slant fewer.
+        let area = relief.area(pixel).max(f64::MIN_POSITIVE);
+        whole += area;
         for i in 0..2 {
             (from[i], to[i]) = (from[i].min(at[i]), to[i].max(at[i]));
         }
-        let at_m = point_m(pixel);
         for i in 0..3 {
             (low_m[i], high_m[i]) = (low_m[i].min(at_m[i]), high_m[i].max(at_m[i]));
-            sum_m[i] += at_m[i];
+            sum_m[i] += area * at_m[i];
             color[i] += rgb(view, pixel)[i];
         }
     }
     let count = pixels.len() as f64;
     let outline = hull(pixels.iter().map(|pixel| place(*pixel)).collect());
     let corner_m = |[u, v]: [i64; 2]| point_m(v as usize * width + u as usize).map(coarse);
+    let level_m: Vec<Point3<f64>> =
+        pixels.iter().map(|pixel| level_from_camera * in_camera_m(*pixel)).collect();
+    let frame_from_level = frame_from_camera * level_from_camera.inverse();
+    let axis = round::axis(&level_m, &level_from_camera.translation.vector.into()).map(|axis| {
+        let end_m = |height_m: f64| {
+            let end_m = frame_from_level * Point3::new(axis.at_m.x, axis.at_m.y, height_m);
+            [end_m.x, end_m.y, end_m.z].map(coarse)
+        };
+        UprightAxis {
+            bottom_m: end_m(axis.bottom_m),
+            top_m: end_m(axis.top_m),
+            radius_m: coarse(axis.radius_m),
+        }
+    });
     Surface {
+        joined_by,
         pixels: pixels.len() as u32,
         from,
         to,
         rgb: color.map(|sum| (255.0 * f64::from(sum) / count).round() as u8),
-        centroid_m: sum_m.map(|sum_m| coarse(sum_m / count)),
+        centroid_m: sum_m.map(|sum_m| coarse(sum_m / whole)),
         extent_m: std::array::from_fn(|i| coarse(high_m[i] - low_m[i])),
         corners_m: corners(&outline).into_iter().map(corner_m).collect(),
+        axis,
         cut_off: from[0] == 0 || from[1] == 0 || to[0] as usize + 1 == width || to[1] as usize + 1 == height,
     }
 }
@@ -233,19 +324,24 @@ mod tests {
         RobotView::new(intrinsics, Frame { width, height, rgb, depth_m, ids: vec![0; WIDTH * HEIGHT] })
     }
 
-    fn found(pixel: Option<[i64; 2]>, color: Option<Color>) -> Option<Surface> {
-        find(&view(), &SurfaceQuery { pixel, color }, &Isometry3::identity())
+    fn found(pixel: Option<[i64; 2]>, color: Option<Color>) -> Vec<Surface> {
+        found_in(&view(), pixel, color)
+    }
+
+    fn found_in(view: &RobotView, pixel: Option<[i64; 2]>, color: Option<Color>) -> Vec<Surface> {
+        let still = Isometry3::identity();
+        let poses = CameraPoses { frame_from_camera: still, level_from_camera: still };
+        find(view, &SurfaceQuery { pixel, color }, &poses)
     }
 
     #[test]
     fn a_surface_is_what_is_joined_and_looks_alike() {
-        let square = found(Some([30, 20]), None).unwrap();
+        let square = found(Some([30, 20]), None).remove(0);
         assert_eq!(
             (square.pixels, square.from, square.to, square.rgb),
             (221, [20, 10], [40, 30], [200, 30, 30])
         );
-        assert!(!square.cut_off);
-        assert_eq!(found(None, Some(Color::Red)), Some(square.clone()), "the larger of two red ones");
+        assert!(!square.cut_off && square.axis.is_none());
         assert!((square.extent_m[0] - 0.4).abs() < 1e-3 && square.extent_m[2].abs() < 1e-3, "{square:?}");
         // Its corners are those of the square on its corner, each 0.2 m from the middle.
         assert_eq!(square.corners_m.len(), 4);
@@ -254,10 +350,44 @@ mod tests {
                 (0..3).map(|i| (corner_m[i] - square.centroid_m[i]).powi(2)).sum::<f64>().sqrt();
             assert!((from_middle_m - 0.2).abs() < 2e-3, "{square:?}");
         }
-        assert_eq!(found(Some([4, 4]), None).unwrap().pixels, 36);
-        let wall = found(None, Some(Color::Grey)).unwrap();
+        let wall = found(None, Some(Color::Grey)).remove(0);
         assert!(wall.cut_off && wall.pixels as usize == WIDTH * HEIGHT - 221 - 36, "{wall:?}");
-        assert_eq!(found(None, Some(Color::Blue)), None);
+        assert_eq!(found(None, Some(Color::Blue)), []);
+    }
+
+    /// The spot on the wall is of one colour, and the wall goes on around it; the square before the wall is a thing by itself.
+    #[test]
+    fn a_pixel_tells_of_its_colour_and_of_the_whole_thing() {
+        let told = |at: [i64; 2]| -> Vec<(JoinedBy, u32)> {
+            found(Some(at), None).iter().map(|surface| (surface.joined_by, surface.pixels)).collect()
+        };
+        let wall = (WIDTH * HEIGHT - 221) as u32;
+        assert_eq!(told([4, 4]), [(JoinedBy::Color, 36), (JoinedBy::Shape, wall)]);
+        assert_eq!(told([30, 20]), [(JoinedBy::Color, 221)]);
+    }
+
+    /// The largest of a colour is mostly the room.
+    #[test]
+    fn surfaces_of_a_colour_come_nearest_first_and_the_room_last() {
+        let mut view = view();
+        let told = |view: &RobotView| -> Vec<u32> {
+            found_in(view, None, Some(Color::Red)).iter().map(|surface| surface.pixels).collect()
+        };
+        assert_eq!(told(&view), [221, 36]);
+        // A red carpet before the robot, nearer than all, and a line where two colours mix.
+        let mut rgb = view.picture.rgb.clone();
+        for pixel in 0..WIDTH * HEIGHT {
+            let v = pixel / WIDTH;
+            if v > 30 || v == 0 {
+                rgb[3 * pixel..3 * pixel + 3].copy_from_slice(&[200, 30, 30]);
+            }
+            if v > 30 {
+                view.depth_m[pixel] = 0.8;
+            }
+        }
+        view.picture = crate::observation::Picture::new(WIDTH as u32, HEIGHT as u32, rgb).into();
+        let carpet = found_in(&view, None, Some(Color::Red));
+        assert_eq!(told(&view), [221, 36, (9 * WIDTH) as u32], "{carpet:?}");
     }
 
     #[test]

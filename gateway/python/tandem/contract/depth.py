@@ -1,0 +1,129 @@
+"""What query_depth replies.
+
+Written by the tests of `tools_spec` from the one list of tools; not to be edited.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+from .commands import PoseFrame
+
+JoinedBy: TypeAlias = Literal[
+    "color",
+    "shape",
+]
+"""By what pixels are joined to a surface. Neighbours of it are of about the same depth always."""
+
+
+@dataclass(frozen=True)
+class DepthReply:
+    """The reply to `query_depth`."""
+
+    robot: str
+    """The robot whose camera measured."""
+
+    frame: PoseFrame | None
+    """The frame of the points, where the call named another than that of the pelvis; left out otherwise."""
+
+    surfaces: tuple[Surface, ...]
+    """The surfaces that were found: at a pixel the patch of its colour and, where that is more, the whole thing;
+    of a colour up to three, the nearest first and what is of the room last. Left out where none was asked for.
+    """
+
+    columns: tuple[str, str, str, str, str]
+    """What each column of `points` is: "u", "v", "x_m", "y_m", "z_m"."""
+
+    points: tuple[tuple[float | None, float | None, float | None, float | None, float | None], ...]
+    """One row per pixel asked for, in the same order; of a region row by row. Millimetres; null where nothing is
+    seen. Of a surface none.
+    """
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> DepthReply:
+        """Reads what JSON has."""
+        return DepthReply(
+            robot=value["robot"],
+            frame=value.get("frame"),
+            surfaces=tuple(Surface.of(item) for item in value.get("surfaces", ())),
+            columns=tuple(value["columns"]),
+            points=tuple(tuple(item) for item in value["points"]),
+        )
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A surface as the camera sees it: only what is in view, and of a thing only its near side."""
+
+    joined_by: JoinedBy
+    """By what its pixels are joined."""
+
+    pixels: int
+    """How many pixels it has."""
+
+    from_: tuple[int, int]
+    """Its top left and bottom right in the picture, as [u, v]."""
+
+    to: tuple[int, int]
+    """See `from`."""
+
+    rgb: tuple[int, int, int]
+    """Its mean colour, [red, green, blue] from 0 to 255."""
+
+    centroid_m: tuple[float, float, float]
+    """The middle of its area, in metres in the frame of the reply."""
+
+    extent_m: tuple[float, float, float]
+    """How far it reaches along each axis of that frame, in metres."""
+
+    corners_m: tuple[tuple[float, float, float], ...]
+    """The four points of its outline that span the most of it in the picture, in the order of its outline: of a
+    rectangle its corners.
+    """
+
+    axis: UprightAxis | None
+    """Its axis, where it is upright and round; left out otherwise."""
+
+    cut_off: bool
+    """Whether it goes on beyond the picture."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> Surface:
+        """Reads what JSON has."""
+        return Surface(
+            joined_by=value["joined_by"],
+            pixels=value["pixels"],
+            from_=tuple(value["from"]),
+            to=tuple(value["to"]),
+            rgb=tuple(value["rgb"]),
+            centroid_m=tuple(value["centroid_m"]),
+            extent_m=tuple(value["extent_m"]),
+            corners_m=tuple(tuple(item) for item in value["corners_m"]),
+            axis=None if (got := value.get("axis")) is None else UprightAxis.of(got),
+            cut_off=value["cut_off"],
+        )
+
+
+@dataclass(frozen=True)
+class UprightAxis:
+    """The axis of a thing that is upright and round, as a bottle."""
+
+    bottom_m: tuple[float, float, float]
+    """Its lower end as far as that is seen, [x, y, z] in metres in the frame of the reply."""
+
+    top_m: tuple[float, float, float]
+    """Its upper end."""
+
+    radius_m: float
+    """The radius of most of it, in metres."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> UprightAxis:
+        """Reads what JSON has."""
+        return UprightAxis(
+            bottom_m=tuple(value["bottom_m"]),
+            top_m=tuple(value["top_m"]),
+            radius_m=value["radius_m"],
+        )
