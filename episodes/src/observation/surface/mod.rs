@@ -374,20 +374,21 @@ mod tests {
             found_in(view, None, Some(Color::Red)).iter().map(|surface| surface.pixels).collect()
         };
         assert_eq!(told(&view), [221, 36]);
-        // A red carpet before the robot, nearer than all, and a line where two colours mix.
+        // A red carpet before the robot, nearer than all and over a quarter of the picture, and a line where two colours mix.
+        let is_carpet = |u: usize, v: usize| v > 30 || (v > 26 && u < 20);
         let mut rgb = view.picture.rgb.clone();
         for pixel in 0..WIDTH * HEIGHT {
-            let v = pixel / WIDTH;
-            if v > 30 || v == 0 {
+            let (u, v) = (pixel % WIDTH, pixel / WIDTH);
+            if is_carpet(u, v) || v == 0 {
                 rgb[3 * pixel..3 * pixel + 3].copy_from_slice(&[200, 30, 30]);
             }
-            if v > 30 {
+            if is_carpet(u, v) {
                 view.depth_m[pixel] = 0.8;
             }
         }
         view.picture = crate::observation::Picture::new(WIDTH as u32, HEIGHT as u32, rgb).into();
         let carpet = found_in(&view, None, Some(Color::Red));
-        assert_eq!(told(&view), [221, 36, (9 * WIDTH) as u32], "{carpet:?}");
+        assert_eq!(told(&view), [221, 36, (9 * WIDTH + 4 * 20) as u32], "{carpet:?}");
     }
 
     #[test]

@@ -76,7 +76,7 @@ struct Carrier {
 
 /// How far a path has been gone, and how fast.
 #[derive(Default)]
-struct Pace {
+struct PathPace {
     gone_m: f64,
     pace_m_s: f64,
     waited: u32,
@@ -108,14 +108,14 @@ impl Way {
         self.shift_m.norm().max(M_PER_RAD * self.turn_rad.abs())
     }
 
-    fn at(&self, part: f64) -> Stand {
-        let angle = part * self.turn_rad;
+    fn at(&self, share: f64) -> Stand {
+        let angle = share * self.turn_rad;
         let (sine, versine) = if angle.abs() < 1e-6 {
             (1.0, 0.5 * angle)
         } else {
             (angle.sin() / angle, (1.0 - angle.cos()) / angle)
         };
-        let [x, y]: [f64; 2] = (part * self.shift_m).into();
+        let [x, y]: [f64; 2] = (share * self.shift_m).into();
         let moved_m = Vector2::new(sine * x - versine * y, versine * x + sine * y);
         Stand {
             at_m: self.from.at_m + Rotation2::new(self.from.heading_rad) * moved_m,
@@ -124,7 +124,7 @@ impl Way {
     }
 }
 
-impl Pace {
+impl PathPace {
     /// Goes on for `time_s` along a path of `length_m`, on which somebody lags by `lag_m`.
     fn go(&mut self, length_m: f64, lag_m: f64, time_s: f64) {
         let left_m = length_m - self.gone_m;
@@ -151,7 +151,7 @@ impl Session {
         let mut carriers: Vec<Carrier> = carriers.collect::<Result<_, _>>()?;
         let length_m = carriers.iter().map(|carrier| carrier.way.length_m()).fold(0.0, f64::max);
         let mut progress = PlanProgress::default();
-        let mut pace = Pace::default();
+        let mut pace = PathPace::default();
         let mut at_end = 0;
         loop {
             let left = walk.steps.saturating_sub(progress.executed_steps());
@@ -219,18 +219,18 @@ impl Session {
 
     /// How far each robot is from where it is to be after this part of its way, start frame: the mean of now and half a cycle ago, which
     /// knows nothing of the pelvis' sway.
-    fn off_path(&self, carriers: &mut [Carrier], part: f64) -> Vec<Vector2<f64>> {
+    fn off_path(&self, carriers: &mut [Carrier], share: f64) -> Vec<Vector2<f64>> {
         let off = |carrier: &mut Carrier| {
-            let now_m = carrier.way.at(part).at_m - self.stands_at(carrier).at_m;
+            let now_m = carrier.way.at(share).at_m - self.stands_at(carrier).at_m;
             0.5 * (now_m + carrier.before_m.replace(now_m).unwrap_or(now_m))
         };
         carriers.iter_mut().map(off).collect()
     }
 
     /// The base command of a robot that is `off_m` its path, on which it goes on by so much of it a second: ahead, left, turning.
-    fn velocity(&self, carrier: &Carrier, part: f64, rate_1_s: f64, off_m: &Vector2<f64>) -> [f64; 3] {
+    fn velocity(&self, carrier: &Carrier, share: f64, rate_1_s: f64, off_m: &Vector2<f64>) -> [f64; 3] {
         let Way { shift_m, turn_rad, .. } = carrier.way;
-        let to_be = carrier.way.at(part);
+        let to_be = carrier.way.at(share);
         let heading_rad = self.stands_at(carrier).heading_rad;
         let in_start_m_s = Rotation2::new(to_be.heading_rad) * shift_m * rate_1_s + GAIN_1_S * off_m;
         let own_m_s = (Rotation2::new(-heading_rad) * in_start_m_s).cap_magnitude(MOST_M_S);
@@ -372,7 +372,7 @@ mod tests {
 
     #[test]
     fn a_path_is_gone_from_rest_to_rest_and_waits() {
-        let mut pace = Pace::default();
+        let mut pace = PathPace::default();
         let mut paces = Vec::new();
         while 1.0 - pace.gone_m > 1e-9 {
             pace.go(1.0, 0.05, 0.26);
@@ -380,7 +380,7 @@ mod tests {
         }
         assert!((pace.gone_m - 1.0).abs() < 1e-9 && paces.len() < 40, "{paces:?}");
         assert!(paces[0] < 0.06 && paces.iter().all(|pace| *pace <= PACE_M_S), "{paces:?}");
-        let mut held_up = Pace { gone_m: 0.5, pace_m_s: 0.2, waited: 0 };
+        let mut held_up = PathPace { gone_m: 0.5, pace_m_s: 0.2, waited: 0 };
         for _ in 0..10 {
             held_up.go(1.0, LEAD_M + 0.01, 0.26);
         }
