@@ -102,7 +102,7 @@ impl Locomotion for Balance {
             body.world_from_soles().iter().map(|sole| sole.translation.z).fold(f32::INFINITY, f32::min);
         let laden = LadenRobot::of(body);
         state.observer.update(laden.velocity_m_s, dt_s);
-        let load = Load::of(body, &laden, ground_m, state.observer.push());
+        let load = Load::of(body, &laden, ground_m, state.observer.push_m_s2());
         state.change_mode(body, &load);
         let (legs, expected_m_s2) = match &mut state.mode {
             Mode::Stand(stand) => stand.tick(body, &load, command.pelvis_height_m, dt_s),
@@ -231,7 +231,7 @@ mod tests {
     fn left_carries(capture_m: [f32; 2], lost_rad_s: Option<f32>) -> bool {
         let body = Posed::standing().body();
         let state = BalanceState::new(&body);
-        let load = Load::of(&body, &LadenRobot::of(&body), 0.0, observer::ObservedPush::default());
+        let load = Load::of(&body, &LadenRobot::of(&body), 0.0, Vector::ZERO);
         let mut stance = state.stance(&body, &load);
         stance.capture_m = Vector::new(capture_m[0], capture_m[1], 0.0);
         state.left_carries_first(&stance, lost_rad_s)
