@@ -171,7 +171,7 @@ class RemoteEpisode(BaseEpisode):
 
 def _row_of(state: RobotState) -> dict[str, float]:
     """The numbers of a state by the names that an episode in this process gives them."""
-    row = {f"{joint}_rad": angle for joint, angle in state.joint_positions_rad.items()}
+    row = {f"{joint}_rad": angle for joint, angle in (state.joint_positions_rad or {}).items()}
     row |= {f"{joint}_rad_s": rate for joint, rate in (state.joint_velocities_rad_s or {}).items()}
     row |= {f"{joint}_n_m": torque for joint, torque in (state.joint_torques_n_m or {}).items()}
     poses = {"left_wrist": state.left_wrist, "right_wrist": state.right_wrist}

@@ -20,6 +20,8 @@ from tandem.agent import main
 
 APIS = ("openai", "openai-chat", "anthropic")
 KEY = "sk-test-0123456789abcdef"
+# Not where the sources lie, which Python would take for the package.
+AWAY = Path(__file__).parent
 SEED = 2000
 
 
@@ -80,7 +82,7 @@ class Grasp:
         self.heard.append(heard)
         heard = yield Says(calls=(("query_depth", {"robot": "A", "surface": {"color": "green"}}),))
         self.heard.append(heard)
-        x, y, z = json.loads(heard[0].text)["surface"]["centroid_m"]
+        x, y, z = json.loads(heard[0].text)["surfaces"][0]["centroid_m"]
         # What is seen is the side that faces the camera, at 0.1 m; the axis is 20 mm behind it.
         away = math.hypot(x - 0.1, y)
         x, y, z = x + 0.02 * (x - 0.1) / away, y + 0.02 * y / away, z - 0.06
@@ -133,7 +135,7 @@ def test_a_request_says_what_may_be_kept(api: str, server: tandem.Server) -> Non
         begun = [request.body[part] for part in ("tools", "instructions", "system") if part in request.body]
         first = endpoint.requests[0].body
         assert begun == [first[part] for part in ("tools", "instructions", "system") if part in first]
-        assert "episode_id" not in json.dumps(request.body["tools"])
+        assert '"episode_id"' not in json.dumps(request.body["tools"])
         marks = json.dumps(request.body).count('"cache_control"')
         if api == "anthropic":
             told = [message for message in request.body["messages"] if message["role"] == "user"]
@@ -338,7 +340,8 @@ def test_the_program_knows_the_flags_that_say_which_model_plays(capsys: pytest.C
     with pytest.raises(SystemExit):
         main(["--help"])
     ours = flags(capsys.readouterr().out) - {"--help", "--task", "--seed", "--url"}
-    program = subprocess.run([sys.executable, "-m", "tandem", "agent", "--help"], capture_output=True, text=True, check=True)
+    command = [sys.executable, "-m", "tandem", "agent", "--help"]
+    program = subprocess.run(command, cwd=AWAY, capture_output=True, text=True, check=True)
     assert ours <= flags(program.stdout)
 
 
@@ -379,7 +382,7 @@ def test_a_signal_ends_the_episode(server: tandem.Server, runs: Path) -> None:
     with ScriptedEndpoint(script) as endpoint:
         where = ["--api", "openai-chat", "--base-url", endpoint.base_url("openai-chat"), "--url", server.url]
         command = [sys.executable, "-m", "tandem.agent", "--model", "m", *where, "--task", "handover", "--seed", str(SEED)]
-        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as program:
+        with subprocess.Popen(command, cwd=AWAY, stderr=subprocess.PIPE, text=True) as program:
             assert asked.wait(60)
             program.terminate()
             told = program.communicate(timeout=60)[1]

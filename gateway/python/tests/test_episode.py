@@ -77,6 +77,7 @@ def test_a_state_has_the_numbers_of_its_columns() -> None:
         episode.wait(3)
         told = episode.get_robot_state("B")
         state = dict(zip(episode.state_columns, episode.state()[1].tolist(), strict=True))
+    assert told.joint_positions_rad is not None
     assert all(math.isclose(state[f"{joint}_rad"], rad, abs_tol=6e-5) for joint, rad in told.joint_positions_rad.items())
     assert told.pelvis_in_start is not None
     assert math.isclose(state["pelvis_in_start_z_m"], told.pelvis_in_start.position_m[2], abs_tol=2e-6)

@@ -38,6 +38,11 @@ def _tool(spec: dict[str, Any]) -> Tool:
     schema = dict(spec["inputSchema"])
     schema["properties"] = {name: field for name, field in schema.get("properties", {}).items() if name != EPISODE_ID}
     schema["required"] = [name for name in schema.get("required", []) if name != EPISODE_ID]
+    schema["examples"] = [
+        {name: value for name, value in example.items() if name != EPISODE_ID} for example in schema.get("examples", [])
+    ]
+    if not schema["examples"]:
+        del schema["examples"]
     return Tool(str(spec["name"]), str(spec["description"]), schema)
 
 
