@@ -43,6 +43,10 @@ const INTERRUPTED: i32 = 130;
 
 /// Have a language model play a task, by any endpoint that speaks OpenAI's or Anthropic's formats. Python plays: pip install
 /// 'tandem-sim[agents]'. Keys are read from the environment: OPENAI_API_KEY, ANTHROPIC_API_KEY.
+#[allow(
+    rustdoc::broken_intra_doc_links,
+    reason = "the command line's help names an extra of the wheel, and no link"
+)]
 #[derive(Debug, clap::Args)]
 pub struct AgentArgs {
     #[command(flatten)]
