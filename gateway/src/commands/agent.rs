@@ -18,7 +18,7 @@ use tracing_subscriber::filter::LevelFilter;
 
 use super::{
     CommandResult, Seeds,
-    flags::{AgentFlags, LocomotionFlag, RendererFlag, SceneFlag, SensingFlags},
+    flags::{AgentFlags, WorldFlags},
     logging::log_to_stderr,
 };
 use crate::{
@@ -71,13 +71,7 @@ pub struct AgentArgs {
     #[arg(long, env = "TANDEM_RUNS", default_value = "runs", value_name = "DIR")]
     runs: PathBuf,
     #[command(flatten)]
-    scene: SceneFlag,
-    #[command(flatten)]
-    locomotion: LocomotionFlag,
-    #[command(flatten)]
-    sensing: SensingFlags,
-    #[command(flatten)]
-    renderer: RendererFlag,
+    world: WorldFlags,
 }
 
 /// Plays every seed. The program fails where the model's endpoint gives no answer.
@@ -90,13 +84,8 @@ pub fn run(args: AgentArgs) -> CommandResult {
         listen: Some((Ipv4Addr::LOCALHOST, FREE_PORT).into()),
         token: Some(token),
         runs: Some(args.runs),
-        scene: args.scene.file,
-        locomotion: args.locomotion.file,
-        state_estimate: Some(args.sensing.state_estimate),
-        sensors: Some(args.sensing.sensors),
-        renderer: Some(args.renderer.kind),
         assistance: Some(args.assistance),
-        ..Layer::default()
+        ..args.world.layer()
     };
     let settings = Settings::resolve(flags, None)?;
     try_runs_folder(&settings.runs)?;

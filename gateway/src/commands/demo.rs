@@ -17,11 +17,7 @@ use tandem_episodes::{
 use tandem_tools_spec::{CommandReply, Protocol, ResultReply, StartEpisode, ToolCall, ToolReply};
 use tracing_subscriber::filter::LevelFilter;
 
-use super::{
-    CommandResult, Seeds,
-    flags::{LocomotionFlag, RendererFlag, SceneFlag, SensingFlags},
-    logging::log_to_stderr,
-};
+use super::{CommandResult, Seeds, flags::WorldFlags, logging::log_to_stderr};
 use crate::{
     drivers::HttpEpisode,
     hosting::{EpisodeThread, try_runs_folder},
@@ -47,27 +43,13 @@ pub struct DemoArgs {
     #[arg(long, env = "TANDEM_RUNS", default_value = "runs", value_name = "DIR")]
     runs: PathBuf,
     #[command(flatten)]
-    scene: SceneFlag,
-    #[command(flatten)]
-    locomotion: LocomotionFlag,
-    #[command(flatten)]
-    sensing: SensingFlags,
-    #[command(flatten)]
-    renderer: RendererFlag,
+    world: WorldFlags,
 }
 
 /// Plays every seed. The program fails if too few episodes reach the last phase.
 pub fn run(args: DemoArgs) -> CommandResult {
     log_to_stderr(LevelFilter::WARN);
-    let flags = Layer {
-        scene: args.scene.file,
-        locomotion: args.locomotion.file,
-        state_estimate: Some(args.sensing.state_estimate),
-        sensors: Some(args.sensing.sensors),
-        renderer: Some(args.renderer.kind),
-        ..Layer::default()
-    };
-    let results = play_all(&args.runs, args.seeds, flags)?;
+    let results = play_all(&args.runs, args.seeds, args.world.layer())?;
     let recorded = results.iter().all(|result| result.recording_failed.is_none());
     Ok(if recorded && passed(&results) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

@@ -1,17 +1,18 @@
 //! The flags that say which episodes to play, and by robots of which kind.
 
-use std::{ops::RangeInclusive, path::PathBuf, str::FromStr};
+use std::{ops::RangeInclusive, str::FromStr};
 
 use clap::Args;
 use tandem_episodes::{
-    Controller, RendererKind, RobotFile, SceneFile, Sensing, SensorModel, SimError, StateSource,
+    RobotFile, SimError,
     evaluation::{EvaluationPlan, Shard, Starts},
     players::Policy,
     tasks::{self, Task},
 };
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol};
 
-use crate::settings::{one_of, read_scene};
+use super::WorldFlags;
+use crate::settings::one_of;
 
 /// Which episodes to play.
 #[derive(Debug, Args)]
@@ -38,72 +39,7 @@ pub struct EpisodeFlags {
     #[arg(long, default_value_t = 1, value_name = "N")]
     jobs: usize,
     #[command(flatten)]
-    scene: SceneFlag,
-    #[command(flatten)]
-    locomotion: LocomotionFlag,
-    #[command(flatten)]
-    sensing: SensingFlags,
-    #[command(flatten)]
-    renderer: RendererFlag,
-}
-
-/// The scene on the command line.
-#[derive(Debug, Args)]
-pub struct SceneFlag {
-    /// MJCF file of a scene in place of the tasks' own; its site `task` says where.
-    #[arg(long = "scene", env = "TANDEM_SCENE", value_name = "FILE")]
-    pub file: Option<PathBuf>,
-}
-
-impl SceneFlag {
-    /// Reads the scene from the file that the flag names.
-    fn read(&self) -> Result<Option<SceneFile>, SimError> {
-        self.file.as_deref().map(read_scene).transpose()
-    }
-}
-
-/// The base controller on the command line.
-#[derive(Debug, Args)]
-pub struct LocomotionFlag {
-    /// ONNX file with a velocity policy for the G1 in place of our own base controller; looped:FILE puts a loop over the robot's place around it.
-    #[arg(long = "locomotion", env = "TANDEM_LOCOMOTION", value_name = "FILE")]
-    pub file: Option<PathBuf>,
-}
-
-impl LocomotionFlag {
-    /// Which controller the flag names; its file is not read yet.
-    pub fn controller(&self) -> Controller {
-        Controller::from_file(self.file.as_deref())
-    }
-}
-
-/// What robots know of themselves, on the command line.
-#[derive(Debug, Args)]
-pub struct SensingFlags {
-    /// Where robots have their own state from: an estimator over what they sense, or the simulator, which no real robot has.
-    #[arg(long, env = "TANDEM_STATE_ESTIMATE", value_name = "SOURCE", value_parser = one_of(StateSource::ALL, StateSource::name))]
-    #[arg(default_value = StateSource::default().name())]
-    pub state_estimate: StateSource,
-    /// What robots sense: everything exactly, or with noise, bias and latency as a G1 does.
-    #[arg(long, env = "TANDEM_SENSORS", value_name = "NAME", value_parser = one_of(SensorModel::ALL, SensorModel::name))]
-    #[arg(default_value = SensorModel::default().name())]
-    pub sensors: SensorModel,
-}
-
-impl SensingFlags {
-    /// Both as one value.
-    pub fn sensing(&self) -> Sensing {
-        Sensing { state_estimate: self.state_estimate, sensors: self.sensors }
-    }
-}
-
-/// The renderer on the command line.
-#[derive(Debug, Args)]
-pub struct RendererFlag {
-    /// Who draws pictures: a graphics processor, the embedded renderer, or whichever is there.
-    #[arg(long = "renderer", env = "TANDEM_RENDERER", value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name),
-          default_value = RendererKind::default().name())]
-    pub kind: RendererKind,
+    world: WorldFlags,
 }
 
 /// Tasks named on the command line. The name keeps clap from taking it for a flag that is given several times.
@@ -131,18 +67,18 @@ impl EpisodeFlags {
         let disclosure = self.disclosure.unwrap_or(assistance.disclosure());
         let hints = self.hints.unwrap_or(assistance.hints());
         tracing::info!("{}", assistance.about(disclosure, hints));
-        tracing::info!("{}", self.renderer.kind.describe()?);
+        tracing::info!("{}", self.world.renderer().describe()?);
         Ok(EvaluationPlan {
             player,
             protocol: self.protocol,
-            scene: self.scene.read()?,
+            scene: self.world.read_scene()?,
             robot: RobotFile::default(),
-            locomotion: self.locomotion.controller(),
-            sensing: self.sensing.sensing(),
+            locomotion: self.world.controller(),
+            sensing: self.world.sensing(),
             assistance,
             disclosure,
             hints,
-            renderer: self.renderer.kind,
+            renderer: self.world.renderer(),
             tasks: self.tasks.0,
             seeds: self.seeds.0.collect(),
             starts: Starts::Task,

@@ -3,7 +3,9 @@
 mod agent;
 mod episode;
 mod policy;
+mod world;
 
 pub use agent::AgentFlags;
-pub use episode::{EpisodeFlags, LocomotionFlag, RendererFlag, SceneFlag, Seeds, SensingFlags};
+pub use episode::{EpisodeFlags, Seeds};
 pub use policy::PolicyFlags;
+pub use world::{LocomotionFlag, SensingFlags, WorldFlags};

@@ -1,0 +1,93 @@
+//! The flags that say in which room, by robots of which kind, and who draws it.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use tandem_episodes::{Controller, RendererKind, SceneFile, Sensing, SensorModel, SimError, StateSource};
+
+use crate::settings::{Layer, one_of, read_scene};
+
+/// What episodes are played in, the same for each of them.
+#[derive(Debug, Args)]
+pub struct WorldFlags {
+    /// MJCF file of a scene in place of the tasks' own; its site `task` says where.
+    #[arg(long, env = "TANDEM_SCENE", value_name = "FILE")]
+    scene: Option<PathBuf>,
+    #[command(flatten)]
+    locomotion: LocomotionFlag,
+    #[command(flatten)]
+    sensing: SensingFlags,
+    /// Who draws pictures: a graphics processor, the embedded renderer, or whichever is there.
+    #[arg(long, env = "TANDEM_RENDERER", value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name),
+          default_value = RendererKind::default().name())]
+    renderer: RendererKind,
+}
+
+impl WorldFlags {
+    /// Reads the scene from the file that the flag names.
+    pub fn read_scene(&self) -> Result<Option<SceneFile>, SimError> {
+        self.scene.as_deref().map(read_scene).transpose()
+    }
+
+    /// Which controller the flag names; its file is not read yet.
+    pub fn controller(&self) -> Controller {
+        self.locomotion.controller()
+    }
+
+    /// What robots know of themselves.
+    pub fn sensing(&self) -> Sensing {
+        self.sensing.sensing()
+    }
+
+    /// Who draws.
+    pub fn renderer(&self) -> RendererKind {
+        self.renderer
+    }
+
+    /// The same as settings of a server.
+    pub fn layer(self) -> Layer {
+        Layer {
+            scene: self.scene,
+            locomotion: self.locomotion.file,
+            state_estimate: Some(self.sensing.state_estimate),
+            sensors: Some(self.sensing.sensors),
+            renderer: Some(self.renderer),
+            ..Layer::default()
+        }
+    }
+}
+
+/// The base controller on the command line.
+#[derive(Debug, Args)]
+pub struct LocomotionFlag {
+    /// ONNX file with a velocity policy for the G1 in place of our own base controller; looped:FILE puts a loop over the robot's place around it.
+    #[arg(long = "locomotion", env = "TANDEM_LOCOMOTION", value_name = "FILE")]
+    file: Option<PathBuf>,
+}
+
+impl LocomotionFlag {
+    /// Which controller the flag names; its file is not read yet.
+    pub fn controller(&self) -> Controller {
+        Controller::from_file(self.file.as_deref())
+    }
+}
+
+/// What robots know of themselves, on the command line.
+#[derive(Debug, Args)]
+pub struct SensingFlags {
+    /// Where robots have their own state from: an estimator over what they sense, or the simulator, which no real robot has.
+    #[arg(long, env = "TANDEM_STATE_ESTIMATE", value_name = "SOURCE", value_parser = one_of(StateSource::ALL, StateSource::name))]
+    #[arg(default_value = StateSource::default().name())]
+    state_estimate: StateSource,
+    /// What robots sense: everything exactly, or with noise, bias and latency as a G1 does.
+    #[arg(long, env = "TANDEM_SENSORS", value_name = "NAME", value_parser = one_of(SensorModel::ALL, SensorModel::name))]
+    #[arg(default_value = SensorModel::default().name())]
+    sensors: SensorModel,
+}
+
+impl SensingFlags {
+    /// Both as one value.
+    pub fn sensing(&self) -> Sensing {
+        Sensing { state_estimate: self.state_estimate, sensors: self.sensors }
+    }
+}
