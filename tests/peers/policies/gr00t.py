@@ -1,15 +1,18 @@
 """Plays an episode by a policy behind GR00T's wire format, msgpack over ZMQ, through `gateway/examples/bridges/gr00t_zmq.py`. The server
-here reads and writes as GR00T's `PolicyServer` does; no model is behind it.
+here reads and writes as GR00T's `PolicyServer` does; no model is behind it. GR00T itself is on no package registry.
 
     pip install -r tests/peers/policies/gr00t.txt
+    pip install ./gateway/python
     cargo build --release
     python tests/peers/policies/gr00t.py target/release/tandem
 """
 
 import io
+import json
 import pathlib
 import subprocess
 import sys
+import tempfile
 import threading
 
 import msgpack
@@ -17,6 +20,9 @@ import numpy as np
 import zmq
 
 from arm_raise import RAISED_RAD, evaluate, tandem_of_command_line
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "environments"))
+from demonstration import SEED, TASK, rows
 
 BRIDGE = pathlib.Path(__file__).resolve().parents[3] / "gateway/examples/bridges/gr00t_zmq.py"
 ROWS = 16
@@ -68,16 +74,57 @@ class Server:
         return action, {"model": "none"}
 
 
-def main():
-    tandem = tandem_of_command_line()
-    server = Server()
+class Demonstration(Server):
+    """Tells the robots what an expert told them."""
+
+    def __init__(self, told):
+        self.told, self.looks = told, {}
+        super().__init__()
+
+    def get_action(self, observation, options):
+        if not observation["video.ego_view"].any():
+            at = np.zeros(ROWS, int)  # a trial without a robot
+        else:
+            [words] = observation["annotation.human.task_description"]
+            look = self.looks[words] = self.looks.get(words, -1) + 1
+            at = np.minimum(np.arange(look * ROWS, (look + 1) * ROWS), len(self.told) - 1)
+        robot = 0 if "Take the bottle" in observation["annotation.human.task_description"][0] else 1
+        told = self.told[at, robot].astype(np.float32)[None]
+        begin, action = 0, {}
+        for part, width in {**PARTS, "base": 4}.items():
+            action[f"action.{part}"] = told[..., begin : begin + width]
+            begin += width
+        base = action.pop("action.base")
+        return {**action, "action.base_height_command": base[..., 3:], "action.navigate_command": base[..., :3]}, {}
+
+
+def asked(tandem, server, run):
+    """What `run` gives, of an address at which `server` answers behind the bridge."""
     command = [sys.executable, BRIDGE, "--server", f"tcp://127.0.0.1:{server.port}", "--port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as bridge:
         try:
             url = bridge.stdout.readline().split()[0]
-            results, done = evaluate(tandem, "--protocol", "benchmark", "--policy", f"act:{url}", "--policy-map", "gr00t_n17_g1")
+            return run(tandem, "--protocol", "benchmark", "--policy", f"act:{url}", "--policy-map", "gr00t_n17_g1")
         finally:
             bridge.terminate()
+
+
+def evaluate_demonstrated(tandem, *flags):
+    with tempfile.TemporaryDirectory() as folder:
+        command = [tandem, "evaluate", "--tasks", TASK, "--seeds", str(SEED), "--out", folder, *flags]
+        subprocess.run(command, check=True, capture_output=True)
+        return json.loads((pathlib.Path(folder) / "results.json").read_text())
+
+
+def main():
+    tandem = tandem_of_command_line()
+    with tempfile.TemporaryDirectory() as folder:
+        told = rows(pathlib.Path(folder), [tandem])
+    [episode] = asked(tandem, Demonstration(told), evaluate_demonstrated)["episodes"]
+    assert "p1" in episode["phases"], episode
+    print(f"gr00t      {episode['phases']} of an expert's rows")
+    server = Server()
+    results, done = asked(tandem, server, evaluate)
     [episode] = results["episodes"]
     # A trial, then fourteen requests for each robot and one more, and then the server fails.
     assert episode["env_steps"] == 14 * ROWS, (episode, done.stdout)

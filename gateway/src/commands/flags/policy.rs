@@ -26,8 +26,8 @@ const LIMIT_S: u32 = 3600;
 pub struct PolicyFlags {
     #[arg(long, value_name = "POLICY", default_value = "expert", value_parser = parse_policy, help = help())]
     policy: PolicyChoice,
-    /// How the policy at a server is asked and understood: a preset, openpi or gr00t_n17_g1, or a TOML file [default: openpi for
-    /// openpi:, none for act:].
+    /// How the policy at a server is asked and understood: a preset, openpi, xpolicylab or gr00t_n17_g1, or a TOML file [default:
+    /// openpi for openpi:, xpolicylab for xpolicylab:, none for act:].
     #[arg(long, value_name = "NAME|FILE")]
     policy_map: Option<String>,
     /// Longest that a program may run in one episode [default: 3600].
@@ -61,8 +61,8 @@ fn help() -> String {
     let players: Vec<String> = players.collect();
     format!(
         "Who plays: {}; exec:COMMAND, a program that is started anew for every episode; \
-         agent:MODEL, a language model, with flags of `tandem agent` as in agent:MODEL?api=anthropic&max-usd=2; openpi:ws://HOST:PORT or act:http://HOST:PORT/act, \
-         a learned policy at a server, or one for each robot, separated by commas",
+         agent:MODEL, a language model, with flags of `tandem agent` as in agent:MODEL?api=anthropic&max-usd=2; openpi:ws://HOST:PORT, \
+         xpolicylab:ws://HOST:PORT or act:http://HOST:PORT/act, a learned policy at a server, or one for each robot, separated by commas",
         players.join(", ")
     )
 }
@@ -83,7 +83,7 @@ fn parse_policy(text: &str) -> Result<PolicyChoice, String> {
         }
     }
     players::find(text).map(PolicyChoice::Player).map_err(|error| {
-        format!("{error}, exec:COMMAND, agent:MODEL, openpi:ws://HOST:PORT, act:http://HOST:PORT/act")
+        format!("{error}, exec:COMMAND, agent:MODEL, openpi:ws://HOST:PORT, xpolicylab:ws://HOST:PORT, act:http://HOST:PORT/act")
     })
 }
 
@@ -133,9 +133,7 @@ impl PolicyFlags {
                 )?)
             }
             (PolicyChoice::Remote(protocol, urls), map, None) => {
-                let default =
-                    (protocol == PolicyProtocol::Openpi).then(|| PolicyProtocol::Openpi.name().to_owned());
-                let Some(map) = map.or(default) else {
+                let Some(map) = map.or(protocol.preset().map(str::to_owned)) else {
                     let presets = PRESETS.map(|(name, _)| name).join(", ");
                     return Err(format!("{protocol}: needs --policy-map, a file or one of {presets}").into());
                 };
@@ -239,7 +237,7 @@ mod tests {
         check(&["--policy", "openpi:http://a"], "give openpi:ws://HOST:PORT");
         check(
             &["--policy", "act:http://a/act"],
-            "act: needs --policy-map, a file or one of openpi, gr00t_n17_g1",
+            "act: needs --policy-map, a file or one of openpi, xpolicylab, gr00t_n17_g1",
         );
         check(
             &["--policy", "openpi:ws://a", "--policy-map", "nothing.toml"],

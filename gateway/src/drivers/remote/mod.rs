@@ -6,6 +6,7 @@ mod client;
 mod columns;
 mod error;
 mod map;
+mod outstanding;
 mod policy_session;
 mod poses;
 mod request;
@@ -121,6 +122,7 @@ impl Policy for RemotePolicy {
 fn instructions(task: &Task) -> TaskInstructions {
     let robots = task.robots.iter();
     TaskInstructions {
+        task: task.id.into(),
         robots: robots.clone().map(|robot| robot.name.into()).collect(),
         per_robot: robots.map(|robot| robot.instruction.into()).collect(),
         joint: task.instruction.into(),

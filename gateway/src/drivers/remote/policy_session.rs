@@ -13,6 +13,7 @@ use super::{
     client::{PolicyClient, PolicyProtocol},
     error::RemoteError,
     map::{AnswerScope, PolicyMap},
+    outstanding::Outstanding,
     request::{ObservationHistory, PolicyObservation, TaskInstructions, request},
 };
 
@@ -43,18 +44,27 @@ impl<'a> PolicySession<'a> {
     ) -> Result<PolicySession<'a>, Vec<RemoteError>> {
         let plan = QueryPlan { map, instructions };
         let deadline = Instant::now() + Duration::from_secs_f64(map.connect_s);
-        let connect = |url: &str, robots: &[usize]| {
-            retry_until(deadline, |left| {
-                let mut client = protocol.open(url, left, plan.within())?;
+        let outstanding = Outstanding::default();
+        let connect = |url: &str, robots: &[usize], busy| {
+            let mut client = retry_until(deadline, |left| {
+                let mut client = protocol.open(url, &plan.instructions.task, left, plan.within())?;
                 plan.probe(&mut *client, robots)?;
+                client.begin_trial(plan.within())?;
                 Ok(client)
-            })
+            })?;
+            drop(busy);
+            outstanding.keep_alive(&mut *client);
+            Ok(client)
         };
         let opened: Vec<Result<Box<dyn PolicyClient>, RemoteError>> = thread::scope(|scope| {
             let connect = &connect;
             let connecting = urls.iter().zip(plan.queries());
-            let connecting: Vec<_> =
-                connecting.map(|(url, robots)| scope.spawn(move || connect(url, &robots))).collect();
+            let connecting: Vec<_> = connecting
+                .map(|(url, robots)| {
+                    let busy = outstanding.one();
+                    scope.spawn(move || connect(url, &robots, busy))
+                })
+                .collect();
             connecting.into_iter().map(joined).collect()
         });
         let (mut clients, mut failures) = (Vec::with_capacity(urls.len()), Vec::new());
@@ -113,13 +123,25 @@ impl<'a> PolicySession<'a> {
         };
         let answers: Result<Vec<Vec<RobotRows>>, RemoteError> = match &mut clients[..] {
             [shared] => queries.iter().map(|robots| ask(&mut **shared, robots)).collect(),
-            own => thread::scope(|scope| {
-                let ask = &ask;
-                let asking = own.iter_mut().zip(&queries);
-                let asked: Vec<_> =
-                    asking.map(|(client, robots)| scope.spawn(move || ask(&mut **client, robots))).collect();
-                asked.into_iter().map(joined).collect()
-            }),
+            own => {
+                let outstanding = Outstanding::default();
+                thread::scope(|scope| {
+                    let (ask, outstanding) = (&ask, &outstanding);
+                    let asking = own.iter_mut().zip(&queries);
+                    let asked: Vec<_> = asking
+                        .map(|(client, robots)| {
+                            let busy = outstanding.one();
+                            scope.spawn(move || {
+                                let answer = ask(&mut **client, robots);
+                                drop(busy);
+                                outstanding.keep_alive(&mut **client);
+                                answer
+                            })
+                        })
+                        .collect();
+                    asked.into_iter().map(joined).collect()
+                })
+            }
         };
         Ok(answers?.into_iter().flatten().collect())
     }

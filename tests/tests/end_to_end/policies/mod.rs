@@ -7,3 +7,5 @@ mod plans;
 mod programs;
 mod servers;
 mod trouble;
+mod xpolicylab;
+mod xpolicylab_server;

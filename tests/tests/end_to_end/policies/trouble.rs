@@ -116,7 +116,11 @@ fn an_evaluation_without_its_server_stops_and_goes_on_later() {
         let one_by_one = EvaluationPlan { jobs: 1, ..plan(policy, vec![1, 2, 3, 4], false) };
         evaluate(&one_by_one, folder.path(), &|_| {}).expect_err("nobody plays").to_string()
     };
-    for (protocol, scheme) in [(PolicyProtocol::Openpi, "ws://"), (PolicyProtocol::Act, "http://")] {
+    for (protocol, scheme) in [
+        (PolicyProtocol::Openpi, "ws://"),
+        (PolicyProtocol::Act, "http://"),
+        (PolicyProtocol::XPolicyLab, "ws://"),
+    ] {
         let absent = [nowhere(), nowhere()].map(|address| format!("{scheme}{address}"));
         let text = refusal(&RemotePolicy::new(protocol, absent.to_vec(), fast.clone()));
         for url in &absent {
@@ -190,7 +194,7 @@ fn a_page_in_html_is_shown() {
         let server = ActServer::start_with_text(move |_| (status, PAGE.into()));
         let url = match protocol {
             PolicyProtocol::Act => server.url(),
-            PolicyProtocol::Openpi => format!("ws://{}", server.address),
+            PolicyProtocol::Openpi | PolicyProtocol::XPolicyLab => format!("ws://{}", server.address),
         };
         let policy = RemotePolicy::new(protocol, vec![url], map(folder.path(), FAST));
         match evaluate(&plan(&policy, vec![1], false), folder.path(), &|_| {}) {
@@ -204,6 +208,7 @@ fn a_page_in_html_is_shown() {
         (502, PolicyProtocol::Act, "failed: 502 Bad Gateway: "),
         (200, PolicyProtocol::Act, "expected JSON; came, with status 200 OK, \""),
         (502, PolicyProtocol::Openpi, "it answers HTTP 502 Bad Gateway: "),
+        (502, PolicyProtocol::XPolicyLab, "it answers HTTP 502 Bad Gateway: "),
         (200, PolicyProtocol::Openpi, "it answers HTTP 200 OK: "),
     ] {
         let text = told(status, protocol);

@@ -169,7 +169,12 @@ mod tests {
 
     fn instructions() -> TaskInstructions {
         let names = ["A", "B"].map(String::from).to_vec();
-        TaskInstructions { per_robot: names.clone(), joint: String::new(), robots: names }
+        TaskInstructions {
+            task: String::new(),
+            per_robot: names.clone(),
+            joint: String::new(),
+            robots: names,
+        }
     }
 
     fn map(text: &str) -> PolicyMap {

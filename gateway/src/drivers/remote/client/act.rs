@@ -77,6 +77,13 @@ impl PolicyClient for Act {
         let reply = serde_json::from_str(&text).map_err(no_json).and_then(from_json);
         reply.map_err(|reason| RemoteError::Unreadable { url: self.url.clone(), reason })
     }
+
+    /// Each request stands for itself.
+    fn begin_trial(&mut self, _within: Duration) -> Result<(), RemoteError> {
+        Ok(())
+    }
+
+    fn keep_alive(&mut self) {}
 }
 
 /// As JSON, with arrays as the Python package `json_numpy` writes them: `{"__numpy__": base64, "dtype": "<f4", "shape": [2, 3]}`.

@@ -1,7 +1,10 @@
 //! Clients of policy servers: one file per protocol.
 
 mod act;
+mod link;
+mod msgpack;
 mod openpi;
+mod xpolicylab;
 
 use std::{fmt, time::Duration};
 
@@ -14,6 +17,12 @@ use super::{
 pub trait PolicyClient: Send {
     /// The answer to a request, if it comes in time.
     fn ask(&mut self, request: &RequestValue, within: Duration) -> Result<ReplyValue, RemoteError>;
+
+    /// What was asked before is over: the policy begins anew, where its protocol has a word for that.
+    fn begin_trial(&mut self, within: Duration) -> Result<(), RemoteError>;
+
+    /// Tells a server that has not been asked for a while that somebody is there still.
+    fn keep_alive(&mut self);
 }
 
 /// How a server is spoken to.
@@ -23,38 +32,54 @@ pub enum PolicyProtocol {
     Openpi,
     /// JSON with numpy arrays over HTTP, as the `/act` of OpenVLA and others.
     Act,
+    /// Frames of msgpack over WebSocket, as XPolicyLab's servers.
+    XPolicyLab,
 }
 
 impl PolicyProtocol {
-    pub const ALL: [PolicyProtocol; 2] = [PolicyProtocol::Openpi, PolicyProtocol::Act];
+    pub const ALL: [PolicyProtocol; 3] =
+        [PolicyProtocol::Openpi, PolicyProtocol::Act, PolicyProtocol::XPolicyLab];
 
     /// As the command line calls it.
     pub fn name(self) -> &'static str {
         match self {
             PolicyProtocol::Openpi => "openpi",
             PolicyProtocol::Act => "act",
+            PolicyProtocol::XPolicyLab => "xpolicylab",
         }
     }
 
     /// What its addresses begin with.
     pub fn scheme(self) -> &'static str {
         match self {
-            PolicyProtocol::Openpi => "ws://",
+            PolicyProtocol::Openpi | PolicyProtocol::XPolicyLab => link::SCHEME,
             PolicyProtocol::Act => "http://",
         }
     }
 
-    /// A client of the server at `url`, which has to be found within `connect_within`; it may be busy then, and has `reply_within` to
-    /// say who it is, or as long as to be found if that is longer.
+    /// The preset that is meant where no map is given.
+    pub fn preset(self) -> Option<&'static str> {
+        match self {
+            PolicyProtocol::Openpi | PolicyProtocol::XPolicyLab => Some(self.name()),
+            PolicyProtocol::Act => None,
+        }
+    }
+
+    /// A client of the server at `url` for an episode of `task`. The server has to be found within `connect_within`; it may be busy
+    /// then, and has `reply_within` to say who it is, or as long as to be found if that is longer.
     pub fn open(
         self,
         url: &str,
+        task: &str,
         connect_within: Duration,
         reply_within: Duration,
     ) -> Result<Box<dyn PolicyClient>, RemoteError> {
         Ok(match self {
             PolicyProtocol::Openpi => Box::new(openpi::Openpi::connect(url, connect_within, reply_within)?),
             PolicyProtocol::Act => Box::new(act::Act::new(url, connect_within)),
+            PolicyProtocol::XPolicyLab => {
+                Box::new(xpolicylab::XPolicyLab::connect(url, task, connect_within, reply_within)?)
+            }
         })
     }
 }

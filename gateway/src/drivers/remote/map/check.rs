@@ -258,10 +258,15 @@ mod tests {
         check("answer = \"all\"\nscope = \"global\"", "put {robot} into the key \"observation/image\"");
         check("scop = \"global\"", "unknown field `scop`");
         check("[images]\n\"i\" = { camera = \"egocentric\", size = [0, 9] }", "from 1 to 4096");
-        assert!(read("preset = \"opempi\"").unwrap_err().to_string().contains("have: openpi, gr00t_n17_g1"));
+        assert!(
+            read("preset = \"opempi\"")
+                .unwrap_err()
+                .to_string()
+                .contains("have: openpi, xpolicylab, gr00t_n17_g1")
+        );
         let text = PolicyMap::find("opempi").unwrap_err().to_string();
         assert!(
-            text.starts_with("no policy map \"opempi\"") && text.contains("openpi, gr00t_n17_g1"),
+            text.starts_with("no policy map \"opempi\"") && text.contains("openpi, xpolicylab, gr00t_n17_g1"),
             "{text}"
         );
     }

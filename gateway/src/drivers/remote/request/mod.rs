@@ -18,6 +18,8 @@ use super::{
 /// The instructions of a task, as policies are given them.
 #[derive(Clone, Debug)]
 pub struct TaskInstructions {
+    /// The task's id.
+    pub task: String,
     /// Names of the robots, in the task's order.
     pub robots: Vec<String>,
     /// What each robot has to do.
@@ -120,6 +122,7 @@ mod tests {
     fn instructions() -> TaskInstructions {
         let both = |texts: [&str; 2]| texts.map(String::from).to_vec();
         TaskInstructions {
+            task: "handover".into(),
             robots: both(["A", "B"]),
             per_robot: both(["give", "take"]),
             joint: "pass it on".into(),
@@ -153,6 +156,10 @@ mod tests {
             asked("openpi"),
             ["observation/image |u1 [224, 224, 3]", "observation/state <f4 [43]", "prompt take"]
         );
+        let xpolicylab = asked("xpolicylab");
+        assert_eq!(xpolicylab[0], "vision cam_head color |u1 [240, 320, 3]");
+        assert!(xpolicylab.contains(&"state left_ee_joint_state <f4 [7]".into()), "{xpolicylab:?}");
+        assert_eq!(xpolicylab.last().map(String::as_str), Some("instruction take"));
         let gr00t = asked("gr00t_n17_g1");
         assert_eq!(gr00t[0], "video.ego_view |u1 [1, 1, 240, 320, 3]");
         assert!(gr00t.contains(&"state.left_leg <f4 [1, 1, 6]".into()), "{gr00t:?}");

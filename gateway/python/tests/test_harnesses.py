@@ -1,0 +1,113 @@
+"""Harnesses of others: their own checks, and an episode of each. What is not installed here is left out."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import tandem
+
+gym = pytest.importorskip("gymnasium")
+SIZE: dict[str, Any] = {"observation_width": 32, "observation_height": 24, "look_every": 10}
+
+
+def held(state: np.ndarray[Any, np.dtype[Any]], columns: list[str]) -> np.ndarray[Any, np.dtype[np.float32]]:
+    """The row that keeps the robots as they are, of a state that has all joints."""
+    names = [name for name in tandem._native.state_columns() if name.endswith("_joint_rad")] + columns[-4:]
+    robots: np.ndarray[Any, np.dtype[Any]] = np.reshape(state, (2, -1))
+    row = robots[:, [names.index(name) for name in columns]].astype(np.float32)
+    row[:, -1] = 0.74
+    return row.ravel()
+
+
+def test_vla_eval_plays_its_benchmark() -> None:
+    pytest.importorskip("vla_eval")
+    # Modules that are typed only where the harness is installed.
+    kind: Any = importlib.import_module("vla_eval_tandem").TandemBenchmark
+    importlib.import_module("vla_eval.render").apply_render_mode(kind, "cpu", "tandem")
+    benchmark = kind(seed=2003, **SIZE)
+    tasks = benchmark.get_tasks()
+    assert {"name": "handover", "suite": "tandem"} in tasks and len(tasks) == len(tandem.tasks().tasks)
+    task: dict[str, Any] = {"name": "handover", "episode_idx": 0}
+    first = benchmark.make_obs(benchmark.reset(task), task)
+    assert {name: image.shape for name, image in first["images"].items()} == {"A": (24, 32, 3), "B": (24, 32, 3)}
+    assert first["state"].shape == (94,) and first["states"] is first["state"]
+    assert first["instructions"].keys() == {"A", "B"} and first["task_description"]
+    # The next episode is another, and the first one begins again as it did.
+    other = benchmark.reset({**task, "episode_idx": 1})
+    assert not np.array_equal(other["pixels"]["A"], first["images"]["A"])
+    again = benchmark.make_obs(benchmark.reset(task), task)
+    assert np.array_equal(again["images"]["A"], first["images"]["A"])
+
+    row = held(first["state"], tandem._native.action_columns())
+    stepped = benchmark.step({"actions": row})
+    assert not benchmark.check_done(stepped)
+    chunk = benchmark.step({"actions": np.stack([row] * 2000)})
+    assert benchmark.check_done(chunk), "the budget ends it within the chunk"
+    result = benchmark.get_step_result(chunk)
+    assert result == {"success": False, "phases": 0, "p1": False, "p2": False, "p3": False}
+    assert benchmark.get_metric_keys().keys() == result.keys()
+    with pytest.raises(ValueError, match=r"handover takes \(70,\)"):
+        benchmark.step({"actions": np.zeros(7)})
+    benchmark.cleanup()
+
+
+def test_inspect_robots_finds_its_embodiment_conformant() -> None:
+    pytest.importorskip("inspect_robots")
+    from inspect_robots.conformance import assert_embodiment_conformant
+    from inspect_robots.registry import resolve
+
+    for told in tandem.tasks().tasks:
+        embodiment = resolve("embodiment", "tandem", task=told.id)
+        assert_embodiment_conformant(embodiment.info)
+        assert all(robot.instruction in embodiment.info.docs for robot in told.robots)
+        embodiment.close()
+    with pytest.raises(ValueError, match="no task 'handove'; have: "):
+        resolve("embodiment", "tandem", task="handove")
+
+
+def test_inspect_robots_evaluates_episodes_by_their_seeds(tmp_path: Path) -> None:
+    pytest.importorskip("inspect_robots")
+    from inspect_robots import eval as evaluate
+    from inspect_robots.policy import PolicyBase, PolicyInfo
+    from inspect_robots.registry import resolve
+    from inspect_robots.types import Action, ActionChunk, Observation
+
+    embodiment = resolve("embodiment", "tandem", **SIZE)
+    info = embodiment.info
+
+    class Still(PolicyBase):
+        """Keeps the robots as it first sees them."""
+
+        info = PolicyInfo("still", embodiment.info.action_space, embodiment.info.observation_space, 50.0)
+        began: list[Observation] = []  # noqa: RUF012
+
+        def reset(self, scene: Any) -> None:
+            self.row: Any = None
+
+        def act(self, observation: Observation) -> ActionChunk:
+            if self.row is None:
+                self.began.append(observation)
+                self.row = np.array(observation.state["joint_pos"])
+                self.row[34::35] = 0.74
+            return ActionChunk([Action(self.row)] * 50, 50.0)
+
+    task = resolve("task", "tandem", seeds="2003-2004")
+    assert [scene.init_seed for scene in task.scenes] == [2003, 2004]
+    policy = Still()
+    task.epochs, task.max_steps = 2, 60
+    (log,) = evaluate(task, policy, embodiment, log_dir=str(tmp_path))
+    assert log.status == "success"
+    assert log.results.metrics == {"success_at_end": 0.0, "tandem_phases": 0.0}
+    state = [seen.state["joint_pos"] for seen in policy.began]
+    pictures = [seen.images["A"] for seen in policy.began]
+    assert len(state) == 4 and state[0].shape == info.action_space.shape
+    assert np.array_equal(pictures[0], pictures[1]) and np.array_equal(pictures[2], pictures[3])
+    assert not np.array_equal(pictures[0], pictures[2])
+    with pytest.raises(ValueError, match="give one, as 2000, or a range"):
+        resolve("task", "tandem", seeds="all")
+    embodiment.close()

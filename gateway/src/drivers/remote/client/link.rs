@@ -1,0 +1,190 @@
+//! A WebSocket to a policy's server, on which nothing takes longer than it may.
+
+use std::{
+    io::{self, Read, Write},
+    net::{TcpStream, ToSocketAddrs},
+    time::{Duration, Instant},
+};
+
+use tungstenite::{Error, HandshakeError, Message, WebSocket, error::ProtocolError};
+
+use crate::drivers::remote::error::{RemoteError, gist};
+
+/// What addresses of such servers begin with.
+pub const SCHEME: &str = "ws://";
+
+/// A connection to one server.
+pub struct PolicySocket {
+    url: String,
+    socket: WebSocket<DeadlineStream>,
+}
+
+/// What a server sends of its own.
+pub enum Frame {
+    Bytes(Vec<u8>),
+    Text(String),
+}
+
+impl PolicySocket {
+    /// Connects to a server that has to be found within `connect_within`, and may be busy with somebody else until `within`.
+    pub fn connect(
+        url: &str,
+        connect_within: Duration,
+        within: Duration,
+    ) -> Result<PolicySocket, RemoteError> {
+        let unreachable = |reason: String| RemoteError::Unreachable { url: url.into(), reason };
+        let mut stream =
+            DeadlineStream::connect(url, connect_within).map_err(|error| unreachable(error.to_string()))?;
+        stream.deadline = Instant::now() + within;
+        let page = stream.stream.try_clone();
+        let (socket, _) = tungstenite::client(url, stream).map_err(|error| match error {
+            // A proxy's page of an error, or another server than a policy's.
+            HandshakeError::Failure(Error::Http(response)) => {
+                let status = response.status();
+                let begun = response.into_body().unwrap_or_default();
+                unreachable(format!("it answers HTTP {status}: {}", gist(&page_text(begun, page))))
+            }
+            HandshakeError::Failure(Error::Io(error)) if is_late(&error) => silent(url, within),
+            HandshakeError::Failure(error) => unreachable(error.to_string()),
+            HandshakeError::Interrupted(_) => silent(url, within),
+        })?;
+        Ok(PolicySocket { url: url.into(), socket })
+    }
+
+    pub fn url(&self) -> &str {
+        &self.url
+    }
+
+    /// Sends a binary message, after which the server has until `within` to answer.
+    pub fn send(&mut self, bytes: Vec<u8>, within: Duration) -> Result<(), RemoteError> {
+        self.socket.get_mut().deadline = Instant::now() + within;
+        self.socket.send(Message::binary(bytes)).map_err(|error| self.failed(error, within))
+    }
+
+    /// What comes next, before the deadline of what was sent last; `within` is how long that was.
+    pub fn hear(&mut self, within: Duration) -> Result<Frame, RemoteError> {
+        loop {
+            match self.socket.read().map_err(|error| self.failed(error, within))? {
+                Message::Binary(bytes) => return Ok(Frame::Bytes(bytes.into())),
+                Message::Text(text) => return Ok(Frame::Text(text.as_str().into())),
+                Message::Close(frame) => {
+                    let reason = frame.map_or("it closed the connection".into(), |frame| {
+                        format!("it closed the connection: {} {}", frame.code, gist(&frame.reason))
+                    });
+                    return Err(RemoteError::Gone { url: self.url.clone(), reason });
+                }
+                // Answered by the library.
+                Message::Ping(_) | Message::Pong(_) | Message::Frame(_) => {}
+            }
+        }
+    }
+
+    /// Answers a server that asks whether anybody is there still. What else goes wrong shows with the next request.
+    pub fn answer_pings(&mut self) {
+        self.socket.get_mut().deadline = Instant::now() + PING_WAIT;
+        let _ = self.hear(PING_WAIT);
+    }
+
+    fn failed(&self, error: Error, within: Duration) -> RemoteError {
+        let url = self.url.clone();
+        match error {
+            Error::Io(error) if is_late(&error) => RemoteError::Slow { url, within },
+            Error::Protocol(ProtocolError::ResetWithoutClosingHandshake) => {
+                RemoteError::Gone { url, reason: error.to_string() }
+            }
+            Error::Protocol(_) | Error::Utf8(_) | Error::Capacity(_) => self.unreadable(error.to_string()),
+            error => RemoteError::Gone { url, reason: error.to_string() },
+        }
+    }
+
+    pub fn unreadable(&self, reason: String) -> RemoteError {
+        RemoteError::Unreadable { url: self.url.clone(), reason }
+    }
+}
+
+/// The server at `url` takes connections and says nothing.
+pub fn silent(url: &str, within: Duration) -> RemoteError {
+    let reason = format!("it says nothing within {} s of the connection", within.as_secs_f64());
+    RemoteError::Unreachable { url: url.into(), reason }
+}
+
+/// The beginning of a page of which `begun` came with its header, as far as it comes soon.
+fn page_text(mut begun: Vec<u8>, stream: io::Result<TcpStream>) -> String {
+    if begun.is_empty()
+        && let Ok(mut stream) = stream
+        && stream.set_read_timeout(Some(PAGE_WAIT)).is_ok()
+    {
+        let mut buffer = [0; 4096];
+        let length = stream.read(&mut buffer).unwrap_or_default();
+        begun.extend_from_slice(&buffer[..length]);
+    }
+    String::from_utf8_lossy(&begun).into_owned()
+}
+
+/// How long an address is tried at least.
+const SHORTEST_TRIAL: Duration = Duration::from_millis(10);
+
+/// How long a ping that has come takes to be read and answered.
+const PING_WAIT: Duration = Duration::from_millis(20);
+
+/// How long the text of a page may follow its header.
+const PAGE_WAIT: Duration = Duration::from_secs(1);
+
+fn is_late(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut)
+}
+
+/// A connection on which nothing takes longer than until a deadline, however small the pieces are in which it comes.
+struct DeadlineStream {
+    stream: TcpStream,
+    deadline: Instant,
+}
+
+impl DeadlineStream {
+    fn connect(url: &str, within: Duration) -> io::Result<DeadlineStream> {
+        let address = url.strip_prefix(SCHEME).unwrap_or(url);
+        let address = address.split('/').next().unwrap_or_default();
+        let mut failure = io::Error::other("no such host");
+        let deadline = Instant::now() + within;
+        let mut addresses = address.to_socket_addrs()?;
+        while let Some(address) = addresses.next() {
+            // Each has its share of what is left, which must not be nothing.
+            let left = deadline.saturating_duration_since(Instant::now());
+            let share = left / (addresses.len() as u32 + 1);
+            match TcpStream::connect_timeout(&address, share.max(SHORTEST_TRIAL)) {
+                Ok(stream) => {
+                    stream.set_nodelay(true)?;
+                    return Ok(DeadlineStream { stream, deadline });
+                }
+                Err(error) => failure = error,
+            }
+        }
+        Err(failure)
+    }
+
+    /// What is left; no time at all is a time that nothing takes, which the system would take for any time.
+    fn left(&self) -> io::Result<Option<Duration>> {
+        match self.deadline.saturating_duration_since(Instant::now()) {
+            Duration::ZERO => Err(io::ErrorKind::TimedOut.into()),
+            left => Ok(Some(left)),
+        }
+    }
+}
+
+impl Read for DeadlineStream {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.stream.set_read_timeout(self.left()?)?;
+        self.stream.read(buffer)
+    }
+}
+
+impl Write for DeadlineStream {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.stream.set_write_timeout(self.left()?)?;
+        self.stream.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.stream.flush()
+    }
+}
