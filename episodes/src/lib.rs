@@ -44,7 +44,7 @@ pub mod tasks;
 pub use commands::{Called, OperatorCall, OperatorCommand};
 pub use describe::{brief, task_list};
 pub use error::{CheckpointError, EpisodeError, SceneError};
-pub use fingerprint::name_program;
+pub use fingerprint::{build, name_program};
 pub use instructions::{Instructions, InstructionsError};
 pub use observation::{Picture, RobotObservation, RobotView, TeamObservation};
 pub use output::{OutputError, create_new_private_folder, create_private_folder, write_whole};

@@ -7,6 +7,7 @@
 mod arrays;
 mod episode;
 mod evaluation;
+mod players;
 mod program;
 mod recording;
 mod refusal;

@@ -17,14 +17,14 @@ from . import _native
 from ._native import Snapshot
 from .base import BaseEpisode, Observation, Stepped
 from .client import Client, RemoteEpisode
-from .contract.arguments import JointChunk, PixelRegion, WalkMove, WristMove
+from .contract.arguments import JointChunk, PixelRegion, SurfaceQuery, WalkMove, WristMove
 from .contract.commands import CommandReply
 from .contract.depth import DepthReply
 from .contract.replies import ReachReply, ResultReply, RobotState, StatusReply
 from .contract.start import Briefing, TaskList
 from .episode import Episode
 from .errors import EpisodeEnded, Refused, SimulatorFailed, TandemError, Unreachable
-from .evaluation import Evaluation, evaluate, report, tasks
+from .evaluation import Evaluation, collect, evaluate, report, tasks
 from .program import main
 from .recording import Picture, RecordedCall, Recording
 from .server import Server, serve
@@ -58,11 +58,13 @@ __all__ = [
     "Snapshot",
     "StatusReply",
     "Stepped",
+    "SurfaceQuery",
     "TandemError",
     "TaskList",
     "Unreachable",
     "WalkMove",
     "WristMove",
+    "collect",
     "evaluate",
     "main",
     "report",

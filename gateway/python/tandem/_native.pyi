@@ -26,7 +26,7 @@ def loaded_from(path: Path | str) -> None: ...
 def run_command_line(arguments: list[str]) -> int: ...
 def write_report(arguments: list[str]) -> None: ...
 def evaluate(
-    play: Callable[[Episode, str], None],
+    play: Callable[..., object] | None,
     name: str,
     settings: str,
     protocol: str,
@@ -36,6 +36,7 @@ def evaluate(
     record: bool,
     out: Path,
     progress: Callable[[str, bool], None] | None,
+    elsewhere: bool,
 ) -> str: ...
 
 class Snapshot:

@@ -17,6 +17,7 @@ from .contract.commands import StopReason
 from .contract.replies import CameraCalibration, EndReason, Protocol, ResultReply, RobotState
 from .contract.start import Briefing
 from .contract.tools import Tools
+from .errors import TandemError
 
 Renderer: TypeAlias = Literal["auto", "cpu", "gpu"]
 """Who draws: a graphics processor, the embedded renderer, or whichever is there."""
@@ -28,6 +29,7 @@ Sensors: TypeAlias = Literal["ideal", "g1"]
 """What robots sense: everything exactly, or with noise, bias and latency as a G1 does."""
 
 Self = TypeVar("Self", bound="BaseEpisode")
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -91,14 +93,16 @@ class BaseEpisode(Tools):
     protocol: Protocol
     """The rules: "agentic" for agents that think between commands, "benchmark" for learned policies."""
 
+    _briefing: Briefing | None = None
+
     @abstractmethod
     def start(self) -> Briefing:
         """Makes the world, at the task's beginning, and returns what a policy has to know. Again: begins anew."""
 
     @property
-    @abstractmethod
     def briefing(self) -> Briefing:
         """What the start has told."""
+        return begun(self._briefing)
 
     @property
     def robots(self) -> tuple[str, ...]:
@@ -150,6 +154,13 @@ class BaseEpisode(Tools):
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self.close()
+
+
+def begun(part: T | None) -> T:
+    """What an episode has from its start on."""
+    if part is None:
+        raise TandemError("the episode has not begun; call start() first, or use it in a `with` block")
+    return part
 
 
 def chunk_of(rows: ArrayLike, robots: int) -> NDArray[np.float32]:

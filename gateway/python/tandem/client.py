@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .base import BaseEpisode, Observation, Stepped, chunk_of
+from .base import BaseEpisode, Observation, Stepped, begun, chunk_of
 from .contract.arguments import Json
 from .contract.replies import CameraCalibration, Protocol, ResultReply, RobotState
 from .contract.start import Briefing, TaskList
@@ -92,7 +92,6 @@ class RemoteEpisode(BaseEpisode):
         self.protocol = protocol
         self._client = client
         self._id: str | None = None
-        self._briefing: Briefing | None = None
         self._result: ResultReply | None = None
 
     def start(self) -> Briefing:
@@ -108,15 +107,7 @@ class RemoteEpisode(BaseEpisode):
     @property
     def episode_id(self) -> str:
         """What the server calls it, and the folder of its recording."""
-        if self._id is None:
-            raise TandemError("the episode has not begun; call start() first, or use it in a `with` block")
-        return self._id
-
-    @property
-    def briefing(self) -> Briefing:
-        if self._briefing is None:
-            raise TandemError("the episode has not begun; call start() first, or use it in a `with` block")
-        return self._briefing
+        return begun(self._id)
 
     def call(self, tool: str, arguments: Mapping[str, Json]) -> Any:
         return self._client.request("POST", f"/v1/episodes/{self.episode_id}/tools/{tool}", arguments)

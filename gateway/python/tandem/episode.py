@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _native
 from ._native import Snapshot
-from .base import BaseEpisode, Observation, Renderer, Sensors, StateEstimate, Stepped, chunk_of, settings_json
+from .base import BaseEpisode, Observation, Renderer, Sensors, StateEstimate, Stepped, begun, chunk_of, settings_json
 from .contract.arguments import Json
 from .contract.commands import StopReason
 from .contract.replies import Assistance, CameraCalibration, EndReason, Protocol, ResultReply, RobotState
@@ -61,7 +61,6 @@ class Episode(BaseEpisode):
             scene=None if scene is None else Path(scene),
         )
         self._native: _native.Episode | None = None
-        self._briefing: Briefing | None = None
         self._columns: tuple[str, ...] | None = None
         self._is_given = False
 
@@ -87,15 +86,7 @@ class Episode(BaseEpisode):
 
     @property
     def _begun_native(self) -> _native.Episode:
-        if self._native is None:
-            raise TandemError("the episode has not begun; call start() first, or use it in a `with` block")
-        return self._native
-
-    @property
-    def briefing(self) -> Briefing:
-        if self._briefing is None:
-            raise TandemError("the episode has not begun; call start() first, or use it in a `with` block")
-        return self._briefing
+        return begun(self._native)
 
     def call(self, tool: str, arguments: Mapping[str, Json]) -> Any:
         return json.loads(self._begun_native.call(tool, json.dumps(arguments)))

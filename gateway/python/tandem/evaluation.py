@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypedDict
 
 from . import _native
 from .base import Renderer, Sensors, StateEstimate, settings_json
 from .contract.replies import Assistance, Protocol, ResultReply
 from .contract.start import TaskList
 from .episode import Episode
+from .errors import TandemError
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
 def tasks() -> TaskList:
@@ -66,6 +70,9 @@ class Evaluation:
     missed; None of a success.
     """
 
+    left_out: tuple[str, ...]
+    """Episodes that could not be begun, and why. The next evaluation into the same folder plays them."""
+
     folder: Path | None
     """Where `results.json` and the episodes lie; None where they were not kept."""
 
@@ -73,70 +80,189 @@ class Evaluation:
     """All of it, as `results.json` has it."""
 
 
+class EvaluationSettings(TypedDict, total=False):
+    """What evaluations have in common, wherever they are played."""
+
+    name: str | None
+    """What results call the policy; without it, the callable's own name."""
+
+    protocol: Protocol
+    """The rules: "agentic", which is the default, or "benchmark"."""
+
+    assistance: Assistance
+    """How much the policy is told; results say which behind its name. The default is "paper", for `collect` "full"."""
+
+    out: str | PathLike[str] | None
+    """Folder for the results. What it holds of this policy's name, build and settings is not played again, so give another
+    name or folder where the policy has changed. Without it, nothing is kept.
+    """
+
+    record: bool
+    """Whether every episode is recorded there."""
+
+    progress: Callable[[ResultReply], object] | None
+    """Called after each episode with its result."""
+
+    renderer: Renderer
+    """Who draws."""
+
+    state_estimate: StateEstimate
+    """Where robots have their own state from."""
+
+    sensors: Sensors
+    """What robots sense."""
+
+    scene: str | PathLike[str] | None
+    """MJCF file of a scene in place of the tasks' own."""
+
+
+Policy: TypeAlias = Callable[[Episode], object] | Literal["expert", "idle"]
+"""Who plays: a callable, which is given each episode as it begins, or a player that Tandem has, by name."""
+
+
 def evaluate(
-    policy: Callable[[Episode], object],
+    policy: Policy,
     tasks: str | Iterable[str] = "all",
     seeds: int | Iterable[int] = range(10),
     jobs: int = 1,
-    *,
-    name: str | None = None,
-    protocol: Protocol = "agentic",
-    assistance: Assistance = "paper",
-    out: str | PathLike[str] | None = None,
-    record: bool = False,
-    progress: Callable[[ResultReply], object] | None = None,
-    renderer: Renderer = "auto",
-    state_estimate: StateEstimate = "estimator",
-    sensors: Sensors = "ideal",
-    scene: str | PathLike[str] | None = None,
+    **settings: Unpack[EvaluationSettings],
 ) -> Evaluation:
     """Plays every seed of every task, and counts what came of it, as `tandem evaluate` does.
 
     policy: Called with each episode, which has begun; it plays until it is done or the episode has ended. An exception of its
-        own ends this episode and no other, and the episode does not count; that the episode has ended is none.
+        own ends this episode and no other, and the episode does not count; that the episode has ended is none. "expert" is
+        the task's scripted expert, which sees object poses; "idle" holds still.
     tasks: A task's id, or several; "all" for every one.
     seeds: A seed, or several.
     jobs: Episodes that run side by side, each on a thread of its own, on which the policy is called. Physics and drawing
         run at the same time; Python code of policies does not.
-    name: What results call the policy. None: the callable's own name.
-    assistance: How much the policy is told; results say which behind its name.
-    out: Folder for the results. What it holds of this policy's name, build and settings is not played again, so give another
-        name or folder where the policy has changed. None: nothing is kept.
-    record: True: every episode is recorded there.
-    progress: Called after each episode with its result.
+    settings: `name`, `protocol`, `assistance`, `out`, `record`, `progress`, `renderer`, `state_estimate`, `sensors`, `scene`:
+        see `EvaluationSettings`.
     """
-    listed = _native_tasks(tasks)
-    called = name or str(getattr(policy, "__qualname__", type(policy).__qualname__))
+    plan = Plan.of(policy, tasks, seeds, settings)
+    return plan.evaluated(lambda folder: plan.play(folder, jobs))
 
-    def play(native: _native.Episode, briefing: str) -> None:
-        policy(Episode._begun(native, briefing))
 
-    def tell(result: str, now: bool) -> None:
-        if progress is not None:
-            progress(ResultReply.of(json.loads(result)))
+def collect(
+    tasks: str | Iterable[str] = "all",
+    seeds: int | Iterable[int] = range(10),
+    jobs: int = 1,
+    **settings: Unpack[EvaluationSettings],
+) -> Evaluation:
+    """Records demonstrations of the experts, as `tandem collect` does: a folder for each episode, in the folder `episodes` of
+    `out`, which is runs/demonstrations where nothing else is given.
+    """
+    return evaluate("expert", tasks, seeds, jobs, **demonstrations(settings))
 
-    settings = settings_json(
-        assistance=assistance,
-        renderer=renderer,
-        state_estimate=state_estimate,
-        sensors=sensors,
-        scene=None if scene is None else Path(scene),
-    )
-    numbers = [seeds] if isinstance(seeds, int) else list(seeds)
 
-    def run(folder: Path) -> dict[str, Any]:
+def demonstrations(settings: EvaluationSettings) -> EvaluationSettings:
+    """The settings with which demonstrations are recorded."""
+    return {"assistance": "full", "out": "runs/demonstrations", **settings, "record": True}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What an evaluation plays. Another process can play a part of it."""
+
+    policy: Policy
+    name: str
+    world: str
+    """Settings of episodes, as the native module reads them."""
+    protocol: Protocol
+    tasks: list[str]
+    seeds: list[int]
+    record: bool
+    out: Path | None = None
+    progress: Callable[[ResultReply], object] | None = None
+
+    @staticmethod
+    def of(policy: Policy, tasks: str | Iterable[str], seeds: int | Iterable[int], settings: EvaluationSettings) -> Plan:
+        """The plan of an evaluation's arguments."""
+        unknown = settings.keys() - EvaluationSettings.__annotations__.keys()
+        if unknown:
+            have = ", ".join(EvaluationSettings.__annotations__)
+            raise TypeError(f"no setting {sorted(unknown)[0]!r} of evaluations; have: {have}")
+        name = settings.get("name")
+        if not callable(policy):
+            if name not in (None, policy):
+                raise TandemError(f"results call the player {policy!r} by its own name; leave `name` out")
+            name = policy
+        out, scene = settings.get("out"), settings.get("scene")
+        return Plan(
+            policy=policy,
+            name=name or str(getattr(policy, "__qualname__", type(policy).__qualname__)),
+            world=settings_json(
+                assistance=settings.get("assistance", "paper"),
+                renderer=settings.get("renderer", "auto"),
+                state_estimate=settings.get("state_estimate", "estimator"),
+                sensors=settings.get("sensors", "ideal"),
+                scene=None if scene is None else Path(scene),
+            ),
+            protocol=settings.get("protocol", "agentic"),
+            tasks=_task_ids(tasks),
+            seeds=[seeds] if isinstance(seeds, int) else list(seeds),
+            record=settings.get("record", False),
+            out=None if out is None else Path(out),
+            progress=settings.get("progress"),
+        )
+
+    def part(self, task: str, seed: int) -> Plan:
+        """One episode of it, for another process."""
+        return replace(self, tasks=[task], seeds=[seed], out=None, progress=None)
+
+    def play(self, folder: Path, jobs: int = 1) -> dict[str, Any]:
+        """Plays what the folder does not hold, in this process, and returns what `results.json` has then."""
+        policy = self.policy
+        if isinstance(policy, str):
+            return self._run(None, folder, jobs)
+
+        def play(native: _native.Episode, briefing: str) -> None:
+            policy(Episode._begun(native, briefing))
+
+        return self._run(play, folder, jobs)
+
+    def play_elsewhere(self, ask: Elsewhere, folder: Path, jobs: int) -> dict[str, Any]:
+        """As `play`, but `ask` has each of `jobs` episodes at once played by another process."""
+        return self._run(ask, folder, jobs, elsewhere=True)
+
+    def _run(self, play: Callable[..., Any] | None, folder: Path, jobs: int, elsewhere: bool = False) -> dict[str, Any]:
+        progress = self.progress
+
+        def tell(result: str, now: bool) -> None:
+            if progress is not None:
+                progress(ResultReply.of(json.loads(result)))
+
         answer = _native.evaluate(
-            play, called, settings, protocol, listed, numbers, jobs, record, folder, tell if progress else None
+            play,
+            self.name,
+            self.world,
+            self.protocol,
+            self.tasks,
+            self.seeds,
+            jobs,
+            self.record,
+            folder,
+            tell if progress else None,
+            elsewhere,
         )
         return json.loads(answer)
 
-    if out is not None:
-        return _evaluation(run(Path(out)), Path(out))
-    with TemporaryDirectory(prefix="tandem-") as folder:
-        return _evaluation(run(Path(folder)), None)
+    def evaluated(self, play: Callable[[Path], dict[str, Any]]) -> Evaluation:
+        """Has `play` fill the folder of the results, or one that is not kept."""
+        if self.out is not None:
+            return _evaluation(play(self.out), self.out)
+        with TemporaryDirectory(prefix="tandem-") as folder:
+            return _evaluation(play(Path(folder)), None)
 
 
-def _native_tasks(named: str | Iterable[str]) -> list[str]:
+Played: TypeAlias = tuple[Literal[True], tuple[str, list[tuple[str, bytes]]]] | tuple[Literal[False], str]
+"""An episode as JSON with the files of its recording, or why it was not played."""
+
+Elsewhere: TypeAlias = Callable[[str, int, Callable[[], bool]], Played]
+"""Has the episode of a task and a seed played; the last argument says whether the user wants all of it to end."""
+
+
+def _task_ids(named: str | Iterable[str]) -> list[str]:
     if named == "all":
         return [task.id for task in tasks().tasks]
     return [named] if isinstance(named, str) else list(named)
@@ -150,6 +276,7 @@ def _evaluation(raw: dict[str, Any], folder: Path | None) -> Evaluation:
         tasks={task: summary(counted) for task, counted in raw["tasks"].items()},
         results=tuple(ResultReply.of(episode) for episode in raw["episodes"]),
         notes=tuple(episode["note"] for episode in raw["episodes"]),
+        left_out=tuple(raw.get("left_out", ())),
         folder=folder,
         raw=raw,
     )

@@ -1,0 +1,236 @@
+//! Who plays the episodes of an evaluation that Python asks for.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyCFunction, PyTracebackMethods};
+use serde_json::json;
+use tandem_episodes::players::{
+    self, Episode, EpisodeOutput, PlayError, PlayOutcome, PlayerEntry, PlayerError, Policy,
+    PrivilegedEpisode, play_in_process,
+};
+use tandem_episodes::results::{PlayedEpisode, PolicyCard};
+use tandem_episodes::{EpisodeSpec, Facts, RESULT_FILE, Session, build, create_private_folder, write_whole};
+use tandem_tools_spec::{EndReason, ToolCall, ToolReply};
+
+use crate::episode::NativeEpisode;
+
+/// A policy, by what Python says of it.
+#[derive(Debug)]
+pub struct PythonPolicy {
+    pub name: String,
+    pub by: PlayedBy,
+    /// Whether the user wants it to end.
+    pub interrupted: Arc<AtomicBool>,
+}
+
+/// Who makes the calls.
+#[derive(Debug)]
+pub enum PlayedBy {
+    /// A player that Tandem has.
+    BuiltIn(&'static PlayerEntry),
+    /// A callable that is given each episode and its briefing as JSON.
+    Callable(Py<PyAny>),
+    /// A callable that has whole episodes played by another process.
+    Elsewhere(Py<PyAny>),
+}
+
+impl PlayedBy {
+    /// The callable `play`, which has episodes played `elsewhere`, or plays them; without one, the player that is called `name`.
+    pub fn new(play: Option<Py<PyAny>>, name: &str, elsewhere: bool) -> Result<PlayedBy, PlayerError> {
+        Ok(match play {
+            None => PlayedBy::BuiltIn(players::find(name)?),
+            Some(play) if elsewhere => PlayedBy::Elsewhere(play),
+            Some(play) => PlayedBy::Callable(play),
+        })
+    }
+}
+
+impl Policy for PythonPolicy {
+    fn card(&self) -> PolicyCard {
+        PolicyCard { name: self.name.clone(), ..PolicyCard::default() }
+    }
+
+    fn play_episode(&self, spec: &EpisodeSpec, output: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
+        self.check_interrupt()?;
+        match &self.by {
+            PlayedBy::BuiltIn(entry) => self.play_built_in(entry, spec, output),
+            PlayedBy::Callable(play) => self.play_callable(play, spec, output),
+            PlayedBy::Elsewhere(play) => self.play_elsewhere(play, spec, output),
+        }
+    }
+}
+
+impl PythonPolicy {
+    fn is_interrupted(&self) -> bool {
+        self.interrupted.load(Ordering::Relaxed)
+    }
+
+    fn check_interrupt(&self) -> Result<(), PlayError> {
+        match self.is_interrupted() {
+            true => Err(PlayError::Absent("interrupted".into())),
+            false => Ok(()),
+        }
+    }
+
+    fn play_built_in(
+        &self,
+        entry: &PlayerEntry,
+        spec: &EpisodeSpec,
+        output: EpisodeOutput,
+    ) -> Result<PlayOutcome, PlayError> {
+        let outcome = play_in_process(spec, output, |episode| {
+            entry.play(spec, &mut Interruptible { episode, interrupted: &self.interrupted })
+        })?;
+        self.check_interrupt()?;
+        Ok(outcome)
+    }
+
+    fn play_callable(
+        &self,
+        play: &Py<PyAny>,
+        spec: &EpisodeSpec,
+        output: EpisodeOutput,
+    ) -> Result<PlayOutcome, PlayError> {
+        let session = Session::start(spec, output.recording())?;
+        if let Some(reason) = session.recording_failed() {
+            return Err(PlayError::Lost(reason.into()));
+        }
+        let briefing = json!(session.briefing()).to_string();
+        let episode = NativeEpisode::of(session, output.record).until(self.interrupted.clone());
+        let (episode, stopped) = Python::attach(|py| self.call(py, play, episode, briefing))
+            .map_err(|error| PlayError::Absent(error.to_string()))?;
+        if self.is_interrupted() {
+            // It does not count, and its recording is whole all the same.
+            let _ = episode.get().end(Some(EndReason::Abandoned));
+            return Err(PlayError::Absent("interrupted".into()));
+        }
+        let thought = episode.get().thought();
+        let reason = stopped.is_some().then_some(EndReason::PolicyFailed);
+        let result = episode.get().end(reason).map_err(|error| PlayError::Lost(error.to_string()))?;
+        Ok(PlayOutcome { result, thought, stopped })
+    }
+
+    /// Lets the callable play. Returns the episode, and what the callable raised, if it did.
+    fn call(
+        &self,
+        py: Python,
+        play: &Py<PyAny>,
+        episode: NativeEpisode,
+        briefing: String,
+    ) -> PyResult<(Py<NativeEpisode>, Option<String>)> {
+        let episode = Py::new(py, episode)?;
+        let over = py.import("tandem.errors")?.getattr("EpisodeEnded")?;
+        match play.call1(py, (episode.clone_ref(py), briefing)) {
+            Ok(_) => Ok((episode, None)),
+            // That it ends under way is no failure: the last phase may have been reached.
+            Err(error) if error.is_instance(py, &over) => Ok((episode, None)),
+            Err(error) if error.is_instance_of::<PyKeyboardInterrupt>(py) => {
+                self.interrupted.store(true, Ordering::Relaxed);
+                Ok((episode, None))
+            }
+            Err(error) => {
+                let trace = error.traceback(py).and_then(|trace| trace.format().ok());
+                Ok((episode, Some(format!("{}{error}", trace.unwrap_or_default()))))
+            }
+        }
+    }
+
+    fn play_elsewhere(
+        &self,
+        play: &Py<PyAny>,
+        spec: &EpisodeSpec,
+        output: EpisodeOutput,
+    ) -> Result<PlayOutcome, PlayError> {
+        let answered = Python::attach(|py| self.ask_elsewhere(py, play, spec));
+        let (played, files) = match answered {
+            Ok(Elsewhere::Played { played, files }) => (played, files),
+            Ok(Elsewhere::NotPlayed { reason }) => return Err(PlayError::NotReady(reason)),
+            Err(error) => {
+                self.check_interrupt()?;
+                return Err(PlayError::Absent(error.to_string()));
+            }
+        };
+        let played: PlayedEpisode = serde_json::from_str(&played).map_err(|error| {
+            PlayError::Absent(format!("another build has played an episode ({error}); {SAME_WHEEL}"))
+        })?;
+        let own = build().map_err(tandem_episodes::EpisodeError::Build)?;
+        if played.build != own {
+            let text = format!("the build {} has played an episode of {own}; {SAME_WHEEL}", played.build);
+            return Err(PlayError::Absent(text));
+        }
+        if played.spec != *spec {
+            let text = "an episode of other settings was played; give every machine the same scene and environment variables";
+            return Err(PlayError::Absent(text.into()));
+        }
+        if let Some(folder) = output.recording() {
+            keep(folder, files).map_err(PlayError::Lost)?;
+        }
+        let thought = Duration::try_from_secs_f64(played.thought_s).unwrap_or_default();
+        Ok(PlayOutcome { result: played.result, thought, stopped: played.note })
+    }
+
+    fn ask_elsewhere(&self, py: Python, play: &Py<PyAny>, spec: &EpisodeSpec) -> PyResult<Elsewhere> {
+        let interrupted = self.interrupted.clone();
+        let is_interrupted =
+            PyCFunction::new_closure(py, None, None, move |_, _| interrupted.load(Ordering::Relaxed))?;
+        let (played, said): (bool, Bound<PyAny>) =
+            play.bind(py).call1((spec.task.id, spec.seed, is_interrupted))?.extract()?;
+        if !played {
+            return Ok(Elsewhere::NotPlayed { reason: said.extract()? });
+        }
+        let (played, files): (String, Vec<(String, Bound<PyBytes>)>) = said.extract()?;
+        let files = files.into_iter().map(|(name, bytes)| (name, bytes.as_bytes().to_vec())).collect();
+        Ok(Elsewhere::Played { played, files })
+    }
+}
+
+/// What to do where machines differ.
+const SAME_WHEEL: &str = "install the same wheel on every machine";
+
+/// What came of an episode that another process was to play.
+enum Elsewhere {
+    /// The episode as its file would have it, and the files of its recording.
+    Played {
+        played: String,
+        files: Vec<(String, Vec<u8>)>,
+    },
+    NotPlayed {
+        reason: String,
+    },
+}
+
+/// Writes the files of a recording, the result last, by which the recording is known to be whole.
+fn keep(folder: &Path, mut files: Vec<(String, Vec<u8>)>) -> Result<(), String> {
+    create_private_folder(folder).map_err(|error| format!("cannot make {}: {error}", folder.display()))?;
+    files.sort_by_key(|(name, _)| name == RESULT_FILE);
+    for (name, bytes) in files {
+        write_whole(&folder.join(name), &bytes).map_err(|error| error.to_string())?;
+    }
+    Ok(())
+}
+
+/// An episode whose calls end when the user wants that.
+struct Interruptible<'a, E> {
+    episode: &'a mut E,
+    interrupted: &'a AtomicBool,
+}
+
+impl<E: Episode> Episode for Interruptible<'_, E> {
+    fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {
+        match self.interrupted.load(Ordering::Relaxed) {
+            true => Err(PlayerError::EpisodeOver),
+            false => self.episode.call(call),
+        }
+    }
+}
+
+impl<E: PrivilegedEpisode> PrivilegedEpisode for Interruptible<'_, E> {
+    fn facts(&mut self) -> Result<Facts, PlayerError> {
+        self.episode.facts()
+    }
+}

@@ -1,0 +1,121 @@
+"""Evaluations on a cluster of Ray: every episode is a task, and results lie in one folder, as if one machine had played them.
+
+    import ray, tandem.ray
+
+    ray.init(address="auto")
+    tandem.ray.evaluate(policy, "all", range(1, 101), out="runs/mine", protocol="benchmark")
+    tandem.report("runs/mine")
+
+Every machine needs the same wheel, and what the policy imports. The folder is on the machine that calls; recordings come to it
+through Ray's object store.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterable, Mapping
+from importlib import import_module
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from .errors import TandemError
+from .evaluation import Evaluation, EvaluationSettings, Plan, Played, Policy, demonstrations
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+try:
+    # Its types are partly unknown.
+    ray: Any = import_module("ray")
+except ModuleNotFoundError as missing:
+    raise ModuleNotFoundError("Ray is not installed; pip install 'tandem-sim[ray]' adds it", name="ray") from missing
+
+_LOOK_S = 0.2
+"""How often it is looked whether the user wants the evaluation to end."""
+
+_LOST = (
+    ray.exceptions.WorkerCrashedError,
+    ray.exceptions.NodeDiedError,
+    ray.exceptions.OutOfMemoryError,
+    ray.exceptions.ObjectLostError,
+)
+"""What ends one episode's task for good, when it has been tried often enough, and no other's."""
+
+_COLOURS = "\x1b\\[[0-9;]*m"
+
+
+def evaluate(
+    policy: Policy,
+    tasks: str | Iterable[str] = "all",
+    seeds: int | Iterable[int] = range(10),
+    jobs: int | None = None,
+    *,
+    retries: int = 3,
+    task_options: Mapping[str, Any] | None = None,
+    **settings: Unpack[EvaluationSettings],
+) -> Evaluation:
+    """As `tandem.evaluate`, with the same results and hashes, by the processes of a cluster.
+
+    policy: As there. A process unpickles it once and calls it for one episode after the other, so what it loads at its first
+        call stays loaded.
+    jobs: Episodes that are under way at once. None: as many as the cluster has processors for as this begins.
+    retries: How often an episode is played anew whose process or machine was lost. One that is lost more often is named in
+        `left_out`, and played by the next evaluation into the same folder.
+    task_options: What an episode's task is to Ray, as {"num_cpus": 2} or {"num_gpus": 0.25}; one processor otherwise.
+    settings: As there. A `scene` has to lie at the same path on every machine.
+    """
+    plan = Plan.of(policy, tasks, seeds, settings)
+    options: dict[str, Any] = {"num_cpus": 1, "max_retries": retries, **(task_options or {})}
+    if not ray.is_initialized():
+        ray.init()
+    play = ray.remote(**options)(_player(plan))
+
+    def ask(task: str, seed: int, is_interrupted: Callable[[], bool]) -> Played:
+        episode = play.remote(task, seed)
+        while not ray.wait([episode], timeout=_LOOK_S)[0]:
+            if is_interrupted():
+                ray.cancel(episode, force=True)
+                raise KeyboardInterrupt
+        try:
+            return ray.get(episode)
+        except _LOST as lost:
+            text = str(lost).splitlines()[0]
+            return False, f"its process was lost ({type(lost).__name__}: {text})"
+        except ray.exceptions.RayError as error:
+            text = re.sub(_COLOURS, "", str(error)).strip()
+            raise TandemError(f"a task of Ray failed; mend what it says here: {text}") from error
+
+    at_once = jobs or max(1, int(ray.cluster_resources().get("CPU", 1) // max(1, options["num_cpus"])))
+    return plan.evaluated(lambda folder: plan.play_elsewhere(ask, folder, at_once))
+
+
+def collect(
+    tasks: str | Iterable[str] = "all",
+    seeds: int | Iterable[int] = range(10),
+    jobs: int | None = None,
+    *,
+    retries: int = 3,
+    task_options: Mapping[str, Any] | None = None,
+    **settings: Unpack[EvaluationSettings],
+) -> Evaluation:
+    """As `tandem.collect`, by the processes of a cluster; see `evaluate`."""
+    return evaluate("expert", tasks, seeds, jobs, retries=retries, task_options=task_options, **demonstrations(settings))
+
+
+def _player(plan: Plan) -> Callable[[str, int], Played]:
+    """What a process of the cluster does for an episode. The plan goes with the function, which every process reads once."""
+    shared = plan.part("", 0)
+
+    def play(task: str, seed: int) -> Played:
+        with TemporaryDirectory(prefix="tandem-") as folder:
+            raw = shared.part(task, seed).play(Path(folder))
+            if not raw["episodes"]:
+                # The evaluation that asks says itself of which episode it speaks.
+                return False, raw["left_out"][0].partition(": ")[2]
+            recording = Path(folder) / "episodes" / f"{task}-{seed}"
+            files = [(path.name, path.read_bytes()) for path in sorted(recording.iterdir())] if shared.record else []
+            return True, (json.dumps(raw["episodes"][0]), files)
+
+    return play

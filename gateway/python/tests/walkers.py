@@ -1,0 +1,46 @@
+"""Policies that processes of a cluster can import."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import tandem
+
+
+def walk(episode: tandem.Episode) -> None:
+    """Walks a little, further at odd seeds."""
+    for _ in range(1 + episode.seed % 2):
+        episode.walk(10, [tandem.WalkMove("A", 0.2, 0.0, 0.0)])
+
+
+@dataclass
+class NotingWalker:
+    """Walks as `walk` does, and notes where; on the doomed node its first episode goes on until the node is gone."""
+
+    notes: Path
+    doomed: str
+
+    def __call__(self, episode: tandem.Episode) -> None:
+        ray: Any = import_module("ray")
+        node = ray.get_runtime_context().get_node_id()
+        with (self.notes / "begun").open("a") as begun:
+            begun.write(f"{episode.seed} {node}\n")
+        if node == self.doomed:
+            (self.notes / "waiting").touch()
+            while True:
+                time.sleep(0.1)
+        walk(episode)
+
+
+def fail(episode: tandem.Episode) -> None:
+    """Waits; at two seeds it takes its process down, or raises an exception."""
+    if episode.seed == 2021:
+        os._exit(1)
+    if episode.seed == 2022:
+        raise ValueError("no plan for this seed")
+    episode.wait(5)
