@@ -111,3 +111,30 @@ def test_inspect_robots_evaluates_episodes_by_their_seeds(tmp_path: Path) -> Non
     with pytest.raises(ValueError, match="give one, as 2000, or a range"):
         resolve("task", "tandem", seeds="all")
     embodiment.close()
+
+
+def test_openenv_steps_by_tools() -> None:
+    pytest.importorskip("openenv")
+    module: Any = importlib.import_module("openenv_tandem")
+    env, action = module.TandemEnvironment(), module.TandemAction
+    with pytest.raises(RuntimeError, match="call reset first"):
+        env.step(action(tool="observe"))
+    began = env.reset(task="handover", seed=2003)
+    assert began.reply["brief"] and (began.reward, began.done) == (0.0, False)
+    assert (env.state.task, env.state.seed, env.state.ended) == ("handover", 2003, None)
+    steps = env.state.step_count
+    waited = env.step(action(tool="wait", arguments={"steps": 5}))
+    assert waited.reply["executed_steps"] == 5 and env.state.step_count == steps + 5
+    refused = env.step(action(tool="wave"))
+    assert refused.reply is None and 'no tool "wave"; have: observe' in refused.problem
+    ended = env.step(action(tool="finish"))
+    assert ended.done and ended.reward == 0.0 and ended.result["ended"] == env.state.ended == "finished"
+    after = env.step(action(tool="wait", arguments={"steps": 5}))
+    assert after.done and after.problem
+    assert env.step(action(tool="finish")).reward == 0.0
+    # The next episode is the next seed's.
+    env.reset()
+    assert env.state.seed == 2004
+    with pytest.raises(ValueError, match="no setting sead; have: task, seed"):
+        env.reset(sead=3)
+    env.close()
