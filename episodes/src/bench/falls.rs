@@ -87,8 +87,9 @@ mod tests {
         }
     }
 
-    /// The first did work where the solver's sweeps had not settled, 25.8 J of 190 J; in the others a crushed finger left its
-    /// range by up to 0.46 rad.
+    /// The first did work where the solver's sweeps had not settled, 25.8 J of 190 J; in the three after it a crushed finger left
+    /// its range by up to 0.46 rad. In the last, waist and shoulder swing an arm that whips wrist and finger to twice and thrice the
+    /// speeds of their motors, the tip to 26.8 m/s where motors brake with no more than they can push.
     #[test]
     fn hard_falls_keep_to_the_limits() {
         let hard = [
@@ -96,6 +97,7 @@ mod tests {
             ("stagger_1.0_500ms", 2056),
             ("stagger_jumps", 2030),
             ("drop_on_robot", 2040),
+            ("stagger_jumps", 2055),
         ];
         for (name, seed) in hard {
             let mut cases = FALL_CASES.iter().enumerate();

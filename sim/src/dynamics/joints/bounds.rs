@@ -176,7 +176,7 @@ impl BoundedDrive {
     /// Begins with the effort of the last step.
     fn new(tree: &Tree, link: usize, dt_s: f64) -> BoundedDrive {
         let law = tree.laws[link];
-        let impulse = (tree.effort[link] * dt_s).clamp(-law.most, law.most);
+        let impulse = tree.effort[link] * dt_s;
         BoundedDrive { law, impulse }
     }
 

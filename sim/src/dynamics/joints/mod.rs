@@ -7,7 +7,7 @@
 //! which is exact and costs nothing. Springs and dampers of the joint itself enter the same way. It knows no limit,
 //! though: a drive near its limit is left out of the mass matrix and becomes a bounded row of the solver (`bounds`).
 //! Which ones are near is guessed from the last step, and the step is repeated where the guess was wrong, so that no
-//! effort, implicit parts included, is ever beyond its limit.
+//! effort, implicit parts included, is beyond its limit but that of a motor which something turns too fast.
 
 pub mod bounds;
 pub mod equality;
@@ -41,7 +41,7 @@ impl DriveLaw {
         let slope = self.slope();
         let low = -slope * (self.speed_limit + v);
         let high = slope * (self.speed_limit - v);
-        [low.clamp(-self.most, self.most), high.clamp(-self.most, self.most)]
+        [low.max((-self.most).min(high)), high.min(self.most.max(low))]
     }
 
     /// The impulse that meets the law at the velocity that it leaves behind:  v' = v + (T' - T) Y.Y,  where v is the
@@ -57,7 +57,7 @@ impl DriveLaw {
         }
         let slope = self.slope();
         let slack = slope * self.speed_limit;
-        let [low, high] = [-slack, slack].map(|rest| line(rest, slope).clamp(-self.most, self.most));
+        let [low, high] = [line(-slack, slope), line(slack, slope)];
         // Not `clamp`, which panics at what is not a number; the step will say that physics diverged.
         wanted.max(low).min(high)
     }

@@ -1,4 +1,4 @@
-//! Drives keep to their effort limits, and report what acts.
+//! Drives keep to their limits of effort and speed, and report what acts.
 
 use rapier3d::glamx::{DPose3, DVec3};
 
@@ -157,7 +157,8 @@ fn dynamics_motor_at_its_speed_limit_pushes_nothing_and_beyond_it_brakes() {
         (9.0, 1.0, -2.0),
         (10.0, 0.0, -2.0),
         (11.0, -1.0, -2.0),
-        (30.0, -2.0, -2.0),
+        (12.0, -2.0, -2.0),
+        (30.0, -20.0, -20.0),
     ] {
         for sign in [1.0, -1.0] {
             let (pushed, braked) =

@@ -65,7 +65,8 @@ pub struct Drive {
 /// turns fast pushes less in the direction in which it turns, and brakes with all it has:
 ///   impulse <= slope (speed_limit - v'),   slope = most / (0.2 speed_limit),   for v' > 0,
 /// which is all of it at 80 % of the limit and nothing at the limit. Beyond the limit, where something else turns it, its
-/// voltage is above the supply's and drives a current back: it brakes whatever it is told, with all it has from 120 % on.
+/// voltage is above the supply's and drives a current back through the diodes of its bridge, which no controller holds back: it
+/// brakes whatever it is told, along the same line, and from 120 % on with more than it could push.
 /// It holds at the end of the step as the rest does, so that no motor drives itself beyond its limit within a step, however
 /// light its link is.
 #[derive(Clone, Copy, Debug, Default)]

@@ -40,7 +40,8 @@ impl Tree {
         range.map_or(0.0, |[low, high]| (low - self.q[link]).max(self.q[link] - high).max(0.0))
     }
 
-    /// What the drive of a joint exerted on average over the last step (N m or N), within its effort limit.
+    /// What the drive of a joint exerted on average over the last step (N m or N): within its effort limit, unless it brakes what
+    /// turns faster than it could.
     pub fn drive_effort(&self, link: usize) -> f64 {
         self.effort[link]
     }

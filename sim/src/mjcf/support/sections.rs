@@ -34,7 +34,7 @@ pub(super) const ELEMENTS: &[Element] = &[
         &["custom"],
         "numeric",
         &[NUMERIC],
-        "one called `actuator_speed_limit` has the speeds (rad/s or m/s) at which motors can push no further, one for each actuator in their order: from 80 % of it on a motor pushes less, and it brakes with all it has; MuJoCo's motors have no such limit; others are ignored",
+        "one called `actuator_speed_limit` has the speeds (rad/s or m/s) at which motors can push no further, one for each actuator in their order: from 80 % of it on a motor pushes less, it brakes with all it has, and from 120 % on, where something else turns it, with more; MuJoCo's motors have no such limit; others are ignored",
     ),
     element(Support::Ignored, "text", &["custom"], &[], "nobody asks for it"),
     element(Support::Ignored, "tuple", &["custom"], &[], "nobody asks for it"),
