@@ -85,7 +85,7 @@ const fn pulled(name: &'static str, force_n: f32, hands: PulledHands, end_s: f32
     Case { name, disturbance: Disturbance::LevelPull { force_n, hands, end_s }, ..HOLD }
 }
 
-pub const CASES: [Case; 28] = [
+pub const CASES: [Case; 29] = [
     Case { name: "stand", ..HOLD },
     Case { name: "stand_waving", duration_s: 60.0, arms: Arms::Waving, ..HOLD },
     Case { name: "stand_1kg", hand_load_kg: 1.0, ..HOLD },
@@ -119,5 +119,6 @@ pub const CASES: [Case; 28] = [
     Case { name: "squat_1kg", hand_load_kg: 1.0, plan: Plan::Squat { high_m: 0.75, low_m: 0.55 }, ..HOLD },
     Case { name: "push_40n", disturbance: Disturbance::Push { force_n: 40.0 }, ..HOLD },
     Case { disturbance: Disturbance::Push { force_n: 30.0 }, ..moving("push_30n_walking", [0.3, 0.0, 0.0]) },
+    Case { name: "punch", duration_s: 6.0, arms: Arms::Waving, plan: Plan::Tour(Tour::LEG), ..HOLD },
     Case { name: "tour", duration_s: 90.0, arms: Arms::Waving, plan: Plan::Tour(Tour::STANDARD), ..HOLD },
 ];

@@ -1,4 +1,4 @@
-//! The tour: waypoints in a square, reached one after the other under punches.
+//! The tour: waypoints in a square, reached one after the other under punches; and one leg of it, under a hard punch.
 
 use rapier3d::math::Vector;
 
@@ -10,13 +10,24 @@ pub(super) struct Tour {
     pub waypoints: usize,
     pub half_side_m: f32,
     pub leg_s: f32,
-    pub punch_n: f32,
+    /// When on a leg, how hard, and for how long.
+    pub punch_at_s: [f32; 2],
+    pub punch_n: [f32; 2],
     pub punch_s: f32,
 }
 
 impl Tour {
-    pub(super) const STANDARD: Tour =
-        Tour { waypoints: 18, half_side_m: 1.5, leg_s: 5.0, punch_n: 300.0, punch_s: 0.08 };
+    pub(super) const STANDARD: Tour = Tour {
+        waypoints: 18,
+        half_side_m: 1.5,
+        leg_s: 5.0,
+        punch_at_s: [0.5, 4.5],
+        punch_n: [0.0, 300.0],
+        punch_s: 0.08,
+    };
+    /// One hard punch: in the same time, more than twice as many falls as in a tour.
+    pub(super) const LEG: Tour =
+        Tour { waypoints: 1, leg_s: 6.0, punch_at_s: [1.5, 3.5], punch_n: [200.0, 300.0], ..Tour::STANDARD };
 }
 
 /// Links that get punched.
@@ -52,10 +63,10 @@ pub(super) fn legs(tour: &Tour, random: &mut SplitMix64) -> Vec<Leg> {
             let target_m = Vector::new(next.x.clamp(-side, side), next.y.clamp(-side, side), 0.0);
             from_m = target_m;
             let direction = random.uniform([0.0, std::f32::consts::TAU]);
-            let size_n = random.uniform([0.0, tour.punch_n]);
+            let size_n = random.uniform(tour.punch_n);
             Leg {
                 target_m,
-                punch_at_s: random.uniform([0.5, tour.leg_s - 0.5]),
+                punch_at_s: random.uniform(tour.punch_at_s),
                 punched_link: BODIES
                     [(random.uniform([0.0, BODIES.len() as f32]) as usize).min(BODIES.len() - 1)],
                 punch_n: Vector::new(direction.cos(), direction.sin(), 0.0) * size_n,
@@ -80,4 +91,25 @@ pub(super) fn command(
         yaw_rate_rad_s: -heading_rad.clamp(-0.5, 0.5) * if still { 0.0 } else { 1.0 },
         pelvis_height_m,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn punches_are_as_late_and_as_hard_as_their_tour_says() {
+        for tour in [Tour::STANDARD, Tour::LEG] {
+            for seed in 0..100 {
+                let legs = legs(&tour, &mut SplitMix64(seed));
+                assert_eq!(legs.len(), tour.waypoints);
+                for leg in legs {
+                    let within = |[low, high]: [f32; 2], value: f32| (low..=high).contains(&value);
+                    assert!(within(tour.punch_at_s, leg.punch_at_s), "{} s", leg.punch_at_s);
+                    assert!(within([tour.punch_n[0] - 0.01, tour.punch_n[1] + 0.01], leg.punch_n.length()));
+                    assert!(leg.punch_at_s + tour.punch_s < tour.leg_s);
+                }
+            }
+        }
+    }
 }

@@ -39,6 +39,13 @@ const STARTING_STEPS: u32 = 5;
 /// One foot holds little against turning: a robot that is turned by force gives way, and turns back slowly.
 const HEADING_LEASH_RAD: f32 = 0.35;
 const RETURN_RAD_S: f32 = 0.4;
+/// A robot that a blow has set spinning turns by a radian while its foot swings: footholds lie within reach of where it will face
+/// then, or the legs would cross. What spins less than this sways as walking robots do. Tuned on punches back at shoulders and
+/// elbows of walking robots, seeds 2600-2799.
+const SWAYING_RAD_S: f32 = 1.0;
+const LARGEST_SPIN_TURN_RAD: f32 = 0.8;
+/// A robot whose velocity is this far from the commanded one was hit: it steps to stand, not to go on. Tuned on the same punches.
+const STRAYING_M_S: f32 = 0.6;
 /// The pelvis sways about the vertical with every step: it faces where it points in the mean of this time.
 const FACING_TIME_S: f32 = 0.2;
 const LIFT_STIFFNESS_1_S2: f32 = 90.0;
@@ -129,14 +136,17 @@ impl Stepping {
         let ground_m = soles[self.stance].translation.z;
         self.turn(body, velocity.yaw_rate_rad_s, dt_s);
         let heading = Rotation::from_rotation_z(self.heading_rad);
-        let (ahead, left) = (heading * Vector::X, heading * Vector::Y);
+        let [ahead, left] = self.landing_axes(body, velocity.yaw_rate_rad_s);
         let rate_1_s = (GRAVITY_M_S2 / (body.com_m.z - ground_m).max(0.4)).sqrt();
         let pelvis_m = body.world_from_pelvis().translation;
         let faced = self.faced_axes(body, dt_s);
         let starts = self.steps < STARTING_STEPS;
         let velocity_m_s = self.course.corrected_velocity(velocity, starts, pelvis_m, faced, dt_s);
         let outside = left * self.stance.sign();
-        let course_m_s = faced[0] * velocity_m_s[0] + faced[1] * velocity_m_s[1];
+        let commanded_m_s = faced[0] * velocity.vx_m_s + faced[1] * velocity.vy_m_s;
+        let strays = flat(body.com_velocity_m_s - commanded_m_s).length() > STRAYING_M_S;
+        let course_m_s =
+            if strays { Vector::ZERO } else { faced[0] * velocity_m_s[0] + faced[1] * velocity_m_s[1] };
         // A robot that turns while it walks goes the coming step where it will face by then.
         let coming = Rotation::from_rotation_z(velocity.yaw_rate_rad_s * PERIOD_S);
         let gait = Gait::new(rate_1_s, coming * course_m_s, outside);
@@ -178,6 +188,16 @@ impl Stepping {
         self.heading_rad += yaw_rate_rad_s * dt_s + return_rad;
         let ahead_rad = wrapped_rad(self.heading_rad - heading_rad(&body.world_from_pelvis()));
         self.heading_rad += ahead_rad.clamp(-HEADING_LEASH_RAD, HEADING_LEASH_RAD) - ahead_rad;
+    }
+
+    /// Ahead and left of where the robot will face when the swinging foot lands, if it was set spinning; of its heading otherwise.
+    fn landing_axes(&self, body: &BodyEstimate, yaw_rate_rad_s: f32) -> [Vector; 2] {
+        let spin_rad_s = body.pelvis_angular_velocity_rad_s.z - yaw_rate_rad_s;
+        let excess_rad_s = spin_rad_s - spin_rad_s.clamp(-SWAYING_RAD_S, SWAYING_RAD_S);
+        let turn_rad = excess_rad_s * (PERIOD_S - self.time_s).max(0.0);
+        let turn_rad = turn_rad.clamp(-LARGEST_SPIN_TURN_RAD, LARGEST_SPIN_TURN_RAD);
+        let facing = Rotation::from_rotation_z(self.heading_rad + turn_rad);
+        [facing * Vector::X, facing * Vector::Y]
     }
 
     /// Ahead and left of where the pelvis faces: a velocity is meant along these, and it may stay behind the heading.
@@ -297,4 +317,42 @@ fn shift(now: &FootstepInputs) -> (Vector, bool) {
 fn clearance_m(sole: &Pose) -> f32 {
     let corner = |x: f32, y: f32| (*sole * Vector::new(x, y, 0.0)).z;
     corner(0.085, 0.03).min(corner(0.085, -0.03)).min(corner(-0.085, 0.025)).min(corner(-0.085, -0.025))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f32::consts::PI;
+
+    use super::*;
+    use crate::body::posed::Posed;
+
+    /// Which way the robot that spins so will face, from its heading, when the foot lands that lifts now.
+    fn turn_rad(spin_rad_s: f32, yaw_rate_rad_s: f32, time_s: f32) -> f32 {
+        let mut posed = Posed::standing();
+        posed.pelvis_angular_velocity_rad_s = Vector::Z * spin_rad_s;
+        let body = posed.body();
+        let step = Stepping { time_s, ..Stepping::start(&body, 0.3, true) };
+        let [ahead, left] = step.landing_axes(&body, yaw_rate_rad_s);
+        assert!((left - Rotation::from_rotation_z(PI / 2.0) * ahead).length() < 1e-6);
+        wrapped_rad(ahead.y.atan2(ahead.x) - 0.3)
+    }
+
+    #[test]
+    fn a_robot_that_spins_puts_its_foot_where_it_will_face() {
+        for (spin_rad_s, yaw_rate_rad_s, time_s, expected_rad) in [
+            (0.0, 0.0, 0.0, 0.0),
+            (0.9, 0.0, 0.0, 0.0),
+            (-0.9, 0.0, 0.0, 0.0),
+            (1.4, 0.5, 0.0, 0.0),
+            (3.0, 0.0, 0.0, 0.6),
+            (-3.0, 0.0, 0.1, -0.4),
+            (-3.0, -0.5, 0.1, -0.3),
+            (9.0, 0.0, 0.0, LARGEST_SPIN_TURN_RAD),
+            (-9.0, 0.0, PERIOD_S, 0.0),
+            (-9.0, 0.0, PERIOD_S + 0.05, 0.0),
+        ] {
+            let turn_rad = turn_rad(spin_rad_s, yaw_rate_rad_s, time_s);
+            assert!((turn_rad - expected_rad).abs() < 1e-3, "{spin_rad_s} rad/s, {time_s} s: {turn_rad} rad");
+        }
+    }
 }
