@@ -40,6 +40,7 @@ mod session;
 mod spec;
 pub mod statistics;
 pub mod tasks;
+mod variation;
 
 pub use commands::{Called, OperatorCall, OperatorCommand};
 pub use describe::{brief, task_list};
@@ -66,3 +67,4 @@ pub use tandem_sim::{
     joint_names,
     render::RendererKind,
 };
+pub use variation::Variation;

@@ -13,6 +13,7 @@ use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, Wording};
 use crate::error::SceneError;
 use crate::scoring::Phase;
 use crate::tasks::{self, Task};
+use crate::variation::Variation;
 
 /// Everything that makes an episode what it is. Equal values, played by equal calls on the same build, end in the same
 /// state, bit for bit.
@@ -45,6 +46,9 @@ pub struct EpisodeSpec {
     /// Hash of the instructions that the policy is given in place of the task's own; see [`crate::Instructions::fingerprint`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub instructions: Option<String>,
+    /// In what it varies beyond the benchmark.
+    #[serde(default, skip_serializing_if = "Variation::is_benchmarks")]
+    pub variation: Variation,
 }
 
 /// Which file describes the robots.
@@ -119,6 +123,7 @@ impl EpisodeSpec {
             disclosure: Assistance::default().disclosure(),
             hints: Assistance::default().hints(),
             instructions: None,
+            variation: Variation::default(),
         }
     }
 
@@ -151,6 +156,7 @@ impl EpisodeSpec {
             disclosure,
             hints,
             instructions,
+            variation,
         } = self;
         let file = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let departures = [
@@ -171,7 +177,7 @@ impl EpisodeSpec {
             (*sensors != SensorModel::default()).then(|| format!("sensors: {}", sensors.name())),
             instructions.as_ref().map(|xxh3| format!("instructions: {xxh3}")),
         ];
-        departures.into_iter().flatten().collect()
+        departures.into_iter().flatten().chain(variation.departures()).collect()
     }
 
     /// Index of the phase that it begins at and that alone counts; `None` where it begins elsewhere, and all count.
@@ -280,6 +286,7 @@ impl Controller {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tasks::Spread;
 
     #[test]
     fn controllers_are_named_as_they_were_asked_for() {
@@ -304,5 +311,19 @@ mod tests {
         let own = EpisodeSpec::new(&tasks::ALL[0], 0, Protocol::Benchmark).assisted(Assistance::Paper);
         let told = EpisodeSpec { instructions: Some("00ff".into()), ..own };
         assert_eq!(told.departures(), ["instructions: 00ff"]);
+    }
+
+    #[test]
+    fn what_varies_as_in_the_benchmark_leaves_no_trace_and_what_does_not_is_named() {
+        let own = EpisodeSpec::new(&tasks::ALL[0], 0, Protocol::Benchmark).assisted(Assistance::Paper);
+        assert_eq!(serde_json::to_value(&own).unwrap().get("variation"), None);
+        let variation = Variation { spread: Spread::Double, variety: 1, disturb: 0.8 };
+        let wide = EpisodeSpec { variation, ..own };
+        assert_eq!(wide.departures(), ["spread: 2", "variety: 1", "disturbed: 0.8"]);
+        let text = serde_json::to_string(&wide).unwrap();
+        assert!(text.contains(r#""variation":{"spread":2,"variety":1,"disturb":0.8}"#), "{text}");
+        assert_eq!(serde_json::from_str::<EpisodeSpec>(&text).unwrap(), wide);
+        let refused = serde_json::from_str::<EpisodeSpec>(&text.replace(r#""spread":2"#, r#""spread":3"#));
+        assert!(refused.unwrap_err().to_string().contains("no spread 3; have: 1, 2, 4"));
     }
 }

@@ -1,16 +1,14 @@
 //! What somebody in the room would be told of what is in it: how large things are, about how far from each robot they stand before
 //! the seed moves them, and where partners stand.
 
-use std::ops::RangeInclusive;
-
 use tandem_sim::mjcf::{Geom, Primitive};
 use tandem_sim::{ObjectModel, Pose, SimError, Vector, wrapped_rad};
 
-use crate::tasks::{ObjectSpot, RobotSpot, Task};
+use crate::tasks::{ObjectSpot, RobotSpot, Spread, Task};
 
 /// One line for each thing of a task, as "service trolley, 0.45 x 0.85 x 0.95 m: middle 0.9 m ahead of A, 3.7 m ahead of B (from the
 /// pelvis, give or take 0.32 m)".
-pub fn room(task: &Task) -> Result<Vec<String>, SimError> {
+pub fn room(task: &Task, spread: Spread) -> Result<Vec<String>, SimError> {
     let line = |spot: &ObjectSpot| {
         let [x_m, y_m, z_m] = size_m(spot)?.to_array();
         let places: Vec<String> = task.robots.iter().map(|robot| place(robot, spot)).collect();
@@ -18,7 +16,7 @@ pub fn room(task: &Task) -> Result<Vec<String>, SimError> {
         let places = places.join(", ");
         Ok(format!(
             "{name}, {x_m:.2} x {y_m:.2} x {z_m:.2} m: middle {places} (from the pelvis{})",
-            give_or_take(task, spot)
+            give_or_take(task, spot, spread)
         ))
     };
     let things = task.objects.iter().map(line);
@@ -52,11 +50,13 @@ fn seen_from(robot: &RobotSpot, [x_m, y_m]: [f32; 2]) -> (f32, f32) {
 }
 
 /// How far the seed may move a thing from there.
-fn give_or_take(task: &Task, spot: &ObjectSpot) -> String {
+fn give_or_take(task: &Task, spot: &ObjectSpot, spread: Spread) -> String {
     let offsets = task.randomize.iter().filter(|offset| offset.objects.contains(&spot.name));
-    let farthest = |range: &RangeInclusive<f32>| range.start().abs().max(range.end().abs());
-    let [x_m, y_m] = offsets
-        .fold([0.0; 2], |[x_m, y_m], offset| [x_m + farthest(&offset.x_m), y_m + farthest(&offset.y_m)]);
+    let farthest = |[low, high]: [f32; 2]| low.abs().max(high.abs());
+    let [x_m, y_m] = offsets.fold([0.0; 2], |[x_m, y_m], offset| {
+        let [of_x_m, of_y_m, ..] = offset.ranges(spread);
+        [x_m + farthest(of_x_m), y_m + farthest(of_y_m)]
+    });
     let most_m = f32::hypot(x_m, y_m);
     if most_m < 0.005 { String::new() } else { format!(", give or take {most_m:.2} m") }
 }
@@ -118,7 +118,7 @@ mod tests {
 
     #[test]
     fn things_are_as_large_and_as_far_as_people_would_say() {
-        let lines = |id: &str| room(tasks::find(id).unwrap()).unwrap();
+        let lines = |id: &str| room(tasks::find(id).unwrap(), Spread::Single).unwrap();
         let cart = lines("cart_service");
         assert!(cart[0].starts_with("service trolley, ") && cart[0].contains("0.9 m ahead of A"), "{cart:?}");
         assert!(cart[0].ends_with("(from the pelvis, give or take 0.32 m)"), "{cart:?}");

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use tandem_tools_spec::{EndReason, ResultReply};
 
-use super::{EvaluationError, EvaluationPlan};
+use super::{EvaluationError, EvaluationPlan, KeptFiles};
 use crate::output::write_whole;
 use crate::players::{EpisodeOutput, PlayError, PlayOutcome};
 use crate::results::{PlayedEpisode, RESULT_FILE, episode_note};
@@ -34,8 +34,9 @@ impl EpisodeCache<'_> {
             return self.keep(spec, cached).map(|kept| PlannedOutcome::Kept(Box::new(kept)));
         }
         let folder = self.folder.join(name(spec));
-        match self.plan.player.play_episode(spec, EpisodeOutput { folder: &folder, record: self.plan.record })
-        {
+        let KeptFiles { pages, .. } = self.plan.files;
+        let output = EpisodeOutput { folder: &folder, record: self.plan.record, pages };
+        match self.plan.player.play_episode(spec, output) {
             Ok(outcome) => self.store(spec, outcome).map(|played| PlannedOutcome::Played(Box::new(played))),
             Err(PlayError::Episode(EpisodeError::Checkpoint(CheckpointError::NoPhase { .. }))) => {
                 Ok(PlannedOutcome::LeftOut("its demonstration did not come so far".into()))
@@ -61,7 +62,8 @@ impl EpisodeCache<'_> {
         let same = by == (&self.plan.player.card(), &self.locomotion, self.build)
             && cached.spec == *spec
             && (cached.result.task.as_str(), cached.result.seed) == (spec.task.id, spec.seed)
-            && self.recording(spec).is_none_or(|folder| folder.join(RESULT_FILE).exists());
+            && (self.is_not_kept(&cached)
+                || self.recording(spec).is_none_or(|folder| folder.join(RESULT_FILE).exists()));
         let cached = PlayedEpisode { keep_failed: self.keeps_failure(&cached.result), ..cached };
         (same && cached.counts()).then_some(cached)
     }
@@ -69,6 +71,11 @@ impl EpisodeCache<'_> {
     /// Whether a result is of a policy that failed itself, which counts here.
     fn keeps_failure(&self, result: &ResultReply) -> bool {
         self.plan.keep_failed && result.ended == EndReason::PolicyFailed
+    }
+
+    /// Whether no recording of an episode is wanted, since it failed.
+    fn is_not_kept(&self, played: &PlayedEpisode) -> bool {
+        self.plan.files.only_successful && !played.succeeded()
     }
 
     /// Has the file of a kept episode say how it counts now.
@@ -103,6 +110,10 @@ impl EpisodeCache<'_> {
             keep_failed: self.keeps_failure(&result),
             result,
         };
+        if let Some(folder) = self.recording(spec).filter(|_| self.is_not_kept(&played)) {
+            std::fs::remove_dir_all(&folder)
+                .map_err(|source| EvaluationError::Io { path: folder, source })?;
+        }
         self.write(spec, played)
     }
 

@@ -14,7 +14,7 @@ use crate::results::{EPISODES, PlayedEpisode};
 use crate::{EpisodeError, fingerprint};
 use cache::EpisodeCache;
 
-pub use plan::{EvaluationPlan, Shard, Starts};
+pub use plan::{EvaluationPlan, KeptFiles, Shard, Starts};
 pub use summary::{Evaluation, TaskSummary};
 
 /// Why an evaluation stopped. Episodes that were played are cached, and the next run goes on from there.

@@ -10,6 +10,7 @@ use crate::recording::Recorder;
 use crate::scoring::Phase;
 use crate::spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, SceneFile, Start};
 use crate::tasks::Task;
+use crate::variation::Variation;
 
 /// What to play.
 #[derive(Clone, Debug)]
@@ -30,6 +31,8 @@ pub struct EvaluationPlan<'a> {
     pub disclosure: Disclosure,
     /// Whether they are told how to grasp.
     pub hints: Hints,
+    /// In what episodes vary beyond the benchmark.
+    pub variation: Variation,
     pub tasks: Vec<&'static Task>,
     pub seeds: Vec<u32>,
     pub starts: Starts,
@@ -38,8 +41,25 @@ pub struct EvaluationPlan<'a> {
     pub jobs: usize,
     /// Record every episode in a folder of its own (`episode.mcap`, `strip.png`, `report.html`).
     pub record: bool,
+    /// Which of these files stay.
+    pub files: KeptFiles,
     /// Count episodes in which the policy itself failed as failures, and keep them. They are played again otherwise.
     pub keep_failed: bool,
+}
+
+/// What is kept of episodes that are recorded; by default everything.
+#[derive(Clone, Copy, Debug)]
+pub struct KeptFiles {
+    /// Whether each has `strip.png` and `report.html`.
+    pub pages: bool,
+    /// Whether of an episode that failed nothing is kept but what it came to.
+    pub only_successful: bool,
+}
+
+impl Default for KeptFiles {
+    fn default() -> KeptFiles {
+        KeptFiles { pages: true, only_successful: false }
+    }
 }
 
 /// Where the episodes begin.
@@ -80,6 +100,7 @@ impl EvaluationPlan<'_> {
             assistance: self.assistance,
             disclosure: self.disclosure,
             hints: self.hints,
+            variation: self.variation,
             start,
             ..EpisodeSpec::new(task, seed, self.protocol)
         }

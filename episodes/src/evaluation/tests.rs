@@ -10,6 +10,7 @@ use crate::players::{EpisodeOutput, PlayError, PlayOutcome, Policy};
 use crate::results::{PhaseLevel, PolicyCard, episode_note, missed_phase_note, write_result};
 use crate::spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, Start};
 use crate::tasks::{self, Task};
+use crate::variation::Variation;
 use crate::{players, scoring::Phase};
 
 fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultReply {
@@ -85,12 +86,14 @@ fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> EvaluationPlan<'static> {
         assistance: Assistance::Full,
         disclosure: Disclosure::Live,
         hints: Hints::On,
+        variation: Variation::default(),
         tasks,
         seeds,
         starts: Starts::Task,
         shard: Shard::WHOLE,
         jobs: 1,
         record: false,
+        files: KeptFiles::default(),
         keep_failed: false,
     }
 }

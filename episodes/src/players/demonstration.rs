@@ -49,7 +49,7 @@ impl Player for Demonstration {
 }
 
 /// What robot number `robot` was told for `step`.
-fn action(step: &Step, robot: usize) -> Vec<f64> {
+pub fn action(step: &Step, robot: usize) -> Vec<f64> {
     let command = &step.robots[robot].command;
     command.upper_rad.into_iter().chain(base_row(&command.base)).map(f64::from).collect()
 }

@@ -7,6 +7,7 @@ mod demonstration;
 pub mod experts;
 mod idle;
 mod in_process;
+mod open_loop;
 mod policy;
 
 use tandem_tools_spec::{ExtraInformation, Observe, ToolCall, ToolReply};
@@ -16,6 +17,7 @@ use crate::scoring::Facts;
 use crate::spec::EpisodeSpec;
 
 pub use in_process::InProcess;
+pub use open_loop::{OpenLoop, OpenLoopError};
 pub use policy::{EpisodeOutput, PlayError, PlayOutcome, Policy, PolicyWait, play_in_process};
 
 /// One episode, in this process or behind HTTP, as a player acts on it: by tool calls.
@@ -93,7 +95,7 @@ pub static ALL: &[PlayerEntry] = &[
     PlayerEntry {
         name: "expert",
         about: "the task's scripted expert, which sees object poses",
-        make: PlayerFactory::PrivilegedPlayer(|spec| Ok(Box::new(experts::Expert::of(spec.task)?))),
+        make: PlayerFactory::PrivilegedPlayer(|spec| Ok(Box::new(experts::Expert::for_episode(spec)?))),
     },
     PlayerEntry {
         name: "idle",

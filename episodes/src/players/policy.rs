@@ -11,7 +11,7 @@ use tandem_tools_spec::{EndReason, ResultReply};
 use super::{InProcess, PlayerEntry, PlayerError};
 use crate::results::PolicyCard;
 use crate::spec::EpisodeSpec;
-use crate::{EpisodeError, Session};
+use crate::{EpisodeError, RunFolder, Session, monotonic};
 
 /// Plays episodes, several of them side by side.
 pub trait Policy: Debug + Send + Sync {
@@ -48,12 +48,19 @@ pub struct EpisodeOutput<'a> {
     pub folder: &'a Path,
     /// Whether the episode is to be recorded there.
     pub record: bool,
+    /// Whether a recorded episode also gets a strip of pictures and a page.
+    pub pages: bool,
 }
 
 impl<'a> EpisodeOutput<'a> {
     /// Where the episode is recorded, if it is.
     pub fn recording(self) -> Option<&'a Path> {
         self.record.then_some(self.folder)
+    }
+
+    /// The same, with what is to be written there.
+    fn run_folder(self) -> Option<RunFolder> {
+        self.recording().map(|folder| RunFolder { pages: self.pages, ..RunFolder::from(folder) })
     }
 }
 
@@ -100,7 +107,7 @@ pub fn play_in_process(
     output: EpisodeOutput,
     act: impl FnOnce(&mut InProcess) -> Result<(), PlayerError>,
 ) -> Result<PlayOutcome, EpisodeError> {
-    let session = Session::start(spec, output.recording())?;
+    let session = Session::start_with_clock(spec, output.run_folder(), monotonic())?;
     let mut episode = match spec.start_phase() {
         Some(phase) => InProcess::until(phase + 1, session),
         None => InProcess::new(session),
@@ -141,7 +148,7 @@ mod tests {
     #[test]
     fn a_panic_of_a_player_ends_its_episode_as_a_failed_policy() {
         let spec = EpisodeSpec::new(tasks::find("handover").unwrap(), 2000, Protocol::Benchmark);
-        let output = EpisodeOutput { folder: Path::new(""), record: false };
+        let output = EpisodeOutput { folder: Path::new(""), record: false, pages: false };
         let played = play_in_process(&spec, output, |_| panic!("no plan for seed {}", 2000)).unwrap();
         assert_eq!(played.result.ended, EndReason::PolicyFailed);
         assert_eq!(played.stopped.as_deref(), Some("it panicked: no plan for seed 2000"));

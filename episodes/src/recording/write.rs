@@ -21,6 +21,7 @@ use crate::output::OutputError;
 use crate::results::RESULT_FILE;
 use crate::scoring::{Facts, ScoreMemory};
 use crate::spec::EpisodeSpec;
+use crate::variation::Disturbance;
 
 /// What is known of an episode before its first step.
 pub struct RecordingHeader {
@@ -42,8 +43,12 @@ pub struct Recorder {
     file: McapFile,
     /// Simulated time at which the recording begins.
     start_s: f64,
+    /// When the last step ended.
+    last_s: f64,
     robots: Vec<RobotSheet>,
     robot_topics: Vec<RobotTopics>,
+    /// What is added to what robots are told, if anything is.
+    disturbance: Option<Disturbance>,
     steps: Topic<Json<StepMessage>>,
     transforms: Topic<FrameTransforms>,
     scene: Topic<SceneUpdate>,
@@ -67,10 +72,12 @@ impl Recorder {
     ) -> Result<Recorder, OutputError> {
         let mut file = McapFile::create(&folder.join(Self::FILE_NAME), visibility)?;
         write_header(&mut file, &header)?;
+        let EpisodeSpec { seed, variation, .. } = &header.spec;
+        let disturbance = Disturbance::new(variation.disturb, *seed, header.robots.len());
         let robot_topics = header
             .robots
             .iter()
-            .map(|robot| RobotTopics::open(&mut file, robot))
+            .map(|robot| RobotTopics::open(&mut file, robot, disturbance.is_some()))
             .collect::<Result<_, _>>()?;
         let mut recorder = Recorder {
             steps: file.topic(topics::STEPS, &[])?,
@@ -82,6 +89,8 @@ impl Recorder {
             notes: file.topic(topics::NOTES, &[])?,
             start_s: start.time_s,
             robot_topics,
+            disturbance,
+            last_s: start.time_s,
             robots: header.robots,
             file,
         };
@@ -125,7 +134,13 @@ impl Recorder {
         let robots = self.robots.iter().zip(&mut self.robot_topics).zip(&step.robots);
         for (index, ((robot, topics), moved)) in robots.enumerate() {
             topics.step(&mut self.file, robot, index, time_s, moved, facts)?;
+            if let Some(disturbance) = &self.disturbance {
+                let RobotSheet { model, base_limits, .. } = robot;
+                let executed = disturbance.executed(index, self.last_s, &moved.command, model, base_limits);
+                topics.executed(&mut self.file, time_s, &executed)?;
+            }
         }
+        self.last_s = time_s;
         self.file.write(&mut self.budget, time_s, &Json::from(&budget))
     }
 

@@ -5,8 +5,8 @@ mod evaluation;
 
 pub use evaluation::{
     ByCollaboration, Comparison, EpisodeCosts, EvaluationReport, ExcludedEpisodes, Failure, FailureMoment,
-    FailureReason, Film, FilmContent, FilmPlace, FilmedEpisode, FoundEpisode, LoadError, LoadedEpisodes,
-    MeanRate, ModelCosts, PairedRow, PhaseReport, PolicyReport, PublishedAverages, PublishedRates, Rate,
-    ReportFormat, ReportPictures, ShownReport, TaskAverage, TaskReport, ValueRange, failure_moments,
-    film_places, gallery, load, pictured_failures,
+    FailureReason, Film, FilmContent, FilmPlace, FilmedEpisode, FloorRate, FoundEpisode, LoadError,
+    LoadedEpisodes, MeanRate, ModelCosts, PairedRow, PhaseReport, PolicyReport, PublishedAverages,
+    PublishedRates, Rate, ReportFormat, ReportPictures, ShownReport, TaskAverage, TaskFloor, TaskReport,
+    ValueRange, failure_moments, film_places, gallery, load, pictured_failures,
 };

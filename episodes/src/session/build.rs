@@ -16,7 +16,7 @@ use crate::commands::{Motion, RobotSheet, UpperBody};
 use crate::convert::isometry_from_sim;
 use crate::error::SceneError;
 use crate::spec::{EpisodeSpec, RobotFile};
-use crate::tasks::Task;
+use crate::tasks::{Spread, Task};
 
 /// Site of a scene at which the origin of a task is.
 const TASK_SITE: &str = "task";
@@ -71,27 +71,28 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
 
 /// What the world of an episode is made of.
 fn world_spec(spec: &EpisodeSpec) -> Result<WorldSpec, EpisodeError> {
-    let own = own_spec(spec.task, spec.seed);
+    let own = own_spec(spec.task, spec.seed, spec.variation.spread);
     match &spec.scene {
         None => Ok(own),
         Some(file) => Ok(elsewhere(own, spec.task, &file.path, file.load()?)?),
     }
 }
 
-fn own_spec(task: &Task, seed: u32) -> WorldSpec {
+fn own_spec(task: &Task, seed: u32, spread: Spread) -> WorldSpec {
     let robots = task.robots.iter().map(|robot| RobotPlacement {
         name: robot.name.into(),
         position_m: robot.position_m,
         yaw_rad: robot.yaw_rad,
     });
-    let objects = task.objects.iter().zip(task.start_poses(seed)).map(|(spot, start)| ObjectPlacement {
-        name: spot.name.into(),
-        file: spot.file.into(),
-        world_from_object: Pose::from_parts(
-            start.position_m.into(),
-            Rotation::from_rotation_z(start.yaw_rad),
-        ),
-    });
+    let objects =
+        task.objects.iter().zip(task.start_poses(seed, spread)).map(|(spot, start)| ObjectPlacement {
+            name: spot.name.into(),
+            file: spot.file.into(),
+            world_from_object: Pose::from_parts(
+                start.position_m.into(),
+                Rotation::from_rotation_z(start.yaw_rad),
+            ),
+        });
     WorldSpec { scene: task.scene.into(), robots: robots.collect(), objects: objects.collect() }
 }
 

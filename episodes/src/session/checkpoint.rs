@@ -168,10 +168,12 @@ impl Origin {
     fn machine(&self) -> String {
         let scene = self.spec.scene.as_ref().map(|scene| format!(" in scene {}", scene.xxh3));
         let scene = scene.unwrap_or_default();
+        let variation: String =
+            self.spec.variation.departures().map(|departure| format!(", {departure}")).collect();
         let sensing = self.spec.sensing;
         let (source, sensors) = (sensing.state_estimate.name(), sensing.sensors.name());
         format!(
-            "robot {}, controller {}, state estimate {source} and sensors {sensors}{scene}",
+            "robot {}, controller {}, state estimate {source} and sensors {sensors}{scene}{variation}",
             self.robot, self.locomotion
         )
     }

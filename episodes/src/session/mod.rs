@@ -40,6 +40,7 @@ use crate::protocol::{Rules, rules};
 use crate::recording::{BEGIN, state_hash_text};
 use crate::scoring::{Facts, Phase, Scores};
 use crate::spec::{EpisodeSpec, Start};
+use crate::variation::Disturbance;
 use crate::{EpisodeError, fingerprint};
 use build::Built;
 use checkpoint::Origin;
@@ -77,6 +78,8 @@ pub struct Session {
     rewind: Rewind,
     /// What the policy has been shown that the benchmark's own policies are not.
     shown: ShownInformation,
+    /// What is added to what robots are told, if anything is.
+    disturbance: Option<Disturbance>,
     /// State hashes of the steps since they were last taken, where somebody wants them.
     hashes: Option<Vec<u64>>,
     /// What it came to, from when the files were closed: the one truth that everybody is told.
@@ -111,7 +114,6 @@ impl Session {
             origin: Origin { spec: spec.clone(), robot, locomotion },
             rules,
             scores: spec.task.scores(&motions[0].robot.model, &present)?,
-            motions,
             clock: ThinkingClock::new(rules.thinking, clock),
             observer: Observer::new(spec.renderer, &world),
             files: None,
@@ -126,8 +128,10 @@ impl Session {
             simulator_failure: None,
             rewind: Rewind::default(),
             shown: ShownInformation::default(),
+            disturbance: Disturbance::new(spec.variation.disturb, spec.seed, motions.len()),
             hashes: None,
             result: None,
+            motions,
             present,
             world,
         })
@@ -236,13 +240,20 @@ impl Session {
         let commands: Vec<RobotCommand> =
             moves.map(|(trajectory, motion)| trajectory.command(step, motion)).collect();
         self.rewind.before_step(&self.world);
-        let stepped = self.world.control_step(&commands);
+        let executed = self.disturbed(&commands);
+        let stepped = self.world.control_step(&executed);
         self.physics += started.elapsed();
         match stepped {
-            Ok(present) => self.present = Arc::new(present),
-            Err(diverged) => return Err(self.fail(diverged, commands, motions)),
+            Ok(mut present) => {
+                // What robots were told is what there is to learn from.
+                for (robot, told) in present.robots.iter_mut().zip(commands) {
+                    robot.command = told;
+                }
+                self.present = Arc::new(present);
+            }
+            Err(diverged) => return Err(self.fail(diverged, executed, motions)),
         }
-        self.rewind.stepped(commands);
+        self.rewind.stepped(executed);
         for (motion, robot) in self.motions.iter_mut().zip(&self.present.robots) {
             let hands_n =
                 robot.estimate.hand_force_n.map(|force_n| Vector3::from(force_n.to_array().map(f64::from)));
@@ -265,6 +276,17 @@ impl Session {
             self.keep_picture("together");
         }
         Ok(())
+    }
+
+    /// What robots do in the next step that are told `commands`.
+    fn disturbed(&self, commands: &[RobotCommand]) -> Vec<RobotCommand> {
+        let Some(disturbance) = &self.disturbance else { return commands.to_vec() };
+        let robots = self.motions.iter().map(|motion| &motion.robot).zip(commands).enumerate();
+        let time_s = self.present.time_s;
+        let executed = robots.map(|(index, (robot, told))| {
+            disturbance.executed(index, time_s, told, &robot.model, &robot.base_limits)
+        });
+        executed.collect()
     }
 
     /// Keeps what this step has reached, of phases that had a number from `first` on.
@@ -294,7 +316,7 @@ impl Session {
 
     /// Keeps a picture of this moment for the strip, if the episode is recorded.
     fn keep_picture(&mut self, caption: &str) {
-        if let Some(files) = &mut self.files {
+        if let Some(files) = self.files.as_mut().filter(|files| files.shows_moments()) {
             let names = self.motions.iter().map(|motion| motion.robot.name.as_str());
             files.keep(moment(caption, &self.present, names, &mut self.observer));
         }

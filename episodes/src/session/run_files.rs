@@ -29,17 +29,20 @@ use crate::tasks::Task;
 pub struct RunFolder {
     pub path: PathBuf,
     pub visibility: Visibility,
+    /// Whether a strip of pictures and a page are made, for people.
+    pub pages: bool,
 }
 
 impl From<&Path> for RunFolder {
     fn from(path: &Path) -> RunFolder {
-        RunFolder { path: path.into(), visibility: Visibility::default() }
+        RunFolder { path: path.into(), visibility: Visibility::default(), pages: true }
     }
 }
 
 /// The files of an episode.
 pub struct RunFiles {
     folder: PathBuf,
+    pages: bool,
     /// `None` where the recording could not begin.
     recorder: Option<RecorderThread>,
     /// The first failure, unless it is the recorder's.
@@ -57,6 +60,7 @@ impl RunFiles {
         let failed = begun.as_ref().err().map(EpisodeError::to_string);
         RunFiles {
             folder: folder.path,
+            pages: folder.pages,
             recorder: begun.ok(),
             failed,
             moments: Vec::new(),
@@ -121,6 +125,11 @@ impl RunFiles {
         }
     }
 
+    /// Whether moments are wanted for the strip.
+    pub(super) fn shows_moments(&self) -> bool {
+        self.pages
+    }
+
     /// Keeps a moment for the strip.
     pub(super) fn keep(&mut self, moment: Result<KeyMoment, PictureError>) {
         match moment {
@@ -141,8 +150,10 @@ impl RunFiles {
         if let Some(recorder) = recorder {
             self.note(recorder.finish(result).map(drop));
         }
-        let reported = self.report(result, task);
-        self.note(reported);
+        if self.pages {
+            let reported = self.report(result, task);
+            self.note(reported);
+        }
         result.recording_failed = self.failed().map(str::to_owned);
         self.note(write_result(result, &self.folder).map(drop));
         result.recording_failed = self.failed().map(str::to_owned);
@@ -174,7 +185,7 @@ impl RunFiles {
 
 /// Begins the recording, so that what cannot be written is known from the start.
 fn begin(folder: &RunFolder, session: &Session) -> Result<RecorderThread, EpisodeError> {
-    let RunFolder { path, visibility } = folder;
+    let RunFolder { path, visibility, .. } = folder;
     let failed = |source| OutputError::Io { path: path.clone(), source };
     create_private_folder(path).map_err(failed)?;
     match fs::remove_file(path.join(FAILED_STEP_FILE)) {

@@ -106,7 +106,7 @@ impl Session {
             room: match self.spec().assistance {
                 Assistance::Paper => Vec::new(),
                 // What cannot be read would have kept the world from being built.
-                Assistance::Full => describe::room(task).unwrap_or_default(),
+                Assistance::Full => describe::room(task, self.spec().variation.spread).unwrap_or_default(),
             },
             brief: describe::brief(self.spec().wording(), &wire_limits(&self.motions[0].robot.base_limits)),
             action_row: action_row(&self.motions[0].robot.model),

@@ -50,7 +50,11 @@ pub const TASK: Task = Task {
         spot("serving_patch", [0.90, -0.40, TABLE_M]),
     ],
     randomize: &[
-        Offset { y_m: -0.30..=0.08, ..uniform_xy(&["service_trolley", "bottle"], 0.10, 0.0) },
+        Offset {
+            y_m: -0.30..=0.08,
+            wider_yaw_rad: 0.1,
+            ..uniform_xy(&["service_trolley", "bottle"], 0.10, 0.0)
+        },
         Offset { y_m: -0.16..=-0.12, ..uniform_xy(&["serving_patch"], 0.0, 0.0) },
     ],
     instruction: "Robot A pushes the trolley down the aisle onto the green rectangle; Robot B takes the wine bottle off it, stands it \

@@ -6,7 +6,7 @@
 
 use std::f32::consts::PI;
 
-use super::{RobotSpot, Task, spot, uniform_xy};
+use super::{Offset, RobotSpot, Task, spot, uniform_xy};
 use crate::scoring::nearness::{all, beside, come, grips, is, standing};
 use crate::scoring::placement::{above_box, stands_as_high, stands_released};
 use crate::scoring::{A, B, Done, Facts, Phase};
@@ -43,7 +43,7 @@ pub const TASK: Task = Task {
         spot("basket", [START_XY_M[0], START_XY_M[1], SHELF_M]),
         spot("basket_patch", [START_XY_M[0], START_XY_M[1] - CARRY_M, SHELF_M]),
     ],
-    randomize: &[uniform_xy(&["basket"], 0.05, 0.05)],
+    randomize: &[Offset { wider_yaw_rad: 0.1, ..uniform_xy(&["basket"], 0.05, 0.05) }],
     instruction: "Both robots take the laundry basket by its rim, carry it level to the green patch on the other shelf, set it \
                   down there and let go.",
     benchmark_steps: 1000,

@@ -5,7 +5,7 @@
 
 use std::f32::consts::PI;
 
-use super::{ObjectSpot, RobotSpot, Task, spot, uniform_xy};
+use super::{ObjectSpot, Offset, RobotSpot, Task, spot, uniform_xy};
 use crate::scoring::nearness::{all, come, grips, is};
 use crate::scoring::{A, B, Done, Facts, Phase};
 
@@ -55,12 +55,15 @@ pub const TASK: Task = Task {
         apple(APPLES[5], 0.08, 0.04),
     ],
     randomize: &[
-        uniform_xy(
-            &["tub", "tub_stack", APPLES[0], APPLES[1], APPLES[2], APPLES[3], APPLES[4], APPLES[5]],
-            0.02,
-            0.01,
-        ),
-        uniform_xy(&["crate", "crate_stack"], 0.06, 0.005),
+        Offset {
+            wider_yaw_rad: 0.05,
+            ..uniform_xy(
+                &["tub", "tub_stack", APPLES[0], APPLES[1], APPLES[2], APPLES[3], APPLES[4], APPLES[5]],
+                0.02,
+                0.01,
+            )
+        },
+        Offset { wider_yaw_rad: 0.05, ..uniform_xy(&["crate", "crate_stack"], 0.06, 0.005) },
         uniform_xy(&[APPLES[0]], 0.008, 0.008),
         uniform_xy(&[APPLES[1]], 0.008, 0.008),
         uniform_xy(&[APPLES[2]], 0.008, 0.008),

@@ -46,7 +46,7 @@ pub const TASK: Task = Task {
     randomize: &[
         uniform_xy(&["frame", "frame_rack", "wall_peg"], 0.05, 0.025),
         Offset { z_m: -0.04..=0.0, ..uniform_xy(&["wall_peg"], 0.0, 0.0) },
-        uniform_xy(&["frame", "frame_rack"], 0.03, 0.01),
+        Offset { wider_yaw_rad: 0.05, ..uniform_xy(&["frame", "frame_rack"], 0.03, 0.01) },
     ],
     instruction: "Both robots lift the picture frame by its sides, hang it by its loop on the peg in the wall, and let go \
                   once it hangs.",

@@ -7,7 +7,7 @@ use std::f32::consts::PI;
 
 use tandem_sim::Side::Right;
 
-use super::{RobotSpot, Task, spot, uniform_xy};
+use super::{Offset, RobotSpot, Task, spot, uniform_xy};
 use crate::scoring::nearness::{all, beside, come, grip, is, standing};
 use crate::scoring::placement::{stands_released, within_box};
 use crate::scoring::{A, B, Done, Facts, Phase};
@@ -38,7 +38,10 @@ pub const TASK: Task = Task {
         },
     ],
     objects: &[spot("bottle", [0.30, -0.07, COUNTER_M]), spot("target_pad", [0.44, -0.06, COUNTER_M])],
-    randomize: &[uniform_xy(&["bottle"], 0.025, 0.025), uniform_xy(&["target_pad"], 0.025, 0.025)],
+    randomize: &[
+        Offset { wider_yaw_rad: 0.3, ..uniform_xy(&["bottle"], 0.025, 0.025) },
+        Offset { wider_yaw_rad: 0.3, ..uniform_xy(&["target_pad"], 0.025, 0.025) },
+    ],
     instruction: "Robot A picks up the bottle with its right hand and passes it straight into Robot B's right hand; \
                   Robot B stands it upright on the target and lets go.",
     benchmark_steps: 1000,

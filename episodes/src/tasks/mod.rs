@@ -14,7 +14,7 @@ mod randomize;
 mod table_align;
 mod trash_collection;
 
-pub use randomize::{Offset, StartPose, uniform_xy};
+pub use randomize::{Offset, Spread, StartPose, uniform_xy};
 
 use std::sync::Arc;
 

@@ -10,7 +10,7 @@ use std::f32::consts::PI;
 
 use tandem_sim::Vector;
 
-use super::{RobotSpot, Task, spot, uniform_xy};
+use super::{Offset, RobotSpot, Task, spot, uniform_xy};
 use crate::scoring::nearness::{all, beside, come, grips, is, standing};
 use crate::scoring::placement::{stands_as_high, stands_released};
 use crate::scoring::{B, C, Done, Facts, Milestone, Phase};
@@ -60,7 +60,7 @@ pub const TASK: Task = Task {
         spot("lever_door", [0.0, 0.0, 0.0]),
         spot("foot_marks", [GOAL_X_M, 0.0, 0.0]),
     ],
-    randomize: &[uniform_xy(&["console_table"], 0.05, 0.05)],
+    randomize: &[Offset { wider_yaw_rad: 0.08, ..uniform_xy(&["console_table"], 0.05, 0.05) }],
     instruction: "Robot A opens the door and stands aside; Robots B and C carry the table out of the bedroom through the doorway, set \
                   it down with its feet on the green squares and let go.",
     benchmark_steps: 1500,

@@ -2,6 +2,7 @@
 
 use std::ops::RangeInclusive;
 
+use serde::{Deserialize, Serialize};
 use tandem_sim::SplitMix64;
 
 use super::Task;
@@ -14,18 +15,96 @@ pub struct Offset {
     pub x_m: RangeInclusive<f32>,
     pub y_m: RangeInclusive<f32>,
     pub z_m: RangeInclusive<f32>,
-    /// Turn about each object's own vertical axis.
+    /// Turn about the vertical axis of the first of them.
     pub yaw_rad: RangeInclusive<f32>,
+    /// How much farther a spread of 2 turns them, either way; a spread of 4 three times as much.
+    pub wider_yaw_rad: f32,
+}
+
+/// How far the seed moves things, as a multiple of the benchmark's randomisation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(try_from = "u8", into = "u8")]
+pub enum Spread {
+    /// As far as in the benchmark.
+    #[default]
+    Single,
+    Double,
+    Quadruple,
+}
+
+impl Spread {
+    pub const ALL: [Spread; 3] = [Spread::Single, Spread::Double, Spread::Quadruple];
+
+    /// The multiple.
+    pub fn times(self) -> u8 {
+        match self {
+            Spread::Single => 1,
+            Spread::Double => 2,
+            Spread::Quadruple => 4,
+        }
+    }
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Spread::Single => "1",
+            Spread::Double => "2",
+            Spread::Quadruple => "4",
+        }
+    }
+}
+
+impl From<Spread> for u8 {
+    fn from(spread: Spread) -> u8 {
+        spread.times()
+    }
+}
+
+impl TryFrom<u8> for Spread {
+    type Error = String;
+
+    fn try_from(times: u8) -> Result<Spread, String> {
+        Spread::ALL
+            .into_iter()
+            .find(|spread| spread.times() == times)
+            .ok_or_else(|| format!("no spread {times}; have: {}", Spread::ALL.map(Spread::name).join(", ")))
+    }
+}
+
+impl Offset {
+    /// What x, y, z and yaw are drawn from. Ranges are widened about their middles.
+    pub fn ranges(&self, spread: Spread) -> [[f32; 2]; 4] {
+        let [x_m, y_m, z_m, yaw_rad] = [&self.x_m, &self.y_m, &self.z_m, &self.yaw_rad];
+        let own = [x_m, y_m, z_m, yaw_rad].map(|range| [*range.start(), *range.end()]);
+        if spread == Spread::Single {
+            // As it is, to the last bit.
+            return own;
+        }
+        let times = f32::from(spread.times());
+        let wider = own.map(|[low, high]| {
+            let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * times);
+            [middle - half, middle + half]
+        });
+        let [x_m, y_m, z_m, [least_rad, most_rad]] = wider;
+        let turn_rad = self.wider_yaw_rad * (times - 1.0);
+        [x_m, y_m, z_m, [least_rad - turn_rad, most_rad + turn_rad]]
+    }
 }
 
 /// An offset of up to `x_m` and `y_m` either way along world x and y, independently.
 pub const fn uniform_xy(objects: &'static [&'static str], x_m: f32, y_m: f32) -> Offset {
-    Offset { objects, x_m: -x_m..=x_m, y_m: -y_m..=y_m, z_m: 0.0..=0.0, yaw_rad: 0.0..=0.0 }
+    Offset {
+        objects,
+        x_m: -x_m..=x_m,
+        y_m: -y_m..=y_m,
+        z_m: 0.0..=0.0,
+        yaw_rad: 0.0..=0.0,
+        wider_yaw_rad: 0.0,
+    }
 }
 
 impl Task {
     /// Where every object starts under `seed`, in the order of [`Task::objects`]: world position in metres, and yaw.
-    pub fn start_poses(&self, seed: u32) -> Vec<StartPose> {
+    pub fn start_poses(&self, seed: u32, spread: Spread) -> Vec<StartPose> {
         let mut random = SplitMix64(seed.into());
         let mut start_poses: Vec<StartPose> = self
             .objects
@@ -33,10 +112,12 @@ impl Task {
             .map(|spot| StartPose { position_m: spot.position_m, yaw_rad: spot.yaw_rad })
             .collect();
         for offset in self.randomize {
-            let [x_m, y_m, z_m, yaw_rad] = [&offset.x_m, &offset.y_m, &offset.z_m, &offset.yaw_rad]
-                .map(|range| random.uniform([*range.start(), *range.end()]));
+            let [x_m, y_m, z_m, yaw_rad] = offset.ranges(spread).map(|range| random.uniform(range));
             let moved = |spot: &super::ObjectSpot| offset.objects.contains(&spot.name);
+            let first = self.objects.iter().position(|spot| offset.objects.first() == Some(&spot.name));
+            let centre_m = first.map(|first| start_poses[first].position_m).unwrap_or_default();
             for (start, _) in start_poses.iter_mut().zip(self.objects).filter(|(_, spot)| moved(spot)) {
+                start.position_m = turned(start.position_m, centre_m, yaw_rad);
                 start.position_m =
                     [start.position_m[0] + x_m, start.position_m[1] + y_m, start.position_m[2] + z_m];
                 start.yaw_rad += yaw_rad;
@@ -44,6 +125,17 @@ impl Task {
         }
         start_poses
     }
+}
+
+/// A point turned about the vertical axis through another, where it lies beside that.
+fn turned(point_m: [f32; 3], centre_m: [f32; 3], yaw_rad: f32) -> [f32; 3] {
+    let [x_m, y_m] = [point_m[0] - centre_m[0], point_m[1] - centre_m[1]];
+    if yaw_rad == 0.0 || (x_m == 0.0 && y_m == 0.0) {
+        return point_m;
+    }
+    let (sine, cosine) = yaw_rad.sin_cos();
+    let [east_m, north_m] = [cosine * x_m - sine * y_m, sine * x_m + cosine * y_m];
+    [centre_m[0] + east_m, centre_m[1] + north_m, point_m[2]]
 }
 
 /// Where one object starts.
@@ -62,7 +154,7 @@ mod tests {
     #[test]
     fn offsets_fill_their_ranges_and_stay_inside() {
         for task in ALL {
-            let start_poses: Vec<_> = (0..400).map(|seed| task.start_poses(seed)).collect();
+            let start_poses: Vec<_> = (0..400).map(|seed| task.start_poses(seed, Spread::Single)).collect();
             for (index, spot) in task.objects.iter().enumerate() {
                 let own: Vec<_> =
                     task.randomize.iter().filter(|offset| offset.objects.contains(&spot.name)).collect();
@@ -97,8 +189,71 @@ mod tests {
     #[test]
     fn a_seed_always_means_the_same_start_and_seeds_differ() {
         for task in ALL {
-            assert_eq!(task.start_poses(7), task.start_poses(7));
-            assert_ne!(task.start_poses(7), task.start_poses(8));
+            for spread in Spread::ALL {
+                assert_eq!(task.start_poses(7, spread), task.start_poses(7, spread));
+                assert_ne!(task.start_poses(7, spread), task.start_poses(8, spread));
+            }
         }
+    }
+
+    /// What a place of the list of tasks was before there was a spread: the four numbers of each offset drawn and added.
+    #[test]
+    fn a_spread_of_one_is_what_the_benchmark_has_bit_for_bit() {
+        for task in ALL {
+            for seed in [0, 7, 2000, u32::MAX] {
+                let mut random = SplitMix64(seed.into());
+                let mut expected: Vec<[f32; 4]> = task
+                    .objects
+                    .iter()
+                    .map(|spot| [spot.position_m[0], spot.position_m[1], spot.position_m[2], spot.yaw_rad])
+                    .collect();
+                for offset in task.randomize {
+                    let drawn = [&offset.x_m, &offset.y_m, &offset.z_m, &offset.yaw_rad]
+                        .map(|range| random.uniform([*range.start(), *range.end()]));
+                    for (place, spot) in expected.iter_mut().zip(task.objects) {
+                        if offset.objects.contains(&spot.name) {
+                            *place = std::array::from_fn(|axis| place[axis] + drawn[axis]);
+                        }
+                    }
+                }
+                let places = task.start_poses(seed, Spread::Single).into_iter().map(|start| {
+                    let [x_m, y_m, z_m] = start.position_m;
+                    [x_m, y_m, z_m, start.yaw_rad].map(f32::to_bits)
+                });
+                let expected = expected.into_iter().map(|place| place.map(f32::to_bits));
+                assert!(places.eq(expected), "{} seed {seed}", task.id);
+            }
+        }
+    }
+
+    #[test]
+    fn a_wider_spread_fills_wider_ranges_and_turns_what_goes_together_as_one() {
+        for task in ALL {
+            let farthest = |spread: Spread| {
+                let places = (0..400).flat_map(|seed| task.start_poses(seed, spread));
+                let moved = places.zip(task.objects.iter().cycle()).map(|(start, spot)| {
+                    f32::hypot(
+                        start.position_m[0] - spot.position_m[0],
+                        start.position_m[1] - spot.position_m[1],
+                    )
+                });
+                moved.fold(0.0, f32::max)
+            };
+            let [one, two, four] = Spread::ALL.map(farthest);
+            assert!(two > 1.3 * one && four > 1.3 * two, "{}: {one} {two} {four}", task.id);
+            let turned = |start: &StartPose, spot: &super::super::ObjectSpot| start.yaw_rad != spot.yaw_rad;
+            let any = task.start_poses(7, Spread::Double);
+            assert!(any.iter().zip(task.objects).any(|(start, spot)| turned(start, spot)), "{}", task.id);
+        }
+        // The bottle stays where it stands on the trolley's tray.
+        let task = crate::tasks::find("cart_service").unwrap();
+        let [trolley, bottle] = [0, 1].map(|index| task.objects[index].position_m);
+        let apart_m = bottle[1] - trolley[1];
+        let start = task.start_poses(2000, Spread::Quadruple);
+        let [trolley, bottle] = [0, 1].map(|index| start[index]);
+        let (sine, cosine) = trolley.yaw_rad.sin_cos();
+        let expected_m = [trolley.position_m[0] - sine * apart_m, trolley.position_m[1] + cosine * apart_m];
+        let off_m = f32::hypot(bottle.position_m[0] - expected_m[0], bottle.position_m[1] - expected_m[1]);
+        assert!(off_m < 1e-5 && trolley.yaw_rad != 0.0, "{start:?}");
     }
 }

@@ -7,7 +7,7 @@
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
-use super::{ObjectSpot, RobotSpot, Task, spot, uniform_xy};
+use super::{ObjectSpot, Offset, RobotSpot, Task, spot, uniform_xy};
 use crate::scoring::nearness::{all, beside, come, grips, is, standing};
 use crate::scoring::placement::{stands_as_high, stands_released};
 use crate::scoring::{A, B, Done, Facts, Phase};
@@ -49,7 +49,7 @@ pub const TASK: Task = Task {
         ObjectSpot { yaw_rad: PI, ..spot("office_chair", [PLACE_XY_M[0] + 0.40, PLACE_XY_M[1], 0.0]) },
         spot("table_patch", [PLACE_XY_M[0], PLACE_XY_M[1], 0.0]),
     ],
-    randomize: &[uniform_xy(&["office_table"], 0.05, 0.05)],
+    randomize: &[Offset { wider_yaw_rad: 0.08, ..uniform_xy(&["office_table"], 0.05, 0.05) }],
     instruction: "Both robots lift the table by the edges of its ends, carry it down the office, turn it by a quarter on the way, set it down \
                   on the green patch with its long side square to the chair, and let go.",
     benchmark_steps: 1100,

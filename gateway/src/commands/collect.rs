@@ -2,7 +2,11 @@
 
 use std::{path::PathBuf, process::ExitCode};
 
-use tandem_episodes::players;
+use tandem_episodes::{
+    Variation,
+    evaluation::{EvaluationPlan, KeptFiles},
+    players,
+};
 use tandem_tools_spec::Assistance;
 use tracing_subscriber::filter::LevelFilter;
 
@@ -13,15 +17,41 @@ use super::{CommandResult, evaluate::play_and_print, flags::EpisodeFlags, loggin
 pub struct CollectArgs {
     #[command(flatten)]
     episodes: EpisodeFlags,
+    /// How much demonstrations of the same task differ in pace, pauses and ways, and how often hands miss and come back: 0 for
+    /// not at all, to 3.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u8).range(..=i64::from(Variation::MOST_VARIETY)))]
+    variety: u8,
+    /// How much slow noise is added to what robots are told before they do it; 1 is 0.016 rad on the joints of arms, and 0.03 m/s
+    /// and 0.06 rad/s on a base that walks. What they were told is recorded as the action.
+    #[arg(long, value_name = "LEVEL", default_value_t = 0.0, value_parser = parse_level)]
+    disturb: f32,
+    /// Keep only demonstrations that reach the last phase; of the others a result remains, and no recording.
+    #[arg(long)]
+    only_successful: bool,
+    /// Write no strip of pictures and no page of each episode, which take a quarter of the space.
+    #[arg(long)]
+    no_reports: bool,
     /// Folder for the recordings.
     #[arg(long, value_name = "DIR", default_value = "runs/demonstrations")]
     out: PathBuf,
+}
+
+/// How much to disturb.
+fn parse_level(text: &str) -> Result<f32, String> {
+    let level = text.parse().ok().filter(|level| (0.0..=Variation::MOST_DISTURB).contains(level));
+    level.ok_or_else(|| format!("no level; give 0 to {}, as 1", Variation::MOST_DISTURB))
 }
 
 /// Plays and records.
 pub fn run(args: CollectArgs) -> CommandResult {
     log_to_stderr(LevelFilter::INFO);
     let plan = args.episodes.plan(players::find("expert")?, true, Assistance::Full)?;
+    let variation = Variation { variety: args.variety, disturb: args.disturb, ..plan.variation };
+    let plan = EvaluationPlan {
+        variation,
+        files: KeptFiles { pages: !args.no_reports, only_successful: args.only_successful },
+        ..plan
+    };
     play_and_print(&plan, &args.out)?;
     Ok(ExitCode::SUCCESS)
 }

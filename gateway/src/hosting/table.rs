@@ -91,7 +91,7 @@ impl EpisodeTable {
         let spec = self.settings.spec(&args)?;
         let place = self.take_place().await?;
         let (id, path) = self.folders.create(&self.settings.runs, spec.task.id, spec.seed);
-        let folder = RunFolder { path, visibility: self.settings.record };
+        let folder = RunFolder { path, visibility: self.settings.record, pages: true };
         let reply = self.begin(&id, spec, &driving, folder, place).await?;
         let briefing = if args.short { reply.briefing.shortened() } else { reply.briefing };
         Ok(StartReply { briefing, ..reply })

@@ -31,6 +31,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
             &["output", "html", "fingerprint", "scoring", "convert", "statistics"],
             &["error"],
             &["tasks"],
+            &["variation"],
             &["protocol", "spec"],
             &["commands", "results"],
             &["observation"],

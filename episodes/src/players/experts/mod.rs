@@ -18,8 +18,9 @@ mod table_align;
 mod trash_collection;
 
 use super::{PlayerError, PrivilegedEpisode, PrivilegedPlayer};
+use crate::spec::EpisodeSpec;
 use crate::tasks::{self, Task};
-use skills::Commander;
+use skills::{Commander, Variety};
 
 /// Performs a task to its end.
 type ExpertScript = fn(&mut Commander) -> Result<(), PlayerError>;
@@ -46,13 +47,15 @@ pub fn solved() -> impl Iterator<Item = &'static Task> {
 pub struct Expert {
     task: &'static Task,
     script: ExpertScript,
+    /// How its demonstration differs from the plain one, if it does.
+    variety: Option<Variety>,
 }
 
 impl Expert {
     /// The expert of `task`.
     pub fn of(task: &'static Task) -> Result<Expert, PlayerError> {
         match ALL.iter().find(|(id, _)| *id == task.id) {
-            Some((_, script)) => Ok(Expert { task, script: *script }),
+            Some((_, script)) => Ok(Expert { task, script: *script, variety: None }),
             None => Err(PlayerError::NoExpert {
                 task: task.id.into(),
                 have: ALL.iter().map(|(id, _)| *id).collect(),
@@ -61,8 +64,16 @@ impl Expert {
     }
 }
 
+impl Expert {
+    /// The expert of an episode, who demonstrates as its spec says.
+    pub fn for_episode(spec: &EpisodeSpec) -> Result<Expert, PlayerError> {
+        let variety = Variety::new(spec.variation.variety, spec.seed);
+        Ok(Expert { variety, ..Expert::of(spec.task)? })
+    }
+}
+
 impl PrivilegedPlayer for Expert {
     fn play(&mut self, episode: &mut dyn PrivilegedEpisode) -> Result<(), PlayerError> {
-        (self.script)(&mut Commander::new(self.task, episode)?)
+        (self.script)(&mut Commander::new(self.task, episode)?.varied(self.variety.clone()))
     }
 }

@@ -1,7 +1,7 @@
 //! The topics of one robot: what its joints do, what it was told, what its hands feel and what its camera saw.
 
 use foxglove::messages::{CameraCalibration, CompressedImage, JointState, JointStates};
-use tandem_sim::{RobotModel, RobotSensed, RobotStep, mjcf::MjcfCamera, render::Intrinsics};
+use tandem_sim::{RobotCommand, RobotModel, RobotSensed, RobotStep, mjcf::MjcfCamera, render::Intrinsics};
 
 use super::messages::{ActionMessage, BaseCommandMessage, HandsMessage, Json};
 use super::transforms::{EGOCENTRIC, robot_frame, timestamp};
@@ -15,6 +15,8 @@ use crate::scoring::Facts;
 pub struct RobotTopics {
     joint_states: Topic<JointStates>,
     action: Topic<Json<ActionMessage>>,
+    /// Where what a robot does is not what it is told.
+    executed: Option<Topic<Json<ActionMessage>>>,
     base_command: Topic<Json<BaseCommandMessage>>,
     hands: Topic<Json<HandsMessage>>,
     /// Opened by the first picture.
@@ -29,13 +31,21 @@ struct CameraTopics {
 }
 
 impl RobotTopics {
-    pub fn open(file: &mut McapFile, robot: &RobotSheet) -> Result<RobotTopics, OutputError> {
+    pub fn open(
+        file: &mut McapFile,
+        robot: &RobotSheet,
+        disturbed: bool,
+    ) -> Result<RobotTopics, OutputError> {
         let columns = action_row(&robot.model).join(",");
+        let mut executed =
+            || file.topic(&format!("/{}/executed_action", robot.name), &[("columns", &columns)]);
+        let executed = disturbed.then(&mut executed).transpose()?;
         Ok(RobotTopics {
             joint_states: file.topic(&format!("/{}/joint_states", robot.name), &[])?,
             action: file.topic(&format!("/{}/action", robot.name), &[("columns", &columns)])?,
             base_command: file.topic(&format!("/{}/base_command", robot.name), &[])?,
             hands: file.topic(&format!("/{}/hands", robot.name), &[])?,
+            executed,
             camera: None,
         })
     }
@@ -55,6 +65,19 @@ impl RobotTopics {
         file.write(&mut self.action, time_s, &Json::from(&step.command))?;
         file.write(&mut self.base_command, time_s, &Json::from(&step.command))?;
         file.write(&mut self.hands, time_s, &HandsMessage::of(step, index, facts))
+    }
+
+    /// Appends what the robot did in the control step that ended at `time_s`, where noise is added to what it is told.
+    pub fn executed(
+        &mut self,
+        file: &mut McapFile,
+        time_s: f64,
+        command: &RobotCommand,
+    ) -> Result<(), OutputError> {
+        match &mut self.executed {
+            Some(topic) => file.write(topic, time_s, &Json::from(command)),
+            None => Ok(()),
+        }
     }
 
     /// Appends a picture seen through the robot's head camera, unless there is one of this moment: physics stands still between

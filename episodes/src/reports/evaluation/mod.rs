@@ -3,6 +3,7 @@
 
 mod compare;
 mod costs;
+mod floor;
 mod load;
 mod page;
 mod policy;
@@ -18,6 +19,7 @@ use serde::Serialize;
 
 pub use compare::{Comparison, PairedRow};
 pub use costs::{EpisodeCosts, ModelCosts, ValueRange};
+pub use floor::{FloorRate, TaskFloor};
 pub use load::{FoundEpisode, LoadError, LoadedEpisodes, load};
 pub use page::ReportPictures;
 pub use page::films::{Film, FilmContent, FilmPlace, FilmedEpisode, film_places};
@@ -37,6 +39,8 @@ pub struct EvaluationReport {
     pub policies: Vec<PolicyReport>,
     /// Each policy against the first.
     pub comparisons: Vec<Comparison>,
+    /// What of these tasks needs no eyes.
+    pub floors: Vec<TaskFloor>,
     /// What was published of the same tasks in another simulator.
     pub published: Vec<PublishedRates>,
     pub published_averages: Vec<PublishedAverages>,
@@ -90,6 +94,7 @@ impl EvaluationReport {
         EvaluationReport {
             published: published::rows().into_iter().filter(|row| played(&row.task)).collect(),
             published_averages: published::averages(),
+            floors: floor::floors(&groups, &policies),
             failure_moments: Vec::new(),
             skipped: loaded.skipped.clone(),
             policies,

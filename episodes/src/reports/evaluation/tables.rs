@@ -2,10 +2,12 @@
 
 use super::compare::{Comparison, PairedRow};
 use super::costs::{EpisodeCosts, ValueRange};
+use super::floor::TaskFloor;
 use super::policy::{PolicyReport, TaskReport};
 use super::rate::{MeanRate, Rate, percent};
 use super::went_wrong::FailureMoment;
 use super::{EvaluationReport, PublishedRates};
+use crate::results::named;
 use crate::statistics::Count;
 
 /// Words in rows and columns.
@@ -42,6 +44,7 @@ impl Table {
 pub fn all(report: &EvaluationReport) -> Vec<Table> {
     let policies = &report.policies;
     let mut tables: Vec<Table> = policies.iter().map(rates).collect();
+    tables.push(floors(&report.floors));
     tables.push(averages(policies));
     tables.push(together(policies));
     tables.push(shown(policies));
@@ -80,6 +83,37 @@ pub fn rates(policy: &PolicyReport) -> Table {
         }
     }
     table
+}
+
+fn floors(floors: &[TaskFloor]) -> Table {
+    let named: Vec<String> = floors.iter().filter(|floor| floor.is_high).map(task_of).collect();
+    let high = match &named[..] {
+        [] => "Of none of these tasks it is above 50 %.".into(),
+        named => format!(
+            "It is above 50 % of {}: there a high rate says little of what a policy sees, and `--spread 2` or `4` more.",
+            named.join(", ")
+        ),
+    };
+    let note = format!(
+        "What needs no eyes, in percent of episodes with the exact 95 % interval: robots that hold still (idle), and what the robots \
+         of a demonstration of another seed were told, replayed without a look (open-loop). {high}"
+    );
+    let mut table = Table::new("The floor", &note, &["Task", "Player", "Measured"], 3);
+    let phases = floors.iter().flat_map(|floor| &floor.players).map(|rate| rate.phases.len());
+    table.head.extend((0..phases.max().unwrap_or_default()).map(crate::scoring::Phase::number));
+    for floor in floors {
+        for rate in &floor.players {
+            let words = [task_of(floor), rate.player.into(), format!("{}, {}", rate.measured, rate.protocol)];
+            let figures = rate.phases.iter().map(|phase| format!("{} {}", phase.text(), phase.fraction()));
+            table.rows.push(words.into_iter().chain(figures).collect());
+        }
+    }
+    table
+}
+
+/// The task, with what is not as the benchmark has it.
+fn task_of(floor: &TaskFloor) -> String {
+    named(floor.task, &floor.departures)
 }
 
 fn averages(policies: &[PolicyReport]) -> Table {

@@ -10,7 +10,7 @@ use crate::spec::{EpisodeSpec, PhaseStart, Start};
 use crate::tasks::{self, Task};
 
 /// An episode that reached the first `phases` phases.
-fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> PlayedEpisode {
+pub fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> PlayedEpisode {
     let reached = |index: usize| (index < phases).then_some(4.0 * (index as f64 + 1.0));
     let times = (0..task.phases.len()).map(|index| (crate::Phase::number(index), reached(index)));
     let ended = if phases == task.phases.len() { EndReason::TaskComplete } else { EndReason::Finished };

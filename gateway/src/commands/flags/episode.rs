@@ -4,10 +4,10 @@ use std::{ops::RangeInclusive, str::FromStr};
 
 use clap::Args;
 use tandem_episodes::{
-    RobotFile, SimError,
-    evaluation::{EvaluationPlan, Shard, Starts},
+    RobotFile, SimError, Variation,
+    evaluation::{EvaluationPlan, KeptFiles, Shard, Starts},
     players::Policy,
-    tasks::{self, Task},
+    tasks::{self, Spread, Task},
 };
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol};
 
@@ -35,6 +35,9 @@ pub struct EpisodeFlags {
     /// For experiments: whether texts say how to grasp, whatever the assistance has.
     #[arg(long, hide = true, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = one_of(Hints::ALL, Hints::name))]
     hints: Option<Hints>,
+    /// How far the seed moves things, as a multiple of the benchmark's randomisation; above 1 it turns them, too.
+    #[arg(long, value_name = "TIMES", value_parser = one_of(Spread::ALL, Spread::name), default_value = Spread::default().name())]
+    spread: Spread,
     /// Worlds that run side by side.
     #[arg(long, default_value_t = 1, value_name = "N")]
     jobs: usize,
@@ -78,6 +81,7 @@ impl EpisodeFlags {
             assistance,
             disclosure,
             hints,
+            variation: Variation { spread: self.spread, ..Variation::default() },
             renderer: self.world.renderer(),
             tasks: self.tasks.0,
             seeds: self.seeds.0.collect(),
@@ -85,6 +89,7 @@ impl EpisodeFlags {
             shard: Shard::WHOLE,
             jobs: self.jobs,
             record,
+            files: KeptFiles::default(),
             keep_failed: false,
         })
     }

@@ -1,10 +1,10 @@
 //! The flags that say who plays: one of the program's own players, a program, or a learned policy at a server.
 
-use std::{error::Error, time::Duration};
+use std::{error::Error, path::PathBuf, time::Duration};
 
 use tandem_episodes::{
     EpisodeSpec,
-    players::{self, EpisodeOutput, PlayError, PlayOutcome, Policy, PolicyWait},
+    players::{self, EpisodeOutput, OpenLoop, PlayError, PlayOutcome, Policy, PolicyWait},
     results::PolicyCard,
 };
 use tandem_tools_spec::{Driving, Operators};
@@ -17,6 +17,9 @@ const EXEC: &str = "exec:";
 
 /// The prefix of --policy that names a language model.
 const AGENT: &str = "agent:";
+
+/// The prefix of --policy that names recordings.
+const OPEN_LOOP: &str = "open-loop:";
 
 /// How long a program may run in an episode, unless a flag says otherwise.
 const LIMIT_S: u32 = 3600;
@@ -53,6 +56,7 @@ enum PolicyChoice {
     Player(&'static players::PlayerEntry),
     Program(String),
     Agent(Box<AgentFlags>),
+    OpenLoop(PathBuf),
     Remote(PolicyProtocol, Vec<String>),
 }
 
@@ -60,9 +64,16 @@ fn help() -> String {
     let players = players::ALL.iter().map(|player| format!("{} ({})", player.name, player.about));
     let players: Vec<String> = players.collect();
     format!(
+<<<<<<< HEAD
         "Who plays: {}; exec:COMMAND, a program that is started anew for every episode; \
          agent:MODEL, a language model, with flags of `tandem agent` as in agent:MODEL?api=anthropic&max-usd=2; openpi:ws://HOST:PORT, \
          xpolicylab:ws://HOST:PORT or act:http://HOST:PORT/act, a learned policy at a server, or one for each robot, separated by commas",
+=======
+        "Who plays: {}; open-loop:RECORDING, what the robots of a demonstration of another seed were told, replayed without a look \
+         (an episode.mcap, or a folder that `collect` wrote); exec:COMMAND, a program that is started anew for every episode; \
+         agent:MODEL, a language model, with flags of `tandem agent` as in agent:MODEL?api=anthropic&max-usd=2; openpi:ws://HOST:PORT or act:http://HOST:PORT/act, \
+         a learned policy at a server, or one for each robot, separated by commas",
+>>>>>>> b7c790e (The floor: open-loop replays a demonstration of another seed, reports name tasks that hardly need eyes; --spread widens what the seed moves; collect --variety and --disturb vary demonstrations, --only-successful and --no-reports keep less)
         players.join(", ")
     )
 }
@@ -77,13 +88,23 @@ fn parse_policy(text: &str) -> Result<PolicyChoice, String> {
     if let Some(agent) = text.strip_prefix(AGENT) {
         return AgentFlags::parse_policy(agent).map(|flags| PolicyChoice::Agent(Box::new(flags)));
     }
+    if let Some(path) = text.strip_prefix(OPEN_LOOP) {
+        return match path.is_empty() {
+            true => Err("no recording; give one, as open-loop:runs/demonstrations".into()),
+            false => Ok(PolicyChoice::OpenLoop(path.into())),
+        };
+    }
     for protocol in PolicyProtocol::ALL {
         if let Some(urls) = text.strip_prefix(&format!("{protocol}:")) {
             return parse_urls(protocol, urls).map(|urls| PolicyChoice::Remote(protocol, urls));
         }
     }
     players::find(text).map(PolicyChoice::Player).map_err(|error| {
+<<<<<<< HEAD
         format!("{error}, exec:COMMAND, agent:MODEL, openpi:ws://HOST:PORT, xpolicylab:ws://HOST:PORT, act:http://HOST:PORT/act")
+=======
+        format!("{error}, exec:COMMAND, agent:MODEL, openpi:ws://HOST:PORT, act:http://HOST:PORT/act, open-loop:RECORDING")
+>>>>>>> b7c790e (The floor: open-loop replays a demonstration of another seed, reports name tasks that hardly need eyes; --spread widens what the seed moves; collect --variety and --disturb vary demonstrations, --only-successful and --no-reports keep less)
     })
 }
 
@@ -103,19 +124,29 @@ impl PolicyFlags {
         let misplaced = |flag: &str, who: &str| Err(format!("{flag} is for {who}").into());
         let driving = self.driving()?;
         let policy: Box<dyn Policy> = match (self.policy, self.policy_map, self.policy_limit) {
-            (PolicyChoice::Player(_) | PolicyChoice::Program(_) | PolicyChoice::Agent(_), Some(_), _) => {
+            (
+                PolicyChoice::Player(_)
+                | PolicyChoice::OpenLoop(_)
+                | PolicyChoice::Program(_)
+                | PolicyChoice::Agent(_),
+                Some(_),
+                _,
+            ) => {
                 return misplaced("--policy-map", "policies at a server");
             }
-            (PolicyChoice::Player(_) | PolicyChoice::Remote(..), _, Some(_)) => {
+            (PolicyChoice::Player(_) | PolicyChoice::OpenLoop(_) | PolicyChoice::Remote(..), _, Some(_)) => {
                 return misplaced("--policy-limit", "programs");
             }
-            (PolicyChoice::Player(_) | PolicyChoice::Remote(..), _, None) if driving.is_per_robot() => {
+            (PolicyChoice::Player(_) | PolicyChoice::OpenLoop(_) | PolicyChoice::Remote(..), _, None)
+                if driving.is_per_robot() =>
+            {
                 return misplaced(
                     "--per-robot",
                     "programs; a policy at a server has one address for each robot",
                 );
             }
             (PolicyChoice::Player(entry), None, None) => Box::new(BuiltIn(entry)),
+            (PolicyChoice::OpenLoop(path), None, None) => Box::new(OpenLoop::read(&path)?),
             (PolicyChoice::Program(command), None, limit_s) => {
                 let limit = Duration::from_secs(limit_s.unwrap_or(LIMIT_S).into());
                 Box::new(Program::new(command, driving, limit)?)
@@ -226,6 +257,13 @@ mod tests {
         };
         check(&["--policy", "expart"], "have: expert, idle, demonstration, exec:COMMAND");
         check(&["--policy", "exec: "], "give one, as exec:");
+        check(&["--policy", "open-loop:"], "give one, as open-loop:runs/demonstrations");
+        check(
+            &["--policy", "open-loop:nowhere/episode.mcap"],
+            "cannot read the recording nowhere/episode.mcap",
+        );
+        check(&["--policy", "open-loop:src"], "src holds no recording of an episode; give an episode.mcap");
+        check(&["--policy", "open-loop:src", "--per-robot"], "--per-robot is for programs");
         check(&["--policy", "agent:?api=openai"], "give one, as agent:MODEL");
         check(
             &["--policy", "agent:m?key=1"],

@@ -262,7 +262,7 @@ impl Policy for Program {
         let server = Server::start(self.settings_for(spec, token, &absolute)?);
         let server = server.map_err(|error| lost("no server", error))?;
         let id = format!("{}-seed{}", spec.task.id, spec.seed);
-        let files = RunFolder { path: absolute.clone(), visibility: Visibility::After };
+        let files = RunFolder { path: absolute.clone(), visibility: Visibility::After, pages: true };
         let (episode, start) = server.host(&id, spec.clone(), &self.driving, files)?;
         if let Some(reason) = start.briefing.recording_failed {
             return Err(PlayError::Lost(reason));

@@ -3,10 +3,10 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use serde_json::json;
-use tandem_episodes::evaluation::{EpisodeEvent, EvaluationPlan, Shard, Starts, evaluate};
+use tandem_episodes::evaluation::{EpisodeEvent, EvaluationPlan, KeptFiles, Shard, Starts, evaluate};
 use tandem_episodes::reports::{EvaluationReport, load};
 use tandem_episodes::results::PlayedEpisode;
-use tandem_episodes::{Controller, EpisodeSpec, RendererKind, RobotFile, Sensing, players, tasks};
+use tandem_episodes::{Controller, EpisodeSpec, RendererKind, RobotFile, Sensing, Variation, players, tasks};
 use tandem_tools_spec::{Assistance, Disclosure, EndReason, Hints, Protocol};
 
 fn plan(jobs: usize, seeds: Vec<u32>) -> EvaluationPlan<'static> {
@@ -21,6 +21,7 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> EvaluationPlan<'static> {
         assistance: Assistance::Full,
         disclosure: Disclosure::Live,
         hints: Hints::On,
+        variation: Variation::default(),
         renderer: RendererKind::Cpu,
         tasks: vec![handover],
         seeds,
@@ -28,6 +29,7 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> EvaluationPlan<'static> {
         shard: Shard::WHOLE,
         jobs,
         record: false,
+        files: KeptFiles::default(),
         keep_failed: false,
     }
 }

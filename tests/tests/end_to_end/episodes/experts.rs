@@ -4,10 +4,12 @@
 use std::ops::RangeInclusive;
 use std::thread::available_parallelism;
 
-use tandem_episodes::evaluation::{EvaluationPlan, Shard, Starts, evaluate};
+use tandem_episodes::evaluation::{EvaluationPlan, KeptFiles, Shard, Starts, evaluate};
 use tandem_episodes::players::{self, Episode, InProcess, PlayerError, PrivilegedEpisode, experts};
 use tandem_episodes::tasks::{self, Task};
-use tandem_episodes::{A, B, C, Controller, EpisodeSpec, Facts, RendererKind, RobotFile, Sensing, Session};
+use tandem_episodes::{
+    A, B, C, Controller, EpisodeSpec, Facts, RendererKind, RobotFile, Sensing, Session, Variation,
+};
 use tandem_sim::{SensorModel, Side};
 use tandem_tools_spec::{ActCall, Assistance, Protocol, ToolCall, ToolReply};
 
@@ -35,6 +37,7 @@ fn solve(tasks: Vec<&'static Task>, may_fail: usize) {
         assistance: Assistance::Paper,
         disclosure: Assistance::Paper.disclosure(),
         hints: Assistance::Paper.hints(),
+        variation: Variation::default(),
         renderer: RendererKind::Cpu,
         tasks: tasks.clone(),
         seeds: SEEDS.into(),
@@ -42,6 +45,7 @@ fn solve(tasks: Vec<&'static Task>, may_fail: usize) {
         shard: Shard::WHOLE,
         jobs: available_parallelism().map_or(1, usize::from),
         record: false,
+        files: KeptFiles::default(),
         keep_failed: false,
     };
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use tandem_episodes::{
-    Controller, Recorder, Recording, RendererKind, RobotFile, Sensing,
-    evaluation::{Evaluation, EvaluationPlan, Shard, Starts, evaluate},
+    Controller, Recorder, Recording, RendererKind, RobotFile, Sensing, Variation,
+    evaluation::{Evaluation, EvaluationPlan, KeptFiles, Shard, Starts, evaluate},
     players::Policy,
     tasks,
 };
@@ -22,6 +22,7 @@ pub fn plan(player: &dyn Policy, seeds: Vec<u32>, record: bool) -> EvaluationPla
         assistance: Assistance::Paper,
         disclosure: Assistance::Paper.disclosure(),
         hints: Assistance::Paper.hints(),
+        variation: Variation::default(),
         renderer: RendererKind::Cpu,
         tasks: vec![tasks::find("handover").expect("a task")],
         seeds,
@@ -29,6 +30,7 @@ pub fn plan(player: &dyn Policy, seeds: Vec<u32>, record: bool) -> EvaluationPla
         shard: Shard::WHOLE,
         jobs: 2,
         record,
+        files: KeptFiles::default(),
         keep_failed: false,
     }
 }

@@ -127,6 +127,7 @@ impl<'a> CarryTeam<'a> {
     /// again.
     pub fn carry(&mut self, commander: &mut Commander, path: &ObjectPath) -> Result<(), PlayerError> {
         let ObjectPath { length_m, pace_m_s, free_m, .. } = *path;
+        let pace_m_s = pace_m_s * commander.walking();
         let mut from_m = 0.0;
         for _ in 0..CARRIES {
             self.give_way(commander, true);

@@ -1,10 +1,11 @@
 //! What every expert builds on: hands that move along straight lines in the world, several at once.
 
-use tandem_sim::{BaseVelocity, CONTROL_DT_S, Pose, Side, Sides};
+use tandem_sim::{BaseVelocity, CONTROL_DT_S, Pose, Side, Sides, Vector};
 use tandem_tools_spec::{MoveWrists, StopReason, Tool as _, ToolReply, WristMove};
 
+use super::variety::{COME_BACK_S, Variety};
 use crate::players::{PlayerError, PrivilegedEpisode};
-use crate::scoring::Facts;
+use crate::scoring::{Facts, Grip};
 use crate::tasks::Task;
 
 /// Control steps of one command: short enough to start and stop smoothly.
@@ -88,6 +89,8 @@ pub struct Commander<'a> {
     targets: Vec<CommandedTargets>,
     /// Whether other scripts play at the same time, so that all commands are equally long.
     in_step: bool,
+    /// How this demonstration differs from the plain one, if it does.
+    variety: Option<Variety>,
 }
 
 impl<'a> Commander<'a> {
@@ -105,7 +108,22 @@ impl<'a> Commander<'a> {
             compliance_n_s_m: None,
         };
         let targets = (0..facts.robots.len()).map(targets).collect();
-        Ok(Commander { task, episode, targets, in_step: false })
+        Ok(Commander { task, episode, targets, in_step: false, variety: None })
+    }
+
+    /// The same, whose motions differ as is drawn.
+    pub fn varied(self, variety: Option<Variety>) -> Commander<'a> {
+        Commander { variety, ..self }
+    }
+
+    /// How the demonstration differs, for the commanders of scripts.
+    pub fn variety(&self) -> Option<&Variety> {
+        self.variety.as_ref()
+    }
+
+    /// What share of its usual pace a robot walks at.
+    pub fn walking(&self) -> f32 {
+        self.variety.as_ref().map_or(1.0, Variety::walking)
     }
 
     /// The commander of one of several scripts that are played at once, with the targets that robots had before.
@@ -114,7 +132,7 @@ impl<'a> Commander<'a> {
         targets: Vec<CommandedTargets>,
         episode: &'a mut dyn PrivilegedEpisode,
     ) -> Commander<'a> {
-        Commander { task, episode, targets, in_step: true }
+        Commander { task, episode, targets, in_step: true, variety: None }
     }
 
     pub fn task(&self) -> &'static Task {
@@ -155,19 +173,64 @@ impl<'a> Commander<'a> {
 
     /// Moves hands along straight lines for `duration_s`, starting and arriving at rest; robots not named hold still.
     pub fn perform(&mut self, duration_s: f32, moves: &[HandMove]) -> Result<(), PlayerError> {
-        self.travel(duration_s, moves, smooth)
+        let Some(mut variety) = self.variety.take() else {
+            return self.travel(duration_s, moves, smooth, Vector::ZERO);
+        };
+        let outcome = self.perform_varied(&mut variety, duration_s, moves);
+        self.variety = Some(variety);
+        outcome
+    }
+
+    /// As [`Commander::perform`], in this demonstration's way.
+    fn perform_varied(
+        &mut self,
+        variety: &mut Variety,
+        duration_s: f32,
+        moves: &[HandMove],
+    ) -> Result<(), PlayerError> {
+        let way_m = |hand: &HandMove| {
+            let from = self.targets[hand.robot].hands[hand.side].world_from_wrist;
+            hand.world_from_wrist.map_or(0.0, |to| (to.translation - from.translation).length())
+        };
+        let way_m = moves.iter().map(way_m).fold(0.0, f32::max);
+        let (pause_s, duration_s) = (variety.pause_s(), variety.duration_s(duration_s));
+        let (stray_m, miss_m) = (variety.stray_m(way_m), variety.miss_m(way_m));
+        if pause_s > 0.0 {
+            let still: Vec<HandMove> =
+                moves.iter().map(|hand| HandMove::still(hand.robot, hand.side)).collect();
+            self.travel(pause_s, &still, smooth, Vector::ZERO)?;
+        }
+        let facts = self.episode.facts()?;
+        let is_free = |hand: &HandMove| {
+            facts.objects.iter().all(|object| object.hands[hand.robot][hand.side] == Grip::Off)
+        };
+        match miss_m.filter(|_| moves.iter().all(is_free)) {
+            None => self.travel(duration_s, moves, smooth, stray_m),
+            Some(off_m) => {
+                let missed = moves.iter().map(|hand| HandMove {
+                    world_from_wrist: hand
+                        .world_from_wrist
+                        .map(|to| Pose::from_parts(to.translation + off_m, to.rotation)),
+                    ..*hand
+                });
+                self.travel(duration_s, &missed.collect::<Vec<_>>(), smooth, stray_m)?;
+                self.travel(COME_BACK_S, moves, smooth, Vector::ZERO)
+            }
+        }
     }
 
     /// The same as [`Commander::perform`], at constant speed: one leg of a longer path.
     pub fn glide(&mut self, duration_s: f32, moves: &[HandMove]) -> Result<(), PlayerError> {
-        self.travel(duration_s, moves, |part| part)
+        self.travel(duration_s, moves, |part| part, Vector::ZERO)
     }
 
+    /// Half way, hands are `stray_m` off their straight lines, all of them the same.
     fn travel(
         &mut self,
         duration_s: f32,
         moves: &[HandMove],
         pace: fn(f32) -> f32,
+        stray_m: Vector,
     ) -> Result<(), PlayerError> {
         let from = self.targets.clone();
         let beat = if self.in_step { BEAT_STEPS } else { 1 };
@@ -177,11 +240,15 @@ impl<'a> Commander<'a> {
         while done < total {
             let steps = most.min(total - done);
             let part = pace((done + steps) as f32 / total as f32);
+            let aside_m = stray_m * (4.0 * part * (1.0 - part)).powi(2);
             for hand in moves {
                 let start = from[hand.robot].hands[hand.side];
                 let target = &mut self.targets[hand.robot].hands[hand.side];
                 if let Some(end) = hand.world_from_wrist {
                     target.world_from_wrist = start.world_from_wrist.lerp(&end, part);
+                    if aside_m != Vector::ZERO {
+                        target.world_from_wrist.translation += aside_m;
+                    }
                 }
                 if let Some(end_rad) = hand.fingers_rad {
                     let start_rad = start.fingers_rad.unwrap_or([0.0; 7]);

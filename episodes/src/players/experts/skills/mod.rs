@@ -8,6 +8,7 @@ mod grasp;
 mod hold;
 mod parallel;
 mod posture_path;
+mod variety;
 mod walk;
 
 pub use carry_team::{COMPLIANCE_N_S_M, CarryTeam, ObjectPath};
@@ -18,4 +19,5 @@ pub use grasp::{HandGrasp, move_together, take_together};
 pub use hold::Hold;
 pub use parallel::{ParallelScript, in_parallel};
 pub use posture_path::{FREE, Posture, PosturePath, follow};
+pub use variety::Variety;
 pub use walk::{Tolerance, WalkGoal, approach, place, upright, walk_to};

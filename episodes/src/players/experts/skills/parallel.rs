@@ -64,14 +64,15 @@ pub fn in_parallel(commander: &mut Commander, scripts: Vec<ParallelScript>) -> R
     thread::scope(|scope| {
         let mut channels = Vec::with_capacity(scripts.len());
         let mut players = Vec::with_capacity(scripts.len());
-        for ParallelScript { robots, script } in scripts {
+        for (index, ParallelScript { robots, script }) in scripts.into_iter().enumerate() {
             let (commands, commanded) = channel();
             let (outcomes, heard) = channel();
             channels.push(ScriptChannel { commands: commanded, outcomes });
             let mut episode = ScriptEpisode { facts: facts.clone(), commands, outcomes: heard };
             let (task, targets) = (commander.task(), commander.targets().to_vec());
+            let variety = commander.variety().map(|variety| variety.of_script(index));
             players.push(scope.spawn(move || {
-                let mut commander = Commander::in_step(task, targets, &mut episode);
+                let mut commander = Commander::in_step(task, targets, &mut episode).varied(variety);
                 let outcome = script(&mut commander);
                 (robots, commander.targets().to_vec(), outcome)
             }));

@@ -76,7 +76,8 @@ pub fn approach(commander: &mut Commander, goals: &[WalkGoal], within: Tolerance
         if now.iter().zip(goals).all(|(at, goal)| is_there(at, goal, within)) {
             break;
         }
-        commander.advance(WALK_STEPS, &moves(goals, &hands, &steered(&now, goals)))?;
+        let velocities = steered(&now, goals, commander.walking());
+        commander.advance(WALK_STEPS, &moves(goals, &hands, &velocities))?;
         left_s -= WALK_STEPS as f32 * CONTROL_DT_S;
     }
     Ok(())
@@ -142,7 +143,7 @@ fn arrive(
             if !resting.contains(&false) {
                 break;
             }
-            let mut velocities = steered(&now, goals);
+            let mut velocities = steered(&now, goals, commander.walking());
             for (velocity, _) in velocities.iter_mut().zip(&resting).filter(|(_, rests)| **rests) {
                 *velocity = BaseVelocity::STILL;
             }
@@ -202,9 +203,11 @@ fn pelvises(commander: &mut Commander, goals: &[WalkGoal]) -> Result<Vec<Pose>, 
     Ok(goals.iter().map(|goal| facts.robots[goal.robot].pelvis_in_world).collect())
 }
 
-/// How robots walk to their places from where they are.
-fn steered(now: &[Pose], goals: &[WalkGoal]) -> Vec<BaseVelocity> {
-    let walk = |(at, goal): (&Pose, &WalkGoal)| steer(at, &goal.to, TargetVelocity::default(), goal.pace_m_s);
+/// How robots walk to their places from where they are, at such a share of their pace.
+fn steered(now: &[Pose], goals: &[WalkGoal], walking: f32) -> Vec<BaseVelocity> {
+    let walk = |(at, goal): (&Pose, &WalkGoal)| {
+        steer(at, &goal.to, TargetVelocity::default(), goal.pace_m_s * walking)
+    };
     now.iter().zip(goals).map(walk).collect()
 }
 

@@ -1,0 +1,131 @@
+//! How demonstrations of one task differ from each other, as people's do: in pace, in moments of waiting, in the ways hands take, and in
+//! that a hand misses now and then and comes back. All of it is drawn from the episode's seed.
+
+use tandem_sim::{SplitMix64, Vector};
+
+/// At level 1, motions take so much less or more time than they would.
+const PACE: [f32; 2] = [-0.08, 0.2];
+/// A robot walks so much slower at most.
+const SLOWER: f32 = 0.12;
+/// How often a motion waits before it begins, and for how long.
+const PAUSES: f32 = 0.12;
+const PAUSE_S: [f32; 2] = [0.1, 0.5];
+/// How far a hand strays from its straight line, as a part of its way, and at most.
+const STRAY: f32 = 0.08;
+const MOST_STRAY_M: f32 = 0.02;
+/// How often a free hand misses on a long way, and by how much.
+const MISSES: f32 = 0.12;
+const MISS_M: [f32; 2] = [0.01, 0.03];
+/// A way is long from here on: nothing that is to be grasped is as near.
+const LONG_WAY_M: f32 = 0.12;
+/// A hand that has missed needs so long to come back.
+pub const COME_BACK_S: f32 = 0.5;
+
+/// What tells these numbers from those by which the same seed moves things.
+const STREAM: u64 = 0x7661_7269_6574_7931;
+
+/// Draws how this demonstration differs.
+#[derive(Clone, Debug)]
+pub struct Variety {
+    level: f32,
+    /// The state of the generator.
+    random: u64,
+    /// Pace at which robots walk, all of this episode the same.
+    walking: f32,
+}
+
+impl Variety {
+    /// `None` for level 0, at which nothing is drawn.
+    pub fn new(level: u8, seed: u32) -> Option<Variety> {
+        if level == 0 {
+            return None;
+        }
+        let mut variety = Variety { level: level.into(), random: u64::from(seed) ^ STREAM, walking: 1.0 };
+        variety.walking = 1.0 - variety.draw([0.0, SLOWER * variety.level]);
+        Some(variety)
+    }
+
+    /// That of one of several scripts that are played at once, which has numbers of its own: which script draws first does not matter.
+    pub fn of_script(&self, script: usize) -> Variety {
+        let mut own = self.clone();
+        own.random ^= (script as u64 + 1) << 40;
+        own
+    }
+
+    /// What share of its usual pace a robot walks at.
+    pub fn walking(&self) -> f32 {
+        self.walking
+    }
+
+    /// How long a motion takes that would take `duration_s`.
+    pub fn duration_s(&mut self, duration_s: f32) -> f32 {
+        duration_s * (1.0 + self.draw(PACE.map(|limit| limit * self.level)))
+    }
+
+    /// How long a robot waits before it begins to move.
+    pub fn pause_s(&mut self) -> f32 {
+        let pause_s = self.draw(PAUSE_S);
+        if self.happens(PAUSES) { pause_s } else { 0.0 }
+    }
+
+    /// How far hands are off their straight line half way along `way_m`, never below it.
+    pub fn stray_m(&mut self, way_m: f32) -> Vector {
+        let most_m = (STRAY * way_m).min(MOST_STRAY_M) * self.level;
+        self.aside_m(most_m)
+    }
+
+    /// By how much free hands miss at the end of `way_m`, if they do.
+    pub fn miss_m(&mut self, way_m: f32) -> Option<Vector> {
+        let off_m = self.draw(MISS_M);
+        let aside_m = self.aside_m(off_m);
+        (self.happens(MISSES) && way_m > LONG_WAY_M).then_some(aside_m)
+    }
+
+    /// Up to so far to any side and up.
+    fn aside_m(&mut self, most_m: f32) -> Vector {
+        let [x, y, z] = [[-1.0, 1.0], [-1.0, 1.0], [0.0, 1.0]].map(|range| self.draw(range));
+        Vector::new(x, y, z) * most_m
+    }
+
+    fn happens(&mut self, share: f32) -> bool {
+        self.draw([0.0, 1.0]) < share * self.level
+    }
+
+    fn draw(&mut self, range: [f32; 2]) -> f32 {
+        let mut generator = SplitMix64(self.random);
+        let drawn = generator.uniform(range);
+        self.random = generator.0;
+        drawn
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_seed_always_draws_the_same_and_seeds_and_scripts_differ() {
+        assert!(Variety::new(0, 7).is_none());
+        let drawn = |mut variety: Variety| -> Vec<f32> {
+            (0..20)
+                .flat_map(|_| [variety.duration_s(1.0), variety.pause_s(), variety.stray_m(0.3).x])
+                .collect()
+        };
+        let of = |seed: u32| Variety::new(1, seed).unwrap();
+        assert_eq!(drawn(of(7)), drawn(of(7)));
+        assert_ne!(drawn(of(7)), drawn(of(8)));
+        assert_ne!(drawn(of(7).of_script(0)), drawn(of(7).of_script(1)));
+        let times = drawn(of(9));
+        assert!(times.iter().step_by(3).all(|time_s| (0.92..=1.2).contains(time_s)), "{times:?}");
+        assert!(times.iter().skip(2).step_by(3).all(|stray_m| stray_m.abs() <= 0.02), "{times:?}");
+    }
+
+    #[test]
+    fn a_hand_misses_on_long_ways_alone() {
+        let mut variety = Variety::new(3, 2000).unwrap();
+        let count =
+            |variety: &mut Variety, way_m: f32| (0..500).filter(|_| variety.miss_m(way_m).is_some()).count();
+        assert_eq!(count(&mut variety, 0.08), 0);
+        assert!((130..230).contains(&count(&mut variety, 0.4)));
+    }
+}
