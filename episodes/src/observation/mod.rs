@@ -4,6 +4,7 @@
 mod formats;
 mod observer;
 mod proprioception;
+mod scaling;
 mod surface;
 
 use std::sync::{Arc, Mutex, PoisonError};

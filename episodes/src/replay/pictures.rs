@@ -9,19 +9,22 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
-use tandem_sim::render::{Camera, DEPTH_UNIT_M, Intrinsics, PictureError, encode_depth_png, encode_png};
+use tandem_sim::render::{
+    Camera, DEPTH_UNIT_M, Frame, Intrinsics, PictureError, RendererKind, encode_depth_png,
+};
 use tandem_sim::{Pose, Step};
 
 use super::video::step_of_picture;
 use super::{EpisodeCamera, EpisodeRenderer, PictureSize, ReplayError};
 use crate::convert::opencv_axes;
+use crate::observation::Picture;
 use crate::output::{OutputError, create_private_folder, write_whole};
 use crate::recording::Recording;
 use crate::spec::EpisodeSpec;
 use crate::tasks::Task;
 
 /// What to draw.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct PicturesPlan {
     /// Pictures a second of each camera.
     pub rate_hz: u32,
@@ -29,6 +32,37 @@ pub struct PicturesPlan {
     pub size: Option<PictureSize>,
     /// Threads that draw.
     pub jobs: usize,
+    /// Names of the cameras; without any, all of the task's.
+    pub cameras: Vec<String>,
+    /// Whether depth is drawn, too.
+    pub depth: bool,
+    /// Who draws, where it is not to be who drew the episode.
+    pub renderer: Option<RendererKind>,
+}
+
+impl Default for PicturesPlan {
+    fn default() -> PicturesPlan {
+        PicturesPlan { rate_hz: 25, size: None, jobs: 1, cameras: Vec::new(), depth: true, renderer: None }
+    }
+}
+
+impl PicturesPlan {
+    /// The cameras of a task's episodes that are drawn.
+    fn views(&self, task: &Task) -> Result<Vec<EpisodeCamera>, PicturesError> {
+        match &self.cameras[..] {
+            [] => Ok(EpisodeCamera::all(task)),
+            names => {
+                let found = names.iter().map(|name| EpisodeCamera::find(name, task));
+                found.collect::<Result<_, _>>().map_err(PicturesError::NoCamera)
+            }
+        }
+    }
+
+    /// What is drawn, by whom it is to be drawn.
+    fn spec(&self, recording: &Recording) -> EpisodeSpec {
+        let spec = recording.spec.clone();
+        EpisodeSpec { renderer: self.renderer.unwrap_or(spec.renderer), ..spec }
+    }
 }
 
 /// What has been drawn.
@@ -46,6 +80,8 @@ pub struct DrawnPictures {
 pub enum PicturesError {
     #[error("{} holds pictures of another recording, rate or size; give another folder", .0.display())]
     OtherPictures(PathBuf),
+    #[error("{0}")]
+    NoCamera(String),
     #[error("a picture cannot be encoded: {0}")]
     Picture(#[from] PictureError),
     #[error(transparent)]
@@ -67,7 +103,9 @@ struct Manifest {
     /// Hash of the state that the episode ended in, or of its last recorded one.
     state_hash: String,
     rate_hz: u32,
-    depth_unit_m: f64,
+    /// Where depth is drawn, too.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    depth_unit_m: Option<f64>,
     cameras: Vec<CameraEntry>,
 }
 
@@ -103,9 +141,10 @@ pub fn draw_all(
     progress: &(dyn Fn() + Sync),
 ) -> Result<DrawnPictures, PicturesError> {
     let steps = moments(recording, plan.rate_hz)?;
-    let scene = EpisodeRenderer::of(&recording.spec).map_err(ReplayError::from)?;
     let task = recording.spec.task;
-    let views = EpisodeCamera::all(task);
+    let views = plan.views(task)?;
+    let spec = plan.spec(recording);
+    let scene = EpisodeRenderer::of(&spec).map_err(ReplayError::from)?;
     prepare(recording, plan, folder, &scene, &steps)?;
     let poses: Vec<CameraPose> = steps
         .iter()
@@ -117,9 +156,9 @@ pub fn draw_all(
     let next = AtomicUsize::new(0);
     let failure: Mutex<Option<PicturesError>> = Mutex::new(None);
     let work = || -> Result<(), PicturesError> {
-        let mut scene = EpisodeRenderer::of(&recording.spec).map_err(ReplayError::from)?;
+        let mut scene = EpisodeRenderer::of(&spec).map_err(ReplayError::from)?;
         while let Some(step) = steps.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let before = views.iter().all(|view| PictureFiles::of(folder, view.name(task), step).exist());
+            let before = views.iter().all(|view| PictureFiles::of(folder, view.name(task), step).exist(plan));
             already_drawn.fetch_add(usize::from(before), Ordering::Relaxed);
             if !before {
                 views.iter().try_for_each(|view| draw(&mut scene, *view, step, plan, folder, task))?;
@@ -174,14 +213,14 @@ fn prepare(
         let Intrinsics { width, height, focal_px, cx, cy } = scene.camera(view, step, plan.size).intrinsics();
         CameraEntry { name: view.name(task).into(), width, height, focal_px, cx, cy }
     };
-    let views = EpisodeCamera::all(task).into_iter();
+    let views = plan.views(task)?.into_iter();
     let state_hash = recording.state_hashes().last();
     let (_, state_hash) = state_hash.transpose().map_err(ReplayError::from)?.unwrap_or_default();
     let manifest = Manifest {
-        spec: recording.spec.clone(),
+        spec: plan.spec(recording),
         state_hash,
         rate_hz: plan.rate_hz,
-        depth_unit_m: DEPTH_UNIT_M,
+        depth_unit_m: plan.depth.then_some(DEPTH_UNIT_M),
         cameras: views.filter_map(|view| Some(entry(view, steps.first()?))).collect(),
     };
     let path = folder.join(MANIFEST);
@@ -193,7 +232,7 @@ fn prepare(
         };
     }
     for camera in &manifest.cameras {
-        for kind in ["rgb", "depth"] {
+        for kind in ["rgb", "depth"].into_iter().take(1 + usize::from(plan.depth)) {
             let path = folder.join(&camera.name).join(kind);
             create_private_folder(&path).map_err(|source| OutputError::Io { path, source })?;
         }
@@ -226,8 +265,8 @@ impl PictureFiles {
         PictureFiles { rgb: file("rgb"), depth: file("depth") }
     }
 
-    fn exist(&self) -> bool {
-        self.rgb.exists() && self.depth.exists()
+    fn exist(&self, plan: &PicturesPlan) -> bool {
+        self.rgb.exists() && (!plan.depth || self.depth.exists())
     }
 }
 
@@ -240,11 +279,18 @@ fn draw(
     task: &Task,
 ) -> Result<(), PicturesError> {
     let files = PictureFiles::of(folder, view.name(task), step);
-    if files.exist() {
+    if files.exist(plan) {
         return Ok(());
     }
+    if !plan.depth {
+        return Ok(write_whole(&files.rgb, &scene.colours(view, step, plan.size).png()?)?);
+    }
     let camera = scene.camera(view, step, plan.size);
-    let frame = scene.draw(step, &camera);
-    write_whole(&files.rgb, &encode_png(frame.width, frame.height, &frame.rgb)?)?;
-    Ok(write_whole(&files.depth, &encode_depth_png(frame.width, frame.height, &frame.depth_m)?)?)
+    let Frame { width, height, rgb, depth_m, .. } = scene.draw(step, &camera);
+    let picture = match plan.size {
+        None => Picture::new(width, height, rgb),
+        size => scene.colours(view, step, size),
+    };
+    write_whole(&files.rgb, &picture.png()?)?;
+    Ok(write_whole(&files.depth, &encode_depth_png(width, height, &depth_m)?)?)
 }

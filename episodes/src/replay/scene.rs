@@ -4,7 +4,7 @@ use tandem_sim::Step;
 use tandem_sim::render::{Camera, Frame};
 
 use crate::EpisodeError;
-use crate::observation::Observer;
+use crate::observation::{Observer, Picture};
 use crate::session::build;
 use crate::spec::EpisodeSpec;
 use crate::tasks::Task;
@@ -70,6 +70,27 @@ impl EpisodeRenderer {
         match size {
             Some(PictureSize { width, height }) => Camera { width, height, ..camera },
             None => camera,
+        }
+    }
+
+    /// What a camera sees after `step`, in its own size or in another, without depth. A size of the same shape that is no larger is
+    /// what a policy is shown that asks for it: the camera's own picture, scaled.
+    pub fn colours(&mut self, view: EpisodeCamera, step: &Step, size: Option<PictureSize>) -> Picture {
+        let own = self.camera(view, step, None);
+        let scaled = size.filter(|size| {
+            let same_shape = u64::from(size.width) * u64::from(own.height)
+                == u64::from(size.height) * u64::from(own.width);
+            same_shape && size.width <= own.width
+        });
+        let camera = if scaled.is_some() { own } else { self.camera(view, step, size) };
+        let Frame { width, height, rgb, .. } = self.draw(step, &camera);
+        let picture = Picture::new(width, height, rgb);
+        match scaled {
+            Some(size) if [size.width, size.height] != [width, height] => {
+                let rgb = picture.scaled([size.width, size.height]).into_raw();
+                Picture::new(size.width, size.height, rgb)
+            }
+            _ => picture,
         }
     }
 

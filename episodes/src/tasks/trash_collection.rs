@@ -48,7 +48,7 @@ pub const TASK: Task = Task {
         spot("carry_point", [0.0, CARRY_POINT_Y_M, 0.0]),
     ],
     randomize: &[
-        Offset { y_m: -0.15..=-0.04, wider_yaw_rad: 0.2, ..uniform_xy(&["bin"], 0.15, 0.0) },
+        Offset { y_m: -0.15..=-0.04, wider_yaw_rad: 0.08, ..uniform_xy(&["bin"], 0.15, 0.0) },
         Offset { y_m: -0.04..=0.12, wider_yaw_rad: 0.3, ..uniform_xy(&["pet_bottle"], 0.10, 0.0) },
     ],
     instruction: "Robot A brings the bin to the end of the bench and holds it there; Robot B sweeps the bottle off the bench into \

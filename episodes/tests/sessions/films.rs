@@ -83,7 +83,12 @@ fn pictures_are_drawn_once_whatever_stops_the_run() {
     let recording = recorded(&folder.path().join("episode"));
     let out = folder.path().join("pictures");
     let draw = |rate_hz: u32, jobs: usize| {
-        draw_all(&recording, &PicturesPlan { rate_hz, size: Some(SIZE), jobs }, &out, &|| {})
+        draw_all(
+            &recording,
+            &PicturesPlan { rate_hz, size: Some(SIZE), jobs, ..PicturesPlan::default() },
+            &out,
+            &|| {},
+        )
     };
     let drawn = draw(10, 2).unwrap();
     assert_eq!((drawn.moments, drawn.already_drawn, drawn.cameras), (3, 0, 3), "steps 0, 5 and 10");

@@ -9,18 +9,10 @@ use std::time::Duration;
 use pyo3::prelude::*;
 use serde_json::{Value, json};
 use tandem::settings::{Layer, Settings};
-<<<<<<< HEAD
-use tandem_episodes::evaluation::{self, EpisodeEvent, EvaluationPlan, Shard, Starts};
-use tandem_episodes::results::PlayedEpisode;
-use tandem_episodes::{RobotFile, tasks};
-use tandem_tools_spec::Protocol;
-=======
 use tandem_episodes::evaluation::{self, EpisodeEvent, EvaluationPlan, KeptFiles, Shard, Starts};
-use tandem_episodes::players::{EpisodeOutput, PlayError, PlayOutcome, Policy};
-use tandem_episodes::results::{PlayedEpisode, PolicyCard};
-use tandem_episodes::{EpisodeSpec, RobotFile, Session, Variation, tasks};
-use tandem_tools_spec::{EndReason, Protocol};
->>>>>>> b7c790e (The floor: open-loop replays a demonstration of another seed, reports name tasks that hardly need eyes; --spread widens what the seed moves; collect --variety and --disturb vary demonstrations, --only-successful and --no-reports keep less)
+use tandem_episodes::results::PlayedEpisode;
+use tandem_episodes::{RobotFile, Variation, tasks};
+use tandem_tools_spec::Protocol;
 
 use crate::players::{PlayedBy, PythonPolicy};
 use crate::refusal::failed;

@@ -9,10 +9,11 @@ use tandem_episodes::replay::{
     Difference, DrawnPictures, EpisodeCamera, PictureSize, PicturesPlan, Verdict, Verification, draw_all,
     film, verify,
 };
-use tandem_episodes::{Checkpoint, EpisodeSpec, FAILED_STEP_FILE, Recording, Session};
+use tandem_episodes::{Checkpoint, EpisodeSpec, FAILED_STEP_FILE, Recording, RendererKind, Session};
 use tandem_tools_spec::ResultReply;
 
 use super::CommandResult;
+use crate::settings::one_of;
 
 /// Play recordings again: say what they hold, verify them, film them, or draw what every camera saw with depth.
 #[derive(Debug, clap::Args)]
@@ -39,6 +40,15 @@ pub struct ReplayArgs {
     /// Size of the pictures, as 640x480 [default: the camera's own].
     #[arg(long, value_name = "WIDTHxHEIGHT")]
     size: Option<SizeFlag>,
+    /// Cameras of --render, separated by commas: third_person or robots' names [default: all].
+    #[arg(long, value_name = "CAMERAS", value_delimiter = ',', requires = "render")]
+    cameras: Vec<String>,
+    /// With --render: pictures alone, in half the time.
+    #[arg(long, requires = "render")]
+    no_depth: bool,
+    /// Who draws the pictures of --render [default: who drew the episode].
+    #[arg(long, value_name = "NAME", requires = "render", value_parser = one_of(RendererKind::ALL, RendererKind::name))]
+    renderer: Option<RendererKind>,
     /// Threads that draw.
     #[arg(long, default_value_t = 1, value_name = "N")]
     jobs: usize,
@@ -87,7 +97,14 @@ pub fn run(args: ReplayArgs) -> CommandResult {
             println!("  {}: {pictures} pictures, {} a second", video.display(), args.rate);
         }
         if let Some(folder) = &args.render {
-            let plan = PicturesPlan { rate_hz: args.rate, size, jobs: args.jobs };
+            let plan = PicturesPlan {
+                rate_hz: args.rate,
+                size,
+                jobs: args.jobs,
+                cameras: args.cameras.clone(),
+                depth: !args.no_depth,
+                renderer: args.renderer,
+            };
             render(&recording, &plan, &folder_for(folder, path, args.recordings.len()))?;
         }
     }
@@ -234,6 +251,9 @@ mod tests {
             rate: 25,
             size: None,
             jobs: 1,
+            cameras: vec![],
+            no_depth: false,
+            renderer: None,
         }
     }
 

@@ -64,16 +64,10 @@ fn help() -> String {
     let players = players::ALL.iter().map(|player| format!("{} ({})", player.name, player.about));
     let players: Vec<String> = players.collect();
     format!(
-<<<<<<< HEAD
-        "Who plays: {}; exec:COMMAND, a program that is started anew for every episode; \
-         agent:MODEL, a language model, with flags of `tandem agent` as in agent:MODEL?api=anthropic&max-usd=2; openpi:ws://HOST:PORT, \
-         xpolicylab:ws://HOST:PORT or act:http://HOST:PORT/act, a learned policy at a server, or one for each robot, separated by commas",
-=======
         "Who plays: {}; open-loop:RECORDING, what the robots of a demonstration of another seed were told, replayed without a look \
          (an episode.mcap, or a folder that `collect` wrote); exec:COMMAND, a program that is started anew for every episode; \
-         agent:MODEL, a language model, with flags of `tandem agent` as in agent:MODEL?api=anthropic&max-usd=2; openpi:ws://HOST:PORT or act:http://HOST:PORT/act, \
-         a learned policy at a server, or one for each robot, separated by commas",
->>>>>>> b7c790e (The floor: open-loop replays a demonstration of another seed, reports name tasks that hardly need eyes; --spread widens what the seed moves; collect --variety and --disturb vary demonstrations, --only-successful and --no-reports keep less)
+         agent:MODEL, a language model, with flags of `tandem agent` as in agent:MODEL?api=anthropic&max-usd=2; openpi:ws://HOST:PORT, \
+         xpolicylab:ws://HOST:PORT or act:http://HOST:PORT/act, a learned policy at a server, or one for each robot, separated by commas",
         players.join(", ")
     )
 }
@@ -100,11 +94,10 @@ fn parse_policy(text: &str) -> Result<PolicyChoice, String> {
         }
     }
     players::find(text).map(PolicyChoice::Player).map_err(|error| {
-<<<<<<< HEAD
-        format!("{error}, exec:COMMAND, agent:MODEL, openpi:ws://HOST:PORT, xpolicylab:ws://HOST:PORT, act:http://HOST:PORT/act")
-=======
-        format!("{error}, exec:COMMAND, agent:MODEL, openpi:ws://HOST:PORT, act:http://HOST:PORT/act, open-loop:RECORDING")
->>>>>>> b7c790e (The floor: open-loop replays a demonstration of another seed, reports name tasks that hardly need eyes; --spread widens what the seed moves; collect --variety and --disturb vary demonstrations, --only-successful and --no-reports keep less)
+        format!(
+            "{error}, exec:COMMAND, agent:MODEL, openpi:ws://HOST:PORT, xpolicylab:ws://HOST:PORT, act:http://HOST:PORT/act, \
+             open-loop:RECORDING"
+        )
     })
 }
 

@@ -2,7 +2,10 @@
 
 use std::ops::Range;
 
-use tandem_episodes::joint_names;
+use tandem_episodes::{
+    joint_names,
+    tasks::{self, Task},
+};
 use tandem_tools_spec::{ACTION_ROW_LEN, BASE_COLUMNS, ExtraInformation, Pose, RobotState};
 
 use super::poses::{POSE_LEN, RotationForm, pose_values};
@@ -11,7 +14,7 @@ use super::poses::{POSE_LEN, RotationForm, pose_values};
 type Block = (String, Range<usize>);
 
 /// Blocks of a robot's numbers, in the order of [`state_values`], but for those of its wrists.
-const STATE: [(&str, Range<usize>); 11] = [
+const STATE: [(&str, Range<usize>); 14] = [
     ("left_leg", 0..6),
     ("right_leg", 6..12),
     ("waist", 12..15),
@@ -21,15 +24,19 @@ const STATE: [(&str, Range<usize>); 11] = [
     ("right_hand", 36..43),
     ("joints", 0..JOINTS),
     ("gravity", STATE_GRAVITY..STATE_PELVIS),
-    ("pelvis_in_start", STATE_PELVIS..STATE_BASE),
+    ("pelvis_in_start", STATE_PELVIS..STATE_MOMENT),
+    ("episode", STATE_MOMENT..STATE_MOMENT + 1),
+    ("step", STATE_MOMENT + 1..STATE_MOMENT + 2),
+    ("reset", STATE_MOMENT + 2..STATE_BASE),
     ("base_command", STATE_BASE..STATE_LEN),
 ];
 const JOINTS: usize = 43;
 const STATE_WRISTS: [usize; 2] = [JOINTS, JOINTS + POSE_LEN];
 const STATE_GRAVITY: usize = JOINTS + 2 * POSE_LEN;
 const STATE_PELVIS: usize = STATE_GRAVITY + 3;
+const STATE_MOMENT: usize = STATE_PELVIS + 7;
 /// The base command comes last.
-const STATE_BASE: usize = STATE_PELVIS + 7;
+const STATE_BASE: usize = STATE_MOMENT + 3;
 const STATE_LEN: usize = STATE_BASE + 4;
 
 /// Blocks of an action row, in the order of `send_joint_chunk`.
@@ -61,9 +68,9 @@ const WRIST_PARTS: [(&str, Range<usize>); 6] = [
 ];
 
 /// All that a robot senses: joints in rad; of each wrist the pose in the pelvis frame; which way is down; the pelvis where its own
-/// odometry has it, x, y, z in m and w, x, y, z; the base command in force, as [`BASE_COLUMNS`] has it. `None` of a state that
+/// odometry has it, x, y, z in m and w, x, y, z; which moment of which episode it is; the base command in force, as [`BASE_COLUMNS`] has it. `None` of a state that
 /// something is withheld from.
-pub fn state_values(state: &RobotState) -> Option<Vec<f64>> {
+pub fn state_values(state: &RobotState, moment: &EpisodeMoment) -> Option<Vec<f64>> {
     let joints = state.joint_positions_rad.0.iter().map(|(_, angle_rad)| *angle_rad);
     let wrists = [&state.left_wrist, &state.right_wrist].into_iter();
     let wrists = wrists.flat_map(|pose| pose_values(pose.position_m, pose.quaternion_wxyz));
@@ -71,7 +78,30 @@ pub fn state_values(state: &RobotState) -> Option<Vec<f64>> {
     let pelvis = position_m.into_iter().chain(quaternion_wxyz);
     let base = &state.base_command;
     let base = [base.vx_m_s, base.vy_m_s, base.yaw_rate_rad_s, base.pelvis_height_m];
-    Some(joints.chain(wrists).chain(state.gravity_in_pelvis?).chain(pelvis).chain(base).collect())
+    let EpisodeMoment { episode, step, is_first } = *moment;
+    let moment = [episode.into(), step, f64::from(is_first)];
+    let sensed = joints.chain(wrists).chain(state.gravity_in_pelvis?).chain(pelvis);
+    Some(sensed.chain(moment).chain(base).collect())
+}
+
+/// Which moment of which episode it is, for policies that remember, at servers that may have several episodes at once.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct EpisodeMoment {
+    /// A number of the episode, above 0, that 32 bits of a float tell from every other.
+    pub episode: u32,
+    /// Control steps since the episode began.
+    pub step: f64,
+    /// Whether nothing was asked in this episode before.
+    pub is_first: bool,
+}
+
+impl EpisodeMoment {
+    /// Millions are of the task, from 1, and what is less is the seed.
+    pub fn number_of(task: &Task, seed: u32) -> u32 {
+        const SEEDS: u32 = 1_000_000;
+        let task = tasks::ALL.iter().position(|known| known == task).unwrap_or_default() as u32;
+        (task + 1) * SEEDS + seed % SEEDS
+    }
 }
 
 /// Numbers of the right length for [`state_values`], of a robot of which nothing is known.
@@ -86,7 +116,7 @@ pub fn sensed_wrist(state_values: &[f64], side: usize) -> &[f64] {
 
 /// As [`sensed_wrist`], of the pelvis.
 pub fn sensed_pelvis(state_values: &[f64]) -> &[f64] {
-    &state_values[STATE_PELVIS..STATE_BASE]
+    &state_values[STATE_PELVIS..STATE_MOMENT]
 }
 
 /// The row that keeps a robot as it senses that it is: arms, hands, waist and height where they are, no walking.
@@ -145,7 +175,7 @@ pub fn state_columns(names: &[String]) -> Result<Vec<usize>, String> {
 pub fn extra_columns(columns: &[usize]) -> Vec<ExtraInformation> {
     let extra = [
         (ExtraInformation::Gravity, STATE_GRAVITY..STATE_PELVIS),
-        (ExtraInformation::Odometry, STATE_PELVIS..STATE_BASE),
+        (ExtraInformation::Odometry, STATE_PELVIS..STATE_MOMENT),
     ];
     let named = |of: &Range<usize>| columns.iter().any(|column| of.contains(column));
     extra.into_iter().filter(|(_, of)| named(of)).map(|(what, _)| what).collect()
@@ -240,6 +270,26 @@ mod tests {
         assert_eq!(text, "\"left_elbow_joint\" is told twice");
         let text = action_columns(&names("right_wrist right_wrist_position")).unwrap_err();
         assert_eq!(text, "\"right_wrist_position\" is told twice");
+    }
+
+    #[test]
+    fn every_episode_has_a_number_that_a_float_holds() {
+        let number = |task: &Task, seed: u32| EpisodeMoment::number_of(task, seed);
+        let mut numbers = std::collections::BTreeSet::new();
+        for task in tasks::ALL {
+            for seed in [0, 1, 2000, 999_999] {
+                let own = number(task, seed);
+                assert!(own > 0 && (own as f32) as u32 == own && numbers.insert(own), "{own}");
+            }
+        }
+        assert_eq!(number(&tasks::ALL[1], 42), 2_000_042);
+        let columns = state_columns(&names("episode step reset")).unwrap();
+        assert_eq!(columns, [STATE_MOMENT, STATE_MOMENT + 1, STATE_MOMENT + 2]);
+        assert_eq!(
+            extra_columns(&columns),
+            [],
+            "it is nothing that the benchmark's policies could not count"
+        );
     }
 
     #[test]

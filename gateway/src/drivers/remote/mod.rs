@@ -32,6 +32,7 @@ pub use error::RemoteError;
 pub use map::{MapError, PRESETS, PolicyMap, preset};
 pub use trial::try_map;
 
+use columns::EpisodeMoment;
 use map::AnswerScope;
 use policy_session::PolicySession;
 use request::TaskInstructions;
@@ -110,7 +111,9 @@ impl Policy for RemotePolicy {
         self.check(spec.task).map_err(PlayError::NotReady)?;
         let most_steps = rules(spec.protocol, spec.task).steps_per_command;
         let mut session = self.open(spec.task, most_steps)?;
-        Ok(play_in_process(spec, place, |episode| session.play(episode))?)
+        Ok(play_in_process(spec, place, |episode| {
+            session.play(episode, EpisodeMoment::number_of(spec.task, spec.seed))
+        })?)
     }
 
     fn waiting(&self) -> Option<PolicyWait> {

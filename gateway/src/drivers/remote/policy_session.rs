@@ -80,17 +80,17 @@ impl<'a> PolicySession<'a> {
         }
     }
 
-    /// Plays until the episode is over, or a policy fails.
-    pub fn play(&mut self, episode: &mut dyn LocalEpisode) -> Result<(), PlayerError> {
-        self.act(episode).map_err(|error| match error {
+    /// Plays the episode of this number until it is over, or a policy fails.
+    pub fn play(&mut self, episode: &mut dyn LocalEpisode, number: u32) -> Result<(), PlayerError> {
+        self.act(episode, number).map_err(|error| match error {
             // An answer that cannot be executed is a failure of the server's, too.
             PlayerError::Call { .. } => PlayerError::Failed(error.to_string()),
             error => error,
         })
     }
 
-    fn act(&mut self, episode: &mut dyn LocalEpisode) -> Result<(), PlayerError> {
-        let mut history = ObservationHistory::begin(self.plan.map, episode)?;
+    fn act(&mut self, episode: &mut dyn LocalEpisode, number: u32) -> Result<(), PlayerError> {
+        let mut history = ObservationHistory::begin(self.plan.map, episode, number)?;
         let held_rows = history.present().held_rows();
         let mut executor = Executor::new(self.plan.map, self.most_steps, history.present());
         let mut executed = 0;

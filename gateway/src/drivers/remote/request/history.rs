@@ -6,7 +6,7 @@ use tandem_episodes::players::{LocalEpisode, PlayerError};
 use tandem_tools_spec::ExtraInformation;
 
 use super::PolicyObservation;
-use crate::drivers::remote::map::PolicyMap;
+use crate::drivers::remote::{columns::EpisodeMoment, map::PolicyMap};
 
 /// The observations of an episode that a policy may still be shown.
 pub struct ObservationHistory {
@@ -15,6 +15,7 @@ pub struct ObservationHistory {
     stride: usize,
     /// What of an observation the benchmark's own policies are not shown.
     shown: Vec<ExtraInformation>,
+    episode: u32,
     /// The latest, and the number of rows that were executed before it.
     present: PolicyObservation,
     present_rows: usize,
@@ -23,12 +24,25 @@ pub struct ObservationHistory {
 }
 
 impl ObservationHistory {
-    /// The first look at an episode.
-    pub fn begin(map: &PolicyMap, episode: &mut dyn LocalEpisode) -> Result<ObservationHistory, PlayerError> {
+    /// The first look at the episode of this number.
+    pub fn begin(
+        map: &PolicyMap,
+        episode: &mut dyn LocalEpisode,
+        number: u32,
+    ) -> Result<ObservationHistory, PlayerError> {
         let shown = map.shown();
         let (length, stride) = map.history.map_or((1, 1), |history| (history.length, history.stride));
-        let present = PolicyObservation::take(episode, &shown)?;
-        Ok(ObservationHistory { length, stride, shown, present, present_rows: 0, past: VecDeque::new() })
+        let first = EpisodeMoment { episode: number, step: 0.0, is_first: true };
+        let present = PolicyObservation::take(episode, &shown, first)?;
+        Ok(ObservationHistory {
+            length,
+            stride,
+            shown,
+            episode: number,
+            present,
+            present_rows: 0,
+            past: VecDeque::new(),
+        })
     }
 
     /// What robots see and feel now.
@@ -38,7 +52,8 @@ impl ObservationHistory {
 
     /// Looks at the episode, of which `rows` rows have been executed now.
     pub fn look(&mut self, episode: &mut dyn LocalEpisode, rows: usize) -> Result<(), PlayerError> {
-        let observation = PolicyObservation::take(episode, &self.shown)?;
+        let moment = EpisodeMoment { episode: self.episode, step: 0.0, is_first: false };
+        let observation = PolicyObservation::take(episode, &self.shown, moment)?;
         self.remember(rows, observation);
         Ok(())
     }
@@ -90,6 +105,7 @@ mod tests {
             length,
             stride,
             shown: Vec::new(),
+            episode: 1,
             present: observation(0),
             present_rows: 0,
             past: VecDeque::new(),

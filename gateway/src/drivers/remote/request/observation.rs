@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use tandem_episodes::{
-    Picture,
+    CONTROL_HZ, Picture,
     players::{LocalEpisode, PlayerError},
 };
 use tandem_tools_spec::{ExtraInformation, Observe, Tool as _};
 
-use crate::drivers::remote::columns::{blank_state_values, held_row, state_values};
+use crate::drivers::remote::columns::{EpisodeMoment, blank_state_values, held_row, state_values};
 
 /// What a policy may be shown of one moment.
 #[derive(Clone)]
@@ -43,11 +43,13 @@ impl PolicyObservation {
     pub fn take(
         episode: &mut dyn LocalEpisode,
         shown: &[ExtraInformation],
+        moment: EpisodeMoment,
     ) -> Result<PolicyObservation, PlayerError> {
         let seen = episode.observe(&Observe { robots: None, short: None, frame: None }, shown)?;
+        let moment = EpisodeMoment { step: (seen.time_s * CONTROL_HZ).round(), ..moment };
         let third_person = shown.contains(&ExtraInformation::ThirdPerson);
         let inputs = seen.robots.iter().map(|robot| {
-            let state_values = state_values(&robot.state).ok_or_else(|| withheld(Observe::NAME))?;
+            let state_values = state_values(&robot.state, &moment).ok_or_else(|| withheld(Observe::NAME))?;
             Ok(RobotInputs { picture: robot.view.picture.clone(), state_values })
         });
         let third_person = third_person.then(|| episode.third_person().into());

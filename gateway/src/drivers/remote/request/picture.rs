@@ -1,6 +1,6 @@
 //! Pictures in the size and order that a policy wants.
 
-use image::{ImageBuffer, Rgb, RgbImage, imageops};
+use image::{RgbImage, imageops};
 use tandem_episodes::Picture;
 
 use crate::drivers::remote::{
@@ -8,30 +8,23 @@ use crate::drivers::remote::{
     values::{Array, Elements},
 };
 
-/// Smooth in both directions, as Pillow's bilinear filter.
-const FILTER: imageops::FilterType = imageops::FilterType::Triangle;
-
 /// The picture in the size that is wanted, as an array of bytes.
 pub fn array(picture: &Picture, size_px: [u32; 2], fit: Fit, layout: Layout) -> Array {
     let Picture { width, height, ref rgb, .. } = *picture;
     if [width, height] == size_px {
         return arranged(rgb.clone(), size_px, layout);
     }
-    let pixels = ImageBuffer::from_raw(width, height, &rgb[..]).expect("three bytes a pixel");
-    arranged(fitted(&pixels, size_px, fit).into_raw(), size_px, layout)
+    arranged(fitted(picture, size_px, fit).into_raw(), size_px, layout)
 }
 
-/// A picture, for the functions of the library `image`.
-type Pixels<'a> = ImageBuffer<Rgb<u8>, &'a [u8]>;
-
 /// The picture in another size.
-fn fitted(picture: &Pixels, [width, height]: [u32; 2], fit: Fit) -> RgbImage {
+fn fitted(picture: &Picture, [width, height]: [u32; 2], fit: Fit) -> RgbImage {
     match fit {
-        Fit::Stretch => imageops::resize(picture, width, height, FILTER),
+        Fit::Stretch => picture.scaled([width, height]),
         Fit::Pad => {
             let ratio = shrinking(picture, [width, height]).into_iter().fold(0.0, f64::max);
-            let [w, h] = [picture.width(), picture.height()].map(|side| (f64::from(side) / ratio) as u32);
-            let small = imageops::resize(picture, w.clamp(1, width), h.clamp(1, height), FILTER);
+            let [w, h] = [picture.width, picture.height].map(|side| (f64::from(side) / ratio) as u32);
+            let small = picture.scaled([w.clamp(1, width), h.clamp(1, height)]);
             let mut padded = RgbImage::new(width, height);
             let [left, top] = [(width - small.width()) / 2, (height - small.height()) / 2];
             imageops::replace(&mut padded, &small, left.into(), top.into());
@@ -40,18 +33,19 @@ fn fitted(picture: &Pixels, [width, height]: [u32; 2], fit: Fit) -> RgbImage {
         Fit::Crop => {
             let ratio = shrinking(picture, [width, height]).into_iter().fold(f64::INFINITY, f64::min);
             let [w, h] = [width, height].map(|side| (f64::from(side) * ratio) as u32);
-            let [w, h] = [w.clamp(1, picture.width()), h.clamp(1, picture.height())];
-            let [left, top] = [(picture.width() - w) / 2, (picture.height() - h) / 2];
-            let part = RgbImage::from_fn(w, h, |u, v| *picture.get_pixel(left + u, top + v));
-            imageops::resize(&part, width, height, FILTER)
+            let [w, h] = [w.clamp(1, picture.width), h.clamp(1, picture.height)];
+            let [left, top] = [(picture.width - w) / 2, (picture.height - h) / 2];
+            let pixels = picture.pixels();
+            let part = RgbImage::from_fn(w, h, |u, v| *pixels.get_pixel(left + u, top + v));
+            Picture::new(w, h, part.into_raw()).scaled([width, height])
         }
     }
 }
 
 /// How many times smaller each side becomes.
-fn shrinking(picture: &Pixels, size_px: [u32; 2]) -> [f64; 2] {
+fn shrinking(picture: &Picture, size_px: [u32; 2]) -> [f64; 2] {
     let [width, height] = size_px.map(f64::from);
-    [f64::from(picture.width()) / width, f64::from(picture.height()) / height]
+    [f64::from(picture.width) / width, f64::from(picture.height) / height]
 }
 
 /// Bytes that lie row by row, colours last, in the order that is wanted.
@@ -71,6 +65,8 @@ fn arranged(rgb: Vec<u8>, [width, height]: [u32; 2], layout: Layout) -> Array {
 
 #[cfg(test)]
 mod tests {
+    use image::Rgb;
+
     use super::*;
 
     const RED: Rgb<u8> = Rgb([200, 0, 0]);
