@@ -73,7 +73,7 @@ impl EpisodeError {
             EpisodeError::PixelOutside { .. } => {
                 Refusal::new("pixel-outside", "Pixel outside the image", Invalid)
             }
-            EpisodeError::NoSurface { .. } => Refusal::new("no-surface", "No such surface", Invalid),
+            EpisodeError::NoSurface { .. } => Refusal::new("no-surface", "No such surface", Conflict),
             EpisodeError::Ended { .. } => Refusal::new("ended", "Episode ended", Conflict),
             EpisodeError::Spec(error) => error.refusal(),
             EpisodeError::Diverged { .. } => Refusal::new("diverged", "Physics diverged", Conflict),
