@@ -5,7 +5,8 @@ use clap::{CommandFactory, Parser, Subcommand};
 use crate::commands::{
     CommandResult,
     about::{completions, man, tasks},
-    agent, bench, collect, demo, doctor, evaluate, locomotion, policy_map, recover, replay, report, serve,
+    agent, bench, collect, demo, doctor, evaluate, export, locomotion, policy_map, recover, replay, report,
+    serve,
 };
 
 /// Physics of humanoids that must work together, behind an HTTP API.
@@ -30,6 +31,7 @@ enum CliCommand {
     Tasks(tasks::TasksArgs),
     Recover(recover::RecoverArgs),
     Replay(replay::ReplayArgs),
+    Export(export::ExportArgs),
     Report(report::ReportArgs),
     Bench(bench::BenchArgs),
     Doctor(doctor::DoctorArgs),
@@ -51,6 +53,7 @@ impl Cli {
             CliCommand::Tasks(args) => tasks::run(args),
             CliCommand::Recover(args) => recover::run(args),
             CliCommand::Replay(args) => replay::run(args),
+            CliCommand::Export(args) => export::run(args),
             CliCommand::Report(args) => report::run(args),
             CliCommand::Bench(args) => bench::run(args),
             CliCommand::Doctor(args) => doctor::run(args),

@@ -1,13 +1,16 @@
 //! Recordings as arrays, and pictures of their steps drawn again.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
+use numpy::PyArray4;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::json;
-use tandem_episodes::Recording;
 use tandem_episodes::replay::{EpisodeCamera, EpisodeRenderer, PictureSize};
+use tandem_episodes::{Grip, Recording, RecordingError};
+use tandem_sim::render::Frame;
 use tandem_sim::{JOINTS, Side, Step};
 use tandem_tools_spec::ACTION_ROW_LEN;
 
@@ -33,7 +36,7 @@ impl NativeRecording {
             let steps = recording.steps().collect::<Result<_, _>>()?;
             Ok(NativeRecording { recording, steps, renderer: Mutex::default() })
         };
-        py.detach(read).map_err(|error: tandem_episodes::RecordingError| failed(py, &error))
+        py.detach(read).map_err(|error: RecordingError| failed(py, &error))
     }
 
     /// What the episode was, its build and controller, its result, its phases, the names of its objects and cameras, and its calls,
@@ -61,6 +64,8 @@ impl NativeRecording {
             "build": build,
             "result": result,
             "phases": self.recording.phases().map_err(|error| failed(py, &error))?,
+            "instruction": spec.task.instruction,
+            "instructions": spec.task.robots.iter().map(|robot| (robot.name, robot.instruction)).collect::<BTreeMap<_, _>>(),
             "robots": spec.task.robots.iter().map(|robot| robot.name).collect::<Vec<_>>(),
             "objects": objects.iter().map(|object| &object.name).collect::<Vec<_>>(),
             "cameras": EpisodeCamera::all(spec.task).iter().map(|camera| camera.name(spec.task)).collect::<Vec<_>>(),
@@ -81,6 +86,14 @@ impl NativeRecording {
         columns.arrays(py)
     }
 
+    /// How each hand of each robot grips each object at every step: 0 not at all, 1 touching, 2 holding, as the scorer sees it.
+    fn grips<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray4<u8>>> {
+        let grips = py.detach(|| self.all_grips()).map_err(|error| failed(py, &error))?;
+        let (robots, objects) =
+            self.steps.first().map_or((0, 0), |step| (step.robots.len(), step.objects.len()));
+        shaped(py, &grips, [self.steps.len(), robots, 2, objects])
+    }
+
     /// Colours and depth that a camera sees after a step, in its own size or in another, width by height.
     fn picture<'py>(
         &self,
@@ -89,6 +102,14 @@ impl NativeRecording {
         step: usize,
         size: Option<(u32, u32)>,
     ) -> PyResult<(Colours<'py>, Depths<'py>)> {
+        let frame = self.frame(py, camera, step, size)?;
+        let (height, width) = (frame.height as usize, frame.width as usize);
+        Ok((shaped(py, &frame.rgb, [height, width, 3])?, shaped(py, &frame.depth_m, [height, width])?))
+    }
+}
+
+impl NativeRecording {
+    fn frame(&self, py: Python, camera: &str, step: usize, size: Option<(u32, u32)>) -> PyResult<Frame> {
         let spec = &self.recording.spec;
         let camera = EpisodeCamera::find(camera, spec.task).map_err(|text| failed(py, &text))?;
         let Some(step) = self.steps.get(step) else {
@@ -105,9 +126,31 @@ impl NativeRecording {
             let camera = renderer.camera(camera, step, size);
             Ok(renderer.draw(step, &camera))
         });
-        let frame = drawn.map_err(|error: tandem_episodes::EpisodeError| refused(py, &error.into()))?;
-        let (height, width) = (frame.height as usize, frame.width as usize);
-        Ok((shaped(py, &frame.rgb, [height, width, 3])?, shaped(py, &frame.depth_m, [height, width])?))
+        drawn.map_err(|error: tandem_episodes::EpisodeError| refused(py, &error.into()))
+    }
+
+    /// Steps by robots by left and right by objects. Before the first step nothing is gripped.
+    fn all_grips(&self) -> Result<Vec<u8>, RecordingError> {
+        let Some(start) = self.steps.first() else { return Ok(Vec::new()) };
+        let spec = &self.recording.spec;
+        let mut scores = spec.task.scores(&spec.robot.model()?, start)?;
+        let mut grips = vec![0; start.robots.len() * 2 * start.objects.len()];
+        for step in &self.steps[1..] {
+            let facts = scores.update(step).facts;
+            for robot in 0..step.robots.len() {
+                for side in Side::BOTH {
+                    grips.extend(step.objects.iter().map(|object| {
+                        let facts = facts.objects.iter().find(|facts| facts.name == object.name);
+                        match facts.map(|facts| facts.hands[robot][side]) {
+                            None | Some(Grip::Off) => 0,
+                            Some(Grip::Touching) => 1,
+                            Some(Grip::Holding) => 2,
+                        }
+                    }));
+                }
+            }
+        }
+        Ok(grips)
     }
 }
 

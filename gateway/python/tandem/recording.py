@@ -103,6 +103,16 @@ class Recording:
         return tuple(RecordedCall(**call) for call in self._about["calls"])
 
     @property
+    def instruction(self) -> str:
+        """What is to be done, in the words that a policy of all robots is told."""
+        return self._about["instruction"]
+
+    @property
+    def instructions(self) -> dict[str, str]:
+        """What each robot is to do, in the words that its own policy is told."""
+        return self._about["instructions"]
+
+    @property
     def robots(self) -> tuple[str, ...]:
         """Names of the robots, in the order of arrays."""
         return tuple(self._about["robots"])
@@ -199,6 +209,13 @@ class Recording:
         by 3 (thumb, fingers, palm) by 3; zero where they do not touch.
         """
         return self._arrays["contact_force_n"]
+
+    @cached_property
+    def grips(self) -> NDArray[np.uint8]:
+        """How hands grip objects, as the episode is scored, steps by robots by 2 (left, right) by objects: 0 not at all, 1
+        touching, 2 holding.
+        """
+        return self._native.grips()
 
     @cached_property
     def state_hashes(self) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ use super::{
     logging::log_to_stderr,
 };
 use crate::{
-    drivers::AgentLoop,
+    drivers::{PythonModule, PythonPart},
     hosting::try_runs_folder,
     http::{Server, shutdown_signal},
     settings::{Layer, Settings, one_of},
@@ -78,7 +78,7 @@ pub struct AgentArgs {
 pub fn run(args: AgentArgs) -> CommandResult {
     log_to_stderr(LevelFilter::WARN);
     let task = tasks::find(&args.task)?;
-    let agent = AgentLoop::new(args.agent.arguments(args.agent.limit_s(LIMIT_S)))?;
+    let agent = PythonModule::new(PythonPart::Agent, args.agent.arguments(args.agent.limit_s(LIMIT_S)))?;
     let (token, text) = Token::random()?;
     let flags = Layer {
         listen: Some((Ipv4Addr::LOCALHOST, FREE_PORT).into()),

@@ -7,6 +7,7 @@ pub mod collect;
 pub mod demo;
 pub mod doctor;
 pub mod evaluate;
+pub mod export;
 mod flags;
 pub mod locomotion;
 mod logging;

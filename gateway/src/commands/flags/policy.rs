@@ -10,7 +10,7 @@ use tandem_episodes::{
 use tandem_tools_spec::{Driving, Operators};
 
 use super::agent::AgentFlags;
-use crate::drivers::{AgentLoop, PRESETS, PolicyMap, PolicyProtocol, Program, RemotePolicy};
+use crate::drivers::{PRESETS, PolicyMap, PolicyProtocol, Program, PythonModule, PythonPart, RemotePolicy};
 
 /// The prefix of --policy that names a program.
 const EXEC: &str = "exec:";
@@ -146,7 +146,7 @@ impl PolicyFlags {
             }
             (PolicyChoice::Agent(flags), None, limit_s) => {
                 let limit_s = limit_s.unwrap_or_else(|| flags.limit_s(LIMIT_S));
-                let agent = AgentLoop::new(flags.arguments(limit_s))?;
+                let agent = PythonModule::new(PythonPart::Agent, flags.arguments(limit_s))?;
                 let limit = Duration::from_secs(limit_s.into());
                 Box::new(Program::agent(
                     &agent,

@@ -21,7 +21,7 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{Driving, EndReason, ResultReply, StartReply};
 
-use super::agent::AgentLoop;
+use super::python::PythonModule;
 use crate::{
     hosting::{EpisodeThread, HostingError},
     http::Server,
@@ -78,7 +78,7 @@ impl Program {
 
     /// Episodes played by a language model that results call `name`; `card` is what they keep of it.
     pub fn agent(
-        agent: &AgentLoop,
+        agent: &PythonModule,
         name: String,
         card: Value,
         driving: Driving,

@@ -1,0 +1,15 @@
+"""Data sets of recordings, for those who train policies: `tandem export`.
+
+    from tandem.export import ExportSettings, export_lerobot
+
+    export_lerobot("runs/demonstrations", "data/handover", ExportSettings(rate_hz=10))
+
+It needs what `pip install 'tandem-sim[lerobot]'` adds: pyarrow, and PyAV with its encoders.
+"""
+
+from __future__ import annotations
+
+from .lerobot import Exported, export_lerobot
+from .settings import ExportSettings
+
+__all__ = ["ExportSettings", "Exported", "export_lerobot"]

@@ -1,0 +1,143 @@
+"""What the rows of a data set hold of a recording.
+
+A row is a moment: what robots sensed then, and what they were told until the next row. Columns whose names begin with
+`privileged` are what no policy gets; LeRobot's policies read `observation` and `action` alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..recording import Recording
+from .settings import EGOCENTRIC, THIRD_PERSON, ExportSettings
+
+STATE = "observation.state"
+ACTION = "action"
+IMAGES = "observation.images."
+PRIVILEGED = "privileged."
+
+POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
+AXES = ("x", "y", "z")
+HANDS = ("left", "right")
+PARTS = ("thumb", "fingers", "palm")
+BASE_VELOCITIES = ("vx_m_s", "vy_m_s", "yaw_rate_rad_s")
+
+
+@dataclass(frozen=True)
+class Column:
+    """Numbers of all rows: rows by names, or one number a row where there are no names."""
+
+    values: NDArray[Any]
+    names: tuple[str, ...] | None
+
+    def feature(self) -> dict[str, Any]:
+        """As `meta/info.json` describes it."""
+        names = None if self.names is None else list(self.names)
+        return {"dtype": str(self.values.dtype), "shape": [1 if names is None else len(names)], "names": names}
+
+
+@dataclass(frozen=True)
+class View:
+    """What one episode of a data set is of a recording."""
+
+    robots: tuple[int, ...]
+    """Whose columns it has, as indices."""
+
+    name: str | None
+    """The robot's, where it is of one."""
+
+    task: str
+    """What is to be done, in words."""
+
+    cameras: dict[str, str]
+    """Names of its picture columns, and the cameras."""
+
+
+def views(recording: Recording, settings: ExportSettings) -> tuple[View, ...]:
+    """The episodes that a recording becomes."""
+    robots, cameras = recording.robots, settings.cameras_of(recording.robots)
+    if settings.view == "joint":
+        named = {IMAGES + (camera if camera == THIRD_PERSON else f"{camera}_egocentric"): camera for camera in cameras}
+        return (View(tuple(range(len(robots))), None, recording.instruction, named),)
+    return tuple(
+        View(
+            (index,),
+            robot,
+            recording.instructions[robot],
+            {
+                IMAGES + (camera if camera == THIRD_PERSON else EGOCENTRIC): camera
+                for camera in cameras
+                if camera in (robot, THIRD_PERSON)
+            },
+        )
+        for index, robot in enumerate(robots)
+    )
+
+
+def moments(recording: Recording, settings: ExportSettings) -> NDArray[np.int64]:
+    """The steps that rows are of: all that something was told after."""
+    return np.arange(0, len(recording) - 1, settings.stride)
+
+
+def told(recording: Recording, rows: NDArray[np.int64], stride: int) -> NDArray[np.float32]:
+    """The action of each row, as a policy map reads a chunk at this rate: joint targets and the pelvis' height that are to be
+    reached when the next row begins, and the mean velocity of the base until then.
+    """
+    last = len(recording) - 1
+    actions = recording.actions[np.minimum(rows + stride, last)]
+    base = [recording.action_columns.index(name) for name in BASE_VELOCITIES]
+    steps = np.minimum(rows[:, None] + np.arange(1, stride + 1), last)
+    actions[..., base] = recording.actions[..., base][steps].mean(axis=1)
+    return actions
+
+
+def columns(recording: Recording, view: View, rows: NDArray[np.int64], stride: int) -> dict[str, Column]:
+    """The columns of an episode, but for its pictures."""
+    robots = [recording.robots[index] for index in view.robots]
+
+    def of_robots(values: NDArray[Any], *parts: tuple[str, ...]) -> Column:
+        """Robots by parts, one after another."""
+        names = [() if view.name is not None else (robot,) for robot in robots]
+        for part in parts:
+            names = [(*name, word) for name in names for word in part]
+        chosen = np.reshape(values[:, list(view.robots)], (len(rows), -1))
+        return Column(np.ascontiguousarray(chosen), tuple(".".join(name) for name in names))
+
+    def of_objects(values: NDArray[Any], *parts: tuple[str, ...]) -> Column:
+        names = [(name,) for name in recording.objects]
+        for part in parts:
+            names = [(*name, word) for name in names for word in part]
+        return Column(np.ascontiguousarray(np.reshape(values, (len(rows), -1))), tuple(".".join(name) for name in names))
+
+    objects = recording.objects
+    joints = tuple(f"{name}_rad" for name in recording.joints)
+    reached_s = [phase.time_s for phase in recording.phases]
+    time_s = recording.time_s[rows]
+    # Just in time counts: a phase is told with the time of the step that reaches it.
+    phases = np.searchsorted(np.asarray(reached_s), time_s + 1e-6, side="right").astype(np.int64)
+    success = np.full(len(rows), is_successful(recording))
+    of_joints = {"velocity_rad_s": recording.qd_rad_s, "torque_n_m": recording.torque_n_m}
+    return {
+        STATE: of_robots(recording.q_rad[rows], joints),
+        ACTION: of_robots(told(recording, rows, stride), recording.action_columns),
+        **{f"{PRIVILEGED}joint_{name}": of_robots(values[rows], recording.joints) for name, values in of_joints.items()},
+        f"{PRIVILEGED}pelvis_in_world": of_robots(recording.pelvis_in_world[rows], POSE),
+        f"{PRIVILEGED}wrists_in_world": of_robots(recording.wrists_in_world[rows], HANDS, POSE),
+        f"{PRIVILEGED}wrist_force_n": of_robots(recording.hand_force_n[rows], HANDS, AXES),
+        f"{PRIVILEGED}contact_force_n": of_robots(recording.contact_force_n[rows], HANDS, objects, PARTS, AXES),
+        f"{PRIVILEGED}grips": of_robots(recording.grips[rows].astype(np.int64), HANDS, objects),
+        f"{PRIVILEGED}objects_in_world": of_objects(recording.objects_in_world[rows], POSE),
+        f"{PRIVILEGED}fallen": of_robots(recording.fallen[rows], ("fallen",)),
+        f"{PRIVILEGED}phases_reached": Column(phases, None),
+        f"{PRIVILEGED}success": Column(success, None),
+    }
+
+
+def is_successful(recording: Recording) -> bool:
+    """Whether the last phase was reached."""
+    result = recording.result
+    return result is not None and all(time_s is not None for time_s in result.phases.values())

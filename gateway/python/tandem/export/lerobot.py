@@ -1,0 +1,320 @@
+"""Recordings to a data set of LeRobot's: found, drawn side by side, put together."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import re
+import shutil
+import threading
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from ..errors import TandemError
+from ..recording import Recording
+from .columns import is_successful
+from .parts import Part, Stopped, make_parts, write_whole
+from .settings import ExportSettings, library
+from .v2 import write_v2
+from .v3 import write_v3
+
+RECORDING_FILE = "episode.mcap"
+GOOD_FILE = "good"
+ABOUT_FILE = "meta/tandem.json"
+PLAN_FILE = "plan.json"
+
+TRAINED = 50
+VALIDATED = 10
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A data set."""
+
+    folder: Path
+    """Where it is."""
+
+    task: str
+    """The task's id."""
+
+    episodes: int
+    """How many episodes it has."""
+
+    rows: int
+    """How many rows they have together."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """A recording that becomes part of a data set."""
+
+    path: Path
+    name: str
+    task: str
+    seed: int
+    success: bool
+    state_hash: str
+    build: str
+
+
+def export_lerobot(
+    runs: str | PathLike[str],
+    out: str | PathLike[str],
+    settings: ExportSettings | None = None,
+    *,
+    only_successful: bool = False,
+    only_good: bool = False,
+    jobs: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Exported]:
+    """Writes the recordings in a folder as a data set, or a data set for each task in a folder of its own. What an interrupted
+    export has done is kept, and a data set is there once it is whole.
+
+    runs: A recording, or a folder that is searched for them; those in it are taken in the order of their names.
+    out: The data set's folder.
+    settings: What it has of them.
+    only_successful: Leaves out episodes that did not reach their last phase.
+    only_good: Leaves out episodes in whose folder no file `good` lies.
+    jobs: Recordings that are read and drawn side by side. None: one a core.
+    progress: Called with the number of recordings that are done, and of all.
+    """
+    settings = settings or ExportSettings()
+    for name in ("pyarrow", "av"):
+        library(name)
+    workers = jobs or len(os.sched_getaffinity(0))
+    root, target = Path(runs), Path(out)
+    found = find(root)
+    if only_good:
+        found = [path for path in found if (path.parent / GOOD_FILE).exists()]
+        if not found:
+            raise TandemError(f"no recording in {root} is marked good, by a file {GOOD_FILE!r} beside it")
+    with ThreadPoolExecutor(workers) as pool:
+        sources = list(pool.map(_source, found, [root] * len(found)))
+    if only_successful:
+        sources = [source for source in sources if source.success]
+        if not sources:
+            raise TandemError(f"no episode in {root} reached its last phase; all would be left out")
+    tasks = list(dict.fromkeys(source.task for source in sources))
+    of_task = {task: [source for source in sources if source.task == task] for task in tasks}
+    done = 0
+
+    def tell(further: int) -> None:
+        nonlocal done
+        done += further
+        if progress is not None:
+            progress(done, len(sources))
+
+    folders = {task: target if len(tasks) == 1 else target / task for task in tasks}
+    return [_export(of_task[task], folders[task], settings, workers, tell) for task in tasks]
+
+
+def find(root: Path) -> list[Path]:
+    """The recordings in a folder, by their names, numbers in these as numbers."""
+    if root.is_file():
+        return [root]
+
+    def order(path: Path) -> list[tuple[int, int, str]]:
+        words = re.split(r"(\d+)", path.relative_to(root).as_posix())
+        return [(0, int(word), "") if word.isdigit() else (1, 0, word) for word in words if word]
+
+    found = sorted(root.rglob(RECORDING_FILE), key=order)
+    if not found:
+        raise TandemError(f"no {RECORDING_FILE} in {root}; give a folder of recordings, as of tandem collect")
+    return found
+
+
+def _source(path: Path, root: Path) -> Source:
+    recording = Recording(path)
+    name = path.name if path == root else path.relative_to(root).as_posix()
+    if len(recording) < 2:
+        raise TandemError(f"{path} has no step; leave it out")
+    return Source(
+        path, name, recording.task, recording.seed, is_successful(recording), recording.state_hashes[-1], recording.build
+    )
+
+
+def _export(
+    sources: Sequence[Source], out: Path, settings: ExportSettings, workers: int, tell: Callable[[int], None]
+) -> Exported:
+    plan = {
+        "settings": settings.as_json(),
+        "recordings": [{"recording": source.name, "state_hash": source.state_hash} for source in sources],
+    }
+    task = sources[0].task
+    if (there := _there(out, plan)) is not None:
+        tell(len(sources))
+        return Exported(out, task, there["episodes"], there["rows"])
+    out.parent.mkdir(parents=True, exist_ok=True)
+    work = out.with_name(out.name + ".partial")
+    work.mkdir(exist_ok=True)
+    with _alone(work):
+        _begin(work, plan)
+        parts = _make_all(sources, work, settings, workers, tell)
+        _check_alike(parts)
+        whole = work / "whole"
+        shutil.rmtree(whole, ignore_errors=True)
+        whole.mkdir()
+        a_recording = len(parts) // len(sources)
+        write = write_v3 if settings.version == "v3" else write_v2
+        write(whole, parts, splits(len(sources), a_recording), settings)
+        rows = sum(part.length for part in parts)
+        _write_about(whole, plan, sources, parts, splits(len(sources), a_recording))
+        if out.exists():
+            out.rmdir()
+        whole.rename(out)
+    shutil.rmtree(work)
+    return Exported(out, task, len(parts), rows)
+
+
+def splits(recordings: int, a_recording: int) -> dict[str, str]:
+    """The first 50 episodes are for training, the next 10 for validation; each of these is `a_recording` of the data set's."""
+    ends = {"train": min(TRAINED, recordings), "val": min(TRAINED + VALIDATED, recordings), "rest": recordings}
+    found: dict[str, str] = {}
+    begin = 0
+    for name, end in ends.items():
+        if end > begin:
+            found[name] = f"{begin * a_recording}:{end * a_recording}"
+        begin = end
+    return found
+
+
+def _there(out: Path, plan: dict[str, Any]) -> dict[str, Any] | None:
+    """What is said of the data set that is there already, if it is this one."""
+    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
+        return None
+    try:
+        about: dict[str, Any] = json.loads((out / ABOUT_FILE).read_text())
+        if about["plan"] == plan:
+            return about
+    except (OSError, ValueError, KeyError):
+        pass
+    raise TandemError(f"{out} is there and holds something else; give another folder, or remove it")
+
+
+def _begin(work: Path, plan: dict[str, Any]) -> None:
+    path = work / PLAN_FILE
+    if not path.exists():
+        write_whole(path, json.dumps(plan))
+    elif json.loads(path.read_text()) != plan:
+        raise TandemError(f"{work} is what another export has left, of other recordings or settings; remove it")
+
+
+@contextmanager
+def _alone(work: Path) -> Generator[None, None, None]:
+    with (work / "lock").open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise TandemError(f"another export writes to {work} now; wait for it") from error
+        yield
+
+
+def _make_all(
+    sources: Sequence[Source], work: Path, settings: ExportSettings, workers: int, tell: Callable[[int], None]
+) -> list[Part]:
+    stop = threading.Event()
+    futures: list[Future[list[Part]]] = []
+    with ThreadPoolExecutor(workers) as pool:
+
+        def make(number: int, source: Source) -> list[Part]:
+            parts = make_parts(source.path, source.name, work / "parts" / f"{number:06d}", settings, stop)
+            tell(1)
+            return parts
+
+        try:
+            futures = [pool.submit(make, number, source) for number, source in enumerate(sources)]
+            ended, _ = wait(futures, return_when=FIRST_EXCEPTION)
+            failed = [error for future in ended if (error := future.exception()) is not None]
+            if failed:
+                raise failed[0]
+        finally:
+            stop.set()
+            pool.shutdown(wait=True, cancel_futures=True)
+    return [part for future in futures for part in future.result()]
+
+
+def _check_alike(parts: Sequence[Part]) -> None:
+    first = parts[0]
+    for part in parts:
+        for key in first.features.keys() | part.features.keys():
+            if first.features.get(key) != part.features.get(key):
+                one, other = first.about["recording"], part.about["recording"]
+                raise TandemError(f"{other} has another {key} than {one}; export them apart")
+
+
+def _write_about(
+    whole: Path, plan: dict[str, Any], sources: Sequence[Source], parts: Sequence[Part], names: dict[str, str]
+) -> None:
+    """What the data set is made of, for readers and for the next export."""
+    rows = sum(part.length for part in parts)
+    builds = sorted({source.build for source in sources})
+    recordings = [
+        {"recording": source.name, "seed": source.seed, "success": source.success, "build": source.build} for source in sources
+    ]
+    about = {
+        "task": sources[0].task,
+        "episodes": len(parts),
+        "rows": rows,
+        "successes": sum(source.success for source in sources),
+        "builds": builds,
+        "instructions": parts[0].about["instructions"],
+        "splits": names,
+        "recordings": recordings,
+        "plan": plan,
+    }
+    (whole / ABOUT_FILE).write_text(json.dumps(about, indent=2))
+    card = CARD.format(
+        task=sources[0].task,
+        rows=rows,
+        episodes=len(parts),
+        recordings=len(sources),
+        successes=about["successes"],
+        seeds=", ".join(_ranges([source.seed for source in sources])),
+        builds=", ".join(builds),
+        settings=", ".join(f"{name} {value}" for name, value in plan["settings"].items()),
+        splits=", ".join(f"{name} {span}" for name, span in names.items()),
+    )
+    (whole / "README.md").write_text(card)
+
+
+def _ranges(numbers: Sequence[int]) -> list[str]:
+    ranges: list[list[int]] = []
+    for number in sorted(set(numbers)):
+        if ranges and ranges[-1][1] == number - 1:
+            ranges[-1][1] = number
+        else:
+            ranges.append([number, number])
+    return [str(first) if first == last else f"{first}-{last}" for first, last in ranges]
+
+
+CARD = """---
+task_categories:
+- robotics
+tags:
+- LeRobot
+configs:
+- config_name: default
+  data_files: data/*/*.parquet
+---
+
+# {task}
+
+{episodes} episodes, {rows} rows, of {recordings} recordings, {successes} of which reached the last phase: simulated Unitree
+G1 robots with Dex3 hands, recorded and exported by Tandem (`tandem export lerobot`). `meta/tandem.json` names every recording.
+
+* Seeds: {seeds}
+* Builds: {builds}
+* Settings: {settings}
+* Episodes of each split: {splits}
+
+A row is a moment: `observation` is what robots sensed and saw then, `action` the joint targets that are to be reached when
+the next row begins, and the mean velocity of the base until then. Columns named `privileged` are what no policy gets.
+"""
+
+__all__ = ["Exported", "Stopped", "export_lerobot", "find", "splits"]

@@ -1,0 +1,163 @@
+"""An episode of a data set as files of its own: what a run that is interrupted has already done."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Generator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..recording import Recording
+from .columns import Column, View, columns, is_successful, moments, views
+from .pictures import Pixels, png, write_film
+from .settings import ExportSettings, library
+from .statistics import Colours, sampled
+
+ROWS_FILE = "rows.parquet"
+PART_FILE = "part.json"
+
+
+class Stopped(Exception):
+    """Somebody has interrupted the export."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """An episode that is whole."""
+
+    folder: Path
+    about: dict[str, Any]
+
+    @property
+    def length(self) -> int:
+        """How many rows it has."""
+        return self.about["length"]
+
+    @property
+    def features(self) -> dict[str, Any]:
+        """Its columns, as `meta/info.json` describes them."""
+        return self.about["features"]
+
+    @property
+    def rows_file(self) -> Path:
+        """Its columns, but for those that number rows and episodes."""
+        return self.folder / ROWS_FILE
+
+    def film(self, key: str) -> Path:
+        """Its film of a camera."""
+        return self.folder / f"{key}.mp4"
+
+    def colours(self, key: str) -> Colours:
+        """What was counted of a camera's pictures."""
+        counted = self.about["colours"][key]
+        return Colours(counted["pictures"], counted["levels"])
+
+
+def make_parts(path: Path, source: str, folder: Path, settings: ExportSettings, stop: threading.Event) -> list[Part]:
+    """The episodes that a recording becomes, drawn and written where they are not there yet.
+
+    path: The recording.
+    source: What the data set calls it.
+    folder: Where parts lie; this recording's have its name.
+    """
+    recording: Recording | None = None
+    names = part_names(folder)
+    if names is None:
+        recording = Recording(path)
+        names = [view.name or "joint" for view in views(recording, settings)]
+    parts: list[Part] = []
+    for index, name in enumerate(names):
+        own = folder / name
+        if not (own / PART_FILE).exists():
+            recording = recording or Recording(path)
+            own.mkdir(parents=True, exist_ok=True)
+            _make(recording, views(recording, settings)[index], source, own, settings, stop)
+        parts.append(Part(own, json.loads((own / PART_FILE).read_text())))
+    # Later runs need not read the recording to know how many there are.
+    write_whole(folder / "parts.json", json.dumps(names))
+    return parts
+
+
+def part_names(folder: Path) -> list[str] | None:
+    """The names of a recording's episodes, if all of them are there."""
+    path = folder / "parts.json"
+    return json.loads(path.read_text()) if path.exists() else None
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Writes a file that is there as a whole, or not at all."""
+    partial = path.with_name(path.name + ".partial")
+    partial.write_text(text)
+    partial.replace(path)
+
+
+def _make(recording: Recording, view: View, source: str, folder: Path, settings: ExportSettings, stop: threading.Event) -> None:
+    rows = moments(recording, settings)
+    held = columns(recording, view, rows, settings.stride)
+    features = {key: column.feature() for key, column in held.items()}
+    width, height = settings.size
+    colours: dict[str, Colours] = {}
+    files: dict[str, list[bytes]] = {}
+    for key, camera in view.cameras.items():
+        counted = colours[key] = Colours()
+        drawn = _draw(recording, camera, rows.tolist(), settings, counted, stop)
+        if settings.images == "video":
+            write_film(folder / f"{key}.mp4", drawn, settings.size, settings.rate_hz, settings.codec)
+        else:
+            files[key] = [png(pixels) for pixels in drawn]
+        kind = "video" if settings.images == "video" else "image"
+        features[key] = {"dtype": kind, "shape": [height, width, 3], "names": ["height", "width", "channels"]}
+    _write_rows(folder / ROWS_FILE, held, files)
+    about = {
+        "recording": source,
+        "task": recording.task,
+        "seed": recording.seed,
+        "robot": view.name,
+        "instruction": view.task,
+        "instructions": dict(recording.instructions),
+        "success": is_successful(recording),
+        "state_hash": recording.state_hashes[-1],
+        "build": recording.build,
+        "length": len(rows),
+        "features": features,
+        "colours": {key: {"pictures": seen.pictures, "levels": seen.levels.tolist()} for key, seen in colours.items()},
+    }
+    write_whole(folder / PART_FILE, json.dumps(about))
+
+
+def _draw(
+    recording: Recording, camera: str, rows: list[int], settings: ExportSettings, colours: Colours, stop: threading.Event
+) -> Generator[Pixels, None, None]:
+    counted = sampled(len(rows))
+    for number, step in enumerate(rows):
+        if stop.is_set():
+            raise Stopped
+        pixels = recording.picture(camera, step, size=settings.size).rgb
+        if number in counted:
+            colours.add(pixels)
+        yield pixels
+
+
+def _write_rows(path: Path, held: dict[str, Column], files: dict[str, list[bytes]]) -> None:
+    pa, pq = library("pyarrow"), library("pyarrow.parquet")
+    arrays: dict[str, Any] = {}
+    for key, column in held.items():
+        flat = pa.array(np.ravel(column.values))
+        # One name is one number a row, which LeRobot keeps as such.
+        listed = column.names is not None and len(column.names) > 1
+        arrays[key] = pa.FixedSizeListArray.from_arrays(flat, len(column.names or ())) if listed else flat
+    for key, pictures in files.items():
+        arrays[key] = pa.array([{"bytes": picture, "path": None} for picture in pictures], picture_type())
+    partial = path.with_name(path.name + ".partial")
+    pq.write_table(pa.table(arrays), partial)
+    partial.replace(path)
+
+
+def picture_type() -> Any:
+    """How Hugging Face's `datasets` keep a picture."""
+    pa = library("pyarrow")
+    return pa.struct([("bytes", pa.binary()), ("path", pa.string())])

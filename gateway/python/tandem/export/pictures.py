@@ -1,0 +1,103 @@
+"""Pictures straight into an encoder."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from fractions import Fraction
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import TandemError
+from .settings import Codec, library
+
+Pixels = NDArray[np.uint8]
+
+KEY_FRAME_EVERY = 2
+"""As LeRobot writes films: any picture is found by decoding two."""
+
+ENCODERS: dict[Codec, tuple[str, dict[str, str]]] = {
+    # A thread for each recording has the cores busy already.
+    "av1": ("libsvtav1", {"crf": "30", "preset": "12", "svtav1-params": "lp=1"}),
+    # Pictures follow each other as they are shown, so that films can be put behind one another.
+    "h264": ("libx264", {"crf": "23", "preset": "veryfast", "bf": "0", "threads": "1"}),
+}
+
+
+def write_film(path: Path, pictures: Iterable[Pixels], size: tuple[int, int], rate_hz: int, codec: Codec) -> None:
+    """Writes a film; what is at `path` is whole."""
+    # The encoder of AV1 tells its settings to everybody's terminal.
+    os.environ.setdefault("SVT_LOG", "1")
+    av = library("av")
+    encoder, options = ENCODERS[codec]
+    partial = path.with_suffix(".partial")
+    with av.open(str(partial), "w", format="mp4") as film:
+        stream = film.add_stream(encoder, rate=rate_hz, options={**options, "g": str(KEY_FRAME_EVERY)})
+        stream.width, stream.height = size
+        stream.pix_fmt = "yuv420p"
+        for number, pixels in enumerate(pictures):
+            frame = av.VideoFrame.from_ndarray(pixels, format="rgb24")
+            frame.pts, frame.time_base = number, Fraction(1, rate_hz)
+            film.mux(stream.encode(frame))
+        film.mux(stream.encode(None))
+    partial.replace(path)
+
+
+def join_films(path: Path, parts: list[tuple[Path, int]], rate_hz: int) -> None:
+    """Writes a film of several, each with its number of pictures, one behind the other; nothing is encoded again."""
+    av = library("av")
+    before = 0
+    with av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"}) as film:
+        stream: Any = None
+        for part, pictures in parts:
+            with av.open(str(part)) as given:
+                source = given.streams.video[0]
+                if stream is None:
+                    stream = film.add_stream_from_template(source, opaque=True)
+                    stream.time_base = source.time_base
+                shift = round(Fraction(before, rate_hz) / source.time_base)
+                count = 0
+                for packet in given.demux(source):
+                    if packet.dts is None:
+                        continue
+                    packet.pts, packet.dts = packet.pts + shift, packet.dts + shift
+                    packet.stream = stream
+                    film.mux(packet)
+                    count += 1
+                if count != pictures:
+                    raise TandemError(f"{part} has {count} pictures and not {pictures}; remove its folder")
+            before += pictures
+
+
+def film_info(path: Path, rate_hz: int) -> dict[str, Any]:
+    """What `meta/info.json` says of films as this one."""
+    av = library("av")
+    with av.open(str(path)) as film:
+        stream = film.streams.video[0]
+        return {
+            "video.height": stream.height,
+            "video.width": stream.width,
+            "video.codec": stream.codec.canonical_name,
+            "video.pix_fmt": stream.pix_fmt,
+            "video.fps": rate_hz,
+            "video.channels": 3,
+            "has_audio": False,
+            "video.g": KEY_FRAME_EVERY,
+            "is_depth_map": False,
+        }
+
+
+def png(pixels: Pixels) -> bytes:
+    """A PNG file."""
+    av = library("av")
+    height, width, _ = pixels.shape
+    codec = av.CodecContext.create("png", "w")
+    codec.width, codec.height, codec.pix_fmt, codec.time_base = width, height, "rgb24", Fraction(1, 1)
+    written = BytesIO()
+    for packet in [*codec.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")), *codec.encode(None)]:
+        written.write(bytes(packet))
+    return written.getvalue()

@@ -1,0 +1,87 @@
+"""What an export is told."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from importlib import import_module
+from typing import Any, Literal, TypeAlias, get_args
+
+from ..errors import TandemError
+
+Version: TypeAlias = Literal["v3", "v2"]
+View: TypeAlias = Literal["joint", "robot"]
+Images: TypeAlias = Literal["video", "png"]
+Codec: TypeAlias = Literal["av1", "h264"]
+
+RATES_HZ = (50, 25, 10)
+CONTROL_HZ = 50
+
+EGOCENTRIC = "egocentric"
+THIRD_PERSON = "third_person"
+
+SIDES_PX = range(16, 3841)
+
+
+@dataclass(frozen=True)
+class ExportSettings:
+    """What a data set has of recordings."""
+
+    version: Version = "v3"
+    """Version of LeRobot's format."""
+
+    view: View = "joint"
+    """"joint": an episode for each recording, with all robots' columns; "robot": one for each robot of it, with its own."""
+
+    cameras: tuple[str, ...] = (EGOCENTRIC,)
+    """"egocentric" for the cameras of all robots' heads, "third_person", or names of robots; none: no pictures."""
+
+    images: Images = "video"
+    """Pictures as films, or as PNG files within the tables."""
+
+    codec: Codec = "av1"
+    """What films are written with."""
+
+    size: tuple[int, int] = (320, 240)
+    """Width and height of pictures in pixels."""
+
+    rate_hz: int = 10
+    """Rows a second: 50, 25 or 10."""
+
+    def __post_init__(self) -> None:
+        for name, kind in (("version", Version), ("view", View), ("images", Images), ("codec", Codec)):
+            if (value := getattr(self, name)) not in get_args(kind):
+                raise TandemError(f"no {name} {value!r}; have: {', '.join(get_args(kind))}")
+        if self.rate_hz not in RATES_HZ:
+            raise TandemError(f"no rate of {self.rate_hz} Hz; have: {', '.join(map(str, RATES_HZ))}")
+        if len(self.size) != 2 or any(side not in SIDES_PX for side in self.size):
+            raise TandemError(f"no size; give width and height in pixels, each {SIDES_PX[0]} to {SIDES_PX[-1]}, as 320x240")
+        if self.images == "video" and any(side % 2 for side in self.size):
+            raise TandemError("films have an even number of pixels each way; give such a size, or images as png")
+
+    @property
+    def stride(self) -> int:
+        """Control steps from one row to the next."""
+        return CONTROL_HZ // self.rate_hz
+
+    def as_json(self) -> dict[str, Any]:
+        """As a file keeps it."""
+        return {**asdict(self), "cameras": list(self.cameras), "size": list(self.size)}
+
+    def cameras_of(self, robots: Sequence[str]) -> tuple[str, ...]:
+        """The cameras of a recording with these robots, as `Recording.picture` calls them."""
+        chosen: list[str] = []
+        for name in self.cameras:
+            if name not in (EGOCENTRIC, THIRD_PERSON, *robots):
+                raise TandemError(f"no camera {name!r}; have: {', '.join((EGOCENTRIC, THIRD_PERSON, *robots))}")
+            chosen.extend(robots if name == EGOCENTRIC else (name,))
+        return tuple(dict.fromkeys(chosen))
+
+
+def library(name: str) -> Any:
+    """A library of the extra, loaded when it is needed: the rest of the package does without."""
+    try:
+        return import_module(name)
+    except ImportError as error:
+        text = f"data sets are written by pyarrow and PyAV, and there is no {name}; pip install 'tandem-sim[lerobot]'"
+        raise TandemError(text) from error

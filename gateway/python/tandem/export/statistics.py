@@ -1,0 +1,87 @@
+"""Statistics of columns and pictures, with LeRobot's names. They are exact, where LeRobot itself takes quantiles from
+histograms, and means of episodes' quantiles for a whole data set.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
+
+LEVELS = 256
+
+FEWEST_SAMPLES = 100
+MOST_SAMPLES = 10_000
+SAMPLED_POWER = 0.75
+
+LARGEST_SIDE_PX = 300
+SAMPLED_SIDE_PX = 150
+
+Statistics = dict[str, Any]
+
+
+def of_numbers(values: NDArray[Any]) -> Statistics:
+    """Statistics of each column of an array."""
+    numbers = np.reshape(np.asarray(values, np.float64), (len(values), -1))
+    found: Statistics = {
+        "min": numbers.min(axis=0).tolist(),
+        "max": numbers.max(axis=0).tolist(),
+        "mean": numbers.mean(axis=0).tolist(),
+        "std": numbers.std(axis=0).tolist(),
+        "count": [len(numbers)],
+    }
+    quantiles = np.quantile(numbers, list(QUANTILES.values()), axis=0)
+    return found | {name: row.tolist() for name, row in zip(QUANTILES, quantiles, strict=True)}
+
+
+def sampled(pictures: int) -> set[int]:
+    """The pictures of an episode whose colours are counted: as many as LeRobot takes."""
+    fewest = min(FEWEST_SAMPLES, pictures)
+    count = max(fewest, min(int(pictures**SAMPLED_POWER), MOST_SAMPLES))
+    return set(np.round(np.linspace(0, pictures - 1, count)).astype(int).tolist())
+
+
+class Colours:
+    """How often each level of red, green and blue occurs in pictures."""
+
+    def __init__(self, pictures: int = 0, levels: Sequence[Sequence[int]] | None = None) -> None:
+        self.pictures = pictures
+        self.levels = np.zeros((3, LEVELS), np.int64) if levels is None else np.asarray(levels, np.int64)
+
+    def add(self, pixels: NDArray[np.uint8]) -> None:
+        """Counts a picture, or every so manieth pixel of a large one."""
+        height, width, _ = pixels.shape
+        if max(width, height) >= LARGEST_SIDE_PX:
+            factor = max(width, height) // SAMPLED_SIDE_PX
+            pixels = pixels[::factor, ::factor]
+        self.pictures += 1
+        for channel in range(3):
+            self.levels[channel] += np.bincount(pixels[..., channel].ravel(), minlength=LEVELS)
+
+    def __add__(self, other: Colours) -> Colours:
+        return Colours(self.pictures + other.pictures, (self.levels + other.levels).tolist())
+
+    def statistics(self) -> Statistics:
+        """Statistics of each channel, from 0 to 1, in the shape of pictures: channels by one by one."""
+        counted, level = self.levels, np.arange(LEVELS) / (LEVELS - 1)
+        total = counted.sum(axis=1)
+        mean = counted @ level / total
+        deviation = np.sqrt(np.maximum(counted @ level**2 / total - mean**2, 0.0))
+        below = counted.cumsum(axis=1) / total[:, None]
+
+        def at(share: float) -> NDArray[np.float64]:
+            return level[(below >= share).argmax(axis=1)]
+
+        seen = counted > 0
+        rows = {
+            "min": level[seen.argmax(axis=1)],
+            "max": level[LEVELS - 1 - seen[:, ::-1].argmax(axis=1)],
+            "mean": mean,
+            "std": deviation,
+            **{name: at(share) for name, share in QUANTILES.items()},
+        }
+        return {**{name: [[[value]] for value in row.tolist()] for name, row in rows.items()}, "count": [self.pictures]}

@@ -1,0 +1,201 @@
+"""Data sets of recordings, read by libraries that others wrote."""
+
+from __future__ import annotations
+
+import json
+import math
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import tandem
+from tandem.export import ExportSettings, export_lerobot
+from tandem.export.command_line import main
+from tandem.export.lerobot import find, splits
+
+av: Any = pytest.importorskip("av")
+parquet: Any = pytest.importorskip("pyarrow.parquet")
+
+SIZE = (160, 120)
+SETTINGS = ExportSettings(cameras=("egocentric", "third_person"), size=SIZE, codec="h264")
+EYES = "observation.images.A_egocentric"
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two episodes, of which nobody reached the end; the second is marked good."""
+    folder = tmp_path_factory.mktemp("runs")
+    for seed, steps in ((2010, 23), (2011, 40)):
+        own = folder / f"handover-{seed}"
+        own.mkdir()
+        with tandem.Episode("handover", seed, protocol="benchmark", record=own) as episode:
+            for part in (20, steps - 20):
+                episode.walk(part, [tandem.WalkMove("A", 0.3, 0.0, 0.0)])
+    (folder / "handover-2011" / "good").touch()
+    return folder
+
+
+def rows_of(data_set: Path) -> dict[str, Any]:
+    table = parquet.read_table(data_set / "data/chunk-000/file-000.parquet")
+    return {key: np.array(table[key].to_pylist()) for key in table.column_names if not key.startswith("observation.images")}
+
+
+def film(data_set: Path, key: str) -> list[NDArray[np.uint8]]:
+    with av.open(str(data_set / f"videos/{key}/chunk-000/file-000.mp4")) as container:
+        frames = list(container.decode(video=0))
+    times = [float(frame.pts * frame.time_base) for frame in frames]
+    assert times == pytest.approx([number / 10 for number in range(len(frames))])
+    return [frame.to_ndarray(format="rgb24") for frame in frames]
+
+
+def noise_ratio_db(one: NDArray[np.uint8], other: NDArray[np.uint8]) -> float:
+    error = float(np.square(one.astype(float) - other.astype(float)).mean())
+    return 10 * math.log10(255**2 / max(error, 1e-9))
+
+
+@pytest.fixture(scope="module")
+def whole(runs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    (exported,) = export_lerobot(runs, tmp_path_factory.mktemp("data") / "set", SETTINGS, jobs=2)
+    assert (exported.task, exported.episodes, exported.rows) == ("handover", 2, 5 + 8)
+    return exported.folder
+
+
+def test_rows_are_what_the_recording_holds(runs: Path, whole: Path) -> None:
+    rows = rows_of(whole)
+    info = json.loads((whole / "meta/info.json").read_text())
+    assert (info["codebase_version"], info["fps"], info["robot_type"]) == ("v3.0", 10, "unitree_g1_dex3")
+    assert (info["total_episodes"], info["total_frames"], info["splits"]) == (2, 13, {"train": "0:2"})
+    assert rows["observation.state"].shape == (13, 86)
+    assert rows["action"].shape == (13, 70)
+    for key, feature in info["features"].items():
+        assert not key.startswith("observation.images") or feature["dtype"] == "video"
+        if feature["names"] and key in rows:
+            assert rows[key].shape == (13, len(feature["names"])), key
+            assert len(set(feature["names"])) == len(feature["names"])
+    assert rows["episode_index"].tolist() == [0] * 5 + [1] * 8
+    assert rows["index"].tolist() == list(range(13))
+    second = tandem.Recording(runs / "handover-2011")
+    assert np.array_equal(rows["observation.state"][7], np.ravel(second.q_rad[10]))
+    # Joint targets are those of the step at which the next row begins, and velocities the mean until then.
+    names = info["features"]["action"]["names"]
+    told = dict(zip(names, rows["action"][7], strict=True))
+    joint = second.action_columns.index("waist_yaw_joint_rad")
+    assert told["B.waist_yaw_joint_rad"] == second.actions[15, 1, joint]
+    forward = second.action_columns.index("vx_m_s")
+    assert told["A.vx_m_s"] == pytest.approx(second.actions[11:16, 0, forward].mean())
+    objects: list[str] = info["features"]["privileged.objects_in_world"]["names"]
+    place = dict(zip(objects, rows["privileged.objects_in_world"][7], strict=True))
+    assert place["bottle.z_m"] == second.objects_in_world[10, second.objects.index("bottle"), 2]
+    assert not rows["privileged.success"].any()
+    assert not rows["privileged.phases_reached"].any()
+
+
+def test_films_show_what_the_recording_saw(runs: Path, whole: Path) -> None:
+    recording = tandem.Recording(runs / "handover-2011")
+    for key, camera in ((EYES, "A"), ("observation.images.third_person", "third_person")):
+        shown = film(whole, key)
+        assert len(shown) == 13
+        steps = (0, 20, 35)
+        for row, step in ((5, 0), (9, 20), (12, 35)):
+            ratios_db = [noise_ratio_db(shown[row], recording.picture(camera, other, size=SIZE).rgb) for other in steps]
+            assert max(ratios_db) == ratios_db[steps.index(step)] > 26, (camera, row, ratios_db)
+    episodes = parquet.read_table(whole / "meta/episodes/chunk-000/file-000.parquet").to_pylist()
+    spans = [(episode[f"videos/{EYES}/from_timestamp"], episode[f"videos/{EYES}/to_timestamp"]) for episode in episodes]
+    assert spans == [(0.0, 0.5), (0.5, 1.3)]
+    assert [episode["dataset_to_index"] for episode in episodes] == [5, 13]
+
+
+def test_statistics_are_of_all_rows(whole: Path) -> None:
+    rows, found = rows_of(whole), json.loads((whole / "meta/stats.json").read_text())
+    state = found["observation.state"]
+    assert state["count"] == [13]
+    assert np.allclose(state["mean"], rows["observation.state"].mean(axis=0))
+    assert np.allclose(state["q90"], np.quantile(rows["observation.state"].astype(float), 0.9, axis=0))
+    seen = np.stack(film(whole, EYES)) / 255
+    assert np.allclose(np.ravel(found[EYES]["mean"]), np.mean(seen, axis=(0, 1, 2)), atol=0.02)
+    assert np.array(found[EYES]["q50"]).shape == (3, 1, 1)
+    tasks = parquet.read_table(whole / "meta/tasks.parquet").to_pylist()
+    assert [row["task_index"] for row in tasks] == [0]
+    assert tasks[0]["task"].startswith("Robot A picks up the bottle")
+
+
+def test_an_export_goes_on_and_disturbs_no_other(runs: Path, whole: Path, tmp_path: Path) -> None:
+    out = tmp_path / "set"
+
+    def interrupt(done: int, total: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        export_lerobot(runs, out, SETTINGS, jobs=1, progress=interrupt)
+    assert not out.exists()
+    kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "set.partial").rglob("*.mp4")}
+    assert kept
+    with pytest.raises(tandem.TandemError, match="other recordings or settings"):
+        export_lerobot(runs, out, ExportSettings(cameras=()))
+    export_lerobot(runs, out, SETTINGS)
+    assert not (tmp_path / "set.partial").exists()
+    for path in ("data/chunk-000/file-000.parquet", f"videos/{EYES}/chunk-000/file-000.mp4", "meta/info.json"):
+        assert (out / path).read_bytes() == (whole / path).read_bytes(), path
+    export_lerobot(runs, out, SETTINGS)
+    with pytest.raises(tandem.TandemError, match="give another folder"):
+        export_lerobot(runs, out, ExportSettings(cameras=()))
+
+
+def test_a_robot_has_episodes_of_its_own_and_pictures_in_the_table(runs: Path, tmp_path: Path) -> None:
+    settings = ExportSettings(view="robot", images="png", size=(50, 35), rate_hz=25)
+    (exported,) = export_lerobot(runs, tmp_path / "set", settings, only_good=True)
+    assert (exported.episodes, exported.rows) == (2, 40)
+    info = json.loads((exported.folder / "meta/info.json").read_text())
+    assert info["splits"] == {"train": "0:2"}
+    assert info["features"]["observation.images.egocentric"]["dtype"] == "image"
+    rows = rows_of(exported.folder)
+    recording = tandem.Recording(runs / "handover-2011")
+    assert np.array_equal(rows["observation.state"][20], recording.q_rad[0, 1])
+    pictures = parquet.read_table(exported.folder / "data/chunk-000/file-000.parquet")["observation.images.egocentric"]
+    with av.open(BytesIO(pictures[23].as_py()["bytes"])) as container:
+        (frame,) = container.decode(video=0)
+    assert np.array_equal(frame.to_ndarray(format="rgb24"), recording.picture("B", 6, size=(50, 35)).rgb)
+    tasks = parquet.read_table(exported.folder / "meta/tasks.parquet").to_pylist()
+    assert [row["task"] for row in tasks] == list(recording.instructions.values())
+
+
+def test_version_2_has_files_for_each_episode(runs: Path, whole: Path, tmp_path: Path) -> None:
+    settings = ExportSettings(version="v2", size=SIZE, codec="h264")
+    (exported,) = export_lerobot(runs, tmp_path / "set", settings)
+    info = json.loads((exported.folder / "meta/info.json").read_text())
+    assert (info["codebase_version"], info["total_episodes"], info["total_videos"], info["total_chunks"]) == ("v2.1", 2, 4, 1)
+    rows = rows_of(whole)
+    for number, length in ((0, 5), (1, 8)):
+        name = {"episode_chunk": 0, "episode_index": number, "video_key": EYES}
+        table = parquet.read_table(exported.folder / info["data_path"].format(**name))
+        assert table["index"].to_pylist() == list(range(number * 5, number * 5 + length))
+        assert np.array_equal(np.array(table["action"].to_pylist()), rows["action"][rows["episode_index"] == number])
+        with av.open(str(exported.folder / info["video_path"].format(**name))) as container:
+            assert len(list(container.decode(video=0))) == length
+    for name, lines in (("tasks", 1), ("episodes", 2), ("episodes_stats", 2)):
+        assert len((exported.folder / f"meta/{name}.jsonl").read_text().splitlines()) == lines
+
+
+def test_what_cannot_be_exported_is_said(runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(tandem.TandemError, match="reached its last phase; all would"):
+        export_lerobot(runs, tmp_path / "set", only_successful=True)
+    with pytest.raises(tandem.TandemError, match="have: egocentric, third_person, A, B"):
+        export_lerobot(runs, tmp_path / "set", ExportSettings(cameras=("C",)))
+    with pytest.raises(tandem.TandemError, match="even number"):
+        ExportSettings(size=(321, 240))
+    assert main(["lerobot", "--cameras=none", str(tmp_path / "nothing"), str(tmp_path / "set2")]) == 1
+    assert "no episode.mcap in" in capsys.readouterr().err
+    assert not (tmp_path / "set2").exists()
+
+
+def test_order_and_splits(tmp_path: Path) -> None:
+    for name in ("task-10", "task-9", "b-1"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "episode.mcap").touch()
+    assert [path.parent.name for path in find(tmp_path)] == ["b-1", "task-9", "task-10"]
+    assert splits(70, 2) == {"train": "0:100", "val": "100:120", "rest": "120:140"}
+    assert splits(50, 1) == {"train": "0:50"}
