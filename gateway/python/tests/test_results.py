@@ -121,6 +121,40 @@ def test_a_callable_is_evaluated(tmp_path: Path) -> None:
         tandem.evaluate(walk_a_little, "handove", 2007)
 
 
+def test_a_policy_that_raises_leaves_its_recordings_whole(tmp_path: Path) -> None:
+    def policy(episode: tandem.Episode) -> None:
+        episode.wait(5)
+        raise ValueError("no plan for this seed")
+
+    failed = tandem.evaluate(policy, "handover", 2007, out=tmp_path, record=True)
+    with pytest.raises(ValueError, match="no plan"), tandem.Episode("handover", 2007, record=tmp_path / "alone") as episode:
+        policy(episode)
+    for folder, ended in ((tmp_path / "episodes/handover-2007", "policy_failed"), (tmp_path / "alone", "finished")):
+        recording = tandem.Recording(folder)
+        assert recording.result is not None
+        assert recording.result.ended == ended
+        assert recording.state_hashes[-1] == recording.result.state_hash
+        assert not list(folder.glob("*.partial"))
+    assert failed.tasks["handover"].policy_failed == 1
+
+
+def test_players_are_named_and_collected(tmp_path: Path) -> None:
+    shown = tandem.collect("handover", 2007, out=tmp_path, protocol="benchmark")
+    played = tandem.evaluate("expert", "handover", 2007, protocol="benchmark", assistance="full")
+    assert shown.tasks["handover"].p3 == played.tasks["handover"].p3 == 1
+    assert (
+        shown.results[0].state_hash
+        == played.results[0].state_hash
+        == tandem.Recording(tmp_path / "episodes/handover-2007").state_hashes[-1]
+    )
+    with pytest.raises(tandem.TandemError, match="have: expert, idle"):
+        tandem.evaluate("nobody", "handover", 2007)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(tandem.TandemError, match="leave `name` out"):
+        tandem.evaluate("expert", "handover", 2007, name="mine")
+    with pytest.raises(TypeError, match="have: name, protocol"):
+        tandem.evaluate("expert", "handover", 2007, seed=3)  # pyright: ignore[reportCallIssue]
+
+
 def test_other_threads_run_while_physics_does() -> None:
     counted = 0
     done = threading.Event()
