@@ -53,7 +53,12 @@ impl Observer {
     /// The colours of what the robot numbered `robot` sees after `step`, in a picture of this width and height.
     pub fn eye(&mut self, step: &Step, robot: usize, [width, height]: [u32; 2]) -> Vec<u8> {
         let camera = Camera { width, height, ..self.cameras.egocentric(step, robot) };
-        self.renderer.render_colours(step, &camera)
+        self.colours(step, &camera)
+    }
+
+    /// The colours of what any camera sees after `step`.
+    pub fn colours(&mut self, step: &Step, camera: &Camera) -> Vec<u8> {
+        self.renderer.render_colours(step, camera)
     }
 
     /// What the robots numbered `robots` see after `step`; each view is drawn the first time only, and those to draw side by side.

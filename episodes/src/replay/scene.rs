@@ -83,8 +83,8 @@ impl EpisodeRenderer {
             same_shape && size.width <= own.width
         });
         let camera = if scaled.is_some() { own } else { self.camera(view, step, size) };
-        let Frame { width, height, rgb, .. } = self.draw(step, &camera);
-        let picture = Picture::new(width, height, rgb);
+        let Camera { width, height, .. } = camera;
+        let picture = Picture::new(width, height, self.observer.colours(step, &camera));
         match scaled {
             Some(size) if [size.width, size.height] != [width, height] => {
                 let rgb = picture.scaled([size.width, size.height]).into_raw();

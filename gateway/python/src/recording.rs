@@ -102,14 +102,40 @@ impl NativeRecording {
         step: usize,
         size: Option<(u32, u32)>,
     ) -> PyResult<(Colours<'py>, Depths<'py>)> {
-        let frame = self.frame(py, camera, step, size)?;
-        let (height, width) = (frame.height as usize, frame.width as usize);
-        Ok((shaped(py, &frame.rgb, [height, width, 3])?, shaped(py, &frame.depth_m, [height, width])?))
+        let draw = |renderer: &mut EpisodeRenderer, camera, step: &Step, size| {
+            let camera = renderer.camera(camera, step, size);
+            renderer.draw(step, &camera)
+        };
+        let Frame { width, height, rgb, depth_m, .. } = self.drawn(py, camera, step, size, draw)?;
+        let (height, width) = (height as usize, width as usize);
+        Ok((shaped(py, &rgb, [height, width, 3])?, shaped(py, &depth_m, [height, width])?))
+    }
+
+    /// The colours alone, as a policy is shown them that asks for this size.
+    fn colours<'py>(
+        &self,
+        py: Python<'py>,
+        camera: &str,
+        step: usize,
+        size: Option<(u32, u32)>,
+    ) -> PyResult<Colours<'py>> {
+        let picture = self.drawn(py, camera, step, size, |renderer, camera, step, size| {
+            renderer.colours(camera, step, size)
+        })?;
+        shaped(py, &picture.rgb, [picture.height as usize, picture.width as usize, 3])
     }
 }
 
 impl NativeRecording {
-    fn frame(&self, py: Python, camera: &str, step: usize, size: Option<(u32, u32)>) -> PyResult<Frame> {
+    /// What is drawn of a step.
+    fn drawn<T: Send>(
+        &self,
+        py: Python,
+        camera: &str,
+        step: usize,
+        size: Option<(u32, u32)>,
+        draw: impl FnOnce(&mut EpisodeRenderer, EpisodeCamera, &Step, Option<PictureSize>) -> T + Send,
+    ) -> PyResult<T> {
         let spec = &self.recording.spec;
         let camera = EpisodeCamera::find(camera, spec.task).map_err(|text| failed(py, &text))?;
         let Some(step) = self.steps.get(step) else {
@@ -123,8 +149,7 @@ impl NativeRecording {
                 Some(made) => made,
                 none => none.insert(EpisodeRenderer::of(spec)?),
             };
-            let camera = renderer.camera(camera, step, size);
-            Ok(renderer.draw(step, &camera))
+            Ok(draw(renderer, camera, step, size))
         });
         drawn.map_err(|error: tandem_episodes::EpisodeError| refused(py, &error.into()))
     }

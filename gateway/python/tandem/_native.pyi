@@ -81,6 +81,7 @@ class Recording:
     def picture(
         self, camera: str, step: int, size: tuple[int, int] | None
     ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]: ...
+    def colours(self, camera: str, step: int, size: tuple[int, int] | None) -> NDArray[np.uint8]: ...
 
 class Worlds:
     def __init__(

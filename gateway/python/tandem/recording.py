@@ -233,8 +233,21 @@ class Recording:
         step: Index into the arrays; negative ones count from the end.
         size: Width and height in pixels. None: the camera's own.
         """
+        rgb, depth_m = self._native.picture(camera, self._index(step), size)
+        return Picture(rgb, depth_m)
+
+    def colours(self, camera: str, step: int, *, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
+        """Draws what a camera saw, without depth, as a policy is shown it that asks for this size: a smaller picture of the
+        same shape is the camera's own, scaled.
+
+        camera: One of `cameras`.
+        step: Index into the arrays; negative ones count from the end.
+        size: Width and height in pixels. None: the camera's own.
+        """
+        return self._native.colours(camera, self._index(step), size)
+
+    def _index(self, step: int) -> int:
         index = step + len(self) if step < 0 else step
         if not 0 <= index < len(self):
             raise IndexError(f"no step {step} in this recording; have 0 to {len(self) - 1}")
-        rgb, depth_m = self._native.picture(camera, index, size)
-        return Picture(rgb, depth_m)
+        return index

@@ -101,7 +101,7 @@ def test_films_show_what_the_recording_saw(runs: Path, whole: Path) -> None:
         assert len(shown) == 13
         steps = (0, 20, 35)
         for row, step in ((5, 0), (9, 20), (12, 35)):
-            ratios_db = [noise_ratio_db(shown[row], recording.picture(camera, other, size=SIZE).rgb) for other in steps]
+            ratios_db = [noise_ratio_db(shown[row], recording.colours(camera, other, size=SIZE)) for other in steps]
             assert max(ratios_db) == ratios_db[steps.index(step)] > 26, (camera, row, ratios_db)
     episodes = parquet.read_table(whole / "meta/episodes/chunk-000/file-000.parquet").to_pylist()
     spans = [(episode[f"videos/{EYES}/from_timestamp"], episode[f"videos/{EYES}/to_timestamp"]) for episode in episodes]
@@ -158,7 +158,7 @@ def test_a_robot_has_episodes_of_its_own_and_pictures_in_the_table(runs: Path, t
     pictures = parquet.read_table(exported.folder / "data/chunk-000/file-000.parquet")["observation.images.egocentric"]
     with av.open(BytesIO(pictures[23].as_py()["bytes"])) as container:
         (frame,) = container.decode(video=0)
-    assert np.array_equal(frame.to_ndarray(format="rgb24"), recording.picture("B", 6, size=(50, 35)).rgb)
+    assert np.array_equal(frame.to_ndarray(format="rgb24"), recording.colours("B", 6, size=(50, 35)))
     tasks = parquet.read_table(exported.folder / "meta/tasks.parquet").to_pylist()
     assert [row["task"] for row in tasks] == list(recording.instructions.values())
 

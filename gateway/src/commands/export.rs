@@ -46,8 +46,8 @@ struct LerobotArgs {
     /// Pictures as films, or as PNG files within the tables.
     #[arg(long, value_name = "KIND", default_value = "video", value_parser = ["video", "png"])]
     images: String,
-    /// What films are written with: AV1, which is smaller, or H.264, which is read faster.
-    #[arg(long, value_name = "CODEC", default_value = "av1", value_parser = ["av1", "h264"])]
+    /// What films are written with: H.264, which is written and read faster, or AV1, as LeRobot writes them itself.
+    #[arg(long, value_name = "CODEC", default_value = "h264", value_parser = ["h264", "av1"])]
     codec: String,
     /// Size of the pictures.
     #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "320x240")]

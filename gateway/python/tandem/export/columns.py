@@ -121,6 +121,8 @@ def columns(recording: Recording, view: View, rows: NDArray[np.int64], stride: i
     phases = np.searchsorted(np.asarray(reached_s), time_s + 1e-6, side="right").astype(np.int64)
     success = np.full(len(rows), is_successful(recording))
     of_joints = {"velocity_rad_s": recording.qd_rad_s, "torque_n_m": recording.torque_n_m}
+    wrists = [index for index, joint in enumerate(recording.joints) if "_wrist_" in joint]
+    wrist_joints = tuple(recording.joints[index] for index in wrists)
     return {
         STATE: of_robots(recording.q_rad[rows], joints),
         ACTION: of_robots(told(recording, rows, stride), recording.action_columns),
@@ -128,6 +130,7 @@ def columns(recording: Recording, view: View, rows: NDArray[np.int64], stride: i
         f"{PRIVILEGED}pelvis_in_world": of_robots(recording.pelvis_in_world[rows], POSE),
         f"{PRIVILEGED}wrists_in_world": of_robots(recording.wrists_in_world[rows], HANDS, POSE),
         f"{PRIVILEGED}wrist_force_n": of_robots(recording.hand_force_n[rows], HANDS, AXES),
+        f"{PRIVILEGED}wrist_torque_n_m": of_robots(recording.torque_n_m[rows][..., wrists], wrist_joints),
         f"{PRIVILEGED}contact_force_n": of_robots(recording.contact_force_n[rows], HANDS, objects, PARTS, AXES),
         f"{PRIVILEGED}grips": of_robots(recording.grips[rows].astype(np.int64), HANDS, objects),
         f"{PRIVILEGED}objects_in_world": of_objects(recording.objects_in_world[rows], POSE),

@@ -27,7 +27,7 @@ def parser() -> argparse.ArgumentParser:
     lerobot.add_argument("--view", choices=("joint", "robot"), default="joint")
     lerobot.add_argument("--cameras", default="egocentric", metavar="CAMERAS")
     lerobot.add_argument("--images", choices=("video", "png"), default="video")
-    lerobot.add_argument("--codec", choices=("av1", "h264"), default="av1")
+    lerobot.add_argument("--codec", choices=("h264", "av1"), default="h264")
     lerobot.add_argument("--size", default="320x240", metavar="WIDTHxHEIGHT")
     lerobot.add_argument("--rate", type=int, choices=RATES_HZ, default=10)
     lerobot.add_argument("--only-successful", action="store_true")

@@ -61,6 +61,7 @@ class Source:
     success: bool
     state_hash: str
     build: str
+    spec: dict[str, Any]
 
 
 def export_lerobot(
@@ -134,9 +135,9 @@ def _source(path: Path, root: Path) -> Source:
     name = path.name if path == root else path.relative_to(root).as_posix()
     if len(recording) < 2:
         raise TandemError(f"{path} has no step; leave it out")
-    return Source(
-        path, name, recording.task, recording.seed, is_successful(recording), recording.state_hashes[-1], recording.build
-    )
+    success, last = is_successful(recording), recording.state_hashes[-1]
+    spec = {key: value for key, value in recording.spec.items() if key != "seed"}
+    return Source(path, name, recording.task, recording.seed, success, last, recording.build, spec)
 
 
 def _export(
@@ -257,12 +258,17 @@ def _write_about(
     recordings = [
         {"recording": source.name, "seed": source.seed, "success": source.success, "build": source.build} for source in sources
     ]
+    specs: list[dict[str, Any]] = []
+    for source in sources:
+        if source.spec not in specs:
+            specs.append(source.spec)
     about = {
         "task": sources[0].task,
         "episodes": len(parts),
         "rows": rows,
         "successes": sum(source.success for source in sources),
         "builds": builds,
+        "specs": specs,
         "instructions": parts[0].about["instructions"],
         "splits": names,
         "recordings": recordings,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ import numpy as np
 
 from ..recording import Recording
 from .columns import Column, View, columns, is_successful, moments, views
-from .pictures import Pixels, png, write_film
+from .pictures import Film, png
 from .settings import ExportSettings, library
 from .statistics import Colours, sampled
 
@@ -100,17 +99,31 @@ def _make(recording: Recording, view: View, source: str, folder: Path, settings:
     held = columns(recording, view, rows, settings.stride)
     features = {key: column.feature() for key, column in held.items()}
     width, height = settings.size
-    colours: dict[str, Colours] = {}
+    colours = {key: Colours() for key in view.cameras}
     files: dict[str, list[bytes]] = {}
-    for key, camera in view.cameras.items():
-        counted = colours[key] = Colours()
-        drawn = _draw(recording, camera, rows.tolist(), settings, counted, stop)
+    films: dict[str, Film] = {}
+    for key in view.cameras:
         if settings.images == "video":
-            write_film(folder / f"{key}.mp4", drawn, settings.size, settings.rate_hz, settings.codec)
+            films[key] = Film(folder / f"{key}.mp4", settings.size, settings.rate_hz, settings.codec)
         else:
-            files[key] = [png(pixels) for pixels in drawn]
+            files[key] = []
         kind = "video" if settings.images == "video" else "image"
         features[key] = {"dtype": kind, "shape": [height, width, 3], "names": ["height", "width", "channels"]}
+    counted = sampled(len(rows))
+    for number, step in enumerate(rows.tolist()):
+        if stop.is_set():
+            raise Stopped
+        # All cameras of a moment one after another: they share its shadows.
+        for key, camera in view.cameras.items():
+            pixels = recording.colours(camera, step, size=settings.size)
+            if number in counted:
+                colours[key].add(pixels)
+            if key in films:
+                films[key].add(pixels)
+            else:
+                files[key].append(png(pixels))
+    for film in films.values():
+        film.finish()
     _write_rows(folder / ROWS_FILE, held, files)
     about = {
         "recording": source,
@@ -127,19 +140,6 @@ def _make(recording: Recording, view: View, source: str, folder: Path, settings:
         "colours": {key: {"pictures": seen.pictures, "levels": seen.levels.tolist()} for key, seen in colours.items()},
     }
     write_whole(folder / PART_FILE, json.dumps(about))
-
-
-def _draw(
-    recording: Recording, camera: str, rows: list[int], settings: ExportSettings, colours: Colours, stop: threading.Event
-) -> Generator[Pixels, None, None]:
-    counted = sampled(len(rows))
-    for number, step in enumerate(rows):
-        if stop.is_set():
-            raise Stopped
-        pixels = recording.picture(camera, step, size=settings.size).rgb
-        if number in counted:
-            colours.add(pixels)
-        yield pixels
 
 
 def _write_rows(path: Path, held: dict[str, Column], files: dict[str, list[bytes]]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
 from fractions import Fraction
 from io import BytesIO
 from pathlib import Path
@@ -28,23 +27,34 @@ ENCODERS: dict[Codec, tuple[str, dict[str, str]]] = {
 }
 
 
-def write_film(path: Path, pictures: Iterable[Pixels], size: tuple[int, int], rate_hz: int, codec: Codec) -> None:
-    """Writes a film; what is at `path` is whole."""
-    # The encoder of AV1 tells its settings to everybody's terminal.
-    os.environ.setdefault("SVT_LOG", "1")
-    av = library("av")
-    encoder, options = ENCODERS[codec]
-    partial = path.with_suffix(".partial")
-    with av.open(str(partial), "w", format="mp4") as film:
-        stream = film.add_stream(encoder, rate=rate_hz, options={**options, "g": str(KEY_FRAME_EVERY)})
-        stream.width, stream.height = size
-        stream.pix_fmt = "yuv420p"
-        for number, pixels in enumerate(pictures):
-            frame = av.VideoFrame.from_ndarray(pixels, format="rgb24")
-            frame.pts, frame.time_base = number, Fraction(1, rate_hz)
-            film.mux(stream.encode(frame))
-        film.mux(stream.encode(None))
-    partial.replace(path)
+class Film:
+    """A film under way; what is at `path` in the end is whole."""
+
+    def __init__(self, path: Path, size: tuple[int, int], rate_hz: int, codec: Codec) -> None:
+        # The encoder of AV1 tells its settings to everybody's terminal.
+        os.environ.setdefault("SVT_LOG", "1")
+        self._av = library("av")
+        encoder, options = ENCODERS[codec]
+        self._path, self._partial = path, path.with_suffix(".partial")
+        self._time_base = Fraction(1, rate_hz)
+        self._pictures = 0
+        self._container: Any = self._av.open(str(self._partial), "w", format="mp4")
+        self._stream = self._container.add_stream(encoder, rate=rate_hz, options={**options, "g": str(KEY_FRAME_EVERY)})
+        self._stream.width, self._stream.height = size
+        self._stream.pix_fmt = "yuv420p"
+
+    def add(self, pixels: Pixels) -> None:
+        """Writes the next picture."""
+        frame = self._av.VideoFrame.from_ndarray(pixels, format="rgb24")
+        frame.pts, frame.time_base = self._pictures, self._time_base
+        self._pictures += 1
+        self._container.mux(self._stream.encode(frame))
+
+    def finish(self) -> None:
+        """Writes the end, and puts the film where it belongs."""
+        self._container.mux(self._stream.encode(None))
+        self._container.close()
+        self._partial.replace(self._path)
 
 
 def join_films(path: Path, parts: list[tuple[Path, int]], rate_hz: int) -> None:

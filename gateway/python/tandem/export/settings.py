@@ -12,7 +12,7 @@ from ..errors import TandemError
 Version: TypeAlias = Literal["v3", "v2"]
 View: TypeAlias = Literal["joint", "robot"]
 Images: TypeAlias = Literal["video", "png"]
-Codec: TypeAlias = Literal["av1", "h264"]
+Codec: TypeAlias = Literal["h264", "av1"]
 
 RATES_HZ = (50, 25, 10)
 CONTROL_HZ = 50
@@ -39,8 +39,8 @@ class ExportSettings:
     images: Images = "video"
     """Pictures as films, or as PNG files within the tables."""
 
-    codec: Codec = "av1"
-    """What films are written with."""
+    codec: Codec = "h264"
+    """What films are written with: H.264, which is written and read faster, or AV1, as LeRobot writes them itself."""
 
     size: tuple[int, int] = (320, 240)
     """Width and height of pictures in pixels."""

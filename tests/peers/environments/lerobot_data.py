@@ -1,0 +1,148 @@
+"""LeRobot's own classes and trainer read what `tandem export lerobot` writes; so do `datasets` and PyArrow without LeRobot.
+
+    pip install -r tests/peers/environments/lerobot_data.txt        (Python 3.12)
+    pip install "./gateway/python[lerobot]"
+    python tests/peers/environments/lerobot_data.py
+
+Two demonstrations of Handover are recorded and exported with both codecs, as PNG, for each robot, and as version 2.1, which
+LeRobot's own converter takes over. Ten rows of each are drawn again from the recording and compared with what LeRobot reads; its
+statistics of the same rows are compared with ours; `lerobot-train` trains an ACT for two steps.
+"""
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import datasets
+import numpy as np
+import torch
+from lerobot.datasets.compute_stats import compute_episode_stats
+from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+import tandem
+from tandem.export import ExportSettings, export_lerobot
+
+PROGRAMS = Path(sys.executable).parent
+SEEDS = (2000, 2001)
+SAMPLES = 10
+# What the codecs lose at their settings; PNG loses nothing.
+LEAST_DB = {"av1": 30.0, "h264": 30.0, "png": 90.0}
+ACT = {
+    "dim_model": 64,
+    "n_heads": 2,
+    "dim_feedforward": 128,
+    "chunk_size": 10,
+    "n_action_steps": 10,
+    "pretrained_backbone_weights": "null",
+    "device": "cpu",
+    "push_to_hub": "false",
+}
+
+
+def noise_ratio_db(one, other):
+    error = np.mean((one.astype(float) - other.astype(float)) ** 2)
+    return 10 * np.log10(255**2 / max(error, 1e-9))
+
+
+def opened(folder):
+    return LeRobotDataset("local/handover", root=folder, video_backend="pyav")
+
+
+def compare(name, folder, recordings, stride, robot=None):
+    """Rows that LeRobot reads against the recordings."""
+    data_set = opened(folder)
+    worst_db = np.inf
+    for row in np.linspace(0, len(data_set) - 1, SAMPLES).astype(int):
+        item = data_set[int(row)]
+        episode, frame = item["episode_index"].item(), item["frame_index"].item()
+        a_recording = 1 if robot is None else 2
+        recording, step = recordings[episode // a_recording], frame * stride
+        own = slice(None) if robot is None else episode % a_recording
+        assert np.array_equal(item["observation.state"].numpy(), np.ravel(recording.q_rad[step, own])), (name, row)
+        assert item["task"] == (recording.instruction if robot is None else recording.instructions[recording.robots[own]]), (
+            item["task"]
+        )
+        for key in data_set.meta.camera_keys:
+            camera = key.removeprefix("observation.images.").removesuffix("_egocentric")
+            if camera == "egocentric":
+                camera = recording.robots[own]
+            height, width = item[key].shape[1:]
+            shown = np.round(item[key].numpy().transpose(1, 2, 0) * 255).astype(np.uint8)
+            worst_db = min(worst_db, noise_ratio_db(shown, recording.colours(camera, step, size=(width, height))))
+    print(f"{name}: {data_set.num_episodes} episodes, {len(data_set)} rows, pictures at least {worst_db:.1f} dB")
+    return data_set, worst_db
+
+
+def compare_statistics(data_set):
+    """LeRobot's statistics of the state of an episode against ours, whose quantiles are exact."""
+    rows = data_set.hf_dataset.with_format("numpy")
+    first = np.stack([rows[index]["observation.state"] for index in range(data_set.meta.episodes[0]["length"])])
+    theirs = compute_episode_stats({"observation.state": first}, data_set.meta.features)["observation.state"]
+    import pyarrow.parquet as parquet
+
+    ours = parquet.read_table(data_set.root / "meta/episodes/chunk-000/file-000.parquet").to_pylist()[0]
+    for name, value in theirs.items():
+        tolerance = 0.02 if name.startswith("q") else 1e-4
+        assert np.allclose(value, ours[f"stats/observation.state/{name}"], atol=tolerance), name
+    print("statistics are as LeRobot's:", ", ".join(theirs))
+
+
+def train(folder, out):
+    command = [
+        PROGRAMS / "lerobot-train",
+        "--dataset.repo_id=local/handover",
+        f"--dataset.root={folder}",
+        "--dataset.video_backend=pyav",
+        "--policy.type=act",
+        *(f"--policy.{name}={value}" for name, value in ACT.items()),
+        "--batch_size=2",
+        "--steps=2",
+        "--num_workers=0",
+        "--save_checkpoint=false",
+        f"--output_dir={out}",
+    ]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0 and "End of training" in done.stderr + done.stdout, done.stderr
+    print("lerobot-train: two steps of ACT")
+
+
+def converted(folder):
+    """LeRobot's own converter makes version 3.0 of version 2.1."""
+    module = "lerobot.scripts.convert_dataset_v21_to_v30"
+    command = [sys.executable, "-m", module, "--repo-id=local/handover", f"--root={folder}", "--push-to-hub=false"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def main():
+    torch.set_num_threads(1)
+    with tempfile.TemporaryDirectory() as scratch:
+        scratch = Path(scratch)
+        runs = scratch / "runs"
+        seeds = f"{SEEDS[0]}-{SEEDS[-1]}"
+        tandem.main(["collect", "--tasks", "handover", "--seeds", seeds, "--protocol", "benchmark", "--out", str(runs)])
+        recordings = [tandem.Recording(runs / f"episodes/handover-{seed}") for seed in SEEDS]
+        cases = {
+            "av1": (ExportSettings(cameras=("egocentric", "third_person")), None),
+            "h264": (ExportSettings(codec="h264", rate_hz=25, size=(160, 120)), None),
+            "png": (ExportSettings(images="png", size=(160, 120)), None),
+            "robot": (ExportSettings(view="robot"), True),
+            "v2": (ExportSettings(version="v2", size=(160, 120)), None),
+        }
+        for name, (settings, robot) in cases.items():
+            (exported,) = export_lerobot(runs, scratch / name, settings, only_successful=True)
+            folder = converted(exported.folder) if name == "v2" else exported.folder
+            data_set, worst_db = compare(name, folder, recordings, settings.stride, robot)
+            assert worst_db > LEAST_DB.get(name, LEAST_DB["av1"]), (name, worst_db)
+            if name == "av1":
+                compare_statistics(data_set)
+                train(folder, scratch / "trained")
+                rows = datasets.load_dataset(str(folder), split="train")
+                assert len(rows) == len(data_set) and len(rows[0]["action"]) == 70, rows
+                print("datasets:", rows.column_names)
+
+
+if __name__ == "__main__":
+    main()
