@@ -83,8 +83,10 @@ def compare_statistics(data_set):
 
     ours = parquet.read_table(data_set.root / "meta/episodes/chunk-000/file-000.parquet").to_pylist()[0]
     for name, value in theirs.items():
-        tolerance = 0.02 if name.startswith("q") else 1e-4
-        assert np.allclose(value, ours[f"stats/observation.state/{name}"], atol=tolerance), name
+        # Theirs come from histograms, and from sums of squares in single precision.
+        tolerance = {"q": 0.02, "s": 5e-3}.get(name[0], 1e-4)
+        error = np.abs(np.ravel(value) - np.ravel(ours[f"stats/observation.state/{name}"])).max()
+        assert error <= tolerance, (name, error)
     print("statistics are as LeRobot's:", ", ".join(theirs))
 
 
