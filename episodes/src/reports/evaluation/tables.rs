@@ -90,7 +90,7 @@ fn floors(floors: &[TaskFloor]) -> Table {
     let high = match &named[..] {
         [] => "Of none of these tasks it is above 50 %.".into(),
         named => format!(
-            "It is above 50 % of {}: there a high rate says little of what a policy sees, and `--spread 2` or `4` more.",
+            "It is above 50 % of {}: there a high rate says little of what a policy sees; one with `--spread 2` or `4` says more.",
             named.join(", ")
         ),
     };
