@@ -17,7 +17,8 @@ The map, whose pictures, states and actions are those that the policy was traine
     [chunk]
     rate_hz = 30.0
 
-A policy that remembers what it saw, as LeRobot's diffusion policy does, needs a server for each robot, and --jobs 1.
+It is for policies that decide by what they see at the moment, as ACT, pi0.5 and SmolVLA do, and not for those that put several
+moments together, as diffusion does: one server is asked by all robots and worlds in turn.
 """
 
 import argparse
@@ -36,7 +37,10 @@ def load(name, device):
     from lerobot.policies.factory import get_policy_class, make_pre_post_processors
     from lerobot.policies.utils import prepare_observation_for_inference
 
-    policy = get_policy_class(PreTrainedConfig.from_pretrained(name).type).from_pretrained(name).to(device).eval()
+    config = PreTrainedConfig.from_pretrained(name)
+    if config.n_obs_steps > 1:
+        raise SystemExit(f"{name} looks at {config.n_obs_steps} moments together; serve a policy that looks at one")
+    policy = get_policy_class(config.type).from_pretrained(name).to(device).eval()
     on_device = {"device_processor": {"device": device}}
     before, after = make_pre_post_processors(policy.config, pretrained_path=name, preprocessor_overrides=on_device)
 

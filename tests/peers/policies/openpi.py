@@ -7,6 +7,7 @@ openpi's `websocket_policy_server`. Its client is tried on the same server first
 """
 
 import threading
+import time
 import traceback
 
 import numpy as np
@@ -18,7 +19,7 @@ from arm_raise import JOINTS, ArmRaise, evaluate, tandem_of_command_line
 INTERNAL_ERROR = 1011
 
 
-def serve(policy):
+def serve(policy, **settings):
     """A server of `policy` on a free port: metadata first, then an answer to each message, or a traceback as text."""
 
     def handle(socket):
@@ -36,7 +37,7 @@ def serve(policy):
                 socket.close(INTERNAL_ERROR, "Internal server error. Traceback included in previous frame.")
                 return
 
-    server = websockets.sync.server.serve(handle, "127.0.0.1", 0, compression=None, max_size=None)
+    server = websockets.sync.server.serve(handle, "127.0.0.1", 0, compression=None, max_size=None, **settings)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     return server.socket.getsockname()[1]
 
@@ -47,6 +48,15 @@ class Forgetful(ArmRaise):
     def infer(self, observation):
         if len(self.seen) == 3:
             raise RuntimeError("lost its weights")
+        return super().infer(observation)
+
+
+class Slow(ArmRaise):
+    """Thinks for long at its third request."""
+
+    def infer(self, observation):
+        if len(self.seen) == 2:
+            time.sleep(20)
         return super().infer(observation)
 
 
@@ -72,6 +82,14 @@ def main():
     [episode] = results["episodes"]
     assert episode["note"].endswith("failed: RuntimeError: lost its weights"), episode["note"]
     print(f"failing    {episode['note']}")
+
+    # A server asks whether anybody is there while its client waits for the other robot's server, as websockets does each 20 s.
+    asking = {"ping_interval": 6, "ping_timeout": 6}
+    urls = ",".join(f"ws://127.0.0.1:{serve(policy, **asking)}" for policy in (ArmRaise(), Slow()))
+    results, _ = evaluate(tandem, "--protocol", "benchmark", "--policy", f"openpi:{urls}")
+    [episode] = results["episodes"]
+    assert (episode["ended"], episode["env_steps"]) == ("step_budget_exhausted", 1000), episode
+    print("waiting    both servers are there to the end")
 
 
 if __name__ == "__main__":

@@ -29,14 +29,15 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "environments"))
 from demonstration import SEED, TASK, rows
 
 CHUNK = 20
+THINKS_S = 12.0
 PARTS = {"left_arm_joint_state": 0, "right_arm_joint_state": 7, "left_ee_joint_state": 14, "right_ee_joint_state": 21}
 
 
 class Model:
     """As XPolicyLab's models: `reset`, `update_obs`, `get_action`; one for all robots, told apart by their words."""
 
-    def __init__(self, told):
-        self.told, self.looks, self.resets = told, {}, 0
+    def __init__(self, told, thinks_s=0.0):
+        self.told, self.looks, self.resets, self.thinks_s = told, {}, 0, thinks_s
 
     def reset(self):
         self.resets += 1
@@ -52,6 +53,7 @@ class Model:
     def get_action(self):
         robot = 0 if "Take the bottle" in self.words else 1
         look = self.looks[robot] = self.looks.get(robot, -1) + 1
+        time.sleep(self.thinks_s if look == 1 else 0.0)
         at = np.minimum(np.arange(look * CHUNK, (look + 1) * CHUNK), len(self.told) - 1)
         return [{part: row[begin : begin + 7] for part, begin in PARTS.items()} for row in self.told[at, robot]]
 
@@ -96,6 +98,14 @@ def until_closed(heard):
         time.sleep(0.01)
 
 
+def evaluate(tandem, urls, out):
+    """The one episode that is asked for, as the results have it."""
+    command = [tandem, "evaluate", "--tasks", TASK, "--seeds", str(SEED), "--protocol", "benchmark"]
+    subprocess.run([*command, "--policy", f"xpolicylab:{urls}", "--out", out], check=True)
+    [episode] = json.loads((out / "results.json").read_text())["episodes"]
+    return episode
+
+
 def main():
     tandem = tandem_of_command_line()
     with tempfile.TemporaryDirectory() as folder:
@@ -112,16 +122,19 @@ def main():
         until_closed(heard)
         heard.clear()
 
-        command = [tandem, "evaluate", "--tasks", TASK, "--seeds", str(SEED), "--protocol", "benchmark"]
-        subprocess.run([*command, "--policy", f"xpolicylab:{url}", "--out", Path(folder) / "asked"], check=True)
-        results = json.loads((Path(folder) / "asked" / "results.json").read_text())
-    [episode] = results["episodes"]
-    until_closed(heard)
+        episode = evaluate(tandem, url, Path(folder) / "shared")
+        until_closed(heard)
+        # A server for each robot, one of which thinks for long; the other one hears that somebody is there still.
+        alone = []
+        urls = [serve(Model(model.told), alone), serve(Model(model.told, THINKS_S), [])]
+        apart = evaluate(tandem, ",".join(urls), Path(folder) / "apart")
     print("heard", *dict.fromkeys(heard), "resets", model.resets)
     assert heard[:6] == ["hello", "prepare_case", "reset", "infer", "trial_end", "reset"], heard[:6]
     assert set(heard[6:-2]) == {"infer"} and heard[-2:] == ["trial_end", "close"], heard
     print(json.dumps(episode["phases"]), episode["ended"], episode["env_steps"])
     assert "p1" in episode["phases"], episode
+    print(json.dumps(apart["phases"]), "heartbeats", alone.count("heartbeat"))
+    assert "p1" in apart["phases"] and "heartbeat" in alone, (apart, alone)
 
 
 if __name__ == "__main__":

@@ -67,6 +67,10 @@ impl PolicyClient for Openpi {
 
 #[cfg(test)]
 mod tests {
+    use std::{net::TcpListener, thread};
+
+    use tungstenite::Message;
+
     use super::*;
 
     #[test]
@@ -78,5 +82,28 @@ mod tests {
         let error = opened.err().unwrap();
         assert!(matches!(error, RemoteError::Unreachable { .. }), "{error}");
         assert!(error.to_string().ends_with("it says nothing within 1 s of the connection"), "{error}");
+    }
+
+    #[test]
+    fn a_ping_between_requests_is_answered() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let url = format!("ws://{}", listener.local_addr().unwrap());
+        let server = thread::spawn(move || {
+            let mut socket = tungstenite::accept(listener.accept().unwrap().0).unwrap();
+            let metadata = b"\x80".to_vec();
+            socket.send(Message::binary(metadata)).unwrap();
+            socket.send(Message::Ping("there?".into())).unwrap();
+            socket.read().unwrap()
+        });
+        let within = Duration::from_secs(5);
+        let mut link = Openpi::connect(&url, within, within).unwrap();
+        for _ in 0..500 {
+            if server.is_finished() {
+                break;
+            }
+            link.keep_alive();
+        }
+        assert!(server.is_finished(), "no answer to a ping");
+        assert_eq!(server.join().unwrap(), Message::Pong("there?".into()));
     }
 }
