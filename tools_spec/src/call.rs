@@ -231,8 +231,11 @@ fn beside<T: DeserializeOwned + Default>(
 pub fn specs_for_programs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
     let wording = wording.into();
     let mut specs = every_tool_spec(wording);
+    let commands = specs.iter().filter(|spec| SendPlan::COMMANDS.contains(&spec.name));
+    let planned: Vec<Value> = commands.map(ToolSpec::as_planned).collect();
     for spec in &mut specs {
         match spec.name {
+            SendPlan::NAME => spec.demand_of_commands(planned.clone()),
             StartEpisode::NAME => {
                 spec.allow(&properties::<Driving>(wording));
                 spec.demand_one_of(Driving::conditions());

@@ -67,6 +67,12 @@ pub fn at_least_one(fields: &[&str]) -> Value {
     json!([{ "anyOf": given }])
 }
 
+/// `not` of an object of whose fields only one is given, each with the type that it has where it is not null.
+pub fn all_of(fields: &[(&str, &str)]) -> Value {
+    let given: Vec<Value> = fields.iter().map(|(field, kind)| has(field, kind)).collect();
+    json!({ "allOf": given })
+}
+
 fn has(field: &str, kind: &str) -> Value {
     json!({ "required": [field], "properties": { field: { "type": kind } } })
 }

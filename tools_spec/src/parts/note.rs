@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::error::SpecError;
-use crate::limits::ROBOT_PATTERN;
+use crate::limits::{ROBOT_PATTERN, one_of};
 use crate::tool::read_as;
 
 /// The most characters of a note: more than a model says in one go.
@@ -75,6 +75,14 @@ pub struct TokenCount {
 impl Note {
     /// What refusals call it.
     pub const NAME: &str = "notes";
+
+    /// What a note has, at least one of them.
+    pub(crate) fn conditions() -> Value {
+        let mut used = one_of(&[("tokens", "object"), ("usd", "number"), ("seconds", "number")]);
+        let words = json!({ "properties": { "text": { "minLength": 1 } } });
+        used.as_array_mut().into_iter().for_each(|used| used.insert(0, words.clone()));
+        used
+    }
 
     /// A note that works.
     pub fn example() -> Note {

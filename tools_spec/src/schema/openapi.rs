@@ -65,7 +65,8 @@ fn tool(spec: &ToolSpec) -> Value {
 
 /// Answered without a body.
 fn note() -> Value {
-    let schema = body_schema::<Note>(Wording::from(Hints::On));
+    let mut schema = body_schema::<Note>(Wording::from(Hints::On));
+    schema["anyOf"] = Note::conditions();
     let description = schema["description"].as_str().unwrap_or_default().to_owned();
     let mut note = operation("note", &description, "204", Value::Null);
     note["responses"]["204"] = json!({ "description": "Kept." });

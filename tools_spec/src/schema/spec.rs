@@ -107,6 +107,18 @@ impl ToolSpec {
         self.marked_body["anyOf"] = conditions;
     }
 
+    /// What a command of a plan has to be where it names this tool.
+    pub(crate) fn as_planned(&self) -> Value {
+        let mut arguments = self.marked_body.clone();
+        arguments.as_object_mut().and_then(|arguments| arguments.shift_remove("$schema"));
+        json!({ "properties": { "tool": { "const": self.name }, "arguments": arguments } })
+    }
+
+    /// Lets the commands of a plan be only what fits one of these schemas, too.
+    pub(crate) fn demand_of_commands(&mut self, planned: Vec<Value>) {
+        self.marked_body["properties"]["commands"]["items"]["anyOf"] = planned.into();
+    }
+
     /// JSON Schema of a REST body, which need not be strict: what may be null may be left out, and lengths are said. A command
     /// may have up to `most_steps` control steps.
     pub fn body_schema(&self, most_steps: u32) -> Value {

@@ -25,6 +25,7 @@ pub struct Walk {
 /// What one robot's base is to do. start_episode names the range of each field; values beyond it are clamped and reported.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("not" = limits::all_of(&[("waist_yaw_rad", "number"), ("look_at_m", "array")])))]
 pub struct WalkMove {
     /// The robot, as "A".
     #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]

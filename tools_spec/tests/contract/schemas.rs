@@ -305,6 +305,21 @@ fn openapi_says_what_is_refused() {
     assert_eq!(field("query_depth", "/pixels/maxItems"), 256);
     assert_eq!(field("send_joint_chunk", "/robots/anyOf").as_array().map(Vec::len), Some(50));
     assert_eq!(field("observe", "/robots/uniqueItems"), true);
+    let both = field("walk", "/robots/items/not/allOf");
+    assert_eq!(
+        [&both[0]["required"], &both[1]["required"]],
+        [&json!(["waist_yaw_rad"]), &json!(["look_at_m"])]
+    );
+    let planned = field("send_plan", "/commands/items/anyOf");
+    let wait =
+        planned.as_array().into_iter().flatten().find(|of| of["properties"]["tool"]["const"] == "wait");
+    let arguments = &wait.expect("a plan may wait")["properties"]["arguments"];
+    assert_eq!(arguments["required"], json!(["steps"]));
+    assert_eq!(arguments["properties"]["steps"]["maximum"], 50);
+    let note = &document["paths"]["/v1/episodes/{episode_id}/notes"]["post"]["requestBody"];
+    let says = &note["content"]["application/json"]["schema"]["anyOf"];
+    assert_eq!(says[0]["properties"]["text"]["minLength"], 1);
+    assert_eq!(says[1]["required"], json!(["tokens"]));
 }
 
 #[test]
