@@ -21,7 +21,7 @@ import zmq
 
 from arm_raise import RAISED_RAD, evaluate, tandem_of_command_line
 
-sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "environments"))
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "harnesses"))
 from demonstration import SEED, TASK, rows
 
 BRIDGE = pathlib.Path(__file__).resolve().parents[3] / "gateway/examples/bridges/gr00t_zmq.py"

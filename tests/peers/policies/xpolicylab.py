@@ -25,7 +25,7 @@ from inspect_robots_xpolicylab._protocol import Frame, MessageType, decode_frame
 
 from arm_raise import tandem_of_command_line
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "environments"))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "harnesses"))
 from demonstration import SEED, TASK, rows
 
 CHUNK = 20

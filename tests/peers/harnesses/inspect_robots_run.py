@@ -1,8 +1,8 @@
 """`inspect-robots` of the harness Inspect Robots runs Handover twice: with a policy of its own kind, and with its language model's agent.
 
-    pip install -r tests/peers/environments/inspect_robots.txt
+    pip install -r tests/peers/harnesses/inspect_robots.txt
     pip install "./gateway/python[inspect-robots]"
-    python tests/peers/environments/inspect_robots_run.py
+    python tests/peers/harnesses/inspect_robots_run.py
 
 The policy tells the robots what an expert told them in this episode, in chunks of 20 rows, and reaches
 every phase. The model behind the agent is a script that names the expert's targets of every sixth row in a call of `move_joints`, and

@@ -1,8 +1,8 @@
 """OpenEnv's client plays Handover on its server: `reset`, `step` and `state`, and two sessions side by side.
 
-    pip install -r tests/peers/environments/openenv.txt
+    pip install -r tests/peers/harnesses/openenv.txt
     pip install "./gateway/python[openenv]"
-    python tests/peers/environments/openenv_run.py
+    python tests/peers/harnesses/openenv_run.py
 
 The policy tells the robots by `send_joint_chunk` what an expert told them in this episode, and reaches every phase.
 """

@@ -1,8 +1,8 @@
 """`vla-eval run` of the harness vla-eval evaluates a policy behind its own wire in Handover, without containers.
 
-    pip install -r tests/peers/environments/vla_eval.txt
+    pip install -r tests/peers/harnesses/vla_eval.txt
     pip install "./gateway/python[gym]"
-    python tests/peers/environments/vla_eval_run.py
+    python tests/peers/harnesses/vla_eval_run.py
 
 The policy is a model server of the harness's own that tells the robots what an expert told them in the first of two episodes, in
 chunks of 20 rows. It reaches every phase there, and does not see where the bottle stands in the other.
