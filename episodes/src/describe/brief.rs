@@ -2,7 +2,8 @@
 
 use tandem_tools_spec::{Assistance, BaseLimits, Brief, Hints, Wording};
 
-use super::grips::grips;
+use super::grips::grips_for;
+use crate::tasks::Task;
 
 const FRAMES: &str = "Poses of wrists and camera, and points of query_depth, are in the robot's own pelvis frame as it is at that \
     moment: x forward, y left, z up, metres. Quaternions are [w, x, y, z].";
@@ -52,7 +53,8 @@ const CARRYING: &str = " To push, and to carry together: grip, and lift what is 
     is to move, in its own start frame (room says how these lie to each other: a partner who faces you goes to its left where you go to \
     your right). Hands keep their places to the robots and their height; 450 steps a metre. To set down, bring the wrists down again by \
     steps of 0.03 m with compliance_n_s_m 250 once both stand: a thing has touched when force_n along z falls towards 0, as from -4.4 to \
-    -2.0. Then open.";
+    -2.0. Open as you are, with compliance_n_s_m 250 and the wrist poses that the last reply tells, until grip is \"none\", and only \
+    then leave over the stops: a hand that turns stiff while it holds pulls its robot from where it stands.";
 
 const NAMED_FRAMES: &str = " Tools that take `frame` know \"pelvis\"; \"level\", the same but upright: z against gravity, x the way the robot \
     faces (a robot that crouches or carries leans by up to 0.1 rad, which is 7 cm at arm's length); and \"start\", which lies on the \
@@ -68,8 +70,8 @@ const WALKING: &str = "A robot that is told to walk gains way after 0.3 to 0.5 s
     hands or a partner pull it, drifts and sinks by 10 cm. Then free what pulls: loosen wrist targets, give way with compliance_n_s_m, or \
     walk the way it is pulled. Arms that reach more than 0.35 m ahead make a robot step, too: walk nearer instead.";
 
-/// The brief of an episode in the words that its policy reads, where robots follow base commands within `limits`.
-pub fn brief(wording: Wording, limits: &BaseLimits) -> Brief {
+/// The brief of an episode of `task` in the words that its policy reads, where robots follow base commands within `limits`.
+pub fn brief(task: &Task, wording: Wording, limits: &BaseLimits) -> Brief {
     let Wording { assistance, hints } = wording;
     let is_full = assistance == Assistance::Full;
     let is_hinted = hints == Hints::On;
@@ -85,7 +87,7 @@ pub fn brief(wording: Wording, limits: &BaseLimits) -> Brief {
         grasping: is_hinted.then(|| {
             [if is_full { GRIP } else { "" }, GRASPING, if is_full { CARRYING } else { "" }].concat()
         }),
-        grips: if is_hinted { grips() } else { Vec::new() },
+        grips: if is_hinted { grips_for(task) } else { Vec::new() },
     }
 }
 
@@ -95,7 +97,7 @@ mod tests {
     use tandem_sim::mjcf::{Geom, Primitive};
     use tandem_sim::{JOINTS, LocomotionChoice, Pose, RobotModel, Side, Sides, Vector, assets};
 
-    use crate::convert::wire_limits;
+    use crate::{convert::wire_limits, tasks};
 
     fn limits() -> BaseLimits {
         wire_limits(&LocomotionChoice::Balance.limits())
@@ -159,7 +161,8 @@ mod tests {
 
     #[test]
     fn without_hints_there_is_geometry_only() {
-        let (with, without) = (brief(Hints::On.into(), &limits()), brief(Hints::Off.into(), &limits()));
+        let brief = |hints: Hints| brief(&tasks::ALL[0], hints.into(), &limits());
+        let (with, without) = (brief(Hints::On), brief(Hints::Off));
         assert!(with.grasping.is_some());
         assert!(!with.grips.is_empty());
         assert_eq!(without, Brief { grasping: None, grips: Vec::new(), ..with });
@@ -168,7 +171,7 @@ mod tests {
     #[test]
     fn bent_knees_are_those_of_our_own_controller() {
         let mut limits = limits();
-        let frames = |limits: &BaseLimits| brief(Assistance::Paper.into(), limits).frames;
+        let frames = |limits: &BaseLimits| brief(&tasks::ALL[0], Assistance::Paper.into(), limits).frames;
         assert!(frames(&limits).contains("0.62 to 0.68 m"));
         // As of a policy in a file.
         limits.pelvis_height_m.min = limits.pelvis_height_m.max;
@@ -177,7 +180,7 @@ mod tests {
 
     #[test]
     fn nothing_is_said_of_what_is_not_told() {
-        let brief = serde_json::json!(brief(Assistance::Paper.into(), &limits())).to_string();
+        let brief = serde_json::json!(brief(&tasks::ALL[0], Assistance::Paper.into(), &limits())).to_string();
         for word in ["pelvis_in_start", "base_motion", "grasping", "odometry", "walking", "level", "grip"] {
             assert!(!brief.contains(word), "{word}: {brief}");
         }

@@ -2,20 +2,22 @@
 //! the seed moves them, and where partners stand.
 
 use tandem_sim::mjcf::{Geom, Primitive};
-use tandem_sim::{ObjectModel, Pose, SimError, Vector, wrapped_rad};
+use tandem_sim::{ObjectModel, Pose, Rotation, SimError, Vector, wrapped_rad};
 
 use crate::tasks::{ObjectSpot, RobotSpot, Spread, Task};
 
-/// One line for each thing of a task, as "service trolley, 0.45 x 0.85 x 0.95 m: middle 0.9 m ahead of A, 3.7 m ahead of B (from the
-/// pelvis, give or take 0.32 m)".
+/// One line for each thing of a task, as "service trolley, 0.85 m along A's x, 0.45 m along its y, 0.95 m high: middle 0.93 m ahead of
+/// A, 3.70 m ahead of B (from the pelvis, give or take 0.32 m)".
 pub fn room(task: &Task, spread: Spread) -> Result<Vec<String>, SimError> {
     let line = |spot: &ObjectSpot| {
-        let [x_m, y_m, z_m] = size_m(spot)?.to_array();
+        let first = &task.robots[0];
+        let [x_m, y_m, z_m] = size_m(spot, spot.yaw_rad - first.yaw_rad)?.to_array();
         let places: Vec<String> = task.robots.iter().map(|robot| place(robot, spot)).collect();
         let name = spot.name.replace('_', " ");
         let places = places.join(", ");
         Ok(format!(
-            "{name}, {x_m:.2} x {y_m:.2} x {z_m:.2} m: middle {places} (from the pelvis{})",
+            "{name}, {x_m:.2} m along {}'s x, {y_m:.2} m along its y, {z_m:.2} m high: middle {places} (from the pelvis{})",
+            first.name,
             give_or_take(task, spot, spread)
         ))
     };
@@ -67,19 +69,21 @@ fn place(robot: &RobotSpot, spot: &ObjectSpot) -> String {
     let (ahead_m, left_m) = seen_from(robot, [x_m, y_m]);
     let part = |part_m: f32, towards: &str, away: &str| {
         let words = if part_m < 0.0 { away } else { towards };
-        (part_m.abs() >= 0.05).then(|| format!("{:.1} m {words} {}", part_m.abs(), robot.name))
+        (part_m.abs() >= 0.005).then(|| format!("{:.2} m {words} {}", part_m.abs(), robot.name))
     };
     let parts = [part(ahead_m, "ahead of", "behind"), part(left_m, "to the left of", "to the right of")];
     let told: Vec<String> = parts.into_iter().flatten().collect();
     if told.is_empty() { format!("where {} stands", robot.name) } else { told.join(" and ") }
 }
 
-/// Along the axes of a thing as its file has it, z up.
-fn size_m(spot: &ObjectSpot) -> Result<Vector, SimError> {
+/// Along the axes of somebody from whom the thing is turned by `yaw_rad`, z up.
+fn size_m(spot: &ObjectSpot, yaw_rad: f32) -> Result<Vector, SimError> {
+    let turn = Rotation::from_rotation_z(yaw_rad);
     let (mut low_m, mut high_m) = (Vector::INFINITY, Vector::NEG_INFINITY);
     for part in ObjectModel::parts(spot.file, spot.name)? {
         for geom in part.model.geoms.iter().filter(|geom| geom.drawn || geom.collides) {
             for corner_m in corners_m(geom, &part.object_from_part) {
+                let corner_m = turn * corner_m;
                 (low_m, high_m) = (low_m.min(corner_m), high_m.max(corner_m));
             }
         }
@@ -120,7 +124,10 @@ mod tests {
     fn things_are_as_large_and_as_far_as_people_would_say() {
         let lines = |id: &str| room(tasks::find(id).unwrap(), Spread::Single).unwrap();
         let cart = lines("cart_service");
-        assert!(cart[0].starts_with("service trolley, ") && cart[0].contains("0.9 m ahead of A"), "{cart:?}");
+        assert!(
+            cart[0].starts_with("service trolley, ") && cart[0].contains("0.93 m ahead of A"),
+            "{cart:?}"
+        );
         assert!(cart[0].ends_with("(from the pelvis, give or take 0.32 m)"), "{cart:?}");
         let mark = cart.iter().find(|line| line.starts_with("parking mark, ")).unwrap();
         assert!(mark.ends_with("(from the pelvis)"), "the seed leaves it where it is: {mark}");
@@ -131,7 +138,10 @@ mod tests {
         let basket = lines("co_carry");
         assert_eq!(basket[2], "B begins at [1.26, 0.00] m in A's start frame, turned by -3.14 rad");
         let handover = lines("handover");
-        assert!(handover[0].starts_with("bottle, 0.07 x 0.07 x 0."), "{handover:?}");
+        assert!(
+            handover[0].starts_with("bottle, 0.07 m along A's x, 0.07 m along its y, 0."),
+            "{handover:?}"
+        );
         for task in tasks::ALL {
             let lines = lines(task.id);
             assert_eq!(lines.len(), task.objects.len() + task.robots.len() - 1);

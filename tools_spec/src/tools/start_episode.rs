@@ -67,7 +67,7 @@ pub struct Briefing {
     /// The phases of the task, in the order they have to be reached; left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub phases: Vec<PhaseInfo>,
-    /// The things of the task: how large they are (along their own axes), and about how far from each robot they stand before the seed
+    /// The things of the task: how large they are, along the first robot's axes, and how far from each robot they stand before the seed
     /// moves them by a decimetre or so. Left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub room: Vec<String>,
