@@ -99,7 +99,7 @@ class Briefing:
     """The phases of the task, in the order they have to be reached; left out where the assistance is "paper"."""
 
     room: tuple[str, ...]
-    """The things of the task: how large they are (along their own axes), and about how far from each robot they
+    """The things of the task: how large they are, along the first robot's axes, and how far from each robot they
     stand before the seed moves them by a decimetre or so. Left out where the assistance is "paper".
     """
 
