@@ -6,7 +6,8 @@
 
 Two demonstrations of Handover are recorded and exported with both codecs, as PNG, for each robot, and as version 2.1, which
 LeRobot's own converter takes over. Ten rows of each are drawn again from the recording and compared with what LeRobot reads; its
-statistics of the same rows are compared with ours; `lerobot-train` trains an ACT for two steps.
+statistics of the same rows are compared with ours; the actions are played in a new episode of the seed; `lerobot-train` trains an
+ACT for two steps.
 """
 
 import subprocess
@@ -90,6 +91,26 @@ def compare_statistics(data_set):
     print("statistics are as LeRobot's:", ", ".join(theirs))
 
 
+def play(data_set, recordings, rate_hz):
+    """The actions of the data set, played as a policy map plays rows, reach what the recording reached, when it did."""
+    rows = data_set.hf_dataset.with_format("numpy")
+    actions = np.stack([rows[index]["action"] for index in range(data_set.meta.episodes[0]["length"])])
+    recording, steps = recordings[0], 50 // rate_hz
+    parts = np.arange(1, steps + 1, dtype=np.float32) / steps
+    with tandem.Episode("handover", recording.seed, protocol="benchmark") as episode:
+        before = recording.actions[1]
+        # It stands still for a second in the end, for phases that have to be held.
+        for row in [*actions.reshape(len(actions), 2, 35), *[actions[-1].reshape(2, 35)] * rate_hz]:
+            told = before[:, None] + (row - before)[:, None] * parts[:, None]
+            told[..., 31:34] = row[:, None, 31:34]
+            before = row
+            if episode.step(told.astype(np.float32)).ended:
+                break
+        reached = episode.finish().phases
+    assert all(abs(reached[name] - time_s) < 0.1 for name, time_s in recording.result.phases.items()), reached
+    print("actions played again reach", reached, "- recorded", recording.result.phases)
+
+
 def train(folder, out):
     command = [
         PROGRAMS / "lerobot-train",
@@ -140,6 +161,7 @@ def main():
             assert worst_db > LEAST_DB.get(name, LEAST_DB["av1"]), (name, worst_db)
             if name == "av1":
                 compare_statistics(data_set)
+                play(data_set, recordings, settings.rate_hz)
                 train(folder, scratch / "trained")
                 rows = datasets.load_dataset(str(folder), split="train")
                 assert len(rows) == len(data_set) and len(rows[0]["action"]) == 70, rows
