@@ -196,6 +196,9 @@ def test_order_and_splits(tmp_path: Path) -> None:
     for name in ("task-10", "task-9", "b-1"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "episode.mcap").touch()
-    assert [path.parent.name for path in find(tmp_path)] == ["b-1", "task-9", "task-10"]
+    chosen = tmp_path / "chosen"
+    chosen.mkdir()
+    (chosen / "one").symlink_to(tmp_path / "task-9")
+    assert [path.parent.name for path in find(tmp_path)] == ["b-1", "one", "task-9", "task-10"]
     assert splits(70, 2) == {"train": "0:100", "val": "100:120", "rest": "120:140"}
     assert splits(50, 1) == {"train": "0:50"}

@@ -27,8 +27,8 @@ from tandem.export import ExportSettings, export_lerobot
 PROGRAMS = Path(sys.executable).parent
 SEEDS = (2000, 2001)
 SAMPLES = 10
-# What the codecs lose at their settings; PNG loses nothing.
-LEAST_DB = {"av1": 30.0, "h264": 30.0, "png": 90.0}
+# What the codecs lose at their settings, small pictures more than large ones; PNG loses nothing.
+LEAST_DB = {"av1": 30.0, "h264": 28.0, "png": 90.0}
 ACT = {
     "dim_model": 64,
     "n_heads": 2,
@@ -158,7 +158,7 @@ def main():
             (exported,) = export_lerobot(runs, scratch / name, settings, only_successful=True)
             folder = converted(exported.folder) if name == "v2" else exported.folder
             data_set, worst_db = compare(name, folder, recordings, settings.stride, robot)
-            assert worst_db > LEAST_DB.get(name, LEAST_DB["av1"]), (name, worst_db)
+            assert worst_db > LEAST_DB.get(name, LEAST_DB["h264"]), (name, worst_db)
             if name == "av1":
                 compare_statistics(data_set)
                 play(data_set, recordings, settings.rate_hz)

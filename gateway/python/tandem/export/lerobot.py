@@ -124,7 +124,9 @@ def find(root: Path) -> list[Path]:
         words = re.split(r"(\d+)", path.relative_to(root).as_posix())
         return [(0, int(word), "") if word.isdigit() else (1, 0, word) for word in words if word]
 
-    found = sorted(root.rglob(RECORDING_FILE), key=order)
+    # Links are followed: a folder of links is how one chooses recordings.
+    folders = [folder for folder, _, files in os.walk(root, followlinks=True) if RECORDING_FILE in files]
+    found = sorted((Path(folder) / RECORDING_FILE for folder in folders), key=order)
     if not found:
         raise TandemError(f"no {RECORDING_FILE} in {root}; give a folder of recordings, as of tandem collect")
     return found
