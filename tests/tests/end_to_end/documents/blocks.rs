@@ -102,7 +102,7 @@ pub fn is_installed(program: &str) -> bool {
 #[test]
 fn examples_are_python() {
     let folders =
-        ["agents", "bridges", "environments"].map(|folder| root().join("gateway/examples").join(folder));
+        ["agents", "bridges", "environments", "servers"].map(|folder| root().join("gateway/examples").join(folder));
     let files = folders.iter().flat_map(|folder| fs::read_dir(folder).expect("a folder of examples"));
     let files: Vec<_> = files.map(|file| file.expect("a file").path()).collect();
     let python: Vec<_> =
