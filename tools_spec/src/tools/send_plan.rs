@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
+use crate::checks;
 use crate::parts::CommandReply;
 use crate::tool::Tool;
 use crate::tools::{MoveWrists, SendJointChunk, Wait, Walk};
@@ -97,6 +98,12 @@ impl Tool for SendPlan {
                 return Err(format!("commands holds {count}; give at most {MOST_COMMANDS}"));
             }
             _ => {}
+        }
+        for (index, command) in self.commands.iter().enumerate() {
+            let Some(Expectation { force_above_n, force_below_n, .. }) = &command.expects else { continue };
+            for (name, force_n) in [("force_above_n", force_above_n), ("force_below_n", force_below_n)] {
+                checks::finite(&format!("commands[{index}].expects.{name}"), force_n.as_slice())?;
+            }
         }
         let names = self.commands.iter().map(|command| command.tool.as_str()).enumerate();
         match names.into_iter().find(|(_, name)| !SendPlan::COMMANDS.contains(name)) {

@@ -132,6 +132,9 @@ fn refusals_say_what_would_work() {
     refused("grasp", json!({}), &["\"grasp\"", "observe", "move_wrists", "finish"]);
     refused("start_episode", json!({}), &["start_episode", "observe"]);
     refused("wait", json!({ "steps": 0 }), &["steps is 0", "at least 1"]);
+    let expects = json!({ "force_below_n": 2e6 });
+    let heavy = json!({ "commands": [{ "tool": "wait", "arguments": { "steps": 1 }, "expects": expects }] });
+    refused("send_plan", heavy, &["commands[0].expects.force_below_n holds 2000000"]);
     refused("wait", json!({ "steps": -1 }), &["wait: steps: ", "-1", "{\"steps\":25}"]);
     refused("wait", json!({ "steps": 2.5 }), &["2.5", "{\"steps\":25}"]);
     refused("wait", json!({ "step": 25 }), &["unknown field `step`", "`steps`"]);
