@@ -101,8 +101,8 @@ pub fn is_installed(program: &str) -> bool {
 /// Files of Python that users are given have nobody else who compiles them.
 #[test]
 fn examples_are_python() {
-    let folders =
-        ["agents", "bridges", "environments", "servers"].map(|folder| root().join("gateway/examples").join(folder));
+    let folders = ["agents", "bridges", "environments", "servers"]
+        .map(|folder| root().join("gateway/examples").join(folder));
     let files = folders.iter().flat_map(|folder| fs::read_dir(folder).expect("a folder of examples"));
     let files: Vec<_> = files.map(|file| file.expect("a file").path()).collect();
     let python: Vec<_> =
