@@ -117,7 +117,7 @@ impl Disturbance {
         limits: &BaseLimits,
     ) -> RobotCommand {
         let noise = &self.robots[robot];
-        let mut executed = told.clone();
+        let mut executed = *told;
         for (column, noise) in noise.upper.iter().enumerate() {
             if let Some(noise) = noise {
                 let joint = &model.joints[UPPER[column]];
@@ -218,13 +218,13 @@ mod tests {
         let noise = Disturbance::new(5.0, seed, 2).unwrap();
         let mut moved = [0; 2];
         for step in 0..500 {
-            for robot in 0..2 {
+            for (robot, moved) in moved.iter_mut().enumerate() {
                 let executed = noise.executed(robot, f64::from(step) * 0.02, &told, &model, &limits);
                 assert_eq!(executed.base, told.base);
                 for (column, joint) in UPPER.into_iter().enumerate() {
                     let (is_rad, limit_rad) = (executed.upper_rad[column], model.joints[joint].upper_rad);
                     assert!(is_rad <= limit_rad, "{column}");
-                    moved[robot] += usize::from(is_rad < limit_rad);
+                    *moved += usize::from(is_rad < limit_rad);
                     let finger = (2 * ARM_JOINTS..WAIST_COLUMN).contains(&column);
                     assert!(!finger || is_rad == limit_rad, "{column}");
                 }
