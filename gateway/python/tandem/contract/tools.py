@@ -209,7 +209,8 @@ class Tools(ABC):
         carries, its hands nearer), one gets no nearer, or the steps are used up. It walks straight and looks at
         nothing: go round what stands in the way by places in between.
 
-        steps: The most control steps of 20 ms to take, up to 1500. A way takes about 120, and 250 a metre; where robots carry, 450 a metre.
+        steps: The most control steps of 20 ms to take, up to 1500. A way takes about 120, and 250 a metre; where
+            robots carry, 450 a metre.
         robots: One entry per robot that is to walk; each robot at most once. Robots that are not named hold still.
         """
         arguments: dict[str, Any] = {

@@ -46,14 +46,14 @@ pub struct FloorRate {
 }
 
 /// Where floors are measured, or wanted.
-type Place = (&'static str, Vec<String>);
+type FloorKey = (&'static str, Vec<String>);
 
 /// The floors of all tasks that were played, in the order of the list of tasks; none where nobody knows one.
 pub fn floors(groups: &[PolicyGroup], policies: &[PolicyReport]) -> Vec<TaskFloor> {
-    let places: BTreeSet<Place> =
+    let places: BTreeSet<FloorKey> =
         groups.iter().flat_map(|group| &group.episodes).map(|found| place(&found.played)).collect();
     let shipped = shipped();
-    let of_place = |(task, departures): Place| {
+    let of_place = |(task, departures): FloorKey| {
         let players: Vec<FloorRate> = PLAYERS
             .into_iter()
             .filter_map(|player| {
@@ -65,7 +65,7 @@ pub fn floors(groups: &[PolicyGroup], policies: &[PolicyReport]) -> Vec<TaskFloo
                     measured.then(|| FloorRate::beside(player, task, policy)).flatten()
                 });
                 let earlier = || {
-                    let same = |(at, rate): &&(Place, FloorRate)| {
+                    let same = |(at, rate): &&(FloorKey, FloorRate)| {
                         rate.player == player && *at == (task, departures.clone())
                     };
                     shipped.iter().find(same).map(|(_, rate)| rate.clone())
@@ -83,7 +83,7 @@ pub fn floors(groups: &[PolicyGroup], policies: &[PolicyReport]) -> Vec<TaskFloo
 }
 
 /// In which task and what circumstances an episode was played. What its policy is told moves nobody who hears nothing.
-fn place(played: &PlayedEpisode) -> Place {
+fn place(played: &PlayedEpisode) -> FloorKey {
     let spec = EpisodeSpec { instructions: None, ..played.spec.clone() }.assisted(Assistance::Paper);
     (spec.task.id, spec.departures())
 }
@@ -113,11 +113,11 @@ impl FloorRate {
 }
 
 /// What was measured before, and where.
-fn shipped() -> Vec<(Place, FloorRate)> {
+fn shipped() -> Vec<(FloorKey, FloorRate)> {
     SHIPPED.lines().skip(1).filter_map(shipped_row).collect()
 }
 
-fn shipped_row(line: &str) -> Option<(Place, FloorRate)> {
+fn shipped_row(line: &str) -> Option<(FloorKey, FloorRate)> {
     let cells: Vec<&str> = line.split(',').collect();
     let [player, task, spread, protocol, first_seed, last_seed, build, trials, reached @ ..] = &cells[..]
     else {
