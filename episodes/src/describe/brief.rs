@@ -2,8 +2,7 @@
 
 use tandem_tools_spec::{Assistance, BaseLimits, Brief, Hints, Wording};
 
-use super::grips::grips_for;
-use crate::tasks::Task;
+use super::grips::grips;
 
 const FRAMES: &str = "Poses of wrists and camera, and points of query_depth, are in the robot's own pelvis frame as it is at that \
     moment: x forward, y left, z up, metres. Quaternions are [w, x, y, z].";
@@ -70,8 +69,8 @@ const WALKING: &str = "A robot that is told to walk gains way after 0.3 to 0.5 s
     hands or a partner pull it, drifts and sinks by 10 cm. Then free what pulls: loosen wrist targets, give way with compliance_n_s_m, or \
     walk the way it is pulled. Arms that reach more than 0.35 m ahead make a robot step, too: walk nearer instead.";
 
-/// The brief of an episode of `task` in the words that its policy reads, where robots follow base commands within `limits`.
-pub fn brief(task: &Task, wording: Wording, limits: &BaseLimits) -> Brief {
+/// The brief of an episode in the words that its policy reads, where robots follow base commands within `limits`.
+pub fn brief(wording: Wording, limits: &BaseLimits) -> Brief {
     let Wording { assistance, hints } = wording;
     let is_full = assistance == Assistance::Full;
     let is_hinted = hints == Hints::On;
@@ -87,7 +86,7 @@ pub fn brief(task: &Task, wording: Wording, limits: &BaseLimits) -> Brief {
         grasping: is_hinted.then(|| {
             [if is_full { GRIP } else { "" }, GRASPING, if is_full { CARRYING } else { "" }].concat()
         }),
-        grips: if is_hinted { grips_for(task) } else { Vec::new() },
+        grips: if is_hinted { grips() } else { Vec::new() },
     }
 }
 
@@ -97,7 +96,7 @@ mod tests {
     use tandem_sim::mjcf::{Geom, Primitive};
     use tandem_sim::{JOINTS, LocomotionChoice, Pose, RobotModel, Side, Sides, Vector, assets};
 
-    use crate::{convert::wire_limits, tasks};
+    use crate::convert::wire_limits;
 
     fn limits() -> BaseLimits {
         wire_limits(&LocomotionChoice::Balance.limits())
@@ -161,7 +160,7 @@ mod tests {
 
     #[test]
     fn without_hints_there_is_geometry_only() {
-        let brief = |hints: Hints| brief(&tasks::ALL[0], hints.into(), &limits());
+        let brief = |hints: Hints| super::brief(hints.into(), &limits());
         let (with, without) = (brief(Hints::On), brief(Hints::Off));
         assert!(with.grasping.is_some());
         assert!(!with.grips.is_empty());
@@ -171,7 +170,7 @@ mod tests {
     #[test]
     fn bent_knees_are_those_of_our_own_controller() {
         let mut limits = limits();
-        let frames = |limits: &BaseLimits| brief(&tasks::ALL[0], Assistance::Paper.into(), limits).frames;
+        let frames = |limits: &BaseLimits| brief(Assistance::Paper.into(), limits).frames;
         assert!(frames(&limits).contains("0.62 to 0.68 m"));
         // As of a policy in a file.
         limits.pelvis_height_m.min = limits.pelvis_height_m.max;
@@ -180,7 +179,7 @@ mod tests {
 
     #[test]
     fn nothing_is_said_of_what_is_not_told() {
-        let brief = serde_json::json!(brief(&tasks::ALL[0], Assistance::Paper.into(), &limits())).to_string();
+        let brief = serde_json::json!(brief(Assistance::Paper.into(), &limits())).to_string();
         for word in ["pelvis_in_start", "base_motion", "grasping", "odometry", "walking", "level", "grip"] {
             assert!(!brief.contains(word), "{word}: {brief}");
         }

@@ -3,8 +3,6 @@
 
 use tandem_tools_spec::WorkedGrip;
 
-use crate::tasks::Task;
-
 const OPEN_RAD: [f64; 7] = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0];
 const HALF: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Right and left wrists: fingers ahead and palms towards each other, fingers ahead and palms down, fingers down and palms towards each
@@ -13,134 +11,97 @@ const AHEAD: [[f64; 4]; 2] = [[1.0, 0.0, 0.0, 0.0]; 2];
 const PALMS_DOWN: [[f64; 4]; 2] = [[HALF, -HALF, 0.0, 0.0], [HALF, HALF, 0.0, 0.0]];
 const FINGERS_DOWN: [[f64; 4]; 2] = [[HALF, 0.0, HALF, 0.0]; 2];
 
-/// A grip, and the files of the things that it is for.
-type GripOf = (WorkedGrip, &'static [&'static str]);
-
-/// Those for the things of a task; where it has none that is known, every one.
-pub fn grips_for(task: &Task) -> Vec<WorkedGrip> {
-    let is_there = |files: &[&str]| task.objects.iter().any(|spot| files.contains(&spot.file));
-    let (fitting, others): (Vec<GripOf>, Vec<GripOf>) = all().partition(|(_, files)| is_there(files));
-    let told = if fitting.is_empty() { others } else { fitting };
-    told.into_iter().map(|(grip, _)| grip).collect()
-}
-
-fn all() -> impl Iterator<Item = GripOf> {
-    wrapped().into_iter().chain(pinched())
-}
-
 /// Every grip.
-#[cfg(test)]
 pub fn grips() -> Vec<WorkedGrip> {
-    all().map(|(grip, _)| grip).collect()
+    wrapped().into_iter().chain(pinched()).collect()
 }
 
 /// Of what fingers and thumb go round.
-fn wrapped() -> Vec<GripOf> {
+fn wrapped() -> Vec<WorkedGrip> {
     let beside = vec![[0.0, 0.08, 0.0]];
     vec![
-        (
-            WorkedGrip {
-                stand_behind_m: None,
-                ..grip(
-                    "upright round things of 7 cm: bottle, cup",
-                    "its axis",
-                    AHEAD,
-                    [0.12, 0.055, 0.0],
-                    beside.clone(),
-                    1.0,
-                )
-            },
-            &["bottle", "cup", "glass"],
-        ),
-        (
-            grip(
-                "a bar of 36 mm, as a handle, from above",
-                "its axis",
-                PALMS_DOWN,
-                [0.105, 0.042, 0.0],
-                beside.clone(),
-                1.3,
-            ),
-            &["service_trolley", "tub"],
-        ),
-        (
-            grip(
-                "an upright moulding of 50 by 40 mm, from outside",
+        WorkedGrip {
+            stand_behind_m: None,
+            ..grip(
+                "upright round things of 7 cm: bottle, cup",
                 "its axis",
                 AHEAD,
-                [0.112, 0.045, 0.0],
+                [0.12, 0.055, 0.0],
                 beside.clone(),
-                1.1,
-            ),
-            &["frame"],
+                1.0,
+            )
+        },
+        grip(
+            "a bar of 36 mm, as a handle, from above",
+            "its axis",
+            PALMS_DOWN,
+            [0.105, 0.042, 0.0],
+            beside.clone(),
+            1.3,
+        ),
+        grip(
+            "an upright moulding of 50 by 40 mm, from outside",
+            "its axis",
+            AHEAD,
+            [0.112, 0.045, 0.0],
+            beside.clone(),
+            1.1,
         ),
     ]
 }
 
 /// Of what the thumb presses against palm or fingers.
-fn pinched() -> Vec<GripOf> {
+fn pinched() -> Vec<WorkedGrip> {
     vec![
-        (
-            WorkedGrip {
-                open_rad: [0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0],
-                close_rad: [0.0, -0.9, -1.74, 0.3, 0.2, 0.3, 0.2],
-                stand_behind_m: Some(0.32),
-                ..grip(
-                    "the edge of a plate of 30 mm, as of a table: thumb under it (thinner or thicker: y of place_m is 0.017 and the thickness)",
-                    "the lower edge; of a round plate 0.24 m apart, both straight ahead",
-                    PALMS_DOWN,
-                    [0.085, 0.047, 0.0],
-                    vec![[0.14, 0.03, 0.0], [0.0, 0.03, 0.0]],
-                    1.0,
-                )
-            },
-            &["round_table", "office_table"],
-        ),
-        (
-            WorkedGrip {
-                pelvis_height_m: Some(0.64),
-                close_rad: [0.0, -0.9, -1.74, 1.0, 1.0, 1.0, 1.0],
-                stand_behind_m: Some(0.38),
-                ..grip(
-                    "an upright leg of 28 mm, from outside, 5 cm under what stands on it",
-                    "its axis",
-                    AHEAD,
-                    [0.1, 0.032, 0.0],
-                    vec![[0.0, 0.09, 0.025], [0.0, 0.0, 0.025]],
-                    1.0,
-                )
-            },
-            &["console_table"],
-        ),
-        (
-            WorkedGrip {
-                close_rad: [0.0, -0.95, -0.6, 1.57, 0.6, 1.57, 0.6],
-                ..grip(
-                    "a rim of 24 mm, from above, fingers inside",
-                    "its axis",
-                    PALMS_DOWN,
-                    [0.095, 0.031, 0.0],
-                    vec![[0.0, 0.09, 0.0]],
-                    1.0,
-                )
-            },
-            &["basket"],
-        ),
-        (
-            WorkedGrip {
-                close_rad: [0.0, -1.04, -1.74, 0.3, 0.3, 0.3, 0.3],
-                stand_behind_m: Some(0.38),
-                ..grip(
-                    "the rim of an upright wall, as of a tall bin: palm on its outside, thumb over the rim",
-                    "the outer edge",
-                    FINGERS_DOWN,
-                    [0.09, 0.017, 0.0],
-                    vec![[0.16, 0.05, 0.0], [0.0, 0.05, 0.0]],
-                    1.0,
-                )
-            },
-            &["bin"],
-        ),
+        WorkedGrip {
+            open_rad: [0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0],
+            close_rad: [0.0, -0.9, -1.74, 0.3, 0.2, 0.3, 0.2],
+            stand_behind_m: Some(0.32),
+            ..grip(
+                "the edge of a plate of 30 mm, as of a table: thumb under it (thinner or thicker: y of place_m is 0.017 and the thickness)",
+                "the lower edge; of a round plate 0.24 m apart, both straight ahead",
+                PALMS_DOWN,
+                [0.085, 0.047, 0.0],
+                vec![[0.14, 0.03, 0.0], [0.0, 0.03, 0.0]],
+                1.0,
+            )
+        },
+        WorkedGrip {
+            pelvis_height_m: Some(0.64),
+            close_rad: [0.0, -0.9, -1.74, 1.0, 1.0, 1.0, 1.0],
+            stand_behind_m: Some(0.38),
+            ..grip(
+                "an upright leg of 28 mm, from outside, 5 cm under what stands on it",
+                "its axis",
+                AHEAD,
+                [0.1, 0.032, 0.0],
+                vec![[0.0, 0.09, 0.025], [0.0, 0.0, 0.025]],
+                1.0,
+            )
+        },
+        WorkedGrip {
+            close_rad: [0.0, -0.95, -0.6, 1.57, 0.6, 1.57, 0.6],
+            ..grip(
+                "a rim of 24 mm, from above, fingers inside",
+                "its axis",
+                PALMS_DOWN,
+                [0.095, 0.031, 0.0],
+                vec![[0.0, 0.09, 0.0]],
+                1.0,
+            )
+        },
+        WorkedGrip {
+            close_rad: [0.0, -1.04, -1.74, 0.3, 0.3, 0.3, 0.3],
+            stand_behind_m: Some(0.38),
+            ..grip(
+                "the rim of an upright wall, as of a tall bin: palm on its outside, thumb over the rim",
+                "the outer edge",
+                FINGERS_DOWN,
+                [0.09, 0.017, 0.0],
+                vec![[0.16, 0.05, 0.0], [0.0, 0.05, 0.0]],
+                1.0,
+            )
+        },
     ]
 }
 
@@ -165,40 +126,5 @@ fn grip(
         close_rad: [0.0, -0.75, -0.8, 1.1, 1.3, 1.1, 1.3].map(|angle_rad: f64| coarse(angle_rad * closure)),
         stand_behind_m: Some(0.29),
         pelvis_height_m: None,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::tasks;
-
-    #[test]
-    fn tasks_have_the_grips_of_their_things() {
-        let told = |id: &str| -> Vec<String> {
-            grips_for(tasks::find(id).unwrap()).into_iter().map(|grip| grip.thing).collect()
-        };
-        let trolley = told("cart_service");
-        assert!(
-            trolley.len() == 2 && trolley[0].contains("bottle") && trolley[1].contains("bar"),
-            "{trolley:?}"
-        );
-        let all: Vec<GripOf> = all().collect();
-        for task in tasks::ALL {
-            let told = told(task.id);
-            assert!((1..=2).contains(&told.len()), "{}: {told:?}", task.id);
-        }
-        for (grip, files) in all {
-            let is_there = |file: &&str| {
-                tasks::ALL.iter().any(|task| task.objects.iter().any(|spot| spot.file == *file))
-            };
-            assert!(!files.is_empty() && files.iter().all(is_there), "{}: {files:?}", grip.thing);
-        }
-    }
-
-    #[test]
-    fn a_task_of_other_things_has_every_grip() {
-        let task = Task { objects: &[], ..tasks::ALL[0] };
-        assert_eq!(grips_for(&task), grips());
     }
 }

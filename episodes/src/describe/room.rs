@@ -6,8 +6,8 @@ use tandem_sim::{ObjectModel, Pose, Rotation, SimError, Vector, wrapped_rad};
 
 use crate::tasks::{ObjectSpot, RobotSpot, Spread, Task};
 
-/// One line for each thing of a task, as "service trolley, 0.85 m along A's x, 0.45 m along its y, 0.95 m high: middle 0.93 m ahead of
-/// A, 3.70 m ahead of B (from the pelvis, give or take 0.32 m)".
+/// One line for each thing of a task, as "service trolley, 0.72 m along A's x, 0.44 m along its y, 0.92 m high: middle 0.85 m ahead of
+/// A, 3.65 m ahead of B (from the pelvis, give or take 0.32 m)".
 pub fn room(task: &Task, spread: Spread) -> Result<Vec<String>, SimError> {
     let line = |spot: &ObjectSpot| {
         let first = &task.robots[0];
@@ -125,7 +125,7 @@ mod tests {
         let lines = |id: &str| room(tasks::find(id).unwrap(), Spread::Single).unwrap();
         let cart = lines("cart_service");
         assert!(
-            cart[0].starts_with("service trolley, ") && cart[0].contains("0.93 m ahead of A"),
+            cart[0].starts_with("service trolley, ") && cart[0].contains("0.85 m ahead of A"),
             "{cart:?}"
         );
         assert!(cart[0].ends_with("(from the pelvis, give or take 0.32 m)"), "{cart:?}");

@@ -108,11 +108,7 @@ impl Session {
                 // What cannot be read would have kept the world from being built.
                 Assistance::Full => describe::room(task, self.spec().variation.spread).unwrap_or_default(),
             },
-            brief: describe::brief(
-                task,
-                self.spec().wording(),
-                &wire_limits(&self.motions[0].robot.base_limits),
-            ),
+            brief: describe::brief(self.spec().wording(), &wire_limits(&self.motions[0].robot.base_limits)),
             action_row: action_row(&self.motions[0].robot.model),
             status: self.status(),
             recording_failed: self.recording_failed().map(str::to_owned),

@@ -23,7 +23,7 @@ fn tandem(python: &Path, arguments: &[&str]) -> (Output, String) {
 fn interpreter(folder: &Path, when_checked: &str, what: &str) -> std::path::PathBuf {
     use std::os::unix::fs::PermissionsExt;
     let path = folder.join("python");
-    let text = format!("#!/bin/sh\ncase \"$*\" in *--check) {when_checked};; esac\n{what}\n");
+    let text = format!("#!/bin/sh\ncase \" $* \" in *\" --check \"*) {when_checked};; esac\n{what}\n");
     fs::write(&path, text).expect("a script");
     fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).expect("a script that runs");
     path

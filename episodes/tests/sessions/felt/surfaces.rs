@@ -68,7 +68,7 @@ fn a_pixel_on_a_bottle_tells_of_all_of_it() {
     assert!((axis.radius_m - 0.035).abs() < 0.004, "{axis:?}");
     let height_m = axis.top_m[2] - axis.bottom_m[2];
     let told = session.briefing().room.into_iter().find(|line| line.starts_with("bottle")).unwrap();
-    let size_m: f64 = told.split(" x ").nth(2).unwrap().split(' ').next().unwrap().parse().unwrap();
+    let size_m: f64 = told.split("its y, ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     assert!((height_m - size_m).abs() < 0.02, "{height_m} m high, and it is {size_m}: {whole:?}");
     assert!(whole.extent_m[0] < 0.09 && whole.extent_m[1] < 0.09, "nothing of the counter: {whole:?}");
 }

@@ -46,7 +46,7 @@ pub fn prompt(
     let task = tasks::find(&start.task).map_err(|error| refused(error.to_string()))?;
     let info = list.tasks.iter().find(|info| info.id == task.id);
     let info = info.ok_or_else(|| refused(format!("{} is not listed", task.id)))?;
-    let text = text(info, &start, &brief(task, wording, &list.base_limits), caller);
+    let text = text(info, &start, &brief(wording, &list.base_limits), caller);
     let mut result = GetPromptResult::new(vec![PromptMessage::new_text(Role::User, text)]);
     result.description = Some(info.instruction.clone());
     Ok(result)

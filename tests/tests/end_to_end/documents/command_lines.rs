@@ -8,7 +8,7 @@ use tandem::cli::Cli;
 use super::pages::root;
 
 /// Programs that are taken at their word: they are not ours.
-const OTHERS: [&str; 5] = ["claude", "export", "mdbook", "ollama", "openssl"];
+const OTHERS: [&str; 7] = ["claude", "export", "jupyter", "jupytext", "mdbook", "ollama", "openssl"];
 
 /// What variables of a cluster stand for, so that a line with them can be read.
 const VARIABLES: [(&str, &str); 6] = [

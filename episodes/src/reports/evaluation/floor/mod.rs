@@ -8,6 +8,7 @@ use tandem_tools_spec::Assistance;
 
 use super::policy::{PhaseReport, PolicyGroup, PolicyReport};
 use super::rate::Rate;
+use crate::players::IDLE;
 use crate::results::{OPEN_LOOP, PlayedEpisode};
 use crate::spec::EpisodeSpec;
 use crate::statistics::Count;
@@ -18,7 +19,7 @@ use crate::variation::Variation;
 const SHIPPED: &str = include_str!("floors.csv");
 
 /// Who looks at nothing.
-const PLAYERS: [&str; 2] = ["idle", OPEN_LOOP];
+const PLAYERS: [&str; 2] = [IDLE, OPEN_LOOP];
 
 /// Above this, a rate of the whole task says little of what a policy sees.
 const HIGH_SHARE: f64 = 0.5;
