@@ -51,7 +51,6 @@ const UNITS: &[&str] = &[
     "steps",
     "m_s",
     "m_s2",
-    "m_s3",
     "rad_s",
     "rad_s2",
     "n_s",
