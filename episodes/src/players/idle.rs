@@ -5,9 +5,6 @@ use tandem_tools_spec::Wait;
 use super::{Episode, Player, PlayerError};
 use crate::tasks::Task;
 
-/// Its name among the players.
-pub const IDLE: &str = "idle";
-
 /// The agentic protocol allows no more.
 const STEPS_PER_COMMAND: u32 = 25;
 

@@ -16,7 +16,6 @@ use crate::observation::{Picture, TeamObservation};
 use crate::scoring::Facts;
 use crate::spec::EpisodeSpec;
 
-pub use idle::IDLE;
 pub use in_process::InProcess;
 pub use open_loop::{OpenLoop, OpenLoopError};
 pub use policy::{EpisodeOutput, PlayError, PlayOutcome, Policy, PolicyWait, play_in_process};
@@ -99,7 +98,7 @@ pub static ALL: &[PlayerEntry] = &[
         make: PlayerFactory::PrivilegedPlayer(|spec| Ok(Box::new(experts::Expert::for_episode(spec)?))),
     },
     PlayerEntry {
-        name: idle::IDLE,
+        name: "idle",
         about: "nobody: robots hold still until the steps of the benchmark protocol are used up",
         make: PlayerFactory::Player(|spec| Ok(Box::new(idle::Idle::new(spec.task)))),
     },

@@ -27,6 +27,9 @@ pub fn write_result(result: &ResultReply, folder: &Path) -> Result<PathBuf, Outp
     Ok(path)
 }
 
+/// What results call nobody, who holds still.
+pub const IDLE: &str = "idle";
+
 /// What results call the policy that replays a demonstration without a look.
 pub const OPEN_LOOP: &str = "open-loop";
 

@@ -100,11 +100,9 @@ fn the_command_gives_a_model_its_server() {
     let agent = ["agent", "--model", "m", "--per-robot", "--task", "pouring", "--seeds", "7-8", "--runs"];
     let (output, printed) = tandem(&python, &[&agent[..], &[runs.to_str().expect("UTF-8")]].concat());
     assert!(output.status.success(), "{printed}");
-    for says in [
-        "--task pouring --seed 7 --per-robot\n",
-        "--task pouring --seed 8 --per-robot\n",
-        "{\"episodes\":[]}",
-    ] {
+    for says in
+        ["--task pouring --seed 7 --per-robot ", "--task pouring --seed 8 --per-robot ", "{\"episodes\":[]}"]
+    {
         assert!(printed.contains(says), "no {says:?} in {printed}");
     }
     let failing = interpreter(folder.path(), "exit 0", "exit 3");

@@ -27,11 +27,11 @@ const STREAM: u64 = 0x7661_7269_6574_7931;
 /// Draws how this demonstration differs.
 #[derive(Clone, Debug)]
 pub struct Variety {
-    level: f32,
+    level_factor: f32,
     /// The state of the generator.
     random: u64,
     /// Pace at which robots walk, all of this episode the same.
-    walking: f32,
+    walking_pace: f32,
 }
 
 impl Variety {
@@ -40,8 +40,9 @@ impl Variety {
         if level == 0 {
             return None;
         }
-        let mut variety = Variety { level: level.into(), random: u64::from(seed) ^ STREAM, walking: 1.0 };
-        variety.walking = 1.0 - variety.draw([0.0, SLOWER * variety.level]);
+        let mut variety =
+            Variety { level_factor: level.into(), random: u64::from(seed) ^ STREAM, walking_pace: 1.0 };
+        variety.walking_pace = 1.0 - variety.draw([0.0, SLOWER * variety.level_factor]);
         Some(variety)
     }
 
@@ -54,12 +55,12 @@ impl Variety {
 
     /// What share of its usual pace a robot walks at.
     pub fn walking(&self) -> f32 {
-        self.walking
+        self.walking_pace
     }
 
     /// How long a motion takes that would take `duration_s`.
     pub fn duration_s(&mut self, duration_s: f32) -> f32 {
-        duration_s * (1.0 + self.draw(PACE.map(|limit| limit * self.level)))
+        duration_s * (1.0 + self.draw(PACE.map(|limit| limit * self.level_factor)))
     }
 
     /// How long a robot waits before it begins to move.
@@ -70,7 +71,7 @@ impl Variety {
 
     /// How far hands are off their straight line half way along `way_m`, never below it.
     pub fn stray_m(&mut self, way_m: f32) -> Vector {
-        let most_m = (STRAY * way_m).min(MOST_STRAY_M) * self.level;
+        let most_m = (STRAY * way_m).min(MOST_STRAY_M) * self.level_factor;
         self.aside_m(most_m)
     }
 
@@ -88,12 +89,12 @@ impl Variety {
     }
 
     fn happens(&mut self, share: f32) -> bool {
-        self.draw([0.0, 1.0]) < share * self.level
+        self.draw([0.0, 1.0]) < share * self.level_factor
     }
 
-    fn draw(&mut self, range: [f32; 2]) -> f32 {
+    fn draw(&mut self, [min, max]: [f32; 2]) -> f32 {
         let mut generator = SplitMix64(self.random);
-        let drawn = generator.uniform(range);
+        let drawn = generator.uniform([min, max]);
         self.random = generator.0;
         drawn
     }

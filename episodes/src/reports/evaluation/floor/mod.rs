@@ -8,8 +8,7 @@ use tandem_tools_spec::Assistance;
 
 use super::policy::{PhaseReport, PolicyGroup, PolicyReport};
 use super::rate::Rate;
-use crate::players::IDLE;
-use crate::results::{OPEN_LOOP, PlayedEpisode};
+use crate::results::{IDLE, OPEN_LOOP, PlayedEpisode};
 use crate::spec::EpisodeSpec;
 use crate::statistics::Count;
 use crate::tasks::{self, Spread};
