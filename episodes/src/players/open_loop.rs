@@ -36,7 +36,7 @@ struct RecordedRows {
     /// Hash of the file.
     xxh3: String,
     /// Of each control step, a row for each robot.
-    steps: Vec<Vec<Vec<f64>>>,
+    step_rows: Vec<Vec<Vec<f64>>>,
 }
 
 /// Why nothing can be replayed.
@@ -146,17 +146,17 @@ impl RecordedRows {
         let last = Phase::number(task.phases.len() - 1);
         let succeeded =
             recording.result.as_ref().is_some_and(|result| result.phases.reached_s(&last).is_some());
-        Ok((RecordedRows { task, seed: *seed, xxh3, steps }, succeeded))
+        Ok((RecordedRows { task, seed: *seed, xxh3, step_rows: steps }, succeeded))
     }
 
     /// Until the episode ends, or all phases have been reached.
     fn play(&self, episode: &mut InProcess) -> Result<(), PlayerError> {
         let most = rules(episode.session.spec().protocol, self.task).steps_per_command as usize;
-        let Some(last) = self.steps.last() else { return Ok(()) };
+        let Some(last) = self.step_rows.last() else { return Ok(()) };
         let mut done = 0;
         while episode.session.reached_phases() < self.task.phases.len() {
             let steps: Vec<&Vec<Vec<f64>>> =
-                (done..done + most).map(|step| self.steps.get(step).unwrap_or(last)).collect();
+                (done..done + most).map(|step| self.step_rows.get(step).unwrap_or(last)).collect();
             let robots = self.task.robot_names().enumerate();
             let rows = |robot: usize| steps.iter().map(|rows| rows[robot].clone()).collect();
             let robots = robots.map(|(robot, name)| JointChunk { robot: name.into(), rows: rows(robot) });

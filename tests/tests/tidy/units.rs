@@ -90,6 +90,10 @@ const DIMENSIONLESS: &[&str] = &[
     "slide",
     "closure",
     "pace",
+    "level",
+    "deviation",
+    "disturb",
+    "waves",
     "gain",
     "caution",
     // Both are counted in phases.

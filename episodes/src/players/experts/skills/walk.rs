@@ -204,9 +204,9 @@ fn pelvises(commander: &mut Commander, goals: &[WalkGoal]) -> Result<Vec<Pose>, 
 }
 
 /// How robots walk to their places from where they are, at such a share of their pace.
-fn steered(now: &[Pose], goals: &[WalkGoal], walking: f32) -> Vec<BaseVelocity> {
+fn steered(now: &[Pose], goals: &[WalkGoal], pace_share: f32) -> Vec<BaseVelocity> {
     let walk = |(at, goal): (&Pose, &WalkGoal)| {
-        steer(at, &goal.to, TargetVelocity::default(), goal.pace_m_s * walking)
+        steer(at, &goal.to, TargetVelocity::default(), goal.pace_m_s * pace_share)
     };
     now.iter().zip(goals).map(walk).collect()
 }
