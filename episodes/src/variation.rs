@@ -140,8 +140,8 @@ impl Disturbance {
 }
 
 impl RobotNoise {
-    fn new(scale: f32, random: &mut SplitMix64) -> RobotNoise {
-        let mut noise = |kind: NoiseKind| SlowNoise::new(kind, scale, random);
+    fn new(level: f32, random: &mut SplitMix64) -> RobotNoise {
+        let mut noise = |kind: NoiseKind| SlowNoise::new(kind, level, random);
         let arms = 2 * ARM_JOINTS;
         let fingers = arms..arms + 2 * HAND_JOINTS;
         let upper = (0..UPPER_JOINTS).map(|column| match column {
@@ -154,13 +154,13 @@ impl RobotNoise {
 }
 
 impl SlowNoise {
-    fn new(kind: NoiseKind, scale: f32, random: &mut SplitMix64) -> SlowNoise {
+    fn new(kind: NoiseKind, level: f32, random: &mut SplitMix64) -> SlowNoise {
         let mut wave = || {
             let [place, phase] = [random.uniform([-0.5, 0.5]), random.uniform([0.0, 1.0])].map(f64::from);
             let frequency_rad_s = (std::f64::consts::PI * place).tan() / kind.time_s;
             [frequency_rad_s.clamp(-FASTEST_RAD_S, FASTEST_RAD_S), std::f64::consts::TAU * phase]
         };
-        SlowNoise { deviation: kind.deviation * scale, waves: std::array::from_fn(|_| wave()) }
+        SlowNoise { deviation: kind.deviation * level, waves: std::array::from_fn(|_| wave()) }
     }
 
     fn at(&self, time_s: f64) -> f32 {

@@ -78,8 +78,8 @@ pub fn state_values(state: &RobotState, moment: &EpisodeMoment) -> Option<Vec<f6
     let pelvis = position_m.into_iter().chain(quaternion_wxyz);
     let base = &state.base_command;
     let base = [base.vx_m_s, base.vy_m_s, base.yaw_rate_rad_s, base.pelvis_height_m];
-    let EpisodeMoment { episode, step, is_first } = *moment;
-    let moment = [episode.into(), step, f64::from(is_first)];
+    let EpisodeMoment { episode, done_steps, is_first } = *moment;
+    let moment = [episode.into(), done_steps, f64::from(is_first)];
     let sensed = joints.chain(wrists).chain(state.gravity_in_pelvis?).chain(pelvis);
     Some(sensed.chain(moment).chain(base).collect())
 }
@@ -90,7 +90,7 @@ pub struct EpisodeMoment {
     /// A number of the episode, above 0, that 32 bits of a float tell from every other.
     pub episode: u32,
     /// Control steps since the episode began.
-    pub step: f64,
+    pub done_steps: f64,
     /// Whether nothing was asked in this episode before.
     pub is_first: bool,
 }

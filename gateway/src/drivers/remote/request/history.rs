@@ -32,7 +32,7 @@ impl ObservationHistory {
     ) -> Result<ObservationHistory, PlayerError> {
         let shown = map.shown();
         let (length, stride) = map.history.map_or((1, 1), |history| (history.length, history.stride));
-        let first = EpisodeMoment { episode: number, step: 0.0, is_first: true };
+        let first = EpisodeMoment { episode: number, done_steps: 0.0, is_first: true };
         let present = PolicyObservation::take(episode, &shown, first)?;
         Ok(ObservationHistory {
             length,
@@ -52,7 +52,7 @@ impl ObservationHistory {
 
     /// Looks at the episode, of which `rows` rows have been executed now.
     pub fn look(&mut self, episode: &mut dyn LocalEpisode, rows: usize) -> Result<(), PlayerError> {
-        let moment = EpisodeMoment { episode: self.episode, step: 0.0, is_first: false };
+        let moment = EpisodeMoment { episode: self.episode, done_steps: 0.0, is_first: false };
         let observation = PolicyObservation::take(episode, &self.shown, moment)?;
         self.remember(rows, observation);
         Ok(())

@@ -46,7 +46,7 @@ impl PolicyObservation {
         moment: EpisodeMoment,
     ) -> Result<PolicyObservation, PlayerError> {
         let seen = episode.observe(&Observe { robots: None, short: None, frame: None }, shown)?;
-        let moment = EpisodeMoment { step: (seen.time_s * CONTROL_HZ).round(), ..moment };
+        let moment = EpisodeMoment { done_steps: (seen.time_s * CONTROL_HZ).round(), ..moment };
         let third_person = shown.contains(&ExtraInformation::ThirdPerson);
         let inputs = seen.robots.iter().map(|robot| {
             let state_values = state_values(&robot.state, &moment).ok_or_else(|| withheld(Observe::NAME))?;
