@@ -20,7 +20,10 @@ def walk(episode: tandem.Episode) -> None:
 
 @dataclass
 class NotingWalker:
-    """Walks as `walk` does, and notes where; on the doomed node its first episode goes on until the node is gone."""
+    """Walks as `walk` does, and notes where; on the doomed node its first episode goes on until the node is gone.
+
+    The others wait for that one to begin: a node may take longer to start a process than they take for all episodes.
+    """
 
     notes: Path
     doomed: str
@@ -34,6 +37,9 @@ class NotingWalker:
             (self.notes / "waiting").touch()
             while True:
                 time.sleep(0.1)
+        deadline = time.monotonic() + 120
+        while not (self.notes / "waiting").exists() and time.monotonic() < deadline:
+            time.sleep(0.1)
         walk(episode)
 
 

@@ -83,6 +83,7 @@ impl Tool for QueryDepth {
 /// A surface in a picture: what is joined to a pixel, or the nearest of a colour.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = limits::one_of(&[("pixel", "array"), ("color", "string")])))]
 pub struct SurfaceQuery {
     /// A pixel on it, as [160, 120]. Null: the nearest of `color`.
     #[schemars(extend("prefixItems" = limits::pixel_range()))]

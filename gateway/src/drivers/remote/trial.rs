@@ -21,9 +21,12 @@ use super::{
 
 /// Rows of a made-up answer where the map leaves open how many there are.
 const ROWS: usize = 10;
+/// Policies answer with 8 to 100 rows: where a map says nothing of its own, no more are taken for granted.
+const MOST_MADE_UP_ROWS: usize = 100;
 
 /// Tries `map` with as many robots as there are tasks for, and says what came of it.
 pub fn try_map(map: &PolicyMap) -> Result<String, RemoteError> {
+    check_execute(map)?;
     let by_robots: BTreeMap<usize, &Task> =
         tasks::ALL.iter().rev().map(|task| (task.robots.len(), task)).collect();
     let trials = by_robots.values().map(|task| Ok(MapTrial::new(map, task)?.text()));
@@ -211,9 +214,10 @@ impl<'a> MapTrial<'a> {
         };
         let count = |calls: usize| if calls == 1 { "1 call".to_owned() } else { format!("{calls} calls") };
         format!(
-            "{}{rows} rows at {} a second make {steps} control steps of 20 ms{between}: {} of {} in the agentic protocol, {} in the \
+            "{}{}{rows} rows at {} a second make {steps} control steps of 20 ms{between}: {} of {} in the agentic protocol, {} in the \
              benchmark's\nan answer whose columns are 0.01, 0.02, ... begins with {} for A: {}\n",
             self.held(),
+            self.made_up_rows(),
             self.map.rate_hz(),
             count(agentic.len()),
             first.name(),
@@ -221,6 +225,18 @@ impl<'a> MapTrial<'a> {
             first.name(),
             told_first(&json!(first))
         )
+    }
+
+    /// What the map leaves open and an answer has to have all the same.
+    fn made_up_rows(&self) -> String {
+        match (self.map.chunk.rows, self.map.chunk.execute) {
+            (None, Some(execute)) => {
+                format!(
+                    "[chunk] leaves rows open: an answer of fewer than {execute} rows is refused when it comes\n"
+                )
+            }
+            _ => String::new(),
+        }
     }
 
     /// What no key tells.
@@ -246,6 +262,18 @@ impl<'a> MapTrial<'a> {
             true => follows.into(),
             false => format!("{follows}no key tells {}: held as at the start\n", held.join(", ")),
         }
+    }
+}
+
+/// Whether a made-up answer can have as many rows as the map executes of it.
+fn check_execute(map: &PolicyMap) -> Result<(), RemoteError> {
+    match (map.chunk.rows, map.chunk.execute) {
+        (None, Some(execute)) if execute > MOST_MADE_UP_ROWS => Err(RemoteError::Misfit(format!(
+            "a made-up answer has at most {MOST_MADE_UP_ROWS} rows, of which [chunk] execute = {execute} are to be executed; give \
+             execute at most as many rows as the policy answers with, and where these are more than {MOST_MADE_UP_ROWS}, rows = \
+             how many as well"
+        ))),
+        _ => Ok(()),
     }
 }
 
@@ -335,10 +363,14 @@ fn told_first(call: &Value) -> Value {
 mod tests {
     use super::*;
 
-    fn tried(text: &str) -> String {
+    fn map(text: &str) -> PolicyMap {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), format!("preset = \"openpi\"\n{text}")).unwrap();
-        try_map(&PolicyMap::find(&file.path().display().to_string()).unwrap()).unwrap()
+        PolicyMap::find(&file.path().display().to_string()).unwrap()
+    }
+
+    fn tried(text: &str) -> String {
+        try_map(&map(text)).unwrap()
     }
 
     fn check(text: &str, says: &[&str]) {
@@ -372,6 +404,23 @@ mod tests {
             let held = told.contains("no key tells waist, base_command: held as at the start");
             assert_eq!(held, name == "xpolicylab", "{name}: {told}");
         }
+    }
+
+    #[test]
+    fn no_more_rows_are_executed_than_an_answer_has() {
+        let refused = |chunk: &str| try_map(&map(chunk)).unwrap_err().to_string();
+        let text = refused("[chunk]\nexecute = 9999");
+        assert!(
+            text.contains("at most 100 rows, of which [chunk] execute = 9999 are to be executed"),
+            "{text}"
+        );
+        assert!(refused("[chunk]\nexecute = 101").contains("execute = 101 are to be executed"));
+        check(
+            "[chunk]\nexecute = 100",
+            &["leaves rows open: an answer of fewer than 100 rows is refused", "100 rows at 50 a second"],
+        );
+        check("[chunk]\nrows = 9999\nexecute = 9999", &["actions [9999, 35]", "9999 rows at 50 a second"]);
+        assert!(!tried("[chunk]\nrows = 50\nexecute = 20").contains("leaves rows open"));
     }
 
     #[test]
