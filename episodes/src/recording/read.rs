@@ -11,8 +11,9 @@ use tandem_tools_spec::{ExtraInformation, PhaseReached, ResultReply};
 
 use super::checked_file::CheckedFile;
 use super::damage::Damage;
-use super::topics::messages::{PhaseMessage, StepError, StepMessage, ToolCallMessage};
+use super::topics::messages::{PhaseMessage, StepError, ToolCallMessage};
 use super::topics::notes::NoteMessage;
+use super::topics::steps::{StepDecoder, state_of};
 use super::{checkpoint_name, metadata, topics};
 use crate::results::RESULT_FILE;
 use crate::scoring::{ScoreMemory, Scores, StepScore};
@@ -125,16 +126,25 @@ impl Recording {
 
     /// The state before the first step, then every step.
     pub fn steps(&self) -> impl Iterator<Item = Result<Step, RecordingError>> {
-        self.messages::<StepMessage>(topics::STEPS).map(|message| {
-            let (_, message) = message?;
-            message.step().map_err(|source| RecordingError::Step { path: self.path.clone(), source })
-        })
+        let mut decoder = StepDecoder::default();
+        self.step_rows().map(move |row| decoder.decode(&row?).map_err(|source| self.no_step(source)))
     }
 
     /// The number and the state hash of every step, that before the first one included.
     pub fn state_hashes(&self) -> impl Iterator<Item = Result<(u64, String), RecordingError>> {
-        let steps = self.messages::<StepMessage>(topics::STEPS);
-        steps.map(|message| message.map(|(_, message)| message.state()))
+        self.step_rows().map(|row| state_of(&row?).map_err(|source| self.no_step(source)))
+    }
+
+    fn step_rows(&self) -> impl Iterator<Item = Result<Vec<u8>, RecordingError>> {
+        self.file.messages(topics::STEPS, |_, row| row.to_vec()).map(|row| row.map_err(|e| self.damaged(e)))
+    }
+
+    fn no_step(&self, source: StepError) -> RecordingError {
+        RecordingError::Step { path: self.path.clone(), source }
+    }
+
+    fn damaged(&self, source: Damage) -> RecordingError {
+        RecordingError::Damaged { path: self.path.clone(), source: source.into() }
     }
 
     /// The checkpoint of `what`: a phase's beginning, or `BEGIN`; `None` where there is none.
@@ -212,10 +222,7 @@ impl Recording {
     ) -> impl Iterator<Item = Result<(f64, T), RecordingError>> {
         let read = |log_time: u64, content: &[u8]| (log_time as f64 / 1e9, serde_json::from_slice(content));
         self.file.messages(topic, read).map(move |message| {
-            let (time_s, content) = message.map_err(|source| RecordingError::Damaged {
-                path: self.path.clone(),
-                source: source.into(),
-            })?;
+            let (time_s, content) = message.map_err(|source| self.damaged(source))?;
             Ok((time_s, content.map_err(|source| self.json(source))?))
         })
     }

@@ -8,11 +8,10 @@ use tandem_sim::{Step, mjcf::Geom, render::robot_rgba};
 use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
 
 use super::mcap_file::{McapFile, Topic, Visibility};
-use super::topics::messages::{
-    BudgetMessage, Json, PhaseMessage, StepMessage, ToolCallMessage, ToolCallRecord,
-};
+use super::topics::messages::{BudgetMessage, Json, PhaseMessage, ToolCallMessage, ToolCallRecord};
 use super::topics::notes::NoteMessage;
 use super::topics::robot::RobotTopics;
+use super::topics::steps::{StepEncoder, StepRow};
 use super::topics::transforms::{self, robot_frame};
 use super::topics::{self, scene};
 use super::{checkpoint_name, metadata};
@@ -22,6 +21,9 @@ use crate::results::RESULT_FILE;
 use crate::scoring::{Facts, ScoreMemory};
 use crate::spec::EpisodeSpec;
 use crate::variation::Disturbance;
+
+/// Poses of links follow from joint states, which every step has; they are for those who look, and are the most bytes of a recording.
+const TRANSFORMS_EVERY: u64 = 5;
 
 /// What is known of an episode before its first step.
 pub struct RecordingHeader {
@@ -49,7 +51,8 @@ pub struct Recorder {
     robot_topics: Vec<RobotTopics>,
     /// What is added to what robots are told, if anything is.
     disturbance: Option<Disturbance>,
-    steps: Topic<Json<StepMessage>>,
+    steps: Topic<StepRow>,
+    step_encoder: StepEncoder,
     transforms: Topic<FrameTransforms>,
     scene: Topic<SceneUpdate>,
     phases: Topic<Json<PhaseMessage>>,
@@ -81,6 +84,7 @@ impl Recorder {
             .collect::<Result<_, _>>()?;
         let mut recorder = Recorder {
             steps: file.topic(topics::STEPS, &[])?,
+            step_encoder: StepEncoder::default(),
             transforms: file.topic("/tf", &[])?,
             scene: file.topic("/scene", &[])?,
             phases: file.topic(topics::PHASES, &[])?,
@@ -95,7 +99,8 @@ impl Recorder {
             file,
         };
         recorder.draw_robots()?;
-        recorder.file.write(&mut recorder.steps, start.time_s, &StepMessage::new(start, state_hash)?)?;
+        let row = recorder.step_encoder.encode(start, state_hash)?;
+        recorder.file.write(&mut recorder.steps, start.time_s, &row)?;
         Ok(recorder)
     }
 
@@ -129,8 +134,11 @@ impl Recorder {
         budget: Budget,
     ) -> Result<(), OutputError> {
         let time_s = step.time_s;
-        self.file.write(&mut self.steps, time_s, &StepMessage::new(step, state_hash)?)?;
-        self.file.write(&mut self.transforms, time_s, &transforms::transforms(&self.robots, step))?;
+        let row = self.step_encoder.encode(step, state_hash)?;
+        self.file.write(&mut self.steps, time_s, &row)?;
+        if self.last_s == self.start_s || step.control_step.is_multiple_of(TRANSFORMS_EVERY) {
+            self.file.write(&mut self.transforms, time_s, &transforms::transforms(&self.robots, step))?;
+        }
         let robots = self.robots.iter().zip(&mut self.robot_topics).zip(&step.robots);
         for (index, ((robot, topics), moved)) in robots.enumerate() {
             topics.step(&mut self.file, robot, index, time_s, moved, facts)?;

@@ -119,3 +119,35 @@ fn pictures_are_drawn_once_whatever_stops_the_run() {
     let text = draw(25, 1).unwrap_err().to_string();
     assert!(text.contains("pictures of another recording, rate or size"), "{text}");
 }
+
+/// What a data set is drawn with and what a policy is shown is one picture: the camera's own, scaled. Drawn at that size it is another.
+#[test]
+fn small_pictures_are_the_cameras_own_scaled() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = recorded(&folder.path().join("episode"));
+    let step = recording.steps().nth(5).unwrap().unwrap();
+    let mut scene = EpisodeRenderer::of(&recording.spec).unwrap();
+    let view = EpisodeCamera::Egocentric(0);
+    let small = PictureSize { width: 160, height: 120 };
+    let own = scene.colours(view, &step, None);
+    let colours = scene.colours(view, &step, Some(small));
+    assert_eq!((own.width, own.height, colours.width, colours.height), (320, 240, 160, 120));
+    assert_eq!(colours.rgb, own.scaled([160, 120]).into_raw());
+    let camera = scene.camera(view, &step, Some(small));
+    assert_ne!(scene.draw(&step, &camera).rgb, colours.rgb);
+
+    // The one camera that is asked for, without depth.
+    let out = folder.path().join("lean");
+    let plan = |name: &str| PicturesPlan {
+        rate_hz: 10,
+        size: Some(small),
+        cameras: vec![name.into()],
+        depth: false,
+        ..PicturesPlan::default()
+    };
+    let drawn = draw_all(&recording, &plan("A"), &out, &|| {}).unwrap();
+    assert_eq!((drawn.moments, drawn.cameras, files(&out).len()), (3, 1, 3 + 2));
+    assert_eq!(image::open(out.join("A/rgb/000005.png")).unwrap().into_rgb8().into_raw(), colours.rgb);
+    let text = draw_all(&recording, &plan("C"), &out, &|| {}).unwrap_err().to_string();
+    assert!(text.contains("no camera \"C\"") && text.contains("third_person, A, B"), "{text}");
+}

@@ -170,3 +170,21 @@ fn a_torn_end_is_left_out() {
         assert!(text.contains(says) && text.contains(name), "{text}");
     }
 }
+
+/// Four steps of Pouring, as a version wrote them that had every step whole, as JSON.
+#[test]
+fn recordings_of_earlier_versions_are_read() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/sessions/recordings/whole_steps.mcap");
+    let recording = Recording::read(&path).unwrap();
+    assert_eq!((recording.spec.task.id, recording.spec.seed), ("pouring", 2000));
+    let steps: Vec<_> = recording.steps().map(Result::unwrap).collect();
+    assert_eq!(steps.iter().map(|step| step.control_step).collect::<Vec<_>>(), [0, 1, 2, 3, 4]);
+    let heights_m = steps.iter().map(|step| step.object("cup").unwrap().world_from_object.translation.z);
+    assert!(heights_m.into_iter().all(|height_m| (0.7..1.2).contains(&height_m)));
+    let hashes: Vec<_> = recording.state_hashes().map(|hash| hash.unwrap().1).collect();
+    assert_eq!(
+        (hashes.len(), hashes.last()),
+        (5, recording.result.as_ref().map(|result| &result.state_hash))
+    );
+    assert!(!recording.score().unwrap().complete());
+}

@@ -12,7 +12,8 @@ use tandem_episodes::players::{self, InProcess, LocalEpisode as _, PlayerError};
 use tandem_episodes::replay::{Verdict, Verification, verify};
 use tandem_episodes::{
     Clock, EpisodeSpec, Phase, PhaseStart, Recorder, Recording, Sensing, SensorModel, Session, Start,
-    recover, tasks,
+    Variation, recover,
+    tasks::{self, Spread},
 };
 use tandem_tools_spec::{EndReason, Finish, GetStatus, Observe, Protocol, Wait};
 
@@ -84,6 +85,32 @@ fn noise_is_the_same_again() {
     // Objects apart, nothing else depends on the seed.
     let exact = |seed: u32| begun(spec("handover", seed, Protocol::Benchmark));
     assert_eq!(exact(5), exact(6));
+}
+
+/// Slow noise on what robots are told is drawn from the seed: the same again, whatever the policy is told is the label, and nobody
+/// who does not ask for it has any.
+#[test]
+fn what_is_disturbed_is_the_same_again_and_its_label_is_what_was_told() {
+    let stand = |seed: u32, disturb: f32, folder: &Path| {
+        let variation = Variation { disturb, spread: Spread::Double, variety: 0 };
+        let spec = EpisodeSpec { variation, ..spec("handover", seed, Protocol::Benchmark) };
+        let mut session = Session::start(&spec, Some(folder)).unwrap();
+        let rest = session.present().robots[0].command.clone();
+        wait(&mut session, 25);
+        assert_eq!(session.present().robots[0].command, rest, "it was told to hold still");
+        session.close()
+    };
+    let mut differ = 0;
+    for seed in 5..9 {
+        let [plain, disturbed] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+        let undisturbed = stand(seed, 0.0, plain.path());
+        let result = stand(seed, 2.0, disturbed.path());
+        differ += usize::from(undisturbed.state_hash != result.state_hash);
+        assert_eq!(undisturbed.departures, ["assistance: full", "spread: 2"]);
+        assert_eq!(result.departures, ["assistance: full", "spread: 2", "disturbed: 2"]);
+        assert_eq!(verified(&disturbed.path().join(Recorder::FILE_NAME)).outcome, Verdict::Same);
+    }
+    assert!((1..=4).contains(&differ), "most episodes are disturbed: {differ} of 4");
 }
 
 /// Three commands of A, in which a second is thought; the policy's clock runs out after `thinking_s` more.

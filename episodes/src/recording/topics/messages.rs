@@ -47,19 +47,14 @@ pub fn state_hash_text(state_hash: u64) -> String {
     format!("{state_hash:016x}")
 }
 
-/// Everything that a control step left behind, as bytes: thousands of numbers that have to come back as they were.
-#[derive(Serialize, Deserialize, JsonSchema)]
+/// Everything that a control step left behind, as recordings of earlier versions have it; [`super::steps`] has it now.
+#[derive(Deserialize)]
 pub struct StepMessage {
     control_step: u64,
     /// Of everything that decides the future, more than the step shows; 16 hexadecimal digits.
     state_hash: String,
     /// [`Step`] in postcard's encoding, base64.
-    #[schemars(extend("contentEncoding" = "base64"))]
     postcard: String,
-}
-
-impl JsonMessage for StepMessage {
-    const SCHEMA_NAME: &str = "tandem.Step";
 }
 
 /// Why a message holds no [`Step`].
@@ -69,18 +64,15 @@ pub enum StepError {
     Base64(#[from] DecodeError),
     #[error("not a step of this build: {0}")]
     Postcard(#[from] postcard::Error),
+    #[error("not a step as JSON: {0}")]
+    Json(#[from] serde_json::Error),
+    #[error("a step is cut short, or of a later version of Tandem")]
+    Cut,
+    #[error("a step before it cannot be read")]
+    Lost,
 }
 
 impl StepMessage {
-    pub fn new(step: &Step, state_hash: u64) -> Result<Json<StepMessage>, OutputError> {
-        let bytes = postcard::to_stdvec(step).map_err(|source| OutputError::Encode(source.into()))?;
-        Ok(Json(StepMessage {
-            control_step: step.control_step,
-            state_hash: state_hash_text(state_hash),
-            postcard: BASE64_STANDARD.encode(bytes),
-        }))
-    }
-
     pub fn step(&self) -> Result<Step, StepError> {
         Ok(postcard::from_bytes(&BASE64_STANDARD.decode(&self.postcard)?)?)
     }

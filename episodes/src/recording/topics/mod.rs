@@ -4,6 +4,7 @@ pub mod messages;
 pub mod notes;
 pub mod robot;
 pub mod scene;
+pub mod steps;
 pub mod transforms;
 
 /// Topics that are read back.

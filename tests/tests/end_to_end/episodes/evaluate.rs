@@ -4,9 +4,13 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use serde_json::json;
 use tandem_episodes::evaluation::{EpisodeEvent, EvaluationPlan, KeptFiles, Shard, Starts, evaluate};
+use tandem_episodes::players::OpenLoop;
+use tandem_episodes::replay::{Verdict, verify};
 use tandem_episodes::reports::{EvaluationReport, load};
 use tandem_episodes::results::PlayedEpisode;
-use tandem_episodes::{Controller, EpisodeSpec, RendererKind, RobotFile, Sensing, Variation, players, tasks};
+use tandem_episodes::{
+    Controller, EpisodeSpec, Recording, RendererKind, RobotFile, Sensing, Variation, players, tasks,
+};
 use tandem_tools_spec::{Assistance, Disclosure, EndReason, Hints, Protocol};
 
 fn plan(jobs: usize, seeds: Vec<u32>) -> EvaluationPlan<'static> {
@@ -120,4 +124,64 @@ fn phases_are_played_on_their_own_by_shares_and_joined_by_a_report() {
         level.phases.iter().map(|rate| (&*rate.number, rate.reached, rate.episodes)).collect();
     assert_eq!(reached, [("p1", 1, 1), ("p2", 1, 1), ("p3", 1, 1)]);
     assert_eq!((level.two_robots.collaborative_share, level.two_robots.drop_share), (Some(1.0), Some(0.0)));
+}
+
+/// What the robots of one seed were told, replayed on another, is no policy's doing; a report says how far it gets.
+#[test]
+fn a_demonstration_is_replayed_without_a_look_on_other_seeds_alone() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let [demos, out] = ["demos", "out"].map(|name| folder.path().join(name));
+    let files = KeptFiles { pages: false, only_successful: true };
+    let collected = EvaluationPlan { record: true, files, ..plan(1, vec![1]) };
+    evaluate(&collected, &demos, &|_| {}).expect("it is played");
+    let kept = |name: &str| demos.join("episodes/handover-1").join(name).exists();
+    assert!(kept("episode.mcap") && !kept("strip.png") && !kept("report.html"));
+
+    let blind = OpenLoop::read(&demos).expect("a demonstration");
+    let replayed = EvaluationPlan { player: &blind, ..plan(1, vec![1, 2]) };
+    let evaluation = evaluate(&replayed, &out, &|_| {}).expect("it is played");
+    assert_eq!(
+        evaluation.left_out,
+        ["handover seed 1: it is what open-loop replays, which is for other seeds"]
+    );
+    let [episode] = &evaluation.episodes[..] else { panic!("{:?}", evaluation.episodes) };
+    assert_eq!((episode.result.seed, episode.policy.name.as_str()), (2, "open-loop"));
+    assert!(episode.reached(0), "what stands nearly where it stood is grasped blindly: {episode:?}");
+    let report = EvaluationReport::of(&load(&[out]).expect("episodes"));
+    let floor = report.floors.iter().find(|floor| floor.task == "handover").expect("its floor");
+    assert!(floor.players.iter().any(|rate| rate.player == "open-loop" && rate.measured == "in this report"));
+}
+
+/// Of what failed nothing is kept but what it came to, and it is not played again.
+#[test]
+fn only_what_succeeded_is_kept_where_that_is_wished() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let files = KeptFiles { pages: true, only_successful: true };
+    let idle = players::find("idle").expect("a player");
+    let plan = EvaluationPlan { player: idle, record: true, files, ..plan(1, vec![1]) };
+    evaluate(&plan, folder.path(), &|_| {}).expect("it is played");
+    assert!(folder.path().join("episodes/handover-1.json").exists());
+    assert!(!folder.path().join("episodes/handover-1").exists());
+    let again = evaluate(&plan, folder.path(), &|event| assert!(matches!(event, EpisodeEvent::Kept(_))));
+    assert_eq!(again.expect("it was played").tasks["handover"].p3, 0);
+}
+
+/// Demonstrations of one seed that are to differ do, succeed, and are the same again; without that the expert is who it was.
+#[test]
+fn demonstrations_vary_as_they_are_asked_to() {
+    let play = |variety: u8, disturb: f32| {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let variation = Variation { variety, disturb, ..Variation::default() };
+        let plan = EvaluationPlan { variation, record: true, ..plan(1, vec![2000]) };
+        let played = evaluate(&plan, folder.path(), &|_| {}).expect("it is played");
+        let recording = folder.path().join("episodes/handover-2000/episode.mcap");
+        let verified = verify(&Recording::read(&recording).expect("a recording")).expect("it is read");
+        assert_eq!(verified.outcome, Verdict::Same);
+        assert_eq!(played.tasks["handover"].p3, 1, "variety {variety}, disturbed {disturb}");
+        played.episodes[0].result.state_hash.clone()
+    };
+    let [plain, varied, again] = [0, 1, 1].map(|variety| play(variety, 0.0));
+    assert_eq!(varied, again);
+    assert_ne!(plain, varied);
+    assert_eq!(play(1, 1.0), play(1, 1.0));
 }
