@@ -95,7 +95,7 @@ fn what_is_disturbed_is_the_same_again_and_its_label_is_what_was_told() {
         let variation = Variation { disturb, spread: Spread::Double, variety: 0 };
         let spec = EpisodeSpec { variation, ..spec("handover", seed, Protocol::Benchmark) };
         let mut session = Session::start(&spec, Some(folder)).unwrap();
-        let rest = session.present().robots[0].command.clone();
+        let rest = session.present().robots[0].command;
         wait(&mut session, 25);
         assert_eq!(session.present().robots[0].command, rest, "it was told to hold still");
         session.close()
