@@ -9,7 +9,7 @@ use tandem_tools_spec::{Briefing, Instruction, TaskList};
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::describe::task_list;
-use crate::tasks;
+use crate::tasks::TaskSet;
 
 /// Instructions by task id, as JSON:
 /// `{"handover": {"joint": "what all robots do", "robots": {"A": "what A does", "B": "what B does"}}}`.
@@ -44,8 +44,8 @@ pub enum InstructionsError {
 }
 
 impl Instructions {
-    /// Reads a file and checks that its tasks and robots exist.
-    pub fn read(path: &Path) -> Result<Instructions, InstructionsError> {
+    /// Reads a file and checks that its tasks are among these, and its robots among theirs.
+    pub fn read(path: &Path, tasks: &TaskSet) -> Result<Instructions, InstructionsError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| InstructionsError::Read { path: path.into(), source })?;
         let instructions: Instructions = serde_json::from_str(&text)
@@ -55,7 +55,7 @@ impl Instructions {
             return Err(InstructionsError::Empty { path: path.into(), place });
         }
         for (id, own) in &instructions.0 {
-            let task = tasks::find(id).map_err(|error| unknown(error.to_string()))?;
+            let task = tasks.find(id).map_err(|error| unknown(error.to_string()))?;
             let names: Vec<&str> = task.robots.iter().map(|robot| robot.name).collect();
             if let Some(robot) = own.robots.keys().find(|robot| !names.contains(&robot.as_str())) {
                 return Err(unknown(format!("{id} has no robot {robot:?}; have: {}", names.join(", "))));
@@ -86,9 +86,9 @@ impl Instructions {
         Some(format!("{:016x}", xxh3_64(format!("{:?}", (joint, robots)).as_bytes())))
     }
 
-    /// The reply to `list_tasks` in these words, where robots follow base commands within `limits`.
-    pub fn task_list(&self, limits: &BaseLimits) -> TaskList {
-        let mut list = task_list(limits);
+    /// The reply to `list_tasks` with these tasks in these words, where robots follow base commands within `limits`.
+    pub fn task_list(&self, tasks: &TaskSet, limits: &BaseLimits) -> TaskList {
+        let mut list = task_list(tasks, limits);
         for task in &mut list.tasks {
             self.rephrase(&task.id, &mut task.instruction, &mut task.robots);
         }
@@ -122,7 +122,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("instructions.json");
         std::fs::write(&path, text).unwrap();
-        Instructions::read(&path).map_err(|error| error.to_string())
+        Instructions::read(&path, &TaskSet::default()).map_err(|error| error.to_string())
     }
 
     #[test]
@@ -130,8 +130,8 @@ mod tests {
         let list =
             read(r#"{"handover": {"joint": "Reicht die Flasche weiter.", "robots": {"B": "Nimm sie."}}}"#);
         let limits = LocomotionChoice::default().limits();
-        let list = list.unwrap().task_list(&limits);
-        let (own, handover) = (task_list(&limits), &list.tasks[0]);
+        let list = list.unwrap().task_list(&TaskSet::default(), &limits);
+        let (own, handover) = (task_list(&TaskSet::default(), &limits), &list.tasks[0]);
         assert_eq!(handover.instruction, "Reicht die Flasche weiter.");
         assert_eq!(handover.robots[0], own.tasks[0].robots[0]);
         assert_eq!(handover.robots[1].instruction, "Nimm sie.");

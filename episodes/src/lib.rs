@@ -19,6 +19,7 @@
 pub mod batch;
 pub mod bench;
 mod commands;
+mod conditions;
 mod convert;
 mod describe;
 mod error;
@@ -39,10 +40,13 @@ mod scoring;
 mod session;
 mod spec;
 pub mod statistics;
+mod task_check;
+mod task_file;
 pub mod tasks;
 mod variation;
 
 pub use commands::{Called, OperatorCall, OperatorCommand};
+pub use conditions::{FUNCTIONS, Function};
 pub use describe::{brief, task_list};
 pub use error::{CheckpointError, EpisodeError, SceneError};
 pub use fingerprint::{build, name_program};
@@ -67,4 +71,6 @@ pub use tandem_sim::{
     joint_names,
     render::RendererKind,
 };
+pub use task_check::{TaskCheck, TaskCheckError, check_task};
+pub use task_file::{TaskFileError, read_task, task_of};
 pub use variation::Variation;

@@ -12,14 +12,14 @@ use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, Wording};
 
 use crate::error::SceneError;
 use crate::scoring::Phase;
-use crate::tasks::{self, Task};
+use crate::tasks::Task;
 use crate::variation::Variation;
 
 /// Everything that makes an episode what it is. Equal values, played by equal calls on the same build, end in the same
 /// state, bit for bit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EpisodeSpec {
-    #[serde(with = "tasks::by_id")]
+    #[serde(with = "crate::task_file::by_id_or_file")]
     pub task: &'static Task,
     pub seed: u32,
     pub protocol: Protocol,
@@ -143,7 +143,7 @@ impl EpisodeSpec {
         // Without `..`, so that the compiler asks about a new field. What is named apart, or changes nothing that a policy could
         // tell, is left out.
         let EpisodeSpec {
-            task: _,
+            task,
             seed: _,
             protocol: _,
             scene,
@@ -160,6 +160,7 @@ impl EpisodeSpec {
         } = self;
         let file = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let departures = [
+            task.file.as_ref().map(|file| format!("task file: {} {}", file.source.name, file.xxh3)),
             (*assistance != Assistance::Paper).then(|| format!("assistance: {assistance}")),
             (*disclosure != assistance.disclosure()).then(|| format!("phases told: {disclosure}")),
             (*hints != assistance.hints()).then(|| format!("hints: {hints}")),
@@ -286,7 +287,7 @@ impl Controller {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tasks::Spread;
+    use crate::tasks::{self, Spread};
 
     #[test]
     fn controllers_are_named_as_they_were_asked_for() {

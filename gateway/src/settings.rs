@@ -14,7 +14,9 @@ use clap::{
 use serde::Deserialize;
 use tandem_episodes::{
     BaseLimits, Controller, EpisodeError, EpisodeSpec, Instructions, InstructionsError, RendererKind,
-    SceneFile, Sensing, SensorModel, SimError, StateSource, Visibility, tasks,
+    SceneFile, Sensing, SensorModel, SimError, StateSource, TaskCheckError, TaskFileError, Visibility,
+    check_task, read_task,
+    tasks::{Task, TaskSet},
 };
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, StartEpisode, Wording};
 
@@ -52,6 +54,9 @@ pub struct Layer {
     /// MJCF file of a scene in place of the tasks' own; its site `task` says where.
     #[arg(long, env = "TANDEM_SCENE", value_name = "FILE")]
     pub scene: Option<PathBuf>,
+    /// TOML files with tasks of your own, separated by commas; one that is called as a built-in task takes its place.
+    #[arg(long, env = "TANDEM_TASK_FILE", value_name = "FILES", value_delimiter = ',')]
+    pub task_file: Option<Vec<PathBuf>>,
     /// ONNX file with a velocity policy for the G1 in place of our own base controller; looped:FILE puts a loop over the robot's place around it.
     #[arg(long, env = "TANDEM_LOCOMOTION", value_name = "FILE")]
     pub locomotion: Option<PathBuf>,
@@ -123,6 +128,7 @@ impl Layer {
             record: self.record.or(next.record),
             instructions: self.instructions.or(next.instructions),
             scene: self.scene.or(next.scene),
+            task_file: self.task_file.or(next.task_file),
             locomotion: self.locomotion.or(next.locomotion),
             state_estimate: self.state_estimate.or(next.state_estimate),
             sensors: self.sensors.or(next.sensors),
@@ -191,9 +197,16 @@ impl Layer {
         self.runs.clone().unwrap_or_else(|| "runs".into())
     }
 
-    /// The instructions of the file, or the tasks' own.
-    pub fn read_instructions(&self) -> Result<Instructions, InstructionsError> {
-        self.instructions.as_deref().map_or_else(|| Ok(Instructions::default()), Instructions::read)
+    /// The benchmark's tasks, and those of files.
+    pub fn read_tasks(&self) -> Result<TaskSet, SettingsError> {
+        let files = self.task_file.iter().flatten();
+        Ok(TaskSet::with(files.map(|path| read_task_file(path)).collect::<Result<_, _>>()?))
+    }
+
+    /// The instructions of the file, which may name these tasks, or the tasks' own.
+    pub fn read_instructions(&self, tasks: &TaskSet) -> Result<Instructions, InstructionsError> {
+        let path = self.instructions.as_deref();
+        path.map_or_else(|| Ok(Instructions::default()), |path| Instructions::read(path, tasks))
     }
 
     /// The base controller; its file is not read yet.
@@ -236,6 +249,8 @@ pub struct Settings {
     pub runs: PathBuf,
     /// When recordings can be read.
     pub record: Visibility,
+    /// What there is to play.
+    pub tasks: TaskSet,
     /// Instructions in place of the tasks' own.
     pub instructions: Instructions,
     /// The scene in place of the tasks' own.
@@ -314,6 +329,17 @@ pub enum SettingsError {
     /// The file with instructions cannot be used.
     #[error(transparent)]
     Instructions(#[from] InstructionsError),
+    /// A task's file cannot be used.
+    #[error(transparent)]
+    TaskFile(#[from] TaskFileError),
+    /// A task of a file is well written, and cannot be played.
+    #[error("{path}: {source}")]
+    Task {
+        /// The file.
+        path: PathBuf,
+        /// What happens.
+        source: TaskCheckError,
+    },
     /// The scene, the base controller or the renderer cannot be used.
     #[error(transparent)]
     Sim(#[from] SimError),
@@ -345,7 +371,7 @@ impl Settings {
             disclosure: self.disclosure,
             hints: self.hints,
             instructions: self.instructions.fingerprint(&start.task),
-            ..EpisodeSpec::new(tasks::find(&start.task)?, start.seed, protocol)
+            ..EpisodeSpec::new(self.tasks.find(&start.task)?, start.seed, protocol)
         })
     }
 
@@ -362,6 +388,7 @@ impl Settings {
         layer.check()?;
         let locomotion = layer.controller();
         let renderer = layer.renderer();
+        let tasks = layer.read_tasks()?;
         let assistance = layer.assistance.unwrap_or_default();
         tracing::info!("{}", renderer.describe()?);
         let seconds = |given: Option<u32>, default: u32| Duration::from_secs(given.unwrap_or(default).into());
@@ -373,7 +400,8 @@ impl Settings {
                 None | Some(Record::Live) => Visibility::Live,
                 Some(Record::After) => Visibility::After,
             },
-            instructions: layer.read_instructions()?,
+            instructions: layer.read_instructions(&tasks)?,
+            tasks,
             scene: layer.scene.as_deref().map(read_scene).transpose()?,
             base_limits: locomotion.load()?.limits(),
             locomotion,
@@ -410,6 +438,18 @@ fn read_layer(path: &Path) -> Result<Layer, SettingsError> {
     toml::from_str(&text).map_err(|source| SettingsError::Parse { path: path.into(), source })
 }
 
+/// Reads a task's file and tries the task: what may be meant so is logged.
+pub fn read_task_file(path: &Path) -> Result<&'static Task, SettingsError> {
+    let task = read_task(path)?;
+    let check = check_task(task, &[FIRST_SEED], None)
+        .map_err(|source| SettingsError::Task { path: path.into(), source })?;
+    check.falls.iter().chain(&check.notes).for_each(|line| tracing::warn!("{}: {line}", task.id));
+    Ok(task)
+}
+
+/// A task is tried with it.
+const FIRST_SEED: u32 = 0;
+
 /// Reads a scene, and logs what of its file does not happen quite as in MuJoCo.
 pub fn read_scene(path: &Path) -> Result<SceneFile, SimError> {
     let (scene, approximations) = SceneFile::with_approximations(path)?;
@@ -418,70 +458,4 @@ pub fn read_scene(path: &Path) -> Result<SceneFile, SimError> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn flags_come_before_the_file_and_the_file_before_defaults() {
-        let path = std::env::temp_dir().join(format!("tandem-settings-{}.toml", std::process::id()));
-        std::fs::write(&path, "max_episodes = 3\nmax_body_bytes = 5\n").unwrap();
-        let flags = Layer { max_body_bytes: Some(7), ..Layer::default() };
-        let settings = Settings::resolve(flags, Some(&path)).unwrap();
-        assert_eq!((settings.max_body_bytes, settings.max_episodes, settings.listen.port()), (7, 3, 8700));
-
-        std::fs::write(&path, "max_episode = 3\n").unwrap();
-        let text = Settings::resolve(Layer::default(), Some(&path)).unwrap_err().to_string();
-        assert!(text.contains("max_episode`") && text.contains("`max_episodes`"), "{text}");
-
-        let flags = Layer { locomotion: Some(path.clone()), ..Layer::default() };
-        let text = Settings::resolve(flags, None).unwrap_err().to_string();
-        assert!(text.contains("ONNX") && text.contains("tandem-settings"), "{text}");
-        std::fs::remove_file(&path).unwrap();
-        assert!(Settings::resolve(Layer::default(), Some(&path)).is_err());
-    }
-
-    #[test]
-    fn an_address_that_others_reach_needs_a_token() {
-        let token = || Token::parse("0123456789abcdef", "a test").unwrap();
-        let resolve = |listen: &str, token: Option<Token>| {
-            let flags = Layer { listen: Some(listen.parse().unwrap()), token, ..Layer::default() };
-            Settings::resolve(flags, None)
-        };
-        for listen in ["127.0.0.1:0", "127.9.9.9:0", "[::1]:0", "[::ffff:127.0.0.1]:0"] {
-            assert!(resolve(listen, None).is_ok(), "{listen}");
-        }
-        for listen in ["0.0.0.0:0", "[::]:0", "10.0.0.5:8700", "[fe80::1]:0"] {
-            let refused = resolve(listen, None).unwrap_err().to_string();
-            assert!(refused.contains("--token-file") && refused.contains("TANDEM_TOKEN"), "{refused}");
-            assert!(resolve(listen, Some(token())).is_ok(), "{listen}");
-        }
-        let both = Layer { token_file: Some("x".into()), token: Some(token()), ..Layer::default() };
-        assert!(matches!(Settings::resolve(both, None), Err(SettingsError::TwoTokens)));
-        let missing = Layer { token_file: Some("/nowhere/token".into()), ..Layer::default() };
-        let refused = Settings::resolve(missing, None).unwrap_err().to_string();
-        assert!(refused.contains("/nowhere/token"), "{refused}");
-    }
-
-    #[test]
-    fn settings_that_let_nobody_in_are_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("settings.toml");
-        let check = |line: &str, says: &[&str]| {
-            std::fs::write(&path, line).unwrap();
-            let text = Settings::resolve(Layer::default(), Some(&path)).unwrap_err().to_string();
-            says.iter().for_each(|part| assert!(text.contains(part), "{line}: {text}"));
-        };
-        check("max_episodes = 0", &["max_episodes is 0", "at least 1, as 8"]);
-        for limit in ["max_body_bytes", "request_timeout", "max_requests", "rate_limit", "idle_timeout"] {
-            check(&format!("{limit} = 0"), &[limit, "at least 1"]);
-        }
-        for host in ["", "http://lab.example", "lab.example:8700", "lab..example", "a b"] {
-            check(&format!("allowed_host = [{host:?}]"), &["no name of a host", "as lab.example"]);
-        }
-        check("token_file = \"\"", &["token_file is set and empty", "openssl"]);
-        check("token = \"\"", &["unknown field `token`", "`token_file`"]);
-        let most = Layer { max_requests: Some(usize::MAX), stop_timeout: Some(0), ..Layer::default() };
-        let hosts = Some(["lab.example", "lab", "10.0.0.5", "fe80::1"].map(String::from).into());
-        assert!(Settings::resolve(Layer { allowed_host: hosts, ..most }, None).is_ok());
-    }
-}
+mod tests;

@@ -67,9 +67,10 @@ const TASK: Task = Task {
         id: "none",
         description: "A bench has no success that would end it early.",
         collaborative: true,
-        done: Done::When(|_| false),
-        nearness: |_| 0.0,
+        done: Done::When(&|_| false),
+        nearness: &|_| 0.0,
     }],
+    file: None,
 };
 
 const fn beside(name: &'static str, left_m: f32) -> RobotSpot {

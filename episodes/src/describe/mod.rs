@@ -18,11 +18,11 @@ use crate::commands::RobotSheet;
 use crate::convert::{rounded, wire_limits};
 use crate::protocol::rules;
 use crate::scoring::Phase;
-use crate::tasks::{self, Task};
+use crate::tasks::{self, Task, TaskSet};
 
-/// The reply to `list_tasks` where robots follow base commands within `limits`.
-pub fn task_list(limits: &BaseLimits) -> TaskList {
-    TaskList { tasks: tasks::ALL.iter().map(task_info).collect(), base_limits: wire_limits(limits) }
+/// The reply to `list_tasks` with these tasks, where robots follow base commands within `limits`.
+pub fn task_list(tasks: &TaskSet, limits: &BaseLimits) -> TaskList {
+    TaskList { tasks: tasks.all().map(task_info).collect(), base_limits: wire_limits(limits) }
 }
 
 fn task_info(task: &Task) -> TaskInfo {

@@ -80,7 +80,7 @@ fn place(robot: &RobotSpot, spot: &ObjectSpot) -> String {
 fn size_m(spot: &ObjectSpot, yaw_rad: f32) -> Result<Vector, SimError> {
     let turn = Rotation::from_rotation_z(yaw_rad);
     let (mut low_m, mut high_m) = (Vector::INFINITY, Vector::NEG_INFINITY);
-    for part in ObjectModel::parts(spot.file, spot.name)? {
+    for part in ObjectModel::parts(&spot.source(), spot.name)? {
         for geom in part.model.geoms.iter().filter(|geom| geom.drawn || geom.collides) {
             for corner_m in corners_m(geom, &part.object_from_part) {
                 let corner_m = turn * corner_m;

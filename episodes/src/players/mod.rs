@@ -15,6 +15,7 @@ use tandem_tools_spec::{ExtraInformation, Observe, ToolCall, ToolReply};
 use crate::observation::{Picture, TeamObservation};
 use crate::scoring::Facts;
 use crate::spec::EpisodeSpec;
+use crate::tasks::Task;
 
 pub use in_process::InProcess;
 pub use open_loop::{OpenLoop, OpenLoopError};
@@ -115,6 +116,11 @@ pub fn find(name: &str) -> Result<&'static PlayerEntry, PlayerError> {
         name: name.into(),
         have: ALL.iter().map(|entry| entry.name).collect(),
     })
+}
+
+/// The player that plays a task by itself: its expert, or nobody where none knows it.
+pub fn expert_or_nobody(task: &'static Task) -> Result<&'static PlayerEntry, PlayerError> {
+    find(if experts::solves(task) { "expert" } else { "idle" })
 }
 
 impl PlayerEntry {

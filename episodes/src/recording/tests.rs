@@ -68,9 +68,13 @@ fn seen(world: &World) -> TeamObservation {
 /// A recorder, and what scores the world's one object.
 fn recorder(folder: &Path, world: &World) -> (Recorder, Scores) {
     let start = world.present();
-    let scores =
-        Scores::new(spec().task.phases, [("bottle", "bottle")].into_iter(), &world.robots()[0].model, &start)
-            .unwrap();
+    let scores = Scores::new(
+        spec().task.phases,
+        [("bottle", "bottle".into())].into_iter(),
+        &world.robots()[0].model,
+        &start,
+    )
+    .unwrap();
     let header = RecordingHeader {
         spec: spec(),
         locomotion: "balance".into(),

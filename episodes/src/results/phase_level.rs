@@ -58,15 +58,17 @@ impl PhaseLevel {
     /// Counts the episodes that began at a phase and count; `None` where none did.
     pub fn of<'a>(episodes: impl Iterator<Item = &'a PlayedEpisode>) -> Option<PhaseLevel> {
         let mut counts: BTreeMap<(usize, usize), [usize; 2]> = BTreeMap::new();
-        for played in episodes.filter(|played| played.counts()) {
-            let task = tasks::ALL.iter().position(|task| task == played.spec.task);
+        let counted: Vec<&PlayedEpisode> = episodes.filter(|played| played.counts()).collect();
+        let order = tasks::in_order(counted.iter().map(|played| played.spec.task));
+        for played in counted {
+            let task = order.iter().position(|task| *task == played.spec.task);
             let Some((key, phase)) = task.zip(played.start_phase()) else { continue };
             let [episodes, reached] = counts.entry((key, phase)).or_default();
             *episodes += 1;
             *reached += usize::from(played.reached(phase));
         }
         let rate = |((task, phase), [episodes, reached]): ((usize, usize), [usize; 2])| {
-            let task = &tasks::ALL[task];
+            let task = order[task];
             let Phase { id, collaborative, .. } = task.phases[phase];
             let robots = task.robots.len();
             PhaseRate {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use tandem_sim::{ObjectModel, RobotModel, SimError, Step};
+use tandem_sim::{ObjectFile, ObjectModel, RobotModel, SimError, Step};
 
 use super::facts::{Facts, ObjectFacts, RobotFacts};
 use super::grasps::ObjectGrasps;
@@ -29,13 +29,13 @@ impl FactsTracker {
     /// Begins to watch `objects`, given by name and file, and what moves on them, and robots of a model, with the state before the
     /// first control step.
     pub fn new<'a>(
-        objects: impl Iterator<Item = (&'a str, &'a str)>,
+        objects: impl Iterator<Item = (&'a str, ObjectFile)>,
         robot: &Arc<RobotModel>,
         start: &Step,
     ) -> Result<FactsTracker, SimError> {
         let mut tracker = FactsTracker { models: Vec::new(), robot: robot.clone(), memory: Vec::new() };
         for (name, file) in objects {
-            for part in ObjectModel::parts(file, name)? {
+            for part in ObjectModel::parts(&file, name)? {
                 let at_start = start.object(&part.name);
                 tracker.memory.push(ObjectMemory {
                     rest_height_m: at_start.map_or(0.0, |state| state.world_from_object.translation.z),

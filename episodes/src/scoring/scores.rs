@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use tandem_sim::{RobotModel, SimError, Step};
+use tandem_sim::{ObjectFile, RobotModel, SimError, Step};
 
 use super::facts_tracker::{FactsTracker, ObjectMemory};
 use super::phases::{PhaseMemory, PhaseTracker};
@@ -35,7 +35,7 @@ impl Scores {
     /// state before the first control step.
     pub fn new<'a>(
         phases: &'static [Phase],
-        objects: impl Iterator<Item = (&'a str, &'a str)>,
+        objects: impl Iterator<Item = (&'a str, ObjectFile)>,
         robot: &Arc<RobotModel>,
         start: &Step,
     ) -> Result<Scores, SimError> {

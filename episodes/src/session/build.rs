@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use tandem_sim::mjcf::{Document, Site};
 use tandem_sim::{
-    CONTROL_HZ, ObjectPlacement, Pose, Robot, RobotModel, RobotPlacement, Rotation, SceneSource, Step,
-    Vector, World, WorldSpec, assets, heading_rad,
+    CONTROL_HZ, ObjectPlacement, Pose, Robot, RobotModel, RobotPlacement, Rotation, SceneSource, SimError,
+    Step, Vector, World, WorldSpec, assets, heading_rad,
 };
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -71,14 +71,14 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
 
 /// What the world of an episode is made of.
 fn world_spec(spec: &EpisodeSpec) -> Result<WorldSpec, EpisodeError> {
-    let own = own_spec(spec.task, spec.seed, spec.variation.spread);
+    let own = own_spec(spec.task, spec.seed, spec.variation.spread)?;
     match &spec.scene {
         None => Ok(own),
         Some(file) => Ok(elsewhere(own, spec.task, &file.path, file.load()?)?),
     }
 }
 
-fn own_spec(task: &Task, seed: u32, spread: Spread) -> WorldSpec {
+fn own_spec(task: &Task, seed: u32, spread: Spread) -> Result<WorldSpec, SimError> {
     let robots = task.robots.iter().map(|robot| RobotPlacement {
         name: robot.name.into(),
         position_m: robot.position_m,
@@ -87,13 +87,25 @@ fn own_spec(task: &Task, seed: u32, spread: Spread) -> WorldSpec {
     let objects =
         task.objects.iter().zip(task.start_poses(seed, spread)).map(|(spot, start)| ObjectPlacement {
             name: spot.name.into(),
-            file: spot.file.into(),
+            file: spot.source(),
             world_from_object: Pose::from_parts(
                 start.position_m.into(),
                 Rotation::from_rotation_z(start.yaw_rad),
             ),
         });
-    WorldSpec { scene: task.scene.into(), robots: robots.collect(), objects: objects.collect() }
+    let scene = match scene_of_file(task) {
+        None => task.scene.into(),
+        Some(document) => {
+            SceneSource::Read { document: Arc::new(document?), world_from_scene: Pose::IDENTITY }
+        }
+    };
+    Ok(WorldSpec { scene, robots: robots.collect(), objects: objects.collect() })
+}
+
+/// The scene that a task's file brings, if it does.
+fn scene_of_file(task: &Task) -> Option<Result<Document, SimError>> {
+    let mjcf = task.file.as_ref()?.scene_mjcf?;
+    Some(Document::parse_alone(task.scene, mjcf))
 }
 
 /// Puts a task into another scene. The scene is moved, so that its site `task` is at the origin; tasks and experts keep their numbers.
@@ -130,7 +142,10 @@ fn elsewhere(
         }
     }
     if document.cameras.iter().all(|camera| camera.name != THIRD_PERSON) {
-        let own = Document::parse(task.scene, assets::scene(task.scene)?)?;
+        let own = match scene_of_file(task) {
+            None => Document::parse(task.scene, assets::scene(task.scene)?)?,
+            Some(document) => document?,
+        };
         let seen = own.cameras.iter().filter(|camera| camera.name == THIRD_PERSON);
         document.cameras.extend(seen.map(|camera| camera.moved(&world_from_scene.inverse())));
     }

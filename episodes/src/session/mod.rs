@@ -14,7 +14,7 @@ mod run_files;
 mod status;
 mod told;
 
-pub(crate) use build::build;
+pub(crate) use build::{Built, build};
 pub use calls::CallReply;
 pub use checkpoint::{Checkpoint, FailedStep};
 pub use clock::{Clock, monotonic};
@@ -42,7 +42,6 @@ use crate::scoring::{Facts, Phase, Scores};
 use crate::spec::{EpisodeSpec, Start};
 use crate::variation::Disturbance;
 use crate::{EpisodeError, fingerprint};
-use build::Built;
 use checkpoint::Origin;
 use clock::ThinkingClock;
 use told::ShownInformation;

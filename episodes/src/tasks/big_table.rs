@@ -61,8 +61,8 @@ pub const TASK: Task = Task {
             id: "joint_grasp_and_lift",
             description: "All three robots hold the table, its foot at least 3 cm off the floor.",
             collaborative: true,
-            done: Done::When(lifted),
-            nearness: |f| {
+            done: Done::When(&lifted),
+            nearness: &|f| {
                 all(&[grips(f, &[A, B, C], "round_table"), come(f.clearance_m("round_table"), 0.0, LIFTED_M)])
             },
         },
@@ -71,8 +71,8 @@ pub const TASK: Task = Task {
             description: "All three robots hold the table with the whole of its foot over the disc and at least 1 cm off the \
                           floor.",
             collaborative: true,
-            done: Done::When(carried),
-            nearness: |f| {
+            done: Done::When(&carried),
+            nearness: &|f| {
                 all(&[
                     is(held_above(f, CLEAR_M)),
                     beside(f, "round_table", "goal_disc", [CARRY_M, 0.05]),
@@ -85,10 +85,11 @@ pub const TASK: Task = Task {
             description: "The whole foot of the table is on the disc, the table as high as at first to 5 cm, upright within 15 \
                           degrees and still, and no robot has touched it for 0.2 s.",
             collaborative: true,
-            done: Done::When(released),
-            nearness: |f| all(&[is(over_disc(f)), standing(f, "round_table"), is(released(f))]),
+            done: Done::When(&released),
+            nearness: &|f| all(&[is(over_disc(f)), standing(f, "round_table"), is(released(f))]),
         },
     ],
+    file: None,
 };
 
 fn held_above(f: &Facts, clear_m: f32) -> bool {

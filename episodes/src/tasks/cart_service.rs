@@ -65,8 +65,8 @@ pub const TASK: Task = Task {
             id: "park",
             description: "The middle of the trolley is within 35 cm of the middle of the green rectangle.",
             collaborative: false,
-            done: Done::When(parked),
-            nearness: |f| {
+            done: Done::When(&parked),
+            nearness: &|f| {
                 all(&[
                     grips(f, &[A], "service_trolley"),
                     beside(f, "service_trolley", "parking_mark", [2.5, PARKED_M]),
@@ -77,8 +77,8 @@ pub const TASK: Task = Task {
             id: "lift_bottle",
             description: "B holds the bottle at least 10 cm above where it stood on the trolley.",
             collaborative: false,
-            done: Done::When(bottle_lifted),
-            nearness: |f| all(&[grips(f, &[B], "bottle"), come(f.lift_m("bottle"), 0.0, LIFTED_M)]),
+            done: Done::When(&bottle_lifted),
+            nearness: &|f| all(&[grips(f, &[B], "bottle"), come(f.lift_m("bottle"), 0.0, LIFTED_M)]),
         },
         Phase {
             id: "serve",
@@ -86,10 +86,11 @@ pub const TASK: Task = Task {
                           within 6 cm of the patch on each axis, upright within 15 degrees and still, and no robot has touched it \
                           for 0.2 s.",
             collaborative: false,
-            done: Done::Sequence { first: carried_to_goal, then: served, broken: away_from_goal },
-            nearness: |f| all(&[beside(f, "bottle", "serving_patch", [1.5, ON_GOAL_M]), is(served(f))]),
+            done: Done::Sequence { first: &carried_to_goal, then: &served, broken: &away_from_goal },
+            nearness: &|f| all(&[beside(f, "bottle", "serving_patch", [1.5, ON_GOAL_M]), is(served(f))]),
         },
     ],
+    file: None,
 };
 
 /// The trolley is at its mark.

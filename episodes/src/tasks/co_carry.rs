@@ -52,16 +52,16 @@ pub const TASK: Task = Task {
             id: "joint_grasp_and_lift",
             description: "Both robots hold the basket, its base at least 3 cm above the shelf.",
             collaborative: true,
-            done: Done::When(lifted),
-            nearness: |f| all(&[grips(f, &[A, B], "basket"), come(f.clearance_m("basket"), 0.0, LIFTED_M)]),
+            done: Done::When(&lifted),
+            nearness: &|f| all(&[grips(f, &[A, B], "basket"), come(f.clearance_m("basket"), 0.0, LIFTED_M)]),
         },
         Phase {
             id: "carry",
             description: "Both robots hold the basket within 15 cm of the patch on each horizontal axis, its base at least \
                           1 cm above the shelf.",
             collaborative: true,
-            done: Done::When(carried),
-            nearness: |f| {
+            done: Done::When(&carried),
+            nearness: &|f| {
                 all(&[is(held_above(f, CLEAR_M)), beside(f, "basket", "basket_patch", [CARRY_M, ON_PATCH_M])])
             },
         },
@@ -70,10 +70,11 @@ pub const TASK: Task = Task {
             description: "The basket stands within 15 cm of the patch on each horizontal axis, as high as on the first shelf to \
                           6 cm, upright within 15 degrees and still, and no robot has touched it for 0.2 s.",
             collaborative: true,
-            done: Done::When(released),
-            nearness: |f| all(&[is(on_patch(f)), standing(f, "basket"), is(released(f))]),
+            done: Done::When(&released),
+            nearness: &|f| all(&[is(on_patch(f)), standing(f, "basket"), is(released(f))]),
         },
     ],
+    file: None,
 };
 
 fn held_above(f: &Facts, clear_m: f32) -> bool {

@@ -20,7 +20,7 @@ const APPLES: [&str; 6] = ["apple_1", "apple_2", "apple_3", "apple_4", "apple_5"
 /// An apple on the floor of the tub, `x_m`, `y_m` from its middle.
 const fn apple(name: &'static str, x_m: f32, y_m: f32) -> ObjectSpot {
     let position_m = [TUB_XY_M[0] + x_m, TUB_XY_M[1] + y_m, TUB_STACK_M + 0.0402];
-    ObjectSpot { name, file: "apple", position_m, yaw_rad: 0.0 }
+    ObjectSpot { file: "apple", ..spot(name, position_m) }
 }
 
 pub const TASK: Task = Task {
@@ -78,24 +78,25 @@ pub const TASK: Task = Task {
             id: "joint_grasp_and_lift",
             description: "Both robots hold the tub, its lowest point at least 3 cm above its stack.",
             collaborative: true,
-            done: Done::When(lifted),
-            nearness: |f| all(&[grips(f, &[A, B], "tub"), come(f.clearance_m("tub"), 0.0, LIFTED_M)]),
+            done: Done::When(&lifted),
+            nearness: &|f| all(&[grips(f, &[A, B], "tub"), come(f.clearance_m("tub"), 0.0, LIFTED_M)]),
         },
         Phase {
             id: "tip",
             description: "Both robots hold the tub, tilted by at least 25 degrees.",
             collaborative: true,
-            done: Done::When(tipped),
-            nearness: |f| all(&[grips(f, &[A, B], "tub"), come(f.tilt_rad("tub"), 0.0, TIPPED_RAD)]),
+            done: Done::When(&tipped),
+            nearness: &|f| all(&[grips(f, &[A, B], "tub"), come(f.tilt_rad("tub"), 0.0, TIPPED_RAD)]),
         },
         Phase {
             id: "pour",
             description: "All apples are inside the crate, and both robots still hold the tub.",
             collaborative: true,
-            done: Done::When(poured),
-            nearness: |f| all(&[grips(f, &[A, B], "tub"), all(&APPLES.map(|apple| is(in_crate(f, apple))))]),
+            done: Done::When(&poured),
+            nearness: &|f| all(&[grips(f, &[A, B], "tub"), all(&APPLES.map(|apple| is(in_crate(f, apple))))]),
         },
     ],
+    file: None,
 };
 
 fn held_by_both(f: &Facts) -> bool {

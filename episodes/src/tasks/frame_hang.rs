@@ -56,25 +56,26 @@ pub const TASK: Task = Task {
             id: "grasp",
             description: "Both robots hold the frame.",
             collaborative: false,
-            done: Done::When(held_by_both),
-            nearness: |f| grips(f, &[A, B], "frame"),
+            done: Done::When(&held_by_both),
+            nearness: &|f| grips(f, &[A, B], "frame"),
         },
         Phase {
             id: "lift",
             description: "Both robots hold the frame at least 10 cm above where it stood.",
             collaborative: true,
-            done: Done::When(lifted),
-            nearness: |f| all(&[grips(f, &[A, B], "frame"), come(f.lift_m("frame"), 0.0, LIFTED_M)]),
+            done: Done::When(&lifted),
+            nearness: &|f| all(&[grips(f, &[A, B], "frame"), come(f.lift_m("frame"), 0.0, LIFTED_M)]),
         },
         Phase {
             id: "hang",
             description: "The peg has passed through the loop while both robots held the frame; the frame has stayed on it, \
                           hangs within 35 degrees of upright and nearly still, and no robot has touched it for 0.2 s.",
             collaborative: true,
-            done: Done::Sequence { first: threaded_while_held, then: hangs, broken: off_the_peg },
-            nearness: |f| all(&[come(from_peg_m(f), 0.5, 0.0), is(threaded(f)), is(hangs(f))]),
+            done: Done::Sequence { first: &threaded_while_held, then: &hangs, broken: &off_the_peg },
+            nearness: &|f| all(&[come(from_peg_m(f), 0.5, 0.0), is(threaded(f)), is(hangs(f))]),
         },
     ],
+    file: None,
 };
 
 fn held_by_both(f: &Facts) -> bool {

@@ -50,24 +50,24 @@ pub const TASK: Task = Task {
             id: "grasp_and_lift",
             description: "A's right hand holds the bottle at least 3 cm above where it rested.",
             collaborative: false,
-            done: Done::When(grasped_and_lifted),
-            nearness: |f| all(&[grip(f, A, Right, "bottle"), come(f.lift_m("bottle"), 0.0, LIFTED_M)]),
+            done: Done::When(&grasped_and_lifted),
+            nearness: &|f| all(&[grip(f, A, Right, "bottle"), come(f.lift_m("bottle"), 0.0, LIFTED_M)]),
         },
         Phase {
             id: "transfer",
             description: "The right hands of A and B hold the bottle together, then B's right hand holds it with both \
                           of A's hands off; at no time in between has every hand let go.",
             collaborative: true,
-            done: Done::Sequence { first: held_together, then: held_by_b_alone, broken: held_by_nobody },
-            nearness: |f| all(&[grip(f, B, Right, "bottle"), is(held_by_b_alone(f))]),
+            done: Done::Sequence { first: &held_together, then: &held_by_b_alone, broken: &held_by_nobody },
+            nearness: &|f| all(&[grip(f, B, Right, "bottle"), is(held_by_b_alone(f))]),
         },
         Phase {
             id: "place",
             description: "The bottle stands within 6 cm of the target on each axis, upright within 15 degrees and \
                           still, and no robot has touched it for 0.2 s.",
             collaborative: false,
-            done: Done::When(placed),
-            nearness: |f| {
+            done: Done::When(&placed),
+            nearness: &|f| {
                 all(&[
                     beside(f, "bottle", "target_pad", [0.6, ON_TARGET_M]),
                     standing(f, "bottle"),
@@ -76,6 +76,7 @@ pub const TASK: Task = Task {
             },
         },
     ],
+    file: None,
 };
 
 /// A's right hand holds the bottle at least 3 cm above where it rested.

@@ -16,9 +16,11 @@ mod trash_collection;
 
 pub use randomize::{Offset, Spread, StartPose, uniform_xy};
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use tandem_sim::{RobotModel, SimError, Step};
+use serde::{Deserialize, Serialize};
+use tandem_sim::{ObjectFile, RobotModel, SimError, Step};
 
 use crate::EpisodeError;
 use crate::scoring::{Phase, Scores};
@@ -37,11 +39,11 @@ pub static ALL: &[Task] = &[
     big_table::TASK,
 ];
 
-/// One benchmark task.
+/// A task: one of the benchmark's, or one that somebody has written into a file.
 #[derive(Debug)]
 pub struct Task {
     pub id: &'static str,
-    /// File name of the scene under `sim/assets/scenes`.
+    /// File name of the scene under `sim/assets/scenes`, or what messages call the scene that the task's file brings.
     pub scene: &'static str,
     pub robots: &'static [RobotSpot],
     pub objects: &'static [ObjectSpot],
@@ -53,6 +55,38 @@ pub struct Task {
     pub benchmark_steps: u32,
     /// p1, p2, ... in the order they have to be reached.
     pub phases: &'static [Phase],
+    /// The file that it was read from; the benchmark's are none.
+    pub file: Option<TaskFile>,
+}
+
+/// The budget of the benchmark's tasks under the agentic protocol, which a task's file may change: control steps, and how long the
+/// policy may think.
+pub const AGENTIC_STEPS: u32 = 6000;
+pub const THINKING_S: u32 = 1800;
+
+/// What a task has that was read from a file, and none of the benchmark's.
+#[derive(Debug)]
+pub struct TaskFile {
+    pub source: TaskSource,
+    /// Hash of the source, by which results tell files of one name apart.
+    pub xxh3: String,
+    /// The MJCF of the scene, where it is not one that the binary carries.
+    pub scene_mjcf: Option<&'static str>,
+    /// Control steps of an episode under the agentic protocol.
+    pub agentic_steps: u32,
+    /// How long a policy may think in it.
+    pub thinking_s: u32,
+}
+
+/// The texts that a task was read from: it is made of nothing else, so that whoever has them has the task.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TaskSource {
+    /// Name of the file, without its folder.
+    pub name: String,
+    pub text: String,
+    /// MJCF files that it names, which lie beside it.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub beside: BTreeMap<String, String>,
 }
 
 /// Where a robot stands, and its part of the task.
@@ -70,21 +104,38 @@ pub struct RobotSpot {
 #[derive(Debug)]
 pub struct ObjectSpot {
     pub name: &'static str,
-    /// File name under `sim/assets/objects`.
+    /// File name under `sim/assets/objects`, or what messages call the MJCF that the task's file brings.
     pub file: &'static str,
     pub position_m: [f32; 3],
     pub yaw_rad: f32,
+    /// The object's MJCF, where it is not one that the binary carries.
+    pub mjcf: Option<&'static str>,
+}
+
+impl ObjectSpot {
+    /// What the object is made of.
+    pub fn source(&self) -> ObjectFile {
+        match self.mjcf {
+            None => ObjectFile::Embedded(self.file.into()),
+            Some(mjcf) => ObjectFile::Text { name: self.file.into(), mjcf: mjcf.into() },
+        }
+    }
 }
 
 /// An object called as its file, not turned.
 pub const fn spot(name: &'static str, position_m: [f32; 3]) -> ObjectSpot {
-    ObjectSpot { name, file: name, position_m, yaw_rad: 0.0 }
+    ObjectSpot { name, file: name, position_m, yaw_rad: 0.0, mjcf: None }
 }
 
 impl Task {
     /// Begins to score an episode of this task with robots of this model, with the state before the first control step.
     pub fn scores(&self, robot: &Arc<RobotModel>, start: &Step) -> Result<Scores, SimError> {
-        Scores::new(self.phases, self.objects.iter().map(|spot| (spot.name, spot.file)), robot, start)
+        Scores::new(self.phases, self.objects.iter().map(|spot| (spot.name, spot.source())), robot, start)
+    }
+
+    /// Hash of the file that it was read from.
+    pub fn file_xxh3(&self) -> Option<&str> {
+        self.file.as_ref().map(|file| file.xxh3.as_str())
     }
 
     /// Names of the robots, in their order.
@@ -93,34 +144,60 @@ impl Task {
     }
 }
 
-/// There is one task of each id.
+/// The benchmark has one task of each id; a file may have another.
 impl PartialEq for Task {
     fn eq(&self, other: &Task) -> bool {
-        self.id == other.id
+        self.id == other.id && self.file_xxh3() == other.file_xxh3()
     }
 }
 
-/// A task written as its id, for `#[serde(with)]`.
-pub mod by_id {
-    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+/// The tasks that there are to play: the benchmark's, and those of files.
+#[derive(Clone, Debug, Default)]
+pub struct TaskSet {
+    of_files: Vec<&'static Task>,
+}
 
-    use super::Task;
-
-    pub fn serialize<S: Serializer>(task: &Task, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(task.id)
+impl TaskSet {
+    /// The benchmark's tasks and these, of which one that is called as one of the benchmark's takes its place.
+    pub fn with(of_files: Vec<&'static Task>) -> TaskSet {
+        TaskSet { of_files }
     }
 
-    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<&'static Task, D::Error> {
-        super::find(&String::deserialize(deserializer)?).map_err(D::Error::custom)
+    /// The first task that a file brings.
+    pub fn first_of_files(&self) -> Option<&'static Task> {
+        self.of_files.first().copied()
+    }
+
+    /// The benchmark's order, then that of the files.
+    pub fn all(&self) -> impl Iterator<Item = &'static Task> {
+        let replaced = |task: &&'static Task| self.of_files.iter().all(|other| other.id != task.id);
+        ALL.iter().filter(replaced).chain(self.of_files.iter().copied())
+    }
+
+    /// The task called `id`.
+    pub fn find(&self, id: &str) -> Result<&'static Task, EpisodeError> {
+        self.all().find(|task| task.id == id).ok_or_else(|| {
+            let have = self.all().map(|task| task.id).collect();
+            EpisodeError::UnknownTask { id: id.into(), have }
+        })
     }
 }
 
-/// The task called `id`.
+/// The tasks of these, each once: the benchmark's in its order, then those of files as they come.
+pub fn in_order(played: impl Iterator<Item = &'static Task> + Clone) -> Vec<&'static Task> {
+    let mut found: Vec<&'static Task> =
+        ALL.iter().filter(|task| played.clone().any(|one| one == *task)).collect();
+    for task in played {
+        if !found.contains(&task) {
+            found.push(task);
+        }
+    }
+    found
+}
+
+/// The benchmark's task called `id`.
 pub fn find(id: &str) -> Result<&'static Task, EpisodeError> {
-    ALL.iter().find(|task| task.id == id).ok_or_else(|| {
-        let have = ALL.iter().map(|task| task.id).collect();
-        EpisodeError::UnknownTask { id: id.into(), have }
-    })
+    TaskSet::default().find(id)
 }
 
 #[cfg(test)]

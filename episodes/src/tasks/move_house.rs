@@ -71,10 +71,10 @@ pub const TASK: Task = Task {
                           been open by at least 1.45 rad for 0.5 s, in either order.",
             collaborative: true,
             done: Done::Milestones(&[
-                Milestone { condition: lifted, for_s: 0.0 },
-                Milestone { condition: open, for_s: OPEN_S },
+                Milestone { condition: &lifted, for_s: 0.0 },
+                Milestone { condition: &open, for_s: OPEN_S },
             ]),
-            nearness: |f| {
+            nearness: &|f| {
                 all(&[grips(f, &[B, C], "console_table"), is(lifted(f)), come(opened_rad(f), 0.0, OPEN_RAD)])
             },
         },
@@ -83,8 +83,8 @@ pub const TASK: Task = Task {
             description: "All of the table and of both carriers is at least 20 cm beyond the middle of the wall; B and C hold \
                           the table, and its feet are at least 1 cm off the floor.",
             collaborative: true,
-            done: Done::When(passed),
-            nearness: |f| {
+            done: Done::When(&passed),
+            nearness: &|f| {
                 all(&[
                     is(held_above(f, CLEAR_M)),
                     beside(f, "console_table", "foot_marks", [GOAL_X_M - START_X_M, 0.4]),
@@ -98,8 +98,8 @@ pub const TASK: Task = Task {
                           and stands with all of each foot on its square of 10 cm, as high as at first to 4 cm, upright within \
                           15 degrees and still, and no robot has touched it for 0.2 s.",
             collaborative: true,
-            done: Done::Sequence { first: carried_to_goal, then: placed, broken: away_from_goal },
-            nearness: |f| {
+            done: Done::Sequence { first: &carried_to_goal, then: &placed, broken: &away_from_goal },
+            nearness: &|f| {
                 all(&[
                     beside(f, "console_table", "foot_marks", [1.0, 0.02]),
                     standing(f, "console_table"),
@@ -108,6 +108,7 @@ pub const TASK: Task = Task {
             },
         },
     ],
+    file: None,
 };
 
 /// B and C hold the table, and all of it is as high off the floor as this.

@@ -54,8 +54,8 @@ pub const TASK: Task = Task {
             id: "lift_both_vessels",
             description: "Cup and glass are at least 3 cm above the worktop at the same time.",
             collaborative: false,
-            done: Done::When(both_aloft),
-            nearness: |f| {
+            done: Done::When(&both_aloft),
+            nearness: &|f| {
                 all(&[grips(f, &[A], "cup"), grips(f, &[B], "glass"), risen(f, "cup"), risen(f, "glass")])
             },
         },
@@ -63,8 +63,8 @@ pub const TASK: Task = Task {
             id: "tip",
             description: "A holds the cup aloft and tilts it by at least 60 degrees.",
             collaborative: false,
-            done: Done::When(tipped),
-            nearness: |f| {
+            done: Done::When(&tipped),
+            nearness: &|f| {
                 all(&[grips(f, &[A], "cup"), risen(f, "cup"), come(f.tilt_rad("cup"), 0.0, TIPPED_RAD)])
             },
         },
@@ -73,12 +73,13 @@ pub const TASK: Task = Task {
             description: "The marble has been inside the glass for 0.5 s without a break, and the glass is at least 3 cm \
                           above the worktop.",
             collaborative: true,
-            done: Done::Lasting { condition: marble_in_glass, for_s: 0.5, at_end: glass_aloft },
-            nearness: |f| {
+            done: Done::Lasting { condition: &marble_in_glass, for_s: 0.5, at_end: &glass_aloft },
+            nearness: &|f| {
                 all(&[beside(f, "marble", "glass", [0.5, 0.02]), is(marble_in_glass(f)), risen(f, "glass")])
             },
         },
     ],
+    file: None,
 };
 
 /// Cup and glass are off the worktop.

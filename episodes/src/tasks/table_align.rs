@@ -58,8 +58,8 @@ pub const TASK: Task = Task {
             id: "joint_grasp_and_lift",
             description: "Both robots hold the table at least 3 cm above where it stood.",
             collaborative: true,
-            done: Done::When(lifted),
-            nearness: |f| {
+            done: Done::When(&lifted),
+            nearness: &|f| {
                 all(&[grips(f, &[A, B], "office_table"), come(f.lift_m("office_table"), 0.0, LIFTED_M)])
             },
         },
@@ -68,8 +68,8 @@ pub const TASK: Task = Task {
             description: "Both robots hold the table with its middle over the green patch and both foot bars at least 1 cm off \
                           the floor.",
             collaborative: true,
-            done: Done::When(carried),
-            nearness: |f| {
+            done: Done::When(&carried),
+            nearness: &|f| {
                 all(&[
                     is(f.held_by_all(&[A, B], "office_table")),
                     beside(f, "office_table", "table_patch", [1.75, 0.1]),
@@ -83,8 +83,8 @@ pub const TASK: Task = Task {
                           long side square to the chair within 4 degrees, as high as at first to 4 cm; it stands upright within \
                           15 degrees and still, and no robot has touched it for 0.2 s.",
             collaborative: true,
-            done: Done::When(aligned),
-            nearness: |f| {
+            done: Done::When(&aligned),
+            nearness: &|f| {
                 all(&[
                     come(off_square_rad(f), FRAC_PI_2, SQUARE_RAD),
                     standing(f, "office_table"),
@@ -93,6 +93,7 @@ pub const TASK: Task = Task {
             },
         },
     ],
+    file: None,
 };
 
 /// Both robots hold the table off the floor.

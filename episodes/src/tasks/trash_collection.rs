@@ -59,16 +59,16 @@ pub const TASK: Task = Task {
             id: "lift_bin",
             description: "A holds the bin, all of it at least 2 cm off the floor.",
             collaborative: false,
-            done: Done::When(lifted),
-            nearness: |f| all(&[grips(f, &[A], "bin"), come(f.clearance_m("bin"), 0.0, LIFTED_M)]),
+            done: Done::When(&lifted),
+            nearness: &|f| all(&[grips(f, &[A], "bin"), come(f.clearance_m("bin"), 0.0, LIFTED_M)]),
         },
         Phase {
             id: "deliver_bin",
             description: "A holds the bin, all of it at least 2 cm off the floor, its middle within 25 cm of the taped mark at the end \
                           of the bench, no point of its rim more than 1 cm higher than the bench's top.",
             collaborative: false,
-            done: Done::When(delivered),
-            nearness: |f| {
+            done: Done::When(&delivered),
+            nearness: &|f| {
                 all(&[is(lifted(f)), beside(f, "bin", "carry_point", [2.0, DELIVERED_M]), is(delivered(f))])
             },
         },
@@ -76,12 +76,13 @@ pub const TASK: Task = Task {
             id: "sweep",
             description: "The bottle is inside the bin, and A still holds the bin.",
             collaborative: true,
-            done: Done::When(swept),
-            nearness: |f| {
+            done: Done::When(&swept),
+            nearness: &|f| {
                 all(&[grips(f, &[A], "bin"), beside(f, "pet_bottle", "bin", [1.2, 0.1]), is(swept(f))])
             },
         },
     ],
+    file: None,
 };
 
 /// A holds the bin off the floor.

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use tandem::settings::{Layer, Settings};
 use tandem_episodes::evaluation::{self, EpisodeEvent, EvaluationPlan, KeptFiles, Shard, Starts};
 use tandem_episodes::results::PlayedEpisode;
-use tandem_episodes::{RobotFile, Variation, tasks};
+use tandem_episodes::{RobotFile, Variation};
 use tandem_tools_spec::Protocol;
 
 use crate::players::{PlayedBy, PythonPolicy};
@@ -44,7 +44,7 @@ pub fn evaluate(
 ) -> PyResult<String> {
     let layer: Layer = serde_json::from_str(settings).map_err(|error| failed(py, &error))?;
     let settings = Settings::resolve(layer, None).map_err(|error| failed(py, &error))?;
-    let found: Result<Vec<_>, _> = tasks.iter().map(|task| tasks::find(task)).collect();
+    let found: Result<Vec<_>, _> = tasks.iter().map(|task| settings.tasks.find(task)).collect();
     let protocol: Protocol =
         serde_json::from_value(Value::from(protocol)).map_err(|error| failed(py, &error))?;
     let by = PlayedBy::new(play, &name, elsewhere).map_err(|error| failed(py, &error))?;

@@ -34,6 +34,7 @@ class Episode(BaseEpisode):
     state_estimate: Where robots have their own state from.
     sensors: What robots sense.
     scene: MJCF file of a scene in place of the task's own.
+    task_file: TOML file with a task of your own, whose id `task` is.
     """
 
     def __init__(
@@ -48,6 +49,7 @@ class Episode(BaseEpisode):
         state_estimate: StateEstimate = "estimator",
         sensors: Sensors = "ideal",
         scene: str | PathLike[str] | None = None,
+        task_file: str | PathLike[str] | None = None,
     ) -> None:
         self.task = task
         self.seed = seed
@@ -59,6 +61,7 @@ class Episode(BaseEpisode):
             state_estimate=state_estimate,
             sensors=sensors,
             scene=None if scene is None else Path(scene),
+            task_file=None if task_file is None else [str(Path(task_file))],
         )
         self._native: _native.Episode | None = None
         self._columns: tuple[str, ...] | None = None

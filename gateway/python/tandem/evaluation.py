@@ -115,6 +115,9 @@ class EvaluationSettings(TypedDict, total=False):
     scene: str | PathLike[str] | None
     """MJCF file of a scene in place of the tasks' own."""
 
+    task_file: str | PathLike[str] | None
+    """TOML file with a task of your own, which `tasks` may name."""
+
 
 Policy: TypeAlias = Callable[[Episode], object] | Literal["expert", "idle"]
 """Who plays: a callable, which is given each episode as it begins, or a player that Tandem has, by name."""
@@ -136,8 +139,8 @@ def evaluate(
     seeds: A seed, or several.
     jobs: Episodes that run side by side, each on a thread of its own, on which the policy is called. Physics and drawing
         run at the same time; Python code of policies does not.
-    settings: `name`, `protocol`, `assistance`, `out`, `record`, `progress`, `renderer`, `state_estimate`, `sensors`, `scene`:
-        see `EvaluationSettings`.
+    settings: `name`, `protocol`, `assistance`, `out`, `record`, `progress`, `renderer`, `state_estimate`, `sensors`, `scene`,
+        `task_file`: see `EvaluationSettings`.
     """
     plan = Plan.of(policy, tasks, seeds, settings)
     return plan.evaluated(lambda folder: plan.play(folder, jobs))
@@ -187,7 +190,7 @@ class Plan:
             if name not in (None, policy):
                 raise TandemError(f"results call the player {policy!r} by its own name; leave `name` out")
             name = policy
-        out, scene = settings.get("out"), settings.get("scene")
+        out, scene, task_file = settings.get("out"), settings.get("scene"), settings.get("task_file")
         return Plan(
             policy=policy,
             name=name or str(getattr(policy, "__qualname__", type(policy).__qualname__)),
@@ -197,6 +200,7 @@ class Plan:
                 state_estimate=settings.get("state_estimate", "estimator"),
                 sensors=settings.get("sensors", "ideal"),
                 scene=None if scene is None else Path(scene),
+                task_file=None if task_file is None else [str(Path(task_file))],
             ),
             protocol=settings.get("protocol", "agentic"),
             tasks=_task_ids(tasks),

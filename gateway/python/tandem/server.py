@@ -42,6 +42,7 @@ def serve(
     state_estimate: StateEstimate = "estimator",
     sensors: Sensors = "ideal",
     scene: str | PathLike[str] | None = None,
+    task_file: str | PathLike[str] | None = None,
     max_episodes: int = 8,
     token_file: str | PathLike[str] | None = None,
 ) -> Server:
@@ -54,6 +55,7 @@ def serve(
     state_estimate: Where robots have their own state from.
     sensors: What robots sense.
     scene: MJCF file of a scene in place of the tasks' own.
+    task_file: TOML file with a task of your own, beside the built-in ones.
     max_episodes: Episodes that may be held at once.
     token_file: File with the token that every request has to send; an address that other machines reach needs one.
     """
@@ -65,6 +67,7 @@ def serve(
         state_estimate=state_estimate,
         sensors=sensors,
         scene=None if scene is None else Path(scene),
+        task_file=None if task_file is None else [str(Path(task_file))],
         max_episodes=max_episodes,
         token_file=None if token_file is None else Path(token_file),
     )

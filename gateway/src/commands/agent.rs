@@ -17,7 +17,7 @@ use tandem_tools_spec::Assistance;
 use tracing_subscriber::filter::LevelFilter;
 
 use super::{
-    CommandResult, Seeds,
+    CommandResult, Seeds, demo,
     flags::{AgentFlags, WorldFlags},
     logging::log_to_stderr,
 };
@@ -51,9 +51,9 @@ const INTERRUPTED: i32 = 130;
 pub struct AgentArgs {
     #[command(flatten)]
     agent: AgentFlags,
-    /// The id of the task.
-    #[arg(long, value_name = "TASK", default_value = "handover")]
-    task: String,
+    /// The id of the task [default: that of --task-file, or else handover].
+    #[arg(long, value_name = "TASK")]
+    task: Option<String>,
     /// One seed, or a range of seeds as 0-9 or 0..9, both ends included.
     #[arg(long, alias = "seed", default_value = "0", value_name = "SEEDS")]
     seeds: Seeds,
@@ -77,7 +77,6 @@ pub struct AgentArgs {
 /// Plays every seed. The program fails where the model's endpoint gives no answer.
 pub fn run(args: AgentArgs) -> CommandResult {
     log_to_stderr(LevelFilter::WARN);
-    let task = tasks::find(&args.task)?;
     let agent = PythonModule::new(PythonPart::Agent, args.agent.arguments(args.agent.limit_s(LIMIT_S)))?;
     let (token, text) = Token::random()?;
     let flags = Layer {
@@ -89,6 +88,10 @@ pub fn run(args: AgentArgs) -> CommandResult {
     };
     let settings = Settings::resolve(flags, None)?;
     try_runs_folder(&settings.runs)?;
+    let task = match &args.task {
+        Some(id) => settings.tasks.find(id)?,
+        None => settings.tasks.first_of_files().map_or_else(|| tasks::find(demo::TASK), Ok)?,
+    };
     let runs = settings.runs.clone();
     let server = Server::start(settings)?;
     let url = format!("http://{}", server.address());

@@ -11,7 +11,7 @@ use std::{
 use indicatif::{ProgressBar, ProgressStyle};
 use tandem_episodes::{
     EpisodeSpec, Facts,
-    players::{self, Episode, PlayerError, PrivilegedEpisode},
+    players::{self, Episode, PlayerError, PrivilegedEpisode, experts},
     tasks::{self, Task},
 };
 use tandem_tools_spec::{CommandReply, Protocol, ResultReply, StartEpisode, ToolCall, ToolReply};
@@ -25,15 +25,15 @@ use crate::{
     settings::{Layer, Settings},
 };
 
-const TASK: &str = "handover";
-const LAST_PHASE: &str = "p3";
+pub(super) const TASK: &str = "handover";
 /// Has the system pick a free port.
 const FREE_PORT: u16 = 0;
 
 /// How many of a hundred episodes have to reach the last phase.
 const PASS_PERCENT: usize = 80;
 
-/// Play the Handover task by a scripted expert over real HTTP, and write what happened.
+/// Play the Handover task by a scripted expert over real HTTP, and write what happened. With --task-file that task is played; where no
+/// expert knows it, nobody acts.
 #[derive(Debug, clap::Args)]
 pub struct DemoArgs {
     /// One seed, or a range of seeds as 0-9 or 0..9, both ends included.
@@ -49,9 +49,10 @@ pub struct DemoArgs {
 /// Plays every seed. The program fails if too few episodes reach the last phase.
 pub fn run(args: DemoArgs) -> CommandResult {
     log_to_stderr(LevelFilter::WARN);
+    let known = args.world.read_task_files()?.first().is_none_or(|task| experts::solves(task));
     let results = play_all(&args.runs, args.seeds, args.world.layer())?;
     let recorded = results.iter().all(|result| result.recording_failed.is_none());
-    Ok(if recorded && passed(&results) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(if recorded && (!known || passed(&results)) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// Plays every seed in turn on a server with these flags, recorded under `runs`, and prints what came of it.
@@ -63,11 +64,12 @@ pub fn play_all(runs: &Path, seeds: Seeds, flags: Layer) -> Result<Vec<ResultRep
     };
     let settings = Settings::resolve(flags, None)?;
     try_runs_folder(&settings.runs)?;
+    let task = settings.tasks.first_of_files().map_or_else(|| tasks::find(TASK), Ok)?;
     let server = Server::start(settings)?;
-    let results = seeds.0.map(|seed| play(&server, seed)).collect::<Result<Vec<_>, _>>()?;
+    let results = seeds.0.map(|seed| play(&server, task, seed)).collect::<Result<Vec<_>, _>>()?;
     server.stop();
     if results.len() > 1 {
-        println!("{LAST_PHASE} on {} of {}", count_last_phase(&results), results.len());
+        println!("p{} on {} of {}", task.phases.len(), count_last_phase(&results), results.len());
     }
     Ok(results)
 }
@@ -78,24 +80,26 @@ pub fn passed(results: &[ResultReply]) -> bool {
 }
 
 fn count_last_phase(results: &[ResultReply]) -> usize {
-    results.iter().filter(|result| result.phases.reached_s(LAST_PHASE).is_some()).count()
+    let last_s = |result: &ResultReply| result.phases.0.last().and_then(|(_, time_s)| *time_s);
+    results.iter().filter(|result| last_s(result).is_some()).count()
 }
 
-fn play(server: &Server, seed: u32) -> Result<ResultReply, Box<dyn Error>> {
-    let task = tasks::find(TASK)?;
+fn play(server: &Server, task: &'static Task, seed: u32) -> Result<ResultReply, Box<dyn Error>> {
     let spec = EpisodeSpec::new(task, seed, Protocol::Agentic);
     let args = StartEpisode { task: task.id.into(), seed, protocol: Some(spec.protocol), short: false };
     let (http, started) = HttpEpisode::start(server.address(), &args)?;
     let assistance = started.briefing.status.assistance;
-    println!("{TASK}, seed {seed}, over http://{}, assistance {assistance}", server.address());
+    println!("{}, seed {seed}, over http://{}, assistance {assistance}", task.id, server.address());
     let thread = server.table().get(&started.episode_id)?;
     let mut episode = OverHttp { http, thread, progress: Progress::new(task.phases.len()) };
-    let outcome = players::find("expert")?.play(&spec, &mut episode);
+    let outcome = players::expert_or_nobody(task)?.play(&spec, &mut episode);
     let OverHttp { http, thread, progress } = episode;
     progress.bar.finish_and_clear();
     let result = http.delete()?;
     if let Err(error) = outcome {
         println!("  the expert gave up: {error}");
+    } else if !experts::solves(task) {
+        println!("  no expert knows {}, so nobody acted", task.id);
     }
     print_result(task, &result, thread.folder());
     Ok(result)

@@ -136,7 +136,7 @@ impl EpisodeTable {
 
     /// The reply to `list_tasks`, without what policies of this server are not told.
     pub fn task_list(&self) -> TaskList {
-        let mut list = self.settings.instructions.task_list(&self.settings.base_limits);
+        let mut list = self.settings.instructions.task_list(&self.settings.tasks, &self.settings.base_limits);
         match self.settings.assistance {
             // How the score is counted is no part of the task.
             Assistance::Paper => list.tasks.iter_mut().for_each(|task| task.phases.clear()),

@@ -57,6 +57,12 @@ impl Document {
         Document::parse_in(file, xml, Path::new("."))
     }
 
+    /// Parses MJCF text that has to be whole: it means the same wherever it is read, so it may name no other file.
+    pub fn parse_alone(file: &str, xml: &str) -> Result<Document, SimError> {
+        source::refuse_files(file, xml)?;
+        Document::parse(file, xml)
+    }
+
     /// Reads a file. What it includes, its meshes and its pictures are read from where they lie beside it.
     pub fn read(path: &Path) -> Result<Document, SimError> {
         let file = path.display().to_string();

@@ -130,6 +130,21 @@ impl MjcfText {
     }
 }
 
+/// Refuses a text that names other files.
+pub(super) fn refuse_files(file: &str, xml: &str) -> Result<(), SimError> {
+    let tree =
+        roxmltree::Document::parse(xml).map_err(|source| SimError::Xml { file: file.into(), source })?;
+    let Some(naming) = tree.descendants().find(|node| node.has_attribute("file")) else { return Ok(()) };
+    let line = 1 + xml[..naming.range().start].matches('\n').count();
+    let what = format!(
+        "{}: a text that is kept with a task names no other file ({:?}); use shapes such as box and cylinder, or give the \
+         scene by --scene",
+        describe(&naming),
+        naming.attribute("file").unwrap_or_default()
+    );
+    Err(SimError::Unsupported { file: format!("{file}:{line}"), what })
+}
+
 impl SourceFile {
     fn line(&self, byte: usize) -> String {
         let before = &self.text.as_bytes()[..byte];

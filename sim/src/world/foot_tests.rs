@@ -55,7 +55,7 @@ fn obstacle(name: &str, robot: &RobotModel, yaw_rad: f32) -> Vec<Geom> {
     let (geoms, height_m) = match name {
         "another foot" => (foot(robot).to_vec(), ANKLE_M),
         "table leg" => (room(TABLE_LEG).trees().expect("a room").remove(0).links.remove(0).geoms, 0.0),
-        file => (ObjectModel::parts(file, file).expect("an object").remove(0).model.geoms, 0.0),
+        file => (ObjectModel::parts(&file.into(), file).expect("an object").remove(0).model.geoms, 0.0),
     };
     let place = Pose::from_parts(Vector::Z * height_m, Rotation::from_rotation_z(yaw_rad));
     geoms.into_iter().map(|geom| Geom { body_from_geom: place * geom.body_from_geom, ..geom }).collect()

@@ -15,7 +15,7 @@ mod knowledge_tests;
 
 use std::sync::Arc;
 
-pub use objects::{ObjectModel, ObjectPart, ObjectPlacement, ObjectState};
+pub use objects::{ObjectFile, ObjectModel, ObjectPart, ObjectPlacement, ObjectState};
 pub use snapshot::Snapshot;
 pub use step::{BodyTouch, HandContacts, ObjectStep, RobotStep, Step, Touch};
 pub use watch::{

@@ -19,7 +19,7 @@ mod trash_collection;
 
 use super::{PlayerError, PrivilegedEpisode, PrivilegedPlayer};
 use crate::spec::EpisodeSpec;
-use crate::tasks::{self, Task};
+use crate::tasks::{self, ObjectSpot, Task};
 use skills::{Commander, Variety};
 
 /// Performs a task to its end.
@@ -52,9 +52,9 @@ pub struct Expert {
 }
 
 impl Expert {
-    /// The expert of `task`.
+    /// The expert of `task`; of a file that is called as one of the benchmark's tasks, if it has what that has.
     pub fn of(task: &'static Task) -> Result<Expert, PlayerError> {
-        match ALL.iter().find(|(id, _)| *id == task.id) {
+        match ALL.iter().find(|(id, _)| *id == task.id && has_what_it_needs(task)) {
             Some((_, script)) => Ok(Expert { task, script: *script, variety: None }),
             None => Err(PlayerError::NoExpert {
                 task: task.id.into(),
@@ -62,6 +62,21 @@ impl Expert {
             }),
         }
     }
+}
+
+/// Whether there is an expert of `task`.
+pub fn solves(task: &'static Task) -> bool {
+    Expert::of(task).is_ok()
+}
+
+/// Whether the robots and objects that an expert asks for by name are those of the benchmark.
+fn has_what_it_needs(task: &Task) -> bool {
+    let Ok(own) = tasks::find(task.id) else { return false };
+    let has = |spot: &ObjectSpot| {
+        let same = |other: &ObjectSpot| other.name == spot.name && other.source() == spot.source();
+        task.objects.iter().any(same)
+    };
+    task.robots.len() == own.robots.len() && own.objects.iter().all(has)
 }
 
 impl Expert {

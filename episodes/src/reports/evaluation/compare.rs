@@ -37,17 +37,18 @@ pub struct PairedRow {
     pub mcnemar_p_value: f64,
 }
 
-/// Episodes by task, seed and where they began; of several the first.
-type Episodes<'a> = BTreeMap<(&'static str, u32, Option<usize>), &'a PlayedEpisode>;
+/// Episodes by task, with the hash of its file, seed and where they began; of several the first.
+type Episodes<'a> = BTreeMap<(&'static str, Option<&'static str>, u32, Option<usize>), &'a PlayedEpisode>;
 
 impl Comparison {
     pub fn of(first: &PolicyGroup, second: &PolicyGroup) -> Comparison {
         let (ones, others) = (episodes(first), episodes(second));
         let shared: Vec<(&PlayedEpisode, &PlayedEpisode)> =
             ones.iter().filter_map(|(key, one)| Some((*one, *others.get(key)?))).collect();
-        let most = tasks::ALL.iter().map(|task| task.phases.len()).max().unwrap_or_default();
+        let order = tasks::in_order(shared.iter().map(|(one, _)| one.spec.task));
+        let most = order.iter().map(|task| task.phases.len()).max().unwrap_or_default();
         let mut rows = Vec::new();
-        for task in tasks::ALL {
+        for task in order {
             let of_task = shared.iter().filter(|(one, _)| one.spec.task == task).copied();
             let of_task: Vec<_> = of_task.collect();
             let last = task.phases.len() - 1;
@@ -62,7 +63,8 @@ impl Comparison {
 fn episodes<'a>(group: &'a PolicyGroup) -> Episodes<'a> {
     let mut found = Episodes::new();
     for played in group.episodes.iter().map(|found| &found.played) {
-        let key = (played.spec.task.id, played.spec.seed, played.start_phase());
+        let task = played.spec.task;
+        let key = (task.id, task.file_xxh3(), played.spec.seed, played.start_phase());
         found.entry(key).or_insert(played);
     }
     found

@@ -212,7 +212,8 @@ impl PolicyReport {
     pub fn of(group: &PolicyGroup) -> PolicyReport {
         let played: Vec<&PlayedEpisode> = group.episodes.iter().map(|found| &found.played).collect();
         let first = played.first().or(group.excluded.first());
-        let of_tasks = tasks::ALL.iter().map(|task| TaskReport::of(task, &played));
+        let order = tasks::in_order(played.iter().map(|played| played.spec.task));
+        let of_tasks = order.into_iter().map(|task| TaskReport::of(task, &played));
         let tasks: Vec<TaskReport> = of_tasks.flatten().collect();
         PolicyReport {
             name: group.name.clone(),

@@ -38,7 +38,7 @@ impl Facts {
         let object = |spot: &crate::tasks::ObjectSpot| {
             let heading = Rotation::from_rotation_z(spot.yaw_rad);
             let world_from_object = Pose::from_parts(spot.position_m.into(), heading);
-            let parts = ObjectModel::parts(spot.file, spot.name).unwrap();
+            let parts = ObjectModel::parts(&spot.source(), spot.name).unwrap();
             parts.into_iter().map(move |found| part(world_from_object, found))
         };
         Facts {

@@ -1,11 +1,18 @@
 //! Which phases have been reached, and when. A phase is looked at only once its predecessors have been reached.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 use super::Facts;
 
+/// Something that holds at a control step, or does not: a function of a task in Rust, or what a task's file says.
+pub type Condition = &'static (dyn Fn(&Facts) -> bool + Sync);
+
+/// How far something has come, from 0 to 1.
+pub type Nearness = &'static (dyn Fn(&Facts) -> f32 + Sync);
+
 /// One scored phase.
-#[derive(Debug)]
 pub struct Phase {
     pub id: &'static str,
     /// When the phase counts as reached, for people and policies.
@@ -15,28 +22,32 @@ pub struct Phase {
     pub done: Done,
     /// How near the phase is, from 0 to 1, once its predecessors have been reached: dense rewards for learners, and nothing else, are made
     /// of it.
-    pub nearness: fn(&Facts) -> f32,
+    pub nearness: Nearness,
 }
 
 /// When a phase is reached. Conditions see one control step at a time; what has to happen in sequence says so here.
-#[derive(Debug)]
 pub enum Done {
     /// It is reached as soon as the condition holds.
-    When(fn(&Facts) -> bool),
+    When(Condition),
     /// It is reached when `then` holds after `first` held; a step at which `broken` holds in between asks for `first` again.
-    Sequence { first: fn(&Facts) -> bool, then: fn(&Facts) -> bool, broken: fn(&Facts) -> bool },
+    Sequence { first: Condition, then: Condition, broken: Condition },
     /// It is reached when `condition` has held without a break for `for_s`, and `at_end` holds then too.
-    Lasting { condition: fn(&Facts) -> bool, for_s: f64, at_end: fn(&Facts) -> bool },
+    Lasting { condition: Condition, for_s: f64, at_end: Condition },
     /// It is reached when every one of these has been passed, in any order.
     Milestones(&'static [Milestone]),
 }
 
 /// One of several things that have to happen once.
-#[derive(Debug)]
 pub struct Milestone {
-    pub condition: fn(&Facts) -> bool,
+    pub condition: Condition,
     /// How long it has to hold without a break.
     pub for_s: f64,
+}
+
+impl fmt::Debug for Phase {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.debug_struct("Phase").field("id", &self.id).finish_non_exhaustive()
+    }
 }
 
 impl Phase {
@@ -150,7 +161,7 @@ impl PhaseMemory {
 }
 
 /// Whether `condition` has held without a break for `for_s`; `since_s` remembers since when.
-fn lasted(since_s: &mut Option<f64>, condition: fn(&Facts) -> bool, for_s: f64, facts: &Facts) -> bool {
+fn lasted(since_s: &mut Option<f64>, condition: Condition, for_s: f64, facts: &Facts) -> bool {
     *since_s = condition(facts).then(|| since_s.unwrap_or(facts.time_s));
     // Times are sums of control steps; half of one keeps rounding out.
     since_s.is_some_and(|since_s| facts.time_s - since_s >= for_s - HALF_STEP_S)

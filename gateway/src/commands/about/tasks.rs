@@ -1,29 +1,91 @@
-//! `tandem tasks`: what there is to play.
+//! `tandem tasks`: what there is to play; `tandem tasks check`: whether a task of one's own can be played.
 
-use std::{fmt::Write, process::ExitCode};
+use std::{
+    fmt::Write,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
-use tandem_episodes::LocomotionChoice;
+use tandem_episodes::{LocomotionChoice, check_task, create_private_folder, read_task, tasks::TaskSet};
 use tandem_tools_spec::TaskList;
 
-use crate::commands::{CommandResult, print};
+use crate::commands::{CommandResult, Seeds, print};
 
-/// List the tasks and their phases.
+/// List the tasks and their phases, or check a task of your own.
 #[derive(Debug, clap::Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub struct TasksArgs {
     /// As JSON, as `GET /v1/tasks` has it: with the robots' instructions, the budgets and the limits of the base command.
     #[arg(long)]
     json: bool,
+    #[command(subcommand)]
+    action: Option<TasksAction>,
 }
 
-/// Prints the tasks as `list_tasks` has them.
+#[derive(Debug, clap::Subcommand)]
+enum TasksAction {
+    Check(CheckArgs),
+}
+
+/// Check a task's file: every mistake with its line and column, what falls while nobody acts, and a picture of the start from every
+/// camera.
+#[derive(Debug, clap::Args)]
+struct CheckArgs {
+    /// TOML file with the task.
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// One seed, or a range of seeds as 0-9 or 0..9, both ends included.
+    #[arg(long, value_name = "SEEDS", default_value = "0-4")]
+    seeds: Seeds,
+    /// Folder for the pictures [default: runs/tasks and the task's id].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+/// Prints the tasks as `list_tasks` has them, or what was found in a file.
 pub fn run(args: TasksArgs) -> CommandResult {
-    let list = tandem_episodes::task_list(&LocomotionChoice::default().limits());
+    if let Some(TasksAction::Check(args)) = args.action {
+        return check(args);
+    }
+    let limits = LocomotionChoice::default().limits();
+    let list = tandem_episodes::task_list(&TaskSet::default(), &limits);
     let text = match args.json {
         true => serde_json::to_string_pretty(&list)? + "\n",
         false => told(&list),
     };
     print(&text)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The program fails if something falls.
+fn check(args: CheckArgs) -> CommandResult {
+    let task = read_task(&args.file)?;
+    let own = tandem_episodes::task_list(&TaskSet::with(vec![task]), &LocomotionChoice::default().limits());
+    let own = TaskList { tasks: own.tasks.into_iter().filter(|info| info.id == task.id).collect(), ..own };
+    print(&told(&own))?;
+    let folder = args.out.unwrap_or_else(|| Path::new("runs/tasks").join(task.id));
+    create_private_folder(&folder)?;
+    let seeds: Vec<u32> = args.seeds.0.collect();
+    let found = check_task(task, &seeds, Some(&folder))?;
+    let mut text = String::new();
+    for note in &found.notes {
+        let _ = writeln!(text, "note: {note}");
+    }
+    for picture in &found.pictures {
+        let _ = writeln!(text, "drawn: {}", picture.display());
+    }
+    for line in &found.falls {
+        let _ = writeln!(text, "falls: {line}");
+    }
+    if found.falls.is_empty() {
+        let _ = writeln!(
+            text,
+            "nothing falls, and nobody who does not act reaches a phase, with {} seeds",
+            seeds.len()
+        );
+    }
+    print(&text)?;
+    Ok(if found.falls.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 fn told(list: &TaskList) -> String {

@@ -1,19 +1,30 @@
-//! What the settings name: limits, the token, instructions, the base controller and the scene.
+//! What the settings name: limits, the token, instructions, files of tasks, the base controller and the scene.
 
 use std::path::Path;
 
 use tandem_episodes::{EpisodeError, SceneError, SceneFile};
 
 use super::{Finding, Findings, specs, trial};
-use crate::{settings::Layer, token::Token};
+use crate::{
+    settings::{Layer, read_task_file},
+    token::Token,
+};
 
 /// Tries each thing that `layer` names.
 pub fn check(layer: &Layer, token: Result<Option<Token>, String>) -> Findings {
     let mut findings =
         vec![("limits", Finding::of(limits(layer))), ("token", Finding::of(check_token(layer, token)))];
     if let Some(path) = &layer.instructions {
-        let read = layer.read_instructions().map_err(|error| error.to_string());
+        let tasks = layer.read_tasks().unwrap_or_default();
+        let read = layer.read_instructions(&tasks).map_err(|error| error.to_string());
         findings.push(("instructions", Finding::of(read.map(|_| format!("{} is read", path.display())))));
+    }
+    for path in layer.task_file.iter().flatten() {
+        let read = read_task_file(path).map_err(|error| error.to_string());
+        findings.push((
+            "task file",
+            Finding::of(read.map(|task| format!("{} is read: {}", path.display(), task.id))),
+        ));
     }
     if let Some(path) = &layer.locomotion {
         let loaded = layer.controller().load().map_err(|error| error.to_string());

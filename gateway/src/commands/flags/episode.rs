@@ -1,10 +1,10 @@
 //! The flags that say which episodes to play, and by robots of which kind.
 
-use std::{ops::RangeInclusive, str::FromStr};
+use std::{error::Error, ops::RangeInclusive, str::FromStr};
 
 use clap::Args;
 use tandem_episodes::{
-    RobotFile, SimError, Variation,
+    RobotFile, Variation,
     evaluation::{EvaluationPlan, KeptFiles, Shard, Starts},
     players::Policy,
     tasks::{self, Spread, Task},
@@ -17,9 +17,9 @@ use crate::settings::one_of;
 /// Which episodes to play.
 #[derive(Debug, Args)]
 pub struct EpisodeFlags {
-    /// Task ids separated by commas, or `all`.
-    #[arg(long, default_value = "all", value_name = "TASKS", value_parser = parse_tasks)]
-    tasks: TaskList,
+    /// Ids of built-in tasks separated by commas, or `all` [default: none with --task-file, and else all].
+    #[arg(long, value_name = "TASKS", value_parser = parse_tasks)]
+    tasks: Option<TaskList>,
     /// One seed, or a range of seeds as 0-9 or 0..9, both ends included.
     #[arg(long, default_value = "0-9", value_name = "SEEDS")]
     seeds: Seeds,
@@ -49,13 +49,26 @@ pub struct EpisodeFlags {
 #[derive(Debug, Clone)]
 struct TaskList(Vec<&'static Task>);
 
-/// The tasks that `text` names: `all`, or ids separated by commas.
+/// The built-in tasks that `text` names: `all`, or ids separated by commas.
 fn parse_tasks(text: &str) -> Result<TaskList, String> {
     let found: Result<_, _> = match text {
         "all" => Ok(tasks::ALL.iter().collect()),
         ids => ids.split(',').map(|id| tasks::find(id.trim())).collect(),
     };
     found.map(TaskList).map_err(|error: tandem_episodes::EpisodeError| error.to_string())
+}
+
+/// What is played: the tasks of files, and beside them the built-in ones that are named and that none of them replaces; all of these
+/// where nothing is given.
+fn played(named: Option<TaskList>, of_files: Vec<&'static Task>) -> Vec<&'static Task> {
+    let named = match named {
+        Some(TaskList(named)) => named,
+        None if of_files.is_empty() => tasks::ALL.iter().collect(),
+        None => Vec::new(),
+    };
+    let replaced = |task: &&'static Task| of_files.iter().any(|other| other.id == task.id);
+    let built_in: Vec<&'static Task> = named.into_iter().filter(|task| !replaced(task)).collect();
+    built_in.into_iter().chain(of_files).collect()
 }
 
 impl EpisodeFlags {
@@ -65,7 +78,8 @@ impl EpisodeFlags {
         player: &dyn Policy,
         record: bool,
         assistance: Assistance,
-    ) -> Result<EvaluationPlan<'_>, SimError> {
+    ) -> Result<EvaluationPlan<'_>, Box<dyn Error>> {
+        let tasks = played(self.tasks, self.world.read_task_files()?);
         let assistance = self.assistance.unwrap_or(assistance);
         let disclosure = self.disclosure.unwrap_or(assistance.disclosure());
         let hints = self.hints.unwrap_or(assistance.hints());
@@ -83,7 +97,7 @@ impl EpisodeFlags {
             hints,
             variation: Variation { spread: self.spread, ..Variation::default() },
             renderer: self.world.renderer(),
-            tasks: self.tasks.0,
+            tasks,
             seeds: self.seeds.0.collect(),
             starts: Starts::Task,
             shard: Shard::WHOLE,
@@ -153,10 +167,10 @@ mod tests {
             if let Some(flag) = of.get_arguments().find(is_seeds) {
                 let name = flag.get_long().unwrap_or_default();
                 let help = flag.get_help().map(ToString::to_string).unwrap_or_default();
-                // With what else has to be given.
+                // With what else has to be given, behind a flag or in its place.
                 let required = of.get_arguments().filter(|flag| flag.is_required_set());
                 let line: String = required
-                    .filter_map(|flag| Some(format!(" --{} x", flag.get_long()?)))
+                    .map(|flag| flag.get_long().map_or(" x".into(), |name| format!(" --{name} x")))
                     .fold(path.clone(), |line, flag| line + &flag);
                 found.push((line, format!("--{name}: {help}")));
             }

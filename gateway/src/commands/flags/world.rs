@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use tandem_episodes::{Controller, RendererKind, SceneFile, Sensing, SensorModel, SimError, StateSource};
+use tandem_episodes::{
+    Controller, RendererKind, SceneFile, Sensing, SensorModel, SimError, StateSource, tasks::Task,
+};
 
-use crate::settings::{Layer, one_of, read_scene};
+use crate::settings::{Layer, SettingsError, one_of, read_scene, read_task_file};
 
 /// What episodes are played in, the same for each of them.
 #[derive(Debug, Args)]
@@ -13,6 +15,9 @@ pub struct WorldFlags {
     /// MJCF file of a scene in place of the tasks' own; its site `task` says where.
     #[arg(long, env = "TANDEM_SCENE", value_name = "FILE")]
     scene: Option<PathBuf>,
+    /// TOML files with tasks of your own, separated by commas; one that is called as a built-in task takes its place.
+    #[arg(long, env = "TANDEM_TASK_FILE", value_name = "FILES", value_delimiter = ',')]
+    task_file: Option<Vec<PathBuf>>,
     #[command(flatten)]
     locomotion: LocomotionFlag,
     #[command(flatten)]
@@ -27,6 +32,11 @@ impl WorldFlags {
     /// Reads the scene from the file that the flag names.
     pub fn read_scene(&self) -> Result<Option<SceneFile>, SimError> {
         self.scene.as_deref().map(read_scene).transpose()
+    }
+
+    /// The tasks of the files that the flag names.
+    pub fn read_task_files(&self) -> Result<Vec<&'static Task>, SettingsError> {
+        self.task_file.iter().flatten().map(|path| read_task_file(path)).collect()
     }
 
     /// Which controller the flag names; its file is not read yet.
@@ -48,6 +58,7 @@ impl WorldFlags {
     pub fn layer(self) -> Layer {
         Layer {
             scene: self.scene,
+            task_file: self.task_file,
             locomotion: self.locomotion.file,
             state_estimate: Some(self.sensing.state_estimate),
             sensors: Some(self.sensing.sensors),

@@ -113,7 +113,7 @@ impl ServerHandler for McpServer {
         _: Option<PaginatedRequestParams>,
         _: RequestContext<RoleServer>,
     ) -> Result<ListPromptsResult, ErrorData> {
-        Ok(ListPromptsResult::with_all_items(prompt::prompts()))
+        Ok(ListPromptsResult::with_all_items(prompt::prompts(&self.app.settings.tasks)))
     }
 
     async fn get_prompt(

@@ -4,7 +4,7 @@ use rmcp::{
     ErrorData,
     model::{GetPromptResult, JsonObject, Prompt, PromptArgument, PromptMessage, Role},
 };
-use tandem_episodes::{brief, tasks};
+use tandem_episodes::{brief, tasks::TaskSet};
 use tandem_tools_spec::{
     Brief, Protocol, ProtocolInfo, StartEpisode, TaskInfo, TaskList, Wording, parse_args,
 };
@@ -15,11 +15,11 @@ use crate::hosting::Caller;
 const NAME: &str = "play_task";
 
 /// The prompts that hosts may offer.
-pub fn prompts() -> Vec<Prompt> {
+pub fn prompts(tasks: &TaskSet) -> Vec<Prompt> {
     let argument = |name: &str, text: &str, required: bool| {
         PromptArgument::new(name).with_description(text).with_required(required)
     };
-    let ids: Vec<&str> = tasks::ALL.iter().map(|task| task.id).collect();
+    let ids: Vec<&str> = tasks.all().map(|task| task.id).collect();
     let arguments = vec![
         argument("task", &format!("What to play: {}.", ids.join(", ")), true),
         argument("seed", "Decides where the objects stand; 0 if it is not given.", false),
@@ -43,9 +43,11 @@ pub fn prompt(
         return Err(refused(format!("no prompt {name:?}; have: {NAME}")));
     }
     let start = start(arguments).map_err(refused)?;
-    let task = tasks::find(&start.task).map_err(|error| refused(error.to_string()))?;
-    let info = list.tasks.iter().find(|info| info.id == task.id);
-    let info = info.ok_or_else(|| refused(format!("{} is not listed", task.id)))?;
+    let info = list.tasks.iter().find(|info| info.id == start.task);
+    let info = info.ok_or_else(|| {
+        let have: Vec<&str> = list.tasks.iter().map(|info| info.id.as_str()).collect();
+        refused(format!("no task {:?}; have: {}", start.task, have.join(", ")))
+    })?;
     let text = text(info, &start, &brief(wording, &list.base_limits), caller);
     let mut result = GetPromptResult::new(vec![PromptMessage::new_text(Role::User, text)]);
     result.description = Some(info.instruction.clone());

@@ -8,7 +8,7 @@ mod site_tests;
 use rapier3d::math::{Pose, Vector};
 use serde::{Deserialize, Serialize};
 
-pub use model::{ObjectModel, ObjectPart};
+pub use model::{ObjectFile, ObjectModel, ObjectPart};
 
 use crate::dynamics::{Dynamics, LinkId};
 use crate::mechanism::rounded;
@@ -20,8 +20,8 @@ pub(super) use insert::{Furniture, insert_object, insert_scene};
 pub struct ObjectPlacement {
     /// What tasks call it.
     pub name: String,
-    /// Name of the file in `assets/objects`; several objects may share one.
-    pub file: String,
+    /// Several objects may share one.
+    pub file: ObjectFile,
     pub world_from_object: Pose,
 }
 

@@ -6,6 +6,21 @@ use crate::mechanism::{Solid, rounded};
 use crate::mjcf::{BodyLink, BodyTree, Document, Geom, LinkJoint, Site};
 use crate::{SimError, assets};
 
+/// Where an object comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ObjectFile {
+    /// A file that the binary carries, by its name in `assets/objects`.
+    Embedded(String),
+    /// MJCF that names no other files, and what messages call it.
+    Text { name: String, mjcf: String },
+}
+
+impl From<&str> for ObjectFile {
+    fn from(name: &str) -> ObjectFile {
+        ObjectFile::Embedded(name.into())
+    }
+}
+
 /// A rigid body of a file as tasks and pictures see it, in its own frame.
 #[derive(Clone, Debug)]
 pub struct ObjectModel {
@@ -29,9 +44,9 @@ pub struct ObjectPart {
 }
 
 impl ObjectModel {
-    /// Reads what an embedded object file becomes in a world where it is called `name`, without a world: a scorer needs sites and
+    /// Reads what an object's file becomes in a world where it is called `name`, without a world: a scorer needs sites and
     /// shapes alone. The object itself is first, then come the parts that move on it.
-    pub fn parts(file: &str, name: &str) -> Result<Vec<ObjectPart>, SimError> {
+    pub fn parts(file: &ObjectFile, name: &str) -> Result<Vec<ObjectPart>, SimError> {
         let (_, tree) = ObjectModel::read(file)?;
         let mut parts: Vec<ObjectPart> = Vec::with_capacity(tree.links.len());
         for link in &tree.links {
@@ -66,9 +81,12 @@ impl ObjectModel {
         self.solid.encloses(point_m)
     }
 
-    /// An embedded object file, and the one body that lies directly in its world with all that is on it.
-    pub(super) fn read(file: &str) -> Result<(Document, BodyTree), SimError> {
-        let document = Document::parse(file, assets::object(file)?)?;
+    /// An object's file, and the one body that lies directly in its world with all that is on it.
+    pub(super) fn read(file: &ObjectFile) -> Result<(Document, BodyTree), SimError> {
+        let document = match file {
+            ObjectFile::Embedded(name) => Document::parse(name, assets::object(name)?)?,
+            ObjectFile::Text { name, mjcf } => Document::parse_alone(name, mjcf)?,
+        };
         let mut trees = document.trees()?.into_iter();
         // The first is the file's own world.
         let world = trees.next().into_iter().flat_map(|world| world.links);

@@ -15,7 +15,7 @@ fn clearance_m(model: &ObjectModel, point_m: Vector) -> f32 {
 }
 
 fn object(name: &str) -> ObjectModel {
-    let mut parts = ObjectModel::parts(name, name).unwrap_or_else(|error| panic!("{error}"));
+    let mut parts = ObjectModel::parts(&name.into(), name).unwrap_or_else(|error| panic!("{error}"));
     parts.remove(0).model
 }
 
@@ -145,7 +145,7 @@ const CARRIED: [(&str, [f32; 3], f32); 5] = [
 #[test]
 fn carried_objects_are_held_by_what_they_have() {
     for (name, size_m, mass_kg) in CARRIED {
-        let (_, tree) = ObjectModel::read(name).unwrap_or_else(|error| panic!("{error}"));
+        let (_, tree) = ObjectModel::read(&name.into()).unwrap_or_else(|error| panic!("{error}"));
         let found_kg = tree.links[0].mass.mass();
         assert!((found_kg - mass_kg).abs() < 0.005, "{name}: {found_kg} kg, and not {mass_kg} kg");
         let file = assets::object(name).unwrap_or_else(|error| panic!("{error}"));

@@ -1,6 +1,6 @@
 //! Every block of code says what becomes of it, and what is no command is what it says it is.
 
-use std::{fs, process::Command};
+use std::{fs, path::Path, process::Command};
 
 use serde_json::Value;
 use tandem::{
@@ -55,6 +55,7 @@ fn check(block: &Block) -> Result<(), String> {
         ("toml", "map") => {
             in_a_file(block, |path| PolicyMap::find(path).map(drop).map_err(|error| error.to_string()))
         }
+        ("toml", "task") => is_example(block),
         ("toml", "settings") => in_a_file(block, |path| {
             let settings = Settings::resolve(Layer::default(), Some(path.as_ref()));
             settings.map(drop).map_err(|error| error.to_string())
@@ -67,6 +68,16 @@ fn check(block: &Block) -> Result<(), String> {
             Err(format!("no fence {language:?} with {purpose:?}; see documents/mod.rs for those there are"))
         }
     }
+}
+
+/// Whether the block is a task's file that can be played, and one of those that the repository has.
+fn is_example(block: &Block) -> Result<(), String> {
+    let folder = root().join("gateway/examples/tasks");
+    let examples = fs::read_dir(folder).map_err(|error| error.to_string())?;
+    let is_this = |path: &Path| fs::read_to_string(path).is_ok_and(|text| text == block.text);
+    let mut paths = examples.filter_map(|entry| Some(entry.ok()?.path()));
+    let path = paths.find(|path| is_this(path)).ok_or("no file in gateway/examples/tasks has this text")?;
+    tandem_episodes::read_task(&path).map(drop).map_err(|error| error.to_string())
 }
 
 /// Gives `read` a file with the block's text.

@@ -13,7 +13,7 @@ use std::{
 };
 
 use clap::Parser;
-use tandem::cli::Cli;
+use tandem::{cli::Cli, settings::Layer};
 use tandem_tests::{TestServer, skipped};
 
 use super::{
@@ -101,7 +101,9 @@ fn run_script(page: &Page, script: &str) {
         return;
     }
     let began = Instant::now();
-    let server = TestServer::start();
+    // Where a page calls a server of a task's file, this is it.
+    let task_file = Some(vec![root().join("gateway/examples/tasks/pass_the_parcel.toml")]);
+    let server = TestServer::with(Layer { task_file, ..Layer::default() });
     let folder = workplace();
     let path = format!("{}/bin:{}", folder.path().display(), env::var("PATH").unwrap_or_default());
     let script = script.replace(ADDRESS, &server.address.to_string());

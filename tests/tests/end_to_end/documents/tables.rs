@@ -116,10 +116,10 @@ fn words(text: &str) -> String {
     words.collect::<Vec<_>>().join(" ")
 }
 
-/// Every subcommand that has none below it, with its flags.
+/// Every subcommand that can be called without another one below it, with its flags.
 fn leaves(path: &str, command: &Command, found: &mut Vec<(String, Vec<Flag>)>) {
     let mut below = command.get_subcommands().peekable();
-    if below.peek().is_none() {
+    if below.peek().is_none() || !command.is_subcommand_required_set() {
         let flags = command.get_arguments().filter(|flag| !flag.is_hide_set()).filter_map(Flag::of);
         let own = flags.filter(|flag| !EVERYWHERE.contains(&flag.name.as_str()));
         found.push((path.trim().to_owned(), own.collect()));

@@ -7,4 +7,5 @@ mod experts;
 mod learned;
 #[cfg(target_os = "linux")]
 mod memory;
+mod task_files;
 mod unprivileged;

@@ -50,7 +50,7 @@ pub fn film_places(loaded: &LoadedEpisodes) -> Vec<FilmPlace> {
         .flat_map(|group| group.episodes.iter().map(|found| (group.name.as_str(), *found)))
         .collect();
     let mut places = Vec::new();
-    for task in tasks::ALL {
+    for task in tasks::in_order(episodes.iter().map(|(_, found)| found.played.spec.task)) {
         let played: Vec<_> =
             episodes.iter().copied().filter(|(_, found)| found.played.spec.task == task).collect();
         if played.is_empty() {

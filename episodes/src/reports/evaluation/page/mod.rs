@@ -61,11 +61,17 @@ fn in_words(names: &[&str]) -> String {
     }
 }
 
-/// The tasks that any policy has played, in the order of the list of tasks.
+/// The tasks that any policy has played, in the order of the list of tasks, then those of files.
 fn tasks(report: &EvaluationReport) -> Vec<&'static str> {
-    let played =
-        |id: &str| report.policies.iter().any(|policy| policy.tasks.iter().any(|task| task.task == id));
-    crate::tasks::ALL.iter().map(|task| task.id).filter(|id| played(id)).collect()
+    let played = || report.policies.iter().flat_map(|policy| &policy.tasks).map(|task| task.task);
+    let known = crate::tasks::ALL.iter().map(|task| task.id);
+    let mut found: Vec<&'static str> = known.filter(|id| played().any(|one| one == *id)).collect();
+    for id in played() {
+        if !found.contains(&id) {
+            found.push(id);
+        }
+    }
+    found
 }
 
 /// A policy at a glance: whole tasks by number of robots, phases by who works on them, rules and build.

@@ -1,0 +1,174 @@
+//! Tries a task before anybody plays it: its world is built and stands for some seconds in which nobody acts. Whatever falls, and every
+//! phase that is reached so, is named; and each camera's first picture is drawn.
+
+use std::path::{Path, PathBuf};
+
+use tandem_sim::{CONTROL_HZ, Step};
+use tandem_tools_spec::Protocol;
+
+use crate::EpisodeError;
+use crate::output::{OutputError, write_whole};
+use crate::replay::{EpisodeCamera, EpisodeRenderer};
+use crate::scoring::{Done, Facts, Phase};
+use crate::session::{Built, build};
+use crate::spec::EpisodeSpec;
+use crate::tasks::Task;
+
+/// So long nobody acts: more than anything takes to fall from a table, and than is waited for until a thing counts as released.
+const TRIAL_STEPS: u32 = 100;
+/// What moves less stays where it was put.
+const STAYS_M: f32 = 0.03;
+/// What turns less stays as it was put.
+const STAYS_RAD: f32 = 0.1;
+
+/// What was seen of a task in which nobody acts.
+#[derive(Debug, Default)]
+pub struct TaskCheck {
+    /// What does not stay where the task puts it, a line each.
+    pub falls: Vec<String>,
+    /// What may be meant so, a line each.
+    pub notes: Vec<String>,
+    /// The pictures that were drawn.
+    pub pictures: Vec<PathBuf>,
+}
+
+#[derive(Debug, thiserror::Error)]
+pub enum TaskCheckError {
+    #[error("{task} cannot be played: {source}")]
+    Episode { task: &'static str, source: EpisodeError },
+    #[error(
+        "{task} goes wrong while nobody acts, with seed {seed}: {source}; look for shapes that begin within each other"
+    )]
+    Diverged { task: &'static str, seed: u32, source: tandem_sim::dynamics::Diverged },
+    #[error(
+        "{task}: phase {phase} is reached {time_s:.2} s after the start with seed {seed}, and nobody has acted; ask for something \
+         that a robot has to do, as holds(...) or lift_m(...) >= 0.03"
+    )]
+    ReachedByNobody { task: &'static str, phase: &'static str, time_s: f64, seed: u32 },
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
+/// Tries a task with each of these seeds, and draws the start of the first into a folder, if one is given.
+pub fn check_task(
+    task: &'static Task,
+    seeds: &[u32],
+    folder: Option<&Path>,
+) -> Result<TaskCheck, TaskCheckError> {
+    let mut check = TaskCheck::default();
+    for (index, seed) in seeds.iter().enumerate() {
+        let spec = EpisodeSpec::new(task, *seed, Protocol::Benchmark);
+        check.stand_still(&spec)?;
+        if index == 0
+            && let Some(folder) = folder
+        {
+            check.draw(&spec, folder)?;
+        }
+    }
+    Ok(check)
+}
+
+impl TaskCheck {
+    fn stand_still(&mut self, spec: &EpisodeSpec) -> Result<(), TaskCheckError> {
+        let (task, seed) = (spec.task, spec.seed);
+        let failed = |source: EpisodeError| TaskCheckError::Episode { task: task.id, source };
+        let Built { mut world, motions, .. } = build(spec).map_err(failed)?;
+        let start = world.present();
+        let scores = task.scores(&motions[0].robot.model, &start);
+        let mut scores = scores.map_err(|error| failed(error.into()))?;
+        self.note_what_holds(task, &scores.facts(&start));
+        let commands: Vec<_> = (0..world.robots().len()).map(|robot| world.rest_command(robot)).collect();
+        let mut step = start.clone();
+        for _ in 0..TRIAL_STEPS {
+            let diverged = |source| TaskCheckError::Diverged { task: task.id, seed, source };
+            step = world.control_step(&commands).map_err(diverged)?;
+            scores.update(&step);
+        }
+        if let Some((phase, time_s)) = scores.reached().next() {
+            return Err(TaskCheckError::ReachedByNobody { task: task.id, phase: phase.id, time_s, seed });
+        }
+        self.find_falls(task, seed, &start, &step);
+        Ok(())
+    }
+
+    /// Names what has not stayed where it was put.
+    fn find_falls(&mut self, task: &Task, seed: u32, start: &Step, end: &Step) {
+        let trial_s = f64::from(TRIAL_STEPS) / CONTROL_HZ;
+        let robots = start.robots.iter().zip(&end.robots).zip(task.robots);
+        for ((before, after), spot) in robots {
+            let by_m =
+                after.truth.world_from_pelvis().translation - before.truth.world_from_pelvis().translation;
+            if after.truth.fallen || by_m.length() > STAYS_M {
+                let how = if after.truth.fallen {
+                    "falls".into()
+                } else {
+                    format!("moves by {:.2} m", by_m.length())
+                };
+                self.falls.push(format!(
+                    "seed {seed}: robot {} {how} within {trial_s:.0} s; it needs level floor at z = 0 and nothing in its way",
+                    spot.name
+                ));
+            }
+        }
+        for spot in task.objects {
+            let (Some(before), Some(after)) = (start.object(spot.name), end.object(spot.name)) else {
+                continue;
+            };
+            let (before, after) = (before.world_from_object, after.world_from_object);
+            let by_m = after.translation - before.translation;
+            let turned_rad = before.rotation.angle_between(after.rotation);
+            if by_m.length() > STAYS_M || turned_rad > STAYS_RAD {
+                let [x_m, y_m, z_m] = before.translation.to_array();
+                self.falls.push(format!(
+                    "seed {seed}: {} does not stay at ({x_m:.2}, {y_m:.2}, {z_m:.2}): within {trial_s:.0} s it goes {:.2} m \
+                     sideways and {:.2} m up, and turns by {:.0} degrees; put it where it touches what it stands on",
+                    spot.name,
+                    by_m.truncate().length(),
+                    by_m.z,
+                    turned_rad.to_degrees()
+                ));
+            }
+        }
+    }
+
+    /// Notes conditions of later phases that hold before anybody has acted.
+    fn note_what_holds(&mut self, task: &Task, facts: &Facts) {
+        for (index, phase) in task.phases.iter().enumerate().skip(1) {
+            let note = format!(
+                "what {} {} asks for holds at the start already, so it is reached in the same step as the phase before it, unless \
+                 that undoes it",
+                Phase::number(index),
+                phase.id
+            );
+            if holds(&phase.done, facts) && !self.notes.contains(&note) {
+                self.notes.push(note);
+            }
+        }
+    }
+
+    fn draw(&mut self, spec: &EpisodeSpec, folder: &Path) -> Result<(), TaskCheckError> {
+        let failed = |source: EpisodeError| TaskCheckError::Episode { task: spec.task.id, source };
+        let start = build(spec).map_err(failed)?.world.present();
+        let mut renderer = EpisodeRenderer::of(spec).map_err(failed)?;
+        for view in EpisodeCamera::all(spec.task) {
+            let picture = renderer.colours(view, &start, None);
+            let path = folder.join(format!("start_{}.png", view.name(spec.task)));
+            write_whole(&path, &picture.png().map_err(|error| failed(error.into()))?)?;
+            self.pictures.push(path);
+        }
+        Ok(())
+    }
+}
+
+/// Whether a phase would be reached at once, were it next.
+fn holds(done: &Done, facts: &Facts) -> bool {
+    match done {
+        Done::When(condition) => condition(facts),
+        Done::Sequence { first, then, .. } => first(facts) && then(facts),
+        Done::Lasting { condition, at_end, .. } => condition(facts) && at_end(facts),
+        Done::Milestones(milestones) => milestones.iter().all(|milestone| (milestone.condition)(facts)),
+    }
+}
+
+#[cfg(test)]
+mod tests;

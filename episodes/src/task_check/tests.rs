@@ -1,0 +1,65 @@
+//! Tasks that stand, fall, and are done by nobody.
+
+use super::*;
+use crate::task_file::task_of;
+use crate::tasks::TaskSource;
+
+/// A box on the floor, one robot, and phases of these conditions.
+fn task(z_m: f32, conditions: [&str; 2]) -> &'static Task {
+    let [first, second] = conditions;
+    let text = format!(
+        r#"
+id = "box"
+scene = "floor"
+instruction = "Lift the box."
+[[robots]]
+name = "A"
+position_m = [0, 0]
+instruction = "Lift the box."
+[[objects]]
+name = "box"
+position_m = [1, 0, {z_m}]
+mjcf = '<mujoco><worldbody><body name="box"><freejoint/><geom type="box" size="0.05 0.05 0.05" mass="0.3"/></body></worldbody></mujoco>'
+[[phases]]
+id = "one"
+description = "It is lifted."
+done = '{first}'
+[[phases]]
+id = "two"
+description = "It is left."
+done = '{second}'
+"#
+    );
+    let source = TaskSource { name: "box.toml".into(), text, beside: Default::default() };
+    task_of(source).unwrap_or_else(|error| panic!("{error}"))
+}
+
+const LIFTED: &str = r#"lift_m("box") >= 0.03"#;
+
+#[test]
+fn what_stands_is_drawn_from_every_camera() {
+    let folder = tempfile::tempdir().unwrap();
+    let check =
+        check_task(task(0.05, [LIFTED, r#"hands_off("A", "box")"#]), &[0, 1], Some(folder.path())).unwrap();
+    assert_eq!(check.falls, Vec::<String>::new());
+    assert!(check.notes.len() == 1 && check.notes[0].contains("p2 two"), "{:?}", check.notes);
+    let names: Vec<_> = check.pictures.iter().filter_map(|path| path.file_name()?.to_str()).collect();
+    assert_eq!(names, ["start_third_person.png", "start_A.png"]);
+    for path in &check.pictures {
+        assert_eq!(&std::fs::read(path).unwrap()[1..4], b"PNG");
+    }
+}
+
+#[test]
+fn what_falls_is_named() {
+    let check = check_task(task(0.5, [LIFTED, LIFTED]), &[3], None).unwrap();
+    let [line] = &check.falls[..] else { panic!("{:?}", check.falls) };
+    assert!(line.contains("seed 3: box does not stay at (1.00, 0.00, 0.50)"), "{line}");
+}
+
+#[test]
+fn a_phase_that_nobody_has_to_work_for_is_refused() {
+    let error = check_task(task(0.05, [r#"released_for_s("box") >= 0.2"#, LIFTED]), &[0], None).unwrap_err();
+    let text = error.to_string();
+    assert!(text.contains("box: phase one is reached 0.2") && text.contains("nobody has acted"), "{text}");
+}

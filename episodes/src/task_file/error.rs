@@ -1,0 +1,56 @@
+//! Why a task's file cannot be played, with the place of each mistake.
+
+use std::fmt;
+use std::ops::Range;
+use std::path::PathBuf;
+
+#[derive(Debug, thiserror::Error)]
+pub enum TaskFileError {
+    #[error("cannot read the task's file {}: {source}", path.display())]
+    Read { path: PathBuf, source: std::io::Error },
+    #[error("{0}")]
+    Mistakes(Mistakes),
+    #[error("{name} is not the file that was recorded: its hash is {now}, and {was} was recorded")]
+    Changed { name: String, was: String, now: String },
+}
+
+/// What is wrong with a file, each as `my_task.toml:12:8: what, and what would be right`, with the line itself.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Mistakes(Vec<String>);
+
+impl Mistakes {
+    /// Mistakes at these bytes of a text, in the order of the text.
+    pub fn new(name: &str, text: &str, mut found: Vec<(Range<usize>, String)>) -> Mistakes {
+        found.sort_by_key(|(at, _)| at.start);
+        Mistakes(found.into_iter().map(|(at, what)| shown(name, text, at, &what)).collect())
+    }
+}
+
+impl fmt::Display for Mistakes {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(&self.0.join("\n"))
+    }
+}
+
+/// A mistake with its line under it, and marks under what is meant.
+fn shown(name: &str, text: &str, at: Range<usize>, what: &str) -> String {
+    let start = floor_char(text, at.start);
+    let line_start = text[..start].rfind('\n').map_or(0, |newline| newline + 1);
+    let line = text[line_start..].lines().next().unwrap_or_default();
+    let number = 1 + text[..line_start].matches('\n').count();
+    let before = text[line_start..start].chars().count();
+    let end = floor_char(text, at.end).clamp(start, line_start + line.len().max(start - line_start));
+    let marks = text[start..end].chars().count().max(1);
+    let margin = " ".repeat(number.to_string().len());
+    let pad = " ".repeat(before);
+    format!(
+        "{name}:{number}:{}: {what}\n {number} | {line}\n {margin} | {pad}{}",
+        before + 1,
+        "^".repeat(marks)
+    )
+}
+
+/// The last place at or before a byte at which a letter begins.
+fn floor_char(text: &str, byte: usize) -> usize {
+    (0..=byte.min(text.len())).rev().find(|byte| text.is_char_boundary(*byte)).unwrap_or_default()
+}

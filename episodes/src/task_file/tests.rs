@@ -1,0 +1,193 @@
+//! Tasks' files, right and wrong.
+
+use super::*;
+use crate::EpisodeSpec;
+use crate::scoring::{A, Done, Facts, Grip};
+use tandem_sim::Side::Right;
+use tandem_tools_spec::Protocol;
+
+const FILE: &str = r#"
+id = "lift_it"
+scene = "floor"
+instruction = "Lift the box."
+
+[[robots]]
+name = "A"
+position_m = [0, 0]
+instruction = "Lift the box."
+
+[[objects]]
+name = "box"
+position_m = [0.4, 0, 0.05]
+mjcf = '''
+<mujoco model="box">
+  <worldbody><body name="box"><freejoint/><geom type="box" size="0.05 0.05 0.05" mass="0.3"/></body></worldbody>
+</mujoco>'''
+
+[[randomize]]
+objects = ["box"]
+x_m = 0.02
+yaw_deg = [-5, 10]
+
+[terms]
+high_m = '0.03'
+held = 'holds("A", "right", "box")'
+
+[[phases]]
+id = "lift"
+description = "It is lifted."
+done = 'held && lift_m("box") >= high_m'
+
+[[phases]]
+id = "carry"
+description = "It is carried away and put down."
+first = 'held && x_m("box") > 1'
+then = 'released_for_s("box") >= 0.2'
+broken = 'fallen("A")'
+
+[[phases]]
+id = "stay"
+description = "It stays, and the robot goes home."
+lasting = 'x_m("box") > 1'
+for_s = 0.5
+at_end = 'speed_m_s("box") < 0.1'
+near = 'coming(x_m("box"), 0.4, 1)'
+"#;
+
+fn source(text: &str) -> TaskSource {
+    TaskSource { name: "lift.toml".into(), text: text.into(), beside: BTreeMap::new() }
+}
+
+fn load(text: &str) -> Result<&'static Task, String> {
+    task_of(source(text)).map_err(|error| error.to_string())
+}
+
+#[test]
+fn a_file_becomes_a_task_like_any_other() {
+    let task = load(FILE).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!((task.id, task.scene, task.robots.len(), task.benchmark_steps), ("lift_it", "floor", 1, 1000));
+    let file = task.file.as_ref().unwrap();
+    assert_eq!((file.agentic_steps, file.thinking_s, file.xxh3.len()), (6000, 1800, 16));
+    let rest = Facts::at_rest(task);
+    let held = rest.clone().grip(A, Right, "box", Grip::Holding);
+    let Done::When(lifted) = &task.phases[0].done else { panic!("it is reached at once") };
+    let mut aloft = held.clone();
+    aloft.object_mut("box").pose_in_world.translation.z += 0.031;
+    assert_eq!([&rest, &held, &aloft].map(|facts| lifted(facts)), [false, false, true]);
+    let near = [&rest, &held, &aloft].map(|facts| (task.phases[0].nearness)(facts));
+    assert!(near[0] > 0.0 && near[0] < 0.5 && near[1] == 0.5 && near[2] == 1.0, "{near:?}");
+    let Done::Lasting { for_s, .. } = &task.phases[2].done else { panic!("it has to last") };
+    assert_eq!(*for_s, 0.5);
+    // The same file is the same task, and another one is another.
+    assert!(std::ptr::eq(task, load(FILE).unwrap()));
+    assert_ne!(task, load(&FILE.replace("0.03", "0.04")).unwrap());
+}
+
+#[test]
+fn a_spec_holds_the_whole_file() {
+    let task = load(FILE).unwrap();
+    let spec = EpisodeSpec::new(task, 3, Protocol::Benchmark);
+    let text = serde_json::to_string(&spec).unwrap();
+    let read: EpisodeSpec = serde_json::from_str(&text).unwrap();
+    assert_eq!(read, spec);
+    assert_eq!(read.departures()[0], format!("task file: lift.toml {}", task.file_xxh3().unwrap()));
+    let changed = text.replace("high_m = '0.03'", "high_m = '0.30'");
+    assert_ne!(changed, text);
+    let error = serde_json::from_str::<EpisodeSpec>(&changed).unwrap_err().to_string();
+    assert!(error.contains("lift.toml is not the file that was recorded"), "{error}");
+}
+
+/// A mistake is told by its line and column.
+#[test]
+fn mistakes_are_told_by_their_places() {
+    let check = |right: &str, wrong: &str, expected: &str| {
+        assert!(FILE.contains(right), "{right}");
+        let error = load(&FILE.replacen(right, wrong, 1)).expect_err(wrong);
+        assert!(error.contains(expected), "{wrong}: {error}");
+    };
+    check("id = \"lift_it\"", "id = \"Lift it\"", "lift.toml:2:6: \"Lift it\" is no id of the task");
+    check("\"floor\"", "\"flor\"", "lift.toml:3:9: no scene `flor`; have: dining_046");
+    check("\"floor\"", "\"room.xml\"", "lift.toml:3:9: there is no room.xml beside");
+    check("scene = \"floor\"\n", "", "no scene; give scene = \"floor\"");
+    check("name = \"A\"", "name = \"R\"", "lift.toml:7:8: there are 1 to 3 [[robots]], called \"A\"");
+    check("[0, 0]", "[0, inf]", "at most 100 either way");
+    check("[0, 0]", "[0]", "lift.toml:8");
+    check(
+        "instruction = \"Lift the box.\"\n\n[[objects",
+        "instruction = \" \"\n\n[[objects",
+        "nobody would know",
+    );
+    check("<freejoint/>", "<freejoint/><warp/>", "lift.toml:16");
+    check("<geom type", "<geom mesh=\"m\" type", "lift.toml:16");
+    check("mass=\"0.3\"/>", "mass=\"0.3\">", "lift.toml");
+    check(
+        "objects = [\"box\"]",
+        "objects = [\"bx\"]",
+        "lift.toml:20:12: no object \"bx\" to move; have: box",
+    );
+    check("x_m = 0.02", "x_m = [0.02, 0.01]", "ends before it begins");
+    check("'0.03'", "'0.03 m'", "lift.toml:25:16: 'm' stands where");
+    check("\"right\", \"box\"", "\"right\", \"bax\"", "lift.toml:26:29: no object \"bax\"; is it box?");
+    check(">= high_m", ">= hihg_m", "no term \"hihg_m\" above this in [terms]; have: held, high_m");
+    check("done = 'held", "don = 'held", "unknown field `don`");
+    check(
+        "done = 'held && lift_m(\"box\") >= high_m'",
+        "done = '1 > 2'",
+        "lift.toml:31:8: this can never hold",
+    );
+    check(
+        "done = 'held && lift_m(\"box\") >= high_m'",
+        "done = 'time_s() >= 0'",
+        "this holds whatever happens",
+    );
+    check("done = 'held && lift_m(\"box\") >= high_m'", "first = 'held'", "a part of this phase is missing");
+    check("broken = ", "at_end = ", "a phase is reached in one way");
+    check("for_s = 0.5\n", "for_s = -1\n", "this may be 0 to 3600 seconds");
+    check("id = \"carry\"", "id = \"lift\"", "there is a phase of this id already");
+    check("near = 'coming(", "near = '!coming(", "something that holds or not is wanted");
+    check("id = ", "id == ", "lift.toml:2:");
+    check("position_m = [0.4", "file = \"box\"\nposition_m = [0.4", "given twice");
+    // All of them are found.
+    let error = load(&FILE.replace("\"box\")", "\"bax\")")).unwrap_err();
+    assert!(error.matches("no object \"bax\"").count() >= 4, "{error}");
+}
+
+#[test]
+fn no_file_makes_it_panic() {
+    let mut random = tandem_sim::SplitMix64(11);
+    let marks = ["\"", "'", "[", "]", "=", "0", "-", "nan", "é", "\n", "x", "{", "1e400", "'''"];
+    for _ in 0..400 {
+        let at = random.uniform([0.0, FILE.len() as f32]) as usize % FILE.len();
+        let mark = marks[random.uniform([0.0, marks.len() as f32]) as usize % marks.len()];
+        let mut text = FILE.to_owned();
+        if text.is_char_boundary(at) {
+            text.replace_range(at..at + 1, mark);
+        }
+        let _ = load(&text);
+    }
+}
+
+#[test]
+fn files_beside_it_belong_to_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("lift.toml");
+    let text = FILE.replace("scene = \"floor\"", "scene = \"room.xml\"");
+    std::fs::write(&path, &text).unwrap();
+    let missing = read_task(&path).unwrap_err().to_string();
+    assert!(missing.contains("room.xml"), "{missing}");
+    let room = r#"<mujoco><worldbody><geom type="plane" size="5 5 1"/></worldbody></mujoco>"#;
+    std::fs::write(folder.path().join("room.xml"), room).unwrap();
+    let task = read_task(&path).unwrap();
+    let text = serde_json::to_string(&EpisodeSpec::new(task, 0, Protocol::Benchmark)).unwrap();
+    drop(folder);
+    let read: EpisodeSpec = serde_json::from_str(&text).unwrap();
+    assert_eq!(read.task.file.as_ref().and_then(|file| file.scene_mjcf), Some(room));
+    let mesh = source(&text.replace("floor", "room.xml"));
+    let with_mesh = TaskSource {
+        text: FILE.replace("scene = \"floor\"", "scene = \"room.xml\""),
+        beside: [("room.xml".into(), r#"<mujoco><include file="other.xml"/></mujoco>"#.into())].into(),
+        ..mesh
+    };
+    let error = task_of(with_mesh).unwrap_err().to_string();
+    assert!(error.contains("room.xml:1") && error.contains("names no other file"), "{error}");
+}
