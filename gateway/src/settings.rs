@@ -338,7 +338,7 @@ pub enum SettingsError {
         /// The file.
         path: PathBuf,
         /// What happens.
-        source: TaskCheckError,
+        source: Box<TaskCheckError>,
     },
     /// The scene, the base controller or the renderer cannot be used.
     #[error(transparent)]
@@ -442,7 +442,7 @@ fn read_layer(path: &Path) -> Result<Layer, SettingsError> {
 pub fn read_task_file(path: &Path) -> Result<&'static Task, SettingsError> {
     let task = read_task(path)?;
     let check = check_task(task, &[FIRST_SEED], None)
-        .map_err(|source| SettingsError::Task { path: path.into(), source })?;
+        .map_err(|source| SettingsError::Task { path: path.into(), source: source.into() })?;
     check.falls.iter().chain(&check.notes).for_each(|line| tracing::warn!("{}: {line}", task.id));
     Ok(task)
 }

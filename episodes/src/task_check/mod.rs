@@ -35,7 +35,7 @@ pub struct TaskCheck {
 #[derive(Debug, thiserror::Error)]
 pub enum TaskCheckError {
     #[error("{task} cannot be played: {source}")]
-    Episode { task: &'static str, source: EpisodeError },
+    Episode { task: &'static str, source: Box<EpisodeError> },
     #[error(
         "{task} goes wrong while nobody acts, with seed {seed}: {source}; look for shapes that begin within each other"
     )]
@@ -71,7 +71,7 @@ pub fn check_task(
 impl TaskCheck {
     fn stand_still(&mut self, spec: &EpisodeSpec) -> Result<(), TaskCheckError> {
         let (task, seed) = (spec.task, spec.seed);
-        let failed = |source: EpisodeError| TaskCheckError::Episode { task: task.id, source };
+        let failed = |source: EpisodeError| TaskCheckError::Episode { task: task.id, source: source.into() };
         let Built { mut world, motions, .. } = build(spec).map_err(failed)?;
         let start = world.present();
         let scores = task.scores(&motions[0].robot.model, &start);
@@ -147,7 +147,8 @@ impl TaskCheck {
     }
 
     fn draw(&mut self, spec: &EpisodeSpec, folder: &Path) -> Result<(), TaskCheckError> {
-        let failed = |source: EpisodeError| TaskCheckError::Episode { task: spec.task.id, source };
+        let failed =
+            |source: EpisodeError| TaskCheckError::Episode { task: spec.task.id, source: source.into() };
         let start = build(spec).map_err(failed)?.world.present();
         let mut renderer = EpisodeRenderer::of(spec).map_err(failed)?;
         for view in EpisodeCamera::all(spec.task) {

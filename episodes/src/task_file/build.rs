@@ -115,7 +115,7 @@ impl Reading<'_> {
     /// What messages call the scene, and its text if it is not one that the binary carries.
     fn scene(&mut self, table: &TaskTable) -> Option<(&'static str, Option<&'static str>)> {
         let (at, (name, mjcf)) = match (&table.scene, &table.scene_mjcf) {
-            (Some(name), None) => (name.span(), self.named(name, |name| assets::scene(name))?),
+            (Some(name), None) => (name.span(), self.named(name, assets::scene)?),
             (None, Some(text)) => (text.span(), self.inline(text)),
             (Some(_), Some(both)) => {
                 self.wrong(both.span(), "the scene is given twice; give scene or scene_mjcf");
@@ -233,7 +233,7 @@ impl Reading<'_> {
                 (None, Some(text)) => Some((text.span(), self.inline(text))),
                 (file, None) => {
                     let file = file.as_ref().unwrap_or(&table.name);
-                    self.named(file, |name| assets::object(name)).map(|named| (file.span(), named))
+                    self.named(file, assets::object).map(|named| (file.span(), named))
                 }
             };
             let Some((at, (file, mjcf))) = given else { continue };

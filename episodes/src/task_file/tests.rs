@@ -73,7 +73,7 @@ fn a_file_becomes_a_task_like_any_other() {
     let Done::When(lifted) = &task.phases[0].done else { panic!("it is reached at once") };
     let mut aloft = held.clone();
     aloft.object_mut("box").pose_in_world.translation.z += 0.031;
-    assert_eq!([&rest, &held, &aloft].map(|facts| lifted(facts)), [false, false, true]);
+    assert_eq!([&rest, &held, &aloft].map(lifted), [false, false, true]);
     let near = [&rest, &held, &aloft].map(|facts| (task.phases[0].nearness)(facts));
     assert!(near[0] > 0.0 && near[0] < 0.5 && near[1] == 0.5 && near[2] == 1.0, "{near:?}");
     let Done::Lasting { for_s, .. } = &task.phases[2].done else { panic!("it has to last") };

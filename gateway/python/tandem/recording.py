@@ -75,7 +75,9 @@ class Recording:
     @property
     def task(self) -> str:
         """The task's id."""
-        return self.spec["task"]
+        named = self.spec["task"]
+        # Of a task of a file the specification holds all of the file.
+        return named if isinstance(named, str) else named["id"]
 
     @property
     def seed(self) -> int:

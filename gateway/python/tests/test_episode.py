@@ -176,3 +176,20 @@ def test_refusals_say_what_would_work(server: tandem.Server) -> None:
 def test_tasks_are_listed_alike(server: tandem.Server) -> None:
     assert tandem.tasks() == tandem.Client(server.url).tasks()
     assert len(tandem.tasks().tasks) == 10
+
+
+TASK_FILE = Path(__file__).parents[2] / "examples" / "tasks" / "pass_the_parcel.toml"
+
+
+def test_a_task_of_a_file_is_played_and_verified(tmp_path: Path) -> None:
+    with tandem.Episode("pass_the_parcel", task_file=TASK_FILE, protocol="benchmark", record=tmp_path) as episode:
+        assert [phase.id for phase in episode.briefing.phases] == ["push", "sweep"]
+        assert episode.wait(5).executed_steps == 5
+        result = episode.close()
+    assert result.task == "pass_the_parcel" and list(result.phases) == ["p1", "p2"]
+    recording = next(tmp_path.rglob("episode.mcap"))
+    assert tandem.Recording(recording).task == "pass_the_parcel"
+    evaluation = tandem.evaluate("idle", "pass_the_parcel", 0, task_file=TASK_FILE, out=tmp_path / "idle")
+    assert evaluation.tasks["pass_the_parcel"].episodes == 1
+    with pytest.raises(tandem.TandemError, match=r"nothing\.toml"):
+        tandem.Episode("pass_the_parcel", task_file="nothing.toml").start()

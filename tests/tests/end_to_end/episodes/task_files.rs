@@ -4,13 +4,13 @@ use tandem_episodes::evaluation::{EvaluationPlan, KeptFiles, Shard, Starts, eval
 use tandem_episodes::players;
 use tandem_episodes::tasks::{self, Task};
 use tandem_episodes::{Controller, RendererKind, RobotFile, Sensing, Variation, read_task};
-use tandem_tools_spec::{Assistance, Protocol};
+use tandem_tools_spec::{Assistance, PhaseTimes, Protocol};
 
 /// As the book names them.
 const SEEDS: [u32; 5] = [2000, 2001, 2002, 2003, 2004];
 
 /// Phases and the hash of the last state, for each seed, as the task's expert plays.
-fn played(task: &'static Task) -> Vec<(Vec<(String, Option<f64>)>, String)> {
+fn played(task: &'static Task) -> Vec<(PhaseTimes, String)> {
     let plan = EvaluationPlan {
         player: players::find("expert").expect("a player"),
         protocol: Protocol::Benchmark,
@@ -35,7 +35,7 @@ fn played(task: &'static Task) -> Vec<(Vec<(String, Option<f64>)>, String)> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let episodes = evaluate(&plan, folder.path(), &|_| {}).expect("worlds can be built").episodes;
     assert_eq!(episodes.len(), SEEDS.len());
-    episodes.into_iter().map(|played| (played.result.phases.0, played.result.state_hash)).collect()
+    episodes.into_iter().map(|played| (played.result.phases, played.result.state_hash)).collect()
 }
 
 /// What `docs/src/task-files.md` says of them.
