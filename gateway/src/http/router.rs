@@ -50,8 +50,8 @@ async fn no_method(method: Method, uri: Uri) -> ApiError {
 }
 
 fn refused_route(method: Method, uri: Uri, other_method: bool) -> ApiError {
-    let have =
-        rest::served().into_iter().chain(["POST /mcp".into(), format!("GET {}", pages::WATCH)]).collect();
+    let pages = [pages::WATCH, pages::operate::OPERATE].map(|page| format!("GET {page}"));
+    let have = rest::served().into_iter().chain(["POST /mcp".into()]).chain(pages).collect();
     ApiError::NoRoute { method: method.to_string(), path: uri.path().into(), have, other_method }
 }
 

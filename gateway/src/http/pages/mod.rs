@@ -3,6 +3,7 @@
 
 mod finished;
 mod live;
+pub mod operate;
 mod socket;
 
 use axum::{
@@ -55,7 +56,7 @@ pub fn router() -> Router<AppState> {
         .route("/watch/film", get(finished::film))
         .route("/watch/file", get(finished::file))
         .layer(middleware::from_fn(only_watchers));
-    inside.route(WATCH, get(page).merge(post(enter)))
+    inside.route(WATCH, get(page).merge(post(enter))).merge(operate::router())
 }
 
 /// Lets nobody in who has not come by the link.

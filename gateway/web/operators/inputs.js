@@ -1,0 +1,66 @@
+// What a person wants of the robot, from keys, buttons and a gamepad.
+
+export const OPEN = { left: [0, -0.3, 0, 0, 0, 0, 0], right: [0, 0.3, 0, 0, 0, 0, 0] };
+export const CLOSED = { left: [0, 0.75, 0.8, -1.1, -1.3, -1.1, -1.3], right: [0, -0.75, -0.8, 1.1, 1.3, 1.1, 1.3] };
+const WALK_M_S = 0.3;
+const TURN_RAD_S = 0.5;
+const WRIST_M_S = 0.2;
+const HEIGHT_M_S = 0.1;
+const STICK_DEAD = 0.15;
+
+const BASE_KEYS = { w: [1, 0, 0], s: [-1, 0, 0], a: [0, 1, 0], d: [0, -1, 0], q: [0, 0, 1], e: [0, 0, -1] };
+const WRIST_KEYS = {
+  ArrowUp: [1, 0, 0], ArrowDown: [-1, 0, 0], ArrowLeft: [0, 1, 0], ArrowRight: [0, -1, 0], PageUp: [0, 0, 1], PageDown: [0, 0, -1],
+};
+const HEIGHT_KEYS = { r: 1, f: -1 };
+
+const typing = (event) => event.target instanceof Element && event.target.closest("input, select, textarea");
+const nameOf = (event) => (event.key.length === 1 ? event.key.toLowerCase() : event.key);
+const sum = (keys, table, length) =>
+  [...keys].map((key) => table[key]).filter(Boolean).reduce((total, one) => total.map((value, axis) => value + one[axis]), Array(length).fill(0));
+
+/** Listens to keys; `pressed(key)` hears of those that act once. */
+export function listen(pressed) {
+  const keys = new Set();
+  addEventListener("keydown", (event) => {
+    if (typing(event) || event.ctrlKey || event.metaKey || event.altKey) return;
+    const key = nameOf(event);
+    const held = key in BASE_KEYS || key in WRIST_KEYS || key in HEIGHT_KEYS;
+    if (held) event.preventDefault();
+    if (held) keys.add(key);
+    else if (!event.repeat && pressed(key)) event.preventDefault();
+  });
+  addEventListener("keyup", (event) => keys.delete(nameOf(event)));
+  addEventListener("blur", () => keys.clear());
+  return keys;
+}
+
+const stick = (value) => (Math.abs(value ?? 0) < STICK_DEAD ? 0 : value);
+
+/** The first gamepad: two sticks for the base, triggers for the fingers, either bumper for the clutch. */
+function gamepad() {
+  const pad = [...(navigator.getGamepads?.() ?? [])].find((one) => one?.connected);
+  if (!pad) return { base: [0, 0, 0], triggers: {}, clutch: false };
+  const [x, y, turn] = [0, 1, 2].map((axis) => stick(pad.axes[axis]));
+  const [leftBumper, rightBumper, left, right] = [4, 5, 6, 7].map((index) => pad.buttons[index]?.value ?? 0);
+  return { base: [-y, -x, -turn], triggers: { left, right }, clutch: leftBumper + rightBumper > 0.5 };
+}
+
+/** What keys and gamepad ask for now: velocities of base, selected wrist and height, triggers and clutch. */
+export function wanted(keys) {
+  const pad = gamepad();
+  const most = (value) => Math.max(-1, Math.min(1, value));
+  const base = sum(keys, BASE_KEYS, 3).map((value, axis) => most(value + pad.base[axis]));
+  return {
+    vx_m_s: base[0] * WALK_M_S,
+    vy_m_s: base[1] * WALK_M_S,
+    yaw_rate_rad_s: base[2] * TURN_RAD_S,
+    wristM_s: sum(keys, WRIST_KEYS, 3).map((value) => value * WRIST_M_S),
+    heightM_s: HEIGHT_M_S * [...keys].reduce((total, key) => total + (HEIGHT_KEYS[key] ?? 0), 0),
+    triggers: pad.triggers,
+    clutch: pad.clutch,
+  };
+}
+
+/** Fingers of `hand` that are closed by a share. */
+export const closedBy = (hand, share) => OPEN[hand].map((open, joint) => open + share * (CLOSED[hand][joint] - open));

@@ -1,0 +1,26 @@
+// `/operate`: whoever comes by the link of a robot drives it; whoever comes without starts an episode.
+
+import { drive } from "./drive.js";
+import { start } from "./start.js";
+
+const main = document.getElementById("main");
+const KEPT = "tandem-operator";
+
+/** What the link gave: from the fragment, which browsers send to nobody; then from this tab, so that a page may be loaded again. */
+function seat() {
+  const given = new URLSearchParams(location.hash.slice(1));
+  if (given.has("token")) {
+    sessionStorage.setItem(KEPT, JSON.stringify(Object.fromEntries(given)));
+    history.replaceState(null, "", "/operate?robot");
+  }
+  if (!location.search) return null;
+  return JSON.parse(sessionStorage.getItem(KEPT) ?? "null");
+}
+
+const show = () => {
+  const held = seat();
+  return held ? drive(main, held) : start(main);
+};
+// A second link pasted into the same tab changes the fragment alone.
+addEventListener("hashchange", () => location.hash.includes("token=") && (seat(), location.reload()));
+show();

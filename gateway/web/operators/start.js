@@ -1,0 +1,83 @@
+// The start of an episode whose robots people drive: what is played, and a link for each person.
+
+import { element } from "../src/dom.js";
+import { call } from "./call.js";
+
+/** The longest that an episode may wait for somebody who is away. */
+const PATIENCE_S = 600;
+
+const labelled = (text, field) => element("p", {}, element("label", {}, `${text} `, field));
+
+/** Shows the form. */
+export function start(main) {
+  const task = element("select", { name: "task", required: true });
+  const seed = element("input", { name: "seed", type: "number", min: 0, max: 4294967295, step: 1, value: 0, required: true });
+  const protocol = element("select", { name: "protocol" },
+    element("option", { value: "benchmark" }, "of the benchmark"), element("option", { value: "agentic" }, "of agents: more time, and a wall clock"));
+  const token = element("input", { name: "token", type: "password", autocomplete: "off" });
+  const players = element("div");
+  const refusal = element("p", { class: "bad", role: "alert" });
+  const links = element("div");
+  let tasks = [];
+
+  const offer = () => {
+    const robots = "ABC".slice(0, robotCount(tasks.find(({ id }) => id === task.value)));
+    players.replaceChildren(...[...robots].map((robot) => labelled(`Robot ${robot} is driven by`,
+      element("select", { name: robot }, element("option", { value: "person" }, "a person"), element("option", { value: "still" }, "nobody: it stands still")))));
+  };
+  const load = async () => {
+    refusal.textContent = "";
+    try {
+      ({ tasks } = await call("/v1/tasks", token.value));
+    } catch (error) {
+      refusal.textContent = error.status === 401 ? "This server wants its token: enter it above." : error.message;
+      return;
+    }
+    task.replaceChildren(...tasks.map(({ id, instruction }) => element("option", { value: id, title: instruction }, id)));
+    offer();
+  };
+  task.addEventListener("change", offer);
+  token.addEventListener("change", load);
+
+  const begin = async (event) => {
+    event.preventDefault();
+    refusal.textContent = "";
+    const chosen = new FormData(event.target);
+    if (!["A", "B", "C"].some((robot) => chosen.get(robot) === "person")) {
+      refusal.textContent = "Somebody has to drive a robot: choose a person for one of them.";
+      return;
+    }
+    const body = { task: task.value, seed: Number(seed.value), protocol: protocol.value, short: true, operators: "per_robot", patience_s: PATIENCE_S, talk: true };
+    try {
+      links.replaceChildren(...linksOf(await call("/v1/episodes", token.value, body), chosen));
+      links.scrollIntoView({ block: "nearest" });
+    } catch (error) {
+      refusal.textContent = error.message;
+    }
+  };
+  main.replaceChildren(
+    element("p", {}, element("a", { href: "/" }, "All episodes")),
+    element("h1", {}, "Operate robots together"),
+    element("p", {}, "Each person drives one robot, on a page of their own. Time passes while everybody's page is open and in view, and stands still while one is away."),
+    element("form", { onsubmit: begin, class: "operate-form" }, labelled("Task", task), labelled("Seed", seed), labelled("Rules", protocol), players,
+      labelled("The server's token, if it has one", token), element("button", {}, "Start"), refusal),
+    links);
+  load();
+}
+
+const robotCount = (task) => task?.robots?.length ?? 2;
+
+/** The links of an episode that has begun. Whoever drives the first robot also lets those stand still that nobody drives. */
+function linksOf({ episode_id: episode, operators, instructions }, chosen) {
+  const still = operators.filter(({ robot }) => chosen.get(robot) === "still");
+  const people = operators.filter((operator) => !still.includes(operator));
+  const rows = people.map(({ robot, token }, index) => {
+    const seat = new URLSearchParams({ episode, robot, token });
+    if (index === 0 && still.length > 0) seat.set("still", still.map((operator) => operator.token).join(","));
+    const part = instructions.find((entry) => entry.robot === robot)?.instruction ?? "";
+    return element("li", {}, element("a", { href: `/operate#${seat}`, target: "_blank", rel: "noopener" }, `Drive robot ${robot}`), ` ${part}`);
+  });
+  return [element("h2", {}, "Links"),
+    element("p", {}, "Send each person one of these, and nobody else: who has the link drives the robot. They are shown this once."),
+    element("ul", {}, ...rows)];
+}
