@@ -21,12 +21,14 @@ const SIDES = ["left", "right"];
 export async function drive(main, seat) {
   const root = `/v1/episodes/${encodeURIComponent(seat.episode)}`;
   const ask = (tool, body) => call(`${root}/tools/${tool}`, seat.token, body);
-  const briefing = await call(`${root}/briefing`, seat.token).catch((error) => error);
-  if (briefing instanceof Error) {
-    main.replaceChildren(element("h1", {}, "Nothing to drive"), element("p", { class: "bad", role: "alert" }, briefing.message),
+  const asked = Promise.all([call(`${root}/briefing`, seat.token), ask("observe", { robots: [seat.robot], short: true })]);
+  const answered = await asked.catch((error) => error);
+  if (answered instanceof Error) {
+    main.replaceChildren(element("h1", {}, "Nothing to drive"), element("p", { class: "bad", role: "alert" }, answered.message),
       element("p", {}, "The link may be of another start of the server, or the episode has ended. ", element("a", { href: "/operate" }, "Start another")));
     return;
   }
+  const [briefing, seen] = answered;
   const state = { seat, ask, root, hand: "right", targets: {}, measured: {}, fingers: {}, shares: {}, heightM: null, camera: null, paused: null, ended: false, gone: new Set() };
   const page = build(main, state, briefing);
   const keys = listen((key) => {
@@ -34,7 +36,6 @@ export async function drive(main, seat) {
     if (action) page.act(action);
     return Boolean(action);
   });
-  const seen = await ask("observe", { robots: [seat.robot], short: true });
   look(state, page, seen);
   await run(state, page, keys);
 }
