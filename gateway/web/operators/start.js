@@ -13,7 +13,7 @@ export function start(main) {
   const task = element("select", { name: "task", required: true });
   const seed = element("input", { name: "seed", type: "number", min: 0, max: 4294967295, step: 1, value: 0, required: true });
   const protocol = element("select", { name: "protocol" },
-    element("option", { value: "benchmark" }, "of the benchmark"), element("option", { value: "agentic" }, "of agents: more time, and a wall clock"));
+    element("option", { value: "agentic" }, "of agents: more time, and a wall clock"), element("option", { value: "benchmark" }, "of the benchmark: little time"));
   const token = element("input", { name: "token", type: "password", autocomplete: "off" });
   const players = element("div");
   const refusal = element("p", { class: "bad", role: "alert" });
