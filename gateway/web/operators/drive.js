@@ -190,7 +190,7 @@ function build(main, state, briefing) {
 
   main.replaceChildren(
     element("h1", {}, `You drive robot ${robot}`), element("p", {}, part), status,
-    element("div", { class: "columns" },
+    element("div", { class: "columns operate" },
       element("div", {}, view, facts),
       element("div", {},
         element("div", { class: "tools" }, button("Left hand", "left", "1"), button("Right hand", "right", "2")),
