@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use tandem_sim::{
@@ -11,6 +12,7 @@ use tandem_sim::{
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, Wording};
 
 use crate::error::SceneError;
+use crate::protocol::{Rules, rules};
 use crate::scoring::Phase;
 use crate::tasks::Task;
 use crate::variation::Variation;
@@ -49,6 +51,9 @@ pub struct EpisodeSpec {
     /// In what it varies beyond the benchmark.
     #[serde(default, skip_serializing_if = "Variation::is_benchmarks")]
     pub variation: Variation,
+    /// How long the policy may think, if not as long as the protocol has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thinking_limit_s: Option<u32>,
 }
 
 /// Which file describes the robots.
@@ -124,7 +129,15 @@ impl EpisodeSpec {
             hints: Assistance::default().hints(),
             instructions: None,
             variation: Variation::default(),
+            thinking_limit_s: None,
         }
+    }
+
+    /// What its protocol allows for its task, with its own limit of thinking where it has one.
+    pub fn rules(&self) -> Rules {
+        let rules = rules(self.protocol, self.task);
+        let own = self.thinking_limit_s.map(|limit_s| Duration::from_secs(limit_s.into()));
+        Rules { thinking: own.or(rules.thinking), ..rules }
     }
 
     /// The same with another assistance, and what that has of phases and hints.
@@ -157,6 +170,7 @@ impl EpisodeSpec {
             hints,
             instructions,
             variation,
+            thinking_limit_s,
         } = self;
         let file = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let departures = [
@@ -177,6 +191,7 @@ impl EpisodeSpec {
                 .then(|| format!("state estimate: {}", state_estimate.name())),
             (*sensors != SensorModel::default()).then(|| format!("sensors: {}", sensors.name())),
             instructions.as_ref().map(|xxh3| format!("instructions: {xxh3}")),
+            thinking_limit_s.map(|limit_s| format!("thinking limit: {limit_s} s")),
         ];
         departures.into_iter().flatten().chain(variation.departures()).collect()
     }

@@ -81,6 +81,9 @@ pub struct Layer {
     /// For experiments: whether texts say how to grasp, whatever the assistance has.
     #[arg(long, hide = true, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = one_of(Hints::ALL, Hints::name))]
     pub hints: Option<Hints>,
+    /// How long a policy may think in an episode, for those that wait for slow models; results name it [default: as the protocol has it].
+    #[arg(long, env = "TANDEM_THINKING_LIMIT", value_name = "SECONDS")]
+    pub thinking_limit: Option<u32>,
     /// Episodes that may be held at once; each costs a thread and about 7 MB, beside 40 MB that they share [default: 8].
     #[arg(long, env = "TANDEM_MAX_EPISODES", value_name = "N")]
     pub max_episodes: Option<u32>,
@@ -136,6 +139,7 @@ impl Layer {
             assistance: self.assistance.or(next.assistance),
             disclosure: self.disclosure.or(next.disclosure),
             hints: self.hints.or(next.hints),
+            thinking_limit: self.thinking_limit.or(next.thinking_limit),
             max_episodes: self.max_episodes.or(next.max_episodes),
             max_body_bytes: self.max_body_bytes.or(next.max_body_bytes),
             request_timeout: self.request_timeout.or(next.request_timeout),
@@ -154,6 +158,7 @@ impl Layer {
     /// Refuses numbers and names that no server could be used with.
     pub fn check(&self) -> Result<(), SettingsError> {
         let numbers = [
+            ("thinking_limit", self.thinking_limit.map(u64::from), "3600"),
             ("max_episodes", self.max_episodes.map(u64::from), "8"),
             ("max_body_bytes", self.max_body_bytes.map(|bytes| bytes as u64), "2000000"),
             ("request_timeout", self.request_timeout.map(u64::from), "30"),
@@ -269,6 +274,8 @@ pub struct Settings {
     pub disclosure: Disclosure,
     /// Whether they are told how to grasp.
     pub hints: Hints,
+    /// How long policies may think, if not as long as the protocol has it, in seconds.
+    pub thinking_limit_s: Option<u32>,
     /// Episodes that may be held at once.
     pub max_episodes: u32,
     /// Largest request body that is read.
@@ -371,6 +378,7 @@ impl Settings {
             disclosure: self.disclosure,
             hints: self.hints,
             instructions: self.instructions.fingerprint(&start.task),
+            thinking_limit_s: self.thinking_limit_s,
             ..EpisodeSpec::new(self.tasks.find(&start.task)?, start.seed, protocol)
         })
     }
@@ -411,6 +419,7 @@ impl Settings {
             disclosure: layer.disclosure.unwrap_or(assistance.disclosure()),
             hints: layer.hints.unwrap_or(assistance.hints()),
             allowed_hosts: layer.allowed_host.unwrap_or_default(),
+            thinking_limit_s: layer.thinking_limit,
             max_episodes: layer.max_episodes.unwrap_or(Layer::MAX_EPISODES),
             max_body_bytes: layer.max_body_bytes.unwrap_or(2_000_000),
             request_timeout: seconds(layer.request_timeout, 30),

@@ -33,6 +33,8 @@ pub struct EvaluationPlan<'a> {
     pub hints: Hints,
     /// In what episodes vary beyond the benchmark.
     pub variation: Variation,
+    /// How long a policy may think in an episode, if not as long as the protocol has it.
+    pub thinking_limit_s: Option<u32>,
     pub tasks: Vec<&'static Task>,
     pub seeds: Vec<u32>,
     pub starts: Starts,
@@ -101,6 +103,7 @@ impl EvaluationPlan<'_> {
             disclosure: self.disclosure,
             hints: self.hints,
             variation: self.variation,
+            thinking_limit_s: self.thinking_limit_s,
             start,
             ..EpisodeSpec::new(task, seed, self.protocol)
         }

@@ -12,7 +12,6 @@ use super::LiveStep;
 use super::frame::{self, RobotFrame};
 use super::geometry::{Geometry, pose_row};
 use crate::commands::Motion;
-use crate::protocol::rules;
 use crate::scoring::Phase;
 use crate::spec::EpisodeSpec;
 
@@ -47,7 +46,7 @@ impl LiveScene {
         let phases = phases.map(|(index, phase)| {
             json!({ "number": Phase::number(index), "id": phase.id, "collaborative": phase.collaborative })
         });
-        let rules = rules(spec.protocol, spec.task);
+        let rules = spec.rules();
         let head = json!({
             "task": spec.task.id, "seed": spec.seed, "protocol": spec.protocol, "instruction": spec.task.instruction,
             "assistance": spec.assistance, "control_hz": CONTROL_HZ,

@@ -6,7 +6,6 @@ use tandem_tools_spec::{JointChunk, SendJointChunk};
 
 use super::{Episode, Player, PlayerError};
 use crate::commands::base_row;
-use crate::protocol::rules;
 use crate::recording::{Recording, RecordingError};
 use crate::spec::{EpisodeSpec, PhaseStart, Start};
 
@@ -37,7 +36,7 @@ impl Demonstration {
 
 impl Player for Demonstration {
     fn play(&mut self, episode: &mut dyn Episode) -> Result<(), PlayerError> {
-        let most = rules(self.spec.protocol, self.spec.task).steps_per_command;
+        let most = self.spec.rules().steps_per_command;
         for steps in self.steps()?.chunks(most as usize) {
             let names = self.spec.task.robot_names().enumerate();
             let rows = |robot: usize| steps.iter().map(|step| action(step, robot)).collect();

@@ -36,7 +36,7 @@ use tandem_tools_spec::{EndReason, ResultReply, Usage};
 use crate::commands::{Clamped, Command, Motion, MotionState, Trajectory};
 use crate::convert::isometry_from_sim;
 use crate::observation::{Observer, Picture};
-use crate::protocol::{Rules, rules};
+use crate::protocol::Rules;
 use crate::recording::{BEGIN, state_hash_text};
 use crate::scoring::{Facts, Phase, Scores};
 use crate::spec::{EpisodeSpec, Start};
@@ -107,7 +107,7 @@ impl Session {
     /// Builds the world of `spec`, at the task's own beginning.
     fn build(spec: &EpisodeSpec, clock: Clock) -> Result<Session, EpisodeError> {
         let Built { world, motions, robot, locomotion } = build(spec)?;
-        let rules = rules(spec.protocol, spec.task);
+        let rules = spec.rules();
         let present = Arc::new(world.present());
         Ok(Session {
             origin: Origin { spec: spec.clone(), robot, locomotion },

@@ -10,7 +10,6 @@ use tandem_tools_spec::{ExtraInformation, ResultReply};
 use super::{Checkpoint, Session};
 use crate::EpisodeError;
 use crate::commands::Called;
-use crate::protocol::rules;
 use crate::recording::{CallerRecord, RecordedCheckpoint};
 use crate::spec::{EpisodeSpec, Start};
 
@@ -39,7 +38,7 @@ impl Replay {
         }
         session.hashes = Some(vec![session.world.state_hash()]);
         if spec.start == Start::Task {
-            session.hold(rules(spec.protocol, spec.task).initial_hold_steps)?;
+            session.hold(spec.rules().initial_hold_steps)?;
         }
         session.clock.resume();
         Ok(Replay { session, policy_clock_ns })

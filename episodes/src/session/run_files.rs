@@ -15,6 +15,7 @@ use super::{Session, this_build};
 use crate::EpisodeError;
 use crate::observation::Observer;
 use crate::output::{OutputError, create_private_folder, write_whole};
+use crate::protocol::Rules;
 use crate::recording::{NoteMessage, Recorder, RecorderThread, RecordingHeader, ToolCallRecord, Visibility};
 use crate::reports::episode::{
     CELL_HEIGHT, CELL_WIDTH, CallCounts, EpisodePage, KeyMoment, LabelledPicture, PAGE_FILE, STRIP_FILE,
@@ -50,6 +51,7 @@ pub struct RunFiles {
     moments: Vec<KeyMoment>,
     begin_s: f64,
     calls: CallCounts,
+    rules: Rules,
     budget_left: Option<Budget>,
 }
 
@@ -66,6 +68,7 @@ impl RunFiles {
             moments: Vec::new(),
             begin_s: session.steps_before as f64 / CONTROL_HZ,
             calls: CallCounts::default(),
+            rules: session.rules,
             budget_left: None,
         }
     }
@@ -168,6 +171,7 @@ impl RunFiles {
             result,
             calls: &self.calls,
             begin_s: self.begin_s,
+            rules: self.rules,
             budget_left: self.budget_left,
             moments: &self.moments,
         };

@@ -245,6 +245,25 @@ fn the_wall_clock_charges_thinking_and_ends_the_episode() {
 }
 
 #[test]
+fn a_limit_of_its_own_takes_the_place_of_the_protocols() {
+    let hands_s = Arc::new(AtomicU64::new(0));
+    let read = hands_s.clone();
+    let clock: Clock = Box::new(move || Duration::from_secs(read.load(Relaxed)));
+    let own = EpisodeSpec { thinking_limit_s: Some(7200), ..spec("handover", 0, Protocol::Benchmark) };
+    let mut session = Session::start_with_clock(&own, None, clock).unwrap();
+    hands_s.fetch_add(7199, Relaxed);
+    assert_eq!(wait(&mut session, 1).budget.wall_clock_left_s, Some(1.0));
+    hands_s.fetch_add(1, Relaxed);
+    let refused = session.call(Wait { steps: 1 }.into()).unwrap_err();
+    assert!(
+        matches!(refused, EpisodeError::Ended { reason: EndReason::WallClockExhausted, .. }),
+        "{refused}"
+    );
+    let named = session.close().departures;
+    assert!(named.contains(&"thinking limit: 7200 s".into()), "{named:?}");
+}
+
+#[test]
 fn an_episode_ends_when_its_policy_has_gone() {
     let ended_after = |protocol: Protocol, thinking_s: u64, idle_s: u64| {
         let hands_s = Arc::new(AtomicU64::new(0));

@@ -134,9 +134,14 @@ impl EpisodeTable {
         Ok(StartReply { episode_id: id.into(), idle_limit_s, operators, briefing })
     }
 
-    /// The reply to `list_tasks`, without what policies of this server are not told.
+    /// The reply to `list_tasks`, with this server's limit of thinking where it has one, and without what its policies are
+    /// not told.
     pub fn task_list(&self) -> TaskList {
         let mut list = self.settings.instructions.task_list(&self.settings.tasks, &self.settings.base_limits);
+        if let Some(limit_s) = self.settings.thinking_limit_s {
+            let protocols = list.tasks.iter_mut().flat_map(|task| &mut task.protocols);
+            protocols.for_each(|info| info.wall_clock_s = Some(limit_s.into()));
+        }
         match self.settings.assistance {
             // How the score is counted is no part of the task.
             Assistance::Paper => list.tasks.iter_mut().for_each(|task| task.phases.clear()),

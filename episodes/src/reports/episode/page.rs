@@ -6,7 +6,7 @@ use tandem_sim::CONTROL_HZ;
 use tandem_tools_spec::{Budget, EndReason, ResultReply};
 
 use crate::html::{self, escape};
-use crate::protocol::{Rules, rules};
+use crate::protocol::Rules;
 use crate::reports::episode::moments::{self, KeyMoment};
 use crate::scoring::Phase;
 use crate::tasks::Task;
@@ -31,6 +31,8 @@ pub struct EpisodePage<'a> {
     pub calls: &'a CallCounts,
     /// Simulated time at which it began: later than 0 where it began at a phase of another episode.
     pub begin_s: f64,
+    /// What it was allowed.
+    pub rules: Rules,
     /// The budget after the last control step; `None` if there was none.
     pub budget_left: Option<Budget>,
     pub moments: &'a [KeyMoment],
@@ -158,8 +160,7 @@ impl EpisodePage<'_> {
     }
 
     fn budget(&self) -> String {
-        let Rules { episode_steps, initial_hold_steps, thinking, .. } =
-            rules(self.result.protocol, self.task);
+        let Rules { episode_steps, initial_hold_steps, thinking, .. } = self.rules;
         let steps = self.result.env_steps;
         let hold = match initial_hold_steps {
             0 => String::new(),

@@ -38,6 +38,9 @@ pub struct EpisodeFlags {
     /// How far the seed moves things, as a multiple of the benchmark's randomisation; above 1 it turns them, too.
     #[arg(long, value_name = "TIMES", value_parser = one_of(Spread::ALL, Spread::name), default_value = Spread::default().name())]
     spread: Spread,
+    /// How long a policy may think in an episode, for those that wait for slow models; results name it [default: as the protocol has it].
+    #[arg(long, env = "TANDEM_THINKING_LIMIT", value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..))]
+    thinking_limit: Option<u32>,
     /// Worlds that run side by side.
     #[arg(long, default_value_t = 1, value_name = "N")]
     jobs: usize,
@@ -96,6 +99,7 @@ impl EpisodeFlags {
             disclosure,
             hints,
             variation: Variation { spread: self.spread, ..Variation::default() },
+            thinking_limit_s: self.thinking_limit,
             renderer: self.world.renderer(),
             tasks,
             seeds: self.seeds.0.collect(),

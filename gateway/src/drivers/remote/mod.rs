@@ -23,7 +23,6 @@ use tandem_episodes::{
     EpisodeSpec,
     players::{EpisodeOutput, PlayError, PlayOutcome, Policy, PolicyWait, play_in_process},
     results::PolicyCard,
-    rules,
     tasks::Task,
 };
 
@@ -109,7 +108,7 @@ impl Policy for RemotePolicy {
 
     fn play_episode(&self, spec: &EpisodeSpec, place: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
         self.check(spec.task).map_err(PlayError::NotReady)?;
-        let most_steps = rules(spec.protocol, spec.task).steps_per_command;
+        let most_steps = spec.rules().steps_per_command;
         let mut session = self.open(spec.task, most_steps)?;
         Ok(play_in_process(spec, place, |episode| {
             session.play(episode, EpisodeMoment::number_of(spec.task, spec.seed))

@@ -38,6 +38,7 @@ fn solve(tasks: Vec<&'static Task>, may_fail: usize) {
         disclosure: Assistance::Paper.disclosure(),
         hints: Assistance::Paper.hints(),
         variation: Variation::default(),
+        thinking_limit_s: None,
         renderer: RendererKind::Cpu,
         tasks: tasks.clone(),
         seeds: SEEDS.into(),

@@ -6,6 +6,8 @@ use std::{
         Mutex,
         atomic::{AtomicUsize, Ordering},
     },
+    thread,
+    time::Duration,
 };
 
 use rmpv::Value;
@@ -82,6 +84,36 @@ fn an_xpolicylab_policy_is_asked_trial_by_trial() {
         assert!(entry(color, "data").as_slice().expect("bytes").iter().any(|byte| *byte > 60));
     }
     assert_ne!(trial, entry(&frames[3], "trial_id"), "the trial with zeros is another");
+}
+
+/// A's server has answered when B's begins to think, which it does until A's has heard that somebody is there still.
+#[test]
+fn a_server_that_has_answered_hears_heartbeats_while_another_thinks() {
+    let (first_of_a, first_of_b) = (Mutex::default(), Mutex::default());
+    let of_a = XPolicyLabServer::start(move |observation| Ok(turning(&first_of_a, observation)));
+    let (heard, looks) = (of_a.frames.clone(), AtomicUsize::new(0));
+    let beats = move || {
+        let frames = heard.lock().expect("no panic");
+        frames.iter().filter(|frame| entry(frame, "message_type").as_str() == Some("heartbeat")).count()
+    };
+    let of_b = XPolicyLabServer::start(move |observation| {
+        // The first look is the trial with zeros.
+        while looks.load(Ordering::Relaxed) == 1 && beats() == 0 {
+            thread::sleep(Duration::from_millis(20));
+        }
+        looks.fetch_add(1, Ordering::Relaxed);
+        Ok(turning(&first_of_b, observation))
+    });
+    let preset = PolicyMap::find("xpolicylab").expect("a preset");
+    let policy = RemotePolicy::new(PolicyProtocol::XPolicyLab, vec![of_a.url(), of_b.url()], preset);
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let evaluation = play(&plan(&policy, vec![1], false), folder.path());
+    let [played] = &evaluation.episodes[..] else { panic!("{evaluation:?}") };
+    assert_eq!((played.result.ended, played.result.env_steps), (EndReason::StepBudgetExhausted, 1000));
+    let asked = of_a.asked();
+    let beat = asked.iter().position(|kind| kind == "heartbeat").expect("a heartbeat");
+    assert_eq!(asked[beat - 1], "infer", "{asked:?}");
+    assert_eq!(asked[beat + 1], "infer", "the trial goes on: {asked:?}");
 }
 
 #[test]

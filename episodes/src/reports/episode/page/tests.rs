@@ -3,6 +3,7 @@
 use tandem_tools_spec::{Assistance, PhaseTimes, Protocol};
 
 use super::*;
+use crate::protocol::rules;
 use crate::reports::episode::LabelledPicture;
 use crate::tasks;
 
@@ -46,7 +47,8 @@ fn page_of(begin_s: f64, result: &ResultReply) -> String {
     let task = tasks::find("handover").unwrap();
     let views = vec![LabelledPicture { label: "what A sees".into(), file: b"png".into() }];
     let moments = [KeyMoment { caption: ["p1 <grasp>".into(), "4.0 s".into()], views }];
-    EpisodePage { task, result, calls: &calls, begin_s, budget_left, moments: &moments }.html()
+    let rules = rules(protocol, task);
+    EpisodePage { task, result, calls: &calls, begin_s, rules, budget_left, moments: &moments }.html()
 }
 
 #[test]
