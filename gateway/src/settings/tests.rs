@@ -53,7 +53,9 @@ fn settings_that_let_nobody_in_are_refused() {
         says.iter().for_each(|part| assert!(text.contains(part), "{line}: {text}"));
     };
     check("max_episodes = 0", &["max_episodes is 0", "at least 1, as 8"]);
-    for limit in ["max_body_bytes", "request_timeout", "max_requests", "rate_limit", "idle_timeout", "thinking_limit"] {
+    for limit in
+        ["max_body_bytes", "request_timeout", "max_requests", "rate_limit", "idle_timeout", "thinking_limit"]
+    {
         check(&format!("{limit} = 0"), &[limit, "at least 1"]);
     }
     for host in ["", "http://lab.example", "lab.example:8700", "lab..example", "a b"] {

@@ -3,7 +3,8 @@
     pip install ./gateway/python
     python tests/peers/environments/memory.py [--episodes 1000] [--most-growth 0.02]
 
-Each kind of episode has a process of its own. What is built once, as the shapes of all ten scenes, is there when every task has
+Each kind of episode has a process of its own, with one arena of the allocator: in arenas of their own, threads that come and go
+keep what others freed, which took recorded episodes from 49 to 55 MB in 1,000 where one arena stays at 42. What is built once, as the shapes of all ten scenes, is there when every task has
 been played, from where growth is counted; it has to stay within 2 %. So few as 50 episodes need more: an allocator that serves
 several threads settles slowly, and one episode that is held would be 20 %. Freed memory is given back to the system before it
 is measured, so that what is told is what is held.
@@ -90,6 +91,8 @@ def main():
     given = parser.parse_args()
     leaks = []
     for kind in given.kinds:
+        # Read by the allocator when the process begins.
+        os.environ["MALLOC_ARENA_MAX"] = "1"
         with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
             held = pool.submit(measure, kind, given.episodes).result()
         begun = held[-(-TASKS // (given.episodes // BLOCKS)) - 1]
