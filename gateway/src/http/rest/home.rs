@@ -19,7 +19,7 @@ pub fn page(version: &str, list: &EpisodeList, caller: &Caller) -> String {
     body += &format!(
         "<p>Simulated humanoids that must work together. <a href=\"/docs\">The interface</a>, for programs \
          <a href=\"/v1/openapi.json\">as OpenAPI</a>; <a href=\"/v1/tasks\">the tasks</a>; <a href=\"/v1/tools\">the tools</a>{figures}. \
-         MCP hosts connect to <code>/mcp</code>. Who came by the link that the server printed when it started <a href=\"/watch\">watches</a>.</p>\n<h2>Episodes</h2>\n"
+         MCP hosts connect to <code>/mcp</code>. Who came by the link that the server printed when it started <a href=\"/watch\">watches</a>. People <a href=\"/operate\">operate</a> robots together.</p>\n<h2>Episodes</h2>\n"
     );
     let rows: String = list.episodes.iter().map(row).collect();
     body += &match rows.is_empty() {
