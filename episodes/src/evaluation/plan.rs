@@ -109,9 +109,15 @@ impl EvaluationPlan<'_> {
         }
     }
 
-    /// What in its episodes is not as the benchmark has it, which is the same in all of them.
+    /// What in its episodes is not as the benchmark has it: the same in all of them, but for the files of tasks.
     pub fn departures(&self) -> Vec<String> {
-        self.tasks.first().map_or_else(Vec::new, |task| self.spec(task, 0, Start::Task).departures())
+        let mut found: Vec<String> = Vec::new();
+        for departure in self.tasks.iter().flat_map(|task| self.spec(task, 0, Start::Task).departures()) {
+            if !found.contains(&departure) {
+                found.push(departure);
+            }
+        }
+        found
     }
 
     /// This share of the episodes, and which of it are left out because nobody has demonstrated them.

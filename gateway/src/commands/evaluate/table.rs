@@ -57,8 +57,14 @@ fn print_tasks(evaluation: &Evaluation) {
         "task", "episodes", "p1", "p2", "p3", "falls", "steps"
     );
     for (id, task) in &evaluation.tasks {
+        let of_task = |played: &&PlayedEpisode| played.result.task == *id;
+        let played = evaluation.episodes.iter().find(of_task);
+        let phases = played.map_or(0, |played| played.spec.task.phases.len());
         let [p1, p2, p3] =
-            [task.p1, task.p2, task.p3].map(|successes| rate(Count { successes, trials: task.episodes }));
+            [(1, task.p1), (2, task.p2), (3, task.p3)].map(|(number, successes)| match number <= phases {
+                true => rate(Count { successes, trials: task.episodes }),
+                false => "-".into(),
+            });
         let kinds = [
             (task.policy_failed, Exclusion::PolicyFailed),
             (task.simulator_failed, Exclusion::SimulatorFailed),
