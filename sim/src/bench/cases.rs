@@ -79,13 +79,13 @@ pub(super) const PULL_RISE_S: f32 = 1.0;
 /// A robot that stands is pulled by its hands until then: to the end of its case, so that it is looked at as it is pulled, or for a
 /// while, so that it is looked at when it has been left alone again.
 const LONG_PULL_END_S: f32 = 20.0;
-const SHORT_PULL_END_S: f32 = 4.0;
+const SHORT_PULL_END_S: f32 = 7.0;
 
 const fn pulled(name: &'static str, force_n: f32, hands: PulledHands, end_s: f32) -> Case {
     Case { name, disturbance: Disturbance::LevelPull { force_n, hands, end_s }, ..HOLD }
 }
 
-pub const CASES: [Case; 29] = [
+pub const CASES: [Case; 30] = [
     Case { name: "stand", ..HOLD },
     Case { name: "stand_waving", duration_s: 60.0, arms: Arms::Waving, ..HOLD },
     Case { name: "stand_1kg", hand_load_kg: 1.0, ..HOLD },
@@ -93,6 +93,10 @@ pub const CASES: [Case; 29] = [
     Case { name: "stand_3kg", hand_load_kg: 3.0, ..HOLD },
     Case { name: "stand_pull_15n", disturbance: Disturbance::Pull { force_n: 15.0 }, ..HOLD },
     pulled("stand_pull_25n_both_hands", 25.0, PulledHands::Both, LONG_PULL_END_S),
+    Case {
+        arms: Arms::Closing,
+        ..pulled("stand_pull_25n_closing", 25.0, PulledHands::Both, LONG_PULL_END_S)
+    },
     pulled("stand_pull_25n_one_hand", 25.0, PulledHands::One, LONG_PULL_END_S),
     pulled("stand_pull_40n", 40.0, PulledHands::Both, SHORT_PULL_END_S),
     moving("forward_0.4", [0.4, 0.0, 0.0]),

@@ -1,7 +1,7 @@
 //! Arm motion, drawn from the random numbers of a seed.
 
 use crate::Sides;
-use crate::body::{ARM_COLUMNS, ARM_JOINTS, MIRRORED_ARM, UPPER_JOINTS};
+use crate::body::{ARM_COLUMNS, ARM_JOINTS, HAND_COLUMNS, HAND_JOINTS, MIRRORED_ARM, UPPER_JOINTS};
 use crate::random::SplitMix64;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -10,15 +10,22 @@ pub(super) enum Arms {
     Forward,
     /// Held out as `Forward`, with every joint swinging widely.
     Waving,
+    /// Held out as `Forward`, with fingers and thumbs that close from [`CLOSES_AT_S`] on.
+    Closing,
 }
 
 /// Hands a forearm's length ahead of the chest: shoulder pitch, roll, yaw, elbow, wrist.
 const FORWARD_LEFT_RAD: [f32; ARM_JOINTS] = [-0.35, 0.2, 0.0, 0.3, 0.0, 0.0, 0.0];
 const RAISE_S: f32 = 1.5;
+/// Fists press on themselves as they would on a load: targets are beyond the range of their joints.
+const CLOSES_AT_S: f32 = 4.0;
+const CLOSING_S: f32 = 0.3;
+const FIST_LEFT_RAD: [f32; HAND_JOINTS] = [0.0, 0.0, 2.3, -2.1, -2.3, -2.1, -2.3];
 
 /// Joint targets over time.
 pub(super) struct ArmMotion {
     waves: Sides<[Wave; ARM_JOINTS]>,
+    closes: bool,
 }
 
 /// The swing of one joint.
@@ -44,7 +51,7 @@ impl ArmMotion {
             phase_rad: random.uniform([0.0, 6.3]),
         };
         let waves = Sides::from_fn(|_| std::array::from_fn(|_| wave()));
-        ArmMotion { waves }
+        ArmMotion { waves, closes: arms == Arms::Closing }
     }
 
     pub(super) fn at(&self, rest_rad: &[f32; UPPER_JOINTS], time_s: f32) -> [f32; UPPER_JOINTS] {
@@ -55,6 +62,14 @@ impl ArmMotion {
                 let forward = FORWARD_LEFT_RAD[i] * if MIRRORED_ARM[i] { side.sign() } else { 1.0 };
                 let column = ARM_COLUMNS[side] + i;
                 q_rad[column] += part * (forward - rest_rad[column] + wave.at(time_s));
+            }
+        }
+        if self.closes {
+            let closed = ((time_s - CLOSES_AT_S) / CLOSING_S).clamp(0.0, 1.0);
+            for (side, first) in HAND_COLUMNS.by_side() {
+                for (q_rad, fist_rad) in q_rad[first..].iter_mut().zip(FIST_LEFT_RAD) {
+                    *q_rad += closed * (fist_rad * side.sign() - *q_rad);
+                }
             }
         }
         q_rad

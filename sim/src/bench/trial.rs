@@ -17,6 +17,8 @@ use crate::robot::{RobotCommand, RobotTruth, Sensing};
 use crate::{CONTROL_DT_S as DT_S, RobotPlacement, Side, SimError, World, WorldSpec};
 
 const PUSH_S: f32 = 1.0;
+/// Of a robot that stands: its arms are where they are held by then.
+const PULLS_AT_S: f32 = 4.0;
 
 /// Runs until the time is up or the robot lies.
 pub(super) fn run(
@@ -101,7 +103,7 @@ fn base_command(
 }
 
 fn disturb(case: &Case, world: &mut World, seed: u32, direction: Vector, legs: &[Leg], time_s: f32) {
-    let pulled_s = time_s - 0.5 * SETTLE_S;
+    let pulled_s = time_s - if matches!(case.plan, Plan::Hold) { PULLS_AT_S } else { 0.5 * SETTLE_S };
     let risen = (pulled_s / PULL_RISE_S).min(1.0);
     match &case.disturbance {
         Disturbance::Pull { force_n } if pulled_s > 0.0 => {

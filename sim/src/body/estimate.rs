@@ -25,6 +25,10 @@ pub struct BodyEstimate {
     pub palm_velocity_m_s: Sides<Vector>,
     /// What each arm does to the trunk, as a force at its palm: that of the world on the hand, and the inertia of the moving arm.
     pub hand_reaction_n: Sides<Vector>,
+    /// Thumb and fingers press on something.
+    pub hand_holds: Sides<bool>,
+    /// Arms or fingers are told to move.
+    pub arms_told: bool,
     /// Where the task wants the waist: yaw, roll, pitch.
     pub waist_target_rad: [f32; WAIST_JOINTS],
 }
@@ -105,6 +109,8 @@ impl BodyEstimate {
             com_velocity_m_s: com_velocity_m_s / model.mass_kg,
             palm_velocity_m_s,
             hand_reaction_n: Sides::both(Vector::ZERO),
+            hand_holds: Sides::both(false),
+            arms_told: false,
             waist_target_rad: [0.0; WAIST_JOINTS],
         }
     }

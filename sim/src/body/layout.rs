@@ -16,7 +16,7 @@ pub const HAND_JOINTS: usize = 7;
 pub(crate) const LEGS: Sides<usize> = Sides { left: 0, right: 6 };
 pub(crate) const WAIST: usize = 12;
 pub(crate) const ARMS: Sides<usize> = Sides { left: 15, right: 29 };
-const HANDS: Sides<usize> = Sides { left: 22, right: 36 };
+pub(crate) const HANDS: Sides<usize> = Sides { left: 22, right: 36 };
 
 /// First joint of each group in action order: left arm, right arm, left hand, right hand, waist.
 pub const ARM_COLUMNS: Sides<usize> = Sides { left: 0, right: 7 };

@@ -20,7 +20,9 @@ pub use layout::{
 pub use model::{HandLinks, JointModel, LinkModel, RobotModel, SiteModel};
 
 pub(crate) use estimate::{LinkMotion, PALM_IN_WRIST_M, PelvisMotion};
-pub(crate) use layout::{ARMS, LEG_JOINTS, LEGS, MIRRORED_ARM, WAIST, WAIST_JOINTS, check_joint_order};
+pub(crate) use layout::{
+    ARMS, HANDS, LEG_JOINTS, LEGS, MIRRORED_ARM, WAIST, WAIST_JOINTS, check_joint_order,
+};
 
 /// Spring, damper and feedforward of one joint for one physics step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -99,6 +99,8 @@ impl Posed {
             com_velocity_m_s,
             palm_velocity_m_s: Sides::both(Vector::ZERO),
             hand_reaction_n: Sides::both(Vector::ZERO),
+            hand_holds: Sides::both(false),
+            arms_told: false,
             waist_target_rad: [0.0; 3],
         }
     }

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::arm_momentum::{ArmMomentum, OBSERVER_TIME_S};
 use crate::Sides;
-use crate::body::{ARM_JOINTS, ARMS, BodyEstimate, JOINTS};
+use crate::body::{ARM_JOINTS, ARMS, BodyEstimate, HAND_JOINTS, HANDS, JOINTS};
 
 #[derive(Clone, Default, Serialize, Deserialize)]
 pub(super) struct HandLoads {
@@ -26,6 +26,7 @@ pub(super) struct HandLoads {
     force: Sides<HandForce>,
     /// The same with the inertia of the moving arm.
     reaction: Sides<HandForce>,
+    grip: Sides<Grip>,
 }
 
 /// What one arm tells of its hand at one instant.
@@ -52,6 +53,13 @@ const LEAST_EXPLAINED: f32 = 0.6;
 /// Dex3-1 hands are not made for more.
 const LARGEST_WEIGHT_N: f32 = 35.0;
 
+/// Of the seven joints of a hand.
+const THUMB_JOINTS: usize = 3;
+const GRIP_FILTER_TIME_S: f32 = 0.2;
+/// More than fingers weigh, less than those that hold press with; what holds does so until it presses with half of that.
+const LEAST_PRESS_N_M: f32 = 0.2;
+const STILL_PRESSES: f32 = 0.5;
+
 impl HandLoads {
     /// One physics step: `torque_n_m` are the drives' torques of the last step. Returns the torques that hold all joints
     /// against gravity and the arms against the weights in the hands.
@@ -73,6 +81,7 @@ impl HandLoads {
             let felt_n_m = arm.excess_n_m.map(|excess_n_m| -excess_n_m);
             self.reaction[side].update(&arm.levers_m, felt_n_m, REACTION_FILTER_TIME_S, dt_s);
             self.payload[side].update(&arm, dt_s);
+            self.grip[side].update(&torque_n_m[HANDS[side]..][..HAND_JOINTS], dt_s);
             for (i, held_n_m) in self.payload[side].torques_n_m(&arm).into_iter().enumerate() {
                 load_n_m[first + i] += held_n_m;
             }
@@ -90,9 +99,38 @@ impl HandLoads {
         self.reaction.each_ref().map(HandForce::force_n)
     }
 
+    /// Whose thumb and fingers both press on something.
+    pub(super) fn holds(&self) -> Sides<bool> {
+        self.grip.each_ref().map(Grip::holds)
+    }
+
     #[cfg(test)]
     fn weight_n(&self) -> Sides<f32> {
         self.payload.each_ref().map(Payload::weight_n)
+    }
+}
+
+/// What presses with thumb and fingers alike.
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Grip {
+    torque_n_m: [f32; HAND_JOINTS],
+    holds: bool,
+}
+
+impl Grip {
+    /// One physics step; torques of the thumb's joints, then of the fingers'.
+    fn update(&mut self, torque_n_m: &[f32], dt_s: f32) {
+        for (felt_n_m, torque_n_m) in self.torque_n_m.iter_mut().zip(torque_n_m) {
+            *felt_n_m += (torque_n_m - *felt_n_m) * (dt_s / GRIP_FILTER_TIME_S);
+        }
+        let (thumb, fingers) = self.torque_n_m.split_at(THUMB_JOINTS);
+        let least_n_m = if self.holds { LEAST_PRESS_N_M * STILL_PRESSES } else { LEAST_PRESS_N_M };
+        self.holds =
+            [thumb, fingers].iter().all(|joints| joints.iter().any(|torque| torque.abs() > least_n_m));
+    }
+
+    fn holds(&self) -> bool {
+        self.holds
     }
 }
 
@@ -235,5 +273,26 @@ mod tests {
         }
         let (feeling, _) = feel(&holding(), Sides::both(Vector::Z * -300.0));
         assert!(feeling.weight_n()[Side::Left] < 35.1 && feeling.force_n().left.length() < 80.1, "an impact");
+    }
+
+    #[test]
+    fn a_hand_holds_while_thumb_and_fingers_press() {
+        let body = holding();
+        let mut feeling = HandLoads::default();
+        let mut press = |thumb_n_m: f32, finger_n_m: f32| {
+            let mut torque_n_m = body.gravity_torques_n_m();
+            torque_n_m[HANDS.left + 1] = thumb_n_m;
+            torque_n_m[HANDS.left + THUMB_JOINTS] = finger_n_m;
+            for _ in 0..400 {
+                feeling.update(&body, &torque_n_m, PHYSICS_DT_S);
+            }
+            feeling.holds()
+        };
+        assert_eq!(press(0.5, 0.1), Sides::both(false), "a thumb alone");
+        assert_eq!(press(-0.1, 0.5), Sides::both(false), "a finger alone");
+        let left = Sides { left: true, right: false };
+        assert_eq!(press(-0.3, 0.3), left);
+        assert_eq!(press(-0.15, 0.15), left, "it does not let go of what it presses a little less");
+        assert_eq!(press(-0.15, 0.05), Sides::both(false), "the fingers have let go");
     }
 }

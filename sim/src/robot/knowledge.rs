@@ -136,6 +136,8 @@ fn from_truth(model: &Arc<RobotModel>, tree: &Tree, readings: &SensorReadings) -
         com_velocity_m_s: com_velocity_m_s / model.mass_kg,
         palm_velocity_m_s,
         hand_reaction_n: Sides::both(Vector::ZERO),
+        hand_holds: Sides::both(false),
+        arms_told: false,
         waist_target_rad: [0.0; WAIST_JOINTS],
     }
 }

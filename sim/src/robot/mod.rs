@@ -59,6 +59,8 @@ struct RobotMemory {
     fallen: bool,
 }
 
+/// Arms and fingers whose targets move slower are told to be still.
+const STILL_TOLD_RAD_S: f32 = 0.2;
 const FALLEN_HEIGHT_M: f64 = 0.4;
 const FALLEN_TILT_COSINE: f64 = 0.5;
 
@@ -98,11 +100,14 @@ impl Robot {
 
     fn take(&mut self, body: BodyEstimate) {
         let hand_reaction_n = self.memory.hand_loads.reaction_n();
-        self.body = BodyEstimate { hand_reaction_n, waist_target_rad: self.waist_target_rad(), ..body };
+        let hand_holds = self.memory.hand_loads.holds();
+        let waist_target_rad = self.waist_target_rad();
+        self.body = BodyEstimate { hand_reaction_n, hand_holds, waist_target_rad, ..body };
     }
 
     /// Sets this robot's joint drives for one physics step, `substep` counting from 0 within the control step.
     pub(crate) fn drive(&mut self, dynamics: &mut Dynamics, command: &RobotCommand, substep: u32) {
+        self.body.arms_told = self.arms_told(command);
         let torque_n_m = &self.memory.knowledge.readings().joints.torque_n_m;
         let load_n_m = self.memory.hand_loads.update(&self.body, torque_n_m, PHYSICS_DT_S);
         let legs = match self.memory.fallen {
@@ -114,6 +119,12 @@ impl Robot {
         set_legs(&mut drives, &legs);
         joints::drive(dynamics.tree_mut(self.tree), &self.model, &drives);
         self.remember(command, substep);
+    }
+
+    /// Whether the command moves an arm or a finger.
+    fn arms_told(&self, command: &RobotCommand) -> bool {
+        let columns = self.memory.last_upper_rad.iter().zip(&command.upper_rad).take(WAIST_COLUMN);
+        columns.into_iter().any(|(from, to)| (to - from).abs() > STILL_TOLD_RAD_S * CONTROL_DT_S)
     }
 
     /// The upper body goes linearly from the last command to this one. A controller that balances with the waist adds to

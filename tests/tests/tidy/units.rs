@@ -51,6 +51,7 @@ const UNITS: &[&str] = &[
     "steps",
     "m_s",
     "m_s2",
+    "m_s3",
     "rad_s",
     "rad_s2",
     "n_s",

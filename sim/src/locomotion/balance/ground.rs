@@ -110,6 +110,13 @@ pub(super) fn distribute(
     })
 }
 
+/// Force (N) on the left foot, whose opposite acts on the right one, of a moment about the vertical:
+///   d x f = m z,   d from the right sole to the left one.
+pub(super) fn couple_n(moment_n_m: f32, soles: Sides<Pose>) -> Vector {
+    let apart_m = flat(soles.left.translation - soles.right.translation);
+    Vector::Z.cross(apart_m) * (moment_n_m / apart_m.length_squared())
+}
+
 /// Torques with which a leg pushes on the ground so that the ground answers with `foot` and a free moment:
 /// tau = -J^T [f; m].
 pub(super) fn leg_torques_n_m(

@@ -2,6 +2,7 @@
 
 use rapier3d::math::Vector;
 
+use super::observer::ObservedPush;
 use crate::body::BodyEstimate;
 use crate::plane::flat;
 use crate::{GRAVITY_M_S2, Sides};
@@ -36,8 +37,12 @@ pub(super) struct Load {
     pub balance_point_m: Vector,
     /// The same without the push: where the robot and what it carries have their centre of mass.
     pub weights_point_m: Vector,
+    /// How fast the balance point moves because the push changes.
+    pub balance_point_m_s: Vector,
     /// Velocity of the robot and of what it carries, as one body.
     pub velocity_m_s: Vector,
+    /// How much the robot leans ahead of pulls, 0 to 1: see [`super::stand::Ahead`].
+    pub ahead: f32,
 }
 
 /// Pushes and pulls are taken to act this high over the centre of mass: at the chest and the hands.
@@ -46,11 +51,19 @@ const PUSH_LEVER_M: f32 = 0.19;
 const DEAD_ZONE_N: f32 = 6.0;
 /// More about the vertical than a foot can hold is not fed forward.
 const LARGEST_TURN_N_M: f32 = 20.0;
+/// So much less of it if feet hold it that push in opposite directions.
+const TURN_LEFT_OUT_N_M: f32 = 10.0;
 
 impl Load {
     /// With height h of the centre of mass c over the ground and vertical load N = m g - f_z:
     ///   p = c + ( m_y + h f_x, -m_x + h f_y ) / N.
-    pub(super) fn of(body: &BodyEstimate, laden: &LadenRobot, ground_m: f32, push_m_s2: Vector) -> Load {
+    pub(super) fn of(
+        body: &BodyEstimate,
+        laden: &LadenRobot,
+        ground_m: f32,
+        push: ObservedPush,
+        ahead: f32,
+    ) -> Load {
         let height_m = body.com_m.z - ground_m;
         let balanced_m = |force_n: Vector, moment_n_m: Vector| {
             let away_m =
@@ -70,12 +83,22 @@ impl Load {
             // acts over the centre of mass.
             moment_n_m.z += (palm_m - body.com_m).cross(flat(hand_n)).z;
         }
-        moment_n_m.z = moment_n_m.z.clamp(-LARGEST_TURN_N_M, LARGEST_TURN_N_M);
-        let pushing_n = push_m_s2 * laden.mass_kg;
+        let largest_turn_n_m = LARGEST_TURN_N_M - TURN_LEFT_OUT_N_M * ahead;
+        moment_n_m.z = moment_n_m.z.clamp(-largest_turn_n_m, largest_turn_n_m);
+        let pushing_n = push.acceleration_m_s2 * laden.mass_kg;
         force_n += pushing_n;
         moment_n_m += Vector::new(0.0, 0.0, PUSH_LEVER_M).cross(pushing_n);
         let balance_point_m = balanced_m(force_n, moment_n_m);
-        Load { force_n, moment_n_m, balance_point_m, weights_point_m, velocity_m_s: laden.velocity_m_s }
+        let balance_point_m_s = push.growth_m_s3 * ((height_m + PUSH_LEVER_M) / GRAVITY_M_S2);
+        Load {
+            force_n,
+            moment_n_m,
+            balance_point_m,
+            weights_point_m,
+            balance_point_m_s,
+            velocity_m_s: laden.velocity_m_s,
+            ahead,
+        }
     }
 }
 
@@ -88,7 +111,7 @@ mod tests {
     #[test]
     fn a_robot_stands_under_what_it_carries() {
         let mut body = Posed::standing().body();
-        let free = Load::of(&body, &LadenRobot::of(&body), 0.0, Vector::ZERO);
+        let free = Load::of(&body, &LadenRobot::of(&body), 0.0, ObservedPush::default(), 0.0);
         assert_eq!(
             (free.force_n, free.moment_n_m, free.balance_point_m),
             (Vector::ZERO, Vector::ZERO, body.com_m)
@@ -97,7 +120,7 @@ mod tests {
         // Equal weights in both hands act as one in the middle: the common centre of mass.
         let weight_n = 20.0;
         body.hand_reaction_n = Sides::both(Vector::new(0.0, 0.0, -weight_n - DEAD_ZONE_N));
-        let loaded = Load::of(&body, &LadenRobot::of(&body), 0.0, Vector::ZERO);
+        let loaded = Load::of(&body, &LadenRobot::of(&body), 0.0, ObservedPush::default(), 0.0);
         let palms_m: Vector = body.palms_m().into_iter().sum();
         let robot_n = body.model.mass_kg * GRAVITY_M_S2;
         let common_m = (body.com_m * robot_n + palms_m * weight_n) / (robot_n + 2.0 * weight_n);
@@ -106,7 +129,10 @@ mod tests {
 
         // What lifts, and what is lighter than the dead zone, is no load.
         body.hand_reaction_n = Sides { left: Vector::Z * 30.0, right: Vector::Z * -0.9 * DEAD_ZONE_N };
-        assert_eq!(Load::of(&body, &LadenRobot::of(&body), 0.0, Vector::ZERO).force_n, Vector::ZERO);
+        assert_eq!(
+            Load::of(&body, &LadenRobot::of(&body), 0.0, ObservedPush::default(), 0.0).force_n,
+            Vector::ZERO
+        );
     }
 
     /// A robot at rest whose hands swing 3 kg each forward: momentum is shared by all that moves.
@@ -128,7 +154,8 @@ mod tests {
     fn a_push_is_leant_against() {
         let body = Posed::standing().body();
         let push_m_s2 = Vector::new(0.5, 0.0, 0.0);
-        let load = Load::of(&body, &LadenRobot::of(&body), 0.0, push_m_s2);
+        let push = ObservedPush { acceleration_m_s2: push_m_s2, ..ObservedPush::default() };
+        let load = Load::of(&body, &LadenRobot::of(&body), 0.0, push, 0.0);
         let lean_m = body.com_m.x - load.balance_point_m.x;
         let expected_m = -push_m_s2.x * (body.com_m.z + PUSH_LEVER_M) / GRAVITY_M_S2;
         assert!((lean_m - expected_m).abs() < 1e-5, "{lean_m} {expected_m}");

@@ -18,11 +18,11 @@ use serde::{Deserialize, Serialize};
 use super::{BaseCommand, BaseLimits, BaseVelocity, LegCommand, Locomotion};
 use crate::GRAVITY_M_S2;
 use crate::body::BodyEstimate;
-use crate::plane::heading_rad;
+use crate::plane::{flat, heading_rad};
 use ground::middle_m;
 use load::{LadenRobot, Load};
-use observer::PushObserver;
-use stand::Stand;
+use observer::{CALM, PushObserver, QUICK};
+use stand::{Ahead, Stand};
 use step::Stepping;
 
 const LIMITS: BaseLimits = BaseLimits {
@@ -40,6 +40,8 @@ const STILL_RAD_S: f32 = 0.01;
 /// Standing ends when the capture point leaves the feet by this much: forward, backward, sideways beyond a sole's centre.
 const FORWARD_M: f32 = 0.075;
 const BACKWARD_M: f32 = 0.07;
+/// So much farther forward for a robot that leans ahead of a pull.
+const FARTHER_M: f32 = 0.01;
 const SIDEWAYS_M: f32 = 0.005;
 /// A capture point so near to the middle of the feet is as near to one as to the other.
 const EITHER_FOOT_M: f32 = 0.01;
@@ -57,6 +59,15 @@ const CAPTURED_M: f32 = 0.066;
 /// A robot that leans farther against a push would fall when the push ends.
 const LARGEST_LEAN_M: f32 = 0.1;
 
+/// A robot that stood and was pushed out of its stance steps back to where it stood: farther than the leash it does not come
+/// back, nearer than these it is back, and what keeps it away for so long keeps it for good.
+const LEASH_M: f32 = 1.0;
+const BACK_M: f32 = 0.04;
+const BACK_RAD: f32 = 0.1;
+const LONGEST_RETURN_S: f32 = 10.0;
+const RETURN_1_S: f32 = 1.0;
+const RETURN_M_S: f32 = 0.15;
+
 /// Stands or steps; see the module's text.
 #[derive(Default)]
 pub struct Balance {
@@ -73,6 +84,17 @@ struct BalanceState {
     /// Where the pelvis rests over the middle of the soles, heading frame.
     pelvis_from_middle_m: Vector,
     observer: PushObserver,
+    quick_observer: PushObserver,
+    ahead: Ahead,
+    /// Of a robot that stands with empty hands, or steps because it was pushed then.
+    place: Option<StandingPlace>,
+}
+
+/// Where a robot stood: the middle of its soles, and its heading.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+struct StandingPlace {
+    middle_m: Vector,
+    heading_rad: f32,
 }
 
 #[derive(Clone, Serialize, Deserialize)]
@@ -96,13 +118,18 @@ impl Locomotion for Balance {
     fn tick(&mut self, body: &BodyEstimate, command: &BaseCommand, dt_s: f32) -> LegCommand {
         let state = self.state.get_or_insert_with(|| BalanceState::new(body));
         let command = LIMITS.clamp(*command);
-        state.velocity = ramped(state.velocity, command.velocity(), dt_s);
         state.time_in_mode_s += dt_s;
+        state.ahead.update(body, &command, dt_s);
+        let told = state.velocity_to_place(body, command.velocity());
+        state.velocity = ramped(state.velocity, told, dt_s);
         let ground_m =
             body.world_from_soles().iter().map(|sole| sole.translation.z).fold(f32::INFINITY, f32::min);
         let laden = LadenRobot::of(body);
-        state.observer.update(laden.velocity_m_s, dt_s);
-        let load = Load::of(body, &laden, ground_m, state.observer.push_m_s2());
+        state.observer.update(laden.velocity_m_s, &CALM, dt_s);
+        state.quick_observer.update(laden.velocity_m_s, &QUICK, dt_s);
+        let ahead = if matches!(state.mode, Mode::Stand(_)) { state.ahead.share() } else { 0.0 };
+        let push = state.observer.push_ahead(&state.quick_observer, ahead);
+        let load = Load::of(body, &laden, ground_m, push, ahead);
         state.change_mode(body, &load);
         let (legs, expected_m_s2) = match &mut state.mode {
             Mode::Stand(stand) => stand.tick(body, &load, command.pelvis_height_m, dt_s),
@@ -112,7 +139,9 @@ impl Locomotion for Balance {
                 done
             }
         };
-        state.observer.expect(expected_m_s2 * (body.model.mass_kg / laden.mass_kg));
+        let expected_m_s2 = expected_m_s2 * (body.model.mass_kg / laden.mass_kg);
+        state.observer.expect(expected_m_s2);
+        state.quick_observer.expect(expected_m_s2);
         legs
     }
 
@@ -145,24 +174,47 @@ impl BalanceState {
             time_in_mode_s: 0.0,
             pelvis_from_middle_m,
             observer: PushObserver::default(),
+            quick_observer: PushObserver::default(),
+            ahead: Ahead::default(),
+            place: None,
         }
     }
 
+    /// The commanded velocity; that back to its place for a robot that is to stand and was pushed out of its stance.
+    fn velocity_to_place(&mut self, body: &BodyEstimate, command: BaseVelocity) -> BaseVelocity {
+        let steps = matches!(self.mode, Mode::Step(_));
+        if is_moving(&command) || !self.ahead.is_free() || steps && self.time_in_mode_s > LONGEST_RETURN_S {
+            self.place = None;
+        }
+        let middle_m = middle_m(&body.world_from_soles());
+        if !steps && !is_moving(&command) && self.ahead.share() == 1.0 {
+            self.place.get_or_insert(StandingPlace { middle_m, heading_rad: self.heading_rad });
+        }
+        let (true, Some(place)) = (steps, &mut self.place) else { return command };
+        let away_m = flat(place.middle_m - middle_m).clamp_length_max(LEASH_M);
+        place.middle_m = middle_m + away_m;
+        if away_m.length() < BACK_M {
+            return command;
+        }
+        let back_m_s =
+            (Rotation::from_rotation_z(-self.heading_rad) * away_m * RETURN_1_S).clamp_length_max(RETURN_M_S);
+        BaseVelocity { vx_m_s: back_m_s.x, vy_m_s: back_m_s.y, ..command }
+    }
+
     fn change_mode(&mut self, body: &BodyEstimate, load: &Load) {
-        let BaseVelocity { vx_m_s, vy_m_s, yaw_rate_rad_s } = self.velocity;
-        let moving =
-            vx_m_s.abs() > STILL_M_S || vy_m_s.abs() > STILL_M_S || yaw_rate_rad_s.abs() > STILL_RAD_S;
+        let moving = is_moving(&self.velocity);
         let stance = self.stance(body, load);
         let half_width_m = stance.left_from_right_m.y * 0.5;
         match &self.mode {
             Mode::Stand(_) => {
-                let lost = stance.capture_m.x > FORWARD_M
+                let lost = stance.capture_m.x > FORWARD_M + FARTHER_M * load.ahead
                     || stance.capture_m.x < -BACKWARD_M
                     || stance.capture_m.y.abs() > half_width_m + SIDEWAYS_M;
                 if (moving || lost) && self.time_in_mode_s > LEAST_STANDING_S {
                     let spin_rad_s = body.pelvis_angular_velocity_rad_s.z;
                     let left_carries = self.left_carries_first(&stance, lost.then_some(spin_rad_s));
-                    self.mode = Mode::Step(Stepping::start(body, self.heading_rad, left_carries));
+                    let goal_rad = self.place.map_or(self.heading_rad, |place| place.heading_rad);
+                    self.mode = Mode::Step(Stepping::start(body, self.heading_rad, goal_rad, left_carries));
                     self.time_in_mode_s = 0.0;
                 }
             }
@@ -173,7 +225,9 @@ impl BalanceState {
                     && stance.com_m.y.abs() < half_width_m;
                 let feet_together = stance.left_from_right_m.x.abs() < LARGEST_STAGGER_M
                     && stance.left_from_right_m.y < LARGEST_WIDTH_M;
-                if !moving && step.just_landed() && step.steps() >= LEAST_STEPS && captured && feet_together {
+                let back = self.place.is_none() || step.to_turn_rad() < BACK_RAD;
+                let landed = step.just_landed() && step.steps() >= LEAST_STEPS;
+                if !moving && back && landed && captured && feet_together {
                     let stand = Stand::plant(body, self.heading_rad, Some((self.pelvis_from_middle_m, load)));
                     self.mode = Mode::Stand(stand);
                     self.time_in_mode_s = 0.0;
@@ -211,6 +265,11 @@ impl BalanceState {
     }
 }
 
+fn is_moving(velocity: &BaseVelocity) -> bool {
+    let BaseVelocity { vx_m_s, vy_m_s, yaw_rate_rad_s } = velocity;
+    vx_m_s.abs() > STILL_M_S || vy_m_s.abs() > STILL_M_S || yaw_rate_rad_s.abs() > STILL_RAD_S
+}
+
 /// One physics step from a velocity towards another.
 fn ramped(from: BaseVelocity, to: BaseVelocity, dt_s: f32) -> BaseVelocity {
     let towards = |from: f32, to: f32, most: f32| from + (to - from).clamp(-most, most);
@@ -231,7 +290,7 @@ mod tests {
     fn left_carries(capture_m: [f32; 2], lost_rad_s: Option<f32>) -> bool {
         let body = Posed::standing().body();
         let state = BalanceState::new(&body);
-        let load = Load::of(&body, &LadenRobot::of(&body), 0.0, Vector::ZERO);
+        let load = Load::of(&body, &LadenRobot::of(&body), 0.0, observer::ObservedPush::default(), 0.0);
         let mut stance = state.stance(&body, &load);
         stance.capture_m = Vector::new(capture_m[0], capture_m[1], 0.0);
         state.left_carries_first(&stance, lost_rad_s)

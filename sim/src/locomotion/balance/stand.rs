@@ -4,17 +4,21 @@
 //! kinematics for it, and add the torques of a virtual spring and damper on centre of mass and trunk, shared by the
 //! feet as ground reaction forces. PD and feedforward act through the leg joints alone.
 
+mod ahead;
+
 use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
 use super::effort::ground_force_n;
-use super::ground::{distribute, leg_torques_n_m, middle_m, supported_force_n};
+use super::ground::{FootForce, couple_n, distribute, leg_torques_n_m, middle_m, supported_force_n};
 use super::legs::{LegAngles, inverse, rotation_vector_rad};
 use super::load::Load;
 use crate::body::{BodyEstimate, JOINTS, JointDrive, LEG_JOINTS, LEGS};
 use crate::locomotion::LegCommand;
 use crate::plane::flat;
 use crate::{GRAVITY_M_S2, Side, Sides};
+
+pub(super) use ahead::Ahead;
 
 /// The centre of mass, with what the hands carry, may lie this far from the middle of the feet before the pelvis gives way.
 const COM_ZONE_M: f32 = 0.0435;
@@ -24,8 +28,22 @@ const RESTING_ZONE_M: f32 = 0.01;
 /// that come down on a table push the robot back, and harder the farther it leans into them: one that leaned against every
 /// push would run away.
 const PUSH_ZONE_M: f32 = 0.03;
+/// To the sides they hold so much more of a pull that is leant against ahead of it.
+const WIDER_ZONE_M: f32 = 0.01;
+/// Of a robot that leans ahead this part of a moment about the vertical is held by feet that push in opposite directions, the rest
+/// by each foot on its own.
+const COUPLE_SHARE: f32 = 0.5;
+/// A pull that grows is leant against as it will be in this time, at most so much farther.
+const LEAD_S: f32 = 0.4;
+const LARGEST_LEAD_M: f32 = 0.08;
+const LEAN_RATE_1_S: f32 = 6.0;
+/// Distance from the hip's roll axis to the ankle roll link of a leg that is bent enough: a robot that leans far is lower, for
+/// legs that are stretched hold it nowhere.
+const LEG_M: f32 = 0.595;
 /// Ahead and to the sides.
 const LARGEST_SHIFT_M: [f32; 2] = [0.2, 0.1];
+/// To the sides, of a robot that leans ahead of pulls, so much more.
+const FARTHER_ASIDE_M: f32 = 0.025;
 /// The lean leaves out little changes of the push: one that followed them would sway for ever, for joints rub.
 const LEAN_PLAY_M: f32 = 0.01;
 const LEANING_TIME_S: f32 = 0.25;
@@ -67,6 +85,9 @@ pub(super) struct Stand {
     heading_rad: f32,
     /// Shift of the pelvis against a push, in the heading frame.
     lean_m: Vector,
+    lean_rate_m_s: Vector,
+    /// Where the shift is going.
+    lean_goal_m: Vector,
     height_m: f32,
     q_rad: Sides<LegAngles>,
 }
@@ -89,12 +110,15 @@ impl Stand {
             tilt: heading.inverse() * pelvis.rotation,
             heading_rad,
             lean_m: Vector::ZERO,
+            lean_rate_m_s: Vector::ZERO,
+            lean_goal_m: Vector::ZERO,
             height_m: pelvis.translation.z - middle_m.z,
             q_rad: Sides::from_fn(|side| std::array::from_fn(|i| body.q_rad[LEGS[side] + i])),
         };
         if let Some((_, load)) = moving {
             stand.home_m += heading * back_into_m(RESTING_ZONE_M, stand.weights_m(body, load));
             stand.lean_m = stand.against_push_m(stand.weights_m(body, load), load);
+            stand.lean_goal_m = stand.lean_m;
             stand.offset_m = flat(pelvis.translation - stand.home_m) - heading * stand.lean_m;
             stand.offset_rate_m_s = flat(body.com_velocity_m_s);
         }
@@ -112,10 +136,11 @@ impl Stand {
     /// in the heading frame, from the middle of the feet.
     fn against_push_m(&self, weights_m: Vector, load: &Load) -> Vector {
         let push_m = flat(load.balance_point_m - load.weights_point_m);
-        let balance_m = weights_m + Rotation::from_rotation_z(-self.heading_rad) * push_m;
-        let zone_m = Vector::new(PUSH_ZONE_M, PUSH_ZONE_M, 0.0);
+        let coming_m = (load.balance_point_m_s * LEAD_S).clamp_length_max(LARGEST_LEAD_M) * load.ahead;
+        let balance_m = weights_m + Rotation::from_rotation_z(-self.heading_rad) * (push_m + coming_m);
+        let zone_m = Vector::new(PUSH_ZONE_M, PUSH_ZONE_M + WIDER_ZONE_M * load.ahead, 0.0);
         let held_m = balance_m.clamp(weights_m.min(-zone_m), weights_m.max(zone_m));
-        within_reach_m(held_m - balance_m)
+        within_reach_m(held_m - balance_m, load.ahead)
     }
 
     /// One physics step towards a pelvis height over the soles.
@@ -133,13 +158,13 @@ impl Stand {
         self.offset_rate_m_s -= pull_m_s2 * dt_s;
         self.offset_m += self.offset_rate_m_s * dt_s;
         self.tilt = self.tilt.slerp(Rotation::IDENTITY, dt_s / TILT_SETTLING_TIME_S);
-        let goal = self.pelvis_goal(body, load, dt_s);
+        let mut goal = self.pelvis_goal(body, load, dt_s);
+        goal.velocity_m_s.z = rise_m / dt_s;
         for side in Side::BOTH {
             let leg = &mut self.q_rad[side];
-            *leg = inverse(&body.model, side, goal, self.feet[side], leg, IK_ITERATIONS);
+            *leg = inverse(&body.model, side, goal.pose, self.feet[side], leg, IK_ITERATIONS);
         }
-        let goal_velocity_m_s = Vector::new(self.offset_rate_m_s.x, self.offset_rate_m_s.y, rise_m / dt_s);
-        let torques_n_m = balance_torques_n_m(body, load, goal, goal_velocity_m_s);
+        let torques_n_m = balance_torques_n_m(body, load, &goal);
         let gravity_n_m = body.gravity_torques_n_m();
         let legs: LegCommand = Sides::from_fn(|side| {
             std::array::from_fn(|i| {
@@ -158,29 +183,63 @@ impl Stand {
         (legs, flat(push_n / body.model.mass_kg))
     }
 
-    /// Pelvis pose (world) that keeps the centre of mass within [`COM_ZONE_M`] of the middle of the planted feet,
+    /// Pelvis (world) that keeps the centre of mass within [`COM_ZONE_M`] of the middle of the planted feet,
     /// as near to home as that and a push allow.
-    fn pelvis_goal(&mut self, body: &BodyEstimate, load: &Load, dt_s: f32) -> Pose {
+    fn pelvis_goal(&mut self, body: &BodyEstimate, load: &Load, dt_s: f32) -> PelvisGoal {
         let heading = Rotation::from_rotation_z(self.heading_rad);
         let weights_m = self.weights_m(body, load);
         let shift_m = back_into_m(COM_ZONE_M, weights_m);
-        let change_m = self.against_push_m(weights_m + shift_m, load) - self.lean_m;
-        self.lean_m += (change_m - change_m.clamp_length_max(LEAN_PLAY_M)) * (dt_s / LEANING_TIME_S);
+        let leaning_m_s2 = self.lean(self.against_push_m(weights_m + shift_m, load), load.ahead, dt_s);
         let mut position_m = self.home_m + self.offset_m + heading * (shift_m + self.lean_m);
         position_m.z = middle_m(&self.soles).z + self.height_m;
+        position_m.z -= (position_m.z - self.highest_m(body, position_m)).max(0.0) * load.ahead;
         let lean_rad = ((LEAN_BELOW_M - self.height_m) * LEAN_RAD_PER_M).clamp(0.0, LARGEST_LEAN_RAD);
-        Pose::from_parts(position_m, heading * Rotation::from_rotation_y(lean_rad) * self.tilt)
+        PelvisGoal {
+            pose: Pose::from_parts(position_m, heading * Rotation::from_rotation_y(lean_rad) * self.tilt),
+            velocity_m_s: flat(self.offset_rate_m_s + heading * self.lean_rate_m_s),
+            acceleration_m_s2: heading * leaning_m_s2,
+        }
+    }
+
+    /// One physics step of the lean towards `wanted_m`, without a jerk if it leans ahead of pulls; gives its acceleration.
+    fn lean(&mut self, wanted_m: Vector, ahead: f32, dt_s: f32) -> Vector {
+        if ahead == 0.0 {
+            let change_m = wanted_m - self.lean_m;
+            self.lean_m += (change_m - change_m.clamp_length_max(LEAN_PLAY_M)) * (dt_s / LEANING_TIME_S);
+            (self.lean_goal_m, self.lean_rate_m_s) = (self.lean_m, Vector::ZERO);
+            return Vector::ZERO;
+        }
+        let change_m = wanted_m - self.lean_goal_m;
+        self.lean_goal_m += change_m - change_m.clamp_length_max(LEAN_PLAY_M);
+        let leaning_m_s2 = (self.lean_goal_m - self.lean_m) * (LEAN_RATE_1_S * LEAN_RATE_1_S)
+            - self.lean_rate_m_s * (2.0 * LEAN_RATE_1_S);
+        self.lean_rate_m_s += leaning_m_s2 * dt_s;
+        self.lean_m += self.lean_rate_m_s * dt_s;
+        leaning_m_s2
+    }
+
+    /// Height up to which both legs reach with the pelvis over `position_m`.
+    fn highest_m(&self, body: &BodyEstimate, position_m: Vector) -> f32 {
+        let pelvis_m = body.world_from_pelvis().translation;
+        let height_m = |side: Side| {
+            let hip_m = body.joint_axis(LEGS[side] + 1).0 - pelvis_m;
+            let foot_m = self.feet[side].translation;
+            let away_m = flat(position_m + hip_m - foot_m).length().min(0.8 * LEG_M);
+            foot_m.z - hip_m.z + (LEG_M * LEG_M - away_m * away_m).sqrt()
+        };
+        height_m(Side::Left).min(height_m(Side::Right))
     }
 }
 
 /// Shift that brings a point back into a zone round the middle of the feet.
 fn back_into_m(zone_m: f32, point_m: Vector) -> Vector {
     let zone_m = Vector::new(zone_m, zone_m, 0.0);
-    within_reach_m(point_m.clamp(-zone_m, zone_m) - point_m)
+    within_reach_m(point_m.clamp(-zone_m, zone_m) - point_m, 0.0)
 }
 
-fn within_reach_m(shift_m: Vector) -> Vector {
-    let most_m = Vector::new(LARGEST_SHIFT_M[0], LARGEST_SHIFT_M[1], 0.0);
+fn within_reach_m(shift_m: Vector, ahead: f32) -> Vector {
+    let [forward_m, aside_m] = LARGEST_SHIFT_M;
+    let most_m = Vector::new(forward_m, aside_m + FARTHER_ASIDE_M * ahead, 0.0);
     shift_m.clamp(-most_m, most_m)
 }
 
@@ -199,25 +258,27 @@ fn push_n(
     ground_force_n(body, side, gravity_n_m, &applied_n_m)
 }
 
+/// Where the pelvis should be, and how it should move.
+struct PelvisGoal {
+    pose: Pose,
+    velocity_m_s: Vector,
+    acceleration_m_s2: Vector,
+}
+
 /// Leg torques of the ground forces that accelerate the centre of mass and right the trunk towards `goal`.
-fn balance_torques_n_m(
-    body: &BodyEstimate,
-    load: &Load,
-    goal: Pose,
-    goal_velocity_m_s: Vector,
-) -> Sides<[f32; LEG_JOINTS]> {
+fn balance_torques_n_m(body: &BodyEstimate, load: &Load, goal: &PelvisGoal) -> Sides<[f32; LEG_JOINTS]> {
     let mass_kg = body.model.mass_kg;
     let pelvis = body.world_from_pelvis();
-    let error_m = goal.translation - pelvis.translation;
+    let error_m = goal.pose.translation - pelvis.translation;
     // The velocity is that of the pelvis, which holds still while arms swing.
-    let rate_m_s = goal_velocity_m_s - body.pelvis_velocity_m_s;
+    let rate_m_s = goal.velocity_m_s - body.pelvis_velocity_m_s;
     let acceleration_m_s2 = Vector::new(
         HORIZONTAL_STIFFNESS_1_S2 * error_m.x + HORIZONTAL_DAMPING_1_S * rate_m_s.x,
         HORIZONTAL_STIFFNESS_1_S2 * error_m.y + HORIZONTAL_DAMPING_1_S * rate_m_s.y,
         VERTICAL_STIFFNESS_1_S2 * error_m.z + VERTICAL_DAMPING_1_S * rate_m_s.z,
     );
     let weight_n = mass_kg * GRAVITY_M_S2;
-    let mut force_n = acceleration_m_s2 * mass_kg;
+    let mut force_n = (acceleration_m_s2 + goal.acceleration_m_s2) * mass_kg;
     force_n.z = (force_n.z + weight_n).max(SMALLEST_LOAD_SHARE * weight_n);
     let horizontal_n = force_n.x.hypot(force_n.y);
     if horizontal_n > FRICTION_USED * force_n.z {
@@ -225,20 +286,27 @@ fn balance_torques_n_m(
         force_n.x *= scale;
         force_n.y *= scale;
     }
-    let tilt_rad = rotation_vector_rad(goal.rotation * pelvis.rotation.inverse());
+    let tilt_rad = rotation_vector_rad(goal.pose.rotation * pelvis.rotation.inverse());
     let moment_n_m =
         tilt_rad * TRUNK_STIFFNESS_N_M_RAD - body.pelvis_angular_velocity_rad_s * TRUNK_DAMPING_N_M_S_RAD;
     let soles = body.world_from_soles();
     let ground_force_n =
         supported_force_n(body.com_m, force_n - load.force_n, moment_n_m - load.moment_n_m, soles);
     let feet = distribute(body.com_m, ground_force_n, moment_n_m - load.moment_n_m, soles);
-    let turning_n_m = Vector::new(0.0, 0.0, (moment_n_m.z - load.moment_n_m.z) * 0.5);
-    Sides::from_fn(|side| leg_torques_n_m(body, side, feet[side], turning_n_m))
+    let turn_n_m = moment_n_m.z - load.moment_n_m.z;
+    let couple_share = COUPLE_SHARE * load.ahead;
+    let couple_n = couple_n(turn_n_m * couple_share, soles);
+    let turning_n_m = Vector::new(0.0, 0.0, turn_n_m * (1.0 - couple_share) * 0.5);
+    Sides::from_fn(|side| {
+        let foot = FootForce { force_n: feet[side].force_n + couple_n * side.sign(), ..feet[side] };
+        leg_torques_n_m(body, side, foot, turning_n_m)
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::load::LadenRobot;
+    use super::super::observer::ObservedPush;
     use super::*;
     use crate::body::posed::Posed;
 
@@ -247,7 +315,8 @@ mod tests {
         let body = Posed::standing().body();
         let stand = Stand::plant(&body, 0.0, None);
         for push_m_s2 in [0.0, 0.2, -0.2, 1.0, -1.0] {
-            let load = Load::of(&body, &LadenRobot::of(&body), 0.0, Vector::Y * push_m_s2);
+            let push = ObservedPush { acceleration_m_s2: Vector::Y * push_m_s2, ..ObservedPush::default() };
+            let load = Load::of(&body, &LadenRobot::of(&body), 0.0, push, 0.0);
             let moved_m = (load.balance_point_m - load.weights_point_m).y;
             let beyond_m = (moved_m.abs() - PUSH_ZONE_M).max(0.0);
             assert_eq!(beyond_m > 0.0, push_m_s2.abs() == 1.0, "{moved_m}");
@@ -255,5 +324,39 @@ mod tests {
             let expected_m = -moved_m.signum() * beyond_m;
             assert!((lean_m.y - expected_m).abs() < 1e-4 && lean_m.x == 0.0, "{lean_m}, not {expected_m}");
         }
+    }
+
+    /// A pull that grows by 2 x 25 N in a second. What hands hold answers to the lean: there nothing is led.
+    #[test]
+    fn a_growing_pull_is_leant_against_before_it_is_there() {
+        let body = Posed::standing().body();
+        let stand = Stand::plant(&body, 0.0, None);
+        let lean_m = |ahead: f32, acceleration_m_s2: f32, growth_m_s3: f32| {
+            let along = |size: f32| Vector::Y * size;
+            let push =
+                ObservedPush { acceleration_m_s2: along(acceleration_m_s2), growth_m_s3: along(growth_m_s3) };
+            let load = Load::of(&body, &LadenRobot::of(&body), 0.0, push, ahead);
+            stand.against_push_m(stand.weights_m(&body, &load), &load).y
+        };
+        assert_eq!(lean_m(1.0, 0.3, 0.0), 0.0);
+        let earlier_m = lean_m(1.0, 0.3, 1.45);
+        assert!((-0.05..-0.03).contains(&earlier_m), "{earlier_m} m");
+        assert_eq!(lean_m(0.0, 0.1, 1.45), 0.0);
+    }
+
+    /// While a hand holds something the lean follows late, and what it is to be later counts for nothing.
+    #[test]
+    fn a_robot_that_holds_something_leans_as_far_as_it_is_pushed_now() {
+        let mut stand = Stand::plant(&Posed::standing().body(), 0.0, None);
+        let wanted_m = Vector::Y * 0.08;
+        for _ in 0..400 {
+            assert_eq!(stand.lean(wanted_m, 0.0, 0.005), Vector::ZERO);
+        }
+        assert!((stand.lean_m.y - (0.08 - LEAN_PLAY_M)).abs() < 1e-4, "{}", stand.lean_m);
+        // A hand that opens finds the robot where it is, and at rest.
+        let held_m = stand.lean_m;
+        let started_m_s2 = stand.lean(wanted_m, 1.0, 0.005);
+        assert!(started_m_s2.length() < 0.01, "{started_m_s2}");
+        assert!((stand.lean_m - held_m).length() < 1e-5, "{}, not {held_m}", stand.lean_m);
     }
 }

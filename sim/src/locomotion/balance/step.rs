@@ -94,13 +94,18 @@ pub(super) struct Stepping {
 }
 
 impl Stepping {
-    /// Starts stepping; the first foot to carry is the one nearer to the capture point.
-    pub(super) fn start(body: &BodyEstimate, heading_rad: f32, left_carries: bool) -> Stepping {
+    /// Starts stepping, and turns to the heading `goal_rad`; the first foot to carry is the one nearer to the capture point.
+    pub(super) fn start(
+        body: &BodyEstimate,
+        heading_rad: f32,
+        goal_rad: f32,
+        left_carries: bool,
+    ) -> Stepping {
         let stance = if left_carries { Side::Left } else { Side::Right };
         let ground_m = body.world_from_soles()[stance].translation.z;
         let mut step = Stepping {
             heading_rad,
-            goal_rad: heading_rad,
+            goal_rad,
             lag_rad: 0.0,
             stance,
             shifting_s: Some(0.0),
@@ -112,6 +117,11 @@ impl Stepping {
         };
         step.swing.plant(body, step.stance.other());
         step
+    }
+
+    /// How far the heading is from where the commands alone would have turned it.
+    pub(super) fn to_turn_rad(&self) -> f32 {
+        wrapped_rad(self.goal_rad - self.heading_rad).abs()
     }
 
     pub(super) fn steps(&self) -> u32 {
@@ -331,7 +341,7 @@ mod tests {
         let mut posed = Posed::standing();
         posed.pelvis_angular_velocity_rad_s = Vector::Z * spin_rad_s;
         let body = posed.body();
-        let step = Stepping { time_s, ..Stepping::start(&body, 0.3, true) };
+        let step = Stepping { time_s, ..Stepping::start(&body, 0.3, 0.3, true) };
         let [ahead, left] = step.landing_axes(&body, yaw_rate_rad_s);
         assert!((left - Rotation::from_rotation_z(PI / 2.0) * ahead).length() < 1e-6);
         wrapped_rad(ahead.y.atan2(ahead.x) - 0.3)

@@ -3,13 +3,14 @@
 use super::*;
 use crate::body::posed::Posed;
 use crate::locomotion::balance::load::LadenRobot;
+use crate::locomotion::balance::observer::ObservedPush;
 
 const STILL: WantedMotion =
     WantedMotion { lift_m_s2: 0.0, turn_rad_s2: Vector::ZERO, feet: Sides::both(AT_REST) };
 const AT_REST: Acceleration = Acceleration { linear_m_s2: Vector::ZERO, angular_rad_s2: Vector::ZERO };
 
 fn solve(body: &BodyEstimate, motion: &WantedMotion, pressure_m: Vector, foot: Option<Side>) -> LegTorques {
-    let load = Load::of(body, &LadenRobot::of(body), 0.0, Vector::ZERO);
+    let load = Load::of(body, &LadenRobot::of(body), 0.0, ObservedPush::default(), 0.0);
     leg_torques_within_limits(body, &load, motion, &GroundContact { pressure_m: flat(pressure_m), foot })
 }
 
@@ -60,7 +61,7 @@ fn torques_ease_off_rather_than_saturate() {
     let kick = Acceleration { linear_m_s2: Vector::new(70.0, 0.0, 20.0), ..AT_REST };
     let motion = WantedMotion { feet: Sides { left: AT_REST, right: kick }, ..STILL };
     let contact = GroundContact { pressure_m: flat(body.com_m), foot: Some(Side::Left) };
-    let load = Load::of(&body, &LadenRobot::of(&body), 0.0, Vector::ZERO);
+    let load = Load::of(&body, &LadenRobot::of(&body), 0.0, ObservedPush::default(), 0.0);
     let most_used = |torques: &LegTorques| {
         let used = torques.torque_n_m.by_side().flat_map(|(side, leg)| {
             let joints = &body.model.joints[LEGS[side]..];

@@ -95,3 +95,15 @@ fn leg_torques_do_the_work_of_the_ground() {
         }
     }
 }
+
+/// Feet that push in opposite directions turn the robot and move it nowhere.
+#[test]
+fn a_couple_of_both_feet_is_a_moment_about_the_vertical_alone() {
+    let feet = soles();
+    for wanted_n_m in [12.0, -7.0] {
+        let left_n = couple_n(wanted_n_m, feet);
+        let apart_m = feet.left.translation - feet.right.translation;
+        let given_n_m = apart_m.cross(left_n);
+        assert!((given_n_m - Vector::Z * wanted_n_m).length() < 1e-4, "{given_n_m}, not {wanted_n_m} N m");
+    }
+}
