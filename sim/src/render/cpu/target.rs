@@ -158,15 +158,17 @@ impl RenderTarget {
     fn fill<S: Simd>(&mut self, simd: S, outline: &ProjectedTriangle, sheet: u32) {
         let nearest = S::as_mut_simd_f32s(self.nearness_1_m.all_mut()).0;
         let owner = S::as_mut_simd_u32s(self.sheet.all_mut()).0;
-        let sheet = simd.splat_u32s(sheet);
+        let (sheet, nothing) = (simd.splat_u32s(sheet), simd.splat_u32s(0));
         outline.draw(
             simd,
             self.grid,
             #[inline(always)]
             |i, nearness| {
                 let nearer = simd.greater_than_f32s(nearness, nearest[i]);
-                nearest[i] = simd.select_f32s(nearer, nearness, nearest[i]);
-                owner[i] = simd.select_u32s(nearer, sheet, owner[i]);
+                nearest[i] = simd.max_f32s(nearness, nearest[i]);
+                // A choice between both would be compiled to a store under a mask, which takes some processors 20 ns.
+                let change = simd.select_u32s(nearer, simd.xor_u32s(owner[i], sheet), nothing);
+                owner[i] = simd.xor_u32s(owner[i], change);
             },
         );
     }
