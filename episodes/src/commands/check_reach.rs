@@ -6,11 +6,8 @@ use tandem_tools_spec::{CheckReach, HandReach, ReachReply};
 
 use super::motion::{Motion, Reach};
 use super::move_wrists::wrist_targets;
-use super::upper_body::REACH_TOLERANCE;
+use super::upper_body::{REACH_TOLERANCE, STEPS_AHEAD_M};
 use crate::convert::coarse;
-
-/// A robot steps whose centre of mass its arms take farther ahead, as measured of one arm and of both at several heights.
-const STEPS_AHEAD_M: f64 = 0.05;
 
 /// The reply to `check_reach`.
 pub fn check_reach(args: &CheckReach, motion: &Motion) -> ReachReply {
@@ -19,7 +16,7 @@ pub fn check_reach(args: &CheckReach, motion: &Motion) -> ReachReply {
         right: (args.right_position_m, args.right_quaternion_wxyz),
     };
     let targets = wrist_targets(halves, args.frame.unwrap_or_default(), motion);
-    let Reach { errors, joints_at_limit, ahead_m } = motion.reach(&targets);
+    let Reach { errors, joints_at_limit, ahead_m } = motion.reach(&targets, args.keep_waist.unwrap_or(false));
     let hands = errors.map(|error| error.map(hand_reach));
     ReachReply {
         robot: args.robot.clone(),

@@ -13,7 +13,7 @@ use tandem_tools_spec::PoseFrame;
 
 use super::columns;
 use super::footing::Footing;
-use super::upper_body::{REACH_TOLERANCE, UpperBody, ahead_m};
+use super::upper_body::{REACH_TOLERANCE, STEPS_AHEAD_M, UpperBody, ahead_m};
 use crate::convert::isometry_from_sim;
 
 /// Part of the remaining error that one control step removes: smooth, and a lag of two steps.
@@ -61,6 +61,7 @@ pub struct MotionState {
     pub(super) upper_rad: [f64; UPPER_JOINTS],
     pub(super) base: BaseCommand,
     pub(super) aims: Sides<Aim>,
+    pub(super) restraint: Restraint,
     /// The pelvis as it was last sensed.
     world_from_pelvis: Isometry3<f64>,
     /// What pulled the pair of hands, as it was last sensed: the way the robot faces and to its left, and about the vertical through the
@@ -75,6 +76,15 @@ pub struct MotionState {
     /// How far each wrist is from its target, and how far it was a moment ago; `None` before it has been seen under its present aim.
     pub(super) approaches: Sides<Option<Approach>>,
     pub(super) footing: Footing,
+}
+
+/// What arms may not do that reach for their aims.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct Restraint {
+    /// Turn or bend the waist.
+    pub keeps_waist: bool,
+    /// Go so far ahead that the robot has to step.
+    pub stands_fast: bool,
 }
 
 /// How a wrist nears its target: metres, of which a radian of its turning counts as a tenth.
@@ -131,6 +141,7 @@ impl Motion {
             upper_rad: rest.upper_rad.map(f64::from),
             base: rest.base,
             aims: Sides::both(Aim::Joints),
+            restraint: Restraint::default(),
             world_from_pelvis,
             pull_n: [0.0; 2],
             turning_n_m: 0.0,
@@ -324,15 +335,16 @@ impl Motion {
         self.state.base = base;
     }
 
-    /// What the wrists are to do from now on.
-    pub(super) fn aim(&mut self, aims: Sides<Aim>) {
+    /// What the wrists are to do from now on, and how.
+    pub(super) fn aim(&mut self, aims: Sides<Aim>, restraint: Restraint) {
         self.state.aims = aims;
+        self.state.restraint = restraint;
         self.state.approaches = Sides::both(None);
     }
 
     /// Both arms keep their joints until they are told otherwise.
     pub(super) fn keep_joints(&mut self) {
-        self.aim(Sides::both(Aim::Joints));
+        self.aim(Sides::both(Aim::Joints), Restraint::default());
     }
 
     /// Aims of the kind of those in force, at which the wrists would have arrived were they where the commanded joints put them and had
@@ -373,7 +385,8 @@ impl Motion {
         let body = self.body.clone();
         let tasks = body.tasks(&targets, GAIN);
         let mut configuration = configuration(&body, &self.state);
-        self.solver.limits.velocity = body.speeds_rad_s(&targets);
+        let Restraint { keeps_waist, stands_fast } = self.state.restraint;
+        self.solver.limits.velocity = body.speeds_rad_s(&targets, keeps_waist);
         self.solver.caution = self.state.caution;
         if let Outcome::Infeasible { .. } = self.solver.track(&mut configuration, &tasks, &[]) {
             // Shapes that already overlap can contradict each other; the joints must still get out.
@@ -382,16 +395,31 @@ impl Motion {
             self.solver.self_collision = barrier;
         }
         self.state.caution = self.solver.caution;
+        let mut upper_rad = self.state.upper_rad;
         for (column, q) in body.columns.iter().zip(configuration.q()) {
-            self.state.upper_rad[*column] = *q;
+            upper_rad[*column] = *q;
+        }
+        if !(stands_fast && self.has_to_step(&upper_rad)) {
+            self.state.upper_rad = upper_rad;
         }
     }
 
+    /// Whether these joint targets take the centre of mass so far ahead, and farther than those in force.
+    fn has_to_step(&self, upper_rad: &[f64; UPPER_JOINTS]) -> bool {
+        let ahead_m = self.ahead_m(upper_rad);
+        ahead_m > STEPS_AHEAD_M && ahead_m > self.ahead_m(&self.state.upper_rad)
+    }
+
+    /// How much farther ahead the whole robot's centre of mass is under these joint targets than with its arms at rest.
+    fn ahead_m(&self, upper_rad: &[f64; UPPER_JOINTS]) -> f64 {
+        ahead_m(&self.robot.model, upper_rad) - self.body.rest_ahead_m(&self.robot.model)
+    }
+
     /// How near to `targets` (pelvis frame) the wrists would come to rest. An arm without a target keeps its joints.
-    pub fn reach(&self, targets: &Sides<Option<Isometry3<f64>>>) -> Reach {
+    pub fn reach(&self, targets: &Sides<Option<Isometry3<f64>>>, keeps_waist: bool) -> Reach {
         let mut solver = self.body.solver();
         solver.tolerance = REACH_TOLERANCE;
-        solver.limits.velocity = self.body.speeds_rad_s(targets);
+        solver.limits.velocity = self.body.speeds_rad_s(targets, keeps_waist);
         let mut configuration = self.configuration();
         let options = SolveOptions { restarts: REACH_RESTARTS, ..SolveOptions::default() };
         let tasks = self.body.tasks(targets, 1.0);
@@ -403,11 +431,10 @@ impl Motion {
         let joints_at_limit = at_limit.map(|joint| self.body.model.joints()[joint].name.clone()).collect();
         // A command goes there step by step, and leaves the trunk more upright than the posture that is found at once.
         let mut twin = self.another();
+        twin.state.restraint = Restraint { keeps_waist, stands_fast: false };
         let aims = targets.map(|target| target.map_or(Aim::Joints, Aim::Carried));
         (0..GOING_STEPS).for_each(|_| twin.follow(&aims));
-        let upper_rad = twin.state.upper_rad;
-        let ahead_m = ahead_m(&self.robot.model, &upper_rad) - self.body.rest_ahead_m(&self.robot.model);
-        Reach { errors, joints_at_limit, ahead_m }
+        Reach { errors, joints_at_limit, ahead_m: self.ahead_m(&twin.state.upper_rad) }
     }
 
     fn in_pelvis(&self, aims: &Sides<Aim>) -> Sides<Option<Isometry3<f64>>> {

@@ -6,7 +6,7 @@ use tandem_sim::{BaseCommand, HAND_JOINTS, Side, Sides, UPPER_JOINTS};
 use tandem_tools_spec::{PoseFrame, WristMove};
 
 use super::columns::{self, Clamped};
-use super::motion::{Aim, Compliance, Motion};
+use super::motion::{Aim, Compliance, Motion, Restraint};
 use crate::convert::unit_quaternion;
 
 /// The way of both wrists and their fingers.
@@ -47,7 +47,11 @@ impl WristTrajectory {
             left: fingers(Side::Left, &entry.left_fingers_rad),
             right: fingers(Side::Right, &entry.right_fingers_rad),
         };
-        motion.aim(to);
+        let restraint = Restraint {
+            keeps_waist: entry.keep_waist.unwrap_or(false),
+            stands_fast: entry.stand_fast.unwrap_or(false),
+        };
+        motion.aim(to, restraint);
         WristTrajectory {
             steps,
             from: motion.arrived(),

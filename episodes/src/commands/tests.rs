@@ -248,7 +248,7 @@ fn reach_is_asked_of_the_named_arm_alone() {
     for (x_m, within) in [(0.3, true), (0.9, false)] {
         let pose = Isometry3::translation(x_m, -0.2, 0.1);
         let Reach { errors, joints_at_limit: at_limit, .. } =
-            motion.reach(&Sides { left: None, right: Some(pose) });
+            motion.reach(&Sides { left: None, right: Some(pose) }, false);
         assert!(errors.left.is_none());
         assert_eq!(errors.right.unwrap().position_m < 0.005, within);
         assert!(at_limit.iter().all(|joint| !joint.starts_with("left")), "{at_limit:?}");

@@ -20,6 +20,8 @@ const POSTURE_COST: f64 = 0.02;
 /// The trunk bends only when the arms do not suffice: bending moves the centre of mass.
 const WAIST_COST: f64 = 0.15;
 const DAMPING_COST: f64 = 2e-4;
+/// A robot steps whose centre of mass its arms take farther ahead, as measured of one arm and of both at several heights.
+pub const STEPS_AHEAD_M: f64 = 0.05;
 pub const REACH_TOLERANCE: Tolerance = Tolerance { position_m: 0.005, orientation_rad: 0.05 };
 
 /// Shared by all robots of an episode.
@@ -89,11 +91,12 @@ impl UpperBody {
         solver
     }
 
-    /// How fast each joint of the model may move: not at all in an arm whose wrist has no target.
-    pub fn speeds_rad_s(&self, targets: &Sides<Option<Isometry3<f64>>>) -> Vec<f64> {
+    /// How fast each joint of the model may move: not at all in an arm whose wrist has no target, nor in a waist that is kept.
+    pub fn speeds_rad_s(&self, targets: &Sides<Option<Isometry3<f64>>>, keeps_waist: bool) -> Vec<f64> {
         let speed_rad_s = |column: &usize| {
             let side = Side::BOTH.into_iter().find(|side| columns::arm(*side).contains(column));
             match side.map(|side| targets[side]) {
+                None if keeps_waist => 0.0,
                 None => WAIST_SPEED_RAD_S,
                 Some(None) => 0.0,
                 Some(Some(_)) => ARM_SPEED_RAD_S,

@@ -50,7 +50,8 @@ const GRASPING: &str = "Fingers that are stopped short of their targets press: a
 const CARRYING: &str = " To push, and to carry together: grip, and lift what is to be lifted by 0.09 m with compliance_n_s_m 250; then call \
     walk_to with carry, once, with every robot that holds the load, each with its own place: where it stands now, moved by what the load \
     is to move, in its own start frame (room says how these lie to each other: a partner who faces you goes to its left where you go to \
-    your right). Hands keep their places to the robots and their height; 450 steps a metre. To set down, bring the wrists down again by \
+    your right). Hands keep their places to the robots and their height; 450 steps a metre. As long as several hold it, name each of them in every \
+    command, with compliance_n_s_m 250: the hands of one that is not named stay stiff, and lead it away. To set down, bring the wrists down again by \
     steps of 0.03 m with compliance_n_s_m 250 once both stand: a thing has touched when force_n along z falls towards 0, as from -4.4 to \
     -2.0. Open as you are, with compliance_n_s_m 250 and the wrist poses that the last reply tells, until grip is \"none\", and only \
     then leave over the stops: a hand that turns stiff while it holds pulls its robot from where it stands.";
@@ -67,7 +68,7 @@ const WALKING: &str = "A robot that is told to walk gains way after 0.3 to 0.5 s
     sways by up to 4 cm to each side, twice a second: mean over half a second what you steer by, or have walk_to do it. base.state says \
     \"standing\", \"stepping\", \"settling\" (told to stop, or the pelvis still rises; comes_to_rest_m says where it will stand) or \"pushed\": it steps because its \
     hands or a partner pull it, drifts and sinks by 10 cm. Then free what pulls: loosen wrist targets, give way with compliance_n_s_m, or \
-    walk the way it is pulled. Arms that reach more than 0.35 m ahead make a robot step, too: walk nearer instead.";
+    walk the way it is pulled. Arms that reach more than 0.35 m ahead make a robot step, too: walk nearer instead, or ask for stand_fast.";
 
 /// The brief of an episode in the words that its policy reads, where robots follow base commands within `limits`.
 pub fn brief(wording: Wording, limits: &BaseLimits) -> Brief {

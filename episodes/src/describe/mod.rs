@@ -11,7 +11,7 @@ pub use room::room;
 
 use tandem_sim::BaseLimits;
 use tandem_tools_spec::{
-    Instruction, JointInfo, PhaseInfo, Protocol, ProtocolInfo, RobotKind, TaskInfo, TaskList,
+    Disclosure, Instruction, JointInfo, PhaseInfo, Protocol, ProtocolInfo, RobotKind, TaskInfo, TaskList,
 };
 
 use crate::commands::RobotSheet;
@@ -56,6 +56,22 @@ fn protocol_info(protocol: Protocol, task: &Task) -> ProtocolInfo {
         wall_clock_s: rules.thinking.map(|thinking| thinking.as_secs_f64()),
         first_seed: rules.seeds.0,
         last_seed: rules.seeds.1,
+    }
+}
+
+/// How an episode ends whose phases are disclosed so.
+pub fn ending(disclosure: Disclosure) -> &'static str {
+    match disclosure {
+        Disclosure::Live => {
+            "Every reply tells the phases that are reached by then, and the last of them ends the episode."
+        }
+        Disclosure::End => {
+            "Phases are told once the episode has ended: until then `phases` is empty, whatever has been reached. Success does not \
+             end it: look whether the task is done, then call finish."
+        }
+        Disclosure::Never => {
+            "Phases are not told, and success does not end the episode: look whether the task is done, then call finish."
+        }
     }
 }
 

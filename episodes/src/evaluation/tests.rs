@@ -22,6 +22,8 @@ fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultRe
         ended: EndReason::Finished,
         env_steps: 812,
         tool_calls: 61,
+        requests: None,
+        thinking_s: 0.0,
         falls: 0,
         realtime_factor: 3.5,
         state_hash: "00c0ffee00c0ffee".into(),

@@ -48,7 +48,7 @@ pub enum Fault {
     Length { said: u64, has: usize },
     #[error("it says that {compressed} bytes hold {uncompressed}, which is more than they can")]
     Expansion { compressed: usize, uncompressed: u64 },
-    #[error("it is compressed as {0:?}; recordings are compressed as \"lz4\"")]
+    #[error("it is compressed as {0:?}; recordings are compressed as \"zstd\", and were as \"lz4\"")]
     Compression(String),
     #[error("it cannot be decompressed: {0}")]
     Decompress(std::io::Error),

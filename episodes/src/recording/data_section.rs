@@ -5,7 +5,7 @@
 //! the process aborts.
 
 use std::collections::{BTreeMap, HashMap};
-use std::io::Read;
+use std::io::{self, Read};
 use std::ops::Range;
 
 use mcap::MAGIC;
@@ -16,6 +16,8 @@ use super::metadata;
 
 /// No bytes in LZ4's format hold more than so many times themselves.
 const LZ4_MOST_EXPANSION: u64 = 255;
+/// Nor in Zstandard's: a block of at most 128 KiB takes three bytes and one that is repeated.
+const ZSTD_MOST_EXPANSION: u64 = (128 << 10) / 4;
 
 /// What every recording of ours says of who wrote it, with a version behind. These have all checksums.
 pub const LIBRARY: &str = "tandem ";
@@ -338,19 +340,25 @@ fn decompress(content: &[u8]) -> Result<(u32, ChunkRecords), Fault> {
         "lz4" if uncompressed > compressed as u64 * LZ4_MOST_EXPANSION => {
             return Err(Fault::Expansion { compressed, uncompressed });
         }
-        "lz4" => {
-            let mut bytes = Vec::new();
-            let decoder = lz4::Decoder::new(&*data).map_err(Fault::Decompress)?;
-            // One byte more would be one too many.
-            decoder.take(uncompressed + 1).read_to_end(&mut bytes).map_err(Fault::Decompress)?;
-            bytes
+        "zstd" if uncompressed > compressed as u64 * ZSTD_MOST_EXPANSION => {
+            return Err(Fault::Expansion { compressed, uncompressed });
         }
+        "lz4" => read_all(lz4::Decoder::new(&*data), uncompressed)?,
+        "zstd" => read_all(zstd::Decoder::new(&*data), uncompressed)?,
         other => return Err(Fault::Compression(other.into())),
     };
     if bytes.len() as u64 != uncompressed {
         return Err(Fault::Length { said: uncompressed, has: bytes.len() });
     }
     Ok((header.uncompressed_crc, ChunkRecords { bytes }))
+}
+
+/// What a decoder gives, and of more than is expected one byte more: that is one too many.
+fn read_all(decoder: io::Result<impl Read>, expected: u64) -> Result<Vec<u8>, Fault> {
+    let mut bytes = Vec::new();
+    let decoder = decoder.map_err(Fault::Decompress)?;
+    decoder.take(expected + 1).read_to_end(&mut bytes).map_err(Fault::Decompress)?;
+    Ok(bytes)
 }
 
 /// Reads the fields of a record one after the other.

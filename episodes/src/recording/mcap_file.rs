@@ -124,7 +124,9 @@ impl McapFile {
 pub fn writer(store: RecordingStore) -> Result<mcap::Writer<RecordingStore>, mcap::McapError> {
     mcap::WriteOptions::new()
         .library(format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION")))
-        .compression(Some(mcap::Compression::Lz4))
+        .compression(Some(mcap::Compression::Zstd))
+        // On the thread that writes.
+        .compression_threads(0)
         .disable_seeking(true)
         .chunk_size(Some(CHUNK_BYTES))
         .create(store)

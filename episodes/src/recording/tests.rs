@@ -145,6 +145,8 @@ fn result() -> ResultReply {
         ended: EndReason::Finished,
         env_steps: STEPS,
         tool_calls: 2,
+        requests: None,
+        thinking_s: 0.0,
         falls: 0,
         realtime_factor: 4.0,
         state_hash: "0123456789abcdef".into(),
@@ -276,7 +278,8 @@ fn wrists_follow_from_transforms(world: &World, recorded: &FrameTransforms) {
         assert!((forward + camera.rotation * Vector::Z).length() < 1e-3, "an image's z axis looks forward");
     }
     let bottle = step.object("bottle").unwrap().world_from_object;
-    assert!((pose("bottle").translation - bottle.translation).length() < 1e-6);
+    // Rounded to 8 um along each axis.
+    assert!((pose("bottle").translation - bottle.translation).length() < 7e-6);
 }
 
 fn metadata(bytes: &[u8]) -> BTreeMap<String, BTreeMap<String, String>> {

@@ -201,6 +201,8 @@ mod tests {
             ended: EndReason::Finished,
             env_steps: 812,
             tool_calls: 61,
+            requests: None,
+            thinking_s: 0.0,
             falls: 0,
             realtime_factor: 3.5,
             state_hash: "00c0ffee00c0ffee".into(),
@@ -222,7 +224,7 @@ mod tests {
             let written: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
             let expected = json!({
                 "task": "handover", "seed": 3, "protocol": "agentic", "phases": {"p1": 4.2, "p2": 9.86, "p3": p3},
-                "assistance": "full", "ended": "finished", "env_steps": 812, "tool_calls": 61, "falls": 0, "realtime_factor": 3.5,
+                "assistance": "full", "ended": "finished", "env_steps": 812, "tool_calls": 61, "thinking_s": 0.0, "falls": 0, "realtime_factor": 3.5,
                 "state_hash": "00c0ffee00c0ffee",
             });
             assert_eq!(written, expected);

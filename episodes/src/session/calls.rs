@@ -286,7 +286,15 @@ impl Session {
         }
         let underway = self.result.is_none();
         self.tool_calls += u32::from(underway);
+        if underway && !self.planning {
+            self.count_request();
+        }
         underway
+    }
+
+    /// The policy has asked for something: for a call, or for a plan of several.
+    pub(super) fn count_request(&mut self) {
+        self.requests = self.requests.map(|requests| requests + 1);
     }
 
     /// A call has come out: records it, and closes the files if it has ended the episode.

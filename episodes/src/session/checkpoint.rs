@@ -56,6 +56,7 @@ struct Progress {
     /// Control steps of the world that are not the episode's.
     steps_before: u64,
     tool_calls: u32,
+    requests: Option<u32>,
     thought: Duration,
     ended: Option<EndReason>,
     /// What the policy has been shown by then.
@@ -192,6 +193,7 @@ impl Session {
             scores: self.scores.memory(),
             steps_before: self.steps_before,
             tool_calls: self.tool_calls,
+            requests: self.requests,
             thought: self.clock.spent(),
             ended: self.ended,
             shown: self.shown.clone(),
@@ -213,6 +215,7 @@ impl Session {
         self.restore(&checkpoint.progress)?;
         self.steps_before = self.present.control_step;
         self.tool_calls = 0;
+        self.requests = self.requests.map(|_| 0);
         self.shown = ShownInformation::default();
         self.clock.set_spent(Duration::ZERO);
         self.ended = None;
@@ -228,6 +231,7 @@ impl Session {
         }
         self.scores.set_memory(progress.scores.clone());
         self.tool_calls = progress.tool_calls;
+        self.requests = self.requests.and(progress.requests);
         self.clock.set_spent(progress.thought);
         self.ended = progress.ended;
         self.shown = progress.shown.clone();

@@ -63,6 +63,8 @@ pub struct Session {
     audience: Audience,
     /// Up to the end.
     tool_calls: u32,
+    /// As many, with one for a plan; `None` where calls are made again that do not tell which of them were a plan's.
+    requests: Option<u32>,
     /// Whether the commands of a plan are made.
     planning: bool,
     /// Calls that have been recorded or shown, those that do not count included.
@@ -119,6 +121,7 @@ impl Session {
             audience: Audience::default(),
             steps_before: 0,
             tool_calls: 0,
+            requests: Some(0),
             planning: false,
             told_calls: 0,
             usage: Usage::default(),

@@ -36,6 +36,7 @@ impl Replay {
         } else if spec.start != Start::Task {
             session.begin(None)?;
         }
+        session.requests = None;
         session.hashes = Some(vec![session.world.state_hash()]);
         if spec.start == Start::Task {
             session.hold(spec.rules().initial_hold_steps)?;

@@ -108,6 +108,7 @@ impl Session {
                 // What cannot be read would have kept the world from being built.
                 Assistance::Full => describe::room(task, self.spec().variation.spread).unwrap_or_default(),
             },
+            ending: describe::ending(self.spec().disclosure).into(),
             brief: describe::brief(self.spec().wording(), &wire_limits(&self.motions[0].robot.base_limits)),
             action_row: action_row(&self.motions[0].robot.model),
             status: self.status(),
@@ -135,6 +136,8 @@ impl Session {
             ended: self.ended.unwrap_or(EndReason::Finished),
             env_steps: self.env_steps(),
             tool_calls: self.tool_calls,
+            requests: self.requests,
+            thinking_s: rounded(self.clock.spent().as_secs_f64()),
             falls: self.fallen().iter().filter(|robot| robot.fallen).count() as u32,
             realtime_factor: if physics_s > 0.0 { self.present.time_s / physics_s } else { 0.0 },
             state_hash: self.state_hash(),

@@ -109,6 +109,7 @@ fn checking_reach_tells_near_from_far_and_moves_nothing() {
             right_position_m: Some(position_m),
             right_quaternion_wxyz: Some([1.0, 0.0, 0.0, 0.0]),
             frame: None,
+            keep_waist: None,
         };
         let ToolReply::Look(LookReply::CheckReach(reply)) = session.call(call.into()).unwrap() else {
             panic!("no reach")

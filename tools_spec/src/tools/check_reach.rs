@@ -33,6 +33,9 @@ pub struct CheckReach {
     /// The frame of the poses: "pelvis", "level" or "start". Null: "pelvis".
     #[schemars(extend("full_only" = true, "default" = PoseFrame::Pelvis))]
     pub frame: Option<PoseFrame>,
+    /// True: with the waist as it is, as move_wrists reaches with keep_waist. Null: false.
+    #[schemars(extend("full_only" = true, "default" = false))]
+    pub keep_waist: Option<bool>,
 }
 
 /// The fields of which at least one has to be given.
@@ -52,6 +55,7 @@ impl Tool for CheckReach {
             right_position_m: Some([0.30, -0.20, 0.10]),
             right_quaternion_wxyz: Some([1.0, 0.0, 0.0, 0.0]),
             frame: None,
+            keep_waist: None,
         }
     }
 

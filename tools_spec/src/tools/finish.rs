@@ -63,6 +63,13 @@ pub struct ResultReply {
     pub env_steps: u32,
     /// Calls of tools up to the end, reads, refused calls and the one that ended the episode included.
     pub tool_calls: u32,
+    /// As tool_calls, but with one for a plan or a walk, whose commands are a call each: what the policy asked for itself. Left out in
+    /// results of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub requests: Option<u32>,
+    /// Wall clock that the policy has thought between its calls, in seconds.
+    #[serde(default)]
+    pub thinking_s: f64,
     /// Robots that fell.
     pub falls: u32,
     /// Simulated seconds per second that the physics took.

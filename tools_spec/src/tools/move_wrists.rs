@@ -68,6 +68,14 @@ pub struct WristMove {
     /// it. False or null: they are fixed in the world.
     #[schemars(extend("default" = false))]
     pub carried: Option<bool>,
+    /// True: the waist stays as it is and the arms alone reach, so that the camera keeps its view; until the next command for this robot.
+    /// False or null: the waist turns and leans where the arms do not suffice.
+    #[schemars(extend("full_only" = true, "default" = false))]
+    pub keep_waist: Option<bool>,
+    /// True: hands stop, as "out_of_reach", before they are so far ahead that the robot would have to step (check_reach: needs_a_step);
+    /// until the next command for this robot. False or null: it steps.
+    #[schemars(extend("full_only" = true, "default" = false))]
+    pub stand_fast: Option<bool>,
     /// How both hands give way to what pulls or pushes them along the way that the robot faces, as a partner at the other end of
     /// a load does: at 1 m/s under as many newtons, up to 6 cm. 250 suits two robots that walk with a load; at least 50.
     /// Null: hands keep to their targets.
@@ -114,6 +122,8 @@ impl WristMove {
             right_quaternion_wxyz: None,
             frame: None,
             carried: None,
+            keep_waist: None,
+            stand_fast: None,
             compliance_n_s_m: None,
             side_compliance_n_s_m: None,
             turn_compliance_n_m_s_rad: None,

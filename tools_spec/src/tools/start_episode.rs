@@ -71,6 +71,8 @@ pub struct Briefing {
     /// moves them by a decimetre or so. Left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub room: Vec<String>,
+    /// How the episode ends, and when phases are told.
+    pub ending: String,
     /// What can be asked of robots of each kind.
     pub kinds: Vec<RobotKind>,
     /// What has to be known to see and to act.

@@ -4,12 +4,17 @@ use foxglove::messages::{CameraCalibration, CompressedImage, JointState, JointSt
 use tandem_sim::{RobotCommand, RobotModel, RobotSensed, RobotStep, mjcf::MjcfCamera, render::Intrinsics};
 
 use super::messages::{ActionMessage, BaseCommandMessage, HandsMessage, Json};
-use super::transforms::{EGOCENTRIC, robot_frame, timestamp};
+use super::transforms::{EGOCENTRIC, robot_frame, rounded, timestamp};
 use crate::commands::{RobotSheet, action_row};
 use crate::observation::Picture;
 use crate::output::OutputError;
 use crate::recording::mcap_file::{McapFile, Topic};
 use crate::scoring::Facts;
+
+/// Binary digits of joint angles (8 urad), velocities (0.1 mrad/s) and torques (1 mN m).
+const ANGLE_DIGITS: u8 = 17;
+const SPEED_DIGITS: u8 = 13;
+const EFFORT_DIGITS: u8 = 10;
 
 /// The topics of one robot.
 pub struct RobotTopics {
@@ -120,10 +125,10 @@ impl RobotTopics {
 fn joint_states(model: &RobotModel, time_s: f64, sensed: &RobotSensed) -> JointStates {
     let joints = model.joints.iter().enumerate().map(|(index, joint)| JointState {
         name: joint.name.clone(),
-        position: Some(sensed.joints.q_rad[index].into()),
-        velocity: Some(sensed.joints.qd_rad_s[index].into()),
+        position: Some(rounded(sensed.joints.q_rad[index], ANGLE_DIGITS)),
+        velocity: Some(rounded(sensed.joints.qd_rad_s[index], SPEED_DIGITS)),
         acceleration: None,
-        effort: Some(sensed.joints.torque_n_m[index].into()),
+        effort: Some(rounded(sensed.joints.torque_n_m[index], EFFORT_DIGITS)),
     });
     JointStates { timestamp: Some(timestamp(time_s)), joints: joints.collect() }
 }

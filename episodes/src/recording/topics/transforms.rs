@@ -12,6 +12,11 @@ pub const WORLD: &str = "world";
 /// Name of a robot's camera frame after the robot's own name.
 pub const EGOCENTRIC: &str = "egocentric";
 
+/// Binary digits of a position in m: 8 um.
+const POSITION_DIGITS: u8 = 17;
+/// Binary digits of a quaternion's parts: 2 urad.
+const ROTATION_DIGITS: u8 = 20;
+
 /// Frame of a robot's link or camera.
 pub fn robot_frame(robot: &str, part: &str) -> String {
     format!("{robot}/{part}")
@@ -24,8 +29,8 @@ pub fn transforms(robots: &[RobotSheet], step: &Step) -> FrameTransforms {
         timestamp: Some(timestamp),
         parent_frame_id: parent,
         child_frame_id: child,
-        translation: Some(vector3(parent_from_child.translation)),
-        rotation: Some(quaternion(parent_from_child.rotation)),
+        translation: Some(rounded_vector3(parent_from_child.translation)),
+        rotation: Some(rounded_quaternion(parent_from_child.rotation)),
     };
     let mut transforms = Vec::new();
     for (robot, moved) in robots.iter().zip(&step.robots) {
@@ -56,10 +61,27 @@ fn link_poses<'a>(
     })
 }
 
+/// A number for those who look: the nearest multiple of `2^-binary_digits`. What compresses badly are the digits behind it, which no
+/// sensor has; steps hold every bit.
+pub fn rounded(value: f32, binary_digits: u8) -> f64 {
+    let ones = f64::from(1u32 << binary_digits);
+    (f64::from(value) * ones).round() / ones
+}
+
 pub fn timestamp(time_s: f64) -> Timestamp {
     const NS_PER_S: u64 = 1_000_000_000;
     let ns = time_ns(time_s);
     Timestamp::new((ns / NS_PER_S) as u32, (ns % NS_PER_S) as u32)
+}
+
+fn rounded_vector3(value_m: Vector) -> Vector3 {
+    let [x, y, z] = [value_m.x, value_m.y, value_m.z].map(|part| rounded(part, POSITION_DIGITS));
+    Vector3 { x, y, z }
+}
+
+fn rounded_quaternion(q: Rotation) -> Quaternion {
+    let [x, y, z, w] = [q.x, q.y, q.z, q.w].map(|part| rounded(part, ROTATION_DIGITS));
+    Quaternion { x, y, z, w }
 }
 
 pub fn vector3(value: Vector) -> Vector3 {

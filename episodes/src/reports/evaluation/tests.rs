@@ -27,6 +27,8 @@ pub fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Pl
             ended,
             env_steps: 500 + seed,
             tool_calls: 60,
+            requests: None,
+            thinking_s: 0.0,
             falls: u32::from(phases == 0),
             realtime_factor: 3.5,
             state_hash: format!("{seed:016x}"),

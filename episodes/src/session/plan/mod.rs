@@ -38,6 +38,7 @@ impl Session {
             self.refuse(caller, &Called::One(Call::from(call)), &refusal);
             return Err(refusal);
         }
+        self.count_request();
         self.planning = true;
         let reply = match plan {
             PlanCall::SendPlan(plan) => self.carry_out_commands(caller, plan),

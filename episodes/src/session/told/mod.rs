@@ -254,6 +254,17 @@ impl Session {
             }
             ToolCall::Look(LookCall::QueryDepth(args)) => vec![args.frame],
             ToolCall::Look(LookCall::CheckReach(args)) => vec![args.frame],
+            ToolCall::Act(ActCall::MoveWrists(args))
+                if self.spec().assistance == Assistance::Paper
+                    && args
+                        .robots
+                        .iter()
+                        .any(|entry| [entry.keep_waist, entry.stand_fast].contains(&Some(true))) =>
+            {
+                return Err(refused(
+                    "this episode's robots turn and step as reaching needs; leave keep_waist and stand_fast out",
+                ));
+            }
             ToolCall::Act(ActCall::MoveWrists(args)) => args.robots.iter().map(|entry| entry.frame).collect(),
             ToolCall::Look(LookCall::Observe(args)) => vec![args.frame],
             ToolCall::Look(LookCall::GetRobotState(_))

@@ -181,6 +181,51 @@ fn a_reach_says_whether_it_takes_a_step() {
     }
 }
 
+/// Hands that reach too far stop where the robot still stands, if they are told so.
+#[test]
+fn a_robot_that_is_to_stand_fast_stops_before_it_has_to_step() {
+    for stands_fast in [false, true] {
+        let mut session = start("co_carry", 2012, Protocol::Agentic);
+        let mut last = serde_json::Value::Null;
+        let mut stepped = false;
+        for _ in 0..4 {
+            let args = serde_json::json!({ "steps": 25, "robots": [{
+                "robot": "B", "stand_fast": stands_fast,
+                "right_position_m": [0.42, -0.15, 0.15], "right_quaternion_wxyz": [1, 0, 0, 0],
+                "left_position_m": [0.42, 0.15, 0.15], "left_quaternion_wxyz": [1, 0, 0, 0],
+            }] });
+            let reply = session.ask(None, Call::parse("move_wrists", args).unwrap()).unwrap().reply;
+            last = serde_json::json!(reply)["robots"][0].clone();
+            stepped |= last["base"]["stepped"] == true;
+        }
+        assert_eq!(stepped, !stands_fast, "{last}");
+        assert_eq!(last["right"]["state"] == "out_of_reach", stands_fast, "{last}");
+    }
+}
+
+/// A hand far across needs the waist, and one whose waist is to stay comes as far as the arm does.
+#[test]
+fn a_waist_that_is_to_stay_does_not_turn() {
+    for keep_waist in [false, true] {
+        let mut session = handover(2011);
+        let args = serde_json::json!({ "steps": 25, "robots": [{
+            "robot": "A", "keep_waist": keep_waist,
+            "right_position_m": [0.25, 0.30, 0.15], "right_quaternion_wxyz": [1, 0, 0, 0],
+        }] });
+        let mut ask = |tool: &str, args: serde_json::Value| {
+            serde_json::json!(session.ask(None, Call::parse(tool, args).unwrap()).unwrap().reply)
+        };
+        let before = ask("get_robot_state", serde_json::json!({ "robot": "A" }));
+        (0..2).for_each(|_| drop(ask("move_wrists", args.clone())));
+        ask("wait", serde_json::json!({ "steps": 25 }));
+        let after = ask("get_robot_state", serde_json::json!({ "robot": "A" }));
+        let waist_rad =
+            |state: &serde_json::Value| state["joint_positions_rad"]["waist_yaw_joint"].as_f64().unwrap();
+        let turned_rad = (waist_rad(&after) - waist_rad(&before)).abs();
+        assert_eq!(turned_rad < 0.02, keep_waist, "{turned_rad} rad");
+    }
+}
+
 /// An observation tells of wrists and camera in the frame that it is asked for.
 #[test]
 fn an_observation_is_told_in_the_frame_that_it_names() {

@@ -46,7 +46,7 @@ const PAPER: &[(&str, &str)] = &[
     ),
     (
         "finish",
-        "task seed protocol assistance phases.p1 phases.p2 phases.p3 ended env_steps tool_calls falls realtime_factor \
+        "task seed protocol assistance phases.p1 phases.p2 phases.p3 ended env_steps tool_calls requests thinking_s falls realtime_factor \
          state_hash",
     ),
 ];

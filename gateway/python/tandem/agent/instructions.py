@@ -40,7 +40,7 @@ def instructions(seat: Seat) -> str:
         *(f"Robot {each['robot']}: {each['instruction']}" for each in told["instructions"]),
         *_listed("The phases that are scored, one after another:", [_phase(phase) for phase in listed(told.get("phases"))]),
         *_listed("In the room at the start:", [str(line) for line in listed(told.get("room"))]),
-        _budget(told["status"]["budget"]),
+        f"{_budget(told['status']['budget'])} {told['ending']} Call finish, too, when the task cannot be done.",
         *_brief(told["brief"]),
     ]
     return "\n\n".join(paragraphs)
@@ -68,7 +68,7 @@ def _budget(budget: dict[str, Any]) -> str:
     clock = f"{left_s:.0f} seconds to think in all" if left_s is not None else "as much time to think as you like"
     return (
         f"Budget: {budget['steps_left']} control steps of 20 ms, at most {budget['steps_per_command']} in one command; "
-        f"{clock}. Call finish when the task is done, or cannot be done."
+        f"{clock}."
     )
 
 

@@ -227,6 +227,16 @@ class WristMove:
     something wants it. False or null: they are fixed in the world.
     """
 
+    keep_waist: bool | None = None
+    """True: the waist stays as it is and the arms alone reach, so that the camera keeps its view; until the next
+    command for this robot. False or null: the waist turns and leans where the arms do not suffice.
+    """
+
+    stand_fast: bool | None = None
+    """True: hands stop, as "out_of_reach", before they are so far ahead that the robot would have to step
+    (check_reach: needs_a_step); until the next command for this robot. False or null: it steps.
+    """
+
     compliance_n_s_m: float | None = None
     """How both hands give way to what pulls or pushes them along the way that the robot faces, as a partner at the
     other end of a load does: at 1 m/s under as many newtons, up to 6 cm. 250 suits two robots that walk with a

@@ -206,6 +206,14 @@ class ResultReply:
     tool_calls: int
     """Calls of tools up to the end, reads, refused calls and the one that ended the episode included."""
 
+    requests: int | None
+    """As tool_calls, but with one for a plan or a walk, whose commands are a call each: what the policy asked for
+    itself. Left out in results of earlier versions.
+    """
+
+    thinking_s: float | None
+    """Wall clock that the policy has thought between its calls, in seconds."""
+
     falls: int
     """Robots that fell."""
 
@@ -249,6 +257,8 @@ class ResultReply:
             ended=value["ended"],
             env_steps=value["env_steps"],
             tool_calls=value["tool_calls"],
+            requests=value.get("requests"),
+            thinking_s=value.get("thinking_s"),
             falls=value["falls"],
             realtime_factor=value["realtime_factor"],
             state_hash=value["state_hash"],

@@ -103,6 +103,9 @@ class Briefing:
     stand before the seed moves them by a decimetre or so. Left out where the assistance is "paper".
     """
 
+    ending: str
+    """How the episode ends, and when phases are told."""
+
     kinds: tuple[RobotKind, ...]
     """What can be asked of robots of each kind."""
 
@@ -127,6 +130,7 @@ class Briefing:
             robots=tuple(RobotInfo.of(item) for item in value["robots"]),
             phases=tuple(PhaseInfo.of(item) for item in value.get("phases", ())),
             room=tuple(value.get("room", ())),
+            ending=value["ending"],
             kinds=tuple(RobotKind.of(item) for item in value["kinds"]),
             brief=Brief.of(value["brief"]),
             action_row=tuple(value.get("action_row", ())),

@@ -89,6 +89,7 @@ class Tools(ABC):
         right_position_m: Numbers | None = None,
         right_quaternion_wxyz: Numbers | None = None,
         frame: PoseFrame | None = None,
+        keep_waist: bool | None = None,
     ) -> ReachReply:
         """Ask whether a robot's wrists could reach poses from where it stands, using the arms that are given a
         pose and the waist. Nothing moves and no steps are spent. Poses are of the wrist links
@@ -103,6 +104,7 @@ class Tools(ABC):
             now, or, without an orientation either, this arm keeps its joints.
         right_quaternion_wxyz: Right wrist orientation [w, x, y, z], as [1, 0, 0, 0]. None: as it is to be now.
         frame: The frame of the poses: "pelvis", "level" or "start". None: "pelvis".
+        keep_waist: True: with the waist as it is, as move_wrists reaches with keep_waist. None: false.
         """
         arguments: dict[str, Any] = {
             "robot": robot,
@@ -111,6 +113,7 @@ class Tools(ABC):
             "right_position_m": right_position_m,
             "right_quaternion_wxyz": right_quaternion_wxyz,
             "frame": frame,
+            "keep_waist": keep_waist,
         }
         return ReachReply.of(self.call("check_reach", plain(arguments)))
 
@@ -209,8 +212,8 @@ class Tools(ABC):
         carries, its hands nearer), one gets no nearer, or the steps are used up. It walks straight and looks at
         nothing: go round what stands in the way by places in between.
 
-        steps: The most control steps of 20 ms to take, up to 1500. A way takes about 120, and 250 a metre; where
-            robots carry, 450 a metre.
+        steps: The most control steps of 20 ms to take, up to 1500. A way takes about 120, and 250 a metre and 150 a
+            quarter turn; where robots carry, 450 a metre.
         robots: One entry per robot that is to walk; each robot at most once. Robots that are not named hold still.
         """
         arguments: dict[str, Any] = {

@@ -84,8 +84,8 @@ fn brief(start: &StartReply, url: &str, robot: Option<&str>, driving: &Driving) 
         None => "as much time to think as you like".into(),
     };
     paragraphs.push(format!(
-        "Budget: {} control steps of 20 ms, at most {} in one command; {clock}. Call finish when the task is done, or cannot be done.",
-        budget.steps_left, budget.steps_per_command
+        "Budget: {} control steps of 20 ms, at most {} in one command; {clock}. {} Call finish, too, when the task cannot be done.",
+        budget.steps_left, budget.steps_per_command, briefing.ending
     ));
     paragraphs.extend(briefing.brief.lines());
     paragraphs.join("\n\n") + "\n"

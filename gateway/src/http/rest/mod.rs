@@ -9,7 +9,7 @@ use axum::{
     body::Bytes,
     extract::{Extension, Path, Query, State},
     http::{HeaderMap, StatusCode, header},
-    response::{Html, IntoResponse, Redirect, Response},
+    response::{Html, IntoResponse, Response},
     routing::{MethodRouter, get, post},
 };
 use serde::Deserialize;
@@ -41,7 +41,7 @@ fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<AppState>);
         ("/v1/tools", &["GET"], get(tools)),
         ("/v1/openapi.json", &["GET"], get(openapi)),
         // Where others have it.
-        ("/openapi.json", &["GET"], get(|| async { Redirect::permanent("/v1/openapi.json") })),
+        ("/openapi.json", &["GET"], get(openapi)),
         ("/v1/episodes", &["GET", "POST"], get(episodes).post(start)),
         ("/v1/episodes/{id}", &["GET", "DELETE"], get(status).delete(remove)),
         ("/v1/episodes/{id}/briefing", &["GET"], get(briefing)),

@@ -25,6 +25,8 @@ fn result(phase_times_s: [Option<f64>; 3], protocol: Protocol) -> ResultReply {
         ended: EndReason::Finished,
         env_steps: 500,
         tool_calls: 3,
+        requests: None,
+        thinking_s: 0.0,
         falls: 0,
         realtime_factor: 3.5,
         state_hash: "<script>".into(),
