@@ -3,7 +3,7 @@
 use pulp::{Arch, Simd, WithSimd};
 use rapier3d::math::Vector;
 
-use super::raster::{Grid, ProjectedTriangle, SampleRows};
+use super::raster::{Grid, Outlines, SampleRows, TriangleBatch};
 use crate::render::scene::prepared::Prepared;
 use crate::render::shading::CONTACT_TEXELS;
 use crate::render::shading::lanes::{Affine, Lanes, lanes};
@@ -37,9 +37,11 @@ pub struct ContactMap {
     support: SampleRows<f32>,
     underside: SampleRows<f32>,
     corners_m: Vec<[f32; 3]>,
-    /// How dark it is, and that smoothed along the rows.
-    dark_share: Vec<[f32; CONTACT_TEXELS]>,
+    /// How dark it is, smoothed along the rows, and in which of them it is dark.
     across_share: Vec<[f32; CONTACT_TEXELS]>,
+    across_dark: Vec<bool>,
+    /// Rows whose texels have to be written: it was dark there, or they are not yet of what can carry things.
+    stale_rows: Vec<bool>,
     /// Whether it is dark in or right beside a square of texels, row by row. Mostly it is not.
     dark_cells: Vec<bool>,
 }
@@ -79,6 +81,7 @@ impl ContactMap {
             self.texels_per_m = CONTACT_TEXELS as f32 / (2.0 * radius_m);
             self.support.reset(GRID, 0.0);
             self.draw_layer(simd, prepared, placed, HeightLayer::Support);
+            self.stale_rows = vec![true; CONTACT_TEXELS];
         }
         self.underside.reset(GRID, 0.0);
         self.draw_layer(simd, prepared, placed, HeightLayer::Underside);
@@ -93,6 +96,7 @@ impl ContactMap {
         placed: &PlacedScenery,
         layer: HeightLayer,
     ) {
+        let mut batch = TriangleBatch::default();
         for (number, part) in prepared.scenery.parts.iter().enumerate() {
             let (pose, (centre_m, around_m)) = (placed.world_from_mesh[number], prepared.bounds[number]);
             if layer != HeightLayer::of(part) || !self.concerns(layer, pose * centre_m, around_m) {
@@ -104,11 +108,14 @@ impl ContactMap {
             if layer == HeightLayer::Support && self.corners_m.iter().any(too_high) {
                 continue;
             }
-            for [a, b, c] in &part.mesh.triangles {
-                let corner_m = |corner: u32| self.corners_m[corner as usize];
-                self.fill(simd, layer, [corner_m(*a), corner_m(*b), corner_m(*c)]);
+            for triangle in &part.mesh.triangles {
+                batch.push(self.projected(layer, triangle.map(|corner| self.corners_m[corner as usize])), 0);
+                if batch.is_full() {
+                    self.fill(simd, layer, &batch.take());
+                }
             }
         }
+        self.fill(simd, layer, &batch.take());
     }
 
     /// Whether a part, given by a sphere around it, is over the map and near what it could touch.
@@ -135,66 +142,79 @@ impl ContactMap {
 
     /// Rows run along y as they do not in pictures: what is seen to turn counter-clockwise faces down.
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, layer: HeightLayer, [a, b, c]: [[f32; 3]; 3]) {
-        let (corners_m, rows, sign) = match layer {
-            HeightLayer::Support => ([a, c, b], &mut self.support, 1.0),
-            HeightLayer::Underside => ([a, b, c], &mut self.underside, -1.0),
-        };
+    fn projected(&self, layer: HeightLayer, [a, b, c]: [[f32; 3]; 3]) -> [[f32; 3]; 3] {
         let ([x_m, y_m], scale) = (self.corner_m, self.texels_per_m);
-        let nearest = S::as_mut_simd_f32s(rows.all_mut()).0;
-        let [a, b, c] = corners_m;
-        let place = |[x, y, z]: [f32; 3]| [(x - x_m) * scale, (y - y_m) * scale, DATUM_M + sign * z];
-        if let Some(outline) = ProjectedTriangle::new([place(a), place(b), place(c)]) {
-            outline.draw(
-                simd,
-                GRID,
-                #[inline(always)]
-                |i, nearness_m| nearest[i] = simd.max_f32s(nearest[i], nearness_m),
-            );
+        match layer {
+            HeightLayer::Support => {
+                [a, c, b].map(|[x, y, z]| [(x - x_m) * scale, (y - y_m) * scale, DATUM_M + z])
+            }
+            HeightLayer::Underside => {
+                [a, b, c].map(|[x, y, z]| [(x - x_m) * scale, (y - y_m) * scale, DATUM_M - z])
+            }
         }
     }
 
-    /// Dark where the lowest underside is near, smoothed.
+    #[inline(always)]
+    fn fill<S: Simd>(&mut self, simd: S, layer: HeightLayer, outlines: &Outlines) {
+        let rows = match layer {
+            HeightLayer::Support => &mut self.support,
+            HeightLayer::Underside => &mut self.underside,
+        };
+        let nearest = S::as_mut_simd_f32s(rows.all_mut()).0;
+        outlines.draw(
+            simd,
+            GRID,
+            #[inline(always)]
+            |i, _, nearness_m| nearest[i] = simd.max_f32s(nearest[i], nearness_m),
+        );
+    }
+
+    /// Dark where the lowest underside is near, smoothed. In most rows it is dark nowhere, and they stay as they are.
     #[inline(always)]
     fn darken(&mut self) {
-        let ContactMap {
-            support,
-            underside,
-            dark_share: dark,
-            across_share: across,
-            texel_values,
-            dark_cells,
-            ..
-        } = self;
-        dark_cells.clear();
-        dark_cells.resize(CELLS * CELLS, false);
-        for rows in [&mut *dark, &mut *across] {
-            rows.resize(CONTACT_TEXELS, [0.0; CONTACT_TEXELS]);
-        }
-        texel_values.resize(CONTACT_TEXELS * CONTACT_TEXELS, [0.0; 2]);
-        for (row, dark) in dark.iter_mut().enumerate() {
-            let layers = support.row(row).iter().zip(underside.row(row));
-            for (dark, (support, underside)) in dark.iter_mut().zip(layers) {
-                // Nothing is above a texel without an underside.
-                let gap_m = 2.0 * DATUM_M - underside - support;
-                let near = (1.0 - gap_m / REACH_M).clamp(0.0, 1.0);
-                *dark = if gap_m > -SINK_M { near } else { 0.0 };
+        self.dark_cells.clear();
+        self.dark_cells.resize(CELLS * CELLS, false);
+        self.across_share.resize(CONTACT_TEXELS, [0.0; CONTACT_TEXELS]);
+        self.across_dark.resize(CONTACT_TEXELS, false);
+        self.texel_values.resize(CONTACT_TEXELS * CONTACT_TEXELS, [0.0; 2]);
+        for row in 0..CONTACT_TEXELS {
+            let dark = row_darkness(self.support.row(row), self.underside.row(row));
+            let is_dark = any(&dark);
+            if is_dark {
+                self.across_share[row] = blurred(|offset, i| dark[shifted(i, offset)]);
+            } else if self.across_dark[row] {
+                self.across_share[row] = [0.0; CONTACT_TEXELS];
             }
+            self.across_dark[row] = is_dark;
         }
-        for (across, dark) in across.iter_mut().zip(dark.iter()) {
-            *across = blurred(|offset, i| dark[shifted(i, offset)]);
-        }
-        for (row, texels) in texel_values.chunks_exact_mut(CONTACT_TEXELS).enumerate() {
-            let near: [_; BLUR.len()] = std::array::from_fn(|offset| &across[shifted(row, offset)]);
-            let dark = blurred(|offset, i| near[offset][i]);
-            for (column, _) in dark.iter().enumerate().filter(|(_, dark)| **dark > 0.0) {
-                for row in [row.saturating_sub(1), row] {
-                    dark_cells[row / CELL * CELLS + column.saturating_sub(1) / CELL] = true;
-                    dark_cells[row / CELL * CELLS + column / CELL] = true;
-                }
+        for row in 0..CONTACT_TEXELS {
+            let near: [usize; BLUR.len()] = std::array::from_fn(|offset| shifted(row, offset));
+            let is_dark = near.iter().any(|near| self.across_dark[*near]);
+            if is_dark {
+                let rows = near.map(|near| &self.across_share[near]);
+                let dark = blurred(|offset, i| rows[offset][i]);
+                self.mark_cells(row, &dark);
+                self.write_row(row, &dark);
+            } else if self.stale_rows[row] {
+                self.write_row(row, &[0.0; CONTACT_TEXELS]);
             }
-            for ((texel, nearness_m), dark) in texels.iter_mut().zip(support.row(row)).zip(dark) {
-                *texel = [nearness_m - DATUM_M, dark];
+            self.stale_rows[row] = is_dark;
+        }
+    }
+
+    #[inline(always)]
+    fn write_row(&mut self, row: usize, dark_share: &[f32; CONTACT_TEXELS]) {
+        let texels = &mut self.texel_values[row * CONTACT_TEXELS..(row + 1) * CONTACT_TEXELS];
+        for ((texel, nearness_m), dark) in texels.iter_mut().zip(self.support.row(row)).zip(dark_share) {
+            *texel = [nearness_m - DATUM_M, *dark];
+        }
+    }
+
+    fn mark_cells(&mut self, row: usize, dark_share: &[f32; CONTACT_TEXELS]) {
+        for (column, _) in dark_share.iter().enumerate().filter(|(_, dark)| **dark > 0.0) {
+            for row in [row.saturating_sub(1), row] {
+                self.dark_cells[row / CELL * CELLS + column.saturating_sub(1) / CELL] = true;
+                self.dark_cells[row / CELL * CELLS + column / CELL] = true;
             }
         }
     }
@@ -245,6 +265,27 @@ impl HeightLayer {
             Carrier::Link { .. } | Carrier::Object(_) => HeightLayer::Underside,
         }
     }
+}
+
+/// How dark it is in a row of texels, before it is smoothed.
+#[inline(always)]
+fn row_darkness(support_m: &[f32], underside_m: &[f32]) -> [f32; CONTACT_TEXELS] {
+    let mut dark = [0.0; CONTACT_TEXELS];
+    // Nothing is above a texel without an underside.
+    if any(underside_m) {
+        for ((dark, support), underside) in dark.iter_mut().zip(support_m).zip(underside_m) {
+            let gap_m = 2.0 * DATUM_M - underside - support;
+            let near = (1.0 - gap_m / REACH_M).clamp(0.0, 1.0);
+            *dark = if gap_m > -SINK_M { near } else { 0.0 };
+        }
+    }
+    dark
+}
+
+/// Whether one of some numbers is not 0.
+#[inline(always)]
+fn any(values: &[f32]) -> bool {
+    values.iter().fold(0, |bits, value| bits | value.to_bits()) != 0
 }
 
 #[inline(always)]

@@ -139,7 +139,7 @@ impl WithSimd for StateDrawing<'_> {
         let StateDrawing { state, prepared, placed } = self;
         state.shadow.draw(simd, prepared, &placed);
         state.contact.draw(prepared, &placed);
-        shade::place(&mut state.facets, prepared, &placed);
+        shade::place(&mut state.facets, prepared, &placed, &state.placed);
         state.placed = placed;
     }
 }

@@ -1,7 +1,7 @@
 //! Sheets in one state of the world, and their light: one sun with shadow, a sky that lights from above, a faint lamp at
 //! the camera.
 
-use rapier3d::math::{Matrix, Vector};
+use rapier3d::math::{Matrix, Pose, Vector};
 
 use super::contact::ContactMap;
 use super::shadow::ShadowMap;
@@ -16,7 +16,7 @@ pub(super) const BATCH: usize = 64;
 const ROOM: usize = BATCH + LANES;
 
 /// A sheet in the world.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(super) struct Facet {
     /// The normal at a point p, of any length, is `normal + slope_1_m * p`.
     pub normal: Vector,
@@ -65,8 +65,9 @@ pub(super) struct Surfaces {
     /// The pixel of each point, and how much it counts there.
     pixels: [u32; ROOM],
     pixel_share: [f32; ROOM],
-    /// Place in the shadow map.
+    /// Place in the shadow map, and the cell there.
     texel: Vectors,
+    cell: [u32; ROOM],
     sun_factor: [f32; ROOM],
     eye_factor: [f32; ROOM],
     highlight_factor: [f32; ROOM],
@@ -101,7 +102,7 @@ fn block(values: &[f32; ROOM], at: usize) -> &Lanes {
 }
 
 #[inline(always)]
-fn block_mut<const N: usize>(values: &mut [f32; ROOM], at: usize) -> &mut Lanes<N> {
+fn block_mut<T, const N: usize>(values: &mut [T; ROOM], at: usize) -> &mut [T; N] {
     values[at..].first_chunk_mut().expect("there is room for a block after each point")
 }
 
@@ -110,12 +111,42 @@ fn dot(a: &[Lanes; 3], b: &[Lanes; 3], i: usize) -> f32 {
     a[0][i] * b[0][i] + a[1][i] * b[1][i] + a[2][i] * b[2][i]
 }
 
-/// The facets of a state, by their sheets' numbers.
-pub(super) fn place(facets: &mut Vec<Facet>, prepared: &Prepared, placed: &PlacedScenery) {
-    let rotations: Vec<_> =
-        placed.world_from_mesh.iter().map(|pose| Matrix::from_quat(pose.rotation)).collect();
-    facets.clear();
-    facets.extend(prepared.sheets.iter().map(|sheet| Facet::new(prepared, placed, &rotations, sheet)));
+/// Makes the facets those of a state, by their sheets' numbers; so far they are those of the state `before`.
+pub(super) fn place(
+    facets: &mut Vec<Facet>,
+    prepared: &Prepared,
+    placed: &PlacedScenery,
+    before: &PlacedScenery,
+) {
+    facets.resize(prepared.sheets.len(), Facet::default());
+    let mut rest = facets.as_mut_slice();
+    for sheets in prepared.sheets.chunk_by(|one, next| one.part == next.part) {
+        let (facets, others) = std::mem::take(&mut rest).split_at_mut(sheets.len());
+        rest = others;
+        let number = sheets[0].part as usize;
+        if before.world_from_mesh.get(number) != Some(&placed.world_from_mesh[number]) {
+            place_part(facets, sheets, prepared, number, placed.world_from_mesh[number]);
+        }
+    }
+}
+
+/// Places the facets of a part, whose sheets these are.
+fn place_part(facets: &mut [Facet], sheets: &[Sheet], prepared: &Prepared, number: usize, pose: Pose) {
+    let part = &prepared.scenery.parts[number];
+    let rotation = Matrix::from_quat(pose.rotation);
+    let common = Facet {
+        normal: Vector::ZERO,
+        slope_1_m: None,
+        linear_rgb: prepared.linear_rgb[number],
+        pattern: part.pattern,
+        pattern_from_world: part.pattern.frame(pose, prepared.grain[number]),
+        carries: part.carrier == Carrier::Room,
+    };
+    for (facet, sheet) in facets.iter_mut().zip(sheets) {
+        let slope_1_m = sheet.bend.slope_1_m.map(|slope_1_m| rotation * slope_1_m * rotation.transpose());
+        let at_origin = slope_1_m.map_or(Vector::ZERO, |slope_1_m| slope_1_m * pose.translation);
+        *facet = Facet { normal: rotation * sheet.bend.normal - at_origin, slope_1_m, ..common };
+    }
 }
 
 impl Rays {
@@ -144,6 +175,7 @@ impl Surfaces {
             pixels: [0; ROOM],
             pixel_share: [0.0; ROOM],
             texel: Vectors::ZERO,
+            cell: [0; ROOM],
             sun_factor: [0.0; ROOM],
             eye_factor: [0.0; ROOM],
             highlight_factor: [0.0; ROOM],
@@ -195,7 +227,7 @@ impl Surfaces {
             }
             if strip.facet.carries {
                 let darkness = contact.darkness(&point_m);
-                *block_mut(&mut self.open_share, at) = lanes::<N>(|i| 1.0 - CONTACT * darkness[i]);
+                *block_mut(&mut self.open_share, at) = lanes::<f32, N>(|i| 1.0 - CONTACT * darkness[i]);
             }
         }
     }
@@ -212,7 +244,8 @@ impl Surfaces {
                 #[inline(always)]
                 |axis| self.texel.0[axis][i],
             );
-            self.sunlit_share[i] = if self.sun_factor[i] > 0.0 { shadow.sunlit(texel) } else { 0.0 };
+            self.sunlit_share[i] =
+                if self.sun_factor[i] > 0.0 { shadow.sunlit(texel, self.cell[i]) } else { 0.0 };
         }
         for at in (0..count).step_by(LANES) {
             let colours = self.light(at);
@@ -247,12 +280,14 @@ impl Surfaces {
         let cosine_2: Lanes = lanes(|i| along[i] * along[i] / dot(&half_way, &half_way, i));
         let cosine_8: Lanes = lanes(|i| cosine_2[i] * cosine_2[i] * cosine_2[i] * cosine_2[i]);
         let cosine_40: Lanes = lanes(|i| cosine_8[i] * cosine_8[i] * cosine_8[i] * cosine_8[i] * cosine_8[i]);
-        *block_mut::<LANES>(&mut self.eye_factor, at) = lanes(|i| towards_eye[i].abs());
-        *block_mut::<LANES>(&mut self.sun_factor, at) =
+        *block_mut::<f32, LANES>(&mut self.eye_factor, at) = lanes(|i| towards_eye[i].abs());
+        *block_mut::<f32, LANES>(&mut self.sun_factor, at) =
             lanes(|i| normal[0][i] * sun[0] + normal[1][i] * sun[1] + normal[2][i] * sun[2]);
-        *block_mut::<LANES>(&mut self.highlight_factor, at) =
+        *block_mut::<f32, LANES>(&mut self.highlight_factor, at) =
             lanes(|i| if along[i] > 0.0 { HIGHLIGHT * cosine_40[i] } else { 0.0 });
-        self.texel.set(at, shadow.texels(&self.point_m.block(at), &normal));
+        let texel = shadow.texels(&self.point_m.block(at), &normal);
+        self.texel.set(at, texel);
+        *block_mut::<u32, LANES>(&mut self.cell, at) = ShadowMap::cells(&texel);
         self.normal.set(at, normal);
     }
 
@@ -279,22 +314,6 @@ impl Surfaces {
 }
 
 impl Facet {
-    fn new(prepared: &Prepared, placed: &PlacedScenery, rotations: &[Matrix], sheet: &Sheet) -> Facet {
-        let number = sheet.part as usize;
-        let (part, pose) = (&prepared.scenery.parts[number], placed.world_from_mesh[number]);
-        let rotation = rotations[number];
-        let slope_1_m = sheet.bend.slope_1_m.map(|slope_1_m| rotation * slope_1_m * rotation.transpose());
-        let at_origin = slope_1_m.map_or(Vector::ZERO, |slope_1_m| slope_1_m * pose.translation);
-        Facet {
-            normal: rotation * sheet.bend.normal - at_origin,
-            slope_1_m,
-            linear_rgb: prepared.linear_rgb[number],
-            pattern: part.pattern,
-            pattern_from_world: part.pattern.frame(pose, prepared.grain[number]),
-            carries: part.carrier == Carrier::Room,
-        }
-    }
-
     /// Normals of any length.
     #[inline(always)]
     fn normals<const N: usize>(&self, point_m: &[Lanes<N>; 3]) -> [Lanes<N>; 3] {

@@ -5,15 +5,17 @@ use std::ops::Range;
 use pulp::Simd;
 use rapier3d::math::Vector;
 
-use super::raster::{Grid, ProjectedTriangle, SampleRows};
+use super::raster::{Grid, Outlines, SampleRows, TriangleBatch, larger, smaller, whole_f32};
 use crate::render::scene::prepared::Prepared;
-use crate::render::shading::lanes::{Affine, Lanes, axes, lanes};
-use crate::render::shading::{BIAS_M, FADE_TEXELS, NORMAL_OFFSET_M, TEXELS, sun_map};
+use crate::render::shading::lanes::{Affine, LANES, Lanes, axes, lanes};
+use crate::render::shading::{BIAS_M, FADE_TEXELS, NORMAL_OFFSET_M, TEXELS, TO_SUN, sun_map};
 use crate::render::{Carrier, PlacedScenery};
 
 /// Texels along each side of a cell: what is nearer than all of a cell is in the sun there, without a look at its texels.
 const CELL: usize = 8;
 const CELLS: usize = TEXELS / CELL;
+/// The cell of everything outside of the map, which is in the sun.
+const OUTSIDE: u32 = (CELLS * CELLS) as u32;
 /// Columns of cells that are widened, beginning with none.
 const NO_CELLS: Range<usize> = Range { start: CELLS, end: 0 };
 /// Texels that the filter takes along each axis: a cell counts those that a filter begun in it can reach.
@@ -32,6 +34,7 @@ pub(super) struct ShadowMap {
     /// For each row of cells, the columns of those in which `all` may differ from `still`.
     moving: Vec<Range<usize>>,
     corners: Vec<[f32; 3]>,
+    front: Vec<u32>,
 }
 
 /// "Nearness" here is [`SUN_DISTANCE_M`] minus the distance from the sun's plane, and grows towards the sun.
@@ -40,7 +43,7 @@ pub(super) struct ShadowMap {
 #[derive(Default)]
 struct ShadowLayer {
     nearness_m: SampleRows<f32>,
-    /// Least and greatest nearness of each cell, row by row.
+    /// Least and greatest nearness of each cell, row by row; behind them, those of [`OUTSIDE`].
     cells_m: Vec<[f32; 2]>,
 }
 
@@ -57,7 +60,7 @@ impl ShadowMap {
             self.focus_m = Some(placed.focus_m);
             self.map_from_world = sun_map(placed.focus_m, prepared.scenery.focus_radius_m);
             self.still.nearness_m.reset(GRID, 0.0);
-            self.still.cells_m.resize(CELLS * CELLS, [0.0; 2]);
+            self.still.cells_m.resize(CELLS * CELLS + 1, [f32::NEG_INFINITY; 2]);
             self.moving = vec![NO_CELLS; CELLS];
             self.draw_parts(simd, prepared, placed, |carrier| carrier == Carrier::Room);
             self.still.measure(&vec![0..CELLS; CELLS]);
@@ -79,6 +82,7 @@ impl ShadowMap {
         placed: &PlacedScenery,
         belong: impl Fn(Carrier) -> bool,
     ) {
+        let mut batch = TriangleBatch::default();
         for (number, part) in prepared.scenery.parts.iter().enumerate() {
             if !part.casts_shadow || !belong(part.carrier) {
                 continue;
@@ -95,21 +99,18 @@ impl ShadowMap {
             for range in &mut self.moving[rows] {
                 *range = range.start.min(columns.start)..range.end.max(columns.end);
             }
-            let nearest = S::as_mut_simd_f32s(layer.nearness_m.all_mut()).0;
             prepared.points[number].map_into(&mut self.corners, |block| map_from_mesh.map_lanes(block));
-            for [a, b, c] in &part.mesh.triangles {
-                let [a, b, c] = [*a as usize, *b as usize, *c as usize];
-                if let Some(outline) =
-                    ProjectedTriangle::new([self.corners[a], self.corners[b], self.corners[c]])
-                {
-                    outline.draw(
-                        simd,
-                        GRID,
-                        #[inline(always)]
-                        |i, nearness_m| nearest[i] = simd.max_f32s(nearest[i], nearness_m),
-                    );
+            let to_sun = placed.world_from_mesh[number].rotation.inverse() * TO_SUN;
+            prepared.faces[number].put_front(&mut self.front, [to_sun.x, to_sun.y, to_sun.z, 0.0]);
+            for triangle in &self.front {
+                let corners =
+                    part.mesh.triangles[*triangle as usize].map(|corner| self.corners[corner as usize]);
+                batch.push(corners, 0);
+                if batch.is_full() {
+                    layer.fill(simd, &batch.take());
                 }
             }
+            layer.fill(simd, &batch.take());
         }
     }
 
@@ -124,22 +125,29 @@ impl ShadowMap {
         [lanes(|i| u[i] - 0.5), lanes(|i| v[i] - 0.5), lanes(|i| nearness_m[i] + BIAS_M)]
     }
 
+    /// The cells of filters that begin at some texels.
+    #[inline(always)]
+    pub(super) fn cells([u, v, _]: &[Lanes; 3]) -> [u32; LANES] {
+        let inside = |i: f32| (i >= 1.0) & (i < (TEXELS - 3) as f32);
+        let cell = |i: f32| ((i - 1.0) * (1.0 / CELL as f32)).floor();
+        lanes(|i| {
+            let number = whole_f32(cell(v[i]) * CELLS as f32 + cell(u[i]));
+            if inside(u[i]) & inside(v[i]) { number } else { OUTSIDE }
+        })
+    }
+
     /// 1 in the sun, 0 in the shadow, smooth over three texels; points outside the map are in the sun.
     #[inline(always)]
-    pub(super) fn sunlit(&self, [u, v, nearness_m]: [f32; 3]) -> f32 {
-        let inside = |i: f32| i >= 1.0 && i < (TEXELS - 3) as f32;
-        if !inside(u) || !inside(v) {
-            return 1.0;
+    pub(super) fn sunlit(&self, [u, v, nearness_m]: [f32; 3], cell: u32) -> f32 {
+        let [least_m, greatest_m] = self.all.cells_m[cell as usize];
+        if nearness_m < greatest_m {
+            let lit = if nearness_m < least_m { 0.0 } else { self.filtered([u, v, nearness_m]) };
+            let last = (TEXELS - 1) as f32;
+            let to_border = u.min(last - u).min(v.min(last - v));
+            1.0 - (1.0 - lit) * (to_border / FADE_TEXELS).min(1.0)
+        } else {
+            1.0
         }
-        let (column, row) = (usize::from(u as u16), usize::from(v as u16));
-        let lit = match self.all.cells_m[(row - 1) / CELL * CELLS + (column - 1) / CELL] {
-            [_, greatest_m] if nearness_m >= greatest_m => return 1.0,
-            [least_m, _] if nearness_m < least_m => 0.0,
-            _ => self.filtered([u, v, nearness_m]),
-        };
-        let last = (TEXELS - 1) as f32;
-        let to_border = u.min(last - u).min(v.min(last - v));
-        1.0 - (1.0 - lit) * (to_border / FADE_TEXELS).min(1.0)
     }
 
     /// Four taps with a tent's weights along each axis are a bilinear filter three texels wide.
@@ -174,6 +182,17 @@ impl ShadowLayer {
         }
     }
 
+    #[inline(always)]
+    fn fill<S: Simd>(&mut self, simd: S, outlines: &Outlines) {
+        let nearest = S::as_mut_simd_f32s(self.nearness_m.all_mut()).0;
+        outlines.draw(
+            simd,
+            GRID,
+            #[inline(always)]
+            |i, _, nearness_m| nearest[i] = simd.max_f32s(nearest[i], nearness_m),
+        );
+    }
+
     /// Finds the least and the greatest of some cells.
     #[inline(always)]
     fn measure(&mut self, drawn: &[Range<usize>]) {
@@ -182,27 +201,33 @@ impl ShadowLayer {
         }
     }
 
+    /// Goes from right to left, for a cell reaches over the first texels of the next.
     #[inline(always)]
     fn measure_row(&mut self, row: usize, columns: Range<usize>) {
-        let mut least = [f32::INFINITY; TEXELS + CELL];
-        let mut greatest = [0.0f32; TEXELS + CELL];
-        let reached = columns.start * CELL..((columns.end + 1) * CELL).min(TEXELS);
-        for row in row * CELL..((row + 1) * CELL + TAPS - 1).min(TEXELS) {
-            let texels = &self.nearness_m.row(row)[reached.clone()];
-            let (least, greatest) = (&mut least[reached.clone()], &mut greatest[reached.clone()]);
-            for ((texel, least), greatest) in texels.iter().zip(least).zip(greatest) {
-                *least = if texel < least { *texel } else { *least };
-                *greatest = if texel > greatest { *texel } else { *greatest };
+        let mut beside = [f32::INFINITY, 0.0];
+        for column in (columns.start..(columns.end + 1).min(CELLS)).rev() {
+            let (mut least, mut greatest) = ([f32::INFINITY; CELL], [0.0; CELL]);
+            for row in row * CELL..((row + 1) * CELL + TAPS - 1).min(TEXELS) {
+                let texels = self.nearness_m.row(row)[column * CELL..].first_chunk::<CELL>();
+                let texels = texels.expect("a row consists of whole cells");
+                least = lanes(|i| smaller(texels[i], least[i]));
+                greatest = lanes(|i| larger(texels[i], greatest[i]));
             }
-        }
-        for column in columns {
-            let reached = column * CELL..(column + 1) * CELL + TAPS - 1;
-            let mut both = [f32::INFINITY, 0.0f32];
-            for (least, greatest) in least[reached.clone()].iter().zip(&greatest[reached]) {
-                both[0] = if *least < both[0] { *least } else { both[0] };
-                both[1] = if *greatest > both[1] { *greatest } else { both[1] };
+            let both = |values: Range<usize>| {
+                [
+                    least[values.clone()].iter().copied().fold(f32::INFINITY, smaller),
+                    greatest[values].iter().copied().fold(0.0, larger),
+                ]
+            };
+            let first = both(0..TAPS - 1);
+            if columns.contains(&column) {
+                let others = both(TAPS - 1..CELL);
+                self.cells_m[row * CELLS + column] = [
+                    smaller(smaller(first[0], others[0]), beside[0]),
+                    larger(larger(first[1], others[1]), beside[1]),
+                ];
             }
-            self.cells_m[row * CELLS + column] = both;
+            beside = first;
         }
     }
 }

@@ -3,7 +3,7 @@
 use pulp::Simd;
 use rapier3d::math::{Pose, Vector};
 
-use super::raster::{Grid, ProjectedTriangle, SampleRows};
+use super::raster::{Grid, Outlines, SampleRows, TriangleBatch};
 use crate::render::scene::camera::NEAR_M;
 use crate::render::scene::prepared::{NOTHING, Prepared};
 use crate::render::shading::SAMPLES;
@@ -35,50 +35,49 @@ pub(super) fn draw<S: Simd>(
     }
     let camera_from_world = camera.world_from_camera.inverse();
     let lens = Lens::new(camera);
-    let mut corners: Vec<[f32; 4]> = Vec::new();
+    let (mut corners, mut front): (Vec<[f32; 4]>, _) = (Vec::new(), Vec::new());
+    let mut batch = TriangleBatch::default();
     for (number, part) in prepared.scenery.parts.iter().enumerate() {
         let camera_from_mesh = camera_from_world * placed.world_from_mesh[number];
         if !lens.sees(prepared.bounds[number], camera_from_mesh) {
             continue;
         }
-        let camera_from_mesh = Affine::of(camera_from_mesh);
+        let map = Affine::of(camera_from_mesh);
         prepared.points[number].map_into(&mut corners, |block| {
-            let [x, y, z] = camera_from_mesh.map_lanes(block);
+            let [x, y, z] = map.map_lanes(block);
             let nearness: Lanes = lanes(|i| -1.0 / z[i]);
             let ([cx, cy], focal) = (lens.centre_px, lens.focal_px);
             let column = lanes(|i| cx + x[i] * focal * nearness[i]);
             let row = lanes(|i| cy - y[i] * focal * nearness[i]);
             [column, row, nearness, z]
         });
-        for (sheet, triangle) in prepared.sheets_of(number).iter().zip(&part.mesh.triangles) {
-            let corner = |i: usize| corners[triangle[i] as usize];
-            let ([au, av, an, az], [bu, bv, bn, bz], [cu, cv, cn, cz]) = (corner(0), corner(1), corner(2));
-            let visible = u32::from(az < -NEAR_M) + u32::from(bz < -NEAR_M) + u32::from(cz < -NEAR_M);
+        let sheets = prepared.sheets_of(number);
+        let eye_m = camera_from_mesh.inverse().translation;
+        prepared.faces[number].put_front(&mut front, [eye_m.x, eye_m.y, eye_m.z, 1.0]);
+        for number in &front {
+            let (sheet, triangle) = (sheets[*number as usize], part.mesh.triangles[*number as usize]);
+            let [a, b, c] = triangle.map(|corner| corners[corner as usize]);
+            let visible = [a, b, c].map(|[_, _, _, z]| u32::from(z < -NEAR_M)).into_iter().sum::<u32>();
             if visible == 3 {
-                fill(
-                    simd,
-                    samples,
-                    centres.as_deref_mut(),
-                    [[au, av, an], [bu, bv, bn], [cu, cv, cn]],
-                    *sheet,
-                );
+                batch.push([a, b, c].map(|[u, v, nearness, _]| [u, v, nearness]), sheet);
             } else if visible > 0 {
                 let position = |corner: u32| part.mesh.vertices[corner as usize].position_m;
                 let (clipped, count) =
-                    clip_near(triangle.map(|corner| Vector::from(camera_from_mesh.map(position(corner)))));
+                    clip_near(triangle.map(|corner| Vector::from(map.map(position(corner)))));
                 for i in 1..count - 1 {
                     let corners = [clipped[0], clipped[i], clipped[i + 1]];
-                    fill(
-                        simd,
-                        samples,
-                        centres.as_deref_mut(),
-                        corners.map(|p| lens.screen(p.to_array())),
-                        *sheet,
-                    );
+                    if batch.is_full() {
+                        fill(simd, samples, centres.as_deref_mut(), &batch.take());
+                    }
+                    batch.push(corners.map(|p| lens.screen(p.to_array())), sheet);
                 }
+            }
+            if batch.is_full() {
+                fill(simd, samples, centres.as_deref_mut(), &batch.take());
             }
         }
     }
+    fill(simd, samples, centres, &batch.take());
 }
 
 /// How a camera's frame comes onto the picture's samples.
@@ -117,14 +116,11 @@ fn fill<S: Simd>(
     simd: S,
     samples: &mut RenderTarget,
     centres: Option<&mut RenderTarget>,
-    corners: [[f32; 3]; 3],
-    sheet: u32,
+    outlines: &Outlines,
 ) {
-    if let Some(outline) = ProjectedTriangle::new(corners) {
-        samples.fill(simd, &outline, sheet);
-        if let Some(centres) = centres {
-            centres.fill(simd, &outline, sheet);
-        }
+    samples.fill(simd, outlines);
+    if let Some(centres) = centres {
+        centres.fill(simd, outlines);
     }
 }
 
@@ -138,11 +134,13 @@ impl RenderTarget {
     }
 
     /// Nearness of the samples of a row.
+    #[inline(always)]
     pub(super) fn nearness_1_m(&self, row: usize) -> &[f32] {
         self.nearness_1_m.row(row)
     }
 
     /// Numbers of the sheets that a row shows.
+    #[inline(always)]
     pub(super) fn sheets(&self, row: usize) -> &[u32] {
         self.sheet.row(row)
     }
@@ -153,21 +151,22 @@ impl RenderTarget {
         self.sheet.reset(grid, NOTHING);
     }
 
-    /// Puts a triangle into those samples that it is the nearest of.
+    /// Puts triangles, tagged with their sheets, into those samples that they are the nearest of.
     #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, outline: &ProjectedTriangle, sheet: u32) {
+    fn fill<S: Simd>(&mut self, simd: S, outlines: &Outlines) {
         let nearest = S::as_mut_simd_f32s(self.nearness_1_m.all_mut()).0;
         let owner = S::as_mut_simd_u32s(self.sheet.all_mut()).0;
-        let (sheet, nothing) = (simd.splat_u32s(sheet), simd.splat_u32s(0));
-        outline.draw(
+        let nothing = simd.splat_u32s(0);
+        outlines.draw(
             simd,
             self.grid,
             #[inline(always)]
-            |i, nearness| {
+            |i, sheet, nearness| {
                 let nearer = simd.greater_than_f32s(nearness, nearest[i]);
                 nearest[i] = simd.max_f32s(nearness, nearest[i]);
                 // A choice between both would be compiled to a store under a mask, which takes some processors 20 ns.
-                let change = simd.select_u32s(nearer, simd.xor_u32s(owner[i], sheet), nothing);
+                let change =
+                    simd.select_u32s(nearer, simd.xor_u32s(owner[i], simd.splat_u32s(sheet)), nothing);
                 owner[i] = simd.xor_u32s(owner[i], change);
             },
         );

@@ -12,6 +12,9 @@ use crate::render::shading::{OUTLINE, OUTLINE_DEPTH_STEP, SAMPLES, SKY, SRGB_STE
 
 const PER_PIXEL: usize = SAMPLES * SAMPLES;
 
+/// Numbers of a pixel's samples, and of those to the right and below.
+type Neighbours = [[u32; SAMPLES + 1]; SAMPLES + 1];
+
 /// A filled target, ready to be shaded.
 pub(super) struct View<'a> {
     pub prepared: &'a Prepared,
@@ -98,58 +101,48 @@ impl View<'_> {
     #[inline(always)]
     fn mixed(&self, row: &mut Row, [x, y]: [usize; 2], rows: [&[u32]; SAMPLES + 1]) {
         let sx = x * SAMPLES;
-        let at = |i: usize| [sx + i % SAMPLES, y * SAMPLES + i / SAMPLES];
-        let sheets = [rows[0][sx], rows[0][sx + 1], rows[1][sx], rows[1][sx + 1]];
-        let last = (sx + SAMPLES).min(self.target.width() - 1);
-        let share = if self.one_thing([&rows[0][sx..=last], &rows[1][sx..=last], &rows[2][sx..=last]]) {
-            1.0
-        } else {
-            let edges =
-                self.outlines(at(0)) + self.outlines(at(1)) + self.outlines(at(2)) + self.outlines(at(3));
-            1.0 - OUTLINE * (edges as f32 / (2 * SAMPLES) as f32).min(1.0)
-        };
+        // At the border of the picture the last samples are their own neighbours.
+        let columns = [sx, sx + 1, (sx + SAMPLES).min(self.target.width() - 1)];
+        let seen = rows.map(|row| columns.map(|column| row[column]));
+        let ids = seen.map(|row| row.map(|sheet| self.prepared.id(sheet)));
+        let one_thing = ids.as_flattened().iter().all(|id| *id == ids[0][0]);
+        let edges = if one_thing { 0 } else { self.outlines(y, columns, &seen, &ids) };
+        let share = 1.0 - OUTLINE * (edges as f32 / (2 * SAMPLES) as f32).min(1.0);
+        let sheets = [seen[0][0], seen[0][1], seen[1][0], seen[1][1]];
         for (i, sheet) in sheets.iter().enumerate() {
             if !sheets[..i].contains(sheet) {
                 let covered = sheets[i..].iter().filter(|other| *other == sheet).count();
-                self.show(row, x..x + 1, at(i), *sheet, share * covered as f32 / PER_PIXEL as f32);
+                let sample = [sx + i % SAMPLES, y * SAMPLES + i / SAMPLES];
+                self.show(row, x..x + 1, sample, *sheet, share * covered as f32 / PER_PIXEL as f32);
             }
         }
     }
 
-    /// Whether all samples show one thing, so that there is no outline.
+    /// How often a sample of a pixel in row `y` and its neighbour to the right or below show different things at different depths.
     #[inline(always)]
-    fn one_thing(&self, rows: [&[u32]; SAMPLES + 1]) -> bool {
-        let first = rows[0][0];
-        let id = self.prepared.id(first);
-        let same = |other: &u32| *other == first || self.prepared.id(*other) == id;
-        rows[0].iter().all(same) && rows[1].iter().all(same) && rows[2].iter().all(same)
-    }
-
-    /// How many of the neighbours to the right and below belong to another thing at another depth.
-    #[inline(always)]
-    fn outlines(&self, [sx, sy]: [usize; 2]) -> u32 {
-        if sx + 1 >= self.target.width() || sy + 1 >= self.target.height() {
-            return 0;
+    fn outlines(&self, y: usize, columns: [usize; 3], seen: &Neighbours, ids: &Neighbours) -> u32 {
+        let last = self.target.height() - 1;
+        let nearness_1_m = |[row, column]: [usize; 2]| {
+            self.target.nearness_1_m((y * SAMPLES + row).min(last))[columns[column]]
+        };
+        let differ = |[r, c]: [usize; 2], [other_r, other_c]: [usize; 2]| {
+            let two_things = ids[r][c] != ids[other_r][other_c]
+                && seen[r][c] != NOTHING
+                && seen[other_r][other_c] != NOTHING;
+            let far_apart = || {
+                let (a, b) = (nearness_1_m([r, c]), nearness_1_m([other_r, other_c]));
+                (a - b).abs() > OUTLINE_DEPTH_STEP * a.max(b)
+            };
+            two_things && far_apart()
+        };
+        let mut edges = 0;
+        // Samples in the last row or column of the picture have no outline.
+        for r in 0..SAMPLES.min(last - y * SAMPLES) {
+            for c in 0..columns[2] - columns[0] {
+                edges += u32::from(differ([r, c], [r, c + 1])) + u32::from(differ([r, c], [r + 1, c]));
+            }
         }
-        let here = self.sample([sx, sy]);
-        u32::from(self.differ(here, self.sample([sx + 1, sy])))
-            + u32::from(self.differ(here, self.sample([sx, sy + 1])))
-    }
-
-    /// Sheet and nearness that a sample shows.
-    #[inline(always)]
-    fn sample(&self, [sx, sy]: [usize; 2]) -> (u32, f32) {
-        (self.target.sheets(sy)[sx], self.target.nearness_1_m(sy)[sx])
-    }
-
-    /// Whether two samples show different things at different depths.
-    #[inline(always)]
-    fn differ(&self, (a, near_a): (u32, f32), (b, near_b): (u32, f32)) -> bool {
-        a != b
-            && a != NOTHING
-            && b != NOTHING
-            && (near_a - near_b).abs() > OUTLINE_DEPTH_STEP * near_a.max(near_b)
-            && self.prepared.id(a) != self.prepared.id(b)
+        edges
     }
 }
 

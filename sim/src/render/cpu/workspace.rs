@@ -1,7 +1,7 @@
 //! What drawing needs and no picture keeps: megabytes, of which a renderer that waits for its next picture needs none. So the renderers
 //! of a process share them, and no more of them draw at the same time than there are processor cores.
 
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Condvar, LazyLock, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
 use super::{Canvas, LitState};
@@ -88,8 +88,11 @@ fn lock() -> MutexGuard<'static, Shared> {
     SHARED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Asked once: the system reads files to tell.
 fn processors() -> usize {
-    thread::available_parallelism().map_or(1, usize::from)
+    static PROCESSORS: LazyLock<usize> =
+        LazyLock::new(|| thread::available_parallelism().map_or(1, usize::from));
+    *PROCESSORS
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 pub mod bend;
 pub mod camera;
+pub mod faces;
 pub mod mesh;
 pub mod prepared;
 

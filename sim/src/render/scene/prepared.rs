@@ -3,6 +3,7 @@
 use rapier3d::math::Vector;
 
 use super::bend::Bend;
+use super::faces::Faces;
 use crate::render::shading::lanes::Points;
 use crate::render::shading::linear;
 use crate::render::{Part, Pattern, Scenery};
@@ -14,6 +15,8 @@ pub struct Prepared {
     pub scenery: Scenery,
     /// Corners of each part's triangles.
     pub points: Vec<Points>,
+    /// Planes of each part's triangles.
+    pub faces: Vec<Faces>,
     pub sheets: Vec<Sheet>,
     /// The number of each triangle's sheet, with triangles counted part by part.
     pub sheet_of: Vec<u32>,
@@ -49,6 +52,7 @@ impl Prepared {
         let id = |sheet: &Sheet| scenery.parts[sheet.part as usize].id;
         Prepared {
             points: scenery.parts.iter().map(points).collect(),
+            faces: scenery.parts.iter().map(|part| Faces::of(&part.mesh)).collect(),
             ids: sheets.iter().map(id).collect(),
             sheets,
             sheet_of,

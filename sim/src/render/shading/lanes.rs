@@ -10,8 +10,8 @@ pub type Lanes<const N: usize = LANES> = [f32; N];
 
 /// Numbers of a block. A loop, for compilers make few instructions of it.
 #[inline(always)]
-pub fn lanes<const N: usize>(each: impl Fn(usize) -> f32) -> Lanes<N> {
-    let mut numbers = [0.0; N];
+pub fn lanes<T: Copy + Default, const N: usize>(each: impl Fn(usize) -> T) -> [T; N] {
+    let mut numbers = [T::default(); N];
     for (i, number) in numbers.iter_mut().enumerate() {
         *number = each(i);
     }

@@ -1,0 +1,48 @@
+//! Which triangles of a mesh turn away, told by their planes and without their corners.
+
+use crate::render::TriangleMesh;
+use crate::render::shading::lanes::{LANES, Lanes, lanes};
+
+/// The planes of a mesh's triangles, in its frame and in whole blocks: normals of length 1, and how far along them the planes lie.
+pub struct Faces {
+    planes_m: Vec<[Lanes; 4]>,
+    count: usize,
+}
+
+/// A face that turns away by less is counted among those that do not: rounding may have it drawn.
+const GRAZING: f32 = 1e-4;
+
+impl Faces {
+    pub fn of(mesh: &TriangleMesh) -> Faces {
+        let mut planes_m = vec![[[0.0; LANES]; 4]; mesh.triangles.len().div_ceil(LANES)];
+        for (number, corners) in mesh.triangles.iter().enumerate() {
+            let [a, b, c] = corners.map(|corner| mesh.vertices[corner as usize].position_m.as_dvec3());
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            for (lanes, value) in
+                planes_m[number / LANES].iter_mut().zip([normal.x, normal.y, normal.z, normal.dot(a)])
+            {
+                lanes[number % LANES] = value as f32;
+            }
+        }
+        Faces { planes_m, count: mesh.triangles.len() }
+    }
+
+    /// Puts the numbers of the triangles that may be seen, in their order, from a point (x, y, z, 1) of the mesh's frame, or against a
+    /// direction (x, y, z, 0).
+    #[inline(always)]
+    pub fn put_front(&self, front: &mut Vec<u32>, [x, y, z, w]: [f32; 4]) {
+        front.resize(self.planes_m.len() * LANES, 0);
+        let mut found = 0;
+        for ([a, b, c, d], block) in self.planes_m.iter().zip(0..) {
+            let side: Lanes = lanes(|i| a[i] * x + b[i] * y + c[i] * z - d[i] * w);
+            for (i, side) in (0..).zip(side) {
+                front[found] = block * LANES as u32 + i;
+                found += usize::from(side > -GRAZING);
+            }
+        }
+        front.truncate(found);
+        while front.last().is_some_and(|last| *last as usize >= self.count) {
+            front.pop();
+        }
+    }
+}
