@@ -25,6 +25,7 @@ from .contract.start import Briefing, TaskList
 from .episode import Episode
 from .errors import EpisodeEnded, Refused, SimulatorFailed, TandemError, Unreachable
 from .evaluation import Evaluation, collect, evaluate, report, tasks
+from .policy_server import PolicyServer, serve_policy
 from .program import main
 from .recording import Picture, RecordedCall, Recording
 from .server import Server, serve
@@ -46,6 +47,7 @@ __all__ = [
     "Observation",
     "Picture",
     "PixelRegion",
+    "PolicyServer",
     "ReachReply",
     "RecordedCall",
     "Recording",
@@ -69,5 +71,6 @@ __all__ = [
     "main",
     "report",
     "serve",
+    "serve_policy",
     "tasks",
 ]

@@ -11,9 +11,10 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).parents[1]
+PAGES = [PACKAGE / "../../docs/src/learned-policies.md", PACKAGE / "../../docs/src/python.md", PACKAGE / "README.md"]
 
 
-@pytest.mark.parametrize("page", [PACKAGE / "../../docs/src/python.md", PACKAGE / "README.md"], ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_blocks_run(page: Path, tmp_path: Path) -> None:
     blocks = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
     assert blocks

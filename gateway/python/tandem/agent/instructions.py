@@ -67,8 +67,7 @@ def _budget(budget: dict[str, Any]) -> str:
     left_s = budget.get("wall_clock_left_s")
     clock = f"{left_s:.0f} seconds to think in all" if left_s is not None else "as much time to think as you like"
     return (
-        f"Budget: {budget['steps_left']} control steps of 20 ms, at most {budget['steps_per_command']} in one command; "
-        f"{clock}."
+        f"Budget: {budget['steps_left']} control steps of 20 ms, at most {budget['steps_per_command']} in one command; {clock}."
     )
 
 

@@ -78,10 +78,12 @@ class ExportSettings:
         return tuple(dict.fromkeys(chosen))
 
 
-def library(name: str) -> Any:
-    """A library of the extra, loaded when it is needed: the rest of the package does without."""
+def library(name: str, what: str = "data sets are written by pyarrow and PyAV", extra: str = "lerobot") -> Any:
+    """A library of an extra, loaded when it is needed: the rest of the package does without.
+
+    what: What it is for, in the words of the error.
+    """
     try:
         return import_module(name)
     except ImportError as error:
-        text = f"data sets are written by pyarrow and PyAV, and there is no {name}; pip install 'tandem-sim[lerobot]'"
-        raise TandemError(text) from error
+        raise TandemError(f"{what}, and there is no {name}; pip install 'tandem-sim[{extra}]'") from error

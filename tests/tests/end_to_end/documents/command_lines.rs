@@ -86,8 +86,8 @@ fn check_command(words: &[&str]) -> Result<(), String> {
             true => Ok(()),
             false => check_tandem(args),
         },
-        ["python" | "python3", "-m", "tandem.agent", ..] => {
-            expect_file("gateway/python/tandem/agent/__main__.py")
+        ["python" | "python3", "-m", module, ..] if module.starts_with("tandem.") => {
+            expect_file(&format!("gateway/python/{}/__main__.py", module.replace('.', "/")))
         }
         ["python" | "python3", file, ..] => expect_file(file),
         [program, ..] if OTHERS.contains(program) => Ok(()),
@@ -270,6 +270,7 @@ fn what_would_not_work_is_refused() {
         "cargo build --release --features onyx",
         "podman run tandem evaluates",
         "pip install -r tests/peers/nothing.txt",
+        "python -m tandem.baseline train",
         "rm -r runs",
     ] {
         assert!(check(script).is_err(), "{script}");

@@ -1,0 +1,37 @@
+"""Policies that learn a task from demonstrations on a laptop, in plain PyTorch: `python -m tandem.baselines`.
+
+    from tandem.baselines import TrainingSettings, load, train
+
+    train("data/pouring", "runs/pouring/policy", TrainingSettings(steps=3000))
+    with load("runs/pouring/policy").serve() as server:
+        print(server.url)
+
+Two kinds, both of which look at each robot's picture through an eye of their own, and tell a second of actions at once: `chunk`
+tells one, `flow` draws one of those that demonstrations had (flow matching). They need `pip install 'tandem-sim[baselines]'`:
+PyTorch, pyarrow and PyAV.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from .settings import PolicyKind, Scope, Sharing, TrainingSettings
+
+if TYPE_CHECKING:
+    from .policy import Baseline, load
+    from .training import train
+
+__all__ = ["Baseline", "PolicyKind", "Scope", "Sharing", "TrainingSettings", "load", "train"]
+
+
+def __getattr__(name: str) -> object:
+    """What needs PyTorch is loaded when it is asked for."""
+    if name in ("Baseline", "load"):
+        from . import policy
+
+        return getattr(policy, name)
+    if name == "train":
+        from .training import train
+
+        return train
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,175 @@
+# pyright: basic, reportMissingImports=false
+# PyTorch is an extra, which is not installed everywhere where types are checked, and its types are partly unknown.
+"""One network that learns: its samples, scales, steps and averaged weights."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from .data import BASE, CLOCK_S, JOINTS, STATES, Demonstrations
+from .networks import PolicyNetwork
+from .settings import TrainingSettings
+from .views import View
+
+WARM_UP = 100
+"""Steps until the learning rate is at its highest."""
+
+LARGEST_GRADIENT = 10.0
+
+LEAST_DEVIATIONS = {"states": 0.05, "chunks": 0.05, "objects": 0.02}
+"""What hardly moves is not blown up when it is normalised."""
+
+BASE_NOISE = (0.03, 0.03, 0.03, 0.01)
+"""Deviations of noise on the base command that is shown, in its own units."""
+
+
+def scaled(values: Tensor, scale: Sequence[Tensor]) -> Tensor:
+    mean, deviation = scale
+    return (values - mean) / deviation
+
+
+def unscaled(values: Tensor, scale: Sequence[Tensor]) -> Tensor:
+    mean, deviation = scale
+    return values * deviation + mean
+
+
+class Learner:
+    """A network, and the moments that it learns from, seen as each of its views has them."""
+
+    def __init__(
+        self, demonstrations: Demonstrations, views: tuple[View, ...], settings: TrainingSettings, number: int, device: str
+    ) -> None:
+        self.settings, self.views, self._device = settings, views, device
+        self._seed = settings.seed + 7919 * number
+        self._pictures = torch.from_numpy(demonstrations.pictures)
+        moments = len(demonstrations)
+        places_m = demonstrations.objects_in_pelvis_m.reshape(moments, len(demonstrations.robots), -1)
+        self._values = {
+            "states": torch.from_numpy(demonstrations.states),
+            "chunks": torch.from_numpy(np.ascontiguousarray(demonstrations.chunks)),
+            "objects": torch.from_numpy(places_m),
+        }
+        self._learned = torch.from_numpy(np.flatnonzero(~demonstrations.validated))
+        self._validated = torch.from_numpy(np.flatnonzero(demonstrations.validated))
+        self._inputs = torch.tensor([view.inputs for view in views])
+        self._outputs = torch.tensor([view.outputs for view in views])
+        self.scales = {name: self._scale(name) for name in self._values}
+        noise = [settings.joint_noise_rad] * JOINTS + list(BASE_NOISE) + [settings.clock_noise_s / CLOCK_S]
+        self._noise = torch.tensor(noise)
+        assert len(noise) == JOINTS + BASE + 1 == STATES
+        torch.manual_seed(self._seed)
+        objects = len(demonstrations.objects)
+        self.network = PolicyNetwork(settings, len(views[0].inputs), len(views[0].outputs), objects).to(device)
+        self.averaged = {name: value.clone() for name, value in self.network.state_dict().items()}
+        self._optimizer = torch.optim.AdamW(self.network.parameters(), weight_decay=settings.weight_decay)
+
+    def step(self, step: int) -> tuple[float, float]:
+        """One step of the optimiser. Returns what the actions and the second task cost."""
+        settings = self.settings
+        # Each step has a generator of its own, so that a run goes on after a checkpoint as it would have without.
+        generator = torch.Generator().manual_seed(self._seed * 1_000_003 + step)
+        samples = len(self._learned) * len(self.views)
+        chosen = torch.randint(samples, (settings.batch,), generator=generator)
+        moments, views = self._learned[chosen // len(self.views)], chosen % len(self.views)
+        for group in self._optimizer.param_groups:
+            group["lr"] = settings.learning_rate * self._rate(step)
+        self.network.train()
+        actions, places = self._losses(moments, views, generator, noisy=True)
+        self._optimizer.zero_grad(set_to_none=True)
+        (actions + settings.auxiliary * places).backward()
+        torch.nn.utils.clip_grad_norm_(self.network.parameters(), LARGEST_GRADIENT)
+        self._optimizer.step()
+        averaging = min(settings.averaging, (step + 1) / (step + 10))
+        with torch.no_grad():
+            for name, value in self.network.state_dict().items():
+                if value.is_floating_point():
+                    self.averaged[name].lerp_(value, 1 - averaging)
+        return actions.item(), places.item()
+
+    @torch.no_grad()
+    def validate(self) -> tuple[float, float]:
+        """Mean errors of the averaged weights on the episodes for validation: of actions, in their own units, and of objects'
+        coordinates in metres. NaN where there are none."""
+        own = {name: value.clone() for name, value in self.network.state_dict().items()}
+        self.network.load_state_dict(self.averaged)
+        self.network.eval()
+        errors = torch.zeros(2)
+        for view in range(len(self.views)):
+            for moments in self._validated.split(64):
+                views = torch.full_like(moments, view)
+                known, places = self._look(moments, views, None)
+                told = unscaled(self.network.act(known), self._scale_of("chunks"))
+                errors[0] += (told - self._of_outputs(moments, views)).abs().mean((1, 2, 3)).sum().cpu()
+                found = unscaled(places, self._scale_of("objects"))
+                errors[1] += (found - self._of_inputs("objects", moments, views)).abs().mean((1, 2)).sum().cpu()
+        self.network.load_state_dict(own)
+        count = len(self._validated) * len(self.views)
+        return (errors[0].item() / count, errors[1].item() / count) if count else (math.nan, math.nan)
+
+    def checkpoint(self) -> dict[str, Any]:
+        return {
+            "network": self.network.state_dict(),
+            "averaged": self.averaged,
+            "optimizer": self._optimizer.state_dict(),
+        }
+
+    def restore(self, checkpoint: dict[str, Any]) -> None:
+        self.network.load_state_dict(checkpoint["network"])
+        self.averaged = checkpoint["averaged"]
+        self._optimizer.load_state_dict(checkpoint["optimizer"])
+
+    def trained(self) -> dict[str, Any]:
+        """What plays."""
+        return {
+            "views": [[list(view.inputs), list(view.outputs)] for view in self.views],
+            "weights": {name: value.cpu() for name, value in self.averaged.items()},
+            "scales": self.scales,
+        }
+
+    def _losses(self, moments: Tensor, views: Tensor, generator: torch.Generator, noisy: bool) -> tuple[Tensor, Tensor]:
+        known, places = self._look(moments, views, generator if noisy else None)
+        chunks = scaled(self._of_outputs(moments, views), self._scale_of("chunks"))
+        objects = scaled(self._of_inputs("objects", moments, views), self._scale_of("objects"))
+        return self.network.loss(known, chunks, generator), functional.l1_loss(places, objects)
+
+    def _look(self, moments: Tensor, views: Tensor, generator: torch.Generator | None) -> tuple[Tensor, Tensor]:
+        pictures = self._pictures[moments[:, None], self._inputs[views]].permute(0, 1, 4, 2, 3).float().div_(255)
+        states = self._values["states"][moments[:, None], self._inputs[views]]
+        if generator is not None:
+            # Colour, brightness and contrast vary; no shifts, since a place in the picture is what is learned.
+            each = (*pictures.shape[:2], 1, 1, 1)
+            colours = 1 + 0.2 * (torch.rand((*pictures.shape[:3], 1, 1), generator=generator) - 0.5)
+            gain = colours * (1 + 0.3 * (torch.rand(each, generator=generator) - 0.5))
+            pictures = (pictures * gain + 0.1 * (torch.rand(each, generator=generator) - 0.5)).clamp_(0, 1)
+            states = states + self._noise * torch.randn(states.shape, generator=generator)
+        states = scaled(states, self.scales["states"])
+        return self.network.look(pictures.to(self._device), states.to(self._device))
+
+    def _of_inputs(self, name: str, moments: Tensor, views: Tensor) -> Tensor:
+        return self._values[name][moments[:, None], self._inputs[views]].to(self._device)
+
+    def _of_outputs(self, moments: Tensor, views: Tensor) -> Tensor:
+        """Batch by rows by outputs by 35."""
+        return self._values["chunks"][moments[:, None], :, self._outputs[views]].transpose(1, 2).to(self._device)
+
+    def _scale_of(self, name: str) -> list[Tensor]:
+        return [part.to(self._device) for part in self.scales[name]]
+
+    def _scale(self, name: str) -> tuple[Tensor, Tensor]:
+        """Mean and deviation over what is learned from, over all views together: robots by columns."""
+        robots = self._outputs if name == "chunks" else self._inputs
+        values = self._values[name][self._learned]
+        # Robots stand before the last axis.
+        seen = torch.cat([values[..., list(chosen), :] for chosen in robots.tolist()])
+        axes = tuple(range(seen.dim() - 2))
+        return seen.mean(axes), seen.std(axes).clamp(min=LEAST_DEVIATIONS[name])
+
+    def _rate(self, step: int) -> float:
+        return min(1.0, (step + 1) / WARM_UP) * (0.5 * (1 + math.cos(math.pi * step / self.settings.steps)) + 0.01)

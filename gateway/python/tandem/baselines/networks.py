@@ -1,0 +1,125 @@
+# pyright: basic, reportMissingImports=false
+# PyTorch is an extra, which is not installed everywhere where types are checked, and its types are partly unknown.
+"""From pictures and states to chunks of actions."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from .data import ACTIONS, STATES
+from .settings import TrainingSettings
+
+FLOW_STEPS = 10
+"""Steps of Euler's method from noise to actions."""
+
+
+class Eye(nn.Module):
+    """A picture, batch by 3 by height by width in 0..1, to features, batch by `width`.
+
+    Keypoints by spatial softmax (Levine et al. 2016): of each of k maps, where its softmax has its mean; and a coarse look at
+    all maps. A pixel of a small picture is 6 mm of a table: no layer but the first takes pixels together, and nothing is
+    normalised over pictures.
+    """
+
+    def __init__(self, keypoints: int) -> None:
+        super().__init__()
+        self.convolutions = nn.Sequential(
+            nn.Conv2d(3, 24, 8, stride=4, padding=2),
+            nn.ReLU(),
+            nn.Conv2d(24, 32, 3, padding=1),
+            nn.ReLU(),
+            nn.Conv2d(32, 32, 3, padding=2, dilation=2),
+            nn.ReLU(),
+            nn.Conv2d(32, keypoints, 1),
+        )
+        for name, parameter in self.convolutions.named_parameters():
+            if name.endswith("weight"):
+                nn.init.kaiming_normal_(parameter, nonlinearity="relu")
+            else:
+                nn.init.zeros_(parameter)
+        self.convolutions.to(memory_format=torch.channels_last)
+        self.sharpness = nn.Parameter(torch.ones(keypoints))
+        self.coarse = nn.Sequential(nn.AdaptiveAvgPool2d((3, 4)), nn.Flatten(), nn.Linear(keypoints * 12, 64), nn.ReLU())
+        self.width = 2 * keypoints + 64
+
+    def forward(self, pictures: Tensor) -> Tensor:
+        channels_last = (2 * pictures - 1).contiguous(memory_format=torch.channels_last)
+        maps = self.convolutions(channels_last).contiguous()
+        height, width = maps.shape[-2:]
+        weights = functional.softmax((maps * self.sharpness[:, None, None]).flatten(2), dim=-1).view_as(maps)
+        x = (weights.sum(2) * torch.linspace(-1, 1, width, device=maps.device)).sum(-1)
+        y = (weights.sum(3) * torch.linspace(-1, 1, height, device=maps.device)).sum(-1)
+        return torch.cat([x, y, self.coarse(maps)], dim=1)
+
+
+class PolicyNetwork(nn.Module):
+    """What `inputs` robots see and sense, to chunks of what `outputs` robots are told. All numbers are normalised."""
+
+    def __init__(self, settings: TrainingSettings, inputs: int, outputs: int, objects: int) -> None:
+        super().__init__()
+        self.chunk_shape = (settings.chunk_rows, outputs, ACTIONS)
+        self.is_flow = settings.kind == "flow"
+        hidden, target = settings.hidden, math.prod(self.chunk_shape)
+        eyes = [Eye(settings.keypoints) for _ in range(inputs)]
+        self.eyes, seen = nn.ModuleList(eyes), eyes[0].width
+        self.objects = nn.ModuleList(
+            nn.Sequential(nn.Linear(seen, 128), nn.ReLU(), nn.Linear(128, 3 * objects)) for _ in range(inputs)
+        )
+        self.state = nn.Sequential(nn.Linear(STATES * inputs, 128), nn.ReLU())
+        known = inputs * (seen + 3 * objects) + 128
+        self.trunk = nn.Sequential(nn.Linear(known, hidden), nn.ReLU(), nn.Linear(hidden, hidden), nn.ReLU())
+        self.head = Flow(hidden, target) if self.is_flow else nn.Linear(hidden, target)
+
+    def look(self, pictures: Tensor, states: Tensor) -> tuple[Tensor, Tensor]:
+        """pictures: batch by inputs by 3 by height by width; states: batch by inputs by `STATES`. Returns what the head needs,
+        batch by `hidden`, and where the objects are, batch by inputs by 3 times objects."""
+        seen = [eye(pictures[:, number]) for number, eye in enumerate(self.eyes)]
+        places = [tell(features) for tell, features in zip(self.objects, seen, strict=True)]
+        known = self.trunk(torch.cat([*seen, *places, self.state(states.flatten(1))], dim=1))
+        return known, torch.stack(places, dim=1)
+
+    def loss(self, known: Tensor, chunks: Tensor, generator: torch.Generator) -> Tensor:
+        """How far what it tells is from `chunks`, batch by rows by outputs by 35."""
+        target = chunks.flatten(1)
+        if not isinstance(self.head, Flow):
+            return functional.l1_loss(self.head(known), target)
+        # Flow matching (Lipman et al. 2023) on straight ways, x = (1 - t) noise + t chunk. The head tells the chunk, not the
+        # velocity chunk - noise, for which all of the noise would have to pass through its hidden layers.
+        noise = torch.randn(target.shape, generator=generator).to(target.device)
+        time = torch.rand(len(target), 1, generator=generator).to(target.device)
+        return functional.mse_loss(self.head(known, (1 - time) * noise + time * target, time), target)
+
+    def act(self, known: Tensor, noise: Tensor | None = None) -> Tensor:
+        """What the robots are told, batch by rows by outputs by 35. `noise`, batch by the product of these, is what a flow
+        begins from; None: zeros, the likeliest."""
+        if not isinstance(self.head, Flow):
+            return self.head(known).view(-1, *self.chunk_shape)
+        chunk = known.new_zeros(len(known), math.prod(self.chunk_shape)) if noise is None else noise
+        for step in range(FLOW_STEPS):
+            time = known.new_full((len(known), 1), step / FLOW_STEPS)
+            # The velocity is (chunk told - x) / (1 - t), of which a step takes 1 / FLOW_STEPS.
+            chunk = chunk + (self.head(known, chunk, time) - chunk) / (FLOW_STEPS - step)
+        return chunk.view(-1, *self.chunk_shape)
+
+
+class Flow(nn.Module):
+    """From a point on the way between noise and a chunk of actions, at a time of 0..1, to the chunk."""
+
+    def __init__(self, hidden: int, target: int) -> None:
+        super().__init__()
+        self.frequencies: Tensor
+        self.register_buffer("frequencies", math.pi * 2.0 ** torch.arange(4))
+        self.begin = nn.Linear(hidden + target + 8, hidden)
+        self.middle = nn.ModuleList(nn.Linear(hidden, hidden) for _ in range(2))
+        self.end = nn.Linear(hidden, target)
+
+    def forward(self, known: Tensor, chunk: Tensor, time: Tensor) -> Tensor:
+        angles = time * self.frequencies
+        flow = functional.silu(self.begin(torch.cat([known, chunk, angles.sin(), angles.cos()], dim=1)))
+        for layer in self.middle:
+            flow = flow + functional.silu(layer(flow))
+        return self.end(flow)

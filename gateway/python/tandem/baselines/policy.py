@@ -1,0 +1,95 @@
+# pyright: basic, reportMissingImports=false
+# PyTorch is an extra, which is not installed everywhere where types are checked, and its types are partly unknown.
+"""A trained policy, as it plays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from ..errors import TandemError
+from ..policy_server import Infer, PolicyServer, serve_policy
+from .data import CLOCK_S
+from .learner import scaled, unscaled
+from .maps import key
+from .networks import PolicyNetwork
+from .settings import TrainingSettings
+from .training import POLICY_FILE
+
+CONTROL_HZ = 50
+
+
+def load(folder: str | PathLike[str]) -> Baseline:
+    """Loads what `train` wrote."""
+    path = Path(folder) / POLICY_FILE
+    try:
+        return Baseline(torch.load(path, weights_only=True))
+    except FileNotFoundError:
+        raise TandemError(f"there is no {path}; give the folder of a training run that is whole") from None
+
+
+class Baseline:
+    """A policy that was trained on demonstrations of a task."""
+
+    def __init__(self, trained: dict[str, Any]) -> None:
+        about = trained["about"]
+        self.settings = TrainingSettings(**about["settings"])
+        self.task: str = about["task"]
+        self.robots: tuple[str, ...] = tuple(about["robots"])
+        objects = len(about["objects"])
+        self._answers: dict[tuple[int, ...], tuple[PolicyNetwork, tuple[int, ...], dict[str, Any]]] = {}
+        for one in trained["networks"]:
+            views = [(tuple(inputs), tuple(outputs)) for inputs, outputs in one["views"]]
+            network = PolicyNetwork(self.settings, len(views[0][0]), len(views[0][1]), objects)
+            network.load_state_dict(one["weights"])
+            network.eval()
+            for inputs, outputs in views:
+                self._answers[outputs] = (network, inputs, one["scales"])
+
+    def serve(self, host: str = "127.0.0.1", port: int = 0) -> PolicyServer:
+        """Begins to serve it, and returns at once."""
+        if self.settings.scope == "global":
+            return serve_policy(self._infer_for(range(len(self.robots))), host=host, port=port)
+        own = {robot: self._infer_for([number]) for number, robot in enumerate(self.robots)}
+        return serve_policy(own, host=host, port=port)
+
+    def act(self, pictures: NDArray[np.uint8], states: NDArray[np.float32], robots: Sequence[int]) -> NDArray[np.float32]:
+        """What robots are told.
+
+        pictures: Of each of `robots`, height by width by 3.
+        states: Of each of them, 43 joint angles, the base command in force and the time since the episode began over 20 s.
+        robots: Whose they are, as indices. Returns rows by robots by 35.
+        """
+        chunks = np.empty((self.settings.chunk_rows, len(robots), 35), np.float32)
+        place = {robot: number for number, robot in enumerate(robots)}
+        seen = torch.from_numpy(pictures).permute(0, 3, 1, 2).float().div(255)
+        sensed = torch.from_numpy(states)
+        for outputs, (network, inputs, scales) in self._answers.items():
+            if not set(outputs) <= place.keys():
+                continue
+            shown = [place[robot] for robot in inputs]
+            with torch.inference_mode():
+                known, _ = network.look(seen[None, shown], scaled(sensed[None, shown], scales["states"]))
+                told = unscaled(network.act(known), scales["chunks"])[0].numpy()
+            for number, robot in enumerate(outputs):
+                chunks[:, place[robot]] = told[:, number]
+        return chunks
+
+    def _infer_for(self, robots: Sequence[int]) -> Infer:
+        names, scope = [self.robots[robot] for robot in robots], self.settings.scope
+
+        def infer(observation: dict[str, Any], memory: dict[str, Any]) -> dict[str, NDArray[np.float32]]:
+            pictures = np.stack([observation[key("image", name, scope)] for name in names])
+            clocks = [observation[key("moment", name, scope)][1:2] / (CONTROL_HZ * CLOCK_S) for name in names]
+            sensed = [observation[key("state", name, scope)] for name in names]
+            states = np.concatenate([np.stack(sensed), np.stack(clocks)], axis=1, dtype=np.float32)
+            chunks = self.act(pictures, states, robots)
+            return {key("actions", name, scope): chunks[:, number] for number, name in enumerate(names)}
+
+        return infer

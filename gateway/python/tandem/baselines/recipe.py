@@ -1,0 +1,95 @@
+"""All of it for one task, on a laptop: demonstrations, data set, policy, evaluation, floor and report."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+from ..errors import TandemError
+from .maps import MAP_FILE
+from .settings import TrainingSettings
+
+DISTURB = 1.0
+"""How much demonstrations are disturbed: a policy needs to have seen how it goes on from beside the way."""
+
+SIZE = "160x120"
+RATE_HZ = 10
+FLOOR_SEED = 2100
+
+WALKING = ("trash_collection", "cart_service", "co_carry", "table_align", "move_house", "big_table")
+"""Tasks in which robots walk, whose policies are asked each 0.2 s; the others' after half a second."""
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What is made and played."""
+
+    demonstrations: str = "2000-2099"
+    """Seeds of the demonstrations, of which those are kept that succeed."""
+
+    seeds: str = "1-100"
+    """Seeds of the evaluation."""
+
+    jobs: int | None = None
+    """Worlds side by side, and threads of PyTorch. None: the machine's cores."""
+
+
+def run_recipe(
+    task: str,
+    out: str | PathLike[str],
+    settings: TrainingSettings,
+    recipe: Recipe | None = None,
+    *,
+    tell: Callable[[str], None] = print,
+) -> Path:
+    """Makes everything that is not there yet, command by command, and returns the report. What was interrupted goes on.
+
+    task: The task's id.
+    out: Folder for all of it.
+    settings: How the policy is trained.
+    recipe: How much.
+    tell: Called with each command, and with what training says.
+    """
+    from .policy import load
+    from .training import train
+
+    recipe, folder = recipe or Recipe(), Path(out)
+    jobs = recipe.jobs or len(os.sched_getaffinity(0))
+    demonstrations, data, policy = folder / "demonstrations", folder / "data", folder / settings.kind
+    benchmark = ["--protocol", "benchmark", "--tasks", task]
+    side_by_side = ["--jobs", str(jobs)]
+
+    def tandem(*arguments: str | Path) -> None:
+        words = [str(argument) for argument in arguments]
+        tell(shlex.join(["tandem", *words]))
+        status = subprocess.run([sys.executable, "-m", "tandem", *words], check=False).returncode
+        if status != 0:
+            raise TandemError(f"tandem {words[0]} failed, with status {status}; the same command goes on")
+
+    kept = ["--no-reports", *side_by_side, "--seeds"]
+    disturbed = ["--disturb", f"{DISTURB:g}", "--only-successful"]
+    tandem("collect", *benchmark, *disturbed, *kept, recipe.demonstrations, "--out", demonstrations)
+    pictures = ["--images", "png", "--size", SIZE, "--rate", str(RATE_HZ)]
+    tandem("export", "lerobot", demonstrations, data, *pictures, *side_by_side)
+    train(data, policy, settings, threads=jobs, tell=tell)
+    evaluated, floor = folder / f"evaluation_{settings.kind}", folder / "floor"
+    with load(policy).serve() as server:
+        asked = ["--policy", server.url, "--policy-map", policy / MAP_FILE, "--policy-name", settings.kind]
+        tandem("evaluate", *asked, *benchmark, "--seeds", recipe.seeds, *side_by_side, "--out", evaluated)
+    tandem("collect", *benchmark, *kept, str(FLOOR_SEED), "--out", folder / "blind")
+    blind = ["--policy", f"open-loop:{folder / 'blind'}"]
+    tandem("evaluate", *blind, *benchmark, "--seeds", recipe.seeds, *side_by_side, "--out", floor)
+    report = folder / "report.html"
+    tandem("report", evaluated, floor, "--out", report)
+    return report
+
+
+def execute_rows(task: str) -> int:
+    """How many rows of an answer are executed before a policy of this task is asked again."""
+    return 2 if task in WALKING else TrainingSettings.execute_rows

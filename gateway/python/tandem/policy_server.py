@@ -1,0 +1,147 @@
+"""A learned policy of this process, served for `tandem evaluate --policy act:...` to ask."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from types import TracebackType
+from typing import Any, TypeAlias, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import TandemError
+
+Infer: TypeAlias = Callable[[dict[str, Any], dict[str, Any]], Mapping[str, Any]]
+"""Takes what a policy map sends, arrays as NumPy's, and the episode's own memory; gives arrays by the map's keys of actions."""
+
+MOMENT = "moment"
+"""Under this key, or one that begins so, a map sends `["episode", "step", "reset"]`."""
+
+REMEMBERED = 256
+"""So many episodes have a memory, those that were asked for last."""
+
+
+class PolicyServer:
+    """A policy that is served. It ends with a `with` block, or by `stop`."""
+
+    def __init__(self, server: ThreadingHTTPServer, paths: list[str]) -> None:
+        self._server = server
+        self._paths = paths
+        self._thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True)
+        self._thread.start()
+
+    @property
+    def url(self) -> str:
+        """What `--policy` of `tandem evaluate` takes: "act:http://127.0.0.1:8001/act", or an address for each robot."""
+        host, port = str(self._server.server_address[0]), self._server.server_address[1]
+        return "act:" + ",".join(f"http://{host}:{port}/{path}" for path in self._paths)
+
+    def wait(self) -> None:
+        """Returns when the server has ended."""
+        while self._thread.is_alive():
+            # A wait without an end would not hear Ctrl-C everywhere.
+            self._thread.join(0.5)
+
+    def stop(self) -> None:
+        """Answers nobody any more."""
+        self._server.shutdown()
+        self._server.server_close()
+        self._thread.join()
+
+    def __enter__(self) -> PolicyServer:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.stop()
+
+
+def serve_policy(infer: Infer | Mapping[str, Infer], *, host: str = "127.0.0.1", port: int = 0) -> PolicyServer:
+    """Begins to serve a policy to `tandem evaluate --policy act:...`, and returns at once. Requests are answered one after the
+    other.
+
+    infer: Called with what the policy map sends, by its keys, and with a dictionary that is empty at an episode's first request
+        and the policy's own until it ends; returns arrays by the map's keys of actions. Episodes, also several at once, have
+        dictionaries of their own where the map has `"moment" = ["episode", "step", "reset"]` among its states; elsewhere every
+        request has an empty one. Of a mapping, each robot's policy is served at an address of its own, for maps whose scope is
+        local.
+    host: Address to listen at.
+    port: Port; 0 takes a free one.
+    """
+    policies = {"act": infer} if callable(infer) else dict(infer)
+    if not policies:
+        raise TandemError("no policy to serve; give a function, or one for each robot by its name")
+    answering = _Answering(policies)
+    return PolicyServer(ThreadingHTTPServer((host, port), _handler(answering)), list(policies))
+
+
+class _Answering:
+    """Policies by the paths they are asked at, and what they remember of episodes."""
+
+    def __init__(self, policies: dict[str, Infer]) -> None:
+        self._policies = policies
+        self._memories: OrderedDict[tuple[str, int], dict[str, Any]] = OrderedDict()
+        # A policy is one model, which answers one request after the other.
+        self._one_by_one = threading.Lock()
+
+    def answer(self, path: str, body: bytes) -> bytes:
+        infer = self._policies.get(path)
+        if infer is None:
+            raise TandemError(f"no policy at /{path}; have: {', '.join('/' + path for path in self._policies)}")
+        observation = cast(dict[str, Any], json.loads(body, object_hook=_from_json))
+        with self._one_by_one:
+            reply = infer(observation, self._memory(path, observation))
+        return json.dumps({key: np.asarray(value, np.float64).tolist() for key, value in reply.items()}).encode()
+
+    def _memory(self, path: str, observation: dict[str, Any]) -> dict[str, Any]:
+        moment = next((value for key, value in observation.items() if key.startswith(MOMENT)), None)
+        if moment is None:
+            return {}
+        episode, _, reset = np.ravel(moment)[-3:]
+        key = (path, int(episode))
+        if reset or key not in self._memories:
+            self._memories[key] = {}
+        self._memories.move_to_end(key)
+        while len(self._memories) > REMEMBERED:
+            self._memories.popitem(last=False)
+        return self._memories[key]
+
+
+def _from_json(entry: dict[str, Any]) -> Any:
+    """Arrays as the package json_numpy writes them, which may be written into."""
+    if "__numpy__" not in entry:
+        return entry
+    flat: NDArray[Any] = np.frombuffer(base64.b64decode(entry["__numpy__"]), entry["dtype"])
+    return np.array(np.reshape(flat, entry["shape"]))
+
+
+def _handler(answering: _Answering) -> type[BaseHTTPRequestHandler]:
+    class Handler(BaseHTTPRequestHandler):
+        protocol_version = "HTTP/1.1"
+
+        def do_POST(self) -> None:
+            body = self.rfile.read(int(self.headers.get("content-length", 0)))
+            try:
+                status, answer = 200, answering.answer(self.path.strip("/"), body)
+            except TandemError as error:
+                status, answer = 404, str(error).encode()
+            except (json.JSONDecodeError, binascii.Error) as error:
+                status, answer = 400, f"no observation as json_numpy writes it: {error}".encode()
+            except Exception as error:
+                # What a policy raises is told to who asked, who says it in the episode's result.
+                status, answer = 500, f"{type(error).__name__}: {error}".encode()
+            self.send_response(status)
+            self.send_header("content-type", "application/json" if status == 200 else "text/plain")
+            self.send_header("content-length", str(len(answer)))
+            self.end_headers()
+            self.wfile.write(answer)
+
+        def log_message(self, format: str, *args: object) -> None:
+            """Says nothing of requests."""
+
+    return Handler
