@@ -1,9 +1,9 @@
-// Makes dist/watch.js of src/. With --check, says whether the committed file is what the sources give, and changes nothing.
+// Makes dist/page.js of src/ and operators/. With --check, says whether the committed file is what the sources give, and changes nothing.
 import { readFile, writeFile } from "node:fs/promises";
 import { gzipSync } from "node:zlib";
 import { build } from "esbuild";
 
-const OUT = new URL("dist/watch.js", import.meta.url);
+const OUT = new URL("dist/page.js", import.meta.url);
 /** A page is for who has a link and a telephone. */
 const MOST_GZIP_BYTES = 200_000;
 
@@ -18,11 +18,11 @@ const made = await build({
   target: "es2022",
   charset: "ascii",
   legalComments: "none",
-  banner: { js: `/* Made of gateway/web/src by gateway/web/build.mjs; holds three.js:\n${licence.trim()}\n*/` },
+  banner: { js: `/* Made of gateway/web by gateway/web/build.mjs; holds three.js:\n${licence.trim()}\n*/` },
 });
 const [{ contents }] = made.outputFiles;
 const gzip = gzipSync(contents, { level: 9 }).length;
-console.log(`dist/watch.js: ${contents.length} bytes, ${gzip} with gzip`);
+console.log(`dist/page.js: ${contents.length} bytes, ${gzip} with gzip`);
 if (gzip > MOST_GZIP_BYTES) {
   console.error(`more than ${MOST_GZIP_BYTES} bytes with gzip`);
   process.exit(1);
@@ -30,7 +30,7 @@ if (gzip > MOST_GZIP_BYTES) {
 if (process.argv.includes("--check")) {
   const committed = await readFile(OUT);
   if (Buffer.compare(committed, Buffer.from(contents)) !== 0) {
-    console.error("dist/watch.js is not what the sources give; run `npm run build` in gateway/web and commit it");
+    console.error("dist/page.js is not what the sources give; run `npm run build` in gateway/web and commit it");
     process.exit(1);
   }
 } else {

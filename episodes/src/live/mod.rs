@@ -22,6 +22,9 @@ pub trait Onlookers: Send {
     /// Whether anybody looks on; where nobody does, nothing is handed over.
     fn any(&self) -> bool;
 
+    /// Whether somebody wants every control step, and not only every [`STEPS_PER_FRAME`]th.
+    fn every_step(&self) -> bool;
+
     /// Must not wait for anybody.
     fn tell(&self, event: LiveEvent);
 }

@@ -3,9 +3,10 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use tandem_tools_spec::{Budget, PhaseReached};
+use tandem_tools_spec::{Budget, ExtraInformation, Observe, PhaseReached};
 
 use super::Session;
+use crate::EpisodeError;
 use crate::live::{LiveEntry, LiveEvent, LiveScene, LiveStep, LiveView, Onlookers, STEPS_PER_FRAME};
 use crate::output::OutputError;
 use crate::recording::{NoteMessage, ToolCallRecord};
@@ -60,9 +61,18 @@ impl Session {
         view
     }
 
+    /// As [`Session::live_view`], for the person who drives `robot`, who sees where everything is. It is a look whose picture nobody
+    /// needs, so that recordings and results name what was shown.
+    pub fn drivers_view(&mut self, robot: &str) -> Result<LiveView, EpisodeError> {
+        let look = Observe { robots: Some(vec![robot.into()]), short: None, frame: None };
+        self.observe(&look, &[ExtraInformation::ThirdPerson])?;
+        Ok(self.live_view())
+    }
+
     /// Shows the present step, where it is one that is shown.
     pub(super) fn show_step(&self, budget: Budget) {
-        if self.present.control_step.is_multiple_of(STEPS_PER_FRAME) {
+        let every = self.audience.onlookers.as_deref().is_some_and(Onlookers::every_step);
+        if every || self.present.control_step.is_multiple_of(STEPS_PER_FRAME) {
             self.audience.tell(|| LiveEvent::Step(Arc::new(self.live_step(budget))));
         }
     }

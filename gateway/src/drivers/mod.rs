@@ -1,11 +1,48 @@
 //! Policies that are not in the episode's process: how they reach it, or it them.
 
 mod http_episode;
+mod people;
 mod program;
 mod python;
 mod remote;
 
+use std::{fs, io, path::Path};
+
+use tandem_episodes::players::PlayError;
+use tandem_tools_spec::ResultReply;
+
+use crate::hosting::HostingError;
+
 pub use http_episode::HttpEpisode;
+pub use people::People;
 pub use program::Program;
 pub use python::{PythonError, PythonModule, PythonPart};
 pub use remote::{MapError, PRESETS, PolicyMap, PolicyProtocol, RemoteError, RemotePolicy, preset, try_map};
+
+/// Removes the result that an interrupted run has left.
+fn remove_old_result(path: &Path) -> Result<(), PlayError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(lost("an old result stays", error)),
+        _ => Ok(()),
+    }
+}
+
+/// The result as the server has left it: a program may have ended its episode in any way.
+fn read_result(folder: &Path) -> Result<ResultReply, PlayError> {
+    let bytes =
+        fs::read(folder.join(tandem_episodes::RESULT_FILE)).map_err(|error| lost("no result", error))?;
+    serde_json::from_slice(&bytes).map_err(|error| lost("no result", error.into()))
+}
+
+fn lost(what: &str, error: io::Error) -> PlayError {
+    PlayError::Lost(format!("{what}: {error}"))
+}
+
+impl From<HostingError> for PlayError {
+    fn from(error: HostingError) -> PlayError {
+        match error {
+            HostingError::Episode(error) => PlayError::Episode(error),
+            error => PlayError::Lost(error.to_string()),
+        }
+    }
+}

@@ -21,7 +21,7 @@ use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 
 use super::{
     Answer, HostingError,
-    onlookers::{FeedEnd, LiveFeed, LiveWatch},
+    onlookers::{EveryStep, FeedEnd, LiveFeed, LiveWatch},
     panic_guard::{EpisodeMetrics, PanicGuard},
 };
 use crate::metrics::Metrics;
@@ -75,6 +75,8 @@ enum Job {
         reason: EndReason,
     },
     Watch {
+        /// The operator of this robot looks on, which is recorded.
+        operator: Option<String>,
         reply: ReplySender<LiveView>,
     },
     Close {
@@ -267,9 +269,19 @@ impl EpisodeThread {
 
     /// How the episode stands, and what happens from now on, for who looks on: no call of the policy's.
     pub async fn watch(&self) -> Result<LiveWatch, HostingError> {
+        self.watch_as(None).await
+    }
+
+    /// As [`EpisodeThread::watch`], for the person who drives `robot` and is told every step. It sees what no policy may know; that is
+    /// recorded, and results name it.
+    pub async fn watch_driving(&self, robot: &str) -> Result<(LiveWatch, EveryStep), HostingError> {
+        Ok((self.watch_as(Some(robot.into())).await?, self.feed.every_step()))
+    }
+
+    async fn watch_as(&self, operator: Option<String>) -> Result<LiveWatch, HostingError> {
         // Listening comes first, so that nothing is missed between the two.
         let events = self.feed.subscribe().ok_or(HostingError::EpisodeStopped)?;
-        let view = self.do_job_in_turn(|reply| Job::Watch { reply }).await?;
+        let view = self.do_job_in_turn(|reply| Job::Watch { operator, reply }).await?;
         Ok(LiveWatch { view, events })
     }
 
@@ -425,7 +437,11 @@ fn serve(mut session: PanicGuard, mut inbox: mpsc::Receiver<Job>, status: &Share
             }
             Job::Status { reply } => drop(reply.send(session.run(|session| standing(session)))),
             Job::Briefing { reply } => drop(reply.send(session.run(|session| session.briefing()))),
-            Job::Watch { reply } => drop(reply.send(session.run(|session| session.live_view()))),
+            Job::Watch { operator, reply } => {
+                let view = session.run(|session| view(session, operator.as_deref()));
+                status.update(&session);
+                let _ = reply.send(view.flatten());
+            }
             Job::Facts { reply } => drop(reply.send(session.run(|session| session.facts()))),
             Job::EndIfAbandoned { idle } => {
                 // The log has the reason of a refusal.
@@ -456,6 +472,13 @@ fn answer(session: &mut Session, operator: Option<&str>, call: Call) -> Result<A
 fn together(session: &mut Session, commands: Vec<OperatorCommand>) -> Result<Vec<Answer>, HostingError> {
     let replies = session.together(commands)?;
     Ok(replies.into_iter().map(|reply| Answer::new(reply, session)).collect())
+}
+
+fn view(session: &mut Session, operator: Option<&str>) -> Result<LiveView, HostingError> {
+    match operator {
+        Some(robot) => Ok(session.drivers_view(robot)?),
+        None => Ok(session.live_view()),
+    }
 }
 
 fn standing(session: &Session) -> Answer {

@@ -27,3 +27,4 @@ pub use onlookers::LiveWatch;
 pub use panic_guard::{EpisodeMetrics, PanicGuard};
 pub use run_folder::{look_at_runs_folder, try_runs_folder};
 pub use table::EpisodeTable;
+pub use team::{CollectedEpisode, Collection, CollectionProgress, CollectionStage, Driver, Wish};

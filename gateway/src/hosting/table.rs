@@ -20,7 +20,7 @@ use super::{
     Caller, EpisodeThread, HostedEpisode, HostingError,
     idempotency_cache::{IdempotencyCache, IdempotentReply},
     run_folder::RunFolders,
-    team::Team,
+    team::{Collection, Team},
 };
 use crate::{metrics::Metrics, settings::Settings};
 
@@ -33,6 +33,8 @@ pub struct EpisodeTable {
     starts: IdempotencyCache<(StartEpisode, Driving), SharedStart>,
     metrics: Arc<Metrics>,
     folders: RunFolders,
+    /// Those who play one episode after another here, if there are such people.
+    collection: Option<Arc<Collection>>,
 }
 
 /// What came of a start, for as many as want to know.
@@ -55,7 +57,18 @@ impl EpisodeTable {
             starts: IdempotencyCache::default(),
             metrics: Arc::default(),
             folders: RunFolders::default(),
+            collection: None,
         }
+    }
+
+    /// As [`EpisodeTable::new`], for the episodes of `collection`.
+    pub fn for_collection(settings: Arc<Settings>, collection: Option<Arc<Collection>>) -> EpisodeTable {
+        EpisodeTable { collection, ..EpisodeTable::new(settings) }
+    }
+
+    /// Those who play one episode after another here.
+    pub fn collection(&self) -> Option<&Collection> {
+        self.collection.as_deref()
     }
 
     /// What has been counted.
@@ -118,7 +131,8 @@ impl EpisodeTable {
         place: OwnedSemaphorePermit,
     ) -> Result<StartReply, HostingError> {
         let (team, operators) = match driving.is_per_robot() {
-            true => Team::new(spec.task.robot_names(), driving).map(|(team, tokens)| (Some(team), tokens))?,
+            true => Team::new(spec.task.robot_names(), driving, self.collection())
+                .map(|(team, tokens)| (Some(team), tokens))?,
             false => (None, Vec::new()),
         };
         let (episode, mut briefing) =
@@ -182,10 +196,13 @@ impl EpisodeTable {
         }
     }
 
-    /// The operator whose token `text` is. Every token of every episode is compared.
+    /// The operator whose token `text` is. Every token of every episode is compared. Between two episodes of a collection, its people are
+    /// operators of none, whose id is empty.
     pub fn operator(&self, text: &str) -> Option<Caller> {
+        let seat = self.collection().and_then(|collection| collection.robot_of(text));
+        let seat = seat.map(|robot| Caller::Operator { episode: String::new(), robot: robot.into() });
         let held = self.lock();
-        held.episodes.iter().fold(None, |found, (id, hosted)| {
+        held.episodes.iter().fold(seat, |found, (id, hosted)| {
             let robot = hosted.team.as_ref().and_then(|team| team.robot_of(text));
             robot.map(|robot| Caller::Operator { episode: id.clone(), robot: robot.into() }).or(found)
         })

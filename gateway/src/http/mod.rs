@@ -16,4 +16,5 @@ mod server;
 mod tests;
 mod watching;
 
+pub use pages::{operate::operator_link, qr::qr_text};
 pub use server::{Server, shutdown_signal};

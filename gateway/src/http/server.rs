@@ -14,7 +14,7 @@ use super::{
     watching::WatchKey,
 };
 use crate::{
-    hosting::{EpisodeTable, EpisodeThread, HostingError},
+    hosting::{Collection, EpisodeTable, EpisodeThread, HostingError},
     settings::Settings,
 };
 
@@ -42,6 +42,11 @@ pub struct Server {
 impl Server {
     /// Binds and begins to serve.
     pub fn start(settings: Arc<Settings>) -> io::Result<Server> {
+        Server::start_for(settings, None)
+    }
+
+    /// As [`Server::start`], for people who play the episodes of `collection`.
+    pub fn start_for(settings: Arc<Settings>, collection: Option<Arc<Collection>>) -> io::Result<Server> {
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(HTTP_THREADS)
             .thread_name("http")
@@ -54,7 +59,7 @@ impl Server {
             )
         })?;
         let address = listener.local_addr()?;
-        let table = Arc::new(EpisodeTable::new(settings.clone()));
+        let table = Arc::new(EpisodeTable::for_collection(settings.clone(), collection));
         let watch_key = WatchKey::random().map_err(io::Error::other)?;
         let watch_link = format!("http://{address}{WATCH}#{}", watch_key.text());
         let app = AppState::new(table.clone(), settings.clone(), watch_key);
@@ -89,6 +94,11 @@ impl Server {
     ) -> Result<(Arc<EpisodeThread>, StartReply), HostingError> {
         let start = self.runtime.block_on(self.table.host(id, spec, driving, folder))?;
         Ok((self.table.get(id)?, start))
+    }
+
+    /// Ends the episode `id` and forgets it.
+    pub fn remove(&self, id: &str) -> Result<(), HostingError> {
+        self.runtime.block_on(self.table.remove(id)).map(drop)
     }
 
     /// The episodes, for experts and scoring in this process.

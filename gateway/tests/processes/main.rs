@@ -4,6 +4,7 @@ mod agents;
 mod command_line;
 mod evaluations;
 mod logs;
+mod people;
 mod resumed;
 mod server;
 mod signals;

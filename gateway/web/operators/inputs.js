@@ -19,8 +19,8 @@ const nameOf = (event) => (event.key.length === 1 ? event.key.toLowerCase() : ev
 const sum = (keys, table, length) =>
   [...keys].map((key) => table[key]).filter(Boolean).reduce((total, one) => total.map((value, axis) => value + one[axis]), Array(length).fill(0));
 
-/** Listens to keys; `pressed(key)` hears of those that act once. */
-export function listen(pressed) {
+/** Listens to keys until `signal` aborts; `pressed(key)` hears of those that act once. */
+export function listen(pressed, signal) {
   const keys = new Set();
   addEventListener("keydown", (event) => {
     if (typing(event) || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -29,9 +29,9 @@ export function listen(pressed) {
     if (held) event.preventDefault();
     if (held) keys.add(key);
     else if (!event.repeat && pressed(key)) event.preventDefault();
-  });
-  addEventListener("keyup", (event) => keys.delete(nameOf(event)));
-  addEventListener("blur", () => keys.clear());
+  }, { signal });
+  addEventListener("keyup", (event) => keys.delete(nameOf(event)), { signal });
+  addEventListener("blur", () => keys.clear(), { signal });
   return keys;
 }
 

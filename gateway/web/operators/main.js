@@ -1,9 +1,10 @@
-// `/operate`: whoever comes by the link of a robot drives it; whoever comes without starts an episode.
+// `/operate`: whoever comes by the link of a robot drives it, once or in all episodes of a collection; whoever comes without starts an
+// episode.
 
+import { collect, overview } from "./collect.js";
 import { drive } from "./drive.js";
 import { start } from "./start.js";
 
-const main = document.getElementById("main");
 const KEPT = "tandem-operator";
 
 /** What the link gave: from the fragment, which browsers send to nobody; then from this tab, so that a page may be loaded again. */
@@ -17,10 +18,12 @@ function seat() {
   return JSON.parse(sessionStorage.getItem(KEPT) ?? "null");
 }
 
-const show = () => {
+/** Shows what whoever comes is to see. */
+export function operate(main) {
+  // A second link pasted into the same tab changes the fragment alone.
+  addEventListener("hashchange", () => location.hash.includes("token=") && (seat(), location.reload()));
   const held = seat();
-  return held ? drive(main, held) : start(main);
-};
-// A second link pasted into the same tab changes the fragment alone.
-addEventListener("hashchange", () => location.hash.includes("token=") && (seat(), location.reload()));
-show();
+  if (!held) return start(main);
+  if (held.collection) return held.robot ? collect(main, held) : overview(main, held);
+  return drive(main, held);
+}

@@ -2,6 +2,7 @@
 
 import { element } from "../src/dom.js";
 import { call } from "./call.js";
+import { linkRow } from "./links.js";
 
 /** The longest that an episode may wait for somebody who is away. */
 const PATIENCE_S = 600;
@@ -49,7 +50,7 @@ export function start(main) {
     }
     const body = { task: task.value, seed: Number(seed.value), protocol: protocol.value, short: true, operators: "per_robot", patience_s: PATIENCE_S, talk: true };
     try {
-      links.replaceChildren(...linksOf(await call("/v1/episodes", token.value, body), chosen));
+      links.replaceChildren(...await linksOf(await call("/v1/episodes", token.value, body), chosen, token.value));
       links.scrollIntoView({ block: "nearest" });
     } catch (error) {
       refusal.textContent = error.message;
@@ -68,16 +69,16 @@ export function start(main) {
 const robotCount = (task) => task?.robots?.length ?? 2;
 
 /** The links of an episode that has begun. Whoever drives the first robot also lets those stand still that nobody drives. */
-function linksOf({ episode_id: episode, operators, instructions }, chosen) {
+async function linksOf({ episode_id: episode, operators, instructions }, chosen, hostToken) {
   const still = operators.filter(({ robot }) => chosen.get(robot) === "still");
   const people = operators.filter((operator) => !still.includes(operator));
   const rows = people.map(({ robot, token }, index) => {
     const seat = new URLSearchParams({ episode, robot, token });
-    if (index === 0 && still.length > 0) seat.set("still", still.map((operator) => operator.token).join(","));
+    if (index === 0 && still.length > 0) seat.set("still", still.map(({ robot: name, token: own }) => `${name}.${own}`).join(","));
     const part = instructions.find((entry) => entry.robot === robot)?.instruction ?? "";
-    return element("li", {}, element("a", { href: `/operate#${seat}`, target: "_blank", rel: "noopener" }, `Drive robot ${robot}`), ` ${part}`);
+    return linkRow(`Drive robot ${robot}`, `${location.origin}/operate#${seat}`, hostToken, part);
   });
   return [element("h2", {}, "Links"),
     element("p", {}, "Send each person one of these, and nobody else: who has the link drives the robot. They are shown this once."),
-    element("ul", {}, ...rows)];
+    element("ul", { class: "links" }, ...await Promise.all(rows))];
 }

@@ -1,13 +1,15 @@
-// `/watch`: the episodes as cards, and each on a page of its own.
+// `/watch`: the episodes as cards, and each on a page of its own. `/operate`: people drive robots.
 
 import { cards } from "./cards.js";
 import { element } from "./dom.js";
 import { episode } from "./episode.js";
+import { operate } from "../operators/main.js";
 
 const main = document.getElementById("main");
 const wanted = new URLSearchParams(location.search);
 
 const page = async () => {
+  if (location.pathname.startsWith("/operate")) return operate(main);
   if (wanted.has("episode")) return episode(main, { episode: wanted.get("episode") });
   if (wanted.has("run")) return episode(main, { run: wanted.get("run"), at: Number(wanted.get("at")) || 0 });
   return cards(main);

@@ -16,6 +16,8 @@ const LEAST_SHOWN_N = 1;
 const FRUSTUM_M = 0.55;
 /** Wrists nearer to their targets need no ghost. */
 const GHOST_FROM_M = 0.01;
+/** Pixels of the page that one of the picture covers, at most, where drawing takes long. */
+const MOST_COARSENESS = 3;
 const STATE_COLOURS = { moving: "--accent", arrived: "--good", blocked: "--bad", out_of_reach: "--odd", joints: "--soft" };
 const SKY_FROM_BELOW = 0x8d8678;
 
@@ -25,6 +27,7 @@ export class Stage {
     this.head = head;
     this.layout = layout;
     this.place = place;
+    this.coarseness = 1;
     this.renderer = new WebGLRenderer({ antialias: true, powerPreference: "high-performance" });
     this.renderer.shadowMap.enabled = true;
     place.append(this.renderer.domElement);
@@ -42,7 +45,8 @@ export class Stage {
     this.extras = { frustums: true, forces: true, targets: true };
     this.robots = head.robots.map((robot, index) => this.extrasOf(robot, index));
     this.stale = true;
-    new ResizeObserver(() => this.resize()).observe(place);
+    this.sized = new ResizeObserver(() => this.resize());
+    this.sized.observe(place);
     this.resize();
     this.paint();
   }
@@ -56,7 +60,7 @@ export class Stage {
   resize() {
     const { clientWidth: width, clientHeight: height } = this.place;
     if (!width || !height) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2) / this.coarseness);
     this.renderer.setSize(width, height, false);
     this.stale = true;
   }
@@ -180,6 +184,12 @@ export class Stage {
     this.controls.update();
     if (!this.stale) return false;
     this.stale = false;
+    this.renderer.render(this.scene, this.camera());
+    return true;
+  }
+
+  /** The camera that looks now, as the place's size wants it. */
+  camera() {
     const { clientWidth: width, clientHeight: height } = this.place;
     const robot = this.head.robots.find(({ name }) => name === this.view);
     const camera = robot ? this.head_camera : this.free;
@@ -191,12 +201,42 @@ export class Stage {
     }
     camera.aspect = width / height;
     camera.updateProjectionMatrix();
-    this.renderer.render(this.scene, camera);
-    return true;
+    return camera;
   }
 
-  /** Draws less, where drawing takes long. */
+  /** Where a point of the world is seen: x to the right and y up, from -1 to 1 within the place, and whether it is ahead. */
+  project(point) {
+    const camera = this.camera();
+    camera.updateMatrixWorld();
+    const seen = point.clone().applyMatrix4(camera.matrixWorldInverse);
+    const { x, y } = point.clone().project(camera);
+    return { x, y, ahead: seen.z < 0 };
+  }
+
+  /** How far a point of the world moves where its picture moves by so many pixels to the right and down, and it goes away by so many metres. */
+  way(point, right, down, away) {
+    const camera = this.camera();
+    camera.updateMatrixWorld();
+    const depth = Math.max(0.1, -point.clone().applyMatrix4(camera.matrixWorldInverse).z);
+    const metres = (2 * depth * Math.tan((camera.fov * Math.PI) / 360)) / this.place.clientHeight;
+    return new Vector3(right * metres, -down * metres, -away).applyQuaternion(camera.quaternion);
+  }
+
+  /** Gives back what a page has few of, where it draws one episode after another. */
+  leave() {
+    this.sized.disconnect();
+    this.controls.dispose();
+    this.renderer.dispose();
+    this.renderer.forceContextLoss();
+  }
+
+  /** Draws less, where drawing takes long: first no shadows, then fewer pixels. */
   simplify() {
+    if (!this.sun.castShadow) {
+      this.coarseness = Math.min(MOST_COARSENESS, this.coarseness * 1.5);
+      this.resize();
+      return;
+    }
     this.renderer.shadowMap.enabled = false;
     this.sun.castShadow = false;
     this.scene.traverse((part) => { if (part.material) part.material.needsUpdate = true; });

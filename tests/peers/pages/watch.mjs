@@ -58,7 +58,7 @@ async function open(width, scheme, link) {
   page.on("console", (message) => message.type() === "error" && page.wrong.push(message.text()));
   page.on("request", (request) => request.url().startsWith(new URL(link).origin) || request.url().startsWith("blob:") || page.wrong.push(`asks ${request.url()}`));
   if (sources) {
-    await page.route("**/watch/page.js", (route) => route.fulfill({ path: join(sources, "dist/watch.js"), contentType: "text/javascript" }));
+    await page.route("**/watch/page.js", (route) => route.fulfill({ path: join(sources, "dist/page.js"), contentType: "text/javascript" }));
     await page.route("**/watch/page.css", (route) => route.fulfill({ path: join(sources, "style.css"), contentType: "text/css" }));
   }
   await page.goto(link);

@@ -5,7 +5,7 @@ mod participant;
 mod process;
 
 use std::{
-    fs::{self, File},
+    fs::File,
     io::{self, Read, Seek, SeekFrom},
     path::Path,
     sync::Arc,
@@ -21,7 +21,7 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{Driving, EndReason, ResultReply, StartReply};
 
-use super::python::PythonModule;
+use super::{lost, python::PythonModule, read_result, remove_old_result};
 use crate::{
     hosting::{EpisodeThread, HostingError},
     http::Server,
@@ -338,36 +338,10 @@ fn last_lines(folder: &Path) -> Option<String> {
     })
 }
 
-/// Removes the result that an interrupted run has left.
-fn remove_old_result(path: &Path) -> Result<(), PlayError> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(lost("an old result stays", error)),
-        _ => Ok(()),
-    }
-}
-
-/// The result as the server has left it: a program may have ended its episode in any way.
-fn read_result(folder: &Path) -> Result<ResultReply, PlayError> {
-    let bytes =
-        fs::read(folder.join(tandem_episodes::RESULT_FILE)).map_err(|error| lost("no result", error))?;
-    serde_json::from_slice(&bytes).map_err(|error| lost("no result", error.into()))
-}
-
-fn lost(what: &str, error: io::Error) -> PlayError {
-    PlayError::Lost(format!("{what}: {error}"))
-}
-
-impl From<HostingError> for PlayError {
-    fn from(error: HostingError) -> PlayError {
-        match error {
-            HostingError::Episode(error) => PlayError::Episode(error),
-            error => PlayError::Lost(error.to_string()),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

@@ -5,11 +5,13 @@
 //! The policy's clock runs until the step is made, so while at least one operator thinks. An operator's call blocks until its
 //! robot's reply is there.
 
+mod collection;
+mod driving;
 mod round;
 
 use std::{
     sync::{Arc, Mutex, MutexGuard},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use tandem_episodes::{EpisodeError, OperatorCall, OperatorCommand};
@@ -21,6 +23,9 @@ use tokio::sync::oneshot;
 
 use super::{Answer, EpisodeThread, HostingError};
 use crate::token::Token;
+pub use collection::{CollectedEpisode, Collection, CollectionProgress, CollectionStage};
+use driving::Wheel;
+pub use driving::{Driver, Wish};
 use round::{Pending, Round};
 
 /// The operators of one episode.
@@ -30,6 +35,20 @@ pub struct Team {
     patience: Duration,
     talk: bool,
     round: Mutex<Round>,
+    wheels: Mutex<Wheels>,
+}
+
+/// People who drive in real time.
+#[derive(Debug, Default)]
+struct Wheels {
+    /// By seat; robots of programs have none.
+    seats: Vec<Option<Wheel>>,
+    /// By seat: when the command was made that is not answered yet.
+    under_way: Vec<Option<Instant>>,
+    /// How many drivers there have been.
+    drivers: u64,
+    /// Whether commands are made of what they say.
+    turning: bool,
 }
 
 /// Who drives which robot.
@@ -40,20 +59,24 @@ struct Seat {
 }
 
 impl Team {
-    /// An operator for each of `robots`, and what each needs.
+    /// An operator for each of `robots`, and what each needs. Who has a seat of `collection` keeps its token.
     pub fn new<'a>(
         robots: impl Iterator<Item = &'a str>,
         driving: &Driving,
+        collection: Option<&Collection>,
     ) -> Result<(Team, Vec<OperatorToken>), HostingError> {
         let (mut seats, mut tokens) = (Vec::new(), Vec::new());
         for robot in robots {
-            let (token, text) = Token::random()?;
+            let kept = collection.and_then(|collection| collection.seat(robot));
+            let (token, text) = kept.map_or_else(Token::random, Ok)?;
             seats.push(Seat { robot: robot.into(), token });
             tokens.push(OperatorToken { robot: robot.into(), token: text });
         }
         let round = Mutex::new(Round::new(seats.iter().map(|seat| seat.robot.clone()).collect()));
         let patience = Duration::from_secs_f64(driving.patience_s());
-        Ok((Team { seats, patience, talk: driving.talk == Some(true), round }, tokens))
+        let (none, under_way) = (seats.iter().map(|_| None).collect(), vec![None; seats.len()]);
+        let wheels = Mutex::new(Wheels { seats: none, under_way, ..Wheels::default() });
+        Ok((Team { seats, patience, talk: driving.talk == Some(true), round, wheels }, tokens))
     }
 
     /// The robot whose operator has the token `text`; every token is compared.
@@ -249,6 +272,11 @@ impl Team {
     fn seat(&self, robot: &str) -> Result<usize, HostingError> {
         let found = self.seats.iter().position(|seat| seat.robot == robot);
         found.ok_or(HostingError::NeedsOperator)
+    }
+
+    fn wheels(&self) -> MutexGuard<'_, Wheels> {
+        // Nothing panics while it holds the lock.
+        self.wheels.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 
     fn round(&self) -> MutexGuard<'_, Round> {

@@ -12,7 +12,11 @@ use crate::{
     hosting::Caller,
     http::{
         app::AppState,
-        pages::{WATCH, door, operate},
+        pages::{
+            WATCH, door,
+            drive::{DRIVE, ENTER, GivenToken, drivers},
+            operate,
+        },
         problem::ApiError,
         watching::Watcher,
     },
@@ -27,17 +31,31 @@ pub async fn identify(State(app): State<AppState>, mut request: Request, next: N
         request.headers_mut().remove(header::AUTHORIZATION);
         return next.run(request).await;
     }
-    let Some(caller) = caller(&app, request.headers()).or(watches.then_some(Caller::Host)) else {
+    let driving = if path_is(&request, DRIVE) { drivers(&app, &request) } else { None };
+    if let Some((_, robots)) = &driving {
+        request.extensions_mut().insert(robots.clone());
+    }
+    let driver = driving.map(|(caller, _)| caller);
+    let caller = driver.or_else(|| caller(&app, request.headers())).or(watches.then_some(Caller::Host));
+    let Some(caller) = caller else {
         tracing::info!("a request without a token was refused");
         return refused(request.headers());
     };
     if watches {
         request.extensions_mut().insert(Watcher);
     }
+    if let Some(token) = bearer(request.headers()).filter(|_| path_is(&request, ENTER)) {
+        let given = GivenToken(token.into());
+        request.extensions_mut().insert(given);
+    }
     request.headers_mut().remove(header::COOKIE);
     request.headers_mut().remove(header::AUTHORIZATION);
     request.extensions_mut().insert(caller);
     next.run(request).await
+}
+
+fn path_is(request: &Request, path: &str) -> bool {
+    request.uri().path() == path
 }
 
 /// Whether a path is one for which the link opens, and no token does.

@@ -58,13 +58,13 @@ pub async fn live(
 }
 
 async fn serve(socket: PageSocket, watch: LiveWatch, _place: OwnedSemaphorePermit) -> io::Result<()> {
-    let PageSocket { mut sender, mut closing } = socket;
+    let PageSocket { mut sender, mut reader } = socket;
     tokio::select! {
         told = tell(&mut sender, watch) => {
             told?;
             sender.close().await
         }
-        () = closing.gone() => Ok(()),
+        () = reader.gone() => Ok(()),
     }
 }
 

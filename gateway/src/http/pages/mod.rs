@@ -1,9 +1,12 @@
 //! Pages for people: `/watch` shows running and finished episodes. What a page draws comes as numbers over a WebSocket; script and style
 //! are in this binary, made of `gateway/web`.
 
+mod collecting;
+pub mod drive;
 mod finished;
 mod live;
 pub mod operate;
+pub mod qr;
 mod socket;
 
 use axum::{
@@ -22,7 +25,7 @@ use crate::hosting::Caller;
 
 const SHELL: &str = include_str!("../../../web/page.html");
 const STYLE: &str = include_str!("../../../web/style.css");
-const SCRIPT: &str = include_str!("../../../web/dist/watch.js");
+const SCRIPT: &str = include_str!("../../../web/dist/page.js");
 const DOOR: &str = include_str!("door.html");
 
 /// Everything comes from this server, and nothing may be sent elsewhere or put into another site's page.

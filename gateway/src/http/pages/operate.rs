@@ -1,14 +1,18 @@
 //! `/operate`: a page on which a person starts an episode or drives one robot. It holds nothing but script and style, so everybody may
-//! read it; what it asks for comes by REST, with the token of a robot's operator.
+//! read it; what it asks for comes by REST, with the token of a robot's operator, and by a socket.
 
 use axum::{
     Router,
     http::header,
     response::{Html, IntoResponse, Response},
-    routing::get,
+    routing::{get, post},
 };
 
-use super::{POLICY, STYLE, asset};
+use super::{
+    POLICY, collecting,
+    drive::{self, DRIVE, ENTER},
+    script, style,
+};
 use crate::http::app::AppState;
 
 /// Where the page is.
@@ -16,33 +20,28 @@ pub const OPERATE: &str = "/operate";
 
 const SHELL: &str = include_str!("../../../web/operators/page.html");
 
-/// The modules of the page, by their paths below it, which are as in `gateway/web`.
-const MODULES: [(&str, &str); 7] = [
-    ("/operators/main.js", include_str!("../../../web/operators/main.js")),
-    ("/operators/start.js", include_str!("../../../web/operators/start.js")),
-    ("/operators/drive.js", include_str!("../../../web/operators/drive.js")),
-    ("/operators/call.js", include_str!("../../../web/operators/call.js")),
-    ("/operators/camera.js", include_str!("../../../web/operators/camera.js")),
-    ("/operators/inputs.js", include_str!("../../../web/operators/inputs.js")),
-    ("/src/dom.js", include_str!("../../../web/src/dom.js")),
-];
-
 /// The routes of the page.
 pub fn router() -> Router<AppState> {
-    let shell = Router::new()
+    Router::new()
         .route(OPERATE, get(page))
-        .route("/operate/page.css", get(async || asset("text/css; charset=utf-8", STYLE)));
-    MODULES.iter().fold(shell, |router, &(path, text)| {
-        let module = async move || asset("text/javascript; charset=utf-8", text);
-        router.route(&format!("{OPERATE}{path}"), get(module))
-    })
+        .route("/operate/page.css", get(style))
+        .route("/operate/page.js", get(script))
+        .route("/operate/collection", get(collecting::progress))
+        .route("/operate/mark", post(collecting::mark))
+        .route("/operate/code", post(collecting::code))
+        .route(ENTER, post(drive::enter))
+        .route(DRIVE, get(drive::drive))
+}
+
+/// The link of a person who drives `robot` in a collection, or, without one, of whoever runs it. Browsers send a fragment to nobody.
+pub fn operator_link(base_url: &str, robot: Option<&str>, token: &str) -> String {
+    let robot = robot.map_or_else(String::new, |robot| format!("robot={robot}&"));
+    format!("{base_url}{OPERATE}#collection=1&{robot}token={token}")
 }
 
 /// Whether a path is of the page, which anybody may read.
 pub fn is_open(path: &str) -> bool {
-    path.strip_prefix(OPERATE).is_some_and(|rest| {
-        matches!(rest, "" | "/page.css") || MODULES.iter().any(|(module, _)| *module == rest)
-    })
+    path.strip_prefix(OPERATE).is_some_and(|rest| matches!(rest, "" | "/page.css" | "/page.js"))
 }
 
 async fn page() -> Response {

@@ -1,6 +1,9 @@
-//! A WebSocket as pages have it: the server tells, and reads only to notice that the page has gone. RFC 6455; frames are tungstenite's.
+//! A WebSocket as pages have it. RFC 6455; frames are tungstenite's.
 
-use std::{io, time::Duration};
+use std::{
+    io::{self, Cursor},
+    time::Duration,
+};
 
 use axum::{
     extract::Request,
@@ -16,8 +19,8 @@ use tokio::{
 use tungstenite::{
     handshake::derive_accept_key,
     protocol::frame::{
-        Frame,
-        coding::{Data, OpCode},
+        Frame, FrameHeader,
+        coding::{Control, Data, OpCode},
     },
 };
 
@@ -26,19 +29,26 @@ use crate::http::problem::ApiError;
 /// A page that takes nothing for so long has gone.
 const WRITE_LIMIT: Duration = Duration::from_secs(10);
 
+/// The most that a page says at once.
+const MOST_BYTES: u64 = 4096;
+
 /// The two ends of a socket.
 pub struct PageSocket {
     /// What the page is told by.
     pub sender: PageSender,
-    /// Where the page's end is noticed.
-    pub closing: PageClosing,
+    /// What the page says, or that it has gone.
+    pub reader: PageReader,
 }
 
 /// Tells a page.
 pub struct PageSender(WriteHalf<TokioIo<Upgraded>>);
 
-/// Notices that a page has gone.
-pub struct PageClosing(ReadHalf<TokioIo<Upgraded>>);
+/// Hears a page.
+pub struct PageReader {
+    half: ReadHalf<TokioIo<Upgraded>>,
+    /// What has come of the next frame.
+    arrived: Vec<u8>,
+}
 
 impl PageSender {
     /// Sends a text.
@@ -68,11 +78,49 @@ impl PageSender {
     }
 }
 
-impl PageClosing {
-    /// Returns when the page has gone. A page has nothing to say, so what it sends ends it, too: a close frame, as a rule.
+impl PageReader {
+    /// Returns when the page has gone. A page that has nothing to say is ended by what it sends, too: a close frame, as a rule.
     pub async fn gone(&mut self) {
         let mut first = [0; 1];
-        let _ = self.0.read(&mut first).await;
+        let _ = self.half.read(&mut first).await;
+    }
+
+    /// The next text of a page; `None` once it has gone. What is no whole text of a reasonable length ends it.
+    pub async fn text(&mut self) -> io::Result<Option<String>> {
+        loop {
+            if let Some((opcode, bytes)) = self.frame()? {
+                match opcode {
+                    OpCode::Data(Data::Text) => {
+                        return String::from_utf8(bytes).map(Some).map_err(io::Error::other);
+                    }
+                    OpCode::Control(Control::Ping | Control::Pong) => continue,
+                    OpCode::Data(_) | OpCode::Control(_) => return Ok(None),
+                }
+            }
+            if self.half.read_buf(&mut self.arrived).await? == 0 {
+                return Ok(None);
+            }
+        }
+    }
+
+    /// Takes a frame out of what has arrived, if a whole one has.
+    fn frame(&mut self) -> io::Result<Option<(OpCode, Vec<u8>)>> {
+        let mut cursor = Cursor::new(&self.arrived[..]);
+        let Some((header, length)) = FrameHeader::parse(&mut cursor).map_err(io::Error::other)? else {
+            return Ok(None);
+        };
+        let Some(mask) = header.mask.filter(|_| header.is_final && length <= MOST_BYTES) else {
+            return Err(io::Error::other("a page sends whole, short, masked frames"));
+        };
+        let begin = cursor.position() as usize;
+        let end = begin + length as usize;
+        if self.arrived.len() < end {
+            return Ok(None);
+        }
+        let bytes = self.arrived[begin..end].iter().zip(mask.iter().cycle()).map(|(byte, mask)| byte ^ mask);
+        let bytes = bytes.collect();
+        self.arrived.drain(..end);
+        Ok(Some((header.opcode, bytes)))
     }
 }
 
@@ -88,9 +136,10 @@ where
     let upgrade = request.extensions_mut().remove::<OnUpgrade>().ok_or_else(no_socket)?;
     tokio::spawn(async move {
         let Ok(upgraded) = upgrade.await else { return };
-        let (closing, sender) = split(TokioIo::new(upgraded));
+        let (half, sender) = split(TokioIo::new(upgraded));
+        let reader = PageReader { half, arrived: Vec::new() };
         // A page that has gone is no error.
-        let _ = serve(PageSocket { sender: PageSender(sender), closing: PageClosing(closing) }).await;
+        let _ = serve(PageSocket { sender: PageSender(sender), reader }).await;
     });
     let headers = [
         (header::CONNECTION, HeaderValue::from_static("upgrade")),

@@ -39,6 +39,8 @@ fn own_refusals() -> Vec<ApiError> {
         ApiError::NoToken,
         ApiError::NoWatcher,
         ApiError::NoRun { run: "expert/handover-seed0".into() },
+        ApiError::NoCollection,
+        ApiError::NothingToMark,
         ApiError::Key,
         ApiError::NoObject("a number"),
         ApiError::SlowBody { limit: Duration::from_secs(30) },

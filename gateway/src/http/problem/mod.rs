@@ -88,6 +88,14 @@ pub enum ApiError {
         /// What was asked for.
         run: String,
     },
+    /// The server has no people who play one episode after another, or the caller is none of them.
+    #[error(
+        "nobody collects episodes by this server and token; tandem collect --operators N prints the links of those who do"
+    )]
+    NoCollection,
+    /// Somebody marks an episode while there is none to be marked.
+    #[error("no episode is to be marked now; mark it when it has ended")]
+    NothingToMark,
     /// An idempotency key that is no text of the right length.
     #[error(
         "Idempotency-Key has to be 1 to 255 letters, digits and signs, as a UUID; a new one for each request"
@@ -238,6 +246,10 @@ impl ApiError {
             ApiError::NoToken => Problem::new("no-token", "No token", StatusCode::UNAUTHORIZED),
             ApiError::NoWatcher => Refusal::new("no-watcher", "Not by the link", Forbidden).into(),
             ApiError::NoRun { .. } => Refusal::new("no-run", "No such finished episode", NotFound).into(),
+            ApiError::NoCollection => Refusal::new("no-collection", "No collection", NotFound).into(),
+            ApiError::NothingToMark => {
+                Problem::new("nothing-to-mark", "Nothing to mark", StatusCode::CONFLICT)
+            }
             ApiError::Key => Problem::new("invalid-key", "Invalid key", StatusCode::BAD_REQUEST),
             ApiError::BrokenBody(_) => {
                 Problem::new("broken-body", "Body not received", StatusCode::BAD_REQUEST)

@@ -1,5 +1,6 @@
 //! Episodes in which each robot has an operator of its own.
 
+mod driving;
 mod page;
 mod processes;
 mod rounds;

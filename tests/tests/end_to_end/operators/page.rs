@@ -1,4 +1,4 @@
-//! The page on which people drive robots: what it is made of, and what its commands come to.
+//! The page on which people drive robots: what it is made of, and that time stands still while one of them is away.
 
 use serde_json::{Value, json};
 use tandem::{settings::Layer, token::Token};
@@ -6,7 +6,7 @@ use tandem_tests::TestServer;
 
 use super::team::Team;
 
-/// A command of the page: a tenth of a second in which a wrist moves and a hand closes.
+/// A command of an operator: a tenth of a second in which a wrist moves and a hand closes.
 fn tick(robot: &str, x_m: f64) -> Value {
     json!({ "steps": 5, "robots": [{
         "robot": robot, "carried": true, "vx_m_s": 0, "vy_m_s": 0, "yaw_rate_rad_s": 0,
@@ -22,10 +22,12 @@ fn everybody_may_read_the_page_and_nobody_acts_without_a_link() {
     let page = String::from_utf8_lossy(&page).into_owned();
     assert!(status == 200 && format!("{headers:?}").contains("default-src 'none'"), "{status} {headers:?}");
     assert!(!page.contains("http://") && !page.contains("https://"), "{page}");
-    for path in ["page.css", "operators/main.js", "operators/drive.js", "operators/start.js", "src/dom.js"] {
+    for path in ["page.css", "page.js"] {
         assert_eq!(server.ask("GET", &format!("/operate/{path}"), &[], b"").0, 200, "{path}");
     }
-    for path in ["/operate/", "/operate/other.js", "/operate/operators", "/operated", "/v1/tasks"] {
+    for path in
+        ["/operate/", "/operate/other.js", "/operate/drive", "/operate/collection", "/operated", "/v1/tasks"]
+    {
         assert_eq!(server.get(path).status, 401, "{path}");
     }
     let forged = [("authorization", "Bearer 0123456789abcdef0123456789abcdef01234567")];

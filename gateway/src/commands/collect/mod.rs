@@ -1,4 +1,6 @@
-//! `tandem collect`: demonstrations of the experts.
+//! `tandem collect`: demonstrations of the experts, or of people.
+
+mod people;
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -8,18 +10,23 @@ use tandem_episodes::{
     players,
 };
 use tandem_tools_spec::Assistance;
-use tracing_subscriber::filter::LevelFilter;
 
-use super::{CommandResult, evaluate::play_and_print, flags::EpisodeFlags, logging::log_to_stderr};
+use people::PeopleFlags;
 
-/// Record demonstrations of the experts as MCAP, one folder per episode.
+use super::{CommandResult, evaluate::play_and_print, flags::EpisodeFlags, logging::log_evaluation};
+
+/// Record demonstrations of the experts, or of people who drive in browsers, as MCAP, one folder per episode. Goes on where an
+/// interrupted run stopped.
 #[derive(Debug, clap::Args)]
 pub struct CollectArgs {
     #[command(flatten)]
     episodes: EpisodeFlags,
+    #[command(flatten)]
+    people: PeopleFlags,
     /// How much demonstrations of the same task differ in pace, pauses and ways, and how often hands miss and come back: 0 for
     /// not at all, to 3.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u8).range(..=i64::from(Variation::MOST_VARIETY)))]
+    #[arg(long, value_name = "N", default_value_t = 0, conflicts_with = "operators",
+          value_parser = clap::value_parser!(u8).range(..=i64::from(Variation::MOST_VARIETY)))]
     variety: u8,
     /// How much slow noise is added to what robots are told before they do it; 1 is 0.016 rad on the joints of arms, and 0.03 m/s
     /// and 0.06 rad/s on a base that walks. What they were told is recorded as the action.
@@ -44,7 +51,7 @@ fn parse_level(text: &str) -> Result<f32, String> {
 
 /// Plays and records.
 pub fn run(args: CollectArgs) -> CommandResult {
-    log_to_stderr(LevelFilter::INFO);
+    log_evaluation();
     let plan = args.episodes.plan(players::find("expert")?, true, Assistance::Full)?;
     let variation = Variation { variety: args.variety, disturb: args.disturb, ..plan.variation };
     let plan = EvaluationPlan {
@@ -52,6 +59,9 @@ pub fn run(args: CollectArgs) -> CommandResult {
         files: KeptFiles { pages: !args.no_reports, only_successful: args.only_successful },
         ..plan
     };
-    play_and_print(&plan, &args.out)?;
+    match args.people.operators() {
+        Some(_) => args.people.collect(plan, &args.out)?,
+        None => drop(play_and_print(&plan, &args.out)?),
+    }
     Ok(ExitCode::SUCCESS)
 }

@@ -1,0 +1,149 @@
+//! `tandem collect --operators`: demonstrations of people, who drive in browsers.
+
+use std::{
+    error::Error,
+    ffi::OsString,
+    io::{IsTerminal, stdout},
+    net::{Ipv4Addr, SocketAddr},
+    path::{Path, PathBuf},
+};
+
+use clap::Args;
+use tandem_episodes::{evaluation::EvaluationPlan, tasks::Task};
+
+use crate::{
+    commands::{evaluate::play_and_print, print},
+    drivers::People,
+    hosting::try_runs_folder,
+    http::qr_text,
+    settings::{Layer, Settings},
+};
+
+/// Has the system pick a free port.
+const FREE_PORT: u16 = 0;
+
+/// How long an episode waits for its people to begin, and to come back.
+const IDLE_S: u32 = 3600;
+
+/// Who drives, and where they reach this machine.
+#[derive(Debug, Args)]
+pub struct PeopleFlags {
+    /// Demonstrations of so many people in place of the experts': each drives one robot in a browser, by a link that is printed.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=3))]
+    operators: Option<u8>,
+    /// With --operators: address to serve their pages on, as 0.0.0.0:8700 for people at other machines [default: 127.0.0.1 and a free port].
+    #[arg(long, value_name = "ADDRESS", requires = "operators")]
+    listen: Option<SocketAddr>,
+    /// With --operators: name that they reach this machine by, for the links [default: its address].
+    #[arg(long, value_name = "HOST", requires = "operators")]
+    allowed_host: Option<String>,
+}
+
+impl PeopleFlags {
+    /// How many people are to drive, if any are.
+    pub fn operators(&self) -> Option<u8> {
+        self.operators
+    }
+
+    /// Has people play what of `plan` is not in `folder` yet. Those that somebody marks bad are put into a folder beside it.
+    pub fn collect(self, plan: EvaluationPlan, folder: &Path) -> Result<(), Box<dyn Error>> {
+        let robots = robots_of(&plan.tasks, self.operators)?;
+        let people = People::start(self.settings(&plan, folder)?, &robots, planned(&plan), aside(folder))?;
+        print(&invitation(&people)?)?;
+        let played = play_and_print(&EvaluationPlan { player: &people, jobs: 1, ..plan }, folder);
+        people.dismiss();
+        played.map(drop)
+    }
+
+    /// A server for these episodes alone.
+    fn settings(self, plan: &EvaluationPlan, folder: &Path) -> Result<Settings, Box<dyn Error>> {
+        let listen = self.listen.unwrap_or(SocketAddr::from((Ipv4Addr::LOCALHOST, FREE_PORT)));
+        let flags = Layer {
+            // The address is set below, where the server has its token.
+            allowed_host: self.allowed_host.map(|name| vec![name]),
+            runs: Some(folder.into()),
+            max_episodes: Some(1),
+            idle_timeout: Some(IDLE_S),
+            ..Layer::default()
+        };
+        let settings = Settings::resolve(flags, None)?;
+        try_runs_folder(&settings.runs)?;
+        Ok(Settings {
+            listen,
+            assistance: plan.assistance,
+            disclosure: plan.disclosure,
+            hints: plan.hints,
+            base_limits: plan.locomotion.load()?.limits(),
+            locomotion: plan.locomotion.clone(),
+            sensing: plan.sensing,
+            renderer: plan.renderer,
+            ..(*settings).clone()
+        })
+    }
+}
+
+/// The robots of all these tasks, one for each of `operators`.
+fn robots_of(tasks: &[&'static Task], operators: Option<u8>) -> Result<Vec<&'static str>, String> {
+    let wanted = usize::from(operators.unwrap_or_default());
+    if let Some(task) = tasks.iter().find(|task| task.robots.len() != wanted) {
+        let (id, robots) = (task.id, task.robots.len());
+        return Err(format!(
+            "{id} has {robots} robots, and each has its person; give --operators {robots}, or --tasks with {wanted} robots"
+        ));
+    }
+    Ok(tasks.first().map_or_else(Vec::new, |task| task.robot_names().collect()))
+}
+
+/// The episodes of a plan, in their order.
+fn planned(plan: &EvaluationPlan) -> Vec<(&'static str, u32)> {
+    plan.episodes().0.iter().map(|spec| (spec.task.id, spec.seed)).collect()
+}
+
+/// Where episodes are put that somebody marks bad: beside the folder, so that no data set is made of them.
+fn aside(folder: &Path) -> PathBuf {
+    let mut name = folder.file_name().map_or_else(OsString::new, OsString::from);
+    name.push("-bad");
+    folder.with_file_name(name)
+}
+
+/// The links, and on a terminal a QR code below each.
+fn invitation(people: &People) -> Result<String, Box<dyn Error>> {
+    let mut text = String::new();
+    for (robot, link) in people.links() {
+        text += &format!("robot {robot}: {link}\n");
+        if stdout().is_terminal() {
+            text += &format!("{}\n", qr_text(&link)?);
+        }
+    }
+    text += &format!("all links: {}\n", people.overview_link());
+    text += &format!("watch at {}\n", people.watch_link());
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use tandem_episodes::tasks;
+
+    use super::*;
+
+    #[test]
+    fn each_robot_has_a_person() {
+        let of = |ids: &[&str], operators| {
+            let tasks: Vec<_> = ids.iter().map(|id| tasks::find(id).unwrap()).collect();
+            robots_of(&tasks, Some(operators))
+        };
+        assert_eq!(of(&["handover", "pouring"], 2).unwrap(), ["A", "B"]);
+        assert_eq!(of(&["move_house"], 3).unwrap(), ["A", "B", "C"]);
+        let refused = of(&["handover", "move_house"], 2).unwrap_err();
+        assert!(
+            refused.contains("move_house has 3 robots") && refused.contains("--operators 3"),
+            "{refused}"
+        );
+    }
+
+    #[test]
+    fn bad_ones_are_beside_the_folder() {
+        assert_eq!(aside(Path::new("runs/people")), Path::new("runs/people-bad"));
+        assert_eq!(aside(Path::new("people")), Path::new("people-bad"));
+    }
+}

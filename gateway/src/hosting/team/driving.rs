@@ -1,0 +1,263 @@
+//! People who drive in real time. A page says up to 50 times a second where its robot's wrists, fingers and base are to be; every
+//! control step, what was said last becomes a `move_wrists` of one step by the operator of that robot, which goes through the team's
+//! rounds like any other command. So the world runs no faster than real time, and stands still while somebody is away.
+//!
+//! A log of 50 commands a second replays bit for bit, because the wall clock decides here, before a call is made, which word becomes a
+//! command, and nothing after it: the session sees whole control steps in the order of its calls, the recording holds each call with its
+//! numbers to the last bit, and replay makes the same calls again. Words that came to nothing leave no trace, in the world or the log.
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use tandem_tools_spec::{Call, MoveWrists, ToolCall, WristMove};
+use tokio::{
+    sync::mpsc,
+    time::{MissedTickBehavior, interval},
+};
+
+use super::{Team, Wheels};
+use crate::hosting::{Answer, EpisodeThread, HostingError};
+
+/// A control step.
+const TICK: Duration = Duration::from_millis(20);
+
+/// Who has said nothing for so long is away: a page that is hidden, or a link that is cut.
+const AWAY_AFTER: Duration = Duration::from_millis(500);
+
+/// The fastest that a wrist's target moves and turns, however far away the next word has it.
+const WRIST_M_PER_STEP: f64 = 1.5 * 0.02;
+const WRIST_RAD_PER_STEP: f64 = 6.0 * 0.02;
+
+/// Answers that a page may lag behind.
+const KEPT_ANSWERS: usize = 64;
+
+/// What a person wants of a robot from now on.
+#[derive(Debug, Clone)]
+pub struct Wish {
+    /// Where it is to be.
+    pub wrist_move: WristMove,
+    /// Whether time may pass.
+    pub go: bool,
+    /// Control steps that may pass though `go` does not say so, step by step.
+    pub steps: u32,
+}
+
+/// A person who drives; dropping it lets the robots go.
+#[derive(Debug)]
+pub struct Driver {
+    team: Arc<Team>,
+    seats: Vec<usize>,
+    number: u64,
+}
+
+/// Where a person drives from.
+#[derive(Debug)]
+pub struct Wheel {
+    /// Which of the drivers that this robot has had.
+    number: u64,
+    wish: Wish,
+    said: Instant,
+    /// What it was told last.
+    last: WristMove,
+    answers: mpsc::Sender<Result<Answer, HostingError>>,
+}
+
+impl Driver {
+    /// Takes the wheel of `robots`, the first of which is the person's own and the others stand still. Who drove them before does no
+    /// more: a page that was loaded again is the same person. What becomes of the commands comes by the receiver.
+    pub fn take(
+        team: &Arc<Team>,
+        episode: &Arc<EpisodeThread>,
+        robots: &[String],
+    ) -> Result<(Driver, mpsc::Receiver<Result<Answer, HostingError>>), HostingError> {
+        let seats = robots.iter().map(|robot| team.seat(robot)).collect::<Result<Vec<usize>, _>>()?;
+        let (sender, answers) = mpsc::channel(KEPT_ANSWERS);
+        let mut wheels = team.wheels();
+        wheels.drivers += 1;
+        let number = wheels.drivers;
+        for (seat, robot) in seats.iter().zip(robots) {
+            let hold = WristMove::hold(robot);
+            let wish = Wish { wrist_move: hold.clone(), go: false, steps: 0 };
+            let wheel = Wheel { number, wish, said: Instant::now(), last: hold, answers: sender.clone() };
+            wheels.seats[*seat] = Some(wheel);
+        }
+        if !std::mem::replace(&mut wheels.turning, true) {
+            tokio::spawn(turn(team.clone(), episode.clone()));
+        }
+        Ok((Driver { team: team.clone(), seats, number }, answers))
+    }
+
+    /// What the person wants from now on of its own robot; the others stand still, and time may pass for them when it may for it.
+    pub fn say(&self, wish: &Wish) {
+        let mut wheels = self.team.wheels();
+        for (place, seat) in self.seats.iter().enumerate() {
+            if let Some(wheel) = wheels.seats[*seat].as_mut().filter(|wheel| wheel.number == self.number) {
+                wheel.said = Instant::now();
+                wheel.wish.go = wish.go;
+                wheel.wish.steps = wheel.wish.steps.saturating_add(wish.steps);
+                if place == 0 {
+                    wheel.wish.wrist_move = wish.wrist_move.clone();
+                }
+            }
+        }
+    }
+
+    /// The robots that the person waits for: those of others, while its own command has been waiting for longer than a moment.
+    pub fn waits_for(&self) -> Vec<String> {
+        let wheels = self.team.wheels();
+        let since = self.seats.first().and_then(|seat| wheels.under_way[*seat]);
+        match since.is_some_and(|since| since.elapsed() > AWAY_AFTER) {
+            true => self.team.round().awaited(),
+            false => Vec::new(),
+        }
+    }
+}
+
+impl Drop for Driver {
+    fn drop(&mut self) {
+        let mut wheels = self.team.wheels();
+        for seat in &self.seats {
+            wheels.seats[*seat].take_if(|wheel| wheel.number == self.number);
+        }
+    }
+}
+
+/// Makes commands of what people say, a control step after another, until nobody drives any more or the episode has ended.
+async fn turn(team: Arc<Team>, episode: Arc<EpisodeThread>) {
+    let mut ticks = interval(TICK);
+    // What could not be done in time is left out, so that time never runs after itself.
+    ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
+    loop {
+        ticks.tick().await;
+        let due = {
+            let mut wheels = team.wheels();
+            if episode.ended() || wheels.seats.iter().all(Option::is_none) {
+                wheels.turning = false;
+                return;
+            }
+            wheels.due(Instant::now())
+        };
+        for (seat, wrist_move) in due {
+            let (team, episode) = (team.clone(), episode.clone());
+            tokio::spawn(async move {
+                let robot = wrist_move.robot.clone();
+                let command = ToolCall::from(MoveWrists { steps: 1, robots: vec![wrist_move] });
+                let call = Call { short: true, ..command.into() };
+                let answer = team.call(&episode, &robot, call).await;
+                let mut wheels = team.wheels();
+                wheels.under_way[seat] = None;
+                if let Some(wheel) = &wheels.seats[seat] {
+                    // A page that does not read its answers misses some.
+                    let _ = wheel.answers.try_send(answer);
+                }
+            });
+        }
+    }
+}
+
+impl Wheels {
+    /// The seats that command now, and what: those whose last command is answered, of whom time may pass.
+    fn due(&mut self, now: Instant) -> Vec<(usize, WristMove)> {
+        let mut found = Vec::new();
+        for (seat, (wheel, under_way)) in self.seats.iter_mut().zip(&mut self.under_way).enumerate() {
+            let Some(wheel) = wheel else { continue };
+            let is_there = now.duration_since(wheel.said) < AWAY_AFTER;
+            let Wish { go, steps, wrist_move } = &mut wheel.wish;
+            if under_way.is_some() || !((*go && is_there) || *steps > 0) {
+                continue;
+            }
+            *steps = steps.saturating_sub(1);
+            wheel.last = within_speed(wrist_move, &wheel.last);
+            *under_way = Some(now);
+            found.push((seat, wheel.last.clone()));
+        }
+        found
+    }
+}
+
+/// `wanted`, with wrists that go no further from where they were told to be last than a step allows.
+fn within_speed(wanted: &WristMove, last: &WristMove) -> WristMove {
+    WristMove {
+        left_position_m: nearer(wanted.left_position_m, last.left_position_m),
+        right_position_m: nearer(wanted.right_position_m, last.right_position_m),
+        left_quaternion_wxyz: turned(wanted.left_quaternion_wxyz, last.left_quaternion_wxyz),
+        right_quaternion_wxyz: turned(wanted.right_quaternion_wxyz, last.right_quaternion_wxyz),
+        ..wanted.clone()
+    }
+}
+
+fn nearer(wanted_m: Option<[f64; 3]>, last_m: Option<[f64; 3]>) -> Option<[f64; 3]> {
+    let (Some(to), Some(from)) = (wanted_m.map(Vector3::from), last_m.map(Vector3::from)) else {
+        return wanted_m;
+    };
+    let away = to - from;
+    match away.norm() {
+        far if far > WRIST_M_PER_STEP => Some((from + away * (WRIST_M_PER_STEP / far)).into()),
+        _ => wanted_m,
+    }
+}
+
+fn turned(wanted_wxyz: Option<[f64; 4]>, last_wxyz: Option<[f64; 4]>) -> Option<[f64; 4]> {
+    let unit = |[w, x, y, z]: [f64; 4]| UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6);
+    let (Some(to), Some(from)) = (wanted_wxyz.and_then(unit), last_wxyz.and_then(unit)) else {
+        return wanted_wxyz;
+    };
+    match from.angle_to(&to) {
+        far if far > WRIST_RAD_PER_STEP => {
+            let between = from.try_slerp(&to, WRIST_RAD_PER_STEP / far, 1e-9).unwrap_or(to);
+            Some([between.w, between.i, between.j, between.k])
+        }
+        _ => wanted_wxyz,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wheels(wish: Wish) -> Wheels {
+        let (answers, _) = mpsc::channel(1);
+        let wheel = Wheel { number: 1, last: wish.wrist_move.clone(), wish, said: Instant::now(), answers };
+        Wheels { seats: vec![Some(wheel), None], under_way: vec![None; 2], ..Wheels::default() }
+    }
+
+    #[test]
+    fn a_robot_moves_while_its_person_is_there_and_never_twice_in_a_step() {
+        let wish = |go, steps| Wish { wrist_move: WristMove::hold("A"), go, steps };
+        let now = Instant::now();
+        assert_eq!(wheels(wish(true, 0)).due(now).len(), 1);
+        assert_eq!(wheels(wish(false, 0)).due(now).len(), 0);
+        assert_eq!(wheels(wish(true, 0)).due(now + 2 * AWAY_AFTER).len(), 0, "a cut link moves nothing");
+        let mut stepped = wheels(wish(false, 2));
+        for expected in [1, 0] {
+            assert_eq!(stepped.due(now).len(), expected, "the command is not answered yet");
+        }
+        for expected in [1, 0] {
+            stepped.under_way[0] = None;
+            assert_eq!(stepped.due(now).len(), expected, "two steps were asked for");
+        }
+    }
+
+    #[test]
+    fn targets_move_no_faster_than_they_may() {
+        let at = |x_m: f64, turn: f64| WristMove {
+            right_position_m: Some([x_m, 0.0, 0.0]),
+            right_quaternion_wxyz: Some([(turn / 2.0).cos(), 0.0, 0.0, (turn / 2.0).sin()]),
+            ..WristMove::hold("A")
+        };
+        let near = at(0.01, 0.05);
+        assert_eq!(within_speed(&near, &at(0.0, 0.0)), near, "what is near enough stays to the last bit");
+        let mut last = at(0.0, 0.0);
+        for step in 1..=10 {
+            last = within_speed(&at(0.1, 0.5), &last);
+            let [x_m, ..] = last.right_position_m.unwrap();
+            assert!((x_m - (f64::from(step) * WRIST_M_PER_STEP).min(0.1)).abs() < 1e-9, "{x_m}");
+        }
+        assert_eq!(last, at(0.1, 0.5));
+        let begun = within_speed(&at(0.4, 1.0), &WristMove::hold("A"));
+        assert_eq!(begun, at(0.4, 1.0), "where it has no target yet, the first is its own");
+    }
+}

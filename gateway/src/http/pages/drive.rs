@@ -1,0 +1,247 @@
+//! The socket by which a person drives: the page says what its robot is to do, and is told every control step as those are who watch.
+
+use std::{io, sync::Arc, time::Duration};
+
+use axum::{
+    Extension,
+    extract::{Request, State},
+    http::{HeaderValue, StatusCode, header},
+    response::{IntoResponse, Response},
+};
+use serde::Deserialize;
+use serde_json::{Map, Value, json};
+use tandem_episodes::live::{LiveEvent, LiveScene, LiveStep};
+use tandem_tools_spec::{Disclosure, ToolReply, WristMove};
+use tokio::{
+    sync::{
+        broadcast::error::{RecvError, TryRecvError},
+        mpsc,
+    },
+    time::{MissedTickBehavior, interval},
+};
+
+use super::socket::{PageReader, PageSender, PageSocket, upgrade};
+use crate::{
+    hosting::{Answer, Caller, Driver, HostingError, LiveWatch, Wish},
+    http::{app::AppState, problem::ApiError},
+};
+
+/// Where the socket is.
+pub const DRIVE: &str = "/operate/drive";
+
+/// Where the cookie for it is given.
+pub const ENTER: &str = "/operate/enter";
+
+/// What the cookies are called that hold operators' tokens, before the name of the robot.
+const COOKIE: &str = "tandem_operator_";
+
+/// How often a page is told for whom its robot waits.
+const STATUS_INTERVAL: Duration = Duration::from_millis(250);
+
+/// With every so many answers a page gets the whole report, five times a second.
+const ANSWERS_PER_REPORT: usize = 10;
+
+/// The robots that a request for the socket may drive: for each a cookie has the token of its operator.
+#[derive(Debug, Clone)]
+pub struct DrivenRobots(pub Vec<String>);
+
+/// What a page says.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Word {
+    /// As an entry of `move_wrists`, without the robot's name.
+    #[serde(rename = "move")]
+    wrist_move: Map<String, Value>,
+    /// Whether time may pass.
+    go: bool,
+    /// Step by step: so many control steps.
+    #[serde(default)]
+    steps: u32,
+}
+
+/// The token of a request for the cookie; the gate takes it from every other request.
+#[derive(Clone)]
+pub struct GivenToken(pub String);
+
+/// An operator gets the cookie that opens the socket: a browser sends no other header with a request for one. No script reads it, and no
+/// other site's page has it sent.
+pub async fn enter(
+    Extension(caller): Extension<Caller>,
+    Extension(GivenToken(token)): Extension<GivenToken>,
+) -> Result<Response, ApiError> {
+    let robot = caller.robot().ok_or(HostingError::NeedsOperator)?;
+    let cookie = format!("{COOKIE}{robot}={token}; Path={DRIVE}; HttpOnly; SameSite=Strict");
+    let cookie: HeaderValue = cookie.parse().map_err(|_| ApiError::NoToken)?;
+    Ok((StatusCode::NO_CONTENT, [(header::SET_COOKIE, cookie)]).into_response())
+}
+
+/// The operators of `robots=A,C` in the query of a request for the socket whose cookies name their tokens: whom it comes from, and all
+/// robots that it may drive. They are of one episode.
+pub fn drivers(app: &AppState, request: &Request) -> Option<(Caller, DrivenRobots)> {
+    let wanted = request.uri().query()?.strip_prefix("robots=")?;
+    let lines = request.headers().get_all(header::COOKIE).into_iter().filter_map(|line| line.to_str().ok());
+    let cookies: Vec<(&str, &str)> =
+        lines.flat_map(|line| line.split(';')).filter_map(|pair| pair.trim().split_once('=')).collect();
+    let operator = |robot: &str| {
+        let named = cookies.iter().filter(|(name, _)| name.strip_prefix(COOKIE) == Some(robot));
+        let mut operators = named.filter_map(|(_, token)| app.table.operator(token));
+        operators.find(|caller| caller.robot() == Some(robot))
+    };
+    let callers = wanted.split(',').map(operator).collect::<Option<Vec<Caller>>>()?;
+    let first = callers.first()?.clone();
+    let same = |caller: &Caller| match (caller, &first) {
+        (Caller::Operator { episode, .. }, Caller::Operator { episode: other, .. }) => episode == other,
+        _ => false,
+    };
+    callers
+        .iter()
+        .all(same)
+        .then(|| (first.clone(), DrivenRobots(wanted.split(',').map(str::to_owned).collect())))
+}
+
+/// The socket.
+pub async fn drive(
+    State(app): State<AppState>,
+    Extension(caller): Extension<Caller>,
+    robots: Option<Extension<DrivenRobots>>,
+    request: Request,
+) -> Result<Response, ApiError> {
+    let (Caller::Operator { episode, robot }, Some(Extension(DrivenRobots(robots)))) = (&caller, robots)
+    else {
+        return Err(HostingError::NeedsOperator.into());
+    };
+    let hosted = app.table.hosted(episode)?;
+    let team = hosted.team.clone().ok_or(HostingError::NeedsOperator)?;
+    let (watch, every_step) = hosted.thread.watch_driving(robot).await?;
+    let (driver, answers) = Driver::take(&team, &hosted.thread, &robots)?;
+    let (robot, disclosure) = (robot.clone(), app.settings.disclosure);
+    upgrade(request, move |PageSocket { mut sender, mut reader }| async move {
+        let _every_step = every_step;
+        let driver = Arc::new(driver);
+        let page = DriversPage { robot, disclosure, driver: driver.clone() };
+        tokio::select! {
+            told = page.tell(&mut sender, watch, answers) => {
+                told?;
+                sender.close().await
+            }
+            heard = hear(&mut reader, &page.robot, &driver) => heard,
+        }
+    })
+}
+
+/// Takes in what a page says until it has gone. What cannot be read ends it, because nobody knows what it wants.
+async fn hear(reader: &mut PageReader, robot: &str, driver: &Driver) -> io::Result<()> {
+    while let Some(text) = reader.text().await? {
+        let Word { mut wrist_move, go, steps } = serde_json::from_str(&text)?;
+        wrist_move.insert("robot".into(), robot.into());
+        let wrist_move: WristMove = serde_json::from_value(Value::Object(wrist_move))?;
+        driver.say(&Wish { wrist_move, go, steps });
+    }
+    Ok(())
+}
+
+/// A page that drives, as it is told what happens.
+struct DriversPage {
+    robot: String,
+    disclosure: Disclosure,
+    driver: Arc<Driver>,
+}
+
+impl DriversPage {
+    /// Tells the scene, and then what happens, until nothing does any more or another page has taken the wheel.
+    async fn tell(
+        &self,
+        sender: &mut PageSender,
+        watch: LiveWatch,
+        mut answers: mpsc::Receiver<Result<Answer, HostingError>>,
+    ) -> io::Result<()> {
+        let LiveWatch { view, mut events } = watch;
+        let scene = view.scene;
+        let more = json!({ "robot": self.robot, "frames": 1 });
+        sender.bytes(scene.message(more, &view.now.frame(&scene))).await?;
+        let mut statuses = interval(STATUS_INTERVAL);
+        statuses.set_missed_tick_behavior(MissedTickBehavior::Skip);
+        let (mut waited_for, mut count) = (Vec::new(), 0);
+        loop {
+            tokio::select! {
+                event = events.recv() => match event {
+                    Ok(LiveEvent::Step(step)) => self.newest(sender, &scene, step, &mut events).await?,
+                    Ok(event) => self.event(sender, &scene, event).await?,
+                    Err(RecvError::Lagged(_)) => {}
+                    Err(RecvError::Closed) => return Ok(()),
+                },
+                answer = answers.recv() => match answer {
+                    Some(answer) => self.answer(sender, answer, &mut count).await?,
+                    // Another page drives.
+                    None => return sender.text(json!({ "kind": "replaced" }).to_string()).await,
+                },
+                _ = statuses.tick() => {
+                    let waits_for = self.driver.waits_for();
+                    if waits_for != waited_for {
+                        sender.text(json!({ "kind": "waits", "for": waits_for }).to_string()).await?;
+                        waited_for = waits_for;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Tells the newest of the steps that have come, and all else. A page that is slow gets what is newest.
+    async fn newest(
+        &self,
+        sender: &mut PageSender,
+        scene: &LiveScene,
+        mut step: Arc<LiveStep>,
+        events: &mut tokio::sync::broadcast::Receiver<LiveEvent>,
+    ) -> io::Result<()> {
+        let mut others = Vec::new();
+        loop {
+            match events.try_recv() {
+                Ok(LiveEvent::Step(newer)) => step = newer,
+                Ok(other) => others.push(other),
+                Err(TryRecvError::Lagged(_)) => {}
+                // That it is closed is found again.
+                Err(TryRecvError::Empty | TryRecvError::Closed) => break,
+            }
+        }
+        sender.bytes(step.frame(scene).to_vec()).await?;
+        for other in others {
+            self.event(sender, scene, other).await?;
+        }
+        Ok(())
+    }
+
+    async fn event(&self, sender: &mut PageSender, scene: &LiveScene, event: LiveEvent) -> io::Result<()> {
+        match event {
+            LiveEvent::Step(step) => sender.bytes(step.frame(scene).to_vec()).await,
+            LiveEvent::Ended(result) => {
+                let result = (*result).clone().disclosed(self.disclosure);
+                sender.text(json!({ "kind": "ended", "result": result }).to_string()).await
+            }
+            // What its own commands came to, a page is told as any operator is.
+            LiveEvent::Entry(_) | LiveEvent::Phase(_) => Ok(()),
+        }
+    }
+
+    /// Tells what came of a command: all of it now and then, and whenever a partner speaks or is away.
+    async fn answer(
+        &self,
+        sender: &mut PageSender,
+        answer: Result<Answer, HostingError>,
+        count: &mut usize,
+    ) -> io::Result<()> {
+        let text = match answer {
+            Ok(answer) => {
+                *count += 1;
+                let own = matches!(&answer.reply, ToolReply::Act(reply) if reply.robots.iter().any(|report| report.robot == self.robot));
+                let due = own && *count % ANSWERS_PER_REPORT == 1;
+                if !due && answer.heard.is_empty() {
+                    return Ok(());
+                }
+                json!({ "kind": "report", "report": answer })
+            }
+            Err(refused) => json!({ "kind": "refused", "detail": ApiError::from(refused).body().detail }),
+        };
+        sender.text(text.to_string()).await
+    }
+}

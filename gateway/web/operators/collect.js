@@ -1,0 +1,85 @@
+// Episodes that the same people play one after another: each has one link for all of them. Between two episodes the page says what comes
+// next, and asks whether the last one was good.
+
+import { element, words } from "../src/dom.js";
+import { call } from "./call.js";
+import { drive } from "./drive.js";
+import { linkRow } from "./links.js";
+
+const POLL_MS = 700;
+const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
+
+/** Whoever sits on `seat` drives, marks and waits until all episodes are there. */
+export async function collect(main, seat) {
+  for (let driven = null; ;) {
+    const progress = await ask(main, seat);
+    const { stage, episode } = progress;
+    if (stage === "over") return show(main, progress, element("p", {}, "That was the last one. Thank you."));
+    if (stage === "playing" && driven !== episode.episode_id + episode.number) {
+      await invited(main, progress, seat.robot);
+      const leave = await drive(main, { ...seat, episode: episode.episode_id });
+      leave?.();
+      driven = episode.episode_id + episode.number;
+    } else if (stage === "marking" && progress.marks[progress.robots.indexOf(seat.robot)] === null) {
+      await marked(main, progress, seat);
+    } else {
+      show(main, progress, element("p", { role: "status" }, stage === "marking" ? `Waiting for ${missing(progress)} to mark it.` : "The next episode is made ready."));
+      await sleep(POLL_MS);
+    }
+  }
+}
+
+/** How far the collection is; asks again while the server cannot be reached. */
+async function ask(main, seat) {
+  for (;;) {
+    try {
+      return await call("/operate/collection", seat.token);
+    } catch (error) {
+      main.replaceChildren(element("h1", {}, "Nothing to drive"), element("p", { class: "bad", role: "alert" }, error.status ? error.message : "The collection has ended, or its server cannot be reached. This page tries again."));
+      await sleep(5 * POLL_MS);
+    }
+  }
+}
+
+const missing = ({ robots, marks }) => robots.filter((_, seat) => marks[seat] === null).join(" and ");
+
+function show(main, { episode, planned, good, bad }, ...below) {
+  const title = episode ? `Episode ${episode.number} of ${planned}: ${words(episode.task)}, seed ${episode.seed}` : `${planned} episodes`;
+  const counts = good + bad > 0 ? element("p", { class: "soft" }, `Good so far: ${good}; bad: ${bad}.`) : null;
+  main.replaceChildren(element("h1", {}, title), ...[counts, ...below].filter(Boolean));
+}
+
+/** Time begins when everybody has said that they are there. */
+const invited = (main, progress, robot) => new Promise((done) => {
+  const begin = element("button", { type: "button", class: "large", onclick: done }, "Begin");
+  show(main, progress, element("p", {}, `You drive robot ${robot}. Time passes once everybody has begun.`), begin);
+  begin.focus();
+});
+
+/** What one person says of the episode. */
+const marked = (main, progress, seat) => new Promise((done) => {
+  const refusal = element("p", { class: "bad", role: "alert" });
+  const say = (good) => call("/operate/mark", seat.token, { good }).then(done, (error) => { refusal.textContent = error.message; });
+  show(main, progress,
+    element("p", {}, "Was it good? It is kept as a demonstration if everybody says so. Otherwise it is put aside, and played again when the collection is run again."),
+    element("div", { class: "tools" },
+      element("button", { type: "button", class: "large", onclick: () => say(true) }, "Good"),
+      element("button", { type: "button", class: "large", onclick: () => say(false) }, "Bad")), refusal);
+});
+
+/** The page of whoever runs the collection: a link for each person, and how far they are. */
+export async function overview(main, seat) {
+  const links = element("ul", { class: "links" });
+  const progress = await ask(main, seat);
+  for (const { robot, token } of progress.operators) {
+    const given = new URLSearchParams({ collection: 1, robot, token });
+    links.append(await linkRow(`Drive robot ${robot}`, `${location.origin}/operate#${given}`, seat.token));
+  }
+  const at = element("p", { role: "status" });
+  for (let now = progress; ; now = await ask(main, seat)) {
+    show(main, now, at, element("h2", {}, "Links"), element("p", {}, "Send each person one of these, and nobody else: who has the link drives the robot, in all episodes."), links);
+    at.textContent = { preparing: "The next episode is made ready.", playing: "They play.", marking: `Waiting for ${missing(now)} to mark it.`, over: "All episodes are there." }[now.stage];
+    if (now.stage === "over") return;
+    await sleep(POLL_MS);
+  }
+}

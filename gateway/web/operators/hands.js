@@ -1,0 +1,68 @@
+// Where a person wants the wrists of a robot to be: poses in its pelvis frame, which go where the pelvis goes. What is shown of them is
+// what the person said, at once, and not what the server has heard of it: on a slow link the hand follows its handle.
+
+import { Quaternion, Vector3 } from "three";
+import { POSE, SIDES } from "../src/message.js";
+
+/** A target is never further from its wrist: what is dragged against a table does not wind up. */
+const LEASH_M = 0.2;
+
+export class Hands {
+  /** @param {number} robot Its number in the scene. */
+  constructor(robot) {
+    this.robot = robot;
+    this.pelvis = { position: new Vector3(), turn: new Quaternion() };
+    this.measured = Object.fromEntries(SIDES.map((side) => [side, { position: new Vector3(), turn: new Quaternion() }]));
+    this.letGo();
+  }
+
+  /** Takes in a step. */
+  see(frame) {
+    const { row, layout } = frame;
+    readPose(row, layout.links[this.robot], this.pelvis);
+    const back = this.pelvis.turn.clone().invert();
+    SIDES.forEach((side, index) => {
+      const wrist = this.measured[side];
+      readPose(row, frame.hand(this.robot, index).wrist, wrist);
+      wrist.position.sub(this.pelvis.position).applyQuaternion(back);
+      wrist.turn.premultiply(back);
+    });
+  }
+
+  /** The wrists have no targets any more: their arms stay as they are. */
+  letGo() {
+    this.targets = { left: null, right: null };
+  }
+
+  /** Moves a target by a way in the pelvis frame, no further than its leash. */
+  shift(side, by) {
+    const from = this.measured[side].position;
+    const to = (this.targets[side] ?? from).clone().add(by);
+    this.targets[side] = to.sub(from).clampLength(0, LEASH_M).add(from);
+  }
+
+  /** A way in the world as one in the pelvis frame. */
+  inPelvis(way) {
+    return way.clone().applyQuaternion(this.pelvis.turn.clone().invert());
+  }
+
+  /** Where a handle is, in the world. */
+  inWorld(side) {
+    return (this.targets[side] ?? this.measured[side].position).clone().applyQuaternion(this.pelvis.turn).add(this.pelvis.position);
+  }
+
+  /** The part of a `move_wrists` entry that is about wrists. */
+  wrists() {
+    const move = { carried: true };
+    for (const side of SIDES) {
+      if (this.targets[side]) move[`${side}_position_m`] = this.targets[side].toArray();
+    }
+    return move;
+  }
+}
+
+function readPose(row, at, { position, turn }) {
+  if (at + POSE > row.length) throw new Error("a row is too short");
+  position.fromArray(row, at);
+  turn.fromArray(row, at + 3);
+}

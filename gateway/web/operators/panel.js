@@ -1,0 +1,105 @@
+// What the page of a person who drives is made of.
+
+import { element, say, words } from "../src/dom.js";
+import { SIDES } from "../src/message.js";
+
+/** There is nothing to drive, and why. */
+export function nothing(main, why) {
+  main.replaceChildren(element("h1", {}, "Nothing to drive"), element("p", { class: "bad", role: "alert" }, why),
+    element("p", {}, "The link may be of another start of the server, or the episode has ended. ", element("a", { href: "/operate" }, "Start another")));
+}
+
+/** Lays the page out; answers with what changes it. `on` hears what the person does beside driving. */
+export function layOut(main, robot, briefing, on) {
+  const part = briefing.instructions.find((entry) => entry.robot === robot)?.instruction ?? "";
+  const status = element("p", { role: "status", class: "operate-status" }, "Looking.");
+  const handles = Object.fromEntries(SIDES.map((side) => [side, element("button", { type: "button", class: `handle ${side}`, "aria-label": `${side} wrist: drag` }, side[0].toUpperCase())]));
+  const border = element("div", { class: "operate-border", title: `what robot ${robot} sees` });
+  const view = element("div", { class: "view" });
+  const place = element("div", { class: "operate-view" }, view, border, ...Object.values(handles));
+  const facts = element("p", { class: "soft" });
+  const button = (text, action, key) => element("button", { type: "button", onclick: () => on.act(action) }, key ? `${text} (${key})` : text);
+  const pause = button("Pause", "pause");
+  const step = button("Step", "step", "Enter");
+  const which = element("span", {});
+  const chat = talk(robot, on.speak);
+  const looks = element("select", { "aria-label": "View", onchange: (event) => on.look(event.target.value) },
+    element("option", { value: "robot" }, `as robot ${robot} looks`), element("option", { value: "free" }, "from anywhere"));
+  const stepwise = element("input", { type: "checkbox", onchange: (event) => on.stepwise(event.target.checked) });
+  main.replaceChildren(
+    element("h1", {}, `You drive robot ${robot}`), element("p", {}, part), status,
+    element("div", { class: "columns operate" },
+      element("div", {}, place, facts),
+      element("div", {},
+        element("div", { class: "tools" }, looks, element("label", {}, stepwise, " step by step"), step),
+        element("div", { class: "tools" }, button("Left hand", "left", "1"), button("Right hand", "right", "2")),
+        element("div", { class: "tools" }, button("Open", "open", "O"), button("Close", "close", "C"), button("Let go of targets", "clutch", "space")),
+        element("div", { class: "tools" }, pause, element("button", { type: "button", onclick: () => on.finish() }, "Finish")),
+        element("p", {}, which),
+        element("p", { class: "soft" }, "Drag a handle; with Shift, or by the wheel, towards you and away. Arrow keys, Page Up and Page Down move the hand. W A S D walk, Q and E turn, R and F raise and lower. Gamepad: sticks walk and turn, triggers close, bumpers let go of targets."),
+        element("h2", {}, "Talk"), ...chat.elements)));
+  const cursors = new Map();
+  return {
+    view, handles,
+    heard: chat.heard,
+    status: (said) => say(status, said),
+    /** Shows where the robot's picture ends, if the view is the robot's. */
+    border: (shown, camera) => {
+      border.hidden = !shown;
+      if (camera) place.style.setProperty("--seen", String(camera.width / camera.height));
+    },
+    handle: (side, at) => put(handles[side], at, true),
+    /** Where a partner wants a wrist to be. */
+    cursor: (name, side, at) => {
+      const key = name + side;
+      if (!cursors.has(key)) {
+        cursors.set(key, element("span", { class: "cursor", "aria-hidden": "true" }, `${name} ${side}`));
+        place.append(cursors.get(key));
+      }
+      put(cursors.get(key), at, false);
+    },
+    facts: (reply, own) => say(facts, factsOf(reply, own)),
+    label: ({ hand, paused, stepwise: steps }) => {
+      say(which, `Keys move the ${hand} hand.`);
+      say(pause, paused ? "Go on" : "Pause");
+      step.hidden = !steps;
+      for (const side of SIDES) handles[side].setAttribute("aria-pressed", String(side === hand));
+    },
+  };
+}
+
+/** Puts something where it is seen; a handle that lies outside of the picture is at its border, and other things are not shown. */
+function put(thing, { x, y, ahead }, always) {
+  const inside = ahead && Math.abs(x) <= 1 && Math.abs(y) <= 1;
+  thing.hidden = !inside && !always;
+  // What lies behind is seen mirrored.
+  const [u, v] = ahead ? [x, y] : [-x, -Math.abs(y) - 1];
+  const within = (share) => `clamp(1.6rem, ${100 * Math.max(0, Math.min(1, share))}%, 100% - 1.6rem)`;
+  thing.style.left = within((1 + u) / 2);
+  thing.style.top = within((1 - v) / 2);
+}
+
+/** What people say to each other. */
+function talk(robot, speak) {
+  const chat = element("ul", { class: "chat", "aria-live": "polite" });
+  const text = element("input", { maxlength: 500, "aria-label": "Say to the others", placeholder: "Say to the others" });
+  const heard = (from, said) => { chat.append(element("li", {}, element("strong", {}, `${from}: `), said)); chat.scrollTop = chat.scrollHeight; };
+  const submit = (event) => {
+    event.preventDefault();
+    const said = text.value.trim();
+    if (!said) return;
+    text.value = "";
+    speak(said).then((reply) => { heard(robot, said); (reply.heard ?? []).forEach((word) => heard(word.from, word.text)); }, (error) => heard("not said", error.message));
+  };
+  return { heard, elements: [chat, element("form", { onsubmit: submit, class: "tools" }, text, element("button", {}, "Say"))] };
+}
+
+/** What the hands do, and what is left. */
+function factsOf(reply, own) {
+  const hands = own ? SIDES.map((side) => {
+    const { state: does, grip } = own[side];
+    return [`${side} hand`, does && words(does), grip && grip !== "none" ? `grips: ${words(grip)}` : null].filter(Boolean).join(" ");
+  }) : [];
+  const phases = (reply.phases ?? []).map(({ id }) => words(id));
+  return [...hands, `${(reply.budget.steps_left / 50).toFixed(0)} s left`, phases.length > 0 ? `reached: ${phases.join(", ")}` : null].filter(Boolean).join(" · ");
+}

@@ -1,0 +1,186 @@
+//! People who drive in real time by a socket each: what they say moves their robot and no other, time stands still while one is away, and
+//! the recording comes to the same again.
+
+use std::{
+    net::TcpStream,
+    time::{Duration, Instant},
+};
+
+use serde_json::{Value, json};
+use tungstenite::{Message, WebSocket, client::IntoClientRequest};
+
+use super::team::Team;
+
+/// A page that drives.
+struct DriversSocket {
+    socket: WebSocket<TcpStream>,
+    scene: Value,
+    /// The last row that has come.
+    row: Vec<f32>,
+}
+
+/// The status of a request for the socket with these headers, or the socket.
+fn ask_for(
+    team: &Team,
+    robots: &str,
+    headers: &[(&'static str, String)],
+) -> Result<WebSocket<TcpStream>, u16> {
+    let address = format!("ws://{}/operate/drive?robots={robots}", team.server.address);
+    let mut request = address.into_client_request().expect("a request");
+    for (name, value) in headers {
+        request.headers_mut().insert(*name, value.parse().expect("a header"));
+    }
+    let stream = TcpStream::connect(team.server.address).expect("a connection");
+    let opened = tungstenite::client(request, stream.try_clone().expect("a stream"));
+    // What is read from now on may not have come yet.
+    stream.set_read_timeout(Some(Duration::from_millis(15))).expect("a limit");
+    match opened {
+        Ok((socket, _)) => Ok(socket),
+        Err(tungstenite::HandshakeError::Failure(tungstenite::Error::Http(answer))) => {
+            Err(answer.status().as_u16())
+        }
+        Err(error) => panic!("{error}"),
+    }
+}
+
+impl DriversSocket {
+    /// Enters as the operator of robot number `robot`, as the page does.
+    fn open(team: &Team, robot: usize) -> DriversSocket {
+        let name = ["A", "B"][robot];
+        let bearer = format!("Bearer {}", team.tokens[robot]);
+        let headers = [("authorization", bearer.as_str()), ("content-type", "application/json")];
+        let (status, given, _) = team.server.ask("POST", "/operate/enter", &headers, b"{}");
+        let cookie = given["set-cookie"].to_str().expect("a cookie").to_owned();
+        assert!(
+            status == 204 && cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"),
+            "{cookie}"
+        );
+        let cookie = cookie.split(';').next().expect("its value").to_owned();
+        let mut socket = ask_for(team, name, &[("cookie", cookie)]).expect("a socket");
+        let message = loop {
+            match socket.read() {
+                Ok(Message::Binary(bytes)) => break bytes,
+                Ok(_) => {}
+                Err(tungstenite::Error::Io(_)) => {}
+                Err(error) => panic!("{error}"),
+            }
+        };
+        let size = u32::from_le_bytes(message[..4].try_into().expect("four bytes")) as usize;
+        let scene = serde_json::from_slice(&message[4..4 + size]).expect("JSON");
+        DriversSocket { socket, scene, row: Vec::new() }
+    }
+
+    fn say(&mut self, wrist_move: Value, go: bool) {
+        let word = json!({ "move": wrist_move, "go": go }).to_string();
+        self.socket.send(Message::text(word)).expect("a page that is heard");
+    }
+
+    /// Takes in what has come.
+    fn read(&mut self) {
+        loop {
+            match self.socket.read() {
+                Ok(Message::Binary(bytes)) => {
+                    let number = |four: &[u8]| f32::from_le_bytes(four.try_into().expect("four bytes"));
+                    self.row = bytes.chunks_exact(4).map(number).collect();
+                    return;
+                }
+                Ok(_) => {}
+                Err(tungstenite::Error::Io(_)) => return,
+                Err(error) => panic!("{error}"),
+            }
+        }
+    }
+
+    fn step(&self) -> f32 {
+        self.row.get(1).copied().unwrap_or_default()
+    }
+
+    /// The place of a robot's right wrist in its pelvis frame, as nearly as a robot that stands has it.
+    fn wrist_m(&self, robot: usize) -> [f32; 3] {
+        let robots = self.scene["robots"].as_array().expect("robots");
+        let links = |robot: &Value| robot["links"].as_u64().expect("links") as usize * 7;
+        let all_links: usize = robots.iter().map(links).sum();
+        let before: usize = robots[..robot].iter().map(links).sum();
+        let objects = self.scene["objects"].as_array().expect("objects").len() * 7;
+        let parts = |robot: &Value| 1 + 7 + 4 + 2 * 23 + robot["joints"].as_array().expect("joints").len();
+        let hand =
+            5 + all_links + objects + robots[..robot].iter().map(parts).sum::<usize>() + 1 + 7 + 4 + 23;
+        std::array::from_fn(|axis| self.row[hand + axis] - self.row[5 + before + axis])
+    }
+}
+
+fn apart_m(one: [f32; 3], other: [f32; 3]) -> f32 {
+    one.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f32>().sqrt()
+}
+
+/// Both pages say what their robots are to do, 50 times a second, for so long.
+fn drive(pages: &mut [DriversSocket], moves: [Value; 2], time: Duration) {
+    let began = Instant::now();
+    while began.elapsed() < time {
+        for (page, wrist_move) in pages.iter_mut().zip(&moves) {
+            page.say(wrist_move.clone(), true);
+            page.read();
+        }
+    }
+}
+
+#[test]
+fn two_people_drive_in_real_time_and_the_recording_comes_to_the_same() {
+    let team = Team::start(json!({ "patience_s": 600, "talk": true, "protocol": "agentic" }));
+    let mut pages = [DriversSocket::open(&team, 0), DriversSocket::open(&team, 1)];
+    let still = || json!({});
+    drive(&mut pages, [still(), still()], Duration::from_millis(500));
+    let before = [0, 1].map(|robot| pages[0].wrist_m(robot));
+    let first = pages[0].step();
+    let began = Instant::now();
+    let reach = json!({ "carried": true, "right_position_m": [0.3, -0.2, 0.2], "right_fingers_rad": [0, -0.75, -0.8, 1.1, 1.3, 1.1, 1.3] });
+    drive(&mut pages, [reach, still()], Duration::from_secs(2));
+    let rate = f64::from(pages[0].step() - first) / 50.0 / began.elapsed().as_secs_f64();
+    assert!(rate < 1.05, "the world runs at {rate} of real time");
+    let moved = [0, 1].map(|robot| apart_m(before[robot], pages[0].wrist_m(robot)));
+    assert!(moved[0] > 0.1 && moved[1] < 0.02, "{moved:?}");
+
+    // B goes away: time stands still, and A is told for whom it waits.
+    let [mut a, b] = pages;
+    drop(b);
+    std::thread::sleep(Duration::from_millis(300));
+    let told_to_wait = (0..100).any(|_| {
+        a.say(json!({}), true);
+        matches!(a.socket.read(), Ok(Message::Text(text)) if text.contains("waits") && text.contains("\"B\""))
+    });
+    assert!(told_to_wait);
+    a.read();
+    let stood = a.step();
+    for _ in 0..20 {
+        a.say(json!({}), true);
+        a.read();
+    }
+    assert_eq!(a.step(), stood);
+    // It comes back, and time goes on.
+    let mut pages = [a, DriversSocket::open(&team, 1)];
+    drive(&mut pages, [still(), still()], Duration::from_secs(1));
+    assert!(pages[0].step() > stood + 5.0, "{} after {stood}", pages[0].step());
+    drop(pages);
+    let (result, _) = team.verified();
+    assert!(
+        result["extra_information"].as_array().is_some_and(|named| named.contains(&json!("third_person")))
+    );
+}
+
+#[test]
+fn the_socket_opens_for_the_own_robot_and_for_pages_of_this_server() {
+    let team = Team::start(json!({ "patience_s": 600 }));
+    let cookie = |robot: &str, token: &str| ("cookie", format!("tandem_operator_{robot}={token}"));
+    let own = cookie("A", &team.tokens[0]);
+    let origin = |address: String| ("origin", address);
+    let same = origin(format!("http://{}", team.server.address));
+    assert!(ask_for(&team, "A", &[own.clone(), same]).is_ok());
+    let check = |robots: &str, headers: &[(&'static str, String)], expected: u16| {
+        assert_eq!(ask_for(&team, robots, headers).err(), Some(expected), "{robots} {headers:?}");
+    };
+    check("A", &[own.clone(), origin("http://evil.example".into())], 403);
+    check("B", &[cookie("B", &team.tokens[0])], 403);
+    check("A,B", &[own], 403);
+    check("A", &[], 403);
+    check("A", &[cookie("A", "0123456789abcdef0123456789abcdef01234567")], 403);
+}
