@@ -1,5 +1,7 @@
 //! Settings: flags first, then environment (`TANDEM_*`), then a TOML file, then defaults.
 
+mod tls;
+
 use std::{
     net::{IpAddr, SocketAddr},
     path::{Path, PathBuf},
@@ -21,6 +23,7 @@ use tandem_episodes::{
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, StartEpisode, Wording};
 
 use crate::token::{Token, TokenError};
+pub use tls::{Certificate, TlsError};
 
 /// One source of settings; what it leaves out comes from the next. The doc comments are the help text.
 #[derive(Debug, Clone, Default, PartialEq, Args, Deserialize)]
@@ -33,6 +36,13 @@ pub struct Layer {
     /// [default: the address of --listen and localhost].
     #[arg(long, env = "TANDEM_ALLOWED_HOST", value_name = "NAMES", value_delimiter = ',')]
     pub allowed_host: Option<Vec<String>>,
+    /// File with a certificate in PEM form, with which HTTPS is served in place of HTTP, as headsets want it; needs --tls-key
+    /// [default: none].
+    #[arg(long, env = "TANDEM_TLS_CERT", value_name = "FILE")]
+    pub tls_cert: Option<PathBuf>,
+    /// File with the certificate's private key in PEM form [default: none].
+    #[arg(long, env = "TANDEM_TLS_KEY", value_name = "FILE")]
+    pub tls_key: Option<PathBuf>,
     /// File with the token that every request has to send, as `Authorization: Bearer TOKEN`; or give the token itself in the
     /// environment, as TANDEM_TOKEN. An address that other machines reach is refused without [default: none].
     #[arg(long, env = "TANDEM_TOKEN_FILE", value_name = "FILE")]
@@ -125,6 +135,8 @@ impl Layer {
         Layer {
             listen: self.listen.or(next.listen),
             allowed_host: self.allowed_host.or(next.allowed_host),
+            tls_cert: self.tls_cert.or(next.tls_cert),
+            tls_key: self.tls_key.or(next.tls_key),
             token_file: self.token_file.or(next.token_file.filter(|_| self.token.is_none())),
             token: self.token.or(next.token),
             runs: self.runs.or(next.runs),
@@ -197,6 +209,11 @@ impl Layer {
         Ok(token)
     }
 
+    /// What HTTPS is served with, if it is.
+    pub fn certificate(&self) -> Result<Option<Certificate>, TlsError> {
+        Certificate::of(self.tls_cert.as_deref(), self.tls_key.as_deref())
+    }
+
     /// Folder that recordings are written to.
     pub fn runs_folder(&self) -> PathBuf {
         self.runs.clone().unwrap_or_else(|| "runs".into())
@@ -248,6 +265,8 @@ pub struct Settings {
     pub listen: SocketAddr,
     /// Names that the server is reached by, besides its address and localhost.
     pub allowed_hosts: Vec<String>,
+    /// What HTTPS is served with; HTTP is served without.
+    pub certificate: Option<Certificate>,
     /// What every request has to send.
     pub token: Option<Token>,
     /// Folder that recordings are written to, one folder per episode.
@@ -309,6 +328,9 @@ pub enum SettingsError {
     /// A file and the environment both give a token.
     #[error("both --token-file and TANDEM_TOKEN give a token; give one of them")]
     TwoTokens,
+    /// HTTPS cannot be served.
+    #[error(transparent)]
+    Tls(#[from] TlsError),
     /// Other machines would reach a server without a token.
     #[error(
         "other machines reach {listen}; give a token that every request has to send, by --token-file FILE or in TANDEM_TOKEN (`openssl rand -hex 32` makes one), or listen on 127.0.0.1"
@@ -402,6 +424,7 @@ impl Settings {
         let seconds = |given: Option<u32>, default: u32| Duration::from_secs(given.unwrap_or(default).into());
         Ok(Arc::new(Settings {
             listen: layer.address(),
+            certificate: layer.certificate()?,
             token: layer.find_token()?,
             runs: layer.runs_folder(),
             record: match layer.record {

@@ -61,16 +61,25 @@ impl Server {
         let address = listener.local_addr()?;
         let table = Arc::new(EpisodeTable::for_collection(settings.clone(), collection));
         let watch_key = WatchKey::random().map_err(io::Error::other)?;
-        let watch_link = format!("http://{address}{WATCH}#{}", watch_key.text());
+        let scheme = if settings.certificate.is_some() { "https" } else { "http" };
+        let watch_link = format!("{scheme}://{address}{WATCH}#{}", watch_key.text());
         let app = AppState::new(table.clone(), settings.clone(), watch_key);
         let router = router(app, Gate::new(settings.clone(), address.ip()), Limits::new(&settings));
         let (stop, stopped) = oneshot::channel::<()>();
-        let served = runtime.spawn(connections::serve(listener, router, settings.request_timeout, async {
+        let certificate = settings.certificate.clone();
+        let stopped = async {
             let _ = stopped.await;
-        }));
+        };
+        let served = runtime.spawn(connections::serve(
+            listener,
+            certificate,
+            router,
+            settings.request_timeout,
+            stopped,
+        ));
         runtime.spawn(end_abandoned_episodes(table.clone()));
         tracing::info!("{}", settings.assistance.about(settings.disclosure, settings.hints));
-        tracing::info!("serving on http://{address}");
+        tracing::info!("serving on {scheme}://{address}");
         Ok(Server { runtime, address, watch_link, table, stop, served, settings })
     }
 

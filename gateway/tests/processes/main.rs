@@ -10,6 +10,7 @@ mod server;
 mod signals;
 #[path = "../../../tests/src/skipped.rs"]
 mod skipped;
+mod tls;
 mod without_space;
 
 pub use server::{Delays, Server, partials};

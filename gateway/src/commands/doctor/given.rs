@@ -1,4 +1,4 @@
-//! What the settings name: limits, the token, instructions, files of tasks, the base controller and the scene.
+//! What the settings name: limits, the token, the certificate, instructions, files of tasks, the base controller and the scene.
 
 use std::path::Path;
 
@@ -14,6 +14,10 @@ use crate::{
 pub fn check(layer: &Layer, token: Result<Option<Token>, String>) -> Findings {
     let mut findings =
         vec![("limits", Finding::of(limits(layer))), ("token", Finding::of(check_token(layer, token)))];
+    if layer.tls_cert.is_some() || layer.tls_key.is_some() {
+        let read = layer.certificate().map_err(|error| error.to_string());
+        findings.push(("tls", Finding::of(read.map(|_| "HTTPS is served with this certificate".into()))));
+    }
     if let Some(path) = &layer.instructions {
         let tasks = layer.read_tasks().unwrap_or_default();
         let read = layer.read_instructions(&tasks).map_err(|error| error.to_string());

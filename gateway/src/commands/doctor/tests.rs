@@ -95,6 +95,25 @@ fn the_file_of_settings_and_all_that_it_names_are_tried() {
 }
 
 #[test]
+fn a_certificate_is_tried_with_its_key() {
+    let place = tempfile::tempdir().unwrap();
+    let [certificate, key, other] = ["cert.pem", "key.pem", "other.pem"].map(|name| place.path().join(name));
+    let made = [(); 2].map(|()| rcgen::generate_simple_self_signed(["localhost".to_owned()]).unwrap());
+    fs::write(&certificate, made[0].cert.pem()).unwrap();
+    fs::write(&key, made[0].signing_key.serialize_pem()).unwrap();
+    fs::write(&other, made[1].signing_key.serialize_pem()).unwrap();
+    let [certificate, key, other] = [certificate, key, other].map(|path| path.to_string_lossy().into_owned());
+
+    let tried = |certificate: &str, key: &str| found(&["--tls-cert", certificate, "--tls-key", key], "tls");
+    assert!(matches!(tried(&certificate, &key)[..], [Finding::Works(_)]));
+    expect_wrong(&tried(&certificate, &other), &["other.pem is not that of the certificate", "openssl req"]);
+    expect_wrong(&tried(&certificate, "nowhere.pem"), &["the private key in nowhere.pem"]);
+    expect_wrong(&tried(&key, &key), &["key.pem holds no certificate"]);
+    expect_wrong(&found(&["--tls-cert", &certificate], "tls"), &["give --tls-key FILE"]);
+    assert!(found(&[], "tls").is_empty());
+}
+
+#[test]
 fn what_is_told_of_several_lines_stands_under_its_first() {
     let findings = vec![
         ("config", Finding::Wrong("no TOML\n  |\n1 | x\n".into())),

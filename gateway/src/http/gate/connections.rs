@@ -1,6 +1,7 @@
-//! Accepts connections and serves each until the server stops, with a limit on how long a request's header may take.
+//! Accepts connections and serves each until the server stops, with a limit on how long a request's header may take. Where the server
+//! has a certificate, connections are encrypted.
 
-use std::time::Duration;
+use std::{io, time::Duration};
 
 use axum::Router;
 use hyper::{
@@ -14,38 +15,54 @@ use hyper_util::{
     service::TowerToHyperService,
 };
 use tokio::{
+    io::{AsyncRead, AsyncWrite},
     net::{TcpListener, TcpStream},
     sync::watch,
     task::JoinSet,
-    time::sleep,
+    time::{sleep, timeout},
 };
+use tokio_rustls::{TlsAcceptor, server::TlsStream};
 
 use super::limits::Peer;
+use crate::{http::problem::ApiError, settings::Certificate};
 
 /// How long to wait after the system refused a connection, as where all its file handles are taken.
 const ACCEPT_RETRY_DELAY: Duration = Duration::from_millis(200);
 
+/// The first byte of a connection with TLS: that of a record that is part of a handshake.
+const TLS_HANDSHAKE: u8 = 22;
+
+/// What serves each connection.
+#[derive(Clone)]
+struct Serving {
+    router: Router,
+    header_limit: Duration,
+    stopping: watch::Receiver<bool>,
+}
+
 /// Serves `router` until `stopped`, then lets the requests under way finish.
 pub async fn serve(
     listener: TcpListener,
+    certificate: Option<Certificate>,
     router: Router,
     header_limit: Duration,
     stopped: impl Future<Output = ()>,
 ) {
     let (stop, stopping) = watch::channel(false);
+    let serving = Serving { router, header_limit, stopping };
+    let tls = certificate.map(|Certificate(config)| TlsAcceptor::from(config));
     let mut connections = JoinSet::new();
     let accepting = async {
         loop {
             match listener.accept().await {
                 Ok((stream, peer)) => {
-                    let peer = Peer(peer.ip());
-                    connections.spawn(connection(
-                        stream,
-                        peer,
-                        router.clone(),
-                        header_limit,
-                        stopping.clone(),
-                    ));
+                    let (serving, tls, peer) = (serving.clone(), tls.clone(), Peer(peer.ip()));
+                    connections.spawn(async move {
+                        match tls {
+                            Some(tls) => serving.encrypted(stream, tls, peer).await,
+                            None => serving.connection(stream, peer).await,
+                        }
+                    });
                     while connections.try_join_next().is_some() {}
                 }
                 Err(error) => {
@@ -64,35 +81,65 @@ pub async fn serve(
     while connections.join_next().await.is_some() {}
 }
 
-async fn connection(
-    stream: TcpStream,
-    peer: Peer,
-    router: Router,
-    header_limit: Duration,
-    mut stopping: watch::Receiver<bool>,
-) {
-    let router = TowerToHyperService::new(router);
-    let with_peer = service_fn(move |mut request: Request<Incoming>| {
-        request.extensions_mut().insert(peer);
-        router.call(request)
-    });
-    let connection = http1::Builder::new()
-        .timer(TokioTimer::new())
-        .header_read_timeout(header_limit)
-        .serve_connection(TokioIo::new(stream), with_peer)
-        .with_upgrades();
-    let mut connection = std::pin::pin!(connection);
-    let stopped = async move {
-        let _ = stopping.wait_for(|stopping| *stopping).await;
-    };
-    let served = tokio::select! {
-        served = connection.as_mut() => served,
-        () = stopped => {
-            connection.as_mut().graceful_shutdown();
-            connection.await
+impl Serving {
+    /// Serves a connection that is to be encrypted. Who speaks HTTP on it is told so.
+    async fn encrypted(self, stream: TcpStream, tls: TlsAcceptor, peer: Peer) {
+        let mut stopping = self.stopping.clone();
+        let begun = tokio::select! {
+            begun = timeout(self.header_limit, begin(stream, tls)) => begun,
+            _ = stopping.wait_for(|stopping| *stopping) => return,
+        };
+        match begun {
+            Ok(Ok(Begun::Encrypted(stream))) => self.connection(*stream, peer).await,
+            Ok(Ok(Begun::Plain(stream))) => {
+                let router = Router::new().fallback(|| async { ApiError::NotEncrypted });
+                Serving { router, ..self }.connection(stream, peer).await;
+            }
+            Ok(Err(error)) => tracing::info!(%error, "a connection was not encrypted"),
+            Err(_) => tracing::info!("a connection was not encrypted in time"),
         }
-    };
-    if let Err(error) = served {
-        tracing::info!(%error, "a connection broke");
     }
+
+    async fn connection(self, stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, peer: Peer) {
+        let Serving { router, header_limit, mut stopping } = self;
+        let router = TowerToHyperService::new(router);
+        let with_peer = service_fn(move |mut request: Request<Incoming>| {
+            request.extensions_mut().insert(peer);
+            router.call(request)
+        });
+        let connection = http1::Builder::new()
+            .timer(TokioTimer::new())
+            .header_read_timeout(header_limit)
+            .serve_connection(TokioIo::new(stream), with_peer)
+            .with_upgrades();
+        let mut connection = std::pin::pin!(connection);
+        let stopped = async move {
+            let _ = stopping.wait_for(|stopping| *stopping).await;
+        };
+        let served = tokio::select! {
+            served = connection.as_mut() => served,
+            () = stopped => {
+                connection.as_mut().graceful_shutdown();
+                connection.await
+            }
+        };
+        if let Err(error) = served {
+            tracing::info!(%error, "a connection broke");
+        }
+    }
+}
+
+/// A connection as its client has begun it.
+enum Begun {
+    Encrypted(Box<TlsStream<TcpStream>>),
+    Plain(TcpStream),
+}
+
+async fn begin(stream: TcpStream, tls: TlsAcceptor) -> io::Result<Begun> {
+    let mut first = [0];
+    let seen = stream.peek(&mut first).await?;
+    if seen == 1 && first[0] != TLS_HANDSHAKE {
+        return Ok(Begun::Plain(stream));
+    }
+    Ok(Begun::Encrypted(Box::new(tls.accept(stream).await?)))
 }

@@ -97,7 +97,8 @@ async fn enter(
     State(app): State<AppState>,
     watcher: Option<Extension<Watcher>>,
 ) -> Result<Response, ApiError> {
-    let cookie = watcher.and_then(|_| app.watch_key.cookie()).ok_or(ApiError::NoWatcher)?;
+    let secure = app.settings.certificate.is_some();
+    let cookie = watcher.and_then(|_| app.watch_key.cookie(secure)).ok_or(ApiError::NoWatcher)?;
     Ok((StatusCode::NO_CONTENT, [(header::SET_COOKIE, cookie)]).into_response())
 }
 

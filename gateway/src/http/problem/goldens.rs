@@ -34,6 +34,7 @@ fn own_refusals() -> Vec<ApiError> {
         ApiError::NoEpisodeNamed { tool: "wait".into() },
         ApiError::ForeignHost("evil.example".into()),
         ApiError::ForeignOrigin("http://evil.example".into()),
+        ApiError::NotEncrypted,
         ApiError::MalformedJson("expected value at line 1".into()),
         ApiError::MalformedMsgpack("it ends too early".into()),
         ApiError::NoToken,

@@ -70,6 +70,9 @@ pub enum ApiError {
     /// The request comes from a web page of somebody else.
     #[error("origin {0:?} is another site, and pages of other sites may not call; call from a program")]
     ForeignOrigin(String),
+    /// HTTP where the server speaks HTTPS.
+    #[error("this server speaks HTTPS; ask for https:// in place of http://")]
+    NotEncrypted,
     /// The body is no JSON.
     #[error("the body is no JSON: {0}; send one JSON object, with finite numbers only, as {{\"steps\": 25}}")]
     MalformedJson(String),
@@ -233,6 +236,7 @@ impl ApiError {
             }
             ApiError::ForeignHost(_) => Refusal::new("foreign-host", "Foreign host", Forbidden).into(),
             ApiError::ForeignOrigin(_) => Refusal::new("foreign-origin", "Foreign origin", Forbidden).into(),
+            ApiError::NotEncrypted => Problem::new("not-encrypted", "Not encrypted", StatusCode::BAD_REQUEST),
             ApiError::NoObject(_) => Refusal::new("no-object", "No JSON object", Invalid).into(),
             ApiError::SlowBody { .. } => {
                 Problem::new("slow-body", "Body too slow", StatusCode::REQUEST_TIMEOUT)

@@ -41,9 +41,10 @@ impl WatchKey {
         keys.fold(false, |opens, key| self.0.0.matches(key) | opens)
     }
 
-    /// The cookie for a browser that has the key: no script reads it, and no other site's page has it sent.
-    pub fn cookie(&self) -> Option<HeaderValue> {
-        format!("{COOKIE}={}; Path=/watch; HttpOnly; SameSite=Strict", self.text()).parse().ok()
+    /// The cookie for a browser that has the key: no script reads it, no other site's page has it sent, and over HTTPS it is `secure`.
+    pub fn cookie(&self, secure: bool) -> Option<HeaderValue> {
+        let secure = if secure { "; Secure" } else { "" };
+        format!("{COOKIE}={}; Path=/watch; HttpOnly; SameSite=Strict{secure}", self.text()).parse().ok()
     }
 }
 

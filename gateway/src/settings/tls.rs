@@ -1,0 +1,100 @@
+//! The certificate that HTTPS is served with. Headsets give WebXR only to pages of HTTPS, and to those of the machine itself.
+
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use tokio_rustls::rustls::{
+    self, ServerConfig,
+    crypto::ring,
+    pki_types::{
+        CertificateDer, PrivateKeyDer,
+        pem::{self, PemObject},
+    },
+    version::TLS13,
+};
+
+/// How a certificate is made for a server that is reached as `lab.example`.
+const MAKES_ONE: &str = "`openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 365 -subj /CN=lab.example \
+     -addext subjectAltName=DNS:lab.example -keyout key.pem -out cert.pem` makes both";
+
+/// A certificate with its private key.
+#[derive(Clone)]
+pub struct Certificate(pub Arc<ServerConfig>);
+
+/// Why HTTPS cannot be served.
+#[derive(Debug, thiserror::Error)]
+pub enum TlsError {
+    /// One of the two files is not named.
+    #[error("HTTPS needs a certificate and its key; give {missing} FILE, too; {MAKES_ONE}")]
+    Half {
+        /// The flag that is missing.
+        missing: &'static str,
+    },
+    /// A file cannot be read, or is not in PEM form.
+    #[error("cannot read {what} in {}: {source}; {MAKES_ONE}", .path.display())]
+    Unreadable {
+        /// What the file should hold.
+        what: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: pem::Error,
+    },
+    /// A file in PEM form holds no certificate.
+    #[error("{} holds no certificate; {MAKES_ONE}", .path.display())]
+    NoCertificate {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The two do not belong together, or cannot be used.
+    #[error("the key in {} is not that of the certificate in {}: {source}; {MAKES_ONE}", .key.display(), .certificate.display())]
+    Mismatch {
+        /// The certificate's file.
+        certificate: PathBuf,
+        /// The key's file.
+        key: PathBuf,
+        /// What is wrong.
+        source: rustls::Error,
+    },
+}
+
+impl Certificate {
+    /// Reads a certificate, with those that vouch for it after it, and its key; both files are named, or neither.
+    pub fn of(certificate: Option<&Path>, key: Option<&Path>) -> Result<Option<Certificate>, TlsError> {
+        match (certificate, key) {
+            (Some(certificate), Some(key)) => Certificate::read(certificate, key).map(Some),
+            (None, None) => Ok(None),
+            (Some(_), None) => Err(TlsError::Half { missing: "--tls-key" }),
+            (None, Some(_)) => Err(TlsError::Half { missing: "--tls-cert" }),
+        }
+    }
+
+    fn read(certificate: &Path, key: &Path) -> Result<Certificate, TlsError> {
+        let chain = CertificateDer::pem_file_iter(certificate)
+            .and_then(Iterator::collect::<Result<Vec<_>, _>>)
+            .map_err(unreadable("the certificate", certificate))?;
+        if chain.is_empty() {
+            return Err(TlsError::NoCertificate { path: certificate.into() });
+        }
+        let secret = PrivateKeyDer::from_pem_file(key).map_err(unreadable("the private key", key))?;
+        ServerConfig::builder_with_provider(Arc::new(ring::default_provider()))
+            .with_protocol_versions(&[&TLS13])
+            .and_then(|builder| builder.with_no_client_auth().with_single_cert(chain, secret))
+            .map(|config| Certificate(Arc::new(config)))
+            .map_err(|source| TlsError::Mismatch { certificate: certificate.into(), key: key.into(), source })
+    }
+}
+
+fn unreadable(what: &'static str, path: &Path) -> impl FnOnce(pem::Error) -> TlsError {
+    let path = path.to_owned();
+    move |source| TlsError::Unreadable { what, path, source }
+}
+
+impl fmt::Debug for Certificate {
+    fn fmt(&self, text: &mut fmt::Formatter) -> fmt::Result {
+        text.write_str("Certificate(..)")
+    }
+}
