@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use tandem_sim::render::{
     Camera, Cameras, Intrinsics, PictureError, Renderer, RendererKind, Scenery, encode_png,
 };
-use tandem_sim::{CONTROL_HZ, Step, World};
+use tandem_sim::{CONTROL_HZ, RobotModel, Side, Step, World};
 
 use super::LiveStep;
 use super::frame::{self, RobotFrame};
@@ -120,6 +120,21 @@ fn robot_head(motion: &Motion) -> Value {
     let joints: Vec<&str> = model.joints.iter().map(|joint| joint.name.as_str()).collect();
     json!({
         "name": motion.robot.name, "links": model.links.len(), "joints": joints,
+        "fingers": [fingers(model, Side::Left), fingers(model, Side::Right)],
         "camera": { "vertical_fov_rad": model.egocentric.vertical_fov_rad, "width": width, "height": height },
     })
+}
+
+/// The finger joints of a hand, in the order of commands: where each turns in the frame of the one before it in its finger, or of the wrist.
+fn fingers(model: &RobotModel, side: Side) -> Value {
+    let hand = &model.hands[side];
+    let is_finger = |link: &usize| hand.thumb.contains(link) || hand.fingers.contains(link);
+    let joints = model.joints.iter().filter(|joint| is_finger(&joint.link));
+    let told = joints.map(|joint| {
+        json!({
+            "pose": pose_row(&model.links[joint.link].parent_from_link), "axis": joint.axis.to_array(),
+            "range_rad": [joint.lower_rad, joint.upper_rad],
+        })
+    });
+    told.collect()
 }

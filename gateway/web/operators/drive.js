@@ -6,7 +6,8 @@ import { SIDES } from "../src/message.js";
 import { Stage } from "../src/stage.js";
 import { call } from "./call.js";
 import { Hands } from "./hands.js";
-import { CLOSED, OPEN, closedBy, listen, wanted } from "./inputs.js";
+import { Headset } from "./headset/headset.js";
+import { CLOSED, OPEN, closedBy, listen, wanted, withHeadset } from "./inputs.js";
 import { layOut, nothing } from "./panel.js";
 import { Wheel } from "./wheel.js";
 
@@ -33,6 +34,7 @@ class DrivePage {
       speak: (text) => call(`${root}/tools/say`, seat.token, { text }),
       finish: () => this.finish(),
       look: (view) => { this.stage?.look(view === "robot" ? seat.robot : "free"); this.panel.border(view === "robot"); },
+      wear: () => this.wear(),
       stepwise: (on) => { this.stepwise = on; this.label(); },
     });
     SIDES.forEach((side) => this.draggable(side));
@@ -65,7 +67,10 @@ class DrivePage {
       clearInterval(saying);
       this.over.abort();
       this.wheel.close();
-      return () => this.stage?.leave();
+      return () => {
+        this.headset?.leave();
+        this.stage?.leave();
+      };
     });
   }
 
@@ -78,6 +83,8 @@ class DrivePage {
     this.stage = new Stage(this.panel.view, scene);
     this.stage.look(this.seat.robot);
     this.panel.border(true, scene.head.robots[robot].camera);
+    this.headset = new Headset(this.stage, this.hands);
+    Headset.supported().then((supported) => this.panel.headset(supported));
     const scheme = matchMedia("(prefers-color-scheme: dark)");
     scheme.addEventListener("change", () => this.stage.paint(), { signal: this.over.signal });
   }
@@ -92,8 +99,9 @@ class DrivePage {
   /** Says what the robot is to do, after `passedS` more. */
   say(passedS) {
     if (!this.hands) return;
-    const go = !document.hidden && !this.paused && !this.stepwise && !this.finishing;
-    const want = wanted(this.keys);
+    const seen = !document.hidden || this.headset.session;
+    const go = seen && !this.paused && !this.stepwise && !this.finishing;
+    const want = this.headset.session ? withHeadset(wanted(this.keys), this.headset.wanted()) : wanted(this.keys);
     if (want.clutch) this.hands.letGo();
     else if (want.wristM_s.some((value) => value !== 0)) this.hands.shift(this.hand, new Vector3(...want.wristM_s).multiplyScalar(passedS));
     const move = this.hands.wrists();
@@ -110,23 +118,41 @@ class DrivePage {
         this.shares[side] = share;
         this.fingers[side] = closedBy(side, share);
       }
+      if (want.fingers?.[side]) this.fingers[side] = want.fingers[side];
       if (this.fingers[side]) move[`${side}_fingers_rad`] = this.fingers[side];
     }
     this.wheel.say({ move, go, steps: this.steps });
     this.steps = 0;
   }
 
+  /** Puts the scene to where the newest step has it. */
+  show() {
+    if (this.stale) this.stage.show(this.frame, this.frame, 1);
+    this.stale = false;
+  }
+
+  /** Draws into a headset until its wearer leaves. */
+  async wear() {
+    try {
+      await this.headset.enter(() => {
+        this.show();
+        return this.panel.said();
+      });
+    } catch (error) {
+      this.panel.status(`The headset cannot be used: ${error.message}`);
+    }
+  }
+
   /** Draws what is newest. */
   draw(now, last, slow) {
     if (this.wheel.over) return;
-    if (this.stage) {
+    if (this.stage && !this.headset.session) {
       slow = now - last > SLOW_FRAME_MS && now - last < 1000 ? slow + 1 : 0;
       if (slow === 20) {
         this.stage.simplify();
         slow = 0;
       }
-      if (this.stale) this.stage.show(this.frame, this.frame, 1);
-      this.stale = false;
+      this.show();
       this.stage.draw();
       for (const side of SIDES) this.panel.handle(side, this.stage.project(this.hands.inWorld(side)));
       for (const { name, index } of this.partners) {

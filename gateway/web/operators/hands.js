@@ -32,13 +32,25 @@ export class Hands {
   /** The wrists have no targets any more: their arms stay as they are. */
   letGo() {
     this.targets = { left: null, right: null };
+    this.turns = { left: null, right: null };
   }
 
-  /** Moves a target by a way in the pelvis frame, no further than its leash. */
+  /** Moves a target by a way in the pelvis frame. */
   shift(side, by) {
+    this.place(side, (this.targets[side] ?? this.measured[side].position).clone().add(by));
+  }
+
+  /** Puts a target to a place in the pelvis frame, no further than its leash; and turns it, if `turn` is given. */
+  place(side, to, turn = null) {
     const from = this.measured[side].position;
-    const to = (this.targets[side] ?? from).clone().add(by);
-    this.targets[side] = to.sub(from).clampLength(0, LEASH_M).add(from);
+    this.targets[side] = to.clone().sub(from).clampLength(0, LEASH_M).add(from);
+    this.turns[side] = turn;
+  }
+
+  /** Where a wrist is to be, or is, and how it is turned, in the pelvis frame. */
+  pose(side) {
+    const { position, turn } = this.measured[side];
+    return { position: (this.targets[side] ?? position).clone(), turn: (this.turns[side] ?? turn).clone() };
   }
 
   /** A way in the world as one in the pelvis frame. */
@@ -56,6 +68,8 @@ export class Hands {
     const move = { carried: true };
     for (const side of SIDES) {
       if (this.targets[side]) move[`${side}_position_m`] = this.targets[side].toArray();
+      const turn = this.turns[side];
+      if (turn) move[`${side}_quaternion_wxyz`] = [turn.w, turn.x, turn.y, turn.z];
     }
     return move;
   }

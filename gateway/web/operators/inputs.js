@@ -62,5 +62,19 @@ export function wanted(keys) {
   };
 }
 
+/** The same with what a headset's controllers ask for. */
+export function withHeadset(want, { base, height, triggers, fingers }) {
+  const [ahead, left, turn] = base;
+  return {
+    ...want,
+    vx_m_s: want.vx_m_s + ahead * WALK_M_S,
+    vy_m_s: want.vy_m_s + left * WALK_M_S,
+    yaw_rate_rad_s: want.yaw_rate_rad_s + turn * TURN_RAD_S,
+    heightM_s: want.heightM_s + height * HEIGHT_M_S,
+    triggers: { ...want.triggers, ...triggers },
+    fingers,
+  };
+}
+
 /** Fingers of `hand` that are closed by a share. */
 export const closedBy = (hand, share) => OPEN[hand].map((open, joint) => open + share * (CLOSED[hand][joint] - open));

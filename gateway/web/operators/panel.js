@@ -25,13 +25,14 @@ export function layOut(main, robot, briefing, on) {
   const chat = talk(robot, on.speak);
   const looks = element("select", { "aria-label": "View", onchange: (event) => on.look(event.target.value) },
     element("option", { value: "robot" }, `as robot ${robot} looks`), element("option", { value: "free" }, "from anywhere"));
+  const wear = element("button", { type: "button", hidden: true, onclick: () => on.wear() }, "Enter VR");
   const stepwise = element("input", { type: "checkbox", onchange: (event) => on.stepwise(event.target.checked) });
   main.replaceChildren(
     element("h1", {}, `You drive robot ${robot}`), element("p", {}, part), status,
     element("div", { class: "columns operate" },
       element("div", {}, place, facts),
       element("div", {},
-        element("div", { class: "tools" }, looks, element("label", {}, stepwise, " step by step"), step),
+        element("div", { class: "tools" }, looks, element("label", {}, stepwise, " step by step"), step, wear),
         element("div", { class: "tools" }, button("Left hand", "left", "1"), button("Right hand", "right", "2")),
         element("div", { class: "tools" }, button("Open", "open", "O"), button("Close", "close", "C"), button("Let go of targets", "clutch", "space")),
         element("div", { class: "tools" }, pause, element("button", { type: "button", onclick: () => on.finish() }, "Finish")),
@@ -43,11 +44,14 @@ export function layOut(main, robot, briefing, on) {
     view, handles,
     heard: chat.heard,
     status: (said) => say(status, said),
+    /** How the episode stands, and what the hands do, as the page says it. */
+    said: () => [status.textContent, facts.textContent],
     /** Shows where the robot's picture ends, if the view is the robot's. */
     border: (shown, camera) => {
       border.hidden = !shown;
       if (camera) place.style.setProperty("--seen", String(camera.width / camera.height));
     },
+    headset: (supported) => { wear.hidden = !supported; },
     handle: (side, at) => put(handles[side], at, true),
     /** Where a partner wants a wrist to be. */
     cursor: (name, side, at) => {

@@ -2,7 +2,7 @@
 
 import {
   AmbientLight, ArrowHelper, BufferAttribute, BufferGeometry, Color, DirectionalLight, Group, HemisphereLight, Line, LineBasicMaterial,
-  LineSegments, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, Quaternion, SRGBColorSpace, Scene, SphereGeometry,
+  LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, Quaternion, SRGBColorSpace, Scene, SphereGeometry,
   Vector3, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
@@ -137,7 +137,10 @@ export class Stage {
     this.robots.forEach((robot, index) => {
       const { camera } = this.layout.robots[index];
       pose(robot.frustum, camera);
-      robot.frustum.visible = this.extras.frustums && this.view !== this.head.robots[index].name;
+      const rides = this.ridden === index;
+      if (rides) this.placeRig(to.row.subarray(camera, camera + POSE));
+      // Whoever rides a robot sees the border of its picture.
+      robot.frustum.visible = rides || (this.extras.frustums && this.view !== this.head.robots[index].name);
       middle.addScaledVector(one.fromArray(to.row, this.layout.links[index]), 1 / this.robots.length);
       robot.hands.forEach((hand, side) => this.showHand(hand, to.hand(index, side), from, pose, targets?.at(from.time + share * (to.time - from.time), index, side)));
       if (this.view === this.head.robots[index].name) pose(this.head_camera, camera);
@@ -202,6 +205,33 @@ export class Stage {
     camera.aspect = width / height;
     camera.updateProjectionMatrix();
     return camera;
+  }
+
+  /** From now on a headset's wearer stands in the place of a robot, or, for null, nobody does. */
+  ride(robot) {
+    this.ridden = robot;
+    this.rig ??= new Group();
+    if (!this.rider) {
+      this.rider = new PerspectiveCamera(60, 1, 0.02, 60);
+      this.rig.add(this.rider);
+      this.scene.add(this.rig);
+    }
+    this.rig.visible = robot !== null;
+    this.stale = true;
+  }
+
+  /** Puts the wearer's space to the eye of the robot, upright, facing where the robot faces: nobody's neck is bent by a tilted camera. */
+  placeRig(pose) {
+    const ahead = new Vector3(0, 0, -1).applyQuaternion(new Quaternion().fromArray(pose, 3));
+    const back = ahead.setZ(0).normalize().negate();
+    this.rig.position.fromArray(pose);
+    this.rig.quaternion.setFromRotationMatrix(new Matrix4().makeBasis(UP.clone().cross(back), UP, back));
+    this.rig.updateMatrixWorld(true);
+  }
+
+  /** Draws for a headset, both eyes. */
+  drawHeadset() {
+    this.renderer.render(this.scene, this.rider);
   }
 
   /** Where a point of the world is seen: x to the right and y up, from -1 to 1 within the place, and whether it is ahead. */

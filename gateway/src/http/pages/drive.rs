@@ -66,11 +66,13 @@ pub struct GivenToken(pub String);
 /// An operator gets the cookie that opens the socket: a browser sends no other header with a request for one. No script reads it, and no
 /// other site's page has it sent.
 pub async fn enter(
+    State(app): State<AppState>,
     Extension(caller): Extension<Caller>,
     Extension(GivenToken(token)): Extension<GivenToken>,
 ) -> Result<Response, ApiError> {
     let robot = caller.robot().ok_or(HostingError::NeedsOperator)?;
-    let cookie = format!("{COOKIE}{robot}={token}; Path={DRIVE}; HttpOnly; SameSite=Strict");
+    let secure = if app.settings.certificate.is_some() { "; Secure" } else { "" };
+    let cookie = format!("{COOKIE}{robot}={token}; Path={DRIVE}; HttpOnly; SameSite=Strict{secure}");
     let cookie: HeaderValue = cookie.parse().map_err(|_| ApiError::NoToken)?;
     Ok((StatusCode::NO_CONTENT, [(header::SET_COOKIE, cookie)]).into_response())
 }

@@ -1,0 +1,61 @@
+// What the wearer of a headset is told, on a board below the line of sight: how the episode stands, what the hands do, what is left.
+
+import { CanvasTexture, Mesh, MeshBasicMaterial, PlaneGeometry, SRGBColorSpace } from "three";
+
+const WIDTH_M = 0.9;
+const PIXELS = [1024, 192];
+const LINE_PIXELS = 44;
+/** Before the eyes, and tilted towards them. */
+const PLACE_M = [0, -0.52, -0.95];
+const TILT_RAD = -0.5;
+
+export class Board {
+  /** @param {import("three").Group} rig The space of the wearer. */
+  constructor(rig) {
+    this.canvas = document.createElement("canvas");
+    [this.canvas.width, this.canvas.height] = PIXELS;
+    this.texture = new CanvasTexture(this.canvas);
+    this.texture.colorSpace = SRGBColorSpace;
+    // Seen before whatever is in its place, as the table is.
+    const material = new MeshBasicMaterial({ map: this.texture, transparent: true, depthTest: false });
+    const board = new Mesh(new PlaneGeometry(WIDTH_M, (WIDTH_M * PIXELS[1]) / PIXELS[0]), material);
+    board.position.fromArray(PLACE_M);
+    board.rotation.x = TILT_RAD;
+    board.renderOrder = 10;
+    rig.add(board);
+  }
+
+  /** Shows lines; those that do not fit on one go on in the next. */
+  say(lines) {
+    const text = lines.join("\n");
+    if (text === this.text) return;
+    this.text = text;
+    const paper = this.canvas.getContext("2d");
+    const [width, height] = PIXELS;
+    paper.clearRect(0, 0, width, height);
+    paper.fillStyle = "rgba(20, 24, 30, 0.7)";
+    paper.fillRect(0, 0, width, height);
+    paper.fillStyle = "#ffffff";
+    paper.font = `${0.75 * LINE_PIXELS}px system-ui, sans-serif`;
+    lines.flatMap((line) => broken(paper, line, width - LINE_PIXELS)).forEach((line, index) => {
+      paper.fillText(line, LINE_PIXELS / 2, LINE_PIXELS * (index + 1));
+    });
+    this.texture.needsUpdate = true;
+  }
+}
+
+/** A line in as many as its width takes. */
+function broken(paper, line, width) {
+  const lines = [];
+  let current = "";
+  for (const word of line.split(" ")) {
+    const longer = current ? `${current} ${word}` : word;
+    if (current && paper.measureText(longer).width > width) {
+      lines.push(current);
+      current = word;
+    } else {
+      current = longer;
+    }
+  }
+  return [...lines, current];
+}
