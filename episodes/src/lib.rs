@@ -72,5 +72,5 @@ pub use tandem_sim::{
     render::RendererKind,
 };
 pub use task_check::{TaskCheck, TaskCheckError, check_task};
-pub use task_file::{TaskFileError, read_task, task_of};
+pub use task_file::{TANDEM_PLUS, TaskFileError, read_task, tandem_plus, task_of, task_set};
 pub use variation::Variation;

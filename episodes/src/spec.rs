@@ -115,7 +115,7 @@ impl EpisodeSpec {
     /// An episode of the embedded robot under our own controller, from the task's beginning.
     pub fn new(task: &'static Task, seed: u32, protocol: Protocol) -> EpisodeSpec {
         EpisodeSpec {
-            task,
+            task: task.under(seed),
             seed,
             protocol,
             scene: None,
@@ -131,6 +131,11 @@ impl EpisodeSpec {
             variation: Variation::default(),
             thinking_limit_s: None,
         }
+    }
+
+    /// The same with another seed, and what that chooses.
+    pub fn seeded(&self, seed: u32) -> EpisodeSpec {
+        EpisodeSpec { task: self.task.under(seed), seed, ..self.clone() }
     }
 
     /// What its protocol allows for its task, with its own limit of thinking where it has one.
@@ -174,7 +179,10 @@ impl EpisodeSpec {
         } = self;
         let file = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let departures = [
-            task.file.as_ref().map(|file| format!("task file: {} {}", file.source.name, file.xxh3)),
+            task.file.as_ref().map(|file| match file.suite {
+                Some(suite) => format!("suite: {suite}"),
+                None => format!("task file: {} {}", file.source.name, file.xxh3),
+            }),
             (*assistance != Assistance::Paper).then(|| format!("assistance: {assistance}")),
             (*disclosure != assistance.disclosure()).then(|| format!("phases told: {disclosure}")),
             (*hints != assistance.hints()).then(|| format!("hints: {hints}")),

@@ -17,7 +17,7 @@ use serde::Deserialize;
 use tandem_episodes::{
     BaseLimits, Controller, EpisodeError, EpisodeSpec, Instructions, InstructionsError, RendererKind,
     SceneFile, Sensing, SensorModel, SimError, StateSource, TaskCheckError, TaskFileError, Visibility,
-    check_task, read_task,
+    check_task, read_task, task_set,
     tasks::{Task, TaskSet},
 };
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, StartEpisode, Wording};
@@ -222,7 +222,7 @@ impl Layer {
     /// The benchmark's tasks, and those of files.
     pub fn read_tasks(&self) -> Result<TaskSet, SettingsError> {
         let files = self.task_file.iter().flatten();
-        Ok(TaskSet::with(files.map(|path| read_task_file(path)).collect::<Result<_, _>>()?))
+        Ok(task_set(files.map(|path| read_task_file(path)).collect::<Result<_, _>>()?))
     }
 
     /// The instructions of the file, which may name these tasks, or the tasks' own.

@@ -109,7 +109,7 @@ impl BatchWorld {
         let round_seed = self.round_seed.unwrap_or(FIRST_SEED);
         let seed = round_seed.wrapping_add(self.stride.wrapping_mul(self.episodes));
         self.close();
-        let episode = EpisodeSpec { seed, ..spec.episode.clone() };
+        let episode = spec.episode.seeded(seed);
         let folder = spec.record.as_ref().map(|record| self.folder(record, &episode));
         let session = Session::start(&episode, folder.as_deref())?;
         if let Some(reason) = session.recording_failed() {

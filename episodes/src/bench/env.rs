@@ -128,7 +128,7 @@ impl Stopwatch {
 fn core_pace(episode: &EpisodeSpec) -> Result<Pace, BenchError> {
     let begin = |seed: usize| -> Result<(World, Vec<RobotCommand>), BenchError> {
         let seed = FIRST_SEED + seed as u32;
-        let world = build(&EpisodeSpec { seed, ..episode.clone() }).map_err(Box::new)?.world;
+        let world = build(&episode.seeded(seed)).map_err(Box::new)?.world;
         let commands = (0..world.robots().len()).map(|robot| world.rest_command(robot)).collect();
         Ok((world, commands))
     };

@@ -28,6 +28,7 @@ pub fn task_list(tasks: &TaskSet, limits: &BaseLimits) -> TaskList {
 fn task_info(task: &Task) -> TaskInfo {
     TaskInfo {
         id: task.id.into(),
+        suite: task.suite().map(str::to_owned),
         instruction: task.instruction.into(),
         robots: instructions(task),
         phases: phases(task),

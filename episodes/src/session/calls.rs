@@ -3,7 +3,7 @@
 use tandem_sim::Step;
 use tandem_tools_spec::{
     Assistance, Call, EndReason, ExtraInformation, Formats, GetRobotState, Look, ManageReply, Observation,
-    Observe, ToolCall, ToolReply,
+    Observe, TalkCall, ToolCall, ToolReply,
 };
 
 use super::Session;
@@ -14,6 +14,7 @@ use crate::commands::{Called, Command, OperatorCall, OperatorCommand, RobotOrder
 use crate::observation::TeamObservation;
 use crate::output::OutputError;
 use crate::recording::{CallOutcome, CallerRecord, ToolCallRecord};
+use crate::reports::episode::SaidWords;
 
 /// What a call comes to.
 #[derive(Clone, Debug)]
@@ -300,8 +301,15 @@ impl Session {
     /// A call has come out: records it, and closes the files if it has ended the episode.
     fn came_out(&mut self, underway: bool, caller: CallerRecord, called: &Called, outcome: CallOutcome) {
         if underway && (self.files.is_some() || self.shows_calls()) {
+            let time_s = self.present.time_s;
             if let Some(files) = &mut self.files {
                 files.count_call(called.name(), outcome.is_ok());
+                if let (Called::One(call), Some(robot), true) = (called, caller.operator(), outcome.is_ok())
+                    && let ToolCall::Talk(TalkCall::Say(said)) = &call.tool
+                {
+                    let words = SaidWords { time_s, robot: robot.into(), text: said.text.clone() };
+                    files.keep_words(words);
+                }
             }
             self.tell(ToolCallRecord::new(self.now(), caller, called, outcome));
         }

@@ -19,7 +19,7 @@ use crate::protocol::Rules;
 use crate::recording::{NoteMessage, Recorder, RecorderThread, RecordingHeader, ToolCallRecord, Visibility};
 use crate::reports::episode::{
     CELL_HEIGHT, CELL_WIDTH, CallCounts, EpisodePage, KeyMoment, LabelledPicture, PAGE_FILE, STRIP_FILE,
-    strip,
+    SaidWords, strip,
 };
 use crate::results::write_result;
 use crate::scoring::Facts;
@@ -51,6 +51,7 @@ pub struct RunFiles {
     moments: Vec<KeyMoment>,
     begin_s: f64,
     calls: CallCounts,
+    said: Vec<SaidWords>,
     rules: Rules,
     budget_left: Option<Budget>,
 }
@@ -68,6 +69,7 @@ impl RunFiles {
             moments: Vec::new(),
             begin_s: session.steps_before as f64 / CONTROL_HZ,
             calls: CallCounts::default(),
+            said: Vec::new(),
             rules: session.rules,
             budget_left: None,
         }
@@ -107,6 +109,11 @@ impl RunFiles {
     /// Counts a call of this tool, and whether it was answered.
     pub(super) fn count_call(&mut self, name: &'static str, ok: bool) {
         self.calls.count(name, ok);
+    }
+
+    /// Keeps what an operator said, for the page.
+    pub(super) fn keep_words(&mut self, words: SaidWords) {
+        self.said.push(words);
     }
 
     pub(super) fn keep_note(&mut self, time_s: f64, note: NoteMessage) {
@@ -170,6 +177,7 @@ impl RunFiles {
             task,
             result,
             calls: &self.calls,
+            said: &self.said,
             begin_s: self.begin_s,
             rules: self.rules,
             budget_left: self.budget_left,

@@ -96,6 +96,7 @@ impl Session {
         let info = |name: &String| RobotInfo { robot: name.clone(), kind: kind.clone() };
         Briefing {
             instruction: task.instruction.into(),
+            shared_instruction: task.shared_instruction().map(str::to_owned),
             instructions: describe::instructions(task),
             robots: self.motions.iter().map(|motion| info(&motion.robot.name)).collect(),
             kinds: vec![describe::robot_kind(kind.clone(), &self.motions[0].robot)],

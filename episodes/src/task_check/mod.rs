@@ -168,6 +168,7 @@ fn holds(done: &Done, facts: &Facts) -> bool {
         Done::Sequence { first, then, .. } => first(facts) && then(facts),
         Done::Lasting { condition, at_end, .. } => condition(facts) && at_end(facts),
         Done::Milestones(milestones) => milestones.iter().all(|milestone| (milestone.condition)(facts)),
+        Done::Unless { spoiled, done } => !spoiled(facts) && holds(done, facts),
     }
 }
 

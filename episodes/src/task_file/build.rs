@@ -2,18 +2,21 @@
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use tandem_sim::mjcf::Document;
 use tandem_sim::{ObjectModel, assets};
 use toml::Spanned;
 
+use super::choices::{filled, ways, with_options};
 use super::error::{Mistakes, TaskFileError};
 use super::phases;
 use super::reading::{Reading, lasting, place_in_file};
+use super::suites::suite_of;
 use super::table::{Extent, ObjectTable, OffsetTable, RobotTable, TaskTable};
 use crate::conditions::Names;
-use crate::tasks::{self, ObjectSpot, Offset, RobotSpot, Task, TaskFile, TaskSource};
+use crate::scoring::Phase;
+use crate::tasks::{self, ChosenOption, ObjectSpot, Offset, RobotSpot, Task, TaskFile, TaskSource};
 
 const ROBOTS: [&str; 3] = ["A", "B", "C"];
 const MOST_OBJECTS: usize = 64;
@@ -47,17 +50,73 @@ fn is_file(name: &str) -> bool {
     name.ends_with(".xml")
 }
 
-/// The task that a source says.
-pub(super) fn task(source: TaskSource, xxh3: String) -> Result<Task, TaskFileError> {
-    let table = parse(&source)?;
-    let mut reading = Reading { source: &source, found: Vec::new() };
-    let read = reading.task(table);
-    match (read, reading.found) {
-        (Some((task, file)), found) if found.is_empty() => {
-            Ok(Task { file: Some(TaskFile { source, xxh3, ..file }), ..task })
-        }
-        (_, found) => Err(TaskFileError::Mistakes(Mistakes::new(&source.name, &source.text, found))),
+/// The task that a source says: before anything is chosen, where it has choices, with the others as its variants.
+pub(super) fn task(source: &TaskSource, xxh3: &str) -> Result<&'static Task, TaskFileError> {
+    let table = parse(source)?;
+    let mut reading = Reading { source, found: Vec::new() };
+    let choices = reading.choices(table.choices);
+    reading.checked()?;
+    let variants = Arc::new(OnceLock::new());
+    let made: Vec<Task> = ways(&choices)
+        .into_iter()
+        .map(|way| one_way(source, xxh3, way, &variants))
+        .collect::<Result<_, _>>()?;
+    let mut made: Vec<&'static Task> = made.into_iter().map(leaked).collect();
+    if choices.is_empty() {
+        return Ok(made.swap_remove(0));
     }
+    let with_all = |text: &Spanned<String>| lasting(&with_options(text.as_ref(), &choices));
+    let robots = made[0].robots.iter().zip(table.robots.as_ref());
+    let robots: Vec<RobotSpot> = robots
+        .map(|(spot, table)| RobotSpot { instruction: with_all(&table.instruction), ..*spot })
+        .collect();
+    let phases = made[0].phases.iter().zip(table.phases.as_ref());
+    let phases: Vec<Phase> =
+        phases.map(|(phase, table)| Phase { description: with_all(&table.description), ..*phase }).collect();
+    let undecided = one_way(source, xxh3, ways(&choices).swap_remove(0), &variants)?;
+    let file = undecided.file.map(|file| TaskFile {
+        shared_instruction: table.shared_instruction.as_ref().map(with_all),
+        chosen: Vec::new(),
+        ..file
+    });
+    let undecided = Task {
+        instruction: with_all(&table.instruction),
+        robots: Vec::leak(robots),
+        phases: Vec::leak(phases),
+        file,
+        ..undecided
+    };
+    // Nobody else has seen it yet.
+    let _ = variants.set(made);
+    Ok(leaked(undecided))
+}
+
+/// The task where this has been chosen. Mistakes are told by their places in the text with the options in it, line by line the same.
+fn one_way(
+    source: &TaskSource,
+    xxh3: &str,
+    chosen: Vec<ChosenOption>,
+    variants: &Arc<OnceLock<Vec<&'static Task>>>,
+) -> Result<Task, TaskFileError> {
+    let written = TaskSource { text: filled(&source.text, &chosen), ..source.clone() };
+    let table = parse(&written)?;
+    let mut reading = Reading { source: &written, found: Vec::new() };
+    let read = reading.task(table);
+    reading.checked()?;
+    let Some((task, file)) = read else { return Err(reading.mistakes()) };
+    let file = TaskFile {
+        source: source.clone(),
+        xxh3: xxh3.into(),
+        suite: suite_of(source),
+        chosen,
+        variants: variants.clone(),
+        ..file
+    };
+    Ok(Task { file: Some(file), ..task })
+}
+
+fn leaked(task: Task) -> &'static Task {
+    Box::leak(Box::new(task))
 }
 
 impl Reading<'_> {
@@ -65,6 +124,7 @@ impl Reading<'_> {
     fn task(&mut self, table: TaskTable) -> Option<(Task, TaskFile)> {
         self.id(&table.id, "the task");
         self.words(&table.instruction);
+        table.shared_instruction.iter().for_each(|text| self.words(text));
         let benchmark_steps =
             self.within(&table.budget.benchmark_steps, &BENCHMARK_STEPS_ALLOWED, DEFAULT_BENCHMARK_STEPS);
         let agentic_steps =
@@ -92,8 +152,18 @@ impl Reading<'_> {
             phases: Vec::leak(phases),
             file: None,
         };
-        let source = TaskSource { name: String::new(), text: String::new(), beside: BTreeMap::new() };
-        Some((task, TaskFile { source, xxh3: String::new(), scene_mjcf, agentic_steps, thinking_s }))
+        let file = TaskFile {
+            source: TaskSource { name: String::new(), text: String::new(), beside: BTreeMap::new() },
+            xxh3: String::new(),
+            scene_mjcf,
+            agentic_steps,
+            thinking_s,
+            shared_instruction: table.shared_instruction.as_ref().map(|text| lasting(text.as_ref())),
+            suite: None,
+            chosen: Vec::new(),
+            variants: Arc::default(),
+        };
+        Some((task, file))
     }
 
     fn within(&mut self, given: &Option<Spanned<u32>>, range: &RangeInclusive<u32>, default: u32) -> u32 {

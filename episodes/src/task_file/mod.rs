@@ -4,9 +4,11 @@
 //! A task is made of its texts alone, which recordings and results hold; so whoever has one of those has the task.
 
 mod build;
+mod choices;
 mod error;
 mod phases;
 mod reading;
+mod suites;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -19,6 +21,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use xxhash_rust::xxh3::xxh3_64;
 
 pub use error::TaskFileError;
+pub use suites::{TANDEM_PLUS, tandem_plus, task_set};
 
 use crate::tasks::{self, Task, TaskSource};
 
@@ -49,7 +52,7 @@ pub fn task_of(source: TaskSource) -> Result<&'static Task, TaskFileError> {
         return Ok(task);
     }
     let xxh3 = fingerprint(&source);
-    let task: &'static Task = Box::leak(Box::new(build::task(source, xxh3)?));
+    let task = build::task(&source, &xxh3)?;
     made().push(task);
     Ok(task)
 }
@@ -80,6 +83,9 @@ pub mod by_id_or_file {
     struct RecordedTask {
         id: String,
         xxh3: String,
+        /// What the seed has chosen in it.
+        #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+        chosen: BTreeMap<String, String>,
         #[serde(flatten)]
         source: TaskSource,
     }
@@ -89,14 +95,16 @@ pub mod by_id_or_file {
         let named = match &task.file {
             None => NamedTask::Id(id),
             Some(file) => {
-                NamedTask::File(RecordedTask { id, xxh3: file.xxh3.clone(), source: file.source.clone() })
+                let chosen = file.chosen.iter().map(|chosen| (chosen.name.clone(), chosen.option.clone()));
+                let (xxh3, chosen) = (file.xxh3.clone(), chosen.collect());
+                NamedTask::File(RecordedTask { id, xxh3, chosen, source: file.source.clone() })
             }
         };
         named.serialize(serializer)
     }
 
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<&'static Task, D::Error> {
-        let RecordedTask { id: _, xxh3, source } = match NamedTask::deserialize(deserializer)? {
+        let RecordedTask { id: _, xxh3, chosen, source } = match NamedTask::deserialize(deserializer)? {
             NamedTask::Id(id) => return tasks::find(&id).map_err(de::Error::custom),
             NamedTask::File(recorded) => recorded,
         };
@@ -105,6 +113,11 @@ pub mod by_id_or_file {
             let changed = TaskFileError::Changed { name: source.name, was: xxh3, now };
             return Err(de::Error::custom(changed));
         }
-        task_of(source).map_err(de::Error::custom)
+        let task = task_of(source).map_err(de::Error::custom)?;
+        let variants = task.file.as_ref().and_then(|file| file.variants.get());
+        let is_chosen = |task: &&&'static Task| {
+            chosen.iter().all(|(name, option)| task.chosen(name) == Some(option.as_str()))
+        };
+        Ok(variants.and_then(|variants| variants.iter().find(is_chosen)).copied().unwrap_or(task))
     }
 }

@@ -47,6 +47,12 @@ pub(super) fn phases(
 impl Reading<'_> {
     fn phase(&mut self, table: &PhaseTable, names: &Names) -> Option<Phase> {
         let (done, parts) = self.done(table, names)?;
+        let done = match &table.spoiled {
+            None => done,
+            Some(text) => {
+                Done::Unless { spoiled: condition(&self.condition(text, names)?), done: leaked(done) }
+            }
+        };
         let near = match &table.near {
             None => None,
             Some(text) => Some(self.meant(text, |text| conditions::number(text, names))?),

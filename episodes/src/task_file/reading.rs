@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use toml::Spanned;
 
+use super::error::{Mistakes, TaskFileError};
 use crate::tasks::TaskSource;
 
 /// Folders, columns and results are called so.
@@ -16,6 +17,20 @@ pub(super) struct Reading<'a> {
 }
 
 impl Reading<'_> {
+    /// Whether nothing has been found wrong.
+    pub fn checked(&mut self) -> Result<(), TaskFileError> {
+        match self.found.is_empty() {
+            true => Ok(()),
+            false => Err(self.mistakes()),
+        }
+    }
+
+    /// What has been found wrong.
+    pub fn mistakes(&mut self) -> TaskFileError {
+        let found = std::mem::take(&mut self.found);
+        TaskFileError::Mistakes(Mistakes::new(&self.source.name, &self.source.text, found))
+    }
+
     pub fn wrong(&mut self, at: Range<usize>, what: impl Into<String>) {
         self.found.push((at, what.into()));
     }

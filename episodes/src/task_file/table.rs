@@ -14,8 +14,13 @@ pub struct TaskTable {
     /// The scene itself.
     pub scene_mjcf: Option<Spanned<String>>,
     pub instruction: Spanned<String>,
+    /// What operators of one robot each read in its place, where it tells what not every robot may know.
+    pub shared_instruction: Option<Spanned<String>>,
     #[serde(default)]
     pub budget: BudgetTable,
+    /// What the seed chooses among: `{name}` in the texts of the file stands for the option.
+    #[serde(default)]
+    pub choices: Vec<ChoiceTable>,
     pub robots: Spanned<Vec<RobotTable>>,
     #[serde(default)]
     pub objects: Vec<ObjectTable>,
@@ -33,6 +38,13 @@ pub struct BudgetTable {
     pub benchmark_steps: Option<Spanned<u32>>,
     pub agentic_steps: Option<Spanned<u32>>,
     pub thinking_s: Option<Spanned<u32>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChoiceTable {
+    pub name: Spanned<String>,
+    pub options: Spanned<Vec<Spanned<String>>>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -94,6 +106,8 @@ pub struct PhaseTable {
     pub for_s: Option<Spanned<f64>>,
     pub at_end: Option<Spanned<String>>,
     pub milestones: Option<Spanned<Vec<MilestoneTable>>>,
+    /// What makes the phase impossible to reach, once it has held while the phase was next.
+    pub spoiled: Option<Spanned<String>>,
     /// A number from 0 to 1 for dense rewards.
     pub near: Option<Spanned<String>>,
 }

@@ -83,6 +83,79 @@ fn a_file_becomes_a_task_like_any_other() {
     assert_ne!(task, load(&FILE.replace("0.03", "0.04")).unwrap());
 }
 
+/// The file with a choice in it, which operators are not told in common.
+fn with_choice() -> String {
+    let text = FILE.replacen(
+        "instruction = \"Lift the box.\"",
+        "instruction = \"Lift the box by the {side}.\"\nshared_instruction = \"Lift the box.\"",
+        1,
+    );
+    text.replace("\"right\", \"box\"", "\"{side}\", \"box\"")
+        .replace("[[robots]]", "[[choices]]\nname = \"side\"\noptions = [\"left\", \"right\"]\n\n[[robots]]")
+}
+
+#[test]
+fn a_seed_chooses_and_nobody_is_told_before() {
+    let text = with_choice();
+    let task = load(&text).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(task.instruction, "Lift the box by the [left / right].");
+    assert_eq!((task.chosen("side"), task.shared_instruction()), (None, Some("Lift the box.")));
+    let mut counts = [0; 2];
+    for seed in 0..1000 {
+        let drawn = task.under(seed);
+        let side = drawn.chosen("side").unwrap();
+        counts[usize::from(side == "right")] += 1;
+        assert!(std::ptr::eq(drawn.under(seed), drawn) && drawn == task);
+        assert_eq!(drawn.instruction, format!("Lift the box by the {side}."));
+        let held = Facts::at_rest(drawn).grip(A, Right, "box", Grip::Holding).raised("box", 0.04);
+        let Done::When(lifted) = &drawn.phases[0].done else { panic!("it is reached at once") };
+        assert_eq!(lifted(&held), side == "right");
+    }
+    assert!(counts.iter().all(|count| (430..=570).contains(count)), "{counts:?}");
+    // A recording holds what was chosen, and a spec of another seed chooses anew.
+    let spec = EpisodeSpec::new(task, 3, Protocol::Benchmark);
+    let read: EpisodeSpec = serde_json::from_str(&serde_json::to_string(&spec).unwrap()).unwrap();
+    assert!(std::ptr::eq(read.task, spec.task), "{:?}", read.task.chosen("side"));
+    assert!((0..20).any(|seed| spec.seeded(seed).task.chosen("side") != spec.task.chosen("side")));
+}
+
+#[test]
+fn mistakes_in_choices_are_told_by_their_places() {
+    let check = |right: &str, wrong: &str, expected: &str| {
+        let text = with_choice();
+        assert!(text.contains(right), "{right}");
+        let error = load(&text.replace(right, wrong)).expect_err(wrong);
+        assert!(error.contains(expected), "{wrong}: {error}");
+    };
+    check("[\"left\", \"right\"]", "[\"left\"]", "lift.toml:9:11: there is nothing to choose");
+    check("[\"left\", \"right\"]", "[\"left\", \"left\"]", "this option is given twice");
+    check("[\"left\", \"right\"]", "[\"left\", \"a 'b'\"]", "an option is a word or two without quotes");
+    check("{side}", "{other}", "lift.toml:8:8: nothing in the file asks for it; write {side}");
+    // A mistake in one of the ways alone is told, too.
+    check("[\"left\", \"right\"]", "[\"left\", \"rigt\"]", "no hand \"rigt\"");
+}
+
+#[test]
+fn the_suite_is_whole() {
+    assert!(!tandem_plus().is_empty());
+    for task in tandem_plus() {
+        let file = task.file.as_ref().unwrap();
+        assert_eq!(file.source.name, format!("{}.toml", task.id));
+        assert_eq!((task.suite(), task_set(Vec::new()).find(task.id).ok()), (Some(TANDEM_PLUS), Some(*task)));
+        assert!(crate::tasks::find(task.id).is_err(), "{} is none of the ten", task.id);
+        assert_eq!(EpisodeSpec::new(task, 0, Protocol::Benchmark).departures()[0], "suite: tandem+");
+        // What one robot alone may know stands in no instruction that all of them read.
+        let shared = task.shared_instruction().unwrap_or(task.instruction);
+        assert!(
+            !shared.contains('[')
+                && task.robots.iter().filter(|robot| robot.instruction.contains('[')).count() <= 1
+        );
+        // A file of somebody else's that says the same with a comment more is not the suite's.
+        let own = TaskSource { text: format!("# mine\n{}", file.source.text), ..file.source.clone() };
+        assert_eq!(task_of(own).unwrap().suite(), None);
+    }
+}
+
 #[test]
 fn a_spec_holds_the_whole_file() {
     let task = load(FILE).unwrap();

@@ -17,10 +17,10 @@ mod trash_collection;
 pub use randomize::{Offset, Spread, StartPose, uniform_xy};
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use serde::{Deserialize, Serialize};
-use tandem_sim::{ObjectFile, RobotModel, SimError, Step};
+use tandem_sim::{ObjectFile, RobotModel, SimError, SplitMix64, Step};
 
 use crate::EpisodeError;
 use crate::scoring::{Phase, Scores};
@@ -38,6 +38,9 @@ pub static ALL: &[Task] = &[
     move_house::TASK,
     big_table::TASK,
 ];
+
+/// What tells the numbers by which a seed chooses from those by which it moves things.
+const CHOICES_STREAM: u64 = 0x6368_6f69_6365_7331;
 
 /// A task: one of the benchmark's, or one that somebody has written into a file.
 #[derive(Debug)]
@@ -76,6 +79,21 @@ pub struct TaskFile {
     pub agentic_steps: u32,
     /// How long a policy may think in it.
     pub thinking_s: u32,
+    /// What operators of one robot each read in place of the joint instruction, where that tells what not all of them may know.
+    pub shared_instruction: Option<&'static str>,
+    /// The suite of the program's own to which the file belongs.
+    pub suite: Option<&'static str>,
+    /// What has been chosen in it; nothing where the seed has not been told yet.
+    pub chosen: Vec<ChosenOption>,
+    /// The same task for each way in which its choices fall out; none where it has no choices.
+    pub variants: Arc<OnceLock<Vec<&'static Task>>>,
+}
+
+/// What a choice of a task's file has come to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ChosenOption {
+    pub name: String,
+    pub option: String,
 }
 
 /// The texts that a task was read from: it is made of nothing else, so that whoever has them has the task.
@@ -138,6 +156,35 @@ impl Task {
         self.file.as_ref().map(|file| file.xxh3.as_str())
     }
 
+    /// This task as the seed's choices make it. One that has nothing to choose is itself.
+    pub fn under(&'static self, seed: u32) -> &'static Task {
+        let variants = self.file.as_ref().and_then(|file| file.variants.get());
+        let Some(variants) = variants else { return self };
+        let drawn = SplitMix64(u64::from(seed) ^ CHOICES_STREAM).uniform([0.0, variants.len() as f32]);
+        variants.get(drawn as usize).copied().unwrap_or(self)
+    }
+
+    /// Whether its file leaves something to the seed's choice.
+    pub fn has_choices(&self) -> bool {
+        self.file.as_ref().is_some_and(|file| file.variants.get().is_some())
+    }
+
+    /// The option that has been chosen, if the task has a choice of this name.
+    pub fn chosen(&self, name: &str) -> Option<&str> {
+        let chosen = &self.file.as_ref()?.chosen;
+        chosen.iter().find(|chosen| chosen.name == name).map(|chosen| chosen.option.as_str())
+    }
+
+    /// The suite that it belongs to, if it is none of the benchmark's.
+    pub fn suite(&self) -> Option<&'static str> {
+        self.file.as_ref()?.suite
+    }
+
+    /// What operators of one robot each read in place of the joint instruction, where that tells what not all of them may know.
+    pub fn shared_instruction(&self) -> Option<&'static str> {
+        self.file.as_ref()?.shared_instruction
+    }
+
     /// Names of the robots, in their order.
     pub fn robot_names(&self) -> impl Iterator<Item = &'static str> {
         self.robots.iter().map(|robot| robot.name)
@@ -151,16 +198,17 @@ impl PartialEq for Task {
     }
 }
 
-/// The tasks that there are to play: the benchmark's, and those of files.
+/// The tasks that there are to play: the benchmark's, those of the program's own suites, and those of files.
 #[derive(Clone, Debug, Default)]
 pub struct TaskSet {
+    of_suites: Vec<&'static Task>,
     of_files: Vec<&'static Task>,
 }
 
 impl TaskSet {
-    /// The benchmark's tasks and these, of which one that is called as one of the benchmark's takes its place.
-    pub fn with(of_files: Vec<&'static Task>) -> TaskSet {
-        TaskSet { of_files }
+    /// The benchmark's tasks, those of suites, and those of files, of which one that is called as one of the others takes its place.
+    pub fn with(of_suites: Vec<&'static Task>, of_files: Vec<&'static Task>) -> TaskSet {
+        TaskSet { of_suites, of_files }
     }
 
     /// The first task that a file brings.
@@ -168,10 +216,11 @@ impl TaskSet {
         self.of_files.first().copied()
     }
 
-    /// The benchmark's order, then that of the files.
+    /// The benchmark's order, then that of the suites, then that of the files.
     pub fn all(&self) -> impl Iterator<Item = &'static Task> {
         let replaced = |task: &&'static Task| self.of_files.iter().all(|other| other.id != task.id);
-        ALL.iter().filter(replaced).chain(self.of_files.iter().copied())
+        let built_in = ALL.iter().chain(self.of_suites.iter().copied());
+        built_in.filter(replaced).chain(self.of_files.iter().copied())
     }
 
     /// The task called `id`.

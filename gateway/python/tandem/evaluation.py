@@ -135,7 +135,7 @@ def evaluate(
     policy: Called with each episode, which has begun; it plays until it is done or the episode has ended. An exception of its
         own ends this episode and no other, and the episode does not count; that the episode has ended is none. "expert" is
         the task's scripted expert, which sees object poses; "idle" holds still.
-    tasks: A task's id, or several; "all" for every one.
+    tasks: A task's id, or several; "all" for the benchmark's ten, "tandem+" for that suite.
     seeds: A seed, or several.
     jobs: Episodes that run side by side, each on a thread of its own, on which the policy is called. Physics and drawing
         run at the same time; Python code of policies does not.
@@ -267,9 +267,10 @@ Elsewhere: TypeAlias = Callable[[str, int, Callable[[], bool]], Played]
 
 
 def _task_ids(named: str | Iterable[str]) -> list[str]:
-    if named == "all":
-        return [task.id for task in tasks().tasks]
-    return [named] if isinstance(named, str) else list(named)
+    if not isinstance(named, str):
+        return list(named)
+    suite = None if named == "all" else named
+    return [task.id for task in tasks().tasks if task.suite == suite] or [named]
 
 
 def _evaluation(raw: dict[str, Any], folder: Path | None) -> Evaluation:

@@ -67,7 +67,7 @@ class TandemBenchmark(StepBenchmark):
         self._env: TandemEnv | None = None
 
     def get_tasks(self) -> list[Task]:
-        return [{"name": name, "suite": "tandem"} for name in self._tasks]
+        return [{"name": name, "suite": told.suite or "tandem"} for name, told in self._tasks.items()]
 
     def reset(self, task: Task) -> Any:
         if self._env is None or self._env.task != task["name"]:

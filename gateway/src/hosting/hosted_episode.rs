@@ -111,12 +111,11 @@ impl HostedEpisode {
     /// What `who` has to know to begin.
     pub async fn briefing(&self, who: &Caller) -> Result<Briefing, HostingError> {
         self.admit(who)?;
-        let mut briefing = self.thread.briefing().await?;
-        if let Caller::Operator { robot, .. } = who {
-            briefing.instructions.retain(|entry| entry.robot == *robot);
-            briefing.status.fallen.retain(|entry| entry.robot == *robot);
-        }
-        Ok(briefing)
+        let briefing = self.thread.briefing().await?;
+        Ok(match who {
+            Caller::Operator { robot, .. } => briefing.for_robot(robot),
+            Caller::Host => briefing,
+        })
     }
 
     /// Its line in the list of episodes. Its thread is not asked, which may be at work.

@@ -45,7 +45,7 @@ pub struct TaskList {
 impl TaskList {
     /// The list as it is told shortly.
     pub fn shortened(mut self) -> TaskList {
-        for TaskInfo { id: _, instruction: _, robots, phases, protocols } in &mut self.tasks {
+        for TaskInfo { id: _, suite: _, instruction: _, robots, phases, protocols } in &mut self.tasks {
             robots.clear();
             phases.clear();
             protocols.clear();
@@ -59,6 +59,9 @@ impl TaskList {
 pub struct TaskInfo {
     /// What start_episode calls it, as `handover`.
     pub id: String,
+    /// The suite that it belongs to, as `tandem+`; left out of the benchmark's tasks and of those of files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub suite: Option<String>,
     /// What has to be done, for whoever directs all robots.
     pub instruction: String,
     /// What each robot has to do, for policies that direct one; left out of a short reply.

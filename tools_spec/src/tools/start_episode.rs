@@ -60,6 +60,10 @@ pub struct StartReply {
 pub struct Briefing {
     /// What has to be done.
     pub instruction: String,
+    /// What those who direct one robot each read in place of `instruction`, where that tells what not all of them may know; left out
+    /// where they may read it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shared_instruction: Option<String>,
     /// What each robot has to do.
     pub instructions: Vec<Instruction>,
     /// The robots.
@@ -88,6 +92,14 @@ pub struct Briefing {
 }
 
 impl Briefing {
+    /// The briefing as whoever directs this robot alone reads it.
+    pub fn for_robot(mut self, robot: &str) -> Briefing {
+        self.instructions.retain(|entry| entry.robot == robot);
+        self.status.fallen.retain(|entry| entry.robot == robot);
+        self.instruction = self.shared_instruction.take().unwrap_or(self.instruction);
+        self
+    }
+
     /// The briefing as it is told shortly.
     pub fn shortened(mut self) -> Briefing {
         self.action_row.clear();

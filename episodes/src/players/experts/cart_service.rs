@@ -7,7 +7,7 @@ use tandem_sim::{Pose, Side, Vector};
 
 use super::skills::{
     CarryTeam, Commander, CylinderGrasp, HandGrasp, Hold, ParallelScript, Tolerance, WalkGoal, approach,
-    grasp_compliantly, in_parallel, let_go, pick_up_all, place, walk_to,
+    at_hand, grasp_compliantly, in_parallel, let_go, pick_up_all, walk_to,
 };
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
@@ -21,8 +21,6 @@ const STANDS_M_S: f32 = 0.03;
 const MOST_STOPPING_BEATS: u32 = 20;
 /// How fast B walks with the bottle in its hand.
 const CARRY_M_S: f32 = 0.25;
-/// Where a robot has what its right hand takes: ahead of the pelvis, and to the right.
-const AT_HAND_M: Vector = Vector::new(0.40, -0.10, 0.0);
 /// While B walks its pelvis is up to 12 cm lower than where it stands, and the bottle with it: it has to clear the table all the same.
 const LIFT_M: f32 = 0.26;
 /// How far B steps back from the trolley before it turns.
@@ -106,12 +104,6 @@ fn await_trolley(commander: &mut Commander) -> Result<(), PlayerError> {
         }
         commander.hold(B)?;
     }
-}
-
-/// Where B stands to have `point_m` before its right hand.
-fn at_hand(point_m: Vector, heading_rad: f32) -> Pose {
-    let facing = place(Vector::ZERO, heading_rad);
-    place(point_m - facing * AT_HAND_M, heading_rad)
 }
 
 fn go(commander: &mut Commander, to: Pose, pace_m_s: f32) -> Result<(), PlayerError> {

@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use tandem_sim::{Side, Vector};
 
-use super::skills::{Commander, CylinderGrasp, pick_up_all};
+use super::skills::{Commander, CylinderGrasp, hand_over, pick_up, release, stand_on};
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
@@ -17,68 +17,19 @@ const TAKER: CylinderGrasp =
 /// Where the bottle changes hands: between the robots, above the counter.
 const MEETING_M: Vector = Vector::new(0.36, -0.06, 0.92);
 const LIFT_M: Vector = Vector::new(0.0, 0.0, 0.10);
-/// How far above the pad the bottle is let down from.
-const ABOVE_PAD_M: Vector = Vector::new(0.0, 0.0, 0.05);
-const ATTEMPTS: usize = 4;
 
 /// Whoever has the bottle already has done what comes before.
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     if !TAKER.holds(commander)? {
         if !GIVER.holds(commander)? {
-            pick_up(commander)?;
+            pick_up(commander, &GIVER, LIFT_M)?;
         }
         let bring = GIVER.carry(commander, MEETING_M)?;
         commander.perform(1.0, &[bring])?;
-        hand_over(commander)?;
+        hand_over(commander, &GIVER, &TAKER)?;
     } else if GIVER.holds(commander)? {
         release(commander, &GIVER)?;
     }
-    put_down(commander)
-}
-
-fn pick_up(commander: &mut Commander) -> Result<(), PlayerError> {
-    for _ in 0..ATTEMPTS {
-        pick_up_all(commander, &[GIVER])?;
-        let resting_m = commander.facts()?.position_m(GIVER.object);
-        let lift = GIVER.carry(commander, resting_m + LIFT_M)?;
-        commander.perform(1.0, &[lift])?;
-        if GIVER.holds(commander)? {
-            return Ok(());
-        }
-        release(commander, &GIVER)?;
-    }
-    Err(PlayerError::GaveUp("A lost the bottle".into()))
-}
-
-fn hand_over(commander: &mut Commander) -> Result<(), PlayerError> {
-    for _ in 0..ATTEMPTS {
-        let beside = TAKER.beside(commander, 0.0)?;
-        commander.perform(1.2, &[beside])?;
-        let around = TAKER.around(commander)?;
-        commander.perform(0.8, &[around])?;
-        commander.perform(0.8, &[TAKER.close()])?;
-        commander.perform(0.2, &[TAKER.close()])?;
-        if TAKER.holds(commander)? {
-            return release(commander, &GIVER);
-        }
-        release(commander, &TAKER)?;
-    }
-    Err(PlayerError::GaveUp("B could not take the bottle".into()))
-}
-
-fn put_down(commander: &mut Commander) -> Result<(), PlayerError> {
     let pad_m = commander.facts()?.position_m("target_pad");
-    let over = TAKER.carry(commander, pad_m + ABOVE_PAD_M)?;
-    commander.perform(1.0, &[over])?;
-    let down = TAKER.carry(commander, pad_m)?;
-    commander.perform(0.8, &[down])?;
-    release(commander, &TAKER)?;
-    // The bottle has to have stood released for a moment.
-    commander.perform(1.0, &[TAKER.open()])
-}
-
-fn release(commander: &mut Commander, grasp: &CylinderGrasp) -> Result<(), PlayerError> {
-    commander.perform(0.5, &[grasp.open()])?;
-    let away = grasp.away(commander)?;
-    commander.perform(0.6, &[away])
+    stand_on(commander, &TAKER, pad_m)
 }

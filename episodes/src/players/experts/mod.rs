@@ -12,6 +12,7 @@ mod co_pouring;
 mod frame_hang;
 mod handover;
 mod move_house;
+mod plus;
 mod pouring;
 pub(crate) mod skills;
 mod table_align;
@@ -19,8 +20,12 @@ mod trash_collection;
 
 use super::{PlayerError, PrivilegedEpisode, PrivilegedPlayer};
 use crate::spec::EpisodeSpec;
+use crate::task_file::task_set;
 use crate::tasks::{self, ObjectSpot, Task};
 use skills::{Commander, Variety};
+
+/// What tells the seed of guesses from the episode's own.
+const GUESSES: u32 = 0x6775_6573;
 
 /// Performs a task to its end.
 type ExpertScript = fn(&mut Commander) -> Result<(), PlayerError>;
@@ -38,7 +43,7 @@ const ALL: &[(&str, ExpertScript)] = &[
     ("big_table", big_table::perform),
 ];
 
-/// The tasks that have an expert, in the order of all tasks.
+/// The tasks of the benchmark that have an expert, in their order.
 pub fn solved() -> impl Iterator<Item = &'static Task> {
     tasks::ALL.iter().filter(|task| Expert::of(task).is_ok())
 }
@@ -52,14 +57,14 @@ pub struct Expert {
 }
 
 impl Expert {
-    /// The expert of `task`; of a file that is called as one of the benchmark's tasks, if it has what that has.
+    /// The expert of `task`; of a file that is called as one of the program's own tasks, if it has what that has.
     pub fn of(task: &'static Task) -> Result<Expert, PlayerError> {
-        match ALL.iter().find(|(id, _)| *id == task.id && has_what_it_needs(task)) {
+        let known = ALL.iter().chain(plus::ALL);
+        match known.clone().find(|(id, _)| *id == task.id && has_what_it_needs(task)) {
             Some((_, script)) => Ok(Expert { task, script: *script, variety: None }),
-            None => Err(PlayerError::NoExpert {
-                task: task.id.into(),
-                have: ALL.iter().map(|(id, _)| *id).collect(),
-            }),
+            None => {
+                Err(PlayerError::NoExpert { task: task.id.into(), have: known.map(|(id, _)| *id).collect() })
+            }
         }
     }
 }
@@ -69,9 +74,9 @@ pub fn solves(task: &'static Task) -> bool {
     Expert::of(task).is_ok()
 }
 
-/// Whether the robots and objects that an expert asks for by name are those of the benchmark.
+/// Whether the robots and objects that an expert asks for by name are those of the program's own task.
 fn has_what_it_needs(task: &Task) -> bool {
-    let Ok(own) = tasks::find(task.id) else { return false };
+    let Ok(own) = task_set(Vec::new()).find(task.id) else { return false };
     let has = |spot: &ObjectSpot| {
         let same = |other: &ObjectSpot| other.name == spot.name && other.source() == spot.source();
         task.objects.iter().any(same)
@@ -84,6 +89,14 @@ impl Expert {
     pub fn for_episode(spec: &EpisodeSpec) -> Result<Expert, PlayerError> {
         let variety = Variety::new(spec.variation.variety, spec.seed);
         Ok(Expert { variety, ..Expert::of(spec.task)? })
+    }
+
+    /// The same, where robots tell each other nothing: it takes another draw of the same choices for what the seed has chosen.
+    pub fn without_words(spec: &EpisodeSpec) -> Result<Expert, PlayerError> {
+        match spec.task.has_choices() {
+            true => Ok(Expert { task: spec.task.under(spec.seed ^ GUESSES), ..Expert::for_episode(spec)? }),
+            false => Err(PlayerError::NothingToSay { task: spec.task.id.into() }),
+        }
     }
 }
 

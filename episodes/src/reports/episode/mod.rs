@@ -5,5 +5,5 @@ mod page;
 pub mod strip;
 
 pub use moments::{KeyMoment, LabelledPicture};
-pub use page::{CallCounts, EpisodePage, PAGE_FILE};
+pub use page::{CallCounts, EpisodePage, PAGE_FILE, SaidWords};
 pub use strip::{CELL_HEIGHT, CELL_WIDTH, STRIP_FILE};

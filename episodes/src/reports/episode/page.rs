@@ -24,11 +24,21 @@ impl CallCounts {
     }
 }
 
+/// What the operator of a robot said to the others, and when.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SaidWords {
+    pub time_s: f64,
+    pub robot: String,
+    pub text: String,
+}
+
 /// What the page tells.
 pub struct EpisodePage<'a> {
     pub task: &'a Task,
     pub result: &'a ResultReply,
     pub calls: &'a CallCounts,
+    /// In the order in which it was said.
+    pub said: &'a [SaidWords],
     /// Simulated time at which it began: later than 0 where it began at a phase of another episode.
     pub begin_s: f64,
     /// What it was allowed.
@@ -54,7 +64,7 @@ impl EpisodePage<'_> {
 {moments}
 <h2>Budget</h2>
 {budget}
-<h2>Tool calls</h2>
+{said}<h2>Tool calls</h2>
 {calls}
 <h2>Recording</h2>
 {recording}"#,
@@ -66,6 +76,7 @@ impl EpisodePage<'_> {
             phases = self.phases(),
             moments = moments::html(self.moments, "moments"),
             budget = self.budget(),
+            said = self.said(),
             calls = self.tool_calls(),
             recording = self.recording(),
         );
@@ -178,6 +189,26 @@ impl EpisodePage<'_> {
             );
         }
         format!(r#"<table class="words">{rows}</table>"#)
+    }
+
+    /// Nothing where nobody spoke.
+    fn said(&self) -> String {
+        if self.said.is_empty() {
+            return String::new();
+        }
+        let row = |words: &SaidWords| {
+            let SaidWords { time_s, robot, text } = words;
+            let (robot, text) = (escape(robot), escape(text));
+            format!(
+                r#"<tr><td class="number">{time_s:.2} s</td><td>{robot}</td><td class="long">{text}</td></tr>"#
+            )
+        };
+        let rows: String = self.said.iter().map(row).collect();
+        format!(
+            r#"<h2>What was said</h2>
+<table class="words"><tr><th class="number">At</th><th>By</th><th>Words</th></tr>{rows}</table>
+"#
+        )
     }
 
     fn tool_calls(&self) -> String {

@@ -13,6 +13,7 @@ pub type Condition = &'static (dyn Fn(&Facts) -> bool + Sync);
 pub type Nearness = &'static (dyn Fn(&Facts) -> f32 + Sync);
 
 /// One scored phase.
+#[derive(Clone, Copy)]
 pub struct Phase {
     pub id: &'static str,
     /// When the phase counts as reached, for people and policies.
@@ -26,6 +27,7 @@ pub struct Phase {
 }
 
 /// When a phase is reached. Conditions see one control step at a time; what has to happen in sequence says so here.
+#[derive(Clone, Copy)]
 pub enum Done {
     /// It is reached as soon as the condition holds.
     When(Condition),
@@ -35,6 +37,8 @@ pub enum Done {
     Lasting { condition: Condition, for_s: f64, at_end: Condition },
     /// It is reached when every one of these has been passed, in any order.
     Milestones(&'static [Milestone]),
+    /// It is reached as `done` says, unless `spoiled` has held at any step since the phase before was reached.
+    Unless { spoiled: Condition, done: &'static Done },
 }
 
 /// One of several things that have to happen once.
@@ -75,6 +79,9 @@ pub struct PhaseMemory {
     since_s: Option<f64>,
     /// The milestones of the present phase that have been begun.
     milestones: Vec<MilestoneMemory>,
+    /// Whether the present phase has been spoiled.
+    #[serde(default)]
+    spoiled: bool,
 }
 
 /// How far a milestone is.
@@ -111,6 +118,7 @@ impl PhaseTracker {
             memory.underway = false;
             memory.since_s = None;
             memory.milestones.clear();
+            memory.spoiled = false;
         }
         memory.reached_s.len() > before
     }
@@ -155,6 +163,10 @@ impl PhaseMemory {
                     memory.passed |= lasted(&mut memory.since_s, milestone.condition, milestone.for_s, facts);
                 }
                 self.milestones.iter().all(|memory| memory.passed)
+            }
+            Done::Unless { spoiled, done } => {
+                self.spoiled |= spoiled(facts);
+                !self.spoiled && self.is_done(done, facts)
             }
         }
     }

@@ -196,3 +196,29 @@ fn each_phase_has_the_time_of_its_step() {
     assert_eq!(reached, [("grasp_and_lift", 2.0), ("transfer", 4.0)]);
     assert!(!tracker.complete());
 }
+
+#[test]
+fn a_spoiled_phase_stays_out_of_reach_and_spoils_no_other() {
+    static LIFTED: Done = Done::When(&|facts| facts.lift_m("bottle") > 0.05);
+    let spoiled: Condition = &|facts| facts.holds(B, Right, "bottle");
+    let phase = |done: Done| Phase {
+        id: "lift",
+        description: "It is lifted.",
+        collaborative: false,
+        done,
+        nearness: &|_| 0.0,
+    };
+    let guarded = || phase(Done::Unless { spoiled, done: &LIFTED });
+    let reached = |phases: Vec<Phase>, states: &[BottleState]| {
+        let mut tracker = PhaseTracker::new(Vec::leak(phases));
+        for state in states {
+            tracker.update(&facts(*state));
+        }
+        tracker.reached().count()
+    };
+    assert_eq!(reached(vec![guarded()], &[Rests, Aloft(&[A])]), 1);
+    assert_eq!(reached(vec![guarded()], &[Rests, Aloft(&[B]), Rests, Aloft(&[A])]), 0);
+    // What was done before the phase was next does not count against it.
+    let rests: Condition = &|facts| facts.lift_m("bottle") < 0.01;
+    assert_eq!(reached(vec![phase(Done::When(rests)), guarded()], &[Aloft(&[B]), Rests, Aloft(&[A])]), 2);
+}

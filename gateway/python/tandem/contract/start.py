@@ -89,6 +89,11 @@ class Briefing:
     instruction: str
     """What has to be done."""
 
+    shared_instruction: str | None
+    """What those who direct one robot each read in place of `instruction`, where that tells what not all of them
+    may know; left out where they may read it.
+    """
+
     instructions: tuple[Instruction, ...]
     """What each robot has to do."""
 
@@ -126,6 +131,7 @@ class Briefing:
         """Reads what JSON has."""
         return Briefing(
             instruction=value["instruction"],
+            shared_instruction=value.get("shared_instruction"),
             instructions=tuple(Instruction.of(item) for item in value["instructions"]),
             robots=tuple(RobotInfo.of(item) for item in value["robots"]),
             phases=tuple(PhaseInfo.of(item) for item in value.get("phases", ())),
@@ -331,6 +337,9 @@ class TaskInfo:
     id: str
     """What start_episode calls it, as `handover`."""
 
+    suite: str | None
+    """The suite that it belongs to, as `tandem+`; left out of the benchmark's tasks and of those of files."""
+
     instruction: str
     """What has to be done, for whoever directs all robots."""
 
@@ -350,6 +359,7 @@ class TaskInfo:
         """Reads what JSON has."""
         return TaskInfo(
             id=value["id"],
+            suite=value.get("suite"),
             instruction=value["instruction"],
             robots=tuple(Instruction.of(item) for item in value.get("robots", ())),
             phases=tuple(PhaseInfo.of(item) for item in value.get("phases", ())),

@@ -6,7 +6,7 @@ use std::{
     process::ExitCode,
 };
 
-use tandem_episodes::{LocomotionChoice, check_task, create_private_folder, read_task, tasks::TaskSet};
+use tandem_episodes::{LocomotionChoice, check_task, create_private_folder, read_task, task_set};
 use tandem_tools_spec::TaskList;
 
 use crate::commands::{CommandResult, Seeds, print};
@@ -48,7 +48,7 @@ pub fn run(args: TasksArgs) -> CommandResult {
         return check(args);
     }
     let limits = LocomotionChoice::default().limits();
-    let list = tandem_episodes::task_list(&TaskSet::default(), &limits);
+    let list = tandem_episodes::task_list(&task_set(Vec::new()), &limits);
     let text = match args.json {
         true => serde_json::to_string_pretty(&list)? + "\n",
         false => told(&list),
@@ -60,7 +60,7 @@ pub fn run(args: TasksArgs) -> CommandResult {
 /// The program fails if something falls.
 fn check(args: CheckArgs) -> CommandResult {
     let task = read_task(&args.file)?;
-    let own = tandem_episodes::task_list(&TaskSet::with(vec![task]), &LocomotionChoice::default().limits());
+    let own = tandem_episodes::task_list(&task_set(vec![task]), &LocomotionChoice::default().limits());
     let own = TaskList { tasks: own.tasks.into_iter().filter(|info| info.id == task.id).collect(), ..own };
     print(&told(&own))?;
     let folder = args.out.unwrap_or_else(|| Path::new("runs/tasks").join(task.id));
@@ -90,8 +90,13 @@ fn check(args: CheckArgs) -> CommandResult {
 
 fn told(list: &TaskList) -> String {
     let mut text = String::new();
+    let mut suite = list.tasks.first().and_then(|task| task.suite.as_ref());
     // Writing to a text cannot fail.
     for task in &list.tasks {
+        if task.suite.as_ref() != suite {
+            suite = task.suite.as_ref();
+            let _ = suite.map(|suite| writeln!(text, "\n{suite}, a suite that is reported apart:"));
+        }
         let _ = writeln!(text, "{}: {}", task.id, task.instruction);
         for phase in &task.phases {
             let who = if phase.collaborative { "together" } else { "alone" };

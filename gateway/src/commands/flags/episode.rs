@@ -4,9 +4,10 @@ use std::{error::Error, ops::RangeInclusive, str::FromStr};
 
 use clap::Args;
 use tandem_episodes::{
-    RobotFile, Variation,
+    RobotFile, TANDEM_PLUS, Variation,
     evaluation::{EvaluationPlan, KeptFiles, Shard, Starts},
     players::Policy,
+    tandem_plus, task_set,
     tasks::{self, Spread, Task},
 };
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol};
@@ -17,7 +18,8 @@ use crate::settings::one_of;
 /// Which episodes to play.
 #[derive(Debug, Args)]
 pub struct EpisodeFlags {
-    /// Ids of built-in tasks separated by commas, or `all` [default: none with --task-file, and else all].
+    /// Ids of built-in tasks separated by commas, or `all` for the benchmark's ten, or `tandem+` for that suite [default: none with
+    /// --task-file, and else all].
     #[arg(long, value_name = "TASKS", value_parser = parse_tasks)]
     tasks: Option<TaskList>,
     /// One seed, or a range of seeds as 0-9 or 0..9, both ends included.
@@ -52,11 +54,15 @@ pub struct EpisodeFlags {
 #[derive(Debug, Clone)]
 struct TaskList(Vec<&'static Task>);
 
-/// The built-in tasks that `text` names: `all`, or ids separated by commas.
+/// The built-in tasks that `text` names: `all` of the benchmark's, those of a suite, or ids separated by commas.
 fn parse_tasks(text: &str) -> Result<TaskList, String> {
     let found: Result<_, _> = match text {
         "all" => Ok(tasks::ALL.iter().collect()),
-        ids => ids.split(',').map(|id| tasks::find(id.trim())).collect(),
+        TANDEM_PLUS => Ok(tandem_plus().to_vec()),
+        ids => {
+            let known = task_set(Vec::new());
+            ids.split(',').map(|id| known.find(id.trim())).collect()
+        }
     };
     found.map(TaskList).map_err(|error: tandem_episodes::EpisodeError| error.to_string())
 }

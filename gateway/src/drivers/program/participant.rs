@@ -42,14 +42,12 @@ impl<'a> Participant<'a> {
             create_private_folder(&self.folder)
                 .map_err(|source| OutputError::Io { path: self.folder.clone(), source })?;
         }
-        let text = brief(start, url, self.robot, driving);
-        write_whole(&self.folder.join(BRIEF_FILE), text.as_bytes())?;
         // A token is given to whom it belongs and is written to no file.
-        let mut shown = StartReply { operators: Vec::new(), ..start.clone() };
-        shown
-            .briefing
-            .instructions
-            .retain(|instruction| self.robot.is_none_or(|robot| robot == instruction.robot));
+        let own = |robot: &str| start.briefing.clone().for_robot(robot);
+        let briefing = self.robot.map_or_else(|| start.briefing.clone(), own);
+        let shown = StartReply { operators: Vec::new(), briefing, ..start.clone() };
+        let text = brief(&shown, url, self.robot, driving);
+        write_whole(&self.folder.join(BRIEF_FILE), text.as_bytes())?;
         let text = serde_json::to_string_pretty(&shown).map_err(OutputError::from)?;
         Ok(write_whole(&self.folder.join(START_FILE), text.as_bytes())?)
     }
@@ -70,8 +68,8 @@ impl<'a> Participant<'a> {
 fn brief(start: &StartReply, url: &str, robot: Option<&str>, driving: &Driving) -> String {
     let StartReply { episode_id: id, briefing, .. } = start;
     let mut paragraphs = vec![addressee(start, robot), format!("Task: {}", briefing.instruction)];
-    let own = briefing.instructions.iter().filter(|entry| robot.is_none_or(|robot| entry.robot == robot));
-    paragraphs.extend(own.map(|entry| format!("Robot {}: {}", entry.robot, entry.instruction)));
+    let told = briefing.instructions.iter();
+    paragraphs.extend(told.map(|entry| format!("Robot {}: {}", entry.robot, entry.instruction)));
     paragraphs.extend(robot.map(|_| partners(driving)));
     paragraphs.push(format!(
         "Tools: over MCP at {url}/mcp, each with the argument episode_id {id:?}; or by HTTP, POST {url}/v1/episodes/{id}/tools/NAME \

@@ -2,6 +2,7 @@
 
 use clap::{Arg, Command, CommandFactory};
 use tandem::cli::Cli;
+use tandem_episodes::tandem_plus;
 use tandem_episodes::tasks::{self, Task};
 use tandem_tests::TestServer;
 
@@ -12,8 +13,9 @@ const EVERYWHERE: [&str; 2] = ["help", "version"];
 
 #[test]
 fn pages_of_tasks_say_what_tasks_are() {
-    for task in tasks::ALL {
-        let text = page(&format!("{BOOK}/tasks/{}.md", task.id)).text;
+    for task in tasks::ALL.iter().chain(tandem_plus().iter().copied()) {
+        let folder = if task.suite().is_some() { "tasks/plus" } else { "tasks" };
+        let text = page(&format!("{BOOK}/{folder}/{}.md", task.id)).text;
         let expected = expected_of(task);
         let missing: Vec<&String> = expected.iter().filter(|part| !text.contains(part.as_str())).collect();
         assert!(missing.is_empty(), "the page of {} does not say {missing:#?}", task.id);
@@ -29,9 +31,10 @@ fn expected_of(task: &Task) -> Vec<String> {
     });
     let objects = task.objects.iter().filter(|object| object.name == object.file);
     let objects = objects.map(|object| format!("`{}`", object.name));
+    let agentic_steps = task.file.as_ref().map_or(tasks::AGENTIC_STEPS, |file| file.agentic_steps);
     let whole = [
         format!("| all robots | {} |", task.instruction),
-        format!("6000, of which 300 are the initial hold | {} |", task.benchmark_steps),
+        format!("{agentic_steps}, of which 300 are the initial hold | {} |", task.benchmark_steps),
         format!("Scene `{}`", task.scene),
         format!("pictures/{}.png", task.id),
     ];

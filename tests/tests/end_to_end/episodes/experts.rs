@@ -5,10 +5,13 @@ use std::ops::RangeInclusive;
 use std::thread::available_parallelism;
 
 use tandem_episodes::evaluation::{EvaluationPlan, KeptFiles, Shard, Starts, evaluate};
-use tandem_episodes::players::{self, Episode, InProcess, PlayerError, PrivilegedEpisode, experts};
+use tandem_episodes::players::{
+    self, Episode, EpisodeOutput, InProcess, PlayerError, Policy, PrivilegedEpisode, experts,
+};
 use tandem_episodes::tasks::{self, Task};
 use tandem_episodes::{
     A, B, C, Controller, EpisodeSpec, Facts, RendererKind, RobotFile, Sensing, Session, Variation,
+    tandem_plus,
 };
 use tandem_sim::{SensorModel, Side};
 use tandem_tools_spec::{ActCall, Assistance, Protocol, ToolCall, ToolReply};
@@ -76,6 +79,30 @@ fn experts_that_stand_solve_their_tasks() {
 #[test]
 fn experts_that_walk_solve_their_tasks() {
     solve(experts::solved().filter(|task| !STANDING.contains(&task.id)).collect(), 2);
+}
+
+#[test]
+fn experts_of_tandem_plus_solve_their_tasks() {
+    solve(tandem_plus().to_vec(), 1);
+}
+
+/// Neither nobody nor a team that does not talk solves what needs words: the last phase is reached where the guess happens to be right.
+#[test]
+fn tandem_plus_needs_somebody_who_acts_and_words() {
+    for task in tandem_plus() {
+        let idle = players::find("idle").expect("a player");
+        let no_words = players::find("no_words").expect("a player");
+        let reached = |player: &players::PlayerEntry, seed: u32| {
+            let spec = EpisodeSpec::new(task, seed, Protocol::Benchmark).assisted(Assistance::Paper);
+            let nowhere = EpisodeOutput { folder: "".as_ref(), record: false, pages: false };
+            let result = player.play_episode(&spec, nowhere).expect("worlds can be built").result;
+            result.phases.0.iter().filter(|(_, time_s)| time_s.is_some()).count()
+        };
+        assert_eq!(reached(idle, SEEDS[0]), 0, "{}", task.id);
+        let silent: Vec<usize> = (2000..2006).map(|seed| reached(no_words, seed)).collect();
+        let failed = silent.iter().filter(|reached| **reached < task.phases.len()).count();
+        assert!(failed >= 3, "{}: phases reached without words {silent:?}", task.id);
+    }
 }
 
 /// An episode in which A's left hand opens and rises for a moment while the table is on its way.

@@ -10,6 +10,9 @@ const AXIS_IN_WRIST_M: Vector = Vector::new(0.1195, 0.055, 0.0);
 /// How far from a cylinder a hand begins to come at it, palm first.
 const STANDOFF_M: f32 = 0.08;
 
+/// How far ahead of a hand, and beside it, others have to themselves what it has given.
+const OUT_OF_THE_WAY_M: Vector = Vector::new(0.16, 0.04, 0.0);
+
 /// A hand that is to hold an upright cylinder.
 #[derive(Clone, Copy)]
 pub struct CylinderGrasp<'a> {
@@ -65,6 +68,11 @@ impl CylinderGrasp<'_> {
     /// Away from the object, the way it came.
     pub fn away(&self, commander: &mut Commander) -> Result<HandMove, PlayerError> {
         back_off(commander, self.robot, self.side, Vector::new(0.0, STANDOFF_M, 0.0))
+    }
+
+    /// Back towards the robot, out of the way of what others do with the object.
+    pub fn out_of_the_way(&self, commander: &mut Commander) -> Result<HandMove, PlayerError> {
+        back_off(commander, self.robot, self.side, OUT_OF_THE_WAY_M)
     }
 
     /// Wrist motion that brings the held object's origin to `object_m` (world), upright.

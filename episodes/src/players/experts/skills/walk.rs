@@ -21,6 +21,8 @@ const LONGEST_S: f32 = 20.0;
 const SETTLE_COMMANDS: u32 = 6;
 /// Commands in which a robot takes a step with either foot.
 const TWO_STEPS_COMMANDS: usize = 6;
+/// Where a robot has what its right hand takes: ahead of the pelvis, and to the right.
+const AT_HAND_M: Vector = Vector::new(0.40, -0.10, 0.0);
 /// How long hands take to reach out.
 const REACH_S: f32 = 1.5;
 /// Hands that have reached out correct the rest.
@@ -233,4 +235,10 @@ pub fn upright(pose: &Pose) -> Pose {
 /// A place and a heading.
 pub fn place(position_m: Vector, heading_rad: f32) -> Pose {
     Pose::from_parts(position_m, Rotation::from_rotation_z(heading_rad))
+}
+
+/// Where a robot stands to have `point_m` before its right hand.
+pub fn at_hand(point_m: Vector, heading_rad: f32) -> Pose {
+    let facing = place(Vector::ZERO, heading_rad);
+    place(point_m - facing * AT_HAND_M, heading_rad)
 }

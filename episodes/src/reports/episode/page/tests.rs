@@ -50,7 +50,9 @@ fn page_of(begin_s: f64, result: &ResultReply) -> String {
     let views = vec![LabelledPicture { label: "what A sees".into(), file: b"png".into() }];
     let moments = [KeyMoment { caption: ["p1 <grasp>".into(), "4.0 s".into()], views }];
     let rules = rules(protocol, task);
-    EpisodePage { task, result, calls: &calls, begin_s, rules, budget_left, moments: &moments }.html()
+    let said = [SaidWords { time_s: 1.5, robot: "A".into(), text: "the <red> one".into() }];
+    EpisodePage { task, result, calls: &calls, said: &said, begin_s, rules, budget_left, moments: &moments }
+        .html()
 }
 
 #[test]
@@ -81,6 +83,7 @@ fn pages_tell_what_happened() {
             "500 of 6000, 300 of them the initial hold",
             "60.0 of 1800 s",
             r#"<code>move_wrists</code></td><td class="number">2</td><td class="number">1</td>"#,
+            r#"<td class="number">1.50 s</td><td>A</td><td class="long">the &lt;red&gt; one</td>"#,
             "data:image/png;base64,cG5n",
             // What a picture shows is text.
             r#"<p>p1 &lt;grasp&gt; <span class="soft">4.0 s</span></p>"#,
@@ -119,7 +122,7 @@ fn no_table_of_words_needs_more_room_than_a_telephone_has() {
     let page = page([Some(4.0), None, None], Protocol::Agentic);
     let tables: Vec<&str> =
         page.split("<table").skip(1).map(|table| table.split_once("</table>").unwrap().0).collect();
-    assert_eq!(tables.len(), 3);
+    assert_eq!(tables.len(), 4);
     for table in tables {
         let words = table.starts_with(" class=\"words\"");
         for cell in table.split("<td").skip(1).map(|cell| cell.split_once("</td>").unwrap().0) {

@@ -1,0 +1,71 @@
+//! An upright cylinder goes from hand to hand: picked up, given, stood on a place and let go of.
+
+use tandem_sim::Vector;
+
+use super::commander::Commander;
+use super::cylinder::{CylinderGrasp, pick_up_all};
+use crate::players::PlayerError;
+
+/// How far above its place the object is let down from.
+const ABOVE_PLACE_M: Vector = Vector::new(0.0, 0.0, 0.05);
+const ATTEMPTS: usize = 4;
+
+/// Takes what stands on something, and lifts it straight up until it is held in the air.
+pub fn pick_up(commander: &mut Commander, grasp: &CylinderGrasp, lift_m: Vector) -> Result<(), PlayerError> {
+    for _ in 0..ATTEMPTS {
+        pick_up_all(commander, &[*grasp])?;
+        let resting_m = commander.facts()?.position_m(grasp.object);
+        let lift = grasp.carry(commander, resting_m + lift_m)?;
+        commander.perform(1.0, &[lift])?;
+        if grasp.holds(commander)? {
+            return Ok(());
+        }
+        release(commander, grasp)?;
+    }
+    let robot = commander.task().robots[grasp.robot].name;
+    Err(PlayerError::GaveUp(format!("{robot} lost the {}", grasp.object.replace('_', " "))))
+}
+
+/// The taker closes its hand on what the giver holds out; then the giver lets go.
+pub fn hand_over(
+    commander: &mut Commander,
+    giver: &CylinderGrasp,
+    taker: &CylinderGrasp,
+) -> Result<(), PlayerError> {
+    for _ in 0..ATTEMPTS {
+        let beside = taker.beside(commander, 0.0)?;
+        commander.perform(1.2, &[beside])?;
+        let around = taker.around(commander)?;
+        commander.perform(0.8, &[around])?;
+        commander.perform(0.8, &[taker.close()])?;
+        commander.perform(0.2, &[taker.close()])?;
+        if taker.holds(commander)? {
+            return release(commander, giver);
+        }
+        release(commander, taker)?;
+    }
+    let robot = commander.task().robots[taker.robot].name;
+    Err(PlayerError::GaveUp(format!("{robot} could not take the {}", taker.object.replace('_', " "))))
+}
+
+/// Stands a held object on a place and lets go of it.
+pub fn stand_on(
+    commander: &mut Commander,
+    grasp: &CylinderGrasp,
+    place_m: Vector,
+) -> Result<(), PlayerError> {
+    let over = grasp.carry(commander, place_m + ABOVE_PLACE_M)?;
+    commander.perform(1.0, &[over])?;
+    let down = grasp.carry(commander, place_m)?;
+    commander.perform(0.8, &[down])?;
+    release(commander, grasp)?;
+    // The object has to have stood released for a moment.
+    commander.perform(1.0, &[grasp.open()])
+}
+
+/// Opens the hand and takes it away.
+pub fn release(commander: &mut Commander, grasp: &CylinderGrasp) -> Result<(), PlayerError> {
+    commander.perform(0.5, &[grasp.open()])?;
+    let away = grasp.away(commander)?;
+    commander.perform(0.6, &[away])
+}

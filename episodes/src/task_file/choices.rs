@@ -1,0 +1,95 @@
+//! What the seed chooses in a task's file: `{name}` in its texts stands for the option. A file with choices is as many tasks as there
+//! are ways to choose, all of one id and one hash.
+
+use toml::Spanned;
+
+use super::reading::Reading;
+use super::table::ChoiceTable;
+use crate::tasks::ChosenOption;
+
+/// A task is made for each way to choose.
+const MOST_WAYS: usize = 64;
+
+/// A choice as its file has it.
+pub(super) struct Choice {
+    name: String,
+    options: Vec<String>,
+}
+
+impl Reading<'_> {
+    /// The choices of a file; what is wrong with them is found here.
+    pub fn choices(&mut self, tables: Vec<ChoiceTable>) -> Vec<Choice> {
+        let mut found: Vec<Choice> = Vec::new();
+        for table in tables {
+            self.id(&table.name, "a choice");
+            if found.iter().any(|choice| choice.name == *table.name.as_ref()) {
+                self.wrong(table.name.span(), "there is a choice of this name already");
+            }
+            let options = table.options.as_ref();
+            if options.len() < 2 {
+                self.wrong(
+                    table.options.span(),
+                    "there is nothing to choose; give two options or more, as [\"left\", \"right\"]",
+                );
+            }
+            for (index, option) in options.iter().enumerate() {
+                self.option(option, &options[..index]);
+            }
+            let placeholder = placeholder(table.name.as_ref());
+            if !self.source.text.contains(&placeholder) {
+                let what = format!("nothing in the file asks for it; write {placeholder} where it belongs");
+                self.wrong(table.name.span(), what);
+            }
+            let options = table.options.into_inner().into_iter().map(Spanned::into_inner).collect();
+            found.push(Choice { name: table.name.into_inner(), options });
+            if found.iter().map(|choice| choice.options.len().max(1)).product::<usize>() > MOST_WAYS {
+                self.wrong(0..0, format!("there are at most {MOST_WAYS} ways to choose in a file"));
+                break;
+            }
+        }
+        found
+    }
+
+    /// An option stands between quotes of TOML and of expressions alike.
+    fn option(&mut self, option: &Spanned<String>, before: &[Spanned<String>]) {
+        let text = option.as_ref();
+        if text.is_empty() || text.contains(['"', '\'', '\\', '{', '}']) || text.contains(char::is_control) {
+            let what = "an option is a word or two without quotes, brackets and line breaks, as \"left\"";
+            self.wrong(option.span(), what);
+        }
+        if before.iter().any(|other| other.as_ref() == text) {
+            self.wrong(option.span(), "this option is given twice");
+        }
+    }
+}
+
+/// Every way to choose, in the order of the options; the last choice changes first.
+pub(super) fn ways(choices: &[Choice]) -> Vec<Vec<ChosenOption>> {
+    let mut ways = vec![Vec::new()];
+    for Choice { name, options } in choices {
+        let with = |way: &Vec<ChosenOption>, option: &String| {
+            let chosen = ChosenOption { name: name.clone(), option: option.clone() };
+            way.iter().cloned().chain([chosen]).collect()
+        };
+        ways = ways.iter().flat_map(|way| options.iter().map(move |option| with(way, option))).collect();
+    }
+    ways
+}
+
+/// A text with what has been chosen in it.
+pub(super) fn filled(text: &str, way: &[ChosenOption]) -> String {
+    let fill = |text: String, chosen: &ChosenOption| text.replace(&placeholder(&chosen.name), &chosen.option);
+    way.iter().fold(text.to_owned(), fill)
+}
+
+/// A text for those who cannot know yet what the seed chooses: all options stand in it.
+pub(super) fn with_options(text: &str, choices: &[Choice]) -> String {
+    let fill = |text: String, choice: &Choice| {
+        text.replace(&placeholder(&choice.name), &format!("[{}]", choice.options.join(" / ")))
+    };
+    choices.iter().fold(text.to_owned(), fill)
+}
+
+fn placeholder(name: &str) -> String {
+    format!("{{{name}}}")
+}
