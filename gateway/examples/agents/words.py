@@ -1,5 +1,5 @@
-"""A team that talks, of Python's standard library alone: who is asked to tell the others something says it; the others wait until they
-have heard it, say it again, and hold still. It shows how words pass between operators; nobody takes a bottle by words alone.
+"""A team that talks, of Python's standard library alone: who is asked to tell the others something says it; the others wait
+until they have heard it, say it again, and hold still. It shows how words pass between operators, and takes nothing.
 
     tandem evaluate --policy exec:"python3 gateway/examples/agents/words.py" --per-robot --talk --protocol benchmark \
         --tasks which_one --seeds 0 --out runs/words
