@@ -47,6 +47,11 @@ pub enum EpisodeError {
     Ik(#[from] tandem_ik::IkError),
     #[error("a picture cannot be encoded: {0}")]
     Picture(#[from] tandem_sim::render::PictureError),
+    #[error(
+        "nobody has worded the task {task:?} in other words, which the stress words-1 to words-3 needs; have: {}; the other axes can be laid over every task",
+        .have.join(", ")
+    )]
+    NoOtherWords { task: String, have: Vec<&'static str> },
     #[error(transparent)]
     Scene(Box<SceneError>),
     #[error(transparent)]
@@ -77,6 +82,7 @@ impl EpisodeError {
             EpisodeError::Ended { .. } => Refusal::new("ended", "Episode ended", Conflict),
             EpisodeError::Spec(error) => error.refusal(),
             EpisodeError::Diverged { .. } => Refusal::new("diverged", "Physics diverged", Conflict),
+            EpisodeError::NoOtherWords { .. } => Refusal::new("no-other-words", "No other words", Invalid),
             EpisodeError::Scene(_) => Refusal::new("scene", "Scene does not fit the task", Invalid),
             EpisodeError::Checkpoint(_) => Refusal::new("checkpoint", "Checkpoint does not fit", Invalid),
             EpisodeError::Sim(_)
@@ -157,6 +163,11 @@ pub enum CheckpointError {
     NoPhase { path: PathBuf, phase: String },
     #[error("{0}")]
     Recording(String),
+    #[error(
+        "{}, played again up to step {step}, goes elsewhere than was recorded: build {made_by} recorded it, this is build {this}, and builds may differ in their physics; begin again with the build that recorded it",
+        path.display()
+    )]
+    OtherWay { path: PathBuf, step: u64, made_by: String, this: &'static str },
     #[error("the checkpoint was made of {made_of}; it fits that episode, and this one is {wanted}")]
     OtherEpisode { made_of: String, wanted: String },
     #[error("the progress in a checkpoint cannot be read or written: {0}")]

@@ -9,6 +9,7 @@ use tandem_tools_spec::{Briefing, Instruction, TaskList};
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::describe::task_list;
+use crate::stress::Stress;
 use crate::tasks::TaskSet;
 
 /// Instructions by task id, as JSON:
@@ -86,9 +87,15 @@ impl Instructions {
         Some(format!("{:016x}", xxh3_64(format!("{:?}", (joint, robots)).as_bytes())))
     }
 
-    /// The reply to `list_tasks` with these tasks in these words, where robots follow base commands within `limits`.
-    pub fn task_list(&self, tasks: &TaskSet, limits: &BaseLimits) -> TaskList {
-        let mut list = task_list(tasks, limits);
+    /// Whether it says nothing of any task.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The reply to `list_tasks` with these tasks in these words, and as they are told under `stress`, where robots follow base commands
+    /// within `limits`.
+    pub fn task_list(&self, tasks: &TaskSet, stress: Option<Stress>, limits: &BaseLimits) -> TaskList {
+        let mut list = task_list(tasks, stress, limits);
         for task in &mut list.tasks {
             self.rephrase(&task.id, &mut task.instruction, &mut task.robots);
         }
@@ -130,8 +137,8 @@ mod tests {
         let list =
             read(r#"{"handover": {"joint": "Reicht die Flasche weiter.", "robots": {"B": "Nimm sie."}}}"#);
         let limits = LocomotionChoice::default().limits();
-        let list = list.unwrap().task_list(&TaskSet::default(), &limits);
-        let (own, handover) = (task_list(&TaskSet::default(), &limits), &list.tasks[0]);
+        let list = list.unwrap().task_list(&TaskSet::default(), None, &limits);
+        let (own, handover) = (task_list(&TaskSet::default(), None, &limits), &list.tasks[0]);
         assert_eq!(handover.instruction, "Reicht die Flasche weiter.");
         assert_eq!(handover.robots[0], own.tasks[0].robots[0]);
         assert_eq!(handover.robots[1].instruction, "Nimm sie.");

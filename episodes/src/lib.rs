@@ -40,6 +40,7 @@ mod scoring;
 mod session;
 mod spec;
 pub mod statistics;
+pub mod stress;
 mod task_check;
 mod task_file;
 pub mod tasks;
@@ -64,7 +65,7 @@ pub use scoring::{A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, Rob
 pub use session::{
     CallReply, Checkpoint, Clock, FAILED_STEP_FILE, FailedStep, RunFiles, RunFolder, Session, monotonic,
 };
-pub use spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, SceneFile, Start};
+pub use spec::{Controller, EpisodeSpec, MomentStart, PhaseStart, RobotFile, SceneFile, Start};
 pub use tandem_sim::{
     BaseLimits, CONTROL_HZ, LocomotionChoice, Sensing, SensorModel, SimError, StateSource,
     assets::{DEFAULT_ROBOT, ROBOTS},

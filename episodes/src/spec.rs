@@ -14,7 +14,8 @@ use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, Wording};
 use crate::error::SceneError;
 use crate::protocol::{Rules, rules};
 use crate::scoring::Phase;
-use crate::tasks::Task;
+use crate::stress::{self, Stress, TaskWords};
+use crate::tasks::{Spread, Task};
 use crate::variation::Variation;
 
 /// Everything that makes an episode what it is. Equal values, played by equal calls on the same build, end in the same
@@ -51,6 +52,9 @@ pub struct EpisodeSpec {
     /// In what it varies beyond the benchmark.
     #[serde(default, skip_serializing_if = "Variation::is_benchmarks")]
     pub variation: Variation,
+    /// What goes wrong in it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stress: Option<Stress>,
     /// How long the policy may think, if not as long as the protocol has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub thinking_limit_s: Option<u32>,
@@ -100,6 +104,20 @@ pub enum Start {
     /// It begins where a phase began in a recorded episode of the same task, seed, robot and controller, with the whole
     /// budget ahead.
     Phase(PhaseStart),
+    /// It begins where a recorded episode of the same task, seed, robot and controller stood some seconds before it went wrong, with the
+    /// whole budget ahead.
+    Moment(MomentStart),
+}
+
+/// A moment of a recorded episode: the last call that was answered by then is the last that is made again.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MomentStart {
+    /// An `episode.mcap`.
+    pub recording: PathBuf,
+    /// Control step of the recorded world.
+    pub control_step: u64,
+    /// How many seconds before the episode went wrong that is.
+    pub before_s: u32,
 }
 
 /// The beginning of a phase of a recorded episode.
@@ -129,6 +147,7 @@ impl EpisodeSpec {
             hints: Assistance::default().hints(),
             instructions: None,
             variation: Variation::default(),
+            stress: None,
             thinking_limit_s: None,
         }
     }
@@ -136,6 +155,22 @@ impl EpisodeSpec {
     /// The same with another seed, and what that chooses.
     pub fn seeded(&self, seed: u32) -> EpisodeSpec {
         EpisodeSpec { task: self.task.under(seed), seed, ..self.clone() }
+    }
+
+    /// How far the seed moves things.
+    pub fn spread(&self) -> Spread {
+        let plain = self.variation.spread;
+        self.stress.map_or(plain, |stress| stress.spread(plain))
+    }
+
+    /// What robots know of themselves, under stress.
+    pub fn stressed_sensing(&self) -> Sensing {
+        self.stress.map_or(self.sensing, |stress| stress.sensing(self.sensing))
+    }
+
+    /// The words in which its policy is told the task, unless a file of instructions has others.
+    pub fn task_words(&self) -> TaskWords {
+        stress::task_words(self.stress, self.task)
     }
 
     /// What its protocol allows for its task, with its own limit of thinking where it has one.
@@ -169,12 +204,13 @@ impl EpisodeSpec {
             locomotion,
             sensing: Sensing { state_estimate, sensors },
             renderer: _,
-            start: _,
+            start,
             assistance,
             disclosure,
             hints,
             instructions,
             variation,
+            stress,
             thinking_limit_s,
         } = self;
         let file = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -200,6 +236,13 @@ impl EpisodeSpec {
             (*sensors != SensorModel::default()).then(|| format!("sensors: {}", sensors.name())),
             instructions.as_ref().map(|xxh3| format!("instructions: {xxh3}")),
             thinking_limit_s.map(|limit_s| format!("thinking limit: {limit_s} s")),
+            stress.map(|stress| format!("stress: {stress}")),
+            match start {
+                Start::Moment(MomentStart { before_s, .. }) => {
+                    Some(format!("begun again {before_s} s before it went wrong"))
+                }
+                Start::Task | Start::Checkpoint(_) | Start::Phase(_) => None,
+            },
         ];
         departures.into_iter().flatten().chain(variation.departures()).collect()
     }
@@ -210,7 +253,7 @@ impl EpisodeSpec {
             Start::Phase(start) => {
                 (0..self.task.phases.len()).find(|phase| Phase::number(*phase) == start.phase)
             }
-            Start::Task | Start::Checkpoint(_) => None,
+            Start::Task | Start::Checkpoint(_) | Start::Moment(_) => None,
         }
     }
 }
@@ -347,7 +390,7 @@ mod tests {
         let text = serde_json::to_string(&wide).unwrap();
         assert!(text.contains(r#""variation":{"spread":2,"variety":1,"disturb":0.8}"#), "{text}");
         assert_eq!(serde_json::from_str::<EpisodeSpec>(&text).unwrap(), wide);
-        let refused = serde_json::from_str::<EpisodeSpec>(&text.replace(r#""spread":2"#, r#""spread":3"#));
-        assert!(refused.unwrap_err().to_string().contains("no spread 3; have: 1, 2, 4"));
+        let refused = serde_json::from_str::<EpisodeSpec>(&text.replace(r#""spread":2"#, r#""spread":5"#));
+        assert!(refused.unwrap_err().to_string().contains("no spread 5; have: 1, 2, 3, 4"));
     }
 }

@@ -17,7 +17,9 @@ use serde::Deserialize;
 use tandem_episodes::{
     BaseLimits, Controller, EpisodeError, EpisodeSpec, Instructions, InstructionsError, RendererKind,
     SceneFile, Sensing, SensorModel, SimError, StateSource, TaskCheckError, TaskFileError, Visibility,
-    check_task, read_task, task_set,
+    check_task, read_task,
+    stress::{Stress, StressAxis, StressLevel},
+    task_set,
     tasks::{Task, TaskSet},
 };
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, StartEpisode, Wording};
@@ -77,6 +79,12 @@ pub struct Layer {
     /// What robots sense: everything exactly, or with noise, bias and latency as a G1 does [default: ideal].
     #[arg(long, env = "TANDEM_SENSORS", value_name = "NAME", value_parser = one_of(SensorModel::ALL, SensorModel::name))]
     pub sensors: Option<SensorModel>,
+    /// What goes wrong in every episode: one axis of what `evaluate` lays over episodes; results name it [default: nothing].
+    #[arg(long, env = "TANDEM_STRESS", value_name = "AXIS", value_parser = one_of(StressAxis::ALL, StressAxis::name))]
+    pub stress: Option<StressAxis>,
+    /// How much of it, from 1 to 3 [default: 1].
+    #[arg(long, env = "TANDEM_LEVEL", value_name = "LEVEL")]
+    pub level: Option<StressLevel>,
     /// Who draws pictures: a graphics processor, the embedded renderer, or whichever is there [default: auto].
     #[arg(long, env = "TANDEM_RENDERER", value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name))]
     pub renderer: Option<RendererKind>,
@@ -147,6 +155,8 @@ impl Layer {
             locomotion: self.locomotion.or(next.locomotion),
             state_estimate: self.state_estimate.or(next.state_estimate),
             sensors: self.sensors.or(next.sensors),
+            stress: self.stress.or(next.stress),
+            level: self.level.or(next.level),
             renderer: self.renderer.or(next.renderer),
             assistance: self.assistance.or(next.assistance),
             disclosure: self.disclosure.or(next.disclosure),
@@ -180,6 +190,12 @@ impl Layer {
         ];
         if let Some((setting, _, example)) = numbers.into_iter().find(|(_, given, _)| *given == Some(0)) {
             return Err(SettingsError::Zero { setting, example });
+        }
+        if self.level.is_some() && self.stress.is_none() {
+            return Err(SettingsError::LevelAlone);
+        }
+        if self.stress == Some(StressAxis::Words) && self.instructions.is_some() {
+            return Err(SettingsError::TwoWordings);
         }
         match self.allowed_host.iter().flatten().find(|name| !is_host(name)) {
             Some(name) => Err(SettingsError::NoHost { name: name.clone() }),
@@ -244,6 +260,11 @@ impl Layer {
         }
     }
 
+    /// What goes wrong in every episode.
+    pub fn stress(&self) -> Option<Stress> {
+        self.stress.map(|axis| Stress { axis, level: self.level.unwrap_or(StressLevel::One) })
+    }
+
     /// Who draws pictures.
     pub fn renderer(&self) -> RendererKind {
         self.renderer.unwrap_or_default()
@@ -283,6 +304,8 @@ pub struct Settings {
     pub locomotion: Controller,
     /// What robots know of themselves.
     pub sensing: Sensing,
+    /// What goes wrong in every episode.
+    pub stress: Option<Stress>,
     /// What that controller follows.
     pub base_limits: BaseLimits,
     /// Who draws pictures.
@@ -347,6 +370,12 @@ pub enum SettingsError {
         /// A number that works.
         example: &'static str,
     },
+    /// A level of nothing.
+    #[error("a level says how much of what goes wrong; give stress, too, as camera, or leave level out")]
+    LevelAlone,
+    /// Two settings say in what words tasks are told.
+    #[error("the stress words tells tasks in other words, and so does instructions; give one of them")]
+    TwoWordings,
     /// What the server is to be reached by is no name.
     #[error(
         "allowed_host {name:?} is no name of a host; give it alone, as lab.example, without http:// and port"
@@ -395,6 +424,7 @@ impl Settings {
             scene: self.scene.clone(),
             locomotion: self.locomotion.clone(),
             sensing: self.sensing,
+            stress: self.stress,
             renderer: self.renderer,
             assistance: self.assistance,
             disclosure: self.disclosure,
@@ -437,6 +467,7 @@ impl Settings {
             base_limits: locomotion.load()?.limits(),
             locomotion,
             sensing: layer.sensing(),
+            stress: layer.stress(),
             renderer,
             assistance,
             disclosure: layer.disclosure.unwrap_or(assistance.disclosure()),

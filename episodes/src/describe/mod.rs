@@ -18,19 +18,21 @@ use crate::commands::RobotSheet;
 use crate::convert::{rounded, wire_limits};
 use crate::protocol::rules;
 use crate::scoring::Phase;
-use crate::tasks::{self, Task, TaskSet};
+use crate::stress::{self, Stress, TaskWords};
+use crate::tasks::{Task, TaskSet};
 
-/// The reply to `list_tasks` with these tasks, where robots follow base commands within `limits`.
-pub fn task_list(tasks: &TaskSet, limits: &BaseLimits) -> TaskList {
-    TaskList { tasks: tasks.all().map(task_info).collect(), base_limits: wire_limits(limits) }
+/// The reply to `list_tasks` with these tasks, as they are told under `stress`, where robots follow base commands within `limits`.
+pub fn task_list(tasks: &TaskSet, stress: Option<Stress>, limits: &BaseLimits) -> TaskList {
+    let info = |task: &'static Task| task_info(task, stress::task_words(stress, task));
+    TaskList { tasks: tasks.all().map(info).collect(), base_limits: wire_limits(limits) }
 }
 
-fn task_info(task: &Task) -> TaskInfo {
+fn task_info(task: &Task, words: TaskWords) -> TaskInfo {
     TaskInfo {
         id: task.id.into(),
         suite: task.suite().map(str::to_owned),
-        instruction: task.instruction.into(),
-        robots: instructions(task),
+        robots: instructions(task, &words),
+        instruction: words.joint,
         phases: phases(task),
         protocols: Protocol::ALL.map(|protocol| protocol_info(protocol, task)).to_vec(),
     }
@@ -76,12 +78,13 @@ pub fn ending(disclosure: Disclosure) -> &'static str {
     }
 }
 
-pub fn instructions(task: &Task) -> Vec<Instruction> {
-    let part = |robot: &tasks::RobotSpot| Instruction {
-        robot: robot.name.into(),
-        instruction: robot.instruction.into(),
+/// What each robot of a task has to do, in these words.
+pub fn instructions(task: &Task, words: &TaskWords) -> Vec<Instruction> {
+    let part = |(name, instruction): (&str, &String)| Instruction {
+        robot: name.into(),
+        instruction: instruction.clone(),
     };
-    task.robots.iter().map(part).collect()
+    task.robot_names().zip(&words.robots).map(part).collect()
 }
 
 /// The kind called `kind`, of which `robot` is one.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use tandem_tools_spec::{EndReason, ResultReply};
 
+use super::retry::again_name;
 use super::{EvaluationError, EvaluationPlan, KeptFiles};
 use crate::output::write_whole;
 use crate::players::{EpisodeOutput, PlayError, PlayOutcome};
@@ -133,6 +134,7 @@ fn name(spec: &EpisodeSpec) -> String {
     let (task, seed) = (spec.task.id, spec.seed);
     match &spec.start {
         Start::Phase(start) => format!("{task}-{seed}-{}", start.phase),
+        Start::Moment(_) => again_name(spec),
         Start::Task | Start::Checkpoint(_) => format!("{task}-{seed}"),
     }
 }

@@ -2,6 +2,7 @@
 
 mod cache;
 mod plan;
+mod retry;
 mod summary;
 #[cfg(test)]
 mod tests;
@@ -15,6 +16,7 @@ use crate::{EpisodeError, fingerprint};
 use cache::EpisodeCache;
 
 pub use plan::{EvaluationPlan, KeptFiles, Shard, Starts};
+pub use retry::{FailedEpisode, failed_episodes};
 pub use summary::{Evaluation, TaskSummary};
 
 /// Why an evaluation stopped. Episodes that were played are cached, and the next run goes on from there.

@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 use tandem_sim::{Sensing, render::RendererKind};
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol};
 
+use super::retry::FailedEpisode;
 use crate::players::Policy;
 use crate::recording::Recorder;
 use crate::scoring::Phase;
-use crate::spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, SceneFile, Start};
+use crate::spec::{Controller, EpisodeSpec, MomentStart, PhaseStart, RobotFile, SceneFile, Start};
+use crate::stress::Stress;
 use crate::tasks::Task;
 use crate::variation::Variation;
 
@@ -33,6 +35,8 @@ pub struct EvaluationPlan<'a> {
     pub hints: Hints,
     /// In what episodes vary beyond the benchmark.
     pub variation: Variation,
+    /// What goes wrong in them.
+    pub stress: Option<Stress>,
     /// How long a policy may think in an episode, if not as long as the protocol has it.
     pub thinking_limit_s: Option<u32>,
     pub tasks: Vec<&'static Task>,
@@ -76,6 +80,8 @@ pub enum Starts {
         /// Numbers or ids, as `p2` or `transfer`; a task without such a phase has no episode of it.
         phases: Vec<String>,
     },
+    /// Each begins some seconds before the moment at which one of these went wrong, in its world; tasks and seeds are theirs.
+    Moments { failed: Vec<FailedEpisode>, before_s: u32 },
 }
 
 /// The share of one process: every episode whose number leaves this remainder.
@@ -103,16 +109,42 @@ impl EvaluationPlan<'_> {
             disclosure: self.disclosure,
             hints: self.hints,
             variation: self.variation,
+            stress: self.stress,
             thinking_limit_s: self.thinking_limit_s,
             start,
             ..EpisodeSpec::new(task, seed, self.protocol)
         }
     }
 
-    /// What in its episodes is not as the benchmark has it: the same in all of them, but for the files of tasks.
+    /// One that begins again where a recorded one had not gone wrong yet: its world, under this plan's rules.
+    fn again(&self, failed: &FailedEpisode, before_s: u32) -> EpisodeSpec {
+        let FailedEpisode { spec, recording, .. } = failed;
+        let control_step = failed.step_before(before_s);
+        let start = Start::Moment(MomentStart { recording: recording.clone(), control_step, before_s });
+        EpisodeSpec {
+            scene: spec.scene.clone(),
+            robot: spec.robot.clone(),
+            locomotion: spec.locomotion.clone(),
+            sensing: spec.sensing,
+            variation: spec.variation,
+            stress: spec.stress,
+            ..self.spec(spec.task, spec.seed, start)
+        }
+    }
+
+    /// What in its episodes is not as the benchmark has it: the same in all of them, but for the files of tasks and for what has been
+    /// begun again.
     pub fn departures(&self) -> Vec<String> {
+        let specs: Vec<EpisodeSpec> = match &self.starts {
+            Starts::Task | Starts::Phases { .. } => {
+                self.tasks.iter().map(|task| self.spec(task, 0, Start::Task)).collect()
+            }
+            Starts::Moments { failed, before_s } => {
+                failed.iter().map(|failed| self.again(failed, *before_s)).collect()
+            }
+        };
         let mut found: Vec<String> = Vec::new();
-        for departure in self.tasks.iter().flat_map(|task| self.spec(task, 0, Start::Task).departures()) {
+        for departure in specs.iter().flat_map(EpisodeSpec::departures) {
             if !found.contains(&departure) {
                 found.push(departure);
             }
@@ -123,11 +155,16 @@ impl EvaluationPlan<'_> {
     /// This share of the episodes, and which of it are left out because nobody has demonstrated them.
     pub fn episodes(&self) -> (Vec<EpisodeSpec>, Vec<String>) {
         let (mut found, mut left_out) = (Vec::new(), Vec::new());
+        let is_own = |number: &usize| number % self.shard.of == self.shard.index;
+        if let Starts::Moments { failed, before_s } = &self.starts {
+            let own = failed.iter().enumerate().filter(|(number, _)| is_own(number));
+            return (own.map(|(_, failed)| self.again(failed, *before_s)).collect(), left_out);
+        }
         let everything =
             self.tasks.iter().flat_map(|task| self.seeds.iter().map(|seed| (*task, *seed))).flat_map(
                 |(task, seed)| self.starts_of(task).into_iter().map(move |phase| (task, seed, phase)),
             );
-        let own = everything.enumerate().filter(|(number, _)| number % self.shard.of == self.shard.index);
+        let own = everything.enumerate().filter(|(number, _)| is_own(number));
         for (_, (task, seed, phase)) in own {
             let start = match (&self.starts, phase) {
                 (Starts::Phases { demonstrations, .. }, Some(phase)) => {
@@ -139,7 +176,7 @@ impl EvaluationPlan<'_> {
                         }
                     }
                 }
-                (Starts::Task | Starts::Phases { .. }, _) => Start::Task,
+                (Starts::Task | Starts::Phases { .. } | Starts::Moments { .. }, _) => Start::Task,
             };
             found.push(self.spec(task, seed, start));
         }
@@ -149,7 +186,7 @@ impl EvaluationPlan<'_> {
     /// Numbers of the phases that episodes of `task` begin at; `None` for its own beginning.
     fn starts_of(&self, task: &Task) -> Vec<Option<String>> {
         match &self.starts {
-            Starts::Task => vec![None],
+            Starts::Task | Starts::Moments { .. } => vec![None],
             Starts::Phases { phases, .. } => {
                 let of_task =
                     task.phases.iter().enumerate().map(|(index, phase)| (Phase::number(index), phase.id));

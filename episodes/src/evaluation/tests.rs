@@ -89,6 +89,7 @@ fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> EvaluationPlan<'static> {
         disclosure: Disclosure::Live,
         hints: Hints::On,
         variation: Variation::default(),
+        stress: None,
         thinking_limit_s: None,
         tasks,
         seeds,

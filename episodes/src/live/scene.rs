@@ -14,6 +14,7 @@ use super::geometry::{Geometry, pose_row};
 use crate::commands::Motion;
 use crate::scoring::Phase;
 use crate::spec::EpisodeSpec;
+use crate::stress;
 
 /// The scene of an episode.
 pub struct LiveScene {
@@ -36,9 +37,9 @@ struct Drawing {
 impl LiveScene {
     /// The scene of the episode `spec`, which is played in `world` by robots that `motions` move.
     pub(crate) fn of(spec: &EpisodeSpec, world: &World, motions: &[Motion]) -> LiveScene {
-        let scenery = Scenery::of(world);
+        let scenery = stress::scenery(spec.stress, spec.seed, world);
         let Geometry { meshes, parts, numbers } = Geometry::of(&scenery);
-        let cameras = Cameras::of(world);
+        let cameras = stress::cameras(spec.stress, spec.seed, world);
         let third_person = cameras.third_person();
         let robots = motions.iter().map(robot_head).collect::<Vec<_>>();
         let objects: Vec<&str> = world.object_models().map(|(name, _)| name).collect();
@@ -48,7 +49,7 @@ impl LiveScene {
         });
         let rules = spec.rules();
         let head = json!({
-            "task": spec.task.id, "seed": spec.seed, "protocol": spec.protocol, "instruction": spec.task.instruction,
+            "task": spec.task.id, "seed": spec.seed, "protocol": spec.protocol, "instruction": spec.task_words().joint,
             "assistance": spec.assistance, "control_hz": CONTROL_HZ,
             "episode_steps": rules.episode_steps, "thinking_s": rules.thinking.map(|time| time.as_secs_f64()),
             "phases": phases.collect::<Vec<_>>(), "robots": robots, "objects": objects,

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3};
-use tandem_sim::render::{Camera, Cameras, Frame, Renderer, RendererKind, Scenery};
+use tandem_sim::render::{Camera, Cameras, Frame, Renderer};
 use tandem_sim::{Step, World};
 use tandem_tools_spec::{DepthReply, DepthRow, PoseFrame, SurfaceQuery};
 
@@ -14,6 +14,8 @@ use super::{Picture, RobotObservation, RobotView, TeamObservation};
 use crate::EpisodeError;
 use crate::commands::RobotSheet;
 use crate::convert::{coarse, isometry_from_sim};
+use crate::spec::EpisodeSpec;
+use crate::stress;
 
 /// Draws what the cameras of one world see.
 pub struct Observer {
@@ -31,8 +33,10 @@ struct DrawnStep {
 }
 
 impl Observer {
-    pub fn new(kind: RendererKind, world: &World) -> Observer {
-        Observer { renderer: kind.renderer(Scenery::of(world)), cameras: Cameras::of(world), drawn: None }
+    /// Looks at the world of the episode `spec`.
+    pub fn new(spec: &EpisodeSpec, world: &World) -> Observer {
+        let renderer = spec.renderer.renderer(stress::scenery(spec.stress, spec.seed, world));
+        Observer { renderer, cameras: stress::cameras(spec.stress, spec.seed, world), drawn: None }
     }
 
     /// The renderer, and on what device it draws.

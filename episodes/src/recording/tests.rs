@@ -61,7 +61,7 @@ fn sheet(robot: &Robot) -> RobotSheet {
 /// What robot A sees and senses.
 fn seen(world: &World) -> TeamObservation {
     let sheets: Vec<RobotSheet> = world.robots().iter().map(sheet).collect();
-    let mut observer = Observer::new(RendererKind::Cpu, world);
+    let mut observer = Observer::new(&EpisodeSpec { renderer: RendererKind::Cpu, ..spec() }, world);
     observer.observe(&world.present().into(), &[0], &sheets.iter().collect::<Vec<_>>(), Detail::Full)
 }
 
@@ -82,6 +82,7 @@ fn recorder(folder: &Path, world: &World) -> (Recorder, Scores) {
         build: "0.1.0+test".into(),
         robots: world.robots().iter().map(sheet).collect(),
         scores: scores.memory(),
+        executes_otherwise: false,
     };
     (Recorder::create(folder, Visibility::Live, header, &start, world.state_hash()).unwrap(), scores)
 }
@@ -102,7 +103,7 @@ fn record_step(recorder: &mut Recorder, scores: &mut Scores, world: &mut World, 
         wall_clock_left_s: Some(1800.0),
         steps_per_command: 25,
     };
-    recorder.step(&step, world.state_hash(), &scores.update(&step).facts, budget).unwrap();
+    recorder.step(&step, &[], world.state_hash(), &scores.update(&step).facts, budget).unwrap();
 }
 
 /// Records `STEPS` steps, a phase, a refused call and an observation with a picture.

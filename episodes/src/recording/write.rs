@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use base64::{Engine, prelude::BASE64_STANDARD};
 use foxglove::messages::{FrameTransforms, SceneUpdate};
-use tandem_sim::{Step, mjcf::Geom, render::robot_rgba};
+use tandem_sim::{RobotCommand, Step, mjcf::Geom, render::robot_rgba};
 use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
 
 use super::mcap_file::{McapFile, Topic, Visibility};
@@ -20,7 +20,6 @@ use crate::output::OutputError;
 use crate::results::RESULT_FILE;
 use crate::scoring::{Facts, ScoreMemory};
 use crate::spec::EpisodeSpec;
-use crate::variation::Disturbance;
 
 /// Poses of links follow from joint states, which every step has; they are for those who look, and are the most bytes of a recording.
 const TRANSFORMS_EVERY: u64 = 5;
@@ -38,6 +37,8 @@ pub struct RecordingHeader {
     pub robots: Vec<RobotSheet>,
     /// What scoring remembers where the recording begins.
     pub scores: ScoreMemory,
+    /// Whether what robots do is not always what they are told.
+    pub executes_otherwise: bool,
 }
 
 /// A recording under way.
@@ -49,8 +50,6 @@ pub struct Recorder {
     last_s: f64,
     robots: Vec<RobotSheet>,
     robot_topics: Vec<RobotTopics>,
-    /// What is added to what robots are told, if anything is.
-    disturbance: Option<Disturbance>,
     steps: Topic<StepRow>,
     step_encoder: StepEncoder,
     transforms: Topic<FrameTransforms>,
@@ -75,12 +74,10 @@ impl Recorder {
     ) -> Result<Recorder, OutputError> {
         let mut file = McapFile::create(&folder.join(Self::FILE_NAME), visibility)?;
         write_header(&mut file, &header)?;
-        let EpisodeSpec { seed, variation, .. } = &header.spec;
-        let disturbance = Disturbance::new(variation.disturb, *seed, header.robots.len());
         let robot_topics = header
             .robots
             .iter()
-            .map(|robot| RobotTopics::open(&mut file, robot, disturbance.is_some()))
+            .map(|robot| RobotTopics::open(&mut file, robot, header.executes_otherwise))
             .collect::<Result<_, _>>()?;
         let mut recorder = Recorder {
             steps: file.topic(topics::STEPS, &[])?,
@@ -93,7 +90,6 @@ impl Recorder {
             notes: file.topic(topics::NOTES, &[])?,
             start_s: start.time_s,
             robot_topics,
-            disturbance,
             last_s: start.time_s,
             robots: header.robots,
             file,
@@ -125,10 +121,12 @@ impl Recorder {
         self.file.write(&mut self.scene, self.start_s, &SceneUpdate { entities, deletions: vec![] })
     }
 
-    /// Appends one control step, of which scoring sees `facts`, and the hash of the whole state that it left.
+    /// Appends one control step, of which scoring sees `facts`, and the hash of the whole state that it left. `executed` is what robots
+    /// did in it, where that may be something else than they were told.
     pub fn step(
         &mut self,
         step: &Step,
+        executed: &[RobotCommand],
         state_hash: u64,
         facts: &Facts,
         budget: Budget,
@@ -142,10 +140,8 @@ impl Recorder {
         let robots = self.robots.iter().zip(&mut self.robot_topics).zip(&step.robots);
         for (index, ((robot, topics), moved)) in robots.enumerate() {
             topics.step(&mut self.file, robot, index, time_s, moved, facts)?;
-            if let Some(disturbance) = &self.disturbance {
-                let RobotSheet { model, base_limits, .. } = robot;
-                let executed = disturbance.executed(index, self.last_s, &moved.command, model, base_limits);
-                topics.executed(&mut self.file, time_s, &executed)?;
+            if let Some(executed) = executed.get(index) {
+                topics.executed(&mut self.file, time_s, executed)?;
             }
         }
         self.last_s = time_s;

@@ -58,7 +58,7 @@ pub struct EpisodeRenderer {
 impl EpisodeRenderer {
     /// Draws the episode `spec`, whose world is built for it and stays at rest.
     pub fn of(spec: &EpisodeSpec) -> Result<EpisodeRenderer, EpisodeError> {
-        Ok(EpisodeRenderer { observer: Observer::new(spec.renderer, &build(spec)?.world) })
+        Ok(EpisodeRenderer { observer: Observer::new(spec, &build(spec)?.world) })
     }
 
     /// The camera after `step`, with pictures of another size if one is given: as high an angle, more or less wide.

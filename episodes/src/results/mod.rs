@@ -36,6 +36,9 @@ pub const OPEN_LOOP: &str = "open-loop";
 /// Folder of single episodes in the folder of an evaluation.
 pub const EPISODES: &str = "episodes";
 
+/// Folder of what was played under stress in the folder of an evaluation: the folders of further evaluations.
+pub const STRESS: &str = "stress";
+
 /// One episode that was played, as it is kept in a file of its own.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlayedEpisode {

@@ -16,6 +16,7 @@ use crate::commands::{Motion, RobotSheet, UpperBody};
 use crate::convert::isometry_from_sim;
 use crate::error::SceneError;
 use crate::spec::{EpisodeSpec, RobotFile};
+use crate::stress;
 use crate::tasks::{Spread, Task};
 
 /// Site of a scene at which the origin of a task is.
@@ -43,13 +44,23 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
     let locomotion = spec.locomotion.load()?;
     let mjcf = spec.robot.read()?;
     let model = Arc::new(RobotModel::parse(&spec.robot.name(), &mjcf)?);
-    let world_spec = world_spec(spec)?;
+    if !stress::is_possible(spec.stress, spec.task) {
+        return Err(EpisodeError::NoOtherWords {
+            task: spec.task.id.into(),
+            have: stress::reworded_tasks().collect(),
+        });
+    }
+    let mut world_spec = world_spec(spec)?;
+    add_distractors(spec, &mut world_spec, &model)?;
     try_scene(spec, &world_spec, &model)?;
     let mut world = World::with_robot(&world_spec, model)?;
+    if let Some(stress) = spec.stress {
+        stress.alter(&mut world, spec.task, spec.seed, spec.rules().initial_hold_steps);
+    }
     for robot in 0..world.robots().len() {
         world.set_locomotion(robot, locomotion.controller());
     }
-    world.set_sensing(spec.sensing, spec.seed);
+    world.set_sensing(spec.stressed_sensing(), spec.seed);
     let body = Arc::new(UpperBody::new(&mjcf, &world.rest_command(0))?);
     let present = world.present();
     let motion = |(index, robot): (usize, &Robot)| {
@@ -71,11 +82,25 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
 
 /// What the world of an episode is made of.
 fn world_spec(spec: &EpisodeSpec) -> Result<WorldSpec, EpisodeError> {
-    let own = own_spec(spec.task, spec.seed, spec.variation.spread)?;
+    let own = own_spec(spec.task, spec.seed, spec.spread())?;
     match &spec.scene {
         None => Ok(own),
         Some(file) => Ok(elsewhere(own, spec.task, &file.path, file.load()?)?),
     }
+}
+
+/// Puts beside the task's things those that stress has stand about, which depends on where everything else is.
+fn add_distractors(
+    spec: &EpisodeSpec,
+    world_spec: &mut WorldSpec,
+    model: &Arc<RobotModel>,
+) -> Result<(), SimError> {
+    let most = spec.stress.map_or(0, |stress| stress.distractors());
+    if most > 0 {
+        let world = World::with_robot(world_spec, model.clone())?;
+        world_spec.objects.extend(stress::distractors(most, spec.seed, spec.task, &world)?);
+    }
+    Ok(())
 }
 
 fn own_spec(task: &Task, seed: u32, spread: Spread) -> Result<WorldSpec, SimError> {

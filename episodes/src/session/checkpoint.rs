@@ -15,9 +15,10 @@ use super::{Session, this_build, told::ShownInformation};
 use crate::commands::MotionState;
 use crate::error::{CheckpointError, EpisodeError};
 use crate::output::write_whole;
-use crate::recording::Recording;
+use crate::recording::{Recording, RecordingError};
 use crate::scoring::ScoreMemory;
 use crate::spec::{EpisodeSpec, PhaseStart};
+use crate::stress::ExecutionMemory;
 
 /// An episode at one instant. It fits episodes of the same task, seed, protocol, robot, controller and sensing, whose policies are
 /// told the same.
@@ -61,6 +62,8 @@ struct Progress {
     ended: Option<EndReason>,
     /// What the policy has been shown by then.
     shown: ShownInformation,
+    /// What robots have been told that they do not do at once, if there is such a thing.
+    execution: Option<ExecutionMemory>,
 }
 
 /// The first line of a file.
@@ -108,7 +111,6 @@ impl Checkpoint {
     /// Reads where a phase of a recorded episode began; this build has to have recorded it.
     pub fn of_phase(start: &PhaseStart) -> Result<Checkpoint, EpisodeError> {
         let PhaseStart { recording: path, phase } = start;
-        let unreadable = |error: crate::RecordingError| CheckpointError::Recording(error.to_string());
         let recording = Recording::read(path).map_err(unreadable)?;
         match recording.checkpoint(phase) {
             Some(found) => Checkpoint::from_bytes(&found.bytes, path),
@@ -171,13 +173,19 @@ impl Origin {
         let scene = scene.unwrap_or_default();
         let variation: String =
             self.spec.variation.departures().map(|departure| format!(", {departure}")).collect();
+        let stress = self.spec.stress.map(|stress| format!(", stress {stress}")).unwrap_or_default();
         let sensing = self.spec.sensing;
         let (source, sensors) = (sensing.state_estimate.name(), sensing.sensors.name());
         format!(
-            "robot {}, controller {}, state estimate {source} and sensors {sensors}{scene}{variation}",
+            "robot {}, controller {}, state estimate {source} and sensors {sensors}{scene}{variation}{stress}",
             self.robot, self.locomotion
         )
     }
+}
+
+/// A recording that cannot be read, or a part of it.
+pub(super) fn unreadable(error: RecordingError) -> CheckpointError {
+    CheckpointError::Recording(error.to_string())
 }
 
 fn hash(bytes: &[u8]) -> String {
@@ -197,6 +205,7 @@ impl Session {
             thought: self.clock.spent(),
             ended: self.ended,
             shown: self.shown.clone(),
+            execution: self.execution.as_ref().map(|execution| execution.memory().clone()),
         };
         Ok(Checkpoint { origin: self.origin.clone(), progress, failed: None })
     }
@@ -235,6 +244,9 @@ impl Session {
         self.clock.set_spent(progress.thought);
         self.ended = progress.ended;
         self.shown = progress.shown.clone();
+        if let (Some(execution), Some(memory)) = (&mut self.execution, &progress.execution) {
+            execution.set_memory(memory.clone());
+        }
         self.simulator_failure = None;
         self.rewind.forget();
         self.result = None;

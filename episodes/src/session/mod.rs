@@ -30,7 +30,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
-use tandem_sim::{RobotCommand, Step, World};
+use tandem_sim::{CONTROL_HZ, RobotCommand, Step, World};
 use tandem_tools_spec::{EndReason, ResultReply, Usage};
 
 use crate::commands::{Clamped, Command, Motion, MotionState, Trajectory};
@@ -40,6 +40,7 @@ use crate::protocol::Rules;
 use crate::recording::{BEGIN, state_hash_text};
 use crate::scoring::{Facts, Phase, Scores};
 use crate::spec::{EpisodeSpec, Start};
+use crate::stress::Execution;
 use crate::variation::Disturbance;
 use crate::{EpisodeError, fingerprint};
 use checkpoint::Origin;
@@ -79,8 +80,8 @@ pub struct Session {
     rewind: Rewind,
     /// What the policy has been shown that the benchmark's own policies are not.
     shown: ShownInformation,
-    /// What is added to what robots are told, if anything is.
-    disturbance: Option<Disturbance>,
+    /// What robots do in place of what they are told, where that is something else.
+    execution: Option<Execution>,
     /// State hashes of the steps since they were last taken, where somebody wants them.
     hashes: Option<Vec<u64>>,
     /// What it came to, from when the files were closed: the one truth that everybody is told.
@@ -111,12 +112,15 @@ impl Session {
         let Built { world, motions, robot, locomotion } = build(spec)?;
         let rules = spec.rules();
         let present = Arc::new(world.present());
+        let rest = (0..motions.len()).map(|robot| world.rest_command(robot)).collect();
+        let disturbance = Disturbance::new(spec.variation.disturb, spec.seed, motions.len());
+        let begin_s = f64::from(rules.initial_hold_steps) / CONTROL_HZ;
         Ok(Session {
             origin: Origin { spec: spec.clone(), robot, locomotion },
             rules,
             scores: spec.task.scores(&motions[0].robot.model, &present)?,
             clock: ThinkingClock::new(rules.thinking, clock),
-            observer: Observer::new(spec.renderer, &world),
+            observer: Observer::new(spec, &world),
             files: None,
             audience: Audience::default(),
             steps_before: 0,
@@ -130,7 +134,7 @@ impl Session {
             simulator_failure: None,
             rewind: Rewind::default(),
             shown: ShownInformation::default(),
-            disturbance: Disturbance::new(spec.variation.disturb, spec.seed, motions.len()),
+            execution: Execution::of(spec.stress, disturbance, spec.seed, begin_s, rest),
             hashes: None,
             result: None,
             motions,
@@ -151,6 +155,10 @@ impl Session {
                 self.take_up(&Checkpoint::of_phase(start)?)?;
                 0
             }
+            Start::Moment(start) => {
+                self.take_up(&Replay::checkpoint_at(start)?)?;
+                0
+            }
         };
         if let Some(folder) = folder {
             self.files = Some(RunFiles::create(folder, self));
@@ -159,7 +167,7 @@ impl Session {
         self.hold(hold_steps)?;
         match self.origin.spec.start {
             Start::Task => self.keep_checkpoint(&Phase::number(0)),
-            Start::Checkpoint(_) | Start::Phase(_) => self.keep_checkpoint(BEGIN),
+            Start::Checkpoint(_) | Start::Phase(_) | Start::Moment(_) => self.keep_checkpoint(BEGIN),
         }
         if let Some(files) = &mut self.files {
             files.flush();
@@ -242,7 +250,8 @@ impl Session {
         let commands: Vec<RobotCommand> =
             moves.map(|(trajectory, motion)| trajectory.command(step, motion)).collect();
         self.rewind.before_step(&self.world);
-        let executed = self.disturbed(&commands);
+        let remembered = self.execution.as_ref().map(|execution| execution.memory().clone());
+        let executed = self.executed(&commands);
         let stepped = self.world.control_step(&executed);
         self.physics += started.elapsed();
         match stepped {
@@ -253,8 +262,14 @@ impl Session {
                 }
                 self.present = Arc::new(present);
             }
-            Err(diverged) => return Err(self.fail(diverged, executed, motions)),
+            Err(diverged) => {
+                if let (Some(execution), Some(memory)) = (&mut self.execution, remembered) {
+                    execution.set_memory(memory);
+                }
+                return Err(self.fail(diverged, executed, motions));
+            }
         }
+        let otherwise = self.execution.is_some().then(|| executed.clone());
         self.rewind.stepped(executed);
         for (motion, robot) in self.motions.iter_mut().zip(&self.present.robots) {
             let hands_n =
@@ -269,7 +284,7 @@ impl Session {
             hashes.push(self.world.state_hash());
         }
         if let Some(files) = &mut self.files {
-            files.step(self.present.clone(), self.world.state_hash(), scored.facts, budget);
+            files.step(self.present.clone(), otherwise, self.world.state_hash(), scored.facts, budget);
         }
         self.show_step(budget);
         if scored.reached {
@@ -281,14 +296,10 @@ impl Session {
     }
 
     /// What robots do in the next step that are told `commands`.
-    fn disturbed(&self, commands: &[RobotCommand]) -> Vec<RobotCommand> {
-        let Some(disturbance) = &self.disturbance else { return commands.to_vec() };
-        let robots = self.motions.iter().map(|motion| &motion.robot).zip(commands).enumerate();
-        let time_s = self.present.time_s;
-        let executed = robots.map(|(index, (robot, told))| {
-            disturbance.executed(index, time_s, told, &robot.model, &robot.base_limits)
-        });
-        executed.collect()
+    fn executed(&mut self, commands: &[RobotCommand]) -> Vec<RobotCommand> {
+        let Some(execution) = &mut self.execution else { return commands.to_vec() };
+        let robots = self.motions.iter().map(|motion| (&*motion.robot.model, &motion.robot.base_limits));
+        execution.execute(self.present.time_s, commands, robots)
     }
 
     /// Keeps what this step has reached, of phases that had a number from `first` on.

@@ -5,13 +5,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
+use tandem_sim::CONTROL_HZ;
 use tandem_tools_spec::{ExtraInformation, ResultReply};
 
-use super::{Checkpoint, Session};
-use crate::EpisodeError;
+use super::checkpoint::unreadable;
+use super::{Checkpoint, Session, this_build};
 use crate::commands::Called;
-use crate::recording::{CallerRecord, RecordedCheckpoint};
-use crate::spec::{EpisodeSpec, Start};
+use crate::error::{CheckpointError, EpisodeError};
+use crate::recording::{BEGIN, CallerRecord, RecordedCheckpoint, Recording, state_hash_text};
+use crate::spec::{EpisodeSpec, MomentStart, Start};
 
 /// An episode under way for the second time.
 pub struct Replay {
@@ -61,6 +63,34 @@ impl Replay {
     /// The hashes of the states since they were last taken, the first of all included.
     pub fn take_hashes(&mut self) -> Vec<u64> {
         self.session.hashes.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+
+    /// The checkpoint of a recorded episode at a moment of it, up to which it is played again; it has to go as it was recorded.
+    pub fn checkpoint_at(start: &MomentStart) -> Result<Checkpoint, EpisodeError> {
+        let MomentStart { recording: path, control_step, .. } = start;
+        let recording = Recording::read(path).map_err(unreadable)?;
+        let begin = recording.checkpoint(BEGIN);
+        let mut replay = Replay::start(&recording.spec, begin.as_ref(), path)?;
+        let until_s = *control_step as f64 / CONTROL_HZ;
+        for call in recording.tool_calls().map_err(unreadable)? {
+            if call.time_s > until_s {
+                break;
+            }
+            // A call that was refused is refused again.
+            let called = Called::parse(&call.tool, call.arguments)?;
+            let _ = replay.call(&called, call.thought, call.shown.as_deref());
+        }
+        let step = replay.session.present.control_step;
+        let hash = replay.session.world.state_hash();
+        let recorded =
+            recording.state_hashes().find(|state| !matches!(state, Ok((number, _)) if *number != step));
+        match recorded.transpose().map_err(unreadable)? {
+            Some((_, recorded)) if recorded == state_hash_text(hash) => replay.session.checkpoint(),
+            _ => {
+                let (path, made_by, this) = (path.clone(), recording.build.clone(), this_build()?);
+                Err(CheckpointError::OtherWay { path, step, made_by, this }.into())
+            }
+        }
     }
 
     /// The result as it stands, and whether the episode has ended by itself.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::{fs, io};
 
 use tandem_sim::render::{Frame, PictureError, encode_png};
-use tandem_sim::{CONTROL_HZ, Step};
+use tandem_sim::{CONTROL_HZ, RobotCommand, Step};
 use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
 
 use super::failure::FAILED_STEP_FILE;
@@ -75,10 +75,18 @@ impl RunFiles {
         }
     }
 
-    pub(super) fn step(&mut self, step: Arc<Step>, state_hash: u64, facts: Facts, budget: Budget) {
+    pub(super) fn step(
+        &mut self,
+        step: Arc<Step>,
+        executed: Option<Vec<RobotCommand>>,
+        state_hash: u64,
+        facts: Facts,
+        budget: Budget,
+    ) {
         self.budget_left = Some(budget);
         if let Some(recorder) = &self.recorder {
-            recorder.append_step(move |recorder| recorder.step(&step, state_hash, &facts, budget));
+            let executed = executed.unwrap_or_default();
+            recorder.append_step(move |recorder| recorder.step(&step, &executed, state_hash, &facts, budget));
         }
     }
 
@@ -212,6 +220,7 @@ fn begin(folder: &RunFolder, session: &Session) -> Result<RecorderThread, Episod
         build: this_build()?.into(),
         robots: session.motions.iter().map(|motion| motion.robot.clone()).collect(),
         scores: session.scores.memory(),
+        executes_otherwise: session.execution.is_some(),
     };
     let mut recorder =
         Recorder::create(path, *visibility, header, &session.present, session.world.state_hash())?;

@@ -91,13 +91,14 @@ impl Session {
     /// What has to be known to begin.
     pub fn briefing(&self) -> Briefing {
         let task = self.spec().task;
+        let words = self.spec().task_words();
         // All robots of an episode are of one file.
         let kind = self.spec().robot.kind();
         let info = |name: &String| RobotInfo { robot: name.clone(), kind: kind.clone() };
         Briefing {
-            instruction: task.instruction.into(),
             shared_instruction: task.shared_instruction().map(str::to_owned),
-            instructions: describe::instructions(task),
+            instructions: describe::instructions(task, &words),
+            instruction: words.joint,
             robots: self.motions.iter().map(|motion| info(&motion.robot.name)).collect(),
             kinds: vec![describe::robot_kind(kind.clone(), &self.motions[0].robot)],
             phases: match self.spec().assistance {
@@ -107,7 +108,7 @@ impl Session {
             room: match self.spec().assistance {
                 Assistance::Paper => Vec::new(),
                 // What cannot be read would have kept the world from being built.
-                Assistance::Full => describe::room(task, self.spec().variation.spread).unwrap_or_default(),
+                Assistance::Full => describe::room(task, self.spec().spread()).unwrap_or_default(),
             },
             ending: describe::ending(self.spec().disclosure).into(),
             brief: describe::brief(self.spec().wording(), &wire_limits(&self.motions[0].robot.base_limits)),

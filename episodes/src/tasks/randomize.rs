@@ -29,17 +29,19 @@ pub enum Spread {
     #[default]
     Single,
     Double,
+    Triple,
     Quadruple,
 }
 
 impl Spread {
-    pub const ALL: [Spread; 3] = [Spread::Single, Spread::Double, Spread::Quadruple];
+    pub const ALL: [Spread; 4] = [Spread::Single, Spread::Double, Spread::Triple, Spread::Quadruple];
 
     /// The multiple.
     pub fn times(self) -> u8 {
         match self {
             Spread::Single => 1,
             Spread::Double => 2,
+            Spread::Triple => 3,
             Spread::Quadruple => 4,
         }
     }
@@ -48,6 +50,7 @@ impl Spread {
         match self {
             Spread::Single => "1",
             Spread::Double => "2",
+            Spread::Triple => "3",
             Spread::Quadruple => "4",
         }
     }
@@ -239,8 +242,9 @@ mod tests {
                 });
                 moved.fold(0.0, f32::max)
             };
-            let [one, two, four] = Spread::ALL.map(farthest);
+            let [one, two, three, four] = Spread::ALL.map(farthest);
             assert!(two > 1.3 * one && four > 1.3 * two, "{}: {one} {two} {four}", task.id);
+            assert!(three > two && four > three, "{}: {two} {three} {four}", task.id);
             let turned = |start: &StartPose, spot: &super::super::ObjectSpot| start.yaw_rad != spot.yaw_rad;
             let any = task.start_poses(7, Spread::Double);
             assert!(any.iter().zip(task.objects).any(|(start, spot)| turned(start, spot)), "{}", task.id);

@@ -13,5 +13,6 @@ mod replays;
 mod scenes;
 #[path = "../../../tests/src/skipped.rs"]
 mod skipped;
+mod stress;
 mod told;
 mod transcripts;

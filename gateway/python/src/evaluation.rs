@@ -61,6 +61,7 @@ pub fn evaluate(
         disclosure: settings.disclosure,
         hints: settings.hints,
         variation: Variation::default(),
+        stress: settings.stress,
         thinking_limit_s: settings.thinking_limit_s,
         tasks: found.map_err(|error| failed(py, &error))?,
         seeds,

@@ -50,7 +50,7 @@ pub fn write_report(py: Python, arguments: Vec<String>) -> PyResult<()> {
 #[pyfunction]
 pub fn list_tasks(py: Python) -> PyResult<String> {
     let settings = Settings::resolve(Layer::default(), None).map_err(|error| failed(py, &error))?;
-    Ok(json!(task_list(&settings.tasks, &settings.base_limits)).to_string())
+    Ok(json!(task_list(&settings.tasks, None, &settings.base_limits)).to_string())
 }
 
 /// A server in the background of this process.

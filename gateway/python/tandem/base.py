@@ -28,6 +28,14 @@ StateEstimate: TypeAlias = Literal["estimator", "truth"]
 Sensors: TypeAlias = Literal["ideal", "g1"]
 """What robots sense: everything exactly, or with noise, bias and latency as a G1 does."""
 
+StressAxis: TypeAlias = Literal[
+    "camera", "light", "texture", "layout", "mass", "friction", "sensors", "latency", "push", "words", "partner"
+]
+"""What goes wrong in an episode."""
+
+StressLevel: TypeAlias = Literal[1, 2, 3]
+"""How much of it."""
+
 Self = TypeVar("Self", bound="BaseEpisode")
 T = TypeVar("T")
 
@@ -179,4 +187,14 @@ def settings_json(**settings: Any) -> str:
     return json.dumps({name: value for name, value in given.items() if value is not None})
 
 
-__all__ = ["BaseEpisode", "EndReason", "Observation", "Renderer", "Sensors", "StateEstimate", "Stepped"]
+__all__ = [
+    "BaseEpisode",
+    "EndReason",
+    "Observation",
+    "Renderer",
+    "Sensors",
+    "StateEstimate",
+    "Stepped",
+    "StressAxis",
+    "StressLevel",
+]

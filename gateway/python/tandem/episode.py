@@ -13,7 +13,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _native
 from ._native import Snapshot
-from .base import BaseEpisode, Observation, Renderer, Sensors, StateEstimate, Stepped, begun, chunk_of, settings_json
+from .base import (
+    BaseEpisode,
+    Observation,
+    Renderer,
+    Sensors,
+    StateEstimate,
+    Stepped,
+    StressAxis,
+    StressLevel,
+    begun,
+    chunk_of,
+    settings_json,
+)
 from .contract.arguments import Json
 from .contract.commands import StopReason
 from .contract.replies import Assistance, CameraCalibration, EndReason, Protocol, ResultReply, RobotState
@@ -33,6 +45,8 @@ class Episode(BaseEpisode):
     renderer: Who draws.
     state_estimate: Where robots have their own state from.
     sensors: What robots sense.
+    stress: What goes wrong; results name it.
+    level: How much of it; 1 where nothing is said.
     scene: MJCF file of a scene in place of the task's own.
     task_file: TOML file with a task of your own, whose id `task` is.
     """
@@ -48,6 +62,8 @@ class Episode(BaseEpisode):
         renderer: Renderer = "auto",
         state_estimate: StateEstimate = "estimator",
         sensors: Sensors = "ideal",
+        stress: StressAxis | None = None,
+        level: StressLevel | None = None,
         scene: str | PathLike[str] | None = None,
         task_file: str | PathLike[str] | None = None,
     ) -> None:
@@ -60,6 +76,8 @@ class Episode(BaseEpisode):
             renderer=renderer,
             state_estimate=state_estimate,
             sensors=sensors,
+            stress=stress,
+            level=level,
             scene=None if scene is None else Path(scene),
             task_file=None if task_file is None else [str(Path(task_file))],
         )

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypedDict
 
 from . import _native
-from .base import Renderer, Sensors, StateEstimate, settings_json
+from .base import Renderer, Sensors, StateEstimate, StressAxis, StressLevel, settings_json
 from .contract.replies import Assistance, Protocol, ResultReply
 from .contract.start import TaskList
 from .episode import Episode
@@ -112,6 +112,12 @@ class EvaluationSettings(TypedDict, total=False):
     sensors: Sensors
     """What robots sense."""
 
+    stress: StressAxis
+    """What goes wrong in every episode; results name it behind the policy's name."""
+
+    level: StressLevel
+    """How much of it; 1 where nothing is said."""
+
     scene: str | PathLike[str] | None
     """MJCF file of a scene in place of the tasks' own."""
 
@@ -139,8 +145,8 @@ def evaluate(
     seeds: A seed, or several.
     jobs: Episodes that run side by side, each on a thread of its own, on which the policy is called. Physics and drawing
         run at the same time; Python code of policies does not.
-    settings: `name`, `protocol`, `assistance`, `out`, `record`, `progress`, `renderer`, `state_estimate`, `sensors`, `scene`,
-        `task_file`: see `EvaluationSettings`.
+    settings: `name`, `protocol`, `assistance`, `out`, `record`, `progress`, `renderer`, `state_estimate`, `sensors`, `stress`,
+        `level`, `scene`, `task_file`: see `EvaluationSettings`.
     """
     plan = Plan.of(policy, tasks, seeds, settings)
     return plan.evaluated(lambda folder: plan.play(folder, jobs))
@@ -199,6 +205,8 @@ class Plan:
                 renderer=settings.get("renderer", "auto"),
                 state_estimate=settings.get("state_estimate", "estimator"),
                 sensors=settings.get("sensors", "ideal"),
+                stress=settings.get("stress"),
+                level=settings.get("level"),
                 scene=None if scene is None else Path(scene),
                 task_file=None if task_file is None else [str(Path(task_file))],
             ),

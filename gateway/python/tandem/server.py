@@ -7,7 +7,7 @@ from pathlib import Path
 from types import TracebackType
 
 from . import _native
-from .base import Renderer, Sensors, StateEstimate, settings_json
+from .base import Renderer, Sensors, StateEstimate, StressAxis, StressLevel, settings_json
 from .contract.replies import Assistance
 
 
@@ -41,6 +41,8 @@ def serve(
     renderer: Renderer = "auto",
     state_estimate: StateEstimate = "estimator",
     sensors: Sensors = "ideal",
+    stress: StressAxis | None = None,
+    level: StressLevel | None = None,
     scene: str | PathLike[str] | None = None,
     task_file: str | PathLike[str] | None = None,
     max_episodes: int = 8,
@@ -54,6 +56,8 @@ def serve(
     renderer: Who draws.
     state_estimate: Where robots have their own state from.
     sensors: What robots sense.
+    stress: What goes wrong; results name it.
+    level: How much of it; 1 where nothing is said.
     scene: MJCF file of a scene in place of the tasks' own.
     task_file: TOML file with a task of your own, beside the built-in ones.
     max_episodes: Episodes that may be held at once.
@@ -66,6 +70,8 @@ def serve(
         renderer=renderer,
         state_estimate=state_estimate,
         sensors=sensors,
+        stress=stress,
+        level=level,
         scene=None if scene is None else Path(scene),
         task_file=None if task_file is None else [str(Path(task_file))],
         max_episodes=max_episodes,

@@ -17,7 +17,11 @@ use tandem_episodes::{
 use tandem_tools_spec::{CommandReply, Protocol, ResultReply, StartEpisode, ToolCall, ToolReply};
 use tracing_subscriber::filter::LevelFilter;
 
-use super::{CommandResult, Seeds, flags::WorldFlags, logging::log_to_stderr};
+use super::{
+    CommandResult, Seeds,
+    flags::{StressFlags, WorldFlags},
+    logging::log_to_stderr,
+};
 use crate::{
     drivers::HttpEpisode,
     hosting::{EpisodeThread, try_runs_folder},
@@ -44,13 +48,15 @@ pub struct DemoArgs {
     runs: PathBuf,
     #[command(flatten)]
     world: WorldFlags,
+    #[command(flatten)]
+    stress: StressFlags,
 }
 
 /// Plays every seed. The program fails if too few episodes reach the last phase.
 pub fn run(args: DemoArgs) -> CommandResult {
     log_to_stderr(LevelFilter::WARN);
     let known = args.world.read_task_files()?.first().is_none_or(|task| experts::solves(task));
-    let results = play_all(&args.runs, args.seeds, args.world.layer())?;
+    let results = play_all(&args.runs, args.seeds, args.stress.over(args.world.layer()))?;
     let recorded = results.iter().all(|result| result.recording_failed.is_none());
     Ok(if recorded && (!known || passed(&results)) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

@@ -130,8 +130,10 @@ impl EpisodeTable {
         folder: RunFolder,
         place: OwnedSemaphorePermit,
     ) -> Result<StartReply, HostingError> {
+        let robots = spec.task.robots.len();
+        let silence = spec.stress.and_then(|stress| stress.silence(spec.seed, robots));
         let (team, operators) = match driving.is_per_robot() {
-            true => Team::new(spec.task.robot_names(), driving, self.collection())
+            true => Team::new(spec.task.robot_names(), driving, self.collection(), silence)
                 .map(|(team, tokens)| (Some(team), tokens))?,
             false => (None, Vec::new()),
         };
@@ -151,7 +153,8 @@ impl EpisodeTable {
     /// The reply to `list_tasks`, with this server's limit of thinking where it has one, and without what its policies are
     /// not told.
     pub fn task_list(&self) -> TaskList {
-        let mut list = self.settings.instructions.task_list(&self.settings.tasks, &self.settings.base_limits);
+        let Settings { tasks, stress, base_limits, instructions, .. } = &*self.settings;
+        let mut list = instructions.task_list(tasks, *stress, base_limits);
         if let Some(limit_s) = self.settings.thinking_limit_s {
             let protocols = list.tasks.iter_mut().flat_map(|task| &mut task.protocols);
             protocols.for_each(|info| info.wall_clock_s = Some(limit_s.into()));

@@ -107,6 +107,12 @@ impl Dynamics {
         self.collision.collider(id)
     }
 
+    /// Leaves colliders of this tag only a share of their friction; see [`Friction::left`].
+    pub fn leave_friction(&mut self, tag: u128, share: f64) {
+        let of_tag = self.collision.colliders_mut().filter(|collider| collider.tag == tag);
+        of_tag.for_each(|collider| collider.friction.left = share);
+    }
+
     /// All colliders, in the order in which they were added, and where they are.
     pub fn colliders(&self) -> impl Iterator<Item = (&Collider, DPose3)> {
         let world_from = |link: &LinkId| self.trees.world_from(*link);

@@ -180,7 +180,7 @@ fn friction(geom: &mjcf_rs::body::Geom) -> Result<Friction, String> {
     let directions = Directions::from_condim(geom.condim)
         .ok_or_else(|| format!("condim=\"{}\"; use 1, 3, 4 or 6", geom.condim))?;
     let [slide, spin_m, roll_m] = geom.friction;
-    Ok(Friction { directions, slide, spin_m, roll_m, priority: geom.priority })
+    Ok(Friction { directions, slide, spin_m, roll_m, priority: geom.priority, left: 1.0 })
 }
 
 fn checker_rgb(document: &Document, material: &mjcf_rs::assets::Material) -> Option<[[f32; 3]; 2]> {

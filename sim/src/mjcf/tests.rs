@@ -194,8 +194,14 @@ fn geoms_have_mujocos_friction_unless_they_state_it() {
         let inside = format!("<worldbody><geom type=\"plane\" size=\"1 1 1\" {attributes}/></worldbody>");
         trees(&inside)[0].links[0].geoms[0].friction
     };
-    let usual =
-        Friction { directions: Directions::Slide, slide: 1.0, spin_m: 0.005, roll_m: 0.0001, priority: 0 };
+    let usual = Friction {
+        directions: Directions::Slide,
+        slide: 1.0,
+        spin_m: 0.005,
+        roll_m: 0.0001,
+        priority: 0,
+        left: 1.0,
+    };
     assert_eq!(friction(""), usual);
     let stated = Friction {
         directions: Directions::SlideSpinRoll,
@@ -203,6 +209,7 @@ fn geoms_have_mujocos_friction_unless_they_state_it() {
         spin_m: 0.01,
         roll_m: 0.002,
         priority: 2,
+        left: 1.0,
     };
     assert_eq!(friction(r#"friction="0.6 0.01 0.002" condim="6" priority="2""#), stated);
 }

@@ -3,6 +3,7 @@
 //! [`Scenery`] is what there is to see, built once per world; a [`Step`] says where it is; a [`Renderer`] draws it:
 //! [`RendererKind`] says which. The embedded one needs nothing of the system.
 
+mod blur;
 mod cpu;
 #[cfg(feature = "gpu")]
 mod gpu;
@@ -11,9 +12,10 @@ mod scene;
 mod shading;
 
 pub use kind::RendererKind;
-pub use scene::camera::{Camera, Cameras, Intrinsics};
+pub use scene::camera::{Camera, Cameras, Intrinsics, LensFlaw};
 pub use scene::mesh::{TriangleMesh, Vertex};
 pub use scene::{Carrier, Part, PlacedScenery, Scenery, robot_rgba};
+pub use shading::Light;
 pub use shading::pattern::Pattern;
 
 use std::slice;

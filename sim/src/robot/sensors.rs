@@ -19,15 +19,22 @@ pub enum SensorModel {
     Ideal,
     /// Noise, bias and latency of a Unitree G1.
     G1,
+    /// The same with twice the noise and bias.
+    G1Twice,
+    /// The same with four times the noise and bias.
+    G1Fourfold,
 }
 
 impl SensorModel {
+    /// Those that settings name; the others are laid over episodes as stress.
     pub const ALL: [SensorModel; 2] = [SensorModel::Ideal, SensorModel::G1];
 
     pub fn name(self) -> &'static str {
         match self {
             SensorModel::Ideal => "ideal",
             SensorModel::G1 => "g1",
+            SensorModel::G1Twice => "g1_twice",
+            SensorModel::G1Fourfold => "g1_fourfold",
         }
     }
 }
@@ -43,6 +50,22 @@ struct Noise {
     latency_s: f32,
     /// Joint velocities are differences of positions, low-passed at this frequency.
     rate_cutoff_hz: f32,
+}
+
+impl Noise {
+    /// As late, with so many times the noise and bias.
+    fn times(&self, factor: f32) -> Noise {
+        Noise {
+            gyro_rad_s: factor * self.gyro_rad_s,
+            gyro_bias_rad_s: factor * self.gyro_bias_rad_s,
+            acc_m_s2: factor * self.acc_m_s2,
+            acc_bias_m_s2: factor * self.acc_bias_m_s2,
+            encoder_rad: factor * self.encoder_rad,
+            torque_n_m: factor * self.torque_n_m,
+            latency_s: self.latency_s,
+            rate_cutoff_hz: self.rate_cutoff_hz,
+        }
+    }
 }
 
 const G1: Noise = Noise {
@@ -91,10 +114,12 @@ impl Sensors {
         sensors
     }
 
-    fn noise(&self) -> Option<&'static Noise> {
+    fn noise(&self) -> Option<Noise> {
         match self.model {
             SensorModel::Ideal => None,
-            SensorModel::G1 => Some(&G1),
+            SensorModel::G1 => Some(G1.times(1.0)),
+            SensorModel::G1Twice => Some(G1.times(2.0)),
+            SensorModel::G1Fourfold => Some(G1.times(4.0)),
         }
     }
 

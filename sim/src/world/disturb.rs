@@ -1,5 +1,7 @@
 //! What no command can make: pushes at a link, weights fused to a hand, objects put elsewhere. For benches and tests of
-//! controllers; no tool reaches them.
+//! controllers, and for what is laid over an episode as stress; no tool reaches them.
+
+use std::ops::Range;
 
 use rapier3d::math::{Pose, Vector};
 use rapier3d::prelude::{AngVector, MassProperties};
@@ -8,7 +10,8 @@ use super::World;
 use crate::Side;
 use crate::dynamics::{ContactPoint, DVec3, Dynamics, LinkId, Mass};
 use crate::locomotion::Locomotion;
-use crate::mechanism::precise;
+use crate::mechanism::{precise, rounded};
+use crate::owner::Owner;
 
 /// Resting contacts are a little deeper than nothing.
 const ALLOWED_OVERLAP_M: f64 = 0.002;
@@ -19,6 +22,19 @@ pub(super) struct Push {
     point_in_link_m: Vector,
     /// World frame.
     force_n: Vector,
+}
+
+/// A force that acts on a robot while some control steps are made, as of somebody who pushes it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlannedPush {
+    pub robot: usize,
+    /// Name of the link that is pushed.
+    pub link: String,
+    pub point_in_link_m: Vector,
+    /// World frame.
+    pub force_n: Vector,
+    /// Of the world's control steps, counted from 0, those in which it acts.
+    pub control_steps: Range<u64>,
 }
 
 impl Push {
@@ -34,10 +50,50 @@ impl World {
     /// Sets the force (N, world) that pulls at a point (link frame) of a robot's link during the next control step, in
     /// addition to other pushes. An unknown link is a bug of the caller.
     pub fn push(&mut self, robot: usize, link: &str, point_in_link_m: Vector, force_n: Vector) {
+        let link = self.robot_link(robot, link);
+        self.pushes.push(Push { link, point_in_link_m, force_n });
+    }
+
+    fn robot_link(&self, robot: usize, link: &str) -> LinkId {
         let robot = &self.robots[robot];
         let found = robot.model.links.iter().position(|candidate| candidate.name == link);
-        let link = found.unwrap_or_else(|| panic!("no link `{link}` in the robot's file"));
-        self.pushes.push(Push { link: robot.tree.link(link), point_in_link_m, force_n });
+        robot.tree.link(found.unwrap_or_else(|| panic!("no link `{link}` in the robot's file")))
+    }
+
+    /// Sets all pushes that are planned. They are part of the set-up, not of the state: a world that is taken back to a snapshot gets
+    /// them anew. An unknown link is a bug of the caller.
+    pub fn plan_pushes(&mut self, planned: Vec<PlannedPush>) {
+        let push = |PlannedPush { robot, link, point_in_link_m, force_n, control_steps }: PlannedPush| {
+            let link = self.robot_link(robot, &link);
+            (control_steps, Push { link, point_in_link_m, force_n })
+        };
+        self.planned_pushes = planned.into_iter().map(push).collect();
+    }
+
+    /// Makes an object, with all that moves on it, so many times as heavy as its file has it. It is part of the set-up.
+    pub fn scale_mass(&mut self, object: &str, factor: f64) {
+        for index in self.parts_of(object) {
+            let Some(link) = self.objects[index].link else { continue };
+            let tree = self.dynamics.tree_mut(link.tree);
+            let Mass { mass_kg, com_m, inertia_kg_m2 } = tree.links()[link.link].mass;
+            let heavier = Mass { mass_kg: mass_kg * factor, com_m, inertia_kg_m2: inertia_kg_m2 * factor };
+            tree.set_mass(link.link, heavier);
+        }
+    }
+
+    /// Leaves an object, with all that moves on it, only this share of its friction with whatever it touches. It is part of the set-up.
+    pub fn leave_friction(&mut self, object: &str, share: f64) {
+        for index in self.parts_of(object) {
+            self.dynamics.leave_friction(Owner::Object(index).tag(), share);
+        }
+    }
+
+    /// Indices of an object and of what moves on it.
+    fn parts_of(&self, object: &str) -> Vec<usize> {
+        let is_part = |name: &str| {
+            name.strip_prefix(object).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
+        };
+        (0..self.objects.len()).filter(|index| is_part(&self.objects[*index].name)).collect()
     }
 
     /// Fuses a point mass to a palm: the controller is not told.
@@ -88,6 +144,17 @@ impl World {
         overlaps
     }
 
+    /// Whether a box along the world's axes meets the bounds of anything that collides; floors that have no end are left out.
+    pub fn touches_box(&self, middle_m: Vector, half_m: Vector) -> bool {
+        let [low_m, high_m] = [middle_m - half_m, middle_m + half_m];
+        self.dynamics.colliders().filter(|(collider, _)| !collider.endless).any(
+            |(collider, world_from_shape)| {
+                let bounds = collider.shape.compute_aabb(&rounded(&world_from_shape));
+                (0..3).all(|axis| bounds.mins[axis] < high_m[axis] && bounds.maxs[axis] > low_m[axis])
+            },
+        )
+    }
+
     /// Puts a free object somewhere, at rest. An unknown one is a bug of the caller.
     pub(crate) fn put_object(&mut self, name: &str, world_from_object: Pose) {
         let link = self.link_of(|object| object.name == name);
@@ -99,5 +166,96 @@ impl World {
     /// Gives a robot another base controller, which starts from how the robot stands now.
     pub fn set_locomotion(&mut self, robot: usize, locomotion: Box<dyn Locomotion>) {
         self.robots[robot].set_locomotion(locomotion);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{CONTROL_DT_S, GRAVITY_M_S2, ObjectPlacement, RobotCommand, RobotPlacement, WorldSpec};
+
+    fn world() -> World {
+        let robot = RobotPlacement { name: "A".into(), position_m: [-2.0, 0.0], yaw_rad: 0.0 };
+        let crate_ =
+            ObjectPlacement { name: "crate".into(), file: "crate".into(), world_from_object: Pose::IDENTITY };
+        World::new(&WorldSpec { scene: "floor".into(), robots: vec![robot], objects: vec![crate_] }).unwrap()
+    }
+
+    fn rest(world: &World) -> Vec<RobotCommand> {
+        vec![world.rest_command(0)]
+    }
+
+    /// How much a crate that slides at 2 m/s slows down in a fifth of a second.
+    fn slowed_m_s(mut world: World) -> f64 {
+        let commands = rest(&world);
+        for _ in 0..10 {
+            world.control_step(&commands).unwrap();
+        }
+        let link = world.link_of(|object| object.name == "crate").unwrap();
+        let pose = world.dynamics.tree(link.tree).world_from_link(0);
+        world.dynamics.tree_mut(link.tree).set_base(pose, DVec3::X * 2.0, DVec3::ZERO);
+        for _ in 0..10 {
+            world.control_step(&commands).unwrap();
+        }
+        2.0 - f64::from(world.present().object("crate").unwrap().velocity_m_s.x)
+    }
+
+    #[test]
+    fn a_slippery_object_is_slowed_by_what_is_left_of_friction_and_a_heavy_one_as_any() {
+        // Wood on wood, as both files have it.
+        let expected_m_s = 0.4 * f64::from(GRAVITY_M_S2) * 10.0 * f64::from(CONTROL_DT_S);
+        for (share, times) in [(1.0, 1.0), (0.5, 1.0), (1.0, 2.0)] {
+            let mut world = world();
+            world.leave_friction("crate", share);
+            world.scale_mass("crate", times);
+            let slowed_m_s = slowed_m_s(world);
+            let wanted_m_s = share * expected_m_s;
+            assert!((slowed_m_s - wanted_m_s).abs() < 0.05 * wanted_m_s, "{share} {times}: {slowed_m_s} m/s");
+        }
+    }
+
+    #[test]
+    fn a_heavier_object_has_so_many_times_the_mass_and_nothing_else_has() {
+        let mut world = world();
+        let masses_kg = |world: &World| -> Vec<f64> {
+            world.dynamics.tree_ids().map(|id| world.dynamics.tree(id).mass_kg()).collect()
+        };
+        let before_kg = masses_kg(&world);
+        world.scale_mass("crate", 1.5);
+        let ratios: Vec<f64> =
+            masses_kg(&world).iter().zip(&before_kg).map(|(after, before)| after / before).collect();
+        assert_eq!(ratios.iter().filter(|ratio| **ratio != 1.0).count(), 1, "{ratios:?}");
+        assert!(ratios.iter().any(|ratio| (ratio - 1.5).abs() < 1e-12), "{ratios:?}");
+    }
+
+    #[test]
+    fn a_planned_push_acts_in_its_steps_and_so_it_does_again_from_a_snapshot() {
+        let (mut plain, mut pushed) = (world(), world());
+        let push = PlannedPush {
+            robot: 0,
+            link: "torso_link".into(),
+            point_in_link_m: Vector::ZERO,
+            force_n: Vector::new(0.0, 30.0, 0.0),
+            control_steps: 3..8,
+        };
+        pushed.plan_pushes(vec![push]);
+        let commands = rest(&plain);
+        let mut snapshot = None;
+        for step in 0..10 {
+            if step == 5 {
+                snapshot = Some(pushed.snapshot().unwrap());
+            }
+            plain.control_step(&commands).unwrap();
+            pushed.control_step(&commands).unwrap();
+            assert_eq!(plain.state_hash() == pushed.state_hash(), step < 3, "step {step}");
+        }
+        let velocity_m_s = |world: &World| world.present().robots[0].truth.world_from_pelvis().translation.y;
+        assert!(velocity_m_s(&pushed) > velocity_m_s(&plain) + 1e-4);
+        let end = pushed.state_hash();
+        pushed.restore(&snapshot.unwrap()).unwrap();
+        for _ in 5..10 {
+            pushed.control_step(&commands).unwrap();
+        }
+        assert_eq!(pushed.state_hash(), end);
     }
 }

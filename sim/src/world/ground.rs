@@ -10,8 +10,14 @@ use crate::mjcf::{Geom, Primitive};
 /// A plane that leans by less carries what falls on it.
 const CARRIES_COSINE: f64 = 0.5;
 /// MJCF's defaults.
-const PLAIN: Friction =
-    Friction { directions: Directions::Slide, slide: 1.0, spin_m: 0.005, roll_m: 0.0001, priority: 0 };
+const PLAIN: Friction = Friction {
+    directions: Directions::Slide,
+    slide: 1.0,
+    spin_m: 0.005,
+    roll_m: 0.0001,
+    priority: 0,
+    left: 1.0,
+};
 
 impl World {
     /// Puts a plane without an end under the lowest shape of the scene, unless the scene has such a plane itself: exported rooms

@@ -13,8 +13,10 @@ mod watch;
 #[cfg(test)]
 mod knowledge_tests;
 
+use std::ops::Range;
 use std::sync::Arc;
 
+pub use disturb::PlannedPush;
 pub use objects::{ObjectFile, ObjectModel, ObjectPart, ObjectPlacement, ObjectState};
 pub use snapshot::Snapshot;
 pub use step::{BodyTouch, HandContacts, ObjectStep, RobotStep, Step, Touch};
@@ -70,6 +72,8 @@ pub struct World {
     control_steps: u64,
     /// Pushes of the next control step.
     pushes: Vec<Push>,
+    /// Those of later control steps, each with its steps.
+    planned_pushes: Vec<(Range<u64>, Push)>,
 }
 
 impl World {
@@ -116,6 +120,7 @@ impl World {
             fixed,
             cameras: scene.cameras.iter().map(|camera| camera.moved(world_from_scene)).collect(),
             pushes: Vec::new(),
+            planned_pushes: Vec::new(),
             control_steps: 0,
         })
     }
@@ -149,7 +154,9 @@ impl World {
             robot.drive(&mut self.dynamics, command, substep);
         }
         self.machinery.drive(&mut self.dynamics, self.control_steps as f64 / CONTROL_HZ);
-        self.pushes.iter().for_each(|push| push.apply(&mut self.dynamics));
+        let planned = self.planned_pushes.iter().filter(|(steps, _)| steps.contains(&self.control_steps));
+        let pushes = self.pushes.iter().chain(planned.map(|(_, push)| push));
+        pushes.for_each(|push| push.apply(&mut self.dynamics));
     }
 
     /// One physics step.

@@ -38,6 +38,7 @@ const FRICTION: Friction = Friction {
     spin_m: 0.005,
     roll_m: 0.0001,
     priority: 0,
+    left: 1.0,
 };
 
 fn scene() -> Dynamics {

@@ -2,7 +2,9 @@
 
 use std::f32::consts::{FRAC_PI_3, PI};
 
-use tandem_sim::render::{Camera, Carrier, Frame, Part, Pattern, Scenery, TriangleMesh, cpu, encode_png};
+use tandem_sim::render::{
+    Camera, Carrier, Frame, Light, Part, Pattern, Scenery, TriangleMesh, cpu, encode_png,
+};
 use tandem_sim::{ObjectState, ObjectStep, Pose, Rotation, Step, Vector};
 
 const GREY: [f32; 3] = [0.6, 0.6, 0.6];
@@ -18,7 +20,11 @@ fn scenery(parts: Vec<(TriangleMesh, Pose)>) -> Scenery {
         id,
         casts_shadow: true,
     };
-    Scenery { parts: parts.into_iter().zip(1..).map(part).collect(), focus_radius_m: 1.0 }
+    Scenery {
+        parts: parts.into_iter().zip(1..).map(part).collect(),
+        focus_radius_m: 1.0,
+        light: Light::default(),
+    }
 }
 
 /// A floor, and something that moves.
@@ -48,7 +54,7 @@ fn floor() -> (TriangleMesh, Pose) {
 }
 
 fn camera(world_from_camera: Pose) -> Camera {
-    Camera { world_from_camera, vertical_fov_rad: FRAC_PI_3, width: 160, height: 120 }
+    Camera { world_from_camera, vertical_fov_rad: FRAC_PI_3, width: 160, height: 120, blur_px: 0.0 }
 }
 
 /// Looks straight down from above the origin.

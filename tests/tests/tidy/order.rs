@@ -32,6 +32,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
             &["error", "conditions"],
             &["tasks"],
             &["variation", "task_file", "protocol"],
+            &["stress"],
             &["spec"],
             &["commands", "results"],
             &["observation"],

@@ -39,12 +39,12 @@ impl RobotTopics {
     pub fn open(
         file: &mut McapFile,
         robot: &RobotSheet,
-        disturbed: bool,
+        executes_otherwise: bool,
     ) -> Result<RobotTopics, OutputError> {
         let columns = action_row(&robot.model).join(",");
         let mut executed =
             || file.topic(&format!("/{}/executed_action", robot.name), &[("columns", &columns)]);
-        let executed = disturbed.then(&mut executed).transpose()?;
+        let executed = executes_otherwise.then(&mut executed).transpose()?;
         Ok(RobotTopics {
             joint_states: file.topic(&format!("/{}/joint_states", robot.name), &[])?,
             action: file.topic(&format!("/{}/action", robot.name), &[("columns", &columns)])?,
@@ -72,7 +72,7 @@ impl RobotTopics {
         file.write(&mut self.hands, time_s, &HandsMessage::of(step, index, facts))
     }
 
-    /// Appends what the robot did in the control step that ended at `time_s`, where noise is added to what it is told.
+    /// Appends what the robot did in the control step that ended at `time_s`, where that may be something else than it was told.
     pub fn executed(
         &mut self,
         file: &mut McapFile,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::recording::{Recorder, Recording};
 use crate::reports::episode::STRIP_FILE;
-use crate::results::{EPISODES, PlayedEpisode, episode_note};
+use crate::results::{EPISODES, PlayedEpisode, STRESS, episode_note};
 
 /// One episode.
 #[derive(Clone, Debug)]
@@ -53,8 +53,15 @@ pub fn load(folders: &[PathBuf]) -> Result<LoadedEpisodes, LoadError> {
         let before = loaded.episodes.len() + loaded.skipped.len();
         let kept = folder.join(EPISODES);
         if kept.is_dir() {
-            load_results(&kept, &mut loaded)?;
-        } else {
+            load_results(&kept, folder, &mut loaded)?;
+        }
+        let stressed = folder.join(STRESS);
+        if stressed.is_dir() {
+            // What `evaluate --stress` wrote beside the plain run, an axis and level a folder.
+            for plan in entries(&stressed)?.into_iter().filter(|plan| plan.join(EPISODES).is_dir()) {
+                load_results(&plan.join(EPISODES), folder, &mut loaded)?;
+            }
+        } else if !kept.is_dir() {
             load_recordings(folder, &mut loaded)?;
         }
         if loaded.episodes.len() + loaded.skipped.len() == before {
@@ -73,11 +80,10 @@ impl LoadedEpisodes {
     }
 }
 
-/// Results of single episodes, each in a file.
-fn load_results(folder: &Path, loaded: &mut LoadedEpisodes) -> Result<(), LoadError> {
-    let absolute = folder.canonicalize().unwrap_or_else(|_| folder.into());
-    // RUNS/EVALUATION/episodes
-    let runs = absolute.ancestors().nth(2).unwrap_or(&absolute);
+/// Results of single episodes of the evaluation in `evaluation`, each in a file.
+fn load_results(folder: &Path, evaluation: &Path, loaded: &mut LoadedEpisodes) -> Result<(), LoadError> {
+    let absolute = evaluation.canonicalize().unwrap_or_else(|_| evaluation.into());
+    let runs = absolute.parent().unwrap_or(&absolute);
     for path in entries(folder)?.into_iter().filter(|path| path.extension().is_some_and(|e| e == "json")) {
         let read = std::fs::read(&path).map_err(|error| error.to_string());
         match read.and_then(|bytes| serde_json::from_slice(&bytes).map_err(|error| error.to_string())) {

@@ -9,6 +9,8 @@ mod page;
 mod policy;
 mod published;
 mod rate;
+mod stress;
+mod table;
 mod tables;
 #[cfg(test)]
 mod tests;
@@ -30,6 +32,8 @@ pub use policy::{
 };
 pub use published::{PublishedAverages, PublishedRates};
 pub use rate::{MeanRate, Rate};
+pub use stress::{AxisLoss, PairedLoss, StressReport, StressRow};
+pub(crate) use went_wrong::moment_of_failure;
 pub use went_wrong::{FailureMoment, failure_moments};
 
 /// Everything that a report says in words and numbers.
@@ -39,6 +43,8 @@ pub struct EvaluationReport {
     pub policies: Vec<PolicyReport>,
     /// Each policy against the first.
     pub comparisons: Vec<Comparison>,
+    /// What is left of policies that were played under stress, too.
+    pub stress: Vec<StressReport>,
     /// What of these tasks needs no eyes.
     pub floors: Vec<TaskFloor>,
     /// What was published of the same tasks in another simulator.
@@ -84,7 +90,13 @@ impl ReportFormat {
 impl EvaluationReport {
     /// Counts what was found.
     pub fn of(loaded: &LoadedEpisodes) -> EvaluationReport {
-        let groups = policy::groups(&loaded.episodes);
+        let all = || loaded.episodes.iter();
+        let plain = all().filter(|found| found.played.spec.stress.is_none());
+        // What is played under stress alone is told as any other.
+        let groups = match plain.clone().next() {
+            Some(_) => policy::groups(plain),
+            None => policy::groups(all()),
+        };
         let policies: Vec<PolicyReport> = groups.iter().map(PolicyReport::of).collect();
         let comparisons = match groups.split_first() {
             Some((first, others)) => others.iter().map(|other| Comparison::of(first, other)).collect(),
@@ -95,6 +107,7 @@ impl EvaluationReport {
             published: published::rows().into_iter().filter(|row| played(&row.task)).collect(),
             published_averages: published::averages(),
             floors: floor::floors(&groups, &policies),
+            stress: stress::stress_reports(all()),
             failure_moments: Vec::new(),
             skipped: loaded.skipped.clone(),
             policies,

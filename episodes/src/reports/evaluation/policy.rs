@@ -130,7 +130,7 @@ pub struct ExcludedEpisodes {
 }
 
 /// Policies in the order in which they were found, with names that tell them apart.
-pub fn groups<'a>(episodes: &'a [FoundEpisode]) -> Vec<PolicyGroup<'a>> {
+pub fn groups<'a>(episodes: impl Iterator<Item = &'a FoundEpisode>) -> Vec<PolicyGroup<'a>> {
     let mut groups: Vec<(Vec<String>, Vec<&FoundEpisode>)> = Vec::new();
     for found in episodes {
         let key = rules_of(&found.played);
@@ -170,7 +170,7 @@ impl<'a> PolicyGroup<'a> {
 }
 
 /// What has to agree for episodes to be of one policy: its name first, then all that may tell namesakes apart.
-fn rules_of(played: &PlayedEpisode) -> Vec<String> {
+pub fn rules_of(played: &PlayedEpisode) -> Vec<String> {
     let spec = &played.spec;
     let short = played.build.chars().rev().take(6).collect::<Vec<_>>();
     let (name, address) = split_address(&played.policy.name);
@@ -342,7 +342,7 @@ pub fn failed_by_turns(
     most: usize,
     wanted: fn(&FoundEpisode) -> bool,
 ) -> Vec<(String, &FoundEpisode)> {
-    let groups = groups(&loaded.episodes);
+    let groups = groups(loaded.episodes.iter());
     let mut all: Vec<(String, &FoundEpisode)> = Vec::new();
     for group in &groups {
         let of_group = failed(group).into_iter().filter(|found| wanted(found));

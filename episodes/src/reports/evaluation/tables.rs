@@ -5,45 +5,17 @@ use super::costs::{EpisodeCosts, ValueRange};
 use super::floor::TaskFloor;
 use super::policy::{PolicyReport, TaskReport};
 use super::rate::{MeanRate, Rate, percent};
+use super::table::{NONE, Table, p_text, signed};
 use super::went_wrong::FailureMoment;
-use super::{EvaluationReport, PublishedRates};
+use super::{EvaluationReport, PublishedRates, stress};
 use crate::results::named;
 use crate::statistics::Count;
-
-/// Words in rows and columns.
-pub struct Table {
-    pub title: String,
-    /// What has to be known to read it.
-    pub note: String,
-    pub head: Vec<String>,
-    pub rows: Vec<Vec<String>>,
-    /// Columns from this one on hold figures.
-    pub figures_from: usize,
-    /// Where the last cell of each row leads, in a table whose rows lead somewhere.
-    pub links: Vec<String>,
-}
-
-/// What there is nothing to say of.
-pub const NONE: &str = "-";
-
-impl Table {
-    pub fn new(title: impl Into<String>, note: &str, head: &[&str], figures_from: usize) -> Table {
-        let head = head.iter().map(|text| text.to_string()).collect();
-        Table {
-            title: title.into(),
-            note: note.into(),
-            head,
-            rows: Vec::new(),
-            figures_from,
-            links: Vec::new(),
-        }
-    }
-}
 
 /// Every table that has rows.
 pub fn all(report: &EvaluationReport) -> Vec<Table> {
     let policies = &report.policies;
     let mut tables: Vec<Table> = policies.iter().map(rates).collect();
+    tables.extend(report.stress.iter().flat_map(stress::tables));
     tables.push(floors(&report.floors));
     tables.push(averages(policies));
     tables.push(together(policies));
@@ -185,12 +157,6 @@ fn together(policies: &[PolicyReport]) -> Table {
         }
     }
     table
-}
-
-/// A share in percent, with its sign.
-pub fn signed(share: f64) -> String {
-    let text = percent(share);
-    if share > 0.0 && text != "0" { format!("+{text}") } else { text }
 }
 
 fn shown(policies: &[PolicyReport]) -> Table {
@@ -339,7 +305,8 @@ fn went_wrong(moments: &[FailureMoment], policies: &[PolicyReport]) -> Table {
         &["Policy", "Task", "Seed", "Stuck before", "What", "At (s)"],
         5,
     );
-    let order = |name: &String| policies.iter().position(|policy| policy.name == *name);
+    let order =
+        |name: &String| policies.iter().position(|policy| policy.name == *name).unwrap_or(policies.len());
     let mut moments: Vec<&FailureMoment> = moments.iter().collect();
     moments.sort_by_key(|moment| order(&moment.policy));
     for moment in moments {
@@ -396,10 +363,6 @@ fn paired_row(row: &PairedRow) -> Vec<String> {
     let words = [row.task.unwrap_or("all tasks").to_owned(), row.phase.clone()];
     let figures = [format!("{} [{low}, {high}]", signed(row.difference_share)), p_text(row.mcnemar_p_value)];
     words.into_iter().chain(counts.map(|count| count.to_string())).chain(figures).collect()
-}
-
-fn p_text(p_value: f64) -> String {
-    if p_value < 0.0001 { "< 0.0001".into() } else { format!("{p_value:.4}") }
 }
 
 /// A row for each method, and a column for each task that was played.

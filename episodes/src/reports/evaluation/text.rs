@@ -1,10 +1,11 @@
 //! Reports without pictures: Markdown, CSV with a line for each rate, and tables for LaTeX.
 
-use super::EvaluationReport;
 use super::costs::ValueRange;
 use super::policy::TaskReport;
 use super::rate::Rate;
-use super::tables::{Table, all};
+use super::table::Table;
+use super::tables::all;
+use super::{EvaluationReport, stress};
 
 pub fn markdown(report: &EvaluationReport) -> String {
     let mut text = String::from("# Tandem: report\n");
@@ -69,6 +70,7 @@ pub fn csv(report: &EvaluationReport) -> String {
             }
         }
     }
+    text.extend(report.stress.iter().flat_map(|of| stress::csv_lines(of, &quoted)));
     text
 }
 

@@ -37,7 +37,7 @@ pub fn failure_moments(loaded: &LoadedEpisodes, most: usize) -> Vec<FailureMomen
 /// `None` where the recording cannot be read.
 fn moment(policy: &str, found: &FoundEpisode) -> Option<FailureMoment> {
     let recording = Recording::read(found.recording.as_deref()?).ok()?;
-    let (time_s, what) = went_wrong(&recording).ok()?;
+    let (time_s, what) = moment_of_failure(&recording).ok()?;
     let spec = &found.played.spec;
     Some(FailureMoment {
         policy: policy.into(),
@@ -51,7 +51,7 @@ fn moment(policy: &str, found: &FoundEpisode) -> Option<FailureMoment> {
 }
 
 /// The first fall of a robot or the first drop of an object after the last phase that was reached; where there was none, the end.
-fn went_wrong(recording: &Recording) -> Result<(f64, String), RecordingError> {
+pub(crate) fn moment_of_failure(recording: &Recording) -> Result<(f64, String), RecordingError> {
     let mut watcher = Watcher::default();
     let names: Vec<&str> = recording.spec.task.robots.iter().map(|robot| robot.name).collect();
     recording.score_with(|scored| watcher.look(&scored.facts, scored.reached, &names))?;

@@ -48,7 +48,7 @@ pub fn run(args: TasksArgs) -> CommandResult {
         return check(args);
     }
     let limits = LocomotionChoice::default().limits();
-    let list = tandem_episodes::task_list(&task_set(Vec::new()), &limits);
+    let list = tandem_episodes::task_list(&task_set(Vec::new()), None, &limits);
     let text = match args.json {
         true => serde_json::to_string_pretty(&list)? + "\n",
         false => told(&list),
@@ -60,7 +60,7 @@ pub fn run(args: TasksArgs) -> CommandResult {
 /// The program fails if something falls.
 fn check(args: CheckArgs) -> CommandResult {
     let task = read_task(&args.file)?;
-    let own = tandem_episodes::task_list(&task_set(vec![task]), &LocomotionChoice::default().limits());
+    let own = tandem_episodes::task_list(&task_set(vec![task]), None, &LocomotionChoice::default().limits());
     let own = TaskList { tasks: own.tasks.into_iter().filter(|info| info.id == task.id).collect(), ..own };
     print(&told(&own))?;
     let folder = args.out.unwrap_or_else(|| Path::new("runs/tasks").join(task.id));

@@ -13,7 +13,12 @@ use tandem_tools_spec::Assistance;
 
 use people::PeopleFlags;
 
-use super::{CommandResult, evaluate::play_and_print, flags::EpisodeFlags, logging::log_evaluation};
+use super::{
+    CommandResult,
+    evaluate::play_and_print,
+    flags::{EpisodeFlags, StressFlags},
+    logging::log_evaluation,
+};
 
 /// Record demonstrations of the experts, or of people who drive in browsers, as MCAP, one folder per episode. Goes on where an
 /// interrupted run stopped.
@@ -23,6 +28,8 @@ pub struct CollectArgs {
     episodes: EpisodeFlags,
     #[command(flatten)]
     people: PeopleFlags,
+    #[command(flatten)]
+    stress: StressFlags,
     /// How much demonstrations of the same task differ in pace, pauses and ways, and how often hands miss and come back: 0 for
     /// not at all, to 3.
     #[arg(long, value_name = "N", default_value_t = 0, conflicts_with = "operators",
@@ -56,6 +63,7 @@ pub fn run(args: CollectArgs) -> CommandResult {
     let variation = Variation { variety: args.variety, disturb: args.disturb, ..plan.variation };
     let plan = EvaluationPlan {
         variation,
+        stress: args.stress.stress(),
         files: KeptFiles { pages: !args.no_reports, only_successful: args.only_successful },
         ..plan
     };

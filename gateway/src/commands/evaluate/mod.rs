@@ -12,7 +12,8 @@ use std::{
 
 use tandem_episodes::{
     Phase,
-    evaluation::{self, EvaluationPlan, Shard, Starts},
+    evaluation::{self, EvaluationPlan, Shard, Starts, failed_episodes},
+    results::STRESS,
     tasks,
 };
 
@@ -20,7 +21,7 @@ use tandem_tools_spec::Assistance;
 
 use super::{
     CommandResult,
-    flags::{EpisodeFlags, PolicyFlags},
+    flags::{EpisodeFlags, PolicyFlags, StressPlanFlags},
     logging::log_evaluation,
 };
 use progress::with_progress;
@@ -32,6 +33,15 @@ pub struct EvaluateArgs {
     policy: PolicyFlags,
     #[command(flatten)]
     episodes: EpisodeFlags,
+    #[command(flatten)]
+    stress: StressPlanFlags,
+    /// Play the failures of another evaluation again, from some seconds before the moment at which each went wrong, with the whole budget
+    /// ahead: its folder, in which episodes were recorded by this build. Tasks, seeds, world and stress are theirs.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["from", "demos", "tasks", "seeds", "spread", "scene", "task_file", "stress"])]
+    retry_from: Option<PathBuf>,
+    /// How many seconds before.
+    #[arg(long, value_name = "SECONDS", default_value_t = 3, requires = "retry_from")]
+    before: u32,
     /// Phases to begin at, by number or id, as p2 or p1,transfer, or `all`: each episode starts where that phase began in the
     /// demonstration of its task and seed, with the whole budget ahead, and that phase alone counts.
     #[arg(long, value_name = "PHASES", value_parser = parse_phases, requires = "demos")]
@@ -100,6 +110,10 @@ pub fn run(args: EvaluateArgs) -> CommandResult {
         (Some(demonstrations), Some(PhaseList(phases))) => Starts::Phases { demonstrations, phases },
         _ => Starts::Task,
     };
+    let starts = match &args.retry_from {
+        Some(folder) => begin_again(folder, args.before)?,
+        None => starts,
+    };
     let ShardFlag(shard) = args.shard;
     let policy = args.policy.policy()?;
     let plan = EvaluationPlan {
@@ -108,10 +122,29 @@ pub fn run(args: EvaluateArgs) -> CommandResult {
         keep_failed: args.keep_failed,
         ..args.episodes.plan(&*policy, args.record, Assistance::Paper)?
     };
-    Ok(match play_and_print(&plan, &args.out)? {
+    let mut counted = play_and_print(&plan, &args.out)?;
+    for stress in args.stress.stresses() {
+        println!("\nunder stress: {stress}");
+        let plan = EvaluationPlan { stress: Some(stress), ..plan.clone() };
+        counted += play_and_print(&plan, &args.out.join(STRESS).join(stress.to_string()))?;
+    }
+    Ok(match counted {
         0 if !plan.episodes().0.is_empty() => ExitCode::FAILURE,
         _ => ExitCode::SUCCESS,
     })
+}
+
+/// What has failed in `folder`, to begin again so many seconds before; what cannot be begun again is logged.
+fn begin_again(folder: &Path, before_s: u32) -> Result<Starts, Box<dyn Error>> {
+    let (failed, left_out) = failed_episodes(folder)?;
+    left_out.iter().for_each(|line| tracing::warn!("not begun again: {line}"));
+    if failed.is_empty() {
+        let folder = folder.display();
+        return Err(
+            format!("{folder} has no failure that was recorded; evaluate with --record writes such").into()
+        );
+    }
+    Ok(Starts::Moments { failed, before_s })
 }
 
 /// Plays `plan` into `folder`, says how it goes on, prints a table, and returns how many of the episodes count.

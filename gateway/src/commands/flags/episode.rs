@@ -105,6 +105,7 @@ impl EpisodeFlags {
             disclosure,
             hints,
             variation: Variation { spread: self.spread, ..Variation::default() },
+            stress: None,
             thinking_limit_s: self.thinking_limit,
             renderer: self.world.renderer(),
             tasks,

@@ -3,9 +3,11 @@
 mod agent;
 mod episode;
 mod policy;
+mod stress;
 mod world;
 
 pub use agent::AgentFlags;
 pub use episode::{EpisodeFlags, Seeds};
 pub use policy::PolicyFlags;
+pub use stress::{StressFlags, StressPlanFlags};
 pub use world::{LocomotionFlag, SensingFlags, WorldFlags};

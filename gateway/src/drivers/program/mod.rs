@@ -103,6 +103,7 @@ impl Program {
             base_limits: spec.locomotion.load().map_err(EpisodeError::from)?.limits(),
             locomotion: spec.locomotion.clone(),
             sensing: spec.sensing,
+            stress: spec.stress,
             renderer: spec.renderer,
             ..(*self.settings).clone()
         }))

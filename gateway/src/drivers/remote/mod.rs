@@ -23,6 +23,7 @@ use tandem_episodes::{
     EpisodeSpec,
     players::{EpisodeOutput, PlayError, PlayOutcome, Policy, PolicyWait, play_in_process},
     results::PolicyCard,
+    stress::TaskWords,
     tasks::Task,
 };
 
@@ -59,11 +60,14 @@ impl RemotePolicy {
     }
 
     /// Connects to the servers for an episode of this task.
-    fn open(&self, task: &Task, most_steps: u32) -> Result<PolicySession<'_>, PlayError> {
+    fn open(&self, spec: &EpisodeSpec) -> Result<PolicySession<'_>, PlayError> {
         let began = Instant::now();
         self.waits().push(began);
-        let session =
-            PolicySession::open(self.protocol, &self.urls, &self.map, instructions(task), most_steps);
+        let session = {
+            let (words, most_steps) =
+                (instructions(spec.task, spec.task_words()), spec.rules().steps_per_command);
+            PolicySession::open(self.protocol, &self.urls, &self.map, words, most_steps)
+        };
         let mut waits = self.waits();
         let own = waits.iter().position(|wait| *wait == began);
         own.map(|index| waits.remove(index));
@@ -108,8 +112,7 @@ impl Policy for RemotePolicy {
 
     fn play_episode(&self, spec: &EpisodeSpec, place: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
         self.check(spec.task).map_err(PlayError::NotReady)?;
-        let most_steps = spec.rules().steps_per_command;
-        let mut session = self.open(spec.task, most_steps)?;
+        let mut session = self.open(spec)?;
         Ok(play_in_process(spec, place, |episode| {
             session.play(episode, EpisodeMoment::number_of(spec.task, spec.seed))
         })?)
@@ -121,12 +124,11 @@ impl Policy for RemotePolicy {
     }
 }
 
-fn instructions(task: &Task) -> TaskInstructions {
-    let robots = task.robots.iter();
+fn instructions(task: &Task, words: TaskWords) -> TaskInstructions {
     TaskInstructions {
         task: task.id.into(),
-        robots: robots.clone().map(|robot| robot.name.into()).collect(),
-        per_robot: robots.map(|robot| robot.instruction.into()).collect(),
-        joint: task.instruction.into(),
+        robots: task.robot_names().map(String::from).collect(),
+        per_robot: words.robots,
+        joint: words.joint,
     }
 }

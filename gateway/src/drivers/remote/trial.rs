@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 use tandem_episodes::{
     CONTROL_HZ, rules,
+    stress::TaskWords,
     tasks::{self, Task},
 };
 use tandem_tools_spec::Protocol;
@@ -54,7 +55,7 @@ struct KeyLine {
 impl<'a> MapTrial<'a> {
     /// Makes up an answer to every request, and reads it as a policy's.
     fn new(map: &'a PolicyMap, task: &'a Task) -> Result<MapTrial<'a>, RemoteError> {
-        let (instructions, robots) = (instructions(task), task.robots.len());
+        let (instructions, robots) = (instructions(task, TaskWords::of(task)), task.robots.len());
         let observation = PolicyObservation::blank(robots);
         let held_rows = observation.held_rows();
         let queries = map.queries(robots);

@@ -14,7 +14,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use tandem_episodes::{EpisodeError, OperatorCall, OperatorCommand};
+use tandem_episodes::{EpisodeError, OperatorCall, OperatorCommand, stress::Silence};
 use tandem_tools_spec::{
     Call, Driving, Finish, GetStatus, Heard, ManageCall, OperatorToken, Partner, PartnerDid, SpecError,
     TalkCall, ToolCall,
@@ -34,6 +34,8 @@ pub struct Team {
     seats: Vec<Seat>,
     patience: Duration,
     talk: bool,
+    /// Whose words do not all reach the others, under stress.
+    silence: Option<Silence>,
     round: Mutex<Round>,
     wheels: Mutex<Wheels>,
 }
@@ -64,6 +66,7 @@ impl Team {
         robots: impl Iterator<Item = &'a str>,
         driving: &Driving,
         collection: Option<&Collection>,
+        silence: Option<Silence>,
     ) -> Result<(Team, Vec<OperatorToken>), HostingError> {
         let (mut seats, mut tokens) = (Vec::new(), Vec::new());
         for robot in robots {
@@ -76,7 +79,7 @@ impl Team {
         let patience = Duration::from_secs_f64(driving.patience_s());
         let (none, under_way) = (seats.iter().map(|_| None).collect(), vec![None; seats.len()]);
         let wheels = Mutex::new(Wheels { seats: none, under_way, ..Wheels::default() });
-        Ok((Team { seats, patience, talk: driving.talk == Some(true), round, wheels }, tokens))
+        Ok((Team { seats, patience, talk: driving.talk == Some(true), silence, round, wheels }, tokens))
     }
 
     /// The robot whose operator has the token `text`; every token is compared.
@@ -141,7 +144,12 @@ impl Team {
         }
         self.round().check_unheard(seat)?;
         let answer = episode.ask(Some(&words.from), call.into_call()).await?;
-        self.round().spread(seat, &words);
+        let mut round = self.round();
+        let said = round.count_said(seat);
+        if self.silence.is_none_or(|silence| silence.lets_hear(seat, said)) {
+            round.spread(seat, &words);
+        }
+        drop(round);
         Ok(self.for_seat(answer, seat))
     }
 

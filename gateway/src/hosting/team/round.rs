@@ -26,6 +26,8 @@ struct Operator {
     /// Steps through which its robot was held without it knowing.
     missed: Option<[u32; 2]>,
     heard: Vec<Heard>,
+    /// How often it has spoken.
+    said: u32,
 }
 
 #[derive(Debug)]
@@ -51,8 +53,13 @@ pub struct Pending {
 impl Round {
     /// The first one, of the operators of `robots`.
     pub fn new(robots: Vec<String>) -> Round {
-        let operator =
-            |robot| Operator { robot, state: OperatorState::Thinking, missed: None, heard: Vec::new() };
+        let operator = |robot| Operator {
+            robot,
+            state: OperatorState::Thinking,
+            missed: None,
+            heard: Vec::new(),
+            said: 0,
+        };
         Round { operators: robots.into_iter().map(operator).collect(), number: 0, patience: None }
     }
 
@@ -175,6 +182,13 @@ impl Round {
             }
             None => Ok(()),
         }
+    }
+
+    /// Counts what the operator on `seat` says, and returns how often it had spoken before.
+    pub fn count_said(&mut self, seat: usize) -> u32 {
+        let said = &mut self.operators[seat].said;
+        *said += 1;
+        *said - 1
     }
 
     /// Lets all but the operator on `from` hear what it said.

@@ -71,6 +71,10 @@ impl Collision {
         self.surfaces.iter().map(|surface| &surface.collider)
     }
 
+    pub fn colliders_mut(&mut self) -> impl Iterator<Item = &mut Collider> {
+        self.surfaces.iter_mut().map(|surface| &mut surface.collider)
+    }
+
     /// Collects what touches, or will within the step.
     pub fn detect(&mut self, trees: &Trees, settings: &Settings) {
         self.place(trees, settings);

@@ -44,12 +44,28 @@ pub struct Friction {
     /// Moment about a tangent per normal force.
     pub roll_m: f64,
     pub priority: i32,
+    /// What the state of the surface leaves of friction with whatever touches it: 1 as it is made, less where it is wet or greasy.
+    pub left: f64,
 }
 
 impl Friction {
-    /// What acts between two colliders: the values of the one with the higher priority, else the larger of each.
+    /// What acts between two colliders: the values of the one with the higher priority, else the larger of each; and of these, what
+    /// both surfaces leave.
     /// Source: MuJoCo, "Contact parameters" in the chapter on modelling.
     pub fn between(a: &Friction, b: &Friction) -> Friction {
+        let Friction { directions, slide, spin_m, roll_m, priority, .. } = Friction::as_made(a, b);
+        let left = a.left * b.left;
+        Friction {
+            directions,
+            slide: slide * left,
+            spin_m: spin_m * left,
+            roll_m: roll_m * left,
+            priority,
+            left: 1.0,
+        }
+    }
+
+    fn as_made(a: &Friction, b: &Friction) -> Friction {
         match a.priority.cmp(&b.priority) {
             std::cmp::Ordering::Greater => *a,
             std::cmp::Ordering::Less => *b,
@@ -59,6 +75,7 @@ impl Friction {
                 spin_m: a.spin_m.max(b.spin_m),
                 roll_m: a.roll_m.max(b.roll_m),
                 priority: a.priority,
+                left: 1.0,
             },
         }
     }

@@ -156,7 +156,7 @@ pub fn hinge(direction: DVec3) -> Joint {
 }
 
 pub fn sliding(slide: f64) -> Friction {
-    Friction { directions: Directions::Slide, slide, spin_m: 0.0, roll_m: 0.0, priority: 0 }
+    Friction { directions: Directions::Slide, slide, spin_m: 0.0, roll_m: 0.0, priority: 0, left: 1.0 }
 }
 
 /// Numbers in -1..1, the same every time.

@@ -62,7 +62,14 @@ fn dynamics_sliding_distance() {
 }
 
 fn rolling(roll_m: f64) -> Friction {
-    Friction { directions: Directions::SlideSpinRoll, slide: 0.8, spin_m: 0.0, roll_m, priority: 0 }
+    Friction {
+        directions: Directions::SlideSpinRoll,
+        slide: 0.8,
+        spin_m: 0.0,
+        roll_m,
+        priority: 0,
+        left: 1.0,
+    }
 }
 
 /// A ball that rolls at 0.5 m/s; gives how far it gets in `time_s` and how fast it still is.
@@ -120,8 +127,14 @@ fn dynamics_ball_rolls_down_a_slope() {
 #[test]
 fn dynamics_torsional_friction_stops_a_top() {
     let spin_m = 0.003;
-    let friction =
-        Friction { directions: Directions::SlideSpin, slide: 0.8, spin_m, roll_m: 0.0, priority: 0 };
+    let friction = Friction {
+        directions: Directions::SlideSpin,
+        slide: 0.8,
+        spin_m,
+        roll_m: 0.0,
+        priority: 0,
+        left: 1.0,
+    };
     let mut bench = Bench::with_floor(DOWN, friction);
     let ball = bench.add_ball(0.3, 0.05, DVec3::new(0.0, 0.0, 0.05), friction);
     bench.run_s(0.1);
@@ -162,20 +175,31 @@ fn dynamics_disc_stops_spinning() {
 /// MJCF's rule: the higher priority wins, else the larger of each.
 #[test]
 fn dynamics_friction_of_a_pair() {
-    let floor =
-        Friction { directions: Directions::Slide, slide: 1.0, spin_m: 0.0, roll_m: 0.0001, priority: 0 };
+    let floor = Friction {
+        directions: Directions::Slide,
+        slide: 1.0,
+        spin_m: 0.0,
+        roll_m: 0.0001,
+        priority: 0,
+        left: 1.0,
+    };
     let ball = Friction {
         directions: Directions::SlideSpinRoll,
         slide: 0.4,
         spin_m: 0.01,
         roll_m: 0.0,
         priority: 0,
+        left: 1.0,
     };
     let both = Friction::between(&floor, &ball);
     assert_eq!(both.lanes(), [1.0, 1.0, 1.0, 0.01, 0.0001, 0.0001]);
     let sole = Friction { slide: 0.6, priority: 1, ..floor };
     assert_eq!(Friction::between(&sole, &ball), sole);
     assert_eq!(Friction::between(&ball, &sole), sole);
+    // What a surface leaves it leaves of whatever acts, whoever's numbers count.
+    let greasy = Friction { left: 0.5, ..ball };
+    assert_eq!(Friction::between(&greasy, &sole), Friction { slide: 0.3, roll_m: 0.00005, ..sole });
+    assert_eq!(Friction::between(&greasy, &greasy).lanes(), [1.0, 0.1, 0.1, 0.0025, 0.0, 0.0]);
 }
 
 #[test]

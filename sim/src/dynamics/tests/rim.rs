@@ -83,6 +83,7 @@ fn dynamics_bottle_on_its_rim_comes_to_rest() {
         spin_m: 0.00001,
         roll_m: 0.0003,
         priority: 0,
+        left: 1.0,
     };
     for rock in ROCKS {
         let (mut bench, tree) = rocking(rock, friction);

@@ -16,6 +16,7 @@ use std::thread;
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::Step;
+use crate::render::blur::blurred;
 use crate::render::scene::prepared::Prepared;
 use crate::render::{Camera, Frame, PlacedScenery, Renderer, Scenery};
 use contact::ContactMap;
@@ -182,7 +183,7 @@ impl WithSimd for PictureDrawing<'_> {
         let mut frame = Frame {
             width: camera.width,
             height: camera.height,
-            rgb: view.rgb(row, srgb),
+            rgb: blurred(view.rgb(row, srgb), camera),
             depth_m: Vec::new(),
             ids: Vec::new(),
         };

@@ -7,8 +7,8 @@ use super::contact::ContactMap;
 use super::shadow::ShadowMap;
 use crate::render::scene::prepared::{Prepared, Sheet};
 use crate::render::shading::lanes::{Affine, LANES, Lanes, axes, lanes};
-use crate::render::shading::{CONTACT, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, SAMPLES, SUN, TO_SUN};
-use crate::render::{Camera, Carrier, Pattern, PlacedScenery};
+use crate::render::shading::{CONTACT, HIGHLIGHT, LAMP, SAMPLES};
+use crate::render::{Camera, Carrier, Light, Pattern, PlacedScenery};
 
 /// So many points are shaded together: enough for a loop to be worth its beginning, few enough to stay near the processor.
 pub(super) const BATCH: usize = 64;
@@ -234,10 +234,10 @@ impl Surfaces {
 
     /// Adds the linear colours of all that were pushed to their pixels; then they are forgotten.
     #[inline(always)]
-    pub(super) fn shade(&mut self, shadow: &ShadowMap, sum_rgb: &mut [[f32; 3]]) {
+    pub(super) fn shade(&mut self, light: &Light, shadow: &ShadowMap, sum_rgb: &mut [[f32; 3]]) {
         let count = std::mem::take(&mut self.count);
         for at in (0..count).step_by(LANES) {
-            self.face(at, shadow);
+            self.face(at, light, shadow);
         }
         for i in 0..count {
             let texel = axes(
@@ -248,7 +248,7 @@ impl Surfaces {
                 if self.sun_factor[i] > 0.0 { shadow.sunlit(texel, self.cell[i]) } else { 0.0 };
         }
         for at in (0..count).step_by(LANES) {
-            let colours = self.light(at);
+            let colours = self.lit(at, light);
             for i in 0..LANES.min(count - at) {
                 let sum = &mut sum_rgb[self.pixels[at + i] as usize];
                 *sum = axes(
@@ -261,7 +261,7 @@ impl Surfaces {
 
     /// How points face what they are lit by.
     #[inline(always)]
-    fn face(&mut self, at: usize, shadow: &ShadowMap) {
+    fn face(&mut self, at: usize, light: &Light, shadow: &ShadowMap) {
         let (ray, normal) = (self.ray.block(at), self.normal.block(at));
         let per_ray: Lanes = lanes(|i| -1.0 / dot(&ray, &ray, i).sqrt());
         let per_normal: Lanes = lanes(|i| 1.0 / dot(&normal, &normal, i).sqrt());
@@ -271,7 +271,7 @@ impl Surfaces {
             #[inline(always)]
             |axis| lanes(|i| normal[axis][i] * outwards[i]),
         );
-        let sun = TO_SUN.to_array();
+        let sun = light.sun_direction.to_array();
         let half_way: [Lanes; 3] = axes(
             #[inline(always)]
             |axis| lanes(|i| ray[axis][i] * per_ray[i] + sun[axis]),
@@ -293,7 +293,7 @@ impl Surfaces {
 
     /// Adds up the light, as far as the points count.
     #[inline(always)]
-    fn light(&self, at: usize) -> [Lanes; 3] {
+    fn lit(&self, at: usize, light: &Light) -> [Lanes; 3] {
         let (albedo, normal) = (self.albedo.block(at), self.normal.block(at));
         let (eye_factor, highlight) = (block(&self.eye_factor, at), block(&self.highlight_factor, at));
         let (sun_factor, sunlit) = (block(&self.sun_factor, at), block(&self.sunlit_share, at));
@@ -301,7 +301,7 @@ impl Surfaces {
         axes(
             #[inline(always)]
             |axis| {
-                let (below, above, sun) = (FROM_BELOW[axis], FROM_ABOVE[axis], SUN[axis]);
+                let (below, above, sun) = (light.below_rgb[axis], light.above_rgb[axis], light.sun_rgb[axis]);
                 lanes(|i| {
                     let ambient = below + (above - below) * (normal[2][i] * 0.5 + 0.5);
                     let unlit = albedo[axis][i] * (ambient + LAMP * eye_factor[i]);

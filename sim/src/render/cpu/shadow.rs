@@ -8,8 +8,8 @@ use rapier3d::math::Vector;
 use super::raster::{Grid, Outlines, SampleRows, TriangleBatch, larger, smaller, whole_f32};
 use crate::render::scene::prepared::Prepared;
 use crate::render::shading::lanes::{Affine, LANES, Lanes, axes, lanes};
-use crate::render::shading::{BIAS_M, FADE_TEXELS, NORMAL_OFFSET_M, TEXELS, TO_SUN, sun_map};
-use crate::render::{Carrier, PlacedScenery};
+use crate::render::shading::{BIAS_M, FADE_TEXELS, NORMAL_OFFSET_M, TEXELS, sun_map};
+use crate::render::{Carrier, PlacedScenery, Scenery};
 
 /// Texels along each side of a cell: what is nearer than all of a cell is in the sun there, without a look at its texels.
 const CELL: usize = 8;
@@ -58,7 +58,8 @@ impl ShadowMap {
     pub(super) fn draw<S: Simd>(&mut self, simd: S, prepared: &Prepared, placed: &PlacedScenery) {
         if self.focus_m != Some(placed.focus_m) {
             self.focus_m = Some(placed.focus_m);
-            self.map_from_world = sun_map(placed.focus_m, prepared.scenery.focus_radius_m);
+            let Scenery { light, focus_radius_m, .. } = &prepared.scenery;
+            self.map_from_world = sun_map(light.sun_direction, placed.focus_m, *focus_radius_m);
             self.still.nearness_m.reset(GRID, 0.0);
             self.still.cells_m.resize(CELLS * CELLS + 1, [f32::NEG_INFINITY; 2]);
             self.moving = vec![NO_CELLS; CELLS];
@@ -100,7 +101,8 @@ impl ShadowMap {
                 *range = range.start.min(columns.start)..range.end.max(columns.end);
             }
             prepared.points[number].map_into(&mut self.corners, |block| map_from_mesh.map_lanes(block));
-            let to_sun = placed.world_from_mesh[number].rotation.inverse() * TO_SUN;
+            let to_sun =
+                placed.world_from_mesh[number].rotation.inverse() * prepared.scenery.light.sun_direction;
             prepared.faces[number].put_front(&mut self.front, [to_sun.x, to_sun.y, to_sun.z, 0.0]);
             for triangle in &self.front {
                 let corners =

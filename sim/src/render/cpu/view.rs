@@ -61,7 +61,7 @@ impl View<'_> {
         let mut x = 0;
         while x < row.sum_rgb.len() {
             if row.surfaces.room() < PER_PIXEL {
-                row.surfaces.shade(self.shadow, &mut row.sum_rgb);
+                row.surfaces.shade(&self.prepared.scenery.light, self.shadow, &mut row.sum_rgb);
             }
             if !plain(&row.edges, x) {
                 self.mixed(row, [x, y], rows);
@@ -74,7 +74,7 @@ impl View<'_> {
             self.show(row, x..end, [x * SAMPLES, y * SAMPLES], rows[0][x * SAMPLES], 1.0);
             x = end;
         }
-        row.surfaces.shade(self.shadow, &mut row.sum_rgb);
+        row.surfaces.shade(&self.prepared.scenery.light, self.shadow, &mut row.sum_rgb);
     }
 
     /// Neighbouring pixels that one sheet covers, or a share of them, seen where the first one's `sample` is.

@@ -18,6 +18,7 @@ use wgpu::{
 };
 
 use crate::Step;
+use crate::render::blur::blurred;
 use crate::render::cpu::contact::ContactMap;
 use crate::render::scene::prepared::{NOTHING, Prepared};
 use crate::render::{Camera, Frame, PlacedScenery, Renderer, Scenery, cpu};
@@ -106,7 +107,7 @@ impl GpuRenderer {
         self.gpu.queue.submit([encoder.finish()]);
         let frame = self.read(&targets)?;
         self.targets = Some(targets);
-        Ok(frame)
+        Ok(Frame { rgb: blurred(frame.rgb, camera), ..frame })
     }
 
     /// All that the device does for a picture.

@@ -18,6 +18,11 @@ struct View {
     scale: vec4f,
     // Of the map of contacts: world coordinates of its corner, and texels per metre.
     contact: vec4f,
+    // What lights the scenery, as `Light` in `shading/mod.rs` has it.
+    sun: vec4f,
+    to_sun: vec4f,
+    from_below: vec4f,
+    from_above: vec4f,
 }
 
 struct Part {
@@ -213,16 +218,16 @@ fn colour(triangle: u32, ray: vec3f) -> vec3f {
     let towards_eye = dot(outwards, eye_direction);
     let normal = outwards * select(1.0, -1.0, towards_eye < 0.0);
     let base = albedo(part, point_m);
-    let ambient = mix(FROM_BELOW, FROM_ABOVE, normal.z * 0.5 + 0.5);
+    let ambient = mix(view.from_below.xyz, view.from_above.xyz, normal.z * 0.5 + 0.5);
     let unlit = base * (ambient + LAMP * abs(towards_eye));
     let open = select(1.0, 1.0 - CONTACT * darkness(point_m), part.flags.z != 0u);
-    let facing_sun = dot(normal, TO_SUN);
+    let facing_sun = dot(normal, view.to_sun.xyz);
     if facing_sun <= 0.0 {
         return unlit * open;
     }
-    let half_way = normalize(eye_direction + TO_SUN);
+    let half_way = normalize(eye_direction + view.to_sun.xyz);
     let highlight = HIGHLIGHT * pow(max(dot(normal, half_way), 0.0), 40.0);
-    return (unlit + (base * SUN + highlight) * (facing_sun * sunlit(point_m, normal))) * open;
+    return (unlit + (base * view.sun.xyz + highlight) * (facing_sun * sunlit(point_m, normal))) * open;
 }
 
 fn ray_at(sample: vec2u) -> vec3f {

@@ -3,7 +3,7 @@
 use rapier3d::math::{Pose, Vector};
 
 use crate::render::cpu::CpuRenderer;
-use crate::render::{Camera, Carrier, Frame, Part, Pattern, PlacedScenery, Scenery, TriangleMesh};
+use crate::render::{Camera, Carrier, Frame, Light, Part, Pattern, PlacedScenery, Scenery, TriangleMesh};
 
 const SIDE_PX: u32 = 64;
 /// So large a share of the pixels may show another thing: on edges, renderers may decide otherwise.
@@ -24,7 +24,7 @@ pub fn scenery() -> Scenery {
     };
     let floor = part(TriangleMesh::plane([1.0, 1.0]), [0.8, 0.7, 0.6], Pattern::Checker([0.5, 0.4, 0.4]), 1);
     let ball = part(TriangleMesh::sphere(0.2), [0.7, 0.2, 0.2], Pattern::Plain, 2);
-    Scenery { parts: vec![floor, ball], focus_radius_m: 1.0 }
+    Scenery { parts: vec![floor, ball], focus_radius_m: 1.0, light: Light::default() }
 }
 
 pub fn placed() -> PlacedScenery {
@@ -39,6 +39,7 @@ pub fn camera() -> Camera {
         vertical_fov_rad: 1.0,
         width: SIDE_PX,
         height: SIDE_PX,
+        blur_px: 0.0,
     }
 }
 

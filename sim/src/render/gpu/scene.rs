@@ -13,7 +13,7 @@ use crate::render::shading::{CONTACT_TEXELS, SAMPLES, sun_map};
 use crate::render::{Camera, Carrier, Part, Pattern, PlacedScenery};
 
 /// Numbers in `picture.wgsl`'s `View`, and in its `Part`.
-const VIEW_NUMBERS: usize = 48;
+const VIEW_NUMBERS: usize = 64;
 const PART_NUMBERS: usize = 24;
 
 /// What `picture.wgsl` calls its group 0.
@@ -73,7 +73,8 @@ impl SceneBuffers {
         let sample = 1.0 / (camera.focal_px() * SAMPLES as f32);
         let (width, height) = (camera.width as f32, camera.height as f32);
         let direction = |axis: Vector| [axis.x, axis.y, axis.z, 0.0];
-        let map = sun_map(placed.focus_m, prepared.scenery.focus_radius_m);
+        let light = &prepared.scenery.light;
+        let map = sun_map(light.sun_direction, placed.focus_m, prepared.scenery.focus_radius_m);
         let [column, row, nearness] = map.0.map(|(axis, constant)| [axis.x, axis.y, axis.z, constant]);
         let [x_m, y_m] = contact.corner_m;
         let numbers: [[f32; 4]; VIEW_NUMBERS / 4] = [
@@ -89,6 +90,10 @@ impl SceneBuffers {
             nearness,
             [2.0 * camera.focal_px() / width, 2.0 * camera.focal_px() / height, width, height],
             [x_m, y_m, contact.texels_per_m, 0.0],
+            direction(light.sun_rgb),
+            direction(light.sun_direction),
+            direction(light.below_rgb),
+            direction(light.above_rgb),
         ];
         gpu.queue.write_buffer(&self.view, 0, &bytes(&bits(numbers.as_flattened())));
     }

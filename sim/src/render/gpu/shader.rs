@@ -10,8 +10,8 @@ use crate::render::shading::pattern::{
     WORD_STRAY, WORDS_PER_M,
 };
 use crate::render::shading::{
-    BIAS_M, CONTACT, CONTACT_TEXELS, FADE_TEXELS, FROM_ABOVE, FROM_BELOW, HIGHLIGHT, LAMP, NORMAL_OFFSET_M,
-    OUTLINE, OUTLINE_DEPTH_STEP, SKY, SRGB_STEPS, SUN, SUN_DISTANCE_M, TEXELS, TO_SUN,
+    BIAS_M, CONTACT, CONTACT_TEXELS, FADE_TEXELS, HIGHLIGHT, LAMP, NORMAL_OFFSET_M, OUTLINE,
+    OUTLINE_DEPTH_STEP, SKY, SRGB_STEPS, SUN_DISTANCE_M, TEXELS,
 };
 
 pub(super) fn text() -> String {
@@ -39,19 +39,11 @@ pub(super) fn text() -> String {
         ("OUTLINE_DEPTH_STEP", OUTLINE_DEPTH_STEP),
         ("SRGB_STEPS", SRGB_STEPS as f32),
     ];
-    let vectors = [
-        ("SUN", SUN),
-        ("TO_SUN", TO_SUN),
-        ("FROM_BELOW", FROM_BELOW),
-        ("FROM_ABOVE", FROM_ABOVE),
-        ("SKY", SKY),
-    ];
+    let Vector { x, y, z } = SKY;
+    let sky = format!("const SKY = vec3f({x:?}f, {y:?}f, {z:?}f);\n");
     let number = |(name, value): (&str, f32)| format!("const {name} = {value:?}f;\n");
-    let vector = |(name, Vector { x, y, z }): (&str, Vector)| {
-        format!("const {name} = vec3f({x:?}f, {y:?}f, {z:?}f);\n")
-    };
     let bits = format!("const NOTHING = {NOTHING}u;\nconst INFINITY_BITS = {}u;\n", f32::INFINITY.to_bits());
     let texels = format!("const CONTACT_TEXELS = {CONTACT_TEXELS}u;\nconst SINK_M = {SINK_M:?}f;\n");
-    let constants = numbers.map(number).into_iter().chain(vectors.map(vector)).chain([bits, texels]);
+    let constants = numbers.map(number).into_iter().chain([sky, bits, texels]);
     constants.chain([include_str!("picture.wgsl").into()]).collect()
 }

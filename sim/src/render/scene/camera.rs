@@ -12,6 +12,16 @@ pub struct Camera {
     pub vertical_fov_rad: f32,
     pub width: u32,
     pub height: u32,
+    /// How far its colours are blurred: the standard deviation of what a point is spread over, in pixels. Depth stays sharp.
+    pub blur_px: f32,
+}
+
+/// How the camera in a robot's head differs from what the robot's file says, which is all that the robot knows of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LensFlaw {
+    /// From where it is to where it ought to be.
+    pub camera_from_lens: Pose,
+    pub blur_px: f32,
 }
 
 /// What a picture's pixels mean, without distortion, as other libraries count: the centre of pixel (0, 0) lies at (0, 0), so a
@@ -61,7 +71,7 @@ pub const NEAR_M: f32 = 0.01;
 #[derive(Clone, Debug)]
 pub struct Cameras {
     /// The camera in each robot's head, by robot.
-    heads: Vec<MjcfCamera>,
+    heads: Vec<(MjcfCamera, LensFlaw)>,
     third_person: Camera,
 }
 
@@ -69,6 +79,11 @@ pub struct Cameras {
 const FALLBACK_EYE_M: Vector = Vector::new(0.4, -2.4, 1.6);
 const FALLBACK_TARGET_M: Vector = Vector::new(0.4, 0.0, 0.8);
 const THIRD_PERSON: &str = "third_person";
+
+impl LensFlaw {
+    /// That of a camera that is as its file says.
+    pub const NONE: LensFlaw = LensFlaw { camera_from_lens: Pose::IDENTITY, blur_px: 0.0 };
+}
 
 impl Camera {
     /// What this camera's pixels mean to others.
@@ -115,15 +130,28 @@ impl Cameras {
                 vertical_fov_rad: 50f32.to_radians(),
                 width: 640,
                 height: 480,
+                blur_px: 0.0,
             },
         };
-        let heads = world.robots().iter().map(|robot| robot.model.egocentric.clone()).collect();
-        Cameras { heads, third_person }
+        let heads = world.robots().iter().map(|robot| (robot.model.egocentric.clone(), LensFlaw::NONE));
+        Cameras { heads: heads.collect(), third_person }
+    }
+
+    /// Gives the camera in the head of robot number `robot` another lens.
+    pub fn set_lens(&mut self, robot: usize, lens: LensFlaw) {
+        self.heads[robot].1 = lens;
     }
 
     /// The camera in a robot's head, as `step` left it.
     pub fn egocentric(&self, step: &Step, robot: usize) -> Camera {
-        camera(&self.heads[robot], step.robots[robot].truth.world_from_camera)
+        let (head, lens) = &self.heads[robot];
+        let world_from_camera = step.robots[robot].truth.world_from_camera;
+        match *lens == LensFlaw::NONE {
+            true => camera(head, world_from_camera),
+            false => {
+                Camera { blur_px: lens.blur_px, ..camera(head, world_from_camera * lens.camera_from_lens) }
+            }
+        }
     }
 
     /// The scene's camera that sees all robots.
@@ -134,7 +162,7 @@ impl Cameras {
 
 fn camera(source: &MjcfCamera, world_from_camera: Pose) -> Camera {
     let (width, height) = source.resolution_px;
-    Camera { world_from_camera, vertical_fov_rad: source.vertical_fov_rad, width, height }
+    Camera { world_from_camera, vertical_fov_rad: source.vertical_fov_rad, width, height, blur_px: 0.0 }
 }
 
 fn look_at(eye_m: Vector, target_m: Vector) -> Pose {

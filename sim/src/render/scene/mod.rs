@@ -9,7 +9,7 @@ pub mod prepared;
 use rapier3d::math::{Pose, Vector};
 
 use crate::mjcf::{Geom, Primitive};
-use crate::render::{Pattern, TriangleMesh};
+use crate::render::{Light, Pattern, TriangleMesh};
 use crate::{Step, World};
 
 /// Shapes and colours of a world, made once.
@@ -18,6 +18,7 @@ pub struct Scenery {
     pub parts: Vec<Part>,
     /// Shadows are drawn within this distance of [`PlacedScenery::focus_m`]: the smaller, the sharper.
     pub focus_radius_m: f32,
+    pub light: Light,
 }
 
 /// One mesh that moves with its carrier.
@@ -89,7 +90,7 @@ impl Scenery {
             let carrier = Carrier::Object(object);
             parts.extend(drawn(&model.geoms).map(|geom| part(geom, carrier, geom.rgba, id)));
         }
-        Scenery { parts, focus_radius_m: FOCUS_RADIUS_M }
+        Scenery { parts, focus_radius_m: FOCUS_RADIUS_M, light: Light::default() }
     }
 
     /// Where `step`, a step of the world that this is the scenery of, has put every part.

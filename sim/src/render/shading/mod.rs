@@ -11,12 +11,30 @@ use lanes::Affine;
 /// Samples a pixel along each axis; a power of two, so that dividing by it is exact.
 pub const SAMPLES: usize = 2;
 
-pub const SUN: Vector = Vector::new(0.80, 0.77, 0.72);
-/// Direction to the sun; high, so that hands over a counter cast their shadow on it.
-pub const TO_SUN: Vector = Vector::new(-0.306_186_2, 0.353_553_4, 0.883_883_5);
-/// Light of the sky, on what faces down and on what faces up.
-pub const FROM_BELOW: Vector = Vector::new(0.20, 0.19, 0.18);
-pub const FROM_ABOVE: Vector = Vector::new(0.40, 0.42, 0.45);
+/// What lights a scenery, as linear colours: a sun with shadows, and a sky.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    pub sun_rgb: Vector,
+    /// Direction to the sun, a unit vector that does not point straight up.
+    pub sun_direction: Vector,
+    /// Light of the sky on what faces down.
+    pub below_rgb: Vector,
+    /// Light of the sky on what faces up.
+    pub above_rgb: Vector,
+}
+
+impl Default for Light {
+    fn default() -> Light {
+        Light {
+            sun_rgb: Vector::new(0.80, 0.77, 0.72),
+            // High, so that hands over a counter cast their shadow on it.
+            sun_direction: Vector::new(-0.306_186_2, 0.353_553_4, 0.883_883_5),
+            below_rgb: Vector::new(0.20, 0.19, 0.18),
+            above_rgb: Vector::new(0.40, 0.42, 0.45),
+        }
+    }
+}
+
 /// A faint lamp at the camera.
 pub const LAMP: f32 = 0.15;
 /// The sun's reflection: its strength where a surface mirrors the sun to the camera. The exponent of the cosine is 40.
@@ -49,13 +67,14 @@ pub const CONTACT: f32 = 0.5;
 /// Steps of the table from linear light to sRGB bytes.
 pub const SRGB_STEPS: usize = 4096;
 
-/// Maps points of the world to the shadow's map around a focus: column and row, counted from its corner, and nearness.
-pub fn sun_map(focus_m: Vector, radius_m: f32) -> Affine {
+/// Maps points of the world to the map of the shadows of a sun that stands in the direction `sun_direction`, around a focus: column and row,
+/// counted from its corner, and nearness.
+pub fn sun_map(sun_direction: Vector, focus_m: Vector, radius_m: f32) -> Affine {
     let half = 0.5 * TEXELS as f32;
-    let right = Vector::Z.cross(TO_SUN).normalize() * (half / radius_m);
-    let down = TO_SUN.cross(right) * -1.0;
+    let right = Vector::Z.cross(sun_direction).normalize() * (half / radius_m);
+    let down = sun_direction.cross(right) * -1.0;
     let about_focus = |axis: Vector, at_focus: f32| (axis, at_focus - axis.dot(focus_m));
-    Affine([about_focus(right, half), about_focus(down, half), about_focus(TO_SUN, SUN_DISTANCE_M)])
+    Affine([about_focus(right, half), about_focus(down, half), about_focus(sun_direction, SUN_DISTANCE_M)])
 }
 
 /// sRGB, as files have it, to linear light.

@@ -26,6 +26,7 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> EvaluationPlan<'static> {
         disclosure: Disclosure::Live,
         hints: Hints::On,
         variation: Variation::default(),
+        stress: None,
         thinking_limit_s: None,
         renderer: RendererKind::Cpu,
         tasks: vec![handover],

@@ -41,6 +41,7 @@ fn solve(tasks: Vec<&'static Task>, may_fail: usize) {
         disclosure: Assistance::Paper.disclosure(),
         hints: Assistance::Paper.hints(),
         variation: Variation::default(),
+        stress: None,
         thinking_limit_s: None,
         renderer: RendererKind::Cpu,
         tasks: tasks.clone(),

@@ -22,6 +22,7 @@ fn played(task: &'static Task) -> Vec<(PhaseTimes, String)> {
         disclosure: Assistance::Paper.disclosure(),
         hints: Assistance::Paper.hints(),
         variation: Variation::default(),
+        stress: None,
         thinking_limit_s: None,
         renderer: RendererKind::Cpu,
         tasks: vec![task],

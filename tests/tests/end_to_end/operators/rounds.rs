@@ -3,6 +3,8 @@
 use std::sync::mpsc;
 
 use serde_json::{Value, json};
+use tandem::settings::Layer;
+use tandem_episodes::stress::{StressAxis, StressLevel};
 use tandem_tests::TestServer;
 
 use super::team::Team;
@@ -183,6 +185,25 @@ fn operators_talk_where_they_may() {
     let said: Vec<_> = calls.iter().filter(|call| call.tool == "say").collect();
     assert_eq!((said.len(), said[1].operator.as_deref()), (2, Some("A")));
     assert_eq!(said[1].arguments["text"], words[1]);
+}
+
+/// Under the stress `partner` every fifth seed has one robot say nothing: what it says is recorded, and nobody hears it.
+#[test]
+fn a_silent_partner_is_not_heard() {
+    let stress = (Some(StressAxis::Partner), Some(StressLevel::Three));
+    let server = || TestServer::with(Layer { stress: stress.0, level: stress.1, ..Layer::default() });
+    let heard = |seed: u32| {
+        let team = Team::on(server(), seed, json!({ "talk": true, "patience_s": 0.1 }));
+        let heard = [0, 1].map(|robot| {
+            team.ask(robot, "say", json!({ "text": "I lift it." })).ok();
+            names(&team.ask(1 - robot, "get_status", json!({})).ok()["heard"], "from").len()
+        });
+        let (_, recording) = team.verified();
+        let calls = recording.tool_calls().expect("its calls");
+        assert_eq!(calls.iter().filter(|call| call.tool == "say").count(), 2);
+        heard.iter().sum::<usize>()
+    };
+    assert_eq!((heard(2004), heard(2000)), (1, 2));
 }
 
 #[test]

@@ -14,9 +14,13 @@ pub struct Team {
 impl Team {
     /// Starts Handover, seed 0, with these fields beside the task.
     pub fn start(fields: Value) -> Team {
-        let server = TestServer::start();
+        Team::on(TestServer::start(), 0, fields)
+    }
+
+    /// The same on a server, with another seed.
+    pub fn on(server: TestServer, seed: u32, fields: Value) -> Team {
         let mut body =
-            json!({ "task": "handover", "seed": 0, "protocol": "benchmark", "operators": "per_robot" });
+            json!({ "task": "handover", "seed": seed, "protocol": "benchmark", "operators": "per_robot" });
         body.as_object_mut().expect("an object").extend(fields.as_object().cloned().unwrap_or_default());
         let started = server.post("/v1/episodes", &body).ok();
         let tokens = ["A", "B"].map(|robot| {

@@ -23,6 +23,7 @@ pub fn plan(player: &dyn Policy, seeds: Vec<u32>, record: bool) -> EvaluationPla
         disclosure: Assistance::Paper.disclosure(),
         hints: Assistance::Paper.hints(),
         variation: Variation::default(),
+        stress: None,
         thinking_limit_s: None,
         renderer: RendererKind::Cpu,
         tasks: vec![tasks::find("handover").expect("a task")],

@@ -44,7 +44,7 @@ pub struct FilmContent {
 
 /// Two places for each task that was played; in each, the first episode of the first policy that has one and its recording.
 pub fn film_places(loaded: &LoadedEpisodes) -> Vec<FilmPlace> {
-    let groups = groups(&loaded.episodes);
+    let groups = groups(loaded.episodes.iter());
     let episodes: Vec<(&str, &FoundEpisode)> = groups
         .iter()
         .flat_map(|group| group.episodes.iter().map(|found| (group.name.as_str(), *found)))

@@ -37,7 +37,7 @@ pub fn gallery(loaded: &LoadedEpisodes, most: usize) -> Vec<Failure> {
 
 /// How many failures have a picture.
 pub fn pictured_failures(loaded: &LoadedEpisodes) -> usize {
-    let failures = groups(&loaded.episodes);
+    let failures = groups(loaded.episodes.iter());
     failures.iter().flat_map(failed).filter(|found| found.strip.is_some()).count()
 }
 

@@ -3,11 +3,13 @@
 pub mod films;
 pub mod gallery;
 mod plot;
+mod stress;
 
 use super::EvaluationReport;
 use super::policy::PolicyReport;
 use super::rate::percent;
-use super::tables::{self, Table};
+use super::table::Table;
+use super::tables;
 use crate::html::{self, escape};
 use crate::results::PhaseLevel;
 use films::Film;
@@ -36,6 +38,7 @@ pub fn html(report: &EvaluationReport, pictures: &ReportPictures) -> String {
 <h2>How far episodes got</h2>
 {legend}
 <div class="plots">{plots}</div>
+{stress}
 {tables}
 {gallery}
 {skipped}"#,
@@ -46,6 +49,7 @@ pub fn html(report: &EvaluationReport, pictures: &ReportPictures) -> String {
         films = films::html(&pictures.films),
         legend = legend(policies),
         plots = tasks(report).iter().map(|task| task_plot(task, policies)).collect::<String>(),
+        stress = stress::html(&report.stress),
         tables = tables::all(report).iter().map(table).collect::<String>(),
         gallery = gallery::html(pictures, policies),
         skipped = skipped(report),

@@ -1,0 +1,58 @@
+//! Episodes that went wrong, to be begun again a little before that.
+
+use std::path::{Path, PathBuf};
+
+use tandem_sim::CONTROL_HZ;
+
+use crate::recording::Recording;
+use crate::reports::{LoadError, load, moment_of_failure};
+use crate::spec::EpisodeSpec;
+
+/// An episode that failed, and when it went wrong.
+#[derive(Clone, Debug)]
+pub struct FailedEpisode {
+    pub spec: EpisodeSpec,
+    /// Its `episode.mcap`.
+    pub recording: PathBuf,
+    /// Simulated time at which it went wrong.
+    pub time_s: f64,
+}
+
+impl FailedEpisode {
+    /// The world's control step that is so many seconds before the episode went wrong.
+    pub fn step_before(&self, before_s: u32) -> u64 {
+        ((self.time_s - f64::from(before_s)).max(0.0) * CONTROL_HZ).round() as u64
+    }
+}
+
+/// The episodes in `folder` that failed and were recorded, and which others failed, and why they cannot be begun again.
+pub fn failed_episodes(folder: &Path) -> Result<(Vec<FailedEpisode>, Vec<String>), LoadError> {
+    let loaded = load(&[folder.to_owned()])?;
+    let (mut failed, mut left_out): (Vec<FailedEpisode>, _) = (Vec::new(), loaded.skipped);
+    for found in loaded.episodes.iter().filter(|found| found.played.counts() && !found.played.succeeded()) {
+        let spec = &found.played.spec;
+        let name = again_name(spec);
+        let mut leave_out = |why: &str| left_out.push(format!("{name}: {why}"));
+        let Some(path) = &found.recording else {
+            leave_out("it was not recorded; play it with --record");
+            continue;
+        };
+        if failed.iter().any(|known| again_name(&known.spec) == name) {
+            leave_out("another failure of the same task, seed and stress is begun again");
+            continue;
+        }
+        // Whoever begins again may be in another folder.
+        let recording = std::path::absolute(path).unwrap_or_else(|_| path.clone());
+        match Recording::read(&recording).and_then(|read| moment_of_failure(&read)) {
+            Ok((time_s, _)) => failed.push(FailedEpisode { spec: spec.clone(), recording, time_s }),
+            Err(error) => leave_out(&error.to_string()),
+        }
+    }
+    Ok((failed, left_out))
+}
+
+/// What an episode's file and folder are called that begins again: failures of one seed may differ in their stress.
+pub(super) fn again_name(spec: &EpisodeSpec) -> String {
+    let stress = spec.stress.map(|stress| format!("-{stress}")).unwrap_or_default();
+    format!("{}-{}{stress}-again", spec.task.id, spec.seed)
+}

@@ -1,0 +1,9 @@
+//! Robots sense with noise, bias and latency: as a real G1 does, then with twice and four times its noise and bias.
+
+use tandem_sim::SensorModel;
+
+use super::StressLevel;
+
+pub fn model(level: StressLevel) -> SensorModel {
+    level.of([SensorModel::G1, SensorModel::G1Twice, SensorModel::G1Fourfold])
+}

@@ -1,0 +1,106 @@
+//! The same task in other words: nearer to what people say, then shorter, then in a roundabout way. Nothing is left out that the task's
+//! own words say of what is to be done, with which hand and by whom.
+
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
+
+use serde::Deserialize;
+
+use super::StressLevel;
+use crate::tasks::Task;
+
+/// What policies are told to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TaskWords {
+    /// For a policy that directs all robots.
+    pub joint: String,
+    /// For policies that direct one each, in the order of the robots.
+    pub robots: Vec<String>,
+}
+
+/// The re-wordings of one task, by level.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Rewording {
+    joint: [String; 3],
+    robots: BTreeMap<String, [String; 3]>,
+}
+
+fn rewordings() -> &'static BTreeMap<String, Rewording> {
+    static READ: OnceLock<BTreeMap<String, Rewording>> = OnceLock::new();
+    READ.get_or_init(|| serde_json::from_str(include_str!("words.json")).expect("the file is tested"))
+}
+
+/// The tasks that there are other words for.
+pub fn reworded_tasks() -> impl Iterator<Item = &'static str> {
+    rewordings().keys().map(String::as_str)
+}
+
+impl TaskWords {
+    /// The task's own.
+    pub fn of(task: &Task) -> TaskWords {
+        TaskWords {
+            joint: task.instruction.into(),
+            robots: task.robots.iter().map(|robot| robot.instruction.into()).collect(),
+        }
+    }
+
+    /// Others; `None` where nobody has worded the task in others.
+    pub fn reworded(task: &Task, level: StressLevel) -> Option<TaskWords> {
+        let Rewording { joint, robots } = rewordings().get(task.id).filter(|_| task.file.is_none())?;
+        let of = |texts: &[String; 3]| level.of(std::array::from_fn(|index| texts[index].clone()));
+        let robot = |name: &str| robots.get(name).map(of);
+        Some(TaskWords { joint: of(joint), robots: task.robot_names().map(robot).collect::<Option<_>>()? })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use crate::tasks;
+
+    /// The share of the words of `own` that are not in `other`.
+    fn new_share(own: &str, other: &str) -> f64 {
+        let words = |text: &str| -> BTreeSet<String> {
+            let letters = |c: char| !c.is_alphanumeric();
+            text.to_lowercase().split(letters).filter(|word| word.len() > 2).map(String::from).collect()
+        };
+        let (own, other) = (words(own), words(other));
+        other.difference(&own).count() as f64 / other.len() as f64
+    }
+
+    fn has(text: &str, word: &str) -> bool {
+        text.split(|c: char| !c.is_alphabetic()).any(|one| one == word)
+    }
+
+    #[test]
+    fn every_role_of_every_task_has_words_that_are_ever_less_its_own() {
+        for task in tasks::ALL {
+            let own = TaskWords::of(task);
+            let levels = StressLevel::ALL.map(|level| TaskWords::reworded(task, level).expect(task.id));
+            let texts = |words: &TaskWords| [vec![words.joint.clone()], words.robots.clone()].concat();
+            let strangeness = levels.each_ref().map(|words| {
+                let pairs = texts(&own).into_iter().zip(texts(words));
+                pairs.map(|(own, other)| new_share(&own, &other)).sum::<f64>()
+            });
+            assert!(
+                strangeness.is_sorted_by(|a, b| a < b) && strangeness[0] > 0.0,
+                "{}: {strangeness:?}",
+                task.id
+            );
+            for words in &levels {
+                assert_eq!(words.robots.len(), task.robots.len());
+                // Partners may face each other, and each has its own side.
+                for (told, robot) in words.robots.iter().zip(task.robots) {
+                    for (side, other) in [("left", "right"), ("right", "left")] {
+                        let asked = has(robot.instruction, side) && !has(robot.instruction, other);
+                        assert!(!asked || has(told, side), "{} {}: {told}", task.id, robot.name);
+                    }
+                }
+            }
+        }
+        assert_eq!(reworded_tasks().count(), tasks::ALL.len());
+    }
+}
