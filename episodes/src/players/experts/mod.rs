@@ -84,6 +84,11 @@ fn has_what_it_needs(task: &Task) -> bool {
     task.robots.len() == own.robots.len() && own.objects.iter().all(has)
 }
 
+/// The task as robots that tell each other nothing take it to be: what the seed has chosen is guessed.
+pub fn guessed(spec: &EpisodeSpec) -> &'static Task {
+    spec.task.under(spec.seed ^ GUESSES)
+}
+
 impl Expert {
     /// The expert of an episode, who demonstrates as its spec says.
     pub fn for_episode(spec: &EpisodeSpec) -> Result<Expert, PlayerError> {
@@ -94,7 +99,7 @@ impl Expert {
     /// The same, where robots tell each other nothing: it takes another draw of the same choices for what the seed has chosen.
     pub fn without_words(spec: &EpisodeSpec) -> Result<Expert, PlayerError> {
         match spec.task.has_choices() {
-            true => Ok(Expert { task: spec.task.under(spec.seed ^ GUESSES), ..Expert::for_episode(spec)? }),
+            true => Ok(Expert { task: guessed(spec), ..Expert::for_episode(spec)? }),
             false => Err(PlayerError::NothingToSay { task: spec.task.id.into() }),
         }
     }
