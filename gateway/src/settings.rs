@@ -1,5 +1,6 @@
 //! Settings: flags first, then environment (`TANDEM_*`), then a TOML file, then defaults.
 
+mod error;
 mod tls;
 
 use std::{
@@ -16,8 +17,7 @@ use clap::{
 use serde::Deserialize;
 use tandem_episodes::{
     BaseLimits, Controller, EpisodeError, EpisodeSpec, Instructions, InstructionsError, RendererKind,
-    SceneFile, Sensing, SensorModel, SimError, StateSource, TaskCheckError, TaskFileError, Visibility,
-    check_task, read_task,
+    SceneFile, Sensing, SensorModel, SimError, StateSource, Visibility, check_task, read_task,
     stress::{Stress, StressAxis, StressLevel},
     task_set,
     tasks::{Task, TaskSet},
@@ -25,6 +25,7 @@ use tandem_episodes::{
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, StartEpisode, Wording};
 
 use crate::token::{Token, TokenError};
+pub use error::SettingsError;
 pub use tls::{Certificate, TlsError};
 
 /// One source of settings; what it leaves out comes from the next. The doc comments are the help text.
@@ -332,83 +333,6 @@ pub struct Settings {
     pub idle_timeout: Duration,
     /// Longest that closing the episodes may take at the end.
     pub stop_timeout: Duration,
-}
-
-/// Why settings cannot be resolved.
-#[derive(Debug, thiserror::Error)]
-pub enum SettingsError {
-    /// The file cannot be read.
-    #[error("cannot read the settings file {path}: {source}")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The token cannot be used.
-    #[error(transparent)]
-    Token(#[from] TokenError),
-    /// A file and the environment both give a token.
-    #[error("both --token-file and TANDEM_TOKEN give a token; give one of them")]
-    TwoTokens,
-    /// HTTPS cannot be served.
-    #[error(transparent)]
-    Tls(#[from] TlsError),
-    /// Other machines would reach a server without a token.
-    #[error(
-        "other machines reach {listen}; give a token that every request has to send, by --token-file FILE or in TANDEM_TOKEN (`openssl rand -hex 32` makes one), or listen on 127.0.0.1"
-    )]
-    Open {
-        /// The address to serve on.
-        listen: SocketAddr,
-    },
-    /// A limit that lets nothing through.
-    #[error("{setting} is 0, and the server could not be used; give at least 1, as {example}")]
-    Zero {
-        /// As files call it.
-        setting: &'static str,
-        /// A number that works.
-        example: &'static str,
-    },
-    /// A level of nothing.
-    #[error("a level says how much of what goes wrong; give stress, too, as camera, or leave level out")]
-    LevelAlone,
-    /// Two settings say in what words tasks are told.
-    #[error("the stress words tells tasks in other words, and so does instructions; give one of them")]
-    TwoWordings,
-    /// What the server is to be reached by is no name.
-    #[error(
-        "allowed_host {name:?} is no name of a host; give it alone, as lab.example, without http:// and port"
-    )]
-    NoHost {
-        /// What was given.
-        name: String,
-    },
-    /// The file with instructions cannot be used.
-    #[error(transparent)]
-    Instructions(#[from] InstructionsError),
-    /// A task's file cannot be used.
-    #[error(transparent)]
-    TaskFile(#[from] TaskFileError),
-    /// A task of a file is well written, and cannot be played.
-    #[error("{path}: {source}")]
-    Task {
-        /// The file.
-        path: PathBuf,
-        /// What happens.
-        source: Box<TaskCheckError>,
-    },
-    /// The scene, the base controller or the renderer cannot be used.
-    #[error(transparent)]
-    Sim(#[from] SimError),
-    /// The file is no TOML, or holds a setting that does not exist.
-    #[error("{path}: {source}")]
-    Parse {
-        /// The file.
-        path: PathBuf,
-        /// Where and what.
-        source: toml::de::Error,
-    },
 }
 
 impl Settings {
