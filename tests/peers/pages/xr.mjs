@@ -84,7 +84,10 @@ const times = ([a, b, c, d], [e, f, g, h]) => [a * e - b * f - c * g - d * h, a 
 const turned = (q, [x, y, z]) => times(times(q, [0, x, y, z]), [q[0], -q[1], -q[2], -q[3]]).slice(1);
 const inHeadset = ([x, y, z]) => [-y, z, -x];
 
-/** Poses in A's pelvis frame of its wrists and of the bottle, as the newest row has them; quaternions are w, x, y, z. */
+/**
+ * Poses in A's pelvis frame of its wrists and of the bottle, and the force on what its right hand touches, as the newest row has them;
+ * quaternions are w, x, y, z.
+ */
 const poses = async () => {
   const { row, head } = await page.evaluate(() => ({ row: window.row, head: window.head }));
   const links = head.robots.map((robot) => 7 * robot.links);
@@ -94,7 +97,7 @@ const poses = async () => {
   const pelvis = read(5);
   const back = [pelvis.turn[0], ...pelvis.turn.slice(1).map((value) => -value)];
   const local = ({ position, turn }) => ({ position: turned(back, position.map((value, axis) => value - pelvis.position[axis])), turn: times(back, turn) });
-  return { pelvis, left: local(read(hands)), right: local(read(hands + 23)), bottle: local(read(objects + 7 * head.objects.indexOf("bottle"))), time_s: row[2] };
+  return { pelvis, left: local(read(hands)), right: local(read(hands + 23)), bottle: local(read(objects + 7 * head.objects.indexOf("bottle"))), time_s: row[2], contact_n: Math.hypot(...row.slice(hands + 43, hands + 46)) };
 };
 const controls = {};
 /** Moves and turns a controller from where its squeeze began, a little at a time, as an arm does. */
@@ -184,8 +187,7 @@ const near = await poses();
 console.log(`before it closes, the wrist is ${near.right.position.map((value, axis) => (value - near.bottle.position[axis]).toFixed(3)).join(", ")} m from the bottle`);
 await picture("xr-grasp.png");
 await press("right", "trigger", 1);
-const grips = async () => Number(/right hand [^·]*grips/.test(await page.locator("p.soft").first().textContent()));
-await until("the right hand grips", grips, 1);
+await until("the right hand feels what it touches [N]", async () => (await poses()).contact_n, 1);
 await reach([-0.12, -0.055, 0.1], 2000);
 await until("the bottle went up [m]", async () => (await poses()).bottle.position[2] - near.bottle.position[2], 0.03);
 await picture("xr-lift.png");

@@ -17,6 +17,9 @@ use crate::hosting::{EpisodeThread, HostingError};
 /// The media type of RFC 9457.
 pub const PROBLEM_JSON: &str = "application/problem+json";
 
+/// What is served for requests that are no HTTP of ours.
+const BAD_REQUEST: StatusCode = StatusCode::BAD_REQUEST;
+
 /// Everything a request can be refused for.
 #[derive(Debug, thiserror::Error)]
 pub enum ApiError {
@@ -236,16 +239,14 @@ impl ApiError {
             }
             ApiError::ForeignHost(_) => Refusal::new("foreign-host", "Foreign host", Forbidden).into(),
             ApiError::ForeignOrigin(_) => Refusal::new("foreign-origin", "Foreign origin", Forbidden).into(),
-            ApiError::NotEncrypted => Problem::new("not-encrypted", "Not encrypted", StatusCode::BAD_REQUEST),
+            ApiError::NotEncrypted => Problem::new("not-encrypted", "Not encrypted", BAD_REQUEST),
             ApiError::NoObject(_) => Refusal::new("no-object", "No JSON object", Invalid).into(),
             ApiError::SlowBody { .. } => {
                 Problem::new("slow-body", "Body too slow", StatusCode::REQUEST_TIMEOUT)
             }
-            ApiError::MalformedJson(_) => {
-                Problem::new("malformed-json", "Malformed JSON", StatusCode::BAD_REQUEST)
-            }
+            ApiError::MalformedJson(_) => Problem::new("malformed-json", "Malformed JSON", BAD_REQUEST),
             ApiError::MalformedMsgpack(_) => {
-                Problem::new("malformed-msgpack", "Malformed MessagePack", StatusCode::BAD_REQUEST)
+                Problem::new("malformed-msgpack", "Malformed MessagePack", BAD_REQUEST)
             }
             ApiError::NoToken => Problem::new("no-token", "No token", StatusCode::UNAUTHORIZED),
             ApiError::NoWatcher => Refusal::new("no-watcher", "Not by the link", Forbidden).into(),
@@ -254,10 +255,8 @@ impl ApiError {
             ApiError::NothingToMark => {
                 Problem::new("nothing-to-mark", "Nothing to mark", StatusCode::CONFLICT)
             }
-            ApiError::Key => Problem::new("invalid-key", "Invalid key", StatusCode::BAD_REQUEST),
-            ApiError::BrokenBody(_) => {
-                Problem::new("broken-body", "Body not received", StatusCode::BAD_REQUEST)
-            }
+            ApiError::Key => Problem::new("invalid-key", "Invalid key", BAD_REQUEST),
+            ApiError::BrokenBody(_) => Problem::new("broken-body", "Body not received", BAD_REQUEST),
             ApiError::BodyTooLarge { .. } => {
                 Problem::new("body-too-large", "Body too large", StatusCode::PAYLOAD_TOO_LARGE)
             }
