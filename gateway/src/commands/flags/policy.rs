@@ -248,7 +248,7 @@ mod tests {
             let refusal = card(flags).unwrap_err();
             assert!(refusal.contains(says), "{refusal}");
         };
-        check(&["--policy", "expart"], "have: expert, idle, demonstration, exec:COMMAND");
+        check(&["--policy", "expart"], "have: expert, no_words, idle, demonstration, exec:COMMAND");
         check(&["--policy", "exec: "], "give one, as exec:");
         check(&["--policy", "open-loop:"], "give one, as open-loop:runs/demonstrations");
         check(
