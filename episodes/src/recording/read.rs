@@ -94,7 +94,9 @@ impl Recording {
         let episode = file.metadata(metadata::EPISODE).ok_or_else(|| missing(metadata::EPISODE))?;
         let entry = |name: &str| episode.get(name).ok_or_else(|| missing(name));
         let step = |source: StepError| RecordingError::Step { path: path.into(), source };
-        let scores = BASE64_STANDARD.decode(entry(metadata::SCORES)?).map_err(|e| step(e.into()))?;
+        let mut scores = BASE64_STANDARD.decode(entry(metadata::SCORES)?).map_err(|e| step(e.into()))?;
+        // Whether the phase has been spoiled comes last, and earlier versions did not write it; a byte too many is left.
+        scores.push(0);
         let result = file.metadata(metadata::RESULT).and_then(|entries| entries.get(RESULT_FILE));
         Ok(Recording {
             path: path.into(),

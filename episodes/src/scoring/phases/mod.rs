@@ -80,7 +80,6 @@ pub struct PhaseMemory {
     /// The milestones of the present phase that have been begun.
     milestones: Vec<MilestoneMemory>,
     /// Whether the present phase has been spoiled.
-    #[serde(default)]
     spoiled: bool,
 }
 

@@ -66,7 +66,11 @@ fn recovers_a_beginning(bytes: &[u8], original: &Recording, folder: &Path, simul
             let ((hashes, calls), (all_hashes, all_calls)) = (content(&found), content(original));
             assert!(all_hashes.starts_with(&hashes) && all_calls.starts_with(&calls), "{what}");
             let lacks = hashes.len() < all_hashes.len() || calls.len() < all_calls.len();
-            assert!(recovered.left_out.is_some() || !lacks, "{what}: what is missing was not said");
+            let is_torn = !ends_behind_a_record(bytes);
+            assert!(
+                recovered.left_out.is_some() || !(lacks && is_torn),
+                "{what}: what is missing was not said"
+            );
             if simulate {
                 assert_eq!(verify(&found).unwrap().outcome, Verdict::Same, "{what}");
             }
@@ -82,6 +86,21 @@ fn recovers_a_beginning(bytes: &[u8], original: &Recording, folder: &Path, simul
         }
     }
     assert!(fs::read(&partial).unwrap() == bytes, "{what}: what is recovered stays as it is");
+}
+
+/// Whether a file ends where a record does, as what a killed process leaves: nothing says then that more had been written.
+fn ends_behind_a_record(bytes: &[u8]) -> bool {
+    let mut position = mcap::MAGIC.len();
+    while let Some(length) = bytes.get(position + 1..).and_then(<[u8]>::first_chunk) {
+        let Some(end) = usize::try_from(u64::from_le_bytes(*length))
+            .ok()
+            .and_then(|length| (position + 9).checked_add(length))
+        else {
+            return false;
+        };
+        position = end;
+    }
+    position == bytes.len()
 }
 
 /// Every byte is held to something, so that no change goes unseen: there is none without meaning.
