@@ -101,12 +101,9 @@ def _recipe(given: argparse.Namespace) -> None:
 
 
 def _serve(given: argparse.Namespace) -> None:
-    import torch
-
     from .policy import load
 
-    torch.set_num_threads(given.threads)
-    policy = load(given.policy)
+    policy = load(given.policy, given.threads)
     with policy.serve(given.host, given.port) as server:
         map_file = Path(given.policy) / MAP_FILE
         print(

@@ -25,8 +25,10 @@ from .training import POLICY_FILE
 CONTROL_HZ = 50
 
 
-def load(folder: str | PathLike[str]) -> Baseline:
-    """Loads what `train` wrote."""
+def load(folder: str | PathLike[str], threads: int | None = None) -> Baseline:
+    """Loads what `train` wrote. PyTorch computes on so many threads from then on, if that is given."""
+    if threads is not None:
+        torch.set_num_threads(threads)
     path = Path(folder) / POLICY_FILE
     try:
         return Baseline(torch.load(path, weights_only=True))
