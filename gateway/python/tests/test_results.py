@@ -147,7 +147,7 @@ def test_players_are_named_and_collected(tmp_path: Path) -> None:
         == played.results[0].state_hash
         == tandem.Recording(tmp_path / "episodes/handover-2007").state_hashes[-1]
     )
-    with pytest.raises(tandem.TandemError, match="have: expert, idle"):
+    with pytest.raises(tandem.TandemError, match="have: expert, no_words, idle"):
         tandem.evaluate("nobody", "handover", 2007)  # pyright: ignore[reportArgumentType]
     with pytest.raises(tandem.TandemError, match="leave `name` out"):
         tandem.evaluate("expert", "handover", 2007, name="mine")
