@@ -10,12 +10,13 @@ pub use world::{RewardKind, WorldStep};
 use std::path::PathBuf;
 
 use tandem_sim::JOINTS;
+use tandem_sim::render::render_colours_together;
 use tandem_tools_spec::ToolCall;
 
 use crate::spec::EpisodeSpec;
 use crate::{EpisodeError, Session};
 use parallel::for_each;
-use world::{BatchWorld, SeenWorld};
+use world::{BatchWorld, SeenStep, SeenWorld, picture_len};
 
 /// Numbers of a robot's state: its joints' angles (rad), then the base command in force.
 pub const STATE_COLUMNS: usize = JOINTS + 4;
@@ -118,15 +119,13 @@ impl Batch {
         seen: SeenArrays,
     ) -> Result<Vec<Option<WorldStep>>, BatchError> {
         let spec = &self.spec;
-        let mut outcomes: Vec<Result<Option<WorldStep>, BatchError>> =
-            self.worlds.iter().map(|_| Ok(None)).collect();
-        let jobs = self.worlds.iter_mut().zip(seen.split(self.spec.worlds)).zip(seeds).zip(&mut outcomes);
-        for_each(self.spec.threads, jobs.collect(), |(((world, seen), seed), outcome)| {
-            if let Some(seed) = seed {
-                *outcome = world.reset(spec, *seed, seen).map(Some);
-            }
+        let mut steps: Vec<Option<Result<SeenStep, BatchError>>> = self.worlds.iter().map(|_| None).collect();
+        let jobs = self.worlds.iter_mut().zip(seen.split(self.spec.worlds)).zip(seeds).zip(&mut steps);
+        for_each(self.spec.threads, jobs.collect(), |(((world, seen), seed), step)| {
+            *step = seed.map(|seed| world.reset(spec, seed, seen));
         });
-        outcomes.into_iter().collect()
+        self.draw_undrawn(steps.iter_mut().map(Option::as_mut));
+        steps.into_iter().map(|step| step.map(|step| step.map(|step| step.outcome)).transpose()).collect()
     }
 
     /// One control step of each world, or the beginning of its next episode. `last` is where the last of an episode is written
@@ -139,14 +138,35 @@ impl Batch {
     ) -> Result<Vec<WorldStep>, BatchError> {
         let calls = self.calls(&step)?;
         let spec = &self.spec;
-        let mut outcomes: Vec<Result<WorldStep, BatchError>> =
-            self.worlds.iter().map(|_| Ok(WorldStep::default())).collect();
+        let mut steps: Vec<Option<Result<SeenStep, BatchError>>> = self.worlds.iter().map(|_| None).collect();
         let seen = seen.split(spec.worlds).zip(last.split(spec.worlds));
-        let jobs = self.worlds.iter_mut().zip(calls).zip(seen).zip(&mut outcomes);
-        for_each(spec.threads, jobs.collect(), |(((world, call), (seen, last)), outcome)| {
-            *outcome = world.step(spec, &step, &call, seen, last);
+        let jobs = self.worlds.iter_mut().zip(calls).zip(seen).zip(&mut steps);
+        for_each(spec.threads, jobs.collect(), |(((world, call), (seen, last)), stepped)| {
+            *stepped = Some(world.step(spec, &step, &call, seen, last));
         });
-        outcomes.into_iter().collect()
+        self.draw_undrawn(steps.iter_mut().map(Option::as_mut));
+        steps.into_iter().flatten().map(|step| step.map(|step| step.outcome)).collect()
+    }
+
+    /// Draws the pictures of all worlds that have left theirs to be drawn together.
+    fn draw_undrawn<'a, 's: 'a>(
+        &mut self,
+        steps: impl Iterator<Item = Option<&'a mut Result<SeenStep<'s>, BatchError>>>,
+    ) {
+        let Some(size_px) = self.spec.pictures_px else { return };
+        let (mut requests, mut places) = (Vec::new(), Vec::new());
+        for (world, step) in self.worlds.iter_mut().zip(steps) {
+            let undrawn = step.and_then(|step| step.as_mut().ok()?.undrawn.take());
+            if let (Some(session), Some(undrawn)) = (&mut world.session, undrawn) {
+                requests.push(session.eyes(size_px));
+                places.push(undrawn);
+            }
+        }
+        for (place, pictures) in places.into_iter().zip(render_colours_together(requests)) {
+            for (place, picture) in place.chunks_exact_mut(picture_len(size_px)).zip(pictures) {
+                place.copy_from_slice(&picture);
+            }
+        }
     }
 
     /// What each world is asked to do, all of it checked.

@@ -3,7 +3,7 @@
 use tandem_tools_spec::{JointChunk, Protocol, SendJointChunk};
 
 use super::*;
-use crate::tasks;
+use crate::{RendererKind, tasks};
 
 const WORLDS: usize = 3;
 const ROBOTS: usize = 2;
@@ -118,13 +118,20 @@ fn an_episode_that_begins_in_the_same_step_leaves_its_last_state() {
     assert_eq!((next[0].env_steps, next[0].seed), (1, 2001));
 }
 
+/// A graphics processor, where this build and the machine have one, draws what all worlds see together.
 #[test]
 fn pictures_are_drawn_where_the_policy_looks() {
+    for renderer in [RendererKind::Cpu, RendererKind::Gpu] {
+        check_pictures(renderer);
+    }
+}
+
+fn check_pictures(renderer: RendererKind) {
     let size_px = [32, 24];
     let mut batch = Batch::new(BatchSpec {
         worlds: 2,
         pictures_px: Some(size_px),
-        episode: EpisodeSpec { renderer: crate::RendererKind::Cpu, ..spec(RewardKind::Sparse).episode },
+        episode: EpisodeSpec { renderer, ..spec(RewardKind::Sparse).episode },
         ..spec(RewardKind::Sparse)
     });
     let (mut seen, mut pixels) = (states(2), vec![0; 2 * ROBOTS * 32 * 24 * 3]);

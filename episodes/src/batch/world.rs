@@ -61,6 +61,12 @@ pub struct SeenWorld<'a> {
     pub pictures: &'a mut [u8],
 }
 
+/// What a step came to, and the pictures that are still to be drawn, with those of other worlds.
+pub struct SeenStep<'a> {
+    pub outcome: WorldStep,
+    pub undrawn: Option<&'a mut [u8]>,
+}
+
 /// Episode after episode.
 pub struct BatchWorld {
     index: usize,
@@ -89,12 +95,12 @@ impl BatchWorld {
     }
 
     /// Begins a round: with this seed, or with the one after that of the last round.
-    pub fn reset(
+    pub fn reset<'a>(
         &mut self,
         spec: &BatchSpec,
         seed: Option<u32>,
-        seen: SeenWorld,
-    ) -> Result<WorldStep, BatchError> {
+        seen: SeenWorld<'a>,
+    ) -> Result<SeenStep<'a>, BatchError> {
         let next = match self.round_seed {
             Some(last) => last.wrapping_add(self.stride),
             None => FIRST_SEED.wrapping_add(self.index as u32),
@@ -105,7 +111,7 @@ impl BatchWorld {
     }
 
     /// Begins the next episode of the round. Its seed is the index's: no episode begins elsewhere because another one ended sooner.
-    fn begin(&mut self, spec: &BatchSpec, seen: SeenWorld) -> Result<WorldStep, BatchError> {
+    fn begin<'a>(&mut self, spec: &BatchSpec, seen: SeenWorld<'a>) -> Result<SeenStep<'a>, BatchError> {
         let round_seed = self.round_seed.unwrap_or(FIRST_SEED);
         let seed = round_seed.wrapping_add(self.stride.wrapping_mul(self.episodes));
         self.close();
@@ -123,19 +129,20 @@ impl BatchWorld {
             RewardKind::Sparse => 0.0,
             RewardKind::Dense => session.progress(),
         };
-        look(spec, session, seen, true);
-        Ok(WorldStep { seed, fallen: vec![false; episode.task.robots.len()], ..WorldStep::default() })
+        let undrawn = look(spec, session, seen, true);
+        let fallen = vec![false; episode.task.robots.len()];
+        Ok(SeenStep { outcome: WorldStep { seed, fallen, ..WorldStep::default() }, undrawn })
     }
 
     /// One control step, or the beginning of the next episode.
-    pub fn step(
+    pub fn step<'a>(
         &mut self,
         spec: &BatchSpec,
         step: &BatchStep,
         call: &ToolCall,
-        seen: SeenWorld,
-        last: SeenWorld,
-    ) -> Result<WorldStep, BatchError> {
+        seen: SeenWorld<'a>,
+        last: SeenWorld<'a>,
+    ) -> Result<SeenStep<'a>, BatchError> {
         if self.over {
             return self.begin(spec, seen);
         }
@@ -145,13 +152,18 @@ impl BatchWorld {
             Autoreset::SameStep if self.over => (last, Some(seen)),
             Autoreset::SameStep | Autoreset::NextStep | Autoreset::Disabled => (seen, None),
         };
-        if let Some(session) = &mut self.session {
-            look(spec, session, shown, step.looks || self.over);
-        }
+        let session = self.session.as_mut();
+        let mut undrawn = session.and_then(|session| look(spec, session, shown, step.looks || self.over));
         if let Some(seen) = anew {
-            outcome.next_seed = Some(self.begin(spec, seen)?.seed);
+            // An episode's last pictures cannot wait: its world goes.
+            if let (Some(session), Some(pictures)) = (&mut self.session, undrawn) {
+                draw(spec, session, pictures);
+            }
+            let next = self.begin(spec, seen)?;
+            outcome.next_seed = Some(next.outcome.seed);
+            undrawn = next.undrawn;
         }
-        Ok(outcome)
+        Ok(SeenStep { outcome, undrawn })
     }
 
     /// One control step, and what it came to. What goes wrong in a world is told of this world alone.
@@ -209,17 +221,39 @@ impl BatchWorld {
     }
 }
 
-/// Writes what is seen now; pictures only where they are to be drawn.
-fn look(spec: &BatchSpec, session: &mut Session, seen: SeenWorld, draws: bool) {
+/// Writes what is seen now; pictures only where they are to be drawn. Returns where they belong if they are better drawn together with
+/// those of other worlds.
+fn look<'a>(
+    spec: &BatchSpec,
+    session: &mut Session,
+    seen: SeenWorld<'a>,
+    draws: bool,
+) -> Option<&'a mut [u8]> {
     let robots = session.present().robots.iter();
     for (robot, row) in robots.zip(seen.state_rows.chunks_exact_mut(STATE_COLUMNS)) {
         let (joints, base) = row.split_at_mut(JOINTS);
         joints.copy_from_slice(&robot.sensed.joints.q_rad);
         base.copy_from_slice(&base_row(&robot.command.base));
     }
-    let Some([width, height]) = spec.pictures_px.filter(|_| draws) else { return };
-    let picture_len = width as usize * height as usize * 3;
-    for (robot, picture) in seen.pictures.chunks_exact_mut(picture_len).enumerate() {
-        picture.copy_from_slice(&session.eye(robot, [width, height]));
+    if !draws || seen.pictures.is_empty() {
+        return None;
     }
+    if session.draws_together() {
+        return Some(seen.pictures);
+    }
+    draw(spec, session, seen.pictures);
+    None
+}
+
+/// Draws what the robots of a world see.
+fn draw(spec: &BatchSpec, session: &mut Session, pictures: &mut [u8]) {
+    let Some(size_px) = spec.pictures_px else { return };
+    for (robot, picture) in pictures.chunks_exact_mut(picture_len(size_px)).enumerate() {
+        picture.copy_from_slice(&session.eye(robot, size_px));
+    }
+}
+
+/// Bytes of a picture.
+pub fn picture_len([width, height]: [u32; 2]) -> usize {
+    width as usize * height as usize * 3
 }

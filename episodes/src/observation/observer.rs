@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3};
-use tandem_sim::render::{Camera, Cameras, Frame, Renderer};
+use tandem_sim::render::{Camera, Cameras, Frame, RenderRequest, Renderer};
 use tandem_sim::{Step, World};
 use tandem_tools_spec::{DepthReply, DepthRow, PoseFrame, SurfaceQuery};
 
@@ -58,6 +58,19 @@ impl Observer {
     pub fn eye(&mut self, step: &Step, robot: usize, [width, height]: [u32; 2]) -> Vec<u8> {
         let camera = Camera { width, height, ..self.cameras.egocentric(step, robot) };
         self.colours(step, &camera)
+    }
+
+    /// Whether [`Observer::eyes`] is the quicker way to pictures of several worlds.
+    pub fn draws_together(&self) -> bool {
+        self.renderer.draws_together()
+    }
+
+    /// What all robots see after `step`, in pictures of this width and height, to be drawn with what others see.
+    pub fn eyes<'a>(&'a mut self, step: &'a Step, [width, height]: [u32; 2]) -> RenderRequest<'a> {
+        let robots = 0..step.robots.len();
+        let cameras =
+            robots.map(|robot| Camera { width, height, ..self.cameras.egocentric(step, robot) }).collect();
+        RenderRequest { renderer: &mut *self.renderer, step, cameras }
     }
 
     /// The colours of what any camera sees after `step`.

@@ -30,6 +30,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
+use tandem_sim::render::RenderRequest;
 use tandem_sim::{CONTROL_HZ, RobotCommand, Step, World};
 use tandem_tools_spec::{EndReason, ResultReply, Usage};
 
@@ -362,6 +363,16 @@ impl Session {
     /// picture: red, green and blue, row by row. No call: what is shown to a policy is for the caller to count.
     pub fn eye(&mut self, robot: usize, size_px: [u32; 2]) -> Vec<u8> {
         self.observer.eye(&self.present, robot, size_px)
+    }
+
+    /// Whether [`Session::eyes`] is the quicker way to pictures of several episodes.
+    pub fn draws_together(&self) -> bool {
+        self.observer.draws_together()
+    }
+
+    /// What [`Session::eye`] gives of all robots, to be drawn with what is seen in other episodes.
+    pub fn eyes(&mut self, size_px: [u32; 2]) -> RenderRequest<'_> {
+        self.observer.eyes(&self.present, size_px)
     }
 
     /// How far the task has come: the phases reached, and how near the next one is, from 0 to 1.

@@ -24,6 +24,8 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
 use crate::Step;
+#[cfg(feature = "gpu")]
+use gpu::colours as together;
 
 /// Draws the scenery that it was made for.
 pub trait Renderer: Send {
@@ -42,6 +44,48 @@ pub trait Renderer: Send {
     fn render_colours(&mut self, step: &Step, camera: &Camera) -> Vec<u8> {
         self.render(step, camera).rgb
     }
+
+    /// Whether [`render_colours_together`] draws its pictures and those of others in less time than each of them does.
+    fn draws_together(&self) -> bool {
+        false
+    }
+
+    /// Itself, if it draws on a graphics processor.
+    #[cfg(feature = "gpu")]
+    fn on_gpu(&mut self) -> Option<&mut gpu::GpuRenderer> {
+        None
+    }
+}
+
+/// What of a picture is drawn.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Wanted {
+    All,
+    /// Without depth and ids.
+    Colours,
+}
+
+/// Views of one world that are to be drawn with those of others.
+pub struct RenderRequest<'a> {
+    pub renderer: &'a mut dyn Renderer,
+    pub step: &'a Step,
+    pub cameras: Vec<Camera>,
+}
+
+/// The colours alone, as [`Frame::rgb`], of what the cameras of several worlds see: world by world, camera by camera. A graphics
+/// processor gets all of it in one submission, and all pictures are read back at once; other renderers draw one after another.
+pub fn render_colours_together(mut requests: Vec<RenderRequest>) -> Vec<Vec<Vec<u8>>> {
+    together(&mut requests).unwrap_or_else(|| {
+        let each = |RenderRequest { renderer, step, cameras }: RenderRequest| {
+            cameras.iter().map(|camera| renderer.render_colours(step, camera)).collect()
+        };
+        requests.into_iter().map(each).collect()
+    })
+}
+
+#[cfg(not(feature = "gpu"))]
+fn together(_: &mut [RenderRequest]) -> Option<Vec<Vec<Vec<u8>>>> {
+    None
 }
 
 /// A rendered picture, row by row from the top left.

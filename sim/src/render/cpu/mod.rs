@@ -18,7 +18,7 @@ use pulp::{Arch, Simd, WithSimd};
 use crate::Step;
 use crate::render::blur::blurred;
 use crate::render::scene::prepared::Prepared;
-use crate::render::{Camera, Frame, PlacedScenery, Renderer, Scenery};
+use crate::render::{Camera, Frame, PlacedScenery, Renderer, Scenery, Wanted};
 use contact::ContactMap;
 use shade::{Facet, Rays};
 use shadow::ShadowMap;
@@ -143,14 +143,6 @@ impl WithSimd for StateDrawing<'_> {
         shade::place(&mut state.facets, prepared, &placed, &state.placed);
         state.placed = placed;
     }
-}
-
-/// What of a picture is drawn.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Wanted {
-    All,
-    /// Without depth and ids.
-    Colours,
 }
 
 /// A picture to draw.

@@ -9,22 +9,25 @@ mod shader;
 mod targets;
 #[cfg(test)]
 mod tests;
+mod together;
 
+use std::slice;
 use std::sync::{Arc, OnceLock};
 
 use wgpu::{
-    Color, CommandEncoder, LoadOp, MapMode, Operations, RenderPassColorAttachment,
+    Buffer, Color, CommandEncoder, LoadOp, Operations, RenderPassColorAttachment,
     RenderPassDepthStencilAttachment, RenderPassDescriptor, StoreOp, TextureView,
 };
 
 use crate::Step;
-use crate::render::blur::blurred;
 use crate::render::cpu::contact::ContactMap;
 use crate::render::scene::prepared::{NOTHING, Prepared};
-use crate::render::{Camera, Frame, PlacedScenery, Renderer, Scenery, cpu};
+use crate::render::{Camera, Frame, PlacedScenery, Renderer, Scenery, Wanted, cpu};
 use device::{Gpu, GpuError};
 use scene::SceneBuffers;
-use targets::{Attachments, Targets};
+use targets::{Attachments, PictureBuffers, Targets};
+pub(super) use together::colours;
+use together::{Asked, Region};
 
 /// Name of the device that draws.
 pub(super) fn name() -> Result<String, GpuError> {
@@ -45,7 +48,7 @@ pub(super) fn is_real() -> bool {
 const GROUP: u32 = 8;
 
 /// Draws on a graphics processor; if that fails, on the calling thread from then on.
-struct GpuRenderer {
+pub struct GpuRenderer {
     gpu: Arc<Gpu>,
     prepared: Prepared,
     scene: SceneBuffers,
@@ -55,6 +58,8 @@ struct GpuRenderer {
     contact: ContactMap,
     /// Targets of the last picture's size.
     targets: Option<Targets>,
+    /// Where pictures are read, if this renderer has drawn alone or as the first of several.
+    pictures: Option<PictureBuffers>,
     embedded: Option<Box<dyn Renderer>>,
 }
 
@@ -65,8 +70,11 @@ fn open() -> Result<Arc<Gpu>, GpuError> {
     let opened = OPENED.get_or_init(|| {
         let gpu = Arc::new(Gpu::open()?);
         let mut renderer = GpuRenderer::new(gpu.clone(), proof::scenery());
-        let drawn = renderer.draw(&proof::placed(), &proof::camera())?;
-        if !proof::accepts(&drawn) {
+        let cameras = [proof::camera()];
+        let wanted = Wanted::All;
+        let asked = Asked { renderer: &mut renderer, placed: proof::placed(), cameras: &cameras, wanted };
+        let drawn = together::draw(&mut [asked])?;
+        if !drawn.iter().flatten().all(proof::accepts) {
             return Err(GpuError::Wrong { name: gpu.name.clone() });
         }
         Ok(gpu)
@@ -86,45 +94,47 @@ impl GpuRenderer {
             placed: None,
             contact: ContactMap::default(),
             targets: None,
+            pictures: None,
             embedded: None,
         }
     }
 
-    fn draw(&mut self, placed: &PlacedScenery, camera: &Camera) -> Result<Frame, GpuError> {
-        let GpuRenderer { gpu, prepared, scene, shadow, contact, .. } = self;
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        let targets = match self.targets.take() {
-            Some(targets) if (targets.width, targets.height) == (camera.width, camera.height) => targets,
-            _ => Targets::new(gpu, shadow, camera.width, camera.height)?,
-        };
-        if self.placed.as_ref() != Some(placed) {
+    /// Tells the device where all parts are; returns whether it did not know.
+    fn place(&mut self, placed: &PlacedScenery) -> bool {
+        let moved = self.placed.as_ref() != Some(placed);
+        if moved {
+            let GpuRenderer { gpu, prepared, scene, contact, .. } = self;
             contact.draw(prepared, placed);
             scene.place(gpu, prepared, placed, contact);
             self.placed = Some(placed.clone());
         }
-        scene.look(gpu, prepared, placed, contact, camera);
-        self.encode(&mut encoder, &targets);
-        self.gpu.queue.submit([encoder.finish()]);
-        let frame = self.read(&targets)?;
-        self.targets = Some(targets);
-        Ok(Frame { rgb: blurred(frame.rgb, camera), ..frame })
+        moved
     }
 
-    /// All that the device does for a picture.
-    fn encode(&self, encoder: &mut CommandEncoder, targets: &Targets) {
-        let passes = &self.gpu.passes;
-        let Targets { width, height, ref samples, ref centres, ref picture, ref readable, ref group } =
-            *targets;
-        {
-            let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
-                depth_stencil_attachment: Some(nearest(&self.shadow)),
-                ..RenderPassDescriptor::default()
-            });
-            pass.set_pipeline(&passes.shadow);
-            pass.set_bind_group(0, &self.scene.group, &[]);
-            pass.draw(0..self.scene.corners, 0..1);
+    /// Has the shadow drawn that all views of a state share; there has to be one.
+    fn encode_shadow(&self, encoder: &mut CommandEncoder) {
+        let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
+            depth_stencil_attachment: Some(nearest(&self.shadow)),
+            ..RenderPassDescriptor::default()
+        });
+        pass.set_pipeline(&self.gpu.passes.shadow);
+        pass.set_bind_group(0, self.scene.group(0), &[]);
+        pass.draw(0..self.scene.corners, 0..1);
+    }
+
+    /// Has a picture drawn, that of a view, which goes to `region` of the buffer of all pictures.
+    fn encode(&mut self, encoder: &mut CommandEncoder, view: usize, region: &Region, drawn: &Buffer) {
+        let size_px = [region.width, region.height];
+        if !self.targets.as_ref().is_some_and(|targets| targets.fit(size_px, region.bytes, drawn)) {
+            self.targets = Some(Targets::new(&self.gpu, &self.shadow, size_px, region.bytes, drawn));
         }
-        for Attachments { triangles, depth } in [samples, centres] {
+        let Some(Targets { samples, centres, group, .. }) = &self.targets else { return };
+        let (passes, scene) = (&self.gpu.passes, self.scene.group(view));
+        let (layers, resolve): (&[&Attachments], _) = match region.wanted {
+            Wanted::All => (&[samples, centres], &passes.resolve),
+            Wanted::Colours => (&[samples], &passes.resolve_colours),
+        };
+        for Attachments { triangles, depth } in layers {
             let nothing = Color { r: f64::from(NOTHING), ..Color::BLACK };
             let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
                 color_attachments: &[Some(RenderPassColorAttachment {
@@ -137,42 +147,32 @@ impl GpuRenderer {
                 ..RenderPassDescriptor::default()
             });
             pass.set_pipeline(&passes.triangles);
-            pass.set_bind_group(0, &self.scene.group, &[]);
+            pass.set_bind_group(0, scene, &[]);
             pass.draw(0..self.scene.corners, 0..1);
         }
-        {
-            let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_pipeline(&passes.resolve);
-            pass.set_bind_group(0, &self.scene.group, &[]);
-            pass.set_bind_group(1, group, &[]);
-            pass.dispatch_workgroups(width.div_ceil(GROUP), height.div_ceil(GROUP), 1);
-        }
-        encoder.copy_buffer_to_buffer(picture, 0, readable, 0, picture.size());
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        pass.set_pipeline(resolve);
+        pass.set_bind_group(0, scene, &[]);
+        pass.set_bind_group(1, group, &[region.offset as u32]);
+        pass.dispatch_workgroups(region.width.div_ceil(GROUP), region.height.div_ceil(GROUP), 1);
     }
 
-    /// Waits for the picture.
-    fn read(&self, targets: &Targets) -> Result<Frame, GpuError> {
-        targets.readable.map_async(MapMode::Read, .., |_| ());
-        self.gpu.settle()?;
-        let mapped =
-            targets.readable.get_mapped_range(..).map_err(|error| self.gpu.unusable(error.to_string()))?;
-        let numbers = mapped.as_chunks::<4>().0;
-        let pixels = numbers.len() / 3;
-        let number = |bytes: &[u8; 4]| u32::from_ne_bytes(*bytes);
-        let frame = Frame {
-            width: targets.width,
-            height: targets.height,
-            rgb: numbers[..pixels]
-                .iter()
-                .map(number)
-                .flat_map(|rgb| [rgb, rgb >> 8, rgb >> 16].map(|c| c as u8))
-                .collect(),
-            depth_m: numbers[pixels..2 * pixels].iter().map(number).map(f32::from_bits).collect(),
-            ids: numbers[2 * pixels..].iter().map(number).collect(),
+    /// What each camera sees; `None` where the device cannot draw it, now or before, so that the embedded renderer has to.
+    fn draw(&mut self, step: &Step, cameras: &[Camera], wanted: Wanted) -> Option<Vec<Frame>> {
+        if self.embedded.is_some() {
+            return None;
+        }
+        let placed = self.prepared.scenery.place(step);
+        let drawn = together::draw(&mut [Asked { renderer: self, placed, cameras, wanted }]);
+        let frames = drawn.map(|frames| frames.into_iter().flatten().collect());
+        let warn = |error: &GpuError| {
+            tracing::warn!("pictures are drawn by the embedded renderer from now on: {error}")
         };
-        drop(mapped);
-        targets.readable.unmap();
-        Ok(frame)
+        frames.inspect_err(warn).ok()
+    }
+
+    fn embedded(&mut self) -> &mut dyn Renderer {
+        &mut **self.embedded.get_or_insert_with(|| cpu(self.prepared.scenery.clone()))
     }
 }
 
@@ -191,14 +191,24 @@ impl Renderer for GpuRenderer {
     }
 
     fn render_all(&mut self, step: &Step, cameras: &[Camera]) -> Vec<Frame> {
-        if let Some(embedded) = &mut self.embedded {
-            return embedded.render_all(step, cameras);
+        match self.draw(step, cameras, Wanted::All) {
+            Some(frames) => frames,
+            None => self.embedded().render_all(step, cameras),
         }
-        let placed = self.prepared.scenery.place(step);
-        let drawn: Result<_, _> = cameras.iter().map(|camera| self.draw(&placed, camera)).collect();
-        drawn.unwrap_or_else(|error| {
-            tracing::warn!("pictures are drawn by the embedded renderer from now on: {error}");
-            self.embedded.insert(cpu(self.prepared.scenery.clone())).render_all(step, cameras)
-        })
+    }
+
+    fn render_colours(&mut self, step: &Step, camera: &Camera) -> Vec<u8> {
+        match self.draw(step, slice::from_ref(camera), Wanted::Colours) {
+            Some(mut frames) => frames.swap_remove(0).rgb,
+            None => self.embedded().render_colours(step, camera),
+        }
+    }
+
+    fn draws_together(&self) -> bool {
+        self.embedded.is_none()
+    }
+
+    fn on_gpu(&mut self) -> Option<&mut GpuRenderer> {
+        self.embedded.is_none().then_some(self)
     }
 }

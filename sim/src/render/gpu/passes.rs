@@ -23,6 +23,8 @@ pub(super) struct Passes {
     /// Passes over samples, and over centres.
     pub triangles: RenderPipeline,
     pub resolve: ComputePipeline,
+    /// The same without depths and ids.
+    pub resolve_colours: ComputePipeline,
 }
 
 impl Passes {
@@ -45,7 +47,12 @@ impl Passes {
                 texture(TextureSampleType::Depth),
                 texture(TextureSampleType::Uint),
                 texture(TextureSampleType::Uint),
-                storage(false),
+                // Where in the buffer of all pictures this one is.
+                BindingType::Buffer {
+                    ty: BufferBindingType::Storage { read_only: false },
+                    has_dynamic_offset: true,
+                    min_binding_size: None,
+                },
             ],
         );
         let pipeline_layout = |groups: &[Option<&BindGroupLayout>]| {
@@ -56,17 +63,21 @@ impl Passes {
         };
         let drawing = pipeline_layout(&[Some(&scene)]);
         let resolving = pipeline_layout(&[Some(&scene), Some(&targets)]);
-        Passes {
-            shadow: render_pipeline(device, &drawing, &module, "cast_shadow", None),
-            triangles: render_pipeline(device, &drawing, &module, "see", Some("mark")),
-            resolve: device.create_compute_pipeline(&ComputePipelineDescriptor {
+        let resolve = |entry_point: &str| {
+            device.create_compute_pipeline(&ComputePipelineDescriptor {
                 label: None,
                 layout: Some(&resolving),
                 module: &module,
-                entry_point: Some("resolve"),
+                entry_point: Some(entry_point),
                 compilation_options: Default::default(),
                 cache: None,
-            }),
+            })
+        };
+        Passes {
+            shadow: render_pipeline(device, &drawing, &module, "cast_shadow", None),
+            triangles: render_pipeline(device, &drawing, &module, "see", Some("mark")),
+            resolve: resolve("resolve"),
+            resolve_colours: resolve("resolve_colours"),
             scene,
             targets,
         }

@@ -294,6 +294,14 @@ fn bytes(linear: vec3f) -> u32 {
 }
 
 @compute @workgroup_size(8, 8)
+fn resolve_colours(@builtin(global_invocation_id) place: vec3u) {
+    let size = vec2u(view.scale.zw);
+    if all(place.xy < size) {
+        picture[place.y * size.x + place.x] = bytes(mean(place.xy, size));
+    }
+}
+
+@compute @workgroup_size(8, 8)
 fn resolve(@builtin(global_invocation_id) place: vec3u) {
     let size = vec2u(view.scale.zw);
     let pixel = place.xy;

@@ -16,14 +16,21 @@ use crate::render::{Camera, Carrier, Part, Pattern, PlacedScenery};
 const VIEW_NUMBERS: usize = 64;
 const PART_NUMBERS: usize = 24;
 
-/// What `picture.wgsl` calls its group 0.
+/// What `picture.wgsl` calls its group 0, once for each view that is drawn at the same time.
 pub(super) struct SceneBuffers {
-    view: Buffer,
+    corner_numbers: Buffer,
+    faces: Buffer,
     parts: Buffer,
     contacts: Buffer,
-    pub group: BindGroup,
+    views: Vec<SceneView>,
     /// Corners of all triangles.
     pub corners: u32,
+}
+
+/// What a camera is told to the device by, and the scene as that camera sees it.
+struct SceneView {
+    numbers: Buffer,
+    group: BindGroup,
 }
 
 impl SceneBuffers {
@@ -34,20 +41,28 @@ impl SceneBuffers {
         let bends = prepared.sheet_of.iter().map(|sheet| prepared.sheets[*sheet as usize].bend);
         let firsts = corners.iter().step_by(3);
         let faces: Vec<[u32; 16]> = bends.zip(firsts).map(|(bend, corner)| face(bend, *corner)).collect();
-        let initialised = |numbers: &[u32], usage: BufferUsages| {
-            // A buffer must not be empty.
-            let contents = bytes(if numbers.is_empty() { &[0; 64] } else { numbers });
-            gpu.device.create_buffer_init(&BufferInitDescriptor { label: None, contents: &contents, usage })
-        };
         let written = BufferUsages::COPY_DST | BufferUsages::STORAGE;
-        let view = initialised(&[0; VIEW_NUMBERS], BufferUsages::COPY_DST | BufferUsages::UNIFORM);
-        let numbers = initialised(corners.as_flattened(), BufferUsages::STORAGE);
-        let faces = initialised(faces.as_flattened(), BufferUsages::STORAGE);
-        let parts = initialised(&vec![0; prepared.scenery.parts.len() * PART_NUMBERS], written);
-        let contacts = initialised(&vec![0; 2 * CONTACT_TEXELS * CONTACT_TEXELS], written);
-        let resources = [&view, &numbers, &faces, &parts, &contacts].map(|buffer| buffer.as_entire_binding());
-        let group = bind(gpu, &gpu.passes.scene, resources);
-        SceneBuffers { view, parts, contacts, group, corners: corners.len() as u32 }
+        SceneBuffers {
+            corner_numbers: initialised(gpu, corners.as_flattened(), BufferUsages::STORAGE),
+            faces: initialised(gpu, faces.as_flattened(), BufferUsages::STORAGE),
+            parts: initialised(gpu, &vec![0; prepared.scenery.parts.len() * PART_NUMBERS], written),
+            contacts: initialised(gpu, &vec![0; 2 * CONTACT_TEXELS * CONTACT_TEXELS], written),
+            views: Vec::new(),
+            corners: corners.len() as u32,
+        }
+    }
+
+    /// The scene as the view of this number sees it.
+    pub(super) fn group(&self, view: usize) -> &BindGroup {
+        &self.views[view].group
+    }
+
+    fn add_view(&mut self, gpu: &Gpu) {
+        let usage = BufferUsages::COPY_DST | BufferUsages::UNIFORM;
+        let numbers = initialised(gpu, &[0; VIEW_NUMBERS], usage);
+        let buffers = [&numbers, &self.corner_numbers, &self.faces, &self.parts, &self.contacts];
+        let group = bind(gpu, &gpu.passes.scene, buffers.map(|buffer| buffer.as_entire_binding()));
+        self.views.push(SceneView { numbers, group });
     }
 
     /// Puts every part where it is.
@@ -60,10 +75,11 @@ impl SceneBuffers {
         gpu.queue.write_buffer(&self.contacts, 0, &bytes(&bits(contact.texel_values.as_flattened())));
     }
 
-    /// Looks through a camera.
+    /// Looks through a camera, in the view of this number: one that there is, or the next.
     pub(super) fn look(
-        &self,
+        &mut self,
         gpu: &Gpu,
+        view: usize,
         prepared: &Prepared,
         placed: &PlacedScenery,
         contact: &ContactMap,
@@ -95,8 +111,17 @@ impl SceneBuffers {
             direction(light.below_rgb),
             direction(light.above_rgb),
         ];
-        gpu.queue.write_buffer(&self.view, 0, &bytes(&bits(numbers.as_flattened())));
+        if view == self.views.len() {
+            self.add_view(gpu);
+        }
+        gpu.queue.write_buffer(&self.views[view].numbers, 0, &bytes(&bits(numbers.as_flattened())));
     }
+}
+
+fn initialised(gpu: &Gpu, numbers: &[u32], usage: BufferUsages) -> Buffer {
+    // A buffer must not be empty.
+    let contents = bytes(if numbers.is_empty() { &[0; 64] } else { numbers });
+    gpu.device.create_buffer_init(&BufferInitDescriptor { label: None, contents: &contents, usage })
 }
 
 /// Three corners a triangle, with the number of their part.

@@ -1,8 +1,8 @@
-//! What pictures of one size are drawn into.
+//! What pictures are drawn into, and the buffer in which they are read.
 
 use wgpu::{
-    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindingResource, Buffer,
-    BufferDescriptor, BufferUsages, Extent3d, TextureDescriptor, TextureDimension, TextureFormat,
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindingResource, Buffer, BufferBinding,
+    BufferDescriptor, BufferSize, BufferUsages, Extent3d, TextureDescriptor, TextureDimension, TextureFormat,
     TextureUsages, TextureView,
 };
 
@@ -10,18 +10,25 @@ use super::device::{Gpu, GpuError};
 use super::passes::{DEPTH, TRIANGLES};
 use crate::render::shading::{SAMPLES, TEXELS};
 
-/// Colours, depths and ids, four bytes each.
-const BYTES_PER_PIXEL: u64 = 12;
+/// Pictures in this buffer begin at multiples of so many bytes.
+pub(super) const ALIGNMENT_BYTES: u64 = 256;
 
+/// Pictures of all views that are drawn together: written by the device, and copied from there to where the processor can read them.
+pub(super) struct PictureBuffers {
+    pub drawn: Buffer,
+    pub readable: Buffer,
+}
+
+/// What pictures of one size are drawn into, one after another.
 pub(super) struct Targets {
     pub width: u32,
     pub height: u32,
+    /// Of a picture, in the buffer.
+    bytes: u64,
+    drawn: Buffer,
     pub samples: Attachments,
     pub centres: Attachments,
-    /// Written by the device, and copied from there to where the processor can read it.
-    pub picture: Buffer,
-    pub readable: Buffer,
-    /// What `picture.wgsl` calls its group 1.
+    /// What `picture.wgsl` calls its group 1, with the first picture in the buffer.
     pub group: BindGroup,
 }
 
@@ -31,19 +38,9 @@ pub(super) struct Attachments {
     pub depth: TextureView,
 }
 
-impl Targets {
-    pub(super) fn new(gpu: &Gpu, shadow: &TextureView, width: u32, height: u32) -> Result<Targets, GpuError> {
-        let most = gpu.device.limits().max_texture_dimension_2d / SAMPLES as u32;
-        if width > most || height > most {
-            return Err(GpuError::TooLarge { name: gpu.name.clone(), width, height });
-        }
-        let layer = |samples: u32| Attachments {
-            triangles: texture(gpu, TRIANGLES, width * samples, height * samples),
-            depth: texture(gpu, DEPTH, width * samples, height * samples),
-        };
-        let (samples, centres) = (layer(SAMPLES as u32), layer(1));
+impl PictureBuffers {
+    pub(super) fn new(gpu: &Gpu, size: u64) -> PictureBuffers {
         let buffer = |usage: BufferUsages| {
-            let size = u64::from(width) * u64::from(height) * BYTES_PER_PIXEL;
             gpu.device.create_buffer(&BufferDescriptor {
                 label: None,
                 size,
@@ -51,17 +48,50 @@ impl Targets {
                 mapped_at_creation: false,
             })
         };
-        let picture = buffer(BufferUsages::STORAGE | BufferUsages::COPY_SRC);
-        let readable = buffer(BufferUsages::MAP_READ | BufferUsages::COPY_DST);
+        PictureBuffers {
+            drawn: buffer(BufferUsages::STORAGE | BufferUsages::COPY_SRC),
+            readable: buffer(BufferUsages::MAP_READ | BufferUsages::COPY_DST),
+        }
+    }
+}
+
+impl Targets {
+    /// For pictures that have so many bytes in a buffer.
+    pub(super) fn new(
+        gpu: &Gpu,
+        shadow: &TextureView,
+        [width, height]: [u32; 2],
+        bytes: u64,
+        drawn: &Buffer,
+    ) -> Targets {
+        let layer = |samples: u32| Attachments {
+            triangles: texture(gpu, TRIANGLES, width * samples, height * samples),
+            depth: texture(gpu, DEPTH, width * samples, height * samples),
+        };
+        let (samples, centres) = (layer(SAMPLES as u32), layer(1));
         let resources = [
             BindingResource::TextureView(shadow),
             BindingResource::TextureView(&samples.triangles),
             BindingResource::TextureView(&centres.triangles),
-            picture.as_entire_binding(),
+            BindingResource::Buffer(BufferBinding { buffer: drawn, offset: 0, size: BufferSize::new(bytes) }),
         ];
         let group = bind(gpu, &gpu.passes.targets, resources);
-        Ok(Targets { width, height, samples, centres, picture, readable, group })
+        Targets { width, height, bytes, drawn: drawn.clone(), samples, centres, group }
     }
+
+    /// Whether such pictures can be drawn into them.
+    pub(super) fn fit(&self, size_px: [u32; 2], bytes: u64, drawn: &Buffer) -> bool {
+        ([self.width, self.height], self.bytes) == (size_px, bytes) && self.drawn == *drawn
+    }
+}
+
+/// An error if the device has no textures as large as a picture takes.
+pub(super) fn check_size(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<(), GpuError> {
+    let most = gpu.device.limits().max_texture_dimension_2d / SAMPLES as u32;
+    if width > most || height > most {
+        return Err(GpuError::TooLarge { name: gpu.name.clone(), width, height });
+    }
+    Ok(())
 }
 
 /// The shadow's map.

@@ -3,7 +3,10 @@
 
 use std::f32::consts::PI;
 
-use crate::render::{Camera, Cameras, Frame, Renderer, RendererKind, Scenery, cpu};
+use super::together::counts;
+use crate::render::{
+    Camera, Cameras, Frame, RenderRequest, Renderer, RendererKind, Scenery, cpu, render_colours_together,
+};
 use crate::{ObjectPlacement, Pose, RobotPlacement, Step, Vector, World, WorldSpec};
 
 #[path = "../../../../tests/src/skipped.rs"]
@@ -108,4 +111,48 @@ fn an_empty_scenery_is_sky() {
     let camera = Camera { width: 16, height: 8, ..Cameras::of(&world).third_person() };
     let expected = cpu(Scenery::default()).render(&world.present(), &camera);
     assert_eq!(gpu.render(&world.present(), &camera), expected);
+}
+
+/// How often `draw` has this thread submit work, and read pictures back.
+fn counted<T>(draw: impl FnOnce() -> T) -> (T, [u32; 2]) {
+    let now = || [counts::SUBMISSIONS.get(), counts::READ_BACKS.get()];
+    let [submissions, read_backs] = now();
+    let drawn = draw();
+    (drawn, [now()[0] - submissions, now()[1] - read_backs])
+}
+
+#[test]
+fn pictures_of_many_worlds_are_one_submission_and_one_read_back() {
+    const WORLDS: usize = 3;
+    let mut worlds: Vec<World> = (0..WORLDS).map(|_| kitchen()).collect();
+    let Some(mut renderers) = worlds.iter().map(|world| gpu(Scenery::of(world))).collect::<Option<Vec<_>>>()
+    else {
+        return;
+    };
+    // Each in another state; twice, for what moves has to be seen to have moved.
+    for _ in 0..2 {
+        let advance = |(number, world): (usize, &mut World)| {
+            let commands = [world.rest_command(0), world.rest_command(1)];
+            let steps = (0..=5 * number).map(|_| world.control_step(&commands).expect("it stays finite"));
+            steps.last().expect("one")
+        };
+        let steps: Vec<Step> = worlds.iter_mut().enumerate().map(advance).collect();
+        let cameras: Vec<Vec<Camera>> =
+            worlds.iter().zip(&steps).map(|(world, step)| views(world, step)).collect();
+        let requests = renderers.iter_mut().zip(&steps).zip(&cameras).map(|((renderer, step), cameras)| {
+            RenderRequest { renderer: &mut **renderer, step, cameras: cameras.clone() }
+        });
+        let requests = requests.collect();
+        let (together, counts) = counted(|| render_colours_together(requests));
+        assert_eq!(counts, [1, 1]);
+        for (((world, step), cameras), together) in worlds.iter().zip(&steps).zip(&cameras).zip(together) {
+            let mut alone = gpu(Scenery::of(world)).expect("there is one");
+            let (frames, counts) = counted(|| alone.render_all(step, cameras));
+            assert_eq!(counts, [1, 1]);
+            assert!(together.iter().eq(frames.iter().map(|frame| &frame.rgb)), "pictures differ");
+            let colours: Vec<_> = cameras.iter().map(|camera| alone.render_colours(step, camera)).collect();
+            assert_eq!(together, colours);
+        }
+        assert!(renderers.iter().all(|renderer| renderer.draws_together()), "the device did not fail");
+    }
 }
