@@ -8,6 +8,7 @@ pub use actions::{ActionKind, wrist_columns};
 pub use world::{RewardKind, WorldStep};
 
 use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tandem_sim::JOINTS;
 use tandem_sim::render::render_colours_together;
@@ -15,8 +16,8 @@ use tandem_tools_spec::ToolCall;
 
 use crate::spec::EpisodeSpec;
 use crate::{EpisodeError, Session};
-use parallel::for_each;
-use world::{BatchWorld, SeenStep, SeenWorld, picture_len};
+use parallel::Threads;
+use world::{BatchWorld, SeenStep, SeenWorld};
 
 /// Numbers of a robot's state: its joints' angles (rad), then the base command in force.
 pub const STATE_COLUMNS: usize = JOINTS + 4;
@@ -96,15 +97,20 @@ pub struct BatchStep<'a> {
 
 /// Worlds that take their steps together.
 pub struct Batch {
-    spec: BatchSpec,
-    worlds: Vec<BatchWorld>,
+    spec: Arc<BatchSpec>,
+    worlds: Arc<[Mutex<BatchWorld>]>,
+    threads: Threads,
 }
+
+/// What a step came to in each world that took one.
+type Steps = Vec<Option<Result<SeenStep, BatchError>>>;
 
 impl Batch {
     /// Worlds in which nothing has begun.
     pub fn new(spec: BatchSpec) -> Batch {
-        let worlds = (0..spec.worlds).map(|index| BatchWorld::new(index, spec.worlds)).collect();
-        Batch { spec, worlds }
+        let worlds = (0..spec.worlds).map(|index| Mutex::new(BatchWorld::new(index, spec.worlds))).collect();
+        let threads = Threads::start(spec.threads.min(spec.worlds));
+        Batch { spec: Arc::new(spec), worlds, threads }
     }
 
     pub fn spec(&self) -> &BatchSpec {
@@ -118,14 +124,10 @@ impl Batch {
         seeds: &[Option<Option<u32>>],
         seen: SeenArrays,
     ) -> Result<Vec<Option<WorldStep>>, BatchError> {
-        let spec = &self.spec;
-        let mut steps: Vec<Option<Result<SeenStep, BatchError>>> = self.worlds.iter().map(|_| None).collect();
-        let jobs = self.worlds.iter_mut().zip(seen.split(self.spec.worlds)).zip(seeds).zip(&mut steps);
-        for_each(self.spec.threads, jobs.collect(), |(((world, seen), seed), step)| {
-            *step = seed.map(|seed| world.reset(spec, seed, seen));
-        });
-        self.draw_undrawn(steps.iter_mut().map(Option::as_mut));
-        steps.into_iter().map(|step| step.map(|step| step.map(|step| step.outcome)).transpose()).collect()
+        let seeds = seeds.to_vec();
+        let steps = self.each(move |index, world, spec| Some(world.reset(spec, (*seeds.get(index)?)?)));
+        let outcomes = self.write(steps, seen, SeenArrays::default());
+        outcomes.into_iter().map(Option::transpose).collect()
     }
 
     /// One control step of each world, or the beginning of its next episode. `last` is where the last of an episode is written
@@ -137,41 +139,67 @@ impl Batch {
         last: SeenArrays,
     ) -> Result<Vec<WorldStep>, BatchError> {
         let calls = self.calls(&step)?;
-        let spec = &self.spec;
-        let mut steps: Vec<Option<Result<SeenStep, BatchError>>> = self.worlds.iter().map(|_| None).collect();
-        let seen = seen.split(spec.worlds).zip(last.split(spec.worlds));
-        let jobs = self.worlds.iter_mut().zip(calls).zip(seen).zip(&mut steps);
-        for_each(spec.threads, jobs.collect(), |(((world, call), (seen, last)), stepped)| {
-            *stepped = Some(world.step(spec, &step, &call, seen, last));
-        });
-        self.draw_undrawn(steps.iter_mut().map(Option::as_mut));
-        steps.into_iter().flatten().map(|step| step.map(|step| step.outcome)).collect()
+        let BatchStep { autoreset, looks, .. } = step;
+        let steps =
+            self.each(move |index, world, spec| Some(world.step(spec, calls.get(index)?, autoreset, looks)));
+        self.write(steps, seen, last).into_iter().flatten().collect()
+    }
+
+    /// Has every world do something.
+    fn each(
+        &self,
+        work: impl Fn(usize, &mut BatchWorld, &BatchSpec) -> Option<Result<SeenStep, BatchError>>
+        + Send
+        + Sync
+        + 'static,
+    ) -> Steps {
+        let (spec, worlds) = (self.spec.clone(), self.worlds.clone());
+        self.threads.map(worlds.len(), move |index| work(index, &mut held(&worlds[index]), &spec))
+    }
+
+    /// Writes what is seen, and tells what steps came to.
+    fn write(
+        &self,
+        mut steps: Steps,
+        seen: SeenArrays,
+        last: SeenArrays,
+    ) -> Vec<Option<Result<WorldStep, BatchError>>> {
+        self.draw_undrawn(&mut steps);
+        let places = seen.split(self.spec.worlds).zip(last.split(self.spec.worlds));
+        let write =
+            |(step, (seen, last)): (Option<Result<SeenStep, BatchError>>, (SeenArrays, SeenArrays))| {
+                Some(step?.map(|step| {
+                    seen.write(&step.seen);
+                    if let Some(of_last) = &step.last {
+                        last.write(of_last);
+                    }
+                    step.outcome
+                }))
+            };
+        steps.into_iter().zip(places).map(write).collect()
     }
 
     /// Draws the pictures of all worlds that have left theirs to be drawn together.
-    fn draw_undrawn<'a, 's: 'a>(
-        &mut self,
-        steps: impl Iterator<Item = Option<&'a mut Result<SeenStep<'s>, BatchError>>>,
-    ) {
+    fn draw_undrawn(&self, steps: &mut Steps) {
         let Some(size_px) = self.spec.pictures_px else { return };
+        let mut worlds: Vec<_> = self.worlds.iter().map(held).collect();
         let (mut requests, mut places) = (Vec::new(), Vec::new());
-        for (world, step) in self.worlds.iter_mut().zip(steps) {
-            let undrawn = step.and_then(|step| step.as_mut().ok()?.undrawn.take());
-            if let (Some(session), Some(undrawn)) = (&mut world.session, undrawn) {
+        for (world, step) in worlds.iter_mut().zip(steps) {
+            if let (Some(session), Some(Ok(step))) = (&mut world.session, step)
+                && step.undrawn
+            {
                 requests.push(session.eyes(size_px));
-                places.push(undrawn);
+                places.push(&mut step.seen.pictures);
             }
         }
         for (place, pictures) in places.into_iter().zip(render_colours_together(requests)) {
-            for (place, picture) in place.chunks_exact_mut(picture_len(size_px)).zip(pictures) {
-                place.copy_from_slice(&picture);
-            }
+            *place = pictures;
         }
     }
 
     /// What each world is asked to do, all of it checked.
     fn calls(&self, step: &BatchStep) -> Result<Vec<ToolCall>, BatchError> {
-        if let Some(world) = self.worlds.iter().position(|world| !world.takes(step.autoreset)) {
+        if let Some(world) = self.worlds.iter().position(|world| !held(world).takes(step.autoreset)) {
             return Err(BatchError::NotBegun { world });
         }
         let columns = self.spec.actions.columns();
@@ -187,28 +215,34 @@ impl Batch {
 
     /// What the robots of a world see in pictures of this size.
     pub fn draw(&mut self, world: usize, size_px: [u32; 2]) -> Result<Vec<u8>, BatchError> {
-        let session = self.session(world)?;
-        let robots = session.spec().task.robots.len();
-        Ok((0..robots).flat_map(|robot| session.eye(robot, size_px)).collect())
+        self.ask(world, |session| {
+            let robots = session.spec().task.robots.len();
+            (0..robots).flat_map(|robot| session.eye(robot, size_px)).collect()
+        })
     }
 
     /// The state of a world, as [`Session::state_hash`].
     pub fn state_hash(&mut self, world: usize) -> Result<String, BatchError> {
-        Ok(self.session(world)?.state_hash())
+        self.ask(world, |session| session.state_hash())
     }
 
-    fn session(&mut self, world: usize) -> Result<&mut Session, BatchError> {
+    fn ask<T>(&self, world: usize, asked: impl FnOnce(&mut Session) -> T) -> Result<T, BatchError> {
         let have = self.worlds.len();
-        let found = self.worlds.get_mut(world).ok_or(BatchError::NoWorld { world, have })?;
-        found.session.as_mut().ok_or(BatchError::NotBegun { world })
+        let found = self.worlds.get(world).ok_or(BatchError::NoWorld { world, have })?;
+        held(found).session.as_mut().map(asked).ok_or(BatchError::NotBegun { world })
     }
 }
 
 /// Recordings are whole, whatever keeps their episodes from being played to the end.
 impl Drop for Batch {
     fn drop(&mut self) {
-        self.worlds.iter_mut().for_each(BatchWorld::close);
+        self.worlds.iter().for_each(|world| held(world).close());
     }
+}
+
+/// A world that has panicked has no session, see [`BatchWorld::session`].
+fn held(world: &Mutex<BatchWorld>) -> MutexGuard<'_, BatchWorld> {
+    world.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl<'a> SeenArrays<'a> {
@@ -217,11 +251,20 @@ impl<'a> SeenArrays<'a> {
         SeenArrays { state_rows, pictures: &mut [] }
     }
 
-    /// What each of so many worlds writes; one that writes nothing has nothing.
-    fn split(self, worlds: usize) -> impl Iterator<Item = SeenWorld<'a>> {
+    /// The part of each of so many worlds; where nothing is to be written, it is empty.
+    fn split(self, worlds: usize) -> impl Iterator<Item = SeenArrays<'a>> {
         let state_rows = parts(self.state_rows, worlds);
         let pictures = parts(self.pictures, worlds);
-        state_rows.zip(pictures).map(|(state_rows, pictures)| SeenWorld { state_rows, pictures })
+        state_rows.zip(pictures).map(|(state_rows, pictures)| SeenArrays { state_rows, pictures })
+    }
+
+    /// Writes what is seen of a world to its part.
+    fn write(self, seen: &SeenWorld) {
+        self.state_rows.iter_mut().zip(&seen.state_rows).for_each(|(place, number)| *place = *number);
+        let each = seen.pictures.first().map_or(1, Vec::len);
+        for (place, picture) in self.pictures.chunks_exact_mut(each).zip(&seen.pictures) {
+            place.copy_from_slice(picture);
+        }
     }
 }
 

@@ -1,24 +1,137 @@
-//! Work that several threads share.
+//! Threads on which worlds step.
 
-use std::sync::{Mutex, PoisonError};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvError, Sender, TryRecvError, channel};
 use std::thread;
+use std::time::{Duration, Instant};
 
-/// Does every job on one of so many threads, this one among them. A thread that is done takes the next job: worlds differ in what a
-/// step costs. Threads live as long as the call, so that none is missing in a process that was forked, and none waits for work.
-pub fn for_each<J: Send>(threads: usize, jobs: Vec<J>, work: impl Fn(J) + Sync) {
-    let threads = threads.min(jobs.len());
-    if threads <= 1 {
-        return jobs.into_iter().for_each(work);
+/// Who has nothing to do looks for work so long before it sleeps: to wake a thread takes a tenth of what a world's step takes, and whoever
+/// steps worlds asks for the next step soon after the last.
+const AWAKE: Duration = Duration::from_micros(200);
+
+/// Threads that work side by side with the one that asks them to, as long as this lives. They know nothing of a process that was forked
+/// from theirs: there nothing is to be asked of them.
+pub struct Threads {
+    helpers: Vec<Sender<Round>>,
+}
+
+/// What all threads do together, each by its number.
+type Round = Arc<dyn Fn(usize) + Send + Sync>;
+
+impl Threads {
+    /// So many threads, the caller's among them; fewer where the system has no more.
+    pub fn start(threads: usize) -> Threads {
+        let helper = |thread| {
+            let (rounds, asked) = channel::<Round>();
+            let work = move || {
+                while let Ok(round) = next(&asked) {
+                    round(thread);
+                }
+            };
+            let started = thread::Builder::new().name("worlds".into()).spawn(work);
+            started.ok().map(|_| rounds)
+        };
+        Threads { helpers: (1..threads).filter_map(helper).collect() }
     }
-    let jobs = Mutex::new(jobs.into_iter());
-    let next = || jobs.lock().unwrap_or_else(PoisonError::into_inner).next();
-    let run = || {
-        while let Some(job) = next() {
-            work(job);
+
+    /// What so many jobs come to. A thread begins with jobs that were its own in the last round, too, and has them in its caches; one
+    /// that is done goes on with those of others, because worlds differ in what a step costs.
+    pub fn map<R: Send + 'static>(
+        &self,
+        jobs: usize,
+        work: impl Fn(usize) -> R + Send + Sync + 'static,
+    ) -> Vec<R> {
+        if self.helpers.is_empty() {
+            return (0..jobs).map(work).collect();
         }
-    };
-    thread::scope(|scope| {
-        (1..threads).for_each(|_| drop(scope.spawn(run)));
-        run();
-    });
+        let threads = self.helpers.len() + 1;
+        let (done, results) = channel();
+        let begun: Vec<AtomicBool> = (0..jobs).map(|_| AtomicBool::new(false)).collect();
+        let round: Round = Arc::new(move |thread| {
+            let own = thread * jobs / threads..(thread + 1) * jobs / threads;
+            for job in own.chain((0..jobs).rev()) {
+                if !begun[job].swap(true, Ordering::Relaxed) {
+                    // Nobody listens any more where another job has panicked.
+                    let _ = done.send((job, catch_unwind(AssertUnwindSafe(|| work(job)))));
+                }
+            }
+        });
+        for helper in &self.helpers {
+            // One that is gone is not missed: every thread does what is left.
+            let _ = helper.send(round.clone());
+        }
+        round(0);
+        in_order(jobs, &results)
+    }
+}
+
+/// The results of so many jobs, as soon as all are there; what a job has panicked with goes on in the caller.
+fn in_order<R>(jobs: usize, results: &Receiver<(usize, thread::Result<R>)>) -> Vec<R> {
+    let mut found: Vec<Option<R>> = (0..jobs).map(|_| None).collect();
+    for _ in 0..jobs {
+        let (job, result) = next(results).expect("every job ends");
+        found[job] = Some(result.unwrap_or_else(|panic| resume_unwind(panic)));
+    }
+    found.into_iter().flatten().collect()
+}
+
+/// What comes next, awake for a while and then asleep.
+fn next<T>(inbox: &Receiver<T>) -> Result<T, RecvError> {
+    let begin = Instant::now();
+    while begin.elapsed() < AWAKE {
+        match inbox.try_recv() {
+            Ok(next) => return Ok(next),
+            Err(TryRecvError::Disconnected) => return Err(RecvError),
+            // On a busy machine somebody else has use for the core.
+            Err(TryRecvError::Empty) => thread::yield_now(),
+        }
+    }
+    inbox.recv()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn every_job_is_done_once_and_told_in_order() {
+        for threads in [1, 2, 5] {
+            let threads = Threads::start(threads);
+            for jobs in [0, 1, 3, 40] {
+                let squares = threads.map(jobs, |job| job * job);
+                assert_eq!(squares, (0..jobs).map(|job| job * job).collect::<Vec<_>>());
+            }
+        }
+    }
+
+    #[test]
+    fn threads_live_on_and_jobs_of_a_slow_one_are_taken_over() {
+        let threads = Threads::start(2);
+        let slow = || {
+            threads.map(8, |job| {
+                thread::sleep(Duration::from_millis(if job == 0 { 100 } else { 1 }));
+                thread::current().id()
+            })
+        };
+        let (first, second) = (slow(), slow());
+        let of = |ids: &[thread::ThreadId]| ids.iter().map(|id| format!("{id:?}")).collect::<BTreeSet<_>>();
+        assert_eq!((of(&first).len(), of(&first)), (2, of(&second)));
+        // All but the slow job are done by the other thread long before that one ends.
+        assert!(first[1..].iter().all(|id| *id == first[7] && *id != first[0]), "{first:?}");
+    }
+
+    #[test]
+    fn a_panic_reaches_the_caller_and_threads_go_on() {
+        let threads = Threads::start(2);
+        let failed = catch_unwind(AssertUnwindSafe(|| {
+            threads.map(6, |job| assert!(job != 5, "job {job}"));
+        }));
+        let panic = failed.unwrap_err();
+        assert_eq!(panic.downcast_ref::<String>().map(String::as_str), Some("job 5"));
+        assert_eq!(threads.map(4, |job| job), [0, 1, 2, 3]);
+    }
 }

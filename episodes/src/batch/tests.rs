@@ -74,7 +74,7 @@ fn seeds_are_those_of_the_episodes_index() {
     );
     // World 0 is over sooner, twice.
     for round in 1..=2 {
-        batch.worlds[0].over = true;
+        held(&batch.worlds[0]).over = true;
         let begun = stepped(&mut batch, Autoreset::NextStep, &mut seen);
         assert_eq!((begun[0].seed, begun[0].env_steps, begun[0].reward), (2000 + 2 * round, 0, 0.0));
         assert_eq!((begun[1].seed, begun[1].env_steps), (2001, round));
@@ -173,7 +173,7 @@ fn a_step_is_refused_as_a_whole() {
     let text = refused(&mut batch, &actions, Autoreset::NextStep);
     assert!(text.contains("row 0"), "{text}");
     assert_eq!(batch.state_hash(0).unwrap(), before);
-    batch.worlds[1].over = true;
+    held(&batch.worlds[1]).over = true;
     let text = refused(&mut batch, &standing(2), Autoreset::Disabled);
     assert_eq!(text, "world 1 has no episode under way; reset it first");
     assert!(batch.draw(2, [8, 8]).unwrap_err().to_string().contains("0 to 1"));
@@ -209,13 +209,14 @@ fn wrists_go_where_a_row_says() {
         let outcome = batch.step(step, SeenArrays::of_states(&mut seen), SeenArrays::default()).unwrap();
         progress += outcome[0].reward;
     }
-    let session = batch.session(0).unwrap();
-    let wrist = session.present().robots[0].sensed.pelvis_from_wrist.right.translation;
+    let wrist =
+        |session: &mut Session| session.present().robots[0].sensed.pelvis_from_wrist.right.translation;
+    let wrist = batch.ask(0, wrist).unwrap();
     // Arms that are flung forward make a robot step, and wrists sway with its pelvis.
     assert!((wrist - tandem_sim::Vector::new(0.25, -0.25, 0.10)).length() < 0.08, "{wrist}");
     // Rewards add up to what has been come by since the beginning: the hands have come nearer to the bottle.
     let begin = Session::start(&EpisodeSpec { seed: 2000, ..batch.spec().episode.clone() }, None).unwrap();
-    let now = batch.session(0).unwrap().progress();
+    let now = batch.ask(0, |session| session.progress()).unwrap();
     assert!((now - begin.progress() - progress).abs() < 1e-6 && progress > 0.01, "{now} {progress}");
     assert_eq!(wrist_columns().len(), ActionKind::Wrists.columns());
 }

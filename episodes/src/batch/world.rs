@@ -3,10 +3,9 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-use tandem_sim::JOINTS;
 use tandem_tools_spec::ToolCall;
 
-use super::{Autoreset, BatchError, BatchSpec, BatchStep, STATE_COLUMNS};
+use super::{Autoreset, BatchError, BatchSpec, STATE_COLUMNS};
 use crate::Session;
 use crate::commands::base_row;
 use crate::spec::EpisodeSpec;
@@ -55,16 +54,23 @@ pub struct WorldStep {
     pub failure: Option<String>,
 }
 
-/// Where a world writes what is seen of it.
-pub struct SeenWorld<'a> {
-    pub state_rows: &'a mut [f32],
-    pub pictures: &'a mut [u8],
+/// What is seen of a world; nothing of one that has panicked.
+#[derive(Default)]
+pub struct SeenWorld {
+    /// [`STATE_COLUMNS`] a robot.
+    pub state_rows: Vec<f32>,
+    /// One a robot, where they have been drawn.
+    pub pictures: Vec<Vec<u8>>,
 }
 
-/// What a step came to, and the pictures that are still to be drawn, with those of other worlds.
-pub struct SeenStep<'a> {
+/// What a step came to, and what is seen then.
+pub struct SeenStep {
     pub outcome: WorldStep,
-    pub undrawn: Option<&'a mut [u8]>,
+    pub seen: SeenWorld,
+    /// The last of the episode, where the next one has begun in the same step.
+    pub last: Option<SeenWorld>,
+    /// Whether pictures are still to be drawn, with those of other worlds.
+    pub undrawn: bool,
 }
 
 /// Episode after episode.
@@ -95,23 +101,18 @@ impl BatchWorld {
     }
 
     /// Begins a round: with this seed, or with the one after that of the last round.
-    pub fn reset<'a>(
-        &mut self,
-        spec: &BatchSpec,
-        seed: Option<u32>,
-        seen: SeenWorld<'a>,
-    ) -> Result<SeenStep<'a>, BatchError> {
+    pub fn reset(&mut self, spec: &BatchSpec, seed: Option<u32>) -> Result<SeenStep, BatchError> {
         let next = match self.round_seed {
             Some(last) => last.wrapping_add(self.stride),
             None => FIRST_SEED.wrapping_add(self.index as u32),
         };
         self.round_seed = Some(seed.unwrap_or(next));
         self.episodes = 0;
-        self.begin(spec, seen)
+        self.begin(spec)
     }
 
     /// Begins the next episode of the round. Its seed is the index's: no episode begins elsewhere because another one ended sooner.
-    fn begin<'a>(&mut self, spec: &BatchSpec, seen: SeenWorld<'a>) -> Result<SeenStep<'a>, BatchError> {
+    fn begin(&mut self, spec: &BatchSpec) -> Result<SeenStep, BatchError> {
         let round_seed = self.round_seed.unwrap_or(FIRST_SEED);
         let seed = round_seed.wrapping_add(self.stride.wrapping_mul(self.episodes));
         self.close();
@@ -129,41 +130,38 @@ impl BatchWorld {
             RewardKind::Sparse => 0.0,
             RewardKind::Dense => session.progress(),
         };
-        let undrawn = look(spec, session, seen, true);
         let fallen = vec![false; episode.task.robots.len()];
-        Ok(SeenStep { outcome: WorldStep { seed, fallen, ..WorldStep::default() }, undrawn })
+        let outcome = WorldStep { seed, fallen, ..WorldStep::default() };
+        Ok(look(spec, session, outcome, true))
     }
 
     /// One control step, or the beginning of the next episode.
-    pub fn step<'a>(
+    pub fn step(
         &mut self,
         spec: &BatchSpec,
-        step: &BatchStep,
         call: &ToolCall,
-        seen: SeenWorld<'a>,
-        last: SeenWorld<'a>,
-    ) -> Result<SeenStep<'a>, BatchError> {
+        autoreset: Autoreset,
+        looks: bool,
+    ) -> Result<SeenStep, BatchError> {
         if self.over {
-            return self.begin(spec, seen);
+            return self.begin(spec);
         }
-        let mut outcome = self.advance(spec, call);
+        let outcome = self.advance(spec, call);
         self.over = outcome.terminated || outcome.truncated;
-        let (shown, anew) = match step.autoreset {
-            Autoreset::SameStep if self.over => (last, Some(seen)),
-            Autoreset::SameStep | Autoreset::NextStep | Autoreset::Disabled => (seen, None),
+        let mut step = match &mut self.session {
+            Some(session) => look(spec, session, outcome, looks || self.over),
+            None => SeenStep { outcome, seen: SeenWorld::default(), last: None, undrawn: false },
         };
-        let session = self.session.as_mut();
-        let mut undrawn = session.and_then(|session| look(spec, session, shown, step.looks || self.over));
-        if let Some(seen) = anew {
+        if self.over && autoreset == Autoreset::SameStep {
             // An episode's last pictures cannot wait: its world goes.
-            if let (Some(session), Some(pictures)) = (&mut self.session, undrawn) {
-                draw(spec, session, pictures);
+            if let Some(session) = self.session.as_mut().filter(|_| step.undrawn) {
+                step.seen.pictures = draw(spec, session);
             }
-            let next = self.begin(spec, seen)?;
-            outcome.next_seed = Some(next.outcome.seed);
-            undrawn = next.undrawn;
+            let next = self.begin(spec)?;
+            step.outcome.next_seed = Some(next.outcome.seed);
+            (step.last, step.seen, step.undrawn) = (Some(step.seen), next.seen, next.undrawn);
         }
-        Ok(SeenStep { outcome, undrawn })
+        Ok(step)
     }
 
     /// One control step, and what it came to. What goes wrong in a world is told of this world alone.
@@ -221,39 +219,22 @@ impl BatchWorld {
     }
 }
 
-/// Writes what is seen now; pictures only where they are to be drawn. Returns where they belong if they are better drawn together with
-/// those of other worlds.
-fn look<'a>(
-    spec: &BatchSpec,
-    session: &mut Session,
-    seen: SeenWorld<'a>,
-    draws: bool,
-) -> Option<&'a mut [u8]> {
-    let robots = session.present().robots.iter();
-    for (robot, row) in robots.zip(seen.state_rows.chunks_exact_mut(STATE_COLUMNS)) {
-        let (joints, base) = row.split_at_mut(JOINTS);
-        joints.copy_from_slice(&robot.sensed.joints.q_rad);
-        base.copy_from_slice(&base_row(&robot.command.base));
+/// What is seen of a world after a step; pictures only where they are to be drawn, and not yet if they are better drawn together with those
+/// of other worlds.
+fn look(spec: &BatchSpec, session: &mut Session, outcome: WorldStep, draws: bool) -> SeenStep {
+    let mut state_rows = Vec::with_capacity(session.present().robots.len() * STATE_COLUMNS);
+    for robot in &session.present().robots {
+        state_rows.extend(robot.sensed.joints.q_rad);
+        state_rows.extend(base_row(&robot.command.base));
     }
-    if !draws || seen.pictures.is_empty() {
-        return None;
-    }
-    if session.draws_together() {
-        return Some(seen.pictures);
-    }
-    draw(spec, session, seen.pictures);
-    None
+    let draws = draws && spec.pictures_px.is_some();
+    let undrawn = draws && session.draws_together();
+    let pictures = if draws && !undrawn { draw(spec, session) } else { Vec::new() };
+    SeenStep { outcome, seen: SeenWorld { state_rows, pictures }, last: None, undrawn }
 }
 
 /// Draws what the robots of a world see.
-fn draw(spec: &BatchSpec, session: &mut Session, pictures: &mut [u8]) {
-    let Some(size_px) = spec.pictures_px else { return };
-    for (robot, picture) in pictures.chunks_exact_mut(picture_len(size_px)).enumerate() {
-        picture.copy_from_slice(&session.eye(robot, size_px));
-    }
-}
-
-/// Bytes of a picture.
-pub fn picture_len([width, height]: [u32; 2]) -> usize {
-    width as usize * height as usize * 3
+fn draw(spec: &BatchSpec, session: &mut Session) -> Vec<Vec<u8>> {
+    let Some(size_px) = spec.pictures_px else { return Vec::new() };
+    (0..session.present().robots.len()).map(|robot| session.eye(robot, size_px)).collect()
 }
