@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import subprocess
+import sys
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -121,6 +123,22 @@ def test_statistics_are_of_all_rows(whole: Path) -> None:
     tasks = parquet.read_table(whole / "meta/tasks.parquet").to_pylist()
     assert [row["task_index"] for row in tasks] == [0]
     assert tasks[0]["task"].startswith("Robot A picks up the bottle")
+
+
+def test_the_card_says_how_it_was_made(whole: Path, tmp_path: Path) -> None:
+    card = (whole / "README.md").read_text()
+    for line in (
+        "* Robots were told: A: Take the bottle",
+        "* Episodes: benchmark protocol, sensors ideal",
+        "* Seeds: 2010-2011",
+    ):
+        assert f"\n{line}" in card, card
+    varied = tmp_path / "varied"
+    told = ["--tasks=handover", "--seeds=2012", "--protocol=benchmark", "--spread=2", "--variety=1", "--disturb=0.5"]
+    command = [sys.executable, "-m", "tandem", "collect", *told, "--no-reports", f"--out={varied}"]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    (exported,) = export_lerobot(varied, tmp_path / "set", ExportSettings(cameras=(), rate_hz=10))
+    assert "ideal, spread 2, variety 1, disturb 0.5\n" in (exported.folder / "README.md").read_text()
 
 
 def test_an_export_goes_on_and_disturbs_no_other(runs: Path, whole: Path, tmp_path: Path) -> None:

@@ -284,11 +284,19 @@ def _write_about(
         recordings=len(sources),
         successes=about["successes"],
         seeds=", ".join(_ranges([source.seed for source in sources])),
+        made="; ".join(_played(spec) for spec in specs),
+        told=" ".join(f"{robot}: {words}" for robot, words in about["instructions"].items()),
         builds=", ".join(builds),
         settings=", ".join(f"{name} {value}" for name, value in plan["settings"].items()),
         splits=", ".join(f"{name} {span}" for name, span in names.items()),
     )
     (whole / "README.md").write_text(card)
+
+
+def _played(spec: dict[str, Any]) -> str:
+    """How episodes were played, in words. What is disturbed is said in the card's last paragraph."""
+    variation = ", ".join(f"{name} {value:g}" for name, value in spec.get("variation", {}).items())
+    return f"{spec['protocol']} protocol, sensors {spec['sensing']['sensors']}" + (f", {variation}" if variation else "")
 
 
 def _ranges(numbers: Sequence[int]) -> list[str]:
@@ -316,13 +324,16 @@ configs:
 {episodes} episodes, {rows} rows, of {recordings} recordings, {successes} of which reached the last phase: simulated Unitree
 G1 robots with Dex3 hands, recorded and exported by Tandem (`tandem export lerobot`). `meta/tandem.json` names every recording.
 
+* Robots were told: {told}
+* Episodes: {made}
 * Seeds: {seeds}
 * Builds: {builds}
 * Settings: {settings}
 * Episodes of each split: {splits}
 
 A row is a moment: `observation` is what robots sensed and saw then, `action` the joint targets that are to be reached when
-the next row begins, and the mean velocity of the base until then. Columns named `privileged` are what no policy gets.
+the next row begins, and the mean velocity of the base until then. Where episodes were disturbed, that is what the demonstrator
+told; what was done is the same with slow noise. Columns named `privileged` are what no policy gets.
 """
 
 __all__ = ["Exported", "Stopped", "export_lerobot", "find", "splits"]
