@@ -14,10 +14,9 @@ use crate::render::{Carrier, PlacedScenery, Scenery};
 /// Texels along each side of a cell: what is nearer than all of a cell is in the sun there, without a look at its texels.
 const CELL: usize = 8;
 const CELLS: usize = TEXELS / CELL;
+const _: () = assert!(CELLS == u128::BITS as usize, "a row of cells is the bits of a number");
 /// The cell of everything outside of the map, which is in the sun.
 const OUTSIDE: u32 = (CELLS * CELLS) as u32;
-/// Columns of cells that are widened, beginning with none.
-const NO_CELLS: Range<usize> = Range { start: CELLS, end: 0 };
 /// Texels that the filter takes along each axis: a cell counts those that a filter begun in it can reach.
 const TAPS: usize = 4;
 const GRID: Grid = Grid { width: TEXELS, height: TEXELS, pitch_px: 1.0 };
@@ -31,8 +30,8 @@ pub(super) struct ShadowMap {
     still: ShadowLayer,
     /// The shadows of everything.
     all: ShadowLayer,
-    /// For each row of cells, the columns of those in which `all` may differ from `still`.
-    moving: Vec<Range<usize>>,
+    /// For each row of cells, those in which `all` may differ from `still`, a bit a column.
+    moving: Vec<u128>,
     corners: Vec<[f32; 3]>,
     front: Vec<u32>,
 }
@@ -62,14 +61,14 @@ impl ShadowMap {
             self.map_from_world = sun_map(light.sun_direction, placed.focus_m, *focus_radius_m);
             self.still.nearness_m.reset(GRID, 0.0);
             self.still.cells_m.resize(CELLS * CELLS + 1, [f32::NEG_INFINITY; 2]);
-            self.moving = vec![NO_CELLS; CELLS];
+            self.moving = vec![0; CELLS];
             self.draw_parts(simd, prepared, placed, |carrier| carrier == Carrier::Room);
-            self.still.measure(&vec![0..CELLS; CELLS]);
+            self.still.measure(&[u128::MAX; CELLS]);
             self.all.nearness_m.copy(&self.still.nearness_m);
             self.all.cells_m.clone_from(&self.still.cells_m);
         }
         self.all.restore(&self.still, &self.moving);
-        self.moving.fill(NO_CELLS);
+        self.moving.fill(0);
         self.draw_parts(simd, prepared, placed, |carrier| carrier != Carrier::Room);
         self.all.measure(&self.moving);
     }
@@ -92,15 +91,18 @@ impl ShadowMap {
             let (centre_m, around_m) = prepared.bounds[number];
             let texels = around_m * 0.5 * TEXELS as f32 / prepared.scenery.focus_radius_m;
             let [u, v, _] = map_from_mesh.map(centre_m);
-            let [columns, rows] = [u, v].map(|middle| cells(middle - texels, middle + texels));
-            if columns.is_empty() || rows.is_empty() {
+            let around = [u, v].map(|middle| cells(middle - texels, middle + texels));
+            if around.iter().any(Range::is_empty) {
                 continue;
             }
-            let layer = if part.carrier == Carrier::Room { &mut self.still } else { &mut self.all };
-            for range in &mut self.moving[rows] {
-                *range = range.start.min(columns.start)..range.end.max(columns.end);
-            }
             prepared.points[number].map_into(&mut self.corners, |block| map_from_mesh.map_lanes(block));
+            let [columns, rows] = reached_cells(&self.corners[..part.mesh.vertices.len()]);
+            let reached =
+                u128::MAX.unbounded_shl(columns.start as u32) & !u128::MAX.unbounded_shl(columns.end as u32);
+            for moving in &mut self.moving[rows] {
+                *moving |= reached;
+            }
+            let layer = if part.carrier == Carrier::Room { &mut self.still } else { &mut self.all };
             let to_sun =
                 placed.world_from_mesh[number].rotation.inverse() * prepared.scenery.light.sun_direction;
             prepared.faces[number].put_front(&mut self.front, [to_sun.x, to_sun.y, to_sun.z, 0.0]);
@@ -172,8 +174,9 @@ impl ShadowMap {
 
 impl ShadowLayer {
     /// Makes what moved as it is without.
-    fn restore(&mut self, still: &ShadowLayer, moving: &[Range<usize>]) {
-        for (row, columns) in moving.iter().enumerate().filter(|(_, columns)| !columns.is_empty()) {
+    fn restore(&mut self, still: &ShadowLayer, moving: &[u128]) {
+        let of_rows = moving.iter().enumerate();
+        for (row, columns) in of_rows.flat_map(|(row, moving)| runs(*moving).map(move |run| (row, run))) {
             let of_row = row * CELLS + columns.start..row * CELLS + columns.end;
             self.cells_m[of_row.clone()].copy_from_slice(&still.cells_m[of_row]);
             for row in row * CELL..(row + 1) * CELL {
@@ -197,15 +200,17 @@ impl ShadowLayer {
 
     /// Finds the least and the greatest of some cells.
     #[inline(always)]
-    fn measure(&mut self, drawn: &[Range<usize>]) {
-        for (row, columns) in drawn.iter().enumerate().filter(|(_, columns)| !columns.is_empty()) {
-            self.measure_row(row, columns.clone());
+    fn measure(&mut self, drawn: &[u128]) {
+        for (row, drawn) in drawn.iter().enumerate() {
+            for columns in runs(*drawn) {
+                self.measure_run(row, columns);
+            }
         }
     }
 
     /// Goes from right to left, for a cell reaches over the first texels of the next.
     #[inline(always)]
-    fn measure_row(&mut self, row: usize, columns: Range<usize>) {
+    fn measure_run(&mut self, row: usize, columns: Range<usize>) {
         let mut beside = [f32::INFINITY, 0.0];
         for column in (columns.start..(columns.end + 1).min(CELLS)).rev() {
             let (mut least, mut greatest) = ([f32::INFINITY; CELL], [0.0; CELL]);
@@ -232,6 +237,27 @@ impl ShadowLayer {
             beside = first;
         }
     }
+}
+
+/// Columns and rows of the cells whose filters reach what is between some corners.
+fn reached_cells(corners: &[[f32; 3]]) -> [Range<usize>; 2] {
+    let mut low = [f32::INFINITY; 2];
+    let mut high = [f32::NEG_INFINITY; 2];
+    for [u, v, _] in corners {
+        low = [smaller(*u, low[0]), smaller(*v, low[1])];
+        high = [larger(*u, high[0]), larger(*v, high[1])];
+    }
+    [cells(low[0], high[0]), cells(low[1], high[1])]
+}
+
+/// The columns whose bits are set, in runs.
+fn runs(mut columns: u128) -> impl Iterator<Item = Range<usize>> {
+    std::iter::from_fn(move || {
+        let start = columns.trailing_zeros();
+        let end = start + columns.unbounded_shr(start).trailing_ones();
+        columns &= u128::MAX.unbounded_shl(end);
+        (start < end).then_some(start as usize..end as usize)
+    })
 }
 
 /// The cells whose filters reach what is between two texels.

@@ -70,7 +70,10 @@ impl View<'_> {
             }
             // Pixels show one sheet as far as they are plain: an edge would be in the last of them.
             let most = row.sum_rgb.len().min(x + row.surfaces.room());
-            let end = (x + 1..most).find(|x| !plain(&row.edges, *x)).unwrap_or(most);
+            let mut end = x + 1;
+            while end < most && plain(&row.edges, end) {
+                end += 1;
+            }
             self.show(row, x..end, [x * SAMPLES, y * SAMPLES], rows[0][x * SAMPLES], 1.0);
             x = end;
         }
@@ -103,8 +106,9 @@ impl View<'_> {
         let sx = x * SAMPLES;
         // At the border of the picture the last samples are their own neighbours.
         let columns = [sx, sx + 1, (sx + SAMPLES).min(self.target.width() - 1)];
-        let seen = rows.map(|row| columns.map(|column| row[column]));
-        let ids = seen.map(|row| row.map(|sheet| self.prepared.id(sheet)));
+        let seen = [picked(rows[0], columns), picked(rows[1], columns), picked(rows[2], columns)];
+        let [above, here, below] = &seen;
+        let ids = [self.ids(above), self.ids(here), self.ids(below)];
         let one_thing = ids.as_flattened().iter().all(|id| *id == ids[0][0]);
         let edges = if one_thing { 0 } else { self.outlines(y, columns, &seen, &ids) };
         let share = 1.0 - OUTLINE * (edges as f32 / (2 * SAMPLES) as f32).min(1.0);
@@ -118,32 +122,39 @@ impl View<'_> {
         }
     }
 
-    /// How often a sample of a pixel in row `y` and its neighbour to the right or below show different things at different depths.
     #[inline(always)]
+    fn ids(&self, sheets: &[u32; SAMPLES + 1]) -> [u32; SAMPLES + 1] {
+        let [a, b, c] = *sheets;
+        [self.prepared.id(a), self.prepared.id(b), self.prepared.id(c)]
+    }
+
+    /// How often a sample of a pixel in row `y` and its neighbour to the right or below show different things at different depths.
     fn outlines(&self, y: usize, columns: [usize; 3], seen: &Neighbours, ids: &Neighbours) -> u32 {
         let last = self.target.height() - 1;
-        let nearness_1_m = |[row, column]: [usize; 2]| {
-            self.target.nearness_1_m((y * SAMPLES + row).min(last))[columns[column]]
+        let two_things = |[r, c]: [usize; 2], [other_r, other_c]: [usize; 2]| {
+            ids[r][c] != ids[other_r][other_c] && seen[r][c] != NOTHING && seen[other_r][other_c] != NOTHING
         };
-        let differ = |[r, c]: [usize; 2], [other_r, other_c]: [usize; 2]| {
-            let two_things = ids[r][c] != ids[other_r][other_c]
-                && seen[r][c] != NOTHING
-                && seen[other_r][other_c] != NOTHING;
-            let far_apart = || {
-                let (a, b) = (nearness_1_m([r, c]), nearness_1_m([other_r, other_c]));
-                (a - b).abs() > OUTLINE_DEPTH_STEP * a.max(b)
-            };
-            two_things && far_apart()
-        };
+        let nearness_1_m =
+            |[r, c]: [usize; 2]| self.target.nearness_1_m((y * SAMPLES + r).min(last))[columns[c]];
         let mut edges = 0;
         // Samples in the last row or column of the picture have no outline.
         for r in 0..SAMPLES.min(last - y * SAMPLES) {
             for c in 0..columns[2] - columns[0] {
-                edges += u32::from(differ([r, c], [r, c + 1])) + u32::from(differ([r, c], [r + 1, c]));
+                for other in [[r, c + 1], [r + 1, c]] {
+                    if two_things([r, c], other) {
+                        let (a, b) = (nearness_1_m([r, c]), nearness_1_m(other));
+                        edges += u32::from((a - b).abs() > OUTLINE_DEPTH_STEP * a.max(b));
+                    }
+                }
             }
         }
         edges
     }
+}
+
+#[inline(always)]
+fn picked(row: &[u32], columns: [usize; SAMPLES + 1]) -> [u32; SAMPLES + 1] {
+    [row[columns[0]], row[columns[1]], row[columns[2]]]
 }
 
 impl Default for Row {
