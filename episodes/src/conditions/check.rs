@@ -57,7 +57,8 @@ impl Checker<'_> {
             NodeKind::Number(value) => Ok(Number::Value(*value).into()),
             NodeKind::Text(text) => {
                 let what = format!(
-                    "{text:?} is a name; names stand in the brackets of facts alone, as in lift_m({text:?}) >= 0.03"
+                    "{text:?} is a text; texts stand in the brackets of facts, as in lift_m({text:?}) >= 0.03, or are compared with \
+                     texts, as what a seed has chosen: \"{{wanted}}\" == \"red\""
                 );
                 Err(Mistake::new(node.at.clone(), what))
             }
@@ -119,6 +120,14 @@ impl Checker<'_> {
     }
 
     fn compared(&self, relation: Relation, left: &Node, right: &Node) -> Result<Meaning, Mistake> {
+        // What a seed has chosen is a text like any other by now.
+        if let (NodeKind::Text(one), NodeKind::Text(other)) = (&left.kind, &right.kind) {
+            match relation {
+                Relation::Equal => return Ok(Truth::Always(one == other).into()),
+                Relation::Unequal => return Ok(Truth::Always(one != other).into()),
+                _ => {}
+            }
+        }
         match (self.meaning(left)?, relation) {
             (Meaning::Number(number), _) => {
                 Ok(Truth::Compared { relation, sides: [number, self.number(right)?] }.into())
@@ -147,8 +156,10 @@ impl Checker<'_> {
         if let Some(meaning) = self.names.terms.get(name) {
             return Ok(meaning.clone());
         }
+        if self.names.mistaken_terms.contains(name) {
+            return Err(Mistake::following(at.clone()));
+        }
         let what = match FUNCTIONS.iter().find(|function| function.name == name) {
-            _ if self.names.mistaken_terms.contains(name) => String::new(),
             Some(function) => format!("{name} is asked for with brackets, as {}", function.signature()),
             None if self.names.objects.contains_key(name)
                 || self.names.robots.iter().any(|one| one == name) =>
@@ -227,6 +238,9 @@ impl Checker<'_> {
                 let name = text(function, node, "an object's name in quotes")?;
                 match self.names.objects.contains_key(name) {
                     true => Ok(Argument::Object(name.into())),
+                    false if self.names.mistaken_objects.contains(name) => {
+                        Err(Mistake::following(node.at.clone()))
+                    }
                     false => Err(unknown(node, "object", name, objects())),
                 }
             }
@@ -299,7 +313,7 @@ fn unknown<'a>(node: &Node, kind: &str, name: &str, have: impl Iterator<Item = &
 }
 
 /// "; is it lift_m?" for what is written nearly so.
-fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
+pub fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
     let changes = known.map(|known| (changes(name, known), known)).min();
     match changes {
         Some((changes, known)) if changes > 0 && changes <= 1 + name.len() / 4 => format!("; is it {known}?"),

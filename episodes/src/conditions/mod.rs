@@ -13,6 +13,7 @@ use std::sync::Arc;
 
 use tandem_sim::ObjectModel;
 
+pub use check::nearest;
 pub use functions::{FUNCTIONS, Function};
 pub use meaning::{Meaning, Number, Truth};
 
@@ -25,8 +26,9 @@ pub struct Names {
     pub objects: BTreeMap<String, Arc<ObjectModel>>,
     /// Names that the file has given to expressions.
     pub terms: BTreeMap<String, Meaning>,
-    /// Names of expressions in which mistakes were found: who uses them makes none.
+    /// Names of expressions and of objects in which mistakes were found: who uses them makes none.
     pub mistaken_terms: BTreeSet<String>,
+    pub mistaken_objects: BTreeSet<String>,
 }
 
 /// What is wrong with an expression, and what would be right.
@@ -41,6 +43,10 @@ impl Mistake {
     /// Whether it only follows from a mistake that is told elsewhere.
     pub fn follows(&self) -> bool {
         self.text.is_empty()
+    }
+
+    fn following(at: Range<usize>) -> Mistake {
+        Mistake::new(at, "")
     }
 
     fn new(at: Range<usize>, text: impl Into<String>) -> Mistake {

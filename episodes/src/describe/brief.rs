@@ -32,11 +32,12 @@ const HANDS: &str = "A wrist's x axis points along its fingers, and its z axis a
 
 /// What only they are told who are told what hands feel.
 const GRIP: &str = "A hand holds something, as phases ask for, while its thumb presses on one side of it and fingers or palm press \
-    against that, each with 1.5 N or more, for 60 ms: grip then says \"holding\". Where it says \"one_sided\", close by 0.2 rad more what \
+    on the opposite one, each with 1.5 N or more, for 60 ms. grip is what the fingers' own drives feel of that: it says \"holding\" where \
+    both press, though a thing that only hangs in a bent hand is pressed on neighbouring sides, and not held; close farther then. Where it says \"one_sided\", close by 0.2 rad more what \
     does not press yet, mostly the thumb; where it says \"touching\" or \"none\" though the hand is closed, bring the palm nearer first. ";
 
 const GRASPING: &str = "Fingers that are stopped short of their targets press: ask them for 0.3 rad more than a thing leaves them. `grips` has \
-    grips that work, for a robot that faces the thing squarely. Put the wrist where the place lies at place_m in its frame: \
+    grips that work, of right hands (left ones negate all angles but the first), for a robot that faces the thing squarely. Put the wrist where the place lies at place_m in its frame: \
     position = place - R place_m, R being the quaternion's rotation. Come with open_rad over the stops, at each of which place_m is so \
     much more, then to place_m itself; close to close_rad in 25 to 40 steps, fingers first around a bar, and hold still for 20. A hand \
     that closes on a thing without lying on it drags it, and is dragged: robots that are pulled so step and sink; then let the hand go \

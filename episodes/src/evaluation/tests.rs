@@ -268,6 +268,14 @@ fn what_was_played_before_is_kept_where_no_other_episode_can_be() {
         workers::play_all(&cache, &work, &mut left_out, &|_| {}).map(|episodes| (episodes.len(), left_out))
     };
     // The first episode finds nobody; what comes after it was played by an earlier run.
+    // A player that knows a task not at all plays none of its episodes.
+    let player = players::find("no_words").unwrap();
+    let refused = player.play_episode(
+        &EpisodeSpec::new(tasks::find("handover").unwrap(), 1, Protocol::Benchmark),
+        EpisodeOutput { folder: folder.path(), record: false, pages: false },
+    );
+    let Err(PlayError::NotReady(reason)) = refused else { panic!("it cannot play that") };
+    assert!(reason.contains("the seed chooses nothing in task \"handover\""), "{reason}");
     let absent = play(|| PlayError::Absent("nobody".into())).unwrap_err();
     assert!(matches!(absent, EvaluationError::PolicyAbsent { kept: 2, planned: 4, .. }), "{absent}");
 

@@ -133,6 +133,14 @@ pub fn expert_or_nobody(task: &'static Task) -> Result<&'static PlayerEntry, Pla
 }
 
 impl PlayerEntry {
+    /// Whether it can play such an episode; why not, if it cannot.
+    pub fn check(&self, spec: &EpisodeSpec) -> Result<(), PlayerError> {
+        match self.make {
+            PlayerFactory::Player(make) => make(spec).map(drop),
+            PlayerFactory::PrivilegedPlayer(make) => make(spec).map(drop),
+        }
+    }
+
     /// Plays the episode `spec`. That it ends under way is no error: the last phase may have been reached.
     pub fn play(&self, spec: &EpisodeSpec, episode: &mut dyn PrivilegedEpisode) -> Result<(), PlayerError> {
         let outcome = match self.make {
@@ -158,12 +166,8 @@ mod tests {
             assert_eq!(find(entry.name).unwrap().name, entry.name);
             for task in tasks::ALL {
                 let spec = EpisodeSpec::new(task, 0, Protocol::Agentic);
-                let made = match entry.make {
-                    PlayerFactory::Player(make) => make(&spec).map(drop),
-                    PlayerFactory::PrivilegedPlayer(make) => make(&spec).map(drop),
-                };
                 let solved = experts::solved().any(|solved| solved == task);
-                match made {
+                match entry.check(&spec) {
                     // None of the benchmark's tasks has choices.
                     Err(PlayerError::NothingToSay { .. }) if entry.name == "no_words" => {}
                     Ok(()) => assert!(solved || entry.name != "expert", "{} for {}", entry.name, task.id),

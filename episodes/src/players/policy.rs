@@ -96,6 +96,7 @@ impl Policy for PlayerEntry {
     }
 
     fn play_episode(&self, spec: &EpisodeSpec, output: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
+        self.check(spec).map_err(|error| PlayError::NotReady(error.to_string()))?;
         Ok(play_in_process(spec, output, |episode| self.play(spec, episode))?)
     }
 }

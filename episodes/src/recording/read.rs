@@ -14,7 +14,7 @@ use super::damage::Damage;
 use super::topics::messages::{PhaseMessage, StepError, ToolCallMessage};
 use super::topics::notes::NoteMessage;
 use super::topics::steps::{StepDecoder, state_of};
-use super::{checkpoint_name, metadata, topics};
+use super::{Recorder, checkpoint_name, metadata, topics};
 use crate::results::RESULT_FILE;
 use crate::scoring::{ScoreMemory, Scores, StepScore};
 use crate::spec::EpisodeSpec;
@@ -78,8 +78,11 @@ pub enum RecordingError {
 }
 
 impl Recording {
-    /// Reads a file, checks every byte of it, and that it is a recording of an episode. Steps are read as they are asked for.
+    /// Reads a file, or the one in an episode's folder, checks every byte of it, and that it is a recording of an episode. Steps are
+    /// read as they are asked for.
     pub fn read(path: &Path) -> Result<Recording, RecordingError> {
+        let inside = path.join(Recorder::FILE_NAME);
+        let path = if inside.is_file() { &inside } else { path };
         let bytes =
             std::fs::read(path).map_err(|source| RecordingError::Read { path: path.into(), source })?;
         Recording::from_bytes(path, bytes)

@@ -225,6 +225,7 @@ fn a_recording_reads_back() {
     let folder = tempfile::tempdir().unwrap();
     let (world, path) = record(folder.path());
     let recording = Recording::read(&path).unwrap();
+    assert_eq!(Recording::read(folder.path()).unwrap().path(), path);
     assert_eq!((recording.spec.clone(), recording.build.as_str()), (spec(), "0.1.0+test"));
     assert_eq!(recording.steps().last().unwrap().unwrap(), world.present());
     let last_hash = recording.state_hashes().last().unwrap().unwrap();

@@ -24,7 +24,7 @@ const STAYS_RAD: f32 = 0.1;
 /// What was seen of a task in which nobody acts.
 #[derive(Debug, Default)]
 pub struct TaskCheck {
-    /// What does not stay where the task puts it, a line each.
+    /// What does not stay where the task puts it, a line each, as it was with the first seed with which it does not.
     pub falls: Vec<String>,
     /// What may be meant so, a line each.
     pub notes: Vec<String>,
@@ -56,20 +56,93 @@ pub fn check_task(
     folder: Option<&Path>,
 ) -> Result<TaskCheck, TaskCheckError> {
     let mut check = TaskCheck::default();
+    check.note_secrets(task);
+    let mut falls = Falls::default();
     for (index, seed) in seeds.iter().enumerate() {
         let spec = EpisodeSpec::new(task, *seed, Protocol::Benchmark);
-        check.stand_still(&spec)?;
+        check.stand_still(&spec, &mut falls)?;
         if index == 0
             && let Some(folder) = folder
         {
             check.draw(&spec, folder)?;
         }
     }
+    check.falls = falls.told();
     Ok(check)
 }
 
+/// For each thing that does not stay where it is put, how that was the first time, and with how many seeds it was so.
+#[derive(Default)]
+struct Falls(Vec<(&'static str, String, usize)>);
+
+impl Falls {
+    fn add(&mut self, what: &'static str, how: impl FnOnce() -> String) {
+        match self.0.iter_mut().find(|(known, ..)| *known == what) {
+            Some((_, _, seeds)) => *seeds += 1,
+            None => self.0.push((what, how(), 1)),
+        }
+    }
+
+    fn told(self) -> Vec<String> {
+        let line = |(_, how, seeds): (_, String, usize)| match seeds {
+            1 => how,
+            2 => how + " (so it is with another seed, too)",
+            seeds => format!("{how} (so it is with {} other seeds, too)", seeds - 1),
+        };
+        self.0.into_iter().map(line).collect()
+    }
+    /// Names what has not stayed where it was put.
+    fn find(&mut self, task: &Task, seed: u32, start: &Step, end: &Step) {
+        let trial_s = f64::from(TRIAL_STEPS) / CONTROL_HZ;
+        let robots = start.robots.iter().zip(&end.robots).zip(task.robots);
+        for ((before, after), spot) in robots {
+            let by_m =
+                after.truth.world_from_pelvis().translation - before.truth.world_from_pelvis().translation;
+            if after.truth.fallen || by_m.length() > STAYS_M {
+                let how = if after.truth.fallen {
+                    "falls".into()
+                } else {
+                    format!("moves by {:.2} m", by_m.length())
+                };
+                self.add(spot.name, || {
+                    format!(
+                        "seed {seed}: robot {} {how} within {trial_s:.0} s; it needs level floor at z = 0 and nothing in its way",
+                        spot.name
+                    )
+                });
+            }
+        }
+        for spot in task.objects {
+            let (Some(before), Some(after)) = (start.object(spot.name), end.object(spot.name)) else {
+                continue;
+            };
+            let (before, after) = (before.world_from_object, after.world_from_object);
+            let by_m = after.translation - before.translation;
+            let turned_rad = before.rotation.angle_between(after.rotation);
+            if by_m.length() > STAYS_M || turned_rad > STAYS_RAD {
+                // Adding zero makes the zero of tiny negative values a positive one.
+                let round = |value: f32| (value * 100.0).round() / 100.0 + 0.0;
+                let place = |place: [f32; 3]| {
+                    let [x_m, y_m, z_m] = place.map(round);
+                    format!("({x_m:.2}, {y_m:.2}, {z_m:.2})")
+                };
+                self.add(spot.name, || {
+                    format!(
+                        "seed {seed}: {} does not stay at {}: within {trial_s:.0} s it comes to {} and turns by {:.0} degrees; put \
+                         it where it touches what it stands on",
+                        spot.name,
+                        place(before.translation.to_array()),
+                        place(after.translation.to_array()),
+                        turned_rad.to_degrees()
+                    )
+                });
+            }
+        }
+    }
+}
+
 impl TaskCheck {
-    fn stand_still(&mut self, spec: &EpisodeSpec) -> Result<(), TaskCheckError> {
+    fn stand_still(&mut self, spec: &EpisodeSpec, falls: &mut Falls) -> Result<(), TaskCheckError> {
         let (task, seed) = (spec.task, spec.seed);
         let failed = |source: EpisodeError| TaskCheckError::Episode { task: task.id, source: source.into() };
         let Built { mut world, motions, .. } = build(spec).map_err(failed)?;
@@ -87,45 +160,36 @@ impl TaskCheck {
         if let Some((phase, time_s)) = scores.reached().next() {
             return Err(TaskCheckError::ReachedByNobody { task: task.id, phase: phase.id, time_s, seed });
         }
-        self.find_falls(task, seed, &start, &step);
+        falls.find(task, seed, &start, &step);
         Ok(())
     }
 
-    /// Names what has not stayed where it was put.
-    fn find_falls(&mut self, task: &Task, seed: u32, start: &Step, end: &Step) {
-        let trial_s = f64::from(TRIAL_STEPS) / CONTROL_HZ;
-        let robots = start.robots.iter().zip(&end.robots).zip(task.robots);
-        for ((before, after), spot) in robots {
-            let by_m =
-                after.truth.world_from_pelvis().translation - before.truth.world_from_pelvis().translation;
-            if after.truth.fallen || by_m.length() > STAYS_M {
-                let how = if after.truth.fallen {
-                    "falls".into()
-                } else {
-                    format!("moves by {:.2} m", by_m.length())
-                };
-                self.falls.push(format!(
-                    "seed {seed}: robot {} {how} within {trial_s:.0} s; it needs level floor at z = 0 and nothing in its way",
-                    spot.name
-                ));
-            }
+    /// Notes what a robot's operator reads of what the seed chooses though its own instruction holds that back.
+    fn note_secrets(&mut self, task: &Task) {
+        let Some(ways) = task.file.as_ref().and_then(|file| file.variants.get()) else { return };
+        let chosen = |text: &dyn Fn(&Task) -> &'static str| ways.iter().any(|way| text(way) != text(ways[0]));
+        let names = task.robots.iter().enumerate();
+        let kept: Vec<&str> = names
+            .filter(|(robot, _)| !chosen(&|way| way.robots[*robot].instruction))
+            .map(|(_, spot)| spot.name)
+            .collect();
+        if kept.is_empty() || kept.len() == task.robots.len() {
+            return;
         }
-        for spot in task.objects {
-            let (Some(before), Some(after)) = (start.object(spot.name), end.object(spot.name)) else {
-                continue;
-            };
-            let (before, after) = (before.world_from_object, after.world_from_object);
-            let by_m = after.translation - before.translation;
-            let turned_rad = before.rotation.angle_between(after.rotation);
-            if by_m.length() > STAYS_M || turned_rad > STAYS_RAD {
-                let [x_m, y_m, z_m] = before.translation.to_array();
-                self.falls.push(format!(
-                    "seed {seed}: {} does not stay at ({x_m:.2}, {y_m:.2}, {z_m:.2}): within {trial_s:.0} s it goes {:.2} m \
-                     sideways and {:.2} m up, and turns by {:.0} degrees; put it where it touches what it stands on",
-                    spot.name,
-                    by_m.truncate().length(),
-                    by_m.z,
-                    turned_rad.to_degrees()
+        let who = kept.join(" and ");
+        if chosen(&|way| way.shared_instruction().unwrap_or(way.instruction)) {
+            self.notes.push(format!(
+                "what the seed chooses is not in the own instruction of {who}, but an operator of that robot alone reads it in the \
+                 joint one; give shared_instruction without it"
+            ));
+        }
+        for (index, phase) in task.phases.iter().enumerate() {
+            if chosen(&|way| way.phases[index].description) {
+                self.notes.push(format!(
+                    "what the seed chooses is not in the own instruction of {who}, but the description of {} {} tells it to whoever is \
+                     told phases; word it without",
+                    Phase::number(index),
+                    phase.id
                 ));
             }
         }

@@ -8,7 +8,7 @@ use tandem_sim::mjcf::Document;
 use tandem_sim::{ObjectModel, assets};
 use toml::Spanned;
 
-use super::choices::{filled, ways, with_options};
+use super::choices::{ways, with_options};
 use super::error::{Mistakes, TaskFileError};
 use super::phases;
 use super::reading::{Reading, lasting, place_in_file};
@@ -53,7 +53,7 @@ fn is_file(name: &str) -> bool {
 /// The task that a source says: before anything is chosen, where it has choices, with the others as its variants.
 pub(super) fn task(source: &TaskSource, xxh3: &str) -> Result<&'static Task, TaskFileError> {
     let table = parse(source)?;
-    let mut reading = Reading { source, found: Vec::new() };
+    let mut reading = Reading::new(source, &[]);
     let choices = reading.choices(table.choices);
     reading.checked()?;
     let variants = Arc::new(OnceLock::new());
@@ -91,16 +91,15 @@ pub(super) fn task(source: &TaskSource, xxh3: &str) -> Result<&'static Task, Tas
     Ok(leaked(undecided))
 }
 
-/// The task where this has been chosen. Mistakes are told by their places in the text with the options in it, line by line the same.
+/// The task where this has been chosen.
 fn one_way(
     source: &TaskSource,
     xxh3: &str,
     chosen: Vec<ChosenOption>,
     variants: &Arc<OnceLock<Vec<&'static Task>>>,
 ) -> Result<Task, TaskFileError> {
-    let written = TaskSource { text: filled(&source.text, &chosen), ..source.clone() };
-    let table = parse(&written)?;
-    let mut reading = Reading { source: &written, found: Vec::new() };
+    let mut reading = Reading::new(source, &chosen);
+    let table = parse(&reading.source)?;
     let read = reading.task(table);
     reading.checked()?;
     let Some((task, file)) = read else { return Err(reading.mistakes()) };
@@ -135,7 +134,7 @@ impl Reading<'_> {
         let mut names =
             Names { robots: robots.iter().map(|robot| robot.name.to_owned()).collect(), ..Names::default() };
         let objects = self.objects(&table.objects, &mut names);
-        let randomize = self.offsets(&table.randomize, &objects);
+        let randomize = self.offsets(&table.randomize, &objects, &names);
         if table.phases.as_ref().is_empty() || table.phases.as_ref().len() > MOST_PHASES {
             self.wrong(table.phases.span(), format!("a task has 1 to {MOST_PHASES} [[phases]]"));
         }
@@ -205,7 +204,7 @@ impl Reading<'_> {
         if let Some(mjcf) = mjcf
             && let Err(error) = Document::parse_alone(name, mjcf)
         {
-            self.wrong(at, error.to_string());
+            self.wrong_mjcf(at, error.to_string());
         }
         Some((name, mjcf))
     }
@@ -249,7 +248,9 @@ impl Reading<'_> {
         let (span, tables) = (tables.span(), tables.as_ref());
         let names: Vec<&str> = tables.iter().map(|robot| robot.name.as_ref().as_str()).collect();
         if tables.is_empty() || tables.len() > ROBOTS.len() || names != ROBOTS[..tables.len()] {
-            let at = tables.first().map_or(span, |robot| robot.name.span());
+            let other = tables.iter().zip(ROBOTS).find(|(robot, name)| robot.name.as_ref() != name);
+            let other = other.map(|(robot, _)| robot).or(tables.get(ROBOTS.len()));
+            let at = other.map_or(span, |robot| robot.name.span());
             let what = format!(
                 "there are 1 to 3 [[robots]], called \"A\", \"B\" and \"C\" in this order; here: {names:?}"
             );
@@ -270,13 +271,14 @@ impl Reading<'_> {
                 }
             }
         }
-        let spot = |robot: &RobotTable| RobotSpot {
-            name: ROBOTS.into_iter().find(|name| *name == robot.name.as_ref()).unwrap_or_default(),
+        // What follows knows robots by the names that they ought to have.
+        let spot = |(robot, name): (&RobotTable, &'static str)| RobotSpot {
+            name,
             position_m: robot.position_m.as_ref().map(|value| value as f32),
             yaw_rad: angle_rad(robot.yaw_deg.as_ref()),
             instruction: lasting(robot.instruction.as_ref()),
         };
-        tables.iter().map(spot).collect()
+        tables.iter().zip(ROBOTS).map(spot).collect()
     }
 
     fn objects(&mut self, tables: &[ObjectTable], names: &mut Names) -> Vec<ObjectSpot> {
@@ -306,7 +308,10 @@ impl Reading<'_> {
                     self.named(file, assets::object).map(|named| (file.span(), named))
                 }
             };
-            let Some((at, (file, mjcf))) = given else { continue };
+            let Some((at, (file, mjcf))) = given else {
+                names.mistaken_objects.insert(name.to_owned());
+                continue;
+            };
             let spot = ObjectSpot {
                 name: lasting(name),
                 file,
@@ -318,22 +323,26 @@ impl Reading<'_> {
                 Ok(parts) => {
                     names.objects.extend(parts.into_iter().map(|part| (part.name, Arc::new(part.model))));
                 }
-                Err(error) => self.wrong(at, error.to_string()),
+                Err(error) => {
+                    self.wrong_mjcf(at, error.to_string());
+                    names.mistaken_objects.insert(name.to_owned());
+                }
             }
             found.push(spot);
         }
         found
     }
 
-    fn offsets(&mut self, tables: &[OffsetTable], objects: &[ObjectSpot]) -> Vec<Offset> {
-        tables.iter().map(|table| self.offset(table, objects)).collect()
+    fn offsets(&mut self, tables: &[OffsetTable], objects: &[ObjectSpot], names: &Names) -> Vec<Offset> {
+        tables.iter().map(|table| self.offset(table, objects, names)).collect()
     }
 
-    fn offset(&mut self, table: &OffsetTable, objects: &[ObjectSpot]) -> Offset {
+    fn offset(&mut self, table: &OffsetTable, objects: &[ObjectSpot], names: &Names) -> Offset {
         let mut moved: Vec<&'static str> = Vec::new();
         for name in table.objects.as_ref() {
             match objects.iter().find(|spot| spot.name == name.as_ref()) {
                 Some(spot) => moved.push(spot.name),
+                None if names.mistaken_objects.contains(name.as_ref()) => {}
                 None => {
                     let have: Vec<&str> = objects.iter().map(|spot| spot.name).collect();
                     let what = format!("no object {:?} to move; have: {}", name.as_ref(), have.join(", "));
@@ -352,10 +361,10 @@ impl Reading<'_> {
             };
             self.finite(given, &[from, to], most_value);
             if from > to {
-                self.wrong(
-                    given.span(),
-                    "this ends before it begins; give 0.02 for either way, or [-0.01, 0.03]",
+                let what = format!(
+                    "this ends before it begins; give [{to}, {from}], or one number for so much either way"
                 );
+                self.wrong(given.span(), what);
             }
             from..=to
         };

@@ -4,19 +4,30 @@ use std::ops::Range;
 
 use toml::Spanned;
 
+use super::choices::{filled, placeholders, told, unfilled_place};
 use super::error::{Mistakes, TaskFileError};
-use crate::tasks::TaskSource;
+use crate::conditions::nearest;
+use crate::tasks::{ChosenOption, TaskSource};
 
 /// Folders, columns and results are called so.
 const LONGEST_ID: usize = 40;
 
 /// A source as it is looked through, and what has been found wrong with it.
 pub(super) struct Reading<'a> {
-    pub source: &'a TaskSource,
-    pub found: Vec<(Range<usize>, String)>,
+    source_as_written: &'a TaskSource,
+    /// The same with what has been chosen in it; lines stay where they are.
+    pub source: TaskSource,
+    chosen: &'a [ChosenOption],
+    /// By their places in `source`.
+    found: Vec<(Range<usize>, String)>,
 }
 
-impl Reading<'_> {
+impl<'a> Reading<'a> {
+    pub fn new(written: &'a TaskSource, chosen: &'a [ChosenOption]) -> Reading<'a> {
+        let source = TaskSource { text: filled(&written.text, chosen), ..written.clone() };
+        Reading { source_as_written: written, source, chosen, found: Vec::new() }
+    }
+
     /// Whether nothing has been found wrong.
     pub fn checked(&mut self) -> Result<(), TaskFileError> {
         match self.found.is_empty() {
@@ -25,14 +36,34 @@ impl Reading<'_> {
         }
     }
 
-    /// What has been found wrong.
+    /// What has been found wrong, by the file's own lines.
     pub fn mistakes(&mut self) -> TaskFileError {
-        let found = std::mem::take(&mut self.found);
-        TaskFileError::Mistakes(Mistakes::new(&self.source.name, &self.source.text, found))
+        let TaskSource { name, text, .. } = self.source_as_written;
+        let written = |(at, what): (Range<usize>, String)| {
+            let [start, end] = [at.start, at.end].map(|byte| unfilled_place(text, self.chosen, byte));
+            (start..end, what + &told(&text[start..end], self.chosen))
+        };
+        let found = std::mem::take(&mut self.found).into_iter().map(written).collect();
+        TaskFileError::Mistakes(Mistakes::new(name, text, found))
     }
 
     pub fn wrong(&mut self, at: Range<usize>, what: impl Into<String>) {
         self.found.push((at, what.into()));
+    }
+
+    /// What is wrong with MJCF. Where that stands in the task's file itself, it is told by the file's line and not by where the MJCF begins.
+    pub fn wrong_mjcf(&mut self, at: Range<usize>, what: String) {
+        let inline = what.strip_prefix(&format!("`{}:", self.source.name)).and_then(|rest| {
+            let (line, what) = rest.split_once("`: ")?;
+            let mut lines = self.source.text.split_inclusive('\n');
+            let above = line.parse::<usize>().ok()?.checked_sub(1)?;
+            let start: usize = lines.by_ref().take(above).map(str::len).sum();
+            let text = lines.next()?;
+            let indent = text.len() - text.trim_start().len();
+            Some((start + indent..start + text.trim_end().len(), what.to_owned()))
+        });
+        let (at, what) = inline.unwrap_or((at, what));
+        self.wrong(at, what);
     }
 
     /// A name of which folders, columns and results are made.
@@ -51,6 +82,14 @@ impl Reading<'_> {
     pub fn words(&mut self, text: &Spanned<String>) {
         if text.as_ref().trim().is_empty() {
             self.wrong(text.span(), "this is empty, and nobody would know what to do or what it means");
+        }
+        for (at, name) in placeholders(text.as_ref()) {
+            let start = place_in_file(&self.source.text, text) + at;
+            let known: Vec<&str> = self.chosen.iter().map(|chosen| chosen.name.as_str()).collect();
+            let have = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+            let near = nearest(name, known.iter().copied());
+            let what = format!("no choice {name:?}{near}; [[choices]] have: {have}");
+            self.wrong(start..start + name.len() + 2, what);
         }
     }
 }

@@ -131,8 +131,37 @@ fn mistakes_in_choices_are_told_by_their_places() {
     check("[\"left\", \"right\"]", "[\"left\", \"left\"]", "this option is given twice");
     check("[\"left\", \"right\"]", "[\"left\", \"a 'b'\"]", "an option is a word or two without quotes");
     check("{side}", "{other}", "lift.toml:8:8: nothing in the file asks for it; write {side}");
-    // A mistake in one of the ways alone is told, too.
-    check("[\"left\", \"right\"]", "[\"left\", \"rigt\"]", "no hand \"rigt\"");
+    // A mistake in one of the ways alone is told, too, by the line that is in the file.
+    let one_way = "no hand \"rigt\"; is it right?; have: left, right (with side = rigt)\n 31 | held = 'holds(\"A\", \"{side}\", \"box\")'\n    |                    ^^^^^^^^";
+    check("[\"left\", \"right\"]", "[\"left\", \"rigt\"]", one_way);
+    // Behind what has been chosen, too.
+    check(
+        "\"{side}\", \"box\"",
+        "\"{side}\", \"bax\"",
+        "lift.toml:31:30: no object \"bax\"; is it box?; have: box\n",
+    );
+    check(
+        "Lift the box by the {side}.",
+        "Lift {sid} {side}.",
+        "no choice \"sid\"; is it side?; [[choices]] have: side",
+    );
+    let error = load(&FILE.replacen("Lift the box.", "Lift the {box}.", 1)).unwrap_err();
+    assert!(error.contains("lift.toml:4:25: no choice \"box\"; [[choices]] have: none"), "{error}");
+}
+
+#[test]
+fn conditions_ask_what_was_chosen() {
+    let asks = r#""{side}" == "left" ? z_m("box") > 1 : z_m("box") > 2"#;
+    let text = with_choice().replace("held && lift_m(\"box\") >= high_m", asks);
+    let task = load(&text).unwrap_or_else(|error| panic!("{error}"));
+    for seed in 0..20 {
+        let drawn = task.under(seed);
+        let Done::When(high) = &drawn.phases[0].done else { panic!("it is reached at once") };
+        let raised = Facts::at_rest(drawn).raised("box", 1.5);
+        assert_eq!(high(&raised), drawn.chosen("side") == Some("left"), "{seed}");
+    }
+    let error = load(&text.replace("== \"left\"", "> \"left\"")).unwrap_err();
+    assert!(error.contains("\"left\" is a text") && error.contains("(with side = left)"), "{error}");
 }
 
 #[test]
@@ -183,6 +212,13 @@ fn mistakes_are_told_by_their_places() {
     check("\"floor\"", "\"room.xml\"", "lift.toml:3:9: there is no room.xml beside");
     check("scene = \"floor\"\n", "", "no scene; give scene = \"floor\"");
     check("name = \"A\"", "name = \"R\"", "lift.toml:7:8: there are 1 to 3 [[robots]], called \"A\"");
+    // What only follows from a mistake is not told.
+    for (right, wrong) in [("name = \"A\"", "name = \"R\""), ("<freejoint/>", "<freejoint/><warp/>")] {
+        let error = load(&FILE.replacen(right, wrong, 1)).unwrap_err();
+        assert_eq!(error.matches("lift.toml").count(), 1, "{error}");
+    }
+    let room = "scene_mjcf = '''\n<mujoco>\n  <worldbody><wrap/></worldbody>\n</mujoco>'''";
+    check("scene = \"floor\"", room, "lift.toml:5:3: wrap");
     check("[0, 0]", "[0, inf]", "at most 100 either way");
     check("[0, 0]", "[0]", "lift.toml:8");
     check(
@@ -198,7 +234,7 @@ fn mistakes_are_told_by_their_places() {
         "objects = [\"bx\"]",
         "lift.toml:20:12: no object \"bx\" to move; have: box",
     );
-    check("x_m = 0.02", "x_m = [0.02, 0.01]", "ends before it begins");
+    check("x_m = 0.02", "x_m = [0.02, 0.01]", "ends before it begins; give [0.01, 0.02]");
     check("'0.03'", "'0.03 m'", "lift.toml:25:16: 'm' stands where");
     check("\"right\", \"box\"", "\"right\", \"bax\"", "lift.toml:26:29: no object \"bax\"; is it box?");
     check(">= high_m", ">= hihg_m", "no term \"hihg_m\" above this in [terms]; have: held, high_m");

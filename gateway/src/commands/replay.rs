@@ -18,7 +18,7 @@ use crate::settings::one_of;
 /// Play recordings again: say what they hold, verify them, film them, or draw what every camera saw with depth.
 #[derive(Debug, clap::Args)]
 pub struct ReplayArgs {
-    /// Recordings, as runs/handover-seed0/episode.mcap, or the failed_step.checkpoint beside one.
+    /// Recordings, as runs/handover-seed0/episode.mcap, or their folders, or the failed_step.checkpoint beside one.
     #[arg(value_name = "FILES", required = true)]
     recordings: Vec<PathBuf>,
     /// Simulate again and compare the state after every step, result and phases; names the first step that differs.
