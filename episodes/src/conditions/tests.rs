@@ -77,7 +77,7 @@ fn mistakes_say_where_and_what_would_be_right() {
     check("heigth > 1", "heigth", "no term \"heigth\"");
     check("3cm > 1", "3", "no number");
     check("", "", "the expression ends where");
-    check("\"bottle\"", "\"bottle\"", "in the brackets of facts alone");
+    check("\"bottle\"", "\"bottle\"", "texts stand in the brackets of facts, as in lift_m");
     check("é", "é", "a condition or a number is expected");
     check("[1, 2]", "[1, 2]", "a list stands only");
     check("mean([]) > 1", "[]", "a list as");
