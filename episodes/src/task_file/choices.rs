@@ -3,6 +3,7 @@
 
 use toml::Spanned;
 
+use super::filling::placeholder;
 use super::reading::Reading;
 use super::table::ChoiceTable;
 use crate::tasks::ChosenOption;
@@ -76,53 +77,10 @@ pub(super) fn ways(choices: &[Choice]) -> Vec<Vec<ChosenOption>> {
     ways
 }
 
-/// A text with what has been chosen in it.
-pub(super) fn filled(text: &str, way: &[ChosenOption]) -> String {
-    let fill = |text: String, chosen: &ChosenOption| text.replace(&placeholder(&chosen.name), &chosen.option);
-    way.iter().fold(text.to_owned(), fill)
-}
-
-/// Where in a text that stands which is at this byte once it is filled; what is within an option, where its placeholder begins.
-pub(super) fn unfilled_place(text: &str, way: &[ChosenOption], filled_at: usize) -> usize {
-    let (mut at, mut filled_to) = (0, 0);
-    while let Some(letter) = text[at..].chars().next() {
-        let placed = |chosen: &&ChosenOption| text[at..].starts_with(&placeholder(&chosen.name));
-        let (written, shown) = match way.iter().find(placed) {
-            Some(chosen) => (placeholder(&chosen.name).len(), chosen.option.len()),
-            None => (letter.len_utf8(), letter.len_utf8()),
-        };
-        if filled_at < filled_to + shown {
-            break;
-        }
-        (at, filled_to) = (at + written, filled_to + shown);
-    }
-    at
-}
-
-/// The names in `{...}` of a text, and where each begins.
-pub(super) fn placeholders(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    text.match_indices('{').filter_map(|(at, _)| {
-        let name = text[at + 1..].split_once('}')?.0;
-        let plain = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
-        (!name.is_empty() && name.chars().all(plain)).then_some((at, name))
-    })
-}
-
-/// " (with wanted = green)" behind what is wrong with a text in which something has been chosen.
-pub(super) fn told(text: &str, way: &[ChosenOption]) -> String {
-    let of_text = way.iter().filter(|chosen| text.contains(&placeholder(&chosen.name)));
-    let told: Vec<String> = of_text.map(|chosen| format!("{} = {}", chosen.name, chosen.option)).collect();
-    if told.is_empty() { String::new() } else { format!(" (with {})", told.join(", ")) }
-}
-
 /// A text for those who cannot know yet what the seed chooses: all options stand in it.
 pub(super) fn with_options(text: &str, choices: &[Choice]) -> String {
     let fill = |text: String, choice: &Choice| {
         text.replace(&placeholder(&choice.name), &format!("[{}]", choice.options.join(" / ")))
     };
     choices.iter().fold(text.to_owned(), fill)
-}
-
-fn placeholder(name: &str) -> String {
-    format!("{{{name}}}")
 }

@@ -6,6 +6,7 @@
 mod build;
 mod choices;
 mod error;
+mod filling;
 mod phases;
 mod reading;
 mod suites;

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use toml::Spanned;
 
-use super::choices::{filled, placeholders, told, unfilled_place};
 use super::error::{Mistakes, TaskFileError};
+use super::filling::{filled, placeholders, told, unfilled_place};
 use crate::conditions::nearest;
 use crate::tasks::{ChosenOption, TaskSource};
 
