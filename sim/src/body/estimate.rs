@@ -1,5 +1,6 @@
 //! Kinematic and static quantities of one robot at one instant, in the world frame.
 
+use std::cell::OnceCell;
 use std::sync::Arc;
 
 use rapier3d::math::{Pose, Vector};
@@ -31,6 +32,14 @@ pub struct BodyEstimate {
     pub arms_told: bool,
     /// Where the task wants the waist: yaw, roll, pitch.
     pub waist_target_rad: [f32; WAIST_JOINTS],
+    /// What follows of all this, once somebody has asked for it.
+    pub(crate) known: KnownOfBody,
+}
+
+#[derive(Default)]
+pub(crate) struct KnownOfBody {
+    link_motions: OnceCell<Vec<LinkMotion>>,
+    gravity_n_m: OnceCell<[f32; JOINTS]>,
 }
 
 /// Where a pelvis is and how it moves.
@@ -112,16 +121,18 @@ impl BodyEstimate {
             hand_holds: Sides::both(false),
             arms_told: false,
             waist_target_rad: [0.0; WAIST_JOINTS],
+            known: KnownOfBody { link_motions: motions.into(), ..KnownOfBody::default() },
         }
     }
 
     /// How all links move.
-    pub(crate) fn link_motions(&self) -> Vec<LinkMotion> {
+    pub(crate) fn link_motions(&self) -> &[LinkMotion] {
         let pelvis = LinkMotion {
             velocity_m_s: self.pelvis_velocity_m_s,
             spin_rad_s: self.pelvis_angular_velocity_rad_s,
         };
-        LinkMotion::of_links(&self.model, pelvis, &self.qd_rad_s, &self.world_from_link)
+        let of_links = || LinkMotion::of_links(&self.model, pelvis, &self.qd_rad_s, &self.world_from_link);
+        self.known.link_motions.get_or_init(of_links)
     }
 
     /// Middle of each palm, where loads of the hands are taken to act.
@@ -157,6 +168,10 @@ impl BodyEstimate {
     /// Torques that hold the links against gravity, pelvis fixed: tau_j = -a_j . (r_j x m_j g), with m_j and r_j the
     /// mass beyond joint j and its centre relative to the joint.
     pub fn gravity_torques_n_m(&self) -> [f32; JOINTS] {
+        *self.known.gravity_n_m.get_or_init(|| self.torques_against_gravity_n_m())
+    }
+
+    fn torques_against_gravity_n_m(&self) -> [f32; JOINTS] {
         let links = self.model.links.len();
         let mut mass_kg = vec![0.0; links];
         let mut moment = vec![Vector::ZERO; links];

@@ -19,7 +19,7 @@ pub use layout::{
 };
 pub use model::{HandLinks, JointModel, LinkModel, RobotModel, SiteModel};
 
-pub(crate) use estimate::{LinkMotion, PALM_IN_WRIST_M, PelvisMotion};
+pub(crate) use estimate::{KnownOfBody, LinkMotion, PALM_IN_WRIST_M, PelvisMotion};
 pub(crate) use layout::{
     ARMS, HANDS, LEG_JOINTS, LEGS, MIRRORED_ARM, WAIST, WAIST_JOINTS, check_joint_order,
 };

@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use rapier3d::math::{Pose, Rotation, Vector};
 
-use super::{Acceleration, BodyEstimate, JOINTS, RobotModel};
+use super::{Acceleration, BodyEstimate, JOINTS, KnownOfBody, RobotModel};
 use crate::{GRAVITY_M_S2, Sides, assets};
 
 /// The embedded robot.
@@ -102,6 +102,7 @@ impl Posed {
             hand_holds: Sides::both(false),
             arms_told: false,
             waist_target_rad: [0.0; 3],
+            known: KnownOfBody::default(),
         }
     }
 

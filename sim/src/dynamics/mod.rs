@@ -65,7 +65,7 @@ impl Dynamics {
     pub fn add_tree(&mut self, tree: Tree) -> TreeId {
         let id = self.trees.push(tree);
         let dofs = self.trees.dofs();
-        self.solver.w.resize(dofs, 0.0);
+        self.solver.w.resize(dofs);
         self.moving_v.resize(dofs, 0.0);
         self.final_v.resize(dofs, 0.0);
         id

@@ -1,5 +1,6 @@
 //! The covariance of the errors of a state, and what a measurement makes of both.
 
+use pulp::{Arch, Simd, WithSimd};
 use rapier3d::glamx::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -171,15 +172,7 @@ impl Update<'_> {
         let spread = row.dot(&product) + sigma * sigma;
         let step = (y - row.dot(&self.errors)) / spread;
         let kept = self.considered_block();
-        for (i, line) in self.covariance.0.iter_mut().enumerate() {
-            // What a measurement says nothing of stays: headings, of a robot that walks.
-            if product[i] == 0.0 {
-                continue;
-            }
-            let gain = product[i] / spread;
-            line.iter_mut().zip(&product).for_each(|(value, other)| *value -= gain * other);
-            self.errors[i] += product[i] * step;
-        }
+        Arch::new().dispatch(Taking { update: self, product: &product, spread, step });
         self.restore(kept, &product, step);
     }
 
@@ -200,6 +193,32 @@ impl Update<'_> {
             for (j, other) in self.considered.iter().enumerate() {
                 self.covariance.0[*error][*other] = kept[i][j];
             }
+        }
+    }
+}
+
+/// Work for the widest vectors that the processor has: of every row its part of  k (P h)^T.
+struct Taking<'a, 'b> {
+    update: &'a mut Update<'b>,
+    product: &'a Errors,
+    spread: f64,
+    step: f64,
+}
+
+impl WithSimd for Taking<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        let Taking { update, product, spread, step } = self;
+        for (i, line) in update.covariance.0.iter_mut().enumerate() {
+            // What a measurement says nothing of stays: headings, of a robot that walks.
+            if product[i] == 0.0 {
+                continue;
+            }
+            let gain = product[i] / spread;
+            line.iter_mut().zip(product).for_each(|(value, other)| *value -= gain * other);
+            update.errors[i] += product[i] * step;
         }
     }
 }

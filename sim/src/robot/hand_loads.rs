@@ -11,7 +11,7 @@
 //! The arms' torques that carry it are fed forward.
 
 use rapier3d::math::Vector;
-use rapier3d::na::{SMatrix, SVector};
+use rapier3d::na::{Cholesky, Const, SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
 use super::arm_momentum::{ArmMomentum, OBSERVER_TIME_S};
@@ -70,16 +70,17 @@ impl HandLoads {
         let motions = body.link_motions();
         for (side, first) in ARMS.by_side() {
             let excess_n_m = std::array::from_fn(|i| torque_n_m[first + i] - gravity_n_m[first + i]);
-            let outside_n_m = self.momentum[side].update(body, &motions, first, &excess_n_m, dt_s);
+            let outside_n_m = self.momentum[side].update(body, motions, first, &excess_n_m, dt_s);
             let arm = Arm {
                 levers_m: [Vector::X, Vector::Y, Vector::Z].map(|direction| {
                     std::array::from_fn(|i| body.moment_n_m(first + i, palms_m[side], direction))
                 }),
                 excess_n_m,
             };
-            self.force[side].update(&arm.levers_m, outside_n_m, FORCE_FILTER_TIME_S, dt_s);
+            let fit = PalmFit::of(&arm.levers_m);
+            self.force[side].update(&fit, outside_n_m, FORCE_FILTER_TIME_S, dt_s);
             let felt_n_m = arm.excess_n_m.map(|excess_n_m| -excess_n_m);
-            self.reaction[side].update(&arm.levers_m, felt_n_m, REACTION_FILTER_TIME_S, dt_s);
+            self.reaction[side].update(&fit, felt_n_m, REACTION_FILTER_TIME_S, dt_s);
             self.payload[side].update(&arm, dt_s);
             self.grip[side].update(&torque_n_m[HANDS[side]..][..HAND_JOINTS], dt_s);
             for (i, held_n_m) in self.payload[side].torques_n_m(&arm).into_iter().enumerate() {
@@ -134,6 +135,25 @@ impl Grip {
     }
 }
 
+/// Finds the force on a palm that does most of what an arm's joints feel.
+struct PalmFit {
+    jacobian_m: SMatrix<f32, 3, ARM_JOINTS>,
+    factor: Option<Cholesky<f32, Const<3>>>,
+}
+
+impl PalmFit {
+    fn of(levers_m: &[[f32; ARM_JOINTS]; 3]) -> PalmFit {
+        let jacobian_m = SMatrix::<f32, 3, ARM_JOINTS>::from_fn(|row, column| levers_m[row][column]);
+        let normal_m2 = jacobian_m * jacobian_m.transpose() + SMatrix::identity() * FORCE_DAMPING_M2;
+        PalmFit { jacobian_m, factor: normal_m2.cholesky() }
+    }
+
+    fn force_n(&self, outside_n_m: [f32; ARM_JOINTS]) -> Option<Vector> {
+        let fitted = self.factor.as_ref()?.solve(&(self.jacobian_m * SVector::from(outside_n_m)));
+        Some(Vector::new(fitted.x, fitted.y, fitted.z))
+    }
+}
+
 #[derive(Clone, Default, Serialize, Deserialize)]
 struct HandForce {
     force_n: Vector,
@@ -146,19 +166,9 @@ impl HandForce {
     }
 
     /// One physics step, in which the palm did `outside_n_m` to the joints.
-    fn update(
-        &mut self,
-        levers_m: &[[f32; ARM_JOINTS]; 3],
-        outside_n_m: [f32; ARM_JOINTS],
-        filter_time_s: f32,
-        dt_s: f32,
-    ) {
-        let jacobian_m = SMatrix::<f32, 3, ARM_JOINTS>::from_fn(|row, column| levers_m[row][column]);
-        let outside_n_m = SVector::from(outside_n_m);
-        let normal_m2 = jacobian_m * jacobian_m.transpose() + SMatrix::identity() * FORCE_DAMPING_M2;
-        let Some(factor) = normal_m2.cholesky() else { return };
-        let fitted = factor.solve(&(jacobian_m * outside_n_m));
-        let measured_n = Vector::new(fitted.x, fitted.y, fitted.z).clamp_length_max(LARGEST_FORCE_N);
+    fn update(&mut self, fit: &PalmFit, outside_n_m: [f32; ARM_JOINTS], filter_time_s: f32, dt_s: f32) {
+        let Some(fitted_n) = fit.force_n(outside_n_m) else { return };
+        let measured_n = fitted_n.clamp_length_max(LARGEST_FORCE_N);
         self.force_n += (measured_n - self.force_n) * (dt_s / filter_time_s);
     }
 }

@@ -6,7 +6,7 @@ use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
 use super::sensors::{SensorModel, Sensors};
-use crate::body::{BodyEstimate, PALM_IN_WRIST_M, RobotModel, WAIST_JOINTS};
+use crate::body::{BodyEstimate, KnownOfBody, PALM_IN_WRIST_M, RobotModel, WAIST_JOINTS};
 use crate::dynamics::Tree;
 use crate::estimate::{SensorReadings, StateEstimator};
 use crate::mechanism::rounded;
@@ -139,6 +139,7 @@ fn from_truth(model: &Arc<RobotModel>, tree: &Tree, readings: &SensorReadings) -
         hand_holds: Sides::both(false),
         arms_told: false,
         waist_target_rad: [0.0; WAIST_JOINTS],
+        known: KnownOfBody::default(),
     }
 }
 

@@ -9,7 +9,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::dynamics::settings::Pass;
-use crate::dynamics::trees::rows::ConstraintRows;
+use crate::dynamics::trees::rows::{ConstraintRows, Whitened};
 
 /// Which of the three coefficients act: MJCF's `condim` 1, 3, 4 and 6.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -135,9 +135,9 @@ impl<const N: usize> Contacts<N> {
         self.all.clear();
     }
 
-    /// The rows of the contact were pushed just before.
-    pub fn push(&mut self, terms: Terms<N>) {
-        let inverse_mass = self.rows.last_inverse_mass();
+    /// The rows of the contact were pushed just before, with this inverse mass.
+    #[inline(always)]
+    pub fn push(&mut self, inverse_mass: [[f64; N]; N], terms: Terms<N>) {
         let mu = terms.friction;
         let mut most = 0.0;
         for lane in [1, 4].into_iter().filter(|lane| lane + 1 < N) {
@@ -160,7 +160,7 @@ impl<const N: usize> Contacts<N> {
     }
 
     /// Adds what the impulses, as they are now, do.
-    pub fn push_impulses(&self, w: &mut [f64]) {
+    pub fn push_impulses(&self, w: &mut Whitened) {
         for (group, contact) in self.all.iter().enumerate() {
             if contact.impulse != [0.0; N] {
                 self.rows.push_impulse(group, &contact.impulse, w);
@@ -169,7 +169,8 @@ impl<const N: usize> Contacts<N> {
     }
 
     /// One sweep of Gauss-Seidel, contact by contact, each of which changes by this share of what it would.
-    pub fn sweep(&mut self, pass: Pass, share: f64, w: &mut [f64]) {
+    #[inline(always)]
+    pub fn sweep(&mut self, pass: Pass, share: f64, w: &mut Whitened) {
         for (group, contact) in self.all.iter_mut().enumerate() {
             let velocity = self.rows.velocity(group, w);
             let mut impulse = contact.update(pass, velocity);
@@ -192,7 +193,7 @@ impl<const N: usize> Contacts<N> {
 
 impl<const N: usize> Contact<N> {
     /// The impulses that this contact alone would choose at the velocities `v` along its lanes.
-    #[inline]
+    #[inline(always)]
     fn update(&self, pass: Pass, mut v: [f64; N]) -> [f64; N] {
         let (a, old) = (&self.inverse_mass, &self.impulse);
         let (bias_m_s, firmness) = match pass {
@@ -223,7 +224,7 @@ impl<const N: usize> Contact<N> {
     }
 
     /// One step of projected gradients from the impulses `from`, at the velocities `v`.
-    #[inline]
+    #[inline(always)]
     fn slide(&self, from: &[f64; N], v: &[f64; N], normal: f64) -> [f64; N] {
         let mut slid = [normal; N];
         for c in 1..N {
@@ -238,13 +239,13 @@ impl<const N: usize> Contact<N> {
     }
 
     /// sum_c (f_c / mu_c)^2 over the friction lanes.
-    #[inline]
+    #[inline(always)]
     fn fullness(&self, impulse: &[f64; N]) -> f64 {
         (1..N).map(|c| impulse[c] * self.inverse_friction[c]).map(|share| share * share).sum()
     }
 
     /// Impulses that stop all lanes: the two tangents together, then spin, then the two rolls together.
-    #[inline]
+    #[inline(always)]
     fn stick(&self, mut v: [f64; N]) -> [f64; N] {
         let (a, old) = (&self.inverse_mass, &self.impulse);
         let mut new = *old;
@@ -263,7 +264,7 @@ impl<const N: usize> Contact<N> {
     }
 
     /// Solves for two lanes together.
-    #[inline]
+    #[inline(always)]
     fn stop_pair(&self, lane: usize, mass: &Symmetric2, v: &[f64; N], impulse: &mut [f64; N]) {
         if self.inverse_friction[lane] == 0.0 {
             (impulse[lane], impulse[lane + 1]) = (0.0, 0.0);

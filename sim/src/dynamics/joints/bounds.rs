@@ -1,14 +1,19 @@
 //! Rows of single joints: drives at their limits, dry friction and limits of position, all along one degree of freedom.
 
+use pulp::Simd;
+
 use super::DriveLaw;
+use super::units::{UnitRow, UnitRows};
 use crate::dynamics::settings::{Pass, Settings};
-use crate::dynamics::trees::rows::ConstraintRows;
+use crate::dynamics::trees::Trees;
+use crate::dynamics::trees::rows::{ConstraintRows, Whitened};
 use crate::dynamics::trees::tree::Tree;
 
 #[derive(Default)]
 pub struct JointRows {
     rows: ConstraintRows<1>,
     all: Vec<JointRow>,
+    units: UnitRows,
 }
 
 struct JointRow {
@@ -80,44 +85,49 @@ impl Tree {
 }
 
 impl JointRows {
-    pub fn clear(&mut self) {
+    /// Rows of the joints that may need one. The trees are factorised. The rows of each tree are in the order of its links; those of
+    /// several trees, which have no part in each other, take turns, so that a processor works on them at the same time.
+    #[inline(always)]
+    pub fn prepare<S: Simd>(&mut self, simd: S, trees: &Trees, settings: &Settings) {
         self.rows.clear();
         self.all.clear();
-    }
-
-    /// Rows of a tree's joints that may need one. The tree is factorised.
-    pub fn push_tree(&mut self, tree: &Tree, index: usize, offset: usize, settings: &Settings) {
-        let dt_s = settings.dt_s;
-        for (i, link) in tree.links.iter().enumerate() {
-            let Some(axis) = link.joint.axis() else { continue };
-            let (dof, q) = (tree.layout.first_dof[i], tree.q[i]);
-            let range = axis.range.filter(|_| tree.range_is_row(i, dt_s));
-            if !tree.is_held(i) && range.is_none() {
-                continue;
-            }
-            let start = self.rows.column.len();
-            self.rows.push_dof(tree, offset, dof, [1.0]);
-            self.rows.close(start);
-            let [[inverse_mass]] = self.rows.last_inverse_mass();
-            let most = axis.friction_loss * dt_s;
-            self.all.push(JointRow {
-                tree: index,
-                link: i,
-                inverse_mass,
-                mass: inverse_mass.recip(),
-                drive: tree.bounded[i].then(|| BoundedDrive::new(tree, i, dt_s)),
-                dry: DryFriction { most, impulse: tree.dry_friction[i].clamp(-most, most) },
-                range: range.map(|[low, high]| Range {
-                    down: approach(q - low, settings),
-                    up: approach(high - q, settings),
-                    impulse_up: 0.0,
-                    impulse_down: 0.0,
-                }),
-            });
+        let mut units = std::mem::take(&mut self.units);
+        units.make(simd, trees, |tree, link| tree.is_held(link) || tree.range_is_row(link, settings.dt_s));
+        for unit in &units.all {
+            self.push(trees, unit, units.y(unit), settings);
         }
+        self.units = units;
     }
 
-    pub fn warm_start(&self, w: &mut [f64]) {
+    #[inline(always)]
+    fn push(&mut self, trees: &Trees, unit: &UnitRow, y: impl Iterator<Item = f64>, settings: &Settings) {
+        let (tree, link, dt_s) = (&trees.all[unit.tree], unit.link, settings.dt_s);
+        let Some(axis) = tree.links[link].joint.axis() else { return };
+        let offset = trees.offset[unit.tree] as u16;
+        self.rows.begin();
+        for (column, y) in tree.layout.path(tree.layout.first_dof[link]).iter().zip(y) {
+            self.rows.push(column + offset, [y]);
+        }
+        let [[inverse_mass]] = self.rows.close();
+        let (most, q) = (axis.friction_loss * dt_s, tree.q[link]);
+        let range = axis.range.filter(|_| tree.range_is_row(link, dt_s));
+        self.all.push(JointRow {
+            tree: unit.tree,
+            link,
+            inverse_mass,
+            mass: inverse_mass.recip(),
+            drive: tree.bounded[link].then(|| BoundedDrive::new(tree, link, dt_s)),
+            dry: DryFriction { most, impulse: tree.dry_friction[link].clamp(-most, most) },
+            range: range.map(|[low, high]| Range {
+                down: approach(q - low, settings),
+                up: approach(high - q, settings),
+                impulse_up: 0.0,
+                impulse_down: 0.0,
+            }),
+        });
+    }
+
+    pub fn warm_start(&self, w: &mut Whitened) {
         for (group, row) in self.all.iter().enumerate() {
             let impulse = row.dry.impulse + row.drive.as_ref().map_or(0.0, |drive| drive.impulse);
             if impulse != 0.0 {
@@ -127,7 +137,8 @@ impl JointRows {
     }
 
     /// The greatest velocity (rad/s or m/s) that an end of a range, or a motor that is turned too fast, took back.
-    pub fn sweep(&mut self, pass: Pass, w: &mut [f64]) -> f64 {
+    #[inline(always)]
+    pub fn sweep(&mut self, pass: Pass, w: &mut Whitened) -> f64 {
         let mut greatest = 0.0f64;
         for (group, row) in self.all.iter_mut().enumerate() {
             let [before] = self.rows.velocity(group, w);
@@ -140,7 +151,7 @@ impl JointRows {
                 }
             }
             row.dry.update(inverse_mass, mass, &mut v);
-            if let Some(range) = &mut row.range {
+            if let Some(range) = row.range.as_mut().filter(|range| range.acts(pass, v)) {
                 let pushed = v;
                 range.update(pass, inverse_mass, mass, &mut v);
                 greatest = greatest.max((v - pushed).abs());
@@ -180,6 +191,7 @@ impl BoundedDrive {
         BoundedDrive { law, impulse }
     }
 
+    #[inline(always)]
     fn update(&mut self, inverse_mass: f64, v: &mut f64) {
         let impulse = self.law.meet(inverse_mass, *v, self.impulse);
         *v += inverse_mass * (impulse - self.impulse);
@@ -188,6 +200,7 @@ impl BoundedDrive {
 }
 
 impl DryFriction {
+    #[inline(always)]
     fn update(&mut self, inverse_mass: f64, mass: f64, v: &mut f64) {
         if self.most > 0.0 {
             let impulse = (self.impulse - *v * mass).clamp(-self.most, self.most);
@@ -198,15 +211,31 @@ impl DryFriction {
 }
 
 impl Range {
-    fn update(&mut self, pass: Pass, inverse_mass: f64, mass: f64, v: &mut f64) {
+    /// Velocities towards both ends that are allowed.
+    #[inline(always)]
+    fn allowed(&self, pass: Pass) -> [f64; 2] {
         let at = match pass {
             Pass::Correcting => 0,
             Pass::Relaxing => 1,
         };
-        let up = (self.impulse_up - (*v + self.down[at]) * mass).max(0.0);
+        [self.down[at], self.up[at]]
+    }
+
+    /// Whether one of the ends has something to do. Most joints are far from both, which is soon seen.
+    #[inline(always)]
+    fn acts(&self, pass: Pass, v: f64) -> bool {
+        let [down, up] = self.allowed(pass);
+        let rests = self.impulse_up == 0.0 && self.impulse_down == 0.0 && v + down >= 0.0 && v - up <= 0.0;
+        !rests
+    }
+
+    #[inline(always)]
+    fn update(&mut self, pass: Pass, inverse_mass: f64, mass: f64, v: &mut f64) {
+        let [most_down, most_up] = self.allowed(pass);
+        let up = (self.impulse_up - (*v + most_down) * mass).max(0.0);
         *v += inverse_mass * (up - self.impulse_up);
         self.impulse_up = up;
-        let down = (self.impulse_down - (*v - self.up[at]) * mass).min(0.0);
+        let down = (self.impulse_down - (*v - most_up) * mass).min(0.0);
         *v += inverse_mass * (down - self.impulse_down);
         self.impulse_down = down;
     }

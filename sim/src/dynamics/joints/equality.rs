@@ -1,10 +1,11 @@
 //! Equalities: coupled joints, points held together, and welds that can be switched, such as a latch.
 
+use pulp::Simd;
 use rapier3d::glamx::{DMat3, DPose3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::dynamics::settings::{Pass, Settings};
-use crate::dynamics::trees::rows::ConstraintRows;
+use crate::dynamics::trees::rows::{ConstraintRows, Whitened};
 use crate::dynamics::trees::spatial::ForceVector;
 use crate::dynamics::trees::{LinkId, Trees};
 
@@ -66,7 +67,8 @@ impl Equalities {
         }
     }
 
-    pub fn prepare(&mut self, trees: &Trees, settings: &Settings) {
+    #[inline(always)]
+    pub fn prepare<S: Simd>(&mut self, simd: S, trees: &Trees, settings: &Settings) {
         self.rows.clear();
         self.blocks.clear();
         for index in 0..self.all.len() {
@@ -75,27 +77,30 @@ impl Equalities {
             }
             match self.all[index].clone() {
                 Equality::Couple { follower, leader, polynomial } => {
-                    let error = self.couple(trees, follower, leader, &polynomial);
-                    self.close(index, 0, DVec3::new(error, 0.0, 0.0), settings);
+                    let (inverse_mass, error) = self.couple(simd, trees, follower, leader, &polynomial);
+                    self.close(index, 0, inverse_mass, DVec3::new(error, 0.0, 0.0), settings);
                 }
                 Equality::Connect { a, a_point_m, b, b_point_m } => {
                     let ends = [world_from(trees, Some(a)) * a_point_m, world_from(trees, b) * b_point_m];
-                    self.hold_point(trees, index, [Some(a), b], ends, settings);
+                    self.hold_point(simd, trees, index, [Some(a), b], ends, settings);
                 }
                 Equality::Weld { a, a_from_b, b } => {
                     let (wanted, is) = (world_from(trees, Some(a)) * a_from_b, world_from(trees, b));
                     let ends = [wanted.translation, is.translation];
-                    self.hold_point(trees, index, [Some(a), b], ends, settings);
+                    self.hold_point(simd, trees, index, [Some(a), b], ends, settings);
                     let error = (is.rotation * wanted.rotation.inverse()).to_scaled_axis();
-                    trees.push_rows(&mut self.rows, [Some(a), b], |_| DVec3::AXES.map(ForceVector::moment));
-                    self.close(index, 1, error, settings);
+                    let moments = |_| DVec3::AXES.map(ForceVector::moment);
+                    let inverse_mass = trees.push_rows(simd, &mut self.rows, [Some(a), b], moments);
+                    self.close(index, 1, inverse_mass, error, settings);
                 }
             }
         }
     }
 
-    fn hold_point(
+    #[inline(always)]
+    fn hold_point<S: Simd>(
         &mut self,
+        simd: S,
         trees: &Trees,
         index: usize,
         bodies: [Option<LinkId>; 2],
@@ -104,31 +109,32 @@ impl Equalities {
     ) {
         let middle_m = (ends_m[0] + ends_m[1]) * 0.5;
         let at = |reference_m| DVec3::AXES.map(|axis| ForceVector::at(middle_m - reference_m, axis));
-        trees.push_rows(&mut self.rows, bodies, at);
-        self.close(index, 0, ends_m[1] - ends_m[0], settings);
+        let inverse_mass = trees.push_rows(simd, &mut self.rows, bodies, at);
+        self.close(index, 0, inverse_mass, ends_m[1] - ends_m[0], settings);
     }
 
-    /// Row of  follower' - p'(leader) leader' = 0;  gives the error  follower - p(leader).
-    fn couple(
+    /// Row of  follower' - p'(leader) leader' = 0;  gives its inverse mass and the error  follower - p(leader).
+    #[inline(always)]
+    fn couple<S: Simd>(
         &mut self,
+        simd: S,
         trees: &Trees,
         follower: LinkId,
         leader: Option<LinkId>,
         polynomial: &[f64; 5],
-    ) -> f64 {
-        let start = self.rows.column.len();
+    ) -> ([[f64; 3]; 3], f64) {
+        self.rows.begin();
         let push = |rows: &mut ConstraintRows<3>, id: LinkId, scale: f64| {
             let tree = &trees.all[id.tree.index()];
             let dof = tree.layout.first_dof[id.link];
-            rows.push_dof(tree, trees.offset[id.tree.index()], dof, [scale, 0.0, 0.0]);
+            rows.push_dof(simd, tree, trees.offset[id.tree.index()], dof, [scale, 0.0, 0.0]);
             tree.q[id.link]
         };
         let position = push(&mut self.rows, follower, 1.0);
         let Some(leader) = leader else {
-            self.rows.close(start);
-            return position - polynomial[0];
+            return (self.rows.close(), position - polynomial[0]);
         };
-        let second = self.rows.column.len();
+        let second = self.rows.columns();
         let x = trees.all[leader.tree.index()].q[leader.link];
         let (mut value, mut slope) = (0.0, 0.0);
         for coefficient in polynomial.iter().rev() {
@@ -137,14 +143,12 @@ impl Equalities {
         }
         push(&mut self.rows, leader, -slope);
         if leader.tree == follower.tree {
-            self.rows.merge(start, second);
+            self.rows.merge(second);
         }
-        self.rows.close(start);
-        position - value
+        (self.rows.close(), position - value)
     }
 
-    fn close(&mut self, equality: usize, part: usize, error: DVec3, settings: &Settings) {
-        let a = self.rows.last_inverse_mass();
+    fn close(&mut self, equality: usize, part: usize, a: [[f64; 3]; 3], error: DVec3, settings: &Settings) {
         let regularisation = REGULARISATION * (a[0][0] + a[1][1] + a[2][2]);
         let mut matrix = DMat3::from_cols_array_2d(&a);
         for c in 0..3 {
@@ -160,13 +164,14 @@ impl Equalities {
         });
     }
 
-    pub fn warm_start(&self, w: &mut [f64]) {
+    pub fn warm_start(&self, w: &mut Whitened) {
         for (group, block) in self.blocks.iter().enumerate() {
             self.rows.push_impulse(group, &block.impulse.to_array(), w);
         }
     }
 
-    pub fn sweep(&mut self, pass: Pass, w: &mut [f64]) {
+    #[inline(always)]
+    pub fn sweep(&mut self, pass: Pass, w: &mut Whitened) {
         for (group, block) in self.blocks.iter_mut().enumerate() {
             let mut velocity = DVec3::from_array(self.rows.velocity(group, w));
             if pass == Pass::Correcting {

@@ -11,6 +11,7 @@
 
 pub mod bounds;
 pub mod equality;
+mod units;
 
 use super::trees::link::{Axis, Drive, DriveLaw};
 use super::trees::tree::Tree;

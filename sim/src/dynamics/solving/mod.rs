@@ -6,13 +6,15 @@ mod step;
 pub use step::Diverged;
 
 use heaps::Heaps;
+use pulp::{Arch, Simd, WithSimd};
 
-use crate::dynamics::contacts::friction::{Contact, Contacts, Directions, Terms};
+use crate::dynamics::contacts::friction::{Contacts, Directions, Terms};
 use crate::dynamics::contacts::{Candidate, ContactPoint, Impulses, continued};
 use crate::dynamics::joints::bounds::JointRows;
 use crate::dynamics::joints::equality::Equalities;
 use crate::dynamics::settings::{Pass, Settings};
 use crate::dynamics::trees::Trees;
+use crate::dynamics::trees::rows::Whitened;
 use crate::dynamics::trees::spatial::ForceVector;
 
 /// Velocity (rad/s or m/s) which, taken back in the last sweep by the end of a range or by a motor that is turned too fast, says that
@@ -33,15 +35,19 @@ const HARD_J: f64 = 0.3;
 #[derive(Default)]
 pub struct Solver {
     /// Whitened velocities of all trees.
-    pub w: Vec<f64>,
+    pub w: Whitened,
     /// Likewise before the step, and what contacts change; only where [`Solver::take_only`] needs them.
     before: Vec<f64>,
-    change: Vec<f64>,
+    change: Whitened,
     joints: JointRows,
     pub equalities: Equalities,
-    /// Contacts that slide and spin, and contacts that also resist rolling; both in the order of the candidates.
+    heaps: Heaps,
+    /// Contacts that slide and spin, and contacts that also resist rolling; both in the order in which heaps take turns.
     plain: Contacts<4>,
     rolling: Contacts<6>,
+    /// With which impulses each candidate begins, and its number among the contacts of its kind.
+    begins: Vec<[f64; 6]>,
+    places: Vec<usize>,
     /// Contact points of the last step, in the order of their colliders.
     pub touches: Vec<ContactPoint>,
     /// Contact points of this step; [`Solver::commit`] makes them those of the last.
@@ -51,13 +57,36 @@ pub struct Solver {
 impl Solver {
     /// Builds all rows. The trees are factorised, and `w` holds the velocities without constraints.
     pub fn prepare(&mut self, trees: &Trees, candidates: &[Candidate], settings: &Settings) {
-        self.joints.clear();
-        for (index, (tree, offset)) in trees.all.iter().zip(&trees.offset).enumerate() {
-            self.joints.push_tree(tree, index, *offset, settings);
-        }
-        self.equalities.prepare(trees, settings);
+        self.w.clear_margins();
+        self.begin(candidates, settings);
+        Arch::new().dispatch(Gathering { solver: self, trees, candidates, settings });
+    }
+
+    #[inline(always)]
+    fn gather<S: Simd>(&mut self, simd: S, trees: &Trees, candidates: &[Candidate], settings: &Settings) {
+        self.joints.prepare(simd, trees, settings);
+        self.equalities.prepare(simd, trees, settings);
         self.plain.clear();
         self.rolling.clear();
+        self.places.clear();
+        self.places.resize(candidates.len(), 0);
+        self.heaps.find(trees.all.len(), candidates);
+        for index in self.heaps.in_turn(candidates) {
+            let (candidate, impulse) = (&candidates[index], self.begins[index]);
+            self.places[index] = match candidate.friction.directions {
+                Directions::None | Directions::Slide | Directions::SlideSpin => {
+                    push(simd, &mut self.plain, candidate, impulse, trees, settings)
+                }
+                Directions::SlideSpinRoll => {
+                    push(simd, &mut self.rolling, candidate, impulse, trees, settings)
+                }
+            };
+        }
+    }
+
+    /// Finds the impulses with which candidates begin: those of the contacts that they continue.
+    fn begin(&mut self, candidates: &[Candidate], settings: &Settings) {
+        self.begins.clear();
         let mut before = 0;
         for candidate in candidates {
             let touch = &candidate.touch;
@@ -67,13 +96,7 @@ impl Solver {
             let of_pair = |old: &&ContactPoint| old.colliders == touch.colliders;
             let same = self.touches[before..].iter().take_while(of_pair).count();
             let old = continued(touch, &self.touches[before..before + same], settings.match_m);
-            let impulse = old.unwrap_or_default().lanes(candidate.directions);
-            match candidate.friction.directions {
-                Directions::None | Directions::Slide | Directions::SlideSpin => {
-                    push(&mut self.plain, candidate, impulse, trees, settings);
-                }
-                Directions::SlideSpinRoll => push(&mut self.rolling, candidate, impulse, trees, settings),
-            }
+            self.begins.push(old.unwrap_or_default().lanes(candidate.directions));
         }
     }
 
@@ -87,10 +110,8 @@ impl Solver {
         self.settle(Pass::Correcting, if deep { sweeps + MORE_SWEEPS } else { sweeps });
         self.equalities.remember();
         self.found.clear();
-        let (mut plain, mut rolling) = (self.plain.all.iter(), self.rolling.all.iter());
-        for candidate in candidates {
-            let lanes = next_impulse(candidate, &mut plain, &mut rolling);
-            let memory = Impulses::of_lanes(lanes, candidate.directions);
+        for (index, candidate) in candidates.iter().enumerate() {
+            let memory = Impulses::of_lanes(self.impulse(index, candidate), candidate.directions);
             self.found.push(ContactPoint { memory, ..candidate.touch });
         }
     }
@@ -102,10 +123,9 @@ impl Solver {
         if corrected_j - kinetic_j(&self.w) > HARD_J {
             self.take_only(trees, candidates);
         }
-        let (mut plain, mut rolling) = (self.plain.all.iter(), self.rolling.all.iter());
-        for (touch, candidate) in self.found.iter_mut().zip(candidates) {
-            let lanes = next_impulse(candidate, &mut plain, &mut rolling);
-            let acted = Impulses::of_lanes(lanes, candidate.directions);
+        for (index, candidate) in candidates.iter().enumerate() {
+            let acted = Impulses::of_lanes(self.impulse(index, candidate), candidate.directions);
+            let touch = &mut self.found[index];
             touch.normal_impulse_n_s = acted.normal;
             touch.impulse_n_s = touch.normal * acted.normal + acted.tangent;
         }
@@ -120,6 +140,11 @@ impl Solver {
 
     /// So many sweeps, and more where ends of ranges and motors that are turned too fast are not settled by then.
     fn settle(&mut self, pass: Pass, sweeps: usize) {
+        Arch::new().dispatch(Settling { solver: self, pass, sweeps });
+    }
+
+    #[inline(always)]
+    fn settle_with(&mut self, pass: Pass, sweeps: usize) {
         let mut pushed = 0.0;
         for sweep in 0..sweeps + MORE_SWEEPS {
             if sweep >= sweeps && pushed < UNSETTLED {
@@ -144,14 +169,13 @@ impl Solver {
                 &mut self.before[*offset..offset + tree.dofs()],
             );
         }
-        self.change.clear();
-        self.change.resize(self.w.len(), 0.0);
+        self.change.resize(self.w.len());
+        self.change.fill(0.0);
         self.plain.push_impulses(&mut self.change);
         self.rolling.push_impulses(&mut self.change);
-        let heaps = Heaps::of(trees.all.len(), candidates);
         let mut work = vec![HeapWork::default(); trees.all.len()];
         for (index, (tree, offset)) in trees.all.iter().zip(&trees.offset).enumerate() {
-            let of_heap = &mut work[heaps.of_tree(index)];
+            let of_heap = &mut work[self.heaps.of_tree(index)];
             for at in *offset..offset + tree.dofs() {
                 of_heap.twice_j += self.change[at] * (self.before[at] + self.w[at]);
                 of_heap.own_j += self.change[at] * self.change[at];
@@ -161,32 +185,77 @@ impl Solver {
             return;
         }
         for (index, (tree, offset)) in trees.all.iter().zip(&trees.offset).enumerate() {
-            let left_out = 1.0 - work[heaps.of_tree(index)].share();
+            let left_out = 1.0 - work[self.heaps.of_tree(index)].share();
             for at in *offset..offset + tree.dofs() {
                 self.w[at] -= left_out * self.change[at];
             }
         }
-        let (mut plain, mut rolling) = (self.plain.all.iter_mut(), self.rolling.all.iter_mut());
-        for candidate in candidates {
-            let share = work[heaps.of_contact(candidate)].share();
+        for (place, candidate) in self.places.iter().zip(candidates) {
+            let share = work[self.heaps.of_contact(candidate)].share();
             let impulse = match candidate.friction.directions {
                 Directions::None | Directions::Slide | Directions::SlideSpin => {
-                    plain.next().map(|contact| &mut contact.impulse[..])
+                    &mut self.plain.all[*place].impulse[..]
                 }
-                Directions::SlideSpinRoll => rolling.next().map(|contact| &mut contact.impulse[..]),
+                Directions::SlideSpinRoll => &mut self.rolling.all[*place].impulse[..],
             };
-            impulse.into_iter().flatten().for_each(|impulse| *impulse *= share);
+            impulse.iter_mut().for_each(|impulse| *impulse *= share);
         }
+    }
+
+    /// Impulses of the contact that a candidate became.
+    fn impulse(&self, index: usize, candidate: &Candidate) -> [f64; 6] {
+        let mut lanes = [0.0; 6];
+        match candidate.friction.directions {
+            Directions::None | Directions::Slide | Directions::SlideSpin => {
+                lanes[..4].copy_from_slice(&self.plain.all[self.places[index]].impulse);
+            }
+            Directions::SlideSpinRoll => lanes = self.rolling.all[self.places[index]].impulse,
+        }
+        lanes
     }
 
     /// Contacts change by this share of what they would. The greatest velocity (rad/s or m/s) that joints took back, see
     /// [`JointRows::sweep`].
+    #[inline(always)]
     fn sweep(&mut self, pass: Pass, share: f64) -> f64 {
         let pushed = self.joints.sweep(pass, &mut self.w);
         self.equalities.sweep(pass, &mut self.w);
         self.plain.sweep(pass, share, &mut self.w);
         self.rolling.sweep(pass, share, &mut self.w);
         pushed
+    }
+}
+
+/// Work for the widest vectors that the processor has. They add and multiply as single numbers do, bit for bit.
+struct Settling<'a> {
+    solver: &'a mut Solver,
+    pass: Pass,
+    sweeps: usize,
+}
+
+impl WithSimd for Settling<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        self.solver.settle_with(self.pass, self.sweeps);
+    }
+}
+
+/// Likewise, all rows of contacts.
+struct Gathering<'a> {
+    solver: &'a mut Solver,
+    trees: &'a Trees,
+    candidates: &'a [Candidate],
+    settings: &'a Settings,
+}
+
+impl WithSimd for Gathering<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        self.solver.gather(simd, self.trees, self.candidates, self.settings);
     }
 }
 
@@ -219,16 +288,19 @@ fn giving_share(gap_m: f64) -> f64 {
     ((RIGID_M + gap_m) / (RIGID_M - DEEP_M)).clamp(0.0, 1.0)
 }
 
-fn push<const N: usize>(
+/// Adds a contact; returns its number.
+#[inline(always)]
+fn push<S: Simd, const N: usize>(
+    simd: S,
     contacts: &mut Contacts<N>,
     candidate: &Candidate,
     impulse: [f64; 6],
     trees: &Trees,
     settings: &Settings,
-) {
+) -> usize {
     let [normal, t1, t2] = candidate.directions;
     let point_m = candidate.touch.point_m;
-    trees.push_rows(&mut contacts.rows, candidate.bodies, |reference_m| {
+    let inverse_mass = trees.push_rows(simd, &mut contacts.rows, candidate.bodies, |reference_m| {
         let at = |direction| ForceVector::at(point_m - reference_m, direction);
         let lanes = [
             at(normal),
@@ -252,27 +324,12 @@ fn push<const N: usize>(
         // reach.
         friction[4..].fill(0.0);
     }
-    contacts.push(Terms {
+    let terms = Terms {
         bias_m_s: [open_m_s + correction_m_s.max(-settings.fastest_correction_m_s), open_m_s],
         softness: softness.compliance(settings.dt_s) * giving_share(gap_m),
         friction: std::array::from_fn(|lane| friction[lane]),
         impulse: std::array::from_fn(|lane| if friction[lane] > 0.0 { impulse[lane] } else { 0.0 }),
-    });
-}
-
-/// Impulses of the contact that a candidate became; candidates and contacts are in the same order.
-fn next_impulse<'a>(
-    candidate: &Candidate,
-    plain: &mut impl Iterator<Item = &'a Contact<4>>,
-    rolling: &mut impl Iterator<Item = &'a Contact<6>>,
-) -> [f64; 6] {
-    let mut lanes = [0.0; 6];
-    match candidate.friction.directions {
-        Directions::None | Directions::Slide | Directions::SlideSpin => {
-            let impulse = plain.next().map_or([0.0; 4], |contact| contact.impulse);
-            lanes[..4].copy_from_slice(&impulse);
-        }
-        Directions::SlideSpinRoll => lanes = rolling.next().map_or(lanes, |contact| contact.impulse),
-    }
-    lanes
+    };
+    contacts.push(inverse_mass, terms);
+    contacts.all.len() - 1
 }

@@ -5,6 +5,8 @@
 //! L has the sparsity of the tree: column by column, only the path to the world.
 //! Source: Featherstone 2008, section 6.5 and table 6.3.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use super::layout::Layout;
 
 pub struct Factor {
@@ -29,6 +31,11 @@ impl Factor {
 
     /// M = L^T D L in place, from the leaves inwards.
     pub fn factorise(&mut self, layout: &Layout) {
+        Arch::new().dispatch(Factorising { factor: self, layout });
+    }
+
+    #[inline(always)]
+    fn factorise_with(&mut self, layout: &Layout) {
         for k in (0..layout.dofs()).rev() {
             let range = layout.row(k);
             let (before, from) = self.h.split_at_mut(range.start);
@@ -90,8 +97,14 @@ impl Factor {
     }
 
     /// Y = D^-1/2 L^-T J^T in place, for N rows at once that are zero outside the path of degree of freedom `k`.
-    #[inline]
-    pub fn whiten_rows<const N: usize>(&self, layout: &Layout, k: usize, y: &mut [[f64; N]]) {
+    #[inline(always)]
+    pub fn whiten_rows<S: Simd, const N: usize>(
+        &self,
+        simd: S,
+        layout: &Layout,
+        k: usize,
+        y: &mut [[f64; N]],
+    ) {
         let path = layout.path(k);
         for p in (0..path.len()).rev() {
             let i = usize::from(path[p]);
@@ -99,13 +112,39 @@ impl Factor {
             let (left, right) = y.split_at_mut(p);
             let pivot = right[0];
             for (t, l) in left.iter_mut().zip(row) {
-                for c in 0..N {
-                    t[c] -= l * pivot[c];
-                }
+                subtract(simd, t, *l, &pivot);
             }
             for entry in &mut right[0] {
                 *entry *= self.inverse_root_d[i];
             }
         }
+    }
+}
+
+/// t -= l pivot, number by number.
+#[inline(always)]
+fn subtract<S: Simd>(simd: S, t: &mut [f64], l: f64, pivot: &[f64]) {
+    let ((wide_t, t), (wide_pivot, pivot)) = (S::as_mut_simd_f64s(t), S::as_simd_f64s(pivot));
+    let wide_l = simd.splat_f64s(l);
+    for (t, pivot) in wide_t.iter_mut().zip(wide_pivot) {
+        *t = simd.sub_f64s(*t, simd.mul_f64s(wide_l, *pivot));
+    }
+    for (t, pivot) in t.iter_mut().zip(pivot) {
+        *t -= l * pivot;
+    }
+}
+
+/// Work for the widest vectors that the processor has.
+struct Factorising<'a> {
+    factor: &'a mut Factor,
+    layout: &'a Layout,
+}
+
+impl WithSimd for Factorising<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        self.factor.factorise_with(self.layout);
     }
 }

@@ -12,6 +12,7 @@ pub mod spatial;
 pub mod state;
 pub mod tree;
 
+use pulp::Simd;
 use rapier3d::glamx::{DPose3, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -86,17 +87,19 @@ impl Trees {
     }
 
     /// Appends N rows whose unit impulses act on the second body as `wrenches` says and on the first as its opposite;
-    /// `None` is the world. `wrenches` gets the tree's reference point.
-    pub fn push_rows<const N: usize>(
+    /// `None` is the world. `wrenches` gets the tree's reference point. Returns the inverse masses.
+    #[inline(always)]
+    pub fn push_rows<S: Simd, const N: usize>(
         &self,
+        simd: S,
         rows: &mut ConstraintRows<N>,
         bodies: [Option<LinkId>; 2],
         wrenches: impl Fn(DVec3) -> [ForceVector; N],
-    ) {
-        let start = rows.column.len();
-        let mut second = start;
+    ) -> [[f64; N]; N] {
+        rows.begin();
+        let mut second = 0;
         for (side, body) in bodies.into_iter().enumerate() {
-            second = if side == 1 { rows.column.len() } else { second };
+            second = if side == 1 { rows.columns() } else { second };
             let Some(body) = body else { continue };
             let index = body.tree.index();
             let tree = &self.all[index];
@@ -104,13 +107,13 @@ impl Trees {
             if side == 0 {
                 on_tree = on_tree.map(|wrench| -wrench);
             }
-            rows.push_link(tree, self.offset[index], body.link, &on_tree);
+            rows.push_link(simd, tree, self.offset[index], body.link, &on_tree);
         }
         if let [Some(a), Some(b)] = bodies
             && a.tree == b.tree
         {
-            rows.merge(start, second);
+            rows.merge(second);
         }
-        rows.close(start);
+        rows.close()
     }
 }

@@ -1,40 +1,112 @@
-//! Sparse whitened rows of constraints.
+//! Sparse whitened rows of constraints, and the velocities that they act on.
+
+use std::ops::{Deref, DerefMut, Range};
+
+use pulp::Simd;
 
 use super::spatial::ForceVector;
 use super::tree::Tree;
 
 /// Groups of N rows that share their columns: of each group the columns that are not zero, and in them Y (see `factor`).
 pub struct ConstraintRows<const N: usize> {
-    pub y: Vec<[f64; N]>,
-    pub column: Vec<u16>,
-    /// Where each group begins, and the end of the last.
-    start: Vec<usize>,
+    /// The last group, column by column, until another one begins.
+    y: Vec<[f64; N]>,
+    column: Vec<u16>,
+    /// All groups.
+    blocks: Vec<RowBlock<N>>,
+    groups: Vec<Range<usize>>,
 }
 
-/// Sums that grow side by side: an addition waits for the one before it.
-const CHAINS: usize = 4;
+/// Columns that are worked on side by side: the sums over every fourth column of a group grow independently of each other.
+const SIDE: usize = 4;
+
+/// Neighbours among a group's columns that are neighbours among all, each at the place that it has in sums. What is at other places
+/// is none of the group's.
+struct RowBlock<const N: usize> {
+    /// Zero at other places.
+    y: [Quad; N],
+    /// Added to what is there otherwise: zeros here, and what changes nothing, zeros of the other sign, at other places.
+    nothing: Quad,
+    /// Where they begin in [`Whitened`].
+    first: usize,
+}
+
+#[derive(Clone, Copy, Default)]
+#[repr(align(32))]
+struct Quad([f64; SIDE]);
+
+/// Whitened velocities of all trees. Before and behind them is room for blocks that reach beyond.
+pub struct Whitened(Vec<f64>);
+
+const MARGIN: usize = SIDE - 1;
+
+impl Default for Whitened {
+    fn default() -> Self {
+        Whitened(vec![0.0; 2 * MARGIN])
+    }
+}
+
+impl Whitened {
+    pub fn resize(&mut self, dofs: usize) {
+        self.0.resize(dofs + 2 * MARGIN, 0.0);
+    }
+
+    /// Whatever a step that diverged has left beyond the velocities.
+    pub fn clear_margins(&mut self) {
+        let end = self.0.len() - MARGIN;
+        self.0[..MARGIN].fill(0.0);
+        self.0[end..].fill(0.0);
+    }
+}
+
+impl Deref for Whitened {
+    type Target = [f64];
+
+    fn deref(&self) -> &[f64] {
+        &self.0[MARGIN..self.0.len() - MARGIN]
+    }
+}
+
+impl DerefMut for Whitened {
+    fn deref_mut(&mut self) -> &mut [f64] {
+        let end = self.0.len() - MARGIN;
+        &mut self.0[MARGIN..end]
+    }
+}
 
 impl<const N: usize> Default for ConstraintRows<N> {
     fn default() -> Self {
-        ConstraintRows { y: Vec::new(), column: Vec::new(), start: vec![0] }
+        ConstraintRows { y: Vec::new(), column: Vec::new(), blocks: Vec::new(), groups: Vec::new() }
     }
 }
 
 impl<const N: usize> ConstraintRows<N> {
     pub fn clear(&mut self) {
-        self.y.clear();
-        self.column.clear();
-        self.start.truncate(1);
+        self.blocks.clear();
+        self.groups.clear();
     }
 
-    #[inline]
-    pub fn group(&self, group: usize) -> (&[[f64; N]], &[u16]) {
-        let range = self.start[group]..self.start[group + 1];
-        (&self.y[range.clone()], &self.column[range])
+    /// Begins a group; the groups follow each other.
+    pub fn begin(&mut self) {
+        self.y.clear();
+        self.column.clear();
+    }
+
+    /// Columns of the group so far.
+    pub fn columns(&self) -> usize {
+        self.column.len()
     }
 
     /// Appends what wrenches about the tree's reference do on a link: J^T = S . wrench along the path, then whitened.
-    pub fn push_link(&mut self, tree: &Tree, offset: usize, link: usize, wrenches: &[ForceVector; N]) {
+    #[inline(always)]
+    pub fn push_link<S: Simd>(
+        &mut self,
+        simd: S,
+        tree: &Tree,
+        offset: usize,
+        link: usize,
+        wrenches: &[ForceVector; N],
+    ) {
         let Some(last) = tree.layout.last_dof[link] else { return };
         let first = self.y.len();
         for k in tree.layout.path(last) {
@@ -42,11 +114,12 @@ impl<const N: usize> ConstraintRows<N> {
             self.y.push(std::array::from_fn(|row| axis.dot(wrenches[row])));
             self.column.push(k + offset as u16);
         }
-        tree.factor.whiten_rows(&tree.layout, last, &mut self.y[first..]);
+        tree.factor.whiten_rows(simd, &tree.layout, last, &mut self.y[first..]);
     }
 
     /// Appends unit rows of one degree of freedom, `scale` in every row.
-    pub fn push_dof(&mut self, tree: &Tree, offset: usize, dof: usize, scale: [f64; N]) {
+    #[inline(always)]
+    pub fn push_dof<S: Simd>(&mut self, simd: S, tree: &Tree, offset: usize, dof: usize, scale: [f64; N]) {
         let first = self.y.len();
         let path = tree.layout.path(dof);
         self.column.extend(path.iter().map(|k| k + offset as u16));
@@ -54,16 +127,16 @@ impl<const N: usize> ConstraintRows<N> {
         if let Some(last) = self.y.last_mut() {
             *last = scale;
         }
-        tree.factor.whiten_rows(&tree.layout, dof, &mut self.y[first..]);
+        tree.factor.whiten_rows(simd, &tree.layout, dof, &mut self.y[first..]);
     }
 
-    /// Adds a second part on the same tree, from `second` on, to the first, from `start` on, where their paths coincide.
-    pub fn merge(&mut self, start: usize, second: usize) {
-        let paths = (start..second).zip(second..self.column.len());
+    /// Adds a second part on the same tree, from the column `second` of the group on, to the first, where their paths coincide.
+    pub fn merge(&mut self, second: usize) {
+        let paths = (0..second).zip(second..self.column.len());
         let shared = paths.take_while(|(a, b)| self.column[*a] == self.column[*b]).count();
         for p in 0..shared {
             let more = self.y[second + p];
-            for (sum, more) in self.y[start + p].iter_mut().zip(more) {
+            for (sum, more) in self.y[p].iter_mut().zip(more) {
                 *sum += more;
             }
         }
@@ -73,17 +146,24 @@ impl<const N: usize> ConstraintRows<N> {
         self.column.truncate(self.column.len() - shared);
     }
 
-    /// Ends the group that began at `start`; the groups follow each other.
-    pub fn close(&mut self, start: usize) {
-        debug_assert_eq!(self.start.last(), Some(&start));
-        self.start.push(self.column.len());
+    /// Appends a column of Y.
+    #[inline(always)]
+    pub fn push(&mut self, column: u16, y: [f64; N]) {
+        self.column.push(column);
+        self.y.push(y);
     }
 
-    /// Y Y^T of the last group: inverse masses.
-    pub fn last_inverse_mass(&self) -> [[f64; N]; N] {
+    /// Ends the group. Returns Y Y^T: inverse masses.
+    #[inline(always)]
+    pub fn close(&mut self) -> [[f64; N]; N] {
+        let first = self.blocks.len();
+        let mut place = 0;
+        while place < self.column.len() {
+            place += self.push_block(place);
+        }
+        self.groups.push(first..self.blocks.len());
         let mut a = [[0.0; N]; N];
-        let (y, _) = self.group(self.start.len() - 2);
-        for y in y {
+        for y in &self.y {
             for i in 0..N {
                 for j in 0..N {
                     a[i][j] += y[i] * y[j];
@@ -93,40 +173,55 @@ impl<const N: usize> ConstraintRows<N> {
         a
     }
 
+    /// Makes a block of the column at this place of the group and of its neighbours; returns how many they are.
+    #[inline(always)]
+    fn push_block(&mut self, place: usize) -> usize {
+        let begin = place % SIDE;
+        let column = &self.column[place..self.column.len().min(place + SIDE - begin)];
+        let are_neighbours = |pair: &[u16]| pair[0] + 1 == pair[1];
+        let count = 1 + column.windows(2).take_while(|pair| are_neighbours(pair)).count();
+        let mut block = RowBlock {
+            y: [Quad::default(); N],
+            nothing: Quad([-0.0; SIDE]),
+            first: usize::from(column[0]) + MARGIN - begin,
+        };
+        for (side, y) in (begin..).zip(&self.y[place..place + count]) {
+            block.nothing.0[side] = 0.0;
+            for (row, y) in block.y.iter_mut().zip(y) {
+                row.0[side] = *y;
+            }
+        }
+        self.blocks.push(block);
+        count
+    }
+
     /// Velocities along the rows of a group.
-    #[inline]
-    pub fn velocity(&self, group: usize, w: &[f64]) -> [f64; N] {
-        let (y, column) = self.group(group);
-        let mut sums = [[0.0; N]; CHAINS];
-        let (whole, whole_columns) = (y.chunks_exact(CHAINS), column.chunks_exact(CHAINS));
-        let (rest, rest_columns) = (whole.remainder(), whole_columns.remainder());
-        for (y, column) in whole.zip(whole_columns) {
-            for chain in 0..CHAINS {
-                let w = w[usize::from(column[chain])];
-                for c in 0..N {
-                    sums[chain][c] += y[chain][c] * w;
+    #[inline(always)]
+    pub fn velocity(&self, group: usize, w: &Whitened) -> [f64; N] {
+        let mut sums = [[0.0; SIDE]; N];
+        for RowBlock { y, first, .. } in &self.blocks[self.groups[group].clone()] {
+            let w = &w.0[*first..*first + SIDE];
+            for (sums, y) in sums.iter_mut().zip(y) {
+                for side in 0..SIDE {
+                    sums[side] += y.0[side] * w[side];
                 }
             }
         }
-        for (chain, (y, column)) in rest.iter().zip(rest_columns).enumerate() {
-            let w = w[usize::from(*column)];
-            for c in 0..N {
-                sums[chain][c] += y[c] * w;
-            }
-        }
-        std::array::from_fn(|c| sums.iter().map(|sum| sum[c]).sum())
+        sums.map(|sums| sums.into_iter().sum())
     }
 
     /// Adds the impulses of a group.
-    #[inline]
-    pub fn push_impulse(&self, group: usize, impulse: &[f64; N], w: &mut [f64]) {
-        let (y, column) = self.group(group);
-        for (y, column) in y.iter().zip(column) {
-            let mut sum = 0.0;
-            for c in 0..N {
-                sum += y[c] * impulse[c];
+    #[inline(always)]
+    pub fn push_impulse(&self, group: usize, impulse: &[f64; N], w: &mut Whitened) {
+        for RowBlock { y, nothing, first } in &self.blocks[self.groups[group].clone()] {
+            let mut sums = [0.0; SIDE];
+            for (y, impulse) in y.iter().zip(impulse) {
+                sums.iter_mut().zip(y.0).for_each(|(sum, y)| *sum += y * impulse);
             }
-            w[usize::from(*column)] += sum;
+            let w = &mut w.0[*first..*first + SIDE];
+            for side in 0..SIDE {
+                w[side] += f64::from_bits(sums[side].to_bits() | nothing.0[side].to_bits());
+            }
         }
     }
 }
