@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use tandem_sim::{
-    LocomotionChoice, RobotModel, Sensing, SensorModel, SimError, StateSource, mjcf::Document,
+    CONTROL_HZ, LocomotionChoice, RobotModel, Sensing, SensorModel, SimError, StateSource, mjcf::Document,
     render::RendererKind,
 };
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, Wording};
@@ -104,8 +104,7 @@ pub enum Start {
     /// It begins where a phase began in a recorded episode of the same task, seed, robot and controller, with the whole
     /// budget ahead.
     Phase(PhaseStart),
-    /// It begins where a recorded episode of the same task, seed, robot and controller stood some seconds before it went wrong, with the
-    /// whole budget ahead.
+    /// It begins where a recorded episode of the same task, seed, robot and controller stood at a moment, with the whole budget ahead.
     Moment(MomentStart),
 }
 
@@ -116,8 +115,9 @@ pub struct MomentStart {
     pub recording: PathBuf,
     /// Control step of the recorded world.
     pub control_step: u64,
-    /// How many seconds before the episode went wrong that is.
-    pub before_s: u32,
+    /// How many seconds before the episode went wrong that is, where it was chosen so; else somebody has taken over there.
+    #[serde(default)]
+    pub before_s: Option<u32>,
 }
 
 /// The beginning of a phase of a recorded episode.
@@ -238,8 +238,11 @@ impl EpisodeSpec {
             thinking_limit_s.map(|limit_s| format!("thinking limit: {limit_s} s")),
             stress.map(|stress| format!("stress: {stress}")),
             match start {
-                Start::Moment(MomentStart { before_s, .. }) => {
+                Start::Moment(MomentStart { before_s: Some(before_s), .. }) => {
                     Some(format!("begun again {before_s} s before it went wrong"))
+                }
+                Start::Moment(MomentStart { before_s: None, control_step, .. }) => {
+                    Some(format!("taken over at {:.1} s", *control_step as f64 / CONTROL_HZ))
                 }
                 Start::Task | Start::Checkpoint(_) | Start::Phase(_) => None,
             },

@@ -3,7 +3,9 @@
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use tandem_tools_spec::{ActCall, Call, Look, SpecError, ToolCall};
+use tandem_tools_spec::{
+    ActCall, Call, JointChunk, Look, MoveWrists, SendJointChunk, SpecError, ToolCall, Wait, Walk,
+};
 
 use super::{Command, Motion, RobotAction, RobotOrder, find};
 use crate::EpisodeError;
@@ -121,6 +123,32 @@ impl OperatorCall {
         self.call
     }
 
+    /// The command without what the operator wants to look at once it is done.
+    pub fn unseen(mut self) -> OperatorCall {
+        self.call.then = None;
+        self
+    }
+
+    /// What is left of a command of which so many control steps have been executed; nothing is of one that is done, and of other calls.
+    pub fn rest(&self, executed_steps: u32) -> Option<OperatorCall> {
+        let ToolCall::Act(act) = &self.call.tool else { return None };
+        let steps = act.steps().checked_sub(executed_steps).filter(|left| *left > 0)?;
+        let rest = match act.clone() {
+            ActCall::MoveWrists(command) => ActCall::MoveWrists(MoveWrists { steps, ..command }),
+            ActCall::Walk(command) => ActCall::Walk(Walk { steps, ..command }),
+            ActCall::Wait(Wait { steps: _ }) => ActCall::Wait(Wait { steps }),
+            ActCall::SendJointChunk(SendJointChunk { robots }) => {
+                let left = |chunk: JointChunk| JointChunk {
+                    rows: chunk.rows.into_iter().skip(executed_steps as usize).collect(),
+                    ..chunk
+                };
+                ActCall::SendJointChunk(SendJointChunk { robots: robots.into_iter().map(left).collect() })
+            }
+        };
+        let call = Call { tool: ToolCall::Act(rest), expected_step: None, ..self.call.clone() };
+        Some(OperatorCall { robot: self.robot.clone(), call })
+    }
+
     /// What the operator wants to look at once its command is done.
     pub(crate) fn take_look(&mut self) -> Option<Look> {
         self.call.then.take()
@@ -194,6 +222,24 @@ mod tests {
             let arguments = serde_json::from_str(&called.arguments().unwrap()).unwrap();
             assert_eq!(Called::parse(called.name(), arguments).unwrap(), called);
         }
+    }
+
+    #[test]
+    fn of_a_command_that_is_cut_off_the_rest_is_left() {
+        let rows = (0..3).map(|row| vec![f64::from(row); 35]).collect();
+        let chunk = SendJointChunk { robots: vec![JointChunk { robot: "A".into(), rows }] };
+        let rest = operator("A", chunk).rest(1).unwrap();
+        let ToolCall::Act(ActCall::SendJointChunk(left)) = &rest.call().tool else { panic!("{rest:?}") };
+        assert_eq!(left.robots[0].rows.iter().map(|row| row[0]).collect::<Vec<_>>(), [1.0, 2.0]);
+        for call in [
+            operator("A", Walk::example()),
+            operator("A", MoveWrists::example()),
+            operator("A", Wait { steps: 25 }),
+        ] {
+            assert_eq!(call.rest(5).unwrap().call().steps(), call.call().steps() - 5);
+            assert_eq!(call.rest(25), None);
+        }
+        assert_eq!(operator("A", GetStatus {}).rest(0), None);
     }
 
     #[test]

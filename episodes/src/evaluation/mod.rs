@@ -2,6 +2,7 @@
 
 mod cache;
 mod plan;
+mod planned;
 mod retry;
 mod summary;
 #[cfg(test)]
@@ -16,6 +17,7 @@ use crate::{EpisodeError, fingerprint};
 use cache::EpisodeCache;
 
 pub use plan::{EvaluationPlan, KeptFiles, Shard, Starts};
+pub use planned::PlannedEpisodes;
 pub use retry::{FailedEpisode, failed_episodes};
 pub use summary::{Evaluation, TaskSummary};
 
@@ -79,6 +81,7 @@ pub fn evaluate(
     let locomotion = plan.locomotion.load().map_err(EpisodeError::from)?.name();
     let cache = EpisodeCache { plan, folder: &cached, locomotion, build };
     let (work, mut left_out) = plan.episodes();
+    PlannedEpisodes { episodes: work.len() }.write(folder, plan.shard)?;
     let episodes = workers::play_all(&cache, &work, &mut left_out, progress)?;
     let evaluation = summary::summarise(&cache, episodes, left_out);
     let text = serde_json::to_string_pretty(&evaluation)?;

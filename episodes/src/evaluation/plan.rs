@@ -120,7 +120,11 @@ impl EvaluationPlan<'_> {
     fn again(&self, failed: &FailedEpisode, before_s: u32) -> EpisodeSpec {
         let FailedEpisode { spec, recording, .. } = failed;
         let control_step = failed.step_before(before_s);
-        let start = Start::Moment(MomentStart { recording: recording.clone(), control_step, before_s });
+        let start = Start::Moment(MomentStart {
+            recording: recording.clone(),
+            control_step,
+            before_s: Some(before_s),
+        });
         EpisodeSpec {
             scene: spec.scene.clone(),
             robot: spec.robot.clone(),

@@ -14,12 +14,14 @@ use crate::convert::isometry_from_sim;
 use crate::live::{LiveScene, LiveStep, told_transcript};
 use crate::recording::{Recording, TranscriptEntry};
 use crate::session::build;
+use crate::spec::EpisodeSpec;
 
 /// Every how many control steps one is shown: ten a second, between which a page draws what lies between.
 const STEPS_PER_FRAME: usize = 5;
 
 /// A recording that is looked at.
 pub struct RecordedEpisode {
+    spec: EpisodeSpec,
     scene: LiveScene,
     motions: Vec<Motion>,
     steps: Vec<Step>,
@@ -55,7 +57,12 @@ impl RecordedEpisode {
             "result": recording.result, "frames": steps.len(),
         });
         let scene = LiveScene::of(&recording.spec, &built.world, &built.motions);
-        Ok(RecordedEpisode { scene, motions: built.motions, steps, looked, told })
+        Ok(RecordedEpisode { spec: recording.spec, scene, motions: built.motions, steps, looked, told })
+    }
+
+    /// What was played.
+    pub fn spec(&self) -> &EpisodeSpec {
+        &self.spec
     }
 
     /// The message that a page draws all of it from: that of the scene with the calls, the phases and the result in its head, and every

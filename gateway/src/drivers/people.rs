@@ -62,10 +62,11 @@ impl People {
         let collection = Collection::new(robots, planned.len()).map_err(HostingError::from)?;
         let collection = Arc::new(collection);
         let settings = Arc::new(Settings { token: Some(token), ..settings });
+        let scheme = if settings.certificate.is_some() { "https" } else { "http" };
         let name = settings.allowed_hosts.first().cloned();
         let server = Server::start_for(settings, Some(collection.clone()));
         let server = server.map_err(|error| lost("no server", error))?;
-        let base_url = base_url(server.address(), name.as_deref());
+        let base_url = base_url(scheme, server.address(), name.as_deref());
         Ok(People { server, collection, planned, aside, base_url, host_token })
     }
 
@@ -159,16 +160,16 @@ impl Policy for People {
 }
 
 /// How others reach a server at `address`: by the name that it was given, or the address that this machine has towards others.
-fn base_url(address: SocketAddr, name: Option<&str>) -> String {
+fn base_url(scheme: &str, address: SocketAddr, name: Option<&str>) -> String {
     let port = address.port();
     if let Some(name) = name {
-        return format!("http://{name}:{port}");
+        return format!("{scheme}://{name}:{port}");
     }
     let ip = match address.ip() {
         ip if ip.is_unspecified() => own_address().unwrap_or(ip),
         ip => ip,
     };
-    format!("http://{}", SocketAddr::new(ip, port))
+    format!("{scheme}://{}", SocketAddr::new(ip, port))
 }
 
 /// The address of this machine from which it would reach others. Nothing is sent: connecting a UDP socket chooses the address alone.
@@ -186,11 +187,13 @@ mod tests {
     #[test]
     fn links_name_what_others_reach() {
         let check = |address: &str, name: Option<&str>, expected: &str| {
-            assert_eq!(base_url(address.parse().unwrap(), name), expected);
+            let scheme = expected.split(':').next().unwrap();
+            assert_eq!(base_url(scheme, address.parse().unwrap(), name), expected);
         };
         check("127.0.0.1:8700", None, "http://127.0.0.1:8700");
         check("10.0.0.5:1", None, "http://10.0.0.5:1");
         check("[::1]:8700", None, "http://[::1]:8700");
         check("0.0.0.0:8700", Some("lab.example"), "http://lab.example:8700");
+        check("0.0.0.0:8700", Some("lab.example"), "https://lab.example:8700");
     }
 }

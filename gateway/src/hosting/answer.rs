@@ -64,6 +64,29 @@ impl Answer {
         self
     }
 
+    /// The control steps of a command that was cut off by a partner's.
+    pub fn cut_off_steps(&self) -> Option<u32> {
+        match &self.reply {
+            ToolReply::Act(reply) if reply.stop_reason == StopReason::PartnerDone => {
+                Some(reply.executed_steps)
+            }
+            ToolReply::Act(_)
+            | ToolReply::Look(_)
+            | ToolReply::Plan(_)
+            | ToolReply::Manage(_)
+            | ToolReply::Talk(_) => None,
+        }
+    }
+
+    /// The answer to a whole command, to whose last part this is one.
+    pub fn after(mut self, steps_before: u32, heard_before: Vec<Heard>) -> Answer {
+        if let ToolReply::Act(reply) = &mut self.reply {
+            reply.executed_steps += steps_before;
+        }
+        let heard = heard_before.into_iter().chain(self.heard).collect();
+        Answer { heard, ..self }
+    }
+
     /// The answer to a command of `asked_steps`, of which fewer were executed where a partner's was shorter.
     pub fn cut_off_after(mut self, asked_steps: u32) -> Answer {
         if let ToolReply::Act(reply) = &mut self.reply

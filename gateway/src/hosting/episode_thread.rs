@@ -14,9 +14,7 @@ use tandem_episodes::{
     CallReply, Clock, EpisodeError, EpisodeSpec, Facts, OperatorCall, OperatorCommand, RunFolder, Session,
     live::LiveView, monotonic,
 };
-use tandem_tools_spec::{
-    Briefing, Call, EndReason, ManageReply, Note, Protocol, ResultReply, ToolCall, ToolReply,
-};
+use tandem_tools_spec::{Briefing, Call, EndReason, ManageReply, Note, ResultReply, ToolCall, ToolReply};
 use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 
 use super::{
@@ -116,21 +114,10 @@ pub struct EpisodeThread {
     jobs: mpsc::Sender<Job>,
     status: Arc<SharedStatus>,
     folder: PathBuf,
-    subject: EpisodeSubject,
+    spec: Arc<EpisodeSpec>,
     robots: Vec<String>,
     steps_per_command: u32,
     feed: Arc<LiveFeed>,
-}
-
-/// What an episode is one of.
-#[derive(Debug, Clone, Copy)]
-pub struct EpisodeSubject {
-    /// The task's id.
-    pub task: &'static str,
-    /// The seed.
-    pub seed: u32,
-    /// The rules.
-    pub protocol: Protocol,
 }
 
 /// What the thread lets everybody know without being asked.
@@ -188,7 +175,8 @@ impl EpisodeThread {
         let (jobs, inbox) = mpsc::channel(WAITING_CALLS);
         let (started, start) = oneshot::channel();
         let status = Arc::new(SharedStatus::default());
-        let subject = EpisodeSubject { task: spec.task.id, seed: spec.seed, protocol: spec.protocol };
+        let spec = Arc::new(spec);
+        let played = spec.clone();
         let (feed, feed_end) = LiveFeed::new();
         let feed = Arc::new(feed);
         let fed = feed.clone();
@@ -196,7 +184,7 @@ impl EpisodeThread {
         let thread = move || {
             // Every line that is logged on this thread names the episode.
             let _named = tracing::info_span!("thread", episode = name).entered();
-            match open_session(&spec, folder, clock, feed_end) {
+            match open_session(&played, folder, clock, feed_end) {
                 Ok((session, briefing)) => {
                     // A caller that went away during the start has dropped the inbox's other end, and serve returns.
                     let _ = started.send(Ok(briefing));
@@ -219,7 +207,7 @@ impl EpisodeThread {
         status.env_steps.fetch_max(briefing.status.env_steps, Ordering::Relaxed);
         let steps_per_command = briefing.status.budget.steps_per_command;
         let robots = briefing.robots.iter().map(|robot| robot.robot.clone()).collect();
-        Ok((EpisodeThread { jobs, status, folder: path, subject, robots, steps_per_command, feed }, briefing))
+        Ok((EpisodeThread { jobs, status, folder: path, spec, robots, steps_per_command, feed }, briefing))
     }
 
     /// Runs a call of the policy that directs all robots and returns its reply.
@@ -329,8 +317,8 @@ impl EpisodeThread {
     }
 
     /// What is played.
-    pub fn subject(&self) -> &EpisodeSubject {
-        &self.subject
+    pub fn spec(&self) -> &EpisodeSpec {
+        &self.spec
     }
 
     /// The robots of the episode, in order.

@@ -2,7 +2,7 @@
 
 use std::{io, sync::Arc};
 
-use tandem_episodes::EpisodeError;
+use tandem_episodes::{EpisodeError, players::PlayerError};
 use tandem_tools_spec::{Refusal, RefusalClass};
 
 use crate::token::TokenError;
@@ -89,6 +89,9 @@ pub enum HostingError {
         "an operator looks through its robot and commands it; this request is for who started the episode"
     )]
     HostsBusiness,
+    /// Nobody here can drive a robot of this task.
+    #[error("{0}")]
+    NoExpert(#[source] PlayerError),
     /// Nobody may talk here.
     #[error(
         "nobody hears you: operators talk in an episode that was started with operators \"per_robot\" and talk true"
@@ -156,6 +159,7 @@ impl HostingError {
             }
             HostingError::NeedsOperator => Refusal::new("needs-operator", "Driven by operators", Forbidden),
             HostingError::HostsBusiness => Refusal::new("hosts-business", "Not for operators", Forbidden),
+            HostingError::NoExpert(_) => Refusal::new("no-expert", "No expert", Invalid),
             HostingError::NoTalk => Refusal::new("no-talk", "Nobody hears", Conflict),
             HostingError::TooMuchSaid { .. } => {
                 Refusal::new("too-much-said", "Too much said", TooMany).retry_after_s(1)
@@ -187,6 +191,7 @@ impl HostingError {
             | HostingError::EpisodePanicked
             | HostingError::NeedsOperator
             | HostingError::HostsBusiness
+            | HostingError::NoExpert(_)
             | HostingError::KeyUsed
             | HostingError::Token(_)
             | HostingError::Shared(_)

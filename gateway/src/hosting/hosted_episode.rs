@@ -120,12 +120,12 @@ impl HostedEpisode {
 
     /// Its line in the list of episodes. Its thread is not asked, which may be at work.
     pub fn entry(&self) -> EpisodeEntry {
-        let subject = self.thread.subject();
+        let spec = self.thread.spec();
         EpisodeEntry {
             episode_id: self.id.clone(),
-            task: subject.task.into(),
-            seed: subject.seed,
-            protocol: subject.protocol,
+            task: spec.task.id.into(),
+            seed: spec.seed,
+            protocol: spec.protocol,
             operators: if self.team.is_some() { Operators::PerRobot } else { Operators::One },
             step: self.thread.env_steps(),
             ended: self.thread.end_reason(),

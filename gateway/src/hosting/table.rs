@@ -101,13 +101,17 @@ impl EpisodeTable {
         args: StartEpisode,
         driving: Driving,
     ) -> Result<StartReply, HostingError> {
-        let spec = self.settings.spec(&args)?;
+        let reply = self.start_spec(self.settings.spec(&args)?, &driving).await?;
+        let briefing = if args.short { reply.briefing.shortened() } else { reply.briefing };
+        Ok(StartReply { briefing, ..reply })
+    }
+
+    /// As [`EpisodeTable::start_driven`], of an episode that is not as this server's are.
+    pub async fn start_spec(&self, spec: EpisodeSpec, driving: &Driving) -> Result<StartReply, HostingError> {
         let place = self.take_place().await?;
         let (id, path) = self.folders.create(&self.settings.runs, spec.task.id, spec.seed);
         let folder = RunFolder { path, visibility: self.settings.record, pages: true };
-        let reply = self.begin(&id, spec, &driving, folder, place).await?;
-        let briefing = if args.short { reply.briefing.shortened() } else { reply.briefing };
-        Ok(StartReply { briefing, ..reply })
+        self.begin(&id, spec, driving, folder, place).await
     }
 
     /// Starts `spec` under the name `id` with its files in `folder`, for an evaluation in this process.

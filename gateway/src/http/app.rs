@@ -11,7 +11,7 @@ use tokio::sync::Semaphore;
 
 use super::{
     problem::ApiError,
-    watching::{LastOpened, MOST_WATCHERS, WatchKey},
+    watching::{KnownEvaluations, LastOpened, MOST_WATCHERS, WatchKey},
 };
 use crate::{
     hosting::{Caller, EpisodeTable},
@@ -34,13 +34,16 @@ pub struct AppState {
     pub watchers: Arc<Semaphore>,
     /// The recording that was watched last.
     pub opened: LastOpened,
+    /// The evaluations in the runs folder, as they were when they were listed last.
+    pub evaluations: KnownEvaluations,
 }
 
 impl AppState {
     /// A server that holds no episode yet.
     pub fn new(table: Arc<EpisodeTable>, settings: Arc<Settings>, watch_key: WatchKey) -> AppState {
         let watchers = Arc::new(Semaphore::new(MOST_WATCHERS));
-        AppState { table, settings, watch_key, watchers, opened: LastOpened::default() }
+        let (opened, evaluations) = (LastOpened::default(), KnownEvaluations::default());
+        AppState { table, settings, watch_key, watchers, opened, evaluations }
     }
 
     /// The tools that `caller` may be offered: talking is for operators who may.

@@ -21,6 +21,11 @@ const STEPS = 10;
 /** Shows the page of `seat` and drives until the episode has ended. Returns what gives back what it draws with, if it has drawn. */
 export async function drive(main, seat) {
   const root = `/v1/episodes/${encodeURIComponent(seat.episode)}`;
+  try {
+    await call("/operate/enter", seat.token, {}, { credentials: "same-origin" });
+  } catch (error) {
+    return nothing(main, error.status === 403 ? "This link drives no robot here." : error.message);
+  }
   const briefing = await call(`${root}/briefing`, seat.token).catch((error) => error);
   if (briefing instanceof Error) return nothing(main, briefing.message);
   return new DrivePage(main, seat, root, briefing).drive();
@@ -50,7 +55,7 @@ class DrivePage {
   /** Drives until the episode is over. The last of it stays to be seen. */
   drive() {
     this.keys = listen((key) => {
-      const action = { 1: "left", 2: "right", o: "open", c: "close", " ": "clutch", Enter: this.stepwise ? "step" : null }[key];
+      const action = { 1: "left", 2: "right", o: "open", c: "close", h: "level", " ": "clutch", Enter: this.stepwise ? "step" : null }[key];
       if (action) this.act(action);
       return Boolean(action);
     }, this.over.signal);
@@ -102,8 +107,13 @@ class DrivePage {
     const seen = !document.hidden || this.headset.session;
     const go = seen && !this.paused && !this.stepwise && !this.finishing;
     const want = this.headset.session ? withHeadset(wanted(this.keys), this.headset.wanted()) : wanted(this.keys);
-    if (want.clutch) this.hands.letGo();
-    else if (want.wristM_s.some((value) => value !== 0)) this.hands.shift(this.hand, new Vector3(...want.wristM_s).multiplyScalar(passedS));
+    const moves = (values) => values.some((value) => value !== 0);
+    if (want.clutch) {
+      this.hands.letGo();
+    } else {
+      if (moves(want.wristM_s)) this.hands.shift(this.hand, new Vector3(...want.wristM_s).multiplyScalar(passedS));
+      if (moves(want.wristRad_s)) this.hands.rotate(this.hand, new Vector3(...want.wristRad_s).multiplyScalar(passedS));
+    }
     const move = this.hands.wrists();
     for (const key of ["vx_m_s", "vy_m_s", "yaw_rate_rad_s"]) move[key] = want[key];
     if (want.heightM_s !== 0 && this.heightM !== null) {
@@ -207,6 +217,7 @@ class DrivePage {
     if (SIDES.includes(action)) this.hand = action;
     if (action === "open") this.fingers[this.hand] = OPEN[this.hand];
     if (action === "close") this.fingers[this.hand] = CLOSED[this.hand];
+    if (action === "level") this.hands?.level(this.hand);
     if (action === "clutch") this.hands?.letGo();
     if (action === "step") this.steps += STEPS;
     if (action === "pause") this.paused = this.paused ? null : "Paused by you.";
@@ -237,7 +248,10 @@ class DrivePage {
     }
   }
 
-  /** Dragging moves a wrist in the plane that faces the camera; with Shift, or by the wheel, along the line of sight. */
+  /**
+   * Dragging moves a wrist in the plane that faces the camera; with Shift, or by the wheel, along the line of sight. With Ctrl it turns the
+   * hand as a ball is turned that lies under the pointer, and the wheel turns it about the line of sight.
+   */
   draggable(side) {
     const handle = this.panel.handles[side];
     const drag = (right, down, away) => {
@@ -246,11 +260,21 @@ class DrivePage {
       this.panel.handle(side, this.stage.project(this.hands.inWorld(side)));
     };
     handle.addEventListener("pointerdown", (event) => { handle.setPointerCapture(event.pointerId); this.act(side); });
+    const turn = (right, down, round) => {
+      if (!this.hands) return;
+      this.hands.rotate(side, this.hands.inPelvis(this.stage.axis(right, down, round)));
+    };
+    handle.addEventListener("contextmenu", (event) => event.preventDefault());
     handle.addEventListener("pointermove", (event) => {
       if (!handle.hasPointerCapture(event.pointerId)) return;
-      if (event.shiftKey) drag(0, 0, -event.movementY * 0.002);
+      if (event.ctrlKey) turn(event.movementX * 0.01, event.movementY * 0.01, 0);
+      else if (event.shiftKey) drag(0, 0, -event.movementY * 0.002);
       else drag(event.movementX, event.movementY, 0);
     });
-    handle.addEventListener("wheel", (event) => { event.preventDefault(); drag(0, 0, -Math.sign(event.deltaY) * 0.01); }, { passive: false });
+    handle.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      if (event.ctrlKey) turn(0, 0, -Math.sign(event.deltaY) * 0.1);
+      else drag(0, 0, -Math.sign(event.deltaY) * 0.01);
+    }, { passive: false });
   }
 }

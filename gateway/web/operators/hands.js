@@ -6,6 +6,7 @@ import { POSE, SIDES } from "../src/message.js";
 
 /** A target is never further from its wrist: what is dragged against a table does not wind up. */
 const LEASH_M = 0.2;
+const LEASH_RAD = 1;
 
 export class Hands {
   /** @param {number} robot Its number in the scene. */
@@ -37,7 +38,18 @@ export class Hands {
 
   /** Moves a target by a way in the pelvis frame. */
   shift(side, by) {
-    this.place(side, (this.targets[side] ?? this.measured[side].position).clone().add(by));
+    this.place(side, this.pose(side).position.add(by), this.turns[side]);
+  }
+
+  /** Turns a target about an axis of the pelvis frame, as far as the leash lets it. @param {Vector3} by Its direction is the axis, its length the angle. */
+  rotate(side, by) {
+    const turn = new Quaternion().setFromAxisAngle(by.clone().normalize(), by.length()).multiply(this.pose(side).turn);
+    if (turn.angleTo(this.measured[side].turn) < LEASH_RAD) this.place(side, this.pose(side).position, turn);
+  }
+
+  /** Turns a target so that the fingers point ahead and the palm to the other hand. */
+  level(side) {
+    this.place(side, this.pose(side).position, new Quaternion());
   }
 
   /** Puts a target to a place in the pelvis frame, no further than its leash; and turns it, if `turn` is given. */

@@ -5,6 +5,7 @@ export const CLOSED = { left: [0, 0.75, 0.8, -1.1, -1.3, -1.1, -1.3], right: [0,
 const WALK_M_S = 0.3;
 const TURN_RAD_S = 0.5;
 const WRIST_M_S = 0.2;
+const WRIST_RAD_S = 0.8;
 const HEIGHT_M_S = 0.1;
 const STICK_DEAD = 0.15;
 
@@ -12,9 +13,13 @@ const BASE_KEYS = { w: [1, 0, 0], s: [-1, 0, 0], a: [0, 1, 0], d: [0, -1, 0], q:
 const WRIST_KEYS = {
   ArrowUp: [1, 0, 0], ArrowDown: [-1, 0, 0], ArrowLeft: [0, 1, 0], ArrowRight: [0, -1, 0], PageUp: [0, 0, 1], PageDown: [0, 0, -1],
 };
+/** Axes of the pelvis frame, about which a hand turns: fingers up and down, to the left and right, and about themselves. */
+const ROTATION_KEYS = { i: [0, -1, 0], k: [0, 1, 0], j: [0, 0, 1], l: [0, 0, -1], u: [-1, 0, 0], m: [1, 0, 0] };
 const HEIGHT_KEYS = { r: 1, f: -1 };
 
-const typing = (event) => event.target instanceof Element && event.target.closest("input, select, textarea");
+const within = (event, what) => event.target instanceof Element && Boolean(event.target.closest(what));
+/** Whether a key is for what has the focus: texts and lists take all, buttons and boxes those by which they are pressed. */
+const taken = (event) => within(event, "input:not([type=checkbox]), select, textarea") || ([" ", "Enter"].includes(event.key) && within(event, "button, input, a"));
 const nameOf = (event) => (event.key.length === 1 ? event.key.toLowerCase() : event.key);
 const sum = (keys, table, length) =>
   [...keys].map((key) => table[key]).filter(Boolean).reduce((total, one) => total.map((value, axis) => value + one[axis]), Array(length).fill(0));
@@ -23,9 +28,9 @@ const sum = (keys, table, length) =>
 export function listen(pressed, signal) {
   const keys = new Set();
   addEventListener("keydown", (event) => {
-    if (typing(event) || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (taken(event) || event.ctrlKey || event.metaKey || event.altKey) return;
     const key = nameOf(event);
-    const held = key in BASE_KEYS || key in WRIST_KEYS || key in HEIGHT_KEYS;
+    const held = key in BASE_KEYS || key in WRIST_KEYS || key in ROTATION_KEYS || key in HEIGHT_KEYS;
     if (held) event.preventDefault();
     if (held) keys.add(key);
     else if (!event.repeat && pressed(key)) event.preventDefault();
@@ -56,6 +61,7 @@ export function wanted(keys) {
     vy_m_s: base[1] * WALK_M_S,
     yaw_rate_rad_s: base[2] * TURN_RAD_S,
     wristM_s: sum(keys, WRIST_KEYS, 3).map((value) => value * WRIST_M_S),
+    wristRad_s: sum(keys, ROTATION_KEYS, 3).map((value) => value * WRIST_RAD_S),
     heightM_s: HEIGHT_M_S * [...keys].reduce((total, key) => total + (HEIGHT_KEYS[key] ?? 0), 0),
     triggers: pad.triggers,
     clutch: pad.clutch,

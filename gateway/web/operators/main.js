@@ -22,6 +22,8 @@ function seat() {
 export function operate(main) {
   // A second link pasted into the same tab changes the fragment alone.
   addEventListener("hashchange", () => location.hash.includes("token=") && (seat(), location.reload()));
+  const asked = new URLSearchParams(location.search);
+  if (asked.has("run")) return start(main, Object.fromEntries(asked));
   const held = seat();
   if (!held) return start(main);
   if (held.collection) return held.robot ? collect(main, held) : overview(main, held);

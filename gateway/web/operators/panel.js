@@ -23,21 +23,21 @@ export function layOut(main, robot, briefing, on) {
   const step = button("Step", "step", "Enter");
   const which = element("span", {});
   const chat = talk(robot, on.speak);
-  const looks = element("select", { "aria-label": "View", onchange: (event) => on.look(event.target.value) },
+  const looks = element("select", { "aria-label": "View", onchange: (event) => { on.look(event.target.value); event.target.blur(); } },
     element("option", { value: "robot" }, `as robot ${robot} looks`), element("option", { value: "free" }, "from anywhere"));
   const wear = element("button", { type: "button", hidden: true, onclick: () => on.wear() }, "Enter VR");
   const stepwise = element("input", { type: "checkbox", onchange: (event) => on.stepwise(event.target.checked) });
   main.replaceChildren(
     element("h1", {}, `You drive robot ${robot}`), element("p", {}, part), status,
-    element("div", { class: "columns operate" },
+    element("div", { class: "columns operate", onmousedown: keepKeys },
       element("div", {}, place, facts),
       element("div", {},
         element("div", { class: "tools" }, looks, element("label", {}, stepwise, " step by step"), step, wear),
         element("div", { class: "tools" }, button("Left hand", "left", "1"), button("Right hand", "right", "2")),
-        element("div", { class: "tools" }, button("Open", "open", "O"), button("Close", "close", "C"), button("Let go of targets", "clutch", "space")),
+        element("div", { class: "tools" }, button("Open", "open", "O"), button("Close", "close", "C"), button("Level", "level", "H"), button("Let go of targets", "clutch", "space")),
         element("div", { class: "tools" }, pause, element("button", { type: "button", onclick: () => on.finish() }, "Finish")),
         element("p", {}, which),
-        element("p", { class: "soft" }, "Drag a handle; with Shift, or by the wheel, towards you and away. Arrow keys, Page Up and Page Down move the hand. W A S D walk, Q and E turn, R and F raise and lower. Gamepad: sticks walk and turn, triggers close, bumpers let go of targets."),
+        element("p", { class: "soft" }, "Drag a handle; with Shift, or by the wheel, towards you and away; with Ctrl to turn the hand. Arrow keys, Page Up and Page Down move the hand, I K J L U M turn it; Level points its fingers ahead. W A S D walk, Q and E turn, R and F raise and lower. Gamepad: sticks walk and turn, triggers close, bumpers let go of targets."),
         element("h2", {}, "Talk"), ...chat.elements)));
   const cursors = new Map();
   return {
@@ -70,6 +70,11 @@ export function layOut(main, robot, briefing, on) {
       for (const side of SIDES) handles[side].setAttribute("aria-pressed", String(side === hand));
     },
   };
+}
+
+/** What is clicked takes no focus, so that the space bar stays the clutch; who comes by the keyboard gives it. */
+function keepKeys(event) {
+  if (event.target.closest("button:not(.handle), input[type=checkbox], label")) event.preventDefault();
 }
 
 /** Puts something where it is seen; a handle that lies outside of the picture is at its border, and other things are not shown. */

@@ -7,6 +7,8 @@ const EVERY_MS = 1500;
 export function cards(main) {
   document.title = "Tandem: episodes";
   const running = element("div", { class: "cards" });
+  const evaluations = element("div", { class: "cards" });
+  const evaluated = element("section", { hidden: true }, element("h2", {}, "Evaluations"), evaluations);
   const finished = element("div", { class: "cards" });
   const none = element("p", { class: "soft" });
   const problem = element("p", { class: "bad", role: "alert" });
@@ -15,6 +17,7 @@ export function cards(main) {
     element("header", { class: "top" }, element("h1", {}, "Tandem"), version),
     problem,
     element("h2", {}, "On this server"), none, running,
+    evaluated,
     element("h2", {}, "Finished"), finished,
   );
   let shown = "";
@@ -28,6 +31,8 @@ export function cards(main) {
       shown = text;
       none.textContent = list.held.length ? "" : "No episode is held. An episode that a policy starts appears here by itself.";
       running.replaceChildren(...list.held.map(heldCard));
+      evaluated.hidden = !list.evaluations.length;
+      evaluations.replaceChildren(...list.evaluations.map(evaluationCard));
       finished.replaceChildren(...list.finished.map(finishedCard));
       if (!list.finished.length) finished.append(element("p", { class: "soft" }, "None yet."));
     } catch (error) {
@@ -45,6 +50,18 @@ function heldCard(entry) {
     element("div", { class: "soft" }, `seed ${entry.seed}, ${entry.protocol}, ${entry.operators === "per_robot" ? "an operator a robot" : "one policy"}`),
     element("div", {}, `${(entry.step / 50).toFixed(1)} s, step ${entry.step}`),
     element("div", { class: "soft id" }, entry.episode_id));
+}
+
+/** How far an evaluation is, which another process plays. */
+function evaluationCard({ folder, policies, tasks, played, succeeded, excluded, planned, last_unix_s: lastS, runs }) {
+  const stands = runs ? badge("runs", "live") : badge(played < (planned ?? 0) ? "stopped" : "complete", "");
+  const left = [`${succeeded} of ${played - excluded} succeeded`, excluded ? `${excluded} do not count` : null].filter(Boolean).join(", ");
+  return element("div", { class: "card" },
+    element("div", { class: "line" }, element("strong", {}, policies.join(", ") || "nothing yet"), stands),
+    element("div", { class: "soft" }, tasks.length > 3 ? `${tasks.length} tasks` : tasks.map(words).join(", ")),
+    planned ? element("progress", { value: played, max: planned, "aria-label": "Episodes played" }) : null,
+    element("div", {}, `${played}${planned ? ` of ${planned}` : ""} episodes, ${left}`),
+    element("div", { class: "soft id" }, `${folder}, ${new Date(1000 * lastS).toLocaleString()}`));
 }
 
 function finishedCard({ run, result, ended_unix_s: endedS, recorded, strip }) {

@@ -139,8 +139,18 @@ class EpisodePage {
       event.preventDefault();
     });
     return element("div", { class: "scrubber" },
-      element("div", { class: "tools" }, step(-1, "◀", "The call before"), this.play, step(1, "▶", "The next call"), speed, this.moment),
+      element("div", { class: "tools" }, step(-1, "◀", "The call before"), this.play, step(1, "▶", "The next call"), speed, this.moment, this.taking()),
       this.timeline.node);
+  }
+
+  /** Goes on from the moment that is shown, as an episode of its own whose robots people drive. */
+  taking() {
+    const go = () => {
+      const { time } = this.time;
+      const from = new URLSearchParams({ run: this.wanted.run, at: time.toFixed(2), task: this.head.task, seed: this.head.seed, protocol: this.head.protocol });
+      location.assign(`/operate?${from}`);
+    };
+    return element("button", { class: "take", title: "People drive the robots from here on, in an episode of its own", onclick: go }, "Take over here");
   }
 
   toggle() {

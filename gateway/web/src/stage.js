@@ -18,6 +18,7 @@ const FRUSTUM_M = 0.55;
 const GHOST_FROM_M = 0.01;
 /** Pixels of the page that one of the picture covers, at most, where drawing takes long. */
 const MOST_COARSENESS = 3;
+const SOFTWARE_COARSENESS = 1.5;
 const STATE_COLOURS = { moving: "--accent", arrived: "--good", blocked: "--bad", out_of_reach: "--odd", joints: "--soft" };
 const SKY_FROM_BELOW = 0x8d8678;
 
@@ -27,12 +28,14 @@ export class Stage {
     this.head = head;
     this.layout = layout;
     this.place = place;
-    this.coarseness = 1;
-    this.renderer = new WebGLRenderer({ antialias: true, powerPreference: "high-performance" });
-    this.renderer.shadowMap.enabled = true;
+    // Where a processor draws, smooth edges and shadows take two thirds of the time.
+    const quick = !drawnBySoftware();
+    this.coarseness = quick ? 1 : SOFTWARE_COARSENESS;
+    this.renderer = new WebGLRenderer({ antialias: quick, powerPreference: "high-performance" });
+    this.renderer.shadowMap.enabled = quick;
     place.append(this.renderer.domElement);
     this.scene = new Scene();
-    this.light();
+    this.light(quick);
     this.carriers = this.build(meshes);
     this.free = new PerspectiveCamera((head.third_person.vertical_fov_rad * 180) / Math.PI, 1, 0.02, 60);
     this.free.up.copy(UP);
@@ -65,10 +68,10 @@ export class Stage {
     this.stale = true;
   }
 
-  light() {
+  light(casts) {
     this.scene.add(new HemisphereLight(0xffffff, SKY_FROM_BELOW, 1.6), new AmbientLight(0xffffff, 0.35));
     this.sun = new DirectionalLight(0xffffff, 2.1);
-    this.sun.castShadow = true;
+    this.sun.castShadow = casts;
     this.sun.shadow.mapSize.set(1024, 1024);
     Object.assign(this.sun.shadow.camera, { left: -2.2, right: 2.2, top: 2.2, bottom: -2.2, near: 0.5, far: 9 });
     this.sun.shadow.bias = -0.0015;
@@ -252,6 +255,11 @@ export class Stage {
     return new Vector3(right * metres, -down * metres, -away).applyQuaternion(camera.quaternion);
   }
 
+  /** The axis and angle, in the world, by which a ball turns that a pointer moves to the right and down, or round the line of sight. */
+  axis(right, down, round) {
+    return new Vector3(down, right, round).applyQuaternion(this.camera().quaternion);
+  }
+
   /** Gives back what a page has few of, where it draws one episode after another. */
   leave() {
     this.sized.disconnect();
@@ -272,6 +280,15 @@ export class Stage {
     this.scene.traverse((part) => { if (part.material) part.material.needsUpdate = true; });
     this.stale = true;
   }
+}
+
+/** Whether a processor draws in place of a graphics processor. */
+function drawnBySoftware() {
+  const context = document.createElement("canvas").getContext("webgl2");
+  const names = context?.getExtension("WEBGL_debug_renderer_info");
+  const name = names ? context.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
+  context?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
 }
 
 /** Squares of half a metre in the world's ground plane, as the server draws them. */

@@ -56,18 +56,18 @@ export class Story {
       element("span", { class: "number" }, entry.number === null ? "–" : `${entry.number}`),
       element("code", {}, entry.tool),
       element("span", {}, summary(entry, asked, reply)),
-      this.when(entry));
+      this.recorded ? null : this.when(entry));
     const details = element("details", { class: entry.ok ? "" : "refused" }, head, body);
     details.addEventListener("toggle", () => {
       if (body.childNodes.length) return;
       body.append(
         entry.number === null ? element("p", { class: "soft" }, entry.ok ? "The commands before it are those of this plan."
           : "It was refused before it reached the episode, and does not count.") : "",
-        element("h4", {}, entry.operator ? `Asked by ${entry.operator}'s operator` : "Asked"), element("pre", {}, text(asked)),
-        element("h4", {}, entry.ok ? "Answered" : "Refused"), element("pre", {}, text(reply)),
+        element("h3", {}, entry.operator ? `Asked by ${entry.operator}'s operator` : "Asked"), element("pre", { tabindex: 0 }, text(asked)),
+        element("h3", {}, entry.ok ? "Answered" : "Refused"), element("pre", { tabindex: 0 }, text(reply)),
         element("p", { class: "soft" }, `The policy had thought for ${entry.thought_s.toFixed(1)} s by then.`));
     });
-    return details;
+    return this.recorded ? element("div", { class: "call" }, details, this.when(entry)) : details;
   }
 
   note(entry) {

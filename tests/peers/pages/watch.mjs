@@ -1,77 +1,22 @@
 // The pages at /watch in a headless Chromium: calls watched as they are made, the demo watched live to its end, a finished episode
-// scrubbed, and pictures of all for somebody to look at.
-//
-//     cargo build --release
-//     mkdir -p /tmp/watch && cd /tmp/watch && npm install playwright-core@1.65.1
-//     node REPOSITORY/tests/peers/pages/watch.mjs REPOSITORY/target/release/tandem
-//
-// Takes a chromium from the path, or from CHROMIUM. Pictures are written to the working folder.
+// scrubbed and taken over, an evaluation's card that fills, and pictures of all for somebody to look at. How it is run is said in
+// browser.mjs.
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
-import { mkdtempSync } from "node:fs";
-import { createRequire } from "node:module";
-import { tmpdir } from "node:os";
 import { join } from "node:path";
+import { accessible, browser, done, open, pictures, post, program, serve } from "./browser.mjs";
 
-const { chromium } = createRequire(join(process.cwd(), "x"))("playwright-core");
-const [program] = process.argv.slice(2);
-/** For whoever changes the page: the files of this folder in place of those in the program. */
-const sources = process.env.TANDEM_WEB;
-const WIDTHS = [400, 1400, 2500];
+const { link, base, runs } = await serve();
+const call = (path, body) => post(base, path, body);
 
-const runs = mkdtempSync(join(tmpdir(), "watch-"));
-
-/** Starts the program, which serves until this one ends, and returns the link that it prints. */
-function start(...words) {
-  const server = spawn(program, [...words, "--runs", runs], { stdio: ["ignore", "pipe", "ignore"] });
-  process.on("exit", () => server.kill());
-  return new Promise((resolve) => {
-    let said = "";
-    server.stdout.on("data", (data) => {
-      said += data;
-      const found = said.match(/watch at (\S+)\n/);
-      if (found) resolve(found[1]);
-    });
-  });
-}
-
-const link = await start("serve", "--listen", "127.0.0.1:0");
-const base = new URL(link).origin;
-
-const call = async (path, body) => {
-  const answer = await fetch(base + path, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) });
-  assert(answer.ok, `${path}: ${await answer.clone().text()}`);
-  return answer.status === 204 ? null : answer.json();
-};
-
-const browser = await chromium.launch({
-  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-  args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync"],
-});
-
-async function open(width, scheme, link) {
-  const context = await browser.newContext({ viewport: { width, height: Math.round(Math.min(width * 1.6, 1400)) }, colorScheme: scheme });
-  const page = await context.newPage();
-  page.wrong = [];
-  page.on("pageerror", (error) => page.wrong.push(error.message));
-  page.on("console", (message) => message.type() === "error" && page.wrong.push(message.text()));
-  page.on("request", (request) => request.url().startsWith(new URL(link).origin) || request.url().startsWith("blob:") || page.wrong.push(`asks ${request.url()}`));
-  if (sources) {
-    await page.route("**/watch/page.js", (route) => route.fulfill({ path: join(sources, "dist/page.js"), contentType: "text/javascript" }));
-    await page.route("**/watch/page.css", (route) => route.fulfill({ path: join(sources, "style.css"), contentType: "text/css" }));
-  }
-  await page.goto(link);
-  await page.waitForSelector("h2");
-  return page;
-}
-
-const wide = await open(1400, "light", link);
+const wide = await open(link, { viewport: { width: 1400, height: 1000 } });
+await wide.waitForSelector("h2");
 
 // Who has not come by the link sees the door.
 const stranger = await (await browser.newContext()).newPage();
 await stranger.goto(`${base}/watch`);
 assert.match(await stranger.textContent("body"), /open the link/);
+await accessible(stranger, "the door");
 
 // A live one.
 const { episode_id: id } = await call("/v1/episodes", { task: "handover", seed: 2000, protocol: "benchmark" });
@@ -97,30 +42,12 @@ await wide.waitForSelector(".pictures img");
 await wide.waitForFunction(() => /3\.0 s/.test(document.querySelector(".facts").textContent));
 assert.doesNotMatch(await wide.locator("main").innerText(), /\b(null|undefined|NaN)\b/);
 assert.equal(await wide.locator(".story .seen img").count(), 2, "the pictures that the policy was shown");
-for (const width of WIDTHS) {
-  for (const scheme of ["light", "dark"]) {
-    await wide.setViewportSize({ width, height: Math.round(Math.min(width * 1.6, 1400)) });
-    await wide.emulateMedia({ colorScheme: scheme });
-    await wide.waitForTimeout(1200);
-    await wide.screenshot({ path: `live-${width}-${scheme}.png`, fullPage: width === 400 });
-    const beyond = await wide.evaluate(() => document.documentElement.scrollWidth - innerWidth);
-    assert(beyond <= 0, `${beyond} pixels beyond a width of ${width}`);
-  }
-}
-await wide.setViewportSize({ width: 1400, height: 1000 });
+await pictures(wide, "live", { heights: { 400: 640, 1400: 1400, 2500: 1400 }, settleMs: 1200 });
 await wide.selectOption(".tools select", "A");
 await wide.waitForTimeout(500);
 assert((await wide.locator(".view").screenshot({ path: "live-as-A.png" })).length > 30_000, "robot A sees something");
-const rate = await wide.evaluate(() => new Promise((resolve) => {
-  const began = performance.now();
-  let frames = 0;
-  const count = () => (++frames, performance.now() - began < 2000 ? requestAnimationFrame(count) : resolve(frames / 2));
-  requestAnimationFrame(count);
-}));
-console.log(`${rate} frames a second at rest, in software`);
 await fetch(`${base}/v1/episodes/${id}`, { method: "DELETE" });
 await wide.waitForSelector("text=Look at it again");
-assert.deepEqual(wide.wrong, []);
 
 // The same, finished.
 await wide.click("text=Look at it again");
@@ -155,32 +82,43 @@ await wide.waitForFunction(() => /call 1 at 0\.0 s/.test(document.querySelector(
 assert.match(await wide.locator(".plots").first().innerText(), /Tokens \[thousands so far\] 5\.3/);
 await wide.locator(".story details").first().click();
 await wide.locator(".track input").fill("1.4");
-for (const width of WIDTHS) {
-  for (const scheme of ["light", "dark"]) {
-    await wide.setViewportSize({ width, height: Math.round(Math.min(width * 1.6, 1400)) });
-    await wide.emulateMedia({ colorScheme: scheme });
-    await wide.waitForTimeout(1200);
-    await wide.screenshot({ path: `finished-${width}-${scheme}.png`, fullPage: true });
-    const beyond = await wide.evaluate(() => document.documentElement.scrollWidth - innerWidth);
-    assert(beyond <= 0, `${beyond} pixels beyond a width of ${width}`);
-  }
-}
-await wide.setViewportSize({ width: 1400, height: 1000 });
-await wide.emulateMedia({ colorScheme: "light" });
+await pictures(wide, "finished", { heights: { 400: 640, 1400: 1400, 2500: 1400 }, settleMs: 1200 });
 console.log(`shown: ${await moment()}`);
 await wide.click(".scrubber .play");
 await wide.waitForFunction(() => document.querySelector(".scrubber .play").textContent === "Pause");
 await wide.waitForFunction(() => !/1\.40 of/.test(document.querySelector(".scrubber output").textContent));
+// People take over from there.
+await wide.click(".scrubber .play");
+await wide.locator(".track input").fill("1.4");
+await wide.click("text=Take over here");
+await wide.getByText(/stood at 1\.4 s: handover, seed 2000/).waitFor();
+await wide.locator("select[name=B]").selectOption("still");
+await pictures(wide, "take-over");
+await wide.getByRole("button", { name: "Start" }).click();
+const over = await wide.getByRole("link", { name: "Drive robot A" }).getAttribute("href");
+const taker = await open(over);
+await taker.getByRole("status").filter({ hasText: "Running" }).waitFor();
+await taker.context().close();
+await wide.goBack();
+await wide.waitForSelector(".scrubber");
 await wide.click("text=Show its film");
 await wide.waitForFunction(() => [...document.images].some((image) => image.src.includes("/film") && image.naturalWidth > 0), null, { timeout: 60000 });
 await wide.click("text=All episodes");
 await wide.waitForSelector(".card img");
-for (const width of WIDTHS) {
-  await wide.setViewportSize({ width, height: 1000 });
-  await wide.waitForTimeout(300);
-  await wide.screenshot({ path: `cards-${width}.png` });
-}
-assert.deepEqual(wide.wrong, []);
+await pictures(wide, "cards", { settleMs: 300 });
+
+// An evaluation that another process plays fills its card.
+const evaluation = spawn(program, ["evaluate", "--policy", "expert", "--tasks", "handover", "--seeds", "2000-2003", "--jobs", "1", "--out", join(runs, "evaluation")]);
+const card = wide.locator(".card", { has: wide.locator("progress") });
+const filled = () => card.locator("progress").evaluate(({ value, max }) => [value, max]);
+await card.waitFor();
+const [first, planned] = await filled();
+assert.ok(planned === 4 && first < 4, `${first} of ${planned}`);
+await card.getByText("runs").waitFor();
+await new Promise((resolve) => { evaluation.on("exit", resolve); });
+await card.getByText("4 of 4 episodes").waitFor();
+await card.getByText("complete").waitFor();
+await wide.screenshot({ path: "cards-evaluation.png" });
 
 // The demo's calls once more, over HTTP and slowly enough to be watched, to the last phase.
 await new Promise((resolve) => { spawn(program, ["demo", "--seeds", "2001", "--runs", runs]).on("exit", resolve); });
@@ -202,7 +140,4 @@ await wide.waitForTimeout(1500);
 await wide.screenshot({ path: "demo-end.png" });
 const ended = await (await fetch(`${base}/v1/episodes/${again}`, { method: "DELETE" })).json();
 assert.equal(ended.state_hash, result.state_hash, "watched or not, the same calls lead to the same state");
-assert.deepEqual(wide.wrong, []);
-await browser.close();
-console.log("watched, scrubbed, and nothing went wrong; look at the pictures");
-process.exit(0);
+await done();

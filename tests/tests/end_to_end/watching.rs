@@ -4,9 +4,12 @@ use std::net::TcpStream;
 
 use serde_json::{Value, json};
 use tandem::{settings::Layer, token::Token};
+use tandem_episodes::{Recorder, Recording, players, replay};
 use tandem_tests::TestServer;
 use tandem_tools_spec::Png;
 use tungstenite::{Message, WebSocket, client::IntoClientRequest};
+
+use crate::policies::plans::{plan, play};
 
 const TOKEN: &str = "correct-horse-battery-staple";
 
@@ -214,6 +217,75 @@ fn a_finished_episode_can_be_looked_at_again() {
     ] {
         assert_eq!(get(&server, &format!("/watch/file?{wrong}")).0, 404, "{wrong}");
     }
+}
+
+#[test]
+fn people_take_over_from_a_moment_of_a_finished_episode() {
+    let token = Token::parse(TOKEN, "a test").expect("a token");
+    let server = TestServer::with(Layer { token: Some(token), ..Layer::default() });
+    let host = format!("Bearer {TOKEN}");
+    let ask = |method: &str, path: &str, bearer: &str, body: &Value| {
+        let headers = [
+            ("content-type", "application/json"),
+            ("authorization", bearer),
+            ("cookie", &format!("tandem_watch={}", server.watch_key())),
+        ];
+        let (status, _, bytes) = server.ask(method, path, &headers, body.to_string().as_bytes());
+        (status, serde_json::from_slice::<Value>(&bytes).unwrap_or_default())
+    };
+    let started = ask(
+        "POST",
+        "/v1/episodes",
+        &host,
+        &json!({ "task": "handover", "seed": 0, "protocol": "benchmark" }),
+    );
+    let id = started.1["episode_id"].as_str().expect("an id").to_owned();
+    for (tool, args) in calls() {
+        assert_eq!(ask("POST", &format!("/v1/episodes/{id}/tools/{tool}"), &host, &args).0, 200);
+    }
+    ask("DELETE", &format!("/v1/episodes/{id}"), &host, &json!({}));
+    let wanted = json!({ "run": id, "time_s": 0.2, "protocol": "agentic" });
+    let watcher = format!("Bearer {}", server.watch_key());
+    assert_eq!(
+        ask("POST", "/watch/take_over", &watcher, &wanted).0,
+        401,
+        "the link for watching starts nothing"
+    );
+    let (status, over) = ask("POST", "/watch/take_over", &host, &wanted);
+    assert_eq!((status, over["operators"].as_array().map(Vec::len)), (200, Some(2)), "{over}");
+    let own = format!("Bearer {}", over["operators"][0]["token"].as_str().expect("a token"));
+    let id = over["episode_id"].as_str().expect("an id");
+    let state =
+        ask("POST", &format!("/v1/episodes/{id}/tools/get_robot_state"), &own, &json!({ "robot": "A" })).1;
+    let x_m = state["right_wrist"]["position_m"][0].as_f64().expect("a number");
+    assert!(x_m > 0.1, "the hand has begun to reach out by then: {state}");
+    let (status, result) = ask("DELETE", &format!("/v1/episodes/{id}"), &host, &json!({}));
+    assert_eq!((status, &result["env_steps"]), (200, &json!(0)), "the whole budget is ahead: {result}");
+    let recording = Recording::read(&server.folder(id).join(Recorder::FILE_NAME)).expect("a whole recording");
+    assert!(recording.spec.departures().contains(&"taken over at 0.2 s".to_owned()));
+    assert_eq!(replay::verify(&recording).expect("a replay").outcome, replay::Verdict::Same);
+    let wrong = json!({ "run": "nope", "time_s": 0.2, "protocol": "agentic" });
+    assert_eq!(ask("POST", "/watch/take_over", &host, &wrong).0, 404);
+}
+
+#[test]
+fn evaluations_in_the_runs_folder_are_listed_as_they_fill() {
+    let server = TestServer::start();
+    let folder = server.folder("evaluation");
+    let list = || {
+        serde_json::from_slice::<Value>(&get(&server, "/watch/episodes").1).expect("JSON")["evaluations"]
+            .clone()
+    };
+    assert_eq!(list(), json!([]));
+    play(&plan(players::find("idle").expect("a player"), vec![1, 2], false), &folder);
+    let complete = list();
+    let expected = json!({
+        "folder": "evaluation", "policies": ["idle"], "tasks": ["handover"], "played": 2, "succeeded": 0, "excluded": 0,
+        "planned": 2, "runs": false, "last_unix_s": complete[0]["last_unix_s"],
+    });
+    assert_eq!(complete, json!([expected]));
+    std::fs::remove_file(folder.join("episodes/handover-2.json")).expect("a result");
+    assert_eq!((&list()[0]["played"], &list()[0]["runs"]), (&json!(1), &json!(true)));
 }
 
 /// A page shows one step in five, and of a look what the policy was shown.

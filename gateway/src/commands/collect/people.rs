@@ -37,6 +37,13 @@ pub struct PeopleFlags {
     /// With --operators: name that they reach this machine by, for the links [default: its address].
     #[arg(long, value_name = "HOST", requires = "operators")]
     allowed_host: Option<String>,
+    /// With --operators: file with a certificate in PEM form, with which their pages are HTTPS, as headsets want it; needs --tls-key
+    /// [default: none].
+    #[arg(long, value_name = "FILE", requires = "operators")]
+    tls_cert: Option<PathBuf>,
+    /// With --operators: file with the certificate's private key in PEM form [default: none].
+    #[arg(long, value_name = "FILE", requires = "operators")]
+    tls_key: Option<PathBuf>,
 }
 
 impl PeopleFlags {
@@ -61,6 +68,8 @@ impl PeopleFlags {
         let flags = Layer {
             // The address is set below, where the server has its token.
             allowed_host: self.allowed_host.map(|name| vec![name]),
+            tls_cert: self.tls_cert,
+            tls_key: self.tls_key,
             runs: Some(folder.into()),
             max_episodes: Some(1),
             idle_timeout: Some(IDLE_S),

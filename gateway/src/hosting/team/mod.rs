@@ -7,6 +7,7 @@
 
 mod collection;
 mod driving;
+mod expert;
 mod round;
 
 use std::{
@@ -51,6 +52,8 @@ struct Wheels {
     drivers: u64,
     /// Whether commands are made of what they say.
     turning: bool,
+    /// By seat: whether the task's expert drives.
+    experts: Vec<bool>,
 }
 
 /// Who drives which robot.
@@ -78,7 +81,8 @@ impl Team {
         let round = Mutex::new(Round::new(seats.iter().map(|seat| seat.robot.clone()).collect()));
         let patience = Duration::from_secs_f64(driving.patience_s());
         let (none, under_way) = (seats.iter().map(|_| None).collect(), vec![None; seats.len()]);
-        let wheels = Mutex::new(Wheels { seats: none, under_way, ..Wheels::default() });
+        let experts = vec![false; seats.len()];
+        let wheels = Mutex::new(Wheels { seats: none, under_way, experts, ..Wheels::default() });
         Ok((Team { seats, patience, talk: driving.talk == Some(true), silence, round, wheels }, tokens))
     }
 
@@ -153,8 +157,54 @@ impl Team {
         Ok(self.for_seat(answer, seat))
     }
 
-    /// Takes a command, and answers when the step has been made.
+    /// Takes a command, and answers when it has been executed. Beside people who drive in real time, whose commands are of one step
+    /// each, it goes on over as many of theirs as it has steps; an expert's always does.
     async fn act(
+        self: &Arc<Self>,
+        episode: &Arc<EpisodeThread>,
+        seat: usize,
+        call: OperatorCall,
+    ) -> Result<Answer, HostingError> {
+        if call.call().steps() <= 1 || !self.goes_on(seat) {
+            return self.act_once(episode, seat, call).await;
+        }
+        let (team, episode) = (self.clone(), episode.clone());
+        // What has begun is finished, whether its caller is still there or not.
+        let going_on = tokio::spawn(async move { team.act_on(&episode, seat, call).await });
+        going_on.await.map_err(|_| HostingError::EpisodeStopped)?
+    }
+
+    async fn act_on(
+        self: Arc<Self>,
+        episode: &Arc<EpisodeThread>,
+        seat: usize,
+        mut left: OperatorCall,
+    ) -> Result<Answer, HostingError> {
+        let (mut executed_steps, mut heard) = (0, Vec::new());
+        loop {
+            let is_cut_off = left.call().steps() > 1 && self.goes_on(seat);
+            let part = if is_cut_off { left.clone().unseen() } else { left.clone() };
+            let mut answer = self.act_once(episode, seat, part).await?;
+            let rest = answer.cut_off_steps().and_then(|steps| Some((steps, left.rest(steps)?)));
+            match rest.filter(|_| self.goes_on(seat)) {
+                Some((steps, rest)) => {
+                    left = rest;
+                    executed_steps += steps;
+                    heard.append(&mut answer.heard);
+                }
+                None => return Ok(answer.after(executed_steps, heard)),
+            }
+        }
+    }
+
+    /// Whether a command by who has `seat` goes on where that of a partner was shorter.
+    fn goes_on(&self, seat: usize) -> bool {
+        let wheels = self.wheels();
+        wheels.experts[seat] || wheels.seats.iter().any(Option::is_some)
+    }
+
+    /// Takes a command, and answers when the step has been made.
+    async fn act_once(
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
         seat: usize,

@@ -30,6 +30,17 @@ struct Operator {
     said: u32,
 }
 
+/// How the others stand to one operator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Company {
+    /// Somebody plays.
+    There,
+    /// Nobody has commanded for longer than the others' patience.
+    Away,
+    /// All have finished.
+    Gone,
+}
+
 #[derive(Debug)]
 enum OperatorState {
     Thinking,
@@ -118,6 +129,17 @@ impl Round {
         let thinking =
             self.operators.iter().filter(|operator| matches!(operator.state, OperatorState::Thinking));
         thinking.map(|operator| operator.robot.clone()).collect()
+    }
+
+    /// How the operators on other seats than `seat` stand.
+    pub fn company(&self, seat: usize) -> Company {
+        let others = self.operators.iter().enumerate().filter(|(other, _)| *other != seat);
+        let states: Vec<&OperatorState> = others.map(|(_, operator)| &operator.state).collect();
+        if states.iter().all(|state| matches!(state, OperatorState::Finished)) {
+            return Company::Gone;
+        }
+        let away = |state: &&OperatorState| matches!(state, OperatorState::Finished | OperatorState::Silent);
+        if states.iter().all(away) { Company::Away } else { Company::There }
     }
 
     /// Whether a step could be made: somebody has commanded, and none is being made.

@@ -18,7 +18,7 @@ use crate::{
             operate,
         },
         problem::ApiError,
-        watching::Watcher,
+        watching::{Host, Watcher},
     },
 };
 
@@ -36,7 +36,11 @@ pub async fn identify(State(app): State<AppState>, mut request: Request, next: N
         request.extensions_mut().insert(robots.clone());
     }
     let driver = driving.map(|(caller, _)| caller);
-    let caller = driver.or_else(|| caller(&app, request.headers())).or(watches.then_some(Caller::Host));
+    let by_token = driver.or_else(|| caller(&app, request.headers()));
+    if by_token == Some(Caller::Host) {
+        request.extensions_mut().insert(Host);
+    }
+    let caller = by_token.or(watches.then_some(Caller::Host));
     let Some(caller) = caller else {
         tracing::info!("a request without a token was refused");
         return refused(request.headers());

@@ -71,9 +71,12 @@ fn collect(folder: &Path, depth: usize, found: &mut Vec<(SystemTime, PathBuf)>) 
     }
 }
 
-/// The folder that a page names, which lies below the runs folder and is an episode's.
 fn folder(app: &AppState, wanted: &Wanted) -> Result<PathBuf, ApiError> {
-    let run = wanted.run.clone().unwrap_or_default();
+    folder_of(app, wanted.run.clone().unwrap_or_default())
+}
+
+/// The folder that a page names, which lies below the runs folder and is an episode's.
+pub fn folder_of(app: &AppState, run: String) -> Result<PathBuf, ApiError> {
     let named = Path::new(&run);
     let below = !run.is_empty() && named.components().all(|part| matches!(part, Component::Normal(_)));
     let folder = app.settings.runs.join(named);

@@ -8,6 +8,7 @@ mod live;
 pub mod operate;
 pub mod qr;
 mod socket;
+mod taking_over;
 
 use axum::{
     Extension, Router,
@@ -58,6 +59,7 @@ pub fn router() -> Router<AppState> {
         .route("/watch/run", get(finished::run))
         .route("/watch/film", get(finished::film))
         .route("/watch/file", get(finished::file))
+        .route("/watch/take_over", post(taking_over::take_over))
         .layer(middleware::from_fn(only_watchers));
     inside.route(WATCH, get(page).merge(post(enter))).merge(operate::router())
 }
@@ -119,14 +121,17 @@ fn asset(kind: &'static str, text: &'static str) -> Response {
     (headers, text).into_response()
 }
 
-/// Running and finished episodes.
+/// Running and finished episodes, and evaluations.
 async fn episodes(State(app): State<AppState>) -> Result<Response, ApiError> {
     let held = app.table.list(&Caller::Host);
     let runs = app.settings.runs.clone();
     let known: Vec<String> = held.episodes.iter().map(|entry| entry.episode_id.clone()).collect();
-    let finished = blocking(move || Ok(finished::list(&runs, &known))).await?;
-    Ok(axum::Json(json!({ "version": super::app::VERSION, "held": held.episodes, "finished": finished }))
-        .into_response())
+    let found = blocking(move || Ok((finished::list(&runs, &known), app.evaluations.list(&runs)))).await?;
+    let (finished, evaluations) = found;
+    let told = json!({
+        "version": super::app::VERSION, "held": held.episodes, "evaluations": evaluations, "finished": finished,
+    });
+    Ok(axum::Json(told).into_response())
 }
 
 /// What a robot sees, now or at a moment of a finished episode.

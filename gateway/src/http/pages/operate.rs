@@ -2,8 +2,9 @@
 //! read it; what it asks for comes by REST, with the token of a robot's operator, and by a socket.
 
 use axum::{
-    Router,
-    http::header,
+    Extension, Router,
+    extract::State,
+    http::{StatusCode, header},
     response::{Html, IntoResponse, Response},
     routing::{get, post},
 };
@@ -13,7 +14,10 @@ use super::{
     drive::{self, DRIVE, ENTER},
     script, style,
 };
-use crate::http::app::AppState;
+use crate::{
+    hosting::{Caller, HostingError},
+    http::{app::AppState, problem::ApiError},
+};
 
 /// Where the page is.
 pub const OPERATE: &str = "/operate";
@@ -29,6 +33,7 @@ pub fn router() -> Router<AppState> {
         .route("/operate/collection", get(collecting::progress))
         .route("/operate/mark", post(collecting::mark))
         .route("/operate/code", post(collecting::code))
+        .route("/operate/expert", post(expert))
         .route(ENTER, post(drive::enter))
         .route(DRIVE, get(drive::drive))
 }
@@ -42,6 +47,18 @@ pub fn operator_link(base_url: &str, robot: Option<&str>, token: &str) -> String
 /// Whether a path is of the page, which anybody may read.
 pub fn is_open(path: &str) -> bool {
     path.strip_prefix(OPERATE).is_some_and(|rest| matches!(rest, "" | "/page.css" | "/page.js"))
+}
+
+/// The task's expert drives the caller's robot from now on.
+async fn expert(
+    State(app): State<AppState>,
+    Extension(caller): Extension<Caller>,
+) -> Result<StatusCode, ApiError> {
+    let Caller::Operator { episode, robot } = &caller else { return Err(HostingError::NeedsOperator.into()) };
+    let hosted = app.table.hosted(episode)?;
+    let team = hosted.team.clone().ok_or(HostingError::NeedsOperator)?;
+    team.take_expert(&hosted.thread, robot).await?;
+    Ok(StatusCode::NO_CONTENT)
 }
 
 async fn page() -> Response {

@@ -10,7 +10,9 @@ use axum::{
     response::IntoResponse,
 };
 use serde_json::{Value, json};
-use tandem_episodes::{CheckpointError, EpisodeError, OutputError, SceneError, SimError};
+use tandem_episodes::{
+    CheckpointError, EpisodeError, OutputError, SceneError, SimError, players::PlayerError,
+};
 use tandem_tools_spec::{Color, EndReason, ResultReply, SpecError, SurfaceQuery};
 
 use super::ApiError;
@@ -78,6 +80,7 @@ fn hosting_refusals() -> Vec<HostingError> {
         HostingError::OperatorFinished { robot: robot() },
         HostingError::NeedsOperator,
         HostingError::HostsBusiness,
+        HostingError::NoExpert(PlayerError::NoExpert { task: "x".into(), have: vec!["handover"] }),
         HostingError::NoTalk,
         HostingError::TooMuchSaid { robot: robot(), unheard: 8 },
         HostingError::KeyUsed,

@@ -19,6 +19,10 @@ pub struct WatchKey(Arc<(Token, String)>);
 #[derive(Debug, Clone, Copy)]
 pub struct Watcher;
 
+/// A request of who may start episodes, whatever else it came with: the link for watching is no token.
+#[derive(Debug, Clone, Copy)]
+pub struct Host;
+
 impl WatchKey {
     /// A new key.
     pub fn random() -> Result<WatchKey, TokenError> {

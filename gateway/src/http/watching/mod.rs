@@ -1,9 +1,11 @@
 //! What a server remembers for those who watch: who may, how many do, and the recording that was looked at last.
 
+mod evaluations;
 mod key;
 mod last_opened;
 
-pub use key::{WatchKey, Watcher};
+pub use evaluations::KnownEvaluations;
+pub use key::{Host, WatchKey, Watcher};
 pub use last_opened::{LastOpened, RECORDING, no_recording, unreadable};
 
 /// How many pages may watch at once.

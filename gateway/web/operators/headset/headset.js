@@ -16,6 +16,20 @@ const MOST_PASSED_S = 0.1;
 
 const dead = (value) => (Math.abs(value ?? 0) < STICK_DEAD ? 0 : value);
 
+/** Axes of WebXR (x right, y up, z back) in those of a pelvis (x ahead, y left, z up). */
+const PELVIS_AXES = new Quaternion().setFromRotationMatrix(new Matrix4().makeBasis(new Vector3(0, -1, 0), new Vector3(0, 0, 1), new Vector3(-1, 0, 0)));
+
+/**
+ * A pose of the headset's space with the axes of the robot's pelvis. It is not that of a hand of somebody who sits in the robot's head:
+ * a robot that leans to reach further would take the hand along, and so lean on.
+ */
+function inPelvis(pose) {
+  if (!pose) return null;
+  const { position: { x, y, z }, orientation } = pose.transform;
+  const turn = new Quaternion(orientation.x, orientation.y, orientation.z, orientation.w).premultiply(PELVIS_AXES);
+  return { position: new Vector3(x, y, z).applyQuaternion(PELVIS_AXES), turn };
+}
+
 export class Headset {
   /** @param {import("../../src/stage.js").Stage} stage @param {import("../hands.js").Hands} hands */
   constructor(stage, hands) {
@@ -72,9 +86,9 @@ export class Headset {
         const places = [...source.hand.values()].map((joint) => frame.getJointPose(joint, space)?.transform.position);
         data[`${side}_hand_pos`] = places.map((at) => at && [at.x, at.y, at.z]);
         this.fingers[side].follow(data[`${side}_hand_pos`], new Quaternion(x, y, z, w), passedS);
-        poses[side] = this.inPelvis(wrist);
+        poses[side] = inPelvis(wrist);
       } else {
-        poses[side] = this.inPelvis(frame.getPose(source.gripSpace ?? source.targetRaySpace, space));
+        poses[side] = inPelvis(frame.getPose(source.gripSpace ?? source.targetRaySpace, space));
         const { buttons = [], axes = [] } = source.gamepad ?? {};
         data[`${side}_ctrl_triggerValue`] = TRIGGER_LET_GO * (1 - (buttons[TRIGGER]?.value ?? 0));
         data[`${side}_ctrl_squeeze`] = (buttons[SQUEEZE]?.value ?? 0) > 0.5;
@@ -91,14 +105,6 @@ export class Headset {
     }
   }
 
-  /** A pose of the headset's space in the frame of the robot's pelvis, as its wearer has it who stands in the robot's place. */
-  inPelvis(pose) {
-    if (!pose) return null;
-    const world = new Matrix4().fromArray(pose.transform.matrix).premultiply(this.stage.rig.matrixWorld);
-    const back = this.hands.pelvis.turn.clone().invert();
-    const position = new Vector3().setFromMatrixPosition(world).sub(this.hands.pelvis.position).applyQuaternion(back);
-    return { position, turn: new Quaternion().setFromRotationMatrix(world).premultiply(back) };
-  }
 
   /**
    * While it is meant, a wrist of the robot goes as the wearer's does; let go, it stays: so the wearer's arm can come back. A

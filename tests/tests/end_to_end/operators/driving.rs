@@ -12,7 +12,7 @@ use tungstenite::{Message, WebSocket, client::IntoClientRequest};
 use super::team::Team;
 
 /// A page that drives.
-struct DriversSocket {
+pub struct DriversSocket {
     socket: WebSocket<TcpStream>,
     scene: Value,
     /// The last row that has come.
@@ -45,7 +45,7 @@ fn ask_for(
 
 impl DriversSocket {
     /// Enters as the operator of robot number `robot`, as the page does.
-    fn open(team: &Team, robot: usize) -> DriversSocket {
+    pub fn open(team: &Team, robot: usize) -> DriversSocket {
         let name = ["A", "B"][robot];
         let bearer = format!("Bearer {}", team.tokens[robot]);
         let headers = [("authorization", bearer.as_str()), ("content-type", "application/json")];
@@ -70,13 +70,13 @@ impl DriversSocket {
         DriversSocket { socket, scene, row: Vec::new() }
     }
 
-    fn say(&mut self, wrist_move: Value, go: bool) {
+    pub fn say(&mut self, wrist_move: Value, go: bool) {
         let word = json!({ "move": wrist_move, "go": go }).to_string();
         self.socket.send(Message::text(word)).expect("a page that is heard");
     }
 
     /// Takes in what has come.
-    fn read(&mut self) {
+    pub fn read(&mut self) {
         loop {
             match self.socket.read() {
                 Ok(Message::Binary(bytes)) => {

@@ -2,6 +2,7 @@
 
 mod driving;
 mod page;
+mod partners;
 mod processes;
 mod rounds;
 mod team;

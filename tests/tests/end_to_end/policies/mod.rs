@@ -3,7 +3,7 @@
 mod act_server;
 mod kinds;
 mod openpi_server;
-mod plans;
+pub mod plans;
 mod programs;
 mod servers;
 mod trouble;

@@ -9,6 +9,7 @@ use crate::players::PlayerError;
 /// How far above its place the object is let down from.
 const ABOVE_PLACE_M: Vector = Vector::new(0.0, 0.0, 0.05);
 const ATTEMPTS: usize = 4;
+const RELEASES: usize = 20;
 
 /// Takes what stands on something, and lifts it straight up until it is held in the air.
 pub fn pick_up(commander: &mut Commander, grasp: &CylinderGrasp, lift_m: Vector) -> Result<(), PlayerError> {
@@ -40,12 +41,24 @@ pub fn hand_over(
         commander.perform(0.8, &[taker.close()])?;
         commander.perform(0.2, &[taker.close()])?;
         if taker.holds(commander)? {
-            return release(commander, giver);
+            return let_go(commander, giver);
         }
         release(commander, taker)?;
     }
     let robot = commander.task().robots[taker.robot].name;
     Err(PlayerError::GaveUp(format!("{robot} could not take the {}", taker.object.replace('_', " "))))
+}
+
+/// Opens the hand and takes it away until it holds nothing any more: it may be a person's, who takes longer.
+fn let_go(commander: &mut Commander, giver: &CylinderGrasp) -> Result<(), PlayerError> {
+    for _ in 0..RELEASES {
+        release(commander, giver)?;
+        if !giver.holds(commander)? {
+            return Ok(());
+        }
+    }
+    let robot = commander.task().robots[giver.robot].name;
+    Err(PlayerError::GaveUp(format!("{robot} does not let go of the {}", giver.object.replace('_', " "))))
 }
 
 /// Stands a held object on a place and lets go of it.

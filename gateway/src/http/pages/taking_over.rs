@@ -1,0 +1,65 @@
+//! "Take over here": people go on with a finished episode from a moment of it, as an episode of their own.
+
+use axum::{
+    Extension,
+    body::Bytes,
+    extract::State,
+    http::header,
+    response::{IntoResponse, Response},
+};
+use serde::Deserialize;
+use tandem_episodes::{CONTROL_HZ, EpisodeSpec, MomentStart, Start};
+use tandem_tools_spec::{Driving, Operators, Protocol};
+
+use super::{blocking, finished::folder_of};
+use crate::http::{
+    app::AppState,
+    problem::ApiError,
+    watching::{Host, RECORDING},
+};
+
+/// How long the others wait for somebody who is away: the longest that there is.
+const PATIENCE_S: f64 = 600.0;
+
+/// From where somebody goes on.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TakeOver {
+    run: String,
+    time_s: f64,
+    protocol: Protocol,
+}
+
+/// Starts an episode with an operator for each robot where a finished one stood at a moment, after the last call that was answered by
+/// then, and answers as every start does. Who watches sees the moment, and who may start episodes starts this one.
+pub async fn take_over(
+    State(app): State<AppState>,
+    host: Option<Extension<Host>>,
+    body: Bytes,
+) -> Result<Response, ApiError> {
+    let Extension(Host) = host.ok_or(ApiError::NoToken)?;
+    let wanted: TakeOver =
+        serde_json::from_slice(&body).map_err(|error| ApiError::MalformedJson(error.to_string()))?;
+    let folder = folder_of(&app, wanted.run)?;
+    let (opened, at) = (app.opened.clone(), folder.clone());
+    let recorded = blocking(move || Ok(opened.open(&at)?.spec().clone())).await?;
+    let settings = &app.settings;
+    // The recording is read on a thread that may have another folder.
+    let recording = std::path::absolute(folder.join(RECORDING)).unwrap_or_else(|_| folder.join(RECORDING));
+    let control_step = (wanted.time_s.max(0.0) * CONTROL_HZ).round() as u64;
+    let spec = EpisodeSpec {
+        start: Start::Moment(MomentStart { recording, control_step, before_s: None }),
+        protocol: wanted.protocol,
+        renderer: settings.renderer,
+        assistance: settings.assistance,
+        disclosure: settings.disclosure,
+        hints: settings.hints,
+        instructions: settings.instructions.fingerprint(recorded.task.id),
+        thinking_limit_s: settings.thinking_limit_s,
+        ..recorded
+    };
+    let driving =
+        Driving { operators: Some(Operators::PerRobot), patience_s: Some(PATIENCE_S), talk: Some(true) };
+    let reply = app.table.start_spec(spec, &driving).await?;
+    Ok(([(header::CACHE_CONTROL, "no-store")], axum::Json(reply)).into_response())
+}

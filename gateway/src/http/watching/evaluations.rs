@@ -1,0 +1,131 @@
+//! The evaluations whose folders lie below the runs folder, as they fill: another process plays them, or has played them.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    sync::{Arc, Mutex, PoisonError},
+    time::{Duration, SystemTime},
+};
+
+use serde::Serialize;
+use tandem_episodes::{
+    evaluation::PlannedEpisodes,
+    results::{EPISODES, PlayedEpisode},
+};
+
+/// How deep below the runs folder they lie.
+const DEPTH: usize = 3;
+
+/// One that is not complete and in which nothing has happened for so long has been stopped.
+const STOPPED_AFTER: Duration = Duration::from_secs(600);
+
+/// What was read of them last.
+#[derive(Debug, Clone, Default)]
+pub struct KnownEvaluations(Arc<Mutex<BTreeMap<PathBuf, (SystemTime, EvaluationCounts)>>>);
+
+/// How far an evaluation is.
+#[derive(Debug, Clone, Default, Serialize)]
+struct EvaluationCounts {
+    policies: Vec<String>,
+    tasks: Vec<String>,
+    played: usize,
+    /// Those that count and reached the last phase.
+    succeeded: usize,
+    /// Those that do not count.
+    excluded: usize,
+}
+
+/// How far an evaluation is, as its card has it.
+#[derive(Debug, Serialize)]
+pub struct EvaluationEntry {
+    /// Its folder, below the runs folder.
+    folder: String,
+    #[serde(flatten)]
+    counts: EvaluationCounts,
+    /// How many episodes there are to be; left out where nobody has said it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    planned: Option<usize>,
+    /// When an episode was played last, in seconds since 1970.
+    last_unix_s: u64,
+    /// Whether more are being played.
+    runs: bool,
+}
+
+impl KnownEvaluations {
+    /// The evaluations below `runs`, that in which something happened last first.
+    pub fn list(&self, runs: &Path) -> Vec<EvaluationEntry> {
+        let mut folders = Vec::new();
+        collect(runs, DEPTH, &mut folders);
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut found: Vec<(SystemTime, EvaluationEntry)> = folders
+            .into_iter()
+            .filter_map(|folder| {
+                // Each episode that is played is a new file there.
+                let changed = fs::metadata(folder.join(EPISODES)).and_then(|found| found.modified()).ok()?;
+                let counts = match known.get(&folder) {
+                    Some((then, counts)) if *then == changed => counts.clone(),
+                    _ => EvaluationCounts::read(&folder.join(EPISODES)),
+                };
+                known.insert(folder.clone(), (changed, counts.clone()));
+                Some((changed, entry(runs, &folder, changed, counts)?))
+            })
+            .collect();
+        found.sort_by_key(|(changed, _)| std::cmp::Reverse(*changed));
+        found.into_iter().map(|(_, entry)| entry).collect()
+    }
+}
+
+fn collect(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    for entry in entries.filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_dir())) {
+        let path = entry.path();
+        if path.join(EPISODES).is_dir() {
+            found.push(path);
+        } else if depth > 1 {
+            collect(&path, depth - 1, found);
+        }
+    }
+}
+
+fn entry(
+    runs: &Path,
+    folder: &Path,
+    changed: SystemTime,
+    counts: EvaluationCounts,
+) -> Option<EvaluationEntry> {
+    let name = folder.strip_prefix(runs).ok()?.to_str()?.replace('\\', "/");
+    let planned = PlannedEpisodes::read_all(folder);
+    let lately = changed.elapsed().map_or(true, |since| since < STOPPED_AFTER);
+    let last_unix_s = changed.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    let runs = lately && planned.is_some_and(|planned| counts.played < planned);
+    Some(EvaluationEntry { folder: name, counts, planned, last_unix_s, runs })
+}
+
+impl EvaluationCounts {
+    fn read(folder: &Path) -> EvaluationCounts {
+        let mut counts = EvaluationCounts::default();
+        let files = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+        for path in files.filter(|path| path.extension().is_some_and(|extension| extension == "json")) {
+            let read = fs::read(&path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
+            if let Some(episode) = read {
+                counts.count(&episode);
+            }
+        }
+        counts
+    }
+
+    fn count(&mut self, episode: &PlayedEpisode) {
+        self.played += 1;
+        self.succeeded += usize::from(episode.counts() && episode.succeeded());
+        self.excluded += usize::from(!episode.counts());
+        for (known, name) in
+            [(&mut self.policies, &episode.policy.full_name()), (&mut self.tasks, &episode.result.task)]
+        {
+            if !known.contains(name) {
+                known.push(name.clone());
+                known.sort();
+            }
+        }
+    }
+}

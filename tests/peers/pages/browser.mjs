@@ -1,0 +1,157 @@
+// What the scripts of this folder share: the program as a server, a headless Chromium whose pages are listened to, pictures of them for
+// somebody to look at, and what axe finds wrong with them.
+//
+//     cargo build --release
+//     (cd tests/peers/pages && npm ci --ignore-scripts)
+//     mkdir -p /tmp/pages && cd /tmp/pages
+//     node REPOSITORY/tests/peers/pages/operate.mjs REPOSITORY/target/release/tandem
+//
+// Takes a chromium from the path, or from CHROMIUM. Pictures are written to the working folder. For whoever changes the pages: the files
+// of the folder TANDEM_WEB are shown in place of those in the program.
+import assert from "node:assert/strict";
+import { spawn } from "node:child_process";
+import { mkdtempSync, readFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { chromium } from "playwright-core";
+
+/** The program that is tried. */
+export const [program] = process.argv.slice(2);
+export const WIDTHS = [400, 1400, 2500];
+/** Of a window that nobody looks at: software draws it. */
+export const SIZE = { width: 800, height: 600 };
+/** How long a page may take on a machine that has other things to do. */
+export const PATIENCE_MS = 120_000;
+/** What pages have said of themselves that they should not have. */
+export const complaints = [];
+
+const sources = process.env.TANDEM_WEB;
+const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+
+/** A folder of its own for what a server leaves. */
+export const folder = (name) => mkdtempSync(join(tmpdir(), `${name}-`));
+
+/** Runs the program until this one ends. Returns what it says up to `last` on its standard output, and what tells that it has ended. */
+export async function run(words, last) {
+  const running = spawn(program, words, { stdio: ["ignore", "pipe", "ignore"] });
+  process.on("exit", () => running.kill());
+  const ended = new Promise((done) => running.on("exit", done));
+  let said = "";
+  await new Promise((resolve, failed) => {
+    running.stdout.on("data", (data) => {
+      said += data;
+      if (last.test(said)) resolve();
+    });
+    ended.then((code) => failed(new Error(`${words[0]} ended with ${code}`)));
+  });
+  return { said, ended, process: running };
+}
+
+/** Starts a server. Returns the link for those who watch, its origin, and the folder of its runs. */
+export async function serve(...words) {
+  const runs = folder("runs");
+  const { said, process: server } = await run(["serve", "--listen", "127.0.0.1:0", "--runs", runs, ...words], /watch at \S+\n/);
+  const [, link] = said.match(/watch at (\S+)\n/);
+  return { link, base: new URL(link).origin, runs, server };
+}
+
+/** What a server answers to a call. */
+export async function post(base, path, body, token) {
+  const headers = { "content-type": "application/json", ...(token ? { authorization: `Bearer ${token}` } : {}) };
+  const answer = await fetch(base + path, { method: "POST", headers, body: JSON.stringify(body) });
+  assert(answer.ok, `${path}: ${await answer.clone().text()}`);
+  return answer.status === 204 ? null : answer.json();
+}
+
+export const browser = await chromium.launch({
+  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+  args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run", "--disable-sync",
+    "--disable-background-networking", "--disable-component-update", "--disable-background-timer-throttling",
+    "--disable-backgrounding-occluded-windows", "--disable-renderer-backgrounding"],
+});
+
+/** A page of a person who shares nothing with others. `before` runs in it before anything of its own does. */
+export async function open(link, { before, ...options } = {}) {
+  const context = await browser.newContext({ viewport: SIZE, ignoreHTTPSErrors: true, ...options });
+  context.setDefaultTimeout(PATIENCE_MS);
+  for (const script of [before ?? []].flat()) await context.addInitScript(script);
+  const page = await context.newPage();
+  page.on("pageerror", (error) => complaints.push(error.message));
+  page.on("console", (line) => line.text().includes("Content Security Policy") && complaints.push(line.text()));
+  page.on("request", (request) => {
+    const { origin, protocol } = new URL(request.url());
+    if (origin !== new URL(link).origin && protocol !== "blob:") complaints.push(`asks ${request.url()}`);
+  });
+  if (sources) {
+    // The page itself stays the server's: one that came from elsewhere may open no socket to this machine.
+    await context.route(/\/(watch|operate)\/page\./, (route) => {
+      const name = new URL(route.request().url()).pathname.endsWith("css") ? "style.css" : "dist/page.js";
+      return route.fulfill({ path: join(sources, name) });
+    });
+  }
+  await page.goto(link);
+  return page;
+}
+
+/** Keeps pictures of a page, narrow and wide, light and dark, which is nowhere wider than its window, and has axe look at it. */
+export async function pictures(page, name, { heights = {}, settleMs = 0 } = {}) {
+  const before = page.viewportSize();
+  for (const colorScheme of ["light", "dark"]) {
+    await page.emulateMedia({ colorScheme });
+    for (const width of WIDTHS) {
+      await page.setViewportSize({ width, height: heights[width] ?? 1000 });
+      if (settleMs) await page.waitForTimeout(settleMs);
+      await page.screenshot({ path: `${name}-${width}-${colorScheme}.png`, fullPage: true });
+      const wide = await page.evaluate(() => document.documentElement.scrollWidth);
+      assert.ok(wide <= width, `${name} is ${wide} pixels wide in a window of ${width}`);
+      if (width !== WIDTHS.at(-1)) await accessible(page, `${name}, ${width} pixels, ${colorScheme}`);
+    }
+  }
+  await page.emulateMedia({ colorScheme: "light" });
+  await page.setViewportSize(before);
+}
+
+/** Has axe look at a page, which must find nothing serious. */
+export async function accessible(page, name) {
+  if (!await page.evaluate(() => Boolean(window.axe))) await page.evaluate(axe);
+  const { violations } = await page.evaluate(() => window.axe.run(document, { resultTypes: ["violations"] }));
+  const told = violations.map(({ impact, id, nodes }) => `${impact}: ${id}: ${nodes.map(({ html, failureSummary }) => `${html} ${failureSummary}`).slice(0, 3).join(" | ")}`);
+  for (const line of told) console.log(`axe, ${name}: ${line}`);
+  const serious = violations.filter(({ impact }) => ["serious", "critical"].includes(impact));
+  assert.deepEqual(serious.map(({ id }) => id), [], `axe finds something serious on ${name}`);
+}
+
+/** Runs in a page before it: counts the pictures in which the page has drawn anything. */
+export function countDrawn() {
+  window.drawn = 0;
+  let drawing = false;
+  const draw = WebGL2RenderingContext.prototype.drawElements;
+  WebGL2RenderingContext.prototype.drawElements = function (...given) {
+    drawing = true;
+    draw.apply(this, given);
+  };
+  const count = () => {
+    window.drawn += Number(drawing);
+    drawing = false;
+    requestAnimationFrame(count);
+  };
+  requestAnimationFrame(count);
+}
+
+/** Pictures of the scene that such a page draws in a second. */
+export async function drawnRate(page, seconds = 3) {
+  const [began, before] = [performance.now(), await page.evaluate(() => window.drawn)];
+  await page.waitForTimeout(1000 * seconds);
+  return (await page.evaluate(() => window.drawn) - before) / ((performance.now() - began) / 1000);
+}
+
+export const median = (values) => values.toSorted((one, other) => one - other)[Math.floor(values.length / 2)];
+
+/** Ends the script: no page may have complained. */
+export async function done() {
+  await browser.close();
+  assert.deepEqual(complaints, []);
+  console.log("as it should be");
+  process.exit(0);
+}

@@ -1,0 +1,112 @@
+// How long it takes on the page at /operate from a drag to a wrist that moves, in real time with two robots: in the row that has it, in the
+// picture of it, and in the handle itself; on this machine, and over a link on which everything takes 100 ms each way. How it is run is said
+// in browser.mjs; the machine has to be quiet.
+import assert from "node:assert/strict";
+import { connect, createServer } from "node:net";
+import { PATIENCE_MS, countDrawn, done, drawnRate, median, open, post, serve } from "./browser.mjs";
+import { hear, places } from "./rows.mjs";
+import { driver } from "./socket.mjs";
+
+/** From a drag to a picture of the wrist moved. */
+const MOST_LATENCY_MS = 120;
+/** How long everything takes each way over the slow link. */
+const SLOW_LINK_MS = 100;
+
+const { base } = await serve();
+const started = await post(base, "/v1/episodes", { task: "handover", seed: 2000, operators: "per_robot", patience_s: 600, talk: true });
+const [a, b] = started.operators;
+const link = `/operate#${new URLSearchParams({ episode: started.episode_id, ...a })}`;
+
+/** Measures moves of the pointer and the places of a page's own right wrist. */
+function watchPointer() {
+  window.moves = [];
+  addEventListener("pointermove", (event) => window.moves.push(event.timeStamp), true);
+}
+
+const person = (origin = base) => open(origin + link, { before: [hear, watchPointer, countDrawn] });
+const running = (page) => page.getByRole("status").filter({ hasText: "Running" }).waitFor({ timeout: PATIENCE_MS });
+
+/** The medians of the times from drags of a person's right handle to the row that has the wrist moved, to a picture of it, and to the handle. */
+async function latencies(page, drags) {
+  const found = [];
+  // From there the wrist is in sight, wherever it is.
+  await page.getByLabel("View").selectOption("free");
+  await page.waitForTimeout(500);
+  const at = places(await page.evaluate(() => window.head), await page.evaluate(() => window.head.robot));
+  for (let drag = 0; drag < drags; drag += 1) {
+    const box = await page.getByRole("button", { name: "right wrist: drag" }).boundingBox();
+    const [u, v] = [box.x + box.width / 2, box.y + box.height / 2];
+    await page.mouse.move(u, v);
+    await page.mouse.down();
+    await page.evaluate(({ right, pelvis }) => {
+      const wrist = ({ row }) => [0, 1, 2].map((axis) => row[right + axis] - row[pelvis + axis]);
+      const before = wrist(window.rows.at(-1));
+      window.moves.length = 0;
+      const own = document.querySelector(".handle.right");
+      const place = own.style.left + own.style.top;
+      window.measured = new Promise((done, failed) => {
+        let handleMs = null;
+        setTimeout(() => failed(new Error("nothing has moved for ten seconds")), 10_000);
+        const look = () => {
+          const [begun] = window.moves;
+          if (begun && handleMs === null && own.style.left + own.style.top !== place) handleMs = performance.now() - begun;
+          const moved = begun && window.rows.find((row) => row.came > begun && row.drawn && Math.hypot(...wrist(row).map((value, axis) => value - before[axis])) > 0.003);
+          if (moved && handleMs !== null) done({ rowMs: moved.came - begun, drawnMs: moved.drawn - begun, handleMs });
+          else requestAnimationFrame(look);
+        };
+        look();
+      });
+    }, at);
+    // To and fro, so that the wrist stays where it can go.
+    await page.mouse.move(u + (drag % 2 ? 30 : -30), v);
+    found.push(await page.evaluate(() => window.measured));
+    await page.mouse.up();
+    await page.waitForTimeout(500);
+  }
+  return Object.fromEntries(["rowMs", "drawnMs", "handleMs"].map((name) => [name, median(found.map((one) => one[name]))]));
+}
+const told = (where, { rowMs, drawnMs, handleMs }) => console.log(`${where}: from a drag to the row with the wrist moved ${rowMs.toFixed(0)} ms, to its picture ${drawnMs.toFixed(0)} ms, to the handle ${handleMs.toFixed(0)} ms (medians)`);
+
+// B's person is at another machine, whose browser does not draw on this one.
+const other = await driver(base, "B", b.token);
+const pageA = await person();
+await running(pageA);
+const time = (page) => page.evaluate(() => window.rows.at(-1).row[2]);
+const [clock, simulated] = [performance.now(), await time(pageA)];
+const quick = await latencies(pageA, 15);
+told("on this machine", quick);
+console.log(`the world ran at ${((await time(pageA) - simulated) / ((performance.now() - clock) / 1000)).toFixed(2)} of real time; A's page drew ${(await drawnRate(pageA)).toFixed(0)} frames a second`);
+
+// A link on which everything takes 100 ms each way: the handle is where the person has it at once, and the wrist follows.
+const slow = createServer((near) => {
+  const far = connect(new URL(base).port, "127.0.0.1");
+  const pass = (from, to) => from.on("data", (data) => setTimeout(() => to.writable && to.write(data), SLOW_LINK_MS)).on("close", () => setTimeout(() => to.end(), SLOW_LINK_MS)).on("error", () => to.destroy());
+  pass(near, far);
+  pass(far, near);
+});
+await new Promise((ready) => slow.listen(0, "127.0.0.1", ready));
+await pageA.context().close();
+const slowA = await person(`http://127.0.0.1:${slow.address().port}`);
+await running(slowA);
+const late = await latencies(slowA, 7);
+told(`over ${SLOW_LINK_MS} ms each way`, late);
+
+// A drag of a second: at its end the handle is where the pointer is, and the wrist arrives.
+const handle = slowA.getByRole("button", { name: "right wrist: drag" });
+const before = await handle.boundingBox();
+const [u, v] = [before.x + before.width / 2, before.y + before.height / 2];
+await slowA.mouse.move(u, v);
+await slowA.mouse.down();
+for (let step = 1; step <= 20; step += 1) {
+  await slowA.mouse.move(u - 4 * step, v - 2 * step);
+  await slowA.waitForTimeout(50);
+}
+const after = await handle.boundingBox();
+await slowA.mouse.up();
+const off = Math.hypot(after.x - before.x + 80, after.y - before.y + 40);
+console.log(`after a drag of a second over the slow link the handle is ${off.toFixed(0)} pixels from the pointer`);
+other.leave();
+slow.close();
+assert.ok(late.rowMs > 2 * SLOW_LINK_MS && late.handleMs < MOST_LATENCY_MS && off < 25, JSON.stringify({ late, off }));
+assert.ok(quick.drawnMs < MOST_LATENCY_MS, `${quick.drawnMs} ms`);
+await done();
