@@ -1,4 +1,4 @@
-// What the scripts of this folder share: the program as a server, a headless Chromium whose pages are listened to, pictures of them for
+// What the scripts of this folder share: a headless Chromium whose pages are listened to, pictures of them for
 // somebody to look at, and what axe finds wrong with them.
 //
 //     cargo build --release
@@ -9,15 +9,13 @@
 // Takes a chromium from the path, or from CHROMIUM. Pictures are written to the working folder. For whoever changes the pages: the files
 // of the folder TANDEM_WEB are shown in place of those in the program.
 import assert from "node:assert/strict";
-import { spawn } from "node:child_process";
-import { mkdtempSync, readFileSync } from "node:fs";
+import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
-import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { chromium } from "playwright-core";
 
-/** The program that is tried. */
-export const [program] = process.argv.slice(2);
+export * from "./server.mjs";
+
 export const WIDTHS = [400, 1400, 2500];
 /** Of a window that nobody looks at: software draws it. */
 export const SIZE = { width: 800, height: 600 };
@@ -28,41 +26,6 @@ export const complaints = [];
 
 const sources = process.env.TANDEM_WEB;
 const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
-
-/** A folder of its own for what a server leaves. */
-export const folder = (name) => mkdtempSync(join(tmpdir(), `${name}-`));
-
-/** Runs the program until this one ends. Returns what it says up to `last` on its standard output, and what tells that it has ended. */
-export async function run(words, last) {
-  const running = spawn(program, words, { stdio: ["ignore", "pipe", "ignore"] });
-  process.on("exit", () => running.kill());
-  const ended = new Promise((done) => running.on("exit", done));
-  let said = "";
-  await new Promise((resolve, failed) => {
-    running.stdout.on("data", (data) => {
-      said += data;
-      if (last.test(said)) resolve();
-    });
-    ended.then((code) => failed(new Error(`${words[0]} ended with ${code}`)));
-  });
-  return { said, ended, process: running };
-}
-
-/** Starts a server. Returns the link for those who watch, its origin, and the folder of its runs. */
-export async function serve(...words) {
-  const runs = folder("runs");
-  const { said, process: server } = await run(["serve", "--listen", "127.0.0.1:0", "--runs", runs, ...words], /watch at \S+\n/);
-  const [, link] = said.match(/watch at (\S+)\n/);
-  return { link, base: new URL(link).origin, runs, server };
-}
-
-/** What a server answers to a call. */
-export async function post(base, path, body, token) {
-  const headers = { "content-type": "application/json", ...(token ? { authorization: `Bearer ${token}` } : {}) };
-  const answer = await fetch(base + path, { method: "POST", headers, body: JSON.stringify(body) });
-  assert(answer.ok, `${path}: ${await answer.clone().text()}`);
-  return answer.status === 204 ? null : answer.json();
-}
 
 export const browser = await chromium.launch({
   executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",

@@ -1,0 +1,60 @@
+// 20 people watch and three drive BigTable for ten minutes, one episode after another: the server's memory stays as it is, and no command is
+// dropped. No browser is needed.
+//
+//     node REPOSITORY/tests/peers/pages/crowd.mjs REPOSITORY/target/release/tandem [MINUTES]
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { post, serve } from "./server.mjs";
+import { driver, watcher } from "./socket.mjs";
+
+const minutes = Number(process.argv[3] ?? 10);
+const WATCHERS = 20;
+const { link, base, server } = await serve();
+const key = new URL(link).hash.slice(1);
+const megabytes = () => Number(readFileSync(`/proc/${server.pid}/status`, "utf8").match(/VmRSS:\s+(\d+)/)[1]) / 1024;
+
+const began = performance.now();
+const memory = [];
+const total = { steps: 0, rows: 0, seen: 0, refused: 0 };
+let rate = 1;
+for (let seed = 2000; performance.now() - began < 60_000 * minutes; seed += 1) {
+  const started = await post(base, "/v1/episodes", { task: "big_table", seed, operators: "per_robot", patience_s: 600, talk: true });
+  const id = started.episode_id;
+  const people = await Promise.all(started.operators.map(({ robot, token }) => driver(base, robot, token)));
+  const watching = await Promise.all(Array.from({ length: WATCHERS }, () => watcher(base, id, key)));
+  const homes = people.map((one) => one.poses());
+  const clock = performance.now();
+  const wave = setInterval(() => people.forEach((one, index) => {
+    const up = 0.05 * Math.sin(performance.now() / 500);
+    const at = (side) => homes[index][side].position.map((value, axis) => value + (axis === 2 ? up : 0));
+    one.move = { carried: true, left_position_m: at("left"), right_position_m: at("right") };
+  }), 20);
+  const last = Math.min(110_000, 60_000 * minutes - (performance.now() - began));
+  await new Promise((passed) => setTimeout(passed, last));
+  clearInterval(wave);
+  const time = people[0].time();
+  rate = Math.min(rate, time / ((performance.now() - clock) / 1000));
+  people.forEach((one) => { one.go = false; });
+  await new Promise((passed) => setTimeout(passed, 1000));
+  for (const one of people) {
+    total.rows += one.rows;
+    total.refused += one.told.filter(({ kind }) => kind === "refused").length;
+    assert.ok(one.told.every(({ kind }) => kind !== "replaced"));
+  }
+  const status = await (await fetch(`${base}/v1/episodes/${id}`)).json();
+  const recorded = await (await fetch(`${base}/watch/scene?episode=${id}`, { headers: { authorization: `Bearer ${key}` } })).arrayBuffer();
+  const { story } = JSON.parse(new TextDecoder().decode(recorded.slice(4, 4 + new DataView(recorded).getUint32(0, true))));
+  const steps = status.env_steps - started.env_steps;
+  total.steps += steps;
+  total.seen += watching.reduce((sum, one) => sum + one.steps, 0) / WATCHERS;
+  assert.ok(watching.every((one) => one.open), "who watches stays");
+  console.log(`${((performance.now() - began) / 60_000).toFixed(1)} min: ${megabytes().toFixed(0)} MB, ${steps} steps, ${story.filter(({ ok }) => ok === false).length} refused, ${(time / ((performance.now() - clock) / 1000)).toFixed(2)} of real time`);
+  people.forEach((one) => one.leave());
+  watching.forEach((one) => one.leave());
+  await fetch(`${base}/v1/episodes/${id}`, { method: "DELETE" });
+  memory.push(megabytes());
+}
+console.log(`${total.steps} steps, each told ${(total.rows / total.steps).toFixed(2)} times to three drivers; ${total.refused} refused; a watcher saw ${(total.seen / total.steps).toFixed(2)} of them; at least ${rate.toFixed(2)} of real time; memory after each episode ${memory.map((value) => value.toFixed(0)).join(", ")} MB`);
+assert.equal(total.refused, 0);
+assert.ok(memory.at(-1) < 1.1 * memory[Math.min(1, memory.length - 1)], "memory grows");
+process.exit(0);
