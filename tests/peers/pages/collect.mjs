@@ -1,10 +1,10 @@
 // `tandem collect --operators 2` in a headless Chromium: whoever runs it opens the page with all links, two people follow theirs, play
 // two episodes, mark one bad, and run the command again; and pictures of all pages for somebody to look at. How it is run is said in
-// browser.mjs.
+// shared/browser.mjs.
 import assert from "node:assert/strict";
 import { existsSync, readFileSync } from "node:fs";
 import { join } from "node:path";
-import { PATIENCE_MS, done, folder, open, pictures, run } from "./browser.mjs";
+import { PATIENCE_MS, done, folder, open, pictures, run } from "./shared/browser.mjs";
 
 const out = join(folder("collect"), "people");
 

@@ -4,8 +4,8 @@
 //     node REPOSITORY/tests/peers/pages/crowd.mjs REPOSITORY/target/release/tandem [MINUTES]
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
-import { post, serve } from "./server.mjs";
-import { driver, watcher } from "./socket.mjs";
+import { post, serve } from "./shared/server.mjs";
+import { driver, watcher } from "./shared/socket.mjs";
 
 const minutes = Number(process.argv[3] ?? 10);
 const WATCHERS = 20;
@@ -44,7 +44,7 @@ for (let seed = 2000; performance.now() - began < 60_000 * minutes; seed += 1) {
   const status = await (await fetch(`${base}/v1/episodes/${id}`)).json();
   const recorded = await (await fetch(`${base}/watch/scene?episode=${id}`, { headers: { authorization: `Bearer ${key}` } })).arrayBuffer();
   const { story } = JSON.parse(new TextDecoder().decode(recorded.slice(4, 4 + new DataView(recorded).getUint32(0, true))));
-  const steps = status.env_steps - started.env_steps;
+  const steps = status.env_steps - started.status.env_steps;
   total.steps += steps;
   total.seen += watching.reduce((sum, one) => sum + one.steps, 0) / WATCHERS;
   assert.ok(watching.every((one) => one.open), "who watches stays");

@@ -1,11 +1,11 @@
 // How long it takes on the page at /operate from a drag to a wrist that moves, in real time with two robots: in the row that has it, in the
 // picture of it, and in the handle itself; on this machine, and over a link on which everything takes 100 ms each way. How it is run is said
-// in browser.mjs; the machine has to be quiet.
+// in shared/browser.mjs; the machine has to be quiet.
 import assert from "node:assert/strict";
 import { connect, createServer } from "node:net";
-import { PATIENCE_MS, countDrawn, done, drawnRate, median, open, post, serve } from "./browser.mjs";
-import { hear, places } from "./rows.mjs";
-import { driver } from "./socket.mjs";
+import { PATIENCE_MS, countDrawn, done, drawnRate, median, open, post, serve } from "./shared/browser.mjs";
+import { hear, places } from "./shared/rows.mjs";
+import { driver } from "./shared/socket.mjs";
 
 /** From a drag to a picture of the wrist moved. */
 const MOST_LATENCY_MS = 120;

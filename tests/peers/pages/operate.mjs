@@ -1,10 +1,10 @@
 // The page at /operate in a headless Chromium: two people start an episode, drive by handles, keys and a gamepad, talk, go away and come
-// back, take hold of the bottle and lift it; and pictures of both pages for somebody to look at. How it is run is said in browser.mjs.
+// back, take hold of the bottle and lift it; and pictures of both pages for somebody to look at. How it is run is said in shared/browser.mjs.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { join } from "node:path";
-import { PATIENCE_MS, done, open, pictures, post, program, serve } from "./browser.mjs";
-import { hear, inPages, poses } from "./rows.mjs";
+import { PATIENCE_MS, done, open, pictures, post, program, serve } from "./shared/browser.mjs";
+import { hear, inPages, poses } from "./shared/rows.mjs";
 
 const { base, runs } = await serve();
 

@@ -1,10 +1,10 @@
 // The pages at /watch in a headless Chromium: calls watched as they are made, the demo watched live to its end, a finished episode
 // scrubbed and taken over, an evaluation's card that fills, and pictures of all for somebody to look at. How it is run is said in
-// browser.mjs.
+// shared/browser.mjs.
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { join } from "node:path";
-import { accessible, browser, done, open, pictures, post, program, serve } from "./browser.mjs";
+import { accessible, browser, done, open, pictures, post, program, serve } from "./shared/browser.mjs";
 
 const { link, base, runs } = await serve();
 const call = (path, body) => post(base, path, body);

@@ -1,4 +1,4 @@
-// The program as a server, for the scripts of this folder.
+// The program as a server, for the scripts beside this folder.
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { mkdtempSync } from "node:fs";

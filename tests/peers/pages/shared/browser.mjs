@@ -1,4 +1,4 @@
-// What the scripts of this folder share: a headless Chromium whose pages are listened to, pictures of them for
+// What the scripts beside this folder share: a headless Chromium whose pages are listened to, pictures of them for
 // somebody to look at, and what axe finds wrong with them.
 //
 //     cargo build --release
