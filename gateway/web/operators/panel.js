@@ -72,9 +72,11 @@ export function layOut(main, robot, briefing, on) {
   };
 }
 
-/** What is clicked takes no focus, so that the space bar stays the clutch; who comes by the keyboard gives it. */
+/** What is clicked takes no focus, and a text that had it loses it, so that keys drive; who comes by the keyboard gives it. */
 function keepKeys(event) {
-  if (event.target.closest("button:not(.handle), input[type=checkbox], label")) event.preventDefault();
+  if (!event.target.closest("button:not(.handle), input[type=checkbox], label")) return;
+  event.preventDefault();
+  document.activeElement?.blur();
 }
 
 /** Puts something where it is seen; a handle that lies outside of the picture is at its border, and other things are not shown. */
@@ -98,6 +100,8 @@ function talk(robot, speak) {
     const said = text.value.trim();
     if (!said) return;
     text.value = "";
+    // Keys drive again.
+    text.blur();
     speak(said).then((reply) => { heard(robot, said); (reply.heard ?? []).forEach((word) => heard(word.from, word.text)); }, (error) => heard("not said", error.message));
   };
   return { heard, elements: [chat, element("form", { onsubmit: submit, class: "tools" }, text, element("button", {}, "Say"))] };
