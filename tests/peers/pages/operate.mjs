@@ -34,6 +34,50 @@ let pageB = await person(b);
 await Promise.all([running(pageA), running(pageB)]);
 assert.ok(!pageA.url().includes("token"), "the token is still in the address");
 
+const withPad = (page, axes, buttons) => page.evaluate(([some, values]) => {
+  window.pad = { connected: true, axes: some, buttons: values.map((value) => ({ value, pressed: value > 0.5 })) };
+}, [axes, Array.from({ length: 17 }, (_, index) => buttons[index] ?? 0)]);
+// A takes the bottle: by keys to beside it, level and open, by the gamepad's trigger closed, by keys up, while B waits.
+await pageA.keyboard.press("2");
+for (const key of [" ", "h", "o"]) await pageA.keyboard.press(key);
+/** Holds keys down until the right wrist is so far from the bottle, along the axes of the pelvis frame; what is near is reached by taps. */
+const reach = (offset) => pageA.evaluate(async (goal) => {
+  const keys = [["ArrowUp", "ArrowDown"], ["ArrowLeft", "ArrowRight"], ["PageUp", "PageDown"]];
+  const press = (kind, wanted) => wanted.forEach((key) => dispatchEvent(new KeyboardEvent(kind, { key })));
+  const passed = (ms) => new Promise((done) => setTimeout(done, ms));
+  for (const began = performance.now(); performance.now() - began < 8000;) {
+    const { right, objects: { bottle } } = posesIn(window.head, window.rows.at(-1).row);
+    const missing = goal.map((value, axis) => bottle.position[axis] + value - right.position[axis]);
+    const keysOf = (least, most) => missing.flatMap((value, axis) => (Math.abs(value) > least && Math.abs(value) <= most ? [keys[axis][value > 0 ? 0 : 1]] : []));
+    const [far, near] = [keysOf(0.05, Infinity), keysOf(0.012, 0.05)];
+    if (far.length + near.length === 0) return;
+    press("keydown", [...far, ...near]);
+    await passed(40);
+    press("keyup", near);
+    await passed(far.length ? 60 : 200);
+    press("keyup", far);
+  }
+}, offset);
+await pageA.waitForTimeout(1000);
+await reach([-0.12, -0.135, 0.12]);
+await reach([-0.12, -0.135, 0.055]);
+await reach([-0.12, -0.06, 0.055]);
+const near = await poses(pageA);
+console.log(`before it closes, the wrist is ${near.right.position.map((value, axis) => (value - near.objects.bottle.position[axis]).toFixed(3)).join(", ")} m from the bottle, turned ${near.right.turn.map((value) => value.toFixed(2)).join(", ")}`);
+await pageA.screenshot({ path: "drive-grasp.png" });
+await withPad(pageA, [0, 0, 0, 0], { 7: 1 });
+await pageA.waitForTimeout(2500);
+await pageA.keyboard.down("PageUp");
+await pageA.getByText("reached: grasp and lift").waitFor({ timeout: 15_000 }).catch(async (error) => {
+  const { right, objects: { bottle }, contact_n: contact } = await poses(pageA);
+  console.log(`the wrist is ${right.position.map((value, axis) => (value - bottle.position[axis]).toFixed(3)).join(", ")} m from the bottle and feels ${contact.toFixed(1)} N`);
+  throw error;
+});
+await pageA.keyboard.up("PageUp");
+await pageA.screenshot({ path: "drive-lift.png" });
+console.log("the first phase is reached");
+await pageA.evaluate(() => { window.pad = null; });
+
 // A drags its right hand upwards in the picture and closes it; B walks by keys.
 const episode = new URLSearchParams(a.split("#")[1]).get("episode");
 const stateOf = (link, robot) =>
@@ -80,9 +124,6 @@ console.log(`the world runs at ${rate.toFixed(2)} of real time`);
 assert.ok(rate <= 1.1 && rate > 0.1, `${rate}`);
 
 // A gamepad: a stick walks, a trigger closes, a bumper lets go.
-const withPad = (page, axes, buttons) => page.evaluate(([some, values]) => {
-  window.pad = { connected: true, axes: some, buttons: values.map((value) => ({ value, pressed: value > 0.5 })) };
-}, [axes, Array.from({ length: 17 }, (_, index) => buttons[index] ?? 0)]);
 const resting = await stateOf(b, "B");
 await withPad(pageB, [0, -1, 0, 0], { 7: 1 });
 await pageB.waitForTimeout(2500);
@@ -111,47 +152,6 @@ await pageA.waitForTimeout(1500);
 const stepped = (await stateOf(a, "A")).time_s - waited;
 assert.ok(Math.abs(stepped - 0.2) < 0.03, `a step is ${stepped} s`);
 await pageA.getByLabel("step by step").uncheck();
-
-// A takes the bottle: by keys to beside it, level and open, by the gamepad's trigger closed, by keys up, while B waits.
-await withPad(pageB, [0, 0, 0, 0], {});
-await pageA.keyboard.press("2");
-for (const key of [" ", "h", "o"]) await pageA.keyboard.press(key);
-/** Holds keys down until the right wrist is so far from the bottle, along the axes of the pelvis frame; what is near is reached by taps. */
-const reach = (offset) => pageA.evaluate(async (goal) => {
-  const keys = [["ArrowUp", "ArrowDown"], ["ArrowLeft", "ArrowRight"], ["PageUp", "PageDown"]];
-  const press = (kind, wanted) => wanted.forEach((key) => dispatchEvent(new KeyboardEvent(kind, { key })));
-  const passed = (ms) => new Promise((done) => setTimeout(done, ms));
-  for (const began = performance.now(); performance.now() - began < 8000;) {
-    const { right, objects: { bottle } } = posesIn(window.head, window.rows.at(-1).row);
-    const missing = goal.map((value, axis) => bottle.position[axis] + value - right.position[axis]);
-    const keysOf = (least, most) => missing.flatMap((value, axis) => (Math.abs(value) > least && Math.abs(value) <= most ? [keys[axis][value > 0 ? 0 : 1]] : []));
-    const [far, near] = [keysOf(0.05, Infinity), keysOf(0.012, 0.05)];
-    if (far.length + near.length === 0) return;
-    press("keydown", [...far, ...near]);
-    await passed(40);
-    press("keyup", near);
-    await passed(far.length ? 60 : 200);
-    press("keyup", far);
-  }
-}, offset);
-await pageA.waitForTimeout(1000);
-await reach([-0.12, -0.135, 0.12]);
-await reach([-0.12, -0.135, 0.055]);
-await reach([-0.12, -0.06, 0.055]);
-const near = await poses(pageA);
-console.log(`before it closes, the wrist is ${near.right.position.map((value, axis) => (value - near.objects.bottle.position[axis]).toFixed(3)).join(", ")} m from the bottle, turned ${near.right.turn.map((value) => value.toFixed(2)).join(", ")}`);
-await pageA.screenshot({ path: "drive-grasp.png" });
-await withPad(pageA, [0, 0, 0, 0], { 7: 1 });
-await pageA.waitForTimeout(2500);
-await pageA.keyboard.down("PageUp");
-await pageA.getByText("reached: grasp and lift").waitFor({ timeout: 15_000 }).catch(async (error) => {
-  const { right, objects: { bottle }, contact_n: contact } = await poses(pageA);
-  console.log(`the wrist is ${right.position.map((value, axis) => (value - bottle.position[axis]).toFixed(3)).join(", ")} m from the bottle and feels ${contact.toFixed(1)} N`);
-  throw error;
-});
-await pageA.keyboard.up("PageUp");
-await pageA.screenshot({ path: "drive-lift.png" });
-console.log("the first phase is reached");
 
 await pageA.screenshot({ path: "drive-free.png" });
 
