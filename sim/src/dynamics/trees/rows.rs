@@ -180,18 +180,17 @@ impl<const N: usize> ConstraintRows<N> {
         let column = &self.column[place..self.column.len().min(place + SIDE - begin)];
         let are_neighbours = |pair: &[u16]| pair[0] + 1 == pair[1];
         let count = 1 + column.windows(2).take_while(|pair| are_neighbours(pair)).count();
-        let mut block = RowBlock {
-            y: [Quad::default(); N],
-            nothing: Quad([-0.0; SIDE]),
-            first: usize::from(column[0]) + MARGIN - begin,
-        };
-        for (side, y) in (begin..).zip(&self.y[place..place + count]) {
-            block.nothing.0[side] = 0.0;
-            for (row, y) in block.y.iter_mut().zip(y) {
-                row.0[side] = *y;
+        let first = usize::from(column[0]) + MARGIN - begin;
+        // Filled where it lies: to move what has been written number by number, a processor has to wait for it.
+        self.blocks.push(RowBlock { y: [Quad::default(); N], nothing: Quad([-0.0; SIDE]), first });
+        if let Some(block) = self.blocks.last_mut() {
+            for (side, y) in (begin..).zip(&self.y[place..place + count]) {
+                block.nothing.0[side] = 0.0;
+                for (row, y) in block.y.iter_mut().zip(y) {
+                    row.0[side] = *y;
+                }
             }
         }
-        self.blocks.push(block);
         count
     }
 
