@@ -14,6 +14,7 @@ const FILES: &[(&str, &str)] = &[
     ("which_one.toml", include_str!("../../tasks/which_one.toml")),
     ("blind_carry.toml", include_str!("../../tasks/blind_carry.toml")),
     ("relay.toml", include_str!("../../tasks/relay.toml")),
+    ("set_the_table.toml", include_str!("../../tasks/set_the_table.toml")),
     ("swap.toml", include_str!("../../tasks/swap.toml")),
 ];
 

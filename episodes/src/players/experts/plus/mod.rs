@@ -3,6 +3,7 @@
 
 mod blind_carry;
 mod relay;
+mod set_the_table;
 mod swap;
 mod which_one;
 
@@ -12,5 +13,6 @@ pub const ALL: &[(&str, ExpertScript)] = &[
     ("which_one", which_one::perform),
     ("blind_carry", blind_carry::perform),
     ("relay", relay::perform),
+    ("set_the_table", set_the_table::perform),
     ("swap", swap::perform),
 ];
