@@ -55,6 +55,8 @@ pub enum EpisodeError {
     #[error(transparent)]
     Scene(Box<SceneError>),
     #[error(transparent)]
+    Robot(Box<RobotError>),
+    #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
     #[error("cannot read this program's own file, which tells it from other builds: {0}")]
     Build(#[source] std::io::Error),
@@ -84,6 +86,7 @@ impl EpisodeError {
             EpisodeError::Diverged { .. } => Refusal::new("diverged", "Physics diverged", Conflict),
             EpisodeError::NoOtherWords { .. } => Refusal::new("no-other-words", "No other words", Invalid),
             EpisodeError::Scene(_) => Refusal::new("scene", "Scene does not fit the task", Invalid),
+            EpisodeError::Robot(_) => Refusal::new("robot", "Robot does not fit", Invalid),
             EpisodeError::Checkpoint(_) => Refusal::new("checkpoint", "Checkpoint does not fit", Invalid),
             EpisodeError::Sim(_)
             | EpisodeError::Ik(_)
@@ -98,6 +101,37 @@ impl From<SceneError> for EpisodeError {
     fn from(error: SceneError) -> EpisodeError {
         EpisodeError::Scene(Box::new(error))
     }
+}
+
+impl From<RobotError> for EpisodeError {
+    fn from(error: RobotError) -> EpisodeError {
+        match error {
+            RobotError::Sim(error) => EpisodeError::Sim(error),
+            error => EpisodeError::Robot(Box::new(error)),
+        }
+    }
+}
+
+/// Why an episode cannot have its robots.
+#[derive(Debug, thiserror::Error)]
+pub enum RobotError {
+    #[error(transparent)]
+    Sim(#[from] tandem_sim::SimError),
+    #[error(
+        "the robot {} has changed: it was {was} and is {now}, with the files that it names; an episode is replayed and resumed with the robot that it was played with",
+        path.display()
+    )]
+    Changed { path: PathBuf, was: String, now: String },
+    #[error(
+        "{task} needs hands that close, and the robot {robot} has none: {}; or give a robot with thumbs and fingers by --robot",
+        match .have.is_empty() {
+            true => "no task that there is here can do without; write one by --task-file whose conditions ask for no grip".into(),
+            false => format!("tasks that such a robot can play are {}", .have.join(", ")),
+        }
+    )]
+    NoFingers { task: String, robot: String, have: Vec<String> },
+    #[error("the robot {robot} cannot have this base controller: {what}")]
+    Controller { robot: String, what: String },
 }
 
 /// Why a task cannot take place in a scene.

@@ -123,6 +123,8 @@ impl Instructions {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tandem_sim::body::BodyScale;
+
     use crate::LocomotionChoice;
 
     fn read(text: &str) -> Result<Instructions, String> {
@@ -136,7 +138,7 @@ mod tests {
     fn only_what_the_file_says_changes() {
         let list =
             read(r#"{"handover": {"joint": "Reicht die Flasche weiter.", "robots": {"B": "Nimm sie."}}}"#);
-        let limits = LocomotionChoice::default().limits();
+        let limits = LocomotionChoice::default().limits(&BodyScale::G1);
         let list = list.unwrap().task_list(&TaskSet::default(), None, &limits);
         let (own, handover) = (task_list(&TaskSet::default(), None, &limits), &list.tasks[0]);
         assert_eq!(handover.instruction, "Reicht die Flasche weiter.");

@@ -49,7 +49,7 @@ mod variation;
 pub use commands::{Called, OperatorCall, OperatorCommand};
 pub use conditions::{FUNCTIONS, Function};
 pub use describe::{brief, task_list};
-pub use error::{CheckpointError, EpisodeError, SceneError};
+pub use error::{CheckpointError, EpisodeError, RobotError, SceneError};
 pub use fingerprint::{build, name_program};
 pub use instructions::{Instructions, InstructionsError};
 pub use observation::{Picture, RobotObservation, RobotView, TeamObservation};
@@ -65,10 +65,11 @@ pub use scoring::{A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, Rob
 pub use session::{
     CallReply, Checkpoint, Clock, FAILED_STEP_FILE, FailedStep, RunFiles, RunFolder, Session, monotonic,
 };
-pub use spec::{Controller, EpisodeSpec, MomentStart, PhaseStart, RobotFile, SceneFile, Start};
+pub use spec::{Controller, EpisodeSpec, MomentStart, OwnRobot, PhaseStart, RobotFile, SceneFile, Start};
 pub use tandem_sim::{
     BaseLimits, CONTROL_HZ, LocomotionChoice, Sensing, SensorModel, SimError, StateSource,
-    assets::{DEFAULT_ROBOT, ROBOTS},
+    assets::{DEFAULT_ROBOT, ROBOTS, robot as embedded_robot},
+    body::BodyScale,
     joint_names,
     render::RendererKind,
 };

@@ -6,15 +6,16 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use tandem_sim::{
-    CONTROL_HZ, LocomotionChoice, RobotModel, Sensing, SensorModel, SimError, StateSource, mjcf::Document,
-    render::RendererKind,
+    BaseLimits, CONTROL_HZ, LocomotionChoice, RobotModel, RobotSource, Sensing, SensorModel, SimError,
+    StateSource, mjcf::Document, render::RendererKind,
 };
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, Wording};
 
-use crate::error::SceneError;
+use crate::error::{RobotError, SceneError};
 use crate::protocol::{Rules, rules};
 use crate::scoring::Phase;
 use crate::stress::{self, Stress, TaskWords};
+use crate::task_file::task_set;
 use crate::tasks::{Spread, Task};
 use crate::variation::Variation;
 
@@ -66,8 +67,16 @@ pub struct EpisodeSpec {
 pub enum RobotFile {
     /// One that the binary carries, by name.
     Embedded(String),
-    /// An MJCF file.
-    File(PathBuf),
+    /// One of somebody's own.
+    File(OwnRobot),
+}
+
+/// A robot that a file describes: MJCF that has what is asked of a robot, or a description in TOML of somebody else's MJCF.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct OwnRobot {
+    pub path: PathBuf,
+    /// Hash of the content when the episode was planned, with all that it names; see [`RobotSource::fingerprint`].
+    pub xxh3: String,
 }
 
 /// A scene in place of the task's own: an MJCF file with what that names.
@@ -276,7 +285,7 @@ impl RobotFile {
     pub fn name(&self) -> String {
         match self {
             RobotFile::Embedded(name) => name.clone(),
-            RobotFile::File(path) => path.display().to_string(),
+            RobotFile::File(own) => own.path.display().to_string(),
         }
     }
 
@@ -284,21 +293,58 @@ impl RobotFile {
     pub fn kind(&self) -> String {
         match self {
             RobotFile::Embedded(name) => name.clone(),
-            RobotFile::File(path) => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            RobotFile::File(own) => own.path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        }
+    }
+
+    /// The robot that a file describes now.
+    pub fn of(path: &Path) -> Result<RobotFile, SimError> {
+        RobotFile::with_approximations(path).map(|(robot, _)| robot)
+    }
+
+    /// The robot that a file describes now, and what the file says that does not happen quite as in MuJoCo, a line each.
+    pub fn with_approximations(path: &Path) -> Result<(RobotFile, Vec<String>), SimError> {
+        let source = RobotSource::read(path)?;
+        let xxh3 = format!("{:016x}", source.fingerprint);
+        // Whoever replays the episode may be in another folder.
+        let path = std::path::absolute(path).unwrap_or_else(|_| path.into());
+        Ok((RobotFile::File(OwnRobot { path, xxh3 }), source.model.approximations))
+    }
+
+    /// Reads the robot, whose file has to be as it was.
+    pub fn load(&self) -> Result<RobotSource, RobotError> {
+        let own = match self {
+            RobotFile::Embedded(name) => return Ok(RobotSource::embedded(name)?),
+            RobotFile::File(own) => own,
+        };
+        let source = RobotSource::read(&own.path)?;
+        let now = format!("{:016x}", source.fingerprint);
+        match now == own.xxh3 {
+            true => Ok(source),
+            false => Err(RobotError::Changed { path: own.path.clone(), was: own.xxh3.clone(), now }),
         }
     }
 
     /// The robot that the file describes.
-    pub fn model(&self) -> Result<Arc<RobotModel>, SimError> {
-        Ok(Arc::new(RobotModel::parse(&self.name(), &self.read()?)?))
+    pub fn model(&self) -> Result<Arc<RobotModel>, RobotError> {
+        Ok(Arc::new(self.load()?.model))
     }
 
-    /// The file's text.
-    pub fn read(&self) -> Result<String, SimError> {
+    /// Whether such a robot, read as `model`, can do what a task asks of its hands.
+    pub fn check_task(&self, model: &RobotModel, task: &Task) -> Result<(), RobotError> {
+        if !task.needs_fingers() || model.has_fingers() {
+            return Ok(());
+        }
+        let own = task_set(Vec::new());
+        let without = own.all().filter(|task| !task.needs_fingers()).map(|task| task.id.into());
+        Err(RobotError::NoFingers { task: task.id.into(), robot: self.kind(), have: without.collect() })
+    }
+
+    /// A name that tells files of different content apart.
+    pub fn identity(&self) -> String {
         match self {
-            RobotFile::Embedded(name) => Ok(tandem_sim::assets::robot(name)?.into()),
-            RobotFile::File(path) => std::fs::read_to_string(path)
-                .map_err(|source| SimError::Read { path: path.display().to_string(), source }),
+            RobotFile::Embedded(name) => name.clone(),
+            RobotFile::File(own) => format!("{}-{}", self.name(), own.xxh3),
         }
     }
 }
@@ -341,6 +387,11 @@ impl Controller {
             Some(file) => Controller::Looped(file.into()),
             None => Controller::File(path.into()),
         }
+    }
+
+    /// Base commands that such a controller follows with this robot.
+    pub fn limits(&self, robot: &RobotFile) -> Result<BaseLimits, RobotError> {
+        Ok(self.load()?.limits(&robot.load()?.model.scale))
     }
 
     /// Reads and checks the file.

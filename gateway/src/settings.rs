@@ -17,7 +17,7 @@ use clap::{
 use serde::Deserialize;
 use tandem_episodes::{
     BaseLimits, Controller, EpisodeError, EpisodeSpec, Instructions, InstructionsError, RendererKind,
-    SceneFile, Sensing, SensorModel, SimError, StateSource, Visibility, check_task, read_task,
+    RobotFile, SceneFile, Sensing, SensorModel, SimError, StateSource, Visibility, check_task, read_task,
     stress::{Stress, StressAxis, StressLevel},
     task_set,
     tasks::{Task, TaskSet},
@@ -67,6 +67,10 @@ pub struct Layer {
     /// MJCF file of a scene in place of the tasks' own; its site `task` says where.
     #[arg(long, env = "TANDEM_SCENE", value_name = "FILE")]
     pub scene: Option<PathBuf>,
+    /// File that describes the robots in place of the embedded one: MJCF that names joints as the embedded robot's does, or a TOML file
+    /// that says of another MJCF which of its joints are which [default: a Unitree G1 with Dex3-1 hands].
+    #[arg(long, env = "TANDEM_ROBOT", value_name = "FILE")]
+    pub robot: Option<PathBuf>,
     /// TOML files with tasks of your own, separated by commas; one that is called as a built-in task takes its place.
     #[arg(long, env = "TANDEM_TASK_FILE", value_name = "FILES", value_delimiter = ',')]
     pub task_file: Option<Vec<PathBuf>>,
@@ -152,6 +156,7 @@ impl Layer {
             record: self.record.or(next.record),
             instructions: self.instructions.or(next.instructions),
             scene: self.scene.or(next.scene),
+            robot: self.robot.or(next.robot),
             task_file: self.task_file.or(next.task_file),
             locomotion: self.locomotion.or(next.locomotion),
             state_estimate: self.state_estimate.or(next.state_estimate),
@@ -248,6 +253,11 @@ impl Layer {
         path.map_or_else(|| Ok(Instructions::default()), |path| Instructions::read(path, tasks))
     }
 
+    /// The robots.
+    pub fn read_robot(&self) -> Result<RobotFile, SimError> {
+        read_robot(self.robot.as_deref())
+    }
+
     /// The base controller; its file is not read yet.
     pub fn controller(&self) -> Controller {
         Controller::from_file(self.locomotion.as_deref())
@@ -301,6 +311,8 @@ pub struct Settings {
     pub instructions: Instructions,
     /// The scene in place of the tasks' own.
     pub scene: Option<SceneFile>,
+    /// What describes the robots.
+    pub robot: RobotFile,
     /// The base controller of every robot.
     pub locomotion: Controller,
     /// What robots know of themselves.
@@ -346,6 +358,7 @@ impl Settings {
         let protocol = start.protocol.unwrap_or(Protocol::Agentic);
         Ok(EpisodeSpec {
             scene: self.scene.clone(),
+            robot: self.robot.clone(),
             locomotion: self.locomotion.clone(),
             sensing: self.sensing,
             stress: self.stress,
@@ -373,6 +386,7 @@ impl Settings {
         let locomotion = layer.controller();
         let renderer = layer.renderer();
         let tasks = layer.read_tasks()?;
+        let robot = layer.read_robot()?;
         let assistance = layer.assistance.unwrap_or_default();
         tracing::info!("{}", renderer.describe()?);
         let seconds = |given: Option<u32>, default: u32| Duration::from_secs(given.unwrap_or(default).into());
@@ -388,7 +402,8 @@ impl Settings {
             instructions: layer.read_instructions(&tasks)?,
             tasks,
             scene: layer.scene.as_deref().map(read_scene).transpose()?,
-            base_limits: locomotion.load()?.limits(),
+            base_limits: locomotion.limits(&robot)?,
+            robot,
             locomotion,
             sensing: layer.sensing(),
             stress: layer.stress(),
@@ -442,6 +457,14 @@ pub fn read_scene(path: &Path) -> Result<SceneFile, SimError> {
     let (scene, approximations) = SceneFile::with_approximations(path)?;
     approximations.iter().for_each(|line| tracing::warn!("not quite as in MuJoCo: {line}"));
     Ok(scene)
+}
+
+/// Reads the robot of a file, or takes the embedded one, and logs what of the file does not happen quite as in MuJoCo.
+pub fn read_robot(path: Option<&Path>) -> Result<RobotFile, SimError> {
+    let Some(path) = path else { return Ok(RobotFile::default()) };
+    let (robot, approximations) = RobotFile::with_approximations(path)?;
+    approximations.iter().for_each(|line| tracing::warn!("not quite as in MuJoCo: {line}"));
+    Ok(robot)
 }
 
 #[cfg(test)]

@@ -13,6 +13,8 @@ pub enum SimError {
     Mjcf { file: String, source: mjcf_rs::ParseError },
     #[error("`{file}` is not valid XML: {source}")]
     Xml { file: String, source: roxmltree::Error },
+    #[error("`{file}` does not describe a robot: {source}")]
+    RobotDescription { file: String, source: Box<dyn std::error::Error + Send + Sync> },
     #[error("`{path}` is not a mesh that can be read: {source}")]
     Mesh { path: String, source: Box<dyn std::error::Error + Send + Sync> },
     #[error("mesh file `{path}` is of a kind that is not read; use .obj or .stl")]

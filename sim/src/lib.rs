@@ -67,7 +67,7 @@ mod units;
 pub mod world;
 
 pub use body::{
-    ARM_COLUMNS, ARM_JOINTS, BodyEstimate, HAND_COLUMNS, HAND_JOINTS, JOINTS, RobotModel, UPPER,
+    ARM_COLUMNS, ARM_JOINTS, BodyEstimate, HAND_COLUMNS, HAND_JOINTS, JOINTS, RobotModel, RobotSource, UPPER,
     UPPER_JOINTS, WAIST_COLUMN, joint_names,
 };
 pub use error::SimError;

@@ -80,7 +80,7 @@ const fn beside(name: &'static str, left_m: f32) -> RobotSpot {
 /// Plays one case on these seeds.
 pub fn run(
     case: &CarryingCase,
-    robot: &str,
+    robot: &RobotFile,
     controller: &Controller,
     sensing: Sensing,
     seeds: &RangeInclusive<u32>,
@@ -116,13 +116,13 @@ struct CarryResult {
 /// One seed; `None` if a robot fell, or hands lost the bar for good.
 fn trial(
     case: &CarryingCase,
-    robot: &str,
+    robot: &RobotFile,
     controller: &Controller,
     sensing: Sensing,
     seed: u32,
 ) -> Result<Option<CarryResult>, BenchError> {
     let spec = EpisodeSpec {
-        robot: RobotFile::Embedded(robot.into()),
+        robot: robot.clone(),
         locomotion: controller.clone(),
         sensing,
         renderer: RendererKind::Cpu,

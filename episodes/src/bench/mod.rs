@@ -24,7 +24,7 @@ use crate::EpisodeError;
 use crate::batch::BatchError;
 use crate::commands;
 use crate::players::PlayerError;
-use crate::spec::Controller;
+use crate::spec::{Controller, RobotFile};
 
 /// Targets drawn where no file gives any.
 const SAMPLED_TARGETS: usize = 200;
@@ -52,10 +52,10 @@ pub enum BenchError {
     NoEpisodes,
 }
 
-/// Plays the cases whose names contain one of the words of `filter`, separated by commas, on these seeds with the embedded robot of
-/// this name, robots of their own first, then two that carry something between them; calls `done` after each case.
+/// Plays the cases whose names contain one of the words of `filter`, separated by commas, on these seeds, robots on their own first, then
+/// two that carry something between them, if they have fingers; calls `done` after each case.
 pub fn locomotion(
-    robot: &str,
+    robot: &RobotFile,
     controller: &Controller,
     sensing: Sensing,
     filter: &str,
@@ -63,7 +63,11 @@ pub fn locomotion(
     mut done: impl FnMut(&CaseReport),
 ) -> Result<LocomotionReport, BenchError> {
     let choice = controller.load()?;
-    let mut report = bench::run(robot, &choice, sensing, filter, seeds, &mut done)?;
+    let model = robot.model().map_err(|error| Box::new(EpisodeError::from(error)))?;
+    let mut report = bench::run(&robot.kind(), &model, &choice, sensing, filter, seeds, &mut done)?;
+    if !model.has_fingers() {
+        return Ok(report);
+    }
     for case in carrying::CASES.iter().filter(|case| bench::is_asked(filter, case.name)) {
         let carried = carrying::run(case, robot, controller, sensing, seeds)?;
         done(&carried);

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use tandem_sim::{BaseCommand, BaseLimits, RobotCommand, RobotModel, Side, Sides, UPPER, assets};
+use tandem_sim::{BaseCommand, BaseLimits, RobotCommand, RobotSource, Side, Sides, UPPER, assets};
 use tandem_tools_spec::{MoveWrists, Protocol, ToolCall, WalkMove, WristMove};
 
 use super::*;
@@ -14,11 +14,11 @@ use crate::tasks;
 
 /// A robot called A that stands at rest with its pelvis 0.78 m over the world's origin.
 fn standing() -> Motion {
-    let mjcf = assets::robot(assets::DEFAULT_ROBOT).unwrap();
-    let model = Arc::new(RobotModel::parse(assets::DEFAULT_ROBOT, mjcf).unwrap());
+    let source = RobotSource::embedded(assets::DEFAULT_ROBOT).unwrap();
+    let model = Arc::new(source.model.clone());
     let base = BaseCommand { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m: 0.78 };
     let rest = RobotCommand { upper_rad: UPPER.map(|joint| model.joints[joint].rest_rad), base };
-    let body = Arc::new(UpperBody::new(mjcf, &rest).unwrap());
+    let body = Arc::new(UpperBody::new(&source, &rest).unwrap());
     let range = [-1.0, 1.0];
     let base_limits =
         BaseLimits { vx_m_s: range, vy_m_s: range, yaw_rate_rad_s: range, pelvis_height_m: range };

@@ -6,7 +6,8 @@ use tandem_ik::{
     Solver, Task, Tolerance,
 };
 use tandem_sim::{
-    CONTROL_HZ, JOINTS, Pose, RobotCommand, RobotModel, Side, Sides, UPPER, UPPER_JOINTS, joint_names,
+    CONTROL_HZ, JOINTS, Pose, RobotCommand, RobotModel, RobotSource, Side, Sides, UPPER, UPPER_JOINTS,
+    joint_names,
 };
 
 use super::columns;
@@ -37,16 +38,16 @@ pub struct UpperBody {
 }
 
 impl UpperBody {
-    /// Reads the robot's MJCF; `rest` is the command that it stands under.
-    pub fn new(robot_mjcf: &str, rest: &RobotCommand) -> Result<UpperBody, IkError> {
+    /// Of a robot that was read; `rest` is the command that it stands under.
+    pub fn new(robot: &RobotSource, rest: &RobotCommand) -> Result<UpperBody, IkError> {
         let names = joint_names();
-        let model = upper_body(&Model::from_mjcf(robot_mjcf)?)?;
+        let model = upper_body(&Model::from_parsed_mjcf(&robot.document.model)?)?;
         let column_of = |name: &str| (0..UPPER_JOINTS).find(|column| names[UPPER[*column]] == name);
         let columns: Vec<usize> = model.joints().iter().filter_map(|joint| column_of(&joint.name)).collect();
         let rest_rad = columns.iter().map(|column| rest.upper_rad[*column].into()).collect();
         Ok(UpperBody {
             wrists: Sides { left: model.frame("left_wrist")?, right: model.frame("right_wrist")? },
-            self_collision: self_collision(&model)?,
+            self_collision: self_collision(&model, &robot.model)?,
             model,
             columns,
             rest_rad,
@@ -129,24 +130,63 @@ fn is_waist(joint: &str) -> bool {
 pub fn upper_body(whole: &Model) -> Result<Model, IkError> {
     let names = joint_names();
     let columns = (0..UPPER_JOINTS).filter(|column| !columns::is_hand(*column));
-    let free: Vec<&str> = columns.map(|column| names[UPPER[column]].as_str()).collect();
+    let has = |name: &&str| whole.joints().iter().any(|joint| joint.name == *name);
+    let free: Vec<&str> = columns.map(|column| names[UPPER[column]].as_str()).filter(has).collect();
     whole.reduced(&free, &vec![0.0; whole.nv()])
 }
 
-/// Trunk, head, forearms and hands as capsules, a little inside the collision shapes of the robot's file.
-fn self_collision(model: &Model) -> Result<SelfCollision, IkError> {
-    let capsule = |frame: &str, a: [f64; 3], b: [f64; 3], radius_m: f64| -> Result<Capsule, IkError> {
-        Ok(Capsule { frame: model.frame(frame)?, ends: [Point3::from(a), Point3::from(b)], radius_m })
-    };
+/// Capsules that may not meet: trunk, head, then forearm and hand of the left and of the right arm.
+const PAIRS: [[usize; 2]; 10] =
+    [[0, 2], [0, 3], [1, 3], [0, 4], [0, 5], [1, 5], [3, 5], [2, 5], [3, 4], [2, 4]];
+
+fn self_collision(model: &Model, robot: &RobotModel) -> Result<SelfCollision, IkError> {
+    let capsules = g1_capsules(model).or_else(|_| capsules(model, robot))?;
+    Ok(SelfCollision { capsules, pairs: PAIRS.into(), margin_m: 0.005, range_m: 0.08, gain: 0.3 })
+}
+
+fn capsule(model: &Model, frame: &str, ends_m: [[f64; 3]; 2], radius_m: f64) -> Result<Capsule, IkError> {
+    Ok(Capsule { frame: model.frame(frame)?, ends: ends_m.map(Point3::from), radius_m })
+}
+
+/// Those of a G1, a little inside the collision shapes of its file.
+fn g1_capsules(model: &Model) -> Result<Vec<Capsule>, IkError> {
     let mut capsules = vec![
-        capsule("torso_link", [0.0, 0.0, 0.08], [0.0, 0.0, 0.25], 0.10)?,
-        capsule("torso_link", [0.0, 0.0, 0.43], [0.0, 0.0, 0.43], 0.10)?,
+        capsule(model, "torso_link", [[0.0, 0.0, 0.08], [0.0, 0.0, 0.25]], 0.10)?,
+        capsule(model, "torso_link", [[0.0, 0.0, 0.43]; 2], 0.10)?,
     ];
     for side in Side::BOTH {
         let link = |part: &str| format!("{}_{part}_link", side.name());
-        capsules.push(capsule(&link("elbow"), [0.0; 3], [0.10, 0.0, -0.01], 0.035)?);
-        capsules.push(capsule(&link("wrist_yaw"), [0.0; 3], [0.15, 0.0, 0.0], 0.045)?);
+        capsules.push(capsule(model, &link("elbow"), [[0.0; 3], [0.10, 0.0, -0.01]], 0.035)?);
+        capsules.push(capsule(model, &link("wrist_yaw"), [[0.0; 3], [0.15, 0.0, 0.0]], 0.045)?);
     }
-    let pairs = vec![[0, 2], [0, 3], [1, 3], [0, 4], [0, 5], [1, 5], [3, 5], [2, 5], [3, 4], [2, 4]];
-    Ok(SelfCollision { capsules, pairs, margin_m: 0.005, range_m: 0.08, gain: 0.3 })
+    Ok(capsules)
+}
+
+/// Those of a robot whose file calls its links otherwise, by where its joints are: a trunk below the shoulders and as wide, a head around
+/// the camera, a forearm up to the link of the wrist, and that link up to the palm, as thick as a G1's of this size.
+fn capsules(model: &Model, robot: &RobotModel) -> Result<Vec<Capsule>, IkError> {
+    let poses = robot.forward_kinematics(Pose::IDENTITY, &[0.0; JOINTS]);
+    let (name, size) = (|link: usize| &robot.links[link].name, f64::from(robot.scale.length_m(1.0)));
+    let numbers = |point_m: tandem_sim::Vector| point_m.to_array().map(f64::from);
+    let link_of = |side: Side, part: &str| {
+        robot.published_link(&format!("{}_{part}_link", side.name())).unwrap_or_default()
+    };
+    let shoulder = &robot.links[link_of(Side::Left, "shoulder_pitch")];
+    let [x, y, z] = numbers(shoulder.parent_from_link.translation);
+    let trunk = name(shoulder.parent.unwrap_or_default());
+    let [ahead, across, up] = numbers(robot.egocentric.body_from_camera.translation);
+    let head = [ahead - 0.1 * size, across, up];
+    let mut capsules = vec![
+        capsule(model, trunk, [[x, 0.0, 0.3 * z], [x, 0.0, z]], 0.95 * y.abs())?,
+        capsule(model, name(robot.egocentric_link), [head; 2], 0.1 * size)?,
+    ];
+    for side in Side::BOTH {
+        let hand = &robot.hands[side];
+        let before = robot.links[hand.wrist].parent.unwrap_or_default();
+        let end_m = poses[before].inverse() * poses[hand.wrist].translation;
+        capsules.push(capsule(model, name(before), [[0.0; 3], numbers(end_m)], 0.035 * size)?);
+        let palm_m = numbers(hand.palm_in_wrist_m);
+        capsules.push(capsule(model, name(hand.wrist), [[0.0; 3], palm_m], 0.045 * size)?);
+    }
+    Ok(capsules)
 }

@@ -53,6 +53,9 @@ const TWO_SITES: &[Parameter] =
     &[Parameter::Object, Parameter::Site { of: 0 }, Parameter::Object, Parameter::Site { of: 2 }];
 const WITHIN: &[Parameter] = &[Parameter::Object, Parameter::Object, Parameter::Number("half_m")];
 
+/// Those that nothing but a hand that closes makes true.
+pub const OF_FINGERS: [&str; 3] = ["holds", "holds_any", "held_by_all"];
+
 /// All of them.
 pub static FUNCTIONS: &[Function] = &[
     // Hands.

@@ -14,7 +14,7 @@ use std::sync::Arc;
 use tandem_sim::ObjectModel;
 
 pub use check::nearest;
-pub use functions::{FUNCTIONS, Function};
+pub use functions::{FUNCTIONS, Function, OF_FINGERS};
 pub use meaning::{Meaning, Number, Truth};
 
 /// What an expression of a task may name.

@@ -95,13 +95,14 @@ pub fn brief(wording: Wording, limits: &BaseLimits) -> Brief {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tandem_sim::body::BodyScale;
     use tandem_sim::mjcf::{Geom, Primitive};
     use tandem_sim::{JOINTS, LocomotionChoice, Pose, RobotModel, Side, Sides, Vector, assets};
 
     use crate::convert::wire_limits;
 
     fn limits() -> BaseLimits {
-        wire_limits(&LocomotionChoice::Balance.limits())
+        wire_limits(&LocomotionChoice::Balance.limits(&BodyScale::G1))
     }
 
     /// Points of a shape, in the frame of its link, and how far it reaches beyond each of them.

@@ -212,7 +212,7 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
         ("hints", |played| played.spec.hints = Hints::Off),
         ("sensing", |played| played.spec.sensing = Sensing::TRUTH),
         ("start", |played| played.spec.start = Start::Checkpoint("other".into())),
-        ("robot", |played| played.spec.robot = RobotFile::File("other.xml".into())),
+        ("robot", |played| played.spec.robot = RobotFile::Embedded("other".into())),
         ("policy", |played| played.policy = "idle".into()),
         ("settings", |played| played.policy.settings = Some(serde_json::json!({ "execute": 25 }))),
         ("extra information", |played| played.policy.extra_information.push("third_person".into())),

@@ -15,6 +15,7 @@ use super::topics::messages::{PhaseMessage, StepError, ToolCallMessage};
 use super::topics::notes::NoteMessage;
 use super::topics::steps::{StepDecoder, state_of};
 use super::{Recorder, checkpoint_name, metadata, topics};
+use crate::error::RobotError;
 use crate::results::RESULT_FILE;
 use crate::scoring::{ScoreMemory, Scores, StepScore};
 use crate::spec::EpisodeSpec;
@@ -75,6 +76,14 @@ pub enum RecordingError {
     Step { path: PathBuf, source: StepError },
     #[error("the objects of the episode cannot be read: {0}")]
     Sim(#[from] SimError),
+    #[error(transparent)]
+    Robot(Box<RobotError>),
+}
+
+impl From<RobotError> for RecordingError {
+    fn from(error: RobotError) -> RecordingError {
+        RecordingError::Robot(Box::new(error))
+    }
 }
 
 impl Recording {

@@ -9,13 +9,12 @@ use tandem_sim::{
     CONTROL_HZ, ObjectPlacement, Pose, Robot, RobotModel, RobotPlacement, Rotation, SceneSource, SimError,
     Step, Vector, World, WorldSpec, assets, heading_rad,
 };
-use xxhash_rust::xxh3::xxh3_64;
 
 use crate::EpisodeError;
 use crate::commands::{Motion, RobotSheet, UpperBody};
 use crate::convert::isometry_from_sim;
-use crate::error::SceneError;
-use crate::spec::{EpisodeSpec, RobotFile};
+use crate::error::{RobotError, SceneError};
+use crate::spec::EpisodeSpec;
 use crate::stress;
 use crate::tasks::{Spread, Task};
 
@@ -42,8 +41,11 @@ pub struct Built {
 /// Reads all files and puts the world together.
 pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
     let locomotion = spec.locomotion.load()?;
-    let mjcf = spec.robot.read()?;
-    let model = Arc::new(RobotModel::parse(&spec.robot.name(), &mjcf)?);
+    let source = spec.robot.load()?;
+    let model = Arc::new(source.model.clone());
+    spec.robot.check_task(&model, spec.task)?;
+    let fits = locomotion.check_robot(&model);
+    fits.map_err(|what| RobotError::Controller { robot: spec.robot.kind(), what })?;
     if !stress::is_possible(spec.stress, spec.task) {
         return Err(EpisodeError::NoOtherWords {
             task: spec.task.id.into(),
@@ -61,7 +63,7 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
         world.set_locomotion(robot, locomotion.controller());
     }
     world.set_sensing(spec.stressed_sensing(), spec.seed);
-    let body = Arc::new(UpperBody::new(&mjcf, &world.rest_command(0))?);
+    let body = Arc::new(UpperBody::new(&source, &world.rest_command(0))?);
     let present = world.present();
     let motion = |(index, robot): (usize, &Robot)| {
         let sheet = RobotSheet {
@@ -73,11 +75,7 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
         Motion::new(sheet, &body, &world.rest_command(index), world_from_pelvis)
     };
     let motions = world.robots().iter().enumerate().map(motion).collect();
-    let robot = match &spec.robot {
-        RobotFile::Embedded(name) => name.clone(),
-        RobotFile::File(_) => format!("{}-{:016x}", spec.robot.name(), xxh3_64(mjcf.as_bytes())),
-    };
-    Ok(Built { world, motions, robot, locomotion: locomotion.name() })
+    Ok(Built { world, motions, robot: spec.robot.identity(), locomotion: locomotion.name() })
 }
 
 /// What the world of an episode is made of.

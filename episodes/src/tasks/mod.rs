@@ -23,6 +23,7 @@ use serde::{Deserialize, Serialize};
 use tandem_sim::{ObjectFile, RobotModel, SimError, SplitMix64, Step};
 
 use crate::EpisodeError;
+use crate::conditions::OF_FINGERS;
 use crate::scoring::{Phase, Scores};
 
 /// Every task, in the benchmark's order.
@@ -229,6 +230,15 @@ impl TaskSet {
             let have = self.all().map(|task| task.id).collect();
             EpisodeError::UnknownTask { id: id.into(), have }
         })
+    }
+}
+
+impl Task {
+    /// Whether its robots have to hold something with a thumb and fingers: those of the benchmark do, and those of files whose conditions
+    /// ask for it.
+    pub fn needs_fingers(&self) -> bool {
+        let asks = |text: &str| OF_FINGERS.iter().any(|name| text.contains(&format!("{name}(")));
+        self.file.as_ref().is_none_or(|file| asks(&file.source.text))
     }
 }
 

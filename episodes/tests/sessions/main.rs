@@ -5,12 +5,12 @@ mod checkpoints;
 mod commands;
 mod common;
 mod felt;
+mod files;
 mod films;
 mod operators;
 mod plans;
 mod recordings;
 mod replays;
-mod scenes;
 #[path = "../../../tests/src/skipped.rs"]
 mod skipped;
 mod stress;

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use tandem::settings::{Layer, Settings};
 use tandem_episodes::evaluation::{self, EpisodeEvent, EvaluationPlan, KeptFiles, Shard, Starts};
 use tandem_episodes::results::PlayedEpisode;
-use tandem_episodes::{RobotFile, Variation};
+use tandem_episodes::Variation;
 use tandem_tools_spec::Protocol;
 
 use crate::players::{PlayedBy, PythonPolicy};
@@ -53,7 +53,7 @@ pub fn evaluate(
         player: &player,
         protocol,
         scene: settings.scene.clone(),
-        robot: RobotFile::default(),
+        robot: settings.robot.clone(),
         locomotion: settings.locomotion.clone(),
         sensing: settings.sensing,
         renderer: settings.renderer,

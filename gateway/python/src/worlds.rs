@@ -242,9 +242,9 @@ pub fn row_columns(actions: &str) -> Vec<String> {
     if actions == ActionKind::Wrists.name() { wrist_columns() } else { action_columns() }
 }
 
-fn limits(episode: &EpisodeSpec, actions: ActionKind) -> Result<Vec<[f32; 2]>, tandem_episodes::SimError> {
+fn limits(episode: &EpisodeSpec, actions: ActionKind) -> Result<Vec<[f32; 2]>, tandem_episodes::RobotError> {
     let model = episode.robot.model()?;
-    let base = episode.locomotion.load()?.limits();
+    let base = episode.locomotion.limits(&episode.robot)?;
     Ok(actions.limits(&model, &base))
 }
 

@@ -48,6 +48,7 @@ class Episode(BaseEpisode):
     stress: What goes wrong; results name it.
     level: How much of it; 1 where nothing is said.
     scene: MJCF file of a scene in place of the task's own.
+    robot: File that describes the robots in place of the embedded one.
     task_file: TOML file with a task of your own, whose id `task` is.
     """
 
@@ -65,6 +66,7 @@ class Episode(BaseEpisode):
         stress: StressAxis | None = None,
         level: StressLevel | None = None,
         scene: str | PathLike[str] | None = None,
+        robot: str | PathLike[str] | None = None,
         task_file: str | PathLike[str] | None = None,
     ) -> None:
         self.task = task
@@ -79,6 +81,7 @@ class Episode(BaseEpisode):
             stress=stress,
             level=level,
             scene=None if scene is None else Path(scene),
+            robot=None if robot is None else Path(robot),
             task_file=None if task_file is None else [str(Path(task_file))],
         )
         self._native: _native.Episode | None = None

@@ -120,6 +120,8 @@ class EvaluationSettings(TypedDict, total=False):
 
     scene: str | PathLike[str] | None
     """MJCF file of a scene in place of the tasks' own."""
+    robot: str | PathLike[str] | None
+    """File that describes the robots in place of the embedded one."""
 
     task_file: str | PathLike[str] | None
     """TOML file with a task of your own, which `tasks` may name."""
@@ -146,7 +148,7 @@ def evaluate(
     jobs: Episodes that run side by side, each on a thread of its own, on which the policy is called. Physics and drawing
         run at the same time; Python code of policies does not.
     settings: `name`, `protocol`, `assistance`, `out`, `record`, `progress`, `renderer`, `state_estimate`, `sensors`, `stress`,
-        `level`, `scene`, `task_file`: see `EvaluationSettings`.
+        `level`, `scene`, `robot`, `task_file`: see `EvaluationSettings`.
     """
     plan = Plan.of(policy, tasks, seeds, settings)
     return plan.evaluated(lambda folder: plan.play(folder, jobs))
@@ -197,6 +199,7 @@ class Plan:
                 raise TandemError(f"results call the player {policy!r} by its own name; leave `name` out")
             name = policy
         out, scene, task_file = settings.get("out"), settings.get("scene"), settings.get("task_file")
+        robot = settings.get("robot")
         return Plan(
             policy=policy,
             name=name or str(getattr(policy, "__qualname__", type(policy).__qualname__)),
@@ -208,6 +211,7 @@ class Plan:
                 stress=settings.get("stress"),
                 level=settings.get("level"),
                 scene=None if scene is None else Path(scene),
+                robot=None if robot is None else Path(robot),
                 task_file=None if task_file is None else [str(Path(task_file))],
             ),
             protocol=settings.get("protocol", "agentic"),

@@ -44,6 +44,7 @@ def serve(
     stress: StressAxis | None = None,
     level: StressLevel | None = None,
     scene: str | PathLike[str] | None = None,
+    robot: str | PathLike[str] | None = None,
     task_file: str | PathLike[str] | None = None,
     max_episodes: int = 8,
     token_file: str | PathLike[str] | None = None,
@@ -59,6 +60,7 @@ def serve(
     stress: What goes wrong; results name it.
     level: How much of it; 1 where nothing is said.
     scene: MJCF file of a scene in place of the tasks' own.
+    robot: File that describes the robots in place of the embedded one.
     task_file: TOML file with a task of your own, beside the built-in ones.
     max_episodes: Episodes that may be held at once.
     token_file: File with the token that every request has to send; an address that other machines reach needs one.
@@ -73,6 +75,7 @@ def serve(
         stress=stress,
         level=level,
         scene=None if scene is None else Path(scene),
+        robot=None if robot is None else Path(robot),
         task_file=None if task_file is None else [str(Path(task_file))],
         max_episodes=max_episodes,
         token_file=None if token_file is None else Path(token_file),

@@ -1,12 +1,17 @@
 //! `tandem locomotion`: the base controller on its own.
 
-use std::{path::PathBuf, process::ExitCode};
+use std::{
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
 use clap::Subcommand;
 use tandem_episodes::{
-    DEFAULT_ROBOT, ROBOTS,
+    DEFAULT_ROBOT, ROBOTS, RobotFile,
     bench::{self, CaseReport},
 };
+
+use crate::settings::read_robot;
 
 use super::{
     CommandResult, Seeds,
@@ -29,8 +34,9 @@ enum LocomotionPart {
         locomotion: LocomotionFlag,
         #[command(flatten)]
         sensing: SensingFlags,
-        /// The robot: with the effort limits of Unitree's MJCF, or of its URDF, which has 35 N m in place of 50 at ankles, waist roll and waist pitch.
-        #[arg(long, value_name = "NAME", value_parser = ROBOTS, default_value = DEFAULT_ROBOT)]
+        /// The robot: `g1_dex3` with the effort limits of Unitree's MJCF, or `g1_dex3_urdf_efforts` with those of its URDF, which has 35 N m
+        /// in place of 50 at ankles, waist roll and waist pitch; or a file that describes another, as for `serve`.
+        #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_ROBOT)]
         robot: String,
         /// Cases whose names contain one of these words, separated by commas.
         #[arg(long, default_value = "", value_name = "WORDS")]
@@ -47,6 +53,10 @@ enum LocomotionPart {
 /// Plays the cases, prints a line per case as it ends and one of what was measured, and writes JSON where it is asked for.
 pub fn run(args: LocomotionArgs) -> CommandResult {
     let LocomotionPart::Bench { locomotion, sensing, robot, cases, seeds, json } = args.part;
+    let robot = match ROBOTS.contains(&robot.as_str()) {
+        true => RobotFile::Embedded(robot),
+        false => read_robot(Some(Path::new(&robot)))?,
+    };
     println!("{}", CaseReport::HEAD);
     let (controller, sensing) = (locomotion.controller(), sensing.sensing());
     let report =

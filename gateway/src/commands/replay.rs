@@ -262,7 +262,7 @@ mod tests {
         write_absurd_robot(&robot);
         let handover = tasks::find("handover").unwrap();
         let spec = EpisodeSpec {
-            robot: RobotFile::File(robot),
+            robot: RobotFile::of(&robot).unwrap(),
             ..EpisodeSpec::new(handover, 0, Protocol::Benchmark)
         };
         let mut session = Session::start(&spec, Some(folder)).unwrap();

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use tandem_episodes::RobotFile;
+use tandem_episodes::{DEFAULT_ROBOT, embedded_robot};
 
 /// The embedded robot with one absurd joint: standing still it does nothing, and to move it takes more torque than numbers
 /// of single precision can say.
 pub fn write_absurd_robot(path: &Path) {
-    let sound = RobotFile::default().read().unwrap();
+    let sound = embedded_robot(DEFAULT_ROBOT).unwrap();
     let elbow = sound.lines().find(|line| line.contains(r#"<position name="right_elbow_joint""#)).unwrap();
     let absurd = r#"<position name="right_elbow_joint" joint="right_elbow_joint" kp="1e38" kv="1e38" forcerange="-1e38 1e38"/>"#;
     std::fs::write(path, sound.replace(elbow, absurd)).unwrap();

@@ -19,7 +19,7 @@ use crate::{
 fn hold(server: &Server, id: &str, robot: &Path, folder: &Path) {
     let handover = tasks::find("handover").unwrap();
     let spec = EpisodeSpec {
-        robot: RobotFile::File(robot.into()),
+        robot: RobotFile::of(robot).unwrap(),
         ..EpisodeSpec::new(handover, 0, Protocol::Benchmark)
     };
     let permit = Arc::new(Semaphore::new(1)).try_acquire_owned().unwrap();

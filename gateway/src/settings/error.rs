@@ -2,7 +2,7 @@
 
 use std::{net::SocketAddr, path::PathBuf};
 
-use tandem_episodes::{InstructionsError, SimError, TaskCheckError, TaskFileError};
+use tandem_episodes::{InstructionsError, RobotError, SimError, TaskCheckError, TaskFileError};
 
 use super::tls::TlsError;
 use crate::token::TokenError;
@@ -71,9 +71,12 @@ pub enum SettingsError {
         /// What happens.
         source: Box<TaskCheckError>,
     },
-    /// The scene, the base controller or the renderer cannot be used.
+    /// The scene, the robot, the base controller or the renderer cannot be used.
     #[error(transparent)]
     Sim(#[from] SimError),
+    /// The robot has changed since it was read.
+    #[error(transparent)]
+    Robot(#[from] RobotError),
     /// The file is no TOML, or holds a setting that does not exist.
     #[error("{path}: {source}")]
     Parse {

@@ -22,8 +22,12 @@ impl Model {
     /// The same, for text that includes files named relative to `folder`.
     pub fn from_mjcf_in(xml: &str, folder: &Path) -> Result<Model, IkError> {
         check_depth(xml)?;
-        let document = mjcf_rs::Model::from_str(xml, folder)?;
-        check_names(&document)?;
+        Model::from_parsed_mjcf(&mjcf_rs::Model::from_str(xml, folder)?)
+    }
+
+    /// The same, for a file that somebody has parsed.
+    pub fn from_parsed_mjcf(document: &mjcf_rs::Model) -> Result<Model, IkError> {
+        check_names(document)?;
         let mut joints: Vec<Joint> = Vec::new();
         let mut frames = Vec::new();
         let mut masses: Vec<Mass> = Vec::new();

@@ -2,9 +2,11 @@
 
 use super::motion::Arms;
 use super::tour::Tour;
+use crate::body::BodyScale;
 use crate::locomotion::BaseVelocity;
 
 /// One situation; a seed draws its arm motion and directions.
+#[derive(Clone)]
 pub struct Case {
     pub name: &'static str,
     pub duration_s: f32,
@@ -15,6 +17,7 @@ pub struct Case {
 }
 
 /// What the base is told.
+#[derive(Clone)]
 pub(super) enum Plan {
     Hold,
     /// The last [`STOP_S`] seconds are a stop.
@@ -28,6 +31,7 @@ pub(super) enum Plan {
 }
 
 /// What else happens.
+#[derive(Clone)]
 pub(super) enum Disturbance {
     None,
     /// A steady force on each hand, in a direction that the seed draws.
@@ -44,6 +48,35 @@ pub(super) enum Disturbance {
     Push {
         force_n: f32,
     },
+}
+
+impl Case {
+    /// The same for a robot of another size: with its speeds and heights, loads and forces.
+    pub(super) fn of_size(&self, scale: &BodyScale) -> Case {
+        let plan = match self.plan.clone() {
+            Plan::Hold => Plan::Hold,
+            Plan::Move(BaseVelocity { vx_m_s, vy_m_s, yaw_rate_rad_s }) => Plan::Move(BaseVelocity {
+                vx_m_s: scale.speed_m_s(vx_m_s),
+                vy_m_s: scale.speed_m_s(vy_m_s),
+                yaw_rate_rad_s: scale.rate_1_s(yaw_rate_rad_s),
+            }),
+            Plan::Squat { high_m, low_m } => {
+                Plan::Squat { high_m: scale.height_m(high_m), low_m: scale.height_m(low_m) }
+            }
+            Plan::Tour(tour) => {
+                Plan::Tour(Tour { punch_n: tour.punch_n.map(|force_n| scale.force_n(force_n)), ..tour })
+            }
+        };
+        let disturbance = match self.disturbance.clone() {
+            Disturbance::None => Disturbance::None,
+            Disturbance::Pull { force_n } => Disturbance::Pull { force_n: scale.force_n(force_n) },
+            Disturbance::LevelPull { force_n, hands, end_s } => {
+                Disturbance::LevelPull { force_n: scale.force_n(force_n), hands, end_s }
+            }
+            Disturbance::Push { force_n } => Disturbance::Push { force_n: scale.force_n(force_n) },
+        };
+        Case { hand_load_kg: scale.force_n(self.hand_load_kg), plan, disturbance, ..self.clone() }
+    }
 }
 
 #[derive(Clone, Copy)]

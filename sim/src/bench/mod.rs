@@ -24,16 +24,16 @@ pub use falls::{Broken, FALL_CASES, FallCase, FallPlace, FallTrial, FallsCase, F
 pub use physics::{PhysicsCase, PhysicsReport, physics};
 pub use pictures::{PicturesCase, PicturesReport, pictures};
 
+use crate::SimError;
 use crate::body::RobotModel;
 use crate::locomotion::LocomotionChoice;
 use crate::robot::Sensing;
-use crate::{SimError, assets};
 use measure::Trial;
 
 /// Results of all cases.
 #[derive(Clone, Debug, Serialize)]
 pub struct LocomotionReport {
-    /// Of [`crate::assets::ROBOTS`].
+    /// Of [`crate::assets::ROBOTS`], or the name of a file.
     pub robot: String,
     /// As recordings call it, with the loop if there is one.
     pub controller: String,
@@ -98,10 +98,11 @@ pub fn is_asked(filter: &str, case: &str) -> bool {
     filter.split(',').any(|word| case.contains(word))
 }
 
-/// Runs every case that `filter` asks for, on these seeds, with the embedded robot of this name; `done` hears of each case as it
-/// ends.
+/// Runs every case that `filter` asks for, on these seeds, with a robot of which results have this name; `done` hears of each case as it
+/// ends. Speeds, heights, loads and forces of the cases are a G1's: a robot of another size has its own.
 pub fn run(
     robot: &str,
+    model: &Arc<RobotModel>,
     choice: &LocomotionChoice,
     sensing: Sensing,
     filter: &str,
@@ -109,9 +110,8 @@ pub fn run(
     mut done: impl FnMut(&CaseReport),
 ) -> Result<LocomotionReport, SimError> {
     let mut cases = Vec::new();
-    let model = Arc::new(RobotModel::parse(robot, assets::robot(robot)?)?);
     for case in CASES.iter().filter(|case| is_asked(filter, case.name)) {
-        let trials = over_seeds(seeds, |seed| trial::run(case, seed, &model, choice.controller(), sensing));
+        let trials = over_seeds(seeds, |seed| trial::run(case, seed, model, choice.controller(), sensing));
         let trials = trials.into_iter().collect::<Result<Vec<_>, _>>()?;
         let report = summarise(case, &trials);
         done(&report);
@@ -228,13 +228,21 @@ impl fmt::Display for CaseReport {
 mod tests {
     use super::*;
     use crate::assets::DEFAULT_ROBOT;
+    use crate::body::posed::model;
     use crate::robot::SensorModel;
 
     #[test]
     fn a_report_says_what_was_measured() {
         let sensing = Sensing { sensors: SensorModel::G1, ..Sensing::TRUTH };
-        let report =
-            run(DEFAULT_ROBOT, &LocomotionChoice::Balance, sensing, "no such case", &(0..=0), |_| {});
+        let report = run(
+            DEFAULT_ROBOT,
+            model(),
+            &LocomotionChoice::Balance,
+            sensing,
+            "no such case",
+            &(0..=0),
+            |_| {},
+        );
         let report = report.unwrap();
         let json = serde_json::to_value(&report).unwrap();
         for (key, value) in [

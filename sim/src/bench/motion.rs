@@ -1,7 +1,10 @@
 //! Arm motion, drawn from the random numbers of a seed.
 
 use crate::Sides;
-use crate::body::{ARM_COLUMNS, ARM_JOINTS, HAND_COLUMNS, HAND_JOINTS, MIRRORED_ARM, UPPER_JOINTS};
+use crate::body::{
+    ARM_COLUMNS, ARM_JOINTS, ARMS, HAND_COLUMNS, HAND_JOINTS, JointModel, MIRRORED_ARM, RobotModel,
+    UPPER_JOINTS,
+};
 use crate::random::SplitMix64;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -25,6 +28,8 @@ const FIST_LEFT_RAD: [f32; HAND_JOINTS] = [0.0, 0.0, 2.3, -2.1, -2.3, -2.1, -2.3
 /// Joint targets over time.
 pub(super) struct ArmMotion {
     waves: Sides<[Wave; ARM_JOINTS]>,
+    /// An arm that lacks joints is held as at rest: the same angles would take it elsewhere.
+    held_out: bool,
     closes: bool,
 }
 
@@ -43,7 +48,7 @@ impl Wave {
 }
 
 impl ArmMotion {
-    pub(super) fn new(arms: Arms, random: &mut SplitMix64) -> ArmMotion {
+    pub(super) fn new(arms: Arms, model: &RobotModel, random: &mut SplitMix64) -> ArmMotion {
         let amplitude_rad = if arms == Arms::Waving { [0.1, 0.35] } else { [0.0, 0.03] };
         let mut wave = || Wave {
             amplitude_rad: random.uniform(amplitude_rad),
@@ -51,7 +56,8 @@ impl ArmMotion {
             phase_rad: random.uniform([0.0, 6.3]),
         };
         let waves = Sides::from_fn(|_| std::array::from_fn(|_| wave()));
-        ArmMotion { waves, closes: arms == Arms::Closing }
+        let whole = |first: usize| model.joints[first..first + ARM_JOINTS].iter().all(JointModel::exists);
+        ArmMotion { waves, held_out: ARMS.into_iter().all(whole), closes: arms == Arms::Closing }
     }
 
     pub(super) fn at(&self, rest_rad: &[f32; UPPER_JOINTS], time_s: f32) -> [f32; UPPER_JOINTS] {
@@ -61,6 +67,7 @@ impl ArmMotion {
             for (i, wave) in waves.into_iter().enumerate() {
                 let forward = FORWARD_LEFT_RAD[i] * if MIRRORED_ARM[i] { side.sign() } else { 1.0 };
                 let column = ARM_COLUMNS[side] + i;
+                let forward = if self.held_out { forward } else { rest_rad[column] };
                 q_rad[column] += part * (forward - rest_rad[column] + wave.at(time_s));
             }
         }

@@ -6,6 +6,7 @@ use crate::locomotion::{BaseCommand, BaseLimits};
 use crate::random::SplitMix64;
 
 /// Parameters of a tour.
+#[derive(Clone)]
 pub(super) struct Tour {
     pub waypoints: usize,
     pub half_side_m: f32,

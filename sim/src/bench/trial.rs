@@ -9,7 +9,7 @@ use super::cases::{Case, Disturbance, PULL_RISE_S, Plan, PulledHands, STOP_S};
 use super::measure::{SETTLE_S, Sample, Trial, measure};
 use super::motion::ArmMotion;
 use super::tour::{self, Leg};
-use crate::body::{PALM_IN_WRIST_M, RobotModel};
+use crate::body::RobotModel;
 use crate::locomotion::{BaseCommand, BaseVelocity, Locomotion};
 use crate::plane::{heading_rad, wrapped_rad};
 use crate::random::SplitMix64;
@@ -28,17 +28,18 @@ pub(super) fn run(
     locomotion: Box<dyn Locomotion>,
     sensing: Sensing,
 ) -> Result<Trial, SimError> {
+    let case = &case.of_size(&model.scale);
     let placement = RobotPlacement { name: "A".into(), position_m: [0.0, 0.0], yaw_rad: 0.0 };
     let spec = WorldSpec { scene: "floor".into(), robots: vec![placement], objects: vec![] };
     let mut world = World::with_robot(&spec, model.clone())?;
     world.set_locomotion(0, locomotion);
     world.set_sensing(sensing, seed);
     let mut random = SplitMix64(seed.into());
-    let arms = ArmMotion::new(case.arms, &mut random);
+    let arms = ArmMotion::new(case.arms, model, &mut random);
     let legs = if let Plan::Tour(tour) = &case.plan { tour::legs(tour, &mut random) } else { Vec::new() };
     let direction = pull_direction(&mut random);
     for side in Side::BOTH {
-        world.load_hand(0, side, case.hand_load_kg, PALM_IN_WRIST_M);
+        world.load_hand(0, side, case.hand_load_kg, model.hands[side].palm_in_wrist_m);
     }
     let rest = world.rest_command(0);
     let feet = world.robots()[0].model.soles.each_ref().map(|sole| sole.link);
@@ -122,7 +123,8 @@ fn disturb(case: &Case, world: &mut World, seed: u32, direction: Vector, legs: &
         Disturbance::Push { force_n } if (5.0..5.0 + PUSH_S).contains(&time_s) => {
             let angle = TAU * seed as f32 / 8.0;
             let force_n = Vector::new(angle.cos(), angle.sin(), 0.0) * *force_n;
-            world.push(0, "torso_link", Vector::new(0.0, 0.0, 0.1), force_n);
+            let point_m = Vector::new(0.0, 0.0, world.robots()[0].model.scale.length_m(0.1));
+            push_published(world, "torso_link", point_m, force_n);
         }
         _ => {}
     }
@@ -130,17 +132,26 @@ fn disturb(case: &Case, world: &mut World, seed: u32, direction: Vector, legs: &
         let leg = ((time_s / tour.leg_s) as usize).min(legs.len() - 1);
         let within_s = time_s - leg as f32 * tour.leg_s - legs[leg].punch_at_s;
         if (0.0..tour.punch_s - 0.5 * DT_S).contains(&within_s) {
-            world.push(0, legs[leg].punched_link, Vector::ZERO, legs[leg].punch_n);
+            push_published(world, legs[leg].punched_link, Vector::ZERO, legs[leg].punch_n);
         }
     }
+}
+
+/// Pushes the link that the embedded robot's file calls so, during the next control step.
+fn push_published(world: &mut World, name: &str, point_in_link_m: Vector, force_n: Vector) {
+    let model = &world.robots()[0].model;
+    let link = &model.links[model.published_link(name).unwrap_or_default()];
+    let link = link.name.clone();
+    world.push(0, &link, point_in_link_m, force_n);
 }
 
 /// Pulls at the palms of these hands during the next control step.
 fn pull(world: &mut World, sides: &[Side], force_n: Vector) {
     for side in sides {
         let model = &world.robots()[0].model;
-        let link = model.links[model.hands[*side].wrist].name.clone();
-        world.push(0, &link, PALM_IN_WRIST_M, force_n);
+        let hand = &model.hands[*side];
+        let (link, palm_m) = (model.links[hand.wrist].name.clone(), hand.palm_in_wrist_m);
+        world.push(0, &link, palm_m, force_n);
     }
 }
 

@@ -8,9 +8,6 @@ use rapier3d::math::{Pose, Vector};
 use super::{JOINTS, LEG_JOINTS, LEGS, RobotModel, SiteModel, WAIST_JOINTS};
 use crate::{GRAVITY_M_S2, Side, Sides};
 
-/// Middle of the palm, where loads of the hands act, in the frame of the link that carries the wrist.
-pub(crate) const PALM_IN_WRIST_M: Vector = Vector::new(0.12, 0.0, 0.0);
-
 /// What a robot takes its own body to be, which is what a controller may know: joint readings, link poses, centre of
 /// mass. The world frame is where the robot believes it to be.
 pub struct BodyEstimate {
@@ -105,7 +102,7 @@ impl BodyEstimate {
         }
         let palm_velocity_m_s = model.hands.each_ref().map(|hand| {
             let LinkMotion { velocity_m_s, spin_rad_s } = motions[hand.wrist];
-            velocity_m_s + spin_rad_s.cross(world_from_link[hand.wrist].rotation * PALM_IN_WRIST_M)
+            velocity_m_s + spin_rad_s.cross(world_from_link[hand.wrist].rotation * hand.palm_in_wrist_m)
         });
         BodyEstimate {
             model: Arc::clone(model),
@@ -137,7 +134,7 @@ impl BodyEstimate {
 
     /// Middle of each palm, where loads of the hands are taken to act.
     pub fn palms_m(&self) -> Sides<Vector> {
-        self.model.hands.each_ref().map(|hand| self.world_from_link[hand.wrist] * PALM_IN_WRIST_M)
+        self.model.hands.each_ref().map(|hand| self.world_from_link[hand.wrist] * hand.palm_in_wrist_m)
     }
 
     pub fn world_from_pelvis(&self) -> Pose {

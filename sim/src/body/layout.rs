@@ -1,7 +1,6 @@
 //! The published order of joints and of the action row.
 
-use super::RobotModel;
-use crate::{Side, Sides, SimError};
+use crate::{Side, Sides};
 
 /// Joints of the robot in published order.
 pub const JOINTS: usize = 43;
@@ -11,6 +10,8 @@ pub(crate) const LEG_JOINTS: usize = 6;
 pub(crate) const WAIST_JOINTS: usize = 3;
 pub const ARM_JOINTS: usize = 7;
 pub const HAND_JOINTS: usize = 7;
+/// Of a hand's joints the first.
+pub(crate) const THUMB_JOINTS: usize = 3;
 
 /// First joint of each group in published order: left leg, right leg, waist, left arm, left hand, right arm, right hand.
 pub(crate) const LEGS: Sides<usize> = Sides { left: 0, right: 6 };
@@ -78,14 +79,3 @@ pub const UPPER: [usize; UPPER_JOINTS] = {
     }
     order
 };
-
-/// Fails unless a robot file's actuators are the published joints in the published order.
-pub(crate) fn check_joint_order(file: &str, model: &RobotModel) -> Result<(), SimError> {
-    let have: Vec<&str> = model.joints.iter().map(|joint| joint.name.as_str()).collect();
-    if have == joint_names() {
-        return Ok(());
-    }
-    let expected = joint_names().join(", ");
-    let what = format!("actuators must be these joints in this order: {expected}");
-    Err(SimError::Unsupported { file: file.into(), what })
-}

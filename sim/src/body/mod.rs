@@ -17,12 +17,10 @@ pub use layout::{
     ARM_COLUMNS, ARM_JOINTS, HAND_COLUMNS, HAND_JOINTS, JOINTS, UPPER, UPPER_JOINTS, WAIST_COLUMN,
     joint_names,
 };
-pub use model::{HandLinks, JointModel, LinkModel, RobotModel, SiteModel};
+pub use model::{BodyScale, HandLinks, JointModel, LinkModel, RobotModel, RobotSource, SiteModel};
 
-pub(crate) use estimate::{KnownOfBody, LinkMotion, PALM_IN_WRIST_M, PelvisMotion};
-pub(crate) use layout::{
-    ARMS, HANDS, LEG_JOINTS, LEGS, MIRRORED_ARM, WAIST, WAIST_JOINTS, check_joint_order,
-};
+pub(crate) use estimate::{KnownOfBody, LinkMotion, PelvisMotion};
+pub(crate) use layout::{ARMS, HANDS, LEG_JOINTS, LEGS, MIRRORED_ARM, WAIST, WAIST_JOINTS};
 
 /// Spring, damper and feedforward of one joint for one physics step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

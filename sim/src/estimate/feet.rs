@@ -70,6 +70,7 @@ impl Foot {
         dt_s: f32,
     ) {
         let down = world_from_pelvis.inverse() * -Vector::Z;
+        let lifted_n = model.scale.force_n(LIFTED_N);
         let lowest_m = Sides::from_fn(|side| {
             let pelvis_from_foot = &pelvis_from_link[feet[side].link];
             let corners_m = model.sole_corners_m[side].iter();
@@ -84,9 +85,10 @@ impl Foot {
             let moved_m = foot.press(model, side, &wrench, pelvis_from_link[foot.link].rotation, dt_s);
             let axes = world_from_pelvis * pelvis_from_link[foot.link].rotation;
             foot.point_m += (axes * moved_m).as_dvec3();
-            let loaded = (foot.force_n - LIFTED_N) / (STANDING_N - LIFTED_N);
+            let loaded = (foot.force_n - lifted_n) / (model.scale.force_n(STANDING_N) - lifted_n);
+            let higher_m = model.scale.length_m(HIGHER_M);
             let above_m = lowest_m[side] - lowest_m[side.other()];
-            let low = 1.0 - (above_m - 0.5 * HIGHER_M) / (0.5 * HIGHER_M);
+            let low = 1.0 - (above_m - 0.5 * higher_m) / (0.5 * higher_m);
             foot.contact_share = f64::from(loaded.min(low).clamp(0.0, 1.0));
         }
     }
@@ -104,7 +106,7 @@ impl Foot {
         let middle_m = model.soles[side].link_from_site.translation;
         let force_n = pelvis_from_foot.inverse() * wrench.force_n;
         let moment_n_m = pelvis_from_foot.inverse() * wrench.moment_n_m;
-        let point_m = if force_n.z > LIFTED_N {
+        let point_m = if force_n.z > model.scale.force_n(LIFTED_N) {
             let x = (middle_m.z * force_n.x - moment_n_m.y) / force_n.z;
             let y = (middle_m.z * force_n.y + moment_n_m.x) / force_n.z;
             let corners_m = &model.sole_corners_m[side];

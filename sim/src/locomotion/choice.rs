@@ -8,6 +8,7 @@ use std::sync::Arc;
 use super::{Agile, Network};
 use super::{Balance, BaseLimits, Locomotion};
 use crate::SimError;
+use crate::body::{BodyScale, RobotModel};
 
 /// Cheap to clone: a file is read and checked once, and robots share its network.
 #[derive(Clone, Debug, Default)]
@@ -35,9 +36,26 @@ impl LocomotionChoice {
         }
     }
 
-    /// Base commands that such a controller follows.
-    pub fn limits(&self) -> BaseLimits {
-        self.controller().limits()
+    /// Base commands that such a controller follows with a robot of this size.
+    pub fn limits(&self, scale: &BodyScale) -> BaseLimits {
+        self.controller().limits(scale)
+    }
+
+    /// Whether such a controller can move this robot; the text says why not.
+    #[cfg(feature = "onnx")]
+    pub fn check_robot(&self, model: &RobotModel) -> Result<(), String> {
+        match self {
+            LocomotionChoice::Balance => Ok(()),
+            LocomotionChoice::Onnx { .. } => Agile::check_robot(model),
+        }
+    }
+
+    /// Whether such a controller can move this robot; ours can.
+    #[cfg(not(feature = "onnx"))]
+    pub fn check_robot(&self, _model: &RobotModel) -> Result<(), String> {
+        match self {
+            LocomotionChoice::Balance => Ok(()),
+        }
     }
 
     /// What recordings and results call it: `balance`, or the file's name with a hash of its content, and the loop if there is one.

@@ -13,7 +13,7 @@ pub use choice::LocomotionChoice;
 use serde::{Deserialize, Serialize};
 
 use crate::Sides;
-use crate::body::{BodyEstimate, JointDrive, LEG_JOINTS, WAIST_JOINTS};
+use crate::body::{BodyEstimate, BodyScale, JointDrive, LEG_JOINTS, WAIST_JOINTS};
 
 /// What a policy asks of the base, in the robot's own heading frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -74,7 +74,8 @@ pub type LegCommand = Sides<[JointDrive; LEG_JOINTS]>;
 
 /// A base controller. It sees its own robot only, and acts through joint drives of legs and waist only.
 pub trait Locomotion: Send {
-    fn limits(&self) -> BaseLimits;
+    /// Of a robot of this size.
+    fn limits(&self, scale: &BodyScale) -> BaseLimits;
 
     /// One physics step.
     fn tick(&mut self, body: &BodyEstimate, command: &BaseCommand, dt_s: f32) -> LegCommand;

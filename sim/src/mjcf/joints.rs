@@ -5,8 +5,11 @@ use mjcf_rs::body::JointType;
 use mjcf_rs::extras::{Actuator as ActuatorElement, ActuatorKind as Kind};
 use rapier3d::glamx::DVec3;
 
+use std::collections::BTreeMap;
+
 use super::Document;
 use super::source::MjcfText;
+use super::stated::stated;
 use crate::SimError;
 use crate::dynamics::Axis;
 
@@ -64,6 +67,47 @@ pub(super) fn speed_limits(source: &MjcfText) -> Result<Option<Vec<f64>>, SimErr
         words.filter_map(|word| word.parse().ok()).collect()
     };
     Ok(limits.map(words))
+}
+
+/// Ranges by the names of joints that `mjcf-rs` reads past.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct UnreadRanges {
+    /// `actuatorfrcrange` of a joint: what all its actuators do to it stays within.
+    effort: BTreeMap<String, [f64; 2]>,
+    /// `inheritrange` of a position actuator: its `ctrlrange` is the joint's range, so many times as wide.
+    inherited_share: BTreeMap<String, f64>,
+}
+
+impl UnreadRanges {
+    pub fn of(source: &MjcfText) -> Result<UnreadRanges, SimError> {
+        let xml = source.xml()?;
+        let mut found = UnreadRanges::default();
+        let acts = |node: &roxmltree::Node| {
+            node.ancestors().any(|one| one.has_tag_name("worldbody") || one.has_tag_name("actuator"))
+        };
+        for node in xml.descendants().filter(acts) {
+            // The table of support has let only numbers pass.
+            let numbers = |attribute: &str| -> Vec<f64> {
+                let words = stated(&node, attribute).unwrap_or_default().split_ascii_whitespace();
+                words.filter_map(|word| word.parse().ok()).collect()
+            };
+            if node.has_tag_name("joint")
+                && let Some(name) = node.attribute("name")
+                && let [low, high] = numbers("actuatorfrcrange")[..]
+                && stated(&node, "actuatorfrclimited") != Some("false")
+            {
+                found.effort.insert(name.into(), [low, high]);
+            }
+            if node.has_tag_name("position")
+                && let Some(joint) = node.attribute("joint")
+                && let [share] = numbers("inheritrange")[..]
+                && share > 0.0
+            {
+                found.inherited_share.insert(joint.into(), share);
+            }
+        }
+        Ok(found)
+    }
 }
 
 impl LinkJoint {
@@ -144,13 +188,32 @@ impl Document {
             );
             return Err(self.unsupported(what));
         }
+        let own_range = limits("ctrl", element.ctrl_limited, element.ctrl_range)?;
         Ok(Actuator {
-            control_range: limits("ctrl", element.ctrl_limited, element.ctrl_range)?,
-            effort_range,
+            control_range: own_range.or(self.inherited_range(&joint)?),
+            effort_range: self.effort_range(&joint, effort_range),
             speed_limit,
             joint,
             kind,
         })
+    }
+
+    /// The efforts that a joint takes, by itself and by an actuator's range, if it has one.
+    pub fn effort_range(&self, joint: &str, of_actuator: Option<[f64; 2]>) -> Option<[f64; 2]> {
+        match (self.unread.effort.get(joint), of_actuator) {
+            (Some([low, high]), Some([least, most])) => Some([low.max(least), high.min(most)]),
+            (own, of_actuator) => own.copied().or(of_actuator),
+        }
+    }
+
+    /// The range of commands that a position actuator takes from its joint.
+    fn inherited_range(&self, joint: &str) -> Result<Option<[f64; 2]>, SimError> {
+        let Some(share) = self.unread.inherited_share.get(joint) else { return Ok(None) };
+        let [low, high] = self.axis_joint(joint)?.range.ok_or_else(|| {
+            self.unsupported(format!("actuator of joint `{joint}` inherits a range that the joint has not"))
+        })?;
+        let (middle, half) = (0.5 * (low + high), 0.5 * share * (high - low));
+        Ok(Some([middle - half, middle + half]))
     }
 
     /// A hinge or slide by name.

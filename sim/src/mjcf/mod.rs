@@ -11,6 +11,7 @@ mod geometry;
 mod joints;
 mod key;
 mod source;
+mod stated;
 mod support;
 #[cfg(test)]
 mod tests;
@@ -32,6 +33,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use crate::SimError;
 use check::Checked;
+use joints::UnreadRanges;
 use source::MjcfText;
 
 /// A parsed file. What it says is all in effect, or it would not have been read.
@@ -42,6 +44,7 @@ pub struct Document {
     pub cameras: Vec<MjcfCamera>,
     /// How fast the motors turn, in the order of the actuators, where the file says so.
     speed_limit_values: Option<Vec<f64>>,
+    unread: UnreadRanges,
     source: MjcfText,
     checked: Checked,
     /// The folder in which files lie that it names.
@@ -81,6 +84,7 @@ impl Document {
             model,
             cameras: frames::cameras(&source)?,
             speed_limit_values: joints::speed_limits(&source)?,
+            unread: UnreadRanges::of(&source)?,
             source,
             checked,
             folder: folder.into(),
@@ -112,7 +116,10 @@ impl Document {
     /// Tells files of different content apart, with all that they include and name; comments do not count.
     pub fn fingerprint(&self) -> u64 {
         let read = (&self.model, &self.cameras, &self.meshes, &self.texture_rgb, &self.speed_limit_values);
-        let content = format!("{read:?}");
+        let mut content = format!("{read:?}");
+        if self.unread != UnreadRanges::default() {
+            content += &format!("{:?}", self.unread);
+        }
         xxh3_64(content.as_bytes())
     }
 

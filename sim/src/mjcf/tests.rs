@@ -402,3 +402,31 @@ fn included_files_keep_their_lines_and_are_read_once() {
     let error = read("box.xml").expect_err("an include that is an include").to_string();
     assert!(error.contains("root.xml:1`: an included file is no <include> itself"), "{error}");
 }
+
+/// A joint's own limit of effort counts with its actuators', and a position actuator may take its commands' range from the joint, whoever
+/// states it: the element, or a class that it has or inherits.
+#[test]
+fn limits_are_those_of_joint_and_actuator_together() {
+    let found = document(
+        r#"<default>
+             <position inheritrange="1"/>
+             <default class="leg"><joint actuatorfrcrange="-20 20"/>
+               <default class="shin"><joint armature="0.1"/></default></default>
+           </default>
+           <worldbody><body childclass="shin"><joint name="knee" range="-1 2"/><geom size="0.1"/>
+             <body><joint name="ankle" class="leg" range="0 1" actuatorfrcrange="-30 30"/><geom size="0.1"/></body>
+           </body></worldbody>
+           <actuator>
+             <position joint="knee" kp="1" kv="1" forcerange="-50 50"/>
+             <position joint="ankle" kp="1" kv="1" forcerange="-5 5" inheritrange="0.5"/>
+           </actuator>"#,
+    );
+    let ranges: Vec<_> = found
+        .actuators()
+        .expect("actuators")
+        .into_iter()
+        .map(|actuator| (actuator.effort_range, actuator.control_range))
+        .collect();
+    let expected = [(Some([-20.0, 20.0]), Some([-1.0, 2.0])), (Some([-5.0, 5.0]), Some([0.25, 0.75]))];
+    assert_eq!(ranges, expected);
+}

@@ -6,18 +6,24 @@ use crate::dynamics::{Drive, Tree};
 /// Coordinates (rad) and velocities (rad/s).
 pub(super) fn read(tree: &Tree, model: &RobotModel) -> ([f32; JOINTS], [f32; JOINTS]) {
     let of = |value: fn(&Tree, usize) -> f64| {
-        std::array::from_fn(|joint| value(tree, model.joints[joint].link) as f32)
+        std::array::from_fn(|joint| of_joint(model, joint, |link| value(tree, link)))
     };
     (of(Tree::joint_position), of(Tree::joint_velocity))
 }
 
 /// Torques that the drives exerted in the last step, limits and implicit parts included (N m).
 pub(super) fn torques_n_m(tree: &Tree, model: &RobotModel) -> [f32; JOINTS] {
-    std::array::from_fn(|joint| tree.drive_effort(model.joints[joint].link) as f32)
+    std::array::from_fn(|joint| of_joint(model, joint, |link| tree.drive_effort(link)))
+}
+
+/// 0 of a joint that the robot lacks.
+fn of_joint(model: &RobotModel, joint: usize, value: impl Fn(usize) -> f64) -> f32 {
+    let joint = &model.joints[joint];
+    if joint.exists() { value(joint.link) as f32 } else { 0.0 }
 }
 
 pub(super) fn drive(tree: &mut Tree, model: &RobotModel, drives: &[JointDrive; JOINTS]) {
-    for (joint, drive) in model.joints.iter().zip(drives) {
+    for (joint, drive) in model.joints.iter().zip(drives).filter(|(joint, _)| joint.exists()) {
         let drive = Drive {
             target: f64::from(drive.target_rad),
             kp: f64::from(drive.kp_n_m_rad),

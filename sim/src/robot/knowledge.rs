@@ -6,7 +6,7 @@ use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
 
 use super::sensors::{SensorModel, Sensors};
-use crate::body::{BodyEstimate, KnownOfBody, PALM_IN_WRIST_M, RobotModel, WAIST_JOINTS};
+use crate::body::{BodyEstimate, KnownOfBody, RobotModel, WAIST_JOINTS};
 use crate::dynamics::Tree;
 use crate::estimate::{SensorReadings, StateEstimator};
 use crate::mechanism::rounded;
@@ -122,7 +122,7 @@ fn from_truth(model: &Arc<RobotModel>, tree: &Tree, readings: &SensorReadings) -
         world_from_link.push(rounded(&world));
     }
     let palm_velocity_m_s = model.hands.each_ref().map(|hand| {
-        let palm_m = tree.world_from_link(hand.wrist) * PALM_IN_WRIST_M.as_dvec3();
+        let palm_m = tree.world_from_link(hand.wrist) * hand.palm_in_wrist_m.as_dvec3();
         tree.point_velocity_m_s(hand.wrist, palm_m).as_vec3()
     });
     BodyEstimate {

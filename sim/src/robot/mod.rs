@@ -67,7 +67,7 @@ const FALLEN_TILT_COSINE: f64 = 0.5;
 impl Robot {
     /// Base commands that this robot can follow.
     pub fn base_limits(&self) -> BaseLimits {
-        self.locomotion.limits()
+        self.locomotion.limits(&self.model.scale)
     }
 
     pub(crate) fn set_locomotion(&mut self, locomotion: Box<dyn Locomotion>) {
@@ -89,7 +89,8 @@ impl Robot {
         // The simulator's word, whatever the robot takes itself to be: it is scored, and ends what its legs can do.
         let pelvis = tree.world_from_link(0);
         let upright = (pelvis.rotation * DVec3::Z).z;
-        self.memory.fallen |= pelvis.translation.z < FALLEN_HEIGHT_M || upright < FALLEN_TILT_COSINE;
+        self.memory.fallen |= pelvis.translation.z < self.model.scale.precise_height_m(FALLEN_HEIGHT_M)
+            || upright < FALLEN_TILT_COSINE;
     }
 
     /// The body as it was known when this robot's memory was made.

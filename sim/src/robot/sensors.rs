@@ -138,7 +138,7 @@ impl Sensors {
             None => ideal.clone(),
         };
         self.last_ideal = Some(ideal);
-        for joint in 0..JOINTS {
+        for joint in (0..JOINTS).filter(|joint| model.joints[*joint].exists()) {
             read.joints.q_rad[joint] += self.random.normal() * noise.encoder_rad;
             read.joints.torque_n_m[joint] += self.random.normal() * noise.torque_n_m;
         }

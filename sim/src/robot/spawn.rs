@@ -8,7 +8,7 @@ use super::hand_loads::HandLoads;
 use super::knowledge::{SelfKnowledge, Sensing};
 use super::{Robot, RobotMemory};
 use crate::SimError;
-use crate::body::{self, RobotModel, UPPER, check_joint_order};
+use crate::body::{self, RobotModel, UPPER};
 use crate::dynamics::{Axis, DVec3, Dynamics, Joint, Link, Mass, Tree};
 use crate::locomotion::{Balance, BaseCommand};
 use crate::mechanism::{add_collider, precise};
@@ -30,13 +30,12 @@ impl Robot {
         placement: &RobotPlacement,
         index: usize,
     ) -> Result<Robot, SimError> {
-        check_joint_order(&placement.name, model)?;
         let q_rad = model.rest_rad();
         let pelvis = standing_pelvis(model, placement, &q_rad);
         let links = model.links.iter().map(|link| tree_link(model, link)).collect();
         let mut tree = Tree::new(&placement.name, links)?;
         tree.set_base(precise(&pelvis), DVec3::ZERO, DVec3::ZERO);
-        for (joint, q_rad) in model.joints.iter().zip(&q_rad) {
+        for (joint, q_rad) in model.joints.iter().zip(&q_rad).filter(|(joint, _)| joint.exists()) {
             tree.set_joint(joint.link, f64::from(*q_rad), 0.0);
         }
         let tree = dynamics.add_tree(tree);

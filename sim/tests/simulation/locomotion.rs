@@ -1,13 +1,18 @@
 //! The default base controller walks, carries, gives way and comes back, bit for bit again.
 
+use std::sync::Arc;
+
 use tandem_sim::assets::DEFAULT_ROBOT;
 use tandem_sim::{
-    BaseCommand, LocomotionChoice, RobotCommand, RobotPlacement, Sensing, World, WorldSpec, bench,
+    BaseCommand, LocomotionChoice, RobotCommand, RobotPlacement, RobotSource, Sensing, World, WorldSpec,
+    bench,
 };
 
 fn report(case: &str, seeds: usize) -> bench::CaseReport {
+    let robot = RobotSource::embedded(DEFAULT_ROBOT).unwrap();
     let report = bench::run(
         DEFAULT_ROBOT,
+        &Arc::new(robot.model),
         &LocomotionChoice::Balance,
         Sensing::default(),
         case,

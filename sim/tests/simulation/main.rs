@@ -8,4 +8,5 @@ mod motors;
 mod odometry;
 mod peer_scenes;
 mod render;
+mod robots;
 mod world;

@@ -205,7 +205,7 @@ fn an_episode_begins_again_at_a_moment_of_another() {
     let _ = players::find("expert").unwrap().play(&spec, &mut episode);
     episode.session.close();
     let recording = folder.path().join(Recorder::FILE_NAME);
-    let moment = MomentStart { recording: recording.clone(), control_step: 200, before_s: 3 };
+    let moment = MomentStart { recording: recording.clone(), control_step: 200, before_s: Some(3) };
     let again = EpisodeSpec { start: Start::Moment(moment), protocol: Protocol::Agentic, ..spec };
     let other = tempfile::tempdir().unwrap();
     let mut session = Session::start(&again, Some(other.path())).unwrap();

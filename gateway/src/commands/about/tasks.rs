@@ -6,7 +6,7 @@ use std::{
     process::ExitCode,
 };
 
-use tandem_episodes::{LocomotionChoice, check_task, create_private_folder, read_task, task_set};
+use tandem_episodes::{BodyScale, LocomotionChoice, check_task, create_private_folder, read_task, task_set};
 use tandem_tools_spec::TaskList;
 
 use crate::commands::{CommandResult, Seeds, print};
@@ -47,7 +47,7 @@ pub fn run(args: TasksArgs) -> CommandResult {
     if let Some(TasksAction::Check(args)) = args.action {
         return check(args);
     }
-    let limits = LocomotionChoice::default().limits();
+    let limits = LocomotionChoice::default().limits(&BodyScale::G1);
     let list = tandem_episodes::task_list(&task_set(Vec::new()), None, &limits);
     let text = match args.json {
         true => serde_json::to_string_pretty(&list)? + "\n",
@@ -60,7 +60,11 @@ pub fn run(args: TasksArgs) -> CommandResult {
 /// The program fails if something falls.
 fn check(args: CheckArgs) -> CommandResult {
     let task = read_task(&args.file)?;
-    let own = tandem_episodes::task_list(&task_set(vec![task]), None, &LocomotionChoice::default().limits());
+    let own = tandem_episodes::task_list(
+        &task_set(vec![task]),
+        None,
+        &LocomotionChoice::default().limits(&BodyScale::G1),
+    );
     let own = TaskList { tasks: own.tasks.into_iter().filter(|info| info.id == task.id).collect(), ..own };
     print(&told(&own))?;
     let folder = args.out.unwrap_or_else(|| Path::new("runs/tasks").join(task.id));

@@ -1,8 +1,8 @@
-//! What the settings name: limits, the token, the certificate, instructions, files of tasks, the base controller and the scene.
+//! What the settings name: limits, the token, the certificate, instructions, files of tasks, the base controller, the robot and the scene.
 
 use std::path::Path;
 
-use tandem_episodes::{EpisodeError, SceneError, SceneFile};
+use tandem_episodes::{EpisodeError, RobotFile, SceneError, SceneFile};
 
 use super::{Finding, Findings, specs, trial};
 use crate::{
@@ -34,6 +34,9 @@ pub fn check(layer: &Layer, token: Result<Option<Token>, String>) -> Findings {
         let loaded = layer.controller().load().map_err(|error| error.to_string());
         findings.push(("locomotion", Finding::of(loaded.map(|_| format!("{} is read", path.display())))));
     }
+    if let Some(path) = &layer.robot {
+        findings.extend(robot(layer, path).into_iter().map(|finding| ("robot", finding)));
+    }
     if let Some(path) = &layer.scene {
         findings.extend(scene(layer, path).into_iter().map(|finding| ("scene", finding)));
     }
@@ -52,6 +55,22 @@ fn check_token(layer: &Layer, token: Result<Option<Token>, String>) -> Result<St
         Ok(None) => Ok(format!("none, and none is needed: only this machine reaches {}", layer.address())),
         Err(error) => Err(error.to_string()),
     }
+}
+
+/// What in a robot's file is not quite as in MuJoCo, and which tasks such robots can play.
+fn robot(layer: &Layer, path: &Path) -> Vec<Finding> {
+    let approximations = match RobotFile::with_approximations(path) {
+        Ok((_, approximations)) => approximations,
+        Err(error) => return vec![Finding::Wrong(error.to_string())],
+    };
+    let mut findings: Vec<Finding> =
+        approximations.iter().map(|line| Finding::Note(format!("not quite as in MuJoCo: {line}"))).collect();
+    // Whether hands and controller fit the first task tells it of all ten.
+    findings.push(Finding::Works(format!("{} is read", path.display())));
+    if let Some(Err(error @ EpisodeError::Robot(_))) = specs(layer).next().map(|spec| trial(&spec)) {
+        findings.push(Finding::Note(error.to_string()));
+    }
+    findings
 }
 
 /// What in a scene's file is not quite as in MuJoCo, and which tasks can be played in it. A scene is made for few of them, so it is

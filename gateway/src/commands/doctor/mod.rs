@@ -93,9 +93,11 @@ fn examine(args: ServeArgs, token: Result<Option<Token>, String>) -> Findings {
 fn specs(layer: &Layer) -> impl Iterator<Item = EpisodeSpec> {
     let scene = layer.scene.as_deref().map(SceneFile::of);
     let scene = scene.and_then(Result::ok);
+    let robot = layer.read_robot().unwrap_or_default();
     let (locomotion, sensing, renderer) = (layer.controller(), layer.sensing(), layer.renderer());
     tasks::ALL.iter().map(move |task| EpisodeSpec {
         scene: scene.clone(),
+        robot: robot.clone(),
         locomotion: locomotion.clone(),
         sensing,
         renderer,

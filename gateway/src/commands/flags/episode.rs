@@ -4,7 +4,7 @@ use std::{error::Error, ops::RangeInclusive, str::FromStr};
 
 use clap::Args;
 use tandem_episodes::{
-    EpisodeError, RobotFile, TANDEM_PLUS, Variation,
+    EpisodeError, TANDEM_PLUS, Variation,
     evaluation::{EvaluationPlan, KeptFiles, Shard, Starts},
     players::Policy,
     tandem_plus, task_set,
@@ -77,6 +77,9 @@ impl EpisodeFlags {
         assistance: Assistance,
     ) -> Result<EvaluationPlan<'_>, Box<dyn Error>> {
         let tasks = played(self.tasks.as_deref(), self.world.read_task_files()?)?;
+        let robot = self.world.read_robot()?;
+        let model = robot.model()?;
+        tasks.iter().try_for_each(|task| robot.check_task(&model, task))?;
         let assistance = self.assistance.unwrap_or(assistance);
         let disclosure = self.disclosure.unwrap_or(assistance.disclosure());
         let hints = self.hints.unwrap_or(assistance.hints());
@@ -86,7 +89,7 @@ impl EpisodeFlags {
             player,
             protocol: self.protocol,
             scene: self.world.read_scene()?,
-            robot: RobotFile::default(),
+            robot,
             locomotion: self.world.controller(),
             sensing: self.world.sensing(),
             assistance,

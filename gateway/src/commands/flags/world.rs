@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use tandem_episodes::{
-    Controller, RendererKind, SceneFile, Sensing, SensorModel, SimError, StateSource, tasks::Task,
+    Controller, RendererKind, RobotFile, SceneFile, Sensing, SensorModel, SimError, StateSource, tasks::Task,
 };
 
-use crate::settings::{Layer, SettingsError, one_of, read_scene, read_task_file};
+use crate::settings::{Layer, SettingsError, one_of, read_robot, read_scene, read_task_file};
 
 /// What episodes are played in, the same for each of them.
 #[derive(Debug, Args)]
@@ -15,6 +15,10 @@ pub struct WorldFlags {
     /// MJCF file of a scene in place of the tasks' own; its site `task` says where.
     #[arg(long, env = "TANDEM_SCENE", value_name = "FILE")]
     scene: Option<PathBuf>,
+    /// File that describes the robots in place of the embedded one: MJCF that names joints as the embedded robot's does, or a TOML file
+    /// that says of another MJCF which of its joints are which.
+    #[arg(long, env = "TANDEM_ROBOT", value_name = "FILE")]
+    robot: Option<PathBuf>,
     /// TOML files with tasks of your own, separated by commas; one that is called as a built-in task takes its place.
     #[arg(long, env = "TANDEM_TASK_FILE", value_name = "FILES", value_delimiter = ',')]
     task_file: Option<Vec<PathBuf>>,
@@ -32,6 +36,11 @@ impl WorldFlags {
     /// Reads the scene from the file that the flag names.
     pub fn read_scene(&self) -> Result<Option<SceneFile>, SimError> {
         self.scene.as_deref().map(read_scene).transpose()
+    }
+
+    /// Reads the robot from the file that the flag names, or takes the embedded one.
+    pub fn read_robot(&self) -> Result<RobotFile, SimError> {
+        read_robot(self.robot.as_deref())
     }
 
     /// The tasks of the files that the flag names.
@@ -58,6 +67,7 @@ impl WorldFlags {
     pub fn layer(self) -> Layer {
         Layer {
             scene: self.scene,
+            robot: self.robot,
             task_file: self.task_file,
             locomotion: self.locomotion.file,
             state_estimate: Some(self.sensing.state_estimate),

@@ -11,7 +11,7 @@ use axum::{
 };
 use serde_json::{Value, json};
 use tandem_episodes::{
-    CheckpointError, EpisodeError, OutputError, SceneError, SimError, players::PlayerError,
+    CheckpointError, EpisodeError, OutputError, RobotError, SceneError, SimError, players::PlayerError,
 };
 use tandem_tools_spec::{Color, EndReason, ResultReply, SpecError, SurfaceQuery};
 
@@ -112,6 +112,11 @@ fn episode_refusals() -> Vec<EpisodeError> {
         EpisodeError::Ended { reason: EndReason::Finished, result: result().into() },
         EpisodeError::Sim(SimError::WithoutGpu),
         EpisodeError::from(SceneError::Tilted { path: "s.xml".into(), site: "task".into(), tilt_deg: 3.0 }),
+        EpisodeError::from(RobotError::NoFingers {
+            task: "handover".into(),
+            robot: "walker".into(),
+            have: vec!["swap".into()],
+        }),
         CheckpointError::NoPhase { path: "c".into(), phase: "p2".into() }.into(),
         EpisodeError::Build(failure()),
         OutputError::Io { path: "runs".into(), source: failure() }.into(),

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::commands::Stagger;
 use super::{FallTrial, play};
-use crate::body::{BodyEstimate, JOINTS, JointDrive, JointModel, LEGS, RobotModel, UPPER};
+use crate::body::{BodyEstimate, BodyScale, JOINTS, JointDrive, JointModel, LEGS, RobotModel, UPPER};
 use crate::locomotion::{BaseCommand, BaseLimits, LegCommand, Locomotion};
 use crate::random::SplitMix64;
 use crate::{CONTROL_DT_S, PHYSICS_STEPS_PER_CONTROL, RobotCommand, Side, Sides, World};
@@ -82,7 +82,7 @@ struct ScriptedLegs {
 }
 
 impl Locomotion for ScriptedLegs {
-    fn limits(&self) -> BaseLimits {
+    fn limits(&self, _scale: &BodyScale) -> BaseLimits {
         self.limits
     }
 

@@ -1,6 +1,12 @@
 //! A robot as its MJCF file describes it: links, joints with gains and limits, sites, cameras, self-collision pairs.
 
+mod description;
+mod fitted;
+mod joints;
 mod read;
+mod scale;
+mod source;
+mod stance;
 
 use std::collections::BTreeSet;
 
@@ -10,6 +16,8 @@ use rapier3d::prelude::MassProperties;
 use crate::Sides;
 use crate::mechanism::Solid;
 use crate::mjcf::{Geom, MjcfCamera};
+pub use scale::BodyScale;
+pub use source::RobotSource;
 
 /// One rigid link. Bodies without a joint are merged into their parent's link.
 #[derive(Clone, Debug)]
@@ -25,12 +33,14 @@ pub struct LinkModel {
     solid: Solid,
 }
 
-/// One actuated hinge, with the PD gains and limits of its position actuator.
+/// One actuated hinge, with the PD gains and limits of its position actuator. A joint of the published order that the robot lacks is
+/// rigid: it stands at 0 and turns about no axis, so that no force has a moment about it.
 #[derive(Clone, Debug)]
 pub struct JointModel {
     pub name: String,
+    /// The link that it carries; of a joint that the robot lacks the one in which it would be.
     pub link: usize,
-    /// The axis in the link's frame.
+    /// The axis in the link's frame; 0 of a joint that the robot lacks.
     pub axis: Vector,
     pub lower_rad: f32,
     pub upper_rad: f32,
@@ -45,6 +55,13 @@ pub struct JointModel {
     pub rest_rad: f32,
 }
 
+impl JointModel {
+    /// Whether the robot has this joint.
+    pub fn exists(&self) -> bool {
+        self.axis != Vector::ZERO
+    }
+}
+
 /// A frame fixed to a link.
 #[derive(Clone, Copy, Debug)]
 pub struct SiteModel {
@@ -57,7 +74,7 @@ pub struct SiteModel {
 pub struct RobotModel {
     /// Parents before children; 0 is the pelvis.
     pub links: Vec<LinkModel>,
-    /// Published order: the file's actuators.
+    /// Published order.
     pub joints: Vec<JointModel>,
     /// The frames that tasks put somewhere.
     pub wrists: Sides<SiteModel>,
@@ -70,6 +87,8 @@ pub struct RobotModel {
     pub egocentric: MjcfCamera,
     pub egocentric_link: usize,
     pub mass_kg: f32,
+    /// How large it is beside the robot for which the base controller's numbers were found.
+    pub scale: BodyScale,
     /// Link pairs that never touch, smaller index first.
     excluded: BTreeSet<(usize, usize)>,
     pub hands: Sides<HandLinks>,
@@ -82,6 +101,8 @@ pub struct RobotModel {
 pub struct HandLinks {
     /// Link that carries palm and wrist.
     pub wrist: usize,
+    /// Middle of the palm, where loads of the hand act, in that link's frame.
+    pub palm_in_wrist_m: Vector,
     pub thumb: Vec<usize>,
     pub fingers: Vec<usize>,
 }
@@ -113,6 +134,21 @@ impl RobotModel {
     pub fn reach_m(&self, world_from_link: &[Pose], direction: Vector) -> f32 {
         let links = self.links.iter().zip(world_from_link);
         links.map(|(link, pose)| link.solid.reach_m(pose, direction)).fold(f32::NEG_INFINITY, f32::max)
+    }
+
+    /// The link that the embedded robot's file calls so: the pelvis, or the one that carries the joint of that name.
+    pub fn published_link(&self, name: &str) -> Option<usize> {
+        let joint = match name {
+            "pelvis" => return Some(0),
+            "torso_link" => "waist_pitch_joint".into(),
+            other => other.replace("_link", "_joint"),
+        };
+        self.joints.iter().find(|candidate| candidate.name == joint).map(|found| found.link)
+    }
+
+    /// Whether it has a hand that can close: a thumb, and a finger against it.
+    pub fn has_fingers(&self) -> bool {
+        self.hands.iter().any(|hand| !hand.thumb.is_empty() && !hand.fingers.is_empty())
     }
 
     pub(crate) fn rest_rad(&self) -> Vec<f32> {

@@ -5,44 +5,64 @@ use std::collections::BTreeSet;
 
 use rapier3d::math::{Pose, Vector};
 
-use super::{HandLinks, JointModel, LinkModel, RobotModel, SiteModel};
+use super::joints::joints_of_file;
+use super::{BodyScale, HandLinks, JointModel, LinkModel, RobotModel, SiteModel};
+use crate::body::layout::{HAND_JOINTS, HANDS, THUMB_JOINTS};
 use crate::mechanism::Solid;
-use crate::mjcf::{Actuator, ActuatorKind, AxisJoint, BodyTree, Document, Geom, LinkJoint, MjcfCamera, pose};
+use crate::mjcf::{BodyTree, Document, Geom, LinkJoint, MjcfCamera, pose};
 use crate::{Side, Sides, SimError};
 
 /// A foot stands on what is lowest of it, to within this.
 const SOLE_M: f32 = 0.002;
+/// Middle of the palm, from a wrist, whose x axis points along the fingers.
+pub(super) const PALM_IN_WRIST_M: Vector = Vector::new(0.12, 0.0, 0.0);
 
 impl RobotModel {
-    /// Reads a robot file: one free root body, hinges with position actuators, sites `left_wrist`, `right_wrist`,
-    /// `left_foot`, `right_foot`, a camera `egocentric` and a first keyframe to stand in.
+    /// Reads a robot's MJCF: see [`RobotModel::of`].
     pub fn parse(file: &str, xml: &str) -> Result<RobotModel, SimError> {
-        let document = &Document::parse(file, xml)?;
+        RobotModel::of(&Document::parse(file, xml)?)
+    }
+
+    /// The robot of a document that has what is asked of a robot: one free root body, hinges with position actuators, called as the
+    /// published joints, sites `left_wrist`, `right_wrist`, `left_foot`, `right_foot`, a camera `egocentric` and a first keyframe to stand
+    /// in. Its waist, arms and hands may lack joints.
+    pub fn of(document: &Document) -> Result<RobotModel, SimError> {
         let tree = only_tree(document)?;
-        let joints = joints(document, &tree)?;
-        let links = links(document, &tree, &joints)?;
-        let (egocentric, egocentric_link) = camera(document, &tree)?;
-        let wrists = sites(document, &tree, "wrist", "where tasks put the hand")?;
+        let joints = joints_of_file(document, &tree)?;
         let soles = sites(document, &tree, "foot", "at the sole's centre")?;
-        Ok(RobotModel {
-            mass_kg: links.iter().map(|link| link.mass.mass()).sum(),
-            egocentric,
-            egocentric_link,
-            wrists,
-            sole_corners_m: soles.each_ref().map(|sole| corners_m(&links[sole.link].geoms)),
-            soles,
-            imu_in_pelvis_m: imu_in_pelvis_m(&tree),
-            excluded: excluded(document, &tree)?,
-            hands: Sides::from_fn(|side| hand(&links, side, wrists[side].link)),
-            links,
-            joints,
-            approximations: document.approximations().to_vec(),
-        })
+        assemble(document, &tree, joints, soles)
     }
 }
 
+/// The robot of a tree whose joints and soles are known.
+pub(super) fn assemble(
+    document: &Document,
+    tree: &BodyTree,
+    joints: Vec<JointModel>,
+    soles: Sides<SiteModel>,
+) -> Result<RobotModel, SimError> {
+    let links = links(document, tree, &joints)?;
+    let (egocentric, egocentric_link) = camera(document, tree)?;
+    let wrists = sites(document, tree, "wrist", "where tasks put the hand")?;
+    Ok(RobotModel {
+        mass_kg: links.iter().map(|link| link.mass.mass()).sum(),
+        scale: BodyScale::G1,
+        egocentric,
+        egocentric_link,
+        sole_corners_m: soles.each_ref().map(|sole| corners_m(&links[sole.link].geoms)),
+        soles,
+        imu_in_pelvis_m: imu_in_pelvis_m(tree),
+        excluded: excluded(document, tree)?,
+        hands: Sides::from_fn(|side| hand(&joints, side, &wrists[side])),
+        wrists,
+        links,
+        joints,
+        approximations: document.approximations().to_vec(),
+    })
+}
+
 /// The tree that a robot is. What a file has beside it would not come along when the robot is put into a world.
-fn only_tree(document: &Document) -> Result<BodyTree, SimError> {
+pub(super) fn only_tree(document: &Document) -> Result<BodyTree, SimError> {
     let mut trees = document.trees()?.into_iter();
     let world = trees.next().into_iter().flat_map(|world| world.links);
     let (Some(tree), None) = (trees.next(), trees.next()) else {
@@ -61,77 +81,9 @@ fn only_tree(document: &Document) -> Result<BodyTree, SimError> {
     Ok(tree)
 }
 
-/// Joints in the order of the actuators.
-fn joints(document: &Document, tree: &BodyTree) -> Result<Vec<JointModel>, SimError> {
-    let rest = document.keys()?.into_iter().next();
-    let rest = rest.ok_or_else(|| document.unsupported("needs a <keyframe> to stand in"))?.positions;
-    let mut joints: Vec<JointModel> = Vec::new();
-    for actuator in document.actuators()? {
-        let name = &actuator.joint;
-        let index = tree.links.iter().position(|link| link.joint.name() == Some(name));
-        let refuse = |what: &str| document.unsupported(format!("joint `{name}` {what}"));
-        let link = index.ok_or_else(|| refuse("is not the robot's"))?;
-        if joints.iter().any(|joint| joint.link == link) {
-            return Err(refuse("has two actuators; put both into one"));
-        }
-        // Before a joint's own coordinate there are seven of the root, and one of each joint before it.
-        let rest_rad = rest.get(6 + link).copied().unwrap_or(0.0) as f32;
-        let joint = match &tree.links[link].joint {
-            LinkJoint::Hinge(joint) => joint_model(joint, &actuator, link, rest_rad),
-            LinkJoint::Slide(_) | LinkJoint::Free { .. } | LinkJoint::Fixed => Err("is no hinge; use hinges"),
-        };
-        joints.push(joint.map_err(refuse)?);
-    }
-    Ok(joints)
-}
-
-fn joint_model(
-    joint: &AxisJoint,
-    actuator: &Actuator,
-    link: usize,
-    rest_rad: f32,
-) -> Result<JointModel, &'static str> {
-    let axis = &joint.axis;
-    let [lower, upper] = axis.range.ok_or("needs a range")?;
-    let effort = match actuator.effort_range {
-        Some([low, high]) if low == -high => high,
-        Some(_) => return Err("is stronger one way; use a forcerange of -x x"),
-        None => return Err("needs a forcerange on its actuator"),
-    };
-    let ActuatorKind::Position { kp, kd } = actuator.kind else {
-        return Err("needs a <position> actuator");
-    };
-    if kp == 0.0 || kd == 0.0 {
-        return Err("needs a kp and a kv above 0 on its actuator");
-    }
-    if actuator.control_range.is_some() {
-        return Err("is told targets within its range; leave out the actuator's ctrlrange");
-    }
-    if axis.anchor_m != Default::default() {
-        return Err("turns beside its body's origin; put the body there");
-    }
-    if axis.stiffness != 0.0 || axis.damping != 0.0 {
-        return Err("has a spring or a damper; state kp and kv on its actuator");
-    }
-    Ok(JointModel {
-        name: joint.name.clone(),
-        link,
-        axis: axis.direction.as_vec3().normalize(),
-        lower_rad: lower as f32,
-        upper_rad: upper as f32,
-        armature_kg_m2: axis.armature as f32,
-        friction_n_m: axis.friction_loss as f32,
-        kp_n_m_rad: kp as f32,
-        kd_n_m_s_rad: kd as f32,
-        effort_n_m: effort as f32,
-        speed_limit_rad_s: actuator.speed_limit.map_or(f32::INFINITY, |limit| limit as f32),
-        rest_rad,
-    })
-}
-
 fn links(document: &Document, tree: &BodyTree, joints: &[JointModel]) -> Result<Vec<LinkModel>, SimError> {
     let read = |(index, link): (usize, &crate::mjcf::BodyLink)| {
-        let joint = joints.iter().position(|joint| joint.link == index);
+        let joint = joints.iter().position(|joint| joint.exists() && joint.link == index);
         if joint.is_none() && link.parent.is_some() {
             let joint = link.joint.name().unwrap_or_default();
             let what = format!("joint `{joint}` of `{}` has no <position> actuator", link.name);
@@ -181,7 +133,7 @@ fn sites(
 
 /// What of a foot stands on the floor: of a sphere its lowest point, of anything else the lower corners of its box; without those of
 /// shapes that end higher.
-fn corners_m(geoms: &[Geom]) -> Vec<Vector> {
+pub(super) fn corners_m(geoms: &[Geom]) -> Vec<Vector> {
     let colliding = geoms.iter().filter(|geom| geom.collides).filter_map(Geom::collider);
     let corners = colliding.flat_map(|(link_from_shape, shape)| match shape.as_ball() {
         Some(ball) => vec![link_from_shape.translation - Vector::Z * ball.radius],
@@ -217,16 +169,20 @@ fn excluded(document: &Document, tree: &BodyTree) -> Result<BTreeSet<(usize, usi
     Ok(excluded)
 }
 
-fn hand(links: &[LinkModel], side: Side, wrist: usize) -> HandLinks {
-    let mut hand = HandLinks { wrist, ..HandLinks::default() };
-    for (index, link) in links.iter().enumerate().filter(|(_, link)| link.name.starts_with(side.name())) {
-        if link.name.contains("hand_thumb") {
-            hand.thumb.push(index);
-        } else if link.name.contains("hand_") {
-            hand.fingers.push(index);
-        }
+/// The links that fingers move, in the order of links, and where the palm is from the wrist.
+fn hand(joints: &[JointModel], side: Side, wrist: &SiteModel) -> HandLinks {
+    let (thumb, fingers) = joints[HANDS[side]..HANDS[side] + HAND_JOINTS].split_at(THUMB_JOINTS);
+    let links = |joints: &[JointModel]| {
+        let moved: BTreeSet<usize> =
+            joints.iter().filter(|joint| joint.exists()).map(|joint| joint.link).collect();
+        moved.into_iter().collect()
+    };
+    HandLinks {
+        wrist: wrist.link,
+        palm_in_wrist_m: wrist.link_from_site * PALM_IN_WRIST_M,
+        thumb: links(thumb),
+        fingers: links(fingers),
     }
-    hand
 }
 
 #[cfg(test)]

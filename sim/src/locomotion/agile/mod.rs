@@ -60,6 +60,20 @@ impl Agile {
         Agile { network, joints: JointMap::new(), looped, state: None }
     }
 
+    /// It moves robots that have all joints of which the policy is told.
+    pub(super) fn check_robot(model: &RobotModel) -> Result<(), String> {
+        let joints = JointMap::new().observed.map(|joint| &model.joints[joint]);
+        let lacking: Vec<&str> =
+            joints.iter().filter(|joint| !joint.exists()).map(|joint| joint.name.as_str()).collect();
+        match lacking.is_empty() {
+            true => Ok(()),
+            false => Err(format!(
+                "a velocity policy for the G1 is told of joints that this robot lacks: {}; leave out --locomotion, and our own controller moves it",
+                lacking.join(", ")
+            )),
+        }
+    }
+
     fn observe(&self, body: &BodyEstimate, velocity_command: [f32; 3]) -> NetworkInputs {
         let pelvis = body.world_from_pelvis().rotation;
         let turning = pelvis.inverse() * body.pelvis_angular_velocity_rad_s;
@@ -105,7 +119,7 @@ impl Agile {
 }
 
 impl Locomotion for Agile {
-    fn limits(&self) -> BaseLimits {
+    fn limits(&self, _scale: &BodyScale) -> BaseLimits {
         LIMITS
     }
 

@@ -3,6 +3,7 @@
 use rapier3d::math::Vector;
 use serde::{Deserialize, Serialize};
 
+use crate::body::BodyScale;
 use crate::locomotion::BaseVelocity;
 use crate::plane::flat;
 
@@ -29,6 +30,7 @@ impl Course {
     /// by now. A robot that still `starts` gathers speed: what it stays behind then is not made up for.
     pub(super) fn corrected_velocity(
         &mut self,
+        scale: &BodyScale,
         velocity: BaseVelocity,
         starts: bool,
         pelvis_m: Vector,
@@ -45,20 +47,22 @@ impl Course {
         }
         self.reference_m += (ahead * velocity.vx_m_s + left * velocity.vy_m_s) * dt_s;
         let mut error_m = flat(self.reference_m - pelvis_m);
-        if error_m.length() > LEASH_M {
-            error_m *= LEASH_M / error_m.length();
+        let leash_m = scale.length_m(LEASH_M);
+        if error_m.length() > leash_m {
+            error_m *= leash_m / error_m.length();
             self.reference_m = pelvis_m + error_m;
         }
         let error_m = [error_m.dot(ahead), error_m.dot(left)];
         let command_m_s = [velocity.vx_m_s, velocity.vy_m_s];
         std::array::from_fn(|i| {
-            let most_m_s = LARGEST_CORRECTION_M_S[i];
+            let most_m_s = scale.speed_m_s(LARGEST_CORRECTION_M_S[i]);
             if !starts {
-                let felt_m = error_m[i].clamp(-LARGEST_ERROR_M, LARGEST_ERROR_M);
-                self.bias_m_s[i] =
-                    (self.bias_m_s[i] + BIAS_GAIN_1_S2 * felt_m * dt_s).clamp(-most_m_s, most_m_s);
+                let most_m = scale.length_m(LARGEST_ERROR_M);
+                let felt_m = error_m[i].clamp(-most_m, most_m);
+                self.bias_m_s[i] = (self.bias_m_s[i] + scale.rate_1_s2(BIAS_GAIN_1_S2) * felt_m * dt_s)
+                    .clamp(-most_m_s, most_m_s);
             }
-            let pull = (POSITION_GAIN_1_S * error_m[i]).clamp(-most_m_s, most_m_s);
+            let pull = (scale.rate_1_s(POSITION_GAIN_1_S) * error_m[i]).clamp(-most_m_s, most_m_s);
             command_m_s[i] + pull + self.bias_m_s[i]
         })
     }
@@ -78,7 +82,7 @@ mod tests {
         let (mut course, mut pelvis_m) = (Course::from(Vector::ZERO), Vector::ZERO);
         let mut told_m_s = [0.0; 2];
         for _ in 0..6000 {
-            told_m_s = course.corrected_velocity(command, false, pelvis_m, AXES, DT_S);
+            told_m_s = course.corrected_velocity(&BodyScale::G1, command, false, pelvis_m, AXES, DT_S);
             pelvis_m += Vector::X * (0.8 * told_m_s[0] * DT_S);
         }
         assert!((0.8 * told_m_s[0] - 0.3).abs() < 1e-3 && told_m_s[1] == 0.0, "{told_m_s:?}");
@@ -89,8 +93,11 @@ mod tests {
         let mut course = Course::from(Vector::ZERO);
         let far_m = Vector::X * -5.0;
         let command = BaseVelocity { vx_m_s: 0.2, ..BaseVelocity::STILL };
-        let told_m_s = course.corrected_velocity(command, false, far_m, AXES, DT_S);
+        let mut told = |command, pelvis_m| {
+            course.corrected_velocity(&BodyScale::G1, command, false, pelvis_m, AXES, DT_S)
+        };
+        let told_m_s = told(command, far_m);
         assert!((told_m_s[0] - 0.2 - POSITION_GAIN_1_S * LEASH_M).abs() < 1e-3, "{told_m_s:?}");
-        assert_eq!(course.corrected_velocity(BaseVelocity::STILL, false, Vector::Y, AXES, DT_S), [0.0; 2]);
+        assert_eq!(told(BaseVelocity::STILL, Vector::Y), [0.0; 2]);
     }
 }

@@ -109,7 +109,8 @@ fn leg_torques(
     contact: &GroundContact,
 ) -> LegTorques {
     let point_m = contact.pressure_m;
-    let height_m = (body.com_m.z - point_m.z).max(LEAST_HEIGHT_M);
+    let scale = &body.model.scale;
+    let height_m = (body.com_m.z - point_m.z).max(scale.length_m(LEAST_HEIGHT_M));
     let away_m = flat(body.com_m - point_m);
     let mut pelvis = Acceleration {
         linear_m_s2: away_m * ((GRAVITY_M_S2 + motion.lift_m_s2) / height_m) + Vector::Z * motion.lift_m_s2,
@@ -119,7 +120,7 @@ fn leg_torques(
     let mut qdd_rad_s2 = [0.0; JOINTS];
     let mut reaction = GroundReaction::of(body, load, motion, pelvis, point_m, &mut qdd_rad_s2);
     for _ in 0..CORRECTIONS {
-        reaction.correct(&mut pelvis, body.model.mass_kg, height_m, most_turn_n_m);
+        reaction.correct(&mut pelvis, body, height_m, most_turn_n_m);
         reaction = GroundReaction::of(body, load, motion, pelvis, point_m, &mut qdd_rad_s2);
     }
     let turn_n_m = Vector::Z * reaction.rest_n_m.z.clamp(-most_turn_n_m, most_turn_n_m);
@@ -135,13 +136,15 @@ fn leg_torques(
 impl GroundContact {
     /// A foot holds less against turning the nearer the pressure is to toe or heel.
     fn most_turn_n_m(&self, body: &BodyEstimate) -> f32 {
+        let scale = &body.model.scale;
+        let largest_n_m = scale.moment_n_m(LARGEST_TURN_N_M);
         match self.foot {
             Some(side) => {
                 let sole_from_world = body.world_from_soles()[side].inverse();
                 let along_m = (sole_from_world * self.pressure_m).x.abs();
-                LARGEST_TURN_N_M * (1.0 - along_m / TURN_FADE_M).max(0.1)
+                largest_n_m * (1.0 - along_m / scale.along_sole_m(TURN_FADE_M)).max(0.1)
             }
-            None => LARGEST_TURN_N_M,
+            None => largest_n_m,
         }
     }
 }
@@ -175,7 +178,8 @@ impl GroundReaction {
 
     /// Accelerates the pelvis away from the moment that is left, no harder than friction gives, and turns it less where
     /// the foot would spin.
-    fn correct(&self, pelvis: &mut Acceleration, mass_kg: f32, height_m: f32, most_turn_n_m: f32) {
+    fn correct(&self, pelvis: &mut Acceleration, body: &BodyEstimate, height_m: f32, most_turn_n_m: f32) {
+        let mass_kg = body.model.mass_kg;
         let away = Vector::new(-self.rest_n_m.y, self.rest_n_m.x, 0.0);
         pelvis.linear_m_s2 += away / (mass_kg * height_m);
         let force_n = self.force_n + away / height_m;
@@ -184,7 +188,7 @@ impl GroundReaction {
             pelvis.linear_m_s2 -= flat(force_n) * ((1.0 - 1.0 / sliding) / mass_kg);
         }
         let too_much_n_m = self.rest_n_m.z - self.rest_n_m.z.clamp(-most_turn_n_m, most_turn_n_m);
-        pelvis.angular_rad_s2.z -= too_much_n_m / TURN_INERTIA_KG_M2;
+        pelvis.angular_rad_s2.z -= too_much_n_m / body.model.scale.inertia_kg_m2(TURN_INERTIA_KG_M2);
     }
 
     /// Torques with which the legs push on the ground.
@@ -203,7 +207,13 @@ impl GroundReaction {
             }
             None => {
                 let about_com_n_m = self.rest_n_m + (point_m - body.com_m).cross(force_n);
-                let feet = distribute(body.com_m, force_n, about_com_n_m, body.world_from_soles());
+                let feet = distribute(
+                    &body.model.scale,
+                    body.com_m,
+                    force_n,
+                    about_com_n_m,
+                    body.world_from_soles(),
+                );
                 Sides::from_fn(|side| leg_torques_n_m(body, side, feet[side], turn_n_m * 0.5))
             }
         }
@@ -255,7 +265,7 @@ fn move_feet(body: &BodyEstimate, motion: &WantedMotion, effort: &Effort, qdd_ra
         let Some(factor) = normal.cholesky() else { continue };
         let change = factor.solve(&(jacobian.transpose() * error));
         for i in 0..LEG_JOINTS {
-            let most = LARGEST_JOINT_ACCELERATION_RAD_S2;
+            let most = body.model.scale.rate_1_s2(LARGEST_JOINT_ACCELERATION_RAD_S2);
             qdd_rad_s2[first + i] = (qdd_rad_s2[first + i] + change[i]).clamp(-most, most);
         }
     }

@@ -7,6 +7,7 @@ use rapier3d::math::{Pose, Vector};
 
 use super::gait::{Gait, PERIOD_S, TRANSFER_S};
 use super::swing::Swing;
+use crate::body::BodyScale;
 use crate::plane::flat;
 
 /// Footholds lie within these of the foot that carries, along the heading and to the inside: the feet never cross.
@@ -27,6 +28,7 @@ const PRESSURE_M: [f32; 2] = [0.075, 0.018];
 
 /// What a footstep is planned from. Horizontal vectors, world frame.
 pub(super) struct FootstepInputs<'a> {
+    pub scale: &'a BodyScale,
     pub gait: &'a Gait,
     pub swing: &'a Swing,
     pub capture_m: Vector,
@@ -35,11 +37,11 @@ pub(super) struct FootstepInputs<'a> {
     pub old_m: Vector,
     pub ahead_axis: Vector,
     pub outside_axis: Vector,
-    /// Time since the stance foot landed, at the pace of the gait.
+    /// Time since the stance foot landed, at the pace of the G1's gait.
     pub time_s: f32,
 }
 
-/// The plan: centre of pressure now, centre of the sole when it lands, and how much faster than the gait.
+/// The plan: centre of pressure now, centre of the sole when it lands, and how much faster than a G1's gait.
 pub(super) struct Footstep {
     pub pressure_m: Vector,
     pub foothold_m: Vector,
@@ -55,7 +57,7 @@ impl FootstepInputs<'_> {
         let gait = self.at_pace(1.0, dt_s);
         faster
             .iter()
-            .map(|pace| self.at_pace(*pace, dt_s))
+            .map(|pace_factor| self.at_pace(*pace_factor, dt_s))
             .fold(gait, |best, next| if next.strain_m < best.strain_m { next } else { best })
     }
 
@@ -65,12 +67,16 @@ impl FootstepInputs<'_> {
         flat(self.stance.translation) + (gait.step_m + gait.offset_m) * (-gait.rate_1_s * remaining_s).exp()
     }
 
-    fn at_pace(&self, pace: f32, dt_s: f32) -> Footstep {
-        let gait = self.gait;
+    /// The footstep at so many times the pace of this robot's gait.
+    fn at_pace(&self, pace_factor: f32, dt_s: f32) -> Footstep {
+        let (gait, scale) = (self.gait, self.scale);
+        let pace = scale.rate_1_s(pace_factor);
         let stance_m = flat(self.stance.translation);
         let time_s = self.time_s + dt_s * pace;
         let remaining_s = (PERIOD_S - time_s).max(0.0) / pace;
-        let most_m = Vector::new(PRESSURE_M[0], PRESSURE_M[1], 0.0);
+        let [along_m, across_m] = [scale.along_sole_m(PRESSURE_M[0]), scale.across_sole_m(PRESSURE_M[1])];
+        let [most_along_m, most_across_m] = scale.ankle_reach_m;
+        let most_m = Vector::new(along_m.min(most_along_m), across_m.min(most_across_m), 0.0);
         let correction_m =
             flat(self.stance.rotation.inverse() * (self.capture_m - self.steady_capture_m(remaining_s)));
         let carrying_m = flat(stance_m + self.stance.rotation * correction_m.clamp(-most_m, most_m));
@@ -78,17 +84,24 @@ impl FootstepInputs<'_> {
         let ramp_s = (TRANSFER_S - time_s).max(0.0) / pace;
         let needed_m =
             gait.predict(self.capture_m, pressure_m, carrying_m, ramp_s, remaining_s) - gait.offset_m;
-        let possible_m =
-            self.swing.reachable_m(self.nearest_m(needed_m, REACH_M, SPREAD_M), time_s - TRANSFER_S, pace);
+        let possible_m = self.swing.reachable_m(
+            scale,
+            self.nearest_m(needed_m, REACH_M, SPREAD_M),
+            time_s - TRANSFER_S,
+            pace,
+        );
         let foothold_m = flat(possible_m);
         let easy_m = self.nearest_m(needed_m, EASY_REACH_M, EASY_SPREAD_M);
-        let strain_m =
-            (needed_m - easy_m).length() + (needed_m - foothold_m).length() * MISS + (pace - 1.0) * HURRY_M;
+        let strain_m = (needed_m - easy_m).length()
+            + (needed_m - foothold_m).length() * MISS
+            + (pace_factor - 1.0) * scale.length_m(HURRY_M);
         Footstep { pressure_m, foothold_m, pace, strain_m }
     }
 
     /// The foothold nearest to `point_m` within a reach along the heading and a spread to the inside.
     fn nearest_m(&self, point_m: Vector, reach_m: [f32; 2], spread_m: [f32; 2]) -> Vector {
+        let reach_m = reach_m.map(|g1_m| self.scale.length_m(g1_m));
+        let spread_m = [self.scale.apart_m(spread_m[0]), self.scale.length_m(spread_m[1])];
         let stance_m = flat(self.stance.translation);
         let away_m = point_m - stance_m;
         stance_m + self.ahead_axis * away_m.dot(self.ahead_axis).clamp(reach_m[0], reach_m[1])

@@ -3,6 +3,7 @@
 use rapier3d::math::Vector;
 
 use super::swing::{AIR_S, SWING_S};
+use crate::body::BodyScale;
 
 /// The pressure moves from the old foot to the new one.
 pub(super) const TRANSFER_S: f32 = 0.05;
@@ -29,14 +30,15 @@ impl Gait {
     /// The foot that swings 2 v T ahead adds to the capture point what is left of s u when it lands, 2 v T s e^{w a}
     /// with a the time from the middle of its flight: b is smaller by that over E G - 1. To the sides b stays as it
     /// is, for robots that start to walk sideways have no room for the narrower step.
-    pub(super) fn new(rate_1_s: f32, velocity_m_s: Vector, outside_axis: Vector) -> Gait {
-        let transfer = (rate_1_s * TRANSFER_S).exp();
-        let whole = (rate_1_s * PERIOD_S).exp();
-        let ramp = whole / transfer * (transfer - 1.0) / (rate_1_s * TRANSFER_S);
-        let along_m = velocity_m_s * PERIOD_S;
+    pub(super) fn new(scale: &BodyScale, rate_1_s: f32, velocity_m_s: Vector, outside_axis: Vector) -> Gait {
+        let [transfer_s, period_s] = [TRANSFER_S, PERIOD_S].map(|g1_s| scale.time_s(g1_s));
+        let transfer = (rate_1_s * transfer_s).exp();
+        let whole = (rate_1_s * period_s).exp();
+        let ramp = whole / transfer * (transfer - 1.0) / (rate_1_s * transfer_s);
+        let along_m = velocity_m_s * period_s;
         let ahead_m = along_m - outside_axis * along_m.dot(outside_axis);
-        let swung = 2.0 * SWING_INERTIA * (rate_1_s * (SWING_S - 0.5 * AIR_S)).exp();
-        let width_m = WIDTH_M + WIDENING * along_m.dot(outside_axis).abs();
+        let swung = 2.0 * SWING_INERTIA * (rate_1_s * scale.time_s(SWING_S - 0.5 * AIR_S)).exp();
+        let width_m = scale.stance_width_m(WIDTH_M) + WIDENING * along_m.dot(outside_axis).abs();
         Gait {
             rate_1_s,
             step_m: along_m - outside_axis * width_m,
@@ -73,7 +75,7 @@ mod tests {
     /// Pressure from `now` to `then` within the ramp, in small steps:  xi' = w (xi - p).
     #[test]
     fn prediction_solves_the_capture_point_equation() {
-        let gait = Gait::new(RATE_1_S, Vector::ZERO, Vector::Y);
+        let gait = Gait::new(&BodyScale::G1, RATE_1_S, Vector::ZERO, Vector::Y);
         let (old_m, then_m) = (Vector::new(-0.1, 0.05, 0.0), Vector::new(0.1, -0.02, 0.0));
         for (now_m, ramp_s, time_s) in [(old_m, 0.05, 0.3), (then_m, 0.0, 0.2), (old_m, 0.02, 0.02)] {
             let mut capture_m = Vector::new(0.03, 0.01, 0.0);
@@ -95,8 +97,8 @@ mod tests {
         for (x, y) in [(0.0, 0.0), (0.4, 0.0), (-0.3, 0.0), (0.0, 0.3), (0.2, -0.25)] {
             for outside in [Vector::Y, -Vector::Y] {
                 let velocity_m_s = Vector::new(x, y, 0.0);
-                let before = Gait::new(RATE_1_S, velocity_m_s, -outside);
-                let gait = Gait::new(RATE_1_S, velocity_m_s, outside);
+                let before = Gait::new(&BodyScale::G1, RATE_1_S, velocity_m_s, -outside);
+                let gait = Gait::new(&BodyScale::G1, RATE_1_S, velocity_m_s, outside);
                 // The stance foot is the origin; the old one is a step behind.
                 let old_m = -before.step_m;
                 let swung = 2.0 * SWING_INERTIA * (RATE_1_S * (SWING_S - 0.5 * AIR_S)).exp();
@@ -112,7 +114,8 @@ mod tests {
 
     #[test]
     fn feet_stay_apart_when_walking_sideways() {
-        let inside_m = |y: f32| -Gait::new(RATE_1_S, Vector::new(0.0, y, 0.0), Vector::Y).step_m.y;
+        let inside_m =
+            |y: f32| -Gait::new(&BodyScale::G1, RATE_1_S, Vector::new(0.0, y, 0.0), Vector::Y).step_m.y;
         assert!((inside_m(0.0) - WIDTH_M).abs() < 1e-6);
         let narrow_m = inside_m(0.3).min(inside_m(-0.3));
         assert!((narrow_m - (WIDTH_M + (WIDENING - 1.0) * 0.3 * PERIOD_S)).abs() < 1e-6, "{narrow_m}");

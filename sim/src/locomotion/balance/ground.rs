@@ -5,7 +5,7 @@ mod tests;
 
 use rapier3d::math::{Pose, Vector};
 
-use crate::body::{BodyEstimate, LEG_JOINTS, LEGS};
+use crate::body::{BodyEstimate, BodyScale, LEG_JOINTS, LEGS};
 use crate::plane::flat;
 use crate::{Side, Sides};
 
@@ -30,11 +30,11 @@ pub(super) fn middle_m(soles: &Sides<Pose>) -> Vector {
 }
 
 /// The point nearest to `point_m` where two planted feet can have their centre of pressure.
-pub(super) fn nearest_support_m(point_m: Vector, soles: Sides<Pose>) -> Vector {
+pub(super) fn nearest_support_m(scale: &BodyScale, point_m: Vector, soles: Sides<Pose>) -> Vector {
     let share = share(point_m, soles);
     let middle_m = between_m(soles, share);
     let turn = soles.right.rotation.slerp(soles.left.rotation, share.left);
-    let inside_m = within_sole_m(turn.inverse() * flat(point_m - middle_m));
+    let inside_m = within_sole_m(scale, turn.inverse() * flat(point_m - middle_m));
     middle_m + flat(turn * inside_m)
 }
 
@@ -52,25 +52,24 @@ fn between_m(soles: Sides<Pose>, share: Sides<f32>) -> Vector {
 }
 
 /// The nearest point of a sole, in its frame.
-fn within_sole_m(point_in_sole_m: Vector) -> Vector {
-    Vector::new(
-        point_in_sole_m.x.clamp(-SOLE_HALF_LENGTH_M, SOLE_HALF_LENGTH_M),
-        point_in_sole_m.y.clamp(-SOLE_HALF_WIDTH_M, SOLE_HALF_WIDTH_M),
-        0.0,
-    )
+fn within_sole_m(scale: &BodyScale, point_in_sole_m: Vector) -> Vector {
+    let length_m = scale.along_sole_m(SOLE_HALF_LENGTH_M);
+    let width_m = scale.across_sole_m(SOLE_HALF_WIDTH_M);
+    Vector::new(point_in_sole_m.x.clamp(-length_m, length_m), point_in_sole_m.y.clamp(-width_m, width_m), 0.0)
 }
 
 /// The net force nearest to `force_n` whose centre of pressure, with a moment about the centre of mass, lies within the
 /// feet: a trunk that stays upright matters more than where the robot drifts.
 pub(super) fn supported_force_n(
+    scale: &BodyScale,
     com_m: Vector,
     force_n: Vector,
     moment_n_m: Vector,
     soles: Sides<Pose>,
 ) -> Vector {
-    let pressure_m = centre_of_pressure_m(com_m, force_n, moment_n_m, soles);
+    let pressure_m = centre_of_pressure_m(scale, com_m, force_n, moment_n_m, soles);
     let height_m = com_m.z - pressure_m.z;
-    let change_m = nearest_support_m(pressure_m, soles) - pressure_m;
+    let change_m = nearest_support_m(scale, pressure_m, soles) - pressure_m;
     Vector::new(
         force_n.x - change_m.x * force_n.z / height_m,
         force_n.y - change_m.y * force_n.z / height_m,
@@ -79,10 +78,16 @@ pub(super) fn supported_force_n(
 }
 
 ///   p = c + ( -(m_y + h f_x), m_x - h f_y ) / f_z,   h = height of c above the soles.
-fn centre_of_pressure_m(com_m: Vector, force_n: Vector, moment_n_m: Vector, soles: Sides<Pose>) -> Vector {
+fn centre_of_pressure_m(
+    scale: &BodyScale,
+    com_m: Vector,
+    force_n: Vector,
+    moment_n_m: Vector,
+    soles: Sides<Pose>,
+) -> Vector {
     let ground_m = (soles.left.translation.z + soles.right.translation.z) * 0.5;
     let height_m = com_m.z - ground_m;
-    let vertical_n = force_n.z.max(SMALLEST_VERTICAL_FORCE_N);
+    let vertical_n = force_n.z.max(scale.force_n(SMALLEST_VERTICAL_FORCE_N));
     Vector::new(
         com_m.x - (moment_n_m.y + height_m * force_n.x) / vertical_n,
         com_m.y + (moment_n_m.x - height_m * force_n.y) / vertical_n,
@@ -93,18 +98,19 @@ fn centre_of_pressure_m(com_m: Vector, force_n: Vector, moment_n_m: Vector, sole
 /// Splits a net force (N) and a moment (N m) about the centre of mass over two feet, given by their sole centres
 /// (world). The centre of pressure is shared along the line between the soles; what is left moves each foot's own.
 pub(super) fn distribute(
+    scale: &BodyScale,
     com_m: Vector,
     force_n: Vector,
     moment_n_m: Vector,
     soles: Sides<Pose>,
 ) -> Sides<FootForce> {
-    let pressure_m = centre_of_pressure_m(com_m, force_n, moment_n_m, soles);
+    let pressure_m = centre_of_pressure_m(scale, com_m, force_n, moment_n_m, soles);
     let ground_m = pressure_m.z;
     let share = share(pressure_m, soles);
     let rest_m = flat(pressure_m - between_m(soles, share));
     Sides::from_fn(|side| {
         let sole = soles[side];
-        let inside_m = within_sole_m(sole.rotation.inverse() * rest_m);
+        let inside_m = within_sole_m(scale, sole.rotation.inverse() * rest_m);
         let point_m = sole.translation + sole.rotation * inside_m;
         FootForce { force_n: force_n * share[side], point_m: Vector::new(point_m.x, point_m.y, ground_m) }
     })

@@ -16,8 +16,9 @@ pub(super) struct LadenRobot {
 
 impl LadenRobot {
     pub(super) fn of(body: &BodyEstimate) -> LadenRobot {
+        let dead_zone_n = body.model.scale.force_n(DEAD_ZONE_N);
         let carried_kg =
-            body.hand_reaction_n.map(|force_n| (-force_n.z - DEAD_ZONE_N).max(0.0) / GRAVITY_M_S2);
+            body.hand_reaction_n.map(|force_n| (-force_n.z - dead_zone_n).max(0.0) / GRAVITY_M_S2);
         let mut mass_kg = body.model.mass_kg;
         let mut momentum_kg_m_s = body.com_velocity_m_s * mass_kg;
         for (carried_kg, palm_m_s) in carried_kg.into_iter().zip(body.palm_velocity_m_s) {
@@ -64,6 +65,8 @@ impl Load {
         push: ObservedPush,
         ahead: f32,
     ) -> Load {
+        let scale = &body.model.scale;
+        let push_lever_m = scale.length_m(PUSH_LEVER_M);
         let height_m = body.com_m.z - ground_m;
         let balanced_m = |force_n: Vector, moment_n_m: Vector| {
             let away_m =
@@ -83,13 +86,14 @@ impl Load {
             // acts over the centre of mass.
             moment_n_m.z += (palm_m - body.com_m).cross(flat(hand_n)).z;
         }
-        let largest_turn_n_m = LARGEST_TURN_N_M - TURN_LEFT_OUT_N_M * ahead;
+        let largest_turn_n_m =
+            scale.moment_n_m(LARGEST_TURN_N_M) - scale.moment_n_m(TURN_LEFT_OUT_N_M) * ahead;
         moment_n_m.z = moment_n_m.z.clamp(-largest_turn_n_m, largest_turn_n_m);
         let pushing_n = push.acceleration_m_s2 * laden.mass_kg;
         force_n += pushing_n;
-        moment_n_m += Vector::new(0.0, 0.0, PUSH_LEVER_M).cross(pushing_n);
+        moment_n_m += Vector::new(0.0, 0.0, push_lever_m).cross(pushing_n);
         let balance_point_m = balanced_m(force_n, moment_n_m);
-        let balance_point_m_s = push.growth_m_s3 * ((height_m + PUSH_LEVER_M) / GRAVITY_M_S2);
+        let balance_point_m_s = push.growth_m_s3 * ((height_m + push_lever_m) / GRAVITY_M_S2);
         Load {
             force_n,
             moment_n_m,

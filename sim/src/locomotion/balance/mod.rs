@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{BaseCommand, BaseLimits, BaseVelocity, LegCommand, Locomotion};
 use crate::GRAVITY_M_S2;
-use crate::body::BodyEstimate;
+use crate::body::{BodyEstimate, BodyScale};
 use crate::plane::{flat, heading_rad};
 use ground::middle_m;
 use load::{LadenRobot, Load};
@@ -111,17 +111,17 @@ struct Stance {
 }
 
 impl Locomotion for Balance {
-    fn limits(&self) -> BaseLimits {
-        LIMITS
+    fn limits(&self, scale: &BodyScale) -> BaseLimits {
+        limits(scale)
     }
 
     fn tick(&mut self, body: &BodyEstimate, command: &BaseCommand, dt_s: f32) -> LegCommand {
         let state = self.state.get_or_insert_with(|| BalanceState::new(body));
-        let command = LIMITS.clamp(*command);
+        let command = limits(&body.model.scale).clamp(*command);
         state.time_in_mode_s += dt_s;
         state.ahead.update(body, &command, dt_s);
         let told = state.velocity_to_place(body, command.velocity());
-        state.velocity = ramped(state.velocity, told, dt_s);
+        state.velocity = ramped(state.velocity, told, &body.model.scale, dt_s);
         let ground_m =
             body.world_from_soles().iter().map(|sole| sole.translation.z).fold(f32::INFINITY, f32::min);
         let laden = LadenRobot::of(body);
@@ -182,8 +182,10 @@ impl BalanceState {
 
     /// The commanded velocity; that back to its place for a robot that is to stand and was pushed out of its stance.
     fn velocity_to_place(&mut self, body: &BodyEstimate, command: BaseVelocity) -> BaseVelocity {
+        let scale = &body.model.scale;
         let steps = matches!(self.mode, Mode::Step(_));
-        if is_moving(&command) || !self.ahead.is_free() || steps && self.time_in_mode_s > LONGEST_RETURN_S {
+        let longest_return_s = scale.time_s(LONGEST_RETURN_S);
+        if is_moving(&command) || !self.ahead.is_free() || steps && self.time_in_mode_s > longest_return_s {
             self.place = None;
         }
         let middle_m = middle_m(&body.world_from_soles());
@@ -191,40 +193,43 @@ impl BalanceState {
             self.place.get_or_insert(StandingPlace { middle_m, heading_rad: self.heading_rad });
         }
         let (true, Some(place)) = (steps, &mut self.place) else { return command };
-        let away_m = flat(place.middle_m - middle_m).clamp_length_max(LEASH_M);
+        let away_m = flat(place.middle_m - middle_m).clamp_length_max(scale.length_m(LEASH_M));
         place.middle_m = middle_m + away_m;
-        if away_m.length() < BACK_M {
+        if away_m.length() < scale.length_m(BACK_M) {
             return command;
         }
-        let back_m_s =
-            (Rotation::from_rotation_z(-self.heading_rad) * away_m * RETURN_1_S).clamp_length_max(RETURN_M_S);
+        let back_m_s = (Rotation::from_rotation_z(-self.heading_rad) * away_m * scale.rate_1_s(RETURN_1_S))
+            .clamp_length_max(scale.speed_m_s(RETURN_M_S));
         BaseVelocity { vx_m_s: back_m_s.x, vy_m_s: back_m_s.y, ..command }
     }
 
     fn change_mode(&mut self, body: &BodyEstimate, load: &Load) {
+        let scale = &body.model.scale;
         let moving = is_moving(&self.velocity);
         let stance = self.stance(body, load);
         let half_width_m = stance.left_from_right_m.y * 0.5;
         match &self.mode {
             Mode::Stand(_) => {
-                let lost = stance.capture_m.x > FORWARD_M + FARTHER_M * load.ahead
-                    || stance.capture_m.x < -BACKWARD_M
-                    || stance.capture_m.y.abs() > half_width_m + SIDEWAYS_M;
-                if (moving || lost) && self.time_in_mode_s > LEAST_STANDING_S {
+                let [forward_m, backward_m, farther_m] =
+                    [FORWARD_M, BACKWARD_M, FARTHER_M].map(|g1_m| scale.along_sole_m(g1_m));
+                let lost = stance.capture_m.x > forward_m + farther_m * load.ahead
+                    || stance.capture_m.x < -backward_m
+                    || stance.capture_m.y.abs() > half_width_m + scale.length_m(SIDEWAYS_M);
+                if (moving || lost) && self.time_in_mode_s > scale.time_s(LEAST_STANDING_S) {
                     let spin_rad_s = body.pelvis_angular_velocity_rad_s.z;
-                    let left_carries = self.left_carries_first(&stance, lost.then_some(spin_rad_s));
+                    let left_carries = self.left_carries_first(scale, &stance, lost.then_some(spin_rad_s));
                     let goal_rad = self.place.map_or(self.heading_rad, |place| place.heading_rad);
                     self.mode = Mode::Step(Stepping::start(body, self.heading_rad, goal_rad, left_carries));
                     self.time_in_mode_s = 0.0;
                 }
             }
             Mode::Step(step) => {
-                let captured = stance.capture_m.x.abs() < CAPTURED_M
+                let captured = stance.capture_m.x.abs() < scale.along_sole_m(CAPTURED_M)
                     && stance.capture_m.y.abs() < half_width_m
-                    && stance.com_m.x.abs() < LARGEST_LEAN_M
+                    && stance.com_m.x.abs() < scale.length_m(LARGEST_LEAN_M)
                     && stance.com_m.y.abs() < half_width_m;
-                let feet_together = stance.left_from_right_m.x.abs() < LARGEST_STAGGER_M
-                    && stance.left_from_right_m.y < LARGEST_WIDTH_M;
+                let feet_together = stance.left_from_right_m.x.abs() < scale.length_m(LARGEST_STAGGER_M)
+                    && stance.left_from_right_m.y < scale.stance_width_m(LARGEST_WIDTH_M);
                 let back = self.place.is_none() || step.to_turn_rad() < BACK_RAD;
                 let landed = step.just_landed() && step.steps() >= LEAST_STEPS;
                 if !moving && back && landed && captured && feet_together {
@@ -238,13 +243,13 @@ impl BalanceState {
 
     /// The foot nearer to the capture point; of feet that are as near, the one from which the robot turns away. A robot that
     /// has lost its stance heeds how fast it spins: see [`SPIN_S_RAD`].
-    fn left_carries_first(&self, stance: &Stance, lost_rad_s: Option<f32>) -> bool {
+    fn left_carries_first(&self, scale: &BodyScale, stance: &Stance, lost_rad_s: Option<f32>) -> bool {
         let capture_m = stance.capture_m;
         if let Some(spin_rad_s) = lost_rad_s {
-            return capture_m.y + SPIN_S_RAD * spin_rad_s * capture_m.x > 0.0;
+            return capture_m.y + scale.time_s(SPIN_S_RAD) * spin_rad_s * capture_m.x > 0.0;
         }
         let yaw_rate_rad_s = self.velocity.yaw_rate_rad_s;
-        if yaw_rate_rad_s.abs() > STILL_RAD_S && capture_m.y.abs() < EITHER_FOOT_M {
+        if yaw_rate_rad_s.abs() > STILL_RAD_S && capture_m.y.abs() < scale.length_m(EITHER_FOOT_M) {
             yaw_rate_rad_s < 0.0
         } else {
             capture_m.y > 0.0
@@ -265,15 +270,25 @@ impl BalanceState {
     }
 }
 
+/// Base commands that a robot of this size can follow.
+fn limits(scale: &BodyScale) -> BaseLimits {
+    BaseLimits {
+        vx_m_s: LIMITS.vx_m_s.map(|g1_m_s| scale.speed_m_s(g1_m_s)),
+        vy_m_s: LIMITS.vy_m_s.map(|g1_m_s| scale.speed_m_s(g1_m_s)),
+        yaw_rate_rad_s: LIMITS.yaw_rate_rad_s.map(|g1_rad_s| scale.rate_1_s(g1_rad_s)),
+        pelvis_height_m: LIMITS.pelvis_height_m.map(|g1_m| scale.height_m(g1_m)),
+    }
+}
+
 fn is_moving(velocity: &BaseVelocity) -> bool {
     let BaseVelocity { vx_m_s, vy_m_s, yaw_rate_rad_s } = velocity;
     vx_m_s.abs() > STILL_M_S || vy_m_s.abs() > STILL_M_S || yaw_rate_rad_s.abs() > STILL_RAD_S
 }
 
 /// One physics step from a velocity towards another.
-fn ramped(from: BaseVelocity, to: BaseVelocity, dt_s: f32) -> BaseVelocity {
+fn ramped(from: BaseVelocity, to: BaseVelocity, scale: &BodyScale, dt_s: f32) -> BaseVelocity {
     let towards = |from: f32, to: f32, most: f32| from + (to - from).clamp(-most, most);
-    let (most_m_s, most_rad_s) = (LARGEST_CHANGE_M_S2 * dt_s, LARGEST_CHANGE_RAD_S2 * dt_s);
+    let (most_m_s, most_rad_s) = (LARGEST_CHANGE_M_S2 * dt_s, scale.rate_1_s2(LARGEST_CHANGE_RAD_S2) * dt_s);
     BaseVelocity {
         vx_m_s: towards(from.vx_m_s, to.vx_m_s, most_m_s),
         vy_m_s: towards(from.vy_m_s, to.vy_m_s, most_m_s),
@@ -293,7 +308,7 @@ mod tests {
         let load = Load::of(&body, &LadenRobot::of(&body), 0.0, observer::ObservedPush::default(), 0.0);
         let mut stance = state.stance(&body, &load);
         stance.capture_m = Vector::new(capture_m[0], capture_m[1], 0.0);
-        state.left_carries_first(&stance, lost_rad_s)
+        state.left_carries_first(&BodyScale::G1, &stance, lost_rad_s)
     }
 
     /// Blown ahead or back at an elbow it swings the leg that stops the spin, though the other foot is a little nearer.

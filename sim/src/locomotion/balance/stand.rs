@@ -13,7 +13,7 @@ use super::effort::ground_force_n;
 use super::ground::{FootForce, couple_n, distribute, leg_torques_n_m, middle_m, supported_force_n};
 use super::legs::{LegAngles, inverse, rotation_vector_rad};
 use super::load::Load;
-use crate::body::{BodyEstimate, JOINTS, JointDrive, LEG_JOINTS, LEGS};
+use crate::body::{BodyEstimate, BodyScale, JOINTS, JointDrive, LEG_JOINTS, LEGS};
 use crate::locomotion::LegCommand;
 use crate::plane::flat;
 use crate::{GRAVITY_M_S2, Side, Sides};
@@ -116,8 +116,9 @@ impl Stand {
             q_rad: Sides::from_fn(|side| std::array::from_fn(|i| body.q_rad[LEGS[side] + i])),
         };
         if let Some((_, load)) = moving {
-            stand.home_m += heading * back_into_m(RESTING_ZONE_M, stand.weights_m(body, load));
-            stand.lean_m = stand.against_push_m(stand.weights_m(body, load), load);
+            let scale = &body.model.scale;
+            stand.home_m += heading * back_into_m(RESTING_ZONE_M, scale, stand.weights_m(body, load));
+            stand.lean_m = stand.against_push_m(scale, stand.weights_m(body, load), load);
             stand.lean_goal_m = stand.lean_m;
             stand.offset_m = flat(pelvis.translation - stand.home_m) - heading * stand.lean_m;
             stand.offset_rate_m_s = flat(body.com_velocity_m_s);
@@ -134,13 +135,17 @@ impl Stand {
 
     /// Shift of the pelvis against what of a push the feet do not hold, with the centre of mass at `weights_m`; all
     /// in the heading frame, from the middle of the feet.
-    fn against_push_m(&self, weights_m: Vector, load: &Load) -> Vector {
+    fn against_push_m(&self, scale: &BodyScale, weights_m: Vector, load: &Load) -> Vector {
         let push_m = flat(load.balance_point_m - load.weights_point_m);
-        let coming_m = (load.balance_point_m_s * LEAD_S).clamp_length_max(LARGEST_LEAD_M) * load.ahead;
+        let coming_m = (load.balance_point_m_s * scale.time_s(LEAD_S))
+            .clamp_length_max(scale.length_m(LARGEST_LEAD_M))
+            * load.ahead;
         let balance_m = weights_m + Rotation::from_rotation_z(-self.heading_rad) * (push_m + coming_m);
-        let zone_m = Vector::new(PUSH_ZONE_M, PUSH_ZONE_M + WIDER_ZONE_M * load.ahead, 0.0);
+        let [along_m, aside_m, wider_m] =
+            [PUSH_ZONE_M, PUSH_ZONE_M, WIDER_ZONE_M].map(|g1_m| scale.length_m(g1_m));
+        let zone_m = Vector::new(along_m, aside_m + wider_m * load.ahead, 0.0);
         let held_m = balance_m.clamp(weights_m.min(-zone_m), weights_m.max(zone_m));
-        within_reach_m(held_m - balance_m, load.ahead)
+        within_reach_m(held_m - balance_m, scale, load.ahead)
     }
 
     /// One physics step towards a pelvis height over the soles.
@@ -151,13 +156,16 @@ impl Stand {
         height_m: f32,
         dt_s: f32,
     ) -> (LegCommand, Vector) {
-        let rise_m = (height_m - self.height_m).clamp(-HEIGHT_RATE_M_S * dt_s, HEIGHT_RATE_M_S * dt_s);
+        let scale = &body.model.scale;
+        let most_m = scale.speed_m_s(HEIGHT_RATE_M_S) * dt_s;
+        let rise_m = (height_m - self.height_m).clamp(-most_m, most_m);
         self.height_m += rise_m;
+        let settling_1_s = scale.rate_1_s(SETTLING_1_S);
         let pull_m_s2 =
-            self.offset_m * (SETTLING_1_S * SETTLING_1_S) + self.offset_rate_m_s * (2.0 * SETTLING_1_S);
+            self.offset_m * (settling_1_s * settling_1_s) + self.offset_rate_m_s * (2.0 * settling_1_s);
         self.offset_rate_m_s -= pull_m_s2 * dt_s;
         self.offset_m += self.offset_rate_m_s * dt_s;
-        self.tilt = self.tilt.slerp(Rotation::IDENTITY, dt_s / TILT_SETTLING_TIME_S);
+        self.tilt = self.tilt.slerp(Rotation::IDENTITY, dt_s / scale.time_s(TILT_SETTLING_TIME_S));
         let mut goal = self.pelvis_goal(body, load, dt_s);
         goal.velocity_m_s.z = rise_m / dt_s;
         for side in Side::BOTH {
@@ -188,12 +196,15 @@ impl Stand {
     fn pelvis_goal(&mut self, body: &BodyEstimate, load: &Load, dt_s: f32) -> PelvisGoal {
         let heading = Rotation::from_rotation_z(self.heading_rad);
         let weights_m = self.weights_m(body, load);
-        let shift_m = back_into_m(COM_ZONE_M, weights_m);
-        let leaning_m_s2 = self.lean(self.against_push_m(weights_m + shift_m, load), load.ahead, dt_s);
+        let scale = &body.model.scale;
+        let shift_m = back_into_m(COM_ZONE_M, scale, weights_m);
+        let against_m = self.against_push_m(scale, weights_m + shift_m, load);
+        let leaning_m_s2 = self.lean(scale, against_m, load.ahead, dt_s);
         let mut position_m = self.home_m + self.offset_m + heading * (shift_m + self.lean_m);
         position_m.z = middle_m(&self.soles).z + self.height_m;
         position_m.z -= (position_m.z - self.highest_m(body, position_m)).max(0.0) * load.ahead;
-        let lean_rad = ((LEAN_BELOW_M - self.height_m) * LEAN_RAD_PER_M).clamp(0.0, LARGEST_LEAN_RAD);
+        let lower_m = scale.height_m(LEAN_BELOW_M) - self.height_m;
+        let lean_rad = (lower_m * scale.per_length(LEAN_RAD_PER_M)).clamp(0.0, LARGEST_LEAN_RAD);
         PelvisGoal {
             pose: Pose::from_parts(position_m, heading * Rotation::from_rotation_y(lean_rad) * self.tilt),
             velocity_m_s: flat(self.offset_rate_m_s + heading * self.lean_rate_m_s),
@@ -202,17 +213,20 @@ impl Stand {
     }
 
     /// One physics step of the lean towards `wanted_m`, without a jerk if it leans ahead of pulls; gives its acceleration.
-    fn lean(&mut self, wanted_m: Vector, ahead: f32, dt_s: f32) -> Vector {
+    fn lean(&mut self, scale: &BodyScale, wanted_m: Vector, ahead: f32, dt_s: f32) -> Vector {
+        let play_m = scale.length_m(LEAN_PLAY_M);
         if ahead == 0.0 {
             let change_m = wanted_m - self.lean_m;
-            self.lean_m += (change_m - change_m.clamp_length_max(LEAN_PLAY_M)) * (dt_s / LEANING_TIME_S);
+            self.lean_m +=
+                (change_m - change_m.clamp_length_max(play_m)) * (dt_s / scale.time_s(LEANING_TIME_S));
             (self.lean_goal_m, self.lean_rate_m_s) = (self.lean_m, Vector::ZERO);
             return Vector::ZERO;
         }
         let change_m = wanted_m - self.lean_goal_m;
-        self.lean_goal_m += change_m - change_m.clamp_length_max(LEAN_PLAY_M);
-        let leaning_m_s2 = (self.lean_goal_m - self.lean_m) * (LEAN_RATE_1_S * LEAN_RATE_1_S)
-            - self.lean_rate_m_s * (2.0 * LEAN_RATE_1_S);
+        self.lean_goal_m += change_m - change_m.clamp_length_max(play_m);
+        let rate_1_s = scale.rate_1_s(LEAN_RATE_1_S);
+        let leaning_m_s2 =
+            (self.lean_goal_m - self.lean_m) * (rate_1_s * rate_1_s) - self.lean_rate_m_s * (2.0 * rate_1_s);
         self.lean_rate_m_s += leaning_m_s2 * dt_s;
         self.lean_m += self.lean_rate_m_s * dt_s;
         leaning_m_s2
@@ -220,26 +234,28 @@ impl Stand {
 
     /// Height up to which both legs reach with the pelvis over `position_m`.
     fn highest_m(&self, body: &BodyEstimate, position_m: Vector) -> f32 {
+        let leg_m = body.model.scale.length_m(LEG_M);
         let pelvis_m = body.world_from_pelvis().translation;
         let height_m = |side: Side| {
             let hip_m = body.joint_axis(LEGS[side] + 1).0 - pelvis_m;
             let foot_m = self.feet[side].translation;
-            let away_m = flat(position_m + hip_m - foot_m).length().min(0.8 * LEG_M);
-            foot_m.z - hip_m.z + (LEG_M * LEG_M - away_m * away_m).sqrt()
+            let away_m = flat(position_m + hip_m - foot_m).length().min(0.8 * leg_m);
+            foot_m.z - hip_m.z + (leg_m * leg_m - away_m * away_m).sqrt()
         };
         height_m(Side::Left).min(height_m(Side::Right))
     }
 }
 
 /// Shift that brings a point back into a zone round the middle of the feet.
-fn back_into_m(zone_m: f32, point_m: Vector) -> Vector {
+fn back_into_m(g1_zone_m: f32, scale: &BodyScale, point_m: Vector) -> Vector {
+    let zone_m = scale.length_m(g1_zone_m);
     let zone_m = Vector::new(zone_m, zone_m, 0.0);
-    within_reach_m(point_m.clamp(-zone_m, zone_m) - point_m, 0.0)
+    within_reach_m(point_m.clamp(-zone_m, zone_m) - point_m, scale, 0.0)
 }
 
-fn within_reach_m(shift_m: Vector, ahead: f32) -> Vector {
-    let [forward_m, aside_m] = LARGEST_SHIFT_M;
-    let most_m = Vector::new(forward_m, aside_m + FARTHER_ASIDE_M * ahead, 0.0);
+fn within_reach_m(shift_m: Vector, scale: &BodyScale, ahead: f32) -> Vector {
+    let [forward_m, aside_m] = LARGEST_SHIFT_M.map(|g1_m| scale.length_m(g1_m));
+    let most_m = Vector::new(forward_m, aside_m + scale.length_m(FARTHER_ASIDE_M) * ahead, 0.0);
     shift_m.clamp(-most_m, most_m)
 }
 
@@ -272,10 +288,15 @@ fn balance_torques_n_m(body: &BodyEstimate, load: &Load, goal: &PelvisGoal) -> S
     let error_m = goal.pose.translation - pelvis.translation;
     // The velocity is that of the pelvis, which holds still while arms swing.
     let rate_m_s = goal.velocity_m_s - body.pelvis_velocity_m_s;
+    let scale = &body.model.scale;
+    let [level_1_s2, upright_1_s2] =
+        [HORIZONTAL_STIFFNESS_1_S2, VERTICAL_STIFFNESS_1_S2].map(|g1_1_s2| scale.rate_1_s2(g1_1_s2));
+    let [level_1_s, upright_1_s] =
+        [HORIZONTAL_DAMPING_1_S, VERTICAL_DAMPING_1_S].map(|g1_1_s| scale.rate_1_s(g1_1_s));
     let acceleration_m_s2 = Vector::new(
-        HORIZONTAL_STIFFNESS_1_S2 * error_m.x + HORIZONTAL_DAMPING_1_S * rate_m_s.x,
-        HORIZONTAL_STIFFNESS_1_S2 * error_m.y + HORIZONTAL_DAMPING_1_S * rate_m_s.y,
-        VERTICAL_STIFFNESS_1_S2 * error_m.z + VERTICAL_DAMPING_1_S * rate_m_s.z,
+        level_1_s2 * error_m.x + level_1_s * rate_m_s.x,
+        level_1_s2 * error_m.y + level_1_s * rate_m_s.y,
+        upright_1_s2 * error_m.z + upright_1_s * rate_m_s.z,
     );
     let weight_n = mass_kg * GRAVITY_M_S2;
     let mut force_n = (acceleration_m_s2 + goal.acceleration_m_s2) * mass_kg;
@@ -287,12 +308,12 @@ fn balance_torques_n_m(body: &BodyEstimate, load: &Load, goal: &PelvisGoal) -> S
         force_n.y *= scale;
     }
     let tilt_rad = rotation_vector_rad(goal.pose.rotation * pelvis.rotation.inverse());
-    let moment_n_m =
-        tilt_rad * TRUNK_STIFFNESS_N_M_RAD - body.pelvis_angular_velocity_rad_s * TRUNK_DAMPING_N_M_S_RAD;
+    let moment_n_m = tilt_rad * scale.moment_n_m(TRUNK_STIFFNESS_N_M_RAD)
+        - body.pelvis_angular_velocity_rad_s * scale.damping_n_m_s(TRUNK_DAMPING_N_M_S_RAD);
     let soles = body.world_from_soles();
     let ground_force_n =
-        supported_force_n(body.com_m, force_n - load.force_n, moment_n_m - load.moment_n_m, soles);
-    let feet = distribute(body.com_m, ground_force_n, moment_n_m - load.moment_n_m, soles);
+        supported_force_n(scale, body.com_m, force_n - load.force_n, moment_n_m - load.moment_n_m, soles);
+    let feet = distribute(scale, body.com_m, ground_force_n, moment_n_m - load.moment_n_m, soles);
     let turn_n_m = moment_n_m.z - load.moment_n_m.z;
     let couple_share = COUPLE_SHARE * load.ahead;
     let couple_n = couple_n(turn_n_m * couple_share, soles);
@@ -320,7 +341,7 @@ mod tests {
             let moved_m = (load.balance_point_m - load.weights_point_m).y;
             let beyond_m = (moved_m.abs() - PUSH_ZONE_M).max(0.0);
             assert_eq!(beyond_m > 0.0, push_m_s2.abs() == 1.0, "{moved_m}");
-            let lean_m = stand.against_push_m(stand.weights_m(&body, &load), &load);
+            let lean_m = stand.against_push_m(&BodyScale::G1, stand.weights_m(&body, &load), &load);
             let expected_m = -moved_m.signum() * beyond_m;
             assert!((lean_m.y - expected_m).abs() < 1e-4 && lean_m.x == 0.0, "{lean_m}, not {expected_m}");
         }
@@ -336,7 +357,7 @@ mod tests {
             let push =
                 ObservedPush { acceleration_m_s2: along(acceleration_m_s2), growth_m_s3: along(growth_m_s3) };
             let load = Load::of(&body, &LadenRobot::of(&body), 0.0, push, ahead);
-            stand.against_push_m(stand.weights_m(&body, &load), &load).y
+            stand.against_push_m(&BodyScale::G1, stand.weights_m(&body, &load), &load).y
         };
         assert_eq!(lean_m(1.0, 0.3, 0.0), 0.0);
         let earlier_m = lean_m(1.0, 0.3, 1.45);
@@ -350,12 +371,12 @@ mod tests {
         let mut stand = Stand::plant(&Posed::standing().body(), 0.0, None);
         let wanted_m = Vector::Y * 0.08;
         for _ in 0..400 {
-            assert_eq!(stand.lean(wanted_m, 0.0, 0.005), Vector::ZERO);
+            assert_eq!(stand.lean(&BodyScale::G1, wanted_m, 0.0, 0.005), Vector::ZERO);
         }
         assert!((stand.lean_m.y - (0.08 - LEAN_PLAY_M)).abs() < 1e-4, "{}", stand.lean_m);
         // A hand that opens finds the robot where it is, and at rest.
         let held_m = stand.lean_m;
-        let started_m_s2 = stand.lean(wanted_m, 1.0, 0.005);
+        let started_m_s2 = stand.lean(&BodyScale::G1, wanted_m, 1.0, 0.005);
         assert!(started_m_s2.length() < 0.01, "{started_m_s2}");
         assert!((stand.lean_m - held_m).length() < 1e-5, "{}, not {held_m}", stand.lean_m);
     }

@@ -21,8 +21,8 @@ use super::gait::{Gait, PERIOD_S, SWING_INERTIA, TRANSFER_S};
 use super::ground::nearest_support_m;
 use super::legs::rotation_vector_rad;
 use super::load::Load;
-use super::swing::{SOLE_IN_FOOT_M, SWING_S, Swing, foot_motion};
-use crate::body::{Acceleration, BodyEstimate, JointDrive, LEGS};
+use super::swing::{SWING_S, Swing, foot_motion};
+use crate::body::{Acceleration, BodyEstimate, BodyScale, JointDrive, LEGS};
 use crate::locomotion::{BaseVelocity, LegCommand};
 use crate::plane::{flat, heading_rad, wrapped_rad};
 use crate::{GRAVITY_M_S2, Side, Sides};
@@ -69,6 +69,8 @@ const ANKLE_HEIGHT_M: f32 = 0.053;
 const EARLIEST_LANDING: f32 = 0.65;
 const LATEST_LANDING: f32 = 1.25;
 const GROUND_M: f32 = 0.002;
+/// Height of the centre of mass over the ground: a robot that is lower has fallen.
+const LEAST_HEIGHT_M: f32 = 0.4;
 
 /// A leg that carries is driven by torque; the drives need some stiffness, around the measured angle.
 const KP_N_M_RAD: f32 = 1.0;
@@ -146,23 +148,25 @@ impl Stepping {
         let ground_m = soles[self.stance].translation.z;
         self.turn(body, velocity.yaw_rate_rad_s, dt_s);
         let heading = Rotation::from_rotation_z(self.heading_rad);
+        let scale = &body.model.scale;
         let [ahead, left] = self.landing_axes(body, velocity.yaw_rate_rad_s);
-        let rate_1_s = (GRAVITY_M_S2 / (body.com_m.z - ground_m).max(0.4)).sqrt();
+        let rate_1_s = (GRAVITY_M_S2 / (body.com_m.z - ground_m).max(scale.length_m(LEAST_HEIGHT_M))).sqrt();
         let pelvis_m = body.world_from_pelvis().translation;
         let faced = self.faced_axes(body, dt_s);
         let starts = self.steps < STARTING_STEPS;
-        let velocity_m_s = self.course.corrected_velocity(velocity, starts, pelvis_m, faced, dt_s);
+        let velocity_m_s = self.course.corrected_velocity(scale, velocity, starts, pelvis_m, faced, dt_s);
         let outside = left * self.stance.sign();
         let commanded_m_s = faced[0] * velocity.vx_m_s + faced[1] * velocity.vy_m_s;
-        let strays = flat(body.com_velocity_m_s - commanded_m_s).length() > STRAYING_M_S;
+        let strays = flat(body.com_velocity_m_s - commanded_m_s).length() > scale.speed_m_s(STRAYING_M_S);
         let course_m_s =
             if strays { Vector::ZERO } else { faced[0] * velocity_m_s[0] + faced[1] * velocity_m_s[1] };
         // A robot that turns while it walks goes the coming step where it will face by then.
-        let coming = Rotation::from_rotation_z(velocity.yaw_rate_rad_s * PERIOD_S);
-        let gait = Gait::new(rate_1_s, coming * course_m_s, outside);
+        let coming = Rotation::from_rotation_z(velocity.yaw_rate_rad_s * scale.time_s(PERIOD_S));
+        let gait = Gait::new(scale, rate_1_s, coming * course_m_s, outside);
         let (_, foot_m_s, _) = foot_motion(body, self.stance.other());
         let lasting_m_s = load.velocity_m_s - foot_m_s * SWING_INERTIA;
         let situation = FootstepInputs {
+            scale,
             gait: &gait,
             swing: &self.swing,
             capture_m: flat(load.balance_point_m + lasting_m_s / rate_1_s),
@@ -174,27 +178,38 @@ impl Stepping {
         };
         let pressure_m = if let Some(shifting_s) = self.shifting_s {
             let (target_m, shifted) = shift(&situation);
-            let ends = shifted || shifting_s + dt_s > LONGEST_SHIFT_S;
+            let ends = shifted || shifting_s + dt_s > scale.time_s(LONGEST_SHIFT_S);
             self.shifting_s = (!ends).then_some(shifting_s + dt_s);
-            nearest_support_m(situation.capture_m + (situation.capture_m - target_m) * SHIFT_GAIN, soles)
+            let shifted_m = situation.capture_m + (situation.capture_m - target_m) * SHIFT_GAIN;
+            nearest_support_m(scale, shifted_m, soles)
         } else {
             let footstep = situation.plan(dt_s);
-            self.advance(&footstep, velocity.yaw_rate_rad_s, ground_m, dt_s);
+            self.advance(scale, &footstep, velocity.yaw_rate_rad_s, ground_m, dt_s);
             footstep.pressure_m
         };
-        let wanted_m = height_m.min(HIGHEST_M).min(self.within_reach_m(body)).max(LOWEST_M);
-        let rise = (wanted_m - self.height_m).clamp(-LOWERING_M_S * dt_s, RAISING_M_S * dt_s);
-        self.height_m += rise;
+        self.rise(body, height_m, dt_s);
         let torques = self.carry(body, load, pressure_m, ground_m, heading, velocity.yaw_rate_rad_s);
         self.land(body, &soles, ground_m);
         (drives(body, &torques), torques.acceleration_m_s2)
     }
 
+    /// Goes up or down towards a height of the pelvis, as far as it walks so high and both legs reach.
+    fn rise(&mut self, body: &BodyEstimate, height_m: f32, dt_s: f32) {
+        let scale = &body.model.scale;
+        let wanted_m = height_m
+            .min(scale.height_m(HIGHEST_M))
+            .min(self.within_reach_m(body))
+            .max(scale.height_m(LOWEST_M));
+        let [lowering_m, raising_m] =
+            [LOWERING_M_S, RAISING_M_S].map(|g1_m_s| scale.speed_m_s(g1_m_s) * dt_s);
+        self.height_m += (wanted_m - self.height_m).clamp(-lowering_m, raising_m);
+    }
+
     /// Turns the heading as commanded, within the leash of where the robot faces.
     fn turn(&mut self, body: &BodyEstimate, yaw_rate_rad_s: f32, dt_s: f32) {
         self.goal_rad += yaw_rate_rad_s * dt_s;
-        let return_rad =
-            wrapped_rad(self.goal_rad - self.heading_rad).clamp(-RETURN_RAD_S * dt_s, RETURN_RAD_S * dt_s);
+        let most_rad = body.model.scale.rate_1_s(RETURN_RAD_S) * dt_s;
+        let return_rad = wrapped_rad(self.goal_rad - self.heading_rad).clamp(-most_rad, most_rad);
         self.heading_rad += yaw_rate_rad_s * dt_s + return_rad;
         let ahead_rad = wrapped_rad(self.heading_rad - heading_rad(&body.world_from_pelvis()));
         self.heading_rad += ahead_rad.clamp(-HEADING_LEASH_RAD, HEADING_LEASH_RAD) - ahead_rad;
@@ -202,9 +217,11 @@ impl Stepping {
 
     /// Ahead and left of where the robot will face when the swinging foot lands, if it was set spinning; of its heading otherwise.
     fn landing_axes(&self, body: &BodyEstimate, yaw_rate_rad_s: f32) -> [Vector; 2] {
+        let scale = &body.model.scale;
+        let swaying_rad_s = scale.rate_1_s(SWAYING_RAD_S);
         let spin_rad_s = body.pelvis_angular_velocity_rad_s.z - yaw_rate_rad_s;
-        let excess_rad_s = spin_rad_s - spin_rad_s.clamp(-SWAYING_RAD_S, SWAYING_RAD_S);
-        let turn_rad = excess_rad_s * (PERIOD_S - self.time_s).max(0.0);
+        let excess_rad_s = spin_rad_s - spin_rad_s.clamp(-swaying_rad_s, swaying_rad_s);
+        let turn_rad = excess_rad_s * scale.time_s((PERIOD_S - self.time_s).max(0.0));
         let turn_rad = turn_rad.clamp(-LARGEST_SPIN_TURN_RAD, LARGEST_SPIN_TURN_RAD);
         let facing = Rotation::from_rotation_z(self.heading_rad + turn_rad);
         [facing * Vector::X, facing * Vector::Y]
@@ -213,26 +230,35 @@ impl Stepping {
     /// Ahead and left of where the pelvis faces: a velocity is meant along these, and it may stay behind the heading.
     fn faced_axes(&mut self, body: &BodyEstimate, dt_s: f32) -> [Vector; 2] {
         let lag_rad = wrapped_rad(self.heading_rad - heading_rad(&body.world_from_pelvis()));
-        self.lag_rad += (lag_rad - self.lag_rad) * (dt_s / FACING_TIME_S);
+        self.lag_rad += (lag_rad - self.lag_rad) * (dt_s / body.model.scale.time_s(FACING_TIME_S));
         let facing = Rotation::from_rotation_z(self.heading_rad - self.lag_rad);
         [facing * Vector::X, facing * Vector::Y]
     }
 
     /// One physics step of the swinging foot.
-    fn advance(&mut self, footstep: &Footstep, yaw_rate_rad_s: f32, ground_m: f32, dt_s: f32) {
+    fn advance(
+        &mut self,
+        scale: &BodyScale,
+        footstep: &Footstep,
+        yaw_rate_rad_s: f32,
+        ground_m: f32,
+        dt_s: f32,
+    ) {
         self.time_s += dt_s * footstep.pace;
         let remaining_s = (PERIOD_S - self.time_s).max(0.0) / footstep.pace;
         let turned = Rotation::from_rotation_z(self.heading_rad + yaw_rate_rad_s * remaining_s);
         let sole_m = footstep.foothold_m + Vector::Z * ground_m;
-        let goal = Pose::from_parts(sole_m - turned * SOLE_IN_FOOT_M, turned);
+        let goal = Pose::from_parts(sole_m - turned * scale.sole_in_foot_m, turned);
         self.swing.advance(goal, self.time_s - TRANSFER_S, footstep.pace, dt_s);
     }
 
     /// Largest height of the pelvis at which both legs reach, now and where the swinging one will land: a leg that is
     /// straight can neither lift its foot nor let the pelvis down.
     fn within_reach_m(&self, body: &BodyEstimate) -> f32 {
+        let scale = &body.model.scale;
+        let (leg_m, ankle_height_m) = (scale.length_m(LEG_M), scale.length_m(ANKLE_HEIGHT_M));
         let pelvis_m = body.world_from_pelvis().translation;
-        let remaining_s = (PERIOD_S - self.time_s).max(0.0);
+        let remaining_s = scale.time_s((PERIOD_S - self.time_s).max(0.0));
         let height_m = |side: Side| {
             let (hip_m, _) = body.joint_axis(LEGS[side] + 1);
             let now_m = flat(body.world_from_foot(side).translation - hip_m).length();
@@ -241,8 +267,8 @@ impl Stepping {
             } else {
                 flat(self.swing.goal_m() - hip_m - body.com_velocity_m_s * remaining_s).length()
             };
-            let away_m = now_m.max(landing_m).min(0.8 * LEG_M);
-            pelvis_m.z - hip_m.z + ANKLE_HEIGHT_M + (LEG_M * LEG_M - away_m * away_m).sqrt()
+            let away_m = now_m.max(landing_m).min(0.8 * leg_m);
+            pelvis_m.z - hip_m.z + ankle_height_m + (leg_m * leg_m - away_m * away_m).sqrt()
         };
         height_m(Side::Left).min(height_m(Side::Right))
     }
@@ -255,7 +281,7 @@ impl Stepping {
             self.swing.plant(body, swing);
             return;
         }
-        let clear_m = clearance_m(&soles[swing]) - ground_m;
+        let clear_m = clearance_m(&body.model.scale, &soles[swing]) - ground_m;
         let met = swinging_s > EARLIEST_LANDING * SWING_S && clear_m < GROUND_M;
         if met || swinging_s >= LATEST_LANDING * SWING_S {
             self.stance = swing;
@@ -276,14 +302,17 @@ impl Stepping {
         yaw_rate_rad_s: f32,
     ) -> LegTorques {
         let pelvis = body.world_from_pelvis();
-        let lift_m_s2 = (LIFT_STIFFNESS_1_S2 * (self.height_m + ground_m - pelvis.translation.z)
-            - LIFT_DAMPING_1_S * body.pelvis_velocity_m_s.z)
+        let scale = &body.model.scale;
+        let lift_m_s2 = (scale.rate_1_s2(LIFT_STIFFNESS_1_S2)
+            * (self.height_m + ground_m - pelvis.translation.z)
+            - scale.rate_1_s(LIFT_DAMPING_1_S) * body.pelvis_velocity_m_s.z)
             .clamp(LIFT_RANGE[0] * GRAVITY_M_S2, LIFT_RANGE[1] * GRAVITY_M_S2);
         let tilt_rad = rotation_vector_rad(heading * pelvis.rotation.inverse());
         let spin_rad_s = Vector::Z * yaw_rate_rad_s - body.pelvis_angular_velocity_rad_s;
-        let turn = tilt_rad * TRUNK_STIFFNESS_1_S2 + spin_rad_s * TRUNK_DAMPING_1_S;
+        let turn =
+            tilt_rad * scale.rate_1_s2(TRUNK_STIFFNESS_1_S2) + spin_rad_s * scale.rate_1_s(TRUNK_DAMPING_1_S);
         let turn = turn * Vector::new(1.0, 1.0, YAW_PART);
-        let most = Vector::splat(LARGEST_TURN_RAD_S2);
+        let most = Vector::splat(scale.rate_1_s2(LARGEST_TURN_RAD_S2));
         let both = self.shifting_s.is_some() || self.time_s < TRANSFER_S;
         let mut feet = Sides::<Acceleration>::default();
         if !both {
@@ -301,14 +330,15 @@ impl Stepping {
 
 /// Torques as drives, whose springs and dampers add nothing at the measured angle and velocity.
 fn drives(body: &BodyEstimate, torques: &LegTorques) -> LegCommand {
+    let kd_n_m_s_rad = body.model.scale.damping_n_m_s(KD_N_M_S_RAD);
     Sides::from_fn(|side| {
         std::array::from_fn(|i| {
             let joint = LEGS[side] + i;
             JointDrive {
                 target_rad: body.q_rad[joint],
-                kp_n_m_rad: KP_N_M_RAD,
-                kd_n_m_s_rad: KD_N_M_S_RAD,
-                feedforward_n_m: torques.torque_n_m[side][i] + KD_N_M_S_RAD * body.qd_rad_s[joint],
+                kp_n_m_rad: body.model.scale.moment_n_m(KP_N_M_RAD),
+                kd_n_m_s_rad,
+                feedforward_n_m: torques.torque_n_m[side][i] + kd_n_m_s_rad * body.qd_rad_s[joint],
             }
         })
     })
@@ -317,15 +347,16 @@ fn drives(body: &BodyEstimate, torques: &LegTorques) -> LegCommand {
 /// Where the capture point has to be when the first foot lifts, as a step that just ended would leave it; and whether
 /// the foot lifts now.
 fn shift(now: &FootstepInputs) -> (Vector, bool) {
-    let target_m = now.steady_capture_m(SWING_S);
+    let scale = now.scale;
+    let target_m = now.steady_capture_m(scale.time_s(SWING_S));
     let middle_m = (flat(now.stance.translation) + now.old_m) * 0.5;
-    let late = (now.capture_m - middle_m).dot(now.ahead_axis).abs() > LATEST_M;
-    (target_m, late || (target_m - now.capture_m).dot(now.outside_axis) < SHIFTED_M)
+    let late = (now.capture_m - middle_m).dot(now.ahead_axis).abs() > scale.along_sole_m(LATEST_M);
+    (target_m, late || (target_m - now.capture_m).dot(now.outside_axis) < scale.length_m(SHIFTED_M))
 }
 
 /// Height of the lowest point of a sole.
-fn clearance_m(sole: &Pose) -> f32 {
-    let corner = |x: f32, y: f32| (*sole * Vector::new(x, y, 0.0)).z;
+fn clearance_m(scale: &BodyScale, sole: &Pose) -> f32 {
+    let corner = |x: f32, y: f32| (*sole * Vector::new(scale.along_sole_m(x), scale.across_sole_m(y), 0.0)).z;
     corner(0.085, 0.03).min(corner(0.085, -0.03)).min(corner(-0.085, 0.025)).min(corner(-0.085, -0.025))
 }
 

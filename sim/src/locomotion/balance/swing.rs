@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::legs::rotation_vector_rad;
 use crate::Side;
-use crate::body::{Acceleration, BodyEstimate, LEG_JOINTS, LEGS};
+use crate::body::{Acceleration, BodyEstimate, BodyScale, LEG_JOINTS, LEGS};
 
 pub(super) const SWING_S: f32 = 0.25;
 /// The foot is down a little before the step ends.
@@ -23,9 +23,6 @@ const LARGEST_ACCELERATION_M_S2: f32 = 60.0;
 const REACH_M_S2: f32 = 14.0;
 const STIFFNESS_1_S2: f32 = 300.0;
 const DAMPING_1_S: f32 = 35.0;
-
-/// Ankle roll link to the centre of its sole.
-pub(super) const SOLE_IN_FOOT_M: Vector = Vector::new(0.035, 0.0, -0.035);
 
 /// Path of the ankle roll link, world frame.
 #[derive(Clone, Default, Serialize, Deserialize)]
@@ -74,9 +71,9 @@ impl Swing {
 
     /// The place nearest to `sole_m` where the sole can come to rest in time. A foot that is left to itself stops at
     ///   x + 0.6 v T + 0.15 a T^2,   where the jerk of least jerk is zero.
-    pub(super) fn reachable_m(&self, sole_m: Vector, time_s: f32, pace: f32) -> Vector {
+    pub(super) fn reachable_m(&self, scale: &BodyScale, sole_m: Vector, time_s: f32, pace: f32) -> Vector {
         let remaining_s = ((AIR_S - time_s) / pace).max(0.0);
-        let resting_m = self.sole_m()
+        let resting_m = self.sole_m(scale)
             + self.velocity_m_s * (0.6 * remaining_s)
             + self.acceleration_m_s2 * (0.15 * remaining_s * remaining_s);
         let mut change_m = sole_m - resting_m;
@@ -85,8 +82,8 @@ impl Swing {
     }
 
     /// Where the sole's centre is on its path, without the lift.
-    pub(super) fn sole_m(&self) -> Vector {
-        self.position_m + self.from.rotation * SOLE_IN_FOOT_M
+    pub(super) fn sole_m(&self, scale: &BodyScale) -> Vector {
+        self.position_m + self.from.rotation * scale.sole_in_foot_m
     }
 
     /// Where the ankle roll link is going.
@@ -98,7 +95,8 @@ impl Swing {
     pub(super) fn wanted(&self, body: &BodyEstimate, side: Side, time_s: f32) -> Acceleration {
         let (foot, speed_m_s, spin_rad_s) = foot_motion(body, side);
         let p = (time_s / AIR_S).clamp(0.0, 1.0);
-        let [lift_m, lift_m_s, lift_m_s2] = lift(time_s);
+        let scale = &body.model.scale;
+        let [lift_m, lift_m_s, lift_m_s2] = lift(time_s).map(|g1_m| scale.length_m(g1_m));
         let lift_m_s = lift_m_s * self.pace;
         let lift_m_s2 = lift_m_s2 * (self.pace * self.pace);
         let position_m = self.position_m + Vector::Z * lift_m;
@@ -106,12 +104,13 @@ impl Swing {
         let smooth = p * p * p * (10.0 - 15.0 * p + 6.0 * p * p);
         let rotation = self.from.rotation.slerp(self.to.rotation, smooth);
         let turn_rad = rotation_vector_rad(rotation * foot.rotation.inverse());
+        let (stiffness_1_s2, damping_1_s) = (scale.rate_1_s2(STIFFNESS_1_S2), scale.rate_1_s(DAMPING_1_S));
         Acceleration {
             linear_m_s2: self.acceleration_m_s2
                 + Vector::Z * lift_m_s2
-                + (position_m - foot.translation) * STIFFNESS_1_S2
-                + (velocity_m_s - speed_m_s) * DAMPING_1_S,
-            angular_rad_s2: turn_rad * STIFFNESS_1_S2 - spin_rad_s * DAMPING_1_S,
+                + (position_m - foot.translation) * stiffness_1_s2
+                + (velocity_m_s - speed_m_s) * damping_1_s,
+            angular_rad_s2: turn_rad * stiffness_1_s2 - spin_rad_s * damping_1_s,
         }
     }
 }

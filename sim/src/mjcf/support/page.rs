@@ -27,9 +27,10 @@ Whatever is not in the table is refused too: a misspelt attribute, or one that a
 * joints that move nothing that has mass, two joints on one body, and shapes with an extent of 0;
 * more than 200 elements inside one another.
 
-A robot's file has one free body with all others on it, hinges with one `<position>` actuator each in the published order,
-sites `left_wrist`, `right_wrist`, `left_foot` and `right_foot`, a camera `egocentric` and a `<keyframe>` whose first key it
-stands in. An object's file has one body in the worldbody, and neither actuators nor keys.
+A robot's file has one free body with all others on it, hinges with one `<position>` actuator each, called as the published
+joints, sites `left_wrist`, `right_wrist`, `left_foot` and `right_foot`, a camera `egocentric` and a `<keyframe>` whose first
+key it stands in; waist, arms and hands may lack joints. Of files that are otherwise, [a description](robots.md) says what is
+what. An object's file has one body in the worldbody, and neither actuators nor keys.
 
 Angles are degrees unless `<compiler angle=\"radian\"/>` says otherwise, as in MuJoCo.
 

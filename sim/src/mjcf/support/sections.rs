@@ -111,7 +111,7 @@ pub(super) const ELEMENTS: &[Element] = &[
         ACTUATORS,
         "actuator",
         &[ACTUATOR, POSITION],
-        "of a robot's file all are of this kind, in the published order of joints",
+        "of a robot's file all are of this kind",
     ),
     other_actuator("general"),
     other_actuator("velocity"),
@@ -393,7 +393,8 @@ const ACTUATOR: &[Attribute] = &[
 const POSITION: &[Attribute] = &[
     mapped(&["kp", "kv"], AMOUNT),
     refused(&["dampratio"], "state kv"),
-    only(&["timeconst", "inheritrange"], &["0"], "state ctrlrange; commands act at once"),
+    only(&["timeconst"], &["0"], "commands act at once"),
+    mapped(&["inheritrange"], AMOUNT),
 ];
 
 const KEY: &[Attribute] = &[

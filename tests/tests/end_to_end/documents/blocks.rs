@@ -1,6 +1,10 @@
 //! Every block of code says what becomes of it, and what is no command is what it says it is.
 
-use std::{fs, path::Path, process::Command};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
 
 use serde_json::Value;
 use tandem::{
@@ -55,7 +59,14 @@ fn check(block: &Block) -> Result<(), String> {
         ("toml", "map") => {
             in_a_file(block, |path| PolicyMap::find(path).map(drop).map_err(|error| error.to_string()))
         }
-        ("toml", "task") => is_example(block),
+        ("toml", "task") => {
+            let path = example(block, "gateway/examples/tasks")?;
+            tandem_episodes::read_task(&path).map(drop).map_err(|error| error.to_string())
+        }
+        ("toml", "robot") => {
+            let path = example(block, "gateway/examples/robots")?;
+            tandem_episodes::RobotFile::of(&path).map(drop).map_err(|error| error.to_string())
+        }
         ("toml", "settings") => in_a_file(block, |path| {
             let settings = Settings::resolve(Layer::default(), Some(path.as_ref()));
             settings.map(drop).map_err(|error| error.to_string())
@@ -70,14 +81,12 @@ fn check(block: &Block) -> Result<(), String> {
     }
 }
 
-/// Whether the block is a task's file that can be played, and one of those that the repository has.
-fn is_example(block: &Block) -> Result<(), String> {
-    let folder = root().join("gateway/examples/tasks");
-    let examples = fs::read_dir(folder).map_err(|error| error.to_string())?;
+/// The file of a folder of the repository that has the block's text.
+fn example(block: &Block, folder: &str) -> Result<PathBuf, String> {
+    let examples = fs::read_dir(root().join(folder)).map_err(|error| error.to_string())?;
     let is_this = |path: &Path| fs::read_to_string(path).is_ok_and(|text| text == block.text);
     let mut paths = examples.filter_map(|entry| Some(entry.ok()?.path()));
-    let path = paths.find(|path| is_this(path)).ok_or("no file in gateway/examples/tasks has this text")?;
-    tandem_episodes::read_task(&path).map(drop).map_err(|error| error.to_string())
+    paths.find(|path| is_this(path)).ok_or_else(|| format!("no file in {folder} has this text"))
 }
 
 /// Gives `read` a file with the block's text.

@@ -9,7 +9,7 @@
 //! | `sh,check` | the command line accepts every `tandem`, and files, packages and tests that other commands name are there |
 //! | `json` | parses; `json,tool=NAME` and `json,start` are sent to a server, `json,instructions` is read by one |
 //! | `toml,map`, `toml,settings` | read as a policy map, as settings |
-//! | `toml,task` | a file of `gateway/examples/tasks`, which is read as a task |
+//! | `toml,task`, `toml,robot` | a file of `gateway/examples/tasks`, of `robots` there, which is read as a task, as a robot |
 //! | `python` | compiles; `python,run` is run where its packages are installed |
 //! | `xml` | parses; `xml,scene` is the scene that a test plays in |
 //! | `yaml` | its `args` are accepted by the command line |

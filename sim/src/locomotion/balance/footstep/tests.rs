@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::Side;
-use crate::locomotion::balance::swing::SOLE_IN_FOOT_M;
+use crate::body::BodyScale;
 
 const DT_S: f32 = 1.0 / 200.0;
 const RATE_1_S: f32 = 3.75;
@@ -20,7 +20,7 @@ struct Pendulum {
 impl Pendulum {
     /// In the middle of stepping in place, as a steady gait is when its foot lands.
     fn stepping() -> Pendulum {
-        let gait = Gait::new(RATE_1_S, Vector::ZERO, Vector::Y);
+        let gait = Gait::new(&BodyScale::G1, RATE_1_S, Vector::ZERO, Vector::Y);
         let stance_m = Vector::ZERO;
         Pendulum {
             com_m: stance_m - gait.offset_m,
@@ -33,14 +33,15 @@ impl Pendulum {
 
     /// One step, until the foot is down.
     fn step(&mut self, velocity_m_s: Vector) {
-        let foot = |sole_m: Vector| Pose::from_translation(sole_m - SOLE_IN_FOOT_M);
+        let foot = |sole_m: Vector| Pose::from_translation(sole_m - BodyScale::G1.sole_in_foot_m);
         let outside = Vector::Y * self.stance.sign();
-        let gait = Gait::new(RATE_1_S, velocity_m_s, outside);
+        let gait = Gait::new(&BodyScale::G1, RATE_1_S, velocity_m_s, outside);
         let mut swing = Swing::at(foot(self.swing_m));
         let old_m = self.swing_m;
         let mut time_s = 0.0;
         while time_s < PERIOD_S {
             let situation = FootstepInputs {
+                scale: &BodyScale::G1,
                 gait: &gait,
                 swing: &swing,
                 capture_m: self.capture_m,
@@ -57,7 +58,7 @@ impl Pendulum {
             self.capture_m += (self.capture_m - plan.pressure_m) * (RATE_1_S * DT_S);
         }
         self.swing_m = self.stance_m;
-        self.stance_m = flat(swing.sole_m());
+        self.stance_m = flat(swing.sole_m(&BodyScale::G1));
         self.stance = self.stance.other();
     }
 
@@ -82,7 +83,7 @@ fn steps_bring_a_pushed_pendulum_to_rest() {
         let ahead_m = (pendulum.capture_m - pendulum.stance_m).x;
         assert!(ahead_m.abs() < 0.005, "the foot is not under the capture point: {ahead_m} m");
         let width_m = (pendulum.stance_m - pendulum.swing_m).y.abs();
-        let steady_m = -Gait::new(RATE_1_S, Vector::ZERO, Vector::Y).step_m.y;
+        let steady_m = -Gait::new(&BodyScale::G1, RATE_1_S, Vector::ZERO, Vector::Y).step_m.y;
         assert!((width_m - steady_m).abs() < 0.01, "feet {width_m} m apart, not {steady_m}");
     }
 }
@@ -101,10 +102,11 @@ fn a_commanded_velocity_is_walked() {
 
 #[test]
 fn feet_do_not_cross_and_hurry_only_when_they_must() {
-    let gait = Gait::new(RATE_1_S, Vector::ZERO, Vector::Y);
-    let swing = Swing::at(Pose::from_translation(gait.step_m - SOLE_IN_FOOT_M));
+    let gait = Gait::new(&BodyScale::G1, RATE_1_S, Vector::ZERO, Vector::Y);
+    let swing = Swing::at(Pose::from_translation(gait.step_m - BodyScale::G1.sole_in_foot_m));
     let plan = |push_m: Vector| {
         let mut situation = FootstepInputs {
+            scale: &BodyScale::G1,
             gait: &gait,
             swing: &swing,
             capture_m: Vector::ZERO,

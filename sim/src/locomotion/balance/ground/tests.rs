@@ -26,7 +26,7 @@ fn both_feet_together_give_the_force_and_its_moment() {
     for (x, y) in [(0.02, 0.0), (0.03, 0.08), (0.0, -0.09), (0.06, 0.02)] {
         let pressure_m = Vector::new(x, y, 0.0);
         let moment_n_m = moment_n_m(pressure_m);
-        let feet = distribute(COM_M, FORCE_N, moment_n_m, soles());
+        let feet = distribute(&BodyScale::G1, COM_M, FORCE_N, moment_n_m, soles());
         let force_n: Vector = feet.map(|foot| foot.force_n).into_iter().sum();
         assert!((force_n - FORCE_N).length() < 1e-3);
         let given_n_m: Vector = feet.map(|foot| (foot.point_m - COM_M).cross(foot.force_n)).into_iter().sum();
@@ -41,7 +41,7 @@ fn the_nearer_foot_carries_more_and_neither_lets_go() {
     let (left_m, right_m) = (feet.left.translation, feet.right.translation);
     for part in [0.0, 0.25, 0.5, 0.9, 1.0] {
         let pressure_m = right_m + (left_m - right_m) * part;
-        let left_n = distribute(COM_M, FORCE_N, moment_n_m(pressure_m), feet).left.force_n;
+        let left_n = distribute(&BodyScale::G1, COM_M, FORCE_N, moment_n_m(pressure_m), feet).left.force_n;
         let expected = part.clamp(SMALLEST_SHARE, 1.0 - SMALLEST_SHARE);
         assert!((left_n.z / FORCE_N.z - expected).abs() < 1e-4, "at {part}: {left_n}");
     }
@@ -50,9 +50,9 @@ fn the_nearer_foot_carries_more_and_neither_lets_go() {
 #[test]
 fn pressure_stays_under_the_feet() {
     let inside_m = Vector::new(0.03, 0.04, 0.0);
-    assert!((nearest_support_m(inside_m, soles()) - inside_m).length() < 1e-6);
+    assert!((nearest_support_m(&BodyScale::G1, inside_m, soles()) - inside_m).length() < 1e-6);
     for (x, y) in [(0.3, 0.0), (-0.4, 0.1), (0.0, 0.5), (0.2, -0.5)] {
-        let nearest_m = nearest_support_m(Vector::new(x, y, 0.0), soles());
+        let nearest_m = nearest_support_m(&BodyScale::G1, Vector::new(x, y, 0.0), soles());
         assert!(nearest_m.x.abs() < 0.05 + SOLE_HALF_LENGTH_M + SOLE_HALF_WIDTH_M);
         assert!(nearest_m.y.abs() < 0.12 + 2.0 * SOLE_HALF_WIDTH_M, "{nearest_m}");
     }
@@ -63,11 +63,17 @@ fn pressure_stays_under_the_feet() {
 fn tipping_moments_cost_horizontal_force() {
     let pressure_m = Vector::new(0.3, 0.0, 0.0);
     let moment_n_m = moment_n_m(pressure_m);
-    let supported_n = supported_force_n(COM_M, FORCE_N, moment_n_m, soles());
+    let supported_n = supported_force_n(&BodyScale::G1, COM_M, FORCE_N, moment_n_m, soles());
     assert_eq!(supported_n.z, FORCE_N.z);
-    let now_m = centre_of_pressure_m(COM_M, supported_n, moment_n_m, soles());
-    assert!((now_m - nearest_support_m(pressure_m, soles())).length() < 1e-4, "{now_m}");
-    let kept_n = supported_force_n(COM_M, FORCE_N, self::moment_n_m(Vector::new(0.03, 0.0, 0.0)), soles());
+    let now_m = centre_of_pressure_m(&BodyScale::G1, COM_M, supported_n, moment_n_m, soles());
+    assert!((now_m - nearest_support_m(&BodyScale::G1, pressure_m, soles())).length() < 1e-4, "{now_m}");
+    let kept_n = supported_force_n(
+        &BodyScale::G1,
+        COM_M,
+        FORCE_N,
+        self::moment_n_m(Vector::new(0.03, 0.0, 0.0)),
+        soles(),
+    );
     assert!((kept_n - FORCE_N).length() < 1e-3, "{kept_n}");
 }
 

@@ -49,12 +49,13 @@ impl Ahead {
         command: &BaseCommand,
         dt_s: f32,
     ) {
+        let scale = &body.model.scale;
         self.still_s = if body.arms_told { 0.0 } else { self.still_s + dt_s };
-        let moves = self.still_s < STILL_S;
+        let moves = self.still_s < scale.time_s(STILL_S);
         let felt_n = body.hand_reaction_n.iter().map(|felt_n| felt_n.length()).fold(0.0, f32::max);
-        self.met = (moves && felt_n > MET_N) || (self.met && felt_n > LEFT_N);
+        self.met = (moves && felt_n > scale.force_n(MET_N)) || (self.met && felt_n > scale.force_n(LEFT_N));
         let holds = body.hand_holds.left || body.hand_holds.right;
-        self.free = !(moves || self.met || holds) && command.pelvis_height_m > LOWEST_M;
+        self.free = !(moves || self.met || holds) && command.pelvis_height_m > scale.height_m(LOWEST_M);
         let change_1_s = if self.free { BEGINS_1_S } else { -ENDS_1_S };
         self.share = (self.share + change_1_s * dt_s).clamp(0.0, 1.0);
     }

@@ -78,16 +78,16 @@ fn the_foot_is_lifted_and_set_down_smoothly() {
 #[test]
 fn far_goals_are_brought_within_reach() {
     let mut swing = Swing::at(START);
-    let sole_m = swing.sole_m();
+    let sole_m = swing.sole_m(&BodyScale::G1);
     let most_m = REACH_M_S2 * AIR_S * AIR_S;
     let near_m = sole_m + Vector::new(0.5 * most_m, 0.0, 0.0);
-    assert!((swing.reachable_m(near_m, 0.0, 1.0) - near_m).length() < 1e-6);
+    assert!((swing.reachable_m(&BodyScale::G1, near_m, 0.0, 1.0) - near_m).length() < 1e-6);
     let far_m = sole_m + Vector::new(3.0 * most_m, 0.0, 0.0);
-    assert!((swing.reachable_m(far_m, 0.0, 1.0).x - sole_m.x - most_m).abs() < 1e-5);
+    assert!((swing.reachable_m(&BodyScale::G1, far_m, 0.0, 1.0).x - sole_m.x - most_m).abs() < 1e-5);
     (swing.velocity_m_s, swing.acceleration_m_s2) = (Vector::X, Vector::new(-2.0, 0.0, 0.0));
     let remaining_s = AIR_S - 0.1;
     let resting_m = sole_m.x + 0.6 * remaining_s - 0.15 * 2.0 * remaining_s * remaining_s;
-    let back_m = swing.reachable_m(sole_m - Vector::X * 9.0, 0.1, 1.0).x;
+    let back_m = swing.reachable_m(&BodyScale::G1, sole_m - Vector::X * 9.0, 0.1, 1.0).x;
     assert!((back_m - resting_m + REACH_M_S2 * remaining_s * remaining_s).abs() < 1e-5);
 }
 
@@ -125,7 +125,7 @@ fn a_foot_off_its_path_is_pulled_back() {
 #[test]
 fn the_sole_is_where_the_robots_file_has_it() {
     for (side, sole) in model().soles.by_side() {
-        assert_eq!(sole.link_from_site.translation, SOLE_IN_FOOT_M);
+        assert_eq!(sole.link_from_site.translation, BodyScale::G1.sole_in_foot_m);
         assert_eq!(sole.link, model().joints[LEGS[side] + LEG_JOINTS - 1].link);
     }
 }

@@ -7,7 +7,7 @@ use tandem_episodes::replay::{Verdict, verify};
 use tandem_episodes::{EpisodeSpec, Recording, SceneFile, Session, players};
 use tandem_tools_spec::Protocol;
 
-use super::common::{play, spec, wait};
+use crate::common::{play, spec, wait};
 
 const KITCHEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/kitchen");
 

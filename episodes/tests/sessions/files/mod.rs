@@ -1,0 +1,4 @@
+//! Episodes in scenes and with robots of files.
+
+mod robots;
+mod scenes;

@@ -1,0 +1,37 @@
+//! Where a robot comes from: an embedded file, MJCF of somebody's own, or a description of somebody else's.
+
+use std::path::Path;
+
+use super::{RobotModel, fitted};
+use crate::mjcf::Document;
+use crate::{SimError, assets};
+
+/// A robot as it was read.
+#[derive(Debug)]
+pub struct RobotSource {
+    pub model: RobotModel,
+    /// The MJCF, in which joints, wrists and camera are called as of every robot.
+    pub document: Document,
+    /// Tells robots of different files apart, with all that these name.
+    pub fingerprint: u64,
+}
+
+impl RobotSource {
+    /// Reads a file: MJCF as [`RobotModel::of`] takes it, or, called `.toml`, a description of somebody else's MJCF.
+    pub fn read(path: &Path) -> Result<RobotSource, SimError> {
+        if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
+            let (model, document, fingerprint) = fitted::read(path)?;
+            return Ok(RobotSource { model, document, fingerprint });
+        }
+        RobotSource::of(Document::read(path)?)
+    }
+
+    /// An embedded robot.
+    pub fn embedded(name: &str) -> Result<RobotSource, SimError> {
+        RobotSource::of(Document::parse(name, assets::robot(name)?)?)
+    }
+
+    fn of(document: Document) -> Result<RobotSource, SimError> {
+        Ok(RobotSource { model: RobotModel::of(&document)?, fingerprint: document.fingerprint(), document })
+    }
+}
