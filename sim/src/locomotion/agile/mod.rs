@@ -22,7 +22,7 @@ pub use network::Network;
 
 use super::{BaseCommand, BaseLimits, LegCommand, Locomotion};
 use crate::PHYSICS_STEPS_PER_CONTROL;
-use crate::body::{BodyEstimate, JOINTS, JointDrive, LEGS, WAIST};
+use crate::body::{BodyEstimate, BodyScale, JOINTS, JointDrive, LEGS, RobotModel, WAIST};
 use joints::JointMap;
 use network::{Action, NetworkInputs, RecurrentState};
 use place::ReferencePlace;
