@@ -102,7 +102,7 @@ fn shells_manuals_and_programs_are_told_what_there_is() {
         let tasks = tasks["tasks"].as_array().expect("a list");
         tasks.iter().filter(|task| task["suite"] == suite).count()
     };
-    assert_eq!((of_suite(Value::Null), of_suite("tandem+".into())), (10, 4));
+    assert_eq!((of_suite(Value::Null), of_suite("tandem+".into())), (10, 5));
     assert!(told(tandem(&["tasks"], &[])).contains("  p3 place (alone): "));
 }
 

@@ -18,10 +18,10 @@ use crate::settings::one_of;
 /// Which episodes to play.
 #[derive(Debug, Args)]
 pub struct EpisodeFlags {
-    /// Ids of tasks separated by commas, or `all` for the benchmark's ten, or `tandem+` for that suite; those of --task-file are played
-    /// in any case [default: none with --task-file, and else all].
-    #[arg(long, value_name = "TASKS")]
-    tasks: Option<String>,
+    /// Ids of built-in tasks separated by commas, or `all` for the benchmark's ten, or `tandem+` for that suite [default: none with
+    /// --task-file, and else all].
+    #[arg(long, value_name = "TASKS", value_parser = parse_tasks)]
+    tasks: Option<TaskList>,
     /// One seed, or a range of seeds as 0-9 or 0..9, both ends included.
     #[arg(long, default_value = "0-9", value_name = "SEEDS")]
     seeds: Seeds,
@@ -50,22 +50,35 @@ pub struct EpisodeFlags {
     world: WorldFlags,
 }
 
+/// Tasks named on the command line. The name keeps clap from taking it for a flag that is given several times.
+#[derive(Debug, Clone)]
+struct TaskList(Vec<&'static Task>);
+
+/// The built-in tasks that `text` names: `all` of the benchmark's, those of a suite, or ids separated by commas.
+fn parse_tasks(text: &str) -> Result<TaskList, String> {
+    let found: Result<_, _> = match text {
+        "all" => Ok(tasks::ALL.iter().collect()),
+        TANDEM_PLUS => Ok(tandem_plus().to_vec()),
+        ids => {
+            let known = task_set(Vec::new());
+            ids.split(',').map(|id| known.find(id.trim())).collect()
+        }
+    };
+    let told = |error: EpisodeError| format!("{error}; those of --task-file are played without being named");
+    found.map(TaskList).map_err(told)
+}
+
 /// What is played: the tasks of files, and beside them the built-in ones that are named and that none of them replaces; all of these
 /// where nothing is given.
-fn played(named: Option<&str>, of_files: Vec<&'static Task>) -> Result<Vec<&'static Task>, EpisodeError> {
-    let named: Vec<&'static Task> = match named {
-        Some("all") => tasks::ALL.iter().collect(),
-        Some(TANDEM_PLUS) => tandem_plus().to_vec(),
-        Some(ids) => {
-            let known = task_set(of_files.clone());
-            ids.split(',').map(|id| known.find(id.trim())).collect::<Result<_, _>>()?
-        }
+fn played(named: Option<TaskList>, of_files: Vec<&'static Task>) -> Vec<&'static Task> {
+    let named = match named {
+        Some(TaskList(named)) => named,
         None if of_files.is_empty() => tasks::ALL.iter().collect(),
         None => Vec::new(),
     };
     let replaced = |task: &&'static Task| of_files.iter().any(|other| other.id == task.id);
     let built_in: Vec<&'static Task> = named.into_iter().filter(|task| !replaced(task)).collect();
-    Ok(built_in.into_iter().chain(of_files).collect())
+    built_in.into_iter().chain(of_files).collect()
 }
 
 impl EpisodeFlags {
@@ -76,7 +89,7 @@ impl EpisodeFlags {
         record: bool,
         assistance: Assistance,
     ) -> Result<EvaluationPlan<'_>, Box<dyn Error>> {
-        let tasks = played(self.tasks.as_deref(), self.world.read_task_files()?)?;
+        let tasks = played(self.tasks, self.world.read_task_files()?);
         let robot = self.world.read_robot()?;
         let model = robot.model()?;
         tasks.iter().try_for_each(|task| robot.check_task(&model, task))?;
