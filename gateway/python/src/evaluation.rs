@@ -9,9 +9,9 @@ use std::time::Duration;
 use pyo3::prelude::*;
 use serde_json::{Value, json};
 use tandem::settings::{Layer, Settings};
+use tandem_episodes::Variation;
 use tandem_episodes::evaluation::{self, EpisodeEvent, EvaluationPlan, KeptFiles, Shard, Starts};
 use tandem_episodes::results::PlayedEpisode;
-use tandem_episodes::Variation;
 use tandem_tools_spec::Protocol;
 
 use crate::players::{PlayedBy, PythonPolicy};
