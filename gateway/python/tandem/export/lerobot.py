@@ -264,6 +264,7 @@ def _write_about(
     for source in sources:
         if source.spec not in specs:
             specs.append(source.spec)
+    instructions: dict[str, str] = parts[0].about["instructions"]
     about = {
         "task": sources[0].task,
         "episodes": len(parts),
@@ -271,7 +272,7 @@ def _write_about(
         "successes": sum(source.success for source in sources),
         "builds": builds,
         "specs": specs,
-        "instructions": parts[0].about["instructions"],
+        "instructions": instructions,
         "splits": names,
         "recordings": recordings,
         "plan": plan,
@@ -285,7 +286,7 @@ def _write_about(
         successes=about["successes"],
         seeds=", ".join(_ranges([source.seed for source in sources])),
         made="; ".join(_played(spec) for spec in specs),
-        told=" ".join(f"{robot}: {words}" for robot, words in about["instructions"].items()),
+        told=" ".join(f"{robot}: {words}" for robot, words in instructions.items()),
         builds=", ".join(builds),
         settings=", ".join(f"{name} {value}" for name, value in plan["settings"].items()),
         splits=", ".join(f"{name} {span}" for name, span in names.items()),
