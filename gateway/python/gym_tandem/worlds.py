@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import weakref
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any, Literal
 
@@ -15,6 +15,8 @@ from typing_extensions import TypedDict
 
 import tandem
 from tandem import _native
+from tandem.base import StressAxis, StressLevel
+from tandem.contract.start import TaskInfo
 
 Observation = dict[str, Any]
 
@@ -22,6 +24,9 @@ STATE_COLUMNS = 47
 """Numbers of a robot's state: 43 joint angles (rad) and the base command in force (m/s, m/s, rad/s, m)."""
 
 LARGEST_SEED = 2**32 - 1
+
+EPISODE_SETTINGS = ("renderer", "sensors", "stress", "level")
+"""Options that mean what they mean to `tandem.Episode`, which has the same defaults."""
 
 
 class Options(TypedDict, total=False):
@@ -47,6 +52,12 @@ class Options(TypedDict, total=False):
 
     sensors: Literal["ideal", "g1"]
     """What robots sense; "ideal"."""
+
+    stress: StressAxis
+    """What goes wrong, as for `tandem.Episode`; nothing where it is left out."""
+
+    level: StressLevel
+    """How much of it; 1."""
 
     renderer: Literal["auto", "cpu", "gpu"]
     """Who draws; "auto"."""
@@ -74,6 +85,12 @@ class Outcome:
     """Worlds in which the simulator failed, and how."""
 
 
+def _reworded(told: TaskInfo, options: Options) -> TaskInfo:
+    """The task in the words that its episodes have under this stress."""
+    with tandem.Episode(told.id, protocol="benchmark", stress="words", level=options.get("level")) as episode:
+        return replace(told, instruction=episode.briefing.instruction, robots=episode.briefing.instructions)
+
+
 class Worlds:
     """Worlds of one task, their spaces, and what is seen of them."""
 
@@ -89,7 +106,7 @@ class Worlds:
             raise TypeError(f"no option {', '.join(sorted(unknown))}; have: {', '.join(Options.__annotations__)}")
         rules = next(rules for rules in told.protocols if rules.protocol == "benchmark")
         self.count = count
-        self.task = told
+        self.task = _reworded(told, options) if options.get("stress") == "words" else told
         self.max_episode_steps = rules.episode_steps - rules.initial_hold_steps
         self.robots = tuple(instruction.robot for instruction in told.robots)
         self.size = options.get("observation_width", 320), options.get("observation_height", 240)
@@ -97,7 +114,7 @@ class Worlds:
         if min(self.size) < 1 or self.look_every < 1:
             raise ValueError(f"pictures of {self.size} at every step of {self.look_every}; give numbers from 1 on")
         self.sees = options.get("obs_type", "pixels_agent_pos") == "pixels_agent_pos"
-        settings = {"renderer": options.get("renderer", "auto"), "sensors": options.get("sensors", "ideal")}
+        settings = {key: value for key, value in options.items() if key in EPISODE_SETTINGS}
         record = options.get("record")
         self._native = _native.Worlds(
             task,

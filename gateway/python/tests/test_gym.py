@@ -43,6 +43,29 @@ def held(observation: dict[str, Any]) -> np.ndarray[Any, np.dtype[np.float32]]:
     return action.ravel()
 
 
+def test_stress_is_laid_over_the_same_episode() -> None:
+    """Of the axis and level that are asked for; a level is 1 where nothing is said."""
+
+    def begun(**settings: Any) -> tuple[str, str]:
+        env = make("Handover", obs_type="state", **settings)
+        observation, _ = env.reset(seed=2000)
+        env.step(held(observation))
+        told = env.unwrapped.state_hash(), env.unwrapped.task_description
+        env.close()
+        return told
+
+    plain, said = begun()
+    masses = [begun(stress="mass", **level)[0] for level in ({}, {"level": 1}, {"level": 3})]
+    assert masses[0] == masses[1] and len({plain, *masses}) == 3
+    # Other words change nothing but what is told.
+    for_words, in_words = begun(stress="words", level=3)
+    assert for_words == plain and in_words != said
+    with pytest.raises(Exception, match="expected one of `camera`"):
+        make("Handover", stress="lihgt")
+    with pytest.raises(Exception, match="give stress, too"):
+        make("Handover", level=2)
+
+
 def test_seeds_belong_to_episodes() -> None:
     env = make("Handover", obs_type="state")
     _, info = env.reset()
