@@ -1,49 +1,64 @@
 //! Rows of single joints: drives at their limits, dry friction and limits of position, all along one degree of freedom.
 
-use pulp::Simd;
+use std::array::from_fn;
+use std::ops::Range;
 
 use super::DriveLaw;
-use super::units::{UnitRow, UnitRows};
 use crate::dynamics::settings::{Pass, Settings};
 use crate::dynamics::trees::Trees;
-use crate::dynamics::trees::rows::{ConstraintRows, Whitened};
+use crate::dynamics::trees::abreast::{ABREAST, Abreast, AbreastRow, Alike};
+use crate::dynamics::trees::rows::Whitened;
 use crate::dynamics::trees::tree::Tree;
 
 #[derive(Default)]
 pub struct JointRows {
-    rows: ConstraintRows<1>,
+    /// In the order of links, those of trees that are alike side by side.
     all: Vec<JointRow>,
-    units: UnitRows,
+    /// Which of them each lot of trees that are alike has.
+    of_alike: Vec<Range<usize>>,
+    /// Of all rows the columns within a tree, and Y in them.
+    column: Vec<u16>,
+    y: Vec<Abreast>,
+    drives: Vec<BoundedDrive>,
+    /// Whitened velocities of the trees whose turn it is.
+    w: Vec<Abreast>,
 }
 
+/// The rows of one joint in each tree of a lot. Where a tree has none, masses, friction and impulses are zero.
 struct JointRow {
-    tree: usize,
     link: usize,
+    exists: [bool; ABREAST],
+    /// Where columns and Y lie among those of all rows.
+    places: Range<usize>,
     /// Y . Y, and its inverse.
-    inverse_mass: f64,
-    mass: f64,
-    drive: Option<BoundedDrive>,
+    inverse_mass: Abreast,
+    mass: Abreast,
+    /// Which of all bounded drives are those of this joint.
+    drives: Range<usize>,
     dry: DryFriction,
-    range: Option<Range>,
+    range: JointRange,
 }
 
 /// A drive near a limit of its effort or speed, which the mass matrix leaves out.
 struct BoundedDrive {
+    lane: usize,
     law: DriveLaw,
     impulse: f64,
 }
 
 struct DryFriction {
-    most: f64,
-    impulse: f64,
+    most: Abreast,
+    impulse: Abreast,
 }
 
-/// Both ends of a joint's range: the velocities towards them that are allowed, by [`Pass`], and the impulses.
-struct Range {
-    down: [f64; 2],
-    up: [f64; 2],
-    impulse_up: f64,
-    impulse_down: f64,
+/// Both ends of a joint's range: the velocities towards them that are allowed, by [`Pass`], and the impulses. No velocity reaches the
+/// ends that a joint does not have.
+struct JointRange {
+    exists: [bool; ABREAST],
+    down: [Abreast; 2],
+    up: [Abreast; 2],
+    impulse_up: Abreast,
+    impulse_down: Abreast,
 }
 
 /// A joint without other rows gets one for its range at first only if it could reach an end when this much faster, rad/s or m/s.
@@ -85,91 +100,138 @@ impl Tree {
 }
 
 impl JointRows {
-    /// Rows of the joints that may need one. The trees are factorised. The rows of each tree are in the order of its links; those of
-    /// several trees, which have no part in each other, take turns, so that a processor works on them at the same time.
+    /// Rows of the joints that may need one. The trees are factorised.
     #[inline(always)]
-    pub fn prepare<S: Simd>(&mut self, simd: S, trees: &Trees, settings: &Settings) {
-        self.rows.clear();
+    pub fn prepare(&mut self, trees: &Trees, settings: &Settings) {
         self.all.clear();
-        let mut units = std::mem::take(&mut self.units);
-        units.make(simd, trees, |tree, link| tree.is_held(link) || tree.range_is_row(link, settings.dt_s));
-        for unit in &units.all {
-            self.push(trees, unit, units.y(unit), settings);
+        self.of_alike.clear();
+        self.column.clear();
+        self.y.clear();
+        self.drives.clear();
+        for alike in &trees.alike {
+            let first = self.all.len();
+            let layout = alike.layout(trees);
+            for link in 0..layout.first_dof.len() {
+                let mut exists = [false; ABREAST];
+                for (lane, tree) in alike.trees.iter().enumerate() {
+                    let tree = &trees.all[*tree];
+                    exists[lane] = tree.is_held(link) || tree.range_is_row(link, settings.dt_s);
+                }
+                if exists != [false; ABREAST] {
+                    self.push(trees, alike, link, exists, settings);
+                }
+            }
+            self.of_alike.push(first..self.all.len());
         }
-        self.units = units;
     }
 
     #[inline(always)]
-    fn push(&mut self, trees: &Trees, unit: &UnitRow, y: impl Iterator<Item = f64>, settings: &Settings) {
-        let (tree, link, dt_s) = (&trees.all[unit.tree], unit.link, settings.dt_s);
-        let Some(axis) = tree.links[link].joint.axis() else { return };
-        let offset = trees.offset[unit.tree] as u16;
-        self.rows.begin();
-        for (column, y) in tree.layout.path(tree.layout.first_dof[link]).iter().zip(y) {
-            self.rows.push(column + offset, [y]);
+    fn push(
+        &mut self,
+        trees: &Trees,
+        alike: &Alike,
+        link: usize,
+        exists: [bool; ABREAST],
+        settings: &Settings,
+    ) {
+        let (layout, dt_s) = (alike.layout(trees), settings.dt_s);
+        let dof = layout.first_dof[link];
+        let (place, first_drive) = (self.y.len(), self.drives.len());
+        self.column.extend_from_slice(layout.path(dof));
+        let inverse_mass = alike.push_unit_row(layout, dof, &mut self.y);
+        let mut dry = DryFriction { most: Abreast::ZERO, impulse: Abreast::ZERO };
+        let mut is_ranged = [false; ABREAST];
+        let [mut below, mut above] = [Abreast([f64::INFINITY; ABREAST]); 2];
+        for (lane, tree) in alike.trees.iter().enumerate().filter(|(lane, _)| exists[*lane]) {
+            let tree = &trees.all[*tree];
+            let Some(axis) = tree.links[link].joint.axis() else { continue };
+            let (most, q) = (axis.friction_loss * dt_s, tree.q[link]);
+            dry.most.0[lane] = most;
+            dry.impulse.0[lane] = tree.dry_friction[link].clamp(-most, most);
+            if let Some([low, high]) = axis.range.filter(|_| tree.range_is_row(link, dt_s)) {
+                is_ranged[lane] = true;
+                (below.0[lane], above.0[lane]) = (q - low, high - q);
+            }
+            if tree.bounded[link] {
+                self.drives.push(BoundedDrive::new(tree, link, lane, dt_s));
+            }
         }
-        let [[inverse_mass]] = self.rows.close();
-        let (most, q) = (axis.friction_loss * dt_s, tree.q[link]);
-        let range = axis.range.filter(|_| tree.range_is_row(link, dt_s));
         self.all.push(JointRow {
-            tree: unit.tree,
             link,
+            exists,
+            places: place..self.y.len(),
             inverse_mass,
-            mass: inverse_mass.recip(),
-            drive: tree.bounded[link].then(|| BoundedDrive::new(tree, link, dt_s)),
-            dry: DryFriction { most, impulse: tree.dry_friction[link].clamp(-most, most) },
-            range: range.map(|[low, high]| Range {
-                down: approach(q - low, settings),
-                up: approach(high - q, settings),
-                impulse_up: 0.0,
-                impulse_down: 0.0,
-            }),
+            mass: Abreast(from_fn(|lane| if exists[lane] { inverse_mass.0[lane].recip() } else { 0.0 })),
+            drives: first_drive..self.drives.len(),
+            dry,
+            range: JointRange {
+                exists: is_ranged,
+                down: approach(below, settings),
+                up: approach(above, settings),
+                impulse_up: Abreast::ZERO,
+                impulse_down: Abreast::ZERO,
+            },
         });
     }
 
-    pub fn warm_start(&self, w: &mut Whitened) {
-        for (group, row) in self.all.iter().enumerate() {
-            let impulse = row.dry.impulse + row.drive.as_ref().map_or(0.0, |drive| drive.impulse);
-            if impulse != 0.0 {
-                self.rows.push_impulse(group, &[impulse], w);
+    #[inline(always)]
+    pub fn warm_start(&mut self, trees: &Trees, w: &mut Whitened) {
+        for (alike, rows) in trees.alike.iter().zip(&self.of_alike) {
+            alike.load(trees, w, &mut self.w);
+            for row in &self.all[rows.clone()] {
+                let mut impulse = row.dry.impulse;
+                for drive in &self.drives[row.drives.clone()] {
+                    impulse.0[drive.lane] += drive.impulse;
+                }
+                let acts = impulse.0.map(|impulse| impulse != 0.0);
+                row.of(&self.column, &self.y).push_impulse(impulse, acts, &mut self.w);
             }
+            alike.store(&trees.offset, &self.w, w);
         }
     }
 
     /// The greatest velocity (rad/s or m/s) that an end of a range, or a motor that is turned too fast, took back.
     #[inline(always)]
-    pub fn sweep(&mut self, pass: Pass, w: &mut Whitened) -> f64 {
+    pub fn sweep(&mut self, pass: Pass, trees: &Trees, w: &mut Whitened) -> f64 {
         let mut greatest = 0.0f64;
-        for (group, row) in self.all.iter_mut().enumerate() {
-            let [before] = self.rows.velocity(group, w);
-            let mut v = before;
-            let (inverse_mass, mass) = (row.inverse_mass, row.mass);
-            if let Some(drive) = &mut row.drive {
-                drive.update(inverse_mass, &mut v);
-                if v.abs() > drive.law.speed_limit {
-                    greatest = greatest.max((v - before).abs());
+        for (alike, rows) in trees.alike.iter().zip(&self.of_alike) {
+            if rows.is_empty() {
+                continue;
+            }
+            alike.load(trees, w, &mut self.w);
+            for row in &mut self.all[rows.clone()] {
+                let lanes = row.of(&self.column, &self.y);
+                let before = lanes.velocity(&self.w);
+                let mut v = before;
+                if !row.drives.is_empty() {
+                    let pushed = row.drive(&mut self.drives, &mut v);
+                    greatest = greatest.max(pushed);
+                }
+                row.dry.update(row.inverse_mass, row.mass, &mut v);
+                if !row.range.rests(pass, v) {
+                    let pushed = row.range.update(pass, row.inverse_mass, row.mass, &mut v);
+                    greatest = greatest.max(pushed);
+                }
+                let acts = from_fn(|lane| v.0[lane] != before.0[lane]);
+                if acts != [false; ABREAST] {
+                    lanes.push_impulse((v - before) * row.mass, acts, &mut self.w);
                 }
             }
-            row.dry.update(inverse_mass, mass, &mut v);
-            if let Some(range) = row.range.as_mut().filter(|range| range.acts(pass, v)) {
-                let pushed = v;
-                range.update(pass, inverse_mass, mass, &mut v);
-                greatest = greatest.max((v - pushed).abs());
-            }
-            if v != before {
-                self.rows.push_impulse(group, &[(v - before) * mass], w);
-            }
+            alike.store(&trees.offset, &self.w, w);
         }
         greatest
     }
 
     /// Gives the trees the impulses of dry friction and the efforts of bounded drives.
-    pub fn commit(&self, trees: &mut [Tree], dt_s: f64) {
-        for row in &self.all {
-            let tree = &mut trees[row.tree];
-            tree.dry_friction[row.link] = row.dry.impulse;
-            if let Some(drive) = &row.drive {
-                tree.effort[row.link] = drive.impulse / dt_s;
+    pub fn commit(&self, trees: &mut Trees, dt_s: f64) {
+        for (alike, rows) in trees.alike.iter().zip(&self.of_alike) {
+            for row in &self.all[rows.clone()] {
+                for (lane, tree) in alike.trees.iter().enumerate().filter(|(lane, _)| row.exists[*lane]) {
+                    trees.all[*tree].dry_friction[row.link] = row.dry.impulse.0[lane];
+                }
+                for drive in &self.drives[row.drives.clone()] {
+                    trees.all[alike.trees[drive.lane]].effort[row.link] = drive.impulse / dt_s;
+                }
             }
         }
     }
@@ -177,21 +239,45 @@ impl JointRows {
 
 /// Velocity towards an end of the range that is allowed at a distance: up to the end within the step; beyond the end
 /// backwards, or none while relaxing.
-fn approach(distance: f64, settings: &Settings) -> [f64; 2] {
-    let open = distance.max(0.0) / settings.dt_s;
-    let correcting = if distance < 0.0 { distance * settings.joint_correction_per_s } else { open };
-    [correcting, open]
+#[inline(always)]
+fn approach(distance: Abreast, settings: &Settings) -> [Abreast; 2] {
+    let open = distance.0.map(|distance| distance.max(0.0) / settings.dt_s);
+    let correcting = from_fn(|lane| match distance.0[lane] < 0.0 {
+        true => distance.0[lane] * settings.joint_correction_per_s,
+        false => open[lane],
+    });
+    [Abreast(correcting), Abreast(open)]
+}
+
+impl JointRow {
+    #[inline(always)]
+    fn of<'a>(&self, column: &'a [u16], y: &'a [Abreast]) -> AbreastRow<'a> {
+        AbreastRow { column: &column[self.places.clone()], y: &y[self.places.clone()] }
+    }
+
+    /// The drives change the velocities; returns the greatest change by a motor that is turned too fast.
+    #[inline(never)]
+    fn drive(&self, drives: &mut [BoundedDrive], v: &mut Abreast) -> f64 {
+        let mut greatest = 0.0f64;
+        for drive in &mut drives[self.drives.clone()] {
+            let (before, v) = (v.0[drive.lane], &mut v.0[drive.lane]);
+            drive.update(self.inverse_mass.0[drive.lane], v);
+            if v.abs() > drive.law.speed_limit {
+                greatest = greatest.max((*v - before).abs());
+            }
+        }
+        greatest
+    }
 }
 
 impl BoundedDrive {
     /// Begins with the effort of the last step.
-    fn new(tree: &Tree, link: usize, dt_s: f64) -> BoundedDrive {
+    fn new(tree: &Tree, link: usize, lane: usize, dt_s: f64) -> BoundedDrive {
         let law = tree.laws[link];
         let impulse = tree.effort[link] * dt_s;
-        BoundedDrive { law, impulse }
+        BoundedDrive { lane, law, impulse }
     }
 
-    #[inline(always)]
     fn update(&mut self, inverse_mass: f64, v: &mut f64) {
         let impulse = self.law.meet(inverse_mass, *v, self.impulse);
         *v += inverse_mass * (impulse - self.impulse);
@@ -200,20 +286,26 @@ impl BoundedDrive {
 }
 
 impl DryFriction {
+    /// Only where there is friction.
     #[inline(always)]
-    fn update(&mut self, inverse_mass: f64, mass: f64, v: &mut f64) {
-        if self.most > 0.0 {
-            let impulse = (self.impulse - *v * mass).clamp(-self.most, self.most);
-            *v += inverse_mass * (impulse - self.impulse);
-            self.impulse = impulse;
-        }
+    fn update(&mut self, inverse_mass: Abreast, mass: Abreast, v: &mut Abreast) {
+        let stopping = self.impulse - *v * mass;
+        let low = self.most.0.map(|most| -most);
+        let least = stopping.with(Abreast(low), |stopping, low| if stopping < low { low } else { stopping });
+        let impulse = least.with(self.most, |least, most| if least > most { most } else { least });
+        let slowed = *v + inverse_mass * (impulse - self.impulse);
+        *v = Abreast(from_fn(|lane| if self.most.0[lane] > 0.0 { slowed.0[lane] } else { v.0[lane] }));
+        self.impulse =
+            Abreast(from_fn(
+                |lane| if self.most.0[lane] > 0.0 { impulse.0[lane] } else { self.impulse.0[lane] },
+            ));
     }
 }
 
-impl Range {
+impl JointRange {
     /// Velocities towards both ends that are allowed.
     #[inline(always)]
-    fn allowed(&self, pass: Pass) -> [f64; 2] {
+    fn allowed(&self, pass: Pass) -> [Abreast; 2] {
         let at = match pass {
             Pass::Correcting => 0,
             Pass::Relaxing => 1,
@@ -221,22 +313,40 @@ impl Range {
         [self.down[at], self.up[at]]
     }
 
-    /// Whether one of the ends has something to do. Most joints are far from both, which is soon seen.
+    /// Whether none of the ends has anything to do. Most joints are far from both, which is soon seen.
     #[inline(always)]
-    fn acts(&self, pass: Pass, v: f64) -> bool {
+    fn rests(&self, pass: Pass, v: Abreast) -> bool {
         let [down, up] = self.allowed(pass);
-        let rests = self.impulse_up == 0.0 && self.impulse_down == 0.0 && v + down >= 0.0 && v - up <= 0.0;
-        !rests
+        let in_lane = |lane: usize| {
+            (self.impulse_up.0[lane] == 0.0)
+                & (self.impulse_down.0[lane] == 0.0)
+                & (v.0[lane] + down.0[lane] >= 0.0)
+                & (v.0[lane] - up.0[lane] <= 0.0)
+        };
+        (0..ABREAST).fold(true, |rests, lane| rests & in_lane(lane))
     }
 
-    #[inline(always)]
-    fn update(&mut self, pass: Pass, inverse_mass: f64, mass: f64, v: &mut f64) {
-        let [most_down, most_up] = self.allowed(pass);
-        let up = (self.impulse_up - (*v + most_down) * mass).max(0.0);
-        *v += inverse_mass * (up - self.impulse_up);
-        self.impulse_up = up;
-        let down = (self.impulse_down - (*v - most_up) * mass).min(0.0);
-        *v += inverse_mass * (down - self.impulse_down);
-        self.impulse_down = down;
+    /// The ends change the velocities; returns the greatest change.
+    #[inline(never)]
+    fn update(&mut self, pass: Pass, inverse_mass: Abreast, mass: Abreast, v: &mut Abreast) -> f64 {
+        let [down, up] = self.allowed(pass);
+        let mut greatest = 0.0f64;
+        for lane in (0..ABREAST).filter(|lane| self.exists[*lane]) {
+            let (most_down, most_up, v) = (down.0[lane], up.0[lane], &mut v.0[lane]);
+            let (inverse_mass, mass) = (inverse_mass.0[lane], mass.0[lane]);
+            let [impulse_up, impulse_down] = [&mut self.impulse_up.0[lane], &mut self.impulse_down.0[lane]];
+            if *impulse_up == 0.0 && *impulse_down == 0.0 && *v + most_down >= 0.0 && *v - most_up <= 0.0 {
+                continue;
+            }
+            let before = *v;
+            let up = (*impulse_up - (*v + most_down) * mass).max(0.0);
+            *v += inverse_mass * (up - *impulse_up);
+            *impulse_up = up;
+            let down = (*impulse_down - (*v - most_up) * mass).min(0.0);
+            *v += inverse_mass * (down - *impulse_down);
+            *impulse_down = down;
+            greatest = greatest.max((*v - before).abs());
+        }
+        greatest
     }
 }

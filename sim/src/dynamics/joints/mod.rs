@@ -11,7 +11,6 @@
 
 pub mod bounds;
 pub mod equality;
-mod units;
 
 use super::trees::link::{Axis, Drive, DriveLaw};
 use super::trees::tree::Tree;
@@ -116,6 +115,7 @@ impl Tree {
     /// Adds springs, dampers and the drives that are not rows to the right-hand side, which holds -bias, and sets their
     /// part of the diagonal. The right-hand side is that of M' (v' - v) with M' the matrix above, so the velocity's own
     /// share is taken off.
+    #[inline(always)]
     pub(in crate::dynamics) fn joint_forces(&mut self, dt_s: f64) {
         for i in 0..self.links.len() {
             let Some(axis) = self.links[i].joint.axis() else { continue };

@@ -64,7 +64,7 @@ impl Solver {
 
     #[inline(always)]
     fn gather<S: Simd>(&mut self, simd: S, trees: &Trees, candidates: &[Candidate], settings: &Settings) {
-        self.joints.prepare(simd, trees, settings);
+        self.joints.prepare(trees, settings);
         self.equalities.prepare(simd, trees, settings);
         self.plain.clear();
         self.rolling.clear();
@@ -101,13 +101,13 @@ impl Solver {
     }
 
     /// Impulses that correct positions; `w` is what positions move by. They are what the next step begins with.
-    pub fn correct(&mut self, candidates: &[Candidate], sweeps: usize) {
-        self.joints.warm_start(&mut self.w);
+    pub fn correct(&mut self, trees: &Trees, candidates: &[Candidate], sweeps: usize) {
+        self.joints.warm_start(trees, &mut self.w);
         self.equalities.warm_start(&mut self.w);
         self.plain.push_impulses(&mut self.w);
         self.rolling.push_impulses(&mut self.w);
         let deep = candidates.iter().any(|candidate| candidate.touch.gap_m < -DEEP_M);
-        self.settle(Pass::Correcting, if deep { sweeps + MORE_SWEEPS } else { sweeps });
+        self.settle(trees, Pass::Correcting, if deep { sweeps + MORE_SWEEPS } else { sweeps });
         self.equalities.remember();
         self.found.clear();
         for (index, candidate) in candidates.iter().enumerate() {
@@ -119,7 +119,7 @@ impl Solver {
     /// Impulses without correction; `w` is then the velocity at the end of the step, and the touches tell what acted.
     pub fn relax(&mut self, trees: &Trees, candidates: &[Candidate], sweeps: usize) {
         let corrected_j = kinetic_j(&self.w);
-        self.settle(Pass::Relaxing, sweeps);
+        self.settle(trees, Pass::Relaxing, sweeps);
         if corrected_j - kinetic_j(&self.w) > HARD_J {
             self.take_only(trees, candidates);
         }
@@ -133,25 +133,25 @@ impl Solver {
 
     /// Keeps what the next step begins with. Before, nothing of the last step has changed.
     pub fn commit(&mut self, trees: &mut Trees, dt_s: f64) {
-        self.joints.commit(&mut trees.all, dt_s);
+        self.joints.commit(trees, dt_s);
         self.equalities.commit();
         std::mem::swap(&mut self.touches, &mut self.found);
     }
 
     /// So many sweeps, and more where ends of ranges and motors that are turned too fast are not settled by then.
-    fn settle(&mut self, pass: Pass, sweeps: usize) {
-        Arch::new().dispatch(Settling { solver: self, pass, sweeps });
+    fn settle(&mut self, trees: &Trees, pass: Pass, sweeps: usize) {
+        Arch::new().dispatch(Settling { solver: self, trees, pass, sweeps });
     }
 
     #[inline(always)]
-    fn settle_with(&mut self, pass: Pass, sweeps: usize) {
+    fn settle_with(&mut self, trees: &Trees, pass: Pass, sweeps: usize) {
         let mut pushed = 0.0;
         for sweep in 0..sweeps + MORE_SWEEPS {
             if sweep >= sweeps && pushed < UNSETTLED {
                 break;
             }
             let share = if sweep < sweeps + WHOLE_SWEEPS { 1.0 } else { DAMPED_SHARE };
-            pushed = self.sweep(pass, share);
+            pushed = self.sweep(trees, pass, share);
         }
     }
 
@@ -217,8 +217,8 @@ impl Solver {
     /// Contacts change by this share of what they would. The greatest velocity (rad/s or m/s) that joints took back, see
     /// [`JointRows::sweep`].
     #[inline(always)]
-    fn sweep(&mut self, pass: Pass, share: f64) -> f64 {
-        let pushed = self.joints.sweep(pass, &mut self.w);
+    fn sweep(&mut self, trees: &Trees, pass: Pass, share: f64) -> f64 {
+        let pushed = self.joints.sweep(pass, trees, &mut self.w);
         self.equalities.sweep(pass, &mut self.w);
         self.plain.sweep(pass, share, &mut self.w);
         self.rolling.sweep(pass, share, &mut self.w);
@@ -229,6 +229,7 @@ impl Solver {
 /// Work for the widest vectors that the processor has. They add and multiply as single numbers do, bit for bit.
 struct Settling<'a> {
     solver: &'a mut Solver,
+    trees: &'a Trees,
     pass: Pass,
     sweeps: usize,
 }
@@ -238,7 +239,7 @@ impl WithSimd for Settling<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
-        self.solver.settle_with(self.pass, self.sweeps);
+        self.solver.settle_with(self.trees, self.pass, self.sweeps);
     }
 }
 

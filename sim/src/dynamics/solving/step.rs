@@ -1,11 +1,13 @@
 //! One step of everything.
 
+use pulp::{Arch, Simd, WithSimd};
 use thiserror::Error;
 
-use crate::dynamics::Dynamics;
 use crate::dynamics::settings::Settings;
+use crate::dynamics::trees::Trees;
 use crate::dynamics::trees::spatial::ForceVector;
 use crate::dynamics::trees::tree::Tree;
+use crate::dynamics::{DVec3, Dynamics};
 
 impl Dynamics {
     /// Detects collisions, finds what forces act, and moves all trees by one step; once its buffers have grown it allocates
@@ -37,16 +39,14 @@ impl Dynamics {
 
     /// Velocities at the end of the step, with the drives as they are bounded.
     fn solve(&mut self) {
-        let settings = &self.settings;
-        for (tree, range) in self.trees.ranges() {
-            tree.prepare(settings.dt_s, settings.gravity_m_s2, &mut self.solver.w[range]);
-        }
-        let candidates = &self.collision.candidates;
-        self.solver.prepare(&self.trees, candidates, settings);
-        self.solver.correct(candidates, settings.sweeps);
-        unwhiten(&self.trees.all, &self.solver.w, &mut self.moving_v);
-        self.solver.relax(&self.trees, candidates, settings.relaxing_sweeps);
-        unwhiten(&self.trees.all, &self.solver.w, &mut self.final_v);
+        let Dynamics { settings, trees, collision, solver, moving_v, final_v } = self;
+        Arch::new().dispatch(Whitening { trees, w: &mut solver.w, settings });
+        let candidates = &collision.candidates;
+        solver.prepare(trees, candidates, settings);
+        solver.correct(trees, candidates, settings.sweeps);
+        Arch::new().dispatch(Unwhitening { trees, w: &solver.w, v: moving_v });
+        solver.relax(trees, candidates, settings.relaxing_sweeps);
+        Arch::new().dispatch(Unwhitening { trees, w: &solver.w, v: final_v });
     }
 
     /// Makes rows of the drives that exceeded their limits and of the joints that left their ranges; every round adds one at
@@ -94,25 +94,51 @@ pub struct Diverged {
 /// m/s or rad/s. Nothing real comes near; beyond, Rapier's f32 would soon overflow.
 const FASTEST: f64 = 1e6;
 
-fn unwhiten(trees: &[Tree], w: &[f64], v: &mut [f64]) {
-    let mut offset = 0;
-    for tree in trees {
-        let range = offset..offset + tree.dofs();
-        tree.factor.unwhiten(&tree.layout, &w[range.clone()], &mut v[range.clone()]);
-        offset = range.end;
+/// Work for the widest vectors that the processor has. They add and multiply as single numbers do, bit for bit.
+struct Whitening<'a> {
+    trees: &'a mut Trees,
+    w: &'a mut [f64],
+    settings: &'a Settings,
+}
+
+impl WithSimd for Whitening<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        let Settings { dt_s, gravity_m_s2, .. } = *self.settings;
+        for tree in &mut self.trees.all {
+            tree.prepare(dt_s, gravity_m_s2);
+        }
+        self.trees.whiten(dt_s, self.w);
+    }
+}
+
+/// Likewise.
+struct Unwhitening<'a> {
+    trees: &'a mut Trees,
+    w: &'a [f64],
+    v: &'a mut [f64],
+}
+
+impl WithSimd for Unwhitening<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        self.trees.unwhiten(self.w, self.v);
     }
 }
 
 impl Tree {
-    /// Factorises the mass matrix and sets `w` to the whitened velocities of a step without constraints.
-    fn prepare(&mut self, dt_s: f64, gravity_m_s2: crate::dynamics::DVec3, w: &mut [f64]) {
+    /// Sets up the mass matrix, what is on the right, and the velocities of a step without forces.
+    #[inline(always)]
+    fn prepare(&mut self, dt_s: f64, gravity_m_s2: DVec3) {
         self.bias(gravity_m_s2);
         self.joint_forces(dt_s);
         self.composite_mass_matrix();
-        self.factor.factorise(&self.layout);
         let mut start = std::mem::take(&mut self.unconstrained);
         self.spin_freely(dt_s, &mut start);
-        self.factor.whiten(&self.layout, dt_s, &start, &mut self.rhs, w);
         self.unconstrained = start;
     }
 }

@@ -17,6 +17,7 @@ use super::tree::Tree;
 
 impl Tree {
     /// Sets `rhs` to -bias with the forces from outside, and each link's own spatial inertia.
+    #[inline(always)]
     pub(in crate::dynamics) fn bias(&mut self, gravity_m_s2: DVec3) {
         let count = self.links.len();
         for i in 0..count {
@@ -50,6 +51,7 @@ impl Tree {
     }
 
     /// a_p + v_p x S q', the acceleration with q'' = 0. Gravity is an acceleration of the world upwards.
+    #[inline(always)]
     fn velocity_product(&self, i: usize, gravity_m_s2: DVec3) -> MotionVector {
         let lifted = MotionVector { angular: DVec3::ZERO, linear: -gravity_m_s2 };
         let velocity = self.velocity[i];
@@ -68,6 +70,7 @@ impl Tree {
     }
 
     /// Fills the packed rows from the links' own inertias (see [`Tree::bias`]), armatures and implicit terms.
+    #[inline(always)]
     pub(in crate::dynamics) fn composite_mass_matrix(&mut self) {
         for i in (0..self.links.len()).rev() {
             let composite = self.inertia[i];

@@ -5,7 +5,7 @@
 //! L has the sparsity of the tree: column by column, only the path to the world.
 //! Source: Featherstone 2008, section 6.5 and table 6.3.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::Simd;
 
 use super::layout::Layout;
 
@@ -13,7 +13,7 @@ pub struct Factor {
     /// Packed rows: M, after [`Factor::factorise`] L, whose diagonal is 1 and not stored.
     pub h: Vec<f64>,
     d: Vec<f64>,
-    inverse_root_d: Vec<f64>,
+    pub inverse_root_d: Vec<f64>,
 }
 
 /// Anything below is rounding, not inertia: a gram at a tenth of a millimetre has 1e-11 kg m^2.
@@ -31,11 +31,6 @@ impl Factor {
 
     /// M = L^T D L in place, from the leaves inwards.
     pub fn factorise(&mut self, layout: &Layout) {
-        Arch::new().dispatch(Factorising { factor: self, layout });
-    }
-
-    #[inline(always)]
-    fn factorise_with(&mut self, layout: &Layout) {
         for k in (0..layout.dofs()).rev() {
             let range = layout.row(k);
             let (before, from) = self.h.split_at_mut(range.start);
@@ -131,20 +126,5 @@ fn subtract<S: Simd>(simd: S, t: &mut [f64], l: f64, pivot: &[f64]) {
     }
     for (t, pivot) in t.iter_mut().zip(pivot) {
         *t -= l * pivot;
-    }
-}
-
-/// Work for the widest vectors that the processor has.
-struct Factorising<'a> {
-    factor: &'a mut Factor,
-    layout: &'a Layout,
-}
-
-impl WithSimd for Factorising<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) {
-        self.factor.factorise_with(self.layout);
     }
 }

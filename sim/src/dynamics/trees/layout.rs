@@ -4,6 +4,7 @@ use super::link::Link;
 
 /// Row k of a packed matrix holds the columns on the path from the world to degree of freedom k, k itself last: where
 /// M and its factor L are not zero (Featherstone 2008, chapter 8). Degrees of freedom of one joint follow each other.
+#[derive(PartialEq)]
 pub struct Layout {
     /// First degree of freedom of each link's joint; that of the next moving link where it has none.
     pub first_dof: Vec<usize>,

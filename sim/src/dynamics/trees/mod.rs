@@ -1,5 +1,6 @@
 //! All trees of a world, and where each one's degrees of freedom lie among all.
 
+pub mod abreast;
 pub mod energy;
 mod equations;
 mod factor;
@@ -16,6 +17,8 @@ use pulp::Simd;
 use rapier3d::glamx::{DPose3, DVec3};
 use serde::{Deserialize, Serialize};
 
+use abreast::{ABREAST, Alike};
+use layout::Layout;
 use rows::ConstraintRows;
 use spatial::ForceVector;
 use tree::Tree;
@@ -46,6 +49,9 @@ pub struct Trees {
     pub all: Vec<Tree>,
     /// First degree of freedom of each tree among all.
     pub offset: Vec<usize>,
+    /// Those that have joints, by their layouts, and those that have none.
+    pub alike: Vec<Alike>,
+    pub jointless: Vec<usize>,
 }
 
 impl Trees {
@@ -57,8 +63,23 @@ impl Trees {
         );
         let id = TreeId(self.all.len() as u16);
         self.offset.push(offset);
+        if tree.links.iter().any(|link| link.joint.axis().is_some()) {
+            self.set_beside(&tree.layout);
+        } else {
+            self.jointless.push(self.all.len());
+        }
         self.all.push(tree);
         id
+    }
+
+    /// Gives the tree that comes next a place among those that are like it.
+    fn set_beside(&mut self, layout: &Layout) {
+        let next = self.all.len();
+        let is_like = |alike: &&mut Alike| self.all[alike.trees[0]].layout == *layout;
+        match self.alike.iter_mut().filter(|alike| alike.trees.len() < ABREAST).find(is_like) {
+            Some(alike) => alike.trees.push(next),
+            None => self.alike.push(Alike::begin(next)),
+        }
     }
 
     pub fn ids(&self) -> impl Iterator<Item = TreeId> + use<> {
@@ -75,6 +96,33 @@ impl Trees {
             let range = *offset..offset + tree.dofs();
             (tree, range)
         })
+    }
+
+    /// Factorises all mass matrices, and sets `w` to the whitened velocities at the end of a step without constraints.
+    #[inline(always)]
+    pub fn whiten(&mut self, dt_s: f64, w: &mut [f64]) {
+        for alike in &mut self.alike {
+            alike.whiten(&mut self.all, &self.offset, dt_s, w);
+        }
+        for index in &self.jointless {
+            let (tree, offset) = (&mut self.all[*index], self.offset[*index]);
+            let own_w = &mut w[offset..offset + tree.dofs()];
+            tree.factor.factorise(&tree.layout);
+            tree.factor.whiten(&tree.layout, dt_s, &tree.unconstrained, &mut tree.rhs, own_w);
+        }
+    }
+
+    /// Velocities of all trees from the whitened ones.
+    #[inline(always)]
+    pub fn unwhiten(&mut self, w: &[f64], v: &mut [f64]) {
+        for alike in &mut self.alike {
+            alike.unwhiten(&self.all, &self.offset, w, v);
+        }
+        for index in &self.jointless {
+            let (tree, offset) = (&self.all[*index], self.offset[*index]);
+            let own = offset..offset + tree.dofs();
+            tree.factor.unwhiten(&tree.layout, &w[own.clone()], &mut v[own]);
+        }
     }
 
     /// Whether something moves a link; without, it is part of the world.

@@ -146,13 +146,6 @@ impl<const N: usize> ConstraintRows<N> {
         self.column.truncate(self.column.len() - shared);
     }
 
-    /// Appends a column of Y.
-    #[inline(always)]
-    pub fn push(&mut self, column: u16, y: [f64; N]) {
-        self.column.push(column);
-        self.y.push(y);
-    }
-
     /// Ends the group. Returns Y Y^T: inverse masses.
     #[inline(always)]
     pub fn close(&mut self) -> [[f64; N]; N] {
