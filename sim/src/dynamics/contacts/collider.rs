@@ -38,6 +38,7 @@ pub struct Surface {
     /// Middle and half extents of its bounds, in its own frame.
     middle_m: DVec3,
     half_m: DVec3,
+    half_length_m: f64,
     pub world_from_shape: DPose3,
     /// How near another surface may be that it could touch within the step; each side of a pair has a part in it.
     pub reach_m: f64,
@@ -72,22 +73,25 @@ impl Surface {
             is_round: is_round(&collider.shape),
             middle_m: local.center().as_dvec3(),
             half_m,
+            half_length_m: half_m.length(),
             world_from_shape: DPose3::IDENTITY,
             reach_m: 0.0,
             bounds: local,
             collider,
         };
-        surface.place(&world_from_body, trees, settings);
+        let spin_rad_s = body.map_or(0.0, |link| trees.spin_rad_s(link));
+        surface.place(&world_from_body, spin_rad_s, trees, settings);
         surface
     }
 
-    /// Puts it where its link is now.
-    pub fn place(&mut self, world_from_body: &DPose3, trees: &Trees, settings: &Settings) {
+    /// Puts it where its link is now, which turns this fast.
+    #[inline(always)]
+    pub fn place(&mut self, world_from_body: &DPose3, spin_rad_s: f64, trees: &Trees, settings: &Settings) {
         self.world_from_shape = *world_from_body * self.collider.body_from_shape;
         let middle_m = self.world_from_shape * self.middle_m;
         let fastest_m_s = self.body.map_or(0.0, |id| {
             let tree = &trees.all[id.tree.index()];
-            let turning_m_s = tree.velocity[id.link].angular.length() * self.half_m.length();
+            let turning_m_s = spin_rad_s * self.half_length_m;
             tree.point_velocity_m_s(id.link, middle_m).length() + turning_m_s
         });
         self.reach_m = (fastest_m_s + 0.5 * settings.margin_m_s) * settings.dt_s;

@@ -4,6 +4,7 @@
 //! one and now the other. So the points of the last step are part of the state. What is round may turn by far less: the place where it
 //! touches runs ahead of a point that goes along with it, and a force that acts behind that place drives it on.
 
+use pulp::{Arch, Simd, WithSimd};
 use rapier3d::math::Vector;
 use rapier3d::parry::bounding_volume::BoundingVolume;
 use rapier3d::parry::query::{
@@ -77,7 +78,7 @@ impl Collision {
 
     /// Collects what touches, or will within the step.
     pub fn detect(&mut self, trees: &Trees, settings: &Settings) {
-        self.place(trees, settings);
+        Arch::new().dispatch(Placing { collision: self, trees, settings });
         self.near.update(&self.surfaces, trees);
         self.candidates.clear();
         self.spare.extend(self.found.drain(..).map(|manifold| manifold.points));
@@ -109,19 +110,36 @@ impl Collision {
     }
 
     /// Puts the colliders that move where their links are.
+    #[inline(always)]
     fn place(&mut self, trees: &Trees, settings: &Settings) {
         let mut last = None;
         for (index, surface) in self.surfaces.iter_mut().enumerate() {
             let Some(body) = surface.body else { continue };
             // Colliders of a link follow each other.
-            let pose = match last {
-                Some((link, pose)) if link == body => pose,
-                _ => trees.world_from(body),
+            let (pose, spin_rad_s) = match last {
+                Some((link, pose, spin_rad_s)) if link == body => (pose, spin_rad_s),
+                _ => (trees.world_from(body), trees.spin_rad_s(body)),
             };
-            last = Some((body, pose));
-            surface.place(&pose, trees, settings);
+            last = Some((body, pose, spin_rad_s));
+            surface.place(&pose, spin_rad_s, trees, settings);
             self.near.place(ColliderId(index as u32), surface);
         }
+    }
+}
+
+/// Work for the widest registers that the processor has, with the same bits.
+struct Placing<'a> {
+    collision: &'a mut Collision,
+    trees: &'a Trees,
+    settings: &'a Settings,
+}
+
+impl WithSimd for Placing<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        self.collision.place(self.trees, self.settings);
     }
 }
 

@@ -59,6 +59,8 @@ struct JointRange {
     up: [Abreast; 2],
     impulse_up: Abreast,
     impulse_down: Abreast,
+    /// Whether one of them is not zero.
+    pushes: bool,
 }
 
 /// A joint without other rows gets one for its range at first only if it could reach an end when this much faster, rad/s or m/s.
@@ -170,6 +172,7 @@ impl JointRows {
                 up: approach(above, settings),
                 impulse_up: Abreast::ZERO,
                 impulse_down: Abreast::ZERO,
+                pushes: false,
             },
         });
     }
@@ -183,7 +186,7 @@ impl JointRows {
                 for drive in &self.drives[row.drives.clone()] {
                     impulse.0[drive.lane] += drive.impulse;
                 }
-                let acts = impulse.0.map(|impulse| impulse != 0.0);
+                let acts = impulse.mask(Abreast::ZERO, |impulse, zero| impulse != zero);
                 row.of(&self.column, &self.y).push_impulse(impulse, acts, &mut self.w);
             }
             alike.store(&trees.offset, &self.w, w);
@@ -212,8 +215,8 @@ impl JointRows {
                     let pushed = row.range.update(pass, row.inverse_mass, row.mass, &mut v);
                     greatest = greatest.max(pushed);
                 }
-                let acts = from_fn(|lane| v.0[lane] != before.0[lane]);
-                if acts != [false; ABREAST] {
+                let acts = v.mask(before, |v, before| v != before);
+                if acts.any() {
                     lanes.push_impulse((v - before) * row.mass, acts, &mut self.w);
                 }
             }
@@ -317,13 +320,9 @@ impl JointRange {
     #[inline(always)]
     fn rests(&self, pass: Pass, v: Abreast) -> bool {
         let [down, up] = self.allowed(pass);
-        let in_lane = |lane: usize| {
-            (self.impulse_up.0[lane] == 0.0)
-                & (self.impulse_down.0[lane] == 0.0)
-                & (v.0[lane] + down.0[lane] >= 0.0)
-                & (v.0[lane] - up.0[lane] <= 0.0)
-        };
-        (0..ABREAST).fold(true, |rests, lane| rests & in_lane(lane))
+        let above = (v + down).mask(Abreast::ZERO, |v, zero| v >= zero);
+        let below = (v - up).mask(Abreast::ZERO, |v, zero| v <= zero);
+        !self.pushes & above.and(below).all()
     }
 
     /// The ends change the velocities; returns the greatest change.
@@ -347,6 +346,8 @@ impl JointRange {
             *impulse_down = down;
             greatest = greatest.max((*v - before).abs());
         }
+        let impulses = self.impulse_up.0.iter().chain(&self.impulse_down.0);
+        self.pushes = impulses.fold(false, |pushes, impulse| pushes | (*impulse != 0.0));
         greatest
     }
 }

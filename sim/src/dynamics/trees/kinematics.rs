@@ -1,16 +1,36 @@
 //! Poses, joint axes and velocities of a tree's links.
 
+use pulp::{Arch, Simd, WithSimd};
 use rapier3d::glamx::{DMat3, DPose3, DQuat, DVec3};
 
 use super::link::Joint;
 use super::spatial::{MotionVector, turned};
 use super::tree::Tree;
 
+/// Work for the widest registers that the processor has, with the same bits.
+struct Kinematics<'a> {
+    tree: &'a mut Tree,
+}
+
+impl WithSimd for Kinematics<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        self.tree.pose_links();
+    }
+}
+
 impl Tree {
     /// From joint positions, with p the parent:  R = R_p R_0 R(q),  r = r_p + R_p (t_0 + ...),  and the axes
     ///   S = (a, r_a x a) of a hinge through r_a,  S = (0, a) of a slide,  both with a = R_p R_0 direction.
     /// Source: Featherstone 2008, section 4.1 and table 4.1, in world axes.
     pub(in crate::dynamics) fn kinematics(&mut self) {
+        Arch::new().dispatch(Kinematics { tree: self });
+    }
+
+    #[inline(always)]
+    fn pose_links(&mut self) {
         let root = &self.links[0];
         self.reference_m = match root.joint {
             Joint::Free => self.base * root.mass.com_m,
@@ -21,10 +41,14 @@ impl Tree {
                 Some(parent) => (self.rotation[parent], self.position_m[parent]),
                 None => (DMat3::IDENTITY, -self.reference_m),
             };
-            let placed =
-                if i == 0 && matches!(link.joint, Joint::Free) { self.base } else { link.parent_from_link };
-            let rotation = parent_rotation * DMat3::from_quat(placed.rotation);
-            let origin_m = parent_m + parent_rotation * placed.translation;
+            let (turned, moved_m) = match link.joint {
+                Joint::Free => (DMat3::from_quat(self.base.rotation), self.base.translation),
+                Joint::Fixed | Joint::Hinge(_) | Joint::Slide(_) => {
+                    (self.parent_from_link_rotation[i], link.parent_from_link.translation)
+                }
+            };
+            let rotation = parent_rotation * turned;
+            let origin_m = parent_m + parent_rotation * moved_m;
             let dof = self.layout.first_dof[i];
             (self.rotation[i], self.position_m[i]) = match &link.joint {
                 Joint::Fixed => (rotation, origin_m),
@@ -53,6 +77,7 @@ impl Tree {
     }
 
     /// v = v_p + S q'.
+    #[inline(always)]
     pub(in crate::dynamics) fn velocities(&mut self) {
         for (i, link) in self.links.iter().enumerate() {
             let dof = self.layout.first_dof[i];

@@ -130,6 +130,10 @@ impl Trees {
         self.all[link.tree.index()].layout.last_dof[link.link].is_some()
     }
 
+    pub fn spin_rad_s(&self, link: LinkId) -> f64 {
+        self.all[link.tree.index()].link_spin_rad_s(link.link).length()
+    }
+
     pub fn world_from(&self, link: LinkId) -> DPose3 {
         self.all[link.tree.index()].world_from_link(link.link)
     }

@@ -174,10 +174,16 @@ impl<const N: usize> ConstraintRows<N> {
         let are_neighbours = |pair: &[u16]| pair[0] + 1 == pair[1];
         let count = 1 + column.windows(2).take_while(|pair| are_neighbours(pair)).count();
         let first = usize::from(column[0]) + MARGIN - begin;
+        let y = &self.y[place..place + count];
+        if let Some(y) = y.first_chunk::<SIDE>() {
+            let y = std::array::from_fn(|row| Quad(y.map(|y| y[row])));
+            self.blocks.push(RowBlock { y, nothing: Quad::default(), first });
+            return SIDE;
+        }
         // Filled where it lies: to move what has been written number by number, a processor has to wait for it.
         self.blocks.push(RowBlock { y: [Quad::default(); N], nothing: Quad([-0.0; SIDE]), first });
         if let Some(block) = self.blocks.last_mut() {
-            for (side, y) in (begin..).zip(&self.y[place..place + count]) {
+            for (side, y) in (begin..).zip(y) {
                 block.nothing.0[side] = 0.0;
                 for (row, y) in block.y.iter_mut().zip(y) {
                     row.0[side] = *y;
@@ -199,7 +205,9 @@ impl<const N: usize> ConstraintRows<N> {
                 }
             }
         }
-        sums.map(|sums| sums.into_iter().sum())
+        let side = |side: usize| -> [f64; N] { std::array::from_fn(|row| sums[row][side]) };
+        let [first, second, third, fourth] = [side(0), side(1), side(2), side(3)];
+        std::array::from_fn(|row| first[row] + second[row] + third[row] + fourth[row])
     }
 
     /// Adds the impulses of a group.

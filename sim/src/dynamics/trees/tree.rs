@@ -41,6 +41,8 @@ pub struct Tree {
     pub(in crate::dynamics) unconstrained: Vec<f64>,
     /// Origin of the spatial vectors, world frame: centre of mass of a free first link, origin of a fixed one.
     pub(in crate::dynamics) reference_m: DVec3,
+    /// How links are turned in their parents with their joints at 0.
+    pub(in crate::dynamics) parent_from_link_rotation: Vec<DMat3>,
     pub(in crate::dynamics) rotation: Vec<DMat3>,
     /// Origins of the links relative to the reference.
     pub(in crate::dynamics) position_m: Vec<DVec3>,
@@ -80,6 +82,10 @@ impl Tree {
             dry_friction: vec![0.0; count],
             unconstrained: vec![0.0; dofs],
             reference_m: DVec3::ZERO,
+            parent_from_link_rotation: links
+                .iter()
+                .map(|link| DMat3::from_quat(link.parent_from_link.rotation))
+                .collect(),
             rotation: vec![DMat3::IDENTITY; count],
             position_m: vec![DVec3::ZERO; count],
             axis: vec![MotionVector::default(); dofs],

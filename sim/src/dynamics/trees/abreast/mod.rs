@@ -32,10 +32,32 @@ impl Abreast {
         Abreast(from_fn(|lane| of(self.0[lane], other.0[lane])))
     }
 
-    /// The bits that one of both has.
+    /// All bits where it is so, and none elsewhere: a mask, which stays in a vector.
+    #[inline(always)]
+    pub fn mask(self, other: Abreast, is: impl Fn(f64, f64) -> bool) -> Abreast {
+        self.with(other, |a, b| f64::from_bits(if is(a, b) { u64::MAX } else { 0 }))
+    }
+
+    #[inline(always)]
+    pub fn and(self, mask: Abreast) -> Abreast {
+        self.with(mask, |a, b| f64::from_bits(a.to_bits() & b.to_bits()))
+    }
+
     #[inline(always)]
     pub fn or(self, other: Abreast) -> Abreast {
         self.with(other, |a, b| f64::from_bits(a.to_bits() | b.to_bits()))
+    }
+
+    /// Whether a bit of one of the numbers is set.
+    #[inline(always)]
+    pub fn any(self) -> bool {
+        self.0.iter().fold(0, |bits, number| bits | number.to_bits()) != 0
+    }
+
+    /// Whether all bits of all numbers are set.
+    #[inline(always)]
+    pub fn all(self) -> bool {
+        self.0.iter().fold(u64::MAX, |bits, number| bits & number.to_bits()) == u64::MAX
     }
 }
 
@@ -91,11 +113,12 @@ impl AbreastRow<'_> {
         sums[0] + sums[1] + sums[2] + sums[3]
     }
 
-    /// Adds impulses where they act; elsewhere velocities stay what they are, the sign of a zero included.
+    /// Adds impulses where the mask says that they act; elsewhere velocities stay what they are, the sign of a zero included.
     #[inline(always)]
-    pub fn push_impulse(&self, impulse: Abreast, acts: [bool; ABREAST], w: &mut [Abreast]) {
-        let impulse = Abreast(from_fn(|lane| if acts[lane] { impulse.0[lane] } else { 0.0 }));
-        let nothing = Abreast(acts.map(|acts| if acts { 0.0 } else { -0.0 }));
+    pub fn push_impulse(&self, impulse: Abreast, acts: Abreast, w: &mut [Abreast]) {
+        let impulse = impulse.and(acts);
+        let nothing = Abreast([-0.0; ABREAST])
+            .with(acts, |nothing, acts| f64::from_bits(nothing.to_bits() & !acts.to_bits()));
         for (column, y) in self.column.iter().zip(self.y) {
             let change = (Abreast::ZERO + *y * impulse).or(nothing);
             w[usize::from(*column)] += change;
