@@ -382,19 +382,20 @@ impl Span {
         let (start, step) = (simd.splat_f32s(self.start_value), simd.splat_f32s(self.step_value));
         let length = simd.splat_f32s((self.end - self.first) as f32);
         let before = simd.splat_f32s(self.first as f32 - (first * lanes) as f32);
+        let start_vector = self.row * (grid.stride() / lanes);
         // How far each sample is from the first of the span.
         let mut offset = simd.sub_f32s(S::as_simd_f32s(&LANE).0[0], before);
         for vector in first..=last {
-            let inside = simd.and_m32s(
-                simd.greater_than_or_equal_f32s(offset, nothing),
-                simd.less_than_f32s(offset, length),
-            );
-            let nearness = simd.add_f32s(start, simd.mul_f32s(step, offset));
-            each(
-                self.row * (grid.stride() / lanes) + vector,
-                tag,
-                simd.select_f32s(inside, nearness, nothing),
-            );
+            let mut nearness = simd.add_f32s(start, simd.mul_f32s(step, offset));
+            // Only the first and the last reach beyond the span.
+            if vector == first || vector == last {
+                let inside = simd.and_m32s(
+                    simd.greater_than_or_equal_f32s(offset, nothing),
+                    simd.less_than_f32s(offset, length),
+                );
+                nearness = simd.select_f32s(inside, nearness, nothing);
+            }
+            each(start_vector + vector, tag, nearness);
             offset = simd.add_f32s(offset, simd.splat_f32s(lanes as f32));
         }
     }

@@ -167,14 +167,15 @@ impl Default for Row {
 #[inline(always)]
 fn mark_edges([top, middle, bottom]: [&[u32]; SAMPLES + 1], edges: &mut Vec<u32>) {
     edges.resize(top.len(), 0);
-    let down = top.iter().zip(middle).zip(bottom);
-    for (edge, ((top, middle), bottom)) in edges.iter_mut().zip(down) {
-        *edge = (top ^ middle) | (middle ^ bottom);
-    }
-    for row in [top, middle, bottom] {
-        for (edge, (here, right)) in edges.iter_mut().zip(row.iter().zip(&row[1..])) {
-            *edge |= here ^ right;
-        }
+    let last = top.len() - 1;
+    // Nothing is to the right of the last.
+    edges[last] = (top[last] ^ middle[last]) | (middle[last] ^ bottom[last]);
+    let [(top, top_right), (middle, middle_right), (bottom, bottom_right)] =
+        [top, middle, bottom].map(|row| (&row[..last], &row[1..=last]));
+    for (x, edge) in edges[..last].iter_mut().enumerate() {
+        let down = (top[x] ^ middle[x]) | (middle[x] ^ bottom[x]);
+        let right = (top[x] ^ top_right[x]) | (middle[x] ^ middle_right[x]) | (bottom[x] ^ bottom_right[x]);
+        *edge = down | right;
     }
 }
 
