@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use tandem_tools_spec::{EndReason, Refusal, RefusalClass, ResultReply, SpecError, SurfaceQuery};
+use tandem_tools_spec::{Color, EndReason, Refusal, RefusalClass, ResultReply, SpecError, SurfaceQuery};
 
 /// The text says what would work, because its reader is often a language model.
 #[derive(Debug, thiserror::Error)]
@@ -27,8 +27,12 @@ pub enum EpisodeError {
     TooManySteps { asked: u32, most: u32, protocol: &'static str },
     #[error("pixel [{u}, {v}] is outside the image; u goes from 0 to {}, v from 0 to {}", .width - 1, .height - 1)]
     PixelOutside { u: i64, v: i64, width: u32, height: u32 },
-    #[error("{}; look with observe, and give a pixel that is on it", no_surface(query))]
-    NoSurface { query: SurfaceQuery },
+    #[error("{}; look with observe, and give a pixel that is on it", no_surface(query, seen))]
+    NoSurface {
+        query: SurfaceQuery,
+        /// The colours of which there is something.
+        seen: Vec<Color>,
+    },
     #[error("the episode has ended ({}); observe, get_robot_state, get_status and finish still answer; start_episode begins another", reason_text(*.reason))]
     Ended {
         reason: EndReason,
@@ -123,13 +127,10 @@ pub enum RobotError {
     )]
     Changed { path: PathBuf, was: String, now: String },
     #[error(
-        "{task} needs hands that close, and the robot {robot} has none: {}; or give a robot with thumbs and fingers by --robot",
-        match .have.is_empty() {
-            true => "no task that there is here can do without; write one by --task-file whose conditions ask for no grip".into(),
-            false => format!("tasks that such a robot can play are {}", .have.join(", ")),
-        }
+        "{task} needs hands that close, and the robot {robot} has none; give by --task-file a task whose conditions ask for no grip, as \
+         gateway/examples/tasks/pass_the_parcel.toml, or by --robot a robot with thumbs and fingers"
     )]
-    NoFingers { task: String, robot: String, have: Vec<String> },
+    NoFingers { task: String, robot: String },
     #[error("the robot {robot} cannot have this base controller: {what}")]
     Controller { robot: String, what: String },
 }
@@ -208,10 +209,16 @@ pub enum CheckpointError {
     Progress(#[from] postcard::Error),
 }
 
-fn no_surface(query: &SurfaceQuery) -> String {
+fn no_surface(query: &SurfaceQuery, seen: &[Color]) -> String {
+    let name = |color: &Color| format!("{color:?}").to_lowercase();
     match (query.color, query.pixel) {
         (Some(color), _) => {
-            format!("nothing of any size in the picture is {}", format!("{color:?}").to_lowercase())
+            let seen: Vec<String> = seen.iter().map(name).collect();
+            format!(
+                "nothing of any size in the picture is {}; there is something {}",
+                name(&color),
+                seen.join(", ")
+            )
         }
         (None, pixel) => format!("nothing is seen at pixel {:?}", pixel.unwrap_or_default()),
     }

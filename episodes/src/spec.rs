@@ -14,9 +14,8 @@ use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, Wording};
 use crate::error::{RobotError, SceneError};
 use crate::protocol::{Rules, rules};
 use crate::scoring::Phase;
-use crate::stress::{self, Stress, TaskWords};
-use crate::task_file::task_set;
-use crate::tasks::{Spread, Task};
+use crate::stress::{self, Stress};
+use crate::tasks::{Spread, Task, TaskWords};
 use crate::variation::Variation;
 
 /// Everything that makes an episode what it is. Equal values, played by equal calls on the same build, end in the same
@@ -335,9 +334,7 @@ impl RobotFile {
         if !task.needs_fingers() || model.has_fingers() {
             return Ok(());
         }
-        let own = task_set(Vec::new());
-        let without = own.all().filter(|task| !task.needs_fingers()).map(|task| task.id.into());
-        Err(RobotError::NoFingers { task: task.id.into(), robot: self.kind(), have: without.collect() })
+        Err(RobotError::NoFingers { task: task.id.into(), robot: self.kind() })
     }
 
     /// A name that tells files of different content apart.

@@ -1,5 +1,7 @@
 //! The command line: which subcommands there are.
 
+use clap::builder::StyledStr;
+use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::commands::{
@@ -40,6 +42,11 @@ enum CliCommand {
 }
 
 impl Cli {
+    /// What the command line of the process says; where it makes no sense, says why and ends the process.
+    pub fn read() -> Cli {
+        Cli::try_parse().unwrap_or_else(|error| with_advice(error).exit())
+    }
+
     /// Runs the subcommand that the command line names.
     pub fn run(self) -> CommandResult {
         match self.command {
@@ -63,9 +70,28 @@ impl Cli {
     }
 }
 
+/// A mistake with the flag in it that other servers have in its place.
+fn with_advice(mut error: clap::Error) -> clap::Error {
+    if error.get(ContextKind::InvalidArg) == Some(&ContextValue::String("--port".into())) {
+        let advice = StyledStr::from("the port is a part of --listen, as in --listen 127.0.0.1:8701");
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice]));
+    }
+    error
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_flag_of_other_servers_is_told_by_ours() {
+        let told = |flags: &[&str]| {
+            let mistake = Cli::try_parse_from([&["tandem", "serve"], flags].concat()).expect_err("a mistake");
+            with_advice(mistake).to_string()
+        };
+        assert!(told(&["--port", "8701"]).contains("tip: the port is a part of --listen"));
+        assert!(!told(&["--ports", "8701"]).contains("a part of --listen"));
+    }
 
     #[test]
     fn every_subcommand_says_what_it_does_and_every_flag_what_it_is_for() {

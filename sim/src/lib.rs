@@ -84,5 +84,5 @@ pub use sides::{Side, Sides};
 pub use units::{CONTROL_DT_S, CONTROL_HZ, GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL};
 pub use world::{
     BodyTouch, HandContacts, ObjectFile, ObjectModel, ObjectPart, ObjectPlacement, ObjectState, ObjectStep,
-    PlannedPush, RobotStep, SceneSource, Snapshot, Step, Touch, World, WorldSpec,
+    PlannedPush, RobotPress, RobotStep, SceneSource, Snapshot, Step, Touch, World, WorldSpec,
 };

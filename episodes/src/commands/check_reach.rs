@@ -1,12 +1,12 @@
 //! Whether a robot's wrists would reach the poses asked for.
 
-use tandem_ik::FrameError;
+use tandem_ik::{FrameError, Tolerance};
 use tandem_sim::Sides;
 use tandem_tools_spec::{CheckReach, HandReach, ReachReply};
 
 use super::motion::{Motion, Reach};
 use super::move_wrists::wrist_targets;
-use super::upper_body::{REACH_TOLERANCE, STEPS_AHEAD_M};
+use super::upper_body::STEPS_AHEAD_M;
 use crate::convert::coarse;
 
 /// The reply to `check_reach`.
@@ -17,7 +17,7 @@ pub fn check_reach(args: &CheckReach, motion: &Motion) -> ReachReply {
     };
     let targets = wrist_targets(halves, args.frame.unwrap_or_default(), motion);
     let Reach { errors, joints_at_limit, ahead_m } = motion.reach(&targets, args.keep_waist.unwrap_or(false));
-    let hands = errors.map(|error| error.map(hand_reach));
+    let hands = Sides::from_fn(|side| errors[side].map(|error| hand_reach(error, &motion.tolerance(side))));
     ReachReply {
         robot: args.robot.clone(),
         reachable: hands.iter().flatten().all(|hand| hand.reachable),
@@ -28,10 +28,9 @@ pub fn check_reach(args: &CheckReach, motion: &Motion) -> ReachReply {
     }
 }
 
-fn hand_reach(error: FrameError) -> HandReach {
+fn hand_reach(error: FrameError, tolerance: &Tolerance) -> HandReach {
     HandReach {
-        reachable: error.position_m <= REACH_TOLERANCE.position_m
-            && error.orientation_rad <= REACH_TOLERANCE.orientation_rad,
+        reachable: tolerance.accepts(&error),
         position_error_m: coarse(error.position_m),
         orientation_error_rad: coarse(error.orientation_rad),
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
-use tandem_ik::{Configuration, FrameError, Outcome, SolveOptions, Solver, frame_errors};
+use tandem_ik::{Configuration, FrameError, Outcome, Solver, Tolerance, frame_errors};
 use tandem_sim::{
     BaseCommand, BaseLimits, CONTROL_HZ, HAND_JOINTS, RobotCommand, RobotModel, RobotSensed, Side, Sides,
     UPPER_JOINTS,
@@ -13,12 +13,11 @@ use tandem_tools_spec::PoseFrame;
 
 use super::columns;
 use super::footing::Footing;
-use super::upper_body::{REACH_TOLERANCE, STEPS_AHEAD_M, UpperBody, ahead_m};
+use super::upper_body::{STEPS_AHEAD_M, UpperBody, ahead_m};
 use crate::convert::isometry_from_sim;
 
 /// Part of the remaining error that one control step removes: smooth, and a lag of two steps.
 const GAIN: f64 = 0.5;
-const REACH_RESTARTS: usize = 8;
 /// Control steps in which wrists come to where they can.
 const GOING_STEPS: u32 = 75;
 /// Hands give way by no more than this ahead and to the side (m) and about the vertical (rad). They creep back at this rate while they may
@@ -171,7 +170,8 @@ impl Motion {
         let before = &self.state.approaches;
         self.state.approaches = Sides::from_fn(|side| {
             let off = isometry_from_sim(&sensed.pelvis_from_wrist[side]).inv_mul(&asked[side]?);
-            let missing_m = off.translation.vector.norm() + M_PER_RAD * off.rotation.angle();
+            let turned_rad = if self.body.turns_hand[side] { off.rotation.angle() } else { 0.0 };
+            let missing_m = off.translation.vector.norm() + M_PER_RAD * turned_rad;
             let lately_m = before[side].map_or(missing_m, |before| before.lately_m);
             Some(Approach { missing_m, lately_m: lately_m + LATELY_PART * (missing_m - lately_m) })
         });
@@ -415,25 +415,31 @@ impl Motion {
         ahead_m(&self.robot.model, upper_rad) - self.body.rest_ahead_m(&self.robot.model)
     }
 
+    /// What a wrist may miss that has come to its target.
+    pub fn tolerance(&self, side: Side) -> Tolerance {
+        self.body.tolerance(side)
+    }
+
     /// How near to `targets` (pelvis frame) the wrists would come to rest. An arm without a target keeps its joints.
     pub fn reach(&self, targets: &Sides<Option<Isometry3<f64>>>, keeps_waist: bool) -> Reach {
-        let mut solver = self.body.solver();
-        solver.tolerance = REACH_TOLERANCE;
-        solver.limits.velocity = self.body.speeds_rad_s(targets, keeps_waist);
-        let mut configuration = self.configuration();
-        let options = SolveOptions { restarts: REACH_RESTARTS, ..SolveOptions::default() };
+        let speeds_rad_s = self.body.speeds_rad_s(targets, keeps_waist);
         let tasks = self.body.tasks(targets, 1.0);
-        solver.solve(&mut configuration, &tasks, &options);
-        let mut errors = frame_errors(&configuration, &tasks);
-        let errors = targets.each_ref().map(|target| target.as_ref().and_then(|_| errors.next()));
-        let moves = solver.limits.velocity.iter().map(|speed| *speed > 0.0).collect::<Vec<_>>();
-        let at_limit = tandem_ik::saturated(&configuration).into_iter().filter(|joint| moves[*joint]);
-        let joints_at_limit = at_limit.map(|joint| self.body.model.joints()[joint].name.clone()).collect();
         // A command goes there step by step, and leaves the trunk more upright than the posture that is found at once.
         let mut twin = self.another();
         twin.state.restraint = Restraint { keeps_waist, stands_fast: false };
         let aims = targets.map(|target| target.map_or(Aim::Joints, Aim::Carried));
         (0..GOING_STEPS).for_each(|_| twin.follow(&aims));
+        let mut asked = targets.by_side().filter(|(_, target)| target.is_some());
+        let configuration = match asked.all(|(side, _)| self.body.turns_hand[side]) {
+            true => self.body.posture(self.configuration(), &tasks, &speeds_rad_s),
+            // What is found at once for an arm that cannot turn its hand gives up the place for the turn.
+            false => twin.configuration(),
+        };
+        let mut errors = frame_errors(&configuration, &tasks);
+        let errors = targets.each_ref().map(|target| target.as_ref().and_then(|_| errors.next()));
+        let at_limit = tandem_ik::saturated(&configuration).into_iter();
+        let at_limit = at_limit.filter(|joint| speeds_rad_s[*joint] > 0.0);
+        let joints_at_limit = at_limit.map(|joint| self.body.model.joints()[joint].name.clone()).collect();
         Reach { errors, joints_at_limit, ahead_m: self.ahead_m(&twin.state.upper_rad) }
     }
 

@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Point3};
 use tandem_ik::{
-    Capsule, DampingTask, FrameId, FrameTask, IkError, JointCouplingTask, Model, PostureTask, SelfCollision,
-    Solver, Task, Tolerance,
+    Capsule, Configuration, DampingTask, FrameId, FrameTask, IkError, JointCouplingTask, Model, PostureTask,
+    SelfCollision, SolveOptions, Solver, Task, Tolerance,
 };
 use tandem_sim::{
     CONTROL_HZ, JOINTS, Pose, RobotCommand, RobotModel, RobotSource, Side, Sides, UPPER, UPPER_JOINTS,
@@ -16,14 +16,19 @@ use super::columns;
 const ARM_SPEED_RAD_S: f64 = 4.0;
 const WAIST_SPEED_RAD_S: f64 = 1.0;
 const ORIENTATION_COST: f64 = 0.5;
+/// Of an arm that cannot hold its hand any way round: what it misses of that takes its wrist off its place by millimetres.
+const SHORT_ARM_ORIENTATION_COST: f64 = 0.02;
+/// A pose has as many numbers, and an arm takes as many joints to hold its hand at a place any way round.
+const POSE_NUMBERS: usize = 6;
 /// Elbows stay near where they rest, without pulling a wrist off its target.
 const POSTURE_COST: f64 = 0.02;
 /// The trunk bends only when the arms do not suffice: bending moves the centre of mass.
 const WAIST_COST: f64 = 0.15;
 const DAMPING_COST: f64 = 2e-4;
+const REACH_RESTARTS: usize = 8;
 /// A robot steps whose centre of mass its arms take farther ahead, as measured of one arm and of both at several heights.
 pub const STEPS_AHEAD_M: f64 = 0.05;
-pub const REACH_TOLERANCE: Tolerance = Tolerance { position_m: 0.005, orientation_rad: 0.05 };
+const REACH_TOLERANCE: Tolerance = Tolerance { position_m: 0.005, orientation_rad: 0.05 };
 
 /// Shared by all robots of an episode.
 pub struct UpperBody {
@@ -31,6 +36,8 @@ pub struct UpperBody {
     pub wrists: Sides<FrameId>,
     /// Position in an action row of each joint of the model.
     pub columns: Vec<usize>,
+    /// Whether an arm has the joints to hold its hand at a place any way round.
+    pub turns_hand: Sides<bool>,
     self_collision: SelfCollision,
     rest_rad: Vec<f64>,
     /// Of all joints above the hips, in action order.
@@ -44,9 +51,11 @@ impl UpperBody {
         let model = upper_body(&Model::from_parsed_mjcf(&robot.document.model)?)?;
         let column_of = |name: &str| (0..UPPER_JOINTS).find(|column| names[UPPER[*column]] == name);
         let columns: Vec<usize> = model.joints().iter().filter_map(|joint| column_of(&joint.name)).collect();
+        let joints = |side: Side| columns.iter().filter(|column| columns::arm(side).contains(column)).count();
         let rest_rad = columns.iter().map(|column| rest.upper_rad[*column].into()).collect();
         Ok(UpperBody {
             wrists: Sides { left: model.frame("left_wrist")?, right: model.frame("right_wrist")? },
+            turns_hand: Sides::from_fn(|side| joints(side) >= POSE_NUMBERS),
             self_collision: self_collision(&model, &robot.model)?,
             model,
             columns,
@@ -60,6 +69,14 @@ impl UpperBody {
         ahead_m(robot, &self.rest_upper_rad)
     }
 
+    /// What a wrist may miss that has come to its target: with an arm of few joints, any of the way that the hand is turned.
+    pub fn tolerance(&self, side: Side) -> Tolerance {
+        match self.turns_hand[side] {
+            true => REACH_TOLERANCE,
+            false => Tolerance { orientation_rad: f64::INFINITY, ..REACH_TOLERANCE },
+        }
+    }
+
     /// Wrists at those `targets` that there are, of whose error one step is to remove the part `gain`, and as little else as
     /// that takes.
     pub fn tasks(&self, targets: &Sides<Option<Isometry3<f64>>>, gain: f64) -> Vec<Task> {
@@ -67,7 +84,9 @@ impl UpperBody {
         for (side, target) in targets.by_side() {
             let Some(target) = target else { continue };
             let wrist = FrameTask::new(self.wrists[side], target);
-            tasks.push(Task::Frame(FrameTask { orientation_cost: ORIENTATION_COST, gain, ..wrist }));
+            let orientation_cost =
+                if self.turns_hand[side] { ORIENTATION_COST } else { SHORT_ARM_ORIENTATION_COST };
+            tasks.push(Task::Frame(FrameTask { orientation_cost, gain, ..wrist }));
         }
         tasks.push(Task::Posture(PostureTask {
             target: self.rest_rad.clone(),
@@ -90,6 +109,22 @@ impl UpperBody {
         let mut solver = Solver::new(&self.model, 1.0 / CONTROL_HZ);
         solver.self_collision = Some(self.self_collision.clone());
         solver
+    }
+
+    /// The posture, found at once from another, that does best what tasks ask of joints that may be this fast.
+    pub fn posture<'a>(
+        &self,
+        from: Configuration<'a>,
+        tasks: &[Task],
+        speeds_rad_s: &[f64],
+    ) -> Configuration<'a> {
+        let mut solver = self.solver();
+        solver.tolerance = REACH_TOLERANCE;
+        solver.limits.velocity = speeds_rad_s.to_vec();
+        let mut posture = from;
+        let options = SolveOptions { restarts: REACH_RESTARTS, ..SolveOptions::default() };
+        solver.solve(&mut posture, tasks, &options);
+        posture
     }
 
     /// How fast each joint of the model may move: not at all in an arm whose wrist has no target, nor in a waist that is kept.

@@ -36,6 +36,14 @@ pub fn meaning(node: &Node, names: &Names) -> Result<Meaning, Mistake> {
     Ok(meaning)
 }
 
+/// What a chain of `&&` joins; what is no such chain, by itself.
+pub fn joined(node: &Node) -> Vec<&Node> {
+    match &node.kind {
+        NodeKind::Pair { operator: Operator::And, parts } => parts.iter().flat_map(joined).collect(),
+        _ => vec![node],
+    }
+}
+
 fn small(size: usize, at: &Range<usize>) -> Result<(), Mistake> {
     match size <= MOST_PARTS {
         true => Ok(()),

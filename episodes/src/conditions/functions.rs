@@ -134,7 +134,7 @@ pub static FUNCTIONS: &[Function] = &[
     number("turned_deg", TWO_OBJECTS, [-180.0, 180.0], |f| {
         f.facts.turned_rad(f.object(0), f.object(1)).to_degrees().into()
     })
-    .help("how far the second object is turned about the vertical against the first"),
+    .help("how far the second object is turned about the vertical against the first, from -180 to 180, positive to the left"),
     number("sites_apart_m", TWO_SITES, NOT_NEGATIVE, |f| {
         (f.facts.site_m(f.object(0), f.site(1)) - f.facts.site_m(f.object(2), f.site(3))).length().into()
     })

@@ -108,6 +108,19 @@ impl Truth {
         }
     }
 
+    /// What a comparison compares.
+    pub fn sides(&self, facts: &Facts) -> Option<[f64; 2]> {
+        match self {
+            Truth::Compared { sides, .. } => Some(sides.each_ref().map(|side| side.value(facts))),
+            _ => None,
+        }
+    }
+
+    /// Whether its nearness grows on the way to holding, as a hand comes to what it is to hold.
+    pub fn grows(&self) -> bool {
+        matches!(self, Truth::Fact { statement: Statement { near: Some(_), .. }, .. })
+    }
+
     /// What it is whatever happens in the world, if that can be told.
     pub fn always(&self) -> Option<bool> {
         match self {

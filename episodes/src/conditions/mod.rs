@@ -29,6 +29,18 @@ pub struct Names {
     /// Names of expressions and of objects in which mistakes were found: who uses them makes none.
     pub mistaken_terms: BTreeSet<String>,
     pub mistaken_objects: BTreeSet<String>,
+    /// What the terms that are conditions are made of.
+    pub parts_of_terms: BTreeMap<String, Vec<ConditionPart>>,
+}
+
+/// Something that has to hold, with others, for a condition to hold.
+#[derive(Clone, Debug)]
+pub struct ConditionPart {
+    /// The byte of the file at which it begins.
+    pub at: usize,
+    /// As it is written.
+    pub text: String,
+    pub truth: Arc<Truth>,
 }
 
 /// What is wrong with an expression, and what would be right.
@@ -67,6 +79,27 @@ pub fn number(text: &str, names: &Names) -> Result<Arc<Number>, Mistake> {
 /// Reads an expression of either kind, for which a file has a name.
 pub fn term(text: &str, names: &Names) -> Result<Meaning, Mistake> {
     check::meaning(&syntax::read(text)?, names)
+}
+
+/// What has to hold at once where a condition holds that begins at this byte of its file: the parts that it joins by `&&`, and in the
+/// place of a term the parts of that.
+pub fn parts(text: &str, starts_at: usize, names: &Names) -> Result<Vec<ConditionPart>, Mistake> {
+    let mut found = Vec::new();
+    for node in check::joined(&syntax::read(text)?) {
+        let of_term = match &node.kind {
+            syntax::NodeKind::Name(name) => names.parts_of_terms.get(name),
+            _ => None,
+        };
+        match of_term {
+            Some(parts) => found.extend_from_slice(parts),
+            None => found.push(ConditionPart {
+                at: starts_at + node.at.start,
+                text: text[node.at.clone()].split_whitespace().collect::<Vec<_>>().join(" "),
+                truth: check::truth(node, names)?,
+            }),
+        }
+    }
+    Ok(found)
 }
 
 #[cfg(test)]

@@ -18,8 +18,8 @@ use crate::commands::RobotSheet;
 use crate::convert::{rounded, wire_limits};
 use crate::protocol::rules;
 use crate::scoring::Phase;
-use crate::stress::{self, Stress, TaskWords};
-use crate::tasks::{Task, TaskSet};
+use crate::stress::{self, Stress};
+use crate::tasks::{Task, TaskSet, TaskWords};
 
 /// The reply to `list_tasks` with these tasks, as they are told under `stress`, where robots follow base commands within `limits`.
 pub fn task_list(tasks: &TaskSet, stress: Option<Stress>, limits: &BaseLimits) -> TaskList {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3};
 use tandem_sim::render::{Camera, Cameras, Frame, RenderRequest, Renderer};
 use tandem_sim::{Step, World};
-use tandem_tools_spec::{DepthReply, DepthRow, PoseFrame, SurfaceQuery};
+use tandem_tools_spec::{Color, DepthReply, DepthRow, PoseFrame, SurfaceQuery};
 
 use super::proprioception::{Detail, Proprioception, calibration, robot_state};
 use super::surface::{self, CameraPoses};
@@ -164,7 +164,10 @@ impl Observer {
         };
         let surfaces = surface::find(&view, query, &poses);
         if surfaces.is_empty() {
-            return Err(EpisodeError::NoSurface { query: *query });
+            let of = |color: &Color| SurfaceQuery { pixel: None, color: Some(*color) };
+            let seen =
+                Color::ALL.into_iter().filter(|color| !surface::find(&view, &of(color), &poses).is_empty());
+            return Err(EpisodeError::NoSurface { query: *query, seen: seen.collect() });
         }
         Ok(DepthReply {
             robot: name.into(),

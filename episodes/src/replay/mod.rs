@@ -1,12 +1,14 @@
 //! Recordings brought back: simulated again and compared step by step, or drawn again by any camera.
 
 mod look_back;
+mod phase_trace;
 mod pictures;
 mod scene;
 mod verify;
 mod video;
 
 pub use look_back::RecordedEpisode;
+pub use phase_trace::{Closest, ConditionTrace, Held, Moment, PartTrace, PhaseTrace};
 pub use pictures::{DrawnPictures, PicturesError, PicturesPlan, draw_all};
 pub use scene::{EpisodeCamera, EpisodeRenderer, PictureSize};
 pub use verify::{Difference, Verdict, Verification, verify};

@@ -96,8 +96,8 @@ impl Session {
         let kind = self.spec().robot.kind();
         let info = |name: &String| RobotInfo { robot: name.clone(), kind: kind.clone() };
         Briefing {
-            shared_instruction: task.shared_instruction().map(str::to_owned),
             instructions: describe::instructions(task, &words),
+            shared_instruction: words.shared,
             instruction: words.joint,
             robots: self.motions.iter().map(|motion| info(&motion.robot.name)).collect(),
             kinds: vec![describe::robot_kind(kind.clone(), &self.motions[0].robot)],

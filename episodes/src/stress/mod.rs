@@ -24,12 +24,12 @@ use serde::{Deserialize, Serialize};
 use tandem_sim::render::{Cameras, Scenery};
 use tandem_sim::{Sensing, SplitMix64, World};
 
-use crate::tasks::{Spread, Task};
+use crate::tasks::{Spread, Task, TaskWords};
 
 pub use execution::{Execution, ExecutionMemory};
 pub use layout::distractors;
 pub use partner::Silence;
-pub use words::{TaskWords, reworded_tasks};
+pub use words::{reworded, reworded_tasks};
 
 /// What goes wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -226,16 +226,15 @@ pub fn cameras(stress: Option<Stress>, seed: u32, world: &World) -> Cameras {
 
 /// The words in which the policies of an episode are told its task.
 pub fn task_words(stress: Option<Stress>, task: &'static Task) -> TaskWords {
-    let reworded = stress
-        .and_then(|stress| stress.on(StressAxis::Words))
-        .and_then(|level| TaskWords::reworded(task, level));
+    let reworded =
+        stress.and_then(|stress| stress.on(StressAxis::Words)).and_then(|level| reworded(task, level));
     reworded.unwrap_or_else(|| TaskWords::of(task))
 }
 
-/// Whether an episode of `task` can be laid under `stress`: a task of a file has no other words than its own.
+/// Whether an episode of `task` can be laid under `stress`: a task has other words only where its file gives some.
 pub fn is_possible(stress: Option<Stress>, task: &'static Task) -> bool {
     let words = stress.and_then(|stress| stress.on(StressAxis::Words));
-    words.is_none_or(|level| TaskWords::reworded(task, level).is_some())
+    words.is_none_or(|level| reworded(task, level).is_some())
 }
 
 /// Numbers that belong to an axis under a seed; `part` tells robots, objects or times apart. Levels share them, so that a higher one is

@@ -7,16 +7,8 @@ use std::sync::OnceLock;
 use serde::Deserialize;
 
 use super::StressLevel;
-use crate::tasks::Task;
-
-/// What policies are told to do.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct TaskWords {
-    /// For a policy that directs all robots.
-    pub joint: String,
-    /// For policies that direct one each, in the order of the robots.
-    pub robots: Vec<String>,
-}
+use crate::task_file::tandem_plus;
+use crate::tasks::{Task, TaskWords};
 
 /// The re-wordings of one task, by level.
 #[derive(Deserialize)]
@@ -31,27 +23,22 @@ fn rewordings() -> &'static BTreeMap<String, Rewording> {
     READ.get_or_init(|| serde_json::from_str(include_str!("words.json")).expect("the file is tested"))
 }
 
-/// The tasks that there are other words for.
+/// The tasks of the binary that there are other words for.
 pub fn reworded_tasks() -> impl Iterator<Item = &'static str> {
-    rewordings().keys().map(String::as_str)
+    let plus = tandem_plus().iter().filter(|task| reworded(task, StressLevel::One).is_some());
+    rewordings().keys().map(String::as_str).chain(plus.map(|task| task.id))
 }
 
-impl TaskWords {
-    /// The task's own.
-    pub fn of(task: &Task) -> TaskWords {
-        TaskWords {
-            joint: task.instruction.into(),
-            robots: task.robots.iter().map(|robot| robot.instruction.into()).collect(),
-        }
+/// A task in other words: those of its file, or those that are kept of the benchmark's; `None` where nobody has worded it in others.
+pub fn reworded(task: &Task, level: StressLevel) -> Option<TaskWords> {
+    if let Some(file) = &task.file {
+        return file.rewordings.as_ref().map(|levels| level.of(levels.each_ref()).clone());
     }
-
-    /// Others; `None` where nobody has worded the task in others.
-    pub fn reworded(task: &Task, level: StressLevel) -> Option<TaskWords> {
-        let Rewording { joint, robots } = rewordings().get(task.id).filter(|_| task.file.is_none())?;
-        let of = |texts: &[String; 3]| level.of(std::array::from_fn(|index| texts[index].clone()));
-        let robot = |name: &str| robots.get(name).map(of);
-        Some(TaskWords { joint: of(joint), robots: task.robot_names().map(robot).collect::<Option<_>>()? })
-    }
+    let Rewording { joint, robots } = rewordings().get(task.id)?;
+    let of = |texts: &[String; 3]| level.of(texts.each_ref()).clone();
+    let robot = |name: &str| robots.get(name).map(of);
+    let robots = task.robot_names().map(robot).collect::<Option<_>>()?;
+    Some(TaskWords { joint: of(joint), shared: None, robots })
 }
 
 #[cfg(test)]
@@ -77,9 +64,9 @@ mod tests {
 
     #[test]
     fn every_role_of_every_task_has_words_that_are_ever_less_its_own() {
-        for task in tasks::ALL {
+        for task in tasks::ALL.iter().chain(tandem_plus().iter().copied()) {
             let own = TaskWords::of(task);
-            let levels = StressLevel::ALL.map(|level| TaskWords::reworded(task, level).expect(task.id));
+            let levels = StressLevel::ALL.map(|level| reworded(task, level).expect(task.id));
             let texts = |words: &TaskWords| [vec![words.joint.clone()], words.robots.clone()].concat();
             let strangeness = levels.each_ref().map(|words| {
                 let pairs = texts(&own).into_iter().zip(texts(words));
@@ -101,6 +88,5 @@ mod tests {
                 }
             }
         }
-        assert_eq!(reworded_tasks().count(), tasks::ALL.len());
     }
 }

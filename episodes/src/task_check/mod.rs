@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use tandem_sim::{CONTROL_HZ, Step};
+use tandem_sim::{CONTROL_HZ, RobotPress, Step};
 use tandem_tools_spec::Protocol;
 
 use crate::EpisodeError;
@@ -12,12 +12,14 @@ use crate::replay::{EpisodeCamera, EpisodeRenderer};
 use crate::scoring::{Done, Facts, Phase};
 use crate::session::{Built, build};
 use crate::spec::EpisodeSpec;
-use crate::tasks::Task;
+use crate::tasks::{Task, TaskWords};
 
 /// So long nobody acts: more than anything takes to fall from a table, and than is waited for until a thing counts as released.
 const TRIAL_STEPS: u32 = 100;
 /// What moves less stays where it was put.
 const STAYS_M: f32 = 0.03;
+/// Below this, robots stand on the floor.
+const FEET_M: f32 = 0.08;
 /// What turns less stays as it was put.
 const STAYS_RAD: f32 = 0.1;
 
@@ -92,10 +94,16 @@ impl Falls {
         self.0.into_iter().map(line).collect()
     }
     /// Names what has not stayed where it was put.
-    fn find(&mut self, task: &Task, seed: u32, start: &Step, end: &Step) {
+    fn find(
+        &mut self,
+        task: &Task,
+        seed: u32,
+        [start, end]: [&Step; 2],
+        first_pressed: &[Option<RobotPress>],
+    ) {
         let trial_s = f64::from(TRIAL_STEPS) / CONTROL_HZ;
-        let robots = start.robots.iter().zip(&end.robots).zip(task.robots);
-        for ((before, after), spot) in robots {
+        let robots = start.robots.iter().zip(&end.robots).zip(task.robots).zip(first_pressed);
+        for (((before, after), spot), pressed) in robots {
             let by_m =
                 after.truth.world_from_pelvis().translation - before.truth.world_from_pelvis().translation;
             if after.truth.fallen || by_m.length() > STAYS_M {
@@ -106,8 +114,9 @@ impl Falls {
                 };
                 self.add(spot.name, || {
                     format!(
-                        "seed {seed}: robot {} {how} within {trial_s:.0} s; it needs level floor at z = 0 and nothing in its way",
-                        spot.name
+                        "seed {seed}: robot {} {how} within {trial_s:.0} s; it needs level floor at z = 0 and nothing in its way{}",
+                        spot.name,
+                        pressed.as_ref().map_or(String::new(), told_press)
                     )
                 });
             }
@@ -141,6 +150,14 @@ impl Falls {
     }
 }
 
+/// What was in a robot's way first.
+fn told_press(press: &RobotPress) -> String {
+    let RobotPress { link, on, at_m } = press;
+    let on = on.as_ref().map_or("the room".into(), |on| format!("{on:?}"));
+    let [x_m, y_m, z_m] = at_m.to_array();
+    format!(": first its {link} presses on {on}, at ({x_m:.2}, {y_m:.2}, {z_m:.2})")
+}
+
 impl TaskCheck {
     fn stand_still(&mut self, spec: &EpisodeSpec, falls: &mut Falls) -> Result<(), TaskCheckError> {
         let (task, seed) = (spec.task, spec.seed);
@@ -152,31 +169,35 @@ impl TaskCheck {
         self.note_what_holds(task, &scores.facts(&start));
         let commands: Vec<_> = (0..world.robots().len()).map(|robot| world.rest_command(robot)).collect();
         let mut step = start.clone();
+        let mut first_pressed = vec![None; commands.len()];
         for _ in 0..TRIAL_STEPS {
             let diverged = |source| TaskCheckError::Diverged { task: task.id, seed, source };
             step = world.control_step(&commands).map_err(diverged)?;
             scores.update(&step);
+            for (robot, pressed) in first_pressed.iter_mut().enumerate() {
+                let above_feet = |press: &RobotPress| press.at_m.z > FEET_M;
+                *pressed = pressed.take().or_else(|| world.presses_of(robot).into_iter().find(above_feet));
+            }
         }
         if let Some((phase, time_s)) = scores.reached().next() {
             return Err(TaskCheckError::ReachedByNobody { task: task.id, phase: phase.id, time_s, seed });
         }
-        falls.find(task, seed, &start, &step);
+        falls.find(task, seed, [&start, &step], &first_pressed);
         Ok(())
     }
 
     /// Notes what a robot's operator reads of what the seed chooses though its own instruction holds that back.
     fn note_secrets(&mut self, task: &Task) {
         let Some(ways) = task.file.as_ref().and_then(|file| file.variants.get()) else { return };
-        let chosen = |text: &dyn Fn(&Task) -> &'static str| ways.iter().any(|way| text(way) != text(ways[0]));
-        let names = task.robots.iter().enumerate();
-        let kept: Vec<&str> = names
-            .filter(|(robot, _)| !chosen(&|way| way.robots[*robot].instruction))
-            .map(|(_, spot)| spot.name)
-            .collect();
-        if kept.is_empty() || kept.len() == task.robots.len() {
+        let chosen =
+            |text: &dyn Fn(&'static Task) -> &'static str| ways.iter().any(|way| text(way) != text(ways[0]));
+        let (told, kept): (Vec<usize>, Vec<usize>) =
+            (0..task.robots.len()).partition(|robot| chosen(&|way| way.robots[*robot].instruction));
+        if kept.is_empty() || told.is_empty() {
             return;
         }
-        let who = kept.join(" and ");
+        let names: Vec<&str> = kept.iter().map(|robot| task.robots[*robot].name).collect();
+        let who = names.join(" and ");
         if chosen(&|way| way.shared_instruction().unwrap_or(way.instruction)) {
             self.notes.push(format!(
                 "what the seed chooses is not in the own instruction of {who}, but an operator of that robot alone reads it in the \
@@ -190,6 +211,28 @@ impl TaskCheck {
                      told phases; word it without",
                     Phase::number(index),
                     phase.id
+                ));
+            }
+        }
+        self.note_rewordings(ways, [&told, &kept]);
+    }
+
+    /// Notes re-wordings that tell other robots than the task's own words what the seed chooses.
+    fn note_rewordings(&mut self, ways: &[&'static Task], [told, kept]: [&[usize]; 2]) {
+        let words = |way: &'static Task| way.file.as_ref().and_then(|file| file.rewordings.as_ref());
+        let levels = words(ways[0]).map_or(0, |levels| levels.len());
+        for level in 0..levels {
+            let chosen = |text: &dyn Fn(&'static TaskWords) -> &'static str| {
+                let text = |way: &'static Task| words(way).map(|levels| text(&levels[level]));
+                ways.iter().any(|way| text(way) != text(ways[0]))
+            };
+            let tells = |robot: &usize| chosen(&|words| &words.robots[*robot]);
+            let shared = chosen(&|words| words.shared.as_ref().unwrap_or(&words.joint));
+            if shared || kept.iter().any(tells) || !told.iter().all(tells) {
+                self.notes.push(format!(
+                    "[[rewordings]] number {} do not tell the same robots what the seed chooses as the instructions do; {{...}} of a \
+                     choice stands in the words of those that are told it, and in no others'",
+                    level + 1
                 ));
             }
         }

@@ -59,6 +59,17 @@ fn what_falls_is_named() {
 }
 
 #[test]
+fn what_is_in_a_robots_way_is_named() {
+    let table = r#"<mujoco><worldbody><geom type="plane" size="5 5 1"/>
+        <geom type="box" size="0.3 0.3 0.02" pos="0.25 0 0.7"/></worldbody></mujoco>"#;
+    let mut source = task(0.05, [LIFTED, LIFTED]).file.as_ref().unwrap().source.clone();
+    source.text = source.text.replace("scene = \"floor\"", &format!("scene_mjcf = '''{table}'''"));
+    let check = check_task(task_of(source).unwrap(), &[0], None).unwrap();
+    let told = check.falls.iter().find(|line| line.contains("robot A")).expect("it stands in a table");
+    assert!(told.contains(": first its ") && told.contains("presses on the room, at (0."), "{told}");
+}
+
+#[test]
 fn what_robots_keep_from_each_other_is_not_told_elsewhere() {
     let text = |joint: &str, description: &str| {
         format!(
@@ -99,6 +110,19 @@ done = '"{{way}}" == "left" ? time_s() > 100 : time_s() > 200'
     let [joint, phase] = &told[..] else { panic!("{told:?}") };
     assert!(joint.contains("own instruction of B") && joint.contains("give shared_instruction"), "{joint}");
     assert!(phase.contains("the description of p1 gone"), "{phase}");
+    // In other words, too.
+    let words = |to_a: &str, to_b: &str| {
+        let words = format!(
+            "[[rewordings]]\ninstruction = \"Off to the {{way}}.\"\nshared_instruction = \"Off as A says.\"\n\
+             robots.A = \"{to_a}\"\nrobots.B = \"{to_b}\"\n"
+        );
+        notes(&format!("{kept}\n{}", words.repeat(3)), "B is there.")
+    };
+    assert_eq!(words("Off to the {way} with B.", "Off with you as A says."), Vec::<String>::new());
+    for (to_a, to_b) in [("Off to the {way}.", "Off to the {way}."), ("Off with B.", "Off with you.")] {
+        let told = words(to_a, to_b);
+        assert!(told.len() == 3 && told[0].starts_with("[[rewordings]] number 1 do not tell"), "{told:?}");
+    }
 }
 
 #[test]

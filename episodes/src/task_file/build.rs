@@ -12,6 +12,7 @@ use super::choices::{ways, with_options};
 use super::error::{Mistakes, TaskFileError};
 use super::phases;
 use super::reading::{Reading, lasting, place_in_file};
+use super::rewordings::in_words;
 use super::suites::suite_of;
 use super::table::{Extent, ObjectTable, OffsetTable, RobotTable, TaskTable};
 use crate::conditions::Names;
@@ -76,6 +77,9 @@ pub(super) fn task(source: &TaskSource, xxh3: &str) -> Result<&'static Task, Tas
     let undecided = one_way(source, xxh3, ways(&choices).swap_remove(0), &variants)?;
     let file = undecided.file.map(|file| TaskFile {
         shared_instruction: table.shared_instruction.as_ref().map(with_all),
+        rewordings: table.rewordings.as_ref().and_then(|rewordings| {
+            in_words(rewordings.as_ref(), |text| with_options(text.as_ref(), &choices))
+        }),
         chosen: Vec::new(),
         ..file
     });
@@ -139,6 +143,8 @@ impl Reading<'_> {
             self.wrong(table.phases.span(), format!("a task has 1 to {MOST_PHASES} [[phases]]"));
         }
         let phases = phases::phases(self, table.terms, table.phases.into_inner(), &mut names);
+        let rewordings = self.rewordings(&table.rewordings, &table.shared_instruction, &robots);
+        let (phases, conditions): (Vec<_>, Vec<_>) = phases.into_iter().unzip();
         let (scene, scene_mjcf) = scene?;
         let task = Task {
             id: lasting(table.id.as_ref()),
@@ -158,6 +164,9 @@ impl Reading<'_> {
             agentic_steps,
             thinking_s,
             shared_instruction: table.shared_instruction.as_ref().map(|text| lasting(text.as_ref())),
+            rewordings,
+            needs_fingers: table.needs_fingers,
+            conditions,
             suite: None,
             chosen: Vec::new(),
             variants: Arc::default(),

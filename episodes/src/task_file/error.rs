@@ -35,19 +35,22 @@ impl fmt::Display for Mistakes {
 /// A mistake with its line under it, and marks under what is meant.
 fn shown(name: &str, text: &str, at: Range<usize>, what: &str) -> String {
     let start = floor_char(text, at.start);
+    let [number, column] = line_and_column(text, start);
+    let before = column - 1;
     let line_start = text[..start].rfind('\n').map_or(0, |newline| newline + 1);
     let line = text[line_start..].lines().next().unwrap_or_default();
-    let number = 1 + text[..line_start].matches('\n').count();
-    let before = text[line_start..start].chars().count();
     let end = floor_char(text, at.end).clamp(start, line_start + line.len().max(start - line_start));
     let marks = text[start..end].chars().count().max(1);
     let margin = " ".repeat(number.to_string().len());
     let pad = " ".repeat(before);
-    format!(
-        "{name}:{number}:{}: {what}\n {number} | {line}\n {margin} | {pad}{}",
-        before + 1,
-        "^".repeat(marks)
-    )
+    format!("{name}:{number}:{column}: {what}\n {number} | {line}\n {margin} | {pad}{}", "^".repeat(marks))
+}
+
+/// The line and the column of a byte of a text, both from 1.
+pub fn line_and_column(text: &str, byte: usize) -> [usize; 2] {
+    let before = &text[..floor_char(text, byte)];
+    let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+    [1 + before.matches('\n').count(), 1 + before[line_start..].chars().count()]
 }
 
 /// The last place at or before a byte at which a letter begins.

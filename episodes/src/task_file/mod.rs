@@ -9,6 +9,7 @@ mod error;
 mod filling;
 mod phases;
 mod reading;
+mod rewordings;
 mod suites;
 mod table;
 #[cfg(test)]

@@ -8,35 +8,43 @@ use toml::Spanned;
 
 use super::reading::{Reading, lasting, place_in_file};
 use super::table::{MilestoneTable, PhaseTable};
-use crate::conditions::{self, Mistake, Names, Truth};
+use crate::conditions::{self, ConditionPart, Meaning, Mistake, Names, Truth};
 use crate::scoring::{Condition, Done, Facts, Milestone, Nearness, Phase};
+use crate::tasks::{PhaseCondition, PhaseSetting};
 
 const EXAMPLE: &str =
     "give done = '...', or first = '...' and then = '...', or lasting = '...' and for_s, or milestones";
 /// Nothing is waited for any longer.
 const LONGEST_S: f64 = 3600.0;
 
-/// The phases, and before them the terms, each of which may name those above it.
+/// The phases and what their conditions are made of, and before them the terms, each of which may name those above it.
 pub(super) fn phases(
     reading: &mut Reading,
     terms: BTreeMap<Spanned<String>, Spanned<String>>,
     tables: Vec<PhaseTable>,
     names: &mut Names,
-) -> Vec<Phase> {
+) -> Vec<(Phase, Vec<PhaseCondition>)> {
     let mut terms: Vec<_> = terms.into_iter().collect();
     terms.sort_by_key(|(name, _)| name.span().start);
     for (name, text) in terms {
         reading.id(&name, "a term");
         match reading.meant(&text, |text| conditions::term(text, names)) {
-            Some(meaning) => drop(names.terms.insert(name.into_inner(), meaning)),
+            Some(meaning) => {
+                if let Meaning::Truth(_) = &meaning
+                    && let Some(parts) = reading.parts(&text, names)
+                {
+                    names.parts_of_terms.insert(name.as_ref().clone(), parts);
+                }
+                names.terms.insert(name.into_inner(), meaning);
+            }
             None => drop(names.mistaken_terms.insert(name.into_inner())),
         }
     }
-    let mut found: Vec<Phase> = Vec::new();
+    let mut found: Vec<(Phase, Vec<PhaseCondition>)> = Vec::new();
     for table in tables {
         reading.id(&table.id, "a phase");
         reading.words(&table.description);
-        if found.iter().any(|phase| phase.id == table.id.as_ref()) {
+        if found.iter().any(|(phase, _)| phase.id == table.id.as_ref()) {
             reading.wrong(table.id.span(), "there is a phase of this id already");
         }
         found.extend(reading.phase(&table, names));
@@ -45,14 +53,8 @@ pub(super) fn phases(
 }
 
 impl Reading<'_> {
-    fn phase(&mut self, table: &PhaseTable, names: &Names) -> Option<Phase> {
-        let (done, parts) = self.done(table, names)?;
-        let done = match &table.spoiled {
-            None => done,
-            Some(text) => {
-                Done::Unless { spoiled: condition(&self.condition(text, names)?), done: leaked(done) }
-            }
-        };
+    fn phase(&mut self, table: &PhaseTable, names: &Names) -> Option<(Phase, Vec<PhaseCondition>)> {
+        let (done, mut conditions) = self.done(table, names)?;
         let near = match &table.near {
             None => None,
             Some(text) => Some(self.meant(text, |text| conditions::number(text, names))?),
@@ -62,22 +64,29 @@ impl Reading<'_> {
                 let value = number.value(facts);
                 if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) as f32 }
             }),
-            None => leaked(move |facts: &Facts| {
-                let sum: f32 = parts.iter().map(|part| part.nearness(facts)).sum();
-                sum / parts.len() as f32
-            }),
+            None => nearness_of(&conditions),
         };
-        Some(Phase {
+        let done = match &table.spoiled {
+            None => done,
+            Some(text) => {
+                let spoiled = self.asked(PhaseSetting::Spoiled, text, 0.0, names)?;
+                let done = Done::Unless { spoiled: condition(&spoiled.truth), done: leaked(done) };
+                conditions.push(spoiled);
+                done
+            }
+        };
+        let phase = Phase {
             id: lasting(table.id.as_ref()),
             description: lasting(table.description.as_ref()),
             collaborative: table.collaborative,
             done,
             nearness,
-        })
+        };
+        Some((phase, conditions))
     }
 
-    /// How a phase is reached, and what has to hold for it at the end.
-    fn done(&mut self, table: &PhaseTable, names: &Names) -> Option<(Done, Vec<Arc<Truth>>)> {
+    /// How a phase is reached, and by which conditions.
+    fn done(&mut self, table: &PhaseTable, names: &Names) -> Option<(Done, Vec<PhaseCondition>)> {
         let PhaseTable { done, first, then, broken, lasting, for_s, at_end, milestones, .. } = table;
         let given =
             (done.is_some(), first.is_some() || then.is_some(), lasting.is_some(), milestones.is_some());
@@ -99,27 +108,25 @@ impl Reading<'_> {
         }
         match (done, (first, then), (lasting, for_s), milestones) {
             (Some(done), ..) => {
-                let truth = self.condition(done, names)?;
-                Some((Done::When(condition(&truth)), vec![truth]))
+                let asked = self.asked(PhaseSetting::Done, done, 0.0, names)?;
+                Some((Done::When(condition(&asked.truth)), vec![asked]))
             }
             (_, (Some(first), Some(then)), ..) => {
-                let (first, then) = (self.condition(first, names), self.condition(then, names));
-                let broken = self.condition_or(broken, names, false);
-                let (first, then, broken) = (first?, then?, broken?);
-                let done = Done::Sequence {
-                    first: condition(&first),
-                    then: condition(&then),
-                    broken: condition(&broken),
-                };
-                Some((done, vec![first, then]))
+                let first = self.asked(PhaseSetting::First, first, 0.0, names);
+                let then = self.asked(PhaseSetting::Then, then, 0.0, names);
+                let broken = self.asked_or(PhaseSetting::Broken, broken, names, false);
+                let (first, then, (broken, may_break)) = (first?, then?, broken?);
+                let done =
+                    Done::Sequence { first: condition(&first.truth), then: condition(&then.truth), broken };
+                Some((done, [first, then].into_iter().chain(may_break).collect()))
             }
             (_, _, (Some(lasting), Some(for_s)), _) => {
-                let truth = self.condition(lasting, names);
-                let at_end = self.condition_or(at_end, names, true);
                 let for_s = self.duration_s(for_s);
-                let (truth, at_end) = (truth?, at_end?);
-                let done = Done::Lasting { condition: condition(&truth), for_s, at_end: condition(&at_end) };
-                Some((done, vec![truth]))
+                let asked = self.asked(PhaseSetting::Lasting, lasting, for_s, names);
+                let at_end = self.asked_or(PhaseSetting::AtEnd, at_end, names, true);
+                let (asked, (at_end, asked_at_end)) = (asked?, at_end?);
+                let done = Done::Lasting { condition: condition(&asked.truth), for_s, at_end };
+                Some((done, [asked].into_iter().chain(asked_at_end).collect()))
             }
             (_, _, _, Some(milestones)) => self.milestones(milestones, names),
             _ => {
@@ -133,22 +140,58 @@ impl Reading<'_> {
         &mut self,
         tables: &Spanned<Vec<MilestoneTable>>,
         names: &Names,
-    ) -> Option<(Done, Vec<Arc<Truth>>)> {
-        let mut parts = Vec::new();
-        let mut found = Vec::new();
+    ) -> Option<(Done, Vec<PhaseCondition>)> {
+        let mut conditions = Vec::new();
         for table in tables.as_ref() {
             let for_s = table.for_s.as_ref().map_or(0.0, |for_s| self.duration_s(for_s));
-            let truth = self.condition(&table.condition, names)?;
-            found.push(Milestone { condition: condition(&truth), for_s });
-            parts.push(truth);
+            conditions.push(self.asked(PhaseSetting::Milestone, &table.condition, for_s, names)?);
         }
-        if found.is_empty() {
+        if conditions.is_empty() {
             let what =
                 "no milestones; give some, as [{ condition = '...' }, { condition = '...', for_s = 0.5 }]";
             self.wrong(tables.span(), what);
             return None;
         }
-        Some((Done::Milestones(Vec::leak(found)), parts))
+        let milestone =
+            |asked: &PhaseCondition| Milestone { condition: condition(&asked.truth), for_s: asked.for_s };
+        let found: Vec<Milestone> = conditions.iter().map(milestone).collect();
+        Some((Done::Milestones(Vec::leak(found)), conditions))
+    }
+
+    /// A condition of a phase, with what it is made of.
+    fn asked(
+        &mut self,
+        setting: PhaseSetting,
+        text: &Spanned<String>,
+        for_s: f64,
+        names: &Names,
+    ) -> Option<PhaseCondition> {
+        let truth = self.condition(text, names)?;
+        let placed = |part: ConditionPart| (self.place(part.at), part);
+        let parts = self.parts(text, names)?.into_iter().map(placed).collect();
+        Some(PhaseCondition { setting, for_s, truth, parts })
+    }
+
+    /// As phases have it, and as [`Reading::asked`]; where no condition is given, what is always so.
+    fn asked_or(
+        &mut self,
+        setting: PhaseSetting,
+        text: &Option<Spanned<String>>,
+        names: &Names,
+        otherwise: bool,
+    ) -> Option<(Condition, Option<PhaseCondition>)> {
+        match text {
+            Some(text) => {
+                let asked = self.asked(setting, text, 0.0, names)?;
+                Some((condition(&asked.truth), Some(asked)))
+            }
+            None => Some((condition(&Truth::Always(otherwise).into()), None)),
+        }
+    }
+
+    /// What an expression without mistakes is made of.
+    fn parts(&self, text: &Spanned<String>, names: &Names) -> Option<Vec<ConditionPart>> {
+        conditions::parts(text.as_ref(), place_in_file(&self.source.text, text), names).ok()
     }
 
     fn duration_s(&mut self, for_s: &Spanned<f64>) -> f64 {
@@ -174,19 +217,6 @@ impl Reading<'_> {
         None
     }
 
-    /// The condition, or what is always so where none is given.
-    fn condition_or(
-        &mut self,
-        text: &Option<Spanned<String>>,
-        names: &Names,
-        otherwise: bool,
-    ) -> Option<Arc<Truth>> {
-        match text {
-            Some(text) => self.condition(text, names),
-            None => Some(Truth::Always(otherwise).into()),
-        }
-    }
-
     /// What an expression means; a mistake in it is told by its place in the file.
     fn meant<T>(&mut self, text: &Spanned<String>, read: impl Fn(&str) -> Result<T, Mistake>) -> Option<T> {
         match read(text.as_ref()) {
@@ -203,6 +233,23 @@ impl Reading<'_> {
 
 fn at_in_file(start: usize, at: Range<usize>) -> Range<usize> {
     start + at.start..start + at.end
+}
+
+/// How near a phase is whose file does not say it: the mean of what has to hold for it at the end.
+fn nearness_of(conditions: &[PhaseCondition]) -> Nearness {
+    let counts = |asked: &&PhaseCondition| match asked.setting {
+        PhaseSetting::Done
+        | PhaseSetting::First
+        | PhaseSetting::Then
+        | PhaseSetting::Lasting
+        | PhaseSetting::Milestone => true,
+        PhaseSetting::Broken | PhaseSetting::AtEnd | PhaseSetting::Spoiled => false,
+    };
+    let parts: Vec<Arc<Truth>> = conditions.iter().filter(counts).map(|asked| asked.truth.clone()).collect();
+    leaked(move |facts: &Facts| {
+        let sum: f32 = parts.iter().map(|part| part.nearness(facts)).sum();
+        sum / parts.len() as f32
+    })
 }
 
 /// As phases have it, for as long as the program runs.

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use toml::Spanned;
 
-use super::error::{Mistakes, TaskFileError};
+use super::error::{Mistakes, TaskFileError, line_and_column};
 use super::filling::{filled, placeholders, told, unfilled_place};
 use crate::conditions::nearest;
 use crate::tasks::{ChosenOption, TaskSource};
@@ -45,6 +45,12 @@ impl<'a> Reading<'a> {
         };
         let found = std::mem::take(&mut self.found).into_iter().map(written).collect();
         TaskFileError::Mistakes(Mistakes::new(name, text, found))
+    }
+
+    /// The line and the column of the file itself at which that stands which is at this byte of `source`.
+    pub fn place(&self, at: usize) -> [usize; 2] {
+        let text = &self.source_as_written.text;
+        line_and_column(text, unfilled_place(text, self.chosen, at))
     }
 
     pub fn wrong(&mut self, at: Range<usize>, what: impl Into<String>) {

@@ -16,6 +16,11 @@ pub struct TaskTable {
     pub instruction: Spanned<String>,
     /// What operators of one robot each read in its place, where it tells what not every robot may know.
     pub shared_instruction: Option<Spanned<String>>,
+    /// The same in other words, for levels 1, 2 and 3 of stress.
+    pub rewordings: Option<Spanned<Vec<RewordingTable>>>,
+    /// Hands have to close, whatever conditions ask for.
+    #[serde(default)]
+    pub needs_fingers: bool,
     #[serde(default)]
     pub budget: BudgetTable,
     /// What the seed chooses among: `{name}` in the texts of the file stands for the option.
@@ -45,6 +50,15 @@ pub struct BudgetTable {
 pub struct ChoiceTable {
     pub name: Spanned<String>,
     pub options: Spanned<Vec<Spanned<String>>>,
+}
+
+/// What is told in the place of the instructions of the same names.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RewordingTable {
+    pub instruction: Spanned<String>,
+    pub shared_instruction: Option<Spanned<String>>,
+    pub robots: BTreeMap<String, Spanned<String>>,
 }
 
 #[derive(Debug, Deserialize)]

@@ -149,6 +149,49 @@ fn mistakes_in_choices_are_told_by_their_places() {
     assert!(error.contains("lift.toml:4:25: no choice \"box\"; [[choices]] have: none"), "{error}");
 }
 
+/// Other words for the file with a choice in it, which tell the robot as much as its own.
+const OTHER_WORDS: &str = r#"
+[[rewordings]]
+instruction = "Raise the box by its {side} side."
+shared_instruction = "Raise the box."
+robots.A = "Raise it by its {side} side."
+"#;
+
+#[test]
+fn a_file_may_have_other_words_of_its_own() {
+    let text = with_choice() + &OTHER_WORDS.repeat(2) + &OTHER_WORDS.replace("Raise", "Up with");
+    let task = load(&text).unwrap_or_else(|error| panic!("{error}"));
+    let words = |task: &Task| task.file.as_ref().unwrap().rewordings.clone().unwrap();
+    assert_eq!(words(task)[0].joint, "Raise the box by its [left / right] side.");
+    let drawn = task.under(3);
+    let side = drawn.chosen("side").unwrap();
+    assert_eq!(words(drawn)[2].robots, [format!("Up with it by its {side} side.")]);
+    assert_eq!(words(drawn)[2].shared.as_deref(), Some("Up with the box."));
+    let check = |text: String, expected: &str| {
+        let error = load(&text).expect_err(expected);
+        assert!(error.contains(expected), "{error}");
+    };
+    check(with_choice() + OTHER_WORDS, "there are 3 [[rewordings]] or none");
+    check(text.replace("robots.A", "robots.B"), "give words for each robot: { A = \"...\" }");
+    check(text.replace("shared_instruction = \"Raise the box.\"\n", ""), "so has each of [[rewordings]]");
+    check(
+        FILE.to_owned() + &OTHER_WORDS.replace("{side} ", "").repeat(3),
+        "no shared_instruction to word anew",
+    );
+    check(text.replace("its {side} side.\"\nshared", "its {sid} side.\"\nshared"), "no choice \"sid\"");
+}
+
+#[test]
+fn a_file_says_that_hands_have_to_close() {
+    let without =
+        FILE.replace("held = 'holds(\"A\", \"right\", \"box\")'", "held = '!hands_off(\"A\", \"box\")'");
+    assert!(load(FILE).unwrap().needs_fingers());
+    assert!(!load(&without).unwrap().needs_fingers());
+    let says = without.replace("scene = \"floor\"", "scene = \"floor\"\nneeds_fingers = true");
+    assert!(load(&says).unwrap().needs_fingers());
+    assert!(tandem_plus().iter().all(|task| task.needs_fingers()));
+}
+
 #[test]
 fn conditions_ask_what_was_chosen() {
     let asks = r#""{side}" == "left" ? z_m("box") > 1 : z_m("box") > 2"#;

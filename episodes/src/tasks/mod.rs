@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 use tandem_sim::{ObjectFile, RobotModel, SimError, SplitMix64, Step};
 
 use crate::EpisodeError;
-use crate::conditions::OF_FINGERS;
+use crate::conditions::{ConditionPart, OF_FINGERS, Truth};
 use crate::scoring::{Phase, Scores};
 
 /// Every task, in the benchmark's order.
@@ -82,12 +82,79 @@ pub struct TaskFile {
     pub thinking_s: u32,
     /// What operators of one robot each read in place of the joint instruction, where that tells what not all of them may know.
     pub shared_instruction: Option<&'static str>,
+    /// The task in other words, for each level of stress; nothing where the file has none.
+    pub rewordings: Option<[TaskWords; 3]>,
+    /// Whether it says that hands have to close, whatever its conditions ask for.
+    pub needs_fingers: bool,
+    /// By phase, what its conditions are made of.
+    pub conditions: Vec<Vec<PhaseCondition>>,
     /// The suite of the program's own to which the file belongs.
     pub suite: Option<&'static str>,
     /// What has been chosen in it; nothing where the seed has not been told yet.
     pub chosen: Vec<ChosenOption>,
     /// The same task for each way in which its choices fall out; none where it has no choices.
     pub variants: Arc<OnceLock<Vec<&'static Task>>>,
+}
+
+/// What policies are told to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TaskWords {
+    /// For a policy that directs all robots.
+    pub joint: String,
+    /// What those who direct one robot each read in its place, where it tells what not all of them may know.
+    pub shared: Option<String>,
+    /// For policies that direct one each, in the order of the robots.
+    pub robots: Vec<String>,
+}
+
+impl TaskWords {
+    /// The task's own.
+    pub fn of(task: &Task) -> TaskWords {
+        TaskWords {
+            joint: task.instruction.into(),
+            shared: task.shared_instruction().map(str::to_owned),
+            robots: task.robots.iter().map(|robot| robot.instruction.into()).collect(),
+        }
+    }
+}
+
+/// A condition of a phase, as its task's file has it.
+#[derive(Clone, Debug)]
+pub struct PhaseCondition {
+    pub setting: PhaseSetting,
+    /// How long it has to hold without a break.
+    pub for_s: f64,
+    pub truth: Arc<Truth>,
+    /// What has to hold at once for it to hold, each with its line and column in the file.
+    pub parts: Vec<([usize; 2], ConditionPart)>,
+}
+
+/// What a condition is to its phase: the setting of the file that it stands in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PhaseSetting {
+    Done,
+    First,
+    Then,
+    Broken,
+    Lasting,
+    AtEnd,
+    Milestone,
+    Spoiled,
+}
+
+impl PhaseSetting {
+    pub fn name(self) -> &'static str {
+        match self {
+            PhaseSetting::Done => "done",
+            PhaseSetting::First => "first",
+            PhaseSetting::Then => "then",
+            PhaseSetting::Broken => "broken",
+            PhaseSetting::Lasting => "lasting",
+            PhaseSetting::AtEnd => "at_end",
+            PhaseSetting::Milestone => "milestone",
+            PhaseSetting::Spoiled => "spoiled",
+        }
+    }
 }
 
 /// What a choice of a task's file has come to.
@@ -235,10 +302,10 @@ impl TaskSet {
 
 impl Task {
     /// Whether its robots have to hold something with a thumb and fingers: those of the benchmark do, and those of files whose conditions
-    /// ask for it.
+    /// ask for it, or that say so.
     pub fn needs_fingers(&self) -> bool {
         let asks = |text: &str| OF_FINGERS.iter().any(|name| text.contains(&format!("{name}(")));
-        self.file.as_ref().is_none_or(|file| asks(&file.source.text))
+        self.file.as_ref().is_none_or(|file| file.needs_fingers || asks(&file.source.text))
     }
 }
 

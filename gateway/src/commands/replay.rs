@@ -1,5 +1,7 @@
 //! `tandem replay`: recordings simulated again, filmed, or drawn with depth.
 
+mod phases;
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
@@ -24,6 +26,9 @@ pub struct ReplayArgs {
     /// Simulate again and compare the state after every step, result and phases; names the first step that differs.
     #[arg(long)]
     verify: bool,
+    /// Say of the first phase that was not reached which parts of its conditions held, when, and how near the others came.
+    #[arg(long)]
+    phases: bool,
     /// Film of one recording: FILE.webp, FILE.gif, or where an ffmpeg is installed FILE.mp4.
     #[arg(long, value_name = "FILE")]
     video: Option<PathBuf>,
@@ -87,6 +92,9 @@ pub fn run(args: ReplayArgs) -> CommandResult {
         }
         let recording = Recording::read(path)?;
         describe(&recording);
+        if args.phases {
+            print!("{}", phases::told(&recording)?);
+        }
         if args.verify {
             all_same &= print_verified(&verify(&recording)?);
         }
@@ -245,6 +253,7 @@ mod tests {
         ReplayArgs {
             recordings: vec![path.into()],
             verify: true,
+            phases: false,
             video: None,
             camera: "third_person".into(),
             render: None,

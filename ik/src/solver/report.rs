@@ -41,7 +41,8 @@ impl Default for Tolerance {
 }
 
 impl Tolerance {
-    pub(crate) fn accepts(&self, error: &FrameError) -> bool {
+    /// Whether this is near enough.
+    pub fn accepts(&self, error: &FrameError) -> bool {
         error.position_m <= self.position_m && error.orientation_rad <= self.orientation_rad
     }
 }

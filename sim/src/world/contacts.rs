@@ -7,7 +7,7 @@ use rapier3d::math::Vector;
 use super::World;
 use super::step::{BodyTouch, HandContacts, Touch};
 use crate::body::HandLinks;
-use crate::dynamics::ColliderId;
+use crate::dynamics::{ColliderId, ContactPoint};
 use crate::owner::Owner;
 use crate::{PHYSICS_DT_S, Side, Sides};
 
@@ -17,6 +17,17 @@ struct Press {
     robot: usize,
     link: usize,
     force_n: Vector,
+}
+
+/// Where a robot pressed on something.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RobotPress {
+    /// The robot's link.
+    pub link: String,
+    /// The object or the other robot; `None` for the room.
+    pub on: Option<String>,
+    /// World frame.
+    pub at_m: Vector,
 }
 
 impl HandContacts {
@@ -76,6 +87,29 @@ impl World {
             let force_n = touch.normal * (touch.normal_impulse_n_s / f64::from(PHYSICS_DT_S));
             (touch.colliders.map(owner), force_n.as_vec3())
         })
+    }
+
+    /// Where a robot's links pressed in the last step on what is none of them.
+    pub fn presses_of(&self, robot: usize) -> Vec<RobotPress> {
+        let owner = |id: ColliderId| Owner::of_tag(self.dynamics.collider(id).tag);
+        let press = |touch: &ContactPoint| {
+            let [one, other] = touch.colliders.map(owner);
+            let (link, on) = match (one, other) {
+                (Some(Owner::Link { robot: found, link }), on) if found == robot => (link, on),
+                (on, Some(Owner::Link { robot: found, link })) if found == robot => (link, on),
+                _ => return None,
+            };
+            let on = match on {
+                Some(Owner::Link { robot: other, .. }) if other == robot => return None,
+                Some(Owner::Link { robot: other, .. }) => Some(self.robots[other].name.clone()),
+                Some(Owner::Object(object)) => Some(self.objects[object].name.clone()),
+                None => None,
+            };
+            let link = self.robots[robot].model.links[link].name.clone();
+            Some(RobotPress { link, on, at_m: touch.point_m.as_vec3() })
+        };
+        let pressed = self.dynamics.touches().iter().filter(|touch| touch.normal_impulse_n_s > 0.0);
+        pressed.filter_map(press).collect()
     }
 
     /// Pairs of a robot's own links that press on each other, with the force (N): empty in a clean pose.

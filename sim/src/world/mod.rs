@@ -16,6 +16,7 @@ mod knowledge_tests;
 use std::ops::Range;
 use std::sync::Arc;
 
+pub use contacts::RobotPress;
 pub use disturb::PlannedPush;
 pub use objects::{ObjectFile, ObjectModel, ObjectPart, ObjectPlacement, ObjectState};
 pub use snapshot::Snapshot;

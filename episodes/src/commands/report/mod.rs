@@ -3,6 +3,7 @@
 mod feel;
 
 use nalgebra::Isometry3;
+use tandem_ik::Tolerance;
 use tandem_sim::{HAND_JOINTS, Pose, RobotSensed, Side, UPPER, Vector};
 use tandem_tools_spec::{
     BaseMotion, Effort, FingerReport, Grip, HandReport, HandState, PoseFrame, RobotReport, Touch,
@@ -10,7 +11,6 @@ use tandem_tools_spec::{
 
 use super::columns::{self, Clamped};
 use super::motion::{Aim, Motion, RobotSheet};
-use super::upper_body::REACH_TOLERANCE;
 use crate::convert::{coarse, coarse_pose, isometry_from_sim, rounded_to};
 
 /// A measured joint this near to its limit rests at it.
@@ -139,14 +139,15 @@ pub fn wrist_state(
             (true, false) => HandState::Blocked,
         };
     }
-    let near = |factor: f64| is_near(measured, target, factor);
+    let tolerance = motion.tolerance(side);
+    let near = |factor: f64| is_near(measured, target, &tolerance, factor);
     // Under its load an arm sags.
     if near(1.0) || (near(HOLDING_FACTOR) && feel::grip(side, sensed, &motion.robot.model).0 == Grip::Holding)
     {
         HandState::Arrived
     } else if motion.comes_nearer(side).unwrap_or_else(turns) {
         HandState::Moving
-    } else if is_near(&motion.commanded_wrists()[side], target, 1.0) {
+    } else if is_near(&motion.commanded_wrists()[side], target, &tolerance, 1.0) {
         HandState::Blocked
     } else {
         HandState::OutOfReach
@@ -154,10 +155,10 @@ pub fn wrist_state(
 }
 
 /// Whether a wrist is within the tolerance by this factor.
-fn is_near(wrist: &Isometry3<f64>, target: &Isometry3<f64>, factor: f64) -> bool {
+fn is_near(wrist: &Isometry3<f64>, target: &Isometry3<f64>, tolerance: &Tolerance, factor: f64) -> bool {
     let missing = wrist.inv_mul(target);
-    missing.translation.vector.norm() <= factor * REACH_TOLERANCE.position_m
-        && missing.rotation.angle() <= factor * REACH_TOLERANCE.orientation_rad
+    missing.translation.vector.norm() <= factor * tolerance.position_m
+        && missing.rotation.angle() <= factor * tolerance.orientation_rad
 }
 
 fn fingers(side: Side, sensed: &RobotSensed, motion: &Motion) -> FingerReport {

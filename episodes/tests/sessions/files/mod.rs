@@ -1,4 +1,5 @@
 //! Episodes in scenes and with robots of files.
 
+mod phases;
 mod robots;
 mod scenes;

@@ -23,8 +23,7 @@ use tandem_episodes::{
     EpisodeSpec,
     players::{EpisodeOutput, PlayError, PlayOutcome, Policy, PolicyWait, play_in_process},
     results::PolicyCard,
-    stress::TaskWords,
-    tasks::Task,
+    tasks::{Task, TaskWords},
 };
 
 pub use client::PolicyProtocol;

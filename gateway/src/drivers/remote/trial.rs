@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 use tandem_episodes::{
     CONTROL_HZ, rules,
-    stress::TaskWords,
-    tasks::{self, Task},
+    tasks::{self, Task, TaskWords},
 };
 use tandem_tools_spec::Protocol;
 

@@ -1,0 +1,182 @@
+//! Why a phase was not reached: what its conditions ask for, and how far a recorded episode came to it.
+
+use tandem_sim::CONTROL_HZ;
+
+use crate::conditions::ConditionPart;
+use crate::recording::{Recording, RecordingError};
+use crate::scoring::{Facts, Phase, StepScore};
+use crate::tasks::{PhaseCondition, PhaseSetting};
+
+/// The first phase that an episode did not reach, over the steps in which it was next.
+#[derive(Debug)]
+pub struct PhaseTrace {
+    pub number: String,
+    pub id: &'static str,
+    pub from_s: f64,
+    pub to_s: f64,
+    /// How near it came, from 0 to 1, and when.
+    pub nearest: Moment<f32>,
+    /// What a task's file asks for; nothing of the benchmark's tasks, whose conditions are in Rust.
+    pub conditions: Vec<ConditionTrace>,
+}
+
+/// The best of something, and when it was so.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment<T> {
+    pub best: T,
+    pub time_s: f64,
+}
+
+/// One condition of the phase.
+#[derive(Debug)]
+pub struct ConditionTrace {
+    pub setting: PhaseSetting,
+    /// How long it has to hold without a break.
+    pub for_s: f64,
+    /// All of its parts at once.
+    pub held: Held,
+    pub parts: Vec<PartTrace>,
+    /// The most parts that held at once.
+    pub most_at_once: Moment<usize>,
+}
+
+/// Something that has to hold for a condition to hold.
+#[derive(Debug)]
+pub struct PartTrace {
+    /// Line and column in the task's file.
+    pub place: [usize; 2],
+    /// As it is written there.
+    pub text: String,
+    pub held: Held,
+    /// How near it came, if it never held and that is a number.
+    pub nearest: Option<Moment<Closest>>,
+}
+
+/// How near something came to holding.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Closest {
+    /// Both sides of a comparison.
+    Sides([f64; 2]),
+    /// From 0 to 1, as of a hand that comes to what it is to hold.
+    Share(f32),
+}
+
+/// When something held.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Held {
+    /// In how many of the steps, and how many there were.
+    pub steps: u32,
+    pub of: u32,
+    /// When it first did.
+    pub first_s: Option<f64>,
+    /// The most steps without a break.
+    pub longest: u32,
+    present: u32,
+}
+
+impl Held {
+    fn take(&mut self, holds: bool, time_s: f64) {
+        self.of += 1;
+        self.present = if holds { self.present + 1 } else { 0 };
+        self.longest = self.longest.max(self.present);
+        if holds {
+            self.steps += 1;
+            self.first_s.get_or_insert(time_s);
+        }
+    }
+
+    /// In seconds, in all.
+    pub fn total_s(&self) -> f64 {
+        f64::from(self.steps) / CONTROL_HZ
+    }
+
+    /// In seconds without a break: from the first of its steps to the last, as durations are counted.
+    pub fn longest_s(&self) -> f64 {
+        f64::from(self.longest.saturating_sub(1)) / CONTROL_HZ
+    }
+}
+
+impl PhaseTrace {
+    /// Of the phase that would have been next when the recording ends; `None` if the last one was reached.
+    pub fn of(recording: &Recording) -> Result<Option<PhaseTrace>, RecordingError> {
+        let task = recording.spec.task;
+        let reached = recording.phases()?;
+        let Some(phase) = task.phases.get(reached.len()) else { return Ok(None) };
+        let since_s = reached.last().map_or(f64::NEG_INFINITY, |last| last.time_s);
+        let asked = task.file.as_ref().map_or(&[][..], |file| &file.conditions[reached.len()]);
+        let mut trace = PhaseTrace {
+            number: Phase::number(reached.len()),
+            id: phase.id,
+            from_s: f64::INFINITY,
+            to_s: 0.0,
+            nearest: Moment { best: 0.0, time_s: 0.0 },
+            conditions: asked.iter().map(ConditionTrace::begin).collect(),
+        };
+        recording.score_with(|StepScore { facts, .. }| {
+            if facts.time_s >= since_s {
+                trace.look(phase, asked, facts);
+            }
+        })?;
+        Ok(Some(trace))
+    }
+
+    fn look(&mut self, phase: &Phase, asked: &[PhaseCondition], facts: &Facts) {
+        let time_s = facts.time_s;
+        (self.from_s, self.to_s) = (self.from_s.min(time_s), time_s);
+        let best = (phase.nearness)(facts);
+        if best > self.nearest.best {
+            self.nearest = Moment { best, time_s };
+        }
+        self.conditions.iter_mut().zip(asked).for_each(|(trace, asked)| trace.look(asked, facts));
+    }
+}
+
+impl ConditionTrace {
+    fn begin(asked: &PhaseCondition) -> ConditionTrace {
+        let part = |(place, part): &([usize; 2], ConditionPart)| PartTrace {
+            place: *place,
+            text: part.text.clone(),
+            held: Held::default(),
+            nearest: None,
+        };
+        ConditionTrace {
+            setting: asked.setting,
+            for_s: asked.for_s,
+            held: Held::default(),
+            parts: asked.parts.iter().map(part).collect(),
+            most_at_once: Moment { best: 0, time_s: 0.0 },
+        }
+    }
+
+    fn look(&mut self, asked: &PhaseCondition, facts: &Facts) {
+        let time_s = facts.time_s;
+        self.held.take(asked.truth.holds(facts), time_s);
+        let mut best = 0;
+        for (trace, (_, part)) in self.parts.iter_mut().zip(&asked.parts) {
+            let holds = part.truth.holds(facts);
+            best += usize::from(holds);
+            trace.held.take(holds, time_s);
+            let near = part.truth.sides(facts).map(Closest::Sides);
+            let near =
+                near.or_else(|| part.truth.grows().then(|| Closest::Share(part.truth.nearness(facts))));
+            let farther = |best: &Moment<Closest>, near: &Closest| best.best.missing() <= near.missing();
+            if let Some(near) = near
+                && !trace.nearest.is_some_and(|best| farther(&best, &near))
+            {
+                trace.nearest = Some(Moment { best: near, time_s });
+            }
+        }
+        if best > self.most_at_once.best {
+            self.most_at_once = Moment { best, time_s };
+        }
+    }
+}
+
+impl Closest {
+    fn missing(self) -> f64 {
+        match self {
+            Closest::Sides([left, right]) => (left - right).abs(),
+            Closest::Share(share) => 1.0 - f64::from(share),
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! What `tandem replay --phases` says of the phase that an episode did not reach.
+
+use std::fmt::Write;
+
+use tandem_episodes::Recording;
+use tandem_episodes::replay::{Closest, ConditionTrace, Held, Moment, PartTrace, PhaseTrace};
+
+/// Lines about what the next phase asks for, each part of its conditions by its place in the task's file.
+pub fn told(recording: &Recording) -> Result<String, Box<dyn std::error::Error>> {
+    let Some(trace) = PhaseTrace::of(recording)? else { return Ok("  all phases were reached\n".into()) };
+    let PhaseTrace { number, id, from_s, to_s, nearest, conditions } = trace;
+    let Moment { best, time_s } = nearest;
+    let mut told = format!(
+        "  {number} {id} was next from {from_s:.2} s to {to_s:.2} s and not reached; it came to {best:.2} of 1, at {time_s:.2} s\n"
+    );
+    match &recording.spec.task.file {
+        None => told += "  its conditions are in Rust; of tasks in files each part is told\n",
+        Some(file) => {
+            writeln!(told, "  {} asks for:", file.source.name)?;
+            let rows: Vec<[String; 4]> = conditions.iter().flat_map(rows).collect();
+            let widths: [usize; 3] =
+                std::array::from_fn(|column| rows.iter().map(|row| row[column].len()).max().unwrap_or(0));
+            for [place, setting, held, text] in &rows {
+                let [place_chars, setting_chars, held_chars] = widths;
+                let row =
+                    format!("    {place:place_chars$}  {setting:setting_chars$}  {held:held_chars$}  {text}");
+                writeln!(told, "{}", row.trim_end())?;
+            }
+        }
+    }
+    Ok(told)
+}
+
+/// Place, setting, when it held, and as it is written, of each part of a condition; and how it was of all of them at once.
+fn rows(condition: &ConditionTrace) -> Vec<[String; 4]> {
+    let ConditionTrace { setting, for_s, held, parts, most_at_once } = condition;
+    let part = |(index, part): (usize, &PartTrace)| {
+        let [line, column] = part.place;
+        let setting = if index == 0 { setting.name() } else { "" };
+        let nearest = part.nearest.map_or(String::new(), |nearest| format!("; nearest {}", near(nearest)));
+        [format!("{line}:{column}"), setting.into(), held_told(&part.held, &nearest), part.text.clone()]
+    };
+    let mut rows: Vec<[String; 4]> = parts.iter().enumerate().map(part).collect();
+    if parts.len() > 1 || *for_s > 0.0 {
+        let Moment { best, time_s } = most_at_once;
+        let most = match parts.len() {
+            1 => String::new(),
+            all => format!("; {best} of {all} at {time_s:.2} s"),
+        };
+        let mut at_once = held_told(held, &most);
+        if *for_s > 0.0 {
+            let _ = write!(at_once, "; without a break {:.2} s of {for_s}", held.longest_s());
+        }
+        let what = if parts.len() > 1 { "all at once" } else { "" };
+        rows.push(["".into(), "".into(), at_once, what.into()]);
+    }
+    rows
+}
+
+/// When something held; `nearest` is said of what never did.
+fn held_told(held: &Held, nearest: &str) -> String {
+    match held.first_s {
+        None => format!("never{nearest}"),
+        Some(_) if held.steps == held.of => "throughout".into(),
+        Some(first_s) => format!("{:.2} s in all, first at {first_s:.2} s", held.total_s()),
+    }
+}
+
+fn near(Moment { best, time_s }: Moment<Closest>) -> String {
+    match best {
+        Closest::Sides([left, right]) => {
+            format!("{} against {}, at {time_s:.2} s", rounded(left), rounded(right))
+        }
+        Closest::Share(share) => format!("{share:.2} of 1, at {time_s:.2} s"),
+    }
+}
+
+/// To a tenth of a millimetre, where it is one.
+fn rounded(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4
+}
