@@ -46,6 +46,13 @@ pub fn grips(f: &Facts, robots: &[usize], object: &str) -> f32 {
     all(&robots.iter().map(nearer).collect::<Vec<_>>())
 }
 
+/// The mean of how far hands have come to holding an object and of what they then do with it, which counts in hands that hold it
+/// alone: a knock lifts and tilts objects, too.
+pub fn in_hands(held: f32, done: &[f32]) -> f32 {
+    let counted = is(held >= 1.0);
+    (held + counted * done.iter().sum::<f32>()) / (1 + done.len()) as f32
+}
+
 /// How far `object` has come, from `from_m` away, to being within `within_m` of `target` on the floor's plane.
 pub fn beside(f: &Facts, object: &str, target: &str, [from_m, within_m]: [f32; 2]) -> f32 {
     come(f.apart_m(object, target), from_m, within_m)
@@ -101,6 +108,19 @@ mod tests {
         assert_eq!((grip(&held, A, Right, "bottle"), grip(&held, A, Left, "bottle") < 0.5), (1.0, true));
         assert_eq!(grips(&held, &[A], "bottle"), 1.0);
         assert!(grips(&held, &[A, B], "bottle") < 0.75);
+    }
+
+    #[test]
+    fn what_is_lifted_counts_in_hands_that_hold_it() {
+        assert_eq!([0.0, TOUCHING, 1.0].map(|held| in_hands(held, &[1.0])), [0.0, 0.5 * TOUCHING, 1.0]);
+        assert_eq!(in_hands(1.0, &[0.5, 0.0]), 0.5);
+        let handover = tasks::find("handover").unwrap();
+        let nearness = |f: &Facts| (handover.phases[0].nearness)(f);
+        let touched = Facts::at_rest(handover).grip(A, Right, "bottle", Grip::Touching);
+        let mut knocked = touched.clone();
+        knocked.object_mut("bottle").pose_in_world.translation.z += 0.02;
+        assert_eq!(nearness(&knocked), nearness(&touched));
+        assert!(nearness(&knocked.grip(A, Right, "bottle", Grip::Holding)) > 0.8);
     }
 
     #[test]

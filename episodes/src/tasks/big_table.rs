@@ -7,7 +7,7 @@
 use std::f32::consts::PI;
 
 use super::{Offset, RobotSpot, Task, spot, uniform_xy};
-use crate::scoring::nearness::{all, beside, come, grips, is, standing};
+use crate::scoring::nearness::{all, beside, come, grips, in_hands, is, standing};
 use crate::scoring::placement::{stands_as_high, stands_released};
 use crate::scoring::{A, B, C, Done, Facts, Phase};
 
@@ -63,7 +63,10 @@ pub const TASK: Task = Task {
             collaborative: true,
             done: Done::When(&lifted),
             nearness: &|f| {
-                all(&[grips(f, &[A, B, C], "round_table"), come(f.clearance_m("round_table"), 0.0, LIFTED_M)])
+                in_hands(
+                    grips(f, &[A, B, C], "round_table"),
+                    &[come(f.clearance_m("round_table"), 0.0, LIFTED_M)],
+                )
             },
         },
         Phase {

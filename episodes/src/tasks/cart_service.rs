@@ -8,7 +8,7 @@
 use std::f32::consts::FRAC_PI_2;
 
 use super::{Offset, RobotSpot, Task, spot, uniform_xy};
-use crate::scoring::nearness::{all, beside, come, grips, is};
+use crate::scoring::nearness::{all, beside, come, grips, in_hands, is};
 use crate::scoring::placement::{stands_released, within_box};
 use crate::scoring::{A, B, Done, Facts, Phase};
 
@@ -78,7 +78,7 @@ pub const TASK: Task = Task {
             description: "B holds the bottle at least 10 cm above where it stood on the trolley.",
             collaborative: false,
             done: Done::When(&bottle_lifted),
-            nearness: &|f| all(&[grips(f, &[B], "bottle"), come(f.lift_m("bottle"), 0.0, LIFTED_M)]),
+            nearness: &|f| in_hands(grips(f, &[B], "bottle"), &[come(f.lift_m("bottle"), 0.0, LIFTED_M)]),
         },
         Phase {
             id: "serve",

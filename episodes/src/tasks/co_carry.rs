@@ -7,7 +7,7 @@
 use std::f32::consts::PI;
 
 use super::{Offset, RobotSpot, Task, spot, uniform_xy};
-use crate::scoring::nearness::{all, beside, come, grips, is, standing};
+use crate::scoring::nearness::{all, beside, come, grips, in_hands, is, standing};
 use crate::scoring::placement::{above_box, stands_as_high, stands_released};
 use crate::scoring::{A, B, Done, Facts, Phase};
 
@@ -53,7 +53,9 @@ pub const TASK: Task = Task {
             description: "Both robots hold the basket, its base at least 3 cm above the shelf.",
             collaborative: true,
             done: Done::When(&lifted),
-            nearness: &|f| all(&[grips(f, &[A, B], "basket"), come(f.clearance_m("basket"), 0.0, LIFTED_M)]),
+            nearness: &|f| {
+                in_hands(grips(f, &[A, B], "basket"), &[come(f.clearance_m("basket"), 0.0, LIFTED_M)])
+            },
         },
         Phase {
             id: "carry",

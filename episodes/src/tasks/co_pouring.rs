@@ -6,7 +6,7 @@
 use std::f32::consts::PI;
 
 use super::{ObjectSpot, Offset, RobotSpot, Task, spot, uniform_xy};
-use crate::scoring::nearness::{all, come, grips, is};
+use crate::scoring::nearness::{all, come, grips, in_hands, is};
 use crate::scoring::{A, B, Done, Facts, Phase};
 
 const TUB_STACK_M: f32 = 0.75;
@@ -79,14 +79,14 @@ pub const TASK: Task = Task {
             description: "Both robots hold the tub, its lowest point at least 3 cm above its stack.",
             collaborative: true,
             done: Done::When(&lifted),
-            nearness: &|f| all(&[grips(f, &[A, B], "tub"), come(f.clearance_m("tub"), 0.0, LIFTED_M)]),
+            nearness: &|f| in_hands(grips(f, &[A, B], "tub"), &[come(f.clearance_m("tub"), 0.0, LIFTED_M)]),
         },
         Phase {
             id: "tip",
             description: "Both robots hold the tub, tilted by at least 25 degrees.",
             collaborative: true,
             done: Done::When(&tipped),
-            nearness: &|f| all(&[grips(f, &[A, B], "tub"), come(f.tilt_rad("tub"), 0.0, TIPPED_RAD)]),
+            nearness: &|f| in_hands(grips(f, &[A, B], "tub"), &[come(f.tilt_rad("tub"), 0.0, TIPPED_RAD)]),
         },
         Phase {
             id: "pour",

@@ -6,7 +6,7 @@
 use std::f32::consts::FRAC_PI_2;
 
 use super::{Offset, RobotSpot, Task, spot, uniform_xy};
-use crate::scoring::nearness::{all, come, grips, is};
+use crate::scoring::nearness::{all, come, grips, in_hands, is};
 use crate::scoring::placement::RELEASE_S;
 use crate::scoring::{A, B, Done, Facts, Phase};
 
@@ -64,7 +64,7 @@ pub const TASK: Task = Task {
             description: "Both robots hold the frame at least 10 cm above where it stood.",
             collaborative: true,
             done: Done::When(&lifted),
-            nearness: &|f| all(&[grips(f, &[A, B], "frame"), come(f.lift_m("frame"), 0.0, LIFTED_M)]),
+            nearness: &|f| in_hands(grips(f, &[A, B], "frame"), &[come(f.lift_m("frame"), 0.0, LIFTED_M)]),
         },
         Phase {
             id: "hang",

@@ -8,7 +8,7 @@ use std::f32::consts::PI;
 use tandem_sim::Side::Right;
 
 use super::{Offset, RobotSpot, Task, spot, uniform_xy};
-use crate::scoring::nearness::{all, beside, come, grip, is, standing};
+use crate::scoring::nearness::{all, beside, come, grip, in_hands, is, standing};
 use crate::scoring::placement::{stands_released, within_box};
 use crate::scoring::{A, B, Done, Facts, Phase};
 
@@ -51,7 +51,7 @@ pub const TASK: Task = Task {
             description: "A's right hand holds the bottle at least 3 cm above where it rested.",
             collaborative: false,
             done: Done::When(&grasped_and_lifted),
-            nearness: &|f| all(&[grip(f, A, Right, "bottle"), come(f.lift_m("bottle"), 0.0, LIFTED_M)]),
+            nearness: &|f| in_hands(grip(f, A, Right, "bottle"), &[come(f.lift_m("bottle"), 0.0, LIFTED_M)]),
         },
         Phase {
             id: "transfer",

@@ -6,7 +6,7 @@
 use std::f32::consts::{FRAC_PI_3, FRAC_PI_6, PI};
 
 use super::{Offset, RobotSpot, Task, spot, uniform_xy};
-use crate::scoring::nearness::{all, beside, come, grips, is};
+use crate::scoring::nearness::{all, beside, come, grips, in_hands, is};
 use crate::scoring::{A, B, Done, Facts, Phase};
 
 /// Height of the worktop above the floor.
@@ -56,7 +56,10 @@ pub const TASK: Task = Task {
             collaborative: false,
             done: Done::When(&both_aloft),
             nearness: &|f| {
-                all(&[grips(f, &[A], "cup"), grips(f, &[B], "glass"), risen(f, "cup"), risen(f, "glass")])
+                all(&[
+                    in_hands(grips(f, &[A], "cup"), &[risen(f, "cup")]),
+                    in_hands(grips(f, &[B], "glass"), &[risen(f, "glass")]),
+                ])
             },
         },
         Phase {
@@ -65,7 +68,7 @@ pub const TASK: Task = Task {
             collaborative: false,
             done: Done::When(&tipped),
             nearness: &|f| {
-                all(&[grips(f, &[A], "cup"), risen(f, "cup"), come(f.tilt_rad("cup"), 0.0, TIPPED_RAD)])
+                in_hands(grips(f, &[A], "cup"), &[risen(f, "cup"), come(f.tilt_rad("cup"), 0.0, TIPPED_RAD)])
             },
         },
         Phase {

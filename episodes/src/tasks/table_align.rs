@@ -8,7 +8,7 @@
 use std::f32::consts::{FRAC_PI_2, PI};
 
 use super::{ObjectSpot, Offset, RobotSpot, Task, spot, uniform_xy};
-use crate::scoring::nearness::{all, beside, come, grips, is, standing};
+use crate::scoring::nearness::{all, beside, come, grips, in_hands, is, standing};
 use crate::scoring::placement::{stands_as_high, stands_released};
 use crate::scoring::{A, B, Done, Facts, Phase};
 
@@ -60,7 +60,7 @@ pub const TASK: Task = Task {
             collaborative: true,
             done: Done::When(&lifted),
             nearness: &|f| {
-                all(&[grips(f, &[A, B], "office_table"), come(f.lift_m("office_table"), 0.0, LIFTED_M)])
+                in_hands(grips(f, &[A, B], "office_table"), &[come(f.lift_m("office_table"), 0.0, LIFTED_M)])
             },
         },
         Phase {

@@ -8,7 +8,7 @@
 use std::f32::consts::FRAC_PI_2;
 
 use super::{Offset, RobotSpot, Task, spot, uniform_xy};
-use crate::scoring::nearness::{all, beside, come, grips, is};
+use crate::scoring::nearness::{all, beside, come, grips, in_hands, is};
 use crate::scoring::{A, Done, Facts, Phase};
 
 /// Height of the bench's top, whose end is at y = 0.
@@ -60,7 +60,7 @@ pub const TASK: Task = Task {
             description: "A holds the bin, all of it at least 2 cm off the floor.",
             collaborative: false,
             done: Done::When(&lifted),
-            nearness: &|f| all(&[grips(f, &[A], "bin"), come(f.clearance_m("bin"), 0.0, LIFTED_M)]),
+            nearness: &|f| in_hands(grips(f, &[A], "bin"), &[come(f.clearance_m("bin"), 0.0, LIFTED_M)]),
         },
         Phase {
             id: "deliver_bin",

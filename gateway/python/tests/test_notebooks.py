@@ -11,10 +11,19 @@ import pytest
 NOTEBOOKS = sorted((Path(__file__).parents[1] / "notebooks").glob("*.py"))
 
 
+NAMES = ("agent_by_hand", "first_episode", "policy_trained_and_compared", "record_look_score")
+
+# What a notebook needs beside what all of them do, and the extra that has it.
+FURTHER = {"policy_trained_and_compared": (("av", "pyarrow", "torch"), "baselines")}
+
+
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebooks_run(path: Path, tmp_path: Path) -> None:
     for needed in ("ipykernel", "jupytext", "matplotlib", "nbclient"):
         pytest.importorskip(needed, reason=f"{needed} is not installed: pip install 'tandem-sim[notebook]'")
+    further, extra = FURTHER.get(path.stem, ((), ""))
+    for needed in further:
+        pytest.importorskip(needed, reason=f"{needed} is not installed: pip install 'tandem-sim[{extra}]'")
     jupytext: Any = import_module("jupytext")
     nbclient: Any = import_module("nbclient")
     notebook = jupytext.read(path)
@@ -27,4 +36,4 @@ def test_notebooks_run(path: Path, tmp_path: Path) -> None:
 
 
 def test_there_are_notebooks() -> None:
-    assert [path.stem for path in NOTEBOOKS] == ["agent_by_hand", "first_episode", "record_look_score"]
+    assert [path.stem for path in NOTEBOOKS] == list(NAMES)

@@ -97,6 +97,8 @@ class Learner:
     def validate(self) -> tuple[float, float]:
         """Mean errors of the averaged weights on the episodes for validation: of actions, in their own units, and of objects'
         coordinates in metres. NaN where there are none."""
+        if not len(self._validated):
+            return math.nan, math.nan
         own = {name: value.clone() for name, value in self.network.state_dict().items()}
         self.network.load_state_dict(self.averaged)
         self.network.eval()
@@ -111,7 +113,7 @@ class Learner:
                 errors[1] += (found - self._of_inputs("objects", moments, views)).abs().mean((1, 2)).sum().cpu()
         self.network.load_state_dict(own)
         count = len(self._validated) * len(self.views)
-        return (errors[0].item() / count, errors[1].item() / count) if count else (math.nan, math.nan)
+        return errors[0].item() / count, errors[1].item() / count
 
     def checkpoint(self) -> dict[str, Any]:
         return {
