@@ -25,19 +25,25 @@ const END_Y_M: f32 = -0.05;
 const SWEEP_M_S: f32 = 0.35;
 /// The bottle rolls aside by about so much on its way.
 const ROLLS_ASIDE_M: f32 = 0.05;
+/// What lies lower than this has fallen off the bench.
+const OFF_BENCH_M: f32 = 0.7;
 const TRIES: u32 = 3;
 
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     let bin = ParallelScript { robots: &[A], script: Box::new(bring_bin) };
-    let hand = ParallelScript { robots: &[B], script: Box::new(reach_behind_bottle) };
+    let hand = ParallelScript { robots: &[B], script: Box::new(hover_behind_bottle) };
     in_parallel(commander, vec![bin, hand])?;
     for _ in 0..TRIES {
         sweep(commander)?;
-        // Nobody reaches for a bottle that lies where it belongs.
-        if commander.facts()?.inside_box("pet_bottle", "bin", "inside") {
+        let facts = commander.facts()?;
+        if facts.inside_box("pet_bottle", "bin", "inside") {
             return Ok(());
         }
-        reach_behind_bottle(commander)?;
+        // Nobody reaches for what lies on the floor.
+        if facts.position_m("pet_bottle").z < OFF_BENCH_M {
+            break;
+        }
+        hover_behind_bottle(commander)?;
     }
     Err(PlayerError::GaveUp("the bottle did not fall into the bin".into()))
 }
@@ -57,16 +63,17 @@ fn bring_bin(commander: &mut Commander) -> Result<(), PlayerError> {
     team.carry_to(commander, &Pose::from_translation(end_m), PACE_M_S)
 }
 
-/// Puts the hand down behind the bottle, wherever that is on the bench.
-fn reach_behind_bottle(commander: &mut Commander) -> Result<(), PlayerError> {
+/// Brings the hand over the place behind the bottle, wherever that is on the bench. A hand that waits beside the bottle touches it, and
+/// it rolls away.
+fn hover_behind_bottle(commander: &mut Commander) -> Result<(), PlayerError> {
     let behind_m = commander.facts()?.position_m("pet_bottle") + BEHIND_BOTTLE_M;
-    commander.perform(1.2, &[reach(behind_m + Vector::Z * ABOVE_M)])?;
-    commander.perform(0.7, &[reach(behind_m)])
+    commander.perform(1.2, &[reach(behind_m + Vector::Z * ABOVE_M)])
 }
 
-/// Sweeps the bottle to the end of the bench.
+/// Puts the hand down there, and sweeps the bottle to the end of the bench.
 fn sweep(commander: &mut Commander) -> Result<(), PlayerError> {
     let behind_m = commander.facts()?.position_m("pet_bottle") + BEHIND_BOTTLE_M;
+    commander.perform(0.7, &[reach(behind_m)])?;
     let end_m = Vector::new(behind_m.x, END_Y_M, behind_m.z);
     commander.glide((end_m.y - behind_m.y).max(0.1) / SWEEP_M_S, &[reach(end_m)])?;
     commander.perform(1.0, &[reach(end_m)])
