@@ -14,6 +14,8 @@ const CUP: CylinderGrasp =
 const GLASS: CylinderGrasp =
     CylinderGrasp { robot: B, side: Side::Right, object: "glass", grip: "grip", heading_rad: PI };
 
+/// Hands go aside so far above where they take hold.
+const OVER_M: f32 = 0.2;
 /// Where B holds the glass: between the robots, just above the table.
 const GLASS_PLACE_M: Vector = Vector::new(0.40, 0.0, 0.86);
 /// Lip above mouth while pouring, and how much further off the cup is while it stands upright.
@@ -39,6 +41,9 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
 }
 
 fn lift(commander: &mut Commander) -> Result<(), PlayerError> {
+    // Hands begin before the vessels, and fingers on their way down would knock over one that stands near.
+    let over = [CUP.beside(commander, OVER_M)?, GLASS.beside(commander, OVER_M)?];
+    commander.perform(0.5, &over)?;
     pick_up_all(commander, &[CUP, GLASS])?;
     let raise = |commander: &mut Commander, grasp: &CylinderGrasp, by_m: f32| {
         let from_m = commander.facts()?.position_m(grasp.object);
