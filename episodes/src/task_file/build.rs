@@ -392,6 +392,7 @@ impl Reading<'_> {
             z_m,
             yaw_rad: rad(*yaw_deg.start())..=rad(*yaw_deg.end()),
             wider_yaw_rad: angle_rad(wider_deg),
+            on_wall: false,
         }
     }
 }

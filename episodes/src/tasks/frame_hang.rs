@@ -44,7 +44,7 @@ pub const TASK: Task = Task {
         spot("wall_peg", [0.0, WALL_Y_M, PEG_HEIGHT_M]),
     ],
     randomize: &[
-        uniform_xy(&["frame", "frame_rack", "wall_peg"], 0.05, 0.025),
+        Offset { on_wall: true, ..uniform_xy(&["frame", "frame_rack", "wall_peg"], 0.05, 0.025) },
         Offset { z_m: -0.04..=0.0, ..uniform_xy(&["wall_peg"], 0.0, 0.0) },
         Offset { wider_yaw_rad: 0.05, ..uniform_xy(&["frame", "frame_rack"], 0.03, 0.01) },
     ],

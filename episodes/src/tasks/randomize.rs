@@ -19,6 +19,8 @@ pub struct Offset {
     pub yaw_rad: RangeInclusive<f32>,
     /// How much farther a spread of 2 turns them, either way; a spread of 4 three times as much.
     pub wider_yaw_rad: f32,
+    /// What hangs on a wall across y: a wider spread, which would bring it into the wall or off it, does not widen y.
+    pub on_wall: bool,
 }
 
 /// How far the seed moves things, as a multiple of the benchmark's randomisation.
@@ -83,11 +85,13 @@ impl Offset {
             return own;
         }
         let times = f32::from(spread.times());
-        let wider = own.map(|[low, high]| {
+        let wider = |[low, high]: [f32; 2]| {
             let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * times);
             [middle - half, middle + half]
-        });
-        let [x_m, y_m, z_m, [least_rad, most_rad]] = wider;
+        };
+        let [x_m, y_m, z_m, yaw_rad] = own;
+        let y_m = if self.on_wall { y_m } else { wider(y_m) };
+        let [x_m, z_m, [least_rad, most_rad]] = [x_m, z_m, yaw_rad].map(wider);
         let turn_rad = self.wider_yaw_rad * (times - 1.0);
         [x_m, y_m, z_m, [least_rad - turn_rad, most_rad + turn_rad]]
     }
@@ -102,6 +106,7 @@ pub const fn uniform_xy(objects: &'static [&'static str], x_m: f32, y_m: f32) ->
         z_m: 0.0..=0.0,
         yaw_rad: 0.0..=0.0,
         wider_yaw_rad: 0.0,
+        on_wall: false,
     }
 }
 
