@@ -48,9 +48,9 @@ pub fn grips(f: &Facts, robots: &[usize], object: &str) -> f32 {
 
 /// The mean of how far hands have come to holding an object and of what they then do with it, which counts in hands that hold it
 /// alone: a knock lifts and tilts objects, too.
-pub fn in_hands(held: f32, done: &[f32]) -> f32 {
-    let counted = is(held >= 1.0);
-    (held + counted * done.iter().sum::<f32>()) / (1 + done.len()) as f32
+pub fn in_hands(held_share: f32, values: &[f32]) -> f32 {
+    let counted = is(held_share >= 1.0);
+    (held_share + counted * values.iter().sum::<f32>()) / (1 + values.len()) as f32
 }
 
 /// How far `object` has come, from `from_m` away, to being within `within_m` of `target` on the floor's plane.
