@@ -4,7 +4,7 @@ use std::{net::SocketAddr, path::PathBuf, time::Duration};
 
 use serde_json::{Value, json};
 use tandem::{
-    http::Server,
+    http::{Guests, Server},
     settings::{Layer, Settings},
 };
 use ureq::{Agent, SendBody, http};
@@ -61,6 +61,11 @@ impl TestServer {
 
     /// Starts a server as [`TestServer::start`] does, with further settings.
     pub fn with(flags: Layer) -> TestServer {
+        TestServer::with_guests(flags, Guests::default())
+    }
+
+    /// The same for guests.
+    pub fn with_guests(flags: Layer, guests: Guests) -> TestServer {
         let runs = tempfile::tempdir().expect("a temporary folder");
         let flags = Layer {
             listen: Some("127.0.0.1:0".parse().expect("an address")),
@@ -69,7 +74,7 @@ impl TestServer {
             ..flags
         };
         let settings = Settings::resolve(flags, None).expect("settings without a file");
-        let server = Server::start(settings).expect("a free port");
+        let server = Server::start_for(settings, guests).expect("a free port");
         let timeout = Some(Duration::from_secs(60));
         let agent =
             Agent::config_builder().http_status_as_error(false).timeout_global(timeout).build().new_agent();

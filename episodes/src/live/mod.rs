@@ -22,8 +22,8 @@ pub trait Onlookers: Send {
     /// Whether anybody looks on; where nobody does, nothing is handed over.
     fn any(&self) -> bool;
 
-    /// Whether somebody wants every control step, and not only every [`STEPS_PER_FRAME`]th.
-    fn every_step(&self) -> bool;
+    /// Whether the control step of this number is wanted, which has just been made. The last one of a call is told in any case.
+    fn wants_step(&self, control_step: u64) -> bool;
 
     /// Must not wait for anybody.
     fn tell(&self, event: LiveEvent);

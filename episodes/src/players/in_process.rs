@@ -64,8 +64,8 @@ impl LocalEpisode for InProcess {
         self.session.carry_out(call).map_err(|error| refused(tool, error))
     }
 
-    fn third_person(&mut self) -> Picture {
-        self.session.third_person()
+    fn third_person(&mut self) -> Result<Picture, PlayerError> {
+        Ok(self.session.third_person())
     }
 }
 

@@ -45,7 +45,7 @@ pub trait LocalEpisode: Episode {
     fn carry_out(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError>;
 
     /// The room, seen from where no robot stands: more than a policy has, and results say so.
-    fn third_person(&mut self) -> Picture;
+    fn third_person(&mut self) -> Result<Picture, PlayerError>;
 }
 
 /// Plays one episode to its end by tool calls alone; made anew for each episode.

@@ -7,7 +7,7 @@ use tandem_tools_spec::{Budget, ExtraInformation, Observe, PhaseReached};
 
 use super::Session;
 use crate::EpisodeError;
-use crate::live::{LiveEntry, LiveEvent, LiveScene, LiveStep, LiveView, Onlookers, STEPS_PER_FRAME};
+use crate::live::{LiveEntry, LiveEvent, LiveScene, LiveStep, LiveView, Onlookers};
 use crate::output::OutputError;
 use crate::recording::{NoteMessage, ToolCallRecord};
 
@@ -24,6 +24,8 @@ pub struct Audience {
     told_entries: u32,
     counted_calls: u32,
     scene: Option<Arc<LiveScene>>,
+    /// The control step that was told last.
+    told_step: Option<u64>,
 }
 
 impl Audience {
@@ -70,11 +72,17 @@ impl Session {
     }
 
     /// Shows the present step, where it is one that is shown.
-    pub(super) fn show_step(&self, budget: Budget) {
-        let every = self.audience.onlookers.as_deref().is_some_and(Onlookers::every_step);
-        if every || self.present.control_step.is_multiple_of(STEPS_PER_FRAME) {
-            self.audience.tell(|| LiveEvent::Step(Arc::new(self.live_step(budget))));
+    pub(super) fn show_step(&mut self, budget: Budget) {
+        let step = self.present.control_step;
+        let onlookers = self.audience.onlookers.as_deref();
+        if onlookers.is_some_and(|onlookers| onlookers.any() && onlookers.wants_step(step)) {
+            self.tell_step(budget);
         }
+    }
+
+    fn tell_step(&mut self, budget: Budget) {
+        self.audience.tell(|| LiveEvent::Step(Arc::new(self.live_step(budget))));
+        self.audience.told_step = Some(self.present.control_step);
     }
 
     pub(super) fn show_phase(&self, phase: &PhaseReached) {
@@ -82,8 +90,8 @@ impl Session {
     }
 
     /// Shows the step in which the episode has ended, and what it came to.
-    pub(super) fn show_end(&self) {
-        self.audience.tell(|| LiveEvent::Step(Arc::new(self.live_step(self.budget()))));
+    pub(super) fn show_end(&mut self) {
+        self.tell_step(self.budget());
         if let Some(result) = &self.result {
             self.audience.tell(|| LiveEvent::Ended(Arc::new(result.clone())));
         }
@@ -94,8 +102,11 @@ impl Session {
         self.audience.onlookers.is_some()
     }
 
-    /// A call that has been answered.
+    /// A call that has been answered, and the step to which it has come: what follows may be long in coming.
     pub(super) fn show_call(&mut self, record: &Result<ToolCallRecord, OutputError>) {
+        if self.audience.told_step != Some(self.present.control_step) {
+            self.tell_step(self.budget());
+        }
         let Ok(record) = record else { return };
         self.audience.counted_calls += u32::from(record.message.counted);
         let number = record.message.counted.then_some(self.audience.counted_calls);

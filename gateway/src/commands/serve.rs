@@ -6,12 +6,13 @@ use tracing_subscriber::filter::LevelFilter;
 
 use super::{
     CommandResult,
+    flags::PartnerFlags,
     logging::{LogFormat, log_server},
     print,
 };
 use crate::{
     hosting::try_runs_folder,
-    http::Server,
+    http::{Guests, Server},
     settings::{Layer, Settings},
     token::Token,
 };
@@ -25,6 +26,9 @@ pub struct ServeArgs {
     /// Log for people, or one JSON object per line.
     #[arg(long, env = "TANDEM_LOG_FORMAT", value_name = "FORMAT", default_value = "text")]
     log_format: LogFormat,
+    /// Who may drive beside people.
+    #[command(flatten)]
+    partner: PartnerFlags,
     /// Settings given as flags or environment.
     #[command(flatten)]
     pub(super) flags: Layer,
@@ -36,10 +40,11 @@ pub fn run(args: ServeArgs) -> CommandResult {
     let flags = Layer { token: Token::from_environment()?, ..args.flags };
     let settings = Settings::resolve(flags, args.config.as_deref())?;
     try_runs_folder(&settings.runs)?;
-    let server = Server::start(settings)?;
+    let server =
+        Server::start_for(settings, Guests { partner: args.partner.policy()?, ..Guests::default() })?;
     // Not in the log, which others may read.
     // Output that cannot be written, as on a full disk, is no reason not to serve.
-    let _ = print(&format!("watch at {}\n", server.watch_link()));
+    let _ = print(&format!("watch at {}\noperate at {}\n", server.watch_link(), server.operate_link()));
     let left = server.run_until_signal();
     Ok(if left.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

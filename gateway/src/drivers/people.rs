@@ -21,7 +21,7 @@ use tandem_tools_spec::{Driving, Operators};
 use super::{lost, read_result, remove_old_result};
 use crate::{
     hosting::{CollectedEpisode, Collection, HostingError},
-    http::{Server, operator_link},
+    http::{Guests, Server, operator_link},
     settings::Settings,
     token::Token,
 };
@@ -64,7 +64,8 @@ impl People {
         let settings = Arc::new(Settings { token: Some(token), ..settings });
         let scheme = if settings.certificate.is_some() { "https" } else { "http" };
         let name = settings.allowed_hosts.first().cloned();
-        let server = Server::start_for(settings, Some(collection.clone()));
+        let guests = Guests { collection: Some(collection.clone()), ..Guests::default() };
+        let server = Server::start_for(settings, guests);
         let server = server.map_err(|error| lost("no server", error))?;
         let base_url = base_url(scheme, server.address(), name.as_deref());
         Ok(People { server, collection, planned, aside, base_url, host_token })

@@ -11,10 +11,12 @@ use std::{
 };
 
 use tandem_episodes::{
-    CallReply, Clock, EpisodeError, EpisodeSpec, Facts, OperatorCall, OperatorCommand, RunFolder, Session,
-    live::LiveView, monotonic,
+    CallReply, Clock, EpisodeError, EpisodeSpec, Facts, OperatorCall, OperatorCommand, Picture, RunFolder,
+    Session, TeamObservation, live::LiveView, monotonic,
 };
-use tandem_tools_spec::{Briefing, Call, EndReason, ManageReply, Note, ResultReply, ToolCall, ToolReply};
+use tandem_tools_spec::{
+    Briefing, Call, EndReason, ExtraInformation, ManageReply, Note, Observe, ResultReply, ToolCall, ToolReply,
+};
 use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 
 use super::{
@@ -65,6 +67,15 @@ enum Job {
     },
     Facts {
         reply: ReplySender<Facts>,
+    },
+    /// A look for a policy in this process, which is shown this of what policies are not shown as a rule.
+    Look {
+        observe: Box<Observe>,
+        shown: Vec<ExtraInformation>,
+        reply: ReplySender<TeamObservation>,
+    },
+    Room {
+        reply: ReplySender<Picture>,
     },
     EndIfAbandoned {
         idle: Duration,
@@ -275,9 +286,23 @@ impl EpisodeThread {
 
     /// Where everything is and who touches what: for experts and scoring in this process, never for policies.
     pub fn facts_blocking(&self) -> Result<Facts, HostingError> {
-        let (reply, answer) = oneshot::channel();
-        self.send(Job::Facts { reply })?;
-        answer.blocking_recv().map_err(|_| HostingError::EpisodeStopped)?
+        self.do_job_blocking(|reply| Job::Facts { reply })
+    }
+
+    /// A look through the robots, as it was drawn, for a policy that is asked from this process and `shown` this of what policies are
+    /// not shown as a rule; results name it.
+    pub fn look_blocking(
+        &self,
+        observe: &Observe,
+        shown: &[ExtraInformation],
+    ) -> Result<TeamObservation, HostingError> {
+        let (observe, shown) = (Box::new(observe.clone()), shown.to_vec());
+        self.do_job_blocking(|reply| Job::Look { observe, shown, reply })
+    }
+
+    /// The room, seen from where no robot stands, for the same policies.
+    pub fn room_blocking(&self) -> Result<Picture, HostingError> {
+        self.do_job_blocking(|reply| Job::Room { reply })
     }
 
     /// Ends the episode if its policy's clock has run out, or if it has made no call for as long as `idle`.
@@ -351,6 +376,13 @@ impl EpisodeThread {
         let (reply, answer) = oneshot::channel();
         self.send(job(reply))?;
         answer.await.map_err(|_| HostingError::EpisodeStopped)?
+    }
+
+    /// As [`EpisodeThread::do_job`], for threads that run no futures.
+    fn do_job_blocking<T>(&self, job: impl FnOnce(ReplySender<T>) -> Job) -> Result<T, HostingError> {
+        let (reply, answer) = oneshot::channel();
+        self.send(job(reply))?;
+        answer.blocking_recv().map_err(|_| HostingError::EpisodeStopped)?
     }
 
     /// Has the thread do a job, however many wait.
@@ -431,6 +463,12 @@ fn serve(mut session: PanicGuard, mut inbox: mpsc::Receiver<Job>, status: &Share
                 let _ = reply.send(view.flatten());
             }
             Job::Facts { reply } => drop(reply.send(session.run(|session| session.facts()))),
+            Job::Look { observe, shown, reply } => {
+                let seen = session.run(|session| Ok(session.observe(&observe, &shown)?));
+                status.update(&session);
+                let _ = reply.send(seen.flatten());
+            }
+            Job::Room { reply } => drop(reply.send(session.run(|session| session.third_person()))),
             Job::EndIfAbandoned { idle } => {
                 // The log has the reason of a refusal.
                 let _ = session.run(|session| session.end_if_abandoned(idle));

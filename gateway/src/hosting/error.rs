@@ -92,6 +92,12 @@ pub enum HostingError {
     /// Nobody here can drive a robot of this task.
     #[error("{0}")]
     NoExpert(#[source] PlayerError),
+    /// No policy can drive a robot here.
+    #[error("{reason}")]
+    NoPolicy {
+        /// What is missing.
+        reason: String,
+    },
     /// Nobody may talk here.
     #[error(
         "nobody hears you: operators talk in an episode that was started with operators \"per_robot\" and talk true"
@@ -160,6 +166,7 @@ impl HostingError {
             HostingError::NeedsOperator => Refusal::new("needs-operator", "Driven by operators", Forbidden),
             HostingError::HostsBusiness => Refusal::new("hosts-business", "Not for operators", Forbidden),
             HostingError::NoExpert(_) => Refusal::new("no-expert", "No expert", Invalid),
+            HostingError::NoPolicy { .. } => Refusal::new("no-policy", "No policy", Conflict),
             HostingError::NoTalk => Refusal::new("no-talk", "Nobody hears", Conflict),
             HostingError::TooMuchSaid { .. } => {
                 Refusal::new("too-much-said", "Too much said", TooMany).retry_after_s(1)
@@ -192,6 +199,7 @@ impl HostingError {
             | HostingError::NeedsOperator
             | HostingError::HostsBusiness
             | HostingError::NoExpert(_)
+            | HostingError::NoPolicy { .. }
             | HostingError::KeyUsed
             | HostingError::Token(_)
             | HostingError::Shared(_)

@@ -27,4 +27,6 @@ pub use onlookers::LiveWatch;
 pub use panic_guard::{EpisodeMetrics, PanicGuard};
 pub use run_folder::{look_at_runs_folder, try_runs_folder};
 pub use table::EpisodeTable;
-pub use team::{CollectedEpisode, Collection, CollectionProgress, CollectionStage, Driver, Wish};
+pub use team::{
+    CollectedEpisode, Collection, CollectionProgress, CollectionStage, Driver, PartnerPolicy, Wish,
+};

@@ -1,15 +1,26 @@
 //! Those who look on at one episode: its thread hands over what happens and waits for nobody; who is too slow misses what was longest ago.
 
-use std::sync::{
-    Arc, Mutex, PoisonError,
-    atomic::{AtomicUsize, Ordering},
+use std::{
+    cell::Cell,
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
+    time::{Duration, Instant},
 };
 
-use tandem_episodes::live::{LiveEvent, LiveView, Onlookers};
+use tandem_episodes::live::{LiveEvent, LiveView, Onlookers, STEPS_PER_FRAME};
 use tokio::sync::broadcast;
 
 /// How far an onlooker may lag behind: ten simulated seconds.
 const KEPT_EVENTS: usize = 256;
+
+/// Those who watch are told no more steps than one in this time, for long: a page draws no more.
+const FRAME_INTERVAL: Duration = Duration::from_millis(20);
+
+/// Steps are told at once that are worth so many intervals, so that what an agent commands now and then is told whole, however fast
+/// it is simulated: ten simulated seconds.
+const MOST_AHEAD: Duration = Duration::from_secs(5);
 
 /// What an episode tells, for as many as listen.
 #[derive(Debug)]
@@ -35,6 +46,13 @@ pub struct LiveWatch {
 pub struct FeedEnd {
     events: broadcast::Sender<LiveEvent>,
     drivers: Arc<AtomicUsize>,
+    pace: Pace,
+}
+
+/// How many steps those who watch are told.
+struct Pace {
+    /// When all that was told would have been told at one step an interval.
+    even_at: Cell<Instant>,
 }
 
 impl LiveFeed {
@@ -43,7 +61,8 @@ impl LiveFeed {
         let (events, _) = broadcast::channel(KEPT_EVENTS);
         let drivers: Arc<AtomicUsize> = Arc::default();
         let feed = LiveFeed { events: Mutex::new(Some(events.clone())), drivers: drivers.clone() };
-        (feed, FeedEnd { events, drivers })
+        let pace = Pace { even_at: Cell::new(Instant::now()) };
+        (feed, FeedEnd { events, drivers, pace })
     }
 
     /// Tells every step for as long as the return value is held.
@@ -70,9 +89,22 @@ impl Drop for EveryStep {
     }
 }
 
+impl Pace {
+    /// Whether one step more may be told at `now`.
+    fn allows(&self, now: Instant) -> bool {
+        let even_at = self.even_at.get().max(now);
+        let allowed = even_at.duration_since(now) < MOST_AHEAD;
+        if allowed {
+            self.even_at.set(even_at + FRAME_INTERVAL);
+        }
+        allowed
+    }
+}
+
 impl Onlookers for FeedEnd {
-    fn every_step(&self) -> bool {
+    fn wants_step(&self, control_step: u64) -> bool {
         self.drivers.load(Ordering::Relaxed) > 0
+            || control_step.is_multiple_of(STEPS_PER_FRAME) && self.pace.allows(Instant::now())
     }
 
     fn any(&self) -> bool {
@@ -82,5 +114,28 @@ impl Onlookers for FeedEnd {
     fn tell(&self, event: LiveEvent) {
         // Where the last listener has just gone, nobody misses it.
         let _ = self.events.send(event);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_is_told_whole_and_what_goes_on_for_long_as_fast_as_it_is_drawn() {
+        let begin = Instant::now();
+        let pace = Pace { even_at: Cell::new(begin) };
+        let mut told = 0;
+        // 800 steps a second that could be told, for ten seconds.
+        for step in 0..8000u32 {
+            told += u32::from(pace.allows(begin + Duration::from_micros(1250) * step));
+            if step == 200 {
+                assert_eq!(told, 201, "four seconds of a robot's time at once");
+            }
+        }
+        assert_eq!(told, 250 + 500);
+        // Whoever pauses is told whole again.
+        let later = begin + Duration::from_secs(20);
+        assert!((0..250).all(|_| pace.allows(later)) && !pace.allows(later));
     }
 }

@@ -14,7 +14,7 @@ use super::{
     watching::{KnownEvaluations, LastOpened, MOST_WATCHERS, WatchKey},
 };
 use crate::{
-    hosting::{Caller, EpisodeTable},
+    hosting::{Caller, EpisodeTable, PartnerPolicy},
     settings::Settings,
 };
 
@@ -36,6 +36,8 @@ pub struct AppState {
     pub opened: LastOpened,
     /// The evaluations in the runs folder, as they were when they were listed last.
     pub evaluations: KnownEvaluations,
+    /// The policy that people may have drive beside them: no page can name another.
+    pub partner: Option<Arc<dyn PartnerPolicy>>,
 }
 
 impl AppState {
@@ -43,7 +45,7 @@ impl AppState {
     pub fn new(table: Arc<EpisodeTable>, settings: Arc<Settings>, watch_key: WatchKey) -> AppState {
         let watchers = Arc::new(Semaphore::new(MOST_WATCHERS));
         let (opened, evaluations) = (LastOpened::default(), KnownEvaluations::default());
-        AppState { table, settings, watch_key, watchers, opened, evaluations }
+        AppState { table, settings, watch_key, watchers, opened, evaluations, partner: None }
     }
 
     /// The tools that `caller` may be offered: talking is for operators who may.

@@ -9,12 +9,12 @@ use tokio::{net::TcpListener, runtime::Runtime, sync::oneshot, task::JoinHandle,
 use super::{
     app::AppState,
     gate::{Gate, connections, limits::Limits},
-    pages::WATCH,
+    pages::{WATCH, operate::OPERATE},
     router::router,
     watching::WatchKey,
 };
 use crate::{
-    hosting::{Collection, EpisodeTable, EpisodeThread, HostingError},
+    hosting::{Collection, EpisodeTable, EpisodeThread, HostingError, PartnerPolicy},
     settings::Settings,
 };
 
@@ -26,6 +26,15 @@ const REQUEST_GRACE: Duration = Duration::from_secs(5);
 
 /// How often the server looks for episodes whose policies make no more calls.
 const ABANDONED_CHECK_INTERVAL: Duration = Duration::from_secs(1);
+
+/// For whom a server is, besides those who start episodes.
+#[derive(Debug, Default)]
+pub struct Guests {
+    /// People who play its episodes.
+    pub collection: Option<Arc<Collection>>,
+    /// A policy that people may have drive beside them.
+    pub partner: Option<Arc<dyn PartnerPolicy>>,
+}
 
 /// A running server. Dropping it stops it at once; [`Server::stop`] lets calls under way finish.
 #[derive(Debug)]
@@ -42,11 +51,12 @@ pub struct Server {
 impl Server {
     /// Binds and begins to serve.
     pub fn start(settings: Arc<Settings>) -> io::Result<Server> {
-        Server::start_for(settings, None)
+        Server::start_for(settings, Guests::default())
     }
 
-    /// As [`Server::start`], for people who play the episodes of `collection`.
-    pub fn start_for(settings: Arc<Settings>, collection: Option<Arc<Collection>>) -> io::Result<Server> {
+    /// As [`Server::start`], for `guests`.
+    pub fn start_for(settings: Arc<Settings>, guests: Guests) -> io::Result<Server> {
+        let Guests { collection, partner } = guests;
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(HTTP_THREADS)
             .thread_name("http")
@@ -63,7 +73,7 @@ impl Server {
         let watch_key = WatchKey::random().map_err(io::Error::other)?;
         let scheme = if settings.certificate.is_some() { "https" } else { "http" };
         let watch_link = format!("{scheme}://{address}{WATCH}#{}", watch_key.text());
-        let app = AppState::new(table.clone(), settings.clone(), watch_key);
+        let app = AppState { partner, ..AppState::new(table.clone(), settings.clone(), watch_key) };
         let router = router(app, Gate::new(settings.clone(), address.ip()), Limits::new(&settings));
         let (stop, stopped) = oneshot::channel::<()>();
         let certificate = settings.certificate.clone();
@@ -91,6 +101,12 @@ impl Server {
     /// The link by which people watch. Who has it sees all, so it is for no log and no policy.
     pub fn watch_link(&self) -> &str {
         &self.watch_link
+    }
+
+    /// Where people start episodes whose robots they drive.
+    pub fn operate_link(&self) -> String {
+        let (origin, _) = self.watch_link.split_once(WATCH).unwrap_or((&self.watch_link, ""));
+        format!("{origin}{OPERATE}")
     }
 
     /// Starts `spec` under the name `id` with its files in `folder`, for an evaluation in this process.

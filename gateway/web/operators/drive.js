@@ -3,7 +3,7 @@
 
 import { Vector3 } from "three";
 import { SIDES } from "../src/message.js";
-import { Stage } from "../src/stage.js";
+import { Pace, Stage } from "../src/stage.js";
 import { call } from "./call.js";
 import { Hands } from "./hands.js";
 import { Headset } from "./headset/headset.js";
@@ -13,8 +13,8 @@ import { Wheel } from "./wheel.js";
 
 const SAY_MS = 20;
 const HEIGHT_RANGE_M = [0.5, 0.78];
-/** Where drawing takes longer, it is made simpler. */
-const SLOW_FRAME_MS = 60;
+/** Where drawing takes longer, it is made simpler: a hand is seen to move two frames after it has. */
+const SLOW_FRAME_MS = 40;
 /** Control steps of a press of the step button. */
 const STEPS = 10;
 
@@ -67,7 +67,8 @@ class DrivePage {
       said = now;
     }, SAY_MS);
     document.addEventListener("visibilitychange", () => this.say(0), { signal: this.over.signal });
-    requestAnimationFrame((now) => this.draw(now, now, 0));
+    this.pace = new Pace(SLOW_FRAME_MS);
+    requestAnimationFrame((now) => this.draw(now, now));
     return new Promise((done) => { this.done = done; }).then(() => {
       clearInterval(saying);
       this.over.abort();
@@ -154,16 +155,11 @@ class DrivePage {
   }
 
   /** Draws what is newest. */
-  draw(now, last, slow) {
+  draw(now, last) {
     if (this.wheel.over) return;
     if (this.stage && !this.headset.session) {
-      slow = now - last > SLOW_FRAME_MS && now - last < 1000 ? slow + 1 : 0;
-      if (slow === 20) {
-        this.stage.simplify();
-        slow = 0;
-      }
       this.show();
-      this.stage.draw();
+      if (this.stage.draw() && this.pace.isSlow(now - last)) this.stage.simplify();
       for (const side of SIDES) this.panel.handle(side, this.stage.project(this.hands.inWorld(side)));
       for (const { name, index } of this.partners) {
         SIDES.forEach((side, place) => {
@@ -172,7 +168,7 @@ class DrivePage {
         });
       }
     }
-    requestAnimationFrame((next) => this.draw(next, now, slow));
+    requestAnimationFrame((next) => this.draw(next, now));
   }
 
   told(message) {

@@ -3,6 +3,9 @@
 import { element, say, words } from "../src/dom.js";
 import { SIDES } from "../src/message.js";
 
+/** No handle is nearer to the border. */
+const BORDER_PX = 26;
+
 /** There is nothing to drive, and why. */
 export function nothing(main, why) {
   main.replaceChildren(element("h1", {}, "Nothing to drive"), element("p", { class: "bad", role: "alert" }, why),
@@ -40,6 +43,8 @@ export function layOut(main, robot, briefing, on) {
         element("p", { class: "soft" }, "Drag a handle; with Shift, or by the wheel, towards you and away; with Ctrl to turn the hand. Arrow keys, Page Up and Page Down move the hand, I K J L U M turn it; Level points its fingers ahead. W A S D walk, Q and E turn, R and F raise and lower. Gamepad: sticks walk and turn, triggers close, bumpers let go of targets."),
         element("h2", {}, "Talk"), ...chat.elements)));
   const cursors = new Map();
+  const size = { width: 0, height: 0 };
+  new ResizeObserver(() => Object.assign(size, { width: place.clientWidth, height: place.clientHeight })).observe(place);
   return {
     view, handles,
     heard: chat.heard,
@@ -52,7 +57,7 @@ export function layOut(main, robot, briefing, on) {
       if (camera) place.style.setProperty("--seen", String(camera.width / camera.height));
     },
     headset: (supported) => { wear.hidden = !supported; },
-    handle: (side, at) => put(handles[side], at, true),
+    handle: (side, at) => put(handles[side], at, true, size),
     /** Where a partner wants a wrist to be. */
     cursor: (name, side, at) => {
       const key = name + side;
@@ -60,7 +65,7 @@ export function layOut(main, robot, briefing, on) {
         cursors.set(key, element("span", { class: "cursor", "aria-hidden": "true" }, `${name} ${side}`));
         place.append(cursors.get(key));
       }
-      put(cursors.get(key), at, false);
+      put(cursors.get(key), at, false, size);
     },
     facts: (reply, own) => say(facts, factsOf(reply, own)),
     label: ({ hand, paused, stepwise: steps }) => {
@@ -79,15 +84,15 @@ function keepKeys(event) {
   document.activeElement?.blur();
 }
 
-/** Puts something where it is seen; a handle that lies outside of the picture is at its border, and other things are not shown. */
-function put(thing, { x, y, ahead }, always) {
+/** Puts something where it is seen; a handle that lies outside of the picture is at its border, and other things are not shown. It is
+ * moved by what needs no layout and no painting. */
+function put(thing, { x, y, ahead }, always, size) {
   const inside = ahead && Math.abs(x) <= 1 && Math.abs(y) <= 1;
   thing.hidden = !inside && !always;
   // What lies behind is seen mirrored.
   const [u, v] = ahead ? [x, y] : [-x, -Math.abs(y) - 1];
-  const within = (share) => `clamp(1.6rem, ${100 * Math.max(0, Math.min(1, share))}%, 100% - 1.6rem)`;
-  thing.style.left = within((1 + u) / 2);
-  thing.style.top = within((1 - v) / 2);
+  const within = (share, length) => Math.max(BORDER_PX, Math.min(length - BORDER_PX, share * length)).toFixed(1);
+  thing.style.transform = `translate(${within((1 + u) / 2, size.width)}px, ${within((1 - v) / 2, size.height)}px) ${always ? "translate(-50%, -50%)" : "translate(-50%, .8rem)"}`;
 }
 
 /** What people say to each other. */

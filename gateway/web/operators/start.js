@@ -4,40 +4,53 @@ import { element, words } from "../src/dom.js";
 import { call } from "./call.js";
 import { linkRow } from "./links.js";
 
+const CONTROL_HZ = 50;
+
 /** The longest that an episode may wait for somebody who is away. */
 const PATIENCE_S = 600;
 
-const labelled = (text, field) => element("p", {}, element("label", {}, `${text} `, field));
+/** A field with its name before it and what it means below. */
+const labelled = (text, field, help = null) => element("p", {}, element("label", {}, element("span", {}, text), field), help);
 
-/** Who may drive a robot. */
-const PLAYERS = [
-  ["person", "a person"], ["expert", "the task's expert, a script that sees everything"], ["program", "a program or an agent of yours"],
-  ["still", "nobody: it stands still"],
+/** Who may drive a robot; `policy` is the learned one that the server was started with, if it was. */
+const playersWith = (policy) => [
+  ["person", "a person"], ["expert", "the task's expert, a script that sees everything"],
+  ...(policy ? [["policy", `the learned policy ${policy}`]] : []),
+  ["program", "a program or an agent of yours"], ["still", "nobody: it stands still"],
 ];
 
 /** Shows the form: of a new episode, or of one that goes on where `from`, a finished one, stood at a moment. */
 export function start(main, from = null) {
   const task = element("select", { name: "task", required: true });
   const seed = element("input", { name: "seed", type: "number", min: 0, max: 4294967295, step: 1, value: 0, required: true });
-  const protocol = element("select", { name: "protocol" },
-    element("option", { value: "agentic" }, "of agents: more time, and a wall clock"), element("option", { value: "benchmark" }, "of the benchmark: little time"));
+  const protocol = element("select", { name: "protocol" });
   const token = element("input", { name: "token", type: "password", autocomplete: "off" });
+  const locked = labelled("The server's token", token);
+  locked.hidden = true;
+  const what = element("span", { class: "soft" });
   const players = element("div");
+  let policy = null;
   const refusal = element("p", { class: "bad", role: "alert" });
   const links = element("div");
   let tasks = [];
 
   const offer = () => {
-    const robots = "ABC".slice(0, robotCount(tasks.find(({ id }) => id === task.value)));
+    const chosen = tasks.find(({ id }) => id === task.value);
+    const kept = protocol.value || from?.protocol;
+    what.textContent = chosen?.instruction ?? "";
+    protocol.replaceChildren(...(chosen?.protocols ?? []).map((rules) => element("option", { value: rules.protocol, selected: rules.protocol === kept }, toldRules(rules))));
+    const robots = "ABC".slice(0, robotCount(chosen));
     players.replaceChildren(...[...robots].map((robot) => labelled(`Robot ${robot} is driven by`,
-      element("select", { name: robot }, ...PLAYERS.map(([value, told]) => element("option", { value }, told))))));
+      element("select", { name: robot }, ...playersWith(policy).map(([value, told]) => element("option", { value }, told))))));
   };
   const load = async () => {
     refusal.textContent = "";
     try {
       ({ tasks } = await call("/v1/tasks", token.value));
+      ({ policy } = await call("/operate/policy", token.value));
     } catch (error) {
-      refusal.textContent = error.status === 401 ? "This server wants its token: enter it above." : error.message;
+      locked.hidden &&= error.status !== 401;
+      refusal.textContent = error.status === 401 ? "This server wants its token." : error.message;
       return;
     }
     const offered = from ? tasks.filter(({ id }) => id === from.task) : tasks;
@@ -66,18 +79,24 @@ export function start(main, from = null) {
       refusal.textContent = error.message;
     }
   };
-  const what = from
+  const place = from
     ? element("p", {}, `Goes on where ${from.run} stood at ${Number(from.at).toFixed(1)} s: ${words(from.task)}, seed ${from.seed}. It becomes an episode of its own, with a whole budget ahead.`)
     : null;
-  if (from) protocol.value = from.protocol;
   main.replaceChildren(
     element("p", {}, element("a", { href: "/" }, "All episodes")),
     element("h1", {}, from ? "Take over" : "Operate robots together"),
-    element("p", {}, "Each person drives one robot, on a page of their own. Time passes while everybody's page is open and in view, and stands still while one is away."),
-    element("form", { onsubmit: begin, class: "operate-form" }, what ?? labelled("Task", task), from ? "" : labelled("Seed", seed), labelled("Rules", protocol), players,
-      labelled("The server's token, if it has one", token), element("button", {}, "Start"), refusal),
+    element("p", {}, "Each person drives one robot, on a page of their own. Time passes while everybody's page is open and in view, and stands still while one is away. If you are alone, let the expert drive the others."),
+    element("form", { onsubmit: begin, class: "operate-form" }, place ?? labelled("Task", task, what),
+      from ? "" : labelled("Seed", seed, element("span", { class: "soft" }, "Says where things stand at the start: the same number, the same start.")),
+      labelled("Rules", protocol), players, locked, element("button", { class: "large" }, "Start"), refusal),
     links);
   load();
+}
+
+/** What is left to a team by the rules of a protocol. */
+function toldRules({ protocol, episode_steps: steps, wall_clock_s: clockS }) {
+  const whose = { agentic: "of agents", benchmark: "of the benchmark" }[protocol] ?? protocol;
+  return `${whose}: ${(steps / CONTROL_HZ).toFixed(0)} s in the world${clockS ? `, ${(clockS / 60).toFixed(0)} minutes on the clock` : ""}`;
 }
 
 const robotCount = (task) => task?.robots?.length ?? 2;
@@ -89,7 +108,7 @@ const robotCount = (task) => task?.robots?.length ?? 2;
 async function linksOf({ episode_id: episode, operators, instructions }, chosen, hostToken) {
   const by = (player) => operators.filter(({ robot }) => chosen.get(robot) === player);
   const [people, still] = [by("person"), by("still")];
-  await Promise.all(by("expert").map(({ token }) => call("/operate/expert", token, {})));
+  for (const player of ["expert", "policy"]) await Promise.all(by(player).map(({ token }) => call(`/operate/${player}`, token, {})));
   const part = (robot) => instructions.find((entry) => entry.robot === robot)?.instruction ?? "";
   const rows = people.map(({ robot, token }, index) => {
     const seat = new URLSearchParams({ episode, robot, token });
@@ -97,12 +116,13 @@ async function linksOf({ episode_id: episode, operators, instructions }, chosen,
     return linkRow(`Drive robot ${robot}`, `${location.origin}/operate#${seat}`, hostToken, part(robot));
   });
   return [element("h2", {}, "Links"),
-    element("p", {}, "Send each person one of these, and nobody else: who has the link drives the robot. They are shown this once."),
+    element("p", {}, "Open your own here, and send each other person one of these, and nobody else: who has the link drives the robot. They are shown this once."),
     element("ul", { class: "links" }, ...await Promise.all(rows)),
     ...by("program").flatMap(({ robot, token }) => [
       element("h2", {}, `Robot ${robot}'s program`),
       element("p", {}, "Start it with this in its environment, or give an agent the address and the token. It commands by HTTP or MCP as ever; time stands still while it thinks."),
       element("pre", {}, [`TANDEM_URL=${location.origin}`, `TANDEM_EPISODE=${episode}`, `TANDEM_ROBOT=${robot}`, `TANDEM_TOKEN=${token}`].join("\n")),
     ]),
-    ...by("expert").map(({ robot }) => element("p", {}, `The expert drives robot ${robot} as soon as somebody else commands.`))];
+    ...by("expert").map(({ robot }) => element("p", {}, `The expert drives robot ${robot} as soon as somebody else commands.`)),
+    ...by("policy").map(({ robot }) => element("p", {}, `The learned policy is connected, and drives robot ${robot} as soon as somebody else commands.`))];
 }

@@ -14,7 +14,7 @@ export function cards(main) {
   const problem = element("p", { class: "bad", role: "alert" });
   const version = element("span", { class: "soft" });
   main.replaceChildren(
-    element("header", { class: "top" }, element("h1", {}, "Tandem"), version),
+    element("header", { class: "top" }, element("h1", {}, "Tandem"), version, element("a", { href: "/operate" }, "Drive robots yourself")),
     problem,
     element("h2", {}, "On this server"), none, running,
     evaluated,
@@ -29,7 +29,7 @@ export function cards(main) {
       const text = JSON.stringify(list);
       if (text === shown) return;
       shown = text;
-      none.textContent = list.held.length ? "" : "No episode is held. An episode that a policy starts appears here by itself.";
+      none.textContent = list.held.length ? "" : "None runs. One that a policy or a person starts appears here by itself, and so does an evaluation into this server's folder of runs.";
       running.replaceChildren(...list.held.map(heldCard));
       evaluated.hidden = !list.evaluations.length;
       evaluations.replaceChildren(...list.evaluations.map(evaluationCard));

@@ -4,7 +4,7 @@ import { badge } from "./cards.js";
 import { ask, element, say, words } from "./dom.js";
 import { Frame, readScene } from "./message.js";
 import { BudgetPlots, Plots } from "./plots.js";
-import { Stage } from "./stage.js";
+import { Pace, Stage } from "./stage.js";
 import { Story } from "./story.js";
 import { Targets } from "./targets.js";
 import { LiveTime, RecordedTime } from "./time.js";
@@ -52,14 +52,11 @@ class EpisodePage {
   begin() {
     if (!this.recorded) this.connect();
     let last = performance.now();
-    let slow = 0;
+    const pace = new Pace(SLOW_FRAME_MS);
     const tick = (now) => {
       const passed = Math.min((now - last) / 1000, 0.5);
-      // A page in the background is not drawn, and so is not slow.
-      slow = now - last > SLOW_FRAME_MS && now - last < 1000 ? slow + 1 : 0;
-      if (slow === 20) this.stage.simplify();
+      if (this.draw(passed) && pace.isSlow(now - last)) this.stage.simplify();
       last = now;
-      this.draw(passed);
       requestAnimationFrame(tick);
     };
     requestAnimationFrame(tick);
@@ -224,6 +221,7 @@ class EpisodePage {
     this.plotsDue = true;
   }
 
+  /** Shows what is to be seen after so many seconds more. Returns whether the scene was drawn anew. */
   draw(seconds) {
     const { from, to, share, moved } = this.time.pass(seconds);
     if (moved || this.again || !this.drawn) {
@@ -239,7 +237,7 @@ class EpisodePage {
       say(this.moment, `${this.time.time.toFixed(2)} of ${this.time.end.toFixed(1)} s`);
       say(this.play, this.time.playing ? "Pause" : "Play");
     }
-    this.stage.draw();
+    return this.stage.draw();
   }
 
   drawPlots() {

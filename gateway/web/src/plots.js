@@ -130,7 +130,8 @@ function drawLines(canvas, lines, { begin, end, least, cursor, marks }) {
   const scale = Math.min(devicePixelRatio, 2);
   canvas.width = width * scale;
   canvas.height = HEIGHT * scale;
-  const context = canvas.getContext("2d");
+  // Drawn by the processor: a graphics processor in software, which draws the scene, takes many times as long for lines.
+  const context = canvas.getContext("2d", { willReadFrequently: true });
   context.scale(scale, scale);
   let most = least;
   for (const { values, first } of lines) for (let i = first; i < values.length; i += 1) most = Math.max(most, values[i]);

@@ -18,6 +18,8 @@ const FRUSTUM_M = 0.55;
 const GHOST_FROM_M = 0.01;
 /** Pixels of the page that one of the picture covers, at most, where drawing takes long. */
 const MOST_COARSENESS = 3;
+/** What has not moved for so long is drawn once more, as finely as the page is. */
+const STILL_MS = 300;
 const SOFTWARE_COARSENESS = 1.5;
 const STATE_COLOURS = { moving: "--accent", arrived: "--good", blocked: "--bad", out_of_reach: "--odd", joints: "--soft" };
 const SKY_FROM_BELOW = 0x8d8678;
@@ -48,6 +50,7 @@ export class Stage {
     this.extras = { frustums: true, forces: true, targets: true };
     this.robots = head.robots.map((robot, index) => this.extrasOf(robot, index));
     this.stale = true;
+    this.drawnAt = 0;
     this.sized = new ResizeObserver(() => this.resize());
     this.sized.observe(place);
     this.resize();
@@ -60,11 +63,13 @@ export class Stage {
     this.stale = true;
   }
 
-  resize() {
+  /** Takes over the size of the place; in fine pixels where nothing moves. */
+  resize(fine = false) {
     const { clientWidth: width, clientHeight: height } = this.place;
     if (!width || !height) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2) / this.coarseness);
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2) / (fine ? 1 : this.coarseness));
     this.renderer.setSize(width, height, false);
+    this.isFine = fine;
     this.stale = true;
   }
 
@@ -188,10 +193,13 @@ export class Stage {
   /** Draws, if anything has changed. Returns whether it has. */
   draw() {
     this.controls.update();
-    if (!this.stale) return false;
+    const isStill = !this.stale && !this.isFine && this.coarseness > 1 && performance.now() - this.drawnAt > STILL_MS;
+    if (!this.stale && !isStill) return false;
+    if (this.isFine || isStill) this.resize(isStill);
     this.stale = false;
     this.renderer.render(this.scene, this.camera());
-    return true;
+    this.drawnAt = performance.now();
+    return !isStill;
   }
 
   /** The camera that looks now, as the place's size wants it. */
@@ -279,6 +287,32 @@ export class Stage {
     this.sun.castShadow = false;
     this.scene.traverse((part) => { if (part.material) part.material.needsUpdate = true; });
     this.stale = true;
+  }
+}
+
+/** Frames over which it is judged whether drawing takes long. */
+const JUDGED_FRAMES = 20;
+/** A page in the background is not drawn, and so is not slow. */
+const NOT_DRAWN_MS = 1000;
+
+/** Says when drawing takes longer, over some frames, than `mostMs` a frame. */
+export class Pace {
+  /** @param {number} mostMs */
+  constructor(mostMs) {
+    this.mostMs = mostMs;
+    this.frames = 0;
+    this.totalMs = 0;
+  }
+
+  /** Another frame came `ms` after the last. Returns whether they come too slowly, once for so many. */
+  isSlow(ms) {
+    if (ms > NOT_DRAWN_MS) return false;
+    this.frames += 1;
+    this.totalMs += ms;
+    if (this.frames < JUDGED_FRAMES) return false;
+    const mean = this.totalMs / this.frames;
+    [this.frames, this.totalMs] = [0, 0];
+    return mean > this.mostMs;
   }
 }
 

@@ -20,6 +20,8 @@ export class Story {
     this.known = new Map();
     this.entries = [];
     this.thought = 0;
+    /** Takes a further command of people's into the item of those before it, if such a one was the last entry. */
+    this.driven = null;
     this.list = element("ol", { class: "story" });
     this.none = element("p", { class: "soft" }, "No call yet.");
     this.node = element("div", { class: recorded ? "reader" : "" }, this.none, this.list);
@@ -29,6 +31,16 @@ export class Story {
   add(entry) {
     if (this.known.has(entry.entry)) return;
     this.none.hidden = true;
+    if (isDriven(entry)) {
+      if (this.driven) {
+        this.known.set(entry.entry, null);
+        this.thought = entry.thought_s;
+        this.driven(entry);
+        return;
+      }
+    } else {
+      this.driven = null;
+    }
     const seen = element("div", { class: "seen" });
     const thought = entry.thought_s - this.thought;
     this.thought = entry.thought_s;
@@ -58,6 +70,10 @@ export class Story {
       element("span", {}, summary(entry, asked, reply)),
       this.recorded ? null : this.when(entry));
     const details = element("details", { class: entry.ok ? "" : "refused" }, head, body);
+    if (isDriven(entry)) {
+      this.goesOn(entry, [...head.children], body);
+      return this.recorded ? element("div", { class: "call" }, details, this.when(entry)) : details;
+    }
     details.addEventListener("toggle", () => {
       if (body.childNodes.length) return;
       body.append(
@@ -68,6 +84,18 @@ export class Story {
         element("p", { class: "soft" }, `The policy had thought for ${entry.thought_s.toFixed(1)} s by then.`));
     });
     return this.recorded ? element("div", { class: "call" }, details, this.when(entry)) : details;
+  }
+
+  /** The commands of people, 50 a second, are one item, which grows. */
+  goesOn(first, [number, , told], body) {
+    let count = 0;
+    this.driven = (entry) => {
+      count += 1;
+      number.textContent = count > 1 ? `${first.number}–${entry.number}` : `${entry.number}`;
+      told.textContent = `people drive, up to ${entry.time_s.toFixed(1)} s: ${count} ${count > 1 ? "commands" : "command"} of a step`;
+    };
+    this.driven(first);
+    body.append(element("p", { class: "soft" }, "What each robot was to do, 50 times a second. The recording has all of it."));
   }
 
   note(entry) {
@@ -121,6 +149,9 @@ export class Story {
     node.scrollTop = Math.max(0, marked.offsetTop - node.offsetTop - node.clientHeight / 3);
   }
 }
+
+/** Whether an entry is one of the commands of a single step that people drive by. */
+const isDriven = ({ kind, ok, tool, reply }) => kind === "call" && ok && tool === "together" && /"executed_steps":\s*1\D/.test(reply);
 
 const parsed = (json) => {
   try {

@@ -4,18 +4,23 @@
 import { Quaternion, Vector3 } from "three";
 import { POSE, SIDES } from "./message.js";
 
+/** The tools whose replies say where wrists were to be; people's commands are of the second. */
+const TELLING = ["move_wrists", "together"];
+
 export class Targets {
   /** @param {ReturnType<import("./message.js").readScene>} scene */
   constructor({ head, layout, frames }) {
     /** By robot and side: targets in order, with the times between which they hold. */
     this.known = head.robots.map(() => SIDES.map(() => []));
     let begin = 0;
+    let latest = 0;
     for (const call of head.story) {
-      const reply = call.ok && call.tool === "move_wrists" ? JSON.parse(call.reply) : null;
+      const reply = call.ok && TELLING.includes(call.tool) ? JSON.parse(call.reply) : null;
+      while (frames[latest + 1]?.time <= call.time_s + 1e-6) latest += 1;
+      const frame = frames[latest];
       for (const told of reply?.robots ?? []) {
         const robot = head.robots.findIndex(({ name }) => name === told.robot);
-        const frame = frames.findLast(({ time }) => time <= call.time_s + 1e-6);
-        if (robot < 0 || !frame) continue;
+        if (robot < 0 || !told.left?.target || !told.right?.target) continue;
         SIDES.forEach((side, index) => {
           const pose = inWorld(frame.row, layout.links[robot], told[side].target);
           this.known[robot][index].push({ begin, end: call.time_s, pose, state: told[side].state ?? "moving" });
@@ -27,7 +32,14 @@ export class Targets {
 
   /** The target of a hand at a time, if a command was under way that had one. */
   at(time, robot, side) {
-    return this.known[robot][side].find(({ begin, end }) => begin <= time && time <= end) ?? null;
+    const known = this.known[robot][side];
+    let [low, high] = [0, known.length];
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (known[middle].end < time) low = middle + 1;
+      else high = middle;
+    }
+    return known[low]?.begin <= time ? known[low] : null;
   }
 
   /** How far a wrist is from its target; `otherwise` where it has none. */

@@ -15,7 +15,7 @@ const SLOW_LINK_MS = 100;
 const { base } = await serve();
 const started = await post(base, "/v1/episodes", { task: "handover", seed: 2000, operators: "per_robot", patience_s: 600, talk: true });
 const [a, b] = started.operators;
-const link = `/operate#${new URLSearchParams({ episode: started.episode_id, ...a })}`;
+const linkTo = (operator) => `/operate#${new URLSearchParams({ episode: started.episode_id, ...operator })}`;
 
 /** Measures moves of the pointer and the places of a page's own right wrist. */
 function watchPointer() {
@@ -23,7 +23,7 @@ function watchPointer() {
   addEventListener("pointermove", (event) => window.moves.push(event.timeStamp), true);
 }
 
-const person = (origin = base) => open(origin + link, { before: [hear, watchPointer, countDrawn] });
+const person = (origin = base, link = linkTo(a)) => open(origin + link, { before: [hear, watchPointer, countDrawn] });
 const running = (page) => page.getByRole("status").filter({ hasText: "Running" }).waitFor({ timeout: PATIENCE_MS });
 
 /** The medians of the times from drags of a person's right handle to the row that has the wrist moved, to a picture of it, and to the handle. */
@@ -43,13 +43,13 @@ async function latencies(page, drags) {
       const before = wrist(window.rows.at(-1));
       window.moves.length = 0;
       const own = document.querySelector(".handle.right");
-      const place = own.style.left + own.style.top;
+      const place = own.style.transform;
       window.measured = new Promise((done, failed) => {
         let handleMs = null;
         setTimeout(() => failed(new Error("nothing has moved for ten seconds")), 10_000);
         const look = () => {
           const [begun] = window.moves;
-          if (begun && handleMs === null && own.style.left + own.style.top !== place) handleMs = performance.now() - begun;
+          if (begun && handleMs === null && own.style.transform !== place) handleMs = performance.now() - begun;
           const moved = begun && window.rows.find((row) => row.came > begun && row.drawn && Math.hypot(...wrist(row).map((value, axis) => value - before[axis])) > 0.003);
           if (moved && handleMs !== null) done({ rowMs: moved.came - begun, drawnMs: moved.drawn - begun, handleMs });
           else requestAnimationFrame(look);
@@ -76,6 +76,16 @@ const [clock, simulated] = [performance.now(), await time(pageA)];
 const quick = await latencies(pageA, 15);
 told("on this machine", quick);
 console.log(`the world ran at ${((await time(pageA) - simulated) / ((performance.now() - clock) / 1000)).toFixed(2)} of real time; A's page drew ${(await drawnRate(pageA)).toFixed(0)} frames a second`);
+
+// B's person at the same machine, in the same browser: one processor draws both pages.
+other.leave();
+const pageB = await person(base, linkTo(b));
+await Promise.all([running(pageA), running(pageB)]);
+const shared = await latencies(pageA, 11);
+told("with B's page in the same browser", shared);
+console.log(`A's page drew ${(await drawnRate(pageA)).toFixed(0)} frames a second, B's ${(await drawnRate(pageB)).toFixed(0)}`);
+await pageB.context().close();
+const again = await driver(base, "B", b.token);
 
 // A link on which everything takes 100 ms each way: the handle is where the person has it at once, and the wrist follows.
 const slow = createServer((near) => {
@@ -105,8 +115,8 @@ const after = await handle.boundingBox();
 await slowA.mouse.up();
 const off = Math.hypot(after.x - before.x + 80, after.y - before.y + 40);
 console.log(`after a drag of a second over the slow link the handle is ${off.toFixed(0)} pixels from the pointer`);
-other.leave();
+again.leave();
 slow.close();
 assert.ok(late.rowMs > 2 * SLOW_LINK_MS && late.handleMs < MOST_LATENCY_MS && off < 25, JSON.stringify({ late, off }));
-assert.ok(quick.drawnMs < MOST_LATENCY_MS, `${quick.drawnMs} ms`);
+assert.ok(quick.drawnMs < MOST_LATENCY_MS && shared.drawnMs < MOST_LATENCY_MS, `${quick.drawnMs} and ${shared.drawnMs} ms`);
 await done();

@@ -135,7 +135,7 @@ assert.ok(movedBy(resting.pelvis_in_start, gone.pelvis_in_start) > 0.1);
 const fingers = ({ joint_positions_rad: joints }) => Object.keys(joints).filter((name) => name.startsWith("right_hand")).map((name) => joints[name]);
 const closed = fingers(gone).map((value, joint) => Math.abs(value - fingers(resting)[joint]));
 assert.ok(Math.max(...closed) > 0.3, `the trigger closes nothing: ${closed}`);
-const targetOf = (page) => page.locator(".handle.right").evaluate((handle) => handle.style.left + handle.style.top);
+const targetOf = (page) => page.locator(".handle.right").evaluate((handle) => handle.style.transform);
 await withPad(pageA, [0, 0, 0, 0], { 5: 1 });
 await pageA.waitForTimeout(300);
 await withPad(pageA, [0, 0, 0, 0], {});

@@ -153,7 +153,11 @@ fn who_watches_sees_steps_calls_and_pictures_until_the_end() {
             other => panic!("{other:?}"),
         }
     }
-    assert_eq!(steps, [0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 10.0], "every other step, and the last");
+    assert_eq!(
+        steps,
+        [0.0, 2.0, 4.0, 5.0, 6.0, 8.0, 10.0, 10.0],
+        "every other step, the last of each call, and the last"
+    );
     assert_eq!((tools, pictures), (vec![json!("wait"), json!("move_wrists"), json!("observe")], 1));
     assert_eq!(ended, Some(json!("finished")));
 }

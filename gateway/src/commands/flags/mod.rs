@@ -8,6 +8,6 @@ mod world;
 
 pub use agent::AgentFlags;
 pub use episode::{EpisodeFlags, Seeds};
-pub use policy::PolicyFlags;
+pub use policy::{PartnerFlags, PolicyFlags};
 pub use stress::{StressFlags, StressPlanFlags};
 pub use world::{LocomotionFlag, SensingFlags, WorldFlags};

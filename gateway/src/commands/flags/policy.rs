@@ -1,6 +1,6 @@
 //! The flags that say who plays: one of the program's own players, a program, or a learned policy at a server.
 
-use std::{error::Error, path::PathBuf, time::Duration};
+use std::{error::Error, path::PathBuf, sync::Arc, time::Duration};
 
 use tandem_episodes::{
     EpisodeSpec,
@@ -10,7 +10,10 @@ use tandem_episodes::{
 use tandem_tools_spec::{Driving, Operators};
 
 use super::agent::AgentFlags;
-use crate::drivers::{PRESETS, PolicyMap, PolicyProtocol, Program, PythonModule, PythonPart, RemotePolicy};
+use crate::{
+    drivers::{PRESETS, PolicyMap, PolicyProtocol, Program, PythonModule, PythonPart, RemotePolicy},
+    hosting::PartnerPolicy,
+};
 
 /// The prefix of --policy that names a program.
 const EXEC: &str = "exec:";
@@ -157,11 +160,7 @@ impl PolicyFlags {
                 )?)
             }
             (PolicyChoice::Remote(protocol, urls), map, None) => {
-                let Some(map) = map.or(protocol.preset().map(str::to_owned)) else {
-                    let presets = PRESETS.map(|(name, _)| name).join(", ");
-                    return Err(format!("{protocol}: needs --policy-map, a file or one of {presets}").into());
-                };
-                Box::new(RemotePolicy::new(protocol, urls, PolicyMap::find(&map)?))
+                Box::new(remote_policy(protocol, urls, map, "--policy-map")?)
             }
         };
         Ok(match self.policy_name {
@@ -174,6 +173,53 @@ impl PolicyFlags {
         let operators = self.per_robot.then_some(Operators::PerRobot);
         let driving = Driving { operators, patience_s: self.patience_s, talk: self.talk.then_some(true) };
         driving.validate().map(|()| driving)
+    }
+}
+
+/// The policy at `urls` with the map that `flag` gives, or else its protocol's own.
+fn remote_policy(
+    protocol: PolicyProtocol,
+    urls: Vec<String>,
+    map: Option<String>,
+    flag: &str,
+) -> Result<RemotePolicy, Box<dyn Error>> {
+    let Some(map) = map.or(protocol.preset().map(str::to_owned)) else {
+        let presets = PRESETS.map(|(name, _)| name).join(", ");
+        return Err(format!("{protocol}: needs {flag}, a file or one of {presets}").into());
+    };
+    Ok(RemotePolicy::new(protocol, urls, PolicyMap::find(&map)?))
+}
+
+/// The flags of a policy that may drive one robot beside people.
+#[derive(Debug, Default, clap::Args)]
+pub struct PartnerFlags {
+    /// A learned policy at a server that people may have drive a robot beside them on /operate: openpi:ws://HOST:PORT,
+    /// xpolicylab:ws://HOST:PORT or act:http://HOST:PORT/act, as `evaluate --policy` takes it [default: none].
+    #[arg(long, env = "TANDEM_PARTNER", value_name = "POLICY", value_parser = parse_partner)]
+    partner: Option<PartnerAddress>,
+    /// How that policy is asked and understood, as `evaluate --policy-map` takes it.
+    #[arg(long, env = "TANDEM_PARTNER_MAP", value_name = "NAME|FILE", requires = "partner")]
+    partner_map: Option<String>,
+}
+
+#[derive(Clone, Debug)]
+struct PartnerAddress(PolicyProtocol, Vec<String>);
+
+fn parse_partner(text: &str) -> Result<PartnerAddress, String> {
+    match parse_policy(text)? {
+        PolicyChoice::Remote(protocol, urls) => Ok(PartnerAddress(protocol, urls)),
+        PolicyChoice::Player(_) | PolicyChoice::Program(_) | PolicyChoice::Agent(_) | PolicyChoice::OpenLoop(_) => Err(
+            "a partner is a policy at a server, as act:http://127.0.0.1:8500/act; people choose experts and programs on /operate without a flag"
+                .into(),
+        ),
+    }
+}
+
+impl PartnerFlags {
+    /// The policy, if there is one; what it needs is read, and no server is asked yet.
+    pub fn policy(self) -> Result<Option<Arc<dyn PartnerPolicy>>, Box<dyn Error>> {
+        let Some(PartnerAddress(protocol, urls)) = self.partner else { return Ok(None) };
+        Ok(Some(Arc::new(remote_policy(protocol, urls, self.partner_map, "--partner-map")?)))
     }
 }
 
@@ -279,5 +325,30 @@ mod tests {
         check(&["--per-robot"], "--per-robot is for programs");
         check(&["--policy", "exec:true", "--talk"], "--per-robot");
         check(&["--policy", "exec:true", "--per-robot", "--patience", "0"], "give 0.05 to 600 seconds");
+    }
+
+    #[test]
+    fn a_partner_is_a_policy_at_a_server() {
+        #[derive(Debug, Parser)]
+        struct Serve {
+            #[command(flatten)]
+            flags: PartnerFlags,
+        }
+        let partner = |flags: &[&str]| {
+            let line =
+                Serve::try_parse_from([&["serve"], flags].concat()).map_err(|error| error.to_string())?;
+            let policy = line.flags.policy().map_err(|error| error.to_string())?;
+            Ok::<_, String>(policy.map(|policy| policy.name()))
+        };
+        assert_eq!(partner(&[]), Ok(None));
+        assert_eq!(partner(&["--partner", "openpi:ws://a:1"]), Ok(Some("openpi:ws://a:1".into())));
+        let check = |flags: &[&str], says: &str| {
+            let refusal = partner(flags).unwrap_err();
+            assert!(refusal.contains(says), "{refusal}");
+        };
+        check(&["--partner", "act:http://a/act"], "act: needs --partner-map, a file or one of openpi");
+        check(&["--partner", "expert"], "a partner is a policy at a server, as act:http://");
+        check(&["--partner", "exec:true"], "a partner is a policy at a server");
+        check(&["--partner-map", "openpi"], "--partner");
     }
 }

@@ -21,7 +21,9 @@ use std::{
 use serde_json::json;
 use tandem_episodes::{
     EpisodeSpec,
-    players::{EpisodeOutput, PlayError, PlayOutcome, Policy, PolicyWait, play_in_process},
+    players::{
+        EpisodeOutput, LocalEpisode, PlayError, PlayOutcome, PlayerError, Policy, PolicyWait, play_in_process,
+    },
     results::PolicyCard,
     tasks::{Task, TaskWords},
 };
@@ -31,6 +33,7 @@ pub use error::RemoteError;
 pub use map::{MapError, PRESETS, PolicyMap, preset};
 pub use trial::try_map;
 
+use crate::hosting::PartnerPolicy;
 use columns::EpisodeMoment;
 use map::AnswerScope;
 use policy_session::PolicySession;
@@ -120,6 +123,24 @@ impl Policy for RemotePolicy {
     fn waiting(&self) -> Option<PolicyWait> {
         let lasted = self.waits().iter().min()?.elapsed();
         Some(PolicyWait { target: self.urls.join(", "), lasted })
+    }
+}
+
+impl PartnerPolicy for RemotePolicy {
+    fn name(&self) -> String {
+        self.card().name
+    }
+
+    fn play(
+        &self,
+        spec: &EpisodeSpec,
+        episode: &mut dyn LocalEpisode,
+        connected: &mut dyn FnMut(),
+    ) -> Result<Result<(), PlayerError>, PlayError> {
+        self.check(spec.task).map_err(PlayError::NotReady)?;
+        let mut session = self.open(spec)?;
+        connected();
+        Ok(session.play(episode, EpisodeMoment::number_of(spec.task, spec.seed)))
     }
 }
 

@@ -7,7 +7,8 @@
 
 mod collection;
 mod driving;
-mod expert;
+mod one_robot;
+mod partner;
 mod round;
 
 use std::{
@@ -27,6 +28,7 @@ use crate::token::Token;
 pub use collection::{CollectedEpisode, Collection, CollectionProgress, CollectionStage};
 use driving::Wheel;
 pub use driving::{Driver, Wish};
+pub use partner::PartnerPolicy;
 use round::{Pending, Round};
 
 /// The operators of one episode.
@@ -52,8 +54,8 @@ struct Wheels {
     drivers: u64,
     /// Whether commands are made of what they say.
     turning: bool,
-    /// By seat: whether the task's expert drives.
-    experts: Vec<bool>,
+    /// By seat: whether the task's expert or a policy drives.
+    partners: Vec<bool>,
 }
 
 /// Who drives which robot.
@@ -81,8 +83,8 @@ impl Team {
         let round = Mutex::new(Round::new(seats.iter().map(|seat| seat.robot.clone()).collect()));
         let patience = Duration::from_secs_f64(driving.patience_s());
         let (none, under_way) = (seats.iter().map(|_| None).collect(), vec![None; seats.len()]);
-        let experts = vec![false; seats.len()];
-        let wheels = Mutex::new(Wheels { seats: none, under_way, experts, ..Wheels::default() });
+        let partners = vec![false; seats.len()];
+        let wheels = Mutex::new(Wheels { seats: none, under_way, partners, ..Wheels::default() });
         Ok((Team { seats, patience, talk: driving.talk == Some(true), silence, round, wheels }, tokens))
     }
 
@@ -158,7 +160,7 @@ impl Team {
     }
 
     /// Takes a command, and answers when it has been executed. Beside people who drive in real time, whose commands are of one step
-    /// each, it goes on over as many of theirs as it has steps; an expert's always does.
+    /// each, it goes on over as many of theirs as it has steps; that of an expert or a policy always does.
     async fn act(
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
@@ -200,7 +202,7 @@ impl Team {
     /// Whether a command by who has `seat` goes on where that of a partner was shorter.
     fn goes_on(&self, seat: usize) -> bool {
         let wheels = self.wheels();
-        wheels.experts[seat] || wheels.seats.iter().any(Option::is_some)
+        wheels.partners[seat] || wheels.seats.iter().any(Option::is_some)
     }
 
     /// Takes a command, and answers when the step has been made.

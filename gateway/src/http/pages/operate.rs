@@ -2,12 +2,14 @@
 //! read it; what it asks for comes by REST, with the token of a robot's operator, and by a socket.
 
 use axum::{
-    Extension, Router,
+    Extension, Json, Router,
     extract::State,
     http::{StatusCode, header},
     response::{Html, IntoResponse, Response},
     routing::{get, post},
 };
+
+use serde_json::{Value, json};
 
 use super::{
     POLICY, collecting,
@@ -34,6 +36,7 @@ pub fn router() -> Router<AppState> {
         .route("/operate/mark", post(collecting::mark))
         .route("/operate/code", post(collecting::code))
         .route("/operate/expert", post(expert))
+        .route("/operate/policy", get(known_policy).merge(post(policy)))
         .route(ENTER, post(drive::enter))
         .route(DRIVE, get(drive::drive))
 }
@@ -58,6 +61,32 @@ async fn expert(
     let hosted = app.table.hosted(episode)?;
     let team = hosted.team.clone().ok_or(HostingError::NeedsOperator)?;
     team.take_expert(&hosted.thread, robot).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Which policy may drive beside people, for who starts episodes.
+async fn known_policy(
+    State(app): State<AppState>,
+    Extension(caller): Extension<Caller>,
+) -> Result<Json<Value>, ApiError> {
+    match caller {
+        Caller::Host => Ok(Json(json!({ "policy": app.partner.map(|policy| policy.name()) }))),
+        Caller::Operator { .. } => Err(HostingError::HostsBusiness.into()),
+    }
+}
+
+/// The policy that this server was started with drives the caller's robot from now on.
+async fn policy(
+    State(app): State<AppState>,
+    Extension(caller): Extension<Caller>,
+) -> Result<StatusCode, ApiError> {
+    let Caller::Operator { episode, robot } = &caller else { return Err(HostingError::NeedsOperator.into()) };
+    let hosted = app.table.hosted(episode)?;
+    let team = hosted.team.clone().ok_or(HostingError::NeedsOperator)?;
+    let reason =
+        "no policy may drive here; start the server with --partner, as act:http://127.0.0.1:8500/act";
+    let policy = app.partner.ok_or_else(|| HostingError::NoPolicy { reason: reason.into() })?;
+    team.take_policy(&hosted.thread, robot, policy).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

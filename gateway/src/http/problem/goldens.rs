@@ -81,6 +81,7 @@ fn hosting_refusals() -> Vec<HostingError> {
         HostingError::NeedsOperator,
         HostingError::HostsBusiness,
         HostingError::NoExpert(PlayerError::NoExpert { task: "x".into(), have: vec!["handover"] }),
+        HostingError::NoPolicy { reason: "nobody listens at http://127.0.0.1:1/act".into() },
         HostingError::NoTalk,
         HostingError::TooMuchSaid { robot: robot(), unheard: 8 },
         HostingError::KeyUsed,

@@ -15,21 +15,24 @@ pub fn page(version: &str, list: &EpisodeList, caller: &Caller) -> String {
         Caller::Host => "; <a href=\"/metrics\">figures for Prometheus</a>",
         Caller::Operator { .. } => "",
     };
-    let mut body = format!("<h1>{}</h1>\n", escape(&title));
+    let mut body = format!("<main>\n<h1>{}</h1>\n", escape(&title));
     body += &format!(
-        "<p>Simulated humanoids that must work together. <a href=\"/docs\">The interface</a>, for programs \
-         <a href=\"/v1/openapi.json\">as OpenAPI</a>; <a href=\"/v1/tasks\">the tasks</a>; <a href=\"/v1/tools\">the tools</a>{figures}. \
-         MCP hosts connect to <code>/mcp</code>. Who came by the link that the server printed when it started <a href=\"/watch\">watches</a>. People <a href=\"/operate\">operate</a> robots together.</p>\n<h2>Episodes</h2>\n"
+        "<p>Simulated humanoids that must work together.</p>\n<ul>\n\
+         <li><a href=\"/operate\">Operate</a>: drive robots yourself in this browser, alone or with others.</li>\n\
+         <li><a href=\"/watch\">Watch</a> episodes and evaluations, by the link that the server printed when it started.</li>\n\
+         <li>For programs: <a href=\"/docs\">the interface</a>, <a href=\"/v1/openapi.json\">as OpenAPI</a>; \
+         <a href=\"/v1/tasks\">the tasks</a>; <a href=\"/v1/tools\">the tools</a>{figures}. MCP hosts connect to <code>/mcp</code>.</li>\n\
+         </ul>\n<h2>Episodes</h2>\n"
     );
     let rows: String = list.episodes.iter().map(row).collect();
     body += &match rows.is_empty() {
-        true => "<p>None is held. <code>POST /v1/episodes</code> starts one.</p>\n".to_owned(),
+        true => "<p>None is held. <code>POST /v1/episodes</code> starts one, or <a href=\"/operate\">a person</a>.</p>\n".to_owned(),
         false => format!(
             "<div class=\"scroll\"><table>\n<tr><th>episode</th><th>task</th><th>seed</th><th>protocol</th><th>driven by</th><th>step</th><th>stands</th><th></th></tr>\n\
              {rows}</table></div>\n"
         ),
     };
-    html::page(&title, &body)
+    html::page(&title, &(body + "</main>\n"))
 }
 
 /// What a program finds first.

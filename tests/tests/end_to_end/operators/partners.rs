@@ -1,17 +1,40 @@
-//! Who else drives beside a person: the task's expert, and programs, whose commands go on over the steps of people.
+//! Who else drives beside a person: the task's expert, a learned policy, and programs, whose commands go on over the steps of people.
 
-use std::time::{Duration, Instant};
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use serde_json::{Value, json};
+use tandem::{
+    drivers::{PolicyMap, PolicyProtocol, RemotePolicy},
+    http::Guests,
+};
+use tandem_tests::TestServer;
 
 use super::{driving::DriversSocket, team::Team};
+use crate::policies::act_server::ActServer;
 
-/// The status of a request for the expert by who has `token`.
-fn ask_for_expert(team: &Team, token: Option<&str>) -> u16 {
+/// The status of a request for a partner at `path` by who has `token`.
+fn ask_for(team: &Team, path: &str, token: Option<&str>) -> u16 {
     let bearer = token.map(|token| format!("Bearer {token}"));
     let mut headers = vec![("content-type", "application/json")];
     headers.extend(bearer.iter().map(|bearer| ("authorization", bearer.as_str())));
-    team.server.ask("POST", "/operate/expert", &headers, b"{}").0
+    team.server.ask("POST", path, &headers, b"{}").0
+}
+
+fn ask_for_expert(team: &Team, token: Option<&str>) -> u16 {
+    ask_for(team, "/operate/expert", token)
+}
+
+/// A server whose people may have the policy at `url` beside them.
+fn server_with_policy(url: &str) -> TestServer {
+    let map = PolicyMap::find("openpi").expect("a preset");
+    let policy = RemotePolicy::new(PolicyProtocol::Act, vec![url.into()], map);
+    TestServer::with_guests(
+        Default::default(),
+        Guests { partner: Some(Arc::new(policy)), ..Guests::default() },
+    )
 }
 
 #[test]
@@ -58,4 +81,56 @@ fn beside_a_person_a_longer_command_goes_on() {
     let together: Vec<Value> =
         calls.into_iter().filter(|call| call.tool == "together").map(|call| call.arguments).collect();
     assert!(together.len() >= 10, "{} steps of the person's", together.len());
+}
+
+#[test]
+fn a_learned_policy_drives_its_own_robot_beside_a_person() {
+    // 10 rows of 35 numbers: both arms raised, the base standing.
+    let mut row = vec![0.0; 35];
+    (row[0], row[7], row[34]) = (-0.6, -0.6, 0.76);
+    let act = ActServer::start(move |_| (200, json!({ "actions": vec![row.clone(); 10] })));
+    let server = server_with_policy(&act.url());
+    assert_eq!(server.get("/operate/policy").ok()["policy"], json!(format!("act:{}", act.url())));
+    let team = Team::on(server, 0, json!({ "patience_s": 600, "protocol": "agentic" }));
+    assert_eq!(ask_for(&team, "/operate/policy", None), 403, "it is for who has a robot");
+    for _ in 0..2 {
+        assert_eq!(ask_for(&team, "/operate/policy", Some(&team.tokens[1])), 204);
+    }
+    let mut page = DriversSocket::open(&team, 0);
+    let began = Instant::now();
+    let raised = |robot: usize, name: &str| {
+        let state = team.ask(robot, "get_robot_state", json!({ "robot": name })).ok();
+        state["joint_positions_rad"]["right_shoulder_pitch_joint"].as_f64().expect("an angle")
+    };
+    let held = raised(0, "A");
+    while (raised(1, "B") + 0.6).abs() > 0.1 {
+        assert!(began.elapsed() < Duration::from_secs(120), "the arm is not raised");
+        page.say(json!({}), true);
+        page.read();
+    }
+    assert!((raised(0, "A") - held).abs() < 0.05, "the person's robot does not do what the policy tells it");
+    drop(page);
+    let (_, recording) = team.verified();
+    let notes = recording.transcript().expect("a transcript");
+    assert!(format!("{notes:?}").contains(&format!("The policy act:{} drives robot B.", act.url())));
+}
+
+#[test]
+fn no_page_names_an_address_of_its_own() {
+    let team = Team::start(json!({ "patience_s": 600 }));
+    assert_eq!(team.server.get("/operate/policy").ok()["policy"], Value::Null);
+    assert_eq!(ask_for(&team, "/operate/policy", Some(&team.tokens[1])), 409);
+    let bearer = format!("Bearer {}", team.tokens[1]);
+    let asked = team.server.ask("GET", "/operate/policy", &[("authorization", &bearer)], b"");
+    assert_eq!(asked.0, 403, "it is for who starts episodes");
+}
+
+#[test]
+fn a_policy_that_is_not_there_is_told_of_and_may_be_asked_for_again() {
+    let act = ActServer::start(|_| (500, json!({ "error": "no weights" })));
+    let team = Team::on(server_with_policy(&act.url()), 0, json!({ "patience_s": 600 }));
+    for _ in 0..2 {
+        assert_eq!(ask_for(&team, "/operate/policy", Some(&team.tokens[1])), 409);
+    }
+    assert!(act.requests.lock().expect("no panic").len() >= 2, "it is asked each time");
 }

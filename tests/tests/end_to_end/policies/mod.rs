@@ -1,6 +1,6 @@
 //! Policies that live elsewhere: programs that are started for an episode, and learned policies at servers.
 
-mod act_server;
+pub mod act_server;
 mod kinds;
 mod openpi_server;
 pub mod plans;

@@ -52,7 +52,7 @@ impl PolicyObservation {
             let state_values = state_values(&robot.state, &moment).ok_or_else(|| withheld(Observe::NAME))?;
             Ok(RobotInputs { picture: robot.view.picture.clone(), state_values })
         });
-        let third_person = third_person.then(|| episode.third_person().into());
+        let third_person = third_person.then(|| episode.third_person()).transpose()?.map(Arc::new);
         let robots = inputs.collect::<Result<_, PlayerError>>()?;
         Ok(PolicyObservation { robots, third_person })
     }

@@ -1,0 +1,139 @@
+//! Who of this process drives one robot beside people or programs who have the others: the task's expert, or a learned policy.
+//!
+//! The expert plays its script for all robots, of which its own does its part. Where something is not done by then, the script gives up,
+//! and begins again with what is as it is.
+
+use std::{fmt, sync::Arc, thread};
+
+use tandem_episodes::{
+    EpisodeSpec,
+    players::{Episode, LocalEpisode, PlayError, PlayerError, PrivilegedPlayer, experts::Expert},
+};
+use tandem_tools_spec::{Finish, Note, Wait};
+use tokio::{runtime::Handle, sync::oneshot};
+
+use super::{Team, one_robot::OneRobot};
+use crate::hosting::{EpisodeThread, HostingError};
+
+/// Control steps for which the robot stands before the expert's script begins again.
+const PAUSE_STEPS: u32 = 25;
+
+/// A policy elsewhere that can drive one robot of an episode: it plays all of them, and its own does its part.
+pub trait PartnerPolicy: fmt::Debug + Send + Sync {
+    /// As people choose it, and recordings name it.
+    fn name(&self) -> String;
+
+    /// Connects for an episode of `spec`, says when that is done by `connected`, and plays until the episode is over or the policy
+    /// fails, which [`PlayerError`] says.
+    fn play(
+        &self,
+        spec: &EpisodeSpec,
+        episode: &mut dyn LocalEpisode,
+        connected: &mut dyn FnMut(),
+    ) -> Result<Result<(), PlayerError>, PlayError>;
+}
+
+impl Team {
+    /// Has the expert of the task drive `robot` from now on, until the episode ends or everybody else has finished. It sees what no
+    /// policy may know, which is recorded, and results name it. Asking again changes nothing.
+    pub async fn take_expert(
+        self: &Arc<Self>,
+        episode: &Arc<EpisodeThread>,
+        robot: &str,
+    ) -> Result<(), HostingError> {
+        let seat = self.seat(robot)?;
+        let spec = episode.spec().clone();
+        Expert::for_episode(&spec).map_err(HostingError::NoExpert)?;
+        if std::mem::replace(&mut self.wheels().partners[seat], true) {
+            return Ok(());
+        }
+        drop(episode.watch_driving(robot).await?);
+        let text = format!("The task's expert drives robot {robot}.");
+        episode.note(Some(robot), Note { text, ..Note::default() }).await?;
+        let own = self.one_robot(episode, seat, robot);
+        let thread = thread::Builder::new().name(format!("expert of {robot}"));
+        thread.spawn(move || play_expert(own, &spec)).map_err(HostingError::Thread)?;
+        Ok(())
+    }
+
+    /// Has `policy` drive `robot` from now on, until the episode ends or everybody else has finished; returns when it is connected. It
+    /// is shown what its map says of all robots. Asking again changes nothing.
+    pub async fn take_policy(
+        self: &Arc<Self>,
+        episode: &Arc<EpisodeThread>,
+        robot: &str,
+        policy: Arc<dyn PartnerPolicy>,
+    ) -> Result<(), HostingError> {
+        let seat = self.seat(robot)?;
+        if std::mem::replace(&mut self.wheels().partners[seat], true) {
+            return Ok(());
+        }
+        let text = format!("The policy {} drives robot {robot}.", policy.name());
+        let own = self.one_robot(episode, seat, robot);
+        let (connected, connection) = oneshot::channel();
+        let thread = thread::Builder::new().name(format!("policy of {robot}"));
+        thread.spawn(move || play_policy(own, &*policy, connected)).map_err(HostingError::Thread)?;
+        match connection.await.map_err(|_| HostingError::EpisodeStopped)? {
+            Ok(()) => episode.note(Some(robot), Note { text, ..Note::default() }).await,
+            Err(error) => {
+                self.wheels().partners[seat] = false;
+                Err(HostingError::NoPolicy { reason: error.to_string() })
+            }
+        }
+    }
+
+    fn one_robot(self: &Arc<Self>, episode: &Arc<EpisodeThread>, seat: usize, robot: &str) -> OneRobot {
+        let (team, episode, runtime) = (self.clone(), episode.clone(), Handle::current());
+        OneRobot { team, episode, seat, robot: robot.into(), runtime }
+    }
+}
+
+/// Plays until nobody does any more.
+fn play_expert(mut own: OneRobot, spec: &EpisodeSpec) {
+    while own.has_company() {
+        let played = Expert::for_episode(spec).and_then(|mut expert| expert.play(&mut own));
+        let paused = match played {
+            Ok(()) | Err(PlayerError::GaveUp(_)) => own.call(Wait { steps: PAUSE_STEPS }.into()).map(drop),
+            Err(error) => Err(error),
+        };
+        match paused {
+            Ok(()) => {}
+            Err(PlayerError::EpisodeOver) => break,
+            Err(error) => {
+                tracing::warn!(%error, robot = own.robot, "the expert of a robot has stopped");
+                break;
+            }
+        }
+    }
+    // Nobody waits for it any more. Of an episode that has ended, nobody is left who could be told.
+    let _ = own.ask(Finish {}.into());
+}
+
+/// Plays until the episode is over or the policy fails, which is noted for who looks at the recording.
+fn play_policy(
+    mut own: OneRobot,
+    policy: &dyn PartnerPolicy,
+    connected: oneshot::Sender<Result<(), PlayError>>,
+) {
+    let mut connected = Some(connected);
+    let mut answer = |came_of_it| {
+        if let Some(connected) = connected.take() {
+            // Who asked may have gone.
+            let _ = connected.send(came_of_it);
+        }
+    };
+    let spec = own.episode.spec().clone();
+    let failed = match policy.play(&spec, &mut own, &mut || answer(Ok(()))) {
+        Err(error) => return answer(Err(error)),
+        Ok(Ok(()) | Err(PlayerError::EpisodeOver)) => None,
+        Ok(Err(error)) => Some(error),
+    };
+    if let Some(error) = failed {
+        tracing::warn!(%error, robot = own.robot, "the policy of a robot has stopped");
+        let text = format!("The policy of robot {} has stopped: {error}", own.robot);
+        let note = own.episode.note(Some(&own.robot), Note { text, ..Note::default() });
+        // Of an episode that has ended, nobody is left who could be told.
+        let _ = own.runtime.block_on(note);
+    }
+    let _ = own.ask(Finish {}.into());
+}
