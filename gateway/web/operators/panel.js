@@ -3,6 +3,14 @@
 import { element, say, words } from "../src/dom.js";
 import { SIDES } from "../src/message.js";
 
+/** How a person drives. */
+const WAYS = [
+  ["Move a hand", "drag L or R; with Shift, or by the wheel, towards you and away; or arrow keys, Page Up and Page Down"],
+  ["Turn it", "Ctrl and drag, or I K, J L, U M; Level points its fingers ahead"],
+  ["Walk", "W A S D; turn by Q and E; rise and sink by R and F"],
+  ["Gamepad", "sticks walk and turn, triggers close the hands, bumpers let go of targets"],
+];
+
 /** No handle is nearer to the border. */
 const BORDER_PX = 26;
 
@@ -40,7 +48,7 @@ export function layOut(main, robot, briefing, on) {
         element("div", { class: "tools" }, button("Open", "open", "O"), button("Close", "close", "C"), button("Level", "level", "H"), button("Let go of targets", "clutch", "space")),
         element("div", { class: "tools" }, pause, element("button", { type: "button", onclick: () => on.finish() }, "Finish")),
         element("p", {}, which),
-        element("p", { class: "soft" }, "Drag a handle; with Shift, or by the wheel, towards you and away; with Ctrl to turn the hand. Arrow keys, Page Up and Page Down move the hand, I K J L U M turn it; Level points its fingers ahead. W A S D walk, Q and E turn, R and F raise and lower. Gamepad: sticks walk and turn, triggers close, bumpers let go of targets."),
+        element("ul", { class: "ways soft" }, ...WAYS.map(([what, how]) => element("li", {}, element("strong", {}, `${what}: `), how))),
         element("h2", {}, "Talk"), ...chat.elements)));
   const cursors = new Map();
   const size = { width: 0, height: 0 };

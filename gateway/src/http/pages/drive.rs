@@ -38,7 +38,7 @@ const COOKIE: &str = "tandem_operator_";
 /// How often a page is told for whom its robot waits.
 const STATUS_INTERVAL: Duration = Duration::from_millis(250);
 
-/// With every so many answers a page gets the whole report, five times a second.
+/// With every so many answers for its own robot a page gets the whole report, five times a second.
 const ANSWERS_PER_REPORT: usize = 10;
 
 /// The robots that a request for the socket may drive: for each a cookie has the token of its operator.
@@ -234,8 +234,8 @@ impl DriversPage {
     ) -> io::Result<()> {
         let text = match answer {
             Ok(answer) => {
-                *count += 1;
                 let own = matches!(&answer.reply, ToolReply::Act(reply) if reply.robots.iter().any(|report| report.robot == self.robot));
+                *count += usize::from(own);
                 let due = own && *count % ANSWERS_PER_REPORT == 1;
                 if !due && answer.heard.is_empty() {
                     return Ok(());
