@@ -1,8 +1,8 @@
-//! What a call on an episode is answered with.
+//! What a call on an episode is answered with, and one that was refused on its way there.
 
 use serde::Serialize;
 use tandem_episodes::{CallReply, Session};
-use tandem_tools_spec::{Heard, ManageReply, Observation, Partner, StopReason, TalkReply, ToolReply};
+use tandem_tools_spec::{Call, Heard, ManageReply, Observation, Partner, StopReason, TalkReply, ToolReply};
 
 /// A tool's reply, and what has to be said with every reply.
 #[derive(Debug, Serialize)]
@@ -96,5 +96,29 @@ impl Answer {
             reply.stop_reason = StopReason::PartnerDone;
         }
         self
+    }
+}
+
+/// A call that was refused before it reached its episode, as it came.
+#[derive(Debug, Clone)]
+pub struct RefusedCall {
+    /// What may be a tool's name.
+    pub tool: String,
+    /// What may be JSON.
+    pub arguments: String,
+    /// Why it was refused.
+    pub problem: String,
+}
+
+impl RefusedCall {
+    /// A call that may yet be refused.
+    pub fn of(call: &Call) -> RefusedCall {
+        let arguments = serde_json::to_string(call).unwrap_or_default();
+        RefusedCall { tool: call.name().into(), arguments, problem: String::new() }
+    }
+
+    /// The call with why it was refused.
+    pub fn because(self, refusal: &impl ToString) -> RefusedCall {
+        RefusedCall { problem: refusal.to_string(), ..self }
     }
 }

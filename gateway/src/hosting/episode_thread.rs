@@ -17,10 +17,10 @@ use tandem_episodes::{
 use tandem_tools_spec::{
     Briefing, Call, EndReason, ExtraInformation, ManageReply, Note, Observe, ResultReply, ToolCall, ToolReply,
 };
-use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot};
 
 use super::{
-    Answer, HostingError,
+    Answer, HostingError, RefusedCall,
     onlookers::{EveryStep, FeedEnd, LiveFeed, LiveWatch},
     panic_guard::{EpisodeMetrics, PanicGuard},
 };
@@ -65,18 +65,8 @@ enum Job {
     Briefing {
         reply: ReplySender<Briefing>,
     },
-    Facts {
-        reply: ReplySender<Facts>,
-    },
-    /// A look for a policy in this process, which is shown this of what policies are not shown as a rule.
-    Look {
-        observe: Box<Observe>,
-        shown: Vec<ExtraInformation>,
-        reply: ReplySender<TeamObservation>,
-    },
-    Room {
-        reply: ReplySender<Picture>,
-    },
+    /// For experts, scoring and clients of policies in this process.
+    Work(Box<dyn FnOnce(&mut PanicGuard) + Send>),
     EndIfAbandoned {
         idle: Duration,
     },
@@ -93,30 +83,6 @@ enum Job {
     },
 }
 
-/// A call that was refused before it reached its episode, as it came.
-#[derive(Debug, Clone)]
-pub struct RefusedCall {
-    /// What may be a tool's name.
-    pub tool: String,
-    /// What may be JSON.
-    pub arguments: String,
-    /// Why it was refused.
-    pub problem: String,
-}
-
-impl RefusedCall {
-    /// A call that may yet be refused.
-    pub fn of(call: &Call) -> RefusedCall {
-        let arguments = serde_json::to_string(call).unwrap_or_default();
-        RefusedCall { tool: call.name().into(), arguments, problem: String::new() }
-    }
-
-    /// The call with why it was refused.
-    pub fn because(self, refusal: &impl ToString) -> RefusedCall {
-        RefusedCall { problem: refusal.to_string(), ..self }
-    }
-}
-
 type ReplySender<T> = oneshot::Sender<Result<T, HostingError>>;
 
 /// A running episode. Dropping the last handle ends the episode and closes its recording.
@@ -129,6 +95,8 @@ pub struct EpisodeThread {
     robots: Vec<String>,
     steps_per_command: u32,
     feed: Arc<LiveFeed>,
+    /// Those who begin to look on wait here, so that many of them take no place of calls.
+    looking: Semaphore,
 }
 
 /// What the thread lets everybody know without being asked.
@@ -218,7 +186,10 @@ impl EpisodeThread {
         status.env_steps.fetch_max(briefing.status.env_steps, Ordering::Relaxed);
         let steps_per_command = briefing.status.budget.steps_per_command;
         let robots = briefing.robots.iter().map(|robot| robot.robot.clone()).collect();
-        Ok((EpisodeThread { jobs, status, folder: path, spec, robots, steps_per_command, feed }, briefing))
+        let looking = Semaphore::new(1);
+        let thread =
+            EpisodeThread { jobs, status, folder: path, spec, robots, steps_per_command, feed, looking };
+        Ok((thread, briefing))
     }
 
     /// Runs a call of the policy that directs all robots and returns its reply.
@@ -280,13 +251,14 @@ impl EpisodeThread {
     async fn watch_as(&self, operator: Option<String>) -> Result<LiveWatch, HostingError> {
         // Listening comes first, so that nothing is missed between the two.
         let events = self.feed.subscribe().ok_or(HostingError::EpisodeStopped)?;
+        let _turn = self.looking.acquire().await.map_err(|_| HostingError::EpisodeStopped)?;
         let view = self.do_job_in_turn(|reply| Job::Watch { operator, reply }).await?;
         Ok(LiveWatch { view, events })
     }
 
     /// Where everything is and who touches what: for experts and scoring in this process, never for policies.
     pub fn facts_blocking(&self) -> Result<Facts, HostingError> {
-        self.do_job_blocking(|reply| Job::Facts { reply })
+        self.work_blocking(|session| Ok(session.facts()))
     }
 
     /// A look through the robots, as it was drawn, for a policy that is asked from this process and `shown` this of what policies are
@@ -296,13 +268,13 @@ impl EpisodeThread {
         observe: &Observe,
         shown: &[ExtraInformation],
     ) -> Result<TeamObservation, HostingError> {
-        let (observe, shown) = (Box::new(observe.clone()), shown.to_vec());
-        self.do_job_blocking(|reply| Job::Look { observe, shown, reply })
+        let (observe, shown) = (observe.clone(), shown.to_vec());
+        self.work_blocking(move |session| Ok(session.observe(&observe, &shown)?))
     }
 
     /// The room, seen from where no robot stands, for the same policies.
     pub fn room_blocking(&self) -> Result<Picture, HostingError> {
-        self.do_job_blocking(|reply| Job::Room { reply })
+        self.work_blocking(|session| Ok(session.third_person()))
     }
 
     /// Ends the episode if its policy's clock has run out, or if it has made no call for as long as `idle`.
@@ -378,10 +350,13 @@ impl EpisodeThread {
         answer.await.map_err(|_| HostingError::EpisodeStopped)?
     }
 
-    /// As [`EpisodeThread::do_job`], for threads that run no futures.
-    fn do_job_blocking<T>(&self, job: impl FnOnce(ReplySender<T>) -> Job) -> Result<T, HostingError> {
-        let (reply, answer) = oneshot::channel();
-        self.send(job(reply))?;
+    /// Does something with the session, unless too many wait already; for threads that run no futures.
+    fn work_blocking<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&mut Session) -> Result<T, HostingError> + Send + 'static,
+    ) -> Result<T, HostingError> {
+        let (reply, answer) = oneshot::channel::<Result<T, HostingError>>();
+        self.send(Job::Work(Box::new(move |session| drop(reply.send(session.run(work).flatten())))))?;
         answer.blocking_recv().map_err(|_| HostingError::EpisodeStopped)?
     }
 
@@ -462,13 +437,10 @@ fn serve(mut session: PanicGuard, mut inbox: mpsc::Receiver<Job>, status: &Share
                 status.update(&session);
                 let _ = reply.send(view.flatten());
             }
-            Job::Facts { reply } => drop(reply.send(session.run(|session| session.facts()))),
-            Job::Look { observe, shown, reply } => {
-                let seen = session.run(|session| Ok(session.observe(&observe, &shown)?));
+            Job::Work(work) => {
+                work(&mut session);
                 status.update(&session);
-                let _ = reply.send(seen.flatten());
             }
-            Job::Room { reply } => drop(reply.send(session.run(|session| session.third_person()))),
             Job::EndIfAbandoned { idle } => {
                 // The log has the reason of a refusal.
                 let _ = session.run(|session| session.end_if_abandoned(idle));

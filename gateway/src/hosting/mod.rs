@@ -18,8 +18,8 @@ mod tests;
 
 #[cfg(test)]
 pub use absurd_robot::write_absurd_robot;
-pub use answer::Answer;
-pub use episode_thread::{EpisodeThread, RefusedCall};
+pub use answer::{Answer, RefusedCall};
+pub use episode_thread::EpisodeThread;
 pub use error::HostingError;
 pub use hosted_episode::{Caller, HostedEpisode};
 pub use idempotency_cache::IdempotentReply;

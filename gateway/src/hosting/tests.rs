@@ -48,6 +48,25 @@ fn hands() -> (Arc<AtomicU64>, Clock) {
 }
 
 #[tokio::test]
+async fn many_who_begin_to_look_on_take_no_place_of_calls() {
+    let folder = tempfile::tempdir().unwrap();
+    let (episode, _, _) = start("looked at", folder.path(), hands().1).await;
+    let mut looking = tokio::task::JoinSet::new();
+    for _ in 0..64 {
+        let episode = episode.clone();
+        looking.spawn(async move { episode.watch().await.map(drop) });
+    }
+    // All of them have begun to wait before the policy calls.
+    tokio::task::yield_now().await;
+    for _ in 0..3 {
+        episode.call(wait()).await.unwrap();
+    }
+    while let Some(looked) = looking.join_next().await {
+        looked.unwrap().unwrap();
+    }
+}
+
+#[tokio::test]
 async fn a_panic_ends_its_own_episode_and_no_other() {
     let [broken_folder, sound_folder] = [(); 2].map(|()| tempfile::tempdir().unwrap());
     let broken = Arc::new(AtomicBool::new(false));

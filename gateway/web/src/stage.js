@@ -60,6 +60,14 @@ export class Stage {
   /** Takes over the colours of the page. */
   paint() {
     this.scene.background = new Color(colour("--sky"));
+    this.robots.forEach(({ frustum, hands }, index) => {
+      const paint = new Color(robotColour(index));
+      frustum.material.color.copy(paint);
+      for (const { felt, contact } of hands) {
+        felt.setColor(paint);
+        contact.setColor(new Color(colour("--force")));
+      }
+    });
     this.stale = true;
   }
 

@@ -28,7 +28,7 @@ pub fn page(version: &str, list: &EpisodeList, caller: &Caller) -> String {
     body += &match rows.is_empty() {
         true => "<p>None is held. <code>POST /v1/episodes</code> starts one, or <a href=\"/operate\">a person</a>.</p>\n".to_owned(),
         false => format!(
-            "<div class=\"scroll\"><table>\n<tr><th>episode</th><th>task</th><th>seed</th><th>protocol</th><th>driven by</th><th>step</th><th>stands</th><th></th></tr>\n\
+            "<div class=\"scroll\"><table>\n<tr><th>episode</th><th>task</th><th>seed</th><th>protocol</th><th>driven by</th><th>step</th><th>stands</th><th>page</th></tr>\n\
              {rows}</table></div>\n"
         ),
     };
