@@ -66,7 +66,7 @@ enum Job {
         reply: ReplySender<Briefing>,
     },
     /// For experts, scoring and clients of policies in this process.
-    Work(Box<dyn FnOnce(&mut PanicGuard) + Send>),
+    Work(Box<dyn FnOnce(&mut PanicGuard, &SharedStatus) + Send>),
     EndIfAbandoned {
         idle: Duration,
     },
@@ -356,7 +356,12 @@ impl EpisodeThread {
         work: impl FnOnce(&mut Session) -> Result<T, HostingError> + Send + 'static,
     ) -> Result<T, HostingError> {
         let (reply, answer) = oneshot::channel::<Result<T, HostingError>>();
-        self.send(Job::Work(Box::new(move |session| drop(reply.send(session.run(work).flatten())))))?;
+        self.send(Job::Work(Box::new(move |session, status| {
+            let done = session.run(work).flatten();
+            status.update(session);
+            // Who asked may have gone.
+            let _ = reply.send(done);
+        })))?;
         answer.blocking_recv().map_err(|_| HostingError::EpisodeStopped)?
     }
 
@@ -437,10 +442,7 @@ fn serve(mut session: PanicGuard, mut inbox: mpsc::Receiver<Job>, status: &Share
                 status.update(&session);
                 let _ = reply.send(view.flatten());
             }
-            Job::Work(work) => {
-                work(&mut session);
-                status.update(&session);
-            }
+            Job::Work(work) => work(&mut session, status),
             Job::EndIfAbandoned { idle } => {
                 // The log has the reason of a refusal.
                 let _ = session.run(|session| session.end_if_abandoned(idle));
