@@ -66,7 +66,7 @@ enum Job {
         reply: ReplySender<Briefing>,
     },
     /// For experts, scoring and clients of policies in this process.
-    Work(Box<dyn FnOnce(&mut PanicGuard, &SharedStatus) + Send>),
+    Work(Work),
     EndIfAbandoned {
         idle: Duration,
     },
@@ -83,6 +83,7 @@ enum Job {
     },
 }
 
+type Work = Box<dyn FnOnce(&mut PanicGuard, &SharedStatus) + Send>;
 type ReplySender<T> = oneshot::Sender<Result<T, HostingError>>;
 
 /// A running episode. Dropping the last handle ends the episode and closes its recording.
