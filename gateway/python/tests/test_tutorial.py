@@ -13,8 +13,9 @@ import pytest
 
 PAGE = Path(__file__).parents[3] / "docs/src/tutorial.md"
 
+# Of disturbed demonstrations one in six fails and is not kept, wherever that happens to be.
 SMALL = {
-    "--seeds 2000-2099": "--seeds 2000-2001",
+    "--seeds 2000-2099": "--seeds 2000-2004",
     "--seeds 1-100": "--seeds 2003",
     "--steps 2500": "--steps 200 --batch 2",
 }
