@@ -181,6 +181,17 @@ impl EpisodeTable {
         self.lock().episodes.get(id).cloned().ok_or_else(|| unknown(id))
     }
 
+    /// An operator's episode, its team, and the operator's robot.
+    pub fn own_robot<'a>(
+        &self,
+        caller: &'a Caller,
+    ) -> Result<(HostedEpisode, Arc<Team>, &'a str), HostingError> {
+        let Caller::Operator { episode, robot } = caller else { return Err(HostingError::NeedsOperator) };
+        let hosted = self.hosted(episode)?;
+        let team = hosted.team.clone().ok_or(HostingError::NeedsOperator)?;
+        Ok((hosted, team, robot))
+    }
+
     /// What `who` has to know to play the episode `id`, in this server's words.
     pub async fn briefing(&self, id: &str, who: &Caller) -> Result<Briefing, HostingError> {
         let mut briefing = self.hosted(id)?.briefing(who).await?;

@@ -108,15 +108,11 @@ pub async fn drive(
     robots: Option<Extension<DrivenRobots>>,
     request: Request,
 ) -> Result<Response, ApiError> {
-    let (Caller::Operator { episode, robot }, Some(Extension(DrivenRobots(robots)))) = (&caller, robots)
-    else {
-        return Err(HostingError::NeedsOperator.into());
-    };
-    let hosted = app.table.hosted(episode)?;
-    let team = hosted.team.clone().ok_or(HostingError::NeedsOperator)?;
+    let Extension(DrivenRobots(robots)) = robots.ok_or(HostingError::NeedsOperator)?;
+    let (hosted, team, robot) = app.table.own_robot(&caller)?;
     let (watch, every_step) = hosted.thread.watch_driving(robot).await?;
     let (driver, answers) = Driver::take(&team, &hosted.thread, &robots)?;
-    let (robot, disclosure) = (robot.clone(), app.settings.disclosure);
+    let (robot, disclosure) = (robot.to_owned(), app.settings.disclosure);
     upgrade(request, move |PageSocket { mut sender, mut reader }| async move {
         let _every_step = every_step;
         let driver = Arc::new(driver);
