@@ -11,7 +11,7 @@ use tokio::sync::Semaphore;
 
 use super::{
     problem::ApiError,
-    watching::{KnownEvaluations, LastOpened, MOST_WATCHERS, WatchKey},
+    watching::{KnownEvaluations, MOST_WATCHERS, RecordingReader, WatchKey},
 };
 use crate::{
     hosting::{Caller, EpisodeTable, PartnerPolicy},
@@ -32,8 +32,10 @@ pub struct AppState {
     pub watch_key: WatchKey,
     /// Places for those who watch.
     pub watchers: Arc<Semaphore>,
-    /// The recording that was watched last.
-    pub opened: LastOpened,
+    /// Reads the recordings that are watched.
+    pub recordings: RecordingReader,
+    /// Reads those of which films are made, which takes longer.
+    pub films: RecordingReader,
     /// The evaluations in the runs folder, as they were when they were listed last.
     pub evaluations: KnownEvaluations,
     /// The policy that people may have drive beside them: no page can name another.
@@ -44,8 +46,9 @@ impl AppState {
     /// A server that holds no episode yet.
     pub fn new(table: Arc<EpisodeTable>, settings: Arc<Settings>, watch_key: WatchKey) -> AppState {
         let watchers = Arc::new(Semaphore::new(MOST_WATCHERS));
-        let (opened, evaluations) = (LastOpened::default(), KnownEvaluations::default());
-        AppState { table, settings, watch_key, watchers, opened, evaluations, partner: None }
+        let (recordings, films) = (RecordingReader::start(), RecordingReader::start());
+        let evaluations = KnownEvaluations::default();
+        AppState { table, settings, watch_key, watchers, recordings, films, evaluations, partner: None }
     }
 
     /// The tools that `caller` may be offered: talking is for operators who may.

@@ -1,5 +1,5 @@
-// 20 people watch and three drive BigTable for ten minutes, one episode after another: the server's memory stays as it is, and no command is
-// dropped. No browser is needed.
+// 20 people watch and three drive BigTable for ten minutes, one episode after another, and all who watched look at each again once it is
+// over: the server's memory stays as it is, and no command is dropped. No browser is needed.
 //
 //     node REPOSITORY/tests/peers/pages/crowd.mjs REPOSITORY/target/release/tandem [MINUTES]
 import assert from "node:assert/strict";
@@ -17,10 +17,10 @@ const megabytes = () => Number(readFileSync(`/proc/${server.pid}/status`, "utf8"
 
 const began = performance.now();
 const memory = [];
-const played = [];
 const refusals = new Set();
 const total = { steps: 0, rows: 0, seen: 0, refused: 0, recorded: 0 };
 let rate = 1;
+const look = async (id) => (await fetch(`${base}/watch/run?run=${id}`, { headers: { authorization: `Bearer ${key}` } })).arrayBuffer();
 for (let seed = 2000; 60_000 * minutes - (performance.now() - began) > LEAST_MS; seed += 1) {
   const started = await post(base, "/v1/episodes", { task: "big_table", seed, operators: "per_robot", patience_s: 600, talk: true });
   const id = started.episode_id;
@@ -55,12 +55,9 @@ for (let seed = 2000; 60_000 * minutes - (performance.now() - began) > LEAST_MS;
   people.forEach((one) => one.leave());
   watching.forEach((one) => one.leave());
   await fetch(`${base}/v1/episodes/${id}`, { method: "DELETE" });
+  const [recording] = await Promise.all(Array.from({ length: WATCHERS }, () => look(id)));
   memory.push(megabytes());
-  played.push(id);
-}
-// Every step that was made has a command of each robot in the recordings, which are read once nobody drives any more.
-for (const id of played) {
-  const recording = await (await fetch(`${base}/watch/run?run=${id}`, { headers: { authorization: `Bearer ${key}` } })).arrayBuffer();
+  // Every step that was made has a command of each robot in the recording.
   const { story } = JSON.parse(new TextDecoder().decode(recording.slice(4, 4 + new DataView(recording).getUint32(0, true))));
   for (const { tool, ok, arguments: asked, reply } of story.filter((entry) => entry.tool === "together")) {
     assert.ok(ok, reply);

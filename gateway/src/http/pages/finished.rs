@@ -14,7 +14,7 @@ use axum::{
 use serde_json::{Value, json};
 use tandem_episodes::{EpisodeError, RESULT_FILE, Recording, replay::short_film};
 
-use super::{Wanted, blocking};
+use super::Wanted;
 use crate::{
     hosting::HostingError,
     http::{
@@ -89,28 +89,28 @@ pub fn folder_of(app: &AppState, run: String) -> Result<PathBuf, ApiError> {
 /// All that a page draws of a finished episode.
 pub async fn run(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> Result<Response, ApiError> {
     let folder = folder(&app, &wanted)?;
-    let message = blocking(move || Ok(app.opened.open(&folder)?.message()));
+    let message = app.recordings.read(move |last| Ok(last.open(&folder)?.message()));
     Ok(([(header::CONTENT_TYPE, "application/octet-stream")], message.await?).into_response())
 }
 
 /// What a robot saw at a moment, as a PNG file.
 pub async fn picture(app: AppState, wanted: Wanted) -> Result<Vec<u8>, ApiError> {
     let folder = folder(&app, &wanted)?;
-    blocking(move || {
-        let episode = app.opened.open(&folder)?;
+    let drawn = app.recordings.read(move |last| {
+        let episode = &last.open(&folder)?.episode;
         let name = wanted.robot.unwrap_or_default();
         let drawn = episode.picture(wanted.time_s.unwrap_or_default(), &name);
         let have = episode.robots().map(str::to_owned).collect();
         let drawn = drawn.ok_or(EpisodeError::UnknownRobot { name, have }).map_err(HostingError::from)?;
         drawn.map_err(|failed| ApiError::Reply(failed.into()))
-    })
-    .await
+    });
+    drawn.await
 }
 
 /// A short film of the episode.
 pub async fn film(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> Result<Response, ApiError> {
     let folder = folder(&app, &wanted)?;
-    let made = blocking(move || {
+    let made = app.films.read(move |_| {
         let recording = Recording::read(&folder.join(RECORDING)).map_err(|error| unreadable(&error))?;
         short_film(&recording).map_err(|error| unreadable(&error))
     });
@@ -124,7 +124,8 @@ pub async fn file(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> 
     let found = FILES.iter().find(|(name, _)| *name == asked);
     let (name, kind) =
         *found.ok_or(ApiError::NoRun { run: format!("{}/{asked}", wanted.run.unwrap_or_default()) })?;
-    let bytes = blocking(move || fs::read(folder.join(name)).map_err(|_| no_recording(&folder))).await?;
+    let read = app.recordings.read(move |_| fs::read(folder.join(name)).map_err(|_| no_recording(&folder)));
+    let bytes = read.await?;
     let headers = [
         (header::CONTENT_TYPE, kind.to_owned()),
         // A report is a page of its own, which runs nothing.

@@ -11,7 +11,7 @@ use serde::Deserialize;
 use tandem_episodes::{CONTROL_HZ, EpisodeSpec, MomentStart, Start};
 use tandem_tools_spec::{Driving, Operators, Protocol};
 
-use super::{blocking, finished::folder_of};
+use super::finished::folder_of;
 use crate::http::{
     app::AppState,
     problem::ApiError,
@@ -41,8 +41,8 @@ pub async fn take_over(
     let wanted: TakeOver =
         serde_json::from_slice(&body).map_err(|error| ApiError::MalformedJson(error.to_string()))?;
     let folder = folder_of(&app, wanted.run)?;
-    let (opened, at) = (app.opened.clone(), folder.clone());
-    let recorded = blocking(move || Ok(opened.open(&at)?.spec().clone())).await?;
+    let at = folder.clone();
+    let recorded = app.recordings.read(move |last| Ok(last.open(&at)?.episode.spec().clone())).await?;
     let settings = &app.settings;
     // The recording is read on a thread that may have another folder.
     let recording = std::path::absolute(folder.join(RECORDING)).unwrap_or_else(|_| folder.join(RECORDING));

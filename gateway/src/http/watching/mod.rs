@@ -2,11 +2,11 @@
 
 mod evaluations;
 mod key;
-mod last_opened;
+mod recording_reader;
 
 pub use evaluations::KnownEvaluations;
 pub use key::{Host, WatchKey, Watcher};
-pub use last_opened::{LastOpened, RECORDING, no_recording, unreadable};
+pub use recording_reader::{RECORDING, RecordingReader, no_recording, unreadable};
 
 /// How many pages may watch at once.
 pub const MOST_WATCHERS: usize = 64;

@@ -1,0 +1,145 @@
+//! The thread that reads recordings for those who look at finished episodes, and keeps the one that was looked at last.
+//!
+//! A recording takes tens of megabytes while it is read, and an allocator keeps what was freed for the thread that had asked for it. Many
+//! threads that read now and then would each keep so much; one does not.
+
+use std::{
+    cell::OnceCell,
+    fmt, fs,
+    panic::{AssertUnwindSafe, catch_unwind},
+    path::{Path, PathBuf},
+    thread,
+    time::SystemTime,
+};
+
+use axum::{body::Bytes, http::StatusCode};
+use tandem_episodes::replay::RecordedEpisode;
+use tokio::sync::{mpsc, oneshot};
+
+use crate::http::problem::ApiError;
+
+/// What a recording is called in an episode's folder.
+pub const RECORDING: &str = "episode.mcap";
+
+/// So many may wait for their turn before others wait to be let in.
+const WAITING: usize = 16;
+
+type ReadingJob = Box<dyn FnOnce(&mut LastOpened) + Send>;
+
+/// Has recordings read, one after another.
+#[derive(Clone)]
+pub struct RecordingReader(mpsc::Sender<ReadingJob>);
+
+impl fmt::Debug for RecordingReader {
+    fn fmt(&self, text: &mut fmt::Formatter) -> fmt::Result {
+        text.write_str("RecordingReader(..)")
+    }
+}
+
+impl RecordingReader {
+    /// A reader that has read nothing yet. Its thread ends with the last clone.
+    pub fn start() -> RecordingReader {
+        let (jobs, mut inbox) = mpsc::channel::<ReadingJob>(WAITING);
+        thread::spawn(move || {
+            let mut last = LastOpened::default();
+            while let Some(job) = inbox.blocking_recv() {
+                // Who waits for a job that panics is told that no answer came.
+                if catch_unwind(AssertUnwindSafe(|| job(&mut last))).is_err() {
+                    last = LastOpened::default();
+                }
+            }
+        });
+        RecordingReader(jobs)
+    }
+
+    /// Has `work` done on the thread, once it is its turn; not at all where whoever asked has gone by then.
+    pub async fn read<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&mut LastOpened) -> Result<T, ApiError> + Send + 'static,
+    ) -> Result<T, ApiError> {
+        let (reply, answer) = oneshot::channel();
+        let job: ReadingJob = Box::new(move |last| {
+            if !reply.is_closed() {
+                let _ = reply.send(work(last));
+            }
+        });
+        self.0.send(job).await.map_err(|gone| ApiError::Reply(gone.to_string().into()))?;
+        answer.await.map_err(|failed| ApiError::Reply(failed.into()))?
+    }
+}
+
+/// The recording that was looked at last: a page asks for many pictures of one.
+#[derive(Default)]
+pub struct LastOpened(Option<OpenedRecording>);
+
+/// A recording in memory, and which file it was read from when.
+pub struct OpenedRecording {
+    path: PathBuf,
+    changed: SystemTime,
+    pub episode: RecordedEpisode,
+    message: OnceCell<Bytes>,
+}
+
+impl OpenedRecording {
+    /// The message that pages draw it from, which all who ask for it share.
+    pub fn message(&self) -> Bytes {
+        self.message.get_or_init(|| self.episode.message().into()).clone()
+    }
+}
+
+impl LastOpened {
+    /// The recording in an episode's folder, read only where it is another one, or has changed.
+    pub fn open(&mut self, folder: &Path) -> Result<&OpenedRecording, ApiError> {
+        let path = folder.join(RECORDING);
+        let changed = fs::metadata(&path).and_then(|file| file.modified());
+        let changed = changed.map_err(|_| no_recording(folder))?;
+        // The one before goes first, so that there are never two.
+        let last = self.0.take().filter(|opened| opened.path == path && opened.changed == changed);
+        let opened = match last {
+            Some(opened) => opened,
+            None => {
+                let episode = RecordedEpisode::read(&path).map_err(|error| unreadable(&error))?;
+                OpenedRecording { path, changed, episode, message: OnceCell::new() }
+            }
+        };
+        Ok(self.0.insert(opened))
+    }
+}
+
+/// The refusal where an episode has no such file.
+pub fn no_recording(folder: &Path) -> ApiError {
+    ApiError::NoRun { run: folder.file_name().unwrap_or_default().to_string_lossy().into_owned() }
+}
+
+/// The refusal where a recording cannot be used.
+pub fn unreadable(error: &dyn std::error::Error) -> ApiError {
+    let status = StatusCode::UNPROCESSABLE_ENTITY;
+    ApiError::Protocol { status, detail: error.to_string() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn all_is_read_on_one_thread_and_a_panic_stops_only_who_caused_it() {
+        let reader = RecordingReader::start();
+        let here = |_: &mut LastOpened| Ok(thread::current().id());
+        let first = reader.read(here).await.expect("an answer");
+        assert_ne!(first, thread::current().id());
+        let broken =
+            reader.read(|_: &mut LastOpened| -> Result<(), ApiError> { panic!("a broken file") }).await;
+        assert!(matches!(broken, Err(ApiError::Reply(_))), "{broken:?}");
+        let many: Vec<_> = (0..3 * WAITING)
+            .map(|_| {
+                tokio::spawn({
+                    let reader = reader.clone();
+                    async move { reader.read(here).await }
+                })
+            })
+            .collect();
+        for one in many {
+            assert_eq!(one.await.expect("no panic").expect("an answer"), first);
+        }
+    }
+}
