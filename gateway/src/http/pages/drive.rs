@@ -159,7 +159,7 @@ impl DriversPage {
         sender.bytes(scene.message(more, &view.now.frame(&scene))).await?;
         let mut statuses = interval(STATUS_INTERVAL);
         statuses.set_missed_tick_behavior(MissedTickBehavior::Skip);
-        let (mut waited_for, mut count) = (Vec::new(), 0);
+        let (mut waited_for, mut own_answers) = (Vec::new(), OwnAnswers::default());
         loop {
             tokio::select! {
                 event = events.recv() => match event {
@@ -169,7 +169,7 @@ impl DriversPage {
                     Err(RecvError::Closed) => return Ok(()),
                 },
                 answer = answers.recv() => match answer {
-                    Some(answer) => self.answer(sender, answer, &mut count).await?,
+                    Some(answer) => self.answer(sender, answer, &mut own_answers).await?,
                     // Another page drives.
                     None => return sender.text(json!({ "kind": "replaced" }).to_string()).await,
                 },
@@ -226,14 +226,12 @@ impl DriversPage {
         &self,
         sender: &mut PageSender,
         answer: Result<Answer, HostingError>,
-        count: &mut usize,
+        own_answers: &mut OwnAnswers,
     ) -> io::Result<()> {
         let text = match answer {
             Ok(answer) => {
                 let own = matches!(&answer.reply, ToolReply::Act(reply) if reply.robots.iter().any(|report| report.robot == self.robot));
-                *count += usize::from(own);
-                let due = own && *count % ANSWERS_PER_REPORT == 1;
-                if !due && answer.heard.is_empty() {
+                if !own_answers.is_reported(own) && answer.heard.is_empty() {
                     return Ok(());
                 }
                 json!({ "kind": "report", "report": answer })
@@ -241,5 +239,35 @@ impl DriversPage {
             Err(refused) => json!({ "kind": "refused", "detail": ApiError::from(refused).body().detail }),
         };
         sender.text(text.to_string()).await
+    }
+}
+
+/// How many answers a page has had for its own robot. Those for robots that stand still beside it come in between, and do not count.
+#[derive(Debug, Default)]
+struct OwnAnswers(usize);
+
+impl OwnAnswers {
+    /// Whether the page gets the whole report on the next answer.
+    fn is_reported(&mut self, own: bool) -> bool {
+        self.0 += usize::from(own);
+        own && self.0 % ANSWERS_PER_REPORT == 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_is_told_of_its_own_robot_in_whatever_order_answers_come() {
+        for order in [[true, false], [false, true]] {
+            let mut answers = OwnAnswers::default();
+            let reported = order
+                .into_iter()
+                .cycle()
+                .take(6 * ANSWERS_PER_REPORT)
+                .filter(|own| answers.is_reported(*own));
+            assert_eq!(reported.collect::<Vec<bool>>(), [true; 3], "{order:?}");
+        }
     }
 }

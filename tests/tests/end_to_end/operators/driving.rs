@@ -43,20 +43,28 @@ fn ask_for(
     }
 }
 
+/// The cookie that the operator of robot number `robot` is given.
+fn entered(team: &Team, robot: usize) -> String {
+    let bearer = format!("Bearer {}", team.tokens[robot]);
+    let headers = [("authorization", bearer.as_str()), ("content-type", "application/json")];
+    let (status, given, _) = team.server.ask("POST", "/operate/enter", &headers, b"{}");
+    let cookie = given["set-cookie"].to_str().expect("a cookie").to_owned();
+    assert!(status == 204 && cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"), "{cookie}");
+    cookie.split(';').next().expect("its value").to_owned()
+}
+
 impl DriversSocket {
     /// Enters as the operator of robot number `robot`, as the page does.
     pub fn open(team: &Team, robot: usize) -> DriversSocket {
-        let name = ["A", "B"][robot];
-        let bearer = format!("Bearer {}", team.tokens[robot]);
-        let headers = [("authorization", bearer.as_str()), ("content-type", "application/json")];
-        let (status, given, _) = team.server.ask("POST", "/operate/enter", &headers, b"{}");
-        let cookie = given["set-cookie"].to_str().expect("a cookie").to_owned();
-        assert!(
-            status == 204 && cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"),
-            "{cookie}"
-        );
-        let cookie = cookie.split(';').next().expect("its value").to_owned();
-        let mut socket = ask_for(team, name, &[("cookie", cookie)]).expect("a socket");
+        DriversSocket::open_for(team, &[robot])
+    }
+
+    /// Enters as the operator of the first of these robots, beside whom the others stand still.
+    fn open_for(team: &Team, robots: &[usize]) -> DriversSocket {
+        let names: Vec<&str> = robots.iter().map(|robot| ["A", "B"][*robot]).collect();
+        let cookies: Vec<String> = robots.iter().map(|robot| entered(team, *robot)).collect();
+        let mut socket =
+            ask_for(team, &names.join(","), &[("cookie", cookies.join("; "))]).expect("a socket");
         let message = loop {
             match socket.read() {
                 Ok(Message::Binary(bytes)) => break bytes,
@@ -165,6 +173,27 @@ fn two_people_drive_in_real_time_and_the_recording_comes_to_the_same() {
     assert!(
         result["extra_information"].as_array().is_some_and(|named| named.contains(&json!("third_person")))
     );
+}
+
+/// The answers to the robot that stands still come on the same socket, before or after.
+#[test]
+fn a_person_beside_a_robot_that_nobody_drives_is_told_how_it_goes() {
+    for robots in [[0, 1], [1, 0]] {
+        let team = Team::start(json!({ "patience_s": 600 }));
+        let own = ["A", "B"][robots[0]];
+        let mut page = DriversSocket::open_for(&team, &robots);
+        let began = Instant::now();
+        loop {
+            assert!(began.elapsed() < Duration::from_secs(60), "robot {own} is told nothing of itself");
+            page.say(json!({}), true);
+            let Ok(Message::Text(text)) = page.socket.read() else { continue };
+            let told: Value = serde_json::from_str(&text).expect("JSON");
+            assert_ne!(told["kind"], "refused", "{told}");
+            if told["kind"] == "report" && told["report"]["robots"][0]["robot"] == own {
+                break;
+            }
+        }
+    }
 }
 
 #[test]
