@@ -17,7 +17,9 @@ pub fn page(title: &str, body: &str) -> String {
 {STYLE}</style>
 </head>
 <body>
+<main>
 {body}
+</main>
 </body>
 </html>
 "#

@@ -174,7 +174,7 @@ class DrivePage {
   told(message) {
     if (message.kind === "waits") {
       const { for: robots } = message;
-      this.waits = robots.length > 0 ? `Time stands still: it waits for robot ${robots.join(" and ")}, whose page is closed, paused or out of view.` : null;
+      this.waits = robots.length > 0 ? `Time stands still: it waits for robot ${robots.join(" and ")}, whose driver is away, has paused or is a program that thinks.` : null;
     }
     if (message.kind === "report") this.report(message.report);
     if (message.kind === "refused") this.panel.status(message.detail);

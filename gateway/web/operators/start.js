@@ -88,15 +88,14 @@ export function start(main, from = null) {
     element("p", {}, "Each person drives one robot, on a page of their own. Time passes while everybody's page is open and in view, and stands still while one is away. If you are alone, let the expert drive the others."),
     element("form", { onsubmit: begin, class: "operate-form" }, place ?? labelled("Task", task, what),
       from ? "" : labelled("Seed", seed, element("span", { class: "soft" }, "Says where things stand at the start: the same number, the same start.")),
-      labelled("Rules", protocol), players, locked, element("button", { class: "large" }, "Start"), refusal),
+      labelled("Rules", protocol, element("span", { class: "soft" }, "The budget: seconds that pass in the world, and the minutes that you may take for them.")), players, locked, element("button", { class: "large" }, "Start"), refusal),
     links);
   load();
 }
 
 /** What is left to a team by the rules of a protocol. */
 function toldRules({ protocol, episode_steps: steps, wall_clock_s: clockS }) {
-  const whose = { agentic: "of agents", benchmark: "of the benchmark" }[protocol] ?? protocol;
-  return `${whose}: ${(steps / CONTROL_HZ).toFixed(0)} s in the world${clockS ? `, ${(clockS / 60).toFixed(0)} minutes on the clock` : ""}`;
+  return `${protocol}: ${(steps / CONTROL_HZ).toFixed(0)} s${clockS ? ` within ${(clockS / 60).toFixed(0)} minutes` : ""}`;
 }
 
 const robotCount = (task) => task?.robots?.length ?? 2;

@@ -29,7 +29,7 @@ export function cards(main) {
       const text = JSON.stringify(list);
       if (text === shown) return;
       shown = text;
-      none.textContent = list.held.length ? "" : "None runs. One that a policy or a person starts appears here by itself, and so does an evaluation into this server's folder of runs.";
+      none.textContent = list.held.length ? "" : "None runs. An episode appears here by itself once a policy or a person starts it, and so does an evaluation that is written into this server's folder of runs.";
       running.replaceChildren(...list.held.map(heldCard));
       evaluated.hidden = !list.evaluations.length;
       evaluations.replaceChildren(...list.evaluations.map(evaluationCard));

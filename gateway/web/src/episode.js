@@ -300,7 +300,7 @@ class EpisodePage {
     const facts = [["time", `${this.time.time.toFixed(1)} s`], ["step", `${Math.round(frame.step)}`]];
     const left = this.recorded ? this.head.episode_steps - frame.step : frame.stepsLeft;
     if (left >= 0) facts.push(["steps left", `${Math.round(left)}`]);
-    if (frame.clockLeft >= 0) facts.push(["to think", `${frame.clockLeft.toFixed(0)} s`]);
+    if (frame.clockLeft >= 0) facts.push(["left to think", `${frame.clockLeft.toFixed(0)} s`]);
     if (this.recorded) facts.push(...this.soFar());
     this.head.robots.forEach(({ name }, index) => frame.fallen(index) && facts.push([`robot ${name}`, "has fallen"]));
     const text = facts.join();

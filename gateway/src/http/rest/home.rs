@@ -15,7 +15,7 @@ pub fn page(version: &str, list: &EpisodeList, caller: &Caller) -> String {
         Caller::Host => "; <a href=\"/metrics\">figures for Prometheus</a>",
         Caller::Operator { .. } => "",
     };
-    let mut body = format!("<main>\n<h1>{}</h1>\n", escape(&title));
+    let mut body = format!("<h1>{}</h1>\n", escape(&title));
     body += &format!(
         "<p>Simulated humanoids that must work together.</p>\n<ul>\n\
          <li><a href=\"/operate\">Operate</a>: drive robots yourself in this browser, alone or with others.</li>\n\
@@ -26,13 +26,13 @@ pub fn page(version: &str, list: &EpisodeList, caller: &Caller) -> String {
     );
     let rows: String = list.episodes.iter().map(row).collect();
     body += &match rows.is_empty() {
-        true => "<p>None is held. <code>POST /v1/episodes</code> starts one, or <a href=\"/operate\">a person</a>.</p>\n".to_owned(),
+        true => "<p>None runs. <a href=\"/operate\">Start one yourself</a>, or have a program start it by <code>POST /v1/episodes</code>.</p>\n".to_owned(),
         false => format!(
-            "<div class=\"scroll\"><table>\n<tr><th>episode</th><th>task</th><th>seed</th><th>protocol</th><th>driven by</th><th>step</th><th>stands</th><th>page</th></tr>\n\
+            "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Episodes\"><table>\n<tr><th>episode</th><th>task</th><th>seed</th><th>protocol</th><th>driven by</th><th>step</th><th>stands</th><th>page</th></tr>\n\
              {rows}</table></div>\n"
         ),
     };
-    html::page(&title, &(body + "</main>\n"))
+    html::page(&title, &body)
 }
 
 /// What a program finds first.
@@ -111,7 +111,7 @@ mod tests {
         let operator = Caller::Operator { episode: "a".into(), robot: "A".into() };
         let page = super::page("1.2.3", &EpisodeList { episodes: Vec::new() }, &operator);
         assert!(
-            page.contains("None is held") && page.contains("/v1/tools") && !page.contains("/metrics"),
+            page.contains("None runs") && page.contains("/v1/tools") && !page.contains("/metrics"),
             "{page}"
         );
     }

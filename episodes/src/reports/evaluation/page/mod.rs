@@ -32,7 +32,7 @@ pub fn html(report: &EvaluationReport, pictures: &ReportPictures) -> String {
     let title = in_words(&names);
     let body = format!(
         r#"<h1>{}</h1>
-<p class="soft">{episodes} episodes over {tasks} tasks, played in Tandem.</p>
+<p class="soft">{played}, played in Tandem.</p>
 <div class="cards">{cards}</div>
 {films}
 <h2>How far episodes got</h2>
@@ -43,8 +43,7 @@ pub fn html(report: &EvaluationReport, pictures: &ReportPictures) -> String {
 {gallery}
 {skipped}"#,
         escape(&title),
-        episodes = policies.iter().map(|policy| policy.episodes).sum::<usize>(),
-        tasks = tasks(report).len(),
+        played = played(policies.iter().map(|policy| policy.episodes).sum(), &tasks(report)),
         cards = policies.iter().enumerate().map(|(index, policy)| card(index, policy)).collect::<String>(),
         films = films::html(&pictures.films),
         legend = legend(policies),
@@ -62,6 +61,24 @@ fn in_words(names: &[&str]) -> String {
     match names.split_last() {
         Some((last, others)) if !others.is_empty() => format!("{} and {last}", others.join(", ")),
         _ => names.concat(),
+    }
+}
+
+/// A text as HTML, in which what stands between backticks is what one types.
+fn marked(text: &str) -> String {
+    let part = |(index, part): (usize, &str)| match index % 2 {
+        0 => escape(part),
+        _ => format!("<code>{}</code>", escape(part)),
+    };
+    text.split('`').enumerate().map(part).collect()
+}
+
+/// How many episodes were played of what.
+fn played(episodes: usize, tasks: &[&str]) -> String {
+    let counted = if episodes == 1 { "1 episode".to_owned() } else { format!("{episodes} episodes") };
+    match tasks {
+        [only] => format!("{counted} of {only}"),
+        several => format!("{counted} of {} tasks", several.len()),
     }
 }
 
@@ -110,7 +127,7 @@ fn card(index: usize, policy: &PolicyReport) -> String {
     let address = address.unwrap_or_default();
     let fact = |(name, value): &(String, String)| format!("<div><dt>{name}</dt><dd>{value}</dd></div>");
     format!(
-        r#"<section class="card" style="--c: var(--s{})"><h3><span class="swatch"></span>{}</h3><dl>{}</dl><p class="soft">{address}{} protocol, controller {}, build <code>{}</code></p></section>"#,
+        r#"<section class="card" style="--c: var(--s{})"><h2><span class="swatch"></span>{}</h2><dl>{}</dl><p class="soft">{address}{} protocol, controller {}, build <code>{}</code></p></section>"#,
         index % SERIES,
         escape(&policy.name),
         facts.iter().map(fact).collect::<String>(),
@@ -170,9 +187,9 @@ fn table(table: &Table) -> String {
         rows += &format!("<tr{class}>{}</tr>", cells.collect::<String>());
     }
     format!(
-        r#"<h2>{}</h2><p class="soft">{}</p><div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"#,
-        escape(&table.title),
-        escape(&table.note),
+        r#"<h2>{title}</h2><p class="soft">{}</p><div class="scroll" tabindex="0" role="region" aria-label="{title}"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"#,
+        marked(&table.note),
+        title = escape(&table.title),
     )
 }
 
