@@ -5,12 +5,13 @@
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { join } from "node:path";
-import { post, program, serve } from "./shared/server.mjs";
+import { deadline, post, program, serve } from "./shared/server.mjs";
 import { driver } from "./shared/socket.mjs";
 
 const CONTROL_HZ = 50;
 /** Longer than the experts take to lift. */
 const MOST_S = 60;
+deadline(5);
 
 const { link, base, runs } = await serve();
 const key = { authorization: `Bearer ${new URL(link).hash.slice(1)}` };

@@ -100,7 +100,9 @@ for (const side of ["left", "right"]) await move(side, [0, 0, 0], undefined, 100
 const before = await state();
 for (const side of ["left", "right"]) await press(side, "squeeze", 1);
 // The squeeze has to be seen before its controller goes.
-await page.waitForTimeout(2000);
+await page.evaluate(async () => {
+  for (let frame = 0; frame < 3; frame += 1) await new Promise((drawn) => { window.device.activeSession.requestAnimationFrame(drawn); });
+});
 await Promise.all([move("left", [0.05, 0, 0.1]), move("right", [0.05, 0, 0.1])]);
 for (const side of ["left", "right"]) {
   await until(`the ${side} wrist moved [m]`, async () => apart(before[side].position, (await state())[side].position), 0.06);

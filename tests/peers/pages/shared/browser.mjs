@@ -13,6 +13,7 @@ import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { join } from "node:path";
 import { chromium } from "playwright-core";
+import { deadline } from "./server.mjs";
 
 export * from "./server.mjs";
 
@@ -21,11 +22,15 @@ export const WIDTHS = [400, 1400, 2500];
 export const SIZE = { width: 800, height: 600 };
 /** How long a page may take on a machine that has other things to do. */
 export const PATIENCE_MS = 120_000;
+/** How many minutes a whole script may take there. */
+const PATIENCE_MIN = 15;
 /** What pages have said of themselves that they should not have. */
 export const complaints = [];
 
 const sources = process.env.TANDEM_WEB;
 const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+
+deadline(PATIENCE_MIN);
 
 export const browser = await chromium.launch({
   executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",

@@ -5,6 +5,14 @@ import { mkdtempSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 
+/** Ends the script, and what it has started, where it is not through by then: nobody waits for a page that hangs. */
+export function deadline(minutes) {
+  setTimeout(() => {
+    console.error(`not through after ${minutes} minutes`);
+    process.exit(1);
+  }, 60_000 * minutes).unref();
+}
+
 /** The program that is tried. */
 export const [program] = process.argv.slice(2);
 
