@@ -3,8 +3,9 @@
 
 use std::collections::BTreeSet;
 use std::path::Path;
+use std::sync::Arc;
 
-use serde_json::{Value, json};
+use serde_json::json;
 use tandem_sim::Step;
 use tandem_sim::render::PictureError;
 
@@ -23,11 +24,10 @@ const STEPS_PER_FRAME: usize = 5;
 pub struct RecordedEpisode {
     spec: EpisodeSpec,
     scene: LiveScene,
-    motions: Vec<Motion>,
     steps: Vec<Step>,
     /// Those that a policy was shown pictures of.
     looked: Vec<Step>,
-    told: Value,
+    message: Arc<[u8]>,
 }
 
 impl RecordedEpisode {
@@ -57,7 +57,10 @@ impl RecordedEpisode {
             "result": recording.result, "frames": steps.len(),
         });
         let scene = LiveScene::of(&recording.spec, &built.world, &built.motions);
-        Ok(RecordedEpisode { spec: recording.spec, scene, motions: built.motions, steps, looked, told })
+        let frames: Vec<u8> =
+            steps.iter().flat_map(|step| scene.frame(&shown(&built.motions, step))).collect();
+        let message = scene.message(told, &frames).into();
+        Ok(RecordedEpisode { spec: recording.spec, scene, steps, looked, message })
     }
 
     /// What was played.
@@ -67,10 +70,8 @@ impl RecordedEpisode {
 
     /// The message that a page draws all of it from: that of the scene with the calls, the phases and the result in its head, and every
     /// step's at its end.
-    pub fn message(&self) -> Vec<u8> {
-        let frames = self.steps.iter().flat_map(|step| self.scene.frame(&self.shown(step)));
-        let frames: Vec<u8> = frames.collect();
-        self.scene.message(self.told.clone(), &frames)
+    pub fn message(&self) -> Arc<[u8]> {
+        self.message.clone()
     }
 
     /// What robot `name` saw in the step that is nearest to `time_s`, of those that are shown and those that a policy was shown pictures
@@ -86,13 +87,13 @@ impl RecordedEpisode {
     pub fn robots(&self) -> impl Iterator<Item = &str> {
         self.scene.robots()
     }
+}
 
-    fn shown(&self, step: &Step) -> LiveStep {
-        let told = self.motions.iter().zip(&step.robots).map(|(motion, robot)| {
-            motion.told(&robot.command, isometry_from_sim(&robot.estimate.world_from_pelvis))
-        });
-        LiveStep::new(step.clone().into(), told.collect(), None)
-    }
+fn shown(motions: &[Motion], step: &Step) -> LiveStep {
+    let told = motions.iter().zip(&step.robots).map(|(motion, robot)| {
+        motion.told(&robot.command, isometry_from_sim(&robot.estimate.world_from_pelvis))
+    });
+    LiveStep::new(step.clone().into(), told.collect(), None)
 }
 
 /// The step of which a policy was shown pictures.

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { join } from "node:path";
-import { PATIENCE_MS, accessible, done, open, post, program, serve } from "./shared/browser.mjs";
+import { PATIENCE_MS, accessible, done, open, post, program, serve, until } from "./shared/browser.mjs";
 import { hear, inPages, poses } from "./shared/rows.mjs";
 
 const { base, runs } = await serve();
@@ -103,6 +103,7 @@ await pageA.evaluate(() => { window.pad = null; });
 const episode = new URLSearchParams(a.split("#")[1]).get("episode");
 const stateOf = (link, robot) =>
   post(base, `/v1/episodes/${episode}/tools/get_robot_state`, { robot }, new URLSearchParams(link.split("#")[1]).get("token"));
+const movedBy = (from, to) => Math.hypot(...to.position_m.map((value, axis) => value - from.position_m[axis]));
 const [beforeA, beforeB] = [await stateOf(a, "A"), await stateOf(b, "B")];
 const handle = await pageA.getByRole("button", { name: "right wrist: drag" }).boundingBox();
 const [x, y] = [handle.x + handle.width / 2, handle.y + handle.height / 2];
@@ -112,15 +113,10 @@ await pageA.mouse.move(x - 40, y - 260, { steps: 12 });
 await pageA.mouse.up();
 await pageA.keyboard.press("c");
 await pageB.keyboard.down("w");
-await worldPasses(1.5);
+const walkedM = async (from) => movedBy(from.pelvis_in_start, (await stateOf(b, "B")).pelvis_in_start);
+await until("A's wrist moved [m]", async () => movedBy(beforeA.right_wrist, (await stateOf(a, "A")).right_wrist), 0.05);
+await until("B walked [m]", () => walkedM(beforeB), 0.1);
 await pageB.keyboard.up("w");
-await worldPasses(0.5);
-const [afterA, afterB] = [await stateOf(a, "A"), await stateOf(b, "B")];
-const movedBy = (from, to) => Math.hypot(...to.position_m.map((value, axis) => value - from.position_m[axis]));
-const wristM = movedBy(beforeA.right_wrist, afterA.right_wrist);
-const walkedM = movedBy(beforeB.pelvis_in_start, afterB.pelvis_in_start);
-console.log(`A's wrist moved ${wristM.toFixed(3)} m, B walked ${walkedM.toFixed(3)} m`);
-assert.ok(wristM > 0.05 && walkedM > 0.1);
 
 await pageA.getByLabel("Say to the others").fill("Here it comes <b>now</b>.");
 await pageA.getByRole("button", { name: "Say" }).click();
@@ -147,15 +143,11 @@ assert.ok(rate <= 1.1, `${rate}`);
 // A gamepad: a stick walks, a trigger closes, a bumper lets go.
 const resting = await stateOf(b, "B");
 await withPad(pageB, [0, -1, 0, 0], { 7: 1 });
-await worldPasses(1.5);
+await until("by a gamepad B walked [m]", () => walkedM(resting), 0.1);
 await withPad(pageB, [0, 0, 0, 0], { 7: 1 });
-await worldPasses(0.5);
-const gone = await stateOf(b, "B");
-console.log(`by a gamepad B walked ${movedBy(resting.pelvis_in_start, gone.pelvis_in_start).toFixed(3)} m`);
-assert.ok(movedBy(resting.pelvis_in_start, gone.pelvis_in_start) > 0.1);
 const fingers = ({ joint_positions_rad: joints }) => Object.keys(joints).filter((name) => name.startsWith("right_hand")).map((name) => joints[name]);
-const closed = fingers(gone).map((value, joint) => Math.abs(value - fingers(resting)[joint]));
-assert.ok(Math.max(...closed) > 0.3, `the trigger closes nothing: ${closed}`);
+const closedRad = async () => Math.max(...fingers(await stateOf(b, "B")).map((value, joint) => Math.abs(value - fingers(resting)[joint])));
+await until("the trigger turned a finger [rad]", closedRad, 0.3);
 const targetOf = (page) => page.locator(".handle.right").evaluate((handle) => handle.style.transform);
 await withPad(pageA, [0, 0, 0, 0], { 5: 1 });
 await pageA.waitForTimeout(300);

@@ -5,7 +5,7 @@ import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { createRequire } from "node:module";
 import { join } from "node:path";
-import { PATIENCE_MS, done, open, post, program, serve } from "./shared/browser.mjs";
+import { PATIENCE_MS, done, open, post, program, serve, until } from "./shared/browser.mjs";
 import { apart, hear, poses } from "./shared/rows.mjs";
 
 const iwer = { path: createRequire(import.meta.url).resolve("iwer/build/iwer.min.js") };
@@ -68,20 +68,6 @@ async function picture(path) {
   await page.evaluate(() => { window.drawing = false; });
 }
 const press = (side, button, value) => page.evaluate(([name, what, how]) => window.device.controllers[name].updateButtonValue(what, how), [side, button, value]);
-
-/** Waits until something is as it should be, and says what it came to. */
-async function until(what, measure, least) {
-  const deadline = performance.now() + PATIENCE_MS;
-  for (;;) {
-    const value = await measure();
-    if (value >= least || performance.now() > deadline) {
-      console.log(`${what}: ${value.toFixed(3)}`);
-      assert.ok(value >= least, what);
-      return;
-    }
-    await page.waitForTimeout(250);
-  }
-}
 
 /** Waits until a wrist is within 3 cm of a place in the pelvis frame, or goes no nearer for two seconds of the world's time. */
 async function arrive(side, goal) {

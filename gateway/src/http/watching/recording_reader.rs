@@ -4,7 +4,6 @@
 //! threads that read now and then would each keep so much; one does not.
 
 use std::{
-    cell::OnceCell,
     fmt, fs,
     panic::{AssertUnwindSafe, catch_unwind},
     path::{Path, PathBuf},
@@ -77,13 +76,12 @@ pub struct OpenedRecording {
     path: PathBuf,
     changed: SystemTime,
     pub episode: RecordedEpisode,
-    message: OnceCell<Bytes>,
 }
 
 impl OpenedRecording {
     /// The message that pages draw it from, which all who ask for it share.
     pub fn message(&self) -> Bytes {
-        self.message.get_or_init(|| self.episode.message().into()).clone()
+        Bytes::from_owner(self.episode.message())
     }
 }
 
@@ -99,7 +97,7 @@ impl LastOpened {
             Some(opened) => opened,
             None => {
                 let episode = RecordedEpisode::read(&path).map_err(|error| unreadable(&error))?;
-                OpenedRecording { path, changed, episode, message: OnceCell::new() }
+                OpenedRecording { path, changed, episode }
             }
         };
         Ok(self.0.insert(opened))

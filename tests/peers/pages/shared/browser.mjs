@@ -116,6 +116,20 @@ export async function drawnRate(page, seconds = 3) {
 
 export const median = (values) => values.toSorted((one, other) => one - other)[Math.floor(values.length / 2)];
 
+/** Waits until something is as it should be, and says what it came to. */
+export async function until(what, measure, least) {
+  const deadline = performance.now() + PATIENCE_MS;
+  for (;;) {
+    const value = await measure();
+    if (value >= least || performance.now() > deadline) {
+      console.log(`${what}: ${value.toFixed(3)}`);
+      assert.ok(value >= least, what);
+      return;
+    }
+    await new Promise((passed) => { setTimeout(passed, 250); });
+  }
+}
+
 /** Ends the script: no page may have complained. */
 export async function done() {
   await browser.close();
