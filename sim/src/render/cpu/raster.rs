@@ -14,9 +14,12 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Distance from a row to the next: rows consist of whole blocks, the last of which may reach beyond the picture.
+    /// Distance from a row to the next: rows consist of whole blocks, the last of which may reach beyond the picture. Were it a whole
+    /// number of kilobytes, the samples of a column would all want the same few places of a processor's cache.
     pub fn stride(self) -> usize {
-        self.width.next_multiple_of(LANES)
+        const KILOBYTE: usize = 1024 / size_of::<f32>();
+        let stride = self.width.next_multiple_of(LANES);
+        if stride.is_multiple_of(KILOBYTE) { stride + 2 * LANES } else { stride }
     }
 }
 
@@ -39,6 +42,13 @@ impl<T: Copy> SampleRows<T> {
     pub fn row(&self, row: usize) -> &[T] {
         let start = row * self.grid.stride();
         &self.numbers[start..start + self.grid.width]
+    }
+
+    /// What begins at a sample and at those below it; the rows go on to the next ones.
+    #[inline(always)]
+    pub fn rows_from(&self, row: usize, column: usize) -> impl Iterator<Item = &[T]> {
+        let stride = self.grid.stride();
+        self.numbers[row * stride + column..].chunks(stride)
     }
 
     pub fn row_mut(&mut self, row: usize) -> &mut [T] {
@@ -126,8 +136,8 @@ struct Edge {
 #[derive(Clone, Copy)]
 struct Span {
     row: usize,
-    first: u32,
-    end: u32,
+    /// The first column and the first one beyond: whole numbers.
+    column_values: [f32; 2],
     start_value: f32,
     step_value: f32,
 }
@@ -139,6 +149,8 @@ const ROWS: usize = 4;
 /// A triangle is small if it is no higher, and reaches into no more blocks of each row.
 const SMALL_ROWS: u32 = 16;
 const SMALL_BLOCKS: usize = 2;
+/// In so few blocks a large triangle is drawn wherever its rows begin and end: where they do is hard to foresee for processors.
+const NARROW_BLOCKS: usize = 5;
 /// A small triangle is drawn this far beyond its edges, in parts of their lengths: f32 then leaves no gaps.
 const OVERLAP: f32 = 1e-5;
 const LANE: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
@@ -199,8 +211,7 @@ impl Outlines {
                 continue;
             }
             let reach = Reach { x0: reaches.x0[i], x1: reaches.x1[i], y0: reaches.y0[i], y1: reaches.y1[i] };
-            let blocks = (reach.x1 / LANES as u32 - reach.x0 / LANES as u32) as usize;
-            if blocks < SMALL_BLOCKS && reach.y1 - reach.y0 < SMALL_ROWS {
+            if reach.blocks() <= SMALL_BLOCKS && reach.y1 - reach.y0 < SMALL_ROWS {
                 slopes.draw(simd, grid, reach, (i, self.tags[i]), &mut each);
             } else {
                 self.draw_large(simd, grid, reach, i, &mut each);
@@ -283,25 +294,28 @@ impl Outlines {
         let (left, right) = self.edges(i);
         let per_pitch = 1.0 / grid.pitch_px;
         let (x0, x1) = (f64::from(reach.x0), f64::from(reach.x1));
+        let narrow = reach.blocks() < NARROW_BLOCKS;
         let [ax, ay] = self.places[0].each_ref().map(|place| place[i]);
         let (nearness_value, x_factor, y_factor) =
             (self.nearness_value[i], self.x_factor[i], self.y_factor[i]);
         for top in (reach.y0..=reach.y1).step_by(ROWS) {
-            let (mut firsts, mut ends, mut starts) = ([0; ROWS], [0; ROWS], [0.0; ROWS]);
+            let (mut firsts, mut ends, mut starts) = ([0.0; ROWS], [0.0; ROWS], [0.0; ROWS]);
             for row in 0..ROWS {
                 let y = (f64::from(top + row as u32) + 0.5) * grid.pitch_px;
                 let x = |edge: Edge| (edge.slope_ratio * y + edge.offset_value) * per_pitch - 0.5;
                 let first = smaller(larger(larger(x(left[0]), x(left[1])), x0).ceil(), x1 + 1.0);
                 let end = larger(smaller(smaller(x(right[0]), x(right[1])), x1).floor() + 1.0, x0);
                 let start = x_factor * ((first + 0.5) * grid.pitch_px - ax) + y_factor * (y - ay);
-                (firsts[row], ends[row]) = (whole(first), whole(end));
+                (firsts[row], ends[row]) = (first as f32, end as f32);
                 starts[row] = (nearness_value + start) as f32;
             }
             for row in 0..ROWS.min((reach.y1 - top + 1) as usize) {
-                if firsts[row] < ends[row] {
-                    let (first, end, start_value) = (firsts[row], ends[row], starts[row]);
-                    let step_value = (x_factor * grid.pitch_px) as f32;
-                    let span = Span { row: top as usize + row, first, end, start_value, step_value };
+                let (column_values, start_value) = ([firsts[row], ends[row]], starts[row]);
+                let step_value = (x_factor * grid.pitch_px) as f32;
+                let span = Span { row: top as usize + row, column_values, start_value, step_value };
+                if narrow {
+                    span.draw_within(simd, grid, reach, self.tags[i], each);
+                } else if firsts[row] < ends[row] {
                     span.draw(simd, grid, self.tags[i], each);
                 }
             }
@@ -373,15 +387,56 @@ impl Slopes {
     }
 }
 
+impl Reach {
+    /// How many blocks of each row it is in.
+    #[inline(always)]
+    fn blocks(self) -> usize {
+        self.x1 as usize / LANES - self.x0 as usize / LANES + 1
+    }
+}
+
 impl Span {
+    /// Goes through all blocks that the triangle can reach.
+    #[inline(always)]
+    fn draw_within<S: Simd>(
+        self,
+        simd: S,
+        grid: Grid,
+        reach: Reach,
+        tag: u32,
+        each: &mut impl FnMut(usize, u32, S::f32s),
+    ) {
+        let lanes = S::F32_LANES;
+        let nothing = simd.splat_f32s(0.0);
+        let (start, step) = (simd.splat_f32s(self.start_value), simd.splat_f32s(self.step_value));
+        let [first_value, end_value] = self.column_values;
+        let (first, end) = (simd.splat_f32s(first_value), simd.splat_f32s(end_value));
+        let vectors = reach.x0 as usize / lanes..=reach.x1 as usize / lanes;
+        let mut column =
+            simd.add_f32s(S::as_simd_f32s(&LANE).0[0], simd.splat_f32s((vectors.start() * lanes) as f32));
+        for vector in vectors {
+            let nearness = simd.add_f32s(start, simd.mul_f32s(step, simd.sub_f32s(column, first)));
+            let inside = simd
+                .and_m32s(simd.greater_than_or_equal_f32s(column, first), simd.less_than_f32s(column, end));
+            each(
+                self.row * (grid.stride() / lanes) + vector,
+                tag,
+                simd.select_f32s(inside, nearness, nothing),
+            );
+            column = simd.add_f32s(column, simd.splat_f32s(lanes as f32));
+        }
+    }
+
     #[inline(always)]
     fn draw<S: Simd>(self, simd: S, grid: Grid, tag: u32, each: &mut impl FnMut(usize, u32, S::f32s)) {
         let lanes = S::F32_LANES;
-        let (first, last) = (self.first as usize / lanes, (self.end as usize - 1) / lanes);
+        let [first_value, end_value] = self.column_values;
+        let (first, last) =
+            (whole_f32(first_value) as usize / lanes, (whole_f32(end_value) as usize - 1) / lanes);
         let nothing = simd.splat_f32s(0.0);
         let (start, step) = (simd.splat_f32s(self.start_value), simd.splat_f32s(self.step_value));
-        let length = simd.splat_f32s((self.end - self.first) as f32);
-        let before = simd.splat_f32s(self.first as f32 - (first * lanes) as f32);
+        let length = simd.splat_f32s(end_value - first_value);
+        let before = simd.splat_f32s(first_value - (first * lanes) as f32);
         let start_vector = self.row * (grid.stride() / lanes);
         // How far each sample is from the first of the span.
         let mut offset = simd.sub_f32s(S::as_simd_f32s(&LANE).0[0], before);
@@ -422,14 +477,8 @@ pub fn smaller<T: PartialOrd>(value: T, max: T) -> T {
     if value < max { value } else { max }
 }
 
-/// A number that is whole and not negative. It becomes the lowest bits of the sum; a cast would look at each for itself.
-#[inline(always)]
-fn whole(value: f64) -> u32 {
-    const ALL_BITS_WHOLE: f64 = (1u64 << 52) as f64;
-    (value + ALL_BITS_WHOLE).to_bits() as u32
-}
-
-/// The same of numbers below 8 million.
+/// A number that is whole, not negative and below 8 million. It becomes the lowest bits of the sum; a cast would look at each for
+/// itself.
 #[inline(always)]
 pub fn whole_f32(value: f32) -> u32 {
     const ALL_BITS_WHOLE: f32 = (1u32 << 23) as f32;

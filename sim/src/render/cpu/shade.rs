@@ -11,6 +11,7 @@ use crate::render::shading::{CONTACT, HIGHLIGHT, LAMP, SAMPLES};
 use crate::render::{Camera, Carrier, Light, Pattern, PlacedScenery};
 
 /// So many points are shaded together: enough for a loop to be worth its beginning, few enough to stay near the processor.
+/// Pictures have other last bits with another number, for a strip ends where a batch does.
 pub(super) const BATCH: usize = 64;
 /// Points are worked on in whole blocks, the last of which may reach beyond the batch.
 const ROOM: usize = BATCH + LANES;
@@ -204,8 +205,13 @@ impl Surfaces {
         let first_ray = rays.first_ray + rays.right_ray * x + rays.down_ray * y;
         for start in (0..strip.count).step_by(N) {
             let at = self.count + start;
-            let nearness_1_m: Lanes<N> =
-                lanes(|i| strip.nearness_1_m[(start + i).min(strip.count - 1) * SAMPLES]);
+            let samples = &strip.nearness_1_m[start * SAMPLES..];
+            // Those behind the strip are of no meaning, but in the last strip of a row there are none.
+            let nearness_1_m: Lanes<N> = if samples.len() >= N * SAMPLES {
+                lanes(|i| samples[i * SAMPLES])
+            } else {
+                lanes(|i| samples[i.min(strip.count - start - 1) * SAMPLES])
+            };
             let depth_m: Lanes<N> = lanes(|i| 1.0 / nearness_1_m[i]);
             let across: Lanes<N> = lanes(|i| ((start + i) * SAMPLES) as f32);
             let ray: [Lanes<N>; 3] = axes(
@@ -222,9 +228,7 @@ impl Surfaces {
             self.albedo.set(at, strip.facet.albedo(&point_m));
             *block_mut(&mut self.pixel_share, at) = [strip.share; N];
             *block_mut(&mut self.open_share, at) = [1.0; N];
-            for i in 0..N.min(strip.count - start) {
-                self.pixels[at + i] = (strip.first_pixel + start + i) as u32;
-            }
+            *block_mut(&mut self.pixels, at) = lanes::<u32, N>(|i| (strip.first_pixel + start + i) as u32);
             if strip.facet.carries {
                 let darkness = contact.darkness(&point_m);
                 *block_mut(&mut self.open_share, at) = lanes::<f32, N>(|i| 1.0 - CONTACT * darkness[i]);
@@ -232,9 +236,9 @@ impl Surfaces {
         }
     }
 
-    /// Adds the linear colours of all that were pushed to their pixels; then they are forgotten.
+    /// Adds the linear colours of all that were pushed to those of their pixels; then they are forgotten.
     #[inline(always)]
-    pub(super) fn shade(&mut self, light: &Light, shadow: &ShadowMap, sum_rgb: &mut [[f32; 3]]) {
+    pub(super) fn shade(&mut self, light: &Light, shadow: &ShadowMap, sum_rgb: &mut [Vec<f32>; 3]) {
         let count = std::mem::take(&mut self.count);
         for at in (0..count).step_by(LANES) {
             self.face(at, light, shadow);
@@ -249,12 +253,20 @@ impl Surfaces {
         }
         for at in (0..count).step_by(LANES) {
             let colours = self.lit(at, light);
-            for i in 0..LANES.min(count - at) {
-                let sum = &mut sum_rgb[self.pixels[at + i] as usize];
-                *sum = axes(
-                    #[inline(always)]
-                    |axis| sum[axis] + colours[axis][i],
-                );
+            let first = self.pixels[at];
+            let beside =
+                (first..).zip(&self.pixels[at..at + LANES]).fold(true, |all, (i, pixel)| all & (i == *pixel));
+            for (sum, colours) in sum_rgb.iter_mut().zip(&colours) {
+                if beside && at + LANES <= count {
+                    let first = first as usize;
+                    for (sum, colour) in sum[first..first + LANES].iter_mut().zip(colours) {
+                        *sum += colour;
+                    }
+                } else {
+                    for (pixel, colour) in self.pixels[at..].iter().zip(colours).take(count - at) {
+                        sum[*pixel as usize] += colour;
+                    }
+                }
             }
         }
     }
@@ -272,6 +284,15 @@ impl Surfaces {
             |axis| lanes(|i| normal[axis][i] * outwards[i]),
         );
         let sun = light.sun_direction.to_array();
+        let sun_factor: Lanes =
+            lanes(|i| normal[0][i] * sun[0] + normal[1][i] * sun[1] + normal[2][i] * sun[2]);
+        *block_mut::<f32, LANES>(&mut self.eye_factor, at) = lanes(|i| towards_eye[i].abs());
+        *block_mut::<f32, LANES>(&mut self.sun_factor, at) = sun_factor;
+        self.normal.set(at, normal);
+        // Neither highlight nor shadow counts where the sun does not shine at all.
+        if sun_factor.iter().fold(true, |away, factor| away & (*factor <= 0.0)) {
+            return;
+        }
         let half_way: [Lanes; 3] = axes(
             #[inline(always)]
             |axis| lanes(|i| ray[axis][i] * per_ray[i] + sun[axis]),
@@ -280,15 +301,11 @@ impl Surfaces {
         let cosine_2: Lanes = lanes(|i| along[i] * along[i] / dot(&half_way, &half_way, i));
         let cosine_8: Lanes = lanes(|i| cosine_2[i] * cosine_2[i] * cosine_2[i] * cosine_2[i]);
         let cosine_40: Lanes = lanes(|i| cosine_8[i] * cosine_8[i] * cosine_8[i] * cosine_8[i] * cosine_8[i]);
-        *block_mut::<f32, LANES>(&mut self.eye_factor, at) = lanes(|i| towards_eye[i].abs());
-        *block_mut::<f32, LANES>(&mut self.sun_factor, at) =
-            lanes(|i| normal[0][i] * sun[0] + normal[1][i] * sun[1] + normal[2][i] * sun[2]);
         *block_mut::<f32, LANES>(&mut self.highlight_factor, at) =
             lanes(|i| if along[i] > 0.0 { HIGHLIGHT * cosine_40[i] } else { 0.0 });
         let texel = shadow.texels(&self.point_m.block(at), &normal);
         self.texel.set(at, texel);
         *block_mut::<u32, LANES>(&mut self.cell, at) = ShadowMap::cells(&texel);
-        self.normal.set(at, normal);
     }
 
     /// Adds up the light, as far as the points count.

@@ -62,29 +62,24 @@ impl ShadowMap {
             self.still.nearness_m.reset(GRID, 0.0);
             self.still.cells_m.resize(CELLS * CELLS + 1, [f32::NEG_INFINITY; 2]);
             self.moving = vec![0; CELLS];
-            self.draw_parts(simd, prepared, placed, |carrier| carrier == Carrier::Room);
+            self.draw_parts(simd, prepared, placed, true);
             self.still.measure(&[u128::MAX; CELLS]);
             self.all.nearness_m.copy(&self.still.nearness_m);
             self.all.cells_m.clone_from(&self.still.cells_m);
         }
         self.all.restore(&self.still, &self.moving);
         self.moving.fill(0);
-        self.draw_parts(simd, prepared, placed, |carrier| carrier != Carrier::Room);
+        self.draw_parts(simd, prepared, placed, false);
         self.all.measure(&self.moving);
     }
 
-    /// Draws the shadows of those parts that `belong`, into the layer that is theirs.
+    /// Draws the shadows of the room, or those of all other parts, into the layer that is theirs.
     #[inline(always)]
-    fn draw_parts<S: Simd>(
-        &mut self,
-        simd: S,
-        prepared: &Prepared,
-        placed: &PlacedScenery,
-        belong: impl Fn(Carrier) -> bool,
-    ) {
+    fn draw_parts<S: Simd>(&mut self, simd: S, prepared: &Prepared, placed: &PlacedScenery, of_room: bool) {
         let mut batch = TriangleBatch::default();
+        let layer = if of_room { &mut self.still } else { &mut self.all };
         for (number, part) in prepared.scenery.parts.iter().enumerate() {
-            if !part.casts_shadow || !belong(part.carrier) {
+            if !part.casts_shadow || (part.carrier == Carrier::Room) != of_room {
                 continue;
             }
             let map_from_mesh = self.map_from_world.after(placed.world_from_mesh[number]);
@@ -102,7 +97,6 @@ impl ShadowMap {
             for moving in &mut self.moving[rows] {
                 *moving |= reached;
             }
-            let layer = if part.carrier == Carrier::Room { &mut self.still } else { &mut self.all };
             let to_sun =
                 placed.world_from_mesh[number].rotation.inverse() * prepared.scenery.light.sun_direction;
             prepared.faces[number].put_front(&mut self.front, [to_sun.x, to_sun.y, to_sun.z, 0.0]);
@@ -114,8 +108,8 @@ impl ShadowMap {
                     layer.fill(simd, &batch.take());
                 }
             }
-            layer.fill(simd, &batch.take());
         }
+        layer.fill(simd, &batch.take());
     }
 
     /// Where surfaces are looked up: column and row, counted from the first texel's centre, and nearness.
@@ -161,8 +155,8 @@ impl ShadowMap {
         let weights = |part: f32| [1.0 - part, 1.0, 1.0, part];
         let (across, down) = (weights(u - column as f32), weights(v - row as f32));
         let mut columns = [0.0; TAPS];
-        for (j, weight) in down.into_iter().enumerate() {
-            let occluders = &self.all.nearness_m.row(row - 1 + j)[column - 1..column - 1 + TAPS];
+        for (weight, occluders) in down.into_iter().zip(self.all.nearness_m.rows_from(row - 1, column - 1)) {
+            let occluders = occluders.first_chunk::<TAPS>().expect("no filter reaches over the border");
             for i in 0..TAPS {
                 columns[i] += if nearness_m >= occluders[i] { weight } else { 0.0 };
             }

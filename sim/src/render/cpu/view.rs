@@ -10,6 +10,8 @@ use crate::render::scene::prepared::{NOTHING, Prepared};
 use crate::render::shading::lanes::{LANES, Lanes, lanes};
 use crate::render::shading::{OUTLINE, OUTLINE_DEPTH_STEP, SAMPLES, SKY, SRGB_STEPS};
 
+/// Pixels that are looked at together.
+const TOGETHER: usize = size_of::<u64>();
 const PER_PIXEL: usize = SAMPLES * SAMPLES;
 
 /// Numbers of a pixel's samples, and of those to the right and below.
@@ -31,8 +33,10 @@ pub(super) struct Row {
     surfaces: Surfaces,
     /// For each column of samples, whether an edge is in it or to its right: some bits are set.
     edges: Vec<u32>,
-    /// Linear colours of the pixels, as far as they are known.
-    sum_rgb: Vec<[f32; 3]>,
+    /// For each pixel, 1 if an edge is in it or beside it, otherwise 0; behind the last are as many ones as are looked at together.
+    mixed: Vec<u8>,
+    /// Linear colours of the pixels, as far as they are known: all red shares, all green, all blue.
+    sum_rgb: [Vec<f32>; 3],
 }
 
 impl View<'_> {
@@ -42,38 +46,40 @@ impl View<'_> {
         let (width, height) = (self.target.width() / SAMPLES, self.target.height() / SAMPLES);
         let mut rgb = vec![0; width * height * 3];
         for (y, bytes) in rgb.chunks_exact_mut(width * 3).enumerate() {
-            row.sum_rgb.clear();
-            row.sum_rgb.resize(width, [0.0; 3]);
-            self.row(y, row);
-            srgb.encode(row.sum_rgb.as_flattened(), bytes);
+            for sum in &mut row.sum_rgb {
+                sum.clear();
+                sum.resize(width, 0.0);
+            }
+            self.row(y, width, row);
+            srgb.encode(&row.sum_rgb, bytes);
         }
         rgb
     }
 
     /// Colours of a row of pixels: means of their samples. A sheet that covers several of them is shaded once.
     #[inline(always)]
-    fn row(&self, y: usize, row: &mut Row) {
+    fn row(&self, y: usize, width: usize, row: &mut Row) {
         let last = self.target.height() - 1;
         let rows: [&[u32]; SAMPLES + 1] =
             std::array::from_fn(|i| self.target.sheets((y * SAMPLES + i).min(last)));
         mark_edges(rows, &mut row.edges);
-        let plain = |edges: &[u32], x: usize| edges[x * SAMPLES] | edges[x * SAMPLES + 1] == 0;
+        row.mixed.resize(width, 0);
+        for (mixed, [left, right]) in row.mixed.iter_mut().zip(row.edges.as_chunks::<SAMPLES>().0) {
+            *mixed = u8::from(left | right != 0);
+        }
+        row.mixed.resize(width + TOGETHER, 1);
         let mut x = 0;
-        while x < row.sum_rgb.len() {
+        while x < width {
             if row.surfaces.room() < PER_PIXEL {
                 row.surfaces.shade(&self.prepared.scenery.light, self.shadow, &mut row.sum_rgb);
             }
-            if !plain(&row.edges, x) {
+            if row.mixed[x] != 0 {
                 self.mixed(row, [x, y], rows);
                 x += 1;
                 continue;
             }
             // Pixels show one sheet as far as they are plain: an edge would be in the last of them.
-            let most = row.sum_rgb.len().min(x + row.surfaces.room());
-            let mut end = x + 1;
-            while end < most && plain(&row.edges, end) {
-                end += 1;
-            }
+            let end = next_mixed(&row.mixed, x).min(x + row.surfaces.room());
             self.show(row, x..end, [x * SAMPLES, y * SAMPLES], rows[0][x * SAMPLES], 1.0);
             x = end;
         }
@@ -84,8 +90,8 @@ impl View<'_> {
     #[inline(always)]
     fn show(&self, row: &mut Row, pixels: Range<usize>, sample: [usize; 2], sheet: u32, share: f32) {
         if sheet == NOTHING {
-            for sum in &mut row.sum_rgb[pixels] {
-                *sum = [sum[0] + SKY.x * share, sum[1] + SKY.y * share, sum[2] + SKY.z * share];
+            for (sum, sky) in row.sum_rgb.iter_mut().zip(SKY.to_array()) {
+                sum[pixels.clone()].iter_mut().for_each(|sum| *sum += sky * share);
             }
             return;
         }
@@ -159,7 +165,19 @@ fn picked(row: &[u32], columns: [usize; SAMPLES + 1]) -> [u32; SAMPLES + 1] {
 
 impl Default for Row {
     fn default() -> Row {
-        Row { surfaces: Surfaces::new(), edges: Vec::new(), sum_rgb: Vec::new() }
+        Row { surfaces: Surfaces::new(), edges: Vec::new(), mixed: Vec::new(), sum_rgb: Default::default() }
+    }
+}
+
+/// The first pixel from one on that is mixed.
+#[inline(always)]
+fn next_mixed(mixed: &[u8], mut x: usize) -> usize {
+    loop {
+        let next = u64::from_le_bytes(*mixed[x..].first_chunk().expect("ones are behind the last"));
+        x += next.trailing_zeros() as usize / 8;
+        if next != 0 {
+            return x;
+        }
     }
 }
 
@@ -192,19 +210,21 @@ impl Default for SrgbTable {
 }
 
 impl SrgbTable {
-    /// Writes the bytes of linear numbers.
+    /// Writes the bytes of pixels whose linear colours are given share by share.
     #[inline(always)]
-    pub(super) fn encode(&self, linear_values: &[f32], bytes: &mut [u8]) {
-        let (value_blocks, values) = linear_values.as_chunks::<LANES>();
-        let (byte_blocks, rest) = bytes.as_chunks_mut::<LANES>();
-        for (bytes, values) in byte_blocks.iter_mut().zip(value_blocks) {
-            let places: Lanes = lanes(|i| place(values[i]));
-            for (byte, place) in bytes.iter_mut().zip(places) {
-                *byte = self.at(place);
+    pub(super) fn encode(&self, linear_rgb: &[Vec<f32>; 3], bytes: &mut [u8]) {
+        for (values, axis) in linear_rgb.iter().zip(0..) {
+            let (blocks, rest) = values.as_chunks::<LANES>();
+            let (byte_blocks, byte_rest) = bytes.as_chunks_mut::<{ 3 * LANES }>();
+            for (bytes, values) in byte_blocks.iter_mut().zip(blocks) {
+                let places: Lanes = lanes(|i| place(values[i]));
+                for (i, place) in places.into_iter().enumerate() {
+                    bytes[3 * i + axis] = self.at(place);
+                }
             }
-        }
-        for (byte, value) in rest.iter_mut().zip(values) {
-            *byte = self.at(place(*value));
+            for (i, value) in rest.iter().enumerate() {
+                byte_rest[3 * i + axis] = self.at(place(*value));
+            }
         }
     }
 

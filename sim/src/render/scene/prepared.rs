@@ -72,10 +72,8 @@ impl Prepared {
     /// What a picture's ids show where it shows a sheet.
     #[inline(always)]
     pub fn id(&self, sheet: u32) -> u32 {
-        match sheet {
-            NOTHING => 0,
-            _ => self.ids[sheet as usize],
-        }
+        // No sheet has the number of nothing.
+        self.ids.get(sheet as usize).copied().unwrap_or(0)
     }
 }
 
