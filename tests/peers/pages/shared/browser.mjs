@@ -23,7 +23,7 @@ export const SIZE = { width: 800, height: 600 };
 /** How long a page may take on a machine that has other things to do. */
 export const PATIENCE_MS = 120_000;
 /** How many minutes a whole script may take there. */
-const PATIENCE_MIN = 15;
+const PATIENCE_MIN = 30;
 /** What pages have said of themselves that they should not have. */
 export const complaints = [];
 
