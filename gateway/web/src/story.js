@@ -25,6 +25,7 @@ export class Story {
     this.list = element("ol", { class: "story" });
     this.none = element("p", { class: "soft" }, "No call yet.");
     this.node = element("div", { class: recorded ? "reader" : "" }, this.none, this.list);
+    if (recorded) new ResizeObserver(() => this.bringIntoSight()).observe(this.node);
   }
 
   /** A call or a note. */
@@ -132,7 +133,7 @@ export class Story {
     seen.append(image);
   }
 
-  /** Marks what was told last at a moment, and brings it into sight. */
+  /** Marks what was told last at a moment. */
   follow(time) {
     let last = null;
     for (const entry of this.entries) {
@@ -144,8 +145,13 @@ export class Story {
     this.marked = last?.item;
     if (!this.marked) return;
     this.marked.setAttribute("aria-current", "step");
-    // The list alone: the page stays where its reader has it.
+    this.bringIntoSight();
+  }
+
+  /** Scrolls the list alone: the page stays where its reader has it. */
+  bringIntoSight() {
     const { node, marked } = this;
+    if (!marked) return;
     node.scrollTop = Math.max(0, marked.offsetTop - node.offsetTop - node.clientHeight / 3);
   }
 }

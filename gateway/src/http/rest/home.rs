@@ -28,7 +28,7 @@ pub fn page(version: &str, list: &EpisodeList, caller: &Caller) -> String {
     body += &match rows.is_empty() {
         true => "<p>None runs. <a href=\"/operate\">Start one yourself</a>, or have a program start it by <code>POST /v1/episodes</code>.</p>\n".to_owned(),
         false => format!(
-            "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Episodes\"><table>\n<tr><th>episode</th><th>task</th><th>seed</th><th>protocol</th><th>driven by</th><th>step</th><th>stands</th><th>page</th></tr>\n\
+            "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Episodes\"><table>\n<tr><th>page</th><th>episode</th><th>task</th><th>seed</th><th>protocol</th><th>driven by</th><th>step</th><th>stands</th></tr>\n\
              {rows}</table></div>\n"
         ),
     };
@@ -60,15 +60,14 @@ fn row(entry: &EpisodeEntry) -> String {
         Some(reason) => json!(reason).as_str().unwrap_or_default().replace('_', " "),
     };
     let (id, mut row) = (escape(episode_id), String::from("<tr>"));
-    // Writing to a text cannot fail.
+    // First, where a telephone shows it. Who has not come by the link is asked for it there. Writing to a text cannot fail.
+    let _ = write!(row, "<td><a href=\"/watch?episode={id}\">watch</a></td>");
     let _ = write!(row, "<td><a href=\"/v1/episodes/{id}\">{id}</a></td>");
     for cell in
         [task.clone(), seed.to_string(), protocol.to_string(), driven.into(), step.to_string(), stands]
     {
         let _ = write!(row, "<td>{}</td>", escape(&cell));
     }
-    // Who has not come by the link is asked for it there.
-    let _ = write!(row, "<td><a href=\"/watch?episode={id}\">watch</a></td>");
     row + "</tr>\n"
 }
 
