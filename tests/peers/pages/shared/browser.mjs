@@ -70,6 +70,7 @@ export async function pictures(page, name, { heights = {}, settleMs = 0 } = {}) 
     for (const width of WIDTHS) {
       await page.setViewportSize({ width, height: heights[width] ?? 1000 });
       if (settleMs) await page.waitForTimeout(settleMs);
+      await page.evaluate(paintAll);
       await page.screenshot({ path: `${name}-${width}-${colorScheme}.png`, fullPage: true });
       const wide = await page.evaluate(() => document.documentElement.scrollWidth);
       assert.ok(wide <= width, `${name} is ${wide} pixels wide in a window of ${width}`);
@@ -78,6 +79,16 @@ export async function pictures(page, name, { heights = {}, settleMs = 0 } = {}) 
   }
   await page.emulateMedia({ colorScheme: "light" });
   await page.setViewportSize(before);
+}
+
+/** Scrolls through a page and back: a browser paints what is scrolled of its own, such as a list, only where it has been in sight. */
+async function paintAll() {
+  for (let top = 0; top < document.documentElement.scrollHeight; top += innerHeight / 2) {
+    scrollTo(0, top);
+    for (let frame = 0; frame < 3; frame += 1) await new Promise((drawn) => { requestAnimationFrame(drawn); });
+  }
+  scrollTo(0, 0);
+  await new Promise((drawn) => { requestAnimationFrame(drawn); });
 }
 
 /** Has axe look at a page, which must find nothing serious. */
