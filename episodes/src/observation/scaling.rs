@@ -1,11 +1,12 @@
 //! Pictures in another size: one way of making them, for policies that look now as for data sets that are drawn later.
 
-use image::{ImageBuffer, Rgb, RgbImage, imageops};
+use fast_image_resize::{
+    FilterType, PixelType, ResizeAlg, ResizeOptions, Resizer,
+    images::ImageRef,
+};
+use image::{ImageBuffer, Rgb, RgbImage};
 
 use super::Picture;
-
-/// Smooth in both directions, as Pillow's bilinear filter.
-const FILTER: imageops::FilterType = imageops::FilterType::Triangle;
 
 /// A picture, for the functions of the library `image`.
 pub type Pixels<'a> = ImageBuffer<Rgb<u8>, &'a [u8]>;
@@ -16,8 +17,13 @@ impl Picture {
         ImageBuffer::from_raw(self.width, self.height, &self.rgb[..]).expect("three bytes a pixel")
     }
 
-    /// The whole picture, stretched to another width and height.
+    /// The whole picture, stretched to another width and height: smooth in both directions, as Pillow's bilinear filter, whose
+    /// whole numbers these are.
     pub fn scaled(&self, [width, height]: [u32; 2]) -> RgbImage {
-        imageops::resize(&self.pixels(), width, height, FILTER)
+        let own = ImageRef::new(self.width, self.height, &self.rgb, PixelType::U8x3).expect("three bytes a pixel");
+        let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(FilterType::Bilinear));
+        let mut scaled = RgbImage::new(width, height);
+        Resizer::new().resize(&own, &mut scaled, &options).expect("both have three bytes a pixel");
+        scaled
     }
 }

@@ -56,7 +56,7 @@ pub const TASK: Task = Task {
     ],
     randomize: &[
         Offset {
-            wider_yaw_rad: 0.05,
+            wider_yaw_rad: 0.15,
             ..uniform_xy(
                 &["tub", "tub_stack", APPLES[0], APPLES[1], APPLES[2], APPLES[3], APPLES[4], APPLES[5]],
                 0.02,

@@ -123,6 +123,8 @@ def _from_json(entry: dict[str, Any]) -> Any:
 def _handler(answering: _Answering) -> type[BaseHTTPRequestHandler]:
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"
+        # The body of an answer would wait 40 ms for its head to be acknowledged.
+        disable_nagle_algorithm = True
 
         def do_POST(self) -> None:
             body = self.rfile.read(int(self.headers.get("content-length", 0)))

@@ -79,7 +79,8 @@ def test_moments_are_what_the_recordings_hold(runs: Path, data_set: Path) -> Non
             pelvis = recording.pelvis_in_world[step, robot]
             offset = recording.objects_in_world[step, :, :3] - pelvis[:3]
             assert np.allclose(read_all.objects_in_pelvis_m[moment, robot], offset @ rotation(pelvis[3:]), atol=1e-5)
-    # Behind the end the last row goes on; no chunk reaches into another episode.
+    # Behind the end the last row goes on, but was not told; no chunk reaches into another episode.
+    assert read_all.told[8].tolist() == [True, False, False, False] and read_all.told[9].all()
     assert np.array_equal(read_all.chunks[8, 0], read_all.chunks[8, 3])
     assert np.array_equal(read_all.chunks[9, 1], read_all.chunks[10, 0])
 
@@ -164,6 +165,18 @@ def test_all_kinds_learn_and_answer(kind: PolicyKind, scope: Scope, sharing: Sha
 
 
 @pytest.mark.parametrize("kind", get_args(PolicyKind))
+def test_nothing_is_learned_from_rows_after_the_end(kind: PolicyKind) -> None:
+    networks: Any = import_module("tandem.baselines.networks")
+    network = networks.PolicyNetwork(replace(TINY, kind=kind), 2, 2, 1)
+    known, chunks = torch().ones(3, TINY.hidden), torch().ones(3, TINY.chunk_rows, 2, 35)
+    told = torch().arange(TINY.chunk_rows) < torch().tensor([[1], [2], [2]])
+    network.loss(known, chunks, told, torch().Generator().manual_seed(1)).backward()
+    last = network.head.end if kind == "flow" else network.head
+    learned = last.bias.grad.view(TINY.chunk_rows, -1) != 0
+    assert learned[:2].all() and not learned[2:].any()
+
+
+@pytest.mark.parametrize("kind", get_args(PolicyKind))
 def test_losses_fall(kind: PolicyKind, data_set: Path) -> None:
     torch()
     learner_module: Any = import_module("tandem.baselines.learner")
@@ -181,7 +194,7 @@ def test_the_whole_way_from_demonstrations_to_a_report(tmp_path: Path) -> None:
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     page = (tmp_path / "out/report.html").read_text()
-    assert "chunk" in page and "open-loop" in page
+    assert "chunk_global_shared_0" in page and "spread: 4" in page
     again = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert again.returncode == 0 and "is trained already" in again.stdout
 

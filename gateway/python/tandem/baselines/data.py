@@ -55,6 +55,10 @@ class Demonstrations:
     chunks: NDArray[np.float32]
     """What was told from each moment on, moments by rows by robots by 35; the last row goes on after the end."""
 
+    told: NDArray[np.bool_]
+    """Which of these rows were told, moments by rows. Nothing is learned from those after the end: an episode ends with its last
+    phase, and a policy that learned to hold still then would let go of what it puts down, and never draw its hands back."""
+
     objects_in_pelvis_m: NDArray[np.float32]
     """Moments by robots by objects by 3: what no policy gets, for the second task."""
 
@@ -96,6 +100,7 @@ def read(data_set: Path, chunk_rows: int, every: int) -> Demonstrations:
         pictures=_pictures(data_set, features, keys, kept),
         states=_states(columns[STATE], actions, number, info["fps"])[kept],
         chunks=actions[later],
+        told=np.arange(chunk_rows) <= left[kept, None],
         objects_in_pelvis_m=_in_pelvis(columns, len(robots), len(objects))[kept],
         validated=_is_in(info["splits"].get("val", "0:0"), episodes[kept]),
     )

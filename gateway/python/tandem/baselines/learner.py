@@ -56,6 +56,7 @@ class Learner:
             "chunks": torch.from_numpy(np.ascontiguousarray(demonstrations.chunks)),
             "objects": torch.from_numpy(places_m),
         }
+        self._told = torch.from_numpy(demonstrations.told)
         self._learned = torch.from_numpy(np.flatnonzero(~demonstrations.validated))
         self._validated = torch.from_numpy(np.flatnonzero(demonstrations.validated))
         self._inputs = torch.tensor([view.inputs for view in views])
@@ -107,8 +108,10 @@ class Learner:
             for moments in self._validated.split(64):
                 views = torch.full_like(moments, view)
                 known, places = self._look(moments, views, None)
-                told = unscaled(self.network.act(known), self._scale_of("chunks"))
-                errors[0] += (told - self._of_outputs(moments, views)).abs().mean((1, 2, 3)).sum().cpu()
+                chunks = unscaled(self.network.act(known), self._scale_of("chunks"))
+                of_rows = (chunks - self._of_outputs(moments, views)).abs().mean((2, 3)).cpu()
+                told = self._told[moments]
+                errors[0] += ((of_rows * told).sum(1) / told.sum(1)).sum()
                 found = unscaled(places, self._scale_of("objects"))
                 errors[1] += (found - self._of_inputs("objects", moments, views)).abs().mean((1, 2)).sum().cpu()
         self.network.load_state_dict(own)
@@ -139,7 +142,8 @@ class Learner:
         known, places = self._look(moments, views, generator if noisy else None)
         chunks = scaled(self._of_outputs(moments, views), self._scale_of("chunks"))
         objects = scaled(self._of_inputs("objects", moments, views), self._scale_of("objects"))
-        return self.network.loss(known, chunks, generator), functional.l1_loss(places, objects)
+        told = self._told[moments].to(self._device)
+        return self.network.loss(known, chunks, told, generator), functional.l1_loss(places, objects)
 
     def _look(self, moments: Tensor, views: Tensor, generator: torch.Generator | None) -> tuple[Tensor, Tensor]:
         pictures = self._pictures[moments[:, None], self._inputs[views]].permute(0, 1, 4, 2, 3).float().div_(255)

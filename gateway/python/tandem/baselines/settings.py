@@ -25,7 +25,7 @@ class TrainingSettings:
     sharing: Sharing = "shared"
     """"shared": one set of weights for all robots; "separate": one for each."""
 
-    steps: int = 3000
+    steps: int = 5000
     """Steps of the optimiser."""
 
     batch: int = 32
@@ -37,7 +37,7 @@ class TrainingSettings:
     execute_rows: int = 5
     """How many of these are executed before the policy is asked again."""
 
-    every: int = 1
+    every: int = 2
     """Each so manieth row of the data set is a moment that is learned from."""
 
     hidden: int = 512

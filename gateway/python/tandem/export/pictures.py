@@ -107,6 +107,8 @@ def png(pixels: Pixels) -> bytes:
     height, width, _ = pixels.shape
     codec = av.CodecContext.create("png", "w")
     codec.width, codec.height, codec.pix_fmt, codec.time_base = width, height, "rgb24", Fraction(1, 1)
+    # A third of the time that FFmpeg's own level takes, for an eighth more bytes.
+    codec.options = {"compression_level": "1"}
     written = BytesIO()
     for packet in [*codec.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")), *codec.encode(None)]:
         written.write(bytes(packet))
