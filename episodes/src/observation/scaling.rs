@@ -1,9 +1,6 @@
 //! Pictures in another size: one way of making them, for policies that look now as for data sets that are drawn later.
 
-use fast_image_resize::{
-    FilterType, PixelType, ResizeAlg, ResizeOptions, Resizer,
-    images::ImageRef,
-};
+use fast_image_resize::{FilterType, PixelType, ResizeAlg, ResizeOptions, Resizer, images::ImageRef};
 use image::{ImageBuffer, Rgb, RgbImage};
 
 use super::Picture;
@@ -17,10 +14,11 @@ impl Picture {
         ImageBuffer::from_raw(self.width, self.height, &self.rgb[..]).expect("three bytes a pixel")
     }
 
-    /// The whole picture, stretched to another width and height: smooth in both directions, as Pillow's bilinear filter, whose
-    /// whole numbers these are.
+    /// The whole picture, stretched to another width and height: smooth in both directions, within 1 of 255 of what Pillow's
+    /// bilinear filter gives.
     pub fn scaled(&self, [width, height]: [u32; 2]) -> RgbImage {
-        let own = ImageRef::new(self.width, self.height, &self.rgb, PixelType::U8x3).expect("three bytes a pixel");
+        let own =
+            ImageRef::new(self.width, self.height, &self.rgb, PixelType::U8x3).expect("three bytes a pixel");
         let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(FilterType::Bilinear));
         let mut scaled = RgbImage::new(width, height);
         Resizer::new().resize(&own, &mut scaled, &options).expect("both have three bytes a pixel");

@@ -56,8 +56,8 @@ class Demonstrations:
     """What was told from each moment on, moments by rows by robots by 35; the last row goes on after the end."""
 
     told: NDArray[np.bool_]
-    """Which of these rows were told, moments by rows. Nothing is learned from those after the end: an episode ends with its last
-    phase, and a policy that learned to hold still then would let go of what it puts down, and never draw its hands back."""
+    """Which of these rows were told, moments by rows. Nothing is learned from those after the end: a policy that learned to
+    hold still then would let go of what it puts down, and never draw its hands back."""
 
     objects_in_pelvis_m: NDArray[np.float32]
     """Moments by robots by objects by 3: what no policy gets, for the second task."""

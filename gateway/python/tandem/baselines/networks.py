@@ -95,11 +95,11 @@ class PolicyNetwork(nn.Module):
         return known, torch.stack(places, dim=1)
 
     def loss(self, known: Tensor, chunks: Tensor, told: Tensor, generator: torch.Generator) -> Tensor:
-        """How far what it tells is from `chunks`, batch by rows by outputs by 35, over the rows that were told, batch by rows."""
+        """How far what it tells is from `chunks`, batch by rows by outputs by 35, in rows that were told, batch by rows."""
         target = chunks.flatten(1)
         if isinstance(self.head, Flow):
-            # Flow matching (Lipman et al. 2023) on straight ways, x = (1 - t) noise + t chunk. The head tells the chunk, not the
-            # velocity chunk - noise, for which all of the noise would have to pass through its hidden layers.
+            # Flow matching (Lipman et al. 2023) on straight ways, x = (1 - t) noise + t chunk. The head tells the chunk, not
+            # the velocity chunk - noise, for which all of the noise would have to pass through its hidden layers.
             noise = torch.randn(target.shape, generator=generator).to(target.device)
             time = torch.rand(len(target), 1, generator=generator).to(target.device)
             errors = (self.head(known, (1 - time) * noise + time * target, time) - target).square()
