@@ -166,6 +166,7 @@ def test_all_kinds_learn_and_answer(kind: PolicyKind, scope: Scope, sharing: Sha
 
 @pytest.mark.parametrize("kind", get_args(PolicyKind))
 def test_nothing_is_learned_from_rows_after_the_end(kind: PolicyKind) -> None:
+    torch()
     networks: Any = import_module("tandem.baselines.networks")
     network = networks.PolicyNetwork(replace(TINY, kind=kind), 2, 2, 1)
     known, chunks = torch().ones(3, TINY.hidden), torch().ones(3, TINY.chunk_rows, 2, 35)
