@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any
 
 import torch
@@ -18,6 +19,7 @@ FLOW_STEPS = 10
 """Steps of Euler's method from noise to actions."""
 
 
+@cache
 def multiplies_halves(device: torch.device) -> bool:
     """Whether bfloat16 is multiplied by instructions of its own. Where it is not, it takes longer than float32."""
     if device.type == "cuda":
