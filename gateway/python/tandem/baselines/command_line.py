@@ -14,7 +14,7 @@ from ..errors import TandemError
 from ..export.settings import library
 from .data import task_of
 from .maps import MAP_FILE
-from .recipe import Recipe, execute_rows, run_recipe
+from .recipe import Recipe, execute_rows, run_recipe, training_steps
 from .settings import PolicyKind, Scope, Sharing, TrainingSettings
 
 INTERRUPTED = 130
@@ -53,14 +53,17 @@ def _add_settings(command: argparse.ArgumentParser) -> None:
         command.add_argument(
             f"--{name}", choices=get_args(values), default=getattr(defaults, name), help="[default: %(default)s]"
         )
-    for name in ("steps", "batch", "chunk_rows", "every", "hidden", "seed"):
+    for name in ("batch", "chunk_rows", "every", "hidden", "seed"):
         flag, default = "--" + name.replace("_", "-"), getattr(defaults, name)
         command.add_argument(flag, type=int, default=default, metavar="N", help="[default: %(default)s]")
+    command.add_argument("--steps", type=int, metavar="N", help="of training [default: as the task asks for]")
     command.add_argument("--execute-rows", type=int, metavar="N", help="of an answer's rows [default: as the task asks for]")
 
 
 def _settings(given: argparse.Namespace, task: str) -> TrainingSettings:
     chosen = {field.name: getattr(given, field.name) for field in fields(TrainingSettings) if hasattr(given, field.name)}
+    if chosen["steps"] is None:
+        chosen["steps"] = training_steps(task)
     if chosen["execute_rows"] is None:
         chosen["execute_rows"] = min(execute_rows(task), chosen["chunk_rows"])
     return TrainingSettings(**chosen)

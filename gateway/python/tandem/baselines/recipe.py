@@ -25,6 +25,11 @@ SOONER = {"trash_collection": 2}
 """Tasks whose policies are asked again after so many rows, and not after half a second, since a walk to a small thing goes on
 being corrected."""
 
+LONGER = ("trash_collection", "co_carry", "table_align", "move_house", "cart_service", "big_table")
+"""Tasks in which robots walk: their demonstrations are several times as long, and hands have to meet what the last step leaves."""
+
+LONGER_STEPS = 12000
+
 WIDE = 2
 """How many times as far as the benchmark's randomisation things are moved where that shows what a policy sees."""
 
@@ -106,3 +111,8 @@ def wide_spread(task: str) -> int:
 def execute_rows(task: str) -> int:
     """How many rows of an answer are executed before a policy of this task is asked again."""
     return SOONER.get(task, TrainingSettings.execute_rows)
+
+
+def training_steps(task: str) -> int:
+    """How many steps of training a policy of this task gets."""
+    return LONGER_STEPS if task in LONGER else TrainingSettings.steps

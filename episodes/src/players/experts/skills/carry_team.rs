@@ -8,6 +8,7 @@ use super::compliant::grasp_compliantly;
 use super::grasp::{HandGrasp, move_together};
 use super::posture_path::{FREE, PathProgress, Posture, PosturePath, follow_while};
 use super::walk::{Tolerance, WalkGoal, approach, upright, walk_reaching};
+use super::walked_way::WalkedWay;
 use crate::players::PlayerError;
 use crate::scoring::{Facts, Grip};
 
@@ -17,7 +18,7 @@ const NEAR: Tolerance = Tolerance { off_m: 0.03, off_rad: 0.05 };
 /// How far hands give way, which two robots that walk with a load need.
 pub const COMPLIANCE_N_S_M: f64 = 250.0;
 /// Robots still correct their places for so long once the object has arrived.
-const HOLD_S: f32 = 0.7;
+const HOLD_S: f32 = 0.4;
 /// How long robots rest: feet come together, and what pulls between the hands fades.
 const REST_S: f32 = 0.6;
 /// A hand has lost what it does not touch for so many commands; the robots then rest, and take it again no more often.
@@ -145,6 +146,20 @@ impl<'a> CarryTeam<'a> {
             self.take_again(commander, &(path.at)(from_m))?;
         }
         Err(PlayerError::GaveUp("hands lost the load again and again".into()))
+    }
+
+    /// Takes the held object through stops, world frame; `pace_m_s` is that of the robot that has farthest to walk.
+    pub fn carry_by(
+        &mut self,
+        commander: &mut Commander,
+        stops: &[Pose],
+        pace_m_s: f32,
+    ) -> Result<(), PlayerError> {
+        let mut all = vec![upright(&self.object(commander)?)];
+        all.extend(stops);
+        let way = WalkedWay::new(&all, &self.object_from_stand);
+        let at = |gone_m: f32| way.at(gone_m);
+        self.carry(commander, &ObjectPath { at: &at, length_m: way.length_m(), pace_m_s, free_m: &FREE })
     }
 
     /// Grasps whose hands do not even touch the object.

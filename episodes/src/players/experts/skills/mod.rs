@@ -11,6 +11,7 @@ mod parallel;
 mod posture_path;
 mod variety;
 mod walk;
+mod walked_way;
 
 pub use carry_team::{COMPLIANCE_N_S_M, CarryTeam, ObjectPath};
 pub use commander::{Commander, HandMove, smooth};

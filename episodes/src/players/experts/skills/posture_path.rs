@@ -7,7 +7,7 @@ use super::walk::{TargetVelocity, steer};
 use crate::players::PlayerError;
 use crate::scoring::Facts;
 
-const ACCELERATION_M_S2: f32 = 0.2;
+const ACCELERATION_M_S2: f32 = 0.4;
 const AT_END_M: f32 = 1e-4;
 /// The slowest that a path is followed.
 const CREEP_M_S: f32 = 0.02;

@@ -66,19 +66,24 @@ pub fn steer(at: &Pose, to: &Pose, drift: TargetVelocity, pace_m_s: f32) -> Base
     }
 }
 
-/// Brings robots near their places, hands kept as they are relative to the body, without waiting for them to come to rest.
+/// Brings robots near their places, hands kept as they are relative to the body, without waiting for them to come to rest. Who has come
+/// near stands while the others still walk.
 pub fn approach(commander: &mut Commander, goals: &[WalkGoal], within: Tolerance) -> Result<(), PlayerError> {
     let mut hands = Vec::with_capacity(goals.len());
     for goal in goals {
         hands.push(WristTargets::InPelvis(commander.facts()?.robots[goal.robot].wrist_in_pelvis));
     }
+    let mut near = vec![false; goals.len()];
     let mut left_s = LONGEST_S;
     while left_s > 0.0 {
         let now = pelvises(commander, goals)?;
-        if now.iter().zip(goals).all(|(at, goal)| is_there(at, goal, within)) {
+        for (near, (at, goal)) in near.iter_mut().zip(now.iter().zip(goals)) {
+            *near |= is_there(at, goal, within);
+        }
+        if !near.contains(&false) {
             break;
         }
-        let velocities = steered(&now, goals, commander.walking());
+        let velocities = standing(steered(&now, goals, commander.walking()), &near);
         commander.advance(WALK_STEPS, &moves(goals, &hands, &velocities))?;
         left_s -= WALK_STEPS as f32 * CONTROL_DT_S;
     }
@@ -145,10 +150,7 @@ fn arrive(
             if !resting.contains(&false) {
                 break;
             }
-            let mut velocities = steered(&now, goals, commander.walking());
-            for (velocity, _) in velocities.iter_mut().zip(&resting).filter(|(_, rests)| **rests) {
-                *velocity = BaseVelocity::STILL;
-            }
+            let velocities = standing(steered(&now, goals, commander.walking()), &resting);
             gone_s += WALK_STEPS as f32 * CONTROL_DT_S;
             commander.advance(WALK_STEPS, &moves(goals, &hands(gone_s), &velocities))?;
         }
@@ -211,6 +213,14 @@ fn steered(now: &[Pose], goals: &[WalkGoal], pace_share: f32) -> Vec<BaseVelocit
         steer(at, &goal.to, TargetVelocity::default(), goal.pace_m_s * pace_share)
     };
     now.iter().zip(goals).map(walk).collect()
+}
+
+/// The same velocities, but those of the robots that stand.
+fn standing(mut velocities: Vec<BaseVelocity>, stand: &[bool]) -> Vec<BaseVelocity> {
+    for (velocity, _) in velocities.iter_mut().zip(stand).filter(|(_, stands)| **stands) {
+        *velocity = BaseVelocity::STILL;
+    }
+    velocities
 }
 
 fn moves(goals: &[WalkGoal], hands: &[WristTargets], velocities: &[BaseVelocity]) -> Vec<RobotMove> {
