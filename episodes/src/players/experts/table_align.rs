@@ -13,7 +13,7 @@ const LIFT_M: f32 = 0.07;
 /// Pelvises over the floor: palms that lie on the top are then at elbow height.
 const PELVIS_M: f32 = 0.75;
 /// Of the robot that has farthest to walk.
-const PACE_M_S: f32 = 0.31;
+const PACE_M_S: f32 = 0.29;
 /// The table's middle in the chair's frame: where the turn ends, clear of the chair, and where it is set down.
 const BEFORE_CHAIR_M: Vector = Vector::new(0.52, -0.30, 0.0);
 const AT_CHAIR_M: Vector = Vector::new(0.40, 0.0, 0.0);
