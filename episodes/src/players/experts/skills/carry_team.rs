@@ -4,8 +4,7 @@
 use tandem_sim::{Pose, Rotation, Sides, Vector, heading_rad, wrapped_rad};
 
 use super::commander::{Commander, HandMove};
-use super::compliant::grasp_compliantly;
-use super::grasp::{HandGrasp, move_together};
+use super::grasps::{HandGrasp, grasp_compliantly, move_together};
 use super::posture_path::{FREE, PathProgress, Posture, PosturePath, follow_while};
 use super::walk::{Tolerance, WalkGoal, approach, upright, walk_reaching};
 use super::walked_way::WalkedWay;

@@ -2,11 +2,7 @@
 
 mod carry_team;
 mod commander;
-mod compliant;
-mod cylinder;
-mod grasp;
-mod hand_over;
-mod hold;
+mod grasps;
 mod parallel;
 mod posture_path;
 mod variety;
@@ -15,11 +11,10 @@ mod walked_way;
 
 pub use carry_team::{COMPLIANCE_N_S_M, CarryTeam, ObjectPath};
 pub use commander::{Commander, HandMove, smooth};
-pub use compliant::{grasp_compliantly, grasp_reached, let_go};
-pub use cylinder::{CylinderGrasp, closed_rad, pick_up_all, wrapped_rad};
-pub use grasp::{HandGrasp, move_together, take_together};
-pub use hand_over::{hand_over, pick_up, release, stand_on};
-pub use hold::Hold;
+pub use grasps::{
+    CylinderGrasp, HandGrasp, Hold, closed_rad, grasp_compliantly, grasp_reached, hand_over, let_go,
+    move_together, pick_up, pick_up_all, release, stand_on, take_together, wrapped_rad,
+};
 pub use parallel::{ParallelScript, in_parallel};
 pub use posture_path::{FREE, Posture, PosturePath, follow};
 pub use variety::Variety;

@@ -3,21 +3,21 @@
 
 use tandem_sim::Pose;
 
-/// Pieces in which a part between two stops is measured.
+/// Pieces in which a stretch between two stops is measured.
 const PIECES: usize = 16;
 
 /// Straight from stop to stop, turning evenly meanwhile.
 pub struct WalkedWay {
-    parts: Vec<Part>,
+    stretches: Vec<Stretch>,
 }
 
-struct Part {
+struct Stretch {
     from: Pose,
     to: Pose,
     length_m: f32,
 }
 
-impl Part {
+impl Stretch {
     fn at(&self, share: f32) -> Pose {
         self.from.lerp(&self.to, share)
     }
@@ -26,32 +26,57 @@ impl Part {
 impl WalkedWay {
     /// Through `stops` of the object, world frame, by robots that stand at `object_from_stand`, in the object's frame.
     pub fn new(stops: &[Pose], object_from_stand: &[Pose]) -> WalkedWay {
-        let part = |ends: &[Pose]| {
-            let mut part = Part { from: ends[0], to: ends[1], length_m: 0.0 };
+        let stretch = |ends: &[Pose]| {
+            let mut stretch = Stretch { from: ends[0], to: ends[1], length_m: 0.0 };
             let walked_m = |stand: &Pose| -> f32 {
-                let place_m = |piece: usize| (part.at(piece as f32 / PIECES as f32) * *stand).translation;
+                let place_m = |piece: usize| (stretch.at(piece as f32 / PIECES as f32) * *stand).translation;
                 (0..PIECES).map(|piece| (place_m(piece + 1) - place_m(piece)).length()).sum()
             };
-            part.length_m = object_from_stand.iter().map(walked_m).fold(0.0, f32::max);
-            part
+            stretch.length_m = object_from_stand.iter().map(walked_m).fold(0.0, f32::max);
+            stretch
         };
-        WalkedWay { parts: stops.windows(2).map(part).collect() }
+        WalkedWay { stretches: stops.windows(2).map(stretch).collect() }
     }
 
     /// How far the robot walks that has farthest to go.
     pub fn length_m(&self) -> f32 {
-        self.parts.iter().map(|part| part.length_m).sum()
+        self.stretches.iter().map(|stretch| stretch.length_m).sum()
     }
 
     /// Where the object is once so much has been gone.
     pub fn at(&self, gone_m: f32) -> Pose {
         let mut left_m = gone_m;
-        for part in &self.parts {
-            if left_m < part.length_m {
-                return part.at(left_m / part.length_m);
+        for stretch in &self.stretches {
+            if left_m < stretch.length_m {
+                return stretch.at(left_m / stretch.length_m);
             }
-            left_m -= part.length_m;
+            left_m -= stretch.length_m;
         }
-        self.parts.last().expect("a way has two stops").to
+        self.stretches.last().expect("a way has two stops").to
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f32::consts::FRAC_PI_2;
+
+    use tandem_sim::{Vector, heading_rad};
+
+    use super::*;
+    use crate::players::experts::skills::place;
+
+    /// Robots 1 m ahead of the object's middle and 0.5 m behind it, which turns by a quarter, and then goes 2 m ahead.
+    #[test]
+    fn a_way_is_as_long_as_that_of_the_robot_with_farthest_to_go() {
+        let ahead_m = |x_m: f32| place(Vector::X * x_m, 0.0);
+        let turned = place(Vector::ZERO, FRAC_PI_2);
+        let gone = place(Vector::Y * 2.0, FRAC_PI_2);
+        let way = WalkedWay::new(&[ahead_m(0.0), turned, gone], &[ahead_m(1.0), ahead_m(-0.5)]);
+
+        assert!((way.length_m() - (FRAC_PI_2 + 2.0)).abs() < 0.002, "{}", way.length_m());
+        let half_turned = way.at((way.length_m() - 2.0) / 2.0);
+        assert!((heading_rad(&half_turned) - FRAC_PI_2 / 2.0).abs() < 1e-3);
+        assert!((way.at(way.length_m() - 0.5).translation - Vector::Y * 1.5).length() < 1e-3);
+        assert!((way.at(way.length_m() + 1.0).translation - gone.translation).length() < 1e-3);
     }
 }

@@ -2,9 +2,9 @@
 
 use tandem_sim::Vector;
 
-use super::commander::{Commander, HandMove};
 use super::grasp::HandGrasp;
 use crate::players::PlayerError;
+use crate::players::experts::skills::commander::{Commander, HandMove};
 use crate::scoring::{Facts, Grip};
 
 const ATTEMPTS: usize = 4;

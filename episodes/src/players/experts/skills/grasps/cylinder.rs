@@ -2,8 +2,8 @@
 
 use tandem_sim::{Pose, Rotation, Side, Vector};
 
-use super::commander::{Commander, HandMove};
 use crate::players::PlayerError;
+use crate::players::experts::skills::commander::{Commander, HandMove};
 
 /// Where the axis of a held cylinder lies in a right wrist's frame: in front of the palm, between fingers and thumb.
 const AXIS_IN_WRIST_M: Vector = Vector::new(0.1195, 0.055, 0.0);

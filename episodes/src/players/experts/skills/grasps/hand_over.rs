@@ -2,9 +2,9 @@
 
 use tandem_sim::Vector;
 
-use super::commander::Commander;
 use super::cylinder::{CylinderGrasp, pick_up_all};
 use crate::players::PlayerError;
+use crate::players::experts::skills::commander::Commander;
 
 /// How far above its place the object is let down from.
 const ABOVE_PLACE_M: Vector = Vector::new(0.0, 0.0, 0.05);

@@ -2,10 +2,10 @@
 
 use tandem_sim::{Pose, Rotation, Side, Vector};
 
-use super::commander::{Commander, HandMove};
 use super::cylinder::{back_off, mirrored, mirrored_m};
 use super::hold::Hold;
 use crate::players::PlayerError;
+use crate::players::experts::skills::commander::{Commander, HandMove};
 use crate::scoring::Facts;
 
 /// A hand that is to hold a place of an object.
