@@ -4,7 +4,7 @@
 import { element, words } from "../src/dom.js";
 import { call } from "./call.js";
 import { drive } from "./drive.js";
-import { linkRow } from "./links.js";
+import { linkRow, nearby } from "./links.js";
 
 const POLL_MS = 700;
 const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
@@ -77,7 +77,7 @@ export async function overview(main, seat) {
   }
   const at = element("p", { role: "status" });
   for (let now = progress; ; now = await ask(main, seat)) {
-    show(main, now, at, element("h2", {}, "Links"), element("p", {}, "Send each person one of these, and nobody else: who has the link drives the robot, in all episodes."), links);
+    show(main, now, at, element("h2", {}, "Links"), element("p", {}, "Send each person one of these, and nobody else: who has the link drives the robot, in all episodes."), nearby(), links);
     at.textContent = { preparing: "The next episode is made ready.", playing: "It is played, once everybody has begun.", marking: `Waiting for ${missing(now)} to mark it.`, over: "All episodes are there." }[now.stage];
     if (now.stage === "over") return;
     await sleep(POLL_MS);

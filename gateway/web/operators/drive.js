@@ -9,7 +9,7 @@ import { Hands } from "./hands.js";
 import { Headset } from "./headset/headset.js";
 import { CLOSED, OPEN, closedBy, listen, wanted, withHeadset } from "./inputs.js";
 import { layOut, nothing } from "./panel.js";
-import { Wheel } from "./wheel.js";
+import { Wheel, tokensOf } from "./wheel.js";
 
 const SAY_MS = 20;
 const HEIGHT_RANGE_M = [0.5, 0.78];
@@ -17,6 +17,10 @@ const HEIGHT_RANGE_M = [0.5, 0.78];
 const SLOW_FRAME_MS = 40;
 /** Control steps of a press of the step button. */
 const STEPS = 10;
+/** A command that is under way takes no longer. */
+const FINISH_AGAIN_MS = 300;
+/** How much of the height the robot's picture takes: below it are the robot's own hands, where they hang. */
+const PICTURE_SHARE = 0.7;
 
 /** Shows the page of `seat` and drives until the episode has ended. Returns what gives back what it draws with, if it has drawn. */
 export async function drive(main, seat) {
@@ -34,7 +38,7 @@ export async function drive(main, seat) {
 class DrivePage {
   constructor(main, seat, root, briefing) {
     Object.assign(this, { seat, root, hand: "right", fingers: {}, shares: {}, heightM: null, paused: null, stepwise: false, steps: 0, gone: new Set(), over: new AbortController() });
-    this.panel = layOut(main, seat.robot, briefing, {
+    this.panel = layOut(main, seat, briefing, {
       act: (action) => this.act(action),
       speak: (text) => call(`${root}/tools/say`, seat.token, { text }),
       finish: () => this.finish(),
@@ -87,8 +91,11 @@ class DrivePage {
     this.hands = new Hands(robot);
     this.partners = scene.head.robots.map(({ name }, index) => ({ name, index })).filter(({ index }) => index !== robot);
     this.stage = new Stage(this.panel.view, scene);
+    this.stage.pictureShare = PICTURE_SHARE;
+    // What partners see is not what this person looks for.
+    this.stage.extras.frustums = false;
     this.stage.look(this.seat.robot);
-    this.panel.border(true, scene.head.robots[robot].camera);
+    this.panel.border(true, scene.head.robots[robot].camera, PICTURE_SHARE);
     this.headset = new Headset(this.stage, this.hands);
     Headset.supported().then((supported) => this.panel.headset(supported));
     const scheme = matchMedia("(prefers-color-scheme: dark)");
@@ -160,7 +167,7 @@ class DrivePage {
     if (this.stage && !this.headset.session) {
       this.show();
       if (this.stage.draw() && this.pace.isSlow(now - last)) this.stage.simplify();
-      for (const side of SIDES) this.panel.handle(side, this.stage.project(this.hands.inWorld(side)));
+      for (const side of SIDES) this.panel.handle(side, this.stage.project(this.hands.handle(side)));
       for (const { name, index } of this.partners) {
         SIDES.forEach((side, place) => {
           const target = new Vector3().fromArray(this.frame.row, this.frame.hand(index, place).target);
@@ -180,7 +187,7 @@ class DrivePage {
     if (message.kind === "refused") this.panel.status(message.detail);
     if (message.kind === "replaced") this.panel.status("Another page drives this robot now.");
     if (message.kind === "ended") {
-      this.panel.status(`The episode has ended: ${String(message.result.ended).replaceAll("_", " ")}.`);
+      this.panel.ended(message.result);
       this.done();
     }
     if (message.kind !== "refused" && message.kind !== "ended" && message.kind !== "replaced") this.standing();
@@ -201,8 +208,9 @@ class DrivePage {
     this.panel.facts(report, report.robots.find(({ robot }) => robot === this.seat.robot));
   }
 
-  /** Says how things stand. */
+  /** Says how things stand, until the episode is over. */
   standing() {
+    if (this.wheel.over) return undefined;
     if (this.finishing) return this.panel.status("You have finished; the episode ends when everybody has.");
     if (this.paused) return this.panel.status(this.paused);
     if (this.waits) return this.panel.status(this.waits);
@@ -225,21 +233,28 @@ class DrivePage {
     if (this.frame) this.standing();
   }
 
-  /** Leaves the task; a command that is under way is answered first. */
+  /** Leaves the task, with the robots that stand still beside this one, which nobody else would have finish. */
   async finish() {
     this.finishing = true;
     this.say(0);
-    for (;;) {
+    try {
+      await Promise.all(tokensOf(this.seat).map((token) => this.finishAs(token)));
+      this.standing();
+    } catch (error) {
+      this.finishing = false;
+      this.panel.status(error.message);
+    }
+  }
+
+  /** Finishes as the operator with a token; a command that is under way is answered first. */
+  async finishAs(token) {
+    while (!this.wheel.over) {
       try {
-        await call(`${this.root}/tools/finish`, this.seat.token, {});
-        return this.standing();
+        await call(`${this.root}/tools/finish`, token, {});
+        return;
       } catch (error) {
-        this.panel.status(error.message);
-        if (error.status !== 409) {
-          this.finishing = false;
-          return undefined;
-        }
-        await new Promise((done) => setTimeout(done, 300));
+        if (error.status !== 409) throw error;
+        await new Promise((done) => setTimeout(done, FINISH_AGAIN_MS));
       }
     }
   }
@@ -252,8 +267,8 @@ class DrivePage {
     const handle = this.panel.handles[side];
     const drag = (right, down, away) => {
       if (!this.hands) return;
-      this.hands.shift(side, this.hands.inPelvis(this.stage.way(this.hands.inWorld(side), right, down, away)));
-      this.panel.handle(side, this.stage.project(this.hands.inWorld(side)));
+      this.hands.shift(side, this.hands.inPelvis(this.stage.way(this.hands.handle(side), right, down, away)));
+      this.panel.handle(side, this.stage.project(this.hands.handle(side)));
     };
     handle.addEventListener("pointerdown", (event) => { handle.setPointerCapture(event.pointerId); this.act(side); });
     const turn = (right, down, round) => {

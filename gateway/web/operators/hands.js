@@ -7,6 +7,8 @@ import { POSE, SIDES } from "../src/message.js";
 /** A target is never further from its wrist: what is dragged against a table does not wind up. */
 const LEASH_M = 0.2;
 const LEASH_RAD = 1;
+/** From a wrist to the middle of its palm, where a person takes hold of the hand. */
+const PALM_IN_WRIST_M = [0.1, 0, 0];
 
 export class Hands {
   /** @param {number} robot Its number in the scene. */
@@ -70,9 +72,11 @@ export class Hands {
     return way.clone().applyQuaternion(this.pelvis.turn.clone().invert());
   }
 
-  /** Where a handle is, in the world. */
-  inWorld(side) {
-    return (this.targets[side] ?? this.measured[side].position).clone().applyQuaternion(this.pelvis.turn).add(this.pelvis.position);
+  /** Where a handle is, in the world: in the palm of a hand that is where it is to be. */
+  handle(side) {
+    const { position, turn } = this.pose(side);
+    const palm = new Vector3().fromArray(PALM_IN_WRIST_M).applyQuaternion(turn).add(position);
+    return palm.applyQuaternion(this.pelvis.turn).add(this.pelvis.position);
   }
 
   /** The part of a `move_wrists` entry that is about wrists. */

@@ -1,11 +1,27 @@
 // A link for a person at this screen, and as a QR code for one with a telephone or a headset.
 
-import { element } from "../src/dom.js";
+import { element, say } from "../src/dom.js";
 
 /** A row of a list: the link, its QR code below, and further text. `token` is that of whoever shows it. */
 export async function linkRow(name, href, token, text = "") {
   const link = element("a", { href, target: "_blank", rel: "noopener" }, name);
-  return element("li", {}, link, text && ` ${text}`, await code(href, token));
+  return element("li", {}, link, " ", copying(href), text && element("div", { class: "soft" }, text), await code(href, token));
+}
+
+/** What puts a link where it can be pasted from; browsers let pages do so that came over HTTPS or from their own machine. */
+function copying(href) {
+  if (!navigator.clipboard) return "";
+  const copy = element("button", { type: "button", class: "small", onclick: () => {
+    navigator.clipboard.writeText(href).then(() => say(copy, "Copied"), () => say(copy, "Not copied: use the link's menu"));
+  } }, "Copy link");
+  return copy;
+}
+
+/** Whom the links of this page are for, where they name this machine by an address that each machine calls itself by. */
+export function nearby() {
+  const isOwn = /^(localhost|127\.|\[::1\])/.test(location.hostname);
+  return element("p", { class: "soft", hidden: !isOwn }, "They open in browsers of this machine alone. For people at others, start the server with ",
+    element("code", {}, "--listen 0.0.0.0:8700"), " and open this page by the machine's name or address.");
 }
 
 /** The QR code of a text, which is sent as a body: addresses are written to logs. */

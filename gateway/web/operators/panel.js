@@ -21,35 +21,41 @@ export function nothing(main, why) {
 }
 
 /** Lays the page out; answers with what changes it. `on` hears what the person does beside driving. */
-export function layOut(main, robot, briefing, on) {
+export function layOut(main, { robot, episode, collection }, briefing, on) {
   const part = briefing.instructions.find((entry) => entry.robot === robot)?.instruction ?? "";
-  const status = element("p", { role: "status", class: "operate-status" }, "Looking.");
+  const status = element("p", { role: "status", class: "operate-status" }, "Connecting.");
   const handles = Object.fromEntries(SIDES.map((side) => [side, element("button", { type: "button", class: `handle ${side}`, "aria-label": `${side} wrist: drag` }, side[0].toUpperCase())]));
   const border = element("div", { class: "operate-border", title: `what robot ${robot} sees` });
   const view = element("div", { class: "view" });
   const place = element("div", { class: "operate-view" }, view, border, ...Object.values(handles));
   const facts = element("p", { class: "soft" });
-  const button = (text, action, key) => element("button", { type: "button", onclick: () => on.act(action) }, key ? `${text} (${key})` : text);
+  const phases = new Phases(briefing.phases ?? []);
+  const button = (text, action, key, title) => element("button", { type: "button", title, onclick: () => on.act(action) }, key ? `${text} (${key})` : text);
   const pause = button("Pause", "pause");
   const step = button("Step", "step", "Enter");
-  const which = element("span", {});
+  const which = { left: button("Left hand", "left", "1", "Keys and buttons are for the left hand"), right: button("Right hand", "right", "2", "Keys and buttons are for the right hand") };
   const chat = talk(robot, on.speak);
   const looks = element("select", { "aria-label": "View", onchange: (event) => { on.look(event.target.value); event.target.blur(); } },
     element("option", { value: "robot" }, `as robot ${robot} looks`), element("option", { value: "free" }, "from anywhere"));
   const wear = element("button", { type: "button", hidden: true, onclick: () => on.wear() }, "Enter VR");
   const stepwise = element("input", { type: "checkbox", onchange: (event) => on.stepwise(event.target.checked) });
+  const after = element("div");
+  const controls = element("div", {},
+    element("div", { class: "tools" }, looks, element("label", {}, stepwise, " step by step"), step, wear),
+    element("div", { class: "tools", role: "group", "aria-label": "The hand that keys and buttons are for" }, which.left, which.right),
+    element("div", { class: "tools" },
+      button("Open", "open", "O", "Opens the fingers of this hand"), button("Close", "close", "C", "Closes the fingers of this hand"),
+      button("Level", "level", "H", "Turns this hand so that its fingers point ahead and its palm inwards"),
+      button("Rest here", "clutch", "space", "Both arms stay as they are: where the hands were to go is forgotten")),
+    element("div", { class: "tools" }, pause,
+      element("button", { type: "button", title: "Your part is done: the episode ends when everybody has finished", onclick: () => on.finish() }, "Finish")),
+    element("ul", { class: "ways soft" }, ...WAYS.map(([what, how]) => element("li", {}, element("strong", {}, `${what}: `), how))));
   main.replaceChildren(
-    element("h1", {}, `You drive robot ${robot}`), element("p", {}, part), status,
+    element("h1", {}, `You drive robot ${robot}`), element("p", {}, part), status, after,
     element("div", { class: "columns operate", onmousedown: keepKeys },
       element("div", {}, place, facts),
-      element("div", {},
-        element("div", { class: "tools" }, looks, element("label", {}, stepwise, " step by step"), step, wear),
-        element("div", { class: "tools" }, button("Left hand", "left", "1"), button("Right hand", "right", "2")),
-        element("div", { class: "tools" }, button("Open", "open", "O"), button("Close", "close", "C"), button("Level", "level", "H"), button("Let go of targets", "clutch", "space")),
-        element("div", { class: "tools" }, pause, element("button", { type: "button", onclick: () => on.finish() }, "Finish")),
-        element("p", {}, which),
-        element("ul", { class: "ways soft" }, ...WAYS.map(([what, how]) => element("li", {}, element("strong", {}, `${what}: `), how))),
-        element("h2", {}, "Talk"), ...chat.elements)));
+      element("div", { class: "side" }, controls, element("h2", {}, "Talk"), ...chat.elements),
+      phases.node));
   const cursors = new Map();
   const size = { width: 0, height: 0 };
   new ResizeObserver(() => Object.assign(size, { width: place.clientWidth, height: place.clientHeight })).observe(place);
@@ -60,9 +66,11 @@ export function layOut(main, robot, briefing, on) {
     /** How the episode stands, and what the hands do, as the page says it. */
     said: () => [status.textContent, facts.textContent],
     /** Shows where the robot's picture ends, if the view is the robot's. */
-    border: (shown, camera) => {
+    border: (shown, camera, share) => {
       border.hidden = !shown;
-      if (camera) place.style.setProperty("--seen", String(camera.width / camera.height));
+      if (!camera) return;
+      place.style.setProperty("--seen", String(camera.width / camera.height));
+      place.style.setProperty("--share", String(share));
     },
     headset: (supported) => { wear.hidden = !supported; },
     handle: (side, at) => put(handles[side], at, true, size),
@@ -75,14 +83,59 @@ export function layOut(main, robot, briefing, on) {
       }
       put(cursors.get(key), at, false, size);
     },
-    facts: (reply, own) => say(facts, factsOf(reply, own)),
+    facts: (reply, own) => {
+      say(facts, factsOf(reply, own));
+      phases.show(new Map((reply.phases ?? []).map(({ number, time_s: timeS }) => [number, timeS])));
+    },
+    /** The episode is over: what has come of it, and where it is found. */
+    ended: (result) => {
+      const reached = Object.entries(result.phases ?? {}).filter(([, timeS]) => timeS !== null);
+      phases.show(new Map(reached), true);
+      const isComplete = result.ended === "task_complete";
+      status.classList.toggle("good", isComplete);
+      say(status, isComplete ? "Done: the task is complete." : `The episode has ended: ${words(result.ended)}.`);
+      controls.hidden = true;
+      for (const handle of Object.values(handles)) handle.hidden = true;
+      for (const cursor of cursors.values()) cursor.hidden = true;
+      chat.close();
+      if (!collection) after.replaceChildren(...whereFound(episode));
+    },
     label: ({ hand, paused, stepwise: steps }) => {
-      say(which, `Keys move the ${hand} hand.`);
       say(pause, paused ? "Go on" : "Pause");
       step.hidden = !steps;
-      for (const side of SIDES) handles[side].setAttribute("aria-pressed", String(side === hand));
+      for (const side of SIDES) for (const chooses of [handles[side], which[side]]) chooses.setAttribute("aria-pressed", String(side === hand));
     },
   };
+}
+
+/** What is asked, phase by phase, where the server tells it. */
+class Phases {
+  constructor(phases) {
+    this.times = new Map(phases.map(({ number }) => [number, element("span", { class: "soft" }, "not yet")]));
+    this.rows = new Map(phases.map(({ number, id, description }) => [number, element("li", {},
+      element("span", { title: description }, `${number} ${words(id)}`, element("span", { class: "what soft" }, description)), this.times.get(number))]));
+    this.node = element("section", { hidden: phases.length === 0 }, element("h2", {}, "Phases"), element("ol", { class: "phases" }, ...this.rows.values()));
+  }
+
+  /** Those of `reached` have been, at these times; the others not yet, or, once it is `over`, never. */
+  show(reached, over = false) {
+    for (const [number, row] of this.rows) {
+      const timeS = reached.get(number);
+      row.classList.toggle("done", timeS !== undefined);
+      const time = this.times.get(number);
+      time.className = timeS === undefined ? "soft" : "good";
+      say(time, timeS === undefined ? (over ? "not reached" : "not yet") : `${timeS.toFixed(1)} s`);
+    }
+  }
+}
+
+/** Where an episode that is over is found again. */
+function whereFound(episode) {
+  return [
+    element("p", {}, "Its recording is ", element("code", {}, episode), " in the server's folder of runs. ",
+      element("a", { href: `/watch?run=${encodeURIComponent(episode)}` }, "Look at it again"), ", if you have the link to watch, which the server printed when it started."),
+    element("p", {}, element("a", { href: "/operate" }, "Start another episode")),
+  ];
 }
 
 /** What is clicked takes no focus, and a text that had it loses it, so that keys drive; who comes by the keyboard gives it. */
@@ -117,7 +170,8 @@ function talk(robot, speak) {
     text.blur();
     speak(said).then((reply) => { heard(robot, said); (reply.heard ?? []).forEach((word) => heard(word.from, word.text)); }, (error) => heard("not said", error.message));
   };
-  return { heard, elements: [chat, element("form", { onsubmit: submit, class: "tools" }, text, element("button", {}, "Say"))] };
+  const form = element("form", { onsubmit: submit, class: "tools" }, text, element("button", {}, "Say"));
+  return { heard, elements: [chat, form], close: () => { form.hidden = true; } };
 }
 
 /** What the hands do, and what is left. */
@@ -126,6 +180,6 @@ function factsOf(reply, own) {
     const { state: does, grip } = own[side];
     return [`${side} hand`, does && words(does), grip && grip !== "none" ? `grips: ${words(grip)}` : null].filter(Boolean).join(" ");
   }) : [];
-  const phases = (reply.phases ?? []).map(({ id }) => words(id));
-  return [...hands, `${(reply.budget.steps_left / 50).toFixed(0)} s left`, phases.length > 0 ? `reached: ${phases.join(", ")}` : null].filter(Boolean).join(" · ");
+  const reached = (reply.phases ?? []).map(({ id }) => words(id));
+  return [...hands, `${(reply.budget.steps_left / 50).toFixed(0)} s left`, reached.length > 0 ? `reached: ${reached.join(", ")}` : null].filter(Boolean).join(" · ");
 }

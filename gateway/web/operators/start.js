@@ -1,8 +1,8 @@
 // The start of an episode whose robots people drive: what is played, and a link for each person.
 
-import { element, words } from "../src/dom.js";
+import { element, say, words } from "../src/dom.js";
 import { call } from "./call.js";
-import { linkRow } from "./links.js";
+import { linkRow, nearby } from "./links.js";
 
 const CONTROL_HZ = 50;
 
@@ -60,6 +60,7 @@ export function start(main, from = null) {
   task.addEventListener("change", offer);
   token.addEventListener("change", load);
 
+  const press = element("button", { class: "large primary" }, "Start");
   const begin = async (event) => {
     event.preventDefault();
     refusal.textContent = "";
@@ -68,6 +69,9 @@ export function start(main, from = null) {
       refusal.textContent = "Somebody has to drive a robot: choose a person for one of them.";
       return;
     }
+    // A second press would begin a second episode.
+    press.disabled = true;
+    say(press, "Starting");
     const body = { task: task.value, seed: Number(seed.value), protocol: protocol.value, short: true, operators: "per_robot", patience_s: PATIENCE_S, talk: true };
     try {
       const started = from
@@ -78,6 +82,8 @@ export function start(main, from = null) {
     } catch (error) {
       refusal.textContent = error.message;
     }
+    press.disabled = false;
+    say(press, "Start");
   };
   const place = from
     ? element("p", {}, `Goes on where ${from.run} stood at ${Number(from.at).toFixed(1)} s: ${words(from.task)}, seed ${from.seed}. It becomes an episode of its own, with a whole budget ahead.`)
@@ -88,7 +94,7 @@ export function start(main, from = null) {
     element("p", {}, "Each person drives one robot, on a page of their own. Time passes while everybody's page is open and in view, and stands still while one is away. If you are alone, let the expert drive the others."),
     element("form", { onsubmit: begin, class: "operate-form" }, place ?? labelled("Task", task, what),
       from ? "" : labelled("Seed", seed, element("span", { class: "soft" }, "Says where things stand at the start: the same number, the same start.")),
-      labelled("Rules", protocol, element("span", { class: "soft" }, "The budget: seconds that pass in the world, and the minutes that you may take for them.")), players, locked, element("button", { class: "large" }, "Start"), refusal),
+      labelled("Rules", protocol, element("span", { class: "soft" }, "The budget: seconds that pass in the world, and the minutes that you may take for them.")), players, locked, press, refusal),
     links);
   load();
 }
@@ -116,6 +122,7 @@ async function linksOf({ episode_id: episode, operators, instructions }, chosen,
   });
   return [element("h2", {}, "Links"),
     element("p", {}, "Open your own here, and send each other person one of these, and nobody else: who has the link drives the robot. They are shown this once."),
+    nearby(),
     element("ul", { class: "links" }, ...await Promise.all(rows)),
     ...by("program").flatMap(({ robot, token }) => [
       element("h2", {}, `Robot ${robot}'s program`),

@@ -84,9 +84,16 @@ async function hasEnded({ episode, token }) {
   }
 }
 
-/** Has the browser keep a cookie for each robot that this page drives or lets stand still: a socket is asked for without headers. */
-async function enter({ robot, token, still }) {
-  const others = still ? still.split(",").map((pair) => pair.split(".")) : [];
-  await Promise.all([[robot, token], ...others].map(([, one]) => call("/operate/enter", one, {}, { credentials: "same-origin" })));
-  return [robot, ...others.map(([name]) => name)].join(",");
+/** The robots that a page drives or lets stand still, its own first, with their tokens. */
+function robotsOf({ robot, token, still }) {
+  return [[robot, token], ...(still ? still.split(",").map((pair) => pair.split(".")) : [])];
+}
+
+/** The tokens of these robots. */
+export const tokensOf = (seat) => robotsOf(seat).map(([, token]) => token);
+
+/** Has the browser keep a cookie for each of these robots: a socket is asked for without headers. */
+async function enter(seat) {
+  await Promise.all(tokensOf(seat).map((token) => call("/operate/enter", token, {}, { credentials: "same-origin" })));
+  return robotsOf(seat).map(([robot]) => robot).join(",");
 }

@@ -47,7 +47,7 @@ function heldCard(entry) {
   const stands = entry.ended ? words(entry.ended) : "runs";
   return element("a", { class: "card", href: `/watch?episode=${encodeURIComponent(entry.episode_id)}` },
     element("div", { class: "line" }, element("strong", {}, words(entry.task)), badge(stands, entry.ended ? "" : "live")),
-    element("div", { class: "soft" }, `seed ${entry.seed}, ${entry.protocol}, ${entry.operators === "per_robot" ? "an operator a robot" : "one policy"}`),
+    element("div", { class: "soft" }, `seed ${entry.seed}, ${entry.protocol}, ${entry.operators === "per_robot" ? "an operator for each robot" : "one policy for all robots"}`),
     element("div", {}, `${(entry.step / 50).toFixed(1)} s, step ${entry.step}`),
     element("div", { class: "soft id" }, entry.episode_id));
 }

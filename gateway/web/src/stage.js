@@ -48,6 +48,8 @@ export class Stage {
     this.controls.addEventListener("change", () => { this.stale = true; });
     this.view = "free";
     this.extras = { frustums: true, forces: true, targets: true };
+    /** How much of the height a robot's picture takes at most, at the top where it is less than all: what is below is shown, too. */
+    this.pictureShare = 1;
     this.robots = head.robots.map((robot, index) => this.extrasOf(robot, index));
     this.stale = true;
     this.drawnAt = 0;
@@ -215,14 +217,15 @@ export class Stage {
     const { clientWidth: width, clientHeight: height } = this.place;
     const robot = this.head.robots.find(({ name }) => name === this.view);
     const camera = robot ? this.head_camera : this.free;
+    let wholePixels = height;
     if (robot) {
-      // The whole of its picture is seen, and beside it what the place has room for.
-      const tall = robot.camera.width / robot.camera.height / (width / height);
-      const half = Math.tan(robot.camera.vertical_fov_rad / 2) * Math.max(1, tall);
-      camera.fov = (2 * Math.atan(half) * 180) / Math.PI;
+      // The whole of its picture is seen, and beside or below it what the place has room for.
+      const picturePixels = Math.min(this.pictureShare * height, (width * robot.camera.height) / robot.camera.width);
+      // A camera looks along the middle of what it draws, whose upper end is not shown where the picture is at the top.
+      if (this.pictureShare < 1) wholePixels = 2 * height - picturePixels;
+      camera.fov = (2 * Math.atan((Math.tan(robot.camera.vertical_fov_rad / 2) * wholePixels) / picturePixels) * 180) / Math.PI;
     }
-    camera.aspect = width / height;
-    camera.updateProjectionMatrix();
+    camera.setViewOffset(width, wholePixels, 0, wholePixels - height, width, height);
     return camera;
   }
 
@@ -267,7 +270,7 @@ export class Stage {
     const camera = this.camera();
     camera.updateMatrixWorld();
     const depth = Math.max(0.1, -point.clone().applyMatrix4(camera.matrixWorldInverse).z);
-    const metres = (2 * depth * Math.tan((camera.fov * Math.PI) / 360)) / this.place.clientHeight;
+    const metres = (2 * depth * Math.tan((camera.fov * Math.PI) / 360)) / camera.view.fullHeight;
     return new Vector3(right * metres, -down * metres, -away).applyQuaternion(camera.quaternion);
   }
 

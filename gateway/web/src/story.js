@@ -167,9 +167,13 @@ const parsed = (json) => {
   }
 };
 
-/** As JSON, with rows of numbers on one line and without what is null. */
+/** As JSON for somebody to read: rows of numbers on one line, numbers to six digits, and nothing that is null. */
 const text = (value) => (typeof value === "string" ? value
-  : JSON.stringify(value, (_, inner) => (inner === null ? undefined : inner), 2).replace(/\[[-\d.,\se]+\]/g, (row) => row.replace(/\s+/g, " ")));
+  : JSON.stringify(value, (_, inner) => readable(inner), 2).replace(/\[[-\d.,\se]+\]/g, (row) => row.replace(/\s+/g, " ")));
+const readable = (value) => {
+  if (value === null) return undefined;
+  return typeof value === "number" && !Number.isInteger(value) ? Number(value.toPrecision(6)) : value;
+};
 
 /** What a note says that was used. */
 export function used({ input_tokens: input, output_tokens: output, cached_tokens: cached, usd, seconds }) {
